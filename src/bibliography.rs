@@ -1,0 +1,49 @@
+//! The sources of the formulas, one documented item each, so that rustdoc checks every citation.
+
+macro_rules! sources {
+    ($($(#[$doc:meta])* $name:ident;)*) => { $($(#[$doc])* #[derive(Debug)] pub enum $name {})* };
+}
+
+sources! {
+    /// C. Minaretzis, D. A. Cucci, N. El-Sheimy, M. G. Sideris, S. Guerrier, M.-P. Victoria-Feser:
+    /// *Robust Multi-signal Estimation Framework with Applications to Inertial Sensor Stochastic
+    /// Calibration*, 2024 (AWV, SR-AWV, DR-AWV; the navigation study).
+    Minaretzis24;
+    /// G. Bakalli et al.: *Multi-signal approaches for repeated sampling schemes in inertial sensor
+    /// calibration*, IEEE Trans. Signal Processing 71, 2023 (AWV).
+    Bakalli23;
+    /// S. Guerrier, J. Skaloud, Y. Stebler, M.-P. Victoria-Feser: *Wavelet-variance-based estimation for
+    /// composite stochastic processes*, JASA 108, 2013 (GMWM).
+    Guerrier13;
+    /// S. Guerrier, R. Molinari, M.-P. Victoria-Feser, H. Xu: *Robust two-step wavelet-based inference for
+    /// time series models*, JASA, 2021 (RGMWM).
+    Guerrier21;
+    /// S. Guerrier, R. Molinari, Y. Stebler: *Theoretical limitations of Allan variance-based regression
+    /// for time series model estimation*, IEEE Signal Processing Letters 23, 2016 (AVLR).
+    Guerrier16;
+    /// D. Mondal, D. B. Percival: *M-estimation of wavelet variance*, Ann. Inst. Stat. Math. 64, 2012.
+    MondalPercival12;
+    /// D. B. Percival: *On estimation of the wavelet variance*, Biometrika 82, 1995.
+    Percival95;
+    /// D. A. Cucci, L. Voirol, M. Khaghani, S. Guerrier: *On performance evaluation of inertial navigation
+    /// systems: the case of stochastic calibration*, IEEE Trans. Instrum. Meas., 2023.
+    Cucci23;
+    /// P. D. Groves: *Principles of GNSS, Inertial, and Multisensor Integrated Navigation Systems*,
+    /// 2nd ed., Artech House, 2013.
+    Groves13;
+    /// P. G. Savage: *Strapdown inertial navigation integration algorithm design*, J. Guidance, Control
+    /// and Dynamics 21, 1998 (parts 1 and 2).
+    Savage98;
+    /// NIMA TR8350.2: *Department of Defense World Geodetic System 1984*, 3rd ed., 2000.
+    Wgs84;
+    /// C. F. van Loan: *Computing integrals involving the matrix exponential*, IEEE TAC 23, 1978.
+    VanLoan78;
+    /// C. L. Lawson, R. J. Hanson: *Solving Least Squares Problems*, 1974 (NNLS).
+    LawsonHanson74;
+    /// Y. Bar-Shalom, X. R. Li, T. Kirubarajan: *Estimation with Applications to Tracking and
+    /// Navigation*, Wiley, 2001 (NEES, NIS).
+    BarShalom01;
+    /// IEEE Std 952-1997 (and 647): *Specification Format Guide and Test Procedure for Single-Axis
+    /// Interferometric Fiber Optic Gyros* (Allan variance of the noise terms).
+    Ieee952;
+}

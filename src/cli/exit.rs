@@ -1,0 +1,44 @@
+//! What went wrong, as the user reads it, and the exit code it means.
+
+use std::process::ExitCode;
+
+/// A failure: exit code, message and hint. 1 could not (I/O, numerics); 2 usage or configuration;
+/// 3 a stated bound was not met; 75 stopped early, resume; 130 interrupted.
+#[derive(Debug)]
+pub(crate) struct Failure {
+    code: u8,
+    message: String,
+    hint: Option<String>,
+}
+
+impl Failure {
+    /// Wrong input: usage, configuration, data (exit code 2).
+    pub(crate) fn input(message: impl ToString) -> Self {
+        Self { code: 2, message: message.to_string(), hint: None }
+    }
+
+    /// Could not: I/O, numerics (exit code 1).
+    pub(crate) fn could_not(message: impl ToString) -> Self {
+        Self { code: 1, message: message.to_string(), hint: None }
+    }
+
+    /// A stated bound was not met (exit code 3).
+    pub(crate) fn bound(message: impl ToString) -> Self {
+        Self { code: 3, message: message.to_string(), hint: None }
+    }
+
+    /// With advice.
+    pub(crate) fn hint(mut self, hint: impl Into<String>) -> Self {
+        self.hint = Some(hint.into());
+        self
+    }
+
+    #[expect(clippy::print_stderr, reason = "the one place where errors are printed")]
+    pub(crate) fn report(self) -> ExitCode {
+        eprintln!("error: {}", self.message);
+        if let Some(hint) = self.hint {
+            eprintln!("\nhint: {hint}");
+        }
+        ExitCode::from(self.code)
+    }
+}

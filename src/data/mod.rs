@@ -1,0 +1,1 @@
+//! Files: recordings, models, trajectories. The only library module that reads files.

@@ -1,0 +1,1 @@
+//! The error-state extended Kalman filter (loosely coupled INS/GNSS).

@@ -1,0 +1,110 @@
+//! Frames, attitude angles and the navigation state.
+//!
+//! n = North-East-Down at the vehicle, b = front-right-down, e = Earth-centred Earth-fixed.
+//! `q_b_n` takes a vector written in b and returns it in n. Euler angles are ZYX: yaw about down, then
+//! pitch, then roll ([Groves](crate::bibliography::Groves13), sec. 2.2).
+
+use glam::{DQuat, DVec3, EulerRot};
+
+/// Position, velocity and attitude at an instant.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NavState {
+    /// Geodetic latitude (rad).
+    pub lat: f64,
+    /// Longitude (rad), in (−π, π].
+    pub lon: f64,
+    /// Height above the WGS-84 ellipsoid (m).
+    pub h: f64,
+    /// Velocity with respect to the Earth in n (m/s).
+    pub v_n: DVec3,
+    /// Attitude: takes b, returns n.
+    pub q_b_n: DQuat,
+}
+
+/// Roll, pitch and yaw.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RollPitchYaw {
+    /// Roll, in (−π, π] (rad).
+    pub roll: f64,
+    /// Pitch, in [−π/2, π/2] (rad).
+    pub pitch: f64,
+    /// Yaw (heading from north), in (−π, π] (rad).
+    pub yaw: f64,
+}
+
+impl RollPitchYaw {
+    /// The attitude quaternion q_b_n.
+    #[must_use]
+    pub fn to_quat(self) -> DQuat {
+        DQuat::from_euler(EulerRot::ZYX, self.yaw, self.pitch, self.roll)
+    }
+
+    /// The angles of an attitude q_b_n. At pitch = ±π/2 roll and yaw are not unique; one pair is given.
+    #[must_use]
+    pub fn from_quat(q_b_n: DQuat) -> Self {
+        let (yaw, pitch, roll) = q_b_n.to_euler(EulerRot::ZYX);
+        Self { roll, pitch, yaw }
+    }
+
+    /// The Jacobian ∂(roll, pitch, yaw)/∂psi_n, rows in that order, for C_est = (I + \[psi_n×\]) C_true.
+    /// Grows as 1/cos(pitch).
+    #[must_use]
+    pub fn jacobian_of_psi_n(&self) -> [DVec3; 3] {
+        let (sy, cy) = self.yaw.sin_cos();
+        let (tp, cp) = (self.pitch.tan(), self.pitch.cos());
+        [DVec3::new(cy / cp, sy / cp, 0.0), DVec3::new(-sy, cy, 0.0), DVec3::new(cy * tp, sy * tp, 1.0)]
+    }
+}
+
+/// The rotation from e to n at a latitude and longitude (rad): takes e, returns n.
+#[must_use]
+pub fn q_e_n(lat: f64, lon: f64) -> DQuat {
+    (DQuat::from_rotation_z(lon) * DQuat::from_rotation_y(-lat - std::f64::consts::FRAC_PI_2)).inverse()
+}
+
+/// Wraps an angle to (−π, π].
+#[must_use]
+pub fn wrap_angle(angle: f64) -> f64 {
+    let wrapped = angle.rem_euclid(std::f64::consts::TAU);
+    if wrapped > std::f64::consts::PI { wrapped - std::f64::consts::TAU } else { wrapped }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::DEG;
+
+    #[test]
+    fn euler_angles_rotate_in_the_order_yaw_pitch_roll() {
+        // Nose north-east and 30° up: the front axis in n is (cos45 cos30, sin45 cos30, −sin30).
+        let q = RollPitchYaw { roll: 0.4, pitch: 30.0 * DEG, yaw: 45.0 * DEG }.to_quat();
+        let (s, c) = (45.0 * DEG).sin_cos();
+        let expected = DVec3::new(c * 0.75_f64.sqrt(), s * 0.75_f64.sqrt(), -0.5);
+        assert!((q * DVec3::X).abs_diff_eq(expected, 1e-15));
+        let back = RollPitchYaw::from_quat(q);
+        assert!((back.roll - 0.4).abs() < 1e-15 && (back.yaw - 45.0 * DEG).abs() < 1e-15);
+    }
+
+    #[test]
+    fn n_axes_in_e_point_north_east_and_down() {
+        let q = q_e_n(0.0, 0.0); // on the equator at Greenwich: down = −x, east = y, north = z
+        assert!((q * DVec3::Z).abs_diff_eq(DVec3::X, 1e-15));
+        assert!((q * DVec3::Y).abs_diff_eq(DVec3::Y, 1e-15));
+        assert!((q * DVec3::X).abs_diff_eq(-DVec3::Z, 1e-15));
+    }
+
+    #[test]
+    fn euler_jacobian_agrees_with_central_differences() {
+        let a = RollPitchYaw { roll: 0.7, pitch: -0.9, yaw: 2.4 };
+        let jacobian = a.jacobian_of_psi_n();
+        let angles = |psi: DVec3| RollPitchYaw::from_quat(DQuat::from_scaled_axis(psi) * a.to_quat());
+        for (k, axis) in DVec3::AXES.into_iter().enumerate() {
+            let (p, m) = (angles(axis * 1e-6), angles(axis * -1e-6));
+            for (row, (p, m)) in
+                [(p.roll, m.roll), (p.pitch, m.pitch), (p.yaw, m.yaw)].into_iter().enumerate()
+            {
+                assert!(((p - m) / 2e-6 - jacobian[row][k]).abs() < 1e-9);
+            }
+        }
+    }
+}

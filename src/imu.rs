@@ -1,0 +1,138 @@
+//! Inertial samples and static recordings.
+
+use glam::DVec3;
+use std::fmt;
+
+/// Kind of inertial sensor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Sensor {
+    /// Accelerometer (m/s²).
+    Accel,
+    /// Gyroscope (rad/s).
+    Gyro,
+}
+
+impl Sensor {
+    /// Both sensors, accelerometer first.
+    pub const ALL: [Self; 2] = [Self::Accel, Self::Gyro];
+    /// Name in files: `accel` or `gyro`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Accel => "accel",
+            Self::Gyro => "gyro",
+        }
+    }
+    /// Unit of a sample.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Accel => "m/s²",
+            Self::Gyro => "rad/s",
+        }
+    }
+}
+
+/// Axis of the sensor triad (body frame: front, right, down).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Axis {
+    /// Front.
+    X,
+    /// Right.
+    Y,
+    /// Down.
+    Z,
+}
+
+impl Axis {
+    /// The three axes.
+    pub const ALL: [Self; 3] = [Self::X, Self::Y, Self::Z];
+    /// Name in files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        ["x", "y", "z"][self as usize]
+    }
+}
+
+/// One of the six signals of an IMU.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Channel {
+    /// Which sensor.
+    pub sensor: Sensor,
+    /// Which axis of it.
+    pub axis: Axis,
+}
+
+impl Channel {
+    /// All six channels: accelerometer x, y, z, gyroscope x, y, z.
+    pub const ALL: [Self; 6] = {
+        let mut all = [Self { sensor: Sensor::Accel, axis: Axis::X }; 6];
+        let mut i = 0;
+        while i < 6 {
+            all[i] = Self { sensor: Sensor::ALL[i / 3], axis: Axis::ALL[i % 3] };
+            i += 1;
+        }
+        all
+    };
+    /// Position in [`Channel::ALL`].
+    #[must_use]
+    pub const fn index(self) -> usize {
+        self.sensor as usize * 3 + self.axis as usize
+    }
+}
+
+impl fmt::Display for Channel {
+    /// `accel.x`
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}.{}", self.sensor.name(), self.axis.name())
+    }
+}
+
+/// Mean angular rate and specific force over one sample interval (t_{k−1}, t_k].
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ImuSample {
+    /// Angular rate of b with respect to i, in b (rad/s).
+    pub omega_ib_b: DVec3,
+    /// Specific force of b, in b (m/s²).
+    pub f_ib_b: DVec3,
+}
+
+/// One signal of a static recording, its mean removed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Signal {
+    /// Which channel.
+    pub channel: Channel,
+    /// The mean that was removed: gravity, Earth rate, turn-on bias (m/s² or rad/s).
+    pub mean: f64,
+    /// The samples less their mean (m/s² or rad/s).
+    pub samples: Vec<f64>,
+}
+
+/// One static replicate: some or all of the six channels at one rate.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    /// File name or other label.
+    pub name: String,
+    /// Sample rate (Hz).
+    pub rate_hz: f64,
+    /// The signals, in the order of [`Channel::ALL`], all of the same length.
+    pub signals: Vec<Signal>,
+}
+
+impl Recording {
+    /// The signal of a channel, if recorded.
+    #[must_use]
+    pub fn signal(&self, channel: Channel) -> Option<&Signal> {
+        self.signals.iter().find(|s| s.channel == channel)
+    }
+    /// Samples per signal.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.signals.first().map_or(0, |s| s.samples.len())
+    }
+    /// Whether it holds no samples.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}

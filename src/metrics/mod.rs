@@ -1,0 +1,1 @@
+//! ASEE, RMSE, NEES, coverage, errors at the end of outages.

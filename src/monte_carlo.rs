@@ -1,0 +1,1 @@
+//! All runs: lane batches over threads, reduced in run order.

@@ -1,0 +1,120 @@
+//! Noise models: the noun in which calibration and navigation meet.
+//!
+//! A [`Process`] is one latent stochastic process; a [`Composite`] is the sum of processes that one axis
+//! carries; a [`Model`] is the six axes of an IMU at a sample rate. Parameters are per sample at that rate.
+
+mod ar1;
+mod composite;
+mod drift;
+mod gauss_markov;
+mod ma1;
+mod quantization;
+mod random_walk;
+mod white;
+
+pub use ar1::Ar1;
+pub use composite::Composite;
+pub use drift::Drift;
+pub use gauss_markov::GaussMarkov;
+pub use ma1::Ma1;
+pub use quantization::Quantization;
+pub use random_walk::RandomWalk;
+pub use white::White;
+
+use crate::imu::{Channel, Sensor};
+
+/// A parameter outside its domain.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{process}: {parameter} = {value} is not {domain}")]
+pub struct ParameterError {
+    /// Process code, as in model files.
+    pub process: &'static str,
+    /// Parameter name, as in model files.
+    pub parameter: &'static str,
+    /// The value refused.
+    pub value: f64,
+    /// What would be accepted, in words.
+    pub domain: &'static str,
+}
+
+/// Accepts a finite, non-negative value.
+fn non_negative(process: &'static str, parameter: &'static str, value: f64) -> Result<f64, ParameterError> {
+    if value.is_finite() && value >= 0.0 {
+        Ok(value)
+    } else {
+        Err(ParameterError { process, parameter, value, domain: "a finite number ≥ 0" })
+    }
+}
+
+/// One latent process.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Process {
+    /// White noise, "WN".
+    White(White),
+    /// Quantization noise, "QN".
+    Quantization(Quantization),
+    /// First-order autoregressive process, "AR1".
+    Ar1(Ar1),
+    /// Random walk, "RW".
+    RandomWalk(RandomWalk),
+    /// Deterministic drift (rate ramp), "DR".
+    Drift(Drift),
+    /// First-order Gauss-Markov process, "GM": an AR1 in other parameters.
+    GaussMarkov(GaussMarkov),
+    /// First-order moving average, "MA1".
+    Ma1(Ma1),
+}
+
+impl Process {
+    /// Code in model files and specifications.
+    #[must_use]
+    pub const fn code(&self) -> &'static str {
+        match self {
+            Self::White(_) => White::CODE,
+            Self::Quantization(_) => Quantization::CODE,
+            Self::Ar1(_) => Ar1::CODE,
+            Self::RandomWalk(_) => RandomWalk::CODE,
+            Self::Drift(_) => Drift::CODE,
+            Self::GaussMarkov(_) => GaussMarkov::CODE,
+            Self::Ma1(_) => Ma1::CODE,
+        }
+    }
+
+    /// The parameters as (name in model files, value).
+    #[must_use]
+    pub fn parameters(&self) -> Vec<(&'static str, f64)> {
+        match self {
+            Self::White(p) => vec![("sigma2", p.sigma2())],
+            Self::Quantization(p) => vec![("q2", p.q2())],
+            Self::Ar1(p) => vec![("phi", p.phi()), ("sigma2", p.sigma2())],
+            Self::RandomWalk(p) => vec![("gamma2", p.gamma2())],
+            Self::Drift(p) => vec![("slope", p.slope())],
+            Self::GaussMarkov(p) => vec![("beta", p.beta()), ("s2", p.s2())],
+            Self::Ma1(p) => vec![("theta", p.theta()), ("sigma2", p.sigma2())],
+        }
+    }
+}
+
+/// The noise of an IMU: six axes, each a sum of processes, and the sample rate the parameters belong to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Model {
+    /// Sample rate (Hz).
+    pub rate_hz: f64,
+    /// The six axes in the order of [`Channel::ALL`].
+    pub axes: [Composite; 6],
+}
+
+impl Model {
+    /// A model with the same noise on the three axes of each sensor.
+    #[must_use]
+    pub fn pooled(rate_hz: f64, accel: &Composite, gyro: &Composite) -> Self {
+        let axes = Channel::ALL.map(|c| if c.sensor == Sensor::Accel { accel.clone() } else { gyro.clone() });
+        Self { rate_hz, axes }
+    }
+
+    /// The noise of one axis.
+    #[must_use]
+    pub fn axis(&self, channel: Channel) -> &Composite {
+        &self.axes[channel.index()]
+    }
+}

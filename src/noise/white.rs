@@ -1,0 +1,28 @@
+//! White noise: independent samples.
+
+use super::{ParameterError, non_negative};
+
+/// White noise: independent samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct White {
+    sigma2: f64,
+}
+
+impl White {
+    /// Code in model files.
+    pub const CODE: &'static str = "WN";
+
+    /// Variance of a sample (units²).
+    ///
+    /// # Errors
+    /// When it is negative or not finite.
+    pub fn new(sigma2: f64) -> Result<Self, ParameterError> {
+        Ok(Self { sigma2: non_negative(Self::CODE, "sigma2", sigma2)? })
+    }
+
+    /// Variance of a sample (units²).
+    #[must_use]
+    pub const fn sigma2(&self) -> f64 {
+        self.sigma2
+    }
+}

@@ -1,0 +1,1 @@
+//! The scenario file: everything of a run in one TOML.

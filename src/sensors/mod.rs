@@ -1,0 +1,1 @@
+//! Sensors along a trajectory: ideal IMU, its errors, GNSS, outages.

@@ -1,0 +1,1 @@
+//! Strapdown mechanisation on WGS-84, eight runs at a time.

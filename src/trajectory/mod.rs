@@ -1,0 +1,1 @@
+//! Reference trajectories: splines through samples, motion profiles, imports.

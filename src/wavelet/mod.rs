@@ -1,0 +1,1 @@
+//! Haar wavelet variance of recordings: classical, robust, intervals.
