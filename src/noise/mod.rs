@@ -10,6 +10,7 @@ mod gauss_markov;
 mod ma1;
 mod quantization;
 mod random_walk;
+mod synthesis;
 mod white;
 
 pub use ar1::Ar1;
@@ -19,6 +20,7 @@ pub use gauss_markov::GaussMarkov;
 pub use ma1::Ma1;
 pub use quantization::Quantization;
 pub use random_walk::RandomWalk;
+pub use synthesis::Synthesizer;
 pub use white::White;
 
 use crate::imu::{Channel, Sensor};

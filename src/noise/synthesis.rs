@@ -1,0 +1,318 @@
+//! Synthesis: draws the noise of one axis from its model, block by block.
+
+use super::{Composite, Process};
+use crate::rng::{Generator, StreamKey};
+use rand::RngExt;
+use rand_distr::StandardNormal;
+
+/// The noise of one axis of one run, as a stream of samples.
+///
+/// Every process of the sum draws from a stream of its own, so that adding or removing one changes no
+/// other's numbers. What comes out does not depend on the sizes of the blocks it is asked for.
+///
+/// AR1 and GM start stationary; MA1 and QN have a past; RW starts at 0 (its first sample is its first
+/// increment) and DR at one slope (X_t = slope·t, t = 1, 2, …).
+#[derive(Debug, Clone)]
+pub struct Synthesizer {
+    sources: Vec<Source>,
+}
+
+impl Synthesizer {
+    /// The noise of one axis (units of the model) at its beginning. The key names seed, scenario, run and
+    /// axis; its `process` is replaced by the label of each summand ([`Composite::labels`]).
+    #[must_use]
+    pub fn new(noise: &Composite, key: StreamKey<'_>) -> Self {
+        let labels = noise.labels();
+        let pairs = noise.processes.iter().zip(&labels);
+        let sources =
+            pairs.filter_map(|(p, label)| Source::new(p, StreamKey { process: label, ..key })).collect();
+        Self { sources }
+    }
+
+    /// Overwrites `out` with the next samples.
+    pub fn fill(&mut self, out: &mut [f64]) {
+        out.fill(0.0);
+        self.sources.iter_mut().for_each(|s| s.add_to(out));
+    }
+}
+
+/// One process with its generator and what it remembers between blocks.
+#[derive(Debug, Clone)]
+struct Source {
+    recursion: Recursion,
+    generator: Generator,
+}
+
+/// How a process makes its next sample; standard deviations, and the state in `last`.
+#[derive(Debug, Clone)]
+enum Recursion {
+    White { sigma: f64 },
+    Quantization { scale: f64, last: f64 },
+    Ar1 { phi: f64, sigma: f64, last: f64 },
+    RandomWalk { gamma: f64, last: f64 },
+    Drift { slope: f64, t: u64 },
+    Ma1 { theta: f64, sigma: f64, last: f64 },
+}
+
+impl Source {
+    /// The source of a process; none if it is identically zero.
+    fn new(process: &Process, key: StreamKey<'_>) -> Option<Self> {
+        let mut generator = key.generator();
+        let recursion = Recursion::start(process, &mut generator)?;
+        Some(Self { recursion, generator })
+    }
+
+    /// Adds the next samples to `out`.
+    fn add_to(&mut self, out: &mut [f64]) {
+        let g = &mut self.generator;
+        match &mut self.recursion {
+            Recursion::White { sigma } => out.iter_mut().for_each(|x| *x += *sigma * normal(g)),
+            Recursion::Quantization { scale, last } => add_with(last, out, |last| {
+                let u = g.random::<f64>();
+                (u, *scale * (u - last))
+            }),
+            Recursion::Ar1 { phi, sigma, last } => add_with(last, out, |last| {
+                let x = *phi * last + *sigma * normal(g);
+                (x, x)
+            }),
+            Recursion::RandomWalk { gamma, last } => add_with(last, out, |last| {
+                let x = last + *gamma * normal(g);
+                (x, x)
+            }),
+            Recursion::Drift { slope, t } => {
+                for x in out {
+                    *t += 1;
+                    *x += *slope * *t as f64;
+                }
+            }
+            Recursion::Ma1 { theta, sigma, last } => add_with(last, out, |last| {
+                let w = *sigma * normal(g);
+                (w, w + *theta * last)
+            }),
+        }
+    }
+}
+
+impl Recursion {
+    /// The state before the first sample; none if the process is identically zero.
+    fn start(process: &Process, g: &mut Generator) -> Option<Self> {
+        let recursion = match process {
+            Process::White(p) if p.sigma2() > 0.0 => Self::White { sigma: p.sigma2().sqrt() },
+            Process::Quantization(p) if p.q2() > 0.0 => {
+                Self::Quantization { scale: (12.0 * p.q2()).sqrt(), last: g.random() }
+            }
+            Process::Ar1(p) if p.sigma2() > 0.0 => Self::ar1(p, g),
+            Process::GaussMarkov(p) if p.s2() > 0.0 => Self::ar1(&p.ar1(), g),
+            Process::RandomWalk(p) if p.gamma2() > 0.0 => {
+                Self::RandomWalk { gamma: p.gamma2().sqrt(), last: 0.0 }
+            }
+            Process::Drift(p) if p.slope() != 0.0 => Self::Drift { slope: p.slope(), t: 0 },
+            Process::Ma1(p) if p.sigma2() > 0.0 => {
+                let sigma = p.sigma2().sqrt();
+                Self::Ma1 { theta: p.theta(), sigma, last: sigma * normal(g) }
+            }
+            _ => return None,
+        };
+        Some(recursion)
+    }
+
+    /// A stationary AR1: X_0 from the stationary law, so that X_1 has it too.
+    fn ar1(p: &super::Ar1, g: &mut Generator) -> Self {
+        Self::Ar1 { phi: p.phi(), sigma: p.sigma2().sqrt(), last: p.variance().sqrt() * normal(g) }
+    }
+}
+
+#[inline(always)]
+fn normal(g: &mut Generator) -> f64 {
+    g.sample(StandardNormal)
+}
+
+/// Runs a recursion over a block with its state in a register: `step` takes the state and returns the
+/// next one and the sample.
+#[inline(always)]
+fn add_with(last: &mut f64, out: &mut [f64], mut step: impl FnMut(f64) -> (f64, f64)) {
+    let mut state = *last;
+    for x in out {
+        let (next, sample) = step(state);
+        state = next;
+        *x += sample;
+    }
+    *last = state;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::{Ar1, Drift, GaussMarkov, Ma1, Quantization, RandomWalk, White};
+
+    const KEY: StreamKey<'_> = StreamKey { seed: 7, scenario: "", run: 0, source: "accel.x", process: "" };
+    /// How many standard deviations a statistic may be off: 2·Φ(−5) = 6e-7 a comparison.
+    const SIGMAS: f64 = 5.0;
+
+    fn white() -> Process {
+        Process::White(White::new(4.0).unwrap())
+    }
+    fn quantization() -> Process {
+        Process::Quantization(Quantization::new(0.5).unwrap())
+    }
+    fn ar1(phi: f64) -> Process {
+        Process::Ar1(Ar1::new(phi, 2.0).unwrap())
+    }
+    fn walk() -> Process {
+        Process::RandomWalk(RandomWalk::new(0.25).unwrap())
+    }
+    fn ma1() -> Process {
+        Process::Ma1(Ma1::new(0.6, 1.5).unwrap())
+    }
+
+    fn draw(processes: Vec<Process>, key: StreamKey<'_>, n: usize) -> Vec<f64> {
+        let mut out = vec![f64::NAN; n];
+        Synthesizer::new(&Composite::new(processes), key).fill(&mut out);
+        out
+    }
+
+    /// Mean of x_t x_{t+k}: the processes have mean zero by construction.
+    fn autocovariance(x: &[f64], k: usize) -> f64 {
+        let n = x.len() - k;
+        x[..n].iter().zip(&x[k..]).map(|(a, b)| a * b).sum::<f64>() / n as f64
+    }
+
+    /// Compares sample autocovariances with `gamma(k)`, within Bartlett's standard deviation:
+    /// var ĉ_k = Σ_m (γ_m² + γ_{m+k} γ_{m−k}) / n for a Gaussian linear process; the excess kurtosis of a
+    /// uniform innovation is negative and only lowers it.
+    fn assert_autocovariance(process: Process, gamma: impl Fn(i64) -> f64) {
+        let x = draw(vec![process], KEY, 1 << 20);
+        for k in [0_i64, 1, 2, 5, 20] {
+            let spread: f64 = (-2000..=2000).map(|m| gamma(m).powi(2) + gamma(m + k) * gamma(m - k)).sum();
+            let bound = SIGMAS * (spread / x.len() as f64).sqrt();
+            let error = autocovariance(&x, k as usize) - gamma(k);
+            assert!(error.abs() < bound, "{process:?}, lag {k}: off by {error}, bound {bound}");
+        }
+    }
+
+    #[test]
+    fn autocovariances_are_those_of_the_processes() {
+        assert_autocovariance(white(), |k| if k == 0 { 4.0 } else { 0.0 });
+        assert_autocovariance(quantization(), |k| [1.0, -0.5, 0.0][k.unsigned_abs().min(2) as usize]);
+        for phi in [0.98, 0.3, -0.7] {
+            assert_autocovariance(ar1(phi), |k| phi.powi(k.unsigned_abs() as i32) * 2.0 / (1.0 - phi * phi));
+        }
+        let gamma_ma = [1.5 * 1.36, 1.5 * 0.6, 0.0];
+        assert_autocovariance(ma1(), |k| gamma_ma[k.unsigned_abs().min(2) as usize]);
+        let gm = GaussMarkov::new(2.0, 3.0, 100.0).unwrap();
+        assert_autocovariance(Process::GaussMarkov(gm), |k| 3.0 * (-2.0 * k.abs() as f64 / 100.0).exp());
+    }
+
+    /// Variance over many runs of the sample at a given time; its standard deviation is σ²√(2/R).
+    fn assert_variance_at(process: Process, t: usize, expected: f64) {
+        const RUNS: u64 = 20_000;
+        let at = |run| draw(vec![process], StreamKey { run, ..KEY }, t)[t - 1];
+        let variance = (0..RUNS).map(|run| at(run).powi(2)).sum::<f64>() / RUNS as f64;
+        let bound = SIGMAS * expected * (2.0 / RUNS as f64).sqrt();
+        assert!((variance - expected).abs() < bound, "{process:?} at {t}: {variance}, expected {expected}");
+    }
+
+    #[test]
+    fn starts_are_stationary_where_the_process_is_and_zero_where_it_walks() {
+        let stationary = 2.0 / (1.0 - 0.999_f64.powi(2));
+        assert_variance_at(ar1(0.999), 1, stationary);
+        assert_variance_at(ar1(0.999), 50, stationary);
+        assert_variance_at(quantization(), 1, 1.0);
+        assert_variance_at(ma1(), 1, 1.5 * 1.36);
+        assert_variance_at(walk(), 1, 0.25);
+        assert_variance_at(walk(), 64, 64.0 * 0.25);
+    }
+
+    #[test]
+    fn increments_of_a_walk_are_white() {
+        let x = draw(vec![walk()], KEY, 1 << 20);
+        let increments: Vec<f64> = x.windows(2).map(|w| w[1] - w[0]).collect();
+        let n = increments.len() as f64;
+        assert!((autocovariance(&increments, 0) - 0.25).abs() < SIGMAS * 0.25 * (2.0 / n).sqrt());
+        assert!(autocovariance(&increments, 1).abs() < SIGMAS * 0.25 / n.sqrt());
+    }
+
+    #[test]
+    fn drift_is_a_ramp_from_one_slope() {
+        let x = draw(vec![Process::Drift(Drift::new(-0.5).unwrap())], KEY, 4);
+        assert_eq!(x, [-0.5, -1.0, -1.5, -2.0]);
+    }
+
+    #[test]
+    fn quantization_is_bounded_by_one_step() {
+        let x = draw(vec![quantization()], KEY, 100_000);
+        let step = (12.0 * 0.5_f64).sqrt();
+        assert!(x.iter().all(|v| v.abs() <= step));
+        assert!(x.iter().any(|v| v.abs() > 0.95 * step));
+    }
+
+    /// Kolmogorov-Smirnov: √n·D exceeds 1.95 with probability 1e-3.
+    #[test]
+    fn white_noise_is_normal() {
+        use statrs::distribution::{ContinuousCDF, Normal};
+        let law = Normal::new(0.0, 2.0).unwrap();
+        let mut x = draw(vec![white()], KEY, 200_000);
+        x.sort_by(f64::total_cmp);
+        let n = x.len() as f64;
+        let distance = |(i, v): (usize, &f64)| {
+            let p = law.cdf(*v);
+            (p - i as f64 / n).abs().max((p - (i + 1) as f64 / n).abs())
+        };
+        let d = x.iter().enumerate().map(distance).fold(0.0, f64::max);
+        assert!(n.sqrt() * d < 1.95, "{}", n.sqrt() * d);
+    }
+
+    /// Correlations between streams that differ in one part of the key; standard deviation 1/√n.
+    #[test]
+    fn streams_are_independent() {
+        let n = 1 << 18;
+        let sigma = |x: &[f64]| autocovariance(x, 0).sqrt();
+        let base = draw(vec![white()], KEY, n);
+        let twins = [
+            draw(vec![white()], StreamKey { run: 1, ..KEY }, n),
+            draw(vec![white()], StreamKey { source: "accel.y", ..KEY }, n),
+            draw(vec![white()], StreamKey { seed: 8, ..KEY }, n),
+            // White because phi = 0, but another process with another label.
+            draw(vec![ar1(0.0)], KEY, n),
+        ];
+        for twin in &twins {
+            let cross = base.iter().zip(twin).map(|(a, b)| a * b).sum::<f64>() / n as f64;
+            let r = cross / (sigma(&base) * sigma(twin));
+            assert!(r.abs() < SIGMAS / (n as f64).sqrt(), "{r}");
+        }
+    }
+
+    #[test]
+    fn a_sum_is_the_sum_of_its_processes() {
+        let parts = vec![white(), ar1(0.9), quantization(), walk(), ma1()];
+        let sum = draw(parts.clone(), KEY, 1000);
+        let mut expected = vec![0.0; 1000];
+        for part in parts {
+            expected.iter_mut().zip(draw(vec![part], KEY, 1000)).for_each(|(e, x)| *e += x);
+        }
+        assert_eq!(sum, expected);
+    }
+
+    #[test]
+    fn block_sizes_do_not_matter() {
+        let drift = Process::Drift(Drift::new(1e-3).unwrap());
+        let noise = Composite::new(vec![white(), ar1(0.9), ar1(0.5), quantization(), walk(), ma1(), drift]);
+        let mut whole = vec![0.0; 5000];
+        Synthesizer::new(&noise, KEY).fill(&mut whole);
+        let mut pieces = vec![0.0; 5000];
+        let mut synthesizer = Synthesizer::new(&noise, KEY);
+        let mut rest = pieces.as_mut_slice();
+        for size in [1, 0, 2, 7, 64, 1000, 3, 3923] {
+            let (block, tail) = rest.split_at_mut(size);
+            synthesizer.fill(block);
+            rest = tail;
+        }
+        assert_eq!(whole, pieces);
+    }
+
+    #[test]
+    fn nothing_is_zero() {
+        assert_eq!(draw(vec![], KEY, 3), [0.0; 3]);
+        assert_eq!(draw(vec![Process::White(White::new(0.0).unwrap())], KEY, 3), [0.0; 3]);
+    }
+}
