@@ -1,5 +1,6 @@
 //! First-order autoregressive process: X_t = phi X_{t−1} + W_t, W white with variance sigma2.
 
+use super::slow_ar1::{Slow, half_scale, sinhc};
 use super::{ParameterError, non_negative};
 
 /// First-order autoregressive process, stationary: |phi| < 1.
@@ -45,5 +46,144 @@ impl Ar1 {
     #[must_use]
     pub fn variance(&self) -> f64 {
         self.sigma2 / ((1.0 - self.phi) * (1.0 + self.phi))
+    }
+
+    /// Haar wavelet variance at a level (units²), scale tau = 2^level samples.
+    #[must_use]
+    pub fn haar_wv(&self, level: u32) -> f64 {
+        self.sigma2 * Self::haar_shape(self.phi, level).0
+    }
+
+    /// Haar wavelet variance per unit of sigma2, and its derivative with respect to phi. Relative error a
+    /// few 1e-15 for every |phi| < 1, up to |phi| = 1 − 1e-16.
+    #[must_use]
+    pub fn haar_shape(phi: f64, level: u32) -> (f64, f64) {
+        let m = half_scale(level);
+        if level <= 1 {
+            let sum = 1.0 + phi;
+            (0.5 / sum, -0.5 / (sum * sum))
+        } else if phi > 0.5 {
+            slow_shape(phi, m)
+        } else if phi >= 0.0 {
+            fast_shape(phi, m)
+        } else {
+            let (value, derivative) = alternating_shape(-phi, level);
+            (value, -derivative)
+        }
+    }
+}
+
+/// ½ < phi < 1: in kappa = −ln phi, where nothing cancels.
+fn slow_shape(phi: f64, m: f64) -> (f64, f64) {
+    // phi − 1 is exact here, so kappa keeps all its digits.
+    let kappa = -(phi - 1.0).ln_1p();
+    let bracket = Slow::new(kappa).bracket(m);
+    let (s, s_log_derivative) = sinhc(kappa);
+    let value = bracket.value / (phi * s);
+    let log_derivative = 1.0 + bracket.log_derivative - s_log_derivative;
+    (value, -value * log_derivative / phi)
+}
+
+/// 0 ≤ phi ≤ ½: [m(1 − phi²) − phi(1 − u)(3 − u)]/[2m²(1 − phi)³(1 + phi)], u = phi^m.
+pub(super) fn fast_shape(phi: f64, m: f64) -> (f64, f64) {
+    let u = phi.powf(m);
+    let (minus, plus) = (1.0 - phi, 1.0 + phi);
+    let bump = (1.0 - u) * (3.0 - u);
+    let numerator = m * minus * plus - phi * bump;
+    let derivative = -2.0 * m * phi - bump + (4.0 - 2.0 * u) * m * u;
+    let value = numerator / (2.0 * m * m * minus * minus * minus * plus);
+    (value, value * (derivative / numerator + 3.0 / minus - 1.0 / plus))
+}
+
+/// phi = −r < 0, level ≥ 2: [m(1 + r) + r·G(3 − u)]/[2m²(1 + r)³] with u = r^m and G = Σ_{k<m} r^k, a
+/// product of 1 + r^(2^i); the derivative is with respect to r.
+fn alternating_shape(r: f64, level: u32) -> (f64, f64) {
+    let m = half_scale(level);
+    // p = r^(2^i), q = 1 − p without cancellation; slant = Σ 2^i q/(1 + p) = m − 1 − 2rG'/G.
+    let (mut p, mut q, mut sum, mut slant, mut weight) = (r, 1.0 - r, 1.0, 0.0, 1.0);
+    for _ in 1..level {
+        sum *= 1.0 + p;
+        slant += weight * q / (1.0 + p);
+        q *= 1.0 + p;
+        p *= p;
+        weight *= 2.0;
+    }
+    let plus = 1.0 + r;
+    let numerator = m * plus + r * sum * (3.0 - p);
+    let moment = 0.5 * sum * (m - 1.0 - slant);
+    let derivative = m + sum * (2.0 - p - slant) + q * (moment + m * sum);
+    let value = numerator / (2.0 * m * m * plus * plus * plus);
+    (value, value * (derivative / numerator - 3.0 / plus))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::GaussMarkov;
+    use approx::assert_relative_eq;
+
+    /// The definition: the variance of a filtered process is a double sum over its autocovariance.
+    fn by_definition(phi: f64, level: u32) -> f64 {
+        let m = 1_i32 << (level - 1);
+        let h = |k: i32| if k < m { 0.5 } else { -0.5 } / f64::from(m);
+        let covariance = |lag: i32| phi.powi(lag.abs()) / (1.0 - phi * phi);
+        let pairs = (0..2 * m).flat_map(|s| (0..2 * m).map(move |t| (s, t)));
+        pairs.map(|(s, t)| h(s) * h(t) * covariance(s - t)).sum()
+    }
+
+    const PHIS: [f64; 12] = [-0.99, -0.9, -0.6, -0.1, 0.0, 0.1, 0.3, 0.499, 0.5, 0.501, 0.9, 0.99];
+
+    #[test]
+    fn haar_shape_is_the_variance_of_the_filtered_process() {
+        for phi in PHIS {
+            for level in 1..=6 {
+                let (value, _) = Ar1::haar_shape(phi, level);
+                assert_relative_eq!(value, by_definition(phi, level), max_relative = 1e-11);
+            }
+        }
+    }
+
+    #[test]
+    fn derivatives_are_central_differences() {
+        for phi in PHIS {
+            for level in 1..=20 {
+                let h = 1e-6;
+                let difference = Ar1::haar_shape(phi + h, level).0 - Ar1::haar_shape(phi - h, level).0;
+                let (value, derivative) = Ar1::haar_shape(phi, level);
+                let scale = derivative.abs() + value;
+                assert_relative_eq!(derivative / scale, difference / (2.0 * h) / scale, epsilon = 3e-7);
+            }
+        }
+    }
+
+    /// Close to −1 the derivative is a difference of terms of order m²: at phi = −1 it is exactly
+    /// known (N = 4m, N' = 2m, value 1/(4m)); beyond level 16 phi = −1 + 2e-16 is no longer close in this sense.
+    #[test]
+    fn an_alternating_process_keeps_its_digits_at_long_scales() {
+        for level in [2, 10, 16] {
+            let m = half_scale(level);
+            let (value, derivative) = Ar1::haar_shape(-1.0 + f64::EPSILON, level);
+            assert_relative_eq!(value, 0.25 / m, max_relative = 1e-8);
+            assert_relative_eq!(derivative, 0.25 / m, max_relative = 1e-6);
+        }
+    }
+
+    #[test]
+    fn a_gauss_markov_process_is_its_ar1() {
+        for kappa in [1e-14_f64, 1e-6, 0.01, 0.69, 0.7, 3.0] {
+            let ar1 = Ar1::new((-kappa).exp(), -(-2.0 * kappa).exp_m1()).unwrap();
+            for level in [1, 5, 20] {
+                let (value, derivative) = GaussMarkov::haar_shape(kappa, level);
+                // The rounding of phi, 1e-16, is 1e-16/kappa of 1 − phi.
+                let tolerance = 1e-14 + 2e-16 / kappa;
+                assert_relative_eq!(value, ar1.haar_wv(level), max_relative = tolerance);
+                let h = 1e-5 * kappa;
+                let (high, low) =
+                    (GaussMarkov::haar_shape(kappa + h, level), GaussMarkov::haar_shape(kappa - h, level));
+                let scale = value / kappa;
+                let difference = (high.0 - low.0) / (2.0 * h);
+                assert_relative_eq!(derivative / scale, difference / scale, epsilon = 1e-8);
+            }
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Drift: a deterministic ramp.
 
 use super::ParameterError;
+use super::slow_ar1::half_scale;
 
 /// Drift: X_t = slope · t, t in samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,5 +34,18 @@ impl Drift {
     #[must_use]
     pub const fn slope(&self) -> f64 {
         self.slope
+    }
+
+    /// Haar wavelet variance at a level (units²), not centred: slope² tau²/16, tau = 2^level.
+    #[must_use]
+    pub fn haar_wv(&self, level: u32) -> f64 {
+        self.slope * self.slope * Self::haar_shape(level)
+    }
+
+    /// Haar wavelet variance per unit of slope².
+    #[must_use]
+    pub fn haar_shape(level: u32) -> f64 {
+        let m = half_scale(level);
+        0.25 * m * m
     }
 }

@@ -1,5 +1,7 @@
 //! First-order Gauss-Markov process: an AR1 described in continuous time.
 
+use super::ar1::fast_shape;
+use super::slow_ar1::{Slow, half_scale};
 use super::{Ar1, ParameterError, non_negative};
 
 /// Gauss-Markov process: autocovariance s2·exp(−beta·|t|); sampled, an AR1 with phi = exp(−beta/f).
@@ -7,6 +9,7 @@ use super::{Ar1, ParameterError, non_negative};
 pub struct GaussMarkov {
     beta: f64,
     s2: f64,
+    rate_hz: f64,
     ar1: Ar1,
 }
 
@@ -29,13 +32,19 @@ impl GaussMarkov {
         let x = positive("beta", beta)? / positive("rate_hz", rate_hz)?;
         let s2 = non_negative(Self::CODE, "s2", s2)?;
         let ar1 = Ar1::new((-x).exp(), s2 * -(-2.0 * x).exp_m1())?;
-        Ok(Self { beta, s2, ar1 })
+        Ok(Self { beta, s2, rate_hz, ar1 })
     }
 
     /// Inverse correlation time (1/s).
     #[must_use]
     pub const fn beta(&self) -> f64 {
         self.beta
+    }
+
+    /// Sample rate (Hz).
+    #[must_use]
+    pub const fn rate_hz(&self) -> f64 {
+        self.rate_hz
     }
 
     /// Stationary variance (units²).
@@ -48,5 +57,28 @@ impl GaussMarkov {
     #[must_use]
     pub const fn ar1(&self) -> Ar1 {
         self.ar1
+    }
+
+    /// Haar wavelet variance at a level (units²), scale tau = 2^level samples.
+    #[must_use]
+    pub fn haar_wv(&self, level: u32) -> f64 {
+        self.s2 * Self::haar_shape(self.beta / self.rate_hz, level).0
+    }
+
+    /// Haar wavelet variance per unit of s2, and its derivative with respect to kappa = beta/f, the inverse
+    /// correlation time in samples.
+    #[must_use]
+    pub fn haar_shape(kappa: f64, level: u32) -> (f64, f64) {
+        let m = half_scale(level);
+        if kappa < std::f64::consts::LN_2 {
+            let bracket = Slow::new(kappa).bracket(m);
+            let value = 2.0 * kappa * bracket.value;
+            (value, 2.0 * bracket.value + value * bracket.log_derivative)
+        } else {
+            let phi = (-kappa).exp();
+            let variance = (1.0 - phi) * (1.0 + phi);
+            let (value, derivative) = fast_shape(phi, m);
+            (value * variance, -phi * (derivative * variance - 2.0 * phi * value))
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! First-order moving average: X_t = W_t + theta W_{t−1}.
 
+use super::slow_ar1::half_scale;
 use super::{ParameterError, non_negative};
 
 /// First-order moving average, invertible: |theta| ≤ 1.
@@ -39,5 +40,19 @@ impl Ma1 {
     #[must_use]
     pub const fn sigma2(&self) -> f64 {
         self.sigma2
+    }
+
+    /// Haar wavelet variance at a level (units²): sigma2 [m(1 + theta)² − 3 theta]/(2m²), m = 2^(level−1).
+    #[must_use]
+    pub fn haar_wv(&self, level: u32) -> f64 {
+        self.sigma2 * Self::haar_shape(self.theta, level).0
+    }
+
+    /// Haar wavelet variance per unit of sigma2, and its derivative with respect to theta.
+    #[must_use]
+    pub fn haar_shape(theta: f64, level: u32) -> (f64, f64) {
+        let m = half_scale(level);
+        let sum = 1.0 + theta;
+        ((m * sum * sum - 3.0 * theta) / (2.0 * m * m), (2.0 * m * sum - 3.0) / (2.0 * m * m))
     }
 }

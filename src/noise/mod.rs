@@ -10,6 +10,8 @@ mod gauss_markov;
 mod ma1;
 mod quantization;
 mod random_walk;
+
+mod slow_ar1;
 mod synthesis;
 mod white;
 
@@ -93,6 +95,46 @@ impl Process {
             Self::Drift(p) => vec![("slope", p.slope())],
             Self::GaussMarkov(p) => vec![("beta", p.beta()), ("s2", p.s2())],
             Self::Ma1(p) => vec![("theta", p.theta()), ("sigma2", p.sigma2())],
+        }
+    }
+
+    /// Theoretical Haar wavelet variance (MODWT, scale tau = 2^level samples) of the process (units²);
+    /// level ≥ 1. Half the Allan variance of averages over tau/2 samples
+    /// ([Guerrier](crate::bibliography::Guerrier13), [Percival](crate::bibliography::Percival95)).
+    #[must_use]
+    pub fn haar_wv(&self, level: u32) -> f64 {
+        match self {
+            Self::White(p) => p.haar_wv(level),
+            Self::Quantization(p) => p.haar_wv(level),
+            Self::Ar1(p) => p.haar_wv(level),
+            Self::RandomWalk(p) => p.haar_wv(level),
+            Self::Drift(p) => p.haar_wv(level),
+            Self::GaussMarkov(p) => p.haar_wv(level),
+            Self::Ma1(p) => p.haar_wv(level),
+        }
+    }
+
+    /// Derivatives of [`Self::haar_wv`] with respect to the parameters, in the order of
+    /// [`Self::parameters`].
+    #[must_use]
+    pub fn haar_wv_gradient(&self, level: u32) -> Vec<f64> {
+        match self {
+            Self::White(_) => vec![White::haar_shape(level)],
+            Self::Quantization(_) => vec![Quantization::haar_shape(level)],
+            Self::Ar1(p) => {
+                let (value, derivative) = Ar1::haar_shape(p.phi(), level);
+                vec![p.sigma2() * derivative, value]
+            }
+            Self::RandomWalk(_) => vec![RandomWalk::haar_shape(level)],
+            Self::Drift(p) => vec![2.0 * p.slope() * Drift::haar_shape(level)],
+            Self::GaussMarkov(p) => {
+                let (value, derivative) = GaussMarkov::haar_shape(p.beta() / p.rate_hz(), level);
+                vec![p.s2() * derivative / p.rate_hz(), value]
+            }
+            Self::Ma1(p) => {
+                let (value, derivative) = Ma1::haar_shape(p.theta(), level);
+                vec![p.sigma2() * derivative, value]
+            }
         }
     }
 }

@@ -1,5 +1,6 @@
 //! White noise: independent samples.
 
+use super::slow_ar1::half_scale;
 use super::{ParameterError, non_negative};
 
 /// White noise: independent samples.
@@ -24,5 +25,17 @@ impl White {
     #[must_use]
     pub const fn sigma2(&self) -> f64 {
         self.sigma2
+    }
+
+    /// Haar wavelet variance at a level (units²): sigma2/tau, tau = 2^level.
+    #[must_use]
+    pub fn haar_wv(&self, level: u32) -> f64 {
+        self.sigma2 * Self::haar_shape(level)
+    }
+
+    /// Haar wavelet variance per unit of sigma2.
+    #[must_use]
+    pub fn haar_shape(level: u32) -> f64 {
+        0.5 / half_scale(level)
     }
 }
