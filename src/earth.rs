@@ -44,7 +44,8 @@ pub fn radii<R: Real>(sin_lat: R) -> Radii<R> {
 }
 
 /// How gravity falls with height.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum GravityModel {
     /// Second-order series of the normal gravity field of WGS-84 (the default),
     /// [Groves](crate::bibliography::Groves13) eq. 2.139 without its north component.

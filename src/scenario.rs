@@ -1,1 +1,272 @@
-//! The scenario file: everything of a run in one TOML.
+//! The scenario file: everything of a run in one TOML. Every key is optional; the defaults are those of
+//! [Minaretzis et al.](crate::bibliography::Minaretzis24), Section V.
+
+use crate::earth::GravityModel;
+use crate::ekf::{FilterStates, InitialSettings};
+use crate::sensors::gnss::GnssSettings;
+use crate::sensors::outage::{Outage, OutagePlan, PeriodicOutages, RandomOutages};
+use crate::units::{SettingError, require_non_negative, require_positive};
+use serde::{Deserialize, Serialize};
+
+/// Everything of a run but the trajectory and the models.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Scenario {
+    /// How many runs, from which seed, by which method.
+    pub run: RunSettings,
+    /// The filter.
+    pub filter: FilterSettings,
+    /// The true IMU.
+    pub imu: ImuSettings,
+    /// The GNSS receiver.
+    pub gnss: GnssSettings,
+    /// A barometer, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub baro: Option<BaroSettings>,
+    /// The start.
+    pub initial: InitialSettings,
+    /// Windows without fixes. Without this key and the two below: the paper's two; an empty list: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outage: Option<Vec<Outage>>,
+    /// Regular outages.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outage_periodic: Option<PeriodicOutages>,
+    /// Random outages.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outage_random: Option<RandomOutages>,
+}
+
+/// `[run]`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RunSettings {
+    /// Monte-Carlo runs.
+    pub runs: u64,
+    /// Seed of all random numbers; without it one is drawn and recorded.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub seed: Option<u64>,
+    /// How the statistics are found.
+    pub method: Method,
+    /// Level of the coverage statistic.
+    pub coverage_level: f64,
+}
+
+impl Default for RunSettings {
+    fn default() -> Self {
+        Self { runs: 100, seed: None, method: Method::MonteCarlo, coverage_level: 0.95 }
+    }
+}
+
+/// How the statistics are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Sampled runs.
+    #[default]
+    MonteCarlo,
+    /// Linear covariance analysis.
+    Lincov,
+}
+
+/// `[filter]`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct FilterSettings {
+    /// How the noise model becomes states.
+    pub states: FilterStates,
+    /// How gravity falls with height, for truth and filter alike.
+    pub gravity: GravityModel,
+}
+
+/// `[imu]`: the true IMU; the filter knows its rate only. Standard deviations, drawn per run and axis.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ImuSettings {
+    /// Samples per second.
+    pub rate_hz: f64,
+    /// Turn-on bias of the accelerometers (m/s²).
+    pub turn_on_bias_accel_m_s2: f64,
+    /// Turn-on bias of the gyroscopes (rad/s).
+    pub turn_on_bias_gyro_rad_s: f64,
+    /// Scale-factor error of the accelerometers (parts per million).
+    pub scale_ppm_accel: f64,
+    /// Scale-factor error of the gyroscopes (parts per million).
+    pub scale_ppm_gyro: f64,
+    /// Misalignment of each axis (rad).
+    pub misalignment_rad: f64,
+}
+
+impl Default for ImuSettings {
+    fn default() -> Self {
+        Self {
+            rate_hz: 100.0,
+            turn_on_bias_accel_m_s2: 0.0,
+            turn_on_bias_gyro_rad_s: 0.0,
+            scale_ppm_accel: 0.0,
+            scale_ppm_gyro: 0.0,
+            misalignment_rad: 0.0,
+        }
+    }
+}
+
+impl ImuSettings {
+    fn errors(&self) -> [(&'static str, f64); 5] {
+        [
+            ("turn_on_bias_accel_m_s2", self.turn_on_bias_accel_m_s2),
+            ("turn_on_bias_gyro_rad_s", self.turn_on_bias_gyro_rad_s),
+            ("scale_ppm_accel", self.scale_ppm_accel),
+            ("scale_ppm_gyro", self.scale_ppm_gyro),
+            ("misalignment_rad", self.misalignment_rad),
+        ]
+    }
+
+    fn validate(&self) -> Result<(), SettingError> {
+        require_positive("rate_hz", &[self.rate_hz])?;
+        for (key, value) in self.errors() {
+            require_non_negative(key, &[value])?;
+            if value > 0.0 {
+                return Err(SettingError::new(key, value, "not simulated yet; leave it at 0"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// `[baro]`: a barometric altimeter.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct BaroSettings {
+    /// Heights per second.
+    pub rate_hz: f64,
+    /// Standard deviation of a height (m).
+    pub sigma_m: f64,
+}
+
+impl Scenario {
+    /// Checks every value, and refuses what is not simulated rather than ignore it.
+    ///
+    /// # Errors
+    /// The first key whose value is refused, with its section.
+    pub fn validate(&self) -> Result<(), SettingError> {
+        self.run.validate().map_err(|e| e.in_section("run"))?;
+        self.imu.validate().map_err(|e| e.in_section("imu"))?;
+        self.gnss.validate().map_err(|e| e.in_section("gnss"))?;
+        self.initial.validate().map_err(|e| e.in_section("initial"))?;
+        self.outages().windows((0.0, 1.0), 0)?;
+        if let Some(baro) = &self.baro {
+            let requirement = "a barometer is not simulated yet; leave the section out";
+            return Err(SettingError::new("rate_hz", baro.rate_hz, requirement).in_section("baro"));
+        }
+        self.fixes_meet_imu_samples()
+    }
+
+    /// A fix must fall on an IMU sample: one that does not would be used late or never.
+    fn fixes_meet_imu_samples(&self) -> Result<(), SettingError> {
+        let samples = self.imu.rate_hz / self.gnss.rate_hz;
+        if samples >= 1.0 - 1e-9 && (samples - samples.round()).abs() <= 1e-9 * samples {
+            return Ok(());
+        }
+        let requirement = format!("imu.rate_hz = {} must be a whole multiple of it", self.imu.rate_hz);
+        Err(SettingError::new("gnss.rate_hz", self.gnss.rate_hz, requirement))
+    }
+
+    /// The outages asked for: the paper's two when nothing is said.
+    #[must_use]
+    pub fn outages(&self) -> OutagePlan {
+        let said = self.outage_periodic.is_some() || self.outage_random.is_some();
+        let unsaid = if said { Vec::new() } else { Outage::PAPER.to_vec() };
+        OutagePlan {
+            fixed: self.outage.clone().unwrap_or(unsaid),
+            periodic: self.outage_periodic,
+            random: self.outage_random,
+        }
+    }
+}
+
+impl RunSettings {
+    fn validate(&self) -> Result<(), SettingError> {
+        if self.runs == 0 {
+            return Err(SettingError::new("runs", self.runs, "at least one run"));
+        }
+        if self.method == Method::Lincov {
+            return Err(SettingError::new("method", "\"lincov\"", "not available yet; use \"monte-carlo\""));
+        }
+        if self.coverage_level > 0.0 && self.coverage_level < 1.0 {
+            return Ok(());
+        }
+        Err(SettingError::new("coverage_level", self.coverage_level, "it must lie between 0 and 1"))
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "values read, not computed")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_empty_file_is_the_papers_setting() {
+        let scenario: Scenario = toml::from_str("").unwrap();
+        assert_eq!(scenario.validate(), Ok(()));
+        assert_eq!((scenario.run.runs, scenario.imu.rate_hz, scenario.gnss.rate_hz), (100, 100.0, 1.0));
+        let variance = |sigma: [f64; 3]| sigma.map(|s| (s * s * 1e6).round() / 1e6);
+        assert_eq!(variance(scenario.gnss.pos_sigma_m), [4.0, 4.0, 16.0]);
+        assert_eq!(variance(scenario.gnss.vel_sigma_m_s.unwrap()), [0.0016, 0.0016, 0.0036]);
+        assert_eq!(scenario.outages().windows((0.0, 900.0), 1).unwrap(), Outage::PAPER);
+    }
+
+    #[test]
+    fn every_key_of_the_interface_is_understood() {
+        let text = r#"
+            outage = []
+            run = { runs = 7, seed = 3, method = "monte-carlo" }
+            filter = { states = "full", gravity = "first-order" }
+            [imu]
+            rate_hz = 200.0
+            turn_on_bias_accel_m_s2 = 0.0
+            [gnss]
+            rate_hz = 5
+            pos_sigma_m = [1, 1, 2]
+            vel_sigma_m_s = "none"
+            lever_arm_m = [0.5, 0, -1]
+            [initial]
+            att_sigma_deg = [1, 1, 5]
+            accel_bias_sigma_m_s2 = 0.01
+            perfect = true
+            [outage_periodic]
+            first_s = 10
+            every_s = 100
+            duration_s = 20
+            [outage_random]
+            rate_per_hour = 3
+            duration_s = 10
+        "#;
+        let scenario: Scenario = toml::from_str(text).unwrap();
+        assert_eq!(scenario.validate(), Ok(()));
+        assert_eq!(scenario.filter.states, FilterStates::Full);
+        assert!(scenario.outages().fixed.is_empty());
+        let again: Scenario = toml::from_str(&toml::to_string(&scenario).unwrap()).unwrap();
+        assert_eq!(again, scenario);
+    }
+
+    #[test]
+    fn no_outage_may_be_asked_for() {
+        let scenario: Scenario = toml::from_str("outage = []").unwrap();
+        assert!(scenario.outages().windows((0.0, 900.0), 1).unwrap().is_empty());
+    }
+
+    #[test]
+    fn refusals_name_section_and_key() {
+        let refused = |text: &str| toml::from_str::<Scenario>(text).unwrap().validate().unwrap_err().key;
+        assert_eq!(refused("run.runs = 0"), "run.runs");
+        assert_eq!(refused("run.coverage_level = 95"), "run.coverage_level");
+        assert_eq!(refused("run.method = 'lincov'"), "run.method");
+        assert_eq!(refused("gnss.rate_hz = 3"), "gnss.rate_hz");
+        assert_eq!(refused("gnss.rate_hz = 200"), "gnss.rate_hz");
+        assert_eq!(refused("gnss.pos_sigma_m = [0, 1, 1]"), "gnss.pos_sigma_m");
+        assert_eq!(refused("imu.rate_hz = -1"), "imu.rate_hz");
+        assert_eq!(refused("imu.scale_ppm_gyro = 300"), "imu.scale_ppm_gyro");
+        assert_eq!(refused("initial.att_sigma_deg = [1, 1, 180]"), "initial.att_sigma_deg");
+        assert_eq!(refused("baro = { rate_hz = 1, sigma_m = 1 }"), "baro.rate_hz");
+        assert_eq!(refused("outage = [{ start_s = 9, end_s = 3 }]"), "outage.end_s");
+    }
+}

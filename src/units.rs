@@ -1,5 +1,5 @@
-//! Units of the border: the factors to SI that headers, keys and flags name. Inside, everything is SI
-//! and radians.
+//! The border: units that headers, keys and flags name, and the values they may take. Inside, everything
+//! is SI and radians.
 
 /// One degree in radians.
 pub const DEG: f64 = std::f64::consts::PI / 180.0;
@@ -7,3 +7,61 @@ pub const DEG: f64 = std::f64::consts::PI / 180.0;
 pub const STANDARD_GRAVITY: f64 = 9.806_65;
 /// One degree per hour in rad/s.
 pub const DEG_PER_HOUR: f64 = DEG / 3600.0;
+
+/// A setting outside its domain, named by its key.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{key} = {value} is refused: {requirement}")]
+pub struct SettingError {
+    /// Key within its section, as in scenario files.
+    pub key: String,
+    /// The value refused.
+    pub value: String,
+    /// What would be accepted, in words.
+    pub requirement: String,
+}
+
+impl SettingError {
+    /// The refusal of a value.
+    #[must_use]
+    pub fn new(key: &str, value: impl ToString, requirement: impl Into<String>) -> Self {
+        Self { key: key.to_owned(), value: value.to_string(), requirement: requirement.into() }
+    }
+
+    /// The same with the section's name before the key.
+    #[must_use]
+    pub fn in_section(mut self, section: &str) -> Self {
+        self.key = format!("{section}.{}", self.key);
+        self
+    }
+}
+
+/// Accepts finite numbers > 0.
+///
+/// # Errors
+/// The first value that is not.
+pub fn require_positive(key: &str, values: &[f64]) -> Result<(), SettingError> {
+    require(key, values, "a finite number > 0", |v| v > 0.0)
+}
+
+/// Accepts finite numbers ≥ 0.
+///
+/// # Errors
+/// The first value that is not.
+pub fn require_non_negative(key: &str, values: &[f64]) -> Result<(), SettingError> {
+    require(key, values, "a finite number ≥ 0", |v| v >= 0.0)
+}
+
+/// Accepts finite numbers.
+///
+/// # Errors
+/// The first value that is not.
+pub fn require_finite(key: &str, values: &[f64]) -> Result<(), SettingError> {
+    require(key, values, "a finite number", |_| true)
+}
+
+fn require(key: &str, values: &[f64], what: &str, ok: impl Fn(f64) -> bool) -> Result<(), SettingError> {
+    match values.iter().find(|v| !(v.is_finite() && ok(**v))) {
+        Some(bad) => Err(SettingError::new(key, bad, format!("it must be {what}"))),
+        None => Ok(()),
+    }
+}

@@ -1,1 +1,4 @@
-//! Sensors along a trajectory: ideal IMU, its errors, GNSS, outages.
+//! Sensors on a trajectory: what is measured, with which errors, and when it is missing.
+
+pub mod gnss;
+pub mod outage;

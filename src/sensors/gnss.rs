@@ -1,0 +1,114 @@
+//! The GNSS receiver: what it measures, how often and how well.
+
+use crate::units::{SettingError, require_finite, require_positive};
+use serde::de::{self, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// GNSS fixes: rate, standard deviations (north, east, down), lever arm. The defaults are those of
+/// [Minaretzis et al.](crate::bibliography::Minaretzis24), Section V: 1 Hz, position variances 4, 4 and
+/// 16 m², velocity variances 0.0016, 0.0016 and 0.0036 (m/s)².
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct GnssSettings {
+    /// Fixes per second.
+    pub rate_hz: f64,
+    /// Position standard deviations north, east, down (m).
+    pub pos_sigma_m: [f64; 3],
+    /// Velocity standard deviations north, east, down (m/s); `None` ("none" in files): no velocity.
+    #[serde(serialize_with = "sigmas_or_none", deserialize_with = "parse_sigmas_or_none")]
+    pub vel_sigma_m_s: Option<[f64; 3]>,
+    /// Antenna position with respect to the IMU, in b: front, right, down (m).
+    pub lever_arm_m: [f64; 3],
+}
+
+impl Default for GnssSettings {
+    fn default() -> Self {
+        Self {
+            rate_hz: 1.0,
+            pos_sigma_m: [2.0, 2.0, 4.0],
+            vel_sigma_m_s: Some([0.04, 0.04, 0.06]),
+            lever_arm_m: [0.0; 3],
+        }
+    }
+}
+
+impl GnssSettings {
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The first key whose value is refused.
+    pub fn validate(&self) -> Result<(), SettingError> {
+        require_positive("rate_hz", &[self.rate_hz])?;
+        require_positive("pos_sigma_m", &self.pos_sigma_m)?;
+        require_positive("vel_sigma_m_s", self.vel_sigma_m_s.as_ref().map_or(&[], |v| v.as_slice()))?;
+        require_finite("lever_arm_m", &self.lever_arm_m)
+    }
+
+    /// Components of one fix: 3 (position) or 6 (and velocity).
+    #[must_use]
+    pub const fn components(&self) -> usize {
+        if self.vel_sigma_m_s.is_some() { 6 } else { 3 }
+    }
+}
+
+fn sigmas_or_none<S: Serializer>(sigmas: &Option<[f64; 3]>, serializer: S) -> Result<S::Ok, S::Error> {
+    match sigmas {
+        Some(sigmas) => sigmas.serialize(serializer),
+        None => serializer.serialize_str("none"),
+    }
+}
+
+fn parse_sigmas_or_none<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<[f64; 3]>, D::Error> {
+    deserializer.deserialize_any(SigmasOrNone)
+}
+
+struct SigmasOrNone;
+
+impl<'de> Visitor<'de> for SigmasOrNone {
+    type Value = Option<[f64; 3]>;
+
+    fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("three numbers or \"none\"")
+    }
+
+    fn visit_str<E: de::Error>(self, text: &str) -> Result<Self::Value, E> {
+        if text == "none" { Ok(None) } else { Err(E::invalid_value(de::Unexpected::Str(text), &self)) }
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, seq: A) -> Result<Self::Value, A::Error> {
+        <[f64; 3]>::deserialize(de::value::SeqAccessDeserializer::new(seq)).map(Some)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn velocity_may_be_none_and_survives_a_round_trip() {
+        let parsed: GnssSettings = toml::from_str("vel_sigma_m_s = \"none\"").unwrap();
+        assert_eq!(parsed.vel_sigma_m_s, None);
+        assert_eq!(parsed.components(), 3);
+        for settings in [parsed, GnssSettings::default()] {
+            let text = toml::to_string(&settings).unwrap();
+            assert_eq!(toml::from_str::<GnssSettings>(&text).unwrap(), settings);
+        }
+        let error = toml::from_str::<GnssSettings>("vel_sigma_m_s = \"nil\"").unwrap_err();
+        assert!(error.message().contains("three numbers or \"none\""), "{error}");
+    }
+
+    #[test]
+    fn impossible_values_are_refused_by_key() {
+        let cases = [
+            GnssSettings { rate_hz: 0.0, ..GnssSettings::default() },
+            GnssSettings { pos_sigma_m: [2.0, f64::NAN, 4.0], ..GnssSettings::default() },
+            GnssSettings { vel_sigma_m_s: Some([0.1, 0.0, 0.1]), ..GnssSettings::default() },
+            GnssSettings { lever_arm_m: [0.0, f64::INFINITY, 0.0], ..GnssSettings::default() },
+        ];
+        let keys = ["rate_hz", "pos_sigma_m", "vel_sigma_m_s", "lever_arm_m"];
+        for (settings, key) in cases.iter().zip(keys) {
+            assert_eq!(settings.validate().unwrap_err().key, key);
+        }
+        assert_eq!(GnssSettings::default().validate(), Ok(()));
+    }
+}
