@@ -1,4 +1,5 @@
 //! Sensors on a trajectory: what is measured, with which errors, and when it is missing.
 
 pub mod gnss;
+pub mod ideal_imu;
 pub mod outage;
