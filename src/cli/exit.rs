@@ -1,6 +1,6 @@
 //! What went wrong, as the user reads it, and the exit code it means.
 
-use std::process::ExitCode;
+use std::fmt;
 
 /// A failure: exit code, message and hint. 1 could not (I/O, numerics); 2 usage or configuration;
 /// 3 a stated bound was not met; 75 stopped early, resume; 130 interrupted.
@@ -33,12 +33,17 @@ impl Failure {
         self
     }
 
-    #[expect(clippy::print_stderr, reason = "the one place where errors are printed")]
-    pub(crate) fn report(self) -> ExitCode {
-        eprintln!("error: {}", self.message);
-        if let Some(hint) = self.hint {
-            eprintln!("\nhint: {hint}");
-        }
-        ExitCode::from(self.code)
+    pub(crate) const fn code(&self) -> u8 {
+        self.code
+    }
+
+    pub(crate) fn advice(&self) -> Option<&str> {
+        self.hint.as_deref()
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
     }
 }

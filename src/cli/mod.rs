@@ -1,13 +1,19 @@
-//! The command line: one file per subcommand, each its `Args` and a `run`.
+//! The command line: one file per subcommand, each its `Args` and a `run(args, &Session)`.
 
+mod common;
+mod completions;
 mod exit;
+mod man;
 mod printer;
+mod progress;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
 
+pub(crate) use common::{Common, Session};
 pub(crate) use exit::Failure;
 pub(crate) use printer::Printer;
+pub(crate) use progress::Progress;
 
 /// INS/GNSS navigation simulator with a robust stochastic-calibration front end.
 #[derive(Parser)]
@@ -19,56 +25,54 @@ struct Cli {
     command: Command,
 }
 
-/// Flags that mean the same in every command.
-#[derive(clap::Args, Clone, Debug)]
-pub(crate) struct Common {
-    /// Seed of all random numbers; without it one is drawn, printed and recorded
-    #[arg(long, global = true, value_name = "N")]
-    pub(crate) seed: Option<u64>,
-    /// Worker threads (default: one per core)
-    #[arg(long, short = 'j', global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
-    pub(crate) threads: Option<u16>,
-    /// Say only errors
-    #[arg(long, short, global = true)]
-    pub(crate) quiet: bool,
-    /// Say more
-    #[arg(long, short, global = true, conflicts_with = "quiet")]
-    pub(crate) verbose: bool,
-    /// No progress bars
-    #[arg(long, global = true)]
-    pub(crate) no_progress: bool,
-    /// Colour
-    #[arg(long, global = true, value_enum, default_value_t)]
-    pub(crate) color: Color,
-    /// Format of what goes to stdout
-    #[arg(long, global = true, value_enum, default_value_t)]
-    pub(crate) format: Format,
-}
-
-#[derive(clap::ValueEnum, Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) enum Color {
-    #[default]
-    Auto,
-    Always,
-    Never,
-}
-
-#[derive(clap::ValueEnum, Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) enum Format {
-    #[default]
-    Text,
-    Json,
-}
-
 #[derive(Subcommand, Debug)]
-enum Command {}
+enum Command {
+    Completions(completions::Args),
+    Man(man::Args),
+}
+
+impl Command {
+    fn run(self, session: &Session) -> Result<(), Failure> {
+        match self {
+            Self::Completions(args) => completions::run(&args, session),
+            Self::Man(args) => man::run(&args, session),
+        }
+    }
+}
+
+/// The whole command line as clap knows it.
+fn command() -> clap::Command {
+    Cli::command()
+}
+
+/// `--color` as written, for the help and usage errors, which clap prints before it has read the flags.
+fn color_choice() -> clap::ColorChoice {
+    let words: Vec<String> = std::env::args_os().map(|w| w.to_string_lossy().into_owned()).collect();
+    let after = words.iter().skip_while(|w| *w != "--color").nth(1).map(String::as_str);
+    match words.iter().find_map(|w| w.strip_prefix("--color=")).or(after) {
+        Some("always") => clap::ColorChoice::Always,
+        Some("never") => clap::ColorChoice::Never,
+        _ => clap::ColorChoice::Auto,
+    }
+}
 
 pub(crate) fn main() -> ExitCode {
-    let cli = Cli::parse();
-    let _printer = Printer::new(&cli.common);
-    let outcome: Result<(), Failure> = match cli.command {};
-    match outcome {
+    let matches = command().color(color_choice()).get_matches();
+    let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
+    let printer = Printer::new(&cli.common);
+    match Session::new(cli.common).and_then(|session| cli.command.run(&session)) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => failure.report(),
+        Err(failure) => {
+            printer.failure(&failure);
+            ExitCode::from(failure.code())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_command_line_is_consistent() {
+        super::command().debug_assert();
     }
 }

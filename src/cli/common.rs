@@ -1,0 +1,93 @@
+//! Flags that mean the same in every command, and what follows from them.
+
+use super::{Failure, Printer, Progress};
+use std::sync::OnceLock;
+
+/// Flags that mean the same in every command.
+#[derive(clap::Args, Clone, Debug)]
+#[command(next_help_heading = "Common options")]
+pub(crate) struct Common {
+    /// Seed of all random numbers; without it one is drawn, printed and recorded
+    #[arg(long, global = true, value_name = "N")]
+    pub(crate) seed: Option<u64>,
+    /// Worker threads (default: one per core)
+    #[arg(long, short = 'j', global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub(crate) threads: Option<u16>,
+    /// Say only errors
+    #[arg(long, short, global = true)]
+    pub(crate) quiet: bool,
+    /// Say more
+    #[arg(long, short, global = true, conflicts_with = "quiet")]
+    pub(crate) verbose: bool,
+    /// No progress, neither bars nor lines
+    #[arg(long, global = true)]
+    pub(crate) no_progress: bool,
+    /// Colour
+    #[arg(long, global = true, value_name = "WHEN", value_enum, default_value_t)]
+    pub(crate) color: Color,
+    /// Format of what goes to stdout
+    #[arg(long, global = true, value_enum, default_value_t)]
+    pub(crate) format: Format,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Color {
+    #[default]
+    Auto,
+    Always,
+    Never,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Format {
+    #[default]
+    Text,
+    Json,
+}
+
+/// What every command is given: where to print, the seed, progress.
+#[derive(Debug)]
+pub(crate) struct Session {
+    common: Common,
+    /// Where results and remarks go.
+    pub(crate) printer: Printer,
+    drawn: OnceLock<u64>,
+}
+
+impl Session {
+    /// Starts the threads asked for.
+    pub(crate) fn new(common: Common) -> Result<Self, Failure> {
+        let threads = common.threads.map_or(0, usize::from); // 0: one per core
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(Failure::could_not)?;
+        Ok(Self { printer: Printer::new(&common), common, drawn: OnceLock::new() })
+    }
+
+    /// Whether stdout gets JSON rather than text.
+    pub(crate) fn json(&self) -> bool {
+        self.common.format == Format::Json
+    }
+
+    /// Threads that work.
+    pub(crate) fn threads(&self) -> usize {
+        rayon::current_num_threads()
+    }
+
+    /// The seed: `--seed`, else the one given (of a file), else one drawn once and said.
+    pub(crate) fn seed(&self, of_file: Option<u64>) -> u64 {
+        let draw = || {
+            // 53 bits, so that it survives JSON readers that know doubles only
+            let seed = rand::random::<u64>() >> 11;
+            self.printer.say(&format!("seed {seed} (drawn; repeat with --seed {seed})"));
+            seed
+        };
+        self.common.seed.or(of_file).unwrap_or_else(|| *self.drawn.get_or_init(draw))
+    }
+
+    /// Progress of `total` units, said on stderr: a bar on a terminal, else a line every 10 %.
+    pub(crate) fn progress(&self, unit: &str, total: u64) -> Progress {
+        if self.common.quiet || self.common.no_progress {
+            return Progress::silent();
+        }
+        Progress::new(unit, total)
+    }
+}

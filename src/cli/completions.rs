@@ -1,0 +1,23 @@
+//! `nav-sim completions`: completion scripts for shells.
+
+use super::{Failure, Session};
+
+/// Print a completion script for a shell
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim completions bash > nav-sim.bash
+  nav-sim completions zsh > _nav-sim
+  nav-sim completions fish > nav-sim.fish")]
+pub(crate) struct Args {
+    /// Which shell
+    #[arg(value_enum)]
+    shell: clap_complete::Shell,
+}
+
+pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut super::command(), "nav-sim", &mut script);
+    session.printer.result(String::from_utf8_lossy(&script).trim_end());
+    Ok(())
+}
