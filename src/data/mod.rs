@@ -1,1 +1,6 @@
 //! Files: recordings, models, trajectories. The only library module that reads files.
+
+pub mod atomic;
+pub mod model_file;
+pub mod suggest;
+pub mod toml_file;

@@ -4,24 +4,27 @@
 //! carries; a [`Model`] is the six axes of an IMU at a sample rate. Parameters are per sample at that rate.
 
 mod ar1;
+mod catalogue;
 mod composite;
 mod drift;
 mod gauss_markov;
 mod ma1;
 mod quantization;
 mod random_walk;
-
 mod slow_ar1;
+pub mod spread;
 mod synthesis;
 mod white;
 
 pub use ar1::Ar1;
+pub use catalogue::CATALOGUE;
 pub use composite::Composite;
 pub use drift::Drift;
 pub use gauss_markov::GaussMarkov;
 pub use ma1::Ma1;
 pub use quantization::Quantization;
 pub use random_walk::RandomWalk;
+pub use spread::{Law, Spread, SpreadError, Variation};
 pub use synthesis::Synthesizer;
 pub use white::White;
 

@@ -1,0 +1,376 @@
+//! TOML files read key by key: every refusal names file, line, key and value, and a mistyped key is
+//! answered with the nearest legal one.
+
+use std::path::Path;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::suggest::nearest;
+
+/// What is wrong with a TOML file.
+#[derive(Debug, thiserror::Error)]
+pub enum TomlError {
+    /// It cannot be read.
+    #[error("{path}: {source}")]
+    Io {
+        /// File.
+        path: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// It is not TOML.
+    #[error("{path}, line {line}, column {column}: {message}")]
+    Syntax {
+        /// File.
+        path: String,
+        /// Line, from 1.
+        line: usize,
+        /// Column, from 1.
+        column: usize,
+        /// What the parser said.
+        message: String,
+    },
+    /// It has a key that means nothing there.
+    #[error("{path}, line {line}: unknown key \"{key}\"")]
+    UnknownKey {
+        /// File.
+        path: String,
+        /// Line, from 1.
+        line: usize,
+        /// Key, dotted.
+        key: String,
+        /// What would be accepted there, or was meant.
+        hint: String,
+    },
+    /// It lacks a key.
+    #[error("{path}, line {line}: {key} is missing")]
+    MissingKey {
+        /// File.
+        path: String,
+        /// Line of the table that lacks it, from 1.
+        line: usize,
+        /// Key, dotted and quoted.
+        key: String,
+    },
+    /// A value is refused.
+    #[error("{path}, line {line}: \"{key}\" = {value} {reason}")]
+    Value {
+        /// File.
+        path: String,
+        /// Line, from 1.
+        line: usize,
+        /// Key, dotted.
+        key: String,
+        /// The value as written.
+        value: String,
+        /// Why, in words that follow the value: "is not …".
+        reason: String,
+        /// What to do about it.
+        hint: Option<Box<str>>,
+    },
+}
+
+impl TomlError {
+    /// What to do about it.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        match self {
+            Self::UnknownKey { hint, .. } => Some(hint.clone()),
+            Self::Value { hint, .. } => hint.as_deref().map(str::to_owned),
+            _ => None,
+        }
+    }
+
+    /// Whether the file's contents are at fault (rather than the machine, or a missing file).
+    #[must_use]
+    pub const fn is_content(&self) -> bool {
+        !matches!(self, Self::Io { .. })
+    }
+}
+
+/// A TOML text and the name it goes by in messages.
+#[derive(Debug)]
+pub(crate) struct Source {
+    path: String,
+    text: String,
+}
+
+impl Source {
+    pub(crate) fn read(path: &Path) -> Result<Self, TomlError> {
+        let name = path.display().to_string();
+        match std::fs::read_to_string(path) {
+            Ok(text) => Ok(Self { path: name, text }),
+            Err(source) => Err(TomlError::Io { path: name, source }),
+        }
+    }
+
+    /// A top-level table as values, for what is passed on unread.
+    pub(crate) fn owned_table(&self, key: &str) -> Option<toml::Table> {
+        let mut all: toml::Table = toml::from_str(&self.text).ok()?;
+        match all.remove(key) {
+            Some(toml::Value::Table(table)) => Some(table),
+            _ => None,
+        }
+    }
+
+    #[cfg(test)]
+    pub(crate) fn new(path: &str, text: &str) -> Self {
+        Self { path: path.into(), text: text.into() }
+    }
+
+    /// The table of the whole file.
+    pub(crate) fn parse(&self) -> Result<Spanned<DeTable<'_>>, TomlError> {
+        DeTable::parse(&self.text).map_err(|e| {
+            let at = e.span().map_or(0, |s| s.start);
+            let line_start = self.text[..at].rfind('\n').map_or(0, |i| i + 1);
+            TomlError::Syntax {
+                path: self.path.clone(),
+                line: self.line(at),
+                column: self.text[line_start..at].chars().count() + 1,
+                message: e.message().to_owned(),
+            }
+        })
+    }
+
+    pub(crate) fn root<'a>(&'a self, table: &'a Spanned<DeTable<'a>>) -> Section<'a> {
+        Section { source: self, name: String::new(), at: 0, table: table.get_ref() }
+    }
+
+    fn line(&self, at: usize) -> usize {
+        1 + self.text.as_bytes()[..at.min(self.text.len())].iter().filter(|b| **b == b'\n').count()
+    }
+}
+
+type Value<'a> = &'a Spanned<DeValue<'a>>;
+
+/// One table of a file, with its name for messages.
+#[derive(Debug, Clone)]
+pub(crate) struct Section<'a> {
+    source: &'a Source,
+    name: String,
+    at: usize,
+    table: &'a DeTable<'a>,
+}
+
+impl<'a> Section<'a> {
+    /// Dotted name of a key of this table.
+    pub(crate) fn key(&self, key: &str) -> String {
+        if self.name.is_empty() { key.to_owned() } else { format!("{}.{key}", self.name) }
+    }
+
+    /// Keys in the order of the file.
+    pub(crate) fn keys(&self) -> Vec<&str> {
+        let mut keys: Vec<_> = self.table.keys().map(|k| (k.span().start, k.get_ref().as_ref())).collect();
+        keys.sort_unstable();
+        keys.into_iter().map(|(_, k)| k).collect()
+    }
+
+    /// Refuses every key that is not listed.
+    pub(crate) fn only(&self, legal: &[&str]) -> Result<(), TomlError> {
+        let Some(key) = self.keys().into_iter().find(|k| !legal.contains(k)) else { return Ok(()) };
+        let hint = match nearest(key, legal.iter().copied()) {
+            Some(meant) => format!("did you mean \"{meant}\"?"),
+            None => format!("legal here: {}", legal.join(", ")),
+        };
+        let at = self.table.keys().find(|k| k.get_ref() == key).map_or(self.at, |k| k.span().start);
+        Err(TomlError::UnknownKey {
+            path: self.source.path.clone(),
+            line: self.source.line(at),
+            key: self.key(key),
+            hint,
+        })
+    }
+
+    pub(crate) fn has(&self, key: &str) -> bool {
+        self.table.contains_key(key)
+    }
+
+    fn get(&self, key: &str) -> Option<Value<'a>> {
+        self.table.get(key)
+    }
+
+    pub(crate) fn missing(&self, key: &str) -> TomlError {
+        self.missing_one_of(&[key])
+    }
+
+    pub(crate) fn missing_one_of(&self, keys: &[&str]) -> TomlError {
+        let keys: Vec<String> = keys.iter().map(|k| format!("\"{}\"", self.key(k))).collect();
+        TomlError::MissingKey {
+            path: self.source.path.clone(),
+            line: self.source.line(self.at),
+            key: keys.join(" or "),
+        }
+    }
+
+    /// A refusal of the value of a key that is there.
+    pub(crate) fn refuse(&self, key: &str, reason: impl Into<String>, hint: Option<String>) -> TomlError {
+        let span = self.get(key).map_or(self.at..self.at, Spanned::span);
+        self.refuse_at(span, self.key(key), reason.into(), hint)
+    }
+
+    fn refuse_at(
+        &self,
+        span: std::ops::Range<usize>,
+        key: String,
+        reason: String,
+        hint: Option<String>,
+    ) -> TomlError {
+        let written = self.source.text.get(span.clone()).unwrap_or_default();
+        let value = written.split_whitespace().collect::<Vec<_>>().join(" ").chars().take(60).collect();
+        let (path, line) = (self.source.path.clone(), self.source.line(span.start));
+        let hint = hint.map(String::into_boxed_str);
+        TomlError::Value { path, line, key, value, reason, hint }
+    }
+
+    fn wrong_type(&self, key: &str, expected: &str) -> TomlError {
+        self.refuse(key, format!("is not {expected}"), None)
+    }
+
+    /// A finite number.
+    pub(crate) fn f64(&self, key: &str) -> Result<Option<f64>, TomlError> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        number(value)
+            .filter(|x| x.is_finite())
+            .map(Some)
+            .ok_or_else(|| self.wrong_type(key, "a finite number"))
+    }
+
+    pub(crate) fn require_f64(&self, key: &str) -> Result<f64, TomlError> {
+        self.f64(key)?.ok_or_else(|| self.missing(key))
+    }
+
+    /// A pair of numbers in ascending order, infinite ones allowed.
+    pub(crate) fn interval(&self, key: &str) -> Result<Option<[f64; 2]>, TomlError> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        let items = value.get_ref().as_array().map_or(&[][..], |a| a);
+        match items.iter().map(number).collect::<Option<Vec<f64>>>().as_deref() {
+            Some(&[low, high]) if low <= high => Ok(Some([low, high])),
+            _ => Err(self.wrong_type(key, "a pair [low, high]")),
+        }
+    }
+
+    /// A whole number ≥ 0.
+    pub(crate) fn u64(&self, key: &str) -> Result<Option<u64>, TomlError> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        integer(value).map(Some).ok_or_else(|| self.wrong_type(key, "a whole number ≥ 0"))
+    }
+
+    pub(crate) fn str(&self, key: &str) -> Result<Option<&'a str>, TomlError> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        value.get_ref().as_str().map(Some).ok_or_else(|| self.wrong_type(key, "a text in quotes"))
+    }
+
+    pub(crate) fn require_str(&self, key: &str) -> Result<&'a str, TomlError> {
+        self.str(key)?.ok_or_else(|| self.missing(key))
+    }
+
+    /// A table.
+    pub(crate) fn section(&self, key: &str) -> Result<Option<Section<'a>>, TomlError> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        let table = value.get_ref().as_table().ok_or_else(|| self.wrong_type(key, "a table"))?;
+        Ok(Some(Section { source: self.source, name: self.key(key), at: value.span().start, table }))
+    }
+
+    pub(crate) fn is_list(&self, key: &str) -> bool {
+        self.get(key).is_some_and(|v| v.get_ref().is_array())
+    }
+
+    /// A list of tables, named `key[1]`, `key[2]`, … in messages.
+    pub(crate) fn sections(&self, key: &str) -> Result<Vec<Section<'a>>, TomlError> {
+        let Some(value) = self.get(key) else { return Ok(Vec::new()) };
+        let items = value.get_ref().as_array().ok_or_else(|| self.wrong_type(key, "a list of tables"))?;
+        let section = |(i, v): (usize, Value<'a>)| {
+            let name = self.key(&format!("{key}[{}]", i + 1));
+            match v.get_ref().as_table() {
+                Some(table) => Ok(Section { source: self.source, name, at: v.span().start, table }),
+                None => Err(self.refuse_at(v.span(), name, "is not a table".into(), None)),
+            }
+        };
+        items.iter().enumerate().map(section).collect()
+    }
+}
+
+fn number(value: &Spanned<DeValue<'_>>) -> Option<f64> {
+    match value.get_ref() {
+        DeValue::Float(f) => f.as_str().parse().ok(),
+        DeValue::Integer(i) if i.radix() == 10 => i.as_str().parse().ok(),
+        _ => None,
+    }
+}
+
+fn integer(value: &Spanned<DeValue<'_>>) -> Option<u64> {
+    value.get_ref().as_integer().and_then(|i| u64::from_str_radix(i.as_str(), i.radix()).ok())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str =
+        "a = 1\nb = [1, 2.5]\n[t]\nword = \"x\"\nbad = [1, \"y\"]\n[[list]]\nn = -1\nx = nan\n";
+
+    fn with<T>(text: &str, f: impl FnOnce(Section<'_>) -> T) -> T {
+        let source = Source::new("f.toml", text);
+        let table = source.parse().unwrap();
+        f(source.root(&table))
+    }
+
+    #[test]
+    fn values_come_out() {
+        with(TEXT, |root| {
+            assert_eq!(root.f64("a").unwrap(), Some(1.0));
+            assert_eq!(root.interval("b").unwrap(), Some([1.0, 2.5]));
+            assert_eq!(root.f64("absent").unwrap(), None);
+            assert_eq!(root.section("t").unwrap().unwrap().str("word").unwrap(), Some("x"));
+            assert_eq!(root.keys(), ["a", "b", "t", "list"]);
+        });
+    }
+
+    #[test]
+    fn refusals_name_file_line_key_and_value() {
+        let message = |e: TomlError| e.to_string();
+        with(TEXT, |root| {
+            let t = root.section("t").unwrap().unwrap();
+            let list = root.sections("list").unwrap().remove(0);
+            assert_eq!(
+                message(t.interval("bad").unwrap_err()),
+                "f.toml, line 5: \"t.bad\" = [1, \"y\"] is not a pair [low, high]"
+            );
+            assert_eq!(
+                message(list.u64("n").unwrap_err()),
+                "f.toml, line 7: \"list[1].n\" = -1 is not a whole number ≥ 0"
+            );
+            assert_eq!(
+                message(list.f64("x").unwrap_err()),
+                "f.toml, line 8: \"list[1].x\" = nan is not a finite number"
+            );
+            assert_eq!(message(t.require_f64("y").unwrap_err()), "f.toml, line 3: \"t.y\" is missing");
+            assert_eq!(message(root.section("a").unwrap_err()), "f.toml, line 1: \"a\" = 1 is not a table");
+        });
+    }
+
+    #[test]
+    fn unknown_keys_are_answered_with_the_nearest() {
+        with("sigma = 1\n", |root| {
+            let e = root.only(&["sigma2", "phi"]).unwrap_err();
+            assert_eq!(e.to_string(), "f.toml, line 1: unknown key \"sigma\"");
+            assert_eq!(e.hint().unwrap(), "did you mean \"sigma2\"?");
+        });
+        with("temperature = 1\n", |root| {
+            assert_eq!(root.only(&["phi", "q2"]).unwrap_err().hint().unwrap(), "legal here: phi, q2");
+        });
+    }
+
+    #[test]
+    fn syntax_errors_have_line_and_column() {
+        let e = Source::new("f.toml", "a = 1\nb = = 2\n").parse().unwrap_err();
+        assert!(e.to_string().starts_with("f.toml, line 2, column 5: "), "{e}");
+    }
+
+    #[test]
+    fn a_missing_file_is_named() {
+        let e = Source::read(Path::new("/no/such.toml")).unwrap_err();
+        assert_eq!(e.to_string(), "/no/such.toml: No such file or directory (os error 2)");
+        assert!(!e.is_content());
+    }
+}
