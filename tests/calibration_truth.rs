@@ -1,6 +1,7 @@
 //! Theory and estimators against numbers from independent implementations (`tests/truth/README.md`).
 
 use nav_sim::noise::{Ar1, Composite, Drift, GaussMarkov, Ma1, Process, Quantization, RandomWalk, White};
+use nav_sim::wavelet::{self, Convention, Tuning, interval};
 use serde_json::Value;
 
 fn truth(file: &str) -> Value {
@@ -58,4 +59,44 @@ fn theoretical_wavelet_variance_and_derivatives() {
         }
     }
     assert_eq!(rows, 9 * 20);
+}
+
+#[test]
+fn robust_constants() {
+    let truth = truth("robust_constants.json");
+    let values = truth["values"].as_object().unwrap();
+    assert_eq!(values.len(), 6);
+    for (efficiency, row) in values {
+        let tuning = Tuning::new(efficiency.parse().unwrap(), Convention::Exact).unwrap();
+        assert_relative(tuning.c(), row["c"].as_f64().unwrap(), 1e-12, efficiency);
+        assert_relative(tuning.a(), row["a"].as_f64().unwrap(), 1e-12, efficiency);
+    }
+}
+
+#[test]
+fn wavelet_variance_of_a_signal() {
+    let root = env!("CARGO_MANIFEST_DIR");
+    let text = std::fs::read_to_string(format!("{root}/tests/truth/signal_clean_4096.csv")).unwrap();
+    let signal: Vec<f64> = text.lines().skip(1).map(|l| l.parse().unwrap()).collect();
+    assert_eq!(signal.len(), 4096);
+    let truth = &truth("wv_4096.json")["signals"]["clean"];
+    let tuning = Tuning::new(0.6, Convention::Exact).unwrap();
+    let (classical, robust) = wavelet::both(&signal, 11, &tuning).unwrap();
+    assert_eq!(classical, wavelet::classical(&signal, 11).unwrap());
+    let comparable = truth["robust_comparable"].as_array().unwrap();
+    for i in 0..11 {
+        let level = i as u32 + 1;
+        let expected = |key: &str| truth[key][i].as_f64().unwrap();
+        assert_relative(classical[i], expected("classical"), 1e-12, &format!("classical {level}"));
+        assert_eq!(wavelet::coefficient_count(4096, level) as f64, expected("M"));
+        let edof = interval::edof_eta3(4096, level);
+        assert_relative(edof, expected("edof"), 1e-15, "edof");
+        let (low, high) = interval::interval(classical[i], edof, 0.95);
+        assert_relative(low, expected("ci_low"), 1e-9, &format!("low {level}"));
+        assert_relative(high, expected("ci_high"), 1e-9, &format!("high {level}"));
+        if comparable[i].as_bool().unwrap() {
+            assert_relative(robust[i].value, expected("robust"), 1e-12, &format!("robust {level}"));
+            assert_eq!(robust[i].status.name(), truth["robust_status"][i].as_str().unwrap());
+        }
+    }
 }

@@ -1,1 +1,73 @@
 //! Haar wavelet variance of recordings: classical, robust, intervals.
+//!
+//! Level j = 1, 2, … has scale tau = 2^j samples. Vectors over levels hold level j at index j − 1.
+
+pub mod haar;
+pub mod interval;
+pub mod robust;
+mod tuning;
+
+pub use haar::classical;
+pub use robust::{RobustVariance, Status, both};
+pub use tuning::{Convention, Tuning};
+
+/// Why there is no wavelet variance.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum WaveletError {
+    /// Not even one coefficient at the last level.
+    #[error(
+        "{samples} samples are too few for {levels} scales: scale 2^{levels} needs {} samples (at most {} scales here)",
+        1_u64.checked_shl(*levels).unwrap_or(u64::MAX), max_levels(*samples)
+    )]
+    TooShort {
+        /// Samples in the signal.
+        samples: usize,
+        /// Levels asked for.
+        levels: u32,
+    },
+    /// No level asked for.
+    #[error("at least one scale is needed")]
+    NoLevels,
+    /// A sample is not a finite number.
+    #[error("sample {index} is {value}")]
+    NotFinite {
+        /// Position, from 0.
+        index: usize,
+        /// The value.
+        value: f64,
+    },
+    /// A tuning that does not exist.
+    #[error("efficiency {0} is out of range: between {low} and {high}", low = tuning::EFFICIENCY_RANGE.0, high = tuning::EFFICIENCY_RANGE.1)]
+    Efficiency(f64),
+}
+
+/// The most levels that have a coefficient: floor(log2 T).
+#[must_use]
+pub fn max_levels(samples: usize) -> u32 {
+    samples.checked_ilog2().unwrap_or(0)
+}
+
+/// The usual number of levels: floor(log2 T) − 1, at least 1.
+#[must_use]
+pub fn default_levels(samples: usize) -> u32 {
+    max_levels(samples).saturating_sub(1).max(1)
+}
+
+/// M_j = T − 2^j + 1, the number of coefficients of a level (0 when the signal is too short).
+#[must_use]
+pub fn coefficient_count(samples: usize, level: u32) -> usize {
+    1_usize.checked_shl(level).map_or(0, |tau| (samples + 1).saturating_sub(tau))
+}
+
+fn check_levels(signal: &[f64], levels: u32) -> Result<(), WaveletError> {
+    if levels == 0 {
+        return Err(WaveletError::NoLevels);
+    }
+    if coefficient_count(signal.len(), levels) == 0 {
+        return Err(WaveletError::TooShort { samples: signal.len(), levels });
+    }
+    match signal.iter().position(|x| !x.is_finite()) {
+        None => Ok(()),
+        Some(index) => Err(WaveletError::NotFinite { index, value: signal[index] }),
+    }
+}

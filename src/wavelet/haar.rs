@@ -1,0 +1,222 @@
+//! The Haar MODWT: classical wavelet variance and the coefficients it is made of.
+//!
+//! Scale tau = 2^level samples, m = tau/2. W_t = (mean of the later m samples − mean of the earlier m)/2,
+//! t = 0 … T − tau; nu = mean(W²), not centred
+//! ([Percival](crate::bibliography::Percival95)). The Allan variance of averages over m samples is 2·nu.
+
+use super::{WaveletError, check_levels};
+use multiversion::multiversion;
+
+/// Elements that advance together; the order of every sum depends on it and on nothing of the machine.
+const WIDTH: usize = 16;
+/// Partial sums of so many elements are added with compensation.
+const BLOCK: usize = 2048;
+
+/// Classical wavelet variance at levels 1 … `levels` (units²); the entry of level j is at j − 1.
+///
+/// # Errors
+/// When the signal is too short for the levels, or a sample is not finite.
+pub fn classical(signal: &[f64], levels: u32) -> Result<Vec<f64>, WaveletError> {
+    let mut pyramid = Pyramid::new(signal, levels)?;
+    Ok((0..levels).map(|_| pyramid.next_variance()).collect())
+}
+
+/// The wavelet coefficients W_t of one level (units), `signal.len() − 2^level + 1` of them.
+///
+/// # Errors
+/// When the signal is too short for the level, or a sample is not finite.
+pub fn coefficients(signal: &[f64], level: u32) -> Result<Vec<f64>, WaveletError> {
+    let mut pyramid = Pyramid::new(signal, level)?;
+    for _ in 1..level {
+        pyramid.next_variance();
+    }
+    let m = pyramid.half;
+    let scale = 0.5 / m as f64;
+    let pairs = pyramid.sums.iter().zip(&pyramid.sums[m..]);
+    Ok(pairs.map(|(early, late)| (late - early) * scale).collect())
+}
+
+/// Running sums of m samples, m doubling from level to level, in one working array. Pairwise addition: the
+/// rounding error grows with log2 of the scale; the first sample is subtracted, so an offset costs no digits.
+pub(super) struct Pyramid {
+    /// Sums of `half` consecutive samples.
+    sums: Vec<f64>,
+    /// m of the level that comes next.
+    pub(super) half: usize,
+}
+
+impl Pyramid {
+    pub(super) fn new(signal: &[f64], levels: u32) -> Result<Self, WaveletError> {
+        check_levels(signal, levels)?;
+        let first = signal[0];
+        Ok(Self { sums: signal.iter().map(|x| x - first).collect(), half: 1 })
+    }
+
+    /// The classical variance of the next level.
+    pub(super) fn next_variance(&mut self) -> f64 {
+        self.advance(None)
+    }
+
+    /// The classical variance of the next level; `squares` receives (2m·W_t)².
+    pub(super) fn next_squares(&mut self, squares: &mut Vec<f64>) -> f64 {
+        squares.resize(self.sums.len() - self.half, 0.0);
+        self.advance(Some(squares))
+    }
+
+    fn advance(&mut self, squares: Option<&mut [f64]>) -> f64 {
+        let count = self.sums.len() - self.half;
+        let total = match squares {
+            None => step(&mut self.sums, self.half),
+            Some(squares) => step_keeping(&mut self.sums, self.half, squares),
+        };
+        let scale = 0.5 / self.half as f64;
+        self.sums.truncate(count);
+        self.half *= 2;
+        total * scale * scale / count as f64
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn step(sums: &mut [f64], half: usize) -> f64 {
+    butterflies(sums, half, |_, _| ())
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+fn step_keeping(sums: &mut [f64], half: usize, squares: &mut [f64]) -> f64 {
+    butterflies(sums, half, |t, values| squares[t..t + values.len()].copy_from_slice(values))
+}
+
+/// Replaces each a = sums\[t\] by a + b, b = sums\[t + half\], and returns Σ (b − a)²; `keep` sees the squares.
+#[inline(always)]
+fn butterflies(sums: &mut [f64], half: usize, mut keep: impl FnMut(usize, &[f64])) -> f64 {
+    let count = sums.len() - half;
+    let mut total = Compensated::default();
+    let mut lanes = [0.0; WIDTH];
+    let whole = count - count % WIDTH;
+    for t in (0..whole).step_by(WIDTH) {
+        let mut early: [f64; WIDTH] = array(&sums[t..t + WIDTH]);
+        let late: [f64; WIDTH] = array(&sums[t + half..t + half + WIDTH]);
+        let mut squares = [0.0; WIDTH];
+        for i in 0..WIDTH {
+            let difference = late[i] - early[i];
+            squares[i] = difference * difference;
+            early[i] += late[i];
+            lanes[i] += squares[i];
+        }
+        sums[t..t + WIDTH].copy_from_slice(&early);
+        keep(t, &squares);
+        if t % BLOCK == BLOCK - WIDTH {
+            total.add(pairwise(&lanes));
+            lanes = [0.0; WIDTH];
+        }
+    }
+    total.add(pairwise(&lanes));
+    for t in whole..count {
+        let difference = sums[t + half] - sums[t];
+        sums[t] += sums[t + half];
+        keep(t, &[difference * difference]);
+        total.add(difference * difference);
+    }
+    total.value()
+}
+
+#[inline(always)]
+pub(super) fn array<const N: usize>(slice: &[f64]) -> [f64; N] {
+    let mut a = [0.0; N];
+    a.copy_from_slice(&slice[..N]);
+    a
+}
+
+/// Sum of the lanes, halving.
+#[inline(always)]
+pub(super) fn pairwise<const N: usize>(lanes: &[f64; N]) -> f64 {
+    let mut a = *lanes;
+    let mut n = N;
+    while n > 1 {
+        n /= 2;
+        for i in 0..n {
+            a[i] += a[i + n];
+        }
+    }
+    a[0]
+}
+
+/// Compensated (Neumaier) sum.
+#[derive(Default)]
+pub(super) struct Compensated {
+    sum: f64,
+    lost: f64,
+}
+
+impl Compensated {
+    #[inline(always)]
+    pub(super) fn add(&mut self, x: f64) {
+        let sum = self.sum + x;
+        self.lost += if self.sum.abs() >= x.abs() { (self.sum - sum) + x } else { (x - sum) + self.sum };
+        self.sum = sum;
+    }
+
+    pub(super) fn value(&self) -> f64 {
+        self.sum + self.lost
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::Generator;
+    use approx::assert_relative_eq;
+    use rand::{RngExt, SeedableRng};
+
+    /// Σ W²·(2m)² in integers: exact.
+    fn exact(signal: &[i64], level: u32) -> f64 {
+        let m = 1_usize << (level - 1);
+        let mut prefix = vec![0_i128; signal.len() + 1];
+        for (t, &x) in signal.iter().enumerate() {
+            prefix[t + 1] = prefix[t] + i128::from(x);
+        }
+        let count = signal.len() - 2 * m + 1;
+        let difference = |t: usize| prefix[t + 2 * m] - 2 * prefix[t + m] + prefix[t];
+        let sum: i128 = (0..count).map(|t| difference(t) * difference(t)).sum();
+        sum as f64 / (2 * m) as f64 / (2 * m) as f64 / count as f64
+    }
+
+    /// White noise on an offset a million times larger, and a random walk far from its start, in
+    /// integers so that the expected value is exact.
+    #[test]
+    fn digits_survive_offsets_and_random_walks() {
+        let mut generator = Generator::seed_from_u64(1);
+        let n = 150_001;
+        let noise: Vec<i64> = (0..n).map(|_| generator.random_range(-1000..=1000)).collect();
+        let offset: Vec<i64> = noise.iter().map(|x| 9_810_000_000_000 + x).collect();
+        let mut position = 0;
+        let walk: Vec<i64> = noise
+            .iter()
+            .map(|x| {
+                position += x;
+                position
+            })
+            .collect();
+        for signal in [noise, offset, walk] {
+            let floats: Vec<f64> = signal.iter().map(|&x| x as f64).collect();
+            for (i, nu) in classical(&floats, 17).unwrap().iter().enumerate() {
+                assert_relative_eq!(*nu, exact(&signal, i as u32 + 1), max_relative = 1e-13);
+            }
+        }
+    }
+
+    #[test]
+    fn the_shortest_signals() {
+        assert_eq!(classical(&[1.0, 2.0], 1).unwrap(), [0.25]);
+        assert_eq!(
+            classical(&[1.0, 2.0, 4.0, 8.0], 2).unwrap(),
+            [(1.0 + 4.0 + 16.0) / 12.0, (4.5_f64 / 2.0).powi(2)]
+        );
+        assert_eq!(coefficients(&[1.0, 2.0, 4.0, 8.0], 2).unwrap(), [2.25]);
+        assert_eq!(classical(&[1.0, 2.0, 3.0], 2), Err(WaveletError::TooShort { samples: 3, levels: 2 }));
+        assert_eq!(classical(&[], 1), Err(WaveletError::TooShort { samples: 0, levels: 1 }));
+        assert_eq!(classical(&[1.0], 0), Err(WaveletError::NoLevels));
+        assert_eq!(classical(&[1.0; 8], 64), Err(WaveletError::TooShort { samples: 8, levels: 64 }));
+        assert!(matches!(classical(&[1.0, f64::NAN], 1), Err(WaveletError::NotFinite { index: 1, .. })));
+    }
+}
