@@ -1,0 +1,109 @@
+//! Statistics of one outage.
+
+use super::estimate::{Estimate, PerState, Quantile, quantile};
+use crate::simulation::{OutageRecord, RunResult};
+
+/// What the runs say about one outage (m, m/s, degrees, s).
+#[derive(Debug, Clone, PartialEq)]
+pub struct OutageMetrics {
+    /// First instant without a fix (s).
+    pub start_s: f64,
+    /// First instant with a fix again (s).
+    pub end_s: f64,
+    /// Mean over the outage's epochs of the ASEE.
+    pub asee_mean: PerState<Estimate>,
+    /// Root mean square error just before the first fix after the outage.
+    pub rmse_end: PerState<Estimate>,
+    /// Horizontal error at the same instant: median.
+    pub horizontal_p50_m: Quantile,
+    /// 95 % quantile.
+    pub horizontal_p95_m: Quantile,
+    /// Largest.
+    pub horizontal_max_m: f64,
+    /// How soon the runs recover.
+    pub reconvergence: Reconvergence,
+}
+
+/// Time from the outage's end until the error is back to what it was (s).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reconvergence {
+    /// Median over the runs that recover.
+    pub p50_s: Quantile,
+    /// 95 % quantile over the runs that recover.
+    pub p95_s: Quantile,
+    /// Runs that do not recover before the trajectory or the next outage ends their chance.
+    pub never: u64,
+}
+
+/// Statistics of every outage, diverged runs left out.
+#[must_use]
+pub fn outages(result: &RunResult) -> Vec<OutageMetrics> {
+    let kept = || result.runs.iter().filter(|r| !r.diverged);
+    let of = |(i, window): (usize, &(f64, f64))| {
+        let records: Vec<&OutageRecord> = kept().filter_map(|r| r.outages.get(i)).collect();
+        outage(*window, &records)
+    };
+    result.outages.iter().enumerate().map(of).collect()
+}
+
+fn outage((start_s, end_s): (f64, f64), records: &[&OutageRecord]) -> OutageMetrics {
+    let horizontal = sorted(records.iter().map(|r| r.horizontal_error_end_m));
+    let recovery = sorted(records.iter().map(|r| r.reconvergence_s).filter(|s| s.is_finite()));
+    let per_state = |f: &dyn Fn(usize) -> Estimate| PerState(std::array::from_fn(f));
+    OutageMetrics {
+        start_s,
+        end_s,
+        asee_mean: per_state(&|i| Estimate::mean_of(records.iter().map(|r| r.see_mean[i]))),
+        rmse_end: per_state(&|i| Estimate::root_mean_square_of(records.iter().map(|r| r.error_end[i]))),
+        horizontal_p50_m: quantile(&horizontal, 0.5),
+        horizontal_p95_m: quantile(&horizontal, 0.95),
+        horizontal_max_m: horizontal.last().copied().unwrap_or(f64::NAN),
+        reconvergence: Reconvergence {
+            p50_s: quantile(&recovery, 0.5),
+            p95_s: quantile(&recovery, 0.95),
+            never: (records.len() - recovery.len()) as u64,
+        },
+    }
+}
+
+fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(f64::total_cmp);
+    values
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "small integers are exact")]
+mod tests {
+    use super::*;
+    use crate::simulation::RunRecord;
+
+    fn run(run: u64, value: f64, diverged: bool) -> RunRecord {
+        let record = OutageRecord {
+            see_mean: [value; 9],
+            error_end: [-value; 9],
+            horizontal_error_end_m: value,
+            reconvergence_s: if value > 4.0 { f64::NAN } else { value },
+        };
+        RunRecord { run, diverged, outages: vec![record], nis: (6.0, 1) }
+    }
+
+    #[test]
+    fn diverged_runs_are_left_out_and_lost_ones_counted() {
+        let runs = vec![run(0, 1.0, false), run(1, 1e9, true), run(2, 5.0, false), run(3, 3.0, false)];
+        let result = RunResult { runs, outages: vec![(300.0, 390.0)], ..RunResult::default() };
+        let metrics = &outages(&result)[0];
+        assert_eq!(metrics.asee_mean.0[1].value, 3.0);
+        assert!((metrics.rmse_end.0[4].value - (35.0_f64 / 3.0).sqrt()).abs() < 1e-15);
+        assert_eq!((metrics.horizontal_p50_m.value, metrics.horizontal_max_m), (3.0, 5.0));
+        assert_eq!((metrics.reconvergence.p50_s.value, metrics.reconvergence.never), (2.0, 1));
+    }
+
+    #[test]
+    fn no_run_left_is_no_number() {
+        let result =
+            RunResult { runs: vec![run(0, 1.0, true)], outages: vec![(0.0, 1.0)], ..RunResult::default() };
+        let metrics = &outages(&result)[0];
+        assert!(metrics.asee_mean.0[0].value.is_nan() && metrics.horizontal_max_m.is_nan());
+    }
+}

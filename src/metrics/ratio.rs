@@ -1,0 +1,214 @@
+//! Ratios between two experiments on the same trajectory with the same outages: what the filter of one
+//! believes, relative to the other ([Minaretzis et al.](crate::bibliography::Minaretzis24), Table I).
+
+use crate::simulation::{OutageRecord, REPORTED, RunRecord};
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+/// The statistics of one epoch that ratios are made of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EpochRow {
+    /// Time on the trajectory (s).
+    pub t_s: f64,
+    /// ASEE of each reported state.
+    pub asee: [f64; REPORTED],
+    /// RMSE of each reported state.
+    pub rmse: [f64; REPORTED],
+    /// Mean NEES.
+    pub nees: f64,
+    /// Share of runs covered.
+    pub coverage: f64,
+}
+
+/// What is kept of an experiment.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Experiment {
+    /// Epochs in time order.
+    pub epochs: Vec<EpochRow>,
+    /// Runs in run order.
+    pub runs: Vec<RunRecord>,
+    /// Outages (start, end) (s).
+    pub outages: Vec<(f64, f64)>,
+}
+
+/// Why two experiments have no ratio.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ComparisonError {
+    /// Other outages.
+    #[error("the outages differ: {candidate} against {reference} of the reference")]
+    Outages {
+        /// Outages of the candidate, in words.
+        candidate: String,
+        /// Outages of the reference, in words.
+        reference: String,
+    },
+    /// Other epochs.
+    #[error("the reporting epochs differ: {candidate} against {reference} of the reference")]
+    Epochs {
+        /// Epochs of the candidate, in words.
+        candidate: String,
+        /// Epochs of the reference, in words.
+        reference: String,
+    },
+}
+
+/// A mean ratio's distance from unity (%) and the 95 % interval of it; NaN where runs are too few.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RatioError {
+    /// (ratio − 1)·100.
+    pub pct: f64,
+    /// Its Monte-Carlo interval.
+    pub ci95_pct: [f64; 2],
+}
+
+/// One state in one outage.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StateRatio {
+    /// Mean over the outage's epochs of (ASEE ratio − 1)·100.
+    pub asee: RatioError,
+    /// Mean over the outage's epochs of |ASEE ratio − 1|·100.
+    pub asee_abs_pct: f64,
+    /// (ratio − 1)·100 of the RMSE just before the first fix after the outage.
+    pub rmse_end: RatioError,
+}
+
+/// One outage of a candidate against the reference.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OutageComparison {
+    /// Reported states.
+    pub states: [StateRatio; REPORTED],
+    /// Mean NEES over the outage's epochs: candidate, reference.
+    pub nees: [f64; 2],
+    /// Mean coverage over the outage's epochs: candidate, reference.
+    pub coverage: [f64; 2],
+}
+
+/// The comparison of a candidate with the reference, outage by outage.
+///
+/// `paired`: whether run k of both saw the same noise (same seed, same truth); the intervals are narrower
+/// for it. The interval of the ASEE ratio comes from the per-run means over the outage, a of the candidate
+/// and b of the reference, by linearisation: with ρ = ā/b̄, ρ − E ρ ≈ mean(a − ρ b)/b̄.
+///
+/// # Errors
+/// When epochs or outages differ.
+pub fn compare(
+    candidate: &Experiment,
+    reference: &Experiment,
+    paired: bool,
+) -> Result<Vec<OutageComparison>, ComparisonError> {
+    comparable(candidate, reference)?;
+    let of = |(i, window): (usize, &(f64, f64))| outage(candidate, reference, i, *window, paired);
+    Ok(reference.outages.iter().enumerate().map(of).collect())
+}
+
+fn comparable(candidate: &Experiment, reference: &Experiment) -> Result<(), ComparisonError> {
+    if candidate.outages != reference.outages {
+        let words = |e: &Experiment| match e.outages.as_slice() {
+            [] => "none".to_owned(),
+            all => all.iter().map(|(a, b)| format!("{a}:{b}")).collect::<Vec<_>>().join(", "),
+        };
+        let (candidate, reference) = (words(candidate), words(reference));
+        return Err(ComparisonError::Outages { candidate, reference });
+    }
+    let times = |e: &Experiment| e.epochs.iter().map(|row| row.t_s.to_bits()).collect::<Vec<_>>();
+    if times(candidate) != times(reference) {
+        let words = |e: &Experiment| match (e.epochs.first(), e.epochs.last()) {
+            (Some(first), Some(last)) => format!("{} from {} to {} s", e.epochs.len(), first.t_s, last.t_s),
+            _ => "none".to_owned(),
+        };
+        let (candidate, reference) = (words(candidate), words(reference));
+        return Err(ComparisonError::Epochs { candidate, reference });
+    }
+    Ok(())
+}
+
+fn outage(
+    candidate: &Experiment,
+    reference: &Experiment,
+    index: usize,
+    (start_s, end_s): (f64, f64),
+    paired: bool,
+) -> OutageComparison {
+    let inside = |row: &&EpochRow| start_s <= row.t_s && row.t_s < end_s;
+    let pick = |e: &Experiment| e.epochs.iter().filter(inside).cloned().collect::<Vec<_>>();
+    let (c, r) = (pick(candidate), pick(reference));
+    let records = records(candidate, reference, index, paired);
+    let state = |i: usize| {
+        let ratios: Vec<f64> = c.iter().zip(&r).map(|(c, r)| (c.asee[i] / r.asee[i] - 1.0) * 100.0).collect();
+        let see = |side: &[&OutageRecord]| side.iter().map(|o| o.see_mean[i]).collect::<Vec<_>>();
+        let square = |side: &[&OutageRecord]| side.iter().map(|o| o.error_end[i].powi(2)).collect::<Vec<_>>();
+        let pct = mean(ratios.iter().copied());
+        let asee = mean_ratio(&see(&records.0), &see(&records.1), paired);
+        StateRatio {
+            asee: RatioError { pct, ci95_pct: [pct - asee.half_width_pct, pct + asee.half_width_pct] },
+            asee_abs_pct: mean(ratios.iter().map(|e| e.abs())),
+            rmse_end: mean_ratio(&square(&records.0), &square(&records.1), paired).root(),
+        }
+    };
+    OutageComparison {
+        states: std::array::from_fn(state),
+        nees: [mean(c.iter().map(|row| row.nees)), mean(r.iter().map(|row| row.nees))],
+        coverage: [mean(c.iter().map(|row| row.coverage)), mean(r.iter().map(|row| row.coverage))],
+    }
+}
+
+type Records<'a> = Vec<&'a OutageRecord>;
+
+/// The records of one outage on both sides: of the runs that neither side lost when paired.
+fn records<'a>(
+    candidate: &'a Experiment,
+    reference: &'a Experiment,
+    outage: usize,
+    paired: bool,
+) -> (Records<'a>, Records<'a>) {
+    let kept = |e: &'a Experiment| e.runs.iter().filter(|r| !r.diverged && r.outages.len() > outage);
+    let record = |r: &'a RunRecord| &r.outages[outage];
+    if !paired {
+        return (kept(candidate).map(record).collect(), kept(reference).map(record).collect());
+    }
+    let of_run: std::collections::HashMap<u64, &RunRecord> = kept(reference).map(|r| (r.run, r)).collect();
+    kept(candidate).filter_map(|c| Some((record(c), record(of_run.get(&c.run)?)))).unzip()
+}
+
+/// A ratio of means and half the width of its 95 % interval (%).
+struct MeanRatio {
+    ratio: f64,
+    half_width_pct: f64,
+}
+
+impl MeanRatio {
+    /// The square root of the ratio, its interval by linearisation.
+    fn root(&self) -> RatioError {
+        let root = self.ratio.sqrt();
+        let (pct, half) = ((root - 1.0) * 100.0, self.half_width_pct / (2.0 * root));
+        RatioError { pct, ci95_pct: [pct - half, pct + half] }
+    }
+}
+
+fn mean_ratio(a: &[f64], b: &[f64], paired: bool) -> MeanRatio {
+    let (mean_a, mean_b) = (mean(a.iter().copied()), mean(b.iter().copied()));
+    let ratio = mean_a / mean_b;
+    let variance = if paired {
+        let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - ratio * b).collect();
+        variance_of_mean(&differences)
+    } else {
+        variance_of_mean(a) + ratio * ratio * variance_of_mean(b)
+    };
+    let freedom = a.len().min(b.len()) as f64 - 1.0;
+    let t = StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |t| t.inverse_cdf(0.975));
+    MeanRatio { ratio, half_width_pct: t * variance.sqrt() / mean_b * 100.0 }
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (n, sum) = values.fold((0.0, 0.0), |(n, sum), v| (n + 1.0, sum + v));
+    sum / n
+}
+
+fn variance_of_mean(values: &[f64]) -> f64 {
+    let n = values.len() as f64;
+    let centre = mean(values.iter().copied());
+    values.iter().map(|v| (v - centre).powi(2)).sum::<f64>() / (n - 1.0) / n
+}
+
+#[cfg(test)]
+#[path = "ratio_tests.rs"]
+mod tests;

@@ -1,0 +1,92 @@
+use super::*;
+use crate::rng::StreamKey;
+use rand_distr::{Distribution, StandardNormal};
+
+fn row(t_s: f64, asee: f64) -> EpochRow {
+    EpochRow { t_s, asee: [asee; REPORTED], rmse: [1.0; REPORTED], nees: 9.0, coverage: 0.95 }
+}
+
+fn record(see: f64, error: f64) -> OutageRecord {
+    OutageRecord { see_mean: [see; REPORTED], error_end: [error; REPORTED], ..OutageRecord::default() }
+}
+
+fn run(run: u64, see: f64, error: f64) -> RunRecord {
+    RunRecord { run, outages: vec![record(see, error)], ..RunRecord::default() }
+}
+
+fn experiment(asee: &[f64], runs: Vec<RunRecord>) -> Experiment {
+    let epochs = asee.iter().enumerate().map(|(i, a)| row(i as f64, *a)).collect();
+    Experiment { epochs, runs, outages: vec![(1.0, 3.0)] }
+}
+
+#[test]
+fn ratio_errors_are_means_over_the_outage_signed_and_absolute() {
+    // Epochs 1 and 2 are in the outage (3 is not): ratios 1.2 and 0.9.
+    let candidate = experiment(&[9.0, 1.2, 1.8, 9.0], vec![run(0, 1.5, 1.0), run(1, 1.5, 1.0)]);
+    let reference = experiment(&[1.0, 1.0, 2.0, 1.0], vec![run(0, 1.5, 0.5), run(1, 1.5, 0.5)]);
+    let result = compare(&candidate, &reference, true).unwrap();
+    let state = result[0].states[4];
+    assert!((state.asee.pct - 5.0).abs() < 1e-12, "{state:?}");
+    assert!((state.asee_abs_pct - 15.0).abs() < 1e-12, "{state:?}");
+    assert!((state.rmse_end.pct - 100.0).abs() < 1e-12, "{state:?}");
+}
+
+#[test]
+fn proportional_runs_leave_no_doubt_when_paired_and_some_when_not() {
+    let scaled = |factor: f64| (0..10).map(|k| run(k, factor * (1.0 + 0.1 * k as f64), 1.0)).collect();
+    let (candidate, reference) =
+        (experiment(&[1.0, 1.3, 1.3], scaled(1.3)), experiment(&[1.0; 3], scaled(1.0)));
+    let width = |paired| {
+        let ci = compare(&candidate, &reference, paired).unwrap()[0].states[0].asee.ci95_pct;
+        ci[1] - ci[0]
+    };
+    assert!(width(true) < 1e-9, "{}", width(true));
+    assert!(width(false) > 10.0, "{}", width(false));
+}
+
+/// The 95 % interval covers the true ratio in 95 % of 4000 repetitions, within 5 standard deviations of a
+/// binomial share (0.0172).
+#[test]
+fn paired_intervals_cover_at_their_level() {
+    let mut rng = StreamKey { seed: 5, scenario: "", run: 0, source: "ratio", process: "test" }.generator();
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    let repetitions = 4000;
+    let mut covered = 0;
+    for _ in 0..repetitions {
+        let (mut a, mut b) = (Vec::new(), Vec::new());
+        for _ in 0..40 {
+            let common = normal();
+            a.push(1.2 * (10.0 + common) + 0.3 * normal());
+            b.push(10.0 + common);
+        }
+        let ratio = mean_ratio(&a, &b, true);
+        covered += u32::from(((ratio.ratio - 1.2) * 100.0).abs() <= ratio.half_width_pct);
+    }
+    let share = f64::from(covered) / f64::from(repetitions);
+    assert!((share - 0.95).abs() < 5.0 * (0.95_f64 * 0.05 / 4000.0).sqrt(), "{share}");
+}
+
+#[test]
+fn runs_that_either_side_lost_are_not_paired() {
+    let mut candidate = experiment(&[1.0; 3], (0..4).map(|k| run(k, 2.0, 1.0)).collect());
+    let mut reference = experiment(&[1.0; 3], (0..4).map(|k| run(k, 1.0, 1.0)).collect());
+    candidate.runs[1] = RunRecord { diverged: true, ..run(1, 1e30, 1e30) };
+    reference.runs[2] = RunRecord { diverged: true, ..run(2, 1e30, 1e30) };
+    let (c, r) = records(&candidate, &reference, 0, true);
+    assert_eq!((c.len(), r.len()), (2, 2));
+    let rmse = compare(&candidate, &reference, true).unwrap()[0].states[0].rmse_end;
+    assert!(rmse.pct.abs() < 1e-12, "{rmse:?}");
+}
+
+#[test]
+fn other_outages_or_epochs_are_refused_in_words() {
+    let reference = experiment(&[1.0; 3], vec![]);
+    let other = Experiment { outages: vec![(5.0, 7.5)], ..reference.clone() };
+    let error = compare(&other, &reference, true).unwrap_err();
+    assert_eq!(error.to_string(), "the outages differ: 5:7.5 against 1:3 of the reference");
+    let error = compare(&experiment(&[1.0; 4], vec![]), &reference, true).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "the reporting epochs differ: 4 from 0 to 3 s against 3 from 0 to 2 s of the reference"
+    );
+}

@@ -1,0 +1,111 @@
+use super::*;
+use crate::rng::StreamKey;
+use crate::simulation::{EpochSums, OutageRecord, RunRecord};
+use rand_distr::{Distribution, StandardNormal};
+
+/// Runs of a filter that is right by construction: errors drawn from its own covariance (identity).
+fn matched(runs: u64, epochs: usize) -> RunResult {
+    let mut rng = StreamKey { seed: 11, scenario: "", run: 0, source: "summary", process: "t" }.generator();
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    let mut sums = Vec::new();
+    for t in 0..epochs {
+        let mut s = EpochSums { t_s: t as f64, gnss: true, count: runs, ..EpochSums::default() };
+        for _ in 0..runs {
+            let e: [f64; 9] = std::array::from_fn(|_| normal());
+            for i in 0..9 {
+                s.see[i] += 1.0;
+                s.see_sq[i] += 1.0;
+                s.error[i] += e[i];
+                s.error_sq[i] += e[i].powi(2);
+                s.error_4[i] += e[i].powi(4);
+            }
+            let nees: f64 = e.iter().map(|x| x * x).sum();
+            s.nees[0] += nees;
+            s.nees[1] += nees * nees;
+            let six: f64 = [0, 1, 2, 6, 7, 8].iter().map(|i| e[*i].powi(2)).sum();
+            s.covered += u64::from(six <= 12.591_587_243_743_977); // 95 % quantile of χ²(6)
+        }
+        sums.push(s);
+    }
+    let record = |run| RunRecord {
+        run,
+        diverged: false,
+        outages: vec![OutageRecord { see_mean: [1.0; 9], ..OutageRecord::default() }],
+        nis: (6.0, 10),
+    };
+    RunResult {
+        epochs: sums,
+        runs: (0..runs).map(record).collect(),
+        outages: vec![(2.0, 4.0)],
+        filter_states: 15,
+        fix_components: 6,
+        coverage_level: 0.95,
+        run_epochs: runs * 1000,
+    }
+}
+
+/// Over 2000 independent epochs 95 % of the NEES means lie in their band, within 5 standard deviations of
+/// a binomial share, 5 √(0.05·0.95/2000) = 0.0244. The band of the coverage is discrete: for 50 runs its
+/// probability is 98.3 % (44 to 50 of 50, and 50 cannot be exceeded).
+#[test]
+fn a_correct_filter_is_found_correct() {
+    let result = matched(50, 2000);
+    let epochs = super::super::epochs(&result.epochs);
+    let summary = Summary::of(&result, &epochs, 7, 2.0);
+    assert!((summary.nees.fraction_inside - 0.95).abs() < 0.0244, "{:?}", summary.nees);
+    assert!((summary.nees.mean - 9.0).abs() < 5.0 * (18.0_f64 / 1e5).sqrt(), "{:?}", summary.nees);
+    assert!(summary.coverage.fraction_inside > 0.95, "{:?}", summary.coverage);
+    assert!((summary.coverage.mean - 0.95).abs() < 5.0 * (0.0475_f64 / 1e5).sqrt(), "{:?}", summary.coverage);
+    let rmse = epochs[0].rmse.0[0];
+    // sd of a mean square of 50 standard normals: √(2/50); of its root half of that
+    assert!((rmse.std_error - 0.1).abs() < 0.05 && (rmse.value - 1.0).abs() < 0.5, "{rmse:?}");
+}
+
+#[test]
+fn a_filter_off_by_a_quarter_is_found_out() {
+    let mut result = matched(100, 200);
+    for s in &mut result.epochs {
+        s.nees = s.nees.map(|n| n * 1.25);
+    }
+    let epochs = super::super::epochs(&result.epochs);
+    assert!(Summary::of(&result, &epochs, 7, 1.0).nees.fraction_inside < 0.2);
+}
+
+#[test]
+fn the_file_has_the_keys_of_the_interface() {
+    let mut result = matched(4, 6);
+    result.runs[2].diverged = true;
+    let summary = Summary::of(&result, &super::super::epochs(&result.epochs), 7, 2.0);
+    let json = serde_json::to_value(&summary).unwrap();
+    for pointer in [
+        "/outages/0/start_s",
+        "/outages/0/asee_mean/pos_e_m",
+        "/outages/0/rmse_end/roll_deg",
+        "/outages/0/horizontal_error_end_m/p50",
+        "/outages/0/horizontal_error_end_m/max",
+        "/nees/fraction_inside",
+        "/coverage/level",
+    ] {
+        assert!(json.pointer(pointer).is_some_and(|v| v.is_number()), "{pointer} in {json}");
+    }
+    assert_eq!(json["schema_version"], 1);
+    assert_eq!(json["method"], "monte-carlo");
+    assert_eq!(
+        (&json["runs"], &json["diverged"], &json["diverged_runs"][0]),
+        (&4.into(), &1.into(), &2.into())
+    );
+    assert_eq!(json["throughput_epochs_per_s"], 2000.0);
+    assert_eq!(json["nis"]["fixes"], 30);
+}
+
+#[test]
+fn nothing_left_is_null_not_a_crash() {
+    let mut result = matched(2, 2);
+    for run in &mut result.runs {
+        run.diverged = true;
+    }
+    result.epochs.iter_mut().for_each(|s| *s = EpochSums { t_s: s.t_s, ..EpochSums::default() });
+    let json =
+        serde_json::to_value(Summary::of(&result, &super::super::epochs(&result.epochs), 7, 1.0)).unwrap();
+    assert!(json["nees"]["mean"].is_null() && json["nees"]["lower95"].is_null());
+}
