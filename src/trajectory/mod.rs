@@ -4,6 +4,7 @@
 //! Everything a sensor could measure follows from it by differentiation, so the ideal IMU and the
 //! reference agree to rounding, whatever the samples were.
 
+pub mod profile;
 mod spline;
 
 use crate::earth::{MAX_LATITUDE, e_to_n, ecef_to_geodetic, geodetic_to_ecef};
