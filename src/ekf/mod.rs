@@ -1,5 +1,18 @@
 //! The error-state extended Kalman filter (loosely coupled INS/GNSS).
+//!
+//! Closed loop: corrections go into the nominal state at once and the error mean is zero between fixes.
+//! Errors are estimate − truth; attitude by C_est = (I + \[psi_n×\]) C_true.
+//!
+//! The filter never sees truth: it is given increments, fixes, and what it believes of the noise.
 
-mod initial;
+pub mod belief;
+pub mod covariance;
+pub mod dynamics;
+pub mod filter;
+pub mod initial;
+pub mod update;
 
-pub use initial::{FilterStates, InitialSettings};
+pub use belief::{Belief, BeliefError, FilterStates};
+pub use covariance::Covariance;
+pub use filter::Ekf;
+pub use initial::InitialSettings;

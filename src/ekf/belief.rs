@@ -1,0 +1,155 @@
+//! What the filter believes of the inertial noise: a noise model in the form of filter states.
+
+use crate::imu::{Channel, Sensor};
+use crate::noise::{Composite, Model, Process, reduction};
+use glam::DVec3;
+
+/// Which states the filter carries for the inertial noise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum FilterStates {
+    /// One first-order Gauss-Markov bias an axis: 15 states. The model is reduced to it.
+    #[default]
+    Reduced,
+    /// One state for each AR1, Gauss-Markov and random-walk process of each axis.
+    Full,
+}
+
+/// A model that cannot be made into filter states.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum BeliefError {
+    /// A process that has no stochastic state.
+    #[error("{channel}: a drift (DR) has no state in the full filter; use the reduced one (15 states)")]
+    Drift {
+        /// The axis that carries it.
+        channel: Channel,
+    },
+    /// Reduction failed.
+    #[error("{channel}: {source}")]
+    Reduction {
+        /// The axis.
+        channel: Channel,
+        /// Why.
+        source: reduction::ReductionError,
+    },
+}
+
+/// One bias state an axis of one sensor: b_{k+1} = phi b_k + w.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct BiasGroup {
+    /// Coefficients of the three axes.
+    pub phi: DVec3,
+    /// Innovation variances (units² per sample).
+    pub innovation: DVec3,
+    /// Initial variances (units²).
+    pub initial: DVec3,
+}
+
+/// What the filter believes: white noise of a sample and bias states, for each sensor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Belief {
+    /// Rate the parameters belong to (Hz).
+    pub rate_hz: f64,
+    /// White variance of a sample on the three axes, accelerometer ((m/s²)²) and gyroscope ((rad/s)²).
+    pub white: [DVec3; 2],
+    /// Bias groups of the accelerometer and of the gyroscope, at least one each.
+    pub groups: [Vec<BiasGroup>; 2],
+    /// Stochastic states carried, navigation included (15 for the reduced filter).
+    pub states: usize,
+}
+
+impl Belief {
+    /// The filter's states for a model.
+    ///
+    /// `window_s` is the longest time scale that matters, for the reduction (see
+    /// [`reduction::window_s`]). Quantization noise is left out of the filter: its integral is bounded, so
+    /// it is not white noise to a filter that integrates.
+    ///
+    /// # Errors
+    /// When a process has no state in the full filter, or the reduction fails.
+    pub fn new(model: &Model, states: FilterStates, window_s: f64) -> Result<Self, BeliefError> {
+        let mut belief =
+            Self { rate_hz: model.rate_hz, white: [DVec3::ZERO; 2], groups: [vec![], vec![]], states: 9 };
+        for channel in Channel::ALL {
+            let axis = match states {
+                FilterStates::Full => AxisBelief::full(model.axis(channel), channel)?,
+                FilterStates::Reduced => AxisBelief::reduced(model, channel, window_s)?,
+            };
+            belief.add(channel, &axis);
+        }
+        for groups in &mut belief.groups {
+            if groups.is_empty() {
+                groups.push(BiasGroup::default());
+            }
+        }
+        Ok(belief)
+    }
+
+    fn add(&mut self, channel: Channel, axis: &AxisBelief) {
+        let (sensor, i) = (channel.sensor as usize, channel.axis as usize);
+        self.white[sensor][i] = axis.white;
+        self.states += axis.biases.len();
+        for (g, bias) in axis.biases.iter().enumerate() {
+            if self.groups[sensor].len() == g {
+                self.groups[sensor].push(BiasGroup::default());
+            }
+            let group = &mut self.groups[sensor][g];
+            (group.phi[i], group.innovation[i], group.initial[i]) = (bias.phi, bias.innovation, bias.initial);
+        }
+    }
+
+    /// Blocks of the covariance: R, V, PSI and the bias groups.
+    #[must_use]
+    pub fn blocks(&self) -> usize {
+        3 + self.groups[0].len() + self.groups[1].len()
+    }
+
+    /// Replaces the initial variance of the first bias group of a sensor by sigma² on each axis.
+    pub fn set_initial_bias_sigma(&mut self, sensor: Sensor, sigma: f64) {
+        if let Some(group) = self.groups[sensor as usize].first_mut() {
+            group.initial = DVec3::splat(sigma * sigma);
+        }
+    }
+}
+
+struct BiasState {
+    phi: f64,
+    innovation: f64,
+    initial: f64,
+}
+
+struct AxisBelief {
+    white: f64,
+    biases: Vec<BiasState>,
+}
+
+impl AxisBelief {
+    fn full(noise: &Composite, channel: Channel) -> Result<Self, BeliefError> {
+        let mut axis = Self { white: 0.0, biases: vec![] };
+        for process in &noise.processes {
+            match process {
+                Process::White(p) => axis.white += p.sigma2(),
+                // its long-run variance: what a filter that integrates feels
+                Process::Ma1(p) => axis.white += (1.0 + p.theta()).powi(2) * p.sigma2(),
+                Process::Quantization(_) => {}
+                Process::Ar1(p) => axis.push(p.phi(), p.sigma2(), p.variance()),
+                Process::GaussMarkov(p) => axis.push(p.ar1().phi(), p.ar1().sigma2(), p.s2()),
+                Process::RandomWalk(p) => axis.push(1.0, p.gamma2(), 0.0),
+                Process::Drift(_) => return Err(BeliefError::Drift { channel }),
+            }
+        }
+        Ok(axis)
+    }
+
+    fn reduced(model: &Model, channel: Channel, window_s: f64) -> Result<Self, BeliefError> {
+        let reduced = reduction::reduce(model.axis(channel), model.rate_hz, window_s)
+            .map_err(|source| BeliefError::Reduction { channel, source })?;
+        let mut axis = Self { white: reduced.white.sigma2(), biases: vec![] };
+        axis.push(reduced.bias.phi(), reduced.bias.sigma2(), reduced.initial_variance);
+        Ok(axis)
+    }
+
+    fn push(&mut self, phi: f64, innovation: f64, initial: f64) {
+        self.biases.push(BiasState { phi, innovation, initial });
+    }
+}
+
