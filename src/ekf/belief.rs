@@ -1,18 +1,12 @@
 //! What the filter believes of the inertial noise: a noise model in the form of filter states.
 
+use super::initial::FilterStates;
 use crate::imu::{Channel, Sensor};
 use crate::noise::{Composite, Model, Process, reduction};
 use glam::DVec3;
 
-/// Which states the filter carries for the inertial noise.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum FilterStates {
-    /// One first-order Gauss-Markov bias an axis: 15 states. The model is reduced to it.
-    #[default]
-    Reduced,
-    /// One state for each AR1, Gauss-Markov and random-walk process of each axis.
-    Full,
-}
+/// Most bias states an axis.
+pub const MAX_GROUPS: usize = 8;
 
 /// A model that cannot be made into filter states.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -21,6 +15,12 @@ pub enum BeliefError {
     #[error("{channel}: a drift (DR) has no state in the full filter; use the reduced one (15 states)")]
     Drift {
         /// The axis that carries it.
+        channel: Channel,
+    },
+    /// More bias states than the filter carries.
+    #[error("{channel}: more than {MAX_GROUPS} correlated processes; use the reduced filter (15 states)")]
+    TooManyStates {
+        /// The axis that carries them.
         channel: Channel,
     },
     /// Reduction failed.
@@ -60,20 +60,27 @@ pub struct Belief {
 impl Belief {
     /// The filter's states for a model.
     ///
-    /// `window_s` is the longest time scale that matters, for the reduction (see
-    /// [`reduction::window_s`]). Quantization noise is left out of the filter: its integral is bounded, so
+    /// The reduction is made for a GNSS interval and a longest time scale (s; [`reduction::window_s`]). Quantization noise is left out of the filter: its integral is bounded, so
     /// it is not white noise to a filter that integrates.
     ///
     /// # Errors
     /// When a process has no state in the full filter, or the reduction fails.
-    pub fn new(model: &Model, states: FilterStates, window_s: f64) -> Result<Self, BeliefError> {
+    pub fn new(
+        model: &Model,
+        states: FilterStates,
+        interval_s: f64,
+        window_s: f64,
+    ) -> Result<Self, BeliefError> {
         let mut belief =
             Self { rate_hz: model.rate_hz, white: [DVec3::ZERO; 2], groups: [vec![], vec![]], states: 9 };
         for channel in Channel::ALL {
             let axis = match states {
                 FilterStates::Full => AxisBelief::full(model.axis(channel), channel)?,
-                FilterStates::Reduced => AxisBelief::reduced(model, channel, window_s)?,
+                FilterStates::Reduced15 => AxisBelief::reduced(model, channel, interval_s, window_s)?,
             };
+            if axis.biases.len() > MAX_GROUPS {
+                return Err(BeliefError::TooManyStates { channel });
+            }
             belief.add(channel, &axis);
         }
         for groups in &mut belief.groups {
@@ -140,8 +147,8 @@ impl AxisBelief {
         Ok(axis)
     }
 
-    fn reduced(model: &Model, channel: Channel, window_s: f64) -> Result<Self, BeliefError> {
-        let reduced = reduction::reduce(model.axis(channel), model.rate_hz, window_s)
+    fn reduced(model: &Model, channel: Channel, interval_s: f64, window_s: f64) -> Result<Self, BeliefError> {
+        let reduced = reduction::reduce(model.axis(channel), model.rate_hz, interval_s, window_s)
             .map_err(|source| BeliefError::Reduction { channel, source })?;
         let mut axis = Self { white: reduced.white.sigma2(), biases: vec![] };
         axis.push(reduced.bias.phi(), reduced.bias.sigma2(), reduced.initial_variance);
@@ -152,4 +159,3 @@ impl AxisBelief {
         self.biases.push(BiasState { phi, innovation, initial });
     }
 }
-

@@ -12,6 +12,7 @@
 use crate::earth::{E2, OMEGA_IE, gravity_down, radii};
 use crate::lanes::{Lanes, Mat3, Real, Vec3};
 use crate::strapdown::{StepTrace, Strapdown};
+use glam::DVec3;
 
 /// Longest step of the Earth terms (s).
 pub const EARTH_STEP_S: f64 = 0.2;
@@ -60,6 +61,30 @@ impl Sample {
         NavRows { r, v, psi }
     }
 
+    /// C diag(variances) Cᵀ dt²: the noise of one sample of a sensor, in n.
+    #[inline(always)]
+    #[must_use]
+    pub fn rotated_noise(&self, variances: DVec3) -> Mat3 {
+        if variances.x == variances.y && variances.x == variances.z {
+            let q = Lanes::splat(variances.x * self.dt * self.dt);
+            return Mat3::diagonal(Vec3([q; 3]));
+        }
+        let c = &self.c_dt;
+        Mat3::from_fn(|i, j| {
+            c.0[i][0] * c.0[j][0] * variances.x
+                + c.0[i][1] * c.0[j][1] * variances.y
+                + c.0[i][2] * c.0[j][2] * variances.z
+        })
+    }
+
+    /// What the sample's own gyroscope noise does to the velocity of the same sample: the covariance of
+    /// V and PSI it adds, −½ \[f_n dt ×\] q_psi.
+    #[inline(always)]
+    #[must_use]
+    pub fn tilted_noise(&self, q_psi: &Mat3) -> Mat3 {
+        self.cross_f(q_psi, -0.5)
+    }
+
     /// \[f_n dt ×\] m · scale.
     #[inline(always)]
     fn cross_f(&self, m: &Mat3, scale: f64) -> Mat3 {
@@ -105,11 +130,7 @@ impl EarthTerms {
         let drn = radii.meridian * s * c * (3.0 * E2) / w2;
         let dre = radii.transverse * s * c * E2 / w2;
 
-        let rr = Mat3([
-            [-(vd / rn), z, wn],
-            [we * tan, -(wn * tan * rn / re) - vd / re, we],
-            [z, z, z],
-        ]);
+        let rr = Mat3([[-(vd / rn), z, wn], [we * tan, -(wn * tan * rn / re) - vd / re, we], [z, z, z]]);
         // For r in metres: ∂/∂lat · 1/rn per metre north, −∂/∂h per metre down.
         let omega_ie = Vec3([c * OMEGA_IE, z, s * -OMEGA_IE]);
         let omega_en = Vec3([we, -wn, -(we * tan)]);

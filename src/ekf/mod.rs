@@ -12,7 +12,10 @@ pub mod filter;
 pub mod initial;
 pub mod update;
 
-pub use belief::{Belief, BeliefError, FilterStates};
+pub use belief::{Belief, BeliefError};
 pub use covariance::Covariance;
 pub use filter::Ekf;
-pub use initial::InitialSettings;
+pub use initial::{FilterStates, InitialSettings};
+
+#[cfg(test)]
+mod tests;

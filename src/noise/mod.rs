@@ -6,11 +6,14 @@
 mod ar1;
 mod catalogue;
 mod composite;
+pub mod continuous;
 mod drift;
 mod gauss_markov;
 mod ma1;
 mod quantization;
 mod random_walk;
+pub mod reduction;
+
 mod slow_ar1;
 pub mod spread;
 mod synthesis;

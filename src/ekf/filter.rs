@@ -1,0 +1,257 @@
+//! The filter itself: nominal state, bias estimates and covariance of eight runs.
+
+use super::belief::Belief;
+use super::covariance::{BIAS, Covariance, PSI, R, V};
+use super::dynamics::{EARTH_STEP_S, EarthTerms, NavRows, Sample};
+use super::initial::InitialSettings;
+use crate::frames::{NavState, RollPitchYaw};
+use crate::imu::Sensor;
+use crate::lanes::{Lanes, Mat3, Vec3};
+use crate::strapdown::Strapdown;
+use crate::units::DEG;
+use glam::DVec3;
+
+/// Error-state extended Kalman filter, closed loop.
+#[derive(Debug, Clone)]
+pub struct Ekf {
+    /// The nominal navigation state.
+    pub nominal: Strapdown,
+    /// Estimates of the bias groups, accelerometer first (m/s², rad/s).
+    pub bias: Vec<Vec3>,
+    /// Covariance of the error state.
+    pub p: Covariance,
+    /// Block transition of the biases: coefficients and innovation variances, by group.
+    phi: Vec<DVec3>,
+    innovation: Vec<DVec3>,
+    white: [DVec3; 2],
+    /// Accelerometer groups: blocks `BIAS..BIAS + accel_groups`; gyroscope groups follow.
+    accel_groups: usize,
+    dt: f64,
+    /// Time since the Earth terms were last applied (s).
+    earth_age: f64,
+    /// Angular rate of the last sample less its bias (rad/s), for the lever arm's velocity.
+    pub(super) omega_ib_b: Vec3,
+    pub(super) scratch: Scratch,
+}
+
+/// Working vectors of the measurement update, one entry a state.
+#[derive(Debug, Clone)]
+pub(super) struct Scratch {
+    pub(super) ph: Vec<Lanes>,
+    pub(super) gain: Vec<Lanes>,
+    pub(super) error: Vec<Lanes>,
+}
+
+impl Ekf {
+    /// A filter that starts at the same nominal state in every lane, with zero bias estimates.
+    ///
+    /// The attitude standard deviations, given for roll, pitch and yaw, are brought to psi_n at the start
+    /// attitude.
+    #[must_use]
+    pub fn new(nominal: Strapdown, belief: &Belief, initial: &InitialSettings) -> Self {
+        let mut belief = belief.clone();
+        let overrides =
+            [(Sensor::Accel, initial.accel_bias_sigma_m_s2), (Sensor::Gyro, initial.gyro_bias_sigma_rad_s)];
+        for (sensor, sigma) in overrides {
+            if let Some(sigma) = sigma {
+                belief.set_initial_bias_sigma(sensor, sigma);
+            }
+        }
+        let groups = belief.groups.concat();
+        let mut p = Covariance::zeros(belief.blocks());
+        let diagonal = |v: DVec3| Mat3::diagonal(Vec3::splat(v));
+        let square = |sigma: [f64; 3]| diagonal(DVec3::from(sigma) * DVec3::from(sigma));
+        p.set_diagonal_block(R, square(initial.pos_sigma_m));
+        p.set_diagonal_block(V, square(initial.vel_sigma_m_s));
+        let start = nominal.lane(0);
+        p.set_diagonal_block(PSI, attitude_covariance(&start, initial.att_sigma_deg));
+        for (g, group) in groups.iter().enumerate() {
+            p.set_diagonal_block(BIAS + g, diagonal(group.initial));
+        }
+        let dim = p.dim();
+        let zeros = || vec![Lanes::ZERO; dim];
+        Self {
+            nominal,
+            bias: vec![Vec3::ZERO; groups.len()],
+            p,
+            phi: groups.iter().map(|g| g.phi).collect(),
+            innovation: groups.iter().map(|g| g.innovation).collect(),
+            white: belief.white,
+            accel_groups: belief.groups[0].len(),
+            dt: 1.0 / belief.rate_hz,
+            earth_age: 0.0,
+            omega_ib_b: Vec3::ZERO,
+            scratch: Scratch { ph: zeros(), gain: zeros(), error: zeros() },
+        }
+    }
+
+    /// Blocks of the accelerometer biases.
+    #[inline(always)]
+    pub(super) fn accel_blocks(&self) -> std::ops::Range<usize> {
+        BIAS..BIAS + self.accel_groups
+    }
+
+    /// Blocks of the gyroscope biases.
+    #[inline(always)]
+    pub(super) fn gyro_blocks(&self) -> std::ops::Range<usize> {
+        BIAS + self.accel_groups..self.p.blocks()
+    }
+
+    /// The bias estimate of a sensor: the sum of its groups.
+    #[inline(always)]
+    #[must_use]
+    pub fn bias_of(&self, sensor: Sensor) -> Vec3 {
+        let (accel, gyro) = self.bias.split_at(self.accel_groups);
+        let groups = if sensor == Sensor::Accel { accel } else { gyro };
+        groups.iter().fold(Vec3::ZERO, |sum, b| sum + *b)
+    }
+
+    /// Advances by one IMU sample: mean rate (rad/s) and mean specific force (m/s²) over the interval.
+    #[inline(always)]
+    pub fn predict(&mut self, omega_ib_b: Vec3, f_ib_b: Vec3) {
+        let dt = self.dt;
+        self.advance_biases();
+        self.omega_ib_b = omega_ib_b - self.bias_of(Sensor::Gyro);
+        let f_ib_b = f_ib_b - self.bias_of(Sensor::Accel);
+        let trace = self.nominal.step(self.omega_ib_b * dt, f_ib_b * dt, dt);
+        let sample = Sample::new(&trace, dt);
+        self.propagate(&sample);
+        self.add_white_noise(&sample);
+        self.earth_age += dt;
+        if self.earth_age + 0.5 * dt > EARTH_STEP_S {
+            self.apply_earth_terms();
+        }
+    }
+
+    /// b_k = phi b_{k−1} + w for estimates and covariance.
+    #[inline(always)]
+    fn advance_biases(&mut self) {
+        let n = self.p.blocks();
+        for g in 0..self.bias.len() {
+            let (phi, innovation) = (self.phi[g], self.innovation[g]);
+            let block = BIAS + g;
+            for axis in 0..3 {
+                self.bias[g][axis] = self.bias[g][axis] * phi[axis];
+            }
+            for i in 0..block {
+                let m = self.p.upper_mut(i, block);
+                for (row, column) in (0..9).map(|k| (k / 3, k % 3)) {
+                    m.0[row][column] = m.0[row][column] * phi[column];
+                }
+            }
+            let m = self.p.upper_mut(block, block);
+            for (row, column) in (0..9).map(|k| (k / 3, k % 3)) {
+                m.0[row][column] = m.0[row][column] * (phi[row] * phi[column]);
+            }
+            for axis in 0..3 {
+                m.0[axis][axis] += Lanes::splat(innovation[axis]);
+            }
+            for j in block + 1..n {
+                let m = self.p.upper_mut(block, j);
+                for (row, column) in (0..9).map(|k| (k / 3, k % 3)) {
+                    m.0[row][column] = m.0[row][column] * phi[row];
+                }
+            }
+        }
+    }
+
+    /// P⁺ = Phi P Phiᵀ of one sample, by block rows and then by block columns.
+    #[inline(always)]
+    fn propagate(&mut self, sample: &Sample) {
+        let accel = self.accel_blocks();
+        let gyro = self.gyro_blocks();
+        // Phi P, navigation rows: first the navigation columns (from the bias blocks as they are) …
+        let rows: [NavRows; 3] = std::array::from_fn(|j| {
+            sample.apply(&self.column(j), &self.sum(accel.clone(), j), &self.sum(gyro.clone(), j))
+        });
+        // … then the bias columns, in place.
+        for j in BIAS..self.p.blocks() {
+            let rows = sample.apply(&self.column(j), &self.sum(accel.clone(), j), &self.sum(gyro.clone(), j));
+            *self.p.upper_mut(R, j) = rows.r;
+            *self.p.upper_mut(V, j) = rows.v;
+            *self.p.upper_mut(PSI, j) = rows.psi;
+        }
+        self.set_nav_columns(&rows, |x, accel, gyro| sample.apply(x, accel, gyro));
+    }
+
+    /// The Earth terms over the time since they were last applied. Called before the state or its
+    /// covariance is looked at.
+    #[inline(always)]
+    pub fn apply_earth_terms(&mut self) {
+        if self.earth_age <= 0.0 {
+            return;
+        }
+        let (terms, age) = (EarthTerms::at(&self.nominal), self.earth_age);
+        self.earth_age = 0.0;
+        let rows: [NavRows; 3] = std::array::from_fn(|j| terms.apply(&self.column(j), age));
+        for j in BIAS..self.p.blocks() {
+            let rows = terms.apply(&self.column(j), age);
+            *self.p.upper_mut(R, j) = rows.r;
+            *self.p.upper_mut(V, j) = rows.v;
+            *self.p.upper_mut(PSI, j) = rows.psi;
+        }
+        self.set_nav_columns(&rows, |x, _, _| terms.apply(x, age));
+    }
+
+    /// The navigation rows of a block column of P.
+    #[inline(always)]
+    fn column(&self, j: usize) -> NavRows {
+        NavRows { r: self.p.block(R, j), v: self.p.block(V, j), psi: self.p.block(PSI, j) }
+    }
+
+    /// The sum of bias blocks of column j.
+    #[inline(always)]
+    fn sum(&self, blocks: std::ops::Range<usize>, j: usize) -> Mat3 {
+        let first = self.p.block(blocks.start, j);
+        (blocks.start + 1..blocks.end).fold(first, |sum, i| sum + self.p.block(i, j))
+    }
+
+    /// Completes A P Aᵀ: `columns[j]` holds the navigation rows of A P in navigation column j, the bias
+    /// columns of P those of A P already; the same row map is applied to the transposed rows.
+    #[inline(always)]
+    fn set_nav_columns(&mut self, columns: &[NavRows; 3], map: impl Fn(&NavRows, &Mat3, &Mat3) -> NavRows) {
+        let [r, v, psi] = columns;
+        // (A P)ᵀ of row i in the bias columns: stored above the diagonal, read below it
+        let sums = |i: usize| (self.sum(self.accel_blocks(), i), self.sum(self.gyro_blocks(), i));
+        let row =
+            |a: &Mat3, b: &Mat3, c: &Mat3| NavRows { r: a.transpose(), v: b.transpose(), psi: c.transpose() };
+        let (accel, gyro) = sums(R);
+        let of_r = map(&row(&r.r, &v.r, &psi.r), &accel, &gyro);
+        let (accel, gyro) = sums(V);
+        let of_v = map(&row(&r.v, &v.v, &psi.v), &accel, &gyro);
+        let (accel, gyro) = sums(PSI);
+        let of_psi = map(&row(&r.psi, &v.psi, &psi.psi), &accel, &gyro);
+        self.p.set_diagonal_block(R, of_r.r);
+        *self.p.upper_mut(R, V) = of_r.v.transpose();
+        *self.p.upper_mut(R, PSI) = of_r.psi.transpose();
+        self.p.set_diagonal_block(V, of_v.v);
+        *self.p.upper_mut(V, PSI) = of_v.psi.transpose();
+        self.p.set_diagonal_block(PSI, of_psi.psi);
+    }
+
+    /// White noise of one sample, held over dt: sigma² dt² into V and PSI, and the part of it that the
+    /// sample itself carries on to R and V.
+    #[inline(always)]
+    fn add_white_noise(&mut self, sample: &Sample) {
+        let [accel, gyro] = self.white.map(|variances| sample.rotated_noise(variances));
+        let half = 0.5 * self.dt;
+        let p = &mut self.p;
+        *p.upper_mut(V, V) = p.block(V, V) + accel;
+        *p.upper_mut(R, V) = p.block(R, V) + accel * half;
+        *p.upper_mut(R, R) = p.block(R, R) + accel * (half * half);
+        *p.upper_mut(PSI, PSI) = p.block(PSI, PSI) + gyro;
+        *p.upper_mut(V, PSI) = p.block(V, PSI) + sample.tilted_noise(&gyro);
+    }
+}
+
+/// Covariance of psi_n for standard deviations of roll, pitch and yaw (degrees).
+fn attitude_covariance(state: &NavState, sigma_deg: [f64; 3]) -> Mat3 {
+    let angles = RollPitchYaw::from_quat(state.q_b_n);
+    let j = angles.jacobian_of_psi_n();
+    let j = nalgebra::Matrix3::from_fn(|row, column| j[row][column]);
+    let sigma = sigma_deg.map(|s| (s * DEG).powi(2));
+    let d = nalgebra::Matrix3::from_diagonal(&sigma.into());
+    // At pitch ±90° roll and yaw are not separate: the standard deviations are then taken about n's axes.
+    let p = j.try_inverse().map_or(d, |inverse| inverse * d * inverse.transpose());
+    Mat3::from_fn(|row, column| Lanes::splat(p[(row, column)]))
+}

@@ -1,0 +1,367 @@
+//! The filter against mathematics that is not its own: central differences of the strapdown, the matrix
+//! exponential, and definiteness under extreme measurements.
+
+use super::covariance::{PSI, R, V};
+use super::dynamics::{EarthTerms, NavRows, Sample};
+use super::update::Fix;
+use super::{Belief, Ekf, FilterStates, InitialSettings};
+use crate::earth::{self, GravityModel};
+use crate::frames::NavState;
+use crate::imu::Sensor;
+use crate::lanes::{Lanes, Mat3, Vec3};
+use crate::noise::{Ar1, Composite, Model, Process, White};
+use crate::rng::{Generator, StreamKey};
+use crate::strapdown::Strapdown;
+use glam::{DQuat, DVec3};
+use nalgebra::{DMatrix, Matrix3, SMatrix};
+use rand::RngExt;
+
+type Matrix15 = SMatrix<f64, 15, 15>;
+
+fn generator(process: &str) -> Generator {
+    StreamKey { seed: 11, scenario: "", run: 0, source: "test", process }.generator()
+}
+
+/// A fast vehicle anywhere, in any attitude, with what its IMU measures.
+fn random_case(g: &mut Generator) -> (NavState, DVec3, DVec3) {
+    let mut vector =
+        |scale: f64| DVec3::from_array(std::array::from_fn(|_| scale * g.random_range(-1.0..1.0)));
+    let (v_n, axis, omega, f) = (vector(250.0), vector(3.0), vector(1.0), vector(20.0));
+    let place = vector(1.0);
+    let q_b_n = DQuat::from_scaled_axis(axis);
+    let state = NavState { lat: place.x * 1.3, lon: place.y * 3.0, h: 6000.0 * (1.0 + place.z), v_n, q_b_n };
+    (state, omega, f)
+}
+
+/// The error of lane `i` about a nominal state: metres, m/s, rad.
+fn error_of(lane: &NavState, nominal: &NavState) -> [f64; 9] {
+    let r = earth::ned_difference(nominal, lane.lat, lane.lon, lane.h);
+    let v = lane.v_n - nominal.v_n;
+    // the logarithm of a small rotation: 2 asin of the vector part, to fourth order
+    let half = (lane.q_b_n * nominal.q_b_n.inverse()).xyz();
+    let psi = half * (2.0 + half.length_squared() / 3.0);
+    std::array::from_fn(|i| [r, v, psi][i / 3][i % 3])
+}
+
+fn perturbed(state: &NavState, block: usize, axis: usize, size: f64) -> NavState {
+    let d = DVec3::AXES[axis] * size;
+    let r = earth::radii(state.lat.sin());
+    match block {
+        R => NavState {
+            lat: state.lat + d.x / (r.meridian + state.h),
+            lon: state.lon + d.y / ((r.transverse + state.h) * state.lat.cos()),
+            h: state.h - d.z,
+            ..*state
+        },
+        V => NavState { v_n: state.v_n + d, ..*state },
+        PSI => NavState { q_b_n: DQuat::from_scaled_axis(d) * state.q_b_n, ..*state },
+        _ => *state,
+    }
+}
+
+const PERTURBATION: [f64; 5] = [1000.0, 1.0, 1e-4, 1e-2, 1e-4];
+
+/// The transition of one sample by central differences of the strapdown, all 15 columns.
+fn numeric_transition(state: &NavState, omega: DVec3, f: DVec3, dt: f64) -> SMatrix<f64, 9, 15> {
+    let mut result = SMatrix::zeros();
+    for column in 0..15 {
+        let (block, axis) = (column / 3, column % 3);
+        let mut ins = Strapdown::new(state, GravityModel::Wgs84);
+        let (mut dtheta, mut dv) = (Vec3::splat(omega * dt), Vec3::splat(f * dt));
+        for (lane, sign) in [(1, 1.0), (2, -1.0)] {
+            let size = sign * PERTURBATION[block];
+            ins.set_lane(lane, &perturbed(state, block, axis, size));
+            // a bias estimate that is too large by `size` takes that much off the sample
+            match block {
+                3 => dv.set_lane(lane, (f - DVec3::AXES[axis] * size) * dt),
+                4 => dtheta.set_lane(lane, (omega - DVec3::AXES[axis] * size) * dt),
+                _ => {}
+            }
+        }
+        ins.step(dtheta, dv, dt);
+        let nominal = ins.lane(0);
+        let (plus, minus) = (error_of(&ins.lane(1), &nominal), error_of(&ins.lane(2), &nominal));
+        for row in 0..9 {
+            result[(row, column)] = (plus[row] - minus[row]) / (2.0 * PERTURBATION[block]);
+        }
+    }
+    result
+}
+
+/// The transition of one sample as the filter's block maps have it, and the Earth's part of F.
+fn filter_transition(state: &NavState, omega: DVec3, f: DVec3, dt: f64) -> SMatrix<f64, 9, 15> {
+    let mut ins = Strapdown::new(state, GravityModel::Wgs84);
+    let terms = EarthTerms::at(&ins);
+    let trace = ins.step(Vec3::splat(omega * dt), Vec3::splat(f * dt), dt);
+    let sample = Sample::new(&trace, dt);
+    let identity = Mat3::diagonal(Vec3([Lanes::ONE; 3]));
+    let mut result = SMatrix::<f64, 9, 15>::zeros();
+    for block in 0..5 {
+        let unit = |b: usize| if b == block { identity } else { Mat3::ZERO };
+        let column = NavRows { r: unit(R), v: unit(V), psi: unit(PSI) };
+        let after = terms.apply(&sample.apply(&column, &unit(3), &unit(4)), dt);
+        for (b, m) in [after.r, after.v, after.psi].iter().enumerate() {
+            result.fixed_view_mut::<3, 3>(3 * b, 3 * block).copy_from(&m.lane(0));
+        }
+    }
+    result
+}
+
+/// Every block of F against central differences of the strapdown itself. F = (Phi − I)/dt at dt = 1 ms,
+/// where what Phi has beyond first order is below 1e-3 of the block's largest element; the bounds of the
+/// blocks that vanish to first order are dt times the neighbouring one.
+#[test]
+fn every_block_of_f_agrees_with_central_differences() {
+    let mut g = generator("f");
+    let dt = 1e-3;
+    for _ in 0..300 {
+        let (state, omega, f) = random_case(&mut g);
+        let (numeric, filter) =
+            (numeric_transition(&state, omega, f, dt), filter_transition(&state, omega, f, dt));
+        for (row, column) in (0..15).map(|k| (k / 5, k % 5)) {
+            let block = |m: &SMatrix<f64, 9, 15>| -> Matrix3<f64> {
+                let identity = if row == column { Matrix3::identity() } else { Matrix3::zeros() };
+                (m.fixed_view::<3, 3>(3 * row, 3 * column) - identity) / dt
+            };
+            let (numeric, filter) = (block(&numeric), block(&filter));
+            // rounding of a difference: of a latitude 4e-9 m, of 400 m/s 1e-12 m/s, of quaternion products
+            // some 16 units of 2.2e-16 rad
+            let rounding = [4e-9, 1e-12, 4e-15][row] / PERTURBATION[column] / dt;
+            let worst = (numeric - filter).amax();
+            let bound = 2e-3 * numeric.amax() + rounding;
+            assert!(worst <= bound, "block ({row}, {column}): {worst:e} > {bound:e}\n{numeric}{filter}");
+        }
+    }
+}
+
+fn model(accel: [Process; 2], gyro: [Process; 2]) -> Model {
+    Model::pooled(100.0, &Composite::new(accel.to_vec()), &Composite::new(gyro.to_vec()))
+}
+
+fn gauss_markov_model() -> Model {
+    let (phi_a, phi_g) = ((-0.01_f64 / 200.0).exp(), (-0.01_f64 / 500.0).exp());
+    model(
+        [
+            Process::White(White::new(4e-5).unwrap()),
+            Process::Ar1(Ar1::new(phi_a, 9e-4 * (1.0 - phi_a * phi_a)).unwrap()),
+        ],
+        [
+            Process::White(White::new(1e-6).unwrap()),
+            Process::Ar1(Ar1::new(phi_g, 1e-8 * (1.0 - phi_g * phi_g)).unwrap()),
+        ],
+    )
+}
+
+/// A vehicle that circles while it climbs and brakes: what its IMU measures at time t.
+fn manoeuvre(t: f64) -> (DVec3, DVec3) {
+    let omega = DVec3::new(0.05 * (0.9 * t).sin(), 0.03 * (0.7 * t).cos(), 0.2 * (0.05 * t).sin());
+    let f = DVec3::new(1.5 * (0.11 * t).sin(), 2.0 * (0.05 * t).sin(), -9.81 + 0.5 * (0.8 * t).cos());
+    (omega, f)
+}
+
+fn ekf(model: &Model, states: FilterStates) -> Ekf {
+    let belief = Belief::new(model, states, 1.0, 800.0).unwrap();
+    let start = NavState {
+        lat: 0.8,
+        lon: 0.1,
+        h: 400.0,
+        v_n: DVec3::new(15.0, -5.0, 0.5),
+        q_b_n: DQuat::from_scaled_axis(DVec3::new(0.05, -0.1, 1.0)),
+    };
+    Ekf::new(Strapdown::new(&start, GravityModel::Wgs84), &belief, &InitialSettings::default())
+}
+
+/// A fix at the nominal position itself: the innovation is zero, the covariance does what it does.
+fn fix_at_nominal(ekf: &Ekf, pos_sigma_m: f64, vel_sigma_m_s: f64) -> Fix {
+    let n = &ekf.nominal;
+    Fix {
+        lat: n.lat,
+        lon: n.lon,
+        h: n.h,
+        v_n: Some(n.v_n),
+        pos_sigma_m: DVec3::splat(pos_sigma_m),
+        vel_sigma_m_s: DVec3::splat(vel_sigma_m_s),
+        lever_arm_b: DVec3::ZERO,
+    }
+}
+
+/// Phi and Qd of one sample by [van Loan](crate::bibliography::VanLoan78) for F and G Q Gᵀ held constant.
+fn van_loan(f: &Matrix15, q: &Matrix15, dt: f64) -> (Matrix15, Matrix15) {
+    let mut m = DMatrix::<f64>::zeros(30, 30);
+    m.view_mut((0, 0), (15, 15)).copy_from(&(-f));
+    m.view_mut((0, 15), (15, 15)).copy_from(q);
+    m.view_mut((15, 15), (15, 15)).copy_from(&f.transpose());
+    let e = (m * dt).exp();
+    let phi: Matrix15 = e.fixed_view::<15, 15>(15, 15).transpose();
+    let qd = phi * e.fixed_view::<15, 15>(0, 15);
+    (phi, qd)
+}
+
+/// The biases' own step is exact in the model (b_k = phi b_{k−1} + w, held over sample k).
+fn bias_step(p: &Matrix15) -> Matrix15 {
+    let phi: [f64; 2] = [(-0.01_f64 / 200.0).exp(), (-0.01_f64 / 500.0).exp()];
+    let variance = [9e-4, 1e-8];
+    let of = |i: usize| if i < 9 { 1.0 } else { phi[i / 3 - 3] };
+    let q = |i: usize| if i < 9 { 0.0 } else { variance[i / 3 - 3] * (1.0 - phi[i / 3 - 3].powi(2)) };
+    Matrix15::from_fn(|i, j| of(i) * p[(i, j)] * of(j) + if i == j { q(i) } else { 0.0 })
+}
+
+/// The standard deviations of a whole run with an outage against the exact discretisation: 1e-4.
+#[test]
+fn covariance_agrees_with_the_matrix_exponential_over_a_run() {
+    let mut ekf = ekf(&gauss_markov_model(), FilterStates::Reduced15);
+    let mut p: Matrix15 = Matrix15::from_fn(|i, j| ekf.p.get(i, j)[0]);
+    let dt = 0.01;
+    for k in 0..20_000 {
+        let t = (k as f64 + 0.5) * dt;
+        let (omega, f) = manoeuvre(t);
+        let terms = EarthTerms::at(&ekf.nominal);
+        let c_before = ekf.nominal.q_b_n.to_matrix().lane(0);
+        ekf.predict(Vec3::splat(omega), Vec3::splat(f));
+        let c = (c_before + ekf.nominal.q_b_n.to_matrix().lane(0)) * 0.5;
+        let (phi, qd) = van_loan(&continuous_f(&terms, &c, f), &continuous_q(), dt);
+        p = bias_step(&p);
+        p = phi * p * phi.transpose() + qd;
+        let second = (k + 1) / 100;
+        if (k + 1) % 100 == 0 && !(60..150).contains(&second) {
+            ekf.update(&fix_at_nominal(&ekf, 2.0, 0.05));
+            for state in 0..6 {
+                let r: f64 = if state < 3 { 4.0 } else { 0.0025 };
+                let column: SMatrix<f64, 15, 1> = p.column(state).into();
+                p -= column * column.transpose() / (p[(state, state)] + r);
+            }
+        }
+        if (k + 1) % 100 == 0 {
+            ekf.apply_earth_terms();
+            for i in 0..15 {
+                let ratio = (ekf.p.get(i, i)[0] / p[(i, i)]).sqrt();
+                assert!((ratio - 1.0).abs() < 1e-4, "state {i} at {second} s: ratio {ratio}");
+            }
+        }
+    }
+}
+
+fn continuous_f(terms: &EarthTerms, c: &Matrix3<f64>, f_b: DVec3) -> Matrix15 {
+    let mut f = Matrix15::zeros();
+    let f_n = c * nalgebra::Vector3::new(f_b.x, f_b.y, f_b.z);
+    let skew = Matrix3::new(0.0, -f_n.z, f_n.y, f_n.z, 0.0, -f_n.x, -f_n.y, f_n.x, 0.0);
+    let blocks = [
+        (0, 0, terms.rr.lane(0)),
+        (0, 1, Matrix3::identity()),
+        (1, 0, terms.vr.lane(0)),
+        (1, 1, terms.vv.lane(0)),
+        (1, 2, -skew),
+        (1, 3, -c),
+        (2, 0, terms.psi_r.lane(0)),
+        (2, 1, terms.psi_v.lane(0)),
+        (2, 2, terms.psi_psi.lane(0)),
+        (2, 4, -c),
+    ];
+    for (i, j, block) in blocks {
+        f.fixed_view_mut::<3, 3>(3 * i, 3 * j).copy_from(&block);
+    }
+    f
+}
+
+/// Power of white accelerations and rates, sigma² dt.
+fn continuous_q() -> Matrix15 {
+    let psd = [0.0, 4e-5 * 0.01, 1e-6 * 0.01, 0.0, 0.0];
+    Matrix15::from_diagonal(&SMatrix::from_fn(|i, _| psd[i / 3]))
+}
+
+/// Positive definite and exactly symmetric after many fixes that are nearly perfect, and nearly worthless.
+#[test]
+fn covariance_stays_positive_definite_under_extreme_measurements() {
+    for variance in [1e-12, 1e12] {
+        let mut ekf = ekf(&gauss_markov_model(), FilterStates::Reduced15);
+        let sigma = f64::sqrt(variance);
+        for k in 0..100_000 {
+            let (omega, f) = manoeuvre(k as f64 * 0.01);
+            ekf.predict(Vec3::splat(omega), Vec3::splat(f));
+            if k % 100 == 99 {
+                ekf.update(&fix_at_nominal(&ekf, sigma, sigma));
+            }
+        }
+        let p = ekf.p.lane(3);
+        let scale = DMatrix::from_diagonal(&p.diagonal().map(|v| 1.0 / v.sqrt()));
+        let correlation = &scale * &p * &scale;
+        assert!(p == p.transpose(), "exactly symmetric");
+        assert!(correlation.cholesky().is_some(), "variance {variance:e}: not positive definite");
+    }
+}
+
+/// A full filter whose model is one Gauss-Markov bias is the 15-state filter: the same numbers; and the
+/// same bias split into two states of one correlation time gives the same navigation covariance.
+#[test]
+fn splitting_a_bias_into_two_states_changes_nothing_outside() {
+    let one = gauss_markov_model();
+    let mut two = one.clone();
+    for axis in &mut two.axes {
+        let Process::Ar1(bias) = axis.processes[1] else { unreachable!("the model's second process") };
+        let part = |share: f64| Process::Ar1(Ar1::new(bias.phi(), bias.sigma2() * share).unwrap());
+        axis.processes.splice(1.., [part(0.3), part(0.7)]);
+    }
+    let mut filters =
+        [ekf(&one, FilterStates::Reduced15), ekf(&one, FilterStates::Full), ekf(&two, FilterStates::Full)];
+    for filter in &mut filters {
+        for k in 0..3000 {
+            let (omega, f) = manoeuvre(k as f64 * 0.01);
+            filter.predict(Vec3::splat(omega), Vec3::splat(f));
+            if k % 100 == 99 {
+                filter.update(&fix_at_nominal(filter, 2.0, 0.05));
+            }
+        }
+    }
+    let [reduced, full, split] = &filters;
+    assert_eq!(reduced.p.lane(0), full.p.lane(0));
+    assert_eq!(split.p.dim(), 21);
+    for i in 0..9 {
+        let ratio = split.p.get(i, i)[0] / full.p.get(i, i)[0];
+        assert!((ratio - 1.0).abs() < 1e-9, "state {i}: {ratio}");
+    }
+}
+
+/// H of position and velocity on a lever arm against central differences of the antenna itself.
+#[test]
+fn lever_arm_rows_agree_with_central_differences() {
+    let mut g = generator("h");
+    let arm = DVec3::new(1.3, -0.7, -2.1);
+    for _ in 0..200 {
+        let (state, omega, _) = random_case(&mut g);
+        let mut ekf = ekf(&gauss_markov_model(), FilterStates::Reduced15);
+        for lane in 0..8 {
+            ekf.nominal.set_lane(lane, &state);
+        }
+        ekf.omega_ib_b = Vec3::splat(omega);
+        // antenna position (relative, m) and velocity for a state and a gyroscope bias error
+        let antenna = |s: &NavState, bias: DVec3| {
+            let r = earth::ned_difference(&state, s.lat, s.lon, s.h) + s.q_b_n * arm;
+            let omega_eb_b = omega - bias - s.q_b_n.inverse() * earth::omega_ie_n(state.lat);
+            (r, s.v_n + s.q_b_n * omega_eb_b.cross(arm))
+        };
+        let rows = ekf.measurement_rows(arm);
+        for column in 0..15 {
+            let (block, axis) = (column / 3, column % 3);
+            let size = [1.0, 1.0, 1e-5, 1.0, 1e-4][block];
+            let bias = |sign: f64| if block == 4 { DVec3::AXES[axis] * (sign * size) } else { DVec3::ZERO };
+            let plus = antenna(&perturbed(&state, block, axis, size), bias(1.0));
+            let minus = antenna(&perturbed(&state, block, axis, -size), bias(-1.0));
+            let numeric = ((plus.0 - minus.0) / (2.0 * size), (plus.1 - minus.1) / (2.0 * size));
+            for (component, row) in rows.iter().enumerate() {
+                let expected = if component < 3 { numeric.0[component] } else { numeric.1[component - 3] };
+                let got = row[column];
+                // position in metres is exact to 1e-3 of its curvature; velocity differences round at 1e-9
+                assert!((got - expected).abs() < 2e-6, "row {component}, column {column}: {got} {expected}");
+            }
+        }
+    }
+}
+
+/// The estimated bias of each sensor is the sum of its groups.
+#[test]
+fn biases_add_up() {
+    let mut filter = ekf(&gauss_markov_model(), FilterStates::Full);
+    filter.bias = vec![Vec3::splat(DVec3::X), Vec3::splat(DVec3::Y)];
+    assert_eq!(filter.bias_of(Sensor::Accel).lane(0), DVec3::X);
+    assert_eq!(filter.bias_of(Sensor::Gyro).lane(0), DVec3::Y);
+}

@@ -1,0 +1,264 @@
+//! Reduction of a noise model to white noise and one Gauss-Markov bias: what a 15-state filter can carry.
+//!
+//! The pair is the one closest to the model's own Haar wavelet variance, in the logarithm, with equal
+//! weights, over the scales from one GNSS interval to [`window_s`]. Quantization noise is left out: its
+//! integral is bounded. The reduction is a pure function of model, interval and window.
+
+use super::{Ar1, Composite, GaussMarkov, ParameterError, Process, White};
+use nalgebra::{Matrix3, Vector3};
+
+/// Longest time scale that matters to a filter whose longest outage is given (s): eight times the outage,
+/// at least 800 s. A window that ends with the outage makes the filter trust itself too much.
+#[must_use]
+pub fn window_s(longest_outage_s: f64) -> f64 {
+    (8.0 * longest_outage_s).max(800.0)
+}
+
+/// White noise and one bias in the place of a model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reduced {
+    /// White noise of a sample.
+    pub white: White,
+    /// The bias: a Gauss-Markov process, sampled.
+    pub bias: Ar1,
+    /// Variance of the bias at the start (units²): that of the model's stationary processes; random walks
+    /// start at 0.
+    pub initial_variance: f64,
+    /// Largest |ln(reduced/model)| of the wavelet variance over the scales fitted; 0 for an exact reduction.
+    pub misfit: f64,
+}
+
+/// Why a model could not be reduced.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ReductionError {
+    /// A parameter left its domain.
+    #[error(transparent)]
+    Parameter(#[from] ParameterError),
+    /// Fewer than three scales between the GNSS interval and the window.
+    #[error("the scales from {interval_s} s to {window_s} s are fewer than three at {rate_hz} Hz")]
+    TooFewScales {
+        /// GNSS interval (s).
+        interval_s: f64,
+        /// Longest scale (s).
+        window_s: f64,
+        /// Sample rate (Hz).
+        rate_hz: f64,
+    },
+}
+
+/// Reduces the noise of one axis at `rate_hz`, over scales from `interval_s` (one GNSS interval) to
+/// `window_s`.
+///
+/// # Errors
+/// When there are too few scales, or a parameter leaves its domain.
+pub fn reduce(
+    noise: &Composite,
+    rate_hz: f64,
+    interval_s: f64,
+    window_s: f64,
+) -> Result<Reduced, ReductionError> {
+    let kept: Vec<Process> =
+        noise.processes.iter().filter(|p| !matches!(p, Process::Quantization(_))).copied().collect();
+    let kept = Composite::new(kept);
+    if let Some(exact) = exact(&kept) {
+        return exact;
+    }
+    let level = |seconds: f64| (seconds * rate_hz).max(2.0).log2().round();
+    let levels: Vec<u32> = (level(interval_s) as u32..=level(window_s).min(40.0) as u32).collect();
+    if levels.len() < 3 {
+        return Err(ReductionError::TooFewScales { interval_s, window_s, rate_hz });
+    }
+    let target: Vec<f64> = levels.iter().map(|l| kept.haar_wv(*l)).collect();
+    let fit = Fit { levels, target };
+    let [ln_white, ln_variance, ln_kappa] = fit.solve();
+    let (kappa, variance) = (ln_kappa.exp(), ln_variance.exp());
+    Ok(Reduced {
+        white: White::new(ln_white.exp())?,
+        bias: Ar1::new((-kappa).exp(), variance * -(-2.0 * kappa).exp_m1())?,
+        initial_variance: stationary_variance(&kept),
+        misfit: fit.residuals(&[ln_white, ln_variance, ln_kappa]).iter().fold(0.0, |m, r| r.abs().max(m)),
+    })
+}
+
+/// The model itself when it already is white noise and at most one stationary bias.
+fn exact(kept: &Composite) -> Option<Result<Reduced, ReductionError>> {
+    let mut white = 0.0;
+    let mut bias = None;
+    for process in &kept.processes {
+        match process {
+            Process::White(p) => white += p.sigma2(),
+            Process::Ar1(p) if bias.is_none() => bias = Some(*p),
+            Process::GaussMarkov(p) if bias.is_none() => bias = Some(p.ar1()),
+            _ => return None,
+        }
+    }
+    let none = Ar1::new(0.0, 0.0);
+    Some((|| {
+        let bias = bias.map_or(none, Ok)?;
+        Ok(Reduced { white: White::new(white)?, bias, initial_variance: bias.variance(), misfit: 0.0 })
+    })())
+}
+
+fn stationary_variance(noise: &Composite) -> f64 {
+    let variance = |p: &Process| match p {
+        Process::Ar1(p) => p.variance(),
+        Process::GaussMarkov(p) => p.s2(),
+        _ => 0.0,
+    };
+    noise.processes.iter().map(variance).sum()
+}
+
+/// Least squares of ln(reduced/model) in (ln sigma2, ln variance, ln kappa), kappa = dt/T.
+struct Fit {
+    levels: Vec<u32>,
+    target: Vec<f64>,
+}
+
+impl Fit {
+    /// Best start of a grid over the correlation time, then Levenberg-Marquardt.
+    fn solve(&self) -> [f64; 3] {
+        let (first, last) = (f64::from(self.levels[0]), f64::from(self.levels[self.levels.len() - 1]));
+        let starts = (0..60).map(|i| {
+            let log2_tau = first - 2.0 + (last - first + 6.0) * f64::from(i) / 59.0;
+            self.start(-log2_tau * std::f64::consts::LN_2)
+        });
+        let best = starts.min_by(|a, b| self.cost(a).total_cmp(&self.cost(b)));
+        self.polish(best.expect("the grid has 60 starts"))
+    }
+
+    /// The two variances for a given kappa: linear least squares of the relative misfit, both kept
+    /// positive (a vanishing one is left at 1e-9 of the model's wavelet variance, where it is invisible).
+    fn start(&self, ln_kappa: f64) -> [f64; 3] {
+        let (mut aa, mut ab, mut bb, mut a1, mut b1) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        let (mut a_max, mut b_max) = (0.0_f64, 0.0_f64);
+        for (level, target) in self.levels.iter().zip(&self.target) {
+            let a = White::haar_shape(*level) / target;
+            let b = GaussMarkov::haar_shape(ln_kappa.exp(), *level).0 / target;
+            (aa, ab, bb, a1, b1) = (aa + a * a, ab + a * b, bb + b * b, a1 + a, b1 + b);
+            (a_max, b_max) = (a_max.max(a), b_max.max(b));
+        }
+        let determinant = aa * bb - ab * ab;
+        let (mut x, mut y) = ((a1 * bb - b1 * ab) / determinant, (b1 * aa - a1 * ab) / determinant);
+        if !(x > 0.0) {
+            (x, y) = (0.0, b1 / bb);
+        } else if !(y > 0.0) {
+            (x, y) = (a1 / aa, 0.0);
+        }
+        [x.max(1e-9 / a_max).ln(), y.max(1e-9 / b_max).ln(), ln_kappa]
+    }
+
+    fn residuals(&self, x: &[f64; 3]) -> Vec<f64> {
+        let (white, variance, kappa) = (x[0].exp(), x[1].exp(), x[2].exp());
+        let model = |l| white * White::haar_shape(l) + variance * GaussMarkov::haar_shape(kappa, l).0;
+        self.levels.iter().zip(&self.target).map(|(l, t)| (model(*l) / t).ln()).collect()
+    }
+
+    fn cost(&self, x: &[f64; 3]) -> f64 {
+        self.residuals(x).iter().map(|r| r * r).sum()
+    }
+
+    /// Levenberg-Marquardt with the analytic Jacobian, to a stationary point or 200 steps.
+    fn polish(&self, mut x: [f64; 3]) -> [f64; 3] {
+        let (mut cost, mut damping) = (self.cost(&x), 1e-3);
+        for _ in 0..200 {
+            let (normal, gradient) = self.normal_equations(&x);
+            let damped = normal + Matrix3::from_diagonal(&normal.diagonal().add_scalar(1e-12)) * damping;
+            let Some(step) = damped.lu().solve(&-gradient) else { break };
+            // a parameter that the fit does not feel may wander: at most e² a step
+            let trial = std::array::from_fn(|i| x[i] + step[i].clamp(-2.0, 2.0));
+            let trial_cost = self.cost(&trial);
+            if trial_cost <= cost {
+                let done = step.amax() < 1e-10;
+                (x, cost, damping) = (trial, trial_cost, (damping * 0.2).max(1e-12));
+                if done {
+                    break;
+                }
+            } else {
+                damping *= 5.0;
+                if damping > 1e12 {
+                    break;
+                }
+            }
+        }
+        x
+    }
+
+    fn normal_equations(&self, x: &[f64; 3]) -> (Matrix3<f64>, Vector3<f64>) {
+        let (white, variance, kappa) = (x[0].exp(), x[1].exp(), x[2].exp());
+        let (mut normal, mut gradient) = (Matrix3::zeros(), Vector3::zeros());
+        for (level, target) in self.levels.iter().zip(&self.target) {
+            let (shape, slope) = GaussMarkov::haar_shape(kappa, *level);
+            let (a, b) = (white * White::haar_shape(*level), variance * shape);
+            let row = Vector3::new(a, b, variance * slope * kappa) / (a + b);
+            normal += row * row.transpose();
+            gradient += row * ((a + b) / target).ln();
+        }
+        (normal, gradient)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::{Quantization, RandomWalk};
+
+    fn ar1(phi: f64, sigma2: f64) -> Process {
+        Process::Ar1(Ar1::new(phi, sigma2).unwrap())
+    }
+
+    fn n2() -> Vec<Process> {
+        vec![
+            Process::White(White::new(5e-5).unwrap()),
+            ar1(0.9835, 1.3e-8),
+            ar1(0.9999, 1e-11),
+            Process::RandomWalk(RandomWalk::new(2.9e-13).unwrap()),
+            Process::Quantization(Quantization::new(1e-7).unwrap()),
+        ]
+    }
+
+    #[test]
+    fn white_noise_and_one_bias_are_left_as_they_are() {
+        let model = Composite::new(vec![ar1(0.999, 1e-9), n2()[0], n2()[4]]);
+        let reduced = reduce(&model, 100.0, 1.0, 800.0).unwrap();
+        assert_eq!((reduced.white.sigma2(), reduced.bias), (5e-5, Ar1::new(0.999, 1e-9).unwrap()));
+        assert!((reduced.initial_variance / (1e-9 / (1.0 - 0.999 * 0.999)) - 1.0).abs() < 1e-12);
+    }
+
+    /// Splitting the bias of a reducible model into two equal halves changes nothing but the form, so the
+    /// fit must find the model itself.
+    #[test]
+    fn the_fit_recovers_a_pair_that_exists() {
+        let model = Composite::new(vec![n2()[0], ar1(0.9995, 2e-10), ar1(0.9995, 3e-10)]);
+        let reduced = reduce(&model, 100.0, 1.0, 800.0).unwrap();
+        assert!((reduced.white.sigma2() / 5e-5 - 1.0).abs() < 1e-6);
+        assert!((reduced.bias.phi() - 0.9995).abs() < 1e-9);
+        assert!((reduced.bias.sigma2() / 5e-10 - 1.0).abs() < 1e-6);
+        assert!(reduced.misfit < 1e-9);
+    }
+
+    /// The stationary point reached is the minimum: no start of a much finer search does better.
+    #[test]
+    fn no_other_pair_is_closer() {
+        let kept = Composite::new(n2()[..4].to_vec());
+        let levels: Vec<u32> = (7..=16).collect();
+        let target = levels.iter().map(|l| kept.haar_wv(*l)).collect();
+        let fit = Fit { levels, target };
+        let found = fit.cost(&fit.solve());
+        for i in 0..4000 {
+            let log10 = |k: i32, low: f64, high: f64| (low + (high - low) * f64::from(k) / 15.0) * 10f64.ln();
+            let x = [log10(i % 16, -6.0, -3.0), log10(i / 16 % 16, -12.0, -5.0), log10(i / 256, -7.0, -1.0)];
+            assert!(found <= fit.cost(&fit.polish(x)) * (1.0 + 1e-6) + 1e-12);
+        }
+    }
+
+    #[test]
+    fn degenerate_models_are_reduced_too() {
+        let none = reduce(&Composite::default(), 100.0, 1.0, 800.0).unwrap();
+        assert_eq!((none.white.sigma2(), none.bias.sigma2(), none.initial_variance), (0.0, 0.0, 0.0));
+        let walk = Composite::new(vec![n2()[3]]);
+        let reduced = reduce(&walk, 100.0, 1.0, 800.0).unwrap();
+        // a random walk is a Gauss-Markov process of infinite correlation time
+        assert!(reduced.misfit < 0.05, "misfit {}", reduced.misfit);
+        assert!(matches!(reduce(&walk, 100.0, 1.0, 2.0), Err(ReductionError::TooFewScales { .. })));
+    }
+}
