@@ -1,0 +1,263 @@
+//! `comparison.json` and the layout of the paper's Table I.
+
+use crate::metrics::OutageComparison;
+use crate::simulation::REPORTED_NAMES;
+use serde::Serialize;
+
+/// Estimators by the names their run directories end in.
+const ESTIMATORS: [&str; 6] = ["sr-awv", "dr-awv", "awv", "rgmwm", "gmwm", "avlr"];
+
+/// Where a run stands in Table I: its row (scenario) and column (estimator, may be empty).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Label {
+    /// Row.
+    pub scenario: String,
+    /// Column.
+    pub estimator: String,
+}
+
+impl Label {
+    /// From a run directory's name: `II_sr-awv` or `II/sr-awv` is scenario II, estimator SR-AWV. A name
+    /// that ends in no estimator is a scenario of its own; the estimator is then the one the model was
+    /// made with, if known.
+    #[must_use]
+    pub fn of(directory: &str, model_estimator: Option<&str>) -> Self {
+        let parts: Vec<&str> = directory.split('/').filter(|p| !p.is_empty() && *p != ".").collect();
+        let name = parts.last().copied().unwrap_or(directory);
+        let lower = name.to_lowercase();
+        for estimator in ESTIMATORS {
+            let Some(head) = lower.strip_suffix(estimator) else { continue };
+            let parent = parts.len().checked_sub(2).map_or("", |i| parts[i]);
+            let separated = head.ends_with(['_', '-', '.', ' ']);
+            let scenario = match head.len() {
+                0 => parent,
+                n if separated => name[..n].trim_end_matches(['_', '-', '.', ' ']),
+                _ => continue,
+            };
+            return Self { scenario: scenario.to_owned(), estimator: estimator.to_uppercase() };
+        }
+        let estimator = model_estimator.unwrap_or_default().to_uppercase();
+        Self { scenario: name.to_owned(), estimator }
+    }
+}
+
+/// A candidate and what the comparison with the reference found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CandidateResult {
+    /// Run directory.
+    pub run: String,
+    /// Its place in the table.
+    pub label: Label,
+    /// Whether it is the reference itself.
+    pub is_reference: bool,
+    /// Outage by outage.
+    pub outages: Vec<OutageComparison>,
+}
+
+/// What `comparison.json` holds.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ComparisonFile {
+    /// Layout version.
+    pub schema_version: u32,
+    /// Run directory of the reference.
+    pub reference: String,
+    /// Whether run k saw the same noise everywhere, so that intervals are those of paired differences.
+    pub paired: bool,
+    /// One row a run, outage and state.
+    pub rows: Vec<Row>,
+    /// One row a run and outage.
+    pub consistency: Vec<ConsistencyRow>,
+}
+
+/// One state of one run in one outage, against the reference.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// Run directory.
+    pub run: String,
+    /// Outage, from 0.
+    pub outage: usize,
+    /// State.
+    pub state: &'static str,
+    /// Mean over the outage of (ASEE ratio − 1)·100.
+    pub ratio_error_pct: f64,
+    /// Mean of its absolute value.
+    pub abs_ratio_error_pct: f64,
+    /// 95 % Monte-Carlo interval of the signed mean.
+    pub ci95_pct: [f64; 2],
+    /// (ratio − 1)·100 of the RMSE at the outage's end.
+    pub rmse_end_ratio_error_pct: f64,
+    /// Its 95 % Monte-Carlo interval.
+    pub rmse_end_ci95_pct: [f64; 2],
+}
+
+/// Consistency of one run in one outage, beside the reference's.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ConsistencyRow {
+    /// Run directory.
+    pub run: String,
+    /// Outage, from 0.
+    pub outage: usize,
+    /// Mean NEES over the outage.
+    pub nees_mean: f64,
+    /// The reference's.
+    pub nees_mean_reference: f64,
+    /// Mean coverage over the outage.
+    pub coverage_mean: f64,
+    /// The reference's.
+    pub coverage_mean_reference: f64,
+}
+
+impl ComparisonFile {
+    /// All candidates against one reference.
+    #[must_use]
+    pub fn new(reference: &str, paired: bool, candidates: &[CandidateResult]) -> Self {
+        let mut file = Self {
+            schema_version: 1,
+            reference: reference.to_owned(),
+            paired,
+            rows: Vec::new(),
+            consistency: Vec::new(),
+        };
+        for candidate in candidates {
+            for (outage, comparison) in candidate.outages.iter().enumerate() {
+                file.rows.extend(rows(&candidate.run, outage, comparison));
+                file.consistency.push(ConsistencyRow {
+                    run: candidate.run.clone(),
+                    outage,
+                    nees_mean: comparison.nees[0],
+                    nees_mean_reference: comparison.nees[1],
+                    coverage_mean: comparison.coverage[0],
+                    coverage_mean_reference: comparison.coverage[1],
+                });
+            }
+        }
+        file
+    }
+}
+
+fn rows<'a>(run: &'a str, outage: usize, comparison: &'a OutageComparison) -> impl Iterator<Item = Row> + 'a {
+    REPORTED_NAMES.iter().zip(&comparison.states).map(move |(state, ratio)| Row {
+        run: run.to_owned(),
+        outage,
+        state,
+        ratio_error_pct: ratio.asee.pct,
+        abs_ratio_error_pct: ratio.asee_abs_pct,
+        ci95_pct: ratio.asee.ci95_pct,
+        rmse_end_ratio_error_pct: ratio.rmse_end.pct,
+        rmse_end_ci95_pct: ratio.rmse_end.ci95_pct,
+    })
+}
+
+/// The paper's Table I: rows scenario × outage, columns state × estimator; each cell the signed mean ratio
+/// error with half its 95 % interval, and in brackets the mean of the absolute ratio error (%). The first
+/// row is the head; `states` are indices of reported states.
+#[must_use]
+pub fn table_rows(candidates: &[CandidateResult], states: &[usize]) -> Vec<Vec<String>> {
+    let scenarios = in_order(candidates.iter().map(|c| c.label.scenario.as_str()));
+    let estimators = in_order(candidates.iter().map(|c| c.label.estimator.as_str()));
+    let columns = || states.iter().flat_map(|s| estimators.iter().map(move |e| (*s, *e)));
+    let name = |(s, e): (usize, &str)| format!("{}\n{e}", REPORTED_NAMES[s]).trim_end().to_owned();
+    let mut rows = vec![["scenario", "outage"].map(str::to_owned).to_vec()];
+    rows[0].extend(columns().map(name));
+    let outages = candidates.iter().map(|c| c.outages.len()).max().unwrap_or(0);
+    for scenario in scenarios {
+        for outage in 0..outages {
+            let cell_of = |(state, estimator): (usize, &str)| {
+                let here = |c: &&CandidateResult| {
+                    c.label.scenario == scenario && c.label.estimator == estimator && outage < c.outages.len()
+                };
+                candidates.iter().find(here).map_or_else(String::new, |c| cell(c, outage, state))
+            };
+            let mut row = vec![scenario.to_owned(), (outage + 1).to_string()];
+            row.extend(columns().map(cell_of));
+            rows.push(row);
+        }
+    }
+    rows
+}
+
+fn cell(candidate: &CandidateResult, outage: usize, state: usize) -> String {
+    if candidate.is_reference {
+        return "–".to_owned();
+    }
+    let ratio = candidate.outages[outage].states[state];
+    let half = (ratio.asee.ci95_pct[1] - ratio.asee.ci95_pct[0]) / 2.0;
+    let interval = if half.is_finite() { format!(" ± {half:.2}") } else { String::new() };
+    format!("{:+.2}{interval} ({:.2})", ratio.asee.pct, ratio.asee_abs_pct)
+}
+
+fn in_order<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+    let mut unique = Vec::new();
+    for name in names {
+        if !unique.contains(&name) {
+            unique.push(name);
+        }
+    }
+    unique
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metrics::{RatioError, StateRatio};
+
+    #[test]
+    fn names_of_directories_are_places_in_the_table() {
+        let cases = [
+            ("runs/II_sr-awv", "II", "SR-AWV"),
+            ("II/dr-awv", "II", "DR-AWV"),
+            ("./III-AWV/", "III", "AWV"),
+            ("awv", "", "AWV"),
+            ("rgmwm", "", "RGMWM"),
+            ("city", "city", "GMWM"),
+            ("lawv", "lawv", "GMWM"),
+        ];
+        for (directory, scenario, estimator) in cases {
+            let label = Label::of(directory, Some("gmwm"));
+            assert_eq!(
+                (label.scenario.as_str(), label.estimator.as_str()),
+                (scenario, estimator),
+                "{directory}"
+            );
+        }
+    }
+
+    fn candidate(run: &str, pct: f64, is_reference: bool) -> CandidateResult {
+        let error = RatioError { pct, ci95_pct: [pct - 0.5, pct + 0.5] };
+        let state = StateRatio { asee: error, asee_abs_pct: pct.abs() + 1.0, rmse_end: error };
+        let outage = OutageComparison { states: [state; 9], nees: [9.5, 9.0], coverage: [0.9, 0.95] };
+        let outages = vec![outage.clone(), outage];
+        CandidateResult { run: run.into(), label: Label::of(run, None), is_reference, outages }
+    }
+
+    #[test]
+    fn the_table_is_laid_out_as_the_papers() {
+        let all = [
+            candidate("I/awv", 0.0, true),
+            candidate("I/sr-awv", 0.96, false),
+            candidate("II/awv", -75.0, false),
+        ];
+        let rows = table_rows(&all, &[1, 6]);
+        assert_eq!(
+            rows[0],
+            ["scenario", "outage", "pos_e_m\nAWV", "pos_e_m\nSR-AWV", "roll_deg\nAWV", "roll_deg\nSR-AWV"]
+        );
+        assert_eq!(rows[1], ["I", "1", "–", "+0.96 ± 0.50 (1.96)", "–", "+0.96 ± 0.50 (1.96)"]);
+        assert_eq!(rows[4][..4], ["II", "2", "-75.00 ± 0.50 (76.00)", ""]);
+    }
+
+    #[test]
+    fn the_file_has_the_keys_of_the_interface() {
+        let file = ComparisonFile::new("I/awv", true, &[candidate("II/awv", 3.0, false)]);
+        let json = serde_json::to_value(&file).unwrap();
+        assert_eq!(json["reference"], "I/awv");
+        assert_eq!(json["rows"].as_array().unwrap().len(), 18);
+        let row = &json["rows"][10];
+        assert_eq!(
+            (&row["run"], &row["outage"], &row["state"]),
+            (&"II/awv".into(), &1.into(), &"pos_e_m".into())
+        );
+        assert_eq!((&row["ratio_error_pct"], &row["ci95_pct"][0]), (&3.0.into(), &2.5.into()));
+        assert_eq!(row["abs_ratio_error_pct"], 4.0);
+    }
+}

@@ -1,0 +1,201 @@
+//! `report.html`: one page with everything inside it.
+
+use super::manifest::Manifest;
+use super::number::readable;
+use super::svg::{Line, Plot, Scale, escape};
+use crate::metrics::{EpochMetrics, Estimate, OutageSummary, PerState, Summary};
+use crate::simulation::{REPORTED_NAMES, RunResult};
+use std::fmt::Write as _;
+
+const STYLE: &str = include_str!("report.css");
+
+/// The page of a run directory.
+pub(super) fn run_page(
+    result: &RunResult,
+    epochs: &[EpochMetrics],
+    summary: &Summary,
+    manifest: &Manifest,
+) -> String {
+    let mut body = String::new();
+    head(manifest, summary, &mut body);
+    outages(&summary.outages, &mut body);
+    consistency(summary, &mut body);
+    let plots = Plots { result, epochs };
+    plots.states("Position", 0, &mut body);
+    plots.states("Attitude", 6, &mut body);
+    plots.states("Velocity", 3, &mut body);
+    plots.consistency(summary, &mut body);
+    provenance(manifest, &mut body);
+    page("nav-sim run", &body)
+}
+
+/// A whole page around a body.
+fn page(title: &str, body: &str) -> String {
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width\">\n<title>{}</title>\n\
+         <style>\n{STYLE}</style>\n</head>\n<body>\n<main>\n{body}</main>\n</body>\n</html>\n",
+        escape(title)
+    )
+}
+
+fn head(manifest: &Manifest, summary: &Summary, body: &mut String) {
+    let input = |role: &str| manifest.inputs.iter().find(|i| i.role == role).map_or("", |i| i.path.as_str());
+    let truth = match (input("static"), input("truth")) {
+        ("", "") => input("model"),
+        ("", model) => model,
+        (recording, _) => recording,
+    };
+    let figures = [
+        ("trajectory", input("trajectory").to_owned()),
+        ("model of the filter", input("model").to_owned()),
+        ("what makes the errors", truth.to_owned()),
+        ("runs", format!("{} ({} diverged)", summary.runs, summary.diverged)),
+        ("filter states", summary.filter_states.to_string()),
+        ("seed", summary.seed.to_string()),
+        ("IMU epochs a second", readable(summary.throughput_epochs_per_s)),
+    ];
+    *body += "<h1>INS/GNSS Monte-Carlo run</h1>\n<dl>\n";
+    for (name, value) in figures {
+        let _ = writeln!(body, "<dt>{name}</dt><dd>{}</dd>", escape(&value));
+    }
+    *body += "</dl>\n";
+}
+
+fn outages(outages: &[OutageSummary], body: &mut String) {
+    if outages.is_empty() {
+        return;
+    }
+    *body += "<h2>Outages</h2>\n<p>Errors just before the first fix after the outage; ASEE averaged over the \
+              outage. ± is one Monte-Carlo standard error; brackets are 95 % intervals.</p>\n";
+    let mut head = vec!["".to_owned()];
+    head.extend(outages.iter().map(|o| format!("{}–{} s", o.start_s, o.end_s)));
+    let mut rows = vec![head];
+    let mut row = |name: &str, cell: &dyn Fn(&OutageSummary) -> String| {
+        let cells = outages.iter().map(cell);
+        rows.push(std::iter::once(name.to_owned()).chain(cells).collect());
+    };
+    let interval = |ci: (Option<f64>, Option<f64>)| {
+        let bound = |b: Option<f64>| b.map_or("–".to_owned(), readable);
+        format!("[{}, {}]", bound(ci.0), bound(ci.1))
+    };
+    row("horizontal error, median (m)", &|o| {
+        let h = &o.horizontal_error_end_m;
+        format!("{} {}", readable(h.p50), interval(h.p50_ci95))
+    });
+    row("horizontal error, 95 % (m)", &|o| {
+        let h = &o.horizontal_error_end_m;
+        format!("{} {}", readable(h.p95), interval(h.p95_ci95))
+    });
+    row("horizontal error, largest (m)", &|o| readable(o.horizontal_error_end_m.max));
+    row("re-convergence, median (s)", &|o| readable(o.reconvergence_s.p50));
+    for (i, name) in REPORTED_NAMES.iter().enumerate() {
+        let estimate = |value: &PerState<f64>, error: &PerState<f64>| {
+            format!("{} ± {}", readable(value.0[i]), readable(error.0[i]))
+        };
+        row(&format!("ASEE {name}"), &|o| estimate(&o.asee_mean, &o.asee_mean_std_error));
+        row(&format!("RMSE {name}"), &|o| estimate(&o.rmse_end, &o.rmse_end_std_error));
+    }
+    table(&rows, body);
+}
+
+fn consistency(summary: &Summary, body: &mut String) {
+    let (nees, nis, coverage) = (&summary.nees, &summary.nis, &summary.coverage);
+    let band = |low: f64, high: f64| format!("[{}, {}]", readable(low), readable(high));
+    let share = |x: f64| if x.is_finite() { format!("{:.0} %", x * 100.0) } else { "–".to_owned() };
+    let rows = [
+        ["", "mean", "if the filter is right", "95 % band", "epochs inside"].map(str::to_owned).to_vec(),
+        vec![
+            "NEES (position, velocity, attitude), per epoch".to_owned(),
+            readable(nees.mean),
+            nees.dof.to_string(),
+            band(nees.lower95, nees.upper95),
+            share(nees.fraction_inside),
+        ],
+        vec![
+            format!("NIS, all {} fixes", nis.fixes),
+            readable(nis.mean),
+            nis.dof.to_string(),
+            band(nis.lower95, nis.upper95),
+            String::new(),
+        ],
+        vec![
+            "coverage (position, attitude), per epoch".to_owned(),
+            readable(coverage.mean),
+            coverage.level.to_string(),
+            band(coverage.lower95, coverage.upper95),
+            share(coverage.fraction_inside),
+        ],
+    ];
+    *body += "<h2>Consistency</h2>\n";
+    table(&rows, body);
+}
+
+struct Plots<'a> {
+    result: &'a RunResult,
+    epochs: &'a [EpochMetrics],
+}
+
+impl Plots<'_> {
+    fn curve(&self, label: &str, class: &'static str, y: impl Fn(&EpochMetrics) -> f64) -> Line {
+        let points = self.epochs.iter().map(|e| (e.t_s, y(e))).collect();
+        Line { label: label.to_owned(), class, points }
+    }
+
+    /// Three states from `first`: what the filter believes (ASEE) and how wrong it is (RMSE).
+    fn states(&self, title: &str, first: usize, body: &mut String) {
+        let _ = writeln!(body, "<h2>{title}</h2>");
+        for state in first..first + 3 {
+            let value =
+                |of: fn(&EpochMetrics) -> &PerState<Estimate>| move |e: &EpochMetrics| of(e).0[state].value;
+            let lines = vec![
+                self.curve("RMSE", "rmse", value(|e| &e.rmse)),
+                self.curve("ASEE", "asee", value(|e| &e.asee)),
+            ];
+            *body += &self.plot(REPORTED_NAMES[state], Scale::Log, lines).render();
+        }
+    }
+
+    fn consistency(&self, summary: &Summary, body: &mut String) {
+        *body += "<h2>Consistency over time</h2>\n";
+        let nees = vec![self.curve("NEES", "asee", |e| e.nees.value)];
+        let band = Some((summary.nees.lower95, summary.nees.upper95));
+        *body += &Plot { band, ..self.plot("NEES and where a right filter keeps it", Scale::Linear, nees) }
+            .render();
+        let coverage = vec![self.curve("coverage", "asee", |e| e.coverage)];
+        let band = Some((summary.coverage.lower95, summary.coverage.upper95));
+        let title = format!("coverage at level {}", summary.coverage.level);
+        *body += &Plot { band, ..self.plot(&title, Scale::Linear, coverage) }.render();
+    }
+
+    fn plot(&self, title: &str, scale: Scale, lines: Vec<Line>) -> Plot {
+        let stripes = self.result.outages.clone();
+        Plot { title: title.to_owned(), scale, include: None, stripes, band: None, lines }
+    }
+}
+
+fn provenance(manifest: &Manifest, body: &mut String) {
+    *body += "<h2>Provenance</h2>\n";
+    let _ = writeln!(body, "<p><code>{}</code></p>", escape(&manifest.command.join(" ")));
+    let _ = writeln!(body, "<p>nav-sim {}, {} threads</p>", escape(&manifest.version), manifest.threads);
+    let mut rows = vec![["input", "file", "BLAKE3"].map(str::to_owned).to_vec()];
+    rows.extend(manifest.inputs.iter().map(|i| vec![i.role.clone(), i.path.clone(), i.blake3.clone()]));
+    table(&rows, body);
+    let configuration = toml::to_string_pretty(&manifest.configuration).unwrap_or_default();
+    let _ = writeln!(
+        body,
+        "<details><summary>Configuration</summary><pre>{}</pre></details>",
+        escape(&configuration)
+    );
+}
+
+/// A table whose first row is its head.
+fn table(rows: &[Vec<String>], body: &mut String) {
+    *body += "<div class=\"scroll\"><table>\n";
+    for (i, row) in rows.iter().enumerate() {
+        let tag = if i == 0 { "th" } else { "td" };
+        let cells = row.iter().map(|c| format!("<{tag}>{}</{tag}>", escape(c))).collect::<String>();
+        let _ = writeln!(body, "<tr>{cells}</tr>");
+    }
+    *body += "</table></div>\n";
+}

@@ -1,0 +1,68 @@
+//! `manifest.json`: all it takes to know where a run directory came from, and to make it again.
+
+use crate::scenario::Scenario;
+use serde::{Deserialize, Serialize};
+
+/// Where a run directory came from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// Layout version.
+    pub schema_version: u32,
+    /// Version of nav-sim.
+    pub version: String,
+    /// The command as given.
+    pub command: Vec<String>,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Name of the truth, part of the key of every random stream.
+    pub scenario: String,
+    /// The resolved configuration: every key, outages one by one.
+    pub configuration: Scenario,
+    /// Every file that was read.
+    pub inputs: Vec<Input>,
+    /// The model the filter believes.
+    pub model: ModelNote,
+    /// Worker threads.
+    pub threads: usize,
+    /// Time from start to results (s).
+    pub wall_s: f64,
+}
+
+/// A file that was read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Input {
+    /// What for: "trajectory", "model", "truth", "static", "scenario".
+    pub role: String,
+    /// Path as given.
+    pub path: String,
+    /// BLAKE3 of its bytes, in hexadecimal.
+    pub blake3: String,
+}
+
+impl Input {
+    /// An input with the hash of its contents.
+    #[must_use]
+    pub fn new(role: &str, path: &str, contents: &[u8]) -> Self {
+        let blake3 = blake3::hash(contents).to_hex().to_string();
+        Self { role: role.to_owned(), path: path.to_owned(), blake3 }
+    }
+}
+
+/// What the model file says about its making.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ModelNote {
+    /// Estimator, if calibrated ("awv", "sr-awv", "dr-awv", …).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub estimator: Option<String>,
+}
+
+impl Manifest {
+    /// Version of the layout.
+    pub const SCHEMA_VERSION: u32 = 1;
+
+    /// The hashes of the inputs of a role, in the order given.
+    #[must_use]
+    pub fn hashes(&self, role: &str) -> Vec<&str> {
+        self.inputs.iter().filter(|i| i.role == role).map(|i| i.blake3.as_str()).collect()
+    }
+}

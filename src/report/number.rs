@@ -1,0 +1,44 @@
+//! Numbers as text.
+
+/// The shortest decimal text that reads back to the same number; powers of ten where plain digits would be
+/// long; `NaN` for what is unknown.
+pub(super) fn shortest(x: f64) -> String {
+    let plain = x == 0.0 || (1e-5..1e15).contains(&x.abs()) || !x.is_finite();
+    if plain { format!("{x}") } else { format!("{x:e}") }
+}
+
+/// A number for people: three significant digits, or four figures before the point.
+pub(super) fn readable(x: f64) -> String {
+    if !x.is_finite() {
+        return "–".to_owned();
+    }
+    let magnitude = x.abs();
+    match magnitude {
+        m if m == 0.0 => "0".to_owned(),
+        m if m < 1e-3 || m >= 1e6 => format!("{x:.2e}"),
+        m if m >= 100.0 => format!("{x:.0}"),
+        m if m >= 10.0 => format!("{x:.1}"),
+        m if m >= 1.0 => format!("{x:.2}"),
+        m => format!("{x:.*}", (2.0 - m.log10().floor()) as usize),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shortest_texts_read_back_to_the_same_number() {
+        let numbers = [0.0, -0.0, 0.1, 300.0, 1.0 / 3.0, 2e-9, -6.02e23, 5e-324, f64::MAX, 1e-5, 9.9e-6];
+        for x in numbers {
+            assert_eq!(shortest(x).parse::<f64>().unwrap().to_bits(), x.to_bits(), "{x:e}");
+        }
+        assert_eq!([300.0, 0.1, 2e-9, f64::NAN].map(shortest), ["300", "0.1", "2e-9", "NaN"]);
+    }
+
+    #[test]
+    fn readable_numbers_have_three_significant_digits() {
+        let shown = [0.0, 1234.5, 123.4, 12.34, 1.234, 0.1234, 0.01, 0.000_123, f64::NAN].map(readable);
+        assert_eq!(shown, ["0", "1234", "123", "12.3", "1.23", "0.123", "0.0100", "1.23e-4", "–"]);
+    }
+}

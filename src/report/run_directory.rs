@@ -1,0 +1,90 @@
+//! The files of a run directory.
+
+use super::html;
+use super::manifest::Manifest;
+use super::tables::{epochs_csv, runs_csv};
+use crate::metrics::{EpochMetrics, Summary};
+use crate::simulation::RunResult;
+
+/// A file to be written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OutputFile {
+    /// Name in the directory.
+    pub name: &'static str,
+    /// All of it.
+    pub contents: String,
+}
+
+/// The files of a run directory, the manifest last: where it is, the rest is whole.
+#[must_use]
+pub fn run_directory(
+    result: &RunResult,
+    epochs: &[EpochMetrics],
+    summary: &Summary,
+    manifest: &Manifest,
+) -> Vec<OutputFile> {
+    let file = |name, contents| OutputFile { name, contents };
+    vec![
+        file("epochs.csv", epochs_csv(epochs)),
+        file("runs.csv", runs_csv(result)),
+        file("summary.json", json(summary)),
+        file("report.html", html::run_page(result, epochs, summary, manifest)),
+        file("manifest.json", json(manifest)),
+    ]
+}
+
+/// Indented JSON with a final newline; NaN is null.
+pub(super) fn json(value: &impl serde::Serialize) -> String {
+    serde_json::to_string_pretty(value).expect("plain structs with text keys are always JSON") + "\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Input, ModelNote, sample};
+    use super::*;
+    use crate::metrics;
+    use crate::scenario::Scenario;
+
+    pub(super) fn files() -> Vec<OutputFile> {
+        let result = sample::result();
+        let epochs = metrics::epochs(&result.epochs);
+        let summary = Summary::of(&result, &epochs, 7, 2.0);
+        let manifest = Manifest {
+            schema_version: Manifest::SCHEMA_VERSION,
+            version: "0.1.0".into(),
+            command: ["nav-sim", "run", "a<b.toml"].map(str::to_owned).to_vec(),
+            seed: 7,
+            scenario: String::new(),
+            configuration: Scenario::default(),
+            inputs: vec![Input::new("trajectory", "a<b.toml", b"x")],
+            model: ModelNote { estimator: Some("dr-awv".into()) },
+            threads: 2,
+            wall_s: 2.0,
+        };
+        run_directory(&result, &epochs, &summary, &manifest)
+    }
+
+    #[test]
+    fn the_manifest_comes_last_and_reads_back() {
+        let files = files();
+        assert_eq!(
+            files.iter().map(|f| f.name).collect::<Vec<_>>(),
+            ["epochs.csv", "runs.csv", "summary.json", "report.html", "manifest.json"]
+        );
+        let manifest: Manifest = serde_json::from_str(&files[4].contents).unwrap();
+        assert_eq!(manifest.hashes("trajectory"), [blake3::hash(b"x").to_hex().as_str()]);
+        assert_eq!(manifest.configuration, Scenario::default());
+    }
+
+    /// The page asks nothing of the network and holds nothing unescaped.
+    #[test]
+    fn the_page_is_self_contained() {
+        let page = &files()[3].contents;
+        for word in ["http:", "https:", "src=", "@import", "url(", "<script", "<link", "a<b"] {
+            assert!(!page.contains(word), "{word}");
+        }
+        assert!(
+            page.contains("a&lt;b.toml") && page.contains("<svg") && page.trim_end().ends_with("</html>")
+        );
+    }
+}

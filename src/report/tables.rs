@@ -1,0 +1,262 @@
+//! `epochs.csv` and `runs.csv` of a run directory, written and read back.
+
+use super::number::shortest;
+use crate::metrics::{EpochMetrics, EpochRow, PerState};
+use crate::simulation::{OutageRecord, REPORTED, REPORTED_NAMES, RunRecord, RunResult};
+use std::collections::HashMap;
+
+/// A table that cannot be read back.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TableError {
+    /// A column is not there.
+    #[error("no column is named \"{column}\"")]
+    Column {
+        /// The column.
+        column: String,
+    },
+    /// A value is not what its column holds.
+    #[error("line {line}: column \"{column}\": \"{value}\" is not a number")]
+    Value {
+        /// Line, from 1.
+        line: u64,
+        /// Column.
+        column: String,
+        /// The text found.
+        value: String,
+    },
+    /// Not a table.
+    #[error("{0}")]
+    Syntax(String),
+}
+
+const EPOCH_ENDS: [&str; 4] = ["mean_pos_err_m", "mean_att_err_deg", "nees", "coverage"];
+
+fn named(prefix: &str) -> impl Iterator<Item = String> {
+    REPORTED_NAMES.iter().map(move |name| format!("{prefix}{name}"))
+}
+
+/// Columns of `epochs.csv`.
+fn epoch_columns() -> Vec<String> {
+    let states = ["asee_", "rmse_", "bias_"].into_iter().flat_map(named);
+    let ends = EPOCH_ENDS.map(str::to_owned);
+    ["t_s", "gnss"].map(str::to_owned).into_iter().chain(states).chain(ends).collect()
+}
+
+/// `epochs.csv`: one row a reporting epoch (1 Hz), means over runs.
+#[must_use]
+pub fn epochs_csv(epochs: &[EpochMetrics]) -> String {
+    let values = |all: &PerState<crate::metrics::Estimate>| all.0.map(|e| shortest(e.value));
+    let row = |e: &EpochMetrics| {
+        let mut row = vec![shortest(e.t_s), u8::from(e.gnss).to_string()];
+        row.extend([&e.asee, &e.rmse, &e.bias].into_iter().flat_map(values));
+        let ends = [e.mean_pos_err_m.value, e.mean_att_err_deg.value, e.nees.value, e.coverage];
+        row.extend(ends.map(shortest));
+        row.join(",")
+    };
+    lines(epoch_columns().join(","), epochs.iter().map(row))
+}
+
+/// Columns of `runs.csv`.
+fn run_columns() -> Vec<String> {
+    let start = ["run", "diverged", "nis_mean", "fixes", "outage"].map(str::to_owned);
+    let ends = ["horizontal_error_end_m", "reconvergence_s"].map(str::to_owned);
+    start.into_iter().chain(named("see_mean_")).chain(named("error_end_")).chain(ends).collect()
+}
+
+/// `runs.csv`: one row a run and outage (one row a run, outage empty, when there is none).
+#[must_use]
+pub fn runs_csv(result: &RunResult) -> String {
+    let rows = result.runs.iter().flat_map(|run| {
+        let start = format!("{},{},{},{}", run.run, u8::from(run.diverged), shortest(run.nis.0), run.nis.1);
+        let empty = run.outages.is_empty().then(|| format!("{start}{}", ",".repeat(run_columns().len() - 4)));
+        let of_outage = move |(i, outage)| format!("{start},{i},{}", outage_cells(outage).join(","));
+        empty.into_iter().chain(run.outages.iter().enumerate().map(of_outage))
+    });
+    lines(run_columns().join(","), rows)
+}
+
+fn outage_cells(outage: &OutageRecord) -> Vec<String> {
+    let states = outage.see_mean.iter().chain(&outage.error_end);
+    let ends = [outage.horizontal_error_end_m, outage.reconvergence_s];
+    states.chain(&ends).copied().map(shortest).collect()
+}
+
+fn lines(header: String, rows: impl Iterator<Item = String>) -> String {
+    let mut text = header + "\n";
+    for row in rows {
+        text += &row;
+        text.push('\n');
+    }
+    text
+}
+
+/// Reads `epochs.csv` back, as far as comparisons need it.
+///
+/// # Errors
+/// A missing column or a value that is not a number.
+pub fn parse_epochs(text: &str) -> Result<Vec<EpochRow>, TableError> {
+    let table = Table::read(text)?;
+    let (asee, rmse) = (table.states("asee_")?, table.states("rmse_")?);
+    let [t_s, nees, coverage] = table.columns(["t_s", "nees", "coverage"])?;
+    let row = |row: usize| {
+        Ok(EpochRow {
+            t_s: table.number(row, t_s)?,
+            asee: table.numbers(row, asee)?,
+            rmse: table.numbers(row, rmse)?,
+            nees: table.number(row, nees)?,
+            coverage: table.number(row, coverage)?,
+        })
+    };
+    (0..table.rows.len()).map(row).collect()
+}
+
+/// Reads `runs.csv` back.
+///
+/// # Errors
+/// A missing column or a value that is not a number.
+pub fn parse_runs(text: &str) -> Result<Vec<RunRecord>, TableError> {
+    let table = Table::read(text)?;
+    let (see, error) = (table.states("see_mean_")?, table.states("error_end_")?);
+    let [run, diverged, nis, fixes, outage, horizontal, recovery] = table.columns([
+        "run",
+        "diverged",
+        "nis_mean",
+        "fixes",
+        "outage",
+        "horizontal_error_end_m",
+        "reconvergence_s",
+    ])?;
+    let mut runs: Vec<RunRecord> = Vec::new();
+    for row in 0..table.rows.len() {
+        let number = table.number(row, run)? as u64;
+        if runs.last().is_none_or(|r| r.run != number) {
+            runs.push(RunRecord {
+                run: number,
+                diverged: table.number(row, diverged)? > 0.0,
+                outages: Vec::new(),
+                nis: (table.number(row, nis)?, table.number(row, fixes)? as u64),
+            });
+        }
+        if table.rows[row][outage].is_empty() {
+            continue;
+        }
+        let record = OutageRecord {
+            see_mean: table.numbers(row, see)?,
+            error_end: table.numbers(row, error)?,
+            horizontal_error_end_m: table.number(row, horizontal)?,
+            reconvergence_s: table.number(row, recovery)?,
+        };
+        if let Some(last) = runs.last_mut() {
+            last.outages.push(record);
+        }
+    }
+    Ok(runs)
+}
+
+/// A table in memory, its columns by name.
+struct Table {
+    index: HashMap<String, usize>,
+    names: Vec<String>,
+    rows: Vec<csv::StringRecord>,
+}
+
+impl Table {
+    fn read(text: &str) -> Result<Self, TableError> {
+        let syntax = |e: csv::Error| TableError::Syntax(e.to_string());
+        let mut reader = csv::Reader::from_reader(text.as_bytes());
+        let names: Vec<String> = reader.headers().map_err(syntax)?.iter().map(str::to_owned).collect();
+        let rows = reader.into_records().collect::<Result<_, _>>().map_err(syntax)?;
+        Ok(Self { index: names.iter().cloned().zip(0..).collect(), names, rows })
+    }
+
+    fn column(&self, name: &str) -> Result<usize, TableError> {
+        self.index.get(name).copied().ok_or_else(|| TableError::Column { column: name.to_owned() })
+    }
+
+    fn columns<const N: usize>(&self, names: [&str; N]) -> Result<[usize; N], TableError> {
+        let mut found = [0; N];
+        for (place, name) in found.iter_mut().zip(names) {
+            *place = self.column(name)?;
+        }
+        Ok(found)
+    }
+
+    fn states(&self, prefix: &str) -> Result<[usize; REPORTED], TableError> {
+        self.columns(REPORTED_NAMES.map(|n| format!("{prefix}{n}")).each_ref().map(String::as_str))
+    }
+
+    fn number(&self, row: usize, column: usize) -> Result<f64, TableError> {
+        let text = &self.rows[row][column];
+        text.parse().map_err(|_| TableError::Value {
+            line: self.rows[row].position().map_or(0, csv::Position::line),
+            column: self.names[column].clone(),
+            value: text.to_owned(),
+        })
+    }
+
+    fn numbers(&self, row: usize, columns: [usize; REPORTED]) -> Result<[f64; REPORTED], TableError> {
+        let mut values = [0.0; REPORTED];
+        for (value, column) in values.iter_mut().zip(columns) {
+            *value = self.number(row, column)?;
+        }
+        Ok(values)
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::float_cmp, reason = "what is written reads back exactly")]
+mod tests {
+    use super::super::sample;
+    use super::*;
+    use crate::metrics::epochs;
+
+    #[test]
+    fn the_columns_are_those_of_the_interface() {
+        let header = epoch_columns().join(", ");
+        assert!(header.starts_with("t_s, gnss, asee_pos_n_m, asee_pos_e_m, asee_pos_d_m, asee_vel_n_m_s, "));
+        assert!(
+            header.contains("asee_yaw_deg, rmse_pos_n_m") && header.contains("rmse_yaw_deg, bias_pos_n_m")
+        );
+        assert!(header.ends_with("bias_yaw_deg, mean_pos_err_m, mean_att_err_deg, nees, coverage"));
+    }
+
+    #[test]
+    fn epochs_read_back_exactly() {
+        let result = sample::result();
+        let metrics = epochs(&result.epochs);
+        let text = epochs_csv(&metrics);
+        let rows = parse_epochs(&text).unwrap();
+        assert_eq!(rows.len(), result.epochs.len());
+        for (row, metric) in rows.iter().zip(&metrics) {
+            assert_eq!((row.t_s, row.nees, row.coverage), (metric.t_s, metric.nees.value, metric.coverage));
+            assert_eq!(row.asee, metric.asee.0.map(|e| e.value));
+            assert_eq!(row.rmse, metric.rmse.0.map(|e| e.value));
+        }
+        assert_eq!(text.lines().nth(1).unwrap().split(',').nth(1), Some("1"));
+    }
+
+    #[test]
+    fn runs_read_back_exactly() {
+        let mut result = sample::result();
+        result.runs[1].outages[0].reconvergence_s = 2.5e-9;
+        assert_eq!(parse_runs(&runs_csv(&result)).unwrap(), result.runs);
+        for run in &mut result.runs {
+            run.outages.clear();
+        }
+        assert_eq!(parse_runs(&runs_csv(&result)).unwrap(), result.runs);
+    }
+
+    #[test]
+    fn unreadable_tables_are_refused_by_line_and_column() {
+        let text = epochs_csv(&epochs(&sample::result().epochs));
+        let error = parse_epochs(&text.replacen("rmse_yaw_deg", "rmse_yow_deg", 1)).unwrap_err();
+        assert_eq!(error.to_string(), "no column is named \"rmse_yaw_deg\"");
+        let broken: String = text
+            .lines()
+            .enumerate()
+            .map(|(i, l)| if i == 2 { format!("x{l}\n") } else { format!("{l}\n") })
+            .collect();
+        let error = parse_epochs(&broken).unwrap_err();
+        assert_eq!(error.to_string(), "line 3: column \"t_s\": \"x1\" is not a number");
+    }
+}
