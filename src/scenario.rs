@@ -267,6 +267,6 @@ mod tests {
         assert_eq!(refused("imu.scale_ppm_gyro = 300"), "imu.scale_ppm_gyro");
         assert_eq!(refused("initial.att_sigma_deg = [1, 1, 180]"), "initial.att_sigma_deg");
         assert_eq!(refused("baro = { rate_hz = 1, sigma_m = 1 }"), "baro.rate_hz");
-        assert_eq!(refused("outage = [{ start_s = 9, end_s = 3 }]"), "outage.end_s");
+        assert_eq!(refused("outage = [{ start_s = 9, end_s = 3 }]"), "outage[1].end_s");
     }
 }

@@ -1,5 +1,7 @@
 //! What went wrong, as the user reads it, and the exit code it means.
 
+use nav_sim::data::atomic::WriteError;
+use nav_sim::data::toml_file::TomlError;
 use std::fmt;
 
 /// A failure: exit code, message and hint. 1 could not (I/O, numerics); 2 usage or configuration;
@@ -33,6 +35,12 @@ impl Failure {
         self
     }
 
+    /// With advice, if there is any.
+    pub(crate) fn maybe_hint(mut self, hint: Option<String>) -> Self {
+        self.hint = hint.or(self.hint);
+        self
+    }
+
     pub(crate) const fn code(&self) -> u8 {
         self.code
     }
@@ -45,5 +53,19 @@ impl Failure {
 impl fmt::Display for Failure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.message)
+    }
+}
+
+impl From<TomlError> for Failure {
+    fn from(e: TomlError) -> Self {
+        let failure = if e.is_content() { Self::input(&e) } else { Self::could_not(&e) };
+        failure.maybe_hint(e.hint())
+    }
+}
+
+impl From<WriteError> for Failure {
+    fn from(e: WriteError) -> Self {
+        let failure = if e.is_usage() { Self::input(&e) } else { Self::could_not(&e) };
+        failure.maybe_hint(e.hint())
     }
 }

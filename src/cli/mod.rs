@@ -1,6 +1,7 @@
 //! The command line: one file per subcommand, each its `Args` and a `run(args, &Session)`.
 
 mod common;
+mod compare;
 mod completions;
 mod exit;
 mod man;
@@ -27,6 +28,7 @@ struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
+    Compare(compare::Args),
     Completions(completions::Args),
     Man(man::Args),
 }
@@ -34,6 +36,7 @@ enum Command {
 impl Command {
     fn run(self, session: &Session) -> Result<(), Failure> {
         match self {
+            Self::Compare(args) => compare::run(&args, session),
             Self::Completions(args) => completions::run(&args, session),
             Self::Man(args) => man::run(&args, session),
         }

@@ -2,5 +2,7 @@
 
 pub mod atomic;
 pub mod model_file;
+pub mod run_directory;
+pub mod scenario_file;
 pub mod suggest;
 pub mod toml_file;

@@ -136,7 +136,16 @@ impl Source {
         Section { source: self, name: String::new(), at: 0, table: table.get_ref() }
     }
 
-    fn line(&self, at: usize) -> usize {
+    pub(crate) fn text(&self) -> &str {
+        &self.text
+    }
+
+    pub(crate) fn path(&self) -> &str {
+        &self.path
+    }
+
+    /// The line (from 1) a byte stands in.
+    pub(crate) fn line(&self, at: usize) -> usize {
         1 + self.text.as_bytes()[..at.min(self.text.len())].iter().filter(|b| **b == b'\n').count()
     }
 }

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// How the noise model becomes states of the filter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(try_from = "WrittenStates")]
 pub enum FilterStates {
     /// 15 states: one first-order Gauss-Markov bias an axis, the reduction of the model.
     #[default]
@@ -13,6 +14,27 @@ pub enum FilterStates {
     /// One state for each AR1 and random walk of each axis.
     #[serde(rename = "full")]
     Full,
+}
+
+/// As people write it: `"15"`, `15` or `"full"`.
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "\"15\" or \"full\"")]
+enum WrittenStates {
+    Number(u64),
+    Word(String),
+}
+
+impl TryFrom<WrittenStates> for FilterStates {
+    type Error = &'static str;
+
+    fn try_from(written: WrittenStates) -> Result<Self, Self::Error> {
+        match written {
+            WrittenStates::Number(15) => Ok(Self::Reduced15),
+            WrittenStates::Word(word) if word == "15" => Ok(Self::Reduced15),
+            WrittenStates::Word(word) if word == "full" => Ok(Self::Full),
+            _ => Err("expected \"15\" or \"full\""),
+        }
+    }
 }
 
 /// Standard deviations of the initial state. The nominal start is drawn from them, so that the filter's

@@ -13,5 +13,5 @@ mod tables;
 
 pub use comparison::{CandidateResult, ComparisonFile, Label, table_rows};
 pub use manifest::{Input, Manifest, ModelNote};
-pub use run_directory::{OutputFile, run_directory};
+pub use run_directory::{OutputFile, json, run_directory};
 pub use tables::{TableError, epochs_csv, parse_epochs, parse_runs, runs_csv};

@@ -14,8 +14,8 @@ pub(super) fn readable(x: f64) -> String {
     }
     let magnitude = x.abs();
     match magnitude {
-        m if m == 0.0 => "0".to_owned(),
-        m if m < 1e-3 || m >= 1e6 => format!("{x:.2e}"),
+        0.0 => "0".to_owned(),
+        m if !(1e-3..1e6).contains(&m) => format!("{x:.2e}"),
         m if m >= 100.0 => format!("{x:.0}"),
         m if m >= 10.0 => format!("{x:.1}"),
         m if m >= 1.0 => format!("{x:.2}"),

@@ -34,7 +34,8 @@ pub fn run_directory(
 }
 
 /// Indented JSON with a final newline; NaN is null.
-pub(super) fn json(value: &impl serde::Serialize) -> String {
+#[must_use]
+pub fn json(value: &impl serde::Serialize) -> String {
     serde_json::to_string_pretty(value).expect("plain structs with text keys are always JSON") + "\n"
 }
 

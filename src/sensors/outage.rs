@@ -140,7 +140,9 @@ impl OutagePlan {
     /// The key of a value that is refused.
     pub fn windows(&self, span_s: (f64, f64), seed: u64) -> Result<Vec<Outage>, SettingError> {
         let mut all = self.fixed.clone();
-        all.iter().try_for_each(Outage::validate).map_err(|e| e.in_section("outage"))?;
+        for (i, outage) in all.iter().enumerate() {
+            outage.validate().map_err(|e| e.in_section(&format!("outage[{}]", i + 1)))?;
+        }
         if let Some(periodic) = &self.periodic {
             periodic.validate().map_err(|e| e.in_section("outage_periodic"))?;
             all.extend(periodic.windows(span_s.1));
@@ -219,7 +221,7 @@ mod tests {
     fn impossible_windows_are_refused_by_key() {
         let refused = |plan: &OutagePlan| plan.windows((0.0, 100.0), 1).unwrap_err().key;
         let fixed = OutagePlan { fixed: vec![outage(9.0, 9.0)], ..OutagePlan::default() };
-        assert_eq!(refused(&fixed), "outage.end_s");
+        assert_eq!(refused(&fixed), "outage[1].end_s");
         let periodic = PeriodicOutages { first_s: 0.0, every_s: 10.0, duration_s: 10.0 };
         let periodic = OutagePlan { periodic: Some(periodic), ..OutagePlan::default() };
         assert_eq!(refused(&periodic), "outage_periodic.duration_s");

@@ -1,0 +1,134 @@
+//! `nav-sim compare`: ratios between runs.
+
+use super::{Failure, Session};
+use comfy_table::{ContentArrangement, Table, presets};
+use nav_sim::data::{atomic, run_directory};
+use nav_sim::metrics;
+use nav_sim::report::{self, CandidateResult, ComparisonFile, Label, Manifest};
+use nav_sim::simulation::REPORTED_NAMES;
+use std::path::{Path, PathBuf};
+
+/// Ratios of ASEE (and RMSE, NEES, coverage) between runs, per outage and state
+///
+/// The table has the layout of the paper's Table I: rows scenario × outage, columns state × estimator, both
+/// from the names of the directories (II_sr-awv, or II/sr-awv). Each cell: the mean over the outage of
+/// (ASEE ratio − 1)·100, ± half its 95 % Monte-Carlo interval, and in brackets the mean of its absolute
+/// value. Everything else is in the JSON file.
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml --runs 8 --seed 1 -o reference
+  nav-sim run trajectories/land_vehicle.toml calib_data/tactical.toml --truth calib_data/consumer_mems.toml --runs 8 --seed 1 -o candidate
+  nav-sim compare candidate --reference reference")]
+pub(crate) struct Args {
+    /// Run directories
+    #[arg(required = true, value_name = "DIR")]
+    runs: Vec<PathBuf>,
+    /// Run directory to compare with
+    #[arg(long, value_name = "DIR")]
+    reference: PathBuf,
+    /// States in the table (repeatable), or "all"
+    #[arg(long = "state", value_name = "STATE", default_values = ["pos_e_m", "roll_deg"])]
+    states: Vec<String>,
+    /// Where to write the comparison
+    #[arg(long, short, value_name = "FILE", default_value = "comparison.json")]
+    out: PathBuf,
+}
+
+pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let states = states(&args.states)?;
+    let reference = read(&args.reference)?;
+    let mut candidates = Vec::new();
+    let mut all_paired = true;
+    for path in &args.runs {
+        let candidate = read(path)?;
+        comparable(path, &candidate.manifest, &reference.manifest)?;
+        let differences = differences(&candidate.manifest, &reference.manifest);
+        for difference in &differences {
+            session.printer.warn(&format!("{}: {difference}", path.display()));
+        }
+        let paired = differences.is_empty();
+        all_paired &= paired;
+        let outages = metrics::compare(&candidate.experiment, &reference.experiment, paired)
+            .map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
+        let run = path.display().to_string();
+        let label = Label::of(&run, candidate.manifest.model.estimator.as_deref());
+        let is_reference = same_place(path, &args.reference);
+        candidates.push(CandidateResult { run, label, is_reference, outages });
+    }
+    let file = ComparisonFile::new(&args.reference.display().to_string(), all_paired, &candidates);
+    let json = report::json(&file);
+    atomic::write(&args.out, &json)?;
+    if session.json() {
+        session.printer.result(json.trim_end());
+    } else {
+        session.printer.result(&table(&report::table_rows(&candidates, &states)));
+    }
+    session.printer.say(&format!("wrote {}", args.out.display()));
+    Ok(())
+}
+
+fn read(path: &Path) -> Result<run_directory::RunDirectory, Failure> {
+    run_directory::read(path).map_err(|e| {
+        let failure = if e.is_content() { Failure::input(&e) } else { Failure::could_not(&e) };
+        failure.maybe_hint(e.hint())
+    })
+}
+
+fn states(names: &[String]) -> Result<Vec<usize>, Failure> {
+    if names.iter().any(|n| n == "all") {
+        return Ok((0..REPORTED_NAMES.len()).collect());
+    }
+    let index = |name: &String| {
+        let found = REPORTED_NAMES.iter().position(|n| n == name);
+        let known = || format!("one of {}, or all", REPORTED_NAMES.join(", "));
+        found.ok_or_else(|| Failure::input(format!("--state {name} is no state")).hint(known()))
+    };
+    names.iter().map(index).collect()
+}
+
+/// Without the same trajectory a ratio means nothing.
+fn comparable(path: &Path, candidate: &Manifest, reference: &Manifest) -> Result<(), Failure> {
+    if candidate.hashes("trajectory") == reference.hashes("trajectory") {
+        return Ok(());
+    }
+    let failure = Failure::input(format!("{}: not the trajectory of the reference", path.display()));
+    Err(failure.hint("compare runs along one and the same trajectory file"))
+}
+
+/// What makes two runs differ beside the model in the filter; then run k did not see the same noise.
+fn differences(candidate: &Manifest, reference: &Manifest) -> Vec<String> {
+    let (c, r) = (&candidate.configuration, &reference.configuration);
+    let mut found = Vec::new();
+    let mut differ = |what: &str, different: bool| {
+        if different {
+            found.push(format!("{what} not that of the reference; the runs are not paired"));
+        }
+    };
+    differ("the seed is", candidate.seed != reference.seed || candidate.scenario != reference.scenario);
+    differ("what makes the errors is", truth(candidate) != truth(reference));
+    differ("[imu] is", c.imu != r.imu);
+    differ("[gnss] is", c.gnss != r.gnss);
+    differ("[initial] is", c.initial != r.initial);
+    found
+}
+
+/// What made the INS errors: a recording, a model, or the filter's own.
+fn truth(manifest: &Manifest) -> Vec<&str> {
+    let given = ["static", "truth", "model"].map(|role| manifest.hashes(role));
+    given.into_iter().find(|hashes| !hashes.is_empty()).unwrap_or_default()
+}
+
+fn same_place(a: &Path, b: &Path) -> bool {
+    a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
+}
+
+/// A table whose first row is its head.
+pub(super) fn table(rows: &[Vec<String>]) -> String {
+    let mut table = Table::new();
+    table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Disabled);
+    if let Some((head, rows)) = rows.split_first() {
+        table.set_header(head).add_rows(rows);
+    }
+    table.to_string()
+}

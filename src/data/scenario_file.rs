@@ -1,0 +1,151 @@
+//! Scenario files (TOML): see [`Scenario`].
+
+use super::suggest::nearest;
+use super::toml_file::{Section, Source, TomlError};
+use crate::scenario::Scenario;
+use crate::units::SettingError;
+use std::path::Path;
+
+/// Reads and checks a scenario.
+///
+/// # Errors
+/// File, line, key and value of what is refused; a mistyped key with the nearest legal one.
+pub fn read(path: &Path) -> Result<Scenario, TomlError> {
+    from_source(&Source::read(path)?)
+}
+
+fn from_source(source: &Source) -> Result<Scenario, TomlError> {
+    let table = source.parse()?;
+    let scenario: Scenario = toml::from_str(source.text()).map_err(|e| explained(&e, source))?;
+    scenario.validate().map_err(|e| located(&e, source, &source.root(&table)))?;
+    Ok(scenario)
+}
+
+/// A refusal by serde as one by key.
+fn explained(error: &toml::de::Error, source: &Source) -> TomlError {
+    let span = error.span().unwrap_or_default();
+    let (path, line) = (source.path().to_owned(), source.line(span.start));
+    let written = source.text().get(span.clone()).unwrap_or_default();
+    let section = section_at(source.text(), span.start);
+    let quoted: Vec<&str> = error.message().split('`').skip(1).step_by(2).collect();
+    if error.message().starts_with("unknown field") && !quoted.is_empty() {
+        let hint = match nearest(quoted[0], quoted[1..].iter().copied()) {
+            Some(meant) => format!("did you mean \"{meant}\"?"),
+            None => format!("legal here: {}", quoted[1..].join(", ")),
+        };
+        return TomlError::UnknownKey { path, line, key: dotted(&section, quoted[0]), hint };
+    }
+    let value = written.split_whitespace().collect::<Vec<_>>().join(" ").chars().take(60).collect();
+    let key = dotted(&section, &key_before(source.text(), span.start));
+    TomlError::Value {
+        path,
+        line,
+        key,
+        value,
+        reason: format!("is refused: {}", error.message()),
+        hint: None,
+    }
+}
+
+/// A refusal by [`Scenario::validate`] at the line its key stands in.
+fn located(error: &SettingError, source: &Source, root: &Section<'_>) -> TomlError {
+    let (section, key) = error.key.rsplit_once('.').unwrap_or(("", &error.key));
+    let reason = format!("is refused: {}", error.requirement);
+    let (name, index) = match section.trim_end_matches(']').split_once('[') {
+        Some((name, index)) => (name, index.parse::<usize>().ok()),
+        None => (section, None),
+    };
+    let found = match index {
+        Some(i) => root.sections(name).ok().and_then(|all| all.into_iter().nth(i - 1)),
+        None => root.section(name).ok().flatten(),
+    };
+    match found {
+        Some(section) if section.has(key) => section.refuse(key, reason, None),
+        _ => TomlError::Value {
+            path: source.path().to_owned(),
+            line: 1,
+            key: error.key.clone(),
+            value: error.value.clone(),
+            reason,
+            hint: Some("the file does not set it: this is the default".into()),
+        },
+    }
+}
+
+/// Name of the table a byte stands in: the last head before it.
+fn section_at(text: &str, at: usize) -> String {
+    let head = |line: &str| {
+        let name = line.trim().strip_prefix('[')?.trim_start_matches('[').split(']').next()?;
+        Some(name.trim().to_owned())
+    };
+    text[..at].lines().rev().find_map(head).unwrap_or_default()
+}
+
+/// The key whose value begins at a byte: what stands before the last `=`.
+fn key_before(text: &str, at: usize) -> String {
+    let before = text[..at].rsplit('\n').next().unwrap_or_default();
+    let left = before.rsplit_once('=').map_or(before, |(left, _)| left);
+    left.rsplit(['{', ',']).next().unwrap_or_default().trim().to_owned()
+}
+
+fn dotted(section: &str, key: &str) -> String {
+    if section.is_empty() { key.to_owned() } else { format!("{section}.{key}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(text: &str) -> (String, Option<String>) {
+        let error = from_source(&Source::new("s.toml", text)).unwrap_err();
+        (error.to_string(), error.hint())
+    }
+
+    #[test]
+    fn typos_are_answered_with_the_nearest_key() {
+        let (message, hint) = refused("[run]\nruns = 3\n[gnss]\nrate_hz = 1\npos_sgima_m = [1, 1, 1]\n");
+        assert_eq!(message, "s.toml, line 5: unknown key \"gnss.pos_sgima_m\"");
+        assert_eq!(hint.unwrap(), "did you mean \"pos_sigma_m\"?");
+        let (message, hint) = refused("[gps]\nrate_hz = 1\n");
+        assert_eq!(message, "s.toml, line 1: unknown key \"gps\"");
+        assert!(hint.unwrap().contains("gnss"));
+    }
+
+    #[test]
+    fn wrong_types_are_refused_by_line_key_and_value() {
+        let (message, _) = refused("[run]\nruns = 3\n[imu]\nrate_hz = \"fast\"\n");
+        assert!(message.starts_with("s.toml, line 4: \"imu.rate_hz\" = \"fast\" is refused: "), "{message}");
+        let (message, _) = refused("[gnss]\npos_sigma_m = [1, 2]\n");
+        assert!(
+            message.starts_with("s.toml, line 2: \"gnss.pos_sigma_m\" = [1, 2] is refused: "),
+            "{message}"
+        );
+        let (message, _) = refused("[filter]\nstates = 16\n");
+        assert!(message.ends_with("= 16 is refused: expected \"15\" or \"full\""), "{message}");
+        let (message, _) = refused("[run]\nmethod = \"lincav\"\n");
+        assert!(
+            message.contains("\"run.method\" = \"lincav\"") && message.contains("`monte-carlo`"),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn values_out_of_range_are_refused_by_line_key_and_value() {
+        let (message, _) = refused("[run]\nruns = 0\n");
+        assert_eq!(message, "s.toml, line 2: \"run.runs\" = 0 is refused: at least one run");
+        let (message, _) =
+            refused("[[outage]]\nstart_s = 1\nend_s = 2\n[[outage]]\nstart_s = 5\nend_s = 5\n");
+        assert_eq!(
+            message,
+            "s.toml, line 6: \"outage[2].end_s\" = 5 is refused: it must come after start_s = 5"
+        );
+        let (message, hint) = refused("[imu]\nrate_hz = 7.5\n");
+        assert!(message.starts_with("s.toml, line 1: \"gnss.rate_hz\" = 1 is refused"), "{message}");
+        assert!(hint.unwrap().contains("default"));
+    }
+
+    #[test]
+    fn states_may_be_a_number() {
+        assert!(from_source(&Source::new("s.toml", "filter.states = 15")).is_ok());
+    }
+}
