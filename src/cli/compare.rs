@@ -126,7 +126,7 @@ fn same_place(a: &Path, b: &Path) -> bool {
 /// A table whose first row is its head.
 pub(super) fn table(rows: &[Vec<String>]) -> String {
     let mut table = Table::new();
-    table.load_preset(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Disabled);
+    table.load_style(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Disabled);
     if let Some((head, rows)) = rows.split_first() {
         table.set_header(head).add_rows(rows);
     }
