@@ -2,6 +2,8 @@
 
 pub mod atomic;
 pub mod model_file;
+pub mod npy;
+pub mod recordings;
 pub mod run_directory;
 pub mod scenario_file;
 pub mod suggest;

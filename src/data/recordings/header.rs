@@ -1,0 +1,374 @@
+//! What a column is, by its name.
+//!
+//! | written by | names |
+//! |---|---|
+//! | this program | `t_s`, `accel_x_m_s2`, `gyro_x_rad_s`; increments `dv_x_m_s`, `dtheta_x_rad` |
+//! | EuRoC, TUM-VI | `#timestamp [ns]`, `w_RS_S_x [rad s^-1]`, `a_RS_S_x [m s^-2]` |
+//! | Kalibr, ROS | `timestamp`, `omega_x`, `alpha_x`; `field.header.stamp`, `field.angular_velocity.x` |
+//! | x-io | `Time (s)`, `Gyroscope X (deg/s)`, `Accelerometer X (g)` |
+//! | gnss-ins-sim | `accel_x (m/s^2)`, `gyro_x (deg/s)` |
+//! | Xsens MT Manager | `PacketCounter`, `SampleTimeFine`, `Acc_X`, `Gyr_X` below a `//` head: SI |
+//! | loggers | `ax_mps2`, `gx_radps`, `gyro_x_dps`, `acc_x [mg]`, … |
+
+use super::error::shown;
+use crate::imu::{Axis, Channel, Sensor};
+use crate::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
+
+/// What a column is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Role {
+    /// Time, with its unit in seconds if that is known.
+    Time {
+        /// Seconds in one unit.
+        unit_s: Option<f64>,
+    },
+    /// A packet counter that starts again at 0 after 65535.
+    Counter,
+    /// A clock of 0.1 ms ticks that starts again at 0 after 2³² − 1.
+    Ticks,
+    /// A signal.
+    Signal {
+        /// Which.
+        channel: Channel,
+        /// Its unit.
+        unit: Unit,
+    },
+}
+
+/// The unit of a signal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Unit {
+    /// That many SI units.
+    Si(f64),
+    /// That many SI units, per sample interval.
+    Increment(f64),
+    /// Not said: m/s², g or mg, to be told from gravity.
+    FromGravity,
+}
+
+/// A column that was recognised.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Found {
+    pub(super) index: usize,
+    pub(super) name: String,
+    pub(super) role: Role,
+}
+
+/// The columns of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Layout {
+    pub(super) found: Vec<Found>,
+    pub(super) ignored: Vec<String>,
+}
+
+/// Why a header is refused.
+#[derive(Debug)]
+pub(super) enum HeaderError {
+    NoChannels { columns: String },
+    NoUnit { column: String },
+    Twice { channel: Channel, first: String, second: String },
+}
+
+/// Endings of time columns and their length in seconds.
+const TIME_UNITS: &[(&[&str], f64)] = &[
+    (&["s", "sec", "secs", "second", "seconds"], 1.0),
+    (&["ms", "msec", "millis", "milliseconds"], 1e-3),
+    (&["us", "usec", "micros", "microseconds"], 1e-6),
+    (&["ns", "nsec", "nanos", "nanoseconds"], 1e-9),
+];
+/// Endings of accelerometer columns and their size in m/s².
+const ACCEL_UNITS: &[(&[&str], f64)] = &[
+    (&["m_s2", "m_s_2", "m_s_s", "mps2", "ms2", "ms_2", "m_sec2", "m_sec_2"], 1.0),
+    (&["g"], STANDARD_GRAVITY),
+    (&["mg"], 1e-3 * STANDARD_GRAVITY),
+    (&["ug"], 1e-6 * STANDARD_GRAVITY),
+];
+/// Endings of gyroscope columns and their size in rad/s.
+const GYRO_UNITS: &[(&[&str], f64)] = &[
+    (&["rad_s", "rad_s_1", "radps", "rads", "rad_sec"], 1.0),
+    (&["mrad_s", "mradps"], 1e-3),
+    (&["deg_s", "deg_s_1", "degps", "dps", "deg_sec"], DEG),
+    (&["mdeg_s", "mdps"], 1e-3 * DEG),
+    (&["deg_h", "deg_h_1", "deg_hr", "dph"], DEG_PER_HOUR),
+];
+/// Names before the axis letter.
+const ACCEL: &[&str] =
+    &["accel", "acc", "accelerometer", "acceleration", "specific_force", "lin_acc", "a", "f", "raw_acc"];
+const GYRO: &[&str] = &["gyro", "gyr", "gyroscope", "angular_rate", "ang_vel", "g", "w", "raw_gyro"];
+/// Names before the axis letter that mean SI by convention.
+const ACCEL_SI: &[&str] = &["linear_acceleration", "field_linear_acceleration", "a_rs_s", "alpha"];
+const GYRO_SI: &[&str] = &["angular_velocity", "field_angular_velocity", "w_rs_s", "omega"];
+const TIME: &[&str] = &["t", "time", "timestamp", "time_stamp", "elapsed", "elapsed_time", "epoch"];
+/// Time of measurement, preferred to the time of arrival beside it.
+const STAMP: &[&str] = &["field_header_stamp", "header_stamp", "stamp"];
+
+/// What a name means; `si` if the file's kind says that unit-less names are SI.
+///
+/// None if it means nothing here; an error with the name if a gyroscope's unit is not said.
+pub(super) fn classify(name: &str, si: bool) -> Option<Result<Role, ()>> {
+    let name = normalise(name);
+    match name.as_str() {
+        "packetcounter" | "packet_counter" => return Some(Ok(Role::Counter)),
+        "sampletimefine" => return Some(Ok(Role::Ticks)),
+        _ => {}
+    }
+    if TIME.contains(&name.as_str()) || STAMP.contains(&name.as_str()) {
+        return Some(Ok(Role::Time { unit_s: None }));
+    }
+    if let Some((stem, unit)) = split_unit(&name, TIME_UNITS)
+        && (TIME.contains(&stem) || STAMP.contains(&stem))
+    {
+        return Some(Ok(Role::Time { unit_s: Some(unit) }));
+    }
+    increment(&name).or_else(|| signal(&name, si))
+}
+
+fn signal(name: &str, si: bool) -> Option<Result<Role, ()>> {
+    for (sensor, units) in [(Sensor::Accel, ACCEL_UNITS), (Sensor::Gyro, GYRO_UNITS)] {
+        if let Some((stem, factor)) = split_unit(name, units)
+            && let Some((axis, _)) = stem_axis(stem, sensor)
+        {
+            let channel = Channel { sensor, axis };
+            return Some(Ok(Role::Signal { channel, unit: Unit::Si(factor) }));
+        }
+        if let Some((axis, convention)) = stem_axis(name, sensor) {
+            let channel = Channel { sensor, axis };
+            return Some(match sensor {
+                _ if si || convention => Ok(Role::Signal { channel, unit: Unit::Si(1.0) }),
+                Sensor::Accel => Ok(Role::Signal { channel, unit: Unit::FromGravity }),
+                Sensor::Gyro => Err(()),
+            });
+        }
+    }
+    None
+}
+
+fn increment(name: &str) -> Option<Result<Role, ()>> {
+    for axis in Axis::ALL {
+        for (stem, sensor, factor) in [
+            (format!("dv_{}_m_s", axis.name()), Sensor::Accel, 1.0),
+            (format!("dtheta_{}_rad", axis.name()), Sensor::Gyro, 1.0),
+            (format!("dtheta_{}_deg", axis.name()), Sensor::Gyro, DEG),
+        ] {
+            if name == stem {
+                let channel = Channel { sensor, axis };
+                return Some(Ok(Role::Signal { channel, unit: Unit::Increment(factor) }));
+            }
+        }
+    }
+    None
+}
+
+/// Lower case; every other character than letters and digits becomes one `_` between words.
+fn normalise(name: &str) -> String {
+    let mut out = String::new();
+    for c in name.chars().flat_map(char::to_lowercase) {
+        match c {
+            '°' => out.push_str("deg"),
+            '²' => out.push('2'),
+            'µ' | 'μ' => out.push('u'),
+            c if c.is_ascii_alphanumeric() => out.push(c),
+            _ if out.is_empty() || out.ends_with('_') => {}
+            _ => out.push('_'),
+        }
+    }
+    out.trim_end_matches('_').to_owned()
+}
+
+/// The name without its unit, and the unit; the longest ending wins.
+fn split_unit<'a>(name: &'a str, units: &[(&[&str], f64)]) -> Option<(&'a str, f64)> {
+    let endings = units.iter().flat_map(|(names, factor)| names.iter().map(move |n| (*n, *factor)));
+    let stem = |ending: &str| name.strip_suffix(ending)?.strip_suffix('_');
+    let hits = endings.filter_map(|(ending, factor)| stem(ending).map(|s| (s, factor)));
+    hits.min_by_key(|(stem, _)| stem.len())
+}
+
+/// The axis of a signal's name, and whether the name means SI by convention.
+fn stem_axis(stem: &str, sensor: Sensor) -> Option<(Axis, bool)> {
+    let axis = Axis::ALL.into_iter().find(|a| stem.ends_with(a.name()))?;
+    let name = stem[..stem.len() - 1].trim_end_matches('_');
+    let (free, convention) = match sensor {
+        Sensor::Accel => (ACCEL, ACCEL_SI),
+        Sensor::Gyro => (GYRO, GYRO_SI),
+    };
+    let si = convention.contains(&name);
+    (si || free.contains(&name)).then_some((axis, si))
+}
+
+impl Layout {
+    /// The columns with a meaning among `names`, of the `wanted` channels (all if none are given).
+    pub(super) fn new(names: &[String], si: bool, wanted: Option<&[Channel]>) -> Result<Self, HeaderError> {
+        let (mut found, mut ignored): (Vec<Found>, Vec<String>) = (Vec::new(), Vec::new());
+        let mut no_unit = None;
+        for (index, name) in names.iter().enumerate() {
+            let name = name.trim().to_owned();
+            match classify(&name, si) {
+                Some(Ok(Role::Signal { channel, .. })) if wanted.is_some_and(|w| !w.contains(&channel)) => {
+                    ignored.push(name);
+                }
+                Some(Ok(role)) => found.push(Found { index, name, role }),
+                Some(Err(())) => no_unit = no_unit.or(Some(name)),
+                None => ignored.push(name),
+            }
+        }
+        if let Some(column) = no_unit {
+            return Err(HeaderError::NoUnit { column });
+        }
+        let mut layout = Self { found, ignored };
+        layout.one_time_column();
+        layout.no_channel_twice()?;
+        if !layout.found.iter().any(|f| matches!(f.role, Role::Signal { .. })) {
+            let quoted: Vec<String> =
+                names.iter().take(20).map(|n| format!("\"{}\"", shown(n.trim(), 40))).collect();
+            return Err(HeaderError::NoChannels { columns: quoted.join(", ") });
+        }
+        Ok(layout)
+    }
+
+    /// Keeps one time column: the stamp of the measurement, else one whose unit is known, else the first.
+    fn one_time_column(&mut self) {
+        let rank = |f: &Found| match f.role {
+            Role::Time { .. } if STAMP.iter().any(|s| normalise(&f.name).starts_with(s)) => Some(0),
+            Role::Time { unit_s: Some(_) } => Some(1),
+            Role::Time { unit_s: None } => Some(2),
+            _ => None,
+        };
+        let best = self.found.iter().filter_map(|f| rank(f).map(|r| (r, f.index))).min();
+        let (kept, passed): (Vec<Found>, Vec<Found>) = std::mem::take(&mut self.found)
+            .into_iter()
+            .partition(|f| rank(f).is_none() || best.is_some_and(|(_, index)| f.index == index));
+        self.found = kept;
+        self.ignored.extend(passed.into_iter().map(|f| f.name));
+    }
+
+    fn no_channel_twice(&self) -> Result<(), HeaderError> {
+        for channel in Channel::ALL {
+            let of_channel = |f: &&Found| matches!(f.role, Role::Signal { channel: c, .. } if c == channel);
+            let mut names = self.found.iter().filter(of_channel).map(|f| f.name.clone());
+            if let (Some(first), Some(second)) = (names.next(), names.next()) {
+                return Err(HeaderError::Twice { channel, first, second });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The names of an array's columns where none are given: six channels in the order of [`Channel::ALL`],
+/// before them the time if there are seven.
+pub(super) fn npy_order(columns: usize) -> Option<Vec<String>> {
+    let six = Channel::ALL.map(column_name).to_vec();
+    match columns {
+        6 => Some(six),
+        7 => Some([vec!["t_s".to_owned()], six].concat()),
+        _ => None,
+    }
+}
+
+/// The name of a channel's column in files of this program.
+#[must_use]
+pub fn column_name(channel: Channel) -> String {
+    let unit = match channel.sensor {
+        Sensor::Accel => "m_s2",
+        Sensor::Gyro => "rad_s",
+    };
+    format!("{}_{}_{unit}", channel.sensor.name(), channel.axis.name())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn signal_of(name: &str, si: bool) -> Option<(String, f64)> {
+        match classify(name, si) {
+            Some(Ok(Role::Signal { channel, unit: Unit::Si(factor) })) => Some((channel.to_string(), factor)),
+            _ => None,
+        }
+    }
+
+    #[test]
+    fn names_of_many_tools() {
+        let g = STANDARD_GRAVITY;
+        for (name, channel, factor) in [
+            ("accel_x_m_s2", "accel.x", 1.0),
+            ("accel_y_g", "accel.y", g),
+            ("accel_z_mg", "accel.z", 1e-3 * g),
+            ("gyro_x_rad_s", "gyro.x", 1.0),
+            ("gyro_y_deg_s", "gyro.y", DEG),
+            ("gyro_z_deg_h", "gyro.z", DEG_PER_HOUR),
+            ("w_RS_S_x [rad s^-1]", "gyro.x", 1.0),
+            ("a_RS_S_z [m s^-2]", "accel.z", 1.0),
+            ("omega_x", "gyro.x", 1.0),
+            ("alpha_z", "accel.z", 1.0),
+            ("field.angular_velocity.y", "gyro.y", 1.0),
+            ("linear_acceleration.x", "accel.x", 1.0),
+            ("Gyroscope X (deg/s)", "gyro.x", DEG),
+            ("Accelerometer Z (g)", "accel.z", g),
+            ("Gyroscope Y (°/s)", "gyro.y", DEG),
+            ("accel_x (m/s^2)", "accel.x", 1.0),
+            ("gyro_z (deg/s)", "gyro.z", DEG),
+            ("ax_mps2", "accel.x", 1.0),
+            ("gz_radps", "gyro.z", 1.0),
+            ("gyro_x_radps", "gyro.x", 1.0),
+            ("acc_y [m/s²]", "accel.y", 1.0),
+            ("gx_dps", "gyro.x", DEG),
+        ] {
+            assert_eq!(signal_of(name, false), Some((channel.to_owned(), factor)), "{name}");
+        }
+        assert_eq!(signal_of("Acc_X", true), Some(("accel.x".into(), 1.0)));
+        assert_eq!(signal_of("Gyr_Z", true), Some(("gyro.z".into(), 1.0)));
+    }
+
+    #[test]
+    fn times_and_counters() {
+        for (name, unit_s) in [
+            ("t_s", Some(1.0)),
+            ("t_ms", Some(1e-3)),
+            ("time (sec)", Some(1.0)),
+            ("Timestamp (us)", Some(1e-6)),
+            ("#timestamp [ns]", Some(1e-9)),
+            ("%time", None),
+            ("field.header.stamp", None),
+            ("Time", None),
+        ] {
+            assert_eq!(classify(name, false), Some(Ok(Role::Time { unit_s })), "{name}");
+        }
+        assert_eq!(classify("PacketCounter", true), Some(Ok(Role::Counter)));
+        assert_eq!(classify("SampleTimeFine", true), Some(Ok(Role::Ticks)));
+    }
+
+    #[test]
+    fn what_is_not_inertial_means_nothing() {
+        for name in
+            ["", "Mag_X", "Magnetometer X (uT)", "field.orientation.x", "lat_deg", "x", "roll", "°", "accel"]
+        {
+            assert_eq!(classify(name, false), None, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_gyro_needs_a_unit_and_an_accelerometer_has_gravity() {
+        assert_eq!(classify("gyro_x", false), Some(Err(())));
+        assert_eq!(classify("gx", false), Some(Err(())));
+        let channel = Channel { sensor: Sensor::Accel, axis: Axis::X };
+        assert_eq!(classify("ax", false), Some(Ok(Role::Signal { channel, unit: Unit::FromGravity })));
+    }
+
+    #[test]
+    fn the_stamp_of_the_measurement_is_the_time() {
+        let names: Vec<String> =
+            ["%time", "field.header.stamp", "field.header.frame_id", "field.linear_acceleration.x"]
+                .map(String::from)
+                .to_vec();
+        let layout = Layout::new(&names, false, None).unwrap();
+        let kept: Vec<usize> = layout.found.iter().map(|f| f.index).collect();
+        assert_eq!(kept, [1, 3]);
+        assert_eq!(layout.ignored, ["field.header.frame_id", "%time"]);
+    }
+
+    #[test]
+    fn our_own_names_are_known() {
+        for channel in Channel::ALL {
+            assert_eq!(signal_of(&column_name(channel), false), Some((channel.to_string(), 1.0)));
+        }
+    }
+}

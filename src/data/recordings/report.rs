@@ -1,0 +1,98 @@
+//! What was found in the files, for the user to check.
+
+use super::header::{Role, Unit};
+use super::{Column, Raw};
+use crate::imu::{Channel, Recording, Sensor};
+use std::fmt;
+
+/// What was found and assumed while reading.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Report {
+    /// One entry a file.
+    pub files: Vec<FileReport>,
+    /// Doubts that belong to no file's contents.
+    pub warnings: Vec<String>,
+}
+
+impl Report {
+    /// Every doubt, those about a file with its name.
+    #[must_use]
+    pub fn all_warnings(&self) -> Vec<String> {
+        let named =
+            |f: &FileReport| f.warnings.iter().map(|w| format!("{}: {w}", f.file)).collect::<Vec<_>>();
+        self.warnings.iter().cloned().chain(self.files.iter().flat_map(named)).collect()
+    }
+}
+
+/// What was found and assumed in one file. Displays as one line.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct FileReport {
+    /// The file.
+    pub file: String,
+    /// Columns that became signals.
+    pub columns: Vec<(String, Channel)>,
+    /// Columns passed over.
+    pub ignored: Vec<String>,
+    /// Sample rate (Hz).
+    pub rate_hz: f64,
+    /// Where the rate is from, in words.
+    pub rate_from: String,
+    /// Samples of each recording made of the file (several if it was split at gaps).
+    pub samples: Vec<usize>,
+    /// The mean removed from each signal of the first of them (m/s² or rad/s).
+    pub means: Vec<(Channel, f64)>,
+    /// What was assumed, in words.
+    pub assumptions: Vec<String>,
+    /// Doubts, in words.
+    pub warnings: Vec<String>,
+}
+
+impl FileReport {
+    pub(super) fn new(raw: &Raw) -> Self {
+        let signal = |c: &Column| match c.role {
+            Role::Signal { channel, .. } => Some((c.name.clone(), channel)),
+            _ => None,
+        };
+        let columns = raw.columns.iter().filter_map(signal).collect();
+        let mut report =
+            Self { file: raw.path.clone(), columns, ignored: raw.ignored.clone(), ..Self::default() };
+        let increments = |c: &Column| matches!(c.role, Role::Signal { unit: Unit::Increment(_), .. });
+        if raw.columns.iter().any(increments) {
+            report.assumptions.push("increments divided by the sample interval".into());
+        }
+        report
+    }
+
+    pub(super) fn warn(&mut self, text: String) {
+        self.warnings.push(text);
+    }
+
+    pub(super) fn finish(&mut self, recordings: &[Recording]) {
+        self.samples = recordings.iter().map(Recording::len).collect();
+        if let Some(first) = recordings.first() {
+            self.rate_hz = first.rate_hz;
+            self.means = first.signals.iter().map(|s| (s.channel, s.mean)).collect();
+        }
+    }
+
+    fn means_of(&self, sensor: Sensor) -> Option<String> {
+        let of_sensor = self.means.iter().filter(|(c, _)| c.sensor == sensor);
+        let parts: Vec<String> = of_sensor.map(|(c, m)| format!("{} {m:.6}", c.axis.name())).collect();
+        (!parts.is_empty()).then(|| format!("{} {} {}", sensor.name(), parts.join(", "), sensor.unit()))
+    }
+}
+
+impl fmt::Display for FileReport {
+    /// `a.csv: 524284 samples at 100 Hz (time column), 5242.84 s; means removed: accel x 0.02, …`
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let total: usize = self.samples.iter().sum();
+        let (rate, from, seconds) = (self.rate_hz, &self.rate_from, total as f64 / self.rate_hz);
+        write!(f, "{}: {total} samples at {rate} Hz ({from}), {seconds} s", self.file)?;
+        if self.samples.len() > 1 {
+            write!(f, ", in {} stretches", self.samples.len())?;
+        }
+        let means: Vec<String> = Sensor::ALL.into_iter().filter_map(|s| self.means_of(s)).collect();
+        write!(f, "; means removed: {}", means.join("; "))?;
+        self.assumptions.iter().try_for_each(|a| write!(f, "; {a}"))
+    }
+}
