@@ -1,9 +1,13 @@
 //! Calibration kernels at the size of the paper's signals (524284 samples), beside a naive reference.
 
+#![allow(clippy::unwrap_used, reason = "a benchmark")]
+
 use criterion::{Criterion, criterion_group, criterion_main};
 
+use nav_sim::calibration::{ModelSpec, Weighting, fit};
+use nav_sim::noise::{Ar1, Process, Quantization, RandomWalk, White};
 use nav_sim::rng::StreamKey;
-use nav_sim::wavelet::{self, Convention, Tuning};
+use nav_sim::wavelet::{self, Convention, Curve, Tuning, interval};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 use std::hint::black_box;
@@ -55,5 +59,34 @@ fn wavelet_variance(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, wavelet_variance);
+/// The N2 curve of a consumer accelerometer, its wavelet variances off by a few of their standard deviations.
+fn noisy_curve() -> Curve {
+    let levels: Vec<u32> = (1..=LEVELS).collect();
+    let n2 = [
+        Process::White(White::new(5.2e-5).unwrap()),
+        Process::Quantization(Quantization::new(1e-7).unwrap()),
+        Process::Ar1(Ar1::new(0.9835, 1.3e-8).unwrap()),
+        Process::Ar1(Ar1::new(0.9999, 1e-11).unwrap()),
+        Process::RandomWalk(RandomWalk::new(2.9e-11).unwrap()),
+    ];
+    let edof: Vec<f64> = levels.iter().map(|j| interval::edof_eta3(SAMPLES, *j)).collect();
+    let exact = |j: u32| n2.iter().map(|p| p.haar_wv(j)).sum::<f64>();
+    let noisy =
+        |(j, edof): (&u32, &f64)| exact(*j) * (1.0 + f64::from(*j).sin() * (2.0 / edof).sqrt().min(0.5));
+    Curve { wv: levels.iter().zip(&edof).map(noisy).collect(), edof, levels }
+}
+
+fn fits(c: &mut Criterion) {
+    let curve = noisy_curve();
+    let mut group = c.benchmark_group("fit");
+    group.sample_size(20).measurement_time(Duration::from_secs(3));
+    for spec in [ModelSpec::n1(), ModelSpec::n2()] {
+        group.bench_function(spec.to_string(), |b| {
+            b.iter(|| fit(black_box(&curve), &spec, 100.0, Weighting::Edof));
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, wavelet_variance, fits);
 criterion_main!(benches);

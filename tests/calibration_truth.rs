@@ -1,7 +1,10 @@
 //! Theory and estimators against numbers from independent implementations (`tests/truth/README.md`).
 
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use nav_sim::calibration::{Termination, Weighting, fit};
 use nav_sim::noise::{Ar1, Composite, Drift, GaussMarkov, Ma1, Process, Quantization, RandomWalk, White};
-use nav_sim::wavelet::{self, Convention, Tuning, interval};
+use nav_sim::wavelet::{self, Convention, Curve, Tuning, interval};
 use serde_json::Value;
 
 fn truth(file: &str) -> Value {
@@ -88,7 +91,7 @@ fn wavelet_variance_of_a_signal() {
         let level = i as u32 + 1;
         let expected = |key: &str| truth[key][i].as_f64().unwrap();
         assert_relative(classical[i], expected("classical"), 1e-12, &format!("classical {level}"));
-        assert_eq!(wavelet::coefficient_count(4096, level) as f64, expected("M"));
+        assert_eq!(wavelet::coefficient_count(4096, level) as u64, truth["M"][i].as_u64().unwrap());
         let edof = interval::edof_eta3(4096, level);
         assert_relative(edof, expected("edof"), 1e-15, "edof");
         let (low, high) = interval::interval(classical[i], edof, 0.95);
@@ -98,5 +101,51 @@ fn wavelet_variance_of_a_signal() {
             assert_relative(robust[i].value, expected("robust"), 1e-12, &format!("robust {level}"));
             assert_eq!(robust[i].status.name(), truth["robust_status"][i].as_str().unwrap());
         }
+    }
+}
+
+#[test]
+fn exact_curves_give_back_their_parameters() {
+    let truth = truth("fit_exact.json");
+    let samples = truth["T"].as_u64().unwrap() as usize;
+    let tolerance = truth["tolerance_rel"].as_f64().unwrap();
+    let cases = truth["cases"].as_array().unwrap();
+    assert_eq!(cases.len(), 4);
+    for case in cases {
+        let wv = numbers(&case["nu_hat"]);
+        let levels: Vec<u32> = (1..=wv.len() as u32).collect();
+        let edof = levels.iter().map(|j| interval::edof_eta3(samples, *j)).collect();
+        let spec: String = case["components"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|c| c.as_str().unwrap())
+            .collect::<Vec<_>>()
+            .join("+");
+        let curve = Curve { levels, wv, edof };
+        let fit = fit(&curve, &spec.parse().unwrap(), 1.0, Weighting::Edof).unwrap();
+        // The truth lists AR1s by descending correlation time, the fit by ascending.
+        let expected = composite(&case["components"], &numbers(&case["theta"]), 1.0);
+        for code in ["WN", "QN", "AR1", "RW"] {
+            let of = |c: &Composite| -> Vec<f64> {
+                let mut found: Vec<_> =
+                    c.processes.iter().filter(|p| p.code() == code).map(Process::parameters).collect();
+                found.sort_by(|a, b| a[0].1.total_cmp(&b[0].1));
+                found.concat().into_iter().map(|(_, v)| v).collect()
+            };
+            for (actual, expected) in of(&fit.composite).iter().zip(of(&expected)) {
+                assert_relative(*actual, expected, 1e-3 * tolerance, &format!("{spec} {code}"));
+            }
+        }
+        assert_eq!(fit.termination, Termination::Converged);
+        assert!(fit.objective < 1e-15 && fit.zero.is_empty() && fit.at_end.is_empty(), "{fit:?}");
+        let phis: Vec<f64> = fit
+            .composite
+            .processes
+            .iter()
+            .filter(|p| p.code() == "AR1")
+            .map(|p| p.parameters()[0].1)
+            .collect();
+        assert!(phis.is_sorted());
     }
 }

@@ -2,6 +2,7 @@
 
 use super::slow_ar1::{Slow, half_scale, sinhc};
 use super::{ParameterError, non_negative};
+use std::f64::consts::LN_2;
 
 /// First-order autoregressive process, stationary: |phi| < 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,7 +64,9 @@ impl Ar1 {
             let sum = 1.0 + phi;
             (0.5 / sum, -0.5 / (sum * sum))
         } else if phi > 0.5 {
-            slow_shape(phi, m)
+            // phi − 1 is exact here, so kappa keeps all its digits.
+            let (value, derivative) = slow_shape(-(phi - 1.0).ln_1p(), m);
+            (value, -derivative / phi)
         } else if phi >= 0.0 {
             fast_shape(phi, m)
         } else {
@@ -71,17 +74,27 @@ impl Ar1 {
             (value, -derivative)
         }
     }
+
+    /// The same in kappa = −ln phi > 0, the inverse correlation time in samples: value and derivative with
+    /// respect to kappa. Keeps the digits of a kappa too small to be told from 0 in phi.
+    #[must_use]
+    pub fn haar_shape_of_kappa(kappa: f64, level: u32) -> (f64, f64) {
+        if kappa < LN_2 && level > 1 {
+            slow_shape(kappa, half_scale(level))
+        } else {
+            let phi = (-kappa).exp();
+            let (value, derivative) = Self::haar_shape(phi, level);
+            (value, -phi * derivative)
+        }
+    }
 }
 
-/// ½ < phi < 1: in kappa = −ln phi, where nothing cancels.
-fn slow_shape(phi: f64, m: f64) -> (f64, f64) {
-    // phi − 1 is exact here, so kappa keeps all its digits.
-    let kappa = -(phi - 1.0).ln_1p();
+/// ½ < phi < 1, in kappa = −ln phi, where nothing cancels.
+fn slow_shape(kappa: f64, m: f64) -> (f64, f64) {
     let bracket = Slow::new(kappa).bracket(m);
     let (s, s_log_derivative) = sinhc(kappa);
-    let value = bracket.value / (phi * s);
-    let log_derivative = 1.0 + bracket.log_derivative - s_log_derivative;
-    (value, -value * log_derivative / phi)
+    let value = bracket.value * kappa.exp() / s;
+    (value, value * (1.0 + bracket.log_derivative - s_log_derivative))
 }
 
 /// 0 ≤ phi ≤ ½: [m(1 − phi²) − phi(1 − u)(3 − u)]/[2m²(1 − phi)³(1 + phi)], u = phi^m.

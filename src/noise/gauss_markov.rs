@@ -3,6 +3,7 @@
 use super::ar1::fast_shape;
 use super::slow_ar1::{Slow, half_scale};
 use super::{Ar1, ParameterError, non_negative};
+use std::f64::consts::LN_2;
 
 /// Gauss-Markov process: autocovariance s2·exp(−beta·|t|); sampled, an AR1 with phi = exp(−beta/f).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,7 +71,7 @@ impl GaussMarkov {
     #[must_use]
     pub fn haar_shape(kappa: f64, level: u32) -> (f64, f64) {
         let m = half_scale(level);
-        if kappa < std::f64::consts::LN_2 {
+        if kappa < LN_2 {
             let bracket = Slow::new(kappa).bracket(m);
             let value = 2.0 * kappa * bracket.value;
             (value, 2.0 * bracket.value + value * bracket.log_derivative)

@@ -2,11 +2,13 @@
 //!
 //! Level j = 1, 2, … has scale tau = 2^j samples. Vectors over levels hold level j at index j − 1.
 
+mod curve;
 pub mod haar;
 pub mod interval;
 pub mod robust;
 mod tuning;
 
+pub use curve::Curve;
 pub use haar::classical;
 pub use robust::{RobustVariance, Status, both};
 pub use tuning::{Convention, Tuning};

@@ -1,0 +1,232 @@
+//! From the wavelet variances of K replicates to one curve
+//! ([Minaretzis](crate::bibliography::Minaretzis24), eqs. 4–8).
+
+use crate::wavelet::{Curve, RobustVariance, interval};
+
+/// Which curve a model is fitted to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Estimator {
+    /// Average of the classical wavelet variances.
+    Awv,
+    /// Average of the robust ones: safe from outliers within replicates.
+    SrAwv,
+    /// Trimmed average, scale by scale, of the robust ones: safe from abnormal replicates too.
+    DrAwv,
+    /// Classical wavelet variance of one replicate.
+    Gmwm,
+    /// Robust wavelet variance of one replicate.
+    Rgmwm,
+}
+
+impl Estimator {
+    /// All estimators.
+    pub const ALL: [Self; 5] = [Self::Awv, Self::SrAwv, Self::DrAwv, Self::Gmwm, Self::Rgmwm];
+
+    /// Name in files and on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Awv => "awv",
+            Self::SrAwv => "sr-awv",
+            Self::DrAwv => "dr-awv",
+            Self::Gmwm => "gmwm",
+            Self::Rgmwm => "rgmwm",
+        }
+    }
+
+    /// Whether it uses the robust wavelet variance.
+    #[must_use]
+    pub const fn is_robust(self) -> bool {
+        matches!(self, Self::SrAwv | Self::DrAwv | Self::Rgmwm)
+    }
+
+    /// Whether it takes one replicate at a time.
+    #[must_use]
+    pub const fn is_single(self) -> bool {
+        matches!(self, Self::Gmwm | Self::Rgmwm)
+    }
+}
+
+/// How many replicates DR-AWV drops at each end, scale by scale.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Trim {
+    /// So many.
+    Count(usize),
+    /// floor(fraction·K).
+    Fraction(f64),
+}
+
+impl Trim {
+    /// The number for K replicates.
+    #[must_use]
+    pub fn count(self, replicates: usize) -> usize {
+        match self {
+            Self::Count(a) => a,
+            // An exact product must not fall short: 0.3·10 is 2.9999999999999996.
+            Self::Fraction(f) => (f * replicates as f64 + 1e-9).floor() as usize,
+        }
+    }
+}
+
+/// The wavelet variances of one replicate of one signal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Replicate {
+    /// File name or other label.
+    pub name: String,
+    /// Its length T.
+    pub samples: usize,
+    /// Classical wavelet variance at levels 1, 2, … (units²).
+    pub classical: Vec<f64>,
+    /// Robust wavelet variance at the same levels.
+    pub robust: Vec<RobustVariance>,
+}
+
+/// Why replicates have no average.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum AverageError {
+    /// No replicate, or none with a scale.
+    #[error("no replicates")]
+    None,
+    /// The trim leaves nothing.
+    #[error("trimming {trim} replicates at each end needs at least {} replicates; there are {replicates}", 2 * trim + 1)]
+    Trim {
+        /// Replicates dropped at each end.
+        trim: usize,
+        /// Replicates there are.
+        replicates: usize,
+    },
+    /// A single-replicate estimator was given several.
+    #[error("{estimator} takes one recording at a time; there are {replicates}")]
+    Single {
+        /// The estimator.
+        estimator: &'static str,
+        /// Replicates there are.
+        replicates: usize,
+    },
+}
+
+/// The curve an estimator fits: averages with weights T_i/Σ T, over the levels that all replicates have.
+///
+/// The paper's slips are resolved: SR-AWV's weights sum to one (its 1/J must be 1/K), DR-AWV keeps the
+/// order statistics a + 1 … K − a (2a are dropped), weights of the kept ones renormalised. `efficiency` is
+/// that of the robust wavelet variance; the degrees of freedom are those of the replicates' eta3 combined.
+///
+/// # Errors
+/// When there is no replicate, more than one for a single-replicate estimator, or none left by the trim.
+pub fn average(
+    replicates: &[Replicate],
+    estimator: Estimator,
+    trim: Trim,
+    efficiency: f64,
+) -> Result<Curve, AverageError> {
+    let count = replicates.len();
+    if estimator.is_single() && count > 1 {
+        return Err(AverageError::Single { estimator: estimator.name(), replicates: count });
+    }
+    let levels = replicates.iter().map(|r| r.classical.len()).min().unwrap_or(0);
+    if levels == 0 {
+        return Err(AverageError::None);
+    }
+    let trim = if estimator == Estimator::DrAwv { trim.count(count) } else { 0 };
+    if count < 2 * trim + 1 {
+        return Err(AverageError::Trim { trim, replicates: count });
+    }
+    let mut curve = Curve { levels: (1..=levels as u32).collect(), ..Curve::default() };
+    for &level in &curve.levels {
+        let mut kept =
+            replicates.iter().map(|r| Term::new(r, level, estimator, efficiency)).collect::<Vec<_>>();
+        kept.sort_by(|a, b| a.nu.total_cmp(&b.nu));
+        let kept = &kept[trim..count - trim];
+        let total: f64 = kept.iter().map(|t| t.samples).sum();
+        curve.wv.push(kept.iter().map(|t| t.samples / total * t.nu).sum());
+        // var(Σ w nu) = Σ w²·2 nu²/eta, the replicates' true nu taken equal.
+        let inverse: f64 = kept.iter().map(|t| (t.samples / total).powi(2) / t.edof).sum();
+        curve.edof.push(1.0 / inverse);
+    }
+    Ok(curve)
+}
+
+/// What one replicate contributes at one level.
+struct Term {
+    samples: f64,
+    nu: f64,
+    edof: f64,
+}
+
+impl Term {
+    fn new(replicate: &Replicate, level: u32, estimator: Estimator, efficiency: f64) -> Self {
+        let i = level as usize - 1;
+        let eta3 = interval::edof_eta3(replicate.samples, level);
+        let (nu, edof) = if estimator.is_robust() {
+            (replicate.robust[i].value, interval::edof_robust(eta3, efficiency))
+        } else {
+            (replicate.classical[i], eta3)
+        };
+        Self { samples: replicate.samples as f64, nu, edof }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wavelet::Status;
+    use approx::assert_relative_eq;
+
+    fn replicate(samples: usize, classical: f64, robust: f64) -> Replicate {
+        let robust = vec![RobustVariance { value: robust, status: Status::Ok }; 2];
+        Replicate { name: String::new(), samples, classical: vec![classical; 2], robust }
+    }
+
+    fn eight() -> Vec<Replicate> {
+        (1..=8).map(|k| replicate(1000, f64::from(k), 10.0 * f64::from(k))).collect()
+    }
+
+    fn first(replicates: &[Replicate], estimator: Estimator, trim: Trim) -> f64 {
+        average(replicates, estimator, trim, 0.6).unwrap().wv[0]
+    }
+
+    #[test]
+    fn thirty_per_cent_of_eight_is_two_at_each_end() {
+        let trim = Trim::Fraction(0.3);
+        assert_relative_eq!(first(&eight(), Estimator::Awv, trim), 4.5);
+        assert_relative_eq!(first(&eight(), Estimator::SrAwv, trim), 45.0);
+        assert_eq!((trim.count(8), trim.count(10), trim.count(3), Trim::Count(2).count(8)), (2, 3, 0, 2));
+        let mut abnormal = eight();
+        abnormal[0] = replicate(1000, 0.0, 1e9);
+        abnormal[1] = replicate(1000, 0.0, 1e-9);
+        // Kept: 40, 50, 60, 70.
+        assert_relative_eq!(first(&abnormal, Estimator::DrAwv, trim), 55.0);
+        assert_relative_eq!(first(&abnormal[..1], Estimator::Rgmwm, trim), 1e9);
+    }
+
+    #[test]
+    fn longer_replicates_weigh_more_and_the_kept_weights_sum_to_one() {
+        let replicates = [replicate(1000, 1.0, 1.0), replicate(3000, 5.0, 5.0), replicate(1000, 9.0, 100.0)];
+        assert_relative_eq!(first(&replicates, Estimator::Awv, Trim::Count(0)), 5.0);
+        assert_relative_eq!(first(&replicates, Estimator::DrAwv, Trim::Count(1)), 5.0);
+        let curve = average(&replicates[..2], Estimator::Awv, Trim::Count(0), 0.6).unwrap();
+        let eta = |samples: f64| (samples - 1.0) / 2.0;
+        assert_relative_eq!(curve.edof[0], 1.0 / (0.0625 / eta(1000.0) + 0.5625 / eta(3000.0)));
+        assert_relative_eq!(curve.wv[0], 4.0);
+    }
+
+    #[test]
+    fn equal_replicates_multiply_the_degrees_of_freedom() {
+        let curve = average(&eight(), Estimator::DrAwv, Trim::Count(2), 0.6).unwrap();
+        assert_relative_eq!(curve.edof[0], 4.0 * 0.6 * 499.5, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn what_cannot_be_averaged_is_refused() {
+        let error = |r: &[Replicate], e, t| average(r, e, t, 0.6).unwrap_err().to_string();
+        assert_eq!(error(&[], Estimator::Awv, Trim::Count(0)), "no replicates");
+        assert_eq!(
+            error(&eight(), Estimator::DrAwv, Trim::Count(4)),
+            "trimming 4 replicates at each end needs at least 9 replicates; there are 8"
+        );
+        assert_eq!(
+            error(&eight(), Estimator::Gmwm, Trim::Count(0)),
+            "gmwm takes one recording at a time; there are 8"
+        );
+    }
+}

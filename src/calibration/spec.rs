@@ -1,0 +1,254 @@
+//! What a model is made of: "2*AR1+RW+WN+QN".
+
+use crate::noise::{Ar1, Drift, GaussMarkov, Ma1, Quantization, RandomWalk, White};
+use std::fmt;
+use std::str::FromStr;
+
+/// A kind of process, as written in specifications.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Kind {
+    /// White noise.
+    White,
+    /// Quantization noise.
+    Quantization,
+    /// First-order autoregression.
+    Ar1,
+    /// First-order Gauss-Markov process.
+    GaussMarkov,
+    /// First-order moving average.
+    Ma1,
+    /// Random walk.
+    RandomWalk,
+    /// Drift.
+    Drift,
+}
+
+impl Kind {
+    /// All kinds, in the order in which models list them.
+    pub const ALL: [Self; 7] = [
+        Self::White,
+        Self::Quantization,
+        Self::Ar1,
+        Self::GaussMarkov,
+        Self::Ma1,
+        Self::RandomWalk,
+        Self::Drift,
+    ];
+
+    /// Code in model files and specifications.
+    #[must_use]
+    pub const fn code(self) -> &'static str {
+        match self {
+            Self::White => White::CODE,
+            Self::Quantization => Quantization::CODE,
+            Self::Ar1 => Ar1::CODE,
+            Self::GaussMarkov => GaussMarkov::CODE,
+            Self::Ma1 => Ma1::CODE,
+            Self::RandomWalk => RandomWalk::CODE,
+            Self::Drift => Drift::CODE,
+        }
+    }
+
+    /// Whether its wavelet variance depends on more than an amplitude.
+    #[must_use]
+    pub const fn has_shape(self) -> bool {
+        matches!(self, Self::Ar1 | Self::GaussMarkov | Self::Ma1)
+    }
+
+    /// How many parameters it has.
+    #[must_use]
+    pub const fn parameters(self) -> usize {
+        1 + self.has_shape() as usize
+    }
+
+    /// How many of it a model may have.
+    const fn most(self) -> usize {
+        match self {
+            Self::Ar1 | Self::GaussMarkov => MOST_SHAPES,
+            _ => 1,
+        }
+    }
+}
+
+/// Processes with a shape parameter that one model may have: the search is over all their combinations.
+const MOST_SHAPES: usize = 5;
+
+/// The kinds of process of a model, in the order of [`Kind::ALL`].
+#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+pub struct ModelSpec {
+    kinds: Vec<Kind>,
+}
+
+/// Why a specification means no model.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum SpecError {
+    /// A term that is neither a process nor a named model.
+    #[error("model \"{spec}\": \"{term}\" is no process")]
+    Unknown {
+        /// The specification.
+        spec: String,
+        /// The term.
+        term: String,
+    },
+    /// Nothing between two plus signs, or nothing at all.
+    #[error("model \"{0}\": a process is missing")]
+    Empty(String),
+    /// "0*AR1", "x*AR1".
+    #[error("model \"{spec}\": \"{count}\" is not a number of processes")]
+    Count {
+        /// The specification.
+        spec: String,
+        /// What stands before the asterisk.
+        count: String,
+    },
+    /// Several of a kind that adds up to one of itself.
+    #[error("model \"{spec}\": {count} {code} are one {code}: their wavelet variances are proportional")]
+    Repeated {
+        /// The specification.
+        spec: String,
+        /// Code of the kind.
+        code: &'static str,
+        /// How many.
+        count: usize,
+    },
+    /// More AR1, GM and MA1 than can be searched.
+    #[error("model \"{spec}\": {count} AR1, GM and MA1 processes; at most {MOST_SHAPES} can be told apart")]
+    TooMany {
+        /// The specification.
+        spec: String,
+        /// How many.
+        count: usize,
+    },
+}
+
+impl ModelSpec {
+    /// N1 = WN + AR1 + RW of the paper.
+    #[must_use]
+    pub fn n1() -> Self {
+        Self { kinds: vec![Kind::White, Kind::Ar1, Kind::RandomWalk] }
+    }
+
+    /// N2 = WN + QN + 2 AR1 + RW of the paper: the usual model.
+    #[must_use]
+    pub fn n2() -> Self {
+        Self { kinds: vec![Kind::White, Kind::Quantization, Kind::Ar1, Kind::Ar1, Kind::RandomWalk] }
+    }
+
+    /// The kinds of process.
+    #[must_use]
+    pub fn kinds(&self) -> &[Kind] {
+        &self.kinds
+    }
+
+    /// Number of parameters.
+    #[must_use]
+    pub fn parameters(&self) -> usize {
+        self.kinds.iter().map(|k| k.parameters()).sum()
+    }
+
+    /// What may stand between plus signs.
+    pub fn legal() -> impl Iterator<Item = &'static str> {
+        Kind::ALL.iter().map(|k| k.code()).chain(["N1", "N2"])
+    }
+}
+
+impl FromStr for ModelSpec {
+    type Err = SpecError;
+
+    fn from_str(spec: &str) -> Result<Self, SpecError> {
+        let mut kinds = Vec::new();
+        for term in spec.split('+').map(str::trim) {
+            let (count, name) = match term.split_once('*') {
+                None => (1, term),
+                Some((count, name)) => (parse_count(spec, count.trim())?, name.trim()),
+            };
+            for _ in 0..count {
+                kinds.extend(named(spec, name)?);
+            }
+        }
+        kinds.sort_unstable();
+        check(spec, &kinds)?;
+        Ok(Self { kinds })
+    }
+}
+
+fn parse_count(spec: &str, count: &str) -> Result<usize, SpecError> {
+    match count.parse() {
+        Ok(n) if (1..=99).contains(&n) => Ok(n),
+        _ => Err(SpecError::Count { spec: spec.into(), count: count.into() }),
+    }
+}
+
+fn named(spec: &str, name: &str) -> Result<Vec<Kind>, SpecError> {
+    let upper = name.to_ascii_uppercase();
+    match upper.as_str() {
+        "" => Err(SpecError::Empty(spec.into())),
+        "N1" => Ok(ModelSpec::n1().kinds),
+        "N2" => Ok(ModelSpec::n2().kinds),
+        code => match Kind::ALL.iter().find(|k| k.code() == code) {
+            Some(kind) => Ok(vec![*kind]),
+            None => Err(SpecError::Unknown { spec: spec.into(), term: name.into() }),
+        },
+    }
+}
+
+fn check(spec: &str, kinds: &[Kind]) -> Result<(), SpecError> {
+    for kind in Kind::ALL {
+        let count = kinds.iter().filter(|k| **k == kind).count();
+        if count > 1 && kind.most() == 1 {
+            return Err(SpecError::Repeated { spec: spec.into(), code: kind.code(), count });
+        }
+    }
+    let count = kinds.iter().filter(|k| k.has_shape()).count();
+    if count > MOST_SHAPES {
+        return Err(SpecError::TooMany { spec: spec.into(), count });
+    }
+    Ok(())
+}
+
+impl fmt::Display for ModelSpec {
+    /// "WN+QN+2*AR1+RW"
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut separator = "";
+        for kind in Kind::ALL {
+            let count = self.kinds.iter().filter(|k| **k == kind).count();
+            match count {
+                0 => continue,
+                1 => write!(f, "{separator}{}", kind.code())?,
+                n => write!(f, "{separator}{n}*{}", kind.code())?,
+            }
+            separator = "+";
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_are_read_in_any_order() {
+        for text in ["2*AR1+RW+WN+QN", " qn + AR1+ rw+wn +ar1", "N2", "n2"] {
+            assert_eq!(text.parse::<ModelSpec>().unwrap(), ModelSpec::n2(), "{text}");
+        }
+        assert_eq!("AR1+RW+WN".parse::<ModelSpec>().unwrap(), ModelSpec::n1());
+        let spec: ModelSpec = "MA1+N1+DR+3*GM".parse().unwrap();
+        assert_eq!(spec.to_string(), "WN+AR1+3*GM+MA1+RW+DR");
+        assert_eq!(spec.to_string().parse::<ModelSpec>().unwrap(), spec);
+        assert_eq!((spec.parameters(), ModelSpec::n2().parameters()), (13, 7));
+    }
+
+    #[test]
+    fn what_means_no_model_is_refused() {
+        let message = |text: &str| text.parse::<ModelSpec>().unwrap_err().to_string();
+        assert_eq!(message("AR1+WM"), "model \"AR1+WM\": \"WM\" is no process");
+        assert_eq!(message(""), "model \"\": a process is missing");
+        assert_eq!(message("WN++RW"), "model \"WN++RW\": a process is missing");
+        assert_eq!(message("0*AR1"), "model \"0*AR1\": \"0\" is not a number of processes");
+        assert_eq!(message("-1*AR1"), "model \"-1*AR1\": \"-1\" is not a number of processes");
+        assert!(message("2*WN").ends_with("2 WN are one WN: their wavelet variances are proportional"));
+        assert!(message("4*AR1+2*GM").contains("6 AR1, GM and MA1 processes; at most 5"));
+        assert!(message("99*N2").contains("99 WN"));
+    }
+}
