@@ -44,7 +44,9 @@ pub fn radii<R: Real>(sin_lat: R) -> Radii<R> {
 }
 
 /// How gravity falls with height.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
 #[serde(rename_all = "kebab-case")]
 pub enum GravityModel {
     /// Second-order series of the normal gravity field of WGS-84 (the default),

@@ -6,10 +6,11 @@ use crate::ekf::{FilterStates, InitialSettings};
 use crate::sensors::gnss::GnssSettings;
 use crate::sensors::outage::{Outage, OutagePlan, PeriodicOutages, RandomOutages};
 use crate::units::{SettingError, require_non_negative, require_positive};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Everything of a run but the trajectory and the models.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Scenario {
     /// How many runs, from which seed, by which method.
@@ -37,7 +38,7 @@ pub struct Scenario {
 }
 
 /// `[run]`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RunSettings {
     /// Monte-Carlo runs.
@@ -58,7 +59,7 @@ impl Default for RunSettings {
 }
 
 /// How the statistics are found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// Sampled runs.
@@ -69,7 +70,7 @@ pub enum Method {
 }
 
 /// `[filter]`.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FilterSettings {
     /// How the noise model becomes states.
@@ -79,7 +80,7 @@ pub struct FilterSettings {
 }
 
 /// `[imu]`: the true IMU; the filter knows its rate only. Standard deviations, drawn per run and axis.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ImuSettings {
     /// Samples per second.
@@ -133,7 +134,7 @@ impl ImuSettings {
 }
 
 /// `[baro]`: a barometric altimeter.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BaroSettings {
     /// Heights per second.

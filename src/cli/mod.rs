@@ -7,6 +7,7 @@ mod exit;
 mod man;
 mod printer;
 mod progress;
+mod schema;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
@@ -31,6 +32,7 @@ enum Command {
     Compare(compare::Args),
     Completions(completions::Args),
     Man(man::Args),
+    Schema(schema::Args),
 }
 
 impl Command {
@@ -39,6 +41,7 @@ impl Command {
             Self::Compare(args) => compare::run(&args, session),
             Self::Completions(args) => completions::run(&args, session),
             Self::Man(args) => man::run(&args, session),
+            Self::Schema(args) => schema::run(&args, session),
         }
     }
 }

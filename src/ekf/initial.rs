@@ -1,11 +1,13 @@
 //! What the filter knows at the start, and how far the nominal start is drawn from the truth.
 
 use crate::units::{SettingError, require_non_negative, require_positive};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// How the noise model becomes states of the filter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "WrittenStates")]
+#[schemars(!try_from)]
 pub enum FilterStates {
     /// 15 states: one first-order Gauss-Markov bias an axis, the reduction of the model.
     #[default]
@@ -42,7 +44,7 @@ impl TryFrom<WrittenStates> for FilterStates {
 /// the help of GNSS: position and velocity as good as one fix of the paper's receiver, half a degree of
 /// roll and pitch (a consumer accelerometer's bias of 0.09 m/s² tilts a levelling by as much), two
 /// degrees of heading.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct InitialSettings {
     /// Position north, east, down (m).

@@ -1,13 +1,14 @@
 //! The GNSS receiver: what it measures, how often and how well.
 
 use crate::units::{SettingError, require_finite, require_positive};
+use schemars::JsonSchema;
 use serde::de::{self, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// GNSS fixes: rate, standard deviations (north, east, down), lever arm. The defaults are those of
 /// [Minaretzis et al.](crate::bibliography::Minaretzis24), Section V: 1 Hz, position variances 4, 4 and
 /// 16 m², velocity variances 0.0016, 0.0016 and 0.0036 (m/s)².
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct GnssSettings {
     /// Fixes per second.
@@ -16,6 +17,7 @@ pub struct GnssSettings {
     pub pos_sigma_m: [f64; 3],
     /// Velocity standard deviations north, east, down (m/s); `None` ("none" in files): no velocity.
     #[serde(serialize_with = "sigmas_or_none", deserialize_with = "parse_sigmas_or_none")]
+    #[schemars(with = "SigmasOrNoneText")]
     pub vel_sigma_m_s: Option<[f64; 3]>,
     /// Antenna position with respect to the IMU, in b: front, right, down (m).
     pub lever_arm_m: [f64; 3],
@@ -60,6 +62,22 @@ fn sigmas_or_none<S: Serializer>(sigmas: &Option<[f64; 3]>, serializer: S) -> Re
 
 fn parse_sigmas_or_none<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<[f64; 3]>, D::Error> {
     deserializer.deserialize_any(SigmasOrNone)
+}
+
+/// How the velocity's standard deviations are written.
+#[derive(Serialize, JsonSchema)]
+#[serde(untagged)]
+#[expect(dead_code, reason = "a description of the text, never a value")]
+enum SigmasOrNoneText {
+    Sigmas([f64; 3]),
+    None(NoneText),
+}
+
+#[derive(Serialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+#[expect(dead_code, reason = "a description of the text, never a value")]
+enum NoneText {
+    None,
 }
 
 struct SigmasOrNone;

@@ -5,10 +5,11 @@
 use crate::rng::StreamKey;
 use crate::units::{SettingError, require_finite, require_positive};
 use rand_distr::{Distribution, Exp};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A window without fixes.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Outage {
     /// First instant without a fix (s).
@@ -44,7 +45,7 @@ impl Outage {
 }
 
 /// Outages of one length at regular times, to the end of the trajectory.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PeriodicOutages {
     /// Start of the first (s).
@@ -84,7 +85,7 @@ impl PeriodicOutages {
 
 /// Outages of one length at random times: from the end of one to the start of the next, an exponential
 /// waiting time. One draw for the whole experiment, so that every run has the same outages.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RandomOutages {
     /// Outages per hour of time with fixes.

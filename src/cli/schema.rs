@@ -1,0 +1,31 @@
+//! `nav-sim schema`: JSON schemas of the files people write.
+
+use super::{Failure, Session};
+use nav_sim::scenario::Scenario;
+
+/// Print the JSON schema of a scenario file, for editors and checkers
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim schema scenario
+  nav-sim schema scenario > scenario.schema.json
+  nav-sim schema scenario --quiet | grep -c description")]
+pub(crate) struct Args {
+    /// Which file
+    #[arg(value_enum)]
+    of: Kind,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug)]
+enum Kind {
+    Scenario,
+}
+
+pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let schema = match args.of {
+        Kind::Scenario => schemars::schema_for!(Scenario),
+    };
+    let text = serde_json::to_string_pretty(&schema).map_err(Failure::could_not)?;
+    session.printer.result(&text);
+    Ok(())
+}
