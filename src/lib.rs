@@ -48,6 +48,7 @@ pub mod strapdown;
 // L4
 pub mod ekf;
 // L5
+pub mod closure;
 pub mod monte_carlo;
 pub mod scenario;
 pub mod simulation;

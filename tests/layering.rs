@@ -21,6 +21,7 @@ const MAY_NAME: &[(&str, &[&str])] = &[
     ("sensors", &["@L1", "trajectory", "noise"]),
     ("strapdown", &["@L1", "noise"]),
     ("ekf", &["@L1", "strapdown", "noise"]),
+    ("closure", &["@L1", "trajectory", "sensors", "strapdown"]),
     ("scenario", &["@L1", "noise", "trajectory", "sensors", "strapdown", "ekf"]),
     ("simulation", &["@L1", "noise", "trajectory", "sensors", "strapdown", "ekf"]),
     ("monte_carlo", &["@L1", "noise", "trajectory", "sensors", "strapdown", "ekf", "simulation"]),

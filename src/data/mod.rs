@@ -8,3 +8,4 @@ pub mod run_directory;
 pub mod scenario_file;
 pub mod suggest;
 pub mod toml_file;
+pub mod trajectory_file;

@@ -4,6 +4,7 @@
 //! Everything a sensor could measure follows from it by differentiation, so the ideal IMU and the
 //! reference agree to rounding, whatever the samples were.
 
+pub mod plausibility;
 pub mod profile;
 mod spline;
 
@@ -82,6 +83,20 @@ pub enum Error {
         /// The angle (deg).
         angle_deg: f64,
     },
+}
+
+impl Error {
+    /// The sample at fault, counted from 0, if it is one.
+    #[must_use]
+    pub const fn index(&self) -> Option<usize> {
+        match self {
+            Self::TooFew { .. } => None,
+            Self::NotFinite { index, .. }
+            | Self::Time { index, .. }
+            | Self::Latitude { index, .. }
+            | Self::Rotation { index, .. } => Some(*index),
+        }
+    }
 }
 
 /// Position, its derivatives, attitude and angular rate at an instant, with respect to the Earth.

@@ -218,6 +218,21 @@ impl Problem {
             Self::Samples(_) => "segment",
         }
     }
+
+    /// What to do about it, where that is not plain.
+    #[must_use]
+    pub const fn hint(&self) -> Option<&'static str> {
+        Some(match self {
+            Self::AtRest { .. } => "put an accelerate segment before it, or give the start a speed_m_s",
+            Self::TooSteep { .. } => "climb over a longer path, or for longer",
+            Self::TooNear { .. } | Self::Unreachable { .. } => {
+                "turn tighter, go slower, or move the point away"
+            }
+            Self::TurnsBack { .. } => "turn back over two points",
+            Self::Samples(super::Error::Rotation { .. }) => "give the turn more time",
+            Self::Domain { .. } | Self::Samples(_) => return None,
+        })
+    }
 }
 
 impl Profile {

@@ -1,0 +1,112 @@
+//! Proof that truth and navigation agree: the noise-free samples of a trajectory, mechanised from its exact
+//! start, return to the trajectory. What is left is the error of the strapdown algorithm at the rate.
+
+use crate::earth::{GravityModel, MAX_LATITUDE, ned_difference};
+use crate::frames::NavState;
+use crate::lanes::Vec3;
+use crate::sensors::ideal_imu::{self, ideal_imu};
+use crate::strapdown::{self, Strapdown};
+use crate::trajectory::Trajectory;
+
+/// The closure cannot be computed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// No IMU samples.
+    #[error(transparent)]
+    Imu(#[from] ideal_imu::Error),
+    /// Too much rotation in a sample.
+    #[error("the vehicle turns {angle_deg:.0}° within one sample at {t_s} s: too slow a rate for it")]
+    Rotation {
+        /// Angle (deg).
+        angle_deg: f64,
+        /// Time of the sample (s).
+        t_s: f64,
+    },
+    /// Too near a pole.
+    #[error("the trajectory comes nearer than 0.1° to a pole at {t_s} s")]
+    Pole {
+        /// When (s).
+        t_s: f64,
+    },
+}
+
+/// How far the mechanised samples come away from the trajectory.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Closure {
+    /// IMU rate (Hz).
+    pub rate_hz: f64,
+    /// Time mechanised (s).
+    pub duration_s: f64,
+    /// Largest distance (m).
+    pub position_m: f64,
+    /// Largest horizontal distance (m).
+    pub horizontal_m: f64,
+    /// Largest difference of velocity (m/s).
+    pub velocity_m_s: f64,
+    /// Largest angle between the attitudes (rad).
+    pub attitude_rad: f64,
+}
+
+/// What a closure must not exceed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    /// Distance (m).
+    pub position_m: f64,
+    /// Velocity (m/s).
+    pub velocity_m_s: f64,
+    /// Angle (rad).
+    pub attitude_rad: f64,
+}
+
+impl Default for Bounds {
+    /// 1 cm, 1 mm/s, 1 µrad: for 900 s at 100 Hz on vehicle dynamics.
+    fn default() -> Self {
+        Self { position_m: 0.01, velocity_m_s: 1e-3, attitude_rad: 1e-6 }
+    }
+}
+
+impl Closure {
+    /// Mechanises the ideal samples of a trajectory.
+    ///
+    /// # Errors
+    /// An impossible rate, a rotation too fast for it, a pole.
+    pub fn new(trajectory: &Trajectory, rate_hz: f64, gravity: GravityModel) -> Result<Self, Error> {
+        let samples = ideal_imu(trajectory, rate_hz, gravity)?;
+        let dt = 1.0 / rate_hz;
+        let mut ins = Strapdown::new(&trajectory.state(trajectory.start_s()), gravity);
+        let duration_s = samples.len() as f64 / rate_hz;
+        let mut closure =
+            Self { rate_hz, duration_s, position_m: 0.0, horizontal_m: 0.0, velocity_m_s: 0.0, attitude_rad: 0.0 };
+        for (k, sample) in samples.iter().enumerate() {
+            let t_s = trajectory.start_s() + (k + 1) as f64 / rate_hz;
+            let dtheta = sample.omega_ib_b * dt;
+            if dtheta.length() > strapdown::MAX_ROTATION {
+                return Err(Error::Rotation { angle_deg: dtheta.length() / crate::units::DEG, t_s });
+            }
+            ins.step(Vec3::splat(dtheta), Vec3::splat(sample.f_ib_b * dt), dt);
+            let truth = trajectory.state(t_s);
+            if truth.lat.abs() > MAX_LATITUDE {
+                return Err(Error::Pole { t_s });
+            }
+            closure.widen(&truth, &ins.lane(0));
+        }
+        Ok(closure)
+    }
+
+    fn widen(&mut self, truth: &NavState, found: &NavState) {
+        let apart = ned_difference(truth, found.lat, found.lon, found.h);
+        let turned = 2.0 * (truth.q_b_n.conjugate() * found.q_b_n).xyz().length();
+        self.position_m = self.position_m.max(apart.length());
+        self.horizontal_m = self.horizontal_m.max(apart.truncate().length());
+        self.velocity_m_s = self.velocity_m_s.max((found.v_n - truth.v_n).length());
+        self.attitude_rad = self.attitude_rad.max(turned);
+    }
+
+    /// Whether it is within the bounds.
+    #[must_use]
+    pub fn within(&self, bounds: &Bounds) -> bool {
+        self.position_m <= bounds.position_m
+            && self.velocity_m_s <= bounds.velocity_m_s
+            && self.attitude_rad <= bounds.attitude_rad
+    }
+}

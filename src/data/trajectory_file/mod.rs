@@ -1,0 +1,69 @@
+//! Trajectory files: CSV, motion profiles (TOML), imports.
+
+mod columns;
+mod error;
+mod profile;
+mod samples;
+mod table;
+mod write;
+
+pub use error::TrajectoryFileError;
+pub use write::{Rows, write_csv};
+
+use crate::trajectory::Trajectory;
+use std::fmt;
+use std::path::Path;
+
+/// How to read a trajectory file.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Options {
+    /// Where local coordinates begin: latitude, longitude (rad), height (m). Without it: the file's own
+    /// `# origin:` line.
+    pub origin: Option<[f64; 3]>,
+}
+
+/// A doubt about a trajectory file that can be used all the same.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Warning {
+    /// The file.
+    pub path: String,
+    /// The line it is about, if it is about one.
+    pub line: Option<u64>,
+    /// What is doubtful.
+    pub message: String,
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.line {
+            Some(line) => write!(f, "{}, line {line}: {}", self.path, self.message),
+            None => write!(f, "{}: {}", self.path, self.message),
+        }
+    }
+}
+
+const KNOWN: &str = ".toml (motion profile), .csv, .tsv or .txt (also .gz)";
+
+/// Reads a trajectory: a motion profile (`.toml`), or a table with a header (`.csv`, `.tsv`, `.txt`, also
+/// `.gz`) whose columns are `t_s`, `lat_deg`, `lon_deg`, `h_m` or `n_m`, `e_m`, `d_m` (in the plane that
+/// touches the Earth at the origin), `roll_deg`, `pitch_deg`, `yaw_deg`. Columns `v_n_m_s`, `v_e_m_s`,
+/// `v_d_m_s` are compared with the positions. Without attitude, heading and pitch follow the path.
+///
+/// # Errors
+/// Whatever is wrong with the file, with its line.
+pub fn load(path: &Path, options: &Options) -> Result<(Trajectory, Vec<Warning>), TrajectoryFileError> {
+    let name = path.display().to_string();
+    let lower = name.to_lowercase();
+    let plain = lower.strip_suffix(".gz").unwrap_or(&lower);
+    match plain.rsplit_once('.').map_or("", |(_, ending)| ending) {
+        "toml" => Ok((profile::load(path)?, Vec::new())),
+        "csv" | "tsv" | "txt" => {
+            let table = table::Table::read(&name, table::open(path)?, None)?;
+            samples::trajectory(&table, options)
+        }
+        _ => Err(TrajectoryFileError::Ending { path: name, known: KNOWN }),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,109 @@
+//! Text tables of numbers.
+
+use super::TrajectoryFileError as Error;
+use flate2::read::MultiGzDecoder;
+use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+
+/// A text table of numbers.
+#[derive(Debug)]
+pub(super) struct Table {
+    pub(super) path: String,
+    /// Line of the header, from 1.
+    pub(super) header_line: u64,
+    pub(super) columns: Vec<String>,
+    /// The lines that begin with `#`, without it.
+    pub(super) comments: Vec<String>,
+    /// Line in the file, values.
+    pub(super) rows: Vec<(u64, Vec<f64>)>,
+}
+
+/// Opens a file, unpacking it when its name ends in `.gz`.
+pub(super) fn open(path: &Path) -> Result<Box<dyn BufRead>, Error> {
+    let io = |source| Error::Io { path: path.display().to_string(), source };
+    let file = BufReader::with_capacity(1 << 16, File::open(path).map_err(io)?);
+    let packed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
+    Ok(if packed { Box::new(BufReader::new(MultiGzDecoder::new(file))) } else { Box::new(file) })
+}
+
+/// The whole text of a file.
+pub(super) fn text(path: &Path) -> Result<String, Error> {
+    let mut text = String::new();
+    let io = |source| Error::Io { path: path.display().to_string(), source };
+    open(path)?.read_to_string(&mut text).map_err(io)?;
+    Ok(text)
+}
+
+impl Table {
+    /// Reads a table. Without `columns` its first line that is no comment names them; with them it has no
+    /// header and its cells stand between blanks.
+    pub(super) fn read(path: &str, reader: impl BufRead, columns: Option<&[&str]>) -> Result<Self, Error> {
+        let names = columns.map(|c| c.iter().map(|&name| name.to_owned()).collect());
+        let mut separator = if columns.is_some() { ' ' } else { ',' };
+        let mut table = Self {
+            path: path.to_owned(),
+            header_line: 0,
+            columns: names.unwrap_or_default(),
+            comments: Vec::new(),
+            rows: Vec::new(),
+        };
+        for (index, line) in reader.lines().enumerate() {
+            let number = index as u64 + 1;
+            let line = line.map_err(|source| Error::Io { path: path.to_owned(), source })?;
+            let text = line.trim_start_matches('\u{feff}').trim();
+            if let Some(comment) = text.strip_prefix(['#', '%']) {
+                table.comments.push(comment.trim().to_owned());
+            } else if text.is_empty() {
+            } else if table.columns.is_empty() {
+                separator = separator_of(text);
+                table.header(number, &cells(text, separator))?;
+            } else {
+                table.row(number, &cells(text, separator))?;
+            }
+        }
+        if table.rows.is_empty() { Err(Error::Empty { path: path.to_owned() }) } else { Ok(table) }
+    }
+
+    fn header(&mut self, line: u64, cells: &[&str]) -> Result<(), Error> {
+        if cells.iter().all(|c| c.parse::<f64>().is_ok()) {
+            let found = cells.join(",").chars().take(60).collect();
+            return Err(Error::NoHeader { path: self.path.clone(), line, found });
+        }
+        self.header_line = line;
+        self.columns = cells.iter().map(|&c| c.to_owned()).collect();
+        Ok(())
+    }
+
+    fn row(&mut self, line: u64, cells: &[&str]) -> Result<(), Error> {
+        let (found, expected) = (cells.len(), self.columns.len());
+        if found != expected {
+            return Err(Error::RowLength { path: self.path.clone(), line, found, expected });
+        }
+        let number = |(i, cell): (usize, &&str)| match cell.parse::<f64>() {
+            Ok(value) if value.is_finite() => Ok(value),
+            Ok(_) => Err(self.cell(line, i, cell, "is not finite")),
+            Err(_) => Err(self.cell(line, i, &format!("\"{cell}\""), "is not a number")),
+        };
+        let values = cells.iter().enumerate().map(number).collect::<Result<_, _>>()?;
+        self.rows.push((line, values));
+        Ok(())
+    }
+
+    /// The refusal of a cell.
+    pub(super) fn cell(&self, line: u64, column: usize, value: &str, reason: &'static str) -> Error {
+        let (path, column) = (self.path.clone(), self.columns[column].clone());
+        Error::Cell { path, line, column, value: value.chars().take(40).collect(), reason }
+    }
+}
+
+fn separator_of(header: &str) -> char {
+    [',', ';', '\t'].into_iter().find(|&s| header.contains(s)).unwrap_or(' ')
+}
+
+fn cells(line: &str, separator: char) -> Vec<&str> {
+    if separator == ' ' {
+        return line.split_whitespace().collect();
+    }
+    line.split(separator).map(|c| c.trim().trim_matches('"')).collect()
+}

@@ -1,0 +1,265 @@
+//! Whether a trajectory could be a vehicle's: speed, acceleration, jerk and angular rate within limits,
+//! velocities that agree with positions.
+
+use super::Trajectory;
+use crate::units::DEG;
+use glam::DVec3;
+use std::fmt;
+
+/// Time over which a change of acceleration counts as a jump (s).
+const JERK_WINDOW_S: f64 = 0.1;
+/// Excesses nearer than this to one another are one (s).
+const SAME_EVENT_S: f64 = 1.0;
+
+/// What no vehicle of the kind does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Speed (m/s).
+    pub speed: f64,
+    /// Acceleration (m/s²).
+    pub acceleration: f64,
+    /// Change of acceleration over 0.1 s, per second (m/s³).
+    pub jerk: f64,
+    /// Angular rate (rad/s).
+    pub rate: f64,
+}
+
+impl Default for Limits {
+    /// A land vehicle or an aircraft that is not aerobatic: 350 m/s, 30 m/s², 35 m/s³, 200 deg/s. Recorded
+    /// drives stay below 25 m/s³ but for glitches of the recording.
+    fn default() -> Self {
+        Self { speed: 350.0, acceleration: 30.0, jerk: 35.0, rate: 200.0 * DEG }
+    }
+}
+
+/// What a limit is on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Speed (m/s).
+    Speed,
+    /// Acceleration (m/s²).
+    Acceleration,
+    /// Change of acceleration (m/s³).
+    Jerk,
+    /// Angular rate (rad/s).
+    Rate,
+}
+
+impl Quantity {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Speed, Self::Acceleration, Self::Jerk, Self::Rate];
+
+    /// Name, unit of display, and its factor from SI.
+    #[must_use]
+    pub const fn display(self) -> (&'static str, &'static str, f64) {
+        match self {
+            Self::Speed => ("speed", "m/s", 1.0),
+            Self::Acceleration => ("acceleration", "m/s²", 1.0),
+            Self::Jerk => ("jump of acceleration", "m/s³", 1.0),
+            Self::Rate => ("angular rate", "deg/s", 1.0 / DEG),
+        }
+    }
+
+    /// The limit on it.
+    #[must_use]
+    pub const fn limit(self, limits: &Limits) -> f64 {
+        match self {
+            Self::Speed => limits.speed,
+            Self::Acceleration => limits.acceleration,
+            Self::Jerk => limits.jerk,
+            Self::Rate => limits.rate,
+        }
+    }
+}
+
+/// A stretch beyond a limit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Excess {
+    /// Of what.
+    pub quantity: Quantity,
+    /// The limit (SI).
+    pub limit: f64,
+    /// The largest value (SI) and its time (s).
+    pub worst: f64,
+    /// Time of the largest value (s).
+    pub worst_s: f64,
+    /// First time beyond the limit (s).
+    pub start_s: f64,
+    /// Last time beyond the limit (s).
+    pub end_s: f64,
+}
+
+impl fmt::Display for Excess {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (name, unit, factor) = self.quantity.display();
+        let (worst, limit) = (self.worst * factor, self.limit * factor);
+        write!(f, "{name} {worst:.1} {unit} at {:.2} s, beyond {limit:.1} {unit}", self.worst_s)?;
+        if self.end_s > self.start_s {
+            write!(f, " (between {:.2} s and {:.2} s)", self.start_s, self.end_s)?;
+        }
+        Ok(())
+    }
+}
+
+/// The largest speed, acceleration, jerk and rate of a trajectory (SI), in the order of [`Quantity::ALL`],
+/// and every stretch beyond the limits, in order of time.
+#[must_use]
+pub fn examine(trajectory: &Trajectory, limits: &Limits) -> ([f64; 4], Vec<Excess>) {
+    let (mut largest, mut found) = ([0.0_f64; 4], Vec::new());
+    let mut open: [Option<Excess>; 4] = [None; 4];
+    // Acceleration is linear between knots, so that its extremes are at knots.
+    for &t_s in trajectory.knots() {
+        for (i, value) in magnitudes(trajectory, t_s).into_iter().enumerate() {
+            largest[i] = largest[i].max(value);
+            let limit = Quantity::ALL[i].limit(limits);
+            if value > limit {
+                let event = Excess {
+                    quantity: Quantity::ALL[i],
+                    limit,
+                    worst: value,
+                    worst_s: t_s,
+                    start_s: t_s,
+                    end_s: t_s,
+                };
+                match &mut open[i] {
+                    Some(e) if t_s - e.end_s <= SAME_EVENT_S => extend(e, &event),
+                    slot => found.extend(slot.replace(event)),
+                }
+            }
+        }
+    }
+    found.extend(open.into_iter().flatten());
+    found.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
+    (largest, found)
+}
+
+fn extend(event: &mut Excess, by: &Excess) {
+    event.end_s = by.end_s;
+    if by.worst > event.worst {
+        (event.worst, event.worst_s) = (by.worst, by.worst_s);
+    }
+}
+
+fn magnitudes(trajectory: &Trajectory, t_s: f64) -> [f64; 4] {
+    let half = 0.5 * JERK_WINDOW_S;
+    let inside = |t: f64| t.clamp(trajectory.start_s(), trajectory.end_s());
+    let (before, after) =
+        (trajectory.kinematics(inside(t_s - half)), trajectory.kinematics(inside(t_s + half)));
+    let now = trajectory.kinematics(t_s);
+    let jerk = (after.a_e - before.a_e).length() / JERK_WINDOW_S;
+    [now.v_e.length(), now.a_e.length(), jerk, now.omega_eb_b.length()]
+}
+
+/// How far given velocities are from those of the positions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct VelocityMisfit {
+    /// Root mean square of the difference vector (m/s).
+    pub rms: f64,
+    /// Its largest length (m/s).
+    pub worst: f64,
+    /// When (s).
+    pub worst_s: f64,
+    /// What was given then (m/s, NED).
+    pub given: DVec3,
+    /// What the positions say then (m/s, NED).
+    pub found: DVec3,
+    /// Root mean square of the speed (m/s).
+    pub rms_speed: f64,
+}
+
+impl VelocityMisfit {
+    /// Compares (time, velocity in n) with the trajectory; none without any.
+    #[must_use]
+    pub fn new(trajectory: &Trajectory, velocities: &[(f64, DVec3)]) -> Option<Self> {
+        let (mut misfit, mut sum, mut speed) = (None::<Self>, 0.0, 0.0);
+        for &(t_s, given) in velocities {
+            let found = trajectory.state(t_s).v_n;
+            let worst = (given - found).length();
+            sum += worst * worst;
+            speed += found.length_squared();
+            if misfit.is_none_or(|m| worst > m.worst) {
+                misfit = Some(Self { rms: 0.0, worst, worst_s: t_s, given, found, rms_speed: 0.0 });
+            }
+        }
+        let mean = |x: f64| (x / velocities.len() as f64).sqrt();
+        misfit.map(|m| Self { rms: mean(sum), rms_speed: mean(speed), ..m })
+    }
+
+    /// Whether they contradict the positions: 0.1 m/s + 2 % of the speed in the mean, or 1 m/s + 10 % once.
+    #[must_use]
+    pub fn contradicts(&self) -> bool {
+        self.rms > 0.1 + 0.02 * self.rms_speed || self.worst > 1.0 + 0.1 * self.rms_speed
+    }
+}
+
+impl fmt::Display for VelocityMisfit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let list = |v: DVec3| format!("{:.2}, {:.2}, {:.2}", v.x, v.y, v.z);
+        write!(f, "velocity columns differ from the positions by {:.3} m/s rms", self.rms)?;
+        let (given, found) = (list(self.given), list(self.found));
+        write!(
+            f,
+            "; most at {:.2} s: north, east, down {given} given, {found} by the positions",
+            self.worst_s
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::trajectory::TrajectorySample;
+    use glam::DQuat;
+
+    /// Due north at 10 m/s (on a sphere of 6380 km, near enough), 20 Hz, with the given shift of height.
+    fn north(shift: impl Fn(f64) -> f64) -> Trajectory {
+        let samples: Vec<_> = (0..=200)
+            .map(|k| {
+                let t_s = 0.05 * f64::from(k);
+                TrajectorySample {
+                    t_s,
+                    lat: 0.8 + 10.0 * t_s / 6.38e6,
+                    lon: 0.1,
+                    h: shift(t_s),
+                    q_b_n: DQuat::IDENTITY,
+                }
+            })
+            .collect();
+        Trajectory::from_samples(&samples).unwrap()
+    }
+
+    #[test]
+    fn a_smooth_motion_is_plausible() {
+        let ([speed, acceleration, jerk, rate], found) = examine(&north(|_| 0.0), &Limits::default());
+        assert!(found.is_empty(), "{found:?}");
+        assert!((speed - 10.0).abs() < 0.1 && acceleration < 1e-3 && jerk < 1e-3 && rate < 1e-4);
+    }
+
+    /// A step of 0.5 m between two samples 0.05 s apart is a speed of 10 m/s and hundreds of m/s².
+    #[test]
+    fn a_jump_is_found_where_it_is() {
+        let t = north(|t| if t > 4.02 { 0.5 } else { 0.0 });
+        let (_, found) = examine(&t, &Limits { speed: 15.0, ..Limits::default() });
+        let kinds: Vec<_> = found.iter().map(|e| e.quantity).collect();
+        assert_eq!(kinds.len(), 2, "{found:?}");
+        assert!(kinds.contains(&Quantity::Acceleration) && kinds.contains(&Quantity::Jerk), "{found:?}");
+        assert!(found.iter().all(|e| (e.worst_s - 4.02).abs() < 0.1 && e.end_s - e.start_s < 1.0));
+        let text = found[0].to_string();
+        assert!(text.contains("beyond") && text.contains("(between 3."), "{text}");
+    }
+
+    #[test]
+    fn velocities_are_compared_with_positions() {
+        let t = north(|_| 0.0);
+        let given = |v: DVec3| (0..=10).map(|k| (f64::from(k), v)).collect::<Vec<_>>();
+        let right = t.state(5.0).v_n;
+        assert!(!VelocityMisfit::new(&t, &given(right)).unwrap().contradicts());
+        let wrong = VelocityMisfit::new(&t, &given(-right)).unwrap();
+        assert!(wrong.contradicts());
+        assert!(
+            wrong.to_string().starts_with("velocity columns differ from the positions by 19.9"),
+            "{wrong}"
+        );
+        assert!(VelocityMisfit::new(&t, &[]).is_none());
+    }
+}
