@@ -75,8 +75,14 @@ impl Closure {
         let dt = 1.0 / rate_hz;
         let mut ins = Strapdown::new(&trajectory.state(trajectory.start_s()), gravity);
         let duration_s = samples.len() as f64 / rate_hz;
-        let mut closure =
-            Self { rate_hz, duration_s, position_m: 0.0, horizontal_m: 0.0, velocity_m_s: 0.0, attitude_rad: 0.0 };
+        let mut closure = Self {
+            rate_hz,
+            duration_s,
+            position_m: 0.0,
+            horizontal_m: 0.0,
+            velocity_m_s: 0.0,
+            attitude_rad: 0.0,
+        };
         for (k, sample) in samples.iter().enumerate() {
             let t_s = trajectory.start_s() + (k + 1) as f64 / rate_hz;
             let dtheta = sample.omega_ib_b * dt;
