@@ -26,7 +26,7 @@ pub enum RunDirectoryError {
         message: String,
     },
     /// A table is not one.
-    #[error("{path}: {source}")]
+    #[error("{path}, {source}")]
     Table {
         /// File.
         path: String,

@@ -4,8 +4,21 @@ use super::manifest::Manifest;
 use super::number::readable;
 use super::svg::{Line, Plot, Scale, escape};
 use crate::metrics::{EpochMetrics, Estimate, OutageSummary, PerState, Summary};
-use crate::simulation::{REPORTED_NAMES, RunResult};
+use crate::simulation::{REPORTED, RunResult};
 use std::fmt::Write as _;
+
+/// The reported states, in words.
+const TITLES: [&str; REPORTED] = [
+    "position north (m)",
+    "position east (m)",
+    "position down (m)",
+    "velocity north (m/s)",
+    "velocity east (m/s)",
+    "velocity down (m/s)",
+    "roll (degrees)",
+    "pitch (degrees)",
+    "yaw (degrees)",
+];
 
 const STYLE: &str = include_str!("report.css");
 
@@ -89,12 +102,29 @@ fn outages(outages: &[OutageSummary], body: &mut String) {
     });
     row("horizontal error, largest (m)", &|o| readable(o.horizontal_error_end_m.max));
     row("re-convergence, median (s)", &|o| readable(o.reconvergence_s.p50));
-    for (i, name) in REPORTED_NAMES.iter().enumerate() {
+    table(&rows, body);
+    outage_states(outages, body);
+}
+
+/// State by state, what the filter believed and how wrong it was.
+fn outage_states(outages: &[OutageSummary], body: &mut String) {
+    let mut head = vec!["".to_owned()];
+    for o in outages {
+        head.extend(
+            ["mean ASEE", "RMSE at the end"].map(|what| format!("{what}, {}–{} s", o.start_s, o.end_s)),
+        );
+    }
+    let mut rows = vec![head];
+    for (i, title) in TITLES.iter().enumerate() {
         let estimate = |value: &PerState<f64>, error: &PerState<f64>| {
             format!("{} ± {}", readable(value.0[i]), readable(error.0[i]))
         };
-        row(&format!("ASEE {name}"), &|o| estimate(&o.asee_mean, &o.asee_mean_std_error));
-        row(&format!("RMSE {name}"), &|o| estimate(&o.rmse_end, &o.rmse_end_std_error));
+        let mut row = vec![(*title).to_owned()];
+        for o in outages {
+            row.push(estimate(&o.asee_mean, &o.asee_mean_std_error));
+            row.push(estimate(&o.rmse_end, &o.rmse_end_std_error));
+        }
+        rows.push(row);
     }
     table(&rows, body);
 }
@@ -152,7 +182,7 @@ impl Plots<'_> {
                 self.curve("RMSE", "rmse", value(|e| &e.rmse)),
                 self.curve("ASEE", "asee", value(|e| &e.asee)),
             ];
-            *body += &self.plot(REPORTED_NAMES[state], Scale::Log, lines).render();
+            *body += &self.plot(TITLES[state], Scale::Log, lines).render();
         }
     }
 

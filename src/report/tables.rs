@@ -9,7 +9,7 @@ use std::collections::HashMap;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TableError {
     /// A column is not there.
-    #[error("no column is named \"{column}\"")]
+    #[error("line 1: no column is named \"{column}\"")]
     Column {
         /// The column.
         column: String,
@@ -25,8 +25,13 @@ pub enum TableError {
         value: String,
     },
     /// Not a table.
-    #[error("{0}")]
-    Syntax(String),
+    #[error("line {line}: {message}")]
+    Syntax {
+        /// Line, from 1.
+        line: u64,
+        /// What the reader said.
+        message: String,
+    },
 }
 
 const EPOCH_ENDS: [&str; 4] = ["mean_pos_err_m", "mean_att_err_deg", "nees", "coverage"];
@@ -162,7 +167,10 @@ struct Table {
 
 impl Table {
     fn read(text: &str) -> Result<Self, TableError> {
-        let syntax = |e: csv::Error| TableError::Syntax(e.to_string());
+        let syntax = |e: csv::Error| TableError::Syntax {
+            line: e.position().map_or(1, csv::Position::line),
+            message: e.to_string(),
+        };
         let mut reader = csv::Reader::from_reader(text.as_bytes());
         let names: Vec<String> = reader.headers().map_err(syntax)?.iter().map(str::to_owned).collect();
         let rows = reader.into_records().collect::<Result<_, _>>().map_err(syntax)?;
@@ -250,7 +258,7 @@ mod tests {
     fn unreadable_tables_are_refused_by_line_and_column() {
         let text = epochs_csv(&epochs(&sample::result().epochs));
         let error = parse_epochs(&text.replacen("rmse_yaw_deg", "rmse_yow_deg", 1)).unwrap_err();
-        assert_eq!(error.to_string(), "no column is named \"rmse_yaw_deg\"");
+        assert_eq!(error.to_string(), "line 1: no column is named \"rmse_yaw_deg\"");
         let broken: String = text
             .lines()
             .enumerate()
