@@ -43,6 +43,9 @@ sources! {
     /// Y. Bar-Shalom, X. R. Li, T. Kirubarajan: *Estimation with Applications to Tracking and
     /// Navigation*, Wiley, 2001 (NEES, NIS).
     BarShalom01;
+    /// J. A. Doornik: *An improved ziggurat method to generate normal random samples*, Nuffield College,
+    /// Oxford, 2005.
+    Doornik05;
     /// IEEE Std 952-1997 (and 647): *Specification Format Guide and Test Procedure for Single-Axis
     /// Interferometric Fiber Optic Gyros* (Allan variance of the noise terms).
     Ieee952;

@@ -1,6 +1,7 @@
 //! Files: recordings, models, trajectories. The only library module that reads files.
 
 pub mod atomic;
+pub mod contamination_file;
 pub mod model_file;
 pub mod npy;
 pub mod recordings;

@@ -113,7 +113,7 @@ impl Source {
         }
     }
 
-    #[cfg(test)]
+    /// A text that is in no file.
     pub(crate) fn new(path: &str, text: &str) -> Self {
         Self { path: path.into(), text: text.into() }
     }
@@ -248,6 +248,15 @@ impl<'a> Section<'a> {
         self.f64(key)?.ok_or_else(|| self.missing(key))
     }
 
+    /// A list of finite numbers.
+    pub(crate) fn f64s(&self, key: &str) -> Result<Option<Vec<f64>>, TomlError> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        let error = || self.wrong_type(key, "a list of finite numbers");
+        let items = value.get_ref().as_array().ok_or_else(error)?;
+        let numbers = items.iter().map(|v| number(v).filter(|x| x.is_finite()));
+        numbers.collect::<Option<Vec<f64>>>().map(Some).ok_or_else(error)
+    }
+
     /// A pair of numbers in ascending order, infinite ones allowed.
     pub(crate) fn interval(&self, key: &str) -> Result<Option<[f64; 2]>, TomlError> {
         let Some(value) = self.get(key) else { return Ok(None) };
@@ -262,6 +271,14 @@ impl<'a> Section<'a> {
     pub(crate) fn u64(&self, key: &str) -> Result<Option<u64>, TomlError> {
         let Some(value) = self.get(key) else { return Ok(None) };
         integer(value).map(Some).ok_or_else(|| self.wrong_type(key, "a whole number ≥ 0"))
+    }
+
+    /// A list of whole numbers ≥ 0.
+    pub(crate) fn u64s(&self, key: &str) -> Result<Option<Vec<u64>>, TomlError> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        let error = || self.wrong_type(key, "a list of whole numbers ≥ 0");
+        let items = value.get_ref().as_array().ok_or_else(error)?;
+        items.iter().map(integer).collect::<Option<Vec<u64>>>().map(Some).ok_or_else(error)
     }
 
     pub(crate) fn str(&self, key: &str) -> Result<Option<&'a str>, TomlError> {

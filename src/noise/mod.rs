@@ -10,10 +10,12 @@ pub mod continuous;
 mod drift;
 mod gauss_markov;
 mod ma1;
+mod normal;
 mod quantization;
 mod random_walk;
 pub mod reduction;
 
+pub mod contamination;
 mod slow_ar1;
 pub mod spread;
 mod synthesis;

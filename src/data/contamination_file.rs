@@ -1,0 +1,359 @@
+//! Contamination files (TOML) and the named ones that come with the program.
+//!
+//! ```toml
+//! schema = 1
+//! [[accel]]                        # or [[gyro]]: all axes of the sensor
+//! operation = "step"               # amplitude, at_share = 0.5 | at_samples | at_s
+//! replicates = [1, 2]              # default: every one
+//! amplitude = [0.004, 0.003]       # one number, or one for each replicate listed
+//! [[accel]]
+//! operation = "replace"            # share | points, sigma, mean (default: the signal's)
+//! [[accel]]
+//! operation = "bursts"             # count = 5, length_samples = 500, spacing_samples = 90000, of_samples,
+//!                                  # amplitude, frequency_hz = 5
+//! [[accel]]
+//! operation = "ar1"                # phi, sigma2
+//! [[accel]]
+//! operation = "scale"              # process = "RW", parameter = "gamma2", factor
+//! ```
+//! With `of_samples` the burst's lengths are meant for a record of so many samples and are scaled to the
+//! record's length. What the operations do, and in which order: [`crate::noise::contamination`].
+
+use super::suggest::nearest;
+use super::toml_file::{Section, Source, TomlError};
+use crate::imu::Sensor;
+use crate::noise::Ar1;
+use crate::noise::contamination::{Contamination, Extent, Operation, Rule};
+use std::path::Path;
+
+/// Names and texts of the contaminations that come with the program.
+const PRESETS: [(&str, &str); 6] = [
+    ("section4-I", "schema = 1\n"),
+    ("section4-II", include_str!("../../calib_data/contamination/section4-II.toml")),
+    ("section4-III", include_str!("../../calib_data/contamination/section4-III.toml")),
+    ("section5-I", "schema = 1\n"),
+    ("section5-II", include_str!("../../calib_data/contamination/section5-II.toml")),
+    ("section5-III", include_str!("../../calib_data/contamination/section5-III.toml")),
+];
+
+/// Names of the contaminations that come with the program: the scenarios of
+/// [Minaretzis](crate::bibliography::Minaretzis24), Sections IV and V.
+#[must_use]
+pub fn names() -> [&'static str; 6] {
+    PRESETS.map(|(name, _)| name)
+}
+
+/// The contamination of a name, or of a file where there is none of that name.
+///
+/// # Errors
+/// When the file cannot be read or is refused.
+pub fn find(name_or_path: &str, rate_hz: f64) -> Result<Contamination, TomlError> {
+    match PRESETS.iter().find(|(name, _)| *name == name_or_path) {
+        Some((name, text)) => parse(&Source::new(name, text), rate_hz),
+        None => parse(&Source::read(Path::new(name_or_path))?, rate_hz),
+    }
+}
+
+/// The name of a preset that was meant by what is neither a preset nor a file.
+#[must_use]
+pub fn meant(name: &str) -> Option<&'static str> {
+    nearest(name, names())
+}
+
+fn parse(source: &Source, rate_hz: f64) -> Result<Contamination, TomlError> {
+    let table = source.parse()?;
+    let root = source.root(&table);
+    root.only(&["schema", "accel", "gyro"])?;
+    if root.u64("schema")?.is_some_and(|s| s != 1) {
+        return Err(root.refuse("schema", "is not a schema this version reads: it reads 1", None));
+    }
+    let mut rules = Vec::new();
+    for sensor in Sensor::ALL {
+        for section in root.sections(sensor.name())? {
+            read_rules(&section, sensor, rate_hz, &mut rules)?;
+        }
+    }
+    Ok(Contamination { name: source.path().to_owned(), rules })
+}
+
+/// Keys legal beside `operation` and `replicates`.
+fn legal(operation: &str) -> Option<&'static [&'static str]> {
+    Some(match operation {
+        "step" => &["amplitude", "at_share", "at_samples", "at_s"],
+        "replace" => &["share", "points", "sigma", "mean"],
+        "bursts" => {
+            &["count", "length_samples", "spacing_samples", "of_samples", "amplitude", "frequency_hz"]
+        }
+        "ar1" => &["phi", "sigma2"],
+        "scale" => &["process", "parameter", "factor"],
+        _ => return None,
+    })
+}
+
+fn read_rules(
+    section: &Section<'_>,
+    sensor: Sensor,
+    rate_hz: f64,
+    into: &mut Vec<Rule>,
+) -> Result<(), TomlError> {
+    let name = section.require_str("operation")?;
+    let Some(keys) = legal(name) else {
+        let hint = "operations: step, replace, bursts, ar1, scale".to_owned();
+        return Err(section.refuse("operation", "is not an operation", Some(hint)));
+    };
+    section.only(&[&["operation", "replicates"], keys].concat())?;
+    let replicates = section.u64s("replicates")?;
+    if replicates.as_ref().is_some_and(|r| r.is_empty() || r.contains(&0)) {
+        return Err(section.refuse(
+            "replicates",
+            "is not a list of replicates: they are counted from 1",
+            None,
+        ));
+    }
+    let listed = replicates.as_ref().map_or(1, Vec::len);
+    for i in 0..listed {
+        let entry = Entry { section, i, listed };
+        let operation = match name {
+            "step" => entry.step(rate_hz)?,
+            "replace" => entry.replace()?,
+            "bursts" => entry.bursts()?,
+            "ar1" => entry.ar1()?,
+            _ => entry.scale()?,
+        };
+        into.push(Rule { sensor, replicate: replicates.as_ref().map(|r| r[i]), operation });
+    }
+    Ok(())
+}
+
+/// One replicate's share of a rule.
+struct Entry<'a> {
+    section: &'a Section<'a>,
+    i: usize,
+    listed: usize,
+}
+
+impl Entry<'_> {
+    /// A number, or this replicate's of a list, in a domain.
+    fn number(
+        &self,
+        key: &str,
+        domain: &str,
+        inside: impl Fn(f64) -> bool,
+    ) -> Result<Option<f64>, TomlError> {
+        let value = if self.section.is_list(key) {
+            let values = self.section.f64s(key)?.unwrap_or_default();
+            if values.len() != self.listed {
+                let reason = format!("has {} values for {} replicates", values.len(), self.listed);
+                return Err(self.section.refuse(key, reason, None));
+            }
+            Some(values[self.i])
+        } else {
+            self.section.f64(key)?
+        };
+        match value {
+            Some(v) if !inside(v) => Err(self.section.refuse(key, format!("is not {domain}"), None)),
+            value => Ok(value),
+        }
+    }
+
+    fn require(&self, key: &str, domain: &str, inside: impl Fn(f64) -> bool) -> Result<f64, TomlError> {
+        self.number(key, domain, inside)?.ok_or_else(|| self.section.missing(key))
+    }
+
+    fn any(&self, key: &str) -> Result<f64, TomlError> {
+        self.require(key, "a number", |_| true)
+    }
+
+    fn share(&self, key: &str) -> Result<Option<f64>, TomlError> {
+        self.number(key, "between 0 and 1", |v| (0.0..=1.0).contains(&v))
+    }
+
+    /// Refuses more than one of several ways to say the same.
+    fn at_most_one(&self, keys: &[&str]) -> Result<(), TomlError> {
+        let mut given = keys.iter().filter(|k| self.section.has(k));
+        match (given.next(), given.next()) {
+            (Some(first), Some(second)) => {
+                Err(self.section.refuse(second, format!("says again what \"{first}\" says"), None))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn step(&self, rate_hz: f64) -> Result<Operation, TomlError> {
+        self.at_most_one(&["at_share", "at_samples", "at_s"])?;
+        let seconds = self.number("at_s", "a time ≥ 0", |v| v >= 0.0)?;
+        let at = match (self.section.u64("at_samples")?, seconds) {
+            (Some(samples), _) => Extent::Samples(samples),
+            (None, Some(s)) => Extent::Samples((s * rate_hz).round() as u64),
+            (None, None) => Extent::Share(self.share("at_share")?.unwrap_or(0.5)),
+        };
+        Ok(Operation::Step { at, amplitude: self.any("amplitude")? })
+    }
+
+    fn replace(&self) -> Result<Operation, TomlError> {
+        self.at_most_one(&["share", "points"])?;
+        let points = match (self.section.u64("points")?, self.share("share")?) {
+            (Some(points), _) => Extent::Samples(points),
+            (None, Some(share)) => Extent::Share(share),
+            (None, None) => return Err(self.section.missing_one_of(&["share", "points"])),
+        };
+        let mean = match self.section.str("mean") {
+            Ok(None | Some("signal")) => None,
+            Ok(Some(_)) => {
+                return Err(self.section.refuse("mean", "is neither a number nor \"signal\"", None));
+            }
+            Err(_) => Some(self.any("mean")?),
+        };
+        let sigma = self.require("sigma", "a number ≥ 0", |v| v >= 0.0)?;
+        Ok(Operation::Replace { points, mean, sigma })
+    }
+
+    fn bursts(&self) -> Result<Operation, TomlError> {
+        let whole = |key, default| Ok::<u64, TomlError>(self.section.u64(key)?.unwrap_or(default));
+        let (count, length) = (whole("count", 5)?, whole("length_samples", 500)?);
+        let spacing = whole("spacing_samples", 90_000)?;
+        let of = self.number("of_samples", "a number of samples > 0", |v| v >= 1.0)?;
+        let extent = |samples: u64| match of {
+            Some(of) => Extent::Share(samples as f64 / of),
+            None => Extent::Samples(samples),
+        };
+        let frequency = self.number("frequency_hz", "a frequency > 0", |v| v > 0.0)?;
+        Ok(Operation::Bursts {
+            count,
+            length: extent(length),
+            spacing: extent(spacing),
+            amplitude: self.any("amplitude")?,
+            frequency_hz: frequency.unwrap_or(5.0),
+        })
+    }
+
+    fn ar1(&self) -> Result<Operation, TomlError> {
+        let (phi, sigma2) = (self.any("phi")?, self.any("sigma2")?);
+        let refuse = |e: crate::noise::ParameterError| {
+            self.section.refuse(e.parameter, format!("is not {}", e.domain), None)
+        };
+        Ok(Operation::Ar1(Ar1::new(phi, sigma2).map_err(refuse)?))
+    }
+
+    fn scale(&self) -> Result<Operation, TomlError> {
+        let process = self.section.require_str("process")?.to_owned();
+        let parameter = self.section.require_str("parameter")?.to_owned();
+        let factor = self.require("factor", "a number ≥ 0", |v| v >= 0.0)?;
+        Ok(Operation::Scale { process, parameter, factor })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::imu::{Axis, Channel};
+
+    fn rules(name: &str, sensor: Sensor, replicate: u64) -> Vec<Operation> {
+        let of = |r: &Rule| r.sensor == sensor && r.replicate.is_none_or(|only| only == replicate);
+        find(name, 100.0).unwrap().rules.into_iter().filter(of).map(|r| r.operation).collect()
+    }
+
+    fn refusal(text: &str) -> String {
+        let e = parse(&Source::new("c.toml", text), 100.0).unwrap_err();
+        format!("{e} | {}", e.hint().unwrap_or_default())
+    }
+
+    /// The paper's items, by the numbers printed there.
+    #[test]
+    fn presets_are_the_papers() {
+        assert!(rules("section5-I", Sensor::Accel, 1).is_empty());
+        let half = Extent::Share(0.5);
+        let replace = |sigma| Operation::Replace { points: Extent::Share(0.01), mean: None, sigma };
+        let second = rules("section5-II", Sensor::Accel, 6);
+        assert_eq!(second[0], Operation::Step { at: half, amplitude: 0.0060 });
+        assert_eq!(second[1], replace(0.16));
+        assert_eq!(second.len(), 3);
+        assert_eq!(
+            rules("section5-II", Sensor::Gyro, 7)[0],
+            Operation::Step { at: half, amplitude: 0.00055 }
+        );
+        assert_eq!(rules("section5-II", Sensor::Gyro, 7)[1], replace(0.026));
+
+        let abnormal = rules("section5-III", Sensor::Accel, 8);
+        assert_eq!(abnormal[0], Operation::Step { at: half, amplitude: 0.0045 });
+        assert_eq!(abnormal[1], replace(0.18));
+        assert_eq!(abnormal[3], Operation::Ar1(Ar1::new(0.975_761, 3.397_832e-7).unwrap()));
+        let abnormal = rules("section5-III", Sensor::Gyro, 5);
+        assert_eq!(abnormal[1], replace(0.026));
+        assert_eq!(abnormal[3], Operation::Ar1(Ar1::new(0.976_658_0, 5.313_189e-9).unwrap()));
+        assert_eq!(rules("section5-III", Sensor::Gyro, 2)[1], replace(0.022));
+        for replicate in [1, 2, 4, 5, 6, 7] {
+            let of = |name| rules(name, Sensor::Accel, replicate);
+            assert_eq!(of("section5-III"), of("section5-II"), "{replicate}");
+        }
+
+        let bursts = |replicate| rules("section4-III", Sensor::Accel, replicate).len();
+        assert_eq!([1, 2, 3, 4, 8].map(bursts), [3, 3, 3, 2, 3]);
+        assert!(
+            matches!(&rules("section4-III", Sensor::Accel, 8)[2], Operation::Scale { factor, .. } if *factor == 4.0)
+        );
+        for name in names() {
+            assert!(!find(name, 100.0).unwrap().touches(9), "{name}: the ninth replicate stays clean");
+        }
+    }
+
+    #[test]
+    fn presets_fit_the_papers_record_and_short_ones() {
+        let channel = Channel { sensor: Sensor::Gyro, axis: Axis::Z };
+        for n in [524_284, 4096] {
+            let mut x = vec![0.0; n];
+            let preset = find("section5-III", 100.0).unwrap();
+            preset.apply(&mut x, channel, 5, 100.0, 1).unwrap();
+            assert!(x.iter().all(|v| v.is_finite()) && x[n - 1] > 0.0005);
+        }
+    }
+
+    #[test]
+    fn a_file_says_the_same_in_other_units() {
+        let text = "[[gyro]]\noperation = \"step\"\nat_s = 2\namplitude = 1\n[[gyro]]\noperation = \"replace\"\npoints = 7\nsigma = 1\nmean = 3.0\n";
+        let rules = parse(&Source::new("c.toml", text), 50.0).unwrap().rules;
+        assert_eq!(rules[0].operation, Operation::Step { at: Extent::Samples(100), amplitude: 1.0 });
+        assert_eq!(rules[0].replicate, None);
+        let replace = Operation::Replace { points: Extent::Samples(7), mean: Some(3.0), sigma: 1.0 };
+        assert_eq!(rules[1].operation, replace);
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        let step = |keys: &str| refusal(&format!("[[accel]]\noperation = \"step\"\n{keys}\n"));
+        assert_eq!(
+            step("amplitud = 1"),
+            "c.toml, line 3: unknown key \"accel[1].amplitud\" | did you mean \"amplitude\"?"
+        );
+        assert_eq!(step("at_s = 1"), "c.toml, line 1: \"accel[1].amplitude\" is missing | ");
+        assert_eq!(
+            step("at_s = -1\namplitude = 1"),
+            "c.toml, line 3: \"accel[1].at_s\" = -1 is not a time ≥ 0 | "
+        );
+        assert_eq!(
+            step("at_s = 1\nat_share = 0.5\namplitude = 1"),
+            "c.toml, line 3: \"accel[1].at_s\" = 1 says again what \"at_share\" says | "
+        );
+        assert_eq!(
+            step("amplitude = [1, 2]\nreplicates = [1, 2, 3]"),
+            "c.toml, line 3: \"accel[1].amplitude\" = [1, 2] has 2 values for 3 replicates | "
+        );
+        assert_eq!(
+            step("amplitude = 1\nreplicates = [0]"),
+            "c.toml, line 4: \"accel[1].replicates\" = [0] is not a list of replicates: they are counted from 1 | "
+        );
+        assert_eq!(
+            refusal("[[gyro]]\noperation = \"jump\"\n"),
+            "c.toml, line 2: \"gyro[1].operation\" = \"jump\" is not an operation | operations: step, replace, bursts, ar1, scale"
+        );
+        assert_eq!(
+            refusal("[[gyro]]\noperation = \"replace\"\nsigma = 1\n"),
+            "c.toml, line 1: \"gyro[1].share\" or \"gyro[1].points\" is missing | "
+        );
+        assert_eq!(
+            refusal("[[gyro]]\noperation = \"ar1\"\nphi = 1\nsigma2 = 1\n"),
+            "c.toml, line 3: \"gyro[1].phi\" = 1 is not between −1 and 1 (exclusive) | "
+        );
+        assert_eq!(meant("section5-2"), Some("section5-I"));
+    }
+}

@@ -1,0 +1,447 @@
+//! Contamination: what goes wrong in a laboratory, done to signals on purpose, in doses and with a seed.
+//!
+//! Steps, replaced points and vibrations as in [Minaretzis](crate::bibliography::Minaretzis24), Sections IV
+//! and V. Whatever the order in which rules are given, they are applied in this one: scaled parameters
+//! (before synthesis), added AR1, step, replacement, bursts.
+
+use super::{Ar1, Composite, Process, Synthesizer};
+use crate::imu::{Channel, Sensor};
+use crate::rng::StreamKey;
+use rand::RngExt;
+use rand_distr::StandardNormal;
+
+/// A number of samples, given as such or as a share of the record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Extent {
+    /// That many samples.
+    Samples(u64),
+    /// That share of the record's samples, rounded down.
+    Share(f64),
+}
+
+impl Extent {
+    /// In samples of a record of `length` samples.
+    #[must_use]
+    pub fn of(self, length: usize) -> usize {
+        match self {
+            Self::Samples(n) => usize::try_from(n).unwrap_or(usize::MAX),
+            // A share written as a ratio of whole numbers must not lose one to rounding.
+            Self::Share(share) => (share * length as f64 + 1e-6) as usize,
+        }
+    }
+}
+
+/// What is done to a signal.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Operation {
+    /// Multiplies a parameter of the model, before synthesis.
+    Scale {
+        /// Label of the process ([`Composite::labels`]).
+        process: String,
+        /// Name of the parameter.
+        parameter: String,
+        /// Factor.
+        factor: f64,
+    },
+    /// Adds an AR1.
+    Ar1(Ar1),
+    /// Adds a constant from a sample on.
+    Step {
+        /// First sample with it.
+        at: Extent,
+        /// The constant (m/s² or rad/s).
+        amplitude: f64,
+    },
+    /// Replaces samples, chosen at random, by white noise.
+    Replace {
+        /// How many.
+        points: Extent,
+        /// Mean of the noise; none: the signal's mean.
+        mean: Option<f64>,
+        /// Standard deviation of the noise (m/s² or rad/s).
+        sigma: f64,
+    },
+    /// Adds vibrations: sines that begin with phase 0 at multiples of the spacing.
+    Bursts {
+        /// How many.
+        count: u64,
+        /// Length of each.
+        length: Extent,
+        /// From one's beginning to the next's, and from the record's beginning to the first's.
+        spacing: Extent,
+        /// Amplitude (m/s² or rad/s).
+        amplitude: f64,
+        /// Frequency (Hz).
+        frequency_hz: f64,
+    },
+}
+
+/// An operation and the signals it is done to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rule {
+    /// Sensor, all its axes.
+    pub sensor: Sensor,
+    /// Replicate, counted from 1 as in file names; none: every one.
+    pub replicate: Option<u64>,
+    /// What is done.
+    pub operation: Operation,
+}
+
+/// A rule that cannot be applied.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ContaminationError {
+    /// The record is too short for it.
+    #[error("{what} needs {needed} samples, the record has {samples}")]
+    TooShort {
+        /// Which operation.
+        what: &'static str,
+        /// Samples it reaches to.
+        needed: usize,
+        /// Samples of the record.
+        samples: usize,
+    },
+    /// The model has no such process or parameter.
+    #[error("{channel} has no {process} {parameter} to scale, only {}", known.join(", "))]
+    NothingToScale {
+        /// The axis.
+        channel: Channel,
+        /// Label asked for.
+        process: String,
+        /// Parameter asked for.
+        parameter: String,
+        /// What there is.
+        known: Vec<String>,
+    },
+    /// The scaled parameter leaves its domain.
+    #[error("scaled: {0}")]
+    Scaled(#[from] super::ParameterError),
+}
+
+/// A named set of rules.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Contamination {
+    /// Name, or file it is from.
+    pub name: String,
+    /// The rules.
+    pub rules: Vec<Rule>,
+}
+
+impl Contamination {
+    /// The rules for a signal of a replicate (counted from 1), in the order of application.
+    fn rules_for(&self, channel: Channel, replicate: u64) -> Vec<&Operation> {
+        let applies =
+            |r: &&Rule| r.sensor == channel.sensor && r.replicate.is_none_or(|only| only == replicate);
+        let mut operations: Vec<&Operation> =
+            self.rules.iter().filter(applies).map(|r| &r.operation).collect();
+        operations.sort_by_key(|o| o.stage());
+        operations
+    }
+
+    /// Whether anything is done to a replicate (counted from 1).
+    #[must_use]
+    pub fn touches(&self, replicate: u64) -> bool {
+        self.rules.iter().any(|r| r.replicate.is_none_or(|only| only == replicate))
+    }
+
+    /// Scales the parameters of a replicate's (counted from 1) axis, before synthesis.
+    ///
+    /// # Errors
+    /// When the model has no such parameter or the scaled one is outside its domain.
+    pub fn scale(
+        &self,
+        noise: &mut Composite,
+        channel: Channel,
+        replicate: u64,
+        rate_hz: f64,
+    ) -> Result<(), ContaminationError> {
+        for operation in self.rules_for(channel, replicate) {
+            if let Operation::Scale { process, parameter, factor } = operation {
+                scale(noise, channel, (process, parameter), *factor, rate_hz)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Contaminates the samples (m/s² or rad/s) of a replicate's (counted from 1) axis. What is random in
+    /// it depends on seed, replicate and axis, not on the other rules or the signal.
+    ///
+    /// # Errors
+    /// When the record is too short for a rule.
+    pub fn apply(
+        &self,
+        samples: &mut [f64],
+        channel: Channel,
+        replicate: u64,
+        rate_hz: f64,
+        seed: u64,
+    ) -> Result<(), ContaminationError> {
+        let source = channel.to_string();
+        let operations = self.rules_for(channel, replicate);
+        for (i, operation) in operations.iter().enumerate() {
+            // A second operation of a kind draws from another stream.
+            let same = operations[..i].iter().filter(|o| o.stage() == operation.stage()).count();
+            let process = format!("{}_{}", operation.name(), same + 1);
+            let run = replicate.wrapping_sub(1);
+            let key = StreamKey { seed, scenario: "contamination", run, source: &source, process: &process };
+            operation.apply(samples, rate_hz, key)?;
+        }
+        Ok(())
+    }
+}
+
+impl Operation {
+    /// Name in files.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Scale { .. } => "scale",
+            Self::Ar1(_) => "ar1",
+            Self::Step { .. } => "step",
+            Self::Replace { .. } => "replace",
+            Self::Bursts { .. } => "bursts",
+        }
+    }
+
+    const fn stage(&self) -> u8 {
+        match self {
+            Self::Scale { .. } => 0,
+            Self::Ar1(_) => 1,
+            Self::Step { .. } => 2,
+            Self::Replace { .. } => 3,
+            Self::Bursts { .. } => 4,
+        }
+    }
+
+    fn apply(&self, x: &mut [f64], rate_hz: f64, key: StreamKey<'_>) -> Result<(), ContaminationError> {
+        let fits = |what, needed| match needed <= x.len() {
+            true => Ok(()),
+            false => Err(ContaminationError::TooShort { what, needed, samples: x.len() }),
+        };
+        match self {
+            Self::Scale { .. } => {}
+            Self::Ar1(ar1) => add_ar1(x, *ar1, key),
+            Self::Step { at, amplitude } => {
+                let at = at.of(x.len());
+                fits("a step", at)?;
+                x[at..].iter_mut().for_each(|v| *v += amplitude);
+            }
+            Self::Replace { points, mean, sigma } => {
+                let points = points.of(x.len());
+                fits("the replacement of points", points)?;
+                let mean = mean.unwrap_or_else(|| x.iter().sum::<f64>() / x.len().max(1) as f64);
+                replace(x, points, mean, *sigma, key);
+            }
+            Self::Bursts { count, length, spacing, amplitude, frequency_hz } => {
+                let (length, spacing) = (length.of(x.len()), spacing.of(x.len()));
+                let count = usize::try_from(*count).unwrap_or(usize::MAX);
+                fits("a train of bursts", count.saturating_mul(spacing).saturating_add(length))?;
+                let step = std::f64::consts::TAU * frequency_hz / rate_hz;
+                for start in (1..=count).map(|i| i * spacing) {
+                    for (k, v) in x[start..start + length].iter_mut().enumerate() {
+                        *v += amplitude * (step * k as f64).sin();
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+fn scale(
+    noise: &mut Composite,
+    channel: Channel,
+    (label, parameter): (&str, &str),
+    factor: f64,
+    rate_hz: f64,
+) -> Result<(), ContaminationError> {
+    let labels = noise.labels();
+    let scaled = labels.iter().position(|l| l == label).and_then(|at| {
+        let process = &noise.processes[at];
+        let value = process.parameters().into_iter().find(|(n, _)| *n == parameter)?.1;
+        Some((at, process.with_parameter(parameter, factor * value, rate_hz)?))
+    });
+    match scaled {
+        Some((at, process)) => {
+            noise.processes[at] = process?;
+            Ok(())
+        }
+        None => {
+            let names = |(p, l): (&Process, &String)| {
+                p.parameters().into_iter().map(|(n, _)| format!("{l} {n}")).collect::<Vec<_>>()
+            };
+            let known = noise.processes.iter().zip(&labels).flat_map(names).collect();
+            let (process, parameter) = (label.to_owned(), parameter.to_owned());
+            Err(ContaminationError::NothingToScale { channel, process, parameter, known })
+        }
+    }
+}
+
+fn add_ar1(x: &mut [f64], ar1: Ar1, key: StreamKey<'_>) {
+    let mut source = Synthesizer::new(&Composite::new(vec![Process::Ar1(ar1)]), key);
+    let mut block = [0.0; 1024];
+    for part in x.chunks_mut(block.len()) {
+        let noise = &mut block[..part.len()];
+        source.fill(noise);
+        part.iter_mut().zip(noise).for_each(|(v, n)| *v += *n);
+    }
+}
+
+/// Replaces `points` distinct samples, every choice equally likely (selection sampling, Knuth's
+/// algorithm S: the numbers drawn do not depend on a library's method).
+fn replace(x: &mut [f64], points: usize, mean: f64, sigma: f64, key: StreamKey<'_>) {
+    let mut g = key.generator();
+    let mut wanted = points;
+    let n = x.len();
+    for (i, v) in x.iter_mut().enumerate() {
+        if wanted == 0 {
+            break;
+        }
+        if g.random::<f64>() * ((n - i) as f64) < wanted as f64 {
+            *v = mean + sigma * g.sample::<f64, _>(StandardNormal);
+            wanted -= 1;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::imu::Axis;
+    use crate::noise::{RandomWalk, White};
+
+    const X: Channel = Channel { sensor: Sensor::Accel, axis: Axis::X };
+
+    fn one(operation: Operation) -> Contamination {
+        let rules = vec![Rule { sensor: Sensor::Accel, replicate: Some(2), operation }];
+        Contamination { name: "test".into(), rules }
+    }
+
+    fn applied(operation: Operation, n: usize) -> Vec<f64> {
+        let mut x = vec![0.0; n];
+        one(operation).apply(&mut x, X, 2, 100.0, 1).unwrap();
+        x
+    }
+
+    #[test]
+    fn shares_of_the_papers_records() {
+        let of = |share: f64| Extent::Share(share).of(524_284);
+        assert_eq!((of(0.00025), of(0.01), of(0.5)), (131, 5242, 262_142));
+        assert_eq!((of(90_000.0 / 524_284.0), of(500.0 / 524_284.0)), (90_000, 500));
+        assert_eq!(Extent::Samples(7).of(3), 7);
+    }
+
+    #[test]
+    fn a_step_is_from_the_middle_on() {
+        let step = Operation::Step { at: Extent::Share(0.5), amplitude: 2.0 };
+        assert_eq!(applied(step, 5), [0.0, 0.0, 2.0, 2.0, 2.0]);
+    }
+
+    /// Mean and variance of the replaced samples within 5 standard deviations; exactly as many as asked,
+    /// half of them in the first half (binomial-like, hypergeometric: sd below √n/2).
+    #[test]
+    fn replacement_is_exact_in_number_and_random_in_place() {
+        let mut x = vec![100.0; 200_000];
+        let replace = Operation::Replace { points: Extent::Share(0.1), mean: Some(-1.0), sigma: 0.5 };
+        one(replace).apply(&mut x, X, 2, 100.0, 1).unwrap();
+        let replaced: Vec<f64> = x.iter().copied().filter(|v| *v < 50.0).collect();
+        assert_eq!(replaced.len(), 20_000);
+        let n = replaced.len() as f64;
+        let mean = replaced.iter().sum::<f64>() / n;
+        let variance = replaced.iter().map(|v| (v + 1.0).powi(2)).sum::<f64>() / n;
+        assert!((mean + 1.0).abs() < 5.0 * 0.5 / n.sqrt());
+        assert!((variance - 0.25).abs() < 5.0 * 0.25 * (2.0 / n).sqrt());
+        let first_half = x[..100_000].iter().filter(|v| **v < 50.0).count() as f64;
+        assert!((first_half - n / 2.0).abs() < 5.0 * n.sqrt() / 2.0);
+    }
+
+    #[test]
+    fn replacement_keeps_the_mean_of_the_signal_if_none_is_given() {
+        let mut x = vec![7.0; 1000];
+        one(Operation::Replace { points: Extent::Samples(1000), mean: None, sigma: 0.0 })
+            .apply(&mut x, X, 2, 100.0, 1)
+            .unwrap();
+        assert_eq!(x, [7.0; 1000]);
+    }
+
+    #[test]
+    fn bursts_are_sines_at_multiples_of_the_spacing() {
+        let bursts = Operation::Bursts {
+            count: 2,
+            length: Extent::Samples(40),
+            spacing: Extent::Samples(100),
+            amplitude: 0.02,
+            frequency_hz: 5.0,
+        };
+        let x = applied(bursts.clone(), 240);
+        // 5 Hz at 100 Hz: 20 samples a period.
+        for (k, v) in x.iter().enumerate() {
+            let inside = (100..140).contains(&k) || (200..240).contains(&k);
+            let expected =
+                if inside { 0.02 * (std::f64::consts::TAU * (k % 20) as f64 / 20.0).sin() } else { 0.0 };
+            assert!((v - expected).abs() < 1e-15, "{k}");
+        }
+        let mut short = vec![0.0; 239];
+        let e = one(bursts).apply(&mut short, X, 2, 100.0, 1).unwrap_err();
+        assert_eq!(e.to_string(), "a train of bursts needs 240 samples, the record has 239");
+    }
+
+    #[test]
+    fn the_added_ar1_has_its_variance() {
+        let ar1 = Ar1::new(0.9, 1.9).unwrap();
+        let x = applied(Operation::Ar1(ar1), 100_000);
+        let variance = x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64;
+        // Bartlett: var of the sample variance 2γ₀²/n · (1 + φ²)/(1 − φ²).
+        let bound = 5.0 * 10.0 * (2.0 / 1e5 * 1.81 / 0.19_f64).sqrt();
+        assert!((variance - 10.0).abs() < bound, "{variance}");
+    }
+
+    #[test]
+    fn the_order_is_fixed_and_other_signals_are_untouched() {
+        let replace = Operation::Replace { points: Extent::Share(1.0), mean: Some(0.0), sigma: 0.0 };
+        let step = Operation::Step { at: Extent::Samples(0), amplitude: 1.0 };
+        let rule = |operation| Rule { sensor: Sensor::Accel, replicate: Some(2), operation };
+        let both = Contamination { name: String::new(), rules: vec![rule(replace), rule(step)] };
+        let mut x = vec![5.0; 4];
+        both.apply(&mut x, X, 2, 100.0, 1).unwrap();
+        assert_eq!(x, [0.0; 4], "the step comes before the replacement");
+        let gyro = Channel { sensor: Sensor::Gyro, axis: Axis::X };
+        for (channel, replicate) in [(X, 1), (gyro, 2)] {
+            let mut x = vec![5.0; 4];
+            both.apply(&mut x, channel, replicate, 100.0, 1).unwrap();
+            assert_eq!(x, [5.0; 4]);
+        }
+        assert!(both.touches(2) && !both.touches(1));
+    }
+
+    #[test]
+    fn parameters_are_scaled_for_their_replicate_only() {
+        let noise = || {
+            let (white, walk) = (White::new(1.0).unwrap(), RandomWalk::new(3.0).unwrap());
+            Composite::new(vec![Process::White(white), Process::RandomWalk(walk)])
+        };
+        let scale = |process: &str| {
+            let (process, parameter) = (process.to_owned(), "gamma2".to_owned());
+            one(Operation::Scale { process, parameter, factor: 4.0 })
+        };
+        let (mut second, mut third) = (noise(), noise());
+        scale("RW").scale(&mut second, X, 2, 100.0).unwrap();
+        scale("RW").scale(&mut third, X, 3, 100.0).unwrap();
+        assert_eq!(second.processes[1].parameters(), [("gamma2", 12.0)]);
+        assert_eq!(third, noise());
+        let e = scale("RW_2").scale(&mut second, X, 2, 100.0).unwrap_err();
+        assert_eq!(e.to_string(), "accel.x has no RW_2 gamma2 to scale, only WN sigma2, RW gamma2");
+    }
+
+    #[test]
+    fn the_same_points_are_replaced_whatever_else_is_done() {
+        let replace = Operation::Replace { points: Extent::Samples(10), mean: Some(0.0), sigma: 1.0 };
+        let alone = applied(replace.clone(), 1000);
+        let mut with_bursts = one(replace);
+        let (length, spacing) = (Extent::Samples(1), Extent::Samples(999));
+        let bursts = Operation::Bursts { count: 1, length, spacing, amplitude: 0.0, frequency_hz: 1.0 };
+        with_bursts.rules.insert(0, Rule { sensor: Sensor::Accel, replicate: None, operation: bursts });
+        let mut x = vec![0.0; 1000];
+        with_bursts.apply(&mut x, X, 2, 100.0, 1).unwrap();
+        assert_eq!(x, alone);
+    }
+}
