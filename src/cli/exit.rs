@@ -1,6 +1,7 @@
 //! What went wrong, as the user reads it, and the exit code it means.
 
 use nav_sim::data::atomic::WriteError;
+use nav_sim::data::recordings::RecordingError;
 use nav_sim::data::toml_file::TomlError;
 use std::fmt;
 
@@ -66,6 +67,13 @@ impl From<TomlError> for Failure {
 impl From<WriteError> for Failure {
     fn from(e: WriteError) -> Self {
         let failure = if e.is_usage() { Self::input(&e) } else { Self::could_not(&e) };
+        failure.maybe_hint(e.hint())
+    }
+}
+
+impl From<RecordingError> for Failure {
+    fn from(e: RecordingError) -> Self {
+        let failure = if e.is_io() { Self::could_not(&e) } else { Self::input(&e) };
         failure.maybe_hint(e.hint())
     }
 }

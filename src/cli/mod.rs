@@ -1,5 +1,6 @@
 //! The command line: one file per subcommand, each its `Args` and a `run(args, &Session)`.
 
+mod check;
 mod common;
 mod compare;
 mod completions;
@@ -7,6 +8,7 @@ mod exit;
 mod man;
 mod printer;
 mod progress;
+mod read;
 mod schema;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -29,6 +31,7 @@ struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
+    Check(check::Args),
     Compare(compare::Args),
     Completions(completions::Args),
     Man(man::Args),
@@ -38,6 +41,7 @@ enum Command {
 impl Command {
     fn run(self, session: &Session) -> Result<(), Failure> {
         match self {
+            Self::Check(args) => check::run(&args, session),
             Self::Compare(args) => compare::run(&args, session),
             Self::Completions(args) => completions::run(&args, session),
             Self::Man(args) => man::run(&args, session),

@@ -1,0 +1,118 @@
+//! `nav-sim check`: whether a file is what it should be.
+
+use super::{Failure, Session, read};
+use nav_sim::data::scenario_file;
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// Check scenario, model, trajectory and recording files without running anything
+///
+/// What a file is follows from its contents: a TOML with [accel] or [gyro] is a noise model, one with
+/// segments or waypoints a motion profile, any other a scenario; a table with lat_deg or n_m is a
+/// trajectory, any other table or .npy a static recording.
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim check calib_data/consumer_mems.toml
+  nav-sim check trajectories/land_vehicle.toml calib_data/tactical.toml
+  nav-sim init study && nav-sim check study/scenario.toml")]
+pub(crate) struct Args {
+    /// Files
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+}
+
+pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    for path in &args.files {
+        let found = check(path, session)?;
+        session.printer.result(&format!("{}: {found}", path.display()));
+    }
+    Ok(())
+}
+
+/// Reads a file as what it is, and says what was found.
+fn check(path: &Path, session: &Session) -> Result<String, Failure> {
+    match kind(path)? {
+        Kind::Scenario => {
+            let scenario = scenario_file::read(path)?;
+            Ok(format!("a scenario of {} runs", scenario.run.runs))
+        }
+        Kind::Model => {
+            let file = read::model(path, session)?;
+            let labels: Vec<String> = file.model.axes.iter().map(|axis| axis.labels().join(" + ")).collect();
+            let (accel, gyro) = (&labels[0], &labels[3]);
+            Ok(format!("a noise model at {} Hz, accel {accel}, gyro {gyro}", file.model.rate_hz))
+        }
+        Kind::Trajectory => {
+            let trajectory = read::trajectory(path, session)?;
+            let seconds = trajectory.end_s() - trajectory.start_s();
+            Ok(format!("a trajectory of {seconds} s"))
+        }
+        Kind::Recording => {
+            let recordings = read::recordings(&[path.to_owned()], session)?;
+            let one = |r: &nav_sim::imu::Recording| {
+                format!("{} channels of {} samples at {} Hz", r.signals.len(), r.len(), r.rate_hz)
+            };
+            Ok(format!("static, {}", recordings.iter().map(one).collect::<Vec<_>>().join("; ")))
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Scenario,
+    Model,
+    Trajectory,
+    Recording,
+}
+
+fn kind(path: &Path) -> Result<Kind, Failure> {
+    let name = path.to_string_lossy().to_lowercase();
+    if path.is_dir() || name.ends_with(".npy") {
+        return Ok(Kind::Recording);
+    }
+    let error = |e| Failure::could_not(format!("{}: {e}", path.display()));
+    let file = std::fs::File::open(path).map_err(error)?;
+    let mut reader: Box<dyn Read> =
+        if name.ends_with(".gz") { Box::new(flate2::read::GzDecoder::new(file)) } else { Box::new(file) };
+    let mut head = Vec::new();
+    reader.by_ref().take(HEAD).read_to_end(&mut head).map_err(error)?;
+    let text = String::from_utf8_lossy(&head);
+    Ok(if name.ends_with(".toml") { toml_kind(&text) } else { table_kind(&text) })
+}
+
+/// Bytes of a file that tell what it is: all of a TOML, the header of a table.
+const HEAD: u64 = 1 << 20;
+
+fn toml_kind(text: &str) -> Kind {
+    // What does not parse is read as a scenario, whose reader says where it is wrong.
+    let table: toml::Table = text.parse().unwrap_or_default();
+    let has = |keys: &[&str]| keys.iter().any(|key| table.contains_key(*key));
+    if has(&["accel", "gyro"]) {
+        Kind::Model
+    } else if has(&["segment", "waypoint", "start", "vehicle"]) {
+        Kind::Trajectory
+    } else {
+        Kind::Scenario
+    }
+}
+
+fn table_kind(text: &str) -> Kind {
+    let position = |line: &str| line.contains("lat_deg") || line.contains("n_m") && line.contains("e_m");
+    if text.lines().take(20).any(position) { Kind::Trajectory } else { Kind::Recording }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn contents_tell_the_kind() {
+        assert_eq!(toml_kind("[accel]\nprocesses = []"), Kind::Model);
+        assert_eq!(toml_kind("start = {}\nsegment = []"), Kind::Trajectory);
+        assert_eq!(toml_kind("[run]\nruns = 3"), Kind::Scenario);
+        assert_eq!(toml_kind("= broken"), Kind::Scenario);
+        assert_eq!(table_kind("# origin\nt_s, lat_deg, lon_deg"), Kind::Trajectory);
+        assert_eq!(table_kind("t_s,accel_x_m_s2,gyro_z_rad_s"), Kind::Recording);
+    }
+}

@@ -1,0 +1,50 @@
+//! Reading inputs for commands: doubts are said, refusals become failures.
+
+use super::{Failure, Session};
+use nav_sim::data::model_file::{self, ModelFile};
+use nav_sim::data::recordings::{self, ReadOptions};
+use nav_sim::data::trajectory_file::{self, TrajectoryFileError};
+use nav_sim::imu::Recording;
+use nav_sim::trajectory::Trajectory;
+use std::path::{Path, PathBuf};
+
+impl From<TrajectoryFileError> for Failure {
+    fn from(e: TrajectoryFileError) -> Self {
+        let failure = match &e {
+            TrajectoryFileError::Io { .. } => Self::could_not(&e),
+            _ => Self::input(&e),
+        };
+        failure.maybe_hint(e.hint())
+    }
+}
+
+/// A trajectory.
+pub(super) fn trajectory(path: &Path, session: &Session) -> Result<Trajectory, Failure> {
+    let (trajectory, warnings) = trajectory_file::load(path, &trajectory_file::Options::default())?;
+    for warning in warnings {
+        session.printer.warn(&warning.to_string());
+    }
+    Ok(trajectory)
+}
+
+/// A model; axes that it does not name are said.
+pub(super) fn model(path: &Path, session: &Session) -> Result<ModelFile, Failure> {
+    let file = model_file::read(path)?;
+    for channel in &file.missing {
+        let shown = path.display();
+        session.printer.warn(&format!("{shown}: says nothing of {channel}, taken as free of noise"));
+    }
+    Ok(file)
+}
+
+/// Static recordings, every channel of them.
+pub(super) fn recordings(paths: &[PathBuf], session: &Session) -> Result<Vec<Recording>, Failure> {
+    let (recordings, report) = recordings::read(paths, &ReadOptions::default())?;
+    for warning in report.all_warnings() {
+        session.printer.warn(&warning);
+    }
+    for file in &report.files {
+        session.printer.detail(&file.to_string());
+    }
+    Ok(recordings)
+}
