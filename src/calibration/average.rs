@@ -1,6 +1,7 @@
 //! From the wavelet variances of K replicates to one curve
 //! ([Minaretzis](crate::bibliography::Minaretzis24), eqs. 4–8).
 
+use crate::imu::Axis;
 use crate::wavelet::{Curve, RobustVariance, interval};
 
 /// Which curve a model is fitted to.
@@ -16,11 +17,13 @@ pub enum Estimator {
     Gmwm,
     /// Robust wavelet variance of one replicate.
     Rgmwm,
+    /// A curve from elsewhere.
+    Given,
 }
 
 impl Estimator {
     /// All estimators.
-    pub const ALL: [Self; 5] = [Self::Awv, Self::SrAwv, Self::DrAwv, Self::Gmwm, Self::Rgmwm];
+    pub const ALL: [Self; 6] = [Self::Awv, Self::SrAwv, Self::DrAwv, Self::Gmwm, Self::Rgmwm, Self::Given];
 
     /// Name in files and on the command line.
     #[must_use]
@@ -31,6 +34,7 @@ impl Estimator {
             Self::DrAwv => "dr-awv",
             Self::Gmwm => "gmwm",
             Self::Rgmwm => "rgmwm",
+            Self::Given => "given",
         }
     }
 
@@ -43,7 +47,7 @@ impl Estimator {
     /// Whether it takes one replicate at a time.
     #[must_use]
     pub const fn is_single(self) -> bool {
-        matches!(self, Self::Gmwm | Self::Rgmwm)
+        matches!(self, Self::Gmwm | Self::Rgmwm | Self::Given)
     }
 }
 
@@ -73,6 +77,8 @@ impl Trim {
 pub struct Replicate {
     /// File name or other label.
     pub name: String,
+    /// The axis it is of, if known.
+    pub axis: Option<Axis>,
     /// Its length T.
     pub samples: usize,
     /// Classical wavelet variance at levels 1, 2, … (units²).
@@ -174,7 +180,7 @@ mod tests {
 
     fn replicate(samples: usize, classical: f64, robust: f64) -> Replicate {
         let robust = vec![RobustVariance { value: robust, status: Status::Ok }; 2];
-        Replicate { name: String::new(), samples, classical: vec![classical; 2], robust }
+        Replicate { name: String::new(), axis: None, samples, classical: vec![classical; 2], robust }
     }
 
     fn eight() -> Vec<Replicate> {

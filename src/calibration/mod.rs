@@ -1,18 +1,25 @@
 //! From replicate recordings to one noise model: AWV, SR-AWV, DR-AWV, GMWM.
 //!
-//! [`average()`] makes one curve of the replicates' wavelet variances, [`fit()`] finds the model whose
-//! theoretical wavelet variance is nearest to it.
+//! [`replicates()`] takes the wavelet variances of all signals, [`average()`] makes one curve of those of a
+//! group, [`fit()`] finds the model whose theoretical wavelet variance is nearest to it; [`calibrate`] is
+//! all of it but the first.
 
 mod average;
 mod bounded;
 mod fit;
+mod notes;
 mod objective;
 mod optimise;
+mod pipeline;
+mod replicates;
 mod search;
 mod spec;
 
 pub use average::{AverageError, Estimator, Replicate, Trim, average};
 pub use fit::{Fit, FitError, fit};
+pub use notes::{Share, correlation_time_s, notes, percent, shares};
 pub use objective::Weighting;
 pub use optimise::Termination;
+pub use pipeline::{CalibrationError, Cause, Outcome, Settings, calibrate, fit_curve};
+pub use replicates::{Group, Pool, SignalError, grouped, replicates};
 pub use spec::{Kind, ModelSpec, SpecError};

@@ -1,5 +1,6 @@
 //! What went wrong, as the user reads it, and the exit code it means.
 
+use nav_sim::calibration::SignalError;
 use nav_sim::data::atomic::WriteError;
 use nav_sim::data::recordings::RecordingError;
 use nav_sim::data::toml_file::TomlError;
@@ -75,5 +76,11 @@ impl From<RecordingError> for Failure {
     fn from(e: RecordingError) -> Self {
         let failure = if e.is_io() { Self::could_not(&e) } else { Self::input(&e) };
         failure.maybe_hint(e.hint())
+    }
+}
+
+impl From<SignalError> for Failure {
+    fn from(e: SignalError) -> Self {
+        Self::input(e)
     }
 }

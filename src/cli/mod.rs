@@ -1,15 +1,20 @@
 //! The command line: one file per subcommand, each its `Args` and a `run(args, &Session)`.
 
+mod calibrate;
 mod check;
 mod common;
 mod compare;
 mod completions;
 mod exit;
 mod man;
+mod parse;
 mod printer;
 mod progress;
 mod read;
+mod recordings;
 mod schema;
+mod tuning;
+mod wv;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::process::ExitCode;
@@ -31,6 +36,8 @@ struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
+    Wv(wv::Args),
+    Calibrate(calibrate::Args),
     Check(check::Args),
     Compare(compare::Args),
     Completions(completions::Args),
@@ -42,6 +49,8 @@ impl Command {
     fn run(self, session: &Session) -> Result<(), Failure> {
         match self {
             Self::Check(args) => check::run(&args, session),
+            Self::Wv(args) => wv::run(&args, session),
+            Self::Calibrate(args) => calibrate::run(&args, session),
             Self::Compare(args) => compare::run(&args, session),
             Self::Completions(args) => completions::run(&args, session),
             Self::Man(args) => man::run(&args, session),

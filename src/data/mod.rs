@@ -2,6 +2,8 @@
 
 pub mod atomic;
 pub mod contamination_file;
+pub mod curve_file;
+pub mod hash;
 pub mod model_file;
 pub mod npy;
 pub mod recordings;

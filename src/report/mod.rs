@@ -2,6 +2,8 @@
 //! every function makes a text, the command line writes it.
 
 mod comparison;
+mod curves;
+mod fits;
 mod html;
 mod manifest;
 mod number;
@@ -12,6 +14,11 @@ mod svg;
 mod tables;
 
 pub use comparison::{CandidateResult, ComparisonFile, Label, table_rows};
+pub use curves::{
+    CONFIDENCE, CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile, intervals_note,
+    signal_rows,
+};
+pub use fits::{FitEntry, FitsFile, describe};
 pub use manifest::{Input, Manifest, ModelNote};
 pub use run_directory::{OutputFile, json, run_directory};
 pub use tables::{TableError, epochs_csv, parse_epochs, parse_runs, runs_csv};

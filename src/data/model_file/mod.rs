@@ -14,9 +14,11 @@
 //! A sensor or axis that is not in the file is noise-free in [`ModelFile::model`] and listed in
 //! [`ModelFile::missing`].
 
+mod calibrated;
 mod read;
 mod write;
 
+pub use calibrated::CalibrationNote;
 pub use read::read;
 pub use write::{to_toml, write};
 

@@ -1,0 +1,175 @@
+//! What a fit says, and what it cannot say, in words.
+
+use super::average::{Estimator, Replicate};
+use super::fit::Fit;
+use crate::noise::{Composite, Process};
+use crate::wavelet::{Curve, Status};
+
+/// What a process contributes to a model's wavelet variance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Share {
+    /// Levels at which it is the largest part, ascending.
+    pub leads: Vec<u32>,
+    /// Its largest part of the whole, and the level of that.
+    pub largest: (f64, u32),
+}
+
+/// The share of each process of a model over some levels.
+#[must_use]
+pub fn shares(model: &Composite, levels: &[u32]) -> Vec<Share> {
+    let part = |process: &Process, level: u32| process.haar_wv(level) / model.haar_wv(level);
+    let leader = |level: u32| {
+        let parts = model.processes.iter().map(|p| part(p, level));
+        parts.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
+    };
+    let share = |(i, process): (usize, &Process)| Share {
+        leads: levels.iter().copied().filter(|level| leader(*level) == Some(i)).collect(),
+        largest: levels
+            .iter()
+            .map(|level| (part(process, *level), *level))
+            .fold((0.0, 0), |a, b| if b.0 > a.0 { b } else { a }),
+    };
+    model.processes.iter().enumerate().map(share).collect()
+}
+
+/// A part of a whole, in per cent.
+#[must_use]
+pub fn percent(part: f64) -> String {
+    match 100.0 * part {
+        p if p >= 9.5 => format!("{p:.0} %"),
+        p if p >= 0.95 => format!("{p:.1} %"),
+        p => format!("{p:.2} %"),
+    }
+}
+
+/// A process that is nowhere more than this part of the whole is hardly seen.
+const FAINT: f64 = 0.2;
+/// Scales missed by more standard deviations than this are told.
+const MISFIT: f64 = 4.0;
+/// The wavelet variance of an AR1 peaks at this many correlation times.
+const PEAK: f64 = 3.78;
+
+/// Remarks on a fit to the average of some replicates at a rate (Hz).
+#[must_use]
+pub fn notes(
+    fit: &Fit,
+    curve: &Curve,
+    estimator: Estimator,
+    replicates: &[Replicate],
+    rate_hz: f64,
+) -> Vec<String> {
+    let mut notes = Vec::new();
+    not_identifiable(fit, curve, rate_hz, &mut notes);
+    misfit(fit, curve, rate_hz, &mut notes);
+    if estimator.is_robust() {
+        robust_remarks(fit, curve, replicates, rate_hz, &mut notes);
+    }
+    notes
+}
+
+fn scale_s(level: u32, rate_hz: f64) -> f64 {
+    f64::from(level).exp2() / rate_hz
+}
+
+fn not_identifiable(fit: &Fit, curve: &Curve, rate_hz: f64, notes: &mut Vec<String>) {
+    for label in &fit.zero {
+        notes.push(format!("{label} is zero at the optimum: not identifiable from these data"));
+    }
+    for label in &fit.at_end {
+        notes.push(format!(
+            "{label} lies at the end of what can be searched: not identifiable from these data"
+        ));
+    }
+    let longest_s = curve.levels.last().map_or(0.0, |level| scale_s(*level, rate_hz));
+    let labels = fit.composite.labels();
+    let all = fit.composite.processes.iter().zip(&labels).zip(shares(&fit.composite, &curve.levels));
+    for ((process, label), share) in all {
+        if fit.zero.contains(label) || fit.at_end.contains(label) {
+            continue;
+        }
+        let (part, level) = share.largest;
+        if part < FAINT {
+            let (part, scale) = (percent(part), scale_s(level, rate_hz));
+            notes.push(format!(
+                "{label} is at most {part} of the wavelet variance (at {scale} s): weakly identifiable"
+            ));
+        }
+        if let Some(t_corr_s) = correlation_time_s(process, rate_hz)
+            && PEAK * t_corr_s > longest_s
+        {
+            notes.push(format!(
+                "{label}: its correlation time of {t_corr_s:.3} s is not identifiable from scales up to \
+                 {longest_s:.3} s; there it looks like a random walk"
+            ));
+        }
+    }
+}
+
+/// Correlation time of an AR1 or a GM at a rate (Hz), in seconds.
+#[must_use]
+pub fn correlation_time_s(process: &Process, rate_hz: f64) -> Option<f64> {
+    match process {
+        Process::Ar1(p) if p.phi() > 0.0 => Some(-1.0 / (p.phi().ln() * rate_hz)),
+        Process::GaussMarkov(p) => Some(1.0 / p.beta()),
+        _ => None,
+    }
+}
+
+fn misfit(fit: &Fit, curve: &Curve, rate_hz: f64, notes: &mut Vec<String>) {
+    let missed = curve.levels.iter().zip(&curve.wv).zip(&curve.edof).filter_map(|((level, nu), edof)| {
+        let relative = nu / fit.composite.haar_wv(*level) - 1.0;
+        let deviations = relative * (0.5 * edof).sqrt();
+        (deviations.abs() > MISFIT).then_some((*level, relative, deviations))
+    });
+    let missed: Vec<_> = missed.collect();
+    let Some(worst) = missed.iter().max_by(|a, b| a.2.abs().total_cmp(&b.2.abs())) else { return };
+    let (level, relative, deviations) = worst;
+    let side = if *relative > 0.0 { "above" } else { "below" };
+    notes.push(format!(
+        "the data disagree with this model at {} of {} scales, most at {} s: {} {side} it, {:.0} standard deviations",
+        missed.len(),
+        curve.levels.len(),
+        scale_s(*level, rate_hz),
+        percent(relative.abs()),
+        deviations.abs()
+    ));
+}
+
+fn robust_remarks(fit: &Fit, curve: &Curve, replicates: &[Replicate], rate_hz: f64, notes: &mut Vec<String>) {
+    let with = |status: Status| {
+        let has = |r: &&Replicate| r.robust[..curve.levels.len()].iter().any(|v| v.status == status);
+        replicates.iter().filter(has).count()
+    };
+    let (count, no_root, coarse) = (replicates.len(), with(Status::NoRoot), with(Status::Coarse));
+    if no_root > 0 {
+        notes.push(format!(
+            "{} scales without an admissible robust variance (too many outliers, or \
+             too few coefficients): the nearest value is used there",
+            have(no_root, count)
+        ));
+    }
+    if coarse > 0 {
+        notes.push(format!(
+            "{} scales most of whose coefficients are exactly zero (coarse quantisation)",
+            have(coarse, count)
+        ));
+    }
+    let leads = |(process, share): (&Process, Share)| {
+        matches!(process, Process::Quantization(_)) && !share.leads.is_empty()
+    };
+    if fit.composite.processes.iter().zip(shares(&fit.composite, &curve.levels)).any(leads) {
+        let scale = curve.levels.first().map_or(0.0, |level| scale_s(*level, rate_hz));
+        notes.push(format!(
+            "quantization noise leads at {scale} s; it is not Gaussian, and the robust wavelet variance reads it \
+             high (by 15 % at efficiency 0.6): so is q2"
+        ));
+    }
+}
+
+fn have(some: usize, all: usize) -> String {
+    match (some, all) {
+        (1, 1) => "the signal has".to_owned(),
+        (1, _) => format!("1 of {all} signals has"),
+        _ => format!("{some} of {all} signals have"),
+    }
+}

@@ -1,0 +1,99 @@
+//! From recordings to groups of replicates: the wavelet variances of every signal.
+
+use super::average::Replicate;
+use crate::imu::{Axis, Channel, Recording, Sensor};
+use crate::wavelet::{Tuning, WaveletError, both, default_levels};
+use rayon::prelude::*;
+
+/// What one model is fitted to: replicates of one axis, or of all axes of a sensor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Group {
+    /// The sensor.
+    pub sensor: Sensor,
+    /// The axis; none if the axes are pooled.
+    pub axis: Option<Axis>,
+    /// The replicates, each with the axis it is of.
+    pub replicates: Vec<Replicate>,
+}
+
+impl Group {
+    /// `accel.x`, or `accel` if the axes are pooled.
+    #[must_use]
+    pub fn name(&self) -> String {
+        match self.axis {
+            None => self.sensor.name().to_owned(),
+            Some(axis) => Channel { sensor: self.sensor, axis }.to_string(),
+        }
+    }
+
+    /// The channels a model of this group is for.
+    #[must_use]
+    pub fn channels(&self) -> Vec<Channel> {
+        let axes = self.axis.map_or(Axis::ALL.to_vec(), |axis| vec![axis]);
+        axes.into_iter().map(|axis| Channel { sensor: self.sensor, axis }).collect()
+    }
+}
+
+/// Which signals are replicates of one another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pool {
+    /// Those of one axis: a model an axis.
+    Axes,
+    /// Those of all axes of a sensor: one model a sensor.
+    Sensor,
+}
+
+/// A signal without a wavelet variance.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{recording}, {channel}: {source}")]
+pub struct SignalError {
+    /// The recording.
+    pub recording: String,
+    /// The signal.
+    pub channel: Channel,
+    /// Why.
+    pub source: WaveletError,
+}
+
+/// The wavelet variances of all signals of all recordings, in their order; `done` is called after each
+/// signal, from any thread. Without a number of levels each signal has as many as usual for its length.
+///
+/// # Errors
+/// When a signal is too short for the levels.
+pub fn replicates(
+    recordings: &[Recording],
+    levels: Option<u32>,
+    tuning: &Tuning,
+    done: &(dyn Fn() + Sync),
+) -> Result<Vec<(Channel, Replicate)>, SignalError> {
+    let signals: Vec<_> = recordings.iter().flat_map(|r| r.signals.iter().map(move |s| (r, s))).collect();
+    let one = |(recording, signal): &(&Recording, &crate::imu::Signal)| {
+        let samples = signal.samples.len();
+        let levels = levels.unwrap_or_else(|| default_levels(samples));
+        let (classical, robust) = both(&signal.samples, levels, tuning).map_err(|source| SignalError {
+            recording: recording.name.clone(),
+            channel: signal.channel,
+            source,
+        })?;
+        done();
+        let name = recording.name.clone();
+        Ok((signal.channel, Replicate { name, axis: Some(signal.channel.axis), samples, classical, robust }))
+    };
+    signals.par_iter().map(one).collect()
+}
+
+/// The groups, in the order of [`Channel::ALL`].
+#[must_use]
+pub fn grouped(replicates: Vec<(Channel, Replicate)>, pool: Pool) -> Vec<Group> {
+    let mut groups: Vec<Group> = Vec::new();
+    let mut replicates = replicates;
+    replicates.sort_by_key(|(channel, _)| channel.index());
+    for (channel, replicate) in replicates {
+        let axis = (pool == Pool::Axes).then_some(channel.axis);
+        match groups.last_mut() {
+            Some(g) if g.sensor == channel.sensor && g.axis == axis => g.replicates.push(replicate),
+            _ => groups.push(Group { sensor: channel.sensor, axis, replicates: vec![replicate] }),
+        }
+    }
+    groups
+}

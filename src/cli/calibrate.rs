@@ -1,0 +1,336 @@
+//! `nav-sim calibrate`: replicate static recordings → noise model.
+
+use super::recordings::{RecordingArgs, sensor};
+use super::tuning::TuningArgs;
+use super::{Failure, Session, parse};
+use nav_sim::calibration::{
+    AverageError, CalibrationError, Cause, Estimator, FitError, Group, ModelSpec, Outcome, Pool, Replicate,
+    Settings, SpecError, Trim, Weighting, calibrate, fit_curve, grouped, replicates,
+};
+use nav_sim::data::curve_file::{self, NamedCurve};
+use nav_sim::data::model_file::{self, CalibrationNote};
+use nav_sim::data::recordings::Report;
+use nav_sim::data::suggest::nearest;
+use nav_sim::data::{atomic, hash};
+use nav_sim::imu::{Channel, Recording, Sensor};
+use nav_sim::report::{self, CurvesFile, FitsFile, Input};
+use std::path::{Path, PathBuf};
+
+/// Replicate static recordings -> noise model
+///
+/// Each recording is one replicate. By default the three axes of a sensor are pooled: one model a sensor,
+/// their signals replicates of one another. The model goes to a TOML file, the curves behind it to
+/// <model>.wv.json beside it; with `--estimator all` to one pair an estimator, <model>_<estimator>.toml.
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim calibrate calib_data/ -o model.toml
+  nav-sim calibrate run1.csv run2.csv run3.csv --estimator all --model N1 --pool axes -o imu.toml
+  nav-sim calibrate --curve curve.csv --model \"AR1+RW+WN\" --format json")]
+pub(crate) struct Args {
+    /// Recordings, or directories of recordings
+    #[arg(value_name = "INPUT", required_unless_present = "curve", conflicts_with = "curve")]
+    inputs: Vec<PathBuf>,
+    /// Fit a curve instead of recordings: CSV tau_samples,wv,edof or a .wv.json
+    #[arg(long, value_name = "FILE")]
+    curve: Option<PathBuf>,
+    /// Sensor of a CSV curve, for the model file
+    #[arg(long, value_name = "SENSOR", value_parser = sensor, requires = "curve")]
+    sensor: Option<Sensor>,
+    /// Which curve is fitted: averages over the replicates (awv; sr-awv robust to outliers; dr-awv robust to
+    /// abnormal replicates too), or that of a single recording (gmwm, rgmwm)
+    #[arg(long, value_enum, default_value_t = EstimatorArg::DrAwv)]
+    estimator: EstimatorArg,
+    /// Sum of WN QN AR1 GM MA1 RW DR such as 2*AR1+RW+WN+QN, or N1 = AR1+RW+WN, N2 = 2*AR1+RW+WN+QN
+    #[arg(long, value_name = "SUM", default_value = "N2")]
+    model: String,
+    /// Replicates that dr-awv drops at each end of each scale: a number, or a percentage of all
+    #[arg(long, value_name = "A", default_value = "30%", value_parser = trim)]
+    trim: Trim,
+    /// What a scale counts in the fit
+    #[arg(long, value_enum, default_value_t = WeightingArg::Edof)]
+    weighting: WeightingArg,
+    /// Which signals are replicates of one another (default: sensor; axes for gmwm and rgmwm)
+    #[arg(long, value_enum)]
+    pool: Option<PoolArg>,
+    /// The model file (default: model.toml; none for --curve)
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+    #[command(flatten)]
+    recordings: RecordingArgs,
+    #[command(flatten)]
+    tuning: TuningArgs,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+enum EstimatorArg {
+    /// Average of the classical wavelet variances
+    Awv,
+    /// Average of the robust wavelet variances
+    SrAwv,
+    /// Trimmed average of the robust wavelet variances
+    DrAwv,
+    /// Classical wavelet variance of one recording
+    Gmwm,
+    /// Robust wavelet variance of one recording
+    Rgmwm,
+    /// The three averages (of one recording: gmwm and rgmwm)
+    All,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+enum WeightingArg {
+    /// Degrees of freedom / (2 wv²): the inverse variance
+    Edof,
+    /// 1 / (width of the 95 % interval)²
+    Ci,
+    /// 1
+    None,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+enum PoolArg {
+    /// Those of one axis: a model an axis
+    Axes,
+    /// Those of all axes of a sensor: a model a sensor
+    Sensor,
+}
+
+fn trim(text: &str) -> Result<Trim, String> {
+    let expected = || "not a number of replicates such as 2, or a percentage under 50 such as 30%".to_owned();
+    match text.strip_suffix('%') {
+        None => text.parse().map(Trim::Count).map_err(|_| expected()),
+        Some(percent) => match parse::non_negative(percent.trim()) {
+            Ok(p) if p < 50.0 => Ok(Trim::Fraction(p / 100.0)),
+            _ => Err(expected()),
+        },
+    }
+}
+
+pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let mut settings = Settings {
+        estimators: Vec::new(),
+        spec: args.model.parse().map_err(unknown_model)?,
+        trim: args.trim,
+        tuning: args.tuning.tuning()?,
+        weighting: match args.weighting {
+            WeightingArg::Edof => Weighting::Edof,
+            WeightingArg::Ci => Weighting::Interval,
+            WeightingArg::None => Weighting::None,
+        },
+        rate_hz: 1.0,
+    };
+    match &args.curve {
+        Some(path) => of_curves(args, path, &mut settings, session),
+        None => of_recordings(args, &mut settings, session),
+    }
+}
+
+fn unknown_model(e: SpecError) -> Failure {
+    let hint = match &e {
+        SpecError::Unknown { term, .. } => match nearest(term, ModelSpec::legal()) {
+            Some(meant) => format!("did you mean \"{meant}\"?"),
+            None => format!("processes and models: {}", ModelSpec::legal().collect::<Vec<_>>().join(", ")),
+        },
+        _ => "a model is a sum such as 2*AR1+RW+WN+QN".into(),
+    };
+    Failure::input(format!("--model: {e}")).hint(hint)
+}
+
+fn of_recordings(args: &Args, settings: &mut Settings, session: &Session) -> Result<(), Failure> {
+    let out = args.out.clone().unwrap_or_else(|| "model.toml".into());
+    writable(&out, &args.inputs)?;
+    // As many scales as parameters, and one that the default leaves out.
+    let needed = args.tuning.scales.map_or(2 << settings.spec.parameters(), |j| 1 << j);
+    let (recordings, report) = args.recordings.read(&args.inputs, needed, session)?;
+    settings.rate_hz = recordings[0].rate_hz;
+    settings.estimators = estimators(args.estimator, recordings.len())?;
+    let pool = pool(args, settings)?;
+    enough(&recordings, pool, settings)?;
+    let count = recordings.iter().map(|r| r.signals.len() as u64).sum();
+    let progress = session.progress("signals", count);
+    let measured = replicates(&recordings, args.tuning.scales, &settings.tuning, &|| progress.add(1))?;
+    drop(progress);
+    drop(recordings);
+    let groups = grouped(measured, pool);
+    let outcomes = calibrate(&groups, settings).map_err(|e| of_calibration(&e))?;
+    let note = note(args, inputs(&report)?);
+    finish(Some(&out), &groups, &outcomes, settings, &note, session)
+}
+
+/// Fails before the work is done, not after.
+fn writable(out: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
+    atomic::guard_inputs(out, inputs.iter().map(PathBuf::as_path))?;
+    drop(atomic::AtomicFile::create(out)?);
+    Ok(())
+}
+
+fn estimators(arg: EstimatorArg, recordings: usize) -> Result<Vec<Estimator>, Failure> {
+    let estimators = match arg {
+        EstimatorArg::Awv => vec![Estimator::Awv],
+        EstimatorArg::SrAwv => vec![Estimator::SrAwv],
+        EstimatorArg::DrAwv => vec![Estimator::DrAwv],
+        EstimatorArg::Gmwm => vec![Estimator::Gmwm],
+        EstimatorArg::Rgmwm => vec![Estimator::Rgmwm],
+        EstimatorArg::All if recordings == 1 => vec![Estimator::Gmwm, Estimator::Rgmwm],
+        EstimatorArg::All => vec![Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv],
+    };
+    match estimators.iter().find(|e| e.is_single() && recordings > 1) {
+        None => Ok(estimators),
+        Some(e) => {
+            let message =
+                format!("--estimator {} takes one recording at a time; there are {recordings}", e.name());
+            Err(Failure::input(message).hint("awv, sr-awv and dr-awv take several"))
+        }
+    }
+}
+
+fn pool(args: &Args, settings: &Settings) -> Result<Pool, Failure> {
+    let single = settings.estimators.iter().any(|e| e.is_single());
+    match args.pool {
+        Some(PoolArg::Axes) => Ok(Pool::Axes),
+        Some(PoolArg::Sensor) if single => {
+            Err(Failure::input("--pool sensor: gmwm and rgmwm take one signal at a time").hint("--pool axes"))
+        }
+        Some(PoolArg::Sensor) => Ok(Pool::Sensor),
+        None if single => Ok(Pool::Axes),
+        None => Ok(Pool::Sensor),
+    }
+}
+
+/// Fails before the wavelet variances are taken if the trim leaves no replicate of a group.
+fn enough(recordings: &[Recording], pool: Pool, settings: &Settings) -> Result<(), Failure> {
+    if !settings.estimators.contains(&Estimator::DrAwv) {
+        return Ok(());
+    }
+    let channels: Vec<Channel> =
+        recordings.iter().flat_map(|r| r.signals.iter().map(|s| s.channel)).collect();
+    for channel in &channels {
+        let alike = |c: &&Channel| match pool {
+            Pool::Axes => *c == channel,
+            Pool::Sensor => c.sensor == channel.sensor,
+        };
+        let replicates = channels.iter().filter(alike).count();
+        let trim = settings.trim.count(replicates);
+        if replicates < 2 * trim + 1 {
+            let of = if pool == Pool::Axes { channel.to_string() } else { channel.sensor.name().to_owned() };
+            let failure = Failure::input(format!("{of}: {}", AverageError::Trim { trim, replicates }));
+            return Err(failure.hint("a smaller --trim, or --estimator sr-awv"));
+        }
+    }
+    Ok(())
+}
+
+fn of_calibration(e: &CalibrationError) -> Failure {
+    let hint = match &e.source {
+        Cause::Fit(FitError::TooFewScales { .. }) => {
+            Some("record for longer, or a --model with fewer processes")
+        }
+        Cause::Fit(FitError::NotPositive { .. }) => Some(
+            "the signal is quantised so coarsely that scales are silent: --estimator awv, or another range",
+        ),
+        _ => None,
+    };
+    Failure::input(e).maybe_hint(hint.map(str::to_owned))
+}
+
+fn of_curves(args: &Args, path: &Path, settings: &mut Settings, session: &Session) -> Result<(), Failure> {
+    if let Some(out) = &args.out {
+        writable(out, &[path.to_owned()])?;
+    }
+    let curves = curve_file::read(path).map_err(|e| {
+        let failure = if e.is_content() { Failure::input(&e) } else { Failure::could_not(&e) };
+        failure.maybe_hint(e.hint())
+    })?;
+    settings.rate_hz = curves[0].rate_hz.or(args.recordings.rate_hz()).unwrap_or(1.0);
+    let mut groups = Vec::new();
+    let mut outcomes = Vec::new();
+    for named in curves {
+        let Some(sensor) = named.sensor.or(args.sensor).or(args.out.is_none().then_some(Sensor::Accel))
+        else {
+            let failure =
+                Failure::input(format!("{}: the curve does not say of which sensor it is", path.display()));
+            return Err(failure.hint("--sensor accel or --sensor gyro"));
+        };
+        groups.push(Group { sensor, axis: named.axis, replicates: Vec::<Replicate>::new() });
+        let NamedCurve { curve, estimator, .. } = named;
+        let named_so = |e: &Estimator| estimator.as_deref() == Some(e.name());
+        let estimator = Estimator::ALL.into_iter().find(named_so).unwrap_or(Estimator::Given);
+        let outcome = fit_curve(&groups, groups.len() - 1, estimator, curve, settings);
+        outcomes.push(outcome.map_err(|e| of_calibration(&e))?);
+    }
+    let input = hashed("curve", path)?;
+    let note = note(args, vec![input]);
+    finish(args.out.as_deref(), &groups, &outcomes, settings, &note, session)
+}
+
+fn hashed(role: &str, path: &Path) -> Result<Input, Failure> {
+    let blake3 = hash::of_file(path).map_err(|e| Failure::could_not(format!("{}: {e}", path.display())))?;
+    Ok(Input { role: role.to_owned(), path: path.display().to_string(), blake3 })
+}
+
+fn inputs(report: &Report) -> Result<Vec<Input>, Failure> {
+    report.files.iter().map(|f| hashed("recording", Path::new(&f.file))).collect()
+}
+
+fn note(args: &Args, inputs: Vec<Input>) -> CalibrationNote {
+    CalibrationNote {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        efficiency_convention: args.tuning.convention().to_owned(),
+        weighting: match args.weighting {
+            WeightingArg::Edof => "edof",
+            WeightingArg::Ci => "ci",
+            WeightingArg::None => "none",
+        }
+        .to_owned(),
+        inputs,
+    }
+}
+
+/// Writes one model and its curves for each estimator, and prints the fits.
+fn finish(
+    out: Option<&Path>,
+    groups: &[Group],
+    outcomes: &[Outcome],
+    settings: &Settings,
+    note: &CalibrationNote,
+    session: &Session,
+) -> Result<(), Failure> {
+    let mut files = Vec::new();
+    for (suffix, own) in by_estimator(outcomes) {
+        let Some(out) = out else { continue };
+        let path = with_suffix(out, &suffix);
+        let curves = path.with_extension("wv.json");
+        atomic::write(&curves, report::json(&CurvesFile::new(groups, &own, settings)))?;
+        model_file::write(&path, &note.model_file(groups, &own, settings))?;
+        files.extend([path, curves].map(|p| p.display().to_string()));
+    }
+    if session.json() {
+        let json = report::json(&FitsFile::new(groups, outcomes, settings, files.clone()));
+        session.printer.result(json.trim_end());
+    } else {
+        let texts = outcomes.iter().map(|o| report::describe(&groups[o.group], o, settings));
+        session.printer.result(&texts.collect::<Vec<_>>().join("\n\n"));
+    }
+    for file in files {
+        session.printer.say(&format!("wrote {file}"));
+    }
+    Ok(())
+}
+
+/// The outcomes of each estimator, and what tells its files from those of the others.
+fn by_estimator(outcomes: &[Outcome]) -> Vec<(String, Vec<&Outcome>)> {
+    let of = |e: Estimator| outcomes.iter().filter(|o| o.estimator == e).collect::<Vec<_>>();
+    let mut parts: Vec<_> = Estimator::ALL.into_iter().map(|e| (format!("_{}", e.name()), of(e))).collect();
+    parts.retain(|(_, own)| !own.is_empty());
+    if let [(suffix, _)] = parts.as_mut_slice() {
+        suffix.clear();
+    }
+    parts
+}
+
+fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
+    let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    let extension = path.extension().map_or_else(|| "toml".into(), |e| e.to_string_lossy().into_owned());
+    path.with_file_name(format!("{stem}{suffix}.{extension}"))
+}

@@ -1,0 +1,50 @@
+//! Flags of the robust wavelet variance.
+
+use super::Failure;
+use nav_sim::wavelet::{Convention, Tuning};
+
+/// How the robust wavelet variance is tuned.
+#[derive(clap::Args, Debug)]
+#[command(next_help_heading = "Wavelet variance")]
+pub(crate) struct TuningArgs {
+    /// Efficiency of the robust wavelet variance at the Gaussian model, 0.3 to 0.99
+    #[arg(long, value_name = "E", default_value_t = 0.6)]
+    efficiency: f64,
+    /// How the tuning constant follows from the efficiency
+    #[arg(long, value_enum, default_value_t = ConventionArg::Exact)]
+    efficiency_convention: ConventionArg,
+    /// Number of scales, 2, 4, 8, … samples (default: one less than the shortest signal allows)
+    #[arg(long, value_name = "J", value_parser = clap::value_parser!(u32).range(1..=62))]
+    pub(crate) scales: Option<u32>,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
+enum ConventionArg {
+    /// From the definition
+    Exact,
+    /// As the R packages wv, gmwm and simts do (a sign error: their 0.6 is 0.727), to reproduce their numbers
+    Wv,
+}
+
+impl TuningArgs {
+    pub(crate) fn tuning(&self) -> Result<Tuning, Failure> {
+        let convention = match self.efficiency_convention {
+            ConventionArg::Exact => Convention::Exact,
+            ConventionArg::Wv => Convention::Wv,
+        };
+        Tuning::new(self.efficiency, convention).map_err(|e| Failure::input(format!("--efficiency: {e}")))
+    }
+
+    /// Name of the convention in files.
+    pub(crate) const fn convention(&self) -> &'static str {
+        match self.efficiency_convention {
+            ConventionArg::Exact => "exact",
+            ConventionArg::Wv => "wv",
+        }
+    }
+
+    /// Samples a recording needs for the scales asked for.
+    pub(crate) fn min_samples(&self) -> usize {
+        self.scales.map_or(4, |j| 1 << j)
+    }
+}

@@ -1,0 +1,290 @@
+//! Wavelet-variance curves to fit: CSV with columns `tau_samples,wv,edof`, or the JSON that `calibrate`
+//! writes.
+
+use crate::imu::{Axis, Sensor};
+use crate::report::CurvesFile;
+use crate::wavelet::Curve;
+use std::path::Path;
+
+/// A curve and what it is of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedCurve {
+    /// The sensor, if the file says it.
+    pub sensor: Option<Sensor>,
+    /// The axis, if it is of one.
+    pub axis: Option<Axis>,
+    /// Sample rate (Hz), if the file says it.
+    pub rate_hz: Option<f64>,
+    /// Estimator, if the file says it.
+    pub estimator: Option<String>,
+    /// The curve.
+    pub curve: Curve,
+}
+
+/// A curve file that is none.
+#[derive(Debug, thiserror::Error)]
+pub enum CurveError {
+    /// It cannot be read.
+    #[error("{path}: {source}")]
+    Io {
+        /// File.
+        path: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// It is not CSV or JSON of this layout.
+    #[error("{path}, line {line}: {message}")]
+    Syntax {
+        /// File.
+        path: String,
+        /// Line, from 1.
+        line: u64,
+        /// What is wrong.
+        message: String,
+    },
+    /// A column is missing.
+    #[error("{path}, line 1: no column is named \"{column}\"")]
+    Column {
+        /// File.
+        path: String,
+        /// Column.
+        column: &'static str,
+    },
+    /// A value means nothing.
+    #[error("{path}, {place}: {column} = {value} is not {expected}")]
+    Value {
+        /// File.
+        path: String,
+        /// Line, or which curve and entry.
+        place: String,
+        /// Column or key.
+        column: &'static str,
+        /// The value.
+        value: String,
+        /// What would be accepted.
+        expected: &'static str,
+    },
+    /// Vectors of different lengths, or empty.
+    #[error("{path}: curve {index} has {tau} scales, {wv} wavelet variances and {edof} degrees of freedom")]
+    Lengths {
+        /// File.
+        path: String,
+        /// Which curve, from 1.
+        index: usize,
+        /// Scales.
+        tau: usize,
+        /// Wavelet variances.
+        wv: usize,
+        /// Degrees of freedom.
+        edof: usize,
+    },
+    /// No curve.
+    #[error("{path}: no curve in it")]
+    Empty {
+        /// File.
+        path: String,
+    },
+}
+
+impl CurveError {
+    /// Whether the contents are at fault (rather than the machine, or a missing file).
+    #[must_use]
+    pub const fn is_content(&self) -> bool {
+        !matches!(self, Self::Io { .. })
+    }
+
+    /// What to do about it.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        match self {
+            Self::Io { .. } => None,
+            _ => Some(
+                "a curve is a CSV with the columns tau_samples,wv,edof (tau_samples = 2, 4, 8, …), or a .wv.json \
+                 written by calibrate"
+                    .into(),
+            ),
+        }
+    }
+}
+
+/// Reads the curves of a file.
+///
+/// # Errors
+/// When it cannot be read, or is no curve file.
+pub fn read(path: &Path) -> Result<Vec<NamedCurve>, CurveError> {
+    let name = path.display().to_string();
+    let text =
+        std::fs::read_to_string(path).map_err(|source| CurveError::Io { path: name.clone(), source })?;
+    let text = text.trim_start_matches('\u{feff}');
+    let curves =
+        if text.trim_start().starts_with('{') { json(&name, text)? } else { vec![csv(&name, text)?] };
+    if curves.iter().any(|c| c.curve.levels.is_empty()) || curves.is_empty() {
+        return Err(CurveError::Empty { path: name });
+    }
+    Ok(curves)
+}
+
+fn csv(path: &str, text: &str) -> Result<NamedCurve, CurveError> {
+    let mut reader =
+        csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
+    let syntax = |e: csv::Error| {
+        let line = e.position().map_or(1, csv::Position::line);
+        CurveError::Syntax { path: path.to_owned(), line, message: e.to_string() }
+    };
+    let head = reader.headers().map_err(syntax)?.clone();
+    let column = |name: &'static str| {
+        head.iter()
+            .position(|c| c == name)
+            .map(|i| (name, i))
+            .ok_or_else(|| CurveError::Column { path: path.to_owned(), column: name })
+    };
+    let (tau, wv, edof) = (column("tau_samples")?, column("wv")?, column("edof")?);
+    let mut curve = Curve::default();
+    for record in reader.records() {
+        let record = record.map_err(syntax)?;
+        let place = format!("line {}", record.position().map_or(0, csv::Position::line));
+        let number = |(column, i): (&'static str, usize)| {
+            let value = record.get(i).unwrap_or_default();
+            value.parse::<f64>().map_err(|_| CurveError::Value {
+                path: path.to_owned(),
+                place: place.clone(),
+                column,
+                value: format!("\"{value}\""),
+                expected: "a number",
+            })
+        };
+        push(&mut curve, path, &place, number(tau)?, number(wv)?, number(edof)?)?;
+    }
+    Ok(NamedCurve { sensor: None, axis: None, rate_hz: None, estimator: None, curve })
+}
+
+fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, CurveError> {
+    let file: CurvesFile = serde_json::from_str(text).map_err(|e| CurveError::Syntax {
+        path: path.to_owned(),
+        line: e.line() as u64,
+        message: e.to_string(),
+    })?;
+    let refuse = |place: &str, column, value: &str, expected| CurveError::Value {
+        path: path.to_owned(),
+        place: place.to_owned(),
+        column,
+        value: value.to_owned(),
+        expected,
+    };
+    if !(file.rate_hz.is_finite() && file.rate_hz > 0.0) {
+        return Err(refuse("rate", "rate_hz", &file.rate_hz.to_string(), "a finite number > 0"));
+    }
+    let mut curves = Vec::new();
+    for (index, entry) in (1..).zip(&file.curves) {
+        let (tau, wv, edof) = (entry.tau_s.len(), entry.wv.len(), entry.edof.len());
+        if tau != wv || tau != edof {
+            return Err(CurveError::Lengths { path: path.to_owned(), index, tau, wv, edof });
+        }
+        let place = format!("curve {index}");
+        let sensor = Sensor::ALL.into_iter().find(|s| s.name() == entry.sensor);
+        let sensor = sensor.ok_or_else(|| refuse(&place, "sensor", &entry.sensor, "accel or gyro"))?;
+        let axis = Axis::ALL.into_iter().find(|a| a.name() == entry.axis);
+        if axis.is_none() && entry.axis != "all" {
+            return Err(refuse(&place, "axis", &entry.axis, "x, y, z or all"));
+        }
+        let mut curve = Curve::default();
+        for i in 0..tau {
+            let place = format!("curve {index}, scale {}", i + 1);
+            push(&mut curve, path, &place, entry.tau_s[i] * file.rate_hz, entry.wv[i], entry.edof[i])?;
+        }
+        curves.push(NamedCurve {
+            sensor: Some(sensor),
+            axis,
+            rate_hz: Some(file.rate_hz),
+            estimator: (!entry.estimator.is_empty()).then(|| entry.estimator.clone()),
+            curve,
+        });
+    }
+    Ok(curves)
+}
+
+/// Appends a point; scales are powers of two, ascending.
+fn push(curve: &mut Curve, path: &str, place: &str, tau: f64, wv: f64, edof: f64) -> Result<(), CurveError> {
+    let refuse = |column, value: f64, expected| {
+        Err(CurveError::Value {
+            path: path.to_owned(),
+            place: place.to_owned(),
+            column,
+            value: value.to_string(),
+            expected,
+        })
+    };
+    let level = tau.log2().round();
+    // Scales in seconds come back from a division by the rate.
+    let is_power = (1.0..=62.0).contains(&level) && (tau / level.exp2() - 1.0).abs() < 1e-6;
+    if !is_power {
+        return refuse("tau_samples", tau, "a power of two ≥ 2");
+    }
+    if curve.levels.last().is_some_and(|last| *last >= level as u32) {
+        return refuse("tau_samples", tau, "greater than the one before");
+    }
+    for (column, value) in [("wv", wv), ("edof", edof)] {
+        if !(value.is_finite() && value > 0.0) {
+            return refuse(column, value, "a finite number > 0");
+        }
+    }
+    curve.levels.push(level as u32);
+    curve.wv.push(wv);
+    curve.edof.push(edof);
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::{FittedCurve, json as to_json};
+
+    #[test]
+    fn a_table_of_scales() {
+        let text = "# mine\nwv, edof ,tau_samples\n1e-5,100,2\n5e-6,50,4\n1e-6,12.5,16\n";
+        let read = csv("c.csv", text).unwrap();
+        assert_eq!(
+            read.curve,
+            Curve { levels: vec![1, 2, 4], wv: vec![1e-5, 5e-6, 1e-6], edof: vec![100.0, 50.0, 12.5] }
+        );
+    }
+
+    #[test]
+    fn what_calibrate_writes() {
+        let entry = FittedCurve {
+            sensor: "gyro".into(),
+            axis: "all".into(),
+            tau_s: vec![2.0 / 30.0, 4.0 / 30.0],
+            wv: vec![2e-7, 1e-7],
+            edof: vec![10.0, 5.0],
+            ..FittedCurve::default()
+        };
+        let file = CurvesFile { schema_version: 1, rate_hz: 30.0, curves: vec![entry] };
+        let read = json("m.wv.json", &to_json(&file)).unwrap();
+        assert_eq!((read[0].sensor, read[0].axis, read[0].rate_hz), (Some(Sensor::Gyro), None, Some(30.0)));
+        assert_eq!(read[0].curve, Curve { levels: vec![1, 2], wv: vec![2e-7, 1e-7], edof: vec![10.0, 5.0] });
+    }
+
+    #[test]
+    fn refusals_name_the_line_and_the_value() {
+        let message = |text: &str| csv("c.csv", text).unwrap_err().to_string();
+        let head = "tau_samples,wv,edof\n";
+        assert_eq!(message("tau,wv,edof\n2,1,1\n"), "c.csv, line 1: no column is named \"tau_samples\"");
+        assert_eq!(message(&format!("{head}2,x,1\n")), "c.csv, line 2: wv = \"x\" is not a number");
+        assert_eq!(
+            message(&format!("{head}3,1,1\n")),
+            "c.csv, line 2: tau_samples = 3 is not a power of two ≥ 2"
+        );
+        assert_eq!(
+            message(&format!("{head}4,1,1\n2,1,1\n")),
+            "c.csv, line 3: tau_samples = 2 is not greater than the one before"
+        );
+        assert_eq!(
+            message(&format!("{head}2,NaN,1\n")),
+            "c.csv, line 2: wv = NaN is not a finite number > 0"
+        );
+        assert_eq!(message(&format!("{head}2,1,0\n")), "c.csv, line 2: edof = 0 is not a finite number > 0");
+        let json_error = json("c.json", "{\"rate_hz\": 1}").unwrap_err().to_string();
+        assert!(json_error.starts_with("c.json, line 1: missing field"), "{json_error}");
+    }
+}

@@ -1,0 +1,14 @@
+//! Fingerprints of inputs.
+
+use std::io;
+use std::path::Path;
+
+/// BLAKE3 of a file's bytes, in hexadecimal, whatever its size.
+///
+/// # Errors
+/// When the system refuses.
+pub fn of_file(path: &Path) -> io::Result<String> {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update_reader(std::fs::File::open(path)?)?;
+    Ok(hasher.finalize().to_hex().to_string())
+}

@@ -1,0 +1,87 @@
+//! The model file of a calibration.
+
+use super::{ModelFile, SCHEMA};
+use crate::calibration::{Estimator, Group, Outcome, Settings};
+use crate::imu::Channel;
+use crate::noise::Model;
+use crate::report::Input;
+use toml::{Table, Value};
+
+/// What a calibration leaves in the file beside the model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CalibrationNote {
+    /// Version of nav-sim.
+    pub version: String,
+    /// How the tuning constant follows from the efficiency: `exact` or `wv`.
+    pub efficiency_convention: String,
+    /// What a scale counts: `edof`, `ci` or `none`.
+    pub weighting: String,
+    /// The recordings or the curve.
+    pub inputs: Vec<Input>,
+}
+
+impl CalibrationNote {
+    /// The model file of the outcomes of one estimator. Channels of no group are missing in it.
+    #[must_use]
+    pub fn model_file(&self, groups: &[Group], outcomes: &[&Outcome], settings: &Settings) -> ModelFile {
+        let mut file = ModelFile::new(Model { rate_hz: settings.rate_hz, axes: Default::default() });
+        file.missing = Channel::ALL.to_vec();
+        for outcome in outcomes {
+            for channel in groups[outcome.group].channels() {
+                file.model.axes[channel.index()] = outcome.fit.composite.clone();
+                file.missing.retain(|c| *c != channel);
+            }
+        }
+        file.provenance = Some(self.provenance(groups, outcomes, settings));
+        file
+    }
+
+    fn provenance(&self, groups: &[Group], outcomes: &[&Outcome], settings: &Settings) -> Table {
+        let mut table = Table::new();
+        let mut put = |key: &str, value: Value| table.insert(key.to_owned(), value);
+        let estimator = outcomes.first().map_or(Estimator::Given, |o| o.estimator);
+        put("program", format!("nav-sim {}", self.version).into());
+        put("schema", (SCHEMA as i64).into());
+        put("estimator", estimator.name().into());
+        put("model", settings.spec.to_string().into());
+        put("weighting", self.weighting.as_str().into());
+        if estimator.is_robust() {
+            put("efficiency", settings.tuning.efficiency().into());
+            put("efficiency_convention", self.efficiency_convention.as_str().into());
+        }
+        put("fits", outcomes.iter().map(|o| fit(&groups[o.group], o, settings)).collect::<Vec<_>>().into());
+        put("inputs", self.inputs.iter().map(input).collect::<Vec<_>>().into());
+        table
+    }
+}
+
+fn fit(group: &Group, outcome: &Outcome, settings: &Settings) -> Table {
+    let fit = &outcome.fit;
+    let mut table = Table::new();
+    let mut put = |key: &str, value: Value| table.insert(key.to_owned(), value);
+    let count = |n: usize| Value::from(n as i64);
+    put("signals", group.name().into());
+    put("replicates", count(group.replicates.len()));
+    if outcome.estimator == Estimator::DrAwv {
+        put("trim", count(settings.trim.count(group.replicates.len())));
+    }
+    put("scales", count(outcome.curve.levels.len()));
+    put("objective", fit.objective.into());
+    put("termination", fit.termination.name().into());
+    put("combinations", count(fit.combinations));
+    put("starts", count(fit.starts));
+    put("agreeing", count(fit.agreeing));
+    if let Some(runner_up) = fit.runner_up {
+        put("runner_up", runner_up.into());
+    }
+    put("notes", outcome.notes.clone().into());
+    table
+}
+
+fn input(input: &Input) -> Table {
+    let mut table = Table::new();
+    table.insert("role".into(), input.role.as_str().into());
+    table.insert("path".into(), input.path.as_str().into());
+    table.insert("blake3".into(), input.blake3.as_str().into());
+    table
+}

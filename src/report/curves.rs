@@ -1,0 +1,256 @@
+//! Wavelet-variance curves as JSON: of signals (`wv`), and of fits (`<model>.wv.json`).
+
+use crate::calibration::{Group, Outcome, Replicate, Settings};
+use crate::imu::Channel;
+use crate::wavelet::{Tuning, interval};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Layout version of both files.
+const SCHEMA_VERSION: u32 = 1;
+/// Confidence of all intervals.
+pub const CONFIDENCE: f64 = 0.95;
+
+/// A wavelet variance with its intervals.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Band {
+    /// Wavelet variance (units²).
+    pub wv: Vec<f64>,
+    /// Lower ends of its 95 % intervals.
+    pub ci_low: Vec<f64>,
+    /// Upper ends.
+    pub ci_high: Vec<f64>,
+    /// How each robust variance came about.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub status: Vec<&'static str>,
+}
+
+impl Band {
+    fn new(wv: Vec<f64>, edof: &[f64], status: Vec<&'static str>) -> Self {
+        let ends = |(nu, edof): (&f64, &f64)| interval::interval(*nu, *edof, CONFIDENCE);
+        let (ci_low, ci_high) = wv.iter().zip(edof).map(ends).unzip();
+        Self { wv, ci_low, ci_high, status }
+    }
+}
+
+/// The wavelet variances of one signal.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SignalCurves {
+    /// Recording.
+    pub file: String,
+    /// `accel` or `gyro`.
+    pub sensor: &'static str,
+    /// `x`, `y` or `z`.
+    pub axis: &'static str,
+    /// Samples.
+    pub samples: usize,
+    /// Scales, 2^j samples (s).
+    pub tau_s: Vec<f64>,
+    /// Equivalent degrees of freedom of the classical variance.
+    pub edof: Vec<f64>,
+    /// Classical.
+    pub classical: Band,
+    /// Robust.
+    pub robust: Band,
+}
+
+impl SignalCurves {
+    /// The curves of a signal at a rate (Hz); `edof` are the degrees of freedom of its classical variance.
+    #[must_use]
+    pub fn new(
+        channel: Channel,
+        replicate: &Replicate,
+        rate_hz: f64,
+        edof: Vec<f64>,
+        efficiency: f64,
+    ) -> Self {
+        let robust_edof: Vec<f64> = edof.iter().map(|e| interval::edof_robust(*e, efficiency)).collect();
+        let (values, status) = replicate.robust.iter().map(|r| (r.value, r.status.name())).unzip();
+        Self {
+            file: replicate.name.clone(),
+            sensor: channel.sensor.name(),
+            axis: channel.axis.name(),
+            samples: replicate.samples,
+            tau_s: (1..=edof.len() as u32).map(|j| tau_s(j, rate_hz)).collect(),
+            classical: Band::new(replicate.classical.clone(), &edof, Vec::new()),
+            robust: Band::new(values, &robust_edof, status),
+            edof,
+        }
+    }
+}
+
+/// Scale of a level (s).
+pub(super) fn tau_s(level: u32, rate_hz: f64) -> f64 {
+    f64::from(level).exp2() / rate_hz
+}
+
+/// What `wv` prints.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SignalsFile {
+    /// Layout version.
+    pub schema_version: u32,
+    /// Sample rate (Hz).
+    pub rate_hz: f64,
+    /// Efficiency of the robust variance; its degrees of freedom are edof times this.
+    pub efficiency: f64,
+    /// Where the degrees of freedom are from: `eta3` or `large-sample`.
+    pub edof_method: &'static str,
+    /// Confidence of the intervals.
+    pub confidence: f64,
+    /// One entry a signal.
+    pub signals: Vec<SignalCurves>,
+}
+
+impl SignalsFile {
+    /// The file of some signals.
+    #[must_use]
+    pub const fn new(
+        rate_hz: f64,
+        efficiency: f64,
+        edof_method: &'static str,
+        signals: Vec<SignalCurves>,
+    ) -> Self {
+        Self {
+            schema_version: SCHEMA_VERSION,
+            rate_hz,
+            efficiency,
+            edof_method,
+            confidence: CONFIDENCE,
+            signals,
+        }
+    }
+}
+
+/// The curves behind a model, and what the model makes of them.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CurvesFile {
+    /// Layout version.
+    pub schema_version: u32,
+    /// Sample rate (Hz).
+    pub rate_hz: f64,
+    /// One entry a fit.
+    pub curves: Vec<FittedCurve>,
+}
+
+/// A curve, the model fitted to it, and the replicates it is the average of. Only sensor, axis, tau_s, wv
+/// and edof are needed to fit a model to it again.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct FittedCurve {
+    /// `accel` or `gyro`.
+    pub sensor: String,
+    /// `x`, `y`, `z`, or `all`.
+    pub axis: String,
+    /// Estimator.
+    #[serde(default)]
+    pub estimator: String,
+    /// Scales, 2^j samples (s).
+    pub tau_s: Vec<f64>,
+    /// Wavelet variance (units²).
+    pub wv: Vec<f64>,
+    /// Equivalent degrees of freedom.
+    pub edof: Vec<f64>,
+    /// Lower ends of the 95 % intervals.
+    #[serde(default)]
+    pub ci_low: Vec<f64>,
+    /// Upper ends.
+    #[serde(default)]
+    pub ci_high: Vec<f64>,
+    /// Wavelet variance of the model.
+    #[serde(default)]
+    pub implied: Vec<f64>,
+    /// The same of each of its processes.
+    #[serde(default)]
+    pub processes: BTreeMap<String, Vec<f64>>,
+    /// The replicates.
+    #[serde(default)]
+    pub replicates: Vec<ReplicateCurve>,
+}
+
+/// The wavelet variance of one replicate: robust where the estimator is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ReplicateCurve {
+    /// Recording.
+    pub file: String,
+    /// Axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axis: Option<String>,
+    /// Samples.
+    pub samples: usize,
+    /// Wavelet variance (units²).
+    pub wv: Vec<f64>,
+}
+
+impl CurvesFile {
+    /// The file of some outcomes.
+    #[must_use]
+    pub fn new(groups: &[Group], outcomes: &[&Outcome], settings: &Settings) -> Self {
+        let curve = |o: &&Outcome| fitted(&groups[o.group], o, settings.rate_hz);
+        let curves = outcomes.iter().map(curve).collect();
+        Self { schema_version: SCHEMA_VERSION, rate_hz: settings.rate_hz, curves }
+    }
+}
+
+fn fitted(group: &Group, outcome: &Outcome, rate_hz: f64) -> FittedCurve {
+    let Outcome { curve, fit, estimator, .. } = outcome;
+    let band = Band::new(curve.wv.clone(), &curve.edof, Vec::new());
+    let model = &fit.composite;
+    let over_levels = |f: &dyn Fn(u32) -> f64| curve.levels.iter().map(|level| f(*level)).collect();
+    let parts = model.labels().into_iter().zip(&model.processes);
+    let replicate = |r: &Replicate| ReplicateCurve {
+        file: r.name.clone(),
+        axis: r.axis.map(|a| a.name().to_owned()),
+        samples: r.samples,
+        wv: if estimator.is_robust() {
+            r.robust.iter().map(|v| v.value).collect()
+        } else {
+            r.classical.clone()
+        },
+    };
+    FittedCurve {
+        sensor: group.sensor.name().to_owned(),
+        axis: group.axis.map_or("all", |a| a.name()).to_owned(),
+        estimator: estimator.name().to_owned(),
+        tau_s: over_levels(&|level| tau_s(level, rate_hz)),
+        wv: band.wv,
+        edof: curve.edof.clone(),
+        ci_low: band.ci_low,
+        ci_high: band.ci_high,
+        implied: over_levels(&|level| model.haar_wv(level)),
+        processes: parts.map(|(label, p)| (label, over_levels(&|level| p.haar_wv(level)))).collect(),
+        replicates: group.replicates.iter().map(replicate).collect(),
+    }
+}
+
+/// A signal's curves as a table: rows of text, the first its head.
+#[must_use]
+pub fn signal_rows(curves: &SignalCurves) -> Vec<Vec<String>> {
+    let head =
+        ["tau (s)", "classical", "95 % interval", "robust", "95 % interval", "", "Allan deviation at tau/2"];
+    let number = |x: f64| format!("{x:.4e}");
+    let range = |band: &Band, i: usize| format!("{} – {}", number(band.ci_low[i]), number(band.ci_high[i]));
+    let row = |i: usize| {
+        let (classical, robust) = (&curves.classical, &curves.robust);
+        let status =
+            if robust.status[i] == "ok" { String::new() } else { robust.status[i].replace('_', " ") };
+        vec![
+            format!("{}", curves.tau_s[i]),
+            number(classical.wv[i]),
+            range(classical, i),
+            number(robust.wv[i]),
+            range(robust, i),
+            status,
+            number((2.0 * classical.wv[i]).sqrt()),
+        ]
+    };
+    std::iter::once(head.map(str::to_owned).to_vec()).chain((0..curves.tau_s.len()).map(row)).collect()
+}
+
+/// What a file of signals says about its intervals.
+#[must_use]
+pub fn intervals_note(edof_method: &str, tuning: &Tuning) -> String {
+    let kind = match edof_method {
+        "large-sample" => "large-sample degrees of freedom (eta1)",
+        _ => "degrees of freedom eta3, conservative beyond the first scale",
+    };
+    format!("intervals: 95 %, {kind}; robust: times the efficiency {:.3}", tuning.efficiency())
+}

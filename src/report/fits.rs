@@ -1,0 +1,217 @@
+//! Fitted models as JSON and as words.
+
+use super::curves::tau_s;
+use crate::calibration::{Estimator, Group, Outcome, Settings, Share, correlation_time_s, percent, shares};
+use crate::imu::Sensor;
+use crate::noise::{Composite, Process};
+use crate::units::DEG;
+use serde::Serialize;
+use serde_json::{Map, Value};
+
+/// What `calibrate --format json` prints.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FitsFile {
+    /// Layout version.
+    pub schema_version: u32,
+    /// Sample rate (Hz).
+    pub rate_hz: f64,
+    /// Structure of the models.
+    pub model: String,
+    /// One entry a fit.
+    pub fits: Vec<FitEntry>,
+    /// Files written.
+    pub files: Vec<String>,
+}
+
+/// One fit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FitEntry {
+    /// `accel` or `gyro`.
+    pub sensor: &'static str,
+    /// `x`, `y`, `z`, or `all`.
+    pub axis: &'static str,
+    /// Estimator.
+    pub estimator: &'static str,
+    /// Replicates averaged.
+    pub replicates: usize,
+    /// Scales used.
+    pub scales: usize,
+    /// The processes, with the keys of model files.
+    pub processes: Vec<Map<String, Value>>,
+    /// Σ Omega_j (nu_j − nu_j(theta))².
+    pub objective: f64,
+    /// `converged`, `linear` or `iteration_limit`.
+    pub termination: &'static str,
+    /// Combinations of correlation times tried.
+    pub combinations: usize,
+    /// Local minima among them, all descended from.
+    pub starts: usize,
+    /// Starts that end at the best objective.
+    pub agreeing: usize,
+    /// Objective of the next best minimum.
+    pub runner_up: Option<f64>,
+    /// Processes whose amplitude is zero.
+    pub zero: Vec<String>,
+    /// Processes whose correlation time lies at the end of its range.
+    pub at_end: Vec<String>,
+    /// Remarks, in words.
+    pub notes: Vec<String>,
+}
+
+impl FitEntry {
+    /// The entry of an outcome of a group.
+    #[must_use]
+    pub fn new(group: &Group, outcome: &Outcome) -> Self {
+        let fit = &outcome.fit;
+        Self {
+            sensor: group.sensor.name(),
+            axis: group.axis.map_or("all", |a| a.name()),
+            estimator: outcome.estimator.name(),
+            replicates: group.replicates.len(),
+            scales: outcome.curve.levels.len(),
+            processes: fit.composite.processes.iter().map(process_json).collect(),
+            objective: fit.objective,
+            termination: fit.termination.name(),
+            combinations: fit.combinations,
+            starts: fit.starts,
+            agreeing: fit.agreeing,
+            runner_up: fit.runner_up,
+            zero: fit.zero.clone(),
+            at_end: fit.at_end.clone(),
+            notes: outcome.notes.clone(),
+        }
+    }
+}
+
+impl FitsFile {
+    /// The file of some outcomes.
+    #[must_use]
+    pub fn new(groups: &[Group], outcomes: &[Outcome], settings: &Settings, files: Vec<String>) -> Self {
+        Self {
+            schema_version: 1,
+            rate_hz: settings.rate_hz,
+            model: settings.spec.to_string(),
+            fits: outcomes.iter().map(|o| FitEntry::new(&groups[o.group], o)).collect(),
+            files,
+        }
+    }
+}
+
+fn process_json(process: &Process) -> Map<String, Value> {
+    let parameters = process.parameters().into_iter().map(|(name, value)| (name.to_owned(), value.into()));
+    std::iter::once(("type".to_owned(), process.code().into())).chain(parameters).collect()
+}
+
+/// A fit in words: a head line, a line for each process, how sure the optimum is, the remarks.
+#[must_use]
+pub fn describe(group: &Group, outcome: &Outcome, settings: &Settings) -> String {
+    let mut lines = vec![head(group, outcome, settings)];
+    lines.extend(process_lines(
+        &outcome.fit.composite,
+        group.sensor,
+        &outcome.curve.levels,
+        settings.rate_hz,
+    ));
+    lines.push(optimum(outcome));
+    lines.extend(outcome.notes.iter().map(|note| format!("  note: {note}")));
+    lines.join("\n")
+}
+
+fn head(group: &Group, outcome: &Outcome, settings: &Settings) -> String {
+    let count = group.replicates.len();
+    let signals = if count == 1 { "1 signal".to_owned() } else { format!("{count} signals") };
+    let trimmed = match settings.trim.count(count) {
+        a if outcome.estimator == Estimator::DrAwv => {
+            format!(", {a} dropped at each end of each scale")
+        }
+        _ => String::new(),
+    };
+    let scales = outcome.curve.levels.len();
+    format!(
+        "{} · {} · {} · {signals}{trimmed}, {scales} scales",
+        group.name(),
+        outcome.estimator.name(),
+        settings.spec
+    )
+}
+
+fn process_lines(model: &Composite, sensor: Sensor, levels: &[u32], rate_hz: f64) -> Vec<String> {
+    let shares = shares(model, levels);
+    let line = |((process, label), share): ((&Process, String), &Share)| {
+        let parameters: Vec<String> =
+            process.parameters().iter().map(|(name, value)| format!("{name} = {value:.6e}")).collect();
+        let parameters = parameters.join(", ");
+        if share.largest.0 <= 0.0 {
+            return format!("  {label:<6} {parameters:<42} no part in it");
+        }
+        let meaning = meaning(process, sensor, rate_hz);
+        let governs = match (share.leads.first(), share.leads.last()) {
+            (Some(first), Some(last)) => {
+                format!("leads from {} s to {} s", tau_s(*first, rate_hz), tau_s(*last, rate_hz))
+            }
+            _ => format!(
+                "leads nowhere, at most {} at {} s",
+                percent(share.largest.0),
+                tau_s(share.largest.1, rate_hz)
+            ),
+        };
+        format!("  {label:<6} {parameters:<42} {meaning}; {governs}")
+    };
+    model.processes.iter().zip(model.labels()).zip(&shares).map(line).collect()
+}
+
+/// The parameters in the terms of data sheets.
+fn meaning(process: &Process, sensor: Sensor, rate_hz: f64) -> String {
+    let dt = 1.0 / rate_hz;
+    let unit = sensor.unit();
+    // Per √h, in degrees for angles.
+    let (per_root_hour, root_hour_unit) = match sensor {
+        Sensor::Accel => (60.0, "m/s/√h"),
+        Sensor::Gyro => (60.0 / DEG, "°/√h"),
+    };
+    match process {
+        Process::White(p) => {
+            format!(
+                "random walk of the integral {:.4e} {root_hour_unit}",
+                (p.sigma2() * dt).sqrt() * per_root_hour
+            )
+        }
+        Process::Quantization(p) => {
+            format!("Q = {:.4e} {unit}, times dt {:.4e} {unit}·s", p.q2().sqrt(), p.q2().sqrt() * dt)
+        }
+        Process::Ar1(p) => match correlation_time_s(process, rate_hz) {
+            Some(t) => {
+                format!("correlation time {t:.4} s, standard deviation {:.4e} {unit}", p.variance().sqrt())
+            }
+            None => format!("alternating, standard deviation {:.4e} {unit}", p.variance().sqrt()),
+        },
+        Process::GaussMarkov(p) => {
+            format!(
+                "correlation time {:.4} s, standard deviation {:.4e} {unit}",
+                1.0 / p.beta(),
+                p.s2().sqrt()
+            )
+        }
+        Process::RandomWalk(p) => format!("{:.4e} {unit}/√s", (p.gamma2() * rate_hz).sqrt()),
+        Process::Drift(p) => format!("{:.4e} {unit}/s", p.slope() * rate_hz),
+        Process::Ma1(p) => {
+            format!("standard deviation {:.4e} {unit}", (p.sigma2() * (1.0 + p.theta() * p.theta())).sqrt())
+        }
+    }
+}
+
+fn optimum(outcome: &Outcome) -> String {
+    let fit = &outcome.fit;
+    let search = match (fit.combinations, fit.starts) {
+        (1, _) => "the only minimum".to_owned(),
+        (n, 1) => format!("{n} combinations of shapes tried, one minimum"),
+        (n, starts) => {
+            let next = fit.runner_up.map_or(String::new(), |f| format!(", the next best at {f:.6e}"));
+            format!(
+                "{n} combinations of shapes tried, {starts} minima descended to, {} agree{next}",
+                fit.agreeing
+            )
+        }
+    };
+    format!("  objective {:.6e}, {}: {search}", fit.objective, fit.termination.name().replace('_', " "))
+}
