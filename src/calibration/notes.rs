@@ -94,9 +94,14 @@ fn not_identifiable(fit: &Fit, curve: &Curve, rate_hz: f64, notes: &mut Vec<Stri
                 "{label} is at most {part} of the wavelet variance (at {scale} s): weakly identifiable"
             ));
         }
-        if let Some(t_corr_s) = correlation_time_s(process, rate_hz)
-            && PEAK * t_corr_s > longest_s
-        {
+        let Some(t_corr_s) = correlation_time_s(process, rate_hz) else { continue };
+        if t_corr_s * rate_hz < 1.0 {
+            notes.push(format!(
+                "{label}: its correlation time of {t_corr_s:.4} s is shorter than a sample: white noise by another \
+                 name"
+            ));
+        }
+        if PEAK * t_corr_s > longest_s {
             notes.push(format!(
                 "{label}: its correlation time of {t_corr_s:.3} s is not identifiable from scales up to \
                  {longest_s:.3} s; there it looks like a random walk"

@@ -9,7 +9,6 @@ use nav_sim::calibration::{
 };
 use nav_sim::data::curve_file::{self, NamedCurve};
 use nav_sim::data::model_file::{self, CalibrationNote};
-use nav_sim::data::recordings::Report;
 use nav_sim::data::suggest::nearest;
 use nav_sim::data::{atomic, hash};
 use nav_sim::imu::{Channel, Recording, Sensor};
@@ -138,13 +137,14 @@ fn unknown_model(e: SpecError) -> Failure {
 }
 
 fn of_recordings(args: &Args, settings: &mut Settings, session: &Session) -> Result<(), Failure> {
-    let out = args.out.clone().unwrap_or_else(|| "model.toml".into());
-    writable(&out, &args.inputs)?;
     // As many scales as parameters, and one that the default leaves out.
     let needed = args.tuning.scales.map_or(2 << settings.spec.parameters(), |j| 1 << j);
     let (recordings, report) = args.recordings.read(&args.inputs, needed, session)?;
     settings.rate_hz = recordings[0].rate_hz;
     settings.estimators = estimators(args.estimator, recordings.len())?;
+    let files: Vec<PathBuf> = report.files.iter().map(|f| PathBuf::from(&f.file)).collect();
+    let out = args.out.as_deref().unwrap_or(Path::new("model.toml"));
+    let outputs = outputs(out, &settings.estimators, &files)?;
     let pool = pool(args, settings)?;
     enough(&recordings, pool, settings)?;
     let count = recordings.iter().map(|r| r.signals.len() as u64).sum();
@@ -154,15 +154,31 @@ fn of_recordings(args: &Args, settings: &mut Settings, session: &Session) -> Res
     drop(recordings);
     let groups = grouped(measured, pool);
     let outcomes = calibrate(&groups, settings).map_err(|e| of_calibration(&e))?;
-    let note = note(args, inputs(&report)?);
-    finish(Some(&out), &groups, &outcomes, settings, &note, session)
+    let inputs = files.iter().map(|f| hashed("recording", f)).collect::<Result<_, _>>()?;
+    let note = note(args, inputs);
+    finish(&outputs, &groups, &outcomes, settings, &note, session)
 }
 
-/// Fails before the work is done, not after.
-fn writable(out: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
-    atomic::guard_inputs(out, inputs.iter().map(PathBuf::as_path))?;
-    drop(atomic::AtomicFile::create(out)?);
-    Ok(())
+/// One estimator's files.
+struct Output {
+    estimator: Estimator,
+    model: PathBuf,
+    curves: PathBuf,
+}
+
+/// The files of each estimator. Fails before the work is done, not after, if they cannot be written.
+fn outputs(out: &Path, estimators: &[Estimator], inputs: &[PathBuf]) -> Result<Vec<Output>, Failure> {
+    let output = |estimator: &Estimator| {
+        let suffix = if estimators.len() > 1 { format!("_{}", estimator.name()) } else { String::new() };
+        let model = with_suffix(out, &suffix);
+        let curves = model.with_extension("wv.json");
+        for path in [&model, &curves] {
+            atomic::guard_inputs(path, inputs.iter().map(PathBuf::as_path))?;
+            drop(atomic::AtomicFile::create(path)?);
+        }
+        Ok(Output { estimator: *estimator, model, curves })
+    };
+    estimators.iter().map(output).collect()
 }
 
 fn estimators(arg: EstimatorArg, recordings: usize) -> Result<Vec<Estimator>, Failure> {
@@ -235,17 +251,24 @@ fn of_calibration(e: &CalibrationError) -> Failure {
 }
 
 fn of_curves(args: &Args, path: &Path, settings: &mut Settings, session: &Session) -> Result<(), Failure> {
-    if let Some(out) = &args.out {
-        writable(out, &[path.to_owned()])?;
-    }
     let curves = curve_file::read(path).map_err(|e| {
         let failure = if e.is_content() { Failure::input(&e) } else { Failure::could_not(&e) };
         failure.maybe_hint(e.hint())
     })?;
     settings.rate_hz = curves[0].rate_hz.or(args.recordings.rate_hz()).unwrap_or(1.0);
+    let estimator = |named: &NamedCurve| {
+        let named_so = |e: &Estimator| named.estimator.as_deref() == Some(e.name());
+        Estimator::ALL.into_iter().find(named_so).unwrap_or(Estimator::Given)
+    };
+    let found: Vec<Estimator> = curves.iter().map(estimator).collect();
+    settings.estimators = Estimator::ALL.into_iter().filter(|e| found.contains(e)).collect();
+    let outputs = match &args.out {
+        Some(out) => outputs(out, &settings.estimators, &[path.to_owned()])?,
+        None => Vec::new(),
+    };
     let mut groups = Vec::new();
     let mut outcomes = Vec::new();
-    for named in curves {
+    for (named, estimator) in curves.into_iter().zip(found) {
         let Some(sensor) = named.sensor.or(args.sensor).or(args.out.is_none().then_some(Sensor::Accel))
         else {
             let failure =
@@ -253,24 +276,17 @@ fn of_curves(args: &Args, path: &Path, settings: &mut Settings, session: &Sessio
             return Err(failure.hint("--sensor accel or --sensor gyro"));
         };
         groups.push(Group { sensor, axis: named.axis, replicates: Vec::<Replicate>::new() });
-        let NamedCurve { curve, estimator, .. } = named;
-        let named_so = |e: &Estimator| estimator.as_deref() == Some(e.name());
-        let estimator = Estimator::ALL.into_iter().find(named_so).unwrap_or(Estimator::Given);
-        let outcome = fit_curve(&groups, groups.len() - 1, estimator, curve, settings);
+        let outcome = fit_curve(&groups, groups.len() - 1, estimator, named.curve, settings);
         outcomes.push(outcome.map_err(|e| of_calibration(&e))?);
     }
     let input = hashed("curve", path)?;
     let note = note(args, vec![input]);
-    finish(args.out.as_deref(), &groups, &outcomes, settings, &note, session)
+    finish(&outputs, &groups, &outcomes, settings, &note, session)
 }
 
 fn hashed(role: &str, path: &Path) -> Result<Input, Failure> {
     let blake3 = hash::of_file(path).map_err(|e| Failure::could_not(format!("{}: {e}", path.display())))?;
     Ok(Input { role: role.to_owned(), path: path.display().to_string(), blake3 })
-}
-
-fn inputs(report: &Report) -> Result<Vec<Input>, Failure> {
-    report.files.iter().map(|f| hashed("recording", Path::new(&f.file))).collect()
 }
 
 fn note(args: &Args, inputs: Vec<Input>) -> CalibrationNote {
@@ -289,7 +305,7 @@ fn note(args: &Args, inputs: Vec<Input>) -> CalibrationNote {
 
 /// Writes one model and its curves for each estimator, and prints the fits.
 fn finish(
-    out: Option<&Path>,
+    outputs: &[Output],
     groups: &[Group],
     outcomes: &[Outcome],
     settings: &Settings,
@@ -297,13 +313,11 @@ fn finish(
     session: &Session,
 ) -> Result<(), Failure> {
     let mut files = Vec::new();
-    for (suffix, own) in by_estimator(outcomes) {
-        let Some(out) = out else { continue };
-        let path = with_suffix(out, &suffix);
-        let curves = path.with_extension("wv.json");
-        atomic::write(&curves, report::json(&CurvesFile::new(groups, &own, settings)))?;
-        model_file::write(&path, &note.model_file(groups, &own, settings))?;
-        files.extend([path, curves].map(|p| p.display().to_string()));
+    for Output { estimator, model, curves } in outputs {
+        let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == *estimator).collect();
+        atomic::write(curves, report::json(&CurvesFile::new(groups, &own, settings)))?;
+        model_file::write(model, &note.model_file(groups, &own, settings))?;
+        files.extend([model, curves].map(|p| p.display().to_string()));
     }
     if session.json() {
         let json = report::json(&FitsFile::new(groups, outcomes, settings, files.clone()));
@@ -316,17 +330,6 @@ fn finish(
         session.printer.say(&format!("wrote {file}"));
     }
     Ok(())
-}
-
-/// The outcomes of each estimator, and what tells its files from those of the others.
-fn by_estimator(outcomes: &[Outcome]) -> Vec<(String, Vec<&Outcome>)> {
-    let of = |e: Estimator| outcomes.iter().filter(|o| o.estimator == e).collect::<Vec<_>>();
-    let mut parts: Vec<_> = Estimator::ALL.into_iter().map(|e| (format!("_{}", e.name()), of(e))).collect();
-    parts.retain(|(_, own)| !own.is_empty());
-    if let [(suffix, _)] = parts.as_mut_slice() {
-        suffix.clear();
-    }
-    parts
 }
 
 fn with_suffix(path: &Path, suffix: &str) -> PathBuf {

@@ -1,0 +1,242 @@
+//! `wv` and `calibrate` as a user runs them.
+
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use assert_cmd::Command;
+use nav_sim::noise::{Ar1, Composite, Process, RandomWalk, White};
+use nav_sim::rng::StreamKey;
+use rand::RngExt;
+use rand_distr::StandardNormal;
+use serde_json::Value;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+const SAMPLES: usize = 1 << 14;
+
+/// WN + AR1 + RW whose parts lead at different scales of 2^14 samples.
+fn truth() -> [Process; 3] {
+    [
+        Process::White(White::new(4e-6).unwrap()),
+        Process::Ar1(Ar1::new(0.98, 4e-8).unwrap()),
+        Process::RandomWalk(RandomWalk::new(1e-11).unwrap()),
+    ]
+}
+
+fn signal(run: u64, source: &str) -> Vec<f64> {
+    let key = StreamKey { seed: 7, scenario: "calibrate", run, source, process: "" };
+    let mut generator = key.generator();
+    let mut normal = || generator.sample::<f64, _>(StandardNormal);
+    let mut ar1 = (4e-8_f64 / (1.0 - 0.98 * 0.98)).sqrt() * normal();
+    let mut walk = 0.0;
+    (0..SAMPLES)
+        .map(|_| {
+            ar1 = 0.98 * ar1 + 2e-4 * normal();
+            walk += 1e-11_f64.sqrt() * normal();
+            2e-3 * normal() + ar1 + walk
+        })
+        .collect()
+}
+
+/// Replicates of gyro x and y at 50 Hz.
+fn recordings(dir: &Path, count: u64) -> PathBuf {
+    let runs = dir.join("runs");
+    std::fs::create_dir(&runs).unwrap();
+    for run in 0..count {
+        let (x, y) = (signal(run, "gyro.x"), signal(run, "gyro.y"));
+        let mut text = "t_s,gyro_x_rad_s,gyro_y_rad_s\n".to_owned();
+        for t in 0..SAMPLES {
+            writeln!(text, "{:.2},{:e},{:e}", 0.02 * t as f64, x[t], y[t]).unwrap();
+        }
+        std::fs::write(runs.join(format!("run{run}.csv")), text).unwrap();
+    }
+    runs
+}
+
+fn nav_sim(dir: &Path) -> Command {
+    let mut command = Command::cargo_bin("nav-sim").unwrap();
+    command.current_dir(dir);
+    command
+}
+
+fn json(dir: &Path, arguments: &[&str]) -> Value {
+    let output = nav_sim(dir).args(arguments).args(["--format", "json", "-q"]).assert().success();
+    serde_json::from_slice(&output.get_output().stdout).unwrap()
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().unwrap_or_else(|| panic!("{value}")).iter().map(|v| v.as_f64().unwrap()).collect()
+}
+
+#[track_caller]
+fn refusal(dir: &Path, arguments: &[&str], code: i32) -> String {
+    let output = nav_sim(dir).args(arguments).assert().code(code);
+    assert!(output.get_output().stdout.is_empty());
+    String::from_utf8(output.get_output().stderr.clone()).unwrap()
+}
+
+#[test]
+fn recordings_become_a_model_file_and_its_curves() {
+    let dir = tempfile::tempdir().unwrap();
+    recordings(dir.path(), 6);
+    let out =
+        json(dir.path(), &["calibrate", "runs", "--model", "N1", "--estimator", "all", "-o", "imu.toml"]);
+    assert_eq!(out["fits"].as_array().unwrap().len(), 3);
+    let model = Composite::new(truth().to_vec());
+    for estimator in ["awv", "sr-awv", "dr-awv"] {
+        let file =
+            nav_sim::data::model_file::read(&dir.path().join(format!("imu_{estimator}.toml"))).unwrap();
+        assert_eq!(file.model.rate_hz.round() as i64, 50);
+        let missing: Vec<String> = file.missing.iter().map(ToString::to_string).collect();
+        assert_eq!(missing, ["accel.x", "accel.y", "accel.z"], "pooled: one model for the three axes");
+        assert_eq!(file.provenance.unwrap()["estimator"].as_str(), Some(estimator));
+        let text = std::fs::read_to_string(dir.path().join(format!("imu_{estimator}.wv.json"))).unwrap();
+        let curves: Value = serde_json::from_str(&text).unwrap();
+        let curve = &curves["curves"][0];
+        assert_eq!((curve["sensor"].as_str(), curve["axis"].as_str()), (Some("gyro"), Some("all")));
+        assert_eq!(curve["replicates"].as_array().unwrap().len(), 12);
+        let (wv, edof) = (numbers(&curve["wv"]), numbers(&curve["edof"]));
+        assert_eq!(wv.len(), 13);
+        let parts: Vec<Vec<f64>> = ["WN", "AR1", "RW"].map(|l| numbers(&curve["processes"][l])).to_vec();
+        for i in 0..13 {
+            // The degrees of freedom are conservative: five deviations, 13 × 3 values.
+            let deviation = (wv[i] / model.haar_wv(i as u32 + 1) - 1.0) / (2.0 / edof[i]).sqrt();
+            assert!(deviation.abs() < 5.0, "{estimator}, level {}: {deviation}", i + 1);
+            let implied = curve["implied"][i].as_f64().unwrap();
+            assert!((parts.iter().map(|p| p[i]).sum::<f64>() / implied - 1.0).abs() < 1e-12);
+            let (low, high) = (numbers(&curve["ci_low"])[i], numbers(&curve["ci_high"])[i]);
+            assert!(low < wv[i] && wv[i] < high);
+            assert!(
+                (curve["tau_s"][i].as_f64().unwrap() / (0.02 * 2_f64.powi(i as i32 + 1)) - 1.0).abs() < 1e-6
+            );
+        }
+    }
+}
+
+#[test]
+fn a_curve_written_is_a_curve_read() {
+    let dir = tempfile::tempdir().unwrap();
+    recordings(dir.path(), 3);
+    let first = json(dir.path(), &["calibrate", "runs", "--model", "N1", "--pool", "axes", "-o", "imu.toml"]);
+    let again = json(dir.path(), &["calibrate", "--curve", "imu.wv.json", "--model", "AR1+WN+RW"]);
+    assert_eq!(first["fits"].as_array().unwrap().len(), 2);
+    for (a, b) in first["fits"].as_array().unwrap().iter().zip(again["fits"].as_array().unwrap()) {
+        assert_eq!(
+            (&a["sensor"], &a["axis"], &a["termination"]),
+            (&b["sensor"], &b["axis"], &b["termination"])
+        );
+        assert!((a["objective"].as_f64().unwrap() / b["objective"].as_f64().unwrap() - 1.0).abs() < 1e-9);
+    }
+    assert_eq!(first["fits"][1]["axis"], "y");
+}
+
+#[test]
+fn a_table_of_exact_values_gives_back_its_parameters() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut text = "tau_samples,wv,edof\n".to_owned();
+    for level in 1..=15_u32 {
+        let wv: f64 = truth().iter().map(|p| p.haar_wv(level)).sum();
+        writeln!(text, "{},{wv:e},{}", 1_u64 << level, 5e5 / f64::from(level).exp2()).unwrap();
+    }
+    std::fs::write(dir.path().join("curve.csv"), text).unwrap();
+    let out = json(dir.path(), &["calibrate", "--curve", "curve.csv", "--model", "N1"]);
+    let processes = &out["fits"][0]["processes"];
+    for (i, process) in truth().iter().enumerate() {
+        assert_eq!(processes[i]["type"], process.code());
+        for (name, value) in process.parameters() {
+            assert!((processes[i][name].as_f64().unwrap() / value - 1.0).abs() < 1e-8, "{name}");
+        }
+    }
+    assert_eq!(out["files"].as_array().unwrap().len(), 0);
+    let stderr = refusal(dir.path(), &["calibrate", "--curve", "curve.csv", "-o", "m.toml"], 2);
+    assert!(stderr.contains("curve.csv: the curve does not say of which sensor it is"), "{stderr}");
+    json(dir.path(), &["calibrate", "--curve", "curve.csv", "--sensor", "gyro", "-o", "m.toml"]);
+    assert!(dir.path().join("m.toml").exists());
+}
+
+#[test]
+fn threads_do_not_change_a_byte() {
+    let dir = tempfile::tempdir().unwrap();
+    recordings(dir.path(), 4);
+    for threads in ["1", "2"] {
+        let out = format!("m{threads}.toml");
+        nav_sim(dir.path()).args(["calibrate", "runs", "-q", "-j", threads, "-o", &out]).assert().success();
+    }
+    let read = |name: &str| std::fs::read_to_string(dir.path().join(name)).unwrap();
+    assert_eq!(read("m1.toml"), read("m2.toml"));
+    assert_eq!(read("m1.wv.json"), read("m2.wv.json"));
+}
+
+#[test]
+fn wv_prints_the_curves_of_every_signal() {
+    let dir = tempfile::tempdir().unwrap();
+    recordings(dir.path(), 2);
+    let out = json(dir.path(), &["wv", "runs/run1.csv"]);
+    let signals = out["signals"].as_array().unwrap();
+    assert_eq!(signals.len(), 2);
+    assert_eq!((&signals[1]["sensor"], &signals[1]["axis"]), (&"gyro".into(), &"y".into()));
+    assert_eq!(signals[0]["samples"], SAMPLES);
+    let x = signal(1, "gyro.x");
+    let mean = x.iter().sum::<f64>() / SAMPLES as f64;
+    let centred: Vec<f64> = x.iter().map(|v| v - mean).collect();
+    let expected = nav_sim::wavelet::classical(&centred, 13).unwrap();
+    for (actual, expected) in numbers(&signals[0]["classical"]["wv"]).iter().zip(expected) {
+        // The file holds all digits; the mean is removed twice along different roads.
+        assert!((actual / expected - 1.0).abs() < 1e-9);
+    }
+    for key in ["wv", "ci_low", "ci_high"] {
+        assert_eq!(numbers(&signals[0]["robust"][key]).len(), 13);
+    }
+    assert_eq!(signals[0]["robust"]["status"][0], "ok");
+    let wide = numbers(&signals[0]["classical"]["ci_high"]);
+    let out = json(dir.path(), &["wv", "runs/run1.csv", "--intervals", "large-sample", "--scales", "5"]);
+    let narrow = numbers(&out["signals"][0]["classical"]["ci_high"]);
+    assert_eq!((narrow.len(), out["edof_method"].as_str()), (5, Some("large-sample")));
+    assert!(narrow[4] < wide[4]);
+    let text = nav_sim(dir.path()).args(["wv", "runs", "-q"]).assert().success();
+    let text = String::from_utf8(text.get_output().stdout.clone()).unwrap();
+    assert!(text.contains("run0.csv · gyro.x · 16384 samples") && text.contains("Allan deviation"), "{text}");
+}
+
+#[test]
+fn bad_requests_are_refused_with_a_hint() {
+    let dir = tempfile::tempdir().unwrap();
+    recordings(dir.path(), 2);
+    let calibrate =
+        |more: &[&str], code| refusal(dir.path(), &[&["calibrate", "runs", "-q"], more].concat(), code);
+    let check = |stderr: String, parts: &[&str]| {
+        for part in parts {
+            assert!(stderr.contains(part), "{part:?} is not in {stderr}");
+        }
+    };
+    check(
+        calibrate(&["--model", "2*AR+RW"], 2),
+        &["error: --model: model \"2*AR+RW\": \"AR\" is no process", "hint: did you mean \"AR1\"?"],
+    );
+    check(calibrate(&["--model", "2*WN"], 2), &["2 WN are one WN"]);
+    check(
+        calibrate(&["--trim", "2"], 2),
+        &["gyro: trimming 2 replicates at each end needs at least 5 replicates; there are 4", "hint:"],
+    );
+    check(calibrate(&["--trim", "60%"], 2), &["--trim", "a percentage under 50"]);
+    check(calibrate(&["--efficiency", "1.5"], 2), &["--efficiency: efficiency 1.5 is out of range"]);
+    check(calibrate(&["--scales", "20"], 2), &["run0.csv", "16384", "hint:"]);
+    check(
+        calibrate(&["--scales", "5"], 2),
+        &["WN+QN+2*AR1+RW has 7 parameters, the curve 5 scales", "hint: record for longer"],
+    );
+    check(calibrate(&["--estimator", "gmwm"], 2), &["gmwm takes one recording at a time; there are 2"]);
+    let before = std::fs::read(dir.path().join("runs/run0.csv")).unwrap();
+    check(calibrate(&["-o", "runs/run0.csv"], 2), &["is an input of this command and would be overwritten"]);
+    assert_eq!(std::fs::read(dir.path().join("runs/run0.csv")).unwrap(), before);
+    std::fs::create_dir(dir.path().join("taken.toml")).unwrap();
+    check(calibrate(&["-o", "taken.toml"], 1), &["taken.toml: "]);
+    check(refusal(dir.path(), &["calibrate"], 2), &["required"]);
+    check(refusal(dir.path(), &["calibrate", "nowhere.csv"], 1), &["nowhere.csv: No such file"]);
+    check(refusal(dir.path(), &["wv", "runs", "--axes", "gyro.w"], 2), &["gyro.w", "accel.x"]);
+    std::fs::write(dir.path().join("curve.csv"), "tau_samples,wv,edof\n2,1e-5,10\n4,0,5\n").unwrap();
+    check(
+        refusal(dir.path(), &["calibrate", "--curve", "curve.csv"], 2),
+        &["curve.csv, line 3: wv = 0 is not a finite number > 0", "hint: a curve is a CSV"],
+    );
+    assert!(!dir.path().join("model.toml").exists() && !dir.path().join("model.wv.json").exists());
+}
