@@ -3,13 +3,15 @@
 use super::belief::Belief;
 use super::covariance::{BIAS, Covariance, PSI, R, V};
 use super::dynamics::{EARTH_STEP_S, EarthTerms, NavRows, Sample};
-use super::initial::InitialSettings;
-use crate::frames::{NavState, RollPitchYaw};
-use crate::imu::Sensor;
+use super::initial::{InitialSettings, psi_of_angles};
+use crate::frames::NavState;
+use crate::imu::{ImuSample, Sensor};
 use crate::lanes::{Lanes, Mat3, Vec3};
 use crate::strapdown::Strapdown;
 use crate::units::DEG;
 use glam::DVec3;
+use multiversion::multiversion;
+use nalgebra::Matrix3;
 
 /// Error-state extended Kalman filter, closed loop.
 #[derive(Debug, Clone)]
@@ -43,12 +45,10 @@ pub(super) struct Scratch {
 }
 
 impl Ekf {
-    /// A filter that starts at the same nominal state in every lane, with zero bias estimates.
-    ///
-    /// The attitude standard deviations, given for roll, pitch and yaw, are brought to psi_n at the start
-    /// attitude.
+    /// A filter at its nominal start, with zero bias estimates. The attitude standard deviations, given
+    /// for roll, pitch and yaw, are brought to psi_n at the attitude of `about`, the same in all lanes.
     #[must_use]
-    pub fn new(nominal: Strapdown, belief: &Belief, initial: &InitialSettings) -> Self {
+    pub fn new(nominal: Strapdown, belief: &Belief, about: &NavState, initial: &InitialSettings) -> Self {
         let mut belief = belief.clone();
         let overrides =
             [(Sensor::Accel, initial.accel_bias_sigma_m_s2), (Sensor::Gyro, initial.gyro_bias_sigma_rad_s)];
@@ -63,8 +63,7 @@ impl Ekf {
         let square = |sigma: [f64; 3]| diagonal(DVec3::from(sigma) * DVec3::from(sigma));
         p.set_diagonal_block(R, square(initial.pos_sigma_m));
         p.set_diagonal_block(V, square(initial.vel_sigma_m_s));
-        let start = nominal.lane(0);
-        p.set_diagonal_block(PSI, attitude_covariance(&start, initial.att_sigma_deg));
+        p.set_diagonal_block(PSI, attitude_covariance(about, initial.att_sigma_deg));
         for (g, group) in groups.iter().enumerate() {
             p.set_diagonal_block(BIAS + g, diagonal(group.initial));
         }
@@ -246,12 +245,22 @@ impl Ekf {
 
 /// Covariance of psi_n for standard deviations of roll, pitch and yaw (degrees).
 fn attitude_covariance(state: &NavState, sigma_deg: [f64; 3]) -> Mat3 {
-    let angles = RollPitchYaw::from_quat(state.q_b_n);
-    let j = angles.jacobian_of_psi_n();
-    let j = nalgebra::Matrix3::from_fn(|row, column| j[row][column]);
-    let sigma = sigma_deg.map(|s| (s * DEG).powi(2));
-    let d = nalgebra::Matrix3::from_diagonal(&sigma.into());
-    // At pitch ±90° roll and yaw are not separate: the standard deviations are then taken about n's axes.
-    let p = j.try_inverse().map_or(d, |inverse| inverse * d * inverse.transpose());
+    let psi = psi_of_angles(state.q_b_n);
+    let variances = sigma_deg.map(|s| (s * DEG).powi(2));
+    let p = psi * Matrix3::from_diagonal(&variances.into()) * psi.transpose();
     Mat3::from_fn(|row, column| Lanes::splat(p[(row, column)]))
+}
+
+/// Advances a filter through IMU samples: the same ideal samples for all runs plus the errors of each,
+/// accelerometer (m/s²) and gyroscope (rad/s). Compiled for the vector units of the machine and
+/// dispatched at run time.
+///
+/// # Panics
+/// When samples and errors are not equally many.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+pub fn advance(ekf: &mut Ekf, samples: &[ImuSample], errors: &[[Vec3; 2]]) {
+    assert_eq!(samples.len(), errors.len(), "one error for each sample");
+    for (sample, [accel, gyro]) in samples.iter().zip(errors) {
+        ekf.predict(Vec3::splat(sample.omega_ib_b) + *gyro, Vec3::splat(sample.f_ib_b) + *accel);
+    }
 }

@@ -1,6 +1,9 @@
 //! What the filter knows at the start, and how far the nominal start is drawn from the truth.
 
+use crate::frames::RollPitchYaw;
 use crate::units::{SettingError, require_non_negative, require_positive};
+use glam::DQuat;
+use nalgebra::Matrix3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -92,6 +95,15 @@ impl InitialSettings {
         require_non_negative("accel_bias_sigma_m_s2", self.accel_bias_sigma_m_s2.as_slice())?;
         require_non_negative("gyro_bias_sigma_rad_s", self.gyro_bias_sigma_rad_s.as_slice())
     }
+}
+
+/// The rotation vector psi_n of small roll, pitch and yaw errors at an attitude: the inverse of
+/// [`RollPitchYaw::jacobian_of_psi_n`]. At pitch ±90° roll and yaw are not separate: the errors are then
+/// taken about the axes of n.
+#[must_use]
+pub fn psi_of_angles(q_b_n: DQuat) -> Matrix3<f64> {
+    let j = RollPitchYaw::from_quat(q_b_n).jacobian_of_psi_n();
+    Matrix3::from_fn(|row, column| j[row][column]).try_inverse().unwrap_or_else(Matrix3::identity)
 }
 
 #[cfg(test)]

@@ -14,8 +14,9 @@ pub mod update;
 
 pub use belief::{Belief, BeliefError};
 pub use covariance::Covariance;
-pub use filter::Ekf;
+pub use filter::{Ekf, advance};
 pub use initial::{FilterStates, InitialSettings};
+pub use update::{Fix, update};
 
 #[cfg(test)]
 mod tests;

@@ -168,7 +168,7 @@ fn ekf(model: &Model, states: FilterStates) -> Ekf {
         v_n: DVec3::new(15.0, -5.0, 0.5),
         q_b_n: DQuat::from_scaled_axis(DVec3::new(0.05, -0.1, 1.0)),
     };
-    Ekf::new(Strapdown::new(&start, GravityModel::Wgs84), &belief, &InitialSettings::default())
+    Ekf::new(Strapdown::new(&start, GravityModel::Wgs84), &belief, &start, &InitialSettings::default())
 }
 
 /// A fix at the nominal position itself: the innovation is zero, the covariance does what it does.

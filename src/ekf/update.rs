@@ -6,6 +6,7 @@ use super::filter::Ekf;
 use crate::earth::{OMEGA_IE, radii};
 use crate::lanes::{Lanes, Mat3, Quat, Real, Vec3};
 use glam::DVec3;
+use multiversion::multiversion;
 
 /// A fix for each of eight runs; the standard deviations are the filter's belief and the same for all.
 #[derive(Debug, Clone, Copy)]
@@ -98,6 +99,12 @@ impl Ekf {
             *bias = *bias - Vec3(std::array::from_fn(|i| self.scratch.error[3 * (BIAS + g) + i]));
         }
     }
+}
+
+/// [`Ekf::update`], compiled for the vector units of the machine and dispatched at run time.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+pub fn update(ekf: &mut Ekf, fix: &Fix) -> Lanes {
+    ekf.update(fix)
 }
 
 /// Where the antenna is and how it moves about the IMU, and the measurement rows that follow.

@@ -1,6 +1,9 @@
 //! The GNSS receiver: what it measures, how often and how well.
 
+use crate::rng::{Generator, StreamKey};
 use crate::units::{SettingError, require_finite, require_positive};
+use glam::DVec3;
+use rand_distr::{Distribution, StandardNormal};
 use schemars::JsonSchema;
 use serde::de::{self, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -51,6 +54,36 @@ impl GnssSettings {
     pub const fn components(&self) -> usize {
         if self.vel_sigma_m_s.is_some() { 6 } else { 3 }
     }
+}
+
+/// The noise of the receiver in one run: one stream a component, drawn at every epoch whether the fix is
+/// used or not, so that outages change no number.
+#[derive(Debug, Clone)]
+pub struct GnssNoise {
+    streams: [Generator; 6],
+    sigma: [f64; 6],
+}
+
+impl GnssNoise {
+    /// The noise of run `key.run`.
+    #[must_use]
+    pub fn new(settings: &GnssSettings, key: StreamKey<'_>) -> Self {
+        const COMPONENTS: [&str; 6] = ["pos_n", "pos_e", "pos_d", "vel_n", "vel_e", "vel_d"];
+        let streams = COMPONENTS.map(|process| StreamKey { source: "gnss", process, ..key }.generator());
+        let velocity = settings.vel_sigma_m_s.unwrap_or([0.0; 3]);
+        let sigma = std::array::from_fn(|i| if i < 3 { settings.pos_sigma_m[i] } else { velocity[i - 3] });
+        Self { streams, sigma }
+    }
+
+    /// Position error (m) and velocity error (m/s) of the next fix, n.
+    pub fn draw(&mut self) -> (DVec3, DVec3) {
+        let e: [f64; 6] = std::array::from_fn(|i| self.sigma[i] * normal(&mut self.streams[i]));
+        (DVec3::new(e[0], e[1], e[2]), DVec3::new(e[3], e[4], e[5]))
+    }
+}
+
+fn normal(generator: &mut Generator) -> f64 {
+    StandardNormal.sample(generator)
 }
 
 fn sigmas_or_none<S: Serializer>(sigmas: &Option<[f64; 3]>, serializer: S) -> Result<S::Ok, S::Error> {

@@ -2,4 +2,5 @@
 
 pub mod gnss;
 pub mod ideal_imu;
+pub mod imu;
 pub mod outage;

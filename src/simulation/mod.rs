@@ -1,5 +1,11 @@
 //! One lane batch: eight runs through one trajectory.
 
+mod batch;
+mod plan;
+
+pub use batch::{Batch, run_batch};
+pub use plan::{Experiment, ExperimentError, Plan};
+
 /// Number of reported navigation states: position, velocity (n, e, d), roll, pitch, yaw.
 pub const REPORTED: usize = 9;
 
@@ -54,13 +60,14 @@ pub struct EpochSums {
 /// What is kept of one run in one outage.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct OutageRecord {
-    /// Mean over the outage's reporting epochs of the SEE of each reported state.
+    /// Mean over the outage's reporting epochs (start ≤ t < end) of the SEE of each reported state.
     pub see_mean: [f64; REPORTED],
     /// Error of each reported state just before the first fix after the outage (or at the end).
     pub error_end: [f64; REPORTED],
     /// Horizontal position error at the same instant (m).
     pub horizontal_error_end_m: f64,
-    /// Time from the outage's end until the horizontal error stays… see `metrics` (s); NaN if never.
+    /// Time from the outage's end until the first report at which the horizontal error is within the
+    /// receiver's own standard deviation (s); NaN if never.
     pub reconvergence_s: f64,
 }
 

@@ -1,1 +1,0 @@
-//! All runs: lane batches over threads, reduced in run order.

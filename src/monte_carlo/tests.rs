@@ -1,0 +1,158 @@
+//! The whole chain, trajectory to sums, against statistics and against itself on other threads.
+
+use super::*;
+use crate::earth::GravityModel;
+use crate::ekf::{Belief, FilterStates, InitialSettings};
+use crate::frames::RollPitchYaw;
+use crate::noise::{Ar1, Composite, Model, Process, White};
+use crate::sensors::gnss::GnssSettings;
+use crate::sensors::imu::Truth;
+use crate::sensors::outage::Outage;
+use crate::simulation::NEES_DOF;
+use crate::trajectory::{Trajectory, TrajectorySample};
+use crate::units::DEG;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+/// A winding drive of the given length, knots at 2 Hz.
+fn trajectory(duration_s: f64) -> Trajectory {
+    let (lat, lon) = (46.5 * DEG, 6.6 * DEG);
+    let sample = |k: u32| {
+        let t_s = 0.5 * f64::from(k);
+        let (north, east) = (12.0 * t_s, 150.0 * (0.05 * t_s).sin());
+        let yaw = (7.5 * (0.05 * t_s).cos()).atan2(12.0);
+        let attitude = RollPitchYaw { roll: 0.02 * (0.3 * t_s).sin(), pitch: 0.03 * (0.1 * t_s).cos(), yaw };
+        TrajectorySample {
+            t_s,
+            lat: lat + north / 6.37e6,
+            lon: lon + east / (6.39e6 * lat.cos()),
+            h: 400.0 + 10.0 * (0.02 * t_s).sin(),
+            q_b_n: attitude.to_quat(),
+        }
+    };
+    Trajectory::from_samples(&(0..=(2.0 * duration_s) as u32).map(sample).collect::<Vec<_>>()).unwrap()
+}
+
+/// White noise and one Gauss-Markov bias an axis: the 15-state filter's own model.
+fn model(scale: f64) -> Model {
+    let axis = |white: f64, deviation: f64, t_corr_s: f64| {
+        let phi = (-0.01 / t_corr_s).exp();
+        let bias = Ar1::new(phi, scale * deviation * deviation * (1.0 - phi * phi)).unwrap();
+        Composite::new(vec![Process::White(White::new(white).unwrap()), Process::Ar1(bias)])
+    };
+    Model::pooled(100.0, &axis(4e-5, 0.02, 200.0), &axis(1e-6, 2e-4, 300.0))
+}
+
+struct Setting {
+    trajectory: Trajectory,
+    model: Model,
+    beliefs: Vec<Belief>,
+    gnss: GnssSettings,
+    initial: InitialSettings,
+    outages: Vec<Outage>,
+}
+
+impl Setting {
+    fn new(duration_s: f64, belief_scales: &[f64]) -> Self {
+        let belief = |scale: &f64| Belief::new(&model(*scale), FilterStates::Reduced15, 1.0, 800.0).unwrap();
+        Self {
+            trajectory: trajectory(duration_s),
+            model: model(1.0),
+            beliefs: belief_scales.iter().map(belief).collect(),
+            gnss: GnssSettings::default(),
+            initial: InitialSettings::default(),
+            outages: vec![Outage { start_s: 20.0, end_s: 40.0 }],
+        }
+    }
+
+    fn experiment(&self) -> Experiment<'_> {
+        Experiment {
+            trajectory: &self.trajectory,
+            rate_hz: 100.0,
+            gravity: GravityModel::Wgs84,
+            truth: Truth::Model(&self.model),
+            beliefs: &self.beliefs,
+            gnss: &self.gnss,
+            initial: &self.initial,
+            outages: &self.outages,
+            seed: 3,
+            scenario: "",
+            coverage_level: 0.95,
+        }
+    }
+
+    fn run(&self, runs: u64) -> Vec<RunResult> {
+        run(&self.experiment(), runs, &|_| {}).unwrap()
+    }
+}
+
+/// Every number to its last bit (the shortest text that reads back as the same number), NaN included.
+fn bits<T: std::fmt::Debug + ?Sized>(value: &T) -> String {
+    format!("{value:?}")
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bits_on_any_number_of_threads() {
+    let setting = Setting::new(30.0, &[1.0]);
+    let on = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| setting.run(20))
+    };
+    let one = on(1);
+    assert!(bits(&one) == bits(&on(2)) && bits(&one) == bits(&on(3)));
+    assert_eq!(one[0].runs.len(), 20);
+}
+
+#[test]
+fn a_run_does_not_depend_on_how_many_others_there_are_or_on_other_candidates() {
+    let setting = Setting::new(30.0, &[1.0]);
+    let (eight, many) = (setting.run(8), setting.run(21));
+    assert!(bits(&eight[0].runs[..8]) == bits(&many[0].runs[..8]));
+    assert!(bits(&setting.run(5)[0].runs[..]) == bits(&many[0].runs[..5]));
+    let with_others = Setting::new(30.0, &[2.0, 1.0]).run(8);
+    assert!(bits(&with_others[1]) == bits(&eight[0]));
+    assert!(with_others[0].epochs != eight[0].epochs);
+}
+
+/// Outages change which fixes are used and no random number: before the outage nothing differs.
+#[test]
+fn outages_leave_the_past_alone() {
+    let mut setting = Setting::new(30.0, &[1.0]);
+    let with = setting.run(8);
+    setting.outages.clear();
+    let without = setting.run(8);
+    assert!(with[0].epochs[..20] == without[0].epochs[..20]);
+    let position = |r: &RunResult| r.epochs[30].see[0] / 8.0;
+    assert!(position(&with[0]) > 2.0 * position(&without[0]));
+    assert!(with[0].epochs[30].error_sq[0] > without[0].epochs[30].error_sq[0]);
+}
+
+/// Truth and belief are the same model, 200 runs: at times 100 s apart (the errors' memory is some tens of
+/// seconds with fixes) Σ NEES over runs is chi-square with 9·200 degrees of freedom, the runs inside the
+/// 95 % ellipsoid binomial. Both must lie inside 99.9 % intervals, corrected for the number of looks
+/// (Bonferroni). A filter whose bias variance is wrong by 4 must not.
+#[test]
+fn matched_models_are_consistent_and_mismatched_ones_are_not() {
+    let runs = 200_u64;
+    let setting = Setting::new(400.0, &[1.0, 0.25]);
+    let results = setting.run(runs);
+    let looks = [41_usize, 100, 200, 300, 400];
+    let chi2 = ChiSquared::new((NEES_DOF as u64 * runs) as f64).unwrap();
+    let alpha = 1e-3 / (2.0 * looks.len() as f64);
+    let (low, high) = (chi2.inverse_cdf(alpha / 2.0), chi2.inverse_cdf(1.0 - alpha / 2.0));
+    for look in looks {
+        let epoch = &results[0].epochs[look];
+        assert_eq!(epoch.count, runs);
+        let nees = epoch.nees[0];
+        assert!((low..high).contains(&nees), "NEES {nees} at {} s not in {low}..{high}", epoch.t_s);
+        // binomial(200, 0.05) misses: P(> 24) = 3.0e-5 and P(< 1) = 3.5e-5, both below alpha/2 = 5e-5
+        let missed = runs - epoch.covered;
+        assert!((1..=24).contains(&missed), "{missed} of {runs} outside the 95 % ellipsoid");
+    }
+    let nis: f64 = results[0].runs.iter().map(|r| r.nis.0 * r.nis.1 as f64).sum();
+    let fixes: u64 = results[0].runs.iter().map(|r| r.nis.1).sum();
+    // Σ NIS is chi-square with 6·fixes degrees of freedom (innovations are white): ±4.4 deviations
+    let deviations = (nis - 6.0 * fixes as f64) / (12.0 * fixes as f64).sqrt();
+    assert!(deviations.abs() < 4.4, "NIS off by {deviations} standard deviations");
+    let end_of_outage = results[1].epochs[39].nees[0];
+    assert!(end_of_outage > high, "a wrong model must show: NEES {end_of_outage}, bound {high}");
+}

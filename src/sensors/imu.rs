@@ -1,0 +1,193 @@
+//! The errors of the inertial sensors, run by run: synthesised from a model, or windows of recordings.
+
+use crate::imu::{Channel, Recording};
+use crate::noise::continuous::same_rate;
+use crate::noise::{Model, Synthesizer};
+use crate::rng::StreamKey;
+use rand::RngExt;
+
+/// What makes the errors of the true IMU.
+#[derive(Debug, Clone, Copy)]
+pub enum Truth<'a> {
+    /// Synthesised from a model, per run and axis.
+    Model(&'a Model),
+    /// A random window of a random static recording for each run, all axes together, so that correlation
+    /// between axes survives; each signal's mean is removed.
+    Static(&'a [Recording]),
+}
+
+/// Why recordings cannot make the errors of a run.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TruthError {
+    /// No recording at all.
+    #[error("no static recording given")]
+    None,
+    /// A recording lacks a channel.
+    #[error("{recording}: channel {channel} is missing; all six are needed")]
+    Missing {
+        /// Name of the recording.
+        recording: String,
+        /// The missing channel.
+        channel: Channel,
+    },
+    /// Another rate than the IMU's.
+    #[error("{recording} was sampled at {rate_hz} Hz, the simulated IMU runs at {imu_hz} Hz")]
+    Rate {
+        /// Name of the recording.
+        recording: String,
+        /// Its rate (Hz).
+        rate_hz: f64,
+        /// Rate of the IMU (Hz).
+        imu_hz: f64,
+    },
+    /// Shorter than the trajectory.
+    #[error("{recording} lasts {has_s} s, the trajectory {needs_s} s: {} s too short", .needs_s - .has_s)]
+    TooShort {
+        /// Name of the recording.
+        recording: String,
+        /// How long it lasts (s).
+        has_s: f64,
+        /// How long the trajectory lasts (s).
+        needs_s: f64,
+    },
+    /// The model belongs to another rate than the IMU's.
+    #[error("the model of the truth belongs to {model_hz} Hz, the simulated IMU runs at {imu_hz} Hz")]
+    ModelRate {
+        /// Rate of the model (Hz).
+        model_hz: f64,
+        /// Rate of the IMU (Hz).
+        imu_hz: f64,
+    },
+}
+
+impl Truth<'_> {
+    /// Checks that `samples` samples at `imu_hz` can be had.
+    ///
+    /// # Errors
+    /// What is missing, and by how much.
+    pub fn check(&self, imu_hz: f64, samples: usize) -> Result<(), TruthError> {
+        match self {
+            Self::Model(model) if same_rate(model.rate_hz, imu_hz) => Ok(()),
+            Self::Model(model) => Err(TruthError::ModelRate { model_hz: model.rate_hz, imu_hz }),
+            Self::Static([]) => Err(TruthError::None),
+            Self::Static(recordings) => {
+                recordings.iter().try_for_each(|r| check_recording(r, imu_hz, samples))
+            }
+        }
+    }
+}
+
+fn check_recording(recording: &Recording, imu_hz: f64, needs: usize) -> Result<(), TruthError> {
+    let name = || recording.name.clone();
+    if let Some(channel) = Channel::ALL.into_iter().find(|c| recording.signal(*c).is_none()) {
+        return Err(TruthError::Missing { recording: name(), channel });
+    }
+    if !same_rate(recording.rate_hz, imu_hz) {
+        return Err(TruthError::Rate { recording: name(), rate_hz: recording.rate_hz, imu_hz });
+    }
+    let has = recording.len();
+    if has < needs {
+        let seconds = |samples: usize| samples as f64 / imu_hz;
+        return Err(TruthError::TooShort { recording: name(), has_s: seconds(has), needs_s: seconds(needs) });
+    }
+    Ok(())
+}
+
+/// The errors of the six channels of one run, as streams of samples.
+#[derive(Debug, Clone)]
+pub struct ImuErrors<'a> {
+    channels: Vec<ChannelErrors<'a>>,
+}
+
+#[derive(Debug, Clone)]
+enum ChannelErrors<'a> {
+    Synthesised(Box<Synthesizer>),
+    /// What is left of the window.
+    Recorded(&'a [f64]),
+}
+
+impl<'a> ImuErrors<'a> {
+    /// The errors of run `key.run` over `samples` samples, from a truth that passed [`Truth::check`].
+    #[must_use]
+    pub fn new(truth: Truth<'a>, key: StreamKey<'_>, samples: usize) -> Self {
+        let channels = match truth {
+            Truth::Model(model) => Channel::ALL.map(|channel| {
+                let source = channel.to_string();
+                let synthesizer = Synthesizer::new(model.axis(channel), StreamKey { source: &source, ..key });
+                ChannelErrors::Synthesised(Box::new(synthesizer))
+            }),
+            Truth::Static(recordings) => {
+                let mut generator = StreamKey { source: "imu", process: "window", ..key }.generator();
+                let recording = &recordings[generator.random_range(0..recordings.len())];
+                let start = generator.random_range(0..=recording.len() - samples);
+                Channel::ALL.map(|channel| {
+                    let all = recording.signal(channel).map_or(&[][..], |s| &s.samples);
+                    ChannelErrors::Recorded(&all[start..start + samples])
+                })
+            }
+        };
+        Self { channels: channels.into() }
+    }
+
+    /// Overwrites `out` with the next samples of a channel (m/s² or rad/s).
+    pub fn fill(&mut self, channel: Channel, out: &mut [f64]) {
+        match &mut self.channels[channel.index()] {
+            ChannelErrors::Synthesised(synthesizer) => synthesizer.fill(out),
+            ChannelErrors::Recorded(left) => {
+                let (now, later) = left.split_at(out.len());
+                out.copy_from_slice(now);
+                *left = later;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::imu::Signal;
+
+    fn recording(rate_hz: f64, samples: usize) -> Recording {
+        let signal = |channel: Channel| Signal {
+            channel,
+            mean: 0.0,
+            samples: (0..samples).map(|k| k as f64 + 1000.0 * channel.index() as f64).collect(),
+        };
+        Recording { name: "r.csv".into(), rate_hz, signals: Channel::ALL.map(signal).into() }
+    }
+
+    const KEY: StreamKey<'_> = StreamKey { seed: 5, scenario: "", run: 0, source: "", process: "" };
+
+    #[test]
+    fn windows_keep_the_axes_together_and_reach_both_ends() {
+        let recordings = [recording(100.0, 12)];
+        let mut starts = std::collections::BTreeSet::new();
+        for run in 0..200 {
+            let mut errors = ImuErrors::new(Truth::Static(&recordings), StreamKey { run, ..KEY }, 10);
+            let mut first = [[0.0; 4]; 6];
+            for (channel, out) in Channel::ALL.into_iter().zip(&mut first) {
+                errors.fill(channel, out);
+            }
+            let start = first[0][0];
+            for (c, block) in first.iter().enumerate() {
+                assert_eq!(*block, std::array::from_fn(|k| start + (k + 1000 * c) as f64));
+            }
+            starts.insert(start as u64);
+        }
+        assert_eq!(starts.into_iter().collect::<Vec<_>>(), [0, 1, 2]);
+    }
+
+    #[test]
+    fn unusable_recordings_are_refused_with_their_name_and_by_how_much() {
+        let refused = |r: Recording| Truth::Static(&[r]).check(100.0, 500).unwrap_err().to_string();
+        assert_eq!(refused(recording(100.0, 300)), "r.csv lasts 3 s, the trajectory 5 s: 2 s too short");
+        assert_eq!(
+            refused(recording(50.0, 600)),
+            "r.csv was sampled at 50 Hz, the simulated IMU runs at 100 Hz"
+        );
+        let mut partial = recording(100.0, 600);
+        partial.signals.remove(4);
+        assert_eq!(refused(partial), "r.csv: channel gyro.y is missing; all six are needed");
+        assert_eq!(Truth::Static(&[]).check(100.0, 1), Err(TruthError::None));
+    }
+}

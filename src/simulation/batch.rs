@@ -1,0 +1,356 @@
+//! Eight runs through the schedule: noise, prediction, fixes, and what is kept of them.
+
+use super::plan::{Event, Plan};
+use super::{COVERAGE_DOF, EpochSums, NEES_DOF, OutageRecord, REPORTED, RunRecord};
+use crate::earth::{ned_difference, radii};
+use crate::ekf::covariance::{PSI, R, V};
+use crate::ekf::initial::psi_of_angles;
+use crate::ekf::{Ekf, Fix, advance, update};
+use crate::frames::{NavState, RollPitchYaw};
+use crate::imu::Channel;
+use crate::lanes::{LANES, Lanes, Real, Vec3};
+use crate::linalg;
+use crate::rng::StreamKey;
+use crate::sensors::gnss::GnssNoise;
+use crate::sensors::imu::ImuErrors;
+use crate::strapdown::Strapdown;
+use crate::units::DEG;
+use glam::{DQuat, DVec3};
+use rand_distr::{Distribution, StandardNormal};
+
+/// What one candidate made of up to eight runs.
+#[derive(Debug)]
+pub struct Batch {
+    /// Sums over the runs that did not diverge, one an epoch.
+    pub epochs: Vec<EpochSums>,
+    /// One record a run.
+    pub runs: Vec<RunRecord>,
+}
+
+/// Runs `first..first + live` (at most [`LANES`]) through all candidates: the noise is drawn once.
+#[must_use]
+pub fn run_batch(plan: &Plan<'_>, first: u64, live: usize) -> Vec<Batch> {
+    let experiment = plan.experiment;
+    let mut source = Source::new(plan, first, live);
+    let starts = source.starts(plan);
+    let mut candidates: Vec<Candidate> =
+        experiment.beliefs.iter().map(|b| Candidate::new(plan, b, &starts, live)).collect();
+    let mut done = 0;
+    for (index, event) in plan.events.iter().enumerate() {
+        let samples = &plan.ideal[done..event.sample];
+        let fix = event.gnss_epoch.then(|| source.fix(plan, event));
+        let errors = source.errors(samples.len());
+        for candidate in &mut candidates {
+            advance(&mut candidate.ekf, samples, errors);
+            candidate.at_event(plan, index, event, fix.as_ref().filter(|_| event.fix));
+        }
+        done = event.sample;
+    }
+    candidates.into_iter().map(|c| c.finish(first)).collect()
+}
+
+/// Everything random of eight runs.
+struct Source<'a> {
+    imu: Vec<ImuErrors<'a>>,
+    gnss: Vec<GnssNoise>,
+    keys: Vec<StreamKey<'a>>,
+    /// Errors of the samples up to the next event, accelerometer and gyroscope.
+    block: Vec<[Vec3; 2]>,
+    channel: Vec<f64>,
+}
+
+impl<'a> Source<'a> {
+    fn new(plan: &Plan<'a>, first: u64, live: usize) -> Self {
+        let experiment = plan.experiment;
+        let key = |run| StreamKey {
+            seed: experiment.seed,
+            scenario: experiment.scenario,
+            run,
+            source: "",
+            process: "",
+        };
+        let keys: Vec<_> = (first..first + live as u64).map(key).collect();
+        let imu = keys.iter().map(|k| ImuErrors::new(experiment.truth, *k, plan.samples())).collect();
+        let gnss = keys.iter().map(|k| GnssNoise::new(experiment.gnss, *k)).collect();
+        Self { imu, gnss, keys, block: Vec::new(), channel: Vec::new() }
+    }
+
+    /// The nominal starts: the truth and an error drawn from the initial standard deviations.
+    fn starts(&self, plan: &Plan<'_>) -> Vec<NavState> {
+        self.keys.iter().map(|key| nominal_start(plan, *key)).collect()
+    }
+
+    /// The inertial errors of the next `n` samples; idle lanes repeat the ideal.
+    fn errors(&mut self, n: usize) -> &[[Vec3; 2]] {
+        self.block.resize(n, [Vec3::ZERO; 2]);
+        self.channel.resize(n, 0.0);
+        for (lane, errors) in self.imu.iter_mut().enumerate() {
+            for channel in Channel::ALL {
+                errors.fill(channel, &mut self.channel);
+                let (sensor, axis) = (channel.sensor as usize, channel.axis as usize);
+                for (sample, value) in self.block.iter_mut().zip(&self.channel) {
+                    sample[sensor][axis][lane] = *value;
+                }
+            }
+        }
+        &self.block
+    }
+
+    /// The fixes of this epoch.
+    fn fix(&mut self, plan: &Plan<'_>, event: &Event) -> Fix {
+        let gnss = plan.experiment.gnss;
+        let (antenna, velocity) = event.antenna;
+        let r = radii(antenna.x.sin());
+        let mut fix = Fix {
+            lat: Lanes::splat(antenna.x),
+            lon: Lanes::splat(antenna.y),
+            h: Lanes::splat(antenna.z),
+            v_n: gnss.vel_sigma_m_s.map(|_| Vec3::splat(velocity)),
+            pos_sigma_m: gnss.pos_sigma_m.into(),
+            vel_sigma_m_s: gnss.vel_sigma_m_s.unwrap_or_default().into(),
+            lever_arm_b: gnss.lever_arm_m.into(),
+        };
+        for (lane, noise) in self.gnss.iter_mut().enumerate() {
+            let (position, speed) = noise.draw();
+            fix.lat[lane] += position.x / (r.meridian + antenna.z);
+            fix.lon[lane] += position.y / ((r.transverse + antenna.z) * antenna.x.cos());
+            fix.h[lane] -= position.z;
+            if let Some(v_n) = &mut fix.v_n {
+                v_n.set_lane(lane, velocity + speed);
+            }
+        }
+        fix
+    }
+}
+
+fn nominal_start(plan: &Plan<'_>, key: StreamKey<'_>) -> NavState {
+    let (truth, initial) = (plan.start, plan.experiment.initial);
+    if initial.perfect {
+        return truth;
+    }
+    let draw = |process: &'static str, sigma: [f64; 3]| {
+        let mut generator = StreamKey { source: "initial", process, ..key }.generator();
+        let mut normal = || -> f64 { StandardNormal.sample(&mut generator) };
+        DVec3::new(sigma[0] * normal(), sigma[1] * normal(), sigma[2] * normal())
+    };
+    let dr = draw("position", initial.pos_sigma_m);
+    let dv = draw("velocity", initial.vel_sigma_m_s);
+    let angles = draw("attitude", initial.att_sigma_deg.map(|s| s * DEG));
+    let psi = linalg::to_glam(&(psi_of_angles(truth.q_b_n) * linalg::to_nalgebra(angles)));
+    let r = radii(truth.lat.sin());
+    NavState {
+        lat: truth.lat + dr.x / (r.meridian + truth.h),
+        lon: truth.lon + dr.y / ((r.transverse + truth.h) * truth.lat.cos()),
+        h: truth.h - dr.z,
+        v_n: truth.v_n + dv,
+        q_b_n: DQuat::from_scaled_axis(psi) * truth.q_b_n,
+    }
+}
+
+/// One filter on eight runs, and what is kept of it.
+struct Candidate {
+    ekf: Ekf,
+    live: usize,
+    trace: Vec<EpochLanes>,
+    /// For each outage and run.
+    outages: Vec<[OutageRecord; LANES]>,
+    /// Sum of the NIS and fixes used.
+    nis: (Lanes, u64),
+}
+
+/// What eight runs report at one epoch.
+struct EpochLanes {
+    t_s: f64,
+    gnss: bool,
+    see: [Lanes; REPORTED],
+    error: [Lanes; REPORTED],
+    att_error_deg: Lanes,
+    nees: Lanes,
+    covered: [bool; LANES],
+}
+
+impl Candidate {
+    fn new(plan: &Plan<'_>, belief: &crate::ekf::Belief, starts: &[NavState], live: usize) -> Self {
+        let mut nominal = Strapdown::new(&plan.start, plan.experiment.gravity);
+        for (lane, start) in starts.iter().enumerate() {
+            nominal.set_lane(lane, start);
+        }
+        let outage =
+            || std::array::from_fn(|_| OutageRecord { reconvergence_s: f64::NAN, ..Default::default() });
+        Self {
+            ekf: Ekf::new(nominal, belief, &plan.start, plan.experiment.initial),
+            live,
+            trace: Vec::with_capacity(plan.events.len()),
+            outages: plan.experiment.outages.iter().map(|_| outage()).collect(),
+            nis: (Lanes::ZERO, 0),
+        }
+    }
+
+    /// Outage ends, the fix if one is used, the report if one is due.
+    fn at_event(&mut self, plan: &Plan<'_>, index: usize, event: &Event, fix: Option<&Fix>) {
+        self.end_outages(plan, index, event);
+        if let Some(fix) = fix {
+            let nis = update(&mut self.ekf, fix);
+            self.nis = (self.nis.0 + nis, self.nis.1 + 1);
+        }
+        if event.report {
+            self.ekf.apply_earth_terms();
+            let epoch = self.report(plan, event);
+            self.follow_outages(plan, event, &epoch);
+            self.trace.push(epoch);
+        }
+    }
+
+    /// The error just before the first fix after an outage, or at the trajectory's end.
+    fn end_outages(&mut self, plan: &Plan<'_>, index: usize, event: &Event) {
+        for ((_, end), records) in plan.outages.iter().zip(&mut self.outages) {
+            if *end != index {
+                continue;
+            }
+            for lane in 0..self.live {
+                let error = reported_error(&self.ekf.nominal.lane(lane), &event.reference);
+                records[lane].error_end = error.values;
+                records[lane].horizontal_error_end_m = error.values[0].hypot(error.values[1]);
+            }
+        }
+    }
+
+    fn report(&self, plan: &Plan<'_>, event: &Event) -> EpochLanes {
+        let jacobian = RollPitchYaw::from_quat(event.reference.q_b_n).jacobian_of_psi_n();
+        let (p, mut x) = (&self.ekf.p, [Lanes::ZERO; NEES_DOF]);
+        let mut epoch = EpochLanes {
+            t_s: event.t_s,
+            gnss: event.fix,
+            see: standard_deviations(&self.ekf, &jacobian),
+            error: [Lanes::ZERO; REPORTED],
+            att_error_deg: Lanes::ZERO,
+            nees: Lanes::ZERO,
+            covered: [false; LANES],
+        };
+        for lane in 0..self.live {
+            let error = reported_error(&self.ekf.nominal.lane(lane), &event.reference);
+            for i in 0..REPORTED {
+                epoch.error[i][lane] = error.values[i];
+            }
+            for i in 0..3 {
+                (x[i][lane], x[3 + i][lane]) = (error.values[i], error.values[3 + i]);
+                x[6 + i][lane] = error.psi_n[i];
+            }
+            epoch.att_error_deg[lane] = error.psi_n.length() / DEG;
+        }
+        epoch.nees = p.normalised_square(std::array::from_fn(|i| i), x);
+        let states: [usize; COVERAGE_DOF] =
+            std::array::from_fn(|i| if i < 3 { 3 * R + i } else { 3 * PSI + i - 3 });
+        let coverage = p.normalised_square(states, states.map(|s| x[s]));
+        epoch.covered = std::array::from_fn(|lane| coverage[lane] <= plan.coverage_quantile);
+        epoch
+    }
+
+    /// Means over outages, and when the horizontal error is back within the receiver's own.
+    fn follow_outages(&mut self, plan: &Plan<'_>, event: &Event, epoch: &EpochLanes) {
+        let [n, e, _] = plan.experiment.gnss.pos_sigma_m;
+        let receiver = n.hypot(e);
+        let outages = plan.experiment.outages.iter().zip(&plan.outages);
+        for ((outage, (reports, _)), records) in outages.zip(&mut self.outages) {
+            let inside = outage.withholds(event.t_s + 1e-9);
+            let after = event.t_s + 1e-9 - outage.end_s;
+            for lane in 0..self.live {
+                let record = &mut records[lane];
+                if inside {
+                    for i in 0..REPORTED {
+                        record.see_mean[i] += epoch.see[i][lane] / reports;
+                    }
+                }
+                let horizontal = epoch.error[0][lane].hypot(epoch.error[1][lane]);
+                if after >= 0.0 && record.reconvergence_s.is_nan() && horizontal <= receiver {
+                    record.reconvergence_s = event.t_s - outage.end_s;
+                }
+            }
+        }
+    }
+
+    fn finish(self, first: u64) -> Batch {
+        let diverged: [bool; LANES] = std::array::from_fn(|lane| {
+            let finite = |e: &EpochLanes| {
+                e.nees[lane].is_finite() && e.see.iter().chain(&e.error).all(|value| value[lane].is_finite())
+            };
+            !self.trace.iter().all(finite)
+        });
+        let kept: Vec<usize> = (0..self.live).filter(|lane| !diverged[*lane]).collect();
+        let epochs = self.trace.iter().map(|e| e.sum(&kept)).collect();
+        let record = |lane: usize| RunRecord {
+            run: first + lane as u64,
+            diverged: diverged[lane],
+            outages: self.outages.iter().map(|records| records[lane].clone()).collect(),
+            nis: (self.nis.0[lane] / self.nis.1.max(1) as f64, self.nis.1),
+        };
+        Batch { epochs, runs: (0..self.live).map(record).collect() }
+    }
+}
+
+impl EpochLanes {
+    fn sum(&self, kept: &[usize]) -> EpochSums {
+        let mut sums = EpochSums { t_s: self.t_s, gnss: self.gnss, ..EpochSums::default() };
+        for &lane in kept {
+            sums.count += 1;
+            for i in 0..REPORTED {
+                let (see, error) = (self.see[i][lane], self.error[i][lane]);
+                sums.see[i] += see;
+                sums.see_sq[i] += see * see;
+                sums.error[i] += error;
+                sums.error_sq[i] += error * error;
+                sums.error_4[i] += error.powi(4);
+            }
+            let position = DVec3::new(self.error[0][lane], self.error[1][lane], self.error[2][lane]).length();
+            for (sum, value) in [
+                (&mut sums.pos_error, position),
+                (&mut sums.att_error, self.att_error_deg[lane]),
+                (&mut sums.nees, self.nees[lane]),
+            ] {
+                sum[0] += value;
+                sum[1] += value * value;
+            }
+            sums.covered += u64::from(self.covered[lane]);
+        }
+        sums
+    }
+}
+
+/// Standard deviations of the reported states: metres, m/s, degrees of roll, pitch, yaw through the
+/// Jacobian at the true attitude.
+fn standard_deviations(ekf: &Ekf, jacobian: &[DVec3; 3]) -> [Lanes; REPORTED] {
+    let (r, v) = (ekf.p.variances(R), ekf.p.variances(V));
+    let psi = ekf.p.block(PSI, PSI);
+    std::array::from_fn(|i| match i {
+        0..3 => r[i].sqrt(),
+        3..6 => v[i - 3].sqrt(),
+        _ => {
+            let j = jacobian[i - 6];
+            let variance =
+                (0..9).fold(Lanes::ZERO, |sum, k| sum + psi.0[k / 3][k % 3] * (j[k / 3] * j[k % 3]));
+            variance.sqrt() * (1.0 / DEG)
+        }
+    })
+}
+
+/// Errors of a run in the reported states (m, m/s, degrees) and the attitude error vector (rad).
+struct ReportedError {
+    values: [f64; REPORTED],
+    psi_n: DVec3,
+}
+
+fn reported_error(estimate: &NavState, truth: &NavState) -> ReportedError {
+    let r = ned_difference(truth, estimate.lat, estimate.lon, estimate.h);
+    let v = estimate.v_n - truth.v_n;
+    let psi_n = rotation_vector(estimate.q_b_n * truth.q_b_n.inverse());
+    let jacobian = RollPitchYaw::from_quat(truth.q_b_n).jacobian_of_psi_n();
+    let angles = jacobian.map(|row| row.dot(psi_n) / DEG);
+    ReportedError { values: [r.x, r.y, r.z, v.x, v.y, v.z, angles[0], angles[1], angles[2]], psi_n }
+}
+
+/// The logarithm of a rotation, exact for small ones too.
+fn rotation_vector(q: DQuat) -> DVec3 {
+    let (v, w) = if q.w < 0.0 { (-q.xyz(), -q.w) } else { (q.xyz(), q.w) };
+    let sine = v.length();
+    if sine < 1e-12 { v * 2.0 } else { v * (2.0 * sine.atan2(w) / sine) }
+}

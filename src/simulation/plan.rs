@@ -1,0 +1,226 @@
+//! What all runs of an experiment share, computed once: ideal samples, reference, schedule.
+
+use crate::earth::{GravityModel, MAX_LATITUDE};
+use crate::ekf::{Belief, InitialSettings};
+use crate::frames::NavState;
+use crate::imu::ImuSample;
+use crate::noise::continuous::same_rate;
+use crate::sensors::gnss::GnssSettings;
+use crate::sensors::ideal_imu::{self, ideal_imu};
+use crate::sensors::imu::{Truth, TruthError};
+use crate::sensors::outage::Outage;
+use crate::strapdown::MAX_ROTATION;
+use crate::trajectory::Trajectory;
+use crate::units::DEG;
+use glam::DVec3;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+/// One experiment: a trajectory, what makes the errors, what filters believe, what is measured when.
+#[derive(Debug, Clone)]
+pub struct Experiment<'a> {
+    /// The reference.
+    pub trajectory: &'a Trajectory,
+    /// Rate of the IMU (Hz).
+    pub rate_hz: f64,
+    /// Gravity of truth and filter.
+    pub gravity: GravityModel,
+    /// What makes the inertial errors.
+    pub truth: Truth<'a>,
+    /// The candidates: filters that run on the same noise, each with its own belief.
+    pub beliefs: &'a [Belief],
+    /// The receiver; its standard deviations are both truth and belief.
+    pub gnss: &'a GnssSettings,
+    /// The start.
+    pub initial: &'a InitialSettings,
+    /// When fixes are missing.
+    pub outages: &'a [Outage],
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Name of the truth scenario, part of the key of every stream.
+    pub scenario: &'a str,
+    /// Level of the coverage statistic, between 0 and 1.
+    pub coverage_level: f64,
+}
+
+/// Why an experiment cannot be run.
+#[derive(Debug, thiserror::Error)]
+pub enum ExperimentError {
+    /// The ideal IMU could not be computed.
+    #[error(transparent)]
+    IdealImu(#[from] ideal_imu::Error),
+    /// The truth does not serve.
+    #[error(transparent)]
+    Truth(#[from] TruthError),
+    /// Latitude and longitude lose their meaning.
+    #[error(
+        "the trajectory reaches latitude {lat_deg}° at {t_s} s; beyond ±89.9° it cannot be navigated in latitude and longitude"
+    )]
+    Pole {
+        /// When (s).
+        t_s: f64,
+        /// Where (degrees).
+        lat_deg: f64,
+    },
+    /// The body turns too far in one sample.
+    #[error(
+        "the vehicle turns {angle_deg:.1}° within one IMU sample at {t_s} s; at most {max_deg:.1}° can be followed at {rate_hz} Hz"
+    )]
+    TurnsTooFast {
+        /// When (s).
+        t_s: f64,
+        /// Rotation of the sample (degrees).
+        angle_deg: f64,
+        /// Largest valid rotation (degrees).
+        max_deg: f64,
+        /// IMU rate (Hz).
+        rate_hz: f64,
+    },
+    /// The filter's model belongs to another rate.
+    #[error("the filter's model belongs to {model_hz} Hz, the IMU runs at {imu_hz} Hz")]
+    BeliefRate {
+        /// Rate of the model (Hz).
+        model_hz: f64,
+        /// Rate of the IMU (Hz).
+        imu_hz: f64,
+    },
+    /// A fix that meets no sample.
+    #[error("the IMU rate {imu_hz} Hz is not a whole multiple of the GNSS rate {gnss_hz} Hz")]
+    FixBetweenSamples {
+        /// IMU rate (Hz).
+        imu_hz: f64,
+        /// GNSS rate (Hz).
+        gnss_hz: f64,
+    },
+}
+
+/// Something happens after this many IMU samples.
+#[derive(Debug, Clone)]
+pub(super) struct Event {
+    /// IMU samples from the start.
+    pub(super) sample: usize,
+    /// Time on the trajectory (s).
+    pub(super) t_s: f64,
+    /// Reference state.
+    pub(super) reference: NavState,
+    /// Reference position and velocity of the antenna: lat, lon (rad), h (m), v_n (m/s).
+    pub(super) antenna: (DVec3, DVec3),
+    /// Whether the receiver has an epoch here.
+    pub(super) gnss_epoch: bool,
+    /// Whether its fix is used.
+    pub(super) fix: bool,
+    /// Whether the epoch is reported (1 Hz).
+    pub(super) report: bool,
+}
+
+/// The shared part of all runs.
+#[derive(Debug)]
+pub struct Plan<'a> {
+    pub(super) experiment: &'a Experiment<'a>,
+    pub(super) ideal: Vec<ImuSample>,
+    pub(super) start: NavState,
+    pub(super) events: Vec<Event>,
+    /// For each outage: how many reports fall into it, and the event of the first fix after it (or the
+    /// last event, when the trajectory ends first).
+    pub(super) outages: Vec<(f64, usize)>,
+    /// Quantile of the coverage statistic.
+    pub(super) coverage_quantile: f64,
+}
+
+impl<'a> Plan<'a> {
+    /// Computes the ideal IMU and the schedule, and checks that everything fits together.
+    ///
+    /// # Errors
+    /// What does not fit, with values.
+    pub fn new(experiment: &'a Experiment<'a>) -> Result<Self, ExperimentError> {
+        let Experiment { trajectory, rate_hz, gravity, .. } = *experiment;
+        for belief in experiment.beliefs {
+            if !same_rate(belief.rate_hz, rate_hz) {
+                return Err(ExperimentError::BeliefRate { model_hz: belief.rate_hz, imu_hz: rate_hz });
+            }
+        }
+        let ideal = ideal_imu(trajectory, rate_hz, gravity)?;
+        experiment.truth.check(rate_hz, ideal.len())?;
+        check_rotation(&ideal, trajectory.start_s(), rate_hz)?;
+        let events = schedule(experiment, ideal.len())?;
+        let chi2 = ChiSquared::new(super::COVERAGE_DOF as f64).expect("degrees of freedom are positive");
+        let coverage_quantile = chi2.inverse_cdf(experiment.coverage_level);
+        let start = trajectory.state(trajectory.start_s());
+        let outages = experiment.outages.iter().map(|o| effects(o, &events)).collect();
+        Ok(Self { experiment, ideal, start, events, outages, coverage_quantile })
+    }
+
+    /// IMU samples of one run.
+    #[must_use]
+    pub fn samples(&self) -> usize {
+        self.ideal.len()
+    }
+}
+
+fn effects(outage: &Outage, events: &[Event]) -> (f64, usize) {
+    let reports = events.iter().filter(|e| e.report && outage.withholds(e.t_s + 1e-9)).count();
+    let first_fix = events.iter().position(|e| e.fix && e.t_s + 1e-9 >= outage.end_s);
+    (reports as f64, first_fix.unwrap_or(events.len() - 1))
+}
+
+fn check_rotation(ideal: &[ImuSample], start_s: f64, rate_hz: f64) -> Result<(), ExperimentError> {
+    let too_fast = ideal.iter().position(|s| s.omega_ib_b.length() / rate_hz > MAX_ROTATION);
+    too_fast.map_or(Ok(()), |k| {
+        Err(ExperimentError::TurnsTooFast {
+            t_s: start_s + k as f64 / rate_hz,
+            angle_deg: ideal[k].omega_ib_b.length() / rate_hz / DEG,
+            max_deg: MAX_ROTATION / DEG,
+            rate_hz,
+        })
+    })
+}
+
+/// Reports at every second from the start, fixes at every GNSS epoch after it, in time order.
+fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, ExperimentError> {
+    let Experiment { trajectory, rate_hz, gnss, .. } = *experiment;
+    let per_fix = rate_hz / gnss.rate_hz;
+    if per_fix < 0.5 || (per_fix - per_fix.round()).abs() > 1e-6 * per_fix {
+        return Err(ExperimentError::FixBetweenSamples { imu_hz: rate_hz, gnss_hz: gnss.rate_hz });
+    }
+    let per_fix = per_fix.round() as usize;
+    let reports = (0_u32..).map(|s| (f64::from(s) * rate_hz).round() as usize);
+    let reports: Vec<usize> = reports.take_while(|k| *k <= samples).collect();
+    let mut all = reports.clone();
+    all.extend((per_fix..=samples).step_by(per_fix));
+    all.push(samples);
+    all.sort_unstable();
+    all.dedup();
+    let event = |sample: usize| {
+        let t_s = trajectory.start_s() + sample as f64 / rate_hz;
+        let reference = trajectory.state(t_s);
+        if reference.lat.abs() > MAX_LATITUDE {
+            return Err(ExperimentError::Pole { t_s, lat_deg: reference.lat / DEG });
+        }
+        let gnss_epoch = sample > 0 && sample % per_fix == 0;
+        // a nanosecond of slack: sample times are multiples of 1/rate, outage times are typed
+        let withheld = experiment.outages.iter().any(|o| o.withholds(t_s + 1e-9));
+        Ok(Event {
+            sample,
+            t_s,
+            reference,
+            antenna: antenna(experiment, t_s, &reference),
+            gnss_epoch,
+            fix: gnss_epoch && !withheld,
+            report: reports.binary_search(&sample).is_ok(),
+        })
+    };
+    all.into_iter().map(event).collect()
+}
+
+/// Position (lat, lon, h) and velocity in n of the antenna.
+fn antenna(experiment: &Experiment<'_>, t_s: f64, reference: &NavState) -> (DVec3, DVec3) {
+    let arm_b = DVec3::from(experiment.gnss.lever_arm_m);
+    let imu = DVec3::new(reference.lat, reference.lon, reference.h);
+    if arm_b == DVec3::ZERO {
+        return (imu, reference.v_n);
+    }
+    let k = experiment.trajectory.kinematics(t_s);
+    let arm_e = k.q_b_e * arm_b;
+    let (lat, lon, h) = crate::earth::ecef_to_geodetic(k.r_e + arm_e);
+    let swing_n = reference.q_b_n * k.omega_eb_b.cross(arm_b);
+    (DVec3::new(lat, lon, h), reference.v_n + swing_n)
+}
