@@ -99,8 +99,8 @@ pub(super) struct Solution {
     pub(super) amplitudes: Vec<f64>,
     /// target − model, in units of the target's length.
     pub(super) residuals: Vec<f64>,
-    /// Half the derivative of the residuals with respect to each coordinate, the amplitudes following:
-    /// Kaufman's approximation. In the order of the components that have a coordinate.
+    /// Derivative of the residuals with respect to each coordinate, the amplitudes following: Kaufman's
+    /// approximation. In the order of the components that have a coordinate.
     pub(super) jacobian: Vec<Vec<f64>>,
 }
 
@@ -108,6 +108,12 @@ impl Solution {
     /// Σ residual².
     pub(super) fn cost(&self) -> f64 {
         dot(&self.residuals, &self.residuals)
+    }
+
+    /// Half its derivative with respect to a coordinate. Exact: at the best amplitudes their own
+    /// derivatives do not matter.
+    pub(super) fn gradient(&self, coordinate: usize) -> f64 {
+        dot(&self.jacobian[coordinate], &self.residuals)
     }
 }
 

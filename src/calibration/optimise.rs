@@ -1,7 +1,10 @@
-//! Iterations, driven by argmin: Levenberg and Marquardt's method on the coordinates, the amplitudes
-//! following (variable projection). The only file that names argmin.
+//! Iterations, driven by argmin: damped Newton steps on the coordinates, the amplitudes following (variable
+//! projection). The only file that names argmin.
+//!
+//! The gradient is analytic. The curvature is the difference of gradients where that is positive definite,
+//! else Gauss and Newton's approximation, which alone would creep where no model fits well.
 
-use super::bounded::Bounded;
+use super::bounded::{Bounded, MOST, Matrix, cholesky_solve};
 use super::objective::{Objective, Range, Solution, dot};
 use argmin::core::{
     CostFunction, Error, Executor, IterState, Jacobian, KV, Problem, Solver, State, TerminationReason,
@@ -45,7 +48,7 @@ const MOST_ITERATIONS: u64 = 300;
 /// Descends from a start to the local minimum.
 pub(super) fn descend(objective: &Objective, start: &[f64]) -> End {
     let ranges: Vec<Range> = objective.shaped().map(|(_, range)| range).collect();
-    let solver = LevenbergMarquardt { ranges, damping: 1e-3, growth: 2.0 };
+    let solver = DampedNewton { ranges, damping: 1e-3, growth: 2.0 };
     let run = Executor::new(Reduced(objective), solver)
         .configure(|state| state.param(start.to_vec()).max_iters(MOST_ITERATIONS))
         .timer(false)
@@ -99,27 +102,56 @@ const LARGE_STEP: f64 = 2.0;
 /// A damping at which no step helps.
 const HOPELESS: f64 = 1e12;
 
-struct LevenbergMarquardt {
+struct DampedNewton {
     ranges: Vec<Range>,
     damping: f64,
     growth: f64,
 }
 
-type LmState = IterState<Vec<f64>, (), Solution, (), (), f64>;
+/// Step of the differences (natural logarithms of a correlation time, or theta).
+const DIFFERENCE: f64 = 1e-5;
 
-impl LevenbergMarquardt {
-    /// The damped step within the ranges, and the decrease the linear model expects of it.
-    fn step(&self, u: &[f64], at: &Solution) -> (Vec<f64>, f64) {
+/// Half the second derivatives of the cost.
+fn curvature(objective: &Objective, u: &[f64], at: &Solution) -> Matrix {
+    let n = u.len();
+    let mut hessian = [[0.0; MOST]; MOST];
+    for j in 0..n {
+        let gradients = |sign: f64| {
+            let mut there = u.to_vec();
+            there[j] += sign * DIFFERENCE;
+            let solution = objective.solve(&there);
+            (0..n).map(|i| solution.gradient(i)).collect::<Vec<_>>()
+        };
+        let (up, down) = (gradients(1.0), gradients(-1.0));
+        for i in 0..n {
+            let half = 0.25 * (up[i] - down[i]) / DIFFERENCE;
+            hessian[i][j] += half;
+            hessian[j][i] += half;
+        }
+    }
+    if cholesky_solve(|i, j| hessian[i][j], [0.0; MOST], n).is_some() {
+        return hessian;
+    }
+    for i in 0..n {
+        for j in 0..n {
+            hessian[i][j] = dot(&at.jacobian[i], &at.jacobian[j]);
+        }
+    }
+    hessian
+}
+
+type Iterate = IterState<Vec<f64>, (), Solution, (), (), f64>;
+
+impl DampedNewton {
+    /// The damped step within the ranges, and the decrease the quadratic model expects of it.
+    fn step(&self, u: &[f64], at: &Solution, curvature: &Matrix) -> (Vec<f64>, f64) {
         let n = u.len();
         let mut problem = Bounded::new(n);
-        let gram = |i: usize, j: usize| dot(&at.jacobian[i], &at.jacobian[j]);
-        let largest = (0..n).map(|i| gram(i, i)).fold(f64::MIN_POSITIVE, f64::max);
+        problem.gram = *curvature;
+        let largest = (0..n).map(|i| curvature[i][i]).fold(f64::MIN_POSITIVE, f64::max);
         for i in 0..n {
-            for j in 0..n {
-                problem.gram[i][j] = gram(i, j);
-            }
             // A component without amplitude has no slope: it stays where it is.
-            problem.gram[i][i] += self.damping * (problem.gram[i][i] + 1e-12 * largest);
+            problem.gram[i][i] += self.damping * (curvature[i][i] + 1e-12 * largest);
         }
         // Shifted so that the start is 0, and scaled to a unit diagonal.
         let scale: Vec<f64> = (0..n).map(|i| problem.gram[i][i].sqrt()).collect();
@@ -127,7 +159,7 @@ impl LevenbergMarquardt {
             for j in 0..n {
                 problem.gram[i][j] /= scale[i] * scale[j];
             }
-            problem.right[i] = -dot(&at.jacobian[i], &at.residuals) / scale[i];
+            problem.right[i] = -at.gradient(i) / scale[i];
             problem.lower[i] = (self.ranges[i].low - u[i]).max(-LARGE_STEP) * scale[i];
             problem.upper[i] = (self.ranges[i].high - u[i]).min(LARGE_STEP) * scale[i];
         }
@@ -137,16 +169,16 @@ impl LevenbergMarquardt {
     }
 }
 
-impl Solver<Reduced<'_>, LmState> for LevenbergMarquardt {
+impl Solver<Reduced<'_>, Iterate> for DampedNewton {
     fn name(&self) -> &str {
-        "Levenberg-Marquardt with variable projection"
+        "damped Newton with variable projection"
     }
 
     fn init(
         &mut self,
         problem: &mut Problem<Reduced<'_>>,
-        state: LmState,
-    ) -> Result<(LmState, Option<KV>), Error> {
+        state: Iterate,
+    ) -> Result<(Iterate, Option<KV>), Error> {
         let solution = problem.jacobian(state.get_param().unwrap_or(&Vec::new()))?;
         Ok((state.cost(solution.cost()).jacobian(solution), None))
     }
@@ -154,12 +186,13 @@ impl Solver<Reduced<'_>, LmState> for LevenbergMarquardt {
     fn next_iter(
         &mut self,
         problem: &mut Problem<Reduced<'_>>,
-        mut state: LmState,
-    ) -> Result<(LmState, Option<KV>), Error> {
+        mut state: Iterate,
+    ) -> Result<(Iterate, Option<KV>), Error> {
         let (Some(u), Some(at)) = (state.take_param(), state.take_jacobian()) else {
             return Ok((state.terminate_with(TerminationReason::SolverExit("no start".into())), None));
         };
-        let (step, expected) = self.step(&u, &at);
+        let curvature = problem.problem("curvature_count", |reduced| Ok(curvature(reduced.0, &u, &at)))?;
+        let (step, expected) = self.step(&u, &at, &curvature);
         let there: Vec<f64> = u.iter().zip(&step).map(|(u, s)| u + s).collect();
         let next = problem.jacobian(&there)?;
         let (before, after) = (at.cost(), next.cost());
@@ -180,7 +213,7 @@ impl Solver<Reduced<'_>, LmState> for LevenbergMarquardt {
         Ok((state, None))
     }
 
-    fn terminate(&mut self, state: &LmState) -> TerminationStatus {
+    fn terminate(&mut self, state: &Iterate) -> TerminationStatus {
         match state.get_cost() {
             cost if cost <= f64::MIN_POSITIVE => {
                 TerminationStatus::Terminated(TerminationReason::TargetCostReached)
