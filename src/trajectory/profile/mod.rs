@@ -417,7 +417,7 @@ impl<'a> Path<'a> {
             self.sample(self.t_s + piece.duration * x(1.0), &to);
         }
         let end = piece.at(1.0);
-        self.t_s += piece.duration;
+        self.t_s = (1e9 * (self.t_s + piece.duration)).round() / 1e9; // sums of decimals stay decimals
         (self.h, self.heading) = (end.h, end.heading);
         self.speed += piece.speed[1];
     }

@@ -36,9 +36,8 @@ pub enum Place {
     },
 }
 
-/// A turn: how far it carries ahead and aside, how long it takes.
+/// How far a turn carries.
 struct Corner {
-    duration: f64,
     /// Length of the straight line from its begin to its end (m), in the direction of half the turn.
     chord: f64,
     /// From its begin to the corner it cuts, and from there to its end (m).
@@ -128,7 +127,7 @@ impl Path<'_> {
         let piece = self.piece([duration, ramp_s], 0.0, angle, 0.0);
         let half = self.heading + 0.5 * angle;
         let chord = self.speed * duration * mean(|x| (piece.at(x).heading - half).cos());
-        Ok(Corner { duration, chord, lead: 0.5 * chord / (0.5 * angle).cos() })
+        Ok(Corner { chord, lead: 0.5 * chord / (0.5 * angle).cos() })
     }
 
     /// Distance before the corner at `target` at which the turn to `next` begins (m).
@@ -147,7 +146,7 @@ impl Path<'_> {
         if angle.abs() < 1e-9 { Ok(0.0) } else { Ok(self.corner(angle, by, ramp_s)?.lead) }
     }
 
-    /// Turns so that the heading after the turn points from there to the target.
+    /// Turns so that the heading after the turn points from there to the target: secant steps on the angle.
     fn turn_towards(
         &mut self,
         target: [f64; 2],
@@ -155,27 +154,34 @@ impl Path<'_> {
         ramp_s: f64,
         number: usize,
     ) -> Result<(), Problem> {
-        let here = [self.lat, self.lon];
-        let r = radii(self.lat.sin());
-        let mut angle = wrap_angle(self.course(here, target).0 - self.heading);
-        for _ in 0..100 {
+        let mut angle = wrap_angle(self.course([self.lat, self.lon], target).0 - self.heading);
+        let mut before: Option<(f64, f64)> = None;
+        for _ in 0..50 {
             if angle.abs() < 1e-9 {
                 return Ok(());
             }
-            let corner = self.corner(angle, by, ramp_s)?;
-            let (sin_psi, cos_psi) = (self.heading + 0.5 * angle).sin_cos();
-            let after = [
-                here[0] + corner.chord * cos_psi / (r.meridian + self.h),
-                here[1] + corner.chord * sin_psi / ((r.transverse + self.h) * here[0].cos()),
-            ];
-            // The same way round as before.
-            let correction = wrap_angle(self.course(after, target).0 - self.heading - angle);
-            angle += correction;
-            if correction.abs() < 1e-12 {
-                return self.push([corner.duration, ramp_s], 0.0, angle, 0.0);
+            let miss = self.miss(angle, target, by, ramp_s)?;
+            if miss.abs() < 1e-11 {
+                let duration = self.turn_duration(angle, by, ramp_s)?;
+                return self.push([duration, ramp_s], 0.0, angle, 0.0);
             }
+            let slope = before.map_or(-1.0, |(a, m)| (miss - m) / (angle - a));
+            before = Some((angle, miss));
+            angle -= (miss / slope).clamp(-1.0, 1.0);
         }
         Err(Problem::Unreachable { number })
+    }
+
+    /// What is left to turn (rad) to the target after a turn by an angle.
+    fn miss(&self, angle: f64, target: [f64; 2], by: Turning, ramp_s: f64) -> Result<f64, Problem> {
+        let corner = self.corner(angle, by, ramp_s)?;
+        let r = radii(self.lat.sin());
+        let (sin_psi, cos_psi) = (self.heading + 0.5 * angle).sin_cos();
+        let after = [
+            self.lat + corner.chord * cos_psi / (r.meridian + self.h),
+            self.lon + corner.chord * sin_psi / ((r.transverse + self.h) * self.lat.cos()),
+        ];
+        Ok(wrap_angle(self.course(after, target).0 - self.heading - angle))
     }
 }
 
