@@ -1,7 +1,7 @@
 //! Strapdown mechanisation on WGS-84, eight runs at a time.
 //!
 //! Quaternion attitude with two-sample coning, velocity with two-sample sculling and rotation
-//! compensation ([Savage](crate::bibliography::Savage98)), Earth and transport rate at the middle of the
+//! compensation to third order ([Savage](crate::bibliography::Savage98)), Earth and transport rate at the middle of the
 //! interval, trapezoidal position in (lat, lon, h) ([Groves](crate::bibliography::Groves13), sec. 5.4–5.5).
 //! No small-angle, flat-Earth or Euler-angle assumption: any heading and attitude, either hemisphere,
 //! across ±180° of longitude. Latitude and longitude lose their meaning at the poles: whoever drives the
@@ -95,8 +95,9 @@ impl Strapdown {
     pub fn step(&mut self, dtheta: Vec3, dv: Vec3, dt: f64) -> StepTrace {
         // Coning and sculling from this sample and the one before (Savage 1998, two-sample form).
         let phi_b = dtheta + self.dtheta_before.cross(dtheta) * (1.0 / 12.0);
+        // Without the triple product, θ²/6 of the specific force is lost in every turn: dt² overall.
         let sculling = self.dtheta_before.cross(dv) + self.dv_before.cross(dtheta);
-        let dv_sf_b = dv + dtheta.cross(dv) * 0.5 + sculling * (1.0 / 12.0);
+        let dv_sf_b = dv + dtheta.cross(dv * 0.5 + dtheta.cross(dv) * (1.0 / 6.0)) + sculling * (1.0 / 12.0);
         self.dtheta_before = dtheta;
         self.dv_before = dv;
 
