@@ -1,5 +1,6 @@
 //! The command line: one file per subcommand, each its `Args` and a `run(args, &Session)`.
 
+mod axes;
 mod calibrate;
 mod check;
 mod common;
@@ -12,8 +13,8 @@ mod printer;
 mod progress;
 mod read;
 mod recordings;
-mod run;
 mod schema;
+mod synthesize;
 mod tuning;
 mod wv;
 
@@ -39,18 +40,17 @@ struct Cli {
 enum Command {
     Wv(wv::Args),
     Calibrate(calibrate::Args),
-    Run(run::Args),
     Check(check::Args),
     Compare(compare::Args),
     Completions(completions::Args),
     Man(man::Args),
     Schema(schema::Args),
+    Synthesize(synthesize::Args),
 }
 
 impl Command {
     fn run(self, session: &Session) -> Result<(), Failure> {
         match self {
-            Self::Run(args) => run::run(&args, session),
             Self::Check(args) => check::run(&args, session),
             Self::Wv(args) => wv::run(&args, session),
             Self::Calibrate(args) => calibrate::run(&args, session),
@@ -58,6 +58,7 @@ impl Command {
             Self::Completions(args) => completions::run(&args, session),
             Self::Man(args) => man::run(&args, session),
             Self::Schema(args) => schema::run(&args, session),
+            Self::Synthesize(args) => synthesize::run(&args, session),
         }
     }
 }

@@ -1,8 +1,9 @@
 //! Flags for static recordings, and reading them.
 
+use super::axes::ChannelSet;
 use super::{Failure, Session};
 use nav_sim::data::recordings::{self, Gaps, ReadOptions, Report};
-use nav_sim::imu::{Channel, Recording, Sensor};
+use nav_sim::imu::{Recording, Sensor};
 use std::path::PathBuf;
 
 /// How recordings are read.
@@ -18,8 +19,8 @@ pub(crate) struct RecordingArgs {
     /// What to do where the time jumps or stands still
     #[arg(long, value_enum, default_value_t = GapsArg::Refuse)]
     gaps: GapsArg,
-    /// Signals to use: accel, gyro, accel.x, … (repeatable or comma-separated; default: all)
-    #[arg(long, value_name = "AXES", value_delimiter = ',', value_parser = channels)]
+    /// Signals to use: all, accel, gyro, x, accel.x, … (repeatable or comma-separated; default: all)
+    #[arg(long, value_name = "AXES", value_delimiter = ',', value_parser = ChannelSet::named)]
     axes: Vec<ChannelSet>,
     /// Names of the columns, comma-separated, instead of the header (and for files without one)
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
@@ -34,19 +35,6 @@ enum GapsArg {
     Split,
     /// Take the samples as evenly spaced
     Ignore,
-}
-
-/// What one word of `--axes` stands for.
-#[derive(Debug, Clone)]
-struct ChannelSet(Vec<Channel>);
-
-fn channels(word: &str) -> Result<ChannelSet, String> {
-    let named = |c: &Channel| c.to_string() == word || c.sensor.name() == word;
-    let found: Vec<Channel> = Channel::ALL.into_iter().filter(named).collect();
-    match found.as_slice() {
-        [] => Err("not accel, gyro, or one axis of them such as accel.x".into()),
-        _ => Ok(ChannelSet(found)),
-    }
 }
 
 impl RecordingArgs {

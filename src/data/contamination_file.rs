@@ -289,9 +289,9 @@ mod tests {
 
         let bursts = |replicate| rules("section4-III", Sensor::Accel, replicate).len();
         assert_eq!([1, 2, 3, 4, 8].map(bursts), [3, 3, 3, 2, 3]);
-        assert!(
-            matches!(&rules("section4-III", Sensor::Accel, 8)[2], Operation::Scale { factor, .. } if *factor == 4.0)
-        );
+        let (process, parameter) = ("RW".to_owned(), "gamma2".to_owned());
+        let scale = Operation::Scale { process, parameter, factor: 4.0 };
+        assert_eq!(rules("section4-III", Sensor::Accel, 8)[2], scale);
         for name in names() {
             assert!(!find(name, 100.0).unwrap().touches(9), "{name}: the ninth replicate stays clean");
         }

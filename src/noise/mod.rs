@@ -14,6 +14,7 @@ mod normal;
 mod quantization;
 mod random_walk;
 pub mod reduction;
+pub mod replicate;
 
 pub mod contamination;
 mod slow_ar1;
@@ -29,6 +30,7 @@ pub use gauss_markov::GaussMarkov;
 pub use ma1::Ma1;
 pub use quantization::Quantization;
 pub use random_walk::RandomWalk;
+pub use replicate::{ReplicateError, VirtualImu};
 pub use spread::{Law, Spread, SpreadError, Variation};
 pub use synthesis::Synthesizer;
 pub use white::White;

@@ -9,7 +9,7 @@ use std::sync::LazyLock;
 
 const LAYERS: usize = 256;
 /// Where the tail begins; with it, 256 layers of equal area close at the top (tested).
-const R: f64 = 3.654_152_885_361_008_8;
+const R: f64 = 3.654_152_885_361_009;
 /// Area of each layer, R·f(R) + ∫_R^∞ f, of the unnormalised density f.
 const AREA: f64 = 0.004_928_673_233_974_655;
 

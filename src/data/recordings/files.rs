@@ -57,7 +57,7 @@ fn name_of(path: &Path) -> String {
 
 /// Whether a name ends like a recording's.
 #[must_use]
-pub(crate) fn is_recording(name: &str) -> bool {
+pub fn is_recording(name: &str) -> bool {
     let lower = name.to_lowercase();
     let plain = lower.strip_suffix(".gz").unwrap_or(&lower);
     plain.rsplit_once('.').is_some_and(|(stem, ending)| !stem.is_empty() && ENDINGS.contains(&ending))

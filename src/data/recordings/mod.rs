@@ -13,9 +13,12 @@ mod files;
 mod report;
 mod text;
 mod timing;
+mod write;
 
 pub use error::RecordingError;
+pub use files::is_recording;
 pub use report::{FileReport, Report};
+pub use write::FileFormat;
 
 use crate::data::npy;
 use crate::imu::{Channel, Recording, Signal};

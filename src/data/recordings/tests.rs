@@ -95,6 +95,7 @@ fn tabs_semicolons_crlf_bom_and_missing_last_newline() {
     for text in [
         "t_s\tgyro_x_rad_s\r\n0\t1\r\n0.01\t2",
         "\u{feff}t_s;gyro_x_rad_s\n0; 1 \n0.01;2;\n",
+        "# t_s gyro_x_rad_s\n0 1\n0.01 2\n",
         "sep=,\n\"t_s\",\"gyro_x_rad_s\"\n0,\"1\"\n\n0.01,2\n\n",
     ] {
         let r = read_one("a.txt", text, &ReadOptions::default()).unwrap();
@@ -172,6 +173,9 @@ fn xsens_counter_wraps_and_tells_what_was_lost() {
     // Every second packet written: the rate is still the head's.
     let r = read_one("mt.txt", xsens(RATE, (65530..65560).step_by(2)), &ReadOptions::default()).unwrap();
     assert_close(&[r.rate_hz], &[50.0]);
+    // A fine clock that is not filled in is passed over.
+    let empty = "// MT Manager version: 2022.2.0\nPacketCounter\tSampleTimeFine\tGyr_X\n51400\tNaN\t0.1\n51401\t\t0.2\n";
+    assert_eq!(read_one("mt.txt", empty, &at_100_hz()).unwrap().len(), 2);
     // No rate in the head: the fine clock has it, over its own wrap.
     let r = read_one("mt.txt", xsens("", 0..12), &ReadOptions::default()).unwrap();
     assert_close(&[r.rate_hz], &[100.0]);

@@ -1,7 +1,7 @@
 //! Text tables: comment head, header, rows.
 
 use super::error::shown;
-use super::header::Layout;
+use super::header::{Layout, Role, classify};
 use super::{Column, Lines, Raw, ReadOptions, RecordingError};
 use flate2::read::MultiGzDecoder;
 use std::fs::File;
@@ -44,6 +44,7 @@ pub(super) fn parse(name: &str, mut reader: Reader, options: &ReadOptions) -> Re
         return Err(RecordingError::Empty { path: name.to_owned() });
     }
     let mut columns: Vec<Column> = columns.into_iter().map(|(_, c)| c).collect();
+    columns.retain(|c| c.role != Role::Ticks || c.values.iter().all(|v| v.is_finite()));
     columns.iter_mut().for_each(|c| c.values.shrink_to_fit());
     let head_rate_hz = head.rate_hz;
     Ok(Raw { path: name.to_owned(), columns, ignored: layout.ignored, head_rate_hz, lines })
@@ -86,8 +87,9 @@ impl Head {
             if text.is_empty() || text.to_lowercase().starts_with("sep=") {
                 continue;
             }
-            let delimiter = delimiter_of(text);
-            let cells = split(text, delimiter);
+            let header = text.trim_start_matches(['#', '%']).trim_start();
+            let delimiter = delimiter_of(header);
+            let cells = split(header, delimiter);
             if text.starts_with(['#', '%']) && Layout::new(&cells, xsens, None).is_err() {
                 continue;
             }
@@ -110,15 +112,19 @@ impl Head {
 /// The rate in a comment such as `Update Rate: 100.0Hz`.
 fn rate_in(comment: &str) -> Option<f64> {
     let lower = comment.to_lowercase();
-    let value = lower.split_once("rate")?.1.trim_start_matches(|c: char| !c.is_ascii_digit());
+    let words = ["update rate", "sample rate", "sampling rate", "output rate"];
+    let after = words.iter().find_map(|w| lower.split_once(w))?.1;
+    let value = after.trim_start_matches(|c: char| !c.is_ascii_digit());
     let digits: String = value.chars().take_while(|c| c.is_ascii_digit() || *c == '.').collect();
     digits.parse().ok().filter(|r: &f64| *r > 0.0)
 }
 
 fn delimiter_of(header: &str) -> u8 {
     let count = |d: u8| header.bytes().filter(|b| *b == d).count();
-    // Of equals, the last.
-    [b',', b';', b'\t'].into_iter().max_by_key(|d| count(*d)).filter(|d| count(*d) > 0).unwrap_or(b',')
+    // Of equals, the last. Spaces separate only where nothing else does and they are not inside one name.
+    let best = [b',', b';', b'\t'].into_iter().max_by_key(|d| count(*d)).filter(|d| count(*d) > 0);
+    let spaced = count(b' ') > 0 && classify(header, true).is_none();
+    best.unwrap_or(if spaced { b' ' } else { b',' })
 }
 
 /// The cells of a line, quotes removed, without empty ones at the end.
@@ -172,6 +178,8 @@ fn read_rows(
             let cell = record.get(*index).unwrap_or_default();
             match number(cell) {
                 Some(value) if value.is_finite() => column.values.push(value),
+                // A clock that the exporter leaves empty is no clock: passed over below.
+                _ if column.role == Role::Ticks => column.values.push(f64::NAN),
                 parsed => return Err(bad_cell(name, line, &column.name, cell, parsed.is_some())),
             }
         }
