@@ -1,5 +1,7 @@
 //! What the program does as a program: exit codes, streams, messages.
 
+#![allow(clippy::unwrap_used, reason = "a test")]
+
 use assert_cmd::Command;
 use std::process::Stdio;
 

@@ -1,5 +1,7 @@
 //! `nav-sim compare` on made-up run directories whose ratios are known.
 
+#![allow(clippy::unwrap_used, reason = "a test")]
+
 use assert_cmd::Command;
 use nav_sim::metrics::{self, Summary};
 use nav_sim::report::{self, Input, Manifest, ModelNote};

@@ -1,5 +1,7 @@
 //! The Rust examples run.
 
+#![allow(clippy::unwrap_used, reason = "a test")]
+
 #[path = "../examples/01_robust_wavelet_variance.rs"]
 mod robust_wavelet_variance;
 

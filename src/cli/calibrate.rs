@@ -2,15 +2,15 @@
 
 use super::recordings::{RecordingArgs, sensor};
 use super::tuning::TuningArgs;
-use super::{Failure, Session, parse};
+use super::{Failure, Session, parse, read};
 use nav_sim::calibration::{
     AverageError, CalibrationError, Cause, Estimator, FitError, Group, ModelSpec, Outcome, Pool, Replicate,
     Settings, SpecError, Trim, Weighting, calibrate, fit_curve, grouped, replicates,
 };
+use nav_sim::data::atomic;
 use nav_sim::data::curve_file::{self, NamedCurve};
 use nav_sim::data::model_file::{self, CalibrationNote};
 use nav_sim::data::suggest::nearest;
-use nav_sim::data::{atomic, hash};
 use nav_sim::imu::{Channel, Recording, Sensor};
 use nav_sim::report::{self, CurvesFile, FitsFile, Input};
 use std::path::{Path, PathBuf};
@@ -154,7 +154,7 @@ fn of_recordings(args: &Args, settings: &mut Settings, session: &Session) -> Res
     drop(recordings);
     let groups = grouped(measured, pool);
     let outcomes = calibrate(&groups, settings).map_err(|e| of_calibration(&e))?;
-    let inputs = files.iter().map(|f| hashed("recording", f)).collect::<Result<_, _>>()?;
+    let inputs = files.iter().map(|f| read::input("recording", f)).collect::<Result<_, _>>()?;
     let note = note(args, inputs);
     finish(&outputs, &groups, &outcomes, settings, &note, session)
 }
@@ -279,14 +279,9 @@ fn of_curves(args: &Args, path: &Path, settings: &mut Settings, session: &Sessio
         let outcome = fit_curve(&groups, groups.len() - 1, estimator, named.curve, settings);
         outcomes.push(outcome.map_err(|e| of_calibration(&e))?);
     }
-    let input = hashed("curve", path)?;
+    let input = read::input("curve", path)?;
     let note = note(args, vec![input]);
     finish(&outputs, &groups, &outcomes, settings, &note, session)
-}
-
-fn hashed(role: &str, path: &Path) -> Result<Input, Failure> {
-    let blake3 = hash::of_file(path).map_err(|e| Failure::could_not(format!("{}: {e}", path.display())))?;
-    Ok(Input { role: role.to_owned(), path: path.display().to_string(), blake3 })
 }
 
 fn note(args: &Args, inputs: Vec<Input>) -> CalibrationNote {

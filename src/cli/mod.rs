@@ -13,6 +13,7 @@ mod printer;
 mod progress;
 mod read;
 mod recordings;
+mod run;
 mod schema;
 mod synthesize;
 mod tuning;
@@ -40,6 +41,7 @@ struct Cli {
 enum Command {
     Wv(wv::Args),
     Calibrate(calibrate::Args),
+    Run(run::Args),
     Check(check::Args),
     Compare(compare::Args),
     Completions(completions::Args),
@@ -51,6 +53,7 @@ enum Command {
 impl Command {
     fn run(self, session: &Session) -> Result<(), Failure> {
         match self {
+            Self::Run(args) => run::run(&args, session),
             Self::Check(args) => check::run(&args, session),
             Self::Wv(args) => wv::run(&args, session),
             Self::Calibrate(args) => calibrate::run(&args, session),

@@ -1,10 +1,12 @@
 //! Reading inputs for commands: doubts are said, refusals become failures.
 
 use super::{Failure, Session};
+use nav_sim::data::hash;
 use nav_sim::data::model_file::{self, ModelFile};
 use nav_sim::data::recordings::{self, ReadOptions};
 use nav_sim::data::trajectory_file::{self, TrajectoryFileError};
 use nav_sim::imu::Recording;
+use nav_sim::report::Input;
 use nav_sim::trajectory::Trajectory;
 use std::path::{Path, PathBuf};
 
@@ -16,6 +18,13 @@ impl From<TrajectoryFileError> for Failure {
         };
         failure.maybe_hint(e.hint())
     }
+}
+
+/// An input with its fingerprint.
+pub(super) fn input(role: &str, path: &Path) -> Result<Input, Failure> {
+    let shown = path.display().to_string();
+    let blake3 = hash::of_file(path).map_err(|e| Failure::could_not(format!("{shown}: {e}")))?;
+    Ok(Input { role: role.to_owned(), path: shown, blake3 })
 }
 
 /// A trajectory.

@@ -20,5 +20,5 @@ pub use curves::{
 };
 pub use fits::{FitEntry, FitsFile, describe};
 pub use manifest::{Input, Manifest, ModelNote};
-pub use run_directory::{OutputFile, json, run_directory};
+pub use run_directory::{OutputFile, RUN_FILES, json, run_directory};
 pub use tables::{TableError, epochs_csv, parse_epochs, parse_runs, runs_csv};

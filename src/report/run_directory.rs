@@ -15,6 +15,9 @@ pub struct OutputFile {
     pub contents: String,
 }
 
+/// Names of the files of a run directory.
+pub const RUN_FILES: [&str; 5] = ["epochs.csv", "runs.csv", "summary.json", "report.html", "manifest.json"];
+
 /// The files of a run directory, the manifest last: where it is, the rest is whole.
 #[must_use]
 pub fn run_directory(
@@ -23,14 +26,14 @@ pub fn run_directory(
     summary: &Summary,
     manifest: &Manifest,
 ) -> Vec<OutputFile> {
-    let file = |name, contents| OutputFile { name, contents };
-    vec![
-        file("epochs.csv", epochs_csv(epochs)),
-        file("runs.csv", runs_csv(result)),
-        file("summary.json", json(summary)),
-        file("report.html", html::run_page(result, epochs, summary, manifest)),
-        file("manifest.json", json(manifest)),
-    ]
+    let contents = [
+        epochs_csv(epochs),
+        runs_csv(result),
+        json(summary),
+        html::run_page(result, epochs, summary, manifest),
+        json(manifest),
+    ];
+    RUN_FILES.into_iter().zip(contents).map(|(name, contents)| OutputFile { name, contents }).collect()
 }
 
 /// Indented JSON with a final newline; NaN is null.
@@ -68,10 +71,7 @@ mod tests {
     #[test]
     fn the_manifest_comes_last_and_reads_back() {
         let files = files();
-        assert_eq!(
-            files.iter().map(|f| f.name).collect::<Vec<_>>(),
-            ["epochs.csv", "runs.csv", "summary.json", "report.html", "manifest.json"]
-        );
+        assert_eq!(files.iter().map(|f| f.name).collect::<Vec<_>>(), RUN_FILES);
         let manifest: Manifest = serde_json::from_str(&files[4].contents).unwrap();
         assert_eq!(manifest.hashes("trajectory"), [blake3::hash(b"x").to_hex().as_str()]);
         assert_eq!(manifest.configuration, Scenario::default());

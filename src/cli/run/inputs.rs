@@ -1,0 +1,90 @@
+//! The files of a run.
+
+use super::Args;
+use crate::cli::{Failure, Session, read};
+use nav_sim::imu::Recording;
+use nav_sim::noise::{Model, continuous};
+use nav_sim::report::{Input, ModelNote};
+use nav_sim::sensors::imu::Truth;
+use nav_sim::trajectory::Trajectory;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// What was read, ready to use.
+pub(super) struct Inputs {
+    pub(super) trajectory: Trajectory,
+    /// At the rate of the IMU.
+    pub(super) model: Model,
+    pub(super) note: ModelNote,
+    truth_model: Option<Model>,
+    recordings: Vec<Recording>,
+    /// Every file with its hash.
+    pub(super) files: Vec<Input>,
+}
+
+impl Inputs {
+    pub(super) fn read(args: &Args, imu_hz: f64, session: &Session) -> Result<Self, Failure> {
+        let files = files(args)?;
+        let trajectory = read::trajectory(&args.trajectory, session)?;
+        let (model, estimator) = model(&args.model, imu_hz, session)?;
+        let truth = args.truth.as_deref().map(|path| self::model(path, imu_hz, session)).transpose()?;
+        let recordings = match args.recordings.as_slice() {
+            [] => Vec::new(),
+            paths => read::recordings(paths, session)?,
+        };
+        let truth_model = truth.map(|(model, _)| model);
+        Ok(Self { trajectory, model, note: ModelNote { estimator }, truth_model, recordings, files })
+    }
+
+    /// What makes the errors.
+    pub(super) fn truth(&self) -> Truth<'_> {
+        match &self.truth_model {
+            _ if !self.recordings.is_empty() => Truth::Static(&self.recordings),
+            Some(model) => Truth::Model(model),
+            None => Truth::Model(&self.model),
+        }
+    }
+}
+
+fn files(args: &Args) -> Result<Vec<Input>, Failure> {
+    let mut named: Vec<(&str, PathBuf)> =
+        vec![("trajectory", args.trajectory.clone()), ("model", args.model.clone())];
+    named.extend(args.truth.iter().map(|p| ("truth", p.clone())));
+    named.extend(listed(&args.recordings)?.into_iter().map(|p| ("static", p)));
+    named.extend(args.scenario.iter().map(|p| ("scenario", p.clone())));
+    named.extend(args.gnss.iter().map(|p| ("gnss", p.clone())));
+    named.iter().map(|(role, path)| read::input(role, path)).collect()
+}
+
+/// The files themselves and those of directories, in name order.
+fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+    let mut files = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            files.push(path.clone());
+            continue;
+        }
+        let error = |e| Failure::could_not(format!("{}: {e}", path.display()));
+        let entries = fs::read_dir(path).map_err(error)?.collect::<Result<Vec<_>, _>>().map_err(error)?;
+        let mut within: Vec<PathBuf> =
+            entries.iter().map(fs::DirEntry::path).filter(|p| p.is_file()).collect();
+        within.sort();
+        files.extend(within);
+    }
+    Ok(files)
+}
+
+/// A model at the rate of the IMU, and the estimator that made it, if known.
+fn model(path: &Path, imu_hz: f64, session: &Session) -> Result<(Model, Option<String>), Failure> {
+    let file = read::model(path, session)?;
+    let (shown, from_hz) = (path.display(), file.model.rate_hz);
+    let converted = continuous::at_rate(&file.model, imu_hz).map_err(|e| {
+        let hint = format!("set rate_hz = {from_hz} in the [imu] section of a --scenario file");
+        Failure::input(format!("{shown}: {e}")).hint(hint)
+    })?;
+    if !continuous::same_rate(from_hz, imu_hz) {
+        session.printer.say(&format!("{shown}: converted from {from_hz} Hz to {imu_hz} Hz"));
+    }
+    let estimator = file.provenance.as_ref().and_then(|p| p.get("estimator"));
+    Ok((converted, estimator.and_then(toml::Value::as_str).map(str::to_owned)))
+}

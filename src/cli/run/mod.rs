@@ -1,0 +1,212 @@
+//! `nav-sim run`: the main job.
+
+mod inputs;
+mod output;
+
+use super::{Failure, Session};
+use inputs::Inputs;
+use nav_sim::data::scenario_file;
+use nav_sim::ekf::{Belief, BeliefError, FilterStates};
+use nav_sim::imu::Sensor;
+use nav_sim::metrics::Summary;
+use nav_sim::monte_carlo;
+use nav_sim::noise::{Model, reduction};
+use nav_sim::report::{self, Manifest};
+use nav_sim::scenario::{Method, Scenario};
+use nav_sim::sensors::outage::Outage;
+use nav_sim::simulation::{Experiment, RunResult};
+use std::path::PathBuf;
+use std::time::Instant;
+
+pub(super) use output::{manifest, text, write};
+
+/// Monte-Carlo INS/GNSS navigation along TRAJECTORY with MODEL in the filter
+///
+/// Writes a run directory: epochs.csv (ASEE, RMSE, bias, NEES, coverage at 1 Hz), runs.csv, summary.json,
+/// report.html, manifest.json. The same seed gives the same noise to every model, so that runs can be
+/// compared pair by pair (see `nav-sim compare`).
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml --seed 1 -o out/run
+  nav-sim run trajectories/land_vehicle.toml calib_data/tactical_mems.toml --truth calib_data/consumer_mems.toml --runs 20 -o out/mismatch
+  nav-sim run trajectories/figure_eight.toml calib_data/consumer_mems.toml --outage 60:90 --filter full --runs 20 -o out/full")]
+pub(crate) struct Args {
+    /// Trajectory: motion profile (.toml) or table (.csv)
+    trajectory: PathBuf,
+    /// Noise model that the filter believes
+    model: PathBuf,
+    /// Noise model that makes the INS errors (default: MODEL itself)
+    #[arg(long, value_name = "MODEL2", conflicts_with = "recordings")]
+    truth: Option<PathBuf>,
+    /// Static recording whose windows make the INS errors (repeatable)
+    #[arg(long = "static", value_name = "FILE")]
+    recordings: Vec<PathBuf>,
+    /// Window without fixes, in seconds (repeatable), or "none" (default: 300:390 and 700:790)
+    #[arg(long = "outage", value_name = "START:END", value_parser = parse_outage)]
+    outages: Vec<OutageArg>,
+    /// Monte-Carlo runs (default: 100)
+    #[arg(long, value_name = "N")]
+    runs: Option<u64>,
+    /// States of the filter: 15 (one bias an axis, the reduction of the model) or full (default: 15)
+    #[arg(long, value_name = "STATES", value_parser = parse_states)]
+    filter: Option<FilterStates>,
+    /// How statistics are found: monte-carlo or lincov (default: monte-carlo)
+    #[arg(long, value_name = "METHOD", value_parser = parse_method)]
+    method: Option<Method>,
+    /// Scenario file whose [gnss] section is used
+    #[arg(long, value_name = "FILE")]
+    gnss: Option<PathBuf>,
+    /// Everything of the run in one TOML file; flags win over it (see `nav-sim schema scenario`)
+    #[arg(long, value_name = "FILE")]
+    scenario: Option<PathBuf>,
+    /// Run directory to make
+    #[arg(long, short, value_name = "DIR", default_value = "out/run")]
+    out: PathBuf,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum OutageArg {
+    None,
+    Window(Outage),
+}
+
+fn parse_outage(text: &str) -> Result<OutageArg, String> {
+    if text == "none" {
+        return Ok(OutageArg::None);
+    }
+    let numbers = text.split_once(':').and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
+    let (start_s, end_s) = numbers.ok_or("expected START:END in seconds, such as 300:390, or none")?;
+    let outage = Outage { start_s, end_s };
+    outage.validate().map_err(|e| e.to_string())?;
+    Ok(OutageArg::Window(outage))
+}
+
+fn parse_states(text: &str) -> Result<FilterStates, String> {
+    match text {
+        "15" => Ok(FilterStates::Reduced15),
+        "full" => Ok(FilterStates::Full),
+        _ => Err("expected 15 or full".to_owned()),
+    }
+}
+
+fn parse_method(text: &str) -> Result<Method, String> {
+    match text {
+        "monte-carlo" => Ok(Method::MonteCarlo),
+        "lincov" => Ok(Method::Lincov),
+        _ => Err("expected monte-carlo or lincov".to_owned()),
+    }
+}
+
+pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let scenario = scenario(args)?;
+    let inputs = Inputs::read(args, scenario.imu.rate_hz, session)?;
+    let seed = session.seed(scenario.run.seed);
+    let span = (inputs.trajectory.start_s(), inputs.trajectory.end_s());
+    let outages = outages(&scenario, span, seed, session)?;
+    let directory = output::open(&args.out, &inputs.files)?;
+    let unusable = |e| Failure::input(format!("{}: {e}", args.model.display()));
+    let belief = belief(&scenario, &inputs.model, &outages).map_err(unusable)?;
+    let experiment = Experiment {
+        trajectory: &inputs.trajectory,
+        rate_hz: scenario.imu.rate_hz,
+        gravity: scenario.filter.gravity,
+        truth: inputs.truth(),
+        beliefs: std::slice::from_ref(&belief),
+        gnss: &scenario.gnss,
+        initial: &scenario.initial,
+        outages: &outages,
+        seed,
+        scenario: "",
+        coverage_level: scenario.run.coverage_level,
+    };
+    let (results, wall_s) = simulate(&experiment, scenario.run.runs, session)?;
+    let manifest = manifest(scenario, &outages, seed, inputs.files.clone(), inputs.note.clone(), session);
+    let summary = write(&results[0], &Manifest { wall_s, ..manifest }, directory)?;
+    let shown = if session.json() { report::json(&summary) } else { text(&summary) };
+    session.printer.result(shown.trim_end());
+    session.printer.say(&format!("wrote {}", args.out.display()));
+    all_finite(&summary)
+}
+
+/// A run that diverged is left out of every number; the exit code says that there was one.
+pub(super) fn all_finite(summary: &Summary) -> Result<(), Failure> {
+    if summary.diverged == 0 {
+        return Ok(());
+    }
+    let failure = Failure::bound(format!("{} of {} runs diverged", summary.diverged, summary.runs));
+    Err(failure.hint("their indices are in summary.json, under diverged_runs; they are in no other number"))
+}
+
+/// The scenario file with the flags over it, checked.
+fn scenario(args: &Args) -> Result<Scenario, Failure> {
+    let mut scenario = args.scenario.as_deref().map(scenario_file::read).transpose()?.unwrap_or_default();
+    if let Some(path) = &args.gnss {
+        scenario.gnss = scenario_file::read(path)?.gnss;
+    }
+    if !args.outages.is_empty() {
+        let window = |o: &OutageArg| match o {
+            OutageArg::None => None,
+            OutageArg::Window(outage) => Some(*outage),
+        };
+        scenario.outage = Some(args.outages.iter().filter_map(window).collect());
+        (scenario.outage_periodic, scenario.outage_random) = (None, None);
+    }
+    scenario.run.runs = args.runs.unwrap_or(scenario.run.runs);
+    scenario.run.method = args.method.unwrap_or(scenario.run.method);
+    scenario.filter.states = args.filter.unwrap_or(scenario.filter.states);
+    scenario.validate().map_err(Failure::input)?;
+    Ok(scenario)
+}
+
+/// The outages on this trajectory. One that was asked for by its times and lies outside is an error; the
+/// default ones are left out where the trajectory is shorter, and that is said.
+fn outages(
+    scenario: &Scenario,
+    span: (f64, f64),
+    seed: u64,
+    session: &Session,
+) -> Result<Vec<Outage>, Failure> {
+    let outside = |o: &&Outage| o.start_s >= span.1 || o.end_s <= span.0 || o.end_s > span.1;
+    let asked = scenario.outage.iter().flatten();
+    if let Some(o) = asked.clone().find(outside) {
+        let message = format!("outage {}:{} does not lie on the trajectory", o.start_s, o.end_s);
+        return Err(Failure::input(message).hint(format!("it lasts from {} to {} s", span.0, span.1)));
+    }
+    let windows = scenario.outages().windows(span, seed).map_err(Failure::input)?;
+    let shown: Vec<String> = windows.iter().map(|o| format!("{}–{} s", o.start_s, o.end_s)).collect();
+    session.printer.say(&match shown.as_slice() {
+        [] => "no outage".to_owned(),
+        some => format!("outages {}", some.join(", ")),
+    });
+    if scenario.outage.is_none() && scenario.outages().fixed.len() > windows.len() {
+        session.printer.warn(&format!("the default outages lie beyond the trajectory's end at {} s", span.1));
+    }
+    Ok(windows)
+}
+
+/// The filter's states for a model.
+pub(super) fn belief(scenario: &Scenario, model: &Model, outages: &[Outage]) -> Result<Belief, BeliefError> {
+    let longest = outages.iter().map(|o| o.end_s - o.start_s).fold(0.0, f64::max);
+    let (interval_s, window_s) = (1.0 / scenario.gnss.rate_hz, reduction::window_s(longest));
+    let mut belief = Belief::new(model, scenario.filter.states, interval_s, window_s)?;
+    if let Some(sigma) = scenario.initial.accel_bias_sigma_m_s2 {
+        belief.set_initial_bias_sigma(Sensor::Accel, sigma);
+    }
+    if let Some(sigma) = scenario.initial.gyro_bias_sigma_rad_s {
+        belief.set_initial_bias_sigma(Sensor::Gyro, sigma);
+    }
+    Ok(belief)
+}
+
+/// All runs, and how long they took (s).
+pub(super) fn simulate(
+    experiment: &Experiment<'_>,
+    runs: u64,
+    session: &Session,
+) -> Result<(Vec<RunResult>, f64), Failure> {
+    let start = Instant::now();
+    let progress = session.progress("runs", runs);
+    let results = monte_carlo::run(experiment, runs, &|n| progress.add(n)).map_err(Failure::input)?;
+    Ok((results, start.elapsed().as_secs_f64()))
+}

@@ -1,0 +1,117 @@
+//! The run directory and what is printed of it.
+
+use crate::cli::compare::table;
+use crate::cli::{Failure, Session};
+use nav_sim::data::atomic::{self, AtomicDir};
+use nav_sim::metrics::{self, OutageSummary, Summary};
+use nav_sim::report::{self, Input, Manifest, ModelNote};
+use nav_sim::scenario::Scenario;
+use nav_sim::sensors::outage::Outage;
+use nav_sim::simulation::RunResult;
+use std::path::Path;
+
+/// The manifest of a run: every key as it was used, outages one by one, the seed.
+pub(crate) fn manifest(
+    mut configuration: Scenario,
+    outages: &[Outage],
+    seed: u64,
+    inputs: Vec<Input>,
+    model: ModelNote,
+    session: &Session,
+) -> Manifest {
+    configuration.outage = Some(outages.to_vec());
+    (configuration.outage_periodic, configuration.outage_random) = (None, None);
+    configuration.run.seed = Some(seed);
+    Manifest {
+        schema_version: Manifest::SCHEMA_VERSION,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        command: std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect(),
+        seed,
+        scenario: String::new(),
+        configuration,
+        inputs,
+        model,
+        threads: session.threads(),
+        wall_s: 0.0,
+    }
+}
+
+/// Makes room for a run directory before the long computation; none of its files may be an input.
+pub(crate) fn open(path: &Path, inputs: &[Input]) -> Result<AtomicDir, Failure> {
+    for name in report::RUN_FILES {
+        atomic::guard_inputs(&path.join(name), inputs.iter().map(|i| Path::new(&i.path)))?;
+    }
+    Ok(AtomicDir::create(path)?)
+}
+
+/// Writes a run directory.
+pub(crate) fn write(
+    result: &RunResult,
+    manifest: &Manifest,
+    mut directory: AtomicDir,
+) -> Result<Summary, Failure> {
+    let epochs = metrics::epochs(&result.epochs);
+    let summary = Summary::of(result, &epochs, manifest.seed, manifest.wall_s);
+    for file in report::run_directory(result, &epochs, &summary, manifest) {
+        directory.write(file.name, file.contents)?;
+    }
+    directory.commit()?;
+    Ok(summary)
+}
+
+/// The summary for people.
+pub(crate) fn text(summary: &Summary) -> String {
+    let (nees, coverage) = (&summary.nees, &summary.coverage);
+    let mut text = format!(
+        "{} runs ({} diverged), {} states, seed {}, {:.2} million IMU epochs/s\n",
+        summary.runs,
+        summary.diverged,
+        summary.filter_states,
+        summary.seed,
+        summary.throughput_epochs_per_s / 1e6
+    );
+    if !summary.outages.is_empty() {
+        text += &outage_table(&summary.outages);
+        text.push('\n');
+    }
+    text += &format!(
+        "NEES {:.2} ({} if the filter is right), {:.0} % of epochs within [{:.2}, {:.2}]\n",
+        nees.mean,
+        nees.dof,
+        nees.fraction_inside * 100.0,
+        nees.lower95,
+        nees.upper95
+    );
+    text += &format!(
+        "coverage {:.3} at level {}, {:.0} % of epochs within [{:.2}, {:.2}]",
+        coverage.mean,
+        coverage.level,
+        coverage.fraction_inside * 100.0,
+        coverage.lower95,
+        coverage.upper95
+    );
+    text
+}
+
+fn outage_table(outages: &[OutageSummary]) -> String {
+    let head = [
+        "outage",
+        "horizontal error (m)\np50",
+        "\np95",
+        "\nmax",
+        "mean ASEE\npos_e_m",
+        "\nroll_deg",
+        "RMSE at the end\npos_e_m",
+        "\nroll_deg",
+    ];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    for o in outages {
+        let h = &o.horizontal_error_end_m;
+        let mut row = vec![format!("{}–{} s", o.start_s, o.end_s)];
+        row.extend([h.p50, h.p95, h.max].map(|v| format!("{v:.1}")));
+        let states = [o.asee_mean.0[1], o.asee_mean.0[6], o.rmse_end.0[1], o.rmse_end.0[6]];
+        row.extend(states.map(|v| format!("{v:.3}")));
+        rows.push(row);
+    }
+    table(&rows)
+}

@@ -1,0 +1,193 @@
+//! `nav-sim run` as a user runs it, on a drive of a minute.
+
+#![allow(clippy::unwrap_used, reason = "a test")]
+
+use assert_cmd::Command;
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+const TRAJECTORY: &str = "
+start = { lat_deg = 46.5, lon_deg = 6.5, h_m = 400, heading_deg = 40 }
+segment = [
+  { kind = \"straight\", duration_s = 5 },
+  { kind = \"accelerate\", to_speed_m_s = 10, duration_s = 10 },
+  { kind = \"turn\", angle_deg = 90, duration_s = 10 },
+  { kind = \"straight\", duration_s = 35 },
+]
+";
+const MODEL: &str = "
+schema = 1
+rate_hz = 100.0
+[accel]
+processes = [{ type = \"WN\", sigma2 = 5.4e-5 }, { type = \"AR1\", phi = 0.9999, sigma2 = 1e-9 }]
+[gyro]
+processes = [{ type = \"WN\", sigma2 = 2e-6 }, { type = \"AR1\", phi = 0.9999, sigma2 = 4e-12 }]
+[provenance]
+estimator = \"dr-awv\"
+";
+
+struct Ran {
+    code: i32,
+    stdout: String,
+    stderr: String,
+}
+
+fn place() -> tempfile::TempDir {
+    let directory = tempfile::tempdir().unwrap();
+    fs::write(directory.path().join("drive.toml"), TRAJECTORY).unwrap();
+    fs::write(directory.path().join("imu.toml"), MODEL).unwrap();
+    directory
+}
+
+fn nav_sim(directory: &Path, arguments: &str) -> Ran {
+    let output = Command::new(env!("CARGO_BIN_EXE_nav-sim"))
+        .current_dir(directory)
+        .args(arguments.split_whitespace())
+        .output()
+        .unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    Ran { code: output.status.code().unwrap(), stdout: text(output.stdout), stderr: text(output.stderr) }
+}
+
+fn done(directory: &Path, arguments: &str) -> Ran {
+    let ran = nav_sim(directory, arguments);
+    assert_eq!(ran.code, 0, "{arguments}\n{}", ran.stderr);
+    ran
+}
+
+/// The command fails with this code, its message starts so, and it leaves no output behind.
+fn refused(arguments: &str, code: i32, message: &str) {
+    let place = place();
+    let ran = nav_sim(place.path(), arguments);
+    assert_eq!(ran.code, code, "{arguments}\n{}", ran.stderr);
+    let said = ran.stderr.split("error: ").nth(1).unwrap_or_default();
+    assert!(said.starts_with(message), "{arguments}\n{}", ran.stderr);
+    let left: Vec<_> = fs::read_dir(place.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert!(left.iter().all(|name| name == "drive.toml" || name == "imu.toml"), "{left:?}");
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
+}
+
+#[test]
+fn a_run_directory_holds_what_the_interface_says() {
+    let place = place();
+    let ran = done(place.path(), "run drive.toml imu.toml --runs 10 --outage 30:40 --seed 5 -o out");
+    assert!(ran.stdout.contains("10 runs (0 diverged), 15 states, seed 5"), "{}", ran.stdout);
+    let out = place.path().join("out");
+    let summary = json(&out.join("summary.json"));
+    assert_eq!(
+        (&summary["runs"], &summary["filter_states"], &summary["seed"]),
+        (&10.into(), &15.into(), &5.into())
+    );
+    assert_eq!(summary["outages"][0]["end_s"], 40.0);
+    assert!(summary["outages"][0]["asee_mean"]["pos_e_m"].as_f64().unwrap() > 0.1);
+    assert!(summary["throughput_epochs_per_s"].as_f64().unwrap() > 0.0);
+    let manifest = json(&out.join("manifest.json"));
+    assert_eq!(manifest["configuration"]["run"]["seed"], 5);
+    assert_eq!(manifest["inputs"][0]["blake3"], blake3::hash(TRAJECTORY.as_bytes()).to_hex().as_str());
+    assert_eq!(manifest["model"]["estimator"], "dr-awv");
+    let epochs = fs::read_to_string(out.join("epochs.csv")).unwrap();
+    assert_eq!(epochs.lines().count(), 62); // header, 0 … 60 s
+    let fixes: Vec<&str> = epochs.lines().skip(1).map(|l| l.split(',').nth(1).unwrap()).collect();
+    assert_eq!((fixes[29], fixes[30], fixes[39], fixes[40]), ("1", "0", "0", "1"));
+    assert!(fs::read_to_string(out.join("report.html")).unwrap().contains("</html>"));
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
+    let place = place();
+    let command = "run drive.toml imu.toml --runs 20 --outage 30:40 --seed 9";
+    done(place.path(), &format!("{command} -j 1 -o one"));
+    done(place.path(), &format!("{command} -j 2 -o two"));
+    for name in ["epochs.csv", "runs.csv"] {
+        let read = |run: &str| fs::read(place.path().join(run).join(name)).unwrap();
+        assert_eq!(read("one"), read("two"), "{name}");
+    }
+}
+
+#[test]
+fn a_seed_that_is_drawn_is_said_recorded_and_repeats_the_run() {
+    let place = place();
+    let ran = done(place.path(), "run drive.toml imu.toml --runs 2 --outage none -o drawn");
+    let seed = ran.stderr.split("--seed ").nth(1).unwrap().split(')').next().unwrap();
+    assert_eq!(json(&place.path().join("drawn/manifest.json"))["seed"].to_string(), seed);
+    done(place.path(), &format!("run drive.toml imu.toml --runs 2 --outage none -o again --seed {seed}"));
+    let read = |run: &str| fs::read(place.path().join(run).join("epochs.csv")).unwrap();
+    assert_eq!(read("drawn"), read("again"));
+}
+
+#[test]
+fn flags_win_over_the_scenario_file() {
+    let place = place();
+    let scenario =
+        "outage = [{ start_s = 20, end_s = 30 }]\nrun = { runs = 3, seed = 4 }\n[gnss]\nrate_hz = 2\n";
+    fs::write(place.path().join("s.toml"), scenario).unwrap();
+    let ran = done(place.path(), "run drive.toml imu.toml --scenario s.toml --runs 2 --format json -o out");
+    let summary: Value = serde_json::from_str(&ran.stdout).unwrap();
+    assert_eq!((&summary["runs"], &summary["seed"]), (&2.into(), &4.into()));
+    assert_eq!(summary["outages"][0]["start_s"], 20.0);
+    assert_eq!(summary["nis"]["fixes"], 2 * (120 - 20));
+}
+
+#[test]
+fn candidates_with_the_same_seed_are_paired() {
+    let place = place();
+    fs::write(place.path().join("louder.toml"), MODEL.replace("1e-9", "4e-9")).unwrap();
+    let common = "--runs 8 --outage 30:50 --seed 3 --truth imu.toml";
+    done(place.path(), &format!("run drive.toml imu.toml {common} -o reference"));
+    done(place.path(), &format!("run drive.toml louder.toml {common} -o louder"));
+    let ran = done(place.path(), "compare louder reference --reference reference --state pos_e_m");
+    assert!(!ran.stderr.contains("warning"), "{}", ran.stderr);
+    let comparison = json(&place.path().join("comparison.json"));
+    let row = &comparison["rows"][1];
+    assert_eq!((&comparison["paired"], &row["state"]), (&true.into(), &"pos_e_m".into()));
+    // the filter that believes in more noise believes itself less, beyond doubt
+    assert!(row["ci95_pct"][0].as_f64().unwrap() > 0.0, "{row}");
+}
+
+#[test]
+fn a_trajectory_shorter_than_the_default_outages_runs_without_them_and_says_so() {
+    let place = place();
+    let ran = done(place.path(), "run drive.toml imu.toml --runs 1 --seed 1 -o out");
+    assert!(
+        ran.stderr.contains("warning: the default outages lie beyond the trajectory's end at 60 s"),
+        "{}",
+        ran.stderr
+    );
+}
+
+#[test]
+fn refusals_name_what_is_wrong_and_leave_nothing() {
+    let base = "run drive.toml imu.toml --seed 1 -o out";
+    refused("run none.toml imu.toml -o out", 1, "none.toml: No such file");
+    refused("run drive.toml none.toml -o out", 1, "none.toml: No such file");
+    refused("run drive.toml drive.toml -o out", 2, "drive.toml, line 2: unknown key \"start\"");
+    refused(&format!("{base} --outage 50:70"), 2, "outage 50:70 does not lie on the trajectory");
+    refused(&format!("{base} --outage 40:30"), 2, "invalid value '40:30' for '--outage <START:END>'");
+    refused(&format!("{base} --outage soon"), 2, "invalid value 'soon' for '--outage <START:END>'");
+    refused(&format!("{base} --runs 0"), 2, "run.runs = 0 is refused: at least one run");
+    refused(&format!("{base} --filter 16"), 2, "invalid value '16' for '--filter <STATES>'");
+    refused(&format!("{base} --method lincov"), 2, "run.method = \"lincov\" is refused");
+    refused(&format!("{base} --threads 0"), 2, "invalid value '0' for '--threads <N>'");
+    refused(&format!("{base} --truth a --static b"), 2, "the argument '--truth <MODEL2>' cannot be used");
+    refused("run drive.toml imu.toml --outage none --seed 1 -o imu.toml", 1, "imu.toml: ");
+}
+
+#[test]
+fn a_recording_that_is_too_short_is_refused_by_how_much() {
+    let place = place();
+    let mut csv =
+        "t_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s\n".to_owned();
+    for k in 0..4000 {
+        let noise = f64::from((k * 7919) % 1000 - 500) * 1e-5;
+        let g = 9.81 + noise;
+        csv += &format!("{},{noise},{noise},{g},{noise},{noise},{noise}\n", f64::from(k) / 100.0);
+    }
+    fs::write(place.path().join("static.csv"), csv).unwrap();
+    let ran = nav_sim(place.path(), "run drive.toml imu.toml --static static.csv --runs 1 --seed 1 -o out");
+    assert_eq!(ran.code, 2, "{}", ran.stderr);
+    assert!(ran.stderr.contains("lasts 40 s, the trajectory 60 s: 20 s too short"), "{}", ran.stderr);
+}
