@@ -1,5 +1,7 @@
 //! The examples of `calib_data/`: one recording in every format, and the virtual IMUs.
 
+#![allow(clippy::unwrap_used, reason = "a test")]
+
 use nav_sim::data::model_file;
 use nav_sim::data::recordings::{ReadOptions, read};
 use nav_sim::imu::Recording;

@@ -1,5 +1,7 @@
 //! `nav-sim synthesize` as a user runs it.
 
+#![allow(clippy::unwrap_used, reason = "a test")]
+
 use assert_cmd::Command;
 use nav_sim::data::recordings::{ReadOptions, read};
 use serde_json::Value;
