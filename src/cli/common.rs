@@ -62,6 +62,15 @@ impl Session {
         Ok(Self { printer: Printer::new(&common), common, drawn: OnceLock::new() })
     }
 
+    /// A session for a command that another one runs: with that command's seed; `muted`, its results and
+    /// remarks are kept back.
+    pub(crate) fn within(&self, inner: &Common, muted: bool) -> Self {
+        let quiet = self.common.quiet || (muted && !self.common.verbose);
+        let common = Common { seed: inner.seed, quiet, ..self.common.clone() };
+        let printer = if muted { Printer::new(&common).without_results() } else { Printer::new(&common) };
+        Self { printer, common, drawn: OnceLock::new() }
+    }
+
     /// Whether stdout gets JSON rather than text.
     pub(crate) fn json(&self) -> bool {
         self.common.format == Format::Json

@@ -6,6 +6,7 @@ mod check;
 mod common;
 mod compare;
 mod completions;
+mod demo;
 mod exit;
 mod man;
 mod parse;
@@ -42,6 +43,7 @@ enum Command {
     Wv(wv::Args),
     Calibrate(calibrate::Args),
     Run(run::Args),
+    Demo(demo::Args),
     Check(check::Args),
     Compare(compare::Args),
     Completions(completions::Args),
@@ -54,6 +56,7 @@ impl Command {
     fn run(self, session: &Session) -> Result<(), Failure> {
         match self {
             Self::Run(args) => run::run(&args, session),
+            Self::Demo(args) => demo::run(&args, session),
             Self::Check(args) => check::run(&args, session),
             Self::Wv(args) => wv::run(&args, session),
             Self::Calibrate(args) => calibrate::run(&args, session),

@@ -10,6 +10,7 @@ pub(crate) struct Printer {
     quiet: bool,
     verbose: bool,
     color: bool,
+    muted: bool,
 }
 
 impl Printer {
@@ -20,11 +21,19 @@ impl Printer {
             Color::Always => true,
             Color::Never => false,
         };
-        Self { quiet: common.quiet, verbose: common.verbose, color }
+        Self { quiet: common.quiet, verbose: common.verbose, color, muted: false }
+    }
+
+    /// The same, but results are kept back.
+    pub(crate) const fn without_results(self) -> Self {
+        Self { muted: true, ..self }
     }
 
     /// A result, to stdout. A closed pipe ends the program quietly, as success; a full disk as a failure.
     pub(crate) fn result(&self, text: &str) {
+        if self.muted {
+            return;
+        }
         let mut stdout = std::io::stdout().lock();
         match writeln!(stdout, "{text}").and_then(|()| stdout.flush()) {
             Ok(()) => {}

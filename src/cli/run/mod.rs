@@ -29,7 +29,7 @@ pub(super) use output::{manifest, text, write};
 #[command(before_help = "\
 Examples:
   nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml --seed 1 -o out/run
-  nav-sim run trajectories/land_vehicle.toml calib_data/tactical_mems.toml --truth calib_data/consumer_mems.toml --runs 20 -o out/mismatch
+  nav-sim run trajectories/land_vehicle.toml calib_data/tactical.toml --truth calib_data/consumer_mems.toml --runs 20 -o out/mismatch
   nav-sim run trajectories/figure_eight.toml calib_data/consumer_mems.toml --outage 60:90 --filter full --runs 20 -o out/full")]
 pub(crate) struct Args {
     /// Trajectory: motion profile (.toml) or table (.csv)

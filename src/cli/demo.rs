@@ -1,0 +1,97 @@
+//! `nav-sim demo`: the case study of the paper, command by command.
+
+use super::{Cli, Failure, Session};
+use clap::Parser;
+
+/// The case study of Minaretzis et al. 2024, Section V, on a virtual IMU: calibrate with three estimators
+/// on clean and corrupted recordings, navigate with each model, compare (their Table I)
+///
+/// Runs other commands of nav-sim one after the other and shows each, so that it can be pasted, changed and
+/// run again: eight static recordings of a virtual consumer IMU (scenario I), the same with replaced points,
+/// vibrations and steps (II), and with two abnormal recordings of each sensor (III); AWV, SR-AWV and DR-AWV
+/// on each; Monte-Carlo navigation with errors from windows of one more clean recording and two outages of
+/// 90 s; the ASEE of each filter relative to AWV in scenario I.
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim demo --seed 1 --samples 100000 --runs 8
+  nav-sim demo --print
+  nav-sim demo --full --print > paper_section5.sh")]
+pub(crate) struct Args {
+    /// Recordings of 524284 samples (87 minutes), as in the paper
+    #[arg(long, conflicts_with = "samples")]
+    full: bool,
+    /// Samples of each recording
+    #[arg(long, value_name = "T", default_value_t = 131_072)]
+    samples: u64,
+    /// Monte-Carlo runs with each model
+    #[arg(long, value_name = "N", default_value_t = 100)]
+    runs: u64,
+    /// Print the commands, run nothing
+    #[arg(long)]
+    print: bool,
+    /// Directory to write to
+    #[arg(long, short, value_name = "DIR", default_value = "out/demo")]
+    out: String,
+}
+
+const IMU: &str = "calib_data/consumer_mems.toml";
+const TRAJECTORY: &str = "trajectories/land_vehicle.toml";
+const SCENARIOS: [&str; 3] = ["I", "II", "III"];
+const ESTIMATORS: [&str; 3] = ["awv", "sr-awv", "dr-awv"];
+
+pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let commands = commands(args, session.seed(None));
+    if args.print {
+        let lines: Vec<String> = commands.iter().map(|c| typed(c)).collect();
+        session.printer.result(&lines.join("\n"));
+        return Ok(());
+    }
+    let last = commands.len() - 1;
+    for (i, command) in commands.iter().enumerate() {
+        session.printer.say(&format!("$ {}", typed(command)));
+        let words = std::iter::once("nav-sim").chain(command.iter().map(String::as_str));
+        let cli = Cli::try_parse_from(words).map_err(Failure::input)?;
+        cli.command.run(&session.within(&cli.common, i < last))?;
+    }
+    Ok(())
+}
+
+/// The commands, as words.
+fn commands(args: &Args, seed: u64) -> Vec<Vec<String>> {
+    let samples = if args.full { 524_284 } else { args.samples };
+    let synthesize = |rest: String| format!("synthesize {IMU} --samples {samples} --spread {rest}");
+    let mut lines = Vec::new();
+    for scenario in SCENARIOS {
+        let corrupted =
+            if scenario == "I" { String::new() } else { format!("--contaminate section5-{scenario}") };
+        lines.push(synthesize(format!("--replicates 8 --axes x {corrupted} --seed {seed} -o @/{scenario}")));
+    }
+    lines.push(synthesize(format!("--seed {} -o @/ninth", seed.wrapping_add(1))));
+    for scenario in SCENARIOS {
+        lines.push(format!("calibrate @/{scenario} --estimator all -o @/models/{scenario}.toml"));
+    }
+    let pairs = || SCENARIOS.iter().flat_map(|s| ESTIMATORS.iter().map(move |e| format!("{s}_{e}")));
+    lines.extend(pairs().map(|name| {
+        format!(
+            "run {TRAJECTORY} @/models/{name}.toml --static @/ninth --outage 300:390 --outage 700:790 \
+             --runs {} --seed {seed} -o @/runs/{name}",
+            args.runs
+        )
+    }));
+    let candidates: Vec<String> = pairs().map(|name| format!("@/runs/{name}")).collect();
+    lines.push(format!("compare {} --reference @/runs/I_awv -o @/comparison.json", candidates.join(" ")));
+    // The directory takes its place after the words are apart: its name may hold blanks.
+    let words = |line: &String| line.split_whitespace().map(|word| word.replace('@', &args.out)).collect();
+    lines.iter().map(words).collect()
+}
+
+/// A command as it would be typed.
+fn typed(command: &[String]) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:,+=".contains(c);
+    let quoted = |word: &String| {
+        if word.chars().all(plain) { word.clone() } else { format!("'{}'", word.replace('\'', "'\\''")) }
+    };
+    let words: Vec<String> = command.iter().map(quoted).collect();
+    format!("nav-sim {}", words.join(" "))
+}
