@@ -2,6 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "a test")]
 
+use nav_sim::scenario::Scenario;
+use nav_sim::sensors::outage::Outage;
+use std::process::Command;
+
 #[path = "../examples/01_robust_wavelet_variance.rs"]
 mod robust_wavelet_variance;
 
@@ -27,4 +31,32 @@ fn examples_are_short() {
             assert!(lines <= 80, "{} has {lines} lines", path.display());
         }
     }
+}
+
+/// The walk-through is the demo of the program, at the paper's size.
+#[test]
+fn the_walk_through_is_what_the_demo_prints() {
+    let script = include_str!("../examples/paper_section5.sh");
+    let commands: Vec<&str> = script.lines().filter(|l| l.starts_with("nav-sim ")).collect();
+    let arguments = ["demo", "--seed", "1", "--full", "--print", "-o", "out/paper_section5"];
+    let output = Command::new(env!("CARGO_BIN_EXE_nav-sim")).args(arguments).output().unwrap();
+    let printed = String::from_utf8(output.stdout).unwrap();
+    assert_eq!(commands, printed.lines().collect::<Vec<_>>());
+}
+
+/// Every key of the example scenario is one, and what it says is the default is the default.
+#[test]
+fn the_example_scenario_says_the_defaults() {
+    let text = include_str!("../examples/scenario.toml");
+    let uncomment = |line: &str| {
+        let bare = line.trim_start_matches("# ").split(" #").next().unwrap().trim_end().to_owned();
+        let is_toml = bare.starts_with('[') || (bare.contains(" = ") && !bare.contains("outage = []"));
+        if is_toml && !bare.contains("  ") { format!("{bare}\n") } else { String::new() }
+    };
+    let said: Scenario = toml::from_str(&text.lines().map(uncomment).collect::<String>()).unwrap();
+    let outages = Some(Outage::PAPER.to_vec());
+    let mut expected = Scenario { outage: outages, ..Scenario::default() };
+    expected.run.seed = Some(1);
+    assert_eq!(said, expected);
+    assert_eq!(toml::from_str::<Scenario>(text).unwrap(), Scenario::default());
 }

@@ -23,9 +23,10 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
-  nav-sim calibrate calib_data/ -o model.toml
-  nav-sim calibrate run1.csv run2.csv run3.csv --estimator all --model N1 --pool axes -o imu.toml
-  nav-sim calibrate --curve curve.csv --model \"AR1+RW+WN\" --format json")]
+  nav-sim synthesize calib_data/consumer_mems.toml \\
+      --replicates 5 --samples 65536 --spread --seed 1 -o static
+  nav-sim calibrate static -o model.toml
+  nav-sim calibrate static --estimator all --model \"AR1+RW+WN\" --pool axes -o imu.toml")]
 pub(crate) struct Args {
     /// Recordings, or directories of recordings
     #[arg(value_name = "INPUT", required_unless_present = "curve", conflicts_with = "curve")]

@@ -17,9 +17,11 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
-  nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml --runs 8 --seed 1 -o reference
-  nav-sim run trajectories/land_vehicle.toml calib_data/tactical.toml --truth calib_data/consumer_mems.toml --runs 8 --seed 1 -o candidate
-  nav-sim compare candidate --reference reference")]
+  nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml \\
+      --runs 8 --seed 1 -o out/right
+  nav-sim run trajectories/land_vehicle.toml calib_data/tactical.toml \\
+      --truth calib_data/consumer_mems.toml --runs 8 --seed 1 -o out/wrong
+  nav-sim compare out/wrong --reference out/right --state all")]
 pub(crate) struct Args {
     /// Run directories
     #[arg(required = true, value_name = "DIR")]

@@ -15,8 +15,8 @@ use clap::Parser;
 #[command(before_help = "\
 Examples:
   nav-sim demo --seed 1 --samples 100000 --runs 8
-  nav-sim demo --print
-  nav-sim demo --full --print > paper_section5.sh")]
+  nav-sim demo --seed 1 --print
+  nav-sim demo --seed 1 --full --print > paper_section5.sh")]
 pub(crate) struct Args {
     /// Recordings of 524284 samples (87 minutes), as in the paper
     #[arg(long, conflicts_with = "samples")]

@@ -8,6 +8,7 @@ mod compare;
 mod completions;
 mod demo;
 mod exit;
+mod init;
 mod man;
 mod parse;
 mod printer;
@@ -42,29 +43,31 @@ struct Cli {
 enum Command {
     Wv(wv::Args),
     Calibrate(calibrate::Args),
+    Synthesize(synthesize::Args),
     Run(run::Args),
+    Compare(compare::Args),
     Demo(demo::Args),
     Check(check::Args),
-    Compare(compare::Args),
+    Init(init::Args),
+    Schema(schema::Args),
     Completions(completions::Args),
     Man(man::Args),
-    Schema(schema::Args),
-    Synthesize(synthesize::Args),
 }
 
 impl Command {
     fn run(self, session: &Session) -> Result<(), Failure> {
         match self {
-            Self::Run(args) => run::run(&args, session),
-            Self::Demo(args) => demo::run(&args, session),
-            Self::Check(args) => check::run(&args, session),
             Self::Wv(args) => wv::run(&args, session),
             Self::Calibrate(args) => calibrate::run(&args, session),
+            Self::Synthesize(args) => synthesize::run(&args, session),
+            Self::Run(args) => run::run(&args, session),
             Self::Compare(args) => compare::run(&args, session),
+            Self::Demo(args) => demo::run(&args, session),
+            Self::Check(args) => check::run(&args, session),
+            Self::Init(args) => init::run(&args, session),
+            Self::Schema(args) => schema::run(&args, session),
             Self::Completions(args) => completions::run(&args, session),
             Self::Man(args) => man::run(&args, session),
-            Self::Schema(args) => schema::run(&args, session),
-            Self::Synthesize(args) => synthesize::run(&args, session),
         }
     }
 }

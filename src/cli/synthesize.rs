@@ -21,8 +21,10 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
-  nav-sim synthesize calib_data/consumer_mems.toml --replicates 9 --samples 65536 --spread --seed 1 -o replicates
-  nav-sim synthesize calib_data/consumer_mems.toml --replicates 8 --samples 65536 --axes x --contaminate section5-II -o corrupted
+  nav-sim synthesize calib_data/consumer_mems.toml \\
+      --replicates 9 --samples 65536 --spread --seed 1 -o replicates
+  nav-sim synthesize calib_data/consumer_mems.toml --replicates 8 --samples 65536 \\
+      --axes x --contaminate section5-II -o corrupted
   nav-sim synthesize calib_data/tactical.toml --duration 600 --output-format npy -o tactical")]
 pub(crate) struct Args {
     /// Noise model (TOML)

@@ -15,9 +15,9 @@ use std::path::PathBuf;
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
-  nav-sim wv calib_data/
-  nav-sim wv static.csv --axes gyro --intervals large-sample
-  nav-sim wv static.csv.gz --format json -o static.wv.json")]
+  nav-sim wv calib_data/formats/own.csv
+  nav-sim wv calib_data/formats/euroc.csv --axes gyro --intervals large-sample
+  nav-sim wv calib_data/formats/compressed.csv.gz --format json -o static.wv.json")]
 pub(crate) struct Args {
     /// Recordings, or directories of recordings
     #[arg(required = true, value_name = "FILE")]

@@ -28,9 +28,11 @@ pub(super) use output::{manifest, text, write};
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
-  nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml --seed 1 -o out/run
-  nav-sim run trajectories/land_vehicle.toml calib_data/tactical.toml --truth calib_data/consumer_mems.toml --runs 20 -o out/mismatch
-  nav-sim run trajectories/figure_eight.toml calib_data/consumer_mems.toml --outage 60:90 --filter full --runs 20 -o out/full")]
+  nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml --seed 1 --runs 20
+  nav-sim run trajectories/figure_eight.toml calib_data/tactical.toml \\
+      --outage 60:90 --filter full --runs 8 -o out/full
+  nav-sim run trajectories/land_vehicle.toml calib_data/tactical.toml \\
+      --truth calib_data/consumer_mems.toml --runs 8 -o out/mismatch")]
 pub(crate) struct Args {
     /// Trajectory: motion profile (.toml) or table (.csv)
     trajectory: PathBuf,

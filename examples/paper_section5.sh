@@ -1,0 +1,33 @@
+#!/usr/bin/env bash
+# The case study of Minaretzis et al. 2024, Section V, on a virtual IMU, at the paper's size: what
+# `nav-sim demo --seed 1 --full -o out/paper_section5` does, command by command. Run it where trajectories/ and
+# calib_data/ are (the repository, or a directory made by `nav-sim init`), with nav-sim on the PATH.
+set -euo pipefail
+
+# Eight static recordings of one axis of each sensor, 87 minutes each, every one with parameters of its own (scenario I);
+# the same recordings with replaced points, vibrations and a step (II); two of them abnormal as well (III).
+nav-sim synthesize calib_data/consumer_mems.toml --samples 524284 --spread --replicates 8 --axes x --seed 1 -o out/paper_section5/I
+nav-sim synthesize calib_data/consumer_mems.toml --samples 524284 --spread --replicates 8 --axes x --contaminate section5-II --seed 1 -o out/paper_section5/II
+nav-sim synthesize calib_data/consumer_mems.toml --samples 524284 --spread --replicates 8 --axes x --contaminate section5-III --seed 1 -o out/paper_section5/III
+
+# One more clean recording, all six axes: windows of it are the errors of the simulated INS.
+nav-sim synthesize calib_data/consumer_mems.toml --samples 524284 --spread --seed 2 -o out/paper_section5/ninth
+
+# Three estimators for each scenario: nine models, each WN + QN + 2 AR1 + RW for both sensors.
+nav-sim calibrate out/paper_section5/I --estimator all -o out/paper_section5/models/I.toml
+nav-sim calibrate out/paper_section5/II --estimator all -o out/paper_section5/models/II.toml
+nav-sim calibrate out/paper_section5/III --estimator all -o out/paper_section5/models/III.toml
+
+# 100 runs with each model in the filter, on the same errors and the same GNSS noise.
+nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/I_awv.toml --static out/paper_section5/ninth --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/I_awv
+nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/I_sr-awv.toml --static out/paper_section5/ninth --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/I_sr-awv
+nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/I_dr-awv.toml --static out/paper_section5/ninth --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/I_dr-awv
+nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/II_awv.toml --static out/paper_section5/ninth --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/II_awv
+nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/II_sr-awv.toml --static out/paper_section5/ninth --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/II_sr-awv
+nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/II_dr-awv.toml --static out/paper_section5/ninth --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/II_dr-awv
+nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/III_awv.toml --static out/paper_section5/ninth --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/III_awv
+nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/III_sr-awv.toml --static out/paper_section5/ninth --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/III_sr-awv
+nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/III_dr-awv.toml --static out/paper_section5/ninth --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/III_dr-awv
+
+# The filters' own standard deviations relative to AWV on clean recordings: the paper's Table I.
+nav-sim compare out/paper_section5/runs/I_awv out/paper_section5/runs/I_sr-awv out/paper_section5/runs/I_dr-awv out/paper_section5/runs/II_awv out/paper_section5/runs/II_sr-awv out/paper_section5/runs/II_dr-awv out/paper_section5/runs/III_awv out/paper_section5/runs/III_sr-awv out/paper_section5/runs/III_dr-awv --reference out/paper_section5/runs/I_awv -o out/paper_section5/comparison.json

@@ -1,0 +1,51 @@
+//! `nav-sim init`: a directory to start from.
+
+use super::{Failure, Session};
+use nav_sim::data::atomic;
+use std::path::PathBuf;
+
+/// Make a directory with everything to start from: trajectories, virtual IMUs, a scenario
+///
+/// The files are those of the repository; the examples of every --help work inside the directory. Files
+/// that are there already are left alone.
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim init study
+  nav-sim check study/scenario.toml study/calib_data/consumer_mems.toml
+  nav-sim run study/trajectories/land_vehicle.toml study/calib_data/consumer_mems.toml \\
+      --scenario study/scenario.toml --runs 8 -o study/out")]
+pub(crate) struct Args {
+    /// Directory
+    #[arg(value_name = "DIR", default_value = ".")]
+    directory: PathBuf,
+}
+
+macro_rules! repository_files {
+    ($($path:literal => $name:literal),* $(,)?) => {
+        &[$(($name, include_str!(concat!("../../", $path)))),*]
+    };
+}
+
+const FILES: &[(&str, &str)] = repository_files![
+    "examples/scenario.toml" => "scenario.toml",
+    "trajectories/land_vehicle.toml" => "trajectories/land_vehicle.toml",
+    "trajectories/figure_eight.toml" => "trajectories/figure_eight.toml",
+    "trajectories/fixed_wing.toml" => "trajectories/fixed_wing.toml",
+    "calib_data/consumer_mems.toml" => "calib_data/consumer_mems.toml",
+    "calib_data/tactical.toml" => "calib_data/tactical.toml",
+    "calib_data/formats/own.csv" => "calib_data/formats/own.csv",
+];
+
+pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    for (name, contents) in FILES {
+        let path = args.directory.join(name);
+        if path.exists() {
+            session.printer.say(&format!("kept {}", path.display()));
+            continue;
+        }
+        atomic::write(&path, contents)?;
+        session.printer.result(&path.display().to_string());
+    }
+    Ok(())
+}
