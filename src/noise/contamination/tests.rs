@@ -1,0 +1,139 @@
+use super::*;
+use crate::imu::Axis;
+use crate::noise::{RandomWalk, White};
+
+const X: Channel = Channel { sensor: Sensor::Accel, axis: Axis::X };
+
+fn one(operation: Operation) -> Contamination {
+    let rules = vec![Rule { sensor: Sensor::Accel, replicate: Some(2), operation }];
+    Contamination { name: "test".into(), rules }
+}
+
+fn applied(operation: Operation, n: usize) -> Vec<f64> {
+    let mut x = vec![0.0; n];
+    one(operation).apply(&mut x, X, 2, 100.0, 1).unwrap();
+    x
+}
+
+#[test]
+fn shares_of_the_papers_records() {
+    let of = |share: f64| Extent::Share(share).of(524_284);
+    assert_eq!((of(0.00025), of(0.01), of(0.5)), (131, 5242, 262_142));
+    assert_eq!((of(90_000.0 / 524_284.0), of(500.0 / 524_284.0)), (90_000, 500));
+    assert_eq!(Extent::Samples(7).of(3), 7);
+}
+
+#[test]
+fn a_step_is_from_the_middle_on() {
+    let step = Operation::Step { at: Extent::Share(0.5), amplitude: 2.0 };
+    assert_eq!(applied(step, 5), [0.0, 0.0, 2.0, 2.0, 2.0]);
+}
+
+/// Mean and variance of the replaced samples within 5 standard deviations; exactly as many as asked,
+/// half of them in the first half (binomial-like, hypergeometric: sd below √n/2).
+#[test]
+fn replacement_is_exact_in_number_and_random_in_place() {
+    let mut x = vec![100.0; 200_000];
+    let replace = Operation::Replace { points: Extent::Share(0.1), mean: Some(-1.0), sigma: 0.5 };
+    one(replace).apply(&mut x, X, 2, 100.0, 1).unwrap();
+    let replaced: Vec<f64> = x.iter().copied().filter(|v| *v < 50.0).collect();
+    assert_eq!(replaced.len(), 20_000);
+    let n = replaced.len() as f64;
+    let mean = replaced.iter().sum::<f64>() / n;
+    let variance = replaced.iter().map(|v| (v + 1.0).powi(2)).sum::<f64>() / n;
+    assert!((mean + 1.0).abs() < 5.0 * 0.5 / n.sqrt());
+    assert!((variance - 0.25).abs() < 5.0 * 0.25 * (2.0 / n).sqrt());
+    let first_half = x[..100_000].iter().filter(|v| **v < 50.0).count() as f64;
+    assert!((first_half - n / 2.0).abs() < 5.0 * n.sqrt() / 2.0);
+}
+
+#[test]
+fn replacement_keeps_the_mean_of_the_signal_if_none_is_given() {
+    let mut x = vec![7.0; 1000];
+    one(Operation::Replace { points: Extent::Samples(1000), mean: None, sigma: 0.0 })
+        .apply(&mut x, X, 2, 100.0, 1)
+        .unwrap();
+    assert_eq!(x, [7.0; 1000]);
+}
+
+#[test]
+fn bursts_are_sines_at_multiples_of_the_spacing() {
+    let bursts = Operation::Bursts {
+        count: 2,
+        length: Extent::Samples(40),
+        spacing: Extent::Samples(100),
+        amplitude: 0.02,
+        frequency_hz: 5.0,
+    };
+    let x = applied(bursts.clone(), 240);
+    // 5 Hz at 100 Hz: 20 samples a period.
+    for (k, v) in x.iter().enumerate() {
+        let inside = (100..140).contains(&k) || (200..240).contains(&k);
+        let expected =
+            if inside { 0.02 * (std::f64::consts::TAU * (k % 20) as f64 / 20.0).sin() } else { 0.0 };
+        assert!((v - expected).abs() < 1e-15, "{k}");
+    }
+    let mut short = vec![0.0; 239];
+    let e = one(bursts).apply(&mut short, X, 2, 100.0, 1).unwrap_err();
+    assert_eq!(e.to_string(), "a train of bursts needs 240 samples, the record has 239");
+}
+
+#[test]
+fn the_added_ar1_has_its_variance() {
+    let ar1 = Ar1::new(0.9, 1.9).unwrap();
+    let x = applied(Operation::Ar1(ar1), 100_000);
+    let variance = x.iter().map(|v| v * v).sum::<f64>() / x.len() as f64;
+    // Bartlett: var of the sample variance 2γ₀²/n · (1 + φ²)/(1 − φ²).
+    let bound = 5.0 * 10.0 * (2.0 / 1e5 * 1.81 / 0.19_f64).sqrt();
+    assert!((variance - 10.0).abs() < bound, "{variance}");
+}
+
+#[test]
+fn the_order_is_fixed_and_other_signals_are_untouched() {
+    let replace = Operation::Replace { points: Extent::Share(1.0), mean: Some(0.0), sigma: 0.0 };
+    let step = Operation::Step { at: Extent::Samples(0), amplitude: 1.0 };
+    let rule = |operation| Rule { sensor: Sensor::Accel, replicate: Some(2), operation };
+    let both = Contamination { name: String::new(), rules: vec![rule(replace), rule(step)] };
+    let mut x = vec![5.0; 4];
+    both.apply(&mut x, X, 2, 100.0, 1).unwrap();
+    assert_eq!(x, [0.0; 4], "the step comes before the replacement");
+    let gyro = Channel { sensor: Sensor::Gyro, axis: Axis::X };
+    for (channel, replicate) in [(X, 1), (gyro, 2)] {
+        let mut x = vec![5.0; 4];
+        both.apply(&mut x, channel, replicate, 100.0, 1).unwrap();
+        assert_eq!(x, [5.0; 4]);
+    }
+    assert!(both.touches(2) && !both.touches(1));
+}
+
+#[test]
+fn parameters_are_scaled_for_their_replicate_only() {
+    let noise = || {
+        let (white, walk) = (White::new(1.0).unwrap(), RandomWalk::new(3.0).unwrap());
+        Composite::new(vec![Process::White(white), Process::RandomWalk(walk)])
+    };
+    let scale = |process: &str| {
+        let (process, parameter) = (process.to_owned(), "gamma2".to_owned());
+        one(Operation::Scale { process, parameter, factor: 4.0 })
+    };
+    let (mut second, mut third) = (noise(), noise());
+    scale("RW").scale(&mut second, X, 2, 100.0).unwrap();
+    scale("RW").scale(&mut third, X, 3, 100.0).unwrap();
+    assert_eq!(second.processes[1].parameters(), [("gamma2", 12.0)]);
+    assert_eq!(third, noise());
+    let e = scale("RW_2").scale(&mut second, X, 2, 100.0).unwrap_err();
+    assert_eq!(e.to_string(), "accel.x has no RW_2 gamma2 to scale, only WN sigma2, RW gamma2");
+}
+
+#[test]
+fn the_same_points_are_replaced_whatever_else_is_done() {
+    let replace = Operation::Replace { points: Extent::Samples(10), mean: Some(0.0), sigma: 1.0 };
+    let alone = applied(replace.clone(), 1000);
+    let mut with_bursts = one(replace);
+    let (length, spacing) = (Extent::Samples(1), Extent::Samples(999));
+    let bursts = Operation::Bursts { count: 1, length, spacing, amplitude: 0.0, frequency_hz: 1.0 };
+    with_bursts.rules.insert(0, Rule { sensor: Sensor::Accel, replicate: None, operation: bursts });
+    let mut x = vec![0.0; 1000];
+    with_bursts.apply(&mut x, X, 2, 100.0, 1).unwrap();
+    assert_eq!(x, alone);
+}
