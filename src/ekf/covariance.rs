@@ -62,7 +62,9 @@ impl Covariance {
     /// Sets a diagonal block, from its upper triangle.
     #[inline(always)]
     pub(crate) fn set_diagonal_block(&mut self, i: usize, m: Mat3) {
-        *self.upper_mut(i, i) = Mat3::from_fn(|r, c| m.0[r.min(c)][r.max(c)]);
+        let m = &m.0;
+        *self.upper_mut(i, i) =
+            Mat3([[m[0][0], m[0][1], m[0][2]], [m[0][1], m[1][1], m[1][2]], [m[0][2], m[1][2], m[2][2]]]);
     }
 
     /// Element (i, j) of the matrix.
@@ -98,9 +100,15 @@ impl Covariance {
     pub fn update(&mut self, h: &[(usize, Lanes)], r: f64, ph: &mut [Lanes], gain: &mut [Lanes]) -> Lanes {
         let n = self.dim();
         for i in 0..n {
-            ph[i] = h.iter().fold(Lanes::ZERO, |sum, (m, c)| sum + self.get(i, *m) * *c);
+            ph[i] = Lanes::ZERO;
+            for (m, c) in h {
+                ph[i] += self.get(i, *m) * *c;
+            }
         }
-        let s = h.iter().fold(Lanes::splat(r), |sum, (m, c)| sum + ph[*m] * *c);
+        let mut s = Lanes::splat(r);
+        for (m, c) in h {
+            s += ph[*m] * *c;
+        }
         let inverse = Lanes::ONE / s;
         for i in 0..n {
             gain[i] = ph[i] * inverse;

@@ -28,6 +28,14 @@ pub struct NavRows {
     pub psi: Mat3,
 }
 
+/// A linear map of the navigation error: what it does to the navigation rows of a block column, given the
+/// summed accelerometer and gyroscope bias rows of the same column.
+pub trait RowMap {
+    /// The rows after the map.
+    #[must_use]
+    fn apply(&self, x: &NavRows, accel: &Mat3, gyro: &Mat3) -> NavRows;
+}
+
 /// The part of the transition that changes with every sample. Errors of the sample's biases are those of
 /// the estimates: b_est − b.
 #[derive(Debug, Clone, Copy)]
@@ -47,20 +55,6 @@ impl Sample {
         Self { c_dt: trace.c_b_n * dt, f_dt: trace.dv_n, dt }
     }
 
-    /// The rows R, V, PSI after the sample, from the rows before and the summed accelerometer and
-    /// gyroscope bias rows. Attitude first, velocity with its mean, position with the mean velocity: the
-    /// second-order terms of the matrix exponential come with it.
-    #[inline(always)]
-    #[must_use]
-    pub fn apply(&self, x: &NavRows, accel: &Mat3, gyro: &Mat3) -> NavRows {
-        let dpsi = self.c_dt * *gyro;
-        let psi = x.psi - dpsi;
-        let dv = self.cross_f(&(x.psi + psi), 0.5) + self.c_dt * *accel;
-        let v = x.v - dv;
-        let r = x.r + (x.v + v) * (0.5 * self.dt);
-        NavRows { r, v, psi }
-    }
-
     /// C diag(variances) Cᵀ dt²: the noise of one sample of a sensor, in n.
     #[inline(always)]
     #[must_use]
@@ -70,11 +64,13 @@ impl Sample {
             return Mat3::diagonal(Vec3([q; 3]));
         }
         let c = &self.c_dt;
-        Mat3::from_fn(|i, j| {
-            c.0[i][0] * c.0[j][0] * variances.x
-                + c.0[i][1] * c.0[j][1] * variances.y
-                + c.0[i][2] * c.0[j][2] * variances.z
-        })
+        let mut scaled = *c;
+        for i in 0..3 {
+            for j in 0..3 {
+                scaled.0[i][j] = c.0[i][j] * variances[j];
+            }
+        }
+        scaled * c.transpose()
     }
 
     /// What the sample's own gyroscope noise does to the velocity of the same sample: the covariance of
@@ -89,10 +85,26 @@ impl Sample {
     #[inline(always)]
     fn cross_f(&self, m: &Mat3, scale: f64) -> Mat3 {
         let f = self.f_dt * scale;
-        Mat3::from_fn(|i, j| {
+        let mut product = Mat3::ZERO;
+        for i in 0..3 {
             let (k, l) = ((i + 1) % 3, (i + 2) % 3);
-            f[k] * m.0[l][j] - f[l] * m.0[k][j]
-        })
+            for j in 0..3 {
+                product.0[i][j] = f[k] * m.0[l][j] - f[l] * m.0[k][j];
+            }
+        }
+        product
+    }
+}
+
+impl RowMap for Sample {
+    /// Attitude first, velocity with its mean, position with the mean velocity: the second-order terms of
+    /// the matrix exponential come with it.
+    #[inline(always)]
+    fn apply(&self, x: &NavRows, accel: &Mat3, gyro: &Mat3) -> NavRows {
+        let psi = x.psi - self.c_dt * *gyro;
+        let v = x.v - (self.cross_f(&(x.psi + psi), 0.5) + self.c_dt * *accel);
+        let r = x.r + (x.v + v) * (0.5 * self.dt);
+        NavRows { r, v, psi }
     }
 }
 
@@ -160,15 +172,25 @@ impl EarthTerms {
             psi_psi: Mat3::skew(-(omega_ie + omega_en)),
         }
     }
+}
 
-    /// The rows R, V, PSI after dt seconds of these terms.
+/// The Earth terms over a time step.
+#[derive(Debug, Clone, Copy)]
+pub struct EarthStep {
+    /// The terms.
+    pub terms: EarthTerms,
+    /// How long they act (s).
+    pub dt: f64,
+}
+
+impl RowMap for EarthStep {
     #[inline(always)]
-    #[must_use]
-    pub fn apply(&self, x: &NavRows, dt: f64) -> NavRows {
+    fn apply(&self, x: &NavRows, _accel: &Mat3, _gyro: &Mat3) -> NavRows {
+        let (t, dt) = (&self.terms, self.dt);
         NavRows {
-            r: x.r + self.rr * x.r * dt,
-            v: x.v + (self.vr * x.r + self.vv * x.v) * dt,
-            psi: x.psi + (self.psi_r * x.r + self.psi_v * x.v + self.psi_psi * x.psi) * dt,
+            r: x.r + t.rr * x.r * dt,
+            v: x.v + (t.vr * x.r + t.vv * x.v) * dt,
+            psi: x.psi + (t.psi_r * x.r + t.psi_v * x.v + t.psi_psi * x.psi) * dt,
         }
     }
 }
@@ -176,7 +198,8 @@ impl EarthTerms {
 /// The matrix with the given north and down columns; nothing depends on longitude.
 #[inline(always)]
 fn columns(north: Vec3, down: Vec3) -> Mat3 {
-    Mat3(std::array::from_fn(|i| [north[i], Lanes::ZERO, down[i]]))
+    let z = Lanes::ZERO;
+    Mat3([[north[0], z, down[0]], [north[1], z, down[1]], [north[2], z, down[2]]])
 }
 
 /// (∂g/∂lat, ∂g/∂(down)) of the down component, by differences of the model itself: the step is exact
@@ -185,8 +208,8 @@ fn columns(north: Vec3, down: Vec3) -> Mat3 {
 fn gravity_gradient(ins: &Strapdown, s: Lanes, c: Lanes) -> (Lanes, Lanes) {
     const STEP_RAD: f64 = 1e-5;
     const STEP_M: f64 = 100.0;
-    let g = |sin_lat: Lanes, h: Lanes| gravity_down(ins.gravity(), sin_lat, h);
-    let north = (g(s + c * STEP_RAD, ins.h) - g(s - c * STEP_RAD, ins.h)) * (0.5 / STEP_RAD);
-    let down = (g(s, ins.h - Lanes::splat(STEP_M)) - g(s, ins.h + STEP_M)) * (0.5 / STEP_M);
-    (north, down)
+    let (model, h) = (ins.gravity(), ins.h);
+    let north = gravity_down(model, s + c * STEP_RAD, h) - gravity_down(model, s - c * STEP_RAD, h);
+    let down = gravity_down(model, s, h - STEP_M) - gravity_down(model, s, h + STEP_M);
+    (north * (0.5 / STEP_RAD), down * (0.5 / STEP_M))
 }

@@ -2,7 +2,7 @@
 
 use super::belief::Belief;
 use super::covariance::{BIAS, Covariance, PSI, R, V};
-use super::dynamics::{EARTH_STEP_S, EarthTerms, NavRows, Sample};
+use super::dynamics::{EARTH_STEP_S, EarthStep, EarthTerms, NavRows, RowMap, Sample};
 use super::initial::{InitialSettings, psi_of_angles};
 use crate::frames::NavState;
 use crate::imu::{ImuSample, Sensor};
@@ -42,6 +42,14 @@ pub(super) struct Scratch {
     pub(super) ph: Vec<Lanes>,
     pub(super) gain: Vec<Lanes>,
     pub(super) error: Vec<Lanes>,
+}
+
+impl Scratch {
+    /// The estimated errors of a block.
+    #[inline(always)]
+    pub(super) fn of(&self, block: usize) -> Vec3 {
+        Vec3([self.error[3 * block], self.error[3 * block + 1], self.error[3 * block + 2]])
+    }
 }
 
 impl Ekf {
@@ -101,20 +109,23 @@ impl Ekf {
     #[must_use]
     pub fn bias_of(&self, sensor: Sensor) -> Vec3 {
         let (accel, gyro) = self.bias.split_at(self.accel_groups);
-        let groups = if sensor == Sensor::Accel { accel } else { gyro };
-        groups.iter().fold(Vec3::ZERO, |sum, b| sum + *b)
+        let mut sum = Vec3::ZERO;
+        for bias in if sensor == Sensor::Accel { accel } else { gyro } {
+            sum = sum + *bias;
+        }
+        sum
     }
 
     /// Advances by one IMU sample: mean rate (rad/s) and mean specific force (m/s²) over the interval.
     #[inline(always)]
-    pub fn predict(&mut self, omega_ib_b: Vec3, f_ib_b: Vec3) {
+    fn predict(&mut self, omega_ib_b: Vec3, f_ib_b: Vec3) {
         let dt = self.dt;
         self.advance_biases();
         self.omega_ib_b = omega_ib_b - self.bias_of(Sensor::Gyro);
         let f_ib_b = f_ib_b - self.bias_of(Sensor::Accel);
         let trace = self.nominal.step(self.omega_ib_b * dt, f_ib_b * dt, dt);
         let sample = Sample::new(&trace, dt);
-        self.propagate(&sample);
+        self.transform(&sample);
         self.add_white_noise(&sample);
         self.earth_age += dt;
         if self.earth_age + 0.5 * dt > EARTH_STEP_S {
@@ -133,106 +144,82 @@ impl Ekf {
                 self.bias[g][axis] = self.bias[g][axis] * phi[axis];
             }
             for i in 0..block {
-                let m = self.p.upper_mut(i, block);
-                for (row, column) in (0..9).map(|k| (k / 3, k % 3)) {
-                    m.0[row][column] = m.0[row][column] * phi[column];
-                }
+                scale(self.p.upper_mut(i, block), DVec3::ONE, phi);
             }
-            let m = self.p.upper_mut(block, block);
-            for (row, column) in (0..9).map(|k| (k / 3, k % 3)) {
-                m.0[row][column] = m.0[row][column] * (phi[row] * phi[column]);
-            }
+            let diagonal = self.p.upper_mut(block, block);
+            scale(diagonal, phi, phi);
             for axis in 0..3 {
-                m.0[axis][axis] += Lanes::splat(innovation[axis]);
+                diagonal.0[axis][axis] += Lanes::splat(innovation[axis]);
             }
             for j in block + 1..n {
-                let m = self.p.upper_mut(block, j);
-                for (row, column) in (0..9).map(|k| (k / 3, k % 3)) {
-                    m.0[row][column] = m.0[row][column] * phi[row];
-                }
+                scale(self.p.upper_mut(block, j), phi, DVec3::ONE);
             }
         }
     }
 
-    /// P⁺ = Phi P Phiᵀ of one sample, by block rows and then by block columns.
+    /// The Earth terms over the time since they were last applied.
     #[inline(always)]
-    fn propagate(&mut self, sample: &Sample) {
-        let accel = self.accel_blocks();
-        let gyro = self.gyro_blocks();
-        // Phi P, navigation rows: first the navigation columns (from the bias blocks as they are) …
-        let rows: [NavRows; 3] = std::array::from_fn(|j| {
-            sample.apply(&self.column(j), &self.sum(accel.clone(), j), &self.sum(gyro.clone(), j))
-        });
+    pub(super) fn apply_earth_terms(&mut self) {
+        if self.earth_age > 0.0 {
+            let step = EarthStep { terms: EarthTerms::at(&self.nominal), dt: self.earth_age };
+            self.earth_age = 0.0;
+            self.transform(&step);
+        }
+    }
+
+    /// P⁺ = A P Aᵀ for a map A of the navigation rows: by block rows, then by block columns.
+    #[inline(always)]
+    fn transform(&mut self, map: &impl RowMap) {
+        // Navigation rows of A P: first the navigation columns (from the bias blocks as they are) …
+        let (of_r, of_v, of_psi) = (self.rows(map, R), self.rows(map, V), self.rows(map, PSI));
         // … then the bias columns, in place.
         for j in BIAS..self.p.blocks() {
-            let rows = sample.apply(&self.column(j), &self.sum(accel.clone(), j), &self.sum(gyro.clone(), j));
+            let rows = self.rows(map, j);
             *self.p.upper_mut(R, j) = rows.r;
             *self.p.upper_mut(V, j) = rows.v;
             *self.p.upper_mut(PSI, j) = rows.psi;
         }
-        self.set_nav_columns(&rows, |x, accel, gyro| sample.apply(x, accel, gyro));
+        // A P Aᵀ: the same map on the transposed rows of A P, of which the upper blocks are kept.
+        let after = self.transposed_rows(map, R, [&of_r.r, &of_v.r, &of_psi.r]);
+        self.p.set_diagonal_block(R, after.r);
+        *self.p.upper_mut(R, V) = after.v.transpose();
+        *self.p.upper_mut(R, PSI) = after.psi.transpose();
+        let after = self.transposed_rows(map, V, [&of_r.v, &of_v.v, &of_psi.v]);
+        self.p.set_diagonal_block(V, after.v);
+        *self.p.upper_mut(V, PSI) = after.psi.transpose();
+        let after = self.transposed_rows(map, PSI, [&of_r.psi, &of_v.psi, &of_psi.psi]);
+        self.p.set_diagonal_block(PSI, after.psi);
     }
 
-    /// The Earth terms over the time since they were last applied. Called before the state or its
-    /// covariance is looked at.
+    /// The navigation rows of A P in block column j.
     #[inline(always)]
-    pub fn apply_earth_terms(&mut self) {
-        if self.earth_age <= 0.0 {
-            return;
-        }
-        let (terms, age) = (EarthTerms::at(&self.nominal), self.earth_age);
-        self.earth_age = 0.0;
-        let rows: [NavRows; 3] = std::array::from_fn(|j| terms.apply(&self.column(j), age));
-        for j in BIAS..self.p.blocks() {
-            let rows = terms.apply(&self.column(j), age);
-            *self.p.upper_mut(R, j) = rows.r;
-            *self.p.upper_mut(V, j) = rows.v;
-            *self.p.upper_mut(PSI, j) = rows.psi;
-        }
-        self.set_nav_columns(&rows, |x, _, _| terms.apply(x, age));
+    fn rows(&self, map: &impl RowMap, j: usize) -> NavRows {
+        let x = NavRows { r: self.p.block(R, j), v: self.p.block(V, j), psi: self.p.block(PSI, j) };
+        map.apply(&x, &self.sum(self.accel_blocks(), j), &self.sum(self.gyro_blocks(), j))
     }
 
-    /// The navigation rows of a block column of P.
+    /// The map on row `i` of A P, transposed: its navigation columns are given, its bias columns stored.
     #[inline(always)]
-    fn column(&self, j: usize) -> NavRows {
-        NavRows { r: self.p.block(R, j), v: self.p.block(V, j), psi: self.p.block(PSI, j) }
+    fn transposed_rows(&self, map: &impl RowMap, i: usize, row: [&Mat3; 3]) -> NavRows {
+        let x = NavRows { r: row[0].transpose(), v: row[1].transpose(), psi: row[2].transpose() };
+        map.apply(&x, &self.sum(self.accel_blocks(), i), &self.sum(self.gyro_blocks(), i))
     }
 
     /// The sum of bias blocks of column j.
     #[inline(always)]
     fn sum(&self, blocks: std::ops::Range<usize>, j: usize) -> Mat3 {
-        let first = self.p.block(blocks.start, j);
-        (blocks.start + 1..blocks.end).fold(first, |sum, i| sum + self.p.block(i, j))
-    }
-
-    /// Completes A P Aᵀ: `columns[j]` holds the navigation rows of A P in navigation column j, the bias
-    /// columns of P those of A P already; the same row map is applied to the transposed rows.
-    #[inline(always)]
-    fn set_nav_columns(&mut self, columns: &[NavRows; 3], map: impl Fn(&NavRows, &Mat3, &Mat3) -> NavRows) {
-        let [r, v, psi] = columns;
-        // (A P)ᵀ of row i in the bias columns: stored above the diagonal, read below it
-        let sums = |i: usize| (self.sum(self.accel_blocks(), i), self.sum(self.gyro_blocks(), i));
-        let row =
-            |a: &Mat3, b: &Mat3, c: &Mat3| NavRows { r: a.transpose(), v: b.transpose(), psi: c.transpose() };
-        let (accel, gyro) = sums(R);
-        let of_r = map(&row(&r.r, &v.r, &psi.r), &accel, &gyro);
-        let (accel, gyro) = sums(V);
-        let of_v = map(&row(&r.v, &v.v, &psi.v), &accel, &gyro);
-        let (accel, gyro) = sums(PSI);
-        let of_psi = map(&row(&r.psi, &v.psi, &psi.psi), &accel, &gyro);
-        self.p.set_diagonal_block(R, of_r.r);
-        *self.p.upper_mut(R, V) = of_r.v.transpose();
-        *self.p.upper_mut(R, PSI) = of_r.psi.transpose();
-        self.p.set_diagonal_block(V, of_v.v);
-        *self.p.upper_mut(V, PSI) = of_v.psi.transpose();
-        self.p.set_diagonal_block(PSI, of_psi.psi);
+        let mut sum = self.p.block(blocks.start, j);
+        for i in blocks.start + 1..blocks.end {
+            sum = sum + self.p.block(i, j);
+        }
+        sum
     }
 
     /// White noise of one sample, held over dt: sigma² dt² into V and PSI, and the part of it that the
     /// sample itself carries on to R and V.
     #[inline(always)]
     fn add_white_noise(&mut self, sample: &Sample) {
-        let [accel, gyro] = self.white.map(|variances| sample.rotated_noise(variances));
+        let (accel, gyro) = (sample.rotated_noise(self.white[0]), sample.rotated_noise(self.white[1]));
         let half = 0.5 * self.dt;
         let p = &mut self.p;
         *p.upper_mut(V, V) = p.block(V, V) + accel;
@@ -243,12 +230,29 @@ impl Ekf {
     }
 }
 
+/// Brings the covariance up to the time of the last sample (the Earth terms lag by up to
+/// [`EARTH_STEP_S`]): to be called before it is looked at.
+#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+pub fn settle(ekf: &mut Ekf) {
+    ekf.apply_earth_terms();
+}
+
+/// diag(rows) m diag(columns), in place.
+#[inline(always)]
+fn scale(m: &mut Mat3, rows: DVec3, columns: DVec3) {
+    for i in 0..3 {
+        for j in 0..3 {
+            m.0[i][j] = m.0[i][j] * (rows[i] * columns[j]);
+        }
+    }
+}
+
 /// Covariance of psi_n for standard deviations of roll, pitch and yaw (degrees).
 fn attitude_covariance(state: &NavState, sigma_deg: [f64; 3]) -> Mat3 {
     let psi = psi_of_angles(state.q_b_n);
     let variances = sigma_deg.map(|s| (s * DEG).powi(2));
     let p = psi * Matrix3::from_diagonal(&variances.into()) * psi.transpose();
-    Mat3::from_fn(|row, column| Lanes::splat(p[(row, column)]))
+    Mat3(std::array::from_fn(|row| std::array::from_fn(|column| Lanes::splat(p[(row, column)]))))
 }
 
 /// Advances a filter through IMU samples: the same ideal samples for all runs plus the errors of each,

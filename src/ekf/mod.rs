@@ -14,7 +14,7 @@ pub mod update;
 
 pub use belief::{Belief, BeliefError};
 pub use covariance::Covariance;
-pub use filter::{Ekf, advance};
+pub use filter::{Ekf, advance, settle};
 pub use initial::{FilterStates, InitialSettings};
 pub use update::{Fix, update};
 

@@ -2,12 +2,11 @@
 //! exponential, and definiteness under extreme measurements.
 
 use super::covariance::{PSI, R, V};
-use super::dynamics::{EarthTerms, NavRows, Sample};
-use super::update::Fix;
-use super::{Belief, Ekf, FilterStates, InitialSettings};
+use super::dynamics::{EarthStep, EarthTerms, NavRows, RowMap, Sample};
+use super::{Belief, Ekf, FilterStates, Fix, InitialSettings, advance, settle, update};
 use crate::earth::{self, GravityModel};
 use crate::frames::NavState;
-use crate::imu::Sensor;
+use crate::imu::{ImuSample, Sensor};
 use crate::lanes::{Lanes, Mat3, Vec3};
 use crate::noise::{Ar1, Composite, Model, Process, White};
 use crate::rng::{Generator, StreamKey};
@@ -99,7 +98,8 @@ fn filter_transition(state: &NavState, omega: DVec3, f: DVec3, dt: f64) -> SMatr
     for block in 0..5 {
         let unit = |b: usize| if b == block { identity } else { Mat3::ZERO };
         let column = NavRows { r: unit(R), v: unit(V), psi: unit(PSI) };
-        let after = terms.apply(&sample.apply(&column, &unit(3), &unit(4)), dt);
+        let after =
+            EarthStep { terms, dt }.apply(&sample.apply(&column, &unit(3), &unit(4)), &unit(3), &unit(4));
         for (b, m) in [after.r, after.v, after.psi].iter().enumerate() {
             result.fixed_view_mut::<3, 3>(3 * b, 3 * block).copy_from(&m.lane(0));
         }
@@ -171,6 +171,11 @@ fn ekf(model: &Model, states: FilterStates) -> Ekf {
     Ekf::new(Strapdown::new(&start, GravityModel::Wgs84), &belief, &start, &InitialSettings::default())
 }
 
+/// One IMU sample, the same in all lanes.
+fn predict(ekf: &mut Ekf, omega_ib_b: DVec3, f_ib_b: DVec3) {
+    advance(ekf, &[ImuSample { omega_ib_b, f_ib_b }], &[[Vec3::ZERO; 2]]);
+}
+
 /// A fix at the nominal position itself: the innovation is zero, the covariance does what it does.
 fn fix_at_nominal(ekf: &Ekf, pos_sigma_m: f64, vel_sigma_m_s: f64) -> Fix {
     let n = &ekf.nominal;
@@ -217,14 +222,15 @@ fn covariance_agrees_with_the_matrix_exponential_over_a_run() {
         let (omega, f) = manoeuvre(t);
         let terms = EarthTerms::at(&ekf.nominal);
         let c_before = ekf.nominal.q_b_n.to_matrix().lane(0);
-        ekf.predict(Vec3::splat(omega), Vec3::splat(f));
+        predict(&mut ekf, omega, f);
         let c = (c_before + ekf.nominal.q_b_n.to_matrix().lane(0)) * 0.5;
         let (phi, qd) = van_loan(&continuous_f(&terms, &c, f), &continuous_q(), dt);
         p = bias_step(&p);
         p = phi * p * phi.transpose() + qd;
         let second = (k + 1) / 100;
         if (k + 1) % 100 == 0 && !(60..150).contains(&second) {
-            ekf.update(&fix_at_nominal(&ekf, 2.0, 0.05));
+            let fix = fix_at_nominal(&ekf, 2.0, 0.05);
+            update(&mut ekf, &fix);
             for state in 0..6 {
                 let r: f64 = if state < 3 { 4.0 } else { 0.0025 };
                 let column: SMatrix<f64, 15, 1> = p.column(state).into();
@@ -232,7 +238,7 @@ fn covariance_agrees_with_the_matrix_exponential_over_a_run() {
             }
         }
         if (k + 1) % 100 == 0 {
-            ekf.apply_earth_terms();
+            settle(&mut ekf);
             for i in 0..15 {
                 let ratio = (ekf.p.get(i, i)[0] / p[(i, i)]).sqrt();
                 assert!((ratio - 1.0).abs() < 1e-4, "state {i} at {second} s: ratio {ratio}");
@@ -277,9 +283,10 @@ fn covariance_stays_positive_definite_under_extreme_measurements() {
         let sigma = f64::sqrt(variance);
         for k in 0..100_000 {
             let (omega, f) = manoeuvre(k as f64 * 0.01);
-            ekf.predict(Vec3::splat(omega), Vec3::splat(f));
+            predict(&mut ekf, omega, f);
             if k % 100 == 99 {
-                ekf.update(&fix_at_nominal(&ekf, sigma, sigma));
+                let fix = fix_at_nominal(&ekf, sigma, sigma);
+                update(&mut ekf, &fix);
             }
         }
         let p = ekf.p.lane(3);
@@ -306,9 +313,10 @@ fn splitting_a_bias_into_two_states_changes_nothing_outside() {
     for filter in &mut filters {
         for k in 0..3000 {
             let (omega, f) = manoeuvre(k as f64 * 0.01);
-            filter.predict(Vec3::splat(omega), Vec3::splat(f));
+            predict(filter, omega, f);
             if k % 100 == 99 {
-                filter.update(&fix_at_nominal(filter, 2.0, 0.05));
+                let fix = fix_at_nominal(filter, 2.0, 0.05);
+                update(filter, &fix);
             }
         }
     }

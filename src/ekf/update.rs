@@ -31,10 +31,8 @@ pub struct Fix {
 const MAX_ROW: usize = 4 + 3 * MAX_GROUPS;
 
 impl Ekf {
-    /// Uses a fix: up to six scalar updates, then the correction of the nominal state. Returns the
-    /// normalised innovation squared (NIS) of the fix.
     #[inline(always)]
-    pub fn update(&mut self, fix: &Fix) -> Lanes {
+    fn update(&mut self, fix: &Fix) -> Lanes {
         self.apply_earth_terms();
         self.scratch.error.fill(Lanes::ZERO);
         let antenna = Antenna::new(self, fix);
@@ -74,7 +72,10 @@ impl Ekf {
     fn scalar(&mut self, h: &[(usize, Lanes)], z: Lanes, r: f64) -> Lanes {
         let scratch = &mut self.scratch;
         let s = self.p.update(h, r, &mut scratch.ph, &mut scratch.gain);
-        let innovation = h.iter().fold(z, |z, (i, c)| z - *c * scratch.error[*i]);
+        let mut innovation = z;
+        for (i, c) in h {
+            innovation -= *c * scratch.error[*i];
+        }
         for (error, gain) in scratch.error.iter_mut().zip(&scratch.gain) {
             *error += *gain * innovation;
         }
@@ -96,12 +97,14 @@ impl Ekf {
         nominal.v_n = nominal.v_n - dv;
         nominal.q_b_n = (Quat::from_rotation_vector(-psi) * nominal.q_b_n).renormalised();
         for (g, bias) in self.bias.iter_mut().enumerate() {
-            *bias = *bias - Vec3(std::array::from_fn(|i| self.scratch.error[3 * (BIAS + g) + i]));
+            *bias = *bias - self.scratch.of(BIAS + g);
         }
     }
 }
 
-/// [`Ekf::update`], compiled for the vector units of the machine and dispatched at run time.
+/// Uses a fix: up to six scalar updates in sequence, then the correction of the nominal state. Returns the
+/// normalised innovation squared (NIS) of the fix. Compiled for the vector units of the machine and
+/// dispatched at run time.
 #[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 pub fn update(ekf: &mut Ekf, fix: &Fix) -> Lanes {
     ekf.update(fix)

@@ -5,7 +5,7 @@ use super::{COVERAGE_DOF, EpochSums, NEES_DOF, OutageRecord, REPORTED, RunRecord
 use crate::earth::{ned_difference, radii};
 use crate::ekf::covariance::{PSI, R, V};
 use crate::ekf::initial::psi_of_angles;
-use crate::ekf::{Ekf, Fix, advance, update};
+use crate::ekf::{Ekf, Fix, advance, settle, update};
 use crate::frames::{NavState, RollPitchYaw};
 use crate::imu::Channel;
 use crate::lanes::{LANES, Lanes, Real, Vec3};
@@ -194,7 +194,7 @@ impl Candidate {
             self.nis = (self.nis.0 + nis, self.nis.1 + 1);
         }
         if event.report {
-            self.ekf.apply_earth_terms();
+            settle(&mut self.ekf);
             let epoch = self.report(plan, event);
             self.follow_outages(plan, event, &epoch);
             self.trace.push(epoch);
