@@ -9,6 +9,7 @@
 //! [Groves](crate::bibliography::Groves13), sec. 14.2.4, with position in metres: delta r_n =
 //! ((R_N + h) δlat, (R_E + h) cos lat δlon, −δh), whose dynamics are derived in closed form.
 
+use super::covariance::{PSI, R, V};
 use crate::earth::{E2, OMEGA_IE, gravity_down, radii};
 use crate::lanes::{Lanes, Mat3, Real, Vec3};
 use crate::strapdown::{StepTrace, Strapdown};
@@ -17,16 +18,9 @@ use glam::DVec3;
 /// Longest step of the Earth terms (s).
 pub const EARTH_STEP_S: f64 = 0.2;
 
-/// Three rows of blocks of a matrix, by the navigation error they belong to: a block column of P.
+/// Three rows of blocks of a matrix, R, V and PSI: the navigation rows of a block column of P.
 #[derive(Debug, Clone, Copy)]
-pub struct NavRows {
-    /// Position rows.
-    pub r: Mat3,
-    /// Velocity rows.
-    pub v: Mat3,
-    /// Attitude rows.
-    pub psi: Mat3,
-}
+pub struct NavRows(pub [Mat3; 3]);
 
 /// A linear map of the navigation error: what it does to the navigation rows of a block column, given the
 /// summed accelerometer and gyroscope bias rows of the same column.
@@ -101,10 +95,11 @@ impl RowMap for Sample {
     /// the matrix exponential come with it.
     #[inline(always)]
     fn apply(&self, x: &NavRows, accel: &Mat3, gyro: &Mat3) -> NavRows {
-        let psi = x.psi - self.c_dt * *gyro;
-        let v = x.v - (self.cross_f(&(x.psi + psi), 0.5) + self.c_dt * *accel);
-        let r = x.r + (x.v + v) * (0.5 * self.dt);
-        NavRows { r, v, psi }
+        let x = &x.0;
+        let psi = x[PSI] - self.c_dt * *gyro;
+        let v = x[V] - (self.cross_f(&(x[PSI] + psi), 0.5) + self.c_dt * *accel);
+        let r = x[R] + (x[V] + v) * (0.5 * self.dt);
+        NavRows([r, v, psi])
     }
 }
 
@@ -186,12 +181,12 @@ pub struct EarthStep {
 impl RowMap for EarthStep {
     #[inline(always)]
     fn apply(&self, x: &NavRows, _accel: &Mat3, _gyro: &Mat3) -> NavRows {
-        let (t, dt) = (&self.terms, self.dt);
-        NavRows {
-            r: x.r + t.rr * x.r * dt,
-            v: x.v + (t.vr * x.r + t.vv * x.v) * dt,
-            psi: x.psi + (t.psi_r * x.r + t.psi_v * x.v + t.psi_psi * x.psi) * dt,
-        }
+        let (t, dt, x) = (&self.terms, self.dt, &x.0);
+        NavRows([
+            x[R] + t.rr * x[R] * dt,
+            x[V] + (t.vr * x[R] + t.vv * x[V]) * dt,
+            x[PSI] + (t.psi_r * x[R] + t.psi_v * x[V] + t.psi_psi * x[PSI]) * dt,
+        ])
     }
 }
 

@@ -1,7 +1,7 @@
 //! The filter itself: nominal state, bias estimates and covariance of eight runs.
 
 use super::belief::Belief;
-use super::covariance::{BIAS, Covariance, PSI, R, V};
+use super::covariance::{BIAS, Covariance, NAV, PSI, R, V};
 use super::dynamics::{EARTH_STEP_S, EarthStep, EarthTerms, NavRows, RowMap, Sample};
 use super::initial::{InitialSettings, psi_of_angles};
 use crate::frames::NavState;
@@ -167,42 +167,32 @@ impl Ekf {
         }
     }
 
-    /// P⁺ = A P Aᵀ for a map A of the navigation rows: by block rows, then by block columns.
+    /// P⁺ = A P Aᵀ for a map A of the navigation rows: by block columns, then by block rows. Loops, so that
+    /// the map is compiled in two places only.
     #[inline(always)]
     fn transform(&mut self, map: &impl RowMap) {
-        // Navigation rows of A P: first the navigation columns (from the bias blocks as they are) …
-        let (of_r, of_v, of_psi) = (self.rows(map, R), self.rows(map, V), self.rows(map, PSI));
-        // … then the bias columns, in place.
-        for j in BIAS..self.p.blocks() {
-            let rows = self.rows(map, j);
-            *self.p.upper_mut(R, j) = rows.r;
-            *self.p.upper_mut(V, j) = rows.v;
-            *self.p.upper_mut(PSI, j) = rows.psi;
+        // Navigation rows of A P: the navigation columns apart, the bias columns in place after them.
+        let mut nav = [NavRows([Mat3::ZERO; 3]); 3];
+        for j in 0..self.p.blocks() {
+            let x = NavRows([self.p.block(R, j), self.p.block(V, j), self.p.block(PSI, j)]);
+            let rows = map.apply(&x, &self.sum(self.accel_blocks(), j), &self.sum(self.gyro_blocks(), j));
+            if j < BIAS {
+                nav[j] = rows;
+            } else {
+                for i in NAV {
+                    *self.p.upper_mut(i, j) = rows.0[i];
+                }
+            }
         }
         // A P Aᵀ: the same map on the transposed rows of A P, of which the upper blocks are kept.
-        let after = self.transposed_rows(map, R, [&of_r.r, &of_v.r, &of_psi.r]);
-        self.p.set_diagonal_block(R, after.r);
-        *self.p.upper_mut(R, V) = after.v.transpose();
-        *self.p.upper_mut(R, PSI) = after.psi.transpose();
-        let after = self.transposed_rows(map, V, [&of_r.v, &of_v.v, &of_psi.v]);
-        self.p.set_diagonal_block(V, after.v);
-        *self.p.upper_mut(V, PSI) = after.psi.transpose();
-        let after = self.transposed_rows(map, PSI, [&of_r.psi, &of_v.psi, &of_psi.psi]);
-        self.p.set_diagonal_block(PSI, after.psi);
-    }
-
-    /// The navigation rows of A P in block column j.
-    #[inline(always)]
-    fn rows(&self, map: &impl RowMap, j: usize) -> NavRows {
-        let x = NavRows { r: self.p.block(R, j), v: self.p.block(V, j), psi: self.p.block(PSI, j) };
-        map.apply(&x, &self.sum(self.accel_blocks(), j), &self.sum(self.gyro_blocks(), j))
-    }
-
-    /// The map on row `i` of A P, transposed: its navigation columns are given, its bias columns stored.
-    #[inline(always)]
-    fn transposed_rows(&self, map: &impl RowMap, i: usize, row: [&Mat3; 3]) -> NavRows {
-        let x = NavRows { r: row[0].transpose(), v: row[1].transpose(), psi: row[2].transpose() };
-        map.apply(&x, &self.sum(self.accel_blocks(), i), &self.sum(self.gyro_blocks(), i))
+        for i in NAV {
+            let row = NavRows([nav[R].0[i].transpose(), nav[V].0[i].transpose(), nav[PSI].0[i].transpose()]);
+            let row = map.apply(&row, &self.sum(self.accel_blocks(), i), &self.sum(self.gyro_blocks(), i));
+            self.p.set_diagonal_block(i, row.0[i]);
+            for j in i + 1..BIAS {
+                *self.p.upper_mut(i, j) = row.0[j].transpose();
+            }
+        }
     }
 
     /// The sum of bias blocks of column j.

@@ -97,10 +97,10 @@ fn filter_transition(state: &NavState, omega: DVec3, f: DVec3, dt: f64) -> SMatr
     let mut result = SMatrix::<f64, 9, 15>::zeros();
     for block in 0..5 {
         let unit = |b: usize| if b == block { identity } else { Mat3::ZERO };
-        let column = NavRows { r: unit(R), v: unit(V), psi: unit(PSI) };
+        let column = NavRows([unit(R), unit(V), unit(PSI)]);
         let after =
             EarthStep { terms, dt }.apply(&sample.apply(&column, &unit(3), &unit(4)), &unit(3), &unit(4));
-        for (b, m) in [after.r, after.v, after.psi].iter().enumerate() {
+        for (b, m) in after.0.iter().enumerate() {
             result.fixed_view_mut::<3, 3>(3 * b, 3 * block).copy_from(&m.lane(0));
         }
     }
