@@ -57,3 +57,4 @@ pub mod metrics;
 // L7
 pub mod data;
 pub mod report;
+pub mod study;

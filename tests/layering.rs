@@ -26,11 +26,15 @@ const MAY_NAME: &[(&str, &[&str])] = &[
     ("simulation", &["@L1", "noise", "trajectory", "sensors", "strapdown", "ekf"]),
     ("monte_carlo", &["@L1", "noise", "trajectory", "sensors", "strapdown", "ekf", "simulation"]),
     ("metrics", &["@L1", "ekf", "simulation", "monte_carlo"]),
+    ("study", &["bibliography", "rng", "imu", "noise", "wavelet", "calibration"]),
     (
         "report",
         &["@L1", "noise", "wavelet", "calibration", "scenario", "simulation", "monte_carlo", "metrics"],
     ),
-    ("data", &["@L1", "noise", "wavelet", "trajectory", "calibration", "scenario", "metrics", "report"]),
+    (
+        "data",
+        &["@L1", "noise", "wavelet", "trajectory", "calibration", "scenario", "metrics", "report", "study"],
+    ),
 ];
 const L0: &[&str] = &["bibliography", "units", "linalg", "lanes", "rng"];
 const L1: &[&str] = &["bibliography", "units", "linalg", "lanes", "rng", "earth", "frames", "gnss", "imu"];

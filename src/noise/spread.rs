@@ -160,7 +160,8 @@ impl Variation {
         }
     }
 
-    fn no_parameter(&self, process: &Process) -> SpreadError {
+    /// The error of a law for a parameter that the process does not have.
+    pub(crate) fn no_parameter(&self, process: &Process) -> SpreadError {
         let known = process.parameters().into_iter().map(|(n, _)| n).collect();
         SpreadError::NoParameter { process: process.code(), parameter: self.parameter.clone(), known }
     }

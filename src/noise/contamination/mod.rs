@@ -127,8 +127,9 @@ pub struct Contamination {
 }
 
 impl Contamination {
-    /// The rules for a signal of a replicate (counted from 1), in the order of application.
-    fn rules_for(&self, channel: Channel, replicate: u64) -> Vec<&Operation> {
+    /// What is done to a signal of a replicate (counted from 1), in the order of application.
+    #[must_use]
+    pub fn rules_for(&self, channel: Channel, replicate: u64) -> Vec<&Operation> {
         let applies =
             |r: &&Rule| r.sensor == channel.sensor && r.replicate.is_none_or(|only| only == replicate);
         let mut operations: Vec<&Operation> =
