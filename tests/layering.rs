@@ -29,7 +29,17 @@ const MAY_NAME: &[(&str, &[&str])] = &[
     ("study", &["bibliography", "rng", "imu", "noise", "wavelet", "calibration"]),
     (
         "report",
-        &["@L1", "noise", "wavelet", "calibration", "scenario", "simulation", "monte_carlo", "metrics"],
+        &[
+            "@L1",
+            "noise",
+            "wavelet",
+            "calibration",
+            "scenario",
+            "simulation",
+            "monte_carlo",
+            "metrics",
+            "study",
+        ],
     ),
     (
         "data",

@@ -7,6 +7,7 @@ mod common;
 mod compare;
 mod completions;
 mod demo;
+mod efficiency;
 mod exit;
 mod init;
 mod man;
@@ -46,6 +47,7 @@ enum Command {
     Synthesize(synthesize::Args),
     Run(run::Args),
     Compare(compare::Args),
+    Efficiency(efficiency::Args),
     Demo(demo::Args),
     Check(check::Args),
     Init(init::Args),
@@ -62,6 +64,7 @@ impl Command {
             Self::Synthesize(args) => synthesize::run(&args, session),
             Self::Run(args) => run::run(&args, session),
             Self::Compare(args) => compare::run(&args, session),
+            Self::Efficiency(args) => efficiency::run(&args, session),
             Self::Demo(args) => demo::run(&args, session),
             Self::Check(args) => check::run(&args, session),
             Self::Init(args) => init::run(&args, session),

@@ -9,6 +9,8 @@ pub mod npy;
 pub mod recordings;
 pub mod run_directory;
 pub mod scenario_file;
+pub mod study_directory;
+pub mod study_file;
 pub mod suggest;
 pub mod toml_file;
 pub mod trajectory_file;

@@ -290,6 +290,15 @@ impl<'a> Section<'a> {
         self.str(key)?.ok_or_else(|| self.missing(key))
     }
 
+    /// A list of texts.
+    pub(crate) fn strs(&self, key: &str) -> Result<Option<Vec<&'a str>>, TomlError> {
+        let Some(value) = self.get(key) else { return Ok(None) };
+        let error = || self.wrong_type(key, "a list of texts in quotes");
+        let items = value.get_ref().as_array().ok_or_else(error)?;
+        let texts = items.iter().map(|v| v.get_ref().as_str());
+        texts.collect::<Option<Vec<&str>>>().map(Some).ok_or_else(error)
+    }
+
     /// A table.
     pub(crate) fn section(&self, key: &str) -> Result<Option<Section<'a>>, TomlError> {
         let Some(value) = self.get(key) else { return Ok(None) };

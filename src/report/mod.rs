@@ -3,6 +3,7 @@
 
 mod comparison;
 mod curves;
+mod efficiency;
 mod fits;
 mod html;
 mod manifest;
@@ -18,6 +19,7 @@ pub use curves::{
     CONFIDENCE, CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile, intervals_note,
     signal_rows,
 };
+pub use efficiency::{EfficiencyFile, EfficiencyRow, efficiency_csv, efficiency_table};
 pub use fits::{FitEntry, FitsFile, describe};
 pub use manifest::{Input, Manifest, ModelNote};
 pub use run_directory::{OutputFile, RUN_FILES, json, run_directory};

@@ -7,7 +7,7 @@ use crate::imu::Channel;
 use crate::noise::contamination::{Contamination, ContaminationError, Operation};
 use crate::noise::{Model, Spread, SpreadError, Synthesizer};
 use crate::rng::StreamKey;
-use crate::wavelet::{Status, Tuning, WaveletError, both};
+use crate::wavelet::{Status, Tuning, WaveletError, both, default_levels};
 use rand::Rng;
 
 /// A study of estimators: what is drawn, what is done to it, how it is estimated from.
@@ -96,6 +96,29 @@ impl Design {
         let estimate = |replicates: &Vec<Replicate>| self.estimate_all(replicates);
         let estimates = scenarios.iter().map(estimate).collect::<Result<Vec<_>, _>>()?;
         Ok(estimates.into_iter().flatten().collect())
+    }
+
+    /// The same study of replicates of another length, with the usual number of levels.
+    #[must_use]
+    pub fn with_samples(self, samples: usize) -> Self {
+        Self { samples, levels: default_levels(samples), ..self }
+    }
+
+    /// Whether the contaminations can be applied and the model has something to scale, before anything is
+    /// drawn.
+    ///
+    /// # Errors
+    /// The first thing that is wrong.
+    pub fn check(&self) -> Result<(), StudyError> {
+        let mut nothing = vec![0.0; self.samples];
+        for scenario in &self.scenarios {
+            for replicate in 1..=self.replicates {
+                let (channel, rate_hz) = (self.channel, self.model.rate_hz);
+                scenario.scale(&mut self.model.axis(channel).clone(), channel, replicate, rate_hz)?;
+                scenario.apply(&mut nothing, channel, replicate, rate_hz, 0)?;
+            }
+        }
+        Ok(())
     }
 
     /// Names of the fitted model's parameters: "AR1 phi", …

@@ -1,0 +1,288 @@
+//! The directory of an estimator study: what it is (`study.json`), and the estimates from each set as they
+//! are finished (`sets.csv`), from which a study that was stopped goes on.
+
+use super::atomic;
+use crate::study::Estimate;
+use serde_json::Value;
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// A directory that cannot be worked in.
+#[derive(Debug, thiserror::Error)]
+pub enum StudyDirectoryError {
+    /// The system refused.
+    #[error("{path}: {source}")]
+    Io {
+        /// File or directory.
+        path: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// An output cannot be written.
+    #[error(transparent)]
+    Write(#[from] atomic::WriteError),
+    /// It holds another study.
+    #[error("{path} holds another study: its \"{key}\" is {found}, not {wanted}")]
+    Other {
+        /// The directory.
+        path: String,
+        /// What differs.
+        key: String,
+        /// What is there.
+        found: String,
+        /// What was asked for.
+        wanted: String,
+    },
+    /// It holds no study but something else of these names.
+    #[error("{path} holds {file}, which is not of a study")]
+    Foreign {
+        /// The directory.
+        path: String,
+        /// The file.
+        file: &'static str,
+    },
+    /// A line of the estimates is damaged.
+    #[error("{path}, line {line}: {reason}")]
+    Damaged {
+        /// The file.
+        path: String,
+        /// Line, from 1.
+        line: u64,
+        /// What is wrong.
+        reason: String,
+    },
+}
+
+impl StudyDirectoryError {
+    /// Whether the contents or the request are at fault (rather than the machine).
+    #[must_use]
+    pub const fn is_usage(&self) -> bool {
+        match self {
+            Self::Io { .. } => false,
+            Self::Write(e) => e.is_usage(),
+            _ => true,
+        }
+    }
+
+    /// What to do about it.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        match self {
+            Self::Write(e) => e.hint(),
+            Self::Io { .. } => None,
+            _ => Some("choose another directory with --out, or remove this one".into()),
+        }
+    }
+}
+
+type Result<T> = std::result::Result<T, StudyDirectoryError>;
+
+/// The names of what is estimated in each set.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Layout {
+    /// (scenario, estimator) of each row of a set.
+    pub rows: Vec<(String, String)>,
+    /// Names of the parameters.
+    pub parameters: Vec<String>,
+}
+
+/// An open study directory.
+#[derive(Debug)]
+pub struct StudyDirectory {
+    path: PathBuf,
+    layout: Layout,
+    sets: File,
+    /// The sets already estimated from, in order.
+    pub done: Vec<Vec<Estimate>>,
+}
+
+impl StudyDirectory {
+    /// Opens or makes the directory of the study that `identity` (an object) describes. An incomplete set
+    /// at the end, left by a run that was stopped, is removed.
+    ///
+    /// # Errors
+    /// When the directory is of another study, damaged, or cannot be written to.
+    pub fn open(path: &Path, identity: &Value, layout: Layout) -> Result<Self> {
+        let (study, sets) = (path.join("study.json"), path.join("sets.csv"));
+        match fs::read_to_string(&study) {
+            Ok(text) => same(path, &text, identity)?,
+            Err(_) if sets.exists() => {
+                return Err(StudyDirectoryError::Foreign {
+                    path: path.display().to_string(),
+                    file: "sets.csv",
+                });
+            }
+            Err(_) => {
+                let text = serde_json::to_string_pretty(identity).unwrap_or_default();
+                atomic::write(&study, text + "\n")?;
+            }
+        }
+        let io = |source| StudyDirectoryError::Io { path: sets.display().to_string(), source };
+        let text = if sets.exists() { fs::read_to_string(&sets).map_err(io)? } else { String::new() };
+        let (done, whole) = parse(&sets, &text, &layout)?;
+        let mut file = File::options().create(true).write(true).truncate(false).open(&sets).map_err(io)?;
+        file.set_len(whole).map_err(io)?;
+        std::io::Seek::seek(&mut file, std::io::SeekFrom::End(0)).map_err(io)?;
+        let mut directory = Self { path: sets.clone(), layout, sets: file, done };
+        if whole == 0 {
+            directory.write(&directory.header())?;
+        }
+        Ok(directory)
+    }
+
+    /// Appends sets, in order after those done, and flushes them to the disk.
+    ///
+    /// # Errors
+    /// When the disk is full.
+    pub fn append(&mut self, sets: Vec<Vec<Estimate>>) -> Result<()> {
+        let mut text = String::new();
+        for set in sets {
+            for ((scenario, estimator), e) in self.layout.rows.iter().zip(&set) {
+                let theta: Vec<String> = e.theta.iter().map(|v| format!("{v:e}")).collect();
+                text += &format!(
+                    "{},{},{estimator},{},{:e},{}\n",
+                    self.done.len() + 1,
+                    quoted(scenario),
+                    theta.join(","),
+                    e.objective,
+                    e.without_root
+                );
+            }
+            self.done.push(set);
+        }
+        self.write(&text)
+    }
+
+    fn header(&self) -> String {
+        let names: Vec<String> = self.layout.parameters.iter().map(|n| n.replace(' ', "_")).collect();
+        format!("set,scenario,estimator,{},objective,without_root\n", names.join(","))
+    }
+
+    fn write(&mut self, text: &str) -> Result<()> {
+        let written = self.sets.write_all(text.as_bytes()).and_then(|()| self.sets.sync_data());
+        written.map_err(|source| StudyDirectoryError::Io { path: self.path.display().to_string(), source })
+    }
+}
+
+/// A field that may hold commas or quotes.
+fn quoted(field: &str) -> String {
+    if field.contains([',', '"']) { format!("\"{}\"", field.replace('"', "\"\"")) } else { field.to_owned() }
+}
+
+/// Refuses a directory whose study is another one.
+fn same(path: &Path, text: &str, wanted: &Value) -> Result<()> {
+    let path = path.display().to_string();
+    let Ok(Value::Object(found)) = serde_json::from_str(text) else {
+        return Err(StudyDirectoryError::Foreign { path, file: "study.json" });
+    };
+    let Some(wanted) = wanted.as_object() else { return Ok(()) };
+    let differs = |key: &&String| found.get(*key) != wanted.get(*key);
+    let Some(key) = wanted.keys().chain(found.keys()).find(differs) else { return Ok(()) };
+    let shown = |value: Option<&Value>| value.map_or_else(|| "not given".into(), Value::to_string);
+    let (found, wanted) = (shown(found.get(key)), shown(wanted.get(key)));
+    Err(StudyDirectoryError::Other { path, key: key.clone(), found, wanted })
+}
+
+/// The complete sets, and how many bytes they take with the header.
+fn parse(path: &Path, text: &str, layout: &Layout) -> Result<(Vec<Vec<Estimate>>, u64)> {
+    let terminated = &text[..text.rfind('\n').map_or(0, |i| i + 1)];
+    let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(terminated.as_bytes());
+    let damaged = |line, reason: &str| StudyDirectoryError::Damaged {
+        path: path.display().to_string(),
+        line,
+        reason: reason.to_owned(),
+    };
+    if terminated.is_empty() {
+        return Ok((Vec::new(), 0));
+    }
+    reader.headers().map_err(|e| damaged(1, &e.to_string()))?;
+    let (mut sets, mut set, mut whole) = (Vec::new(), Vec::new(), reader.position().byte());
+    let mut record = csv::StringRecord::new();
+    while reader.read_record(&mut record).map_err(|e| damaged(reader.position().line(), &e.to_string()))? {
+        let line = record.position().map_or(0, csv::Position::line);
+        let row = estimate(&record, sets.len() + 1, set.len(), layout);
+        set.push(row.ok_or_else(|| damaged(line, "is not a row of this study"))?);
+        if set.len() == layout.rows.len() {
+            sets.push(std::mem::take(&mut set));
+            whole = reader.position().byte();
+        }
+    }
+    Ok((sets, whole))
+}
+
+fn estimate(record: &csv::StringRecord, set: usize, row: usize, layout: &Layout) -> Option<Estimate> {
+    let (scenario, estimator) = layout.rows.get(row)?;
+    let p = layout.parameters.len();
+    let as_expected = record.len() == p + 5
+        && record[0].parse() == Ok(set)
+        && record[1] == **scenario
+        && record[2] == **estimator;
+    let number = |i: usize| record.get(i)?.parse::<f64>().ok();
+    if !as_expected {
+        return None;
+    }
+    Some(Estimate {
+        theta: (3..3 + p).map(number).collect::<Option<_>>()?,
+        objective: number(3 + p)?,
+        without_root: record[4 + p].parse().ok()?,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn layout() -> Layout {
+        let rows = ["awv", "dr-awv"].map(|e| ("a, b".to_owned(), e.to_owned())).to_vec();
+        Layout { rows, parameters: vec!["WN sigma2".into()] }
+    }
+
+    fn set(seed: f64) -> Vec<Estimate> {
+        let one = |x: f64| Estimate { theta: vec![x / 3.0], objective: x, without_root: 2 };
+        vec![one(seed), one(-seed)]
+    }
+
+    fn open(path: &Path) -> StudyDirectory {
+        StudyDirectory::open(path, &json!({ "seed": 1 }), layout()).unwrap()
+    }
+
+    #[test]
+    fn what_is_appended_comes_back_bit_by_bit_and_a_torn_tail_does_not() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("study");
+        let mut first = open(&path);
+        first.append(vec![set(1.0), set(1e-300)]).unwrap();
+        first.append(vec![set(0.1)]).unwrap();
+        let sets = [set(1.0), set(1e-300), set(0.1)];
+        assert_eq!(open(&path).done, sets);
+        let file = path.join("sets.csv");
+        let whole = fs::read(&file).unwrap();
+        for cut in 1..whole.len() {
+            fs::write(&file, &whole[..cut]).unwrap();
+            let mut again = open(&path);
+            let done = again.done.len();
+            assert_eq!(again.done, sets[..done]);
+            again.append(sets[done..].to_vec()).unwrap();
+            assert_eq!(fs::read(&file).unwrap(), whole, "cut at {cut}");
+        }
+    }
+
+    #[test]
+    fn another_study_and_damage_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        open(dir.path()).append(vec![set(1.0)]).unwrap();
+        let e = StudyDirectory::open(dir.path(), &json!({ "seed": 2 }), layout()).unwrap_err();
+        assert!(e.to_string().ends_with("holds another study: its \"seed\" is 1, not 2"), "{e}");
+        assert!(e.is_usage() && e.hint().is_some());
+        let file = dir.path().join("sets.csv");
+        let text = fs::read_to_string(&file).unwrap().replace("dr-awv", "gmwm");
+        fs::write(&file, text).unwrap();
+        let e = StudyDirectory::open(dir.path(), &json!({ "seed": 1 }), layout()).unwrap_err();
+        assert!(e.to_string().ends_with("sets.csv, line 3: is not a row of this study"), "{e}");
+        fs::remove_file(dir.path().join("study.json")).unwrap();
+        let e = StudyDirectory::open(dir.path(), &json!({ "seed": 1 }), layout()).unwrap_err();
+        assert!(e.to_string().ends_with("holds sets.csv, which is not of a study"), "{e}");
+    }
+}
