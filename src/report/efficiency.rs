@@ -98,7 +98,7 @@ pub fn efficiency_table(file: &EfficiencyFile) -> String {
         }
     }
     let mut table = Table::new();
-    table.load_preset(presets::ASCII_MARKDOWN).set_content_arrangement(ContentArrangement::Disabled);
+    table.load_style(presets::ASCII_MARKDOWN).set_content_arrangement(ContentArrangement::Disabled);
     let heads = parameters.iter().map(|(name, target)| format!("{name} = {target:.6e}"));
     table.set_header(["scenario".to_owned(), "estimator".to_owned()].into_iter().chain(heads));
     for row in file.results.chunks(parameters.len().max(1)) {
