@@ -239,7 +239,7 @@ mod tests {
         );
         assert_eq!(
             with("sets", "estimators = [\"gmwm\"]\nsets"),
-            "s.toml, line 5: \"estimators\" = [\"gmwm\"] names gmwm, which is no average of replicates | did you mean \"awv\"?"
+            "s.toml, line 5: \"estimators\" = [\"gmwm\"] names gmwm, which is no average of replicates | estimators: awv, sr-awv, dr-awv"
         );
         assert_eq!(
             with("sets", "axis = \"gyro.x\"\nsets"),

@@ -279,8 +279,8 @@ pub(super) mod tests {
         assert_ne!(first[0].theta, other.set(0).unwrap()[0].theta);
     }
 
-    /// Outliers of 30 sigma in 0.5 % of the samples multiply the variance of the first scale by about
-    /// 1 + 0.005·900 = 5.5: AWV's white noise follows, that of the robust estimators does not. One
+    /// 20 outliers of 30 sigma among 16384 samples multiply the variance of the first scale by about
+    /// 1 + 20·900/16384 = 2.1: AWV's white noise follows, that of the robust estimators does not. One
     /// replicate of five with a random walk of 100 times the variance raises the mean variance to 20.8
     /// times, which SR-AWV follows and DR-AWV does not.
     #[test]
@@ -291,7 +291,7 @@ pub(super) mod tests {
         let estimates = design.set(0).unwrap();
         let theta =
             |scenario: usize, estimator: usize, p: usize| estimates[3 * scenario + estimator].theta[p];
-        assert!(theta(1, 0, 0) > 3.0, "AWV: {}", theta(1, 0, 0));
+        assert!(theta(1, 0, 0) > 1.5, "AWV: {}", theta(1, 0, 0));
         for robust in [1, 2] {
             assert!((theta(1, robust, 0) / theta(0, robust, 0) - 1.0).abs() < 0.1);
         }

@@ -3,8 +3,8 @@
 use crate::noise::Law;
 use nalgebra::{DMatrix, SymmetricEigen};
 
-/// Nodes a law is replaced by: exact for polynomials of degree 63 under a beta law.
-const NODES: usize = 32;
+/// Nodes a law is replaced by: exact for polynomials of degree 95 under a beta law.
+const NODES: usize = 48;
 /// A normal law is cut off so many standard deviations from its centre: 1e-19 of it lies beyond.
 const CUT: f64 = 9.0;
 

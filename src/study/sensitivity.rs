@@ -127,14 +127,16 @@ mod tests {
     }
 
     /// One replicate with f times the random walk: the mean variance grows by (f − 1)/K of one replicate's,
-    /// and AWV and SR-AWV with it; DR-AWV drops the replicate at every scale.
+    /// and AWV and SR-AWV with it (past some factor the walk drowns the rest, and its scales that are in view
+    /// are taken for an AR1); DR-AWV drops the replicate at every scale.
     #[test]
     fn an_abnormal_replicate_moves_all_but_dr_awv_without_bound() {
         let design = design(1 << 14);
         let moves = abnormal_curve(&design, 1, &[1e2, 1e4, 1e6, 1e8]).unwrap();
         for e in [AWV, SR] {
-            let walk = |i: usize| moves[i].changes[e][WALK];
-            assert!(walk(1) > 100.0 && walk(3) > 1e5, "{moves:?}");
+            assert!(moves[1].changes[e][WALK] > 100.0, "{moves:?}");
+            let (third, fourth) = (largest(&moves[2].changes[e]), largest(&moves[3].changes[e]));
+            assert!(third > 100.0 && fourth > 50.0 * third, "{moves:?}");
         }
         for m in &moves {
             assert!(largest(&m.changes[DR]) < 1.0, "{m:?}");
@@ -146,10 +148,11 @@ mod tests {
     /// a + 1 are not.
     #[test]
     fn dr_awv_withstands_as_many_abnormal_replicates_as_it_trims() {
-        for (trim, borne) in [(1, 1), (2, 2)] {
+        for trim in [1, 2] {
             let design = Design { trim: Trim::Count(trim), ..design(1 << 13) };
-            let change = |count| abnormal_curve(&design, count, &[1e8]).unwrap()[0].changes[DR][WALK];
-            assert!(change(borne).abs() < 5.0, "{trim}: {}", change(borne));
+            let change = |count| largest(&abnormal_curve(&design, count, &[1e8]).unwrap()[0].changes[DR]);
+            let borne = trim as u64;
+            assert!(change(borne) < 5.0, "{trim}: {}", change(borne));
             assert!(change(borne + 1) > 1e4, "{trim}: {}", change(borne + 1));
         }
     }
