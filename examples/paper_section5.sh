@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # The case study of Minaretzis et al. 2024, Section V, on a virtual IMU, at the paper's size: what
-# `nav-sim demo --seed 1 --full -o out/paper_section5` does, command by command. Run it where trajectories/ and
+# `nav-sim demo --seed 1 -o out/paper_section5` does, command by command. Run it where trajectories/ and
 # calib_data/ are (the repository, or a directory made by `nav-sim init`), with nav-sim on the PATH.
 set -euo pipefail
 

@@ -33,12 +33,12 @@ fn examples_are_short() {
     }
 }
 
-/// The walk-through is the demo of the program, at the paper's size.
+/// The walk-through is the demo of the program.
 #[test]
 fn the_walk_through_is_what_the_demo_prints() {
     let script = include_str!("../examples/paper_section5.sh");
     let commands: Vec<&str> = script.lines().filter(|l| l.starts_with("nav-sim ")).collect();
-    let arguments = ["demo", "--seed", "1", "--full", "--print", "-o", "out/paper_section5"];
+    let arguments = ["demo", "--seed", "1", "--print", "-o", "out/paper_section5"];
     let output = Command::new(env!("CARGO_BIN_EXE_nav-sim")).args(arguments).output().unwrap();
     let printed = String::from_utf8(output.stdout).unwrap();
     assert_eq!(commands, printed.lines().collect::<Vec<_>>());

@@ -125,10 +125,10 @@ fn same_place(a: &Path, b: &Path) -> bool {
     a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
 }
 
-/// A table whose first row is its head.
+/// A table whose first row is its head, as text that is Markdown too.
 pub(super) fn table(rows: &[Vec<String>]) -> String {
     let mut table = Table::new();
-    table.load_style(presets::UTF8_HORIZONTAL_ONLY).set_content_arrangement(ContentArrangement::Disabled);
+    table.load_style(presets::ASCII_MARKDOWN).set_content_arrangement(ContentArrangement::Disabled);
     if let Some((head, rows)) = rows.split_first() {
         table.set_header(head).add_rows(rows);
     }

@@ -15,14 +15,11 @@ use clap::Parser;
 #[command(before_help = "\
 Examples:
   nav-sim demo --seed 1 --samples 100000 --runs 8
-  nav-sim demo --seed 1 --print
-  nav-sim demo --seed 1 --full --print > paper_section5.sh")]
+  nav-sim demo --seed 1 --print -o study
+  nav-sim demo --seed 1 --print > paper_section5.sh")]
 pub(crate) struct Args {
-    /// Recordings of 524284 samples (87 minutes), as in the paper
-    #[arg(long, conflicts_with = "samples")]
-    full: bool,
-    /// Samples of each recording
-    #[arg(long, value_name = "T", default_value_t = 131_072)]
+    /// Samples of each recording (default: 87 minutes, as in the paper; short ones do not show its ordering)
+    #[arg(long, value_name = "T", default_value_t = 524_284)]
     samples: u64,
     /// Monte-Carlo runs with each model
     #[arg(long, value_name = "N", default_value_t = 100)]
@@ -59,8 +56,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 /// The commands, as words.
 fn commands(args: &Args, seed: u64) -> Vec<Vec<String>> {
-    let samples = if args.full { 524_284 } else { args.samples };
-    let synthesize = |rest: String| format!("synthesize {IMU} --samples {samples} --spread {rest}");
+    let synthesize = |rest: String| format!("synthesize {IMU} --samples {} --spread {rest}", args.samples);
     let mut lines = Vec::new();
     for scenario in SCENARIOS {
         let corrupted =

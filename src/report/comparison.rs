@@ -150,13 +150,13 @@ fn rows<'a>(run: &'a str, outage: usize, comparison: &'a OutageComparison) -> im
 
 /// The paper's Table I: rows scenario × outage, columns state × estimator; each cell the signed mean ratio
 /// error with half its 95 % interval, and in brackets the mean of the absolute ratio error (%). The first
-/// row is the head; `states` are indices of reported states.
+/// row is the head; an interval below half a hundredth is left out; `states` are indices of reported states.
 #[must_use]
 pub fn table_rows(candidates: &[CandidateResult], states: &[usize]) -> Vec<Vec<String>> {
     let scenarios = in_order(candidates.iter().map(|c| c.label.scenario.as_str()));
     let estimators = in_order(candidates.iter().map(|c| c.label.estimator.as_str()));
     let columns = || states.iter().flat_map(|s| estimators.iter().map(move |e| (*s, *e)));
-    let name = |(s, e): (usize, &str)| format!("{}\n{e}", REPORTED_NAMES[s]).trim_end().to_owned();
+    let name = |(s, e): (usize, &str)| format!("{} {e}", REPORTED_NAMES[s]).trim_end().to_owned();
     let mut rows = vec![["scenario", "outage"].map(str::to_owned).to_vec()];
     rows[0].extend(columns().map(name));
     let outages = candidates.iter().map(|c| c.outages.len()).max().unwrap_or(0);
@@ -182,7 +182,7 @@ fn cell(candidate: &CandidateResult, outage: usize, state: usize) -> String {
     }
     let ratio = candidate.outages[outage].states[state];
     let half = (ratio.asee.ci95_pct[1] - ratio.asee.ci95_pct[0]) / 2.0;
-    let interval = if half.is_finite() { format!(" ± {half:.2}") } else { String::new() };
+    let interval = if half >= 0.005 { format!(" ± {half:.2}") } else { String::new() };
     format!("{:+.2}{interval} ({:.2})", ratio.asee.pct, ratio.asee_abs_pct)
 }
 
@@ -240,7 +240,7 @@ mod tests {
         let rows = table_rows(&all, &[1, 6]);
         assert_eq!(
             rows[0],
-            ["scenario", "outage", "pos_e_m\nAWV", "pos_e_m\nSR-AWV", "roll_deg\nAWV", "roll_deg\nSR-AWV"]
+            ["scenario", "outage", "pos_e_m AWV", "pos_e_m SR-AWV", "roll_deg AWV", "roll_deg SR-AWV"]
         );
         assert_eq!(rows[1], ["I", "1", "–", "+0.96 ± 0.50 (1.96)", "–", "+0.96 ± 0.50 (1.96)"]);
         assert_eq!(rows[4][..4], ["II", "2", "-75.00 ± 0.50 (76.00)", ""]);

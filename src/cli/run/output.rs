@@ -96,13 +96,13 @@ pub(crate) fn text(summary: &Summary) -> String {
 fn outage_table(outages: &[OutageSummary]) -> String {
     let head = [
         "outage",
-        "horizontal error (m)\np50",
-        "\np95",
-        "\nmax",
-        "mean ASEE\npos_e_m",
-        "\nroll_deg",
-        "RMSE at the end\npos_e_m",
-        "\nroll_deg",
+        "horizontal p50 (m)",
+        "p95",
+        "max",
+        "ASEE pos_e_m",
+        "roll_deg",
+        "RMSE pos_e_m",
+        "roll_deg",
     ];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for o in outages {
