@@ -19,6 +19,7 @@ mod recordings;
 mod run;
 mod schema;
 mod synthesize;
+mod trajectory;
 mod tuning;
 mod wv;
 
@@ -45,6 +46,7 @@ enum Command {
     Wv(wv::Args),
     Calibrate(calibrate::Args),
     Synthesize(synthesize::Args),
+    Trajectory(trajectory::Args),
     Run(run::Args),
     Compare(compare::Args),
     Efficiency(efficiency::Args),
@@ -62,6 +64,7 @@ impl Command {
             Self::Wv(args) => wv::run(&args, session),
             Self::Calibrate(args) => calibrate::run(&args, session),
             Self::Synthesize(args) => synthesize::run(&args, session),
+            Self::Trajectory(args) => trajectory::run(&args, session),
             Self::Run(args) => run::run(&args, session),
             Self::Compare(args) => compare::run(&args, session),
             Self::Efficiency(args) => efficiency::run(&args, session),

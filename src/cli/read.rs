@@ -12,10 +12,7 @@ use std::path::{Path, PathBuf};
 
 impl From<TrajectoryFileError> for Failure {
     fn from(e: TrajectoryFileError) -> Self {
-        let failure = match &e {
-            TrajectoryFileError::Io { .. } => Self::could_not(&e),
-            _ => Self::input(&e),
-        };
+        let failure = if e.is_content() { Self::input(&e) } else { Self::could_not(&e) };
         failure.maybe_hint(e.hint())
     }
 }

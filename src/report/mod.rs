@@ -13,6 +13,7 @@ mod run_directory;
 mod sample;
 mod svg;
 mod tables;
+mod trajectory;
 
 pub use comparison::{CandidateResult, ComparisonFile, Label, table_rows};
 pub use curves::{
@@ -24,3 +25,4 @@ pub use fits::{FitEntry, FitsFile, describe};
 pub use manifest::{Input, Manifest, ModelNote};
 pub use run_directory::{OutputFile, RUN_FILES, json, run_directory};
 pub use tables::{TableError, epochs_csv, parse_epochs, parse_runs, runs_csv};
+pub use trajectory::{TrajectorySeries, trajectory_svg};

@@ -33,12 +33,12 @@ pub(super) struct Plot {
     pub(super) lines: Vec<Line>,
 }
 
-const WIDTH: f64 = 860.0;
-const HEIGHT: f64 = 210.0;
-const LEFT: f64 = 62.0;
-const RIGHT: f64 = 12.0;
-const TOP: f64 = 28.0;
-const BOTTOM: f64 = 34.0;
+pub(super) const WIDTH: f64 = 860.0;
+pub(super) const HEIGHT: f64 = 210.0;
+pub(super) const LEFT: f64 = 62.0;
+pub(super) const RIGHT: f64 = 12.0;
+pub(super) const TOP: f64 = 28.0;
+pub(super) const BOTTOM: f64 = 34.0;
 /// More points than this a line add nothing to see.
 const MAX_POINTS: usize = 2000;
 
@@ -64,20 +64,28 @@ impl Frame {
 impl Plot {
     /// The panel as an `<svg>` element.
     pub(super) fn render(&self) -> String {
-        let Some(frame) = self.frame() else {
-            return format!("<p>{}: nothing to show.</p>\n", escape(&self.title));
-        };
-        let mut svg = format!(
-            "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{}\">\n",
-            escape(&self.title)
-        );
+        let title = escape(&self.title);
+        match self.inside() {
+            None => format!("<p>{title}: nothing to show.</p>\n"),
+            Some(inside) => {
+                format!(
+                    "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"{title}\">\n{inside}</svg>\n"
+                )
+            }
+        }
+    }
+
+    /// What the panel shows, [`WIDTH`] by [`HEIGHT`]; nothing without a point to show.
+    pub(super) fn inside(&self) -> Option<String> {
+        let frame = self.frame()?;
+        let mut svg = String::new();
         self.background(&frame, &mut svg);
         axes(&frame, &mut svg);
         for line in &self.lines {
             path(line, &frame, &mut svg);
         }
         self.legend(&mut svg);
-        svg + "</svg>\n"
+        Some(svg)
     }
 
     fn frame(&self) -> Option<Frame> {
@@ -139,7 +147,7 @@ fn axes(frame: &Frame, svg: &mut String) {
     let _ = writeln!(svg, "<path class=\"axis\" d=\"M{LEFT} {TOP}V{bottom}H{:.1}\"/>", WIDTH - RIGHT);
 }
 
-fn tick_label(value: f64) -> String {
+pub(super) fn tick_label(value: f64) -> String {
     let rounded = (value * 1e9).round() / 1e9;
     if rounded.abs() >= 1e-4 && rounded.abs() < 1e6 || rounded == 0.0 {
         format!("{rounded}")
@@ -149,7 +157,7 @@ fn tick_label(value: f64) -> String {
 }
 
 /// Round values inside a range: about six of them; on a log scale 1, 2 and 5 of each decade, or decades.
-fn ticks((low, high): (f64, f64), scale: Scale) -> Vec<f64> {
+pub(super) fn ticks((low, high): (f64, f64), scale: Scale) -> Vec<f64> {
     match scale {
         Scale::Linear => {
             let raw = (high - low) / 6.0;
@@ -199,7 +207,7 @@ fn thinned(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     points.chunks(bucket).flat_map(extremes).collect()
 }
 
-fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+pub(super) fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     values.fold(None, |range, v| {
         let (low, high) = range.unwrap_or((v, v));
         Some((low.min(v), high.max(v)))
@@ -213,7 +221,7 @@ fn rect(svg: &mut String, class: &str, (x, y): (f64, f64), (w, h): (f64, f64)) {
     );
 }
 
-fn text(svg: &mut String, class: &str, (x, y): (f64, f64), anchor: &str, words: &str) {
+pub(super) fn text(svg: &mut String, class: &str, (x, y): (f64, f64), anchor: &str, words: &str) {
     let _ = writeln!(
         svg,
         "<text class=\"{class}\" x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\">{}</text>",

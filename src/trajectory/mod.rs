@@ -4,6 +4,7 @@
 //! Everything a sensor could measure follows from it by differentiation, so the ideal IMU and the
 //! reference agree to rounding, whatever the samples were.
 
+pub mod import;
 pub mod plausibility;
 pub mod profile;
 mod spline;

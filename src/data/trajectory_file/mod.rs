@@ -2,13 +2,14 @@
 
 mod columns;
 mod error;
+mod imports;
 mod profile;
 mod samples;
 mod table;
 mod write;
 
 pub use error::TrajectoryFileError;
-pub use write::{Rows, write_csv};
+pub use write::{Rows, write_csv, write_rows};
 
 use crate::trajectory::Trajectory;
 use std::fmt;
@@ -42,12 +43,15 @@ impl fmt::Display for Warning {
     }
 }
 
-const KNOWN: &str = ".toml (motion profile), .csv, .tsv or .txt (also .gz)";
+const KNOWN: &str = ".toml (motion profile), .csv, .tsv, .txt, .nav (KF-GINS), .tum or .gpx (also .gz)";
 
-/// Reads a trajectory: a motion profile (`.toml`), or a table with a header (`.csv`, `.tsv`, `.txt`, also
-/// `.gz`) whose columns are `t_s`, `lat_deg`, `lon_deg`, `h_m` or `n_m`, `e_m`, `d_m` (in the plane that
-/// touches the Earth at the origin), `roll_deg`, `pitch_deg`, `yaw_deg`. Columns `v_n_m_s`, `v_e_m_s`,
-/// `v_d_m_s` are compared with the positions. Without attitude, heading and pitch follow the path.
+/// Reads a trajectory: a motion profile (`.toml`), or a table with a header (`.csv`, `.tsv`, `.txt`) whose columns
+/// are `t_s`, `lat_deg`, `lon_deg`, `h_m` or `n_m`, `e_m`, `d_m` (in the plane that touches the Earth at the
+/// origin), `roll_deg`, `pitch_deg`, `yaw_deg`. Columns `v_n_m_s`, `v_e_m_s`, `v_d_m_s` are compared with the
+/// positions. Without attitude, heading and pitch follow the path.
+///
+/// Of other tools: KF-GINS results (`.nav`), TUM (`.tum`), GPX (`.gpx`), motion definitions of gnss-ins-sim
+/// (`.csv`, known by their first line). All but profiles may be packed (`.gz`).
 ///
 /// # Errors
 /// Whatever is wrong with the file, with its line.
@@ -55,11 +59,18 @@ pub fn load(path: &Path, options: &Options) -> Result<(Trajectory, Vec<Warning>)
     let name = path.display().to_string();
     let lower = name.to_lowercase();
     let plain = lower.strip_suffix(".gz").unwrap_or(&lower);
+    let text = || table::text(path);
     match plain.rsplit_once('.').map_or("", |(_, ending)| ending) {
         "toml" => Ok((profile::load(path)?, Vec::new())),
+        "nav" => imports::kf_gins(&name, &text()?, options),
+        "tum" => imports::tum(&name, &text()?, options),
+        "gpx" => imports::gpx(&name, &text()?),
         "csv" | "tsv" | "txt" => {
-            let table = table::Table::read(&name, table::open(path)?, None)?;
-            samples::trajectory(&table, options)
+            let text = text()?;
+            if imports::is_motion_definition(&text) {
+                return imports::motion_definition(&name, &text);
+            }
+            samples::trajectory(&table::Table::read(&name, text.as_bytes(), None)?, options)
         }
         _ => Err(TrajectoryFileError::Ending { path: name, known: KNOWN }),
     }

@@ -26,8 +26,8 @@ pub(super) fn trajectory(table: &Table, options: &Options) -> Result<(Trajectory
     check_ranges(table, &columns)?;
     let mut doubts = Doubts { path: &table.path, found: Vec::new() };
     doubts.ignored(&columns.ignored);
-    doubts.steps(table, &columns);
     let mut samples = samples(table, &columns, options)?;
+    doubts.steps(&samples, table);
     check_jumps(table, &samples)?;
     if columns.has(Yaw) {
         let trajectory = build(table, &samples)?;
@@ -174,10 +174,9 @@ impl Doubts<'_> {
     }
 
     /// Long steps, where the curve between rows is a guess, and gaps.
-    fn steps(&mut self, table: &Table, columns: &Columns) {
-        let time = |i: usize| columns.value(Time, &table.rows[i].1);
-        let mut steps: Vec<(f64, usize)> =
-            (1..table.rows.len()).map(|i| (time(i) - time(i - 1), i)).collect();
+    pub(super) fn steps(&mut self, samples: &[TrajectorySample], table: &Table) {
+        let time = |i: usize| samples[i].t_s;
+        let mut steps: Vec<(f64, usize)> = (1..samples.len()).map(|i| (time(i) - time(i - 1), i)).collect();
         steps.sort_by(|a, b| a.0.total_cmp(&b.0));
         let Some(&(median, _)) = steps.get(steps.len() / 2) else { return };
         let gaps = steps.iter().filter(|(s, _)| *s > LONG_STEP_S.max(1.5 * median)).count();

@@ -39,15 +39,8 @@ impl Table {
     /// Reads a table. Without `columns` its first line that is no comment names them; with them it has no
     /// header and its cells stand between blanks.
     pub(super) fn read(path: &str, reader: impl BufRead, columns: Option<&[&str]>) -> Result<Self, Error> {
-        let names = columns.map(|c| c.iter().map(|&name| name.to_owned()).collect());
         let mut separator = if columns.is_some() { ' ' } else { ',' };
-        let mut table = Self {
-            path: path.to_owned(),
-            header_line: 0,
-            columns: names.unwrap_or_default(),
-            comments: Vec::new(),
-            rows: Vec::new(),
-        };
+        let mut table = Self::of_columns(path, columns.unwrap_or_default());
         for (index, line) in reader.lines().enumerate() {
             let number = index as u64 + 1;
             let line = line.map_err(|source| Error::Io { path: path.to_owned(), source })?;
@@ -63,6 +56,12 @@ impl Table {
             }
         }
         if table.rows.is_empty() { Err(Error::Empty { path: path.to_owned() }) } else { Ok(table) }
+    }
+
+    /// A table of these columns, without rows yet.
+    pub(super) fn of_columns(path: &str, columns: &[&str]) -> Self {
+        let columns = columns.iter().map(|&name| name.to_owned()).collect();
+        Self { path: path.to_owned(), header_line: 0, columns, comments: Vec::new(), rows: Vec::new() }
     }
 
     fn header(&mut self, line: u64, cells: &[&str]) -> Result<(), Error> {

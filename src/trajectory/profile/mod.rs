@@ -11,7 +11,8 @@ use super::{Trajectory, TrajectorySample};
 use crate::earth::radii;
 use crate::frames::RollPitchYaw;
 use crate::units::{DEG, STANDARD_GRAVITY};
-use piece::{Motion, Piece, Shape};
+pub(super) use piece::Shape;
+use piece::{Motion, Piece};
 
 pub use waypoints::{Place, Waypoint};
 

@@ -5,13 +5,13 @@
 /// quintic smooth step, stays, and falls likewise. Value, rate, and the rate's first two derivatives are
 /// continuous; outside [0, 1] nothing changes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Shape {
+pub(in crate::trajectory) struct Shape {
     /// Share of the whole that each ramp takes, in (0, 1/2].
     ramp: f64,
 }
 
 impl Shape {
-    pub(super) fn new(ramp: f64) -> Self {
+    pub(in crate::trajectory) fn new(ramp: f64) -> Self {
         Self { ramp: ramp.min(0.5) }
     }
 
@@ -27,7 +27,7 @@ impl Shape {
     }
 
     /// The change so far: the integral of the rate.
-    pub(super) fn value(self, x: f64) -> f64 {
+    pub(in crate::trajectory) fn value(self, x: f64) -> f64 {
         if x > 0.5 {
             return 1.0 - self.value(1.0 - x);
         }

@@ -1,0 +1,86 @@
+//! `nav-sim trajectory`: reference trajectories.
+
+mod check;
+mod plot;
+mod write;
+
+use super::{Failure, Session};
+use nav_sim::data::trajectory_file::{Options, load};
+use nav_sim::trajectory::Trajectory;
+use nav_sim::units::DEG;
+use std::path::{Path, PathBuf};
+
+/// Make, check, convert and draw reference trajectories
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim trajectory check trajectories/land_vehicle.toml
+  nav-sim trajectory generate trajectories/fixed_wing.toml --rate-hz 10 -o flight.csv
+  nav-sim trajectory plot trajectories/land_vehicle.toml --outage 300:390 --outage 700:790 -o drive.svg")]
+pub(crate) struct Args {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(clap::Subcommand, Debug)]
+enum Command {
+    Generate(write::GenerateArgs),
+    Check(check::Args),
+    Convert(write::ConvertArgs),
+    Plot(plot::Args),
+}
+
+/// The trajectory of a command.
+#[derive(clap::Args, Debug)]
+struct Source {
+    /// Motion profile (.toml) or table (.csv, .tsv, .txt, also .gz)
+    #[arg(value_name = "TRAJECTORY")]
+    path: PathBuf,
+    /// Origin of local coordinates, where the file does not say it: latitude, longitude, height
+    #[arg(long, value_name = "LAT_DEG,LON_DEG,H_M", value_parser = origin, allow_hyphen_values = true)]
+    origin: Option<Origin>,
+}
+
+impl Source {
+    /// Reads it; what is doubtful about it is said and handed back.
+    fn read(&self, session: &Session) -> Result<(Trajectory, Vec<String>), Failure> {
+        let options = Options { origin: self.origin.map(|o| o.0) };
+        let (trajectory, warnings) = load(&self.path, &options)?;
+        let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+        warnings.iter().for_each(|w| session.printer.warn(w));
+        Ok((trajectory, warnings))
+    }
+
+    /// Name of the file.
+    fn name(&self) -> String {
+        self.path.display().to_string()
+    }
+}
+
+/// Latitude, longitude (rad), height (m).
+#[derive(Debug, Clone, Copy)]
+struct Origin([f64; 3]);
+
+fn origin(text: &str) -> Result<Origin, String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|x| x.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        Some(&[lat, lon, h]) if lat.abs() <= 89.9 && lon.abs() <= 360.0 && h.is_finite() => {
+            Ok(Origin([lat * DEG, lon * DEG, h]))
+        }
+        _ => Err("not LAT_DEG,LON_DEG,H_M with a latitude within ±89.9".into()),
+    }
+}
+
+pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    match &args.command {
+        Command::Generate(args) => write::generate(args, session),
+        Command::Check(args) => check::run(args, session),
+        Command::Convert(args) => write::convert(args, session),
+        Command::Plot(args) => plot::run(args, session),
+    }
+}
+
+/// Says where an output is.
+fn wrote(path: &Path, session: &Session) {
+    session.printer.say(&format!("wrote {}", path.display()));
+}

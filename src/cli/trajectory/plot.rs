@@ -1,0 +1,69 @@
+//! `nav-sim trajectory plot`.
+
+use super::{Source, wrote};
+use crate::cli::{Failure, Session};
+use nav_sim::data::atomic;
+use nav_sim::earth::ned_difference;
+use nav_sim::frames::RollPitchYaw;
+use nav_sim::report::{TrajectorySeries, trajectory_svg};
+use nav_sim::sensors::outage::Outage;
+use nav_sim::trajectory::Trajectory;
+use nav_sim::units::DEG;
+use std::path::PathBuf;
+
+/// Draw a trajectory: map, height, speed, attitude, outages marked
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim trajectory plot trajectories/land_vehicle.toml -o drive.svg
+  nav-sim trajectory plot trajectories/land_vehicle.toml --outage 300:390 --outage 700:790 -o drive.svg
+  nav-sim trajectory plot trajectories/fixed_wing.toml -o flight.svg")]
+pub(super) struct Args {
+    #[command(flatten)]
+    source: Source,
+    /// A stretch without GNSS to mark, in seconds (repeatable)
+    #[arg(long = "outage", value_name = "START:END", value_parser = outage)]
+    outages: Vec<Outage>,
+    /// SVG to write
+    #[arg(long, short, value_name = "FILE")]
+    out: PathBuf,
+}
+
+fn outage(text: &str) -> Result<Outage, String> {
+    let number = |x: &str| x.trim().parse::<f64>().ok();
+    let pair = text.split_once(':').and_then(|(start, end)| Some((number(start)?, number(end)?)));
+    let (start_s, end_s) = pair.ok_or("not START:END in seconds")?;
+    let outage = Outage { start_s, end_s };
+    outage.validate().map(|()| outage).map_err(|e| e.to_string())
+}
+
+/// Instants drawn: more do not show.
+const INSTANTS: u32 = 4000;
+
+pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    atomic::guard_inputs(&args.out, [args.source.path.as_path()])?;
+    let (trajectory, _) = args.source.read(session)?;
+    let outages: Vec<_> = args.outages.iter().map(|o| (o.start_s, o.end_s)).collect();
+    let name = args.source.path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+    atomic::write(&args.out, trajectory_svg(&name, &series(&trajectory), &outages))?;
+    wrote(&args.out, session);
+    Ok(())
+}
+
+fn series(trajectory: &Trajectory) -> TrajectorySeries {
+    let start = trajectory.state(trajectory.start_s());
+    let step = (trajectory.end_s() - trajectory.start_s()) / f64::from(INSTANTS);
+    let mut series = TrajectorySeries::default();
+    for k in 0..=INSTANTS {
+        let t_s = trajectory.start_s() + step * f64::from(k);
+        let state = trajectory.state(t_s);
+        let moved = ned_difference(&start, state.lat, state.lon, state.h);
+        let rpy = RollPitchYaw::from_quat(state.q_b_n);
+        series.t_s.push(t_s);
+        series.north_east_m.push([moved.x, moved.y]);
+        series.height_m.push(state.h);
+        series.speed_m_s.push(state.v_n.length());
+        series.rpy_deg.push([rpy.roll, rpy.pitch, rpy.yaw].map(|a| a / DEG));
+    }
+    series
+}

@@ -1,0 +1,73 @@
+//! `nav-sim trajectory generate` and `convert`.
+
+use super::{Source, wrote};
+use crate::cli::{Failure, Session, parse};
+use nav_sim::data::atomic::guard_inputs;
+use nav_sim::data::trajectory_file::{Rows, write_csv, write_rows};
+use std::path::PathBuf;
+
+/// Write a motion profile as a table of evenly spaced rows
+///
+/// Columns: time, latitude, longitude, height, velocity north, east, down, roll, pitch, yaw. Numbers have
+/// the digits that read back to them.
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim trajectory generate trajectories/land_vehicle.toml -o drive.csv
+  nav-sim trajectory generate trajectories/fixed_wing.toml --rate-hz 10 -o flight.csv.gz
+  nav-sim trajectory generate trajectories/figure_eight.toml --rate-hz 1")]
+pub(super) struct GenerateArgs {
+    #[command(flatten)]
+    source: Source,
+    /// Rows a second
+    #[arg(long, value_name = "HZ", default_value_t = 100.0, value_parser = parse::positive)]
+    rate_hz: f64,
+    /// Table to write (.csv or .csv.gz); without it, standard output
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Write a trajectory file of any kind as our table
+///
+/// The rows are those of the input, or evenly spaced ones with --rate-hz. Of local coordinates come
+/// latitude, longitude and height; of a path without attitude, heading and pitch along it.
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim trajectory convert trajectories/figure_eight.toml -o eight.csv
+  nav-sim trajectory convert trajectories/fixed_wing.toml --rate-hz 20 -o flight.csv.gz
+  nav-sim trajectory convert trajectories/land_vehicle.toml --rate-hz 1 -o drive.csv")]
+pub(super) struct ConvertArgs {
+    #[command(flatten)]
+    source: Source,
+    /// Rows a second (default: the rows of the input)
+    #[arg(long, value_name = "HZ", value_parser = parse::positive)]
+    rate_hz: Option<f64>,
+    /// Table to write (.csv or .csv.gz)
+    #[arg(long, short, value_name = "FILE")]
+    out: PathBuf,
+}
+
+pub(super) fn generate(args: &GenerateArgs, session: &Session) -> Result<(), Failure> {
+    let rows = Rows::Rate(args.rate_hz);
+    if let Some(out) = &args.out {
+        return write(&args.source, out, rows, session);
+    }
+    let (trajectory, _) = args.source.read(session)?;
+    let mut text = Vec::new();
+    write_rows(&mut text, &trajectory, rows).map_err(Failure::could_not)?;
+    session.printer.result(String::from_utf8_lossy(&text).trim_end());
+    Ok(())
+}
+
+pub(super) fn convert(args: &ConvertArgs, session: &Session) -> Result<(), Failure> {
+    write(&args.source, &args.out, args.rate_hz.map_or(Rows::Knots, Rows::Rate), session)
+}
+
+fn write(source: &Source, out: &PathBuf, rows: Rows, session: &Session) -> Result<(), Failure> {
+    guard_inputs(out, [source.path.as_path()])?;
+    let (trajectory, _) = source.read(session)?;
+    write_csv(out, &trajectory, rows)?;
+    wrote(out, session);
+    Ok(())
+}
