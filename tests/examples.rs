@@ -15,11 +15,15 @@ mod calibrate;
 #[path = "../examples/03_ideal_imu.rs"]
 mod ideal_imu;
 
+#[path = "../examples/04_monte_carlo.rs"]
+mod monte_carlo;
+
 #[test]
 fn examples_run() {
     robust_wavelet_variance::main().unwrap();
     calibrate::main().unwrap();
     ideal_imu::main().unwrap();
+    monte_carlo::main().unwrap();
 }
 
 #[test]

@@ -190,4 +190,24 @@ fn a_recording_that_is_too_short_is_refused_by_how_much() {
     let ran = nav_sim(place.path(), "run drive.toml imu.toml --static static.csv --runs 1 --seed 1 -o out");
     assert_eq!(ran.code, 2, "{}", ran.stderr);
     assert!(ran.stderr.contains("lasts 40 s, the trajectory 60 s: 20 s too short"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("hint: each run takes a window as long as the trajectory"), "{}", ran.stderr);
+}
+
+/// Whatever ends a run before its time, nothing is left that looks like one.
+#[test]
+fn a_run_that_is_killed_leaves_nothing() {
+    let place = place();
+    let names = || fs::read_dir(place.path()).unwrap().map(|e| e.unwrap().file_name()).collect::<Vec<_>>();
+    let before = names();
+    let command = "run drive.toml imu.toml --runs 1000000 --outage none --seed 1 -q -o out";
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_nav-sim"))
+        .args(command.split_whitespace())
+        .current_dir(&place)
+        .spawn()
+        .unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    assert!(child.try_wait().unwrap().is_none(), "a million runs in half a second?");
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert_eq!(names(), before);
 }

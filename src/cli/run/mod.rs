@@ -13,8 +13,9 @@ use nav_sim::monte_carlo;
 use nav_sim::noise::{Model, reduction};
 use nav_sim::report::{self, Manifest};
 use nav_sim::scenario::{Method, Scenario};
+use nav_sim::sensors::imu::TruthError;
 use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::{Experiment, RunResult};
+use nav_sim::simulation::{Experiment, ExperimentError, RunResult};
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -106,7 +107,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let seed = session.seed(scenario.run.seed);
     let span = (inputs.trajectory.start_s(), inputs.trajectory.end_s());
     let outages = outages(&scenario, span, seed, session)?;
-    let directory = output::open(&args.out, &inputs.files)?;
+    output::try_open(&args.out, &inputs.files)?;
     let unusable = |e| Failure::input(format!("{}: {e}", args.model.display()));
     let belief = belief(&scenario, &inputs.model, &outages).map_err(unusable)?;
     let experiment = Experiment {
@@ -124,7 +125,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     };
     let (results, wall_s) = simulate(&experiment, scenario.run.runs, session)?;
     let manifest = manifest(scenario, &outages, seed, inputs.files.clone(), inputs.note.clone(), session);
-    let summary = write(&results[0], &Manifest { wall_s, ..manifest }, directory)?;
+    let summary = write(&results[0], &Manifest { wall_s, ..manifest }, &args.out)?;
     let shown = if session.json() { report::json(&summary) } else { text(&summary) };
     session.printer.result(shown.trim_end());
     session.printer.say(&format!("wrote {}", args.out.display()));
@@ -201,6 +202,20 @@ pub(super) fn belief(scenario: &Scenario, model: &Model, outages: &[Outage]) -> 
     Ok(belief)
 }
 
+/// An experiment that does not fit together.
+fn impossible(e: ExperimentError) -> Failure {
+    let failure = Failure::input(&e);
+    match e {
+        ExperimentError::Truth(TruthError::TooShort { .. }) => {
+            failure.hint("each run takes a window as long as the trajectory: record for longer")
+        }
+        ExperimentError::Truth(TruthError::Rate { rate_hz, .. }) => {
+            failure.hint(format!("set rate_hz = {rate_hz} in the [imu] section of a --scenario file"))
+        }
+        _ => failure,
+    }
+}
+
 /// All runs, and how long they took (s).
 pub(super) fn simulate(
     experiment: &Experiment<'_>,
@@ -209,6 +224,6 @@ pub(super) fn simulate(
 ) -> Result<(Vec<RunResult>, f64), Failure> {
     let start = Instant::now();
     let progress = session.progress("runs", runs);
-    let results = monte_carlo::run(experiment, runs, &|n| progress.add(n)).map_err(Failure::input)?;
+    let results = monte_carlo::run(experiment, runs, &|n| progress.add(n)).map_err(impossible)?;
     Ok((results, start.elapsed().as_secs_f64()))
 }

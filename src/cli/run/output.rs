@@ -36,22 +36,21 @@ pub(crate) fn manifest(
     }
 }
 
-/// Makes room for a run directory before the long computation; none of its files may be an input.
-pub(crate) fn open(path: &Path, inputs: &[Input]) -> Result<AtomicDir, Failure> {
+/// Whether a run directory can be made, found out before the long computation; none of its files may be an
+/// input. Nothing is left: a run that is interrupted leaves no trace.
+pub(crate) fn try_open(path: &Path, inputs: &[Input]) -> Result<(), Failure> {
     for name in report::RUN_FILES {
         atomic::guard_inputs(&path.join(name), inputs.iter().map(|i| Path::new(&i.path)))?;
     }
-    Ok(AtomicDir::create(path)?)
+    drop(AtomicDir::create(path)?);
+    Ok(())
 }
 
 /// Writes a run directory.
-pub(crate) fn write(
-    result: &RunResult,
-    manifest: &Manifest,
-    mut directory: AtomicDir,
-) -> Result<Summary, Failure> {
+pub(crate) fn write(result: &RunResult, manifest: &Manifest, path: &Path) -> Result<Summary, Failure> {
     let epochs = metrics::epochs(&result.epochs);
     let summary = Summary::of(result, &epochs, manifest.seed, manifest.wall_s);
+    let mut directory = AtomicDir::create(path)?;
     for file in report::run_directory(result, &epochs, &summary, manifest) {
         directory.write(file.name, file.contents)?;
     }

@@ -1,0 +1,60 @@
+//! Two filters on the same noise: one believes the model that made it, the other that the gyroscopes' bias
+//! is ten times as steady. What they claim, and what is true.
+#![expect(clippy::print_stdout, reason = "an example shows its results")]
+
+use nav_sim::data::trajectory_file::{Options, load};
+use nav_sim::earth::GravityModel;
+use nav_sim::ekf::{Belief, FilterStates, InitialSettings};
+use nav_sim::metrics::{Summary, epochs};
+use nav_sim::monte_carlo;
+use nav_sim::noise::{Ar1, Composite, Model, Process, White};
+use nav_sim::sensors::gnss::GnssSettings;
+use nav_sim::sensors::imu::Truth;
+use nav_sim::sensors::outage::Outage;
+use nav_sim::simulation::Experiment;
+use std::path::Path;
+
+fn model(gyro_bias_sigma: f64) -> Result<Model, Box<dyn std::error::Error>> {
+    let phi = 0.9999_f64; // a correlation time of 100 s at 100 Hz
+    let bias = |sigma: f64| Ar1::new(phi, sigma * sigma * (1.0 - phi * phi)).map(Process::Ar1);
+    let accel = Composite::new(vec![Process::White(White::new(1e-4)?), bias(5e-3)?]);
+    let gyro = Composite::new(vec![Process::White(White::new(1e-6)?), bias(gyro_bias_sigma)?]);
+    Ok(Model::pooled(100.0, &accel, &gyro))
+}
+
+pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("trajectories/land_vehicle.toml");
+    let (trajectory, _) = load(&path, &Options::default())?;
+    let truth = model(1e-4)?;
+    let belief = |m: &Model| Belief::new(m, FilterStates::Full, 1.0, 800.0);
+    let beliefs = [belief(&truth)?, belief(&model(1e-5)?)?];
+    let experiment = Experiment {
+        trajectory: &trajectory,
+        rate_hz: 100.0,
+        gravity: GravityModel::Wgs84,
+        truth: Truth::Model(&truth),
+        beliefs: &beliefs,
+        gnss: &GnssSettings::default(),
+        initial: &InitialSettings::default(),
+        outages: &Outage::PAPER,
+        seed: 1,
+        scenario: "",
+        coverage_level: 0.95,
+    };
+    let results = monte_carlo::run(&experiment, 16, &|_| {})?;
+    for (name, result) in ["right", "optimist"].iter().zip(&results) {
+        let summary = Summary::of(result, &epochs(&result.epochs), 1, f64::NAN);
+        let end = summary.outages[0].horizontal_error_end_m;
+        println!(
+            "{name:8}: NEES {:5.2} of {}, coverage {:.2} of 0.95",
+            summary.nees.mean, 9, summary.coverage.mean
+        );
+        println!("          after 90 s without GNSS {:.0} m (median), {:.0} m (95 %)", end.p50, end.p95);
+    }
+    let nees = |i: usize| {
+        let all = epochs(&results[i].epochs);
+        all.iter().map(|e| e.nees.value).sum::<f64>() / all.len() as f64
+    };
+    assert!(nees(0) < 11.0 && nees(1) > 2.0 * nees(0));
+    Ok(())
+}
