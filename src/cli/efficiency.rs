@@ -21,9 +21,9 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
-  nav-sim efficiency examples/paper_fig2.toml --sets 4 --samples 8192 --seed 1 -o quick
-  nav-sim efficiency examples/paper_fig2.toml --sets 2 --samples 16384 --seed 1 --sensitivity -o curves
-  nav-sim efficiency examples/paper_fig2.toml --sets 6 --samples 8192 --seed 1 -o quick --format json")]
+  nav-sim efficiency examples/paper_fig2.toml --sets 4 --samples 8192 -o quick
+  nav-sim efficiency examples/paper_fig2.toml --sets 2 --samples 8192 --sensitivity -o curves
+  nav-sim efficiency examples/paper_fig2.toml --sets 6 --samples 8192 -o quick --format json")]
 pub(crate) struct Args {
     /// The study (TOML)
     #[arg(value_name = "STUDY")]
