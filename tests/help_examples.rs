@@ -21,11 +21,14 @@ fn subcommands(help: &str) -> Vec<String> {
     section.filter(|l| !l.starts_with("   ")).filter_map(name).filter(|n| n != "help").collect()
 }
 
-/// All commands that can be run, as paths of names.
+/// All commands below one, as paths of names.
 fn commands(path: &[String]) -> Vec<Vec<String>> {
-    let below = subcommands(&help(path));
-    let deeper = |name: String| commands(&[path, &[name]].concat());
-    if below.is_empty() { vec![path.to_vec()] } else { below.into_iter().flat_map(deeper).collect() }
+    let deeper = |name: String| {
+        let path = [path, &[name]].concat();
+        let below = commands(&path);
+        std::iter::once(path).chain(below)
+    };
+    subcommands(&help(path)).into_iter().flat_map(deeper).collect()
 }
 
 /// The lines under "Examples:", which must come first.
