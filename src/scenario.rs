@@ -200,7 +200,6 @@ impl RunSettings {
 }
 
 #[cfg(test)]
-#[expect(clippy::float_cmp, reason = "values read, not computed")]
 mod tests {
     use super::*;
 

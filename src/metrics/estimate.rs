@@ -98,7 +98,6 @@ fn order_statistic_interval(sorted: &[f64], p: f64) -> (Option<f64>, Option<f64>
 }
 
 #[cfg(test)]
-#[expect(clippy::float_cmp, reason = "small integers are exact")]
 mod tests {
     use super::*;
 

@@ -73,7 +73,6 @@ fn sorted(values: impl Iterator<Item = f64>) -> Vec<f64> {
 }
 
 #[cfg(test)]
-#[expect(clippy::float_cmp, reason = "small integers are exact")]
 mod tests {
     use super::*;
     use crate::simulation::RunRecord;

@@ -139,9 +139,9 @@ impl Fit {
         }
         let determinant = aa * bb - ab * ab;
         let (mut x, mut y) = ((a1 * bb - b1 * ab) / determinant, (b1 * aa - a1 * ab) / determinant);
-        if !(x > 0.0) {
+        if x.is_nan() || x <= 0.0 {
             (x, y) = (0.0, b1 / bb);
-        } else if !(y > 0.0) {
+        } else if y.is_nan() || y <= 0.0 {
             (x, y) = (a1 / aa, 0.0);
         }
         [x.max(1e-9 / a_max).ln(), y.max(1e-9 / b_max).ln(), ln_kappa]

@@ -235,7 +235,6 @@ pub(super) fn escape(text: &str) -> String {
 }
 
 #[cfg(test)]
-#[expect(clippy::float_cmp, reason = "round numbers are exact")]
 mod tests {
     use super::*;
 

@@ -212,7 +212,6 @@ impl Table {
 }
 
 #[cfg(test)]
-#[expect(clippy::float_cmp, reason = "what is written reads back exactly")]
 mod tests {
     use super::super::sample;
     use super::*;

@@ -195,7 +195,7 @@ fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, E
         if reference.lat.abs() > MAX_LATITUDE {
             return Err(ExperimentError::Pole { t_s, lat_deg: reference.lat / DEG });
         }
-        let gnss_epoch = sample > 0 && sample % per_fix == 0;
+        let gnss_epoch = sample > 0 && sample.is_multiple_of(per_fix);
         // a nanosecond of slack: sample times are multiples of 1/rate, outage times are typed
         let withheld = experiment.outages.iter().any(|o| o.withholds(t_s + 1e-9));
         Ok(Event {

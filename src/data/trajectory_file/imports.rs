@@ -199,7 +199,7 @@ pub(super) fn motion_definition(path: &str, text: &str) -> Loaded {
             5 => (angles, speeds - v_b),
             _ => return Err(bad_line(path, line.0, format!("command type {} is none of 1 to 5", cells[0]))),
         };
-        if !(duration_s > 0.0) {
+        if duration_s.is_nan() || duration_s <= 0.0 {
             return Err(bad_line(path, line.0, format!("command duration {duration_s} s is not > 0")));
         }
         timed &= cells[0] as i64 == 1;
