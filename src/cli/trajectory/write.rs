@@ -4,7 +4,7 @@ use super::{Source, wrote};
 use crate::cli::{Failure, Session, parse};
 use nav_sim::data::atomic::guard_inputs;
 use nav_sim::data::trajectory_file::{Rows, write_csv, write_rows};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Write a motion profile as a table of evenly spaced rows
 ///
@@ -64,7 +64,7 @@ pub(super) fn convert(args: &ConvertArgs, session: &Session) -> Result<(), Failu
     write(&args.source, &args.out, args.rate_hz.map_or(Rows::Knots, Rows::Rate), session)
 }
 
-fn write(source: &Source, out: &PathBuf, rows: Rows, session: &Session) -> Result<(), Failure> {
+fn write(source: &Source, out: &Path, rows: Rows, session: &Session) -> Result<(), Failure> {
     guard_inputs(out, [source.path.as_path()])?;
     let (trajectory, _) = source.read(session)?;
     write_csv(out, &trajectory, rows)?;
