@@ -1,5 +1,7 @@
 //! The filter's standard deviations against an independent implementation (provenance in tests/truth).
 
+#![allow(clippy::unwrap_used, reason = "a test")]
+
 use glam::DVec3;
 use nav_sim::earth::GravityModel;
 use nav_sim::ekf::{Belief, Ekf, FilterStates, Fix, InitialSettings, advance, settle, update};

@@ -1,6 +1,8 @@
 //! Holds the import rule of the architecture (crate documentation): a module names only modules that
 //! stand above it, and of those only the ones listed here.
 
+#![allow(clippy::unwrap_used, reason = "a test")]
+
 use std::{fs, path::Path};
 
 /// (module, what it may name of the crate besides itself).

@@ -1,6 +1,8 @@
 //! The shipped trajectories are plausible and close: their noise-free IMU samples, mechanised, return to
 //! them. And ideal samples and strapdown agree with independent truth.
 
+#![allow(clippy::unwrap_used, reason = "a test")]
+
 use glam::DVec3;
 use nav_sim::closure::{Bounds, Closure};
 use nav_sim::data::trajectory_file::{Options, load};

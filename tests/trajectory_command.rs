@@ -1,5 +1,7 @@
 //! `nav-sim trajectory`: streams, exit codes, files.
 
+#![allow(clippy::unwrap_used, reason = "a test")]
+
 use assert_cmd::Command;
 use std::path::{Path, PathBuf};
 
