@@ -88,6 +88,11 @@ fn recordings_become_a_model_file_and_its_curves() {
         assert_eq!(file.model.rate_hz.round() as i64, 50);
         let missing: Vec<String> = file.missing.iter().map(ToString::to_string).collect();
         assert_eq!(missing, ["accel.x", "accel.y", "accel.z"], "pooled: one model for the three axes");
+        // Four parameters on each of three axes, each with its interval.
+        assert_eq!(file.intervals.len(), 12);
+        for i in file.intervals {
+            assert!(i.low < i.high && i.low >= 0.0, "{i:?}");
+        }
         assert_eq!(file.provenance.unwrap()["estimator"].as_str(), Some(estimator));
         let text = std::fs::read_to_string(dir.path().join(format!("imu_{estimator}.wv.json"))).unwrap();
         let curves: Value = serde_json::from_str(&text).unwrap();

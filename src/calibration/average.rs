@@ -87,6 +87,14 @@ pub struct Replicate {
     pub robust: Vec<RobustVariance>,
 }
 
+impl Replicate {
+    /// The wavelet variance that an estimator uses, at index level − 1.
+    #[must_use]
+    pub fn value(&self, estimator: Estimator, index: usize) -> f64 {
+        if estimator.is_robust() { self.robust[index].value } else { self.classical[index] }
+    }
+}
+
 /// Why replicates have no average.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum AverageError {
@@ -163,12 +171,8 @@ impl Term {
     fn new(replicate: &Replicate, level: u32, estimator: Estimator, efficiency: f64) -> Self {
         let i = level as usize - 1;
         let eta3 = interval::edof_eta3(replicate.samples, level);
-        let (nu, edof) = if estimator.is_robust() {
-            (replicate.robust[i].value, interval::edof_robust(eta3, efficiency))
-        } else {
-            (replicate.classical[i], eta3)
-        };
-        Self { samples: replicate.samples as f64, nu, edof }
+        let edof = if estimator.is_robust() { interval::edof_robust(eta3, efficiency) } else { eta3 };
+        Self { samples: replicate.samples as f64, nu: replicate.value(estimator, i), edof }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::objective::{Component, Objective, Range, Weighting};
 use super::optimise::Termination;
-use super::search::{Found, search};
+use super::search::{COMBINATIONS, Found, search};
 use super::spec::{Kind, ModelSpec};
 use crate::noise::{
     Ar1, Composite, Drift, GaussMarkov, Ma1, ParameterError, Process, Quantization, RandomWalk, White,
@@ -32,6 +32,8 @@ pub struct Fit {
     pub at_end: Vec<String>,
     /// √Omega_j (nu_j − nu_j(theta)) of each scale; in standard deviations when weighted by edof.
     pub residuals: Vec<f64>,
+    /// Coordinates of the minima found, best first: where the search of a similar curve begins.
+    pub(super) minima: Vec<Vec<f64>>,
 }
 
 /// Why a curve has no fit.
@@ -76,10 +78,35 @@ pub enum FitError {
 /// # Errors
 /// When the curve has fewer scales than the model parameters, or numbers that are no wavelet variances.
 pub fn fit(curve: &Curve, spec: &ModelSpec, rate_hz: f64, weighting: Weighting) -> Result<Fit, FitError> {
+    fit_near(curve, spec, rate_hz, weighting, COMBINATIONS, &[])
+}
+
+/// Combinations tried for a curve that resembles one already fitted.
+const FEW: usize = 300;
+
+/// The same for a curve that resembles one already fitted: a coarser grid, and the minima of that one.
+pub(super) fn refit(
+    curve: &Curve,
+    spec: &ModelSpec,
+    rate_hz: f64,
+    weighting: Weighting,
+    like: &Fit,
+) -> Result<Fit, FitError> {
+    fit_near(curve, spec, rate_hz, weighting, FEW, &like.minima)
+}
+
+fn fit_near(
+    curve: &Curve,
+    spec: &ModelSpec,
+    rate_hz: f64,
+    weighting: Weighting,
+    combinations: usize,
+    known: &[Vec<f64>],
+) -> Result<Fit, FitError> {
     check(curve, spec)?;
     let components = spec.kinds().iter().map(|kind| component(*kind, curve)).collect();
     let objective = Objective::new(curve, weighting, components);
-    let found = search(&objective);
+    let found = search(&objective, combinations, known);
     assemble(&objective, &found, rate_hz)
 }
 
@@ -131,9 +158,25 @@ fn assemble(objective: &Objective, found: &Found, rate_hz: f64) -> Result<Fit, F
         runner_up: found.ends.iter().find(|e| !agreeing(e.cost)).map(|e| e.cost * unit),
         zero: labelled(|t| t.amplitude <= 0.0),
         at_end: labelled(|t| t.amplitude > 0.0 && t.at_end),
+        minima: minima(found),
         residuals: solution.residuals.iter().map(|r| r * objective.length).collect(),
         composite,
     })
+}
+
+/// Minima that are kept.
+const KEPT: usize = 4;
+
+/// The ends that differ, best first.
+fn minima(found: &Found) -> Vec<Vec<f64>> {
+    let mut minima: Vec<Vec<f64>> = Vec::new();
+    for end in &found.ends {
+        let same = |m: &Vec<f64>| m.iter().zip(&end.coordinates).all(|(a, b)| (a - b).abs() < 1e-3);
+        if minima.len() < KEPT && !minima.iter().any(same) {
+            minima.push(end.coordinates.clone());
+        }
+    }
+    minima
 }
 
 /// One process of the result.

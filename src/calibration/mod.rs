@@ -7,16 +7,23 @@
 mod average;
 mod bounded;
 mod fit;
+mod goodness;
+mod inference;
 mod notes;
 mod objective;
 mod optimise;
 mod pipeline;
 mod replicates;
+mod robust_scale;
+mod sampling;
 mod search;
 mod spec;
+mod spread;
 
 pub use average::{AverageError, Estimator, Replicate, Trim, average};
 pub use fit::{Fit, FitError, fit};
+pub use goodness::Goodness;
+pub use inference::{Bootstrap, Inference, ParameterInterval, infer};
 pub use notes::{Share, correlation_time_s, notes, percent, shares};
 pub use objective::Weighting;
 pub use optimise::Termination;

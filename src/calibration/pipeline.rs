@@ -2,6 +2,7 @@
 
 use super::average::{AverageError, Estimator, Trim, average};
 use super::fit::{Fit, FitError, fit};
+use super::inference::Inference;
 use super::notes::notes;
 use super::objective::Weighting;
 use super::replicates::Group;
@@ -39,6 +40,8 @@ pub struct Outcome {
     pub fit: Fit,
     /// Remarks, in words.
     pub notes: Vec<String>,
+    /// Intervals of its parameters and goodness of fit, once [`infer`](super::infer) was asked for them.
+    pub inference: Option<Inference>,
 }
 
 /// Why a group has no model.
@@ -101,5 +104,5 @@ pub fn fit_curve(
     let fit = fit(&curve, &settings.spec, settings.rate_hz, settings.weighting)
         .map_err(|source| CalibrationError::new(group, estimator, source))?;
     let notes = notes(&fit, &curve, estimator, &group.replicates, settings.rate_hz);
-    Ok(Outcome { group: index, estimator, curve, fit, notes })
+    Ok(Outcome { group: index, estimator, curve, fit, notes, inference: None })
 }

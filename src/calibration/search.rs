@@ -10,7 +10,7 @@ use super::optimise::{End, Termination, descend};
 use rayon::prelude::*;
 
 /// Combinations of the grid at most, about.
-const COMBINATIONS: usize = 6000;
+pub(super) const COMBINATIONS: usize = 6000;
 /// Points of one dimension at most.
 const POINTS: usize = 160;
 /// Local minima of the grid to descend from, at most.
@@ -27,17 +27,19 @@ pub(super) struct Found {
     pub(super) combinations: usize,
 }
 
-/// Searches all coordinates.
-pub(super) fn search(objective: &Objective) -> Found {
+/// Searches all coordinates, on a grid of about so many combinations at most and from the `known` minima of
+/// a similar curve.
+pub(super) fn search(objective: &Objective, combinations: usize, known: &[Vec<f64>]) -> Found {
     let dimensions: Vec<(usize, Range)> = objective.shaped().collect();
     if dimensions.is_empty() {
         let cost = objective.solve(&[]).cost();
         let best = End { coordinates: Vec::new(), cost, termination: Termination::Linear };
         return Found { ends: vec![best.clone()], best, combinations: 1 };
     }
-    let grid = Grid::new(objective, &dimensions);
+    let grid = Grid::new(objective, &dimensions, combinations);
     let choices = grid.choices();
-    let starts = grid.starts(&choices);
+    let mut starts = grid.starts(&choices);
+    starts.extend_from_slice(known);
     let mut ends: Vec<End> = starts.par_iter().map(|start| descend(objective, start)).collect();
     ends.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     Found { best: ends[0].clone(), ends, combinations: choices.len() }
@@ -58,8 +60,8 @@ struct Grid<'a> {
 }
 
 impl<'a> Grid<'a> {
-    fn new(objective: &'a Objective, dimensions: &[(usize, Range)]) -> Self {
-        let count = points_per_dimension(dimensions.len());
+    fn new(objective: &'a Objective, dimensions: &[(usize, Range)], combinations: usize) -> Self {
+        let count = points_per_dimension(dimensions.len(), combinations);
         let points: Vec<Vec<f64>> = dimensions.iter().map(|(_, r)| spread(*r, count)).collect();
         let repeats = (0..dimensions.len())
             .map(|d| {
@@ -159,10 +161,10 @@ fn neighbours(choice: &[usize]) -> Vec<Vec<usize>> {
     all
 }
 
-fn points_per_dimension(dimensions: usize) -> usize {
+fn points_per_dimension(dimensions: usize, most: usize) -> usize {
     // n·(n − 1)···/k! combinations of k alike dimensions.
     let combinations = |n: usize| (0..dimensions).fold(1, |c, k| c * (n - k) / (k + 1));
-    (dimensions + 1..=POINTS).take_while(|n| combinations(*n) <= COMBINATIONS).last().unwrap_or(POINTS)
+    (dimensions + 1..=POINTS).take_while(|n| combinations(*n) <= most).last().unwrap_or(dimensions + 1)
 }
 
 fn spread(range: Range, count: usize) -> Vec<f64> {

@@ -4,8 +4,8 @@ use super::recordings::{RecordingArgs, sensor};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, parse, read};
 use nav_sim::calibration::{
-    AverageError, CalibrationError, Cause, Estimator, FitError, Group, ModelSpec, Outcome, Pool, Replicate,
-    Settings, SpecError, Trim, Weighting, calibrate, fit_curve, grouped, replicates,
+    AverageError, Bootstrap, CalibrationError, Cause, Estimator, FitError, Group, ModelSpec, Outcome, Pool,
+    Replicate, Settings, SpecError, Trim, Weighting, calibrate, fit_curve, grouped, infer, replicates,
 };
 use nav_sim::data::atomic;
 use nav_sim::data::curve_file::{self, NamedCurve};
@@ -53,6 +53,9 @@ pub(crate) struct Args {
     /// Which signals are replicates of one another (default: sensor; axes for gmwm and rgmwm)
     #[arg(long, value_enum)]
     pool: Option<PoolArg>,
+    /// Draws of the parametric bootstrap behind intervals and goodness of fit (0: neither)
+    #[arg(long, value_name = "B", default_value_t = 200, value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    bootstrap: u32,
     /// The model file (default: model.toml; none for --curve)
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -154,7 +157,8 @@ fn of_recordings(args: &Args, settings: &mut Settings, session: &Session) -> Res
     drop(progress);
     drop(recordings);
     let groups = grouped(measured, pool);
-    let outcomes = calibrate(&groups, settings).map_err(|e| of_calibration(&e))?;
+    let mut outcomes = calibrate(&groups, settings).map_err(|e| of_calibration(&e))?;
+    bootstrap(args, &groups, &mut outcomes, settings, session);
     let inputs = files.iter().map(|f| read::input("recording", f)).collect::<Result<_, _>>()?;
     let note = note(args, inputs);
     finish(&outputs, &groups, &outcomes, settings, &note, session)
@@ -280,9 +284,26 @@ fn of_curves(args: &Args, path: &Path, settings: &mut Settings, session: &Sessio
         let outcome = fit_curve(&groups, groups.len() - 1, estimator, named.curve, settings);
         outcomes.push(outcome.map_err(|e| of_calibration(&e))?);
     }
+    bootstrap(args, &groups, &mut outcomes, settings, session);
     let input = read::input("curve", path)?;
     let note = note(args, vec![input]);
     finish(&outputs, &groups, &outcomes, settings, &note, session)
+}
+
+/// The seed of a bootstrap without `--seed`: intervals are an answer, the same each time.
+const SEED: u64 = 1;
+
+fn bootstrap(
+    args: &Args,
+    groups: &[Group],
+    outcomes: &mut [Outcome],
+    settings: &Settings,
+    session: &Session,
+) {
+    if args.bootstrap > 0 {
+        let bootstrap = Bootstrap { draws: args.bootstrap as usize, seed: session.seed(Some(SEED)) };
+        infer(groups, outcomes, settings, bootstrap);
+    }
 }
 
 fn note(args: &Args, inputs: Vec<Input>) -> CalibrationNote {

@@ -1,7 +1,10 @@
 //! Fitted models as JSON and as words.
 
 use super::curves::tau_s;
-use crate::calibration::{Estimator, Group, Outcome, Settings, Share, correlation_time_s, percent, shares};
+use crate::calibration::{
+    Estimator, Goodness, Group, Inference, Outcome, ParameterInterval, Settings, Share, correlation_time_s,
+    percent, shares,
+};
 use crate::imu::Sensor;
 use crate::noise::{Composite, Process};
 use crate::units::DEG;
@@ -38,6 +41,12 @@ pub struct FitEntry {
     pub scales: usize,
     /// The processes, with the keys of model files.
     pub processes: Vec<Map<String, Value>>,
+    /// J-test; none without bootstrap.
+    pub goodness: Option<GoodnessEntry>,
+    /// Standard deviation of ln wv of a replicate at each scale: within by theory, between beyond that.
+    pub spread: Vec<SpreadEntry>,
+    /// Draws of the bootstrap.
+    pub bootstrap: usize,
     /// Σ Omega_j (nu_j − nu_j(theta))².
     pub objective: f64,
     /// `converged`, `linear` or `iteration_limit`.
@@ -58,18 +67,59 @@ pub struct FitEntry {
     pub notes: Vec<String>,
 }
 
+/// The J-test of a fit.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GoodnessEntry {
+    /// J, the objective.
+    pub statistic: f64,
+    /// Scales less parameters.
+    pub dof: usize,
+    /// Median of J when the model holds.
+    pub expected: f64,
+    /// Probability of such a J when the model holds.
+    pub p_value: f64,
+}
+
+/// How replicates differ at one scale.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SpreadEntry {
+    /// Scale (s).
+    pub tau_s: f64,
+    /// Standard deviation of ln wv that noise alone makes.
+    pub within: f64,
+    /// Standard deviation beyond that.
+    pub between: f64,
+}
+
 impl FitEntry {
     /// The entry of an outcome of a group.
     #[must_use]
-    pub fn new(group: &Group, outcome: &Outcome) -> Self {
+    pub fn new(group: &Group, outcome: &Outcome, rate_hz: f64) -> Self {
         let fit = &outcome.fit;
+        let inference = outcome.inference.as_ref();
+        let goodness = inference.map(|i| i.goodness);
+        let spread = inference.map_or(&[][..], |i| &i.spread).iter();
         Self {
             sensor: group.sensor.name(),
             axis: group.axis.map_or("all", |a| a.name()),
             estimator: outcome.estimator.name(),
             replicates: group.replicates.len(),
             scales: outcome.curve.levels.len(),
-            processes: fit.composite.processes.iter().map(process_json).collect(),
+            processes: processes_json(outcome),
+            goodness: goodness.map(|Goodness { statistic, dof, expected, p_value }| GoodnessEntry {
+                statistic,
+                dof,
+                expected,
+                p_value,
+            }),
+            spread: spread
+                .map(|&(level, within, between)| SpreadEntry {
+                    tau_s: tau_s(level, rate_hz),
+                    within,
+                    between,
+                })
+                .collect(),
+            bootstrap: inference.map_or(0, |i| i.draws),
             objective: fit.objective,
             termination: fit.termination.name(),
             combinations: fit.combinations,
@@ -91,15 +141,32 @@ impl FitsFile {
             schema_version: 1,
             rate_hz: settings.rate_hz,
             model: settings.spec.to_string(),
-            fits: outcomes.iter().map(|o| FitEntry::new(&groups[o.group], o)).collect(),
+            fits: outcomes.iter().map(|o| FitEntry::new(&groups[o.group], o, settings.rate_hz)).collect(),
             files,
         }
     }
 }
 
-fn process_json(process: &Process) -> Map<String, Value> {
-    let parameters = process.parameters().into_iter().map(|(name, value)| (name.to_owned(), value.into()));
-    std::iter::once(("type".to_owned(), process.code().into())).chain(parameters).collect()
+fn processes_json(outcome: &Outcome) -> Vec<Map<String, Value>> {
+    let model = &outcome.fit.composite;
+    model.processes.iter().zip(model.labels()).map(|(p, label)| process_json(p, &label, outcome)).collect()
+}
+
+fn process_json(process: &Process, label: &str, outcome: &Outcome) -> Map<String, Value> {
+    let mut map = Map::new();
+    map.insert("type".to_owned(), process.code().into());
+    for (name, value) in process.parameters() {
+        map.insert(name.to_owned(), value.into());
+        if let Some(i) = interval_of(outcome, label, name) {
+            map.insert(format!("{name}_ci95"), vec![i.low, i.high].into());
+        }
+    }
+    map
+}
+
+fn interval_of<'a>(outcome: &'a Outcome, label: &str, parameter: &str) -> Option<&'a ParameterInterval> {
+    let mut all = outcome.inference.iter().flat_map(|i| &i.intervals);
+    all.find(|i| i.process == label && i.parameter == parameter)
 }
 
 /// A fit in words: a head line, a line for each process, how sure the optimum is, the remarks.
@@ -113,8 +180,41 @@ pub fn describe(group: &Group, outcome: &Outcome, settings: &Settings) -> String
         settings.rate_hz,
     ));
     lines.push(optimum(outcome));
+    lines.extend(outcome.inference.iter().flat_map(|i| inference_lines(i, settings.rate_hz)));
     lines.extend(outcome.notes.iter().map(|note| format!("  note: {note}")));
     lines.join("\n")
+}
+
+fn inference_lines(inference: &Inference, rate_hz: f64) -> Vec<String> {
+    let Goodness { statistic, dof, expected, p_value } = inference.goodness;
+    let verdict =
+        if p_value < 0.05 { "the model does not describe the curve" } else { "no evidence against" };
+    let mut lines = vec![format!(
+        "  J-test {statistic:.4e} on {dof} degrees of freedom, median {expected:.4e} if the model holds, p = \
+         {p_value:.3}: {verdict}"
+    )];
+    for i in &inference.intervals {
+        lines.push(format!("  95 % {:<6} {:<7} {:.6e} … {:.6e}", i.process, i.parameter, i.low, i.high));
+    }
+    lines.extend(spread_line(inference, rate_hz));
+    lines
+}
+
+/// Where replicates differ most beyond what noise alone makes.
+fn spread_line(inference: &Inference, rate_hz: f64) -> Option<String> {
+    let most = |(_, within, between): &&(u32, f64, f64)| between / within;
+    let (level, within, between) = *inference.spread.iter().max_by(|a, b| most(a).total_cmp(&most(b)))?;
+    let tau = tau_s(level, rate_hz);
+    Some(if between <= within {
+        "  replicates differ no more than their noise makes them at any scale, or hardly".to_owned()
+    } else {
+        format!(
+            "  replicates differ beyond their noise, most at {tau} s: by {} of the wavelet variance, noise alone \
+             makes {}",
+            percent(between),
+            percent(within)
+        )
+    })
 }
 
 fn head(group: &Group, outcome: &Outcome, settings: &Settings) -> String {

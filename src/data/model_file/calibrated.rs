@@ -1,6 +1,6 @@
 //! The model file of a calibration.
 
-use super::{ModelFile, SCHEMA};
+use super::{Interval, ModelFile, SCHEMA};
 use crate::calibration::{Estimator, Group, Outcome, Settings};
 use crate::imu::Channel;
 use crate::noise::Model;
@@ -30,6 +30,7 @@ impl CalibrationNote {
             for channel in groups[outcome.group].channels() {
                 file.model.axes[channel.index()] = outcome.fit.composite.clone();
                 file.missing.retain(|c| *c != channel);
+                file.intervals.extend(intervals(outcome, channel));
             }
         }
         file.provenance = Some(self.provenance(groups, outcomes, settings));
@@ -55,6 +56,18 @@ impl CalibrationNote {
     }
 }
 
+fn intervals(outcome: &Outcome, channel: Channel) -> Vec<Interval> {
+    let all = outcome.inference.iter().flat_map(|i| &i.intervals).filter(|i| i.low.is_finite());
+    all.map(|i| Interval {
+        channel,
+        process: i.process.clone(),
+        parameter: i.parameter.to_owned(),
+        low: i.low,
+        high: i.high,
+    })
+    .collect()
+}
+
 fn fit(group: &Group, outcome: &Outcome, settings: &Settings) -> Table {
     let fit = &outcome.fit;
     let mut table = Table::new();
@@ -73,6 +86,11 @@ fn fit(group: &Group, outcome: &Outcome, settings: &Settings) -> Table {
     put("agreeing", count(fit.agreeing));
     if let Some(runner_up) = fit.runner_up {
         put("runner_up", runner_up.into());
+    }
+    if let Some(inference) = &outcome.inference {
+        put("bootstrap", count(inference.draws));
+        put("j_dof", count(inference.goodness.dof));
+        put("j_p_value", inference.goodness.p_value.into());
     }
     put("notes", outcome.notes.clone().into());
     table

@@ -1,0 +1,206 @@
+//! How a wavelet variance scatters from recording to recording of the same noise: its large-sample law.
+//!
+//! For Gaussian coefficients cov(nu_j, nu_k) ≈ 2/√(M_j M_k) ∫ |H_j|² |H_k|² S² df, H the Haar filters, S the
+//! spectrum of the model ([Percival](crate::bibliography::Percival95)). Each nu_j is taken as chi-square with
+//! the degrees of freedom 2 nu²/var that follow, joined by the correlations that follow. Drift is not noise:
+//! it adds to nu and not to its scatter.
+
+use crate::noise::{Composite, Process};
+use crate::rng::Generator;
+use nalgebra::{DMatrix, DVector};
+use rand::RngExt;
+use rand_distr::StandardNormal;
+use std::f64::consts::PI;
+
+/// The law of the wavelet variances of one model at levels 1, 2, …
+#[derive(Debug, Clone)]
+pub(super) struct SamplingLaw {
+    /// Degrees of freedom per coefficient, of each level.
+    per_coefficient: Vec<f64>,
+    /// Correlations between levels, and the lower Cholesky factor.
+    pub(super) correlation: DMatrix<f64>,
+    factor: DMatrix<f64>,
+}
+
+impl SamplingLaw {
+    /// The law for a model, at levels 1 … `levels`.
+    pub(super) fn new(model: &Composite, levels: usize) -> Self {
+        let products = products(model, levels);
+        let per_coefficient = (0..levels)
+            .map(|i| {
+                let nu = model.haar_wv(i as u32 + 1);
+                let plain = 0.5_f64.powi(i as i32 + 1);
+                if products[(i, i)] > 0.0 { nu * nu / products[(i, i)] } else { plain }
+            })
+            .collect();
+        let mut correlation = DMatrix::from_fn(levels, levels, |i, j| {
+            let scale = (products[(i, i)] * products[(j, j)]).sqrt();
+            if scale > 0.0 { products[(i, j)] / scale } else { 0.0 }
+        });
+        correlation.fill_diagonal(1.0);
+        let factor = factor(&correlation);
+        Self { per_coefficient, correlation, factor }
+    }
+
+    /// Degrees of freedom of the classical wavelet variance of a signal of so many samples.
+    pub(super) fn edof(&self, samples: usize) -> Vec<f64> {
+        let count = |i: usize| crate::wavelet::coefficient_count(samples, i as u32 + 1) as f64;
+        self.per_coefficient.iter().enumerate().map(|(i, e)| (e * count(i)).max(1.0)).collect()
+    }
+
+    /// Draws nu*/nu of every level, given the degrees of freedom.
+    pub(super) fn draw(&self, edof: &[f64], generator: &mut Generator) -> Vec<f64> {
+        let z = DVector::from_fn(edof.len(), |_, _| generator.sample::<f64, _>(StandardNormal));
+        let correlated = &self.factor * z;
+        correlated.iter().zip(edof).map(|(z, edof)| chi_square_ratio(*z, *edof)).collect()
+    }
+}
+
+/// A chi-square variable over its degrees of freedom whose normal score is z (Wilson and Hilferty).
+fn chi_square_ratio(z: f64, edof: f64) -> f64 {
+    let variance = 2.0 / (9.0 * edof);
+    (1.0 - variance + z * variance.sqrt()).max(0.02).powi(3)
+}
+
+/// The Cholesky factor; where rounding leaves no positive definite matrix, that of independent levels.
+fn factor(correlation: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = correlation.nrows();
+    correlation.clone().cholesky().map_or_else(|| DMatrix::identity(n, n), |c| c.l())
+}
+
+/// ∫ |H_j|² |H_k|² S² df over −½ … ½, for all pairs of levels (units⁴).
+///
+/// A sum over 2^(levels + 1) frequencies: exact where the autocovariance of the coefficients of the longest
+/// scale ends within that scale, as it does for WN, QN, MA1 and RW.
+fn products(model: &Composite, levels: usize) -> DMatrix<f64> {
+    let half = 1_usize << levels;
+    let mut sums = DMatrix::zeros(levels, levels);
+    let mut gains = vec![0.0; levels];
+    for k in 0..half {
+        // sin²(πf) of the midpoint; then sin²(2x) = 4 sin²x (1 − sin²x) from level to level.
+        let base = (0.5 * PI * (k as f64 + 0.5) / half as f64).sin().powi(2);
+        let density = model.processes.iter().map(|p| spectrum(p, base)).sum::<f64>();
+        let mut sin2 = base;
+        for (i, gain) in gains.iter_mut().enumerate() {
+            let m = f64::from(i as u32).exp2();
+            *gain = density * sin2 * sin2 / (m * m * base);
+            sin2 = 4.0 * sin2 * (1.0 - sin2);
+        }
+        for j in 0..levels {
+            for i in j..levels {
+                sums[(i, j)] += gains[i] * gains[j];
+            }
+        }
+    }
+    sums /= half as f64;
+    sums.fill_upper_triangle_with_lower_triangle();
+    sums
+}
+
+/// Two-sided spectral density per sample (units²), at the frequency whose sin²(πf) is given.
+fn spectrum(process: &Process, sin2: f64) -> f64 {
+    // |1 − r e^(−2πif)|²
+    let distance = |r: f64| (1.0 - r) * (1.0 - r) + 4.0 * r * sin2;
+    match process {
+        Process::White(p) => p.sigma2(),
+        Process::Quantization(p) => 4.0 * p.q2() * sin2,
+        Process::Ar1(p) => p.sigma2() / distance(p.phi()),
+        Process::GaussMarkov(p) => p.ar1().sigma2() / distance(p.ar1().phi()),
+        Process::Ma1(p) => p.sigma2() * distance(-p.theta()),
+        Process::RandomWalk(p) => p.gamma2() / (4.0 * sin2),
+        Process::Drift(_) => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::{Ar1, Quantization, RandomWalk, White};
+    use crate::wavelet::classical;
+    use approx::assert_relative_eq;
+    use rand::SeedableRng;
+
+    /// White noise, levels 1 and 2, by hand: W at level 1 is (x' − x)/2, with autocovariances ½, −¼ (σ² = 1),
+    /// so Σ s² = ¼ + 2/16 = 3/8; per coefficient nu²/Σ s² = (½)²/(3/8) = 2/3. Level 2 has ¼, 1/16·(…): the
+    /// autocovariances are (4, 1, −2, −1)/16, Σ s² = (16 + 2·6)/256, per coefficient (1/16)/(28/256) = 4/7.
+    #[test]
+    fn white_noise_by_hand() {
+        let model = Composite::new(vec![Process::White(White::new(1.0).unwrap())]);
+        let law = SamplingLaw::new(&model, 6);
+        assert_relative_eq!(law.per_coefficient[0], 2.0 / 3.0, max_relative = 1e-12);
+        assert_relative_eq!(law.per_coefficient[1], 4.0 / 7.0, max_relative = 1e-12);
+        assert_relative_eq!(law.edof(1000)[1], 997.0 * 4.0 / 7.0, max_relative = 1e-12);
+    }
+
+    /// The spectrum and the filters agree with the closed forms: ∫ |H_j|² S df = nu_j.
+    #[test]
+    fn spectra_integrate_to_the_wavelet_variance() {
+        let processes = [
+            Process::White(White::new(2.0).unwrap()),
+            Process::Quantization(Quantization::new(3.0).unwrap()),
+            Process::Ar1(Ar1::new(0.9, 0.5).unwrap()),
+            Process::RandomWalk(RandomWalk::new(0.1).unwrap()),
+            Process::Ma1(crate::noise::Ma1::new(0.5, 1.0).unwrap()),
+            Process::GaussMarkov(crate::noise::GaussMarkov::new(10.0, 0.3, 100.0).unwrap()),
+        ];
+        let half = 1 << 14;
+        for process in &processes {
+            for level in 1..=6 {
+                let m = f64::from(level - 1).exp2();
+                let term = |k: usize| {
+                    let x = 0.5 * PI * (k as f64 + 0.5) / half as f64;
+                    spectrum(process, x.sin().powi(2)) * (m * x).sin().powi(4) / (m * x.sin()).powi(2)
+                };
+                let integral = (0..half).map(term).sum::<f64>() / half as f64;
+                assert_relative_eq!(integral, process.haar_wv(level), max_relative = 1e-9);
+            }
+        }
+    }
+
+    /// 600 signals of white noise plus AR1: the scatter of log nu and its correlation from level to level.
+    /// A variance estimated from n draws is known to √(2/n) = 5.8 %, a correlation to 1/√n = 0.041; four
+    /// deviations are allowed, and log nu's variance is 2/edof·(1 + 1/edof + …), under 3 % off from edof 30.
+    #[test]
+    fn simulated_signals_scatter_so() {
+        const SIGNALS: usize = 600;
+        let model = Composite::new(vec![
+            Process::White(White::new(1.0).unwrap()),
+            Process::Ar1(Ar1::new(0.8, 0.5).unwrap()),
+        ]);
+        let law = SamplingLaw::new(&model, 5);
+        let edof = law.edof(2048);
+        let mut generator = Generator::seed_from_u64(11);
+        let mut logs = vec![Vec::new(); 5];
+        let mut drawn = vec![Vec::new(); 5];
+        for _ in 0..SIGNALS {
+            let mut normal = || generator.sample::<f64, _>(StandardNormal);
+            let mut ar1 = (0.5_f64 / 0.36).sqrt() * normal();
+            let signal: Vec<f64> = (0..2048)
+                .map(|_| {
+                    ar1 = 0.8 * ar1 + 0.5_f64.sqrt() * normal();
+                    ar1 + normal()
+                })
+                .collect();
+            let nu = classical(&signal, 5).unwrap();
+            nu.iter().zip(&mut logs).for_each(|(nu, l)| l.push(nu.ln()));
+            let ratios = law.draw(&edof, &mut generator);
+            ratios.iter().zip(&mut drawn).for_each(|(r, l)| l.push(r.ln()));
+        }
+        let covariance = |a: &[f64], b: &[f64]| {
+            let mean = |x: &[f64]| x.iter().sum::<f64>() / SIGNALS as f64;
+            let (ma, mb) = (mean(a), mean(b));
+            a.iter().zip(b).map(|(x, y)| (x - ma) * (y - mb)).sum::<f64>() / (SIGNALS - 1) as f64
+        };
+        for logs in [&logs, &drawn] {
+            for i in 0..5 {
+                let ratio = covariance(&logs[i], &logs[i]) * edof[i] / 2.0;
+                assert!((ratio - 1.0).abs() < 4.0 * 0.058 + 0.03, "level {}: {ratio}", i + 1);
+                for j in 0..i {
+                    let scale = (covariance(&logs[i], &logs[i]) * covariance(&logs[j], &logs[j])).sqrt();
+                    let r = covariance(&logs[i], &logs[j]) / scale;
+                    assert!((r - law.correlation[(i, j)]).abs() < 4.0 * 0.041, "{i} {j}: {r}");
+                }
+            }
+        }
+    }
+}
