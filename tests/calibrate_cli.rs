@@ -81,6 +81,9 @@ fn recordings_become_a_model_file_and_its_curves() {
     let out =
         json(dir.path(), &["calibrate", "runs", "--model", "N1", "--estimator", "all", "-o", "imu.toml"]);
     assert_eq!(out["fits"].as_array().unwrap().len(), 3);
+    let replicates = out["replicates"].as_array().unwrap();
+    assert_eq!(replicates.len(), 12);
+    assert!(replicates.iter().all(|r| r["verdict"] == "normal"), "{replicates:?}");
     let model = Composite::new(truth().to_vec());
     for estimator in ["awv", "sr-awv", "dr-awv"] {
         let file =

@@ -6,6 +6,7 @@
 
 mod average;
 mod bounded;
+mod diagnosis;
 mod fit;
 mod goodness;
 mod inference;
@@ -21,6 +22,7 @@ mod spec;
 mod spread;
 
 pub use average::{AverageError, Estimator, Replicate, Trim, average};
+pub use diagnosis::{LeftOut, ReplicateDiagnosis, Verdict, advice, diagnose, large};
 pub use fit::{Fit, FitError, fit};
 pub use goodness::Goodness;
 pub use inference::{Bootstrap, Inference, ParameterInterval, infer};

@@ -340,7 +340,8 @@ fn finish(
         let json = report::json(&FitsFile::new(groups, outcomes, settings, files.clone()));
         session.printer.result(json.trim_end());
     } else {
-        let texts = outcomes.iter().map(|o| report::describe(&groups[o.group], o, settings));
+        let fits = outcomes.iter().map(|o| report::describe(&groups[o.group], o, settings));
+        let texts = fits.chain(groups.iter().filter_map(|g| report::describe_replicates(g, settings)));
         session.printer.result(&texts.collect::<Vec<_>>().join("\n\n"));
     }
     for file in files {

@@ -1,6 +1,7 @@
 //! Fitted models as JSON and as words.
 
 use super::curves::tau_s;
+use super::replicates::{ReplicateEntry, replicate_entries};
 use crate::calibration::{
     Estimator, Goodness, Group, Inference, Outcome, ParameterInterval, Settings, Share, correlation_time_s,
     percent, shares,
@@ -22,6 +23,8 @@ pub struct FitsFile {
     pub model: String,
     /// One entry a fit.
     pub fits: Vec<FitEntry>,
+    /// One entry a replicate of each group: whether it is abnormal.
+    pub replicates: Vec<ReplicateEntry>,
     /// Files written.
     pub files: Vec<String>,
 }
@@ -142,6 +145,7 @@ impl FitsFile {
             rate_hz: settings.rate_hz,
             model: settings.spec.to_string(),
             fits: outcomes.iter().map(|o| FitEntry::new(&groups[o.group], o, settings.rate_hz)).collect(),
+            replicates: groups.iter().flat_map(|g| replicate_entries(g, settings)).collect(),
             files,
         }
     }
