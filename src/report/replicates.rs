@@ -30,10 +30,12 @@ pub struct ReplicateEntry {
 pub struct LeftOutEntry {
     /// Estimator.
     pub estimator: &'static str,
-    /// Scale (s) at which its curve moves most.
+    /// Scale (s) at which its curve moves most, in standard deviations.
     pub tau_s: f64,
     /// wv without it over wv with it, less one, there.
     pub change: f64,
+    /// The same in standard deviations of ln wv of the curve.
+    pub deviations: f64,
 }
 
 /// The entries of a group.
@@ -49,6 +51,7 @@ fn entry(group: &Group, diagnosis: ReplicateDiagnosis, rate_hz: f64) -> Replicat
         estimator: l.estimator.name(),
         tau_s: tau_s(l.level, rate_hz),
         change: l.change,
+        deviations: l.deviations,
     };
     ReplicateEntry {
         sensor: group.sensor.name(),
