@@ -21,6 +21,7 @@ use crate::rng::StreamKey;
 use crate::wavelet::{Curve, RobustVariance, Status};
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
+use std::cmp::Ordering;
 
 /// How to draw.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -177,8 +178,12 @@ fn corrected(sorted: &[f64], estimate: f64, z: f64) -> f64 {
     if estimate <= 0.0 || count < 2.0 {
         return normal.cdf(z);
     }
-    let below =
-        sorted.iter().map(|v| if *v < estimate { 1.0 } else { 0.5 * f64::from(u8::from(*v == estimate)) });
+    // Ties count half.
+    let below = sorted.iter().map(|v| match v.total_cmp(&estimate) {
+        Ordering::Less => 1.0,
+        Ordering::Equal => 0.5,
+        Ordering::Greater => 0.0,
+    });
     let share = (below.sum::<f64>() / count).clamp(0.5 / count, 1.0 - 0.5 / count);
     let mean = sorted.iter().sum::<f64>() / count;
     let moment = |n: i32| sorted.iter().map(|v| (v - mean).powi(n)).sum::<f64>() / count;
