@@ -3,6 +3,9 @@
 use glam::DVec3;
 use std::fmt;
 
+/// Highest sample rate accepted (Hz): above any inertial sensor's, and a bound on what one run can hold.
+pub const MAX_RATE_HZ: f64 = 100_000.0;
+
 /// Kind of inertial sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Sensor {

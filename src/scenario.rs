@@ -3,6 +3,7 @@
 
 use crate::earth::GravityModel;
 use crate::ekf::{FilterStates, InitialSettings};
+use crate::imu::MAX_RATE_HZ;
 use crate::sensors::gnss::GnssSettings;
 use crate::sensors::outage::{Outage, OutagePlan, PeriodicOutages, RandomOutages};
 use crate::units::{SettingError, require_non_negative, require_positive};
@@ -36,6 +37,9 @@ pub struct Scenario {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub outage_random: Option<RandomOutages>,
 }
+
+/// Most runs of one job: days of computation, and a record of each in memory.
+pub const MAX_RUNS: u64 = 10_000_000;
 
 /// `[run]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -123,6 +127,10 @@ impl ImuSettings {
 
     fn validate(&self) -> Result<(), SettingError> {
         require_positive("rate_hz", &[self.rate_hz])?;
+        if self.rate_hz > MAX_RATE_HZ {
+            let requirement = format!("at most {MAX_RATE_HZ} samples a second");
+            return Err(SettingError::new("rate_hz", self.rate_hz, requirement));
+        }
         for (key, value) in self.errors() {
             require_non_negative(key, &[value])?;
             if value > 0.0 {
@@ -188,6 +196,9 @@ impl RunSettings {
     fn validate(&self) -> Result<(), SettingError> {
         if self.runs == 0 {
             return Err(SettingError::new("runs", self.runs, "at least one run"));
+        }
+        if self.runs > MAX_RUNS {
+            return Err(SettingError::new("runs", self.runs, format!("at most {MAX_RUNS} runs")));
         }
         if self.method == Method::Lincov {
             return Err(SettingError::new("method", "\"lincov\"", "not available yet; use \"monte-carlo\""));
@@ -258,6 +269,8 @@ mod tests {
     fn refusals_name_section_and_key() {
         let refused = |text: &str| toml::from_str::<Scenario>(text).unwrap().validate().unwrap_err().key;
         assert_eq!(refused("run.runs = 0"), "run.runs");
+        assert_eq!(refused("run.runs = 99999999999"), "run.runs");
+        assert_eq!(refused("imu.rate_hz = 1e9"), "imu.rate_hz");
         assert_eq!(refused("run.coverage_level = 95"), "run.coverage_level");
         assert_eq!(refused("run.method = 'lincov'"), "run.method");
         assert_eq!(refused("gnss.rate_hz = 3"), "gnss.rate_hz");

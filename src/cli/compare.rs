@@ -39,6 +39,10 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let states = states(&args.states)?;
+    let read_from = args.runs.iter().chain([&args.reference]);
+    let inputs: Vec<PathBuf> =
+        read_from.flat_map(|run| report::RUN_FILES.map(|name| run.join(name))).collect();
+    atomic::guard_inputs(&args.out, inputs.iter().map(PathBuf::as_path))?;
     let reference = read(&args.reference)?;
     let mut candidates = Vec::new();
     let mut all_paired = true;

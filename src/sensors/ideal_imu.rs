@@ -1,7 +1,7 @@
 //! What a perfect integrating IMU measures along a trajectory.
 
 use crate::earth::{GravityModel, OMEGA_IE, ecef_to_geodetic, gravity_down};
-use crate::imu::ImuSample;
+use crate::imu::{ImuSample, MAX_RATE_HZ};
 use crate::trajectory::Trajectory;
 use glam::DVec3;
 
@@ -9,7 +9,7 @@ use glam::DVec3;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
     /// Not a sample rate.
-    #[error("IMU rate {0} Hz is not a finite number > 0")]
+    #[error("IMU rate {0} Hz is not a number > 0 and ≤ {MAX_RATE_HZ}")]
     Rate(f64),
     /// The trajectory ends before the first sample does.
     #[error("the trajectory lasts {duration_s} s: less than one sample at {rate_hz} Hz")]
@@ -53,7 +53,7 @@ pub fn ideal_imu(
     rate_hz: f64,
     gravity: GravityModel,
 ) -> Result<Vec<ImuSample>, Error> {
-    if !(rate_hz.is_finite() && rate_hz > 0.0) {
+    if !(rate_hz > 0.0 && rate_hz <= MAX_RATE_HZ) {
         return Err(Error::Rate(rate_hz));
     }
     let start_s = trajectory.start_s();
@@ -195,8 +195,9 @@ mod tests {
     fn impossible_rates_are_refused() {
         let trajectory = through(4, 1.0, |_| (0.8, 0.1, 0.0, DQuat::IDENTITY));
         let refused = |rate_hz| ideal_imu(&trajectory, rate_hz, WGS84).unwrap_err().to_string();
-        assert_eq!(refused(0.0), "IMU rate 0 Hz is not a finite number > 0");
-        assert_eq!(refused(f64::NAN), "IMU rate NaN Hz is not a finite number > 0");
+        assert_eq!(refused(0.0), "IMU rate 0 Hz is not a number > 0 and ≤ 100000");
+        assert_eq!(refused(f64::NAN), "IMU rate NaN Hz is not a number > 0 and ≤ 100000");
+        assert_eq!(refused(1e9), "IMU rate 1000000000 Hz is not a number > 0 and ≤ 100000");
         assert_eq!(refused(0.1), "the trajectory lasts 4 s: less than one sample at 0.1 Hz");
     }
 }

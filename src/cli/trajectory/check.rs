@@ -24,7 +24,7 @@ pub(super) struct Args {
     #[command(flatten)]
     source: Source,
     /// IMU rate at which the closure is computed
-    #[arg(long, value_name = "HZ", default_value_t = 100.0, value_parser = parse::positive)]
+    #[arg(long, value_name = "HZ", default_value_t = 100.0, value_parser = parse::rate_hz)]
     rate_hz: f64,
     /// Bound on the closure's distance
     #[arg(long, value_name = "M", default_value_t = Bounds::default().position_m, value_parser = parse::positive)]

@@ -20,7 +20,7 @@ pub(super) struct GenerateArgs {
     #[command(flatten)]
     source: Source,
     /// Rows a second
-    #[arg(long, value_name = "HZ", default_value_t = 100.0, value_parser = parse::positive)]
+    #[arg(long, value_name = "HZ", default_value_t = 100.0, value_parser = parse::rate_hz)]
     rate_hz: f64,
     /// Table to write (.csv or .csv.gz); without it, standard output
     #[arg(long, short, value_name = "FILE")]
@@ -41,7 +41,7 @@ pub(super) struct ConvertArgs {
     #[command(flatten)]
     source: Source,
     /// Rows a second (default: the rows of the input)
-    #[arg(long, value_name = "HZ", value_parser = parse::positive)]
+    #[arg(long, value_name = "HZ", value_parser = parse::rate_hz)]
     rate_hz: Option<f64>,
     /// Table to write (.csv or .csv.gz)
     #[arg(long, short, value_name = "FILE")]
