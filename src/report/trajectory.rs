@@ -53,36 +53,30 @@ fn panels(series: &TrajectorySeries, outages: &[(f64, f64)]) -> Vec<Plot> {
         series.t_s.iter().enumerate().map(|(i, t)| (*t, values(i))).collect()
     };
     let line = |label: &str, class, points| Line { label: label.to_owned(), class, points };
-    let panel = |title: &str, lines| Plot {
+    // At least so much is shown, so that rounding does not fill a panel.
+    let panel = |title: &str, include, lines| Plot {
         title: title.to_owned(),
         scale: Scale::Linear,
-        include: None,
+        include: Some(include),
         stripes: outages.to_vec(),
         band: None,
         lines,
     };
     let rpy = |k: usize| over_time(&|i| series.rpy_deg[i][k]);
+    let height = series.height_m.first().map_or((0.0, 1.0), |h| (h - 1.0, h + 1.0));
+    let attitude = vec![line("roll", "first", rpy(0)), line("pitch", "second", rpy(1))];
+    let yaw = pieces(&rpy(2)).into_iter().map(|points| line("", "first", points)).collect();
     vec![
-        panel("height (m)", vec![line("", "first", over_time(&|i| series.height_m[i]))]),
-        panel("speed (m/s)", vec![line("", "first", over_time(&|i| series.speed_m_s[i]))]),
-        panel(
-            "roll and pitch (degrees)",
-            vec![line("roll", "first", rpy(0)), line("pitch", "second", rpy(1))],
-        ),
-        panel("yaw (degrees)", vec![line("", "first", unwrapped(rpy(2)))]),
+        panel("height (m)", height, vec![line("", "first", over_time(&|i| series.height_m[i]))]),
+        panel("speed (m/s)", (0.0, 1.0), vec![line("", "first", over_time(&|i| series.speed_m_s[i]))]),
+        panel("roll and pitch (degrees)", (-1.0, 1.0), attitude),
+        panel("yaw (degrees)", (-1.0, 1.0), yaw),
     ]
 }
 
 /// The line is broken where the heading passes ±180°.
-fn unwrapped(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
-    let mut broken: Vec<(f64, f64)> = Vec::with_capacity(points.len());
-    for point in points {
-        if broken.last().is_some_and(|last| (last.1 - point.1).abs() > 180.0) {
-            broken.push((point.0, f64::NAN));
-        }
-        broken.push(point);
-    }
-    broken
+fn pieces(points: &[(f64, f64)]) -> Vec<Vec<(f64, f64)>> {
+    points.chunk_by(|a, b| (a.1 - b.1).abs() <= 180.0).map(<[_]>::to_vec).collect()
 }
 
 /// From metres to the picture, the same scale both ways.
@@ -177,7 +171,7 @@ mod tests {
         let frame = Frame::of(&s).unwrap();
         let ((x0, y0), (x1, y1)) = (frame.at([0.0, 0.0]), frame.at([300.0, 300.0]));
         assert!((x1 - x0 - (y0 - y1)).abs() < 1e-9 && x1 > x0);
-        let yaw = unwrapped(s.t_s.iter().zip(&s.rpy_deg).map(|(t, r)| (*t, r[2])).collect());
-        assert!(yaw.len() == 12 && yaw[5].1.is_nan());
+        let yaw: Vec<_> = s.t_s.iter().zip(&s.rpy_deg).map(|(t, r)| (*t, r[2])).collect();
+        assert_eq!(pieces(&yaw).iter().map(Vec::len).collect::<Vec<_>>(), [5, 6]);
     }
 }

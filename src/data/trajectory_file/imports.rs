@@ -185,7 +185,7 @@ pub(super) fn motion_definition(path: &str, text: &str) -> Loaded {
         rpy: DVec3::new(ini[8], ini[7], ini[6]) * DEG,
         commands: Vec::new(),
     };
-    let (mut rpy, mut v_b, mut timed) = (motion.rpy, motion.v_b, true);
+    let (mut rpy, mut v_b, mut timed, mut total_s) = (motion.rpy, motion.v_b, true, 0.0);
     for &line in rest {
         let cells = row(line, 8)?;
         let duration_s = cells[7];
@@ -199,8 +199,10 @@ pub(super) fn motion_definition(path: &str, text: &str) -> Loaded {
             5 => (angles, speeds - v_b),
             _ => return Err(bad_line(path, line.0, format!("command type {} is none of 1 to 5", cells[0]))),
         };
-        if duration_s.is_nan() || duration_s <= 0.0 {
-            return Err(bad_line(path, line.0, format!("command duration {duration_s} s is not > 0")));
+        total_s += duration_s;
+        if duration_s <= 0.0 || total_s > 86_400.0 {
+            let message = format!("command duration {duration_s} s is not > 0, or makes more than a day");
+            return Err(bad_line(path, line.0, message));
         }
         timed &= cells[0] as i64 == 1;
         (rpy, v_b) = (rpy + change.0, v_b + change.1);
@@ -331,7 +333,10 @@ mod tests {
         let refused =
             |line: &str| motion_definition("m.csv", &format!("{HEAD}{line}\n")).unwrap_err().to_string();
         assert_eq!(refused("7,0,0,0,0,0,0,1,0"), "m.csv, line 4: command type 7 is none of 1 to 5");
-        assert_eq!(refused("1,0,0,0,0,0,0,0,0"), "m.csv, line 4: command duration 0 s is not > 0");
+        assert_eq!(
+            refused("1,0,0,0,0,0,0,0,0"),
+            "m.csv, line 4: command duration 0 s is not > 0, or makes more than a day"
+        );
         assert_eq!(refused("1,0,x,0,0,0,0,1,0"), "m.csv, line 4: \"x\" is not a number");
     }
 }

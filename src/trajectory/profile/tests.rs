@@ -1,6 +1,9 @@
 use super::*;
+use crate::earth::radii;
 use crate::earth::{GravityModel, e_to_n, gravity_down, ned_difference};
+use crate::frames::RollPitchYaw;
 use crate::frames::wrap_angle;
+use crate::units::{DEG, STANDARD_GRAVITY};
 use glam::DVec3;
 
 fn straight(by: Length) -> Segment {
@@ -168,6 +171,10 @@ fn what_cannot_be_followed_is_refused() {
         |speed: f64, segment: Segment| profile(speed, vec![segment]).build().unwrap_err().to_string();
     let straight_s = |s| straight(Length::Duration(s));
     assert_eq!(refused(1.0, straight_s(-4.0)), "segment 1: \"duration_s\" is not a finite number > 0");
+    assert_eq!(
+        refused(1.0, straight_s(1e300)),
+        "segment 1: \"duration_s\" makes the trajectory 1.000e300 s long: more than a day"
+    );
     assert_eq!(
         refused(0.0, straight(Length::Distance(5.0))),
         "segment 1: \"distance_m\" needs a moving vehicle, but it stands still here"

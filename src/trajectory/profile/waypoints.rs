@@ -1,6 +1,7 @@
 //! Straight legs between points, corners cut by smooth turns.
 
-use super::{Length, MAX_SLOPE, Path, Problem, Turning, domain};
+use super::path::{MAX_SLOPE, Path, domain};
+use super::{Length, Problem, Turning};
 use crate::earth::radii;
 use crate::frames::wrap_angle;
 use crate::units::DEG;
