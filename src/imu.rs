@@ -100,6 +100,19 @@ pub struct ImuSample {
     pub f_ib_b: DVec3,
 }
 
+/// One recorded sample: what the sensors summed up over an interval that ends at `t_s`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImuIncrement {
+    /// End of the interval (s).
+    pub t_s: f64,
+    /// Its length (s).
+    pub dt_s: f64,
+    /// ∫ omega_ib dt in the axes of the sensor (rad).
+    pub dtheta: DVec3,
+    /// ∫ f_ib dt in the axes of the sensor (m/s).
+    pub dv: DVec3,
+}
+
 /// One signal of a static recording, its mean removed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Signal {

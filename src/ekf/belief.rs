@@ -7,6 +7,8 @@ use glam::DVec3;
 
 /// Most bias states an axis.
 pub const MAX_GROUPS: usize = 8;
+/// Most bias groups of a sensor: those of the model and an unknown constant.
+pub(super) const MAX_BLOCKS: usize = MAX_GROUPS + 1;
 
 /// A model that cannot be made into filter states.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -42,6 +44,32 @@ pub struct BiasGroup {
     pub innovation: DVec3,
     /// Initial variances (units²).
     pub initial: DVec3,
+}
+
+impl BiasGroup {
+    /// A constant that is not known: the same for all time, with this standard deviation on each axis.
+    #[must_use]
+    pub fn constant(sigma: f64) -> Self {
+        Self { phi: DVec3::ONE, innovation: DVec3::ZERO, initial: DVec3::splat(sigma * sigma) }
+    }
+
+    /// Coefficients and innovation variances over `ratio` samples, which need not be whole: a Gauss-Markov
+    /// process keeps its correlation time and variance, a random walk its growth. A coefficient ≤ 0 belongs
+    /// to no process in continuous time and is left as it is.
+    #[must_use]
+    pub fn over(&self, ratio: f64) -> (DVec3, DVec3) {
+        let axis = |i: usize| match self.phi[i] {
+            phi if phi >= 1.0 => (phi, self.innovation[i] * ratio),
+            phi if phi > 0.0 => {
+                let kappa = -(phi - 1.0).ln_1p();
+                let share = (-2.0 * kappa * ratio).exp_m1() / (-2.0 * kappa).exp_m1();
+                ((-kappa * ratio).exp(), self.innovation[i] * share)
+            }
+            phi => (phi, self.innovation[i]),
+        };
+        let [x, y, z] = [0, 1, 2].map(axis);
+        (DVec3::new(x.0, y.0, z.0), DVec3::new(x.1, y.1, z.1))
+    }
 }
 
 /// What the filter believes: white noise of a sample and bias states, for each sensor.
@@ -110,6 +138,20 @@ impl Belief {
         3 + self.groups[0].len() + self.groups[1].len()
     }
 
+    /// Adds an unknown constant to the biases of a sensor (a turn-on bias); nothing where sigma is 0.
+    pub fn add_constant(&mut self, sensor: Sensor, sigma: f64) {
+        if sigma > 0.0 {
+            self.groups[sensor as usize].push(BiasGroup::constant(sigma));
+            self.states += 3;
+        }
+    }
+
+    /// Standard deviation of the biases of a sensor at the start: the largest of the three axes.
+    #[must_use]
+    pub fn initial_bias_sigma(&self, sensor: Sensor) -> f64 {
+        self.groups[sensor as usize].iter().map(|g| g.initial).sum::<DVec3>().max_element().sqrt()
+    }
+
     /// Replaces the initial variance of the first bias group of a sensor by sigma² on each axis.
     pub fn set_initial_bias_sigma(&mut self, sensor: Sensor, sigma: f64) {
         if let Some(group) = self.groups[sensor as usize].first_mut() {
@@ -157,5 +199,28 @@ impl AxisBelief {
 
     fn push(&mut self, phi: f64, innovation: f64, initial: f64) {
         self.biases.push(BiasState { phi, innovation, initial });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two steps of half a sample and of one and a half are two whole ones: b_{k+1} = phi b_k + w twice.
+    #[test]
+    fn parts_of_a_sample_compose() {
+        let phi = DVec3::new(0.9, 1.0, 0.0);
+        let group = BiasGroup { phi, innovation: DVec3::new(0.2, 0.3, 0.4), initial: DVec3::ONE };
+        let (a, b) = (group.over(0.5), group.over(1.5));
+        for i in 0..2 {
+            let (phi, q) = (a.0[i] * b.0[i], b.0[i].powi(2) * a.1[i] + b.1[i]);
+            let whole = (phi_squared(group.phi[i]), (1.0 + phi_squared(group.phi[i])) * group.innovation[i]);
+            assert!((phi - whole.0).abs() < 1e-14 && (q - whole.1).abs() < 1e-14, "axis {i}");
+        }
+        assert_eq!((a.0.z, a.1.z), (0.0, 0.4));
+    }
+
+    fn phi_squared(phi: f64) -> f64 {
+        phi * phi
     }
 }

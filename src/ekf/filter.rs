@@ -1,6 +1,6 @@
 //! The filter itself: nominal state, bias estimates and covariance of eight runs.
 
-use super::belief::Belief;
+use super::belief::{Belief, BiasGroup};
 use super::covariance::{BIAS, Covariance, NAV, PSI, R, V};
 use super::dynamics::{EARTH_STEP_S, EarthStep, EarthTerms, NavRows, RowMap, Sample};
 use super::initial::{InitialSettings, psi_of_angles};
@@ -26,6 +26,8 @@ pub struct Ekf {
     phi: Vec<DVec3>,
     innovation: Vec<DVec3>,
     white: [DVec3; 2],
+    /// What is believed of one sample at the belief's own rate: groups, white noise, interval (s).
+    of_sample: (Vec<BiasGroup>, [DVec3; 2], f64),
     /// Accelerometer groups: blocks `BIAS..BIAS + accel_groups`; gyroscope groups follow.
     accel_groups: usize,
     dt: f64,
@@ -85,11 +87,25 @@ impl Ekf {
             innovation: groups.iter().map(|g| g.innovation).collect(),
             white: belief.white,
             accel_groups: belief.groups[0].len(),
+            of_sample: (groups, belief.white, 1.0 / belief.rate_hz),
             dt: 1.0 / belief.rate_hz,
             earth_age: 0.0,
             omega_ib_b: Vec3::ZERO,
             scratch: Scratch { ph: zeros(), gain: zeros(), error: zeros() },
         }
+    }
+
+    /// The next samples last `dt` seconds, whatever the belief's own rate: white noise keeps its density,
+    /// biases their correlation time and variance. For recorded data, whose clock is not even and whose
+    /// samples are split where a fix falls between them.
+    pub fn set_interval(&mut self, dt: f64) {
+        let (groups, white, belief_dt) = &self.of_sample;
+        let ratio = dt / belief_dt;
+        for (g, group) in groups.iter().enumerate() {
+            (self.phi[g], self.innovation[g]) = group.over(ratio);
+        }
+        self.white = white.map(|w| w / ratio);
+        self.dt = dt;
     }
 
     /// Blocks of the accelerometer biases.

@@ -1,6 +1,6 @@
 //! GNSS updates: position and velocity of an antenna on a lever arm, as scalars in sequence.
 
-use super::belief::MAX_GROUPS;
+use super::belief::MAX_BLOCKS;
 use super::covariance::{BIAS, PSI, R, V};
 use super::filter::Ekf;
 use crate::earth::{OMEGA_IE, radii};
@@ -28,7 +28,7 @@ pub struct Fix {
 }
 
 /// Most entries of a measurement row: one of R or V, three of PSI, three of each gyroscope group.
-const MAX_ROW: usize = 4 + 3 * MAX_GROUPS;
+const MAX_ROW: usize = 4 + 3 * MAX_BLOCKS;
 
 impl Ekf {
     #[inline(always)]
@@ -36,14 +36,13 @@ impl Ekf {
         self.apply_earth_terms();
         self.scratch.error.fill(Lanes::ZERO);
         let antenna = Antenna::new(self, fix);
-        let position = self.position_innovation(fix, &antenna);
+        let [position, velocity] = self.innovation_at(fix, &antenna);
         let mut nis = Lanes::ZERO;
         for axis in 0..3 {
             let row = antenna.position_row(axis);
             nis += self.scalar(row.entries(), position[axis], fix.pos_sigma_m[axis].powi(2));
         }
-        if let Some(v_n) = fix.v_n {
-            let velocity = self.nominal.v_n + antenna.swing_n - v_n;
+        if fix.v_n.is_some() {
             for axis in 0..3 {
                 let row = antenna.velocity_row(axis, self.gyro_blocks());
                 nis += self.scalar(row.entries(), velocity[axis], fix.vel_sigma_m_s[axis].powi(2));
@@ -51,6 +50,19 @@ impl Ekf {
         }
         self.correct();
         nis
+    }
+
+    /// Estimated less measured position and velocity of the antenna: metres and m/s north, east, down; the
+    /// velocity zero where none is measured.
+    #[must_use]
+    pub fn innovation(&self, fix: &Fix) -> [Vec3; 2] {
+        self.innovation_at(fix, &Antenna::new(self, fix))
+    }
+
+    #[inline(always)]
+    fn innovation_at(&self, fix: &Fix, antenna: &Antenna) -> [Vec3; 2] {
+        let velocity = fix.v_n.map(|v_n| self.nominal.v_n + antenna.swing_n - v_n);
+        [self.position_innovation(fix, antenna), velocity.unwrap_or(Vec3::ZERO)]
     }
 
     /// Estimated less measured antenna position, metres north, east, down.
@@ -198,10 +210,10 @@ impl Row {
     }
 }
 
-#[cfg(test)]
 impl Ekf {
-    /// The six measurement rows of the first lane, dense.
-    pub(super) fn measurement_rows(&self, lever_arm_b: DVec3) -> Vec<Vec<f64>> {
+    /// The six measurement rows (position, velocity) of the first lane, dense.
+    #[must_use]
+    pub fn measurement_rows(&self, lever_arm_b: DVec3) -> Vec<Vec<f64>> {
         let fix = Fix {
             lat: self.nominal.lat,
             lon: self.nominal.lon,
