@@ -25,7 +25,15 @@ pub const SOMIGLIANA_K: f64 = 0.001_931_852_652_41;
 /// Navigation in latitude and longitude is refused beyond this latitude (rad): 89.9°.
 pub const MAX_LATITUDE: f64 = 89.9 * crate::units::DEG;
 
-/// Radii of curvature and their derivatives at a latitude.
+/// What the ellipsoid and gravity take from a latitude: one square root and one division for all.
+#[derive(Debug, Clone, Copy)]
+pub struct Parallel<R> {
+    sin_lat: R,
+    /// 1/√(1 − e² sin² lat).
+    per_w: R,
+}
+
+/// Radii of curvature at a latitude.
 #[derive(Debug, Clone, Copy)]
 pub struct Radii<R> {
     /// Meridian radius R_N (m), [Groves](crate::bibliography::Groves13) eq. 2.105.
@@ -34,13 +42,56 @@ pub struct Radii<R> {
     pub transverse: R,
 }
 
+impl<R: Real> Parallel<R> {
+    /// The parallel at the latitude whose sine is given.
+    #[inline(always)]
+    #[must_use]
+    pub fn at(sin_lat: R) -> Self {
+        let w2 = sin_lat * sin_lat * -E2 + 1.0;
+        Self { sin_lat, per_w: R::from(1.0) / w2.sqrt() }
+    }
+
+    /// The parallel at a sine that differs by less than 1e-6: one Newton step of the inverse root, exact to
+    /// rounding there (its error is 3/8 of the square of e² · 1e-6).
+    #[inline(always)]
+    #[must_use]
+    pub fn nearby(&self, sin_lat: R) -> Self {
+        let w2 = sin_lat * sin_lat * -E2 + 1.0;
+        Self { sin_lat, per_w: self.per_w * (w2 * self.per_w * self.per_w * -0.5 + 1.5) }
+    }
+
+    /// Radii of curvature.
+    #[inline(always)]
+    #[must_use]
+    pub fn radii(&self) -> Radii<R> {
+        let transverse = self.per_w * A;
+        Radii { meridian: transverse * (self.per_w * self.per_w) * (1.0 - E2), transverse }
+    }
+
+    /// Normal gravity at height h (m), down component of g_n (m/s²; centrifugal part included). North and
+    /// east are zero: the north component is below 1e-5 m/s² under 1.2 km of height and left out (as all
+    /// peers do).
+    #[inline(always)]
+    #[must_use]
+    pub fn gravity_down(&self, model: GravityModel, h: R) -> R {
+        let s2 = self.sin_lat * self.sin_lat;
+        let surface = (s2 * SOMIGLIANA_K + 1.0) * GRAVITY_EQUATOR * self.per_w;
+        match model {
+            GravityModel::Wgs84 => {
+                const M: f64 = OMEGA_IE * OMEGA_IE * A * A * (A * (1.0 - F)) / MU;
+                let first = (s2 * (-2.0 * F) + (1.0 + F + M)) * (-2.0 / A);
+                surface * (h * (first + h * (3.0 / (A * A))) + 1.0)
+            }
+            GravityModel::FirstOrder => surface * (h * (-2.0 / A) + 1.0),
+        }
+    }
+}
+
 /// Radii of curvature at the latitude whose sine is given.
 #[inline(always)]
 #[must_use]
 pub fn radii<R: Real>(sin_lat: R) -> Radii<R> {
-    let w2 = sin_lat * sin_lat * -E2 + 1.0;
-    let transverse = R::from(A) / w2.sqrt();
-    Radii { meridian: transverse * (1.0 - E2) / w2, transverse }
+    Parallel::at(sin_lat).radii()
 }
 
 /// How gravity falls with height.
@@ -57,21 +108,11 @@ pub enum GravityModel {
     FirstOrder,
 }
 
-/// Normal gravity, down component of g_n (m/s²; centrifugal part included). North and east are zero:
-/// the north component is below 1e-5 m/s² under 1.2 km of height and left out (as all peers do).
+/// [`Parallel::gravity_down`] at the latitude whose sine is given.
 #[inline(always)]
 #[must_use]
 pub fn gravity_down<R: Real>(model: GravityModel, sin_lat: R, h: R) -> R {
-    let s2 = sin_lat * sin_lat;
-    let surface = (s2 * SOMIGLIANA_K + 1.0) * GRAVITY_EQUATOR / (s2 * -E2 + 1.0).sqrt();
-    match model {
-        GravityModel::Wgs84 => {
-            const M: f64 = OMEGA_IE * OMEGA_IE * A * A * (A * (1.0 - F)) / MU;
-            let first = (s2 * (-2.0 * F) + (1.0 + F + M)) * (-2.0 / A);
-            surface * (h * (first + h * (3.0 / (A * A))) + 1.0)
-        }
-        GravityModel::FirstOrder => surface * (h * (-2.0 / A) + 1.0),
-    }
+    Parallel::at(sin_lat).gravity_down(model, h)
 }
 
 /// Position in e (m).

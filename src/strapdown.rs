@@ -7,42 +7,43 @@
 //! across ±180° of longitude. Latitude and longitude lose their meaning at the poles: whoever drives the
 //! mechanisation refuses |lat| > [`MAX_LATITUDE`](crate::earth::MAX_LATITUDE).
 
-use crate::earth::{GravityModel, OMEGA_IE, gravity_down, radii};
+use crate::earth::{GravityModel, OMEGA_IE, Parallel};
 use crate::frames::{NavState, wrap_angle};
-use crate::lanes::{Lanes, Mat3, Quat, Real, Vec3};
+use crate::lanes::{Lanes, Mat3, Quat, Real, Vec3, Wide};
 
 /// Largest rotation of one sample interval (rad); beyond it the two-sample algorithm is not valid.
 pub const MAX_ROTATION: f64 = 0.5;
 
-/// The navigation states of eight runs, and the increments of the sample before.
-#[derive(Debug, Clone)]
-pub struct Strapdown {
+/// The navigation states of eight runs, and the increments of the sample before; in memory, or in
+/// registers inside a kernel.
+#[derive(Debug, Clone, Copy)]
+pub struct Strapdown<L = Lanes> {
     /// Geodetic latitude (rad).
-    pub lat: Lanes,
+    pub lat: L,
     /// Longitude (rad), not wrapped.
-    pub lon: Lanes,
+    pub lon: L,
     /// Height above the ellipsoid (m).
-    pub h: Lanes,
+    pub h: L,
     /// Velocity with respect to the Earth in n (m/s).
-    pub v_n: Vec3,
+    pub v_n: Vec3<L>,
     /// Attitude: takes b, returns n.
-    pub q_b_n: Quat,
+    pub q_b_n: Quat<L>,
     /// Angle increment of the sample before (rad).
-    dtheta_before: Vec3,
+    dtheta_before: Vec3<L>,
     /// Velocity increment of the sample before (m/s).
-    dv_before: Vec3,
+    dv_before: Vec3<L>,
     /// Coriolis acceleration of the sample before (m/s²), slow enough to extrapolate with.
-    coriolis_before: Vec3,
+    coriolis_before: Vec3<L>,
     gravity: GravityModel,
 }
 
 /// What one step passed through, for the filter that linearises about it.
 #[derive(Debug, Clone, Copy)]
-pub struct StepTrace {
+pub struct StepTrace<L> {
     /// Attitude matrix at the middle of the step, takes b, returns n.
-    pub c_b_n: Mat3,
+    pub c_b_n: Mat3<L>,
     /// Velocity increment by specific force in n: ∫ f_ib_n dt (m/s).
-    pub dv_n: Vec3,
+    pub dv_n: Vec3<L>,
 }
 
 impl Strapdown {
@@ -81,6 +82,38 @@ impl Strapdown {
         self.q_b_n.set_lane(i, state.q_b_n);
     }
 
+    /// Into registers.
+    #[inline(always)]
+    #[must_use]
+    pub fn load<W: Wide>(&self) -> Strapdown<W> {
+        Strapdown {
+            lat: W::load(&self.lat),
+            lon: W::load(&self.lon),
+            h: W::load(&self.h),
+            v_n: self.v_n.load(),
+            q_b_n: self.q_b_n.load(),
+            dtheta_before: self.dtheta_before.load(),
+            dv_before: self.dv_before.load(),
+            coriolis_before: self.coriolis_before.load(),
+            gravity: self.gravity,
+        }
+    }
+
+    /// From registers.
+    #[inline(always)]
+    pub fn store<W: Wide>(&mut self, ins: &Strapdown<W>) {
+        ins.lat.store(&mut self.lat);
+        ins.lon.store(&mut self.lon);
+        ins.h.store(&mut self.h);
+        self.v_n.store(ins.v_n);
+        self.q_b_n.store(ins.q_b_n);
+        self.dtheta_before.store(ins.dtheta_before);
+        self.dv_before.store(ins.dv_before);
+        self.coriolis_before.store(ins.coriolis_before);
+    }
+}
+
+impl<L: Real> Strapdown<L> {
     /// The gravity model in use.
     #[must_use]
     pub const fn gravity(&self) -> GravityModel {
@@ -92,82 +125,97 @@ impl Strapdown {
     /// `dtheta` = ∫ omega_ib_b dt (rad) and `dv` = ∫ f_ib_b dt (m/s) over the interval, in the rotating
     /// body axes, as an integrating IMU gives them (its mean rates times dt).
     #[inline(always)]
-    pub fn step(&mut self, dtheta: Vec3, dv: Vec3, dt: f64) -> StepTrace {
+    pub fn step(&mut self, dtheta: Vec3<L>, dv: Vec3<L>, dt: f64) -> StepTrace<L> {
+        let [half, sixth, twelfth] = [0.5, 1.0 / 6.0, 1.0 / 12.0].map(L::from);
+        let seconds = L::from(dt);
         // Coning and sculling from this sample and the one before (Savage 1998, two-sample form).
-        let phi_b = dtheta + self.dtheta_before.cross(dtheta) * (1.0 / 12.0);
+        let phi_b = self.dtheta_before.cross(dtheta).mul_add(twelfth, dtheta);
         // Without the triple product, θ²/6 of the specific force is lost in every turn: dt² overall.
         let sculling = self.dtheta_before.cross(dv) + self.dv_before.cross(dtheta);
-        let dv_sf_b = dv + dtheta.cross(dv * 0.5 + dtheta.cross(dv) * (1.0 / 6.0)) + sculling * (1.0 / 12.0);
+        let turned = dtheta.cross(dv * half + dtheta.cross(dv) * sixth);
+        let dv_sf_b = sculling.mul_add(twelfth, dv + turned);
         self.dtheta_before = dtheta;
         self.dv_before = dv;
 
         let c_before = self.q_b_n.to_matrix();
         let dv_sf_n = c_before * dv_sf_b;
         let mid = self.at_middle(dv_sf_n, dt);
-        let zeta = (mid.omega_ie_n + mid.omega_en_n) * dt;
+        let zeta = (mid.omega_ie_n + mid.omega_en_n) * seconds;
 
         // Velocity: specific force with the rotation of n, gravity, Coriolis.
-        let dv_n = dv_sf_n - zeta.cross(dv_sf_n) * 0.5;
-        let coriolis = (mid.omega_ie_n * 2.0 + mid.omega_en_n).cross(mid.v_n);
+        let dv_n = dv_sf_n - zeta.cross(dv_sf_n) * half;
+        let coriolis = (mid.omega_ie_n + mid.omega_ie_n + mid.omega_en_n).cross(mid.v_n);
         self.coriolis_before = coriolis;
-        let mut v_new = self.v_n + dv_n - coriolis * dt;
+        let mut v_new = self.v_n + dv_n - coriolis * seconds;
         v_new[2] += mid.gravity * dt;
 
         // Position by the trapezoidal rule.
-        let v_mean = (self.v_n + v_new) * 0.5;
-        self.lat += v_mean[0] * dt / mid.meridian;
-        self.lon += v_mean[1] * dt / (mid.transverse * mid.cos_lat);
+        let v_mean = (self.v_n + v_new) * half;
+        self.lat += v_mean[0] * dt * mid.per_meridian;
+        self.lon += v_mean[1] * dt * mid.per_transverse * mid.per_cos_lat;
         self.h -= v_mean[2] * dt;
         self.v_n = v_new;
 
         // Attitude: b turns by phi_b, n by zeta (≤ 3e-4 rad, second order suffices to rounding).
-        let half = zeta * 0.5;
-        let q_n = Quat { w: Lanes::ONE - half.dot(half) * 0.5, v: -half };
+        let half_zeta = zeta * half;
+        let q_n = Quat { w: half_zeta.dot(half_zeta) * -0.5 + 1.0, v: -half_zeta };
         self.q_b_n = (q_n * self.q_b_n * Quat::from_rotation_vector(phi_b)).renormalised();
-        let c_b_n = (c_before + self.q_b_n.to_matrix()) * 0.5;
+        let mut c_b_n = self.q_b_n.to_matrix();
+        for i in 0..3 {
+            for j in 0..3 {
+                c_b_n.0[i][j] = (c_before.0[i][j] + c_b_n.0[i][j]) * 0.5;
+            }
+        }
         StepTrace { c_b_n, dv_n }
     }
 
     /// Velocity, rates, radii and gravity at the middle of the interval, extrapolated by half of it.
     #[inline(always)]
-    fn at_middle(&self, dv_sf_n: Vec3, dt: f64) -> Middle {
+    fn at_middle(&self, dv_sf_n: Vec3<L>, dt: f64) -> Middle<L> {
         let (s, c) = self.lat.sin_cos();
-        let r = radii(s);
-        let mut v_n = self.v_n + (dv_sf_n - self.coriolis_before * dt) * 0.5;
-        v_n[2] += gravity_down(self.gravity, s, self.h) * (0.5 * dt);
+        let parallel = Parallel::at(s);
+        let r = parallel.radii();
+        let half = L::from(0.5 * dt);
+        let mut v_n = self.v_n + dv_sf_n * L::from(0.5) - self.coriolis_before * half;
+        v_n[2] += parallel.gravity_down(self.gravity, self.h) * half;
         let h = self.h - (self.v_n[2] + v_n[2]) * (0.25 * dt);
+        // one division for both
         let (meridian, transverse) = (r.meridian + h, r.transverse + h);
-        let half_dlat = v_n[0] * (0.5 * dt) / meridian;
+        let inverse = L::from(1.0) / (meridian * transverse);
+        let (per_meridian, per_transverse) = (inverse * transverse, inverse * meridian);
+        let half_dlat = v_n[0] * half * per_meridian;
         let (sin_lat, cos_lat) = (s + c * half_dlat, c - s * half_dlat);
-        let east = v_n[1] / transverse;
-        let z = Lanes::ZERO;
+        let per_cos_lat = L::from(1.0) / cos_lat;
+        let east = v_n[1] * per_transverse;
         Middle {
             v_n,
-            omega_ie_n: Vec3([cos_lat * OMEGA_IE, z, sin_lat * -OMEGA_IE]),
-            omega_en_n: Vec3([east, -(v_n[0] / meridian), -(east * sin_lat / cos_lat)]),
-            gravity: gravity_down(self.gravity, sin_lat, h),
-            meridian,
-            transverse,
-            cos_lat,
+            omega_ie_n: Vec3([cos_lat * OMEGA_IE, L::from(0.0), sin_lat * -OMEGA_IE]),
+            omega_en_n: Vec3([east, -(v_n[0] * per_meridian), -(east * sin_lat * per_cos_lat)]),
+            gravity: parallel.nearby(sin_lat).gravity_down(self.gravity, h),
+            per_meridian,
+            per_transverse,
+            per_cos_lat,
         }
     }
 }
 
-/// Quantities at the middle of a step; radii include the height.
-struct Middle {
-    v_n: Vec3,
-    omega_ie_n: Vec3,
-    omega_en_n: Vec3,
-    gravity: Lanes,
-    meridian: Lanes,
-    transverse: Lanes,
-    cos_lat: Lanes,
+/// Quantities at the middle of a step.
+struct Middle<L> {
+    v_n: Vec3<L>,
+    omega_ie_n: Vec3<L>,
+    omega_en_n: Vec3<L>,
+    gravity: L,
+    /// 1/(R_N + h) (1/m).
+    per_meridian: L,
+    /// 1/(R_E + h) (1/m).
+    per_transverse: L,
+    per_cos_lat: L,
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::earth;
+    use crate::earth::{self, gravity_down, radii};
     use crate::frames::RollPitchYaw;
     use crate::units::DEG;
     use glam::{DQuat, DVec3};

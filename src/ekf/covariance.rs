@@ -1,11 +1,10 @@
-//! The covariance of eight runs in 3×3 blocks.
+//! The covariance of eight runs.
 //!
-//! Blocks: [`R`] position error (m, n), [`V`] velocity error (m/s, n), [`PSI`] attitude error (rad, n),
-//! then one block of three axes for each bias group, accelerometer groups first ([`BIAS`]).
-//! Only the blocks on and above the diagonal are stored and computed; diagonal blocks are kept exactly
-//! symmetric.
+//! States by threes: [`R`] position error (m, n), [`V`] velocity error (m/s, n), [`PSI`] attitude error
+//! (rad, n), then one triple of axes for each bias group, accelerometer groups first ([`BIAS`]). Only
+//! the upper triangle is stored, so the matrix is symmetric by construction.
 
-use crate::lanes::{Lanes, Mat3, Real, Vec3};
+use crate::lanes::{Lanes, Mat3, Real, Vec3, Wide};
 
 /// Position error block (m, n).
 pub const R: usize = 0;
@@ -18,78 +17,71 @@ pub const BIAS: usize = 3;
 /// The navigation blocks.
 pub const NAV: [usize; 3] = [R, V, PSI];
 
-/// Symmetric covariance of eight runs in 3×3 blocks.
+/// Symmetric covariance of eight runs.
 #[derive(Debug, Clone)]
 pub struct Covariance {
-    blocks: usize,
-    /// Row-major blocks; entries below the diagonal are unused.
-    p: Vec<Mat3>,
+    dim: usize,
+    /// Row-major; what is below the diagonal is unused.
+    p: Vec<Lanes>,
 }
 
 impl Covariance {
-    /// Zero covariance of `blocks` 3×3 blocks a side.
+    /// Zero covariance of `dim` states.
     #[must_use]
-    pub fn zeros(blocks: usize) -> Self {
-        Self { blocks, p: vec![Mat3::ZERO; blocks * blocks] }
-    }
-
-    /// Blocks a side.
-    #[must_use]
-    pub const fn blocks(&self) -> usize {
-        self.blocks
+    pub fn zeros(dim: usize) -> Self {
+        Self { dim, p: vec![Lanes::ZERO; dim * dim] }
     }
 
     /// States: rows of the matrix.
     #[must_use]
     pub const fn dim(&self) -> usize {
-        3 * self.blocks
+        self.dim
     }
 
-    /// Block (i, j), wherever it stands.
     #[inline(always)]
-    #[must_use]
-    pub fn block(&self, i: usize, j: usize) -> Mat3 {
-        if i <= j { self.p[i * self.blocks + j] } else { self.p[j * self.blocks + i].transpose() }
-    }
-
-    /// Block (i, j) above the diagonal, to be changed in place.
-    #[inline(always)]
-    pub(crate) fn upper_mut(&mut self, i: usize, j: usize) -> &mut Mat3 {
-        debug_assert!(i <= j);
-        &mut self.p[i * self.blocks + j]
-    }
-
-    /// Sets a diagonal block, from its upper triangle.
-    #[inline(always)]
-    pub(crate) fn set_diagonal_block(&mut self, i: usize, m: Mat3) {
-        let m = &m.0;
-        *self.upper_mut(i, i) =
-            Mat3([[m[0][0], m[0][1], m[0][2]], [m[0][1], m[1][1], m[1][2]], [m[0][2], m[1][2], m[2][2]]]);
+    fn index(&self, i: usize, j: usize) -> usize {
+        if i <= j { i * self.dim + j } else { j * self.dim + i }
     }
 
     /// Element (i, j) of the matrix.
     #[inline(always)]
     #[must_use]
-    pub fn get(&self, i: usize, j: usize) -> Lanes {
-        let (a, b) = (i.min(j), i.max(j));
-        self.p[(a / 3) * self.blocks + b / 3].0[a % 3][b % 3]
+    pub fn get<W: Wide>(&self, i: usize, j: usize) -> W {
+        W::load(&self.p[self.index(i, j)])
     }
 
     #[inline(always)]
-    fn set(&mut self, i: usize, j: usize, value: Lanes) {
-        let (a, b) = (i.min(j), i.max(j));
-        self.p[(a / 3) * self.blocks + b / 3].0[a % 3][b % 3] = value;
-        if a / 3 == b / 3 {
-            self.p[(a / 3) * self.blocks + b / 3].0[b % 3][a % 3] = value;
+    pub(super) fn set<W: Wide>(&mut self, i: usize, j: usize, value: W) {
+        let index = self.index(i, j);
+        value.store(&mut self.p[index]);
+    }
+
+    #[inline(always)]
+    pub(super) fn add<W: Wide>(&mut self, i: usize, j: usize, value: W) {
+        self.set(i, j, self.get::<W>(i, j) + value);
+    }
+
+    /// Elements (i, j), (i + 1, j), (i + 2, j).
+    #[inline(always)]
+    #[must_use]
+    pub fn triple<W: Wide>(&self, i: usize, j: usize) -> Vec3<W> {
+        Vec3([self.get(i, j), self.get(i + 1, j), self.get(i + 2, j)])
+    }
+
+    /// Adds to the upper triangle of a diagonal block of three states.
+    #[inline(always)]
+    pub(super) fn add_diagonal_block<W: Wide>(&mut self, block: usize, m: &Mat3<W>) {
+        for i in 0..3 {
+            for j in i..3 {
+                self.add(3 * block + i, 3 * block + j, m.0[i][j]);
+            }
         }
     }
 
     /// The variances of a block's three states.
-    #[inline(always)]
     #[must_use]
     pub fn variances(&self, block: usize) -> Vec3 {
-        let m = self.block(block, block);
-        Vec3([m.0[0][0], m.0[1][1], m.0[2][2]])
+        Vec3([0, 1, 2].map(|i| self.get(3 * block + i, 3 * block + i)))
     }
 
     /// One scalar measurement z = h·x + noise of variance r, in Joseph's form
@@ -97,29 +89,37 @@ impl Covariance {
     /// semi-definite for any r > 0. `h` lists (state, coefficient). The gain is left in `gain` (one entry
     /// a state, also used as scratch); the innovation variance is returned.
     #[inline(always)]
-    pub fn update(&mut self, h: &[(usize, Lanes)], r: f64, ph: &mut [Lanes], gain: &mut [Lanes]) -> Lanes {
-        let n = self.dim();
+    pub(super) fn update<W: Wide>(
+        &mut self,
+        h: &[(usize, W)],
+        r: f64,
+        ph: &mut [Lanes],
+        gain: &mut [Lanes],
+    ) -> W {
+        let n = self.dim;
         for i in 0..n {
-            ph[i] = Lanes::ZERO;
+            let mut sum = W::from(0.0);
             for (m, c) in h {
-                ph[i] += self.get(i, *m) * *c;
+                sum = self.get::<W>(i, *m).mul_add(*c, sum);
             }
+            sum.store(&mut ph[i]);
         }
-        let mut s = Lanes::splat(r);
+        let mut h_ph = W::from(0.0);
         for (m, c) in h {
-            s += ph[*m] * *c;
+            h_ph = W::load(&ph[*m]).mul_add(*c, h_ph);
         }
-        let inverse = Lanes::ONE / s;
+        let s = h_ph + r;
+        let inverse = W::from(1.0) / s;
         for i in 0..n {
-            gain[i] = ph[i] * inverse;
+            (W::load(&ph[i]) * inverse).store(&mut gain[i]);
         }
         // With M = (I − k hᵀ) P:  P⁺ = M (I − k hᵀ)ᵀ + r k kᵀ = M + (r k − M h) kᵀ.
-        let h_ph = s - Lanes::splat(r);
         for i in 0..n {
-            let residual = gain[i] * r - (ph[i] - gain[i] * h_ph);
+            let (ph_i, gain_i) = (W::load(&ph[i]), W::load(&gain[i]));
+            let residual = gain_i * r - (ph_i - gain_i * h_ph);
             for j in i..n {
-                let m = self.get(i, j) - gain[i] * ph[j];
-                self.set(i, j, m + residual * gain[j]);
+                let m = (-gain_i).mul_add(W::load(&ph[j]), self.get(i, j));
+                self.set(i, j, residual.mul_add(W::load(&gain[j]), m));
             }
         }
         s
@@ -134,7 +134,7 @@ impl Covariance {
         let mut sum = Lanes::ZERO;
         for i in 0..N {
             for j in 0..=i {
-                let mut a = self.get(states[i], states[j]);
+                let mut a: Lanes = self.get(states[i], states[j]);
                 for k in 0..j {
                     a -= l[i][k] * l[j][k];
                 }
@@ -153,7 +153,7 @@ impl Covariance {
     /// The matrix of one lane.
     #[must_use]
     pub fn lane(&self, lane: usize) -> nalgebra::DMatrix<f64> {
-        nalgebra::DMatrix::from_fn(self.dim(), self.dim(), |i, j| self.get(i, j)[lane])
+        nalgebra::DMatrix::from_fn(self.dim(), self.dim(), |i, j| self.get::<Lanes>(i, j)[lane])
     }
 }
 
@@ -167,7 +167,7 @@ mod tests {
         let n = 3 * blocks;
         let a = DMatrix::from_fn(n, n, |i, j| ((i * 7 + j * 3) % 11) as f64 / 11.0 - 0.4);
         let m = &a * a.transpose() + DMatrix::identity(n, n) * 0.1;
-        let mut p = Covariance::zeros(blocks);
+        let mut p = Covariance::zeros(n);
         for (i, j) in (0..n * n).map(|k| (k / n, k % n)) {
             p.set(i, j, Lanes::splat(m[(i, j)]));
         }

@@ -11,121 +11,112 @@
 
 use super::covariance::{PSI, R, V};
 use crate::earth::{E2, OMEGA_IE, gravity_down, radii};
-use crate::lanes::{Lanes, Mat3, Real, Vec3};
+use crate::lanes::{Mat3, Real, Vec3};
 use crate::strapdown::{StepTrace, Strapdown};
 use glam::DVec3;
 
 /// Longest step of the Earth terms (s).
 pub const EARTH_STEP_S: f64 = 0.2;
 
-/// Three rows of blocks of a matrix, R, V and PSI: the navigation rows of a block column of P.
-#[derive(Debug, Clone, Copy)]
-pub struct NavRows(pub [Mat3; 3]);
+/// A navigation error: triples [`R`], [`V`] and [`PSI`].
+pub type NavError<L> = [Vec3<L>; 3];
 
-/// A linear map of the navigation error: what it does to the navigation rows of a block column, given the
-/// summed accelerometer and gyroscope bias rows of the same column.
-pub trait RowMap {
-    /// The rows after the map.
+/// A linear map of the navigation error, given the errors of the accelerometer and gyroscope biases.
+pub trait ErrorMap<L> {
+    /// The error after the map.
     #[must_use]
-    fn apply(&self, x: &NavRows, accel: &Mat3, gyro: &Mat3) -> NavRows;
+    fn apply(&self, x: NavError<L>, accel: Vec3<L>, gyro: Vec3<L>) -> NavError<L>;
 }
 
 /// The part of the transition that changes with every sample. Errors of the sample's biases are those of
 /// the estimates: b_est − b.
 #[derive(Debug, Clone, Copy)]
-pub struct Sample {
+pub struct Sample<L> {
     /// C_b_n · dt (s).
-    c_dt: Mat3,
-    /// ∫ f_ib_n dt (m/s).
-    f_dt: Vec3,
-    dt: f64,
+    c_dt: Mat3<L>,
+    /// ½ ∫ f_ib_n dt (m/s).
+    half_f_dt: Vec3<L>,
+    half_dt: L,
 }
 
-impl Sample {
+impl<L: Real> Sample<L> {
     /// From what the strapdown passed through.
     #[inline(always)]
     #[must_use]
-    pub fn new(trace: &StepTrace, dt: f64) -> Self {
-        Self { c_dt: trace.c_b_n * dt, f_dt: trace.dv_n, dt }
+    pub fn new(trace: &StepTrace<L>, dt: f64) -> Self {
+        Self {
+            c_dt: trace.c_b_n.scaled(L::from(dt)),
+            half_f_dt: trace.dv_n * L::from(0.5),
+            half_dt: L::from(0.5 * dt),
+        }
     }
 
     /// C diag(variances) Cᵀ dt²: the noise of one sample of a sensor, in n.
     #[inline(always)]
     #[must_use]
-    pub fn rotated_noise(&self, variances: DVec3) -> Mat3 {
+    pub fn rotated_noise(&self, variances: DVec3) -> Mat3<L> {
+        let z = L::from(0.0);
+        let mut noise = Mat3([[z; 3]; 3]);
         if variances.x == variances.y && variances.x == variances.z {
-            let q = Lanes::splat(variances.x * self.dt * self.dt);
-            return Mat3::diagonal(Vec3([q; 3]));
+            for i in 0..3 {
+                noise.0[i][i] = self.half_dt * self.half_dt * (4.0 * variances.x);
+            }
+            return noise;
         }
-        let c = &self.c_dt;
-        let mut scaled = *c;
         for i in 0..3 {
+            let row = self.c_dt.0[i];
+            let scaled = Vec3([row[0] * variances.x, row[1] * variances.y, row[2] * variances.z]);
             for j in 0..3 {
-                scaled.0[i][j] = c.0[i][j] * variances[j];
+                noise.0[i][j] = scaled.dot(Vec3(self.c_dt.0[j]));
             }
         }
-        scaled * c.transpose()
+        noise
     }
 
-    /// What the sample's own gyroscope noise does to the velocity of the same sample: the covariance of
-    /// V and PSI it adds, −½ \[f_n dt ×\] q_psi.
+    /// What the sample's own gyroscope noise does to the velocity of the same sample: column j of the
+    /// covariance of V and PSI it adds, −½ \[f_n dt ×\] q_psi.
     #[inline(always)]
     #[must_use]
-    pub fn tilted_noise(&self, q_psi: &Mat3) -> Mat3 {
-        self.cross_f(q_psi, -0.5)
-    }
-
-    /// \[f_n dt ×\] m · scale.
-    #[inline(always)]
-    fn cross_f(&self, m: &Mat3, scale: f64) -> Mat3 {
-        let f = self.f_dt * scale;
-        let mut product = Mat3::ZERO;
-        for i in 0..3 {
-            let (k, l) = ((i + 1) % 3, (i + 2) % 3);
-            for j in 0..3 {
-                product.0[i][j] = f[k] * m.0[l][j] - f[l] * m.0[k][j];
-            }
-        }
-        product
+    pub fn tilted_noise(&self, q_psi: &Mat3<L>, j: usize) -> Vec3<L> {
+        Vec3([q_psi.0[0][j], q_psi.0[1][j], q_psi.0[2][j]]).cross(self.half_f_dt)
     }
 }
 
-impl RowMap for Sample {
+impl<L: Real> ErrorMap<L> for Sample<L> {
     /// Attitude first, velocity with its mean, position with the mean velocity: the second-order terms of
     /// the matrix exponential come with it.
     #[inline(always)]
-    fn apply(&self, x: &NavRows, accel: &Mat3, gyro: &Mat3) -> NavRows {
-        let x = &x.0;
-        let psi = x[PSI] - self.c_dt * *gyro;
-        let v = x[V] - (self.cross_f(&(x[PSI] + psi), 0.5) + self.c_dt * *accel);
-        let r = x[R] + (x[V] + v) * (0.5 * self.dt);
-        NavRows([r, v, psi])
+    fn apply(&self, x: NavError<L>, accel: Vec3<L>, gyro: Vec3<L>) -> NavError<L> {
+        let psi = x[PSI] - self.c_dt * gyro;
+        let v = x[V] + (x[PSI] + psi).cross(self.half_f_dt) - self.c_dt * accel;
+        let r = (x[V] + v).mul_add(self.half_dt, x[R]);
+        [r, v, psi]
     }
 }
 
 /// The blocks of F that the rotating, curved, heavy Earth contributes.
 #[derive(Debug, Clone, Copy)]
-pub struct EarthTerms {
+pub struct EarthTerms<L> {
     /// ∂(dr/dt)/∂r (1/s).
-    pub rr: Mat3,
+    pub rr: Mat3<L>,
     /// ∂(dv/dt)/∂r (1/s²).
-    pub vr: Mat3,
+    pub vr: Mat3<L>,
     /// ∂(dv/dt)/∂v (1/s).
-    pub vv: Mat3,
+    pub vv: Mat3<L>,
     /// ∂(dpsi/dt)/∂r (rad/(m s)).
-    pub psi_r: Mat3,
+    pub psi_r: Mat3<L>,
     /// ∂(dpsi/dt)/∂v (rad/m).
-    pub psi_v: Mat3,
+    pub psi_v: Mat3<L>,
     /// ∂(dpsi/dt)/∂psi (1/s).
-    pub psi_psi: Mat3,
+    pub psi_psi: Mat3<L>,
 }
 
-impl EarthTerms {
+impl<L: Real> EarthTerms<L> {
     /// At the nominal state.
     #[inline(always)]
     #[must_use]
-    pub fn at(ins: &Strapdown) -> Self {
-        let z = Lanes::ZERO;
+    pub fn at(ins: &Strapdown<L>) -> Self {
+        let (z, one) = (L::from(0.0), L::from(1.0));
         let (s, c) = ins.lat.sin_cos();
         let radii = radii(s);
         let (rn, re) = (radii.meridian + ins.h, radii.transverse + ins.h);
@@ -141,15 +132,14 @@ impl EarthTerms {
         // For r in metres: ∂/∂lat · 1/rn per metre north, −∂/∂h per metre down.
         let omega_ie = Vec3([c * OMEGA_IE, z, s * -OMEGA_IE]);
         let omega_en = Vec3([we, -wn, -(we * tan)]);
-        let d_ie_north = Vec3([s * -OMEGA_IE, z, c * -OMEGA_IE]) * (Lanes::ONE / rn);
+        let d_ie_north = Vec3([s * -OMEGA_IE, z, c * -OMEGA_IE]) * (one / rn);
         let east = -(we * dre / re);
-        let d_en_north =
-            Vec3([east, wn * drn / rn, -(east * tan) - we * (tan * tan + 1.0)]) * (Lanes::ONE / rn);
+        let d_en_north = Vec3([east, wn * drn / rn, -(east * tan) - we * (tan * tan + 1.0)]) * (one / rn);
         let d_en_down = Vec3([we / re, -(wn / rn), -(we * tan / re)]);
-        let d_en_v = Mat3([[z, Lanes::ONE / re, z], [-(Lanes::ONE / rn), z, z], [z, -(tan / re), z]]);
+        let d_en_v = Mat3([[z, one / re, z], [-(one / rn), z, z], [z, -(tan / re), z]]);
 
-        let coriolis = omega_ie * 2.0 + omega_en;
-        let mut v_north = -(d_ie_north * 2.0 + d_en_north).cross(ins.v_n);
+        let coriolis = omega_ie + omega_ie + omega_en;
+        let mut v_north = -(d_ie_north + d_ie_north + d_en_north).cross(ins.v_n);
         let mut v_down = -d_en_down.cross(ins.v_n);
         let (g_north, g_down) = gravity_gradient(ins, s, c);
         v_north[2] += g_north / rn;
@@ -163,7 +153,7 @@ impl EarthTerms {
             vr: columns(v_north, v_down),
             vv,
             psi_r: columns(psi_north, psi_down),
-            psi_v: d_en_v * -1.0,
+            psi_v: d_en_v.scaled(L::from(-1.0)),
             psi_psi: Mat3::skew(-(omega_ie + omega_en)),
         }
     }
@@ -171,40 +161,40 @@ impl EarthTerms {
 
 /// The Earth terms over a time step.
 #[derive(Debug, Clone, Copy)]
-pub struct EarthStep {
+pub struct EarthStep<L> {
     /// The terms.
-    pub terms: EarthTerms,
+    pub terms: EarthTerms<L>,
     /// How long they act (s).
     pub dt: f64,
 }
 
-impl RowMap for EarthStep {
+impl<L: Real> ErrorMap<L> for EarthStep<L> {
     #[inline(always)]
-    fn apply(&self, x: &NavRows, _accel: &Mat3, _gyro: &Mat3) -> NavRows {
-        let (t, dt, x) = (&self.terms, self.dt, &x.0);
-        NavRows([
-            x[R] + t.rr * x[R] * dt,
-            x[V] + (t.vr * x[R] + t.vv * x[V]) * dt,
-            x[PSI] + (t.psi_r * x[R] + t.psi_v * x[V] + t.psi_psi * x[PSI]) * dt,
-        ])
+    fn apply(&self, x: NavError<L>, _accel: Vec3<L>, _gyro: Vec3<L>) -> NavError<L> {
+        let (t, dt) = (&self.terms, L::from(self.dt));
+        [
+            (t.rr * x[R]).mul_add(dt, x[R]),
+            (t.vr * x[R] + t.vv * x[V]).mul_add(dt, x[V]),
+            (t.psi_r * x[R] + t.psi_v * x[V] + t.psi_psi * x[PSI]).mul_add(dt, x[PSI]),
+        ]
     }
 }
 
 /// The matrix with the given north and down columns; nothing depends on longitude.
 #[inline(always)]
-fn columns(north: Vec3, down: Vec3) -> Mat3 {
-    let z = Lanes::ZERO;
+fn columns<L: Real>(north: Vec3<L>, down: Vec3<L>) -> Mat3<L> {
+    let z = L::from(0.0);
     Mat3([[north[0], z, down[0]], [north[1], z, down[1]], [north[2], z, down[2]]])
 }
 
 /// (∂g/∂lat, ∂g/∂(down)) of the down component, by differences of the model itself: the step is exact
 /// enough (second order, 1e-9 relative) and follows whatever gravity model is in use.
 #[inline(always)]
-fn gravity_gradient(ins: &Strapdown, s: Lanes, c: Lanes) -> (Lanes, Lanes) {
+fn gravity_gradient<L: Real>(ins: &Strapdown<L>, s: L, c: L) -> (L, L) {
     const STEP_RAD: f64 = 1e-5;
     const STEP_M: f64 = 100.0;
     let (model, h) = (ins.gravity(), ins.h);
     let north = gravity_down(model, s + c * STEP_RAD, h) - gravity_down(model, s - c * STEP_RAD, h);
-    let down = gravity_down(model, s, h - STEP_M) - gravity_down(model, s, h + STEP_M);
+    let down = gravity_down(model, s, h + -STEP_M) - gravity_down(model, s, h + STEP_M);
     (north * (0.5 / STEP_RAD), down * (0.5 / STEP_M))
 }

@@ -1,16 +1,15 @@
 //! The filter itself: nominal state, bias estimates and covariance of eight runs.
 
 use super::belief::{Belief, BiasGroup};
-use super::covariance::{BIAS, Covariance, NAV, PSI, R, V};
-use super::dynamics::{EARTH_STEP_S, EarthStep, EarthTerms, NavRows, RowMap, Sample};
+use super::covariance::{BIAS, Covariance, PSI, R, V};
+use super::dynamics::{EARTH_STEP_S, EarthStep, EarthTerms, ErrorMap, NavError, Sample};
 use super::initial::{InitialSettings, psi_of_angles};
 use crate::frames::NavState;
 use crate::imu::{ImuSample, Sensor};
-use crate::lanes::{Lanes, Mat3, Vec3};
+use crate::lanes::{Kernel, Lanes, Level, Mat3, Vec3, Wide, dispatch};
 use crate::strapdown::Strapdown;
 use crate::units::DEG;
 use glam::DVec3;
-use multiversion::multiversion;
 use nalgebra::Matrix3;
 
 /// Error-state extended Kalman filter, closed loop.
@@ -36,6 +35,7 @@ pub struct Ekf {
     /// Angular rate of the last sample less its bias (rad/s), for the lever arm's velocity.
     pub(super) omega_ib_b: Vec3,
     pub(super) scratch: Scratch,
+    pub(super) level: Level,
 }
 
 /// Working vectors of the measurement update, one entry a state.
@@ -49,8 +49,8 @@ pub(super) struct Scratch {
 impl Scratch {
     /// The estimated errors of a block.
     #[inline(always)]
-    pub(super) fn of(&self, block: usize) -> Vec3 {
-        Vec3([self.error[3 * block], self.error[3 * block + 1], self.error[3 * block + 2]])
+    pub(super) fn of<W: Wide>(&self, block: usize) -> Vec3<W> {
+        Vec3([0, 1, 2].map(|i| W::load(&self.error[3 * block + i])))
     }
 }
 
@@ -68,14 +68,13 @@ impl Ekf {
             }
         }
         let groups = belief.groups.concat();
-        let mut p = Covariance::zeros(belief.blocks());
-        let diagonal = |v: DVec3| Mat3::diagonal(Vec3::splat(v));
-        let square = |sigma: [f64; 3]| diagonal(DVec3::from(sigma) * DVec3::from(sigma));
-        p.set_diagonal_block(R, square(initial.pos_sigma_m));
-        p.set_diagonal_block(V, square(initial.vel_sigma_m_s));
-        p.set_diagonal_block(PSI, attitude_covariance(about, initial.att_sigma_deg));
+        let mut p = Covariance::zeros(3 * belief.blocks());
+        let square = |sigma: [f64; 3]| Matrix3::from_diagonal(&sigma.map(|s| s * s).into());
+        add_block(&mut p, R, &square(initial.pos_sigma_m));
+        add_block(&mut p, V, &square(initial.vel_sigma_m_s));
+        add_block(&mut p, PSI, &attitude_covariance(about, initial.att_sigma_deg));
         for (g, group) in groups.iter().enumerate() {
-            p.set_diagonal_block(BIAS + g, diagonal(group.initial));
+            add_block(&mut p, BIAS + g, &Matrix3::from_diagonal(&group.initial.to_array().into()));
         }
         let dim = p.dim();
         let zeros = || vec![Lanes::ZERO; dim];
@@ -92,6 +91,7 @@ impl Ekf {
             earth_age: 0.0,
             omega_ib_b: Vec3::ZERO,
             scratch: Scratch { ph: zeros(), gain: zeros(), error: zeros() },
+            level: Level::best(),
         }
     }
 
@@ -117,106 +117,99 @@ impl Ekf {
     /// Blocks of the gyroscope biases.
     #[inline(always)]
     pub(super) fn gyro_blocks(&self) -> std::ops::Range<usize> {
-        BIAS + self.accel_groups..self.p.blocks()
+        BIAS + self.accel_groups..BIAS + self.bias.len()
     }
 
     /// The bias estimate of a sensor: the sum of its groups.
     #[inline(always)]
     #[must_use]
-    pub fn bias_of(&self, sensor: Sensor) -> Vec3 {
+    pub fn bias_of<W: Wide>(&self, sensor: Sensor) -> Vec3<W> {
         let (accel, gyro) = self.bias.split_at(self.accel_groups);
-        let mut sum = Vec3::ZERO;
+        let mut sum = Vec3::splat(DVec3::ZERO);
         for bias in if sensor == Sensor::Accel { accel } else { gyro } {
-            sum = sum + *bias;
+            sum = sum + bias.load();
         }
         sum
     }
 
     /// Advances by one IMU sample: mean rate (rad/s) and mean specific force (m/s²) over the interval.
     #[inline(always)]
-    fn predict(&mut self, omega_ib_b: Vec3, f_ib_b: Vec3) {
+    fn predict<W: Wide>(&mut self, ins: &mut Strapdown<W>, omega_ib_b: Vec3<W>, f_ib_b: Vec3<W>) {
         let dt = self.dt;
-        self.advance_biases();
-        self.omega_ib_b = omega_ib_b - self.bias_of(Sensor::Gyro);
+        self.advance_biases::<W>();
+        let omega_ib_b = omega_ib_b - self.bias_of(Sensor::Gyro);
         let f_ib_b = f_ib_b - self.bias_of(Sensor::Accel);
-        let trace = self.nominal.step(self.omega_ib_b * dt, f_ib_b * dt, dt);
-        let sample = Sample::new(&trace, dt);
+        self.omega_ib_b.store(omega_ib_b);
+        let seconds = W::from(dt);
+        let sample = Sample::new(&ins.step(omega_ib_b * seconds, f_ib_b * seconds, dt), dt);
         self.transform(&sample);
         self.add_white_noise(&sample);
         self.earth_age += dt;
         if self.earth_age + 0.5 * dt > EARTH_STEP_S {
-            self.apply_earth_terms();
+            self.apply_earth_terms(ins);
         }
     }
 
     /// b_k = phi b_{k−1} + w for estimates and covariance.
     #[inline(always)]
-    fn advance_biases(&mut self) {
-        let n = self.p.blocks();
-        for g in 0..self.bias.len() {
-            let (phi, innovation) = (self.phi[g], self.innovation[g]);
-            let block = BIAS + g;
-            for axis in 0..3 {
-                self.bias[g][axis] = self.bias[g][axis] * phi[axis];
+    fn advance_biases<W: Wide>(&mut self) {
+        let n = self.p.dim();
+        for m in 0..n - 3 * BIAS {
+            let (g, axis, state) = (m / 3, m % 3, 3 * BIAS + m);
+            let (phi, innovation) = (W::from(self.phi[g][axis]), W::from(self.innovation[g][axis]));
+            (W::load(&self.bias[g][axis]) * phi).store(&mut self.bias[g][axis]);
+            for i in 0..state {
+                self.p.set(i, state, self.p.get::<W>(i, state) * phi);
             }
-            for i in 0..block {
-                scale(self.p.upper_mut(i, block), DVec3::ONE, phi);
-            }
-            let diagonal = self.p.upper_mut(block, block);
-            scale(diagonal, phi, phi);
-            for axis in 0..3 {
-                diagonal.0[axis][axis] += Lanes::splat(innovation[axis]);
-            }
-            for j in block + 1..n {
-                scale(self.p.upper_mut(block, j), phi, DVec3::ONE);
+            self.p.set(state, state, (self.p.get::<W>(state, state) * phi).mul_add(phi, innovation));
+            for j in state + 1..n {
+                self.p.set(state, j, self.p.get::<W>(state, j) * phi);
             }
         }
     }
 
     /// The Earth terms over the time since they were last applied.
     #[inline(always)]
-    pub(super) fn apply_earth_terms(&mut self) {
+    pub(super) fn apply_earth_terms<W: Wide>(&mut self, ins: &Strapdown<W>) {
         if self.earth_age > 0.0 {
-            let step = EarthStep { terms: EarthTerms::at(&self.nominal), dt: self.earth_age };
+            let step = EarthStep { terms: EarthTerms::at(ins), dt: self.earth_age };
             self.earth_age = 0.0;
             self.transform(&step);
         }
     }
 
-    /// P⁺ = A P Aᵀ for a map A of the navigation rows: by block columns, then by block rows. Loops, so that
-    /// the map is compiled in two places only.
+    /// P⁺ = A P Aᵀ for a map A of the navigation error: by columns, then by rows.
     #[inline(always)]
-    fn transform(&mut self, map: &impl RowMap) {
-        // Navigation rows of A P: the navigation columns apart, the bias columns in place after them.
-        let mut nav = [NavRows([Mat3::ZERO; 3]); 3];
-        for j in 0..self.p.blocks() {
-            let x = NavRows([self.p.block(R, j), self.p.block(V, j), self.p.block(PSI, j)]);
-            let rows = map.apply(&x, &self.sum(self.accel_blocks(), j), &self.sum(self.gyro_blocks(), j));
-            if j < BIAS {
-                nav[j] = rows;
-            } else {
-                for i in NAV {
-                    *self.p.upper_mut(i, j) = rows.0[i];
-                }
+    fn transform<W: Wide>(&mut self, map: &impl ErrorMap<W>) {
+        // The navigation rows of A P: the navigation columns apart, the bias columns in place after them.
+        let mut nav = [[Lanes::ZERO; 3 * BIAS]; 3 * BIAS];
+        for j in 0..self.p.dim() {
+            let after = map.apply(
+                [R, V, PSI].map(|block| self.p.triple(3 * block, j)),
+                self.sum(self.accel_blocks(), j),
+                self.sum(self.gyro_blocks(), j),
+            );
+            for i in 0..3 * BIAS {
+                let value = after[i / 3][i % 3];
+                if j < 3 * BIAS { value.store(&mut nav[i][j]) } else { self.p.set(i, j, value) }
             }
         }
-        // A P Aᵀ: the same map on the transposed rows of A P, of which the upper blocks are kept.
-        for i in NAV {
-            let row = NavRows([nav[R].0[i].transpose(), nav[V].0[i].transpose(), nav[PSI].0[i].transpose()]);
-            let row = map.apply(&row, &self.sum(self.accel_blocks(), i), &self.sum(self.gyro_blocks(), i));
-            self.p.set_diagonal_block(i, row.0[i]);
-            for j in i + 1..BIAS {
-                *self.p.upper_mut(i, j) = row.0[j].transpose();
+        // A P Aᵀ: the same map on the rows of A P, of which the upper triangle is kept.
+        for i in 0..3 * BIAS {
+            let row: NavError<W> = [R, V, PSI].map(|b| Vec3([0, 1, 2].map(|k| W::load(&nav[i][3 * b + k]))));
+            let after = map.apply(row, self.sum(self.accel_blocks(), i), self.sum(self.gyro_blocks(), i));
+            for j in i..3 * BIAS {
+                self.p.set(i, j, after[j / 3][j % 3]);
             }
         }
     }
 
     /// The sum of bias blocks of column j.
     #[inline(always)]
-    fn sum(&self, blocks: std::ops::Range<usize>, j: usize) -> Mat3 {
-        let mut sum = self.p.block(blocks.start, j);
-        for i in blocks.start + 1..blocks.end {
-            sum = sum + self.p.block(i, j);
+    fn sum<W: Wide>(&self, blocks: std::ops::Range<usize>, j: usize) -> Vec3<W> {
+        let mut sum = self.p.triple(3 * blocks.start, j);
+        for block in blocks.start + 1..blocks.end {
+            sum = sum + self.p.triple(3 * block, j);
         }
         sum
     }
@@ -224,53 +217,78 @@ impl Ekf {
     /// White noise of one sample, held over dt: sigma² dt² into V and PSI, and the part of it that the
     /// sample itself carries on to R and V.
     #[inline(always)]
-    fn add_white_noise(&mut self, sample: &Sample) {
+    fn add_white_noise<W: Wide>(&mut self, sample: &Sample<W>) {
         let (accel, gyro) = (sample.rotated_noise(self.white[0]), sample.rotated_noise(self.white[1]));
-        let half = 0.5 * self.dt;
-        let p = &mut self.p;
-        *p.upper_mut(V, V) = p.block(V, V) + accel;
-        *p.upper_mut(R, V) = p.block(R, V) + accel * half;
-        *p.upper_mut(R, R) = p.block(R, R) + accel * (half * half);
-        *p.upper_mut(PSI, PSI) = p.block(PSI, PSI) + gyro;
-        *p.upper_mut(V, PSI) = p.block(V, PSI) + sample.tilted_noise(&gyro);
-    }
-}
-
-/// Brings the covariance up to the time of the last sample (the Earth terms lag by up to
-/// [`EARTH_STEP_S`]): to be called before it is looked at.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
-pub fn settle(ekf: &mut Ekf) {
-    ekf.apply_earth_terms();
-}
-
-/// diag(rows) m diag(columns), in place.
-#[inline(always)]
-fn scale(m: &mut Mat3, rows: DVec3, columns: DVec3) {
-    for i in 0..3 {
+        let half = W::from(0.5 * self.dt);
+        let to_position = accel.scaled(half);
+        self.p.add_diagonal_block(V, &accel);
+        self.p.add_diagonal_block(R, &to_position.scaled(half));
+        self.p.add_diagonal_block(PSI, &gyro);
         for j in 0..3 {
-            m.0[i][j] = m.0[i][j] * (rows[i] * columns[j]);
+            let tilted = sample.tilted_noise(&gyro, j);
+            for i in 0..3 {
+                self.p.add(3 * R + i, 3 * V + j, to_position.0[i][j]);
+                self.p.add(3 * V + i, 3 * PSI + j, tilted[i]);
+            }
         }
     }
 }
 
+/// Adds the same block to the diagonal of all lanes.
+fn add_block(p: &mut Covariance, block: usize, m: &Matrix3<f64>) {
+    p.add_diagonal_block(block, &Mat3([0, 1, 2].map(|i| [0, 1, 2].map(|j| Lanes::splat(m[(i, j)])))));
+}
+
 /// Covariance of psi_n for standard deviations of roll, pitch and yaw (degrees).
-fn attitude_covariance(state: &NavState, sigma_deg: [f64; 3]) -> Mat3 {
+fn attitude_covariance(state: &NavState, sigma_deg: [f64; 3]) -> Matrix3<f64> {
     let psi = psi_of_angles(state.q_b_n);
     let variances = sigma_deg.map(|s| (s * DEG).powi(2));
-    let p = psi * Matrix3::from_diagonal(&variances.into()) * psi.transpose();
-    Mat3(std::array::from_fn(|row| std::array::from_fn(|column| Lanes::splat(p[(row, column)]))))
+    psi * Matrix3::from_diagonal(&variances.into()) * psi.transpose()
+}
+
+/// Brings the covariance up to the time of the last sample (the Earth terms lag by up to
+/// [`EARTH_STEP_S`]): to be called before it is looked at.
+pub fn settle(ekf: &mut Ekf) {
+    dispatch(ekf.level, Settle(ekf));
+}
+
+struct Settle<'a>(&'a mut Ekf);
+
+impl Kernel for Settle<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<W: Wide>(self) {
+        let ins = self.0.nominal.load::<W>();
+        self.0.apply_earth_terms(&ins);
+    }
 }
 
 /// Advances a filter through IMU samples: the same ideal samples for all runs plus the errors of each,
-/// accelerometer (m/s²) and gyroscope (rad/s). Compiled for the vector units of the machine and
-/// dispatched at run time.
+/// accelerometer (m/s²) and gyroscope (rad/s).
 ///
 /// # Panics
 /// When samples and errors are not equally many.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
 pub fn advance(ekf: &mut Ekf, samples: &[ImuSample], errors: &[[Vec3; 2]]) {
     assert_eq!(samples.len(), errors.len(), "one error for each sample");
-    for (sample, [accel, gyro]) in samples.iter().zip(errors) {
-        ekf.predict(Vec3::splat(sample.omega_ib_b) + *gyro, Vec3::splat(sample.f_ib_b) + *accel);
+    dispatch(ekf.level, Advance { ekf, samples, errors });
+}
+
+struct Advance<'a> {
+    ekf: &'a mut Ekf,
+    samples: &'a [ImuSample],
+    errors: &'a [[Vec3; 2]],
+}
+
+impl Kernel for Advance<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<W: Wide>(self) {
+        let mut ins = self.ekf.nominal.load::<W>();
+        for (sample, [accel, gyro]) in self.samples.iter().zip(self.errors) {
+            let omega_ib_b = Vec3::splat(sample.omega_ib_b) + gyro.load();
+            let f_ib_b = Vec3::splat(sample.f_ib_b) + accel.load();
+            self.ekf.predict(&mut ins, omega_ib_b, f_ib_b);
+        }
+        self.ekf.nominal.store(&ins);
     }
 }

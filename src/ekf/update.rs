@@ -4,9 +4,10 @@ use super::belief::MAX_BLOCKS;
 use super::covariance::{BIAS, PSI, R, V};
 use super::filter::Ekf;
 use crate::earth::{OMEGA_IE, radii};
-use crate::lanes::{Lanes, Mat3, Quat, Real, Vec3};
+use crate::lanes::{Kernel, Lanes, Mat3, Quat, Real, Vec3, Wide, dispatch, rounded};
+use crate::strapdown::Strapdown;
 use glam::DVec3;
-use multiversion::multiversion;
+use std::f64::consts::TAU;
 
 /// A fix for each of eight runs; the standard deviations are the filter's belief and the same for all.
 #[derive(Debug, Clone, Copy)]
@@ -32,12 +33,13 @@ const MAX_ROW: usize = 4 + 3 * MAX_BLOCKS;
 
 impl Ekf {
     #[inline(always)]
-    fn update(&mut self, fix: &Fix) -> Lanes {
-        self.apply_earth_terms();
+    fn use_fix<W: Wide>(&mut self, fix: &Fix) -> W {
+        let ins = self.nominal.load::<W>();
+        self.apply_earth_terms(&ins);
         self.scratch.error.fill(Lanes::ZERO);
-        let antenna = Antenna::new(self, fix);
-        let [position, velocity] = self.innovation_at(fix, &antenna);
-        let mut nis = Lanes::ZERO;
+        let antenna = Antenna::new(&ins, self.omega_ib_b.load(), fix.lever_arm_b);
+        let [position, velocity] = antenna.innovation(&ins, fix);
+        let mut nis = W::from(0.0);
         for axis in 0..3 {
             let row = antenna.position_row(axis);
             nis += self.scalar(row.entries(), position[axis], fix.pos_sigma_m[axis].powi(2));
@@ -48,7 +50,7 @@ impl Ekf {
                 nis += self.scalar(row.entries(), velocity[axis], fix.vel_sigma_m_s[axis].powi(2));
             }
         }
-        self.correct();
+        self.correct(ins);
         nis
     }
 
@@ -56,101 +58,87 @@ impl Ekf {
     /// velocity zero where none is measured.
     #[must_use]
     pub fn innovation(&self, fix: &Fix) -> [Vec3; 2] {
-        self.innovation_at(fix, &Antenna::new(self, fix))
-    }
-
-    #[inline(always)]
-    fn innovation_at(&self, fix: &Fix, antenna: &Antenna) -> [Vec3; 2] {
-        let velocity = fix.v_n.map(|v_n| self.nominal.v_n + antenna.swing_n - v_n);
-        [self.position_innovation(fix, antenna), velocity.unwrap_or(Vec3::ZERO)]
-    }
-
-    /// Estimated less measured antenna position, metres north, east, down.
-    #[inline(always)]
-    fn position_innovation(&self, fix: &Fix, antenna: &Antenna) -> Vec3 {
-        let (s, c) = self.nominal.lat.sin_cos();
-        let r = radii(s);
-        let h = self.nominal.h;
-        // longitudes may differ by a whole turn
-        let turns = ((self.nominal.lon - fix.lon) * (1.0 / std::f64::consts::TAU)).map(f64::round_ties_even);
-        let dlon = self.nominal.lon - fix.lon - turns * std::f64::consts::TAU;
-        let imu =
-            Vec3([(self.nominal.lat - fix.lat) * (r.meridian + h), dlon * (r.transverse + h) * c, fix.h - h]);
-        imu + antenna.arm_n
+        Antenna::new(&self.nominal, self.omega_ib_b, fix.lever_arm_b).innovation(&self.nominal, fix)
     }
 
     /// One scalar: innovation z = h·error + noise of variance r; returns its NIS.
     #[inline(always)]
-    fn scalar(&mut self, h: &[(usize, Lanes)], z: Lanes, r: f64) -> Lanes {
+    fn scalar<W: Wide>(&mut self, h: &[(usize, W)], z: W, r: f64) -> W {
         let scratch = &mut self.scratch;
         let s = self.p.update(h, r, &mut scratch.ph, &mut scratch.gain);
         let mut innovation = z;
         for (i, c) in h {
-            innovation -= *c * scratch.error[*i];
+            innovation -= *c * W::load(&scratch.error[*i]);
         }
         for (error, gain) in scratch.error.iter_mut().zip(&scratch.gain) {
-            *error += *gain * innovation;
+            W::load(gain).mul_add(innovation, W::load(error)).store(error);
         }
         innovation * innovation / s
     }
 
     /// Takes the estimated error out of the nominal state and the biases.
     #[inline(always)]
-    fn correct(&mut self) {
-        let error =
-            |block: usize| -> Vec3 { Vec3(std::array::from_fn(|i| self.scratch.error[3 * block + i])) };
-        let (dr, dv, psi) = (error(R), error(V), error(PSI));
-        let (s, c) = self.nominal.lat.sin_cos();
+    fn correct<W: Wide>(&mut self, mut ins: Strapdown<W>) {
+        let (dr, dv, psi) = (self.scratch.of::<W>(R), self.scratch.of(V), self.scratch.of(PSI));
+        let (s, c) = ins.lat.sin_cos();
         let radii = radii(s);
-        let nominal = &mut self.nominal;
-        nominal.lon -= dr[1] / ((radii.transverse + nominal.h) * c);
-        nominal.lat -= dr[0] / (radii.meridian + nominal.h);
-        nominal.h += dr[2];
-        nominal.v_n = nominal.v_n - dv;
-        nominal.q_b_n = (Quat::from_rotation_vector(-psi) * nominal.q_b_n).renormalised();
+        ins.lon -= dr[1] / ((radii.transverse + ins.h) * c);
+        ins.lat -= dr[0] / (radii.meridian + ins.h);
+        ins.h += dr[2];
+        ins.v_n = ins.v_n - dv;
+        ins.q_b_n = (Quat::from_rotation_vector(-psi) * ins.q_b_n).renormalised();
+        self.nominal.store(&ins);
         for (g, bias) in self.bias.iter_mut().enumerate() {
-            *bias = *bias - self.scratch.of(BIAS + g);
+            bias.store(bias.load::<W>() - self.scratch.of(BIAS + g));
         }
     }
 }
 
 /// Uses a fix: up to six scalar updates in sequence, then the correction of the nominal state. Returns the
-/// normalised innovation squared (NIS) of the fix. Compiled for the vector units of the machine and
-/// dispatched at run time.
-#[multiversion(targets("x86_64+avx512f+avx512vl+avx512dq+avx512bw", "x86_64+avx2+fma"))]
+/// normalised innovation squared (NIS) of the fix.
 pub fn update(ekf: &mut Ekf, fix: &Fix) -> Lanes {
-    ekf.update(fix)
+    dispatch(ekf.level, Update { ekf, fix })
+}
+
+struct Update<'a> {
+    ekf: &'a mut Ekf,
+    fix: &'a Fix,
+}
+
+impl Kernel for Update<'_> {
+    type Output = Lanes;
+    #[inline(always)]
+    fn run<W: Wide>(self) -> Lanes {
+        let mut nis = Lanes::ZERO;
+        self.ekf.use_fix::<W>(self.fix).store(&mut nis);
+        nis
+    }
 }
 
 /// Where the antenna is and how it moves about the IMU, and the measurement rows that follow.
-struct Antenna {
+struct Antenna<L> {
     has_arm: bool,
     /// Lever arm in n (m).
-    arm_n: Vec3,
+    arm_n: Vec3<L>,
     /// Velocity of the antenna about the IMU, C (omega_eb_b × l), in n (m/s).
-    swing_n: Vec3,
+    swing_n: Vec3<L>,
     /// What an attitude error does to it: −\[C (omega_ib_b × l) ×\] + \[omega_ie_n ×\] \[C l ×\].
-    of_psi: Mat3,
+    of_psi: Mat3<L>,
     /// What a gyroscope bias error does to it: C \[l ×\].
-    of_bias: Mat3,
+    of_bias: Mat3<L>,
 }
 
-impl Antenna {
+impl<W: Wide> Antenna<W> {
     #[inline(always)]
-    fn new(ekf: &Ekf, fix: &Fix) -> Self {
-        let has_arm = fix.lever_arm_b != DVec3::ZERO;
-        if !has_arm {
-            let (z, m) = (Vec3::ZERO, Mat3::ZERO);
-            return Self { has_arm, arm_n: z, swing_n: z, of_psi: m, of_bias: m };
-        }
-        let c_b_n = ekf.nominal.q_b_n.to_matrix();
-        let arm_b = Vec3::splat(fix.lever_arm_b);
+    fn new(ins: &Strapdown<W>, omega_ib_b: Vec3<W>, lever_arm_b: DVec3) -> Self {
+        let c_b_n = ins.q_b_n.to_matrix();
+        let arm_b = Vec3::splat(lever_arm_b);
         let arm_n = c_b_n * arm_b;
-        let (s, c) = ekf.nominal.lat.sin_cos();
-        let omega_ie_n = Vec3([c * OMEGA_IE, Lanes::ZERO, s * -OMEGA_IE]);
-        let inertial_n = c_b_n * ekf.omega_ib_b.cross(arm_b);
+        let (s, c) = ins.lat.sin_cos();
+        let omega_ie_n = Vec3([c * OMEGA_IE, W::from(0.0), s * -OMEGA_IE]);
+        let inertial_n = c_b_n * omega_ib_b.cross(arm_b);
         Self {
-            has_arm,
+            has_arm: lever_arm_b != DVec3::ZERO,
             arm_n,
             swing_n: inertial_n - omega_ie_n.cross(arm_n),
             of_psi: Mat3::skew(omega_ie_n) * Mat3::skew(arm_n) - Mat3::skew(inertial_n),
@@ -158,9 +146,23 @@ impl Antenna {
         }
     }
 
+    /// Estimated less measured position (m) and velocity (m/s) of the antenna, north, east, down.
+    #[inline(always)]
+    fn innovation(&self, ins: &Strapdown<W>, fix: &Fix) -> [Vec3<W>; 2] {
+        let (s, c) = ins.lat.sin_cos();
+        let r = radii(s);
+        let (lat, lon, h) = (W::load(&fix.lat), W::load(&fix.lon), W::load(&fix.h));
+        // longitudes may differ by whole turns
+        let dlon = ins.lon - lon;
+        let dlon = dlon - rounded(dlon * (1.0 / TAU)) * TAU;
+        let (north, east) = ((ins.lat - lat) * (r.meridian + ins.h), dlon * (r.transverse + ins.h) * c);
+        let velocity = fix.v_n.map(|v_n| ins.v_n + self.swing_n - v_n.load());
+        [Vec3([north, east, h - ins.h]) + self.arm_n, velocity.unwrap_or(Vec3::splat(DVec3::ZERO))]
+    }
+
     /// Position of the antenna: delta r_n − \[C l ×\] psi_n.
     #[inline(always)]
-    fn position_row(&self, axis: usize) -> Row {
+    fn position_row(&self, axis: usize) -> Row<W> {
         let mut row = Row::new(3 * R + axis);
         if self.has_arm {
             row.push3(3 * PSI, Mat3::skew(-self.arm_n).0[axis]);
@@ -170,7 +172,7 @@ impl Antenna {
 
     /// Velocity of the antenna: delta v_n + `of_psi` psi_n + C \[l ×\] delta b_g.
     #[inline(always)]
-    fn velocity_row(&self, axis: usize, gyro_blocks: std::ops::Range<usize>) -> Row {
+    fn velocity_row(&self, axis: usize, gyro_blocks: std::ops::Range<usize>) -> Row<W> {
         let mut row = Row::new(3 * V + axis);
         if self.has_arm {
             row.push3(3 * PSI, self.of_psi.0[axis]);
@@ -183,21 +185,21 @@ impl Antenna {
 }
 
 /// One measurement row: (state, coefficient), without allocation.
-struct Row {
-    entries: [(usize, Lanes); MAX_ROW],
+struct Row<L> {
+    entries: [(usize, L); MAX_ROW],
     len: usize,
 }
 
-impl Row {
+impl<L: Real> Row<L> {
     #[inline(always)]
     fn new(state: usize) -> Self {
-        let mut entries = [(0, Lanes::ZERO); MAX_ROW];
-        entries[0] = (state, Lanes::ONE);
+        let mut entries = [(0, L::from(0.0)); MAX_ROW];
+        entries[0] = (state, L::from(1.0));
         Self { entries, len: 1 }
     }
 
     #[inline(always)]
-    fn push3(&mut self, first: usize, coefficients: [Lanes; 3]) {
+    fn push3(&mut self, first: usize, coefficients: [L; 3]) {
         for (i, c) in coefficients.into_iter().enumerate() {
             self.entries[self.len] = (first + i, c);
             self.len += 1;
@@ -205,7 +207,7 @@ impl Row {
     }
 
     #[inline(always)]
-    fn entries(&self) -> &[(usize, Lanes)] {
+    fn entries(&self) -> &[(usize, L)] {
         &self.entries[..self.len]
     }
 }
@@ -214,19 +216,10 @@ impl Ekf {
     /// The six measurement rows (position, velocity) of the first lane, dense.
     #[must_use]
     pub fn measurement_rows(&self, lever_arm_b: DVec3) -> Vec<Vec<f64>> {
-        let fix = Fix {
-            lat: self.nominal.lat,
-            lon: self.nominal.lon,
-            h: self.nominal.h,
-            v_n: None,
-            pos_sigma_m: DVec3::ONE,
-            vel_sigma_m_s: DVec3::ONE,
-            lever_arm_b,
-        };
-        let antenna = Antenna::new(self, &fix);
+        let antenna = Antenna::new(&self.nominal, self.omega_ib_b, lever_arm_b);
         let position = (0..3).map(|axis| antenna.position_row(axis));
         let velocity = (0..3).map(|axis| antenna.velocity_row(axis, self.gyro_blocks()));
-        let dense = |row: Row| {
+        let dense = |row: Row<Lanes>| {
             let mut dense = vec![0.0; self.p.dim()];
             row.entries().iter().for_each(|(i, c)| dense[*i] += c[0]);
             dense

@@ -320,14 +320,16 @@ impl EpochLanes {
 /// Jacobian at the true attitude.
 fn standard_deviations(ekf: &Ekf, jacobian: &[DVec3; 3]) -> [Lanes; REPORTED] {
     let (r, v) = (ekf.p.variances(R), ekf.p.variances(V));
-    let psi = ekf.p.block(PSI, PSI);
+
     std::array::from_fn(|i| match i {
         0..3 => r[i].sqrt(),
         3..6 => v[i - 3].sqrt(),
         _ => {
             let j = jacobian[i - 6];
-            let variance =
-                (0..9).fold(Lanes::ZERO, |sum, k| sum + psi.0[k / 3][k % 3] * (j[k / 3] * j[k % 3]));
+            let variance = (0..9).fold(Lanes::ZERO, |sum, k| {
+                let covariance: Lanes = ekf.p.get(3 * PSI + k / 3, 3 * PSI + k % 3);
+                sum + covariance * (j[k / 3] * j[k % 3])
+            });
             variance.sqrt() * (1.0 / DEG)
         }
     })

@@ -1,0 +1,205 @@
+//! Eight lanes in the registers of the machine, chosen at run time.
+#![allow(unsafe_code, reason = "vector instructions, used only after the processor was asked for them")]
+
+use super::{Lanes, Real};
+
+/// Eight lanes as a kernel computes with them.
+pub trait Wide: Real {
+    /// From memory.
+    #[must_use]
+    fn load(lanes: &Lanes) -> Self;
+    /// To memory.
+    fn store(self, lanes: &mut Lanes);
+}
+
+impl Wide for Lanes {
+    #[inline(always)]
+    fn load(lanes: &Lanes) -> Self {
+        *lanes
+    }
+    #[inline(always)]
+    fn store(self, lanes: &mut Lanes) {
+        *lanes = self;
+    }
+}
+
+/// What the processor can do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Level {
+    /// Whatever the compiler makes of plain arrays.
+    Portable,
+    /// Two registers of four, fused multiply-add.
+    Avx2,
+    /// One register of eight, fused multiply-add.
+    Avx512,
+}
+
+impl Level {
+    /// The best of this machine.
+    #[must_use]
+    pub fn best() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        {
+            if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") {
+                return Self::Avx512;
+            }
+            if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+                return Self::Avx2;
+            }
+        }
+        Self::Portable
+    }
+
+    /// Whether this machine has it.
+    fn is_here(self) -> bool {
+        self as u8 <= Self::best() as u8
+    }
+}
+
+/// A computation written for any width. `run` and all it calls must be `#[inline(always)]`: what is not
+/// inlined into the dispatching function is not compiled for the wider units.
+pub(crate) trait Kernel {
+    /// What it returns.
+    type Output;
+    /// Computes with registers of type `W`.
+    fn run<W: Wide>(self) -> Self::Output;
+}
+
+/// Runs a kernel at a level, or portably where the machine does not have it.
+pub(crate) fn dispatch<K: Kernel>(level: Level, kernel: K) -> K::Output {
+    match level {
+        // Safety: the processor has what the functions were compiled for.
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx512 if level.is_here() => unsafe { x86::avx512(kernel) },
+        #[cfg(target_arch = "x86_64")]
+        Level::Avx2 if level.is_here() => unsafe { x86::avx2(kernel) },
+        _ => kernel.run::<Lanes>(),
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    //! The register types are private to this module: they exist only inside the two functions below,
+    //! whose caller has asked the processor. That is why every `unsafe` here is sound.
+
+    use super::{Kernel, Lanes, Real, Wide};
+    use crate::lanes::derived_operators;
+    use std::arch::x86_64::*;
+    use std::ops::{Add, Div, Mul, Neg, Sub};
+
+    #[target_feature(enable = "avx512f,avx512vl")]
+    pub(super) fn avx512<K: Kernel>(kernel: K) -> K::Output {
+        kernel.run::<Avx512>()
+    }
+
+    #[target_feature(enable = "avx2,fma")]
+    pub(super) fn avx2<K: Kernel>(kernel: K) -> K::Output {
+        kernel.run::<Avx2>()
+    }
+
+    macro_rules! operator {
+        ($name:ident, $count:literal, $trait:ident, $method:ident, $intrinsic:ident) => {
+            impl $trait for $name {
+                type Output = Self;
+                #[inline(always)]
+                fn $method(mut self, other: Self) -> Self {
+                    for i in 0..$count {
+                        self.0[i] = unsafe { $intrinsic(self.0[i], other.0[i]) };
+                    }
+                    self
+                }
+            }
+        };
+    }
+
+    /// Eight lanes in `$count` registers of `$width` lanes.
+    macro_rules! wide {
+        ($name:ident, $register:ident, $count:literal, $width:literal, $set:ident, $load:ident, $store:ident,
+         $add:ident, $sub:ident, $mul:ident, $div:ident, $sqrt:ident, $fma:ident) => {
+            #[derive(Clone, Copy)]
+            struct $name([$register; $count]);
+            operator!($name, $count, Add, add, $add);
+            operator!($name, $count, Sub, sub, $sub);
+            operator!($name, $count, Mul, mul, $mul);
+            operator!($name, $count, Div, div, $div);
+            derived_operators!($name);
+            impl From<f64> for $name {
+                #[inline(always)]
+                fn from(value: f64) -> Self {
+                    Self(unsafe { [$set(value); $count] })
+                }
+            }
+            impl Neg for $name {
+                type Output = Self;
+                #[inline(always)]
+                fn neg(self) -> Self {
+                    Self::from(-0.0) - self
+                }
+            }
+            impl Real for $name {
+                #[inline(always)]
+                fn sqrt(mut self) -> Self {
+                    for i in 0..$count {
+                        self.0[i] = unsafe { $sqrt(self.0[i]) };
+                    }
+                    self
+                }
+                #[inline(always)]
+                fn mul_add(mut self, factor: Self, term: Self) -> Self {
+                    for i in 0..$count {
+                        self.0[i] = unsafe { $fma(self.0[i], factor.0[i], term.0[i]) };
+                    }
+                    self
+                }
+            }
+            impl Wide for $name {
+                #[inline(always)]
+                fn load(lanes: &Lanes) -> Self {
+                    let mut result = Self::from(0.0);
+                    for i in 0..$count {
+                        // Lanes is aligned to 64 bytes and eight values long
+                        result.0[i] = unsafe { $load(lanes.0.as_ptr().add($width * i)) };
+                    }
+                    result
+                }
+                #[inline(always)]
+                fn store(self, lanes: &mut Lanes) {
+                    for i in 0..$count {
+                        unsafe { $store(lanes.0.as_mut_ptr().add($width * i), self.0[i]) };
+                    }
+                }
+            }
+        };
+    }
+
+    wide!(
+        Avx512,
+        __m512d,
+        1,
+        8,
+        _mm512_set1_pd,
+        _mm512_load_pd,
+        _mm512_store_pd,
+        _mm512_add_pd,
+        _mm512_sub_pd,
+        _mm512_mul_pd,
+        _mm512_div_pd,
+        _mm512_sqrt_pd,
+        _mm512_fmadd_pd
+    );
+    wide!(
+        Avx2,
+        __m256d,
+        2,
+        4,
+        _mm256_set1_pd,
+        _mm256_load_pd,
+        _mm256_store_pd,
+        _mm256_add_pd,
+        _mm256_sub_pd,
+        _mm256_mul_pd,
+        _mm256_div_pd,
+        _mm256_sqrt_pd,
+        _mm256_fmadd_pd
+    );
+}
