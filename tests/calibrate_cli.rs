@@ -82,8 +82,16 @@ fn recordings_become_a_model_file_and_its_curves() {
         json(dir.path(), &["calibrate", "runs", "--model", "N1", "--estimator", "all", "-o", "imu.toml"]);
     assert_eq!(out["fits"].as_array().unwrap().len(), 3);
     let replicates = out["replicates"].as_array().unwrap();
-    assert_eq!(replicates.len(), 12);
+    assert_eq!(replicates.len(), 6);
     assert!(replicates.iter().all(|r| r["verdict"] == "normal"), "{replicates:?}");
+    for replicate in replicates {
+        assert_eq!(replicate["scores"]["y"]["noise"].as_array().unwrap().len(), 13);
+        // Three estimators, four parameters each.
+        let left_out = replicate["left_out"].as_array().unwrap();
+        assert!(
+            left_out.len() == 3 && left_out.iter().all(|l| l["parameters"].as_array().unwrap().len() == 4)
+        );
+    }
     let model = Composite::new(truth().to_vec());
     for estimator in ["awv", "sr-awv", "dr-awv"] {
         let file =

@@ -22,7 +22,7 @@ mod spec;
 mod spread;
 
 pub use average::{AverageError, Estimator, Replicate, Trim, average};
-pub use diagnosis::{LeftOut, ReplicateDiagnosis, Verdict, advice, diagnose, large};
+pub use diagnosis::{Alarm, AxisScores, Diagnosis, LeftOut, Movement, Verdict, advice, diagnose};
 pub use fit::{Fit, FitError, fit};
 pub use goodness::Goodness;
 pub use inference::{Bootstrap, Inference, ParameterInterval, infer};

@@ -42,6 +42,14 @@ impl SamplingLaw {
         Self { per_coefficient, correlation, factor }
     }
 
+    /// The law of the first so many levels.
+    pub(super) fn first(&self, levels: usize) -> Self {
+        let correlation = self.correlation.view((0, 0), (levels, levels)).into_owned();
+        // The leading block of a lower triangular factor is the factor of the leading block.
+        let factor = self.factor.view((0, 0), (levels, levels)).into_owned();
+        Self { per_coefficient: self.per_coefficient[..levels].to_vec(), correlation, factor }
+    }
+
     /// Degrees of freedom of the classical wavelet variance of a signal of so many samples.
     pub(super) fn edof(&self, samples: usize) -> Vec<f64> {
         let count = |i: usize| crate::wavelet::coefficient_count(samples, i as u32 + 1) as f64;

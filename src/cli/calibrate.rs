@@ -5,7 +5,8 @@ use super::tuning::TuningArgs;
 use super::{Failure, Session, parse, read};
 use nav_sim::calibration::{
     AverageError, Bootstrap, CalibrationError, Cause, Estimator, FitError, Group, ModelSpec, Outcome, Pool,
-    Replicate, Settings, SpecError, Trim, Weighting, calibrate, fit_curve, grouped, infer, replicates,
+    Replicate, Settings, SpecError, Trim, Weighting, calibrate, diagnose, fit_curve, grouped, infer,
+    replicates,
 };
 use nav_sim::data::atomic;
 use nav_sim::data::curve_file::{self, NamedCurve};
@@ -336,12 +337,13 @@ fn finish(
         model_file::write(model, &note.model_file(groups, &own, settings))?;
         files.extend([model, curves].map(|p| p.display().to_string()));
     }
+    let diagnoses = diagnose(groups, outcomes, settings);
     if session.json() {
-        let json = report::json(&FitsFile::new(groups, outcomes, settings, files.clone()));
+        let json = report::json(&FitsFile::new(groups, outcomes, &diagnoses, settings, files.clone()));
         session.printer.result(json.trim_end());
     } else {
         let fits = outcomes.iter().map(|o| report::describe(&groups[o.group], o, settings));
-        let texts = fits.chain(groups.iter().filter_map(|g| report::describe_replicates(g, settings)));
+        let texts = fits.chain(report::describe_replicates(&diagnoses, settings.rate_hz));
         session.printer.result(&texts.collect::<Vec<_>>().join("\n\n"));
     }
     for file in files {

@@ -1,10 +1,10 @@
 //! Fitted models as JSON and as words.
 
 use super::curves::tau_s;
-use super::replicates::{ReplicateEntry, replicate_entries};
+use super::replicates::ReplicateEntry;
 use crate::calibration::{
-    Estimator, Goodness, Group, Inference, Outcome, ParameterInterval, Settings, Share, correlation_time_s,
-    percent, shares,
+    Diagnosis, Estimator, Goodness, Group, Inference, Outcome, ParameterInterval, Settings, Share,
+    correlation_time_s, percent, shares,
 };
 use crate::imu::Sensor;
 use crate::noise::{Composite, Process};
@@ -23,7 +23,7 @@ pub struct FitsFile {
     pub model: String,
     /// One entry a fit.
     pub fits: Vec<FitEntry>,
-    /// One entry a replicate of each group: whether it is abnormal.
+    /// One entry a recording and sensor: whether it is abnormal.
     pub replicates: Vec<ReplicateEntry>,
     /// Files written.
     pub files: Vec<String>,
@@ -139,13 +139,20 @@ impl FitEntry {
 impl FitsFile {
     /// The file of some outcomes.
     #[must_use]
-    pub fn new(groups: &[Group], outcomes: &[Outcome], settings: &Settings, files: Vec<String>) -> Self {
+    pub fn new(
+        groups: &[Group],
+        outcomes: &[Outcome],
+        diagnoses: &[Diagnosis],
+        settings: &Settings,
+        files: Vec<String>,
+    ) -> Self {
+        let rate_hz = settings.rate_hz;
         Self {
             schema_version: 1,
-            rate_hz: settings.rate_hz,
+            rate_hz,
             model: settings.spec.to_string(),
-            fits: outcomes.iter().map(|o| FitEntry::new(&groups[o.group], o, settings.rate_hz)).collect(),
-            replicates: groups.iter().flat_map(|g| replicate_entries(g, settings)).collect(),
+            fits: outcomes.iter().map(|o| FitEntry::new(&groups[o.group], o, rate_hz)).collect(),
+            replicates: diagnoses.iter().map(|d| ReplicateEntry::new(d, rate_hz)).collect(),
             files,
         }
     }

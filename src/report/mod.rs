@@ -24,7 +24,9 @@ pub use curves::{
 pub use efficiency::{EfficiencyFile, EfficiencyRow, efficiency_csv, efficiency_table};
 pub use fits::{FitEntry, FitsFile, describe};
 pub use manifest::{Input, Manifest, ModelNote};
-pub use replicates::{LeftOutEntry, ReplicateEntry, describe_replicates};
+pub use replicates::{
+    AlarmEntry, LeftOutEntry, MovementEntry, ReplicateEntry, ScoresEntry, describe_replicates,
+};
 pub use run_directory::{OutputFile, RUN_FILES, json, run_directory};
 pub use tables::{TableError, epochs_csv, parse_epochs, parse_runs, runs_csv};
 pub use trajectory::{TrajectorySeries, trajectory_svg};

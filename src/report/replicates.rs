@@ -1,33 +1,55 @@
-//! Which replicates are abnormal, as JSON and as words.
+//! Which recordings are abnormal, as JSON and as words.
 
 use super::curves::tau_s;
-use crate::calibration::{Group, LeftOut, ReplicateDiagnosis, Settings, advice, diagnose, large};
+use crate::calibration::{Alarm, AxisScores, Diagnosis, LeftOut, Movement, advice};
+use crate::imu::Sensor;
 use serde::Serialize;
+use std::collections::BTreeMap;
 
-/// One replicate of one signal against the others.
+/// One sensor of one recording against the others.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReplicateEntry {
     /// Recording.
     pub file: String,
     /// `accel` or `gyro`.
     pub sensor: &'static str,
-    /// `x`, `y` or `z`.
-    pub axis: Option<&'static str>,
-    /// `normal`, `outliers` (only its classical wavelet variance is far off) or `abnormal` (its robust one is).
+    /// `normal`, `outliers` (within it) or `abnormal` (its noise is another).
     pub verdict: &'static str,
-    /// Scores of the classical wavelet variance against the other replicates, a scale each.
-    pub z_classical: Vec<f64>,
-    /// Scores of the robust one.
-    pub z_robust: Vec<f64>,
-    /// Scales (s) at which either is beyond five deviations.
-    pub at_tau_s: Vec<f64>,
-    /// What leaving it out does to each estimator.
+    /// Why its noise is not that of the others (ln robust wv).
+    pub noise: Option<AlarmEntry>,
+    /// Why there are outliers within it (ln (classical / robust wv)).
+    pub outliers: Option<AlarmEntry>,
+    /// Scores at every scale, by axis.
+    pub scores: BTreeMap<&'static str, ScoresEntry>,
+    /// What leaving it out does to each fit.
     pub left_out: Vec<LeftOutEntry>,
 }
 
-/// How far an estimator's curve moves without a replicate.
+/// Why a recording is abnormal.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AlarmEntry {
+    /// Probability that the most unusual of recordings that are alike is as unusual.
+    pub p_value: f64,
+    /// First and last of the neighbouring scales (s) at which it is most unusual.
+    pub tau_s: [f64; 2],
+    /// What was looked at there against the others, in standard deviations, by axis.
+    pub deviations: BTreeMap<&'static str, f64>,
+}
+
+/// Scores of one axis against the others at every scale, in standard deviations.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ScoresEntry {
+    /// Of ln robust wv.
+    pub noise: Vec<f64>,
+    /// Of ln (classical / robust wv).
+    pub outliers: Vec<f64>,
+}
+
+/// How far a fit moves without a recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LeftOutEntry {
+    /// What was fitted: `accel`, `accel.x`, …
+    pub signals: String,
     /// Estimator.
     pub estimator: &'static str,
     /// Scale (s) at which its curve moves most, in standard deviations.
@@ -36,42 +58,80 @@ pub struct LeftOutEntry {
     pub change: f64,
     /// The same in standard deviations of ln wv of the curve.
     pub deviations: f64,
+    /// Every parameter without it.
+    pub parameters: Vec<MovementEntry>,
 }
 
-/// The entries of a group.
-pub(super) fn replicate_entries(group: &Group, settings: &Settings) -> Vec<ReplicateEntry> {
-    diagnose(group, settings).into_iter().map(|d| entry(group, d, settings.rate_hz)).collect()
+/// A parameter with and without a recording.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MovementEntry {
+    /// Label of the process.
+    pub process: String,
+    /// Name of the parameter.
+    pub parameter: &'static str,
+    /// With all recordings.
+    pub with: f64,
+    /// Without this one.
+    pub without: f64,
 }
 
-fn entry(group: &Group, diagnosis: ReplicateDiagnosis, rate_hz: f64) -> ReplicateEntry {
-    let mut levels = [large(&diagnosis.classical), large(&diagnosis.robust)].concat();
-    levels.sort_unstable();
-    levels.dedup();
-    let left_out = |l: &LeftOut| LeftOutEntry {
-        estimator: l.estimator.name(),
-        tau_s: tau_s(l.level, rate_hz),
-        change: l.change,
-        deviations: l.deviations,
-    };
-    ReplicateEntry {
-        sensor: group.sensor.name(),
-        axis: diagnosis.axis.map(|a| a.name()),
-        verdict: diagnosis.verdict.name(),
-        at_tau_s: levels.into_iter().map(|level| tau_s(level, rate_hz)).collect(),
-        left_out: diagnosis.left_out.iter().map(left_out).collect(),
-        file: diagnosis.name,
-        z_classical: diagnosis.classical,
-        z_robust: diagnosis.robust,
+impl ReplicateEntry {
+    /// The entry of a diagnosis at a rate (Hz).
+    #[must_use]
+    pub fn new(diagnosis: &Diagnosis, rate_hz: f64) -> Self {
+        let scores = |s: &AxisScores| {
+            let entry = ScoresEntry { noise: s.noise.clone(), outliers: s.outliers.clone() };
+            (s.axis.name(), entry)
+        };
+        Self {
+            file: diagnosis.name.clone(),
+            sensor: diagnosis.sensor.name(),
+            verdict: diagnosis.verdict.name(),
+            noise: diagnosis.noise.as_ref().map(|a| AlarmEntry::new(a, rate_hz)),
+            outliers: diagnosis.outliers.as_ref().map(|a| AlarmEntry::new(a, rate_hz)),
+            scores: diagnosis.scores.iter().map(scores).collect(),
+            left_out: diagnosis.left_out.iter().map(|l| LeftOutEntry::new(l, rate_hz)).collect(),
+        }
     }
 }
 
-/// What the replicates of a group say of one another, in words; none for a single one.
+impl AlarmEntry {
+    fn new(alarm: &Alarm, rate_hz: f64) -> Self {
+        Self {
+            p_value: alarm.p_value,
+            tau_s: [tau_s(alarm.levels.0, rate_hz), tau_s(alarm.levels.1, rate_hz)],
+            deviations: alarm.deviations.iter().map(|(axis, z)| (axis.name(), *z)).collect(),
+        }
+    }
+}
+
+impl LeftOutEntry {
+    fn new(left_out: &LeftOut, rate_hz: f64) -> Self {
+        let movement = |m: &Movement| MovementEntry {
+            process: m.process.clone(),
+            parameter: m.parameter,
+            with: m.with,
+            without: m.without,
+        };
+        Self {
+            signals: left_out.group.clone(),
+            estimator: left_out.estimator.name(),
+            tau_s: tau_s(left_out.level, rate_hz),
+            change: left_out.change,
+            deviations: left_out.deviations,
+            parameters: left_out.parameters.iter().map(movement).collect(),
+        }
+    }
+}
+
+/// What the recordings of each sensor say of one another, in words; nothing of a single one.
 #[must_use]
-pub fn describe_replicates(group: &Group, settings: &Settings) -> Option<String> {
-    let lines = advice(&diagnose(group, settings), settings);
-    if lines.is_empty() {
-        return None;
-    }
-    let head = format!("{}: do the replicates agree?", group.name());
-    Some(std::iter::once(head).chain(lines.iter().map(|l| format!("  {l}"))).collect::<Vec<_>>().join("\n"))
+pub fn describe_replicates(diagnoses: &[Diagnosis], rate_hz: f64) -> Vec<String> {
+    let of_sensor = |sensor: Sensor| {
+        let lines = advice(diagnoses, sensor, rate_hz);
+        let head = format!("{}: do the recordings agree?", sensor.name());
+        let text = std::iter::once(head).chain(lines.iter().map(|l| format!("  {l}")));
+        (!lines.is_empty()).then(|| text.collect::<Vec<_>>().join("\n"))
+    };
+    Sensor::ALL.into_iter().filter_map(of_sensor).collect()
 }

@@ -1,0 +1,79 @@
+//! Which recordings are further from the others than chance would have it.
+//!
+//! The largest F over all windows and files is compared with what it is in sets of alike recordings, drawn by
+//! the sampling law, that differ as much as these do (their excess variance at each scale, independent from
+//! scale to scale: more chances of a large F than real differences, which hang together, have). Then the
+//! furthest is taken out and the others are looked at again.
+
+use super::FEWEST;
+use super::contrasts::{Distance, Furthest, Noise, Table, Window, furthest};
+use crate::rng::StreamKey;
+use rayon::prelude::*;
+
+/// Probability of an alarm in a set of alike recordings, for one sensor and one question.
+pub(super) const FALSE_ALARM: f64 = 0.025;
+/// Sets drawn.
+const DRAWS: usize = 799;
+/// Seed of the draws: a diagnosis is an answer, the same each time.
+const SEED: u64 = 1;
+
+/// What is unusual about a file.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Found {
+    pub(super) file: usize,
+    /// Probability that the most unusual of alike files is as unusual.
+    pub(super) p_value: f64,
+    pub(super) window: Window,
+    pub(super) distance: Distance,
+}
+
+/// The abnormal files, the most abnormal first. `source` and `process` name the streams.
+pub(super) fn alarms(table: &Table, noise: &[Noise], source: &str, process: &str) -> Vec<Found> {
+    let files = table.logs.first().map_or(0, Vec::len);
+    let mut active = vec![true; files];
+    let mut found = Vec::new();
+    while active.iter().filter(|on| **on).count() >= FEWEST {
+        let Some(next) = most_abnormal(table, noise, &active, source, process) else { break };
+        if next.p_value > FALSE_ALARM {
+            break;
+        }
+        active[next.file] = false;
+        found.push(next);
+    }
+    found
+}
+
+fn most_abnormal(
+    table: &Table,
+    noise: &[Noise],
+    active: &[bool],
+    source: &str,
+    process: &str,
+) -> Option<Found> {
+    let mut own = furthest(table, noise, active);
+    let between = table.between(noise, active);
+    let draw = |run: usize| {
+        let key = StreamKey { seed: SEED, scenario: "diagnosis", run: run as u64, source, process };
+        let drawn = table.drawn(noise, &between, &mut key.generator());
+        let all = furthest(&drawn, noise, active);
+        [0, 1].map(|kind| all.iter().map(|f| f.f[kind]).fold(0.0, f64::max))
+    };
+    let draws: Vec<[f64; 2]> = (0..DRAWS).into_par_iter().map(draw).collect();
+    // Both kinds of F in units of what each exceeds with the probability of a false alarm.
+    let limits = [0, 1].map(|kind| limit(draws.iter().map(|d| d[kind]).collect()));
+    let joint = |f: &[f64; 2]| f.iter().zip(&limits).map(|(f, limit)| f / limit).fold(0.0, f64::max);
+    let file = (0..own.len()).max_by(|a, b| joint(&own[*a].f).total_cmp(&joint(&own[*b].f)))?;
+    let Furthest { f, at } = own.swap_remove(file);
+    let kind = usize::from(f[1] / limits[1] > f[0] / limits[0]);
+    let larger = draws.iter().filter(|d| joint(d) >= joint(&f)).count();
+    let [plain, passed] = at;
+    let (window, distance) = if kind == 0 { plain } else { passed }?;
+    Some(Found { file, p_value: (1 + larger) as f64 / (1 + DRAWS) as f64, window, distance })
+}
+
+/// What a share [`FALSE_ALARM`] of the values exceeds; 1 where all are 0.
+fn limit(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    let index = ((1.0 - FALSE_ALARM) * values.len() as f64) as usize;
+    values.get(index).copied().filter(|v| *v > 0.0).unwrap_or(1.0)
+}

@@ -1,0 +1,317 @@
+//! How far each recording is from the others, over neighbouring scales and all axes of a sensor.
+//!
+//! A contrast is the mean of ln nu over a window of neighbouring scales, of one axis. The distance of a
+//! recording is F = Σ_axes d²/(1 + 1/n) / (A·max(s², v)): d from the mean of the n others, s² their variance,
+//! pooled over the A axes, v what noise alone makes (sampling law). When recordings differ by Gaussian
+//! numbers, alike on the axes, F follows Fisher's law with A and A(n − 1) degrees of freedom, or lies below.
+//! The spread is that of the contrast itself, so however the scales hang together, nothing is assumed of it.
+
+use super::FEWEST;
+use crate::calibration::sampling::SamplingLaw;
+use crate::calibration::spread::variance_of_log;
+use crate::rng::Generator;
+use rand::RngExt;
+use rand_distr::StandardNormal;
+
+/// Numbers of neighbouring scales that are taken together.
+const WIDTHS: [usize; 3] = [1, 3, 5];
+/// Fewest recordings of which one of the others may be passed over.
+const FEWEST_TO_PASS_OVER: usize = 6;
+
+/// Neighbouring scales.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Window {
+    /// Index of the first.
+    pub(super) first: usize,
+    /// How many.
+    pub(super) width: usize,
+}
+
+impl Window {
+    /// All windows over so many scales.
+    pub(super) fn all(levels: usize) -> Vec<Self> {
+        let of_width =
+            |width: usize| (0..(levels + 1).saturating_sub(width)).map(move |first| Self { first, width });
+        WIDTHS.into_iter().flat_map(of_width).collect()
+    }
+
+    fn range(self) -> std::ops::Range<usize> {
+        self.first..self.first + self.width
+    }
+}
+
+/// What noise alone does to one axis.
+#[derive(Debug, Clone)]
+pub(super) struct Noise {
+    law: SamplingLaw,
+    /// Degrees of freedom, `[file][level]`.
+    edof: Vec<Vec<f64>>,
+    /// Variance of the contrast of each window, `[window][file]`.
+    variances: Vec<Vec<f64>>,
+}
+
+impl Noise {
+    /// Of files with so many degrees of freedom at each level.
+    pub(super) fn new(law: SamplingLaw, edof: Vec<Vec<f64>>) -> Self {
+        let levels = edof.first().map_or(0, Vec::len);
+        let deviations: Vec<Vec<f64>> =
+            edof.iter().map(|e| e.iter().map(|e| variance_of_log(*e).sqrt()).collect()).collect();
+        let of_window = |window: Window| {
+            let of_file = |s: &Vec<f64>| {
+                let pair =
+                    |i: usize| window.range().map(|j| law.correlation[(i, j)] * s[i] * s[j]).sum::<f64>();
+                window.range().map(pair).sum::<f64>() / (window.width * window.width) as f64
+            };
+            deviations.iter().map(of_file).collect()
+        };
+        let variances = Window::all(levels).into_iter().map(of_window).collect();
+        Self { law, edof, variances }
+    }
+}
+
+/// ln nu of every file on the axes of a sensor, `[axis][file][level]`; not every file has every axis.
+#[derive(Debug, Clone)]
+pub(super) struct Table {
+    pub(super) logs: Vec<Vec<Option<Vec<f64>>>>,
+    /// Only what lies above the others counts.
+    pub(super) above_only: bool,
+}
+
+impl Table {
+    /// New files of the same noise, that differ by Gaussian numbers besides, of the standard deviation given
+    /// for each level, independent from level to level and axis to axis.
+    pub(super) fn drawn(&self, noise: &[Noise], between: &[f64], generator: &mut Generator) -> Self {
+        let mut file = |noise: &Noise, k: usize, own: &Option<Vec<f64>>| {
+            own.as_ref().map(|_| {
+                let ratios = noise.law.draw(&noise.edof[k], generator);
+                let difference =
+                    |(r, b): (f64, &f64)| r.ln() + b * generator.sample::<f64, _>(StandardNormal);
+                ratios.into_iter().zip(between).map(difference).collect()
+            })
+        };
+        let axis = |(files, noise): (&Vec<Option<Vec<f64>>>, &Noise)| {
+            files.iter().enumerate().map(|(k, own)| file(noise, k, own)).collect()
+        };
+        let logs = self.logs.iter().zip(noise).map(axis).collect();
+        Self { logs, above_only: self.above_only }
+    }
+
+    /// Standard deviation by which the active files differ at each level, beyond their noise.
+    pub(super) fn between(&self, noise: &[Noise], active: &[bool]) -> Vec<f64> {
+        let levels = noise.first().and_then(|n| n.edof.first()).map_or(0, Vec::len);
+        let level = |j: usize| {
+            let contrasts = self.contrasts(noise, Window { first: j, width: 1 }, j, active);
+            let (mut squares, mut freedom, mut own) = (0.0, 0.0, 0.0);
+            for axis in &contrasts {
+                squares += axis.squares;
+                freedom += axis.count - 1.0;
+                own += axis.noise * (axis.count - 1.0);
+            }
+            let excess = (squares - own) / freedom;
+            if excess.is_finite() { excess.max(0.0).sqrt() } else { 0.0 }
+        };
+        (0..levels).map(level).collect()
+    }
+
+    /// The contrasts of a window, of each axis with enough active files.
+    fn contrasts(&self, noise: &[Noise], window: Window, index: usize, active: &[bool]) -> Vec<Contrast> {
+        let axis = |(a, (files, noise)): (usize, (&Vec<Option<Vec<f64>>>, &Noise))| {
+            let mean = |logs: &Vec<f64>| logs[window.range()].iter().sum::<f64>() / window.width as f64;
+            let values: Vec<Option<f64>> =
+                files.iter().zip(active).map(|(f, on)| f.as_ref().filter(|_| *on).map(mean)).collect();
+            Contrast::new(a, values, &noise.variances[index])
+        };
+        self.logs.iter().zip(noise).enumerate().filter_map(axis).collect()
+    }
+}
+
+/// The values of one axis at one window, about their mean.
+#[derive(Debug)]
+struct Contrast {
+    axis: usize,
+    values: Vec<Option<f64>>,
+    /// Σ of all values and of their squares.
+    sum: f64,
+    squares: f64,
+    count: f64,
+    /// What noise makes: mean variance, and what each file has above it.
+    noise: f64,
+    excess: Vec<f64>,
+}
+
+/// Values without some.
+struct Rest {
+    mean: f64,
+    /// Σ of the squares about the mean.
+    squares: f64,
+    count: f64,
+}
+
+impl Contrast {
+    fn new(axis: usize, mut values: Vec<Option<f64>>, variances: &[f64]) -> Option<Self> {
+        let count = values.iter().flatten().count() as f64;
+        let mean = values.iter().flatten().sum::<f64>() / count;
+        let present = || values.iter().zip(variances).filter(|(v, _)| v.is_some()).map(|(_, s)| s);
+        let noise = present().sum::<f64>() / count;
+        // A silent scale (coarse quantisation) has no logarithm, and says nothing.
+        if count < FEWEST as f64 || !mean.is_finite() {
+            return None;
+        }
+        values.iter_mut().flatten().for_each(|v| *v -= mean);
+        let (sum, squares) = (values.iter().flatten().sum(), values.iter().flatten().map(|v| v * v).sum());
+        let excess = variances.iter().map(|s| (s - noise).max(0.0)).collect();
+        Some(Self { axis, values, sum, squares, count, noise, excess })
+    }
+
+    fn without(&self, one: usize, other: usize) -> Rest {
+        let (mut sum, mut squares, mut count) = (self.sum, self.squares, self.count);
+        for value in [one, other].into_iter().filter_map(|k| *self.values.get(k)?) {
+            sum -= value;
+            squares -= value * value;
+            count -= 1.0;
+        }
+        Rest { mean: sum / count, squares: (squares - sum * sum / count).max(0.0), count }
+    }
+}
+
+/// How far a file is from the others at one window.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Distance {
+    /// F, with one of the others passed over or none.
+    pub(super) f: f64,
+    /// Of each axis (index): d in standard deviations.
+    pub(super) deviations: Vec<(usize, f64)>,
+}
+
+/// F of a file against the others, or all of them but the one without which they agree best.
+fn distance(contrasts: &[Contrast], file: usize, pass_over: bool) -> Option<Distance> {
+    let own: Vec<&Contrast> =
+        contrasts.iter().filter(|c| c.values.get(file).copied().flatten().is_some()).collect();
+    let spread = |other: usize| {
+        let rests = || own.iter().map(|c| c.without(file, other));
+        rests().map(|r| r.squares).sum::<f64>() / rests().map(|r| r.count - 1.0).sum::<f64>()
+    };
+    let files = own.first()?.values.len();
+    let other = if pass_over {
+        let candidates = (0..files).filter(|h| *h != file && own[0].values[*h].is_some());
+        candidates.map(|h| (spread(h), h)).min_by(|a, b| a.0.total_cmp(&b.0))?.1
+    } else {
+        usize::MAX
+    };
+    let noise = own.iter().map(|c| c.noise).sum::<f64>() / own.len() as f64;
+    let scale2 = spread(other).max(noise);
+    let of_axis = |c: &&Contrast| {
+        let rest = c.without(file, other);
+        let d = c.values[file].unwrap_or(rest.mean) - rest.mean;
+        (c.axis, d / (scale2 * (1.0 + 1.0 / rest.count) + c.excess[file]).sqrt())
+    };
+    let deviations: Vec<(usize, f64)> = own.iter().map(of_axis).collect();
+    let f = deviations.iter().map(|(_, z)| z * z).sum::<f64>() / deviations.len() as f64;
+    f.is_finite().then_some(Distance { f, deviations })
+}
+
+/// The largest distances of a file: against all others, and with one of them passed over (0 if too few).
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Furthest {
+    /// The two F.
+    pub(super) f: [f64; 2],
+    /// Where, with the deviations there.
+    pub(super) at: [Option<(Window, Distance)>; 2],
+}
+
+/// The largest distances of every file.
+pub(super) fn furthest(table: &Table, noise: &[Noise], active: &[bool]) -> Vec<Furthest> {
+    let levels = noise.first().and_then(|n| n.edof.first()).map_or(0, Vec::len);
+    let count = active.iter().filter(|on| **on).count();
+    let mut all = vec![Furthest { f: [0.0; 2], at: [None, None] }; active.len()];
+    for (index, window) in Window::all(levels).into_iter().enumerate() {
+        let contrasts = table.contrasts(noise, window, index, active);
+        for (file, furthest) in all.iter_mut().enumerate().filter(|(k, _)| active[*k]) {
+            for pass_over in [false, true] {
+                if pass_over && count < FEWEST_TO_PASS_OVER {
+                    continue;
+                }
+                let Some(distance) = distance(&contrasts, file, pass_over) else { continue };
+                let above = distance.deviations.iter().map(|(_, z)| z).sum::<f64>() > 0.0;
+                if table.above_only && !above {
+                    continue;
+                }
+                let kind = usize::from(pass_over);
+                if distance.f > furthest.f[kind] {
+                    furthest.f[kind] = distance.f;
+                    furthest.at[kind] = Some((window, distance));
+                }
+            }
+        }
+    }
+    all
+}
+
+/// Deviations of a file at every single scale, `[axis][level]`; 0 where nothing can be said.
+pub(super) fn scores(table: &Table, noise: &[Noise], active: &[bool], file: usize) -> Vec<Vec<f64>> {
+    let levels = noise.first().and_then(|n| n.edof.first()).map_or(0, Vec::len);
+    let mut scores = vec![vec![0.0; levels]; table.logs.len()];
+    for j in 0..levels {
+        let contrasts = table.contrasts(noise, Window { first: j, width: 1 }, j, active);
+        for (axis, z) in distance(&contrasts, file, false).map_or(Vec::new(), |d| d.deviations) {
+            scores[axis][j] = z;
+        }
+    }
+    scores
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::{Composite, Process, White};
+    use rand::SeedableRng;
+
+    fn noise(files: usize, levels: usize, edof: f64) -> Noise {
+        let white = Composite::new(vec![Process::White(White::new(1.0).unwrap())]);
+        Noise::new(SamplingLaw::new(&white, levels), vec![vec![edof; levels]; files])
+    }
+
+    /// Five files by hand, one axis: the others of the last are −1, −1, 1, 1 (mean 0, variance 4/3), itself
+    /// 6: F = 36/(4/3·5/4) = 21.6. (Noise of 1e9 degrees of freedom is nothing.)
+    #[test]
+    fn a_distance_by_hand() {
+        let values = [-1.0, -1.0, 1.0, 1.0, 6.0];
+        let table = Table { logs: vec![values.iter().map(|v| Some(vec![*v])).collect()], above_only: false };
+        let found = furthest(&table, &[noise(5, 1, 1e9)], &[true; 5]);
+        approx::assert_relative_eq!(found[4].f[0], 21.6, max_relative = 1e-12);
+        assert_eq!(found[4].f[1], 0.0, "five are too few to pass one over");
+        // With noise of variance 12 the spread of the others does not count: F = 36/(12·5/4).
+        let edof = 2.0 / 12.0;
+        let law = noise(5, 1, edof);
+        let found = furthest(&table, std::slice::from_ref(&law), &[true; 5]);
+        approx::assert_relative_eq!(
+            found[4].f[0],
+            36.0 / (1.25 * variance_of_log(edof)),
+            max_relative = 1e-12
+        );
+    }
+
+    /// Of files that differ by Gaussian numbers F has Fisher's mean m/(m − 2), m = A(n − 1): three axes, seven
+    /// others make 18/16. 600 sets of one window: its variance is 2m²(A + m − 2)/(A(m − 2)²(m − 4)) = 1.144, so
+    /// four deviations of the mean are 4·√(1.144/600) = 0.175.
+    #[test]
+    fn distances_follow_fishers_law() {
+        let mut generator = Generator::seed_from_u64(5);
+        let empty = Table { logs: vec![vec![Some(vec![]); 8]; 3], above_only: false };
+        let noise = [noise(8, 1, 1e9), noise(8, 1, 1e9), noise(8, 1, 1e9)];
+        let mut f = || {
+            let table = empty.drawn(&noise, &[0.3], &mut generator);
+            furthest(&table, &noise, &[true; 8])[0].f[0]
+        };
+        let mean = (0..600).map(|_| f()).sum::<f64>() / 600.0;
+        assert!((mean - 18.0 / 16.0).abs() < 0.175, "{mean}");
+    }
+
+    #[test]
+    fn one_of_the_others_is_passed_over() {
+        let values = [0.0, 0.1, -0.1, 0.05, -0.05, 5.0, 5.0];
+        let table = Table { logs: vec![values.iter().map(|v| Some(vec![*v])).collect()], above_only: false };
+        let found = furthest(&table, &[noise(7, 1, 1e9)], &[true; 7]);
+        assert!(found[6].f[0] < 10.0 && found[6].f[1] > 1000.0, "{:?}", found[6]);
+    }
+}

@@ -1,0 +1,67 @@
+//! What leaving a recording out does to each estimator: its curve, and every parameter.
+
+use super::super::average::{Estimator, Replicate, average};
+use super::super::fit::refit;
+use super::super::pipeline::{Outcome, Settings};
+use super::super::replicates::Group;
+use super::super::spread::variance_of_log;
+
+/// How far an estimator moves when one recording is left out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LeftOut {
+    /// The group, `accel` or `accel.x`.
+    pub group: String,
+    /// The estimator.
+    pub estimator: Estimator,
+    /// Level at which the curve moves most, in standard deviations of its own.
+    pub level: u32,
+    /// nu without it over nu with it, less one, there.
+    pub change: f64,
+    /// The same in standard deviations of ln nu of the curve.
+    pub deviations: f64,
+    /// How every parameter moves; empty where there is no fit without it.
+    pub parameters: Vec<Movement>,
+}
+
+/// How one parameter moves.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Movement {
+    /// Label of the process.
+    pub process: String,
+    /// Name of the parameter.
+    pub parameter: &'static str,
+    /// With all recordings (units of the parameter).
+    pub with: f64,
+    /// Without this one.
+    pub without: f64,
+}
+
+/// Without the recording of that name. None if no curve is left.
+pub(super) fn left_out(group: &Group, name: &str, outcome: &Outcome, settings: &Settings) -> Option<LeftOut> {
+    let rest: Vec<Replicate> = group.replicates.iter().filter(|r| r.name != name).cloned().collect();
+    let efficiency = settings.tuning.efficiency();
+    let without = average(&rest, outcome.estimator, settings.trim, efficiency).ok()?;
+    let with = &outcome.curve;
+    let moves = with.levels.iter().zip(&with.wv).zip(&with.edof).zip(&without.wv);
+    let one = |(((level, with), edof), without): (((&u32, &f64), &f64), &f64)| {
+        let ratio = without / with;
+        (*level, ratio - 1.0, ratio.ln() / variance_of_log(*edof).sqrt())
+    };
+    let (level, change, deviations) = moves.map(one).max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))?;
+    let spec = &settings.spec;
+    let parameters = refit(&without, spec, settings.rate_hz, settings.weighting, &outcome.fit)
+        .map_or(Vec::new(), |fit| movements(outcome, &fit.composite));
+    Some(LeftOut { group: group.name(), estimator: outcome.estimator, level, change, deviations, parameters })
+}
+
+fn movements(outcome: &Outcome, without: &crate::noise::Composite) -> Vec<Movement> {
+    let with = &outcome.fit.composite;
+    let of_process = |((a, b), label): ((&crate::noise::Process, &crate::noise::Process), String)| {
+        let pairs = a.parameters().into_iter().zip(b.parameters());
+        let movement = |((parameter, with), (_, without)): ((&'static str, f64), (&'static str, f64))| {
+            Movement { process: label.clone(), parameter, with, without }
+        };
+        pairs.map(movement).collect::<Vec<_>>()
+    };
+    with.processes.iter().zip(&without.processes).zip(with.labels()).flat_map(of_process).collect()
+}

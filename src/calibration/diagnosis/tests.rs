@@ -1,0 +1,186 @@
+//! Alarms in simulated sets: as rare as said where recordings are alike, there where one is not.
+
+use super::*;
+use crate::calibration::{ModelSpec, Pool, Trim, Weighting, calibrate, grouped};
+use crate::imu::Channel;
+use crate::rng::{Generator, StreamKey};
+use crate::wavelet::{Convention, Tuning, both};
+use rand::RngExt;
+use rand_distr::StandardNormal;
+
+fn settings() -> Settings {
+    Settings {
+        estimators: vec![Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv],
+        spec: "WN+RW".parse::<ModelSpec>().unwrap(),
+        trim: Trim::Count(1),
+        tuning: Tuning::new(0.6, Convention::Exact).unwrap(),
+        weighting: Weighting::Edof,
+        rate_hz: 1.0,
+    }
+}
+
+/// What the recordings of a set differ by: the standard deviation of ln sigma2 and ln gamma2, and how much of
+/// its variance the axes of a recording share.
+#[derive(Clone, Copy)]
+struct Differences {
+    deviation: f64,
+    shared: f64,
+}
+
+const NONE: Differences = Differences { deviation: 0.0, shared: 0.0 };
+const LEVELS: u32 = 10;
+const SAMPLES: usize = 2048;
+
+/// Three axes of white noise and random walk for each recording; `change` may spoil a recording's axis.
+fn set(
+    set: u64,
+    count: usize,
+    differences: Differences,
+    change: impl Fn(usize, Axis, &mut [f64]),
+) -> Vec<Diagnosis> {
+    let mut replicates = Vec::new();
+    for file in 0..count {
+        let run = file as u64;
+        let mut generator = StreamKey { seed: set, scenario: "", run, source: "", process: "" }.generator();
+        let common = normals(&mut generator);
+        for axis in Axis::ALL {
+            let own = normals(&mut generator);
+            let factor = |i: usize| {
+                let Differences { deviation, shared } = differences;
+                (deviation * (shared.sqrt() * common[i] + (1.0 - shared).sqrt() * own[i])).exp()
+            };
+            let (sigma, gamma) = (factor(0).sqrt(), (1e-4 * factor(1)).sqrt());
+            let mut walk = 0.0;
+            let mut next = || {
+                walk += gamma * generator.sample::<f64, _>(StandardNormal);
+                walk + sigma * generator.sample::<f64, _>(StandardNormal)
+            };
+            let mut signal: Vec<f64> = (0..SAMPLES).map(|_| next()).collect();
+            change(file, axis, &mut signal);
+            let (classical, robust) = both(&signal, LEVELS, &settings().tuning).unwrap();
+            let name = format!("run{file}");
+            let replicate = Replicate { name, axis: Some(axis), samples: SAMPLES, classical, robust };
+            replicates.push((Channel { sensor: Sensor::Accel, axis }, replicate));
+        }
+    }
+    let groups = grouped(replicates, Pool::Sensor);
+    let outcomes = calibrate(&groups, &settings()).unwrap();
+    diagnose(&groups, &outcomes, &settings())
+}
+
+fn normals(generator: &mut Generator) -> [f64; 2] {
+    [0, 1].map(|_| generator.sample(StandardNormal))
+}
+
+/// Sets, of so many, with an alarm of noise and of outliers.
+fn alarmed(sets: u64, count: usize, differences: Differences) -> [u32; 2] {
+    let mut alarmed = [0; 2];
+    for seed in 0..sets {
+        let all = set(seed, count, differences, |_, _, _| ());
+        alarmed[0] += u32::from(all.iter().any(|d| d.noise.is_some()));
+        alarmed[1] += u32::from(all.iter().any(|d| d.outliers.is_some()));
+    }
+    alarmed
+}
+
+/// An alarm has a probability of at most 2.5 %: of 24 sets with it 0.6 ± √(24·0.025·0.975) = 0.77, so no more
+/// than 3 (four deviations: 3.7). Once for recordings that differ by nothing but noise, once for some that differ
+/// by a fifth.
+#[test]
+fn alike_recordings_raise_no_more_alarms_than_said() {
+    for differences in [NONE, Differences { deviation: 0.2, shared: 0.0 }] {
+        let alarms = alarmed(24, 6, differences);
+        assert!(alarms.iter().all(|n| *n <= 3), "{alarms:?} of 24");
+    }
+}
+
+/// The same at length, printed: `cargo test --release -- --ignored --nocapture false_alarm_rates`. 400 sets
+/// know a rate of 2.5 % to 0.8 %. Where axes share their differences, which the law does not allow for, it is
+/// higher.
+#[test]
+#[ignore = "minutes"]
+fn false_alarm_rates() {
+    for (count, deviation, shared) in [
+        (4, 0.1, 0.0),
+        (6, 0.0, 0.0),
+        (6, 0.05, 0.0),
+        (6, 0.2, 0.0),
+        (6, 1.0, 0.0),
+        (10, 0.2, 0.0),
+        (6, 0.2, 0.5),
+        (6, 0.2, 1.0),
+    ] {
+        let alarms = alarmed(400, count, Differences { deviation, shared });
+        let rates = alarms.map(|n| f64::from(n) / 4.0);
+        println!("{count} recordings, deviation {deviation}, shared {shared}: {rates:.2?} %");
+    }
+}
+
+fn verdicts(all: &[Diagnosis]) -> Vec<Verdict> {
+    all.iter().map(|d| d.verdict).collect()
+}
+
+/// One recording with a few spikes on two axes, one with a third more noise on all, among seven that differ by
+/// 3 %.
+#[test]
+fn outliers_and_another_noise_are_told_apart() {
+    let all =
+        set(100, 7, Differences { deviation: 0.03, shared: 0.0 }, |file, axis, signal| match (file, axis) {
+            (2, Axis::X | Axis::Y) => (0..3).for_each(|i| signal[100 + 600 * i] += 60.0),
+            (5, _) => signal.iter_mut().for_each(|x| *x *= 1.15),
+            _ => {}
+        });
+    use Verdict::{Noise, Normal, Outliers};
+    assert_eq!(verdicts(&all), [Normal, Normal, Outliers, Normal, Normal, Noise, Normal]);
+    let alarm = all[2].outliers.as_ref().unwrap();
+    assert!(alarm.deviations[0].1 > 5.0 && alarm.deviations[2].1 < 5.0, "{alarm:?}");
+    let words = advice(&all, Sensor::Accel, 1.0);
+    assert!(words[0].starts_with("run2 is abnormal: outliers within it"), "{words:?}");
+    let last = words.last().unwrap();
+    assert!(
+        last.starts_with("use dr-awv with a --trim of at least 1 (--pool axes) or 3 (pooled axes)"),
+        "{last}"
+    );
+    assert!(advice(&all, Sensor::Gyro, 1.0).is_empty());
+}
+
+/// What spikes do to the parameters: 3 of 60² on two of three axes of 2048 samples make the sigma2 of AWV 1 +
+/// 2·5.3/21; without the recording it is 1 again. The others stay within four deviations of an eighth of the
+/// noise: √(2/2048/18) = 0.7 % and less.
+#[test]
+fn leaving_out_moves_what_it_should() {
+    let all = set(100, 7, NONE, |file, axis, signal| {
+        if file == 2 && axis != Axis::Z {
+            (0..3).for_each(|i| signal[100 + 600 * i] += 60.0);
+        }
+    });
+    let of = |file: usize, estimator: Estimator| {
+        let left = all[file].left_out.iter().find(|l| l.estimator == estimator).unwrap();
+        let sigma2 = left.parameters.iter().find(|m| m.parameter == "sigma2").unwrap();
+        sigma2.without / sigma2.with - 1.0
+    };
+    assert!((of(2, Estimator::Awv) + 0.33).abs() < 0.1, "{}", of(2, Estimator::Awv));
+    assert!(of(2, Estimator::SrAwv).abs() < 0.03 && of(2, Estimator::DrAwv).abs() < 0.03);
+    assert!(of(3, Estimator::SrAwv).abs() < 0.03);
+}
+
+/// Two of eight with twice the variance at all scales.
+#[test]
+fn two_abnormal_recordings_do_not_hide_each_other() {
+    let all = set(7, 8, Differences { deviation: 0.03, shared: 0.0 }, |file, _, signal| {
+        if [1, 6].contains(&file) {
+            signal.iter_mut().for_each(|x| *x *= 2.0_f64.sqrt());
+        }
+    });
+    let noisy: Vec<usize> =
+        all.iter().enumerate().filter(|(_, d)| d.verdict == Verdict::Noise).map(|(i, _)| i).collect();
+    assert_eq!(noisy, [1, 6]);
+}
+
+#[test]
+fn three_recordings_cannot_say_which() {
+    let all = set(7, 3, NONE, |_, _, _| ());
+    assert!(all.iter().all(|d| d.scores.is_empty() && d.verdict == Verdict::Normal));
+    assert!(advice(&all, Sensor::Accel, 1.0)[0].starts_with("too few recordings"));
+    assert!(set(7, 1, NONE, |_, _, _| ()).is_empty());
+}
