@@ -49,6 +49,7 @@ pub mod strapdown;
 pub mod ekf;
 // L5
 pub mod closure;
+pub mod fusion;
 pub mod monte_carlo;
 pub mod scenario;
 pub mod simulation;

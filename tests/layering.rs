@@ -24,6 +24,7 @@ const MAY_NAME: &[(&str, &[&str])] = &[
     ("strapdown", &["@L1", "noise"]),
     ("ekf", &["@L1", "strapdown", "noise"]),
     ("closure", &["@L1", "trajectory", "sensors", "strapdown"]),
+    ("fusion", &["@L1", "noise", "trajectory", "sensors", "strapdown", "ekf"]),
     ("scenario", &["@L1", "noise", "trajectory", "sensors", "strapdown", "ekf"]),
     ("simulation", &["@L1", "noise", "trajectory", "sensors", "strapdown", "ekf"]),
     ("monte_carlo", &["@L1", "noise", "trajectory", "sensors", "strapdown", "ekf", "simulation"]),
@@ -36,6 +37,8 @@ const MAY_NAME: &[(&str, &[&str])] = &[
             "noise",
             "wavelet",
             "calibration",
+            "ekf",
+            "fusion",
             "scenario",
             "simulation",
             "monte_carlo",
@@ -45,7 +48,20 @@ const MAY_NAME: &[(&str, &[&str])] = &[
     ),
     (
         "data",
-        &["@L1", "noise", "wavelet", "trajectory", "calibration", "scenario", "metrics", "report", "study"],
+        &[
+            "@L1",
+            "noise",
+            "wavelet",
+            "trajectory",
+            "calibration",
+            "ekf",
+            "strapdown",
+            "fusion",
+            "scenario",
+            "metrics",
+            "report",
+            "study",
+        ],
     ),
 ];
 const L0: &[&str] = &["bibliography", "units", "linalg", "lanes", "rng"];

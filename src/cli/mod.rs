@@ -9,6 +9,7 @@ mod completions;
 mod demo;
 mod efficiency;
 mod exit;
+mod fuse;
 mod init;
 mod man;
 mod parse;
@@ -48,6 +49,7 @@ enum Command {
     Synthesize(synthesize::Args),
     Trajectory(trajectory::Args),
     Run(run::Args),
+    Fuse(fuse::Args),
     Compare(compare::Args),
     Efficiency(efficiency::Args),
     Demo(demo::Args),
@@ -66,6 +68,7 @@ impl Command {
             Self::Synthesize(args) => synthesize::run(&args, session),
             Self::Trajectory(args) => trajectory::run(&args, session),
             Self::Run(args) => run::run(&args, session),
+            Self::Fuse(args) => fuse::run(&args, session),
             Self::Compare(args) => compare::run(&args, session),
             Self::Efficiency(args) => efficiency::run(&args, session),
             Self::Demo(args) => demo::run(&args, session),

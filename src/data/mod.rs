@@ -3,6 +3,7 @@
 pub mod atomic;
 pub mod contamination_file;
 pub mod curve_file;
+pub mod fusion_files;
 pub mod hash;
 pub mod model_file;
 pub mod npy;

@@ -5,6 +5,7 @@ mod comparison;
 mod curves;
 mod efficiency;
 mod fits;
+mod fusion;
 mod html;
 mod manifest;
 mod number;
@@ -23,6 +24,7 @@ pub use curves::{
 };
 pub use efficiency::{EfficiencyFile, EfficiencyRow, efficiency_csv, efficiency_table};
 pub use fits::{FitEntry, FitsFile, describe};
+pub use fusion::{FUSION_FILES, FusionKind, FusionManifest, FusionSummary, fusion_directory, solution_csv};
 pub use manifest::{Input, Manifest, ModelNote};
 pub use replicates::{
     AlarmEntry, LeftOutEntry, MovementEntry, ReplicateEntry, ScoresEntry, describe_replicates,

@@ -69,12 +69,12 @@ pub(crate) struct Args {
 }
 
 #[derive(Debug, Clone, Copy)]
-enum OutageArg {
+pub(super) enum OutageArg {
     None,
     Window(Outage),
 }
 
-fn parse_outage(text: &str) -> Result<OutageArg, String> {
+pub(super) fn parse_outage(text: &str) -> Result<OutageArg, String> {
     if text == "none" {
         return Ok(OutageArg::None);
     }
@@ -85,7 +85,16 @@ fn parse_outage(text: &str) -> Result<OutageArg, String> {
     Ok(OutageArg::Window(outage))
 }
 
-fn parse_states(text: &str) -> Result<FilterStates, String> {
+/// The windows among the values of `--outage`.
+pub(super) fn windows_of(outages: &[OutageArg]) -> Vec<Outage> {
+    let window = |o: &OutageArg| match o {
+        OutageArg::None => None,
+        OutageArg::Window(outage) => Some(*outage),
+    };
+    outages.iter().filter_map(window).collect()
+}
+
+pub(super) fn parse_states(text: &str) -> Result<FilterStates, String> {
     match text {
         "15" => Ok(FilterStates::Reduced15),
         "full" => Ok(FilterStates::Full),
@@ -148,11 +157,7 @@ fn scenario(args: &Args) -> Result<Scenario, Failure> {
         scenario.gnss = scenario_file::read(path)?.gnss;
     }
     if !args.outages.is_empty() {
-        let window = |o: &OutageArg| match o {
-            OutageArg::None => None,
-            OutageArg::Window(outage) => Some(*outage),
-        };
-        scenario.outage = Some(args.outages.iter().filter_map(window).collect());
+        scenario.outage = Some(windows_of(&args.outages));
         (scenario.outage_periodic, scenario.outage_random) = (None, None);
     }
     scenario.run.runs = args.runs.unwrap_or(scenario.run.runs);

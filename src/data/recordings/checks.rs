@@ -27,7 +27,7 @@ pub(super) fn resolve_units(raw: &mut Raw, rate_hz: f64) -> Result<(), Recording
 }
 
 /// The unit of accelerometer columns that do not say it, from the length of their mean.
-fn gravity_factor(raw: &Raw) -> Result<f64, RecordingError> {
+pub(in crate::data) fn gravity_factor(raw: &Raw) -> Result<f64, RecordingError> {
     let unnamed: Vec<&Column> = raw
         .columns
         .iter()
@@ -88,7 +88,7 @@ pub(super) fn plausible(recordings: &[Recording], report: &mut FileReport) -> Re
     Ok(())
 }
 
-fn check_gravity(path: &str, norm: f64) -> Result<(), RecordingError> {
+pub(in crate::data) fn check_gravity(path: &str, norm: f64) -> Result<(), RecordingError> {
     let near = |target: f64| (norm / target - 1.0).abs() < 0.1;
     // Below 0.3 m/s² the mean was removed before: nothing to be learnt from it.
     if near(STANDARD_GRAVITY) || norm < 0.3 {

@@ -7,12 +7,12 @@
 
 pub mod header;
 
-mod checks;
+pub(in crate::data) mod checks;
 mod error;
 mod files;
 mod report;
 mod text;
-mod timing;
+pub(in crate::data) mod timing;
 mod write;
 
 pub use error::RecordingError;

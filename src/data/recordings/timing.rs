@@ -159,7 +159,7 @@ fn rounded(value: f64) -> f64 {
     if (short / value - 1.0).abs() < 1e-7 { short } else { value }
 }
 
-fn median_step(times: &[f64]) -> f64 {
+pub(in crate::data) fn median_step(times: &[f64]) -> f64 {
     let mut steps: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
     if steps.is_empty() {
         return 0.0;
@@ -169,7 +169,7 @@ fn median_step(times: &[f64]) -> f64 {
 }
 
 /// The unit in which a step is that of 10 Hz … 10 kHz: the four ranges do not overlap.
-fn unit_of_step(step: f64) -> (f64, &'static str) {
+pub(in crate::data) fn unit_of_step(step: f64) -> (f64, &'static str) {
     match step {
         s if s >= 1e5 => (1e-9, "ns"),
         s if s >= 100.0 => (1e-6, "µs"),

@@ -5,7 +5,7 @@ mod error;
 mod imports;
 mod profile;
 mod samples;
-mod table;
+pub(in crate::data) mod table;
 mod write;
 
 pub use error::TrajectoryFileError;

@@ -8,19 +8,19 @@ use std::path::Path;
 
 /// A text table of numbers.
 #[derive(Debug)]
-pub(super) struct Table {
-    pub(super) path: String,
+pub(in crate::data) struct Table {
+    pub(in crate::data) path: String,
     /// Line of the header, from 1.
-    pub(super) header_line: u64,
-    pub(super) columns: Vec<String>,
+    pub(in crate::data) header_line: u64,
+    pub(in crate::data) columns: Vec<String>,
     /// The lines that begin with `#`, without it.
-    pub(super) comments: Vec<String>,
+    pub(in crate::data) comments: Vec<String>,
     /// Line in the file, values.
-    pub(super) rows: Vec<(u64, Vec<f64>)>,
+    pub(in crate::data) rows: Vec<(u64, Vec<f64>)>,
 }
 
 /// Opens a file, unpacking it when its name ends in `.gz`.
-pub(super) fn open(path: &Path) -> Result<Box<dyn BufRead>, Error> {
+pub(in crate::data) fn open(path: &Path) -> Result<Box<dyn BufRead>, Error> {
     let io = |source| Error::Io { path: path.display().to_string(), source };
     let file = BufReader::with_capacity(1 << 16, File::open(path).map_err(io)?);
     let packed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
@@ -28,7 +28,7 @@ pub(super) fn open(path: &Path) -> Result<Box<dyn BufRead>, Error> {
 }
 
 /// The whole text of a file.
-pub(super) fn text(path: &Path) -> Result<String, Error> {
+pub(in crate::data) fn text(path: &Path) -> Result<String, Error> {
     let mut text = String::new();
     let io = |source| Error::Io { path: path.display().to_string(), source };
     open(path)?.read_to_string(&mut text).map_err(io)?;
@@ -38,7 +38,11 @@ pub(super) fn text(path: &Path) -> Result<String, Error> {
 impl Table {
     /// Reads a table. Without `columns` its first line that is no comment names them; with them it has no
     /// header and its cells stand between blanks.
-    pub(super) fn read(path: &str, reader: impl BufRead, columns: Option<&[&str]>) -> Result<Self, Error> {
+    pub(in crate::data) fn read(
+        path: &str,
+        reader: impl BufRead,
+        columns: Option<&[&str]>,
+    ) -> Result<Self, Error> {
         let mut separator = if columns.is_some() { ' ' } else { ',' };
         let mut table = Self::of_columns(path, columns.unwrap_or_default());
         for (index, line) in reader.lines().enumerate() {
@@ -59,7 +63,7 @@ impl Table {
     }
 
     /// A table of these columns, without rows yet.
-    pub(super) fn of_columns(path: &str, columns: &[&str]) -> Self {
+    pub(in crate::data) fn of_columns(path: &str, columns: &[&str]) -> Self {
         let columns = columns.iter().map(|&name| name.to_owned()).collect();
         Self { path: path.to_owned(), header_line: 0, columns, comments: Vec::new(), rows: Vec::new() }
     }
@@ -90,7 +94,7 @@ impl Table {
     }
 
     /// The refusal of a cell.
-    pub(super) fn cell(&self, line: u64, column: usize, value: &str, reason: &'static str) -> Error {
+    pub(in crate::data) fn cell(&self, line: u64, column: usize, value: &str, reason: &'static str) -> Error {
         let (path, column) = (self.path.clone(), self.columns[column].clone());
         Error::Cell { path, line, column, value: value.chars().take(40).collect(), reason }
     }

@@ -1,0 +1,157 @@
+//! The files of a fusion.
+
+use super::Args;
+use crate::cli::{Failure, Session, parse, read};
+use glam::DQuat;
+use nav_sim::data::fusion_files::{FusionFileError, ImuFile, read_gnss, read_imu, read_initial};
+use nav_sim::ekf::Belief;
+use nav_sim::frames::RollPitchYaw;
+use nav_sim::fusion::alignment::{self, BiasSigma};
+use nav_sim::fusion::{FusionError, Recorded, Settings, Start, check_clocks};
+use nav_sim::gnss::GnssFix;
+use nav_sim::imu::Sensor;
+use nav_sim::noise::{Composite, Model, Process, continuous, reduction};
+use nav_sim::report::Input;
+use nav_sim::sensors::outage::Outage;
+use nav_sim::trajectory::Trajectory;
+use nav_sim::units::DEG;
+use std::path::{Path, PathBuf};
+
+impl From<FusionFileError> for Failure {
+    fn from(e: FusionFileError) -> Self {
+        let failure = if e.is_io() { Self::could_not(&e) } else { Self::input(&e) };
+        failure.maybe_hint(e.hint())
+    }
+}
+
+/// What was read, ready to use.
+pub(super) struct Inputs {
+    pub(super) imu: ImuFile,
+    pub(super) gnss: Vec<GnssFix>,
+    pub(super) belief: Belief,
+    pub(super) reference: Option<Trajectory>,
+    initial: Option<Start>,
+    /// Every file with its hash.
+    pub(super) files: Vec<Input>,
+}
+
+impl Inputs {
+    pub(super) fn read(args: &Args, settings: &Settings, session: &Session) -> Result<Self, Failure> {
+        let given = (args.initial.as_os_str() != "auto").then_some(&args.initial);
+        let mut named: Vec<(&str, &PathBuf)> =
+            vec![("imu", &args.imu), ("gnss", &args.gnss), ("model", &args.model)];
+        named.extend(given.map(|p| ("initial", p)));
+        named.extend(args.reference.iter().map(|p| ("reference", p)));
+        let files = named.iter().map(|(role, path)| read::input(role, path)).collect::<Result<_, _>>()?;
+        let imu = read_imu(&args.imu)?;
+        let (mut gnss, remarks) = read_gnss(&args.gnss)?;
+        imu.remarks.iter().chain(&remarks).for_each(|r| session.printer.warn(r));
+        if let Some(parse::Pair([position, velocity])) = args.gnss_sigma_factor {
+            scale(&mut gnss, position, velocity);
+        }
+        check_clocks(&Recorded { imu: &imu.samples, gnss: &gnss }).map_err(impossible)?;
+        let belief = belief(args, settings, &imu, &gnss, session)?;
+        let initial = given.map(|path| read_initial(path)).transpose()?;
+        let reference = args.reference.as_deref().map(|path| read::trajectory(path, session)).transpose()?;
+        Ok(Self { imu, gnss, belief, reference, initial, files })
+    }
+
+    /// Where the filter starts.
+    pub(super) fn start(
+        &self,
+        args: &Args,
+        recorded: &Recorded<'_>,
+        settings: &Settings,
+    ) -> Result<Start, Failure> {
+        if let Some(start) = &self.initial {
+            return Ok(start.clone());
+        }
+        let sigma = |sensor| self.belief.initial_bias_sigma(sensor);
+        let bias = BiasSigma { accel: sigma(Sensor::Accel), gyro: sigma(Sensor::Gyro) };
+        alignment::coarse(recorded, settings, bias).map_err(|e| {
+            let failure = Failure::input(format!("{}: {e}", args.gnss.display()));
+            failure.hint("give the start with --initial FILE (t_s, lat_deg, lon_deg, h_m, roll_deg, pitch_deg, yaw_deg)")
+        })
+    }
+}
+
+/// What does not fit together.
+pub(super) fn impossible(e: FusionError) -> Failure {
+    let failure =
+        if matches!(e, FusionError::Diverged { .. }) { Failure::could_not(&e) } else { Failure::input(&e) };
+    failure.maybe_hint(e.hint())
+}
+
+/// The IMU in the vehicle.
+pub(super) fn mounting(angles_deg: Option<parse::Triple>) -> DQuat {
+    let Some(parse::Triple([roll, pitch, yaw])) = angles_deg else { return DQuat::IDENTITY };
+    RollPitchYaw { roll: roll * DEG, pitch: pitch * DEG, yaw: yaw * DEG }.to_quat()
+}
+
+/// An outage outside the data withholds nothing: that is a mistake.
+pub(super) fn check_outages(outages: &[Outage], recorded: &Recorded<'_>) -> Result<(), Failure> {
+    let empty = |o: &&Outage| !recorded.gnss.iter().any(|f| o.withholds(f.t_s + 1e-9));
+    let Some(o) = outages.iter().find(empty) else { return Ok(()) };
+    let (first, last) = (recorded.gnss.first(), recorded.gnss.last());
+    let message = format!("outage {}:{} withholds no fix", o.start_s, o.end_s);
+    let span = first.zip(last).map(|(a, b)| format!("the fixes run from {} to {} s", a.t_s, b.t_s));
+    Err(Failure::input(message).maybe_hint(span))
+}
+
+fn scale(gnss: &mut [GnssFix], position: f64, velocity: f64) {
+    for fix in gnss {
+        fix.pos_sigma_n *= position;
+        if let Some((_, sigma)) = &mut fix.velocity {
+            *sigma *= velocity;
+        }
+    }
+}
+
+/// The filter's states for the model at the rate of the recording.
+fn belief(
+    args: &Args,
+    settings: &Settings,
+    imu: &ImuFile,
+    gnss: &[GnssFix],
+    session: &Session,
+) -> Result<Belief, Failure> {
+    let shown = args.model.display();
+    let file = read::model(&args.model, session)?;
+    let model = at_rate(&file.model, imu.rate_hz).map_err(|e| Failure::input(format!("{shown}: {e}")))?;
+    if (imu.rate_hz / file.model.rate_hz - 1.0).abs() > 0.01 {
+        let (from, to) = (file.model.rate_hz, imu.rate_hz);
+        session.printer.say(&format!("{shown}: converted from {from} Hz to {to:.3} Hz"));
+    }
+    let longest = settings.outages.iter().map(|o| o.end_s - o.start_s).fold(0.0, f64::max);
+    let mut steps: Vec<f64> = gnss.windows(2).map(|w| w[1].t_s - w[0].t_s).collect();
+    steps.sort_by(f64::total_cmp);
+    let interval_s = steps.get(steps.len() / 2).copied().unwrap_or(1.0);
+    let window_s = reduction::window_s(longest);
+    let mut belief = Belief::new(&model, args.filter, interval_s, window_s)
+        .map_err(|e| Failure::input(format!("{shown}: {e}")))?;
+    if let Some(parse::Pair([accel, gyro])) = args.turn_on_bias {
+        belief.add_constant(Sensor::Accel, accel);
+        belief.add_constant(Sensor::Gyro, gyro);
+    }
+    Ok(belief)
+}
+
+/// At the rate of the recording, without quantization noise: the filter leaves it out, and it belongs to
+/// its own rate.
+fn at_rate(model: &Model, rate_hz: f64) -> Result<Model, continuous::RateError> {
+    let kept = |axis: &Composite| {
+        let processes = axis.processes.iter().filter(|p| !matches!(p, Process::Quantization(_)));
+        Composite::new(processes.copied().collect())
+    };
+    let axes = std::array::from_fn(|i| kept(&model.axes[i]));
+    continuous::at_rate(&Model { rate_hz: model.rate_hz, axes }, rate_hz)
+}
+
+/// Where an output would fall on an input.
+pub(super) fn guarded(out: &Path, inputs: &[Input]) -> Result<(), Failure> {
+    for name in nav_sim::report::FUSION_FILES {
+        let paths = inputs.iter().map(|i| Path::new(&i.path));
+        nav_sim::data::atomic::guard_inputs(&out.join(name), paths)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,112 @@
+//! `nav-sim fuse`: the filter on recorded data.
+
+mod inputs;
+mod output;
+
+use super::run::{parse_outage, parse_states, windows_of};
+use super::{Failure, Session, parse};
+use inputs::Inputs;
+use nav_sim::ekf::FilterStates;
+use nav_sim::fusion::{self, Recorded, Settings};
+use nav_sim::report::FusionSummary;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Fuse recorded IMU and GNSS data with the filter of `run`, MODEL telling it the noise of the IMU
+///
+/// IMU: rates (t_s, gyro_x_rad_s … accel_z_m_s2; other units and loggers' names as for `wv`) or increments
+/// (dtheta_x_rad … dv_z_m_s, time = end of the interval). GNSS: t_s, lat_deg, lon_deg, h_m, sd_n_m, sd_e_m,
+/// sd_d_m, and v_n_m_s … sd_vd_m_s where velocity is measured. Or both as the text files of KF-GINS. Writes
+/// solution.csv, innovations.csv, errors.csv (with a reference), solution.kml, summary.json, manifest.json.
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim fuse examples/drive/imu.csv examples/drive/gnss.csv calib_data/tactical.toml
+  nav-sim fuse examples/drive/imu.csv examples/drive/gnss.csv calib_data/tactical.toml \\
+      --reference examples/drive/reference.csv --outage 60:75 -o out/gap
+  nav-sim fuse examples/drive/imu.csv examples/drive/gnss.csv calib_data/tactical.toml \\
+      --initial examples/drive/initial.toml --nis-gate 0.999 -o out/given")]
+pub(crate) struct Args {
+    /// IMU recording (.csv, .tsv, .txt, .npy, also .gz)
+    #[arg(value_name = "IMU")]
+    imu: PathBuf,
+    /// GNSS fixes (.csv, .txt, also .gz)
+    #[arg(value_name = "GNSS")]
+    gnss: PathBuf,
+    /// Noise model that the filter believes
+    #[arg(value_name = "MODEL")]
+    model: PathBuf,
+    /// Initial state (TOML), or auto: level from the IMU, heading from the GNSS course
+    #[arg(long, value_name = "FILE|auto", default_value = "auto")]
+    initial: PathBuf,
+    /// GNSS antenna from the IMU: front, right, down (m)
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse::triple, allow_hyphen_values = true)]
+    lever_arm: Option<parse::Triple>,
+    /// Attitude of the IMU in the vehicle, where its axes are not front, right, down (degrees)
+    #[arg(long, value_name = "ROLL,PITCH,YAW", value_parser = parse::triple, allow_hyphen_values = true)]
+    mounting: Option<parse::Triple>,
+    /// Trajectory to compare with
+    #[arg(long, value_name = "TRAJECTORY")]
+    reference: Option<PathBuf>,
+    /// Window in which fixes are withheld, on the clock of the data in seconds (repeatable)
+    #[arg(long = "outage", value_name = "START:END", value_parser = parse_outage)]
+    outages: Vec<super::run::OutageArg>,
+    /// States of the filter: 15 (one bias an axis, the reduction of the model) or full
+    #[arg(long, value_name = "STATES", value_parser = parse_states, default_value = "15")]
+    filter: FilterStates,
+    /// Constant biases that the model does not have (a calibration removes them): standard deviations,
+    /// accelerometer in m/s², gyroscope in rad/s; 3 states each
+    #[arg(long, value_name = "ACCEL,GYRO", value_parser = parse::pair)]
+    turn_on_bias: Option<parse::Pair>,
+    /// Multiply the receiver's standard deviations, of position and of velocity
+    #[arg(long, value_name = "POS,VEL", value_parser = parse::positive_pair)]
+    gnss_sigma_factor: Option<parse::Pair>,
+    /// Refuse fixes whose NIS is above the chi-square quantile of this probability
+    #[arg(long, value_name = "P", value_parser = parse::probability)]
+    nis_gate: Option<f64>,
+    /// Rows of the solution a second
+    #[arg(long, value_name = "HZ", default_value_t = 10.0, value_parser = parse::rate_hz)]
+    rate_hz: f64,
+    /// Directory to make
+    #[arg(long, short, value_name = "DIR", default_value = "out/fuse")]
+    out: PathBuf,
+}
+
+pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let begin = Instant::now();
+    let settings = settings(args);
+    let inputs = Inputs::read(args, &settings, session)?;
+    output::try_open(&args.out, &inputs.files)?;
+    let recorded = Recorded { imu: &inputs.imu.samples, gnss: &inputs.gnss };
+    inputs::check_outages(&settings.outages, &recorded)?;
+    let start = inputs.start(args, &recorded, &settings)?;
+    for line in &start.how {
+        session.printer.say(&format!("initial state at {} s: {line}", start.t_s));
+    }
+    let solution = fusion::fuse(&recorded, &inputs.belief, &start, &settings, inputs.reference.as_ref())
+        .map_err(inputs::impossible)?;
+    if inputs.reference.is_some() && solution.rows.iter().all(|row| row.error.is_none()) {
+        let message = "the reference and the solution have no time in common";
+        return Err(Failure::input(message).hint("both need one clock"));
+    }
+    let outcome = fusion::outcome(&solution, &settings.outages);
+    let (rate_hz, states) = (inputs.imu.rate_hz, inputs.belief.states);
+    let summary = FusionSummary::of(&solution, &outcome, &start, rate_hz, states);
+    let wall_s = begin.elapsed().as_secs_f64();
+    output::write(&solution, &summary, inputs.files, wall_s, &args.out)?;
+    let shown = if session.json() { nav_sim::report::json(&summary) } else { summary.text() };
+    session.printer.result(shown.trim_end());
+    session.printer.say(&format!("wrote {}", args.out.display()));
+    Ok(())
+}
+
+fn settings(args: &Args) -> Settings {
+    Settings {
+        q_s_b: inputs::mounting(args.mounting),
+        lever_arm_b: args.lever_arm.map_or(glam::DVec3::ZERO, |t| t.0.into()),
+        gravity: nav_sim::earth::GravityModel::default(),
+        outages: windows_of(&args.outages),
+        nis_gate: args.nis_gate,
+        rows_hz: args.rate_hz,
+    }
+}

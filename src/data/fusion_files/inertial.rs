@@ -1,0 +1,196 @@
+//! Recorded IMU data.
+
+use super::{FusionFileError as Error, is_bare, table, text};
+use crate::data::recordings::checks::{check_gravity, gravity_factor};
+use crate::data::recordings::header::{Role, Unit};
+use crate::data::recordings::timing::{median_step, unit_of_step};
+use crate::data::recordings::{self, Raw, ReadOptions};
+use crate::imu::{Axis, Channel, ImuIncrement, Sensor};
+use crate::strapdown::MAX_ROTATION;
+use crate::units::DEG;
+use glam::DVec3;
+use std::path::Path;
+
+/// Longest gap that is bridged with the mean of its neighbours (s).
+const LONGEST_GAP_S: f64 = 1.0;
+/// A step this many times the median one is a gap.
+const GAP: f64 = 1.5;
+/// Mean angular rate above which the unit is doubted (rad/s).
+const FAST: f64 = 2.0;
+
+/// A recording, ready to be fused.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImuFile {
+    /// Samples whose intervals follow one another.
+    pub samples: Vec<ImuIncrement>,
+    /// Samples a second, by the median step.
+    pub rate_hz: f64,
+    /// What is doubtful, and how the file was read.
+    pub remarks: Vec<String>,
+}
+
+/// Six values a sample, and the time it ends.
+struct Columns {
+    path: String,
+    t_s: Vec<f64>,
+    /// In the order of [`Channel::ALL`], SI: rates, or increments.
+    values: Vec<[f64; 6]>,
+    /// Which of the two each sensor gives.
+    increments: [bool; 2],
+    lines: Vec<u64>,
+    remarks: Vec<String>,
+}
+
+/// Reads a recording: a table whose headers are those of static recordings (rates, or increments over the
+/// interval that ends at the time given), or the text of KF-GINS: time, three angle increments (rad), three
+/// velocity increments (m/s).
+///
+/// # Errors
+/// Whatever is wrong with it, with its line.
+pub fn read_imu(path: &Path) -> Result<ImuFile, Error> {
+    let packed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy"));
+    let bare = if packed { None } else { Some(text(path)?).filter(|t| is_bare(t, 7)) };
+    let columns = match bare {
+        Some(text) => kf_gins(path, &text)?,
+        None => headed(path)?,
+    };
+    columns.increments()
+}
+
+fn kf_gins(path: &Path, text: &str) -> Result<Columns, Error> {
+    const NAMES: [&str; 7] =
+        ["t_s", "dtheta_x_rad", "dtheta_y_rad", "dtheta_z_rad", "dv_x_m_s", "dv_y_m_s", "dv_z_m_s"];
+    let table = table(path, text, Some(&NAMES))?;
+    Ok(Columns {
+        path: table.path,
+        t_s: table.rows.iter().map(|(_, r)| r[0]).collect(),
+        values: table.rows.iter().map(|(_, r)| [r[4], r[5], r[6], r[1], r[2], r[3]]).collect(),
+        increments: [true; 2],
+        lines: table.rows.iter().map(|(line, _)| *line).collect(),
+        remarks: vec!["no header: read as KF-GINS text, angle then velocity increments".into()],
+    })
+}
+
+fn headed(path: &Path) -> Result<Columns, Error> {
+    let raw = recordings::load(path, &ReadOptions::default())?;
+    let shown = raw.path.clone();
+    let find = |channel: Channel| {
+        let is = |role: Role| matches!(role, Role::Signal { channel: c, .. } if c == channel);
+        raw.columns.iter().find(|c| is(c.role)).ok_or(Error::Missing { path: shown.clone(), channel })
+    };
+    let signals = Channel::ALL.map(find).into_iter().collect::<Result<Vec<_>, _>>()?;
+    let from_gravity = gravity_factor(&raw)?;
+    let scale = |role: Role| match role {
+        Role::Signal { unit: Unit::Si(factor) | Unit::Increment(factor), .. } => factor,
+        _ => from_gravity,
+    };
+    let incremental = |i: usize| matches!(signals[i].role, Role::Signal { unit: Unit::Increment(_), .. });
+    let factors: Vec<f64> = signals.iter().map(|c| scale(c.role)).collect();
+    let t_s = times(&raw)?;
+    let sample = |k: usize| std::array::from_fn(|i| signals[i].values[k] * factors[i]);
+    Ok(Columns {
+        values: (0..t_s.len()).map(sample).collect(),
+        increments: [incremental(0), incremental(3)],
+        lines: (0..t_s.len()).map(|k| raw.lines.of(k)).collect(),
+        remarks: Vec::new(),
+        path: shown,
+        t_s,
+    })
+}
+
+fn times(raw: &Raw) -> Result<Vec<f64>, Error> {
+    let column = raw.columns.iter().find(|c| matches!(c.role, Role::Time { .. }));
+    let column = column.ok_or_else(|| Error::NoTime { path: raw.path.clone() })?;
+    let unit = match column.role {
+        Role::Time { unit_s: Some(unit) } => unit,
+        _ => unit_of_step(median_step(&column.values)).0,
+    };
+    Ok(column.values.iter().map(|t| t * unit).collect())
+}
+
+impl Columns {
+    fn increments(mut self) -> Result<ImuFile, Error> {
+        if self.t_s.len() < 3 {
+            return Err(Error::TooFew { path: self.path, found: self.t_s.len(), needed: 3 });
+        }
+        if let Some(k) = (1..self.t_s.len()).find(|k| self.t_s[*k] <= self.t_s[k - 1]) {
+            let (path, line) = (self.path.clone(), self.lines[k]);
+            return Err(Error::Time { path, line, previous_s: self.t_s[k - 1], t_s: self.t_s[k] });
+        }
+        let step = median_step(&self.t_s);
+        self.doubt_units(step)?;
+        let mut samples = Vec::with_capacity(self.t_s.len());
+        let mut gaps = Vec::new();
+        for k in 0..self.t_s.len() {
+            let t_s = self.t_s[k];
+            let previous_s = if k == 0 { t_s - step } else { self.t_s[k - 1] };
+            let mut dt = t_s - previous_s;
+            if dt > GAP * step {
+                let (path, line) = (self.path.clone(), self.lines[k]);
+                if dt > LONGEST_GAP_S.max(3.0 * step) {
+                    return Err(Error::Gap { path, line, previous_s, t_s });
+                }
+                gaps.push(line);
+                // what is missing is made of the samples on either side; the sample itself lasts a step
+                let (before, after) = (self.sample(k - 1, step, previous_s), self.sample(k, step, t_s));
+                let share = 0.5 * (dt - step) / step;
+                let (dtheta, dv) = ((before.dtheta + after.dtheta) * share, (before.dv + after.dv) * share);
+                samples.push(ImuIncrement { t_s: t_s - step, dt_s: dt - step, dtheta, dv });
+                dt = step;
+            }
+            let sample = self.sample(k, dt, t_s);
+            let angle = sample.dtheta.length();
+            if angle > MAX_ROTATION {
+                let (path, line) = (self.path, self.lines[k]);
+                return Err(Error::Rotation {
+                    path,
+                    line,
+                    angle_deg: angle / DEG,
+                    max_deg: MAX_ROTATION / DEG,
+                });
+            }
+            samples.push(sample);
+        }
+        if let Some(first) = gaps.first() {
+            let n = gaps.len();
+            self.remarks
+                .push(format!("{n} gaps bridged with the samples beside them, the first in line {first}"));
+        }
+        let path = &self.path;
+        let remarks = self.remarks.iter().map(|r| format!("{path}: {r}")).collect();
+        Ok(ImuFile { samples, rate_hz: 1.0 / step, remarks })
+    }
+
+    /// Sample k over `dt` seconds that end at `t_s`.
+    fn sample(&self, k: usize, dt: f64, t_s: f64) -> ImuIncrement {
+        let v = &self.values[k];
+        let seconds = |sensor: Sensor| if self.increments[sensor as usize] { 1.0 } else { dt };
+        let triad = |sensor: Sensor| {
+            let first = Channel { sensor, axis: Axis::X }.index();
+            DVec3::new(v[first], v[first + 1], v[first + 2]) * seconds(sensor)
+        };
+        ImuIncrement { t_s, dt_s: dt, dtheta: triad(Sensor::Gyro), dv: triad(Sensor::Accel) }
+    }
+
+    /// Over a whole recording the specific force is gravity in the mean, and nothing turns all the time.
+    fn doubt_units(&mut self, step: f64) -> Result<(), Error> {
+        let n = self.values.len() as f64;
+        let mean = |sensor: Sensor| {
+            let length = |k: usize| {
+                let s = self.sample(k, step, 0.0);
+                (if sensor == Sensor::Accel { s.dv } else { s.dtheta }).length() / step
+            };
+            (0..self.values.len()).map(length).sum::<f64>() / n
+        };
+        let (force, rate) = (mean(Sensor::Accel), mean(Sensor::Gyro));
+        if !(4.0..25.0).contains(&force) {
+            check_gravity(&self.path, force.max(0.3))?;
+        }
+        if rate > FAST {
+            let degrees = rate / DEG;
+            self.remarks
+                .push(format!("mean angular rate {degrees:.0} deg/s: are these degrees named radians?"));
+        }
+        Ok(())
+    }
+}

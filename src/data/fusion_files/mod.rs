@@ -1,0 +1,35 @@
+//! What `fuse` reads: recorded IMU data, GNSS fixes, an initial state. Our own tables, the headers that
+//! recordings may have, and the text files of KF-GINS.
+
+mod error;
+mod fixes;
+mod inertial;
+mod initial;
+#[cfg(test)]
+mod tests;
+
+pub use error::FusionFileError;
+pub use fixes::read_gnss;
+pub use inertial::{ImuFile, read_imu};
+pub use initial::read_initial;
+
+use crate::data::trajectory_file::table::{self, Table};
+use std::path::Path;
+
+/// Whether a text is a table of numbers between blanks without a header, of that many columns.
+fn is_bare(text: &str, columns: usize) -> bool {
+    let first = text.lines().map(str::trim).find(|l| !(l.is_empty() || l.starts_with(['#', '%', '/'])));
+    first.is_some_and(|line| {
+        let cells: Vec<&str> = line.split_whitespace().collect();
+        cells.len() == columns && cells.iter().all(|c| c.parse::<f64>().is_ok())
+    })
+}
+
+/// The table of a file, its columns named when it has no header.
+fn table(path: &Path, text: &str, columns: Option<&[&str]>) -> Result<Table, FusionFileError> {
+    Ok(Table::read(&path.display().to_string(), text.as_bytes(), columns)?)
+}
+
+fn text(path: &Path) -> Result<String, FusionFileError> {
+    Ok(table::text(path)?)
+}

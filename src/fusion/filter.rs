@@ -1,0 +1,128 @@
+//! The one place where recorded data meet the filter: one run, the same in all lanes.
+
+use super::{FixRecord, Nine, Row, RowError, Settings, Start, Use};
+use crate::earth::ned_difference;
+use crate::ekf::covariance::{PSI, R, V};
+use crate::ekf::{Belief, Ekf, Fix, advance, settle, update};
+use crate::frames::{NavState, RollPitchYaw};
+use crate::gnss::GnssFix;
+use crate::imu::{ImuIncrement, ImuSample, Sensor};
+use crate::lanes::{Lanes, Vec3};
+use crate::linalg::to_nalgebra;
+use crate::strapdown::Strapdown;
+use crate::units::DEG;
+use glam::{DQuat, DVec3};
+use nalgebra::{DMatrix, DVector};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+/// The NIS above which a fix of `dof` components is refused: the chi-square quantile of the probability.
+pub(super) fn gate(probability: f64, dof: usize) -> f64 {
+    ChiSquared::new(dof as f64).map_or(f64::INFINITY, |chi2| chi2.inverse_cdf(probability))
+}
+
+/// The filter in the axes of the IMU.
+pub(super) struct Filter {
+    ekf: Ekf,
+    q_s_b: DQuat,
+    lever_arm_s: DVec3,
+}
+
+impl Filter {
+    pub(super) fn new(belief: &Belief, start: &Start, settings: &Settings) -> Self {
+        let q_s_b = settings.q_s_b;
+        let of_imu = NavState { q_b_n: start.state.q_b_n * q_s_b, ..start.state };
+        let nominal = Strapdown::new(&of_imu, settings.gravity);
+        Self {
+            // roll, pitch and yaw are those of the vehicle: their deviations go to n at its attitude
+            ekf: Ekf::new(nominal, belief, &start.state, &start.sigma),
+            q_s_b,
+            lever_arm_s: q_s_b.inverse() * settings.lever_arm_b,
+        }
+    }
+
+    /// Through `seconds` of a sample.
+    pub(super) fn advance(&mut self, sample: &ImuIncrement, seconds: f64) {
+        let mean = ImuSample { omega_ib_b: sample.dtheta / sample.dt_s, f_ib_b: sample.dv / sample.dt_s };
+        self.ekf.set_interval(seconds);
+        advance(&mut self.ekf, &[mean], &[[Vec3::ZERO; 2]]);
+    }
+
+    fn fix(&self, fix: &GnssFix) -> Fix {
+        let (velocity, vel_sigma) = fix.velocity.unzip();
+        Fix {
+            lat: Lanes::splat(fix.lat),
+            lon: Lanes::splat(fix.lon),
+            h: Lanes::splat(fix.h),
+            v_n: velocity.map(Vec3::splat),
+            pos_sigma_m: fix.pos_sigma_n,
+            vel_sigma_m_s: vel_sigma.unwrap_or(DVec3::ONE),
+            lever_arm_b: self.lever_arm_s,
+        }
+    }
+
+    /// Innovation, its standard deviations and NIS, all components together.
+    pub(super) fn look_at(&mut self, fix: &GnssFix) -> FixRecord {
+        settle(&mut self.ekf);
+        let measured = self.fix(fix);
+        let components = if measured.v_n.is_some() { 6 } else { 3 };
+        let [position, velocity] = self.ekf.innovation(&measured);
+        let both = [position.lane(0).to_array(), velocity.lane(0).to_array()].concat();
+        let z = DVector::from_fn(components, |i, _| both[i]);
+        let sigma = [measured.pos_sigma_m.to_array(), measured.vel_sigma_m_s.to_array()].concat();
+        let rows = self.ekf.measurement_rows(self.lever_arm_s);
+        let h = DMatrix::from_fn(components, self.ekf.p.dim(), |i, j| rows[i][j]);
+        let noise =
+            DMatrix::from_fn(components, components, |i, j| if i == j { sigma[i].powi(2) } else { 0.0 });
+        let s = &h * self.ekf.p.lane(0) * h.transpose() + noise;
+        let sigma = s.diagonal().map(f64::sqrt).as_slice().to_vec();
+        let nis = s.cholesky().map_or(f64::NAN, |c| z.dot(&c.solve(&z)));
+        FixRecord {
+            t_s: fix.t_s,
+            used: Use::Used,
+            innovation: z.as_slice().to_vec(),
+            sigma,
+            nis,
+            error: None,
+        }
+    }
+
+    pub(super) fn update(&mut self, fix: &GnssFix) {
+        let fix = self.fix(fix);
+        let _ = update(&mut self.ekf, &fix);
+    }
+
+    /// The vehicle's state.
+    fn state(&self) -> NavState {
+        let of_imu = self.ekf.nominal.lane(0);
+        NavState { q_b_n: (of_imu.q_b_n * self.q_s_b.inverse()).normalize(), ..of_imu }
+    }
+
+    pub(super) fn row(&mut self, t_s: f64) -> Row {
+        settle(&mut self.ekf);
+        let (state, p) = (self.state(), &self.ekf.p);
+        let (r, v) = (p.variances(R).lane(0), p.variances(V).lane(0));
+        let psi = p.block(PSI, PSI).lane(0);
+        let jacobian = RollPitchYaw::from_quat(state.q_b_n).jacobian_of_psi_n().map(to_nalgebra);
+        let angle = |i: usize| (jacobian[i].transpose() * psi * jacobian[i])[0].sqrt() / DEG;
+        let sigma = [r.x.sqrt(), r.y.sqrt(), r.z.sqrt(), v.x.sqrt(), v.y.sqrt(), v.z.sqrt()];
+        let sigma: Nine = std::array::from_fn(|i| if i < 6 { sigma[i] } else { angle(i - 6) });
+        let bias = Sensor::ALL.map(|sensor| self.ekf.bias_of(sensor).lane(0));
+        Row { t_s, state, sigma, bias, error: None }
+    }
+
+    /// Difference from a reference.
+    pub(super) fn error(&mut self, truth: &NavState) -> RowError {
+        settle(&mut self.ekf);
+        let estimate = self.state();
+        let r = ned_difference(truth, estimate.lat, estimate.lon, estimate.h);
+        let v = estimate.v_n - truth.v_n;
+        let q = estimate.q_b_n * truth.q_b_n.inverse();
+        let psi_n = (if q.w < 0.0 { -q } else { q }).to_scaled_axis();
+        let angles = RollPitchYaw::from_quat(truth.q_b_n).jacobian_of_psi_n().map(|row| row.dot(psi_n) / DEG);
+        let states = std::array::from_fn(|i| i);
+        let x: Vec<f64> = [r, v, psi_n].iter().flat_map(|part| part.to_array()).collect();
+        let nees = self.ekf.p.normalised_square::<9>(states, std::array::from_fn(|i| Lanes::splat(x[i])))[0];
+        let all = [r.to_array(), v.to_array(), angles].concat();
+        RowError { values: std::array::from_fn(|i| all[i]), nees }
+    }
+}

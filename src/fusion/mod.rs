@@ -1,0 +1,311 @@
+//! Fusion of recorded IMU and GNSS: the filter of the simulation on a user's own data.
+//!
+//! The IMU's axes are those of its housing; `q_s_b` takes them (s) to the vehicle's front, right, down
+//! (b). The filter works in s, so that its noise model stays with the axes it was calibrated on; attitudes
+//! go in and come out as those of the vehicle.
+
+pub mod alignment;
+mod filter;
+mod outcome;
+
+pub use outcome::{Drift, OutageDrift, Outcome, outcome};
+
+use crate::earth::{GravityModel, MAX_LATITUDE};
+use crate::ekf::{Belief, InitialSettings};
+use crate::frames::NavState;
+use crate::gnss::GnssFix;
+use crate::imu::ImuIncrement;
+use crate::sensors::outage::Outage;
+use crate::trajectory::Trajectory;
+use crate::units::DEG;
+use filter::Filter;
+use glam::{DQuat, DVec3};
+
+/// Position (m, north, east, down), velocity (m/s), roll, pitch, yaw (degrees).
+pub type Nine = [f64; 9];
+
+/// What was recorded, both in order of time.
+#[derive(Debug, Clone, Copy)]
+pub struct Recorded<'a> {
+    /// Samples whose intervals follow one another.
+    pub imu: &'a [ImuIncrement],
+    /// Fixes.
+    pub gnss: &'a [GnssFix],
+}
+
+/// How it is fused.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// The IMU in the vehicle: takes the IMU's axes, returns front, right, down.
+    pub q_s_b: DQuat,
+    /// Antenna from IMU: front, right, down (m).
+    pub lever_arm_b: DVec3,
+    /// Gravity.
+    pub gravity: GravityModel,
+    /// When fixes are withheld.
+    pub outages: Vec<Outage>,
+    /// A fix is refused whose NIS is above the chi-square quantile of this probability.
+    pub nis_gate: Option<f64>,
+    /// Rows of the solution a second.
+    pub rows_hz: f64,
+}
+
+/// Where the filter starts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Start {
+    /// When (s).
+    pub t_s: f64,
+    /// Position of the IMU, velocity, attitude of the vehicle.
+    pub state: NavState,
+    /// How well they are known.
+    pub sigma: InitialSettings,
+    /// How they were found.
+    pub how: Vec<String>,
+}
+
+/// The state at an instant, and how well it is known.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Time (s).
+    pub t_s: f64,
+    /// Position of the IMU, velocity, attitude of the vehicle.
+    pub state: NavState,
+    /// Standard deviations.
+    pub sigma: Nine,
+    /// Bias estimates in the axes of the IMU: accelerometer (m/s²), gyroscope (rad/s).
+    pub bias: [DVec3; 2],
+    /// Difference from the reference, where there is one.
+    pub error: Option<RowError>,
+}
+
+/// Estimate less reference.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RowError {
+    /// In each state.
+    pub values: Nine,
+    /// Normalised by the filter's own covariance of the nine: its mean is 9 if both are right.
+    pub nees: f64,
+}
+
+/// What became of a fix.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Use {
+    /// Used.
+    Used,
+    /// In an outage.
+    Withheld,
+    /// Its NIS was above the gate.
+    Rejected,
+}
+
+/// A fix as the filter saw it, before using it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FixRecord {
+    /// Time (s).
+    pub t_s: f64,
+    /// What became of it.
+    pub used: Use,
+    /// Estimated less measured: position (m), velocity (m/s), north, east, down.
+    pub innovation: Vec<f64>,
+    /// Standard deviations of these, by the filter and the receiver together.
+    pub sigma: Vec<f64>,
+    /// Normalised innovation squared.
+    pub nis: f64,
+    /// Difference from the reference just before.
+    pub error: Option<Nine>,
+}
+
+/// What came out.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Solution {
+    /// States at `rows_hz`.
+    pub rows: Vec<Row>,
+    /// Every fix from start to end of the IMU.
+    pub fixes: Vec<FixRecord>,
+    /// IMU samples used.
+    pub samples: usize,
+}
+
+/// Why recorded data cannot be fused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FusionError {
+    /// The clocks have nothing in common.
+    #[error(
+        "the clocks do not overlap: the IMU runs from {} to {} s, GNSS from {} to {} s", .imu.0, .imu.1, .gnss.0, .gnss.1
+    )]
+    Clocks {
+        /// First and last sample (s).
+        imu: (f64, f64),
+        /// First and last fix (s).
+        gnss: (f64, f64),
+    },
+    /// It begins after the data end, or before they begin.
+    #[error("the start at {t_s} s is not within the IMU's {} to {} s", .imu.0, .imu.1)]
+    Start {
+        /// The start (s).
+        t_s: f64,
+        /// First and last sample (s).
+        imu: (f64, f64),
+    },
+    /// Latitude and longitude lose their meaning.
+    #[error(
+        "latitude {lat_deg:.3}° at {t_s} s: beyond ±89.9° there is no navigation in latitude and longitude"
+    )]
+    Pole {
+        /// When (s).
+        t_s: f64,
+        /// Where (degrees).
+        lat_deg: f64,
+    },
+    /// State or covariance stopped being finite.
+    #[error("the filter diverged at {t_s} s")]
+    Diverged {
+        /// When (s).
+        t_s: f64,
+    },
+}
+
+impl FusionError {
+    /// What to do about it.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        const WEEK_S: f64 = 604_800.0;
+        match self {
+            Self::Clocks { imu, gnss } => {
+                let weeks = ((imu.0 - gnss.0) / WEEK_S).round();
+                let rest = (imu.0 - gnss.0 - weeks * WEEK_S).abs();
+                Some(if weeks != 0.0 && rest < 86_400.0 {
+                    format!("they are {weeks} GPS weeks apart: give both in seconds of the week, without a week column")
+                } else {
+                    "both files need one clock: is one in milliseconds, or counted from its own start?".into()
+                })
+            }
+            Self::Start { .. } => Some("give t_s of the initial state on the clock of the IMU".into()),
+            Self::Diverged { .. } => Some(
+                "are the IMU's axes front, right, down (--mounting), its units right, the initial state true?".into(),
+            ),
+            Self::Pole { .. } => None,
+        }
+    }
+}
+
+/// Checks that IMU and GNSS have time in common.
+///
+/// # Errors
+/// [`FusionError::Clocks`].
+pub fn check_clocks(recorded: &Recorded<'_>) -> Result<(), FusionError> {
+    let (imu, gnss) = spans(recorded);
+    if imu.0 <= gnss.1 && gnss.0 <= imu.1 { Ok(()) } else { Err(FusionError::Clocks { imu, gnss }) }
+}
+
+fn spans(recorded: &Recorded<'_>) -> ((f64, f64), (f64, f64)) {
+    let ends = |first: Option<f64>, last: Option<f64>| (first.unwrap_or(f64::NAN), last.unwrap_or(f64::NAN));
+    let (imu, gnss) = (recorded.imu, recorded.gnss);
+    (
+        ends(imu.first().map(|s| s.t_s - s.dt_s), imu.last().map(|s| s.t_s)),
+        ends(gnss.first().map(|f| f.t_s), gnss.last().map(|f| f.t_s)),
+    )
+}
+
+/// Runs the filter through recorded data from `start`. A fix is applied at its own time: the sample it
+/// falls into is split there. `reference` is only compared with.
+///
+/// # Errors
+/// Clocks that do not overlap, a start outside the data, a pole, divergence.
+pub fn fuse(
+    recorded: &Recorded<'_>,
+    belief: &Belief,
+    start: &Start,
+    settings: &Settings,
+    reference: Option<&Trajectory>,
+) -> Result<Solution, FusionError> {
+    check_clocks(recorded)?;
+    let imu = spans(recorded).0;
+    if !(imu.0 - 1e-9..imu.1).contains(&start.t_s) {
+        return Err(FusionError::Start { t_s: start.t_s, imu });
+    }
+    let mut run = Run {
+        filter: Filter::new(belief, start, settings),
+        settings,
+        reference,
+        now: start.t_s,
+        next_row: start.t_s,
+        solution: Solution::default(),
+    };
+    let mut fixes = recorded.gnss.iter().skip_while(|f| f.t_s <= start.t_s).peekable();
+    run.row()?;
+    for sample in recorded.imu.iter().skip_while(|s| s.t_s <= start.t_s) {
+        // a fix that is a millionth of a sample late belongs to its end
+        let slack = 1e-6 * sample.dt_s;
+        while let Some(fix) = fixes.next_if(|f| f.t_s <= sample.t_s + slack) {
+            run.advance(sample, fix.t_s, slack);
+            run.fix(fix)?;
+        }
+        run.advance(sample, sample.t_s, 0.0);
+        run.solution.samples += 1;
+        if sample.t_s + slack >= run.next_row {
+            run.row()?;
+        }
+    }
+    Ok(run.solution)
+}
+
+/// The state of a run through the data.
+struct Run<'a> {
+    filter: Filter,
+    settings: &'a Settings,
+    reference: Option<&'a Trajectory>,
+    now: f64,
+    next_row: f64,
+    solution: Solution,
+}
+
+impl Run<'_> {
+    /// Through the sample as far as `to`, which is taken as the sample's end when it is nearly that.
+    fn advance(&mut self, sample: &ImuIncrement, to: f64, slack: f64) {
+        let to = if to + slack >= sample.t_s { sample.t_s } else { to };
+        if to > self.now + slack {
+            self.filter.advance(sample, to - self.now);
+            self.now = to;
+        }
+    }
+
+    fn fix(&mut self, fix: &GnssFix) -> Result<(), FusionError> {
+        let mut record = self.filter.look_at(fix);
+        record.error = self.error().map(|e| e.values);
+        let withheld = self.settings.outages.iter().any(|o| o.withholds(fix.t_s + 1e-9));
+        let limit = self.settings.nis_gate.map(|p| filter::gate(p, record.innovation.len()));
+        record.used = match limit {
+            _ if withheld => Use::Withheld,
+            Some(limit) if record.nis > limit => Use::Rejected,
+            _ => Use::Used,
+        };
+        if record.used == Use::Used {
+            self.filter.update(fix);
+        }
+        let finite = record.nis.is_finite();
+        self.solution.fixes.push(record);
+        if finite { Ok(()) } else { Err(FusionError::Diverged { t_s: self.now }) }
+    }
+
+    fn row(&mut self) -> Result<(), FusionError> {
+        self.next_row = (self.next_row + 1.0 / self.settings.rows_hz).max(self.now);
+        let mut row = self.filter.row(self.now);
+        if !(row.sigma.iter().all(|s| s.is_finite()) && row.state.q_b_n.is_finite()) {
+            return Err(FusionError::Diverged { t_s: self.now });
+        }
+        if row.state.lat.abs() > MAX_LATITUDE {
+            return Err(FusionError::Pole { t_s: self.now, lat_deg: row.state.lat / DEG });
+        }
+        row.error = self.error();
+        self.solution.rows.push(row);
+        Ok(())
+    }
+
+    /// Difference from the reference now, if it reaches here.
+    fn error(&mut self) -> Option<RowError> {
+        let reference = self.reference?;
+        let inside = (reference.start_s()..=reference.end_s()).contains(&self.now);
+        inside.then(|| self.filter.error(&reference.state(self.now)))
+    }
+}

@@ -1,0 +1,312 @@
+//! The files of a fusion: `solution.csv`, `innovations.csv`, `errors.csv`, `summary.json`, `solution.kml`.
+
+use super::json;
+use super::manifest::Input;
+use super::number::shortest;
+use super::run_directory::OutputFile;
+use crate::earth::radii;
+use crate::ekf::InitialSettings;
+use crate::frames::{NavState, RollPitchYaw};
+use crate::fusion::{Drift, Outcome, Row, Solution, Start, Use};
+use crate::metrics::PerState;
+use crate::simulation::REPORTED_NAMES;
+use crate::units::DEG;
+use serde::{Deserialize, Serialize};
+use std::fmt::Write as _;
+
+/// Names of the files of a fusion directory, the manifest last.
+pub const FUSION_FILES: [&str; 6] =
+    ["solution.csv", "innovations.csv", "errors.csv", "solution.kml", "summary.json", "manifest.json"];
+
+const STATE: [&str; 9] =
+    ["lat_deg", "lon_deg", "h_m", "v_n_m_s", "v_e_m_s", "v_d_m_s", "roll_deg", "pitch_deg", "yaw_deg"];
+const COMPONENTS: [&str; 6] = ["pos_n_m", "pos_e_m", "pos_d_m", "vel_n_m_s", "vel_e_m_s", "vel_d_m_s"];
+const BIASES: [&str; 6] = ["b_ax_m_s2", "b_ay_m_s2", "b_az_m_s2", "b_gx_rad_s", "b_gy_rad_s", "b_gz_rad_s"];
+const SCHEMA_VERSION: u32 = 1;
+
+/// Where a fusion came from: `manifest.json`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FusionManifest {
+    /// Layout version.
+    pub schema_version: u32,
+    /// What made the directory.
+    pub kind: FusionKind,
+    /// Version of nav-sim.
+    pub version: String,
+    /// The command as given.
+    pub command: Vec<String>,
+    /// Every file that was read.
+    pub inputs: Vec<Input>,
+    /// Time from start to results (s).
+    pub wall_s: f64,
+}
+
+/// Tells the directory of a fusion from that of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum FusionKind {
+    /// `nav-sim fuse`.
+    Fusion,
+}
+
+/// `summary.json` of a fusion.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FusionSummary {
+    schema_version: u32,
+    method: &'static str,
+    imu_samples: usize,
+    imu_rate_hz: f64,
+    start_s: f64,
+    end_s: f64,
+    filter_states: usize,
+    initial: Initial,
+    fixes: Fixes,
+    nis_per_component: f64,
+    outages: Vec<OutageRow>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reference: Option<Reference>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct Initial {
+    t_s: f64,
+    state: PerName,
+    sigma: InitialSettings,
+    how: Vec<String>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(transparent)]
+struct PerName(std::collections::BTreeMap<&'static str, f64>);
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+struct Fixes {
+    used: usize,
+    withheld: usize,
+    rejected: usize,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+struct OutageRow {
+    start_s: f64,
+    end_s: f64,
+    fixes_withheld: usize,
+    end_from_fix: Option<DriftRow>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    end_from_reference: Option<DriftRow>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+struct DriftRow {
+    horizontal_m: f64,
+    down_m: f64,
+    expected_sigma_m: f64,
+}
+
+impl From<Drift> for DriftRow {
+    fn from(d: Drift) -> Self {
+        Self { horizontal_m: d.horizontal_m, down_m: d.down_m, expected_sigma_m: d.sigma_m }
+    }
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct Reference {
+    rmse: PerState<f64>,
+    horizontal_rmse_m: f64,
+    horizontal_max_m: f64,
+    nees_mean: f64,
+    nees_dof: usize,
+}
+
+impl FusionSummary {
+    /// The summary of a fusion.
+    #[must_use]
+    pub fn of(
+        solution: &Solution,
+        outcome: &Outcome,
+        start: &Start,
+        imu_rate_hz: f64,
+        filter_states: usize,
+    ) -> Self {
+        let outage = |o: &crate::fusion::OutageDrift| OutageRow {
+            start_s: o.outage.start_s,
+            end_s: o.outage.end_s,
+            fixes_withheld: o.withheld,
+            end_from_fix: o.from_fix.map(Into::into),
+            end_from_reference: o.from_reference.map(Into::into),
+        };
+        let reference = outcome.rmse.map(|rmse| Reference {
+            rmse: PerState(rmse),
+            horizontal_rmse_m: rmse[0].hypot(rmse[1]),
+            horizontal_max_m: outcome.horizontal_max_m.unwrap_or(f64::NAN),
+            nees_mean: outcome.nees_mean.unwrap_or(f64::NAN),
+            nees_dof: 9,
+        });
+        let [used, withheld, rejected] = outcome.fixes;
+        Self {
+            schema_version: SCHEMA_VERSION,
+            method: "fusion",
+            imu_samples: solution.samples,
+            imu_rate_hz,
+            start_s: start.t_s,
+            end_s: solution.rows.last().map_or(start.t_s, |r| r.t_s),
+            filter_states,
+            initial: Initial {
+                t_s: start.t_s,
+                state: PerName(STATE.into_iter().zip(values(&start.state)).collect()),
+                sigma: start.sigma.clone(),
+                how: start.how.clone(),
+            },
+            fixes: Fixes { used, withheld, rejected },
+            nis_per_component: outcome.nis_per_component,
+            outages: outcome.outages.iter().map(outage).collect(),
+            reference,
+        }
+    }
+
+    /// The summary for people.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let Fixes { used, withheld, rejected } = self.fixes;
+        let mut lines = vec![format!(
+            "{} IMU samples at {:.2} Hz, {} to {:.2} s, {} states; {used} fixes used, {withheld} withheld, {rejected} rejected",
+            self.imu_samples, self.imu_rate_hz, self.start_s, self.end_s, self.filter_states
+        )];
+        lines.push(format!("NIS {:.2} per component (1 if all is as believed)", self.nis_per_component));
+        for o in &self.outages {
+            let of = |name: &str, d: Option<DriftRow>| {
+                d.map(|d| {
+                    format!("{:.2} m from the {name} (1 sigma {:.2} m)", d.horizontal_m, d.expected_sigma_m)
+                })
+            };
+            let ends = [of("next fix", o.end_from_fix), of("reference", o.end_from_reference)];
+            let ends: Vec<String> = ends.into_iter().flatten().collect();
+            lines.push(format!(
+                "outage {}–{} s, {} fixes withheld: at its end {}",
+                o.start_s,
+                o.end_s,
+                o.fixes_withheld,
+                if ends.is_empty() { "nothing to compare with".to_owned() } else { ends.join(", ") }
+            ));
+        }
+        if let Some(r) = &self.reference {
+            let e = &r.rmse.0;
+            lines.push(format!(
+                "against the reference, RMSE: horizontal {:.3} m (largest {:.3} m), down {:.3} m, velocity {:.3} {:.3} {:.3} m/s, \
+                 roll {:.3}°, pitch {:.3}°, yaw {:.3}°; NEES {:.2} (9 if both are right)",
+                r.horizontal_rmse_m, r.horizontal_max_m, e[2], e[3], e[4], e[5], e[6], e[7], e[8], r.nees_mean
+            ));
+        }
+        lines.join("\n")
+    }
+}
+
+/// The files of a fusion directory, the manifest last; `errors.csv` is empty but for its header without a
+/// reference.
+#[must_use]
+pub fn fusion_directory(
+    solution: &Solution,
+    summary: &FusionSummary,
+    manifest: &FusionManifest,
+    title: &str,
+) -> Vec<OutputFile> {
+    let contents = [
+        solution_csv(&solution.rows),
+        innovations_csv(solution),
+        errors_csv(&solution.rows),
+        kml(solution, title),
+        json(summary),
+        json(manifest),
+    ];
+    FUSION_FILES.into_iter().zip(contents).map(|(name, contents)| OutputFile { name, contents }).collect()
+}
+
+/// Position (degrees, m), velocity, roll, pitch, yaw (degrees).
+fn values(s: &NavState) -> [f64; 9] {
+    let rpy = RollPitchYaw::from_quat(s.q_b_n);
+    let [roll, pitch, yaw] = [rpy.roll, rpy.pitch, rpy.yaw].map(|a| a / DEG);
+    [s.lat / DEG, s.lon / DEG, s.h, s.v_n.x, s.v_n.y, s.v_n.z, roll, pitch, yaw]
+}
+
+fn header(groups: &[(&str, &[&str])]) -> String {
+    let names = groups.iter().flat_map(|(prefix, names)| names.iter().map(move |n| format!("{prefix}{n}")));
+    std::iter::once("t_s".to_owned()).chain(names).collect::<Vec<_>>().join(",") + "\n"
+}
+
+/// A number with as many digits as its size deserves: 1e-10 degrees are 0.01 mm.
+fn fixed(x: f64, digits: usize) -> String {
+    if x.is_finite() && x.abs() < 1e15 { format!("{x:.digits$}") } else { shortest(x) }
+}
+
+/// `solution.csv`: states, their standard deviations (those of latitude and longitude in degrees), bias
+/// estimates, and the horizontal standard deviations in metres.
+#[must_use]
+pub fn solution_csv(rows: &[Row]) -> String {
+    let mut text = header(&[("", &STATE), ("sd_", &STATE), ("", &BIASES), ("sd_", &["n_m", "e_m"])]);
+    for row in rows {
+        let (state, sd) = (values(&row.state), &row.sigma);
+        let r = radii(row.state.lat.sin());
+        let sd_lat = sd[0] / (r.meridian + row.state.h) / DEG;
+        let sd_lon = sd[1] / ((r.transverse + row.state.h) * row.state.lat.cos()) / DEG;
+        let digits = [10, 10, 5, 6, 6, 6, 7, 7, 7];
+        let mut cells = vec![fixed(row.t_s, 6)];
+        cells.extend(state.iter().zip(digits).map(|(x, d)| fixed(*x, d)));
+        cells.extend([sd_lat, sd_lon].map(|x| format!("{x:.4e}")));
+        cells.extend(sd[2..].iter().map(|x| fixed(*x, 6)));
+        cells.extend(row.bias.iter().flat_map(|b| b.to_array()).map(|x| fixed(x, 9)));
+        cells.extend(sd[..2].iter().map(|x| fixed(*x, 6)));
+        text += &(cells.join(",") + "\n");
+    }
+    text
+}
+
+/// `innovations.csv`: every fix; 1 where it was used, and why not where it was not.
+fn innovations_csv(solution: &Solution) -> String {
+    let mut text =
+        header(&[("", &["used", "status"]), ("", &COMPONENTS), ("sd_", &COMPONENTS), ("", &["nis", "dof"])]);
+    for fix in &solution.fixes {
+        let status = match fix.used {
+            Use::Used => "used",
+            Use::Withheld => "withheld",
+            Use::Rejected => "rejected",
+        };
+        let mut cells =
+            vec![fixed(fix.t_s, 6), u8::from(fix.used == Use::Used).to_string(), status.to_owned()];
+        for list in [&fix.innovation, &fix.sigma] {
+            cells.extend((0..6).map(|i| list.get(i).map_or_else(String::new, |x| fixed(*x, 6))));
+        }
+        cells.extend([fixed(fix.nis, 4), fix.innovation.len().to_string()]);
+        text += &(cells.join(",") + "\n");
+    }
+    text
+}
+
+fn errors_csv(rows: &[Row]) -> String {
+    let mut text = header(&[("err_", &REPORTED_NAMES), ("", &["nees"])]);
+    for (row, error) in rows.iter().filter_map(|row| Some((row, row.error?))) {
+        let cells: Vec<String> = error.values.iter().map(|x| fixed(*x, 6)).collect();
+        let _ = writeln!(text, "{},{},{}", fixed(row.t_s, 6), cells.join(","), fixed(error.nees, 4));
+    }
+    text
+}
+
+/// The way as a line on the map, a point a second at most.
+fn kml(solution: &Solution, title: &str) -> String {
+    let mut line = String::new();
+    let mut last = f64::NEG_INFINITY;
+    for row in &solution.rows {
+        if row.t_s - last >= 1.0 - 1e-6 || std::ptr::eq(row, &solution.rows[solution.rows.len() - 1]) {
+            let _ = write!(line, "{:.8},{:.8},{:.2} ", row.state.lon / DEG, row.state.lat / DEG, row.state.h);
+            last = row.t_s;
+        }
+    }
+    let title = super::svg::escape(title);
+    format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<kml xmlns=\"http://www.opengis.net/kml/2.2\">\n<Document>\n\
+         <name>{title}</name>\n<Placemark>\n<name>solution</name>\n<Style><LineStyle><color>ff0050ff</color>\
+         <width>3</width></LineStyle></Style>\n<LineString><tessellate>1</tessellate>\
+         <altitudeMode>clampToGround</altitudeMode>\n<coordinates>{}</coordinates>\n</LineString>\n</Placemark>\n\
+         </Document>\n</kml>\n",
+        line.trim_end()
+    )
+}
