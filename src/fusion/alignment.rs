@@ -20,6 +20,8 @@ pub const MIN_SPEED: f64 = 3.0;
 const SLIP: f64 = 2.0 * DEG;
 /// Length of a static window (s).
 const STILL_S: f64 = 2.0;
+/// How long it takes from the first acceleration to a speed that GNSS shows (s).
+const DEPARTURE_S: f64 = 3.0;
 /// How long the gyroscopes carry a levelling on (s).
 const MAX_AGE_S: f64 = 60.0;
 /// Length of the window in motion (s).
@@ -196,8 +198,8 @@ fn still(
     let window = |end: f64| {
         let samples = between(recorded.imu, end - STILL_S, end);
         let seconds: f64 = samples.iter().map(|s| s.dt_s).sum();
-        (seconds > 0.8 * STILL_S && slow(end) && slow(end - STILL_S))
-            .then(|| (end, mean(samples, settings.q_s_b)))
+        let stands = [end - STILL_S, end, end + DEPARTURE_S].into_iter().all(slow);
+        (seconds > 0.8 * STILL_S && stands).then(|| (end, mean(samples, settings.q_s_b)))
     };
     let calm = |(_, (f, spread, omega)): &(f64, (DVec3, f64, f64))| {
         *spread < STILL.0 && *omega < STILL.1 && (f.length() - g).abs() < 0.5

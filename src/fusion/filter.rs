@@ -76,7 +76,9 @@ impl Filter {
         let s = &h * self.ekf.p.lane(0) * h.transpose() + noise;
         let sigma = s.diagonal().map(f64::sqrt).as_slice().to_vec();
         let nis = s.cholesky().map_or(f64::NAN, |c| z.dot(&c.solve(&z)));
+        let before = self.ekf.p.variances(R).lane(0);
         FixRecord {
+            horizontal_sigma_m: (before.x + before.y).sqrt(),
             t_s: fix.t_s,
             used: Use::Used,
             innovation: z.as_slice().to_vec(),
@@ -101,7 +103,8 @@ impl Filter {
         settle(&mut self.ekf);
         let (state, p) = (self.state(), &self.ekf.p);
         let (r, v) = (p.variances(R).lane(0), p.variances(V).lane(0));
-        let psi = p.block(PSI, PSI).lane(0);
+        let full = p.lane(0);
+        let psi = full.fixed_view::<3, 3>(3 * PSI, 3 * PSI);
         let jacobian = RollPitchYaw::from_quat(state.q_b_n).jacobian_of_psi_n().map(to_nalgebra);
         let angle = |i: usize| (jacobian[i].transpose() * psi * jacobian[i])[0].sqrt() / DEG;
         let sigma = [r.x.sqrt(), r.y.sqrt(), r.z.sqrt(), v.x.sqrt(), v.y.sqrt(), v.z.sqrt()];

@@ -111,6 +111,8 @@ pub struct FixRecord {
     pub sigma: Vec<f64>,
     /// Normalised innovation squared.
     pub nis: f64,
+    /// Horizontal standard deviation of the IMU's position just before, by the filter alone (m).
+    pub horizontal_sigma_m: f64,
     /// Difference from the reference just before.
     pub error: Option<Nine>,
 }
@@ -199,7 +201,9 @@ pub fn check_clocks(recorded: &Recorded<'_>) -> Result<(), FusionError> {
 }
 
 fn spans(recorded: &Recorded<'_>) -> ((f64, f64), (f64, f64)) {
-    let ends = |first: Option<f64>, last: Option<f64>| (first.unwrap_or(f64::NAN), last.unwrap_or(f64::NAN));
+    // microseconds: what clocks and people tell apart
+    let rounded = |t: Option<f64>| t.map_or(f64::NAN, |t| (t * 1e6).round() / 1e6);
+    let ends = |first: Option<f64>, last: Option<f64>| (rounded(first), rounded(last));
     let (imu, gnss) = (recorded.imu, recorded.gnss);
     (
         ends(imu.first().map(|s| s.t_s - s.dt_s), imu.last().map(|s| s.t_s)),
@@ -221,7 +225,7 @@ pub fn fuse(
 ) -> Result<Solution, FusionError> {
     check_clocks(recorded)?;
     let imu = spans(recorded).0;
-    if !(imu.0 - 1e-9..imu.1).contains(&start.t_s) {
+    if !(imu.0 - 1e-6..imu.1).contains(&start.t_s) {
         return Err(FusionError::Start { t_s: start.t_s, imu });
     }
     let mut run = Run {

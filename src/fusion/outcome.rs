@@ -76,9 +76,8 @@ fn drift(solution: &Solution, outage: Outage) -> OutageDrift {
     });
     let from_reference = last.and_then(|f| {
         let error = f.error?;
-        let row = solution.rows.iter().rfind(|row| row.t_s <= f.t_s)?;
-        let sigma_m = row.sigma[0].hypot(row.sigma[1]);
-        Some(Drift { horizontal_m: error[0].hypot(error[1]), down_m: error[2], sigma_m })
+        let horizontal_m = error[0].hypot(error[1]);
+        Some(Drift { horizontal_m, down_m: error[2], sigma_m: f.horizontal_sigma_m })
     });
     OutageDrift { outage, withheld: withheld().count(), from_fix, from_reference }
 }

@@ -9,6 +9,7 @@ mod fusion;
 mod html;
 mod manifest;
 mod number;
+mod recording;
 mod replicates;
 mod run_directory;
 #[cfg(test)]
@@ -26,6 +27,7 @@ pub use efficiency::{EfficiencyFile, EfficiencyRow, efficiency_csv, efficiency_t
 pub use fits::{FitEntry, FitsFile, describe};
 pub use fusion::{FUSION_FILES, FusionKind, FusionManifest, FusionSummary, fusion_directory, solution_csv};
 pub use manifest::{Input, Manifest, ModelNote};
+pub use recording::{gnss_csv, imu_csv, initial_toml};
 pub use replicates::{
     AlarmEntry, LeftOutEntry, MovementEntry, ReplicateEntry, ScoresEntry, describe_replicates,
 };

@@ -123,7 +123,7 @@ impl<'a> Source<'a> {
     }
 }
 
-fn nominal_start(plan: &Plan<'_>, key: StreamKey<'_>) -> NavState {
+pub(super) fn nominal_start(plan: &Plan<'_>, key: StreamKey<'_>) -> NavState {
     let (truth, initial) = (plan.start, plan.experiment.initial);
     if initial.perfect {
         return truth;

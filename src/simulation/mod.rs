@@ -2,9 +2,11 @@
 
 mod batch;
 mod plan;
+mod recording;
 
 pub use batch::{Batch, run_batch};
 pub use plan::{Experiment, ExperimentError, Plan};
+pub use recording::{Recording, record};
 
 /// Number of reported navigation states: position, velocity (n, e, d), roll, pitch, yaw.
 pub const REPORTED: usize = 9;

@@ -21,11 +21,11 @@ use std::time::Instant;
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
-  nav-sim fuse examples/drive/imu.csv examples/drive/gnss.csv calib_data/tactical.toml
-  nav-sim fuse examples/drive/imu.csv examples/drive/gnss.csv calib_data/tactical.toml \\
-      --reference examples/drive/reference.csv --outage 60:75 -o out/gap
-  nav-sim fuse examples/drive/imu.csv examples/drive/gnss.csv calib_data/tactical.toml \\
-      --initial examples/drive/initial.toml --nis-gate 0.999 -o out/given")]
+  nav-sim trajectory record trajectories/land_vehicle.toml calib_data/tactical.toml -o drive
+  nav-sim fuse drive/imu.csv drive/gnss.csv calib_data/tactical.toml \\
+      --reference drive/reference.csv --outage 300:360 -o out/fused
+  nav-sim fuse drive/imu.csv drive/gnss.csv calib_data/tactical.toml \\
+      --initial drive/initial.toml --nis-gate 0.999 -o out/given")]
 pub(crate) struct Args {
     /// IMU recording (.csv, .tsv, .txt, .npy, also .gz)
     #[arg(value_name = "IMU")]

@@ -2,6 +2,7 @@
 
 mod check;
 mod plot;
+mod record;
 mod write;
 
 use super::{Failure, Session};
@@ -28,6 +29,7 @@ enum Command {
     Check(check::Args),
     Convert(write::ConvertArgs),
     Plot(plot::Args),
+    Record(record::Args),
 }
 
 /// The trajectory of a command.
@@ -77,6 +79,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         Command::Check(args) => check::run(args, session),
         Command::Convert(args) => write::convert(args, session),
         Command::Plot(args) => plot::run(args, session),
+        Command::Record(args) => record::run(args, session),
     }
 }
 

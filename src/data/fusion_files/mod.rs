@@ -5,8 +5,6 @@ mod error;
 mod fixes;
 mod inertial;
 mod initial;
-#[cfg(test)]
-mod tests;
 
 pub use error::FusionFileError;
 pub use fixes::read_gnss;

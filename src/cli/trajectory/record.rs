@@ -1,0 +1,79 @@
+//! `nav-sim trajectory record`.
+
+use super::{Source, wrote};
+use crate::cli::{Failure, Session, read};
+use nav_sim::data::atomic::{AtomicDir, guard_inputs};
+use nav_sim::data::scenario_file;
+use nav_sim::data::trajectory_file::{Rows, write_rows};
+use nav_sim::noise::continuous;
+use nav_sim::report::{gnss_csv, imu_csv, initial_toml};
+use nav_sim::sensors::imu::Truth;
+use nav_sim::simulation::{Experiment, Plan, record};
+use std::path::PathBuf;
+
+/// Names of the files, in the order of writing.
+const FILES: [&str; 4] = ["imu.csv", "gnss.csv", "reference.csv", "initial.toml"];
+
+/// Write what an IMU with the noise of MODEL and a GNSS receiver record along a trajectory
+///
+/// The files are those that `fuse` reads: imu.csv (rates), gnss.csv, reference.csv (the truth, 10 Hz),
+/// initial.toml (a start drawn from the initial standard deviations). The noise is that of the first run of
+/// `run` with the same seed.
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim trajectory record trajectories/land_vehicle.toml calib_data/tactical.toml -o drive
+  nav-sim trajectory record trajectories/figure_eight.toml calib_data/tactical.toml --seed 1
+  nav-sim trajectory record trajectories/fixed_wing.toml calib_data/consumer_mems.toml \\
+      --scenario examples/scenario.toml -o flight")]
+pub(super) struct Args {
+    #[command(flatten)]
+    source: Source,
+    /// Noise model of the IMU
+    #[arg(value_name = "MODEL")]
+    model: PathBuf,
+    /// Scenario file whose [imu], [gnss] and [initial] sections are used
+    #[arg(long, value_name = "FILE")]
+    scenario: Option<PathBuf>,
+    /// Directory to write to
+    #[arg(long, short, value_name = "DIR", default_value = "out/recording")]
+    out: PathBuf,
+}
+
+pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let inputs = [Some(&args.source.path), Some(&args.model), args.scenario.as_ref()];
+    for name in FILES {
+        guard_inputs(&args.out.join(name), inputs.iter().flatten().map(|p| p.as_path()))?;
+    }
+    let scenario = args.scenario.as_deref().map(scenario_file::read).transpose()?.unwrap_or_default();
+    let (trajectory, _) = args.source.read(session)?;
+    let shown = args.model.display();
+    let model = continuous::at_rate(&read::model(&args.model, session)?.model, scenario.imu.rate_hz)
+        .map_err(|e| Failure::input(format!("{shown}: {e}")))?;
+    let experiment = Experiment {
+        trajectory: &trajectory,
+        rate_hz: scenario.imu.rate_hz,
+        gravity: scenario.filter.gravity,
+        truth: Truth::Model(&model),
+        beliefs: &[],
+        gnss: &scenario.gnss,
+        initial: &scenario.initial,
+        outages: &[],
+        seed: session.seed(scenario.run.seed),
+        scenario: "",
+        coverage_level: scenario.run.coverage_level,
+    };
+    let plan = Plan::new(&experiment).map_err(Failure::input)?;
+    let recording = record(&plan, 0);
+    let mut reference = Vec::new();
+    write_rows(&mut reference, &trajectory, Rows::Rate(10.0)).map_err(Failure::could_not)?;
+    let initial = initial_toml(trajectory.start_s(), &recording.start, &scenario.initial);
+    let mut directory = AtomicDir::create(&args.out)?;
+    directory.write(FILES[0], imu_csv(&recording.imu))?;
+    directory.write(FILES[1], gnss_csv(&recording.gnss))?;
+    directory.write(FILES[2], reference)?;
+    directory.write(FILES[3], initial)?;
+    directory.commit()?;
+    wrote(&args.out, session);
+    Ok(())
+}

@@ -1,0 +1,464 @@
+//! Fusion of recordings: consistent with its own covariance on simulated ones, whatever form they are
+//! written in; and the command as a user runs it.
+
+#![allow(clippy::unwrap_used, reason = "a test")]
+
+use assert_cmd::Command;
+use glam::{DQuat, DVec3};
+use nav_sim::data::{model_file, trajectory_file};
+use nav_sim::earth::GravityModel;
+use nav_sim::ekf::{Belief, FilterStates, InitialSettings};
+use nav_sim::frames::RollPitchYaw;
+use nav_sim::fusion::{Recorded, Settings, Solution, Start, Use, fuse, outcome};
+use nav_sim::gnss::GnssFix;
+use nav_sim::imu::ImuIncrement;
+use nav_sim::noise::Model;
+use nav_sim::sensors::gnss::GnssSettings;
+use nav_sim::sensors::imu::Truth;
+use nav_sim::sensors::outage::Outage;
+use nav_sim::simulation::{Experiment, Plan, Recording, record};
+use nav_sim::trajectory::Trajectory;
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use std::fs;
+use std::path::Path;
+
+const DRIVE: &str = "
+start = { lat_deg = 46.5, lon_deg = 6.5, h_m = 400, heading_deg = 40 }
+segment = [
+  { kind = \"straight\", duration_s = 10 },
+  { kind = \"accelerate\", to_speed_m_s = 10, duration_s = 10 },
+  { kind = \"turn\", angle_deg = 90, duration_s = 10 },
+  { kind = \"straight\", duration_s = 30 },
+  { kind = \"turn\", angle_deg = -120, duration_s = 15 },
+  { kind = \"straight\", duration_s = 25 },
+]
+";
+/// White noise and one Gauss-Markov bias: what the filter of 15 states carries without reduction.
+const MODEL: &str = "
+schema = 1
+rate_hz = 100.0
+[accel]
+processes = [{ type = \"WN\", sigma2 = 5.4e-5 }, { type = \"AR1\", phi = 0.9999, sigma2 = 1e-9 }]
+[gyro]
+processes = [{ type = \"WN\", sigma2 = 2e-6 }, { type = \"AR1\", phi = 0.9999, sigma2 = 4e-12 }]
+";
+
+fn place() -> tempfile::TempDir {
+    let directory = tempfile::tempdir().unwrap();
+    fs::write(directory.path().join("drive.toml"), DRIVE).unwrap();
+    fs::write(directory.path().join("imu.toml"), MODEL).unwrap();
+    directory
+}
+
+fn model() -> Model {
+    let place = place();
+    model_file::read(&place.path().join("imu.toml")).unwrap().model
+}
+
+fn shipped(name: &str) -> Trajectory {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("trajectories").join(name);
+    trajectory_file::load(&path, &trajectory_file::Options::default()).unwrap().0
+}
+
+fn settings() -> Settings {
+    Settings {
+        q_s_b: DQuat::IDENTITY,
+        lever_arm_b: DVec3::ZERO,
+        gravity: GravityModel::default(),
+        outages: Vec::new(),
+        nis_gate: None,
+        rows_hz: 1.0,
+    }
+}
+
+fn belief(model: &Model) -> Belief {
+    Belief::new(model, FilterStates::Reduced15, 1.0, 800.0).unwrap()
+}
+
+/// Records runs of an experiment on a trajectory and hands each to `then`.
+fn recorded(
+    trajectory: &Trajectory,
+    model: &Model,
+    gnss: &GnssSettings,
+    runs: u64,
+    mut then: impl FnMut(&Recording, &Start),
+) {
+    let initial = InitialSettings::default();
+    let experiment = Experiment {
+        trajectory,
+        rate_hz: 100.0,
+        gravity: GravityModel::default(),
+        truth: Truth::Model(model),
+        beliefs: &[],
+        gnss,
+        initial: &initial,
+        outages: &[],
+        seed: 17,
+        scenario: "",
+        coverage_level: 0.95,
+    };
+    let plan = Plan::new(&experiment).unwrap();
+    for run in 0..runs {
+        let recording = record(&plan, run);
+        let start = Start {
+            t_s: trajectory.start_s(),
+            state: recording.start,
+            sigma: initial.clone(),
+            how: Vec::new(),
+        };
+        then(&recording, &start);
+    }
+}
+
+fn run(
+    imu: &[ImuIncrement],
+    gnss: &[GnssFix],
+    start: &Start,
+    settings: &Settings,
+    reference: &Trajectory,
+) -> Solution {
+    fuse(&Recorded { imu, gnss }, &belief(&model()), start, settings, Some(reference)).unwrap()
+}
+
+/// On recordings made from the model that the filter believes, on three shipped trajectories, the errors
+/// are as large as the filter says: the sum of the NEES over 24 independent runs is chi-square of 24·9
+/// degrees at every instant, the sum of the NIS chi-square of 6 a fix (two-sided 1e-4 each, 7 looks).
+#[test]
+fn errors_are_as_large_as_the_filter_says() {
+    let looks = [30, 120, 300, 500, 700, 880];
+    let (mut nees, mut nis, mut components, mut runs) = ([0.0; 6], 0.0, 0.0, 0.0);
+    let gnss = GnssSettings { lever_arm_m: [0.8, -0.3, -1.2], ..GnssSettings::default() };
+    let settings = Settings { lever_arm_b: gnss.lever_arm_m.into(), ..settings() };
+    for name in ["land_vehicle.toml", "figure_eight.toml", "fixed_wing.toml"] {
+        let trajectory = shipped(name);
+        recorded(&trajectory, &model(), &gnss, 8, |recording, start| {
+            let solution = run(&recording.imu, &recording.gnss, start, &settings, &trajectory);
+            for (sum, look) in nees.iter_mut().zip(looks) {
+                *sum += solution.rows[look].error.unwrap().nees;
+            }
+            nis += solution.fixes.iter().map(|f| f.nis).sum::<f64>();
+            components += 6.0 * solution.fixes.len() as f64;
+            runs += 1.0;
+        });
+    }
+    let inside = |sum: f64, dof: f64| {
+        let p = ChiSquared::new(dof).unwrap().cdf(sum);
+        assert!((1e-4..=1.0 - 1e-4).contains(&p), "{sum} of {dof} degrees: p = {p}");
+    };
+    nees.iter().for_each(|sum| inside(*sum, 9.0 * runs));
+    inside(nis, components);
+}
+
+/// Without noise, fixes between the samples agree to millimetres only when they are used at their own time:
+/// 3.7 ms at 25 m/s are 9 cm.
+#[test]
+fn fixes_between_samples_are_used_at_their_own_time() {
+    let trajectory = shipped("land_vehicle.toml");
+    let free = Model { rate_hz: 100.0, axes: Default::default() };
+    recorded(&trajectory, &free, &GnssSettings::default(), 1, |recording, start| {
+        let fix = |k: u32, late: f64| {
+            let t_s = f64::from(k) + 0.0037;
+            let s = trajectory.state(t_s - late);
+            let velocity = Some((s.v_n, DVec3::splat(0.01)));
+            GnssFix { t_s, lat: s.lat, lon: s.lon, h: s.h, pos_sigma_n: DVec3::splat(0.01), velocity }
+        };
+        let start = Start { state: trajectory.state(trajectory.start_s()), ..start.clone() };
+        let worst = |late: f64| {
+            let gnss: Vec<_> = (1..200).map(|k| fix(k, late)).collect();
+            let imu = &recording.imu[..20_050];
+            let solution = run(imu, &gnss, &start, &settings(), &trajectory);
+            let horizontal = |e: &[f64; 9]| e[0].hypot(e[1]);
+            solution.fixes[20..].iter().map(|f| horizontal(&f.error.unwrap())).fold(0.0, f64::max)
+        };
+        assert!(worst(0.0) < 2e-3, "{} m", worst(0.0));
+        assert!(worst(0.0037) > 0.03, "the test would not notice: {} m", worst(0.0037));
+    });
+}
+
+/// A turned IMU whose turn is told gives the same solution; the outage is longer than its fixes are apart.
+#[test]
+fn mounting_angles_take_a_turned_imu_back() {
+    let trajectory = shipped("figure_eight.toml");
+    recorded(&trajectory, &model(), &GnssSettings::default(), 1, |recording, start| {
+        let q_s_b = RollPitchYaw { roll: -0.17, pitch: -1.06, yaw: -2.91 }.to_quat();
+        let imu = &recording.imu[..12_000];
+        let turn = |s: &ImuIncrement| ImuIncrement {
+            dtheta: q_s_b.inverse() * s.dtheta,
+            dv: q_s_b.inverse() * s.dv,
+            ..*s
+        };
+        let turned: Vec<_> = imu.iter().map(turn).collect();
+        let outages = vec![Outage { start_s: 60.0, end_s: 80.0 }];
+        let straight = Settings { outages: outages.clone(), ..settings() };
+        let a = run(imu, &recording.gnss, start, &straight, &trajectory);
+        let b = run(&turned, &recording.gnss, start, &Settings { q_s_b, ..straight }, &trajectory);
+        let (end_a, end_b) = (a.rows.last().unwrap(), b.rows.last().unwrap());
+        for i in 0..9 {
+            let (x, y) = (end_a.error.unwrap().values[i], end_b.error.unwrap().values[i]);
+            assert!((x - y).abs() < 1e-6 * (1.0 + x.abs()), "state {i}: {x} {y}");
+            assert!((end_a.sigma[i] / end_b.sigma[i] - 1.0).abs() < 1e-6);
+        }
+        assert_eq!(a.fixes.iter().filter(|f| f.used == Use::Withheld).count(), 20);
+        let drift = &outcome(&a, &outages).outages[0];
+        assert_eq!(drift.withheld, 20);
+        let (fix, reference) = (drift.from_fix.unwrap(), drift.from_reference.unwrap());
+        // the two differ by the noise of one fix, 2.8 m in the horizontal: within 4 of them
+        assert!((fix.horizontal_m - reference.horizontal_m).abs() < 11.4);
+        assert!(reference.horizontal_m < 4.0 * reference.sigma_m);
+    });
+}
+
+struct Ran {
+    code: i32,
+    stdout: String,
+    stderr: String,
+}
+
+fn nav_sim(directory: &Path, arguments: &str) -> Ran {
+    let output = Command::new(env!("CARGO_BIN_EXE_nav-sim"))
+        .current_dir(directory)
+        .args(arguments.split_whitespace())
+        .output()
+        .unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    Ran { code: output.status.code().unwrap(), stdout: text(output.stdout), stderr: text(output.stderr) }
+}
+
+fn done(directory: &Path, arguments: &str) -> Ran {
+    let ran = nav_sim(directory, arguments);
+    assert_eq!(ran.code, 0, "{arguments}\n{}", ran.stderr);
+    ran
+}
+
+/// A place with a recorded drive in `rec`.
+fn drive() -> tempfile::TempDir {
+    let place = place();
+    done(place.path(), "trajectory record drive.toml imu.toml --seed 3 -o rec");
+    place
+}
+
+fn table(path: &Path) -> Vec<Vec<f64>> {
+    let text = fs::read_to_string(path).unwrap();
+    let cells = |line: &str| line.split(',').map(|c| c.parse().unwrap_or(f64::NAN)).collect();
+    text.lines().skip(1).map(cells).collect()
+}
+
+#[test]
+fn a_fusion_directory_holds_what_the_interface_says() {
+    let place = drive();
+    let ran = done(
+        place.path(),
+        "fuse rec/imu.csv rec/gnss.csv imu.toml --reference rec/reference.csv --outage 60:75 -o out",
+    );
+    assert!(ran.stderr.contains("from levelling at rest until"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("from the course of the fix at"), "{}", ran.stderr);
+    assert!(ran.stdout.contains("15 fixes withheld"), "{}", ran.stdout);
+    let out = place.path().join("out");
+    let header = fs::read_to_string(out.join("solution.csv")).unwrap().lines().next().unwrap().to_owned();
+    assert!(header.starts_with(
+        "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg,sd_lat_deg,"
+    ));
+    assert!(header.contains(",sd_yaw_deg,b_ax_m_s2,b_ay_m_s2,b_az_m_s2,b_gx_rad_s,b_gy_rad_s,b_gz_rad_s"));
+    let summary: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(out.join("summary.json")).unwrap()).unwrap();
+    let outage = &summary["outages"][0];
+    assert_eq!((&summary["fixes"]["withheld"], &outage["fixes_withheld"]), (&15.into(), &15.into()));
+    let (drift, sigma) =
+        (&outage["end_from_reference"]["horizontal_m"], &outage["end_from_reference"]["expected_sigma_m"]);
+    assert!(drift.as_f64().unwrap() < 4.0 * sigma.as_f64().unwrap(), "{outage}");
+    assert!(summary["reference"]["rmse"]["pos_n_m"].as_f64().unwrap() < 10.0);
+    // the coarse alignment is as good as it says, at its own epoch, in every state
+    let (errors, solution) = (table(&out.join("errors.csv")), table(&out.join("solution.csv")));
+    let sd = |i: usize| if i < 2 { solution[0][25 + i] } else { solution[0][10 + i] };
+    for i in 0..9 {
+        assert!(errors[0][1 + i].abs() < 4.0 * sd(i), "state {i}: {} against {}", errors[0][1 + i], sd(i));
+    }
+    assert!(fs::read_to_string(out.join("solution.kml")).unwrap().contains("<LineString>"));
+    assert!(fs::read_to_string(out.join("manifest.json")).unwrap().contains("\"kind\": \"fusion\""));
+}
+
+/// The same recording as rates, as increments, as KF-GINS texts: one solution, to the digits written.
+#[test]
+fn rates_increments_and_kf_gins_texts_give_one_solution() {
+    let place = drive();
+    let at = |name: &str| place.path().join(name);
+    let (imu, gnss) = (table(&at("rec/imu.csv")), table(&at("rec/gnss.csv")));
+    let mut csv = "t_s,dtheta_x_rad,dtheta_y_rad,dtheta_z_rad,dv_x_m_s,dv_y_m_s,dv_z_m_s\n".to_owned();
+    let mut text = String::new();
+    for row in &imu {
+        let cells: Vec<String> = row[1..].iter().map(|x| format!("{:.14}", x * 0.01)).collect();
+        csv += &format!("{},{}\n", row[0], cells.join(","));
+        text += &format!("  {:.6}   {}\n", row[0], cells.join("  "));
+    }
+    let fixes: String = gnss
+        .iter()
+        .map(|r| format!("{} {:.10} {:.10} {:.4} {} {} {}\n", r[0], r[1], r[2], r[3], r[4], r[5], r[6]))
+        .collect();
+    let position_only: String =
+        "t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m\n".to_owned() + &fixes.replace(' ', ",");
+    for (name, contents) in
+        [("inc.csv", &csv), ("imu.txt", &text), ("gnss.txt", &fixes), ("pos.csv", &position_only)]
+    {
+        fs::write(at(name), contents).unwrap();
+    }
+    let pairs = [("rec/imu.csv", "pos.csv"), ("inc.csv", "pos.csv"), ("imu.txt", "gnss.txt")];
+    let ends = pairs.map(|(imu, gnss)| {
+        done(place.path(), &format!("fuse {imu} {gnss} imu.toml --initial rec/initial.toml -o out"));
+        table(&at("out/solution.csv")).pop().unwrap()
+    });
+    for end in &ends[1..] {
+        for (column, (x, y)) in ends[0].iter().zip(end).enumerate() {
+            assert!((x - y).abs() <= 2e-6 * (1.0 + x.abs()), "column {column}: {x} {y}");
+        }
+    }
+}
+
+/// Edits a file of the drive and expects the refusal, with exit code 2 and nothing left.
+fn refused(name: &str, edit: impl Fn(&str) -> String, flags: &str, expected: &[&str]) {
+    let place = drive();
+    let path = place.path().join(name);
+    fs::write(&path, edit(&fs::read_to_string(&path).unwrap())).unwrap();
+    let ran = nav_sim(place.path(), &format!("fuse rec/imu.csv rec/gnss.csv imu.toml {flags} -o out"));
+    assert_eq!(ran.code, 2, "{expected:?}\n{}", ran.stderr);
+    for text in expected {
+        assert!(ran.stderr.contains(text), "{text}\n{}", ran.stderr);
+    }
+    assert!(!place.path().join("out").exists());
+}
+
+/// The table with one cell of one line replaced.
+fn cell(line: usize, column: usize, value: &str) -> impl Fn(&str) -> String {
+    let value = value.to_owned();
+    move |text| {
+        let edit = |(i, l): (usize, &str)| {
+            let mut cells: Vec<&str> = l.split(',').collect();
+            if i + 1 == line {
+                cells[column] = &value;
+            }
+            cells.join(",") + "\n"
+        };
+        text.lines().enumerate().map(edit).collect()
+    }
+}
+
+fn shifted(seconds: f64) -> impl Fn(&str) -> String {
+    move |text| {
+        let mut lines = text.lines();
+        let mut out = lines.next().unwrap().to_owned() + "\n";
+        for line in lines {
+            let (t, rest) = line.split_once(',').unwrap();
+            out += &format!("{},{rest}\n", t.parse::<f64>().unwrap() + seconds);
+        }
+        out
+    }
+}
+
+#[test]
+fn bad_fixes_are_refused_by_line_and_value() {
+    let gnss = "rec/gnss.csv";
+    refused(
+        gnss,
+        cell(5, 4, "0"),
+        "",
+        &["gnss.csv, line 5: column \"sd_n_m\": 0 is not a standard deviation", "hint: "],
+    );
+    refused(
+        gnss,
+        cell(5, 12, "-0.1"),
+        "",
+        &["line 5: column \"sd_vd_m_s\": -0.1 is not a standard deviation"],
+    );
+    refused(gnss, cell(7, 1, "89.95"), "", &["line 7: column \"lat_deg\": 89.95 is too near a pole"]);
+    refused(gnss, cell(7, 1, "-146.5"), "", &["line 7: column \"lat_deg\": -146.5 is not a latitude"]);
+    refused(gnss, cell(7, 1, "6.5"), "", &["line 7: the fix is", "swapped"]);
+    refused(gnss, cell(9, 0, "2"), "", &["line 9: time goes from 7 s to 2 s: it must increase"]);
+    refused(gnss, cell(9, 3, "NaN"), "", &["line 9: column \"h_m\": NaN is not finite"]);
+    refused(
+        gnss,
+        cell(1, 4, "sdn_m"),
+        "",
+        &["line 1: \"sdn_m\" is not known (\"sd_n_m\"?); sd_n_m is missing"],
+    );
+    refused(
+        gnss,
+        shifted(604_800.0),
+        "",
+        &["the clocks do not overlap", "hint: they are -1 GPS weeks apart"],
+    );
+    refused(
+        gnss,
+        shifted(5000.0),
+        "",
+        &["the clocks do not overlap: the IMU runs from 0 to 100 s", "one clock"],
+    );
+}
+
+#[test]
+fn bad_imu_data_and_flags_are_refused() {
+    let imu = "rec/imu.csv";
+    refused(
+        imu,
+        cell(50, 2, "inf"),
+        "",
+        &["imu.csv, line 50: column \"gyro_y_rad_s\": \"inf\" is not finite"],
+    );
+    refused(imu, cell(50, 0, "0.1"), "", &["imu.csv, line 50: time goes from 0.48 s to 0.1 s"]);
+    refused(imu, cell(50, 1, "99"), "", &["imu.csv, line 50: a rotation of", "hint: is the unit right?"]);
+    refused(
+        imu,
+        |t| {
+            t.replace("accel_x_m_s2", "accel_x_mg")
+                .replace("accel_y_m_s2", "accel_y_mg")
+                .replace("accel_z_m_s2", "accel_z_mg")
+        },
+        "",
+        &["far from 9.81 m/s²"],
+    );
+    refused(imu, |t| t.replace("gyro_z_rad_s", "magnet_z"), "", &["channel gyro.z is missing"]);
+    let same = |t: &str| t.to_owned();
+    let gap = |t: &str| {
+        t.lines()
+            .enumerate()
+            .filter(|(i, _)| !(100..350).contains(i))
+            .map(|(_, l)| l.to_owned() + "\n")
+            .collect()
+    };
+    refused(imu, gap, "", &["line 101: no samples from 0.99 s to 3.5 s"]);
+    refused(
+        imu,
+        same,
+        "--outage 300:400",
+        &["outage 300:400 withholds no fix", "hint: the fixes run from 1 to 100 s"],
+    );
+    refused(imu, same, "--lever-arm 1,2", &["expected three numbers"]);
+    refused(imu, same, "--nis-gate 1.5", &["not a probability below 1"]);
+    refused(
+        "rec/initial.toml",
+        |t| t.replace("yaw_deg", "yaw"),
+        "--initial rec/initial.toml",
+        &["unknown key \"yaw\"", "yaw_deg"],
+    );
+    refused(
+        "rec/initial.toml",
+        |t| t.replace("t_s = 0.0", "t_s = 500.0"),
+        "--initial rec/initial.toml",
+        &["the start at 500 s is not within the IMU's 0 to 100 s"],
+    );
+}
+
+/// A recording that never moves has no course: the message says what to give instead.
+#[test]
+fn standing_still_needs_an_initial_state() {
+    let place = place();
+    let still = "start = { lat_deg = 46.5, lon_deg = 6.5, h_m = 400, heading_deg = 40 }\nsegment = [{ kind = \"straight\", duration_s = 30 }]\n";
+    fs::write(place.path().join("drive.toml"), still).unwrap();
+    done(place.path(), "trajectory record drive.toml imu.toml --seed 3 -o rec");
+    let ran = nav_sim(place.path(), "fuse rec/imu.csv rec/gnss.csv imu.toml -o out");
+    assert_eq!(ran.code, 2);
+    assert!(
+        ran.stderr.contains("moves at 3 m/s or more") && ran.stderr.contains("--initial FILE"),
+        "{}",
+        ran.stderr
+    );
+    done(place.path(), "fuse rec/imu.csv rec/gnss.csv imu.toml --initial rec/initial.toml -o out");
+}
