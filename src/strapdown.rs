@@ -126,7 +126,7 @@ impl<L: Real> Strapdown<L> {
     /// body axes, as an integrating IMU gives them (its mean rates times dt).
     #[inline(always)]
     pub fn step(&mut self, dtheta: Vec3<L>, dv: Vec3<L>, dt: f64) -> StepTrace<L> {
-        let [half, sixth, twelfth] = [0.5, 1.0 / 6.0, 1.0 / 12.0].map(L::from);
+        let (half, sixth, twelfth) = (L::from(0.5), L::from(1.0 / 6.0), L::from(1.0 / 12.0));
         let seconds = L::from(dt);
         // Coning and sculling from this sample and the one before (Savage 1998, two-sample form).
         let phi_b = self.dtheta_before.cross(dtheta).mul_add(twelfth, dtheta);

@@ -1,10 +1,16 @@
 //! The covariance of eight runs.
 //!
 //! States by threes: [`R`] position error (m, n), [`V`] velocity error (m/s, n), [`PSI`] attitude error
-//! (rad, n), then one triple of axes for each bias group, accelerometer groups first ([`BIAS`]). Only
-//! the upper triangle is stored, so the matrix is symmetric by construction.
+//! (rad, n), then one triple of axes for each bias group, accelerometer groups first ([`BIAS`]).
+//!
+//! The lower triangle is the matrix. Inside the square of the navigation states and inside that of the
+//! biases the upper triangle repeats it, so that a column can be read as a row.
 
+use super::belief::MAX_BLOCKS;
+use super::dynamics::{ErrorMap, NavError};
 use crate::lanes::{Lanes, Mat3, Real, Vec3, Wide};
+use glam::DVec3;
+use std::ops::Range;
 
 /// Position error block (m, n).
 pub const R: usize = 0;
@@ -14,22 +20,35 @@ pub const V: usize = 1;
 pub const PSI: usize = 2;
 /// First bias block.
 pub const BIAS: usize = 3;
-/// The navigation blocks.
-pub const NAV: [usize; 3] = [R, V, PSI];
+/// Navigation states.
+const NAV: usize = 3 * BIAS;
 
 /// Symmetric covariance of eight runs.
 #[derive(Debug, Clone)]
 pub struct Covariance {
     dim: usize,
-    /// Row-major; what is below the diagonal is unused.
+    /// Row-major.
     p: Vec<Lanes>,
+    /// Scratch: columns of A P, navigation rows.
+    columns: [[Lanes; NAV]; NAV],
 }
+
+/// A bias triple of the filter's transition: coefficients and innovation variances of the three axes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct BiasStep {
+    pub(super) phi: DVec3,
+    pub(super) innovation: DVec3,
+}
+
+/// Biases that stay as they are.
+pub(super) const CONSTANT_BIASES: [BiasStep; 2 * MAX_BLOCKS] =
+    [BiasStep { phi: DVec3::ONE, innovation: DVec3::ZERO }; 2 * MAX_BLOCKS];
 
 impl Covariance {
     /// Zero covariance of `dim` states.
     #[must_use]
     pub fn zeros(dim: usize) -> Self {
-        Self { dim, p: vec![Lanes::ZERO; dim * dim] }
+        Self { dim, p: vec![Lanes::ZERO; dim * dim], columns: [[Lanes::ZERO; NAV]; NAV] }
     }
 
     /// States: rows of the matrix.
@@ -38,42 +57,106 @@ impl Covariance {
         self.dim
     }
 
-    #[inline(always)]
-    fn index(&self, i: usize, j: usize) -> usize {
-        if i <= j { i * self.dim + j } else { j * self.dim + i }
-    }
-
     /// Element (i, j) of the matrix.
     #[inline(always)]
     #[must_use]
     pub fn get<W: Wide>(&self, i: usize, j: usize) -> W {
-        W::load(&self.p[self.index(i, j)])
+        W::load(&self.p[i.max(j) * self.dim + i.min(j)])
     }
 
     #[inline(always)]
-    pub(super) fn set<W: Wide>(&mut self, i: usize, j: usize, value: W) {
-        let index = self.index(i, j);
-        value.store(&mut self.p[index]);
+    fn set<W: Wide>(&mut self, i: usize, j: usize, value: W) {
+        value.store(&mut self.p[i * self.dim + j]);
+        value.store(&mut self.p[j * self.dim + i]);
     }
 
+    /// Adds to an element of the navigation square and its mirror image.
     #[inline(always)]
     pub(super) fn add<W: Wide>(&mut self, i: usize, j: usize, value: W) {
         self.set(i, j, self.get::<W>(i, j) + value);
     }
 
-    /// Elements (i, j), (i + 1, j), (i + 2, j).
-    #[inline(always)]
-    #[must_use]
-    pub fn triple<W: Wide>(&self, i: usize, j: usize) -> Vec3<W> {
-        Vec3([self.get(i, j), self.get(i + 1, j), self.get(i + 2, j)])
-    }
-
-    /// Adds to the upper triangle of a diagonal block of three states.
+    /// Adds to a diagonal block of three states.
     #[inline(always)]
     pub(super) fn add_diagonal_block<W: Wide>(&mut self, block: usize, m: &Mat3<W>) {
         for i in 0..3 {
             for j in i..3 {
                 self.add(3 * block + i, 3 * block + j, m.0[i][j]);
+            }
+        }
+    }
+
+    /// P⁺ = A P Aᵀ + Q for a map A of the navigation error and the transition of the biases; the biases
+    /// take their step first: `b_k = phi b_{k−1} + w`, and the map uses `b_k`. Groups of the accelerometer
+    /// come first.
+    #[inline(always)]
+    pub(super) fn step<W: Wide>(&mut self, map: &impl ErrorMap<W>, biases: &[BiasStep], accel_groups: usize) {
+        self.step_biases::<W>(biases);
+        let (n, gyro) = (self.dim, NAV + 3 * accel_groups);
+        // A P, the navigation columns apart: they are read again below.
+        for j in 0..NAV {
+            let (accel, gyro) = (self.bias_sum(NAV..gyro, j, biases), self.bias_sum(gyro..n, j, biases));
+            let after = map.apply(load_error(&self.p[j * n..]), accel, gyro);
+            store_error(&mut self.columns[j], &after);
+        }
+        for j in NAV..n {
+            let phi = W::from(biases[j / 3 - BIAS].phi[j % 3]);
+            let (nav, bias) = self.p[j * n..(j + 1) * n].split_at_mut(NAV);
+            let (accel, gyro) = bias.split_at(gyro - NAV);
+            let x = load_error::<W>(nav);
+            let x = [x[R] * phi, x[V] * phi, x[PSI] * phi];
+            store_error(nav, &map.apply(x, sum_triples(accel), sum_triples(gyro)));
+        }
+        // (A P) Aᵀ: the same map on the rows of A P.
+        for i in 0..NAV {
+            let mut row = [Lanes::ZERO; NAV];
+            for (element, column) in row.iter_mut().zip(&self.columns) {
+                *element = column[i];
+            }
+            let still = &CONSTANT_BIASES[..biases.len()];
+            let (accel, gyro) = (self.bias_sum(NAV..gyro, i, still), self.bias_sum(gyro..n, i, still));
+            let after = map.apply(load_error(&row), accel, gyro);
+            store_error(&mut self.p[i * n..], &after);
+        }
+        self.mirror_navigation();
+    }
+
+    /// The sum of triples of biases in column j of the navigation, each after its step.
+    #[inline(always)]
+    fn bias_sum<W: Wide>(&self, states: Range<usize>, j: usize, biases: &[BiasStep]) -> Vec3<W> {
+        let mut sum = [W::from(0.0); 3];
+        for m in states.step_by(3) {
+            let phi = biases[m / 3 - BIAS].phi;
+            for axis in 0..3 {
+                let element = W::load(&self.p[(m + axis) * self.dim + j]);
+                sum[axis] = element.mul_add(W::from(phi[axis]), sum[axis]);
+            }
+        }
+        Vec3(sum)
+    }
+
+    /// The square of the biases: Phi P Phiᵀ + Q.
+    #[inline(always)]
+    fn step_biases<W: Wide>(&mut self, biases: &[BiasStep]) {
+        for i in NAV..self.dim {
+            let BiasStep { phi, innovation } = biases[i / 3 - BIAS];
+            let row = &mut self.p[i * self.dim..(i + 1) * self.dim];
+            for (g, triple) in row[NAV..].as_chunks_mut::<3>().0.iter_mut().enumerate() {
+                let factor = biases[g].phi * phi[i % 3];
+                for axis in 0..3 {
+                    (W::load(&triple[axis]) * factor[axis]).store(&mut triple[axis]);
+                }
+            }
+            (W::load(&row[i]) + innovation[i % 3]).store(&mut row[i]);
+        }
+    }
+
+    /// Copies the upper triangle of the navigation square to the lower.
+    #[inline(always)]
+    fn mirror_navigation(&mut self) {
+        for i in 0..NAV {
+            for j in i + 1..NAV {
+                self.p[j * self.dim + i] = self.p[i * self.dim + j];
             }
         }
     }
@@ -117,7 +200,7 @@ impl Covariance {
         for i in 0..n {
             let (ph_i, gain_i) = (W::load(&ph[i]), W::load(&gain[i]));
             let residual = gain_i * r - (ph_i - gain_i * h_ph);
-            for j in i..n {
+            for j in 0..=i {
                 let m = (-gain_i).mul_add(W::load(&ph[j]), self.get(i, j));
                 self.set(i, j, residual.mul_add(W::load(&gain[j]), m));
             }
@@ -155,6 +238,36 @@ impl Covariance {
     pub fn lane(&self, lane: usize) -> nalgebra::DMatrix<f64> {
         nalgebra::DMatrix::from_fn(self.dim(), self.dim(), |i, j| self.get::<Lanes>(i, j)[lane])
     }
+}
+
+/// The first nine lanes of a row as a navigation error.
+#[inline(always)]
+fn load_error<W: Wide>(row: &[Lanes]) -> NavError<W> {
+    let row = &row[..NAV];
+    [load_triple(&row[..3]), load_triple(&row[3..6]), load_triple(&row[6..])]
+}
+
+#[inline(always)]
+fn store_error<W: Wide>(row: &mut [Lanes], x: &NavError<W>) {
+    let row = &mut row[..NAV];
+    for k in 0..NAV {
+        x[k / 3][k % 3].store(&mut row[k]);
+    }
+}
+
+#[inline(always)]
+fn load_triple<W: Wide>(triple: &[Lanes]) -> Vec3<W> {
+    Vec3([W::load(&triple[0]), W::load(&triple[1]), W::load(&triple[2])])
+}
+
+/// The sum of the triples of a row.
+#[inline(always)]
+fn sum_triples<W: Wide>(row: &[Lanes]) -> Vec3<W> {
+    let mut sum = Vec3::splat(DVec3::ZERO);
+    for triple in row.as_chunks::<3>().0 {
+        sum = sum + load_triple(triple);
+    }
+    sum
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! The filter itself: nominal state, bias estimates and covariance of eight runs.
 
 use super::belief::{Belief, BiasGroup};
-use super::covariance::{BIAS, Covariance, PSI, R, V};
-use super::dynamics::{EARTH_STEP_S, EarthStep, EarthTerms, ErrorMap, NavError, Sample};
+use super::covariance::{BIAS, BiasStep, CONSTANT_BIASES, Covariance, PSI, R, V};
+use super::dynamics::{EARTH_STEP_S, EarthStep, EarthTerms, Sample};
 use super::initial::{InitialSettings, psi_of_angles};
 use crate::frames::NavState;
 use crate::imu::{ImuSample, Sensor};
@@ -21,9 +21,7 @@ pub struct Ekf {
     pub bias: Vec<Vec3>,
     /// Covariance of the error state.
     pub p: Covariance,
-    /// Block transition of the biases: coefficients and innovation variances, by group.
-    phi: Vec<DVec3>,
-    innovation: Vec<DVec3>,
+    bias_steps: Vec<BiasStep>,
     white: [DVec3; 2],
     /// What is believed of one sample at the belief's own rate: groups, white noise, interval (s).
     of_sample: (Vec<BiasGroup>, [DVec3; 2], f64),
@@ -50,7 +48,8 @@ impl Scratch {
     /// The estimated errors of a block.
     #[inline(always)]
     pub(super) fn of<W: Wide>(&self, block: usize) -> Vec3<W> {
-        Vec3([0, 1, 2].map(|i| W::load(&self.error[3 * block + i])))
+        let of = &self.error[3 * block..];
+        Vec3([W::load(&of[0]), W::load(&of[1]), W::load(&of[2])])
     }
 }
 
@@ -82,8 +81,7 @@ impl Ekf {
             nominal,
             bias: vec![Vec3::ZERO; groups.len()],
             p,
-            phi: groups.iter().map(|g| g.phi).collect(),
-            innovation: groups.iter().map(|g| g.innovation).collect(),
+            bias_steps: groups.iter().map(|g| BiasStep { phi: g.phi, innovation: g.innovation }).collect(),
             white: belief.white,
             accel_groups: belief.groups[0].len(),
             of_sample: (groups, belief.white, 1.0 / belief.rate_hz),
@@ -102,16 +100,11 @@ impl Ekf {
         let (groups, white, belief_dt) = &self.of_sample;
         let ratio = dt / belief_dt;
         for (g, group) in groups.iter().enumerate() {
-            (self.phi[g], self.innovation[g]) = group.over(ratio);
+            let (phi, innovation) = group.over(ratio);
+            self.bias_steps[g] = BiasStep { phi, innovation };
         }
         self.white = white.map(|w| w / ratio);
         self.dt = dt;
-    }
-
-    /// Blocks of the accelerometer biases.
-    #[inline(always)]
-    pub(super) fn accel_blocks(&self) -> std::ops::Range<usize> {
-        BIAS..BIAS + self.accel_groups
     }
 
     /// Blocks of the gyroscope biases.
@@ -136,35 +129,21 @@ impl Ekf {
     #[inline(always)]
     fn predict<W: Wide>(&mut self, ins: &mut Strapdown<W>, omega_ib_b: Vec3<W>, f_ib_b: Vec3<W>) {
         let dt = self.dt;
-        self.advance_biases::<W>();
+        for (bias, step) in self.bias.iter_mut().zip(&self.bias_steps) {
+            for axis in 0..3 {
+                (W::load(&bias[axis]) * step.phi[axis]).store(&mut bias[axis]);
+            }
+        }
         let omega_ib_b = omega_ib_b - self.bias_of(Sensor::Gyro);
         let f_ib_b = f_ib_b - self.bias_of(Sensor::Accel);
         self.omega_ib_b.store(omega_ib_b);
         let seconds = W::from(dt);
         let sample = Sample::new(&ins.step(omega_ib_b * seconds, f_ib_b * seconds, dt), dt);
-        self.transform(&sample);
+        self.p.step(&sample, &self.bias_steps, self.accel_groups);
         self.add_white_noise(&sample);
         self.earth_age += dt;
         if self.earth_age + 0.5 * dt > EARTH_STEP_S {
             self.apply_earth_terms(ins);
-        }
-    }
-
-    /// b_k = phi b_{k−1} + w for estimates and covariance.
-    #[inline(always)]
-    fn advance_biases<W: Wide>(&mut self) {
-        let n = self.p.dim();
-        for m in 0..n - 3 * BIAS {
-            let (g, axis, state) = (m / 3, m % 3, 3 * BIAS + m);
-            let (phi, innovation) = (W::from(self.phi[g][axis]), W::from(self.innovation[g][axis]));
-            (W::load(&self.bias[g][axis]) * phi).store(&mut self.bias[g][axis]);
-            for i in 0..state {
-                self.p.set(i, state, self.p.get::<W>(i, state) * phi);
-            }
-            self.p.set(state, state, (self.p.get::<W>(state, state) * phi).mul_add(phi, innovation));
-            for j in state + 1..n {
-                self.p.set(state, j, self.p.get::<W>(state, j) * phi);
-            }
         }
     }
 
@@ -174,44 +153,8 @@ impl Ekf {
         if self.earth_age > 0.0 {
             let step = EarthStep { terms: EarthTerms::at(ins), dt: self.earth_age };
             self.earth_age = 0.0;
-            self.transform(&step);
+            self.p.step(&step, &CONSTANT_BIASES[..self.bias.len()], self.accel_groups);
         }
-    }
-
-    /// P⁺ = A P Aᵀ for a map A of the navigation error: by columns, then by rows.
-    #[inline(always)]
-    fn transform<W: Wide>(&mut self, map: &impl ErrorMap<W>) {
-        // The navigation rows of A P: the navigation columns apart, the bias columns in place after them.
-        let mut nav = [[Lanes::ZERO; 3 * BIAS]; 3 * BIAS];
-        for j in 0..self.p.dim() {
-            let after = map.apply(
-                [R, V, PSI].map(|block| self.p.triple(3 * block, j)),
-                self.sum(self.accel_blocks(), j),
-                self.sum(self.gyro_blocks(), j),
-            );
-            for i in 0..3 * BIAS {
-                let value = after[i / 3][i % 3];
-                if j < 3 * BIAS { value.store(&mut nav[i][j]) } else { self.p.set(i, j, value) }
-            }
-        }
-        // A P Aᵀ: the same map on the rows of A P, of which the upper triangle is kept.
-        for i in 0..3 * BIAS {
-            let row: NavError<W> = [R, V, PSI].map(|b| Vec3([0, 1, 2].map(|k| W::load(&nav[i][3 * b + k]))));
-            let after = map.apply(row, self.sum(self.accel_blocks(), i), self.sum(self.gyro_blocks(), i));
-            for j in i..3 * BIAS {
-                self.p.set(i, j, after[j / 3][j % 3]);
-            }
-        }
-    }
-
-    /// The sum of bias blocks of column j.
-    #[inline(always)]
-    fn sum<W: Wide>(&self, blocks: std::ops::Range<usize>, j: usize) -> Vec3<W> {
-        let mut sum = self.p.triple(3 * blocks.start, j);
-        for block in blocks.start + 1..blocks.end {
-            sum = sum + self.p.triple(3 * block, j);
-        }
-        sum
     }
 
     /// White noise of one sample, held over dt: sigma² dt² into V and PSI, and the part of it that the

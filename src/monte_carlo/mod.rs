@@ -1,8 +1,8 @@
 //! All runs: lane batches over threads, reduced in run order.
 //!
 //! Batches of eight runs are computed in any order on any number of threads and added up in run order,
-//! so that the result is the same to the last bit. A fixed number of batches is in flight: memory does
-//! not grow with the number of runs (but for one small record a run).
+//! so that the result is the same to the last bit. A few batches a thread are in flight: memory does not grow
+//! with the number of runs (but for one small record a run).
 
 use crate::lanes::LANES;
 use crate::simulation::{
@@ -10,8 +10,8 @@ use crate::simulation::{
 };
 use rayon::prelude::*;
 
-/// Batches computed before they are added up.
-const WAVE: u64 = 16;
+/// Batches a thread computes before they are added up.
+const BATCHES_A_THREAD: u64 = 4;
 
 /// Runs `0..runs` of an experiment, all candidates on the same noise; one result a candidate, in their
 /// order. `progress` is told how many runs have been completed.
@@ -27,8 +27,9 @@ pub fn run(
     let mut results: Vec<RunResult> =
         experiment.beliefs.iter().map(|b| empty(experiment, b.states)).collect();
     let batches = runs.div_ceil(LANES as u64);
-    for wave in (0..batches).step_by(WAVE as usize) {
-        let computed: Vec<Vec<Batch>> = (wave..batches.min(wave + WAVE))
+    let wave = BATCHES_A_THREAD * rayon::current_num_threads() as u64;
+    for start in (0..batches).step_by(wave as usize) {
+        let computed: Vec<Vec<Batch>> = (start..batches.min(start + wave))
             .into_par_iter()
             .map(|batch| {
                 let first = batch * LANES as u64;
