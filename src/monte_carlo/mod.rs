@@ -1,17 +1,16 @@
 //! All runs: lane batches over threads, reduced in run order.
 //!
-//! Batches of eight runs are computed in any order on any number of threads and added up in run order,
-//! so that the result is the same to the last bit. A few batches a thread are in flight: memory does not grow
-//! with the number of runs (but for one small record a run).
+//! Batches of eight runs are handed out in order to any number of threads and added up in order as they
+//! come back, so that the result is the same to the last bit. One batch a thread is in flight and few
+//! wait for their turn: memory does not grow with the number of runs (but for one small record a run).
 
 use crate::lanes::LANES;
 use crate::simulation::{
     Batch, EpochSums, Experiment, ExperimentError, Plan, REPORTED, RunResult, run_batch,
 };
 use rayon::prelude::*;
-
-/// Batches a thread computes before they are added up.
-const BATCHES_A_THREAD: u64 = 4;
+use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
 
 /// Runs `0..runs` of an experiment, all candidates on the same noise; one result a candidate, in their
 /// order. `progress` is told how many runs have been completed.
@@ -24,29 +23,36 @@ pub fn run(
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<Vec<RunResult>, ExperimentError> {
     let plan = Plan::new(experiment)?;
-    let mut results: Vec<RunResult> =
-        experiment.beliefs.iter().map(|b| empty(experiment, b.states)).collect();
-    let batches = runs.div_ceil(LANES as u64);
-    let wave = BATCHES_A_THREAD * rayon::current_num_threads() as u64;
-    for start in (0..batches).step_by(wave as usize) {
-        let computed: Vec<Vec<Batch>> = (start..batches.min(start + wave))
-            .into_par_iter()
-            .map(|batch| {
-                let first = batch * LANES as u64;
-                let live = (runs - first).min(LANES as u64);
-                let computed = run_batch(&plan, first, live as usize);
-                progress(live);
-                computed
-            })
-            .collect();
-        for batch in computed {
-            for (result, part) in results.iter_mut().zip(batch) {
-                result.run_epochs += plan.samples() as u64 * part.runs.len() as u64;
+    let results = experiment.beliefs.iter().map(|b| empty(experiment, b.states)).collect();
+    let sums = Mutex::new(InOrder { results, next: 0, waiting: BTreeMap::new() });
+    (0..runs.div_ceil(LANES as u64)).par_bridge().for_each(|batch| {
+        let first = batch * LANES as u64;
+        let live = (runs - first).min(LANES as u64);
+        let computed = run_batch(&plan, first, live as usize);
+        progress(live);
+        sums.lock().unwrap_or_else(PoisonError::into_inner).take(batch, computed, plan.samples());
+    });
+    Ok(sums.into_inner().unwrap_or_else(PoisonError::into_inner).results)
+}
+
+/// The results so far, and the batches that came before their turn: one of each candidate.
+struct InOrder {
+    results: Vec<RunResult>,
+    next: u64,
+    waiting: BTreeMap<u64, Vec<Batch>>,
+}
+
+impl InOrder {
+    fn take(&mut self, batch: u64, computed: Vec<Batch>, samples: usize) {
+        self.waiting.insert(batch, computed);
+        while let Some(parts) = self.waiting.remove(&self.next) {
+            self.next += 1;
+            for (result, part) in self.results.iter_mut().zip(parts) {
+                result.run_epochs += (samples * part.runs.len()) as u64;
                 add(result, part);
             }
         }
     }
-    Ok(results)
 }
 
 fn empty(experiment: &Experiment<'_>, filter_states: usize) -> RunResult {
