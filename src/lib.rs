@@ -56,6 +56,7 @@ pub mod simulation;
 // L6
 pub mod metrics;
 // L7
+pub mod batch;
 pub mod data;
 pub mod report;
 pub mod study;

@@ -2,8 +2,9 @@
 //! [Minaretzis et al.](crate::bibliography::Minaretzis24), Section V.
 
 use crate::earth::GravityModel;
-use crate::ekf::{FilterStates, InitialSettings};
-use crate::imu::MAX_RATE_HZ;
+use crate::ekf::{Belief, BeliefError, FilterStates, InitialSettings};
+use crate::imu::{MAX_RATE_HZ, Sensor};
+use crate::noise::{Model, reduction};
 use crate::sensors::gnss::GnssSettings;
 use crate::sensors::outage::{Outage, OutagePlan, PeriodicOutages, RandomOutages};
 use crate::units::{SettingError, require_non_negative, require_positive};
@@ -177,6 +178,23 @@ impl Scenario {
         }
         let requirement = format!("imu.rate_hz = {} must be a whole multiple of it", self.imu.rate_hz);
         Err(SettingError::new("gnss.rate_hz", self.gnss.rate_hz, requirement))
+    }
+
+    /// What the filter believes of a model at the IMU's rate, reduced for these outages.
+    ///
+    /// # Errors
+    /// When the model has no such filter.
+    pub fn belief(&self, model: &Model, outages: &[Outage]) -> Result<Belief, BeliefError> {
+        let longest = outages.iter().map(|o| o.end_s - o.start_s).fold(0.0, f64::max);
+        let (interval_s, window_s) = (1.0 / self.gnss.rate_hz, reduction::window_s(longest));
+        let mut belief = Belief::new(model, self.filter.states, interval_s, window_s)?;
+        if let Some(sigma) = self.initial.accel_bias_sigma_m_s2 {
+            belief.set_initial_bias_sigma(Sensor::Accel, sigma);
+        }
+        if let Some(sigma) = self.initial.gyro_bias_sigma_rad_s {
+            belief.set_initial_bias_sigma(Sensor::Gyro, sigma);
+        }
+        Ok(belief)
     }
 
     /// The outages asked for: the paper's two when nothing is said.

@@ -1,20 +1,21 @@
 //! `nav-sim check`: whether a file is what it should be.
 
 use super::{Failure, Session, read};
-use nav_sim::data::scenario_file;
+use nav_sim::data::{batch_file, scenario_file, study_file};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-/// Check scenario, model, trajectory and recording files without running anything
+/// Check scenario, study, model, trajectory and recording files without running anything
 ///
 /// What a file is follows from its contents: a TOML with [accel] or [gyro] is a noise model, one with
-/// segments or waypoints a motion profile, any other a scenario; a table with lat_deg or n_m is a
-/// trajectory, any other table or .npy a static recording.
+/// segments or waypoints a motion profile, one with candidates a study of `batch`, one with sets of
+/// replicates a study of `efficiency`, any other a scenario; a table with lat_deg or n_m is a trajectory, any
+/// other table or .npy a static recording.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
   nav-sim check calib_data/consumer_mems.toml
-  nav-sim check trajectories/land_vehicle.toml calib_data/tactical.toml
+  nav-sim check trajectories/land_vehicle.toml examples/paper_table1.toml
   nav-sim init study && nav-sim check study/scenario.toml")]
 pub(crate) struct Args {
     /// Files
@@ -36,6 +37,15 @@ fn check(path: &Path, session: &Session) -> Result<String, Failure> {
         Kind::Scenario => {
             let scenario = scenario_file::read(path)?;
             Ok(format!("a scenario of {} runs", scenario.run.runs))
+        }
+        Kind::Study => {
+            let study = batch_file::read(path)?.study;
+            let (candidates, sets) = (study.candidates().len(), study.outage_sets().map_or(0, |s| s.len()));
+            Ok(format!("a study of {candidates} candidates, {sets} outage sets, {} runs each", study.runs))
+        }
+        Kind::Efficiency => {
+            let study = study_file::read(path)?;
+            Ok(format!("a study of estimators on {} sets of recordings", study.sets))
         }
         Kind::Model => {
             let file = read::model(path, session)?;
@@ -61,6 +71,8 @@ fn check(path: &Path, session: &Session) -> Result<String, Failure> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Scenario,
+    Study,
+    Efficiency,
     Model,
     Trajectory,
     Recording,
@@ -92,6 +104,10 @@ fn toml_kind(text: &str) -> Kind {
         Kind::Model
     } else if has(&["segment", "waypoint", "start", "vehicle"]) {
         Kind::Trajectory
+    } else if has(&["candidate", "trajectory", "truth"]) {
+        Kind::Study
+    } else if has(&["sets", "replicates", "estimators"]) {
+        Kind::Efficiency
     } else {
         Kind::Scenario
     }
@@ -110,6 +126,8 @@ mod tests {
     fn contents_tell_the_kind() {
         assert_eq!(toml_kind("[accel]\nprocesses = []"), Kind::Model);
         assert_eq!(toml_kind("start = {}\nsegment = []"), Kind::Trajectory);
+        assert_eq!(toml_kind("runs = 3\n[[candidate]]"), Kind::Study);
+        assert_eq!(toml_kind("sets = 500\nmodel = 'n1.toml'"), Kind::Efficiency);
         assert_eq!(toml_kind("[run]\nruns = 3"), Kind::Scenario);
         assert_eq!(toml_kind("= broken"), Kind::Scenario);
         assert_eq!(table_kind("# origin\nt_s, lat_deg, lon_deg"), Kind::Trajectory);

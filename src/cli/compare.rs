@@ -81,7 +81,7 @@ fn read(path: &Path) -> Result<run_directory::RunDirectory, Failure> {
     })
 }
 
-fn states(names: &[String]) -> Result<Vec<usize>, Failure> {
+pub(super) fn states(names: &[String]) -> Result<Vec<usize>, Failure> {
     if names.iter().any(|n| n == "all") {
         return Ok((0..REPORTED_NAMES.len()).collect());
     }

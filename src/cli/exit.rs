@@ -31,6 +31,21 @@ impl Failure {
         Self { code: 3, message: message.to_string(), hint: None }
     }
 
+    /// Stopped early, to be resumed (exit code 75).
+    pub(crate) fn stopped(message: impl ToString) -> Self {
+        Self { code: 75, message: message.to_string(), hint: None }
+    }
+
+    /// Interrupted by the user (exit code 130).
+    pub(crate) fn interrupted(message: impl ToString) -> Self {
+        Self { code: 130, message: message.to_string(), hint: None }
+    }
+
+    /// The same, of a part.
+    pub(crate) fn within(self, part: &str) -> Self {
+        Self { message: format!("{part}: {}", self.message), ..self }
+    }
+
     /// With advice.
     pub(crate) fn hint(mut self, hint: impl Into<String>) -> Self {
         self.hint = Some(hint.into());

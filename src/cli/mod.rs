@@ -1,6 +1,7 @@
 //! The command line: one file per subcommand, each its `Args` and a `run(args, &Session)`.
 
 mod axes;
+mod batch;
 mod calibrate;
 mod check;
 mod common;
@@ -51,6 +52,7 @@ enum Command {
     Run(run::Args),
     Fuse(fuse::Args),
     Compare(compare::Args),
+    Batch(batch::Args),
     Efficiency(efficiency::Args),
     Demo(demo::Args),
     Check(check::Args),
@@ -70,6 +72,7 @@ impl Command {
             Self::Run(args) => run::run(&args, session),
             Self::Fuse(args) => fuse::run(&args, session),
             Self::Compare(args) => compare::run(&args, session),
+            Self::Batch(args) => batch::run(&args, session),
             Self::Efficiency(args) => efficiency::run(&args, session),
             Self::Demo(args) => demo::run(&args, session),
             Self::Check(args) => check::run(&args, session),

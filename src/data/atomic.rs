@@ -95,8 +95,7 @@ impl AtomicFile {
         }
         let destination = destination.canonicalize().unwrap_or_else(|_| destination.into());
         make_parent(&destination).map_err(error)?;
-        let temporary = temporary_name(&destination);
-        let file = File::create_new(&temporary).map_err(error)?;
+        let (file, temporary) = create_temporary(&destination).map_err(error)?;
         Ok(Self { destination, temporary: Some(temporary), file: BufWriter::with_capacity(BUFFER, file) })
     }
 
@@ -264,6 +263,18 @@ fn make_parent(path: &Path) -> io::Result<()> {
 
 /// A name beside `path` that no other writer of this machine uses now; hidden, and with an ending that no
 /// reader takes for data.
+/// A new file beside the destination. The name may be taken: by what a killed process left whose number this
+/// one has now (in containers every process has the same), or by one of another machine on a shared disk.
+fn create_temporary(destination: &Path) -> io::Result<(File, PathBuf)> {
+    const ATTEMPTS: usize = 1000;
+    let mut attempts = (0..ATTEMPTS).map(|_| {
+        let name = temporary_name(destination);
+        File::create_new(&name).map(|file| (file, name))
+    });
+    let taken = |r: &io::Result<_>| r.as_ref().is_err_and(|e| e.kind() == io::ErrorKind::AlreadyExists);
+    attempts.find(|r| !taken(r)).unwrap_or_else(|| Err(io::ErrorKind::AlreadyExists.into()))
+}
+
 fn temporary_name(path: &Path) -> PathBuf {
     static COUNT: AtomicU64 = AtomicU64::new(0);
     let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
@@ -304,6 +315,17 @@ mod tests {
         drop(file);
         assert_eq!(fs::read(&path).unwrap(), b"old");
         assert_eq!(listing(dir.path()), ["a.csv"]);
+    }
+
+    #[test]
+    fn what_a_killed_process_left_is_not_in_the_way() {
+        let dir = tempfile::tempdir().unwrap();
+        let pid = std::process::id();
+        for count in 0..200 {
+            fs::write(dir.path().join(format!(".a.csv.{pid}-{count}.partial")), "left").unwrap();
+        }
+        write(&dir.path().join("a.csv"), "new").unwrap();
+        assert_eq!(fs::read(dir.path().join("a.csv")).unwrap(), b"new");
     }
 
     #[test]

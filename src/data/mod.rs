@@ -1,6 +1,8 @@
 //! Files: recordings, models, trajectories. The only library module that reads files.
 
 pub mod atomic;
+pub mod batch_directory;
+pub mod batch_file;
 pub mod contamination_file;
 pub mod curve_file;
 pub mod fusion_files;
@@ -13,5 +15,7 @@ pub mod scenario_file;
 pub mod study_directory;
 pub mod study_file;
 pub mod suggest;
+pub mod table_files;
 pub mod toml_file;
 pub mod trajectory_file;
+pub mod unit_file;

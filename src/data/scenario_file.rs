@@ -22,7 +22,7 @@ fn from_source(source: &Source) -> Result<Scenario, TomlError> {
 }
 
 /// A refusal by serde as one by key.
-fn explained(error: &toml::de::Error, source: &Source) -> TomlError {
+pub(super) fn explained(error: &toml::de::Error, source: &Source) -> TomlError {
     let span = error.span().unwrap_or_default();
     let (path, line) = (source.path().to_owned(), source.line(span.start));
     let written = source.text().get(span.clone()).unwrap_or_default();
@@ -48,7 +48,7 @@ fn explained(error: &toml::de::Error, source: &Source) -> TomlError {
 }
 
 /// A refusal by [`Scenario::validate`] at the line its key stands in.
-fn located(error: &SettingError, source: &Source, root: &Section<'_>) -> TomlError {
+pub(super) fn located(error: &SettingError, source: &Source, root: &Section<'_>) -> TomlError {
     let (section, key) = error.key.rsplit_once('.').unwrap_or(("", &error.key));
     let reason = format!("is refused: {}", error.requirement);
     let (name, index) = match section.trim_end_matches(']').split_once('[') {

@@ -68,6 +68,18 @@ pub enum TomlError {
         /// What to do about it.
         hint: Option<Box<str>>,
     },
+    /// The whole makes no sense, though each key does.
+    #[error("{path}, line {line}: {message}")]
+    Study {
+        /// File.
+        path: String,
+        /// Line, from 1.
+        line: usize,
+        /// What is wrong.
+        message: String,
+        /// What to do about it.
+        hint: Option<Box<str>>,
+    },
 }
 
 impl TomlError {
@@ -76,7 +88,7 @@ impl TomlError {
     pub fn hint(&self) -> Option<String> {
         match self {
             Self::UnknownKey { hint, .. } => Some(hint.clone()),
-            Self::Value { hint, .. } => hint.as_deref().map(str::to_owned),
+            Self::Value { hint, .. } | Self::Study { hint, .. } => hint.as_deref().map(str::to_owned),
             _ => None,
         }
     }
@@ -188,6 +200,16 @@ impl<'a> Section<'a> {
             key: self.key(key),
             hint,
         })
+    }
+
+    /// The line it begins in.
+    pub(crate) fn line(&self) -> usize {
+        self.source.line(self.at)
+    }
+
+    /// The line in which the value of a key begins.
+    pub(crate) fn line_of(&self, key: &str) -> usize {
+        self.source.line(self.get(key).map_or(self.at, |v| v.span().start))
     }
 
     pub(crate) fn has(&self, key: &str) -> bool {

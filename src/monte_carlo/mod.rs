@@ -6,7 +6,7 @@
 
 use crate::lanes::LANES;
 use crate::simulation::{
-    Batch, EpochSums, Experiment, ExperimentError, Plan, REPORTED, RunResult, run_batch,
+    Batch, EpochSums, Experiment, ExperimentError, Plan, REPORTED, RunRecord, RunResult, run_batch,
 };
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -23,16 +23,36 @@ pub fn run(
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<Vec<RunResult>, ExperimentError> {
     let plan = Plan::new(experiment)?;
+    let results = run_range(&plan, 0, runs, &|| true, progress);
+    Ok(results.expect("nothing stops it"))
+}
+
+/// Runs `first..first + runs` of a planned experiment; `None` if `go_on`, asked before each batch of eight,
+/// said no. Sums are made in run order, batches of eight from `first` on.
+#[must_use]
+pub fn run_range(
+    plan: &Plan<'_>,
+    first: u64,
+    runs: u64,
+    go_on: &(dyn Fn() -> bool + Sync),
+    progress: &(dyn Fn(u64) + Sync),
+) -> Option<Vec<RunResult>> {
+    let experiment = plan.experiment();
     let results = experiment.beliefs.iter().map(|b| empty(experiment, b.states)).collect();
     let sums = Mutex::new(InOrder { results, next: 0, waiting: BTreeMap::new() });
-    (0..runs.div_ceil(LANES as u64)).par_bridge().for_each(|batch| {
-        let first = batch * LANES as u64;
-        let live = (runs - first).min(LANES as u64);
-        let computed = run_batch(&plan, first, live as usize);
+    let batches = runs.div_ceil(LANES as u64);
+    (0..batches).par_bridge().for_each(|batch| {
+        if !go_on() {
+            return;
+        }
+        let done = batch * LANES as u64;
+        let live = (runs - done).min(LANES as u64);
+        let computed = run_batch(plan, first + done, live as usize);
         progress(live);
         sums.lock().unwrap_or_else(PoisonError::into_inner).take(batch, computed, plan.samples());
     });
-    Ok(sums.into_inner().unwrap_or_else(PoisonError::into_inner).results)
+    let sums = sums.into_inner().unwrap_or_else(PoisonError::into_inner);
+    (sums.next == batches).then_some(sums.results)
 }
 
 /// The results so far, and the batches that came before their turn: one of each candidate.
@@ -49,7 +69,7 @@ impl InOrder {
             self.next += 1;
             for (result, part) in self.results.iter_mut().zip(parts) {
                 result.run_epochs += (samples * part.runs.len()) as u64;
-                add(result, part);
+                result.add(part.epochs, part.runs);
             }
         }
     }
@@ -65,13 +85,21 @@ fn empty(experiment: &Experiment<'_>, filter_states: usize) -> RunResult {
     }
 }
 
-fn add(result: &mut RunResult, part: Batch) {
-    if result.epochs.is_empty() {
-        result.epochs = part.epochs;
-    } else {
-        result.epochs.iter_mut().zip(&part.epochs).for_each(|(sum, epoch)| sum.add(epoch));
+impl RunResult {
+    fn add(&mut self, epochs: Vec<EpochSums>, runs: Vec<RunRecord>) {
+        if self.epochs.is_empty() {
+            self.epochs = epochs;
+        } else {
+            self.epochs.iter_mut().zip(&epochs).for_each(|(sum, epoch)| sum.add(epoch));
+        }
+        self.runs.extend(runs);
     }
-    result.runs.extend(part.runs);
+
+    /// Adds the result of further runs of the same experiment, made at the same epochs.
+    pub fn append(&mut self, later: Self) {
+        self.run_epochs += later.run_epochs;
+        self.add(later.epochs, later.runs);
+    }
 }
 
 impl EpochSums {

@@ -1,6 +1,7 @@
 //! Results as files: tables, JSON, one self-contained page. It computes no statistic and touches no file:
 //! every function makes a text, the command line writes it.
 
+mod batch;
 mod comparison;
 mod curves;
 mod efficiency;
@@ -18,6 +19,11 @@ mod svg;
 mod tables;
 mod trajectory;
 
+pub use batch::{
+    ColumnResult, ShownCell, ShownColumn, TableColumn, TableRow, Value, ValueKind, drift_table,
+    epoch_columns, epoch_rows, experiment_of, outage_columns, outage_rows, ratio_table, run_columns,
+    run_rows,
+};
 pub use comparison::{CandidateResult, ComparisonFile, Label, table_rows};
 pub use curves::{
     CONFIDENCE, CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile, intervals_note,

@@ -149,6 +149,12 @@ impl<'a> Plan<'a> {
         Ok(Self { experiment, ideal, start, events, outages, coverage_quantile })
     }
 
+    /// What was planned.
+    #[must_use]
+    pub const fn experiment(&self) -> &'a Experiment<'a> {
+        self.experiment
+    }
+
     /// IMU samples of one run.
     #[must_use]
     pub fn samples(&self) -> usize {

@@ -6,11 +6,9 @@ mod output;
 use super::{Failure, Session};
 use inputs::Inputs;
 use nav_sim::data::scenario_file;
-use nav_sim::ekf::{Belief, BeliefError, FilterStates};
-use nav_sim::imu::Sensor;
+use nav_sim::ekf::FilterStates;
 use nav_sim::metrics::Summary;
 use nav_sim::monte_carlo;
-use nav_sim::noise::{Model, reduction};
 use nav_sim::report::{self, Manifest};
 use nav_sim::scenario::{Method, Scenario};
 use nav_sim::sensors::imu::TruthError;
@@ -118,7 +116,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let outages = outages(&scenario, span, seed, session)?;
     output::try_open(&args.out, &inputs.files)?;
     let unusable = |e| Failure::input(format!("{}: {e}", args.model.display()));
-    let belief = belief(&scenario, &inputs.model, &outages).map_err(unusable)?;
+    let belief = scenario.belief(&inputs.model, &outages).map_err(unusable)?;
     let experiment = Experiment {
         trajectory: &inputs.trajectory,
         rate_hz: scenario.imu.rate_hz,
@@ -191,20 +189,6 @@ fn outages(
         session.printer.warn(&format!("the default outages lie beyond the trajectory's end at {} s", span.1));
     }
     Ok(windows)
-}
-
-/// The filter's states for a model.
-pub(super) fn belief(scenario: &Scenario, model: &Model, outages: &[Outage]) -> Result<Belief, BeliefError> {
-    let longest = outages.iter().map(|o| o.end_s - o.start_s).fold(0.0, f64::max);
-    let (interval_s, window_s) = (1.0 / scenario.gnss.rate_hz, reduction::window_s(longest));
-    let mut belief = Belief::new(model, scenario.filter.states, interval_s, window_s)?;
-    if let Some(sigma) = scenario.initial.accel_bias_sigma_m_s2 {
-        belief.set_initial_bias_sigma(Sensor::Accel, sigma);
-    }
-    if let Some(sigma) = scenario.initial.gyro_bias_sigma_rad_s {
-        belief.set_initial_bias_sigma(Sensor::Gyro, sigma);
-    }
-    Ok(belief)
 }
 
 /// An experiment that does not fit together.

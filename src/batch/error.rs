@@ -1,0 +1,114 @@
+//! What is wrong with a study.
+
+use crate::calibration::{CalibrationError, SignalError};
+use crate::noise::ReplicateError;
+
+/// A study that means no grid.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum StudyError {
+    /// A value is refused.
+    #[error("\"{key}\" = {value} {reason}")]
+    Refused {
+        /// Key, dotted.
+        key: String,
+        /// Value.
+        value: String,
+        /// Why.
+        reason: String,
+    },
+    /// An axis without a point: the grid would be empty.
+    #[error("the grid is empty: no {axis}")]
+    Empty {
+        /// Key of the axis.
+        axis: String,
+    },
+    /// Two points of one name.
+    #[error("two {axis} entries are named \"{name}\"")]
+    Duplicate {
+        /// Key of the axis.
+        axis: String,
+        /// The name.
+        name: String,
+    },
+    /// A point without a name.
+    #[error("{axis}[{entry}] has no name")]
+    Unnamed {
+        /// Key of the axis.
+        axis: String,
+        /// Which, from 1.
+        entry: usize,
+    },
+    /// Too little or too much said.
+    #[error("{axis}[{entry}] needs exactly one of {keys}")]
+    NotOne {
+        /// Key of the axis.
+        axis: String,
+        /// Which, from 1.
+        entry: usize,
+        /// The keys.
+        keys: &'static str,
+    },
+    /// The reference is no candidate.
+    #[error("\"reference\" = \"{reference}\" is no candidate")]
+    NoReference {
+        /// The name given.
+        reference: String,
+        /// The names there are.
+        candidates: Vec<String>,
+    },
+}
+
+impl StudyError {
+    /// The refusal of a value.
+    #[must_use]
+    pub fn refused(key: &str, value: impl ToString, reason: impl Into<String>) -> Self {
+        Self::Refused { key: key.to_owned(), value: value.to_string(), reason: reason.into() }
+    }
+
+    /// The key to look for in the file.
+    #[must_use]
+    pub fn key(&self) -> &str {
+        match self {
+            Self::Refused { key, .. } => key,
+            Self::Empty { axis } | Self::Duplicate { axis, .. } => axis,
+            Self::Unnamed { axis, .. } | Self::NotOne { axis, .. } => axis,
+            Self::NoReference { .. } => "reference",
+        }
+    }
+
+    /// What to do about it.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        match self {
+            Self::Empty { axis } if axis.contains('[') => Some("a list without values makes no cell".into()),
+            Self::Empty { axis } => Some(format!("add a [[{axis}]] to the study")),
+            Self::Duplicate { .. } | Self::Unnamed { .. } => Some("give each entry a \"name\"".into()),
+            Self::NoReference { candidates, .. } => Some(format!("candidates: {}", candidates.join(", "))),
+            _ => None,
+        }
+    }
+}
+
+/// A calibration step or virtual recording that cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum PrepareError {
+    /// Virtual recordings.
+    #[error(transparent)]
+    Replicate(#[from] ReplicateError),
+    /// Wavelet variances.
+    #[error(transparent)]
+    Signal(#[from] SignalError),
+    /// Fits.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
+    /// A word that means nothing.
+    #[error("\"{key}\" = \"{value}\" {reason}")]
+    Word {
+        /// Key.
+        key: &'static str,
+        /// Value.
+        value: String,
+        /// Why.
+        reason: String,
+    },
+}

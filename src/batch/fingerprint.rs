@@ -1,0 +1,71 @@
+//! Whether this build on this machine makes the same numbers as the one that planned.
+
+use super::unit::experiment;
+use crate::ekf::{Belief, FilterStates};
+use crate::frames::RollPitchYaw;
+use crate::monte_carlo;
+use crate::noise::{Ar1, Composite, Model, Process, Quantization, RandomWalk, White};
+use crate::scenario::Scenario;
+use crate::sensors::imu::Truth;
+use crate::sensors::outage::Outage;
+use crate::trajectory::{Trajectory, TrajectorySample};
+
+/// Hash of the bits that a small experiment makes here: 4 s of a climbing turn, synthesised errors, both
+/// filters, a fix, an outage. Another processor, system library or compiler may round the last digit of a
+/// sine otherwise; units of the two would make a table that neither of them makes.
+#[must_use]
+pub fn fingerprint() -> String {
+    let bits = results().unwrap_or_else(|| "this build runs no experiment".to_owned());
+    blake3::hash(bits.as_bytes()).to_hex()[..16].to_owned()
+}
+
+fn results() -> Option<String> {
+    let trajectory = Trajectory::from_samples(&samples()).ok()?;
+    let model = model()?;
+    let (scenario, outages) = (Scenario::default(), [Outage { start_s: 1.5, end_s: 2.5 }]);
+    let belief = |states| Belief::new(&model, states, 1.0, 800.0).ok();
+    let beliefs = [belief(FilterStates::Reduced15)?, belief(FilterStates::Full)?];
+    let experiment = experiment(&trajectory, Truth::Model(&model), &beliefs, &scenario, &outages, 1);
+    let results = monte_carlo::run(&experiment, 3, &|_| {}).ok()?;
+    // Debug prints as many digits of a number as tell it from every other one
+    Some(format!("{results:?}"))
+}
+
+fn samples() -> Vec<TrajectorySample> {
+    let sample = |k: u32| {
+        let t_s = f64::from(k);
+        let attitude = RollPitchYaw { roll: 0.1 * t_s.sin(), pitch: 0.05, yaw: 0.2 * t_s };
+        TrajectorySample {
+            t_s,
+            lat: 0.8 + 3e-6 * (0.2 * t_s).sin(),
+            lon: 0.2 + 3e-6 * t_s,
+            h: 400.0 + t_s,
+            q_b_n: attitude.to_quat(),
+        }
+    };
+    (0..=4).map(sample).collect()
+}
+
+fn model() -> Option<Model> {
+    let of = |unit: f64| {
+        Some(Composite::new(vec![
+            Process::White(White::new(1e-5 * unit).ok()?),
+            Process::Quantization(Quantization::new(1e-7 * unit).ok()?),
+            Process::Ar1(Ar1::new(0.99, 1e-8 * unit).ok()?),
+            Process::RandomWalk(RandomWalk::new(1e-11 * unit).ok()?),
+        ]))
+    };
+    Some(Model::pooled(100.0, &of(1.0)?, &of(1e-2)?))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_experiment_runs_and_repeats() {
+        let bits = results().unwrap();
+        assert!(bits.contains("filter_states: 15") && bits.contains("diverged: false"));
+        assert_eq!(fingerprint(), fingerprint());
+    }
+}

@@ -1,0 +1,100 @@
+//! One unit of work: some runs of one cell, through all its columns.
+
+use super::study::{Metric, Study};
+use crate::ekf::Belief;
+use crate::monte_carlo;
+use crate::scenario::Scenario;
+use crate::sensors::imu::Truth;
+use crate::sensors::outage::Outage;
+use crate::simulation::{Experiment, Plan, RunResult};
+use crate::trajectory::Trajectory;
+use serde::{Deserialize, Serialize};
+
+/// What is kept of the sums at epochs; records of runs are always kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kept {
+    /// None.
+    Runs,
+    /// Those of epochs inside outages.
+    OutageEpochs,
+    /// All.
+    AllEpochs,
+}
+
+impl Kept {
+    /// What the metrics of a study need.
+    #[must_use]
+    pub fn of(study: &Study) -> Self {
+        if study.keeps(Metric::Epochs) {
+            Self::AllEpochs
+        } else if study.keeps(Metric::Ratios) {
+            Self::OutageEpochs
+        } else {
+            Self::Runs
+        }
+    }
+
+    fn reduce(self, result: &mut RunResult) {
+        let outages = result.outages.clone();
+        let inside = |t_s: f64| outages.iter().any(|(start, end)| *start <= t_s && t_s < *end);
+        match self {
+            Self::AllEpochs => {}
+            Self::OutageEpochs => result.epochs.retain(|e| inside(e.t_s)),
+            Self::Runs => result.epochs.clear(),
+        }
+    }
+}
+
+/// What a unit found: a result for each column, its epochs reduced to what is kept.
+#[derive(Debug, Clone, PartialEq)]
+pub struct UnitResult {
+    /// Name of the unit.
+    pub id: String,
+    /// First run.
+    pub first: u64,
+    /// Number of runs.
+    pub runs: u64,
+    /// One result a column.
+    pub columns: Vec<RunResult>,
+}
+
+/// The experiment of a cell.
+#[must_use]
+pub fn experiment<'a>(
+    trajectory: &'a Trajectory,
+    truth: Truth<'a>,
+    beliefs: &'a [Belief],
+    scenario: &'a Scenario,
+    outages: &'a [Outage],
+    seed: u64,
+) -> Experiment<'a> {
+    Experiment {
+        trajectory,
+        rate_hz: scenario.imu.rate_hz,
+        gravity: scenario.filter.gravity,
+        truth,
+        beliefs,
+        gnss: &scenario.gnss,
+        initial: &scenario.initial,
+        outages,
+        seed,
+        scenario: "",
+        coverage_level: scenario.run.coverage_level,
+    }
+}
+
+/// Computes runs `first..first + runs`; `None` if `go_on` said no on the way. `progress` is told of runs
+/// completed.
+#[must_use]
+pub fn run_unit(
+    plan: &Plan<'_>,
+    (first, runs): (u64, u64),
+    kept: Kept,
+    go_on: &(dyn Fn() -> bool + Sync),
+    progress: &(dyn Fn(u64) + Sync),
+) -> Option<Vec<RunResult>> {
+    let mut results = monte_carlo::run_range(plan, first, runs, go_on, progress)?;
+    results.iter_mut().for_each(|r| kept.reduce(r));
+    Some(results)
+}

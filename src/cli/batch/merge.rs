@@ -1,0 +1,300 @@
+//! `nav-sim batch merge`: units to tables.
+
+use super::status::Count;
+use super::{Place, Planned, filter_name};
+use crate::cli::compare::table;
+use crate::cli::{Failure, Session};
+use nav_sim::batch::{CellSums, Kept, Metric, Unit};
+use nav_sim::data::atomic::AtomicDir;
+use nav_sim::data::table_files::{TableFiles, TableFormat};
+use nav_sim::data::unit_file;
+use nav_sim::metrics::{self, Experiment, OutageComparison};
+use nav_sim::report::{self, ColumnResult, ShownCell, ShownColumn, TableRow};
+use nav_sim::simulation::{REPORTED_NAMES, RunResult};
+use rayon::prelude::*;
+use serde_json::json;
+
+/// Tables of a finished study: outages, ratios to the reference, epochs, runs
+///
+/// Writes results/ in the directory of the study: outages.csv, .json and .parquet (a row an outage of each
+/// candidate in each cell), runs.parquet, epochs.csv and .parquet if the study asks for them, tables.md. The
+/// bytes depend on the plan alone, not on how it was run. Nothing is written while units are missing: they are
+/// listed, and the exit code is 75.
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim batch plan examples/quick_study.toml --seed 1 \\
+      && nav-sim batch run examples/quick_study.toml
+  nav-sim batch merge examples/quick_study.toml
+  nav-sim batch merge examples/quick_study.toml --state all --format json")]
+pub(crate) struct Args {
+    #[command(flatten)]
+    place: Place,
+    /// States in the tables (repeatable), or "all"; the files have all
+    #[arg(long = "state", value_name = "STATE", default_values = ["pos_e_m", "roll_deg"])]
+    states: Vec<String>,
+}
+
+pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let states = crate::cli::compare::states(&args.states)?;
+    let planned = args.place.planned()?;
+    complete(&planned)?;
+    let mut out = AtomicDir::create(&planned.directory.join("results"))?;
+    let mut tables = Tables::create(&mut out, &planned)?;
+    let mut texts = Texts::default();
+    let units: Vec<(Unit, String)> = planned.plan.named_units(&planned.grid).collect();
+    let cells: Vec<&[(Unit, String)]> = units.chunk_by(|a, b| a.0.cell == b.0.cell).collect();
+    let mut damaged = Vec::new();
+    let mut diverged = 0;
+    let wave = wave(&planned, session);
+    for some in cells.chunks(wave) {
+        let found: Vec<Result<CellTables, Bad>> =
+            some.par_iter().map(|units| cell_tables(&planned, units)).collect();
+        for cell in found {
+            match cell {
+                Ok(cell) if damaged.is_empty() => {
+                    diverged += cell.diverged;
+                    tables.add(&cell)?;
+                    texts.add(cell);
+                }
+                Ok(_) => {}
+                Err(Bad::Damaged(names)) => damaged.extend(names),
+                Err(Bad::Failed(e)) => return Err(e),
+            }
+        }
+    }
+    if !damaged.is_empty() {
+        return Err(incomplete(damaged.len(), units.len(), &damaged));
+    }
+    tables.finish()?;
+    let text = texts.render(&states);
+    out.write("tables.md", format!("{text}\n"))?;
+    let summary = summary(&planned, units.len(), diverged);
+    out.write("study.json", report::json(&summary))?;
+    out.commit()?;
+    session.printer.result(if session.json() { summary.to_string() } else { text }.trim_end());
+    session.printer.say(&format!("wrote {}", planned.directory.join("results").display()));
+    all_finite(diverged)
+}
+
+fn all_finite(diverged: u64) -> Result<(), Failure> {
+    if diverged == 0 {
+        return Ok(());
+    }
+    let failure = Failure::bound(format!("{diverged} runs diverged"));
+    Err(failure.hint("they are in runs.parquet, diverged = 1, and in no other number"))
+}
+
+/// All units must be there, and none of another plan.
+fn complete(planned: &Planned) -> Result<(), Failure> {
+    let count = Count::of(planned)?;
+    if let Some(id) = count.foreign.first() {
+        let n = count.foreign.len();
+        let path = unit_file::path(&planned.directory, id);
+        let failure =
+            Failure::input(format!("{n} unit files are of another plan, such as {}", path.display()));
+        return Err(failure.hint("one directory holds one plan: move them away"));
+    }
+    if count.missing.is_empty() {
+        return Ok(());
+    }
+    Err(incomplete(count.units - count.done, count.units, &count.missing))
+}
+
+fn incomplete(missing: usize, units: usize, names: &[String]) -> Failure {
+    let shown: Vec<&str> = names.iter().take(10).map(String::as_str).collect();
+    let more = if missing > shown.len() { ", …" } else { "" };
+    let failure = Failure::stopped(format!(
+        "{missing} of {units} units are missing or damaged: {}{more}",
+        shown.join(", ")
+    ));
+    failure.hint("`nav-sim batch run` computes them; nothing was written")
+}
+
+/// Cells that are held in memory together.
+fn wave(planned: &Planned, session: &Session) -> usize {
+    const MEMORY: f64 = 1e8;
+    let cells = planned.grid.len().max(1) as f64;
+    let of_cell = 3.0 * planned.plan.estimate.bytes / cells + 1e4;
+    ((MEMORY / of_cell) as usize).clamp(1, 64 * session.threads().max(1))
+}
+
+/// Why a cell has no tables.
+enum Bad {
+    /// These units are damaged.
+    Damaged(Vec<String>),
+    /// Something else.
+    Failed(Failure),
+}
+
+/// What a cell contributes.
+struct CellTables {
+    shown: ShownCell,
+    outages: Vec<TableRow>,
+    epochs: Vec<TableRow>,
+    runs: Vec<TableRow>,
+    diverged: u64,
+}
+
+fn cell_tables(planned: &Planned, units: &[(Unit, String)]) -> Result<CellTables, Bad> {
+    let sums = sums(planned, units)?;
+    let grid = &planned.grid;
+    let cell = grid.cell(units[0].0.cell);
+    let names = grid.names(cell);
+    let comparisons = comparisons(planned, &sums.columns)?;
+    let mut tables = CellTables {
+        shown: ShownCell { name: planned.cell_name(cell), columns: Vec::new() },
+        outages: Vec::new(),
+        epochs: Vec::new(),
+        runs: Vec::new(),
+        diverged: 0,
+    };
+    for ((column, result), (comparison, is_reference)) in
+        grid.columns.iter().zip(&sums.columns).zip(comparisons)
+    {
+        let filter = filter_name(grid.filter(cell, column));
+        let of = ColumnResult { cell: names, candidate: &column.name, filter, result };
+        let outages = metrics::outages(result);
+        tables.outages.extend(report::outage_rows(&of, &outages, comparison.as_deref()));
+        tables.runs.extend(report::run_rows(&of));
+        if planned.plan.study.keeps(Metric::Epochs) {
+            tables.epochs.extend(report::epoch_rows(&of, &metrics::epochs(&result.epochs)));
+        }
+        tables.diverged += result.runs.iter().filter(|r| r.diverged).count() as u64;
+        let several = planned.plan.study.filters.len() > 1;
+        let name = if several { format!("{} {filter}", column.name) } else { column.name.clone() };
+        tables.shown.columns.push(ShownColumn { name, outages, comparison, is_reference });
+    }
+    Ok(tables)
+}
+
+fn sums(planned: &Planned, units: &[(Unit, String)]) -> Result<CellSums, Bad> {
+    let mut sums = CellSums::default();
+    let mut damaged = Vec::new();
+    for (unit, id) in units {
+        match unit_file::read(&planned.directory, id) {
+            Ok(result) if result.runs == unit.runs && result.columns.len() == planned.grid.columns.len() => {
+                if damaged.is_empty() && !sums.add(result) {
+                    damaged.push(id.clone());
+                }
+            }
+            Err(unit_file::UnitFileError::Io { path, source }) => {
+                return Err(Bad::Failed(Failure::could_not(format!("{path}: {source}"))));
+            }
+            Ok(_) | Err(_) => damaged.push(id.clone()),
+        }
+    }
+    if damaged.is_empty() { Ok(sums) } else { Err(Bad::Damaged(damaged)) }
+}
+
+type Compared = (Option<Vec<OutageComparison>>, bool);
+
+/// The comparison of each column with the reference that has the same filter, if ratios are kept.
+fn comparisons(planned: &Planned, results: &[RunResult]) -> Result<Vec<Compared>, Bad> {
+    let study = &planned.plan.study;
+    let failed = |e: String| Bad::Failed(Failure::could_not(e));
+    let reference = study.reference().map_err(|e| failed(e.to_string()))?;
+    let columns = &planned.grid.columns;
+    if planned.plan.kept() == Kept::Runs {
+        return Ok(vec![(None, false); columns.len()]);
+    }
+    let experiments: Vec<Experiment> = results.iter().map(report::experiment_of).collect();
+    let one = |i: usize| {
+        let filter = columns[i].filter;
+        let own = columns.iter().position(|c| c.candidate == reference && c.filter == filter).unwrap_or(0);
+        let compared = metrics::compare(&experiments[i], &experiments[own], true);
+        compared.map(|c| (Some(c), own == i)).map_err(|e| failed(e.to_string()))
+    };
+    (0..columns.len()).map(one).collect()
+}
+
+/// The tables being written.
+struct Tables {
+    outages: TableFiles,
+    runs: TableFiles,
+    epochs: Option<TableFiles>,
+}
+
+impl Tables {
+    fn create(out: &mut AtomicDir, planned: &Planned) -> Result<Self, Failure> {
+        let outages = TableFiles::create(out, "outages", &TableFormat::ALL, report::outage_columns())?;
+        let runs = TableFiles::create(out, "runs", &[TableFormat::Parquet], report::run_columns())?;
+        let formats = [TableFormat::Csv, TableFormat::Parquet];
+        let epochs = planned.plan.study.keeps(Metric::Epochs);
+        let epochs = epochs.then(|| TableFiles::create(out, "epochs", &formats, report::epoch_columns()));
+        Ok(Self { outages, runs, epochs: epochs.transpose()? })
+    }
+
+    fn add(&mut self, cell: &CellTables) -> Result<(), Failure> {
+        self.outages.add(cell.outages.iter().cloned())?;
+        self.runs.add(cell.runs.iter().cloned())?;
+        match &mut self.epochs {
+            Some(epochs) => Ok(epochs.add(cell.epochs.iter().cloned())?),
+            None => Ok(()),
+        }
+    }
+
+    fn finish(self) -> Result<(), Failure> {
+        self.outages.finish()?;
+        self.runs.finish()?;
+        Ok(self.epochs.map_or(Ok(()), TableFiles::finish)?)
+    }
+}
+
+/// What people read: of the first cells only, the files have all.
+#[derive(Default)]
+struct Texts {
+    cells: Vec<ShownCell>,
+    more: usize,
+}
+
+const SHOWN: usize = 24;
+
+impl Texts {
+    fn add(&mut self, cell: CellTables) {
+        if self.cells.len() < SHOWN {
+            self.cells.push(cell.shown);
+        } else {
+            self.more += 1;
+        }
+    }
+
+    fn render(&self, states: &[usize]) -> String {
+        let mut text =
+            "Horizontal error before the first fix after the outage, median (95 %), m\n\n".to_owned();
+        text += &table(&report::drift_table(&self.cells));
+        let has_ratios = |cell: &&ShownCell| cell.columns.len() > 1 && cell.columns[0].comparison.is_some();
+        for cell in self.cells.iter().filter(has_ratios) {
+            let reference = cell.columns.iter().find(|c| c.is_reference).map_or("", |c| &c.name);
+            text += &format!(
+                "\n\n{}: ASEE relative to {reference}, mean over the outage of (ratio − 1)·100 ± half the 95 % \
+                 interval (mean of the absolute value), %\n\n",
+                cell.name
+            );
+            text += &table(&report::ratio_table(cell, states));
+        }
+        if self.more > 0 {
+            text += &format!("\n\n{} more cells are in outages.csv", self.more);
+        }
+        text
+    }
+}
+
+fn summary(planned: &Planned, units: usize, diverged: u64) -> serde_json::Value {
+    let plan = &planned.plan;
+    json!({
+        "schema_version": 1,
+        "plan": plan.id(),
+        "version": plan.version,
+        "numerics": plan.numerics,
+        "seed": plan.seed,
+        "cells": planned.grid.len(),
+        "units": units,
+        "runs": plan.study.runs,
+        "diverged": diverged,
+        "states": REPORTED_NAMES,
+        "study": plan.study,
+        "inputs": plan.inputs,
+        "models": plan.models,
+    })
+}

@@ -1,0 +1,212 @@
+//! `nav-sim batch run`: the units of a shard that are not done yet.
+
+use super::inputs::Inputs;
+use super::shard::{self, Shard};
+use super::{Place, Planned};
+use crate::cli::{Failure, Session};
+use nav_sim::batch::{Plan, Unit, UnitResult, run_unit};
+use nav_sim::data::{batch_directory, unit_file};
+use nav_sim::lanes::LANES;
+use nav_sim::simulation;
+use rayon::prelude::*;
+use signal_hook::consts::{SIGINT, SIGTERM};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Do the units of work that are not done yet, all or those of one shard
+///
+/// Each unit appears whole, by rename, with a checksum; what is there and whole is skipped, what is damaged is
+/// done again. On SIGTERM, or at the time limit, the unit at work is dropped and the exit code is 75: run
+/// again to go on. Any number of processes may work at once; two on the same shard waste time and harm nothing.
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim batch plan examples/quick_study.toml --seed 1 \\
+      && nav-sim batch run examples/quick_study.toml
+  nav-sim batch run examples/quick_study.toml --shard 0/2 --time-limit 50m
+  nav-sim batch run examples/quick_study.toml --shard 1/2 -j 1")]
+pub(crate) struct Args {
+    #[command(flatten)]
+    place: Place,
+    /// Which shard of how many, from 0/n to n−1/n (default: from HQ_TASK_ID, SLURM_ARRAY_TASK_ID,
+    /// PBS_ARRAY_INDEX or JOB_COMPLETION_INDEX, else everything)
+    #[arg(long, value_name = "I/N", value_parser = shard::parse)]
+    shard: Option<Shard>,
+    /// How many shards there are, where only their index comes from the scheduler
+    #[arg(long, value_name = "N", conflicts_with = "shard", value_parser = clap::value_parser!(u64).range(1..))]
+    shards: Option<u64>,
+    /// Stop after this time (exit code 75): seconds, or with s, m, h
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    time_limit: Option<Duration>,
+}
+
+/// `90`, `90s`, `1.5m`, `2h`.
+pub(super) fn time(text: &str) -> Result<Duration, String> {
+    let (number, unit) = match text.char_indices().last() {
+        Some((i, 's')) => (&text[..i], 1.0),
+        Some((i, 'm')) => (&text[..i], 60.0),
+        Some((i, 'h')) => (&text[..i], 3600.0),
+        _ => (text, 1.0),
+    };
+    let seconds =
+        number.parse::<f64>().ok().map(|x| x * unit).and_then(|s| Duration::try_from_secs_f64(s).ok());
+    seconds.ok_or_else(|| "expected a time such as 3000, 50m or 1.5h".to_owned())
+}
+
+/// Why to stop.
+struct Stop {
+    terminated: Arc<AtomicBool>,
+    interrupted: Arc<AtomicBool>,
+    deadline: Option<Instant>,
+}
+
+impl Stop {
+    fn new(limit: Option<Duration>) -> Result<Self, Failure> {
+        let flag = |signal| -> Result<Arc<AtomicBool>, Failure> {
+            let flag = Arc::new(AtomicBool::new(false));
+            // A second signal of the kind ends the process at once: every unit file is whole anyway.
+            signal_hook::flag::register_conditional_default(signal, Arc::clone(&flag))
+                .and_then(|_| signal_hook::flag::register(signal, Arc::clone(&flag)))
+                .map_err(Failure::could_not)?;
+            Ok(flag)
+        };
+        let deadline = limit.and_then(|limit| Instant::now().checked_add(limit));
+        Ok(Self { terminated: flag(SIGTERM)?, interrupted: flag(SIGINT)?, deadline })
+    }
+
+    fn go_on(&self) -> bool {
+        let signal = self.terminated.load(Ordering::Relaxed) || self.interrupted.load(Ordering::Relaxed);
+        !signal && self.deadline.is_none_or(|d| Instant::now() < d)
+    }
+
+    fn failure(&self, left: usize) -> Option<Failure> {
+        let why = if self.interrupted.load(Ordering::Relaxed) {
+            return Some(Failure::interrupted(format!("interrupted; {left} units left")));
+        } else if self.terminated.load(Ordering::Relaxed) {
+            "SIGTERM"
+        } else if self.go_on() {
+            return None;
+        } else {
+            "the time limit"
+        };
+        let failure = Failure::stopped(format!("stopped by {why}; {left} units left"));
+        Some(failure.hint("the same command goes on where this one stopped"))
+    }
+}
+
+pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let stop = Stop::new(args.time_limit)?;
+    let planned = args.place.planned()?;
+    planned.same_numbers()?;
+    let (shard, from) = shard::find(args.shard, args.shards, &|name| std::env::var(name).ok())?;
+    session.printer.say(&format!("shard {}/{} ({from})", shard.index, shard.count));
+    let pending = pending(&planned, shard, session)?;
+    let runs = pending.iter().map(|(unit, _)| unit.runs).sum();
+    let progress = session.progress("runs", runs);
+    let mut inputs = Inputs::new(&planned, &args.place.study, session);
+    let mut left = pending.len();
+    for of_cell in pending.chunk_by(|a, b| a.0.cell == b.0.cell) {
+        if !stop.go_on() {
+            break;
+        }
+        let cell = planned.grid.cell(of_cell[0].0.cell);
+        inputs.with_cell(cell, |simulation| {
+            let job = Job { planned: &planned, simulation, stop: &stop, progress: &|n| progress.add(n) };
+            for some in of_cell.chunks(together(of_cell, session.threads())) {
+                left -= job.run(some)?;
+            }
+            Ok(())
+        })?;
+    }
+    drop(progress);
+    match (left, stop.failure(left)) {
+        (1.., Some(failure)) => Err(failure),
+        _ => {
+            session.printer.say(&format!("{} units done, none left in this shard", pending.len()));
+            Ok(())
+        }
+    }
+}
+
+type Named = (Unit, String);
+
+/// The units of a shard that are not there, or damaged.
+fn pending(planned: &Planned, shard: Shard, session: &Session) -> Result<Vec<Named>, Failure> {
+    let mine = planned.plan.named_units(&planned.grid).filter(|(unit, _)| shard.has(unit.index));
+    let (mut pending, mut there) = (Vec::new(), 0_usize);
+    for (unit, id) in mine {
+        let finished = batch_directory::finished(&planned.directory, &id).map_err(Failure::could_not)?;
+        match finished {
+            Ok(true) => there += 1,
+            Ok(false) => pending.push((unit, id)),
+            Err(damage) => {
+                session.printer.warn(&format!("{damage}; it is computed again"));
+                pending.push((unit, id));
+            }
+        }
+    }
+    if there > 0 {
+        session.printer.say(&format!("{there} units are done already, {} to do", pending.len()));
+    }
+    Ok(pending)
+}
+
+/// How many units are computed at once: more than one where each has too few batches for the threads.
+fn together(units: &[Named], threads: usize) -> usize {
+    let batches = units[0].0.runs.div_ceil(LANES as u64) as usize;
+    (4 * threads / batches).max(1)
+}
+
+/// Units of one cell.
+struct Job<'a> {
+    planned: &'a Planned,
+    simulation: &'a simulation::Plan<'a>,
+    stop: &'a Stop,
+    progress: &'a (dyn Fn(u64) + Sync),
+}
+
+impl Job<'_> {
+    /// Computes and writes units; how many were finished.
+    fn run(&self, units: &[Named]) -> Result<usize, Failure> {
+        let outcomes: Vec<Result<bool, Failure>> = units.par_iter().map(|unit| self.one(unit)).collect();
+        let mut done = 0;
+        for outcome in outcomes {
+            done += usize::from(outcome?);
+        }
+        Ok(done)
+    }
+
+    fn one(&self, (unit, id): &Named) -> Result<bool, Failure> {
+        let go_on = || self.stop.go_on();
+        match compute(&self.planned.plan, self.simulation, *unit, id, &go_on, self.progress) {
+            Some(result) => Ok(unit_file::write(&self.planned.directory, &result).map(|()| true)?),
+            None => Ok(false),
+        }
+    }
+}
+
+/// What a unit finds.
+pub(super) fn compute(
+    plan: &Plan,
+    simulation: &simulation::Plan<'_>,
+    unit: Unit,
+    id: &str,
+    go_on: &(dyn Fn() -> bool + Sync),
+    progress: &(dyn Fn(u64) + Sync),
+) -> Option<UnitResult> {
+    let columns = run_unit(simulation, (unit.first, unit.runs), plan.kept(), go_on, progress)?;
+    Some(UnitResult { id: id.to_owned(), first: unit.first, runs: unit.runs, columns })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_understood() {
+        let seconds = ["90", "90s", "1.5m", "2h"].map(|t| time(t).unwrap().as_secs());
+        assert_eq!(seconds, [90, 90, 90, 7200]);
+        assert!(["", "m", "-1", "1d", "nan"].iter().all(|t| time(t).is_err()));
+    }
+}

@@ -1,0 +1,94 @@
+//! `nav-sim batch status`: what is done and what is left.
+
+use super::plan::duration;
+use super::{Place, Planned};
+use crate::cli::{Failure, Session};
+use nav_sim::data::batch_directory;
+use serde_json::json;
+
+/// What is done of a study and what is left
+///
+/// Counts unit files by name; whether they are whole is seen by `run` and `merge`.
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim batch plan examples/quick_study.toml --seed 1 \\
+      && nav-sim batch status examples/quick_study.toml
+  nav-sim batch run examples/quick_study.toml --shard 0/2 \\
+      && nav-sim batch status examples/quick_study.toml
+  nav-sim batch status examples/quick_study.toml --format json")]
+pub(crate) struct Args {
+    #[command(flatten)]
+    place: Place,
+}
+
+pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let planned = args.place.planned()?;
+    let count = Count::of(&planned)?;
+    let (plan, grid) = (&planned.plan, &planned.grid);
+    let wall_s = count.left_s / plan.estimate.threads.max(1) as f64;
+    if session.json() {
+        let json = json!({
+            "schema_version": 1, "plan": plan.id(), "cells": grid.len(), "cells_done": count.cells_done,
+            "units": count.units, "done": count.done, "foreign": count.foreign.len(),
+            "processor_s_left": count.left_s,
+        });
+        session.printer.result(&json.to_string());
+        return Ok(());
+    }
+    session.printer.result(&format!(
+        "{} of {} units done, {} of {} cells complete; about {} left on {} threads",
+        count.done,
+        count.units,
+        count.cells_done,
+        grid.len(),
+        duration(wall_s),
+        plan.estimate.threads
+    ));
+    if let Some(id) = count.foreign.first() {
+        let n = count.foreign.len();
+        session.printer.warn(&format!("{n} unit files are not of this plan, such as {id}"));
+    }
+    Ok(())
+}
+
+/// What is there of a plan.
+pub(super) struct Count {
+    pub(super) units: usize,
+    pub(super) done: usize,
+    cells_done: usize,
+    left_s: f64,
+    /// The first units that are not there.
+    pub(super) missing: Vec<String>,
+    /// Units of another plan.
+    pub(super) foreign: Vec<String>,
+}
+
+impl Count {
+    pub(super) fn of(planned: &Planned) -> Result<Self, Failure> {
+        let mut there = batch_directory::units(&planned.directory)?;
+        let (plan, grid) = (&planned.plan, &planned.grid);
+        let mut count =
+            Self { units: 0, done: 0, cells_done: 0, left_s: 0.0, missing: Vec::new(), foreign: Vec::new() };
+        let mut cell_whole = true;
+        for (unit, id) in plan.named_units(grid) {
+            let done = there.remove(&id);
+            count.units += 1;
+            count.done += usize::from(done);
+            cell_whole &= done;
+            if !done {
+                let run_s = plan.estimate.run_s.get(grid.cell(unit.cell).trajectory).copied();
+                count.left_s += run_s.unwrap_or(0.0) * unit.runs as f64;
+                if count.missing.len() < 20 {
+                    count.missing.push(id);
+                }
+            }
+            if unit.first + unit.runs == plan.study.runs {
+                count.cells_done += usize::from(cell_whole);
+                cell_whole = true;
+            }
+        }
+        count.foreign = there.into_iter().collect();
+        Ok(count)
+    }
+}

@@ -1,0 +1,351 @@
+//! Tables of studies: one row a cell, column and outage (and epoch, and run). Every column has its unit in
+//! its name; numbers that do not exist are NaN (null in JSON).
+
+use super::comparison::{CandidateResult, Label, table_rows};
+use super::number::readable;
+use crate::metrics::{self, EpochMetrics, EpochRow, Experiment, OutageComparison, OutageMetrics};
+use crate::simulation::{REPORTED, REPORTED_NAMES, RunResult};
+
+/// A value of a table.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Value {
+    /// A name.
+    Text(String),
+    /// A count.
+    Int(u64),
+    /// A number, NaN if there is none.
+    Float(f64),
+}
+
+/// What a column holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ValueKind {
+    /// Names.
+    Text,
+    /// Counts.
+    Int,
+    /// Numbers.
+    Float,
+}
+
+/// Name of a column and what it holds.
+pub type TableColumn = (String, ValueKind);
+
+/// A row: one value a column.
+pub type TableRow = Vec<Value>;
+
+/// A column of a cell by name, and what its runs gave.
+#[derive(Debug, Clone, Copy)]
+pub struct ColumnResult<'a> {
+    /// Trajectory, truth, scenario, receiver, outage set.
+    pub cell: [&'a str; 5],
+    /// Candidate.
+    pub candidate: &'a str,
+    /// Filter: 15 or full.
+    pub filter: &'a str,
+    /// The sums of all runs.
+    pub result: &'a RunResult,
+}
+
+const KEYS: [&str; 7] = ["trajectory", "truth", "scenario", "gnss", "outage_set", "candidate", "filter"];
+
+/// Names of the states without their units, and the units.
+fn states() -> [(&'static str, &'static str); REPORTED] {
+    REPORTED_NAMES.map(|name| {
+        let unit = ["_m_s", "_deg", "_m"].into_iter().find(|unit| name.ends_with(unit)).unwrap_or("");
+        (&name[..name.len() - unit.len()], &unit[unit.len().min(1)..])
+    })
+}
+
+fn columns(names: impl IntoIterator<Item = (String, ValueKind)>) -> Vec<TableColumn> {
+    KEYS.iter().map(|k| ((*k).to_owned(), ValueKind::Text)).chain(names).collect()
+}
+
+fn floats(names: Vec<String>) -> impl Iterator<Item = (String, ValueKind)> {
+    names.into_iter().map(|name| (name, ValueKind::Float))
+}
+
+fn ints<const N: usize>(names: [&str; N]) -> impl Iterator<Item = (String, ValueKind)> {
+    names.map(|name| (name.to_owned(), ValueKind::Int)).into_iter()
+}
+
+fn keys(of: &ColumnResult<'_>) -> TableRow {
+    let names = of.cell.into_iter().chain([of.candidate, of.filter]);
+    names.map(|name| Value::Text(name.to_owned())).collect()
+}
+
+fn prefixed(prefix: &str) -> Vec<String> {
+    REPORTED_NAMES.map(|name| format!("{prefix}_{name}")).into()
+}
+
+const HORIZONTAL: [&str; 10] = [
+    "horizontal_error_end_p50_m",
+    "horizontal_error_end_p50_ci95_low_m",
+    "horizontal_error_end_p50_ci95_high_m",
+    "horizontal_error_end_p95_m",
+    "horizontal_error_end_p95_ci95_low_m",
+    "horizontal_error_end_p95_ci95_high_m",
+    "horizontal_error_end_max_m",
+    "reconvergence_p50_s",
+    "reconvergence_p95_s",
+    "reconvergence_never_share",
+];
+
+/// Columns of the table of outages.
+#[must_use]
+pub fn outage_columns() -> Vec<TableColumn> {
+    let mut names: Vec<String> = ["start_s", "end_s", "duration_s"].map(str::to_owned).into();
+    for prefix in ["asee_mean", "asee_mean_std_error", "rmse_end", "rmse_end_std_error"] {
+        names.extend(prefixed(prefix));
+    }
+    names.extend(HORIZONTAL.map(str::to_owned));
+    for (state, _) in states() {
+        let ratio = |name: &str| format!("{name}_{state}_pct");
+        names.extend(["asee_ratio_error", "asee_ratio_abs_error"].map(ratio));
+        names.extend(["low", "high"].map(|end| format!("asee_ratio_error_{state}_ci95_{end}_pct")));
+        names.push(format!("rmse_end_ratio_error_{state}_pct"));
+        names.extend(["low", "high"].map(|end| format!("rmse_end_ratio_error_{state}_ci95_{end}_pct")));
+    }
+    names.extend(
+        ["nees_mean", "nees_mean_reference", "coverage_mean", "coverage_mean_reference"].map(str::to_owned),
+    );
+    columns(ints(["outage", "runs", "diverged"]).chain(floats(names)))
+}
+
+/// One row an outage; a set without outages has no row.
+#[must_use]
+pub fn outage_rows(
+    of: &ColumnResult<'_>,
+    outages: &[OutageMetrics],
+    comparison: Option<&[OutageComparison]>,
+) -> Vec<TableRow> {
+    let runs = of.result.runs.len() as u64;
+    let diverged = of.result.runs.iter().filter(|r| r.diverged).count() as u64;
+    let row = |(i, outage): (usize, &OutageMetrics)| {
+        let mut row = keys(of);
+        row.extend([i as u64, runs, diverged].map(Value::Int));
+        let ratios = comparison.and_then(|c| c.get(i));
+        row.extend(
+            outage_values(outage, runs - diverged).into_iter().chain(ratio_values(ratios)).map(Value::Float),
+        );
+        row
+    };
+    outages.iter().enumerate().map(row).collect()
+}
+
+fn outage_values(o: &OutageMetrics, kept: u64) -> Vec<f64> {
+    let mut values = vec![o.start_s, o.end_s, o.end_s - o.start_s];
+    for estimates in [&o.asee_mean, &o.rmse_end] {
+        values.extend(estimates.0.map(|e| e.value));
+        values.extend(estimates.0.map(|e| e.std_error));
+    }
+    for quantile in [&o.horizontal_p50_m, &o.horizontal_p95_m] {
+        let (low, high) = quantile.ci95;
+        values.extend([quantile.value, low.unwrap_or(f64::NAN), high.unwrap_or(f64::NAN)]);
+    }
+    let r = &o.reconvergence;
+    values.extend([o.horizontal_max_m, r.p50_s.value, r.p95_s.value, r.never as f64 / kept as f64]);
+    values
+}
+
+fn ratio_values(comparison: Option<&OutageComparison>) -> Vec<f64> {
+    let Some(c) = comparison else { return vec![f64::NAN; 7 * REPORTED + 4] };
+    let of_state = |s: &metrics::StateRatio| {
+        let ([low, high], [rmse_low, rmse_high]) = (s.asee.ci95_pct, s.rmse_end.ci95_pct);
+        [s.asee.pct, s.asee_abs_pct, low, high, s.rmse_end.pct, rmse_low, rmse_high]
+    };
+    c.states.iter().flat_map(of_state).chain(c.nees).chain(c.coverage).collect()
+}
+
+/// Columns of the table of epochs.
+#[must_use]
+pub fn epoch_columns() -> Vec<TableColumn> {
+    let mut names = vec!["t_s".to_owned()];
+    for prefix in ["asee", "asee_std_error", "rmse", "rmse_std_error", "bias"] {
+        names.extend(prefixed(prefix));
+    }
+    names.extend(["mean_pos_err_m", "mean_att_err_deg", "nees", "coverage"].map(str::to_owned));
+    columns(ints(["fix", "runs"]).chain(floats(names)))
+}
+
+/// One row an epoch.
+#[must_use]
+pub fn epoch_rows(of: &ColumnResult<'_>, epochs: &[EpochMetrics]) -> Vec<TableRow> {
+    let row = |e: &EpochMetrics| {
+        let mut row = keys(of);
+        row.extend([u64::from(e.gnss), e.count].map(Value::Int));
+        let mut values = vec![e.t_s];
+        for estimates in [&e.asee, &e.rmse] {
+            values.extend(estimates.0.map(|e| e.value));
+            values.extend(estimates.0.map(|e| e.std_error));
+        }
+        values.extend(e.bias.0.map(|e| e.value));
+        values.extend([e.mean_pos_err_m.value, e.mean_att_err_deg.value, e.nees.value, e.coverage]);
+        row.extend(values.into_iter().map(Value::Float));
+        row
+    };
+    epochs.iter().map(row).collect()
+}
+
+/// Columns of the table of runs.
+#[must_use]
+pub fn run_columns() -> Vec<TableColumn> {
+    let mut names = vec!["nis_mean".to_owned()];
+    names.extend(prefixed("see_mean"));
+    names.extend(prefixed("error_end"));
+    names.extend(["horizontal_error_end_m", "reconvergence_s"].map(str::to_owned));
+    columns(ints(["run", "outage", "diverged", "fixes"]).chain(floats(names)))
+}
+
+/// One row a run and outage.
+#[must_use]
+pub fn run_rows(of: &ColumnResult<'_>) -> Vec<TableRow> {
+    let mut rows = Vec::new();
+    for run in &of.result.runs {
+        for (i, o) in run.outages.iter().enumerate() {
+            let mut row = keys(of);
+            row.extend([run.run, i as u64, u64::from(run.diverged), run.nis.1].map(Value::Int));
+            let values = std::iter::once(run.nis.0).chain(o.see_mean).chain(o.error_end);
+            row.extend(values.chain([o.horizontal_error_end_m, o.reconvergence_s]).map(Value::Float));
+            rows.push(row);
+        }
+    }
+    rows
+}
+
+/// What ratios are made of.
+#[must_use]
+pub fn experiment_of(result: &RunResult) -> Experiment {
+    let row = |e: &EpochMetrics| EpochRow {
+        t_s: e.t_s,
+        asee: e.asee.0.map(|e| e.value),
+        rmse: e.rmse.0.map(|e| e.value),
+        nees: e.nees.value,
+        coverage: e.coverage,
+    };
+    Experiment {
+        epochs: metrics::epochs(&result.epochs).iter().map(row).collect(),
+        runs: result.runs.clone(),
+        outages: result.outages.clone(),
+    }
+}
+
+/// A column of a cell as people read it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShownColumn {
+    /// Candidate, and filter where there are several.
+    pub name: String,
+    /// Its outages.
+    pub outages: Vec<OutageMetrics>,
+    /// Against the reference, if ratios are kept.
+    pub comparison: Option<Vec<OutageComparison>>,
+    /// Whether it is the reference.
+    pub is_reference: bool,
+}
+
+/// A cell as people read it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ShownCell {
+    /// Its name.
+    pub name: String,
+    /// Its columns.
+    pub columns: Vec<ShownColumn>,
+}
+
+/// The layout of the paper's Table I for one cell; `states` are indices of reported states.
+#[must_use]
+pub fn ratio_table(cell: &ShownCell, states: &[usize]) -> Vec<Vec<String>> {
+    let candidate = |column: &ShownColumn| CandidateResult {
+        run: column.name.clone(),
+        label: Label::of(&column.name, None),
+        is_reference: column.is_reference,
+        outages: column.comparison.clone().unwrap_or_default(),
+    };
+    table_rows(&cell.columns.iter().map(candidate).collect::<Vec<_>>(), states)
+}
+
+/// Horizontal error just before the first fix after each outage, median and (95 %) in metres: a row an
+/// outage, a column a candidate.
+#[must_use]
+pub fn drift_table(cells: &[ShownCell]) -> Vec<Vec<String>> {
+    let mut rows = vec![["cell", "outage"].map(str::to_owned).to_vec()];
+    if let Some(cell) = cells.first() {
+        rows[0].extend(cell.columns.iter().map(|c| c.name.clone()));
+    }
+    for ShownCell { name, columns } in cells {
+        let Some(first) = columns.first() else { continue };
+        for (i, o) in first.outages.iter().enumerate() {
+            let mut row = vec![name.clone(), format!("{}–{} s", o.start_s, o.end_s)];
+            let shown = |column: &ShownColumn| {
+                let o = &column.outages[i];
+                let (p50, p95) = (o.horizontal_p50_m.value, o.horizontal_p95_m.value);
+                format!("{} ({})", readable(p50), readable(p95))
+            };
+            row.extend(columns.iter().map(shown));
+            rows.push(row);
+        }
+    }
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::sample;
+    use super::*;
+
+    fn of(result: &RunResult) -> ColumnResult<'_> {
+        ColumnResult { cell: ["land", "m", "s", "g", "o"], candidate: "I/awv", filter: "15", result }
+    }
+
+    #[test]
+    fn rows_fit_their_columns_and_names_carry_units() {
+        let result = sample::result();
+        let (outages, epochs) = (metrics::outages(&result), metrics::epochs(&result.epochs));
+        let experiment = experiment_of(&result);
+        let comparison = metrics::compare(&experiment, &experiment, true).unwrap();
+        let tables = [
+            (outage_columns(), outage_rows(&of(&result), &outages, Some(&comparison))),
+            (outage_columns(), outage_rows(&of(&result), &outages, None)),
+            (epoch_columns(), epoch_rows(&of(&result), &epochs)),
+            (run_columns(), run_rows(&of(&result))),
+        ];
+        for (columns, rows) in tables {
+            assert!(!rows.is_empty());
+            let names: std::collections::HashSet<&str> = columns.iter().map(|(n, _)| n.as_str()).collect();
+            assert_eq!(names.len(), columns.len());
+            for row in &rows {
+                assert_eq!(row.len(), columns.len());
+                for (value, (name, kind)) in row.iter().zip(&columns) {
+                    let found = match value {
+                        Value::Text(_) => ValueKind::Text,
+                        Value::Int(_) => ValueKind::Int,
+                        Value::Float(_) => ValueKind::Float,
+                    };
+                    assert_eq!(found, *kind, "{name}");
+                }
+            }
+        }
+        let units = ["_s", "_m", "_deg", "_pct", "_share", "_mean", "_reference", "nees", "coverage"];
+        for (name, kind) in outage_columns().iter().chain(&epoch_columns()).chain(&run_columns()) {
+            assert!(*kind != ValueKind::Float || units.iter().any(|u| name.ends_with(u)), "{name}");
+        }
+    }
+
+    #[test]
+    fn values_stand_under_their_names() {
+        let result = sample::result();
+        let outages = metrics::outages(&result);
+        let rows = outage_rows(&of(&result), &outages, None);
+        let at = |name: &str| {
+            let i = outage_columns().iter().position(|(n, _)| n == name).unwrap();
+            rows[0][i].clone()
+        };
+        let o = &outages[0];
+        assert_eq!(at("candidate"), Value::Text("I/awv".into()));
+        assert_eq!(at("duration_s"), Value::Float(o.end_s - o.start_s));
+        assert_eq!(at("asee_mean_std_error_pos_n_m"), Value::Float(o.asee_mean.0[0].std_error));
+        assert_eq!(at("rmse_end_yaw_deg"), Value::Float(o.rmse_end.0[8].value));
+        assert_eq!(at("horizontal_error_end_max_m"), Value::Float(o.horizontal_max_m));
+        assert!(matches!(at("coverage_mean"), Value::Float(x) if x.is_nan()));
+    }
+}
