@@ -115,13 +115,14 @@ impl Table {
 
     /// The contrasts of a window, of each axis with enough active files.
     fn contrasts(&self, noise: &[Noise], window: Window, index: usize, active: &[bool]) -> Vec<Contrast> {
-        let axis = |(a, (files, noise)): (usize, (&Vec<Option<Vec<f64>>>, &Noise))| {
+        let axis = |a: usize| {
+            let (files, noise) = (self.logs.get(a)?, noise.get(a)?);
             let mean = |logs: &Vec<f64>| logs[window.range()].iter().sum::<f64>() / window.width as f64;
             let values: Vec<Option<f64>> =
                 files.iter().zip(active).map(|(f, on)| f.as_ref().filter(|_| *on).map(mean)).collect();
             Contrast::new(a, values, &noise.variances[index])
         };
-        self.logs.iter().zip(noise).enumerate().filter_map(axis).collect()
+        (0..self.logs.len()).filter_map(axis).collect()
     }
 }
 

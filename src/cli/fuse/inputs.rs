@@ -51,7 +51,10 @@ impl Inputs {
         }
         check_clocks(&Recorded { imu: &imu.samples, gnss: &gnss }).map_err(impossible)?;
         let belief = belief(args, settings, &imu, &gnss, session)?;
-        let initial = given.map(|path| read_initial(path)).transpose()?;
+        let initial = match given {
+            Some(path) => Some(read_initial(path)?),
+            None => None,
+        };
         let reference = args.reference.as_deref().map(|path| read::trajectory(path, session)).transpose()?;
         Ok(Self { imu, gnss, belief, reference, initial, files })
     }
