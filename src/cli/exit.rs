@@ -96,6 +96,6 @@ impl From<RecordingError> for Failure {
 
 impl From<SignalError> for Failure {
     fn from(e: SignalError) -> Self {
-        Self::input(e)
+        Self::input(e).hint("fewer --scales, or record for longer")
     }
 }

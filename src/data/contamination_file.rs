@@ -325,7 +325,10 @@ mod tests {
             step("amplitud = 1"),
             "c.toml, line 3: unknown key \"accel[1].amplitud\" | did you mean \"amplitude\"?"
         );
-        assert_eq!(step("at_s = 1"), "c.toml, line 1: \"accel[1].amplitude\" is missing | ");
+        assert_eq!(
+            step("at_s = 1"),
+            "c.toml, line 1: \"accel[1].amplitude\" is missing | add the key \"accel[1].amplitude\""
+        );
         assert_eq!(
             step("at_s = -1\namplitude = 1"),
             "c.toml, line 3: \"accel[1].at_s\" = -1 is not a time ≥ 0 | "

@@ -4,6 +4,7 @@
 use crate::imu::{Axis, Sensor};
 use crate::report::CurvesFile;
 use crate::wavelet::Curve;
+use std::io::ErrorKind;
 use std::path::Path;
 
 /// A curve and what it is of.
@@ -89,15 +90,19 @@ pub enum CurveError {
 impl CurveError {
     /// Whether the contents are at fault (rather than the machine, or a missing file).
     #[must_use]
-    pub const fn is_content(&self) -> bool {
-        !matches!(self, Self::Io { .. })
+    pub fn is_content(&self) -> bool {
+        match self {
+            Self::Io { source, .. } => source.kind() == ErrorKind::InvalidData,
+            _ => true,
+        }
     }
 
     /// What to do about it.
     #[must_use]
     pub fn hint(&self) -> Option<String> {
         match self {
-            Self::Io { .. } => None,
+            Self::Io { source, .. } if source.kind() == ErrorKind::NotFound => Some("check the path".into()),
+            Self::Io { source, .. } if source.kind() != ErrorKind::InvalidData => None,
             _ => Some(
                 "a curve is a CSV with the columns tau_samples,wv,edof (tau_samples = 2, 4, 8, …), or a .wv.json \
                  written by calibrate"

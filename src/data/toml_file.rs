@@ -1,6 +1,7 @@
 //! TOML files read key by key: every refusal names file, line, key and value, and a mistyped key is
 //! answered with the nearest legal one.
 
+use std::io::ErrorKind;
 use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -89,14 +90,27 @@ impl TomlError {
         match self {
             Self::UnknownKey { hint, .. } => Some(hint.clone()),
             Self::Value { hint, .. } | Self::Study { hint, .. } => hint.as_deref().map(str::to_owned),
+            Self::MissingKey { key, .. } if key == "\"rate_hz\"" => {
+                Some("add rate_hz = 100.0, the sample rate (Hz)".to_owned())
+            }
+            Self::MissingKey { key, .. } => Some(format!("add the key {key}")),
+            Self::Io { source, .. } if source.kind() == ErrorKind::NotFound => {
+                Some("check the path; nav-sim init makes a directory of files to start from".to_owned())
+            }
+            Self::Io { source, .. } if source.kind() == ErrorKind::InvalidData => {
+                Some("a TOML file is text in UTF-8".to_owned())
+            }
             _ => None,
         }
     }
 
     /// Whether the file's contents are at fault (rather than the machine, or a missing file).
     #[must_use]
-    pub const fn is_content(&self) -> bool {
-        !matches!(self, Self::Io { .. })
+    pub fn is_content(&self) -> bool {
+        match self {
+            Self::Io { source, .. } => source.kind() == ErrorKind::InvalidData,
+            _ => true,
+        }
     }
 }
 
@@ -260,10 +274,10 @@ impl<'a> Section<'a> {
     /// A finite number.
     pub(crate) fn f64(&self, key: &str) -> Result<Option<f64>, TomlError> {
         let Some(value) = self.get(key) else { return Ok(None) };
-        number(value)
-            .filter(|x| x.is_finite())
-            .map(Some)
-            .ok_or_else(|| self.wrong_type(key, "a finite number"))
+        number(value).filter(|x| x.is_finite()).map(Some).ok_or_else(|| {
+            let hint = "a number such as 1.5e-4; neither nan nor inf".to_owned();
+            self.refuse(key, "is not a finite number", Some(hint))
+        })
     }
 
     pub(crate) fn require_f64(&self, key: &str) -> Result<f64, TomlError> {

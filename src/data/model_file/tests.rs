@@ -129,11 +129,11 @@ fn wrong_values_are_refused_with_line_key_and_value() {
     );
     assert_eq!(
         process_refusal("type = \"QN\", q2 = nan"),
-        "m.toml, line 4: \"accel.processes[1].q2\" = nan is not a finite number | "
+        "m.toml, line 4: \"accel.processes[1].q2\" = nan is not a finite number | a number such as 1.5e-4; neither nan nor inf"
     );
     assert_eq!(
         process_refusal("type = \"WN\", sigma2 = \"1\""),
-        "m.toml, line 4: \"accel.processes[1].sigma2\" = \"1\" is not a finite number | "
+        "m.toml, line 4: \"accel.processes[1].sigma2\" = \"1\" is not a finite number | a number such as 1.5e-4; neither nan nor inf"
     );
     assert_eq!(
         process_refusal("type = \"WN\", sigma2 = 1, sigma2_ci95 = [1]"),
@@ -162,15 +162,27 @@ fn wrong_keys_are_refused_with_what_was_meant() {
         "m.toml, line 4: \"accel.processes[1].type\" = \"flicker\" is not a process | \
          processes: WN, QN, AR1, RW, DR, GM, MA1"
     );
-    assert_eq!(process_refusal("sigma2 = 1"), "m.toml, line 4: \"accel.processes[1].type\" is missing | ");
+    assert_eq!(
+        process_refusal("sigma2 = 1"),
+        "m.toml, line 4: \"accel.processes[1].type\" is missing | add the key \"accel.processes[1].type\""
+    );
     assert_eq!(
         process_refusal("type = \"AR1\", phi = 0.5"),
-        "m.toml, line 4: \"accel.processes[1].sigma2\" is missing | "
+        "m.toml, line 4: \"accel.processes[1].sigma2\" is missing | add the key \"accel.processes[1].sigma2\""
     );
     assert_eq!(refusal("rate = 100\n"), "m.toml, line 1: unknown key \"rate\" | did you mean \"rate_hz\"?");
-    assert_eq!(refusal("[accel]\nprocesses = []\n"), "m.toml, line 1: \"rate_hz\" is missing | ");
-    assert_eq!(refusal("rate_hz = 1\n"), "m.toml, line 1: \"accel\" or \"gyro\" is missing | ");
-    assert_eq!(refusal("rate_hz = 1\n[accel]\n"), "m.toml, line 2: \"accel.processes\" is missing | ");
+    assert_eq!(
+        refusal("[accel]\nprocesses = []\n"),
+        "m.toml, line 1: \"rate_hz\" is missing | add rate_hz = 100.0, the sample rate (Hz)"
+    );
+    assert_eq!(
+        refusal("rate_hz = 1\n"),
+        "m.toml, line 1: \"accel\" or \"gyro\" is missing | add the key \"accel\" or \"gyro\""
+    );
+    assert_eq!(
+        refusal("rate_hz = 1\n[accel]\n"),
+        "m.toml, line 2: \"accel.processes\" is missing | add the key \"accel.processes\""
+    );
     assert_eq!(
         refusal("rate_hz = 1\n[accel]\nprocesses = []\n[accel.x]\nprocesses = []\n"),
         "m.toml, line 4: \"accel.x\" = [accel.x] is given both for all axes and for this one | \

@@ -3,6 +3,7 @@
 use super::header::HeaderError;
 use crate::data::npy::NpyError;
 use crate::imu::Channel;
+use std::io::ErrorKind;
 
 /// What is wrong with a recording: which file, which line, which column, which value.
 #[derive(Debug, thiserror::Error)]
@@ -29,6 +30,15 @@ pub enum RecordingError {
     /// A gyroscope column whose unit cannot be known.
     #[error("{path}, line {line}: column \"{column}\" has no unit in its name")]
     NoUnit { path: String, line: u64, column: String },
+    /// A column of an axis in a unit that is not known.
+    #[error("{path}, line {line}: column \"{column}\" is in a unit that is not known")]
+    UnknownUnit { path: String, line: u64, column: String, units: String },
+    /// A file that is no text of lines.
+    #[error("{path} is no table of text: {what}")]
+    NotText { path: String, what: &'static str },
+    /// A warm-up as long as the recording.
+    #[error("{path}: --skip-s {skip_s} leaves {samples} samples of {seconds} s, but {needed} are needed")]
+    Skipped { path: String, skip_s: f64, seconds: f64, samples: usize, needed: usize },
     /// Two columns for one channel.
     #[error("{path}, line {line}: columns \"{first}\" and \"{second}\" are both {channel}")]
     ColumnTwice { path: String, line: u64, channel: Channel, first: String, second: String },
@@ -104,6 +114,7 @@ impl RecordingError {
         match e {
             HeaderError::NoChannels { columns } => Self::NoChannels { path, line, columns },
             HeaderError::NoUnit { column } => Self::NoUnit { path, line, column },
+            HeaderError::UnknownUnit { column, units } => Self::UnknownUnit { path, line, column, units },
             HeaderError::Twice { channel, first, second } => {
                 Self::ColumnTwice { path, line, channel, first, second }
             }
@@ -112,8 +123,12 @@ impl RecordingError {
 
     /// Whether the system, not the contents, is at fault.
     #[must_use]
-    pub const fn is_io(&self) -> bool {
-        matches!(self, Self::Io { .. } | Self::Npy(NpyError::Io { .. }))
+    pub fn is_io(&self) -> bool {
+        match self {
+            Self::Io { source, .. } => !is_damage(source.kind()),
+            Self::Npy(NpyError::Io { .. }) => true,
+            _ => false,
+        }
     }
 
     /// What to do about it.
@@ -121,6 +136,22 @@ impl RecordingError {
     pub fn hint(&self) -> Option<String> {
         let text = match self {
             Self::NoHeader { .. } | Self::NoChannels { .. } | Self::NpyColumns { .. } => COLUMNS,
+            Self::UnknownUnit { units, .. } => {
+                return Some(format!(
+                    "known units: {units}; give the names with --columns, or leave the axis out with --axes"
+                ));
+            }
+            Self::NotText { .. } => {
+                "save it as CSV in UTF-8, one row a line; arrays end in .npy, gzipped tables in .gz"
+            }
+            Self::Skipped { .. } => "a smaller --skip-s, or a longer recording",
+            Self::Io { source, .. } if is_damage(source.kind()) => {
+                "the file is cut off, or not gzipped though it ends in .gz: copy it again, or rename it"
+            }
+            Self::Io { source, .. } if source.kind() == ErrorKind::NotFound => {
+                "check the path; a directory stands for all its recordings"
+            }
+            Self::Empty { .. } => "a recording has a header line and a row for each sample",
             Self::NoUnit { .. } => {
                 "end its name in _rad_s, _deg_s or _deg_h, or give the names with --columns"
             }
@@ -158,6 +189,11 @@ pub(super) fn shown(text: &str, longest: usize) -> String {
 
 fn escaped(c: char) -> Vec<char> {
     if c.is_control() { c.escape_default().collect() } else { vec![c] }
+}
+
+/// Whether an error of the system is one of the contents: compressed data that are none, or cut off.
+pub(super) const fn is_damage(kind: ErrorKind) -> bool {
+    matches!(kind, ErrorKind::InvalidData | ErrorKind::InvalidInput | ErrorKind::UnexpectedEof)
 }
 
 fn decimal_comma(value: &str) -> bool {

@@ -66,6 +66,7 @@ pub(super) struct Layout {
 pub(super) enum HeaderError {
     NoChannels { columns: String },
     NoUnit { column: String },
+    UnknownUnit { column: String, units: String },
     Twice { channel: Channel, first: String, second: String },
 }
 
@@ -183,6 +184,21 @@ fn split_unit<'a>(name: &'a str, units: &[(&[&str], f64)]) -> Option<(&'a str, f
     hits.min_by_key(|(stem, _)| stem.len())
 }
 
+/// The channel of a name such as `accel_x_ft_s2`: a sensor, an axis, and something else.
+fn in_unknown_unit(name: &str) -> Option<Channel> {
+    let of = |sensor: Sensor, stem: &str| {
+        let rest = name.strip_prefix(stem)?.trim_start_matches('_');
+        let axis = Axis::ALL.into_iter().find(|a| rest.starts_with(a.name()))?;
+        let unit = rest[1..].strip_prefix('_')?;
+        // `a_x_…` may be anything; `ax_…` is an accelerometer.
+        let clear = stem.len() > 1 || !name[1..].starts_with('_');
+        (clear && !unit.is_empty()).then_some(Channel { sensor, axis })
+    };
+    let stems = [(Sensor::Accel, ACCEL), (Sensor::Gyro, GYRO)];
+    let mut all = stems.into_iter().flat_map(|(sensor, names)| names.iter().map(move |n| (sensor, *n)));
+    all.find_map(|(sensor, stem)| of(sensor, stem))
+}
+
 /// The axis of a signal's name, and whether the name means SI by convention.
 fn stem_axis(stem: &str, sensor: Sensor) -> Option<(Axis, bool)> {
     let axis = Axis::ALL.into_iter().find(|a| stem.ends_with(a.name()))?;
@@ -217,6 +233,7 @@ impl Layout {
         let mut layout = Self { found, ignored };
         layout.one_time_column();
         layout.no_channel_twice()?;
+        layout.no_unknown_unit(wanted)?;
         if !layout.found.iter().any(|f| matches!(f.role, Role::Signal { .. })) {
             let quoted: Vec<String> =
                 names.iter().take(20).map(|n| format!("\"{}\"", shown(n.trim(), 40))).collect();
@@ -239,6 +256,25 @@ impl Layout {
             .partition(|f| rank(f).is_none() || best.is_some_and(|(_, index)| f.index == index));
         self.found = kept;
         self.ignored.extend(passed.into_iter().map(|f| f.name));
+    }
+
+    /// A column that is an axis by its name but in a unit that is not known must not be dropped in silence: unless
+    /// another column is that axis, or it is not wanted.
+    fn no_unknown_unit(&self, wanted: Option<&[Channel]>) -> Result<(), HeaderError> {
+        let is = |f: &Found, channel| matches!(f.role, Role::Signal { channel: c, .. } if c == channel);
+        for name in &self.ignored {
+            let Some(channel) = in_unknown_unit(&normalise(name)) else { continue };
+            let missed = wanted.is_none_or(|w| w.contains(&channel));
+            if missed && !self.found.iter().any(|f| is(f, channel)) {
+                let units = match channel.sensor {
+                    Sensor::Accel => ACCEL_UNITS,
+                    Sensor::Gyro => GYRO_UNITS,
+                };
+                let units: Vec<String> = units.iter().map(|(names, _)| format!("_{}", names[0])).collect();
+                return Err(HeaderError::UnknownUnit { column: name.clone(), units: units.join(", ") });
+            }
+        }
+        Ok(())
     }
 
     fn no_channel_twice(&self) -> Result<(), HeaderError> {
@@ -351,6 +387,21 @@ mod tests {
         assert_eq!(classify("gx", false), Some(Err(())));
         let channel = Channel { sensor: Sensor::Accel, axis: Axis::X };
         assert_eq!(classify("ax", false), Some(Ok(Role::Signal { channel, unit: Unit::FromGravity })));
+    }
+
+    #[test]
+    fn an_unknown_unit_is_not_passed_over() {
+        let layout = |names: &[&str], wanted: Option<&[Channel]>| {
+            Layout::new(&names.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>(), false, wanted)
+        };
+        for name in ["accel_x_ft_s2", "gyro_z_rpm", "Accelerometer X (counts)", "ax_lsb"] {
+            let error = layout(&["t_s", "gyro_x_rad_s", name], None).unwrap_err();
+            assert!(matches!(error, HeaderError::UnknownUnit { column, .. } if column == name), "{name}");
+        }
+        assert!(layout(&["accel_x_m_s2", "accel_x_sigma"], None).is_ok(), "the axis is there");
+        let y = Channel { sensor: Sensor::Accel, axis: Axis::Y };
+        assert!(layout(&["accel_x_ft_s2", "accel_y_g"], Some(&[y])).is_ok(), "not wanted");
+        assert!(layout(&["accel_y_g", "temperature", "a_x_ratio", "mag_x_ut"], None).is_ok());
     }
 
     #[test]

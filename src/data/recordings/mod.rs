@@ -94,6 +94,11 @@ fn read_file(path: &Path, options: &ReadOptions) -> Result<(Vec<Recording>, File
     let pieces = pieces(&raw, &timing, options);
     let needed = options.min_samples.max(2);
     let longest = pieces.iter().map(|p| p.len()).max().unwrap_or(0);
+    if longest < needed && options.skip_s > 0.0 {
+        let seconds = raw.columns.first().map_or(0, |c| c.values.len()) as f64 / timing.rate_hz;
+        let (path, skip_s) = (raw.path, options.skip_s);
+        return Err(RecordingError::Skipped { path, skip_s, seconds, samples: longest, needed });
+    }
     if longest < needed {
         return Err(RecordingError::TooShort { path: raw.path, samples: longest, needed });
     }

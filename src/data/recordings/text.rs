@@ -76,6 +76,9 @@ impl Head {
             if bytes.is_empty() {
                 return Err(RecordingError::Empty { path: name.to_owned() });
             }
+            if let Some(what) = no_text(&bytes) {
+                return Err(RecordingError::NotText { path: name.to_owned(), what });
+            }
             line += 1;
             let text = String::from_utf8_lossy(&bytes).into_owned();
             let text = text.trim_start_matches('\u{feff}').trim();
@@ -162,7 +165,7 @@ fn read_rows(
         match rows.read_byte_record(&mut record) {
             Ok(true) => {}
             Ok(false) => return Ok(lines),
-            Err(e) => return Err(RecordingError::Io { path: name.to_owned(), source: e.into() }),
+            Err(e) => return Err(RecordingError::Io { path: name.to_owned(), source: of_csv(e) }),
         }
         let line = head.lines_before + line_of(&record, rows.position().line());
         let found = record.len();
@@ -186,6 +189,27 @@ fn read_rows(
         lines.push(sample, line);
         sample += 1;
     }
+}
+
+/// What the system said, with its kind.
+fn of_csv(e: csv::Error) -> std::io::Error {
+    match e.into_kind() {
+        csv::ErrorKind::Io(source) => source,
+        other => std::io::Error::other(format!("{other:?}")),
+    }
+}
+
+/// What a line shows a file to be that is no text of lines, if it does.
+fn no_text(bytes: &[u8]) -> Option<&'static str> {
+    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+        return Some("it is in UTF-16");
+    }
+    let control = bytes.iter().filter(|b| b.is_ascii_control() && !b"\t\r\n".contains(b)).count();
+    if bytes.contains(&0) || 20 * control > bytes.len() {
+        return Some("it is binary");
+    }
+    let lone = bytes.windows(2).any(|pair| pair[0] == b'\r' && !b"\r\n".contains(&pair[1]));
+    lone.then_some("its lines end in a carriage return only")
 }
 
 /// Line of a record that ended before line `next`. (The record's own position is that before any empty

@@ -57,7 +57,7 @@ const COLUMNS: &str = "a trajectory has the columns t_s, lat_deg, lon_deg, h_m (
 impl TrajectoryFileError {
     /// Whether the file's contents are at fault (rather than the machine, or a missing file).
     #[must_use]
-    pub const fn is_content(&self) -> bool {
+    pub fn is_content(&self) -> bool {
         match self {
             Self::Io { .. } => false,
             Self::Profile(e) => e.is_content(),
