@@ -1,0 +1,78 @@
+//! How often the 95 % intervals of a calibration hold the truth: sets of eight replicates of the paper's Section IV
+//! (clean, parameters drawn for each), theta_0 by quadrature.
+//!
+//! `cargo run --release --example 05_interval_coverage -- SETS SAMPLES DRAWS` (default 200 65536 199)
+#![expect(clippy::print_stdout, reason = "an example shows its results")]
+
+use nav_sim::calibration::{
+    Bootstrap, ModelChoice, Outcome, Pool, Replicate, Settings, calibrate, grouped, infer,
+};
+use nav_sim::data::study_file;
+use nav_sim::noise::Synthesizer;
+use nav_sim::rng::StreamKey;
+use nav_sim::study::{Design, target};
+use nav_sim::wavelet::both;
+use rayon::prelude::*;
+use std::error::Error;
+use std::path::Path;
+
+type Failure = Box<dyn Error + Send + Sync>;
+
+/// The fits of one set, with their intervals.
+fn set(design: &Design, set: u64, draws: usize) -> Result<Vec<Outcome>, Failure> {
+    let mut measured = Vec::new();
+    for run in 0..design.replicates {
+        let drawn = design.spread.draw(&design.model, set, run)?;
+        let key = StreamKey { seed: set, scenario: "coverage", run, source: "", process: "" };
+        let mut signal = vec![0.0; design.samples];
+        Synthesizer::new(drawn.axis(design.channel), key).fill(&mut signal);
+        let (classical, robust) = both(&signal, design.levels, &design.tuning)?;
+        let (name, axis) = (run.to_string(), Some(design.channel.axis));
+        measured.push((design.channel, Replicate { name, axis, samples: design.samples, classical, robust }));
+    }
+    let settings = Settings {
+        estimators: design.estimators.clone(),
+        model: ModelChoice::Given(design.spec.clone()),
+        limits: Vec::new(),
+        trim: design.trim,
+        tuning: design.tuning,
+        weighting: design.weighting,
+        rate_hz: design.model.rate_hz,
+    };
+    let groups = grouped(measured, Pool::Axes);
+    let mut outcomes = calibrate(&groups, &settings)?;
+    infer(&groups, &mut outcomes, &settings, Bootstrap { draws, seed: set });
+    Ok(outcomes)
+}
+
+fn main() -> Result<(), Failure> {
+    let numbers: Vec<usize> = std::env::args().skip(1).map(|a| a.parse()).collect::<Result<_, _>>()?;
+    let number = |i: usize, default: usize| numbers.get(i).copied().unwrap_or(default);
+    let (sets, samples, draws) = (number(0, 200), number(1, 1 << 16), number(2, 199));
+    let study = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/paper_fig2.toml");
+    let design = study_file::read(&study)?.design.with_samples(samples);
+    let aim = target(&design)?;
+    let (names, truth) = (Design::parameters(&aim.fit.composite), Design::values(&aim.fit.composite));
+    let all: Vec<Vec<Outcome>> =
+        (0..sets as u64).into_par_iter().map(|s| set(&design, s, draws)).collect::<Result<_, _>>()?;
+    println!(
+        "{sets} sets, {samples} samples, {draws} draws; truth in the 95 % interval (below it, above it)"
+    );
+    for (e, estimator) in design.estimators.iter().enumerate() {
+        let rejected =
+            all.iter().filter(|o| o[e].inference.as_ref().is_some_and(|i| i.goodness.p_value <= 0.05));
+        println!("{}: J-test rejects {:.1} % at 5 %", estimator.name(), percent(rejected.count(), sets));
+        for (p, (name, truth)) in names.iter().zip(&truth).enumerate() {
+            let ends = || all.iter().filter_map(|o| Some(&o[e].inference.as_ref()?.intervals[p]));
+            let (above, below) =
+                (ends().filter(|i| i.low > *truth).count(), ends().filter(|i| i.high < *truth).count());
+            let inside = percent(sets - above - below, sets);
+            println!("  {name:10} {inside:5.1} % ({:.1}, {:.1})", percent(above, sets), percent(below, sets));
+        }
+    }
+    Ok(())
+}
+
+fn percent(some: usize, all: usize) -> f64 {
+    100.0 * some as f64 / all as f64
+}
