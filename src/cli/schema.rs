@@ -2,14 +2,15 @@
 
 use super::{Failure, Session};
 use nav_sim::batch::Study;
+use nav_sim::data::{parameters_file, study_file};
 use nav_sim::scenario::Scenario;
 
-/// Print the JSON schema of a scenario or study file, for editors and checkers
+/// Print the JSON schema of a file that people write, for editors and checkers
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
-  nav-sim schema scenario
   nav-sim schema scenario > scenario.schema.json
+  nav-sim schema parameters | grep -c AR1
   nav-sim schema study | grep -c description")]
 pub(crate) struct Args {
     /// Which file
@@ -23,12 +24,18 @@ enum Kind {
     Scenario,
     /// A grid of experiments (`nav-sim batch`)
     Study,
+    /// A study of the estimators (`nav-sim efficiency`)
+    Efficiency,
+    /// What is known of parameters before a fit (`nav-sim calibrate --parameters`)
+    Parameters,
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let schema = match args.of {
-        Kind::Scenario => schemars::schema_for!(Scenario),
-        Kind::Study => schemars::schema_for!(Study),
+        Kind::Scenario => schemars::schema_for!(Scenario).to_value(),
+        Kind::Study => schemars::schema_for!(Study).to_value(),
+        Kind::Efficiency => study_file::schema(),
+        Kind::Parameters => parameters_file::schema(),
     };
     let text = serde_json::to_string_pretty(&schema).map_err(Failure::could_not)?;
     session.printer.result(&text);

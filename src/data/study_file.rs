@@ -11,7 +11,7 @@
 //! sets = 500                               # H
 //! seed = 1                                 # default: --seed, or drawn
 //! scenarios = ["section4-I", "clean.toml"] # contaminations: names, or files relative to this one
-//! estimators = ["awv", "sr-awv", "dr-awv"] # default: these
+//! estimators = ["awv", "sr-awv", "dr-awv"] # default: these; also avlr (models of WN, QN, RW, DR)
 //! trim = 2                                 # replicates that dr-awv drops at each end (default: 30 %)
 //! efficiency = 0.6                         # of the robust wavelet variance (default)
 //! ```
@@ -89,7 +89,46 @@ pub fn read(path: &Path) -> Result<StudyFile, TomlError> {
         model: file.model,
     };
     enough(&root, &design)?;
+    has_slopes(&root, &design)?;
     Ok(StudyFile { design, seed: root.u64("seed")?, sets: at_least(&root, "sets", 1)?, model })
+}
+
+/// The JSON schema of a study file.
+#[must_use]
+pub fn schema() -> serde_json::Value {
+    use serde_json::json;
+    let whole = |least: u64| json!({ "type": "integer", "minimum": least });
+    let described = |text: &str, mut of: serde_json::Value| {
+        of["description"] = text.into();
+        of
+    };
+    let text = || json!({ "type": "string" });
+    let several: Vec<&str> = ["awv", "sr-awv", "dr-awv", "avlr"].to_vec();
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Study",
+        "description": "Monte-Carlo study of estimators: nav-sim efficiency",
+        "type": "object",
+        "properties": {
+            "schema": { "const": 1 },
+            "model": described("Model file with [spread], relative to this file", text()),
+            "axis": described("The axis studied: accel.x (default) … gyro.z", text()),
+            "fit": described("What is fitted, such as N1", text()),
+            "replicates": described("Replicates of a set, K", whole(1)),
+            "samples": described("Samples of a replicate, T", whole(4)),
+            "levels": described("Scales, J (default: floor(log2 T) - 1)", whole(1)),
+            "sets": described("Sets of replicates, H", whole(1)),
+            "seed": whole(0),
+            "scenarios": described("Contaminations: names, or files relative to this one",
+                json!({ "type": "array", "items": text(), "minItems": 1, "uniqueItems": true })),
+            "estimators": json!({ "type": "array", "items": { "enum": several }, "minItems": 1, "uniqueItems": true }),
+            "trim": described("Replicates that dr-awv drops at each end (default: 30 %)", whole(0)),
+            "efficiency": { "type": "number", "minimum": 0.3, "maximum": 0.99,
+                "description": "Efficiency of the robust wavelet variance (default 0.6)" }
+        },
+        "required": ["model", "fit", "replicates", "samples", "sets", "scenarios"],
+        "additionalProperties": false
+    })
 }
 
 /// A required whole number in a range that fits memory and file formats.
@@ -153,8 +192,10 @@ fn scenarios(
 }
 
 fn estimators(root: &Section<'_>) -> Result<Vec<Estimator>, TomlError> {
-    let several = || Estimator::ALL.into_iter().filter(|e| !e.is_single());
-    let Some(names) = root.strs("estimators")? else { return Ok(several().collect()) };
+    let several = || Estimator::ALL.into_iter().filter(|e| !e.is_single() || *e == Estimator::Avlr);
+    let Some(names) = root.strs("estimators")? else {
+        return Ok(several().filter(|e| !e.is_single()).collect());
+    };
     let find = |name: &&str| {
         several().find(|e| e.name() == *name).ok_or_else(|| {
             let hint = nearest(name, several().map(Estimator::name)).map_or_else(
@@ -194,6 +235,18 @@ fn enough(root: &Section<'_>, design: &Design) -> Result<(), TomlError> {
     Ok(())
 }
 
+/// AVLR reads slopes, and some processes have none.
+fn has_slopes(root: &Section<'_>, design: &Design) -> Result<(), TomlError> {
+    let without = design.spec.kinds().iter().find(|k| k.has_shape());
+    match without {
+        Some(kind) if design.estimators.contains(&Estimator::Avlr) => {
+            let reason = format!("has avlr, which cannot tell {}: it has no slope of its own", kind.code());
+            Err(root.refuse("estimators", reason, Some("fit = \"WN+RW\", a sum of WN, QN, RW, DR".into())))
+        }
+        _ => Ok(()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -231,7 +284,7 @@ mod tests {
             "s.toml, line 6: \"scenarios\" = [\"section4-2\"] names section4-2, which is not there | did you mean \"section4-I\"?"
         );
         assert_eq!(with("fit = ", "fits = "), "s.toml, line 2: unknown key \"fits\" | did you mean \"fit\"?");
-        assert_eq!(with("sets = 3\n", ""), "s.toml, line 1: \"sets\" is missing | ");
+        assert_eq!(with("sets = 3\n", ""), "s.toml, line 1: \"sets\" is missing | add the key \"sets\"");
         assert_eq!(with("sets = 3", "sets = 0"), "s.toml, line 5: \"sets\" = 0 is not a whole number ≥ 1 | ");
         assert_eq!(
             with("samples = 64", "samples = 64\nlevels = 7"),
@@ -239,7 +292,7 @@ mod tests {
         );
         assert_eq!(
             with("sets", "estimators = [\"gmwm\"]\nsets"),
-            "s.toml, line 5: \"estimators\" = [\"gmwm\"] names gmwm, which is no average of replicates | estimators: awv, sr-awv, dr-awv"
+            "s.toml, line 5: \"estimators\" = [\"gmwm\"] names gmwm, which is no average of replicates | estimators: awv, sr-awv, dr-awv, avlr"
         );
         assert_eq!(
             with("sets", "axis = \"gyro.x\"\nsets"),

@@ -5,6 +5,7 @@ mod batch;
 mod comparison;
 mod curves;
 mod efficiency;
+mod efficiency_svg;
 mod fits;
 mod fusion;
 mod html;
@@ -30,7 +31,8 @@ pub use curves::{
     signal_rows,
 };
 pub use efficiency::{EfficiencyFile, EfficiencyRow, efficiency_csv, efficiency_table};
-pub use fits::{FitEntry, FitsFile, describe};
+pub use efficiency_svg::efficiency_svg;
+pub use fits::{CandidateEntry, FitEntry, FitsFile, describe};
 pub use fusion::{FUSION_FILES, FusionKind, FusionManifest, FusionSummary, fusion_directory, solution_csv};
 pub use manifest::{Input, Manifest, ModelNote};
 pub use recording::{gnss_csv, imu_csv, initial_toml};
