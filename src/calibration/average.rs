@@ -17,13 +17,16 @@ pub enum Estimator {
     Gmwm,
     /// Robust wavelet variance of one replicate.
     Rgmwm,
+    /// Regression on the slopes of the Allan deviation of one replicate.
+    Avlr,
     /// A curve from elsewhere.
     Given,
 }
 
 impl Estimator {
     /// All estimators.
-    pub const ALL: [Self; 6] = [Self::Awv, Self::SrAwv, Self::DrAwv, Self::Gmwm, Self::Rgmwm, Self::Given];
+    pub const ALL: [Self; 7] =
+        [Self::Awv, Self::SrAwv, Self::DrAwv, Self::Gmwm, Self::Rgmwm, Self::Avlr, Self::Given];
 
     /// Name in files and on the command line.
     #[must_use]
@@ -34,6 +37,7 @@ impl Estimator {
             Self::DrAwv => "dr-awv",
             Self::Gmwm => "gmwm",
             Self::Rgmwm => "rgmwm",
+            Self::Avlr => "avlr",
             Self::Given => "given",
         }
     }
@@ -47,7 +51,7 @@ impl Estimator {
     /// Whether it takes one replicate at a time.
     #[must_use]
     pub const fn is_single(self) -> bool {
-        matches!(self, Self::Gmwm | Self::Rgmwm | Self::Given)
+        matches!(self, Self::Gmwm | Self::Rgmwm | Self::Avlr | Self::Given)
     }
 }
 

@@ -1,18 +1,24 @@
 //! A model fitted to a curve: theta = argmin Σ Omega_j (nu_j − nu_j(theta))².
 
-use super::objective::{Component, Objective, Range, Weighting};
+use super::limits::Limits;
+use super::objective::{Component, Objective, Range, Weighting, whitening};
 use super::optimise::Termination;
+use super::sampling::SamplingLaw;
 use super::search::{COMBINATIONS, Found, search};
 use super::spec::{Kind, ModelSpec};
 use crate::noise::{
     Ar1, Composite, Drift, GaussMarkov, Ma1, ParameterError, Process, Quantization, RandomWalk, White,
 };
 use crate::wavelet::Curve;
+use nalgebra::DMatrix;
+use std::cmp::Ordering;
+use std::sync::Arc;
 
 /// A fitted model. That the iterations did not converge is told, not an error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
-    /// The model: processes in the order of [`Kind::ALL`], alike ones by ascending correlation time.
+    /// The model: processes in the order of [`Kind::ALL`], alike ones by ascending correlation time (or in the
+    /// order of their limits, if they have any).
     pub composite: Composite,
     /// Σ Omega_j (nu_j − nu_j(theta))² at theta.
     pub objective: f64,
@@ -30,10 +36,13 @@ pub struct Fit {
     pub zero: Vec<String>,
     /// Labels of the processes whose shape lies at the end of its range: not identifiable either.
     pub at_end: Vec<String>,
-    /// √Omega_j (nu_j − nu_j(theta)) of each scale; in standard deviations when weighted by edof.
+    /// √Omega_j (nu_j − nu_j(theta)) of each scale; in standard deviations when weighted by edof. With the full
+    /// covariance the scales are mixed so that these are uncorrelated.
     pub residuals: Vec<f64>,
     /// Coordinates of the minima found, best first: where the search of a similar curve begins.
     pub(super) minima: Vec<Vec<f64>>,
+    /// What the scales were mixed with, with the full covariance.
+    pub(super) mixing: Option<Arc<DMatrix<f64>>>,
 }
 
 /// Why a curve has no fit.
@@ -65,6 +74,12 @@ pub enum FitError {
         /// The value.
         value: f64,
     },
+    /// Nothing to be read off.
+    #[error("{process} has no slope of its own in the Allan deviation: avlr cannot tell it")]
+    NoSlope {
+        /// Code of the process.
+        process: &'static str,
+    },
     /// A result outside its domain: the numbers of the curve are out of range.
     #[error("the fit left the domain of its parameters: {0}")]
     Domain(#[from] ParameterError),
@@ -78,7 +93,36 @@ pub enum FitError {
 /// # Errors
 /// When the curve has fewer scales than the model parameters, or numbers that are no wavelet variances.
 pub fn fit(curve: &Curve, spec: &ModelSpec, rate_hz: f64, weighting: Weighting) -> Result<Fit, FitError> {
-    fit_near(curve, spec, rate_hz, weighting, COMBINATIONS, &[])
+    let diagonal = fit_near(curve, spec, rate_hz, weighting, None, COMBINATIONS, &[])?;
+    if weighting != Weighting::Full {
+        return Ok(diagonal);
+    }
+    fit_with_covariance(curve, spec, rate_hz, &covariance(curve, &diagonal))
+}
+
+/// Relative covariance of a curve of independent degrees of freedom, by the large-sample law of a model
+/// ([`SamplingLaw`]).
+fn covariance(curve: &Curve, fit: &Fit) -> DMatrix<f64> {
+    let levels = curve.levels.iter().copied().max().unwrap_or(1) as usize;
+    let law = SamplingLaw::new(&fit.composite, levels);
+    let at = |i: usize| curve.levels[i] as usize - 1;
+    let deviation = |i: usize| (2.0 / curve.edof[i]).sqrt();
+    let n = curve.levels.len();
+    DMatrix::from_fn(n, n, |i, j| law.correlation[(at(i), at(j))] * deviation(i) * deviation(j))
+}
+
+/// The fit weighted by the inverse of a relative covariance of the curve.
+///
+/// # Errors
+/// As [`fit`].
+pub(super) fn fit_with_covariance(
+    curve: &Curve,
+    spec: &ModelSpec,
+    rate_hz: f64,
+    covariance: &DMatrix<f64>,
+) -> Result<Fit, FitError> {
+    let mixing = Some(Arc::new(whitening(covariance)));
+    fit_near(curve, spec, rate_hz, Weighting::Full, mixing, COMBINATIONS, &[])
 }
 
 /// Combinations tried for a curve that resembles one already fitted.
@@ -92,7 +136,7 @@ pub(super) fn refit(
     weighting: Weighting,
     like: &Fit,
 ) -> Result<Fit, FitError> {
-    fit_near(curve, spec, rate_hz, weighting, FEW, &like.minima)
+    fit_near(curve, spec, rate_hz, weighting, like.mixing.clone(), FEW, &like.minima)
 }
 
 fn fit_near(
@@ -100,14 +144,16 @@ fn fit_near(
     spec: &ModelSpec,
     rate_hz: f64,
     weighting: Weighting,
+    mixing: Option<Arc<DMatrix<f64>>>,
     combinations: usize,
     known: &[Vec<f64>],
 ) -> Result<Fit, FitError> {
     check(curve, spec)?;
-    let components = spec.kinds().iter().map(|kind| component(*kind, curve)).collect();
-    let objective = Objective::new(curve, weighting, components);
+    let limited = spec.kinds().iter().zip(spec.limits());
+    let components = limited.map(|(kind, limits)| component(*kind, *limits, curve, rate_hz)).collect();
+    let objective = Objective::new(curve, weighting, mixing.clone(), components);
     let found = search(&objective, combinations, known);
-    assemble(&objective, &found, rate_hz)
+    Ok(Fit { mixing, ..assemble(&objective, &found, spec, rate_hz)? })
 }
 
 fn check(curve: &Curve, spec: &ModelSpec) -> Result<(), FitError> {
@@ -125,23 +171,58 @@ fn check(curve: &Curve, spec: &ModelSpec) -> Result<(), FitError> {
     Ok(())
 }
 
-/// The widest ranges in which a curve can say anything.
-fn component(kind: Kind, curve: &Curve) -> Component {
+/// The widest ranges in which a curve can say anything, less what the limits leave out.
+fn component(kind: Kind, limits: Limits, curve: &Curve, rate_hz: f64) -> Component {
     let longest = f64::from(curve.levels.iter().copied().max().unwrap_or(1)).exp2();
-    let coordinate = match kind {
-        Kind::Ar1 | Kind::GaussMarkov => Some(Range { low: -(20.0 * longest).ln(), high: 6.0_f64.ln() }),
-        Kind::Ma1 => Some(Range { low: -1.0, high: 1.0 }),
+    let correlated = Range { low: -(20.0 * longest).ln(), high: 6.0_f64.ln() };
+    // Coordinates of the limits: ln κ, which falls as phi rises.
+    let coordinate = match (kind, limits.shape) {
+        (Kind::Ar1, Some((low, high))) => {
+            let kappa = |phi: f64| (-phi.ln()).ln();
+            Some(within(correlated, (low > 0.0).then(|| kappa(low)), (high < 1.0).then(|| kappa(high))))
+        }
+        (Kind::GaussMarkov, Some((low, high))) => {
+            let kappa = |beta: f64| (beta / rate_hz).ln();
+            Some(within(correlated, high.is_finite().then(|| kappa(high)), (low > 0.0).then(|| kappa(low))))
+        }
+        (Kind::Ar1 | Kind::GaussMarkov, None) => Some(correlated),
+        (Kind::Ma1, shape) => {
+            let (low, high) = shape.unwrap_or((-1.0, 1.0));
+            Some(Range { low: low.max(-1.0), high: high.min(1.0) })
+        }
         _ => None,
     };
-    Component { kind, amplitude: Range { low: 0.0, high: f64::INFINITY }, coordinate }
+    let (low, high) = limits.amplitude;
+    let amplitude = match kind {
+        Kind::Drift => Range { low: low * low, high: high * high },
+        _ => Range { low, high },
+    };
+    Component { kind, amplitude, coordinate }
 }
 
-fn assemble(objective: &Objective, found: &Found, rate_hz: f64) -> Result<Fit, FitError> {
+/// A range with its ends replaced where they are limited; what is given counts, even beyond the range.
+fn within(range: Range, high: Option<f64>, low: Option<f64>) -> Range {
+    let high = high.unwrap_or(range.high);
+    let low = low.unwrap_or_else(|| range.low.min(high));
+    Range { low, high: high.max(low) }
+}
+
+fn assemble(objective: &Objective, found: &Found, spec: &ModelSpec, rate_hz: f64) -> Result<Fit, FitError> {
     let unit = objective.length * objective.length;
     let best = &found.best;
     let solution = objective.solve(&best.coordinates);
     let mut terms = terms(objective, &best.coordinates, &solution.amplitudes);
-    terms.sort_by(|a, b| a.kind.cmp(&b.kind).then(b.coordinate.total_cmp(&a.coordinate)));
+    for (term, limits) in terms.iter_mut().zip(spec.limits()) {
+        term.at_end &= limits.shape.is_none();
+    }
+    let limited = |kind: Kind| {
+        spec.kinds().iter().zip(spec.limits()).any(|(k, limits)| *k == kind && *limits != Limits::NONE)
+    };
+    let by_time = |a: &Term, b: &Term| match limited(a.kind) {
+        true => Ordering::Equal,
+        false => b.coordinate.total_cmp(&a.coordinate),
+    };
+    terms.sort_by(|a, b| a.kind.cmp(&b.kind).then_with(|| by_time(a, b)));
     let processes = terms.iter().map(|t| t.process(rate_hz)).collect::<Result<_, _>>()?;
     let composite = Composite::new(processes);
     let labels = composite.labels();
@@ -159,6 +240,7 @@ fn assemble(objective: &Objective, found: &Found, rate_hz: f64) -> Result<Fit, F
         zero: labelled(|t| t.amplitude <= 0.0),
         at_end: labelled(|t| t.amplitude > 0.0 && t.at_end),
         minima: minima(found),
+        mixing: None,
         residuals: solution.residuals.iter().map(|r| r * objective.length).collect(),
         composite,
     })

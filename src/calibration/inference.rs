@@ -10,15 +10,16 @@
 //! its own degrees of freedom.
 
 use super::average::{Replicate, average};
-use super::fit::{Fit, refit};
+use super::fit::Fit;
 use super::goodness::{Goodness, goodness};
-use super::pipeline::{Outcome, Settings};
+use super::pipeline::{Outcome, Settings, estimate_again};
 use super::replicates::Group;
 use super::sampling::SamplingLaw;
 use super::spread::Spread;
 use crate::noise::Composite;
 use crate::rng::StreamKey;
 use crate::wavelet::{Curve, RobustVariance, Status};
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::cmp::Ordering;
@@ -81,7 +82,7 @@ fn inference(group: &Group, outcome: &Outcome, settings: &Settings, bootstrap: B
             process: outcome.estimator.name(),
         };
         let curve = world.draw(&key, settings)?;
-        refit(&curve, &settings.spec, settings.rate_hz, settings.weighting, &outcome.fit).ok()
+        estimate_again(&curve, outcome, settings).ok()
     };
     let fits: Vec<Fit> = (0..bootstrap.draws).into_par_iter().filter_map(draw).collect();
     let spread = world.spread.as_ref();
@@ -99,7 +100,7 @@ fn inference(group: &Group, outcome: &Outcome, settings: &Settings, bootstrap: B
 }
 
 /// What is drawn from.
-struct World<'a> {
+pub(super) struct World<'a> {
     replicates: &'a [Replicate],
     outcome: &'a Outcome,
     law: SamplingLaw,
@@ -107,10 +108,12 @@ struct World<'a> {
     spread: Option<Spread>,
     /// Wavelet variance of the model, of each level of the curve.
     centre: Vec<f64>,
+    /// Whether what replicates differ by has the tails of how little is known of it.
+    heavy_tails: bool,
 }
 
 impl<'a> World<'a> {
-    fn new(replicates: &'a [Replicate], outcome: &'a Outcome, settings: &Settings) -> Self {
+    pub(super) fn new(replicates: &'a [Replicate], outcome: &'a Outcome, settings: &Settings) -> Self {
         let model = &outcome.fit.composite;
         let levels = outcome.curve.levels.iter().copied().max().unwrap_or(1) as usize;
         let law = SamplingLaw::new(model, levels);
@@ -118,11 +121,34 @@ impl<'a> World<'a> {
         let spread =
             (!replicates.is_empty()).then(|| Spread::new(replicates, outcome.estimator, &law, efficiency));
         let centre = outcome.curve.levels.iter().map(|level| model.haar_wv(*level)).collect();
-        Self { replicates, outcome, law, spread, centre }
+        Self { replicates, outcome, law, spread, centre, heavy_tails: true }
+    }
+
+    /// The same, replicates differing by Gaussian numbers: their curves have a covariance.
+    pub(super) fn gaussian(self) -> Self {
+        Self { heavy_tails: false, ..self }
+    }
+
+    /// Covariance of curves, relative to that of the model.
+    pub(super) fn covariance(&self, draws: usize, group: &str, settings: &Settings) -> DMatrix<f64> {
+        let process = self.outcome.estimator.name();
+        let draw = |run: usize| {
+            let key = StreamKey { seed: 1, scenario: "covariance", run: run as u64, source: group, process };
+            let curve = self.draw(&key, settings)?;
+            Some(curve.wv.iter().zip(&self.centre).map(|(nu, centre)| nu / centre - 1.0).collect())
+        };
+        let errors: Vec<Vec<f64>> = (0..draws).filter_map(draw).collect();
+        let count = errors.len() as f64;
+        let levels = self.centre.len();
+        let mean: Vec<f64> = (0..levels).map(|j| errors.iter().map(|e| e[j]).sum::<f64>() / count).collect();
+        let product = |i: usize, j: usize| {
+            errors.iter().map(|e| (e[i] - mean[i]) * (e[j] - mean[j])).sum::<f64>() / (count - 1.0)
+        };
+        DMatrix::from_fn(levels, levels, product)
     }
 
     /// A new curve of the same estimator.
-    fn draw(&self, key: &StreamKey<'_>, settings: &Settings) -> Option<Curve> {
+    pub(super) fn draw(&self, key: &StreamKey<'_>, settings: &Settings) -> Option<Curve> {
         let mut generator = key.generator();
         let Some(spread) = &self.spread else {
             let curve = &self.outcome.curve;
@@ -133,7 +159,7 @@ impl<'a> World<'a> {
             let wv = curve.levels.iter().zip(&self.centre).map(|(l, nu)| nu * ratio[*l as usize - 1]);
             return Some(Curve { wv: wv.collect(), ..curve.clone() });
         };
-        let between = spread.draw_between(&mut generator);
+        let between = spread.draw_between(self.heavy_tails, &mut generator);
         let drawn = self.replicates.iter().zip(&spread.edof).zip(&between);
         let replicates: Vec<Replicate> = drawn
             .map(|((replicate, edof), between)| {
@@ -208,7 +234,7 @@ fn quantile(sorted: &[f64], p: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::{Estimator, Pool, Trim, Weighting, calibrate, grouped};
+    use crate::calibration::{Estimator, ModelChoice, Pool, Trim, Weighting, calibrate, grouped};
     use crate::imu::{Axis, Channel, Sensor};
     use crate::noise::{Process, RandomWalk, White};
     use crate::wavelet::{Convention, Tuning, classical};
@@ -221,7 +247,8 @@ mod tests {
     fn settings(spec: &str) -> Settings {
         Settings {
             estimators: vec![Estimator::Awv],
-            spec: spec.parse().unwrap(),
+            model: ModelChoice::Given(spec.parse().unwrap()),
+            limits: Vec::new(),
             trim: Trim::Count(0),
             tuning: Tuning::new(0.6, Convention::Exact).unwrap(),
             weighting: Weighting::Edof,

@@ -4,12 +4,15 @@
 //! group, [`fit()`] finds the model whose theoretical wavelet variance is nearest to it; [`calibrate`] is
 //! all of it but the first.
 
+mod auto;
 mod average;
+mod avlr;
 mod bounded;
 mod diagnosis;
 mod fit;
 mod goodness;
 mod inference;
+mod limits;
 mod notes;
 mod objective;
 mod optimise;
@@ -20,15 +23,21 @@ mod sampling;
 mod search;
 mod spec;
 mod spread;
+mod stationarity;
 
+pub use auto::{Candidate, Ranking};
 pub use average::{AverageError, Estimator, Replicate, Trim, average};
 pub use diagnosis::{Alarm, AxisScores, Diagnosis, LeftOut, Movement, Verdict, advice, diagnose};
 pub use fit::{Fit, FitError, fit};
 pub use goodness::Goodness;
 pub use inference::{Bootstrap, Inference, ParameterInterval, infer};
-pub use notes::{Share, correlation_time_s, notes, percent, shares};
+pub use limits::{LimitError, Limits};
+pub use notes::{Share, correlation_time_s, duration, notes, percent, shares};
 pub use objective::Weighting;
 pub use optimise::Termination;
-pub use pipeline::{CalibrationError, Cause, Outcome, Settings, calibrate, fit_curve};
+pub use pipeline::{
+    CalibrationError, Cause, ModelChoice, Outcome, ParameterLimit, Settings, calibrate, estimate, fit_curve,
+};
 pub use replicates::{Group, Pool, SignalError, grouped, replicates};
 pub use spec::{Kind, ModelSpec, SpecError};
+pub use stationarity::{WarmUp, warm_up};

@@ -2,6 +2,7 @@
 
 use super::average::{Estimator, Replicate};
 use super::fit::Fit;
+use super::pipeline::Outcome;
 use crate::noise::{Composite, Process};
 use crate::wavelet::{Curve, Status};
 
@@ -17,7 +18,11 @@ pub struct Share {
 /// The share of each process of a model over some levels.
 #[must_use]
 pub fn shares(model: &Composite, levels: &[u32]) -> Vec<Share> {
-    let part = |process: &Process, level: u32| process.haar_wv(level) / model.haar_wv(level);
+    let part = |process: &Process, level: u32| match process.haar_wv(level) / model.haar_wv(level) {
+        part if part.is_finite() => part,
+        // Of nothing nothing is a part.
+        _ => 0.0,
+    };
     let leader = |level: u32| {
         let parts = model.processes.iter().map(|p| part(p, level));
         parts.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
@@ -51,15 +56,17 @@ const PEAK: f64 = 3.78;
 
 /// Remarks on a fit to the average of some replicates at a rate (Hz).
 #[must_use]
-pub fn notes(
-    fit: &Fit,
-    curve: &Curve,
-    estimator: Estimator,
-    replicates: &[Replicate],
-    rate_hz: f64,
-) -> Vec<String> {
+pub fn notes(outcome: &Outcome, replicates: &[Replicate], rate_hz: f64) -> Vec<String> {
+    let Outcome { fit, curve, estimator, .. } = outcome;
     let mut notes = Vec::new();
-    not_identifiable(fit, curve, rate_hz, &mut notes);
+    let record_s = replicates.iter().map(|r| r.samples as f64 / rate_hz).fold(0.0, f64::max);
+    if *estimator == Estimator::Avlr {
+        notes.push(
+            "slopes are read as if each process were alone: inconsistent where they overlap (Guerrier et al. 2016)"
+                .to_owned(),
+        );
+    }
+    not_identifiable(fit, curve, record_s, rate_hz, &mut notes);
     misfit(fit, curve, rate_hz, &mut notes);
     if estimator.is_robust() {
         robust_remarks(fit, curve, replicates, rate_hz, &mut notes);
@@ -67,11 +74,31 @@ pub fn notes(
     notes
 }
 
+/// A time for people: seconds, minutes or hours.
+#[must_use]
+pub fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 120.0 => format!("{} s", three_digits(s)),
+        s if s < 7200.0 => format!("{} min", three_digits(s / 60.0)),
+        s => format!("{} h", three_digits(s / 3600.0)),
+    }
+}
+
+/// Three digits, without zeros at the end.
+fn three_digits(x: f64) -> String {
+    if x >= 1e6 || (x > 0.0 && x < 1e-3) {
+        return format!("{x:.2e}");
+    }
+    let decimals = (2 - x.max(1e-3).log10().floor() as i32).clamp(0, 6) as usize;
+    let text = format!("{x:.decimals$}");
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+}
+
 fn scale_s(level: u32, rate_hz: f64) -> f64 {
     f64::from(level).exp2() / rate_hz
 }
 
-fn not_identifiable(fit: &Fit, curve: &Curve, rate_hz: f64, notes: &mut Vec<String>) {
+fn not_identifiable(fit: &Fit, curve: &Curve, record_s: f64, rate_hz: f64, notes: &mut Vec<String>) {
     for label in &fit.zero {
         notes.push(format!("{label} is zero at the optimum: not identifiable from these data"));
     }
@@ -94,6 +121,14 @@ fn not_identifiable(fit: &Fit, curve: &Curve, rate_hz: f64, notes: &mut Vec<Stri
                 "{label} is at most {part} of the wavelet variance (at {scale} s): weakly identifiable"
             ));
         }
+        let last = curve.levels.last().copied().unwrap_or(0);
+        if matches!(process, Process::RandomWalk(_) | Process::Drift(_)) && share.leads == [last] {
+            notes.push(format!(
+                "{label} leads at the last scale only ({}), of which there are few independent values: a longer \
+                 record would tell it better",
+                duration(longest_s)
+            ));
+        }
         let Some(t_corr_s) = correlation_time_s(process, rate_hz) else { continue };
         if t_corr_s * rate_hz < 1.0 {
             notes.push(format!(
@@ -102,9 +137,15 @@ fn not_identifiable(fit: &Fit, curve: &Curve, rate_hz: f64, notes: &mut Vec<Stri
             ));
         }
         if PEAK * t_corr_s > longest_s {
+            let record = match record_s {
+                r if r > 0.0 => format!("the record is {}: ", duration(r)),
+                _ => String::new(),
+            };
             notes.push(format!(
-                "{label}: its correlation time of {t_corr_s:.3} s is not identifiable from scales up to \
-                 {longest_s:.3} s; there it looks like a random walk"
+                "{record}{label}'s correlation time of {} is not identifiable from scales up to {}; there it looks \
+                 like a random walk",
+                duration(t_corr_s),
+                duration(longest_s)
             ));
         }
     }

@@ -7,6 +7,8 @@ use super::bounded::{Bounded, MOST, Matrix, Vector, cholesky_solve};
 use super::spec::Kind;
 use crate::noise::{Ar1, Drift, GaussMarkov, Ma1, Quantization, RandomWalk, White};
 use crate::wavelet::{Curve, interval};
+use nalgebra::DMatrix;
+use std::sync::Arc;
 
 /// Omega: what a scale counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,13 +19,15 @@ pub enum Weighting {
     Interval,
     /// 1 for every scale.
     None,
+    /// The inverse of the covariance of nu_hat over all scales.
+    Full,
 }
 
 impl Weighting {
     /// √Omega_j of each scale (1/units²).
     pub(super) fn roots(self, curve: &Curve) -> Vec<f64> {
         let root = |(nu, edof): (&f64, &f64)| match self {
-            Self::Edof => (0.5 * edof).sqrt() / nu,
+            Self::Edof | Self::Full => (0.5 * edof).sqrt() / nu,
             Self::Interval => {
                 let (low, high) = interval::interval(*nu, *edof, 0.95);
                 1.0 / (high - low)
@@ -87,6 +91,8 @@ pub(super) struct Column {
 pub(super) struct Objective {
     levels: Vec<u32>,
     roots: Vec<f64>,
+    /// What mixes the scales so that their errors are uncorrelated, once they are relative to the curve.
+    mixing: Option<Arc<DMatrix<f64>>>,
     pub(super) target: Vec<f64>,
     pub(super) length: f64,
     pub(super) components: Vec<Component>,
@@ -118,12 +124,22 @@ impl Solution {
 }
 
 impl Objective {
-    pub(super) fn new(curve: &Curve, weighting: Weighting, components: Vec<Component>) -> Self {
-        let roots = weighting.roots(curve);
+    /// With a mixing matrix it is applied to nu_j(theta)/nu_j, and the weighting does not matter.
+    pub(super) fn new(
+        curve: &Curve,
+        weighting: Weighting,
+        mixing: Option<Arc<DMatrix<f64>>>,
+        components: Vec<Component>,
+    ) -> Self {
+        let roots = match mixing {
+            Some(_) => curve.wv.iter().map(|nu| 1.0 / nu).collect(),
+            None => weighting.roots(curve),
+        };
         let target: Vec<f64> = roots.iter().zip(&curve.wv).map(|(w, nu)| w * nu).collect();
+        let target = mixed(mixing.as_deref(), target);
         let length = dot(&target, &target).sqrt();
         let target = target.iter().map(|b| b / length).collect();
-        Self { levels: curve.levels.clone(), roots, target, length, components }
+        Self { levels: curve.levels.clone(), roots, mixing, target, length, components }
     }
 
     /// The components that have a coordinate.
@@ -137,8 +153,10 @@ impl Objective {
             let (value, slope) = component.shape(u, *level);
             (value * root, slope * root)
         };
-        let (mut values, mut slopes): (Vec<f64>, Vec<f64>) =
+        let (values, slopes): (Vec<f64>, Vec<f64>) =
             self.levels.iter().zip(&self.roots).map(weighted).unzip();
+        let mut values = mixed(self.mixing.as_deref(), values);
+        let mut slopes = mixed(self.mixing.as_deref(), slopes);
         let length = dot(&values, &values).sqrt();
         values.iter_mut().chain(&mut slopes).for_each(|v| *v /= length);
         Column { values, slopes, length }
@@ -223,6 +241,21 @@ fn tangent(columns: &[Column], active: &[usize], gram: &Matrix, i: usize, amplit
         }
     }
     tangent
+}
+
+fn mixed(mixing: Option<&DMatrix<f64>>, values: Vec<f64>) -> Vec<f64> {
+    let Some(mixing) = mixing else { return values };
+    (0..values.len()).map(|i| (0..values.len()).map(|j| mixing[(i, j)] * values[j]).sum()).collect()
+}
+
+/// What makes errors of this covariance uncorrelated and of unit variance: the inverse of its Cholesky factor; where
+/// rounding leaves no positive definite matrix, of its diagonal alone.
+pub(super) fn whitening(covariance: &DMatrix<f64>) -> DMatrix<f64> {
+    let inverse = covariance.clone().cholesky().and_then(|c| c.l().try_inverse());
+    inverse.unwrap_or_else(|| {
+        let root = |i: usize| 1.0 / covariance[(i, i)].max(f64::MIN_POSITIVE).sqrt();
+        DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |i, j| if i == j { root(i) } else { 0.0 })
+    })
 }
 
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {

@@ -20,6 +20,8 @@ pub enum Termination {
     Converged,
     /// The limit of iterations was reached first.
     IterationLimit,
+    /// Nothing was minimised: lines were read off.
+    Regression,
 }
 
 impl Termination {
@@ -30,6 +32,7 @@ impl Termination {
             Self::Linear => "linear",
             Self::Converged => "converged",
             Self::IterationLimit => "iteration_limit",
+            Self::Regression => "regression",
         }
     }
 }

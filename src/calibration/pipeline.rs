@@ -1,12 +1,16 @@
 //! The whole of a calibration: groups of replicates × estimators → fits.
 
+use super::auto::{Ranking, choose};
 use super::average::{AverageError, Estimator, Trim, average};
-use super::fit::{Fit, FitError, fit};
-use super::inference::Inference;
+use super::avlr::avlr;
+use super::fit::{Fit, FitError, fit, fit_with_covariance, refit};
+use super::inference::{Inference, World};
+use super::limits::LimitError;
 use super::notes::notes;
 use super::objective::Weighting;
 use super::replicates::Group;
 use super::spec::ModelSpec;
+use crate::imu::{Axis, Sensor};
 use crate::wavelet::{Curve, Tuning};
 use rayon::prelude::*;
 
@@ -16,7 +20,9 @@ pub struct Settings {
     /// Which curves to fit.
     pub estimators: Vec<Estimator>,
     /// What the model is made of.
-    pub spec: ModelSpec,
+    pub model: ModelChoice,
+    /// Where its parameters may be, the more special after the more general.
+    pub limits: Vec<ParameterLimit>,
     /// What DR-AWV drops.
     pub trim: Trim,
     /// The tuning the robust wavelet variances were made with.
@@ -27,6 +33,56 @@ pub struct Settings {
     pub rate_hz: f64,
 }
 
+/// Who says what the model is made of.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ModelChoice {
+    /// The user.
+    Given(ModelSpec),
+    /// The curves.
+    Auto,
+}
+
+impl std::fmt::Display for ModelChoice {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Given(spec) => spec.fmt(f),
+            Self::Auto => f.write_str("auto"),
+        }
+    }
+}
+
+/// Where one parameter may be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParameterLimit {
+    /// The sensor, or both.
+    pub sensor: Option<Sensor>,
+    /// The axis, or all.
+    pub axis: Option<Axis>,
+    /// Label of the process.
+    pub process: String,
+    /// Name of the parameter.
+    pub parameter: String,
+    /// Lower bound (units of the parameter).
+    pub low: Option<f64>,
+    /// Upper bound (units of the parameter).
+    pub high: Option<f64>,
+}
+
+impl Settings {
+    /// The model of a group, with its limits.
+    fn limited(&self, spec: &ModelSpec, group: &Group) -> Result<ModelSpec, LimitError> {
+        let mut spec = spec.clone();
+        for l in &self.limits {
+            let meant = l.sensor.is_none_or(|s| s == group.sensor)
+                && l.axis.is_none_or(|axis| group.axis == Some(axis));
+            if meant {
+                spec.limit(&l.process, &l.parameter, l.low, l.high)?;
+            }
+        }
+        Ok(spec)
+    }
+}
+
 /// One fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
@@ -34,6 +90,10 @@ pub struct Outcome {
     pub group: usize,
     /// The estimator.
     pub estimator: Estimator,
+    /// What the model is made of.
+    pub spec: ModelSpec,
+    /// How that was chosen, if it was.
+    pub ranking: Option<Ranking>,
     /// The curve that was fitted.
     pub curve: Curve,
     /// The model.
@@ -71,6 +131,9 @@ pub enum Cause {
     /// No fit.
     #[error(transparent)]
     Fit(#[from] FitError),
+    /// Limits that mean nothing.
+    #[error(transparent)]
+    Limit(#[from] LimitError),
 }
 
 /// Fits every group with every estimator, in that order.
@@ -101,8 +164,68 @@ pub fn fit_curve(
     settings: &Settings,
 ) -> Result<Outcome, CalibrationError> {
     let group = &groups[index];
-    let fit = fit(&curve, &settings.spec, settings.rate_hz, settings.weighting)
-        .map_err(|source| CalibrationError::new(group, estimator, source))?;
-    let notes = notes(&fit, &curve, estimator, &group.replicates, settings.rate_hz);
-    Ok(Outcome { group: index, estimator, curve, fit, notes, inference: None })
+    let error = |source: Cause| CalibrationError::new(group, estimator, source);
+    let (spec, ranking) = match &settings.model {
+        ModelChoice::Given(spec) => (settings.limited(spec, group).map_err(|e| error(e.into()))?, None),
+        ModelChoice::Auto => {
+            let (spec, ranking) =
+                choose(group, index, estimator, &curve, settings).map_err(|e| error(e.into()))?;
+            (spec, Some(ranking))
+        }
+    };
+    let fit = estimate(estimator, &curve, &spec, settings.rate_hz, settings.weighting)
+        .map_err(|e| error(e.into()))?;
+    let mut outcome = Outcome { ranking, ..Outcome::bare(index, estimator, curve, spec, fit) };
+    if settings.weighting == Weighting::Full && estimator != Estimator::Avlr {
+        weigh_fully(group, &mut outcome, settings).map_err(|e| error(e.into()))?;
+    }
+    outcome.notes = notes(&outcome, &group.replicates, settings.rate_hz);
+    Ok(outcome)
+}
+
+impl Outcome {
+    /// A fit and nothing about it.
+    pub(super) fn bare(group: usize, estimator: Estimator, curve: Curve, spec: ModelSpec, fit: Fit) -> Self {
+        Self { group, estimator, spec, ranking: None, curve, fit, notes: Vec::new(), inference: None }
+    }
+}
+
+/// Draws behind the covariance of a curve.
+const DRAWS: usize = 2000;
+
+/// The fit again, weighted by the covariance of curves drawn from it: the scatter within recordings and the
+/// differences between them.
+fn weigh_fully(group: &Group, outcome: &mut Outcome, settings: &Settings) -> Result<(), FitError> {
+    if group.replicates.is_empty() {
+        return Ok(());
+    }
+    let world = World::new(&group.replicates, outcome, settings).gaussian();
+    let covariance = world.covariance(DRAWS, &group.name(), settings);
+    outcome.fit = fit_with_covariance(&outcome.curve, &outcome.spec, settings.rate_hz, &covariance)?;
+    Ok(())
+}
+
+/// The model an estimator makes of a curve.
+///
+/// # Errors
+/// As [`fit`]; for [`Estimator::Avlr`] when a process has no slope of its own.
+pub fn estimate(
+    estimator: Estimator,
+    curve: &Curve,
+    spec: &ModelSpec,
+    rate_hz: f64,
+    weighting: Weighting,
+) -> Result<Fit, FitError> {
+    match estimator {
+        Estimator::Avlr => avlr(curve, spec),
+        _ => fit(curve, spec, rate_hz, weighting),
+    }
+}
+
+/// The same for a curve that resembles that of an outcome.
+pub(super) fn estimate_again(curve: &Curve, outcome: &Outcome, settings: &Settings) -> Result<Fit, FitError> {
+    match outcome.estimator {
+        Estimator::Avlr => avlr(curve, &outcome.spec),
+        _ => refit(curve, &outcome.spec, settings.rate_hz, settings.weighting, &outcome.fit),
+    }
 }

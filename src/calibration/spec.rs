@@ -1,5 +1,6 @@
 //! What a model is made of: "2*AR1+RW+WN+QN".
 
+use super::limits::Limits;
 use crate::noise::{Ar1, Drift, GaussMarkov, Ma1, Quantization, RandomWalk, White};
 use std::fmt;
 use std::str::FromStr;
@@ -73,10 +74,11 @@ impl Kind {
 /// Processes with a shape parameter that one model may have: the search is over all their combinations.
 const MOST_SHAPES: usize = 5;
 
-/// The kinds of process of a model, in the order of [`Kind::ALL`].
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+/// The kinds of process of a model, in the order of [`Kind::ALL`], and where their parameters may be.
+#[derive(Debug, Clone, PartialEq)]
 pub struct ModelSpec {
     kinds: Vec<Kind>,
+    limits: Vec<Limits>,
 }
 
 /// Why a specification means no model.
@@ -125,13 +127,53 @@ impl ModelSpec {
     /// N1 = WN + AR1 + RW of the paper.
     #[must_use]
     pub fn n1() -> Self {
-        Self { kinds: vec![Kind::White, Kind::Ar1, Kind::RandomWalk] }
+        Self::of([Kind::White, Kind::Ar1, Kind::RandomWalk])
     }
 
     /// N2 = WN + QN + 2 AR1 + RW of the paper: the usual model.
     #[must_use]
     pub fn n2() -> Self {
-        Self { kinds: vec![Kind::White, Kind::Quantization, Kind::Ar1, Kind::Ar1, Kind::RandomWalk] }
+        Self::of([Kind::White, Kind::Quantization, Kind::Ar1, Kind::Ar1, Kind::RandomWalk])
+    }
+
+    /// A sum of processes that can be told apart.
+    pub(super) fn of(kinds: impl IntoIterator<Item = Kind>) -> Self {
+        let mut kinds: Vec<Kind> = kinds.into_iter().collect();
+        kinds.sort_unstable();
+        let limits = vec![Limits::NONE; kinds.len()];
+        Self { kinds, limits }
+    }
+
+    /// Labels of the processes, as those of a fitted model: `WN`, `AR1_1`, `AR1_2`, …
+    #[must_use]
+    pub fn labels(&self) -> Vec<String> {
+        let count = |kinds: &[Kind], kind: Kind| kinds.iter().filter(|k| **k == kind).count();
+        let label = |(i, kind): (usize, &Kind)| match count(&self.kinds, *kind) {
+            1 => kind.code().to_owned(),
+            _ => format!("{}_{}", kind.code(), count(&self.kinds[..=i], *kind)),
+        };
+        self.kinds.iter().enumerate().map(label).collect()
+    }
+
+    /// Names of the parameters of the process of that label; none of one that is not there.
+    #[must_use]
+    pub fn parameter_names(&self, label: &str) -> Vec<&'static str> {
+        let kind = self.labels().iter().position(|l| l == label).map(|i| self.kinds[i]);
+        kind.map_or(Vec::new(), |k| k.shape_name().into_iter().chain([k.amplitude_name()]).collect())
+    }
+
+    pub(super) fn limits(&self) -> &[Limits] {
+        &self.limits
+    }
+
+    pub(super) fn limits_mut(&mut self) -> &mut [Limits] {
+        &mut self.limits
+    }
+
+    /// Whether all its processes are in another model.
+    pub(super) fn is_part_of(&self, other: &Self) -> bool {
+        let count = |spec: &Self, kind: Kind| spec.kinds.iter().filter(|k| **k == kind).count();
+        Kind::ALL.iter().all(|kind| count(self, *kind) <= count(other, *kind))
     }
 
     /// The kinds of process.
@@ -140,10 +182,14 @@ impl ModelSpec {
         &self.kinds
     }
 
-    /// Number of parameters.
+    /// Number of parameters that are not fixed.
     #[must_use]
     pub fn parameters(&self) -> usize {
-        self.kinds.iter().map(|k| k.parameters()).sum()
+        let fixed = |(low, high): (f64, f64)| usize::from(low >= high);
+        let free = |(kind, limits): (&Kind, &Limits)| {
+            kind.parameters() - fixed(limits.amplitude) - limits.shape.map_or(0, fixed)
+        };
+        self.kinds.iter().zip(&self.limits).map(free).sum()
     }
 
     /// What may stand between plus signs.
@@ -168,7 +214,7 @@ impl FromStr for ModelSpec {
         }
         kinds.sort_unstable();
         check(spec, &kinds)?;
-        Ok(Self { kinds })
+        Ok(Self::of(kinds))
     }
 }
 

@@ -57,15 +57,16 @@ impl Spread {
         Self { within, between, edof, units }
     }
 
-    /// Draws the differences of ln nu of as many new replicates as there are, `[replicate][level]`, with the
-    /// heavier tails that the few replicates they are known from call for.
-    pub(super) fn draw_between(&self, generator: &mut Generator) -> Vec<Vec<f64>> {
+    /// Draws the differences of ln nu of as many new replicates as there are, `[replicate][level]`; on demand with
+    /// the heavier tails that the few replicates they are known from call for (which have no variance for three
+    /// replicates or fewer).
+    pub(super) fn draw_between(&self, heavy_tails: bool, generator: &mut Generator) -> Vec<Vec<f64>> {
         let count = self.units.len();
         let levels = self.between.len();
         let freedom = (count as f64 - 1.0).max(1.0);
         // The degrees of freedom are at least 1.
         let chi2 = ChiSquared::new(freedom).map_or(freedom, |law| generator.sample(law));
-        let tail = (freedom / chi2.max(1e-3)).sqrt();
+        let tail = if heavy_tails { (freedom / chi2.max(1e-3)).sqrt() } else { 1.0 };
         let mut draw = |_| {
             let mut difference = vec![0.0; levels];
             for unit in &self.units {

@@ -4,16 +4,17 @@ use super::recordings::{RecordingArgs, sensor};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, parse, read};
 use nav_sim::calibration::{
-    AverageError, Bootstrap, CalibrationError, Cause, Estimator, FitError, Group, ModelSpec, Outcome, Pool,
-    Replicate, Settings, SpecError, Trim, Weighting, calibrate, diagnose, fit_curve, grouped, infer,
-    replicates,
+    AverageError, Bootstrap, CalibrationError, Cause, Estimator, FitError, Group, ModelChoice, ModelSpec,
+    Outcome, ParameterLimit, Pool, Replicate, Settings, SpecError, Trim, WarmUp, Weighting, calibrate,
+    diagnose, fit_curve, grouped, infer, replicates, warm_up,
 };
-use nav_sim::data::atomic;
 use nav_sim::data::curve_file::{self, NamedCurve};
 use nav_sim::data::model_file::{self, CalibrationNote};
 use nav_sim::data::suggest::nearest;
-use nav_sim::imu::{Channel, Recording, Sensor};
+use nav_sim::data::{atomic, parameters_file};
+use nav_sim::imu::{Channel, Recording, Sensor, Signal};
 use nav_sim::report::{self, CurvesFile, FitsFile, Input};
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 /// Replicate static recordings -> noise model
@@ -39,19 +40,23 @@ pub(crate) struct Args {
     #[arg(long, value_name = "SENSOR", value_parser = sensor, requires = "curve")]
     sensor: Option<Sensor>,
     /// Which curve is fitted: averages over the replicates (awv; sr-awv robust to outliers; dr-awv robust to
-    /// abnormal replicates too), or that of a single recording (gmwm, rgmwm)
+    /// abnormal replicates too), or that of a single recording (gmwm, rgmwm; avlr: slopes of its Allan deviation)
     #[arg(long, value_enum, default_value_t = EstimatorArg::DrAwv)]
     estimator: EstimatorArg,
-    /// Sum of WN QN AR1 GM MA1 RW DR such as 2*AR1+RW+WN+QN, or N1 = AR1+RW+WN, N2 = 2*AR1+RW+WN+QN
+    /// Sum of WN QN AR1 GM MA1 RW DR such as 2*AR1+RW+WN+QN, N1 = AR1+RW+WN, N2 = 2*AR1+RW+WN+QN, or auto: the
+    /// simplest sum of WN QN RW DR and up to two AR1 that does as well as the best, with its reasons
     #[arg(long, value_name = "SUM", default_value = "N2")]
     model: String,
+    /// What is known of the parameters: a TOML file that fixes or bounds them (nav-sim schema parameters)
+    #[arg(long, value_name = "FILE")]
+    parameters: Option<PathBuf>,
     /// Replicates that dr-awv drops at each end of each scale: a number, or a percentage of all
     #[arg(long, value_name = "A", default_value = "30%", value_parser = trim)]
     trim: Trim,
     /// What a scale counts in the fit
     #[arg(long, value_enum, default_value_t = WeightingArg::Edof)]
     weighting: WeightingArg,
-    /// Which signals are replicates of one another (default: sensor; axes for gmwm and rgmwm)
+    /// Which signals are replicates of one another (default: sensor; axes for gmwm, rgmwm and avlr)
     #[arg(long, value_enum)]
     pool: Option<PoolArg>,
     /// Draws of the parametric bootstrap behind intervals and goodness of fit (0: neither)
@@ -78,6 +83,8 @@ enum EstimatorArg {
     Gmwm,
     /// Robust wavelet variance of one recording
     Rgmwm,
+    /// Slopes of the Allan deviation of one recording, read off one by one: WN, QN, RW, DR
+    Avlr,
     /// The three averages (of one recording: gmwm and rgmwm)
     All,
 }
@@ -90,6 +97,8 @@ enum WeightingArg {
     Ci,
     /// 1
     None,
+    /// The inverse of the covariance between scales, by bootstrap
+    Full,
 }
 
 #[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,19 +123,85 @@ fn trim(text: &str) -> Result<Trim, String> {
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut settings = Settings {
         estimators: Vec::new(),
-        spec: args.model.parse().map_err(unknown_model)?,
+        model: model(args)?,
+        limits: Vec::new(),
         trim: args.trim,
         tuning: args.tuning.tuning()?,
         weighting: match args.weighting {
             WeightingArg::Edof => Weighting::Edof,
             WeightingArg::Ci => Weighting::Interval,
             WeightingArg::None => Weighting::None,
+            WeightingArg::Full => Weighting::Full,
         },
         rate_hz: 1.0,
     };
+    settings.limits = limits(args, &settings.model)?;
     match &args.curve {
         Some(path) => of_curves(args, path, &mut settings, session),
         None => of_recordings(args, &mut settings, session),
+    }
+}
+
+fn model(args: &Args) -> Result<ModelChoice, Failure> {
+    let chosen = if args.model.eq_ignore_ascii_case("auto") {
+        ModelChoice::Auto
+    } else {
+        ModelChoice::Given(args.model.parse().map_err(unknown_model)?)
+    };
+    if args.estimator != EstimatorArg::Avlr {
+        return Ok(chosen);
+    }
+    let without = match &chosen {
+        ModelChoice::Given(spec) => spec.kinds().iter().find(|k| k.has_shape()).map(|k| k.code()),
+        ModelChoice::Auto => Some("the AR1 of auto"),
+    };
+    match without {
+        None => Ok(chosen),
+        Some(name) => {
+            let message = format!("--estimator avlr: {name} has no slope of its own in the Allan deviation");
+            Err(Failure::input(message)
+                .hint("--model WN+QN+RW, a sum of WN, QN, RW and DR; or --estimator gmwm"))
+        }
+    }
+}
+
+fn limits(args: &Args, model: &ModelChoice) -> Result<Vec<ParameterLimit>, Failure> {
+    let Some(path) = &args.parameters else { return Ok(Vec::new()) };
+    let conflict = |message: &str, hint: &str| Err(Failure::input(message).hint(hint));
+    match model {
+        ModelChoice::Auto => {
+            conflict("--parameters with --model auto: whose parameters?", "name the --model, such as N2")
+        }
+        ModelChoice::Given(_) if args.estimator == EstimatorArg::Avlr => {
+            conflict("--parameters: avlr reads slopes, it cannot be bounded", "--estimator gmwm")
+        }
+        ModelChoice::Given(spec) => {
+            let limits = parameters_file::read(path, spec)?;
+            let of_axis = limits.iter().find(|l| l.axis.is_some());
+            match of_axis {
+                Some(l) if args.pool != Some(PoolArg::Axes) && !args.estimator.is_single() => {
+                    let axis = l.axis.map_or("x", |a| a.name());
+                    let message =
+                        format!("{}: the axis {axis} is named, but the axes are pooled", path.display());
+                    conflict(&message, "--pool axes")
+                }
+                _ => Ok(limits),
+            }
+        }
+    }
+}
+
+impl EstimatorArg {
+    const fn is_single(self) -> bool {
+        matches!(self, Self::Gmwm | Self::Rgmwm | Self::Avlr)
+    }
+}
+
+/// Parameters to be found, at least.
+fn free_parameters(model: &ModelChoice) -> usize {
+    match model {
+        ModelChoice::Given(spec) => spec.parameters(),
+        ModelChoice::Auto => 2,
     }
 }
 
@@ -134,7 +209,9 @@ fn unknown_model(e: SpecError) -> Failure {
     let hint = match &e {
         SpecError::Unknown { term, .. } => match nearest(term, ModelSpec::legal()) {
             Some(meant) => format!("did you mean \"{meant}\"?"),
-            None => format!("processes and models: {}", ModelSpec::legal().collect::<Vec<_>>().join(", ")),
+            None => {
+                format!("processes and models: {}, auto", ModelSpec::legal().collect::<Vec<_>>().join(", "))
+            }
         },
         _ => "a model is a sum such as 2*AR1+RW+WN+QN".into(),
     };
@@ -143,8 +220,9 @@ fn unknown_model(e: SpecError) -> Failure {
 
 fn of_recordings(args: &Args, settings: &mut Settings, session: &Session) -> Result<(), Failure> {
     // As many scales as parameters, and one that the default leaves out.
-    let needed = args.tuning.scales.map_or(2 << settings.spec.parameters(), |j| 1 << j);
+    let needed = args.tuning.scales.map_or(2 << free_parameters(&settings.model), |j| 1 << j);
     let (recordings, report) = args.recordings.read(&args.inputs, needed, session)?;
+    warm_ups(&recordings, session);
     settings.rate_hz = recordings[0].rate_hz;
     settings.estimators = estimators(args.estimator, recordings.len())?;
     let files: Vec<PathBuf> = report.files.iter().map(|f| PathBuf::from(&f.file)).collect();
@@ -163,6 +241,25 @@ fn of_recordings(args: &Args, settings: &mut Settings, session: &Session) -> Res
     let inputs = files.iter().map(|f| read::input("recording", f)).collect::<Result<_, _>>()?;
     let note = note(args, inputs);
     finish(&outputs, &groups, &outcomes, settings, &note, session)
+}
+
+/// Says which recordings do not begin as they go on, and what to leave out.
+fn warm_ups(recordings: &[Recording], session: &Session) {
+    for recording in recordings {
+        let of_signal = |s: &Signal| warm_up(&s.samples).map(|w| (s.channel, w));
+        let found: Vec<(Channel, WarmUp)> = recording.signals.par_iter().filter_map(of_signal).collect();
+        let Some((_, longest)) = found.iter().max_by_key(|(_, w)| w.samples) else { continue };
+        let one = |(channel, w): &(Channel, WarmUp)| {
+            let what = if w.mean { "its mean moves" } else { "its noise is another" };
+            format!("{channel} ({what}, {:+.0} deviations)", w.deviations)
+        };
+        session.printer.warn(&format!(
+            "{}: not stationary at its beginning: {}; warm-up? --skip-s {} leaves that out",
+            recording.name,
+            found.iter().map(one).collect::<Vec<_>>().join(", "),
+            (longest.samples as f64 / recording.rate_hz).ceil()
+        ));
+    }
 }
 
 /// One estimator's files.
@@ -194,6 +291,7 @@ fn estimators(arg: EstimatorArg, recordings: usize) -> Result<Vec<Estimator>, Fa
         EstimatorArg::DrAwv => vec![Estimator::DrAwv],
         EstimatorArg::Gmwm => vec![Estimator::Gmwm],
         EstimatorArg::Rgmwm => vec![Estimator::Rgmwm],
+        EstimatorArg::Avlr => vec![Estimator::Avlr],
         EstimatorArg::All if recordings == 1 => vec![Estimator::Gmwm, Estimator::Rgmwm],
         EstimatorArg::All => vec![Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv],
     };
@@ -212,7 +310,8 @@ fn pool(args: &Args, settings: &Settings) -> Result<Pool, Failure> {
     match args.pool {
         Some(PoolArg::Axes) => Ok(Pool::Axes),
         Some(PoolArg::Sensor) if single => {
-            Err(Failure::input("--pool sensor: gmwm and rgmwm take one signal at a time").hint("--pool axes"))
+            Err(Failure::input("--pool sensor: gmwm, rgmwm and avlr take one signal at a time")
+                .hint("--pool axes"))
         }
         Some(PoolArg::Sensor) => Ok(Pool::Sensor),
         None if single => Ok(Pool::Axes),
@@ -248,6 +347,7 @@ fn of_calibration(e: &CalibrationError) -> Failure {
         Cause::Fit(FitError::TooFewScales { .. }) => {
             Some("record for longer, or a --model with fewer processes")
         }
+        Cause::Fit(FitError::NoSlope { .. }) => Some("--model WN+QN+RW, a sum of WN, QN, RW and DR"),
         Cause::Fit(FitError::NotPositive { .. }) => Some(
             "the signal is quantised so coarsely that scales are silent: --estimator awv, or another range",
         ),
@@ -261,7 +361,13 @@ fn of_curves(args: &Args, path: &Path, settings: &mut Settings, session: &Sessio
         let failure = if e.is_content() { Failure::input(&e) } else { Failure::could_not(&e) };
         failure.maybe_hint(e.hint())
     })?;
-    settings.rate_hz = curves[0].rate_hz.or(args.recordings.rate_hz()).unwrap_or(1.0);
+    let Some(rate_hz) = curves[0].rate_hz.or(args.recordings.rate_hz()) else {
+        let failure = Failure::input(format!("{}: the curve does not say its sample rate", path.display()));
+        return Err(
+            failure.hint("give the rate with --rate-hz: correlation times and the model file need it")
+        );
+    };
+    settings.rate_hz = rate_hz;
     let estimator = |named: &NamedCurve| {
         let named_so = |e: &Estimator| named.estimator.as_deref() == Some(e.name());
         Estimator::ALL.into_iter().find(named_so).unwrap_or(Estimator::Given)
@@ -315,6 +421,7 @@ fn note(args: &Args, inputs: Vec<Input>) -> CalibrationNote {
             WeightingArg::Edof => "edof",
             WeightingArg::Ci => "ci",
             WeightingArg::None => "none",
+            WeightingArg::Full => "full",
         }
         .to_owned(),
         inputs,

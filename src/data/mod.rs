@@ -9,6 +9,7 @@ pub mod fusion_files;
 pub mod hash;
 pub mod model_file;
 pub mod npy;
+pub mod parameters_file;
 pub mod recordings;
 pub mod run_directory;
 pub mod scenario_file;

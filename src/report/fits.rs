@@ -3,8 +3,8 @@
 use super::curves::tau_s;
 use super::replicates::ReplicateEntry;
 use crate::calibration::{
-    Diagnosis, Estimator, Goodness, Group, Inference, Outcome, ParameterInterval, Settings, Share,
-    correlation_time_s, percent, shares,
+    Candidate, Diagnosis, Estimator, Goodness, Group, Inference, Outcome, ParameterInterval, Ranking,
+    Settings, Share, correlation_time_s, percent, shares,
 };
 use crate::imu::Sensor;
 use crate::noise::{Composite, Process};
@@ -38,6 +38,12 @@ pub struct FitEntry {
     pub axis: &'static str,
     /// Estimator.
     pub estimator: &'static str,
+    /// What the model is made of.
+    pub model: String,
+    /// The models it was chosen from, best first; empty where it was given.
+    pub ranking: Vec<CandidateEntry>,
+    /// Why it was chosen, in words.
+    pub reasons: Vec<String>,
     /// Replicates averaged.
     pub replicates: usize,
     /// Scales used.
@@ -68,6 +74,65 @@ pub struct FitEntry {
     pub at_end: Vec<String>,
     /// Remarks, in words.
     pub notes: Vec<String>,
+}
+
+/// A model that was tried.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CandidateEntry {
+    /// The model.
+    pub model: String,
+    /// Its parameters.
+    pub parameters: usize,
+    /// Σ Omega_j (nu_j − nu_j(theta))².
+    pub objective: f64,
+    /// What is to be added for following the noise of its own curve.
+    pub optimism: f64,
+    /// The sum of the two.
+    pub wvic: f64,
+    /// Probability of so large a distance from the best if this one is true, where it was asked for.
+    pub p_value: Option<f64>,
+    /// Whether it was chosen.
+    pub chosen: bool,
+}
+
+impl CandidateEntry {
+    fn all(ranking: &Ranking) -> Vec<Self> {
+        let entry = |(i, c): (usize, &Candidate)| Self {
+            model: c.spec.to_string(),
+            parameters: c.spec.parameters(),
+            objective: c.objective,
+            optimism: c.optimism,
+            wvic: c.wvic(),
+            p_value: c.p_value,
+            chosen: i == ranking.chosen,
+        };
+        ranking.candidates.iter().enumerate().map(entry).collect()
+    }
+}
+
+/// Candidates that are shown.
+const SHOWN: usize = 8;
+
+/// The ranking as lines.
+fn ranking_lines(ranking: &Ranking) -> Vec<String> {
+    let line = |c: CandidateEntry| {
+        let p = c.p_value.map_or(String::new(), |p| format!("  p = {p:.3}"));
+        let mark = if c.chosen { "*" } else { " " };
+        format!(
+            "  {mark} {:<18} WVIC {:>10.4} = {:.4} + {:.4}, {} parameters{p}",
+            c.model, c.wvic, c.objective, c.optimism, c.parameters
+        )
+    };
+    let all = CandidateEntry::all(ranking);
+    let left = all.len().saturating_sub(SHOWN.max(ranking.chosen + 1));
+    let mut lines: Vec<String> = all.into_iter().take(SHOWN.max(ranking.chosen + 1)).map(line).collect();
+    lines.push(format!(
+        "    {} more with a larger WVIC, {} not identifiable (a process is zero or at the end of its range)",
+        left + ranking.far,
+        ranking.not_identifiable
+    ));
+    lines.extend(ranking.reasons.iter().map(|r| format!("  chosen: {r}")));
+    lines
 }
 
 /// The J-test of a fit.
@@ -106,6 +171,9 @@ impl FitEntry {
             sensor: group.sensor.name(),
             axis: group.axis.map_or("all", |a| a.name()),
             estimator: outcome.estimator.name(),
+            model: outcome.spec.to_string(),
+            ranking: outcome.ranking.iter().flat_map(CandidateEntry::all).collect(),
+            reasons: outcome.ranking.as_ref().map_or(Vec::new(), |r| r.reasons.clone()),
             replicates: group.replicates.len(),
             scales: outcome.curve.levels.len(),
             processes: processes_json(outcome),
@@ -150,7 +218,7 @@ impl FitsFile {
         Self {
             schema_version: 1,
             rate_hz,
-            model: settings.spec.to_string(),
+            model: settings.model.to_string(),
             fits: outcomes.iter().map(|o| FitEntry::new(&groups[o.group], o, rate_hz)).collect(),
             replicates: diagnoses.iter().map(|d| ReplicateEntry::new(d, rate_hz)).collect(),
             files,
@@ -184,6 +252,7 @@ fn interval_of<'a>(outcome: &'a Outcome, label: &str, parameter: &str) -> Option
 #[must_use]
 pub fn describe(group: &Group, outcome: &Outcome, settings: &Settings) -> String {
     let mut lines = vec![head(group, outcome, settings)];
+    lines.extend(outcome.ranking.iter().flat_map(ranking_lines));
     lines.extend(process_lines(
         &outcome.fit.composite,
         group.sensor,
@@ -197,6 +266,12 @@ pub fn describe(group: &Group, outcome: &Outcome, settings: &Settings) -> String
 }
 
 fn inference_lines(inference: &Inference, rate_hz: f64) -> Vec<String> {
+    if inference.fitted < 2 {
+        return vec![format!(
+            "  {} of {} draws of the bootstrap had a fit: no intervals",
+            inference.fitted, inference.draws
+        )];
+    }
     let Goodness { statistic, dof, expected, p_value } = inference.goodness;
     let verdict =
         if p_value < 0.05 { "the model does not describe the curve" } else { "no evidence against" };
@@ -230,9 +305,13 @@ fn spread_line(inference: &Inference, rate_hz: f64) -> Option<String> {
 
 fn head(group: &Group, outcome: &Outcome, settings: &Settings) -> String {
     let count = group.replicates.len();
-    let signals = if count == 1 { "1 signal".to_owned() } else { format!("{count} signals") };
+    let signals = match count {
+        0 => "a curve".to_owned(),
+        1 => "1 signal".to_owned(),
+        _ => format!("{count} signals"),
+    };
     let trimmed = match settings.trim.count(count) {
-        a if outcome.estimator == Estimator::DrAwv => {
+        a if outcome.estimator == Estimator::DrAwv && count > 0 => {
             format!(", {a} dropped at each end of each scale")
         }
         _ => String::new(),
@@ -242,7 +321,7 @@ fn head(group: &Group, outcome: &Outcome, settings: &Settings) -> String {
         "{} · {} · {} · {signals}{trimmed}, {scales} scales",
         group.name(),
         outcome.estimator.name(),
-        settings.spec
+        outcome.spec
     )
 }
 
@@ -314,6 +393,7 @@ fn meaning(process: &Process, sensor: Sensor, rate_hz: f64) -> String {
 fn optimum(outcome: &Outcome) -> String {
     let fit = &outcome.fit;
     let search = match (fit.combinations, fit.starts) {
+        _ if outcome.estimator == Estimator::Avlr => "slopes read off, nothing minimised".to_owned(),
         (1, _) => "the only minimum".to_owned(),
         (n, 1) => format!("{n} combinations of shapes tried, one minimum"),
         (n, starts) => {

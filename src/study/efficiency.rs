@@ -1,7 +1,7 @@
 //! One set of replicates: drawn, contaminated in several ways, estimated from.
 
 use crate::calibration::{
-    AverageError, Estimator, FitError, ModelSpec, Replicate, Trim, Weighting, average, fit,
+    AverageError, Estimator, FitError, ModelSpec, Replicate, Trim, Weighting, average, estimate,
 };
 use crate::imu::Channel;
 use crate::noise::contamination::{Contamination, ContaminationError, Operation};
@@ -29,7 +29,7 @@ pub struct Design {
     pub levels: u32,
     /// What is done to the replicates, one scenario each.
     pub scenarios: Vec<Contamination>,
-    /// The estimators compared: averages over replicates.
+    /// The estimators compared: averages over replicates, and AVLR of the classical average.
     pub estimators: Vec<Estimator>,
     /// The model that is fitted.
     pub spec: ModelSpec,
@@ -192,8 +192,10 @@ impl Design {
     }
 
     fn estimate(&self, replicates: &[Replicate], estimator: Estimator) -> Result<Estimate, StudyError> {
-        let curve = average(replicates, estimator, self.trim, self.tuning.efficiency())?;
-        let fit = fit(&curve, &self.spec, self.model.rate_hz, self.weighting)?;
+        // The slopes of several replicates are those of their average.
+        let averaged = if estimator == Estimator::Avlr { Estimator::Awv } else { estimator };
+        let curve = average(replicates, averaged, self.trim, self.tuning.efficiency())?;
+        let fit = estimate(estimator, &curve, &self.spec, self.model.rate_hz, self.weighting)?;
         let robust = replicates.iter().flat_map(|r| &r.robust);
         let without_root = robust.filter(|v| v.status == Status::NoRoot).count();
         Ok(Estimate {

@@ -1,8 +1,7 @@
 //! What leaving a recording out does to each estimator: its curve, and every parameter.
 
 use super::super::average::{Estimator, Replicate, average};
-use super::super::fit::refit;
-use super::super::pipeline::{Outcome, Settings};
+use super::super::pipeline::{Outcome, Settings, estimate_again};
 use super::super::replicates::Group;
 use super::super::spread::variance_of_log;
 
@@ -48,8 +47,7 @@ pub(super) fn left_out(group: &Group, name: &str, outcome: &Outcome, settings: &
         (*level, ratio - 1.0, ratio.ln() / variance_of_log(*edof).sqrt())
     };
     let (level, change, deviations) = moves.map(one).max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))?;
-    let spec = &settings.spec;
-    let parameters = refit(&without, spec, settings.rate_hz, settings.weighting, &outcome.fit)
+    let parameters = estimate_again(&without, outcome, settings)
         .map_or(Vec::new(), |fit| movements(outcome, &fit.composite));
     Some(LeftOut { group: group.name(), estimator: outcome.estimator, level, change, deviations, parameters })
 }

@@ -1,7 +1,7 @@
 //! Alarms in simulated sets: as rare as said where recordings are alike, there where one is not.
 
 use super::*;
-use crate::calibration::{ModelSpec, Pool, Trim, Weighting, calibrate, grouped};
+use crate::calibration::{ModelChoice, Pool, Trim, Weighting, calibrate, grouped};
 use crate::imu::Channel;
 use crate::rng::{Generator, StreamKey};
 use crate::wavelet::{Convention, Tuning, both};
@@ -11,7 +11,8 @@ use rand_distr::StandardNormal;
 fn settings() -> Settings {
     Settings {
         estimators: vec![Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv],
-        spec: "WN+RW".parse::<ModelSpec>().unwrap(),
+        model: ModelChoice::Given("WN+RW".parse().unwrap()),
+        limits: Vec::new(),
         trim: Trim::Count(1),
         tuning: Tuning::new(0.6, Convention::Exact).unwrap(),
         weighting: Weighting::Edof,

@@ -14,7 +14,7 @@ pub struct CalibrationNote {
     pub version: String,
     /// How the tuning constant follows from the efficiency: `exact` or `wv`.
     pub efficiency_convention: String,
-    /// What a scale counts: `edof`, `ci` or `none`.
+    /// What a scale counts: `edof`, `ci`, `none` or `full`.
     pub weighting: String,
     /// The recordings or the curve.
     pub inputs: Vec<Input>,
@@ -44,7 +44,7 @@ impl CalibrationNote {
         put("program", format!("nav-sim {}", self.version).into());
         put("schema", (SCHEMA as i64).into());
         put("estimator", estimator.name().into());
-        put("model", settings.spec.to_string().into());
+        put("model", settings.model.to_string().into());
         put("weighting", self.weighting.as_str().into());
         if estimator.is_robust() {
             put("efficiency", settings.tuning.efficiency().into());
@@ -74,6 +74,7 @@ fn fit(group: &Group, outcome: &Outcome, settings: &Settings) -> Table {
     let mut put = |key: &str, value: Value| table.insert(key.to_owned(), value);
     let count = |n: usize| Value::from(n as i64);
     put("signals", group.name().into());
+    put("model", outcome.spec.to_string().into());
     put("replicates", count(group.replicates.len()));
     if outcome.estimator == Estimator::DrAwv {
         put("trim", count(settings.trim.count(group.replicates.len())));

@@ -1,0 +1,290 @@
+//! Which model? Ranks sums of processes by the wavelet information criterion, and takes the simplest that is as
+//! good as the best.
+//!
+//! WVIC = Σ Omega_j (nu_j − nu_j(theta))² + 2 Σ Omega_j cov(nu_j, nu_j(theta)): what the distance to the curve of
+//! another recording of the same noise would be on average, the covariance (the optimism: how far the model
+//! follows the noise of its own curve) from a parametric bootstrap
+//! ([Guerrier](crate::bibliography::Guerrier13); Efron's covariance penalty). Draws are from the candidate
+//! that fits best, the same for all.
+//!
+//! A criterion of this kind keeps a superfluous process now and then however long the record. So the simplest
+//! candidate nested in the best is taken whose distance is not larger than that of the best beyond chance: by a bootstrap from
+//! it, at 5 %.
+
+use super::average::Estimator;
+use super::fit::{Fit, FitError, fit, refit};
+use super::inference::World;
+use super::objective::Weighting;
+use super::pipeline::{Outcome, Settings};
+use super::replicates::Group;
+use super::spec::{Kind, ModelSpec};
+use crate::rng::StreamKey;
+use crate::wavelet::Curve;
+use rayon::prelude::*;
+
+/// Draws behind an optimism, and behind a test.
+const DRAWS: usize = 79;
+/// Draws after which a simpler model that is twice as far off as any of them is given up.
+const FIRST: usize = 19;
+/// A simpler model is given up when chance makes so large a difference with less than this probability.
+const LEVEL: f64 = 0.05;
+/// Seed of the draws: a choice is an answer, the same each time.
+const SEED: u64 = 1;
+
+/// A model that was tried.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Candidate {
+    /// The model.
+    pub spec: ModelSpec,
+    /// Σ Omega_j (nu_j − nu_j(theta))².
+    pub objective: f64,
+    /// 2 Σ Omega_j cov(nu_j, nu_j(theta)).
+    pub optimism: f64,
+    /// For a simpler one than the best that was tested against it: the probability of so large a difference of
+    /// their objectives if it is true.
+    pub p_value: Option<f64>,
+}
+
+impl Candidate {
+    /// The criterion.
+    #[must_use]
+    pub fn wvic(&self) -> f64 {
+        self.objective + self.optimism
+    }
+}
+
+/// The candidates and the choice.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ranking {
+    /// The candidates all of whose processes can be identified, by WVIC; those whose distance alone exceeds the
+    /// WVIC of the nearest are left out.
+    pub candidates: Vec<Candidate>,
+    /// Which was chosen.
+    pub chosen: usize,
+    /// How many were left out because a process of theirs is zero or at the end of its range: the same without it
+    /// is among the others.
+    pub not_identifiable: usize,
+    /// How many were left out because their distance alone is too large.
+    pub far: usize,
+    /// Why, in words.
+    pub reasons: Vec<String>,
+}
+
+/// All sums of WN, QN, RW, DR and up to two AR1 that so many scales can carry.
+fn sums(scales: usize) -> Vec<ModelSpec> {
+    let single = [Kind::White, Kind::Quantization, Kind::RandomWalk, Kind::Drift];
+    let mut all = Vec::new();
+    for bits in 0..1_u32 << single.len() {
+        for correlated in 0..=2 {
+            let chosen = single.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, k)| *k);
+            let spec = ModelSpec::of(chosen.chain(std::iter::repeat_n(Kind::Ar1, correlated)));
+            if (1..scales).contains(&spec.parameters()) {
+                all.push(spec);
+            }
+        }
+    }
+    all.sort_by_key(ModelSpec::parameters);
+    all
+}
+
+/// Fits every candidate and chooses.
+///
+/// # Errors
+/// When the curve is too short for any, or no curve.
+pub(super) fn choose(
+    group: &Group,
+    index: usize,
+    estimator: Estimator,
+    curve: &Curve,
+    settings: &Settings,
+) -> Result<(ModelSpec, Ranking), FitError> {
+    // One weighting for all candidates.
+    let weighting = match settings.weighting {
+        Weighting::Full => Weighting::Edof,
+        other => other,
+    };
+    let settings = &Settings { weighting, ..settings.clone() };
+    let one = |spec: &ModelSpec| {
+        fit(curve, spec, settings.rate_hz, settings.weighting).map(|fit| (spec.clone(), fit))
+    };
+    let all = sums(curve.levels.len());
+    let fits = all.par_iter().map(one).collect::<Result<Vec<_>, _>>()?;
+    let tried = fits.len();
+    let fits: Vec<(ModelSpec, Fit)> =
+        fits.into_iter().filter(|(_, f)| f.zero.is_empty() && f.at_end.is_empty()).collect();
+    let not_identifiable = tried - fits.len();
+    let field = Field { group, index, estimator, curve, settings, fits };
+    field.rank(not_identifiable).ok_or_else(|| FitError::TooFewScales {
+        spec: "auto".to_owned(),
+        parameters: 2,
+        scales: curve.levels.len(),
+    })
+}
+
+/// What is compared.
+struct Field<'a> {
+    group: &'a Group,
+    index: usize,
+    estimator: Estimator,
+    curve: &'a Curve,
+    settings: &'a Settings,
+    fits: Vec<(ModelSpec, Fit)>,
+}
+
+impl Field<'_> {
+    fn rank(&self, not_identifiable: usize) -> Option<(ModelSpec, Ranking)> {
+        let nearest =
+            (0..self.fits.len()).min_by(|a, b| self.objective(*a).total_cmp(&self.objective(*b)))?;
+        let curves = self.draws(nearest);
+        // An optimism is not negative: whose distance alone exceeds the sum of the nearest is not the best.
+        let bound = self.objective(nearest) + self.optimism(nearest, &curves);
+        let near: Vec<usize> = (0..self.fits.len()).filter(|i| self.objective(*i) <= bound).collect();
+        let mut ranked: Vec<(usize, f64)> =
+            near.into_par_iter().map(|i| (i, self.optimism(i, &curves))).collect();
+        let order = |ranked: &mut Vec<(usize, f64)>| {
+            ranked.sort_by(|a, b| (self.objective(a.0) + a.1).total_cmp(&(self.objective(b.0) + b.1)))
+        };
+        order(&mut ranked);
+        let best = ranked.first()?.0;
+        let (chosen, tested) = self.simplest(best);
+        if !ranked.iter().any(|(i, _)| *i == chosen) {
+            ranked.push((chosen, self.optimism(chosen, &curves)));
+            order(&mut ranked);
+        }
+        let candidate = |&(i, optimism): &(usize, f64)| Candidate {
+            spec: self.fits[i].0.clone(),
+            objective: self.objective(i),
+            optimism,
+            p_value: tested.iter().find(|(t, _)| *t == i).map(|(_, p)| *p),
+        };
+        let candidates: Vec<Candidate> = ranked.iter().map(candidate).collect();
+        let place = ranked.iter().position(|(i, _)| *i == chosen)?;
+        let reasons = self.reasons(&candidates, place, best, chosen, &tested);
+        let spec = self.fits[chosen].0.clone();
+        let far = self.fits.len() - candidates.len();
+        Some((spec, Ranking { candidates, chosen: place, not_identifiable, far, reasons }))
+    }
+
+    fn objective(&self, i: usize) -> f64 {
+        self.fits[i].1.objective
+    }
+
+    /// New curves of a candidate.
+    fn draws(&self, i: usize) -> Vec<Curve> {
+        let (spec, fit) = &self.fits[i];
+        let outcome =
+            Outcome::bare(self.index, self.estimator, self.curve.clone(), spec.clone(), fit.clone());
+        let world = World::new(&self.group.replicates, &outcome, self.settings).gaussian();
+        let (name, process) = (self.group.name(), self.estimator.name());
+        let draw = |run: usize| {
+            let key = StreamKey { seed: SEED, scenario: "auto", run: run as u64, source: &name, process };
+            world.draw(&key, self.settings)
+        };
+        (0..DRAWS).filter_map(draw).collect()
+    }
+
+    fn again(&self, i: usize, curve: &Curve) -> Option<Fit> {
+        let (spec, fit) = &self.fits[i];
+        refit(curve, spec, self.settings.rate_hz, self.settings.weighting, fit).ok()
+    }
+
+    /// 2 Σ Omega_j cov(nu_j, nu_j(theta)), Omega that of the curve itself.
+    fn optimism(&self, i: usize, curves: &[Curve]) -> f64 {
+        let pairs: Vec<(&Curve, Fit)> = curves.iter().filter_map(|c| Some((c, self.again(i, c)?))).collect();
+        let count = pairs.len() as f64;
+        let roots = self.settings.weighting.roots(self.curve);
+        let term = |(j, root): (usize, &f64)| {
+            let level = self.curve.levels[j];
+            let of = |(c, f): &(&Curve, Fit)| (root * c.wv[j], root * f.composite.haar_wv(level));
+            let (mut a, mut b, mut ab) = (0.0, 0.0, 0.0);
+            // About the first, so that no digits are lost.
+            let first = of(&pairs[0]);
+            for (x, y) in pairs.iter().map(of) {
+                let (x, y) = (x - first.0, y - first.1);
+                (a, b, ab) = (a + x, b + y, ab + x * y);
+            }
+            2.0 * (ab - a * b / count) / (count - 1.0)
+        };
+        if pairs.len() < 2 { f64::INFINITY } else { roots.iter().enumerate().map(term).sum() }
+    }
+
+    /// The simplest candidate nested in the best that does as well, and the probabilities of those tested.
+    fn simplest(&self, best: usize) -> (usize, Vec<(usize, f64)>) {
+        let mut tested = Vec::new();
+        // Ascending in their number of parameters.
+        for i in (0..self.fits.len()).filter(|i| self.fits[*i].0.is_part_of(&self.fits[best].0)) {
+            if i == best {
+                continue;
+            }
+            let p = self.p_value(i, best);
+            tested.push((i, p));
+            if p > LEVEL {
+                return (i, tested);
+            }
+        }
+        (best, tested)
+    }
+
+    /// Probability that the objectives differ by so much if the simpler is true (an upper bound where it is
+    /// hopeless).
+    fn p_value(&self, simple: usize, best: usize) -> f64 {
+        let observed = self.objective(simple) - self.objective(best);
+        let curves = self.draws(simple);
+        let difference = |c: &Curve| Some(self.again(simple, c)?.objective - self.again(best, c)?.objective);
+        let (some, rest) = curves.split_at(FIRST.min(curves.len()));
+        let mut drawn: Vec<f64> = some.par_iter().filter_map(difference).collect();
+        if observed <= 2.0 * drawn.iter().copied().fold(0.0, f64::max) {
+            drawn.extend(rest.par_iter().filter_map(difference).collect::<Vec<_>>());
+        }
+        let larger = drawn.iter().filter(|d| **d >= observed).count();
+        (1 + larger) as f64 / (1 + drawn.len()) as f64
+    }
+
+    fn reasons(
+        &self,
+        candidates: &[Candidate],
+        place: usize,
+        best: usize,
+        chosen: usize,
+        tested: &[(usize, f64)],
+    ) -> Vec<String> {
+        let name = |i: usize| self.fits[i].0.to_string();
+        let mut lines = Vec::new();
+        if chosen == best {
+            lines.push(format!("{} has the least WVIC, and nothing simpler does as well", name(best)));
+        } else {
+            let p = tested.iter().find(|(i, _)| *i == chosen).map_or(f64::NAN, |(_, p)| *p);
+            lines.push(format!(
+                "{} has the least WVIC, {:.4} against {:.4} of {}, but is not needed: where {} is true, so large a gain \
+                 has a probability of {p:.2}",
+                name(best),
+                candidates[0].wvic(),
+                candidates[place].wvic(),
+                name(chosen),
+                name(chosen)
+            ));
+        }
+        let refused = tested.iter().rev().find(|(i, p)| *p <= LEVEL && *i != chosen);
+        if let Some((simpler, p)) = refused {
+            let (level, share) = self.deciding(*simpler, chosen);
+            lines.push(format!(
+                "{} is too simple (p = {p:.3}): {share:.0} % of the difference is at {} s",
+                name(*simpler),
+                f64::from(level).exp2() / self.settings.rate_hz
+            ));
+        }
+        lines
+    }
+
+    /// The scale that speaks loudest for one candidate against another, and its part of all that does (%).
+    fn deciding(&self, against: usize, chosen: usize) -> (u32, f64) {
+        let (a, b) = (&self.fits[against].1.residuals, &self.fits[chosen].1.residuals);
+        let gains: Vec<f64> = a.iter().zip(b).map(|(a, b)| a * a - b * b).collect();
+        let total: f64 = gains.iter().filter(|g| **g > 0.0).sum();
+        let loudest = gains.iter().zip(&self.curve.levels).max_by(|x, y| x.0.total_cmp(y.0));
+        loudest.map_or((0, 0.0), |(gain, level)| (*level, 100.0 * gain / total))
+    }
+}
+
+#[cfg(test)]
+mod tests;

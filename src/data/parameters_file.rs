@@ -1,0 +1,195 @@
+//! What is known of a model's parameters before it is fitted (TOML), for `nav-sim calibrate --parameters`.
+//!
+//! ```toml
+//! schema = 1
+//! [WN]                                # of every signal
+//! sigma2 = { lower = 1e-6, upper = 1e-4 }
+//! [gyro.AR1_1]                        # of the gyroscopes
+//! phi = { fix = 0.98 }
+//! [accel.x.RW]                        # of one axis (with --pool axes)
+//! gamma2 = { fix = 0 }                # not there
+//! ```
+//!
+//! Parameters and units are those of model files. What is said of an axis wins over what is said of its
+//! sensor, and that over what is said of all.
+
+use super::toml_file::{Section, Source, TomlError};
+use crate::calibration::{ModelSpec, ParameterLimit};
+use crate::imu::{Axis, Sensor};
+use std::path::Path;
+
+/// Reads the limits of a file. Each is tried on the model.
+///
+/// # Errors
+/// When it cannot be read, names what the model does not have, or bounds between which nothing lies.
+pub fn read(path: &Path, spec: &ModelSpec) -> Result<Vec<ParameterLimit>, TomlError> {
+    limits(&Source::read(path)?, spec)
+}
+
+fn limits(source: &Source, spec: &ModelSpec) -> Result<Vec<ParameterLimit>, TomlError> {
+    let table = source.parse()?;
+    let root = source.root(&table);
+    if root.u64("schema")?.is_some_and(|s| s != 1) {
+        return Err(root.refuse("schema", "is not a schema this version reads: it reads 1", None));
+    }
+    let labels = spec.labels();
+    let mut own: Vec<&str> = labels.iter().map(String::as_str).collect();
+    let processes = own.clone();
+    own.extend(Sensor::ALL.map(Sensor::name));
+    let mut limits = Vec::new();
+    root.only(&[own.as_slice(), &["schema"]].concat())?;
+    of_processes(&root, &processes, None, None, spec, &mut limits)?;
+    for sensor in Sensor::ALL {
+        let Some(section) = root.section(sensor.name())? else { continue };
+        section.only(&[processes.as_slice(), &Axis::ALL.map(Axis::name)].concat())?;
+        of_processes(&section, &processes, Some(sensor), None, spec, &mut limits)?;
+        for axis in Axis::ALL {
+            let Some(section) = section.section(axis.name())? else { continue };
+            section.only(&processes)?;
+            of_processes(&section, &processes, Some(sensor), Some(axis), spec, &mut limits)?;
+        }
+    }
+    // The more special later: they win.
+    limits.sort_by_key(|l| usize::from(l.sensor.is_some()) + usize::from(l.axis.is_some()));
+    Ok(limits)
+}
+
+fn of_processes(
+    section: &Section<'_>,
+    processes: &[&str],
+    sensor: Option<Sensor>,
+    axis: Option<Axis>,
+    spec: &ModelSpec,
+    into: &mut Vec<ParameterLimit>,
+) -> Result<(), TomlError> {
+    for process in processes {
+        let Some(table) = section.section(process)? else { continue };
+        table.only(&spec.parameter_names(process))?;
+        for parameter in table.keys() {
+            let Some(range) = table.section(parameter)? else { continue };
+            let (low, high) = bounds(&table, parameter, &range)?;
+            let refuse = |e: crate::calibration::LimitError| {
+                table.refuse(parameter, format!("is not possible: {e}"), Some(e.hint()))
+            };
+            spec.clone().limit(process, parameter, low, high).map_err(refuse)?;
+            let (process, parameter) = ((*process).to_owned(), parameter.to_owned());
+            into.push(ParameterLimit { sensor, axis, process, parameter, low, high });
+        }
+    }
+    Ok(())
+}
+
+/// `{ fix = v }`, or `{ lower = v, upper = v }`, one of the two.
+fn bounds(
+    table: &Section<'_>,
+    parameter: &str,
+    range: &Section<'_>,
+) -> Result<(Option<f64>, Option<f64>), TomlError> {
+    range.only(&["fix", "lower", "upper"])?;
+    let (fix, lower, upper) = (range.f64("fix")?, range.f64("lower")?, range.f64("upper")?);
+    let hint = || Some("{ fix = 0.98 }, or { lower = 0.9, upper = 0.99 }, or one of these two".to_owned());
+    match (fix, lower, upper) {
+        (Some(value), None, None) => Ok((Some(value), Some(value))),
+        (Some(_), ..) => Err(table.refuse(parameter, "is both fixed and bounded", hint())),
+        (None, None, None) => Err(table.refuse(parameter, "says nothing", hint())),
+        (None, lower, upper) => Ok((lower, upper)),
+    }
+}
+
+/// The JSON schema of such a file.
+#[must_use]
+pub fn schema() -> serde_json::Value {
+    use serde_json::json;
+    let number = json!({ "type": "number" });
+    let range = json!({
+        "description": "Where a parameter may be, in the units of model files",
+        "oneOf": [
+            { "type": "object", "properties": { "fix": number }, "required": ["fix"], "additionalProperties": false },
+            { "type": "object", "properties": { "lower": number, "upper": number }, "minProperties": 1,
+              "additionalProperties": false }
+        ]
+    });
+    let of = |names: &[&str]| {
+        let properties: serde_json::Map<String, serde_json::Value> =
+            names.iter().map(|n| ((*n).to_owned(), range.clone())).collect();
+        json!({ "type": "object", "properties": properties, "additionalProperties": false })
+    };
+    let processes = json!({
+        "^WN$": of(&["sigma2"]),
+        "^QN$": of(&["q2"]),
+        "^AR1(_[1-9])?$": of(&["phi", "sigma2"]),
+        "^GM(_[1-9])?$": of(&["beta", "s2"]),
+        "^MA1$": of(&["theta", "sigma2"]),
+        "^RW$": of(&["gamma2"]),
+        "^DR$": of(&["slope"]),
+    });
+    let axis = json!({ "type": "object", "patternProperties": processes, "additionalProperties": false });
+    let sensor = json!({
+        "type": "object",
+        "patternProperties": processes,
+        "properties": { "x": axis, "y": axis, "z": axis },
+        "additionalProperties": false
+    });
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Parameters",
+        "description": "What is known of a model's parameters before it is fitted: nav-sim calibrate --parameters",
+        "type": "object",
+        "patternProperties": processes,
+        "properties": { "schema": { "const": 1 }, "accel": sensor, "gyro": sensor },
+        "additionalProperties": false
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Vec<ParameterLimit>, String> {
+        limits(&Source::new("p.toml", text), &ModelSpec::n2())
+            .map_err(|e| format!("{e} | {}", e.hint().unwrap_or_default()))
+    }
+
+    #[test]
+    fn the_special_comes_after_the_general() {
+        let text = "[accel.x.WN]\nsigma2 = { fix = 3 }\n[WN]\nsigma2 = { lower = 1 }\n[gyro.AR1_2]\nphi = { lower = 0.9, upper = 0.99 }\n";
+        let limits = read(text).unwrap();
+        let shown: Vec<_> = limits.iter().map(|l| (l.sensor, l.axis, l.low, l.high)).collect();
+        let (accel, gyro) = (Some(Sensor::Accel), Some(Sensor::Gyro));
+        assert_eq!(
+            shown,
+            [
+                (None, None, Some(1.0), None),
+                (gyro, None, Some(0.9), Some(0.99)),
+                (accel, Some(Axis::X), Some(3.0), Some(3.0))
+            ]
+        );
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        for (text, expected) in [
+            ("[WM]\n", "p.toml, line 1: unknown key \"WM\" | did you mean \"WN\"?"),
+            (
+                "[WN]\nsigma = { fix = 1 }\n",
+                "p.toml, line 2: unknown key \"WN.sigma\" | did you mean \"sigma2\"?",
+            ),
+            (
+                "[WN]\nsigma2 = { fix = 1, lower = 0 }\n",
+                "p.toml, line 2: \"WN.sigma2\" = { fix = 1, lower = 0 } is both fixed and bounded | ",
+            ),
+            (
+                "[AR1_1]\nphi = { lower = 0.9, upper = 0.8 }\n",
+                "p.toml, line 2: \"AR1_1.phi\" = { lower = 0.9, upper = 0.8 } is not possible: AR1_1 phi: nothing lies between 0.9 and 0.8 | lower ≤ upper",
+            ),
+            (
+                "[gyro.RW]\ngamma2 = { fix = -1 }\n",
+                "p.toml, line 2: \"gyro.RW.gamma2\" = { fix = -1 } is not possible: RW gamma2: -1 is not a finite number ≥ 0 | ",
+            ),
+            ("[WN]\nsigma2 = 3\n", "p.toml, line 2: \"WN.sigma2\" = 3 is not a table | "),
+        ] {
+            let message = read(text).unwrap_err();
+            assert!(message.starts_with(expected), "{message}");
+        }
+    }
+}
