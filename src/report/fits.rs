@@ -116,7 +116,7 @@ const SHOWN: usize = 8;
 /// The ranking as lines.
 fn ranking_lines(ranking: &Ranking) -> Vec<String> {
     let line = |c: CandidateEntry| {
-        let p = c.p_value.map_or(String::new(), |p| format!("  p = {p:.3}"));
+        let p = c.p_value.map_or(String::new(), |p| format!("  p ≤ {p:.3}"));
         let mark = if c.chosen { "*" } else { " " };
         format!(
             "  {mark} {:<18} WVIC {:>10.4} = {:.4} + {:.4}, {} parameters{p}",
@@ -260,12 +260,12 @@ pub fn describe(group: &Group, outcome: &Outcome, settings: &Settings) -> String
         settings.rate_hz,
     ));
     lines.push(optimum(outcome));
-    lines.extend(outcome.inference.iter().flat_map(|i| inference_lines(i, settings.rate_hz)));
+    lines.extend(outcome.inference.iter().flat_map(|i| inference_lines(i, group, settings.rate_hz)));
     lines.extend(outcome.notes.iter().map(|note| format!("  note: {note}")));
     lines.join("\n")
 }
 
-fn inference_lines(inference: &Inference, rate_hz: f64) -> Vec<String> {
+fn inference_lines(inference: &Inference, group: &Group, rate_hz: f64) -> Vec<String> {
     if inference.fitted < 2 {
         return vec![format!(
             "  {} of {} draws of the bootstrap had a fit: no intervals",
@@ -282,7 +282,9 @@ fn inference_lines(inference: &Inference, rate_hz: f64) -> Vec<String> {
     for i in &inference.intervals {
         lines.push(format!("  95 % {:<6} {:<7} {:.6e} … {:.6e}", i.process, i.parameter, i.low, i.high));
     }
-    lines.extend(spread_line(inference, rate_hz));
+    if group.replicates.len() > 1 {
+        lines.extend(spread_line(inference, rate_hz));
+    }
     lines
 }
 

@@ -268,7 +268,7 @@ impl Field<'_> {
         if let Some((simpler, p)) = refused {
             let (level, share) = self.deciding(*simpler, chosen);
             lines.push(format!(
-                "{} is too simple (p = {p:.3}): {share:.0} % of the difference is at {} s",
+                "{} is too simple (p ≤ {p:.3}): {share:.0} % of the difference is at {} s",
                 name(*simpler),
                 f64::from(level).exp2() / self.settings.rate_hz
             ));

@@ -52,7 +52,7 @@ pub enum FusionFileError {
 impl FusionFileError {
     /// Whether the system, not the contents, is at fault.
     #[must_use]
-    pub const fn is_io(&self) -> bool {
+    pub fn is_io(&self) -> bool {
         match self {
             Self::Table(e) => !e.is_content(),
             Self::Imu(e) => e.is_io(),
