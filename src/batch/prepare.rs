@@ -3,7 +3,7 @@
 use super::PrepareError;
 use super::study::{CalibrateStep, Synthesis};
 use crate::calibration::{
-    Estimator, Group, ModelSpec, Outcome, Pool, Settings, Trim, Weighting, calibrate, grouped, replicates,
+    Estimator, Group, ModelChoice, Outcome, Pool, Settings, Trim, Weighting, calibrate, grouped, replicates,
 };
 use crate::imu::{Channel, Recording};
 use crate::noise::contamination::Contamination;
@@ -71,14 +71,19 @@ pub(super) fn settings(step: &CalibrateStep, rate_hz: f64) -> Result<Settings, P
         let found = Estimator::ALL.into_iter().find(takes_many);
         found.ok_or_else(|| word("estimators", name, "is not awv, sr-awv, dr-awv, gmwm or rgmwm".to_owned()))
     };
-    let spec: ModelSpec =
-        step.fit.parse().map_err(|e| word("fit", &step.fit, format!("is no model: {e}")))?;
+    let model = if step.fit.eq_ignore_ascii_case("auto") {
+        ModelChoice::Auto
+    } else {
+        let spec = step.fit.parse().map_err(|e| word("fit", &step.fit, format!("is no model: {e}")))?;
+        ModelChoice::Given(spec)
+    };
     let tuning = Tuning::new(step.efficiency, Convention::Exact).map_err(|_| {
         word("efficiency", &step.efficiency.to_string(), "is not between 0.3 and 0.99".to_owned())
     })?;
     Ok(Settings {
         estimators: step.estimators.iter().map(estimator).collect::<Result<_, _>>()?,
-        spec,
+        model,
+        limits: Vec::new(),
         trim: step.trim.map_or(Trim::Fraction(0.3), Trim::Count),
         tuning,
         weighting: Weighting::Edof,

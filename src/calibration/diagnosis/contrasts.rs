@@ -69,10 +69,13 @@ impl Noise {
     }
 }
 
+/// What every file has at each level on one axis, if it has that axis.
+type Files = Vec<Option<Vec<f64>>>;
+
 /// ln nu of every file on the axes of a sensor, `[axis][file][level]`; not every file has every axis.
 #[derive(Debug, Clone)]
 pub(super) struct Table {
-    pub(super) logs: Vec<Vec<Option<Vec<f64>>>>,
+    pub(super) logs: Vec<Files>,
     /// Only what lies above the others counts.
     pub(super) above_only: bool,
 }
@@ -89,7 +92,7 @@ impl Table {
                 ratios.into_iter().zip(between).map(difference).collect()
             })
         };
-        let axis = |(files, noise): (&Vec<Option<Vec<f64>>>, &Noise)| {
+        let axis = |(files, noise): (&Files, &Noise)| {
             files.iter().enumerate().map(|(k, own)| file(noise, k, own)).collect()
         };
         let logs = self.logs.iter().zip(noise).map(axis).collect();
