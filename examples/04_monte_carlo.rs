@@ -8,6 +8,7 @@ use nav_sim::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim::metrics::{Summary, epochs};
 use nav_sim::monte_carlo;
 use nav_sim::noise::{Ar1, Composite, Model, Process, White};
+use nav_sim::sensors::defects::ImuSettings;
 use nav_sim::sensors::gnss::GnssSettings;
 use nav_sim::sensors::imu::Truth;
 use nav_sim::sensors::outage::Outage;
@@ -36,6 +37,9 @@ pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
         beliefs: &beliefs,
         gnss: &GnssSettings::default(),
         initial: &InitialSettings::default(),
+        defects: &ImuSettings::default(),
+        baro: None,
+        nis_gate: None,
         outages: &Outage::PAPER,
         seed: 1,
         scenario: "",

@@ -3,11 +3,13 @@
 
 use crate::earth::GravityModel;
 use crate::ekf::{Belief, BeliefError, FilterStates, InitialSettings};
-use crate::imu::{MAX_RATE_HZ, Sensor};
+use crate::imu::Sensor;
 use crate::noise::{Model, reduction};
+use crate::sensors::baro::BaroSettings;
+use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
 use crate::sensors::outage::{Outage, OutagePlan, PeriodicOutages, RandomOutages};
-use crate::units::{SettingError, require_non_negative, require_positive};
+use crate::units::SettingError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -82,74 +84,21 @@ pub struct FilterSettings {
     pub states: FilterStates,
     /// How gravity falls with height, for truth and filter alike.
     pub gravity: GravityModel,
+    /// A fix is not used when its NIS is above the chi-square quantile of this probability; without it, every
+    /// fix is used.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub nis_gate: Option<f64>,
 }
 
-/// `[imu]`: the true IMU; the filter knows its rate only. Standard deviations, drawn per run and axis.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct ImuSettings {
-    /// Samples per second.
-    pub rate_hz: f64,
-    /// Turn-on bias of the accelerometers (m/s²).
-    pub turn_on_bias_accel_m_s2: f64,
-    /// Turn-on bias of the gyroscopes (rad/s).
-    pub turn_on_bias_gyro_rad_s: f64,
-    /// Scale-factor error of the accelerometers (parts per million).
-    pub scale_ppm_accel: f64,
-    /// Scale-factor error of the gyroscopes (parts per million).
-    pub scale_ppm_gyro: f64,
-    /// Misalignment of each axis (rad).
-    pub misalignment_rad: f64,
-}
-
-impl Default for ImuSettings {
-    fn default() -> Self {
-        Self {
-            rate_hz: 100.0,
-            turn_on_bias_accel_m_s2: 0.0,
-            turn_on_bias_gyro_rad_s: 0.0,
-            scale_ppm_accel: 0.0,
-            scale_ppm_gyro: 0.0,
-            misalignment_rad: 0.0,
-        }
-    }
-}
-
-impl ImuSettings {
-    fn errors(&self) -> [(&'static str, f64); 5] {
-        [
-            ("turn_on_bias_accel_m_s2", self.turn_on_bias_accel_m_s2),
-            ("turn_on_bias_gyro_rad_s", self.turn_on_bias_gyro_rad_s),
-            ("scale_ppm_accel", self.scale_ppm_accel),
-            ("scale_ppm_gyro", self.scale_ppm_gyro),
-            ("misalignment_rad", self.misalignment_rad),
-        ]
-    }
-
+impl FilterSettings {
     fn validate(&self) -> Result<(), SettingError> {
-        require_positive("rate_hz", &[self.rate_hz])?;
-        if self.rate_hz > MAX_RATE_HZ {
-            let requirement = format!("at most {MAX_RATE_HZ} samples a second");
-            return Err(SettingError::new("rate_hz", self.rate_hz, requirement));
-        }
-        for (key, value) in self.errors() {
-            require_non_negative(key, &[value])?;
-            if value > 0.0 {
-                return Err(SettingError::new(key, value, "not simulated yet; leave it at 0"));
+        match self.nis_gate {
+            Some(p) if !(p > 0.0 && p < 1.0) => {
+                Err(SettingError::new("nis_gate", p, "a probability between 0 and 1, such as 0.999"))
             }
+            _ => Ok(()),
         }
-        Ok(())
     }
-}
-
-/// `[baro]`: a barometric altimeter.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct BaroSettings {
-    /// Heights per second.
-    pub rate_hz: f64,
-    /// Standard deviation of a height (m).
-    pub sigma_m: f64,
 }
 
 impl Scenario {
@@ -163,21 +112,22 @@ impl Scenario {
         self.gnss.validate().map_err(|e| e.in_section("gnss"))?;
         self.initial.validate().map_err(|e| e.in_section("initial"))?;
         self.outages().windows((0.0, 1.0), 0)?;
+        self.filter.validate().map_err(|e| e.in_section("filter"))?;
         if let Some(baro) = &self.baro {
-            let requirement = "a barometer is not simulated yet; leave the section out";
-            return Err(SettingError::new("rate_hz", baro.rate_hz, requirement).in_section("baro"));
+            baro.validate().map_err(|e| e.in_section("baro"))?;
+            self.meets_imu_samples("baro.rate_hz", baro.rate_hz)?;
         }
-        self.fixes_meet_imu_samples()
+        self.meets_imu_samples("gnss.rate_hz", self.gnss.rate_hz)
     }
 
-    /// A fix must fall on an IMU sample: one that does not would be used late or never.
-    fn fixes_meet_imu_samples(&self) -> Result<(), SettingError> {
-        let samples = self.imu.rate_hz / self.gnss.rate_hz;
+    /// A measurement must fall on an IMU sample: one that does not would be used late or never.
+    fn meets_imu_samples(&self, key: &str, rate_hz: f64) -> Result<(), SettingError> {
+        let samples = self.imu.rate_hz / rate_hz;
         if samples >= 1.0 - 1e-9 && (samples - samples.round()).abs() <= 1e-9 * samples {
             return Ok(());
         }
         let requirement = format!("imu.rate_hz = {} must be a whole multiple of it", self.imu.rate_hz);
-        Err(SettingError::new("gnss.rate_hz", self.gnss.rate_hz, requirement))
+        Err(SettingError::new(key, rate_hz, requirement))
     }
 
     /// What the filter believes of a model at the IMU's rate, reduced for these outages.
@@ -295,9 +245,12 @@ mod tests {
         assert_eq!(refused("gnss.rate_hz = 200"), "gnss.rate_hz");
         assert_eq!(refused("gnss.pos_sigma_m = [0, 1, 1]"), "gnss.pos_sigma_m");
         assert_eq!(refused("imu.rate_hz = -1"), "imu.rate_hz");
-        assert_eq!(refused("imu.scale_ppm_gyro = 300"), "imu.scale_ppm_gyro");
+        assert_eq!(refused("imu.misalignment_rad = 0.5"), "imu.misalignment_rad");
+        assert_eq!(refused("filter.nis_gate = 1"), "filter.nis_gate");
+        assert_eq!(refused("gnss.correlation_time_s = 0"), "gnss.correlation_time_s");
+        assert_eq!(refused("baro = { rate_hz = 1, sigma_m = 0 }"), "baro.sigma_m");
         assert_eq!(refused("initial.att_sigma_deg = [1, 1, 180]"), "initial.att_sigma_deg");
-        assert_eq!(refused("baro = { rate_hz = 1, sigma_m = 1 }"), "baro.rate_hz");
+        assert_eq!(refused("baro = { rate_hz = 3, sigma_m = 1 }"), "baro.rate_hz");
         assert_eq!(refused("outage = [{ start_s = 9, end_s = 3 }]"), "outage[1].end_s");
     }
 }

@@ -32,6 +32,7 @@ fn result(factor: f64) -> RunResult {
         diverged: false,
         outages: vec![OutageRecord { see_mean: [see; 9], error_end: [1.0; 9], ..OutageRecord::default() }],
         nis: (6.0, 6),
+        rejected: 0,
     };
     RunResult {
         epochs: (0..10).map(epoch).collect(),

@@ -13,6 +13,7 @@ use nav_sim::fusion::{Recorded, Settings, Solution, Start, Use, fuse, outcome};
 use nav_sim::gnss::GnssFix;
 use nav_sim::imu::ImuIncrement;
 use nav_sim::noise::Model;
+use nav_sim::sensors::defects::ImuSettings;
 use nav_sim::sensors::gnss::GnssSettings;
 use nav_sim::sensors::imu::Truth;
 use nav_sim::sensors::outage::Outage;
@@ -92,6 +93,9 @@ fn recorded(
         beliefs: &[],
         gnss,
         initial: &initial,
+        defects: &ImuSettings::default(),
+        baro: None,
+        nis_gate: None,
         outages: &[],
         seed: 17,
         scenario: "",

@@ -28,7 +28,7 @@ const MAY_NAME: &[(&str, &[&str])] = &[
     ("scenario", &["@L1", "noise", "trajectory", "sensors", "strapdown", "ekf"]),
     ("simulation", &["@L1", "noise", "trajectory", "sensors", "strapdown", "ekf"]),
     ("monte_carlo", &["@L1", "noise", "trajectory", "sensors", "strapdown", "ekf", "simulation"]),
-    ("metrics", &["@L1", "ekf", "simulation", "monte_carlo"]),
+    ("metrics", &["@L1", "noise", "ekf", "simulation", "monte_carlo"]),
     (
         "batch",
         &[

@@ -211,3 +211,52 @@ fn a_run_that_is_killed_leaves_nothing() {
     child.wait().unwrap();
     assert_eq!(names(), before);
 }
+
+/// A truth that the filter does not know, a barometer and a gate, all by the scenario file: they change the
+/// run, are kept in its manifest, and show in its figures.
+#[test]
+fn the_true_imu_the_receiver_and_the_barometer_follow_the_scenario() {
+    let place = place();
+    let scenario = "
+filter.nis_gate = 0.99
+imu = { turn_on_bias_accel_m_s2 = 0.2, scale_ppm_gyro = 2000, misalignment_rad = 0.002 }
+gnss = { correlated_pos_sigma_m = [5, 5, 5], correlation_time_s = 30 }
+baro = { rate_hz = 2, sigma_m = 0.5 }
+outage = [{ start_s = 30, end_s = 45 }]
+";
+    fs::write(place.path().join("s.toml"), scenario).unwrap();
+    done(place.path(), "run drive.toml imu.toml --runs 8 --seed 2 --outage 30:45 -o plain");
+    done(place.path(), "run drive.toml imu.toml --runs 8 --seed 2 --scenario s.toml -o worse");
+    let (plain, worse) =
+        (json(&place.path().join("plain/summary.json")), json(&place.path().join("worse/summary.json")));
+    let nees = |summary: &Value| summary["nees"]["mean"].as_f64().unwrap();
+    assert!(nees(&worse) > 2.0 * nees(&plain), "{} {}", nees(&plain), nees(&worse));
+    assert!(worse["nis"]["rejected"].as_u64().unwrap() > 10 && plain["nis"]["rejected"] == 0);
+    let down = |summary: &Value| summary["outages"][0]["asee_mean"]["pos_d_m"].as_f64().unwrap();
+    assert!(down(&worse) < 0.5 * down(&plain));
+    let kept = json(&place.path().join("worse/manifest.json"));
+    assert_eq!(kept["configuration"]["imu"]["scale_ppm_gyro"], 2000.0);
+}
+
+/// A model of several processes is reduced to 15 states: said, kept with its curves, and compared with the
+/// full filter; a model that fits 15 states is left alone.
+#[test]
+fn the_reduction_of_the_model_is_said_and_kept() {
+    let place = place();
+    let two = MODEL.replace(
+        "phi = 0.9999, sigma2 = 1e-9 }",
+        "phi = 0.9999, sigma2 = 1e-9 }, { type = \"AR1\", phi = 0.99, sigma2 = 1e-7 }",
+    );
+    fs::write(place.path().join("two.toml"), two).unwrap();
+    let ran = done(place.path(), "run drive.toml two.toml --runs 2 --outage 20:40 --seed 1 -o out");
+    assert!(ran.stderr.contains("accel reduced to white noise"), "{}", ran.stderr);
+    let reduction = &json(&place.path().join("out/summary.json"))["reduction"];
+    assert_eq!(reduction["axes"].as_array().unwrap().len(), 6);
+    let ratio = reduction["quality"]["outage_end"][0]["pos_e_m"].as_f64().unwrap();
+    assert!((0.5..2.0).contains(&ratio), "{ratio}");
+    let ran = done(place.path(), "run drive.toml imu.toml --runs 2 --outage 20:40 --seed 1 -o same");
+    assert!(!ran.stderr.contains("reduced to"), "{}", ran.stderr);
+    assert_eq!(json(&place.path().join("same/summary.json"))["reduction"]["axes"][0]["misfit"], 0.0);
+    done(place.path(), "run drive.toml two.toml --filter full --runs 2 --outage 20:40 --seed 1 -o full");
+    assert!(json(&place.path().join("full/summary.json"))["reduction"].is_null());
+}

@@ -9,14 +9,16 @@ pub mod belief;
 pub mod covariance;
 pub mod dynamics;
 pub mod filter;
+pub mod gate;
 pub mod initial;
 pub mod update;
 
 pub use belief::{Belief, BeliefError};
 pub use covariance::Covariance;
 pub use filter::{Ekf, advance, settle};
+pub use gate::{nis_limit, update_within};
 pub use initial::{FilterStates, InitialSettings};
-pub use update::{Fix, update};
+pub use update::{Fix, update, update_height};
 
 #[cfg(test)]
 mod tests;

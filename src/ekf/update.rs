@@ -54,6 +54,17 @@ impl Ekf {
         nis
     }
 
+    #[inline(always)]
+    fn use_height<W: Wide>(&mut self, h: W, sigma_m: f64) -> W {
+        let ins = self.nominal.load::<W>();
+        self.apply_earth_terms(&ins);
+        self.scratch.error.fill(Lanes::ZERO);
+        // the third component of the position error is down: estimated less measured
+        let nis = self.scalar(&[(3 * R + 2, W::from(1.0))], h - ins.h, sigma_m * sigma_m);
+        self.correct(ins);
+        nis
+    }
+
     /// Estimated less measured position and velocity of the antenna: metres and m/s north, east, down; the
     /// velocity zero where none is measured.
     #[must_use]
@@ -111,6 +122,27 @@ impl Kernel for Update<'_> {
     fn run<W: Wide>(self) -> Lanes {
         let mut nis = Lanes::ZERO;
         self.ekf.use_fix::<W>(self.fix).store(&mut nis);
+        nis
+    }
+}
+
+/// Uses a height above the ellipsoid (m), measured at the IMU with a standard deviation. Returns its NIS.
+pub fn update_height(ekf: &mut Ekf, h: &Lanes, sigma_m: f64) -> Lanes {
+    dispatch(ekf.level, UpdateHeight { ekf, h, sigma_m })
+}
+
+struct UpdateHeight<'a> {
+    ekf: &'a mut Ekf,
+    h: &'a Lanes,
+    sigma_m: f64,
+}
+
+impl Kernel for UpdateHeight<'_> {
+    type Output = Lanes;
+    #[inline(always)]
+    fn run<W: Wide>(self) -> Lanes {
+        let mut nis = Lanes::ZERO;
+        self.ekf.use_height(W::load(self.h), self.sigma_m).store(&mut nis);
         nis
     }
 }

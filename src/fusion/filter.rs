@@ -13,12 +13,6 @@ use crate::strapdown::Strapdown;
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
 use nalgebra::{DMatrix, DVector};
-use statrs::distribution::{ChiSquared, ContinuousCDF};
-
-/// The NIS above which a fix of `dof` components is refused: the chi-square quantile of the probability.
-pub(super) fn gate(probability: f64, dof: usize) -> f64 {
-    ChiSquared::new(dof as f64).map_or(f64::INFINITY, |chi2| chi2.inverse_cdf(probability))
-}
 
 /// The filter in the axes of the IMU.
 pub(super) struct Filter {

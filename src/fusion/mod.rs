@@ -11,7 +11,7 @@ mod outcome;
 pub use outcome::{Drift, OutageDrift, Outcome, outcome};
 
 use crate::earth::{GravityModel, MAX_LATITUDE};
-use crate::ekf::{Belief, InitialSettings};
+use crate::ekf::{Belief, InitialSettings, nis_limit};
 use crate::frames::NavState;
 use crate::gnss::GnssFix;
 use crate::imu::ImuIncrement;
@@ -278,7 +278,7 @@ impl Run<'_> {
         let mut record = self.filter.look_at(fix);
         record.error = self.error().map(|e| e.values);
         let withheld = self.settings.outages.iter().any(|o| o.withholds(fix.t_s + 1e-9));
-        let limit = self.settings.nis_gate.map(|p| filter::gate(p, record.innovation.len()));
+        let limit = self.settings.nis_gate.map(|p| nis_limit(p, record.innovation.len()));
         record.used = match limit {
             _ if withheld => Use::Withheld,
             Some(limit) if record.nis > limit => Use::Rejected,

@@ -9,6 +9,7 @@ mod epoch;
 mod estimate;
 mod outage;
 mod ratio;
+mod reduction;
 mod summary;
 
 pub use consistency::{Band, chi_square_band, coverage_band};
@@ -16,4 +17,5 @@ pub use epoch::{EpochMetrics, epochs};
 pub use estimate::{Estimate, PerState, Quantile, quantile};
 pub use outage::{OutageMetrics, Reconvergence, outages};
 pub use ratio::{ComparisonError, EpochRow, Experiment, OutageComparison, RatioError, StateRatio, compare};
+pub use reduction::{AxisReduction, ReductionQuality, ReductionSummary, TOLERANCE};
 pub use summary::{Consistency, Coverage, Nis, OutageSummary, Recovery, Spread, Summary};

@@ -84,7 +84,7 @@ mod tests {
             horizontal_error_end_m: value,
             reconvergence_s: if value > 4.0 { f64::NAN } else { value },
         };
-        RunRecord { run, diverged, outages: vec![record], nis: (6.0, 1) }
+        RunRecord { run, diverged, outages: vec![record], nis: (6.0, 1), rejected: 0 }
     }
 
     #[test]

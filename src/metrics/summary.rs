@@ -4,6 +4,7 @@ use super::consistency::{Band, chi_square_band, coverage_band};
 use super::epoch::EpochMetrics;
 use super::estimate::{Estimate, PerState, Quantile};
 use super::outage::{self, OutageMetrics};
+use super::reduction::ReductionSummary;
 use crate::simulation::{NEES_DOF, RunResult};
 use serde::Serialize;
 
@@ -35,6 +36,9 @@ pub struct Summary {
     pub nis: Nis,
     /// Share of runs inside the filter's ellipsoid of position and attitude.
     pub coverage: Coverage,
+    /// What the reduction to 15 states leaves of the model; none for the full filter.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reduction: Option<ReductionSummary>,
     /// IMU epochs a second, all runs together; only known to who measured it.
     pub throughput_epochs_per_s: f64,
 }
@@ -112,8 +116,10 @@ pub struct Nis {
     pub lower95: f64,
     /// Its upper end.
     pub upper95: f64,
-    /// Fixes.
+    /// Fixes used.
     pub fixes: u64,
+    /// Fixes refused by the gate on the NIS.
+    pub rejected: u64,
 }
 
 /// Empirical coverage.
@@ -148,6 +154,7 @@ impl Summary {
             nees: nees(epochs),
             nis: nis(result),
             coverage: coverage(epochs, result.coverage_level),
+            reduction: None,
             throughput_epochs_per_s: result.run_epochs as f64 / wall_s,
         }
     }
@@ -215,6 +222,7 @@ fn nis(result: &RunResult) -> Nis {
         lower95: band.lower,
         upper95: band.upper,
         fixes,
+        rejected: result.runs.iter().filter(|r| !r.diverged).map(|r| r.rejected).sum(),
     }
 }
 

@@ -32,6 +32,7 @@ fn matched(runs: u64, epochs: usize) -> RunResult {
         diverged: false,
         outages: vec![OutageRecord { see_mean: [1.0; 9], ..OutageRecord::default() }],
         nis: (6.0, 10),
+        rejected: 0,
     };
     RunResult {
         epochs: sums,

@@ -5,6 +5,9 @@ use crate::earth::GravityModel;
 use crate::ekf::{Belief, FilterStates, InitialSettings};
 use crate::frames::RollPitchYaw;
 use crate::noise::{Ar1, Composite, Model, Process, White};
+use crate::rng::StreamKey;
+use crate::sensors::baro::BaroSettings;
+use crate::sensors::defects::{Defects, ImuSettings};
 use crate::sensors::gnss::GnssSettings;
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::Outage;
@@ -49,6 +52,9 @@ struct Setting {
     gnss: GnssSettings,
     initial: InitialSettings,
     outages: Vec<Outage>,
+    defects: ImuSettings,
+    baro: Option<BaroSettings>,
+    nis_gate: Option<f64>,
 }
 
 impl Setting {
@@ -61,6 +67,9 @@ impl Setting {
             gnss: GnssSettings::default(),
             initial: InitialSettings::default(),
             outages: vec![Outage { start_s: 20.0, end_s: 40.0 }],
+            defects: ImuSettings::default(),
+            baro: None,
+            nis_gate: None,
         }
     }
 
@@ -73,6 +82,9 @@ impl Setting {
             beliefs: &self.beliefs,
             gnss: &self.gnss,
             initial: &self.initial,
+            defects: &self.defects,
+            baro: self.baro.as_ref(),
+            nis_gate: self.nis_gate,
             outages: &self.outages,
             seed: 3,
             scenario: "",
@@ -155,4 +167,82 @@ fn matched_models_are_consistent_and_mismatched_ones_are_not() {
     assert!(deviations.abs() < 4.4, "NIS off by {deviations} standard deviations");
     let end_of_outage = results[1].epochs[39].nees[0];
     assert!(end_of_outage > high, "a wrong model must show: NEES {end_of_outage}, bound {high}");
+}
+
+/// Without a single fix, a straight acceleration a over t seconds along x and east leaves a velocity error
+/// of (bias + scale · a) t, and by Coriolis Ω t² times the false acceleration down: run by run, what the run
+/// drew. (The tilt by the false transport rate takes g t²/(6 R) = 1e-4 of it, and transport is v/(R Ω) ≤ 9 %
+/// of Coriolis.)
+#[test]
+fn bias_and_scale_factor_of_the_true_imu_act_as_in_closed_form() {
+    let (a, seconds) = (2.0, 20.0);
+    let straight = |k: u32| {
+        let t_s = 0.25 * f64::from(k);
+        let q_b_n = RollPitchYaw { roll: 0.0, pitch: 0.0, yaw: 90.0 * DEG }.to_quat();
+        TrajectorySample { t_s, lat: 0.0, lon: 0.5 * a * t_s * t_s / crate::earth::A, h: 0.0, q_b_n }
+    };
+    let samples: Vec<_> = (0..=80).map(straight).collect();
+    let defects =
+        ImuSettings { turn_on_bias_accel_m_s2: 0.05, scale_ppm_accel: 20_000.0, ..ImuSettings::default() };
+    let setting = Setting {
+        trajectory: Trajectory::from_samples(&samples).unwrap(),
+        model: Model { rate_hz: 100.0, axes: Default::default() },
+        initial: InitialSettings { perfect: true, ..InitialSettings::default() },
+        outages: vec![Outage { start_s: 0.0, end_s: 100.0 }],
+        defects: defects.clone(),
+        ..Setting::new(30.0, &[1.0])
+    };
+    for run in &setting.run(20)[0].runs {
+        let key = StreamKey { seed: 3, scenario: "", run: run.run, source: "", process: "" };
+        let drawn = Defects::draw(&defects, key);
+        let along = (drawn.bias[0].x + drawn.matrix[0].x_axis.x * a) * seconds;
+        let down = drawn.bias[0].z - drawn.matrix[0].z_axis.z * crate::earth::GRAVITY_EQUATOR;
+        let coriolis = crate::earth::OMEGA_IE * down * seconds * seconds;
+        let (found, bound) = (run.outages[0].error_end[4], 3e-4 * along.abs() + 0.1 * coriolis.abs());
+        let expected = along + coriolis;
+        assert!((found - expected).abs() < bound, "run {}: {found} m/s, {expected} m/s", run.run);
+    }
+}
+
+/// The sum of the NEES over the runs of a matched experiment is chi-square at every look (99.9 % in all).
+fn assert_consistent(result: &RunResult, runs: u64, looks: &[usize]) {
+    let chi2 = ChiSquared::new((NEES_DOF as u64 * runs) as f64).unwrap();
+    let alpha = 1e-3 / looks.len() as f64;
+    let (low, high) = (chi2.inverse_cdf(alpha / 2.0), chi2.inverse_cdf(1.0 - alpha / 2.0));
+    for look in looks {
+        let nees = result.epochs[*look].nees[0];
+        assert!((low..high).contains(&nees), "NEES {nees} at {look} s not in {low}..{high}");
+    }
+}
+
+/// A barometer of 0.5 m holds the height through an outage that costs metres without it, and the filter
+/// stays as sure as it should.
+#[test]
+fn a_barometer_holds_the_height() {
+    let runs = 104;
+    let mut setting = Setting::new(80.0, &[1.0]);
+    setting.outages = vec![Outage { start_s: 20.0, end_s: 60.0 }];
+    let without = setting.run(8);
+    setting.baro = Some(BaroSettings { rate_hz: 2.0, sigma_m: 0.5 });
+    let with = setting.run(runs);
+    let down = |r: &RunResult, runs: u64| r.epochs[59].see[2] / runs as f64;
+    assert!(down(&with[0], runs) < 0.4 && down(&without[0], 8) > 2.0);
+    assert_consistent(&with[0], runs, &[10, 30, 59, 75]);
+}
+
+/// A filter of matched models refuses one fix in a thousand at a gate of 0.999: binomial(8000, 0.001), between
+/// 0 and 24 with probability 1 − 1e-6; with a correlated error that it does not know it refuses more.
+#[test]
+fn the_gate_refuses_as_many_fixes_as_its_probability_says() {
+    let mut setting = Setting::new(100.0, &[1.0]);
+    setting.outages.clear();
+    setting.nis_gate = Some(0.999);
+    let rejected = |r: &RunResult| r.runs.iter().map(|run| run.rejected).sum::<u64>();
+    let matched = setting.run(80);
+    assert!(rejected(&matched[0]) <= 24, "{} of 8000", rejected(&matched[0]));
+    assert!(matched[0].runs.iter().all(|run| run.nis.1 + run.rejected == 100));
+    setting.gnss.correlated_pos_sigma_m = [6.0, 6.0, 6.0];
+    setting.gnss.correlation_time_s = 5.0;
+    let coloured = setting.run(80);
+    assert!(rejected(&coloured[0]) > 200, "{} of 8000", rejected(&coloured[0]));
 }

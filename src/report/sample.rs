@@ -34,6 +34,7 @@ pub(super) fn result() -> RunResult {
             reconvergence_s: 1.0 + f64::from(run),
         }],
         nis: (5.5 + 0.3 * f64::from(run), 8),
+        rejected: 0,
     };
     RunResult {
         epochs: (0..12).map(epoch).collect(),

@@ -140,6 +140,7 @@ pub fn parse_runs(text: &str) -> Result<Vec<RunRecord>, TableError> {
                 diverged: table.number(row, diverged)? > 0.0,
                 outages: Vec::new(),
                 nis: (table.number(row, nis)?, table.number(row, fixes)? as u64),
+                rejected: 0, // known to the summary only
             });
         }
         if table.rows[row][outage].is_empty() {

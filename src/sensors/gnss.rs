@@ -1,7 +1,7 @@
 //! The GNSS receiver: what it measures, how often and how well.
 
 use crate::rng::{Generator, StreamKey};
-use crate::units::{SettingError, require_finite, require_positive};
+use crate::units::{SettingError, require_finite, require_non_negative, require_positive};
 use glam::DVec3;
 use rand_distr::{Distribution, StandardNormal};
 use schemars::JsonSchema;
@@ -24,6 +24,11 @@ pub struct GnssSettings {
     pub vel_sigma_m_s: Option<[f64; 3]>,
     /// Antenna position with respect to the IMU, in b: front, right, down (m).
     pub lever_arm_m: [f64; 3],
+    /// Standard deviations of a correlated position error north, east, down (m): a Gauss-Markov process beside
+    /// the white noise, in the true receiver only. The filter believes `pos_sigma_m`, white.
+    pub correlated_pos_sigma_m: [f64; 3],
+    /// Correlation time of that error (s).
+    pub correlation_time_s: f64,
 }
 
 impl Default for GnssSettings {
@@ -33,6 +38,8 @@ impl Default for GnssSettings {
             pos_sigma_m: [2.0, 2.0, 4.0],
             vel_sigma_m_s: Some([0.04, 0.04, 0.06]),
             lever_arm_m: [0.0; 3],
+            correlated_pos_sigma_m: [0.0; 3],
+            correlation_time_s: 100.0,
         }
     }
 }
@@ -46,7 +53,9 @@ impl GnssSettings {
         require_positive("rate_hz", &[self.rate_hz])?;
         require_positive("pos_sigma_m", &self.pos_sigma_m)?;
         require_positive("vel_sigma_m_s", self.vel_sigma_m_s.as_ref().map_or(&[], |v| v.as_slice()))?;
-        require_finite("lever_arm_m", &self.lever_arm_m)
+        require_finite("lever_arm_m", &self.lever_arm_m)?;
+        require_non_negative("correlated_pos_sigma_m", &self.correlated_pos_sigma_m)?;
+        require_positive("correlation_time_s", &[self.correlation_time_s])
     }
 
     /// Components of one fix: 3 (position) or 6 (and velocity).
@@ -62,6 +71,30 @@ impl GnssSettings {
 pub struct GnssNoise {
     streams: [Generator; 6],
     sigma: [f64; 6],
+    correlated: [Correlated; 3],
+}
+
+/// One component of the correlated error: e_k = phi e_{k−1} + w, stationary from the first epoch.
+#[derive(Debug, Clone)]
+struct Correlated {
+    stream: Generator,
+    phi: f64,
+    sigma: f64,
+    /// None before the first epoch.
+    value: Option<f64>,
+}
+
+impl Correlated {
+    fn next(&mut self) -> f64 {
+        if self.sigma == 0.0 {
+            return 0.0;
+        }
+        let fresh = self.sigma * normal(&mut self.stream);
+        let innovation = (1.0 - self.phi * self.phi).sqrt();
+        let value = self.value.map_or(fresh, |before| self.phi * before + innovation * fresh);
+        self.value = Some(value);
+        value
+    }
 }
 
 impl GnssNoise {
@@ -72,13 +105,20 @@ impl GnssNoise {
         let streams = COMPONENTS.map(|process| StreamKey { source: "gnss", process, ..key }.generator());
         let velocity = settings.vel_sigma_m_s.unwrap_or([0.0; 3]);
         let sigma = std::array::from_fn(|i| if i < 3 { settings.pos_sigma_m[i] } else { velocity[i - 3] });
-        Self { streams, sigma }
+        let phi = (-1.0 / (settings.rate_hz * settings.correlation_time_s)).exp();
+        let correlated = std::array::from_fn(|i| {
+            let process = ["correlated_n", "correlated_e", "correlated_d"][i];
+            let stream = StreamKey { source: "gnss", process, ..key }.generator();
+            Correlated { stream, phi, sigma: settings.correlated_pos_sigma_m[i], value: None }
+        });
+        Self { streams, sigma, correlated }
     }
 
     /// Position error (m) and velocity error (m/s) of the next fix, n.
     pub fn draw(&mut self) -> (DVec3, DVec3) {
         let e: [f64; 6] = std::array::from_fn(|i| self.sigma[i] * normal(&mut self.streams[i]));
-        (DVec3::new(e[0], e[1], e[2]), DVec3::new(e[3], e[4], e[5]))
+        let slow = DVec3::from_array(std::array::from_fn(|i| self.correlated[i].next()));
+        (DVec3::new(e[0], e[1], e[2]) + slow, DVec3::new(e[3], e[4], e[5]))
     }
 }
 
@@ -146,6 +186,36 @@ mod tests {
         }
         let error = toml::from_str::<GnssSettings>("vel_sigma_m_s = \"nil\"").unwrap_err();
         assert!(error.message().contains("three numbers or \"none\""), "{error}");
+    }
+
+    /// White and correlated error together: variance sigma² + s², covariance at lag k s² phi^k. Over n
+    /// epochs the correlated part is worth n (1 − phi²)/(1 + phi²) independent ones; 5 deviations.
+    #[test]
+    fn the_correlated_error_has_its_variance_and_memory() {
+        let settings = GnssSettings {
+            pos_sigma_m: [1.0; 3],
+            correlated_pos_sigma_m: [3.0, 0.0, 2.0],
+            correlation_time_s: 20.0,
+            ..GnssSettings::default()
+        };
+        let key = StreamKey { seed: 4, scenario: "", run: 0, source: "", process: "" };
+        let mut noise = GnssNoise::new(&settings, key);
+        let n = 400_000;
+        let errors: Vec<DVec3> = (0..n).map(|_| noise.draw().0).collect();
+        let phi = (-1.0_f64 / 20.0).exp();
+        let independent = n as f64 * (1.0 - phi * phi) / (1.0 + phi * phi);
+        for (axis, s) in [(0, 3.0_f64), (1, 0.0), (2, 2.0)] {
+            for lag in [0, 5, 20] {
+                let products = errors.windows(lag + 1).map(|w| w[0][axis] * w[lag][axis]);
+                let found = products.sum::<f64>() / (n - lag) as f64;
+                let expected = s * s * phi.powi(lag as i32) + if lag == 0 { 1.0 } else { 0.0 };
+                let deviation = (s * s + 1.0) * (2.0 / independent).sqrt();
+                assert!(
+                    (found - expected).abs() < 5.0 * deviation,
+                    "axis {axis}, lag {lag}: {found} {expected}"
+                );
+            }
+        }
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! Sensors on a trajectory: what is measured, with which errors, and when it is missing.
 
+pub mod baro;
+pub mod defects;
 pub mod gnss;
 pub mod ideal_imu;
 pub mod imu;

@@ -5,12 +5,14 @@ use super::{COVERAGE_DOF, EpochSums, NEES_DOF, OutageRecord, REPORTED, RunRecord
 use crate::earth::{ned_difference, radii};
 use crate::ekf::covariance::{PSI, R, V};
 use crate::ekf::initial::psi_of_angles;
-use crate::ekf::{Ekf, Fix, advance, settle, update};
+use crate::ekf::{Ekf, Fix, advance, nis_limit, settle, update, update_height, update_within};
 use crate::frames::{NavState, RollPitchYaw};
-use crate::imu::Channel;
+use crate::imu::{Channel, ImuSample};
 use crate::lanes::{LANES, Lanes, Real, Vec3};
 use crate::linalg;
 use crate::rng::StreamKey;
+use crate::sensors::baro::BaroNoise;
+use crate::sensors::defects::Defects;
 use crate::sensors::gnss::GnssNoise;
 use crate::sensors::imu::ImuErrors;
 use crate::strapdown::Strapdown;
@@ -39,10 +41,11 @@ pub fn run_batch(plan: &Plan<'_>, first: u64, live: usize) -> Vec<Batch> {
     for (index, event) in plan.events.iter().enumerate() {
         let samples = &plan.ideal[done..event.sample];
         let fix = event.gnss_epoch.then(|| source.fix(plan, event));
-        let errors = source.errors(samples.len());
+        let height = source.height(event);
+        let errors = source.errors(samples);
         for candidate in &mut candidates {
             advance(&mut candidate.ekf, samples, errors);
-            candidate.at_event(plan, index, event, fix.as_ref().filter(|_| event.fix));
+            candidate.at_event(plan, index, event, fix.as_ref().filter(|_| event.fix), height.as_ref());
         }
         done = event.sample;
     }
@@ -53,6 +56,9 @@ pub fn run_batch(plan: &Plan<'_>, first: u64, live: usize) -> Vec<Batch> {
 struct Source<'a> {
     imu: Vec<ImuErrors<'a>>,
     gnss: Vec<GnssNoise>,
+    baro: Vec<BaroNoise>,
+    /// Empty for an IMU without defects.
+    defects: Vec<Defects>,
     keys: Vec<StreamKey<'a>>,
     /// Errors of the samples up to the next event, accelerometer and gyroscope.
     block: Vec<[Vec3; 2]>,
@@ -72,7 +78,12 @@ impl<'a> Source<'a> {
         let keys: Vec<_> = (first..first + live as u64).map(key).collect();
         let imu = keys.iter().map(|k| ImuErrors::new(experiment.truth, *k, plan.samples())).collect();
         let gnss = keys.iter().map(|k| GnssNoise::new(experiment.gnss, *k)).collect();
-        Self { imu, gnss, keys, block: Vec::new(), channel: Vec::new() }
+        let baro = experiment.baro.iter().flat_map(|b| keys.iter().map(|k| BaroNoise::new(b, *k))).collect();
+        let defects = match experiment.defects {
+            settings if settings.is_ideal() => Vec::new(),
+            settings => keys.iter().map(|k| Defects::draw(settings, *k)).collect(),
+        };
+        Self { imu, gnss, baro, defects, keys, block: Vec::new(), channel: Vec::new() }
     }
 
     /// The nominal starts: the truth and an error drawn from the initial standard deviations.
@@ -80,8 +91,9 @@ impl<'a> Source<'a> {
         self.keys.iter().map(|key| nominal_start(plan, *key)).collect()
     }
 
-    /// The inertial errors of the next `n` samples; idle lanes repeat the ideal.
-    fn errors(&mut self, n: usize) -> &[[Vec3; 2]] {
+    /// The inertial errors of the next samples; idle lanes repeat the ideal.
+    fn errors(&mut self, ideal: &[ImuSample]) -> &[[Vec3; 2]] {
+        let n = ideal.len();
         self.block.resize(n, [Vec3::ZERO; 2]);
         self.channel.resize(n, 0.0);
         for (lane, errors) in self.imu.iter_mut().enumerate() {
@@ -93,23 +105,30 @@ impl<'a> Source<'a> {
                 }
             }
         }
+        for (lane, defects) in self.defects.iter().enumerate() {
+            for (sample, truth) in self.block.iter_mut().zip(ideal) {
+                for (error, more) in sample.iter_mut().zip(defects.error(truth)) {
+                    error.set_lane(lane, error.lane(lane) + more);
+                }
+            }
+        }
         &self.block
+    }
+
+    /// The heights of this epoch, if the barometer has one.
+    fn height(&mut self, event: &Event) -> Option<Lanes> {
+        let mut h = Lanes::splat(event.reference.h);
+        for (lane, noise) in self.baro.iter_mut().enumerate().filter(|_| event.baro) {
+            h[lane] += noise.draw();
+        }
+        event.baro.then_some(h)
     }
 
     /// The fixes of this epoch.
     fn fix(&mut self, plan: &Plan<'_>, event: &Event) -> Fix {
-        let gnss = plan.experiment.gnss;
         let (antenna, velocity) = event.antenna;
         let r = radii(antenna.x.sin());
-        let mut fix = Fix {
-            lat: Lanes::splat(antenna.x),
-            lon: Lanes::splat(antenna.y),
-            h: Lanes::splat(antenna.z),
-            v_n: gnss.vel_sigma_m_s.map(|_| Vec3::splat(velocity)),
-            pos_sigma_m: gnss.pos_sigma_m.into(),
-            vel_sigma_m_s: gnss.vel_sigma_m_s.unwrap_or_default().into(),
-            lever_arm_b: gnss.lever_arm_m.into(),
-        };
+        let mut fix = exact_fix(plan, event);
         for (lane, noise) in self.gnss.iter_mut().enumerate() {
             let (position, speed) = noise.draw();
             fix.lat[lane] += position.x / (r.meridian + antenna.z);
@@ -120,6 +139,21 @@ impl<'a> Source<'a> {
             }
         }
         fix
+    }
+}
+
+/// The fix of a receiver without noise, with the standard deviations of the one that is simulated.
+pub(super) fn exact_fix(plan: &Plan<'_>, event: &Event) -> Fix {
+    let gnss = plan.experiment.gnss;
+    let (antenna, velocity) = event.antenna;
+    Fix {
+        lat: Lanes::splat(antenna.x),
+        lon: Lanes::splat(antenna.y),
+        h: Lanes::splat(antenna.z),
+        v_n: gnss.vel_sigma_m_s.map(|_| Vec3::splat(velocity)),
+        pos_sigma_m: gnss.pos_sigma_m.into(),
+        vel_sigma_m_s: gnss.vel_sigma_m_s.unwrap_or_default().into(),
+        lever_arm_b: gnss.lever_arm_m.into(),
     }
 }
 
@@ -154,8 +188,10 @@ struct Candidate {
     trace: Vec<EpochLanes>,
     /// For each outage and run.
     outages: Vec<[OutageRecord; LANES]>,
-    /// Sum of the NIS and fixes used.
-    nis: (Lanes, u64),
+    /// For each run: sum of the NIS of the fixes used, their number, fixes refused.
+    nis: [(f64, u64, u64); LANES],
+    /// Largest NIS of a fix that is used, if there is a gate.
+    limit: Option<f64>,
 }
 
 /// What eight runs report at one epoch.
@@ -182,22 +218,47 @@ impl Candidate {
             live,
             trace: Vec::with_capacity(plan.events.len()),
             outages: plan.experiment.outages.iter().map(|_| outage()).collect(),
-            nis: (Lanes::ZERO, 0),
+            nis: [(0.0, 0, 0); LANES],
+            limit: plan.experiment.nis_gate.map(|p| nis_limit(p, plan.experiment.gnss.components())),
         }
     }
 
     /// Outage ends, the fix if one is used, the report if one is due.
-    fn at_event(&mut self, plan: &Plan<'_>, index: usize, event: &Event, fix: Option<&Fix>) {
+    fn at_event(
+        &mut self,
+        plan: &Plan<'_>,
+        index: usize,
+        event: &Event,
+        fix: Option<&Fix>,
+        height: Option<&Lanes>,
+    ) {
         self.end_outages(plan, index, event);
         if let Some(fix) = fix {
-            let nis = update(&mut self.ekf, fix);
-            self.nis = (self.nis.0 + nis, self.nis.1 + 1);
+            self.use_fix(fix);
+        }
+        if let (Some(h), Some(baro)) = (height, plan.experiment.baro) {
+            let _ = update_height(&mut self.ekf, h, baro.sigma_m);
         }
         if event.report {
             settle(&mut self.ekf);
             let epoch = self.report(plan, event);
             self.follow_outages(plan, event, &epoch);
             self.trace.push(epoch);
+        }
+    }
+
+    fn use_fix(&mut self, fix: &Fix) {
+        let (nis, refused) = match self.limit {
+            Some(limit) => update_within(&mut self.ekf, fix, limit),
+            None => (update(&mut self.ekf, fix), [false; LANES]),
+        };
+        for (lane, (sum, used, rejected)) in self.nis.iter_mut().enumerate() {
+            if refused[lane] {
+                *rejected += 1;
+            } else {
+                *sum += nis[lane];
+                *used += 1;
+            }
         }
     }
 
@@ -282,7 +343,8 @@ impl Candidate {
             run: first + lane as u64,
             diverged: diverged[lane],
             outages: self.outages.iter().map(|records| records[lane].clone()).collect(),
-            nis: (self.nis.0[lane] / self.nis.1.max(1) as f64, self.nis.1),
+            nis: (self.nis[lane].0 / self.nis[lane].1.max(1) as f64, self.nis[lane].1),
+            rejected: self.nis[lane].2,
         };
         Batch { epochs, runs: (0..self.live).map(record).collect() }
     }
@@ -318,7 +380,7 @@ impl EpochLanes {
 
 /// Standard deviations of the reported states: metres, m/s, degrees of roll, pitch, yaw through the
 /// Jacobian at the true attitude.
-fn standard_deviations(ekf: &Ekf, jacobian: &[DVec3; 3]) -> [Lanes; REPORTED] {
+pub(super) fn standard_deviations(ekf: &Ekf, jacobian: &[DVec3; 3]) -> [Lanes; REPORTED] {
     let (r, v) = (ekf.p.variances(R), ekf.p.variances(V));
 
     std::array::from_fn(|i| match i {

@@ -1,10 +1,12 @@
 //! One lane batch: eight runs through one trajectory.
 
 mod batch;
+mod covariance_pass;
 mod plan;
 mod recording;
 
 pub use batch::{Batch, run_batch};
+pub use covariance_pass::{CovariancePass, covariance_pass};
 pub use plan::{Experiment, ExperimentError, Plan};
 pub use recording::{Recording, record};
 
@@ -84,6 +86,8 @@ pub struct RunRecord {
     pub outages: Vec<OutageRecord>,
     /// Mean NIS of its GNSS updates (per fix) and how many fixes.
     pub nis: (f64, u64),
+    /// Fixes refused by the gate on the NIS.
+    pub rejected: u64,
 }
 
 /// All runs of one experiment, reduced in run order.

@@ -5,6 +5,8 @@ use crate::ekf::{Belief, InitialSettings};
 use crate::frames::NavState;
 use crate::imu::ImuSample;
 use crate::noise::continuous::same_rate;
+use crate::sensors::baro::BaroSettings;
+use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
 use crate::sensors::ideal_imu::{self, ideal_imu};
 use crate::sensors::imu::{Truth, TruthError};
@@ -32,6 +34,12 @@ pub struct Experiment<'a> {
     pub gnss: &'a GnssSettings,
     /// The start.
     pub initial: &'a InitialSettings,
+    /// What is wrong with the true IMU beside its noise.
+    pub defects: &'a ImuSettings,
+    /// A barometer, if there is one.
+    pub baro: Option<&'a BaroSettings>,
+    /// Probability of the gate on the NIS of fixes, if there is one.
+    pub nis_gate: Option<f64>,
     /// When fixes are missing.
     pub outages: &'a [Outage],
     /// Seed of all random numbers.
@@ -84,12 +92,14 @@ pub enum ExperimentError {
         imu_hz: f64,
     },
     /// A fix that meets no sample.
-    #[error("the IMU rate {imu_hz} Hz is not a whole multiple of the GNSS rate {gnss_hz} Hz")]
+    #[error("the IMU rate {imu_hz} Hz is not a whole multiple of the rate {fix_hz} Hz of {what}")]
     FixBetweenSamples {
         /// IMU rate (Hz).
         imu_hz: f64,
-        /// GNSS rate (Hz).
-        gnss_hz: f64,
+        /// Rate of the fixes (Hz).
+        fix_hz: f64,
+        /// Whose.
+        what: &'static str,
     },
 }
 
@@ -108,6 +118,8 @@ pub(super) struct Event {
     pub(super) gnss_epoch: bool,
     /// Whether its fix is used.
     pub(super) fix: bool,
+    /// Whether the barometer has a height here.
+    pub(super) baro: bool,
     /// Whether the epoch is reported (1 Hz).
     pub(super) report: bool,
 }
@@ -183,15 +195,13 @@ fn check_rotation(ideal: &[ImuSample], start_s: f64, rate_hz: f64) -> Result<(),
 /// Reports at every second from the start, fixes at every GNSS epoch after it, in time order.
 fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, ExperimentError> {
     let Experiment { trajectory, rate_hz, gnss, .. } = *experiment;
-    let per_fix = rate_hz / gnss.rate_hz;
-    if per_fix < 0.5 || (per_fix - per_fix.round()).abs() > 1e-6 * per_fix {
-        return Err(ExperimentError::FixBetweenSamples { imu_hz: rate_hz, gnss_hz: gnss.rate_hz });
-    }
-    let per_fix = per_fix.round() as usize;
+    let per_fix = samples_per(rate_hz, gnss.rate_hz, "GNSS")?;
+    let baro = experiment.baro.map(|b| samples_per(rate_hz, b.rate_hz, "the barometer")).transpose()?;
     let reports = (0_u32..).map(|s| (f64::from(s) * rate_hz).round() as usize);
     let reports: Vec<usize> = reports.take_while(|k| *k <= samples).collect();
     let mut all = reports.clone();
     all.extend((per_fix..=samples).step_by(per_fix));
+    all.extend(baro.iter().flat_map(|step| (*step..=samples).step_by(*step)));
     all.push(samples);
     all.sort_unstable();
     all.dedup();
@@ -211,10 +221,20 @@ fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, E
             antenna: antenna(experiment, t_s, &reference),
             gnss_epoch,
             fix: gnss_epoch && !withheld,
+            baro: baro.is_some_and(|step| sample > 0 && sample.is_multiple_of(step)),
             report: reports.binary_search(&sample).is_ok(),
         })
     };
     all.into_iter().map(event).collect()
+}
+
+/// IMU samples from one measurement to the next.
+fn samples_per(imu_hz: f64, fix_hz: f64, what: &'static str) -> Result<usize, ExperimentError> {
+    let samples = imu_hz / fix_hz;
+    if samples < 0.5 || (samples - samples.round()).abs() > 1e-6 * samples {
+        return Err(ExperimentError::FixBetweenSamples { imu_hz, fix_hz, what });
+    }
+    Ok(samples.round() as usize)
 }
 
 /// Position (lat, lon, h) and velocity in n of the antenna.

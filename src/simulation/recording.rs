@@ -7,6 +7,7 @@ use crate::frames::NavState;
 use crate::gnss::GnssFix;
 use crate::imu::{Channel, ImuIncrement, Sensor};
 use crate::rng::StreamKey;
+use crate::sensors::defects::Defects;
 use crate::sensors::gnss::GnssNoise;
 use crate::sensors::imu::ImuErrors;
 use glam::DVec3;
@@ -55,6 +56,7 @@ fn inertial(plan: &Plan<'_>, key: StreamKey<'_>) -> Vec<ImuIncrement> {
         signal
     };
     let signals = Channel::ALL.map(|channel| of(channel, &mut errors));
+    let defects = Defects::draw(plan.experiment.defects, key);
     let triad = |sensor: Sensor, k: usize| {
         let first = 3 * sensor as usize;
         DVec3::new(signals[first][k], signals[first + 1][k], signals[first + 2][k])
@@ -63,8 +65,8 @@ fn inertial(plan: &Plan<'_>, key: StreamKey<'_>) -> Vec<ImuIncrement> {
     let sample = |(k, ideal): (usize, &crate::imu::ImuSample)| ImuIncrement {
         t_s: start_s + (k + 1) as f64 / rate_hz,
         dt_s,
-        dtheta: (ideal.omega_ib_b + triad(Sensor::Gyro, k)) * dt_s,
-        dv: (ideal.f_ib_b + triad(Sensor::Accel, k)) * dt_s,
+        dtheta: (ideal.omega_ib_b + defects.error(ideal)[1] + triad(Sensor::Gyro, k)) * dt_s,
+        dv: (ideal.f_ib_b + defects.error(ideal)[0] + triad(Sensor::Accel, k)) * dt_s,
     };
     plan.ideal.iter().enumerate().map(sample).collect()
 }

@@ -2,6 +2,7 @@
 
 mod inputs;
 mod output;
+mod reduced;
 
 use super::{Failure, Session};
 use inputs::Inputs;
@@ -125,14 +126,18 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         beliefs: std::slice::from_ref(&belief),
         gnss: &scenario.gnss,
         initial: &scenario.initial,
+        defects: &scenario.imu,
+        baro: scenario.baro.as_ref(),
+        nis_gate: scenario.filter.nis_gate,
         outages: &outages,
         seed,
         scenario: "",
         coverage_level: scenario.run.coverage_level,
     };
+    let reduction = reduced::reduction(&scenario, &inputs.model, &belief, &experiment, session)?;
     let (results, wall_s) = simulate(&experiment, scenario.run.runs, session)?;
     let manifest = manifest(scenario, &outages, seed, inputs.files.clone(), inputs.note.clone(), session);
-    let summary = write(&results[0], &Manifest { wall_s, ..manifest }, &args.out)?;
+    let summary = write(&results[0], &Manifest { wall_s, ..manifest }, reduction, &args.out)?;
     let shown = if session.json() { report::json(&summary) } else { text(&summary) };
     session.printer.result(shown.trim_end());
     session.printer.say(&format!("wrote {}", args.out.display()));

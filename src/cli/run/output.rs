@@ -3,7 +3,7 @@
 use crate::cli::compare::table;
 use crate::cli::{Failure, Session};
 use nav_sim::data::atomic::{self, AtomicDir};
-use nav_sim::metrics::{self, OutageSummary, Summary};
+use nav_sim::metrics::{self, OutageSummary, ReductionSummary, Summary};
 use nav_sim::report::{self, Input, Manifest, ModelNote};
 use nav_sim::scenario::Scenario;
 use nav_sim::sensors::outage::Outage;
@@ -47,9 +47,14 @@ pub(crate) fn try_open(path: &Path, inputs: &[Input]) -> Result<(), Failure> {
 }
 
 /// Writes a run directory.
-pub(crate) fn write(result: &RunResult, manifest: &Manifest, path: &Path) -> Result<Summary, Failure> {
+pub(crate) fn write(
+    result: &RunResult,
+    manifest: &Manifest,
+    reduction: Option<ReductionSummary>,
+    path: &Path,
+) -> Result<Summary, Failure> {
     let epochs = metrics::epochs(&result.epochs);
-    let summary = Summary::of(result, &epochs, manifest.seed, manifest.wall_s);
+    let summary = Summary { reduction, ..Summary::of(result, &epochs, manifest.seed, manifest.wall_s) };
     let mut directory = AtomicDir::create(path)?;
     for file in report::run_directory(result, &epochs, &summary, manifest) {
         directory.write(file.name, file.contents)?;
