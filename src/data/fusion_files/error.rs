@@ -11,7 +11,7 @@ use crate::imu::Channel;
 pub enum FusionFileError {
     /// A table that is none.
     #[error(transparent)]
-    Table(#[from] TrajectoryFileError),
+    Table(Box<TrajectoryFileError>),
     /// An IMU file that cannot be read.
     #[error(transparent)]
     Imu(#[from] RecordingError),
@@ -49,6 +49,12 @@ pub enum FusionFileError {
     TooFew { path: String, found: usize, needed: usize },
 }
 
+impl From<TrajectoryFileError> for FusionFileError {
+    fn from(e: TrajectoryFileError) -> Self {
+        Self::Table(Box::new(e))
+    }
+}
+
 impl FusionFileError {
     /// Whether the system, not the contents, is at fault.
     #[must_use]
@@ -69,10 +75,12 @@ impl FusionFileError {
                             have v_n_m_s, v_e_m_s, v_d_m_s, sd_vn_m_s, sd_ve_m_s, sd_vd_m_s; or it is a KF-GINS text \
                             of 7 columns";
         let text = match self {
-            Self::Table(T::NoHeader { .. } | T::MissingColumns { .. } | T::Empty { .. }) => GNSS,
-            Self::Table(T::RowLength { .. }) => "every row needs one value a column; was the file cut off?",
-            Self::Table(T::Cell { .. }) => "remove the row: a fix that is not whole is no fix",
-            Self::Table(e) => return e.hint(),
+            Self::Table(e) => match **e {
+                T::NoHeader { .. } | T::MissingColumns { .. } | T::Empty { .. } => GNSS,
+                T::RowLength { .. } => "every row needs one value a column; was the file cut off?",
+                T::Cell { .. } => "remove the row: a fix that is not whole is no fix",
+                _ => return e.hint(),
+            },
             Self::Imu(e) => return e.hint(),
             Self::Initial(e) => return e.hint(),
             Self::Missing { .. } | Self::NoTime { .. } => {
