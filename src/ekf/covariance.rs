@@ -90,6 +90,9 @@ impl Covariance {
     pub(super) fn copy_lane(&mut self, other: &Self, lane: usize) {
         for (to, from) in self.p.iter_mut().zip(&other.p) {
             to[lane] = from[lane];
+        }
+    }
+
     /// P⁺ = A P Aᵀ + Q for a map A of the navigation error and the transition of the biases; the biases
     /// take their step first: `b_k = phi b_{k−1} + w`, and the map uses `b_k`. Groups of the accelerometer
     /// come first.
