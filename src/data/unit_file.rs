@@ -17,7 +17,7 @@ const CHECKSUM: usize = 32;
 /// Numbers of an outage record, an epoch, and a run without its outages.
 const OUTAGE: usize = 2 * REPORTED + 2;
 const EPOCH: usize = 4 + 5 * REPORTED + 6;
-const RUN: usize = 4;
+const RUN: usize = 5;
 
 /// A unit file that cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -134,7 +134,7 @@ fn put(bytes: &mut Vec<u8>, values: &[f64]) {
 }
 
 fn put_run(bytes: &mut Vec<u8>, run: &RunRecord) {
-    for word in [run.run, u64::from(run.diverged), run.nis.1] {
+    for word in [run.run, u64::from(run.diverged), run.nis.1, run.rejected] {
         bytes.extend(word.to_le_bytes());
     }
     put(bytes, &[run.nis.0]);
@@ -216,7 +216,7 @@ impl Words<'_> {
 }
 
 fn run(outages: usize, words: &mut Words<'_>) -> RunRecord {
-    let (run, diverged, fixes) = (words.int(), words.int() != 0, words.int());
+    let (run, diverged, fixes, rejected) = (words.int(), words.int() != 0, words.int(), words.int());
     let nis = (words.float(), fixes);
     let outage = |_| OutageRecord {
         see_mean: words.floats(),
@@ -224,7 +224,7 @@ fn run(outages: usize, words: &mut Words<'_>) -> RunRecord {
         horizontal_error_end_m: words.float(),
         reconvergence_s: words.float(),
     };
-    RunRecord { run, diverged, outages: (0..outages).map(outage).collect(), nis }
+    RunRecord { run, diverged, outages: (0..outages).map(outage).collect(), nis, rejected }
 }
 
 fn epoch(words: &mut Words<'_>) -> EpochSums {
@@ -262,6 +262,7 @@ mod tests {
             diverged: k == 1,
             outages: vec![outage(k), outage(k + 1)],
             nis: (value(k), 700),
+            rejected: 3 + k as u64,
         };
         let epoch = |k: usize| EpochSums {
             t_s: k as f64,
