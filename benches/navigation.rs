@@ -1,79 +1,93 @@
-//! What an epoch costs: filter with and without noise, beside a dense filter of the same states.
+//! What an epoch costs: noise, filter and fix, beside references that do the same another way.
 //!
-//! `cargo bench --bench navigation` prints, for one IMU epoch of one run: the strapdown and covariance of
-//! the lane filter (15 and 27 states), the noise of six N2 axes, and a dense 15-state covariance step.
+//! `cargo bench --bench navigation` prints the time of a round of [`SAMPLES`] IMU samples (of eight runs for
+//! the lane kernels, of one for the references) and run-epochs a second. The references are a dense
+//! 15-state covariance step in nalgebra, without strapdown, and kinavis-ins, a public 15-state filter in
+//! f64, strapdown and covariance.
 
-use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
-use glam::DVec3;
+use criterion::measurement::WallTime;
+use criterion::{BatchSize, BenchmarkGroup, Criterion, Throughput, criterion_group, criterion_main};
+use kinavis_ins::{ImuNoise, ImuSample, InsFilter, InsPriors, Quaternion, gravity_down};
+use kinavis_kernel::{
+    Angle, Distance, GeodeticPoint, Height, Instant, Position, Speed, TrueCourse, Utc, Vector3,
+};
 use nalgebra::SMatrix;
-use nav_sim::earth::GravityModel;
-use nav_sim::ekf::{Belief, Ekf, FilterStates, InitialSettings, advance};
-use nav_sim::frames::{NavState, RollPitchYaw};
-use nav_sim::imu::{Channel, ImuSample};
-use nav_sim::lanes::{LANES, Vec3};
-use nav_sim::noise::{Ar1, Composite, Model, Process, Quantization, RandomWalk, White};
-use nav_sim::rng::StreamKey;
-use nav_sim::sensors::imu::{ImuErrors, Truth};
-use nav_sim::strapdown::Strapdown;
+use nav_sim::ekf::FilterStates;
+use nav_sim::lanes::Level;
+use nav_sim::throughput::{Load, RUN_EPOCHS, SAMPLES, model};
 use std::hint::black_box;
+use std::time::Duration;
 
-const EPOCHS: usize = 100;
+const VALID: &str = "the parameters are in their domains";
 
-fn n2(scale: f64) -> Composite {
-    let new = "parameters are in their domains";
-    Composite::new(vec![
-        Process::White(White::new(scale * 5e-5).expect(new)),
-        Process::Quantization(Quantization::new(scale * 1e-7).expect(new)),
-        Process::Ar1(Ar1::new(0.9835, scale * 1.3e-8).expect(new)),
-        Process::Ar1(Ar1::new(0.9999, scale * 1e-11).expect(new)),
-        Process::RandomWalk(RandomWalk::new(scale * 2.9e-11).expect(new)),
-    ])
-}
-
-fn filter(model: &Model, states: FilterStates) -> Ekf {
-    let belief = Belief::new(model, states, 1.0, 800.0).expect("N2 can be reduced");
-    let attitude = RollPitchYaw { roll: 0.02, pitch: 0.03, yaw: 1.0 };
-    let v_n = DVec3::new(10.0, 5.0, 0.0);
-    let start = NavState { lat: 0.8, lon: 0.1, h: 400.0, v_n, q_b_n: attitude.to_quat() };
-    Ekf::new(Strapdown::new(&start, GravityModel::Wgs84), &belief, &start, &InitialSettings::default())
-}
-
-fn epochs(c: &mut Criterion) {
-    let model = Model::pooled(100.0, &n2(1.0), &n2(1e-2));
-    let sample = ImuSample { omega_ib_b: DVec3::new(0.01, 0.02, 0.1), f_ib_b: DVec3::new(0.5, 1.0, -9.8) };
-    let (samples, errors) = (vec![sample; EPOCHS], vec![[Vec3::ZERO; 2]; EPOCHS]);
+fn run_epochs(c: &mut Criterion) {
+    let model = model().expect(VALID);
     let mut group = c.benchmark_group("run-epoch");
-    for (name, states) in [("filter-15", FilterStates::Reduced15), ("filter-27", FilterStates::Full)] {
-        group.throughput(Throughput::Elements((EPOCHS * LANES) as u64));
-        let start = filter(&model, states);
-        group.bench_function(name, |b| {
-            b.iter_batched_ref(
-                || start.clone(),
-                |ekf| advance(black_box(ekf), black_box(&samples), black_box(&errors)),
-                BatchSize::SmallInput,
-            );
-        });
+    group.throughput(Throughput::Elements(RUN_EPOCHS as u64));
+    let load = |states, level| Load::new(&model, states, level).expect(VALID);
+    let (reduced, full) = (FilterStates::Reduced15, FilterStates::Full);
+    for (name, states, level) in [
+        ("filter-15", reduced, Level::best()),
+        ("filter-15-avx2", reduced, Level::Avx2),
+        ("filter-15-portable", reduced, Level::Portable),
+        ("filter-27", full, Level::best()),
+    ] {
+        let mut load = load(states, level);
+        load.noise();
+        let second = |load: &mut Load<'_>| black_box(load).filter();
+        group.bench_function(name, |b| b.iter_batched_ref(|| load.clone(), second, BatchSize::SmallInput));
     }
-    group.throughput(Throughput::Elements(EPOCHS as u64));
-    group.bench_function("noise-n2-six-axes", |b| {
-        let key = StreamKey { seed: 1, scenario: "", run: 0, source: "", process: "" };
-        let mut noise = ImuErrors::new(Truth::Model(&model), key, EPOCHS);
-        let mut out = vec![0.0; EPOCHS];
-        b.iter(|| Channel::ALL.into_iter().for_each(|c| noise.fill(c, black_box(&mut out))));
-    });
-    group.bench_function("dense-15-reference", |b| {
-        let mut p = SMatrix::<f64, 15, 15>::identity();
-        let q = SMatrix::<f64, 15, 15>::identity() * 1e-9;
-        let phi = SMatrix::<f64, 15, 15>::from_fn(|i, j| f64::from(u8::from(i == j)) + 1e-4 * (i + j) as f64);
+    let mut whole = load(reduced, Level::best());
+    group.bench_function("noise-n2-six-axes", |b| b.iter(|| black_box(&mut whole).noise()));
+    group.bench_function("fix", |b| b.iter(|| black_box(&mut whole).fix()));
+    group.bench_function("second", |b| {
         b.iter(|| {
-            for _ in 0..EPOCHS {
+            whole.noise();
+            whole.filter();
+            whole.fix()
+        });
+    });
+    group.throughput(Throughput::Elements(SAMPLES as u64));
+    dense_reference(&mut group);
+    public_filter(&mut group);
+    group.finish();
+}
+
+/// P ← Phi P Phiᵀ + Q, 15 × 15, as one would write it first.
+fn dense_reference(group: &mut BenchmarkGroup<'_, WallTime>) {
+    let mut p = SMatrix::<f64, 15, 15>::identity();
+    let q = SMatrix::<f64, 15, 15>::identity() * 1e-9;
+    let phi = SMatrix::<f64, 15, 15>::from_fn(|i, j| f64::from(u8::from(i == j)) + 1e-4 * (i + j) as f64);
+    group.bench_function("dense-covariance-15", |b| {
+        b.iter(|| {
+            for _ in 0..SAMPLES {
                 p = black_box(phi) * p * phi.transpose() * 0.5 + q;
             }
             p
         });
     });
-    group.finish();
 }
 
-criterion_group!(benches, epochs);
+/// A public filter of the same states on the same second: at rest, 100 Hz.
+fn public_filter(group: &mut BenchmarkGroup<'_, WallTime>) {
+    let start = Instant::<Utc>::from_unix_seconds(1_789_000_000);
+    let place = Position::from_degrees(45.8, 5.7).expect(VALID);
+    let point =
+        GeodeticPoint::new(place, Height::above_ellipsoid(Distance::from_metres(400.0).expect(VALID)));
+    let still = Vector3::new(Speed::ZERO, Speed::ZERO, Speed::ZERO);
+    let level = Quaternion::from_euler(Angle::ZERO, Angle::ZERO, TrueCourse::new(0.0).expect(VALID));
+    let nominal = kinavis_ins::Strapdown::new(start, point, still, level).expect(VALID);
+    let mut filter = InsFilter::new(nominal, ImuNoise::mems(), &InsPriors::standard());
+    let gravity = gravity_down(45.8_f64.to_radians().sin(), 400.0);
+    let sample = ImuSample::new([0.0; 3], [0.0, 0.0, -gravity], Duration::from_millis(10)).expect(VALID);
+    group.bench_function("kinavis-ins-15", |b| {
+        b.iter(|| {
+            for _ in 0..SAMPLES {
+                black_box(&mut filter).predict(&sample).expect("at rest");
+            }
+        });
+    });
+}
+
+criterion_group!(benches, run_epochs);
 criterion_main!(benches);

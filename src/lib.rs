@@ -53,6 +53,7 @@ pub mod fusion;
 pub mod monte_carlo;
 pub mod scenario;
 pub mod simulation;
+pub mod throughput;
 // L6
 pub mod metrics;
 // L7

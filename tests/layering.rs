@@ -27,6 +27,7 @@ const MAY_NAME: &[(&str, &[&str])] = &[
     ("fusion", &["@L1", "noise", "trajectory", "sensors", "strapdown", "ekf"]),
     ("scenario", &["@L1", "noise", "trajectory", "sensors", "strapdown", "ekf"]),
     ("simulation", &["@L1", "noise", "trajectory", "sensors", "strapdown", "ekf"]),
+    ("throughput", &["@L1", "noise", "sensors", "strapdown", "ekf"]),
     ("monte_carlo", &["@L1", "noise", "trajectory", "sensors", "strapdown", "ekf", "simulation"]),
     ("metrics", &["@L1", "noise", "ekf", "simulation", "monte_carlo"]),
     (

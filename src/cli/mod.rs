@@ -2,6 +2,7 @@
 
 mod axes;
 mod batch;
+mod bench;
 mod calibrate;
 mod check;
 mod common;
@@ -60,6 +61,8 @@ enum Command {
     Schema(schema::Args),
     Completions(completions::Args),
     Man(man::Args),
+    #[command(hide = true)]
+    Bench(bench::Args),
 }
 
 impl Command {
@@ -80,6 +83,7 @@ impl Command {
             Self::Schema(args) => schema::run(&args, session),
             Self::Completions(args) => completions::run(&args, session),
             Self::Man(args) => man::run(&args, session),
+            Self::Bench(args) => bench::run(&args, session),
         }
     }
 }

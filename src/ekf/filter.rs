@@ -93,6 +93,12 @@ impl Ekf {
         }
     }
 
+    /// The same filter with other vector units, for comparison; portable where the machine lacks them.
+    #[must_use]
+    pub fn at_level(self, level: Level) -> Self {
+        Self { level, ..self }
+    }
+
     /// The next samples last `dt` seconds, whatever the belief's own rate: white noise keeps its density,
     /// biases their correlation time and variance. For recorded data, whose clock is not even and whose
     /// samples are split where a fix falls between them.

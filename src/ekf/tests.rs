@@ -334,8 +334,7 @@ fn splitting_a_bias_into_two_states_changes_nothing_outside() {
 #[test]
 fn every_vector_unit_computes_the_same() {
     let run = |level: Level| {
-        let mut filter = ekf(&gauss_markov_model(), FilterStates::Full);
-        filter.level = level;
+        let mut filter = ekf(&gauss_markov_model(), FilterStates::Full).at_level(level);
         for k in 0..6000 {
             let (omega, f) = manoeuvre(k as f64 * 0.01);
             predict(&mut filter, omega, f);

@@ -56,6 +56,16 @@ impl Level {
     }
 }
 
+impl std::fmt::Display for Level {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Portable => "none used (portable)",
+            Self::Avx2 => "AVX2 + FMA",
+            Self::Avx512 => "AVX-512",
+        })
+    }
+}
+
 /// A computation written for any width. `run` and all it calls must be `#[inline(always)]`, loops rather
 /// than closures or `array::map`: what is not inlined into the dispatching function is not compiled for
 /// the wider units (a factor of four from one `map`, seen in the profile).

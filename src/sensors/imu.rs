@@ -1,6 +1,7 @@
 //! The errors of the inertial sensors, run by run: synthesised from a model, or windows of recordings.
 
 use crate::imu::{Channel, Recording};
+use crate::lanes::Vec3;
 use crate::noise::continuous::same_rate;
 use crate::noise::{Model, Synthesizer};
 use crate::rng::StreamKey;
@@ -139,6 +140,45 @@ impl<'a> ImuErrors<'a> {
                 *left = later;
             }
         }
+    }
+}
+
+/// The errors of up to eight runs, side by side.
+#[derive(Debug, Clone)]
+pub struct LaneErrors<'a> {
+    runs: Vec<ImuErrors<'a>>,
+    /// For each sample, accelerometer (m/s²) and gyroscope (rad/s).
+    block: Vec<[Vec3; 2]>,
+    channel: Vec<f64>,
+}
+
+impl<'a> LaneErrors<'a> {
+    /// Of at most eight runs; the lanes beyond them are without error.
+    #[must_use]
+    pub const fn new(runs: Vec<ImuErrors<'a>>) -> Self {
+        Self { runs, block: Vec::new(), channel: Vec::new() }
+    }
+
+    /// Draws the errors of the next `n` samples: accelerometer (m/s²) and gyroscope (rad/s).
+    pub fn next(&mut self, n: usize) -> &mut [[Vec3; 2]] {
+        self.block.resize(n, [Vec3::ZERO; 2]);
+        self.channel.resize(n, 0.0);
+        for (lane, errors) in self.runs.iter_mut().enumerate() {
+            for channel in Channel::ALL {
+                errors.fill(channel, &mut self.channel);
+                let (sensor, axis) = (channel.sensor as usize, channel.axis as usize);
+                for (sample, value) in self.block.iter_mut().zip(&self.channel) {
+                    sample[sensor][axis][lane] = *value;
+                }
+            }
+        }
+        &mut self.block
+    }
+
+    /// What was drawn last.
+    #[must_use]
+    pub fn drawn(&self) -> &[[Vec3; 2]] {
+        &self.block
     }
 }
 

@@ -1,0 +1,91 @@
+//! A standard load, part by part: what the benches and `nav-sim bench` time.
+//!
+//! Eight runs of a consumer-grade IMU (N2 noise on six axes, 100 Hz) at rest, one second at a time: noise,
+//! prediction, one fix. What a second costs does not depend on what the vehicle does.
+
+use crate::earth::{GravityModel, gravity_down};
+use crate::ekf::{Belief, BeliefError, Ekf, FilterStates, Fix, InitialSettings, advance, update};
+use crate::frames::NavState;
+use crate::imu::ImuSample;
+use crate::lanes::{LANES, Lanes, Level, Vec3};
+use crate::noise::{Ar1, Composite, Model, ParameterError, Process, Quantization, RandomWalk, White};
+use crate::rng::StreamKey;
+use crate::sensors::imu::{ImuErrors, LaneErrors, Truth};
+use crate::strapdown::Strapdown;
+use glam::{DQuat, DVec3};
+
+/// IMU samples of one round.
+pub const SAMPLES: usize = 100;
+/// Run-epochs of one round: one IMU sample of one run each.
+pub const RUN_EPOCHS: usize = SAMPLES * LANES;
+
+/// The noise model of the load: N2, two AR1 + RW + WN + QN, at 100 Hz.
+///
+/// # Errors
+/// None for these parameters.
+pub fn model() -> Result<Model, ParameterError> {
+    let axis = |scale: f64| -> Result<Composite, ParameterError> {
+        Ok(Composite::new(vec![
+            Process::White(White::new(scale * 5e-5)?),
+            Process::Quantization(Quantization::new(scale * 1e-7)?),
+            Process::Ar1(Ar1::new(0.9835, scale * 1.3e-8)?),
+            Process::Ar1(Ar1::new(0.9999, scale * 1e-11)?),
+            Process::RandomWalk(RandomWalk::new(scale * 2.9e-11)?),
+        ]))
+    };
+    Ok(Model::pooled(100.0, &axis(1.0)?, &axis(1e-2)?))
+}
+
+/// One batch of eight runs, a second at a time.
+#[derive(Debug, Clone)]
+pub struct Load<'a> {
+    ekf: Ekf,
+    samples: [ImuSample; SAMPLES],
+    errors: LaneErrors<'a>,
+    fix: Fix,
+}
+
+impl<'a> Load<'a> {
+    /// With a model for truth and filter, a filter variant and a dispatch level.
+    ///
+    /// # Errors
+    /// When the model cannot be made into filter states.
+    pub fn new(model: &'a Model, states: FilterStates, level: Level) -> Result<Self, BeliefError> {
+        let belief = Belief::new(model, states, 1.0, 800.0)?;
+        let start = NavState { lat: 0.8, lon: 0.1, h: 400.0, v_n: DVec3::ZERO, q_b_n: DQuat::IDENTITY };
+        let gravity = GravityModel::Wgs84;
+        let f_ib_b = DVec3::NEG_Z * gravity_down(gravity, start.lat.sin(), start.h);
+        let key = |run| StreamKey { seed: 1, scenario: "", run, source: "", process: "" };
+        let imu = (0..LANES as u64).map(|run| ImuErrors::new(Truth::Model(model), key(run), SAMPLES));
+        let settings = InitialSettings::default();
+        Ok(Self {
+            ekf: Ekf::new(Strapdown::new(&start, gravity), &belief, &start, &settings).at_level(level),
+            samples: [ImuSample { omega_ib_b: DVec3::ZERO, f_ib_b }; SAMPLES],
+            errors: LaneErrors::new(imu.collect()),
+            fix: Fix {
+                lat: Lanes::splat(start.lat),
+                lon: Lanes::splat(start.lon),
+                h: Lanes::splat(start.h),
+                v_n: Some(Vec3::ZERO),
+                pos_sigma_m: DVec3::new(2.0, 2.0, 4.0),
+                vel_sigma_m_s: DVec3::new(0.04, 0.04, 0.06),
+                lever_arm_b: DVec3::ZERO,
+            },
+        })
+    }
+
+    /// Draws the inertial errors of a second.
+    pub fn noise(&mut self) {
+        self.errors.next(SAMPLES);
+    }
+
+    /// Predicts through a second: strapdown and covariance at the full rate.
+    pub fn filter(&mut self) {
+        advance(&mut self.ekf, &self.samples, self.errors.drawn());
+    }
+
+    /// Uses a fix, position and velocity.
+    pub fn fix(&mut self) {
+        update(&mut self.ekf, &self.fix);
+    }
+}
