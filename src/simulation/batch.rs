@@ -7,14 +7,14 @@ use crate::ekf::covariance::{PSI, R, V};
 use crate::ekf::initial::psi_of_angles;
 use crate::ekf::{Ekf, Fix, advance, nis_limit, settle, update, update_height, update_within};
 use crate::frames::{NavState, RollPitchYaw};
-use crate::imu::{Channel, ImuSample};
+use crate::imu::ImuSample;
 use crate::lanes::{LANES, Lanes, Real, Vec3};
 use crate::linalg;
 use crate::rng::StreamKey;
 use crate::sensors::baro::BaroNoise;
 use crate::sensors::defects::Defects;
 use crate::sensors::gnss::GnssNoise;
-use crate::sensors::imu::ImuErrors;
+use crate::sensors::imu::{ImuErrors, LaneErrors};
 use crate::strapdown::Strapdown;
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
@@ -54,15 +54,12 @@ pub fn run_batch(plan: &Plan<'_>, first: u64, live: usize) -> Vec<Batch> {
 
 /// Everything random of eight runs.
 struct Source<'a> {
-    imu: Vec<ImuErrors<'a>>,
+    imu: LaneErrors<'a>,
     gnss: Vec<GnssNoise>,
     baro: Vec<BaroNoise>,
     /// Empty for an IMU without defects.
     defects: Vec<Defects>,
     keys: Vec<StreamKey<'a>>,
-    /// Errors of the samples up to the next event, accelerometer and gyroscope.
-    block: Vec<[Vec3; 2]>,
-    channel: Vec<f64>,
 }
 
 impl<'a> Source<'a> {
@@ -76,14 +73,14 @@ impl<'a> Source<'a> {
             process: "",
         };
         let keys: Vec<_> = (first..first + live as u64).map(key).collect();
-        let imu = keys.iter().map(|k| ImuErrors::new(experiment.truth, *k, plan.samples())).collect();
+        let imu = keys.iter().map(|k| ImuErrors::new(experiment.truth, *k, plan.samples()));
         let gnss = keys.iter().map(|k| GnssNoise::new(experiment.gnss, *k)).collect();
         let baro = experiment.baro.iter().flat_map(|b| keys.iter().map(|k| BaroNoise::new(b, *k))).collect();
         let defects = match experiment.defects {
             settings if settings.is_ideal() => Vec::new(),
             settings => keys.iter().map(|k| Defects::draw(settings, *k)).collect(),
         };
-        Self { imu, gnss, baro, defects, keys, block: Vec::new(), channel: Vec::new() }
+        Self { imu: LaneErrors::new(imu.collect()), gnss, baro, defects, keys }
     }
 
     /// The nominal starts: the truth and an error drawn from the initial standard deviations.
@@ -93,26 +90,15 @@ impl<'a> Source<'a> {
 
     /// The inertial errors of the next samples; idle lanes repeat the ideal.
     fn errors(&mut self, ideal: &[ImuSample]) -> &[[Vec3; 2]] {
-        let n = ideal.len();
-        self.block.resize(n, [Vec3::ZERO; 2]);
-        self.channel.resize(n, 0.0);
-        for (lane, errors) in self.imu.iter_mut().enumerate() {
-            for channel in Channel::ALL {
-                errors.fill(channel, &mut self.channel);
-                let (sensor, axis) = (channel.sensor as usize, channel.axis as usize);
-                for (sample, value) in self.block.iter_mut().zip(&self.channel) {
-                    sample[sensor][axis][lane] = *value;
-                }
-            }
-        }
+        let block = self.imu.next(ideal.len());
         for (lane, defects) in self.defects.iter().enumerate() {
-            for (sample, truth) in self.block.iter_mut().zip(ideal) {
+            for (sample, truth) in block.iter_mut().zip(ideal) {
                 for (error, more) in sample.iter_mut().zip(defects.error(truth)) {
                     error.set_lane(lane, error.lane(lane) + more);
                 }
             }
         }
-        &self.block
+        block
     }
 
     /// The heights of this epoch, if the barometer has one.

@@ -1,0 +1,83 @@
+//! Nothing is allocated inside the time loop: twice as long a drive makes as many allocations.
+
+#![allow(clippy::unwrap_used, reason = "a test")]
+#![allow(unsafe_code, reason = "an allocator that counts")]
+
+use nav_sim::data::trajectory_file::{Options, load};
+use nav_sim::earth::GravityModel;
+use nav_sim::ekf::{Belief, FilterStates, InitialSettings};
+use nav_sim::sensors::defects::ImuSettings;
+use nav_sim::sensors::gnss::GnssSettings;
+use nav_sim::sensors::imu::Truth;
+use nav_sim::sensors::outage::Outage;
+use nav_sim::simulation::{Experiment, Plan, run_batch};
+use nav_sim::throughput;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+struct Counting;
+
+static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        unsafe { System.dealloc(pointer, layout) }
+    }
+    unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        unsafe { System.realloc(pointer, layout, size) }
+    }
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+/// Allocations of a batch of eight runs along a profile that drives straight for `duration_s`.
+fn allocations(duration_s: u32) -> u64 {
+    let directory = tempfile::tempdir().unwrap();
+    let file = directory.path().join("straight.toml");
+    let profile = format!(
+        "start = {{ lat_deg = 46.5, lon_deg = 6.6, h_m = 400, heading_deg = 40 }}\n\
+         segment = [{{ kind = \"straight\", duration_s = {duration_s} }}]\n"
+    );
+    std::fs::write(&file, profile).unwrap();
+    let (trajectory, _) = load(&file, &Options::default()).unwrap();
+    let model = throughput::model().unwrap();
+    let beliefs = [FilterStates::Reduced15, FilterStates::Full]
+        .map(|states| Belief::new(&model, states, 1.0, 800.0).unwrap());
+    let experiment = Experiment {
+        trajectory: &trajectory,
+        rate_hz: 100.0,
+        gravity: GravityModel::Wgs84,
+        truth: Truth::Model(&model),
+        beliefs: &beliefs,
+        gnss: &GnssSettings::default(),
+        initial: &InitialSettings::default(),
+        defects: &ImuSettings::default(),
+        baro: None,
+        nis_gate: None,
+        outages: &[Outage { start_s: 20.0, end_s: 30.0 }],
+        seed: 1,
+        scenario: "",
+        coverage_level: 0.95,
+    };
+    let plan = Plan::new(&experiment).unwrap();
+    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    let batches = run_batch(&plan, 0, 8);
+    let made = ALLOCATIONS.load(Ordering::Relaxed) - before;
+    assert_eq!(batches[0].runs.len(), 8);
+    made
+}
+
+#[test]
+fn the_time_loop_allocates_nothing() {
+    allocations(40); // tables that are made once
+    let (short, long) = (allocations(60), allocations(120));
+    assert_eq!(short, long);
+    // what a batch is made of: eight runs of six axes of five processes, and records
+    assert!(short > 0, "the allocator counts");
+}
