@@ -82,6 +82,16 @@ impl Channel {
     pub const fn index(self) -> usize {
         self.sensor as usize * 3 + self.axis as usize
     }
+
+    /// The channels a word stands for: `all`, a sensor (`accel`), an axis of both sensors (`x`) or one channel
+    /// (`accel.x`); none for any other.
+    #[must_use]
+    pub fn named(word: &str) -> Vec<Self> {
+        let meant = |c: &Self| {
+            word == "all" || word == c.sensor.name() || word == c.axis.name() || word == c.to_string()
+        };
+        Self::ALL.into_iter().filter(meant).collect()
+    }
 }
 
 impl fmt::Display for Channel {

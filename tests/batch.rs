@@ -246,6 +246,30 @@ fn candidates_are_calibrated_in_place_and_a_dry_run_leaves_nothing() {
 }
 
 #[test]
+fn shipped_studies_are_studies_and_their_schema_knows_their_keys() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let nav_sim = |arguments: &[&str]| {
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_nav-sim"))
+            .current_dir(root)
+            .args(arguments)
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let schema: serde_json::Value = serde_json::from_str(&nav_sim(&["schema", "study"])).unwrap();
+    for (name, candidates, sets) in
+        [("quick_study", 2, 3), ("paper_table1", 9, 1), ("paper_table1_10000", 9, 1), ("outage_length", 4, 8)]
+    {
+        let file = format!("examples/{name}.toml");
+        let said = nav_sim(&["check", &file]);
+        assert!(said.contains(&format!("a study of {candidates} candidates, {sets} outage sets")), "{said}");
+        let table: toml::Table = fs::read_to_string(root.join(&file)).unwrap().parse().unwrap();
+        assert!(table.keys().all(|key| schema["properties"][key].is_object()), "{name}");
+    }
+}
+
+#[test]
 fn scripts_for_schedulers_are_well_formed() {
     let place = place();
     let dir = place.path();

@@ -12,7 +12,7 @@
 //!                                                  └► merge, in run order ─► outages, ratios, epochs, runs
 //! ```
 //!
-//! Sums of a unit are made in run order, sums of a cell in the order of its units; the plan fixes the
+//! Nothing goes by time stamps: clocks that disagree do no harm. Sums of a unit are made in run order, sums of a cell in the order of its units; the plan fixes the
 //! units, so the merged result is the same to the last bit for any number of shards, threads or restarts.
 
 mod error;

@@ -49,10 +49,7 @@ impl Material<'_> {
 /// # Errors
 /// When it stands for none.
 pub fn channels(word: &str) -> Result<Vec<Channel>, PrepareError> {
-    let meant = |c: &Channel| {
-        word == "all" || word == c.sensor.name() || word == c.axis.name() || word == c.to_string()
-    };
-    let found: Vec<Channel> = Channel::ALL.into_iter().filter(meant).collect();
+    let found = Channel::named(word);
     if found.is_empty() {
         let reason = "is not all, accel, gyro, x, y, z, or one channel such as accel.x";
         return Err(PrepareError::Word { key: "axes", value: word.to_owned(), reason: reason.to_owned() });

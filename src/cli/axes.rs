@@ -9,10 +9,7 @@ pub(super) struct ChannelSet(pub(super) Vec<Channel>);
 impl ChannelSet {
     /// `all`, a sensor (`accel`), an axis of both sensors (`x`) or one channel (`accel.x`).
     pub(super) fn named(word: &str) -> Result<Self, String> {
-        let meant = |c: &Channel| {
-            word == "all" || word == c.sensor.name() || word == c.axis.name() || word == c.to_string()
-        };
-        let found: Vec<Channel> = Channel::ALL.into_iter().filter(meant).collect();
+        let found = Channel::named(word);
         match found.as_slice() {
             [] => Err("not all, accel, gyro, x, y, z, or one channel such as accel.x".into()),
             _ => Ok(Self(found)),

@@ -8,6 +8,7 @@ use nav_sim::data::trajectory_file::{self, TrajectoryFileError};
 use nav_sim::imu::Recording;
 use nav_sim::report::Input;
 use nav_sim::trajectory::Trajectory;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 impl From<TrajectoryFileError> for Failure {
@@ -53,4 +54,22 @@ pub(super) fn recordings(paths: &[PathBuf], session: &Session) -> Result<Vec<Rec
         session.printer.detail(&file.to_string());
     }
     Ok(recordings)
+}
+
+/// The files themselves and those of directories, in name order.
+pub(super) fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+    let mut files = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            files.push(path.clone());
+            continue;
+        }
+        let error = |e| Failure::could_not(format!("{}: {e}", path.display()));
+        let entries = fs::read_dir(path).map_err(error)?.collect::<Result<Vec<_>, _>>().map_err(error)?;
+        let mut within: Vec<PathBuf> =
+            entries.iter().map(fs::DirEntry::path).filter(|p| p.is_file()).collect();
+        within.sort();
+        files.extend(within);
+    }
+    Ok(files)
 }

@@ -150,7 +150,7 @@ fn rows<'a>(run: &'a str, outage: usize, comparison: &'a OutageComparison) -> im
 
 /// The paper's Table I: rows scenario × outage, columns state × estimator; each cell the signed mean ratio
 /// error with half its 95 % interval, and in brackets the mean of the absolute ratio error (%). The first
-/// row is the head; an interval below half a hundredth is left out; `states` are indices of reported states.
+/// row is the head; an interval below half a hundredth has one digit; `states` are indices of reported states.
 #[must_use]
 pub fn table_rows(candidates: &[CandidateResult], states: &[usize]) -> Vec<Vec<String>> {
     let scenarios = in_order(candidates.iter().map(|c| c.label.scenario.as_str()));
@@ -182,7 +182,11 @@ fn cell(candidate: &CandidateResult, outage: usize, state: usize) -> String {
     }
     let ratio = candidate.outages[outage].states[state];
     let half = (ratio.asee.ci95_pct[1] - ratio.asee.ci95_pct[0]) / 2.0;
-    let interval = if half >= 0.005 { format!(" ± {half:.2}") } else { String::new() };
+    let interval = match half {
+        h if h >= 0.005 => format!(" ± {h:.2}"),
+        h if h > 0.0 => format!(" ± {h:.0e}"),
+        _ => String::new(),
+    };
     format!("{:+.2}{interval} ({:.2})", ratio.asee.pct, ratio.asee_abs_pct)
 }
 

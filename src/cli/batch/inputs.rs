@@ -176,20 +176,8 @@ fn changed(what: &str) -> Failure {
 
 /// The files behind a list of recordings, directories in name order.
 pub(super) fn listed(study: &Path, recordings: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
-    let mut files = Vec::new();
-    for path in recordings {
-        let path = batch_file::beside(study, path);
-        if !path.is_dir() {
-            files.push(path);
-            continue;
-        }
-        let error = |e| Failure::could_not(format!("{}: {e}", path.display()));
-        let entries = std::fs::read_dir(&path).map_err(error)?;
-        let mut within: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(|p| p.is_file()).collect();
-        within.sort();
-        files.extend(within);
-    }
-    Ok(files)
+    let paths: Vec<PathBuf> = recordings.iter().map(|p| batch_file::beside(study, p)).collect();
+    read::listed(&paths)
 }
 
 fn file_hash(path: &Path) -> Result<String, Failure> {

@@ -155,7 +155,7 @@ fn pending(planned: &Planned, shard: Shard, session: &Session) -> Result<Vec<Nam
 /// How many units are computed at once: more than one where each has too few batches for the threads.
 fn together(units: &[Named], threads: usize) -> usize {
     let batches = units[0].0.runs.div_ceil(LANES as u64) as usize;
-    (4 * threads / batches).max(1)
+    (16 * threads / batches).max(1)
 }
 
 /// Units of one cell.

@@ -7,7 +7,6 @@ use nav_sim::noise::{Model, continuous};
 use nav_sim::report::{Input, ModelNote};
 use nav_sim::sensors::imu::Truth;
 use nav_sim::trajectory::Trajectory;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// What was read, ready to use.
@@ -50,28 +49,10 @@ fn files(args: &Args) -> Result<Vec<Input>, Failure> {
     let mut named: Vec<(&str, PathBuf)> =
         vec![("trajectory", args.trajectory.clone()), ("model", args.model.clone())];
     named.extend(args.truth.iter().map(|p| ("truth", p.clone())));
-    named.extend(listed(&args.recordings)?.into_iter().map(|p| ("static", p)));
+    named.extend(read::listed(&args.recordings)?.into_iter().map(|p| ("static", p)));
     named.extend(args.scenario.iter().map(|p| ("scenario", p.clone())));
     named.extend(args.gnss.iter().map(|p| ("gnss", p.clone())));
     named.iter().map(|(role, path)| read::input(role, path)).collect()
-}
-
-/// The files themselves and those of directories, in name order.
-fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
-    let mut files = Vec::new();
-    for path in paths {
-        if !path.is_dir() {
-            files.push(path.clone());
-            continue;
-        }
-        let error = |e| Failure::could_not(format!("{}: {e}", path.display()));
-        let entries = fs::read_dir(path).map_err(error)?.collect::<Result<Vec<_>, _>>().map_err(error)?;
-        let mut within: Vec<PathBuf> =
-            entries.iter().map(fs::DirEntry::path).filter(|p| p.is_file()).collect();
-        within.sort();
-        files.extend(within);
-    }
-    Ok(files)
 }
 
 /// A model at the rate of the IMU, and the estimator that made it, if known.
