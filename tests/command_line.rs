@@ -66,3 +66,71 @@ fn a_directory_that_is_no_run_is_refused_with_advice() {
     let expected = format!("error: {path}/manifest.json: No such file or directory");
     assert!(said.starts_with(&expected) && said.contains("\n\nhint: not a finished run directory"), "{said}");
 }
+
+/// Every file is looked at: one that is wrong does not hide those after it. Recordings without a clock need a
+/// rate.
+#[test]
+fn check_looks_at_every_file() {
+    let place = tempfile::tempdir().unwrap();
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    std::fs::write(place.path().join("bad.toml"), "[run]\nruns = 0\n").unwrap();
+    std::fs::write(place.path().join("worse.toml"), "[gps]\n").unwrap();
+    let timeless: String =
+        (0..100).map(|k| format!("{},{}\n", f64::from(k % 7) * 1e-3, f64::from(k % 5) * 1e-4)).collect();
+    std::fs::write(place.path().join("timeless.csv"), format!("accel_x_m_s2,gyro_x_rad_s\n{timeless}"))
+        .unwrap();
+    let check = |arguments: &[&str]| {
+        let output = nav_sim().current_dir(place.path()).arg("check").args(arguments).output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+    };
+    let good = root.join("calib_data/tactical.toml");
+    let (code, out, said) = check(&["bad.toml", "worse.toml", good.to_str().unwrap()]);
+    assert_eq!(code, 2, "{said}");
+    assert!(said.contains("bad.toml, line 2") && said.contains("worse.toml, line 1"), "{said}");
+    assert!(said.contains("2 of 3 files are not as they should be"), "{said}");
+    assert!(out.contains("tactical.toml: a noise model"), "{out}");
+    assert!(check(&["timeless.csv"]).2.contains("hint: give the rate with --rate-hz"));
+    let (code, out, said) = check(&["timeless.csv", "--rate-hz", "50"]);
+    assert!(code == 0 && out.contains("2 channels of 100 samples at 50 Hz"), "{out}{said}");
+    let array = root.join("calib_data/formats/array.npy");
+    assert_eq!(check(&[array.to_str().unwrap(), "--rate-hz", "100"]).0, 0);
+}
+
+/// What `init` makes is all that the examples of the help texts name.
+#[test]
+fn init_makes_every_file_that_the_help_names() {
+    let place = tempfile::tempdir().unwrap();
+    nav_sim().args(["init", place.path().to_str().unwrap()]).assert().success();
+    let help = String::from_utf8(nav_sim().args(["man", "--help"]).output().unwrap().stdout).unwrap();
+    assert!(help.starts_with("Examples:"));
+    let mut texts = vec![help];
+    for command in [
+        "wv",
+        "calibrate",
+        "synthesize",
+        "trajectory",
+        "run",
+        "fuse",
+        "compare",
+        "efficiency",
+        "demo",
+        "check",
+    ] {
+        texts.push(String::from_utf8(nav_sim().args([command, "--help"]).output().unwrap().stdout).unwrap());
+    }
+    for sub in ["generate", "check", "convert", "plot", "record"] {
+        texts.push(
+            String::from_utf8(nav_sim().args(["trajectory", sub, "--help"]).output().unwrap().stdout)
+                .unwrap(),
+        );
+    }
+    for text in texts {
+        let examples = text.split("\n\n").next().unwrap();
+        for word in examples.split_whitespace() {
+            if ["calib_data/", "trajectories/", "examples/"].iter().any(|d| word.starts_with(d)) {
+                assert!(place.path().join(word).exists(), "{word}");
+            }
+        }
+    }
+}

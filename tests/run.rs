@@ -166,6 +166,7 @@ fn refusals_name_what_is_wrong_and_leave_nothing() {
     refused("run drive.toml none.toml -o out", 1, "none.toml: No such file");
     refused("run drive.toml drive.toml -o out", 2, "drive.toml, line 2: unknown key \"start\"");
     refused(&format!("{base} --outage 50:70"), 2, "outage 50:70 does not lie on the trajectory");
+    refused(&format!("{base} --outage=-10:20"), 2, "outage -10:20 does not lie on the trajectory");
     refused(&format!("{base} --outage 40:30"), 2, "invalid value '40:30' for '--outage <START:END>'");
     refused(&format!("{base} --outage soon"), 2, "invalid value 'soon' for '--outage <START:END>'");
     refused(&format!("{base} --runs 0"), 2, "run.runs = 0 is refused: at least one run");
@@ -259,4 +260,34 @@ fn the_reduction_of_the_model_is_said_and_kept() {
     assert_eq!(json(&place.path().join("same/summary.json"))["reduction"]["axes"][0]["misfit"], 0.0);
     done(place.path(), "run drive.toml two.toml --filter full --runs 2 --outage 20:40 --seed 1 -o full");
     assert!(json(&place.path().join("full/summary.json"))["reduction"].is_null());
+}
+
+#[test]
+fn doubtful_requests_are_said() {
+    let place = place();
+    let ran =
+        done(place.path(), "run drive.toml imu.toml --outage 10:20 --outage 15:30 --runs 1 --seed 1 -o out");
+    assert!(ran.stderr.contains("warning: outages that overlap or touch are made one"), "{}", ran.stderr);
+    fs::write(
+        place.path().join("wild.toml"),
+        MODEL.replace("phi = 0.9999, sigma2 = 1e-9", "phi = 0.9999999, sigma2 = 1e-5"),
+    )
+    .unwrap();
+    let ran = done(place.path(), "run drive.toml wild.toml --outage none --runs 1 --seed 1 -o wild");
+    assert!(ran.stderr.contains("the filter starts with a bias of 7.071 m/s²"), "{}", ran.stderr);
+}
+
+/// The manifest of another command is not replaced; that of a run is.
+#[test]
+fn a_directory_of_another_command_is_refused() {
+    let place = place();
+    done(place.path(), "synthesize imu.toml --replicates 1 --samples 1000 --seed 1 -o made");
+    let before = fs::read(place.path().join("made/manifest.json")).unwrap();
+    let ran = nav_sim(place.path(), "run drive.toml imu.toml --runs 1 --outage none --seed 1 -o made");
+    assert_eq!(ran.code, 2, "{}", ran.stderr);
+    assert!(ran.stderr.contains("made/manifest.json is of another command"), "{}", ran.stderr);
+    assert_eq!(fs::read(place.path().join("made/manifest.json")).unwrap(), before);
+    for _ in 0..2 {
+        done(place.path(), "run drive.toml imu.toml --runs 1 --outage none --seed 1 -o mine");
+    }
 }

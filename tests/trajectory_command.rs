@@ -116,3 +116,23 @@ fn bad_files_exit_with_2_and_missing_ones_with_1() {
         assert!(code == 1 && err.contains(": No such file or directory"), "{name}: {err}");
     }
 }
+
+/// Heights of no vehicle are doubted with their line; heights of no gravity model are refused.
+#[test]
+fn heights_are_looked_at() {
+    let place = tempfile::tempdir().unwrap();
+    let rows = |h: f64| -> String {
+        let row = |k: u32| format!("{k},46.{:04},6.5,{h},0,0,0\n", 5000 + k);
+        "t_s,lat_deg,lon_deg,h_m,roll_deg,pitch_deg,yaw_deg\n".to_owned()
+            + &(0..10).map(row).collect::<String>()
+    };
+    let check = |h: f64| {
+        let path = file(place.path(), "h.csv", &rows(h));
+        trajectory(&["check", path.to_str().unwrap()])
+    };
+    assert!(!check(400.0).2.contains("height"));
+    let (_, _, said) = check(-800.0);
+    assert!(said.contains("h.csv, line 2: height -800"), "{said}");
+    let (code, _, said) = check(4e6);
+    assert!(code == 2 && said.contains("line 2: column \"h_m\": 4000000 is no height within"), "{said}");
+}

@@ -1,6 +1,6 @@
 //! `nav-sim check`: whether a file is what it should be.
 
-use super::{Failure, Session, read};
+use super::{Failure, Session, parse, read};
 use nav_sim::data::{batch_file, scenario_file, study_file};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -21,18 +21,34 @@ pub(crate) struct Args {
     /// Files
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
+    /// Sample rate of recordings without a time column
+    #[arg(long, value_name = "HZ", value_parser = parse::rate_hz)]
+    rate_hz: Option<f64>,
 }
 
+/// Every file is looked at, whatever the others are.
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let mut failures = Vec::new();
     for path in &args.files {
-        let found = check(path, session)?;
-        session.printer.result(&format!("{}: {found}", path.display()));
+        match check(path, args.rate_hz, session) {
+            Ok(found) => session.printer.result(&format!("{}: {found}", path.display())),
+            Err(failure) => failures.push(failure),
+        }
     }
-    Ok(())
+    let (Some(last), wrong, all) = (failures.pop(), failures.len() + 1, args.files.len()) else {
+        return Ok(());
+    };
+    if all == 1 {
+        return Err(last);
+    }
+    failures.iter().chain([&last]).for_each(|failure| session.printer.failure(failure));
+    let message = format!("{wrong} of {all} files are not as they should be");
+    let unreadable = failures.iter().chain([&last]).any(|failure| failure.code() == 1);
+    Err(if unreadable { Failure::could_not(message) } else { Failure::input(message) })
 }
 
 /// Reads a file as what it is, and says what was found.
-fn check(path: &Path, session: &Session) -> Result<String, Failure> {
+fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String, Failure> {
     match kind(path)? {
         Kind::Scenario => {
             let scenario = scenario_file::read(path)?;
@@ -59,7 +75,7 @@ fn check(path: &Path, session: &Session) -> Result<String, Failure> {
             Ok(format!("a trajectory of {seconds} s"))
         }
         Kind::Recording => {
-            let recordings = read::recordings(&[path.to_owned()], session)?;
+            let recordings = read::recordings_at(&[path.to_owned()], rate_hz, session)?;
             let one = |r: &nav_sim::imu::Recording| {
                 format!("{} channels of {} samples at {} Hz", r.signals.len(), r.len(), r.rate_hz)
             };

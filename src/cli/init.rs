@@ -23,11 +23,11 @@ pub(crate) struct Args {
 
 macro_rules! repository_files {
     ($($path:literal => $name:literal),* $(,)?) => {
-        &[$(($name, include_str!(concat!("../../", $path)))),*]
+        &[$(($name, include_bytes!(concat!("../../", $path)).as_slice())),*]
     };
 }
 
-const FILES: &[(&str, &str)] = repository_files![
+const FILES: &[(&str, &[u8])] = repository_files![
     "examples/scenario.toml" => "scenario.toml",
     "trajectories/land_vehicle.toml" => "trajectories/land_vehicle.toml",
     "trajectories/figure_eight.toml" => "trajectories/figure_eight.toml",
@@ -35,6 +35,12 @@ const FILES: &[(&str, &str)] = repository_files![
     "calib_data/consumer_mems.toml" => "calib_data/consumer_mems.toml",
     "calib_data/tactical.toml" => "calib_data/tactical.toml",
     "calib_data/formats/own.csv" => "calib_data/formats/own.csv",
+    "calib_data/formats/euroc.csv" => "calib_data/formats/euroc.csv",
+    "calib_data/formats/compressed.csv.gz" => "calib_data/formats/compressed.csv.gz",
+    "examples/scenario.toml" => "examples/scenario.toml",
+    "examples/paper_fig2.toml" => "examples/paper_fig2.toml",
+    "examples/accelerometer_n1.toml" => "examples/accelerometer_n1.toml",
+    "examples/phone.toml" => "examples/phone.toml",
 ];
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {

@@ -46,7 +46,16 @@ pub(super) fn model(path: &Path, session: &Session) -> Result<ModelFile, Failure
 
 /// Static recordings, every channel of them.
 pub(super) fn recordings(paths: &[PathBuf], session: &Session) -> Result<Vec<Recording>, Failure> {
-    let (recordings, report) = recordings::read(paths, &ReadOptions::default())?;
+    recordings_at(paths, None, session)
+}
+
+/// The same where files have no time column: at a rate that is given.
+pub(super) fn recordings_at(
+    paths: &[PathBuf],
+    rate_hz: Option<f64>,
+    session: &Session,
+) -> Result<Vec<Recording>, Failure> {
+    let (recordings, report) = recordings::read(paths, &ReadOptions { rate_hz, ..ReadOptions::default() })?;
     for warning in report.all_warnings() {
         session.printer.warn(&warning);
     }

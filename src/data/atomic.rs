@@ -95,7 +95,9 @@ impl AtomicFile {
         }
         let destination = destination.canonicalize().unwrap_or_else(|_| destination.into());
         make_parent(&destination).map_err(error)?;
+        remove_abandoned(&destination);
         let (file, temporary) = create_temporary(&destination).map_err(error)?;
+        let _ = file.try_lock(); // until it is closed: see `hold`
         Ok(Self { destination, temporary: Some(temporary), file: BufWriter::with_capacity(BUFFER, file) })
     }
 
@@ -161,6 +163,8 @@ pub struct AtomicDir {
     staging: PathBuf,
     names: Vec<String>,
     committed: bool,
+    /// Held until the directory has its name, or is gone.
+    _lock: Option<File>,
 }
 
 impl AtomicDir {
@@ -174,14 +178,20 @@ impl AtomicDir {
         if existing.as_ref().is_some_and(|m| !m.is_dir()) {
             return Err(error(io::ErrorKind::NotADirectory.into()));
         }
-        let staging = if existing.is_some() {
-            temporary_name(&destination.join("out"))
-        } else {
-            make_parent(destination).map_err(error)?;
-            temporary_name(destination)
-        };
+        let inside = destination.join("out");
+        let path = if existing.is_some() { inside.as_path() } else { destination };
+        make_parent(path).map_err(error)?;
+        remove_abandoned(path);
+        let staging = temporary_name(path);
         fs::create_dir(&staging).map_err(error)?;
-        Ok(Self { destination: destination.into(), staging, names: Vec::new(), committed: false })
+        let lock = hold(&staging);
+        Ok(Self {
+            destination: destination.into(),
+            staging,
+            names: Vec::new(),
+            committed: false,
+            _lock: lock,
+        })
     }
 
     /// Declares a file and returns the path to write it at for now.
@@ -261,8 +271,30 @@ fn make_parent(path: &Path) -> io::Result<()> {
     }
 }
 
-/// A name beside `path` that no other writer of this machine uses now; hidden, and with an ending that no
-/// reader takes for data.
+/// Holds an output that is being written: whoever can take the lock knows that its writer is gone. Where
+/// there are no locks nothing is ever taken for abandoned.
+fn hold(path: &Path) -> Option<File> {
+    File::open(path).ok().filter(|file| file.try_lock().is_ok())
+}
+
+/// Removes what earlier writers of `path` left when they were killed.
+fn remove_abandoned(path: &Path) {
+    let (Some(parent), Some(name)) = (path.parent(), path.file_name()) else { return };
+    let parent = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
+    let start = format!(".{}.", name.to_string_lossy());
+    let is_ours = |file: &str| {
+        let middle = file.strip_prefix(&start).and_then(|rest| rest.strip_suffix(".partial"));
+        middle
+            .is_some_and(|m| m.split('-').count() == 2 && m.bytes().all(|b| b.is_ascii_digit() || b == b'-'))
+    };
+    for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
+        if is_ours(&entry.file_name().to_string_lossy()) && hold(&entry.path()).is_some() {
+            let left = entry.path();
+            let _ = if left.is_dir() { fs::remove_dir_all(left) } else { fs::remove_file(left) };
+        }
+    }
+}
+
 /// A new file beside the destination. The name may be taken: by what a killed process left whose number this
 /// one has now (in containers every process has the same), or by one of another machine on a shared disk.
 fn create_temporary(destination: &Path) -> io::Result<(File, PathBuf)> {
@@ -275,6 +307,8 @@ fn create_temporary(destination: &Path) -> io::Result<(File, PathBuf)> {
     attempts.find(|r| !taken(r)).unwrap_or_else(|| Err(io::ErrorKind::AlreadyExists.into()))
 }
 
+/// A name beside `path` that no other writer of this machine uses now; hidden, and with an ending that no
+/// reader takes for data.
 fn temporary_name(path: &Path) -> PathBuf {
     static COUNT: AtomicU64 = AtomicU64::new(0);
     let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
@@ -303,6 +337,28 @@ mod tests {
         file.commit().unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"whole");
         assert_eq!(listing(path.parent().unwrap()), ["model.toml"]);
+    }
+
+    /// What a killed writer left is removed by the next one of the same output; what a living one writes, and
+    /// what only looks like it, stays.
+    #[test]
+    fn what_killed_writers_left_goes_with_the_next_write() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.csv");
+        let living = AtomicFile::create(&path).unwrap();
+        fs::write(dir.path().join(".a.csv.12345-0.partial"), "half").unwrap();
+        fs::create_dir(dir.path().join(".run.12345-7.partial")).unwrap();
+        fs::write(dir.path().join(".a.csv.mine.partial"), "other").unwrap();
+        write(&path, "whole").unwrap();
+        let mut names = listing(dir.path());
+        assert_eq!(names.len(), 4, "{names:?}");
+        assert!(!names.iter().any(|n| n == ".a.csv.12345-0.partial"));
+        drop(living);
+        let mut run = AtomicDir::create(&dir.path().join("run")).unwrap();
+        run.write("b.csv", "b").unwrap();
+        run.commit().unwrap();
+        names = listing(dir.path());
+        assert_eq!(names, [".a.csv.mine.partial", "a.csv", "run"]);
     }
 
     #[test]

@@ -58,6 +58,8 @@ fn perturbed(state: &NavState, block: usize, axis: usize, size: f64) -> NavState
     }
 }
 
+/// Random states at which F and H are compared.
+const RANDOM_STATES: usize = 100_000;
 const PERTURBATION: [f64; 5] = [1000.0, 1.0, 1e-4, 1e-2, 1e-4];
 
 /// The transition of one sample by central differences of the strapdown, all 15 columns.
@@ -114,7 +116,7 @@ fn filter_transition(state: &NavState, omega: DVec3, f: DVec3, dt: f64) -> SMatr
 fn every_block_of_f_agrees_with_central_differences() {
     let mut g = generator("f");
     let dt = 1e-3;
-    for _ in 0..300 {
+    for _ in 0..RANDOM_STATES {
         let (state, omega, f) = random_case(&mut g);
         let (numeric, filter) =
             (numeric_transition(&state, omega, f, dt), filter_transition(&state, omega, f, dt));
@@ -278,11 +280,22 @@ fn continuous_q() -> Matrix15 {
 /// Positive definite and exactly symmetric after many fixes that are nearly perfect, and nearly worthless.
 #[test]
 fn covariance_stays_positive_definite_under_extreme_measurements() {
+    extreme_measurements(100_000);
+}
+
+/// The same over 10⁶ epochs: `cargo test --lib extreme -- --ignored`.
+#[test]
+#[ignore = "two times 10^6 epochs: some seconds of an optimised build"]
+fn covariance_stays_positive_definite_under_extreme_measurements_for_a_million_epochs() {
+    extreme_measurements(1_000_000);
+}
+
+fn extreme_measurements(epochs: u32) {
     for variance in [1e-12, 1e12] {
         let mut ekf = ekf(&gauss_markov_model(), FilterStates::Reduced15);
         let sigma = f64::sqrt(variance);
-        for k in 0..100_000 {
-            let (omega, f) = manoeuvre(k as f64 * 0.01);
+        for k in 0..epochs {
+            let (omega, f) = manoeuvre(f64::from(k) * 0.01);
             predict(&mut ekf, omega, f);
             if k % 100 == 99 {
                 let fix = fix_at_nominal(&ekf, sigma, sigma);
@@ -371,7 +384,7 @@ fn every_vector_unit_computes_the_same() {
 fn lever_arm_rows_agree_with_central_differences() {
     let mut g = generator("h");
     let arm = DVec3::new(1.3, -0.7, -2.1);
-    for _ in 0..200 {
+    for _ in 0..RANDOM_STATES {
         let (state, omega, _) = random_case(&mut g);
         let mut ekf = ekf(&gauss_markov_model(), FilterStates::Reduced15);
         for lane in 0..8 {

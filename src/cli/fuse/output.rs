@@ -2,6 +2,7 @@
 
 use super::inputs::guarded;
 use crate::cli::Failure;
+use crate::cli::run::not_of_another_command;
 use nav_sim::data::atomic::AtomicDir;
 use nav_sim::fusion::Solution;
 use nav_sim::report::{FusionKind, FusionManifest, FusionSummary, Input, fusion_directory};
@@ -10,6 +11,7 @@ use std::path::Path;
 /// Whether the directory can be made, found out before the work.
 pub(super) fn try_open(out: &Path, inputs: &[Input]) -> Result<(), Failure> {
     guarded(out, inputs)?;
+    not_of_another_command(out, |text| serde_json::from_str::<FusionManifest>(text).is_ok())?;
     drop(AtomicDir::create(out)?);
     Ok(())
 }

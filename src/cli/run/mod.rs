@@ -18,7 +18,7 @@ use nav_sim::simulation::{Experiment, ExperimentError, RunResult};
 use std::path::PathBuf;
 use std::time::Instant;
 
-pub(super) use output::{manifest, text, write};
+pub(super) use output::{manifest, not_of_another_command, text, write};
 
 /// Monte-Carlo INS/GNSS navigation along TRAJECTORY with MODEL in the filter
 ///
@@ -53,7 +53,7 @@ pub(crate) struct Args {
     /// States of the filter: 15 (one bias an axis, the reduction of the model) or full (default: 15)
     #[arg(long, value_name = "STATES", value_parser = parse_states)]
     filter: Option<FilterStates>,
-    /// How statistics are found: monte-carlo or lincov (default: monte-carlo)
+    /// How statistics are found: monte-carlo
     #[arg(long, value_name = "METHOD", value_parser = parse_method)]
     method: Option<Method>,
     /// Scenario file whose [gnss] section is used
@@ -105,7 +105,7 @@ fn parse_method(text: &str) -> Result<Method, String> {
     match text {
         "monte-carlo" => Ok(Method::MonteCarlo),
         "lincov" => Ok(Method::Lincov),
-        _ => Err("expected monte-carlo or lincov".to_owned()),
+        _ => Err("expected monte-carlo".to_owned()),
     }
 }
 
@@ -118,6 +118,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     output::try_open(&args.out, &inputs.files)?;
     let unusable = |e| Failure::input(format!("{}: {e}", args.model.display()));
     let belief = scenario.belief(&inputs.model, &outages).map_err(unusable)?;
+    doubt_biases(&belief, session);
     let experiment = Experiment {
         trajectory: &inputs.trajectory,
         rate_hz: scenario.imu.rate_hz,
@@ -178,7 +179,7 @@ fn outages(
     seed: u64,
     session: &Session,
 ) -> Result<Vec<Outage>, Failure> {
-    let outside = |o: &&Outage| o.start_s >= span.1 || o.end_s <= span.0 || o.end_s > span.1;
+    let outside = |o: &&Outage| o.start_s < span.0 || o.end_s > span.1;
     let asked = scenario.outage.iter().flatten();
     if let Some(o) = asked.clone().find(outside) {
         let message = format!("outage {}:{} does not lie on the trajectory", o.start_s, o.end_s);
@@ -190,10 +191,33 @@ fn outages(
         [] => "no outage".to_owned(),
         some => format!("outages {}", some.join(", ")),
     });
+    if scenario.outage.as_ref().is_some_and(|asked| asked.len() > windows.len()) {
+        session.printer.warn("outages that overlap or touch are made one");
+    }
     if scenario.outage.is_none() && scenario.outages().fixed.len() > windows.len() {
         session.printer.warn(&format!("the default outages lie beyond the trajectory's end at {} s", span.1));
     }
     Ok(windows)
+}
+
+/// A Gauss-Markov process of phi ≈ 1 may have any stationary variance: a filter that starts with it believes
+/// nothing of its first sensor readings.
+fn doubt_biases(belief: &Belief, session: &Session) {
+    let limits = [
+        (Sensor::Accel, 1.0, "initial.accel_bias_sigma_m_s2"),
+        (Sensor::Gyro, 0.1, "initial.gyro_bias_sigma_rad_s"),
+    ];
+    for (sensor, limit, key) in limits {
+        let sigma = belief.initial_bias_sigma(sensor);
+        if sigma > limit {
+            session.printer.warn(&format!(
+                "the filter starts with a bias of {sigma:.3} {} ({} of the model, its correlated processes together): \
+                 an AR1 of phi near 1? {key} in a --scenario file sets it",
+                sensor.unit(),
+                sensor.name()
+            ));
+        }
+    }
 }
 
 /// An experiment that does not fit together.

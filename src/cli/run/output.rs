@@ -42,8 +42,20 @@ pub(crate) fn try_open(path: &Path, inputs: &[Input]) -> Result<(), Failure> {
     for name in report::RUN_FILES {
         atomic::guard_inputs(&path.join(name), inputs.iter().map(|i| Path::new(&i.path)))?;
     }
+    not_of_another_command(path, |text| serde_json::from_str::<Manifest>(text).is_ok())?;
     drop(AtomicDir::create(path)?);
     Ok(())
+}
+
+/// Refuses a directory whose manifest is that of another command: its own would take its place.
+pub(crate) fn not_of_another_command(path: &Path, is_ours: fn(&str) -> bool) -> Result<(), Failure> {
+    let manifest = path.join("manifest.json");
+    let Ok(text) = std::fs::read_to_string(&manifest) else { return Ok(()) };
+    if is_ours(&text) {
+        return Ok(());
+    }
+    let message = format!("{} is of another command, or of another version", manifest.display());
+    Err(Failure::input(message).hint("choose another directory with --out, or remove it"))
 }
 
 /// Writes a run directory.

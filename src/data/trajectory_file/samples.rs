@@ -15,6 +15,10 @@ use Quantity::{D, E, H, Lat, Lon, N, Pitch, Roll, Time, Vd, Ve, Vn, Yaw};
 
 /// Positions faster than this from one row to the next are no motion (m/s).
 const MAX_SPEED: f64 = 8000.0;
+/// Heights that are not doubted (m).
+const PLAUSIBLE_HEIGHT: std::ops::RangeInclusive<f64> = -500.0..=100_000.0;
+/// Heights at which the gravity model means something (m).
+const HEIGHT: std::ops::RangeInclusive<f64> = -12_000.0..=1_000_000.0;
 /// Below this speed a path has no direction (m/s).
 const MOVING: f64 = 0.5;
 /// Longest step between rows that is not doubted (s).
@@ -27,7 +31,9 @@ pub(super) fn trajectory(table: &Table, options: &Options) -> Result<(Trajectory
     let mut doubts = Doubts { path: &table.path, found: Vec::new() };
     doubts.ignored(&columns.ignored);
     let mut samples = samples(table, &columns, options)?;
+    check_heights(table, &columns, &samples)?;
     doubts.steps(&samples, table);
+    doubts.heights(&samples, table);
     check_jumps(table, &samples)?;
     if columns.has(Yaw) {
         let trajectory = build(table, &samples)?;
@@ -112,6 +118,14 @@ fn check_ranges(table: &Table, columns: &Columns) -> Result<(), Error> {
     Ok(())
 }
 
+/// Heights below the deepest trench and beyond a low orbit are no heights in metres.
+fn check_heights(table: &Table, columns: &Columns, samples: &[TrajectorySample]) -> Result<(), Error> {
+    let Some(i) = samples.iter().position(|s| !HEIGHT.contains(&s.h)) else { return Ok(()) };
+    let column = columns.index(if columns.has(Lat) { H } else { D });
+    let (line, row) = &table.rows[i];
+    Err(table.cell(*line, column, &row[column].to_string(), "is no height within −12 to 1000 km"))
+}
+
 fn check_jumps(table: &Table, samples: &[TrajectorySample]) -> Result<(), Error> {
     let place = |s: &TrajectorySample| geodetic_to_ecef(s.lat, s.lon, s.h);
     for (pair, (line, _)) in samples.windows(2).zip(&table.rows[1..]) {
@@ -193,6 +207,14 @@ impl Doubts<'_> {
                 line,
                 format!("gap of {step:.3} s before {} s{more}: the path in it is a guess", time(i)),
             );
+        }
+    }
+
+    /// Heights where no vehicle of these goes: a wrong unit, a wrong sign, a depth.
+    fn heights(&mut self, samples: &[TrajectorySample], table: &Table) {
+        if let Some(i) = samples.iter().position(|s| !PLAUSIBLE_HEIGHT.contains(&s.h)) {
+            let (line, h) = (Some(table.rows[i].0), samples[i].h);
+            self.add(line, format!("height {h} m: in metres above the ellipsoid, up?"));
         }
     }
 

@@ -30,8 +30,9 @@ impl Rows {
     }
 }
 
-/// Writes a trajectory as CSV, packed when the name ends in `.gz`. Every number is written with the digits
-/// that read back to it, so that the same trajectory comes out of the file.
+/// Writes a trajectory as CSV, packed when the name ends in `.gz`. Positions are written with the digits
+/// that read back to them, since accelerations are their second differences; times to the nanosecond,
+/// velocities to 1e-9 m/s, angles to 1e-12 degrees.
 ///
 /// # Errors
 /// The file cannot be written.
@@ -60,14 +61,35 @@ pub fn write_rows(out: &mut impl Write, trajectory: &Trajectory, rows: Rows) -> 
         let (roll, pitch, yaw) = (rpy.roll / DEG, rpy.pitch / DEG, rpy.yaw / DEG);
         writeln!(
             out,
-            "{t_s},{},{},{},{},{},{},{roll},{pitch},{yaw}",
-            state.lat / DEG,
-            state.lon / DEG,
-            state.h,
-            v.x,
-            v.y,
-            v.z
+            "{},{},{},{},{},{},{},{},{},{}",
+            tidy(t_s, 9),
+            state.lat / DEG + 0.0,
+            state.lon / DEG + 0.0,
+            state.h + 0.0,
+            tidy(v.x, 9),
+            tidy(v.y, 9),
+            tidy(v.z, 9),
+            tidy(roll, 12),
+            tidy(pitch, 12),
+            tidy(yaw, 12)
         )?;
     }
     Ok(())
+}
+
+/// The nearest number of so many decimals; no negative zero.
+fn tidy(x: f64, decimals: i32) -> f64 {
+    let scale = 10_f64.powi(decimals);
+    (x * scale).round() / scale + 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_tidy() {
+        let shown = [-0.0, 0.1 + 0.2, -1e-14, 45.000_000_000_000_007].map(|x| tidy(x, 9).to_string());
+        assert_eq!(shown, ["0", "0.3", "0", "45"]);
+    }
 }
