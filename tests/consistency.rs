@@ -39,7 +39,7 @@ fn axis(sigma2: f64, s: f64, t_s: f64) -> Composite {
 fn model(scale: [f64; 6]) -> Model {
     let [aw, ab, at, gw, gb, gt] = scale;
     // so noisy that each parameter matters between fixes of 0.04 m/s: a vibrating unit
-    let accel = axis(1e-2 * aw, 0.05 * ab.sqrt(), 100.0 * at);
+    let accel = axis(0.1 * aw, 0.05 * ab.sqrt(), 100.0 * at);
     let gyro = axis(1e-4 * gw, 5e-4 * gb.sqrt(), 200.0 * gt);
     Model::pooled(100.0, &accel, &gyro)
 }
