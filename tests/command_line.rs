@@ -116,6 +116,7 @@ fn init_makes_every_file_that_the_help_names() {
         "efficiency",
         "demo",
         "check",
+        "batch",
     ] {
         texts.push(String::from_utf8(nav_sim().args([command, "--help"]).output().unwrap().stdout).unwrap());
     }

@@ -41,6 +41,9 @@ const FILES: &[(&str, &[u8])] = repository_files![
     "examples/paper_fig2.toml" => "examples/paper_fig2.toml",
     "examples/accelerometer_n1.toml" => "examples/accelerometer_n1.toml",
     "examples/phone.toml" => "examples/phone.toml",
+    "examples/paper_table1.toml" => "examples/paper_table1.toml",
+    "examples/quick_study.toml" => "examples/quick_study.toml",
+    "examples/quick_drive.toml" => "examples/quick_drive.toml",
 ];
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
