@@ -131,7 +131,7 @@ pub struct CandidateEntry {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Synthesis {
-    /// Model file, with [spread] if `spread` is wanted.
+    /// Model file, with `[spread]` if `spread` is wanted.
     pub model: PathBuf,
     /// How many recordings.
     #[serde(default = "one")]

@@ -1,7 +1,7 @@
 //! The lane type: eight independent `f64` that advance together, and the small vectors made of it.
 //!
 //! Eight Monte-Carlo runs share one instruction stream. [`Lanes`] is how they stand in memory; in the
-//! kernels of the filter they are registers of the machine ([`Wide`]), chosen at run time by [`dispatch`],
+//! kernels of the filter they are registers of the machine ([`Wide`]), chosen at run time by `dispatch`,
 //! so a plain `cargo build --release` reaches the vector units. The formulas are written once, over
 //! [`Real`]: the Earth model for a scalar (trajectories), strapdown and covariance for any width.
 //!
