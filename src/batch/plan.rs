@@ -173,3 +173,88 @@ impl Plan {
         blake3::hash(&json).to_hex()[..16].to_owned()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    fn plan(change: impl FnOnce(&mut Study)) -> (Plan, Grid) {
+        let text = "runs = 250\n\
+            trajectory = [{ file = \"a.toml\" }, { file = \"b.toml\" }]\n\
+            truth = [{ model = \"m.toml\" }]\n\
+            candidate = [{ model = \"m.toml\" }, { model = \"n.toml\" }]\n\
+            filters = [15, \"full\"]\n\
+            outages = [{ sweep = { start_s = [10, 20, 30], duration_s = [1, 2] } }]\n";
+        let mut study: Study = toml::from_str(text).unwrap();
+        change(&mut study);
+        study.resolve().unwrap();
+        let prepared =
+            |blake3: &str| Prepared { role: String::new(), path: String::new(), blake3: blake3.into() };
+        let plan = Plan {
+            schema_version: 1,
+            version: "0".into(),
+            numerics: "n".into(),
+            seed: 1,
+            study,
+            scenarios: Vec::new(),
+            gnss: Vec::new(),
+            trajectories: vec!["a".into(), "b".into()],
+            truths: vec!["t".into()],
+            models: vec![prepared("m"), prepared("n")],
+            inputs: Vec::new(),
+            unit_runs: vec![100, 8],
+            estimate: Estimate::default(),
+        };
+        let grid = Grid::of(&plan).unwrap();
+        (plan, grid)
+    }
+
+    fn named(plan: &Plan, grid: &Grid) -> Vec<(Unit, String)> {
+        plan.named_units(grid).collect()
+    }
+
+    #[test]
+    fn units_cover_every_run_of_every_cell_once() {
+        let (plan, grid) = plan(|_| {});
+        let units = named(&plan, &grid);
+        assert_eq!((grid.len(), grid.columns.len()), (12, 4));
+        assert_eq!((units.len(), plan.unit_count(&grid)), (6 * 3 + 6 * 32, 6 * 3 + 6 * 32));
+        assert!(units.iter().enumerate().all(|(i, (unit, _))| unit.index == i));
+        for cell in 0..grid.len() {
+            let mut next = 0;
+            for (unit, _) in units.iter().filter(|(u, _)| u.cell == cell) {
+                assert_eq!(unit.first, next);
+                next += unit.runs;
+            }
+            assert_eq!(next, 250);
+        }
+        let cells: HashSet<[String; 5]> =
+            (0..12).map(|i| grid.names(grid.cell(i)).map(str::to_owned)).collect();
+        assert_eq!(cells.len(), 12);
+    }
+
+    #[test]
+    fn names_differ_in_everything_that_decides_the_bytes_and_in_nothing_else() {
+        let (base, grid) = plan(|_| {});
+        let names: HashSet<String> = named(&base, &grid).into_iter().map(|(_, id)| id).collect();
+        assert_eq!(names.len(), base.unit_count(&grid));
+        let shared =
+            |other: &(Plan, Grid)| named(&other.0, &other.1).iter().filter(|u| names.contains(&u.1)).count();
+        let with = |change: &dyn Fn(&mut Plan)| {
+            let mut other = base.clone();
+            change(&mut other);
+            shared(&(other, grid.clone()))
+        };
+        assert_eq!(with(&|p| p.seed = 2), 0);
+        assert_eq!(with(&|p| p.numerics = "o".into()), 0);
+        assert_eq!(with(&|p| p.version = "1".into()), 0);
+        assert_eq!(with(&|p| p.truths[0] = "u".into()), 0);
+        assert_eq!(with(&|p| p.models[1].blake3 = "o".into()), 0);
+        assert_eq!(with(&|p| p.study.metrics = vec![super::super::Metric::Outages]), 0);
+        assert_eq!(with(&|p| p.trajectories[1] = "c".into()), 6 * 3);
+        // another candidate's name changes no number, and more runs keep the units there are
+        assert_eq!(shared(&plan(|s| s.candidate[1].name = "other".into())), names.len());
+        assert_eq!(shared(&plan(|s| s.runs = 1000)), 6 * 2 + 6 * 31);
+    }
+}
