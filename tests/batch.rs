@@ -127,6 +127,11 @@ fn what_changed_since_the_plan_is_refused() {
     done(dir, "status study.toml -o out");
     let said = refused(dir, "plan study.toml -o out --seed 6", 2);
     assert!(said.contains("\"seed\" is 5 in the plan, 6 in the study"), "{said}");
+    // --seed wins over the study's, then and later
+    fs::write(dir.join("study.toml"), STUDY).unwrap();
+    done(dir, "plan study.toml -o seven --seed 7");
+    done(dir, "run study.toml -o seven --shard 0/50");
+    assert!(fs::read_to_string(dir.join("seven/plan.json")).unwrap().contains("\"seed\": 7"));
     let plan = fs::read_to_string(dir.join("out/plan.json")).unwrap();
     let other = plan.replace("\"version\": \"", "\"version\": \"0.0.");
     fs::write(dir.join("out/plan.json"), other).unwrap();

@@ -15,6 +15,7 @@
 //! Nothing goes by time stamps: clocks that disagree do no harm. Sums of a unit are made in run order, sums of a cell in the order of its units; the plan fixes the
 //! units, so the merged result is the same to the last bit for any number of shards, threads or restarts.
 
+mod check;
 mod error;
 mod fingerprint;
 mod grid;

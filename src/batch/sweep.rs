@@ -1,7 +1,8 @@
 //! Outage sets, one by one and swept.
 
 use super::StudyError;
-use super::study::{OutagesEntry, exactly_one};
+use super::check::exactly_one;
+use super::study::OutagesEntry;
 use crate::sensors::outage::{Outage, OutagePlan, PeriodicOutages, RandomOutages};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -111,15 +111,25 @@ pub fn plan(directory: &Path) -> Result<Option<Plan>, BatchDirectoryError> {
 pub fn plan_of(directory: &Path, study: &Study) -> Result<Plan, BatchDirectoryError> {
     let plan = plan(directory)?
         .ok_or_else(|| BatchDirectoryError::NoPlan { path: directory.display().to_string() })?;
-    same(directory, &plan, study)?;
+    same(directory, &plan, study, None)?;
     Ok(plan)
 }
 
-/// Refuses a plan that is not of this study.
+/// Refuses a plan that is not of this study, or has another seed than the one asked for.
 ///
 /// # Errors
 /// The key that differs.
-pub fn same(directory: &Path, plan: &Plan, study: &Study) -> Result<(), BatchDirectoryError> {
+pub fn same(
+    directory: &Path,
+    plan: &Plan,
+    study: &Study,
+    seed: Option<u64>,
+) -> Result<(), BatchDirectoryError> {
+    let path = file(directory).display().to_string();
+    if let Some(seed) = seed.filter(|seed| *seed != plan.seed) {
+        let (found, wanted) = (plan.seed.to_string(), seed.to_string());
+        return Err(BatchDirectoryError::Other { path, key: "seed".into(), found, wanted });
+    }
     let study = Study { seed: study.seed.or(plan.study.seed), ..study.clone() };
     let value = |s: &Study| serde_json::to_value(s).unwrap_or_default();
     let (found, wanted) = (value(&plan.study), value(&study));
@@ -134,7 +144,6 @@ pub fn same(directory: &Path, plan: &Plan, study: &Study) -> Result<(), BatchDir
             text
         }
     };
-    let path = file(directory).display().to_string();
     let (found, wanted) = (shown(found.get(key)), shown(wanted.get(key)));
     Err(BatchDirectoryError::Other { path, key: key.clone(), found, wanted })
 }

@@ -10,7 +10,7 @@ mod status;
 mod verify;
 
 use super::{Failure, Session};
-use nav_sim::batch::{Grid, Plan, PrepareError, Study, StudyError, fingerprint};
+use nav_sim::batch::{Grid, Plan, PrepareError, StudyError, fingerprint};
 use nav_sim::data::batch_directory::{self, BatchDirectoryError};
 use nav_sim::data::batch_file::{self, BatchFile};
 use std::path::{Path, PathBuf};
@@ -136,11 +136,6 @@ fn filter_name(filter: nav_sim::ekf::FilterStates) -> &'static str {
         nav_sim::ekf::FilterStates::Reduced15 => "15",
         nav_sim::ekf::FilterStates::Full => "full",
     }
-}
-
-fn seeded(mut study: Study, seed: u64) -> Study {
-    study.seed = Some(seed);
-    study
 }
 
 impl From<BatchDirectoryError> for Failure {

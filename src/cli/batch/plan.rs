@@ -1,7 +1,7 @@
 //! `nav-sim batch plan`: inputs checked and hashed, candidates calibrated, units cut.
 
 use super::inputs::{self, CALIBRATED, CANDIDATE_SEED, Inputs};
-use super::{Place, Planned, seeded, unusable};
+use super::{Place, Planned, unusable};
 use crate::cli::{Failure, Session, read};
 use nav_sim::batch::{
     CalibrateStep, Estimate, Grid, Kept, Plan, Prepared, Study, calibrated, fingerprint, run_unit,
@@ -45,7 +45,6 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return again(args, &directory, plan, &file, session);
     }
     let seed = session.seed(file.study.seed);
-    let file = BatchFile { study: seeded(file.study, seed), ..file };
     let (mut planned, models) = prepared(args, &directory, file, seed, session)?;
     // Models calibrated here are read back from the directory: of a dry run, from one that goes away.
     let scratch = args.dry_run.then(|| Scratch::new(&directory));
@@ -91,8 +90,8 @@ fn again(
     file: &BatchFile,
     session: &Session,
 ) -> Result<(), Failure> {
-    let wanted = session.seed(Some(file.study.seed.unwrap_or(plan.seed)));
-    batch_directory::same(directory, &plan, &seeded(file.study.clone(), wanted))?;
+    let wanted = session.seed(Some(plan.seed));
+    batch_directory::same(directory, &plan, &file.study, Some(wanted))?;
     let study = &args.place.study;
     for input in &plan.inputs {
         let path = batch_file::beside(study, Path::new(&input.path));
