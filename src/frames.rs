@@ -62,9 +62,12 @@ pub fn q_e_n(lat: f64, lon: f64) -> DQuat {
     (DQuat::from_rotation_z(lon) * DQuat::from_rotation_y(-lat - std::f64::consts::FRAC_PI_2)).inverse()
 }
 
-/// Wraps an angle to (−π, π].
+/// Wraps an angle to (−π, π]; one that is there already comes back as it is, to the last bit.
 #[must_use]
 pub fn wrap_angle(angle: f64) -> f64 {
+    if angle.abs() < std::f64::consts::PI {
+        return angle;
+    }
     let wrapped = angle.rem_euclid(std::f64::consts::TAU);
     if wrapped > std::f64::consts::PI { wrapped - std::f64::consts::TAU } else { wrapped }
 }

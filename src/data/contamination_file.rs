@@ -351,7 +351,7 @@ mod tests {
         );
         assert_eq!(
             refusal("[[gyro]]\noperation = \"replace\"\nsigma = 1\n"),
-            "c.toml, line 1: \"gyro[1].share\" or \"gyro[1].points\" is missing | "
+            "c.toml, line 1: \"gyro[1].share\" or \"gyro[1].points\" is missing | add the key \"gyro[1].share\" or \"gyro[1].points\""
         );
         assert_eq!(
             refusal("[[gyro]]\noperation = \"ar1\"\nphi = 1\nsigma2 = 1\n"),
