@@ -184,7 +184,8 @@ fn cell(candidate: &CandidateResult, outage: usize, state: usize) -> String {
     let half = (ratio.asee.ci95_pct[1] - ratio.asee.ci95_pct[0]) / 2.0;
     let interval = match half {
         h if h >= 0.005 => format!(" ± {h:.2}"),
-        h if h > 0.0 => format!(" ± {h:.0e}"),
+        // below that it is the rounding of equal ratios
+        h if h > 1e-9 => format!(" ± {h:.0e}"),
         _ => String::new(),
     };
     format!("{:+.2}{interval} ({:.2})", ratio.asee.pct, ratio.asee_abs_pct)
