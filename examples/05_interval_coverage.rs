@@ -59,8 +59,9 @@ fn main() -> Result<(), Failure> {
         "{sets} sets, {samples} samples, {draws} draws; truth in the 95 % interval (below it, above it)"
     );
     for (e, estimator) in design.estimators.iter().enumerate() {
-        let rejected =
-            all.iter().filter(|o| o[e].inference.as_ref().is_some_and(|i| i.goodness.p_value <= 0.05));
+        let rejected = all
+            .iter()
+            .filter(|o| o[e].inference.as_ref().and_then(|i| i.goodness).is_some_and(|g| g.p_value <= 0.05));
         println!("{}: J-test rejects {:.1} % at 5 %", estimator.name(), percent(rejected.count(), sets));
         for (p, (name, truth)) in names.iter().zip(&truth).enumerate() {
             let ends = || all.iter().filter_map(|o| Some(&o[e].inference.as_ref()?.intervals[p]));

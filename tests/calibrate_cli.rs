@@ -182,10 +182,12 @@ fn threads_do_not_change_a_byte() {
     recordings(dir.path(), 4);
     for threads in ["1", "2"] {
         let out = format!("m{threads}.toml");
-        nav_sim(dir.path()).args(["calibrate", "runs", "-q", "-j", threads, "-o", &out]).assert().success();
+        let seeded = ["calibrate", "runs", "-q", "--seed", "4", "-j", threads, "-o", &out];
+        nav_sim(dir.path()).args(seeded).assert().success();
     }
     let read = |name: &str| std::fs::read_to_string(dir.path().join(name)).unwrap();
     assert_eq!(read("m1.toml"), read("m2.toml"));
+    assert!(read("m1.toml").contains("seed = 4\n"));
     assert_eq!(read("m1.wv.json"), read("m2.wv.json"));
 }
 
@@ -230,12 +232,18 @@ fn parameters_can_be_fixed_and_bounded() {
     let calibrate = ["calibrate", "runs", "--model", "N1", "--estimator", "awv", "-o", "m.toml"];
     let out = json(dir.path(), &[&calibrate[..], &["--parameters", "p.toml"]].concat());
     let processes = &out["fits"][0]["processes"];
-    assert!((processes[0]["sigma2"].as_f64().unwrap() / 8e-6 - 1.0).abs() < 1e-12);
-    for end in numbers(&processes[0]["sigma2_ci95"]) {
-        assert!((end / 8e-6 - 1.0).abs() < 1e-12, "{end}");
-    }
-    let phi = processes[1]["phi"].as_f64().unwrap();
-    assert!((0.5..=0.9 + 1e-12).contains(&phi), "{phi}");
+    assert_eq!(processes[0]["sigma2"].to_string(), "8e-6", "as given, to the last bit");
+    assert!(processes[0].get("sigma2_ci95").is_none(), "nothing is estimated of it");
+    assert_eq!(processes[1]["phi"].to_string(), "0.9");
+    let notes = out["fits"][0]["notes"].to_string();
+    assert!(notes.contains("AR1 phi = 0.9 is its bound, as given"), "{notes}");
+    assert!(!notes.contains("sigma2 ="), "{notes}");
+    let scales = out["fits"][0]["scales"].as_u64().unwrap();
+    assert_eq!(
+        out["fits"][0]["goodness"]["dof"].as_u64().unwrap(),
+        scales - 3,
+        "phi, sigma2 and gamma2 are free"
+    );
     std::fs::write(dir.path().join("p.toml"), "[AR1]\nphi = { lower = 0.9, upper = 0.5 }\n").unwrap();
     let stderr = refusal(dir.path(), &[&calibrate[..], &["--parameters", "p.toml"]].concat(), 2);
     assert!(
@@ -265,8 +273,16 @@ fn a_model_is_chosen_and_slopes_are_read() {
     assert!((4e-6..8e-6).contains(&sigma2), "{sigma2}");
     let stderr = refusal(dir.path(), &avlr, 2);
     assert!(
-        stderr.contains("AR1 has no slope of its own") && stderr.contains("hint: --model WN+QN+RW"),
+        stderr.contains("AR1 has no slope of its own") && stderr.contains("hint: --model WN+RW"),
         "{stderr}"
+    );
+    // The curve of white noise begins with the slope −½: no quantization noise, whatever its end does.
+    let out = json(dir.path(), &[&avlr[..], &["--model", "WN+QN+RW"]].concat());
+    let fit = &out["fits"][0];
+    assert_eq!(fit["zero"].to_string(), "[\"QN\"]");
+    assert!(
+        fit["notes"].to_string().contains("QN: no such slope found") && fit["goodness"].is_null(),
+        "{fit}"
     );
     let full = json(
         dir.path(),
@@ -344,7 +360,8 @@ fn bad_requests_are_refused_with_a_hint() {
     check(calibrate(&["-o", "runs/run0.csv"], 2), &["is an input of this command and would be overwritten"]);
     assert_eq!(std::fs::read(dir.path().join("runs/run0.csv")).unwrap(), before);
     std::fs::create_dir(dir.path().join("taken.toml")).unwrap();
-    check(calibrate(&["-o", "taken.toml"], 1), &["taken.toml: "]);
+    check(calibrate(&["-o", "taken.toml"], 2), &["--out taken.toml: it is a directory", "hint:"]);
+    check(calibrate(&["-o", "/dev/full"], 2), &["--out /dev/full: it is a device"]);
     check(refusal(dir.path(), &["calibrate"], 2), &["required"]);
     check(refusal(dir.path(), &["calibrate", "nowhere.csv"], 1), &["nowhere.csv: No such file"]);
     check(refusal(dir.path(), &["wv", "runs", "--axes", "gyro.w"], 2), &["gyro.w", "accel.x"]);
@@ -353,5 +370,68 @@ fn bad_requests_are_refused_with_a_hint() {
         refusal(dir.path(), &["calibrate", "--curve", "curve.csv"], 2),
         &["curve.csv, line 3: wv = 0 is not a finite number > 0", "hint: a curve is a CSV"],
     );
+    std::fs::write(dir.path().join("curve.csv"), "tau_samples,wv,edof\n2,1e-5,10\n4,1e-5,5\n").unwrap();
+    for flag in
+        [["--trim", "1"], ["--skip-s", "0"], ["--estimator", "awv"], ["--scales", "2"], ["--axes", "x"]]
+    {
+        let arguments = [&["calibrate", "--curve", "curve.csv", "--rate-hz", "1"][..], &flag].concat();
+        check(refusal(dir.path(), &arguments, 2), &["cannot be used with", "--curve"]);
+    }
     assert!(!dir.path().join("model.toml").exists() && !dir.path().join("model.wv.json").exists());
+}
+
+/// A model without `--seed` says which one was drawn, in the file too; the name of the output is the one given; copies of
+/// a recording do not count.
+#[test]
+fn what_was_drawn_is_recorded_and_copies_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    recordings(dir.path(), 2);
+    let calibrate = ["calibrate", "runs", "--model", "N1", "--bootstrap", "19", "-o", "imu"];
+    let output = nav_sim(dir.path()).args(calibrate).assert().success();
+    let said = String::from_utf8(output.get_output().stderr.clone()).unwrap();
+    let seed =
+        said.split("(drawn; repeat with --seed ").nth(1).unwrap().split(')').next().unwrap().to_owned();
+    let text = std::fs::read_to_string(dir.path().join("imu")).unwrap();
+    assert!(text.contains(&format!("seed = {seed}\n")), "{text}");
+    assert!(dir.path().join("imu.wv.json").exists() && !dir.path().join("imu.toml").exists());
+    let curve = ["calibrate", "--curve", "imu.wv.json", "--model", "N1", "--rate-hz", "50"];
+    assert!(refusal(dir.path(), &curve, 2).contains("the curve says its rate, 50 Hz"));
+
+    let copy = dir.path().join("runs/run2.csv");
+    std::fs::copy(dir.path().join("runs/run0.csv"), &copy).unwrap();
+    let stderr = refusal(dir.path(), &calibrate, 2);
+    assert!(stderr.contains("run2.csv is a copy of runs/run0.csv"), "{stderr}");
+    // A recording that costs the others scales is told.
+    let rows = std::fs::read_to_string(&copy).unwrap();
+    let first: Vec<&str> = rows.lines().take(600).collect();
+    std::fs::write(&copy, first.join("\n") + "\n").unwrap();
+    let short = ["calibrate", "runs", "--model", "WN+RW", "--bootstrap", "0", "-o", "short.toml"];
+    let output = nav_sim(dir.path()).args(short).assert().success();
+    let said = String::from_utf8(output.get_output().stderr.clone()).unwrap();
+    assert!(said.contains("run2.csv: its 599 samples limit all recordings to 8 scales"), "{said}");
+}
+
+/// Twenty seconds of another level at the beginning; half of them already left out: what is advised counts from the
+/// beginning of the file.
+#[test]
+fn what_is_skipped_counts_in_the_advice() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut text = "t_s,gyro_x_rad_s\n".to_owned();
+    for (t, x) in signal(0, "gyro.x").iter().enumerate() {
+        let level = if t < 3000 { 1e-4 * (3000 - t) as f64 } else { 0.0 };
+        writeln!(text, "{:.2},{:e}", 0.02 * t as f64, x + level).unwrap();
+    }
+    std::fs::write(dir.path().join("warm.csv"), text).unwrap();
+    let advised = |skip: &str| {
+        let arguments =
+            ["calibrate", "warm.csv", "--estimator", "gmwm", "--model", "WN+RW", "--bootstrap", "0"];
+        let output = nav_sim(dir.path()).args(arguments).args(["--skip-s", skip]).assert().success();
+        let said = String::from_utf8(output.get_output().stderr.clone()).unwrap();
+        let seconds = said.split("warm-up? --skip-s ").nth(1).unwrap_or_else(|| panic!("{said}"));
+        seconds.split(' ').next().unwrap().parse::<f64>().unwrap()
+    };
+    for skip in ["0", "20"] {
+        let seconds = advised(skip);
+        assert!((50.0..=85.0).contains(&seconds), "after {skip}: {seconds}");
+    }
 }

@@ -158,6 +158,18 @@ fn mistakes_are_refused_and_leave_nothing() {
         "replicate 1: the replacement of points needs 500 samples, the record has 100",
         "",
     );
+    fs::write(
+        place.path("plain.toml"),
+        "rate_hz = 100\n[gyro]\nprocesses = [{ type = \"WN\", sigma2 = 1 }]\n",
+    )
+    .unwrap();
+    refused(
+        &["plain.toml", "--axes", "gyro", "--contaminate", "section4-III"],
+        "--contaminate section4-III: it corrupts the accel, which is not made",
+        "another contamination",
+    );
+    fs::write(place.path("plain.toml"), "[[accel]]\noperation = \"replace\"\npoints = 500\nsigma = 1\n")
+        .unwrap();
     refused(&["plain.toml"], "plain.toml, line 1: \"rate_hz\" is missing", "");
 }
 
@@ -176,7 +188,10 @@ fn an_unknown_contamination_is_answered_with_the_nearest() {
 fn recordings_of_another_job_are_not_mixed_in_and_inputs_not_overwritten() {
     let place = Place::new();
     place.make("out", &["--replicates", "3", "--samples", "10"]);
-    place.make("out", &["--replicates", "3", "--samples", "20"]);
+    let again = ["model.toml", "--replicates", "3", "--samples", "20", "--seed", "5", "-o", "out"];
+    let (code, said) = place.run(&again);
+    assert_eq!(code, 0, "{said}");
+    assert!(said.contains("warning: out: the replicates in it are replaced"), "{said}");
     let (recordings, _) = read(&[place.path("out")], &ReadOptions::default()).unwrap();
     assert_eq!(recordings[0].len(), 20);
     let (code, said) = place.run(&["model.toml", "--replicates", "2", "--samples", "10", "-o", "out"]);

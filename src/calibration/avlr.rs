@@ -10,6 +10,9 @@
 //! | RW | +½ | gamma2·m/3 |
 //! | DR | +1 | slope²·m²/2 |
 //!
+//! QN falls fastest of all: where it is more than the others it is at the first scales. A slope of −1 further on is noise of
+//! the curve; unless the curve begins with one QN is zero, no such slope found.
+//!
 //! m = tau/2 samples are averaged. The stretch is the longest run of neighbouring scales around the
 //! one where the local slope is nearest to the term's in which the slope is within 0.15 of it; the line of that slope
 //! through them, by least squares, is the term. AR1 and GM have no slope of their own.
@@ -40,6 +43,9 @@ pub(super) fn avlr(curve: &Curve, spec: &ModelSpec) -> Result<Fit, FitError> {
     }
     let processes = spec.kinds().iter().map(|kind| term(*kind, &points)).collect::<Result<Vec<_>, _>>()?;
     let composite = Composite::new(processes);
+    let labelled = composite.processes.iter().zip(composite.labels());
+    let not_found = |p: &Process| p.parameters().iter().all(|(_, value)| *value <= 0.0);
+    let zero = labelled.filter(|(p, _)| not_found(p)).map(|(_, label)| label).collect();
     let residual = |((level, nu), edof): ((&u32, &f64), &f64)| {
         (0.5 * edof).sqrt() * (1.0 - composite.haar_wv(*level) / nu)
     };
@@ -52,8 +58,9 @@ pub(super) fn avlr(curve: &Curve, spec: &ModelSpec) -> Result<Fit, FitError> {
         starts: 1,
         agreeing: 1,
         runner_up: None,
-        zero: Vec::new(),
+        zero,
         at_end: Vec::new(),
+        bounded: Vec::new(),
         minima: Vec::new(),
         mixing: None,
         composite,
@@ -68,11 +75,18 @@ fn term(kind: Kind, points: &[(f64, f64)]) -> Result<Process, FitError> {
     };
     Ok(match kind {
         Kind::White => Process::White(White::new(at_one(-0.5).powi(2))?),
+        Kind::Quantization if !begins(points, -1.0) => Process::Quantization(Quantization::new(0.0)?),
         Kind::Quantization => Process::Quantization(Quantization::new(at_one(-1.0).powi(2) / 3.0)?),
         Kind::RandomWalk => Process::RandomWalk(RandomWalk::new(3.0 * at_one(0.5).powi(2))?),
         Kind::Drift => Process::Drift(Drift::new(std::f64::consts::SQRT_2 * at_one(1.0))?),
         Kind::Ar1 | Kind::GaussMarkov | Kind::Ma1 => return Err(FitError::NoSlope { process: kind.code() }),
     })
+}
+
+/// Whether the first scales have a slope.
+fn begins(points: &[(f64, f64)], slope: f64) -> bool {
+    let ((x0, y0), (x1, y1)) = (points[0], points[1]);
+    ((y1 - y0) / (x1 - x0) - slope).abs() <= NEAR
 }
 
 /// The points whose stretch has a slope: at least the two between which it is nearest.
@@ -137,6 +151,19 @@ mod tests {
             let high = value / truth - 1.0;
             assert!(high > 0.005 && high < 0.176, "{high}");
         }
+    }
+
+    /// White noise with a dip at the tenth scale, to the slope −1 and back: no quantization noise. With enough of it
+    /// (three parts in four of the first scale are 3Q²) there is.
+    #[test]
+    fn a_slope_further_on_is_no_quantization_noise() {
+        let white = || Process::White(White::new(1.0).unwrap());
+        let mut dipped = curve(&Composite::new(vec![white()]));
+        dipped.wv[10] *= 0.5;
+        let fit = avlr(&dipped, &"WN+QN".parse().unwrap()).unwrap();
+        assert_eq!(fit.zero, ["QN"]);
+        let led = read(vec![white(), Process::Quantization(Quantization::new(40.0).unwrap())]);
+        assert!((led[1] / 40.0 - 1.0).abs() < 0.15, "{led:?}");
     }
 
     #[test]

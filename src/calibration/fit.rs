@@ -36,6 +36,8 @@ pub struct Fit {
     pub zero: Vec<String>,
     /// Labels of the processes whose shape lies at the end of its range: not identifiable either.
     pub at_end: Vec<String>,
+    /// Parameters on a bound that was given (not fixed), such as `AR1_1 phi = 0.99`.
+    pub bounded: Vec<String>,
     /// √Omega_j (nu_j − nu_j(theta)) of each scale; in standard deviations when weighted by edof. With the full
     /// covariance the scales are mixed so that these are uncorrelated.
     pub residuals: Vec<f64>,
@@ -214,6 +216,7 @@ fn assemble(objective: &Objective, found: &Found, spec: &ModelSpec, rate_hz: f64
     let mut terms = terms(objective, &best.coordinates, &solution.amplitudes);
     for (term, limits) in terms.iter_mut().zip(spec.limits()) {
         term.at_end &= limits.shape.is_none();
+        term.limits = *limits;
     }
     let limited = |kind: Kind| {
         spec.kinds().iter().zip(spec.limits()).any(|(k, limits)| *k == kind && *limits != Limits::NONE)
@@ -239,6 +242,7 @@ fn assemble(objective: &Objective, found: &Found, spec: &ModelSpec, rate_hz: f64
         runner_up: found.ends.iter().find(|e| !agreeing(e.cost)).map(|e| e.cost * unit),
         zero: labelled(|t| t.amplitude <= 0.0),
         at_end: labelled(|t| t.amplitude > 0.0 && t.at_end),
+        bounded: terms.iter().zip(&labels).flat_map(|(t, label)| t.bounded(label, rate_hz)).collect(),
         minima: minima(found),
         mixing: None,
         residuals: solution.residuals.iter().map(|r| r * objective.length).collect(),
@@ -261,12 +265,19 @@ fn minima(found: &Found) -> Vec<Vec<f64>> {
     minima
 }
 
+/// A value, or the bound that it is but for rounding.
+fn at_bound(value: f64, (low, high): (f64, f64), scale: f64) -> f64 {
+    let near = |bound: &f64| (value - bound).abs() <= 1e-9 * scale;
+    [low, high].into_iter().find(near).unwrap_or(value)
+}
+
 /// One process of the result.
 struct Term {
     kind: Kind,
     amplitude: f64,
     coordinate: f64,
     at_end: bool,
+    limits: Limits,
 }
 
 fn terms(objective: &Objective, coordinates: &[f64], amplitudes: &[f64]) -> Vec<Term> {
@@ -279,22 +290,55 @@ fn terms(objective: &Objective, coordinates: &[f64], amplitudes: &[f64]) -> Vec<
                 (u, high > low && (u - low < 1e-6 || high - u < 1e-6))
             }
         };
-        Term { kind: component.kind, amplitude: *amplitude, coordinate, at_end }
+        Term { kind: component.kind, amplitude: *amplitude, coordinate, at_end, limits: Limits::NONE }
     };
     objective.components.iter().zip(amplitudes).map(term).collect()
 }
 
 impl Term {
     fn process(&self, rate_hz: f64) -> Result<Process, ParameterError> {
-        let (amplitude, kappa) = (self.amplitude, self.coordinate.exp());
+        let (amplitude, shape) = self.values(rate_hz);
         Ok(match self.kind {
             Kind::White => Process::White(White::new(amplitude)?),
             Kind::Quantization => Process::Quantization(Quantization::new(amplitude)?),
-            Kind::Ar1 => Process::Ar1(Ar1::new((-kappa).exp(), amplitude)?),
-            Kind::GaussMarkov => Process::GaussMarkov(GaussMarkov::new(kappa * rate_hz, amplitude, rate_hz)?),
-            Kind::Ma1 => Process::Ma1(Ma1::new(self.coordinate, amplitude)?),
+            Kind::Ar1 => Process::Ar1(Ar1::new(shape, amplitude)?),
+            Kind::GaussMarkov => Process::GaussMarkov(GaussMarkov::new(shape, amplitude, rate_hz)?),
+            Kind::Ma1 => Process::Ma1(Ma1::new(shape, amplitude)?),
             Kind::RandomWalk => Process::RandomWalk(RandomWalk::new(amplitude)?),
-            Kind::Drift => Process::Drift(Drift::new(amplitude.sqrt())?),
+            Kind::Drift => Process::Drift(Drift::new(amplitude)?),
         })
+    }
+
+    /// Amplitude and shape in the units of the parameters; on a bound, the bound as it was given.
+    fn values(&self, rate_hz: f64) -> (f64, f64) {
+        let kappa = self.coordinate.exp();
+        let amplitude = if self.kind == Kind::Drift { self.amplitude.sqrt() } else { self.amplitude };
+        let (shape, scale) = match self.kind {
+            Kind::Ar1 => ((-kappa).exp(), kappa.min(1.0)),
+            Kind::GaussMarkov => (kappa * rate_hz, kappa * rate_hz),
+            _ => (self.coordinate, 1.0),
+        };
+        let limits = self.limits.shape.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
+        (at_bound(amplitude, self.limits.amplitude, amplitude), at_bound(shape, limits, scale))
+    }
+
+    /// The parameters that lie on a bound given, in words; those that are fixed have nowhere else to be.
+    fn bounded(&self, label: &str, rate_hz: f64) -> Vec<String> {
+        let (amplitude, shape) = self.values(rate_hz);
+        let on = |value: f64, (low, high): (f64, f64)| {
+            low < high
+                && value.abs() > 0.0
+                && (value.to_bits() == low.to_bits() || value.to_bits() == high.to_bits())
+        };
+        let mut bounded = Vec::new();
+        if on(amplitude, self.limits.amplitude) {
+            bounded.push(format!("{label} {} = {amplitude}", self.kind.amplitude_name()));
+        }
+        if let (Some(name), Some(limits)) = (self.kind.shape_name(), self.limits.shape)
+            && on(shape, limits)
+        {
+            bounded.push(format!("{label} {name} = {shape}"));
+        }
+        bounded
     }
 }

@@ -2,6 +2,8 @@
 //! ([Guerrier](crate::bibliography::Guerrier13)).
 
 use super::fit::Fit;
+use super::spec::ModelSpec;
+use crate::noise::Process;
 
 /// The test of over-identifying restrictions. Its statistic is the least Σ Omega_j (nu_j − nu_j(theta))²; what it
 /// is when the model holds is known from the bootstrap, which repeats the whole estimation, so no weighting and
@@ -10,7 +12,7 @@ use super::fit::Fit;
 pub struct Goodness {
     /// J, the objective.
     pub statistic: f64,
-    /// Scales less parameters of processes that are there.
+    /// Scales less free parameters of processes that are there.
     pub dof: usize,
     /// Median of J when the model holds.
     pub expected: f64,
@@ -19,12 +21,14 @@ pub struct Goodness {
 }
 
 /// The test of a fit, given the fits of the draws.
-pub(super) fn goodness(fit: &Fit, draws: &[Fit]) -> Goodness {
+pub(super) fn goodness(fit: &Fit, spec: &ModelSpec, draws: &[Fit]) -> Goodness {
     let objectives: Vec<f64> = draws.iter().map(|d| d.objective).collect();
     let larger = objectives.iter().filter(|o| **o >= fit.objective).count();
-    let there = fit.composite.processes.iter().zip(fit.composite.labels());
-    let parameters: usize =
-        there.filter(|(_, label)| !fit.zero.contains(label)).map(|(p, _)| p.parameters().len()).sum();
+    let there = fit.composite.processes.iter().zip(fit.composite.labels()).enumerate();
+    let free = |(i, (process, _)): (usize, (&Process, String))| {
+        process.parameters().iter().filter(|(name, _)| !spec.is_fixed(i, name)).count()
+    };
+    let parameters: usize = there.filter(|(_, (_, label))| !fit.zero.contains(label)).map(free).sum();
     Goodness {
         statistic: fit.objective,
         dof: fit.residuals.len().saturating_sub(parameters),

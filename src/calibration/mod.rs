@@ -27,7 +27,9 @@ mod stationarity;
 
 pub use auto::{Candidate, Ranking};
 pub use average::{AverageError, Estimator, Replicate, Trim, average};
-pub use diagnosis::{Alarm, AxisScores, Diagnosis, LeftOut, Movement, Verdict, advice, diagnose};
+pub use diagnosis::{
+    Alarm, AxisScores, CommonOutliers, Diagnosis, LeftOut, Movement, Verdict, advice, diagnose,
+};
 pub use fit::{Fit, FitError, fit};
 pub use goodness::Goodness;
 pub use inference::{Bootstrap, Inference, ParameterInterval, infer};

@@ -66,7 +66,7 @@ pub fn notes(outcome: &Outcome, replicates: &[Replicate], rate_hz: f64) -> Vec<S
                 .to_owned(),
         );
     }
-    not_identifiable(fit, curve, record_s, rate_hz, &mut notes);
+    not_identifiable(*estimator == Estimator::Avlr, fit, curve, record_s, rate_hz, &mut notes);
     misfit(fit, curve, rate_hz, &mut notes);
     if estimator.is_robust() {
         robust_remarks(fit, curve, replicates, rate_hz, &mut notes);
@@ -98,9 +98,23 @@ fn scale_s(level: u32, rate_hz: f64) -> f64 {
     f64::from(level).exp2() / rate_hz
 }
 
-fn not_identifiable(fit: &Fit, curve: &Curve, record_s: f64, rate_hz: f64, notes: &mut Vec<String>) {
+fn not_identifiable(
+    slopes: bool,
+    fit: &Fit,
+    curve: &Curve,
+    record_s: f64,
+    rate_hz: f64,
+    notes: &mut Vec<String>,
+) {
     for label in &fit.zero {
-        notes.push(format!("{label} is zero at the optimum: not identifiable from these data"));
+        notes.push(if slopes {
+            format!("{label}: no such slope found where it could be the largest part")
+        } else {
+            format!("{label} is zero at the optimum: not identifiable from these data")
+        });
+    }
+    for bound in &fit.bounded {
+        notes.push(format!("{bound} is its bound, as given: the curve asks for a value beyond it"));
     }
     for label in &fit.at_end {
         notes.push(format!(

@@ -162,6 +162,17 @@ impl ModelSpec {
         kind.map_or(Vec::new(), |k| k.shape_name().into_iter().chain([k.amplitude_name()]).collect())
     }
 
+    /// Whether a parameter of the process at an index has one value only.
+    pub(super) fn is_fixed(&self, index: usize, parameter: &str) -> bool {
+        let (kind, limits) = (self.kinds[index], self.limits[index]);
+        let (low, high) = if parameter == kind.amplitude_name() {
+            limits.amplitude
+        } else {
+            limits.shape.unwrap_or((0.0, 1.0))
+        };
+        low >= high
+    }
+
     pub(super) fn limits(&self) -> &[Limits] {
         &self.limits
     }

@@ -14,6 +14,7 @@ use nav_sim::data::suggest::nearest;
 use nav_sim::data::{atomic, parameters_file};
 use nav_sim::imu::{Channel, Recording, Sensor, Signal};
 use nav_sim::report::{self, CurvesFile, FitsFile, Input};
+use nav_sim::wavelet::default_levels;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
@@ -34,7 +35,7 @@ pub(crate) struct Args {
     #[arg(value_name = "INPUT", required_unless_present = "curve", conflicts_with = "curve")]
     inputs: Vec<PathBuf>,
     /// Fit a curve instead of recordings: CSV tau_samples,wv,edof or a .wv.json
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = OF_RECORDINGS)]
     curve: Option<PathBuf>,
     /// Sensor of a CSV curve, for the model file
     #[arg(long, value_name = "SENSOR", value_parser = sensor, requires = "curve")]
@@ -70,6 +71,10 @@ pub(crate) struct Args {
     #[command(flatten)]
     tuning: TuningArgs,
 }
+
+/// Flags about recordings and their averages, which a curve has behind it.
+const OF_RECORDINGS: [&str; 9] =
+    ["estimator", "trim", "pool", "skip_s", "gaps", "axes", "columns", "efficiency", "scales"];
 
 #[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
 enum EstimatorArg {
@@ -160,7 +165,7 @@ fn model(args: &Args) -> Result<ModelChoice, Failure> {
         Some(name) => {
             let message = format!("--estimator avlr: {name} has no slope of its own in the Allan deviation");
             Err(Failure::input(message)
-                .hint("--model WN+QN+RW, a sum of WN, QN, RW and DR; or --estimator gmwm"))
+                .hint("--model WN+RW, a sum of WN, RW and DR (and QN where the curve begins with its slope); or --estimator gmwm"))
         }
     }
 }
@@ -222,12 +227,15 @@ fn of_recordings(args: &Args, settings: &mut Settings, session: &Session) -> Res
     // As many scales as parameters, and one that the default leaves out.
     let needed = args.tuning.scales.map_or(2 << free_parameters(&settings.model), |j| 1 << j);
     let (recordings, report) = args.recordings.read(&args.inputs, needed, session)?;
-    warm_ups(&recordings, session);
+    warm_ups(&recordings, args.recordings.skip_s(), session);
+    shortest(&recordings, args.tuning.scales, session);
     settings.rate_hz = recordings[0].rate_hz;
     settings.estimators = estimators(args.estimator, recordings.len())?;
     let files: Vec<PathBuf> = report.files.iter().map(|f| PathBuf::from(&f.file)).collect();
     let out = args.out.as_deref().unwrap_or(Path::new("model.toml"));
     let outputs = outputs(out, &settings.estimators, &files)?;
+    let inputs = files.iter().map(|f| read::input("recording", f)).collect::<Result<Vec<_>, _>>()?;
+    distinct(&inputs)?;
     let pool = pool(args, settings)?;
     enough(&recordings, pool, settings)?;
     let count = recordings.iter().map(|r| r.signals.len() as u64).sum();
@@ -238,13 +246,12 @@ fn of_recordings(args: &Args, settings: &mut Settings, session: &Session) -> Res
     let groups = grouped(measured, pool);
     let mut outcomes = calibrate(&groups, settings).map_err(|e| of_calibration(&e))?;
     bootstrap(args, &groups, &mut outcomes, settings, session);
-    let inputs = files.iter().map(|f| read::input("recording", f)).collect::<Result<_, _>>()?;
-    let note = note(args, inputs);
+    let note = note(args, inputs, session);
     finish(&outputs, &groups, &outcomes, settings, &note, session)
 }
 
-/// Says which recordings do not begin as they go on, and what to leave out.
-fn warm_ups(recordings: &[Recording], session: &Session) {
+/// Says which recordings do not begin as they go on after what was skipped, and what to leave out.
+fn warm_ups(recordings: &[Recording], skipped_s: f64, session: &Session) {
     for recording in recordings {
         let of_signal = |s: &Signal| warm_up(&s.samples).map(|w| (s.channel, w));
         let found: Vec<(Channel, WarmUp)> = recording.signals.par_iter().filter_map(of_signal).collect();
@@ -257,7 +264,24 @@ fn warm_ups(recordings: &[Recording], session: &Session) {
             "{}: not stationary at its beginning: {}; warm-up? --skip-s {} leaves that out",
             recording.name,
             found.iter().map(one).collect::<Vec<_>>().join(", "),
-            (longest.samples as f64 / recording.rate_hz).ceil()
+            (skipped_s + longest.samples as f64 / recording.rate_hz).ceil()
+        ));
+    }
+}
+
+/// Says which recording is so much shorter than the others that it costs all of them scales.
+fn shortest(recordings: &[Recording], scales: Option<u32>, session: &Session) {
+    let levels = |r: &Recording| scales.unwrap_or(u32::MAX).min(default_levels(r.len()));
+    let Some(short) = recordings.iter().min_by_key(|r| levels(r)) else { return };
+    let mut all: Vec<u32> = recordings.iter().map(levels).collect();
+    all.sort_unstable();
+    let (fewest, usual) = (levels(short), all[all.len() / 2]);
+    if fewest < usual {
+        session.printer.warn(&format!(
+            "{}: its {} samples limit all recordings to {fewest} scales; without it there would be more (half of \
+             them have {usual}): leave it out for those",
+            short.name,
+            short.len()
         ));
     }
 }
@@ -271,17 +295,35 @@ struct Output {
 
 /// The files of each estimator. Fails before the work is done, not after, if they cannot be written.
 fn outputs(out: &Path, estimators: &[Estimator], inputs: &[PathBuf]) -> Result<Vec<Output>, Failure> {
+    regular(out)?;
     let output = |estimator: &Estimator| {
         let suffix = if estimators.len() > 1 { format!("_{}", estimator.name()) } else { String::new() };
         let model = with_suffix(out, &suffix);
         let curves = model.with_extension("wv.json");
         for path in [&model, &curves] {
+            regular(path)?;
             atomic::guard_inputs(path, inputs.iter().map(PathBuf::as_path))?;
             drop(atomic::AtomicFile::create(path)?);
         }
         Ok(Output { estimator: *estimator, model, curves })
     };
     estimators.iter().map(output).collect()
+}
+
+/// Refuses an output that cannot be replaced by a file: several are made of it, by its name.
+fn regular(out: &Path) -> Result<(), Failure> {
+    let refuse = |what: &str| {
+        Err(Failure::input(format!("--out {}: it is a {what}", out.display()))
+            .hint("name a file, such as model.toml"))
+    };
+    match std::fs::metadata(out) {
+        Ok(m) if m.is_dir() => refuse("directory"),
+        Ok(m) if !m.is_file() => refuse("device, and a model is a file with its curves beside it"),
+        _ if out.file_name().is_none() || out.as_os_str().to_string_lossy().ends_with('/') => {
+            refuse("directory")
+        }
+        _ => Ok(()),
+    }
 }
 
 fn estimators(arg: EstimatorArg, recordings: usize) -> Result<Vec<Estimator>, Failure> {
@@ -319,6 +361,18 @@ fn pool(args: &Args, settings: &Settings) -> Result<Pool, Failure> {
     }
 }
 
+/// Refuses copies of a recording: one replicate would count as two, and intervals come out too narrow.
+fn distinct(inputs: &[Input]) -> Result<(), Failure> {
+    for (i, input) in inputs.iter().enumerate() {
+        if let Some(first) = inputs[..i].iter().find(|other| other.blake3 == input.blake3) {
+            let message =
+                format!("{} is a copy of {}: it would count as two replicates", input.path, first.path);
+            return Err(Failure::input(message).hint("leave one of them out"));
+        }
+    }
+    Ok(())
+}
+
 /// Fails before the wavelet variances are taken if the trim leaves no replicate of a group.
 fn enough(recordings: &[Recording], pool: Pool, settings: &Settings) -> Result<(), Failure> {
     if !settings.estimators.contains(&Estimator::DrAwv) {
@@ -347,7 +401,9 @@ fn of_calibration(e: &CalibrationError) -> Failure {
         Cause::Fit(FitError::TooFewScales { .. }) => {
             Some("record for longer, or a --model with fewer processes")
         }
-        Cause::Fit(FitError::NoSlope { .. }) => Some("--model WN+QN+RW, a sum of WN, QN, RW and DR"),
+        Cause::Fit(FitError::NoSlope { .. }) => {
+            Some("--model WN+RW, a sum of WN, RW and DR (and QN where the curve begins with its slope)")
+        }
         Cause::Fit(FitError::NotPositive { .. }) => Some(
             "the signal is quantised so coarsely that scales are silent: --estimator awv, or another range",
         ),
@@ -361,6 +417,11 @@ fn of_curves(args: &Args, path: &Path, settings: &mut Settings, session: &Sessio
         let failure = if e.is_content() { Failure::input(&e) } else { Failure::could_not(&e) };
         failure.maybe_hint(e.hint())
     })?;
+    if let (Some(own), Some(given)) = (curves[0].rate_hz, args.recordings.rate_hz()) {
+        let message =
+            format!("{}: the curve says its rate, {own} Hz; --rate-hz {given} is another", path.display());
+        return Err(Failure::input(message).hint("leave --rate-hz out: it is for a CSV curve"));
+    }
     let Some(rate_hz) = curves[0].rate_hz.or(args.recordings.rate_hz()) else {
         let failure = Failure::input(format!("{}: the curve does not say its sample rate", path.display()));
         return Err(
@@ -393,12 +454,9 @@ fn of_curves(args: &Args, path: &Path, settings: &mut Settings, session: &Sessio
     }
     bootstrap(args, &groups, &mut outcomes, settings, session);
     let input = read::input("curve", path)?;
-    let note = note(args, vec![input]);
+    let note = note(args, vec![input], session);
     finish(&outputs, &groups, &outcomes, settings, &note, session)
 }
-
-/// The seed of a bootstrap without `--seed`: intervals are an answer, the same each time.
-const SEED: u64 = 1;
 
 fn bootstrap(
     args: &Args,
@@ -408,12 +466,12 @@ fn bootstrap(
     session: &Session,
 ) {
     if args.bootstrap > 0 {
-        let bootstrap = Bootstrap { draws: args.bootstrap as usize, seed: session.seed(Some(SEED)) };
+        let bootstrap = Bootstrap { draws: args.bootstrap as usize, seed: session.seed(None) };
         infer(groups, outcomes, settings, bootstrap);
     }
 }
 
-fn note(args: &Args, inputs: Vec<Input>) -> CalibrationNote {
+fn note(args: &Args, inputs: Vec<Input>, session: &Session) -> CalibrationNote {
     CalibrationNote {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         efficiency_convention: args.tuning.convention().to_owned(),
@@ -424,6 +482,7 @@ fn note(args: &Args, inputs: Vec<Input>) -> CalibrationNote {
             WeightingArg::Full => "full",
         }
         .to_owned(),
+        seed: (args.bootstrap > 0).then(|| session.seed(None)),
         inputs,
     }
 }
@@ -461,6 +520,6 @@ fn finish(
 
 fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    let extension = path.extension().map_or_else(|| "toml".into(), |e| e.to_string_lossy().into_owned());
-    path.with_file_name(format!("{stem}{suffix}.{extension}"))
+    let extension = path.extension().map_or_else(String::new, |e| format!(".{}", e.to_string_lossy()));
+    path.with_file_name(format!("{stem}{suffix}{extension}"))
 }

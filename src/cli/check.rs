@@ -1,7 +1,7 @@
 //! `nav-sim check`: whether a file is what it should be.
 
 use super::{Failure, Session, parse, read};
-use nav_sim::data::{batch_file, scenario_file, study_file};
+use nav_sim::data::{batch_file, contamination_file, curve_file, parameters_file, scenario_file, study_file};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -9,8 +9,9 @@ use std::path::{Path, PathBuf};
 ///
 /// What a file is follows from its contents: a TOML with [accel] or [gyro] is a noise model, one with
 /// segments or waypoints a motion profile, one with candidates a study of `batch`, one with sets of
-/// replicates a study of `efficiency`, any other a scenario; a table with lat_deg or n_m is a trajectory, any
-/// other table or .npy a static recording.
+/// replicates a study of `efficiency`, one with bounds of parameters (lower, upper, fix) or operations that of
+/// `calibrate --parameters` or `synthesize --contaminate`, any other a scenario; a table with lat_deg or n_m is
+/// a trajectory, with tau_samples (or a .wv.json) a curve, any other table or .npy a static recording.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -69,6 +70,23 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
             let (accel, gyro) = (&labels[0], &labels[3]);
             Ok(format!("a noise model at {} Hz, accel {accel}, gyro {gyro}", file.model.rate_hz))
         }
+        Kind::Parameters => {
+            parameters_file::check(path)?;
+            Ok("bounds of parameters; whether a model has those, calibrate says".to_owned())
+        }
+        Kind::Contamination => {
+            // The rate only turns seconds into samples.
+            let rules = contamination_file::find(&path.to_string_lossy(), rate_hz.unwrap_or(100.0))?.rules;
+            Ok(format!("a contamination of {} operations", rules.len()))
+        }
+        Kind::Curve => {
+            let curves = curve_file::read(path).map_err(|e| {
+                let failure = if e.is_content() { Failure::input(&e) } else { Failure::could_not(&e) };
+                failure.maybe_hint(e.hint())
+            })?;
+            let scales: Vec<String> = curves.iter().map(|c| c.curve.levels.len().to_string()).collect();
+            Ok(format!("wavelet-variance curves, of {} scales", scales.join(", ")))
+        }
         Kind::Trajectory => {
             let trajectory = read::trajectory(path, session)?;
             let seconds = trajectory.end_s() - trajectory.start_s();
@@ -90,6 +108,9 @@ enum Kind {
     Study,
     Efficiency,
     Model,
+    Parameters,
+    Contamination,
+    Curve,
     Trajectory,
     Recording,
 }
@@ -106,6 +127,9 @@ fn kind(path: &Path) -> Result<Kind, Failure> {
     let mut head = Vec::new();
     reader.by_ref().take(HEAD).read_to_end(&mut head).map_err(error)?;
     let text = String::from_utf8_lossy(&head);
+    if name.ends_with(".json") {
+        return Ok(Kind::Curve);
+    }
     Ok(if name.ends_with(".toml") { toml_kind(&text) } else { table_kind(&text) })
 }
 
@@ -116,7 +140,12 @@ fn toml_kind(text: &str) -> Kind {
     // What does not parse is read as a scenario, whose reader says where it is wrong.
     let table: toml::Table = text.parse().unwrap_or_default();
     let has = |keys: &[&str]| keys.iter().any(|key| table.contains_key(*key));
-    if has(&["accel", "gyro"]) {
+    let sensors = || ["accel", "gyro"].iter().filter_map(|sensor| table.get(*sensor));
+    if sensors().any(toml::Value::is_array) {
+        Kind::Contamination
+    } else if table.values().any(bounds) {
+        Kind::Parameters
+    } else if has(&["accel", "gyro"]) {
         Kind::Model
     } else if has(&["segment", "waypoint", "start", "vehicle"]) {
         Kind::Trajectory
@@ -129,9 +158,23 @@ fn toml_kind(text: &str) -> Kind {
     }
 }
 
+/// Whether there is a bound of a parameter in it.
+fn bounds(value: &toml::Value) -> bool {
+    let Some(table) = value.as_table() else { return false };
+    let of_parameter =
+        ["lower", "upper", "fix"].iter().any(|key| table.get(*key).is_some_and(|v| !v.is_table()));
+    of_parameter || table.iter().any(|(key, value)| key != "spread" && bounds(value))
+}
+
 fn table_kind(text: &str) -> Kind {
     let position = |line: &str| line.contains("lat_deg") || line.contains("n_m") && line.contains("e_m");
-    if text.lines().take(20).any(position) { Kind::Trajectory } else { Kind::Recording }
+    if text.lines().take(20).any(|line| line.contains("tau_samples")) {
+        Kind::Curve
+    } else if text.lines().take(20).any(position) {
+        Kind::Trajectory
+    } else {
+        Kind::Recording
+    }
 }
 
 #[cfg(test)]
@@ -145,6 +188,10 @@ mod tests {
         assert_eq!(toml_kind("runs = 3\n[[candidate]]"), Kind::Study);
         assert_eq!(toml_kind("sets = 500\nmodel = 'n1.toml'"), Kind::Efficiency);
         assert_eq!(toml_kind("[run]\nruns = 3"), Kind::Scenario);
+        assert_eq!(toml_kind("[gyro.AR1_1]\nphi = { fix = 0.98 }"), Kind::Parameters);
+        assert_eq!(toml_kind("[WN]\nsigma2 = { lower = 0.1 }"), Kind::Parameters);
+        assert_eq!(toml_kind("[[accel]]\noperation = 'ar1'"), Kind::Contamination);
+        assert_eq!(table_kind("tau_samples,wv,edof"), Kind::Curve);
         assert_eq!(toml_kind("= broken"), Kind::Scenario);
         assert_eq!(table_kind("# origin\nt_s, lat_deg, lon_deg"), Kind::Trajectory);
         assert_eq!(table_kind("t_s,accel_x_m_s2,gyro_z_rad_s"), Kind::Recording);

@@ -43,6 +43,11 @@ impl RecordingArgs {
         self.rate_hz
     }
 
+    /// Seconds left out at the beginning of each file.
+    pub(crate) const fn skip_s(&self) -> f64 {
+        self.skip_s
+    }
+
     /// Reads recordings, says what was found (in detail with `--verbose`) and what is doubtful.
     pub(crate) fn read(
         &self,

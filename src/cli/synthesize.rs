@@ -7,7 +7,7 @@ use nav_sim::data::contamination_file;
 use nav_sim::data::model_file::{self, ModelFile};
 use nav_sim::data::recordings::{FileFormat, is_recording};
 use nav_sim::imu::Channel;
-use nav_sim::noise::contamination::Contamination;
+use nav_sim::noise::contamination::{Contamination, Rule};
 use nav_sim::noise::{Composite, Model, Process, ReplicateError, VirtualImu};
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
@@ -89,7 +89,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let job = Job::new(args, session)?;
     let names: Vec<String> =
         (1..=args.replicates).map(|k| format!("replicate_{k}.{}", job.format.ending())).collect();
-    check_directory(args, &names)?;
+    check_directory(args, &names, session)?;
     let mut out = AtomicDir::create(&args.out)?;
     let paths: Vec<PathBuf> = names.iter().map(|n| out.path(n)).collect();
     let progress = session.progress("replicates", args.replicates);
@@ -127,7 +127,7 @@ fn report(args: &Args, job: &Job, manifest: &str, session: &Session) {
 }
 
 /// Refuses to overwrite an input, and to leave recordings of another job beside this one's.
-fn check_directory(args: &Args, names: &[String]) -> Result<(), Failure> {
+fn check_directory(args: &Args, names: &[String], session: &Session) -> Result<(), Failure> {
     let contamination = args.contaminate.as_deref().map(Path::new);
     for name in names.iter().map(String::as_str).chain(["manifest.json"]) {
         guard_inputs(&args.out.join(name), contamination.into_iter().chain([args.model.as_path()]))?;
@@ -139,7 +139,12 @@ fn check_directory(args: &Args, names: &[String]) -> Result<(), Failure> {
     stale.sort();
     match stale.into_iter().next() {
         Some(stale) => Err(WriteError::Stale { path: args.out.display().to_string(), stale }.into()),
-        None => Ok(()),
+        None => {
+            if args.out.join("manifest.json").exists() {
+                session.printer.warn(&format!("{}: the replicates in it are replaced", args.out.display()));
+            }
+            Ok(())
+        }
     }
 }
 
@@ -169,6 +174,7 @@ impl Job {
         let contamination = args.contaminate.as_deref().map(|c| contamination(c, file.model.rate_hz));
         let contamination = contamination.transpose()?;
         let channels = wanted(args, &file, session)?;
+        reaches(contamination.as_ref(), &channels, session)?;
         let samples = match args.duration {
             Some(s) => (s * file.model.rate_hz).round(),
             None => args.samples.unwrap_or(524_284) as f64,
@@ -254,6 +260,24 @@ fn wanted(args: &Args, file: &ModelFile, session: &Session) -> Result<Vec<Channe
         session.printer.warn(&format!("{shown}: says nothing of {channel}: not made"));
     }
     Ok(there)
+}
+
+/// Refuses a contamination that touches nothing of what is made: the replicates would be clean by another name. Says
+/// which of its rules do not.
+fn reaches(
+    contamination: Option<&Contamination>,
+    channels: &[Channel],
+    session: &Session,
+) -> Result<(), Failure> {
+    let Some(Contamination { name, rules }) = contamination else { return Ok(()) };
+    let made = |rule: &Rule| channels.iter().any(|c| c.sensor == rule.sensor);
+    let Some(Rule { sensor, .. }) = rules.iter().find(|rule| !made(rule)) else { return Ok(()) };
+    let message = format!("--contaminate {name}: it corrupts the {}, which is not made", sensor.name());
+    if rules.iter().any(made) {
+        session.printer.warn(&message);
+        return Ok(());
+    }
+    Err(Failure::input(message).hint("another contamination, or --axes with that sensor"))
 }
 
 fn contamination(name: &str, rate_hz: f64) -> Result<Contamination, Failure> {

@@ -176,6 +176,14 @@ fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, CurveError> {
         value: value.to_owned(),
         expected,
     };
+    if file.schema_version != 1 {
+        return Err(refuse(
+            "head",
+            "schema_version",
+            &file.schema_version.to_string(),
+            "1, which this version reads",
+        ));
+    }
     if !(file.rate_hz.is_finite() && file.rate_hz > 0.0) {
         return Err(refuse("rate", "rate_hz", &file.rate_hz.to_string(), "a finite number > 0"));
     }
@@ -289,6 +297,11 @@ mod tests {
             "c.csv, line 2: wv = NaN is not a finite number > 0"
         );
         assert_eq!(message(&format!("{head}2,1,0\n")), "c.csv, line 2: edof = 0 is not a finite number > 0");
+        let later = to_json(&CurvesFile { schema_version: 9, rate_hz: 30.0, curves: vec![] });
+        assert_eq!(
+            json("c.json", &later).unwrap_err().to_string(),
+            "c.json, head: schema_version = 9 is not 1, which this version reads"
+        );
         let json_error = json("c.json", "{\"rate_hz\": 1}").unwrap_err().to_string();
         assert!(json_error.starts_with("c.json, line 1: missing field"), "{json_error}");
     }

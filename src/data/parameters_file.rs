@@ -26,6 +26,43 @@ pub fn read(path: &Path, spec: &ModelSpec) -> Result<Vec<ParameterLimit>, TomlEr
     limits(&Source::read(path)?, spec)
 }
 
+/// Reads a file without a model: its layout and its bounds, process by process that it names.
+///
+/// # Errors
+/// As [`read`], for a model of the processes named.
+pub fn check(path: &Path) -> Result<(), TomlError> {
+    let source = Source::read(path)?;
+    source.parse()?;
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let table: toml::Table = text.trim_start_matches('\u{feff}').parse().unwrap_or_default();
+    let mut names = Vec::new();
+    named(&table, &mut names);
+    let spec = spec_of(&names).unwrap_or_else(ModelSpec::n2);
+    limits(&source, &spec).map(|_| ())
+}
+
+/// Labels of processes that a table names, at any depth.
+fn named(table: &toml::Table, into: &mut Vec<String>) {
+    for (key, value) in table {
+        let Some(inner) = value.as_table() else { continue };
+        let outer = Sensor::ALL.iter().any(|s| s.name() == key) || Axis::ALL.iter().any(|a| a.name() == key);
+        if outer { named(inner, into) } else { into.push(key.clone()) }
+    }
+}
+
+/// The smallest model that has processes of those labels.
+fn spec_of(labels: &[String]) -> Option<ModelSpec> {
+    let mut terms = std::collections::BTreeMap::new();
+    for label in labels {
+        let (code, count) = label.split_once('_').unwrap_or((label, "1"));
+        let count: usize = count.parse().ok()?;
+        let most: &mut usize = terms.entry(code).or_insert(0);
+        *most = count.max(*most).max(1 + usize::from(label.contains('_')));
+    }
+    let sum: Vec<String> = terms.iter().map(|(code, count)| format!("{count}*{code}")).collect();
+    sum.join("+").parse().ok()
+}
+
 fn limits(source: &Source, spec: &ModelSpec) -> Result<Vec<ParameterLimit>, TomlError> {
     let table = source.parse()?;
     let root = source.root(&table);

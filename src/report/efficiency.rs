@@ -104,7 +104,8 @@ pub fn efficiency_table(file: &EfficiencyFile) -> String {
     for row in file.results.chunks(parameters.len().max(1)) {
         let cell = |r: &EfficiencyRow| {
             let [rmse, se, bias] = [r.rmse, r.rmse_se, r.bias].map(|v| 100.0 * v);
-            format!("{} ± {} ({})", percent(rmse), percent(se), signed(bias))
+            let se = if se.is_finite() { percent(se) } else { "n/a".to_owned() };
+            format!("{} ± {se} ({})", percent(rmse), signed(bias))
         };
         let names = [row[0].scenario.clone(), row[0].estimator.clone()];
         table.add_row(names.into_iter().chain(row.iter().map(cell)));

@@ -165,7 +165,8 @@ impl FitEntry {
     pub fn new(group: &Group, outcome: &Outcome, rate_hz: f64) -> Self {
         let fit = &outcome.fit;
         let inference = outcome.inference.as_ref();
-        let goodness = inference.map(|i| i.goodness);
+        let goodness = inference.and_then(|i| i.goodness);
+        let undetermined = inference.into_iter().flat_map(|i| &i.intervals).filter_map(|i| i.undetermined());
         let spread = inference.map_or(&[][..], |i| &i.spread).iter();
         Self {
             sensor: group.sensor.name(),
@@ -199,7 +200,7 @@ impl FitEntry {
             runner_up: fit.runner_up,
             zero: fit.zero.clone(),
             at_end: fit.at_end.clone(),
-            notes: outcome.notes.clone(),
+            notes: outcome.notes.iter().cloned().chain(undetermined).collect(),
         }
     }
 }
@@ -237,7 +238,8 @@ fn process_json(process: &Process, label: &str, outcome: &Outcome) -> Map<String
     for (name, value) in process.parameters() {
         map.insert(name.to_owned(), value.into());
         if let Some(i) = interval_of(outcome, label, name) {
-            map.insert(format!("{name}_ci95"), vec![i.low, i.high].into());
+            let ends = if i.undetermined().is_none() { vec![i.low, i.high].into() } else { Value::Null };
+            map.insert(format!("{name}_ci95"), ends);
         }
     }
     map
@@ -272,20 +274,28 @@ fn inference_lines(inference: &Inference, group: &Group, rate_hz: f64) -> Vec<St
             inference.fitted, inference.draws
         )];
     }
-    let Goodness { statistic, dof, expected, p_value } = inference.goodness;
-    let verdict =
-        if p_value < 0.05 { "the model does not describe the curve" } else { "no evidence against" };
-    let mut lines = vec![format!(
-        "  J-test {statistic:.4e} on {dof} degrees of freedom, median {expected:.4e} if the model holds, p = \
-         {p_value:.3}: {verdict}"
-    )];
+    let mut lines: Vec<String> = inference.goodness.iter().map(j_test).collect();
     for i in &inference.intervals {
+        if let Some(text) = i.undetermined() {
+            lines.push(format!("  95 % {text}"));
+            continue;
+        }
         lines.push(format!("  95 % {:<6} {:<7} {:.6e} … {:.6e}", i.process, i.parameter, i.low, i.high));
     }
     if group.replicates.len() > 1 {
         lines.extend(spread_line(inference, rate_hz));
     }
     lines
+}
+
+fn j_test(goodness: &Goodness) -> String {
+    let Goodness { statistic, dof, expected, p_value } = goodness;
+    let verdict =
+        if *p_value < 0.05 { "the model does not describe the curve" } else { "no evidence against" };
+    format!(
+        "  J-test {statistic:.4e} on {dof} degrees of freedom, median {expected:.4e} if the model holds, p = \
+         {p_value:.3}: {verdict}"
+    )
 }
 
 /// Where replicates differ most beyond what noise alone makes.

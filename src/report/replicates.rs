@@ -19,10 +19,25 @@ pub struct ReplicateEntry {
     pub noise: Option<AlarmEntry>,
     /// Why there are outliers within it (ln (classical / robust wv)).
     pub outliers: Option<AlarmEntry>,
+    /// Outliers that most signals of this sensor hold, in all recordings alike.
+    pub common_outliers: Option<CommonEntry>,
     /// Scores at every scale, by axis.
     pub scores: BTreeMap<&'static str, ScoresEntry>,
     /// What leaving it out does to each fit.
     pub left_out: Vec<LeftOutEntry>,
+}
+
+/// Outliers that most signals of a sensor hold.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CommonEntry {
+    /// The scales (s) at which there are.
+    pub tau_s: Vec<f64>,
+    /// The one where they weigh most.
+    pub most_tau_s: f64,
+    /// Median of classical over robust wv, less one, there.
+    pub excess: f64,
+    /// The same in standard deviations.
+    pub deviations: f64,
 }
 
 /// Why a recording is abnormal.
@@ -89,6 +104,12 @@ impl ReplicateEntry {
             verdict: diagnosis.verdict.name(),
             noise: diagnosis.noise.as_ref().map(|a| AlarmEntry::new(a, rate_hz)),
             outliers: diagnosis.outliers.as_ref().map(|a| AlarmEntry::new(a, rate_hz)),
+            common_outliers: diagnosis.common.as_ref().map(|c| CommonEntry {
+                tau_s: c.levels.iter().map(|level| tau_s(*level, rate_hz)).collect(),
+                most_tau_s: tau_s(c.most, rate_hz),
+                excess: c.excess,
+                deviations: c.deviations,
+            }),
             scores: diagnosis.scores.iter().map(scores).collect(),
             left_out: diagnosis.left_out.iter().map(|l| LeftOutEntry::new(l, rate_hz)).collect(),
         }

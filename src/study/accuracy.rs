@@ -30,7 +30,8 @@ impl Accuracy {
     #[must_use]
     pub fn ratio_to(&self, other: &Self) -> (f64, f64) {
         let ratios: Vec<f64> = self.resampled.iter().zip(&other.resampled).map(|(a, b)| a / b).collect();
-        (self.rmse / other.rmse, standard_deviation(&ratios))
+        let error = if self.rmse_se.is_nan() { f64::NAN } else { standard_deviation(&ratios) };
+        (self.rmse / other.rmse, error)
     }
 }
 
@@ -52,12 +53,14 @@ pub fn accuracy(estimates: &[f64], target: f64, seed: u64) -> Accuracy {
     let resampled: Vec<(f64, f64)> = (0..RESAMPLES).map(|_| draw()).collect();
     let biases: Vec<f64> = resampled.iter().map(|(bias, _)| *bias).collect();
     let rmses: Vec<f64> = resampled.iter().map(|(bias, spread)| bias.hypot(*spread)).collect();
+    // A single set says nothing of how sets differ.
+    let error = |x: &[f64]| if estimates.len() > 1 { standard_deviation(x) } else { f64::NAN };
     Accuracy {
         bias,
         spread,
         rmse: bias.hypot(spread),
-        bias_se: standard_deviation(&biases),
-        rmse_se: standard_deviation(&rmses),
+        bias_se: error(&biases),
+        rmse_se: error(&rmses),
         resampled: rmses,
     }
 }

@@ -8,16 +8,18 @@
 //! (1/e − 1) times it.
 
 mod alarm;
+mod common;
 mod contrasts;
 mod leave_out;
 mod words;
 
+pub use common::CommonOutliers;
 pub use leave_out::{LeftOut, Movement};
 pub use words::advice;
 
 use super::average::{Estimator, Replicate};
 use super::pipeline::{Outcome, Settings};
-use super::replicates::Group;
+use super::replicates::{Group, Pool};
 use super::sampling::SamplingLaw;
 use crate::imu::{Axis, Sensor};
 use crate::wavelet::interval::edof_robust;
@@ -98,6 +100,10 @@ pub struct Diagnosis {
     pub outliers: Option<Alarm>,
     /// Scores; empty when there are fewer than four recordings.
     pub scores: Vec<AxisScores>,
+    /// Outliers that most signals of this sensor hold, in all recordings alike.
+    pub common: Option<CommonOutliers>,
+    /// Whether the axes of the sensor were pooled, and what DR-AWV dropped at each end of each scale, if it ran.
+    pub dropped: Option<(Pool, usize)>,
     /// What leaving it out does to each fit.
     pub left_out: Vec<LeftOut>,
 }
@@ -119,7 +125,10 @@ fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &
     if names.len() < 2 {
         return Vec::new();
     }
-    let pieces = if names.len() < FEWEST { Vec::new() } else { axes(&own, &names, outcomes) };
+    let pieces = axes(&own, &names, outcomes);
+    let common = common::common(&pieces, settings.tuning.efficiency());
+    let pieces = if names.len() < FEWEST { Vec::new() } else { pieces };
+    let dropped = dropped(&own, settings);
     let [noise, outliers] = [Question::Noise, Question::Outliers]
         .map(|question| Sight::new(&pieces, sensor, question, settings.tuning.efficiency()));
     let left_out = |name: &str| {
@@ -145,10 +154,19 @@ fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &
             noise: alarms.0,
             outliers: alarms.1,
             scores: joined(&pieces, noise.scores(index), outliers.scores(index)),
+            common: common.clone(),
+            dropped,
             left_out: left_out(name),
         }
     };
     names.iter().enumerate().map(one).collect()
+}
+
+/// What DR-AWV drops of the smallest group of a sensor.
+fn dropped(own: &[(usize, &Group)], settings: &Settings) -> Option<(Pool, usize)> {
+    let trim = own.iter().map(|(_, g)| settings.trim.count(g.replicates.len())).min()?;
+    let pool = if own.iter().any(|(_, g)| g.axis.is_none()) { Pool::Sensor } else { Pool::Axes };
+    settings.estimators.contains(&Estimator::DrAwv).then_some((pool, trim))
 }
 
 /// The replicates of one axis, by recording.

@@ -178,6 +178,35 @@ fn two_abnormal_recordings_do_not_hide_each_other() {
     assert_eq!(noisy, [1, 6]);
 }
 
+/// Spikes in every recording: of 2048 samples 1 % of 8 deviations adds 0.64 to 1 at the first scales, in all alike.
+/// None is abnormal, and yet the classical estimators are not to be used. Clean sets say nothing of the kind.
+#[test]
+fn outliers_in_all_recordings_are_told() {
+    let all = set(9, 6, NONE, |_, _, signal| (0..20).for_each(|i| signal[50 + 100 * i] += 8.0));
+    assert!(all.iter().all(|d| d.verdict == Verdict::Normal));
+    let common = all[0].common.as_ref().unwrap();
+    assert!((common.excess / 0.64 - 1.0).abs() < 0.3 && common.levels.contains(&1), "{common:?}");
+    let words = advice(&all, Sensor::Accel, 1.0);
+    assert!(words[0].starts_with("outliers within all 6 recordings"), "{words:?}");
+    assert_eq!(words[1], "the 6 recordings agree: use them all, with sr-awv, dr-awv or rgmwm");
+    for seed in 0..6 {
+        assert_eq!(set(seed, 6, NONE, |_, _, _| ())[0].common, None);
+    }
+}
+
+/// One abnormal recording of three axes, pooled: a trim of 3 already does without it.
+#[test]
+fn a_trim_that_suffices_is_not_asked_for() {
+    let mut one = set(7, 8, NONE, |file, _, signal| {
+        if file == 1 {
+            signal.iter_mut().for_each(|x| *x *= 2.0_f64.sqrt());
+        }
+    });
+    assert!(advice(&one, Sensor::Accel, 1.0).last().unwrap().contains("--trim of at least 1"));
+    one[0].dropped = Some((Pool::Sensor, 3));
+    assert!(advice(&one, Sensor::Accel, 1.0).last().unwrap().contains("the --trim it ran with, 3, already"));
+}
+
 #[test]
 fn three_recordings_cannot_say_which() {
     let all = set(7, 3, NONE, |_, _, _| ());

@@ -1,6 +1,7 @@
 //! The diagnosis in words.
 
-use super::{Alarm, Diagnosis, Movement, Verdict};
+use super::{Alarm, CommonOutliers, Diagnosis, Movement, Verdict};
+use crate::calibration::replicates::Pool;
 use crate::imu::Sensor;
 use std::fmt::Write;
 
@@ -13,12 +14,37 @@ pub fn advice(diagnoses: &[Diagnosis], sensor: Sensor, rate_hz: f64) -> Vec<Stri
         return Vec::new();
     }
     if own.iter().all(|d| d.scores.is_empty()) {
-        return vec!["too few recordings to tell which of them is abnormal: four are needed".to_owned()];
+        let few = "too few recordings to tell which of them is abnormal: four are needed".to_owned();
+        return std::iter::once(few)
+            .chain(own[0].common.iter().map(|c| outliers(c, own.len(), rate_hz)))
+            .collect();
     }
     let abnormal: Vec<&Diagnosis> = own.iter().copied().filter(|d| d.verdict != Verdict::Normal).collect();
     let mut lines: Vec<String> = abnormal.iter().flat_map(|d| describe(d, rate_hz)).collect();
+    lines.extend(own[0].common.iter().map(|c| outliers(c, own.len(), rate_hz)));
     lines.push(answer(&own, &abnormal));
     lines
+}
+
+/// What is said of outliers that all recordings hold.
+fn outliers(common: &CommonOutliers, count: usize, rate_hz: f64) -> String {
+    let (first, last) = (common.levels[0], common.levels[common.levels.len() - 1]);
+    format!(
+        "outliers within all {count} recordings, or most: the classical wavelet variance is above the robust one \
+         from {} s to {} s, most at {} s: by {} in the median ({:.0} standard deviations): not awv, gmwm or avlr",
+        tau_s(first, rate_hz),
+        tau_s(last, rate_hz),
+        tau_s(common.most, rate_hz),
+        percent(common.excess).trim_start_matches('+'),
+        common.deviations
+    )
+}
+
+/// Whether DR-AWV, as it ran, already drops so many abnormal recordings of so many signals.
+fn suffices(own: &[&Diagnosis], recordings: usize, signals: usize) -> Option<usize> {
+    let (pool, trim) = own[0].dropped?;
+    let needed = if pool == Pool::Axes { recordings } else { signals };
+    (trim >= needed).then_some(trim)
 }
 
 fn describe(diagnosis: &Diagnosis, rate_hz: f64) -> Vec<String> {
@@ -82,8 +108,16 @@ fn answer(own: &[&Diagnosis], abnormal: &[&Diagnosis]) -> String {
     let of_noise = || abnormal.iter().filter(|d| d.verdict == Verdict::Noise);
     let signals: usize = of_noise().map(|d| d.axes).sum();
     match (abnormal.len(), of_noise().count()) {
+        (0, _) if own[0].common.is_some() => {
+            format!("the {} recordings agree: use them all, with sr-awv, dr-awv or rgmwm", own.len())
+        }
         (0, _) => format!("the {} recordings agree: use them all, with any estimator", own.len()),
         (_, 0) => "use all of them with sr-awv or dr-awv: the outliers hardly touch those".to_owned(),
+        (_, n) if 2 * n < own.len() && suffices(own, n, signals).is_some() => format!(
+            "use dr-awv: the --trim it ran with, {}, already does without them; or leave the abnormal recordings \
+             out once you know what happened to them",
+            suffices(own, n, signals).unwrap_or_default()
+        ),
         (_, n) if 2 * n < own.len() => {
             let trim = if n == signals {
                 n.to_string()

@@ -220,6 +220,7 @@ fn calibration(
         version: env!("CARGO_PKG_VERSION").to_owned(),
         efficiency_convention: "exact".to_owned(),
         weighting: "edof".to_owned(),
+        seed: None,
         inputs: inputs.collect::<Result<Vec<Input>, _>>()?,
     };
     let text = |estimator: &nav_sim::calibration::Estimator| {

@@ -16,6 +16,8 @@ pub struct CalibrationNote {
     pub efficiency_convention: String,
     /// What a scale counts: `edof`, `ci`, `none` or `full`.
     pub weighting: String,
+    /// Seed of the bootstrap, if there was one.
+    pub seed: Option<u64>,
     /// The recordings or the curve.
     pub inputs: Vec<Input>,
 }
@@ -46,6 +48,10 @@ impl CalibrationNote {
         put("estimator", estimator.name().into());
         put("model", settings.model.to_string().into());
         put("weighting", self.weighting.as_str().into());
+        if let Some(seed) = self.seed {
+            // TOML integers are signed; larger seeds go as text.
+            put("seed", i64::try_from(seed).map_or_else(|_| seed.to_string().into(), Value::from));
+        }
         if estimator.is_robust() {
             put("efficiency", settings.tuning.efficiency().into());
             put("efficiency_convention", self.efficiency_convention.as_str().into());
@@ -90,10 +96,13 @@ fn fit(group: &Group, outcome: &Outcome, settings: &Settings) -> Table {
     }
     if let Some(inference) = &outcome.inference {
         put("bootstrap", count(inference.draws));
-        put("j_dof", count(inference.goodness.dof));
-        put("j_p_value", inference.goodness.p_value.into());
+        if let Some(goodness) = inference.goodness {
+            put("j_dof", count(goodness.dof));
+            put("j_p_value", goodness.p_value.into());
+        }
     }
-    put("notes", outcome.notes.clone().into());
+    let undetermined = outcome.inference.iter().flat_map(|i| &i.intervals).filter_map(|i| i.undetermined());
+    put("notes", outcome.notes.iter().cloned().chain(undetermined).collect::<Vec<_>>().into());
     table
 }
 

@@ -48,6 +48,9 @@ pub enum RecordingError {
     /// A cell that is NaN or infinite.
     #[error("{path}, line {line}: column \"{column}\": \"{value}\" is not finite")]
     NotFinite { path: String, line: u64, column: String, value: String },
+    /// A number that no sensor gives, whose square is none a computer has.
+    #[error("{path}, line {line}: column \"{column}\": {value} is beyond 1e100, no measurement")]
+    Absurd { path: String, line: u64, column: String, value: String },
     /// A row with too few or too many cells.
     #[error("{path}, line {line}: {found} values, but {expected} columns")]
     RowLength { path: String, line: u64, found: usize, expected: usize },
@@ -152,13 +155,16 @@ impl RecordingError {
                 "check the path; a directory stands for all its recordings"
             }
             Self::Empty { .. } => "a recording has a header line and a row for each sample",
+            Self::NoUnit { column, .. } if column.to_lowercase().starts_with('a') => {
+                "end its name in _m_s2, _g or _mg, or give the names with --columns"
+            }
             Self::NoUnit { .. } => {
                 "end its name in _rad_s, _deg_s or _deg_h, or give the names with --columns"
             }
             Self::NotANumber { value, .. } if decimal_comma(value) => {
                 "write decimals with a point: 0.5, not 0,5"
             }
-            Self::NotANumber { .. } | Self::NotFinite { .. } => {
+            Self::NotANumber { .. } | Self::NotFinite { .. } | Self::Absurd { .. } => {
                 "remove the line, or record again: a sample that is made up would change the noise"
             }
             Self::RowLength { .. } => "every row needs one value a column; was the file cut off?",

@@ -155,6 +155,9 @@ impl Lines {
     }
 }
 
+/// Beyond this a number is no measurement, and its square may be no number.
+const LARGEST: f64 = 1e100;
+
 /// Reads a file's columns.
 pub(crate) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, RecordingError> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) {
@@ -186,13 +189,13 @@ fn load_npy(path: &Path, options: &ReadOptions) -> Result<Raw, RecordingError> {
     let (ignored, columns) = (layout.ignored, layout.found.into_iter().map(take).collect());
     let raw = Raw { path: name, columns, ignored, head_rate_hz: None, lines: Lines::default() };
     for column in &raw.columns {
-        if let Some(at) = column.values.iter().position(|v| !v.is_finite()) {
-            let (line, value) = (raw.lines.of(at), column.values[at].to_string());
-            return Err(RecordingError::NotFinite {
-                path: raw.path,
-                line,
-                column: column.name.clone(),
-                value,
+        if let Some(at) = column.values.iter().position(|v| v.is_nan() || v.abs() > LARGEST) {
+            let (line, column, value) = (raw.lines.of(at), column.name.clone(), column.values[at]);
+            let path = raw.path;
+            return Err(if value.is_finite() {
+                RecordingError::Absurd { path, line, column, value: format!("{value:e}") }
+            } else {
+                RecordingError::NotFinite { path, line, column, value: value.to_string() }
             });
         }
     }

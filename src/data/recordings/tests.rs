@@ -445,3 +445,17 @@ mod garbage {
         }
     }
 }
+
+/// Finite, and yet no measurement: its square overflows.
+#[test]
+fn absurd_numbers_are_refused_with_their_place() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.csv");
+    std::fs::write(&path, "gyro_x_rad_s\n0.1\n1e308\n0.2\n").unwrap();
+    let options = ReadOptions { rate_hz: Some(1.0), ..ReadOptions::default() };
+    let message = read(&[path], &options).unwrap_err().to_string();
+    assert!(
+        message.ends_with("a.csv, line 3: column \"gyro_x_rad_s\": 1e308 is beyond 1e100, no measurement"),
+        "{message}"
+    );
+}

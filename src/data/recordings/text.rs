@@ -2,7 +2,7 @@
 
 use super::error::shown;
 use super::header::{Layout, Role, classify};
-use super::{Column, Lines, Raw, ReadOptions, RecordingError};
+use super::{Column, LARGEST, Lines, Raw, ReadOptions, RecordingError};
 use flate2::read::MultiGzDecoder;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Read};
@@ -180,10 +180,10 @@ fn read_rows(
         for (index, column) in columns.iter_mut() {
             let cell = record.get(*index).unwrap_or_default();
             match number(cell) {
-                Some(value) if value.is_finite() => column.values.push(value),
+                Some(value) if value.abs() <= LARGEST => column.values.push(value),
                 // A clock that the exporter leaves empty is no clock: passed over below.
                 _ if column.role == Role::Ticks => column.values.push(f64::NAN),
-                parsed => return Err(bad_cell(name, line, &column.name, cell, parsed.is_some())),
+                parsed => return Err(bad_cell(name, line, &column.name, cell, parsed)),
             }
         }
         lines.push(sample, line);
@@ -228,12 +228,12 @@ fn number(cell: &[u8]) -> Option<f64> {
     std::str::from_utf8(cell.trim_ascii()).ok()?.parse().ok()
 }
 
-fn bad_cell(path: &str, line: u64, column: &str, cell: &[u8], is_number: bool) -> RecordingError {
+fn bad_cell(path: &str, line: u64, column: &str, cell: &[u8], parsed: Option<f64>) -> RecordingError {
     let value = shown(&String::from_utf8_lossy(cell.trim_ascii()), 40);
     let (path, column) = (path.to_owned(), column.to_owned());
-    if is_number {
-        RecordingError::NotFinite { path, line, column, value }
-    } else {
-        RecordingError::NotANumber { path, line, column, value }
+    match parsed {
+        None => RecordingError::NotANumber { path, line, column, value },
+        Some(number) if number.is_finite() => RecordingError::Absurd { path, line, column, value },
+        Some(_) => RecordingError::NotFinite { path, line, column, value },
     }
 }

@@ -1,0 +1,56 @@
+//! Outliers that all recordings hold: comparing one with the others does not show those.
+//!
+//! ln (classical / robust) of every signal has, when the noise is Gaussian, the mean (1/e − 1)/eta and the variance
+//! (1/e − 1)·2/eta (see [`super`]). Looked at is the median over the signals, so that a minority makes no alarm.
+
+use super::{Piece, Question};
+
+/// Standard deviations of the median: 1 in 10⁶ by chance, at each of some ten scales.
+const ALARM: f64 = 5.0;
+/// Classical over robust, less one, from which it is told: less than that hardly moves a fit.
+const LEAST: f64 = 0.02;
+/// Standard deviation of a median of Gaussian numbers, times the root of how many: √(π/2).
+const MEDIAN: f64 = 1.2533;
+
+/// Outliers in most of the signals of a sensor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CommonOutliers {
+    /// The levels at which there are.
+    pub levels: Vec<u32>,
+    /// The one where they weigh most.
+    pub most: u32,
+    /// Median of classical over robust wavelet variance, less one, there.
+    pub excess: f64,
+    /// The same (in the logarithm) in standard deviations.
+    pub deviations: f64,
+}
+
+/// Looks at all signals of a sensor together.
+pub(super) fn common(pieces: &[Piece<'_>], efficiency: f64) -> Option<CommonOutliers> {
+    let question = Question::Outliers;
+    let mut found: Option<CommonOutliers> = None;
+    for level in 0..question.levels(pieces) {
+        let (mut logs, mut variance) = (Vec::new(), 0.0);
+        for piece in pieces {
+            for replicate in piece.replicates.iter().flatten() {
+                let eta = question.edof(piece.law.edof(replicate.samples)[level], efficiency);
+                logs.push(question.value(replicate, level) - 1.0 / eta);
+                variance += 2.0 / eta;
+            }
+        }
+        let count = logs.len() as f64;
+        let centre = crate::calibration::robust_scale::median(&logs);
+        let deviations = centre / (MEDIAN * variance.sqrt() / count);
+        let excess = centre.exp_m1();
+        if !(excess.is_finite() && deviations > ALARM && excess > LEAST) {
+            continue;
+        }
+        let level = level as u32 + 1;
+        let all = found.get_or_insert(CommonOutliers { levels: Vec::new(), most: level, excess, deviations });
+        all.levels.push(level);
+        if excess > all.excess {
+            (all.most, all.excess, all.deviations) = (level, excess, deviations);
+        }
+    }
+    found
+}
