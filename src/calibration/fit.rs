@@ -334,7 +334,9 @@ impl Term {
         if on(amplitude, self.limits.amplitude) {
             bounded.push(format!("{label} {} = {amplitude}", self.kind.amplitude_name()));
         }
+        // What is not there has its shape anywhere.
         if let (Some(name), Some(limits)) = (self.kind.shape_name(), self.limits.shape)
+            && amplitude > 0.0
             && on(shape, limits)
         {
             bounded.push(format!("{label} {name} = {shape}"));

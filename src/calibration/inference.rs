@@ -20,7 +20,7 @@ use super::replicates::Group;
 use super::sampling::SamplingLaw;
 use super::spec::ModelSpec;
 use super::spread::Spread;
-use crate::noise::{Composite, Process};
+use crate::noise::Process;
 use crate::rng::StreamKey;
 use crate::wavelet::{Curve, RobustVariance, Status};
 use nalgebra::DMatrix;
@@ -58,7 +58,9 @@ impl ParameterInterval {
             return None;
         }
         let Self { process, parameter, lost, .. } = self;
-        Some(if *lost > TAIL {
+        Some(if *lost >= 1.0 {
+            format!("{process} {parameter}: no interval, not determined: {process} is zero")
+        } else if *lost > TAIL {
             format!(
                 "{process} {parameter}: no interval, not determined: {process} vanishes in {} of the draws",
                 super::notes::percent(*lost)
@@ -204,11 +206,13 @@ fn like(replicate: &Replicate, nu: Vec<f64>) -> Replicate {
 
 fn intervals(outcome: &Outcome, fits: &[Fit]) -> Vec<ParameterInterval> {
     let (model, spec) = (&outcome.fit.composite, &outcome.spec);
-    let matched: Vec<Vec<Option<&Process>>> = fits.iter().map(|fit| matched(model, spec, fit)).collect();
+    let zero = &outcome.fit.zero;
+    let matched: Vec<Vec<Option<&Process>>> =
+        fits.iter().map(|fit| matched(&outcome.fit, spec, fit)).collect();
     let mut intervals = Vec::new();
     for (i, (process, label)) in model.processes.iter().zip(model.labels()).enumerate() {
         let there: Vec<&Process> = matched.iter().filter_map(|m| m[i]).collect();
-        let lost = 1.0 - there.len() as f64 / fits.len() as f64;
+        let lost = if zero.contains(&label) { 1.0 } else { 1.0 - there.len() as f64 / fits.len() as f64 };
         for (p, (parameter, value)) in process.parameters().into_iter().enumerate() {
             if spec.is_fixed(i, parameter) {
                 continue;
@@ -232,25 +236,28 @@ fn holding(value: f64, [low, high]: [f64; 2]) -> [f64; 2] {
 }
 
 /// The processes of a draw in the order of the model; none where one has vanished. Alike ones are told apart by
-/// their correlation times: those of the draw that are there keep their order, and are given to those of the
-/// model to which they are nearest.
-fn matched<'a>(model: &Composite, spec: &ModelSpec, fit: &'a Fit) -> Vec<Option<&'a Process>> {
+/// their correlation times: those that are there, in the draw and in the model, keep their order, and so many of
+/// them are paired as can be, the nearest.
+fn matched<'a>(estimate: &Fit, spec: &ModelSpec, fit: &'a Fit) -> Vec<Option<&'a Process>> {
     let labels = fit.composite.labels();
-    let there = |i: &usize| !fit.zero.contains(&labels[*i]);
-    let processes = &fit.composite.processes;
+    let (drawn, model) = (&fit.composite.processes, &estimate.composite.processes);
+    let there = |fit: &Fit, i: usize| !fit.zero.contains(&labels[i]);
     let kinds = spec.kinds();
-    let mut matched = vec![None; processes.len()];
+    let cost = |i: usize, d: usize| (log_time(&model[i]) - log_time(&drawn[d])).powi(2);
+    let mut matched = vec![None; drawn.len()];
     for (first, kind) in kinds.iter().enumerate().filter(|(i, kind)| !kinds[..*i].contains(kind)) {
         let own: Vec<usize> = (first..kinds.len()).filter(|i| kinds[*i] == *kind).collect();
-        let drawn: Vec<usize> = own.iter().copied().filter(there).collect();
-        let limited = own.iter().any(|i| spec.limits()[*i] != Limits::NONE);
-        let places = if limited || drawn.len() == own.len() {
-            drawn.clone()
+        let items: Vec<usize> = own.iter().copied().filter(|i| there(fit, *i)).collect();
+        let places: Vec<usize> = own.iter().copied().filter(|i| there(estimate, *i)).collect();
+        let pairs: Vec<(usize, usize)> = if own.iter().any(|i| spec.limits()[*i] != Limits::NONE) {
+            items.iter().map(|i| (*i, *i)).collect()
+        } else if items.len() <= places.len() {
+            nearest(&places, &items, cost).into_iter().zip(items).collect()
         } else {
-            nearest(&own, &drawn, |i, d| (log_time(&model.processes[i]) - log_time(&processes[d])).powi(2))
+            places.iter().copied().zip(nearest(&items, &places, |d, i| cost(i, d))).collect()
         };
-        for (place, d) in places.into_iter().zip(drawn) {
-            matched[place] = Some(&processes[d]);
+        for (place, d) in pairs {
+            matched[place] = Some(&drawn[d]);
         }
     }
     matched
@@ -323,7 +330,7 @@ mod tests {
     use super::*;
     use crate::calibration::{Estimator, ModelChoice, Pool, Trim, Weighting, calibrate, grouped};
     use crate::imu::{Axis, Channel, Sensor};
-    use crate::noise::{Process, RandomWalk, White};
+    use crate::noise::{RandomWalk, White};
     use crate::wavelet::{Convention, Tuning, classical};
     use rand::RngExt;
     use rand_distr::StandardNormal;
@@ -380,7 +387,7 @@ mod tests {
     /// quantile leaves out, the first has no interval.
     #[test]
     fn a_component_that_vanishes_in_draws_takes_nothing_of_the_other() {
-        use crate::noise::Ar1;
+        use crate::noise::{Ar1, Composite};
         let ar1 = |time: f64, sigma2: f64| Process::Ar1(Ar1::new((-1.0 / time).exp(), sigma2).unwrap());
         let of = |processes: Vec<Process>| {
             let composite = Composite::new(processes);
@@ -397,7 +404,7 @@ mod tests {
         // The one that is not there has a time beyond the other's: by order it is the second.
         let mut lost = of(vec![ar1(700.0, 1.1), ar1(5000.0, 0.0)]).fit;
         lost.zero = vec!["AR1_2".to_owned()];
-        let matched = matched(&outcome.fit.composite, &outcome.spec, &lost);
+        let matched = matched(&outcome.fit, &outcome.spec, &lost);
         assert!(matched[0].is_none() && matched[1].unwrap() == &lost.composite.processes[0]);
         let draws = |lost_ones: usize| -> Vec<Fit> {
             let whole = (0..100 - lost_ones).map(|i| whole(0.8 + 0.4 * i as f64 / 99.0));
