@@ -140,18 +140,117 @@ fn what_changed_since_the_plan_is_refused() {
 }
 
 #[test]
-fn units_of_two_plans_are_never_merged() {
+fn units_of_another_plan_are_named_and_left_out() {
     let place = place();
     let dir = place.path();
     whole(dir, "five");
     fs::write(dir.join("study.toml"), STUDY.replace("seed = 5", "seed = 6")).unwrap();
-    whole(dir, "six");
+    let undisturbed = whole(dir, "six");
     let stray = units(&dir.join("five")).remove(0);
     let inner = dir.join("six/units").join(stray.parent().unwrap().file_name().unwrap());
     fs::create_dir_all(&inner).unwrap();
     fs::copy(&stray, inner.join(stray.file_name().unwrap())).unwrap();
-    let said = refused(dir, "merge study.toml -o six", 2);
-    assert!(said.contains("1 unit files are of another plan"), "{said}");
+    for command in ["plan", "run", "merge", "status"] {
+        let said = done(dir, &format!("{command} study.toml -o six"));
+        assert!(said.contains("1 unit files are of another plan and left out, such as six/units/"), "{said}");
+    }
+    assert_eq!(results(&dir.join("six")), undisturbed);
+}
+
+/// Names with a slash, several filters: every candidate and filter has a row of its own, with its numbers.
+#[test]
+fn every_candidate_and_filter_is_in_the_ratio_table() {
+    let place = place();
+    let dir = place.path();
+    let candidates = "{ name = \"clean/awv\", model = \"imu.toml\" }, { name = \"III/awv\", model = \"wrong.toml\" }, \
+         { name = \"II\", calibrate = { estimators = [\"awv\", \"dr-awv\"], fit = \"AR1+WN\", trim = 1, \
+         synthesize = { model = \"imu.toml\", replicates = 3, samples = 8192, axes = \"x\" } } }";
+    let study =
+        STUDY.replace("{ model = \"imu.toml\" }, { name = \"wrong\", model = \"wrong.toml\" }", candidates);
+    let study = study.replace("runs = 77", "runs = 8\nreference = \"III/awv\"\nfilters = [15, \"full\"]");
+    fs::write(dir.join("study.toml"), study.replace("[2, 4, 8, 16]", "[8]")).unwrap();
+    // two processes, which 15 states reduce to one
+    let two = MODEL.replace("4e-12 }", "4e-12 }, { type = \"AR1\", phi = 0.99, sigma2 = 1e-8 }");
+    fs::write(dir.join("wrong.toml"), two).unwrap();
+    whole(dir, "out");
+    let text = fs::read_to_string(dir.join("out/results/tables.md")).unwrap();
+    let (_, ratios) = text.split_once(": ASEE relative to III/awv with the same filter, mean").unwrap();
+    let ratios = ratios.split("none: ASEE").next().unwrap();
+    let filters = ["15", "full"];
+    for name in ["clean/awv", "III/awv", "II"].iter().flat_map(|c| filters.map(|f| format!("{c} {f}"))) {
+        let row: Vec<&str> = ratios.lines().filter(|l| l.contains(&name)).collect();
+        assert_eq!(row.len(), 1, "{name}: {ratios}");
+        // two states are shown, each by estimator: two for the calibrated ones, none for the others
+        let filled = row[0].matches('(').count() + row[0].matches(" –").count();
+        assert_eq!(filled, if name.starts_with("II ") { 4 } else { 2 }, "{ratios}");
+        assert_eq!(row[0].contains('–'), name.starts_with("III"), "{ratios}");
+    }
+    let text = fs::read_to_string(dir.join("out/results/outages.json")).unwrap();
+    let rows: Vec<serde_json::Value> = serde_json::from_str(&text).unwrap();
+    assert_eq!(rows.len(), 4 * 2);
+    let mut different = false;
+    for row in &rows {
+        assert_eq!(row["reference"], "III/awv");
+        let of_reference =
+            |r: &&serde_json::Value| r["candidate"] == row["reference"] && r["filter"] == row["filter"];
+        let own = rows.iter().find(of_reference).unwrap();
+        assert_eq!(row["nees_mean_reference"], own["nees_mean"]);
+        different |= own["nees_mean"] != rows[0]["nees_mean_reference"];
+    }
+    assert!(different, "the two filters are two references");
+}
+
+#[test]
+fn tables_of_an_earlier_plan_do_not_survive() {
+    let place = place();
+    let dir = place.path();
+    whole(dir, "out");
+    fs::remove_file(dir.join("out/plan.json")).unwrap();
+    let study = STUDY.replace("seed = 5", "seed = 6").replace(", \"epochs\"]", "]");
+    fs::write(dir.join("study.toml"), &study).unwrap();
+    let said = done(dir, "plan study.toml -o out");
+    assert!(said.contains("50 unit files are of another plan and left out"), "{said}");
+    assert!(said.contains("out/results holds the tables of another plan"), "{said}");
+    let said = refused(dir, "merge study.toml -o out", 75);
+    assert!(said.contains("out/results is of another plan"), "{said}");
+    let again = whole(dir, "out");
+    let names: Vec<&str> = again.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, FILES.into_iter().filter(|f| !f.starts_with("epochs")).collect::<Vec<_>>());
+    assert_eq!(again, whole(dir, "fresh"));
+}
+
+#[test]
+fn another_seed_than_the_plans_is_refused() {
+    let place = place();
+    let dir = place.path();
+    done(dir, "plan study.toml -o out");
+    for command in ["run", "merge", "status", "plan"] {
+        let said = refused(dir, &format!("{command} study.toml -o out --seed 6"), 2);
+        assert!(said.contains("\"seed\" is 5 in the plan, 6 in the study"), "{said}");
+    }
+    done(dir, "status study.toml -o out --seed 5");
+}
+
+#[test]
+fn what_is_missing_is_told_by_cell_and_runs() {
+    let place = place();
+    let dir = place.path();
+    let said = done(dir, "plan study.toml -o out");
+    assert!(said.contains("cell \"none\" has no outages: its table is empty"), "{said}");
+    done(dir, "run study.toml -o out --shard 0/2");
+    let output = batch(dir, "merge study.toml -o out --format json -v");
+    assert_eq!(output.status.code(), Some(75));
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let missing = json["missing"].as_array().unwrap();
+    assert_eq!((json["units"].as_u64(), missing.len()), (Some(50), 25));
+    assert_eq!(missing[0]["runs"], serde_json::json!([8, 16]));
+    assert_eq!(missing[24]["cell"], serde_json::json!(["drive", "imu", "default", "default", "none"]));
+    assert_eq!(missing[24]["runs"], serde_json::json!([72, 77]));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    for unit in missing {
+        assert!(said.contains(&format!("{}: drive, imu, default", unit["unit"].as_str().unwrap())), "{said}");
+    }
+    assert!(said.contains("none, runs 72 to 76"), "{said}");
 }
 
 #[test]

@@ -17,6 +17,7 @@ impl Study {
         for (axis, names) in self.names() {
             unique(axis, &names)?;
         }
+        self.check_filters()?;
         self.outage_sets().map(|_| ())
     }
 
@@ -104,6 +105,18 @@ impl Study {
             Some(s) => {
                 let value = format!("{} of {} samples", s.replicates, s.samples);
                 Err(StudyError::refused("synthesize", value, "are no recordings"))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// No filter twice: its columns could not be told apart.
+    fn check_filters(&self) -> Result<(), StudyError> {
+        match self.filters.iter().enumerate().find(|(i, f)| self.filters[..*i].contains(f)) {
+            Some((_, filter)) => {
+                let twice = serde_json::to_string(filter).unwrap_or_default();
+                let shown = serde_json::to_string(&self.filters).unwrap_or_default();
+                Err(StudyError::refused("filters", shown, format!("names {twice} twice")))
             }
             None => Ok(()),
         }

@@ -30,13 +30,14 @@ pub struct Study {
     /// What is kept and tabled; outages and their ratios by default.
     #[serde(default = "default_metrics")]
     pub metrics: Vec<Metric>,
-    /// The candidate that ratios refer to (default: the first).
+    /// The candidate that ratios refer to (default: the first). Ratios are taken within a filter variant: to
+    /// the reference with the same filter.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reference: Option<String>,
     /// Runs of one unit of work; without it `batch plan` measures and aims at two minutes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub unit_runs: Option<u64>,
-    /// Filter variants; by default the scenario's.
+    /// Filter variants, each once; by default the scenario's.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub filters: Vec<FilterStates>,
     /// References to follow.

@@ -10,8 +10,8 @@ pub(crate) struct Common {
     /// Seed of all random numbers; without it one is drawn, printed and recorded
     #[arg(long, global = true, value_name = "N")]
     pub(crate) seed: Option<u64>,
-    /// Worker threads (default: one per core)
-    #[arg(long, short = 'j', global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    /// Worker threads, at most 1024 (default: one per core)
+    #[arg(long, short = 'j', global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
     /// Say only errors
     #[arg(long, short, global = true)]
@@ -90,6 +90,11 @@ impl Session {
             seed
         };
         self.common.seed.or(of_file).unwrap_or_else(|| *self.drawn.get_or_init(draw))
+    }
+
+    /// The seed of the command line, if there is one.
+    pub(crate) const fn asked_seed(&self) -> Option<u64> {
+        self.common.seed
     }
 
     /// Progress of `total` units, said on stderr: a bar on a terminal, else a line every 10 %.

@@ -107,11 +107,11 @@ pub fn plan(directory: &Path) -> Result<Option<Plan>, BatchDirectoryError> {
 /// The plan of a study, which must be the one in the directory. A study without a seed takes the plan's.
 ///
 /// # Errors
-/// When there is none, or the study is not the one that was planned.
-pub fn plan_of(directory: &Path, study: &Study) -> Result<Plan, BatchDirectoryError> {
+/// When there is none, or the study is not the one that was planned, or `seed` is given and not the plan's.
+pub fn plan_of(directory: &Path, study: &Study, seed: Option<u64>) -> Result<Plan, BatchDirectoryError> {
     let plan = plan(directory)?
         .ok_or_else(|| BatchDirectoryError::NoPlan { path: directory.display().to_string() })?;
-    same(directory, &plan, study, None)?;
+    same(directory, &plan, study, seed)?;
     Ok(plan)
 }
 

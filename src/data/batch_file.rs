@@ -34,7 +34,15 @@ pub fn read(path: &Path) -> Result<BatchFile, TomlError> {
     let source = Source::read(path)?;
     let table = source.parse()?;
     let root = source.root(&table);
+    let written: toml::Table = source.text().parse().unwrap_or_default();
     let mut study: Study = toml::from_str(source.text()).map_err(|e| explained(&e, &source))?;
+    for key in ["filters", "scenario", "gnss", "outages"] {
+        let is_empty = |value: &toml::Value| value.as_array().is_some_and(Vec::is_empty);
+        if written.get(key).is_some_and(is_empty) {
+            let e = StudyError::refused(key, "[]", "makes no cell; leave the key out for the default");
+            return Err(located(&e, &source, &root));
+        }
+    }
     study.resolve().map_err(|e| located(&e, &source, &root))?;
     study.reference().map_err(|e| located(&e, &source, &root))?;
     let scenarios = scenarios(&study, path, &source)?;
@@ -161,6 +169,16 @@ mod tests {
     #[test]
     fn mistakes_are_named() {
         let with = |from: &str, to: &str| study(&STUDY.replace(from, to)).unwrap_err();
+        for key in ["filters", "scenario", "gnss", "outages"] {
+            let text = format!("{key} = []\n{}", STUDY.split("[[outages]]").next().unwrap());
+            let refusal =
+                format!("s.toml, line 1: \"{key}\" = [] makes no cell; leave the key out for the default | ");
+            assert_eq!(study(&text).unwrap_err(), refusal);
+        }
+        assert_eq!(
+            with("runs = 8", "filters = [15, \"full\", \"15\"]"),
+            "s.toml, line 1: \"filters\" = [\"15\",\"full\",\"15\"] names \"15\" twice | "
+        );
         assert_eq!(
             with("runs = 8", "rums = 8"),
             "s.toml, line 1: unknown key \"rums\" | did you mean \"runs\"?"

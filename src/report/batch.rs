@@ -43,6 +43,8 @@ pub struct ColumnResult<'a> {
     pub candidate: &'a str,
     /// Filter: 15 or full.
     pub filter: &'a str,
+    /// The candidate its ratios refer to, with the same filter; empty without ratios.
+    pub reference: &'a str,
     /// The sums of all runs.
     pub result: &'a RunResult,
 }
@@ -109,7 +111,8 @@ pub fn outage_columns() -> Vec<TableColumn> {
     names.extend(
         ["nees_mean", "nees_mean_reference", "coverage_mean", "coverage_mean_reference"].map(str::to_owned),
     );
-    columns(ints(["outage", "runs", "diverged"]).chain(floats(names)))
+    let reference = std::iter::once(("reference".to_owned(), ValueKind::Text));
+    columns(reference.chain(ints(["outage", "runs", "diverged"])).chain(floats(names)))
 }
 
 /// One row an outage; a set without outages has no row.
@@ -123,6 +126,7 @@ pub fn outage_rows(
     let diverged = of.result.runs.iter().filter(|r| r.diverged).count() as u64;
     let row = |(i, outage): (usize, &OutageMetrics)| {
         let mut row = keys(of);
+        row.push(Value::Text(of.reference.to_owned()));
         row.extend([i as u64, runs, diverged].map(Value::Int));
         let ratios = comparison.and_then(|c| c.get(i));
         row.extend(
@@ -235,6 +239,8 @@ pub fn experiment_of(result: &RunResult) -> Experiment {
 pub struct ShownColumn {
     /// Candidate, and filter where there are several.
     pub name: String,
+    /// Its place in the table of ratios.
+    pub label: Label,
     /// Its outages.
     pub outages: Vec<OutageMetrics>,
     /// Against the reference, if ratios are kept.
@@ -257,7 +263,7 @@ pub struct ShownCell {
 pub fn ratio_table(cell: &ShownCell, states: &[usize]) -> Vec<Vec<String>> {
     let candidate = |column: &ShownColumn| CandidateResult {
         run: column.name.clone(),
-        label: Label::of(&column.name, None),
+        label: column.label.clone(),
         is_reference: column.is_reference,
         outages: column.comparison.clone().unwrap_or_default(),
     };
@@ -294,7 +300,8 @@ mod tests {
     use super::*;
 
     fn of(result: &RunResult) -> ColumnResult<'_> {
-        ColumnResult { cell: ["land", "m", "s", "g", "o"], candidate: "I/awv", filter: "15", result }
+        let cell = ["land", "m", "s", "g", "o"];
+        ColumnResult { cell, candidate: "I/awv", filter: "15", reference: "I/awv", result }
     }
 
     #[test]

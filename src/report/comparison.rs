@@ -153,8 +153,9 @@ fn rows<'a>(run: &'a str, outage: usize, comparison: &'a OutageComparison) -> im
 /// row is the head; an interval below half a hundredth has one digit; `states` are indices of reported states.
 #[must_use]
 pub fn table_rows(candidates: &[CandidateResult], states: &[usize]) -> Vec<Vec<String>> {
-    let scenarios = in_order(candidates.iter().map(|c| c.label.scenario.as_str()));
-    let estimators = in_order(candidates.iter().map(|c| c.label.estimator.as_str()));
+    let labels = distinct_labels(candidates);
+    let scenarios = in_order(labels.iter().map(|label| label.scenario.as_str()));
+    let estimators = in_order(labels.iter().map(|label| label.estimator.as_str()));
     let columns = || states.iter().flat_map(|s| estimators.iter().map(move |e| (*s, *e)));
     let name = |(s, e): (usize, &str)| format!("{} {e}", REPORTED_NAMES[s]).trim_end().to_owned();
     let mut rows = vec![["scenario", "outage"].map(str::to_owned).to_vec()];
@@ -163,10 +164,10 @@ pub fn table_rows(candidates: &[CandidateResult], states: &[usize]) -> Vec<Vec<S
     for scenario in scenarios {
         for outage in 0..outages {
             let cell_of = |(state, estimator): (usize, &str)| {
-                let here = |c: &&CandidateResult| {
-                    c.label.scenario == scenario && c.label.estimator == estimator && outage < c.outages.len()
-                };
-                candidates.iter().find(here).map_or_else(String::new, |c| cell(c, outage, state))
+                let here = |label: &Label| label.scenario == scenario && label.estimator == estimator;
+                let found = labels.iter().position(here).map(|i| &candidates[i]);
+                let found = found.filter(|c| outage < c.outages.len());
+                found.map_or_else(String::new, |c| cell(c, outage, state))
             };
             let mut row = vec![scenario.to_owned(), (outage + 1).to_string()];
             row.extend(columns().map(cell_of));
@@ -174,6 +175,31 @@ pub fn table_rows(candidates: &[CandidateResult], states: &[usize]) -> Vec<Vec<S
         }
     }
     rows
+}
+
+/// The places of candidates, each its own: those that would share one have rows of their full names, and a
+/// number if even these are the same.
+fn distinct_labels(candidates: &[CandidateResult]) -> Vec<Label> {
+    let shared = |c: &CandidateResult| candidates.iter().filter(|o| o.label == c.label).count() > 1;
+    let mut labels: Vec<Label> = Vec::new();
+    for candidate in candidates {
+        let mut label = candidate.label.clone();
+        if shared(candidate) {
+            label.scenario.clone_from(&candidate.run);
+        }
+        let name = label.scenario.clone();
+        let taken = |label: &Label, labels: &[Label]| {
+            labels.contains(label)
+                || candidates.iter().any(|c| !shared(c) && shared(candidate) && c.label == *label)
+        };
+        let mut number = 1;
+        while taken(&label, &labels) {
+            number += 1;
+            label.scenario = format!("{name} ({number})");
+        }
+        labels.push(label);
+    }
+    labels
 }
 
 fn cell(candidate: &CandidateResult, outage: usize, state: usize) -> String {
@@ -249,6 +275,20 @@ mod tests {
         );
         assert_eq!(rows[1], ["I", "1", "–", "+0.96 ± 0.50 (1.96)", "–", "+0.96 ± 0.50 (1.96)"]);
         assert_eq!(rows[4][..4], ["II", "2", "-75.00 ± 0.50 (76.00)", ""]);
+    }
+
+    #[test]
+    fn candidates_that_would_share_a_place_all_have_one() {
+        let runs = ["a/drive", "b/drive", "x/I_awv", "y/I_awv", "c", "c"];
+        let all: Vec<_> = (1..).zip(runs).map(|(k, run)| candidate(run, f64::from(k), false)).collect();
+        let rows = table_rows(&all, &[0]);
+        let names: Vec<&str> = rows[1..].iter().step_by(2).map(|row| row[0].as_str()).collect();
+        assert_eq!(names, ["a/drive", "b/drive", "x/I_awv", "y/I_awv", "c", "c (2)"]);
+        assert_eq!(rows.len(), 1 + 2 * all.len());
+        for (k, row) in rows[1..].iter().enumerate() {
+            let shown = format!("+{}.00", k / 2 + 1);
+            assert_eq!(row.iter().filter(|text| text.starts_with(&shown)).count(), 1, "{row:?}");
+        }
     }
 
     #[test]

@@ -65,13 +65,15 @@ impl<'a> Inputs<'a> {
         f(&simulation)
     }
 
-    /// Refuses outages that do not lie on the trajectory of a cell.
-    pub(super) fn check_outages(&mut self, cell: Cell) -> Result<(), Failure> {
+    /// Number of outages of a cell; refuses those that do not lie on its trajectory.
+    pub(super) fn outages(&mut self, cell: Cell) -> Result<usize, Failure> {
         let (plan, grid) = (&self.planned.plan, &self.planned.grid);
         let trajectory = self.trajectory(cell.trajectory)?;
         let span = (trajectory.start_s(), trajectory.end_s());
         let found = windows(&grid.scenario(cell, plan.seed), span, plan.seed);
-        found.map(|_| ()).map_err(|e| Failure::input(format!("{}: {e}", grid.names(cell).join(", "))))
+        found
+            .map(|windows| windows.len())
+            .map_err(|e| Failure::input(format!("{}: {e}", grid.names(cell).join(", "))))
     }
 
     /// Duration of a trajectory (s).

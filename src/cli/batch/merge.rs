@@ -4,12 +4,12 @@ use super::status::Count;
 use super::{Place, Planned, filter_name};
 use crate::cli::compare::table;
 use crate::cli::{Failure, Session};
-use nav_sim::batch::{CellSums, Kept, Metric, Unit};
+use nav_sim::batch::{CellSums, Column, Kept, Metric, Study, Unit};
 use nav_sim::data::atomic::AtomicDir;
 use nav_sim::data::table_files::{TableFiles, TableFormat};
 use nav_sim::data::unit_file;
 use nav_sim::metrics::{self, Experiment, OutageComparison};
-use nav_sim::report::{self, ColumnResult, ShownCell, ShownColumn, TableRow};
+use nav_sim::report::{self, ColumnResult, Label, ShownCell, ShownColumn, TableRow};
 use nav_sim::simulation::{REPORTED_NAMES, RunResult};
 use rayon::prelude::*;
 use serde_json::json;
@@ -18,8 +18,9 @@ use serde_json::json;
 ///
 /// Writes results/ in the directory of the study: outages.csv, .json and .parquet (a row an outage of each
 /// candidate in each cell), runs.parquet, epochs.csv and .parquet if the study asks for them, tables.md. The
-/// bytes depend on the plan alone, not on how it was run. Nothing is written while units are missing: they are
-/// listed, and the exit code is 75.
+/// bytes depend on the plan alone, not on how it was run. Ratios are taken within a filter: column `reference`
+/// names the candidate they refer to, in the row's own filter. Nothing is written while units are missing: they
+/// are listed (all of them with --verbose or --format json), and the exit code is 75.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -37,11 +38,11 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let states = crate::cli::compare::states(&args.states)?;
-    let planned = args.place.planned()?;
-    complete(&planned)?;
+    let planned = args.place.planned(session.asked_seed())?;
+    complete(&planned, session)?;
     let mut out = AtomicDir::create(&planned.directory.join("results"))?;
     let mut tables = Tables::create(&mut out, &planned)?;
-    let mut texts = Texts::default();
+    let mut texts = Texts::new(&planned)?;
     let units: Vec<(Unit, String)> = planned.plan.named_units(&planned.grid).collect();
     let cells: Vec<&[(Unit, String)]> = units.chunk_by(|a, b| a.0.cell == b.0.cell).collect();
     let mut damaged = Vec::new();
@@ -64,17 +65,35 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         }
     }
     if !damaged.is_empty() {
-        return Err(incomplete(damaged.len(), units.len(), &damaged));
+        return Err(incomplete(&planned, units.len(), &damaged, session));
     }
     tables.finish()?;
     let text = texts.render(&states);
     out.write("tables.md", format!("{text}\n"))?;
     let summary = summary(&planned, units.len(), diverged);
     out.write("study.json", report::json(&summary))?;
+    remove_stale(&planned)?;
     out.commit()?;
     session.printer.result(if session.json() { summary.to_string() } else { text }.trim_end());
     session.printer.say(&format!("wrote {}", planned.directory.join("results").display()));
     all_finite(diverged)
+}
+
+/// Removes tables of an earlier plan that this one does not write; all others are replaced.
+fn remove_stale(planned: &Planned) -> Result<(), Failure> {
+    if planned.plan.study.keeps(Metric::Epochs) {
+        return Ok(());
+    }
+    for name in ["epochs.csv", "epochs.parquet"] {
+        let path = planned.directory.join("results").join(name);
+        match std::fs::remove_file(&path) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
+                return Err(Failure::could_not(format!("{}: {e}", path.display())));
+            }
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 fn all_finite(diverged: u64) -> Result<(), Failure> {
@@ -85,30 +104,52 @@ fn all_finite(diverged: u64) -> Result<(), Failure> {
     Err(failure.hint("they are in runs.parquet, diverged = 1, and in no other number"))
 }
 
-/// All units must be there, and none of another plan.
-fn complete(planned: &Planned) -> Result<(), Failure> {
+/// All units must be there; those of another plan are left out.
+fn complete(planned: &Planned, session: &Session) -> Result<(), Failure> {
     let count = Count::of(planned)?;
-    if let Some(id) = count.foreign.first() {
-        let n = count.foreign.len();
-        let path = unit_file::path(&planned.directory, id);
-        let failure =
-            Failure::input(format!("{n} unit files are of another plan, such as {}", path.display()));
-        return Err(failure.hint("one directory holds one plan: move them away"));
-    }
+    count.warn_of_foreign(planned, session);
     if count.missing.is_empty() {
         return Ok(());
     }
-    Err(incomplete(count.units - count.done, count.units, &count.missing))
+    Err(incomplete(planned, count.units, &count.missing, session))
 }
 
-fn incomplete(missing: usize, units: usize, names: &[String]) -> Failure {
-    let shown: Vec<&str> = names.iter().take(10).map(String::as_str).collect();
-    let more = if missing > shown.len() { ", …" } else { "" };
-    let failure = Failure::stopped(format!(
-        "{missing} of {units} units are missing or damaged: {}{more}",
-        shown.join(", ")
-    ));
-    failure.hint("`nav-sim batch run` computes them; nothing was written")
+/// Names the units that are missing or damaged, all of them on stdout as JSON or with --verbose.
+fn incomplete(planned: &Planned, units: usize, missing: &[(Unit, String)], session: &Session) -> Failure {
+    let cell = |unit: &Unit| planned.grid.names(planned.grid.cell(unit.cell));
+    if session.json() {
+        let one = |(unit, id): &(Unit, String)| {
+            let runs = [unit.first, unit.first + unit.runs];
+            json!({ "unit": id, "index": unit.index, "cell": cell(unit), "runs": runs })
+        };
+        let missing: Vec<serde_json::Value> = missing.iter().map(one).collect();
+        let json = json!({
+            "schema_version": 1, "plan": planned.plan.id(), "units": units, "missing": missing,
+        });
+        session.printer.result(&json.to_string());
+    }
+    for (unit, id) in missing {
+        let (name, last) = (cell(unit).join(", "), unit.first + unit.runs - 1);
+        session.printer.detail(&format!("{id}: {name}, runs {} to {last}", unit.first));
+    }
+    let shown: Vec<&str> = missing.iter().take(10).map(|(_, id)| id.as_str()).collect();
+    let more = if missing.len() > shown.len() { ", … (all with --verbose)" } else { "" };
+    let n = missing.len();
+    let message = format!("{n} of {units} units are missing or damaged: {}{more}", shown.join(", "));
+    let stale = match stale_results(planned) {
+        Some(path) => format!("; {} is of another plan", path.display()),
+        None => String::new(),
+    };
+    let hint = format!("`nav-sim batch run` computes them; nothing was written{stale}");
+    Failure::stopped(message).hint(hint)
+}
+
+/// The results that another plan left here, if there are any.
+pub(super) fn stale_results(planned: &Planned) -> Option<std::path::PathBuf> {
+    let path = planned.directory.join("results");
+    let text = std::fs::read_to_string(path.join("study.json")).ok()?;
+    let summary: serde_json::Value = serde_json::from_str(&text).ok()?;
+    (summary["plan"] != planned.plan.id().as_str()).then_some(path)
 }
 
 /// Cells that are held in memory together.
@@ -122,7 +163,7 @@ fn wave(planned: &Planned, session: &Session) -> usize {
 /// Why a cell has no tables.
 enum Bad {
     /// These units are damaged.
-    Damaged(Vec<String>),
+    Damaged(Vec<(Unit, String)>),
     /// Something else.
     Failed(Failure),
 }
@@ -149,11 +190,13 @@ fn cell_tables(planned: &Planned, units: &[(Unit, String)]) -> Result<CellTables
         runs: Vec::new(),
         diverged: 0,
     };
+    let reference = reference(planned)?;
     for ((column, result), (comparison, is_reference)) in
         grid.columns.iter().zip(&sums.columns).zip(comparisons)
     {
         let filter = filter_name(grid.filter(cell, column));
-        let of = ColumnResult { cell: names, candidate: &column.name, filter, result };
+        let reference = if comparison.is_some() { reference.1.as_str() } else { "" };
+        let of = ColumnResult { cell: names, candidate: &column.name, filter, reference, result };
         let outages = metrics::outages(result);
         tables.outages.extend(report::outage_rows(&of, &outages, comparison.as_deref()));
         tables.runs.extend(report::run_rows(&of));
@@ -161,11 +204,33 @@ fn cell_tables(planned: &Planned, units: &[(Unit, String)]) -> Result<CellTables
             tables.epochs.extend(report::epoch_rows(&of, &metrics::epochs(&result.epochs)));
         }
         tables.diverged += result.runs.iter().filter(|r| r.diverged).count() as u64;
-        let several = planned.plan.study.filters.len() > 1;
-        let name = if several { format!("{} {filter}", column.name) } else { column.name.clone() };
-        tables.shown.columns.push(ShownColumn { name, outages, comparison, is_reference });
+        let (name, label) = shown_names(&planned.plan.study, column, filter);
+        tables.shown.columns.push(ShownColumn { name, label, outages, comparison, is_reference });
     }
     Ok(tables)
+}
+
+/// The name of a column, and its place in the layout of Table I: the estimators of one calibration stand in a
+/// row, every other candidate has its own. Where there are several filters, each has a row.
+fn shown_names(study: &Study, column: &Column, filter: &str) -> (String, Label) {
+    let with_filter = |name: &str| match study.filters.len() {
+        0 | 1 => name.to_owned(),
+        _ => format!("{name} {filter}"),
+    };
+    let (name, entry, estimator) = study.candidates().swap_remove(column.candidate);
+    let of_several = estimator.filter(|_| name != study.candidate[entry].name);
+    let label = Label {
+        scenario: with_filter(&study.candidate[entry].name),
+        estimator: of_several.unwrap_or_default().to_uppercase(),
+    };
+    (with_filter(&name), label)
+}
+
+/// Position and name of the candidate that ratios refer to.
+fn reference(planned: &Planned) -> Result<(usize, String), Bad> {
+    let study = &planned.plan.study;
+    let index = study.reference().map_err(|e| Bad::Failed(Failure::could_not(e)))?;
+    Ok((index, study.candidates().swap_remove(index).0))
 }
 
 fn sums(planned: &Planned, units: &[(Unit, String)]) -> Result<CellSums, Bad> {
@@ -175,13 +240,13 @@ fn sums(planned: &Planned, units: &[(Unit, String)]) -> Result<CellSums, Bad> {
         match unit_file::read(&planned.directory, id) {
             Ok(result) if result.runs == unit.runs && result.columns.len() == planned.grid.columns.len() => {
                 if damaged.is_empty() && !sums.add(result) {
-                    damaged.push(id.clone());
+                    damaged.push((*unit, id.clone()));
                 }
             }
             Err(unit_file::UnitFileError::Io { path, source }) => {
                 return Err(Bad::Failed(Failure::could_not(format!("{path}: {source}"))));
             }
-            Ok(_) | Err(_) => damaged.push(id.clone()),
+            Ok(_) | Err(_) => damaged.push((*unit, id.clone())),
         }
     }
     if damaged.is_empty() { Ok(sums) } else { Err(Bad::Damaged(damaged)) }
@@ -191,9 +256,8 @@ type Compared = (Option<Vec<OutageComparison>>, bool);
 
 /// The comparison of each column with the reference that has the same filter, if ratios are kept.
 fn comparisons(planned: &Planned, results: &[RunResult]) -> Result<Vec<Compared>, Bad> {
-    let study = &planned.plan.study;
     let failed = |e: String| Bad::Failed(Failure::could_not(e));
-    let reference = study.reference().map_err(|e| failed(e.to_string()))?;
+    let (reference, _) = reference(planned)?;
     let columns = &planned.grid.columns;
     if planned.plan.kept() == Kept::Runs {
         return Ok(vec![(None, false); columns.len()]);
@@ -242,8 +306,9 @@ impl Tables {
 }
 
 /// What people read: of the first cells only, the files have all.
-#[derive(Default)]
 struct Texts {
+    /// What ratios refer to, in words.
+    reference: String,
     cells: Vec<ShownCell>,
     more: usize,
 }
@@ -251,6 +316,14 @@ struct Texts {
 const SHOWN: usize = 24;
 
 impl Texts {
+    fn new(planned: &Planned) -> Result<Self, Failure> {
+        let study = &planned.plan.study;
+        let candidates = study.candidates();
+        let index = study.reference().map_err(|e| Failure::could_not(&e))?;
+        let same = if study.filters.len() > 1 { " with the same filter" } else { "" };
+        Ok(Self { reference: format!("{}{same}", candidates[index].0), cells: Vec::new(), more: 0 })
+    }
+
     fn add(&mut self, cell: CellTables) {
         if self.cells.len() < SHOWN {
             self.cells.push(cell.shown);
@@ -265,11 +338,10 @@ impl Texts {
         text += &table(&report::drift_table(&self.cells));
         let has_ratios = |cell: &&ShownCell| cell.columns.len() > 1 && cell.columns[0].comparison.is_some();
         for cell in self.cells.iter().filter(has_ratios) {
-            let reference = cell.columns.iter().find(|c| c.is_reference).map_or("", |c| &c.name);
             text += &format!(
-                "\n\n{}: ASEE relative to {reference}, mean over the outage of (ratio − 1)·100 ± half the 95 % \
+                "\n\n{}: ASEE relative to {}, mean over the outage of (ratio − 1)·100 ± half the 95 % \
                  interval (mean of the absolute value), %\n\n",
-                cell.name
+                cell.name, self.reference
             );
             text += &table(&report::ratio_table(cell, states));
         }

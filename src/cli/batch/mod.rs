@@ -74,10 +74,10 @@ impl Place {
         Ok(batch_file::read(&self.study)?)
     }
 
-    /// The plan in the directory, which must be that of the study.
-    fn planned(&self) -> Result<Planned, Failure> {
+    /// The plan in the directory, which must be that of the study, and have the seed if one is asked for.
+    fn planned(&self, seed: Option<u64>) -> Result<Planned, Failure> {
         let (directory, file) = (self.directory(), self.read()?);
-        let plan = batch_directory::plan_of(&directory, &file.study)?;
+        let plan = batch_directory::plan_of(&directory, &file.study, seed)?;
         let grid = Grid::of(&plan).map_err(|e| unusable(&self.study, &e))?;
         Ok(Planned { plan, grid, directory })
     }

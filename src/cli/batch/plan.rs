@@ -1,6 +1,8 @@
 //! `nav-sim batch plan`: inputs checked and hashed, candidates calibrated, units cut.
 
 use super::inputs::{self, CALIBRATED, CANDIDATE_SEED, Inputs};
+use super::merge::stale_results;
+use super::status::Count;
 use super::{Place, Planned, unusable};
 use crate::cli::{Failure, Session, read};
 use nav_sim::batch::{
@@ -56,6 +58,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     validate(&planned, &args.place.study, session)?;
     probe(&mut planned, &args.place.study, session)?;
+    warn_of_leftovers(&planned, session)?;
     if !args.dry_run {
         batch_directory::write_plan(&directory, &planned.plan)?;
     }
@@ -103,7 +106,9 @@ fn again(
         }
     }
     let grid = Grid::of(&plan).map_err(|e| unusable(study, &e))?;
-    report(&Planned { plan, grid, directory: directory.to_owned() }, session);
+    let planned = Planned { plan, grid, directory: directory.to_owned() };
+    warn_of_leftovers(&planned, session)?;
+    report(&planned, session);
     session.printer.say(&format!("{} was planned already", directory.display()));
     Ok(())
 }
@@ -236,13 +241,36 @@ fn validate(planned: &Planned, study: &Path, session: &Session) -> Result<(), Fa
     let grid = &planned.grid;
     let mut inputs = Inputs::new(planned, study, session);
     let mut seen = std::collections::HashSet::new();
+    let mut without = Vec::new();
     for index in 0..grid.len() {
         let cell = grid.cell(index);
         if seen.insert((cell.trajectory, cell.truth, cell.scenario, 0)) || grid.len() <= 64 {
             inputs.with_cell(cell, |_| Ok(()))?;
-        } else if seen.insert((cell.trajectory, cell.scenario, cell.outages, 1)) {
-            inputs.check_outages(cell)?;
         }
+        if seen.insert((cell.trajectory, cell.scenario, cell.outages, 1)) && inputs.outages(cell)? == 0 {
+            without.push(planned.cell_name(cell));
+        }
+    }
+    warn_of_no_outages(&without, session);
+    Ok(())
+}
+
+fn warn_of_no_outages(cells: &[String], session: &Session) {
+    const SHOWN: usize = 5;
+    for name in cells.iter().take(SHOWN) {
+        session.printer.warn(&format!("cell \"{name}\" has no outages: its table is empty"));
+    }
+    if cells.len() > SHOWN {
+        session.printer.warn(&format!("{} more cells have no outages", cells.len() - SHOWN));
+    }
+}
+
+/// Says what other plans left in the directory.
+fn warn_of_leftovers(planned: &Planned, session: &Session) -> Result<(), Failure> {
+    Count::of(planned)?.warn_of_foreign(planned, session);
+    if let Some(path) = stale_results(planned) {
+        let path = path.display();
+        session.printer.warn(&format!("{path} holds the tables of another plan; `merge` replaces them"));
     }
     Ok(())
 }

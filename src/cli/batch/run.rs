@@ -2,6 +2,7 @@
 
 use super::inputs::Inputs;
 use super::shard::{self, Shard};
+use super::status::Count;
 use super::{Place, Planned};
 use crate::cli::{Failure, Session};
 use nav_sim::batch::{Plan, Unit, UnitResult, run_unit};
@@ -97,8 +98,9 @@ impl Stop {
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let stop = Stop::new(args.time_limit)?;
-    let planned = args.place.planned()?;
+    let planned = args.place.planned(session.asked_seed())?;
     planned.same_numbers()?;
+    Count::of(&planned)?.warn_of_foreign(&planned, session);
     let (shard, from) = shard::find(args.shard, args.shards, &|name| std::env::var(name).ok())?;
     session.printer.say(&format!("shard {}/{} ({from})", shard.index, shard.count));
     let pending = pending(&planned, shard, session)?;

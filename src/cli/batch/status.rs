@@ -3,7 +3,8 @@
 use super::plan::duration;
 use super::{Place, Planned};
 use crate::cli::{Failure, Session};
-use nav_sim::data::batch_directory;
+use nav_sim::batch::Unit;
+use nav_sim::data::{batch_directory, unit_file};
 use serde_json::json;
 
 /// What is done of a study and what is left
@@ -23,7 +24,7 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let planned = args.place.planned()?;
+    let planned = args.place.planned(session.asked_seed())?;
     let count = Count::of(&planned)?;
     let (plan, grid) = (&planned.plan, &planned.grid);
     let wall_s = count.left_s / plan.estimate.threads.max(1) as f64;
@@ -45,23 +46,20 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         duration(wall_s),
         plan.estimate.threads
     ));
-    if let Some(id) = count.foreign.first() {
-        let n = count.foreign.len();
-        session.printer.warn(&format!("{n} unit files are not of this plan, such as {id}"));
-    }
+    count.warn_of_foreign(&planned, session);
     Ok(())
 }
 
 /// What is there of a plan.
 pub(super) struct Count {
     pub(super) units: usize,
-    pub(super) done: usize,
+    done: usize,
     cells_done: usize,
     left_s: f64,
-    /// The first units that are not there.
-    pub(super) missing: Vec<String>,
+    /// The units that are not there.
+    pub(super) missing: Vec<(Unit, String)>,
     /// Units of another plan.
-    pub(super) foreign: Vec<String>,
+    foreign: Vec<String>,
 }
 
 impl Count {
@@ -79,9 +77,7 @@ impl Count {
             if !done {
                 let run_s = plan.estimate.run_s.get(grid.cell(unit.cell).trajectory).copied();
                 count.left_s += run_s.unwrap_or(0.0) * unit.runs as f64;
-                if count.missing.len() < 20 {
-                    count.missing.push(id);
-                }
+                count.missing.push((unit, id));
             }
             if unit.first + unit.runs == plan.study.runs {
                 count.cells_done += usize::from(cell_whole);
@@ -90,5 +86,14 @@ impl Count {
         }
         count.foreign = there.into_iter().collect();
         Ok(count)
+    }
+
+    /// Says how many unit files are not of this plan, and where.
+    pub(super) fn warn_of_foreign(&self, planned: &Planned, session: &Session) {
+        if let Some(id) = self.foreign.first() {
+            let (n, path) = (self.foreign.len(), unit_file::path(&planned.directory, id));
+            let path = path.display();
+            session.printer.warn(&format!("{n} unit files are of another plan and left out, such as {path}"));
+        }
     }
 }

@@ -28,7 +28,8 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let planned = args.place.planned()?;
+    // --seed draws the units here
+    let planned = args.place.planned(None)?;
     planned.same_numbers()?;
     let there = batch_directory::units(&planned.directory)?;
     let done: Vec<(Unit, String)> =
