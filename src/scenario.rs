@@ -244,6 +244,13 @@ mod tests {
         assert_eq!(refused("gnss.rate_hz = 3"), "gnss.rate_hz");
         assert_eq!(refused("gnss.rate_hz = 200"), "gnss.rate_hz");
         assert_eq!(refused("gnss.pos_sigma_m = [0, 1, 1]"), "gnss.pos_sigma_m");
+        assert_eq!(refused("gnss.lever_arm_m = [0, 120, 0]"), "gnss.lever_arm_m");
+        assert_eq!(refused("imu.turn_on_bias_gyro_rad_s = 100"), "imu.turn_on_bias_gyro_rad_s");
+        assert_eq!(refused("imu.turn_on_bias_accel_m_s2 = 100"), "imu.turn_on_bias_accel_m_s2");
+        assert_eq!(refused("initial.gyro_bias_sigma_rad_s = 5"), "initial.gyro_bias_sigma_rad_s");
+        assert_eq!(refused("initial.accel_bias_sigma_m_s2 = 50"), "initial.accel_bias_sigma_m_s2");
+        assert_eq!(refused("initial.pos_sigma_m = [1e7, 1, 1]"), "initial.pos_sigma_m");
+        assert_eq!(refused("initial.vel_sigma_m_s = [1, 1, 5000]"), "initial.vel_sigma_m_s");
         assert_eq!(refused("imu.rate_hz = -1"), "imu.rate_hz");
         assert_eq!(refused("imu.misalignment_rad = 0.5"), "imu.misalignment_rad");
         assert_eq!(refused("filter.nis_gate = 1"), "filter.nis_gate");

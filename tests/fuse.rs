@@ -460,9 +460,105 @@ fn standing_still_needs_an_initial_state() {
     let ran = nav_sim(place.path(), "fuse rec/imu.csv rec/gnss.csv imu.toml -o out");
     assert_eq!(ran.code, 2);
     assert!(
-        ran.stderr.contains("moves at 3 m/s or more") && ran.stderr.contains("--initial FILE"),
+        ran.stderr.contains("moves at 3.0 m/s or more") && ran.stderr.contains("--initial FILE"),
         "{}",
         ran.stderr
     );
     done(place.path(), "fuse rec/imu.csv rec/gnss.csv imu.toml --initial rec/initial.toml -o out");
+}
+
+/// Positions alone: the heading is never turned round, and every state of the coarse alignment is as good as
+/// it says (4 standard deviations, 9 states, 6 recordings: p < 0.004 of a false alarm).
+#[test]
+fn alignment_from_positions_alone_is_as_good_as_it_says() {
+    let place = place();
+    let fast = DRIVE.replace("to_speed_m_s = 10, duration_s = 10", "to_speed_m_s = 28, duration_s = 14");
+    fs::write(place.path().join("drive.toml"), fast).unwrap();
+    for seed in 1..=6 {
+        done(place.path(), &format!("trajectory record drive.toml imu.toml --seed {seed} -o rec"));
+        let gnss = fs::read_to_string(place.path().join("rec/gnss.csv")).unwrap();
+        let positions = |l: &str| l.split(',').take(7).collect::<Vec<_>>().join(",") + "\n";
+        fs::write(place.path().join("pos.csv"), gnss.lines().map(positions).collect::<String>()).unwrap();
+        let ran =
+            done(place.path(), "fuse rec/imu.csv pos.csv imu.toml --reference rec/reference.csv -o out");
+        assert!(!ran.stderr.contains("reversing"), "{}", ran.stderr);
+        assert!(!ran.stderr.contains("warning: NIS"), "{}", ran.stderr);
+        let out = place.path().join("out");
+        let (errors, solution) = (table(&out.join("errors.csv")), table(&out.join("solution.csv")));
+        let sd = |i: usize| if i < 2 { solution[0][25 + i] } else { solution[0][10 + i] };
+        for i in 0..9 {
+            let (error, sd) = (errors[0][1 + i], sd(i));
+            assert!(error.abs() < 4.0 * sd, "seed {seed}, state {i}: {error} against {sd}\n{}", ran.stderr);
+        }
+    }
+}
+
+/// What cannot be right is refused, or said: a start elsewhere, a lever arm in millimetres, a filter whose
+/// fixes are far from what it believes.
+#[test]
+fn useless_fusions_are_refused_or_said() {
+    let initial = "rec/initial.toml";
+    let elsewhere = |t: &str| t.replace("lat_deg = 46.", "lat_deg = 47.");
+    refused(
+        initial,
+        elsewhere,
+        "--initial rec/initial.toml",
+        &["the initial position is 11", "hint: are t_s"],
+    );
+    let same = |t: &str| t.to_owned();
+    refused(initial, same, "--lever-arm 800,0,-1200", &["--lever-arm 800, 0, -1200: more than 100 m"]);
+    refused(initial, same, "--outage none --outage 60:70", &["--outage none stands beside other outages"]);
+    refused(initial, same, "--outage 90:130", &["--outage 90:130 does not lie within the fixes"]);
+    let place = drive();
+    let turned = "fuse rec/imu.csv rec/gnss.csv imu.toml --initial rec/initial.toml --mounting 0,0,90 -o out";
+    let ran = nav_sim(place.path(), turned);
+    assert!(ran.stderr.contains("warning: NIS") && ran.stderr.contains("--mounting"), "{}", ran.stderr);
+    let ran = done(place.path(), "fuse rec/imu.csv rec/gnss.csv imu.toml --initial rec/initial.toml -o out");
+    assert!(!ran.stderr.contains("warning"), "{}", ran.stderr);
+    let twice = "fuse rec/imu.csv rec/gnss.csv imu.toml --outage 60:70 --outage 65:75 -o out";
+    let ran = done(place.path(), twice);
+    assert!(
+        ran.stderr.contains("overlap or touch") && ran.stdout.contains("outage 60–75 s"),
+        "{}",
+        ran.stdout
+    );
+}
+
+/// East of 180° what is recorded is what `fuse` reads.
+#[test]
+fn a_recording_across_the_antimeridian_is_fused() {
+    let place = place();
+    let drive =
+        DRIVE.replace("lon_deg = 6.5", "lon_deg = 179.9999").replace("heading_deg = 40", "heading_deg = 90");
+    fs::write(place.path().join("drive.toml"), drive).unwrap();
+    done(place.path(), "trajectory record drive.toml imu.toml --seed 3 -o rec");
+    for name in ["rec/gnss.csv", "rec/reference.csv"] {
+        let longitudes: Vec<f64> = table(&place.path().join(name)).iter().map(|row| row[2]).collect();
+        assert!(longitudes.iter().all(|l| -180.0 < *l && *l <= 180.0), "{name}");
+        assert!(longitudes.iter().any(|l| *l < 0.0) && longitudes.iter().any(|l| *l > 0.0), "{name}");
+    }
+    let ran = done(
+        place.path(),
+        "fuse rec/imu.csv rec/gnss.csv imu.toml --initial rec/initial.toml --reference rec/reference.csv -o out",
+    );
+    assert!(!ran.stderr.contains("warning"), "{}", ran.stderr);
+}
+
+/// Nobody's files are replaced: neither by a fusion nor by a recording.
+#[test]
+fn a_directory_of_something_else_is_refused() {
+    let place = drive();
+    fs::create_dir(place.path().join("mine")).unwrap();
+    fs::write(place.path().join("mine/imu.csv"), "precious").unwrap();
+    for command in [
+        "trajectory record drive.toml imu.toml --seed 3 -o mine",
+        "fuse rec/imu.csv rec/gnss.csv imu.toml -o mine",
+        "run drive.toml imu.toml --runs 1 --outage none --seed 1 -o mine",
+    ] {
+        let ran = nav_sim(place.path(), command);
+        assert_eq!(ran.code, 2, "{command}\n{}", ran.stderr);
+        assert!(ran.stderr.contains("mine is not empty"), "{}", ran.stderr);
+    }
+    assert_eq!(fs::read_to_string(place.path().join("mine/imu.csv")).unwrap(), "precious");
+    done(place.path(), "trajectory record drive.toml imu.toml --seed 3 -o rec"); // its own is replaced
 }

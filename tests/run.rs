@@ -153,7 +153,8 @@ fn a_trajectory_shorter_than_the_default_outages_runs_without_them_and_says_so()
     let place = place();
     let ran = done(place.path(), "run drive.toml imu.toml --runs 1 --seed 1 -o out");
     assert!(
-        ran.stderr.contains("warning: the default outages lie beyond the trajectory's end at 60 s"),
+        ran.stderr
+            .contains("warning: the default outage 300:390 is left out: the trajectory lasts from 0 to 60 s"),
         "{}",
         ran.stderr
     );
@@ -167,6 +168,8 @@ fn refusals_name_what_is_wrong_and_leave_nothing() {
     refused("run drive.toml drive.toml -o out", 2, "drive.toml, line 2: unknown key \"start\"");
     refused(&format!("{base} --outage 50:70"), 2, "outage 50:70 does not lie on the trajectory");
     refused(&format!("{base} --outage=-10:20"), 2, "outage -10:20 does not lie on the trajectory");
+    refused(&format!("{base} --outage 30.2:30.7"), 2, "outage 30.2:30.7 withholds no fix");
+    refused(&format!("{base} --outage none --outage 30:40"), 2, "--outage none stands beside other outages");
     refused(&format!("{base} --outage 40:30"), 2, "invalid value '40:30' for '--outage <START:END>'");
     refused(&format!("{base} --outage soon"), 2, "invalid value 'soon' for '--outage <START:END>'");
     refused(&format!("{base} --runs 0"), 2, "run.runs = 0 is refused: at least one run");
@@ -289,5 +292,37 @@ fn a_directory_of_another_command_is_refused() {
     assert_eq!(fs::read(place.path().join("made/manifest.json")).unwrap(), before);
     for _ in 0..2 {
         done(place.path(), "run drive.toml imu.toml --runs 1 --outage none --seed 1 -o mine");
+    }
+}
+
+/// A drive is no static recording: that it becomes the errors of the IMU is said.
+#[test]
+fn motion_in_a_static_recording_is_said() {
+    let place = place();
+    done(place.path(), "trajectory record drive.toml imu.toml --seed 3 -o rec");
+    let short = TRAJECTORY.replace("duration_s = 35", "duration_s = 5");
+    fs::write(place.path().join("short.toml"), short).unwrap();
+    let command = "run short.toml imu.toml --static rec/imu.csv --runs 1 --outage none --seed 1 -o out";
+    let ran = nav_sim(place.path(), command);
+    assert!(ran.stderr.contains("imu.csv: not static? The mean over a second of accel.x"), "{}", ran.stderr);
+}
+
+#[test]
+fn check_knows_the_files_of_a_fusion_and_speaks_json() {
+    let place = place();
+    done(place.path(), "trajectory record drive.toml imu.toml --seed 3 -o rec");
+    let ran = done(place.path(), "check rec/initial.toml rec/gnss.csv rec/reference.csv --format json");
+    let said: Value = serde_json::from_str(&ran.stdout).unwrap();
+    let found: Vec<&str> = said.as_array().unwrap().iter().map(|f| f["found"].as_str().unwrap()).collect();
+    let expected =
+        ["an initial state at 0 s", "60 GNSS fixes with velocity over 59 s", "a trajectory of 60 s"];
+    assert_eq!(found, expected);
+    let slow: String = (0..9).map(|k| format!("{},46.5,6.5,{k}\n", 1000 * k)).collect();
+    fs::write(place.path().join("ms.csv"), format!("t_s,lat_deg,lon_deg,h_m\n{slow}")).unwrap();
+    fs::write(place.path().join("deep.toml"), TRAJECTORY.replace("h_m = 400", "h_m = -7e6")).unwrap();
+    for (file, message) in [("ms.csv", "milliseconds (t_ms)?"), ("deep.toml", "no height within")] {
+        let ran = nav_sim(place.path(), &format!("check {file} --format json"));
+        let said: Value = serde_json::from_str(&ran.stdout).unwrap();
+        assert!(ran.code == 2 && said[0]["ok"] == false && ran.stderr.contains(message), "{}", ran.stderr);
     }
 }

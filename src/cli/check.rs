@@ -1,6 +1,7 @@
 //! `nav-sim check`: whether a file is what it should be.
 
 use super::{Failure, Session, parse, read};
+use nav_sim::data::fusion_files::{read_gnss, read_initial};
 use nav_sim::data::{batch_file, contamination_file, curve_file, parameters_file, scenario_file, study_file};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -10,8 +11,9 @@ use std::path::{Path, PathBuf};
 /// What a file is follows from its contents: a TOML with [accel] or [gyro] is a noise model, one with
 /// segments or waypoints a motion profile, one with candidates a study of `batch`, one with sets of
 /// replicates a study of `efficiency`, one with bounds of parameters (lower, upper, fix) or operations that of
-/// `calibrate --parameters` or `synthesize --contaminate`, any other a scenario; a table with lat_deg or n_m is
-/// a trajectory, with tau_samples (or a .wv.json) a curve, any other table or .npy a static recording.
+/// `calibrate --parameters` or `synthesize --contaminate`, one with lat_deg and yaw_deg an initial
+/// state of `fuse`, any other a scenario; a table with lat_deg or n_m is a trajectory, or with standard
+/// deviations GNSS fixes, with tau_samples (or a .wv.json) a curve, any other table or .npy a static recording.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -27,14 +29,32 @@ pub(crate) struct Args {
     rate_hz: Option<f64>,
 }
 
+/// What is said of a file in JSON.
+#[derive(serde::Serialize)]
+struct Checked {
+    file: String,
+    ok: bool,
+    /// What it is, or what is wrong.
+    found: String,
+}
+
 /// Every file is looked at, whatever the others are.
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut failures = Vec::new();
+    let mut checked = Vec::new();
     for path in &args.files {
+        let file = path.display().to_string();
         match check(path, args.rate_hz, session) {
-            Ok(found) => session.printer.result(&format!("{}: {found}", path.display())),
-            Err(failure) => failures.push(failure),
+            Ok(found) if session.json() => checked.push(Checked { file, ok: true, found }),
+            Ok(found) => session.printer.result(&format!("{file}: {found}")),
+            Err(failure) => {
+                checked.push(Checked { file, ok: false, found: failure.to_string() });
+                failures.push(failure);
+            }
         }
+    }
+    if session.json() {
+        session.printer.result(nav_sim::report::json(&checked).trim_end());
     }
     let (Some(last), wrong, all) = (failures.pop(), failures.len() + 1, args.files.len()) else {
         return Ok(());
@@ -92,6 +112,17 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
             let seconds = trajectory.end_s() - trajectory.start_s();
             Ok(format!("a trajectory of {seconds} s"))
         }
+        Kind::Initial => {
+            let start = read_initial(path)?;
+            Ok(format!("an initial state at {} s", start.t_s))
+        }
+        Kind::Gnss => {
+            let (fixes, remarks) = read_gnss(path)?;
+            remarks.iter().for_each(|remark| session.printer.warn(remark));
+            let span = fixes.first().zip(fixes.last()).map_or(0.0, |(a, b)| b.t_s - a.t_s);
+            let velocity = if fixes.iter().any(|f| f.velocity.is_some()) { " with velocity" } else { "" };
+            Ok(format!("{} GNSS fixes{velocity} over {span} s", fixes.len()))
+        }
         Kind::Recording => {
             let recordings = read::recordings_at(&[path.to_owned()], rate_hz, session)?;
             let one = |r: &nav_sim::imu::Recording| {
@@ -112,6 +143,8 @@ enum Kind {
     Contamination,
     Curve,
     Trajectory,
+    Initial,
+    Gnss,
     Recording,
 }
 
@@ -147,6 +180,8 @@ fn toml_kind(text: &str) -> Kind {
         Kind::Parameters
     } else if has(&["accel", "gyro"]) {
         Kind::Model
+    } else if has(&["lat_deg", "yaw_deg"]) {
+        Kind::Initial
     } else if has(&["segment", "waypoint", "start", "vehicle"]) {
         Kind::Trajectory
     } else if has(&["candidate", "trajectory", "truth"]) {
@@ -168,8 +203,13 @@ fn bounds(value: &toml::Value) -> bool {
 
 fn table_kind(text: &str) -> Kind {
     let position = |line: &str| line.contains("lat_deg") || line.contains("n_m") && line.contains("e_m");
+    let fixes = |line: &str| {
+        position(line) && ["sd_", "std_", "sigma_"].iter().any(|s| line.contains(s)) && !line.contains("yaw")
+    };
     if text.lines().take(20).any(|line| line.contains("tau_samples")) {
         Kind::Curve
+    } else if text.lines().take(20).any(fixes) {
+        Kind::Gnss
     } else if text.lines().take(20).any(position) {
         Kind::Trajectory
     } else {
@@ -192,6 +232,9 @@ mod tests {
         assert_eq!(toml_kind("[WN]\nsigma2 = { lower = 0.1 }"), Kind::Parameters);
         assert_eq!(toml_kind("[[accel]]\noperation = 'ar1'"), Kind::Contamination);
         assert_eq!(table_kind("tau_samples,wv,edof"), Kind::Curve);
+        assert_eq!(toml_kind("t_s = 0\nlat_deg = 46\nyaw_deg = 3"), Kind::Initial);
+        assert_eq!(table_kind("t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m"), Kind::Gnss);
+        assert_eq!(table_kind("t_s,lat_deg,lon_deg,h_m,yaw_deg,sd_yaw_deg"), Kind::Trajectory);
         assert_eq!(toml_kind("= broken"), Kind::Scenario);
         assert_eq!(table_kind("# origin\nt_s, lat_deg, lon_deg"), Kind::Trajectory);
         assert_eq!(table_kind("t_s,accel_x_m_s2,gyro_z_rad_s"), Kind::Recording);

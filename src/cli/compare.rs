@@ -55,8 +55,12 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         }
         let paired = differences.is_empty();
         all_paired &= paired;
-        let outages = metrics::compare(&candidate.experiment, &reference.experiment, paired)
-            .map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
+        let outages =
+            metrics::compare(&candidate.experiment, &reference.experiment, paired).map_err(|e| {
+                let failure = Failure::input(format!("{}: {e}", path.display()));
+                let runs = matches!(e, metrics::ComparisonError::Runs { .. });
+                failure.maybe_hint(runs.then(|| "make both with one number of --runs".to_owned()))
+            })?;
         let run = path.display().to_string();
         let label = Label::of(&run, candidate.manifest.model.estimator.as_deref());
         let is_reference = same_place(path, &args.reference);

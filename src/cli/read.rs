@@ -18,6 +18,19 @@ impl From<TrajectoryFileError> for Failure {
     }
 }
 
+/// For commands without the option `--origin`: `trajectory convert` has it.
+fn without_options(e: TrajectoryFileError) -> Failure {
+    let local = matches!(e, TrajectoryFileError::NoOrigin { .. });
+    let failure = Failure::from(e);
+    if local {
+        return failure.hint(
+            "write it with latitude and longitude: nav-sim trajectory convert FILE --origin LAT_DEG,LON_DEG,H_M; or \
+             give it a first line \"# origin: LAT_DEG, LON_DEG, H_M\"",
+        );
+    }
+    failure
+}
+
 /// An input with its fingerprint.
 pub(super) fn input(role: &str, path: &Path) -> Result<Input, Failure> {
     let shown = path.display().to_string();
@@ -27,7 +40,8 @@ pub(super) fn input(role: &str, path: &Path) -> Result<Input, Failure> {
 
 /// A trajectory.
 pub(super) fn trajectory(path: &Path, session: &Session) -> Result<Trajectory, Failure> {
-    let (trajectory, warnings) = trajectory_file::load(path, &trajectory_file::Options::default())?;
+    let (trajectory, warnings) =
+        trajectory_file::load(path, &trajectory_file::Options::default()).map_err(without_options)?;
     for warning in warnings {
         session.printer.warn(&warning.to_string());
     }
@@ -44,12 +58,7 @@ pub(super) fn model(path: &Path, session: &Session) -> Result<ModelFile, Failure
     Ok(file)
 }
 
-/// Static recordings, every channel of them.
-pub(super) fn recordings(paths: &[PathBuf], session: &Session) -> Result<Vec<Recording>, Failure> {
-    recordings_at(paths, None, session)
-}
-
-/// The same where files have no time column: at a rate that is given.
+/// Static recordings, every channel of them; files without a time column at a rate that is given.
 pub(super) fn recordings_at(
     paths: &[PathBuf],
     rate_hz: Option<f64>,

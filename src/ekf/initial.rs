@@ -93,7 +93,22 @@ impl InitialSettings {
             return Err(SettingError::new("att_sigma_deg", large, requirement));
         }
         require_non_negative("accel_bias_sigma_m_s2", self.accel_bias_sigma_m_s2.as_slice())?;
-        require_non_negative("gyro_bias_sigma_rad_s", self.gyro_bias_sigma_rad_s.as_slice())
+        require_non_negative("gyro_bias_sigma_rad_s", self.gyro_bias_sigma_rad_s.as_slice())?;
+        at_most("pos_sigma_m", &self.pos_sigma_m, 1e5, "m")?;
+        at_most("vel_sigma_m_s", &self.vel_sigma_m_s, 1000.0, "m/s")?;
+        at_most("accel_bias_sigma_m_s2", self.accel_bias_sigma_m_s2.as_slice(), 10.0, "m/s²")?;
+        at_most("gyro_bias_sigma_rad_s", self.gyro_bias_sigma_rad_s.as_slice(), 1.0, "rad/s")
+    }
+}
+
+/// A deviation so large that the linear filter means nothing with it is a slip of unit.
+fn at_most(key: &str, sigmas: &[f64], limit: f64, unit: &str) -> Result<(), SettingError> {
+    match sigmas.iter().find(|s| **s > limit) {
+        Some(large) => {
+            let requirement = format!("the error-state filter is linear: at most {limit} {unit}");
+            Err(SettingError::new(key, large, requirement))
+        }
+        None => Ok(()),
     }
 }
 

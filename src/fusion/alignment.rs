@@ -26,6 +26,10 @@ const DEPARTURE_S: f64 = 3.0;
 const MAX_AGE_S: f64 = 60.0;
 /// Length of the window in motion (s).
 const MOVING_S: f64 = 5.0;
+/// Shortest time from one position to another that gives a velocity, and the longest (s).
+const BASELINE_S: (f64, f64) = (1.0, 3.0);
+/// What a vehicle may accelerate between two positions, of which their mean velocity says nothing (m/s²).
+const ACCELERATION: f64 = 2.0;
 /// Spread of specific force (m/s²) and mean angular rate (rad/s) above which nothing is static.
 const STILL: (f64, f64) = (0.5, 0.03);
 
@@ -43,12 +47,14 @@ pub struct BiasSigma {
 pub enum AlignmentError {
     /// It never moves fast enough.
     #[error(
-        "no fix within the IMU recording moves at {MIN_SPEED} m/s or more (the fastest: {fastest:.2} m/s): \
+        "no fix within the IMU recording moves at {needed:.1} m/s or more (the fastest: {fastest:.2} m/s): \
          its course would be no heading"
     )]
     NoCourse {
         /// Fastest fix (m/s).
         fastest: f64,
+        /// What its velocity needs to be a heading: five of its standard deviations (m/s).
+        needed: f64,
     },
     /// No specific force to level with.
     #[error("no IMU samples after the first moving fix at {t_s} s to level with")]
@@ -58,12 +64,24 @@ pub enum AlignmentError {
     },
 }
 
-/// A fix with its velocity, and the standard deviation of its horizontal part (m/s).
+/// A fix with its velocity and the standard deviations of it (m/s).
 #[derive(Debug, Clone, Copy)]
 struct Moving {
     fix: GnssFix,
     v_n: DVec3,
-    sigma: f64,
+    sigma_n: DVec3,
+    /// Half the time between the two positions it comes from: it is as old as that (s); 0 as measured.
+    lag_s: f64,
+}
+
+impl Moving {
+    fn speed(&self) -> f64 {
+        self.v_n.truncate().length()
+    }
+
+    fn sigma(&self) -> f64 {
+        self.sigma_n.truncate().max_element()
+    }
 }
 
 /// The start of a recording.
@@ -80,16 +98,27 @@ pub fn coarse(
     let last = recorded.imu.last().map_or(f64::NEG_INFINITY, |s| s.t_s);
     let inside: Vec<Moving> =
         velocities.into_iter().filter(|m| m.fix.t_s >= first && m.fix.t_s < last).collect();
-    let speed = |m: &Moving| m.v_n.truncate().length();
-    let found = inside.iter().position(|m| speed(m) >= MIN_SPEED.max(5.0 * m.sigma));
-    let Some(at) = found else {
-        return Err(AlignmentError::NoCourse { fastest: inside.iter().map(speed).fold(0.0, f64::max) });
+    let needed = |m: &Moving| MIN_SPEED.max(5.0 * m.sigma());
+    let Some(at) = inside.iter().position(|m| m.speed() >= needed(m)) else {
+        let fastest = inside.iter().map(Moving::speed).fold(0.0, f64::max);
+        let needed = inside.iter().map(needed).fold(f64::INFINITY, f64::min);
+        return Err(AlignmentError::NoCourse {
+            fastest,
+            needed: if needed.is_finite() { needed } else { MIN_SPEED },
+        });
     };
     let moving = inside[at];
     let g = gravity_down(settings.gravity, moving.fix.lat.sin(), moving.fix.h);
-    let level = still(recorded, settings, &inside[..at], moving.fix.t_s, g)
+    let level = still(recorded, settings, &inside[..at], &moving, g)
         .map_or_else(|| in_motion(recorded, settings, &inside[at..], g), Ok)?;
-    Ok(start(&moving, &level, settings, bias, g))
+    let turned = turned(recorded, &moving);
+    Ok(start(&moving, &level, settings, bias, (g, turned)))
+}
+
+/// How far the vehicle turned since the instant that its velocity is of (rad).
+fn turned(recorded: &Recorded<'_>, moving: &Moving) -> f64 {
+    let since = between(recorded.imu, moving.fix.t_s - moving.lag_s, moving.fix.t_s);
+    since.iter().map(|s| s.dtheta).sum::<DVec3>().length()
 }
 
 /// Roll and pitch at the first moving fix.
@@ -104,9 +133,14 @@ struct Level {
     how: String,
 }
 
-fn start(moving: &Moving, level: &Level, settings: &Settings, bias: BiasSigma, g: f64) -> Start {
-    let (fix, v_n) = (moving.fix, moving.v_n);
-    let speed = v_n.truncate().length();
+fn start(
+    moving: &Moving,
+    level: &Level,
+    settings: &Settings,
+    bias: BiasSigma,
+    (g, turned): (f64, f64),
+) -> Start {
+    let (fix, v_n, speed) = (moving.fix, moving.v_n, moving.speed());
     let course = v_n.y.atan2(v_n.x);
     let yaw = if level.reversed { wrap_angle(course + std::f64::consts::PI) } else { course };
     let q_b_n = RollPitchYaw { roll: level.roll, pitch: level.pitch, yaw }.to_quat();
@@ -120,12 +154,11 @@ fn start(moving: &Moving, level: &Level, settings: &Settings, bias: BiasSigma, g
         q_b_n,
     };
     let tilt = (bias.accel / g).hypot(bias.gyro * level.age_s).hypot(level.sigma).hypot(0.3 * DEG);
-    let heading = (moving.sigma / speed).hypot(SLIP);
+    let heading = (moving.sigma() / speed).hypot(SLIP).hypot(turned);
     let degrees = |angle: f64| (angle / DEG).min(30.0);
-    let vel_sigma = fix.velocity.map_or(DVec3::splat(moving.sigma), |(_, sigma)| sigma);
     let sigma = InitialSettings {
         pos_sigma_m: fix.pos_sigma_n.to_array(),
-        vel_sigma_m_s: vel_sigma.to_array(),
+        vel_sigma_m_s: moving.sigma_n.to_array(),
         att_sigma_deg: [degrees(tilt), degrees(tilt), degrees(heading)],
         ..InitialSettings::default()
     };
@@ -147,23 +180,31 @@ fn start(moving: &Moving, level: &Level, settings: &Settings, bias: BiasSigma, g
     Start { t_s: fix.t_s, state, sigma, how }
 }
 
-/// Velocities as measured, or from the position of the fix before.
+/// Velocities as measured, or from the position of a fix a second or more before.
 fn velocities(gnss: &[GnssFix]) -> Vec<Moving> {
-    let pairs = gnss.iter().zip(std::iter::once(None).chain(gnss.iter().map(Some)));
-    let of = |(fix, before): (&GnssFix, Option<&GnssFix>)| {
-        if let Some((v_n, sigma)) = fix.velocity {
-            return Some(Moving { fix: *fix, v_n, sigma: sigma.truncate().max_element() });
+    let of = |(i, fix): (usize, &GnssFix)| match fix.velocity {
+        Some((v_n, sigma_n)) => Some(Moving { fix: *fix, v_n, sigma_n, lag_s: 0.0 }),
+        None => {
+            let earlier = gnss[..i].partition_point(|f| f.t_s <= fix.t_s - BASELINE_S.0 + 1e-6);
+            derived(&gnss[earlier.checked_sub(1)?], fix)
         }
-        let before = before?;
-        let (r, dt) = (radii(fix.lat.sin()), fix.t_s - before.t_s);
-        let dlon = wrap_angle(fix.lon - before.lon);
-        let north = (fix.lat - before.lat) * (r.meridian + fix.h);
-        let east = dlon * (r.transverse + fix.h) * fix.lat.cos();
-        let variance = fix.pos_sigma_n.powf(2.0) + before.pos_sigma_n.powf(2.0);
-        let sigma = variance.truncate().max_element().sqrt() / dt;
-        Some(Moving { fix: *fix, v_n: DVec3::new(north, east, before.h - fix.h) / dt, sigma })
     };
-    pairs.filter_map(of).collect()
+    gnss.iter().enumerate().filter_map(of).collect()
+}
+
+/// The mean velocity between two fixes; none where they are too far apart in time.
+fn derived(before: &GnssFix, fix: &GnssFix) -> Option<Moving> {
+    let (r, dt) = (radii(fix.lat.sin()), fix.t_s - before.t_s);
+    if dt > BASELINE_S.1 {
+        return None;
+    }
+    let north = (fix.lat - before.lat) * (r.meridian + fix.h);
+    let east = wrap_angle(fix.lon - before.lon) * (r.transverse + fix.h) * fix.lat.cos();
+    let v_n = DVec3::new(north, east, before.h - fix.h) / dt;
+    let lag_s = 0.5 * dt;
+    let variance = (fix.pos_sigma_n.powf(2.0) + before.pos_sigma_n.powf(2.0)) / (dt * dt);
+    let sigma_n = (variance + DVec3::splat((ACCELERATION * lag_s).powi(2))).powf(0.5);
+    Some(Moving { fix: *fix, v_n, sigma_n, lag_s })
 }
 
 /// Samples whose interval ends in (from, to].
@@ -187,41 +228,85 @@ fn still(
     recorded: &Recorded<'_>,
     settings: &Settings,
     before: &[Moving],
-    to_s: f64,
+    moving: &Moving,
     g: f64,
 ) -> Option<Level> {
+    let (to_s, measured) = (moving.fix.t_s, moving.fix.velocity.is_some());
     let slow = |t: f64| {
         let near = before.iter().min_by(|a, b| (a.fix.t_s - t).abs().total_cmp(&(b.fix.t_s - t).abs()));
-        near.is_some_and(|m| m.v_n.truncate().length() < 0.3_f64.max(3.0 * m.sigma))
+        near.is_some_and(|m| m.speed() < 0.3_f64.max(3.0 * m.sigma()))
     };
     let steps = (0..).map(|k| to_s - 0.25 * f64::from(k)).take_while(|end| to_s - end <= MAX_AGE_S);
     let window = |end: f64| {
         let samples = between(recorded.imu, end - STILL_S, end);
         let seconds: f64 = samples.iter().map(|s| s.dt_s).sum();
-        let stands = [end - STILL_S, end, end + DEPARTURE_S].into_iter().all(slow);
+        let (from, to) = (end - STILL_S, end + DEPARTURE_S);
+        let stands = if measured { [from, end, to].into_iter().all(slow) } else { stays(before, from, to) };
         (seconds > 0.8 * STILL_S && stands).then(|| (end, mean(samples, settings.q_s_b)))
     };
     let calm = |(_, (f, spread, omega)): &(f64, (DVec3, f64, f64))| {
         *spread < STILL.0 && *omega < STILL.1 && (f.length() - g).abs() < 0.5
     };
-    let (end, (f, spread, _)) = steps.filter_map(window).find(calm)?;
-    let (roll, pitch) = level(f, DVec3::Z * -g);
-    // from the level frame of heading 0 to the body, and what the vehicle gained in speed on the way
-    let mut q = RollPitchYaw { roll, pitch, yaw: 0.0 }.to_quat();
-    let mut gained = 0.0;
-    for s in between(recorded.imu, end, to_s) {
-        gained += (settings.q_s_b * s.dv).x + (q.inverse() * DVec3::Z).x * g * s.dt_s;
-        q = (q * DQuat::from_scaled_axis(settings.q_s_b * s.dtheta)).normalize();
-    }
+    let agrees = |at: &(f64, (DVec3, f64, f64))| {
+        let carried = carry(recorded, settings, *at, to_s, g);
+        // positions alone are slow to tell rest from acceleration: what the IMU gained on the way must be
+        // the speed that GNSS then shows
+        let tolerance = 3.0 * moving.sigma();
+        let gained = carried.1.truncate().length();
+        let plausible = measured || (gained - moving.speed()).abs() < tolerance && carried.2 > 0.0;
+        plausible.then_some((at.0, at.1.1, carried))
+    };
+    let (end, spread, (q, _, forward)) = steps.filter_map(window).filter(calm).find_map(|at| agrees(&at))?;
     let now = RollPitchYaw::from_quat(q);
+    let age_s = to_s - end;
+    // the tilt that this comparison, or what stayed in place, leaves possible
+    let unseen = if measured { 0.0 } else { moving.sigma() / (age_s * g) };
     Some(Level {
         roll: now.roll,
         pitch: now.pitch,
-        reversed: gained < -0.5 * MIN_SPEED && to_s - end < 20.0,
-        age_s: to_s - end,
-        sigma: spread / g / 10.0,
+        reversed: measured && forward < -0.5 * MIN_SPEED && age_s < 20.0,
+        age_s,
+        sigma: (spread / g / 10.0).hypot(unseen),
         how: format!("from levelling at rest until {end:.2} s, carried on by the gyroscopes"),
     })
+}
+
+/// Whether the fixes in a stretch of time stay in one place, as far as they are good to: within four
+/// standard deviations of the first.
+fn stays(fixes: &[Moving], from: f64, to: f64) -> bool {
+    let within: Vec<&GnssFix> =
+        fixes.iter().map(|m| &m.fix).filter(|f| (from..=to).contains(&f.t_s)).collect();
+    let Some((first, rest)) = within.split_first() else { return false };
+    let r = radii(first.lat.sin());
+    let near = |f: &&GnssFix| {
+        let north = (f.lat - first.lat) * (r.meridian + first.h);
+        let east = wrap_angle(f.lon - first.lon) * (r.transverse + first.h) * first.lat.cos();
+        let sigma = f.pos_sigma_n.truncate().length().hypot(first.pos_sigma_n.truncate().length());
+        north.hypot(east) < 0.5_f64.max(4.0 / std::f64::consts::SQRT_2 * sigma)
+    };
+    rest.len() >= 2 && rest.iter().all(near)
+}
+
+/// A levelling at rest carried on with the gyroscopes: the attitude from level axes whose first is the
+/// heading of the body then, the velocity gained in them, and that along the vehicle (m/s).
+fn carry(
+    recorded: &Recorded<'_>,
+    settings: &Settings,
+    (end, (f, _, _)): (f64, (DVec3, f64, f64)),
+    to_s: f64,
+    g: f64,
+) -> (DQuat, DVec3, f64) {
+    let (roll, pitch) = level(f, DVec3::Z * -g);
+    // from the level frame of heading 0 to the body, and what the vehicle gained in speed on the way
+    let mut q = RollPitchYaw { roll, pitch, yaw: 0.0 }.to_quat();
+    let (mut gained, mut forward) = (DVec3::ZERO, 0.0);
+    for s in between(recorded.imu, end, to_s) {
+        let gain = q * (settings.q_s_b * s.dv) + DVec3::Z * g * s.dt_s;
+        gained += gain;
+        forward += (q.inverse() * gain).x;
+        q = (q * DQuat::from_scaled_axis(settings.q_s_b * s.dtheta)).normalize();
+    }
+    (q, gained, forward)
 }
 
 /// Levelling while it moves: the mean specific force after the fix is the change of the GNSS velocity
@@ -254,7 +339,7 @@ fn in_motion(
         pitch,
         reversed: false,
         age_s: 0.5 * seconds,
-        sigma: from.sigma.hypot(to.sigma) / (seconds * g),
+        sigma: from.sigma().hypot(to.sigma()) / (seconds * g),
         how: format!("from accelerations over the {seconds:.1} s after it (no static window before)"),
     })
 }

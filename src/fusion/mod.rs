@@ -8,9 +8,9 @@ pub mod alignment;
 mod filter;
 mod outcome;
 
-pub use outcome::{Drift, OutageDrift, Outcome, outcome};
+pub use outcome::{Drift, OutageDrift, Outcome, doubts, outcome};
 
-use crate::earth::{GravityModel, MAX_LATITUDE};
+use crate::earth::{GravityModel, MAX_LATITUDE, geodetic_to_ecef};
 use crate::ekf::{Belief, InitialSettings, nis_limit};
 use crate::frames::NavState;
 use crate::gnss::GnssFix;
@@ -149,6 +149,18 @@ pub enum FusionError {
         /// First and last sample (s).
         imu: (f64, f64),
     },
+    /// The initial position is not where the fixes are.
+    #[error(
+        "the initial position is {metres:.0} m from the fix at {t_s} s (both together are good to {sigma_m:.1} m)"
+    )]
+    Place {
+        /// The first fix after the start (s).
+        t_s: f64,
+        /// How far (m).
+        metres: f64,
+        /// Horizontal standard deviation of both (m).
+        sigma_m: f64,
+    },
     /// Latitude and longitude lose their meaning.
     #[error(
         "latitude {lat_deg:.3}° at {t_s} s: beyond ±89.9° there is no navigation in latitude and longitude"
@@ -167,6 +179,10 @@ pub enum FusionError {
     },
 }
 
+/// What to look at where a solution is not to be believed.
+pub const DOUBTFUL: &str =
+    "are the IMU's axes front, right, down (--mounting), its units right, the initial state true?";
+
 impl FusionError {
     /// What to do about it.
     #[must_use]
@@ -183,8 +199,9 @@ impl FusionError {
                 })
             }
             Self::Start { .. } => Some("give t_s of the initial state on the clock of the IMU".into()),
-            Self::Diverged { .. } => Some(
-                "are the IMU's axes front, right, down (--mounting), its units right, the initial state true?".into(),
+            Self::Diverged { .. } => Some(DOUBTFUL.to_owned()),
+            Self::Place { .. } => Some(
+                "are t_s, lat_deg and lon_deg of the initial state those of this recording, its pos_sigma_m honest?".into(),
             ),
             Self::Pole { .. } => None,
         }
@@ -228,6 +245,7 @@ pub fn fuse(
     if !(imu.0 - 1e-6..imu.1).contains(&start.t_s) {
         return Err(FusionError::Start { t_s: start.t_s, imu });
     }
+    check_place(recorded, start, settings)?;
     let mut run = Run {
         filter: Filter::new(belief, start, settings),
         settings,
@@ -252,6 +270,22 @@ pub fn fuse(
         }
     }
     Ok(run.solution)
+}
+
+/// Refuses a start that its own and the receiver's deviations cannot explain: 10 km or 50 of both, beside
+/// the way to the first fix.
+fn check_place(recorded: &Recorded<'_>, start: &Start, settings: &Settings) -> Result<(), FusionError> {
+    const FAR: (f64, f64) = (10_000.0, 50.0);
+    let Some(fix) = recorded.gnss.iter().find(|f| f.t_s >= start.t_s) else { return Ok(()) };
+    let seconds = fix.t_s - start.t_s;
+    let place = geodetic_to_ecef(start.state.lat, start.state.lon, fix.h);
+    let metres = geodetic_to_ecef(fix.lat, fix.lon, fix.h).distance(place);
+    let [n, e, _] = start.sigma.pos_sigma_m;
+    let sigma_m = n.hypot(e).hypot(fix.pos_sigma_n.truncate().length());
+    // at twice the speed, accelerating with a gravity
+    let way = 2.0 * start.state.v_n.length() * seconds + 5.0 * seconds * seconds;
+    let allowed = FAR.0.min(FAR.1 * sigma_m) + way + settings.lever_arm_b.length();
+    if metres > allowed { Err(FusionError::Place { t_s: fix.t_s, metres, sigma_m }) } else { Ok(()) }
 }
 
 /// The state of a run through the data.

@@ -41,6 +41,14 @@ pub enum ComparisonError {
         /// Outages of the reference, in words.
         reference: String,
     },
+    /// Other numbers of runs of the same noise: the epochs' statistics are of all runs, not of the common ones.
+    #[error("{candidate} runs against {reference} of the reference, of the same seed")]
+    Runs {
+        /// Runs of the candidate.
+        candidate: usize,
+        /// Runs of the reference.
+        reference: usize,
+    },
     /// Other epochs.
     #[error("the reporting epochs differ: {candidate} against {reference} of the reference")]
     Epochs {
@@ -89,13 +97,19 @@ pub struct OutageComparison {
 /// and b of the reference, by linearisation: with ρ = ā/b̄, ρ − E ρ ≈ mean(a − ρ b)/b̄.
 ///
 /// # Errors
-/// When epochs or outages differ.
+/// When epochs or outages differ, or the numbers of paired runs.
 pub fn compare(
     candidate: &Experiment,
     reference: &Experiment,
     paired: bool,
 ) -> Result<Vec<OutageComparison>, ComparisonError> {
     comparable(candidate, reference)?;
+    if paired && candidate.runs.len() != reference.runs.len() {
+        return Err(ComparisonError::Runs {
+            candidate: candidate.runs.len(),
+            reference: reference.runs.len(),
+        });
+    }
     let of = |(i, window): (usize, &(f64, f64))| outage(candidate, reference, i, *window, paired);
     Ok(reference.outages.iter().enumerate().map(of).collect())
 }

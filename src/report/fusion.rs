@@ -6,7 +6,7 @@ use super::number::shortest;
 use super::run_directory::OutputFile;
 use crate::earth::radii;
 use crate::ekf::InitialSettings;
-use crate::frames::{NavState, RollPitchYaw};
+use crate::frames::{NavState, RollPitchYaw, wrap_angle};
 use crate::fusion::{Drift, Outcome, Row, Solution, Start, Use};
 use crate::metrics::PerState;
 use crate::simulation::REPORTED_NAMES;
@@ -225,7 +225,7 @@ pub fn fusion_directory(
 fn values(s: &NavState) -> [f64; 9] {
     let rpy = RollPitchYaw::from_quat(s.q_b_n);
     let [roll, pitch, yaw] = [rpy.roll, rpy.pitch, rpy.yaw].map(|a| a / DEG);
-    [s.lat / DEG, s.lon / DEG, s.h, s.v_n.x, s.v_n.y, s.v_n.z, roll, pitch, yaw]
+    [s.lat / DEG, wrap_angle(s.lon) / DEG, s.h, s.v_n.x, s.v_n.y, s.v_n.z, roll, pitch, yaw]
 }
 
 fn header(groups: &[(&str, &[&str])]) -> String {
@@ -296,7 +296,13 @@ fn kml(solution: &Solution, title: &str) -> String {
     let mut last = f64::NEG_INFINITY;
     for row in &solution.rows {
         if row.t_s - last >= 1.0 - 1e-6 || std::ptr::eq(row, &solution.rows[solution.rows.len() - 1]) {
-            let _ = write!(line, "{:.8},{:.8},{:.2} ", row.state.lon / DEG, row.state.lat / DEG, row.state.h);
+            let _ = write!(
+                line,
+                "{:.8},{:.8},{:.2} ",
+                wrap_angle(row.state.lon) / DEG,
+                row.state.lat / DEG,
+                row.state.h
+            );
             last = row.t_s;
         }
     }

@@ -1,7 +1,7 @@
 //! A simulated recording as the files that `fuse` reads.
 
 use crate::ekf::InitialSettings;
-use crate::frames::{NavState, RollPitchYaw};
+use crate::frames::{NavState, RollPitchYaw, wrap_angle};
 use crate::gnss::GnssFix;
 use crate::imu::ImuIncrement;
 use crate::units::DEG;
@@ -38,7 +38,7 @@ pub fn gnss_csv(fixes: &[GnssFix]) -> String {
             "{:.6},{:.10},{:.10},{:.4},{},{},{}",
             f.t_s,
             f.lat / DEG,
-            f.lon / DEG,
+            wrap_angle(f.lon) / DEG,
             f.h,
             s.x,
             s.y,
@@ -63,7 +63,7 @@ pub fn initial_toml(t_s: f64, state: &NavState, sigma: &InitialSettings) -> Stri
          v_d_m_s = {:.5}\nroll_deg = {:.6}\npitch_deg = {:.6}\nyaw_deg = {:.6}\npos_sigma_m = {}\n\
          vel_sigma_m_s = {}\natt_sigma_deg = {}\n",
         state.lat / DEG,
-        state.lon / DEG,
+        wrap_angle(state.lon) / DEG,
         state.h,
         v.x,
         v.y,

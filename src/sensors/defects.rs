@@ -9,6 +9,11 @@ use rand_distr::{Distribution, StandardNormal};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Largest standard deviation of an accelerometer's bias (m/s²): a gravity.
+pub const MAX_BIAS_M_S2: f64 = 10.0;
+/// Largest standard deviation of a gyroscope's bias (rad/s): beyond it an attitude is lost in seconds.
+pub const MAX_BIAS_RAD_S: f64 = 1.0;
+
 /// `[imu]`: the true IMU; the filter knows its rate only. Turn-on bias, scale factors and misalignment are
 /// standard deviations: each run draws its own, normal and constant over the run, for every axis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -54,6 +59,22 @@ impl ImuSettings {
         }
         require_non_negative("turn_on_bias_accel_m_s2", &[self.turn_on_bias_accel_m_s2])?;
         require_non_negative("turn_on_bias_gyro_rad_s", &[self.turn_on_bias_gyro_rad_s])?;
+        if self.turn_on_bias_accel_m_s2 > MAX_BIAS_M_S2 {
+            let requirement = format!("at most {MAX_BIAS_M_S2} m/s² (mg named m/s²?)");
+            return Err(SettingError::new(
+                "turn_on_bias_accel_m_s2",
+                self.turn_on_bias_accel_m_s2,
+                requirement,
+            ));
+        }
+        if self.turn_on_bias_gyro_rad_s > MAX_BIAS_RAD_S {
+            let requirement = format!("at most {MAX_BIAS_RAD_S} rad/s (degrees an hour named rad/s?)");
+            return Err(SettingError::new(
+                "turn_on_bias_gyro_rad_s",
+                self.turn_on_bias_gyro_rad_s,
+                requirement,
+            ));
+        }
         for (key, ppm) in [("scale_ppm_accel", self.scale_ppm_accel), ("scale_ppm_gyro", self.scale_ppm_gyro)]
         {
             require_non_negative(key, &[ppm])?;

@@ -8,6 +8,9 @@ use schemars::JsonSchema;
 use serde::de::{self, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+/// Longest lever arm (m): no vehicle is larger.
+pub const MAX_LEVER_ARM_M: f64 = 100.0;
+
 /// GNSS fixes: rate, standard deviations (north, east, down), lever arm. The defaults are those of
 /// [Minaretzis et al.](crate::bibliography::Minaretzis24), Section V: 1 Hz, position variances 4, 4 and
 /// 16 m², velocity variances 0.0016, 0.0016 and 0.0036 (m/s)².
@@ -54,6 +57,10 @@ impl GnssSettings {
         require_positive("pos_sigma_m", &self.pos_sigma_m)?;
         require_positive("vel_sigma_m_s", self.vel_sigma_m_s.as_ref().map_or(&[], |v| v.as_slice()))?;
         require_finite("lever_arm_m", &self.lever_arm_m)?;
+        if let Some(long) = self.lever_arm_m.iter().find(|x| x.abs() > MAX_LEVER_ARM_M) {
+            let requirement = format!("metres from the IMU to the antenna, at most {MAX_LEVER_ARM_M}");
+            return Err(SettingError::new("lever_arm_m", long, requirement));
+        }
         require_non_negative("correlated_pos_sigma_m", &self.correlated_pos_sigma_m)?;
         require_positive("correlation_time_s", &[self.correlation_time_s])
     }

@@ -265,5 +265,5 @@ fn source(study: &Path, entry: &TruthEntry, seed: u64, session: &Session) -> Res
         return Ok(Source::Recordings(synthesised(study, step, seed, session)?));
     }
     let paths: Vec<PathBuf> = entry.recordings.iter().map(|p| batch_file::beside(study, p)).collect();
-    Ok(Source::Recordings(read::recordings(&paths, session)?))
+    Ok(Source::Recordings(read::recordings_at(&paths, None, session)?))
 }

@@ -215,7 +215,7 @@ fn calibration(
         None => {
             let beside = |p: &PathBuf| batch_file::beside(study_path, p);
             let paths: Vec<PathBuf> = step.recordings.iter().map(beside).collect();
-            read::recordings(&paths, session)?
+            read::recordings_at(&paths, None, session)?
         }
     };
     let (groups, outcomes, settings) = calibrated(&recordings, step)?;

@@ -12,7 +12,7 @@ use nav_sim::gnss::GnssFix;
 use nav_sim::imu::Sensor;
 use nav_sim::noise::{Composite, Model, Process, continuous, reduction};
 use nav_sim::report::Input;
-use nav_sim::sensors::outage::Outage;
+use nav_sim::sensors::outage::{Outage, OutagePlan};
 use nav_sim::trajectory::Trajectory;
 use nav_sim::units::DEG;
 use std::path::{Path, PathBuf};
@@ -20,7 +20,9 @@ use std::path::{Path, PathBuf};
 impl From<FusionFileError> for Failure {
     fn from(e: FusionFileError) -> Self {
         let failure = if e.is_io() { Self::could_not(&e) } else { Self::input(&e) };
-        failure.maybe_hint(e.hint())
+        // without the option of the commands for static recordings
+        let hint = e.hint().map(|h| h.replace("give the names with --columns", "correct the header"));
+        failure.maybe_hint(hint)
     }
 }
 
@@ -91,14 +93,44 @@ pub(super) fn mounting(angles_deg: Option<parse::Triple>) -> DQuat {
     RollPitchYaw { roll: roll * DEG, pitch: pitch * DEG, yaw: yaw * DEG }.to_quat()
 }
 
-/// An outage outside the data withholds nothing: that is a mistake.
-pub(super) fn check_outages(outages: &[Outage], recorded: &Recorded<'_>) -> Result<(), Failure> {
-    let empty = |o: &&Outage| !recorded.gnss.iter().any(|f| o.withholds(f.t_s + 1e-9));
-    let Some(o) = outages.iter().find(empty) else { return Ok(()) };
+/// The settings with outages as `run` has them: those that overlap or touch are one.
+pub(super) fn with_outages(
+    mut settings: Settings,
+    recorded: &Recorded<'_>,
+    session: &Session,
+) -> Result<Settings, Failure> {
+    check_outages(&settings.outages, recorded)?;
+    let asked = settings.outages.len();
+    let plan = OutagePlan { fixed: settings.outages, ..OutagePlan::default() };
+    settings.outages = plan.windows((f64::NEG_INFINITY, f64::INFINITY), 0).map_err(Failure::input)?;
+    if settings.outages.len() < asked {
+        session.printer.warn("outages that overlap or touch are made one");
+    }
+    Ok(settings)
+}
+
+/// An outage outside the data withholds nothing, or less than it says: that is a mistake.
+fn check_outages(outages: &[Outage], recorded: &Recorded<'_>) -> Result<(), Failure> {
     let (first, last) = (recorded.gnss.first(), recorded.gnss.last());
-    let message = format!("outage {}:{} withholds no fix", o.start_s, o.end_s);
     let span = first.zip(last).map(|(a, b)| format!("the fixes run from {} to {} s", a.t_s, b.t_s));
-    Err(Failure::input(message).maybe_hint(span))
+    let empty = |o: &&Outage| !recorded.gnss.iter().any(|f| o.withholds(f.t_s + 1e-9));
+    if let Some(o) = outages.iter().find(empty) {
+        let message = format!("--outage {}:{} withholds no fix", o.start_s, o.end_s);
+        return Err(Failure::input(message).maybe_hint(span));
+    }
+    let outside = |o: &&Outage| {
+        // an outage may last until a fix later than the last would come
+        let interval = recorded.gnss.windows(2).map(|w| w[1].t_s - w[0].t_s).fold(0.0, f64::max);
+        let over = |t: Option<&GnssFix>, sign: f64, at: f64| {
+            t.is_some_and(|f| sign * (at - f.t_s) > interval + 1e-6)
+        };
+        over(first, -1.0, o.start_s) || over(last, 1.0, o.end_s)
+    };
+    if let Some(o) = outages.iter().find(outside) {
+        let message = format!("--outage {}:{} does not lie within the fixes", o.start_s, o.end_s);
+        return Err(Failure::input(message).maybe_hint(span));
+    }
+    Ok(())
 }
 
 fn scale(gnss: &mut [GnssFix], position: f64, velocity: f64) {

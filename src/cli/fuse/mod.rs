@@ -9,8 +9,12 @@ use inputs::Inputs;
 use nav_sim::ekf::FilterStates;
 use nav_sim::fusion::{self, Recorded, Settings};
 use nav_sim::report::FusionSummary;
+use nav_sim::sensors::gnss::MAX_LEVER_ARM_M;
 use std::path::PathBuf;
 use std::time::Instant;
+
+/// A distance from the reference that no filter makes: another place, or another time (m).
+const ELSEWHERE_M: f64 = 10_000.0;
 
 /// Fuse recorded IMU and GNSS data with the filter of `run`, MODEL telling it the noise of the IMU
 ///
@@ -74,11 +78,11 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let begin = Instant::now();
-    let settings = settings(args);
+    let settings = settings(args)?;
     let inputs = Inputs::read(args, &settings, session)?;
     output::try_open(&args.out, &inputs.files)?;
     let recorded = Recorded { imu: &inputs.imu.samples, gnss: &inputs.gnss };
-    inputs::check_outages(&settings.outages, &recorded)?;
+    let settings = inputs::with_outages(settings, &recorded, session)?;
     let start = inputs.start(args, &recorded, &settings)?;
     for line in &start.how {
         session.printer.say(&format!("initial state at {} s: {line}", start.t_s));
@@ -91,6 +95,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     let outcome = fusion::outcome(&solution, &settings.outages);
     let (rate_hz, states) = (inputs.imu.rate_hz, inputs.belief.states);
+    doubt(&solution, &outcome, session);
     let summary = FusionSummary::of(&solution, &outcome, &start, rate_hz, states);
     let wall_s = begin.elapsed().as_secs_f64();
     output::write(&solution, &summary, inputs.files, wall_s, &args.out)?;
@@ -100,13 +105,36 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     Ok(())
 }
 
-fn settings(args: &Args) -> Settings {
-    Settings {
+fn settings(args: &Args) -> Result<Settings, Failure> {
+    let lever_arm_b = args.lever_arm.map_or(glam::DVec3::ZERO, |t| t.0.into());
+    if lever_arm_b.abs().max_element() > MAX_LEVER_ARM_M {
+        let message = format!(
+            "--lever-arm {}, {}, {}: more than {MAX_LEVER_ARM_M} m",
+            lever_arm_b.x, lever_arm_b.y, lever_arm_b.z
+        );
+        return Err(Failure::input(message).hint("metres from the IMU to the antenna: front, right, down"));
+    }
+    Ok(Settings {
         q_s_b: inputs::mounting(args.mounting),
-        lever_arm_b: args.lever_arm.map_or(glam::DVec3::ZERO, |t| t.0.into()),
+        lever_arm_b,
         gravity: nav_sim::earth::GravityModel::default(),
-        outages: windows_of(&args.outages),
+        outages: windows_of(&args.outages)?,
         nis_gate: args.nis_gate,
         rows_hz: args.rate_hz,
+    })
+}
+
+/// Says what makes the solution, or the comparison with the reference, not to be believed.
+fn doubt(solution: &fusion::Solution, outcome: &fusion::Outcome, session: &Session) {
+    let found = fusion::doubts(solution, outcome);
+    found.iter().for_each(|doubt| session.printer.warn(doubt));
+    if !found.is_empty() {
+        session.printer.say(&format!("hint: {}", fusion::DOUBTFUL));
+    }
+    if let Some(far) = outcome.horizontal_max_m.filter(|m| *m > ELSEWHERE_M) {
+        let message = format!(
+            "the solution is up to {far:.0} m from the reference: is that of this drive, on this clock?"
+        );
+        session.printer.warn(&message);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::Args;
 use crate::cli::{Failure, Session, read};
-use nav_sim::imu::Recording;
+use nav_sim::imu::{Recording, Sensor};
 use nav_sim::noise::{Model, continuous};
 use nav_sim::report::{Input, ModelNote};
 use nav_sim::sensors::imu::Truth;
@@ -29,8 +29,9 @@ impl Inputs {
         let truth = args.truth.as_deref().map(|path| self::model(path, imu_hz, session)).transpose()?;
         let recordings = match args.recordings.as_slice() {
             [] => Vec::new(),
-            paths => read::recordings(paths, session)?,
+            paths => read::recordings_at(paths, args.static_rate_hz, session)?,
         };
+        recordings.iter().filter_map(motion).for_each(|doubt| session.printer.warn(&doubt));
         let truth_model = truth.map(|(model, _)| model);
         Ok(Self { trajectory, model, note: ModelNote { estimator }, truth_model, recordings, files })
     }
@@ -43,6 +44,29 @@ impl Inputs {
             None => Truth::Model(&self.model),
         }
     }
+}
+
+/// Means over a second that differ so much are motion, not noise: m/s², rad/s.
+const MOTION: (f64, f64) = (0.5, 0.05);
+
+/// Says where a recording is not static.
+fn motion(recording: &Recording) -> Option<String> {
+    let second = (recording.rate_hz.round() as usize).max(1);
+    recording.signals.iter().find_map(|signal| {
+        let limit = if signal.channel.sensor == Sensor::Accel { MOTION.0 } else { MOTION.1 };
+        let means = signal.samples.chunks_exact(second).map(|c| c.iter().sum::<f64>() / second as f64);
+        let (low, high) = means.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), m| (l.min(m), h.max(m)));
+        let message = format!(
+            "{}: not static? The mean over a second of {} goes from {:.3} to {:.3} {}: motion becomes errors of the \
+             IMU",
+            recording.name,
+            signal.channel,
+            low + signal.mean,
+            high + signal.mean,
+            signal.channel.sensor.unit()
+        );
+        (high - low > limit).then_some(message)
+    })
 }
 
 fn files(args: &Args) -> Result<Vec<Input>, Failure> {

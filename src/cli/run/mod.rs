@@ -19,7 +19,7 @@ use nav_sim::simulation::{Experiment, ExperimentError, RunResult};
 use std::path::PathBuf;
 use std::time::Instant;
 
-pub(super) use output::{manifest, not_of_another_command, text, write};
+pub(super) use output::{empty_or_new, manifest, not_of_another_command, text, write};
 
 /// Monte-Carlo INS/GNSS navigation along TRAJECTORY with MODEL in the filter
 ///
@@ -45,6 +45,9 @@ pub(crate) struct Args {
     /// Static recording whose windows make the INS errors (repeatable)
     #[arg(long = "static", value_name = "FILE")]
     recordings: Vec<PathBuf>,
+    /// Sample rate of static recordings without a time column
+    #[arg(long = "rate-hz", value_name = "HZ", value_parser = super::parse::rate_hz, requires = "recordings")]
+    static_rate_hz: Option<f64>,
     /// Window without fixes, in seconds (repeatable), or "none" (default: 300:390 and 700:790)
     #[arg(long = "outage", value_name = "START:END", value_parser = parse_outage)]
     outages: Vec<OutageArg>,
@@ -85,13 +88,17 @@ pub(super) fn parse_outage(text: &str) -> Result<OutageArg, String> {
     Ok(OutageArg::Window(outage))
 }
 
-/// The windows among the values of `--outage`.
-pub(super) fn windows_of(outages: &[OutageArg]) -> Vec<Outage> {
+/// The windows among the values of `--outage`, of which "none" stands alone.
+pub(super) fn windows_of(outages: &[OutageArg]) -> Result<Vec<Outage>, Failure> {
+    if outages.len() > 1 && outages.iter().any(|o| matches!(o, OutageArg::None)) {
+        let message = "--outage none stands beside other outages";
+        return Err(Failure::input(message).hint("give the windows, or none alone"));
+    }
     let window = |o: &OutageArg| match o {
         OutageArg::None => None,
         OutageArg::Window(outage) => Some(*outage),
     };
-    outages.iter().filter_map(window).collect()
+    Ok(outages.iter().filter_map(window).collect())
 }
 
 pub(super) fn parse_states(text: &str) -> Result<FilterStates, String> {
@@ -151,6 +158,10 @@ pub(super) fn all_finite(summary: &Summary) -> Result<(), Failure> {
     if summary.diverged == 0 {
         return Ok(());
     }
+    if summary.diverged == summary.runs {
+        let failure = Failure::could_not(format!("all {} runs diverged: there is no result", summary.runs));
+        return Err(failure.hint("does the model fit the IMU, are [imu] and [initial] plausible?"));
+    }
     let failure = Failure::bound(format!("{} of {} runs diverged", summary.diverged, summary.runs));
     Err(failure.hint("their indices are in summary.json, under diverged_runs; they are in no other number"))
 }
@@ -162,7 +173,7 @@ fn scenario(args: &Args) -> Result<Scenario, Failure> {
         scenario.gnss = scenario_file::read(path)?.gnss;
     }
     if !args.outages.is_empty() {
-        scenario.outage = Some(windows_of(&args.outages));
+        scenario.outage = Some(windows_of(&args.outages)?);
         (scenario.outage_periodic, scenario.outage_random) = (None, None);
     }
     scenario.run.runs = args.runs.unwrap_or(scenario.run.runs);
@@ -186,6 +197,11 @@ fn outages(
         let message = format!("outage {}:{} does not lie on the trajectory", o.start_s, o.end_s);
         return Err(Failure::input(message).hint(format!("it lasts from {} to {} s", span.0, span.1)));
     }
+    if let Some(o) = asked.clone().find(|o| !withholds_a_fix(o, span.0, scenario.gnss.rate_hz)) {
+        let message = format!("outage {}:{} withholds no fix", o.start_s, o.end_s);
+        let hint = format!("fixes come every {} s from {} s", 1.0 / scenario.gnss.rate_hz, span.0);
+        return Err(Failure::input(message).hint(hint));
+    }
     let windows = scenario.outages().windows(span, seed).map_err(Failure::input)?;
     let shown: Vec<String> = windows.iter().map(|o| format!("{}–{} s", o.start_s, o.end_s)).collect();
     session.printer.say(&match shown.as_slice() {
@@ -195,10 +211,34 @@ fn outages(
     if scenario.outage.as_ref().is_some_and(|asked| asked.len() > windows.len()) {
         session.printer.warn("outages that overlap or touch are made one");
     }
-    if scenario.outage.is_none() && scenario.outages().fixed.len() > windows.len() {
-        session.printer.warn(&format!("the default outages lie beyond the trajectory's end at {} s", span.1));
+    if let Some(p) = scenario.outage_periodic.filter(|p| p.first_s >= span.1) {
+        let message =
+            format!("outage_periodic.first_s = {} s: the trajectory ends at {} s", p.first_s, span.1);
+        session.printer.warn(&message);
+    }
+    if scenario.outage.is_none() {
+        doubt_defaults(&scenario.outages().fixed, span, session);
     }
     Ok(windows)
+}
+
+/// Default outages that the trajectory does not have, or has a part of.
+fn doubt_defaults(defaults: &[Outage], (start_s, end_s): (f64, f64), session: &Session) {
+    let lasts = format!("the trajectory lasts from {start_s} to {end_s} s");
+    for o in defaults {
+        let shown = format!("the default outage {}:{}", o.start_s, o.end_s);
+        if o.end_s <= start_s || o.start_s >= end_s {
+            session.printer.warn(&format!("{shown} is left out: {lasts}"));
+        } else if o.start_s < start_s || o.end_s > end_s {
+            session.printer.warn(&format!("{shown} is cut: {lasts}"));
+        }
+    }
+}
+
+/// Whether a fix falls into an outage: they come at whole intervals from the trajectory's start.
+fn withholds_a_fix(outage: &Outage, start_s: f64, rate_hz: f64) -> bool {
+    let next = ((outage.start_s - start_s) * rate_hz - 1e-6).ceil().max(1.0);
+    start_s + next / rate_hz < outage.end_s
 }
 
 /// A Gauss-Markov process of phi ≈ 1 may have any stationary variance: a filter that starts with it believes

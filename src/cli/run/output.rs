@@ -50,12 +50,27 @@ pub(crate) fn try_open(path: &Path, inputs: &[Input]) -> Result<(), Failure> {
 /// Refuses a directory whose manifest is that of another command: its own would take its place.
 pub(crate) fn not_of_another_command(path: &Path, is_ours: fn(&str) -> bool) -> Result<(), Failure> {
     let manifest = path.join("manifest.json");
-    let Ok(text) = std::fs::read_to_string(&manifest) else { return Ok(()) };
+    let Ok(text) = std::fs::read_to_string(&manifest) else { return empty_or_new(path) };
     if is_ours(&text) {
         return Ok(());
     }
     let message = format!("{} is of another command, or of another version", manifest.display());
     Err(Failure::input(message).hint("choose another directory with --out, or remove it"))
+}
+
+/// Refuses a directory that holds anything: files of the same names would be lost.
+pub(crate) fn empty_or_new(path: &Path) -> Result<(), Failure> {
+    let Ok(entries) = std::fs::read_dir(path) else { return Ok(()) };
+    let visible = |name: &std::ffi::OsString| !name.to_string_lossy().starts_with('.');
+    let mut names: Vec<_> = entries.flatten().map(|e| e.file_name()).filter(visible).collect();
+    names.sort();
+    let Some(first) = names.first() else { return Ok(()) };
+    let message = format!(
+        "{} is not empty, and not of this command: it holds {}",
+        path.display(),
+        first.to_string_lossy()
+    );
+    Err(Failure::input(message).hint("choose a new directory with --out"))
 }
 
 /// Writes a run directory.
@@ -86,6 +101,9 @@ pub(crate) fn text(summary: &Summary) -> String {
         summary.seed,
         summary.throughput_epochs_per_s / 1e6
     );
+    if summary.diverged == summary.runs {
+        return text.trim_end().to_owned();
+    }
     if !summary.outages.is_empty() {
         text += &outage_table(&summary.outages);
         text.push('\n');

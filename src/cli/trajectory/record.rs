@@ -45,6 +45,9 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     for name in FILES {
         guard_inputs(&args.out.join(name), inputs.iter().flatten().map(|p| p.as_path()))?;
     }
+    if !FILES.iter().all(|name| args.out.join(name).is_file()) {
+        crate::cli::run::empty_or_new(&args.out)?; // not a recording made before
+    }
     let scenario = args.scenario.as_deref().map(scenario_file::read).transpose()?.unwrap_or_default();
     let (trajectory, _) = args.source.read(session)?;
     let shown = args.model.display();

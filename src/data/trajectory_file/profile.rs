@@ -1,6 +1,7 @@
 //! Motion profiles in TOML.
 
 use super::TrajectoryFileError as Error;
+use super::samples::HEIGHT;
 use crate::data::toml_file::{Section, Source, TomlError};
 use crate::trajectory::Trajectory;
 use crate::trajectory::profile::{
@@ -75,10 +76,19 @@ fn read_start(start: &Section<'_>) -> Result<Start, TomlError> {
         t_s: start.f64("t_s")?.unwrap_or(0.0),
         lat: start.require_f64("lat_deg")? * DEG,
         lon: start.require_f64("lon_deg")? * DEG,
-        h: start.require_f64("h_m")?,
+        h: height(start)?,
         heading: start.require_f64("heading_deg")? * DEG,
         speed: start.f64("speed_m_s")?.unwrap_or(0.0),
     })
+}
+
+/// A height at which the gravity model means something.
+fn height(section: &Section<'_>) -> Result<f64, TomlError> {
+    let h = section.require_f64("h_m")?;
+    if HEIGHT.contains(&h) {
+        return Ok(h);
+    }
+    Err(section.refuse("h_m", "is no height within −12 to 1000 km", None))
 }
 
 const KINDS: &str = "straight, accelerate, turn, climb, stop, waypoints";
@@ -153,7 +163,7 @@ fn read_point(point: &Section<'_>) -> Result<Waypoint, TomlError> {
     } else {
         Place::Geodetic { lat: point.require_f64("lat_deg")? * DEG, lon: point.require_f64("lon_deg")? * DEG }
     };
-    Ok(Waypoint { place, h: point.f64("h_m")? })
+    Ok(Waypoint { place, h: if point.has("h_m") { Some(height(point)?) } else { None } })
 }
 
 fn turning(segment: &Section<'_>, keys: &[&'static str]) -> Result<Turning, TomlError> {

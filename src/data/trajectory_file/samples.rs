@@ -18,7 +18,7 @@ const MAX_SPEED: f64 = 8000.0;
 /// Heights that are not doubted (m).
 const PLAUSIBLE_HEIGHT: std::ops::RangeInclusive<f64> = -500.0..=100_000.0;
 /// Heights at which the gravity model means something (m).
-const HEIGHT: std::ops::RangeInclusive<f64> = -12_000.0..=1_000_000.0;
+pub(super) const HEIGHT: std::ops::RangeInclusive<f64> = -12_000.0..=1_000_000.0;
 /// Below this speed a path has no direction (m/s).
 const MOVING: f64 = 0.5;
 /// Longest step between rows that is not doubted (s).
@@ -32,6 +32,7 @@ pub(super) fn trajectory(table: &Table, options: &Options) -> Result<(Trajectory
     doubts.ignored(&columns.ignored);
     let mut samples = samples(table, &columns, options)?;
     check_heights(table, &columns, &samples)?;
+    check_steps(table, &columns, &samples)?;
     doubts.steps(&samples, table);
     doubts.heights(&samples, table);
     check_jumps(table, &samples)?;
@@ -124,6 +125,19 @@ fn check_heights(table: &Table, columns: &Columns, samples: &[TrajectorySample])
     let column = columns.index(if columns.has(Lat) { H } else { D });
     let (line, row) = &table.rows[i];
     Err(table.cell(*line, column, &row[column].to_string(), "is no height within −12 to 1000 km"))
+}
+
+/// Rows a minute apart are no trajectory of a vehicle: their time is in milliseconds.
+fn check_steps(table: &Table, columns: &Columns, samples: &[TrajectorySample]) -> Result<(), Error> {
+    let mut steps: Vec<f64> = samples.windows(2).map(|w| w[1].t_s - w[0].t_s).collect();
+    steps.sort_by(f64::total_cmp);
+    let Some(&median) = steps.get(steps.len() / 2) else { return Ok(()) };
+    if median < 50.0 {
+        return Ok(());
+    }
+    let (index, (line, row)) = (columns.index(Time), &table.rows[1]);
+    let reason = "is in seconds, and rows are a minute or more apart: is it in milliseconds (t_ms)?";
+    Err(table.cell(*line, index, &row[index].to_string(), reason))
 }
 
 fn check_jumps(table: &Table, samples: &[TrajectorySample]) -> Result<(), Error> {
