@@ -5,7 +5,6 @@ use crate::frames::{RollPitchYaw, wrap_angle};
 use crate::trajectory::Trajectory;
 use crate::units::DEG;
 use flate2::{Compression, write::GzEncoder};
-use std::f64::consts::PI;
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -65,7 +64,7 @@ pub fn write_rows(out: &mut impl Write, trajectory: &Trajectory, rows: Rows) -> 
             "{},{},{},{},{},{},{},{},{},{}",
             tidy(t_s, 9),
             state.lat / DEG + 0.0,
-            longitude_deg(state.lon),
+            wrap_angle(state.lon) / DEG + 0.0,
             state.h + 0.0,
             tidy(v.x, 9),
             tidy(v.y, 9),
@@ -76,12 +75,6 @@ pub fn write_rows(out: &mut impl Write, trajectory: &Trajectory, rows: Rows) -> 
         )?;
     }
     Ok(())
-}
-
-/// Within (−180, 180], unchanged to the last digit where it is so already; no negative zero.
-fn longitude_deg(lon: f64) -> f64 {
-    let inside = lon > -PI && lon <= PI;
-    (if inside { lon } else { wrap_angle(lon) }) / DEG + 0.0
 }
 
 /// The nearest number of so many decimals; no negative zero.
