@@ -100,6 +100,12 @@ fn damaged_units_are_noticed_and_computed_again() {
     let said = refused(dir, "merge study.toml -o out", 75);
     assert!(said.contains("4 of 50 units are missing or damaged"), "{said}");
     assert!(!dir.join("out/results").exists());
+    let said = refused(dir, "verify study.toml -o out --units 1 --seed 1", 3);
+    assert!(
+        said.contains("4 units are damaged: ") && said.matches(".unit is damaged").count() == 4,
+        "{said}"
+    );
+    refused(dir, "verify study.toml -o out --units 0", 2);
     let said = done(dir, "run study.toml -o out");
     assert_eq!(said.matches("it is computed again").count(), 4, "{said}");
     done(dir, "merge study.toml -o out");
@@ -259,11 +265,15 @@ fn a_time_limit_and_sigterm_end_with_75_and_two_on_one_shard_do_no_harm() {
     let dir = place.path();
     let undisturbed = whole(dir, "one");
     done(dir, "plan study.toml -o out");
-    let said = refused(dir, "run study.toml -o out --time-limit 0", 75);
-    assert!(said.contains("stopped by the time limit; 50 units left"), "{said}");
+    // Not one unit fits: to go on would be to go on for ever.
+    let said = refused(dir, "run study.toml -o out --time-limit 0", 1);
+    assert!(said.contains("the time limit is too short for a single unit; 50 units left"), "{said}");
     // A study that lasts, to be stopped.
-    fs::write(dir.join("long.toml"), STUDY.replace("runs = 77", "runs = 1000000")).unwrap();
+    fs::write(dir.join("long.toml"), STUDY.replace("runs = 77", "runs = 100000")).unwrap();
     done(dir, "plan long.toml -o long");
+    let said = refused(dir, "run long.toml -o long --time-limit 3", 75);
+    assert!(said.contains("stopped by the time limit; ") && said.contains("goes on"), "{said}");
+    units(&dir.join("long")).iter().for_each(|unit| fs::remove_file(unit).unwrap());
     let mut child = spawn(dir, "run long.toml -o long");
     while units(&dir.join("long")).is_empty() {
         std::thread::sleep(std::time::Duration::from_millis(5));
@@ -294,6 +304,8 @@ fn the_scheduler_says_which_shard() {
     assert!(slurm("1").status.success());
     assert_eq!(units(&dir.join("out")).len(), UNITS);
     assert_eq!(slurm("3").status.code(), Some(2));
+    let too_many = batch(dir, "run study.toml -o out -j 65535");
+    assert_eq!(too_many.status.code(), Some(2));
 }
 
 #[test]
@@ -337,6 +349,20 @@ fn candidates_are_calibrated_in_place_and_a_dry_run_leaves_nothing() {
     assert!(!dir.join("out").exists());
     whole(dir, "out");
     assert_eq!(fs::read_dir(dir.join("out/models")).unwrap().count(), 2);
+    // models that are lost come back as they were
+    let models = || {
+        let files = fs::read_dir(dir.join("out/models")).unwrap().map(|e| e.unwrap().path());
+        let mut files: Vec<_> = files.map(|p| (p.clone(), fs::read(&p).unwrap())).collect();
+        files.sort();
+        files
+    };
+    let made = models();
+    fs::remove_dir_all(dir.join("out/models")).unwrap();
+    let said = refused(dir, "verify study.toml -o out --seed 1", 1);
+    assert!(said.contains("`nav-sim batch plan` makes it anew"), "{said}");
+    done(dir, "plan study.toml -o out");
+    assert_eq!(models(), made);
+    done(dir, "verify study.toml -o out --seed 1");
     let text = fs::read_to_string(dir.join("out/results/outages.json")).unwrap();
     let rows: Vec<serde_json::Value> = serde_json::from_str(&text).unwrap();
     assert_eq!(rows.len(), 4 * 6);
@@ -396,6 +422,15 @@ fn scripts_for_schedulers_are_well_formed() {
             );
         }
     }
+    // a task that can finish no unit
+    fs::write(
+        dir.join("long.toml"),
+        STUDY.replace("_runs = 8", "_runs = 1000000").replace("= 77", "= 1000000"),
+    )
+    .unwrap();
+    done(dir, "plan long.toml -o long");
+    let said = refused(dir, "emit slurm long.toml -o long --time 2s", 2);
+    assert!(said.contains("a task works for 2 s, but a unit takes about"), "{said}");
     fs::write(dir.join("script"), batch(dir, "emit local study.toml -o out --shards 2").stdout).unwrap();
     let bin = Path::new(env!("CARGO_BIN_EXE_nav-sim")).parent().unwrap().display().to_string();
     let path = format!("{bin}:{}", std::env::var("PATH").unwrap());

@@ -1,14 +1,17 @@
 //! `nav-sim batch emit`: scripts for schedulers.
 
 use super::Place;
+use super::plan::duration;
 use crate::cli::{Failure, Session};
+use nav_sim::data::batch_directory;
 use std::fmt::Write;
 use std::path::Path;
 
 /// Print a script that runs a planned study on a cluster or here
 ///
 /// Paths are as seen from the directory in which the script is submitted; it must be shared by all machines.
-/// Every script may be submitted again and again: what is done is skipped.
+/// Every script may be submitted again and again: what is done is skipped. If the study is planned already, a
+/// --time too short for a unit is refused.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -48,13 +51,32 @@ enum Target {
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     args.place.read()?;
-    let script = Script::of(args);
+    let script = Script::of(args, session.asked_seed());
+    let is_planned = batch_directory::plan(&args.place.directory())?.is_some();
+    if is_planned && args.target != Target::Local {
+        let planned = args.place.planned(session.asked_seed())?;
+        long_enough(script.limit_s() as f64, planned.unit_s(u64::from(args.cpus)), session)?;
+    }
     session.printer.result(script.text(args.target).trim_end());
+    Ok(())
+}
+
+/// A task must be able to finish a unit, or it would be started again for ever.
+fn long_enough(limit_s: f64, unit_s: f64, session: &Session) -> Result<(), Failure> {
+    let unit = format!("a unit takes about {} by the plan", duration(unit_s));
+    if limit_s < unit_s {
+        let message = format!("--time: a task works for {}, but {unit}", duration(limit_s));
+        return Err(Failure::input(message).hint("a longer --time, or a study with fewer unit_runs"));
+    }
+    if limit_s < 3.0 * unit_s {
+        session.printer.warn(&format!("a task works for {}, and {unit}", duration(limit_s)));
+    }
     Ok(())
 }
 
 /// What goes into every script.
 struct Script {
+    seed: Option<u64>,
     study: String,
     directory: String,
     name: String,
@@ -64,11 +86,12 @@ struct Script {
 }
 
 impl Script {
-    fn of(args: &Args) -> Self {
+    fn of(args: &Args, seed: Option<u64>) -> Self {
         let text = |path: &Path| path.to_string_lossy().into_owned();
         let stem = args.place.study.file_stem().unwrap_or_default().to_string_lossy();
         let tame = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
         Self {
+            seed,
             study: text(&args.place.study),
             directory: text(&args.place.directory()),
             name: stem.chars().map(tame).collect::<String>().trim_matches('-').to_owned(),
@@ -90,16 +113,23 @@ impl Script {
 
     /// Words of a command of the study.
     fn words(&self, command: &str) -> Vec<String> {
-        ["nav-sim", "batch", command, &self.study, "--out", &self.directory].map(str::to_owned).into()
+        let words = ["nav-sim", "batch", command, &self.study, "--out", &self.directory].map(str::to_owned);
+        let seed = self.seed.map(|seed| ["--seed".to_owned(), seed.to_string()]);
+        words.into_iter().chain(seed.into_iter().flatten()).collect()
+    }
+
+    /// How long a task works (s): it stops in time to be counted.
+    fn limit_s(&self) -> u64 {
+        self.seconds - (self.seconds / 10).min(120)
     }
 
     fn shell(&self, command: &str) -> String {
         self.words(command).iter().map(|w| shell_quoted(w)).collect::<Vec<_>>().join(" ")
     }
 
-    /// The working command of a task whose index the scheduler gives; it stops in time to be counted.
+    /// The working command of a task whose index the scheduler gives.
     fn task(&self) -> String {
-        let limit = self.seconds - (self.seconds / 10).min(120);
+        let limit = self.limit_s();
         format!(
             "{} --shards {} -j {} --time-limit {limit}s --no-progress",
             self.shell("run"),
@@ -231,7 +261,7 @@ impl Script {
 
     fn hyperqueue(&self) -> String {
         let mut words = self.words("run");
-        let limit = self.seconds - (self.seconds / 10).min(120);
+        let limit = self.limit_s();
         words.extend([
             "--shards".to_owned(),
             self.shards.to_string(),

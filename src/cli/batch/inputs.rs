@@ -136,7 +136,12 @@ impl<'a> Inputs<'a> {
         if !self.models.contains_key(&candidate) {
             let model = &self.planned.plan.models[candidate];
             let path = model_path(self.study, &self.planned.directory, &model.role, &model.path);
-            unchanged(&path, &model.blake3)?;
+            let whole = unchanged(&path, &model.blake3);
+            if model.role == CALIBRATED {
+                whole.map_err(|e| e.hint("`nav-sim batch plan` makes it anew"))?;
+            } else {
+                whole?;
+            }
             self.models.insert(candidate, read::model(&path, self.session)?.model);
         }
         Ok(&self.models[&candidate])

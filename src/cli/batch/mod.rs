@@ -109,6 +109,15 @@ impl Planned {
 }
 
 impl Planned {
+    /// What the longest unit takes by the plan's probe (s) on so many threads.
+    fn unit_s(&self, threads: u64) -> f64 {
+        let of = |(run_s, runs): (&f64, &u64)| {
+            let batches = runs.div_ceil(nav_sim::lanes::LANES as u64);
+            run_s * *runs as f64 / threads.clamp(1, batches.max(1)) as f64
+        };
+        self.plan.estimate.run_s.iter().zip(&self.plan.unit_runs).map(of).fold(0.0, f64::max)
+    }
+
     /// The names of a cell on those axes that have more than one.
     fn cell_name(&self, cell: nav_sim::batch::Cell) -> String {
         let grid = &self.grid;

@@ -23,7 +23,7 @@ use std::time::Instant;
 ///
 /// A probe (eight runs of the first cell) says how long it will take; units are made to last about two
 /// minutes, unless the study says `unit_runs`. The directory then holds plan.json, which names every input by
-/// its hash, and models/ calibrated here. Nothing is computed yet: see `nav-sim batch run`.
+/// its hash, and models/ calibrated here (planning again restores those that are lost). Nothing is computed yet: see `nav-sim batch run`.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -105,11 +105,32 @@ fn again(
             return Err(failure.hint("put it back, or plan into another directory with --out"));
         }
     }
+    restore_models(study, directory, &plan, session)?;
     let grid = Grid::of(&plan).map_err(|e| unusable(study, &e))?;
     let planned = Planned { plan, grid, directory: directory.to_owned() };
     warn_of_leftovers(&planned, session)?;
     report(&planned, session);
     session.printer.say(&format!("{} was planned already", directory.display()));
+    Ok(())
+}
+
+/// Calibrates again what is lost or damaged in models/; it must be what the plan says.
+fn restore_models(study: &Path, directory: &Path, plan: &Plan, session: &Session) -> Result<(), Failure> {
+    let whole = |m: &Prepared| hash::of_file(&directory.join(&m.path)).is_ok_and(|found| found == m.blake3);
+    let lost: Vec<&Prepared> = plan.models.iter().filter(|m| m.role == CALIBRATED && !whole(m)).collect();
+    if lost.is_empty() {
+        return Ok(());
+    }
+    // models that are files of their own do not matter here
+    let (_, texts) = models(study, &plan.study, plan.seed, &|_| String::new(), session)?;
+    for model in lost {
+        let Some((path, text)) = texts.iter().find(|(path, _)| *path == model.path) else {
+            let failure = Failure::input(format!("{} cannot be made again as it was planned", model.path));
+            return Err(failure.hint("use the build that planned, or plan into another directory with --out"));
+        };
+        atomic::write(&directory.join(path), text)?;
+        session.printer.say(&format!("wrote {} again", directory.join(path).display()));
+    }
     Ok(())
 }
 

@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 ///
 /// Each unit appears whole, by rename, with a checksum; what is there and whole is skipped, what is damaged is
 /// done again. On SIGTERM, or at the time limit, the unit at work is dropped and the exit code is 75: run
-/// again to go on. Any number of processes may work at once; two on the same shard waste time and harm nothing.
+/// again to go on (1 if the time limit was too short for a single unit). Any number of processes may work at once; two on the same shard waste time and harm nothing.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -37,7 +37,7 @@ pub(crate) struct Args {
     /// How many shards there are, where only their index comes from the scheduler
     #[arg(long, value_name = "N", conflicts_with = "shard", value_parser = clap::value_parser!(u64).range(1..))]
     shards: Option<u64>,
-    /// Stop after this time (exit code 75): seconds, or with s, m, h
+    /// Stop after this time (exit code 75; 1 if no unit was finished): seconds, or with s, m, h
     #[arg(long, value_name = "TIME", value_parser = time)]
     time_limit: Option<Duration>,
 }
@@ -81,13 +81,18 @@ impl Stop {
         !signal && self.deadline.is_none_or(|d| Instant::now() < d)
     }
 
-    fn failure(&self, left: usize) -> Option<Failure> {
+    fn failure(&self, left: usize, finished: usize) -> Option<Failure> {
         let why = if self.interrupted.load(Ordering::Relaxed) {
             return Some(Failure::interrupted(format!("interrupted; {left} units left")));
         } else if self.terminated.load(Ordering::Relaxed) {
             "SIGTERM"
         } else if self.go_on() {
             return None;
+        } else if finished == 0 {
+            // the same command would end the same way: no code for "to be resumed"
+            let message = format!("the time limit is too short for a single unit; {left} units left");
+            let hint = "a longer --time-limit, or a study with fewer unit_runs";
+            return Some(Failure::could_not(message).hint(hint));
         } else {
             "the time limit"
         };
@@ -101,7 +106,11 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let planned = args.place.planned(session.asked_seed())?;
     planned.same_numbers()?;
     Count::of(&planned)?.warn_of_foreign(&planned, session);
-    let (shard, from) = shard::find(args.shard, args.shards, &|name| std::env::var(name).ok())?;
+    let variable = |name: &str| std::env::var(name).ok();
+    let (shard, from) = shard::find(args.shard, args.shards, &variable)?;
+    if let Some(remark) = shard::mismatch(args.shard, args.shards, &variable) {
+        session.printer.warn(&remark);
+    }
     session.printer.say(&format!("shard {}/{} ({from})", shard.index, shard.count));
     let pending = pending(&planned, shard, session)?;
     let runs = pending.iter().map(|(unit, _)| unit.runs).sum();
@@ -122,7 +131,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         })?;
     }
     drop(progress);
-    match (left, stop.failure(left)) {
+    match (left, stop.failure(left, pending.len() - left)) {
         (1.., Some(failure)) => Err(failure),
         _ => {
             session.printer.say(&format!("{} units done, none left in this shard", pending.len()));

@@ -1,8 +1,8 @@
 //! `nav-sim batch verify`: finished units computed again and compared.
 
-use super::Place;
 use super::inputs::Inputs;
 use super::run::compute;
+use super::{Place, Planned};
 use crate::cli::{Failure, Session};
 use nav_sim::batch::Unit;
 use nav_sim::data::{batch_directory, unit_file};
@@ -11,7 +11,8 @@ use rand::seq::IndexedRandom;
 
 /// Compute some finished units again and compare them bit by bit
 ///
-/// Which ones is drawn with --seed. Exit code 3 if any differs.
+/// Which ones is drawn with --seed. All finished units are read first, and damaged ones listed. Exit code 3 if
+/// any is damaged or differs.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -23,8 +24,8 @@ pub(crate) struct Args {
     #[command(flatten)]
     place: Place,
     /// How many
-    #[arg(long, value_name = "K", default_value_t = 3)]
-    units: usize,
+    #[arg(long, value_name = "K", default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..))]
+    units: u64,
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
@@ -32,14 +33,16 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let planned = args.place.planned(None)?;
     planned.same_numbers()?;
     let there = batch_directory::units(&planned.directory)?;
-    let done: Vec<(Unit, String)> =
+    let done: Vec<Named> =
         planned.plan.named_units(&planned.grid).filter(|(_, id)| there.contains(id)).collect();
     if done.is_empty() {
         return Err(Failure::input("no unit is done yet").hint("see `nav-sim batch run`"));
     }
+    let (done, damaged) = whole(&planned, done)?;
     let seed = session.seed(None);
     let key = StreamKey { seed, scenario: "", run: 0, source: "batch.verify", process: "units" };
-    let mut chosen: Vec<&(Unit, String)> = done.sample(&mut key.generator(), args.units).collect();
+    let amount = usize::try_from(args.units).unwrap_or(usize::MAX);
+    let mut chosen: Vec<&Named> = done.sample(&mut key.generator(), amount).collect();
     chosen.sort_by_key(|(unit, _)| unit.index);
     let mut inputs = Inputs::new(&planned, &args.place.study, session);
     let progress = session.progress("runs", chosen.iter().map(|(unit, _)| unit.runs).sum());
@@ -55,7 +58,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         }
     }
     drop(progress);
-    if different.is_empty() {
+    if different.is_empty() && damaged.is_empty() {
         session.printer.result(&format!(
             "{} of {} finished units computed again: the same bits",
             chosen.len(),
@@ -63,6 +66,30 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         ));
         return Ok(());
     }
-    let failure = Failure::bound(format!("{} units differ: {}", different.len(), different.join("; ")));
-    Err(failure.hint("remove these files and run again; if they still differ, machines or builds do"))
+    let listed = |what: &str, units: &[String]| match units.len() {
+        0 => None,
+        n => Some(format!("{n} units {what}: {}", units.join("; "))),
+    };
+    let found = [listed("are damaged", &damaged), listed("differ", &different)];
+    let failure = Failure::bound(found.into_iter().flatten().collect::<Vec<_>>().join("\n"));
+    Err(failure.hint(if different.is_empty() {
+        "`nav-sim batch run` computes them again"
+    } else {
+        "remove these files and run again; if they still differ, machines or builds do"
+    }))
+}
+
+type Named = (Unit, String);
+
+/// The units that are whole, and what is wrong with the others.
+fn whole(planned: &Planned, units: Vec<Named>) -> Result<(Vec<Named>, Vec<String>), Failure> {
+    let (mut whole, mut damaged) = (Vec::new(), Vec::new());
+    for (unit, id) in units {
+        match batch_directory::finished(&planned.directory, &id).map_err(Failure::could_not)? {
+            Ok(true) => whole.push((unit, id)),
+            Ok(false) => {}
+            Err(what) => damaged.push(what),
+        }
+    }
+    Ok((whole, damaged))
 }
