@@ -207,10 +207,23 @@ impl AtomicDir {
     /// # Errors
     /// When the system refuses.
     pub fn write(&mut self, name: &str, contents: impl AsRef<[u8]>) -> Result<(), WriteError> {
+        self.write_parts(name, [contents])
+    }
+
+    /// Writes a file part by part.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub fn write_parts(
+        &mut self,
+        name: &str,
+        parts: impl IntoIterator<Item = impl AsRef<[u8]>>,
+    ) -> Result<(), WriteError> {
         let path = self.path(name);
         let write = || {
-            let mut file = File::create(&path)?;
-            file.write_all(contents.as_ref())
+            let mut file = std::io::BufWriter::new(File::create(&path)?);
+            parts.into_iter().try_for_each(|part| file.write_all(part.as_ref()))?;
+            file.flush()
         };
         write().map_err(|e| WriteError::io(&self.destination.join(name), e))
     }

@@ -209,7 +209,7 @@ pub fn fusion_directory(
     summary: &FusionSummary,
     manifest: &FusionManifest,
     title: &str,
-) -> Vec<OutputFile> {
+) -> Vec<OutputFile<'static>> {
     let contents = [
         solution_csv(&solution.rows),
         innovations_csv(solution),
@@ -218,7 +218,7 @@ pub fn fusion_directory(
         json(summary),
         json(manifest),
     ];
-    FUSION_FILES.into_iter().zip(contents).map(|(name, contents)| OutputFile { name, contents }).collect()
+    FUSION_FILES.into_iter().zip(contents).map(|(name, text)| OutputFile::whole(name, text)).collect()
 }
 
 /// Position (degrees, m), velocity, roll, pitch, yaw (degrees).

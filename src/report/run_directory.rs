@@ -7,12 +7,19 @@ use crate::metrics::{EpochMetrics, Summary};
 use crate::simulation::RunResult;
 
 /// A file to be written.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct OutputFile {
+pub struct OutputFile<'a> {
     /// Name in the directory.
     pub name: &'static str,
-    /// All of it.
-    pub contents: String,
+    /// Its text, part by part: the table of many runs is never whole in memory.
+    pub parts: Box<dyn Iterator<Item = String> + 'a>,
+}
+
+impl OutputFile<'_> {
+    /// A small file.
+    #[must_use]
+    pub fn whole(name: &'static str, text: String) -> Self {
+        Self { name, parts: Box::new(std::iter::once(text)) }
+    }
 }
 
 /// Names of the files of a run directory.
@@ -20,20 +27,20 @@ pub const RUN_FILES: [&str; 5] = ["epochs.csv", "runs.csv", "summary.json", "rep
 
 /// The files of a run directory, the manifest last: where it is, the rest is whole.
 #[must_use]
-pub fn run_directory(
-    result: &RunResult,
+pub fn run_directory<'a>(
+    result: &'a RunResult,
     epochs: &[EpochMetrics],
     summary: &Summary,
     manifest: &Manifest,
-) -> Vec<OutputFile> {
-    let contents = [
-        epochs_csv(epochs),
-        runs_csv(result),
-        json(summary),
-        html::run_page(result, epochs, summary, manifest),
-        json(manifest),
-    ];
-    RUN_FILES.into_iter().zip(contents).map(|(name, contents)| OutputFile { name, contents }).collect()
+) -> Vec<OutputFile<'a>> {
+    let [epochs_name, runs_name, summary_name, page_name, manifest_name] = RUN_FILES;
+    vec![
+        OutputFile::whole(epochs_name, epochs_csv(epochs)),
+        OutputFile { name: runs_name, parts: Box::new(runs_csv(result)) },
+        OutputFile::whole(summary_name, json(summary)),
+        OutputFile::whole(page_name, html::run_page(result, epochs, summary, manifest)),
+        OutputFile::whole(manifest_name, json(manifest)),
+    ]
 }
 
 /// Indented JSON with a final newline; NaN is null.
@@ -49,7 +56,8 @@ mod tests {
     use crate::metrics;
     use crate::scenario::Scenario;
 
-    pub(super) fn files() -> Vec<OutputFile> {
+    /// Names and texts.
+    fn files() -> Vec<(&'static str, String)> {
         let result = sample::result();
         let epochs = metrics::epochs(&result.epochs);
         let summary = Summary::of(&result, &epochs, 7, 2.0);
@@ -65,14 +73,15 @@ mod tests {
             threads: 2,
             wall_s: 2.0,
         };
-        run_directory(&result, &epochs, &summary, &manifest)
+        let files = run_directory(&result, &epochs, &summary, &manifest);
+        files.into_iter().map(|file| (file.name, file.parts.collect())).collect()
     }
 
     #[test]
     fn the_manifest_comes_last_and_reads_back() {
         let files = files();
-        assert_eq!(files.iter().map(|f| f.name).collect::<Vec<_>>(), RUN_FILES);
-        let manifest: Manifest = serde_json::from_str(&files[4].contents).unwrap();
+        assert_eq!(files.iter().map(|f| f.0).collect::<Vec<_>>(), RUN_FILES);
+        let manifest: Manifest = serde_json::from_str(&files[4].1).unwrap();
         assert_eq!(manifest.hashes("trajectory"), [blake3::hash(b"x").to_hex().as_str()]);
         assert_eq!(manifest.configuration, Scenario::default());
     }
@@ -80,7 +89,7 @@ mod tests {
     /// The page asks nothing of the network and holds nothing unescaped.
     #[test]
     fn the_page_is_self_contained() {
-        let page = &files()[3].contents;
+        let page = &files()[3].1;
         for word in ["http:", "https:", "src=", "@import", "url(", "<script", "<link", "a<b"] {
             assert!(!page.contains(word), "{word}");
         }

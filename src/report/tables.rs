@@ -68,16 +68,17 @@ fn run_columns() -> Vec<String> {
     start.into_iter().chain(named("see_mean_")).chain(named("error_end_")).chain(ends).collect()
 }
 
-/// `runs.csv`: one row a run and outage (one row a run, outage empty, when there is none).
-#[must_use]
-pub fn runs_csv(result: &RunResult) -> String {
-    let rows = result.runs.iter().flat_map(|run| {
+/// `runs.csv`, line by line: one row a run and outage (one row a run, outage empty, when there is none).
+pub fn runs_csv(result: &RunResult) -> impl Iterator<Item = String> {
+    let columns = run_columns();
+    let states = columns.len() - 4;
+    let rows = result.runs.iter().flat_map(move |run| {
         let start = format!("{},{},{},{}", run.run, u8::from(run.diverged), shortest(run.nis.0), run.nis.1);
-        let empty = run.outages.is_empty().then(|| format!("{start}{}", ",".repeat(run_columns().len() - 4)));
-        let of_outage = move |(i, outage)| format!("{start},{i},{}", outage_cells(outage).join(","));
+        let empty = run.outages.is_empty().then(|| format!("{start}{}\n", ",".repeat(states)));
+        let of_outage = move |(i, outage)| format!("{start},{i},{}\n", outage_cells(outage).join(","));
         empty.into_iter().chain(run.outages.iter().enumerate().map(of_outage))
     });
-    lines(run_columns().join(","), rows)
+    std::iter::once(columns.join(",") + "\n").chain(rows)
 }
 
 fn outage_cells(outage: &OutageRecord) -> Vec<String> {
@@ -247,11 +248,11 @@ mod tests {
     fn runs_read_back_exactly() {
         let mut result = sample::result();
         result.runs[1].outages[0].reconvergence_s = 2.5e-9;
-        assert_eq!(parse_runs(&runs_csv(&result)).unwrap(), result.runs);
+        assert_eq!(parse_runs(&runs_csv(&result).collect::<String>()).unwrap(), result.runs);
         for run in &mut result.runs {
             run.outages.clear();
         }
-        assert_eq!(parse_runs(&runs_csv(&result)).unwrap(), result.runs);
+        assert_eq!(parse_runs(&runs_csv(&result).collect::<String>()).unwrap(), result.runs);
     }
 
     #[test]

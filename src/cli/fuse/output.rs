@@ -35,7 +35,7 @@ pub(super) fn write(
     };
     let mut directory = AtomicDir::create(out)?;
     for file in fusion_directory(solution, summary, &manifest, &title) {
-        directory.write(file.name, file.contents)?;
+        directory.write_parts(file.name, file.parts)?;
     }
     directory.commit()?;
     Ok(())

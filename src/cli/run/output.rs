@@ -84,7 +84,7 @@ pub(crate) fn write(
     let summary = Summary { reduction, ..Summary::of(result, &epochs, manifest.seed, manifest.wall_s) };
     let mut directory = AtomicDir::create(path)?;
     for file in report::run_directory(result, &epochs, &summary, manifest) {
-        directory.write(file.name, file.contents)?;
+        directory.write_parts(file.name, file.parts)?;
     }
     directory.commit()?;
     Ok(summary)
