@@ -49,15 +49,15 @@ pub struct BiasGroup {
 impl BiasGroup {
     /// A constant that is not known: the same for all time, with this standard deviation on each axis.
     #[must_use]
-    pub fn constant(sigma: f64) -> Self {
+    pub const fn constant(sigma: f64) -> Self {
         Self { phi: DVec3::ONE, innovation: DVec3::ZERO, initial: DVec3::splat(sigma * sigma) }
     }
 
-    /// Coefficients and innovation variances over `ratio` samples, which need not be whole: a Gauss-Markov
-    /// process keeps its correlation time and variance, a random walk its growth. A coefficient ≤ 0 belongs
-    /// to no process in continuous time and is left as it is.
+    /// The same bias with a step of `ratio` samples, which need not be whole: a Gauss-Markov process keeps its
+    /// correlation time and variance, a random walk its growth. A coefficient ≤ 0 belongs to no process in
+    /// continuous time and is left as it is.
     #[must_use]
-    pub fn over(&self, ratio: f64) -> (DVec3, DVec3) {
+    pub fn over(&self, ratio: f64) -> Self {
         let axis = |i: usize| match self.phi[i] {
             phi if phi >= 1.0 => (phi, self.innovation[i] * ratio),
             phi if phi > 0.0 => {
@@ -68,7 +68,7 @@ impl BiasGroup {
             phi => (phi, self.innovation[i]),
         };
         let [x, y, z] = [0, 1, 2].map(axis);
-        (DVec3::new(x.0, y.0, z.0), DVec3::new(x.1, y.1, z.1))
+        Self { phi: DVec3::new(x.0, y.0, z.0), innovation: DVec3::new(x.1, y.1, z.1), ..*self }
     }
 }
 
@@ -213,11 +213,11 @@ mod tests {
         let group = BiasGroup { phi, innovation: DVec3::new(0.2, 0.3, 0.4), initial: DVec3::ONE };
         let (a, b) = (group.over(0.5), group.over(1.5));
         for i in 0..2 {
-            let (phi, q) = (a.0[i] * b.0[i], b.0[i].powi(2) * a.1[i] + b.1[i]);
+            let (phi, q) = (a.phi[i] * b.phi[i], b.phi[i].powi(2) * a.innovation[i] + b.innovation[i]);
             let whole = (phi_squared(group.phi[i]), (1.0 + phi_squared(group.phi[i])) * group.innovation[i]);
             assert!((phi - whole.0).abs() < 1e-14 && (q - whole.1).abs() < 1e-14, "axis {i}");
         }
-        assert_eq!((a.0.z, a.1.z), (0.0, 0.4));
+        assert_eq!((a.phi.z, a.innovation.z), (0.0, 0.4));
     }
 
     fn phi_squared(phi: f64) -> f64 {

@@ -6,7 +6,7 @@
 //! The lower triangle is the matrix. Inside the square of the navigation states and inside that of the
 //! biases the upper triangle repeats it, so that a column can be read as a row.
 
-use super::belief::MAX_BLOCKS;
+use super::belief::{BiasGroup, MAX_BLOCKS};
 use super::dynamics::{ErrorMap, NavError};
 use crate::lanes::{Lanes, Mat3, Real, Vec3, Wide};
 use glam::DVec3;
@@ -33,16 +33,8 @@ pub struct Covariance {
     columns: [[Lanes; NAV]; NAV],
 }
 
-/// A bias triple of the filter's transition: coefficients and innovation variances of the three axes.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct BiasStep {
-    pub(super) phi: DVec3,
-    pub(super) innovation: DVec3,
-}
-
 /// Biases that stay as they are.
-pub(super) const CONSTANT_BIASES: [BiasStep; 2 * MAX_BLOCKS] =
-    [BiasStep { phi: DVec3::ONE, innovation: DVec3::ZERO }; 2 * MAX_BLOCKS];
+pub(super) const CONSTANT_BIASES: [BiasGroup; 2 * MAX_BLOCKS] = [BiasGroup::constant(0.0); 2 * MAX_BLOCKS];
 
 impl Covariance {
     /// Zero covariance of `dim` states.
@@ -97,7 +89,12 @@ impl Covariance {
     /// take their step first: `b_k = phi b_{k−1} + w`, and the map uses `b_k`. Groups of the accelerometer
     /// come first.
     #[inline(always)]
-    pub(super) fn step<W: Wide>(&mut self, map: &impl ErrorMap<W>, biases: &[BiasStep], accel_groups: usize) {
+    pub(super) fn step<W: Wide>(
+        &mut self,
+        map: &impl ErrorMap<W>,
+        biases: &[BiasGroup],
+        accel_groups: usize,
+    ) {
         self.step_biases::<W>(biases);
         let (n, gyro) = (self.dim, NAV + 3 * accel_groups);
         // A P, the navigation columns apart: they are read again below.
@@ -130,7 +127,7 @@ impl Covariance {
 
     /// The sum of triples of biases in column j of the navigation, each after its step.
     #[inline(always)]
-    fn bias_sum<W: Wide>(&self, states: Range<usize>, j: usize, biases: &[BiasStep]) -> Vec3<W> {
+    fn bias_sum<W: Wide>(&self, states: Range<usize>, j: usize, biases: &[BiasGroup]) -> Vec3<W> {
         let mut sum = [W::from(0.0); 3];
         for m in states.step_by(3) {
             let phi = biases[m / 3 - BIAS].phi;
@@ -144,9 +141,9 @@ impl Covariance {
 
     /// The square of the biases: Phi P Phiᵀ + Q.
     #[inline(always)]
-    fn step_biases<W: Wide>(&mut self, biases: &[BiasStep]) {
+    fn step_biases<W: Wide>(&mut self, biases: &[BiasGroup]) {
         for i in NAV..self.dim {
-            let BiasStep { phi, innovation } = biases[i / 3 - BIAS];
+            let BiasGroup { phi, innovation, .. } = biases[i / 3 - BIAS];
             let row = &mut self.p[i * self.dim..(i + 1) * self.dim];
             for (g, triple) in row[NAV..].as_chunks_mut::<3>().0.iter_mut().enumerate() {
                 let factor = biases[g].phi * phi[i % 3];

@@ -1,7 +1,7 @@
 //! The filter itself: nominal state, bias estimates and covariance of eight runs.
 
 use super::belief::{Belief, BiasGroup};
-use super::covariance::{BIAS, BiasStep, CONSTANT_BIASES, Covariance, PSI, R, V};
+use super::covariance::{BIAS, CONSTANT_BIASES, Covariance, PSI, R, V};
 use super::dynamics::{EARTH_STEP_S, EarthStep, EarthTerms, Sample};
 use super::initial::{InitialSettings, psi_of_angles};
 use crate::frames::NavState;
@@ -21,10 +21,11 @@ pub struct Ekf {
     pub bias: Vec<Vec3>,
     /// Covariance of the error state.
     pub p: Covariance,
-    bias_steps: Vec<BiasStep>,
+    /// What is believed of a sample at the belief's own rate.
+    belief: Belief,
+    /// The same of a sample of `dt` seconds: groups, accelerometer first, and white variances.
+    groups: Vec<BiasGroup>,
     white: [DVec3; 2],
-    /// What is believed of one sample at the belief's own rate: groups, white noise, interval (s).
-    of_sample: (Vec<BiasGroup>, [DVec3; 2], f64),
     /// Accelerometer groups: blocks `BIAS..BIAS + accel_groups`; gyroscope groups follow.
     accel_groups: usize,
     dt: f64,
@@ -81,11 +82,11 @@ impl Ekf {
             nominal,
             bias: vec![Vec3::ZERO; groups.len()],
             p,
-            bias_steps: groups.iter().map(|g| BiasStep { phi: g.phi, innovation: g.innovation }).collect(),
+            groups,
             white: belief.white,
             accel_groups: belief.groups[0].len(),
-            of_sample: (groups, belief.white, 1.0 / belief.rate_hz),
             dt: 1.0 / belief.rate_hz,
+            belief,
             earth_age: 0.0,
             omega_ib_b: Vec3::ZERO,
             scratch: Scratch { ph: zeros(), gain: zeros(), error: zeros() },
@@ -103,13 +104,11 @@ impl Ekf {
     /// biases their correlation time and variance. For recorded data, whose clock is not even and whose
     /// samples are split where a fix falls between them.
     pub fn set_interval(&mut self, dt: f64) {
-        let (groups, white, belief_dt) = &self.of_sample;
-        let ratio = dt / belief_dt;
-        for (g, group) in groups.iter().enumerate() {
-            let (phi, innovation) = group.over(ratio);
-            self.bias_steps[g] = BiasStep { phi, innovation };
+        let ratio = dt * self.belief.rate_hz;
+        for (group, believed) in self.groups.iter_mut().zip(self.belief.groups.iter().flatten()) {
+            *group = believed.over(ratio);
         }
-        self.white = white.map(|w| w / ratio);
+        self.white = self.belief.white.map(|w| w / ratio);
         self.dt = dt;
     }
 
@@ -135,9 +134,9 @@ impl Ekf {
     #[inline(always)]
     fn predict<W: Wide>(&mut self, ins: &mut Strapdown<W>, omega_ib_b: Vec3<W>, f_ib_b: Vec3<W>) {
         let dt = self.dt;
-        for (bias, step) in self.bias.iter_mut().zip(&self.bias_steps) {
+        for (bias, group) in self.bias.iter_mut().zip(&self.groups) {
             for axis in 0..3 {
-                (W::load(&bias[axis]) * step.phi[axis]).store(&mut bias[axis]);
+                (W::load(&bias[axis]) * group.phi[axis]).store(&mut bias[axis]);
             }
         }
         let omega_ib_b = omega_ib_b - self.bias_of(Sensor::Gyro);
@@ -145,7 +144,7 @@ impl Ekf {
         self.omega_ib_b.store(omega_ib_b);
         let seconds = W::from(dt);
         let sample = Sample::new(&ins.step(omega_ib_b * seconds, f_ib_b * seconds, dt), dt);
-        self.p.step(&sample, &self.bias_steps, self.accel_groups);
+        self.p.step(&sample, &self.groups, self.accel_groups);
         self.add_white_noise(&sample);
         self.earth_age += dt;
         if self.earth_age + 0.5 * dt > EARTH_STEP_S {
