@@ -7,6 +7,7 @@
 mod auto;
 mod average;
 mod avlr;
+mod bootstrap;
 mod bounded;
 mod diagnosis;
 mod fit;
@@ -16,6 +17,7 @@ mod limits;
 mod notes;
 mod objective;
 mod optimise;
+mod parameter_intervals;
 mod pipeline;
 mod replicates;
 mod robust_scale;
@@ -32,11 +34,12 @@ pub use diagnosis::{
 };
 pub use fit::{Fit, FitError, fit};
 pub use goodness::Goodness;
-pub use inference::{Bootstrap, Inference, ParameterInterval, infer};
+pub use inference::{Bootstrap, Inference, infer};
 pub use limits::{LimitError, Limits};
 pub use notes::{Share, correlation_time_s, duration, notes, percent, shares};
 pub use objective::Weighting;
 pub use optimise::Termination;
+pub use parameter_intervals::ParameterInterval;
 pub use pipeline::{
     CalibrationError, Cause, ModelChoice, Outcome, ParameterLimit, Settings, calibrate, estimate, fit_curve,
 };

@@ -3,8 +3,9 @@
 use super::auto::{Ranking, choose};
 use super::average::{AverageError, Estimator, Trim, average};
 use super::avlr::avlr;
+use super::bootstrap::CurveSampler;
 use super::fit::{Fit, FitError, fit, fit_with_covariance, refit};
-use super::inference::{Inference, World};
+use super::inference::Inference;
 use super::limits::LimitError;
 use super::notes::notes;
 use super::objective::Weighting;
@@ -199,8 +200,8 @@ fn weigh_fully(group: &Group, outcome: &mut Outcome, settings: &Settings) -> Res
     if group.replicates.is_empty() {
         return Ok(());
     }
-    let world = World::new(&group.replicates, outcome, settings).gaussian();
-    let covariance = world.covariance(DRAWS, &group.name(), settings);
+    let sampler = CurveSampler::new(&group.replicates, outcome, settings).gaussian();
+    let covariance = sampler.covariance(DRAWS, &group.name(), settings);
     outcome.fit = fit_with_covariance(&outcome.curve, &outcome.spec, settings.rate_hz, &covariance)?;
     Ok(())
 }

@@ -12,8 +12,8 @@
 //! it, at 5 %.
 
 use super::average::Estimator;
+use super::bootstrap::CurveSampler;
 use super::fit::{Fit, FitError, fit, refit};
-use super::inference::World;
 use super::objective::Weighting;
 use super::pipeline::{Outcome, Settings};
 use super::replicates::Group;
@@ -174,11 +174,11 @@ impl Field<'_> {
         let (spec, fit) = &self.fits[i];
         let outcome =
             Outcome::bare(self.index, self.estimator, self.curve.clone(), spec.clone(), fit.clone());
-        let world = World::new(&self.group.replicates, &outcome, self.settings).gaussian();
+        let sampler = CurveSampler::new(&self.group.replicates, &outcome, self.settings).gaussian();
         let (name, process) = (self.group.name(), self.estimator.name());
         let draw = |run: usize| {
             let key = StreamKey { seed: SEED, scenario: "auto", run: run as u64, source: &name, process };
-            world.draw(&key, self.settings)
+            sampler.draw(&key, self.settings)
         };
         (0..DRAWS).filter_map(draw).collect()
     }
