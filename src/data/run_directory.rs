@@ -1,6 +1,6 @@
 //! Run directories read back, as far as comparisons need them.
 
-use crate::metrics::Experiment;
+use crate::metrics::Measured;
 use crate::report::{Manifest, TableError, parse_epochs, parse_runs};
 use std::path::Path;
 
@@ -72,7 +72,7 @@ pub struct RunDirectory {
     /// Where it came from.
     pub manifest: Manifest,
     /// What was found.
-    pub experiment: Experiment,
+    pub experiment: Measured,
 }
 
 /// Reads a run directory.
@@ -85,7 +85,7 @@ pub fn read(directory: &Path) -> Result<RunDirectory, RunDirectoryError> {
     let (runs_path, runs) = text(directory, "runs.csv")?;
     let table = |path: String| move |source| RunDirectoryError::Table { path, source };
     let outages = manifest.configuration.outage.iter().flatten().map(|o| (o.start_s, o.end_s)).collect();
-    let experiment = Experiment {
+    let experiment = Measured {
         epochs: parse_epochs(&epochs).map_err(table(epochs_path))?,
         runs: parse_runs(&runs).map_err(table(runs_path))?,
         outages,

@@ -16,6 +16,6 @@ pub use consistency::{Band, chi_square_band, coverage_band};
 pub use epoch::{EpochMetrics, epochs};
 pub use estimate::{Estimate, PerState, Quantile, quantile};
 pub use outage::{OutageMetrics, Reconvergence, outages};
-pub use ratio::{ComparisonError, EpochRow, Experiment, OutageComparison, RatioError, StateRatio, compare};
+pub use ratio::{ComparisonError, EpochRow, Measured, OutageComparison, RatioError, StateRatio, compare};
 pub use reduction::{AxisReduction, ReductionQuality, ReductionSummary, TOLERANCE};
 pub use summary::{Consistency, Coverage, Nis, OutageSummary, Recovery, Spread, Summary};

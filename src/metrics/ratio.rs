@@ -19,9 +19,9 @@ pub struct EpochRow {
     pub coverage: f64,
 }
 
-/// What is kept of an experiment.
+/// What was measured in an experiment, as far as ratios need it.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Experiment {
+pub struct Measured {
     /// Epochs in time order.
     pub epochs: Vec<EpochRow>,
     /// Runs in run order.
@@ -99,8 +99,8 @@ pub struct OutageComparison {
 /// # Errors
 /// When epochs or outages differ, or the numbers of paired runs.
 pub fn compare(
-    candidate: &Experiment,
-    reference: &Experiment,
+    candidate: &Measured,
+    reference: &Measured,
     paired: bool,
 ) -> Result<Vec<OutageComparison>, ComparisonError> {
     comparable(candidate, reference)?;
@@ -114,18 +114,18 @@ pub fn compare(
     Ok(reference.outages.iter().enumerate().map(of).collect())
 }
 
-fn comparable(candidate: &Experiment, reference: &Experiment) -> Result<(), ComparisonError> {
+fn comparable(candidate: &Measured, reference: &Measured) -> Result<(), ComparisonError> {
     if candidate.outages != reference.outages {
-        let words = |e: &Experiment| match e.outages.as_slice() {
+        let words = |e: &Measured| match e.outages.as_slice() {
             [] => "none".to_owned(),
             all => all.iter().map(|(a, b)| format!("{a}:{b}")).collect::<Vec<_>>().join(", "),
         };
         let (candidate, reference) = (words(candidate), words(reference));
         return Err(ComparisonError::Outages { candidate, reference });
     }
-    let times = |e: &Experiment| e.epochs.iter().map(|row| row.t_s.to_bits()).collect::<Vec<_>>();
+    let times = |e: &Measured| e.epochs.iter().map(|row| row.t_s.to_bits()).collect::<Vec<_>>();
     if times(candidate) != times(reference) {
-        let words = |e: &Experiment| match (e.epochs.first(), e.epochs.last()) {
+        let words = |e: &Measured| match (e.epochs.first(), e.epochs.last()) {
             (Some(first), Some(last)) => format!("{} from {} to {} s", e.epochs.len(), first.t_s, last.t_s),
             _ => "none".to_owned(),
         };
@@ -136,14 +136,14 @@ fn comparable(candidate: &Experiment, reference: &Experiment) -> Result<(), Comp
 }
 
 fn outage(
-    candidate: &Experiment,
-    reference: &Experiment,
+    candidate: &Measured,
+    reference: &Measured,
     index: usize,
     (start_s, end_s): (f64, f64),
     paired: bool,
 ) -> OutageComparison {
     let inside = |row: &&EpochRow| start_s <= row.t_s && row.t_s < end_s;
-    let pick = |e: &Experiment| e.epochs.iter().filter(inside).cloned().collect::<Vec<_>>();
+    let pick = |e: &Measured| e.epochs.iter().filter(inside).cloned().collect::<Vec<_>>();
     let (c, r) = (pick(candidate), pick(reference));
     let records = records(candidate, reference, index, paired);
     let state = |i: usize| {
@@ -169,12 +169,12 @@ type Records<'a> = Vec<&'a OutageRecord>;
 
 /// The records of one outage on both sides: of the runs that neither side lost when paired.
 fn records<'a>(
-    candidate: &'a Experiment,
-    reference: &'a Experiment,
+    candidate: &'a Measured,
+    reference: &'a Measured,
     outage: usize,
     paired: bool,
 ) -> (Records<'a>, Records<'a>) {
-    let kept = |e: &'a Experiment| e.runs.iter().filter(|r| !r.diverged && r.outages.len() > outage);
+    let kept = |e: &'a Measured| e.runs.iter().filter(|r| !r.diverged && r.outages.len() > outage);
     let record = |r: &'a RunRecord| &r.outages[outage];
     if !paired {
         return (kept(candidate).map(record).collect(), kept(reference).map(record).collect());

@@ -14,9 +14,9 @@ fn run(run: u64, see: f64, error: f64) -> RunRecord {
     RunRecord { run, outages: vec![record(see, error)], ..RunRecord::default() }
 }
 
-fn experiment(asee: &[f64], runs: Vec<RunRecord>) -> Experiment {
+fn experiment(asee: &[f64], runs: Vec<RunRecord>) -> Measured {
     let epochs = asee.iter().enumerate().map(|(i, a)| row(i as f64, *a)).collect();
-    Experiment { epochs, runs, outages: vec![(1.0, 3.0)] }
+    Measured { epochs, runs, outages: vec![(1.0, 3.0)] }
 }
 
 #[test]
@@ -81,7 +81,7 @@ fn runs_that_either_side_lost_are_not_paired() {
 #[test]
 fn other_outages_or_epochs_are_refused_in_words() {
     let reference = experiment(&[1.0; 3], vec![]);
-    let other = Experiment { outages: vec![(5.0, 7.5)], ..reference.clone() };
+    let other = Measured { outages: vec![(5.0, 7.5)], ..reference.clone() };
     let error = compare(&other, &reference, true).unwrap_err();
     assert_eq!(error.to_string(), "the outages differ: 5:7.5 against 1:3 of the reference");
     let error = compare(&experiment(&[1.0; 4], vec![]), &reference, true).unwrap_err();

@@ -3,7 +3,7 @@
 
 use super::comparison::{CandidateResult, Label, table_rows};
 use super::number::readable;
-use crate::metrics::{self, EpochMetrics, EpochRow, Experiment, OutageComparison, OutageMetrics};
+use crate::metrics::{self, EpochMetrics, EpochRow, Measured, OutageComparison, OutageMetrics};
 use crate::simulation::{REPORTED, REPORTED_NAMES, RunResult};
 
 /// A value of a table.
@@ -219,7 +219,7 @@ pub fn run_rows(of: &ColumnResult<'_>) -> Vec<TableRow> {
 
 /// What ratios are made of.
 #[must_use]
-pub fn experiment_of(result: &RunResult) -> Experiment {
+pub fn measured(result: &RunResult) -> Measured {
     let row = |e: &EpochMetrics| EpochRow {
         t_s: e.t_s,
         asee: e.asee.0.map(|e| e.value),
@@ -227,7 +227,7 @@ pub fn experiment_of(result: &RunResult) -> Experiment {
         nees: e.nees.value,
         coverage: e.coverage,
     };
-    Experiment {
+    Measured {
         epochs: metrics::epochs(&result.epochs).iter().map(row).collect(),
         runs: result.runs.clone(),
         outages: result.outages.clone(),
@@ -308,7 +308,7 @@ mod tests {
     fn rows_fit_their_columns_and_names_carry_units() {
         let result = sample::result();
         let (outages, epochs) = (metrics::outages(&result), metrics::epochs(&result.epochs));
-        let experiment = experiment_of(&result);
+        let experiment = measured(&result);
         let comparison = metrics::compare(&experiment, &experiment, true).unwrap();
         let tables = [
             (outage_columns(), outage_rows(&of(&result), &outages, Some(&comparison))),

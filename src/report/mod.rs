@@ -22,8 +22,7 @@ mod trajectory;
 
 pub use batch::{
     ColumnResult, ShownCell, ShownColumn, TableColumn, TableRow, Value, ValueKind, drift_table,
-    epoch_columns, epoch_rows, experiment_of, outage_columns, outage_rows, ratio_table, run_columns,
-    run_rows,
+    epoch_columns, epoch_rows, measured, outage_columns, outage_rows, ratio_table, run_columns, run_rows,
 };
 pub use comparison::{CandidateResult, ComparisonFile, Label, table_rows};
 pub use curves::{

@@ -8,7 +8,7 @@ use nav_sim::batch::{CellSums, Column, Kept, Metric, Study, Unit};
 use nav_sim::data::atomic::AtomicDir;
 use nav_sim::data::table_files::{TableFiles, TableFormat};
 use nav_sim::data::unit_file;
-use nav_sim::metrics::{self, Experiment, OutageComparison};
+use nav_sim::metrics::{self, Measured, OutageComparison};
 use nav_sim::report::{self, ColumnResult, Label, ShownCell, ShownColumn, TableRow};
 use nav_sim::simulation::{REPORTED_NAMES, RunResult};
 use rayon::prelude::*;
@@ -262,7 +262,7 @@ fn comparisons(planned: &Planned, results: &[RunResult]) -> Result<Vec<Compared>
     if planned.plan.kept() == Kept::Runs {
         return Ok(vec![(None, false); columns.len()]);
     }
-    let experiments: Vec<Experiment> = results.iter().map(report::experiment_of).collect();
+    let experiments: Vec<Measured> = results.iter().map(report::measured).collect();
     let one = |i: usize| {
         let filter = columns[i].filter;
         let own = columns.iter().position(|c| c.candidate == reference && c.filter == filter).unwrap_or(0);
