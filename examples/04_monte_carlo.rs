@@ -3,16 +3,13 @@
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
 use nav_sim::data::trajectory_file::{Options, load};
-use nav_sim::earth::GravityModel;
-use nav_sim::ekf::{Belief, FilterStates, InitialSettings};
+use nav_sim::ekf::{Belief, FilterStates};
 use nav_sim::metrics::{Summary, epochs};
 use nav_sim::monte_carlo;
 use nav_sim::noise::{Ar1, Composite, Model, Process, White};
-use nav_sim::sensors::defects::ImuSettings;
-use nav_sim::sensors::gnss::GnssSettings;
+use nav_sim::scenario::Scenario;
 use nav_sim::sensors::imu::Truth;
 use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::Experiment;
 use std::path::Path;
 
 fn model(gyro_bias_sigma: f64) -> Result<Model, Box<dyn std::error::Error>> {
@@ -29,22 +26,8 @@ pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     let truth = model(1e-4)?;
     let belief = |m: &Model| Belief::new(m, FilterStates::Full, 1.0, 800.0);
     let beliefs = [belief(&truth)?, belief(&model(1e-5)?)?];
-    let experiment = Experiment {
-        trajectory: &trajectory,
-        rate_hz: 100.0,
-        gravity: GravityModel::Wgs84,
-        truth: Truth::Model(&truth),
-        beliefs: &beliefs,
-        gnss: &GnssSettings::default(),
-        initial: &InitialSettings::default(),
-        defects: &ImuSettings::default(),
-        baro: None,
-        nis_gate: None,
-        outages: &Outage::PAPER,
-        seed: 1,
-        scenario: "",
-        coverage_level: 0.95,
-    };
+    let scenario = Scenario::default();
+    let experiment = scenario.experiment(&trajectory, Truth::Model(&truth), &beliefs, &Outage::PAPER, 1);
     let results = monte_carlo::run(&experiment, 16, &|_| {})?;
     for (name, result) in ["right", "optimist"].iter().zip(&results) {
         let summary = Summary::of(result, &epochs(&result.epochs), 1, f64::NAN);

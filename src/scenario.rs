@@ -8,7 +8,10 @@ use crate::noise::{Model, reduction};
 use crate::sensors::baro::BaroSettings;
 use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
+use crate::sensors::imu::Truth;
 use crate::sensors::outage::{Outage, OutagePlan, PeriodicOutages, RandomOutages};
+use crate::simulation::Experiment;
+use crate::trajectory::Trajectory;
 use crate::units::SettingError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -102,6 +105,35 @@ impl FilterSettings {
 }
 
 impl Scenario {
+    /// The experiment that this scenario describes: a trajectory, what makes the inertial errors, the
+    /// candidates, and the outages and the seed, which have been drawn.
+    #[must_use]
+    pub fn experiment<'a>(
+        &'a self,
+        trajectory: &'a Trajectory,
+        truth: Truth<'a>,
+        beliefs: &'a [Belief],
+        outages: &'a [Outage],
+        seed: u64,
+    ) -> Experiment<'a> {
+        Experiment {
+            trajectory,
+            rate_hz: self.imu.rate_hz,
+            gravity: self.filter.gravity,
+            truth,
+            beliefs,
+            gnss: &self.gnss,
+            initial: &self.initial,
+            defects: &self.imu,
+            baro: self.baro.as_ref(),
+            nis_gate: self.filter.nis_gate,
+            outages,
+            seed,
+            scenario: "",
+            coverage_level: self.run.coverage_level,
+        }
+    }
+
     /// Checks every value, and refuses what is not simulated rather than ignore it.
     ///
     /// # Errors

@@ -4,13 +4,11 @@
 #![allow(unsafe_code, reason = "an allocator that counts")]
 
 use nav_sim::data::trajectory_file::{Options, load};
-use nav_sim::earth::GravityModel;
-use nav_sim::ekf::{Belief, FilterStates, InitialSettings};
-use nav_sim::sensors::defects::ImuSettings;
-use nav_sim::sensors::gnss::GnssSettings;
+use nav_sim::ekf::{Belief, FilterStates};
+use nav_sim::scenario::Scenario;
 use nav_sim::sensors::imu::Truth;
 use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::{Experiment, Plan, run_batch};
+use nav_sim::simulation::{Plan, run_batch};
 use nav_sim::throughput;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -49,22 +47,8 @@ fn allocations(duration_s: u32) -> u64 {
     let model = throughput::model().unwrap();
     let beliefs = [FilterStates::Reduced15, FilterStates::Full]
         .map(|states| Belief::new(&model, states, 1.0, 800.0).unwrap());
-    let experiment = Experiment {
-        trajectory: &trajectory,
-        rate_hz: 100.0,
-        gravity: GravityModel::Wgs84,
-        truth: Truth::Model(&model),
-        beliefs: &beliefs,
-        gnss: &GnssSettings::default(),
-        initial: &InitialSettings::default(),
-        defects: &ImuSettings::default(),
-        baro: None,
-        nis_gate: None,
-        outages: &[Outage { start_s: 20.0, end_s: 30.0 }],
-        seed: 1,
-        scenario: "",
-        coverage_level: 0.95,
-    };
+    let (scenario, outages) = (Scenario::default(), [Outage { start_s: 20.0, end_s: 30.0 }]);
+    let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &beliefs, &outages, 1);
     let plan = Plan::new(&experiment).unwrap();
     let before = ALLOCATIONS.load(Ordering::Relaxed);
     let batches = run_batch(&plan, 0, 8);

@@ -4,15 +4,13 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a test with a table")]
 
 use nav_sim::data::trajectory_file::{Options, load};
-use nav_sim::earth::GravityModel;
-use nav_sim::ekf::{Belief, FilterStates, InitialSettings};
+use nav_sim::ekf::{Belief, FilterStates};
 use nav_sim::monte_carlo;
 use nav_sim::noise::{Ar1, Composite, Model, Process, RandomWalk, White};
-use nav_sim::sensors::defects::ImuSettings;
-use nav_sim::sensors::gnss::GnssSettings;
+use nav_sim::scenario::Scenario;
 use nav_sim::sensors::imu::Truth;
 use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::{Experiment, NEES_DOF, RunResult};
+use nav_sim::simulation::{NEES_DOF, RunResult};
 use nav_sim::trajectory::Trajectory;
 use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF};
 use std::path::Path;
@@ -45,22 +43,8 @@ fn model(scale: [f64; 6]) -> Model {
 }
 
 fn run(trajectory: &Trajectory, truth: &Model, beliefs: &[Belief]) -> Vec<RunResult> {
-    let experiment = Experiment {
-        trajectory,
-        rate_hz: 100.0,
-        gravity: GravityModel::Wgs84,
-        truth: Truth::Model(truth),
-        beliefs,
-        gnss: &GnssSettings::default(),
-        initial: &InitialSettings::default(),
-        defects: &ImuSettings::default(),
-        baro: None,
-        nis_gate: None,
-        outages: &OUTAGES,
-        seed: 23,
-        scenario: "",
-        coverage_level: 0.95,
-    };
+    let scenario = Scenario::default();
+    let experiment = scenario.experiment(trajectory, Truth::Model(truth), beliefs, &OUTAGES, 23);
     monte_carlo::run(&experiment, RUNS, &|_| {}).unwrap()
 }
 

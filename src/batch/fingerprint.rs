@@ -1,6 +1,5 @@
 //! Whether this build on this machine makes the same numbers as the one that planned.
 
-use super::unit::experiment;
 use crate::ekf::{Belief, FilterStates};
 use crate::frames::RollPitchYaw;
 use crate::monte_carlo;
@@ -25,7 +24,7 @@ fn results() -> Option<String> {
     let (scenario, outages) = (Scenario::default(), [Outage { start_s: 1.5, end_s: 2.5 }]);
     let belief = |states| Belief::new(&model, states, 1.0, 800.0).ok();
     let beliefs = [belief(FilterStates::Reduced15)?, belief(FilterStates::Full)?];
-    let experiment = experiment(&trajectory, Truth::Model(&model), &beliefs, &scenario, &outages, 1);
+    let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &beliefs, &outages, 1);
     let results = monte_carlo::run(&experiment, 3, &|_| {}).ok()?;
     // Debug prints as many digits of a number as tell it from every other one
     Some(format!("{results:?}"))

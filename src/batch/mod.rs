@@ -37,4 +37,4 @@ pub use study::{
     TrajectoryEntry, TruthEntry,
 };
 pub use sweep::{OneOrMany, OutageSet, Periodic, Random, Sweep};
-pub use unit::{Kept, UnitResult, experiment, run_unit};
+pub use unit::{Kept, UnitResult, run_unit};

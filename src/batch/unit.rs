@@ -1,13 +1,8 @@
 //! One unit of work: some runs of one cell, through all its columns.
 
 use super::study::{Metric, Study};
-use crate::ekf::Belief;
 use crate::monte_carlo;
-use crate::scenario::Scenario;
-use crate::sensors::imu::Truth;
-use crate::sensors::outage::Outage;
-use crate::simulation::{Experiment, Plan, RunResult};
-use crate::trajectory::Trajectory;
+use crate::simulation::{Plan, RunResult};
 use serde::{Deserialize, Serialize};
 
 /// What is kept of the sums at epochs; records of runs are always kept.
@@ -57,34 +52,6 @@ pub struct UnitResult {
     pub runs: u64,
     /// One result a column.
     pub columns: Vec<RunResult>,
-}
-
-/// The experiment of a cell.
-#[must_use]
-pub fn experiment<'a>(
-    trajectory: &'a Trajectory,
-    truth: Truth<'a>,
-    beliefs: &'a [Belief],
-    scenario: &'a Scenario,
-    outages: &'a [Outage],
-    seed: u64,
-) -> Experiment<'a> {
-    Experiment {
-        trajectory,
-        rate_hz: scenario.imu.rate_hz,
-        gravity: scenario.filter.gravity,
-        truth,
-        beliefs,
-        gnss: &scenario.gnss,
-        initial: &scenario.initial,
-        defects: &scenario.imu,
-        baro: scenario.baro.as_ref(),
-        nis_gate: scenario.filter.nis_gate,
-        outages,
-        seed,
-        scenario: "",
-        coverage_level: scenario.run.coverage_level,
-    }
 }
 
 /// Computes runs `first..first + runs`; `None` if `go_on` said no on the way. `progress` is told of runs

@@ -59,8 +59,7 @@ impl<'a> Inputs<'a> {
                 Truth::Model(&truth_model)
             }
         };
-        let experiment =
-            nav_sim::batch::experiment(&trajectory, truth, &beliefs, &scenario, &outages, plan.seed);
+        let experiment = scenario.experiment(&trajectory, truth, &beliefs, &outages, plan.seed);
         let simulation = simulation::Plan::new(&experiment).map_err(|e| at(&e))?;
         f(&simulation)
     }

@@ -127,22 +127,13 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let unusable = |e| Failure::input(format!("{}: {e}", args.model.display()));
     let belief = scenario.belief(&inputs.model, &outages).map_err(unusable)?;
     doubt_biases(&belief, session);
-    let experiment = Experiment {
-        trajectory: &inputs.trajectory,
-        rate_hz: scenario.imu.rate_hz,
-        gravity: scenario.filter.gravity,
-        truth: inputs.truth(),
-        beliefs: std::slice::from_ref(&belief),
-        gnss: &scenario.gnss,
-        initial: &scenario.initial,
-        defects: &scenario.imu,
-        baro: scenario.baro.as_ref(),
-        nis_gate: scenario.filter.nis_gate,
-        outages: &outages,
+    let experiment = scenario.experiment(
+        &inputs.trajectory,
+        inputs.truth(),
+        std::slice::from_ref(&belief),
+        &outages,
         seed,
-        scenario: "",
-        coverage_level: scenario.run.coverage_level,
-    };
+    );
     let reduction = reduced::reduction(&scenario, &inputs.model, &belief, &experiment, session)?;
     let (results, wall_s) = simulate(&experiment, scenario.run.runs, session)?;
     let manifest = manifest(scenario, &outages, seed, inputs.files.clone(), inputs.note.clone(), session);

@@ -7,8 +7,9 @@ use nav_sim::data::scenario_file;
 use nav_sim::data::trajectory_file::{Rows, write_rows};
 use nav_sim::noise::continuous;
 use nav_sim::report::{gnss_csv, imu_csv, initial_toml};
+use nav_sim::scenario::Scenario;
 use nav_sim::sensors::imu::Truth;
-use nav_sim::simulation::{Experiment, Plan, record};
+use nav_sim::simulation::{Plan, record};
 use std::path::PathBuf;
 
 /// Names of the files, in the order of writing.
@@ -53,22 +54,10 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let shown = args.model.display();
     let model = continuous::at_rate(&read::model(&args.model, session)?.model, scenario.imu.rate_hz)
         .map_err(|e| Failure::input(format!("{shown}: {e}")))?;
-    let experiment = Experiment {
-        trajectory: &trajectory,
-        rate_hz: scenario.imu.rate_hz,
-        gravity: scenario.filter.gravity,
-        truth: Truth::Model(&model),
-        beliefs: &[],
-        gnss: &scenario.gnss,
-        initial: &scenario.initial,
-        defects: &scenario.imu,
-        baro: None,
-        nis_gate: None,
-        outages: &[],
-        seed: session.seed(scenario.run.seed),
-        scenario: "",
-        coverage_level: scenario.run.coverage_level,
-    };
+    let seed = session.seed(scenario.run.seed);
+    // a recording is what IMU and receiver give: no barometer, no filter
+    let scenario = Scenario { baro: None, ..scenario };
+    let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &[], &[], seed);
     let plan = Plan::new(&experiment).map_err(Failure::input)?;
     let recording = record(&plan, 0);
     let mut reference = Vec::new();
