@@ -1,59 +1,17 @@
 //! `nav-sim run` as a user runs it, on a drive of a minute.
 
-#![allow(clippy::unwrap_used, reason = "a test")]
+#![allow(clippy::unwrap_used, unreachable_pub, reason = "a test")]
 
-use assert_cmd::Command;
+#[path = "common/drive.rs"]
+mod drive;
+
+use drive::*;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
 
-const TRAJECTORY: &str = "
-start = { lat_deg = 46.5, lon_deg = 6.5, h_m = 400, heading_deg = 40 }
-segment = [
-  { kind = \"straight\", duration_s = 5 },
-  { kind = \"accelerate\", to_speed_m_s = 10, duration_s = 10 },
-  { kind = \"turn\", angle_deg = 90, duration_s = 10 },
-  { kind = \"straight\", duration_s = 35 },
-]
-";
-const MODEL: &str = "
-schema = 1
-rate_hz = 100.0
-[accel]
-processes = [{ type = \"WN\", sigma2 = 5.4e-5 }, { type = \"AR1\", phi = 0.9999, sigma2 = 1e-9 }]
-[gyro]
-processes = [{ type = \"WN\", sigma2 = 2e-6 }, { type = \"AR1\", phi = 0.9999, sigma2 = 4e-12 }]
-[provenance]
-estimator = \"dr-awv\"
-";
-
-struct Ran {
-    code: i32,
-    stdout: String,
-    stderr: String,
-}
-
 fn place() -> tempfile::TempDir {
-    let directory = tempfile::tempdir().unwrap();
-    fs::write(directory.path().join("drive.toml"), TRAJECTORY).unwrap();
-    fs::write(directory.path().join("imu.toml"), MODEL).unwrap();
-    directory
-}
-
-fn nav_sim(directory: &Path, arguments: &str) -> Ran {
-    let output = Command::new(env!("CARGO_BIN_EXE_nav-sim"))
-        .current_dir(directory)
-        .args(arguments.split_whitespace())
-        .output()
-        .unwrap();
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
-    Ran { code: output.status.code().unwrap(), stdout: text(output.stdout), stderr: text(output.stderr) }
-}
-
-fn done(directory: &Path, arguments: &str) -> Ran {
-    let ran = nav_sim(directory, arguments);
-    assert_eq!(ran.code, 0, "{arguments}\n{}", ran.stderr);
-    ran
+    place_with(DRIVE, &format!("{MODEL}[provenance]\nestimator = \"dr-awv\"\n"))
 }
 
 /// The command fails with this code, its message starts so, and it leaves no output behind.
@@ -87,7 +45,7 @@ fn a_run_directory_holds_what_the_interface_says() {
     assert!(summary["throughput_epochs_per_s"].as_f64().unwrap() > 0.0);
     let manifest = json(&out.join("manifest.json"));
     assert_eq!(manifest["configuration"]["run"]["seed"], 5);
-    assert_eq!(manifest["inputs"][0]["blake3"], blake3::hash(TRAJECTORY.as_bytes()).to_hex().as_str());
+    assert_eq!(manifest["inputs"][0]["blake3"], blake3::hash(DRIVE.as_bytes()).to_hex().as_str());
     assert_eq!(manifest["model"]["estimator"], "dr-awv");
     let epochs = fs::read_to_string(out.join("epochs.csv")).unwrap();
     assert_eq!(epochs.lines().count(), 62); // header, 0 … 60 s
@@ -300,7 +258,7 @@ fn a_directory_of_another_command_is_refused() {
 fn motion_in_a_static_recording_is_said() {
     let place = place();
     done(place.path(), "trajectory record drive.toml imu.toml --seed 3 -o rec");
-    let short = TRAJECTORY.replace("duration_s = 35", "duration_s = 5");
+    let short = DRIVE.replace("duration_s = 35", "duration_s = 5");
     fs::write(place.path().join("short.toml"), short).unwrap();
     let command = "run short.toml imu.toml --static rec/imu.csv --runs 1 --outage none --seed 1 -o out";
     let ran = nav_sim(place.path(), command);
@@ -319,7 +277,7 @@ fn check_knows_the_files_of_a_fusion_and_speaks_json() {
     assert_eq!(found, expected);
     let slow: String = (0..9).map(|k| format!("{},46.5,6.5,{k}\n", 1000 * k)).collect();
     fs::write(place.path().join("ms.csv"), format!("t_s,lat_deg,lon_deg,h_m\n{slow}")).unwrap();
-    fs::write(place.path().join("deep.toml"), TRAJECTORY.replace("h_m = 400", "h_m = -7e6")).unwrap();
+    fs::write(place.path().join("deep.toml"), DRIVE.replace("h_m = 400", "h_m = -7e6")).unwrap();
     for (file, message) in [("ms.csv", "milliseconds (t_ms)?"), ("deep.toml", "no height within")] {
         let ran = nav_sim(place.path(), &format!("check {file} --format json"));
         let said: Value = serde_json::from_str(&ran.stdout).unwrap();

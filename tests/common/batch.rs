@@ -1,24 +1,13 @@
 //! A study of 50 units of a few milliseconds, and how to run parts of it.
 
+#[path = "drive.rs"]
+mod drive;
+
+pub use drive::MODEL;
+use drive::{DRIVE, place_with};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 
-pub const DRIVE: &str = "
-start = { lat_deg = 46.5, lon_deg = 6.5, h_m = 400, heading_deg = 40 }
-segment = [
-  { kind = \"straight\", duration_s = 5 },
-  { kind = \"accelerate\", to_speed_m_s = 10, duration_s = 10 },
-  { kind = \"turn\", angle_deg = 90, duration_s = 10 },
-  { kind = \"straight\", duration_s = 35 },
-]
-";
-pub const MODEL: &str = "
-rate_hz = 100.0
-[accel]
-processes = [{ type = \"WN\", sigma2 = 5.4e-5 }, { type = \"AR1\", phi = 0.9999, sigma2 = 1e-9 }]
-[gyro]
-processes = [{ type = \"WN\", sigma2 = 2e-6 }, { type = \"AR1\", phi = 0.9999, sigma2 = 4e-12 }]
-";
 /// Five cells of ten units; two columns.
 pub const STUDY: &str = "
 runs = 77
@@ -34,10 +23,8 @@ pub const UNITS: usize = 50;
 
 /// A directory with the study and what it needs.
 pub fn place() -> tempfile::TempDir {
-    let dir = tempfile::tempdir().unwrap();
-    for (name, text) in [("drive.toml", DRIVE), ("imu.toml", MODEL), ("study.toml", STUDY)] {
-        std::fs::write(dir.path().join(name), text).unwrap();
-    }
+    let dir = place_with(DRIVE, MODEL);
+    std::fs::write(dir.path().join("study.toml"), STUDY).unwrap();
     std::fs::write(dir.path().join("wrong.toml"), MODEL.replace("4e-12", "4e-13")).unwrap();
     dir
 }
