@@ -43,6 +43,8 @@ sources! {
     /// Y. Bar-Shalom, X. R. Li, T. Kirubarajan: *Estimation with Applications to Tracking and
     /// Navigation*, Wiley, 2001 (NEES, NIS).
     BarShalom01;
+    /// A. C. Davison, D. V. Hinkley: *Bootstrap Methods and their Application*, Cambridge University Press, 1997.
+    DavisonHinkley97;
     /// J. A. Doornik: *An improved ziggurat method to generate normal random samples*, Nuffield College,
     /// Oxford, 2005.
     Doornik05;

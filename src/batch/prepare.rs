@@ -103,8 +103,9 @@ pub fn calibrated(
         let reason = format!("gmwm and rgmwm take a single recording; there are {}", recordings.len());
         return Err(PrepareError::Word { key: "estimators", value, reason });
     }
-    let measured = replicates(recordings, None, &settings.tuning, &|| {})?;
-    let groups = grouped(measured, if single { Pool::Axes } else { Pool::Sensor });
+    let of = |recording| replicates(recording, None, &settings.tuning);
+    let measured: Vec<_> = recordings.par_iter().map(of).collect::<Result<_, _>>()?;
+    let groups = grouped(measured.concat(), if single { Pool::Axes } else { Pool::Sensor });
     let outcomes = calibrate(&groups, &settings)?;
     Ok((groups, outcomes, settings))
 }

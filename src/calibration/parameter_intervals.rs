@@ -155,10 +155,11 @@ fn interval(parameter: &str, estimate: f64, drawn: Vec<f64>) -> [f64; 2] {
 /// Probability beyond either end of a 95 % interval.
 const TAIL: f64 = 0.025;
 
-/// Quantile of sorted numbers, interpolated; NaN of none.
+/// Quantile of sorted draws, interpolated; NaN of none. The k-th of n is at k/(n + 1), so that one draw more is
+/// beyond it with that probability exactly ([Davison and Hinkley](crate::bibliography::DavisonHinkley97), Section 5.2).
 fn quantile(sorted: &[f64], p: f64) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
-    let at = p * last as f64;
+    let at = (p * (sorted.len() + 1) as f64 - 1.0).clamp(0.0, last as f64);
     let below = at.floor() as usize;
     let above = (below + 1).min(last);
     sorted[below] + (at - below as f64) * (sorted[above] - sorted[below])
@@ -231,7 +232,7 @@ mod tests {
             (low / (24.0 / 17.53) - 1.0).abs() < 0.064 && (high / (24.0 / 2.18) - 1.0).abs() < 0.125,
             "{low} {high}"
         );
-        assert_eq!(interval("sigma2", 0.0, vec![0.0, 0.0, 1.0]), [0.0, 0.95]);
+        assert_eq!(interval("sigma2", 0.0, vec![0.0, 0.0, 1.0]), [0.0, 1.0]);
         let [low, high] = interval("phi", 0.9, vec![0.85, 0.9, 0.93]);
         assert!(0.0 < low && low < 0.9 && 0.9 < high && high < 1.0, "{low} {high}");
     }

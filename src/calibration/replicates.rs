@@ -1,7 +1,7 @@
 //! From recordings to groups of replicates: the wavelet variances of every signal.
 
 use super::average::Replicate;
-use crate::imu::{Axis, Channel, Recording, Sensor};
+use crate::imu::{Axis, Channel, Recording, Sensor, Signal};
 use crate::wavelet::{Tuning, WaveletError, both, default_levels};
 use rayon::prelude::*;
 
@@ -55,31 +55,27 @@ pub struct SignalError {
     pub source: WaveletError,
 }
 
-/// The wavelet variances of all signals of all recordings, in their order; `done` is called after each
-/// signal, from any thread. Without a number of levels each signal has as many as usual for its length.
+/// The wavelet variances of all signals of a recording, in their order. Without a number of levels there are as
+/// many as usual for its length.
 ///
 /// # Errors
-/// When a signal is too short for the levels.
+/// When it is too short for the levels.
 pub fn replicates(
-    recordings: &[Recording],
+    recording: &Recording,
     levels: Option<u32>,
     tuning: &Tuning,
-    done: &(dyn Fn() + Sync),
 ) -> Result<Vec<(Channel, Replicate)>, SignalError> {
-    let signals: Vec<_> = recordings.iter().flat_map(|r| r.signals.iter().map(move |s| (r, s))).collect();
-    let one = |(recording, signal): &(&Recording, &crate::imu::Signal)| {
-        let samples = signal.samples.len();
-        let levels = levels.unwrap_or_else(|| default_levels(samples));
-        let (classical, robust) = both(&signal.samples, levels, tuning).map_err(|source| SignalError {
-            recording: recording.name.clone(),
-            channel: signal.channel,
-            source,
-        })?;
-        done();
-        let name = recording.name.clone();
-        Ok((signal.channel, Replicate { name, axis: Some(signal.channel.axis), samples, classical, robust }))
-    };
-    signals.par_iter().map(one).collect()
+    let one =
+        |signal: &Signal| {
+            let samples = signal.samples.len();
+            let levels = levels.unwrap_or_else(|| default_levels(samples));
+            let (classical, robust) = both(&signal.samples, levels, tuning).map_err(|source| {
+                SignalError { recording: recording.name.clone(), channel: signal.channel, source }
+            })?;
+            let (name, axis) = (recording.name.clone(), Some(signal.channel.axis));
+            Ok((signal.channel, Replicate { name, axis, samples, classical, robust }))
+        };
+    recording.signals.par_iter().map(one).collect()
 }
 
 /// The groups, in the order of [`Channel::ALL`].

@@ -4,6 +4,7 @@ use super::axes::ChannelSet;
 use super::{Failure, Session};
 use nav_sim::data::recordings::{self, Gaps, ReadOptions, Report};
 use nav_sim::imu::{Recording, Sensor};
+use std::cell::OnceCell;
 use std::path::PathBuf;
 
 /// How recordings are read.
@@ -48,13 +49,14 @@ impl RecordingArgs {
         self.skip_s
     }
 
-    /// Reads recordings, says what was found (in detail with `--verbose`) and what is doubtful.
-    pub(crate) fn read(
+    /// Looks at recordings one by one, says what was found (in detail with `--verbose`) and what is doubtful.
+    pub(crate) fn visit<T: Send>(
         &self,
         paths: &[PathBuf],
         min_samples: usize,
         session: &Session,
-    ) -> Result<(Vec<Recording>, Report), Failure> {
+        look: &(dyn Fn(Recording) -> T + Sync),
+    ) -> Result<(Vec<T>, Report), Failure> {
         let options = ReadOptions {
             rate_hz: self.rate_hz,
             skip_s: self.skip_s,
@@ -66,8 +68,18 @@ impl RecordingArgs {
             channels: (!self.axes.is_empty()).then(|| self.axes.iter().flat_map(|s| s.0.clone()).collect()),
             columns: self.columns.clone(),
             min_samples,
+            ..ReadOptions::default()
         };
-        let (recordings, report) = recordings::read(paths, &options)?;
+        let progress = OnceCell::new();
+        let tell = |done: usize, all: usize| {
+            let progress = progress.get_or_init(|| session.progress("recordings", all as u64));
+            if done > 0 {
+                progress.add(1);
+            }
+        };
+        let visited = recordings::visit(paths, &options, look, &tell);
+        drop(progress);
+        let (looks, report) = visited?;
         for file in &report.files {
             session.printer.say(&file.to_string());
             if !file.ignored.is_empty() {
@@ -77,7 +89,7 @@ impl RecordingArgs {
         for warning in report.all_warnings() {
             session.printer.warn(&warning);
         }
-        Ok((recordings, report))
+        Ok((looks, report))
     }
 }
 

@@ -56,18 +56,18 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if let Some(out) = &args.out {
         atomic::guard_inputs(out, args.files.iter().map(PathBuf::as_path))?;
     }
-    let (recordings, _) = args.recordings.read(&args.files, args.tuning.min_samples(), session)?;
-    let rate_hz = recordings[0].rate_hz;
-    let count = recordings.iter().map(|r| r.signals.len() as u64).sum();
-    let progress = session.progress("signals", count);
-    let measured = replicates(&recordings, args.tuning.scales, &tuning, &|| progress.add(1))?;
-    drop(progress);
-    let curves = |(channel, replicate): &(Channel, Replicate)| {
-        let edof = degrees_of_freedom(args.intervals, &recordings, *channel, replicate)?;
-        Ok(SignalCurves::new(*channel, replicate, rate_hz, edof, tuning.efficiency()))
+    let look = |recording: Recording| -> Result<Vec<SignalCurves>, Failure> {
+        let measured = replicates(&recording, args.tuning.scales, &tuning)?;
+        let curves = |(channel, replicate): &(Channel, Replicate)| {
+            let edof = degrees_of_freedom(args.intervals, &recording, *channel, replicate)?;
+            Ok(SignalCurves::new(*channel, replicate, recording.rate_hz, edof, tuning.efficiency()))
+        };
+        let curves = measured.par_iter().map(curves).collect::<Result<_, WaveletError>>();
+        curves.map_err(Failure::could_not)
     };
-    let signals = measured.par_iter().map(curves).collect::<Result<Vec<_>, WaveletError>>();
-    let signals = signals.map_err(Failure::could_not)?;
+    let (looks, report) = args.recordings.visit(&args.files, args.tuning.min_samples(), session, &look)?;
+    let signals = looks.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
+    let rate_hz = report.files[0].rate_hz;
     let method = args.intervals.name();
     let file = SignalsFile::new(rate_hz, tuning.efficiency(), method, signals);
     let json = report::json(&file);
@@ -90,13 +90,12 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 fn degrees_of_freedom(
     intervals: Intervals,
-    recordings: &[Recording],
+    recording: &Recording,
     channel: Channel,
     replicate: &Replicate,
 ) -> Result<Vec<f64>, WaveletError> {
     let levels = 1..=replicate.classical.len() as u32;
-    let signal = recordings.iter().find(|r| r.name == replicate.name).and_then(|r| r.signal(channel));
-    match (intervals, signal) {
+    match (intervals, recording.signal(channel)) {
         (Intervals::LargeSample, Some(signal)) => levels
             .map(|level| Ok(interval::edof_large_sample(&haar::coefficients(&signal.samples, level)?, level)))
             .collect(),

@@ -29,20 +29,21 @@ pub enum NpyError {
     Short { path: String, expected: u64, found: u64 },
 }
 
-/// An array by columns.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Array {
-    /// Columns, all of the same length.
-    pub columns: Vec<Vec<f64>>,
-}
-
 const MAGIC: &[u8] = b"\x93NUMPY";
 
-/// Reads an array; a vector is an array of one column.
+/// An array of real numbers: its header read, its elements to come.
+#[derive(Debug)]
+pub struct Array<R> {
+    path: String,
+    header: Header,
+    elements: R,
+}
+
+/// Opens an array; a vector is an array of one column.
 ///
 /// # Errors
 /// When it cannot be read, is no array of real numbers of one or two dimensions, or is cut off.
-pub fn read(path: &Path) -> Result<Array, NpyError> {
+pub fn open(path: &Path) -> Result<Array<BufReader<File>>, NpyError> {
     let name = path.display().to_string();
     let io = |source| NpyError::Io { path: name.clone(), source };
     let file = File::open(path).map_err(io)?;
@@ -61,7 +62,7 @@ struct Header {
     columns: usize,
 }
 
-fn parse(path: &str, mut reader: impl Read, size: u64) -> Result<Array, NpyError> {
+fn parse<R: Read>(path: &str, mut reader: R, size: u64) -> Result<Array<R>, NpyError> {
     let malformed = |what| NpyError::Malformed { path: path.to_owned(), what };
     let io = |source: io::Error| match source.kind() {
         io::ErrorKind::UnexpectedEof => malformed("the header is cut off"),
@@ -88,7 +89,7 @@ fn parse(path: &str, mut reader: impl Read, size: u64) -> Result<Array, NpyError
     if size - before < expected {
         return Err(NpyError::Short { path: path.to_owned(), expected, found: size - before });
     }
-    Ok(Array { columns: elements_of(&header, reader).map_err(io)? })
+    Ok(Array { path: path.to_owned(), header, elements: reader })
 }
 
 impl Header {
@@ -150,24 +151,33 @@ fn element_type(code: &str) -> Option<(bool, u8, usize)> {
     (known && matches!(order, b'<' | b'>' | b'|' | b'=')).then_some((order == b'>', kind, width))
 }
 
-fn elements_of(header: &Header, mut reader: impl Read) -> io::Result<Vec<Vec<f64>>> {
-    if header.rows == 0 || header.columns == 0 {
-        return Ok(Vec::new());
+impl<R: Read> Array<R> {
+    /// Its columns.
+    #[must_use]
+    pub const fn columns(&self) -> usize {
+        self.header.columns
     }
-    let mut columns = vec![Vec::new(); header.columns];
-    columns.iter_mut().for_each(|c| c.reserve_exact(header.rows));
-    // One row, or in Fortran order one element, at a time from the buffer.
-    let per_read = if header.fortran { 1 } else { header.columns };
-    let mut bytes = vec![0; per_read * header.width];
-    let reads = if header.fortran { header.rows * header.columns } else { header.rows };
-    for i in 0..reads {
-        reader.read_exact(&mut bytes)?;
-        for (j, element) in bytes.chunks_exact(header.width).enumerate() {
-            let column = if header.fortran { i / header.rows } else { j };
-            columns[column].push(header.element(element));
+
+    /// Shows every element, with its row and column, in the order of the file.
+    ///
+    /// # Errors
+    /// When it cannot be read, and what `show` returns.
+    pub fn each<E: From<NpyError>>(
+        mut self,
+        mut show: impl FnMut(usize, usize, f64) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let Header { rows, columns, width, fortran, .. } = self.header;
+        let mut bytes = [0; 8];
+        for i in 0..rows * columns {
+            let element = &mut bytes[..width];
+            self.elements
+                .read_exact(element)
+                .map_err(|source| NpyError::Io { path: self.path.clone(), source })?;
+            let (row, column) = if fortran { (i % rows, i / rows) } else { (i / columns, i % columns) };
+            show(row, column, self.header.element(element))?;
         }
+        Ok(())
     }
-    Ok(columns)
 }
 
 /// Writes the header of a C-ordered array of `f64`; the elements follow, little-endian, row by row.
@@ -200,8 +210,16 @@ mod tests {
         bytes
     }
 
-    fn read_bytes(bytes: &[u8]) -> Result<Array, NpyError> {
-        parse("a.npy", bytes, bytes.len() as u64)
+    /// The columns.
+    fn read_bytes(bytes: &[u8]) -> Result<Vec<Vec<f64>>, NpyError> {
+        let array = parse("a.npy", bytes, bytes.len() as u64)?;
+        let mut columns = vec![Vec::new(); array.columns()];
+        array.each::<NpyError>(|row, column, value| {
+            assert_eq!(columns[column].len(), row);
+            columns[column].push(value);
+            Ok(())
+        })?;
+        Ok(columns)
     }
 
     #[test]
@@ -212,7 +230,7 @@ mod tests {
         for v in [0.1_f64, -2.0, 3e-300, 4.0, 5.0, 6.0] {
             bytes.extend(v.to_le_bytes());
         }
-        let expected = Array { columns: vec![vec![0.1, 3e-300, 5.0], vec![-2.0, 4.0, 6.0]] };
+        let expected = vec![vec![0.1, 3e-300, 5.0], vec![-2.0, 4.0, 6.0]];
         assert_eq!(read_bytes(&bytes).unwrap(), expected);
     }
 
@@ -221,7 +239,7 @@ mod tests {
     fn orders_types_and_versions() {
         let header = "{'descr': '>i2', 'fortran_order': True, 'shape': (2, 3), }\n";
         let elements: Vec<u8> = [1_i16, -2, 3, -4, 5, -6].iter().flat_map(|v| v.to_be_bytes()).collect();
-        let expected = Array { columns: vec![vec![1.0, -2.0], vec![3.0, -4.0], vec![5.0, -6.0]] };
+        let expected = vec![vec![1.0, -2.0], vec![3.0, -4.0], vec![5.0, -6.0]];
         for version in [1, 2, 3] {
             assert_eq!(read_bytes(&file(version, header, &elements)).unwrap(), expected);
         }
@@ -230,7 +248,7 @@ mod tests {
             "{'descr': '<f4', 'fortran_order': False, 'shape': (2,), }",
             &[0, 0, 128, 63, 0, 0, 0, 192],
         );
-        assert_eq!(read_bytes(&vector).unwrap().columns, [[1.0, -2.0]]);
+        assert_eq!(read_bytes(&vector).unwrap(), [[1.0, -2.0]]);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use super::{FusionFileError as Error, is_bare, table, text};
 use crate::data::recordings::checks::{check_gravity, gravity_factor};
 use crate::data::recordings::header::{Role, Unit};
 use crate::data::recordings::timing::{median_step, unit_of_step};
-use crate::data::recordings::{self, Raw, ReadOptions};
+use crate::data::recordings::{self, Raw, ReadOptions, RecordingError};
 use crate::imu::{Axis, Channel, ImuIncrement, Sensor};
 use crate::strapdown::MAX_ROTATION;
 use crate::units::DEG;
@@ -72,25 +72,27 @@ fn kf_gins(path: &Path, text: &str) -> Result<Columns, Error> {
 }
 
 fn headed(path: &Path) -> Result<Columns, Error> {
-    let raw = recordings::load(path, &ReadOptions::default())?;
+    let options = ReadOptions { hold_bytes: usize::MAX, ..ReadOptions::default() };
+    let mut raw = recordings::load(path, &options)?;
     let shown = raw.path.clone();
-    let find = |channel: Channel| {
-        let is = |role: Role| matches!(role, Role::Signal { channel: c, .. } if c == channel);
-        raw.columns.iter().find(|c| is(c.role)).ok_or(Error::Missing { path: shown.clone(), channel })
-    };
-    let signals = Channel::ALL.map(find).into_iter().collect::<Result<Vec<_>, _>>()?;
     let from_gravity = gravity_factor(&raw)?;
-    let scale = |role: Role| match role {
-        Role::Signal { unit: Unit::Si(factor) | Unit::Increment(factor), .. } => factor,
-        _ => from_gravity,
-    };
-    let incremental = |i: usize| matches!(signals[i].role, Role::Signal { unit: Unit::Increment(_), .. });
-    let factors: Vec<f64> = signals.iter().map(|c| scale(c.role)).collect();
-    let t_s = times(&raw)?;
-    let sample = |k: usize| std::array::from_fn(|i| signals[i].values[k] * factors[i]);
+    let mut signals = Vec::new();
+    for channel in Channel::ALL {
+        let (role, values) =
+            take(&mut raw, |role| matches!(role, Role::Signal { channel: c, .. } if *c == channel))?
+                .ok_or_else(|| Error::Missing { path: shown.clone(), channel })?;
+        let (factor, increment) = match role {
+            Role::Signal { unit: Unit::Si(factor), .. } => (factor, false),
+            Role::Signal { unit: Unit::Increment(factor), .. } => (factor, true),
+            _ => (from_gravity, false),
+        };
+        signals.push((values, factor, increment));
+    }
+    let t_s = times(&mut raw)?;
+    let sample = |k: usize| std::array::from_fn(|i| signals[i].0[k] * signals[i].1);
     Ok(Columns {
         values: (0..t_s.len()).map(sample).collect(),
-        increments: [incremental(0), incremental(3)],
+        increments: [signals[0].2, signals[3].2],
         lines: (0..t_s.len()).map(|k| raw.lines.of(k)).collect(),
         remarks: Vec::new(),
         path: shown,
@@ -98,14 +100,23 @@ fn headed(path: &Path) -> Result<Columns, Error> {
     })
 }
 
-fn times(raw: &Raw) -> Result<Vec<f64>, Error> {
-    let column = raw.columns.iter().find(|c| matches!(c.role, Role::Time { .. }));
-    let column = column.ok_or_else(|| Error::NoTime { path: raw.path.clone() })?;
-    let unit = match column.role {
+/// The first column of such a role, with its numbers.
+fn take(raw: &mut Raw, is: impl Fn(&Role) -> bool) -> Result<Option<(Role, Vec<f64>)>, RecordingError> {
+    let Some(at) = raw.columns.iter().position(|c| is(&c.role)) else { return Ok(None) };
+    let column = raw.columns.swap_remove(at);
+    let values = column.values.into_vec();
+    let values = values.map_err(|source| RecordingError::Storage { path: raw.path.clone(), source })?;
+    Ok(Some((column.role, values)))
+}
+
+fn times(raw: &mut Raw) -> Result<Vec<f64>, Error> {
+    let found = take(raw, |role| matches!(role, Role::Time { .. }))?;
+    let (role, values) = found.ok_or_else(|| Error::NoTime { path: raw.path.clone() })?;
+    let unit = match role {
         Role::Time { unit_s: Some(unit) } => unit,
-        _ => unit_of_step(median_step(&column.values)).0,
+        _ => unit_of_step(median_step(&values)).0,
     };
-    Ok(column.values.iter().map(|t| t * unit).collect())
+    Ok(values.iter().map(|t| t * unit).collect())
 }
 
 impl Columns {

@@ -1,29 +1,33 @@
 //! Units and plausibility of the signals.
 
 use super::header::{Role, Unit};
-use super::{Column, FileReport, Raw, RecordingError};
-use crate::imu::{Recording, Sensor};
+use super::table::{Column, Raw};
+use super::values::Values;
+use super::{FileReport, RecordingError};
+use crate::imu::{Channel, Sensor};
 use crate::units::STANDARD_GRAVITY;
+use std::io;
+use std::ops::Range;
 
-/// Brings every signal to SI units; refuses dead axes.
-pub(super) fn resolve_units(raw: &mut Raw, rate_hz: f64) -> Result<(), RecordingError> {
+/// What brings each column to SI units; refuses dead axes.
+pub(super) fn factors(raw: &Raw, rate_hz: f64) -> Result<Vec<f64>, RecordingError> {
     let from_gravity = gravity_factor(raw)?;
-    for column in &mut raw.columns {
-        let Role::Signal { channel, unit } = column.role else { continue };
-        if let Some(value) = constant(&column.values) {
+    let factor = |column: &Column| {
+        let Role::Signal { channel, unit } = column.role else { return Ok(1.0) };
+        let dead = constant(&column.values);
+        if let Some(value) =
+            dead.map_err(|source| RecordingError::Storage { path: raw.path.clone(), source })?
+        {
             let (path, column) = (raw.path.clone(), column.name.clone());
             return Err(RecordingError::Dead { path, channel, column, value });
         }
-        let factor = match unit {
+        Ok(match unit {
             Unit::Si(factor) => factor,
             Unit::Increment(factor) => factor * rate_hz,
             Unit::FromGravity => from_gravity,
-        };
-        if factor.to_bits() != 1.0_f64.to_bits() {
-            column.values.iter_mut().for_each(|v| *v *= factor);
-        }
-    }
-    Ok(())
+        })
+    };
+    raw.columns.iter().map(factor).collect()
 }
 
 /// The unit of accelerometer columns that do not say it, from the length of their mean.
@@ -34,7 +38,10 @@ pub(in crate::data) fn gravity_factor(raw: &Raw) -> Result<f64, RecordingError> 
         .filter(|c| matches!(c.role, Role::Signal { unit: Unit::FromGravity, .. }))
         .collect();
     let Some(first) = unnamed.first() else { return Ok(1.0) };
-    let norm = unnamed.iter().map(|c| mean(&c.values).powi(2)).sum::<f64>().sqrt();
+    let means =
+        unnamed.iter().map(|c| mean(&c.values, 0..c.values.len(), 1.0)).collect::<Result<Vec<_>, _>>();
+    let means = means.map_err(|source| RecordingError::Storage { path: raw.path.clone(), source })?;
+    let norm = norm(&means);
     let near = |target: f64| (norm / target - 1.0).abs() < 0.1;
     if unnamed.len() == 3 {
         for factor in [1.0, STANDARD_GRAVITY, 1e-3 * STANDARD_GRAVITY] {
@@ -50,40 +57,42 @@ pub(in crate::data) fn gravity_factor(raw: &Raw) -> Result<f64, RecordingError> 
     })
 }
 
-fn constant(values: &[f64]) -> Option<f64> {
-    let first = *values.first()?;
-    (values.len() > 1 && values.iter().all(|v| v.to_bits() == first.to_bits())).then_some(first)
+/// The value that all of them have, if so.
+fn constant(values: &Values) -> io::Result<Option<f64>> {
+    let (mut first, mut alike) = (None, values.len() > 1);
+    values.each_block(0..values.len(), |block| {
+        let first: f64 = *first.get_or_insert(block[0]);
+        alike = alike && block.iter().all(|v| v.to_bits() == first.to_bits());
+    })?;
+    Ok(first.filter(|_| alike))
 }
 
-/// The mean, summed about the first sample so that a large offset costs no digits.
-fn mean(values: &[f64]) -> f64 {
-    let Some(first) = values.first() else { return 0.0 };
-    let sums = values.chunks(4096).map(|c| c.iter().map(|v| v - first).sum::<f64>());
-    first + sums.sum::<f64>() / values.len() as f64
+/// The mean of a stretch times a factor, summed about the first of them so that a large offset costs no digits.
+pub(super) fn mean(values: &Values, range: Range<usize>, factor: f64) -> io::Result<f64> {
+    let (mut first, mut sum, count) = (None, 0.0, range.len() as f64);
+    values.each_block(range, |block| {
+        let first = *first.get_or_insert(block[0] * factor);
+        sum += block.iter().map(|v| v * factor - first).sum::<f64>();
+    })?;
+    Ok(first.map_or(0.0, |first| first + sum / count))
 }
 
-/// Removes the mean and returns it.
-pub(super) fn remove_mean(values: &mut [f64]) -> f64 {
-    let mean = mean(values);
-    values.iter_mut().for_each(|v| *v -= mean);
-    mean
+fn norm(vector: &[f64]) -> f64 {
+    vector.iter().map(|v| v * v).sum::<f64>().sqrt()
 }
 
 /// Static specific force is gravity, or nothing where the mean was removed before; rates are small.
-pub(super) fn plausible(recordings: &[Recording], report: &mut FileReport) -> Result<(), RecordingError> {
-    for recording in recordings {
-        let means = |sensor| -> Vec<f64> {
-            recording.signals.iter().filter(|s| s.channel.sensor == sensor).map(|s| s.mean).collect()
-        };
-        let (accel, gyro) = (means(Sensor::Accel), means(Sensor::Gyro));
-        let norm = |v: &[f64]| v.iter().map(|m| m * m).sum::<f64>().sqrt();
-        if accel.len() == 3 {
-            check_gravity(&report.file, norm(&accel))?;
-        }
-        if norm(&gyro) > 0.1 {
-            let degrees = norm(&gyro).to_degrees();
-            report.warn(format!("mean angular rate {degrees:.1} deg/s: not static, or deg/s named rad/s?"));
-        }
+pub(super) fn plausible(means: &[(Channel, f64)], report: &mut FileReport) -> Result<(), RecordingError> {
+    let of = |sensor| -> Vec<f64> {
+        means.iter().filter(|(channel, _)| channel.sensor == sensor).map(|(_, mean)| *mean).collect()
+    };
+    let (accel, gyro) = (of(Sensor::Accel), of(Sensor::Gyro));
+    if accel.len() == 3 {
+        check_gravity(&report.file, norm(&accel))?;
+    }
+    if norm(&gyro) > 0.1 {
+        let degrees = norm(&gyro).to_degrees();
+        report.warn(format!("mean angular rate {degrees:.1} deg/s: not static, or deg/s named rad/s?"));
     }
     Ok(())
 }
@@ -107,14 +116,14 @@ pub(in crate::data) fn check_gravity(path: &str, norm: f64) -> Result<(), Record
 }
 
 /// Replicates of one sensor have one rate (0.5 % allows for clocks).
-pub(super) fn same_rate(recordings: &[Recording]) -> Result<(), RecordingError> {
-    let Some(first) = recordings.first() else { return Ok(()) };
-    match recordings.iter().find(|r| (r.rate_hz / first.rate_hz - 1.0).abs() > 0.005) {
+pub(super) fn same_rate(files: &[FileReport]) -> Result<(), RecordingError> {
+    let Some(first) = files.first() else { return Ok(()) };
+    match files.iter().find(|f| (f.rate_hz / first.rate_hz - 1.0).abs() > 0.005) {
         None => Ok(()),
         Some(other) => Err(RecordingError::RatesDiffer {
-            path: other.name.clone(),
+            path: other.file.clone(),
             rate_hz: other.rate_hz,
-            first: first.name.clone(),
+            first: first.file.clone(),
             first_hz: first.rate_hz,
         }),
     }

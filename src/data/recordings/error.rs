@@ -12,6 +12,11 @@ pub enum RecordingError {
     /// A file or directory cannot be read.
     #[error("{path}: {source}")]
     Io { path: String, source: std::io::Error },
+    /// A file too long to be held, and no place for it.
+    #[error(
+        "{path}: too long to be held in memory, and its samples cannot be kept in a temporary file: {source}"
+    )]
+    Storage { path: String, source: std::io::Error },
     /// A directory without recordings.
     #[error("{path}: no recordings in it")]
     NoFiles { path: String },
@@ -129,7 +134,7 @@ impl RecordingError {
     pub fn is_io(&self) -> bool {
         match self {
             Self::Io { source, .. } => !is_damage(source.kind()),
-            Self::Npy(NpyError::Io { .. }) => true,
+            Self::Npy(NpyError::Io { .. }) | Self::Storage { .. } => true,
             _ => false,
         }
     }
@@ -153,6 +158,9 @@ impl RecordingError {
             }
             Self::Io { source, .. } if source.kind() == ErrorKind::NotFound => {
                 "check the path; a directory stands for all its recordings"
+            }
+            Self::Storage { .. } => {
+                "make room there, or name another directory in TMPDIR; --axes takes fewer signals at a time"
             }
             Self::Empty { .. } => "a recording has a header line and a row for each sample",
             Self::NoUnit { column, .. } if column.to_lowercase().starts_with('a') => {

@@ -11,6 +11,8 @@
 //! | loggers | `ax_mps2`, `gx_radps`, `gyro_x_dps`, `acc_x [mg]`, … |
 
 use super::error::shown;
+use super::table::Column;
+use super::values::Values;
 use crate::imu::{Axis, Channel, Sensor};
 use crate::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
 
@@ -212,6 +214,12 @@ fn stem_axis(stem: &str, sensor: Sensor) -> Option<(Axis, bool)> {
 }
 
 impl Layout {
+    /// Where each column stands in a row, and the columns, empty.
+    pub(super) fn columns(&self) -> (Vec<usize>, Vec<Column>) {
+        let empty = |f: &Found| Column { name: f.name.clone(), role: f.role, values: Values::default() };
+        self.found.iter().map(|f| (f.index, empty(f))).unzip()
+    }
+
     /// The columns with a meaning among `names`, of the `wanted` channels (all if none are given).
     pub(super) fn new(names: &[String], si: bool, wanted: Option<&[Channel]>) -> Result<Self, HeaderError> {
         let (mut found, mut ignored): (Vec<Found>, Vec<String>) = (Vec::new(), Vec::new());

@@ -10,9 +10,12 @@ pub mod header;
 pub(in crate::data) mod checks;
 mod error;
 mod files;
+mod prepared;
 mod report;
+mod table;
 mod text;
 pub(in crate::data) mod timing;
+mod values;
 mod write;
 
 pub use error::RecordingError;
@@ -20,15 +23,15 @@ pub use files::is_recording;
 pub use report::{FileReport, Report};
 pub use write::FileFormat;
 
-use crate::data::npy;
-use crate::imu::{Channel, Recording, Signal};
-use header::Role;
+pub(in crate::data) use table::{Raw, load};
+
+use crate::imu::{Channel, Recording};
+use prepared::Prepared;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
-use timing::Timing;
 
 /// How recordings are read.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct ReadOptions {
     /// Sample rate (Hz) for files without a time column; where there is one, it must agree within 1 %.
     pub rate_hz: Option<f64>,
@@ -42,6 +45,22 @@ pub struct ReadOptions {
     pub columns: Option<Vec<String>>,
     /// Fewest samples a recording must have (at least 2).
     pub min_samples: usize,
+    /// Bytes of one file's samples that are held in memory (512 MiB); those of a longer one wait in a temporary file.
+    pub hold_bytes: usize,
+}
+
+impl Default for ReadOptions {
+    fn default() -> Self {
+        Self {
+            rate_hz: None,
+            skip_s: 0.0,
+            gaps: Gaps::default(),
+            channels: None,
+            columns: None,
+            min_samples: 2,
+            hold_bytes: 512 << 20,
+        }
+    }
 }
 
 /// What to do where a time step is over 1.5 or under 0.5 of the median step.
@@ -56,190 +75,72 @@ pub enum Gaps {
     Ignore,
 }
 
-/// Reads recordings; those of a directory in name order (numbers in names by value).
+/// Reads recordings; those of a directory in name order (numbers in names by value). All are held.
 ///
 /// # Errors
 /// When a file cannot be read, or holds what no sound recording can: [`RecordingError`].
 pub fn read(paths: &[PathBuf], options: &ReadOptions) -> Result<(Vec<Recording>, Report), RecordingError> {
+    let options = ReadOptions { hold_bytes: usize::MAX, ..options.clone() };
+    visit(paths, &options, &|recording| recording, &|_, _| {})
+}
+
+/// Reads recordings and shows each to `look`, then lets it go: no more files than there are threads are held at a
+/// time, from any of which `look` is called. The signals of a file longer than is to be held
+/// ([`ReadOptions::hold_bytes`]) are shown one by one, as recordings of the same name, no two at a time. What
+/// `look` returned is in the order of the files. `tell` is told how many files are done, and of how many, from 0 on.
+///
+/// # Errors
+/// When a file cannot be read, or holds what no sound recording can: [`RecordingError`].
+pub fn visit<T: Send>(
+    paths: &[PathBuf],
+    options: &ReadOptions,
+    look: &(dyn Fn(Recording) -> T + Sync),
+    tell: &dyn Fn(usize, usize),
+) -> Result<(Vec<T>, Report), RecordingError> {
     let files = files::expand(paths)?;
-    let outcomes: Vec<_> = files.par_iter().map(|file| read_file(&file.path, options)).collect();
-    let (mut recordings, mut report) = (Vec::new(), Report::default());
-    for (file, outcome) in files.iter().zip(outcomes) {
-        match outcome {
-            Err(RecordingError::NoChannels { .. }) if file.from_directory => {
-                let text = format!("{}: passed over, no column is a known one", file.path.display());
-                report.warnings.push(text);
+    let (mut looks, mut report) = (Vec::new(), Report::default());
+    tell(0, files.len());
+    let mut done = 0;
+    for some in files.chunks(rayon::current_num_threads().max(1)) {
+        let outcomes: Vec<_> = some.par_iter().map(|file| held(&file.path, options, look)).collect();
+        for (file, outcome) in some.iter().zip(outcomes) {
+            match outcome {
+                Err(RecordingError::NoChannels { .. }) if file.from_directory => {
+                    let text = format!("{}: passed over, no column is a known one", file.path.display());
+                    report.warnings.push(text);
+                }
+                outcome => {
+                    let (of_file, held, stored) = outcome?;
+                    looks.extend(held);
+                    for recording in stored.iter().flat_map(Prepared::signals) {
+                        looks.push(look(recording?));
+                    }
+                    report.files.push(of_file);
+                }
             }
-            outcome => {
-                let (pieces, of_file) = outcome?;
-                recordings.extend(pieces);
-                report.files.push(of_file);
-            }
+            done += 1;
+            tell(done, files.len());
         }
     }
-    checks::same_rate(&recordings)?;
-    if recordings.is_empty() {
+    checks::same_rate(&report.files)?;
+    if looks.is_empty() {
         let path = paths.first().map(|p| p.display().to_string()).unwrap_or_default();
         return Err(RecordingError::NoFiles { path });
     }
-    Ok((recordings, report))
+    Ok((looks, report))
 }
 
-fn read_file(path: &Path, options: &ReadOptions) -> Result<(Vec<Recording>, FileReport), RecordingError> {
-    let mut raw = load(path, options)?;
-    let mut report = FileReport::new(&raw);
-    let timing = timing::timing(&mut raw, options, &mut report)?;
-    raw.columns.retain(|c| matches!(c.role, Role::Signal { .. }));
-    checks::resolve_units(&mut raw, timing.rate_hz)?;
-    let pieces = pieces(&raw, &timing, options);
-    let needed = options.min_samples.max(2);
-    let longest = pieces.iter().map(|p| p.len()).max().unwrap_or(0);
-    if longest < needed && options.skip_s > 0.0 {
-        let seconds = raw.columns.first().map_or(0, |c| c.values.len()) as f64 / timing.rate_hz;
-        let (path, skip_s) = (raw.path, options.skip_s);
-        return Err(RecordingError::Skipped { path, skip_s, seconds, samples: longest, needed });
+/// What `look` made of a file that is held; or the file, if it is stored.
+fn held<T>(
+    path: &Path,
+    options: &ReadOptions,
+    look: &(dyn Fn(Recording) -> T + Sync),
+) -> Result<(FileReport, Vec<T>, Option<Prepared>), RecordingError> {
+    let (prepared, report) = Prepared::new(load(path, options)?, options)?;
+    if prepared.is_stored() {
+        return Ok((report, Vec::new(), Some(prepared)));
     }
-    if longest < needed {
-        return Err(RecordingError::TooShort { path: raw.path, samples: longest, needed });
-    }
-    let dropped = pieces.iter().filter(|p| p.len() < needed).count();
-    if dropped > 0 {
-        report.warn(format!("{dropped} stretches between gaps have fewer than {needed} samples: left out"));
-    }
-    let kept: Vec<_> = pieces.into_iter().filter(|p| p.len() >= needed).collect();
-    let recordings = cut(raw, &timing, &kept);
-    report.finish(&recordings);
-    checks::plausible(&recordings, &mut report)?;
-    Ok((recordings, report))
-}
-
-/// A file's columns as found, before anything is decided about time and units.
-#[derive(Debug)]
-pub(crate) struct Raw {
-    pub(crate) path: String,
-    pub(crate) columns: Vec<Column>,
-    /// Names of columns that mean nothing here.
-    pub(crate) ignored: Vec<String>,
-    /// Rate said in the head of the file (Hz).
-    pub(crate) head_rate_hz: Option<f64>,
-    pub(crate) lines: Lines,
-}
-
-/// A column with a meaning.
-#[derive(Debug)]
-pub(crate) struct Column {
-    pub(crate) name: String,
-    pub(crate) role: Role,
-    pub(crate) values: Vec<f64>,
-}
-
-/// Which line of the file each sample stands on.
-#[derive(Debug, Default)]
-pub(crate) struct Lines {
-    /// (sample from which on, line less sample index), where it changes.
-    shifts: Vec<(usize, u64)>,
-}
-
-impl Lines {
-    fn push(&mut self, sample: usize, line: u64) {
-        let shift = line.saturating_sub(sample as u64);
-        if self.shifts.last().is_none_or(|(_, s)| *s != shift) {
-            self.shifts.push((sample, shift));
-        }
-    }
-
-    /// Line of a sample (row, from 1, in a file without lines).
-    pub(crate) fn of(&self, sample: usize) -> u64 {
-        let before = self.shifts.partition_point(|(from, _)| *from <= sample);
-        sample as u64 + before.checked_sub(1).map_or(1, |i| self.shifts[i].1)
-    }
-}
-
-/// Beyond this a number is no measurement, and its square may be no number.
-const LARGEST: f64 = 1e100;
-
-/// Reads a file's columns.
-pub(crate) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, RecordingError> {
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) {
-        load_npy(path, options)
-    } else {
-        text::load(path, options)
-    }
-}
-
-fn load_npy(path: &Path, options: &ReadOptions) -> Result<Raw, RecordingError> {
-    let name = path.display().to_string();
-    let array = npy::read(path)?;
-    let names = match &options.columns {
-        Some(names) => names.clone(),
-        None => header::npy_order(array.columns.len())
-            .ok_or_else(|| RecordingError::NpyColumns { path: name.clone(), found: array.columns.len() })?,
-    };
-    if names.len() != array.columns.len() {
-        let (expected, found) = (names.len(), array.columns.len());
-        return Err(RecordingError::RowLength { path: name, line: 1, found, expected });
-    }
-    let layout = header::Layout::new(&names, false, options.channels.as_deref())
-        .map_err(|e| RecordingError::header(&name, 1, e))?;
-    let mut arrays: Vec<Option<Vec<f64>>> = array.columns.into_iter().map(Some).collect();
-    let take = |found: header::Found| {
-        let values = arrays[found.index].take().unwrap_or_default();
-        Column { name: found.name, role: found.role, values }
-    };
-    let (ignored, columns) = (layout.ignored, layout.found.into_iter().map(take).collect());
-    let raw = Raw { path: name, columns, ignored, head_rate_hz: None, lines: Lines::default() };
-    for column in &raw.columns {
-        if let Some(at) = column.values.iter().position(|v| v.is_nan() || v.abs() > LARGEST) {
-            let (line, column, value) = (raw.lines.of(at), column.name.clone(), column.values[at]);
-            let path = raw.path;
-            return Err(if value.is_finite() {
-                RecordingError::Absurd { path, line, column, value: format!("{value:e}") }
-            } else {
-                RecordingError::NotFinite { path, line, column, value: value.to_string() }
-            });
-        }
-    }
-    Ok(raw)
-}
-
-/// The stretches of samples that become recordings.
-fn pieces(raw: &Raw, timing: &Timing, options: &ReadOptions) -> Vec<std::ops::Range<usize>> {
-    let samples = raw.columns.first().map_or(0, |c| c.values.len());
-    let skip = ((options.skip_s.max(0.0) * timing.rate_hz).round() as usize).min(samples);
-    let inner = timing.breaks.iter().copied().filter(|b| *b > skip);
-    let ends: Vec<usize> = std::iter::once(skip).chain(inner).chain([samples]).collect();
-    ends.windows(2).map(|w| w[0]..w[1]).collect()
-}
-
-/// The recordings of a file, their means removed.
-fn cut(raw: Raw, timing: &Timing, pieces: &[std::ops::Range<usize>]) -> Vec<Recording> {
-    let whole = pieces.len() == 1;
-    let mut columns = raw.columns;
-    columns.sort_by_key(|c| c.channel().map(Channel::index));
-    let mut recordings: Vec<Recording> = (0..pieces.len())
-        .map(|i| {
-            let name = if whole { raw.path.clone() } else { format!("{}[{}]", raw.path, i + 1) };
-            Recording { name, rate_hz: timing.rate_hz, signals: Vec::new() }
-        })
-        .collect();
-    for column in columns {
-        let Some(channel) = column.channel() else { continue };
-        for (recording, piece) in recordings.iter_mut().zip(pieces) {
-            let mut samples = column.values[piece.clone()].to_vec();
-            let mean = checks::remove_mean(&mut samples);
-            recording.signals.push(Signal { channel, mean, samples });
-        }
-    }
-    recordings
-}
-
-impl Column {
-    fn channel(&self) -> Option<Channel> {
-        match self.role {
-            Role::Signal { channel, .. } => Some(channel),
-            _ => None,
-        }
-    }
+    Ok((report, prepared.recordings()?.into_iter().map(look).collect(), None))
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! What was found in the files, for the user to check.
 
 use super::header::{Role, Unit};
-use super::{Column, Raw};
-use crate::imu::{Channel, Recording, Sensor};
+use super::table::{Column, Raw};
+use crate::imu::{Channel, Sensor};
 use std::fmt;
 
 /// What was found and assumed while reading.
@@ -65,14 +65,6 @@ impl FileReport {
 
     pub(super) fn warn(&mut self, text: String) {
         self.warnings.push(text);
-    }
-
-    pub(super) fn finish(&mut self, recordings: &[Recording]) {
-        self.samples = recordings.iter().map(Recording::len).collect();
-        if let Some(first) = recordings.first() {
-            self.rate_hz = first.rate_hz;
-            self.means = first.signals.iter().map(|s| (s.channel, s.mean)).collect();
-        }
     }
 
     fn means_of(&self, sensor: Sensor) -> Option<String> {

@@ -1,4 +1,6 @@
 use super::*;
+use crate::data::npy;
+use crate::imu::Signal;
 use crate::units::{DEG, STANDARD_GRAVITY};
 use std::fs;
 use tempfile::TempDir;
@@ -414,14 +416,8 @@ mod garbage {
 
     fn parse(bytes: Vec<u8>) {
         let options = ReadOptions::default();
-        if let Ok(mut raw) = text::parse("a.csv", Box::new(Cursor::new(bytes)), &options) {
-            let mut report = FileReport::new(&raw);
-            if let Ok(timing) = timing::timing(&mut raw, &options, &mut report) {
-                raw.columns.retain(|c| matches!(c.role, Role::Signal { .. }));
-                let _ = checks::resolve_units(&mut raw, timing.rate_hz);
-                let pieces = pieces(&raw, &timing, &options);
-                cut(raw, &timing, &pieces);
-            }
+        if let Ok(raw) = text::parse("a.csv", Box::new(Cursor::new(bytes)), &options) {
+            let _ = Prepared::new(raw, &options).and_then(|(prepared, _)| prepared.recordings());
         }
     }
 
@@ -458,4 +454,39 @@ fn absurd_numbers_are_refused_with_their_place() {
         message.ends_with("a.csv, line 3: column \"gyro_x_rad_s\": 1e308 is beyond 1e100, no measurement"),
         "{message}"
     );
+}
+
+/// Files that wait on disk show the same signals as files that are held, one by one: a time column in ms, increments,
+/// units told from gravity, stretches between gaps, a warm-up; a gzipped table and arrays.
+#[test]
+fn what_is_not_held_reads_the_same() {
+    let g = [0.1, -0.05, 0.99];
+    let row = |k: usize, t: usize| {
+        let noise = |i: usize| 1e-3 * ((k * (i + 3)) % 11) as f64;
+        let (f, w): (Vec<_>, Vec<_>) = (0..3).map(|i| (g[i] + noise(i), 1e-4 * noise(i + 5))).unzip();
+        format!("{},{},{},{},{},{},{}", 10 * t, f[0], f[1], f[2], w[0], w[1], w[2])
+    };
+    let head = "t_ms,acc_x,acc_y,acc_z,dtheta_x_rad,dtheta_y_rad,dtheta_z_rad".to_owned();
+    let table = |gaps: bool| {
+        let at = |k: usize| k + if gaps && k > 9000 { 40 } else { 0 };
+        std::iter::once(head.clone()).chain((0..20_000).map(|k| row(k, at(k)))).collect::<Vec<_>>().join("\n")
+    };
+    let mut array = Vec::new();
+    npy::write_header(&mut array, 9000, 6).unwrap();
+    (0..54_000).for_each(|i| array.extend((f64::from(i % 13) * 1e-3).to_le_bytes()));
+    let files = Files::new();
+    let paths =
+        [files.add("a.csv", table(true)), files.add("b.csv", table(false)), files.add("c.npy", array)];
+    let options =
+        ReadOptions { gaps: Gaps::Split, skip_s: 1.5, rate_hz: Some(100.0), ..ReadOptions::default() };
+    let (held, report) = read(&paths, &options).unwrap();
+    assert_eq!(held.iter().map(Recording::len).collect::<Vec<_>>(), [8851, 10_999, 19_850, 8850]);
+    let on_disk = ReadOptions { hold_bytes: 0, ..options };
+    let (mut shown, same) = visit(&paths, &on_disk, &|r| r, &|_, _| {}).unwrap();
+    assert_eq!(same, report);
+    assert!(shown.iter().all(|r| r.signals.len() == 1) && shown.len() == 4 * 6);
+    for whole in &held {
+        let signals: Vec<Signal> = shown.drain(..6).flat_map(|r| r.signals).collect();
+        assert_eq!(signals, whole.signals);
+    }
 }

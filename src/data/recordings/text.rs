@@ -2,7 +2,9 @@
 
 use super::error::shown;
 use super::header::{Layout, Role, classify};
-use super::{Column, LARGEST, Lines, Raw, ReadOptions, RecordingError};
+use super::table::{BETWEEN, Column, LARGEST, Lines, Raw, relieve, settle};
+use super::values::Values;
+use super::{ReadOptions, RecordingError};
 use flate2::read::MultiGzDecoder;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Read};
@@ -36,18 +38,21 @@ pub(super) fn parse(name: &str, mut reader: Reader, options: &ReadOptions) -> Re
     let head = Head::read(name, &mut reader, options)?;
     let error = |e| RecordingError::header(name, head.line, e);
     let layout = Layout::new(&head.names, head.xsens, options.channels.as_deref()).map_err(error)?;
-    let column =
-        |f: super::header::Found| (f.index, Column { name: f.name, role: f.role, values: Vec::new() });
-    let mut columns: Vec<(usize, Column)> = layout.found.into_iter().map(column).collect();
-    let lines = read_rows(name, reader, &head, &mut columns)?;
-    if lines.shifts.is_empty() {
+    let (indices, mut columns) = layout.columns();
+    let lines = read_rows(name, reader, &head, &indices, &mut columns, options)?;
+    if lines.is_empty() {
         return Err(RecordingError::Empty { path: name.to_owned() });
     }
-    let mut columns: Vec<Column> = columns.into_iter().map(|(_, c)| c).collect();
-    columns.retain(|c| c.role != Role::Ticks || c.values.iter().all(|v| v.is_finite()));
-    columns.iter_mut().for_each(|c| c.values.shrink_to_fit());
+    let stored = |source| RecordingError::Storage { path: name.to_owned(), source };
+    settle(&mut columns, options).map_err(stored)?;
+    let mut kept = Vec::new();
+    for column in columns {
+        if column.role != Role::Ticks || all_finite(&column.values).map_err(stored)? {
+            kept.push(column);
+        }
+    }
     let head_rate_hz = head.rate_hz;
-    Ok(Raw { path: name.to_owned(), columns, ignored: layout.ignored, head_rate_hz, lines })
+    Ok(Raw { path: name.to_owned(), columns: kept, ignored: layout.ignored, head_rate_hz, lines })
 }
 
 /// What stands before the rows.
@@ -146,12 +151,21 @@ fn split(text: &str, delimiter: u8) -> Vec<String> {
     cells
 }
 
+/// Whether there is no NaN in a column.
+fn all_finite(values: &Values) -> std::io::Result<bool> {
+    let mut finite = true;
+    values.each_block(0..values.len(), |block| finite &= block.iter().all(|v| v.is_finite()))?;
+    Ok(finite)
+}
+
 /// Appends every row's values to their columns.
 fn read_rows(
     name: &str,
     reader: Reader,
     head: &Head,
-    columns: &mut [(usize, Column)],
+    indices: &[usize],
+    columns: &mut [Column],
+    options: &ReadOptions,
 ) -> Result<Lines, RecordingError> {
     let mut rows = csv::ReaderBuilder::new()
         .has_headers(false)
@@ -177,7 +191,11 @@ fn read_rows(
             }
             return Err(RecordingError::RowLength { path: name.to_owned(), line, found, expected });
         }
-        for (index, column) in columns.iter_mut() {
+        if sample % BETWEEN == 0 {
+            relieve(columns, options)
+                .map_err(|source| RecordingError::Storage { path: name.to_owned(), source })?;
+        }
+        for (index, column) in indices.iter().zip(columns.iter_mut()) {
             let cell = record.get(*index).unwrap_or_default();
             match number(cell) {
                 Some(value) if value.abs() <= LARGEST => column.values.push(value),

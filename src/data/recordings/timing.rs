@@ -1,7 +1,14 @@
 //! Sample rate, gaps and duplicates, from the time column or the packet counter.
 
 use super::header::Role;
-use super::{Column, FileReport, Gaps, Raw, ReadOptions, RecordingError};
+use super::table::{Column, Raw};
+use super::values::Values;
+use super::{FileReport, Gaps, ReadOptions, RecordingError};
+
+/// All numbers of a column.
+fn of_file(raw: &Raw, values: Values) -> Result<Vec<f64>, RecordingError> {
+    values.into_vec().map_err(|source| RecordingError::Storage { path: raw.path.clone(), source })
+}
 
 /// When the samples were taken.
 #[derive(Debug)]
@@ -32,12 +39,12 @@ pub(super) fn timing(
         (Some(time), ..) => Clock::of_time(time, raw, report)?,
         (None, Some(counter), _, Some(rate_hz)) => {
             let source = if options.rate_hz.is_some() { "given" } else { "head of the file" };
-            let mut clock = Clock::counting(counter, 65536.0, 1.0);
+            let mut clock = Clock::counting(counter, raw, 65536.0, 1.0)?;
             // The counter tells what was lost, not the rate: with a skip factor it counts by more than one.
             clock.unit_s = 1.0 / (rate_hz * median_step(&clock.since).max(1.0));
             Clock { source: format!("{source}, packet counter"), ..clock }
         }
-        (None, _, Some(ticks), _) => Clock::counting(ticks, 4_294_967_296.0, 1e-4),
+        (None, _, Some(ticks), _) => Clock::counting(ticks, raw, 4_294_967_296.0, 1e-4)?,
         (None, _, None, Some(rate_hz)) => {
             report.rate_from = if options.rate_hz.is_some() { "given" } else { "head of the file" }.into();
             return Ok(Timing { rate_hz, breaks: Vec::new() });
@@ -72,7 +79,7 @@ struct Clock {
 
 impl Clock {
     fn of_time(column: Column, raw: &Raw, report: &mut FileReport) -> Result<Self, RecordingError> {
-        let (name, mut since) = (column.name, column.values);
+        let (name, mut since) = (column.name, of_file(raw, column.values)?);
         let first = since.first().copied().unwrap_or(0.0);
         since.iter_mut().for_each(|t| *t -= first);
         let unit_s = match column.role {
@@ -92,8 +99,8 @@ impl Clock {
     }
 
     /// A counter that starts again at 0 when it reaches `modulus`.
-    fn counting(column: Column, modulus: f64, unit_s: f64) -> Self {
-        let mut since = column.values;
+    fn counting(column: Column, raw: &Raw, modulus: f64, unit_s: f64) -> Result<Self, RecordingError> {
+        let mut since = of_file(raw, column.values)?;
         let (mut last, mut total) = (since.first().copied().unwrap_or(0.0), 0.0);
         for value in &mut since {
             let step = *value - last;
@@ -102,7 +109,8 @@ impl Clock {
             total += if step < -0.5 * modulus { step + modulus } else { step };
             *value = total;
         }
-        Self { source: format!("column \"{}\"", column.name), name: column.name, start: 0.0, since, unit_s }
+        let source = format!("column \"{}\"", column.name);
+        Ok(Self { source, name: column.name, start: 0.0, since, unit_s })
     }
 
     fn time_of(&self, sample: usize) -> f64 {

@@ -1,0 +1,129 @@
+//! A file whose time, units and stretches are decided: what is left is to take its samples.
+
+use super::header::Role;
+use super::table::{Column, Raw};
+use super::timing::{self, Timing};
+use super::{FileReport, ReadOptions, RecordingError, checks};
+use crate::imu::{Channel, Recording, Signal};
+use std::ops::Range;
+
+/// What recordings are made of.
+pub(super) struct Prepared {
+    path: String,
+    rate_hz: f64,
+    /// The signals, as they stand in the file.
+    columns: Vec<Signals>,
+    /// The stretches of samples that become recordings.
+    pieces: Vec<Range<usize>>,
+}
+
+/// The signals of one column.
+struct Signals {
+    column: Column,
+    channel: Channel,
+    /// What brings it to SI units.
+    factor: f64,
+    /// Mean of each stretch (SI units).
+    means: Vec<f64>,
+}
+
+impl Prepared {
+    pub(super) fn new(mut raw: Raw, options: &ReadOptions) -> Result<(Self, FileReport), RecordingError> {
+        let mut report = FileReport::new(&raw);
+        let timing = timing::timing(&mut raw, options, &mut report)?;
+        raw.columns.retain(|c| matches!(c.role, Role::Signal { .. }));
+        raw.columns.sort_by_key(|c| c.channel().map(Channel::index));
+        let factors = checks::factors(&raw, timing.rate_hz)?;
+        let samples = raw.columns.first().map_or(0, |c| c.values.len());
+        let pieces = pieces(&raw.path, samples, &timing, options, &mut report)?;
+        let stored = |source| RecordingError::Storage { path: raw.path.clone(), source };
+        let mut columns = Vec::new();
+        for (column, factor) in raw.columns.into_iter().zip(factors) {
+            let Some(channel) = column.channel() else { continue };
+            let mean = |piece: &Range<usize>| checks::mean(&column.values, piece.clone(), factor);
+            let means = pieces.iter().map(mean).collect::<Result<_, _>>().map_err(stored)?;
+            columns.push(Signals { column, channel, factor, means });
+        }
+        let means_of = |i| columns.iter().map(|c| (c.channel, c.means[i])).collect::<Vec<_>>();
+        for i in 0..pieces.len() {
+            checks::plausible(&means_of(i), &mut report)?;
+        }
+        report.samples = pieces.iter().map(Range::len).collect();
+        report.rate_hz = timing.rate_hz;
+        report.means = means_of(0);
+        Ok((Self { path: raw.path, rate_hz: timing.rate_hz, columns, pieces }, report))
+    }
+
+    pub(super) fn is_stored(&self) -> bool {
+        self.columns.iter().any(|c| c.column.values.is_stored())
+    }
+
+    /// All recordings of the file.
+    pub(super) fn recordings(self) -> Result<Vec<Recording>, RecordingError> {
+        let mut recordings: Vec<Recording> = (0..self.pieces.len()).map(|i| self.recording(i)).collect();
+        for signals in self.columns {
+            let Signals { column, channel, factor, means } = signals;
+            let stretches = column.values.into_stretches(&self.pieces);
+            let stretches =
+                stretches.map_err(|source| RecordingError::Storage { path: self.path.clone(), source })?;
+            for ((recording, samples), mean) in recordings.iter_mut().zip(stretches).zip(means) {
+                recording.signals.push(signal(channel, samples, factor, mean));
+            }
+        }
+        Ok(recordings)
+    }
+
+    /// One signal at a time, as recordings: those of the first stretch, those of the next.
+    pub(super) fn signals(&self) -> impl Iterator<Item = Result<Recording, RecordingError>> {
+        let one = |(i, piece, signals): (usize, &Range<usize>, &Signals)| {
+            let samples = signals.column.values.stretch(piece.clone());
+            let samples =
+                samples.map_err(|source| RecordingError::Storage { path: self.path.clone(), source })?;
+            let signal = signal(signals.channel, samples, signals.factor, signals.means[i]);
+            Ok(Recording { signals: vec![signal], ..self.recording(i) })
+        };
+        let pieces = self.pieces.iter().enumerate();
+        pieces.flat_map(|(i, piece)| self.columns.iter().map(move |c| (i, piece, c))).map(one)
+    }
+
+    /// A recording without its signals.
+    fn recording(&self, piece: usize) -> Recording {
+        let whole = self.pieces.len() == 1;
+        let name = if whole { self.path.clone() } else { format!("{}[{}]", self.path, piece + 1) };
+        Recording { name, rate_hz: self.rate_hz, signals: Vec::new() }
+    }
+}
+
+/// A signal in SI units without its mean.
+fn signal(channel: Channel, mut samples: Vec<f64>, factor: f64, mean: f64) -> Signal {
+    samples.iter_mut().for_each(|v| *v = *v * factor - mean);
+    Signal { channel, mean, samples }
+}
+
+/// The stretches of samples that become recordings: at least one.
+fn pieces(
+    path: &str,
+    samples: usize,
+    timing: &Timing,
+    options: &ReadOptions,
+    report: &mut FileReport,
+) -> Result<Vec<Range<usize>>, RecordingError> {
+    let skip = ((options.skip_s.max(0.0) * timing.rate_hz).round() as usize).min(samples);
+    let inner = timing.breaks.iter().copied().filter(|b| *b > skip);
+    let ends: Vec<usize> = std::iter::once(skip).chain(inner).chain([samples]).collect();
+    let all = || ends.windows(2).map(|w| w[0]..w[1]);
+    let needed = options.min_samples.max(2);
+    let longest = all().map(|p| p.len()).max().unwrap_or(0);
+    if longest < needed && options.skip_s > 0.0 {
+        let (path, skip_s, seconds) = (path.to_owned(), options.skip_s, samples as f64 / timing.rate_hz);
+        return Err(RecordingError::Skipped { path, skip_s, seconds, samples: longest, needed });
+    }
+    if longest < needed {
+        return Err(RecordingError::TooShort { path: path.to_owned(), samples: longest, needed });
+    }
+    let dropped = all().filter(|p| p.len() < needed).count();
+    if dropped > 0 {
+        report.warn(format!("{dropped} stretches between gaps have fewer than {needed} samples: left out"));
+    }
+    Ok(all().filter(|p| p.len() >= needed).collect())
+}
