@@ -348,7 +348,7 @@ fn bad_requests_are_refused_with_a_hint() {
     check(calibrate(&["--model", "2*WN"], 2), &["2 WN are one WN"]);
     check(
         calibrate(&["--trim", "2"], 2),
-        &["gyro: trimming 2 replicates at each end needs at least 5 replicates; there are 4", "hint:"],
+        &["gyro, dr-awv: trimming 2 replicates at each end needs at least 5 replicates; there are 4", "hint:"],
     );
     check(calibrate(&["--trim", "60%"], 2), &["--trim", "a percentage under 50"]);
     check(calibrate(&["--efficiency", "1.5"], 2), &["--efficiency: efficiency 1.5 is out of range"]);
