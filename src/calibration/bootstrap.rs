@@ -1,19 +1,25 @@
 //! New curves from a fit: the parametric bootstrap behind intervals, goodness of fit and full weighting.
 //!
-//! Each draw makes K new replicates: ln nu* of replicate i at level j is ln nu_j of the fitted model, plus a
-//! difference *between* replicates (Gaussian, with the excess variance the recorded replicates show at that level
-//! and their correlations between levels; a Student tail for the few they are), plus the scatter *within* a
-//! recording (chi-square, from the large-sample law of the model's own wavelet variance and the length of the
-//! recording; divided by the efficiency where robust). The estimator is applied to the new replicates, trim and
-//! all. No signal is simulated. A curve from elsewhere scatters by its own degrees of freedom.
+//! Each draw makes K new replicates. Their ln nu at all levels have the variances and the correlations that the
+//! recorded ones show (Gaussian scores; chi-square in shape, so that the mean of nu is that of the fitted model): what
+//! replicates differ by and the scatter within each are in these together, so that nothing is assumed of either, and what
+//! few replicates leave unknown is Student's t ([`Spread::student`]). The draws for full weighting, which needs more
+//! than the rank of K replicates, and those of a single recording have the scatter *within* a recording of the
+//! large-sample law (of the model's own wavelet variance and the length; divided by the efficiency where robust) and,
+//! *between* replicates, the excess over it. Robust variances of few coefficients read high, in a draw as in a recording.
+//! The estimator is applied to the new replicates, trim and all. No signal is simulated. A curve from elsewhere
+//! scatters by its own degrees of freedom.
 
 use super::average::{Replicate, average};
 use super::pipeline::{Outcome, Settings};
 use super::sampling::SamplingLaw;
 use super::spread::Spread;
-use crate::rng::StreamKey;
+use crate::rng::{Generator, StreamKey};
 use crate::wavelet::{Curve, RobustVariance, Status};
 use nalgebra::DMatrix;
+
+/// The bias of a robust variance is not known to grow beyond this: its expansion ends with two degrees of freedom.
+const LARGEST_BIAS: f64 = 0.2;
 
 /// Draws curves as the fitted model and the spread of the replicates would give them.
 pub(super) struct CurveSampler<'a> {
@@ -24,8 +30,8 @@ pub(super) struct CurveSampler<'a> {
     pub(super) spread: Option<Spread>,
     /// Wavelet variance of the model, of each level of the curve.
     centre: Vec<f64>,
-    /// Whether what replicates differ by has the tails of how little is known of it.
-    heavy_tails: bool,
+    /// Of a robust variance ([`Tuning::bias`](crate::wavelet::Tuning::bias)).
+    bias_times_edof: f64,
 }
 
 impl<'a> CurveSampler<'a> {
@@ -37,12 +43,7 @@ impl<'a> CurveSampler<'a> {
         let spread =
             (!replicates.is_empty()).then(|| Spread::new(replicates, outcome.estimator, &law, efficiency));
         let centre = outcome.curve.levels.iter().map(|level| model.haar_wv(*level)).collect();
-        Self { replicates, outcome, law, spread, centre, heavy_tails: true }
-    }
-
-    /// The same, replicates differing by Gaussian numbers: their curves have a covariance.
-    pub(super) fn gaussian(self) -> Self {
-        Self { heavy_tails: false, ..self }
+        Self { replicates, outcome, law, spread, centre, bias_times_edof: settings.tuning.bias() }
     }
 
     /// Covariance of curves, relative to that of the model.
@@ -63,28 +64,60 @@ impl<'a> CurveSampler<'a> {
         DMatrix::from_fn(levels, levels, product)
     }
 
-    /// A new curve of the same estimator.
+    /// A new curve of the same estimator, of replicates that scatter as the recorded ones do.
+    pub(super) fn draw_as_recorded(&self, key: &StreamKey<'_>, settings: &Settings) -> Option<Curve> {
+        match &self.spread {
+            Some(spread) if self.replicates.len() > 1 => {
+                self.curve(spread.draw(&mut key.generator()), settings)
+            }
+            _ => self.draw(key, settings),
+        }
+    }
+
+    /// A new curve of the same estimator, of replicates that scatter by the law and by what they differ beyond it.
     pub(super) fn draw(&self, key: &StreamKey<'_>, settings: &Settings) -> Option<Curve> {
         let mut generator = key.generator();
-        let Some(spread) = &self.spread else {
-            let curve = &self.outcome.curve;
-            // The law knows all levels from 1; the curve may have some of them.
-            let mut edof = vec![1.0; self.law.correlation.nrows()];
-            curve.levels.iter().zip(&curve.edof).for_each(|(l, e)| edof[*l as usize - 1] = *e);
-            let ratio = self.law.draw(&edof, &mut generator);
-            let wv = curve.levels.iter().zip(&self.centre).map(|(l, nu)| nu * ratio[*l as usize - 1]);
-            return Some(Curve { wv: wv.collect(), ..curve.clone() });
+        match &self.spread {
+            Some(spread) => self.curve(self.random_effects(spread, &mut generator), settings),
+            None => Some(self.elsewhere(&mut generator)),
+        }
+    }
+
+    /// nu*/nu of new replicates: what they differ by, and the scatter of each.
+    fn random_effects(&self, spread: &Spread, generator: &mut Generator) -> Vec<Vec<f64>> {
+        let between = spread.draw_between(generator);
+        let with = |(edof, between): (&Vec<f64>, Vec<f64>)| {
+            let within = self.law.draw(edof, generator);
+            within.into_iter().zip(between).map(|(ratio, b)| ratio * b.exp()).collect()
         };
-        let between = spread.draw_between(self.heavy_tails, &mut generator);
-        let drawn = self.replicates.iter().zip(&spread.edof).zip(&between);
-        let replicates: Vec<Replicate> = drawn
-            .map(|((replicate, edof), between)| {
-                let ratios = self.law.draw(edof, &mut generator);
-                let nu = self.centre.iter().zip(ratios).zip(between).map(|((nu, r), b)| nu * r * b.exp());
-                like(replicate, nu.collect())
-            })
-            .collect();
+        spread.edof.iter().zip(between).map(with).collect()
+    }
+
+    /// The estimator's curve of replicates of which nu*/nu is given.
+    fn curve(&self, ratios: Vec<Vec<f64>>, settings: &Settings) -> Option<Curve> {
+        let edof = self.spread.iter().flat_map(|s| &s.edof);
+        let of = |((replicate, ratios), edof): ((&Replicate, Vec<f64>), &Vec<f64>)| {
+            let levels = self.centre.iter().zip(ratios).zip(edof);
+            like(replicate, levels.map(|((nu, ratio), edof)| nu * ratio * (1.0 + self.bias(*edof))).collect())
+        };
+        let replicates: Vec<Replicate> = self.replicates.iter().zip(ratios).zip(edof).map(of).collect();
         average(&replicates, self.outcome.estimator, settings.trim, settings.tuning.efficiency()).ok()
+    }
+
+    /// By how much a robust variance of so many degrees of freedom reads high.
+    fn bias(&self, edof: f64) -> f64 {
+        if self.outcome.estimator.is_robust() { (self.bias_times_edof / edof).min(LARGEST_BIAS) } else { 0.0 }
+    }
+
+    /// A curve from elsewhere, which scatters by its degrees of freedom.
+    fn elsewhere(&self, generator: &mut Generator) -> Curve {
+        let curve = &self.outcome.curve;
+        // The law knows all levels from 1; the curve may have some of them.
+        let mut edof = vec![1.0; self.law.correlation.nrows()];
+        curve.levels.iter().zip(&curve.edof).for_each(|(l, e)| edof[*l as usize - 1] = *e);
+        let ratio = self.law.draw(&edof, generator);
+        let wv = curve.levels.iter().zip(&self.centre).map(|(l, nu)| nu * ratio[*l as usize - 1]);
+        Curve { wv: wv.collect(), ..curve.clone() }
     }
 }
 

@@ -2,8 +2,8 @@
 //!
 //! A parametric bootstrap ([`super::bootstrap`]): the model is fitted to each curve drawn.
 //!
-//! Where replicates differ the J-test is conservative: their residuals, which give the correlations between scales,
-//! have the noise in them.
+//! Intervals of two replicates, known to one degree of freedom at every scale, cover less than they say (87 and 93 % of
+//! 300 sets, white noise and random walk); of three and more 93 to 96 %.
 
 use super::average::Estimator;
 use super::bootstrap::CurveSampler;
@@ -60,7 +60,7 @@ fn inference(group: &Group, outcome: &Outcome, settings: &Settings, bootstrap: B
             source: &name,
             process: outcome.estimator.name(),
         };
-        let curve = sampler.draw(&key, settings)?;
+        let curve = sampler.draw_as_recorded(&key, settings)?;
         estimate_again(&curve, outcome, settings).ok()
     };
     let fits: Vec<Fit> = (0..bootstrap.draws).into_par_iter().filter_map(draw).collect();
@@ -72,7 +72,7 @@ fn inference(group: &Group, outcome: &Outcome, settings: &Settings, bootstrap: B
     Inference {
         draws: bootstrap.draws,
         fitted: fits.len(),
-        intervals: intervals(outcome, &fits),
+        intervals: intervals(outcome, &fits, spread.map_or(1.0, Spread::student)),
         goodness: (outcome.estimator != Estimator::Avlr)
             .then(|| goodness(&outcome.fit, &outcome.spec, &fits)),
         spread: spread.map_or(Vec::new(), rows),
@@ -137,7 +137,7 @@ mod tests {
         outcomes.remove(0)
     }
 
-    /// 150 sets of 4 signals: a frequency that is really 0.95 lies within 4·√(0.95·0.05/150) = 0.071 of it; the
+    /// 150 sets of 3, 4 and 8 signals: a frequency that is really 0.95 lies within 4·√(0.95·0.05/150) = 0.071 of it; the
     /// test rejects in 5 % of them, within the same.
     #[test]
     fn intervals_cover_and_the_j_test_keeps_its_level() {
@@ -145,21 +145,27 @@ mod tests {
         let settings = settings("WN+RW");
         let truth =
             [Process::White(White::new(1.0).unwrap()), Process::RandomWalk(RandomWalk::new(1e-3).unwrap())];
-        let mut covered = [0_u32; 2];
-        let mut rejected = 0_u32;
-        for set in 0..SETS {
-            let inference = inferred(group(set, &[(1.0, 1e-3); 4]), &settings, 99).inference.unwrap();
-            for (i, process) in truth.iter().enumerate() {
-                let value = process.parameters()[0].1;
-                let interval = &inference.intervals[i];
-                covered[i] += u32::from(interval.low < value && value < interval.high);
+        for replicates in [3, 4, 8] {
+            let mut covered = [0_u32; 2];
+            let mut rejected = 0_u32;
+            for set in 0..SETS {
+                let group = group(set, &vec![(1.0, 1e-3); replicates]);
+                let inference = inferred(group, &settings, 99).inference.unwrap();
+                for (i, process) in truth.iter().enumerate() {
+                    let value = process.parameters()[0].1;
+                    let interval = &inference.intervals[i];
+                    covered[i] += u32::from(interval.low < value && value < interval.high);
+                }
+                rejected += u32::from(inference.goodness.unwrap().p_value <= 0.05);
             }
-            rejected += u32::from(inference.goodness.unwrap().p_value <= 0.05);
+            let share = |n: u32| f64::from(n) / SETS as f64;
+            let shown = (share(covered[0]), share(covered[1]), share(rejected));
+            assert!(
+                (shown.0 - 0.95).abs() < 0.071 && (shown.1 - 0.95).abs() < 0.071,
+                "{replicates}: {shown:?}"
+            );
+            assert!((shown.2 - 0.05).abs() < 0.071, "{replicates}: {shown:?}");
         }
-        let share = |n: u32| f64::from(n) / SETS as f64;
-        let shown = (share(covered[0]), share(covered[1]), share(rejected));
-        assert!((shown.0 - 0.95).abs() < 0.071 && (shown.1 - 0.95).abs() < 0.071, "{shown:?}");
-        assert!((shown.2 - 0.05).abs() < 0.071, "{shown:?}");
     }
 
     /// sigma2 of 8 replicates with variances 0.8 … 1.22: their standard deviation over √8 is the spread of the

@@ -42,8 +42,9 @@ impl ParameterInterval {
     }
 }
 
-/// The intervals of all parameters that are not fixed, in the order of the model.
-pub(super) fn intervals(outcome: &Outcome, fits: &[Fit]) -> Vec<ParameterInterval> {
+/// The intervals of all parameters that are not fixed, in the order of the model. `stretch`: Student's quantile over
+/// the normal one, where the draws' own spread is known from few replicates.
+pub(super) fn intervals(outcome: &Outcome, fits: &[Fit], stretch: f64) -> Vec<ParameterInterval> {
     let (model, spec) = (&outcome.fit.composite, &outcome.spec);
     let zero = &outcome.fit.zero;
     let matched: Vec<Vec<Option<&Process>>> =
@@ -60,7 +61,7 @@ pub(super) fn intervals(outcome: &Outcome, fits: &[Fit]) -> Vec<ParameterInterva
             let [low, high] = match lost {
                 // The quantile is that of what has vanished.
                 lost if lost > TAIL => [f64::NAN; 2],
-                _ => holding(value, interval(parameter, value, drawn)),
+                _ => holding(value, interval(parameter, value, drawn, stretch)),
             };
             intervals.push(ParameterInterval { process: label.clone(), parameter, low, high, lost });
         }
@@ -133,7 +134,7 @@ fn log_time(process: &Process) -> f64 {
 /// is a chi-square; the same as the quantiles themselves where the draws are symmetric in the logarithm); theta
 /// of MA1 likewise with differences. It takes no skewness of the draws, which have heavy tails. Where the
 /// estimate or a quantile is at the bound, 0, the ends are the quantiles themselves.
-fn interval(parameter: &str, estimate: f64, drawn: Vec<f64>) -> [f64; 2] {
+fn interval(parameter: &str, estimate: f64, drawn: Vec<f64>, stretch: f64) -> [f64; 2] {
     let scale = |value: f64| match parameter {
         "phi" => (-value.ln()).ln(),
         "theta" => value,
@@ -147,7 +148,8 @@ fn interval(parameter: &str, estimate: f64, drawn: Vec<f64>) -> [f64; 2] {
     let mut sorted = drawn;
     sorted.sort_by(f64::total_cmp);
     let quantiles = [TAIL, 1.0 - TAIL].map(|p| quantile(&sorted, p));
-    let mut ends = quantiles.map(|q| back(2.0 * scale(estimate) - scale(q)));
+    let middle = scale(quantile(&sorted, 0.5));
+    let mut ends = quantiles.map(|q| back(2.0 * scale(estimate) - middle - stretch * (scale(q) - middle)));
     ends.sort_by(f64::total_cmp);
     if ends.iter().all(|e| e.is_finite()) && scale(estimate).is_finite() { ends } else { quantiles }
 }
@@ -202,9 +204,9 @@ mod tests {
             let whole = (0..100 - lost_ones).map(|i| whole(0.8 + 0.4 * i as f64 / 99.0));
             whole.chain((0..lost_ones).map(|_| lost.clone())).collect()
         };
-        let all = intervals(&outcome, &draws(2));
+        let all = intervals(&outcome, &draws(2), 1.0);
         assert!(all.iter().all(|i| i.undetermined().is_none()), "{all:?}");
-        let all = intervals(&outcome, &draws(10));
+        let all = intervals(&outcome, &draws(10), 1.0);
         let text = all[0].undetermined().unwrap();
         assert_eq!(text, "AR1_1 phi: no interval, not determined: AR1_1 vanishes in 10 % of the draws");
         assert!(
@@ -227,13 +229,13 @@ mod tests {
         let mut generator = StreamKey { seed: 1, scenario: "", run: 0, source: "", process: "" }.generator();
         let law = ChiSquared::new(8.0).unwrap();
         let drawn = (0..4000).map(|_| 3.0 * generator.sample(law) / 8.0).collect();
-        let [low, high] = interval("sigma2", 3.0, drawn);
+        let [low, high] = interval("sigma2", 3.0, drawn, 1.0);
         assert!(
             (low / (24.0 / 17.53) - 1.0).abs() < 0.064 && (high / (24.0 / 2.18) - 1.0).abs() < 0.125,
             "{low} {high}"
         );
-        assert_eq!(interval("sigma2", 0.0, vec![0.0, 0.0, 1.0]), [0.0, 1.0]);
-        let [low, high] = interval("phi", 0.9, vec![0.85, 0.9, 0.93]);
+        assert_eq!(interval("sigma2", 0.0, vec![0.0, 0.0, 1.0], 1.0), [0.0, 1.0]);
+        let [low, high] = interval("phi", 0.9, vec![0.85, 0.9, 0.93], 1.0);
         assert!(0.0 < low && low < 0.9 && 0.9 < high && high < 1.0, "{low} {high}");
     }
 }

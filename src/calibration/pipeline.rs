@@ -200,7 +200,7 @@ fn weigh_fully(group: &Group, outcome: &mut Outcome, settings: &Settings) -> Res
     if group.replicates.is_empty() {
         return Ok(());
     }
-    let sampler = CurveSampler::new(&group.replicates, outcome, settings).gaussian();
+    let sampler = CurveSampler::new(&group.replicates, outcome, settings);
     let covariance = sampler.covariance(DRAWS, &group.name(), settings);
     outcome.fit = fit_with_covariance(&outcome.curve, &outcome.spec, settings.rate_hz, &covariance)?;
     Ok(())

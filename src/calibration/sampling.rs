@@ -65,7 +65,7 @@ impl SamplingLaw {
 }
 
 /// A chi-square variable over its degrees of freedom whose normal score is z (Wilson and Hilferty).
-fn chi_square_ratio(z: f64, edof: f64) -> f64 {
+pub(super) fn chi_square_ratio(z: f64, edof: f64) -> f64 {
     let variance = 2.0 / (9.0 * edof);
     (1.0 - variance + z * variance.sqrt()).max(0.02).powi(3)
 }

@@ -82,6 +82,14 @@ impl Tuning {
         1.0 - self.a / mean_chi(low)
     }
 
+    /// How far the variance of few Gaussian coefficients reads high in the mean, relative, times its degrees of
+    /// freedom: 0.295 at efficiency 0.6, 0 for the classical variance. To second order in the estimating equation it is
+    /// 1 + 2 cov(chi, chi')/var chi − E chi''/E chi', derivatives with respect to ln s of chi(W/√s).
+    #[must_use]
+    pub fn bias(&self) -> f64 {
+        Moments::new(self.c).bias()
+    }
+
     /// True efficiency at the Gaussian model, whatever the convention says it is.
     #[must_use]
     pub const fn efficiency(&self) -> f64 {
@@ -119,6 +127,16 @@ impl Moments {
 
     fn chi(&self) -> f64 {
         self.bump(1, 4)
+    }
+
+    fn bias(&self) -> f64 {
+        let c2 = self.c * self.c;
+        // chi = r² y⁴, chi' = −r² y⁴ + 4 r⁴ y³/c², chi'' = r² y⁴ − 12 r⁴ y³/c² + 12 r⁶ y²/c⁴ with y = 1 − r²/c².
+        let first = 4.0 * self.bump(2, 3) / c2 - self.chi();
+        let second = self.chi() - 12.0 * self.bump(2, 3) / c2 + 12.0 * self.bump(3, 2) / (c2 * c2);
+        let variance = self.bump(2, 8) - self.chi() * self.chi();
+        let covariance = 4.0 * self.bump(3, 7) / c2 - self.bump(2, 8) - self.chi() * first;
+        1.0 + 2.0 * covariance / variance - second / first
     }
 
     fn efficiency(&self, convention: Convention) -> f64 {

@@ -174,7 +174,7 @@ impl Field<'_> {
         let (spec, fit) = &self.fits[i];
         let outcome =
             Outcome::bare(self.index, self.estimator, self.curve.clone(), spec.clone(), fit.clone());
-        let sampler = CurveSampler::new(&self.group.replicates, &outcome, self.settings).gaussian();
+        let sampler = CurveSampler::new(&self.group.replicates, &outcome, self.settings);
         let (name, process) = (self.group.name(), self.estimator.name());
         let draw = |run: usize| {
             let key = StreamKey { seed: SEED, scenario: "auto", run: run as u64, source: &name, process };
