@@ -147,6 +147,39 @@ fn a_curve_written_is_a_curve_read() {
     assert_eq!(first["fits"][1]["axis"], "y");
 }
 
+/// The file of `wv` is a curve file: its classical curves are GMWM's, the robust ones RGMWM's.
+#[test]
+fn the_curves_of_wv_give_the_fits_of_their_recording() {
+    let dir = tempfile::tempdir().unwrap();
+    recordings(dir.path(), 2);
+    json(dir.path(), &["wv", "runs/run1.csv", "-o", "one.wv.json"]);
+    let direct = json(
+        dir.path(),
+        &["calibrate", "runs/run1.csv", "--estimator", "all", "--model", "N1", "-o", "m.toml"],
+    );
+    let fits = json(dir.path(), &["calibrate", "--curve", "one.wv.json", "--model", "N1"]);
+    let sorted = |out: &Value| {
+        let key = |f: &Value| (f["estimator"].to_string(), f["axis"].to_string());
+        let mut fits: Vec<_> = out["fits"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|f| (key(f), f["objective"].as_f64().unwrap()))
+            .collect();
+        fits.sort_by(|a, b| a.0.cmp(&b.0));
+        fits
+    };
+    let (direct, fits) = (sorted(&direct), sorted(&fits));
+    assert_eq!(direct.len(), 4);
+    for (a, b) in direct.iter().zip(&fits) {
+        assert!(a.0 == b.0 && (a.1 / b.1 - 1.0).abs() < 1e-9, "{a:?} {b:?}");
+    }
+    json(dir.path(), &["check", "one.wv.json"]);
+    json(dir.path(), &["wv", "runs", "-o", "two.wv.json"]);
+    let stderr = refusal(dir.path(), &["calibrate", "--curve", "two.wv.json", "--model", "N1"], 2);
+    assert!(stderr.contains("two.wv.json: there are two curves of gyro.x for gmwm"), "{stderr}");
+}
+
 #[test]
 fn a_table_of_exact_values_gives_back_its_parameters() {
     let dir = tempfile::tempdir().unwrap();
@@ -348,7 +381,10 @@ fn bad_requests_are_refused_with_a_hint() {
     check(calibrate(&["--model", "2*WN"], 2), &["2 WN are one WN"]);
     check(
         calibrate(&["--trim", "2"], 2),
-        &["gyro, dr-awv: trimming 2 replicates at each end needs at least 5 replicates; there are 4", "hint:"],
+        &[
+            "gyro, dr-awv: trimming 2 replicates at each end needs at least 5 replicates; there are 4",
+            "hint:",
+        ],
     );
     check(calibrate(&["--trim", "60%"], 2), &["--trim", "a percentage under 50"]);
     check(calibrate(&["--efficiency", "1.5"], 2), &["--efficiency: efficiency 1.5 is out of range"]);

@@ -1,8 +1,8 @@
-//! Wavelet-variance curves to fit: CSV with columns `tau_samples,wv,edof`, or the JSON that `calibrate`
-//! writes.
+//! Wavelet-variance curves to fit: CSV with columns `tau_samples,wv,edof`, or the JSON that `calibrate` or `wv`
+//! writes (the classical curve of a signal is GMWM's, the robust one RGMWM's).
 
 use crate::imu::{Axis, Sensor};
-use crate::report::CurvesFile;
+use crate::report::{CurvesFile, SignalsFile};
 use crate::wavelet::Curve;
 use std::io::ErrorKind;
 use std::path::Path;
@@ -105,7 +105,7 @@ impl CurveError {
             Self::Io { source, .. } if source.kind() != ErrorKind::InvalidData => None,
             _ => Some(
                 "a curve is a CSV with the columns tau_samples,wv,edof (tau_samples = 2, 4, 8, …), or a .wv.json \
-                 written by calibrate"
+                 written by calibrate or wv"
                     .into(),
             ),
         }
@@ -163,12 +163,23 @@ fn csv(path: &str, text: &str) -> Result<NamedCurve, CurveError> {
     Ok(NamedCurve { sensor: None, axis: None, rate_hz: None, estimator: None, curve })
 }
 
+/// What tells the file of `wv` from that of `calibrate`.
+#[derive(serde::Deserialize)]
+struct Kind {
+    signals: Option<serde::de::IgnoredAny>,
+}
+
 fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, CurveError> {
-    let file: CurvesFile = serde_json::from_str(text).map_err(|e| CurveError::Syntax {
+    let syntax = |e: serde_json::Error| CurveError::Syntax {
         path: path.to_owned(),
         line: e.line() as u64,
         message: e.to_string(),
-    })?;
+    };
+    let Kind { signals } = serde_json::from_str(text).map_err(syntax)?;
+    let file = match signals {
+        Some(_) => CurvesFile::from(serde_json::from_str::<SignalsFile>(text).map_err(syntax)?),
+        None => serde_json::from_str(text).map_err(syntax)?,
+    };
     let refuse = |place: &str, column, value: &str, expected| CurveError::Value {
         path: path.to_owned(),
         place: place.to_owned(),

@@ -6,8 +6,7 @@
 //! [`Real`]: the Earth model for a scalar (trajectories), strapdown and covariance for any width.
 //!
 //! `[f64; 8]` alone is not enough: LLVM takes it apart into eight scalars and finds its way back to vector
-//! instructions only in part, with a quarter of them shuffles (seen in the profile; five times slower
-//! and ten times the code).
+//! instructions only in part, with shuffles between (seen in the profile).
 
 mod elementary;
 mod space;

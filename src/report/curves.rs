@@ -1,6 +1,6 @@
 //! Wavelet-variance curves as JSON: of signals (`wv`), and of fits (`<model>.wv.json`).
 
-use crate::calibration::{Group, Outcome, Replicate, Settings};
+use crate::calibration::{Estimator, Group, Outcome, Replicate, Settings};
 use crate::imu::Channel;
 use crate::wavelet::{Tuning, interval};
 use serde::{Deserialize, Serialize};
@@ -12,7 +12,7 @@ const SCHEMA_VERSION: u32 = 1;
 pub const CONFIDENCE: f64 = 0.95;
 
 /// A wavelet variance with its intervals.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Band {
     /// Wavelet variance (units²).
     pub wv: Vec<f64>,
@@ -21,12 +21,12 @@ pub struct Band {
     /// Upper ends.
     pub ci_high: Vec<f64>,
     /// How each robust variance came about.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub status: Vec<&'static str>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub status: Vec<String>,
 }
 
 impl Band {
-    fn new(wv: Vec<f64>, edof: &[f64], status: Vec<&'static str>) -> Self {
+    fn new(wv: Vec<f64>, edof: &[f64], status: Vec<String>) -> Self {
         let ends = |(nu, edof): (&f64, &f64)| interval::interval(*nu, *edof, CONFIDENCE);
         let (ci_low, ci_high) = wv.iter().zip(edof).map(ends).unzip();
         Self { wv, ci_low, ci_high, status }
@@ -34,14 +34,14 @@ impl Band {
 }
 
 /// The wavelet variances of one signal.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SignalCurves {
     /// Recording.
     pub file: String,
     /// `accel` or `gyro`.
-    pub sensor: &'static str,
+    pub sensor: String,
     /// `x`, `y` or `z`.
-    pub axis: &'static str,
+    pub axis: String,
     /// Samples.
     pub samples: usize,
     /// Scales, 2^j samples (s).
@@ -65,11 +65,11 @@ impl SignalCurves {
         efficiency: f64,
     ) -> Self {
         let robust_edof: Vec<f64> = edof.iter().map(|e| interval::edof_robust(*e, efficiency)).collect();
-        let (values, status) = replicate.robust.iter().map(|r| (r.value, r.status.name())).unzip();
+        let (values, status) = replicate.robust.iter().map(|r| (r.value, r.status.name().to_owned())).unzip();
         Self {
             file: replicate.name.clone(),
-            sensor: channel.sensor.name(),
-            axis: channel.axis.name(),
+            sensor: channel.sensor.name().to_owned(),
+            axis: channel.axis.name().to_owned(),
             samples: replicate.samples,
             tau_s: (1..=edof.len() as u32).map(|j| tau_s(j, rate_hz)).collect(),
             classical: Band::new(replicate.classical.clone(), &edof, Vec::new()),
@@ -85,7 +85,7 @@ pub(super) fn tau_s(level: u32, rate_hz: f64) -> f64 {
 }
 
 /// What `wv` prints.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SignalsFile {
     /// Layout version.
     pub schema_version: u32,
@@ -94,7 +94,7 @@ pub struct SignalsFile {
     /// Efficiency of the robust variance; its degrees of freedom are edof times this.
     pub efficiency: f64,
     /// Where the degrees of freedom are from: `eta3` or `large-sample`.
-    pub edof_method: &'static str,
+    pub edof_method: String,
     /// Confidence of the intervals.
     pub confidence: f64,
     /// One entry a signal.
@@ -104,20 +104,39 @@ pub struct SignalsFile {
 impl SignalsFile {
     /// The file of some signals.
     #[must_use]
-    pub const fn new(
-        rate_hz: f64,
-        efficiency: f64,
-        edof_method: &'static str,
-        signals: Vec<SignalCurves>,
-    ) -> Self {
+    pub fn new(rate_hz: f64, efficiency: f64, edof_method: &str, signals: Vec<SignalCurves>) -> Self {
         Self {
             schema_version: SCHEMA_VERSION,
             rate_hz,
             efficiency,
-            edof_method,
+            edof_method: edof_method.to_owned(),
             confidence: CONFIDENCE,
             signals,
         }
+    }
+}
+
+impl From<SignalsFile> for CurvesFile {
+    /// The classical variance of each signal as the curve of GMWM, the robust one as that of RGMWM.
+    fn from(file: SignalsFile) -> Self {
+        let efficiency = file.efficiency;
+        let curves = file.signals.into_iter().flat_map(|s| {
+            let robust_edof = s.edof.iter().map(|e| interval::edof_robust(*e, efficiency)).collect();
+            let of = |estimator: Estimator, wv: Vec<f64>, edof: Vec<f64>| FittedCurve {
+                sensor: s.sensor.clone(),
+                axis: s.axis.clone(),
+                estimator: estimator.name().to_owned(),
+                tau_s: s.tau_s.clone(),
+                wv,
+                edof,
+                ..FittedCurve::default()
+            };
+            [
+                of(Estimator::Gmwm, s.classical.wv.clone(), s.edof.clone()),
+                of(Estimator::Rgmwm, s.robust.wv.clone(), robust_edof),
+            ]
+        });
+        Self { schema_version: file.schema_version, rate_hz: file.rate_hz, curves: curves.collect() }
     }
 }
 

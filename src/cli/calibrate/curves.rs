@@ -3,7 +3,7 @@
 use super::output::{self, outputs};
 use super::{Args, bootstrap, of_calibration};
 use crate::cli::{Failure, Session, read};
-use nav_sim::calibration::{Estimator, Group, Replicate, Settings, fit_curve};
+use nav_sim::calibration::{Estimator, Group, Outcome, Settings, fit_curve};
 use nav_sim::data::curve_file::{self, NamedCurve};
 use nav_sim::imu::Sensor;
 use std::path::Path;
@@ -40,8 +40,8 @@ pub(super) fn run(
         Some(out) => outputs(out, &settings.estimators, &[path.to_owned()])?,
         None => Vec::new(),
     };
-    let mut groups = Vec::new();
-    let mut outcomes = Vec::new();
+    let mut groups: Vec<Group> = Vec::new();
+    let mut outcomes: Vec<Outcome> = Vec::new();
     for (named, estimator) in curves.into_iter().zip(found) {
         let Some(sensor) = named.sensor.or(args.sensor).or(args.out.is_none().then_some(Sensor::Accel))
         else {
@@ -49,7 +49,14 @@ pub(super) fn run(
                 Failure::input(format!("{}: the curve does not say of which sensor it is", path.display()));
             return Err(failure.hint("--sensor accel or --sensor gyro"));
         };
-        groups.push(Group { sensor, axis: named.axis, replicates: Vec::<Replicate>::new() });
+        let group = Group { sensor, axis: named.axis, replicates: Vec::new() };
+        let same = |o: &Outcome| o.estimator == estimator && groups[o.group].name() == group.name();
+        if outcomes.iter().any(same) {
+            let (name, estimator) = (group.name(), estimator.name());
+            let message = format!("{}: there are two curves of {name} for {estimator}", path.display());
+            return Err(Failure::input(message).hint("calibrate the recordings themselves: it averages them"));
+        }
+        groups.push(group);
         let outcome = fit_curve(&groups, groups.len() - 1, estimator, named.curve, settings);
         outcomes.push(outcome.map_err(|e| of_calibration(&e))?);
     }

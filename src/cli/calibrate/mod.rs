@@ -32,7 +32,7 @@ pub(crate) struct Args {
     /// Recordings, or directories of recordings
     #[arg(value_name = "INPUT", required_unless_present = "curve", conflicts_with = "curve")]
     inputs: Vec<PathBuf>,
-    /// Fit a curve instead of recordings: CSV tau_samples,wv,edof or a .wv.json
+    /// Fit a curve instead of recordings: CSV tau_samples,wv,edof or a .wv.json (also of wv)
     #[arg(long, value_name = "FILE", conflicts_with_all = OF_RECORDINGS)]
     curve: Option<PathBuf>,
     /// Sensor of a CSV curve, for the model file

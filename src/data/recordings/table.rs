@@ -136,10 +136,10 @@ pub(super) fn settle(columns: &mut [Column], options: &ReadOptions) -> std::io::
     relieve(columns, options)?;
     let any = columns.iter().any(|c| c.values.is_stored());
     for column in columns {
-        column.values.fit();
         if any {
             column.values.store()?;
         }
+        column.values.fit();
     }
     Ok(())
 }
