@@ -1,6 +1,7 @@
 //! The directory of a study: `plan.json`, `models/` calibrated by the plan, `units/`, and `results/`.
 
 use super::atomic;
+use super::difference::{self, Difference};
 use super::unit_file;
 use crate::batch::{Plan, Study};
 use std::collections::BTreeSet;
@@ -134,18 +135,12 @@ pub fn same(
     let value = |s: &Study| serde_json::to_value(s).unwrap_or_default();
     let (found, wanted) = (value(&plan.study), value(&study));
     let (Some(found), Some(wanted)) = (found.as_object(), wanted.as_object()) else { return Ok(()) };
-    let differs = |key: &&String| found.get(*key) != wanted.get(*key);
-    let Some(key) = wanted.keys().chain(found.keys()).find(differs) else { return Ok(()) };
-    let shown = |v: Option<&serde_json::Value>| {
-        let text = v.map_or_else(|| "not given".into(), serde_json::Value::to_string);
-        if text.chars().count() > 80 {
-            format!("{}…", text.chars().take(80).collect::<String>())
-        } else {
-            text
+    match difference::first(found, wanted) {
+        None => Ok(()),
+        Some(Difference { key, found, wanted }) => {
+            Err(BatchDirectoryError::Other { path, key, found, wanted })
         }
-    };
-    let (found, wanted) = (shown(found.get(key)), shown(wanted.get(key)));
-    Err(BatchDirectoryError::Other { path, key: key.clone(), found, wanted })
+    }
 }
 
 /// Writes a plan where none is.

@@ -5,6 +5,7 @@ pub mod batch_directory;
 pub mod batch_file;
 pub mod contamination_file;
 pub mod curve_file;
+mod difference;
 pub mod fusion_files;
 pub mod hash;
 pub mod model_file;

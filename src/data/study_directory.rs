@@ -2,6 +2,7 @@
 //! are finished (`sets.csv`), from which a study that was stopped goes on.
 
 use super::atomic;
+use super::difference::{self, Difference};
 use crate::study::Estimate;
 use serde_json::Value;
 use std::fs::{self, File};
@@ -177,11 +178,12 @@ fn same(path: &Path, text: &str, wanted: &Value) -> Result<()> {
         return Err(StudyDirectoryError::Foreign { path, file: "study.json" });
     };
     let Some(wanted) = wanted.as_object() else { return Ok(()) };
-    let differs = |key: &&String| found.get(*key) != wanted.get(*key);
-    let Some(key) = wanted.keys().chain(found.keys()).find(differs) else { return Ok(()) };
-    let shown = |value: Option<&Value>| value.map_or_else(|| "not given".into(), Value::to_string);
-    let (found, wanted) = (shown(found.get(key)), shown(wanted.get(key)));
-    Err(StudyDirectoryError::Other { path, key: key.clone(), found, wanted })
+    match difference::first(&found, wanted) {
+        None => Ok(()),
+        Some(Difference { key, found, wanted }) => {
+            Err(StudyDirectoryError::Other { path, key, found, wanted })
+        }
+    }
 }
 
 /// The complete sets, and how many bytes they take with the header.
