@@ -46,15 +46,34 @@ impl<'a> CurveSampler<'a> {
         Self { replicates, outcome, law, spread, centre, bias_times_edof: settings.tuning.bias() }
     }
 
-    /// Covariance of curves, relative to that of the model.
+    /// Covariance of curves by the law, relative to that of the model.
     pub(super) fn covariance(&self, draws: usize, group: &str, settings: &Settings) -> DMatrix<f64> {
+        self.covariance_of(draws, group, |key| self.draw(key, settings))
+    }
+
+    /// The same of curves as recorded: of no greater rank than replicates give.
+    pub(super) fn covariance_as_recorded(
+        &self,
+        draws: usize,
+        group: &str,
+        settings: &Settings,
+    ) -> DMatrix<f64> {
+        self.covariance_of(draws, group, |key| self.draw_as_recorded(key, settings))
+    }
+
+    fn covariance_of(
+        &self,
+        draws: usize,
+        group: &str,
+        draw: impl Fn(&StreamKey<'_>) -> Option<Curve>,
+    ) -> DMatrix<f64> {
         let process = self.outcome.estimator.name();
-        let draw = |run: usize| {
+        let error = |run: usize| {
             let key = StreamKey { seed: 1, scenario: "covariance", run: run as u64, source: group, process };
-            let curve = self.draw(&key, settings)?;
+            let curve = draw(&key)?;
             Some(curve.wv.iter().zip(&self.centre).map(|(nu, centre)| nu / centre - 1.0).collect())
         };
-        let errors: Vec<Vec<f64>> = (0..draws).filter_map(draw).collect();
+        let errors: Vec<Vec<f64>> = (0..draws).filter_map(error).collect();
         let count = errors.len() as f64;
         let levels = self.centre.len();
         let mean: Vec<f64> = (0..levels).map(|j| errors.iter().map(|e| e[j]).sum::<f64>() / count).collect();

@@ -22,6 +22,7 @@ mod pipeline;
 mod replicates;
 mod robust_scale;
 mod sampling;
+mod sandwich;
 mod search;
 mod spec;
 mod spread;

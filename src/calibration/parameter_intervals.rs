@@ -19,6 +19,8 @@ pub struct ParameterInterval {
     pub high: f64,
     /// Share of the draws in which its process has vanished.
     pub lost: f64,
+    /// Standard error by the sandwich (units of the parameter); NaN where it stands at a bound.
+    pub standard_error: f64,
 }
 
 impl ParameterInterval {
@@ -43,8 +45,13 @@ impl ParameterInterval {
 }
 
 /// The intervals of all parameters that are not fixed, in the order of the model. `stretch`: Student's quantile over
-/// the normal one, where the draws' own spread is known from few replicates.
-pub(super) fn intervals(outcome: &Outcome, fits: &[Fit], stretch: f64) -> Vec<ParameterInterval> {
+/// the normal one, where the draws' own spread is known from few replicates. `standard_errors`: of the same parameters.
+pub(super) fn intervals(
+    outcome: &Outcome,
+    fits: &[Fit],
+    stretch: f64,
+    standard_errors: &[f64],
+) -> Vec<ParameterInterval> {
     let (model, spec) = (&outcome.fit.composite, &outcome.spec);
     let zero = &outcome.fit.zero;
     let matched: Vec<Vec<Option<&Process>>> =
@@ -63,7 +70,9 @@ pub(super) fn intervals(outcome: &Outcome, fits: &[Fit], stretch: f64) -> Vec<Pa
                 lost if lost > TAIL => [f64::NAN; 2],
                 _ => holding(value, interval(parameter, value, drawn, stretch)),
             };
-            intervals.push(ParameterInterval { process: label.clone(), parameter, low, high, lost });
+            let standard_error = standard_errors[intervals.len()];
+            let process = label.clone();
+            intervals.push(ParameterInterval { process, parameter, low, high, lost, standard_error });
         }
     }
     intervals
@@ -204,9 +213,9 @@ mod tests {
             let whole = (0..100 - lost_ones).map(|i| whole(0.8 + 0.4 * i as f64 / 99.0));
             whole.chain((0..lost_ones).map(|_| lost.clone())).collect()
         };
-        let all = intervals(&outcome, &draws(2), 1.0);
+        let all = intervals(&outcome, &draws(2), 1.0, &[f64::NAN; 4]);
         assert!(all.iter().all(|i| i.undetermined().is_none()), "{all:?}");
-        let all = intervals(&outcome, &draws(10), 1.0);
+        let all = intervals(&outcome, &draws(10), 1.0, &[f64::NAN; 4]);
         let text = all[0].undetermined().unwrap();
         assert_eq!(text, "AR1_1 phi: no interval, not determined: AR1_1 vanishes in 10 % of the draws");
         assert!(

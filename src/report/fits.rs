@@ -240,6 +240,8 @@ fn process_json(process: &Process, label: &str, outcome: &Outcome) -> Map<String
         if let Some(i) = interval_of(outcome, label, name) {
             let ends = if i.undetermined().is_none() { vec![i.low, i.high].into() } else { Value::Null };
             map.insert(format!("{name}_ci95"), ends);
+            let error = i.standard_error;
+            map.insert(format!("{name}_se"), if error.is_finite() { error.into() } else { Value::Null });
         }
     }
     map
@@ -280,7 +282,14 @@ fn inference_lines(inference: &Inference, group: &Group, rate_hz: f64) -> Vec<St
             lines.push(format!("  95 % {text}"));
             continue;
         }
-        lines.push(format!("  95 % {:<6} {:<7} {:.6e} … {:.6e}", i.process, i.parameter, i.low, i.high));
+        let error = match i.standard_error {
+            error if error.is_finite() => format!("  (standard error {error:.2e})"),
+            _ => String::new(),
+        };
+        lines.push(format!(
+            "  95 % {:<6} {:<7} {:.6e} … {:.6e}{error}",
+            i.process, i.parameter, i.low, i.high
+        ));
     }
     if group.replicates.len() > 1 {
         lines.extend(spread_line(inference, rate_hz));
