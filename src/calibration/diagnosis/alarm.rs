@@ -1,9 +1,9 @@
 //! Which recordings are further from the others than chance would have it.
 //!
 //! The largest F over all windows and files is compared with what it is in sets of alike recordings, drawn by
-//! the sampling law, that differ as much as these do (their excess variance at each scale, independent from
-//! scale to scale: more chances of a large F than real differences, which hang together, have). Then the
-//! furthest is taken out and the others are looked at again.
+//! the sampling law, that differ as much as these do (their excess variance at each scale, of which the axes share as
+//! much as they do among the others of the furthest; independent from scale to scale: more chances of a large F than
+//! real differences, which hang together, have). Then the furthest is taken out and the others are looked at again.
 
 use super::FEWEST;
 use super::contrasts::{Distance, Furthest, Noise, Table, Window, furthest};
@@ -52,9 +52,15 @@ fn most_abnormal(
 ) -> Option<Found> {
     let mut own = furthest(table, noise, active);
     let between = table.between(noise, active);
+    // One file that is far off on all axes must not pass for files that share their differences.
+    let mut others = active.to_vec();
+    if let Some(first) = (0..own.len()).max_by(|a, b| own[*a].f[0].total_cmp(&own[*b].f[0])) {
+        others[first] = false;
+    }
+    let shared = table.shared(noise, &table.between(noise, &others), &others);
     let draw = |run: usize| {
         let key = StreamKey { seed: SEED, scenario: "diagnosis", run: run as u64, source, process };
-        let drawn = table.drawn(noise, &between, &mut key.generator());
+        let drawn = table.drawn(noise, &between, shared, &mut key.generator());
         let all = furthest(&drawn, noise, active);
         [0, 1].map(|kind| all.iter().map(|f| f.f[kind]).fold(0.0, f64::max))
     };

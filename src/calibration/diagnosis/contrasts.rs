@@ -82,14 +82,26 @@ pub(super) struct Table {
 
 impl Table {
     /// New files of the same noise, that differ by Gaussian numbers besides, of the standard deviation given
-    /// for each level, independent from level to level and axis to axis.
-    pub(super) fn drawn(&self, noise: &[Noise], between: &[f64], generator: &mut Generator) -> Self {
+    /// for each level, independent from level to level; of their variance the axes of a file share a part.
+    pub(super) fn drawn(
+        &self,
+        noise: &[Noise],
+        between: &[f64],
+        shared: f64,
+        generator: &mut Generator,
+    ) -> Self {
+        let files = self.logs.first().map_or(0, Vec::len);
+        let mut normals =
+            || -> Vec<f64> { between.iter().map(|_| generator.sample(StandardNormal)).collect() };
+        let common: Vec<Vec<f64>> = (0..files).map(|_| normals()).collect();
         let mut file = |noise: &Noise, k: usize, own: &Option<Vec<f64>>| {
             own.as_ref().map(|_| {
                 let ratios = noise.law.draw(&noise.edof[k], generator);
-                let difference =
-                    |(r, b): (f64, &f64)| r.ln() + b * generator.sample::<f64, _>(StandardNormal);
-                ratios.into_iter().zip(between).map(difference).collect()
+                let difference = |((r, b), common): ((f64, &f64), &f64)| {
+                    let own: f64 = generator.sample(StandardNormal);
+                    r.ln() + b * (shared.sqrt() * common + (1.0 - shared).sqrt() * own)
+                };
+                ratios.into_iter().zip(between).zip(&common[k]).map(difference).collect()
             })
         };
         let axis = |(files, noise): (&Files, &Noise)| {
@@ -97,6 +109,27 @@ impl Table {
         };
         let logs = self.logs.iter().zip(noise).map(axis).collect();
         Self { logs, above_only: self.above_only }
+    }
+
+    /// What the axes of a file share of the variance by which the active files differ beyond their noise: the
+    /// covariance between axes over the excess variance, over all levels, each weighted by its certainty.
+    pub(super) fn shared(&self, noise: &[Noise], between: &[f64], active: &[bool]) -> f64 {
+        let (mut covariance, mut variance) = (0.0, 0.0);
+        for (j, between) in between.iter().enumerate() {
+            let contrasts = self.contrasts(noise, Window { first: j, width: 1 }, j, active);
+            for (i, one) in contrasts.iter().enumerate() {
+                for other in &contrasts[..i] {
+                    let pairs = one.values.iter().zip(&other.values);
+                    let products: Vec<f64> = pairs.filter_map(|(x, y)| Some((*x)? * (*y)?)).collect();
+                    let excess = between * between;
+                    let weight = (0.5 * (one.noise + other.noise) + excess).powi(-2);
+                    covariance += weight * products.iter().sum::<f64>() / (products.len() as f64 - 1.0);
+                    variance += weight * excess;
+                }
+            }
+        }
+        let share = covariance / variance;
+        if share.is_finite() { share.clamp(0.0, 1.0) } else { 0.0 }
     }
 
     /// Standard deviation by which the active files differ at each level, beyond their noise.
@@ -304,7 +337,7 @@ mod tests {
         let empty = Table { logs: vec![vec![Some(vec![]); 8]; 3], above_only: false };
         let noise = [noise(8, 1, 1e9), noise(8, 1, 1e9), noise(8, 1, 1e9)];
         let mut f = || {
-            let table = empty.drawn(&noise, &[0.3], &mut generator);
+            let table = empty.drawn(&noise, &[0.3], 0.0, &mut generator);
             furthest(&table, &noise, &[true; 8])[0].f[0]
         };
         let mean = (0..600).map(|_| f()).sum::<f64>() / 600.0;
