@@ -43,6 +43,11 @@ sources! {
     /// Y. Bar-Shalom, X. R. Li, T. Kirubarajan: *Estimation with Applications to Tracking and
     /// Navigation*, Wiley, 2001 (NEES, NIS).
     BarShalom01;
+    /// R. C. Paule, J. Mandel: *Consensus values and weighting factors*, J. Res. National Bureau of Standards 87, 1982.
+    PauleMandel82;
+    /// D. J. Best, D. E. Roberts: *Algorithm AS 91: The percentage points of the χ² distribution*, Applied Statistics 24,
+    /// 1975.
+    BestRoberts75;
     /// A. C. Davison, D. V. Hinkley: *Bootstrap Methods and their Application*, Cambridge University Press, 1997.
     DavisonHinkley97;
     /// J. A. Doornik: *An improved ziggurat method to generate normal random samples*, Nuffield College,

@@ -147,6 +147,22 @@ fn a_curve_written_is_a_curve_read() {
     assert_eq!(first["fits"][1]["axis"], "y");
 }
 
+/// Without the shortest recording there would be more scales; the diagnosis leaves it out all the same.
+#[test]
+fn a_short_recording_is_left_out_at_the_same_scales() {
+    let dir = tempfile::tempdir().unwrap();
+    recordings(dir.path(), 4);
+    let path = dir.path().join("runs/run3.csv");
+    let text = std::fs::read_to_string(&path).unwrap();
+    let short: Vec<&str> = text.lines().take(1 + SAMPLES / 10).collect();
+    std::fs::write(&path, short.join("\n") + "\n").unwrap();
+    for weighting in ["edof", "full"] {
+        let call = ["calibrate", "runs", "--model", "N1", "--estimator", "awv", "--weighting", weighting];
+        let out = json(dir.path(), &call);
+        assert_eq!(out["fits"].as_array().unwrap().len(), 1);
+    }
+}
+
 /// The file of `wv` is a curve file: its classical curves are GMWM's, the robust ones RGMWM's.
 #[test]
 fn the_curves_of_wv_give_the_fits_of_their_recording() {
@@ -396,6 +412,9 @@ fn bad_requests_are_refused_with_a_hint() {
     check(calibrate(&["--estimator", "gmwm"], 2), &["gmwm takes one recording at a time; there are 2"]);
     let before = std::fs::read(dir.path().join("runs/run0.csv")).unwrap();
     check(calibrate(&["-o", "runs/run0.csv"], 2), &["is an input of this command and would be overwritten"]);
+    std::fs::write(dir.path().join("known.toml"), "[WN]\nsigma2 = { upper = 1.0 }\n").unwrap();
+    let onto_parameters = calibrate(&["--model", "WN", "--parameters", "known.toml", "-o", "known.toml"], 2);
+    check(onto_parameters, &["known.toml is an input of this command and would be overwritten"]);
     assert_eq!(std::fs::read(dir.path().join("runs/run0.csv")).unwrap(), before);
     std::fs::create_dir(dir.path().join("taken.toml")).unwrap();
     check(calibrate(&["-o", "taken.toml"], 2), &["--out taken.toml: it is a directory", "hint:"]);
@@ -436,7 +455,9 @@ fn what_was_drawn_is_recorded_and_copies_are_refused() {
     assert!(refusal(dir.path(), &curve, 2).contains("the curve says its rate, 50 Hz"));
 
     let copy = dir.path().join("runs/run2.csv");
-    std::fs::copy(dir.path().join("runs/run0.csv"), &copy).unwrap();
+    // With other line ends: the samples count, not the bytes.
+    let text = std::fs::read_to_string(dir.path().join("runs/run0.csv")).unwrap();
+    std::fs::write(&copy, text.replace('\n', "\r\n")).unwrap();
     let stderr = refusal(dir.path(), &calibrate, 2);
     assert!(stderr.contains("run2.csv is a copy of runs/run0.csv"), "{stderr}");
     // A recording that costs the others scales is told.

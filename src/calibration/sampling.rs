@@ -10,7 +10,9 @@ use crate::rng::Generator;
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
 use rand_distr::StandardNormal;
-use std::f64::consts::PI;
+use statrs::function::erf::erfc;
+use statrs::function::gamma::ln_gamma;
+use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 /// The law of the wavelet variances of one model at levels 1, 2, …
 #[derive(Debug, Clone)]
@@ -64,10 +66,25 @@ impl SamplingLaw {
     }
 }
 
-/// A chi-square variable over its degrees of freedom whose normal score is z (Wilson and Hilferty).
+/// A chi-square variable over its degrees of freedom whose normal score is z: Wilson and Hilferty's cube, and where
+/// that ends, far below, the series P(x) = (x/2)^(nu/2) e^(−x/2)/Γ(nu/2 + 1)·(1 + x/(nu + 2) + …)
+/// ([Best and Roberts](crate::bibliography::BestRoberts75)).
 pub(super) fn chi_square_ratio(z: f64, edof: f64) -> f64 {
+    // No score is so far below that the series is needed for more.
+    const MOST: f64 = 30.0;
+    if edof < MOST && z < 1.0 {
+        let probability = 0.5 * erfc(-z * FRAC_1_SQRT_2);
+        if edof < -1.24 * probability.ln() {
+            let half = 0.5 * edof;
+            let known = probability.ln() + ln_gamma(half + 1.0);
+            let x = 2.0 * (known / half).exp();
+            // P(x) with two terms more, solved once again for its power of x.
+            let more = (1.0 + x / (edof + 2.0) * (1.0 + x / (edof + 4.0))).ln();
+            return ((known + 0.5 * x - more) / half).exp() / half;
+        }
+    }
     let variance = 2.0 / (9.0 * edof);
-    (1.0 - variance + z * variance.sqrt()).max(0.02).powi(3)
+    (1.0 - variance + z * variance.sqrt()).powi(3)
 }
 
 /// The Cholesky factor; where rounding leaves no positive definite matrix, that of independent levels.
@@ -138,6 +155,22 @@ mod tests {
         assert_relative_eq!(law.per_coefficient[0], 2.0 / 3.0, max_relative = 1e-12);
         assert_relative_eq!(law.per_coefficient[1], 4.0 / 7.0, max_relative = 1e-12);
         assert_relative_eq!(law.edof(1000)[1], 997.0 * 4.0 / 7.0, max_relative = 1e-12);
+    }
+
+    /// Quantiles of the chi-square law at three deviations below to three above: a draw is to be off by far less than it
+    /// scatters, √(2/nu). Furthest where the two formulas meet.
+    #[test]
+    fn scores_become_chi_square() {
+        use statrs::distribution::{ChiSquared, ContinuousCDF};
+        for (edof, error) in [(0.7, 0.05), (1.0, 0.04), (2.0, 0.03), (5.0, 0.06), (29.0, 0.01), (1e4, 1e-4)] {
+            let law = ChiSquared::new(edof).unwrap();
+            for i in -30..=30 {
+                let z = 0.1 * f64::from(i);
+                let exact = law.inverse_cdf(0.5 * erfc(-z * FRAC_1_SQRT_2)) / edof;
+                let found = chi_square_ratio(z, edof);
+                assert!((found / exact).ln().abs() < error, "{edof} {z}: {found} {exact}");
+            }
+        }
     }
 
     /// The spectrum and the filters agree with the closed forms: ∫ |H_j|² S df = nu_j.

@@ -29,6 +29,9 @@ pub(super) fn standard_errors(outcome: &Outcome, settings: &Settings, covariance
         })
         .collect();
     let moving: Vec<usize> = (0..all.len()).filter(|p| all[*p].1).collect();
+    if moving.is_empty() {
+        return vec![f64::NAN; all.iter().filter(|p| !p.0).count()];
+    }
     let levels = curve.levels.len();
     let gradients: Vec<Vec<f64>> = curve.levels.iter().map(|l| fit.composite.haar_wv_gradient(*l)).collect();
     let weights = match &fit.mixing {

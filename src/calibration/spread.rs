@@ -5,7 +5,7 @@
 //! random-effects model, level by level: ln nu_ij = centre_j + between_ij + within_ij).
 
 use super::average::{Estimator, Replicate};
-use super::robust_scale::{deviation, median};
+use super::robust_scale::{MAD_TO_DEVIATION, median};
 use super::sampling::{SamplingLaw, chi_square_ratio};
 use crate::rng::Generator;
 use crate::wavelet::interval::edof_robust;
@@ -56,13 +56,12 @@ impl Spread {
         let mut between = vec![0.0; levels];
         for j in 0..levels {
             let logs: Vec<f64> = replicates.iter().map(|r| r.value(estimator, j).ln()).collect();
-            let (residuals, deviation) = residuals(&logs, estimator);
-            between[j] = (deviation * deviation - within[j] * within[j]).max(0.0).sqrt();
-            let own = |e: &Vec<f64>| (variance_of_log(e[j]) + between[j] * between[j]).sqrt();
-            let usual = within[j].hypot(between[j]);
-            for (i, residual) in residuals.into_iter().enumerate() {
-                units[i][j] = residual;
-                total[i][j] = deviation * own(&edof[i]) / usual;
+            let noise: Vec<f64> = edof.iter().map(|e| variance_of_log(e[j])).collect();
+            let scatter = Scatter::new(&logs, &noise, estimator);
+            between[j] = scatter.between;
+            for (i, unit) in scatter.units.into_iter().enumerate() {
+                units[i][j] = unit;
+                total[i][j] = scatter.factor * noise[i].sqrt().hypot(between[j]);
             }
         }
         let freedom = (share_of_freedom(estimator) * (count - 1.0)).max(1.0);
@@ -81,8 +80,11 @@ impl Spread {
     }
 
     /// What makes an interval of normal quantiles one of Student's, for the few replicates that the variances are
-    /// known from: the ratio of the quantiles 0.975.
+    /// known from: the ratio of the quantiles 0.975. Nothing is known from a single one: its variances are the law's.
     pub(super) fn student(&self) -> f64 {
+        if self.units.len() < 2 {
+            return 1.0;
+        }
         let student = StudentsT::new(0.0, 1.0, self.freedom).map_or(NORMAL_975, |law| law.inverse_cdf(0.975));
         student / NORMAL_975
     }
@@ -139,27 +141,90 @@ fn small_sample(count: usize) -> f64 {
     1.0 + 0.6 / count as f64
 }
 
-/// Residuals over their standard deviation, and that: plain, or for DR-AWV clipped at [`CLIP`] deviations (by the MAD)
-/// from the median.
-fn residuals(logs: &[f64], estimator: Estimator) -> (Vec<f64>, f64) {
-    let freedom = logs.len() as f64 - 1.0;
-    if freedom < 1.0 {
-        return (vec![0.0; logs.len()], 0.0);
+/// How the ln nu of replicates scatter at one level.
+struct Scatter {
+    /// Standard deviation of what they differ by beyond their noise.
+    between: f64,
+    /// Residuals in standard deviations, noise and differences together; Σ of their squares is K − 1.
+    units: Vec<f64>,
+    /// Those standard deviations over what noise and differences make: 1, or less where the replicates scatter less
+    /// than their noise does.
+    factor: f64,
+}
+
+impl Scatter {
+    /// `noise` is the variance of each by its length. What they differ by is what brings the mean square of the
+    /// residuals, each over its own variance, to 1
+    /// ([Paule and Mandel](crate::bibliography::PauleMandel82)); for DR-AWV clipped residuals.
+    fn new(logs: &[f64], noise: &[f64], estimator: Estimator) -> Self {
+        let freedom = logs.len() as f64 - 1.0;
+        let lowest = logs.iter().copied().fold(f64::INFINITY, f64::min);
+        let range = logs.iter().copied().fold(lowest, f64::max) - lowest;
+        if freedom < 1.0 || !range.is_finite() {
+            return Self { between: 0.0, units: vec![0.0; logs.len()], factor: 0.0 };
+        }
+        let clipped = estimator == Estimator::DrAwv;
+        let correction = if clipped { small_sample(logs.len()) } else { 1.0 };
+        let of = |between: f64| {
+            let weights: Vec<f64> = noise.iter().map(|n| 1.0 / (n + between * between)).collect();
+            let residuals = residuals(logs, &weights, clipped);
+            let length = (residuals.iter().map(|z| z * z).sum::<f64>() / freedom).sqrt();
+            (residuals, length)
+        };
+        let (mut low, mut high) = (0.0, 2.0 * range);
+        if of(low).1 * correction.sqrt() > 1.0 {
+            // Halved to rounding.
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                if of(middle).1 * correction.sqrt() > 1.0 { low = middle } else { high = middle }
+            }
+        }
+        let (mut units, length) = of(low);
+        if length > 0.0 {
+            units.iter_mut().for_each(|z| *z /= length);
+        }
+        Self { between: low, units, factor: length * correction.sqrt() }
     }
-    let mut kept = logs.to_vec();
-    let mut correction = 1.0;
-    if estimator == Estimator::DrAwv {
-        let (centre, scale) = (median(logs), deviation(logs));
-        kept.iter_mut().for_each(|x| *x = x.clamp(centre - CLIP * scale, centre + CLIP * scale));
-        correction = small_sample(logs.len());
+}
+
+/// Residuals from the weighted mean in standard deviations (weights: 1/variance); clipped ones are those from the
+/// weighted median, within [`CLIP`] deviations by their median, about their own weighted mean.
+fn residuals(values: &[f64], weights: &[f64], clipped: bool) -> Vec<f64> {
+    let mean = |values: &[f64]| {
+        let sum: f64 = values.iter().zip(weights).map(|(x, w)| x * w).sum();
+        sum / weights.iter().sum::<f64>()
+    };
+    let mut kept = values.to_vec();
+    if clipped {
+        let centre = weighted_median(values, weights);
+        let distances: Vec<f64> =
+            values.iter().zip(weights).map(|(x, w)| (x - centre).abs() * w.sqrt()).collect();
+        let most = CLIP * MAD_TO_DEVIATION * median(&distances);
+        for (x, w) in kept.iter_mut().zip(weights) {
+            let most = most / w.sqrt();
+            *x = x.clamp(centre - most, centre + most);
+        }
     }
-    let mean = kept.iter().sum::<f64>() / logs.len() as f64;
-    let mut units: Vec<f64> = kept.iter().map(|x| x - mean).collect();
-    let deviation = (units.iter().map(|x| x * x).sum::<f64>() / freedom).sqrt();
-    if deviation > 0.0 {
-        units.iter_mut().for_each(|x| *x /= deviation);
+    let mean = mean(&kept);
+    kept.iter().zip(weights).map(|(x, w)| (x - mean) * w.sqrt()).collect()
+}
+
+/// The value below which half of the weight lies; the mean of two where it lies between them.
+fn weighted_median(values: &[f64], weights: &[f64]) -> f64 {
+    let mut pairs: Vec<(f64, f64)> = values.iter().copied().zip(weights.iter().copied()).collect();
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * weights.iter().sum::<f64>();
+    let mut below = 0.0;
+    for (i, (value, weight)) in pairs.iter().enumerate() {
+        below += weight;
+        if below > half * (1.0 + 1e-9) {
+            return *value;
+        }
+        if below > half * (1.0 - 1e-9) {
+            return pairs.get(i + 1).map_or(*value, |next| 0.5 * (value + next.0));
+        }
     }
-    (units, deviation * correction.sqrt())
+    pairs.last().map_or(f64::NAN, |last| last.0)
 }
 
 #[cfg(test)]
@@ -176,15 +241,34 @@ mod tests {
         assert_relative_eq!(variance_of_log(4.0), pi2 / 6.0 - 1.0, max_relative = 1e-5);
     }
 
+    /// Of replicates whose noise is nothing.
+    fn noiseless(logs: &[f64], estimator: Estimator) -> Scatter {
+        Scatter::new(logs, &vec![1e-12; logs.len()], estimator)
+    }
+
     #[test]
     fn one_abnormal_value_moves_the_plain_residuals_and_hardly_the_clipped() {
         let mut logs = vec![-0.1, 0.0, 0.1, 0.05, -0.05, 0.02];
-        let clean = residuals(&logs, Estimator::DrAwv).1;
+        let clean = noiseless(&logs, Estimator::DrAwv).between;
         logs[2] = 10.0;
-        assert!(residuals(&logs, Estimator::SrAwv).1 > 3.0);
-        assert!(residuals(&logs, Estimator::DrAwv).1 < 3.0 * clean);
-        let (units, _) = residuals(&logs, Estimator::SrAwv);
-        assert_relative_eq!(units.iter().map(|u| u * u).sum::<f64>(), 5.0, max_relative = 1e-12);
+        assert!(noiseless(&logs, Estimator::SrAwv).between > 3.0);
+        assert!(noiseless(&logs, Estimator::DrAwv).between < 3.0 * clean);
+        let units = noiseless(&logs, Estimator::SrAwv).units;
+        assert_relative_eq!(units.iter().map(|u| u * u).sum::<f64>(), 5.0, max_relative = 1e-9);
+    }
+
+    /// Paule and Mandel's equation by hand, two values: (x − y)²/(n₁ + n₂ + 2b²) = 1. Four within their noise: no
+    /// difference, and the scatter is that of the values.
+    #[test]
+    fn unequal_noise_is_allowed_for() {
+        let two = Scatter::new(&[0.0, 3.0], &[1.0, 4.0], Estimator::Awv);
+        assert_relative_eq!(two.between, 2.0_f64.sqrt(), max_relative = 1e-9);
+        assert_relative_eq!(two.factor, 1.0, max_relative = 1e-9);
+        let four = Scatter::new(&[0.0, 0.1, -0.1, 0.2], &[1.0; 4], Estimator::SrAwv);
+        assert_eq!(four.between, 0.0);
+        assert_relative_eq!(four.factor, (0.05_f64 / 3.0).sqrt(), max_relative = 1e-9);
+        assert_eq!(weighted_median(&[5.0, 1.0, 2.0], &[1.0, 1.0, 3.0]), 2.0);
+        assert_eq!(weighted_median(&[5.0, 1.0, 2.0, 4.0], &[1.0; 4]), 3.0);
     }
 
     /// 4000 draws of K Gaussian numbers: the mean of the clipped variance, corrected, is the variance (its standard
@@ -198,7 +282,7 @@ mod tests {
         for count in [5, 6, 8, 12, 24] {
             let variance = |generator: &mut Generator| {
                 let x: Vec<f64> = (0..count).map(|_| generator.sample(StandardNormal)).collect();
-                residuals(&x, Estimator::DrAwv).1.powi(2)
+                noiseless(&x, Estimator::DrAwv).between.powi(2)
             };
             let drawn: Vec<f64> = (0..4000).map(|_| variance(&mut generator)).collect();
             let mean = drawn.iter().sum::<f64>() / 4000.0;

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 #[command(next_help_heading = "Recordings")]
 pub(crate) struct RecordingArgs {
     /// Sample rate (Hz) of files without a time column
-    #[arg(long, value_name = "HZ", value_parser = super::parse::positive)]
+    #[arg(long, value_name = "HZ", value_parser = super::parse::rate_hz)]
     rate_hz: Option<f64>,
     /// Seconds to leave out at the beginning of each file (warm-up)
     #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = super::parse::non_negative)]

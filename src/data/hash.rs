@@ -12,3 +12,14 @@ pub fn of_file(path: &Path) -> io::Result<String> {
     hasher.update_reader(std::fs::File::open(path)?)?;
     Ok(hasher.finalize().to_hex().to_string())
 }
+
+/// BLAKE3 of samples, in hexadecimal.
+#[must_use]
+pub fn samples(samples: &[f64]) -> String {
+    let mut hasher = blake3::Hasher::new();
+    for block in samples.chunks(4096) {
+        let bytes: Vec<u8> = block.iter().flat_map(|x| x.to_le_bytes()).collect();
+        hasher.update(&bytes);
+    }
+    hasher.finalize().to_hex().to_string()
+}

@@ -37,7 +37,12 @@ pub struct Movement {
 
 /// Without the recording of that name. None if no curve is left.
 pub(super) fn left_out(group: &Group, name: &str, outcome: &Outcome, settings: &Settings) -> Option<LeftOut> {
-    let rest: Vec<Replicate> = group.replicates.iter().filter(|r| r.name != name).cloned().collect();
+    let mut rest: Vec<Replicate> = group.replicates.iter().filter(|r| r.name != name).cloned().collect();
+    // Without the shortest there would be more scales: another fit than this one.
+    for replicate in &mut rest {
+        replicate.classical.truncate(outcome.curve.levels.len());
+        replicate.robust.truncate(outcome.curve.levels.len());
+    }
     let efficiency = settings.tuning.efficiency();
     let without = average(&rest, outcome.estimator, settings.trim, efficiency).ok()?;
     let with = &outcome.curve;

@@ -6,7 +6,7 @@ use crate::cli::{Failure, Session, read};
 use nav_sim::calibration::{Estimator, Group, Outcome, Settings, fit_curve};
 use nav_sim::data::curve_file::{self, NamedCurve};
 use nav_sim::imu::Sensor;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 pub(super) fn run(
     args: &Args,
@@ -37,7 +37,11 @@ pub(super) fn run(
     let found: Vec<Estimator> = curves.iter().map(estimator).collect();
     settings.estimators = Estimator::ALL.into_iter().filter(|e| found.contains(e)).collect();
     let outputs = match &args.out {
-        Some(out) => outputs(out, &settings.estimators, &[path.to_owned()])?,
+        Some(out) => {
+            let inputs: Vec<PathBuf> =
+                [path].into_iter().map(Path::to_owned).chain(args.parameters.clone()).collect();
+            outputs(out, &settings.estimators, &inputs)?
+        }
         None => Vec::new(),
     };
     let mut groups: Vec<Group> = Vec::new();

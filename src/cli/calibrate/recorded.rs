@@ -6,9 +6,9 @@ use crate::cli::{Failure, Session, read};
 use nav_sim::calibration::{
     Estimator, Pool, Replicate, Settings, SignalError, WarmUp, calibrate, grouped, replicates, warm_up,
 };
-use nav_sim::data::recordings::Report;
+use nav_sim::data::hash;
+use nav_sim::data::recordings::{FileReport, Report};
 use nav_sim::imu::{Channel, Recording, Signal};
-use nav_sim::report::Input;
 use nav_sim::wavelet::{Tuning, default_levels};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -22,6 +22,7 @@ pub(super) fn run(args: &Args, settings: &mut Settings, session: &Session) -> Re
     let look = |recording: Recording| Look::new(&recording, args.tuning.scales, &tuning);
     let (looks, report) = args.recordings.visit(&args.inputs, needed, session, &look)?;
     let looks = looks.into_iter().collect::<Result<Vec<_>, _>>()?;
+    distinct(&looks)?;
     settings.rate_hz = report.files[0].rate_hz;
     warm_ups(&looks, args.recordings.skip_s(), settings.rate_hz, session);
     shortest(&report, args.tuning.scales, session);
@@ -29,9 +30,9 @@ pub(super) fn run(args: &Args, settings: &mut Settings, session: &Session) -> Re
     settings.estimators = estimators(args.estimator, recordings)?;
     let pool = pool(args, settings)?;
     let files: Vec<PathBuf> = report.files.iter().map(|f| PathBuf::from(&f.file)).collect();
-    let outputs = outputs(out, &settings.estimators, &files)?;
+    let guarded: Vec<PathBuf> = files.iter().chain(&args.parameters).cloned().collect();
+    let outputs = outputs(out, &settings.estimators, &guarded)?;
     let inputs = files.iter().map(|f| read::input("recording", f)).collect::<Result<Vec<_>, _>>()?;
-    distinct(&inputs)?;
     let measured = looks.into_iter().flat_map(|look| look.replicates).collect();
     let groups = grouped(measured, pool);
     let mut outcomes = calibrate(&groups, settings).map_err(|e| of_calibration(&e))?;
@@ -43,6 +44,8 @@ pub(super) fn run(args: &Args, settings: &mut Settings, session: &Session) -> Re
 /// What is kept of a recording, or of one signal of it.
 struct Look {
     recording: String,
+    /// What tells the samples of each signal from others.
+    signals: Vec<(Channel, String)>,
     warm_ups: Vec<(Channel, WarmUp)>,
     replicates: Vec<(Channel, Replicate)>,
 }
@@ -52,6 +55,7 @@ impl Look {
         let of_signal = |s: &Signal| warm_up(&s.samples).map(|w| (s.channel, w));
         Ok(Self {
             recording: recording.name.clone(),
+            signals: recording.signals.par_iter().map(|s| (s.channel, hash::samples(&s.samples))).collect(),
             warm_ups: recording.signals.par_iter().filter_map(of_signal).collect(),
             replicates: replicates(recording, levels, tuning)?,
         })
@@ -79,9 +83,11 @@ fn warm_ups(looks: &[Look], skipped_s: f64, rate_hz: f64, session: &Session) {
 /// Says which recording is so much shorter than the others that it costs all of them scales.
 fn shortest(report: &Report, scales: Option<u32>, session: &Session) {
     let levels = |samples: usize| scales.unwrap_or(u32::MAX).min(default_levels(samples));
-    let all = report.files.iter().flat_map(|f| f.samples.iter().map(|samples| (&f.file, *samples)));
-    let Some((file, samples)) = all.clone().min_by_key(|(_, samples)| levels(*samples)) else { return };
-    let mut found: Vec<u32> = all.map(|(_, samples)| levels(samples)).collect();
+    let recordings = report.files.iter().flat_map(FileReport::recordings);
+    let Some((file, samples)) = recordings.clone().min_by_key(|(_, samples)| levels(*samples)) else {
+        return;
+    };
+    let mut found: Vec<u32> = recordings.map(|(_, samples)| levels(samples)).collect();
     found.sort_unstable();
     let (fewest, usual) = (found[0], found[found.len() / 2]);
     if fewest < usual {
@@ -128,11 +134,14 @@ fn pool(args: &Args, settings: &Settings) -> Result<Pool, Failure> {
 }
 
 /// Refuses copies of a recording: one replicate would count as two, and intervals come out too narrow.
-fn distinct(inputs: &[Input]) -> Result<(), Failure> {
-    for (i, input) in inputs.iter().enumerate() {
-        if let Some(first) = inputs[..i].iter().find(|other| other.blake3 == input.blake3) {
-            let message =
-                format!("{} is a copy of {}: it would count as two replicates", input.path, first.path);
+fn distinct(looks: &[Look]) -> Result<(), Failure> {
+    for (i, look) in looks.iter().enumerate() {
+        let copy = |other: &&Look| {
+            other.recording != look.recording && other.signals.iter().any(|s| look.signals.contains(s))
+        };
+        if let Some(first) = looks[..i].iter().find(copy) {
+            let (copy, first) = (&look.recording, &first.recording);
+            let message = format!("{copy} is a copy of {first}: it would count as two replicates");
             return Err(Failure::input(message).hint("leave one of them out"));
         }
     }

@@ -9,17 +9,29 @@ use crate::units::STANDARD_GRAVITY;
 use std::io;
 use std::ops::Range;
 
-/// What brings each column to SI units; refuses dead axes.
-pub(super) fn factors(raw: &Raw, rate_hz: f64) -> Result<Vec<f64>, RecordingError> {
+/// From so many samples of one value on, and such a share of the record, a signal stands still.
+const LONG_STANDING: usize = 100;
+const LONG_SHARE: f64 = 0.1;
+
+/// What brings each column to SI units; refuses dead axes, tells those that stand still for long.
+pub(super) fn factors(raw: &Raw, rate_hz: f64, report: &mut FileReport) -> Result<Vec<f64>, RecordingError> {
     let from_gravity = gravity_factor(raw)?;
     let factor = |column: &Column| {
         let Role::Signal { channel, unit } = column.role else { return Ok(1.0) };
-        let dead = constant(&column.values);
-        if let Some(value) =
-            dead.map_err(|source| RecordingError::Storage { path: raw.path.clone(), source })?
-        {
+        let standing = standing(&column.values);
+        let Standing { first, count, value } =
+            standing.map_err(|source| RecordingError::Storage { path: raw.path.clone(), source })?;
+        let all = column.values.len();
+        if count == all && all > 1 {
             let (path, column) = (raw.path.clone(), column.name.clone());
             return Err(RecordingError::Dead { path, channel, column, value });
+        }
+        if count >= LONG_STANDING && count as f64 > LONG_SHARE * all as f64 {
+            let (percent, line) = (100.0 * count as f64 / all as f64, raw.lines.of(first));
+            report.warn(format!(
+                "{channel} (column \"{}\") stands at {value} for {percent:.0} % of the record, from line {line} on",
+                column.name
+            ));
         }
         Ok(match unit {
             Unit::Si(factor) => factor,
@@ -57,14 +69,29 @@ pub(in crate::data) fn gravity_factor(raw: &Raw) -> Result<f64, RecordingError> 
     })
 }
 
-/// The value that all of them have, if so.
-fn constant(values: &Values) -> io::Result<Option<f64>> {
-    let (mut first, mut alike) = (None, values.len() > 1);
+/// The longest stretch of one value.
+#[derive(Debug, Clone, Copy, Default)]
+struct Standing {
+    first: usize,
+    count: usize,
+    value: f64,
+}
+
+fn standing(values: &Values) -> io::Result<Standing> {
+    let (mut longest, mut last, mut sample) = (Standing::default(), Standing::default(), 0);
     values.each_block(0..values.len(), |block| {
-        let first: f64 = *first.get_or_insert(block[0]);
-        alike = alike && block.iter().all(|v| v.to_bits() == first.to_bits());
+        for &value in block {
+            if last.count == 0 || value.to_bits() != last.value.to_bits() {
+                last = Standing { first: sample, count: 0, value };
+            }
+            last.count += 1;
+            sample += 1;
+            if last.count > longest.count {
+                longest = last;
+            }
+        }
     })?;
-    Ok(first.filter(|_| alike))
+    Ok(longest)
 }
 
 /// The mean of a stretch times a factor, summed about the first of them so that a large offset costs no digits.

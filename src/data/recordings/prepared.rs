@@ -1,6 +1,7 @@
 //! A file whose time, units and stretches are decided: what is left is to take its samples.
 
 use super::header::Role;
+use super::report::name_of;
 use super::table::{Column, Raw};
 use super::timing::{self, Timing};
 use super::{FileReport, ReadOptions, RecordingError, checks};
@@ -33,7 +34,7 @@ impl Prepared {
         let timing = timing::timing(&mut raw, options, &mut report)?;
         raw.columns.retain(|c| matches!(c.role, Role::Signal { .. }));
         raw.columns.sort_by_key(|c| c.channel().map(Channel::index));
-        let factors = checks::factors(&raw, timing.rate_hz)?;
+        let factors = checks::factors(&raw, timing.rate_hz, &mut report)?;
         let samples = raw.columns.first().map_or(0, |c| c.values.len());
         let pieces = pieces(&raw.path, samples, &timing, options, &mut report)?;
         let stored = |source| RecordingError::Storage { path: raw.path.clone(), source };
@@ -88,8 +89,7 @@ impl Prepared {
 
     /// A recording without its signals.
     fn recording(&self, piece: usize) -> Recording {
-        let whole = self.pieces.len() == 1;
-        let name = if whole { self.path.clone() } else { format!("{}[{}]", self.path, piece + 1) };
+        let name = name_of(&self.path, piece, self.pieces.len());
         Recording { name, rate_hz: self.rate_hz, signals: Vec::new() }
     }
 }
@@ -99,6 +99,9 @@ fn signal(channel: Channel, mut samples: Vec<f64>, factor: f64, mean: f64) -> Si
     samples.iter_mut().for_each(|v| *v = *v * factor - mean);
     Signal { channel, mean, samples }
 }
+
+/// Of the stretches between gaps those shorter than the longest by more than this are left out.
+const LONGEST_OVER_SHORTEST: usize = 16;
 
 /// The stretches of samples that become recordings: at least one.
 fn pieces(
@@ -112,8 +115,8 @@ fn pieces(
     let inner = timing.breaks.iter().copied().filter(|b| *b > skip);
     let ends: Vec<usize> = std::iter::once(skip).chain(inner).chain([samples]).collect();
     let all = || ends.windows(2).map(|w| w[0]..w[1]);
-    let needed = options.min_samples.max(2);
     let longest = all().map(|p| p.len()).max().unwrap_or(0);
+    let needed = options.min_samples.max(2);
     if longest < needed && options.skip_s > 0.0 {
         let (path, skip_s, seconds) = (path.to_owned(), options.skip_s, samples as f64 / timing.rate_hz);
         return Err(RecordingError::Skipped { path, skip_s, seconds, samples: longest, needed });
@@ -121,6 +124,8 @@ fn pieces(
     if longest < needed {
         return Err(RecordingError::TooShort { path: path.to_owned(), samples: longest, needed });
     }
+    // A short one would cost all others their long scales.
+    let needed = needed.max(longest / LONGEST_OVER_SHORTEST);
     let dropped = all().filter(|p| p.len() < needed).count();
     if dropped > 0 {
         report.warn(format!("{dropped} stretches between gaps have fewer than {needed} samples: left out"));

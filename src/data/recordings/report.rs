@@ -1,7 +1,8 @@
 //! What was found in the files, for the user to check.
 
-use super::header::{Role, Unit};
+use super::header::{self, Role, Unit};
 use super::table::{Column, Raw};
+use crate::data::suggest::nearest;
 use crate::imu::{Channel, Sensor};
 use std::fmt;
 
@@ -47,6 +48,11 @@ pub struct FileReport {
     pub warnings: Vec<String>,
 }
 
+/// The name of one of the recordings of a file.
+pub(super) fn name_of(file: &str, index: usize, count: usize) -> String {
+    if count > 1 { format!("{file}[{}]", index + 1) } else { file.to_owned() }
+}
+
 impl FileReport {
     pub(super) fn new(raw: &Raw) -> Self {
         let signal = |c: &Column| match c.role {
@@ -56,11 +62,26 @@ impl FileReport {
         let columns = raw.columns.iter().filter_map(signal).collect();
         let mut report =
             Self { file: raw.path.clone(), columns, ignored: raw.ignored.clone(), ..Self::default() };
+        let has = |channel: Channel| raw.columns.iter().any(|c| c.channel() == Some(channel));
+        let missing: Vec<String> =
+            Channel::ALL.into_iter().filter(|c| !has(*c)).map(header::column_name).collect();
+        // One that means something was not asked for.
+        for name in raw.ignored.iter().filter(|name| header::classify(name, true).is_none()) {
+            if let Some(meant) = nearest(name, missing.iter().map(String::as_str)) {
+                report.warn(format!("column \"{name}\" is passed over: is it {meant}?"));
+            }
+        }
         let increments = |c: &Column| matches!(c.role, Role::Signal { unit: Unit::Increment(_), .. });
         if raw.columns.iter().any(increments) {
             report.assumptions.push("increments divided by the sample interval".into());
         }
         report
+    }
+
+    /// The names of its recordings, with their samples: of several, such as stretches between gaps, `a.csv[1]`, …
+    pub fn recordings(&self) -> impl Iterator<Item = (String, usize)> + Clone {
+        let count = self.samples.len();
+        self.samples.iter().enumerate().map(move |(i, samples)| (name_of(&self.file, i, count), *samples))
     }
 
     pub(super) fn warn(&mut self, text: String) {

@@ -409,6 +409,46 @@ fn a_directory_is_all_its_recordings_in_name_order() {
     assert!(e.is_io());
 }
 
+/// What is no error and yet not as it seems: told, and read.
+#[test]
+fn doubts_are_told() {
+    let warnings = |text: &str, options: &ReadOptions| {
+        let (_files, path) = Files::with("a.csv", text);
+        read(&[path], options).unwrap().1.files.remove(0).warnings
+    };
+    let rows = |step: f64, stands_from: usize| {
+        let value = |k: usize| (k.min(stands_from) % 7) as f64 * 1e-3;
+        (0..1000)
+            .map(|k| format!("{},{},{}\n", k as f64 * step, value(k), (k % 5) as f64))
+            .collect::<String>()
+    };
+    let plain = ReadOptions::default();
+    assert_eq!(warnings(&format!("t_s,gyro_x_rad_s,temperature\n{}", rows(0.01, 1000)), &plain), [""; 0]);
+    assert_eq!(
+        warnings(&format!("t_s,gyro_x_rad_s,gryo_y_rad_s\n{}", rows(0.01, 1000)), &plain),
+        ["column \"gryo_y_rad_s\" is passed over: is it gyro_y_rad_s?"]
+    );
+    assert_eq!(
+        warnings(&format!("t_s,gyro_x_rad_s,b\n{}", rows(10.0, 1000)), &plain),
+        ["0.1 Hz is no usual rate of an IMU: is the unit of \"t_s\" right?"]
+    );
+    assert_eq!(
+        warnings(&format!("t_s,gyro_x_rad_s,b\n{}", rows(0.01, 250)), &plain),
+        ["gyro.x (column \"gyro_x_rad_s\") stands at 0.005 for 75 % of the record, from line 252 on"]
+    );
+    // A stretch of 30 beside one of 969 would cost all the long scales.
+    let gap = |k: usize| k as f64 * 0.01 + if k >= 970 { 1.0 } else { 0.0 };
+    let text: String = (0..1000).map(|k| format!("{},{}\n", gap(k), (k % 7) as f64 * 1e-3)).collect();
+    let split = ReadOptions { gaps: Gaps::Split, ..plain };
+    assert_eq!(
+        warnings(&format!("t_s,gyro_x_rad_s\n{text}"), &split),
+        [
+            "split at 1 gaps or duplicates in time, the first in line 972",
+            "1 stretches between gaps have fewer than 60 samples: left out"
+        ]
+    );
+}
+
 mod garbage {
     use super::*;
     use proptest::prelude::*;

@@ -5,6 +5,9 @@ use super::table::{Column, Raw};
 use super::values::Values;
 use super::{FileReport, Gaps, ReadOptions, RecordingError};
 
+/// Rates beyond these are looked at twice (Hz).
+const USUAL_RATES_HZ: std::ops::RangeInclusive<f64> = 0.5..=20_000.0;
+
 /// All numbers of a column.
 fn of_file(raw: &Raw, values: Values) -> Result<Vec<f64>, RecordingError> {
     values.into_vec().map_err(|source| RecordingError::Storage { path: raw.path.clone(), source })
@@ -53,6 +56,10 @@ pub(super) fn timing(
     };
     let timing = clock.check(raw, options)?;
     report.rate_from = clock.source;
+    if !USUAL_RATES_HZ.contains(&timing.rate_hz) {
+        let (rate_hz, column) = (timing.rate_hz, &clock.name);
+        report.warn(format!("{rate_hz} Hz is no usual rate of an IMU: is the unit of \"{column}\" right?"));
+    }
     if !timing.breaks.is_empty() {
         let first = raw.lines.of(timing.breaks[0]);
         let n = timing.breaks.len();
