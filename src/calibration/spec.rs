@@ -181,10 +181,14 @@ impl ModelSpec {
         &mut self.limits
     }
 
-    /// Whether all its processes are in another model.
-    pub(super) fn is_part_of(&self, other: &Self) -> bool {
+    /// Whether another model, with some amplitudes zero and some AR1 at the ends of their range, is this one: an AR1
+    /// is white noise at phi = 0 and a random walk at phi = 1.
+    pub(super) fn is_special_case_of(&self, other: &Self) -> bool {
         let count = |spec: &Self, kind: Kind| spec.kinds.iter().filter(|k| **k == kind).count();
-        Kind::ALL.iter().all(|kind| count(self, *kind) <= count(other, *kind))
+        let more = |kind: Kind| count(self, kind).saturating_sub(count(other, kind));
+        let (white, walk) = (more(Kind::White), more(Kind::RandomWalk));
+        let others: usize = Kind::ALL.into_iter().map(more).sum::<usize>() - white - walk;
+        others == 0 && count(self, Kind::Ar1) + white + walk <= count(other, Kind::Ar1)
     }
 
     /// The kinds of process.
@@ -294,6 +298,26 @@ mod tests {
         assert_eq!(spec.to_string(), "WN+AR1+3*GM+MA1+RW+DR");
         assert_eq!(spec.to_string().parse::<ModelSpec>().unwrap(), spec);
         assert_eq!((spec.parameters(), ModelSpec::n2().parameters()), (13, 7));
+    }
+
+    #[test]
+    fn special_cases() {
+        let special = |a: &str, b: &str| {
+            a.parse::<ModelSpec>().unwrap().is_special_case_of(&b.parse::<ModelSpec>().unwrap())
+        };
+        for (a, b) in [
+            ("WN", "N1"),
+            ("N1", "N1"),
+            ("WN", "AR1"),
+            ("RW", "AR1"),
+            ("WN+RW", "2*AR1"),
+            ("WN+AR1", "2*AR1"),
+        ] {
+            assert!(special(a, b), "{a} of {b}");
+        }
+        for (a, b) in [("WN+RW", "AR1"), ("N1", "2*AR1"), ("QN", "AR1"), ("AR1", "WN+RW"), ("DR", "N2")] {
+            assert!(!special(a, b), "{a} of {b}");
+        }
     }
 
     #[test]

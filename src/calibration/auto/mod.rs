@@ -212,7 +212,7 @@ impl Field<'_> {
     fn simplest(&self, best: usize) -> (usize, Vec<(usize, f64)>) {
         let mut tested = Vec::new();
         // Ascending in their number of parameters.
-        for i in (0..self.fits.len()).filter(|i| self.fits[*i].0.is_part_of(&self.fits[best].0)) {
+        for i in (0..self.fits.len()).filter(|i| self.fits[*i].0.is_special_case_of(&self.fits[best].0)) {
             if i == best {
                 continue;
             }
