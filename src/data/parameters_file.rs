@@ -14,7 +14,7 @@
 //! sensor, and that over what is said of all.
 
 use super::toml_file::{Section, Source, TomlError};
-use crate::calibration::{ModelSpec, ParameterLimit};
+use crate::calibration::{Kind, ModelSpec, ParameterLimit};
 use crate::imu::{Axis, Sensor};
 use std::path::Path;
 
@@ -74,14 +74,17 @@ fn limits(source: &Source, spec: &ModelSpec) -> Result<Vec<ParameterLimit>, Toml
     let processes = own.clone();
     own.extend(Sensor::ALL.map(Sensor::name));
     let mut limits = Vec::new();
+    not_of_the_model(&root, &processes, spec)?;
     root.only(&[own.as_slice(), &["schema"]].concat())?;
     of_processes(&root, &processes, None, None, spec, &mut limits)?;
     for sensor in Sensor::ALL {
         let Some(section) = root.section(sensor.name())? else { continue };
+        not_of_the_model(&section, &processes, spec)?;
         section.only(&[processes.as_slice(), &Axis::ALL.map(Axis::name)].concat())?;
         of_processes(&section, &processes, Some(sensor), None, spec, &mut limits)?;
         for axis in Axis::ALL {
             let Some(section) = section.section(axis.name())? else { continue };
+            not_of_the_model(&section, &processes, spec)?;
             section.only(&processes)?;
             of_processes(&section, &processes, Some(sensor), Some(axis), spec, &mut limits)?;
         }
@@ -89,6 +92,18 @@ fn limits(source: &Source, spec: &ModelSpec) -> Result<Vec<ParameterLimit>, Toml
     // The more special later: they win.
     limits.sort_by_key(|l| usize::from(l.sensor.is_some()) + usize::from(l.axis.is_some()));
     Ok(limits)
+}
+
+/// Refuses a process that there is, but not in this model.
+fn not_of_the_model(section: &Section<'_>, processes: &[&str], spec: &ModelSpec) -> Result<(), TomlError> {
+    let is_process = |key: &str| Kind::ALL.iter().any(|k| Some(k.code()) == key.split('_').next());
+    match section.keys().into_iter().find(|key| is_process(key) && !processes.contains(key)) {
+        None => Ok(()),
+        Some(key) => {
+            let hint = format!("its processes: {}", processes.join(", "));
+            Err(section.refuse(key, format!("is no process of the model {spec}"), Some(hint)))
+        }
+    }
 }
 
 fn of_processes(
@@ -207,6 +222,10 @@ mod tests {
     fn mistakes_are_named() {
         for (text, expected) in [
             ("[WM]\n", "p.toml, line 1: unknown key \"WM\" | did you mean \"WN\"?"),
+            (
+                "[DR]\nslope = { fix = 1 }\n",
+                "p.toml, line 1: \"DR\" = [DR] is no process of the model WN+QN+2*AR1+RW | its processes: WN, QN, AR1_1, AR1_2, RW",
+            ),
             (
                 "[WN]\nsigma = { fix = 1 }\n",
                 "p.toml, line 2: unknown key \"WN.sigma\" | did you mean \"sigma2\"?",
