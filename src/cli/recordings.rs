@@ -32,7 +32,7 @@ pub(crate) struct RecordingArgs {
 enum GapsArg {
     /// Refuse the file
     Refuse,
-    /// Make each stretch between gaps a recording of its own
+    /// Make each stretch between gaps a recording of its own (but not one 16 times shorter than the longest)
     Split,
     /// Take the samples as evenly spaced
     Ignore,
