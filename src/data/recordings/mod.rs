@@ -84,8 +84,11 @@ pub fn read(paths: &[PathBuf], options: &ReadOptions) -> Result<(Vec<Recording>,
     visit(paths, &options, &|recording| recording, &|_, _| {})
 }
 
-/// Reads recordings and shows each to `look`, then lets it go: no more files than there are threads are held at a
-/// time, from any of which `look` is called. The signals of a file longer than is to be held
+/// Files that are read side by side.
+const AT_ONCE: usize = 8;
+
+/// Reads recordings and shows each to `look`, from any thread, then lets it go: no more than eight files are held at a
+/// time. The signals of a file longer than is to be held
 /// ([`ReadOptions::hold_bytes`]) are shown one by one, as recordings of the same name, no two at a time. What
 /// `look` returned is in the order of the files. `tell` is told how many files are done, and of how many, from 0 on.
 ///
@@ -101,7 +104,7 @@ pub fn visit<T: Send>(
     let (mut looks, mut report) = (Vec::new(), Report::default());
     tell(0, files.len());
     let mut done = 0;
-    for some in files.chunks(rayon::current_num_threads().max(1)) {
+    for some in files.chunks(AT_ONCE) {
         let outcomes: Vec<_> = some.par_iter().map(|file| held(&file.path, options, look)).collect();
         for (file, outcome) in some.iter().zip(outcomes) {
             match outcome {
