@@ -191,6 +191,14 @@ fn the_curves_of_wv_give_the_fits_of_their_recording() {
         assert!(a.0 == b.0 && (a.1 / b.1 - 1.0).abs() < 1e-9, "{a:?} {b:?}");
     }
     json(dir.path(), &["check", "one.wv.json"]);
+    let text = std::fs::read_to_string(dir.path().join("one.wv.json")).unwrap();
+    let edited: Value = serde_json::from_str(&text).unwrap();
+    let edited = Value::Object(
+        edited.as_object().unwrap().clone().into_iter().chain([("efficiency".into(), 0.into())]).collect(),
+    );
+    std::fs::write(dir.path().join("none.wv.json"), edited.to_string()).unwrap();
+    let stderr = refusal(dir.path(), &["calibrate", "--curve", "none.wv.json", "--model", "N1"], 2);
+    assert!(stderr.contains("none.wv.json, head: efficiency = 0 is not a number above 0"), "{stderr}");
     json(dir.path(), &["wv", "runs", "-o", "two.wv.json"]);
     let stderr = refusal(dir.path(), &["calibrate", "--curve", "two.wv.json", "--model", "N1"], 2);
     assert!(stderr.contains("two.wv.json: there are two curves of gyro.x for gmwm"), "{stderr}");
@@ -414,6 +422,10 @@ fn bad_requests_are_refused_with_a_hint() {
     check(calibrate(&["-o", "runs/run0.csv"], 2), &["is an input of this command and would be overwritten"]);
     std::fs::write(dir.path().join("known.toml"), "[WN]\nsigma2 = { upper = 1.0 }\n").unwrap();
     let onto_parameters = calibrate(&["--model", "WN", "--parameters", "known.toml", "-o", "known.toml"], 2);
+    check(
+        refusal(dir.path(), &["wv", "runs", "-o", "runs/run0.csv"], 2),
+        &["run0.csv is an input of this command"],
+    );
     check(onto_parameters, &["known.toml is an input of this command and would be overwritten"]);
     assert_eq!(std::fs::read(dir.path().join("runs/run0.csv")).unwrap(), before);
     std::fs::create_dir(dir.path().join("taken.toml")).unwrap();

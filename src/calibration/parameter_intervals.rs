@@ -70,6 +70,9 @@ pub(super) fn intervals(
                 lost if lost > TAIL => [f64::NAN; 2],
                 _ => holding(value, interval(parameter, value, drawn, stretch)),
             };
+            // The intervals of a parameter that is bounded end there.
+            let (from, to) = spec.range(i, parameter);
+            let [low, high] = [low, high].map(|end: f64| end.clamp(from, to));
             let standard_error = standard_errors[intervals.len()];
             let process = label.clone();
             intervals.push(ParameterInterval { process, parameter, low, high, lost, standard_error });

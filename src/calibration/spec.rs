@@ -162,14 +162,19 @@ impl ModelSpec {
         kind.map_or(Vec::new(), |k| k.shape_name().into_iter().chain([k.amplitude_name()]).collect())
     }
 
-    /// Whether a parameter of the process at an index has one value only.
-    pub(super) fn is_fixed(&self, index: usize, parameter: &str) -> bool {
+    /// Where a parameter of the process at an index may be, by what was given.
+    pub(super) fn range(&self, index: usize, parameter: &str) -> (f64, f64) {
         let (kind, limits) = (self.kinds[index], self.limits[index]);
-        let (low, high) = if parameter == kind.amplitude_name() {
+        if parameter == kind.amplitude_name() {
             limits.amplitude
         } else {
-            limits.shape.unwrap_or((0.0, 1.0))
-        };
+            limits.shape.unwrap_or((f64::NEG_INFINITY, f64::INFINITY))
+        }
+    }
+
+    /// Whether a parameter of the process at an index has one value only.
+    pub(super) fn is_fixed(&self, index: usize, parameter: &str) -> bool {
+        let (low, high) = self.range(index, parameter);
         low >= high
     }
 

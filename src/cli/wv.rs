@@ -2,7 +2,7 @@
 
 use super::recordings::RecordingArgs;
 use super::tuning::TuningArgs;
-use super::{Failure, Session};
+use super::{Failure, Session, read};
 use nav_sim::calibration::{Replicate, replicates};
 use nav_sim::data::atomic;
 use nav_sim::imu::{Channel, Recording};
@@ -54,7 +54,7 @@ impl Intervals {
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let tuning = args.tuning.tuning()?;
     if let Some(out) = &args.out {
-        atomic::guard_inputs(out, args.files.iter().map(PathBuf::as_path))?;
+        atomic::guard_inputs(out, read::listed(&args.files)?.iter().map(PathBuf::as_path))?;
     }
     let look = |recording: Recording| -> Result<Vec<SignalCurves>, Failure> {
         let measured = replicates(&recording, args.tuning.scales, &tuning)?;

@@ -176,16 +176,23 @@ fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, CurveError> {
         message: e.to_string(),
     };
     let Kind { signals } = serde_json::from_str(text).map_err(syntax)?;
-    let file = match signals {
-        Some(_) => CurvesFile::from(serde_json::from_str::<SignalsFile>(text).map_err(syntax)?),
-        None => serde_json::from_str(text).map_err(syntax)?,
-    };
     let refuse = |place: &str, column, value: &str, expected| CurveError::Value {
         path: path.to_owned(),
         place: place.to_owned(),
         column,
         value: value.to_owned(),
         expected,
+    };
+    let file = match signals {
+        None => serde_json::from_str(text).map_err(syntax)?,
+        Some(_) => {
+            let file: SignalsFile = serde_json::from_str(text).map_err(syntax)?;
+            if !(file.efficiency > 0.0 && file.efficiency <= 1.0) {
+                let found = file.efficiency.to_string();
+                return Err(refuse("head", "efficiency", &found, "a number above 0, up to 1"));
+            }
+            CurvesFile::from(file)
+        }
     };
     if file.schema_version != 1 {
         return Err(refuse(
