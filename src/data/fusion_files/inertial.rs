@@ -105,7 +105,7 @@ fn take(raw: &mut Raw, is: impl Fn(&Role) -> bool) -> Result<Option<(Role, Vec<f
     let Some(at) = raw.columns.iter().position(|c| is(&c.role)) else { return Ok(None) };
     let column = raw.columns.swap_remove(at);
     let values = column.values.into_vec();
-    let values = values.map_err(|source| RecordingError::Storage { path: raw.path.clone(), source })?;
+    let values = values.map_err(RecordingError::storage(&raw.path))?;
     Ok(Some((column.role, values)))
 }
 

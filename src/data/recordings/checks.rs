@@ -18,9 +18,8 @@ pub(super) fn factors(raw: &Raw, rate_hz: f64, report: &mut FileReport) -> Resul
     let from_gravity = gravity_factor(raw)?;
     let factor = |column: &Column| {
         let Role::Signal { channel, unit } = column.role else { return Ok(1.0) };
-        let standing = standing(&column.values);
         let Standing { first, count, value } =
-            standing.map_err(|source| RecordingError::Storage { path: raw.path.clone(), source })?;
+            standing(&column.values).map_err(RecordingError::storage(&raw.path))?;
         let all = column.values.len();
         if count == all && all > 1 {
             let (path, column) = (raw.path.clone(), column.name.clone());
@@ -52,7 +51,7 @@ pub(in crate::data) fn gravity_factor(raw: &Raw) -> Result<f64, RecordingError> 
     let Some(first) = unnamed.first() else { return Ok(1.0) };
     let means =
         unnamed.iter().map(|c| mean(&c.values, 0..c.values.len(), 1.0)).collect::<Result<Vec<_>, _>>();
-    let means = means.map_err(|source| RecordingError::Storage { path: raw.path.clone(), source })?;
+    let means = means.map_err(RecordingError::storage(&raw.path))?;
     let norm = norm(&means);
     let near = |target: f64| (norm / target - 1.0).abs() < 0.1;
     if unnamed.len() == 3 {

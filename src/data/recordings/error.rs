@@ -117,6 +117,11 @@ const COLUMNS: &str = "name the columns t_s, accel_x_m_s2 … gyro_z_rad_s (also
                        t_ns), or give the names with --columns";
 
 impl RecordingError {
+    /// For a file whose samples cannot be kept, or taken back.
+    pub(in crate::data) fn storage(path: &str) -> impl Fn(std::io::Error) -> Self {
+        move |source| Self::Storage { path: path.to_owned(), source }
+    }
+
     pub(super) fn header(path: &str, line: u64, e: HeaderError) -> Self {
         let path = path.to_owned();
         match e {

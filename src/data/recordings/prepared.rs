@@ -37,12 +37,12 @@ impl Prepared {
         let factors = checks::factors(&raw, timing.rate_hz, &mut report)?;
         let samples = raw.columns.first().map_or(0, |c| c.values.len());
         let pieces = pieces(&raw.path, samples, &timing, options, &mut report)?;
-        let stored = |source| RecordingError::Storage { path: raw.path.clone(), source };
+        let stored = RecordingError::storage(&raw.path);
         let mut columns = Vec::new();
         for (column, factor) in raw.columns.into_iter().zip(factors) {
             let Some(channel) = column.channel() else { continue };
             let mean = |piece: &Range<usize>| checks::mean(&column.values, piece.clone(), factor);
-            let means = pieces.iter().map(mean).collect::<Result<_, _>>().map_err(stored)?;
+            let means = pieces.iter().map(mean).collect::<Result<_, _>>().map_err(&stored)?;
             columns.push(Signals { column, channel, factor, means });
         }
         let means_of = |i| columns.iter().map(|c| (c.channel, c.means[i])).collect::<Vec<_>>();
@@ -52,7 +52,7 @@ impl Prepared {
         report.samples = pieces.iter().map(Range::len).collect();
         report.rate_hz = timing.rate_hz;
         report.means = means_of(0);
-        Ok((Self { path: raw.path, rate_hz: timing.rate_hz, columns, pieces }, report))
+        Ok((Self { path: raw.path.clone(), rate_hz: timing.rate_hz, columns, pieces }, report))
     }
 
     pub(super) fn is_stored(&self) -> bool {
@@ -65,8 +65,7 @@ impl Prepared {
         for signals in self.columns {
             let Signals { column, channel, factor, means } = signals;
             let stretches = column.values.into_stretches(&self.pieces);
-            let stretches =
-                stretches.map_err(|source| RecordingError::Storage { path: self.path.clone(), source })?;
+            let stretches = stretches.map_err(RecordingError::storage(&self.path))?;
             for ((recording, samples), mean) in recordings.iter_mut().zip(stretches).zip(means) {
                 recording.signals.push(signal(channel, samples, factor, mean));
             }
@@ -78,8 +77,7 @@ impl Prepared {
     pub(super) fn signals(&self) -> impl Iterator<Item = Result<Recording, RecordingError>> {
         let one = |(i, piece, signals): (usize, &Range<usize>, &Signals)| {
             let samples = signals.column.values.stretch(piece.clone());
-            let samples =
-                samples.map_err(|source| RecordingError::Storage { path: self.path.clone(), source })?;
+            let samples = samples.map_err(RecordingError::storage(&self.path))?;
             let signal = signal(signals.channel, samples, signals.factor, signals.means[i]);
             Ok(Recording { signals: vec![signal], ..self.recording(i) })
         };

@@ -96,7 +96,7 @@ fn load_npy(path: &Path, options: &ReadOptions) -> Result<Raw, RecordingError> {
     let (indices, mut columns) = layout.columns();
     let place: Vec<Option<usize>> =
         (0..expected).map(|index| indices.iter().position(|i| *i == index)).collect();
-    let stored = |source| RecordingError::Storage { path: name.clone(), source };
+    let stored = RecordingError::storage(&name);
     let mut count = 0;
     array.each(|row, index, value| {
         let Some(at) = place[index] else { return Ok(()) };
@@ -109,14 +109,20 @@ fn load_npy(path: &Path, options: &ReadOptions) -> Result<Raw, RecordingError> {
             });
         }
         if count % BETWEEN == 0 {
-            relieve(&mut columns, options).map_err(stored)?;
+            relieve(&mut columns, options).map_err(&stored)?;
         }
         count += 1;
         columns[at].values.push(value);
         Ok(())
     })?;
-    settle(&mut columns, options).map_err(stored)?;
-    Ok(Raw { path: name, columns, ignored: layout.ignored, head_rate_hz: None, lines: Lines::default() })
+    settle(&mut columns, options).map_err(&stored)?;
+    Ok(Raw {
+        path: name.clone(),
+        columns,
+        ignored: layout.ignored,
+        head_rate_hz: None,
+        lines: Lines::default(),
+    })
 }
 
 /// So many rows, or elements, come between one look at what is held and the next.

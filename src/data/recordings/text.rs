@@ -43,11 +43,11 @@ pub(super) fn parse(name: &str, mut reader: Reader, options: &ReadOptions) -> Re
     if lines.is_empty() {
         return Err(RecordingError::Empty { path: name.to_owned() });
     }
-    let stored = |source| RecordingError::Storage { path: name.to_owned(), source };
-    settle(&mut columns, options).map_err(stored)?;
+    let stored = RecordingError::storage(name);
+    settle(&mut columns, options).map_err(&stored)?;
     let mut kept = Vec::new();
     for column in columns {
-        if column.role != Role::Ticks || all_finite(&column.values).map_err(stored)? {
+        if column.role != Role::Ticks || all_finite(&column.values).map_err(&stored)? {
             kept.push(column);
         }
     }
@@ -192,8 +192,7 @@ fn read_rows(
             return Err(RecordingError::RowLength { path: name.to_owned(), line, found, expected });
         }
         if sample % BETWEEN == 0 {
-            relieve(columns, options)
-                .map_err(|source| RecordingError::Storage { path: name.to_owned(), source })?;
+            relieve(columns, options).map_err(RecordingError::storage(name))?;
         }
         for (index, column) in indices.iter().zip(columns.iter_mut()) {
             let cell = record.get(*index).unwrap_or_default();

@@ -10,7 +10,7 @@ const USUAL_RATES_HZ: std::ops::RangeInclusive<f64> = 0.5..=20_000.0;
 
 /// All numbers of a column.
 fn of_file(raw: &Raw, values: Values) -> Result<Vec<f64>, RecordingError> {
-    values.into_vec().map_err(|source| RecordingError::Storage { path: raw.path.clone(), source })
+    values.into_vec().map_err(RecordingError::storage(&raw.path))
 }
 
 /// When the samples were taken.
