@@ -197,7 +197,8 @@ const DRAWS: usize = 2000;
 /// The fit again, weighted by the covariance of curves drawn from it: the scatter within recordings and the
 /// differences between them.
 fn weigh_fully(group: &Group, outcome: &mut Outcome, settings: &Settings) -> Result<(), FitError> {
-    if group.replicates.is_empty() {
+    // Of a curve from elsewhere nothing more is known; a model that is fixed is not fitted.
+    if group.replicates.is_empty() || outcome.spec.parameters() == 0 {
         return Ok(());
     }
     let sampler = CurveSampler::new(&group.replicates, outcome, settings);

@@ -65,16 +65,14 @@ pub fn replicates(
     levels: Option<u32>,
     tuning: &Tuning,
 ) -> Result<Vec<(Channel, Replicate)>, SignalError> {
-    let one =
-        |signal: &Signal| {
-            let samples = signal.samples.len();
-            let levels = levels.unwrap_or_else(|| default_levels(samples));
-            let (classical, robust) = both(&signal.samples, levels, tuning).map_err(|source| {
-                SignalError { recording: recording.name.clone(), channel: signal.channel, source }
-            })?;
-            let (name, axis) = (recording.name.clone(), Some(signal.channel.axis));
-            Ok((signal.channel, Replicate { name, axis, samples, classical, robust }))
-        };
+    let one = |signal: &Signal| {
+        let (channel, samples) = (signal.channel, signal.samples.len());
+        let levels = levels.unwrap_or_else(|| default_levels(samples));
+        let error = |source| SignalError { recording: recording.name.clone(), channel, source };
+        let (classical, robust) = both(&signal.samples, levels, tuning).map_err(error)?;
+        let (name, axis) = (recording.name.clone(), Some(channel.axis));
+        Ok((channel, Replicate { name, axis, samples, classical, robust }))
+    };
     recording.signals.par_iter().map(one).collect()
 }
 
