@@ -18,7 +18,8 @@ use crate::rng::{Generator, StreamKey};
 use crate::wavelet::{Curve, RobustVariance, Status};
 use nalgebra::DMatrix;
 
-/// The bias of a robust variance is not known to grow beyond this: its expansion ends with two degrees of freedom.
+/// Beyond this the expansion of the bias of a robust variance ends: the most that was measured (README, Limits: 21 % with
+/// two lengths of the scale in the record).
 const LARGEST_BIAS: f64 = 0.2;
 
 /// Draws curves as the fitted model and the spread of the replicates would give them.

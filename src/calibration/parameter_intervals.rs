@@ -144,8 +144,8 @@ fn log_time(process: &Process) -> f64 {
 /// Amplitudes and correlation times are scale parameters: estimate over truth is distributed as draw over estimate, whatever
 /// the truth. So the ends are estimate²/draw at the quantiles of the draws (exact for a variance whose estimate
 /// is a chi-square; the same as the quantiles themselves where the draws are symmetric in the logarithm); theta
-/// of MA1 likewise with differences. It takes no skewness of the draws, which have heavy tails. Where the
-/// estimate or a quantile is at the bound, 0, the ends are the quantiles themselves.
+/// of MA1 likewise with differences. The distances of the quantiles from the median are multiplied by `stretch`. Where
+/// the estimate or a quantile is at the bound, 0, the ends are the quantiles themselves.
 fn interval(parameter: &str, estimate: f64, drawn: Vec<f64>, stretch: f64) -> [f64; 2] {
     let scale = |value: f64| match parameter {
         "phi" => (-value.ln()).ln(),

@@ -1,7 +1,7 @@
 //! Standard errors without a bootstrap: what a fit passes on, to first order, of the scatter of its curve.
 //!
 //! cov(theta) = A Sigma Aᵀ with A = (Jᵀ Omega J)⁻¹ Jᵀ Omega, J the derivatives of the model's wavelet variance, Sigma
-//! the covariance of curves ([Guerrier](crate::bibliography::Guerrier13), theorem 2). A parameter that stands at a
+//! the covariance of curves (the asymptotic covariance of [Guerrier](crate::bibliography::Guerrier13)). A parameter that stands at a
 //! bound, or whose process has no amplitude, is taken as known. Slopes (AVLR) are no least squares: they have none.
 
 use super::average::Estimator;

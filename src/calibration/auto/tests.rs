@@ -32,7 +32,8 @@ fn outcome(set: u64, noise: &Composite) -> Outcome {
     calibrate(&groups, &settings).unwrap().remove(0)
 }
 
-/// 8 sets each. The true model is refused with a probability of about 5 % if the best of some larger ones seems better;
+/// 8 sets each. The true model is refused with a probability of 1 % against one larger model, up to 5 % against the best
+/// of five;
 /// anything simpler is far off (the parts differ by factors at several scales). So 0.95·8 = 7.6 ± 0.62 sets choose
 /// the truth; four deviations below are 5.1.
 #[test]

@@ -99,7 +99,7 @@ fn alike_recordings_raise_no_more_alarms_than_said() {
 /// The same at length, printed: `cargo test --release -- --ignored --nocapture false_alarm_rates`. 400 sets
 /// know a rate of 2.5 % to 0.8 %.
 #[test]
-#[ignore = "minutes"]
+#[ignore = "six minutes"]
 fn false_alarm_rates() {
     for (count, deviation, shared) in [
         (4, 0.1, 0.0),
