@@ -66,7 +66,7 @@ fn the_virtual_imus_are_what_they_say() {
     let (micro_g, deg_h) = (9.806_65e-6, 1.0_f64.to_radians() / 3600.0);
     let deg_root_h = 1.0_f64.to_radians() / 60.0;
     for (name, accel_density, accel_floor, arw, gyro_floor) in [
-        ("consumer_mems.toml", (75.0, 0.5), (40.0, 0.5), (0.42, 0.005), (8.2, 0.05)),
+        ("consumer_mems.toml", (75.0, 0.5), (40.0, 0.5), (0.42, 0.005), (8.3, 0.05)),
         ("tactical.toml", (51.0, 0.5), (12.0, 0.5), (0.04, 0.0005), (0.29, 0.005)),
     ] {
         let file = model_file::read(&shipped(name)).unwrap();
