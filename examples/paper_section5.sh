@@ -18,16 +18,16 @@ nav-sim calibrate out/paper_section5/I --estimator all -o out/paper_section5/mod
 nav-sim calibrate out/paper_section5/II --estimator all -o out/paper_section5/models/II.toml
 nav-sim calibrate out/paper_section5/III --estimator all -o out/paper_section5/models/III.toml
 
-# 100 runs with each model in the filter, on the same errors and the same GNSS noise.
-nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/I_awv.toml --static out/paper_section5/ninth --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/I_awv
-nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/I_sr-awv.toml --static out/paper_section5/ninth --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/I_sr-awv
-nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/I_dr-awv.toml --static out/paper_section5/ninth --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/I_dr-awv
-nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/II_awv.toml --static out/paper_section5/ninth --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/II_awv
-nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/II_sr-awv.toml --static out/paper_section5/ninth --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/II_sr-awv
-nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/II_dr-awv.toml --static out/paper_section5/ninth --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/II_dr-awv
-nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/III_awv.toml --static out/paper_section5/ninth --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/III_awv
-nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/III_sr-awv.toml --static out/paper_section5/ninth --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/III_sr-awv
-nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/III_dr-awv.toml --static out/paper_section5/ninth --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/III_dr-awv
+# 100 runs with each model in the filter (a state for each AR1 and random walk), on the same errors and GNSS noise.
+nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/I_awv.toml --static out/paper_section5/ninth --filter full --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/I_awv
+nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/I_sr-awv.toml --static out/paper_section5/ninth --filter full --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/I_sr-awv
+nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/I_dr-awv.toml --static out/paper_section5/ninth --filter full --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/I_dr-awv
+nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/II_awv.toml --static out/paper_section5/ninth --filter full --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/II_awv
+nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/II_sr-awv.toml --static out/paper_section5/ninth --filter full --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/II_sr-awv
+nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/II_dr-awv.toml --static out/paper_section5/ninth --filter full --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/II_dr-awv
+nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/III_awv.toml --static out/paper_section5/ninth --filter full --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/III_awv
+nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/III_sr-awv.toml --static out/paper_section5/ninth --filter full --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/III_sr-awv
+nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/III_dr-awv.toml --static out/paper_section5/ninth --filter full --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/III_dr-awv
 
 # The filters' own standard deviations relative to AWV on clean recordings: the paper's Table I.
 nav-sim compare out/paper_section5/runs/I_awv out/paper_section5/runs/I_sr-awv out/paper_section5/runs/I_dr-awv out/paper_section5/runs/II_awv out/paper_section5/runs/II_sr-awv out/paper_section5/runs/II_dr-awv out/paper_section5/runs/III_awv out/paper_section5/runs/III_sr-awv out/paper_section5/runs/III_dr-awv --reference out/paper_section5/runs/I_awv -o out/paper_section5/comparison.json

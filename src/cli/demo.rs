@@ -10,7 +10,8 @@ use clap::Parser;
 /// run again: eight static recordings of a virtual consumer IMU (scenario I), the same with replaced points,
 /// vibrations and steps (II), and with two abnormal recordings of each sensor (III); AWV, SR-AWV and DR-AWV
 /// on each; Monte-Carlo navigation with errors from windows of one more clean recording and two outages of
-/// 90 s; the ASEE of each filter relative to AWV in scenario I.
+/// 90 s, the filter with a state for each AR1 and random walk as in the paper; the ASEE of each filter relative to AWV in
+/// scenario I.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -70,7 +71,7 @@ fn commands(args: &Args, seed: u64) -> Vec<Vec<String>> {
     let pairs = || SCENARIOS.iter().flat_map(|s| ESTIMATORS.iter().map(move |e| format!("{s}_{e}")));
     lines.extend(pairs().map(|name| {
         format!(
-            "run {TRAJECTORY} @/models/{name}.toml --static @/ninth --outage 300:390 --outage 700:790 \
+            "run {TRAJECTORY} @/models/{name}.toml --static @/ninth --filter full --outage 300:390 --outage 700:790 \
              --runs {} --seed {seed} -o @/runs/{name}",
             args.runs
         )
