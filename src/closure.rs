@@ -4,6 +4,7 @@
 use crate::earth::{GravityModel, MAX_LATITUDE, ned_difference};
 use crate::frames::NavState;
 use crate::lanes::Vec3;
+use crate::linalg::larger;
 use crate::sensors::ideal_imu::{self, ideal_imu};
 use crate::strapdown::{self, Strapdown};
 use crate::trajectory::Trajectory;
@@ -103,17 +104,47 @@ impl Closure {
     fn widen(&mut self, truth: &NavState, found: &NavState) {
         let apart = ned_difference(truth, found.lat, found.lon, found.h);
         let turned = 2.0 * (truth.q_b_n.conjugate() * found.q_b_n).xyz().length();
-        self.position_m = self.position_m.max(apart.length());
-        self.horizontal_m = self.horizontal_m.max(apart.truncate().length());
-        self.velocity_m_s = self.velocity_m_s.max((found.v_n - truth.v_n).length());
-        self.attitude_rad = self.attitude_rad.max(turned);
+        self.position_m = larger(self.position_m, apart.length());
+        self.horizontal_m = larger(self.horizontal_m, apart.truncate().length());
+        self.velocity_m_s = larger(self.velocity_m_s, (found.v_n - truth.v_n).length());
+        self.attitude_rad = larger(self.attitude_rad, turned);
     }
 
-    /// Whether it is within the bounds.
+    /// Whether it is within the bounds; what is not finite is within none.
     #[must_use]
     pub fn within(&self, bounds: &Bounds) -> bool {
         self.position_m <= bounds.position_m
             && self.velocity_m_s <= bounds.velocity_m_s
             && self.attitude_rad <= bounds.attitude_rad
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{DQuat, DVec3};
+
+    /// A navigation that became NaN, at any epoch, is the largest error there is.
+    #[test]
+    fn what_is_not_finite_is_never_within_bounds() {
+        let state = NavState { lat: 0.8, lon: 0.1, h: 400.0, v_n: DVec3::ZERO, q_b_n: DQuat::IDENTITY };
+        let lost = NavState { h: f64::NAN, v_n: DVec3::NAN, q_b_n: DQuat::NAN, ..state };
+        let mut closure = Closure {
+            rate_hz: 100.0,
+            duration_s: 1.0,
+            position_m: 0.0,
+            horizontal_m: 0.0,
+            velocity_m_s: 0.0,
+            attitude_rad: 0.0,
+        };
+        closure.widen(&state, &state);
+        assert!(closure.within(&Bounds::default()));
+        closure.widen(&state, &lost);
+        closure.widen(&state, &state);
+        assert!(
+            closure.position_m.is_nan() && closure.velocity_m_s.is_nan() && closure.attitude_rad.is_nan()
+        );
+        assert!(!closure.within(&Bounds::default()));
+        assert!(!closure.within(&Bounds { position_m: f64::INFINITY, velocity_m_s: 1.0, attitude_rad: 1.0 }));
     }
 }

@@ -3,6 +3,12 @@
 use glam::{DMat3, DVec3};
 use nalgebra::{Matrix3, Vector3};
 
+/// The larger of two numbers; NaN where either is, so that what was lost is not overlooked.
+#[must_use]
+pub const fn larger(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a >= b { a } else { b }
+}
+
 /// glam vector to nalgebra.
 #[must_use]
 pub fn to_nalgebra(v: DVec3) -> Vector3<f64> {
@@ -30,6 +36,12 @@ pub fn skew(v: DVec3) -> Matrix3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_larger_of_anything_and_nan_is_nan() {
+        assert_eq!((larger(1.0, 2.0), larger(2.0, 1.0)), (2.0, 2.0));
+        assert!(larger(f64::NAN, 1.0).is_nan() && larger(1.0, f64::NAN).is_nan());
+    }
 
     #[test]
     fn a_matrix_keeps_its_rows_and_columns() {

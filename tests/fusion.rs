@@ -81,7 +81,8 @@ fn run(
     settings: &Settings,
     reference: &Trajectory,
 ) -> Solution {
-    fuse(&Recorded { imu, gnss }, &belief(&model()), start, settings, Some(reference)).unwrap()
+    fuse(&Recorded { imu, gnss }, &belief(&model()), start, settings, Some(&reference.clone().into()))
+        .unwrap()
 }
 
 /// On recordings made from the model that the filter believes, on three shipped trajectories, the errors

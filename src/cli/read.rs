@@ -8,6 +8,7 @@ use nav_sim::data::trajectory_file::{self, TrajectoryFileError};
 use nav_sim::imu::Recording;
 use nav_sim::report::Input;
 use nav_sim::trajectory::Trajectory;
+use nav_sim::trajectory::reference::Reference;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -46,6 +47,16 @@ pub(super) fn trajectory(path: &Path, session: &Session) -> Result<Trajectory, F
         session.printer.warn(&warning.to_string());
     }
     Ok(trajectory)
+}
+
+/// A trajectory to compare with; what is left out of it is said.
+pub(super) fn reference(path: &Path, session: &Session) -> Result<Reference, Failure> {
+    let (reference, warnings) = trajectory_file::load_reference(path, &trajectory_file::Options::default())
+        .map_err(without_options)?;
+    for warning in warnings {
+        session.printer.warn(&warning.to_string());
+    }
+    Ok(reference)
 }
 
 /// A model; axes that it does not name are said.

@@ -16,7 +16,7 @@ use crate::frames::NavState;
 use crate::gnss::GnssFix;
 use crate::imu::ImuIncrement;
 use crate::sensors::outage::Outage;
-use crate::trajectory::Trajectory;
+use crate::trajectory::reference::Reference;
 use crate::units::DEG;
 use filter::Filter;
 use glam::{DQuat, DVec3};
@@ -238,7 +238,7 @@ pub fn fuse(
     belief: &Belief,
     start: &Start,
     settings: &Settings,
-    reference: Option<&Trajectory>,
+    reference: Option<&Reference>,
 ) -> Result<Solution, FusionError> {
     check_clocks(recorded)?;
     let imu = spans(recorded).0;
@@ -292,7 +292,7 @@ fn check_place(recorded: &Recorded<'_>, start: &Start, settings: &Settings) -> R
 struct Run<'a> {
     filter: Filter,
     settings: &'a Settings,
-    reference: Option<&'a Trajectory>,
+    reference: Option<&'a Reference>,
     now: f64,
     next_row: f64,
     solution: Solution,
@@ -342,8 +342,7 @@ impl Run<'_> {
 
     /// Difference from the reference now, if it reaches here.
     fn error(&mut self) -> Option<RowError> {
-        let reference = self.reference?;
-        let inside = (reference.start_s()..=reference.end_s()).contains(&self.now);
-        inside.then(|| self.filter.error(&reference.state(self.now)))
+        let truth = self.reference?.state(self.now)?;
+        Some(self.filter.error(&truth))
     }
 }

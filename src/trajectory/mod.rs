@@ -7,6 +7,7 @@
 pub mod import;
 pub mod plausibility;
 pub mod profile;
+pub mod reference;
 mod spline;
 
 use crate::earth::{MAX_LATITUDE, e_to_n, ecef_to_geodetic, geodetic_to_ecef};

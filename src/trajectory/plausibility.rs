@@ -2,6 +2,7 @@
 //! velocities that agree with positions.
 
 use super::Trajectory;
+use crate::linalg::larger;
 use crate::units::DEG;
 use glam::DVec3;
 use std::fmt;
@@ -110,9 +111,9 @@ pub fn examine(trajectory: &Trajectory, limits: &Limits) -> ([f64; 4], Vec<Exces
     // Acceleration is linear between knots, so that its extremes are at knots.
     for &t_s in trajectory.knots() {
         for (i, value) in magnitudes(trajectory, t_s).into_iter().enumerate() {
-            largest[i] = largest[i].max(value);
+            largest[i] = larger(largest[i], value);
             let limit = Quantity::ALL[i].limit(limits);
-            if value > limit {
+            if value.is_nan() || value > limit {
                 let event = Excess {
                     quantity: Quantity::ALL[i],
                     limit,

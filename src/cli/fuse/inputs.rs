@@ -13,7 +13,7 @@ use nav_sim::imu::Sensor;
 use nav_sim::noise::{Composite, Model, Process, continuous, reduction};
 use nav_sim::report::Input;
 use nav_sim::sensors::outage::{Outage, OutagePlan};
-use nav_sim::trajectory::Trajectory;
+use nav_sim::trajectory::reference::Reference;
 use nav_sim::units::DEG;
 use std::path::{Path, PathBuf};
 
@@ -31,7 +31,7 @@ pub(super) struct Inputs {
     pub(super) imu: ImuFile,
     pub(super) gnss: Vec<GnssFix>,
     pub(super) belief: Belief,
-    pub(super) reference: Option<Trajectory>,
+    pub(super) reference: Option<Reference>,
     initial: Option<Start>,
     /// Every file with its hash.
     pub(super) files: Vec<Input>,
@@ -57,7 +57,7 @@ impl Inputs {
             Some(path) => Some(read_initial(path)?),
             None => None,
         };
-        let reference = args.reference.as_deref().map(|path| read::trajectory(path, session)).transpose()?;
+        let reference = args.reference.as_deref().map(|path| read::reference(path, session)).transpose()?;
         Ok(Self { imu, gnss, belief, reference, initial, files })
     }
 

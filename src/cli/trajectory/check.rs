@@ -157,7 +157,7 @@ impl Args {
             (c.attitude_rad, self.max_attitude_rad, "rad"),
         ]
         .into_iter()
-        .filter(|(found, bound, _)| found > bound)
+        .filter(|(found, bound, _)| found.is_nan() || found > bound)
         .map(|(found, bound, unit)| format!("{found:.3e} {unit}, beyond {bound:e} {unit}"))
         .collect::<Vec<_>>();
         Failure::bound(format!("{}: closure at {} Hz is {}", report.file, c.rate_hz, text.join("; ")))

@@ -11,7 +11,7 @@ pub use fixes::read_gnss;
 pub use inertial::{ImuFile, read_imu};
 pub use initial::read_initial;
 
-use crate::data::trajectory_file::table::{self, Table};
+use crate::data::trajectory_file::table::{self, Numbers, Table};
 use std::path::Path;
 
 /// Whether a text is a table of numbers between blanks without a header, of that many columns.
@@ -25,7 +25,7 @@ fn is_bare(text: &str, columns: usize) -> bool {
 
 /// The table of a file, its columns named when it has no header.
 fn table(path: &Path, text: &str, columns: Option<&[&str]>) -> Result<Table, FusionFileError> {
-    Ok(Table::read(&path.display().to_string(), text.as_bytes(), columns)?)
+    Ok(Table::read(&path.display().to_string(), text.as_bytes(), columns, Numbers::Finite)?)
 }
 
 fn text(path: &Path) -> Result<String, FusionFileError> {

@@ -43,9 +43,23 @@ pub enum TrajectoryFileError {
     /// Rows that no trajectory goes through.
     #[error("{path}, line {line}: {source}")]
     Samples { path: String, line: u64, source: trajectory::Error },
+    /// Not a height in metres.
+    #[error("{path}, line {line}: height {h} m is not within −12 to 1000 km")]
+    Height { path: String, line: u64, h: f64 },
+    /// Rows too far apart in time.
+    #[error("{path}, line {line}: the rows are {step_s} s apart")]
+    SlowRows { path: String, line: u64, step_s: f64 },
+    /// Longer than can be simulated.
+    #[error(
+        "{path}, line {line}: time goes from {previous_s} s to {t_s} s: the rows cover {duration_s} s, a day at most"
+    )]
+    TooLong { path: String, line: u64, duration_s: f64, previous_s: f64, t_s: f64 },
     /// Two rows too far apart.
     #[error("{path}, line {line}: position jumps by {metres:.0} m in {seconds} s")]
     Jump { path: String, line: u64, metres: f64, seconds: f64 },
+    /// A reference that jumps throughout.
+    #[error("{path}: no stretch of five seconds without a jump in position or attitude")]
+    NoStretch { path: String },
     /// A text format that is not followed.
     #[error("{path}, line {line}: {message}")]
     Format { path: String, line: u64, message: String },
@@ -91,6 +105,11 @@ impl TrajectoryFileError {
             Self::Samples { source: E::TooFew { .. }, .. } => "give at least four rows, one a second or more",
             Self::Samples { source: E::Latitude { .. }, .. } => {
                 "latitude and longitude cannot navigate at the poles; is a column swapped?"
+            }
+            Self::Height { .. } => "is a value in the wrong column, or the row damaged?",
+            Self::SlowRows { .. } => "give at least one row a second; is the time in milliseconds (t_ms)?",
+            Self::TooLong { .. } => {
+                "is that time stamp damaged, on another clock, or in another unit? Split what lasts longer than a day"
             }
             Self::Jump { .. } => "is a latitude swapped with a longitude, a sign lost, or a row damaged?",
             _ => return None,

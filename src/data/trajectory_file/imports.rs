@@ -1,10 +1,10 @@
 //! Trajectories of other tools: KF-GINS results, TUM, GPX, motion definitions of gnss-ins-sim.
 
-use super::samples::{Doubts, build, follow_path, local};
-use super::table::Table;
-use super::{Options, TrajectoryFileError as Error, Warning};
+use super::samples::{Attitude, Rows, local};
+use super::table::{Numbers, Table};
+use super::{Options, TrajectoryFileError as Error};
+use crate::trajectory::TrajectorySample;
 use crate::trajectory::import::{BodyMotion, Command};
-use crate::trajectory::{Trajectory, TrajectorySample};
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
@@ -12,12 +12,13 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI};
 /// Seconds of a GNSS week.
 const WEEK_S: f64 = 604_800.0;
 
-type Loaded = Result<(Trajectory, Vec<Warning>), Error>;
+/// Longest motion definition (s).
+const DAY_S: f64 = 86_400.0;
 
 /// A KF-GINS navigation result or truth: week, seconds of week, latitude, longitude (deg), height (m), velocity
 /// north, east, down (m/s), roll, pitch, yaw (deg), between blanks. Read as our own table, time counted on
 /// from the first week.
-pub(super) fn kf_gins(path: &str, text: &str, options: &Options) -> Loaded {
+pub(super) fn kf_gins(path: &str, text: &str, options: &Options, numbers: Numbers) -> Result<Rows, Error> {
     let names = [
         "week",
         "t_s",
@@ -31,21 +32,22 @@ pub(super) fn kf_gins(path: &str, text: &str, options: &Options) -> Loaded {
         "pitch_deg",
         "yaw_deg",
     ];
-    let mut table = Table::read(path, text.as_bytes(), Some(&names))?;
+    let mut table = Table::read(path, text.as_bytes(), Some(&names), numbers)?;
     let first = table.rows[0].1[0];
     for (_, row) in &mut table.rows {
         let week = row.remove(0);
         row[0] += (week - first) * WEEK_S;
     }
     table.columns.remove(0);
-    super::samples::trajectory(&table, options)
+    super::samples::rows(table, options, numbers)
 }
 
 /// A TUM file: time, x, y, z (m), quaternion x, y, z, w, between blanks. The axes are taken as ROS has them
 /// (REP 103): position east, north, up of the origin; body forward, left, up.
-pub(super) fn tum(path: &str, text: &str, options: &Options) -> Loaded {
+pub(super) fn tum(path: &str, text: &str, options: &Options, numbers: Numbers) -> Result<Rows, Error> {
     let names = ["t_s", "x", "y", "z", "qx", "qy", "qz", "qw"];
-    let table = Table::read(path, text.as_bytes(), Some(&names))?;
+    let mut table = Table::read(path, text.as_bytes(), Some(&names), numbers)?;
+    table.rows.retain(|(_, row)| row.iter().all(|x| x.is_finite()));
     let origin = super::samples::origin(&table, options)?;
     // East-north-up to north-east-down, front-right-down to front-left-up: half turns.
     let q_enu_ned = DQuat::from_xyzw(FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0, 0.0);
@@ -64,14 +66,26 @@ pub(super) fn tum(path: &str, text: &str, options: &Options) -> Loaded {
         let r_ned = q_enu_ned * DVec3::new(row[1], row[2], row[3]);
         samples.push(local(row[0], origin, r_ned, q_enu_ned * q_flu_enu * q_frd_flu));
     }
-    let trajectory = build(&table, &samples)?;
-    let mut doubts = Doubts { path, found: Vec::new() };
-    doubts.add(None, "axes taken as ROS has them: position east, north, up; body forward, left, up".into());
-    Ok((trajectory, doubts.found))
+    let mut rows = of_samples(path, &table, samples, Attitude::Given);
+    rows.doubt(None, "axes taken as ROS has them: position east, north, up; body forward, left, up");
+    Ok(rows)
+}
+
+/// Samples of the rows of a table, without velocities.
+fn of_samples(path: &str, table: &Table, samples: Vec<TrajectorySample>, attitude: Attitude) -> Rows {
+    Rows {
+        path: path.to_owned(),
+        lines: table.rows.iter().map(|(line, _)| *line).collect(),
+        samples,
+        attitude,
+        velocities: Vec::new(),
+        geodetic: false,
+        doubts: Vec::new(),
+    }
 }
 
 /// A GPX track: time, latitude, longitude, elevation of every `trkpt`; heading and pitch along the path.
-pub(super) fn gpx(path: &str, text: &str) -> Loaded {
+pub(super) fn gpx(path: &str, text: &str) -> Result<Rows, Error> {
     let mut table = Table::of_columns(path, &["time", "lat", "lon", "ele"]);
     for (line, point) in track_points(text) {
         let row = [
@@ -96,15 +110,11 @@ pub(super) fn gpx(path: &str, text: &str) -> Loaded {
         h: row[3],
         q_b_n: DQuat::IDENTITY,
     };
-    let mut samples: Vec<_> = table.rows.iter().map(at).collect();
-    follow_path(&table, &mut samples)?;
-    let trajectory = build(&table, &samples)?;
-    let mut doubts = Doubts { path, found: Vec::new() };
-    doubts.add(None, "no attitude in GPX: heading and pitch follow the path, roll is 0".into());
-    doubts
-        .add(None, "elevations are taken as heights above the ellipsoid, times from the first point".into());
-    doubts.steps(&samples, &table);
-    Ok((trajectory, doubts.found))
+    let samples = table.rows.iter().map(at).collect();
+    let mut rows = of_samples(path, &table, samples, Attitude::OfPath);
+    rows.doubt(None, "no attitude in GPX: heading and pitch follow the path, roll is 0");
+    rows.doubt(None, "elevations are taken as heights above the ellipsoid, times from the first point");
+    Ok(rows)
 }
 
 /// Line and text of every `<trkpt …>…</trkpt>`.
@@ -147,7 +157,11 @@ fn seconds(text: &str) -> Option<f64> {
     };
     match (&day[..], &clock[..]) {
         (&[y, m, d], &[h, min, s]) => {
-            Some(days(y, m, d) as f64 * 86_400.0 + h * 3600.0 + min * 60.0 + s + shift)
+            let calendar = (1..=12).contains(&m) && (1..=31).contains(&d) && (1..=9999).contains(&y);
+            // 61 s: a leap second
+            let of_day = (0.0..=24.0).contains(&h) && (0.0..60.0).contains(&min) && (0.0..61.0).contains(&s);
+            (calendar && of_day && shift.abs() <= DAY_S)
+                .then(|| days(y, m, d) as f64 * DAY_S + h * 3600.0 + min * 60.0 + s + shift)
         }
         _ => None,
     }
@@ -167,7 +181,7 @@ pub(super) fn is_motion_definition(text: &str) -> bool {
 /// A motion definition of gnss-ins-sim: a start (latitude, longitude, height, body velocity, yaw, pitch, roll),
 /// then commands (type, yaw, pitch, roll, body velocity, duration): 1 rates of change; 2 values to reach;
 /// 3 changes; 4 attitude to reach, change of velocity; 5 change of attitude, velocity to reach.
-pub(super) fn motion_definition(path: &str, text: &str) -> Loaded {
+pub(super) fn motion_definition(path: &str, text: &str) -> Result<Rows, Error> {
     let lines: Vec<(u64, &str)> = text
         .lines()
         .enumerate()
@@ -200,7 +214,7 @@ pub(super) fn motion_definition(path: &str, text: &str) -> Loaded {
             _ => return Err(bad_line(path, line.0, format!("command type {} is none of 1 to 5", cells[0]))),
         };
         total_s += duration_s;
-        if duration_s <= 0.0 || total_s > 86_400.0 {
+        if duration_s <= 0.0 || total_s > DAY_S {
             let message = format!("command duration {duration_s} s is not > 0, or makes more than a day");
             return Err(bad_line(path, line.0, message));
         }
@@ -209,19 +223,39 @@ pub(super) fn motion_definition(path: &str, text: &str) -> Loaded {
         motion.commands.push(Command { duration_s, rpy: change.0, v_b: change.1 });
     }
     let samples = motion.samples();
-    let trajectory = Trajectory::from_samples(&samples).map_err(|source| Error::Samples {
+    let mut rows = Rows {
         path: path.to_owned(),
-        line: start.0,
-        source,
-    })?;
-    let mut doubts = Doubts { path, found: Vec::new() };
+        lines: command_lines(&samples, &motion, start.0, rest),
+        samples,
+        attitude: Attitude::Given,
+        velocities: Vec::new(),
+        geodetic: false,
+        doubts: Vec::new(),
+    };
     if !timed {
-        doubts.add(
+        rows.doubt(
             None,
-            "commands of type 2 to 5 take all of their time here, not only what a vehicle needs".into(),
+            "commands of type 2 to 5 take all of their time here, not only what a vehicle needs",
         );
     }
-    Ok((trajectory, doubts.found))
+    Ok(rows)
+}
+
+/// The line of the command that leads to each sample; that of the start for the first.
+fn command_lines(
+    samples: &[TrajectorySample],
+    motion: &BodyMotion,
+    start: u64,
+    commands: &[(u64, &str)],
+) -> Vec<u64> {
+    let (mut lines, mut end_s) = (vec![start], 0.0);
+    for (command, (line, _)) in motion.commands.iter().zip(commands) {
+        end_s += command.duration_s;
+        let within = samples[lines.len()..].iter().take_while(|s| s.t_s <= end_s + 1e-6).count();
+        lines.extend(std::iter::repeat_n(*line, within));
+    }
+    lines.resize(samples.len(), lines.last().copied().unwrap_or(start));
+    lines
 }
 
 fn numbers(path: &str, line: u64, text: &str, least: usize) -> Result<Vec<f64>, Error> {
@@ -243,7 +277,27 @@ fn bad_line(path: &str, line: u64, message: String) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::data::trajectory_file::Warning;
     use crate::frames::RollPitchYaw;
+    use crate::trajectory::Trajectory;
+
+    type Loaded = Result<(Trajectory, Vec<Warning>), Error>;
+
+    fn nav(text: &str) -> Loaded {
+        kf_gins("truth.nav", text, &Options::default(), Numbers::Finite)?.trajectory()
+    }
+
+    fn tum(path: &str, text: &str, options: &Options) -> Loaded {
+        super::tum(path, text, options, Numbers::Finite)?.trajectory()
+    }
+
+    fn gpx(path: &str, text: &str) -> Loaded {
+        super::gpx(path, text)?.trajectory()
+    }
+
+    fn motion_definition(path: &str, text: &str) -> Loaded {
+        super::motion_definition(path, text)?.trajectory()
+    }
 
     #[test]
     fn kf_gins_results_run_on_across_the_week() {
@@ -254,11 +308,11 @@ mod tests {
             format!("{week}  {sow:.3} 30.5 {lon:.6} 20.0 0.0 19.2 0.0 0.1 0.2 90.0\n")
         };
         let text: String = (0..9).map(row).collect();
-        let (t, warnings) = kf_gins("truth.nav", &text, &Options::default()).unwrap();
+        let (t, warnings) = nav(&text).unwrap();
         assert!(warnings.is_empty(), "{warnings:?}");
         assert_eq!((t.start_s(), t.end_s()), (604_798.5, 604_802.5));
         assert!((t.state(604_800.0).v_n.y - 19.2).abs() < 0.02, "{}", t.state(604_800.0).v_n);
-        let e = kf_gins("truth.nav", "2016 1 2 3\n", &Options::default()).unwrap_err();
+        let e = nav("2016 1 2 3\n").unwrap_err();
         assert_eq!(e.to_string(), "truth.nav, line 1: 4 values, but 11 columns");
     }
 

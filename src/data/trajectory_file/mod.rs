@@ -1,9 +1,11 @@
 //! Trajectory files: CSV, motion profiles (TOML), imports.
 
 mod columns;
+mod doubts;
 mod error;
 mod imports;
 mod profile;
+mod reference;
 mod samples;
 pub(in crate::data) mod table;
 mod write;
@@ -12,8 +14,10 @@ pub use error::TrajectoryFileError;
 pub use write::{Rows, write_csv, write_rows};
 
 use crate::trajectory::Trajectory;
+use crate::trajectory::reference::Reference;
 use std::fmt;
 use std::path::Path;
+use table::{Numbers, Table};
 
 /// How to read a trajectory file.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -56,24 +60,59 @@ const KNOWN: &str = ".toml (motion profile), .csv, .tsv, .txt, .nav (KF-GINS), .
 /// # Errors
 /// Whatever is wrong with the file, with its line.
 pub fn load(path: &Path, options: &Options) -> Result<(Trajectory, Vec<Warning>), TrajectoryFileError> {
+    match parse(path, options, Numbers::Finite)? {
+        Parsed::Profile(trajectory) => Ok((trajectory, Vec::new())),
+        Parsed::Rows(rows) => rows.trajectory(),
+    }
+}
+
+/// Reads a trajectory that is only compared with. Where its position or attitude jumps as no vehicle does, where
+/// rows are missing, not finite or out of range, it is left out and the rest is used; what was left out is
+/// among the warnings.
+///
+/// # Errors
+/// What cannot be read at all, with its line; rows of which no stretch is usable.
+pub fn load_reference(
+    path: &Path,
+    options: &Options,
+) -> Result<(Reference, Vec<Warning>), TrajectoryFileError> {
+    match parse(path, options, Numbers::Any)? {
+        Parsed::Profile(trajectory) => Ok((trajectory.into(), Vec::new())),
+        Parsed::Rows(rows) => rows.reference(),
+    }
+}
+
+enum Parsed {
+    Profile(Trajectory),
+    Rows(samples::Rows),
+}
+
+fn parse(path: &Path, options: &Options, numbers: Numbers) -> Result<Parsed, TrajectoryFileError> {
     let name = path.display().to_string();
     let lower = name.to_lowercase();
     let plain = lower.strip_suffix(".gz").unwrap_or(&lower);
     let text = || table::text(path);
-    match plain.rsplit_once('.').map_or("", |(_, ending)| ending) {
-        "toml" => Ok((profile::load(path)?, Vec::new())),
-        "nav" => imports::kf_gins(&name, &text()?, options),
-        "tum" => imports::tum(&name, &text()?, options),
+    let rows = match plain.rsplit_once('.').map_or("", |(_, ending)| ending) {
+        "toml" => return Ok(Parsed::Profile(profile::load(path)?)),
+        "nav" => imports::kf_gins(&name, &text()?, options, numbers),
+        "tum" => imports::tum(&name, &text()?, options, numbers),
         "gpx" => imports::gpx(&name, &text()?),
-        "csv" | "tsv" | "txt" => {
-            let text = text()?;
-            if imports::is_motion_definition(&text) {
-                return imports::motion_definition(&name, &text);
-            }
-            samples::trajectory(&table::Table::read(&name, text.as_bytes(), None)?, options)
-        }
+        "csv" | "tsv" | "txt" => parse_table(&name, &text()?, options, numbers),
         _ => Err(TrajectoryFileError::Ending { path: name, known: KNOWN }),
+    };
+    rows.map(Parsed::Rows)
+}
+
+fn parse_table(
+    name: &str,
+    text: &str,
+    options: &Options,
+    numbers: Numbers,
+) -> Result<samples::Rows, TrajectoryFileError> {
+    if imports::is_motion_definition(text) {
+        return imports::motion_definition(name, text);
     }
+    samples::rows(Table::read(name, text.as_bytes(), None, numbers)?, options, numbers)
 }
 
 #[cfg(test)]

@@ -1,51 +1,163 @@
-//! From the rows of a table to a trajectory.
+//! From rows to a trajectory.
 
 use super::columns::{Columns, Quantity};
-use super::table::Table;
+use super::doubts;
+use super::table::{Numbers, Table};
 use super::{Options, TrajectoryFileError as Error, Warning};
 use crate::earth::{e_to_n, ecef_to_geodetic, geodetic_to_ecef};
 use crate::frames::{RollPitchYaw, q_e_n, wrap_angle};
-use crate::trajectory::plausibility::VelocityMisfit;
 use crate::trajectory::{Trajectory, TrajectorySample};
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
-use std::f64::consts::PI;
 
 use Quantity::{D, E, H, Lat, Lon, N, Pitch, Roll, Time, Vd, Ve, Vn, Yaw};
 
 /// Positions faster than this from one row to the next are no motion (m/s).
 const MAX_SPEED: f64 = 8000.0;
-/// Heights that are not doubted (m).
-const PLAUSIBLE_HEIGHT: std::ops::RangeInclusive<f64> = -500.0..=100_000.0;
 /// Heights at which the gravity model means something (m).
 pub(super) const HEIGHT: std::ops::RangeInclusive<f64> = -12_000.0..=1_000_000.0;
 /// Below this speed a path has no direction (m/s).
-const MOVING: f64 = 0.5;
-/// Longest step between rows that is not doubted (s).
-const LONG_STEP_S: f64 = 1.0 + 1e-6;
+pub(super) const MOVING: f64 = 0.5;
+/// A trajectory lasts a day at most (s), as motion profiles do: a wrong time stamp would ask for more memory
+/// than there is.
+const MAX_DURATION_S: f64 = 86_400.0;
 
-/// The trajectory of a table, and what is doubtful about it.
-pub(super) fn trajectory(table: &Table, options: &Options) -> Result<(Trajectory, Vec<Warning>), Error> {
-    let columns = Columns::of(table)?;
-    check_ranges(table, &columns)?;
-    let mut doubts = Doubts { path: &table.path, found: Vec::new() };
-    doubts.ignored(&columns.ignored);
-    let mut samples = samples(table, &columns, options)?;
-    check_heights(table, &columns, &samples)?;
-    check_steps(table, &columns, &samples)?;
-    doubts.steps(&samples, table);
-    doubts.heights(&samples, table);
-    check_jumps(table, &samples)?;
-    if columns.has(Yaw) {
-        let trajectory = build(table, &samples)?;
-        doubts.radians(&trajectory, table, &columns);
-    } else {
-        follow_path(table, &mut samples)?;
-        doubts.add(None, "no attitude columns: heading and pitch follow the path, roll is 0".into());
+/// Where the attitude of rows comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Attitude {
+    /// The file.
+    Given,
+    /// Heading and pitch follow the path.
+    OfPath,
+}
+
+/// What a file of any format holds: samples, and the line that each comes from.
+#[derive(Debug)]
+pub(super) struct Rows {
+    pub(super) path: String,
+    /// One for each sample.
+    pub(super) lines: Vec<u64>,
+    pub(super) samples: Vec<TrajectorySample>,
+    pub(super) attitude: Attitude,
+    /// Velocities in n (m/s) that the file gives, one for each sample, or none at all.
+    pub(super) velocities: Vec<DVec3>,
+    /// Whether positions are latitude and longitude, which may have been given in the wrong unit.
+    pub(super) geodetic: bool,
+    /// What is doubtful.
+    pub(super) doubts: Vec<Warning>,
+}
+
+impl Rows {
+    pub(super) fn doubt(&mut self, line: Option<u64>, message: impl Into<String>) {
+        self.doubts.push(Warning { path: self.path.clone(), line, message: message.into() });
     }
-    let trajectory = build(table, &samples)?;
-    doubts.velocities(&trajectory, table, &columns);
-    Ok((trajectory, doubts.found))
+
+    /// The trajectory through all rows, and what is doubtful about it. Every format comes through here, so that
+    /// what is refused in one is refused in all.
+    pub(super) fn trajectory(mut self) -> Result<(Trajectory, Vec<Warning>), Error> {
+        self.check_heights()?;
+        self.check_steps()?;
+        doubts::steps(&mut self);
+        doubts::heights(&mut self);
+        self.check_jumps()?;
+        if self.attitude == Attitude::OfPath {
+            self.through(&self.samples)?; // times increase, positions are on the Earth
+            follow_path(&mut self.samples);
+        }
+        let trajectory = self.through(&self.samples)?;
+        doubts::of_trajectory(&mut self, &trajectory);
+        Ok((trajectory, self.doubts))
+    }
+
+    fn through(&self, samples: &[TrajectorySample]) -> Result<Trajectory, Error> {
+        Trajectory::from_samples(samples).map_err(|source| {
+            let index = source.index().unwrap_or(self.lines.len().saturating_sub(1));
+            let line = self.lines.get(index).copied().unwrap_or(1);
+            Error::Samples { path: self.path.clone(), line, source }
+        })
+    }
+
+    /// Heights below the deepest trench and beyond a low orbit are no heights in metres; neither is what is
+    /// not finite.
+    fn check_heights(&self) -> Result<(), Error> {
+        let bad = self.samples.iter().zip(&self.lines).find(|(s, _)| !HEIGHT.contains(&s.h));
+        let Some((sample, line)) = bad else { return Ok(()) };
+        Err(Error::Height { path: self.path.clone(), line: *line, h: sample.h })
+    }
+
+    /// Rows a minute apart are no trajectory of a vehicle, their time is in milliseconds; and one time stamp
+    /// that is far off makes no trajectory of years.
+    fn check_steps(&self) -> Result<(), Error> {
+        let step = |i: usize| self.samples[i].t_s - self.samples[i - 1].t_s;
+        let mut order: Vec<usize> = (1..self.samples.len()).collect();
+        order.sort_by(|a, b| step(*a).total_cmp(&step(*b)));
+        let (Some(&middle), Some(&longest)) = (order.get(order.len() / 2), order.last()) else {
+            return Ok(());
+        };
+        let path = || self.path.clone();
+        if step(middle) >= 50.0 {
+            return Err(Error::SlowRows { path: path(), line: self.lines[1], step_s: step(middle) });
+        }
+        let duration_s = self.samples[self.samples.len() - 1].t_s - self.samples[0].t_s;
+        if duration_s <= MAX_DURATION_S {
+            return Ok(());
+        }
+        let (previous_s, t_s) = (self.samples[longest - 1].t_s, self.samples[longest].t_s);
+        Err(Error::TooLong { path: path(), line: self.lines[longest], duration_s, previous_s, t_s })
+    }
+
+    fn check_jumps(&self) -> Result<(), Error> {
+        let place = |s: &TrajectorySample| geodetic_to_ecef(s.lat, s.lon, s.h);
+        for (pair, line) in self.samples.windows(2).zip(&self.lines[1..]) {
+            let (metres, seconds) = (place(&pair[1]).distance(place(&pair[0])), pair[1].t_s - pair[0].t_s);
+            if seconds > 0.0 && metres > MAX_SPEED * seconds {
+                return Err(Error::Jump { path: self.path.clone(), line: *line, metres, seconds });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The rows of a table. Cells out of range are refused, or their rows left out where not every row is needed.
+pub(super) fn rows(mut table: Table, options: &Options, numbers: Numbers) -> Result<Rows, Error> {
+    let columns = Columns::of(&table)?;
+    let all = table.rows.len();
+    match numbers {
+        Numbers::Finite => check_ranges(&table, &columns)?,
+        Numbers::Any => table
+            .rows
+            .retain(|row| row.1.iter().all(|x| x.is_finite()) && out_of_range(row, &columns).is_none()),
+    }
+    let mut rows = Rows {
+        lines: table.rows.iter().map(|(line, _)| *line).collect(),
+        samples: samples(&table, &columns, options)?,
+        attitude: if columns.has(Yaw) { Attitude::Given } else { Attitude::OfPath },
+        velocities: velocities(&table, &columns),
+        geodetic: columns.has(Lat),
+        doubts: Vec::new(),
+        path: table.path,
+    };
+    if all > rows.lines.len() {
+        rows.doubt(
+            None,
+            format!("{} rows left out: values not finite, or out of range", all - rows.lines.len()),
+        );
+    }
+    if !columns.ignored.is_empty() {
+        rows.doubt(None, format!("columns not used: {}", columns.ignored.join(", ")));
+    }
+    if rows.attitude == Attitude::OfPath {
+        rows.doubt(None, "no attitude columns: heading and pitch follow the path, roll is 0");
+    }
+    Ok(rows)
+}
+
+fn velocities(table: &Table, columns: &Columns) -> Vec<DVec3> {
+    if !columns.has(Vn) {
+        return Vec::new();
+    }
+    let given = |(_, row): &(u64, Vec<f64>)| DVec3::from([Vn, Ve, Vd].map(|q| columns.value(q, row)));
+    table.rows.iter().map(given).collect()
 }
 
 fn samples(table: &Table, columns: &Columns, options: &Options) -> Result<Vec<TrajectorySample>, Error> {
@@ -91,69 +203,33 @@ pub(super) fn origin(table: &Table, options: &Options) -> Result<[f64; 3], Error
     }
 }
 
-/// The trajectory through samples that are rows of a table.
-pub(super) fn build(table: &Table, samples: &[TrajectorySample]) -> Result<Trajectory, Error> {
-    Trajectory::from_samples(samples).map_err(|source| {
-        let index = source.index().unwrap_or(table.rows.len() - 1);
-        Error::Samples { path: table.path.clone(), line: table.rows[index].0, source }
-    })
+/// The first value of a row that is out of its range: of which column, and why.
+fn out_of_range((_, row): &(u64, Vec<f64>), columns: &Columns) -> Option<(usize, &'static str)> {
+    // a heading that was unwrapped goes on below −180 and above 180: the same angle
+    let ranges = [
+        (Lat, 90.0, 90.0, "is not a latitude"),
+        (Lon, 180.0, 360.0, "is not a longitude"),
+        (Roll, 180.0, 180.0, "is not a roll angle"),
+        (Pitch, 90.0, 90.0, "is not a pitch angle"),
+        (Yaw, 360.0, 360.0, "is not a heading"),
+    ];
+    let outside = |(quantity, below, above, _): &(Quantity, f64, f64, &str)| {
+        !(-below - 1e-9..=above + 1e-9).contains(&(columns.value(*quantity, row) / DEG))
+    };
+    ranges
+        .iter()
+        .find(|range| outside(range))
+        .map(|(quantity, .., reason)| (columns.index(*quantity), *reason))
 }
 
 fn check_ranges(table: &Table, columns: &Columns) -> Result<(), Error> {
-    let ranges = [
-        (Lat, -90.0, 90.0, "is not a latitude"),
-        (Lon, -180.0, 360.0, "is not a longitude"),
-        (Roll, -180.0, 180.0, "is not a roll angle"),
-        (Pitch, -90.0, 90.0, "is not a pitch angle"),
-        (Yaw, -180.0, 360.0, "is not a heading"),
-    ];
-    for (line, row) in &table.rows {
-        for (quantity, low, high, reason) in ranges {
-            let angle = columns.value(quantity, row) / DEG;
-            if !(low - 1e-9..=high + 1e-9).contains(&angle) {
-                let index = columns.index(quantity);
-                return Err(table.cell(*line, index, &row[index].to_string(), reason));
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Heights below the deepest trench and beyond a low orbit are no heights in metres.
-fn check_heights(table: &Table, columns: &Columns, samples: &[TrajectorySample]) -> Result<(), Error> {
-    let Some(i) = samples.iter().position(|s| !HEIGHT.contains(&s.h)) else { return Ok(()) };
-    let column = columns.index(if columns.has(Lat) { H } else { D });
-    let (line, row) = &table.rows[i];
-    Err(table.cell(*line, column, &row[column].to_string(), "is no height within −12 to 1000 km"))
-}
-
-/// Rows a minute apart are no trajectory of a vehicle: their time is in milliseconds.
-fn check_steps(table: &Table, columns: &Columns, samples: &[TrajectorySample]) -> Result<(), Error> {
-    let mut steps: Vec<f64> = samples.windows(2).map(|w| w[1].t_s - w[0].t_s).collect();
-    steps.sort_by(f64::total_cmp);
-    let Some(&median) = steps.get(steps.len() / 2) else { return Ok(()) };
-    if median < 50.0 {
-        return Ok(());
-    }
-    let (index, (line, row)) = (columns.index(Time), &table.rows[1]);
-    let reason = "is in seconds, and rows are a minute or more apart: is it in milliseconds (t_ms)?";
+    let found = table.rows.iter().find_map(|row| Some((row, out_of_range(row, columns)?)));
+    let Some(((line, row), (index, reason))) = found else { return Ok(()) };
     Err(table.cell(*line, index, &row[index].to_string(), reason))
 }
 
-fn check_jumps(table: &Table, samples: &[TrajectorySample]) -> Result<(), Error> {
-    let place = |s: &TrajectorySample| geodetic_to_ecef(s.lat, s.lon, s.h);
-    for (pair, (line, _)) in samples.windows(2).zip(&table.rows[1..]) {
-        let (metres, seconds) = (place(&pair[1]).distance(place(&pair[0])), pair[1].t_s - pair[0].t_s);
-        if seconds > 0.0 && metres > MAX_SPEED * seconds {
-            return Err(Error::Jump { path: table.path.clone(), line: *line, metres, seconds });
-        }
-    }
-    Ok(())
-}
-
 /// Heading and pitch along the path; at rest between those before and after.
-pub(super) fn follow_path(table: &Table, samples: &mut [TrajectorySample]) -> Result<(), Error> {
-    build(table, samples)?; // times increase, positions are on the Earth
+pub(super) fn follow_path(samples: &mut [TrajectorySample]) {
     let directions: Vec<Option<(f64, f64)>> = (0..samples.len()).map(|i| direction(samples, i)).collect();
     let moving: Vec<usize> = (0..samples.len()).filter(|&i| directions[i].is_some()).collect();
     for i in 0..samples.len() {
@@ -173,7 +249,6 @@ pub(super) fn follow_path(table: &Table, samples: &mut [TrajectorySample]) -> Re
         let pitch = from.1 + share * (to.1 - from.1);
         samples[i].q_b_n = RollPitchYaw { roll: 0.0, pitch, yaw }.to_quat();
     }
-    Ok(())
 }
 
 /// Heading and pitch of the chord from the sample before to the one after, if that is a motion.
@@ -182,101 +257,4 @@ fn direction(samples: &[TrajectorySample], i: usize) -> Option<(f64, f64)> {
     let chord = geodetic_to_ecef(b.lat, b.lon, b.h) - geodetic_to_ecef(a.lat, a.lon, a.h);
     let v = e_to_n(samples[i].lat, samples[i].lon, chord) / (b.t_s - a.t_s);
     (v.length() > MOVING).then(|| (v.y.atan2(v.x), (-v.z).atan2(v.x.hypot(v.y))))
-}
-
-/// What is doubtful about a file.
-pub(super) struct Doubts<'a> {
-    pub(super) path: &'a str,
-    pub(super) found: Vec<Warning>,
-}
-
-impl Doubts<'_> {
-    pub(super) fn add(&mut self, line: Option<u64>, message: String) {
-        self.found.push(Warning { path: self.path.to_owned(), line, message });
-    }
-
-    fn ignored(&mut self, columns: &[String]) {
-        if !columns.is_empty() {
-            self.add(None, format!("columns not used: {}", columns.join(", ")));
-        }
-    }
-
-    /// Long steps, where the curve between rows is a guess, and gaps.
-    pub(super) fn steps(&mut self, samples: &[TrajectorySample], table: &Table) {
-        let time = |i: usize| samples[i].t_s;
-        let mut steps: Vec<(f64, usize)> = (1..samples.len()).map(|i| (time(i) - time(i - 1), i)).collect();
-        steps.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let Some(&(median, _)) = steps.get(steps.len() / 2) else { return };
-        let gaps = steps.iter().filter(|(s, _)| *s > LONG_STEP_S.max(1.5 * median)).count();
-        if median > LONG_STEP_S {
-            self.add(
-                None,
-                format!("rows are {median} s apart: less than one a second, the path between is a guess"),
-            );
-        }
-        if let Some(&(step, i)) = steps.last().filter(|_| gaps > 0) {
-            let more = if gaps > 1 { format!(" ({gaps} such gaps)") } else { String::new() };
-            let line = Some(table.rows[i].0);
-            self.add(
-                line,
-                format!("gap of {step:.3} s before {} s{more}: the path in it is a guess", time(i)),
-            );
-        }
-    }
-
-    /// Heights where no vehicle of these goes: a wrong unit, a wrong sign, a depth.
-    fn heights(&mut self, samples: &[TrajectorySample], table: &Table) {
-        if let Some(i) = samples.iter().position(|s| !PLAUSIBLE_HEIGHT.contains(&s.h)) {
-            let (line, h) = (Some(table.rows[i].0), samples[i].h);
-            self.add(line, format!("height {h} m: in metres above the ellipsoid, up?"));
-        }
-    }
-
-    /// Degrees that look like radians: all within ±π, and the path says so where there is one.
-    fn radians(&mut self, trajectory: &Trajectory, table: &Table, columns: &Columns) {
-        let small = |q: Quantity, limit: f64| {
-            let mut values = table.rows.iter().map(|(_, row)| columns.value(q, row).abs() / DEG);
-            values.all(|v| v <= limit + 1e-6)
-        };
-        let zero = [Roll, Pitch, Yaw].into_iter().all(|q| small(q, 0.0));
-        if !zero && small(Roll, PI) && small(Pitch, 0.5 * PI) && small(Yaw, 2.0 * PI) {
-            let (mut as_degrees, mut as_radians, mut moving) = (0.0, 0.0, 0);
-            for (_, row) in &table.rows {
-                let v = trajectory.state(columns.value(Time, row)).v_n;
-                if v.x.hypot(v.y) > MOVING {
-                    let (track, yaw) = (v.y.atan2(v.x), columns.value(Yaw, row));
-                    as_degrees += wrap_angle(track - yaw).abs();
-                    as_radians += wrap_angle(track - yaw / DEG).abs();
-                    moving += 1;
-                }
-            }
-            if moving == 0 || 2.0 * as_radians < as_degrees {
-                let says = if moving == 0 { "" } else { ", and the path agrees with radians" };
-                let list = "roll_deg, pitch_deg and yaw_deg never exceed π";
-                self.add(
-                    None,
-                    format!("{list}{says}: radians? Then name the columns roll_rad, pitch_rad, yaw_rad"),
-                );
-            }
-        }
-        if columns.has(Lat) && small(Lat, 0.5 * PI) && small(Lon, 2.0 * PI) {
-            let list = "lat_deg and lon_deg never exceed π";
-            self.add(None, format!("{list}: radians? Then name the columns lat_rad, lon_rad"));
-        }
-    }
-
-    fn velocities(&mut self, trajectory: &Trajectory, table: &Table, columns: &Columns) {
-        if !columns.has(Vn) {
-            return;
-        }
-        let given = |(_, row): &(u64, Vec<f64>)| {
-            let value = |q| columns.value(q, row);
-            (value(Time), DVec3::new(value(Vn), value(Ve), value(Vd)))
-        };
-        let given: Vec<_> = table.rows.iter().map(given).collect();
-        if let Some(misfit) = VelocityMisfit::new(trajectory, &given).filter(VelocityMisfit::contradicts) {
-            let line = given.iter().position(|(t, _)| *t == misfit.worst_s).map(|i| table.rows[i].0);
-            self.add(line, format!("{misfit}; the positions are used"));
-        }
-    }
 }

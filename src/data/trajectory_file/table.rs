@@ -35,6 +35,15 @@ pub(in crate::data) fn text(path: &Path) -> Result<String, Error> {
     Ok(text)
 }
 
+/// Which numbers a table may hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::data) enum Numbers {
+    /// A cell that is not finite is refused.
+    Finite,
+    /// Any: who reads it leaves those rows out.
+    Any,
+}
+
 impl Table {
     /// Reads a table. Without `columns` its first line that is no comment names them; with them it has no
     /// header and its cells stand between blanks.
@@ -42,6 +51,7 @@ impl Table {
         path: &str,
         reader: impl BufRead,
         columns: Option<&[&str]>,
+        numbers: Numbers,
     ) -> Result<Self, Error> {
         let mut separator = if columns.is_some() { ' ' } else { ',' };
         let mut table = Self::of_columns(path, columns.unwrap_or_default());
@@ -56,7 +66,7 @@ impl Table {
                 separator = separator_of(text);
                 table.header(number, &cells(text, separator))?;
             } else {
-                table.row(number, &cells(text, separator))?;
+                table.row(number, &cells(text, separator), numbers)?;
             }
         }
         if table.rows.is_empty() { Err(Error::Empty { path: path.to_owned() }) } else { Ok(table) }
@@ -78,13 +88,13 @@ impl Table {
         Ok(())
     }
 
-    fn row(&mut self, line: u64, cells: &[&str]) -> Result<(), Error> {
+    fn row(&mut self, line: u64, cells: &[&str], numbers: Numbers) -> Result<(), Error> {
         let (found, expected) = (cells.len(), self.columns.len());
         if found != expected {
             return Err(Error::RowLength { path: self.path.clone(), line, found, expected });
         }
         let number = |(i, cell): (usize, &&str)| match cell.parse::<f64>() {
-            Ok(value) if value.is_finite() => Ok(value),
+            Ok(value) if value.is_finite() || numbers == Numbers::Any => Ok(value),
             Ok(_) => Err(self.cell(line, i, cell, "is not finite")),
             Err(_) => Err(self.cell(line, i, &format!("\"{cell}\""), "is not a number")),
         };

@@ -1,0 +1,259 @@
+//! A trajectory that a solution is compared with: a recorded one has start-up jumps, outages and glitches, and
+//! what can be compared with are the stretches between them.
+
+use super::{MAX_ROTATION, Trajectory, TrajectorySample};
+use crate::earth::geodetic_to_ecef;
+use crate::frames::NavState;
+use crate::units::DEG;
+use glam::DVec3;
+use std::fmt;
+use std::ops::Range;
+
+/// A step of position this far from where the steps about it lead is a jump (m), beside what an acceleration
+/// makes of it (m/s²). Corrections of a filter, tenths of a metre to metres, are none.
+const POSITION_JUMP: (f64, f64) = (5.0, 30.0);
+/// A rotation of so much (rad) and so fast beside it (rad/s) from one sample to the next is a jump.
+const ATTITUDE_JUMP: (f64, f64) = (10.0 * DEG, 200.0 * DEG);
+/// Steps on either side whose median says where a step should lead.
+const NEIGHBOURS: usize = 5;
+/// A longer step than so many median ones, and than so long (s), is a gap: what is in it is a guess.
+const GAP: (f64, f64) = (1.5, 1.0 + 1e-6);
+/// What is left out on either side of a jump (s): smoothing spreads it.
+const AROUND_JUMP_S: f64 = 1.0;
+/// A stretch with a jump at an end lasts at least so long (s), or is part of what jumps.
+const SHORTEST_S: f64 = 5.0;
+
+/// Stretches of a recorded trajectory, in order of time.
+#[derive(Debug, Clone)]
+pub struct Reference {
+    stretches: Vec<Trajectory>,
+}
+
+impl From<Trajectory> for Reference {
+    fn from(whole: Trajectory) -> Self {
+        Self { stretches: vec![whole] }
+    }
+}
+
+/// Why samples are left out.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Fault {
+    /// No samples for so long (s).
+    Gap(f64),
+    /// Time stands still or goes back by so much (s).
+    Back(f64),
+    /// The position is so far from where it was to be expected (m).
+    Position(f64),
+    /// The attitude turns by so much (rad) from one sample to the next.
+    Attitude(f64),
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Gap(seconds) => write!(f, "a gap of {seconds:.2} s"),
+            Self::Back(seconds) => write!(f, "time goes back by {seconds:.2} s"),
+            Self::Position(metres) => write!(f, "a jump of {metres:.1} m"),
+            Self::Attitude(angle) => write!(f, "a jump of {:.1}° in attitude", angle / DEG),
+        }
+    }
+}
+
+/// The fault that ends a stretch: between sample `index − 1` and `index`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Break {
+    /// The sample after it.
+    pub index: usize,
+    /// What is wrong.
+    pub fault: Fault,
+}
+
+impl Reference {
+    /// The reference of stretches in order of time; none without any.
+    #[must_use]
+    pub fn of_stretches(stretches: Vec<Trajectory>) -> Option<Self> {
+        (!stretches.is_empty()).then_some(Self { stretches })
+    }
+
+    /// Position, velocity and attitude at an instant; none where nothing is known.
+    #[must_use]
+    pub fn state(&self, t_s: f64) -> Option<NavState> {
+        let next = self.stretches.partition_point(|s| s.end_s() < t_s);
+        let stretch = self.stretches.get(next).filter(|s| s.start_s() <= t_s)?;
+        Some(stretch.state(t_s))
+    }
+
+    /// The stretches.
+    #[must_use]
+    pub fn stretches(&self) -> &[Trajectory] {
+        &self.stretches
+    }
+}
+
+/// Where samples do not follow one another as a vehicle moves.
+#[must_use]
+pub fn breaks(samples: &[TrajectorySample]) -> Vec<Break> {
+    let steps = Steps::new(samples);
+    let at = |index| steps.fault(index).map(|fault| Break { index, fault });
+    (1..samples.len()).filter_map(at).collect()
+}
+
+/// Samples that can be compared with: those between breaks, without what is near a jump.
+#[must_use]
+pub fn usable(samples: &[TrajectorySample], breaks: &[Break]) -> Vec<Range<usize>> {
+    let jump =
+        |b: Option<&Break>| b.is_some_and(|b| matches!(b.fault, Fault::Position(_) | Fault::Attitude(_)));
+    let edges: Vec<usize> =
+        std::iter::once(0).chain(breaks.iter().map(|b| b.index)).chain([samples.len()]).collect();
+    let mut found: Vec<Range<usize>> = Vec::new();
+    for (k, edge) in edges.windows(2).enumerate() {
+        let (before, after) = (k.checked_sub(1).and_then(|k| breaks.get(k)), breaks.get(k));
+        let part = &samples[edge[0]..edge[1]];
+        let Some((first, last)) = part.first().zip(part.last()) else { continue };
+        let trimmed = |is: bool| if is { AROUND_JUMP_S } else { 0.0 };
+        let (from, to) = (first.t_s + trimmed(jump(before)), last.t_s - trimmed(jump(after)));
+        if (jump(before) || jump(after)) && last.t_s - first.t_s < SHORTEST_S {
+            continue;
+        }
+        let range = edge[0] + part.partition_point(|s| s.t_s < from - 1e-6)
+            ..edge[0] + part.partition_point(|s| s.t_s <= to + 1e-6);
+        // a clock that was set back: what is behind is not gone through twice
+        let later =
+            found.last().is_none_or(|r| samples[r.end - 1].t_s < samples[range.start.min(edge[1] - 1)].t_s);
+        if range.len() >= 4 && later {
+            found.push(range);
+        }
+    }
+    found
+}
+
+/// What lies between consecutive samples.
+struct Steps<'a> {
+    samples: &'a [TrajectorySample],
+    /// From the sample before (m), in e.
+    moved_e: Vec<DVec3>,
+    median_s: f64,
+}
+
+impl<'a> Steps<'a> {
+    fn new(samples: &'a [TrajectorySample]) -> Self {
+        let place = |s: &TrajectorySample| geodetic_to_ecef(s.lat, s.lon, s.h);
+        let mut seconds: Vec<f64> = samples.windows(2).map(|w| w[1].t_s - w[0].t_s).collect();
+        seconds.sort_by(f64::total_cmp);
+        Self {
+            samples,
+            moved_e: samples.windows(2).map(|w| place(&w[1]) - place(&w[0])).collect(),
+            median_s: seconds.get(seconds.len() / 2).copied().unwrap_or(0.0),
+        }
+    }
+
+    fn seconds(&self, index: usize) -> f64 {
+        self.samples[index].t_s - self.samples[index - 1].t_s
+    }
+
+    /// What is wrong with the step to sample `index`.
+    fn fault(&self, index: usize) -> Option<Fault> {
+        let seconds = self.seconds(index);
+        if seconds <= 0.0 {
+            return Some(Fault::Back(-seconds));
+        }
+        if seconds > GAP.1.max(GAP.0 * self.median_s) {
+            return Some(Fault::Gap(seconds));
+        }
+        let turn = self.samples[index - 1].q_b_n.conjugate() * self.samples[index].q_b_n;
+        let angle = 2.0 * turn.xyz().length().atan2(turn.w.abs());
+        if angle > MAX_ROTATION.min(ATTITUDE_JUMP.0 + ATTITUDE_JUMP.1 * seconds) {
+            return Some(Fault::Attitude(angle));
+        }
+        let (expected, reach_s) = self.expected(index);
+        let metres = (self.moved_e[index - 1] - expected * seconds).length();
+        (metres > POSITION_JUMP.0 + POSITION_JUMP.1 * seconds * reach_s).then_some(Fault::Position(metres))
+    }
+
+    /// The median velocity of the steps about one (m/s, in e), each axis by itself, and how far in time they
+    /// reach (s). The median is not moved by a jump to another place and back.
+    fn expected(&self, index: usize) -> (DVec3, f64) {
+        let first = index.saturating_sub(NEIGHBOURS).max(1);
+        let last = (index + NEIGHBOURS).min(self.samples.len() - 1);
+        let near = || (first..=last).filter(|i| self.seconds(*i) > 0.0);
+        let axis = |a: usize| {
+            let mut of: Vec<f64> = near().map(|i| self.moved_e[i - 1][a] / self.seconds(i)).collect();
+            of.sort_by(f64::total_cmp);
+            of[of.len() / 2]
+        };
+        let now = self.samples[index].t_s;
+        let reach = (now - self.samples[first - 1].t_s).max(self.samples[last].t_s - now);
+        (DVec3::new(axis(0), axis(1), axis(2)), reach)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::frames::RollPitchYaw;
+
+    /// 60 s north at 15 m/s, 20 samples a second, changed by `fault`.
+    fn drive(fault: impl Fn(f64, &mut TrajectorySample)) -> Vec<TrajectorySample> {
+        let sample = |k: u32| {
+            let t_s = 0.05 * f64::from(k);
+            let q_b_n = RollPitchYaw { roll: 0.0, pitch: 0.0, yaw: 0.3 }.to_quat();
+            let mut s = TrajectorySample { t_s, lat: 0.8 + 15.0 * t_s / 6.38e6, lon: 0.1, h: 400.0, q_b_n };
+            fault(t_s, &mut s);
+            s
+        };
+        (0..=1200).map(sample).collect()
+    }
+
+    fn spans(samples: &[TrajectorySample]) -> Vec<(f64, f64)> {
+        let rounded = |t: f64| (t * 1e3).round() / 1e3;
+        let span = |r: Range<usize>| (rounded(samples[r.start].t_s), rounded(samples[r.end - 1].t_s));
+        usable(samples, &breaks(samples)).into_iter().map(span).collect()
+    }
+
+    #[test]
+    fn a_sound_recording_is_one_stretch() {
+        // corrections of 1 m twice a second, as references with GNSS updates have them
+        let corrected = drive(|t, s| s.h += if (2.0 * t).floor() % 2.0 == 0.0 { 1.0 } else { 0.0 });
+        assert_eq!(spans(&drive(|_, _| {})), [(0.0, 60.0)]);
+        assert_eq!(spans(&corrected), [(0.0, 60.0)]);
+    }
+
+    /// 2.4 km away for a third of a second; an attitude that starts with another heading; 20 m for good.
+    #[test]
+    fn what_is_near_a_jump_is_left_out_and_nothing_else() {
+        let away = drive(|t, s| s.lon += if (30.02..30.33).contains(&t) { 5.5e-4 } else { 0.0 });
+        assert_eq!(spans(&away), [(0.0, 29.0), (31.35, 60.0)]);
+        let found = breaks(&away);
+        assert!(matches!(found[0].fault, Fault::Position(m) if (2300.0..2600.0).contains(&m)), "{found:?}");
+        let started = drive(|t, s| {
+            if t < 3.02 {
+                s.q_b_n = RollPitchYaw { roll: 0.0, pitch: 0.0, yaw: 2.9 }.to_quat();
+            }
+        });
+        assert_eq!(spans(&started), [(4.05, 60.0)]);
+        let shifted = drive(|t, s| s.h += if t > 20.02 { 20.0 } else { 0.0 });
+        assert_eq!(spans(&shifted), [(0.0, 19.0), (21.05, 60.0)]);
+    }
+
+    #[test]
+    fn gaps_and_clocks_set_back_part_it_without_loss() {
+        let mut gap = drive(|_, _| {});
+        gap.retain(|s| !(20.02..25.02).contains(&s.t_s));
+        assert_eq!(spans(&gap), [(0.0, 20.0), (25.05, 60.0)]);
+        let far = drive(|t, s| s.t_s += if (30.02..30.06).contains(&t) { 1.7e9 } else { 0.0 });
+        assert_eq!(spans(&far), [(0.0, 30.0), (30.1, 60.0)]);
+        let back = drive(|t, s| s.t_s -= if t > 40.02 { 10.0 } else { 0.0 });
+        assert_eq!(spans(&back), [(0.0, 40.0)]);
+    }
+
+    #[test]
+    fn between_stretches_nothing_is_known() {
+        let samples = drive(|_, _| {});
+        let part = |r: Range<usize>| Trajectory::from_samples(&samples[r]).unwrap();
+        let reference = Reference::of_stretches(vec![part(0..401), part(600..1201)]).unwrap();
+        assert!(reference.state(10.0).is_some() && reference.state(20.0).is_some());
+        assert!(reference.state(25.0).is_none() && reference.state(30.0).is_some());
+        assert!(reference.state(-0.1).is_none() && reference.state(60.1).is_none());
+        assert!(Reference::of_stretches(Vec::new()).is_none());
+    }
+}
