@@ -5,10 +5,13 @@
 //! go in and come out as those of the vehicle.
 
 pub mod alignment;
+mod assessment;
 mod filter;
 mod outcome;
 
-pub use outcome::{Drift, OutageDrift, Outcome, doubts, outcome};
+use assessment::nis_bound;
+pub use assessment::{Assessment, Verdict, assess};
+pub use outcome::{Drift, OutageDrift, Outcome, outcome};
 
 use crate::earth::{GravityModel, MAX_LATITUDE, geodetic_to_ecef};
 use crate::ekf::{Belief, InitialSettings, nis_limit};

@@ -65,35 +65,6 @@ pub fn outcome(solution: &Solution, outages: &[Outage]) -> Outcome {
     }
 }
 
-/// Mean NIS per component above which a solution is not to be believed: innovations twice as large as
-/// stated, where that is no chance (five standard deviations of the mean of chi-squares).
-fn nis_bound(components: usize) -> f64 {
-    4.0_f64.max(1.0 + 5.0 * (2.0 / components as f64).sqrt())
-}
-
-/// What makes a solution not to be believed.
-#[must_use]
-pub fn doubts(solution: &Solution, outcome: &Outcome) -> Vec<String> {
-    let [used, _, rejected] = outcome.fixes;
-    let per_fix = solution.fixes.first().map_or(1, |f| f.innovation.len());
-    let mut found = Vec::new();
-    if used > 0 && outcome.nis_per_component > nis_bound(used * per_fix) {
-        found.push(format!(
-            "NIS {:.1} per component, where 1 is right: the fixes are {:.1} times as far from the solution as it \
-             states",
-            outcome.nis_per_component,
-            outcome.nis_per_component.sqrt()
-        ));
-    }
-    if rejected > used {
-        found.push(format!(
-            "{rejected} of {} fixes were rejected: the solution went its own way",
-            used + rejected
-        ));
-    }
-    found
-}
-
 fn drift(solution: &Solution, outage: Outage) -> OutageDrift {
     let withheld = || solution.fixes.iter().filter(|f| outage.withholds(f.t_s + 1e-9));
     let after = solution.fixes.iter().find(|f| f.t_s + 1e-9 >= outage.end_s);

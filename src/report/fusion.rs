@@ -7,7 +7,7 @@ use super::run_directory::OutputFile;
 use crate::earth::radii;
 use crate::ekf::InitialSettings;
 use crate::frames::{NavState, RollPitchYaw, wrap_angle};
-use crate::fusion::{Drift, Outcome, Row, Solution, Start, Use};
+use crate::fusion::{Assessment, Drift, Outcome, Row, Solution, Start, Use, Verdict};
 use crate::metrics::PerState;
 use crate::simulation::REPORTED_NAMES;
 use crate::units::DEG;
@@ -54,6 +54,10 @@ pub enum FusionKind {
 pub struct FusionSummary {
     schema_version: u32,
     method: &'static str,
+    /// `ok`, `underconfident`, `doubtful` or `overconfident` (not to be believed).
+    verdict: &'static str,
+    /// Why, where the verdict is not `ok`.
+    reasons: Vec<String>,
     imu_samples: usize,
     imu_rate_hz: f64,
     start_s: f64,
@@ -123,7 +127,7 @@ impl FusionSummary {
     #[must_use]
     pub fn of(
         solution: &Solution,
-        outcome: &Outcome,
+        (outcome, assessment): (&Outcome, &Assessment),
         start: &Start,
         imu_rate_hz: f64,
         filter_states: usize,
@@ -146,6 +150,8 @@ impl FusionSummary {
         Self {
             schema_version: SCHEMA_VERSION,
             method: "fusion",
+            verdict: assessment.verdict.name(),
+            reasons: assessment.reasons.iter().map(|(_, text)| text.clone()).collect(),
             imu_samples: solution.samples,
             imu_rate_hz,
             start_s: start.t_s,
@@ -164,14 +170,27 @@ impl FusionSummary {
         }
     }
 
-    /// The summary for people.
+    fn verdict_line(&self) -> String {
+        let words = match self.verdict {
+            word if word == Verdict::Ok.name() => "consistent with its fixes",
+            word if word == Verdict::Underconfident.name() => "consistent with its fixes, and cautious",
+            word if word == Verdict::Doubtful.name() => "doubtful",
+            _ => "not to be believed",
+        };
+        let reasons =
+            if self.reasons.is_empty() { String::new() } else { format!(": {}", self.reasons.join("; ")) };
+        format!("verdict: {words}{reasons}")
+    }
+
+    /// The summary for people, the verdict first.
     #[must_use]
     pub fn text(&self) -> String {
         let Fixes { used, withheld, rejected } = self.fixes;
-        let mut lines = vec![format!(
+        let mut lines = vec![self.verdict_line()];
+        lines.push(format!(
             "{} IMU samples at {:.2} Hz, {} to {:.2} s, {} states; {used} fixes used, {withheld} withheld, {rejected} rejected",
             self.imu_samples, self.imu_rate_hz, self.start_s, self.end_s, self.filter_states
-        )];
+        ));
         lines.push(format!("NIS {:.2} per component (1 if all is as believed)", self.nis_per_component));
         for o in &self.outages {
             let of = |name: &str, d: Option<DriftRow>| {

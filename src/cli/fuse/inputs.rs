@@ -6,7 +6,7 @@ use glam::DQuat;
 use nav_sim::data::fusion_files::{FusionFileError, ImuFile, read_gnss, read_imu, read_initial};
 use nav_sim::ekf::Belief;
 use nav_sim::frames::RollPitchYaw;
-use nav_sim::fusion::alignment::{self, BiasSigma};
+use nav_sim::fusion::alignment::{self, Alignment};
 use nav_sim::fusion::{FusionError, Recorded, Settings, Start, check_clocks};
 use nav_sim::gnss::GnssFix;
 use nav_sim::imu::Sensor;
@@ -67,13 +67,11 @@ impl Inputs {
         args: &Args,
         recorded: &Recorded<'_>,
         settings: &Settings,
-    ) -> Result<Start, Failure> {
+    ) -> Result<Alignment, Failure> {
         if let Some(start) = &self.initial {
-            return Ok(start.clone());
+            return Ok(Alignment { start: start.clone(), doubts: Vec::new() });
         }
-        let sigma = |sensor| self.belief.initial_bias_sigma(sensor);
-        let bias = BiasSigma { accel: sigma(Sensor::Accel), gyro: sigma(Sensor::Gyro) };
-        alignment::coarse(recorded, settings, bias).map_err(|e| {
+        alignment::coarse(recorded, settings, &self.belief).map_err(|e| {
             let failure = Failure::input(format!("{}: {e}", args.gnss.display()));
             failure.hint("give the start with --initial FILE (t_s, lat_deg, lon_deg, h_m, roll_deg, pitch_deg, yaw_deg)")
         })

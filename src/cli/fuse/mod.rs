@@ -7,12 +7,19 @@ use super::run::{parse_outage, parse_states, windows_of};
 use super::{Failure, Session, parse};
 use inputs::Inputs;
 use nav_sim::ekf::FilterStates;
-use nav_sim::fusion::{self, Recorded, Settings};
+use nav_sim::fusion::alignment::Alignment;
+use nav_sim::fusion::{self, Assessment, Recorded, Settings, Verdict};
 use nav_sim::report::FusionSummary;
 use nav_sim::sensors::gnss::MAX_LEVER_ARM_M;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+/// What to look at where a solution is not to be believed.
+const ADVICE: &str = "are the IMU's axes front, right, down (if not: --mounting), its units right, the start true (if not: \
+                      --initial FILE), the receiver's standard deviations honest (if not: --gnss-sigma-factor)?";
+/// The same where the fixes agree with the solution and the reference does not.
+const LASTING: &str = "the filter takes the errors of the fixes as white: where they last, give larger standard deviations \
+                       (--gnss-sigma-factor); is the reference's attitude that of the vehicle (if not: --mounting)?";
 /// A distance from the reference that no filter makes: another place, or another time (m).
 const ELSEWHERE_M: f64 = 10_000.0;
 
@@ -83,7 +90,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     output::try_open(&args.out, &inputs.files)?;
     let recorded = Recorded { imu: &inputs.imu.samples, gnss: &inputs.gnss };
     let settings = inputs::with_outages(settings, &recorded, session)?;
-    let start = inputs.start(args, &recorded, &settings)?;
+    let Alignment { start, doubts } = inputs.start(args, &recorded, &settings)?;
     for line in &start.how {
         session.printer.say(&format!("initial state at {} s: {line}", start.t_s));
     }
@@ -95,14 +102,25 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     let outcome = fusion::outcome(&solution, &settings.outages);
     let (rate_hz, states) = (inputs.imu.rate_hz, inputs.belief.states);
-    doubt(&solution, &outcome, session);
-    let summary = FusionSummary::of(&solution, &outcome, &start, rate_hz, states);
+    let assessment = fusion::assess(&solution, &outcome, &doubts);
+    warn(&assessment, &outcome, session);
+    let summary = FusionSummary::of(&solution, (&outcome, &assessment), &start, rate_hz, states);
     let wall_s = begin.elapsed().as_secs_f64();
     output::write(&solution, &summary, inputs.files, wall_s, &args.out)?;
     let shown = if session.json() { nav_sim::report::json(&summary) } else { summary.text() };
     session.printer.result(shown.trim_end());
     session.printer.say(&format!("wrote {}", args.out.display()));
-    Ok(())
+    believed(&assessment, &args.out, outcome.nis_per_component)
+}
+
+/// Exit code 3 for a solution that is not to be believed.
+fn believed(assessment: &Assessment, out: &Path, nis: f64) -> Result<(), Failure> {
+    if assessment.verdict < Verdict::Overconfident {
+        return Ok(());
+    }
+    let message = format!("the solution in {} is not to be believed (see the warnings above)", out.display());
+    // where the innovations are as small as they should be, it is the reference that contradicts
+    Err(Failure::bound(message).hint(if nis < 1.0 { LASTING } else { ADVICE }))
 }
 
 fn settings(args: &Args) -> Result<Settings, Failure> {
@@ -124,12 +142,15 @@ fn settings(args: &Args) -> Result<Settings, Failure> {
     })
 }
 
-/// Says what makes the solution, or the comparison with the reference, not to be believed.
-fn doubt(solution: &fusion::Solution, outcome: &fusion::Outcome, session: &Session) {
-    let found = fusion::doubts(solution, outcome);
-    found.iter().for_each(|doubt| session.printer.warn(doubt));
-    if !found.is_empty() {
-        session.printer.say(&format!("hint: {}", fusion::DOUBTFUL));
+/// Says what makes the solution, or the comparison with the reference, doubtful.
+fn warn(assessment: &Assessment, outcome: &fusion::Outcome, session: &Session) {
+    let told = |(verdict, text): &(Verdict, String)| match verdict {
+        Verdict::Ok | Verdict::Underconfident => session.printer.say(&format!("note: {text}")),
+        Verdict::Doubtful | Verdict::Overconfident => session.printer.warn(text),
+    };
+    assessment.reasons.iter().for_each(told);
+    if assessment.verdict == Verdict::Doubtful {
+        session.printer.say(&format!("hint: {ADVICE}"));
     }
     if let Some(far) = outcome.horizontal_max_m.filter(|m| *m > ELSEWHERE_M) {
         let message = format!(

@@ -1,0 +1,108 @@
+//! The course of the vehicle from GNSS: velocities as measured, or from positions a second or more apart.
+
+use super::{MIN_SPEED, between};
+use crate::earth::radii;
+use crate::frames::wrap_angle;
+use crate::gnss::GnssFix;
+use crate::imu::ImuIncrement;
+use crate::units::DEG;
+use glam::DVec3;
+
+/// How far the axis of a vehicle may be from its course on a straight road (rad): slip, mounting.
+const SLIP: f64 = 2.0 * DEG;
+/// Distance from the axle that does not steer to the IMU (m): in a turn the course there leaves the axis.
+const AXLE_M: f64 = 2.0;
+/// Shortest time from one position to another that gives a velocity, and the longest (s).
+const BASELINE_S: (f64, f64) = (1.0, 3.0);
+/// What a vehicle may accelerate between two positions, of which their mean velocity says nothing (m/s²).
+const ACCELERATION: f64 = 2.0;
+
+/// A fix with its velocity and the standard deviations of it (m/s).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Moving {
+    pub(super) fix: GnssFix,
+    pub(super) v_n: DVec3,
+    pub(super) sigma_n: DVec3,
+    /// Half the time between the two positions it comes from: it is as old as that (s); 0 as measured.
+    pub(super) lag_s: f64,
+}
+
+impl Moving {
+    pub(super) fn speed(&self) -> f64 {
+        self.v_n.truncate().length()
+    }
+
+    pub(super) fn sigma(&self) -> f64 {
+        self.sigma_n.truncate().max_element()
+    }
+
+    /// The speed from which the course of this fix is a heading (m/s).
+    fn needed(&self) -> f64 {
+        MIN_SPEED.max(5.0 * self.sigma())
+    }
+
+    /// The direction in which it moves (rad from north).
+    pub(super) fn course(&self) -> f64 {
+        self.v_n.y.atan2(self.v_n.x)
+    }
+
+    /// Standard deviation of the vehicle's axis about the course (rad).
+    pub(super) fn heading_sigma(&self, imu: &[ImuIncrement]) -> f64 {
+        let sum = |samples: &[ImuIncrement]| samples.iter().map(|s| s.dtheta).sum::<DVec3>().length();
+        let turned = sum(between(imu, self.fix.t_s - self.lag_s, self.fix.t_s));
+        // the angular rate over a second around the fix
+        let around = between(imu, self.fix.t_s - 0.5, self.fix.t_s + 0.5);
+        let seconds: f64 = around.iter().map(|s| s.dt_s).sum();
+        let rate = if seconds > 0.0 { sum(around) / seconds } else { 0.0 };
+        // the first fast fix is one whose error makes it fast: the vehicle moves more slowly than it says
+        let speed = self.speed() - 1.5 * self.sigma();
+        (self.sigma() / speed).hypot(SLIP).hypot(turned).hypot(rate * AXLE_M / speed)
+    }
+}
+
+/// The velocities within the IMU recording.
+pub(super) fn courses(gnss: &[GnssFix], imu: &[ImuIncrement]) -> Vec<Moving> {
+    let first = imu.first().map_or(f64::INFINITY, |s| s.t_s - s.dt_s);
+    let last = imu.last().map_or(f64::NEG_INFINITY, |s| s.t_s);
+    let inside = |m: &Moving| m.fix.t_s >= first && m.fix.t_s < last;
+    let velocity = |(i, fix): (usize, &GnssFix)| match fix.velocity {
+        Some((v_n, sigma_n)) => Some(Moving { fix: *fix, v_n, sigma_n, lag_s: 0.0 }),
+        None => {
+            let earlier = gnss[..i].partition_point(|f| f.t_s <= fix.t_s - BASELINE_S.0 + 1e-6);
+            derived(&gnss[earlier.checked_sub(1)?], fix)
+        }
+    };
+    gnss.iter().enumerate().filter_map(velocity).filter(inside).collect()
+}
+
+/// The first fix from `from_s` on whose course is a heading. One fix alone may be an outlier, and among
+/// thousands at rest one is five standard deviations off: the next must move as well.
+pub(super) fn first_fast(courses: &[Moving], from_s: f64) -> Option<usize> {
+    let fast = |i: usize| {
+        let supported = courses.get(i + 1).is_none_or(|next| next.speed() >= 0.6 * next.needed());
+        courses[i].fix.t_s >= from_s && courses[i].speed() >= courses[i].needed() && supported
+    };
+    (0..courses.len()).find(|i| fast(*i))
+}
+
+/// The fix that comes nearest to moving fast enough: when (s), its speed and standard deviation (m/s).
+pub(super) fn nearest_to_fast(courses: &[Moving]) -> Option<(f64, f64, f64)> {
+    let share = |m: &Moving| m.speed() / m.needed();
+    let nearest = courses.iter().max_by(|a, b| share(a).total_cmp(&share(b)))?;
+    Some((nearest.fix.t_s, nearest.speed(), nearest.sigma()))
+}
+
+/// The mean velocity between two fixes; none where they are too far apart in time.
+fn derived(before: &GnssFix, fix: &GnssFix) -> Option<Moving> {
+    let (r, dt) = (radii(fix.lat.sin()), fix.t_s - before.t_s);
+    if dt > BASELINE_S.1 {
+        return None;
+    }
+    let north = (fix.lat - before.lat) * (r.meridian + fix.h);
+    let east = wrap_angle(fix.lon - before.lon) * (r.transverse + fix.h) * fix.lat.cos();
+    let v_n = DVec3::new(north, east, before.h - fix.h) / dt;
+    let lag_s = 0.5 * dt;
+    let variance = (fix.pos_sigma_n.powf(2.0) + before.pos_sigma_n.powf(2.0)) / (dt * dt);
+    let sigma_n = (variance + DVec3::splat((ACCELERATION * lag_s).powi(2))).powf(0.5);
+    Some(Moving { fix: *fix, v_n, sigma_n, lag_s })
+}

@@ -1,0 +1,240 @@
+//! Coarse alignment: where a recording that says nothing of its start begins to be navigated.
+//!
+//! Heading is the course of the first fix that moves fast enough, or its opposite: the filter is run from
+//! both, and the innovations of the fixes that follow tell whether the vehicle goes forwards or backwards.
+//! Roll and pitch come from levelling ([Groves](crate::bibliography::Groves13), sec. 5.6.1) in a static
+//! window before it, carried on with the gyroscopes, or from the mean specific force while it moves and the
+//! change of the GNSS velocity, whichever is known better. A start that the fixes of the following minute
+//! contradict is given up for the next.
+
+mod course;
+mod levelling;
+mod trial;
+
+use super::{Recorded, Settings, Start, Verdict};
+use crate::earth::{gravity_down, radii};
+use crate::ekf::{Belief, InitialSettings};
+use crate::frames::{NavState, RollPitchYaw, wrap_angle};
+use crate::gnss::GnssFix;
+use crate::imu::{ImuIncrement, Sensor};
+use crate::units::DEG;
+use course::{Moving, courses, first_fast, nearest_to_fast};
+use levelling::{Level, Scene};
+use std::f64::consts::PI;
+
+/// Slowest course that is taken as a heading (m/s).
+pub const MIN_SPEED: f64 = 3.0;
+/// How much later other starts are tried (s), where none at the first moving fix agrees with what follows.
+const LATER_S: [f64; 5] = [15.0, 30.0, 60.0, 120.0, 240.0];
+/// Tilt beyond which the axes of an IMU are hardly those of a vehicle (rad).
+const UPRIGHT: f64 = 45.0 * DEG;
+
+/// Standard deviations of the biases, which spoil a levelling.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct BiasSigma {
+    /// Accelerometer (m/s²).
+    accel: f64,
+    /// Gyroscope (rad/s).
+    gyro: f64,
+}
+
+/// Why a recording cannot be aligned.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum AlignmentError {
+    /// It never moves fast enough.
+    #[error(
+        "no fix within the IMU recording moves at {MIN_SPEED:.1} m/s or more and at five standard deviations \
+         of its velocity or more{}: its course would be no heading",
+        .nearest.map_or_else(String::new, |(t, v, s)| format!(" (nearest to it: {v:.2} ± {s:.2} m/s at {t} s)"))
+    )]
+    NoCourse {
+        /// The fix that comes nearest to it: when (s), its speed and the standard deviation of that (m/s).
+        nearest: Option<(f64, f64, f64)>,
+    },
+    /// No specific force to level with.
+    #[error("no IMU samples after the first moving fix at {t_s} s to level with")]
+    NoSamples {
+        /// The fix (s).
+        t_s: f64,
+    },
+}
+
+/// A start found in the recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Alignment {
+    /// Where the filter starts.
+    pub start: Start,
+    /// What speaks against it.
+    pub doubts: Vec<(Verdict, String)>,
+}
+
+/// The start of a recording. Fixes that are withheld are not looked at.
+///
+/// # Errors
+/// When it never moves, or there is nothing to level with.
+pub fn coarse(
+    recorded: &Recorded<'_>,
+    settings: &Settings,
+    belief: &Belief,
+) -> Result<Alignment, AlignmentError> {
+    let withheld = |f: &GnssFix| settings.outages.iter().any(|o| o.withholds(f.t_s + 1e-9));
+    let gnss: Vec<GnssFix> = recorded.gnss.iter().filter(|f| !withheld(f)).copied().collect();
+    let recorded = Recorded { gnss: &gnss, ..*recorded };
+    let courses = courses(&gnss, recorded.imu);
+    let Some(first) = first_fast(&courses, f64::NEG_INFINITY) else {
+        return Err(AlignmentError::NoCourse { nearest: nearest_to_fast(&courses) });
+    };
+    let first_s = courses[first].fix.t_s;
+    let later = LATER_S.iter().filter_map(|s| first_fast(&courses, first_s + s));
+    let mut best: Option<Candidate> = None;
+    let mut tried_s = f64::NEG_INFINITY;
+    for at in std::iter::once(first).chain(later) {
+        if courses[at].fix.t_s <= tried_s {
+            continue;
+        }
+        tried_s = courses[at].fix.t_s;
+        for candidate in candidates(&recorded, settings, belief, &courses, at) {
+            // on a straight road anything agrees: a later start must also tell forwards from backwards
+            if candidate.agrees() && (at == first || candidate.trial.decided) {
+                return Ok(candidate.alignment(first_s));
+            }
+            best.get_or_insert(candidate);
+        }
+    }
+    best.map(|b| b.alignment(first_s)).ok_or(AlignmentError::NoSamples { t_s: first_s })
+}
+
+/// Which way the vehicle goes along its course.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Direction {
+    Forwards,
+    Backwards,
+}
+
+/// A start that was tried on the fixes after it.
+struct Candidate {
+    start: Start,
+    trial: trial::Trial,
+}
+
+impl Candidate {
+    fn agrees(&self) -> bool {
+        self.trial.agreements.iter().all(trial::Agreement::holds)
+    }
+
+    fn alignment(self, first_s: f64) -> Alignment {
+        let (start_s, nis) = (self.start.t_s, self.trial.agreements[0].nis);
+        let mut doubts = Vec::new();
+        if !self.agrees() {
+            let text = format!(
+                "the start at {start_s} s is contradicted by the fixes of the minute after it (NIS {nis:.1} per \
+                 component), forwards and backwards along the course, and so is every other that was tried"
+            );
+            doubts.push((Verdict::Overconfident, text));
+        } else if start_s > first_s {
+            let text = format!(
+                "the {:.0} s from the first moving fix at {first_s} s are left out: no start there agrees with the \
+                 fixes after it",
+                start_s - first_s
+            );
+            doubts.push((Verdict::Doubtful, text));
+        }
+        if !self.trial.decided {
+            let text =
+                "the fixes do not tell whether the vehicle goes forwards or backwards: forwards is taken";
+            doubts.push((Verdict::Doubtful, text.to_owned()));
+        }
+        doubts.extend(not_upright(&self.start).map(|text| (Verdict::Doubtful, text)));
+        Alignment { start: self.start, doubts }
+    }
+}
+
+/// A vehicle is level, more or less, at its start.
+fn not_upright(start: &Start) -> Option<String> {
+    let RollPitchYaw { roll, pitch, .. } = RollPitchYaw::from_quat(start.state.q_b_n);
+    let tilt = (roll.cos() * pitch.cos()).acos();
+    let turned = if tilt > 150.0 * DEG {
+        "upside down: its z axis points up"
+    } else {
+        "not level: its axes are not front, right, down"
+    };
+    let text = || format!("the IMU is {turned} (roll {:.0}°, pitch {:.0}°)", roll / DEG, pitch / DEG);
+    (tilt > UPRIGHT).then(text)
+}
+
+/// The starts at a moving fix, the one whose levelling is known best first, in the direction that the fixes
+/// speak for.
+fn candidates(
+    recorded: &Recorded<'_>,
+    settings: &Settings,
+    belief: &Belief,
+    courses: &[Moving],
+    at: usize,
+) -> Vec<Candidate> {
+    let moving = &courses[at];
+    let sigma = |sensor| belief.initial_bias_sigma(sensor);
+    let bias = BiasSigma { accel: sigma(Sensor::Accel), gyro: sigma(Sensor::Gyro) };
+    let g = gravity_down(settings.gravity, moving.fix.lat.sin(), moving.fix.h);
+    let scene = Scene { recorded: *recorded, settings, bias, g };
+    let heading_sigma = moving.heading_sigma(recorded.imu);
+    let in_motion = |heading| scene.in_motion(&courses[at..], heading, heading_sigma);
+    let forwards = moving.course();
+    let backwards = wrap_angle(forwards + PI);
+    let rest = scene.at_rest(&courses[..at], moving).map(|level| [level.clone(), level]);
+    let motion = in_motion(forwards).zip(in_motion(backwards)).map(|(f, b)| [f, b]);
+    let mut levels: Vec<[Level; 2]> = [rest, motion].into_iter().flatten().collect();
+    levels.sort_by(|a, b| a[0].sigma.total_cmp(&b[0].sigma));
+    let tried = |[f, b]: [Level; 2]| {
+        let starts = [(f, Direction::Forwards, forwards), (b, Direction::Backwards, backwards)]
+            .map(|(level, direction, yaw)| start(moving, &level, direction, (yaw, heading_sigma), settings));
+        let trial = trial::opposite(recorded, belief, settings, starts.each_ref());
+        let [f, b] = starts;
+        Candidate { start: if trial.better == 0 { f } else { b }, trial }
+    };
+    levels.into_iter().map(tried).collect()
+}
+
+fn start(
+    moving: &Moving,
+    level: &Level,
+    direction: Direction,
+    (yaw, heading_sigma): (f64, f64),
+    settings: &Settings,
+) -> Start {
+    let (fix, speed) = (moving.fix, moving.speed());
+    let q_b_n = RollPitchYaw { roll: level.roll, pitch: level.pitch, yaw }.to_quat();
+    let arm_n = q_b_n * settings.lever_arm_b;
+    let r = radii(fix.lat.sin());
+    let state = NavState {
+        lat: fix.lat - arm_n.x / (r.meridian + fix.h),
+        lon: fix.lon - arm_n.y / ((r.transverse + fix.h) * fix.lat.cos()),
+        h: fix.h + arm_n.z,
+        v_n: moving.v_n,
+        q_b_n,
+    };
+    let degrees = |angle: f64| (angle / DEG).min(30.0);
+    let (tilt, heading) = (degrees(level.sigma), degrees(heading_sigma));
+    let sigma = InitialSettings {
+        pos_sigma_m: fix.pos_sigma_n.to_array(),
+        vel_sigma_m_s: moving.sigma_n.to_array(),
+        att_sigma_deg: [tilt, tilt, heading],
+        ..InitialSettings::default()
+    };
+    let (roll, pitch) = (level.roll / DEG, level.pitch / DEG);
+    let tilts = format!("roll {roll:.2}°, pitch {pitch:.2}° ± {tilt:.2}° {}", level.how);
+    let back = if direction == Direction::Backwards { ", reversing" } else { "" };
+    let headings = format!(
+        "heading {:.1}° ± {heading:.1}° from the course of the fix at {} s ({speed:.1} m/s{back})",
+        yaw / DEG,
+        fix.t_s
+    );
+    let how = vec![tilts, headings, "biases start at zero".to_owned()];
+    Start { t_s: fix.t_s, state, sigma, how }
+}
+
+/// Samples whose interval ends in (from, to].
+fn between(imu: &[ImuIncrement], from: f64, to: f64) -> &[ImuIncrement] {
+    let first = imu.partition_point(|s| s.t_s <= from + 1e-9);
+    let end = imu.partition_point(|s| s.t_s <= to + 1e-9);
+    &imu[first..end.max(first)]
+}
