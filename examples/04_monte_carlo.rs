@@ -30,7 +30,7 @@ pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     let experiment = scenario.experiment(&trajectory, Truth::Model(&truth), &beliefs, &Outage::PAPER, 1);
     let results = monte_carlo::run(&experiment, 16, &|_| {})?;
     for (name, result) in ["right", "optimist"].iter().zip(&results) {
-        let summary = Summary::of(result, &epochs(&result.epochs), 1, f64::NAN);
+        let summary = Summary::of(result, &epochs(result), 1);
         let end = summary.outages[0].horizontal_error_end_m;
         println!(
             "{name:8}: NEES {:5.2} of {}, coverage {:.2} of 0.95",
@@ -39,7 +39,7 @@ pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
         println!("          after 90 s without GNSS {:.0} m (median), {:.0} m (95 %)", end.p50, end.p95);
     }
     let nees = |i: usize| {
-        let all = epochs(&results[i].epochs);
+        let all = epochs(&results[i]);
         all.iter().map(|e| e.nees.value).sum::<f64>() / all.len() as f64
     };
     assert!(nees(0) < 11.0 && nees(1) > 2.0 * nees(0));

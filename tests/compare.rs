@@ -30,9 +30,18 @@ fn result(factor: f64) -> RunResult {
     let run = |(run, see): (u32, f64)| RunRecord {
         run: u64::from(run),
         diverged: false,
-        outages: vec![OutageRecord { see_mean: [see; 9], error_end: [1.0; 9], ..OutageRecord::default() }],
+        outages: vec![OutageRecord {
+            see_mean: [see; 9],
+            see_end: [see; 9],
+            error_end: [1.0; 9],
+            nees_end: 9.0 / (see * see),
+            ..OutageRecord::default()
+        }],
         nis: (6.0, 6),
-        rejected: 0,
+        nees_mean: 9.0,
+        covered: 0.95,
+        normalised_sq: [1.0; 9],
+        ..RunRecord::default()
     };
     RunResult {
         epochs: (0..10).map(epoch).collect(),
@@ -42,13 +51,14 @@ fn result(factor: f64) -> RunResult {
         fix_components: 6,
         coverage_level: 0.95,
         run_epochs: 1000,
+        independent_windows: None,
     }
 }
 
 fn write(directory: &Path, factor: f64, change: impl FnOnce(&mut Manifest)) {
     let result = result(factor);
-    let epochs = metrics::epochs(&result.epochs);
-    let summary = Summary::of(&result, &epochs, 7, 1.0);
+    let epochs = metrics::epochs(&result);
+    let summary = Summary::of(&result, &epochs, 7);
     let outage = Some(vec![Outage { start_s: 4.0, end_s: 8.0 }]);
     let mut manifest = Manifest {
         schema_version: Manifest::SCHEMA_VERSION,
@@ -60,7 +70,9 @@ fn write(directory: &Path, factor: f64, change: impl FnOnce(&mut Manifest)) {
         inputs: vec![Input::new("trajectory", "t.csv", b"t"), Input::new("truth", "m.toml", b"m")],
         model: ModelNote::default(),
         threads: 1,
+        independent_windows: None,
         wall_s: 1.0,
+        throughput_epochs_per_s: 1.0,
     };
     change(&mut manifest);
     std::fs::create_dir_all(directory).unwrap();
@@ -97,9 +109,18 @@ fn ratios_are_those_that_were_made() {
     for cell in ["+75.00 (75.00)", "-10.00 (10.00)", "SR-AWV", "–"] {
         assert!(ran.stdout.contains(cell), "{cell} in\n{}", ran.stdout);
     }
+    // errors are 1; the filters believe 1, 1.75 and 0.9 times (1 to 1.38): the second is too timid for 20 runs
+    let mut lines = ran.stdout.lines();
+    assert!(lines.next().unwrap().starts_with("underconfident: II_awv (NEES 9.00, 0."), "{}", ran.stdout);
+    assert!(lines.next().unwrap().starts_with("consistent: I_awv (NEES 9.00, "), "{}", ran.stdout);
+    assert!(ran.stdout.contains("NEES, coverage, RMSE pos_e_m, RMSE roll_deg SR-AWV"), "{}", ran.stdout);
+    assert!(ran.stdout.contains("9.00, 0.950, +0.00, +0.00") && ran.stdout.lines().count() <= 20);
     let text = std::fs::read_to_string(directory.path().join("comparison.json")).unwrap();
     let json: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!((&json["reference"], &json["paired"]), (&"I_awv".into(), &true.into()));
+    let kinds: Vec<&str> =
+        json["verdicts"].as_array().unwrap().iter().map(|v| v["kind"].as_str().unwrap()).collect();
+    assert_eq!(kinds, ["ok", "underconfident", "ok"]);
     let row =
         json["rows"].as_array().unwrap().iter().find(|r| r["run"] == "II_awv" && r["state"] == "roll_deg");
     let row = row.unwrap();

@@ -33,6 +33,7 @@ fn json(path: &Path) -> Value {
 fn a_run_directory_holds_what_the_interface_says() {
     let place = place();
     let ran = done(place.path(), "run drive.toml imu.toml --runs 10 --outage 30:40 --seed 5 -o out");
+    assert!(ran.stdout.starts_with("verdict: consistent: NEES "), "{}", ran.stdout);
     assert!(ran.stdout.contains("10 runs (0 diverged), 15 states, seed 5"), "{}", ran.stdout);
     let out = place.path().join("out");
     let summary = json(&out.join("summary.json"));
@@ -42,8 +43,9 @@ fn a_run_directory_holds_what_the_interface_says() {
     );
     assert_eq!(summary["outages"][0]["end_s"], 40.0);
     assert!(summary["outages"][0]["asee_mean"]["pos_e_m"].as_f64().unwrap() > 0.1);
-    assert!(summary["throughput_epochs_per_s"].as_f64().unwrap() > 0.0);
+    assert_eq!(summary["verdict"]["kind"], "ok");
     let manifest = json(&out.join("manifest.json"));
+    assert!(manifest["throughput_epochs_per_s"].as_f64().unwrap() > 0.0);
     assert_eq!(manifest["configuration"]["run"]["seed"], 5);
     assert_eq!(manifest["inputs"][0]["blake3"], blake3::hash(DRIVE.as_bytes()).to_hex().as_str());
     assert_eq!(manifest["model"]["estimator"], "dr-awv");
@@ -60,7 +62,7 @@ fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
     let command = "run drive.toml imu.toml --runs 20 --outage 30:40 --seed 9";
     done(place.path(), &format!("{command} -j 1 -o one"));
     done(place.path(), &format!("{command} -j 2 -o two"));
-    for name in ["epochs.csv", "runs.csv"] {
+    for name in ["epochs.csv", "runs.csv", "summary.json", "report.html"] {
         let read = |run: &str| fs::read(place.path().join(run).join(name)).unwrap();
         assert_eq!(read("one"), read("two"), "{name}");
     }
@@ -75,6 +77,56 @@ fn a_seed_that_is_drawn_is_said_recorded_and_repeats_the_run() {
     done(place.path(), &format!("run drive.toml imu.toml --runs 2 --outage none -o again --seed {seed}"));
     let read = |run: &str| fs::read(place.path().join(run).join("epochs.csv")).unwrap();
     assert_eq!(read("drawn"), read("again"));
+}
+
+/// A filter whose accelerometer is 300 times as bad as it believes: said first, loudly, and in every file.
+#[test]
+fn a_filter_that_is_lost_is_told_first() {
+    let place = place();
+    fs::write(place.path().join("rough.toml"), MODEL.replace("1e-9", "1e-4")).unwrap();
+    let command = "run drive.toml imu.toml --truth rough.toml --runs 8 --outage 20:50 --seed 3 -o out";
+    let ran = done(place.path(), command);
+    assert!(
+        ran.stdout.starts_with("verdict: OVERCONFIDENT BY FAR, the filter is lost: errors are "),
+        "{}",
+        ran.stdout
+    );
+    assert!(ran.stderr.contains("warning: the filter is OVERCONFIDENT BY FAR"), "{}", ran.stderr);
+    let verdict = &json(&place.path().join("out/summary.json"))["verdict"];
+    assert_eq!(verdict["kind"], "overconfident");
+    assert!(
+        verdict["nees"].as_f64().unwrap() > 100.0 && verdict["ratio"].as_f64().unwrap() > 3.0,
+        "{verdict}"
+    );
+    let page = fs::read_to_string(place.path().join("out/report.html")).unwrap();
+    assert!(page.contains("<p class=\"verdict overconfident\">The filter is OVERCONFIDENT BY FAR"));
+}
+
+/// Without outages the accuracy over the run is told, RMSE beside ASEE.
+#[test]
+fn accuracy_is_told_without_outages() {
+    let place = place();
+    let ran = done(place.path(), "run drive.toml imu.toml --runs 8 --outage none --seed 3 -o out");
+    for word in ["| RMSE ", "| ASEE ", "| ratio", "pos_d_m", "averaged standard estimation error"] {
+        assert!(ran.stdout.contains(word), "{word} in {}", ran.stdout);
+    }
+    let accuracy = &json(&place.path().join("out/summary.json"))["accuracy"];
+    let ratio = |state: &str| {
+        accuracy["rmse_mean"][state].as_f64().unwrap() / accuracy["asee_mean"][state].as_f64().unwrap()
+    };
+    // 8 runs of a matched filter, some tens of independent seconds each
+    assert!((0.6..1.5).contains(&ratio("pos_e_m")) && (0.6..1.5).contains(&ratio("vel_n_m_s")));
+}
+
+#[test]
+fn times_of_random_outages_are_rounded() {
+    let place = place();
+    let scenario = "[outage_random]\nrate_per_hour = 1000\nduration_s = 5.5\n";
+    fs::write(place.path().join("s.toml"), scenario).unwrap();
+    let ran = done(place.path(), "run drive.toml imu.toml --scenario s.toml --runs 1 --seed 1 -o out");
+    let shown = ran.stderr.split("outages ").nth(1).unwrap().split(" s").next().unwrap();
+    // hundredths of seconds within a minute
+    assert!(shown.split('–').all(|t| t.len() <= 5 && t.parse::<f64>().is_ok()), "{shown}");
 }
 
 #[test]

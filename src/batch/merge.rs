@@ -38,3 +38,53 @@ fn alike(a: &RunResult, b: &RunResult) -> bool {
     let times = |r: &RunResult| r.epochs.iter().map(|e| e.t_s.to_bits()).collect::<Vec<_>>();
     a.outages == b.outages && a.filter_states == b.filter_states && times(a) == times(b)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulation::{EpochSums, RunRecord};
+
+    /// Two runs of one column, from `first`.
+    fn unit(first: u64) -> UnitResult {
+        let run = |run| RunRecord { run, ..RunRecord::default() };
+        let column = RunResult {
+            epochs: vec![EpochSums { t_s: 1.0, count: 2, error_4: [1.5; 9], ..EpochSums::default() }],
+            runs: (first..first + 2).map(run).collect(),
+            outages: vec![(300.0, 390.0)],
+            filter_states: 15,
+            ..RunResult::default()
+        };
+        UnitResult { id: String::new(), first, runs: 2, columns: vec![column] }
+    }
+
+    #[test]
+    fn units_are_added_in_the_order_of_their_runs() {
+        let mut sums = CellSums::default();
+        assert!(sums.add(unit(0)) && sums.add(unit(2)));
+        let before = sums.clone();
+        for wrong in [0, 2, 6] {
+            assert!(!sums.add(unit(wrong)) && sums == before, "runs from {wrong} after 4");
+        }
+        assert_eq!((sums.runs, sums.columns[0].epochs[0].count), (4, 4));
+        assert_eq!(sums.columns[0].epochs[0].error_4, [3.0; 9]);
+        assert!(!CellSums::default().add(unit(2)), "the first unit is missing");
+    }
+
+    #[test]
+    fn units_of_another_form_are_refused() {
+        let changes: [fn(&mut UnitResult); 5] = [
+            |u| u.columns[0].outages[0].1 = 391.0,
+            |u| u.columns[0].outages.clear(),
+            |u| u.columns[0].filter_states = 27,
+            |u| u.columns[0].epochs[0].t_s = 2.0,
+            |u| u.columns.clear(),
+        ];
+        for (k, change) in changes.iter().enumerate() {
+            let mut sums = CellSums::default();
+            assert!(sums.add(unit(0)));
+            let (before, mut other) = (sums.clone(), unit(2));
+            change(&mut other);
+            assert!(!sums.add(other) && sums == before, "change {k}");
+        }
+    }
+}

@@ -3,7 +3,7 @@
 use super::{Failure, Session};
 use comfy_table::{ContentArrangement, Table, presets};
 use nav_sim::data::{atomic, run_directory};
-use nav_sim::metrics;
+use nav_sim::metrics::{self, Measured, Verdict};
 use nav_sim::report::{self, CandidateResult, ComparisonFile, Label, Manifest};
 use nav_sim::simulation::REPORTED_NAMES;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,9 @@ use std::path::{Path, PathBuf};
 /// The table has the layout of the paper's Table I: rows scenario × outage, columns state × estimator, both
 /// from the names of the directories (II_sr-awv, or II/sr-awv). Each cell: the mean over the outage of
 /// (ASEE ratio − 1)·100, ± half its 95 % Monte-Carlo interval, and in brackets the mean of its absolute
-/// value. Everything else is in the JSON file.
+/// value. ASEE is the averaged standard estimation error: what the filter believes, not how wrong it is. So the
+/// verdict on every filter comes first, and a second table has NEES, coverage and the ratios of the RMSE at the
+/// end of the outage. All states are in the JSON file.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -64,18 +66,39 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         let run = path.display().to_string();
         let label = Label::of(&run, candidate.manifest.model.estimator.as_deref());
         let is_reference = same_place(path, &args.reference);
-        candidates.push(CandidateResult { run, label, is_reference, outages });
+        let verdict = verdict(&candidate.experiment);
+        candidates.push(CandidateResult { run, label, is_reference, verdict, outages });
     }
-    let file = ComparisonFile::new(&args.reference.display().to_string(), all_paired, &candidates);
+    let name = args.reference.display().to_string();
+    let file = ComparisonFile::new((&name, &verdict(&reference.experiment)), all_paired, &candidates);
     let json = report::json(&file);
     atomic::write(&args.out, &json)?;
     if session.json() {
         session.printer.result(json.trim_end());
     } else {
-        session.printer.result(&table(&report::table_rows(&candidates, &states)));
+        session.printer.result(&text(&file, &candidates, &states));
     }
     session.printer.say(&format!("wrote {}", args.out.display()));
     Ok(())
+}
+
+fn verdict(experiment: &Measured) -> Verdict {
+    Verdict::of(&experiment.runs, experiment.outages.len(), experiment.independent_windows)
+}
+
+/// The verdicts, the table of ASEE ratios, and what stands beside them.
+fn text(file: &ComparisonFile, candidates: &[CandidateResult], states: &[usize]) -> String {
+    let mut lines = report::verdict_lines(&file.verdicts);
+    if candidates.iter().any(|c| !c.outages.is_empty()) {
+        lines.push(format!("ASEE against {}, mean over the outage, %:", file.reference));
+        lines.push(table(&report::table_rows(candidates, states)));
+        lines.push(
+            "NEES (9 if right) and coverage over the outage, RMSE at its end against the reference, %:"
+                .to_owned(),
+        );
+        lines.push(table(&report::consistency_rows(candidates, states)));
+    }
+    lines.join("\n")
 }
 
 fn read(path: &Path) -> Result<run_directory::RunDirectory, Failure> {

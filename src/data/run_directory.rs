@@ -89,6 +89,7 @@ pub fn read(directory: &Path) -> Result<RunDirectory, RunDirectoryError> {
         epochs: parse_epochs(&epochs).map_err(table(epochs_path))?,
         runs: parse_runs(&runs).map_err(table(runs_path))?,
         outages,
+        independent_windows: manifest.independent_windows,
     };
     Ok(RunDirectory { manifest, experiment })
 }

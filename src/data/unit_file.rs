@@ -1,6 +1,6 @@
 //! Unit files of studies: what a unit found, as bytes with a checksum.
 //!
-//! `nav-sim unit 1\n`, the length of the head (u32), the head (JSON), the numbers (little-endian f64 and
+//! `nav-sim unit 2\n`, the length of the head (u32), the head (JSON), the numbers (little-endian f64 and
 //! u64: for each column its runs, then its epochs), BLAKE3 of all before. A file that is cut off or changed
 //! in one bit is no unit file.
 
@@ -12,12 +12,12 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-const MAGIC: &[u8] = b"nav-sim unit 1\n";
+const MAGIC: &[u8] = b"nav-sim unit 2\n";
 const CHECKSUM: usize = 32;
 /// Numbers of an outage record, an epoch, and a run without its outages.
-const OUTAGE: usize = 2 * REPORTED + 2;
+const OUTAGE: usize = 3 * REPORTED + 3;
 const EPOCH: usize = 4 + 5 * REPORTED + 6;
-const RUN: usize = 5;
+const RUN: usize = 7 + REPORTED;
 
 /// A unit file that cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -61,6 +61,7 @@ struct ColumnHead {
     fix_components: usize,
     coverage_level: f64,
     run_epochs: u64,
+    independent_windows: Option<f64>,
     epochs: usize,
 }
 
@@ -112,6 +113,7 @@ pub fn encode(unit: &UnitResult) -> Vec<u8> {
         fix_components: r.fix_components,
         coverage_level: r.coverage_level,
         run_epochs: r.run_epochs,
+        independent_windows: r.independent_windows,
         epochs: r.epochs.len(),
     };
     let columns = unit.columns.iter().map(head).collect();
@@ -137,11 +139,13 @@ fn put_run(bytes: &mut Vec<u8>, run: &RunRecord) {
     for word in [run.run, u64::from(run.diverged), run.nis.1, run.rejected] {
         bytes.extend(word.to_le_bytes());
     }
-    put(bytes, &[run.nis.0]);
+    put(bytes, &[run.nis.0, run.nees_mean, run.covered]);
+    put(bytes, &run.normalised_sq);
     for o in &run.outages {
         put(bytes, &o.see_mean);
+        put(bytes, &o.see_end);
         put(bytes, &o.error_end);
-        put(bytes, &[o.horizontal_error_end_m, o.reconvergence_s]);
+        put(bytes, &[o.nees_end, o.horizontal_error_end_m, o.reconvergence_s]);
     }
 }
 
@@ -193,6 +197,7 @@ fn column(head: ColumnHead, runs: u64, words: &mut Words<'_>) -> RunResult {
         fix_components: head.fix_components,
         coverage_level: head.coverage_level,
         run_epochs: head.run_epochs,
+        independent_windows: head.independent_windows,
     }
 }
 
@@ -218,13 +223,17 @@ impl Words<'_> {
 fn run(outages: usize, words: &mut Words<'_>) -> RunRecord {
     let (run, diverged, fixes, rejected) = (words.int(), words.int() != 0, words.int(), words.int());
     let nis = (words.float(), fixes);
+    let (nees_mean, covered, normalised_sq) = (words.float(), words.float(), words.floats());
     let outage = |_| OutageRecord {
         see_mean: words.floats(),
+        see_end: words.floats(),
         error_end: words.floats(),
+        nees_end: words.float(),
         horizontal_error_end_m: words.float(),
         reconvergence_s: words.float(),
     };
-    RunRecord { run, diverged, outages: (0..outages).map(outage).collect(), nis, rejected }
+    let outages = (0..outages).map(outage).collect();
+    RunRecord { run, diverged, outages, nis, rejected, nees_mean, covered, normalised_sq }
 }
 
 fn epoch(words: &mut Words<'_>) -> EpochSums {
@@ -253,6 +262,8 @@ mod tests {
         let value = |k: usize| (k as f64 + 0.1).sqrt();
         let outage = |k: usize| OutageRecord {
             see_mean: [value(k); 9],
+            see_end: [value(k + 5); 9],
+            nees_end: value(k + 6),
             error_end: std::array::from_fn(|i| -value(i + k)),
             horizontal_error_end_m: 1e-300,
             reconvergence_s: if k == 1 { f64::INFINITY } else { -0.0 },
@@ -263,6 +274,9 @@ mod tests {
             outages: vec![outage(k), outage(k + 1)],
             nis: (value(k), 700),
             rejected: 3 + k as u64,
+            nees_mean: value(k + 7),
+            covered: value(k + 8),
+            normalised_sq: std::array::from_fn(|i| value(i + k + 9)),
         };
         let epoch = |k: usize| EpochSums {
             t_s: k as f64,
@@ -282,6 +296,7 @@ mod tests {
             fix_components: 6,
             coverage_level: 0.95,
             run_epochs: 180_000,
+            independent_windows: Some(5.8),
         };
         UnitResult { id: "ab12".into(), first: 16, runs: 2, columns: vec![column(15), column(27)] }
     }

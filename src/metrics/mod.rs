@@ -11,11 +11,13 @@ mod outage;
 mod ratio;
 mod reduction;
 mod summary;
+mod verdict;
 
-pub use consistency::{Band, chi_square_band, coverage_band};
-pub use epoch::{EpochMetrics, epochs};
-pub use estimate::{Estimate, PerState, Quantile, quantile};
+pub use consistency::{Band, chi_square_band, chi_square_interval, coverage_band};
+pub use epoch::{Accuracy, EpochMetrics, epochs};
+pub use estimate::{Estimate, PerState, Quantile, SampleSize, quantile};
 pub use outage::{OutageMetrics, Reconvergence, outages};
 pub use ratio::{ComparisonError, EpochRow, Measured, OutageComparison, RatioError, StateRatio, compare};
 pub use reduction::{AxisReduction, ReductionQuality, ReductionSummary, TOLERANCE};
-pub use summary::{Consistency, Coverage, Nis, OutageSummary, Recovery, Spread, Summary};
+pub use summary::{AccuracySummary, Consistency, Coverage, Nis, OutageSummary, Recovery, Spread, Summary};
+pub use verdict::{Verdict, VerdictKind};

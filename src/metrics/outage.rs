@@ -1,7 +1,8 @@
 //! Statistics of one outage.
 
+use super::epoch::{Accuracy, epochs};
 use super::estimate::{Estimate, PerState, Quantile, quantile};
-use crate::simulation::{OutageRecord, RunResult};
+use crate::simulation::{OutageRecord, REPORTED, RunResult};
 
 /// What the runs say about one outage (m, m/s, degrees, s).
 #[derive(Debug, Clone, PartialEq)]
@@ -12,9 +13,15 @@ pub struct OutageMetrics {
     pub end_s: f64,
     /// Mean over the outage's epochs of the ASEE.
     pub asee_mean: PerState<Estimate>,
+    /// Mean over the outage's epochs of the RMSE (NaN where the epochs were not kept).
+    pub rmse_mean: PerState<Estimate>,
+    /// ASEE just before the first fix after the outage.
+    pub asee_end: PerState<Estimate>,
+    /// Mean NEES at the same instant.
+    pub nees_end: Estimate,
     /// Root mean square error just before the first fix after the outage.
     pub rmse_end: PerState<Estimate>,
-    /// Horizontal error at the same instant: median.
+    /// Horizontal error there: median.
     pub horizontal_p50_m: Quantile,
     /// 95 % quantile.
     pub horizontal_p95_m: Quantile,
@@ -39,28 +46,40 @@ pub struct Reconvergence {
 #[must_use]
 pub fn outages(result: &RunResult) -> Vec<OutageMetrics> {
     let kept = || result.runs.iter().filter(|r| !r.diverged);
+    let epochs = epochs(result);
     let of = |(i, window): (usize, &(f64, f64))| {
         let records: Vec<&OutageRecord> = kept().filter_map(|r| r.outages.get(i)).collect();
-        outage(*window, &records)
+        // a nanosecond of slack: sample times are multiples of 1/rate, outage times are typed
+        let inside = epochs.iter().filter(|e| window.0 <= e.t_s + 1e-9 && e.t_s + 1e-9 < window.1);
+        OutageMetrics {
+            rmse_mean: Accuracy::over(inside).rmse_mean,
+            ..outage(*window, &records, result.independent_windows)
+        }
     };
     result.outages.iter().enumerate().map(of).collect()
 }
 
-fn outage((start_s, end_s): (f64, f64), records: &[&OutageRecord]) -> OutageMetrics {
+/// All that the records of the runs tell.
+fn outage((start_s, end_s): (f64, f64), records: &[&OutageRecord], windows: Option<f64>) -> OutageMetrics {
     let horizontal = sorted(records.iter().map(|r| r.horizontal_error_end_m));
     let recovery = sorted(records.iter().map(|r| r.reconvergence_s).filter(|s| s.is_finite()));
+    let mean =
+        |value: &dyn Fn(&OutageRecord) -> f64| Estimate::mean_of(records.iter().map(|r| value(r)), windows);
     let per_state = |f: &dyn Fn(usize) -> Estimate| PerState(std::array::from_fn(f));
     OutageMetrics {
         start_s,
         end_s,
-        asee_mean: per_state(&|i| Estimate::mean_of(records.iter().map(|r| r.see_mean[i]))),
-        rmse_end: per_state(&|i| Estimate::root_mean_square_of(records.iter().map(|r| r.error_end[i]))),
-        horizontal_p50_m: quantile(&horizontal, 0.5),
-        horizontal_p95_m: quantile(&horizontal, 0.95),
+        asee_mean: per_state(&|i| mean(&|r| r.see_mean[i])),
+        rmse_mean: PerState([Estimate { value: f64::NAN, std_error: f64::NAN }; REPORTED]),
+        asee_end: per_state(&|i| mean(&|r| r.see_end[i])),
+        nees_end: mean(&|r| r.nees_end),
+        rmse_end: per_state(&|i| mean(&|r| r.error_end[i].powi(2)).root()),
+        horizontal_p50_m: quantile(&horizontal, 0.5, windows),
+        horizontal_p95_m: quantile(&horizontal, 0.95, windows),
         horizontal_max_m: horizontal.last().copied().unwrap_or(f64::NAN),
         reconvergence: Reconvergence {
-            p50_s: quantile(&recovery, 0.5),
-            p95_s: quantile(&recovery, 0.95),
+            p50_s: quantile(&recovery, 0.5, windows),
+            p95_s: quantile(&recovery, 0.95, windows),
             never: (records.len() - recovery.len()) as u64,
         },
     }
@@ -83,8 +102,10 @@ mod tests {
             error_end: [-value; 9],
             horizontal_error_end_m: value,
             reconvergence_s: if value > 4.0 { f64::NAN } else { value },
+            see_end: [2.0 * value; 9],
+            nees_end: 9.0 * value,
         };
-        RunRecord { run, diverged, outages: vec![record], nis: (6.0, 1), rejected: 0 }
+        RunRecord { run, diverged, outages: vec![record], nis: (6.0, 1), ..RunRecord::default() }
     }
 
     #[test]
@@ -94,6 +115,7 @@ mod tests {
         let metrics = &outages(&result)[0];
         assert_eq!(metrics.asee_mean.0[1].value, 3.0);
         assert!((metrics.rmse_end.0[4].value - (35.0_f64 / 3.0).sqrt()).abs() < 1e-15);
+        assert_eq!((metrics.asee_end.0[1].value, metrics.nees_end.value), (6.0, 27.0));
         assert_eq!((metrics.horizontal_p50_m.value, metrics.horizontal_max_m), (3.0, 5.0));
         assert_eq!((metrics.reconvergence.p50_s.value, metrics.reconvergence.never), (2.0, 1));
     }

@@ -1,6 +1,7 @@
 //! Ratios between two experiments on the same trajectory with the same outages: what the filter of one
 //! believes, relative to the other ([Minaretzis et al.](crate::bibliography::Minaretzis24), Table I).
 
+use super::estimate::{Estimate, SampleSize};
 use crate::simulation::{OutageRecord, REPORTED, RunRecord};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -28,6 +29,8 @@ pub struct Measured {
     pub runs: Vec<RunRecord>,
     /// Outages (start, end) (s).
     pub outages: Vec<(f64, f64)>,
+    /// As in [`RunResult`](crate::simulation::RunResult): runs beyond these share their noise.
+    pub independent_windows: Option<f64>,
 }
 
 /// Why two experiments have no ratio.
@@ -146,16 +149,18 @@ fn outage(
     let pick = |e: &Measured| e.epochs.iter().filter(inside).cloned().collect::<Vec<_>>();
     let (c, r) = (pick(candidate), pick(reference));
     let records = records(candidate, reference, index, paired);
+    let windows = [candidate.independent_windows, reference.independent_windows].into_iter().flatten();
+    let pairing = Pairing { paired, windows: windows.reduce(f64::min) };
     let state = |i: usize| {
         let ratios: Vec<f64> = c.iter().zip(&r).map(|(c, r)| (c.asee[i] / r.asee[i] - 1.0) * 100.0).collect();
         let see = |side: &[&OutageRecord]| side.iter().map(|o| o.see_mean[i]).collect::<Vec<_>>();
         let square = |side: &[&OutageRecord]| side.iter().map(|o| o.error_end[i].powi(2)).collect::<Vec<_>>();
         let pct = mean(ratios.iter().copied());
-        let asee = mean_ratio(&see(&records.0), &see(&records.1), paired);
+        let asee = pairing.mean_ratio(&see(&records.0), &see(&records.1));
         StateRatio {
             asee: RatioError { pct, ci95_pct: [pct - asee.half_width_pct, pct + asee.half_width_pct] },
             asee_abs_pct: mean(ratios.iter().map(|e| e.abs())),
-            rmse_end: mean_ratio(&square(&records.0), &square(&records.1), paired).root(),
+            rmse_end: pairing.mean_ratio(&square(&records.0), &square(&records.1)).root(),
         }
     };
     OutageComparison {
@@ -198,29 +203,37 @@ impl MeanRatio {
     }
 }
 
-fn mean_ratio(a: &[f64], b: &[f64], paired: bool) -> MeanRatio {
-    let (mean_a, mean_b) = (mean(a.iter().copied()), mean(b.iter().copied()));
-    let ratio = mean_a / mean_b;
-    let variance = if paired {
-        let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - ratio * b).collect();
-        variance_of_mean(&differences)
-    } else {
-        variance_of_mean(a) + ratio * ratio * variance_of_mean(b)
-    };
-    let freedom = a.len().min(b.len()) as f64 - 1.0;
-    let t = StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |t| t.inverse_cdf(0.975));
-    MeanRatio { ratio, half_width_pct: t * variance.sqrt() / mean_b * 100.0 }
+/// How the runs of two experiments belong together.
+struct Pairing {
+    /// Whether run k of both saw the same noise.
+    paired: bool,
+    /// Independent windows of noise, where they are limited.
+    windows: Option<f64>,
+}
+
+impl Pairing {
+    fn mean_ratio(&self, a: &[f64], b: &[f64]) -> MeanRatio {
+        let (mean_a, mean_b) = (mean(a.iter().copied()), mean(b.iter().copied()));
+        let ratio = mean_a / mean_b;
+        let variance = if self.paired {
+            let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - ratio * b).collect();
+            self.variance_of_mean(&differences)
+        } else {
+            self.variance_of_mean(a) + ratio * ratio * self.variance_of_mean(b)
+        };
+        let freedom = SampleSize::of(a.len().min(b.len()) as u64, self.windows).independent - 1.0;
+        let t = StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |t| t.inverse_cdf(0.975));
+        MeanRatio { ratio, half_width_pct: t * variance.sqrt() / mean_b * 100.0 }
+    }
+
+    fn variance_of_mean(&self, values: &[f64]) -> f64 {
+        Estimate::mean_of(values.iter().copied(), self.windows).std_error.powi(2)
+    }
 }
 
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (n, sum) = values.fold((0.0, 0.0), |(n, sum), v| (n + 1.0, sum + v));
     sum / n
-}
-
-fn variance_of_mean(values: &[f64]) -> f64 {
-    let n = values.len() as f64;
-    let centre = mean(values.iter().copied());
-    values.iter().map(|v| (v - centre).powi(2)).sum::<f64>() / (n - 1.0) / n
 }
 
 #[cfg(test)]

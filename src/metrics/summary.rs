@@ -1,10 +1,11 @@
 //! The summary of an experiment: what `summary.json` holds.
 
 use super::consistency::{Band, chi_square_band, coverage_band};
-use super::epoch::EpochMetrics;
-use super::estimate::{Estimate, PerState, Quantile};
+use super::epoch::{Accuracy, EpochMetrics};
+use super::estimate::{Estimate, PerState, Quantile, SampleSize};
 use super::outage::{self, OutageMetrics};
 use super::reduction::ReductionSummary;
+use super::verdict::Verdict;
 use crate::simulation::{NEES_DOF, RunResult};
 use serde::Serialize;
 
@@ -18,16 +19,23 @@ pub struct Summary {
     pub schema_version: u32,
     /// "monte-carlo".
     pub method: &'static str,
+    /// Whether the filter is as good as it believes.
+    pub verdict: Verdict,
     /// Runs, diverged ones included.
     pub runs: u64,
     /// Runs whose state or covariance stopped being finite; they are in no other number.
     pub diverged: u64,
     /// Their indices: with the seed, each can be repeated.
     pub diverged_runs: Vec<u64>,
+    /// Runs that count as independent in every error stated here: fewer than were made where they share the
+    /// windows of static recordings.
+    pub independent_runs: f64,
     /// States of the filter.
     pub filter_states: usize,
     /// Seed of all random numbers.
     pub seed: u64,
+    /// Means over all epochs, with and without fixes.
+    pub accuracy: AccuracySummary,
     /// Outages in time order.
     pub outages: Vec<OutageSummary>,
     /// Normalised estimation error squared of position, velocity and attitude.
@@ -39,8 +47,17 @@ pub struct Summary {
     /// What the reduction to 15 states leaves of the model; none for the full filter.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reduction: Option<ReductionSummary>,
-    /// IMU epochs a second, all runs together; only known to who measured it.
-    pub throughput_epochs_per_s: f64,
+}
+
+/// ASEE and RMSE as means over epochs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AccuracySummary {
+    /// Mean over the epochs of the ASEE.
+    pub asee_mean: PerState<f64>,
+    /// Mean over the epochs of the RMSE.
+    pub rmse_mean: PerState<f64>,
+    /// Its Monte-Carlo standard error (an upper bound: as if all epochs erred together).
+    pub rmse_mean_std_error: PerState<f64>,
 }
 
 /// One outage.
@@ -54,10 +71,22 @@ pub struct OutageSummary {
     pub asee_mean: PerState<f64>,
     /// Its Monte-Carlo standard error.
     pub asee_mean_std_error: PerState<f64>,
+    /// Mean over the outage's epochs of the RMSE.
+    pub rmse_mean: PerState<f64>,
+    /// Its Monte-Carlo standard error (an upper bound: as if all epochs erred together).
+    pub rmse_mean_std_error: PerState<f64>,
+    /// ASEE just before the first fix after the outage.
+    pub asee_end: PerState<f64>,
+    /// Its Monte-Carlo standard error.
+    pub asee_end_std_error: PerState<f64>,
     /// RMSE just before the first fix after the outage.
     pub rmse_end: PerState<f64>,
     /// Its Monte-Carlo standard error.
     pub rmse_end_std_error: PerState<f64>,
+    /// Mean NEES at the same instant.
+    pub nees_end: f64,
+    /// Its Monte-Carlo standard error.
+    pub nees_end_std_error: f64,
     /// Horizontal error at the same instant.
     pub horizontal_error_end_m: Spread,
     /// Time until the error is back to what it was before.
@@ -138,40 +167,66 @@ pub struct Coverage {
 }
 
 impl Summary {
-    /// The summary of a Monte-Carlo experiment that took `wall_s` seconds.
+    /// The summary of a Monte-Carlo experiment.
     #[must_use]
-    pub fn of(result: &RunResult, epochs: &[EpochMetrics], seed: u64, wall_s: f64) -> Self {
+    pub fn of(result: &RunResult, epochs: &[EpochMetrics], seed: u64) -> Self {
+        let windows = result.independent_windows;
+        let verdict = Verdict::of(&result.runs, result.outages.len(), windows);
         let diverged_runs: Vec<u64> = result.runs.iter().filter(|r| r.diverged).map(|r| r.run).collect();
         Self {
             schema_version: SCHEMA_VERSION,
             method: "monte-carlo",
+            verdict,
             runs: result.runs.len() as u64,
             diverged: diverged_runs.len() as u64,
             diverged_runs,
+            independent_runs: verdict.independent_runs,
             filter_states: result.filter_states,
             seed,
+            accuracy: AccuracySummary::from(&Accuracy::over(epochs.iter())),
             outages: outage::outages(result).iter().map(OutageSummary::from).collect(),
-            nees: nees(epochs),
+            nees: nees(epochs, windows),
             nis: nis(result),
-            coverage: coverage(epochs, result.coverage_level),
+            coverage: coverage(epochs, result.coverage_level, windows),
             reduction: None,
-            throughput_epochs_per_s: result.run_epochs as f64 / wall_s,
+        }
+    }
+}
+
+fn values(all: &PerState<Estimate>) -> PerState<f64> {
+    PerState(all.0.map(|e| e.value))
+}
+
+fn errors(all: &PerState<Estimate>) -> PerState<f64> {
+    PerState(all.0.map(|e| e.std_error))
+}
+
+impl From<&Accuracy> for AccuracySummary {
+    fn from(a: &Accuracy) -> Self {
+        Self {
+            asee_mean: values(&a.asee_mean),
+            rmse_mean: values(&a.rmse_mean),
+            rmse_mean_std_error: errors(&a.rmse_mean),
         }
     }
 }
 
 impl From<&OutageMetrics> for OutageSummary {
     fn from(o: &OutageMetrics) -> Self {
-        let values = |all: &PerState<Estimate>| PerState(all.0.map(|e| e.value));
-        let errors = |all: &PerState<Estimate>| PerState(all.0.map(|e| e.std_error));
         let (p50, p95) = (o.horizontal_p50_m, o.horizontal_p95_m);
         Self {
             start_s: o.start_s,
             end_s: o.end_s,
             asee_mean: values(&o.asee_mean),
             asee_mean_std_error: errors(&o.asee_mean),
+            rmse_mean: values(&o.rmse_mean),
+            rmse_mean_std_error: errors(&o.rmse_mean),
+            asee_end: values(&o.asee_end),
+            asee_end_std_error: errors(&o.asee_end),
             rmse_end: values(&o.rmse_end),
             rmse_end_std_error: errors(&o.rmse_end),
+            nees_end: o.nees_end.value,
+            nees_end_std_error: o.nees_end.std_error,
             horizontal_error_end_m: Spread::new(p50, p95, o.horizontal_max_m),
             reconvergence_s: Recovery {
                 p50: o.reconvergence.p50_s.value,
@@ -188,19 +243,19 @@ impl Spread {
     }
 }
 
-/// The runs behind most epochs (all but the diverged ones).
-fn count(epochs: &[EpochMetrics]) -> u64 {
-    epochs.iter().map(|e| e.count).max().unwrap_or(0)
+/// Independent runs behind most epochs (all but the diverged ones).
+fn count(epochs: &[EpochMetrics], windows: Option<f64>) -> f64 {
+    SampleSize::of(epochs.iter().map(|e| e.count).max().unwrap_or(0), windows).independent
 }
 
-fn nees(epochs: &[EpochMetrics]) -> Consistency {
-    let band = chi_square_band(NEES_DOF, count(epochs));
+fn nees(epochs: &[EpochMetrics], windows: Option<f64>) -> Consistency {
+    let band = chi_square_band(NEES_DOF, count(epochs, windows));
     let (mean, fraction_inside) = mean_and_inside(epochs, band, |e| e.nees.value);
     Consistency { dof: NEES_DOF, mean, lower95: band.lower, upper95: band.upper, fraction_inside }
 }
 
-fn coverage(epochs: &[EpochMetrics], level: f64) -> Coverage {
-    let band = coverage_band(level, count(epochs));
+fn coverage(epochs: &[EpochMetrics], level: f64, windows: Option<f64>) -> Coverage {
+    let band = coverage_band(level, count(epochs, windows));
     let (mean, fraction_inside) = mean_and_inside(epochs, band, |e| e.coverage);
     Coverage { level, mean, lower95: band.lower, upper95: band.upper, fraction_inside }
 }
@@ -215,7 +270,9 @@ fn nis(result: &RunResult) -> Nis {
     let kept = || result.runs.iter().filter(|r| !r.diverged).map(|r| r.nis).filter(|(_, fixes)| *fixes > 0);
     let fixes: u64 = kept().map(|(_, fixes)| fixes).sum();
     let sum: f64 = kept().map(|(mean, fixes)| mean * fixes as f64).sum();
-    let band = chi_square_band(result.fix_components, fixes);
+    let runs = SampleSize::of(kept().count() as u64, result.independent_windows);
+    let share = runs.independent / runs.values as f64;
+    let band = chi_square_band(result.fix_components, fixes as f64 * share);
     Nis {
         dof: result.fix_components,
         mean: sum / fixes as f64,

@@ -30,9 +30,9 @@ fn matched(runs: u64, epochs: usize) -> RunResult {
     let record = |run| RunRecord {
         run,
         diverged: false,
-        outages: vec![OutageRecord { see_mean: [1.0; 9], ..OutageRecord::default() }],
+        outages: vec![OutageRecord { see_mean: [1.0; 9], see_end: [1.0; 9], ..OutageRecord::default() }],
         nis: (6.0, 10),
-        rejected: 0,
+        ..RunRecord::default()
     };
     RunResult {
         epochs: sums,
@@ -42,6 +42,7 @@ fn matched(runs: u64, epochs: usize) -> RunResult {
         fix_components: 6,
         coverage_level: 0.95,
         run_epochs: runs * 1000,
+        independent_windows: None,
     }
 }
 
@@ -51,8 +52,8 @@ fn matched(runs: u64, epochs: usize) -> RunResult {
 #[test]
 fn a_correct_filter_is_found_correct() {
     let result = matched(50, 2000);
-    let epochs = super::super::epochs(&result.epochs);
-    let summary = Summary::of(&result, &epochs, 7, 2.0);
+    let epochs = super::super::epochs(&result);
+    let summary = Summary::of(&result, &epochs, 7);
     assert!((summary.nees.fraction_inside - 0.95).abs() < 0.0244, "{:?}", summary.nees);
     assert!((summary.nees.mean - 9.0).abs() < 5.0 * (18.0_f64 / 1e5).sqrt(), "{:?}", summary.nees);
     assert!(summary.coverage.fraction_inside > 0.95, "{:?}", summary.coverage);
@@ -68,20 +69,26 @@ fn a_filter_off_by_a_quarter_is_found_out() {
     for s in &mut result.epochs {
         s.nees = s.nees.map(|n| n * 1.25);
     }
-    let epochs = super::super::epochs(&result.epochs);
-    assert!(Summary::of(&result, &epochs, 7, 1.0).nees.fraction_inside < 0.2);
+    let epochs = super::super::epochs(&result);
+    assert!(Summary::of(&result, &epochs, 7).nees.fraction_inside < 0.2);
 }
 
 #[test]
 fn the_file_has_the_keys_of_the_interface() {
     let mut result = matched(4, 6);
     result.runs[2].diverged = true;
-    let summary = Summary::of(&result, &super::super::epochs(&result.epochs), 7, 2.0);
+    let summary = Summary::of(&result, &super::super::epochs(&result), 7);
     let json = serde_json::to_value(&summary).unwrap();
     for pointer in [
         "/outages/0/start_s",
         "/outages/0/asee_mean/pos_e_m",
         "/outages/0/rmse_end/roll_deg",
+        "/outages/0/asee_end/roll_deg",
+        "/outages/0/rmse_mean/pos_d_m",
+        "/accuracy/rmse_mean/yaw_deg",
+        "/verdict/nees",
+        "/verdict/coverage",
+        "/independent_runs",
         "/outages/0/horizontal_error_end_m/p50",
         "/outages/0/horizontal_error_end_m/max",
         "/nees/fraction_inside",
@@ -91,11 +98,11 @@ fn the_file_has_the_keys_of_the_interface() {
     }
     assert_eq!(json["schema_version"], 1);
     assert_eq!(json["method"], "monte-carlo");
+    assert_eq!(json["verdict"]["kind"], "diverged");
     assert_eq!(
         (&json["runs"], &json["diverged"], &json["diverged_runs"][0]),
         (&4.into(), &1.into(), &2.into())
     );
-    assert_eq!(json["throughput_epochs_per_s"], 2000.0);
     assert_eq!(json["nis"]["fixes"], 30);
 }
 
@@ -106,7 +113,21 @@ fn nothing_left_is_null_not_a_crash() {
         run.diverged = true;
     }
     result.epochs.iter_mut().for_each(|s| *s = EpochSums { t_s: s.t_s, ..EpochSums::default() });
-    let json =
-        serde_json::to_value(Summary::of(&result, &super::super::epochs(&result.epochs), 7, 1.0)).unwrap();
+    let json = serde_json::to_value(Summary::of(&result, &super::super::epochs(&result), 7)).unwrap();
     assert!(json["nees"]["mean"].is_null() && json["nees"]["lower95"].is_null());
+}
+
+/// Sixteen runs that are each other's copies in fours: every interval is that of four.
+#[test]
+fn runs_that_share_their_noise_count_once_in_every_band() {
+    let mut copies = matched(16, 20);
+    copies.independent_windows = Some(4.0);
+    let summary = Summary::of(&copies, &super::super::epochs(&copies), 7);
+    let four = chi_square_band(9, 4.0);
+    assert_eq!((summary.nees.lower95, summary.nees.upper95), (four.lower, four.upper));
+    let four = coverage_band(0.95, 4.0);
+    assert_eq!((summary.coverage.lower95, summary.coverage.upper95), (four.lower, four.upper));
+    let four = chi_square_band(6, 40.0);
+    assert_eq!((summary.nis.lower95, summary.nis.upper95), (four.lower, four.upper));
+    assert_eq!(summary.independent_runs, 4.0);
 }

@@ -38,7 +38,7 @@ pub fn run_range(
     progress: &(dyn Fn(u64) + Sync),
 ) -> Option<Vec<RunResult>> {
     let experiment = plan.experiment();
-    let results = experiment.beliefs.iter().map(|b| empty(experiment, b.states)).collect();
+    let results = experiment.beliefs.iter().map(|b| empty(plan, b.states)).collect();
     let sums = Mutex::new(InOrder { results, next: 0, waiting: BTreeMap::new() });
     let batches = runs.div_ceil(LANES as u64);
     (0..batches).par_bridge().for_each(|batch| {
@@ -75,12 +75,14 @@ impl InOrder {
     }
 }
 
-fn empty(experiment: &Experiment<'_>, filter_states: usize) -> RunResult {
+fn empty(plan: &Plan<'_>, filter_states: usize) -> RunResult {
+    let experiment = plan.experiment();
     RunResult {
         outages: experiment.outages.iter().map(|o| (o.start_s, o.end_s)).collect(),
         filter_states,
         fix_components: experiment.gnss.components(),
         coverage_level: experiment.coverage_level,
+        independent_windows: experiment.truth.independent_windows(plan.samples()),
         ..RunResult::default()
     }
 }

@@ -246,3 +246,81 @@ fn the_gate_refuses_as_many_fixes_as_its_probability_says() {
     let coloured = setting.run(80);
     assert!(rejected(&coloured[0]) > 200, "{} of 8000", rejected(&coloured[0]));
 }
+
+/// Sums over runs are those of the runs one by one, in every field: 11 runs are two batches.
+#[test]
+fn sums_of_batches_are_sums_of_runs() {
+    let setting = Setting::new(30.0, &[1.0]);
+    let experiment = setting.experiment();
+    let plan = Plan::new(&experiment).unwrap();
+    let of = |first, runs| run_range(&plan, first, runs, &|| true, &|_| {}).unwrap().swap_remove(0);
+    let together = of(0, 11);
+    let mut appended = of(0, 5);
+    appended.append(of(5, 6));
+    let single: Vec<RunResult> = (0..11).map(|k| of(k, 1)).collect();
+    let agree = |sum: f64, parts: &dyn Fn(&EpochSums) -> f64, epoch: usize| {
+        let expected: f64 = single.iter().map(|r| parts(&r.epochs[epoch])).sum();
+        assert!((sum - expected).abs() <= 1e-9 * expected.abs() + 1e-12, "epoch {epoch}: {sum}, {expected}");
+    };
+    for (k, sums) in together.epochs.iter().chain(&appended.epochs).enumerate() {
+        let k = k % together.epochs.len();
+        for i in 0..REPORTED {
+            agree(sums.see[i], &|e| e.see[i], k);
+            agree(sums.see_sq[i], &|e| e.see[i].powi(2), k);
+            agree(sums.error_sq[i], &|e| e.error[i].powi(2), k);
+            agree(sums.error_4[i], &|e| e.error[i].powi(4), k);
+        }
+        agree(sums.nees[1], &|e| e.nees[0].powi(2), k);
+        agree(sums.pos_error[1], &|e| e.pos_error[0].powi(2), k);
+        agree(sums.att_error[1], &|e| e.att_error[0].powi(2), k);
+        assert_eq!(sums.covered, single.iter().map(|r| r.epochs[k].covered).sum::<u64>());
+    }
+    assert_eq!((together.run_epochs, appended.run_epochs), (33_000, 33_000));
+}
+
+/// What is kept of a run is what its epochs say: means over the run, the mean SEE over the outage (start ≤ t <
+/// end), the state at its end, and when the horizontal error is back within that of the receiver, 2√2 m.
+#[test]
+fn records_agree_with_the_epochs_of_their_run() {
+    let mut setting = Setting::new(60.0, &[1.0]);
+    setting.gnss.vel_sigma_m_s = None;
+    let experiment = setting.experiment();
+    let plan = Plan::new(&experiment).unwrap();
+    let mut late = 0;
+    for k in 0..24 {
+        let result = run_range(&plan, k, 1, &|| true, &|_| {}).unwrap().swap_remove(0);
+        let (record, epochs) = (&result.runs[0], &result.epochs);
+        let mean = |value: &dyn Fn(&EpochSums) -> f64, of: &[EpochSums]| {
+            of.iter().map(value).sum::<f64>() / of.len() as f64
+        };
+        let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-12, "run {k}: {a} {b}");
+        let outage = &record.outages[0];
+        near(record.nees_mean, mean(&|e| e.nees[0], epochs));
+        near(record.covered, mean(&|e| e.covered as f64, epochs));
+        for i in 0..REPORTED {
+            near(record.normalised_sq[i], mean(&|e| (e.error[i] / e.see[i]).powi(2), epochs));
+            near(outage.see_mean[i], mean(&|e| e.see[i], &epochs[20..40]));
+        }
+        let horizontal = |e: &EpochSums| e.error[0].hypot(e.error[1]);
+        let back = epochs[40..].iter().position(|e| horizontal(e) <= 8.0_f64.sqrt());
+        near(1.0 + outage.reconvergence_s, back.map_or(f64::NAN, |s| 1.0 + s as f64));
+        late += u32::from(back.is_some_and(|s| s > 0 && horizontal(&epochs[40]) <= 2.0 * 8.0_f64.sqrt()));
+        // at 40 s, before the fix there: a second of growth after 39 s, and far above what the fix leaves
+        assert!(outage.see_end[0] > epochs[39].see[0] && outage.see_end[0] > 1.5 * epochs[40].see[0]);
+        near(outage.horizontal_error_end_m, outage.error_end[0].hypot(outage.error_end[1]));
+    }
+    assert!(
+        late > 0,
+        "no run is between one and two standard deviations of the receiver: the test sees nothing"
+    );
+}
+
+/// At the very end of a trajectory there is no fix: the end of the outage is the last epoch.
+#[test]
+fn an_outage_that_outlasts_the_trajectory_ends_with_it() {
+    let mut setting = Setting::new(30.0, &[1.0]);
+    setting.outages = vec![Outage { start_s: 20.0, end_s: 31.0 }];
+    let result = &setting.run(1)[0];
+    let (last, outage) = (&result.epochs[30], &result.runs[0].outages[0]);
+    assert_eq!((outage.see_end, outage.error_end, outage.nees_end), (last.see, last.error, last.nees[0]));
+}

@@ -2,8 +2,9 @@
 //! its name; numbers that do not exist are NaN (null in JSON).
 
 use super::comparison::{CandidateResult, Label, table_rows};
-use super::number::readable;
-use crate::metrics::{self, EpochMetrics, EpochRow, Measured, OutageComparison, OutageMetrics};
+use super::number::{readable, seconds};
+use super::verdict::verdict_word;
+use crate::metrics::{self, EpochMetrics, EpochRow, Measured, OutageComparison, OutageMetrics, Verdict};
 use crate::simulation::{REPORTED, REPORTED_NAMES, RunResult};
 
 /// A value of a table.
@@ -97,9 +98,11 @@ const HORIZONTAL: [&str; 10] = [
 #[must_use]
 pub fn outage_columns() -> Vec<TableColumn> {
     let mut names: Vec<String> = ["start_s", "end_s", "duration_s"].map(str::to_owned).into();
-    for prefix in ["asee_mean", "asee_mean_std_error", "rmse_end", "rmse_end_std_error"] {
+    for prefix in ["asee_mean", "rmse_mean", "asee_end", "rmse_end"] {
         names.extend(prefixed(prefix));
+        names.extend(prefixed(&format!("{prefix}_std_error")));
     }
+    names.extend(["nees_end", "nees_end_std_error", "verdict_ratio"].map(str::to_owned));
     names.extend(HORIZONTAL.map(str::to_owned));
     for (state, _) in states() {
         let ratio = |name: &str| format!("{name}_{state}_pct");
@@ -111,8 +114,8 @@ pub fn outage_columns() -> Vec<TableColumn> {
     names.extend(
         ["nees_mean", "nees_mean_reference", "coverage_mean", "coverage_mean_reference"].map(str::to_owned),
     );
-    let reference = std::iter::once(("reference".to_owned(), ValueKind::Text));
-    columns(reference.chain(ints(["outage", "runs", "diverged"])).chain(floats(names)))
+    let words = ["reference", "verdict", "verdict_state"].map(|name| (name.to_owned(), ValueKind::Text));
+    columns(words.into_iter().chain(ints(["outage", "runs", "diverged"])).chain(floats(names)))
 }
 
 /// One row an outage; a set without outages has no row.
@@ -124,25 +127,37 @@ pub fn outage_rows(
 ) -> Vec<TableRow> {
     let runs = of.result.runs.len() as u64;
     let diverged = of.result.runs.iter().filter(|r| r.diverged).count() as u64;
+    let verdict = verdict(of.result);
+    let words = [of.reference, verdict_word(verdict.kind), verdict.worst_state];
     let row = |(i, outage): (usize, &OutageMetrics)| {
         let mut row = keys(of);
-        row.push(Value::Text(of.reference.to_owned()));
+        row.extend(words.map(|word| Value::Text(word.to_owned())));
         row.extend([i as u64, runs, diverged].map(Value::Int));
         let ratios = comparison.and_then(|c| c.get(i));
         row.extend(
-            outage_values(outage, runs - diverged).into_iter().chain(ratio_values(ratios)).map(Value::Float),
+            outage_values(outage, verdict.ratio, runs - diverged)
+                .into_iter()
+                .chain(ratio_values(ratios))
+                .map(Value::Float),
         );
         row
     };
     outages.iter().enumerate().map(row).collect()
 }
 
-fn outage_values(o: &OutageMetrics, kept: u64) -> Vec<f64> {
+/// The verdict on a column: of the whole experiment, not of one outage.
+#[must_use]
+pub fn verdict(result: &RunResult) -> Verdict {
+    Verdict::of(&result.runs, result.outages.len(), result.independent_windows)
+}
+
+fn outage_values(o: &OutageMetrics, verdict_ratio: f64, kept: u64) -> Vec<f64> {
     let mut values = vec![o.start_s, o.end_s, o.end_s - o.start_s];
-    for estimates in [&o.asee_mean, &o.rmse_end] {
+    for estimates in [&o.asee_mean, &o.rmse_mean, &o.asee_end, &o.rmse_end] {
         values.extend(estimates.0.map(|e| e.value));
         values.extend(estimates.0.map(|e| e.std_error));
     }
+    values.extend([o.nees_end.value, o.nees_end.std_error, verdict_ratio]);
     for quantile in [&o.horizontal_p50_m, &o.horizontal_p95_m] {
         let (low, high) = quantile.ci95;
         values.extend([quantile.value, low.unwrap_or(f64::NAN), high.unwrap_or(f64::NAN)]);
@@ -194,10 +209,9 @@ pub fn epoch_rows(of: &ColumnResult<'_>, epochs: &[EpochMetrics]) -> Vec<TableRo
 /// Columns of the table of runs.
 #[must_use]
 pub fn run_columns() -> Vec<TableColumn> {
-    let mut names = vec!["nis_mean".to_owned()];
-    names.extend(prefixed("see_mean"));
-    names.extend(prefixed("error_end"));
-    names.extend(["horizontal_error_end_m", "reconvergence_s"].map(str::to_owned));
+    let mut names: Vec<String> = ["nis_mean", "nees_mean", "coverage"].map(str::to_owned).into();
+    names.extend(["see_mean", "see_end", "error_end"].into_iter().flat_map(prefixed));
+    names.extend(["nees_end", "horizontal_error_end_m", "reconvergence_s"].map(str::to_owned));
     columns(ints(["run", "outage", "diverged", "fixes"]).chain(floats(names)))
 }
 
@@ -209,8 +223,10 @@ pub fn run_rows(of: &ColumnResult<'_>) -> Vec<TableRow> {
         for (i, o) in run.outages.iter().enumerate() {
             let mut row = keys(of);
             row.extend([run.run, i as u64, u64::from(run.diverged), run.nis.1].map(Value::Int));
-            let values = std::iter::once(run.nis.0).chain(o.see_mean).chain(o.error_end);
-            row.extend(values.chain([o.horizontal_error_end_m, o.reconvergence_s]).map(Value::Float));
+            let whole = [run.nis.0, run.nees_mean, run.covered].into_iter();
+            let states = whole.chain(o.see_mean).chain(o.see_end).chain(o.error_end);
+            let ends = [o.nees_end, o.horizontal_error_end_m, o.reconvergence_s];
+            row.extend(states.chain(ends).map(Value::Float));
             rows.push(row);
         }
     }
@@ -228,9 +244,10 @@ pub fn measured(result: &RunResult) -> Measured {
         coverage: e.coverage,
     };
     Measured {
-        epochs: metrics::epochs(&result.epochs).iter().map(row).collect(),
+        epochs: metrics::epochs(result).iter().map(row).collect(),
         runs: result.runs.clone(),
         outages: result.outages.clone(),
+        independent_windows: result.independent_windows,
     }
 }
 
@@ -247,6 +264,8 @@ pub struct ShownColumn {
     pub comparison: Option<Vec<OutageComparison>>,
     /// Whether it is the reference.
     pub is_reference: bool,
+    /// Whether its filter is as good as it believes.
+    pub verdict: Verdict,
 }
 
 /// A cell as people read it.
@@ -265,9 +284,36 @@ pub fn ratio_table(cell: &ShownCell, states: &[usize]) -> Vec<Vec<String>> {
         run: column.name.clone(),
         label: column.label.clone(),
         is_reference: column.is_reference,
+        verdict: column.verdict,
         outages: column.comparison.clone().unwrap_or_default(),
     };
     table_rows(&cell.columns.iter().map(candidate).collect::<Vec<_>>(), states)
+}
+
+/// Whether the filters are as good as they believe: a row a cell, a column a candidate; the ratio is that of
+/// error to standard deviation in the state that is farthest off.
+#[must_use]
+pub fn verdict_table(cells: &[ShownCell]) -> Vec<Vec<String>> {
+    let mut rows = vec![vec!["cell".to_owned()]];
+    if let Some(cell) = cells.first() {
+        rows[0].extend(cell.columns.iter().map(|c| c.name.clone()));
+    }
+    let shown = |column: &ShownColumn| {
+        let v = &column.verdict;
+        format!(
+            "{}, NEES {}, {} × in {}",
+            verdict_word(v.kind),
+            readable(v.nees),
+            readable(v.ratio),
+            v.worst_state
+        )
+    };
+    rows.extend(
+        cells
+            .iter()
+            .map(|cell| std::iter::once(cell.name.clone()).chain(cell.columns.iter().map(shown)).collect()),
+    );
+    rows
 }
 
 /// Horizontal error just before the first fix after each outage, median and (95 %) in metres: a row an
@@ -281,7 +327,7 @@ pub fn drift_table(cells: &[ShownCell]) -> Vec<Vec<String>> {
     for ShownCell { name, columns } in cells {
         let Some(first) = columns.first() else { continue };
         for (i, o) in first.outages.iter().enumerate() {
-            let mut row = vec![name.clone(), format!("{}–{} s", o.start_s, o.end_s)];
+            let mut row = vec![name.clone(), format!("{}–{} s", seconds(o.start_s), seconds(o.end_s))];
             let shown = |column: &ShownColumn| {
                 let o = &column.outages[i];
                 let (p50, p95) = (o.horizontal_p50_m.value, o.horizontal_p95_m.value);
@@ -307,7 +353,7 @@ mod tests {
     #[test]
     fn rows_fit_their_columns_and_names_carry_units() {
         let result = sample::result();
-        let (outages, epochs) = (metrics::outages(&result), metrics::epochs(&result.epochs));
+        let (outages, epochs) = (metrics::outages(&result), metrics::epochs(&result));
         let experiment = measured(&result);
         let comparison = metrics::compare(&experiment, &experiment, true).unwrap();
         let tables = [
@@ -332,7 +378,20 @@ mod tests {
                 }
             }
         }
-        let units = ["_s", "_m", "_deg", "_pct", "_share", "_mean", "_reference", "nees", "coverage"];
+        let units = [
+            "_s",
+            "_m",
+            "_deg",
+            "_pct",
+            "_share",
+            "_mean",
+            "_reference",
+            "nees",
+            "coverage",
+            "nees_end",
+            "nees_end_std_error",
+            "_ratio",
+        ];
         for (name, kind) in outage_columns().iter().chain(&epoch_columns()).chain(&run_columns()) {
             assert!(*kind != ValueKind::Float || units.iter().any(|u| name.ends_with(u)), "{name}");
         }

@@ -1,6 +1,8 @@
 //! `comparison.json` and the layout of the paper's Table I.
 
-use crate::metrics::OutageComparison;
+use super::number::readable;
+use super::verdict::{verdict_in_short, verdict_word};
+use crate::metrics::{OutageComparison, RatioError, Verdict, VerdictKind};
 use crate::simulation::REPORTED_NAMES;
 use serde::Serialize;
 
@@ -50,6 +52,8 @@ pub struct CandidateResult {
     pub label: Label,
     /// Whether it is the reference itself.
     pub is_reference: bool,
+    /// Whether its filter is as good as it believes.
+    pub verdict: Verdict,
     /// Outage by outage.
     pub outages: Vec<OutageComparison>,
 }
@@ -63,10 +67,22 @@ pub struct ComparisonFile {
     pub reference: String,
     /// Whether run k saw the same noise everywhere, so that intervals are those of paired differences.
     pub paired: bool,
+    /// One row a run, the reference first.
+    pub verdicts: Vec<VerdictRow>,
     /// One row a run, outage and state.
     pub rows: Vec<Row>,
     /// One row a run and outage.
     pub consistency: Vec<ConsistencyRow>,
+}
+
+/// Whether the filter of a run is as good as it believes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct VerdictRow {
+    /// Run directory.
+    pub run: String,
+    /// The verdict.
+    #[serde(flatten)]
+    pub verdict: Verdict,
 }
 
 /// One state of one run in one outage, against the reference.
@@ -110,11 +126,15 @@ pub struct ConsistencyRow {
 impl ComparisonFile {
     /// All candidates against one reference.
     #[must_use]
-    pub fn new(reference: &str, paired: bool, candidates: &[CandidateResult]) -> Self {
+    pub fn new(reference: (&str, &Verdict), paired: bool, candidates: &[CandidateResult]) -> Self {
+        let own = VerdictRow { run: reference.0.to_owned(), verdict: *reference.1 };
+        let others = candidates.iter().filter(|c| !c.is_reference);
+        let verdicts = others.map(|c| VerdictRow { run: c.run.clone(), verdict: c.verdict });
         let mut file = Self {
             schema_version: 1,
-            reference: reference.to_owned(),
+            reference: reference.0.to_owned(),
             paired,
+            verdicts: std::iter::once(own).chain(verdicts).collect(),
             rows: Vec::new(),
             consistency: Vec::new(),
         };
@@ -148,26 +168,68 @@ fn rows<'a>(run: &'a str, outage: usize, comparison: &'a OutageComparison) -> im
     })
 }
 
+/// Which filters are as good as they believe: a line a kind of verdict, the gravest first.
+#[must_use]
+pub fn verdict_lines(verdicts: &[VerdictRow]) -> Vec<String> {
+    let kinds =
+        [VerdictKind::Diverged, VerdictKind::Overconfident, VerdictKind::Underconfident, VerdictKind::Ok];
+    let line = |kind: VerdictKind| {
+        let of_kind = verdicts.iter().filter(|row| row.verdict.kind == kind);
+        let runs: Vec<String> =
+            of_kind.map(|row| format!("{} ({})", row.run, verdict_in_short(&row.verdict))).collect();
+        (!runs.is_empty()).then(|| format!("{}: {}", verdict_word(kind), runs.join(", ")))
+    };
+    kinds.into_iter().filter_map(line).collect()
+}
+
 /// The paper's Table I: rows scenario × outage, columns state × estimator; each cell the signed mean ratio
 /// error with half its 95 % interval, and in brackets the mean of the absolute ratio error (%). The first
 /// row is the head; an interval below half a hundredth has one digit; `states` are indices of reported states.
 #[must_use]
 pub fn table_rows(candidates: &[CandidateResult], states: &[usize]) -> Vec<Vec<String>> {
+    let heads: Vec<String> = states.iter().map(|s| REPORTED_NAMES[*s].to_owned()).collect();
+    laid_out(candidates, &heads, &|candidate, outage, column| cell(candidate, outage, states[column]))
+}
+
+/// Beside Table I, in its layout: mean NEES and coverage over the outage, and (ratio − 1)·100 of the RMSE at
+/// its end with half its 95 % interval, for each of the `states`.
+#[must_use]
+pub fn consistency_rows(candidates: &[CandidateResult], states: &[usize]) -> Vec<Vec<String>> {
+    let names: Vec<&str> = states.iter().map(|s| REPORTED_NAMES[*s]).collect();
+    let head = format!("NEES, coverage, RMSE {}", names.join(", RMSE "));
+    let consistency = |candidate: &CandidateResult, outage: usize, _: usize| {
+        let found = &candidate.outages[outage];
+        let mut parts = vec![readable(found.nees[0]), format!("{:.3}", found.coverage[0])];
+        parts.extend(states.iter().map(|s| match candidate.is_reference {
+            true => "–".to_owned(),
+            false => signed(&found.states[*s].rmse_end),
+        }));
+        parts.join(", ")
+    };
+    laid_out(candidates, &[head], &consistency)
+}
+
+/// Rows scenario × outage, columns `heads` × estimator.
+fn laid_out(
+    candidates: &[CandidateResult],
+    heads: &[String],
+    cell: &dyn Fn(&CandidateResult, usize, usize) -> String,
+) -> Vec<Vec<String>> {
     let labels = distinct_labels(candidates);
     let scenarios = in_order(labels.iter().map(|label| label.scenario.as_str()));
     let estimators = in_order(labels.iter().map(|label| label.estimator.as_str()));
-    let columns = || states.iter().flat_map(|s| estimators.iter().map(move |e| (*s, *e)));
-    let name = |(s, e): (usize, &str)| format!("{} {e}", REPORTED_NAMES[s]).trim_end().to_owned();
+    let columns = || (0..heads.len()).flat_map(|s| estimators.iter().map(move |e| (s, *e)));
+    let name = |(s, e): (usize, &str)| format!("{} {e}", heads[s]).trim_end().to_owned();
     let mut rows = vec![["scenario", "outage"].map(str::to_owned).to_vec()];
     rows[0].extend(columns().map(name));
     let outages = candidates.iter().map(|c| c.outages.len()).max().unwrap_or(0);
     for scenario in scenarios {
         for outage in 0..outages {
-            let cell_of = |(state, estimator): (usize, &str)| {
+            let cell_of = |(column, estimator): (usize, &str)| {
                 let here = |label: &Label| label.scenario == scenario && label.estimator == estimator;
                 let found = labels.iter().position(here).map(|i| &candidates[i]);
                 let found = found.filter(|c| outage < c.outages.len());
-                found.map_or_else(String::new, |c| cell(c, outage, state))
+                found.map_or_else(String::new, |c| cell(c, outage, column))
             };
             let mut row = vec![scenario.to_owned(), (outage + 1).to_string()];
             row.extend(columns().map(cell_of));
@@ -207,14 +269,19 @@ fn cell(candidate: &CandidateResult, outage: usize, state: usize) -> String {
         return "–".to_owned();
     }
     let ratio = candidate.outages[outage].states[state];
-    let half = (ratio.asee.ci95_pct[1] - ratio.asee.ci95_pct[0]) / 2.0;
+    format!("{} ({:.2})", signed(&ratio.asee), ratio.asee_abs_pct)
+}
+
+/// A ratio's distance from unity with half its 95 % interval (%).
+fn signed(error: &RatioError) -> String {
+    let half = (error.ci95_pct[1] - error.ci95_pct[0]) / 2.0;
     let interval = match half {
         h if h >= 0.005 => format!(" ± {h:.2}"),
         // below that it is the rounding of equal ratios
         h if h > 1e-9 => format!(" ± {h:.0e}"),
         _ => String::new(),
     };
-    format!("{:+.2}{interval} ({:.2})", ratio.asee.pct, ratio.asee_abs_pct)
+    format!("{:+.2}{interval}", error.pct)
 }
 
 fn in_order<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
@@ -230,7 +297,7 @@ fn in_order<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::metrics::{RatioError, StateRatio};
+    use crate::metrics::StateRatio;
 
     #[test]
     fn names_of_directories_are_places_in_the_table() {
@@ -258,7 +325,8 @@ mod tests {
         let state = StateRatio { asee: error, asee_abs_pct: pct.abs() + 1.0, rmse_end: error };
         let outage = OutageComparison { states: [state; 9], nees: [9.5, 9.0], coverage: [0.9, 0.95] };
         let outages = vec![outage.clone(), outage];
-        CandidateResult { run: run.into(), label: Label::of(run, None), is_reference, outages }
+        let verdict = Verdict::of(&[], 2, None);
+        CandidateResult { run: run.into(), label: Label::of(run, None), is_reference, verdict, outages }
     }
 
     #[test]
@@ -275,6 +343,9 @@ mod tests {
         );
         assert_eq!(rows[1], ["I", "1", "–", "+0.96 ± 0.50 (1.96)", "–", "+0.96 ± 0.50 (1.96)"]);
         assert_eq!(rows[4][..4], ["II", "2", "-75.00 ± 0.50 (76.00)", ""]);
+        let rows = consistency_rows(&all, &[1, 6]);
+        assert_eq!(rows[0][2], "NEES, coverage, RMSE pos_e_m, RMSE roll_deg AWV");
+        assert_eq!(rows[1][2..], ["9.50, 0.900, –, –", "9.50, 0.900, +0.96 ± 0.50, +0.96 ± 0.50"]);
     }
 
     #[test]
@@ -293,7 +364,11 @@ mod tests {
 
     #[test]
     fn the_file_has_the_keys_of_the_interface() {
-        let file = ComparisonFile::new("I/awv", true, &[candidate("II/awv", 3.0, false)]);
+        let file = ComparisonFile::new(
+            ("I/awv", &Verdict::of(&[], 2, None)),
+            true,
+            &[candidate("II/awv", 3.0, false)],
+        );
         let json = serde_json::to_value(&file).unwrap();
         assert_eq!(json["reference"], "I/awv");
         assert_eq!(json["rows"].as_array().unwrap().len(), 18);

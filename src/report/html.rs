@@ -1,8 +1,9 @@
 //! `report.html`: one page with everything inside it.
 
 use super::manifest::Manifest;
-use super::number::readable;
+use super::number::{readable, seconds};
 use super::svg::{Line, Plot, Scale, escape};
+use super::verdict::{verdict_line, verdict_word};
 use crate::metrics::{EpochMetrics, Estimate, OutageSummary, PerState, Summary};
 use crate::simulation::{REPORTED, RunResult};
 use std::fmt::Write as _;
@@ -31,6 +32,7 @@ pub(super) fn run_page(
 ) -> String {
     let mut body = String::new();
     head(manifest, summary, &mut body);
+    accuracy(summary, &mut body);
     outages(&summary.outages, &mut body);
     consistency(summary, &mut body);
     let plots = Plots { result, epochs };
@@ -64,11 +66,16 @@ fn head(manifest: &Manifest, summary: &Summary, body: &mut String) {
         ("model of the filter", input("model").to_owned()),
         ("what makes the errors", truth.to_owned()),
         ("runs", format!("{} ({} diverged)", summary.runs, summary.diverged)),
+        ("independent runs", readable(summary.independent_runs)),
         ("filter states", summary.filter_states.to_string()),
         ("seed", summary.seed.to_string()),
-        ("IMU epochs a second", readable(summary.throughput_epochs_per_s)),
     ];
-    *body += "<h1>INS/GNSS Monte-Carlo run</h1>\n<dl>\n";
+    let windows: Vec<(f64, f64)> = summary.outages.iter().map(|o| (o.start_s, o.end_s)).collect();
+    let verdict = verdict_line(&summary.verdict, &windows, summary.runs, summary.diverged);
+    *body += "<h1>INS/GNSS Monte-Carlo run</h1>\n";
+    let class = verdict_word(summary.verdict.kind);
+    let _ = writeln!(body, "<p class=\"verdict {class}\">The filter is {}</p>", escape(&verdict));
+    *body += "<dl>\n";
     for (name, value) in figures {
         let _ = writeln!(body, "<dt>{name}</dt><dd>{}</dd>", escape(&value));
     }
@@ -79,10 +86,10 @@ fn outages(outages: &[OutageSummary], body: &mut String) {
     if outages.is_empty() {
         return;
     }
-    *body += "<h2>Outages</h2>\n<p>Errors just before the first fix after the outage; ASEE averaged over the \
-              outage. ± is one Monte-Carlo standard error; brackets are 95 % intervals.</p>\n";
+    *body += "<h2>Outages</h2>\n<p>Horizontal errors just before the first fix after the outage; brackets are \
+              95 % intervals.</p>\n";
     let mut head = vec!["".to_owned()];
-    head.extend(outages.iter().map(|o| format!("{}–{} s", o.start_s, o.end_s)));
+    head.extend(outages.iter().map(window));
     let mut rows = vec![head];
     let mut row = |name: &str, cell: &dyn Fn(&OutageSummary) -> String| {
         let cells = outages.iter().map(cell);
@@ -103,26 +110,62 @@ fn outages(outages: &[OutageSummary], body: &mut String) {
     row("horizontal error, largest (m)", &|o| readable(o.horizontal_error_end_m.max));
     row("re-convergence, median (s)", &|o| readable(o.reconvergence_s.p50));
     table(&rows, body);
-    outage_states(outages, body);
+    *body += "<h3>Just before the first fix after the outage</h3>\n";
+    let at_end = |o: &OutageSummary| Pair {
+        name: window(o),
+        rmse: o.rmse_end,
+        rmse_std_error: o.rmse_end_std_error,
+        asee: o.asee_end,
+    };
+    pairs(&outages.iter().map(at_end).collect::<Vec<_>>(), body);
+    *body += "<h3>Mean over the outage</h3>\n";
+    let over_all = |o: &OutageSummary| Pair {
+        name: window(o),
+        rmse: o.rmse_mean,
+        rmse_std_error: o.rmse_mean_std_error,
+        asee: o.asee_mean,
+    };
+    pairs(&outages.iter().map(over_all).collect::<Vec<_>>(), body);
 }
 
-/// State by state, what the filter believed and how wrong it was.
-fn outage_states(outages: &[OutageSummary], body: &mut String) {
+fn window(o: &OutageSummary) -> String {
+    format!("{}–{} s", seconds(o.start_s), seconds(o.end_s))
+}
+
+/// Means over the run.
+fn accuracy(summary: &Summary, body: &mut String) {
+    *body += "<h2>Accuracy</h2>\n<p>RMSE: how wrong the runs were. ASEE (averaged standard estimation error): the \
+              filter's own standard deviation, averaged over the runs. Their ratio is 1 if the filter is right. \
+              ± is one Monte-Carlo standard error.</p>\n";
+    let a = &summary.accuracy;
+    let name = "mean over the run".to_owned();
+    let whole = Pair { name, rmse: a.rmse_mean, rmse_std_error: a.rmse_mean_std_error, asee: a.asee_mean };
+    pairs(&[whole], body);
+}
+
+/// How wrong the runs were and how wrong the filter believed them to be, both at the same time.
+struct Pair {
+    /// When.
+    name: String,
+    rmse: PerState<f64>,
+    rmse_std_error: PerState<f64>,
+    asee: PerState<f64>,
+}
+
+/// State by state.
+fn pairs(pairs: &[Pair], body: &mut String) {
     let mut head = vec!["".to_owned()];
-    for o in outages {
-        head.extend(
-            ["mean ASEE", "RMSE at the end"].map(|what| format!("{what}, {}–{} s", o.start_s, o.end_s)),
-        );
+    for pair in pairs {
+        head.extend(["RMSE", "ASEE", "RMSE/ASEE"].map(|what| format!("{what}, {}", pair.name)));
     }
     let mut rows = vec![head];
     for (i, title) in TITLES.iter().enumerate() {
-        let estimate = |value: &PerState<f64>, error: &PerState<f64>| {
-            format!("{} ± {}", readable(value.0[i]), readable(error.0[i]))
-        };
         let mut row = vec![(*title).to_owned()];
-        for o in outages {
-            row.push(estimate(&o.asee_mean, &o.asee_mean_std_error));
-            row.push(estimate(&o.rmse_end, &o.rmse_end_std_error));
+        for pair in pairs {
+            let (rmse, error, asee) = (pair.rmse.0[i], pair.rmse_std_error.0[i], pair.asee.0[i]);
+            row.push(format!("{} ± {}", readable(rmse), readable(error)));
+            row.push(readable(asee));
+            row.push(format!("{} ± {}", readable(rmse / asee), readable(error / asee)));
         }
         rows.push(row);
     }
@@ -206,8 +249,8 @@ impl Plots<'_> {
 
 fn provenance(manifest: &Manifest, body: &mut String) {
     *body += "<h2>Provenance</h2>\n";
-    let _ = writeln!(body, "<p><code>{}</code></p>", escape(&manifest.command.join(" ")));
-    let _ = writeln!(body, "<p>nav-sim {}, {} threads</p>", escape(&manifest.version), manifest.threads);
+    // the command, the threads and the time taken are in manifest.json: this page is the same for the same seed
+    let _ = writeln!(body, "<p>nav-sim {}; the command is in manifest.json</p>", escape(&manifest.version));
     let mut rows = vec![["input", "file", "BLAKE3"].map(str::to_owned).to_vec()];
     rows.extend(manifest.inputs.iter().map(|i| vec![i.role.clone(), i.path.clone(), i.blake3.clone()]));
     table(&rows, body);

@@ -24,8 +24,13 @@ pub struct Manifest {
     pub model: ModelNote,
     /// Worker threads.
     pub threads: usize,
+    /// Independent windows that the static recordings hold, where they made the errors.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub independent_windows: Option<f64>,
     /// Time from start to results (s).
     pub wall_s: f64,
+    /// IMU epochs a second, all runs together.
+    pub throughput_epochs_per_s: f64,
 }
 
 /// A file that was read.
@@ -58,7 +63,7 @@ pub struct ModelNote {
 
 impl Manifest {
     /// Version of the layout.
-    pub const SCHEMA_VERSION: u32 = 1;
+    pub const SCHEMA_VERSION: u32 = 2;
 
     /// The hashes of the inputs of a role, in the order given.
     #[must_use]

@@ -19,12 +19,14 @@ mod sample;
 mod svg;
 mod tables;
 mod trajectory;
+mod verdict;
 
 pub use batch::{
     ColumnResult, ShownCell, ShownColumn, TableColumn, TableRow, Value, ValueKind, drift_table,
     epoch_columns, epoch_rows, measured, outage_columns, outage_rows, ratio_table, run_columns, run_rows,
+    verdict, verdict_table,
 };
-pub use comparison::{CandidateResult, ComparisonFile, Label, table_rows};
+pub use comparison::{CandidateResult, ComparisonFile, Label, consistency_rows, table_rows, verdict_lines};
 pub use curves::{
     CONFIDENCE, CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile, intervals_note,
     signal_rows,
@@ -34,6 +36,7 @@ pub use efficiency_svg::efficiency_svg;
 pub use fits::{CandidateEntry, FitEntry, FitsFile, describe};
 pub use fusion::{FUSION_FILES, FusionKind, FusionManifest, FusionSummary, fusion_directory, solution_csv};
 pub use manifest::{Input, Manifest, ModelNote};
+pub use number::seconds;
 pub use recording::{gnss_csv, imu_csv, initial_toml};
 pub use replicates::{
     AlarmEntry, LeftOutEntry, MovementEntry, ReplicateEntry, ScoresEntry, describe_replicates,
@@ -41,3 +44,4 @@ pub use replicates::{
 pub use run_directory::{OutputFile, RUN_FILES, json, run_directory};
 pub use tables::{TableError, epochs_csv, parse_epochs, parse_runs, runs_csv};
 pub use trajectory::{TrajectorySeries, trajectory_svg};
+pub use verdict::{verdict_in_short, verdict_line, verdict_word};

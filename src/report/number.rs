@@ -7,6 +7,12 @@ pub(super) fn shortest(x: f64) -> String {
     if plain { format!("{x}") } else { format!("{x:e}") }
 }
 
+/// A time of a schedule, to a hundredth of a second.
+#[must_use]
+pub fn seconds(t_s: f64) -> String {
+    format!("{}", (t_s * 100.0).round() / 100.0)
+}
+
 /// A number for people: three significant digits, or four figures before the point.
 pub(super) fn readable(x: f64) -> String {
     if !x.is_finite() {
@@ -34,6 +40,11 @@ mod tests {
             assert_eq!(shortest(x).parse::<f64>().unwrap().to_bits(), x.to_bits(), "{x:e}");
         }
         assert_eq!([300.0, 0.1, 2e-9, f64::NAN].map(shortest), ["300", "0.1", "2e-9", "NaN"]);
+    }
+
+    #[test]
+    fn times_are_rounded() {
+        assert_eq!([300.0, 412.345_678_901_2, 0.1].map(seconds), ["300", "412.35", "0.1"]);
     }
 
     #[test]

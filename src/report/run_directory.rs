@@ -59,8 +59,8 @@ mod tests {
     /// Names and texts.
     fn files() -> Vec<(&'static str, String)> {
         let result = sample::result();
-        let epochs = metrics::epochs(&result.epochs);
-        let summary = Summary::of(&result, &epochs, 7, 2.0);
+        let epochs = metrics::epochs(&result);
+        let summary = Summary::of(&result, &epochs, 7);
         let manifest = Manifest {
             schema_version: Manifest::SCHEMA_VERSION,
             version: "0.1.0".into(),
@@ -71,7 +71,9 @@ mod tests {
             inputs: vec![Input::new("trajectory", "a<b.toml", b"x")],
             model: ModelNote { estimator: Some("dr-awv".into()) },
             threads: 2,
+            independent_windows: None,
             wall_s: 2.0,
+            throughput_epochs_per_s: 2400.0,
         };
         let files = run_directory(&result, &epochs, &summary, &manifest);
         files.into_iter().map(|file| (file.name, file.parts.collect())).collect()

@@ -29,12 +29,17 @@ pub(super) fn result() -> RunResult {
         diverged: false,
         outages: vec![OutageRecord {
             see_mean: [7.5 + 0.01 * f64::from(run); 9],
+            see_end: [16.3 + 0.01 * f64::from(run); 9],
+            nees_end: 8.0 + f64::from(run),
             error_end: [3.0 - f64::from(run); 9],
             horizontal_error_end_m: 2.0 + f64::from(run),
             reconvergence_s: 1.0 + f64::from(run),
         }],
         nis: (5.5 + 0.3 * f64::from(run), 8),
         rejected: 0,
+        nees_mean: 8.5 + 0.1 * f64::from(run),
+        covered: 0.75,
+        normalised_sq: [1.0 + 0.1 * f64::from(run); 9],
     };
     RunResult {
         epochs: (0..12).map(epoch).collect(),
@@ -44,5 +49,6 @@ pub(super) fn result() -> RunResult {
         fix_components: 6,
         coverage_level: 0.95,
         run_epochs: 4800,
+        independent_windows: None,
     }
 }

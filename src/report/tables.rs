@@ -63,18 +63,22 @@ pub fn epochs_csv(epochs: &[EpochMetrics]) -> String {
 
 /// Columns of `runs.csv`.
 fn run_columns() -> Vec<String> {
-    let start = ["run", "diverged", "nis_mean", "fixes", "outage"].map(str::to_owned);
-    let ends = ["horizontal_error_end_m", "reconvergence_s"].map(str::to_owned);
-    start.into_iter().chain(named("see_mean_")).chain(named("error_end_")).chain(ends).collect()
+    let start = ["run", "diverged", "nis_mean", "fixes", "nees_mean", "coverage"].map(str::to_owned);
+    let whole = start.into_iter().chain(named("normalised_sq_")).chain(["outage".to_owned()]);
+    let ends = ["nees_end", "horizontal_error_end_m", "reconvergence_s"].map(str::to_owned);
+    let states = ["see_mean_", "see_end_", "error_end_"].into_iter().flat_map(named);
+    whole.chain(states).chain(ends).collect()
 }
 
 /// `runs.csv`, line by line: one row a run and outage (one row a run, outage empty, when there is none).
 pub fn runs_csv(result: &RunResult) -> impl Iterator<Item = String> {
     let columns = run_columns();
-    let states = columns.len() - 4;
+    let of_an_outage = columns.len() - 6 - REPORTED;
     let rows = result.runs.iter().flat_map(move |run| {
-        let start = format!("{},{},{},{}", run.run, u8::from(run.diverged), shortest(run.nis.0), run.nis.1);
-        let empty = run.outages.is_empty().then(|| format!("{start}{}\n", ",".repeat(states)));
+        let counts = format!("{},{},{},{}", run.run, u8::from(run.diverged), shortest(run.nis.0), run.nis.1);
+        let whole = [run.nees_mean, run.covered].into_iter().chain(run.normalised_sq).map(shortest);
+        let start = format!("{counts},{}", whole.collect::<Vec<_>>().join(","));
+        let empty = run.outages.is_empty().then(|| format!("{start}{}\n", ",".repeat(of_an_outage)));
         let of_outage = move |(i, outage)| format!("{start},{i},{}\n", outage_cells(outage).join(","));
         empty.into_iter().chain(run.outages.iter().enumerate().map(of_outage))
     });
@@ -82,8 +86,8 @@ pub fn runs_csv(result: &RunResult) -> impl Iterator<Item = String> {
 }
 
 fn outage_cells(outage: &OutageRecord) -> Vec<String> {
-    let states = outage.see_mean.iter().chain(&outage.error_end);
-    let ends = [outage.horizontal_error_end_m, outage.reconvergence_s];
+    let states = outage.see_mean.iter().chain(&outage.see_end).chain(&outage.error_end);
+    let ends = [outage.nees_end, outage.horizontal_error_end_m, outage.reconvergence_s];
     states.chain(&ends).copied().map(shortest).collect()
 }
 
@@ -122,16 +126,22 @@ pub fn parse_epochs(text: &str) -> Result<Vec<EpochRow>, TableError> {
 /// A missing column or a value that is not a number.
 pub fn parse_runs(text: &str) -> Result<Vec<RunRecord>, TableError> {
     let table = Table::read(text)?;
-    let (see, error) = (table.states("see_mean_")?, table.states("error_end_")?);
-    let [run, diverged, nis, fixes, outage, horizontal, recovery] = table.columns([
-        "run",
-        "diverged",
-        "nis_mean",
-        "fixes",
-        "outage",
-        "horizontal_error_end_m",
-        "reconvergence_s",
-    ])?;
+    let (see, see_end, error) =
+        (table.states("see_mean_")?, table.states("see_end_")?, table.states("error_end_")?);
+    let normalised = table.states("normalised_sq_")?;
+    let [run, diverged, nis, fixes, nees, coverage, outage, nees_end, horizontal, recovery] =
+        table.columns([
+            "run",
+            "diverged",
+            "nis_mean",
+            "fixes",
+            "nees_mean",
+            "coverage",
+            "outage",
+            "nees_end",
+            "horizontal_error_end_m",
+            "reconvergence_s",
+        ])?;
     let mut runs: Vec<RunRecord> = Vec::new();
     for row in 0..table.rows.len() {
         let number = table.number(row, run)? as u64;
@@ -142,6 +152,9 @@ pub fn parse_runs(text: &str) -> Result<Vec<RunRecord>, TableError> {
                 outages: Vec::new(),
                 nis: (table.number(row, nis)?, table.number(row, fixes)? as u64),
                 rejected: 0, // known to the summary only
+                nees_mean: table.number(row, nees)?,
+                covered: table.number(row, coverage)?,
+                normalised_sq: table.numbers(row, normalised)?,
             });
         }
         if table.rows[row][outage].is_empty() {
@@ -149,6 +162,8 @@ pub fn parse_runs(text: &str) -> Result<Vec<RunRecord>, TableError> {
         }
         let record = OutageRecord {
             see_mean: table.numbers(row, see)?,
+            see_end: table.numbers(row, see_end)?,
+            nees_end: table.number(row, nees_end)?,
             error_end: table.numbers(row, error)?,
             horizontal_error_end_m: table.number(row, horizontal)?,
             reconvergence_s: table.number(row, recovery)?,
@@ -232,7 +247,7 @@ mod tests {
     #[test]
     fn epochs_read_back_exactly() {
         let result = sample::result();
-        let metrics = epochs(&result.epochs);
+        let metrics = epochs(&result);
         let text = epochs_csv(&metrics);
         let rows = parse_epochs(&text).unwrap();
         assert_eq!(rows.len(), result.epochs.len());
@@ -257,7 +272,7 @@ mod tests {
 
     #[test]
     fn unreadable_tables_are_refused_by_line_and_column() {
-        let text = epochs_csv(&epochs(&sample::result().epochs));
+        let text = epochs_csv(&epochs(&sample::result()));
         let error = parse_epochs(&text.replacen("rmse_yaw_deg", "rmse_yow_deg", 1)).unwrap_err();
         assert_eq!(error.to_string(), "line 1: no column is named \"rmse_yaw_deg\"");
         let broken: String = text

@@ -78,6 +78,20 @@ impl Truth<'_> {
     }
 }
 
+impl Truth<'_> {
+    /// How many windows of `samples` samples the recordings hold side by side: runs beyond these share noise
+    /// with others. None for a model, which gives every run noise of its own.
+    #[must_use]
+    pub fn independent_windows(&self, samples: usize) -> Option<f64> {
+        match self {
+            Self::Model(_) => None,
+            Self::Static(recordings) => {
+                Some(recordings.iter().map(|r| r.len() as f64).sum::<f64>() / samples.max(1) as f64)
+            }
+        }
+    }
+}
+
 fn check_recording(recording: &Recording, imu_hz: f64, needs: usize) -> Result<(), TruthError> {
     let name = || recording.name.clone();
     if let Some(channel) = Channel::ALL.into_iter().find(|c| recording.signal(*c).is_none()) {

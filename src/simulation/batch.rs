@@ -1,12 +1,13 @@
 //! Eight runs through the schedule: noise, prediction, fixes, and what is kept of them.
 
+use super::assessment::{Assessment, EpochLanes};
 use super::plan::{Event, Plan};
-use super::{COVERAGE_DOF, EpochSums, NEES_DOF, OutageRecord, REPORTED, RunRecord};
-use crate::earth::{ned_difference, radii};
+use super::{EpochSums, OutageRecord, REPORTED, RunRecord};
+use crate::earth::radii;
 use crate::ekf::covariance::{PSI, R, V};
 use crate::ekf::initial::psi_of_angles;
 use crate::ekf::{Ekf, Fix, advance, nis_limit, settle, update, update_height, update_within};
-use crate::frames::{NavState, RollPitchYaw};
+use crate::frames::NavState;
 use crate::imu::ImuSample;
 use crate::lanes::{LANES, Lanes, Real, Vec3};
 use crate::linalg;
@@ -180,17 +181,6 @@ struct Candidate {
     limit: Option<f64>,
 }
 
-/// What eight runs report at one epoch.
-struct EpochLanes {
-    t_s: f64,
-    gnss: bool,
-    see: [Lanes; REPORTED],
-    error: [Lanes; REPORTED],
-    att_error_deg: Lanes,
-    nees: Lanes,
-    covered: [bool; LANES],
-}
-
 impl Candidate {
     fn new(plan: &Plan<'_>, belief: &crate::ekf::Belief, starts: &[NavState], live: usize) -> Self {
         let mut nominal = Strapdown::new(&plan.start, plan.experiment.gravity);
@@ -227,7 +217,7 @@ impl Candidate {
         }
         if event.report {
             settle(&mut self.ekf);
-            let epoch = self.report(plan, event);
+            let epoch = EpochLanes::of(&self.ekf, self.live, plan, event);
             self.follow_outages(plan, event, &epoch);
             self.trace.push(epoch);
         }
@@ -248,49 +238,21 @@ impl Candidate {
         }
     }
 
-    /// The error just before the first fix after an outage, or at the trajectory's end.
+    /// Error and belief just before the first fix after an outage, or at the trajectory's end.
     fn end_outages(&mut self, plan: &Plan<'_>, index: usize, event: &Event) {
-        for ((_, end), records) in plan.outages.iter().zip(&mut self.outages) {
-            if *end != index {
-                continue;
-            }
-            for lane in 0..self.live {
-                let error = reported_error(&self.ekf.nominal.lane(lane), &event.reference);
-                records[lane].error_end = error.values;
-                records[lane].horizontal_error_end_m = error.values[0].hypot(error.values[1]);
+        if plan.outages.iter().all(|(_, end)| *end != index) {
+            return;
+        }
+        settle(&mut self.ekf);
+        let found = Assessment::of(&self.ekf, self.live, &event.reference);
+        for (_, records) in plan.outages.iter().zip(&mut self.outages).filter(|((_, end), _)| *end == index) {
+            for (lane, record) in records.iter_mut().enumerate().take(self.live) {
+                record.see_end = found.see.map(|s| s[lane]);
+                record.error_end = found.error.map(|e| e[lane]);
+                record.nees_end = found.nees[lane];
+                record.horizontal_error_end_m = record.error_end[0].hypot(record.error_end[1]);
             }
         }
-    }
-
-    fn report(&self, plan: &Plan<'_>, event: &Event) -> EpochLanes {
-        let jacobian = RollPitchYaw::from_quat(event.reference.q_b_n).jacobian_of_psi_n();
-        let (p, mut x) = (&self.ekf.p, [Lanes::ZERO; NEES_DOF]);
-        let mut epoch = EpochLanes {
-            t_s: event.t_s,
-            gnss: event.fix,
-            see: standard_deviations(&self.ekf, &jacobian),
-            error: [Lanes::ZERO; REPORTED],
-            att_error_deg: Lanes::ZERO,
-            nees: Lanes::ZERO,
-            covered: [false; LANES],
-        };
-        for lane in 0..self.live {
-            let error = reported_error(&self.ekf.nominal.lane(lane), &event.reference);
-            for i in 0..REPORTED {
-                epoch.error[i][lane] = error.values[i];
-            }
-            for i in 0..3 {
-                (x[i][lane], x[3 + i][lane]) = (error.values[i], error.values[3 + i]);
-                x[6 + i][lane] = error.psi_n[i];
-            }
-            epoch.att_error_deg[lane] = error.psi_n.length() / DEG;
-        }
-        epoch.nees = p.normalised_square(std::array::from_fn(|i| i), x);
-        let states: [usize; COVERAGE_DOF] =
-            std::array::from_fn(|i| if i < 3 { 3 * R + i } else { 3 * PSI + i - 3 });
-        let coverage = p.normalised_square(states, states.map(|s| x[s]));
-        epoch.covered = std::array::from_fn(|lane| coverage[lane] <= plan.coverage_quantile);
-        epoch
     }
 
     /// Means over outages, and when the horizontal error is back within the receiver's own.
@@ -325,42 +287,19 @@ impl Candidate {
         });
         let kept: Vec<usize> = (0..self.live).filter(|lane| !diverged[*lane]).collect();
         let epochs = self.trace.iter().map(|e| e.sum(&kept)).collect();
+        let reports = self.trace.len() as f64;
+        let mean = |value: &dyn Fn(&EpochLanes) -> f64| self.trace.iter().map(value).sum::<f64>() / reports;
         let record = |lane: usize| RunRecord {
             run: first + lane as u64,
             diverged: diverged[lane],
             outages: self.outages.iter().map(|records| records[lane].clone()).collect(),
             nis: (self.nis[lane].0 / self.nis[lane].1.max(1) as f64, self.nis[lane].1),
             rejected: self.nis[lane].2,
+            nees_mean: mean(&|e| e.nees[lane]),
+            covered: mean(&|e| f64::from(u8::from(e.covered[lane]))),
+            normalised_sq: std::array::from_fn(|i| mean(&|e| (e.error[i][lane] / e.see[i][lane]).powi(2))),
         };
         Batch { epochs, runs: (0..self.live).map(record).collect() }
-    }
-}
-
-impl EpochLanes {
-    fn sum(&self, kept: &[usize]) -> EpochSums {
-        let mut sums = EpochSums { t_s: self.t_s, gnss: self.gnss, ..EpochSums::default() };
-        for &lane in kept {
-            sums.count += 1;
-            for i in 0..REPORTED {
-                let (see, error) = (self.see[i][lane], self.error[i][lane]);
-                sums.see[i] += see;
-                sums.see_sq[i] += see * see;
-                sums.error[i] += error;
-                sums.error_sq[i] += error * error;
-                sums.error_4[i] += error.powi(4);
-            }
-            let position = DVec3::new(self.error[0][lane], self.error[1][lane], self.error[2][lane]).length();
-            for (sum, value) in [
-                (&mut sums.pos_error, position),
-                (&mut sums.att_error, self.att_error_deg[lane]),
-                (&mut sums.nees, self.nees[lane]),
-            ] {
-                sum[0] += value;
-                sum[1] += value * value;
-            }
-            sums.covered += u64::from(self.covered[lane]);
-        }
-        sums
     }
 }
 
@@ -381,26 +320,4 @@ pub(super) fn standard_deviations(ekf: &Ekf, jacobian: &[DVec3; 3]) -> [Lanes; R
             variance.sqrt() * (1.0 / DEG)
         }
     })
-}
-
-/// Errors of a run in the reported states (m, m/s, degrees) and the attitude error vector (rad).
-struct ReportedError {
-    values: [f64; REPORTED],
-    psi_n: DVec3,
-}
-
-fn reported_error(estimate: &NavState, truth: &NavState) -> ReportedError {
-    let r = ned_difference(truth, estimate.lat, estimate.lon, estimate.h);
-    let v = estimate.v_n - truth.v_n;
-    let psi_n = rotation_vector(estimate.q_b_n * truth.q_b_n.inverse());
-    let jacobian = RollPitchYaw::from_quat(truth.q_b_n).jacobian_of_psi_n();
-    let angles = jacobian.map(|row| row.dot(psi_n) / DEG);
-    ReportedError { values: [r.x, r.y, r.z, v.x, v.y, v.z, angles[0], angles[1], angles[2]], psi_n }
-}
-
-/// The logarithm of a rotation, exact for small ones too.
-fn rotation_vector(q: DQuat) -> DVec3 {
-    let (v, w) = if q.w < 0.0 { (-q.xyz(), -q.w) } else { (q.xyz(), q.w) };
-    let sine = v.length();
-    if sine < 1e-12 { v * 2.0 } else { v * (2.0 * sine.atan2(w) / sine) }
 }

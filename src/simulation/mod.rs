@@ -1,5 +1,6 @@
 //! One lane batch: eight runs through one trajectory.
 
+mod assessment;
 mod batch;
 mod covariance_pass;
 mod plan;
@@ -66,8 +67,12 @@ pub struct EpochSums {
 pub struct OutageRecord {
     /// Mean over the outage's reporting epochs (start ≤ t < end) of the SEE of each reported state.
     pub see_mean: [f64; REPORTED],
+    /// SEE of each reported state at the instant of `error_end`.
+    pub see_end: [f64; REPORTED],
     /// Error of each reported state just before the first fix after the outage (or at the end).
     pub error_end: [f64; REPORTED],
+    /// NEES over [`NEES_DOF`] states at the same instant.
+    pub nees_end: f64,
     /// Horizontal position error at the same instant (m).
     pub horizontal_error_end_m: f64,
     /// Time from the outage's end until the first report at which the horizontal error is within the
@@ -88,6 +93,12 @@ pub struct RunRecord {
     pub nis: (f64, u64),
     /// Fixes refused by the gate on the NIS.
     pub rejected: u64,
+    /// Mean over its reporting epochs of the NEES over [`NEES_DOF`] states.
+    pub nees_mean: f64,
+    /// Share of its reporting epochs inside the filter's ellipsoid at the coverage level.
+    pub covered: f64,
+    /// Mean over its reporting epochs of (error/SEE)² of each reported state.
+    pub normalised_sq: [f64; REPORTED],
 }
 
 /// All runs of one experiment, reduced in run order.
@@ -107,4 +118,7 @@ pub struct RunResult {
     pub coverage_level: f64,
     /// IMU epochs processed, all runs.
     pub run_epochs: u64,
+    /// How many windows of the recordings that made the errors do not overlap: more runs than these share
+    /// their noise. None: every run has noise of its own.
+    pub independent_windows: Option<f64>,
 }

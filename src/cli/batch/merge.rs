@@ -201,11 +201,12 @@ fn cell_tables(planned: &Planned, units: &[(Unit, String)]) -> Result<CellTables
         tables.outages.extend(report::outage_rows(&of, &outages, comparison.as_deref()));
         tables.runs.extend(report::run_rows(&of));
         if planned.plan.study.keeps(Metric::Epochs) {
-            tables.epochs.extend(report::epoch_rows(&of, &metrics::epochs(&result.epochs)));
+            tables.epochs.extend(report::epoch_rows(&of, &metrics::epochs(result)));
         }
         tables.diverged += result.runs.iter().filter(|r| r.diverged).count() as u64;
         let (name, label) = shown_names(&planned.plan.study, column, filter);
-        tables.shown.columns.push(ShownColumn { name, label, outages, comparison, is_reference });
+        let verdict = report::verdict(result);
+        tables.shown.columns.push(ShownColumn { name, label, outages, comparison, is_reference, verdict });
     }
     Ok(tables)
 }
@@ -333,8 +334,11 @@ impl Texts {
     }
 
     fn render(&self, states: &[usize]) -> String {
-        let mut text =
-            "Horizontal error before the first fix after the outage, median (95 %), m\n\n".to_owned();
+        let mut text = "Verdict on each filter: NEES over the run (9 if right), error over its standard deviation in the \
+                        state that is farthest off\n\n"
+            .to_owned();
+        text += &table(&report::verdict_table(&self.cells));
+        text += "\n\nHorizontal error before the first fix after the outage, median (95 %), m\n\n";
         text += &table(&report::drift_table(&self.cells));
         let has_ratios = |cell: &&ShownCell| cell.columns.len() > 1 && cell.columns[0].comparison.is_some();
         for cell in self.cells.iter().filter(has_ratios) {

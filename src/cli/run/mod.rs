@@ -11,7 +11,7 @@ use nav_sim::ekf::{Belief, FilterStates};
 use nav_sim::imu::Sensor;
 use nav_sim::metrics::Summary;
 use nav_sim::monte_carlo;
-use nav_sim::report::{self, Manifest};
+use nav_sim::report::{Manifest, seconds};
 use nav_sim::scenario::{Method, Scenario};
 use nav_sim::sensors::imu::TruthError;
 use nav_sim::sensors::outage::Outage;
@@ -137,9 +137,13 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let reduction = reduced::reduction(&scenario, &inputs.model, &belief, &experiment, session)?;
     let (results, wall_s) = simulate(&experiment, scenario.run.runs, session)?;
     let manifest = manifest(scenario, &outages, seed, inputs.files.clone(), inputs.note.clone(), session);
-    let summary = write(&results[0], &Manifest { wall_s, ..manifest }, reduction, &args.out)?;
-    let shown = if session.json() { report::json(&summary) } else { text(&summary) };
-    session.printer.result(shown.trim_end());
+    let throughput_epochs_per_s = results[0].run_epochs as f64 / wall_s;
+    let independent_windows = results[0].independent_windows;
+    let manifest = Manifest { independent_windows, wall_s, throughput_epochs_per_s, ..manifest };
+    let summary = write(&results[0], &manifest, reduction, &args.out)?;
+    let shown = if session.json() { output::json } else { text };
+    session.printer.result(shown(&summary, throughput_epochs_per_s).trim_end());
+    output::doubt_filter(&summary, session);
     session.printer.say(&format!("wrote {}", args.out.display()));
     all_finite(&summary)
 }
@@ -194,7 +198,8 @@ fn outages(
         return Err(Failure::input(message).hint(hint));
     }
     let windows = scenario.outages().windows(span, seed).map_err(Failure::input)?;
-    let shown: Vec<String> = windows.iter().map(|o| format!("{}–{} s", o.start_s, o.end_s)).collect();
+    let shown: Vec<String> =
+        windows.iter().map(|o| format!("{}–{} s", seconds(o.start_s), seconds(o.end_s))).collect();
     session.printer.say(&match shown.as_slice() {
         [] => "no outage".to_owned(),
         some => format!("outages {}", some.join(", ")),

@@ -3,11 +3,11 @@
 use crate::cli::compare::table;
 use crate::cli::{Failure, Session};
 use nav_sim::data::atomic::{self, AtomicDir};
-use nav_sim::metrics::{self, OutageSummary, ReductionSummary, Summary};
-use nav_sim::report::{self, Input, Manifest, ModelNote};
+use nav_sim::metrics::{self, OutageSummary, PerState, ReductionSummary, Summary, VerdictKind};
+use nav_sim::report::{self, Input, Manifest, ModelNote, seconds};
 use nav_sim::scenario::Scenario;
 use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::RunResult;
+use nav_sim::simulation::{REPORTED_NAMES, RunResult};
 use std::path::Path;
 
 /// The manifest of a run: every key as it was used, outages one by one, the seed.
@@ -32,7 +32,9 @@ pub(crate) fn manifest(
         inputs,
         model,
         threads: session.threads(),
+        independent_windows: None,
         wall_s: 0.0,
+        throughput_epochs_per_s: 0.0,
     }
 }
 
@@ -80,8 +82,8 @@ pub(crate) fn write(
     reduction: Option<ReductionSummary>,
     path: &Path,
 ) -> Result<Summary, Failure> {
-    let epochs = metrics::epochs(&result.epochs);
-    let summary = Summary { reduction, ..Summary::of(result, &epochs, manifest.seed, manifest.wall_s) };
+    let epochs = metrics::epochs(result);
+    let summary = Summary { reduction, ..Summary::of(result, &epochs, manifest.seed) };
     let mut directory = AtomicDir::create(path)?;
     for file in report::run_directory(result, &epochs, &summary, manifest) {
         directory.write_parts(file.name, file.parts)?;
@@ -90,24 +92,55 @@ pub(crate) fn write(
     Ok(summary)
 }
 
-/// The summary for people.
-pub(crate) fn text(summary: &Summary) -> String {
+/// The verdict in words.
+fn verdict(summary: &Summary) -> String {
+    let windows: Vec<(f64, f64)> = summary.outages.iter().map(|o| (o.start_s, o.end_s)).collect();
+    report::verdict_line(&summary.verdict, &windows, summary.runs, summary.diverged)
+}
+
+/// Says aloud that a filter believes too much of itself.
+pub(crate) fn doubt_filter(summary: &Summary, session: &Session) {
+    if summary.verdict.kind == VerdictKind::Overconfident {
+        session.printer.warn(&format!("the filter is {}", verdict(summary)));
+    }
+}
+
+/// The summary and how fast it was found, for programs.
+pub(crate) fn json(summary: &Summary, throughput_epochs_per_s: f64) -> String {
+    #[derive(serde::Serialize)]
+    struct Printed<'a> {
+        #[serde(flatten)]
+        summary: &'a Summary,
+        throughput_epochs_per_s: f64,
+    }
+    report::json(&Printed { summary, throughput_epochs_per_s })
+}
+
+/// The summary for people, the verdict first.
+pub(crate) fn text(summary: &Summary, throughput_epochs_per_s: f64) -> String {
     let (nees, coverage) = (&summary.nees, &summary.coverage);
+    let shared = match summary.independent_runs < (summary.runs - summary.diverged) as f64 {
+        true => format!(", worth {:.1} independent ones", summary.independent_runs),
+        false => String::new(),
+    };
     let mut text = format!(
-        "{} runs ({} diverged), {} states, seed {}, {:.2} million IMU epochs/s\n",
+        "verdict: {}\n{} runs ({} diverged){shared}, {} states, seed {}, {:.2} million IMU epochs/s\n",
+        verdict(summary),
         summary.runs,
         summary.diverged,
         summary.filter_states,
         summary.seed,
-        summary.throughput_epochs_per_s / 1e6
+        throughput_epochs_per_s / 1e6
     );
     if summary.diverged == summary.runs {
         return text.trim_end().to_owned();
     }
-    if !summary.outages.is_empty() {
-        text += &outage_table(&summary.outages);
-        text.push('\n');
-    }
+    text += &if summary.outages.is_empty() {
+        format!("{}\nmeans over the run of RMSE and of ", whole_run_table(summary))
+    } else {
+        format!("{}\njust before the first fix after the outage: RMSE and ", outage_table(&summary.outages))
+    };
+    text += "ASEE (averaged standard estimation error: the filter's own standard deviation)\n";
     text += &format!(
         "NEES {:.2} ({} if the filter is right), {:.0} % of epochs within [{:.2}, {:.2}]\n",
         nees.mean,
@@ -133,19 +166,40 @@ fn outage_table(outages: &[OutageSummary]) -> String {
         "horizontal p50 (m)",
         "p95",
         "max",
-        "ASEE pos_e_m",
-        "roll_deg",
         "RMSE pos_e_m",
-        "roll_deg",
+        "ASEE",
+        "ratio",
+        "RMSE roll_deg",
+        "ASEE",
+        "ratio",
+        "largest ratio",
     ];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for o in outages {
         let h = &o.horizontal_error_end_m;
-        let mut row = vec![format!("{}–{} s", o.start_s, o.end_s)];
+        let mut row = vec![format!("{}–{} s", seconds(o.start_s), seconds(o.end_s))];
         row.extend([h.p50, h.p95, h.max].map(|v| format!("{v:.1}")));
-        let states = [o.asee_mean.0[1], o.asee_mean.0[6], o.rmse_end.0[1], o.rmse_end.0[6]];
-        row.extend(states.map(|v| format!("{v:.3}")));
+        let ratios = ratios(&o.rmse_end, &o.asee_end);
+        for state in [1, 6] {
+            let values = [o.rmse_end.0[state], o.asee_end.0[state]].map(|v| format!("{v:.3}"));
+            row.extend(values.into_iter().chain([format!("{:.2}", ratios[state])]));
+        }
+        let largest = (0..ratios.len()).max_by(|a, b| ratios[*a].total_cmp(&ratios[*b])).unwrap_or(0);
+        row.push(format!("{:.2} {}", ratios[largest], REPORTED_NAMES[largest]));
         rows.push(row);
     }
     table(&rows)
+}
+
+fn ratios(rmse: &PerState<f64>, asee: &PerState<f64>) -> Vec<f64> {
+    rmse.0.iter().zip(&asee.0).map(|(rmse, asee)| rmse / asee).collect()
+}
+
+fn whole_run_table(summary: &Summary) -> String {
+    let (rmse, asee) = (&summary.accuracy.rmse_mean, &summary.accuracy.asee_mean);
+    let row = |name: &str, values: &[f64]| {
+        std::iter::once(name.to_owned()).chain(values.iter().map(|v| format!("{v:.3}"))).collect::<Vec<_>>()
+    };
+    let head = std::iter::once("").chain(REPORTED_NAMES).map(str::to_owned).collect();
+    table(&[head, row("RMSE", &rmse.0), row("ASEE", &asee.0), row("ratio", &ratios(rmse, asee))])
 }

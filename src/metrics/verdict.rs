@@ -1,0 +1,209 @@
+//! Whether a filter is as good as it believes: one verdict, from the normalised errors of all runs.
+//!
+//! Statistics: NEES and (error/SEE)² of every reported state, as means over the whole run and at the end of
+//! each outage. Of a right filter each is a mean of chi-square variables, one of 9 or of 1 degree of freedom
+//! for each independent run. The epochs of one run hang together in a way nobody knows beforehand, so a mean
+//! over epochs is given the freedom of a single epoch: an interval that holds whatever their correlation, exact
+//! at the ends of outages. All statistics together alarm on a right filter with probability 1 % at most
+//! (Bonferroni), and what is significant but smaller than 10 % is let pass.
+
+use super::consistency::chi_square_interval;
+use super::estimate::Estimate;
+use crate::simulation::{NEES_DOF, OutageRecord, REPORTED, REPORTED_NAMES, RunRecord};
+use serde::Serialize;
+
+/// Probability at which a right filter is called wrong, all statistics together.
+const LEVEL: f64 = 0.01;
+/// Errors that differ by less than this share from the filter's standard deviations are let pass.
+const TOLERANCE: f64 = 0.1;
+/// A mean NEES above this is not a matter of tuning: the filter has lost its way.
+const LOST: f64 = 100.0;
+
+/// What the verdict is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum VerdictKind {
+    /// Nothing speaks against the filter.
+    Ok,
+    /// Errors are larger than the filter believes.
+    Overconfident,
+    /// Errors are smaller than the filter believes.
+    Underconfident,
+    /// A state or covariance stopped being finite in at least one run.
+    Diverged,
+}
+
+/// The verdict on the filter of an experiment.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Verdict {
+    /// In one word.
+    pub kind: VerdictKind,
+    /// Mean NEES over epochs and runs; 9 if the filter is right.
+    pub nees: f64,
+    /// Its Monte-Carlo standard error, from the scatter of the runs.
+    pub nees_std_error: f64,
+    /// Mean share of epochs inside the filter's ellipsoid.
+    pub coverage: f64,
+    /// Its Monte-Carlo standard error, from the scatter of the runs.
+    pub coverage_std_error: f64,
+    /// The state that is farthest off in the direction of the verdict.
+    pub worst_state: &'static str,
+    /// The outage at whose end it is (from 0); none: over the whole run.
+    pub worst_outage: Option<usize>,
+    /// Root mean square there of error over standard deviation: 1 if the filter is right.
+    pub ratio: f64,
+    /// Its Monte-Carlo standard error.
+    pub ratio_std_error: f64,
+    /// Runs that count as independent.
+    pub independent_runs: f64,
+    /// The error over standard deviation, common to all states, from which on these runs would tell it.
+    pub detectable_ratio: f64,
+    /// The same of one state alone.
+    pub detectable_state_ratio: f64,
+    /// Probability at which a right filter is called wrong, all statistics together.
+    pub level: f64,
+    /// Errors that differ by less than this share from the filter's standard deviations are let pass.
+    pub tolerance: f64,
+}
+
+impl Verdict {
+    /// From the records of the runs through a number of outages, those that diverged left out;
+    /// `independent_windows` as in [`RunResult`](crate::simulation::RunResult).
+    #[must_use]
+    pub fn of(runs: &[RunRecord], outages: usize, independent_windows: Option<f64>) -> Self {
+        let kept: Vec<&RunRecord> = runs.iter().filter(|r| !r.diverged).collect();
+        let evidence = Evidence { runs: &kept, windows: independent_windows };
+        let statistics = evidence.statistics(outages);
+        let independent_runs = independent_windows.unwrap_or(f64::INFINITY).min(kept.len() as f64);
+        let judge = Judge::new(independent_runs, LEVEL / (2.0 * statistics.len() as f64));
+        let kind = if kept.len() < runs.len() { VerdictKind::Diverged } else { judge.kind(&statistics) };
+        let worst = judge.worst(&statistics, kind);
+        let nees = evidence.mean(&|r| r.nees_mean);
+        let coverage = evidence.mean(&|r| r.covered);
+        Self {
+            kind,
+            nees: nees.value,
+            nees_std_error: nees.std_error,
+            coverage: coverage.value,
+            coverage_std_error: coverage.std_error,
+            worst_state: REPORTED_NAMES[worst.state.unwrap_or(0)],
+            worst_outage: worst.outage,
+            ratio: worst.ratio.value,
+            ratio_std_error: worst.ratio.std_error,
+            independent_runs,
+            detectable_ratio: judge.limits[0].1.max(1.0 + TOLERANCE),
+            detectable_state_ratio: judge.limits[1].1.max(1.0 + TOLERANCE),
+            level: LEVEL,
+            tolerance: TOLERANCE,
+        }
+    }
+
+    /// Whether the errors are of another order than the filter believes.
+    #[must_use]
+    pub fn is_lost(&self) -> bool {
+        self.nees > LOST
+    }
+}
+
+/// A root mean square of normalised errors.
+#[derive(Debug, Clone, Copy)]
+struct Statistic {
+    /// Reported state; none: all of them, by the NEES.
+    state: Option<usize>,
+    /// At the end of this outage; none: over the whole run.
+    outage: Option<usize>,
+    /// √(mean/degrees of freedom).
+    ratio: Estimate,
+}
+
+/// The runs that count.
+struct Evidence<'a> {
+    runs: &'a [&'a RunRecord],
+    windows: Option<f64>,
+}
+
+impl Evidence<'_> {
+    fn mean(&self, value: &dyn Fn(&RunRecord) -> f64) -> Estimate {
+        Estimate::mean_of(self.runs.iter().map(|r| value(r)), self.windows)
+    }
+
+    fn statistics(&self, outages: usize) -> Vec<Statistic> {
+        let ratio = |value: &dyn Fn(&RunRecord) -> f64| self.mean(value).root();
+        let mut all = Vec::new();
+        let all_states = |r: &RunRecord| r.nees_mean / NEES_DOF as f64;
+        all.push(Statistic { state: None, outage: None, ratio: ratio(&all_states) });
+        for i in 0..REPORTED {
+            all.push(Statistic { state: Some(i), outage: None, ratio: ratio(&|r| r.normalised_sq[i]) });
+        }
+        for k in 0..outages {
+            let end = |value: &dyn Fn(&OutageRecord) -> f64| {
+                ratio(&|r: &RunRecord| r.outages.get(k).map_or(f64::NAN, value))
+            };
+            let nees = end(&|o| o.nees_end / NEES_DOF as f64);
+            all.push(Statistic { state: None, outage: Some(k), ratio: nees });
+            for i in 0..REPORTED {
+                let one = end(&|o| (o.error_end[i] / o.see_end[i]).powi(2));
+                all.push(Statistic { state: Some(i), outage: Some(k), ratio: one });
+            }
+        }
+        all
+    }
+}
+
+/// What the ratios of a right filter do not leave.
+struct Judge {
+    /// Lower and upper limit of all states together, and of one state.
+    limits: [(f64, f64); 2],
+}
+
+impl Judge {
+    /// With probability `tail` beyond each limit.
+    fn new(independent_runs: f64, tail: f64) -> Self {
+        let limits = [NEES_DOF, 1].map(|dof| {
+            let band = chi_square_interval(dof, independent_runs, tail);
+            let ratio = |mean: f64| (mean / dof as f64).sqrt();
+            (ratio(band.lower), ratio(band.upper))
+        });
+        Self { limits }
+    }
+
+    /// Whether a statistic is significantly and materially off.
+    fn of(&self, statistic: &Statistic) -> VerdictKind {
+        let (lower, upper) = self.limits[usize::from(statistic.state.is_some())];
+        let ratio = statistic.ratio.value;
+        if ratio > upper && ratio > 1.0 + TOLERANCE {
+            VerdictKind::Overconfident
+        } else if ratio < lower && ratio < 1.0 / (1.0 + TOLERANCE) {
+            VerdictKind::Underconfident
+        } else {
+            VerdictKind::Ok
+        }
+    }
+
+    /// Too much confidence anywhere is the graver fault.
+    fn kind(&self, all: &[Statistic]) -> VerdictKind {
+        let found: Vec<VerdictKind> = all.iter().map(|s| self.of(s)).collect();
+        let faults = [VerdictKind::Overconfident, VerdictKind::Underconfident];
+        faults.into_iter().find(|fault| found.contains(fault)).unwrap_or(VerdictKind::Ok)
+    }
+
+    /// The state that is farthest off in the direction of the verdict; of those that alarm, if any does.
+    fn worst(&self, all: &[Statistic], kind: VerdictKind) -> Statistic {
+        let distance = |s: &Statistic| match kind {
+            VerdictKind::Underconfident => -s.ratio.value.ln(),
+            VerdictKind::Overconfident => s.ratio.value.ln(),
+            VerdictKind::Ok | VerdictKind::Diverged => s.ratio.value.ln().abs(),
+        };
+        let key = |s: &&Statistic| (self.of(s) == kind, distance(s));
+        let states = all.iter().filter(|s| s.state.is_some());
+        let farther = |a: &&Statistic, b: &&Statistic| {
+            let (a, b) = (key(a), key(b));
+            a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
+        };
+        states.max_by(farther).copied().unwrap_or(all[0])
+    }
+}
+
+#[cfg(test)]
+#[path = "verdict_tests.rs"]
+mod tests;

@@ -1,0 +1,99 @@
+use super::*;
+use crate::rng::StreamKey;
+use rand_distr::{Distribution, StandardNormal};
+
+/// Runs of one outage whose errors are `scale` times what the filter believes in each state; `epochs`
+/// independent ones a run.
+fn runs(count: u64, epochs: usize, seed: u64, scale: [f64; REPORTED]) -> Vec<RunRecord> {
+    let mut rng = StreamKey { seed, scenario: "", run: 0, source: "verdict", process: "t" }.generator();
+    let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+    let mut errors = || -> [f64; REPORTED] { std::array::from_fn(|i| scale[i] * normal()) };
+    let nees = |e: &[f64; REPORTED]| e.iter().map(|x| x * x).sum::<f64>();
+    let mut record = |run| {
+        let all: Vec<[f64; REPORTED]> = (0..epochs).map(|_| errors()).collect();
+        let mean =
+            |value: &dyn Fn(&[f64; REPORTED]) -> f64| all.iter().map(value).sum::<f64>() / epochs as f64;
+        let end = errors();
+        let see = [2.0; REPORTED];
+        let outage = OutageRecord {
+            see_end: see,
+            error_end: end.map(|e| 2.0 * e),
+            nees_end: nees(&end),
+            ..OutageRecord::default()
+        };
+        RunRecord {
+            run,
+            outages: vec![outage],
+            nees_mean: mean(&nees),
+            covered: 0.95,
+            normalised_sq: std::array::from_fn(|i| mean(&|e| e[i] * e[i])),
+            ..RunRecord::default()
+        }
+    };
+    (0..count).map(&mut record).collect()
+}
+
+/// 1500 experiments of a right filter, with one epoch a run (the worst correlation there can be) and 30 or 8
+/// runs: false alarms are at most 1 %, by more than three deviations of a binomial share (0.26 %) never 1.8 %.
+#[test]
+fn a_right_filter_is_rarely_called_wrong() {
+    for count in [8, 30] {
+        let wrong =
+            |seed: &u64| Verdict::of(&runs(count, 1, *seed, [1.0; 9]), 1, None).kind != VerdictKind::Ok;
+        let alarms = (0..1500).filter(wrong).count();
+        assert!(alarms <= 27, "{alarms} of 1500 with {count} runs");
+    }
+}
+
+/// A state 1.5 times as far off as believed, of 200 runs: told by name, with its ratio within five standard
+/// errors, 1.5/√400.
+#[test]
+fn an_overconfident_state_is_named() {
+    let mut scale = [1.0; 9];
+    scale[6] = 1.5;
+    let verdict = Verdict::of(&runs(200, 20, 3, scale), 1, None);
+    assert_eq!((verdict.kind, verdict.worst_state), (VerdictKind::Overconfident, "roll_deg"));
+    assert!((verdict.ratio - 1.5).abs() < 5.0 * 1.5 / 20.0, "{verdict:?}");
+}
+
+#[test]
+fn too_little_confidence_is_told_and_too_much_comes_first() {
+    let timid = Verdict::of(&runs(200, 20, 3, [0.7; 9]), 1, None);
+    assert_eq!(timid.kind, VerdictKind::Underconfident);
+    assert!(timid.ratio < 0.8, "{timid:?}");
+    let mut scale = [0.7; 9];
+    scale[8] = 2.0;
+    let both = Verdict::of(&runs(200, 20, 3, scale), 1, None);
+    assert_eq!((both.kind, both.worst_state), (VerdictKind::Overconfident, "yaw_deg"));
+}
+
+/// What is significant and small is let pass: 5 % with 20 000 runs.
+#[test]
+fn a_small_difference_is_no_verdict() {
+    let verdict = Verdict::of(&runs(20_000, 1, 3, [1.05; 9]), 1, None);
+    assert_eq!(verdict.kind, VerdictKind::Ok);
+    assert!((verdict.nees / 9.0 - 1.05 * 1.05).abs() < 0.02, "{verdict:?}");
+}
+
+/// The same hundred runs, worth 3 of them: nothing can be told any more from a state 1.5 times off.
+#[test]
+fn runs_that_share_their_noise_tell_less() {
+    let records = runs(100, 1, 3, [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.5, 1.0, 1.0]);
+    assert_eq!(Verdict::of(&records, 1, None).kind, VerdictKind::Overconfident);
+    let shared = Verdict::of(&records, 1, Some(3.0));
+    assert_eq!((shared.kind, shared.independent_runs), (VerdictKind::Ok, 3.0));
+    assert!(shared.detectable_state_ratio > 2.0 && shared.ratio_std_error > 0.2, "{shared:?}");
+}
+
+#[test]
+fn a_lost_filter_and_a_diverged_run_are_told() {
+    let far = Verdict::of(&runs(1, 20, 3, [11.0; 9]), 1, None);
+    assert!(far.is_lost() && far.kind == VerdictKind::Overconfident && far.nees_std_error.is_nan());
+    let mut records = runs(8, 20, 3, [1.0; 9]);
+    records[3] = RunRecord { diverged: true, nees_mean: f64::NAN, ..records[3].clone() };
+    let verdict = Verdict::of(&records, 1, None);
+    assert!(verdict.kind == VerdictKind::Diverged && verdict.nees.is_finite());
+    records.iter_mut().for_each(|r| r.diverged = true);
+    let none = Verdict::of(&records, 1, None);
+    assert!(none.kind == VerdictKind::Diverged && none.nees.is_nan());
+}

@@ -1,0 +1,122 @@
+//! Verdicts in words.
+
+use super::number::{readable, seconds};
+use crate::metrics::{Verdict, VerdictKind};
+
+/// One line: the verdict, by how much and where, the figures it rests on. `outages` are those of the
+/// experiment (start, end) in seconds; `runs` and `diverged` count its runs.
+#[must_use]
+pub fn verdict_line(verdict: &Verdict, outages: &[(f64, f64)], runs: u64, diverged: u64) -> String {
+    let figures = format!(
+        "NEES {} (9 if right), coverage {:.3}",
+        with_error(verdict.nees, verdict.nees_std_error),
+        verdict.coverage
+    );
+    let departure = departure(verdict, outages);
+    match verdict.kind {
+        VerdictKind::Diverged if diverged == runs => format!("diverged: all {runs} runs"),
+        VerdictKind::Diverged => {
+            format!("diverged: {diverged} of {runs} runs; of the others, {departure}; {figures}")
+        }
+        VerdictKind::Overconfident if verdict.is_lost() => {
+            format!("OVERCONFIDENT BY FAR, the filter is lost: {departure}; {figures}")
+        }
+        VerdictKind::Overconfident => format!("overconfident: {departure}; {figures}"),
+        VerdictKind::Underconfident => format!("underconfident: {departure}; {figures}"),
+        VerdictKind::Ok => {
+            let percent = |ratio: f64| readable(100.0 * (ratio - 1.0));
+            format!(
+                "consistent: {figures}; {} would tell errors {} % above the filter's standard deviations, {} % in one \
+                 state alone",
+                independent(verdict.independent_runs),
+                percent(verdict.detectable_ratio),
+                percent(verdict.detectable_state_ratio)
+            )
+        }
+    }
+}
+
+fn independent(runs: f64) -> String {
+    let shown = if runs.fract() == 0.0 { format!("{runs}") } else { format!("{runs:.1}") };
+    if runs == 1.0 { "one run".to_owned() } else { format!("{shown} independent runs") }
+}
+
+/// How far errors are from what the filter believes, in which state and when.
+fn departure(verdict: &Verdict, outages: &[(f64, f64)]) -> String {
+    let place = match verdict.worst_outage.and_then(|k| outages.get(k)) {
+        Some((start_s, end_s)) => {
+            format!("at the end of the outage {}–{} s", seconds(*start_s), seconds(*end_s))
+        }
+        None => "over the run".to_owned(),
+    };
+    format!(
+        "errors are {} times the filter's standard deviation in {} {place}",
+        with_error(verdict.ratio, verdict.ratio_std_error),
+        verdict.worst_state
+    )
+}
+
+fn with_error(value: f64, error: f64) -> String {
+    if error.is_finite() { format!("{} ± {}", readable(value), readable(error)) } else { readable(value) }
+}
+
+/// For a line that names several runs: "NEES 1189, 34.6 × in yaw_deg".
+#[must_use]
+pub fn verdict_in_short(verdict: &Verdict) -> String {
+    format!("NEES {}, {} × in {}", readable(verdict.nees), readable(verdict.ratio), verdict.worst_state)
+}
+
+/// The verdict in one word.
+#[must_use]
+pub const fn verdict_word(kind: VerdictKind) -> &'static str {
+    match kind {
+        VerdictKind::Ok => "consistent",
+        VerdictKind::Overconfident => "overconfident",
+        VerdictKind::Underconfident => "underconfident",
+        VerdictKind::Diverged => "diverged",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulation::{OutageRecord, RunRecord};
+
+    /// Runs whose errors are `scale` times what the filter believes, in every state and at every time.
+    fn verdict(runs: u64, scale: f64) -> Verdict {
+        let square = scale * scale;
+        let outage = OutageRecord {
+            see_end: [1.0; 9],
+            error_end: [scale; 9],
+            nees_end: 9.0 * square,
+            ..Default::default()
+        };
+        let run = |run| RunRecord {
+            run,
+            outages: vec![outage.clone()],
+            nees_mean: 9.0 * square,
+            covered: 0.5,
+            normalised_sq: [square; 9],
+            ..RunRecord::default()
+        };
+        Verdict::of(&(0..runs).map(run).collect::<Vec<_>>(), 1, None)
+    }
+
+    #[test]
+    fn verdicts_are_told_in_words() {
+        let outages = [(300.123_456_789, 390.0)];
+        let line = |scale: f64| verdict_line(&verdict(100, scale), &outages, 100, 0);
+        assert!(
+            line(1.0)
+                .starts_with("consistent: NEES 9.00 ± 0 (9 if right), coverage 0.500; 100 independent runs")
+        );
+        let over = line(1.5);
+        let expected = "overconfident: errors are 1.50 ± 0 times the filter's standard deviation in ";
+        assert!(
+            over.starts_with(expected) && over.contains("at the end of the outage 300.12–390 s"),
+            "{over}"
+        );
+        assert!(line(0.5).starts_with("underconfident: errors are 0.500"), "{}", line(0.5));
+        assert!(line(12.0).starts_with("OVERCONFIDENT BY FAR, the filter is lost: "), "{}", line(12.0));
+    }
+}
