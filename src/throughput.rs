@@ -10,7 +10,7 @@ use crate::imu::ImuSample;
 use crate::lanes::{LANES, Lanes, Level, Vec3};
 use crate::noise::{Ar1, Composite, Model, ParameterError, Process, Quantization, RandomWalk, White};
 use crate::rng::StreamKey;
-use crate::sensors::imu::{ImuErrors, LaneErrors, Truth};
+use crate::sensors::imu::{ErrorSource, ImuErrors, LaneErrors};
 use crate::strapdown::Strapdown;
 use glam::{DQuat, DVec3};
 
@@ -56,7 +56,7 @@ impl<'a> Load<'a> {
         let gravity = GravityModel::Wgs84;
         let f_ib_b = DVec3::NEG_Z * gravity_down(gravity, start.lat.sin(), start.h);
         let key = |run| StreamKey { seed: 1, scenario: "", run, source: "", process: "" };
-        let imu = (0..LANES as u64).map(|run| ImuErrors::new(Truth::Model(model), key(run), SAMPLES));
+        let imu = (0..LANES as u64).map(|run| ImuErrors::new(&ErrorSource::Model(model), key(run), SAMPLES));
         let settings = InitialSettings::default();
         Ok(Self {
             ekf: Ekf::new(Strapdown::new(&start, gravity), &belief, &start, &settings).at_level(level),

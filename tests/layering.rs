@@ -20,7 +20,7 @@ const MAY_NAME: &[(&str, &[&str])] = &[
     ("wavelet", L1),
     ("trajectory", L1),
     ("calibration", &["bibliography", "units", "linalg", "lanes", "rng", "imu", "noise", "wavelet"]),
-    ("sensors", &["@L1", "trajectory", "noise"]),
+    ("sensors", &["@L1", "trajectory", "noise", "wavelet"]),
     ("strapdown", &["@L1", "noise"]),
     ("ekf", &["@L1", "strapdown", "noise"]),
     ("closure", &["@L1", "trajectory", "sensors", "strapdown"]),

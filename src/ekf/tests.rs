@@ -423,3 +423,57 @@ fn biases_add_up() {
     assert_eq!(filter.bias_of::<Lanes>(Sensor::Accel).lane(0), DVec3::X);
     assert_eq!(filter.bias_of::<Lanes>(Sensor::Gyro).lane(0), DVec3::Y);
 }
+
+/// A filter that is certain of everything but for white noise of a sample of these variances at 100 Hz.
+fn certain(accel: f64, gyro: f64) -> Ekf {
+    let axis = |sigma2: f64| Composite::new(vec![Process::White(White::new(sigma2).unwrap())]);
+    let model = Model::pooled(100.0, &axis(accel), &axis(gyro));
+    let belief = Belief::new(&model, FilterStates::Full, 1.0, 800.0).unwrap();
+    let start =
+        NavState { lat: 0.8, lon: 0.1, h: 400.0, v_n: DVec3::ZERO, q_b_n: DQuat::from_rotation_z(0.7) };
+    let settings = InitialSettings {
+        pos_sigma_m: [0.0; 3],
+        vel_sigma_m_s: [0.0; 3],
+        att_sigma_deg: [0.0; 3],
+        ..InitialSettings::default()
+    };
+    Ekf::new(Strapdown::new(&start, GravityModel::Wgs84), &belief, &start, &settings)
+}
+
+/// One sample of white rates tilts and, while it lasts, lets the specific force drive the velocity:
+/// Q of velocity and attitude is −\[f_n ×\] S dt²/2, S the power of the rates (van Loan to first order).
+#[test]
+fn noise_of_one_sample_correlates_velocity_and_attitude() {
+    let mut filter = certain(4e-5, 1e-6);
+    let f_b = DVec3::new(1.0, -2.0, -9.8);
+    predict(&mut filter, DVec3::ZERO, f_b);
+    let f = DQuat::from_rotation_z(0.7) * f_b;
+    let skew = [[0.0, -f.z, f.y], [f.z, 0.0, -f.x], [-f.y, f.x, 0.0]];
+    let half = 0.5 * 1e-6 * 0.01 * 0.01 * 0.01;
+    for i in 0..3 {
+        for j in 0..3 {
+            let (found, expected) = (filter.p.get::<Lanes>(3 + i, 6 + j)[0], -skew[i][j] * half);
+            assert!((found - expected).abs() < 1e-3 * 9.8 * half, "({i}, {j}): {found:e} {expected:e}");
+        }
+    }
+}
+
+/// White noise keeps its density whatever the interval: velocity and attitude variance after a second are
+/// sigma² dt·1 s, at 100 Hz and in steps of 2 to 40 ms.
+#[test]
+fn white_noise_does_not_depend_on_how_time_is_cut() {
+    for steps in [vec![0.01; 100], [0.002, 0.04, 0.008].repeat(20)] {
+        let mut filter = certain(4e-5, 1e-6);
+        for dt in steps {
+            filter.set_interval(dt);
+            predict(&mut filter, DVec3::ZERO, DVec3::ZERO);
+        }
+        settle(&mut filter);
+        for i in 0..3 {
+            let (velocity, attitude) =
+                (filter.p.get::<Lanes>(3 + i, 3 + i)[0], filter.p.get::<Lanes>(6 + i, 6 + i)[0]);
+            assert!((velocity / (4e-5 * 0.01) - 1.0).abs() < 1e-3, "{velocity:e}");
+            assert!((attitude / (1e-6 * 0.01) - 1.0).abs() < 1e-3, "{attitude:e}");
+        }
+    }
+}

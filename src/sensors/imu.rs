@@ -1,19 +1,19 @@
 //! The errors of the inertial sensors, run by run: synthesised from a model, or windows of recordings.
 
+use super::windows::Windows;
 use crate::imu::{Channel, Recording};
 use crate::lanes::Vec3;
 use crate::noise::continuous::same_rate;
 use crate::noise::{Model, Synthesizer};
 use crate::rng::StreamKey;
-use rand::RngExt;
 
 /// What makes the errors of the true IMU.
 #[derive(Debug, Clone, Copy)]
 pub enum Truth<'a> {
     /// Synthesised from a model, per run and axis.
     Model(&'a Model),
-    /// A random window of a random static recording for each run, all axes together, so that correlation
-    /// between axes survives; each signal's mean is removed.
+    /// A window of a static recording for each run, all axes together, so that correlation between axes
+    /// survives; windows are spread evenly, and each starts from the level best known there ([`Windows`]).
     Static(&'a [Recording]),
 }
 
@@ -59,6 +59,29 @@ pub enum TruthError {
         /// Rate of the IMU (Hz).
         imu_hz: f64,
     },
+}
+
+/// What makes the errors, ready to be drawn from.
+#[derive(Debug, Clone)]
+pub enum ErrorSource<'a> {
+    /// Synthesised from a model.
+    Model(&'a Model),
+    /// Windows of recordings.
+    Windows(Windows<'a>),
+}
+
+impl<'a> Truth<'a> {
+    /// Prepares errors of `samples` samples at `imu_hz`.
+    ///
+    /// # Errors
+    /// As [`check`](Self::check).
+    pub fn source(&self, imu_hz: f64, samples: usize) -> Result<ErrorSource<'a>, TruthError> {
+        self.check(imu_hz, samples)?;
+        Ok(match self {
+            Self::Model(model) => ErrorSource::Model(model),
+            Self::Static(recordings) => ErrorSource::Windows(Windows::new(recordings)),
+        })
+    }
 }
 
 impl Truth<'_> {
@@ -117,28 +140,22 @@ pub struct ImuErrors<'a> {
 #[derive(Debug, Clone)]
 enum ChannelErrors<'a> {
     Synthesised(Box<Synthesizer>),
-    /// What is left of the window.
-    Recorded(&'a [f64]),
+    /// What is left of the window, and the level it started from.
+    Recorded(&'a [f64], f64),
 }
 
 impl<'a> ImuErrors<'a> {
-    /// The errors of run `key.run` over `samples` samples, from a truth that passed [`Truth::check`].
+    /// The errors of run `key.run` over `samples` samples, as many as the source was made for.
     #[must_use]
-    pub fn new(truth: Truth<'a>, key: StreamKey<'_>, samples: usize) -> Self {
-        let channels = match truth {
-            Truth::Model(model) => Channel::ALL.map(|channel| {
+    pub fn new(errors: &ErrorSource<'a>, key: StreamKey<'_>, samples: usize) -> Self {
+        let channels = match errors {
+            ErrorSource::Model(model) => Channel::ALL.map(|channel| {
                 let source = channel.to_string();
                 let synthesizer = Synthesizer::new(model.axis(channel), StreamKey { source: &source, ..key });
                 ChannelErrors::Synthesised(Box::new(synthesizer))
             }),
-            Truth::Static(recordings) => {
-                let mut generator = StreamKey { source: "imu", process: "window", ..key }.generator();
-                let recording = &recordings[generator.random_range(0..recordings.len())];
-                let start = generator.random_range(0..=recording.len() - samples);
-                Channel::ALL.map(|channel| {
-                    let all = recording.signal(channel).map_or(&[][..], |s| &s.samples);
-                    ChannelErrors::Recorded(&all[start..start + samples])
-                })
+            ErrorSource::Windows(windows) => {
+                windows.of_run(key, samples).map(|(window, level)| ChannelErrors::Recorded(window, level))
             }
         };
         Self { channels: channels.into() }
@@ -148,9 +165,9 @@ impl<'a> ImuErrors<'a> {
     pub fn fill(&mut self, channel: Channel, out: &mut [f64]) {
         match &mut self.channels[channel.index()] {
             ChannelErrors::Synthesised(synthesizer) => synthesizer.fill(out),
-            ChannelErrors::Recorded(left) => {
+            ChannelErrors::Recorded(left, level) => {
                 let (now, later) = left.split_at(out.len());
-                out.copy_from_slice(now);
+                out.iter_mut().zip(now).for_each(|(error, sample)| *error = sample - *level);
                 *left = later;
             }
         }
@@ -216,8 +233,9 @@ mod tests {
     fn windows_keep_the_axes_together_and_reach_both_ends() {
         let recordings = [recording(100.0, 12)];
         let mut starts = std::collections::BTreeSet::new();
+        let source = Truth::Static(&recordings).source(100.0, 10).unwrap();
         for run in 0..200 {
-            let mut errors = ImuErrors::new(Truth::Static(&recordings), StreamKey { run, ..KEY }, 10);
+            let mut errors = ImuErrors::new(&source, StreamKey { run, ..KEY }, 10);
             let mut first = [[0.0; 4]; 6];
             for (channel, out) in Channel::ALL.into_iter().zip(&mut first) {
                 errors.fill(channel, out);

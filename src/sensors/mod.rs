@@ -6,3 +6,4 @@ pub mod gnss;
 pub mod ideal_imu;
 pub mod imu;
 pub mod outage;
+pub mod windows;

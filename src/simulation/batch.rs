@@ -74,7 +74,7 @@ impl<'a> Source<'a> {
             process: "",
         };
         let keys: Vec<_> = (first..first + live as u64).map(key).collect();
-        let imu = keys.iter().map(|k| ImuErrors::new(experiment.truth, *k, plan.samples()));
+        let imu = keys.iter().map(|k| ImuErrors::new(&plan.errors, *k, plan.samples()));
         let gnss = keys.iter().map(|k| GnssNoise::new(experiment.gnss, *k)).collect();
         let baro = experiment.baro.iter().flat_map(|b| keys.iter().map(|k| BaroNoise::new(b, *k))).collect();
         let defects = match experiment.defects {

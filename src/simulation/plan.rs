@@ -9,7 +9,7 @@ use crate::sensors::baro::BaroSettings;
 use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
 use crate::sensors::ideal_imu::{self, ideal_imu};
-use crate::sensors::imu::{Truth, TruthError};
+use crate::sensors::imu::{ErrorSource, Truth, TruthError};
 use crate::sensors::outage::Outage;
 use crate::strapdown::MAX_ROTATION;
 use crate::trajectory::Trajectory;
@@ -129,6 +129,8 @@ pub(super) struct Event {
 pub struct Plan<'a> {
     pub(super) experiment: &'a Experiment<'a>,
     pub(super) ideal: Vec<ImuSample>,
+    /// What makes the inertial errors.
+    pub(super) errors: ErrorSource<'a>,
     pub(super) start: NavState,
     pub(super) events: Vec<Event>,
     /// For each outage: how many reports fall into it, and the event of the first fix after it (or the
@@ -151,14 +153,14 @@ impl<'a> Plan<'a> {
             }
         }
         let ideal = ideal_imu(trajectory, rate_hz, gravity)?;
-        experiment.truth.check(rate_hz, ideal.len())?;
+        let errors = experiment.truth.source(rate_hz, ideal.len())?;
         check_rotation(&ideal, trajectory.start_s(), rate_hz)?;
         let events = schedule(experiment, ideal.len())?;
         let chi2 = ChiSquared::new(super::COVERAGE_DOF as f64).expect("degrees of freedom are positive");
         let coverage_quantile = chi2.inverse_cdf(experiment.coverage_level);
         let start = trajectory.state(trajectory.start_s());
         let outages = experiment.outages.iter().map(|o| effects(o, &events)).collect();
-        Ok(Self { experiment, ideal, start, events, outages, coverage_quantile })
+        Ok(Self { experiment, ideal, errors, start, events, outages, coverage_quantile })
     }
 
     /// What was planned.

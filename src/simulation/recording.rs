@@ -49,7 +49,7 @@ pub fn record(plan: &Plan<'_>, run: u64) -> Recording {
 
 fn inertial(plan: &Plan<'_>, key: StreamKey<'_>) -> Vec<ImuIncrement> {
     let (rate_hz, start_s) = (plan.experiment.rate_hz, plan.experiment.trajectory.start_s());
-    let mut errors = ImuErrors::new(plan.experiment.truth, key, plan.samples());
+    let mut errors = ImuErrors::new(&plan.errors, key, plan.samples());
     let of = |channel: Channel, errors: &mut ImuErrors<'_>| {
         let mut signal = vec![0.0; plan.samples()];
         errors.fill(channel, &mut signal);

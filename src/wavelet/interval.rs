@@ -67,6 +67,18 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
 
+    /// Coefficients that never forget, cos(2π k/2^level): Σ s_k²/s_0² over the 32 lags of a sixteenth of the
+    /// scale, two scales in all, is 16; eta1 = M/(step·(1 + 2·16)) to order 2^(level + 2)/M. Lags to one scale
+    /// only would give twice as many degrees of freedom.
+    #[test]
+    fn large_sample_degrees_of_freedom_have_lags_to_two_scales() {
+        let (level, count) = (6_u32, 1 << 18);
+        let w: Vec<f64> =
+            (0..count).map(|k| (std::f64::consts::TAU * f64::from(k % 64) / 64.0).cos()).collect();
+        let expected = f64::from(count) / (4.0 * 33.0);
+        assert!((edof_large_sample(&w, level) / expected - 1.0).abs() < 5e-3);
+    }
+
     /// 400 white signals: a frequency that is really 0.95 lies within 4 standard deviations,
     /// 4·√(0.95·0.05/400) = 0.044, of it.
     #[test]
