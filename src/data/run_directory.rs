@@ -1,5 +1,6 @@
 //! Run directories read back, as far as comparisons need them.
 
+use super::atomic;
 use crate::metrics::Measured;
 use crate::report::{Manifest, TableError, parse_epochs, parse_runs};
 use std::path::Path;
@@ -75,11 +76,12 @@ pub struct RunDirectory {
     pub experiment: Measured,
 }
 
-/// Reads a run directory.
+/// Reads a run directory; what a killed command had begun to replace in it is finished first.
 ///
 /// # Errors
 /// The file, and what is wrong with it.
 pub fn read(directory: &Path) -> Result<RunDirectory, RunDirectoryError> {
+    atomic::recover(directory);
     let manifest = manifest(directory)?;
     let (epochs_path, epochs) = text(directory, "epochs.csv")?;
     let (runs_path, runs) = text(directory, "runs.csv")?;

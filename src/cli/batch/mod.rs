@@ -42,6 +42,13 @@ enum Command {
     Emit(emit::Args),
 }
 
+impl Args {
+    /// Whether the command ends in good order at a signal, to be resumed.
+    pub(crate) const fn heeds_signals(&self) -> bool {
+        matches!(self.command, Command::Run(_))
+    }
+}
+
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     match &args.command {
         Command::Plan(args) => plan::run(args, session),
