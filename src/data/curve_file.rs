@@ -1,6 +1,7 @@
 //! Wavelet-variance curves to fit: CSV with columns `tau_samples,wv,edof`, or the JSON that `calibrate` or `wv`
 //! writes (the classical curve of a signal is GMWM's, the robust one RGMWM's).
 
+use super::source;
 use crate::imu::{Axis, Sensor};
 use crate::report::{CurvesFile, SignalsFile};
 use crate::wavelet::Curve;
@@ -92,7 +93,7 @@ impl CurveError {
     #[must_use]
     pub fn is_content(&self) -> bool {
         match self {
-            Self::Io { source, .. } => source.kind() == ErrorKind::InvalidData,
+            Self::Io { source, .. } => source::is_damage(source.kind()),
             _ => true,
         }
     }
@@ -118,8 +119,7 @@ impl CurveError {
 /// When it cannot be read, or is no curve file.
 pub fn read(path: &Path) -> Result<Vec<NamedCurve>, CurveError> {
     let name = path.display().to_string();
-    let text =
-        std::fs::read_to_string(path).map_err(|source| CurveError::Io { path: name.clone(), source })?;
+    let text = source::text(path).map_err(|source| CurveError::Io { path: name.clone(), source })?;
     let text = text.trim_start_matches('\u{feff}');
     let curves =
         if text.trim_start().starts_with('{') { json(&name, text)? } else { vec![csv(&name, text)?] };

@@ -91,11 +91,8 @@ impl AtomicDir {
             let sync = File::open(self.staging.path().join(name)).and_then(|f| f.sync_all());
             sync.map_err(|e| WriteError::io(&self.destination.join(name), e))?;
         }
-        let moved = if self.destination.is_dir() {
-            self.replace()
-        } else {
-            self.staging.rename(&self.destination)
-        };
+        let moved =
+            if self.destination.is_dir() { self.replace() } else { self.staging.rename(&self.destination) };
         moved.map_err(|e| WriteError::io(&self.destination, e))
     }
 

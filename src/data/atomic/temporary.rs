@@ -108,7 +108,10 @@ fn hold_open(file: File, path: &Path) -> Hold {
 fn is_at(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
     let identity = |m: fs::Metadata| (m.dev(), m.ino());
-    file.metadata().ok().map(identity).is_some_and(|found| fs::metadata(path).ok().map(identity) == Some(found))
+    file.metadata()
+        .ok()
+        .map(identity)
+        .is_some_and(|found| fs::metadata(path).ok().map(identity) == Some(found))
 }
 
 #[cfg(not(unix))]

@@ -188,7 +188,10 @@ fn a_replacement_that_is_killed_is_finished_by_the_next_command() {
         recover(dir.path());
         assert_eq!(listing(dir.path()), ["a.csv", "b.csv", "manifest.json", "notes.txt"]);
         let contents = |name: &str| fs::read_to_string(dir.path().join(name)).unwrap();
-        assert_eq!(["a.csv", "b.csv", "manifest.json", "notes.txt"].map(contents), ["new", "new", "new", "old"]);
+        assert_eq!(
+            ["a.csv", "b.csv", "manifest.json", "notes.txt"].map(contents),
+            ["new", "new", "new", "old"]
+        );
     }
 }
 
