@@ -359,6 +359,7 @@ mod tests {
                 filter_states: 15,
                 fix_components: 6,
                 coverage_level: 0.95,
+                independent_windows: None,
                 run_epochs: 1,
                 epochs,
             };

@@ -6,7 +6,6 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
 
 /// What this process is writing. Whoever gives an output its name holds the list meanwhile, so that an
 /// interrupt finds the output whole or without its name.
@@ -22,12 +21,12 @@ pub fn remove_unfinished() {
     let unfinished = unfinished();
     for path in unfinished.iter() {
         // Other threads may still make files in a directory that is being removed.
-        for _ in 0..100 {
+        for _ in 0..10_000 {
             remove(path);
             if !path.exists() {
                 break;
             }
-            std::thread::sleep(Duration::from_millis(5));
+            std::thread::yield_now();
         }
     }
     std::mem::forget(unfinished);
