@@ -110,7 +110,12 @@ mod tests {
     fn curve(model: &Composite) -> Curve {
         let levels: Vec<u32> = (1..=16).collect();
         let wv = levels.iter().map(|l| model.haar_wv(*l)).collect();
-        Curve { edof: levels.iter().map(|l| 1e6 / f64::from(*l).exp2()).collect(), wv, levels }
+        Curve {
+            edof: levels.iter().map(|l| 1e6 / f64::from(*l).exp2()).collect(),
+            wv,
+            levels,
+            quantization: None,
+        }
     }
 
     fn read(processes: Vec<Process>) -> Vec<f64> {

@@ -146,7 +146,7 @@ pub fn calibrate(groups: &[Group], settings: &Settings) -> Result<Vec<Outcome>, 
         (0..groups.len()).flat_map(|g| settings.estimators.iter().map(move |e| (g, *e))).collect();
     let run = |&(index, estimator): &(usize, Estimator)| {
         let replicates = &groups[index].replicates;
-        let curve = average(replicates, estimator, settings.trim, settings.tuning.efficiency())
+        let curve = average(replicates, estimator, settings.trim, &settings.tuning)
             .map_err(|source| CalibrationError::new(&groups[index], estimator, source))?;
         fit_curve(groups, index, estimator, curve, settings)
     };

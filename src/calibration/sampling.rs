@@ -3,10 +3,14 @@
 //! For Gaussian coefficients cov(nu_j, nu_k) ≈ 2/√(M_j M_k) ∫ |H_j|² |H_k|² S² df, H the Haar filters, S the
 //! spectrum of the model ([Percival](crate::bibliography::Percival95)). Each nu_j is taken as chi-square with
 //! the degrees of freedom 2 nu²/var that follow, joined by the correlations that follow. Drift is not noise:
-//! it adds to nu and not to its scatter.
+//! it adds to nu and not to its scatter. Quantization noise is not Gaussian: what that leaves of the scatter of a robust
+//! variance is in [`SamplingLaw::robust_edof`].
 
+use super::implied::quantization_share;
 use crate::noise::{Composite, Process};
 use crate::rng::Generator;
+use crate::wavelet::Tuning;
+use crate::wavelet::interval::edof_robust;
 use nalgebra::{DMatrix, DVector};
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -19,6 +23,8 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI};
 pub(super) struct SamplingLaw {
     /// Degrees of freedom per coefficient, of each level.
     per_coefficient: Vec<f64>,
+    /// The part of the wavelet variance that is quantization noise, of each level.
+    pub(super) quantization: Vec<f64>,
     /// Correlations between levels, and the lower Cholesky factor.
     pub(super) correlation: DMatrix<f64>,
     factor: DMatrix<f64>,
@@ -41,7 +47,8 @@ impl SamplingLaw {
         });
         correlation.fill_diagonal(1.0);
         let factor = factor(&correlation);
-        Self { per_coefficient, correlation, factor }
+        let quantization = (1..=levels as u32).map(|level| quantization_share(model, level)).collect();
+        Self { per_coefficient, quantization, correlation, factor }
     }
 
     /// The law of the first so many levels.
@@ -49,13 +56,22 @@ impl SamplingLaw {
         let correlation = self.correlation.view((0, 0), (levels, levels)).into_owned();
         // The leading block of a lower triangular factor is the factor of the leading block.
         let factor = self.factor.view((0, 0), (levels, levels)).into_owned();
-        Self { per_coefficient: self.per_coefficient[..levels].to_vec(), correlation, factor }
+        let per_coefficient = self.per_coefficient[..levels].to_vec();
+        Self { per_coefficient, quantization: self.quantization[..levels].to_vec(), correlation, factor }
     }
 
     /// Degrees of freedom of the classical wavelet variance of a signal of so many samples.
     pub(super) fn edof(&self, samples: usize) -> Vec<f64> {
         let count = |i: usize| crate::wavelet::coefficient_count(samples, i as u32 + 1) as f64;
         self.per_coefficient.iter().enumerate().map(|(i, e)| (e * count(i)).max(1.0)).collect()
+    }
+
+    /// The same of the robust one, at least 1.
+    pub(super) fn robust_edof(&self, samples: usize, tuning: &Tuning) -> Vec<f64> {
+        let robust = |(edof, share): (f64, &f64)| {
+            edof_robust(edof, tuning.efficiency() * tuning.quantization().degrees(*share))
+        };
+        self.edof(samples).into_iter().zip(&self.quantization).map(robust).collect()
     }
 
     /// Draws nu*/nu of every level, given the degrees of freedom.

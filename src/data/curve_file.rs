@@ -4,7 +4,7 @@
 use super::source;
 use crate::imu::{Axis, Sensor};
 use crate::report::{CurvesFile, SignalsFile};
-use crate::wavelet::Curve;
+use crate::wavelet::{Convention, Curve, QuantizationResponse, Tuning};
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -187,10 +187,7 @@ fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, CurveError> {
         None => serde_json::from_str(text).map_err(syntax)?,
         Some(_) => {
             let file: SignalsFile = serde_json::from_str(text).map_err(syntax)?;
-            if !(file.efficiency > 0.0 && file.efficiency <= 1.0) {
-                let found = file.efficiency.to_string();
-                return Err(refuse("head", "efficiency", &found, "a number above 0, up to 1"));
-            }
+            quantization(path, "head", Some(file.efficiency))?;
             CurvesFile::from(file)
         }
     };
@@ -218,7 +215,8 @@ fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, CurveError> {
         if axis.is_none() && entry.axis != "all" {
             return Err(refuse(&place, "axis", &entry.axis, "x, y, z or all"));
         }
-        let mut curve = Curve::default();
+        let mut curve =
+            Curve { quantization: quantization(path, &place, entry.efficiency)?, ..Curve::default() };
         for i in 0..tau {
             let place = format!("curve {index}, scale {}", i + 1);
             push(&mut curve, path, &place, entry.tau_s[i] * file.rate_hz, entry.wv[i], entry.edof[i])?;
@@ -232,6 +230,27 @@ fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, CurveError> {
         });
     }
     Ok(curves)
+}
+
+/// How robust variances of an efficiency read quantization noise.
+fn quantization(
+    path: &str,
+    place: &str,
+    efficiency: Option<f64>,
+) -> Result<Option<QuantizationResponse>, CurveError> {
+    let Some(efficiency) = efficiency else { return Ok(None) };
+    // The efficiency in a file is the true one, which the other convention puts a little beyond the range.
+    let tuning = Tuning::new(efficiency.clamp(0.3, 0.99), Convention::Exact);
+    match tuning {
+        Ok(tuning) if efficiency > 0.0 && efficiency <= 1.0 => Ok(Some(*tuning.quantization())),
+        _ => Err(CurveError::Value {
+            path: path.to_owned(),
+            place: place.to_owned(),
+            column: "efficiency",
+            value: efficiency.to_string(),
+            expected: "a number above 0, up to 1",
+        }),
+    }
 }
 
 /// Appends a point; scales are powers of two, ascending.
@@ -276,7 +295,12 @@ mod tests {
         let read = csv("c.csv", text).unwrap();
         assert_eq!(
             read.curve,
-            Curve { levels: vec![1, 2, 4], wv: vec![1e-5, 5e-6, 1e-6], edof: vec![100.0, 50.0, 12.5] }
+            Curve {
+                levels: vec![1, 2, 4],
+                wv: vec![1e-5, 5e-6, 1e-6],
+                edof: vec![100.0, 50.0, 12.5],
+                quantization: None
+            }
         );
     }
 
@@ -293,7 +317,10 @@ mod tests {
         let file = CurvesFile { schema_version: 1, rate_hz: 30.0, curves: vec![entry] };
         let read = json("m.wv.json", &to_json(&file)).unwrap();
         assert_eq!((read[0].sensor, read[0].axis, read[0].rate_hz), (Some(Sensor::Gyro), None, Some(30.0)));
-        assert_eq!(read[0].curve, Curve { levels: vec![1, 2], wv: vec![2e-7, 1e-7], edof: vec![10.0, 5.0] });
+        assert_eq!(
+            read[0].curve,
+            Curve { levels: vec![1, 2], wv: vec![2e-7, 1e-7], edof: vec![10.0, 5.0], quantization: None }
+        );
     }
 
     #[test]

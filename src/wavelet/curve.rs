@@ -1,5 +1,7 @@
 //! A wavelet-variance curve: what a model is fitted to.
 
+use super::QuantizationResponse;
+
 /// Wavelet variance over scales, and how well it is known.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Curve {
@@ -9,4 +11,6 @@ pub struct Curve {
     pub wv: Vec<f64>,
     /// Equivalent degrees of freedom.
     pub edof: Vec<f64>,
+    /// How its variances read quantization noise, where they are robust; classical ones read it as it is.
+    pub quantization: Option<QuantizationResponse>,
 }
