@@ -181,10 +181,10 @@ fn failures(cases: u64, robust: bool) -> Vec<String> {
         let edof = levels.iter().map(|j| interval::edof_eta3(samples, *j)).collect();
         let (classical, m_scales) = both(&signal, 15, &tuning).unwrap();
         let curve = match robust {
-            false => Curve { wv: classical, edof, levels, quantization: None },
+            false => Curve { wv: classical, edof, levels, ..Curve::default() },
             true => {
                 let wv = m_scales.iter().map(|v| v.value).collect();
-                Curve { wv, edof, levels, quantization: Some(*tuning.quantization()) }
+                Curve { wv, edof, levels, quantization: Some(*tuning.quantization()), ..Curve::default() }
             }
         };
         let spec = if n2 { ModelSpec::n2() } else { ModelSpec::n1() };

@@ -2,7 +2,7 @@
 //! ([Minaretzis](crate::bibliography::Minaretzis24), eqs. 4–8).
 
 use crate::imu::Axis;
-use crate::wavelet::{Curve, RobustVariance, Tuning, interval};
+use crate::wavelet::{Curve, RobustVariance, Status, Tuning, interval};
 
 /// Which curve a model is fitted to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -127,7 +127,8 @@ pub enum AverageError {
 ///
 /// The paper's slips are resolved: SR-AWV's weights sum to one (its 1/J must be 1/K), DR-AWV keeps the
 /// order statistics a + 1 … K − a (2a are dropped), weights of the kept ones renormalised. `tuning` is
-/// that of the robust wavelet variances; the degrees of freedom are those of the replicates' eta3 combined.
+/// that of the robust wavelet variances; the degrees of freedom are those of the replicates' eta3 combined. A level
+/// at which half of the kept ones or more have no admissible robust variance is ignored in fits.
 ///
 /// # Errors
 /// When there is no replicate, more than one for a single-replicate estimator, or none left by the trim.
@@ -163,6 +164,9 @@ pub fn average(
         // var(Σ w nu) = Σ w²·2 nu²/eta, the replicates' true nu taken equal.
         let inverse: f64 = kept.iter().map(|t| (t.samples / total).powi(2) / t.edof).sum();
         curve.edof.push(1.0 / inverse);
+        if 2 * kept.iter().filter(|t| !t.has_root).count() >= kept.len() {
+            curve.ignored.push(level);
+        }
     }
     Ok(curve)
 }
@@ -172,6 +176,7 @@ struct Term {
     samples: f64,
     nu: f64,
     edof: f64,
+    has_root: bool,
 }
 
 impl Term {
@@ -179,14 +184,15 @@ impl Term {
         let i = level as usize - 1;
         let eta3 = interval::edof_eta3(replicate.samples, level);
         let edof = if estimator.is_robust() { interval::edof_robust(eta3, efficiency) } else { eta3 };
-        Self { samples: replicate.samples as f64, nu: replicate.value(estimator, i), edof }
+        let has_root = !(estimator.is_robust() && replicate.robust[i].status == Status::NoRoot);
+        Self { samples: replicate.samples as f64, nu: replicate.value(estimator, i), edof, has_root }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wavelet::{Convention, Status};
+    use crate::wavelet::Convention;
     use approx::assert_relative_eq;
 
     fn tuning() -> Tuning {

@@ -62,6 +62,7 @@ pub(super) fn avlr(curve: &Curve, spec: &ModelSpec) -> Result<Fit, FitError> {
         at_end: Vec::new(),
         bounded: Vec::new(),
         minima: Vec::new(),
+        weighted_for: Vec::new(),
         mixing: None,
         composite,
     })
@@ -114,7 +115,7 @@ mod tests {
             edof: levels.iter().map(|l| 1e6 / f64::from(*l).exp2()).collect(),
             wv,
             levels,
-            quantization: None,
+            ..Curve::default()
         }
     }
 

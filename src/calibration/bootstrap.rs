@@ -121,7 +121,8 @@ impl<'a> CurveSampler<'a> {
             like(replicate, levels.map(|((nu, ratio), edof)| nu * ratio * (1.0 + self.bias(*edof))).collect())
         };
         let replicates: Vec<Replicate> = self.replicates.iter().zip(ratios).zip(edof).map(of).collect();
-        average(&replicates, self.outcome.estimator, settings.trim, &settings.tuning).ok()
+        let curve = average(&replicates, self.outcome.estimator, settings.trim, &settings.tuning).ok()?;
+        Some(Curve { ignored: self.outcome.curve.ignored.clone(), ..curve })
     }
 
     /// By how much a robust variance of so many degrees of freedom reads high.

@@ -18,7 +18,11 @@ use std::sync::Arc;
 /// Omega: what a scale counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Weighting {
-    /// edof/(2 nu²), the inverse variance of nu_hat.
+    /// edof/(2 nu(theta)²), the inverse variance of nu_hat where the model holds. The fit is repeated until the weights
+    /// are those of its own result, which makes it the maximum-likelihood estimate of independent chi-squares; a
+    /// variance that is low by chance weighs no more than others.
+    Model,
+    /// edof/(2 nu_hat²), the convention of the literature: what is low by chance weighs most.
     Edof,
     /// 1/(width of the 95 % interval)².
     Interval,
@@ -29,17 +33,18 @@ pub enum Weighting {
 }
 
 impl Weighting {
-    /// √Omega_j of each scale (1/units²).
-    pub(super) fn roots(self, curve: &Curve) -> Vec<f64> {
-        let root = |(nu, edof): (&f64, &f64)| match self {
-            Self::Edof | Self::Full => (0.5 * edof).sqrt() / nu,
+    /// √Omega_j of each scale (1/units²), where its variance is taken to be `nu`.
+    pub(super) fn roots(self, curve: &Curve, nu: &[f64]) -> Vec<f64> {
+        let root = |((nu, edof), level): ((&f64, &f64), &u32)| match self {
+            _ if curve.ignored.contains(level) => 0.0,
+            Self::Model | Self::Edof | Self::Full => (0.5 * edof).sqrt() / nu,
             Self::Interval => {
                 let (low, high) = interval::interval(*nu, *edof, 0.95);
                 1.0 / (high - low)
             }
             Self::None => 1.0,
         };
-        curve.wv.iter().zip(&curve.edof).map(root).collect()
+        nu.iter().zip(&curve.edof).zip(&curve.levels).map(root).collect()
     }
 }
 
@@ -157,16 +162,18 @@ impl Solution {
 }
 
 impl Objective {
-    /// With a mixing matrix it is applied to nu_j(theta)/nu_j, and the weighting does not matter.
+    /// Weights where the variances are taken to be `nu`. With a mixing matrix it is applied to nu_j(theta)/nu_j, and the
+    /// weighting does not matter.
     pub(super) fn new(
         curve: &Curve,
         weighting: Weighting,
+        nu: &[f64],
         mixing: Option<Arc<DMatrix<f64>>>,
         components: Vec<Component>,
     ) -> Self {
         let roots = match mixing {
-            Some(_) => curve.wv.iter().map(|nu| 1.0 / nu).collect(),
-            None => weighting.roots(curve),
+            Some(_) => nu.iter().map(|nu| 1.0 / nu).collect(),
+            None => weighting.roots(curve, nu),
         };
         let target: Vec<f64> = roots.iter().zip(&curve.wv).map(|(w, nu)| w * nu).collect();
         let target = mixed(mixing.as_deref(), target);

@@ -37,9 +37,9 @@ pub(super) fn standard_errors(outcome: &Outcome, settings: &Settings, covariance
     let gradients = implied_gradients(&fit.composite, curve);
     let centre = implied(&fit.composite, curve);
     let weights = match &fit.mixing {
-        Some(mixing) => DMatrix::from_fn(levels, levels, |i, j| mixing[(i, j)] / curve.wv[j]),
+        Some(mixing) => DMatrix::from_fn(levels, levels, |i, j| mixing[(i, j)] / fit.weighted_for[j]),
         None => {
-            let roots = settings.weighting.roots(curve);
+            let roots = settings.weighting.roots(curve, &fit.weighted_for);
             DMatrix::from_fn(levels, levels, |i, j| if i == j { roots[i] } else { 0.0 })
         }
     };

@@ -27,7 +27,7 @@ pub(super) struct Found {
     pub(super) combinations: usize,
 }
 
-/// Searches all coordinates, on a grid of about so many combinations at most and from the `known` minima of
+/// Searches all coordinates, on a grid of about so many combinations at most (none for 0) and from the `known` minima of
 /// a similar curve.
 pub(super) fn search(objective: &Objective, combinations: usize, known: &[Vec<f64>]) -> Found {
     let dimensions: Vec<(usize, Range)> = objective.shaped().collect();
@@ -36,13 +36,17 @@ pub(super) fn search(objective: &Objective, combinations: usize, known: &[Vec<f6
         let best = End { coordinates: Vec::new(), cost, termination: Termination::Linear };
         return Found { ends: vec![best.clone()], best, combinations: 1 };
     }
-    let grid = Grid::new(objective, &dimensions, combinations);
-    let choices = grid.choices();
-    let mut starts = grid.starts(&choices);
-    starts.extend_from_slice(known);
+    let mut starts = known.to_vec();
+    let mut tried = 0;
+    if combinations > 0 || known.is_empty() {
+        let grid = Grid::new(objective, &dimensions, combinations);
+        let choices = grid.choices();
+        tried = choices.len();
+        starts.splice(0..0, grid.starts(&choices));
+    }
     let mut ends: Vec<End> = starts.par_iter().map(|start| descend(objective, start)).collect();
     ends.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    Found { best: ends[0].clone(), ends, combinations: choices.len() }
+    Found { best: ends[0].clone(), ends, combinations: tried }
 }
 
 /// The grid: for each dimension its points and their columns; the inner products of all columns.

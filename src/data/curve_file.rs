@@ -273,10 +273,12 @@ fn push(curve: &mut Curve, path: &str, place: &str, tau: f64, wv: f64, edof: f64
     if curve.levels.last().is_some_and(|last| *last >= level as u32) {
         return refuse("tau_samples", tau, "greater than the one before");
     }
-    for (column, value) in [("wv", wv), ("edof", edof)] {
-        if !(value.is_finite() && value > 0.0) {
-            return refuse(column, value, "a finite number > 0");
-        }
+    let positive = |range: (f64, f64), value: f64| value >= range.0 && value <= range.1;
+    if !positive(Curve::WV_RANGE, wv) {
+        return refuse("wv", wv, "a number from 1e-100 to 1e100");
+    }
+    if !positive(Curve::EDOF_RANGE, edof) {
+        return refuse("edof", edof, "a number from 1e-15 to 1e15");
     }
     curve.levels.push(level as u32);
     curve.wv.push(wv);
@@ -299,7 +301,7 @@ mod tests {
                 levels: vec![1, 2, 4],
                 wv: vec![1e-5, 5e-6, 1e-6],
                 edof: vec![100.0, 50.0, 12.5],
-                quantization: None
+                ..Curve::default()
             }
         );
     }
@@ -319,7 +321,7 @@ mod tests {
         assert_eq!((read[0].sensor, read[0].axis, read[0].rate_hz), (Some(Sensor::Gyro), None, Some(30.0)));
         assert_eq!(
             read[0].curve,
-            Curve { levels: vec![1, 2], wv: vec![2e-7, 1e-7], edof: vec![10.0, 5.0], quantization: None }
+            Curve { levels: vec![1, 2], wv: vec![2e-7, 1e-7], edof: vec![10.0, 5.0], ..Curve::default() }
         );
     }
 

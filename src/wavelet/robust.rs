@@ -123,7 +123,8 @@ impl Equation<'_> {
     }
 
     /// The march from the squared MAD: up while g > 0; else down until g > 0, then to that region's falling
-    /// edge.
+    /// edge; if nothing is positive downward, up to a positive region and on to its falling edge (where nearly half of the
+    /// coefficients are many times as large as the others).
     fn search(&self) -> RobustVariance {
         let mad = squared_mad(self.squares);
         let status = if mad > 0.0 { Status::Ok } else { Status::Coarse };
@@ -155,7 +156,26 @@ impl Equation<'_> {
         if g > 0.0 {
             return RobustVariance { value: self.falling_edge(top, best * STEP), status };
         }
-        RobustVariance { value: top, status: Status::NoRoot }
+        match self.root_above(start, mean) {
+            Some(value) => RobustVariance { value, status },
+            None => RobustVariance { value: top, status: Status::NoRoot },
+        }
+    }
+
+    /// The falling edge of the first positive region above a start.
+    fn root_above(&self, start: f64, mean: f64) -> Option<f64> {
+        // Ends: chi(r) ≤ r², so g(s) ≤ mean/s − a, which is negative beyond mean/a.
+        let mut s = start;
+        while self.at(s).0 <= 0.0 {
+            s *= STEP;
+            if s >= STEP * mean / self.tuning.a() {
+                return None;
+            }
+        }
+        while self.at(s * STEP).0 > 0.0 {
+            s *= STEP;
+        }
+        Some(self.falling_edge(s, s * STEP))
     }
 
     /// The root in (low, high) with g(low) > 0 ≥ g(high): Newton's iteration on ln s, halving when it leaves
@@ -332,6 +352,20 @@ mod tests {
         let result = m_scale(&squares(&w), &tuning());
         assert_eq!(result.status, Status::NoRoot);
         assert!((0.1..1.5).contains(&result.value), "{}", result.value);
+    }
+
+    /// 55 % standard normal numbers (at their quantiles) and 45 % at ±8: the equation rises through zero at 9.06 and falls
+    /// through it at 34.46, solved elsewhere; nothing is positive below the MAD.
+    #[test]
+    fn a_root_above_is_found() {
+        use statrs::distribution::{ContinuousCDF, Normal};
+        let normal = Normal::new(0.0, 1.0).unwrap();
+        let mut w: Vec<f64> = (0..5500).map(|i| normal.inverse_cdf((f64::from(i) + 0.5) / 5500.0)).collect();
+        w.extend((0..4500).map(|i| if i % 2 == 0 { 8.0 } else { -8.0 }));
+        let found = m_scale(&squares(&w), &tuning());
+        assert_eq!(found.status, Status::Ok);
+        assert_relative_eq!(found.value, 34.46, max_relative = 1e-3);
+        assert_falls_through_zero(&w, found.value);
     }
 
     #[test]

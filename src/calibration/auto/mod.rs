@@ -101,9 +101,9 @@ pub(super) fn choose(
     curve: &Curve,
     settings: &Settings,
 ) -> Result<(ModelSpec, Ranking), FitError> {
-    // One weighting for all candidates.
+    // One weighting for all candidates, whatever their models expect.
     let weighting = match settings.weighting {
-        Weighting::Full => Weighting::Edof,
+        Weighting::Full | Weighting::Model => Weighting::Edof,
         other => other,
     };
     let settings = &Settings { weighting, ..settings.clone() };
@@ -196,7 +196,7 @@ impl Field<'_> {
         let fitted = |c| Some((c, implied(&self.again(i, c)?.composite, c)));
         let pairs: Vec<(&Curve, Vec<f64>)> = curves.iter().filter_map(fitted).collect();
         let count = pairs.len() as f64;
-        let roots = self.settings.weighting.roots(self.curve);
+        let roots = self.settings.weighting.roots(self.curve, &self.curve.wv);
         let term = |(j, root): (usize, &f64)| {
             let of = |(c, implied): &(&Curve, Vec<f64>)| (root * c.wv[j], root * implied[j]);
             let (mut a, mut b, mut ab) = (0.0, 0.0, 0.0);

@@ -245,7 +245,7 @@ fn calibration(
     let note = CalibrationNote {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         efficiency_convention: "exact".to_owned(),
-        weighting: "edof".to_owned(),
+        weighting: "model".to_owned(),
         seed: None,
         inputs: inputs.collect::<Result<Vec<Input>, _>>()?,
     };
