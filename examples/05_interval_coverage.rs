@@ -53,7 +53,7 @@ fn case(name: &str, paper: Design) -> Result<Design, Failure> {
         let mut processes = Vec::new();
         for (code, values) in parts {
             processes
-                .push(Process::from_values(code, values, paper.model.rate_hz)?.ok_or("no such process")?);
+                .push(Process::from_values(code, values, paper.model.rate_hz).ok_or("no such process")??);
         }
         let noise = Composite::new(processes);
         let model = Model::pooled(paper.model.rate_hz, &noise, &noise);

@@ -66,7 +66,7 @@ fn variances_are_those_of_the_closed_form() {
             levels: (1..=LEVELS).collect(),
             wv: classical(&signal, LEVELS).unwrap(),
             edof,
-            ..Curve::default(),
+            ..Curve::default()
         };
         for (weighting, into) in [Weighting::Edof, Weighting::Full].into_iter().zip(&mut estimates) {
             let fit = fit(&curve, &spec, 1.0, weighting).unwrap();

@@ -354,8 +354,9 @@ mod tests {
         assert!((0.1..1.5).contains(&result.value), "{}", result.value);
     }
 
-    /// 55 % standard normal numbers (at their quantiles) and 45 % at ±8: the equation rises through zero at 9.06 and falls
-    /// through it at 34.46, solved elsewhere; nothing is positive below the MAD.
+    /// 55 % standard normal numbers (at their quantiles) and 45 % at ±8: nothing is positive below the MAD. At s = 35 by hand
+    /// 0.55·0.95/35 + 0.45·1.829·(1 − 1.829/19.36)⁴ = 0.5683 for a = 0.5692, and with 34.5 in the place of 35 it is 0.5731:
+    /// the falling root is at 34.9. (A random sample of these had 34.46, solved elsewhere, and a rising root at 9.06.)
     #[test]
     fn a_root_above_is_found() {
         use statrs::distribution::{ContinuousCDF, Normal};
@@ -364,7 +365,7 @@ mod tests {
         w.extend((0..4500).map(|i| if i % 2 == 0 { 8.0 } else { -8.0 }));
         let found = m_scale(&squares(&w), &tuning());
         assert_eq!(found.status, Status::Ok);
-        assert_relative_eq!(found.value, 34.46, max_relative = 1e-3);
+        assert_relative_eq!(found.value, 34.9, max_relative = 3e-3);
         assert_falls_through_zero(&w, found.value);
     }
 
