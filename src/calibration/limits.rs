@@ -184,6 +184,9 @@ mod tests {
             message("RW", "gamma2", Some(-1.0), None),
             "RW gamma2: -1 is not a number from 0 to 1e100"
         );
+        assert!(
+            message("WN", "sigma2", Some(1e308), Some(1e308)).ends_with("is not a number from 0 to 1e100")
+        );
         assert_eq!(spec.parameters(), 7);
         spec.limit("AR1_2", "phi", Some(0.99), Some(0.99)).unwrap();
         assert_eq!(spec.parameters(), 6, "a fixed parameter is not free");
