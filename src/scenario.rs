@@ -169,14 +169,51 @@ impl Scenario {
     pub fn belief(&self, model: &Model, outages: &[Outage]) -> Result<Belief, BeliefError> {
         let longest = outages.iter().map(|o| o.end_s - o.start_s).fold(0.0, f64::max);
         let (interval_s, window_s) = (1.0 / self.gnss.rate_hz, reduction::window_s(longest));
-        let mut belief = Belief::new(model, self.filter.states, interval_s, window_s)?;
-        if let Some(sigma) = self.initial.accel_bias_sigma_m_s2 {
-            belief.set_initial_bias_sigma(Sensor::Accel, sigma);
+        let belief = Belief::new(model, self.filter.states, interval_s, window_s)?;
+        Ok(belief.with_initial(&self.initial))
+    }
+
+    /// The same with a filter that has a state for every process of the model; what it expects beside the model
+    /// stays.
+    #[must_use]
+    pub fn with_full_noise(&self) -> Self {
+        let mut full = self.clone();
+        full.filter.states = FilterStates::Full;
+        let ppm = self.filter.states.scale_sigma() * 1e6;
+        if ppm > 0.0 {
+            full.initial.accel_scale_sigma_ppm.get_or_insert(ppm);
+            full.initial.gyro_scale_sigma_ppm.get_or_insert(ppm);
         }
-        if let Some(sigma) = self.initial.gyro_bias_sigma_rad_s {
-            belief.set_initial_bias_sigma(Sensor::Gyro, sigma);
+        full
+    }
+
+    /// What the true IMU has and the filter does not expect: its errors will be larger than it says.
+    #[must_use]
+    pub fn doubts(&self) -> Vec<String> {
+        let mut doubts = Vec::new();
+        for sensor in Sensor::ALL {
+            let (name, unit) = (sensor.name(), sensor.unit());
+            let (bias, ppm) = self.imu.deviations(sensor);
+            // of half of what is there, errors may be twice as large as stated
+            let expected = self.initial.bias_sigma(sensor).unwrap_or(0.0);
+            if expected < 0.5 * bias {
+                let key = InitialSettings::bias_key(sensor);
+                doubts.push(format!(
+                    "the true {name} has a turn-on bias of {bias} {unit}, the filter expects {expected}: \
+                     initial.{key} gives it states"
+                ));
+            }
+            let by_default = self.filter.states.scale_sigma() * 1e6;
+            let expected = self.initial.scale_sigma_ppm(sensor).unwrap_or(by_default);
+            if expected < 0.5 * ppm {
+                let key = InitialSettings::scale_key(sensor);
+                doubts.push(format!(
+                    "the true {name} has a scale-factor error of {ppm} ppm, the filter expects {expected}: \
+                     initial.{key} gives it states"
+                ));
+            }
         }
-        Ok(belief)
+        doubts
     }
 
     /// The outages asked for: the paper's two when nothing is said.
@@ -213,6 +250,7 @@ impl RunSettings {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::noise::{Ar1, Composite, Process, RandomWalk};
 
     #[test]
     fn an_empty_file_is_the_papers_setting() {
@@ -257,6 +295,43 @@ mod tests {
         assert!(scenario.outages().fixed.is_empty());
         let again: Scenario = toml::from_str(&toml::to_string(&scenario).unwrap()).unwrap();
         assert_eq!(again, scenario);
+    }
+
+    #[test]
+    fn what_the_filter_does_not_expect_is_said_of_each_sensor() {
+        let doubts = |text: &str| toml::from_str::<Scenario>(text).unwrap().doubts();
+        assert!(doubts("").is_empty());
+        let bias = doubts("imu = { turn_on_bias_gyro_rad_s = 1e-4, turn_on_bias_accel_m_s2 = 0.02 }");
+        assert!(bias.len() == 2 && bias[0].contains("initial.accel_bias_sigma_m_s2"), "{bias:?}");
+        let expected = "imu.turn_on_bias_gyro_rad_s = 1e-4\ninitial.gyro_bias_sigma_rad_s = ";
+        assert_eq!(
+            (doubts(&format!("{expected}1e-4")).len(), doubts(&format!("{expected}4e-5")).len()),
+            (0, 1)
+        );
+        let scale = doubts("imu.scale_ppm_accel = 300");
+        assert!(scale.len() == 1 && scale[0].contains("initial.accel_scale_sigma_ppm"), "{scale:?}");
+        assert!(doubts("imu.scale_ppm_accel = 300\nfilter.states = 21").is_empty());
+    }
+
+    /// With N1 an axis has two bias states: 9 + 12, scale factors 6, turn-on biases of the gyroscope 3.
+    #[test]
+    fn what_is_expected_beside_the_model_adds_states_to_any_filter() {
+        let axis = Composite::new(vec![
+            Process::Ar1(Ar1::new(0.99, 1e-8).unwrap()),
+            Process::RandomWalk(RandomWalk::new(1e-12).unwrap()),
+        ]);
+        let model = Model::pooled(100.0, &axis, &axis);
+        let states = |text: &str| {
+            let scenario: Scenario = toml::from_str(text).unwrap();
+            assert_eq!(scenario.validate(), Ok(()));
+            let full = scenario.with_full_noise().belief(&model, &[]).unwrap().states;
+            (scenario.belief(&model, &[]).unwrap().states, full)
+        };
+        assert_eq!(states(""), (15, 21));
+        assert_eq!(states("filter.states = 21"), (21, 27));
+        assert_eq!(states("initial.gyro_bias_sigma_rad_s = 1e-4\nfilter.states = 21"), (24, 30));
+        assert_eq!(states("initial.gyro_scale_sigma_ppm = 0\nfilter.states = 21"), (18, 24));
+        assert_eq!(states("initial.accel_scale_sigma_ppm = 100"), (18, 24));
     }
 
     #[test]

@@ -153,6 +153,25 @@ impl Grid {
         scenario
     }
 
+    /// What the true IMU of a scenario has and a filter does not expect ([`Scenario::doubts`]), each once.
+    #[must_use]
+    pub fn doubts(&self) -> Vec<String> {
+        let mut found: Vec<String> = Vec::new();
+        for (name, scenario) in &self.scenarios {
+            for column in &self.columns {
+                let mut own = scenario.clone();
+                own.filter.states = column.filter.unwrap_or(own.filter.states);
+                let states = own.filter.states;
+                found.extend(
+                    own.doubts().iter().map(|doubt| format!("scenario {name}, filter {states}: {doubt}")),
+                );
+            }
+        }
+        let mut seen = std::collections::HashSet::new();
+        found.retain(|doubt| seen.insert(doubt.clone()));
+        found
+    }
+
     /// The filter of a column in a cell.
     #[must_use]
     pub fn filter(&self, cell: Cell, column: &Column) -> FilterStates {

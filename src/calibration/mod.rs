@@ -12,7 +12,6 @@ mod bounded;
 mod diagnosis;
 mod fit;
 mod goodness;
-mod implied;
 mod inference;
 mod limits;
 mod notes;
@@ -36,7 +35,6 @@ pub use diagnosis::{
 };
 pub use fit::{Fit, FitError, fit};
 pub use goodness::Goodness;
-pub use implied::implied;
 pub use inference::{Bootstrap, Inference, infer};
 pub use limits::{LimitError, Limits};
 pub use notes::{Share, correlation_time_s, duration, notes, percent, shares};

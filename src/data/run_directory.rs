@@ -1,6 +1,5 @@
 //! Run directories read back, as far as comparisons need them.
 
-use super::{atomic, source};
 use crate::metrics::Measured;
 use crate::report::{Manifest, TableError, parse_epochs, parse_runs};
 use std::path::Path;
@@ -49,11 +48,8 @@ pub enum RunDirectoryError {
 impl RunDirectoryError {
     /// Whether the contents are at fault (rather than the machine, or a missing file).
     #[must_use]
-    pub fn is_content(&self) -> bool {
-        match self {
-            Self::Io { source, .. } => source::is_damage(source.kind()),
-            _ => true,
-        }
+    pub const fn is_content(&self) -> bool {
+        !matches!(self, Self::Io { .. })
     }
 
     /// What to do about it.
@@ -79,12 +75,11 @@ pub struct RunDirectory {
     pub experiment: Measured,
 }
 
-/// Reads a run directory; what a killed command had begun to replace in it is finished first.
+/// Reads a run directory.
 ///
 /// # Errors
 /// The file, and what is wrong with it.
 pub fn read(directory: &Path) -> Result<RunDirectory, RunDirectoryError> {
-    atomic::recover(directory);
     let manifest = manifest(directory)?;
     let (epochs_path, epochs) = text(directory, "epochs.csv")?;
     let (runs_path, runs) = text(directory, "runs.csv")?;
@@ -113,7 +108,7 @@ fn manifest(directory: &Path) -> Result<Manifest, RunDirectoryError> {
 fn text(directory: &Path, name: &str) -> Result<(String, String), RunDirectoryError> {
     let path = directory.join(name);
     let shown = path.display().to_string();
-    match source::text(&path) {
+    match std::fs::read_to_string(&path) {
         Ok(text) => Ok((shown, text)),
         Err(source) => Err(RunDirectoryError::Io { path: shown, source }),
     }

@@ -1,24 +1,20 @@
 //! What the filter believes of the inertial noise: a noise model in the form of filter states.
 
-use super::initial::FilterStates;
-use crate::imu::{Channel, Sensor};
+use super::initial::InitialSettings;
+use super::states::FilterStates;
+use super::unknowns::{KINDS, Unknown, UnknownKind};
+use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::{Composite, Model, Process, reduction};
 use glam::DVec3;
 
 /// Most bias states an axis.
 pub const MAX_GROUPS: usize = 8;
-/// Most bias groups of a sensor: those of the model and an unknown constant.
-pub(super) const MAX_BLOCKS: usize = MAX_GROUPS + 1;
+/// Most blocks of a sensor: bias groups of the model, an unknown constant, and what is multiplied.
+pub(super) const MAX_BLOCKS: usize = MAX_GROUPS + 1 + KINDS;
 
 /// A model that cannot be made into filter states.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum BeliefError {
-    /// A process that has no stochastic state.
-    #[error("{channel}: a drift (DR) has no state in the full filter; use the reduced one (15 states)")]
-    Drift {
-        /// The axis that carries it.
-        channel: Channel,
-    },
     /// More bias states than the filter carries.
     #[error("{channel}: more than {MAX_GROUPS} correlated processes; use the reduced filter (15 states)")]
     TooManyStates {
@@ -53,6 +49,16 @@ impl BiasGroup {
         Self { phi: DVec3::ONE, innovation: DVec3::ZERO, initial: DVec3::splat(sigma * sigma) }
     }
 
+    /// Whether it is zero for all time.
+    fn is_empty(&self) -> bool {
+        self.innovation == DVec3::ZERO && self.initial == DVec3::ZERO
+    }
+
+    /// Whether it is an unknown constant.
+    fn is_constant(&self) -> bool {
+        self.innovation == DVec3::ZERO && self.phi == DVec3::ONE
+    }
+
     /// The same bias with a step of `ratio` samples, which need not be whole: a Gauss-Markov process keeps its
     /// correlation time and variance, a random walk its growth. A coefficient ≤ 0 belongs to no process in
     /// continuous time and is left as it is.
@@ -72,7 +78,7 @@ impl BiasGroup {
     }
 }
 
-/// What the filter believes: white noise of a sample and bias states, for each sensor.
+/// What the filter believes: white noise of a sample, bias states and unknown constants, for each sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Belief {
     /// Rate the parameters belong to (Hz).
@@ -81,6 +87,8 @@ pub struct Belief {
     pub white: [DVec3; 2],
     /// Bias groups of the accelerometer and of the gyroscope, at least one each.
     pub groups: [Vec<BiasGroup>; 2],
+    /// Unknown constants that act on the samples of each sensor multiplied, each kind at most once, in order.
+    pub(super) unknowns: [Vec<Unknown>; 2],
     /// Stochastic states carried, navigation included (15 for the reduced filter).
     pub states: usize,
 }
@@ -88,23 +96,31 @@ pub struct Belief {
 impl Belief {
     /// The filter's states for a model.
     ///
-    /// The reduction is made for a GNSS interval and a longest time scale (s; [`reduction::window_s`]). Quantization noise is left out of the filter: its integral is bounded, so
-    /// it is not white noise to a filter that integrates.
+    /// The reduction is made for a GNSS interval and a longest time scale (s; [`reduction::window_s`]).
+    /// Quantization noise is left out of the filter: its integral is bounded, so it is not white noise to a
+    /// filter that integrates. A drift has a state of its own in any filter, [`UnknownKind::Drift`]. What is
+    /// expected beside the model comes by [`Belief::with_initial`].
     ///
     /// # Errors
-    /// When a process has no state in the full filter, or the reduction fails.
+    /// When the model has too many processes for the full filter, or the reduction fails.
     pub fn new(
         model: &Model,
         states: FilterStates,
         interval_s: f64,
         window_s: f64,
     ) -> Result<Self, BeliefError> {
-        let mut belief =
-            Self { rate_hz: model.rate_hz, white: [DVec3::ZERO; 2], groups: [vec![], vec![]], states: 9 };
+        let mut belief = Self {
+            rate_hz: model.rate_hz,
+            white: [DVec3::ZERO; 2],
+            groups: [vec![], vec![]],
+            unknowns: [vec![], vec![]],
+            states: 9,
+        };
         for channel in Channel::ALL {
-            let axis = match states {
-                FilterStates::Full => AxisBelief::full(model.axis(channel), channel)?,
-                FilterStates::Reduced15 => AxisBelief::reduced(model, channel, interval_s, window_s)?,
+            let axis = if states.is_reduced() {
+                AxisBelief::reduced(model, channel, interval_s, window_s)?
+            } else {
+                AxisBelief::full(model.axis(channel))
             };
             if axis.biases.len() > MAX_GROUPS {
                 return Err(BeliefError::TooManyStates { channel });
@@ -116,7 +132,24 @@ impl Belief {
                 groups.push(BiasGroup::default());
             }
         }
+        for sensor in Sensor::ALL {
+            belief.set_unknown(sensor, UnknownKind::Drift, drift(model, sensor));
+            belief.set_unknown(sensor, UnknownKind::ScaleFactor, DVec3::splat(states.scale_sigma()));
+        }
         Ok(belief)
+    }
+
+    /// With the turn-on biases and scale factors that the settings of the start expect; the attitude, position
+    /// and velocity of the start are the filter's own affair ([`super::Ekf::new`]).
+    #[must_use]
+    pub fn with_initial(mut self, initial: &InitialSettings) -> Self {
+        for sensor in Sensor::ALL {
+            self.add_constant(sensor, initial.bias_sigma(sensor).unwrap_or(0.0));
+            if let Some(ppm) = initial.scale_sigma_ppm(sensor) {
+                self.set_unknown(sensor, UnknownKind::ScaleFactor, DVec3::splat(ppm * 1e-6));
+            }
+        }
+        self
     }
 
     fn add(&mut self, channel: Channel, axis: &AxisBelief) {
@@ -132,32 +165,67 @@ impl Belief {
         }
     }
 
-    /// Blocks of the covariance: R, V, PSI and the bias groups.
+    /// Blocks of the covariance: R, V, PSI, the bias groups and the unknowns.
     #[must_use]
     pub fn blocks(&self) -> usize {
-        3 + self.groups[0].len() + self.groups[1].len()
+        3 + Sensor::ALL
+            .map(|s| self.groups[s as usize].len() + self.unknowns[s as usize].len())
+            .iter()
+            .sum::<usize>()
     }
 
-    /// Adds an unknown constant to the biases of a sensor (a turn-on bias); nothing where sigma is 0.
+    /// Adds an unknown constant to the biases of a sensor (a turn-on bias), the same deviation on each axis
+    /// (m/s² or rad/s); nothing where sigma is 0. With another one before, it is one of both variances.
     pub fn add_constant(&mut self, sensor: Sensor, sigma: f64) {
-        if sigma > 0.0 {
-            self.groups[sensor as usize].push(BiasGroup::constant(sigma));
-            self.states += 3;
+        if sigma <= 0.0 {
+            return;
+        }
+        let groups = &mut self.groups[sensor as usize];
+        if let Some(before) = groups.iter_mut().find(|g| g.is_constant()) {
+            before.initial += DVec3::splat(sigma * sigma);
+            return;
+        }
+        groups.retain(|g| !g.is_empty());
+        groups.push(BiasGroup::constant(sigma));
+        self.states += 3;
+    }
+
+    /// Sets the deviations of an unknown on the three axes; without any, it has no states.
+    pub fn set_unknown(&mut self, sensor: Sensor, kind: UnknownKind, sigma: DVec3) {
+        let unknowns = &mut self.unknowns[sensor as usize];
+        let axes = |sigma: DVec3| sigma.to_array().iter().filter(|s| **s > 0.0).count();
+        self.states -= unknowns.iter().filter(|u| u.kind == kind).map(|u| axes(u.sigma)).sum::<usize>();
+        unknowns.retain(|u| u.kind != kind);
+        if sigma != DVec3::ZERO {
+            self.states += axes(sigma);
+            unknowns.push(Unknown { kind, sigma });
+            unknowns.sort_by_key(|u| u.kind);
         }
     }
 
     /// Standard deviation of the biases of a sensor at the start: the largest of the three axes.
     #[must_use]
     pub fn initial_bias_sigma(&self, sensor: Sensor) -> f64 {
-        self.groups[sensor as usize].iter().map(|g| g.initial).sum::<DVec3>().max_element().sqrt()
+        self.deviation(sensor, |_| true)
     }
 
-    /// Replaces the initial variance of the first bias group of a sensor by sigma² on each axis.
-    pub fn set_initial_bias_sigma(&mut self, sensor: Sensor, sigma: f64) {
-        if let Some(group) = self.groups[sensor as usize].first_mut() {
-            group.initial = DVec3::splat(sigma * sigma);
-        }
+    /// The part of it that the model's processes have, the unknown constant apart.
+    #[must_use]
+    pub fn process_sigma(&self, sensor: Sensor) -> f64 {
+        self.deviation(sensor, |g| !g.is_constant())
     }
+
+    fn deviation(&self, sensor: Sensor, counts: impl Fn(&BiasGroup) -> bool) -> f64 {
+        let groups = self.groups[sensor as usize].iter().filter(|g| counts(g));
+        groups.map(|g| g.initial).sum::<DVec3>().max_element().sqrt()
+    }
+}
+
+/// Magnitudes of the drifts of a sensor's axes (units per sample).
+fn drift(model: &Model, sensor: Sensor) -> DVec3 {
+    let slope = |p: &Process| if let Process::Drift(p) = p { p.slope() } else { 0.0 };
+    let of_axis = |axis| model.axis(Channel { sensor, axis }).processes.iter().map(slope).sum::<f64>().abs();
+    DVec3::from_array(Axis::ALL.map(of_axis))
 }
 
 struct BiasState {
@@ -172,21 +240,21 @@ struct AxisBelief {
 }
 
 impl AxisBelief {
-    fn full(noise: &Composite, channel: Channel) -> Result<Self, BeliefError> {
+    fn full(noise: &Composite) -> Self {
         let mut axis = Self { white: 0.0, biases: vec![] };
         for process in &noise.processes {
             match process {
                 Process::White(p) => axis.white += p.sigma2(),
                 // its long-run variance: what a filter that integrates feels
                 Process::Ma1(p) => axis.white += (1.0 + p.theta()).powi(2) * p.sigma2(),
-                Process::Quantization(_) => {}
+                // left out, and a state of its own
+                Process::Quantization(_) | Process::Drift(_) => {}
                 Process::Ar1(p) => axis.push(p.phi(), p.sigma2(), p.variance()),
                 Process::GaussMarkov(p) => axis.push(p.ar1().phi(), p.ar1().sigma2(), p.s2()),
                 Process::RandomWalk(p) => axis.push(1.0, p.gamma2(), 0.0),
-                Process::Drift(_) => return Err(BeliefError::Drift { channel }),
             }
         }
-        Ok(axis)
+        axis
     }
 
     fn reduced(model: &Model, channel: Channel, interval_s: f64, window_s: f64) -> Result<Self, BeliefError> {

@@ -1,13 +1,16 @@
 //! The covariance of eight runs.
 //!
 //! States by threes: [`R`] position error (m, n), [`V`] velocity error (m/s, n), [`PSI`] attitude error
-//! (rad, n), then one triple of axes for each bias group, accelerometer groups first ([`BIAS`]).
+//! (rad, n), then one triple of axes for each bias group, accelerometer groups first ([`BIAS`]), and for each
+//! unknown constant that acts multiplied, in the same order.
 //!
 //! The lower triangle is the matrix. Inside the square of the navigation states and inside that of the
 //! biases the upper triangle repeats it, so that a column can be read as a row.
 
-use super::belief::{BiasGroup, MAX_BLOCKS};
+use super::belief::{Belief, BiasGroup, MAX_BLOCKS};
 use super::dynamics::{ErrorMap, NavError};
+use super::unknowns::Regressor;
+use crate::imu::Sensor;
 use crate::lanes::{Lanes, Mat3, Real, Vec3, Wide};
 use glam::DVec3;
 use std::ops::Range;
@@ -34,7 +37,46 @@ pub struct Covariance {
 }
 
 /// Biases that stay as they are.
-pub(super) const CONSTANT_BIASES: [BiasGroup; 2 * MAX_BLOCKS] = [BiasGroup::constant(0.0); 2 * MAX_BLOCKS];
+const CONSTANT_BIASES: [BiasGroup; 2 * MAX_BLOCKS] = [BiasGroup::constant(0.0); 2 * MAX_BLOCKS];
+
+/// The blocks behind the navigation's: what makes the errors of a sample.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sources<'a> {
+    /// The step of each block: biases of the accelerometer, of the gyroscope, unknowns of both.
+    pub(super) steps: &'a [BiasGroup],
+    /// Bias groups of each sensor.
+    pub(super) biases: [usize; 2],
+    /// What the unknowns of each sensor are multiplied by.
+    pub(super) regressors: [&'a [Regressor]; 2],
+}
+
+impl<'a> Sources<'a> {
+    #[inline(always)]
+    pub(super) fn new(belief: &Belief, steps: &'a [BiasGroup], regressors: &'a [Vec<Regressor>; 2]) -> Self {
+        let [accel, gyro] = &belief.groups;
+        Self { steps, biases: [accel.len(), gyro.len()], regressors: [&regressors[0], &regressors[1]] }
+    }
+
+    /// The first unknown of a sensor among the blocks.
+    #[inline(always)]
+    pub(super) fn unknowns(&self, sensor: Sensor) -> usize {
+        let before = if sensor == Sensor::Accel { 0 } else { self.regressors[0].len() };
+        self.biases[0] + self.biases[1] + before
+    }
+
+    /// The same, all constant.
+    pub(super) fn still(self) -> Self {
+        Self { steps: &CONSTANT_BIASES[..self.steps.len()], ..self }
+    }
+
+    /// First states of: accelerometer biases, gyroscope biases, accelerometer unknowns, gyroscope unknowns.
+    #[inline(always)]
+    pub(super) fn starts(&self) -> [usize; 4] {
+        let gyro = NAV + 3 * self.biases[0];
+        let unknown = gyro + 3 * self.biases[1];
+        [NAV, gyro, unknown, unknown + 3 * self.regressors[0].len()]
+    }
+}
 
 impl Covariance {
     /// Zero covariance of `dim` states.
@@ -86,43 +128,49 @@ impl Covariance {
     }
 
     /// P⁺ = A P Aᵀ + Q for a map A of the navigation error and the transition of the biases; the biases
-    /// take their step first: `b_k = phi b_{k−1} + w`, and the map uses `b_k`. Groups of the accelerometer
-    /// come first.
+    /// take their step first: `b_k = phi b_{k−1} + w`, and the map uses `b_k`.
     #[inline(always)]
-    pub(super) fn step<W: Wide>(
-        &mut self,
-        map: &impl ErrorMap<W>,
-        biases: &[BiasGroup],
-        accel_groups: usize,
-    ) {
-        self.step_biases::<W>(biases);
-        let (n, gyro) = (self.dim, NAV + 3 * accel_groups);
+    pub(super) fn step<W: Wide>(&mut self, map: &impl ErrorMap<W>, sources: &Sources<'_>) {
+        self.step_biases::<W>(sources.steps);
+        let n = self.dim;
         // A P, the navigation columns apart: they are read again below.
         for j in 0..NAV {
-            let (accel, gyro) = (self.bias_sum(NAV..gyro, j, biases), self.bias_sum(gyro..n, j, biases));
+            let [accel, gyro] = self.column_errors(j, sources);
             let after = map.apply(load_error(&self.p[j * n..]), accel, gyro);
             store_error(&mut self.columns[j], &after);
         }
         for j in NAV..n {
-            let phi = W::from(biases[j / 3 - BIAS].phi[j % 3]);
-            let (nav, bias) = self.p[j * n..(j + 1) * n].split_at_mut(NAV);
-            let (accel, gyro) = bias.split_at(gyro - NAV);
+            let phi = W::from(sources.steps[j / 3 - BIAS].phi[j % 3]);
+            let (nav, rest) = self.p[j * n..(j + 1) * n].split_at_mut(NAV);
+            let [accel, gyro] = row_errors(rest, sources);
             let x = load_error::<W>(nav);
             let x = [x[R] * phi, x[V] * phi, x[PSI] * phi];
-            store_error(nav, &map.apply(x, sum_triples(accel), sum_triples(gyro)));
+            store_error(nav, &map.apply(x, accel, gyro));
         }
         // (A P) Aᵀ: the same map on the rows of A P.
+        let still = sources.still();
         for i in 0..NAV {
             let mut row = [Lanes::ZERO; NAV];
             for (element, column) in row.iter_mut().zip(&self.columns) {
                 *element = column[i];
             }
-            let still = &CONSTANT_BIASES[..biases.len()];
-            let (accel, gyro) = (self.bias_sum(NAV..gyro, i, still), self.bias_sum(gyro..n, i, still));
+            let [accel, gyro] = self.column_errors(i, &still);
             let after = map.apply(load_error(&row), accel, gyro);
             store_error(&mut self.p[i * n..], &after);
         }
         self.mirror_navigation();
+    }
+
+    /// The errors of the sample of each sensor in column j of the navigation, every bias after its step.
+    #[inline(always)]
+    fn column_errors<W: Wide>(&self, j: usize, sources: &Sources<'_>) -> [Vec3<W>; 2] {
+        let [accel, gyro, accel_unknown, gyro_unknown] = sources.starts();
+        let of_accel = self.bias_sum(accel..gyro, j, sources.steps);
+        let of_gyro = self.bias_sum(gyro..accel_unknown, j, sources.steps);
+        [
+            self.add_unknowns(of_accel, accel_unknown, j, sources.regressors[0]),
+            self.add_unknowns(of_gyro, gyro_unknown, j, sources.regressors[1]),
+        ]
     }
 
     /// The sum of triples of biases in column j of the navigation, each after its step.
@@ -137,6 +185,24 @@ impl Covariance {
             }
         }
         Vec3(sum)
+    }
+
+    /// Adds the unknowns from state `first` on in column j of the navigation, each times its regressor.
+    #[inline(always)]
+    fn add_unknowns<W: Wide>(
+        &self,
+        mut sum: Vec3<W>,
+        first: usize,
+        j: usize,
+        regressors: &[Regressor],
+    ) -> Vec3<W> {
+        for (u, regressor) in regressors.iter().enumerate() {
+            for axis in 0..3 {
+                let element = W::load(&self.p[(first + 3 * u + axis) * self.dim + j]);
+                sum[axis] = element.mul_add(W::load(&regressor.value[axis]), sum[axis]);
+            }
+        }
+        sum
     }
 
     /// The square of the biases: Phi P Phiᵀ + Q.
@@ -270,6 +336,30 @@ fn sum_triples<W: Wide>(row: &[Lanes]) -> Vec3<W> {
     let mut sum = Vec3::splat(DVec3::ZERO);
     for triple in row.as_chunks::<3>().0 {
         sum = sum + load_triple(triple);
+    }
+    sum
+}
+
+/// The errors of the sample of each sensor in the row of a state behind the navigation's.
+#[inline(always)]
+fn row_errors<W: Wide>(row: &[Lanes], sources: &Sources<'_>) -> [Vec3<W>; 2] {
+    let (accel, rest) = row.split_at(3 * sources.biases[0]);
+    let (gyro, rest) = rest.split_at(3 * sources.biases[1]);
+    let [of_accel, of_gyro] = sources.regressors;
+    let (accel_unknowns, gyro_unknowns) = rest.split_at(3 * of_accel.len());
+    [
+        add_products(sum_triples(accel), accel_unknowns, of_accel),
+        add_products(sum_triples(gyro), gyro_unknowns, of_gyro),
+    ]
+}
+
+/// Adds the triples of a row, each times its regressor.
+#[inline(always)]
+fn add_products<W: Wide>(mut sum: Vec3<W>, row: &[Lanes], regressors: &[Regressor]) -> Vec3<W> {
+    for (triple, regressor) in row.as_chunks::<3>().0.iter().zip(regressors) {
+        for axis in 0..3 {
+            sum[axis] = W::load(&triple[axis]).mul_add(W::load(&regressor.value[axis]), sum[axis]);
+        }
     }
     sum
 }

@@ -1,9 +1,10 @@
 //! The filter itself: nominal state, bias estimates and covariance of eight runs.
 
 use super::belief::{Belief, BiasGroup};
-use super::covariance::{BIAS, CONSTANT_BIASES, Covariance, PSI, R, V};
+use super::covariance::{BIAS, Covariance, PSI, R, Sources, V};
 use super::dynamics::{EARTH_STEP_S, EarthStep, EarthTerms, Sample};
 use super::initial::{InitialSettings, psi_of_angles};
+use super::unknowns::{Regressor, UnknownKind};
 use crate::frames::NavState;
 use crate::imu::{ImuSample, Sensor};
 use crate::lanes::{Kernel, Lanes, Level, Mat3, Vec3, Wide, dispatch};
@@ -17,18 +18,21 @@ use nalgebra::Matrix3;
 pub struct Ekf {
     /// The nominal navigation state.
     pub nominal: Strapdown,
-    /// Estimates of the bias groups, accelerometer first (m/s², rad/s).
-    pub bias: Vec<Vec3>,
+    /// Estimates of the blocks behind the navigation's: bias groups, accelerometer first (m/s², rad/s), then
+    /// the unknowns of both sensors (scale factors, slopes of drifts).
+    pub(super) estimates: Vec<Vec3>,
     /// Covariance of the error state.
     pub p: Covariance,
     /// What is believed of a sample at the belief's own rate.
-    belief: Belief,
-    /// The same of a sample of `dt` seconds: groups, accelerometer first, and white variances.
-    groups: Vec<BiasGroup>,
+    pub(super) belief: Belief,
+    /// The same of a sample of `dt` seconds: the step of each block behind the navigation's, white variances.
+    pub(super) steps: Vec<BiasGroup>,
     white: [DVec3; 2],
-    /// Accelerometer groups: blocks `BIAS..BIAS + accel_groups`; gyroscope groups follow.
-    accel_groups: usize,
+    /// What the unknowns of each sensor are multiplied by in the last sample.
+    regressors: [Vec<Regressor>; 2],
     dt: f64,
+    /// Samples of the belief's rate since the start.
+    age: f64,
     /// Time since the Earth terms were last applied (s).
     earth_age: f64,
     /// Angular rate of the last sample less its bias (rad/s), for the lever arm's velocity.
@@ -55,38 +59,34 @@ impl Scratch {
 }
 
 impl Ekf {
-    /// A filter at its nominal start, with zero bias estimates. The attitude standard deviations, given
-    /// for roll, pitch and yaw, are brought to psi_n at the attitude of `about`, the same in all lanes.
+    /// A filter at its nominal start, with zero estimates of biases and unknowns, whose deviations are those
+    /// of the belief. The attitude standard deviations, given for roll, pitch and yaw, are brought to psi_n at
+    /// the attitude of `about`, the same in all lanes.
     #[must_use]
     pub fn new(nominal: Strapdown, belief: &Belief, about: &NavState, initial: &InitialSettings) -> Self {
-        let mut belief = belief.clone();
-        let overrides =
-            [(Sensor::Accel, initial.accel_bias_sigma_m_s2), (Sensor::Gyro, initial.gyro_bias_sigma_rad_s)];
-        for (sensor, sigma) in overrides {
-            if let Some(sigma) = sigma {
-                belief.set_initial_bias_sigma(sensor, sigma);
-            }
-        }
-        let groups = belief.groups.concat();
+        let unknowns = belief.unknowns.iter().flatten();
+        let constant = unknowns.map(|u| BiasGroup { initial: u.sigma * u.sigma, ..BiasGroup::constant(0.0) });
+        let steps: Vec<BiasGroup> = belief.groups.iter().flatten().copied().chain(constant).collect();
         let mut p = Covariance::zeros(3 * belief.blocks());
         let square = |sigma: [f64; 3]| Matrix3::from_diagonal(&sigma.map(|s| s * s).into());
         add_block(&mut p, R, &square(initial.pos_sigma_m));
         add_block(&mut p, V, &square(initial.vel_sigma_m_s));
         add_block(&mut p, PSI, &attitude_covariance(about, initial.att_sigma_deg));
-        for (g, group) in groups.iter().enumerate() {
-            add_block(&mut p, BIAS + g, &Matrix3::from_diagonal(&group.initial.to_array().into()));
+        for (g, step) in steps.iter().enumerate() {
+            add_block(&mut p, BIAS + g, &Matrix3::from_diagonal(&step.initial.to_array().into()));
         }
         let dim = p.dim();
         let zeros = || vec![Lanes::ZERO; dim];
         Self {
             nominal,
-            bias: vec![Vec3::ZERO; groups.len()],
+            estimates: vec![Vec3::ZERO; steps.len()],
             p,
-            groups,
+            steps,
             white: belief.white,
-            accel_groups: belief.groups[0].len(),
+            regressors: belief.unknowns.each_ref().map(|u| u.iter().map(Regressor::of).collect()),
             dt: 1.0 / belief.rate_hz,
-            belief,
+            age: 0.0,
+            belief: belief.clone(),
             earth_age: 0.0,
             omega_ib_b: Vec3::ZERO,
             scratch: Scratch { ph: zeros(), gain: zeros(), error: zeros() },
@@ -105,26 +105,50 @@ impl Ekf {
     /// samples are split where a fix falls between them.
     pub fn set_interval(&mut self, dt: f64) {
         let ratio = dt * self.belief.rate_hz;
-        for (group, believed) in self.groups.iter_mut().zip(self.belief.groups.iter().flatten()) {
-            *group = believed.over(ratio);
+        for (step, believed) in self.steps.iter_mut().zip(self.belief.groups.iter().flatten()) {
+            *step = believed.over(ratio);
         }
         self.white = self.belief.white.map(|w| w / ratio);
         self.dt = dt;
     }
 
-    /// Blocks of the gyroscope biases.
+    /// The blocks behind the navigation's.
     #[inline(always)]
-    pub(super) fn gyro_blocks(&self) -> std::ops::Range<usize> {
-        BIAS + self.accel_groups..BIAS + self.bias.len()
+    pub(super) fn sources(&self) -> Sources<'_> {
+        Sources::new(&self.belief, &self.steps, &self.regressors)
     }
 
-    /// The bias estimate of a sensor: the sum of its groups.
+    /// A sample less its estimated errors; it becomes the regressor of its scale factor. The sensor reads
+    /// (1 + s) ∘ sample + biases + slope · `age`, the number of the sample since the start.
     #[inline(always)]
-    #[must_use]
-    pub fn bias_of<W: Wide>(&self, sensor: Sensor) -> Vec3<W> {
-        let (accel, gyro) = self.bias.split_at(self.accel_groups);
+    fn corrected<W: Wide>(&mut self, sensor: Sensor, mut sample: Vec3<W>, age: f64) -> Vec3<W> {
+        sample = sample - self.bias_sum(sensor);
+        let first = self.sources().unknowns(sensor);
+        // in the order of their kinds: drifts, which add to the sample as biases do, before scale factors
+        for (regressor, estimate) in self.regressors[sensor as usize].iter_mut().zip(&self.estimates[first..])
+        {
+            let estimate = estimate.load();
+            if regressor.kind == UnknownKind::Drift {
+                let age = Vec3::splat(DVec3::splat(age));
+                sample = sample - times(estimate, age);
+                regressor.value.store(age);
+            } else {
+                for axis in 0..3 {
+                    sample[axis] = sample[axis] / (estimate[axis] + 1.0);
+                }
+                regressor.value.store(sample);
+            }
+        }
+        sample
+    }
+
+    /// The sum of the bias groups of a sensor.
+    #[inline(always)]
+    pub(super) fn bias_sum<W: Wide>(&self, sensor: Sensor) -> Vec3<W> {
+        let [accel, gyro] = self.belief.groups.each_ref().map(Vec::len);
+        let of_sensor = if sensor == Sensor::Accel { 0..accel } else { accel..accel + gyro };
         let mut sum = Vec3::splat(DVec3::ZERO);
-        for bias in if sensor == Sensor::Accel { accel } else { gyro } {
+        for bias in &self.estimates[of_sensor] {
             sum = sum + bias.load();
         }
         sum
@@ -134,17 +158,21 @@ impl Ekf {
     #[inline(always)]
     fn predict<W: Wide>(&mut self, ins: &mut Strapdown<W>, omega_ib_b: Vec3<W>, f_ib_b: Vec3<W>) {
         let dt = self.dt;
-        for (bias, group) in self.bias.iter_mut().zip(&self.groups) {
+        for (estimate, step) in self.estimates.iter_mut().zip(&self.steps) {
             for axis in 0..3 {
-                (W::load(&bias[axis]) * group.phi[axis]).store(&mut bias[axis]);
+                (W::load(&estimate[axis]) * step.phi[axis]).store(&mut estimate[axis]);
             }
         }
-        let omega_ib_b = omega_ib_b - self.bias_of(Sensor::Gyro);
-        let f_ib_b = f_ib_b - self.bias_of(Sensor::Accel);
+        // the drift is that of the interval's middle, counted so that whole samples are 1, 2, 3, …
+        let samples = dt * self.belief.rate_hz;
+        let age = self.age + 0.5 * (samples + 1.0);
+        self.age += samples;
+        let omega_ib_b = self.corrected(Sensor::Gyro, omega_ib_b, age);
+        let f_ib_b = self.corrected(Sensor::Accel, f_ib_b, age);
         self.omega_ib_b.store(omega_ib_b);
         let seconds = W::from(dt);
         let sample = Sample::new(&ins.step(omega_ib_b * seconds, f_ib_b * seconds, dt), dt);
-        self.p.step(&sample, &self.groups, self.accel_groups);
+        self.p.step(&sample, &Sources::new(&self.belief, &self.steps, &self.regressors));
         self.add_white_noise(&sample);
         self.earth_age += dt;
         if self.earth_age + 0.5 * dt > EARTH_STEP_S {
@@ -158,7 +186,8 @@ impl Ekf {
         if self.earth_age > 0.0 {
             let step = EarthStep { terms: EarthTerms::at(ins), dt: self.earth_age };
             self.earth_age = 0.0;
-            self.p.step(&step, &CONSTANT_BIASES[..self.bias.len()], self.accel_groups);
+            let sources = Sources::new(&self.belief, &self.steps, &self.regressors);
+            self.p.step(&step, &sources.still());
         }
     }
 
@@ -180,6 +209,12 @@ impl Ekf {
             }
         }
     }
+}
+
+/// The product axis by axis.
+#[inline(always)]
+fn times<W: Wide>(a: Vec3<W>, b: Vec3<W>) -> Vec3<W> {
+    Vec3([a[0] * b[0], a[1] * b[1], a[2] * b[2]])
 }
 
 /// Adds the same block to the diagonal of all lanes.

@@ -34,7 +34,7 @@ impl Ekf {
         }
         to.v_n.set_lane(lane, from.v_n.lane(lane));
         to.q_b_n.set_lane(lane, from.q_b_n.lane(lane));
-        for (to, from) in self.bias.iter_mut().zip(&other.bias) {
+        for (to, from) in self.estimates.iter_mut().zip(&other.estimates) {
             to.set_lane(lane, from.lane(lane));
         }
         self.p.copy_lane(&other.p, lane);

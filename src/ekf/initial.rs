@@ -1,52 +1,18 @@
 //! What the filter knows at the start, and how far the nominal start is drawn from the truth.
 
 use crate::frames::RollPitchYaw;
+use crate::imu::Sensor;
 use crate::units::{SettingError, require_non_negative, require_positive};
 use glam::DQuat;
 use nalgebra::Matrix3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How the noise model becomes states of the filter.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(try_from = "WrittenStates")]
-#[schemars(!try_from)]
-pub enum FilterStates {
-    /// 15 states: one first-order Gauss-Markov bias an axis, the reduction of the model.
-    #[default]
-    #[serde(rename = "15")]
-    Reduced15,
-    /// One state for each AR1 and random walk of each axis.
-    #[serde(rename = "full")]
-    Full,
-}
-
-/// As people write it: `"15"`, `15` or `"full"`.
-#[derive(Deserialize)]
-#[serde(untagged, expecting = "\"15\" or \"full\"")]
-enum WrittenStates {
-    Number(u64),
-    Word(String),
-}
-
-impl TryFrom<WrittenStates> for FilterStates {
-    type Error = &'static str;
-
-    fn try_from(written: WrittenStates) -> Result<Self, Self::Error> {
-        match written {
-            WrittenStates::Number(15) => Ok(Self::Reduced15),
-            WrittenStates::Word(word) if word == "15" => Ok(Self::Reduced15),
-            WrittenStates::Word(word) if word == "full" => Ok(Self::Full),
-            _ => Err("expected \"15\" or \"full\""),
-        }
-    }
-}
-
 /// Standard deviations of the initial state. The nominal start is drawn from them, so that the filter's
 /// own covariance is true at the first epoch. The defaults are a vehicle that has just been aligned with
 /// the help of GNSS: position and velocity as good as one fix of the paper's receiver, half a degree of
 /// roll and pitch (a consumer accelerometer's bias of 0.09 m/s² tilts a levelling by as much), two
-/// degrees of heading.
+/// degrees of heading. Biases and scale factors are not drawn from here: those of the true IMU are its own.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct InitialSettings {
@@ -56,12 +22,22 @@ pub struct InitialSettings {
     pub vel_sigma_m_s: [f64; 3],
     /// Roll, pitch, yaw (degrees).
     pub att_sigma_deg: [f64; 3],
-    /// Accelerometer bias (m/s²); without it, the stationary deviation of the model's AR1 processes.
+    /// Turn-on bias of the accelerometers that the filter expects beside the model's processes (m/s²): an
+    /// unknown constant, one state an axis; without it, none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accel_bias_sigma_m_s2: Option<f64>,
-    /// Gyroscope bias (rad/s); without it, the stationary deviation of the model's AR1 processes.
+    /// Turn-on bias of the gyroscopes that the filter expects beside the model's processes (rad/s): an unknown
+    /// constant, one state an axis; without it, none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gyro_bias_sigma_rad_s: Option<f64>,
+    /// Scale-factor error of the accelerometers that the filter expects (parts per million): an unknown
+    /// constant, one state an axis; without it, 300 in the filter of 21 states and none in the others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub accel_scale_sigma_ppm: Option<f64>,
+    /// Scale-factor error of the gyroscopes that the filter expects (parts per million), as that of the
+    /// accelerometers.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gyro_scale_sigma_ppm: Option<f64>,
     /// Start exactly at the truth; the filter's covariance stays as given above.
     pub perfect: bool,
 }
@@ -74,12 +50,50 @@ impl Default for InitialSettings {
             att_sigma_deg: [0.5, 0.5, 2.0],
             accel_bias_sigma_m_s2: None,
             gyro_bias_sigma_rad_s: None,
+            accel_scale_sigma_ppm: None,
+            gyro_scale_sigma_ppm: None,
             perfect: false,
         }
     }
 }
 
 impl InitialSettings {
+    /// The turn-on bias that the filter expects of a sensor (m/s² or rad/s).
+    #[must_use]
+    pub const fn bias_sigma(&self, sensor: Sensor) -> Option<f64> {
+        match sensor {
+            Sensor::Accel => self.accel_bias_sigma_m_s2,
+            Sensor::Gyro => self.gyro_bias_sigma_rad_s,
+        }
+    }
+
+    /// The scale-factor error that the filter expects of a sensor (parts per million).
+    #[must_use]
+    pub const fn scale_sigma_ppm(&self, sensor: Sensor) -> Option<f64> {
+        match sensor {
+            Sensor::Accel => self.accel_scale_sigma_ppm,
+            Sensor::Gyro => self.gyro_scale_sigma_ppm,
+        }
+    }
+
+    /// The key of [`Self::bias_sigma`].
+    #[must_use]
+    pub const fn bias_key(sensor: Sensor) -> &'static str {
+        match sensor {
+            Sensor::Accel => "accel_bias_sigma_m_s2",
+            Sensor::Gyro => "gyro_bias_sigma_rad_s",
+        }
+    }
+
+    /// The key of [`Self::scale_sigma_ppm`].
+    #[must_use]
+    pub const fn scale_key(sensor: Sensor) -> &'static str {
+        match sensor {
+            Sensor::Accel => "accel_scale_sigma_ppm",
+            Sensor::Gyro => "gyro_scale_sigma_ppm",
+        }
+    }
+
     /// Checks every value.
     ///
     /// # Errors
@@ -92,12 +106,17 @@ impl InitialSettings {
             let requirement = "the error-state filter is linear: at most 30 degrees";
             return Err(SettingError::new("att_sigma_deg", large, requirement));
         }
-        require_non_negative("accel_bias_sigma_m_s2", self.accel_bias_sigma_m_s2.as_slice())?;
-        require_non_negative("gyro_bias_sigma_rad_s", self.gyro_bias_sigma_rad_s.as_slice())?;
+        for sensor in Sensor::ALL {
+            let (key, sigma) = (Self::bias_key(sensor), self.bias_sigma(sensor));
+            let limit = if sensor == Sensor::Accel { 10.0 } else { 1.0 };
+            require_non_negative(key, sigma.as_slice())?;
+            at_most(key, sigma.as_slice(), limit, sensor.unit())?;
+            let (key, ppm) = (Self::scale_key(sensor), self.scale_sigma_ppm(sensor));
+            require_non_negative(key, ppm.as_slice())?;
+            at_most(key, ppm.as_slice(), 1e5, "parts per million, a tenth")?;
+        }
         at_most("pos_sigma_m", &self.pos_sigma_m, 1e5, "m")?;
-        at_most("vel_sigma_m_s", &self.vel_sigma_m_s, 1000.0, "m/s")?;
-        at_most("accel_bias_sigma_m_s2", self.accel_bias_sigma_m_s2.as_slice(), 10.0, "m/s²")?;
-        at_most("gyro_bias_sigma_rad_s", self.gyro_bias_sigma_rad_s.as_slice(), 1.0, "rad/s")
+        at_most("vel_sigma_m_s", &self.vel_sigma_m_s, 1000.0, "m/s")
     }
 }
 
@@ -133,6 +152,8 @@ mod tests {
             (InitialSettings { vel_sigma_m_s: [1.0, -1.0, 1.0], ..d.clone() }, "vel_sigma_m_s"),
             (InitialSettings { att_sigma_deg: [1.0, 1.0, 90.0], ..d.clone() }, "att_sigma_deg"),
             (InitialSettings { gyro_bias_sigma_rad_s: Some(-1.0), ..d.clone() }, "gyro_bias_sigma_rad_s"),
+            (InitialSettings { gyro_scale_sigma_ppm: Some(2e5), ..d.clone() }, "gyro_scale_sigma_ppm"),
+            (InitialSettings { accel_scale_sigma_ppm: Some(-1.0), ..d.clone() }, "accel_scale_sigma_ppm"),
         ];
         for (settings, key) in cases {
             assert_eq!(settings.validate().unwrap_err().key, key);

@@ -11,14 +11,20 @@ pub mod dynamics;
 pub mod filter;
 pub mod gate;
 pub mod initial;
+pub mod states;
+pub mod unknowns;
 pub mod update;
 
 pub use belief::{Belief, BeliefError};
 pub use covariance::Covariance;
 pub use filter::{Ekf, advance, settle};
 pub use gate::{nis_limit, update_within};
-pub use initial::{FilterStates, InitialSettings};
+pub use initial::InitialSettings;
+pub use states::FilterStates;
+pub use unknowns::{Unknown, UnknownKind};
 pub use update::{Fix, update, update_height};
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod unknowns_tests;

@@ -15,14 +15,14 @@ use glam::{DQuat, DVec3};
 use nalgebra::{DMatrix, Matrix3, SMatrix};
 use rand::RngExt;
 
-type Matrix15 = SMatrix<f64, 15, 15>;
+pub(super) type Matrix15 = SMatrix<f64, 15, 15>;
 
-fn generator(process: &str) -> Generator {
+pub(super) fn generator(process: &str) -> Generator {
     StreamKey { seed: 11, scenario: "", run: 0, source: "test", process }.generator()
 }
 
 /// A fast vehicle anywhere, in any attitude, with what its IMU measures.
-fn random_case(g: &mut Generator) -> (NavState, DVec3, DVec3) {
+pub(super) fn random_case(g: &mut Generator) -> (NavState, DVec3, DVec3) {
     let mut vector =
         |scale: f64| DVec3::from_array(std::array::from_fn(|_| scale * g.random_range(-1.0..1.0)));
     let (v_n, axis, omega, f) = (vector(250.0), vector(3.0), vector(1.0), vector(20.0));
@@ -33,7 +33,7 @@ fn random_case(g: &mut Generator) -> (NavState, DVec3, DVec3) {
 }
 
 /// The error of lane `i` about a nominal state: metres, m/s, rad.
-fn error_of(lane: &NavState, nominal: &NavState) -> [f64; 9] {
+pub(super) fn error_of(lane: &NavState, nominal: &NavState) -> [f64; 9] {
     let r = earth::ned_difference(nominal, lane.lat, lane.lon, lane.h);
     let v = lane.v_n - nominal.v_n;
     // the logarithm of a small rotation: 2 asin of the vector part, to fourth order
@@ -42,7 +42,7 @@ fn error_of(lane: &NavState, nominal: &NavState) -> [f64; 9] {
     std::array::from_fn(|i| [r, v, psi][i / 3][i % 3])
 }
 
-fn perturbed(state: &NavState, block: usize, axis: usize, size: f64) -> NavState {
+pub(super) fn perturbed(state: &NavState, block: usize, axis: usize, size: f64) -> NavState {
     let d = DVec3::AXES[axis] * size;
     let r = earth::radii(state.lat.sin());
     match block {
@@ -140,7 +140,7 @@ fn model(accel: [Process; 2], gyro: [Process; 2]) -> Model {
     Model::pooled(100.0, &Composite::new(accel.to_vec()), &Composite::new(gyro.to_vec()))
 }
 
-fn gauss_markov_model() -> Model {
+pub(super) fn gauss_markov_model() -> Model {
     let (phi_a, phi_g) = ((-0.01_f64 / 200.0).exp(), (-0.01_f64 / 500.0).exp());
     model(
         [
@@ -155,7 +155,7 @@ fn gauss_markov_model() -> Model {
 }
 
 /// A vehicle that circles while it climbs and brakes: what its IMU measures at time t.
-fn manoeuvre(t: f64) -> (DVec3, DVec3) {
+pub(super) fn manoeuvre(t: f64) -> (DVec3, DVec3) {
     let omega = DVec3::new(0.05 * (0.9 * t).sin(), 0.03 * (0.7 * t).cos(), 0.2 * (0.05 * t).sin());
     let f = DVec3::new(1.5 * (0.11 * t).sin(), 2.0 * (0.05 * t).sin(), -9.81 + 0.5 * (0.8 * t).cos());
     (omega, f)
@@ -174,12 +174,12 @@ fn ekf(model: &Model, states: FilterStates) -> Ekf {
 }
 
 /// One IMU sample, the same in all lanes.
-fn predict(ekf: &mut Ekf, omega_ib_b: DVec3, f_ib_b: DVec3) {
+pub(super) fn predict(ekf: &mut Ekf, omega_ib_b: DVec3, f_ib_b: DVec3) {
     advance(ekf, &[ImuSample { omega_ib_b, f_ib_b }], &[[Vec3::ZERO; 2]]);
 }
 
 /// A fix at the nominal position itself: the innovation is zero, the covariance does what it does.
-fn fix_at_nominal(ekf: &Ekf, pos_sigma_m: f64, vel_sigma_m_s: f64) -> Fix {
+pub(super) fn fix_at_nominal(ekf: &Ekf, pos_sigma_m: f64, vel_sigma_m_s: f64) -> Fix {
     let n = &ekf.nominal;
     Fix {
         lat: n.lat,
@@ -249,7 +249,7 @@ fn covariance_agrees_with_the_matrix_exponential_over_a_run() {
     }
 }
 
-fn continuous_f(terms: &EarthTerms<Lanes>, c: &Matrix3<f64>, f_b: DVec3) -> Matrix15 {
+pub(super) fn continuous_f(terms: &EarthTerms<Lanes>, c: &Matrix3<f64>, f_b: DVec3) -> Matrix15 {
     let mut f = Matrix15::zeros();
     let f_n = c * nalgebra::Vector3::new(f_b.x, f_b.y, f_b.z);
     let skew = Matrix3::new(0.0, -f_n.z, f_n.y, f_n.z, 0.0, -f_n.x, -f_n.y, f_n.x, 0.0);
@@ -272,7 +272,7 @@ fn continuous_f(terms: &EarthTerms<Lanes>, c: &Matrix3<f64>, f_b: DVec3) -> Matr
 }
 
 /// Power of white accelerations and rates, sigma² dt.
-fn continuous_q() -> Matrix15 {
+pub(super) fn continuous_q() -> Matrix15 {
     let psd = [0.0, 4e-5 * 0.01, 1e-6 * 0.01, 0.0, 0.0];
     Matrix15::from_diagonal(&SMatrix::from_fn(|i, _| psd[i / 3]))
 }
@@ -419,7 +419,7 @@ fn lever_arm_rows_agree_with_central_differences() {
 #[test]
 fn biases_add_up() {
     let mut filter = ekf(&gauss_markov_model(), FilterStates::Full);
-    filter.bias = vec![Vec3::splat(DVec3::X), Vec3::splat(DVec3::Y)];
+    filter.estimates = vec![Vec3::splat(DVec3::X), Vec3::splat(DVec3::Y)];
     assert_eq!(filter.bias_of::<Lanes>(Sensor::Accel).lane(0), DVec3::X);
     assert_eq!(filter.bias_of::<Lanes>(Sensor::Gyro).lane(0), DVec3::Y);
 }

@@ -1,9 +1,10 @@
 //! GNSS updates: position and velocity of an antenna on a lever arm, as scalars in sequence.
 
 use super::belief::MAX_BLOCKS;
-use super::covariance::{BIAS, PSI, R, V};
+use super::covariance::{BIAS, PSI, R, Sources, V};
 use super::filter::Ekf;
 use crate::earth::{OMEGA_IE, radii};
+use crate::imu::Sensor;
 use crate::lanes::{Kernel, Lanes, Mat3, Quat, Real, Vec3, Wide, dispatch, rounded};
 use crate::strapdown::Strapdown;
 use glam::DVec3;
@@ -28,7 +29,7 @@ pub struct Fix {
     pub lever_arm_b: DVec3,
 }
 
-/// Most entries of a measurement row: one of R or V, three of PSI, three of each gyroscope group.
+/// Most entries of a measurement row: one of R or V, three of PSI, three of each gyroscope block.
 const MAX_ROW: usize = 4 + 3 * MAX_BLOCKS;
 
 impl Ekf {
@@ -46,7 +47,7 @@ impl Ekf {
         }
         if fix.v_n.is_some() {
             for axis in 0..3 {
-                let row = antenna.velocity_row(axis, self.gyro_blocks());
+                let row = antenna.velocity_row(axis, &self.sources());
                 nis += self.scalar(row.entries(), velocity[axis], fix.vel_sigma_m_s[axis].powi(2));
             }
         }
@@ -99,8 +100,8 @@ impl Ekf {
         ins.v_n = ins.v_n - dv;
         ins.q_b_n = (Quat::from_rotation_vector(-psi) * ins.q_b_n).renormalised();
         self.nominal.store(&ins);
-        for (g, bias) in self.bias.iter_mut().enumerate() {
-            bias.store(bias.load::<W>() - self.scratch.of(BIAS + g));
+        for (g, estimate) in self.estimates.iter_mut().enumerate() {
+            estimate.store(estimate.load::<W>() - self.scratch.of(BIAS + g));
         }
     }
 }
@@ -202,14 +203,21 @@ impl<W: Wide> Antenna<W> {
         row
     }
 
-    /// Velocity of the antenna: delta v_n + `of_psi` psi_n + C \[l ×\] delta b_g.
+    /// Velocity of the antenna: delta v_n + `of_psi` psi_n + C \[l ×\] (delta b_g + delta u ∘ regressor), u an
+    /// unknown of the gyroscope.
     #[inline(always)]
-    fn velocity_row(&self, axis: usize, gyro_blocks: std::ops::Range<usize>) -> Row<W> {
+    fn velocity_row(&self, axis: usize, sources: &Sources<'_>) -> Row<W> {
         let mut row = Row::new(3 * V + axis);
         if self.has_arm {
             row.push3(3 * PSI, self.of_psi.0[axis]);
-            for block in gyro_blocks {
-                row.push3(3 * block, self.of_bias.0[axis]);
+            let of_bias = self.of_bias.0[axis];
+            let [_, gyro, unknown, gyro_unknown] = sources.starts();
+            for first in (gyro..unknown).step_by(3) {
+                row.push3(first, of_bias);
+            }
+            for (u, regressor) in sources.regressors[Sensor::Gyro as usize].iter().enumerate() {
+                let Vec3([x, y, z]) = regressor.value.load::<W>();
+                row.push3(gyro_unknown + 3 * u, [of_bias[0] * x, of_bias[1] * y, of_bias[2] * z]);
             }
         }
         row
@@ -250,7 +258,7 @@ impl Ekf {
     pub fn measurement_rows(&self, lever_arm_b: DVec3) -> Vec<Vec<f64>> {
         let antenna = Antenna::new(&self.nominal, self.omega_ib_b, lever_arm_b);
         let position = (0..3).map(|axis| antenna.position_row(axis));
-        let velocity = (0..3).map(|axis| antenna.velocity_row(axis, self.gyro_blocks()));
+        let velocity = (0..3).map(|axis| antenna.velocity_row(axis, &self.sources()));
         let dense = |row: Row<Lanes>| {
             let mut dense = vec![0.0; self.p.dim()];
             row.entries().iter().for_each(|(i, c)| dense[*i] += c[0]);

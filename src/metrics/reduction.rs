@@ -3,7 +3,7 @@
 
 use super::estimate::PerState;
 use crate::imu::{Channel, Sensor};
-use crate::noise::reduction::{Reduced, ReductionError, reduce};
+use crate::noise::reduction::{Reduced, ReductionError, carried, reduce};
 use crate::noise::{Composite, Model, Process, continuous};
 use crate::simulation::{CovariancePass, REPORTED};
 use serde::Serialize;
@@ -124,7 +124,7 @@ impl AxisReduction {
     fn new(channel: Channel, model: &Model, reduced: &Reduced, window_s: f64) -> Self {
         let noise = model.axis(channel);
         let is_quantization = |p: &&Process| matches!(p, Process::Quantization(_));
-        let kept = Composite::new(noise.processes.iter().filter(|p| !is_quantization(p)).copied().collect());
+        let kept = carried(noise);
         let pair = Composite::new(vec![Process::White(reduced.white), Process::Ar1(reduced.bias)]);
         let last = (window_s * model.rate_hz).max(2.0).log2().round().min(40.0) as u32;
         let levels: Vec<u32> = (1..=last).collect();

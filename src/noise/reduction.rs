@@ -2,7 +2,7 @@
 //!
 //! The pair is the one closest to the model's own Haar wavelet variance, in the logarithm, with equal
 //! weights, over the scales from one GNSS interval to [`window_s`]. Quantization noise is left out: its
-//! integral is bounded. The reduction is a pure function of model, interval and window.
+//! integral is bounded. So is a drift: the filter has a state for its slope. The reduction is a pure function of model, interval and window.
 
 use super::{Ar1, Composite, GaussMarkov, ParameterError, Process, White};
 use nalgebra::{Matrix3, Vector3};
@@ -57,9 +57,7 @@ pub fn reduce(
     interval_s: f64,
     window_s: f64,
 ) -> Result<Reduced, ReductionError> {
-    let kept: Vec<Process> =
-        noise.processes.iter().filter(|p| !matches!(p, Process::Quantization(_))).copied().collect();
-    let kept = Composite::new(kept);
+    let kept = carried(noise);
     if let Some(exact) = exact(&kept) {
         return exact;
     }
@@ -78,6 +76,13 @@ pub fn reduce(
         initial_variance: stationary_variance(&kept),
         misfit: fit.residuals(&[ln_white, ln_variance, ln_kappa]).iter().fold(0.0, |m, r| r.abs().max(m)),
     })
+}
+
+/// The processes that the pair stands for: without quantization noise and without drift.
+#[must_use]
+pub fn carried(noise: &Composite) -> Composite {
+    let apart = |p: &&Process| matches!(p, Process::Quantization(_) | Process::Drift(_));
+    Composite::new(noise.processes.iter().filter(|p| !apart(p)).copied().collect())
 }
 
 /// The model itself when it already is white noise and at most one stationary bias.

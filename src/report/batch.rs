@@ -42,7 +42,7 @@ pub struct ColumnResult<'a> {
     pub cell: [&'a str; 5],
     /// Candidate.
     pub candidate: &'a str,
-    /// Filter: 15 or full.
+    /// Filter: 15, 21 or full.
     pub filter: &'a str,
     /// The candidate its ratios refer to, with the same filter; empty without ratios.
     pub reference: &'a str,

@@ -3,7 +3,7 @@
 use crate::ekf::InitialSettings;
 use crate::frames::{NavState, RollPitchYaw, wrap_angle};
 use crate::gnss::GnssFix;
-use crate::imu::ImuIncrement;
+use crate::imu::{ImuIncrement, Sensor};
 use crate::units::DEG;
 use std::fmt::Write as _;
 
@@ -58,10 +58,16 @@ pub fn initial_toml(t_s: f64, state: &NavState, sigma: &InitialSettings) -> Stri
     let rpy = RollPitchYaw::from_quat(state.q_b_n);
     let v = state.v_n;
     let list = |x: [f64; 3]| format!("[{:?}, {:?}, {:?}]", x[0], x[1], x[2]);
+    let beside = |sensor: Sensor| {
+        let bias = (InitialSettings::bias_key(sensor), sigma.bias_sigma(sensor));
+        let scale = (InitialSettings::scale_key(sensor), sigma.scale_sigma_ppm(sensor));
+        let said = [bias, scale].into_iter().filter_map(|(key, sigma)| Some((key, sigma?)));
+        said.map(|(key, sigma)| format!("{key} = {sigma:?}\n")).collect::<String>()
+    };
     format!(
         "t_s = {t_s:?}\nlat_deg = {:.10}\nlon_deg = {:.10}\nh_m = {:.4}\nv_n_m_s = {:.5}\nv_e_m_s = {:.5}\n\
          v_d_m_s = {:.5}\nroll_deg = {:.6}\npitch_deg = {:.6}\nyaw_deg = {:.6}\npos_sigma_m = {}\n\
-         vel_sigma_m_s = {}\natt_sigma_deg = {}\n",
+         vel_sigma_m_s = {}\natt_sigma_deg = {}\n{}{}",
         state.lat / DEG,
         wrap_angle(state.lon) / DEG,
         state.h,
@@ -73,6 +79,8 @@ pub fn initial_toml(t_s: f64, state: &NavState, sigma: &InitialSettings) -> Stri
         rpy.yaw / DEG,
         list(sigma.pos_sigma_m),
         list(sigma.vel_sigma_m_s),
-        list(sigma.att_sigma_deg)
+        list(sigma.att_sigma_deg),
+        beside(Sensor::Accel),
+        beside(Sensor::Gyro)
     )
 }

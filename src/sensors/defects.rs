@@ -1,5 +1,5 @@
 //! What is wrong with the true IMU beside its noise: turn-on bias, scale factors, misalignment. The filter
-//! knows nothing of them.
+//! knows nothing of them but what `[initial]` lets it expect.
 
 use crate::imu::{ImuSample, MAX_RATE_HZ, Sensor};
 use crate::rng::StreamKey;
@@ -14,7 +14,7 @@ pub const MAX_BIAS_M_S2: f64 = 10.0;
 /// Largest standard deviation of a gyroscope's bias (rad/s): beyond it an attitude is lost in seconds.
 pub const MAX_BIAS_RAD_S: f64 = 1.0;
 
-/// `[imu]`: the true IMU; the filter knows its rate only. Turn-on bias, scale factors and misalignment are
+/// `[imu]`: the true IMU; the filter knows its rate only (what it expects is in `[initial]`). Turn-on bias, scale factors and misalignment are
 /// standard deviations: each run draws its own, normal and constant over the run, for every axis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -90,8 +90,9 @@ impl ImuSettings {
         Ok(())
     }
 
-    /// Bias and scale of a sensor.
-    fn of(&self, sensor: Sensor) -> (f64, f64) {
+    /// Standard deviations of turn-on bias (m/s² or rad/s) and scale factor (parts per million) of a sensor.
+    #[must_use]
+    pub const fn deviations(&self, sensor: Sensor) -> (f64, f64) {
         match sensor {
             Sensor::Accel => (self.turn_on_bias_accel_m_s2, self.scale_ppm_accel),
             Sensor::Gyro => (self.turn_on_bias_gyro_rad_s, self.scale_ppm_gyro),
@@ -101,7 +102,7 @@ impl ImuSettings {
     /// Whether the true IMU has none of them.
     #[must_use]
     pub fn is_ideal(&self) -> bool {
-        let [accel, gyro] = Sensor::ALL.map(|sensor| self.of(sensor));
+        let [accel, gyro] = Sensor::ALL.map(|sensor| self.deviations(sensor));
         [accel.0, accel.1, gyro.0, gyro.1, self.misalignment_rad].iter().all(|x| *x == 0.0)
     }
 }
@@ -125,7 +126,7 @@ impl Defects {
                 let mut generator = StreamKey { source: &source, process, ..key }.generator();
                 (0..n).map(|_| StandardNormal.sample(&mut generator)).collect()
             };
-            let (bias_sigma, ppm) = settings.of(sensor);
+            let (bias_sigma, ppm) = settings.deviations(sensor);
             let bias = DVec3::from_slice(&normals("turn_on_bias", 3)) * bias_sigma;
             let mut matrix = DMat3::from_diagonal(DVec3::from_slice(&normals("scale", 3)) * (ppm * 1e-6));
             let angles = normals("misalignment", 6);

@@ -10,7 +10,7 @@ mod status;
 mod verify;
 
 use super::{Failure, Session};
-use nav_sim::batch::{Grid, Plan, PrepareError, StudyError, Unit, fingerprint};
+use nav_sim::batch::{Grid, Plan, PrepareError, StudyError, fingerprint};
 use nav_sim::data::batch_directory::{self, BatchDirectoryError};
 use nav_sim::data::batch_file::{self, BatchFile};
 use std::path::{Path, PathBuf};
@@ -40,13 +40,6 @@ enum Command {
     Status(status::Args),
     Verify(verify::Args),
     Emit(emit::Args),
-}
-
-impl Args {
-    /// Whether the command ends in good order at a signal, to be resumed.
-    pub(crate) const fn heeds_signals(&self) -> bool {
-        matches!(self.command, Command::Run(_))
-    }
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
@@ -118,11 +111,11 @@ impl Planned {
 impl Planned {
     /// What the longest unit takes by the plan's probe (s) on so many threads.
     fn unit_s(&self, threads: u64) -> f64 {
-        let wall_s = |unit: Unit| {
-            let batches = unit.runs.div_ceil(nav_sim::lanes::LANES as u64);
-            self.plan.unit_s(&self.grid, unit) / threads.clamp(1, batches.max(1)) as f64
+        let of = |(run_s, runs): (&f64, &u64)| {
+            let batches = runs.div_ceil(nav_sim::lanes::LANES as u64);
+            run_s * *runs as f64 / threads.clamp(1, batches.max(1)) as f64
         };
-        self.plan.units(&self.grid).map(wall_s).fold(0.0, f64::max)
+        self.plan.estimate.run_s.iter().zip(&self.plan.unit_runs).map(of).fold(0.0, f64::max)
     }
 
     /// The names of a cell on those axes that have more than one.
@@ -144,14 +137,6 @@ impl Planned {
 /// A refusal of the study as a whole.
 fn unusable(study: &Path, e: &StudyError) -> Failure {
     Failure::input(format!("{}: {e}", study.display())).maybe_hint(e.hint())
-}
-
-/// The columns of a study by name, filters too where there are several.
-fn filter_name(filter: nav_sim::ekf::FilterStates) -> &'static str {
-    match filter {
-        nav_sim::ekf::FilterStates::Reduced15 => "15",
-        nav_sim::ekf::FilterStates::Full => "full",
-    }
 }
 
 impl From<BatchDirectoryError> for Failure {

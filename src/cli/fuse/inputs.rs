@@ -4,12 +4,11 @@ use super::Args;
 use crate::cli::{Failure, Session, parse, read};
 use glam::DQuat;
 use nav_sim::data::fusion_files::{FusionFileError, ImuFile, read_gnss, read_imu, read_initial};
-use nav_sim::ekf::Belief;
+use nav_sim::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim::frames::RollPitchYaw;
 use nav_sim::fusion::alignment::{self, Alignment};
 use nav_sim::fusion::{FusionError, Recorded, Settings, Start, check_clocks};
 use nav_sim::gnss::GnssFix;
-use nav_sim::imu::Sensor;
 use nav_sim::noise::{Composite, Model, Process, continuous, reduction};
 use nav_sim::report::Input;
 use nav_sim::sensors::outage::{Outage, OutagePlan};
@@ -52,11 +51,9 @@ impl Inputs {
             scale(&mut gnss, position, velocity);
         }
         check_clocks(&Recorded { imu: &imu.samples, gnss: &gnss }).map_err(impossible)?;
-        let belief = belief(args, settings, &imu, &gnss, session)?;
-        let initial = match given {
-            Some(path) => Some(read_initial(path)?),
-            None => None,
-        };
+        let initial = given.map(|path| read_initial(path)).transpose()?;
+        let start = initial.as_ref().map(|start| start.sigma.clone()).unwrap_or_default();
+        let belief = belief(args, start, settings, &imu, &gnss, session)?;
         let reference = args.reference.as_deref().map(|path| read::reference(path, session)).transpose()?;
         Ok(Self { imu, gnss, belief, reference, initial, files })
     }
@@ -140,9 +137,10 @@ fn scale(gnss: &mut [GnssFix], position: f64, velocity: f64) {
     }
 }
 
-/// The filter's states for the model at the rate of the recording.
+/// The filter's states for the model at the rate of the recording, with what it expects at the start.
 fn belief(
     args: &Args,
+    mut initial: InitialSettings,
     settings: &Settings,
     imu: &ImuFile,
     gnss: &[GnssFix],
@@ -160,13 +158,12 @@ fn belief(
     steps.sort_by(f64::total_cmp);
     let interval_s = steps.get(steps.len() / 2).copied().unwrap_or(1.0);
     let window_s = reduction::window_s(longest);
-    let mut belief = Belief::new(&model, args.filter, interval_s, window_s)
+    let mut states = FilterStates::default();
+    args.filter.over(&mut states, &mut initial);
+    initial.validate().map_err(Failure::input)?;
+    let belief = Belief::new(&model, states, interval_s, window_s)
         .map_err(|e| Failure::input(format!("{shown}: {e}")))?;
-    if let Some(parse::Pair([accel, gyro])) = args.turn_on_bias {
-        belief.add_constant(Sensor::Accel, accel);
-        belief.add_constant(Sensor::Gyro, gyro);
-    }
-    Ok(belief)
+    Ok(belief.with_initial(&initial))
 }
 
 /// At the rate of the recording, without quantization noise: the filter leaves it out, and it belongs to

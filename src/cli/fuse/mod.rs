@@ -3,10 +3,10 @@
 mod inputs;
 mod output;
 
-use super::run::{parse_outage, parse_states, windows_of};
+use super::filter::FilterArgs;
+use super::run::{parse_outage, windows_of};
 use super::{Failure, Session, parse};
 use inputs::Inputs;
-use nav_sim::ekf::FilterStates;
 use nav_sim::fusion::alignment::Alignment;
 use nav_sim::fusion::{self, Assessment, Recorded, Settings, Verdict};
 use nav_sim::report::FusionSummary;
@@ -62,13 +62,8 @@ pub(crate) struct Args {
     /// Window in which fixes are withheld, on the clock of the data in seconds (repeatable)
     #[arg(long = "outage", value_name = "START:END", value_parser = parse_outage)]
     outages: Vec<super::run::OutageArg>,
-    /// States of the filter: 15 (one bias an axis, the reduction of the model) or full
-    #[arg(long, value_name = "STATES", value_parser = parse_states, default_value = "15")]
-    filter: FilterStates,
-    /// Constant biases that the model does not have (a calibration removes them): standard deviations,
-    /// accelerometer in m/s², gyroscope in rad/s; 3 states each
-    #[arg(long, value_name = "ACCEL,GYRO", value_parser = parse::pair)]
-    turn_on_bias: Option<parse::Pair>,
+    #[command(flatten)]
+    filter: FilterArgs,
     /// Multiply the receiver's standard deviations, of position and of velocity
     #[arg(long, value_name = "POS,VEL", value_parser = parse::positive_pair)]
     gnss_sigma_factor: Option<parse::Pair>,

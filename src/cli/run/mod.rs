@@ -4,10 +4,11 @@ mod inputs;
 mod output;
 mod reduced;
 
+use super::filter::FilterArgs;
 use super::{Failure, Session};
 use inputs::Inputs;
 use nav_sim::data::scenario_file;
-use nav_sim::ekf::{Belief, FilterStates};
+use nav_sim::ekf::Belief;
 use nav_sim::imu::Sensor;
 use nav_sim::metrics::Summary;
 use nav_sim::monte_carlo;
@@ -54,9 +55,8 @@ pub(crate) struct Args {
     /// Monte-Carlo runs (default: 100)
     #[arg(long, value_name = "N")]
     runs: Option<u64>,
-    /// States of the filter: 15 (one bias an axis, the reduction of the model) or full (default: 15)
-    #[arg(long, value_name = "STATES", value_parser = parse_states)]
-    filter: Option<FilterStates>,
+    #[command(flatten)]
+    filter: FilterArgs,
     /// How statistics are found: monte-carlo
     #[arg(long, value_name = "METHOD", value_parser = parse_method)]
     method: Option<Method>,
@@ -101,14 +101,6 @@ pub(super) fn windows_of(outages: &[OutageArg]) -> Result<Vec<Outage>, Failure> 
     Ok(outages.iter().filter_map(window).collect())
 }
 
-pub(super) fn parse_states(text: &str) -> Result<FilterStates, String> {
-    match text {
-        "15" => Ok(FilterStates::Reduced15),
-        "full" => Ok(FilterStates::Full),
-        _ => Err("expected 15 or full".to_owned()),
-    }
-}
-
 fn parse_method(text: &str) -> Result<Method, String> {
     match text {
         "monte-carlo" => Ok(Method::MonteCarlo),
@@ -127,6 +119,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let unusable = |e| Failure::input(format!("{}: {e}", args.model.display()));
     let belief = scenario.belief(&inputs.model, &outages).map_err(unusable)?;
     doubt_biases(&belief, session);
+    scenario.doubts().iter().for_each(|doubt| session.printer.warn(doubt));
     let experiment = scenario.experiment(
         &inputs.trajectory,
         inputs.truth(),
@@ -173,7 +166,7 @@ fn scenario(args: &Args) -> Result<Scenario, Failure> {
     }
     scenario.run.runs = args.runs.unwrap_or(scenario.run.runs);
     scenario.run.method = args.method.unwrap_or(scenario.run.method);
-    scenario.filter.states = args.filter.unwrap_or(scenario.filter.states);
+    args.filter.over(&mut scenario.filter.states, &mut scenario.initial);
     scenario.validate().map_err(Failure::input)?;
     Ok(scenario)
 }
@@ -240,16 +233,12 @@ fn withholds_a_fix(outage: &Outage, start_s: f64, rate_hz: f64) -> bool {
 /// A Gauss-Markov process of phi ≈ 1 may have any stationary variance: a filter that starts with it believes
 /// nothing of its first sensor readings.
 fn doubt_biases(belief: &Belief, session: &Session) {
-    let limits = [
-        (Sensor::Accel, 1.0, "initial.accel_bias_sigma_m_s2"),
-        (Sensor::Gyro, 0.1, "initial.gyro_bias_sigma_rad_s"),
-    ];
-    for (sensor, limit, key) in limits {
-        let sigma = belief.initial_bias_sigma(sensor);
+    for (sensor, limit) in [(Sensor::Accel, 1.0), (Sensor::Gyro, 0.1)] {
+        let sigma = belief.process_sigma(sensor);
         if sigma > limit {
             session.printer.warn(&format!(
                 "the filter starts with a bias of {sigma:.3} {} ({} of the model, its correlated processes together): \
-                 an AR1 of phi near 1? {key} in a --scenario file sets it",
+                 an AR1 of phi near 1? `nav-sim calibrate --parameters` bounds it",
                 sensor.unit(),
                 sensor.name()
             ));

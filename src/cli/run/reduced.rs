@@ -2,10 +2,10 @@
 
 use super::impossible;
 use crate::cli::{Failure, Session};
-use nav_sim::ekf::{Belief, FilterStates};
+use nav_sim::ekf::Belief;
 use nav_sim::metrics::{ReductionQuality, ReductionSummary, TOLERANCE};
 use nav_sim::noise::{Model, reduction};
-use nav_sim::scenario::{FilterSettings, Scenario};
+use nav_sim::scenario::Scenario;
 use nav_sim::simulation::{Experiment, Plan, covariance_pass};
 
 /// The reduction and its quality, found by one covariance pass of the reduced and of the full filter along
@@ -17,7 +17,7 @@ pub(super) fn reduction(
     experiment: &Experiment<'_>,
     session: &Session,
 ) -> Result<Option<ReductionSummary>, Failure> {
-    if scenario.filter.states == FilterStates::Full {
+    if !scenario.filter.states.is_reduced() {
         return Ok(None);
     }
     let longest = experiment.outages.iter().map(|o| o.end_s - o.start_s).fold(0.0, f64::max);
@@ -27,8 +27,7 @@ pub(super) fn reduction(
         return Ok(Some(summary));
     }
     summary.lines().iter().for_each(|line| session.printer.say(line));
-    let filter = FilterSettings { states: FilterStates::Full, ..scenario.filter };
-    let Ok(full) = (Scenario { filter, ..scenario.clone() }).belief(model, experiment.outages) else {
+    let Ok(full) = scenario.with_full_noise().belief(model, experiment.outages) else {
         session.printer.say("the model has no full filter to compare the reduction with");
         return Ok(Some(summary));
     };

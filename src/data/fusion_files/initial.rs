@@ -10,7 +10,7 @@ use crate::units::DEG;
 use glam::DVec3;
 use std::path::Path;
 
-const KEYS: [&str; 15] = [
+const KEYS: [&str; 17] = [
     "t_s",
     "lat_deg",
     "lon_deg",
@@ -26,6 +26,8 @@ const KEYS: [&str; 15] = [
     "att_sigma_deg",
     "accel_bias_sigma_m_s2",
     "gyro_bias_sigma_rad_s",
+    "accel_scale_sigma_ppm",
+    "gyro_scale_sigma_ppm",
 ];
 
 /// Reads an initial state: time, position of the IMU, velocity (0 where it is not said), attitude of the
@@ -81,6 +83,8 @@ fn sigma(root: &Section<'_>) -> Result<InitialSettings, TomlError> {
         att_sigma_deg: three("att_sigma_deg", d.att_sigma_deg)?,
         accel_bias_sigma_m_s2: root.f64("accel_bias_sigma_m_s2")?,
         gyro_bias_sigma_rad_s: root.f64("gyro_bias_sigma_rad_s")?,
+        accel_scale_sigma_ppm: root.f64("accel_scale_sigma_ppm")?,
+        gyro_scale_sigma_ppm: root.f64("gyro_scale_sigma_ppm")?,
         perfect: false,
     };
     sigma

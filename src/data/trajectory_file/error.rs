@@ -1,6 +1,5 @@
 //! What can be wrong with a trajectory file.
 
-use crate::data::source;
 use crate::data::toml_file::TomlError;
 use crate::trajectory;
 
@@ -74,7 +73,7 @@ impl TrajectoryFileError {
     #[must_use]
     pub fn is_content(&self) -> bool {
         match self {
-            Self::Io { source, .. } => source::is_damage(source.kind()),
+            Self::Io { .. } => false,
             Self::Profile(e) => e.is_content(),
             _ => true,
         }
