@@ -73,7 +73,7 @@ fn noisy_curve() -> Curve {
     let exact = |j: u32| n2.iter().map(|p| p.haar_wv(j)).sum::<f64>();
     let noisy =
         |(j, edof): (&u32, &f64)| exact(*j) * (1.0 + f64::from(*j).sin() * (2.0 / edof).sqrt().min(0.5));
-    Curve { wv: levels.iter().zip(&edof).map(noisy).collect(), edof, levels }
+    Curve { wv: levels.iter().zip(&edof).map(noisy).collect(), edof, levels, ..Curve::default() }
 }
 
 fn fits(c: &mut Criterion) {

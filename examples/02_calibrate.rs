@@ -33,7 +33,7 @@ pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut gamma2 = Vec::new();
     println!("random-walk variance of seven replicates: 3.3e-11, of the eighth: 3.3e-9");
     for estimator in [Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv] {
-        let curve = average(&replicates, estimator, Trim::Count(2), tuning.efficiency())?;
+        let curve = average(&replicates, estimator, Trim::Count(2), &tuning)?;
         let fitted = fit(&curve, &ModelSpec::n1(), 100.0, Weighting::Edof)?;
         let walk = fitted.composite.processes.iter().find_map(|p| match p {
             Process::RandomWalk(walk) => Some(walk.gamma2()),

@@ -112,6 +112,41 @@ fn damaged_units_are_noticed_and_computed_again() {
     assert_eq!(results(&dir.join("out")), undisturbed);
 }
 
+/// A directory in a unit's place, and a whole unit of other runs or other outages under its name: `merge` says they
+/// are damaged, and `run` mends them.
+#[test]
+fn what_stands_in_the_place_of_a_unit_is_computed_again() {
+    use nav_sim::data::unit_file;
+    let place = place();
+    let dir = place.path();
+    let undisturbed = whole(dir, "out");
+    let files = units(&dir.join("out"));
+    fs::remove_file(&files[3]).unwrap();
+    fs::create_dir(&files[3]).unwrap();
+    fs::write(files[3].join("note"), "mine").unwrap();
+    let forge = |file: &Path, change: &dyn Fn(&mut nav_sim::batch::UnitResult)| {
+        let id = file.file_stem().unwrap().to_str().unwrap();
+        let mut unit = unit_file::read(&dir.join("out"), id).unwrap();
+        change(&mut unit);
+        fs::write(file, unit_file::encode(&unit)).unwrap();
+    };
+    forge(&files[7], &|unit| unit.columns[1].runs[0].run += 1);
+    let has_outages = |file: &&std::path::PathBuf| {
+        let id = file.file_stem().unwrap().to_str().unwrap();
+        unit_file::read(&dir.join("out"), id).is_ok_and(|unit| !unit.columns[0].outages.is_empty())
+    };
+    let other = files[8..].iter().find(has_outages).unwrap();
+    forge(other, &|unit| unit.columns.iter_mut().for_each(|c| c.outages[0].1 += 1.0));
+    fs::remove_dir_all(dir.join("out/results")).unwrap();
+    refused(dir, "merge study.toml -o out", 75);
+    let said = done(dir, "run study.toml -o out");
+    assert_eq!(said.matches("it is computed again").count(), 3, "{said}");
+    assert!(said.contains(".unit is damaged: it is a directory; it is computed again"), "{said}");
+    assert_eq!(fs::read(files[3].with_extension("unit.damaged").join("note")).unwrap(), b"mine");
+    done(dir, "merge study.toml -o out");
+    assert_eq!(results(&dir.join("out")), undisturbed);
+}
+
 #[test]
 fn what_changed_since_the_plan_is_refused() {
     let place = place();

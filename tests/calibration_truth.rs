@@ -122,7 +122,7 @@ fn exact_curves_give_back_their_parameters() {
             .map(|c| c.as_str().unwrap())
             .collect::<Vec<_>>()
             .join("+");
-        let curve = Curve { levels, wv, edof };
+        let curve = Curve { levels, wv, edof, ..Curve::default() };
         let fit = fit(&curve, &spec.parse().unwrap(), 1.0, Weighting::Edof).unwrap();
         // The truth lists AR1s by descending correlation time, the fit by ascending.
         let expected = composite(&case["components"], &numbers(&case["theta"]), 1.0);

@@ -135,3 +135,51 @@ fn init_makes_every_file_that_the_help_names() {
         }
     }
 }
+
+/// What `init` cannot finish it takes back; what was there stays.
+#[test]
+fn init_makes_all_its_files_or_none() {
+    let directory = tempfile::tempdir().unwrap();
+    let study = directory.path().join("study");
+    std::fs::create_dir(&study).unwrap();
+    std::fs::write(study.join("examples"), "in the way").unwrap();
+    let output = nav_sim().arg("init").arg(&study).output().unwrap();
+    assert_eq!((output.status.code(), output.stdout.as_slice()), (Some(1), &b""[..]));
+    let left: Vec<_> = std::fs::read_dir(&study).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert_eq!(left, ["examples"]);
+    std::fs::remove_file(study.join("examples")).unwrap();
+    assert!(nav_sim().arg("init").arg(&study).output().unwrap().status.success());
+    assert!(study.join("calib_data/formats/own.csv").exists() && study.join("examples/phone.toml").exists());
+}
+
+/// Pipes are read once and serve as files do: what is computed and what is recorded of them is of the same bytes.
+#[test]
+fn inputs_may_be_pipes() {
+    let directory = tempfile::tempdir().unwrap();
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let program = env!("CARGO_BIN_EXE_nav-sim");
+    let model = root.join("calib_data/tactical.toml").display().to_string();
+    let script = format!(
+        "set -e; {program} synthesize <(cat {model}) --samples 512 --seed 1 -o out; \
+         {program} wv <(cat out/replicate_1.csv) > piped; {program} wv out/replicate_1.csv > plain"
+    );
+    let output =
+        std::process::Command::new("bash").current_dir(&directory).args(["-c", &script]).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let read = |name: &str| std::fs::read_to_string(directory.path().join(name)).unwrap();
+    let manifest: serde_json::Value = serde_json::from_str(&read("out/manifest.json")).unwrap();
+    let bytes = std::fs::read(&model).unwrap();
+    assert_eq!(manifest["model_blake3"], blake3::hash(&bytes).to_hex().to_string());
+    assert_eq!(read("piped").replace("/dev/fd/63", "out/replicate_1.csv"), read("plain"));
+}
+
+#[test]
+fn text_that_is_not_utf_8_is_refused_with_its_line() {
+    let directory = tempfile::tempdir().unwrap();
+    let model = directory.path().join("a.toml");
+    std::fs::write(&model, b"schema = 1\n# \xe9\n").unwrap();
+    let output = nav_sim().arg("synthesize").arg(&model).args(["-o", "x"]).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("a.toml: line 2 is not text in UTF-8"), "{said}");
+}

@@ -129,6 +129,29 @@ fn ratios_are_those_that_were_made() {
     assert!(row["rmse_end_ratio_error_pct"].as_f64().unwrap().abs() < 1e-9, "{row}");
 }
 
+/// Without `--out` a file of the default's name is replaced only if it is a comparison.
+#[test]
+fn a_file_that_is_no_comparison_is_left_alone() {
+    let directory = tempfile::tempdir().unwrap();
+    write(&directory.path().join("a"), 1.0, |_| {});
+    let path = directory.path().join("comparison.json");
+    std::fs::write(&path, "{\"mine\": 1}").unwrap();
+    let ran = compare(directory.path(), &["a", "--reference", "a"]);
+    assert_eq!(ran.code, 2);
+    assert!(
+        ran.stderr.starts_with("error: comparison.json is there and is no comparison\n\nhint: "),
+        "{}",
+        ran.stderr
+    );
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "{\"mine\": 1}");
+    for arguments in
+        [["a", "--reference", "a", "-o", "comparison.json"].as_slice(), &["a", "--reference", "a"]]
+    {
+        let ran = compare(directory.path(), arguments);
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+    }
+}
+
 #[test]
 fn another_trajectory_or_other_outages_are_refused() {
     let directory = tempfile::tempdir().unwrap();

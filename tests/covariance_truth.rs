@@ -114,7 +114,11 @@ fn standard_deviations_are_those_of_an_independent_filter() {
 }
 
 /// 900 s with two outages, and the free inertial integration: on reference files too large to ship, whose
-/// directory `NAV_SIM_TRUTH` names (`cargo test --test covariance_truth -- --ignored --nocapture`).
+/// directory `NAV_SIM_TRUTH` names (`cargo test --test covariance_truth -- --ignored --nocapture`). The bounds are
+/// README's figures with what their causes leave open: the order of the discretisation, dt/T = 1e-4 at the first fixes
+/// as in the 60 s above, which outages do not add to (1.3e-4 measured); and the truncation of coning and sculling at dt = 10 ms, of
+/// which the reference tool's own order test has 0.0107 m at 120 s and 0.139 m at 900 s for two samples; the mechanisation
+/// here is of the next order, a tenth of that (0.0135 m measured).
 #[test]
 #[ignore = "needs reference files that are not shipped"]
 fn the_whole_reference_drive() {
@@ -140,5 +144,5 @@ fn the_whole_reference_drive() {
         "worst standard deviation {worst:.3e}; {:.4} m at 120 s, {:.4} m at 900 s",
         errors[119], errors[899]
     );
-    assert!(worst < 5e-3 && errors[119] < 0.02 && errors[899] < 0.2);
+    assert!(worst < 2e-4 && errors[119] < 0.0107 && errors[899] < 0.02);
 }

@@ -62,7 +62,12 @@ fn variances_are_those_of_the_closed_form() {
         let mut signal = vec![0.0; SAMPLES];
         Synthesizer::new(&noise, key).fill(&mut signal);
         let edof = (0..LEVELS as usize).map(|j| 2.0 / covariance[(j, j)]).collect();
-        let curve = Curve { levels: (1..=LEVELS).collect(), wv: classical(&signal, LEVELS).unwrap(), edof };
+        let curve = Curve {
+            levels: (1..=LEVELS).collect(),
+            wv: classical(&signal, LEVELS).unwrap(),
+            edof,
+            ..Curve::default()
+        };
         for (weighting, into) in [Weighting::Edof, Weighting::Full].into_iter().zip(&mut estimates) {
             let fit = fit(&curve, &spec, 1.0, weighting).unwrap();
             into.push(fit.composite.processes[0].parameters()[0].1);

@@ -204,3 +204,57 @@ fn recordings_of_another_job_are_not_mixed_in_and_inputs_not_overwritten() {
     assert!(said.contains("manifest.json is an input of this command and would be overwritten"), "{said}");
     assert_eq!(place.bytes("manifest.json"), MODEL.as_bytes());
 }
+
+/// Recordings of the user's own, under the names of replicates, are never replaced.
+#[test]
+fn recordings_that_this_command_did_not_make_are_left_alone() {
+    let place = Place::new();
+    let own = "t_s,accel_x_m_s2\n0,1\n0.01,2\n";
+    let refused = |message: &str| {
+        let (code, said) = place.run(&["model.toml", "--replicates", "2", "--samples", "10", "-o", "own"]);
+        assert_eq!(code, 2, "{said}");
+        assert!(said.contains(message), "{said}");
+        assert_eq!(place.bytes("own/replicate_2.csv"), own.as_bytes());
+    };
+    fs::create_dir(place.path("own")).unwrap();
+    fs::write(place.path("own/replicate_2.csv"), own).unwrap();
+    refused("own is not empty, and not of this command: it holds replicate_2.csv");
+    fs::write(place.path("own/manifest.json"), "{\"command\": \"run\"}").unwrap();
+    refused("manifest.json is of another command, or of another version");
+    // beside replicates of this command, too
+    fs::remove_dir_all(place.path("own")).unwrap();
+    place.make("own", &["--samples", "10"]);
+    fs::write(place.path("own/replicate_2.csv"), own).unwrap();
+    refused("own holds replicate_2.csv, which this command did not make");
+}
+
+/// Interrupted, it ends with 128 + signal and leaves nothing; a signal that it was started to ignore does nothing.
+#[test]
+fn an_interrupt_leaves_nothing() {
+    let place = Place::new();
+    let began = || entries(place.0.path()).iter().any(|name| name.ends_with(".partial"));
+    for (signal, code) in [("INT", 130), ("TERM", 143), ("HUP", 129)] {
+        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_nav-sim"))
+            .current_dir(&place.0)
+            .args(["synthesize", "model.toml", "--replicates", "1000", "--samples", "100000", "-o", "out"])
+            .stderr(std::process::Stdio::null())
+            .spawn()
+            .unwrap();
+        while !began() {
+            assert!(child.try_wait().unwrap().is_none());
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        let kill = format!("kill -{signal} {}", child.id());
+        assert!(std::process::Command::new("sh").args(["-c", &kill]).status().unwrap().success());
+        assert_eq!(child.wait().unwrap().code(), Some(code));
+        assert_eq!(entries(place.0.path()), ["model.toml"]);
+    }
+    let script = format!(
+        "trap '' HUP; {} synthesize model.toml --samples 300000 --no-progress -o out & \
+         while kill -0 $! && ! ls -A | grep -q partial; do :; done; kill -HUP $!; wait $!",
+        env!("CARGO_BIN_EXE_nav-sim")
+    );
+    let ran = std::process::Command::new("sh").current_dir(&place.0).args(["-c", &script]).output().unwrap();
+    assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+    assert_eq!(entries(&place.path("out")), ["manifest.json", "replicate_1.csv"]);
+}

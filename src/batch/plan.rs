@@ -3,6 +3,7 @@
 use super::grid::{Cell, Grid};
 use super::study::Study;
 use super::unit::Kept;
+use crate::lanes::LANES;
 use crate::scenario::Scenario;
 use crate::sensors::gnss::GnssSettings;
 use serde::{Deserialize, Serialize};
@@ -122,6 +123,14 @@ impl Plan {
         (0..grid.trajectories.len()).map(|t| self.units_per_cell(t).saturating_mul(cells)).sum()
     }
 
+    /// Processor time of a unit by the estimate (s). Runs are computed as many at a time as there are lanes: a unit of
+    /// one run lasts as long as one of eight.
+    #[must_use]
+    pub fn unit_s(&self, grid: &Grid, unit: Unit) -> f64 {
+        let run_s = self.estimate.run_s.get(grid.cell(unit.cell).trajectory).copied().unwrap_or(0.0);
+        run_s * unit.runs.next_multiple_of(LANES as u64) as f64
+    }
+
     /// Hash of everything that decides the bytes of a cell's units.
     #[must_use]
     pub fn cell_hash(&self, grid: &Grid, cell: Cell) -> blake3::Hash {
@@ -232,6 +241,17 @@ mod tests {
         let cells: HashSet<[String; 5]> =
             (0..12).map(|i| grid.names(grid.cell(i)).map(str::to_owned)).collect();
         assert_eq!(cells.len(), 12);
+    }
+
+    /// 250 runs in units of one take 250 batches of eight lanes, in units of 100 two and a rest of 13 + 13 + 7.
+    #[test]
+    fn a_unit_lasts_as_long_as_its_batches() {
+        let (mut plan, grid) = plan(|_| {});
+        plan.estimate.run_s = vec![0.5, 0.25];
+        let seconds = |plan: &Plan| plan.units(&grid).map(|unit| plan.unit_s(&grid, unit)).sum::<f64>();
+        assert_eq!(seconds(&plan), 6.0 * (0.5 * 8.0 * 33.0 + 0.25 * 256.0));
+        plan.unit_runs = vec![1, 8];
+        assert_eq!(seconds(&plan), 6.0 * (0.5 * 8.0 * 250.0 + 0.25 * 256.0));
     }
 
     #[test]

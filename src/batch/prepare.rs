@@ -83,7 +83,7 @@ pub(super) fn settings(step: &CalibrateStep, rate_hz: f64) -> Result<Settings, P
         limits: Vec::new(),
         trim: step.trim.map_or(Trim::Fraction(0.3), Trim::Count),
         tuning,
-        weighting: Weighting::Edof,
+        weighting: Weighting::Model,
         rate_hz,
     })
 }

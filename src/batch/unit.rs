@@ -1,5 +1,6 @@
 //! One unit of work: some runs of one cell, through all its columns.
 
+use super::plan::Unit;
 use super::study::{Metric, Study};
 use crate::monte_carlo;
 use crate::simulation::{Plan, RunResult};
@@ -52,6 +53,18 @@ pub struct UnitResult {
     pub runs: u64,
     /// One result a column.
     pub columns: Vec<RunResult>,
+}
+
+impl UnitResult {
+    /// Whether it holds the runs of this unit of a plan, all of them, in so many columns with these outages (start and
+    /// end, s).
+    #[must_use]
+    pub fn fits(&self, unit: Unit, columns: usize, outages: &[(f64, f64)]) -> bool {
+        let numbers = || unit.first..unit.first + unit.runs;
+        let column_fits = |c: &RunResult| c.outages == outages && c.runs.iter().map(|r| r.run).eq(numbers());
+        (self.first, self.runs, self.columns.len()) == (unit.first, unit.runs, columns)
+            && self.columns.iter().all(column_fits)
+    }
 }
 
 /// Computes runs `first..first + runs`; `None` if `go_on` said no on the way. `progress` is told of runs

@@ -2,7 +2,7 @@
 //! ([Minaretzis](crate::bibliography::Minaretzis24), eqs. 4–8).
 
 use crate::imu::Axis;
-use crate::wavelet::{Curve, RobustVariance, interval};
+use crate::wavelet::{Curve, RobustVariance, Status, Tuning, interval};
 
 /// Which curve a model is fitted to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -126,8 +126,9 @@ pub enum AverageError {
 /// The curve an estimator fits: averages with weights T_i/Σ T, over the levels that all replicates have.
 ///
 /// The paper's slips are resolved: SR-AWV's weights sum to one (its 1/J must be 1/K), DR-AWV keeps the
-/// order statistics a + 1 … K − a (2a are dropped), weights of the kept ones renormalised. `efficiency` is
-/// that of the robust wavelet variance; the degrees of freedom are those of the replicates' eta3 combined.
+/// order statistics a + 1 … K − a (2a are dropped), weights of the kept ones renormalised. `tuning` is
+/// that of the robust wavelet variances; the degrees of freedom are those of the replicates' eta3 combined. A level
+/// at which half of the kept ones or more have no admissible robust variance is ignored in fits.
 ///
 /// # Errors
 /// When there is no replicate, more than one for a single-replicate estimator, or none left by the trim.
@@ -135,7 +136,7 @@ pub fn average(
     replicates: &[Replicate],
     estimator: Estimator,
     trim: Trim,
-    efficiency: f64,
+    tuning: &Tuning,
 ) -> Result<Curve, AverageError> {
     let count = replicates.len();
     if estimator.is_single() && count > 1 {
@@ -150,9 +151,12 @@ pub fn average(
         return Err(AverageError::Trim { trim, replicates: count });
     }
     let mut curve = Curve { levels: (1..=levels as u32).collect(), ..Curve::default() };
+    curve.quantization = estimator.is_robust().then(|| *tuning.quantization());
     for &level in &curve.levels {
-        let mut kept =
-            replicates.iter().map(|r| Term::new(r, level, estimator, efficiency)).collect::<Vec<_>>();
+        let mut kept = replicates
+            .iter()
+            .map(|r| Term::new(r, level, estimator, tuning.efficiency()))
+            .collect::<Vec<_>>();
         kept.sort_by(|a, b| a.nu.total_cmp(&b.nu));
         let kept = &kept[trim..count - trim];
         let total: f64 = kept.iter().map(|t| t.samples).sum();
@@ -160,6 +164,9 @@ pub fn average(
         // var(Σ w nu) = Σ w²·2 nu²/eta, the replicates' true nu taken equal.
         let inverse: f64 = kept.iter().map(|t| (t.samples / total).powi(2) / t.edof).sum();
         curve.edof.push(1.0 / inverse);
+        if 2 * kept.iter().filter(|t| !t.has_root).count() >= kept.len() {
+            curve.ignored.push(level);
+        }
     }
     Ok(curve)
 }
@@ -169,6 +176,7 @@ struct Term {
     samples: f64,
     nu: f64,
     edof: f64,
+    has_root: bool,
 }
 
 impl Term {
@@ -176,15 +184,20 @@ impl Term {
         let i = level as usize - 1;
         let eta3 = interval::edof_eta3(replicate.samples, level);
         let edof = if estimator.is_robust() { interval::edof_robust(eta3, efficiency) } else { eta3 };
-        Self { samples: replicate.samples as f64, nu: replicate.value(estimator, i), edof }
+        let has_root = !(estimator.is_robust() && replicate.robust[i].status == Status::NoRoot);
+        Self { samples: replicate.samples as f64, nu: replicate.value(estimator, i), edof, has_root }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::wavelet::Status;
+    use crate::wavelet::Convention;
     use approx::assert_relative_eq;
+
+    fn tuning() -> Tuning {
+        Tuning::new(0.6, Convention::Exact).unwrap()
+    }
 
     fn replicate(samples: usize, classical: f64, robust: f64) -> Replicate {
         let robust = vec![RobustVariance { value: robust, status: Status::Ok }; 2];
@@ -196,7 +209,7 @@ mod tests {
     }
 
     fn first(replicates: &[Replicate], estimator: Estimator, trim: Trim) -> f64 {
-        average(replicates, estimator, trim, 0.6).unwrap().wv[0]
+        average(replicates, estimator, trim, &tuning()).unwrap().wv[0]
     }
 
     #[test]
@@ -218,7 +231,7 @@ mod tests {
         let replicates = [replicate(1000, 1.0, 1.0), replicate(3000, 5.0, 5.0), replicate(1000, 9.0, 100.0)];
         assert_relative_eq!(first(&replicates, Estimator::Awv, Trim::Count(0)), 5.0);
         assert_relative_eq!(first(&replicates, Estimator::DrAwv, Trim::Count(1)), 5.0);
-        let curve = average(&replicates[..2], Estimator::Awv, Trim::Count(0), 0.6).unwrap();
+        let curve = average(&replicates[..2], Estimator::Awv, Trim::Count(0), &tuning()).unwrap();
         let eta = |samples: f64| (samples - 1.0) / 2.0;
         assert_relative_eq!(curve.edof[0], 1.0 / (0.0625 / eta(1000.0) + 0.5625 / eta(3000.0)));
         assert_relative_eq!(curve.wv[0], 4.0);
@@ -226,13 +239,13 @@ mod tests {
 
     #[test]
     fn equal_replicates_multiply_the_degrees_of_freedom() {
-        let curve = average(&eight(), Estimator::DrAwv, Trim::Count(2), 0.6).unwrap();
+        let curve = average(&eight(), Estimator::DrAwv, Trim::Count(2), &tuning()).unwrap();
         assert_relative_eq!(curve.edof[0], 4.0 * 0.6 * 499.5, max_relative = 1e-12);
     }
 
     #[test]
     fn what_cannot_be_averaged_is_refused() {
-        let error = |r: &[Replicate], e, t| average(r, e, t, 0.6).unwrap_err().to_string();
+        let error = |r: &[Replicate], e, t| average(r, e, t, &tuning()).unwrap_err().to_string();
         assert_eq!(error(&[], Estimator::Awv, Trim::Count(0)), "no replicates");
         assert_eq!(
             error(&eight(), Estimator::DrAwv, Trim::Count(4)),

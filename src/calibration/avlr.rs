@@ -62,6 +62,7 @@ pub(super) fn avlr(curve: &Curve, spec: &ModelSpec) -> Result<Fit, FitError> {
         at_end: Vec::new(),
         bounded: Vec::new(),
         minima: Vec::new(),
+        weighted_for: Vec::new(),
         mixing: None,
         composite,
     })
@@ -110,7 +111,12 @@ mod tests {
     fn curve(model: &Composite) -> Curve {
         let levels: Vec<u32> = (1..=16).collect();
         let wv = levels.iter().map(|l| model.haar_wv(*l)).collect();
-        Curve { edof: levels.iter().map(|l| 1e6 / f64::from(*l).exp2()).collect(), wv, levels }
+        Curve {
+            edof: levels.iter().map(|l| 1e6 / f64::from(*l).exp2()).collect(),
+            wv,
+            levels,
+            ..Curve::default()
+        }
     }
 
     fn read(processes: Vec<Process>) -> Vec<f64> {

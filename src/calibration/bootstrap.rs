@@ -11,6 +11,7 @@
 //! scatters by its own degrees of freedom.
 
 use super::average::{Replicate, average};
+use super::implied::implied;
 use super::pipeline::{Outcome, Settings};
 use super::sampling::SamplingLaw;
 use super::spread::Spread;
@@ -29,7 +30,7 @@ pub(super) struct CurveSampler<'a> {
     law: SamplingLaw,
     /// Of replicates; none for a curve from elsewhere.
     pub(super) spread: Option<Spread>,
-    /// Wavelet variance of the model, of each level of the curve.
+    /// The curve that the model implies.
     centre: Vec<f64>,
     /// Of a robust variance ([`Tuning::bias`](crate::wavelet::Tuning::bias)).
     bias_times_edof: f64,
@@ -40,10 +41,9 @@ impl<'a> CurveSampler<'a> {
         let model = &outcome.fit.composite;
         let levels = outcome.curve.levels.iter().copied().max().unwrap_or(1) as usize;
         let law = SamplingLaw::new(model, levels);
-        let efficiency = settings.tuning.efficiency();
-        let spread =
-            (!replicates.is_empty()).then(|| Spread::new(replicates, outcome.estimator, &law, efficiency));
-        let centre = outcome.curve.levels.iter().map(|level| model.haar_wv(*level)).collect();
+        let spread = (!replicates.is_empty())
+            .then(|| Spread::new(replicates, outcome.estimator, &law, &settings.tuning));
+        let centre = implied(model, &outcome.curve);
         Self { replicates, outcome, law, spread, centre, bias_times_edof: settings.tuning.bias() }
     }
 
@@ -121,7 +121,8 @@ impl<'a> CurveSampler<'a> {
             like(replicate, levels.map(|((nu, ratio), edof)| nu * ratio * (1.0 + self.bias(*edof))).collect())
         };
         let replicates: Vec<Replicate> = self.replicates.iter().zip(ratios).zip(edof).map(of).collect();
-        average(&replicates, self.outcome.estimator, settings.trim, settings.tuning.efficiency()).ok()
+        let curve = average(&replicates, self.outcome.estimator, settings.trim, &settings.tuning).ok()?;
+        Some(Curve { ignored: self.outcome.curve.ignored.clone(), ..curve })
     }
 
     /// By how much a robust variance of so many degrees of freedom reads high.

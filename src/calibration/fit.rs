@@ -1,5 +1,6 @@
 //! A model fitted to a curve: theta = argmin Σ Omega_j (nu_j − nu_j(theta))².
 
+use super::implied::implied;
 use super::limits::Limits;
 use super::objective::{Component, Objective, Range, Weighting, whitening};
 use super::optimise::Termination;
@@ -43,6 +44,8 @@ pub struct Fit {
     pub residuals: Vec<f64>,
     /// Coordinates of the minima found, best first: where the search of a similar curve begins.
     pub(super) minima: Vec<Vec<f64>>,
+    /// The variances that the weights were made for.
+    pub(super) weighted_for: Vec<f64>,
     /// What the scales were mixed with, with the full covariance.
     pub(super) mixing: Option<Arc<DMatrix<f64>>>,
 }
@@ -61,7 +64,7 @@ pub enum FitError {
         scales: usize,
     },
     /// A wavelet variance that is not positive has no logarithm, no weight, no meaning.
-    #[error("the wavelet variance at scale 2^{level} is {value}: it must be a finite number > 0")]
+    #[error("the wavelet variance at scale 2^{level} is {value}: it must be a number from 1e-100 to 1e100")]
     NotPositive {
         /// Level.
         level: u32,
@@ -69,7 +72,9 @@ pub enum FitError {
         value: f64,
     },
     /// Degrees of freedom that weigh nothing.
-    #[error("the degrees of freedom at scale 2^{level} are {value}: they must be a finite number > 0")]
+    #[error(
+        "the degrees of freedom at scale 2^{level} are {value}: they must be a number from 1e-15 to 1e15"
+    )]
     NoWeight {
         /// Level.
         level: u32,
@@ -95,11 +100,50 @@ pub enum FitError {
 /// # Errors
 /// When the curve has fewer scales than the model parameters, or numbers that are no wavelet variances.
 pub fn fit(curve: &Curve, spec: &ModelSpec, rate_hz: f64, weighting: Weighting) -> Result<Fit, FitError> {
-    let diagonal = fit_near(curve, spec, rate_hz, weighting, None, COMBINATIONS, &[])?;
-    if weighting != Weighting::Full {
-        return Ok(diagonal);
+    let observed = Weights { weighting, nu: curve.wv.clone(), mixing: None };
+    let first = fit_near(curve, spec, rate_hz, observed, COMBINATIONS, &[])?;
+    match weighting {
+        Weighting::Model => reweighted(curve, spec, rate_hz, first, MOST_ROUNDS, COMBINATIONS),
+        Weighting::Full => {
+            fit_with_covariance(curve, spec, rate_hz, &covariance(curve, &first), expected(curve, &first))
+        }
+        Weighting::Edof | Weighting::Interval | Weighting::None => Ok(first),
     }
-    fit_with_covariance(curve, spec, rate_hz, &covariance(curve, &diagonal))
+}
+
+/// Fits again at most, until the weights are those of the model itself.
+const MOST_ROUNDS: usize = 20;
+/// The same of a curve that resembles one already fitted, whose model is where the weights begin.
+const FEW_ROUNDS: usize = 3;
+/// Changes of the implied curve, relative, that are not worth another fit.
+const SETTLED: f64 = 1e-6;
+
+/// The curve that a fit implies, where it may be divided by.
+pub(super) fn expected(curve: &Curve, fit: &Fit) -> Vec<f64> {
+    // A model without any amplitude implies nothing.
+    implied(&fit.composite, curve).iter().zip(&curve.wv).map(|(nu, wv)| nu.max(1e-6 * wv)).collect()
+}
+
+/// Fits with the weights of the last result.
+fn reweighted(
+    curve: &Curve,
+    spec: &ModelSpec,
+    rate_hz: f64,
+    first: Fit,
+    rounds: usize,
+    combinations: usize,
+) -> Result<Fit, FitError> {
+    let mut last = first;
+    for _ in 0..rounds {
+        let nu = expected(curve, &last);
+        let change = nu.iter().zip(&last.weighted_for).map(|(a, b)| (a / b - 1.0).abs());
+        if change.fold(0.0, f64::max) < SETTLED {
+            break;
+        }
+        let weights = Weights { weighting: Weighting::Model, nu, mixing: None };
+        last = fit_near(curve, spec, rate_hz, weights, combinations, &last.minima)?;
+    }
+    Ok(last)
 }
 
 /// Relative covariance of a curve of independent degrees of freedom, by the large-sample law of a model
@@ -113,7 +157,7 @@ fn covariance(curve: &Curve, fit: &Fit) -> DMatrix<f64> {
     DMatrix::from_fn(n, n, |i, j| law.correlation[(at(i), at(j))] * deviation(i) * deviation(j))
 }
 
-/// The fit weighted by the inverse of a relative covariance of the curve.
+/// The fit weighted by the inverse of a covariance of the curve relative to `nu`.
 ///
 /// # Errors
 /// As [`fit`].
@@ -122,9 +166,10 @@ pub(super) fn fit_with_covariance(
     spec: &ModelSpec,
     rate_hz: f64,
     covariance: &DMatrix<f64>,
+    nu: Vec<f64>,
 ) -> Result<Fit, FitError> {
     let mixing = Some(Arc::new(whitening(covariance)));
-    fit_near(curve, spec, rate_hz, Weighting::Full, mixing, COMBINATIONS, &[])
+    fit_near(curve, spec, rate_hz, Weights { weighting: Weighting::Full, nu, mixing }, COMBINATIONS, &[])
 }
 
 /// Combinations tried for a curve that resembles one already fitted.
@@ -138,35 +183,56 @@ pub(super) fn refit(
     weighting: Weighting,
     like: &Fit,
 ) -> Result<Fit, FitError> {
-    fit_near(curve, spec, rate_hz, weighting, like.mixing.clone(), FEW, &like.minima)
+    let nu = match weighting {
+        Weighting::Model | Weighting::Full => expected(curve, like),
+        Weighting::Edof | Weighting::Interval | Weighting::None => curve.wv.clone(),
+    };
+    let weights = Weights { weighting, nu, mixing: like.mixing.clone() };
+    let first = fit_near(curve, spec, rate_hz, weights, FEW, &like.minima)?;
+    match weighting {
+        Weighting::Model => reweighted(curve, spec, rate_hz, first, FEW_ROUNDS, NO_GRID),
+        _ => Ok(first),
+    }
+}
+
+/// Descents from the known minima only.
+const NO_GRID: usize = 0;
+
+/// What the scales of a curve count.
+struct Weights {
+    weighting: Weighting,
+    /// The variances it is made for.
+    nu: Vec<f64>,
+    mixing: Option<Arc<DMatrix<f64>>>,
 }
 
 fn fit_near(
     curve: &Curve,
     spec: &ModelSpec,
     rate_hz: f64,
-    weighting: Weighting,
-    mixing: Option<Arc<DMatrix<f64>>>,
+    weights: Weights,
     combinations: usize,
     known: &[Vec<f64>],
 ) -> Result<Fit, FitError> {
     check(curve, spec)?;
     let limited = spec.kinds().iter().zip(spec.limits());
     let components = limited.map(|(kind, limits)| component(*kind, *limits, curve, rate_hz)).collect();
-    let objective = Objective::new(curve, weighting, mixing.clone(), components);
+    let Weights { weighting, nu, mixing } = weights;
+    let objective = Objective::new(curve, weighting, &nu, mixing.clone(), components);
     let found = search(&objective, combinations, known);
-    Ok(Fit { mixing, ..assemble(&objective, &found, spec, rate_hz)? })
+    Ok(Fit { mixing, weighted_for: nu, ..assemble(&objective, &found, spec, rate_hz)? })
 }
 
 fn check(curve: &Curve, spec: &ModelSpec) -> Result<(), FitError> {
-    let bad = |values: &[f64]| values.iter().position(|v| !(v.is_finite() && *v > 0.0));
-    if let Some(i) = bad(&curve.wv) {
+    let bad =
+        |values: &[f64], (low, high): (f64, f64)| values.iter().position(|v| !(*v >= low && *v <= high));
+    if let Some(i) = bad(&curve.wv, Curve::WV_RANGE) {
         return Err(FitError::NotPositive { level: curve.levels[i], value: curve.wv[i] });
     }
-    if let Some(i) = bad(&curve.edof) {
+    if let Some(i) = bad(&curve.edof, Curve::EDOF_RANGE) {
         return Err(FitError::NoWeight { level: curve.levels[i], value: curve.edof[i] });
     }
-    let (parameters, scales) = (spec.parameters(), curve.levels.len());
+    let (parameters, scales) = (spec.parameters(), curve.levels.len() - curve.ignored.len());
     if scales < parameters {
         return Err(FitError::TooFewScales { spec: spec.to_string(), parameters, scales });
     }
@@ -244,6 +310,7 @@ fn assemble(objective: &Objective, found: &Found, spec: &ModelSpec, rate_hz: f64
         at_end: labelled(|t| t.amplitude > 0.0 && t.at_end),
         bounded: terms.iter().zip(&labels).flat_map(|(t, label)| t.bounded(label, rate_hz)).collect(),
         minima: minima(found),
+        weighted_for: Vec::new(),
         mixing: None,
         residuals: solution.residuals.iter().map(|r| r * objective.length).collect(),
         composite,

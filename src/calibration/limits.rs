@@ -1,6 +1,7 @@
 //! Where the parameters of a model may be: fixed, or within bounds.
 
 use super::spec::{Kind, ModelSpec};
+use crate::wavelet::Curve;
 
 /// Where the parameters of one process may be, in the units of the parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -107,7 +108,7 @@ impl Kind {
         match self {
             // The search is over positive correlations.
             Self::Ar1 => (value > 0.0 && value < 1.0, "between 0 and 1"),
-            Self::GaussMarkov => (value > 0.0 && value.is_finite(), "a finite number > 0 (1/s)"),
+            Self::GaussMarkov => ((1e-100..=1e100).contains(&value), "a number from 1e-100 to 1e100 (1/s)"),
             _ => ((-1.0..=1.0).contains(&value), "between -1 and 1"),
         }
     }
@@ -142,7 +143,7 @@ impl ModelSpec {
             return Err(LimitError::Parameter { process, parameter, legal });
         }
         for value in [low, high].into_iter().flatten() {
-            let amplitude = (value >= 0.0 && value.is_finite(), "a finite number ≥ 0");
+            let amplitude = ((0.0..=Curve::WV_RANGE.1).contains(&value), "a number from 0 to 1e100");
             let (inside, domain) = if is_amplitude { amplitude } else { kind.shape_domain(value) };
             if !inside {
                 let (process, parameter) = (process.to_owned(), parameter.to_owned());
@@ -179,7 +180,13 @@ mod tests {
             "AR1_1 phi: nothing lies between 0.9 and 0.8"
         );
         assert_eq!(message("AR1_2", "phi", None, Some(1.0)), "AR1_2 phi: 1 is not between 0 and 1");
-        assert_eq!(message("RW", "gamma2", Some(-1.0), None), "RW gamma2: -1 is not a finite number ≥ 0");
+        assert_eq!(
+            message("RW", "gamma2", Some(-1.0), None),
+            "RW gamma2: -1 is not a number from 0 to 1e100"
+        );
+        assert!(
+            message("WN", "sigma2", Some(1e308), Some(1e308)).ends_with("is not a number from 0 to 1e100")
+        );
         assert_eq!(spec.parameters(), 7);
         spec.limit("AR1_2", "phi", Some(0.99), Some(0.99)).unwrap();
         assert_eq!(spec.parameters(), 6, "a fixed parameter is not free");

@@ -12,6 +12,7 @@ mod bounded;
 mod diagnosis;
 mod fit;
 mod goodness;
+mod implied;
 mod inference;
 mod limits;
 mod notes;
@@ -35,6 +36,7 @@ pub use diagnosis::{
 };
 pub use fit::{Fit, FitError, fit};
 pub use goodness::Goodness;
+pub use implied::implied;
 pub use inference::{Bootstrap, Inference, infer};
 pub use limits::{LimitError, Limits};
 pub use notes::{Share, correlation_time_s, duration, notes, percent, shares};

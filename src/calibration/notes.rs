@@ -2,6 +2,7 @@
 
 use super::average::{Estimator, Replicate};
 use super::fit::Fit;
+use super::implied::implied;
 use super::pipeline::Outcome;
 use crate::noise::{Composite, Process};
 use crate::wavelet::{Curve, Status};
@@ -69,7 +70,7 @@ pub fn notes(outcome: &Outcome, replicates: &[Replicate], rate_hz: f64) -> Vec<S
     not_identifiable(*estimator == Estimator::Avlr, fit, curve, record_s, rate_hz, &mut notes);
     misfit(fit, curve, rate_hz, &mut notes);
     if estimator.is_robust() {
-        robust_remarks(fit, curve, replicates, rate_hz, &mut notes);
+        robust_remarks(curve, replicates, &mut notes);
     }
     notes
 }
@@ -176,8 +177,10 @@ pub fn correlation_time_s(process: &Process, rate_hz: f64) -> Option<f64> {
 }
 
 fn misfit(fit: &Fit, curve: &Curve, rate_hz: f64, notes: &mut Vec<String>) {
-    let missed = curve.levels.iter().zip(&curve.wv).zip(&curve.edof).filter_map(|((level, nu), edof)| {
-        let relative = nu / fit.composite.haar_wv(*level) - 1.0;
+    let implied = implied(&fit.composite, curve);
+    let scales = curve.levels.iter().zip(&curve.wv).zip(&curve.edof).zip(implied);
+    let missed = scales.filter_map(|(((level, nu), edof), implied)| {
+        let relative = nu / implied - 1.0;
         let deviations = relative * (0.5 * edof).sqrt();
         (deviations.abs() > MISFIT).then_some((*level, relative, deviations))
     });
@@ -195,7 +198,7 @@ fn misfit(fit: &Fit, curve: &Curve, rate_hz: f64, notes: &mut Vec<String>) {
     ));
 }
 
-fn robust_remarks(fit: &Fit, curve: &Curve, replicates: &[Replicate], rate_hz: f64, notes: &mut Vec<String>) {
+fn robust_remarks(curve: &Curve, replicates: &[Replicate], notes: &mut Vec<String>) {
     let with = |status: Status| {
         let has = |r: &&Replicate| r.robust[..curve.levels.len()].iter().any(|v| v.status == status);
         replicates.iter().filter(has).count()
@@ -212,16 +215,6 @@ fn robust_remarks(fit: &Fit, curve: &Curve, replicates: &[Replicate], rate_hz: f
         notes.push(format!(
             "{} scales most of whose coefficients are exactly zero (coarse quantisation)",
             have(coarse, count)
-        ));
-    }
-    let leads = |(process, share): (&Process, Share)| {
-        matches!(process, Process::Quantization(_)) && !share.leads.is_empty()
-    };
-    if fit.composite.processes.iter().zip(shares(&fit.composite, &curve.levels)).any(leads) {
-        let scale = curve.levels.first().map_or(0.0, |level| scale_s(*level, rate_hz));
-        notes.push(format!(
-            "quantization noise leads at {scale} s; it is not Gaussian, and the robust wavelet variance reads it \
-             high (by 15 % at efficiency 0.6): so is q2"
         ));
     }
 }

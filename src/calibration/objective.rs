@@ -1,19 +1,28 @@
 //! The distance between a curve and a model: Σ Omega_j (nu_j − nu_j(theta))²
 //! ([Guerrier](crate::bibliography::Guerrier13), eq. 6).
 //!
-//! Every process contributes an amplitude times a shape, so with the shapes fixed the model is linear.
+//! Every process contributes an amplitude times a shape, so with the shapes fixed the model is linear. Not quite so for
+//! robust variances, which read quantization noise high by a factor of its share ([`super::implied`]): there the linear
+//! problem is solved for the derivatives at the last solution until the shares settle. The implied curve is homogeneous in
+//! the amplitudes, so that its linear expansion at a solution has no constant, and where the shares have settled the
+//! conditions of the linear problem are those of the true one.
 
 use super::bounded::{Bounded, MOST, Matrix, Vector, cholesky_solve};
+use super::implied::Response;
 use super::spec::Kind;
 use crate::noise::{Ar1, Drift, GaussMarkov, Ma1, Quantization, RandomWalk, White};
-use crate::wavelet::{Curve, interval};
+use crate::wavelet::{Curve, QuantizationResponse, interval};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
 /// Omega: what a scale counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Weighting {
-    /// edof/(2 nu²), the inverse variance of nu_hat.
+    /// edof/(2 nu(theta)²), the inverse variance of nu_hat where the model holds. The fit is repeated until the weights
+    /// are those of its own result, which makes it the maximum-likelihood estimate of independent chi-squares; a
+    /// variance that is low by chance weighs no more than others.
+    Model,
+    /// edof/(2 nu_hat²), the convention of the literature: what is low by chance weighs most.
     Edof,
     /// 1/(width of the 95 % interval)².
     Interval,
@@ -24,17 +33,18 @@ pub enum Weighting {
 }
 
 impl Weighting {
-    /// √Omega_j of each scale (1/units²).
-    pub(super) fn roots(self, curve: &Curve) -> Vec<f64> {
-        let root = |(nu, edof): (&f64, &f64)| match self {
-            Self::Edof | Self::Full => (0.5 * edof).sqrt() / nu,
+    /// √Omega_j of each scale (1/units²), where its variance is taken to be `nu`.
+    pub(super) fn roots(self, curve: &Curve, nu: &[f64]) -> Vec<f64> {
+        let root = |((nu, edof), level): ((&f64, &f64), &u32)| match self {
+            _ if curve.ignored.contains(level) => 0.0,
+            Self::Model | Self::Edof | Self::Full => (0.5 * edof).sqrt() / nu,
             Self::Interval => {
                 let (low, high) = interval::interval(*nu, *edof, 0.95);
                 1.0 / (high - low)
             }
             Self::None => 1.0,
         };
-        curve.wv.iter().zip(&curve.edof).map(root).collect()
+        nu.iter().zip(&curve.edof).zip(&curve.levels).map(root).collect()
     }
 }
 
@@ -76,15 +86,41 @@ fn of_log(u: f64, shape: impl Fn(f64) -> (f64, f64)) -> (f64, f64) {
     (value, derivative * kappa)
 }
 
+/// Wavelet variance of a component per unit of its amplitude, at all levels.
+#[derive(Debug, Clone)]
+pub(super) struct Shape {
+    pub(super) component: usize,
+    values: Vec<f64>,
+    /// Derivative with respect to the coordinate.
+    slopes: Vec<f64>,
+}
+
 /// A column of the linear problem, at unit length.
 #[derive(Debug, Clone)]
 pub(super) struct Column {
     pub(super) values: Vec<f64>,
     /// Derivative with respect to the coordinate, divided by the same length.
-    pub(super) slopes: Vec<f64>,
+    slopes: Vec<f64>,
     /// The length taken out.
     pub(super) length: f64,
 }
+
+/// Solution of the linear problem.
+struct LinearBest {
+    gram: Matrix,
+    /// Amplitudes, in units of their columns' lengths.
+    x: Vector,
+    /// Those on no bound.
+    active: Vec<usize>,
+    residuals: Vec<f64>,
+}
+
+/// Rounds at most until the shares of quantization noise have settled; each takes off two digits or so.
+const SETTLED: usize = 16;
+/// Changes of the response that are rounding.
+const SETTLED_CHANGE: f64 = 1e-13;
+/// Rounds that tell which of the grid's combinations are near.
+pub(super) const NEARLY_SETTLED: usize = 3;
 
 /// The least-squares problem: weighted curve, in units of its length.
 #[derive(Debug, Clone)]
@@ -93,6 +129,8 @@ pub(super) struct Objective {
     roots: Vec<f64>,
     /// What mixes the scales so that their errors are uncorrelated, once they are relative to the curve.
     mixing: Option<Arc<DMatrix<f64>>>,
+    /// How the curve reads quantization noise, where that is not as it is and the model has some.
+    quantization: Option<QuantizationResponse>,
     pub(super) target: Vec<f64>,
     pub(super) length: f64,
     pub(super) components: Vec<Component>,
@@ -124,22 +162,31 @@ impl Solution {
 }
 
 impl Objective {
-    /// With a mixing matrix it is applied to nu_j(theta)/nu_j, and the weighting does not matter.
+    /// Weights where the variances are taken to be `nu`. With a mixing matrix it is applied to nu_j(theta)/nu_j, and the
+    /// weighting does not matter.
     pub(super) fn new(
         curve: &Curve,
         weighting: Weighting,
+        nu: &[f64],
         mixing: Option<Arc<DMatrix<f64>>>,
         components: Vec<Component>,
     ) -> Self {
         let roots = match mixing {
-            Some(_) => curve.wv.iter().map(|nu| 1.0 / nu).collect(),
-            None => weighting.roots(curve),
+            Some(_) => nu.iter().map(|nu| 1.0 / nu).collect(),
+            None => weighting.roots(curve, nu),
         };
         let target: Vec<f64> = roots.iter().zip(&curve.wv).map(|(w, nu)| w * nu).collect();
         let target = mixed(mixing.as_deref(), target);
         let length = dot(&target, &target).sqrt();
         let target = target.iter().map(|b| b / length).collect();
-        Self { levels: curve.levels.clone(), roots, mixing, target, length, components }
+        let has_quantization = components.iter().any(|c| c.kind == Kind::Quantization);
+        let quantization = curve.quantization.filter(|_| has_quantization);
+        Self { levels: curve.levels.clone(), roots, mixing, quantization, target, length, components }
+    }
+
+    /// Whether the model is linear in its amplitudes.
+    pub(super) const fn is_linear(&self) -> bool {
+        self.quantization.is_none()
     }
 
     /// The components that have a coordinate.
@@ -147,19 +194,49 @@ impl Objective {
         self.components.iter().enumerate().filter_map(|(i, c)| Some((i, c.coordinate?)))
     }
 
-    pub(super) fn column(&self, component: usize, u: f64) -> Column {
-        let component = &self.components[component];
-        let weighted = |(level, root): (&u32, &f64)| {
-            let (value, slope) = component.shape(u, *level);
-            (value * root, slope * root)
-        };
+    pub(super) fn shape(&self, component: usize, u: f64) -> Shape {
+        let process = &self.components[component];
+        let (values, slopes) = self.levels.iter().map(|level| process.shape(u, *level)).unzip();
+        Shape { component, values, slopes }
+    }
+
+    /// The column of a shape where the curve responds so, level by level.
+    pub(super) fn column(&self, shape: &Shape, responses: &[Response]) -> Column {
+        let is_quantization = self.components[shape.component].kind == Kind::Quantization;
+        let weights = self.roots.iter().zip(responses).map(|(root, response)| {
+            root * if is_quantization { response.quantization } else { response.others }
+        });
+        let weighted = |((value, slope), weight): ((&f64, &f64), f64)| (value * weight, slope * weight);
         let (values, slopes): (Vec<f64>, Vec<f64>) =
-            self.levels.iter().zip(&self.roots).map(weighted).unzip();
+            shape.values.iter().zip(&shape.slopes).zip(weights).map(weighted).unzip();
         let mut values = mixed(self.mixing.as_deref(), values);
         let mut slopes = mixed(self.mixing.as_deref(), slopes);
         let length = dot(&values, &values).sqrt();
         values.iter_mut().chain(&mut slopes).for_each(|v| *v /= length);
         Column { values, slopes, length }
+    }
+
+    /// Of a curve that reads everything as it is.
+    pub(super) fn plain_responses(&self) -> Vec<Response> {
+        vec![Response::PLAIN; self.levels.len()]
+    }
+
+    /// How the curve responds to small changes of the amplitudes, level by level.
+    fn responses(&self, shapes: &[&Shape], amplitudes: &[f64]) -> Vec<Response> {
+        let Some(quantization) = &self.quantization else { return self.plain_responses() };
+        let at_level = |level: usize| {
+            let (mut own, mut all) = (0.0, 0.0);
+            for (shape, amplitude) in shapes.iter().zip(amplitudes) {
+                let nu = amplitude * shape.values[level];
+                all += nu;
+                if self.components[shape.component].kind == Kind::Quantization {
+                    own += nu;
+                }
+            }
+            // Of nothing nothing is a part.
+            if all > 0.0 { Response::new(quantization, (own / all).clamp(0.0, 1.0)) } else { Response::PLAIN }
+        };
+        (0..self.levels.len()).map(at_level).collect()
     }
 
     /// The bounds of an amplitude in units in which its column has unit length.
@@ -171,31 +248,62 @@ impl Objective {
     /// The best amplitudes for the coordinates given (one for each component that has one).
     pub(super) fn solve(&self, coordinates: &[f64]) -> Solution {
         let mut next = coordinates.iter();
-        let columns: Vec<Column> = (0..self.components.len())
+        let shapes: Vec<Shape> = (0..self.components.len())
             .map(|i| {
                 let shaped = self.components[i].coordinate.is_some();
-                self.column(i, if shaped { next.next().copied().unwrap_or(0.0) } else { 0.0 })
+                self.shape(i, if shaped { next.next().copied().unwrap_or(0.0) } else { 0.0 })
             })
             .collect();
-        let problem = self.linear_problem(&columns);
+        self.best_amplitudes(&shapes.iter().collect::<Vec<_>>(), SETTLED)
+    }
+
+    /// The best amplitudes for shapes of all components, in their order, after so many rounds at most.
+    pub(super) fn best_amplitudes(&self, shapes: &[&Shape], rounds: usize) -> Solution {
+        let columns_of = |responses: &[Response]| -> Vec<Column> {
+            shapes.iter().map(|shape| self.column(shape, responses)).collect()
+        };
+        let mut responses = self.plain_responses();
+        let mut columns = columns_of(&responses);
+        let mut best = self.linear_best(&columns);
+        for _ in 0..if self.is_linear() { 0 } else { rounds } {
+            let next = self.responses(shapes, &self.amplitudes(&columns, &best.x));
+            let change = |(a, b): (&Response, &Response)| {
+                (a.others - b.others).abs().max((a.quantization - b.quantization).abs())
+            };
+            if next.iter().zip(&responses).map(change).fold(0.0, f64::max) < SETTLED_CHANGE {
+                break;
+            }
+            responses = next;
+            columns = columns_of(&responses);
+            best = self.linear_best(&columns);
+        }
+        let LinearBest { gram, x, active, residuals } = best;
+        let jacobian = self.shaped().map(|(i, _)| tangent(&columns, &active, &gram, i, x[i])).collect();
+        Solution { amplitudes: self.amplitudes(&columns, &x), residuals, jacobian }
+    }
+
+    /// The best amplitudes of columns of all components.
+    fn linear_best(&self, columns: &[Column]) -> LinearBest {
+        let problem = self.linear_problem(columns);
         let mut x = problem.minimise();
         let free = |x: &Vector, i: usize| x[i] > problem.lower[i] && x[i] < problem.upper[i];
         let active: Vec<usize> = (0..columns.len()).filter(|i| free(&x, *i)).collect();
         // One refinement with the residuals themselves: the normal equations know only half the digits.
-        let mut residuals = self.residuals(&columns, &x);
-        if let Some(change) = project(&columns, &active, &problem.gram, &residuals) {
+        let mut residuals = self.residuals(columns, &x);
+        if let Some(change) = project(columns, &active, &problem.gram, &residuals) {
             let mut refined = x;
             active.iter().zip(change).for_each(|(i, d)| refined[*i] += d);
             if active.iter().all(|i| free(&refined, *i)) {
                 x = refined;
-                residuals = self.residuals(&columns, &x);
+                residuals = self.residuals(columns, &x);
             }
         }
-        let jacobian =
-            self.shaped().map(|(i, _)| tangent(&columns, &active, &problem.gram, i, x[i])).collect();
-        let unit = |(x, c): (&f64, &Column)| x * self.length / c.length;
-        let amplitudes = x.iter().zip(&columns).map(unit).collect();
-        Solution { amplitudes, residuals, jacobian }
+        LinearBest { gram: problem.gram, x, active, residuals }
+    }
+
+    /// Amplitudes in the parameters' units.
+    fn amplitudes(&self, columns: &[Column], x: &Vector) -> Vec<f64> {
+        x.iter().zip(columns).map(|(x, c)| x * self.length / c.length).collect()
     }
 
     fn linear_problem(&self, columns: &[Column]) -> Bounded {

@@ -199,7 +199,7 @@ mod tests {
             let composite = Composite::new(processes);
             let levels: Vec<u32> = (1..=12).collect();
             let wv = levels.iter().map(|l| composite.haar_wv(*l) + 1e-12).collect();
-            let curve = Curve { edof: vec![100.0; 12], levels, wv };
+            let curve = Curve { edof: vec![100.0; 12], levels, wv, ..Curve::default() };
             let spec = "2*AR1".parse().unwrap();
             let mut fit = fit(&curve, &spec, 1.0, Weighting::Edof).unwrap();
             (fit.composite, fit.zero) = (composite, Vec::new());

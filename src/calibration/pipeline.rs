@@ -4,7 +4,7 @@ use super::auto::{Ranking, choose};
 use super::average::{AverageError, Estimator, Trim, average};
 use super::avlr::avlr;
 use super::bootstrap::CurveSampler;
-use super::fit::{Fit, FitError, fit, fit_with_covariance, refit};
+use super::fit::{Fit, FitError, expected, fit, fit_with_covariance, refit};
 use super::inference::Inference;
 use super::limits::LimitError;
 use super::notes::notes;
@@ -146,7 +146,7 @@ pub fn calibrate(groups: &[Group], settings: &Settings) -> Result<Vec<Outcome>, 
         (0..groups.len()).flat_map(|g| settings.estimators.iter().map(move |e| (g, *e))).collect();
     let run = |&(index, estimator): &(usize, Estimator)| {
         let replicates = &groups[index].replicates;
-        let curve = average(replicates, estimator, settings.trim, settings.tuning.efficiency())
+        let curve = average(replicates, estimator, settings.trim, &settings.tuning)
             .map_err(|source| CalibrationError::new(&groups[index], estimator, source))?;
         fit_curve(groups, index, estimator, curve, settings)
     };
@@ -203,7 +203,13 @@ fn weigh_fully(group: &Group, outcome: &mut Outcome, settings: &Settings) -> Res
     }
     let sampler = CurveSampler::new(&group.replicates, outcome, settings);
     let covariance = sampler.covariance(DRAWS, &group.name(), settings);
-    outcome.fit = fit_with_covariance(&outcome.curve, &outcome.spec, settings.rate_hz, &covariance)?;
+    outcome.fit = fit_with_covariance(
+        &outcome.curve,
+        &outcome.spec,
+        settings.rate_hz,
+        &covariance,
+        expected(&outcome.curve, &outcome.fit),
+    )?;
     Ok(())
 }
 

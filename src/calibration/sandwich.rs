@@ -5,6 +5,7 @@
 //! bound, or whose process has no amplitude, is taken as known. Slopes (AVLR) are no least squares: they have none.
 
 use super::average::Estimator;
+use super::implied::{implied, implied_gradients};
 use super::pipeline::{Outcome, Settings};
 use nalgebra::DMatrix;
 
@@ -33,20 +34,18 @@ pub(super) fn standard_errors(outcome: &Outcome, settings: &Settings, covariance
         return vec![f64::NAN; all.iter().filter(|p| !p.0).count()];
     }
     let levels = curve.levels.len();
-    let gradients: Vec<Vec<f64>> = curve.levels.iter().map(|l| fit.composite.haar_wv_gradient(*l)).collect();
+    let gradients = implied_gradients(&fit.composite, curve);
+    let centre = implied(&fit.composite, curve);
     let weights = match &fit.mixing {
-        Some(mixing) => DMatrix::from_fn(levels, levels, |i, j| mixing[(i, j)] / curve.wv[j]),
+        Some(mixing) => DMatrix::from_fn(levels, levels, |i, j| mixing[(i, j)] / fit.weighted_for[j]),
         None => {
-            let roots = settings.weighting.roots(curve);
+            let roots = settings.weighting.roots(curve, &fit.weighted_for);
             DMatrix::from_fn(levels, levels, |i, j| if i == j { roots[i] } else { 0.0 })
         }
     };
     // Relative to the parameters, which are of very different sizes.
     let jacobian = DMatrix::from_fn(levels, moving.len(), |j, m| gradients[j][moving[m]] * all[moving[m]].2);
-    let scatter = DMatrix::from_fn(levels, levels, |i, j| {
-        let nu = |level: usize| fit.composite.haar_wv(curve.levels[level]);
-        covariance[(i, j)] * nu(i) * nu(j)
-    });
+    let scatter = DMatrix::from_fn(levels, levels, |i, j| covariance[(i, j)] * centre[i] * centre[j]);
     let relative = (&weights * jacobian)
         .pseudo_inverse(f64::EPSILON)
         .map(|inverse| inverse * weights)

@@ -5,7 +5,7 @@
 //! between grid points, and the objective is smooth there: neighbouring shapes differ by a few per cent.
 
 use super::bounded::{Bounded, MOST};
-use super::objective::{Column, Objective, Range, dot};
+use super::objective::{Column, NEARLY_SETTLED, Objective, Range, Shape, dot};
 use super::optimise::{End, Termination, descend};
 use rayon::prelude::*;
 
@@ -27,7 +27,7 @@ pub(super) struct Found {
     pub(super) combinations: usize,
 }
 
-/// Searches all coordinates, on a grid of about so many combinations at most and from the `known` minima of
+/// Searches all coordinates, on a grid of about so many combinations at most (none for 0) and from the `known` minima of
 /// a similar curve.
 pub(super) fn search(objective: &Objective, combinations: usize, known: &[Vec<f64>]) -> Found {
     let dimensions: Vec<(usize, Range)> = objective.shaped().collect();
@@ -36,13 +36,17 @@ pub(super) fn search(objective: &Objective, combinations: usize, known: &[Vec<f6
         let best = End { coordinates: Vec::new(), cost, termination: Termination::Linear };
         return Found { ends: vec![best.clone()], best, combinations: 1 };
     }
-    let grid = Grid::new(objective, &dimensions, combinations);
-    let choices = grid.choices();
-    let mut starts = grid.starts(&choices);
-    starts.extend_from_slice(known);
+    let mut starts = known.to_vec();
+    let mut tried = 0;
+    if combinations > 0 || known.is_empty() {
+        let grid = Grid::new(objective, &dimensions, combinations);
+        let choices = grid.choices();
+        tried = choices.len();
+        starts.splice(0..0, grid.starts(&choices));
+    }
     let mut ends: Vec<End> = starts.par_iter().map(|start| descend(objective, start)).collect();
     ends.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    Found { best: ends[0].clone(), ends, combinations: choices.len() }
+    Found { best: ends[0].clone(), ends, combinations: tried }
 }
 
 /// The grid: for each dimension its points and their columns; the inner products of all columns.
@@ -51,7 +55,9 @@ struct Grid<'a> {
     points: Vec<Vec<f64>>,
     /// Whether a dimension is alike the one before it, so that only ascending pairs are needed.
     repeats: Vec<bool>,
-    /// Columns of the components without a shape, then those of the points of each dimension.
+    /// Shapes of the components without a coordinate, then those of the points of each dimension.
+    shapes: Vec<Shape>,
+    /// Their columns.
     columns: Vec<Column>,
     /// Component of each column.
     owners: Vec<usize>,
@@ -70,15 +76,17 @@ impl<'a> Grid<'a> {
             .collect();
         let fixed = (0..objective.components.len()).filter(|i| objective.components[*i].coordinate.is_none());
         let mut owners: Vec<usize> = fixed.collect();
-        let mut columns: Vec<Column> = owners.iter().map(|i| objective.column(*i, 0.0)).collect();
+        let mut shapes: Vec<Shape> = owners.iter().map(|i| objective.shape(*i, 0.0)).collect();
         for ((owner, _), points) in dimensions.iter().zip(&points) {
-            columns.extend(points.iter().map(|u| objective.column(*owner, *u)));
+            shapes.extend(points.iter().map(|u| objective.shape(*owner, *u)));
             owners.extend(points.iter().map(|_| *owner));
         }
+        let plain = objective.plain_responses();
+        let columns: Vec<Column> = shapes.iter().map(|shape| objective.column(shape, &plain)).collect();
         let n = columns.len();
         let gram = (0..n * n).map(|k| dot(&columns[k / n].values, &columns[k % n].values)).collect();
         let right = columns.iter().map(|c| dot(&c.values, &objective.target)).collect();
-        Self { objective, points, repeats, columns, owners, gram, right }
+        Self { objective, points, repeats, shapes, columns, owners, gram, right }
     }
 
     /// Least Σ residual² for a choice of points, one for each dimension.
@@ -92,6 +100,11 @@ impl<'a> Grid<'a> {
             selected[n] = offset + index;
             offset += points.len();
             n += 1;
+        }
+        if !self.objective.is_linear() {
+            let mut shapes: Vec<&Shape> = selected[..n].iter().map(|i| &self.shapes[*i]).collect();
+            shapes.sort_unstable_by_key(|shape| shape.component);
+            return self.objective.best_amplitudes(&shapes, NEARLY_SETTLED).cost();
         }
         let mut problem = Bounded::new(n);
         for a in 0..n {

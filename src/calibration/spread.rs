@@ -8,7 +8,7 @@ use super::average::{Estimator, Replicate};
 use super::robust_scale::{MAD_TO_DEVIATION, median};
 use super::sampling::{SamplingLaw, chi_square_ratio};
 use crate::rng::Generator;
-use crate::wavelet::interval::edof_robust;
+use crate::wavelet::Tuning;
 use rand::RngExt;
 use rand_distr::StandardNormal;
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -43,10 +43,10 @@ impl Spread {
         replicates: &[Replicate],
         estimator: Estimator,
         law: &SamplingLaw,
-        efficiency: f64,
+        tuning: &Tuning,
     ) -> Self {
         let levels = law.correlation.nrows();
-        let edof: Vec<Vec<f64>> = replicates.iter().map(|r| edof(r, estimator, law, efficiency)).collect();
+        let edof: Vec<Vec<f64>> = replicates.iter().map(|r| edof(r, estimator, law, tuning)).collect();
         let count = replicates.len() as f64;
         let within: Vec<f64> = (0..levels)
             .map(|j| (edof.iter().map(|e| variance_of_log(e[j])).sum::<f64>() / count).sqrt())
@@ -112,9 +112,12 @@ fn edof_of_log(variance: f64) -> f64 {
     (1.0 + (1.0 + 2.0 * variance).sqrt()) / variance
 }
 
-fn edof(replicate: &Replicate, estimator: Estimator, law: &SamplingLaw, efficiency: f64) -> Vec<f64> {
-    let reduce = |e: f64| if estimator.is_robust() { edof_robust(e, efficiency) } else { e };
-    law.edof(replicate.samples).into_iter().map(reduce).collect()
+fn edof(replicate: &Replicate, estimator: Estimator, law: &SamplingLaw, tuning: &Tuning) -> Vec<f64> {
+    if estimator.is_robust() {
+        law.robust_edof(replicate.samples, tuning)
+    } else {
+        law.edof(replicate.samples)
+    }
 }
 
 /// Variance of ln(chi²/eta): the trigamma function at eta/2, by its asymptotic series.

@@ -34,17 +34,18 @@ pub(crate) struct Args {
     /// States in the table (repeatable), or "all"
     #[arg(long = "state", value_name = "STATE", default_values = ["pos_e_m", "roll_deg"])]
     states: Vec<String>,
-    /// Where to write the comparison
-    #[arg(long, short, value_name = "FILE", default_value = "comparison.json")]
-    out: PathBuf,
+    /// Where to write the comparison [default: comparison.json, unless that is something else]
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let states = states(&args.states)?;
+    let out = &args.out.clone().map_or_else(unasked_output, Ok)?;
     let read_from = args.runs.iter().chain([&args.reference]);
     let inputs: Vec<PathBuf> =
         read_from.flat_map(|run| report::RUN_FILES.map(|name| run.join(name))).collect();
-    atomic::guard_inputs(&args.out, inputs.iter().map(PathBuf::as_path))?;
+    atomic::guard_inputs(out, inputs.iter().map(PathBuf::as_path))?;
     let reference = read(&args.reference)?;
     let mut candidates = Vec::new();
     let mut all_paired = true;
@@ -72,13 +73,13 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let name = args.reference.display().to_string();
     let file = ComparisonFile::new((&name, &verdict(&reference.experiment)), all_paired, &candidates);
     let json = report::json(&file);
-    atomic::write(&args.out, &json)?;
+    atomic::write(out, &json)?;
     if session.json() {
         session.printer.result(json.trim_end());
     } else {
         session.printer.result(&text(&file, &candidates, &states));
     }
-    session.printer.say(&format!("wrote {}", args.out.display()));
+    session.printer.say(&format!("wrote {}", out.display()));
     Ok(())
 }
 
@@ -99,6 +100,20 @@ fn text(file: &ComparisonFile, candidates: &[CandidateResult], states: &[usize])
         lines.push(table(&report::consistency_rows(candidates, states)));
     }
     lines.join("\n")
+}
+
+/// The output that nobody named: a file there that is no comparison is somebody's own.
+fn unasked_output() -> Result<PathBuf, Failure> {
+    let path = PathBuf::from("comparison.json");
+    let is_comparison = |text: String| {
+        let file: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
+        ["schema_version", "reference", "paired", "rows"].iter().all(|key| !file[key].is_null())
+    };
+    if !path.exists() || std::fs::read_to_string(&path).is_ok_and(is_comparison) {
+        return Ok(path);
+    }
+    let failure = Failure::input(format!("{} is there and is no comparison", path.display()));
+    Err(failure.hint("name the output with --out"))
 }
 
 fn read(path: &Path) -> Result<run_directory::RunDirectory, Failure> {
@@ -160,8 +175,25 @@ fn same_place(a: &Path, b: &Path) -> bool {
 pub(super) fn table(rows: &[Vec<String>]) -> String {
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN).set_content_arrangement(ContentArrangement::Disabled);
+    let escaped = |row: &Vec<String>| row.iter().map(|cell| markdown(cell)).collect::<Vec<_>>();
     if let Some((head, rows)) = rows.split_first() {
-        table.set_header(head).add_rows(rows);
+        table.set_header(escaped(head)).add_rows(rows.iter().map(escaped));
     }
     table.to_string()
+}
+
+/// A text in Markdown, of which no part is taken for a cell's end, a line's end or HTML.
+pub(super) fn markdown(text: &str) -> String {
+    text.replace('|', "\\|").replace('<', "&lt;").replace(['\n', '\r'], " ")
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn names_stay_in_their_cells() {
+        let rows = [vec!["run".to_owned()], vec!["a|b\n<script>".to_owned()]];
+        let table = super::table(&rows);
+        assert_eq!(table.lines().count(), 3, "{table}");
+        assert!(table.contains("a\\|b &lt;script>"), "{table}");
+    }
 }

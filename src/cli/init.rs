@@ -2,7 +2,8 @@
 
 use super::{Failure, Session};
 use nav_sim::data::atomic;
-use std::path::PathBuf;
+use std::fs;
+use std::path::{Path, PathBuf};
 
 /// Make a directory with everything to start from: trajectories, virtual IMUs, a scenario
 ///
@@ -47,14 +48,47 @@ const FILES: &[(&str, &[u8])] = repository_files![
 ];
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let mut made = Made::default();
     for (name, contents) in FILES {
         let path = args.directory.join(name);
         if path.exists() {
             session.printer.say(&format!("kept {}", path.display()));
             continue;
         }
-        atomic::write(&path, contents)?;
+        made.directories.extend(path.ancestors().skip(1).filter(|p| !p.exists()).map(Path::to_owned));
+        made.write(path, contents)?;
+    }
+    made.directories.clear();
+    for path in std::mem::take(&mut made.files) {
         session.printer.result(&path.display().to_string());
     }
     Ok(())
+}
+
+/// What was made so far; removed again if not all can be.
+#[derive(Default)]
+struct Made {
+    files: Vec<PathBuf>,
+    /// Those that were not there before.
+    directories: Vec<PathBuf>,
+}
+
+impl Made {
+    fn write(&mut self, path: PathBuf, contents: &[u8]) -> Result<(), Failure> {
+        atomic::write(&path, contents)?;
+        self.files.push(path);
+        Ok(())
+    }
+}
+
+impl Drop for Made {
+    fn drop(&mut self) {
+        for file in &self.files {
+            let _ = fs::remove_file(file);
+        }
+        self.directories.sort_by_key(|path| std::cmp::Reverse(path.components().count()));
+        for directory in &self.directories {
+            let _ = fs::remove_dir(directory); // if nothing else is in it
+        }
+    }
 }

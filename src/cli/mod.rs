@@ -14,6 +14,7 @@ mod exit;
 mod filter;
 mod fuse;
 mod init;
+mod interrupt;
 mod man;
 mod parse;
 mod printer;
@@ -67,6 +68,11 @@ enum Command {
 }
 
 impl Command {
+    /// Whether the command itself ends in good order at a signal.
+    const fn heeds_signals(&self) -> bool {
+        matches!(self, Self::Batch(args) if args.heeds_signals())
+    }
+
     fn run(self, session: &Session) -> Result<(), Failure> {
         match self {
             Self::Wv(args) => wv::run(&args, session),
@@ -109,7 +115,12 @@ pub(crate) fn main() -> ExitCode {
     let matches = command().color(color_choice()).get_matches();
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
     let printer = Printer::new(&cli.common);
-    match Session::new(cli.common).and_then(|session| cli.command.run(&session)) {
+    if !cli.command.heeds_signals() {
+        interrupt::watch(Printer::new(&cli.common));
+    }
+    let outcome = Session::new(cli.common).and_then(|session| cli.command.run(&session));
+    interrupt::settle();
+    match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             printer.failure(&failure);

@@ -2,6 +2,7 @@
 
 use super::common::{Color, Common};
 use super::exit::Failure;
+use std::borrow::Cow;
 use std::io::{ErrorKind, IsTerminal, Write};
 
 /// Where results and remarks go.
@@ -35,7 +36,7 @@ impl Printer {
             return;
         }
         let mut stdout = std::io::stdout().lock();
-        match writeln!(stdout, "{text}").and_then(|()| stdout.flush()) {
+        match writeln!(stdout, "{}", safe(text)).and_then(|()| stdout.flush()) {
             Ok(()) => {}
             Err(e) if e.kind() == ErrorKind::BrokenPipe => std::process::exit(0),
             Err(e) => {
@@ -48,6 +49,10 @@ impl Printer {
 
     /// A remark, to stderr.
     pub(crate) fn say(&self, text: &str) {
+        self.line(&safe(text));
+    }
+
+    fn line(&self, text: &str) {
         if !self.quiet {
             let _ = writeln!(std::io::stderr(), "{text}");
         }
@@ -55,7 +60,7 @@ impl Printer {
 
     /// A doubt about the input or the result, to stderr.
     pub(crate) fn warn(&self, text: &str) {
-        self.say(&format!("{} {text}", self.painted("warning:", "\x1b[1;33m")));
+        self.line(&format!("{} {}", self.painted("warning:", "\x1b[1;33m"), safe(text)));
     }
 
     /// A detail, to stderr, with `--verbose`.
@@ -67,14 +72,36 @@ impl Printer {
 
     /// What went wrong and what to do about it, to stderr, even with `--quiet`.
     pub(crate) fn failure(&self, failure: &Failure) {
-        let mut text = format!("{} {failure}\n", self.painted("error:", "\x1b[1;31m"));
+        let message = failure.to_string();
+        let mut text = format!("{} {}\n", self.painted("error:", "\x1b[1;31m"), safe(&message));
         if let Some(advice) = failure.advice() {
-            text += &format!("\n{} {advice}\n", self.painted("hint:", "\x1b[1;36m"));
+            text += &format!("\n{} {}\n", self.painted("hint:", "\x1b[1;36m"), safe(advice));
         }
         let _ = std::io::stderr().write_all(text.as_bytes());
     }
 
     fn painted(&self, word: &str, style: &str) -> String {
         if self.color { format!("{style}{word}\x1b[0m") } else { word.to_owned() }
+    }
+}
+
+/// A text whose control characters (of file names, say) do nothing to a terminal; lines and tabulators stay.
+fn safe(text: &str) -> Cow<'_, str> {
+    let is_unsafe = |c: char| c.is_control() && c != '\n' && c != '\t';
+    if !text.contains(is_unsafe) {
+        return Cow::Borrowed(text);
+    }
+    let shown = |c: char| if is_unsafe(c) { c.escape_default().to_string() } else { c.to_string() };
+    Cow::Owned(text.chars().map(shown).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::safe;
+
+    #[test]
+    fn control_characters_are_shown() {
+        assert_eq!(safe("a\tb\nc \u{b5}m"), "a\tb\nc \u{b5}m");
+        assert_eq!(safe("ri\u{1b}[31mght\u{9b}\r"), "ri\\u{1b}[31mght\\u{9b}\\r");
     }
 }

@@ -79,6 +79,9 @@ pub(super) fn recordings_at(
     for warning in report.all_warnings() {
         session.printer.warn(&warning);
     }
+    if let Some((one, other, _)) = report.overlap() {
+        session.printer.warn(&format!("{other} and {one} have samples in common"));
+    }
     for file in &report.files {
         session.printer.detail(&file.to_string());
     }

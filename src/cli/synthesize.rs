@@ -1,7 +1,8 @@
 //! `nav-sim synthesize`: replicate recordings from a noise model.
 
 use super::axes::ChannelSet;
-use super::{Failure, Session};
+use super::run::not_of_another_command;
+use super::{Failure, Session, read};
 use nav_sim::data::atomic::{AtomicDir, WriteError, guard_inputs};
 use nav_sim::data::contamination_file;
 use nav_sim::data::model_file::{self, ModelFile};
@@ -126,26 +127,40 @@ fn report(args: &Args, job: &Job, manifest: &str, session: &Session) {
     ));
 }
 
-/// Refuses to overwrite an input, and to leave recordings of another job beside this one's.
+/// Refuses to overwrite an input or what this command did not make, and to leave recordings of another job beside
+/// this one's.
 fn check_directory(args: &Args, names: &[String], session: &Session) -> Result<(), Failure> {
     let contamination = args.contaminate.as_deref().map(Path::new);
     for name in names.iter().map(String::as_str).chain(["manifest.json"]) {
         guard_inputs(&args.out.join(name), contamination.into_iter().chain([args.model.as_path()]))?;
     }
-    let Ok(entries) = std::fs::read_dir(&args.out) else { return Ok(()) };
-    let inside = entries.flatten().filter_map(|e| e.file_name().into_string().ok());
-    let mut stale: Vec<String> =
-        inside.filter(|n| is_recording(n) && !n.starts_with('.') && !names.contains(n)).collect();
-    stale.sort();
-    match stale.into_iter().next() {
-        Some(stale) => Err(WriteError::Stale { path: args.out.display().to_string(), stale }.into()),
-        None => {
-            if args.out.join("manifest.json").exists() {
-                session.printer.warn(&format!("{}: the replicates in it are replaced", args.out.display()));
-            }
-            Ok(())
-        }
+    not_of_another_command(&args.out, |text| made(text).is_some())?;
+    let Ok(manifest) = std::fs::read_to_string(args.out.join("manifest.json")) else { return Ok(()) };
+    let made = made(&manifest).unwrap_or_default();
+    let mut inside: Vec<String> = std::fs::read_dir(&args.out)
+        .into_iter()
+        .flat_map(|entries| entries.flatten().filter_map(|e| e.file_name().into_string().ok()))
+        .filter(|n| is_recording(n) && !n.starts_with('.'))
+        .collect();
+    inside.sort();
+    let shown = args.out.display();
+    if let Some(other) = inside.iter().find(|n| !made.contains(n) && names.contains(n)) {
+        let failure = Failure::input(format!("{shown} holds {other}, which this command did not make"));
+        return Err(failure.hint("move it away, or choose another directory with --out"));
     }
+    if let Some(stale) = inside.into_iter().find(|n| !names.contains(n)) {
+        return Err(WriteError::Stale { path: shown.to_string(), stale }.into());
+    }
+    session.printer.warn(&format!("{shown}: the replicates in it are replaced"));
+    Ok(())
+}
+
+/// The recordings that a manifest of this command names; `None` if it is another's.
+fn made(manifest: &str) -> Option<Vec<String>> {
+    let manifest: Value = serde_json::from_str(manifest).ok()?;
+    let name = |replicate: &Value| replicate["file"].as_str().map(str::to_owned);
+    let replicates = manifest["replicates"].as_array().filter(|_| manifest["command"] == "synthesize")?;
+    replicates.iter().map(name).collect()
 }
 
 /// A replicate that was not written.
@@ -212,8 +227,7 @@ impl Job {
 
     /// What was drawn.
     fn manifest(&self, args: &Args, names: &[String], models: &[Model]) -> Result<Value, Failure> {
-        let bytes = std::fs::read(&args.model)
-            .map_err(|e| Failure::could_not(format!("{}: {e}", args.model.display())))?;
+        let model = read::input("model", &args.model)?;
         let entry = |(i, (name, model)): (usize, (&String, &Model))| {
             let contaminated = self.contamination.as_ref().is_some_and(|c| c.touches(i as u64 + 1));
             let axes: Map<String, Value> =
@@ -227,7 +241,7 @@ impl Job {
             "version": env!("CARGO_PKG_VERSION"),
             "seed": self.seed,
             "model": args.model.display().to_string(),
-            "model_blake3": blake3::hash(&bytes).to_hex().to_string(),
+            "model_blake3": model.blake3,
             "rate_hz": self.file.model.rate_hz,
             "samples": self.samples,
             "spread": self.spread,

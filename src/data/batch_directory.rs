@@ -2,8 +2,8 @@
 
 use super::atomic;
 use super::difference::{self, Difference};
-use super::unit_file;
-use crate::batch::{Plan, Study};
+use super::{source, unit_file};
+use crate::batch::{Plan, Study, Unit};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -57,9 +57,9 @@ pub enum BatchDirectoryError {
 impl BatchDirectoryError {
     /// Whether the contents or the request are at fault (rather than the machine).
     #[must_use]
-    pub const fn is_usage(&self) -> bool {
+    pub fn is_usage(&self) -> bool {
         match self {
-            Self::Io { .. } => false,
+            Self::Io { source, .. } => source::is_damage(source.kind()),
             Self::Write(e) => e.is_usage(),
             _ => true,
         }
@@ -89,7 +89,7 @@ fn file(directory: &Path) -> PathBuf {
 pub fn plan(directory: &Path) -> Result<Option<Plan>, BatchDirectoryError> {
     let path = file(directory);
     let shown = path.display().to_string();
-    let text = match fs::read_to_string(&path) {
+    let text = match source::text(&path) {
         Ok(text) => text,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
         Err(source) => return Err(BatchDirectoryError::Io { path: shown, source }),
@@ -179,13 +179,23 @@ fn entries(path: &Path) -> Result<Vec<PathBuf>, BatchDirectoryError> {
     }
 }
 
-/// Whether a unit is there and whole; why not, if it is damaged.
+/// Whether a unit is there, whole and what the plan says (see [`fits`](crate::batch::UnitResult::fits)); why not, if it is damaged.
 ///
 /// # Errors
 /// When the system refuses.
-pub fn finished(directory: &Path, id: &str) -> Result<Result<bool, String>, unit_file::UnitFileError> {
+pub fn finished(
+    directory: &Path,
+    (unit, id): (Unit, &str),
+    columns: usize,
+    outages: &[(f64, f64)],
+) -> Result<Result<bool, String>, unit_file::UnitFileError> {
     match unit_file::read(directory, id) {
-        Ok(_) => Ok(Ok(true)),
+        Ok(result) if result.fits(unit, columns, outages) => Ok(Ok(true)),
+        Ok(_) => {
+            let path = unit_file::path(directory, id).display().to_string();
+            let what = "it holds other runs, candidates or outages than the plan";
+            Ok(Err(unit_file::UnitFileError::Damaged { path, what }.to_string()))
+        }
         Err(unit_file::UnitFileError::Missing { .. }) => Ok(Ok(false)),
         Err(e @ unit_file::UnitFileError::Damaged { .. }) => Ok(Err(e.to_string())),
         Err(e) => Err(e),

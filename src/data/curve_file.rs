@@ -1,9 +1,10 @@
 //! Wavelet-variance curves to fit: CSV with columns `tau_samples,wv,edof`, or the JSON that `calibrate` or `wv`
 //! writes (the classical curve of a signal is GMWM's, the robust one RGMWM's).
 
+use super::source;
 use crate::imu::{Axis, Sensor};
 use crate::report::{CurvesFile, SignalsFile};
-use crate::wavelet::Curve;
+use crate::wavelet::{Convention, Curve, QuantizationResponse, Tuning};
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -92,7 +93,7 @@ impl CurveError {
     #[must_use]
     pub fn is_content(&self) -> bool {
         match self {
-            Self::Io { source, .. } => source.kind() == ErrorKind::InvalidData,
+            Self::Io { source, .. } => source::is_damage(source.kind()),
             _ => true,
         }
     }
@@ -118,8 +119,7 @@ impl CurveError {
 /// When it cannot be read, or is no curve file.
 pub fn read(path: &Path) -> Result<Vec<NamedCurve>, CurveError> {
     let name = path.display().to_string();
-    let text =
-        std::fs::read_to_string(path).map_err(|source| CurveError::Io { path: name.clone(), source })?;
+    let text = source::text(path).map_err(|source| CurveError::Io { path: name.clone(), source })?;
     let text = text.trim_start_matches('\u{feff}');
     let curves =
         if text.trim_start().starts_with('{') { json(&name, text)? } else { vec![csv(&name, text)?] };
@@ -187,10 +187,7 @@ fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, CurveError> {
         None => serde_json::from_str(text).map_err(syntax)?,
         Some(_) => {
             let file: SignalsFile = serde_json::from_str(text).map_err(syntax)?;
-            if !(file.efficiency > 0.0 && file.efficiency <= 1.0) {
-                let found = file.efficiency.to_string();
-                return Err(refuse("head", "efficiency", &found, "a number above 0, up to 1"));
-            }
+            quantization(path, "head", Some(file.efficiency))?;
             CurvesFile::from(file)
         }
     };
@@ -218,7 +215,8 @@ fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, CurveError> {
         if axis.is_none() && entry.axis != "all" {
             return Err(refuse(&place, "axis", &entry.axis, "x, y, z or all"));
         }
-        let mut curve = Curve::default();
+        let mut curve =
+            Curve { quantization: quantization(path, &place, entry.efficiency)?, ..Curve::default() };
         for i in 0..tau {
             let place = format!("curve {index}, scale {}", i + 1);
             push(&mut curve, path, &place, entry.tau_s[i] * file.rate_hz, entry.wv[i], entry.edof[i])?;
@@ -232,6 +230,27 @@ fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, CurveError> {
         });
     }
     Ok(curves)
+}
+
+/// How robust variances of an efficiency read quantization noise.
+fn quantization(
+    path: &str,
+    place: &str,
+    efficiency: Option<f64>,
+) -> Result<Option<QuantizationResponse>, CurveError> {
+    let Some(efficiency) = efficiency else { return Ok(None) };
+    // The efficiency in a file is the true one, which the other convention puts a little beyond the range.
+    let tuning = Tuning::new(efficiency.clamp(0.3, 0.99), Convention::Exact);
+    match tuning {
+        Ok(tuning) if efficiency > 0.0 && efficiency <= 1.0 => Ok(Some(*tuning.quantization())),
+        _ => Err(CurveError::Value {
+            path: path.to_owned(),
+            place: place.to_owned(),
+            column: "efficiency",
+            value: efficiency.to_string(),
+            expected: "a number above 0, up to 1",
+        }),
+    }
 }
 
 /// Appends a point; scales are powers of two, ascending.
@@ -254,10 +273,12 @@ fn push(curve: &mut Curve, path: &str, place: &str, tau: f64, wv: f64, edof: f64
     if curve.levels.last().is_some_and(|last| *last >= level as u32) {
         return refuse("tau_samples", tau, "greater than the one before");
     }
-    for (column, value) in [("wv", wv), ("edof", edof)] {
-        if !(value.is_finite() && value > 0.0) {
-            return refuse(column, value, "a finite number > 0");
-        }
+    let positive = |range: (f64, f64), value: f64| value >= range.0 && value <= range.1;
+    if !positive(Curve::WV_RANGE, wv) {
+        return refuse("wv", wv, "a number from 1e-100 to 1e100");
+    }
+    if !positive(Curve::EDOF_RANGE, edof) {
+        return refuse("edof", edof, "a number from 1e-15 to 1e15");
     }
     curve.levels.push(level as u32);
     curve.wv.push(wv);
@@ -276,7 +297,12 @@ mod tests {
         let read = csv("c.csv", text).unwrap();
         assert_eq!(
             read.curve,
-            Curve { levels: vec![1, 2, 4], wv: vec![1e-5, 5e-6, 1e-6], edof: vec![100.0, 50.0, 12.5] }
+            Curve {
+                levels: vec![1, 2, 4],
+                wv: vec![1e-5, 5e-6, 1e-6],
+                edof: vec![100.0, 50.0, 12.5],
+                ..Curve::default()
+            }
         );
     }
 
@@ -293,7 +319,10 @@ mod tests {
         let file = CurvesFile { schema_version: 1, rate_hz: 30.0, curves: vec![entry] };
         let read = json("m.wv.json", &to_json(&file)).unwrap();
         assert_eq!((read[0].sensor, read[0].axis, read[0].rate_hz), (Some(Sensor::Gyro), None, Some(30.0)));
-        assert_eq!(read[0].curve, Curve { levels: vec![1, 2], wv: vec![2e-7, 1e-7], edof: vec![10.0, 5.0] });
+        assert_eq!(
+            read[0].curve,
+            Curve { levels: vec![1, 2], wv: vec![2e-7, 1e-7], edof: vec![10.0, 5.0], ..Curve::default() }
+        );
     }
 
     #[test]
@@ -312,9 +341,18 @@ mod tests {
         );
         assert_eq!(
             message(&format!("{head}2,NaN,1\n")),
-            "c.csv, line 2: wv = NaN is not a finite number > 0"
+            "c.csv, line 2: wv = NaN is not a number from 1e-100 to 1e100"
         );
-        assert_eq!(message(&format!("{head}2,1,0\n")), "c.csv, line 2: edof = 0 is not a finite number > 0");
+        assert_eq!(
+            message(&format!("{head}2,1,0\n")),
+            "c.csv, line 2: edof = 0 is not a number from 1e-15 to 1e15"
+        );
+        // Beyond these the time of intervals grows without bound, and squares of variances are no numbers.
+        assert!(
+            message(&format!("{head}2,1,1e16\n"))
+                .starts_with("c.csv, line 2: edof = 10000000000000000 is not")
+        );
+        assert!(message(&format!("{head}2,1e170,1\n")).contains("is not a number from 1e-100 to 1e100"));
         let later = to_json(&CurvesFile { schema_version: 9, rate_hz: 30.0, curves: vec![] });
         assert_eq!(
             json("c.json", &later).unwrap_err().to_string(),

@@ -1,5 +1,6 @@
 //! Fingerprints of inputs.
 
+use super::source;
 use std::io;
 use std::path::Path;
 
@@ -9,7 +10,7 @@ use std::path::Path;
 /// When the system refuses.
 pub fn of_file(path: &Path) -> io::Result<String> {
     let mut hasher = blake3::Hasher::new();
-    hasher.update_reader(std::fs::File::open(path)?)?;
+    hasher.update_reader(source::open(path)?)?;
     Ok(hasher.finalize().to_hex().to_string())
 }
 

@@ -14,6 +14,7 @@ pub mod parameters_file;
 pub mod recordings;
 pub mod run_directory;
 pub mod scenario_file;
+mod source;
 pub mod study_directory;
 pub mod study_file;
 pub mod suggest;

@@ -1,5 +1,6 @@
 //! Run directories read back, as far as comparisons need them.
 
+use super::{atomic, source};
 use crate::metrics::Measured;
 use crate::report::{Manifest, TableError, parse_epochs, parse_runs};
 use std::path::Path;
@@ -48,8 +49,11 @@ pub enum RunDirectoryError {
 impl RunDirectoryError {
     /// Whether the contents are at fault (rather than the machine, or a missing file).
     #[must_use]
-    pub const fn is_content(&self) -> bool {
-        !matches!(self, Self::Io { .. })
+    pub fn is_content(&self) -> bool {
+        match self {
+            Self::Io { source, .. } => source::is_damage(source.kind()),
+            _ => true,
+        }
     }
 
     /// What to do about it.
@@ -75,11 +79,12 @@ pub struct RunDirectory {
     pub experiment: Measured,
 }
 
-/// Reads a run directory.
+/// Reads a run directory; what a killed command had begun to replace in it is finished first.
 ///
 /// # Errors
 /// The file, and what is wrong with it.
 pub fn read(directory: &Path) -> Result<RunDirectory, RunDirectoryError> {
+    atomic::recover(directory);
     let manifest = manifest(directory)?;
     let (epochs_path, epochs) = text(directory, "epochs.csv")?;
     let (runs_path, runs) = text(directory, "runs.csv")?;
@@ -108,7 +113,7 @@ fn manifest(directory: &Path) -> Result<Manifest, RunDirectoryError> {
 fn text(directory: &Path, name: &str) -> Result<(String, String), RunDirectoryError> {
     let path = directory.join(name);
     let shown = path.display().to_string();
-    match std::fs::read_to_string(&path) {
+    match source::text(&path) {
         Ok(text) => Ok((shown, text)),
         Err(source) => Err(RunDirectoryError::Io { path: shown, source }),
     }

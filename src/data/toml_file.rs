@@ -6,6 +6,7 @@ use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::source;
 use super::suggest::nearest;
 
 /// What is wrong with a TOML file.
@@ -108,7 +109,7 @@ impl TomlError {
     #[must_use]
     pub fn is_content(&self) -> bool {
         match self {
-            Self::Io { source, .. } => source.kind() == ErrorKind::InvalidData,
+            Self::Io { source, .. } => source::is_damage(source.kind()),
             _ => true,
         }
     }
@@ -124,7 +125,7 @@ pub(crate) struct Source {
 impl Source {
     pub(crate) fn read(path: &Path) -> Result<Self, TomlError> {
         let name = path.display().to_string();
-        match std::fs::read_to_string(path) {
+        match source::text(path) {
             Ok(text) => Ok(Self { path: name, text }),
             Err(source) => Err(TomlError::Io { path: name, source }),
         }

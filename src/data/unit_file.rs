@@ -78,12 +78,22 @@ pub fn size(columns: usize, runs: u64, outages: usize, epochs: usize) -> f64 {
     400.0 + columns as f64 * (100.0 + 8.0 * numbers)
 }
 
-/// Writes a unit.
+/// Writes a unit; a directory in its place is set aside as `….unit.damaged`. Where another process has written the
+/// same unit meanwhile (on a shared disk without locks it may have taken this one's temporary file for abandoned),
+/// there is nothing left to do.
 ///
 /// # Errors
 /// When the disk is full or the directory cannot be written to; nothing is left then.
 pub fn write(directory: &Path, unit: &UnitResult) -> Result<(), WriteError> {
-    atomic::write(&path(directory, &unit.id), encode(unit))
+    let file = path(directory, &unit.id);
+    if file.is_dir() {
+        let aside = file.with_extension("unit.damaged");
+        fs::rename(&file, &aside).map_err(|e| WriteError::io(&file, e))?;
+    }
+    atomic::write(&file, encode(unit)).or_else(|e| match read(directory, &unit.id) {
+        Ok(there) if encode(&there) == encode(unit) => Ok(()),
+        _ => Err(e),
+    })
 }
 
 /// Reads a unit and checks that it is the one of that name, whole.
@@ -95,6 +105,7 @@ pub fn read(directory: &Path, id: &str) -> Result<UnitResult, UnitFileError> {
     let shown = || file.display().to_string();
     let bytes = fs::read(&file).map_err(|source| match source.kind() {
         io::ErrorKind::NotFound => UnitFileError::Missing { path: shown() },
+        io::ErrorKind::IsADirectory => UnitFileError::Damaged { path: shown(), what: "it is a directory" },
         _ => UnitFileError::Io { path: shown(), source },
     })?;
     let unit = decode(&bytes).map_err(|what| UnitFileError::Damaged { path: shown(), what })?;
@@ -176,14 +187,24 @@ pub fn decode(bytes: &[u8]) -> Result<UnitResult, &'static str> {
     let (length, rest) = rest.split_first_chunk::<4>().ok_or("it has no head")?;
     let (json, numbers) =
         rest.split_at_checked(u32::from_le_bytes(*length) as usize).ok_or("it has no head")?;
-    let head: Head = serde_json::from_slice(json).map_err(|_| "its head is not one")?;
-    let words = |c: &ColumnHead| head.runs as usize * (RUN + c.outages.len() * OUTAGE) + c.epochs * EPOCH;
-    if numbers.len() != 8 * head.columns.iter().map(words).sum::<usize>() {
+    let head: Head = serde_json::from_slice(json).map_err(|_| "its head is not valid JSON")?;
+    if announced(&head) != Some(numbers.len()) {
         return Err("its length is wrong");
     }
     let mut words = Words(numbers);
     let columns = head.columns.into_iter().map(|c| column(c, head.runs, &mut words)).collect();
     Ok(UnitResult { id: head.id, first: head.first, runs: head.runs, columns })
+}
+
+/// Bytes of the numbers that the head announces; `None` beyond what memory has.
+fn announced(head: &Head) -> Option<usize> {
+    let runs = usize::try_from(head.runs).ok()?;
+    let words_of_column = |c: &ColumnHead| {
+        let words_of_runs = runs.checked_mul(RUN + c.outages.len() * OUTAGE)?;
+        words_of_runs.checked_add(c.epochs.checked_mul(EPOCH)?)
+    };
+    let mut columns = head.columns.iter().map(words_of_column);
+    columns.try_fold(0_usize, |sum, words| sum.checked_add(words?))?.checked_mul(8)
 }
 
 fn column(head: ColumnHead, runs: u64, words: &mut Words<'_>) -> RunResult {
@@ -327,6 +348,32 @@ mod tests {
             bytes[at] ^= 0x10;
             assert_eq!(decode(&bytes).unwrap_err(), "its checksum is wrong", "byte {at}");
         }
+    }
+
+    /// A right checksum over a head that announces 2^61 runs: eight bytes a number of them are none.
+    #[test]
+    fn a_head_that_announces_more_than_there_is_is_refused() {
+        let forged = |runs: u64, epochs: usize| {
+            let mut column = ColumnHead {
+                outages: Vec::new(),
+                filter_states: 15,
+                fix_components: 6,
+                coverage_level: 0.95,
+                independent_windows: None,
+                run_epochs: 1,
+                epochs,
+            };
+            column.outages = vec![(0.0, 1.0); 8];
+            let head = Head { id: "ab12".into(), first: 0, runs, columns: vec![column] };
+            let json = serde_json::to_vec(&head).unwrap();
+            let mut bytes = [MAGIC, &(json.len() as u32).to_le_bytes(), &json].concat();
+            bytes.extend(blake3::hash(&bytes).as_bytes());
+            bytes
+        };
+        for (runs, epochs) in [(1 << 61, 0), (u64::MAX, 0), (0, 1 << 61), (1 << 60, 1 << 60)] {
+            assert_eq!(decode(&forged(runs, epochs)).unwrap_err(), "its length is wrong", "{runs} {epochs}");
+        }
+        assert!(decode(&forged(0, 0)).is_ok());
     }
 
     #[test]

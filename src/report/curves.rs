@@ -1,6 +1,6 @@
 //! Wavelet-variance curves as JSON: of signals (`wv`), and of fits (`<model>.wv.json`).
 
-use crate::calibration::{Estimator, Group, Outcome, Replicate, Settings};
+use crate::calibration::{Estimator, Group, Outcome, Replicate, Settings, implied};
 use crate::imu::Channel;
 use crate::wavelet::{Tuning, interval};
 use serde::{Deserialize, Serialize};
@@ -123,6 +123,7 @@ impl From<SignalsFile> for CurvesFile {
         let curves = file.signals.into_iter().flat_map(|s| {
             let robust_edof = s.edof.iter().map(|e| interval::edof_robust(*e, efficiency)).collect();
             let of = |estimator: Estimator, wv: Vec<f64>, edof: Vec<f64>| FittedCurve {
+                efficiency: estimator.is_robust().then_some(efficiency),
                 sensor: s.sensor.clone(),
                 axis: s.axis.clone(),
                 estimator: estimator.name().to_owned(),
@@ -168,16 +169,19 @@ pub struct FittedCurve {
     pub wv: Vec<f64>,
     /// Equivalent degrees of freedom.
     pub edof: Vec<f64>,
+    /// Efficiency of the robust wavelet variance, where it is one: says how it reads quantization noise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub efficiency: Option<f64>,
     /// Lower ends of the 95 % intervals.
     #[serde(default)]
     pub ci_low: Vec<f64>,
     /// Upper ends.
     #[serde(default)]
     pub ci_high: Vec<f64>,
-    /// Wavelet variance of the model.
+    /// The curve that the model implies: its wavelet variance, or what the robust one reads of it.
     #[serde(default)]
     pub implied: Vec<f64>,
-    /// The same of each of its processes.
+    /// Wavelet variance of each of its processes.
     #[serde(default)]
     pub processes: BTreeMap<String, Vec<f64>>,
     /// The replicates.
@@ -203,13 +207,13 @@ impl CurvesFile {
     /// The file of some outcomes.
     #[must_use]
     pub fn new(groups: &[Group], outcomes: &[&Outcome], settings: &Settings) -> Self {
-        let curve = |o: &&Outcome| fitted(&groups[o.group], o, settings.rate_hz);
+        let curve = |o: &&Outcome| fitted(&groups[o.group], o, settings);
         let curves = outcomes.iter().map(curve).collect();
         Self { schema_version: SCHEMA_VERSION, rate_hz: settings.rate_hz, curves }
     }
 }
 
-fn fitted(group: &Group, outcome: &Outcome, rate_hz: f64) -> FittedCurve {
+fn fitted(group: &Group, outcome: &Outcome, settings: &Settings) -> FittedCurve {
     let Outcome { curve, fit, estimator, .. } = outcome;
     let band = Band::new(curve.wv.clone(), &curve.edof, Vec::new());
     let model = &fit.composite;
@@ -229,12 +233,13 @@ fn fitted(group: &Group, outcome: &Outcome, rate_hz: f64) -> FittedCurve {
         sensor: group.sensor.name().to_owned(),
         axis: group.axis.map_or("all", |a| a.name()).to_owned(),
         estimator: estimator.name().to_owned(),
-        tau_s: over_levels(&|level| tau_s(level, rate_hz)),
+        tau_s: over_levels(&|level| tau_s(level, settings.rate_hz)),
         wv: band.wv,
         edof: curve.edof.clone(),
+        efficiency: estimator.is_robust().then(|| settings.tuning.efficiency()),
         ci_low: band.ci_low,
         ci_high: band.ci_high,
-        implied: over_levels(&|level| model.haar_wv(level)),
+        implied: implied(model, curve),
         processes: parts.map(|(label, p)| (label, over_levels(&|level| p.haar_wv(level)))).collect(),
         replicates: group.replicates.iter().map(replicate).collect(),
     }

@@ -194,7 +194,7 @@ impl Design {
     fn estimate(&self, replicates: &[Replicate], estimator: Estimator) -> Result<Estimate, StudyError> {
         // The slopes of several replicates are those of their average.
         let averaged = if estimator == Estimator::Avlr { Estimator::Awv } else { estimator };
-        let curve = average(replicates, averaged, self.trim, self.tuning.efficiency())?;
+        let curve = average(replicates, averaged, self.trim, &self.tuning)?;
         let fit = estimate(estimator, &curve, &self.spec, self.model.rate_hz, self.weighting)?;
         let robust = replicates.iter().flat_map(|r| &r.robust);
         let without_root = robust.filter(|v| v.status == Status::NoRoot).count();

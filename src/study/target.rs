@@ -35,6 +35,7 @@ pub fn target(design: &Design) -> Result<Target, StudyError> {
         wv: expected_wv(noise, laws, rate_hz, design.levels)?,
         edof: levels.iter().map(|j| edof(*j)).collect(),
         levels,
+        ..Curve::default()
     };
     let fit = fit(&curve, &design.spec, rate_hz, design.weighting)?;
     Ok(Target { curve, fit })

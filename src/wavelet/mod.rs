@@ -5,11 +5,13 @@
 mod curve;
 pub mod haar;
 pub mod interval;
+mod quantization;
 pub mod robust;
 mod tuning;
 
 pub use curve::Curve;
 pub use haar::classical;
+pub use quantization::QuantizationResponse;
 pub use robust::{RobustVariance, Status, both};
 pub use tuning::{Convention, Tuning};
 

@@ -3,7 +3,7 @@
 //! chi(r) = r²(1 − (r/c)²)⁴ on |r| ≤ c. With Z standard normal: a = E chi(Z), M = E\[Z² chi(Z)\] − a,
 //! Q = E chi(Z)² − a², efficiency = M²/(2Q) ([Mondal and Percival](crate::bibliography::MondalPercival12)).
 
-use super::WaveletError;
+use super::{QuantizationResponse, WaveletError};
 use statrs::function::erf::erf;
 use std::f64::consts::{PI, SQRT_2};
 
@@ -29,6 +29,7 @@ pub struct Tuning {
     efficiency: f64,
     c: f64,
     a: f64,
+    quantization: QuantizationResponse,
 }
 
 impl Tuning {
@@ -53,7 +54,8 @@ impl Tuning {
             }
         }
         let moments = Moments::new(high);
-        Ok(Self { efficiency: moments.efficiency(Convention::Exact), c: high, a: moments.chi() })
+        let (efficiency, a) = (moments.efficiency(Convention::Exact), moments.chi());
+        Ok(Self { efficiency, c: high, a, quantization: QuantizationResponse::new(high, a) })
     }
 
     /// Rejection point: coefficients beyond c standard deviations have no influence.
@@ -88,6 +90,12 @@ impl Tuning {
     #[must_use]
     pub fn bias(&self) -> f64 {
         Moments::new(self.c).bias()
+    }
+
+    /// How the robust wavelet variance reads quantization noise.
+    #[must_use]
+    pub const fn quantization(&self) -> &QuantizationResponse {
+        &self.quantization
     }
 
     /// True efficiency at the Gaussian model, whatever the convention says it is.

@@ -14,6 +14,7 @@
 use super::average::Estimator;
 use super::bootstrap::CurveSampler;
 use super::fit::{Fit, FitError, fit, refit};
+use super::implied::implied;
 use super::objective::Weighting;
 use super::pipeline::{Outcome, Settings};
 use super::replicates::Group;
@@ -100,9 +101,9 @@ pub(super) fn choose(
     curve: &Curve,
     settings: &Settings,
 ) -> Result<(ModelSpec, Ranking), FitError> {
-    // One weighting for all candidates.
+    // One weighting for all candidates, whatever their models expect.
     let weighting = match settings.weighting {
-        Weighting::Full => Weighting::Edof,
+        Weighting::Full | Weighting::Model => Weighting::Edof,
         other => other,
     };
     let settings = &Settings { weighting, ..settings.clone() };
@@ -192,12 +193,12 @@ impl Field<'_> {
 
     /// 2 Σ Omega_j cov(nu_j, nu_j(theta)), Omega that of the curve itself.
     fn optimism(&self, i: usize, curves: &[Curve]) -> f64 {
-        let pairs: Vec<(&Curve, Fit)> = curves.iter().filter_map(|c| Some((c, self.again(i, c)?))).collect();
+        let fitted = |c| Some((c, implied(&self.again(i, c)?.composite, c)));
+        let pairs: Vec<(&Curve, Vec<f64>)> = curves.iter().filter_map(fitted).collect();
         let count = pairs.len() as f64;
-        let roots = self.settings.weighting.roots(self.curve);
+        let roots = self.settings.weighting.roots(self.curve, &self.curve.wv);
         let term = |(j, root): (usize, &f64)| {
-            let level = self.curve.levels[j];
-            let of = |(c, f): &(&Curve, Fit)| (root * c.wv[j], root * f.composite.haar_wv(level));
+            let of = |(c, implied): &(&Curve, Vec<f64>)| (root * c.wv[j], root * implied[j]);
             let (mut a, mut b, mut ab) = (0.0, 0.0, 0.0);
             // About the first, so that no digits are lost.
             let first = of(&pairs[0]);

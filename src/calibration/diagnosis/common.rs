@@ -1,9 +1,10 @@
 //! Outliers that all recordings hold: comparing one with the others does not show those.
 //!
 //! ln (classical / robust) of every signal has, when the noise is Gaussian, the mean (1/e − 1)/eta and the variance
-//! (1/e − 1)·2/eta (see [`super`]). Looked at is the median over the signals, so that a minority makes no alarm.
+//! (1/e − 1)·2/eta (see [`super`]); quantization noise, which the robust variance reads high, is allowed for. Looked at is the median over the signals, so that a minority makes no alarm.
 
 use super::{Piece, Question};
+use crate::wavelet::Tuning;
 
 /// Standard deviations of the median: 1 in 10⁶ by chance, at each of some ten scales.
 const ALARM: f64 = 5.0;
@@ -26,15 +27,16 @@ pub struct CommonOutliers {
 }
 
 /// Looks at all signals of a sensor together.
-pub(super) fn common(pieces: &[Piece<'_>], efficiency: f64) -> Option<CommonOutliers> {
+pub(super) fn common(pieces: &[Piece<'_>], tuning: &Tuning) -> Option<CommonOutliers> {
     let question = Question::Outliers;
     let mut found: Option<CommonOutliers> = None;
     for level in 0..question.levels(pieces) {
         let (mut logs, mut variance) = (Vec::new(), 0.0);
         for piece in pieces {
             for replicate in piece.replicates.iter().flatten() {
-                let eta = question.edof(piece.law.edof(replicate.samples)[level], efficiency);
-                logs.push(question.value(replicate, level) - 1.0 / eta);
+                let eta = question.edof(piece.law.edof(replicate.samples)[level], tuning.efficiency());
+                let (read_high, _) = tuning.quantization().factor(piece.law.quantization[level]);
+                logs.push(question.value(replicate, level) + read_high.ln() - 1.0 / eta);
                 variance += 2.0 / eta;
             }
         }

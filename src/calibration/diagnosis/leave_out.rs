@@ -43,8 +43,7 @@ pub(super) fn left_out(group: &Group, name: &str, outcome: &Outcome, settings: &
         replicate.classical.truncate(outcome.curve.levels.len());
         replicate.robust.truncate(outcome.curve.levels.len());
     }
-    let efficiency = settings.tuning.efficiency();
-    let without = average(&rest, outcome.estimator, settings.trim, efficiency).ok()?;
+    let without = average(&rest, outcome.estimator, settings.trim, &settings.tuning).ok()?;
     let with = &outcome.curve;
     let moves = with.levels.iter().zip(&with.wv).zip(&with.edof).zip(&without.wv);
     let one = |(((level, with), edof), without): (((&u32, &f64), &f64), &f64)| {

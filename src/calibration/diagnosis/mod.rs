@@ -126,7 +126,7 @@ fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &
         return Vec::new();
     }
     let pieces = axes(&own, &names, outcomes);
-    let common = common::common(&pieces, settings.tuning.efficiency());
+    let common = common::common(&pieces, &settings.tuning);
     let pieces = if names.len() < FEWEST { Vec::new() } else { pieces };
     let dropped = dropped(&own, settings);
     let [noise, outliers] = [Question::Noise, Question::Outliers]

@@ -2,8 +2,8 @@
 
 use super::Planned;
 use crate::cli::{Failure, Session, read};
-use nav_sim::batch::{Cell, Material, Synthesis, TruthEntry};
-use nav_sim::data::{batch_file, contamination_file, hash, model_file};
+use nav_sim::batch::{Cell, Material, Synthesis, TruthEntry, Unit};
+use nav_sim::data::{batch_directory, batch_file, contamination_file, hash, model_file};
 use nav_sim::ekf::Belief;
 use nav_sim::imu::Recording;
 use nav_sim::noise::{Model, continuous};
@@ -64,15 +64,14 @@ impl<'a> Inputs<'a> {
         f(&simulation)
     }
 
-    /// Number of outages of a cell; refuses those that do not lie on its trajectory.
-    pub(super) fn outages(&mut self, cell: Cell) -> Result<usize, Failure> {
+    /// The outages of a cell (start and end, s); refuses those that do not lie on its trajectory.
+    pub(super) fn outages(&mut self, cell: Cell) -> Result<Vec<(f64, f64)>, Failure> {
         let (plan, grid) = (&self.planned.plan, &self.planned.grid);
         let trajectory = self.trajectory(cell.trajectory)?;
         let span = (trajectory.start_s(), trajectory.end_s());
         let found = windows(&grid.scenario(cell, plan.seed), span, plan.seed);
-        found
-            .map(|windows| windows.len())
-            .map_err(|e| Failure::input(format!("{}: {e}", grid.names(cell).join(", "))))
+        let windows = found.map_err(|e| Failure::input(format!("{}: {e}", grid.names(cell).join(", "))))?;
+        Ok(windows.iter().map(|o| (o.start_s, o.end_s)).collect())
     }
 
     /// Duration of a trajectory (s).
@@ -145,6 +144,17 @@ impl<'a> Inputs<'a> {
         }
         Ok(&self.models[&candidate])
     }
+}
+
+/// Whether a unit is there and what the plan says; what is wrong with it, if it is damaged.
+pub(super) fn finished(
+    planned: &Planned,
+    (unit, id): (Unit, &str),
+    inputs: &mut Inputs<'_>,
+) -> Result<Result<bool, String>, Failure> {
+    let outages = inputs.outages(planned.grid.cell(unit.cell))?;
+    let columns = planned.grid.columns.len();
+    batch_directory::finished(&planned.directory, (unit, id), columns, &outages).map_err(Failure::could_not)
 }
 
 /// Role of models that the plan calibrated.

@@ -2,9 +2,9 @@
 
 use super::status::Count;
 use super::{Place, Planned};
-use crate::cli::compare::table;
+use crate::cli::compare::{markdown, table};
 use crate::cli::{Failure, Session};
-use nav_sim::batch::{CellSums, Column, Kept, Metric, Study, Unit};
+use nav_sim::batch::{CellSums, Column, Kept, Metric, Study, Unit, UnitResult};
 use nav_sim::data::atomic::AtomicDir;
 use nav_sim::data::table_files::{TableFiles, TableFormat};
 use nav_sim::data::unit_file;
@@ -234,12 +234,18 @@ fn reference(planned: &Planned) -> Result<(usize, String), Bad> {
     Ok((index, study.candidates().swap_remove(index).0))
 }
 
+/// Whether a unit is what the plan says; that its outages are those of the cell's others is seen when it is added.
+fn fits(planned: &Planned, unit: Unit, result: &UnitResult) -> bool {
+    let outages = result.columns.first().map_or([].as_slice(), |c| &c.outages);
+    result.fits(unit, planned.grid.columns.len(), outages)
+}
+
 fn sums(planned: &Planned, units: &[(Unit, String)]) -> Result<CellSums, Bad> {
     let mut sums = CellSums::default();
     let mut damaged = Vec::new();
     for (unit, id) in units {
         match unit_file::read(&planned.directory, id) {
-            Ok(result) if result.runs == unit.runs && result.columns.len() == planned.grid.columns.len() => {
+            Ok(result) if fits(planned, *unit, &result) => {
                 if damaged.is_empty() && !sums.add(result) {
                     damaged.push((*unit, id.clone()));
                 }
@@ -345,7 +351,8 @@ impl Texts {
             text += &format!(
                 "\n\n{}: ASEE relative to {}, mean over the outage of (ratio − 1)·100 ± half the 95 % \
                  interval (mean of the absolute value), %\n\n",
-                cell.name, self.reference
+                markdown(&cell.name),
+                markdown(&self.reference)
             );
             text += &table(&report::ratio_table(cell, states));
         }

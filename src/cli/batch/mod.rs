@@ -10,7 +10,7 @@ mod status;
 mod verify;
 
 use super::{Failure, Session};
-use nav_sim::batch::{Grid, Plan, PrepareError, StudyError, fingerprint};
+use nav_sim::batch::{Grid, Plan, PrepareError, StudyError, Unit, fingerprint};
 use nav_sim::data::batch_directory::{self, BatchDirectoryError};
 use nav_sim::data::batch_file::{self, BatchFile};
 use std::path::{Path, PathBuf};
@@ -40,6 +40,13 @@ enum Command {
     Status(status::Args),
     Verify(verify::Args),
     Emit(emit::Args),
+}
+
+impl Args {
+    /// Whether the command ends in good order at a signal, to be resumed.
+    pub(crate) const fn heeds_signals(&self) -> bool {
+        matches!(self.command, Command::Run(_))
+    }
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
@@ -111,11 +118,11 @@ impl Planned {
 impl Planned {
     /// What the longest unit takes by the plan's probe (s) on so many threads.
     fn unit_s(&self, threads: u64) -> f64 {
-        let of = |(run_s, runs): (&f64, &u64)| {
-            let batches = runs.div_ceil(nav_sim::lanes::LANES as u64);
-            run_s * *runs as f64 / threads.clamp(1, batches.max(1)) as f64
+        let wall_s = |unit: Unit| {
+            let batches = unit.runs.div_ceil(nav_sim::lanes::LANES as u64);
+            self.plan.unit_s(&self.grid, unit) / threads.clamp(1, batches.max(1)) as f64
         };
-        self.plan.estimate.run_s.iter().zip(&self.plan.unit_runs).map(of).fold(0.0, f64::max)
+        self.plan.units(&self.grid).map(wall_s).fold(0.0, f64::max)
     }
 
     /// The names of a cell on those axes that have more than one.

@@ -245,7 +245,7 @@ fn calibration(
     let note = CalibrationNote {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         efficiency_convention: "exact".to_owned(),
-        weighting: "edof".to_owned(),
+        weighting: "model".to_owned(),
         seed: None,
         inputs: inputs.collect::<Result<Vec<Input>, _>>()?,
     };
@@ -268,7 +268,8 @@ fn validate(planned: &Planned, study: &Path, session: &Session) -> Result<(), Fa
         if seen.insert((cell.trajectory, cell.truth, cell.scenario, 0)) || grid.len() <= 64 {
             inputs.with_cell(cell, |_| Ok(()))?;
         }
-        if seen.insert((cell.trajectory, cell.scenario, cell.outages, 1)) && inputs.outages(cell)? == 0 {
+        if seen.insert((cell.trajectory, cell.scenario, cell.outages, 1)) && inputs.outages(cell)?.is_empty()
+        {
             without.push(planned.cell_name(cell));
         }
     }
@@ -347,8 +348,7 @@ fn unit_runs(run_s: f64, runs: u64, threads: usize) -> u64 {
 fn report(planned: &Planned, session: &Session) {
     let (plan, grid) = (&planned.plan, &planned.grid);
     let units = plan.unit_count(grid);
-    let total_s =
-        plan.estimate.run_s.iter().sum::<f64>() * (grid.per_trajectory() as f64) * plan.study.runs as f64;
+    let total_s: f64 = plan.units(grid).map(|unit| plan.unit_s(grid, unit)).sum();
     let wall_s = total_s / plan.estimate.threads.max(1) as f64;
     if session.json() {
         let json = json!({

@@ -1,6 +1,6 @@
 //! `nav-sim batch run`: the units of a shard that are not done yet.
 
-use super::inputs::Inputs;
+use super::inputs::{Inputs, finished};
 use super::shard::{self, Shard};
 use super::status::Count;
 use super::{Place, Planned};
@@ -112,10 +112,10 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         session.printer.warn(&remark);
     }
     session.printer.say(&format!("shard {}/{} ({from})", shard.index, shard.count));
-    let pending = pending(&planned, shard, session)?;
+    let mut inputs = Inputs::new(&planned, &args.place.study, session);
+    let pending = pending(&planned, shard, &mut inputs, session)?;
     let runs = pending.iter().map(|(unit, _)| unit.runs).sum();
     let progress = session.progress("runs", runs);
-    let mut inputs = Inputs::new(&planned, &args.place.study, session);
     let mut left = pending.len();
     for of_cell in pending.chunk_by(|a, b| a.0.cell == b.0.cell) {
         if !stop.go_on() {
@@ -143,12 +143,19 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 type Named = (Unit, String);
 
 /// The units of a shard that are not there, or damaged.
-fn pending(planned: &Planned, shard: Shard, session: &Session) -> Result<Vec<Named>, Failure> {
+fn pending(
+    planned: &Planned,
+    shard: Shard,
+    inputs: &mut Inputs<'_>,
+    session: &Session,
+) -> Result<Vec<Named>, Failure> {
+    let names = batch_directory::units(&planned.directory)?;
     let mine = planned.plan.named_units(&planned.grid).filter(|(unit, _)| shard.has(unit.index));
     let (mut pending, mut there) = (Vec::new(), 0_usize);
     for (unit, id) in mine {
-        let finished = batch_directory::finished(&planned.directory, &id).map_err(Failure::could_not)?;
-        match finished {
+        // Without the unit's file its trajectory need not be read yet.
+        let found = if names.contains(&id) { finished(planned, (unit, &id), inputs)? } else { Ok(false) };
+        match found {
             Ok(true) => there += 1,
             Ok(false) => pending.push((unit, id)),
             Err(damage) => {

@@ -75,8 +75,7 @@ impl Count {
             count.done += usize::from(done);
             cell_whole &= done;
             if !done {
-                let run_s = plan.estimate.run_s.get(grid.cell(unit.cell).trajectory).copied();
-                count.left_s += run_s.unwrap_or(0.0) * unit.runs as f64;
+                count.left_s += plan.unit_s(grid, unit);
                 count.missing.push((unit, id));
             }
             if unit.first + unit.runs == plan.study.runs {

@@ -1,6 +1,6 @@
 //! `nav-sim batch verify`: finished units computed again and compared.
 
-use super::inputs::Inputs;
+use super::inputs::{Inputs, finished};
 use super::run::compute;
 use super::{Place, Planned};
 use crate::cli::{Failure, Session};
@@ -38,13 +38,13 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if done.is_empty() {
         return Err(Failure::input("no unit is done yet").hint("see `nav-sim batch run`"));
     }
-    let (done, damaged) = whole(&planned, done)?;
+    let mut inputs = Inputs::new(&planned, &args.place.study, session);
+    let (done, damaged) = whole(&planned, done, &mut inputs)?;
     let seed = session.seed(None);
     let key = StreamKey { seed, scenario: "", run: 0, source: "batch.verify", process: "units" };
     let amount = usize::try_from(args.units).unwrap_or(usize::MAX);
     let mut chosen: Vec<&Named> = done.sample(&mut key.generator(), amount).collect();
     chosen.sort_by_key(|(unit, _)| unit.index);
-    let mut inputs = Inputs::new(&planned, &args.place.study, session);
     let progress = session.progress("runs", chosen.iter().map(|(unit, _)| unit.runs).sum());
     let mut different = Vec::new();
     for (unit, id) in &chosen {
@@ -82,10 +82,14 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 type Named = (Unit, String);
 
 /// The units that are whole, and what is wrong with the others.
-fn whole(planned: &Planned, units: Vec<Named>) -> Result<(Vec<Named>, Vec<String>), Failure> {
+fn whole(
+    planned: &Planned,
+    units: Vec<Named>,
+    inputs: &mut Inputs<'_>,
+) -> Result<(Vec<Named>, Vec<String>), Failure> {
     let (mut whole, mut damaged) = (Vec::new(), Vec::new());
     for (unit, id) in units {
-        match batch_directory::finished(&planned.directory, &id).map_err(Failure::could_not)? {
+        match finished(planned, (unit, &id), inputs)? {
             Ok(true) => whole.push((unit, id)),
             Ok(false) => {}
             Err(what) => damaged.push(what),

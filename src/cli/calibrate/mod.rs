@@ -53,7 +53,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "A", default_value = "30%", value_parser = trim)]
     trim: Trim,
     /// What a scale counts in the fit
-    #[arg(long, value_enum, default_value_t = WeightingArg::Edof)]
+    #[arg(long, value_enum, default_value_t = WeightingArg::Model)]
     weighting: WeightingArg,
     /// Which signals are replicates of one another (default: sensor; axes for gmwm, rgmwm and avlr)
     #[arg(long, value_enum)]
@@ -104,7 +104,9 @@ enum EstimatorArg {
 
 #[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
 enum WeightingArg {
-    /// Degrees of freedom / (2 wv²): the inverse variance
+    /// Degrees of freedom / (2 wv²), wv that of the fitted model: the inverse variance
+    Model,
+    /// The same with the observed wv: the convention of the literature, low where wv is low by chance
     Edof,
     /// 1 / (width of the 95 % interval)²
     Ci,
@@ -141,6 +143,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         trim: args.trim,
         tuning: args.tuning.tuning()?,
         weighting: match args.weighting {
+            WeightingArg::Model => Weighting::Model,
             WeightingArg::Edof => Weighting::Edof,
             WeightingArg::Ci => Weighting::Interval,
             WeightingArg::None => Weighting::None,

@@ -62,6 +62,7 @@ pub(super) fn note(args: &Args, inputs: Vec<Input>, session: &Session) -> Calibr
         version: env!("CARGO_PKG_VERSION").to_owned(),
         efficiency_convention: args.tuning.convention().to_owned(),
         weighting: match args.weighting {
+            WeightingArg::Model => "model",
             WeightingArg::Edof => "edof",
             WeightingArg::Ci => "ci",
             WeightingArg::None => "none",

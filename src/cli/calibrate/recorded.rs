@@ -23,13 +23,14 @@ pub(super) fn run(args: &Args, settings: &mut Settings, session: &Session) -> Re
     let (looks, report) = args.recordings.visit(&args.inputs, needed, session, &look)?;
     let looks = looks.into_iter().collect::<Result<Vec<_>, _>>()?;
     distinct(&looks)?;
+    disjoint(&report)?;
     settings.rate_hz = report.files[0].rate_hz;
     warm_ups(&looks, args.recordings.skip_s(), settings.rate_hz, session);
     shortest(&report, args.tuning.scales, session);
     let recordings = report.files.iter().map(|f| f.samples.len()).sum();
     settings.estimators = estimators(args.estimator, recordings)?;
     let pool = pool(args, settings)?;
-    let files: Vec<PathBuf> = report.files.iter().map(|f| PathBuf::from(&f.file)).collect();
+    let files: Vec<PathBuf> = report.files.iter().map(|f| f.path.clone()).collect();
     let guarded: Vec<PathBuf> = files.iter().chain(&args.parameters).cloned().collect();
     let outputs = outputs(out, &settings.estimators, &guarded)?;
     let inputs = files.iter().map(|f| read::input("recording", f)).collect::<Result<Vec<_>, _>>()?;
@@ -146,4 +147,14 @@ fn distinct(looks: &[Look]) -> Result<(), Failure> {
         }
     }
     Ok(())
+}
+
+/// Refuses recordings that have samples in common, such as a copy less its first rows: as copies.
+fn disjoint(report: &Report) -> Result<(), Failure> {
+    let Some((one, other, share)) = report.overlap() else { return Ok(()) };
+    let percent = 100.0 * share;
+    let message = format!(
+        "{other} and {one} have samples in common, about {percent:.0} % of each: they are no two replicates"
+    );
+    Err(Failure::input(message).hint("leave one of them out, or cut off the rows that both have"))
 }

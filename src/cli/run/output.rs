@@ -49,8 +49,10 @@ pub(crate) fn try_open(path: &Path, inputs: &[Input]) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Refuses a directory whose manifest is that of another command: its own would take its place.
+/// Refuses a directory whose manifest is that of another command: its own would take its place. What a killed
+/// command had begun to replace is finished first.
 pub(crate) fn not_of_another_command(path: &Path, is_ours: fn(&str) -> bool) -> Result<(), Failure> {
+    atomic::recover(path);
     let manifest = path.join("manifest.json");
     let Ok(text) = std::fs::read_to_string(&manifest) else { return empty_or_new(path) };
     if is_ours(&text) {

@@ -2,7 +2,7 @@
 
 use super::{Source, wrote};
 use crate::cli::{Failure, Session, read};
-use nav_sim::data::atomic::{AtomicDir, guard_inputs};
+use nav_sim::data::atomic::{AtomicDir, guard_inputs, recover};
 use nav_sim::data::scenario_file;
 use nav_sim::data::trajectory_file::{Rows, write_rows};
 use nav_sim::noise::continuous;
@@ -46,6 +46,7 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     for name in FILES {
         guard_inputs(&args.out.join(name), inputs.iter().flatten().map(|p| p.as_path()))?;
     }
+    recover(&args.out);
     if !FILES.iter().all(|name| args.out.join(name).is_file()) {
         crate::cli::run::empty_or_new(&args.out)?; // not a recording made before
     }

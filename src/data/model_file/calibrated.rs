@@ -14,7 +14,7 @@ pub struct CalibrationNote {
     pub version: String,
     /// How the tuning constant follows from the efficiency: `exact` or `wv`.
     pub efficiency_convention: String,
-    /// What a scale counts: `edof`, `ci`, `none` or `full`.
+    /// What a scale counts: `model`, `edof`, `ci`, `none` or `full`.
     pub weighting: String,
     /// Seed of the bootstrap, if there was one.
     pub seed: Option<u64>,

@@ -108,13 +108,27 @@ fn norm(vector: &[f64]) -> f64 {
 }
 
 /// Static specific force is gravity, or nothing where the mean was removed before; rates are small.
-pub(super) fn plausible(means: &[(Channel, f64)], report: &mut FileReport) -> Result<(), RecordingError> {
+pub(super) fn plausible(
+    means: &[(Channel, f64)],
+    rate_hz: f64,
+    report: &mut FileReport,
+) -> Result<(), RecordingError> {
+    /// Room for local gravity, a scale error and a bias of 30 mg.
+    const NEAR: f64 = 0.03;
     let of = |sensor| -> Vec<f64> {
         means.iter().filter(|(channel, _)| channel.sensor == sensor).map(|(_, mean)| *mean).collect()
     };
     let (accel, gyro) = (of(Sensor::Accel), of(Sensor::Gyro));
     if accel.len() == 3 {
         check_gravity(&report.file, norm(&accel))?;
+        let in_an_interval = STANDARD_GRAVITY / rate_hz;
+        if (norm(&accel) / in_an_interval - 1.0).abs() < NEAR && (rate_hz - 1.0).abs() > NEAR {
+            report.warn(format!(
+                "static |f| is {:.4} m/s², which is what gravity adds in one sample interval: increments named as \
+                 rates? Name the columns dv_x_m_s, … and dtheta_x_rad, …",
+                norm(&accel)
+            ));
+        }
     }
     if norm(&gyro) > 0.1 {
         let degrees = norm(&gyro).to_degrees();

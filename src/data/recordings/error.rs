@@ -2,6 +2,7 @@
 
 use super::header::HeaderError;
 use crate::data::npy::NpyError;
+use crate::data::source::is_damage;
 use crate::imu::Channel;
 use std::io::ErrorKind;
 
@@ -158,6 +159,9 @@ impl RecordingError {
                 "save it as CSV in UTF-8, one row a line; arrays end in .npy, gzipped tables in .gz"
             }
             Self::Skipped { .. } => "a smaller --skip-s, or a longer recording",
+            Self::Io { source, .. } if source.kind() == ErrorKind::FileTooLarge => {
+                "write what comes through a pipe to a file first"
+            }
             Self::Io { source, .. } if is_damage(source.kind()) => {
                 "the file is cut off, or not gzipped though it ends in .gz: copy it again, or rename it"
             }
@@ -208,11 +212,6 @@ pub(super) fn shown(text: &str, longest: usize) -> String {
 
 fn escaped(c: char) -> Vec<char> {
     if c.is_control() { c.escape_default().collect() } else { vec![c] }
-}
-
-/// Whether an error of the system is one of the contents: compressed data that are none, or cut off.
-pub(super) const fn is_damage(kind: ErrorKind) -> bool {
-    matches!(kind, ErrorKind::InvalidData | ErrorKind::InvalidInput | ErrorKind::UnexpectedEof)
 }
 
 fn decimal_comma(value: &str) -> bool {

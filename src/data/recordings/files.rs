@@ -31,7 +31,8 @@ pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<File>, RecordingError> {
     }
     let mut seen = HashSet::new();
     for file in &files {
-        if !file.path.canonicalize().is_ok_and(|p| seen.insert(p)) {
+        // A pipe has no path of its own.
+        if !seen.insert(file.path.canonicalize().unwrap_or_else(|_| file.path.clone())) {
             return Err(RecordingError::GivenTwice { path: file.path.display().to_string() });
         }
     }

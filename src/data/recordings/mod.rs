@@ -11,9 +11,11 @@ pub(in crate::data) mod checks;
 mod error;
 mod files;
 mod prepared;
+mod repeats;
 mod report;
 mod table;
 mod text;
+mod texture;
 pub(in crate::data) mod timing;
 mod values;
 mod write;
@@ -139,7 +141,8 @@ fn held<T>(
     options: &ReadOptions,
     look: &(dyn Fn(Recording) -> T + Sync),
 ) -> Result<(FileReport, Vec<T>, Option<Prepared>), RecordingError> {
-    let (prepared, report) = Prepared::new(load(path, options)?, options)?;
+    let (prepared, mut report) = Prepared::new(load(path, options)?, options)?;
+    path.clone_into(&mut report.path);
     if prepared.is_stored() {
         return Ok((report, Vec::new(), Some(prepared)));
     }

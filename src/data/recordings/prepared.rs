@@ -4,7 +4,7 @@ use super::header::Role;
 use super::report::name_of;
 use super::table::{Column, Raw};
 use super::timing::{self, Timing};
-use super::{FileReport, ReadOptions, RecordingError, checks};
+use super::{FileReport, ReadOptions, RecordingError, checks, repeats, texture};
 use crate::imu::{Channel, Recording, Signal};
 use std::ops::Range;
 
@@ -35,6 +35,8 @@ impl Prepared {
         raw.columns.retain(|c| matches!(c.role, Role::Signal { .. }));
         raw.columns.sort_by_key(|c| c.channel().map(Channel::index));
         let factors = checks::factors(&raw, timing.rate_hz, &mut report)?;
+        texture::doubts(&raw, &factors, &mut report)?;
+        repeats::doubts(&raw, &mut report)?;
         let samples = raw.columns.first().map_or(0, |c| c.values.len());
         let pieces = pieces(&raw.path, samples, &timing, options, &mut report)?;
         let stored = RecordingError::storage(&raw.path);
@@ -47,7 +49,7 @@ impl Prepared {
         }
         let means_of = |i| columns.iter().map(|c| (c.channel, c.means[i])).collect::<Vec<_>>();
         for i in 0..pieces.len() {
-            checks::plausible(&means_of(i), &mut report)?;
+            checks::plausible(&means_of(i), timing.rate_hz, &mut report)?;
         }
         report.samples = pieces.iter().map(Range::len).collect();
         report.rate_hz = timing.rate_hz;

@@ -1,10 +1,12 @@
 //! What was found in the files, for the user to check.
 
 use super::header::{self, Role, Unit};
+use super::repeats::{self, Sketch};
 use super::table::{Column, Raw};
 use crate::data::suggest::nearest;
 use crate::imu::{Channel, Sensor};
 use std::fmt;
+use std::path::PathBuf;
 
 /// What was found and assumed while reading.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -16,6 +18,18 @@ pub struct Report {
 }
 
 impl Report {
+    /// The first two files that have samples in common, wherever these stand in them, and about which share of one is
+    /// in the other (of both, where they are equally long).
+    #[must_use]
+    pub fn overlap(&self) -> Option<(&str, &str, f64)> {
+        let pairs =
+            self.files.iter().enumerate().flat_map(|(i, b)| self.files[..i].iter().map(move |a| (a, b)));
+        pairs.into_iter().find_map(|(a, b)| {
+            let share = repeats::overlap(&a.sketches, &b.sketches)?;
+            Some((a.file.as_str(), b.file.as_str(), share))
+        })
+    }
+
     /// Every doubt, those about a file with its name.
     #[must_use]
     pub fn all_warnings(&self) -> Vec<String> {
@@ -28,8 +42,10 @@ impl Report {
 /// What was found and assumed in one file. Displays as one line.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FileReport {
-    /// The file.
+    /// The file, as shown.
     pub file: String,
+    /// The file itself: its name need not be UTF-8.
+    pub path: PathBuf,
     /// Columns that became signals.
     pub columns: Vec<(String, Channel)>,
     /// Columns passed over.
@@ -46,6 +62,8 @@ pub struct FileReport {
     pub assumptions: Vec<String>,
     /// Doubts, in words.
     pub warnings: Vec<String>,
+    /// What tells the samples of each column from others.
+    pub(super) sketches: Vec<(Channel, Sketch)>,
 }
 
 /// The name of one of the recordings of a file.

@@ -5,8 +5,8 @@ use super::header::{Layout, Role, classify};
 use super::table::{BETWEEN, Column, LARGEST, Lines, Raw, relieve, settle};
 use super::values::Values;
 use super::{ReadOptions, RecordingError};
+use crate::data::source;
 use flate2::read::MultiGzDecoder;
-use std::fs::File;
 use std::io::{BufRead, BufReader, Cursor, Read};
 use std::path::Path;
 
@@ -20,7 +20,7 @@ const BUFFER: usize = 1 << 17;
 pub(super) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, RecordingError> {
     let name = path.display().to_string();
     let io = |source| RecordingError::Io { path: name.clone(), source };
-    let file = File::open(path).map_err(io)?;
+    let file = source::open(path).map_err(io)?;
     let gzipped = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
     let reader: Reader = if gzipped {
         Box::new(BufReader::with_capacity(

@@ -56,6 +56,11 @@ pub(super) fn timing(
     };
     let timing = clock.check(raw, options)?;
     report.rate_from = clock.source;
+    if let Some(given) = options.rate_hz.filter(|given| (timing.found_hz / given - 1.0).abs() > ROUNDED) {
+        let found = timing.found_hz;
+        report.rate_from = format!("given; the {} has {found} Hz", report.rate_from);
+        report.warn(format!("{given} Hz is given, but the file runs at {found} Hz: the rate given is taken"));
+    }
     if !USUAL_RATES_HZ.contains(&timing.rate_hz) {
         let (rate_hz, column) = (timing.rate_hz, &clock.name);
         report.warn(format!("{rate_hz} Hz is no usual rate of an IMU: is the unit of \"{column}\" right?"));
@@ -71,6 +76,17 @@ pub(super) fn timing(
     let breaks = if options.gaps == Gaps::Split { timing.breaks } else { Vec::new() };
     Ok(Timing { rate_hz: timing.rate_hz, breaks })
 }
+
+/// What the steps of a clock say.
+struct Checked {
+    rate_hz: f64,
+    /// The clock's own rate (Hz).
+    found_hz: f64,
+    breaks: Vec<usize>,
+}
+
+/// A rate that is given may differ from the clock's by so much without a word: it was rounded.
+const ROUNDED: f64 = 1e-3;
 
 /// Time of each sample.
 #[derive(Debug)]
@@ -125,7 +141,7 @@ impl Clock {
         ((self.start + self.since[sample] * self.unit_s) * 1e9).round() / 1e9
     }
 
-    fn check(&self, raw: &Raw, options: &ReadOptions) -> Result<Timing, RecordingError> {
+    fn check(&self, raw: &Raw, options: &ReadOptions) -> Result<Checked, RecordingError> {
         let steps = || self.since.windows(2).map(|w| w[1] - w[0]);
         let path = || raw.path.clone();
         let at = |i: usize| (raw.lines.of(i + 1), self.time_of(i), self.time_of(i + 1));
@@ -157,7 +173,7 @@ impl Clock {
         if (found / given - 1.0).abs() > 0.01 {
             return Err(RecordingError::RateGiven { path: path(), found, given });
         }
-        Ok(Timing { rate_hz: given, breaks })
+        Ok(Checked { rate_hz: given, found_hz: found, breaks })
     }
 
     /// From the whole span if it has no gaps (averages the jitter), else from the median step.

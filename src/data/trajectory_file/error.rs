@@ -1,5 +1,6 @@
 //! What can be wrong with a trajectory file.
 
+use crate::data::source;
 use crate::data::toml_file::TomlError;
 use crate::trajectory;
 
@@ -73,7 +74,7 @@ impl TrajectoryFileError {
     #[must_use]
     pub fn is_content(&self) -> bool {
         match self {
-            Self::Io { .. } => false,
+            Self::Io { source, .. } => source::is_damage(source.kind()),
             Self::Profile(e) => e.is_content(),
             _ => true,
         }

@@ -1,8 +1,8 @@
 //! Text tables of numbers.
 
 use super::TrajectoryFileError as Error;
+use crate::data::source;
 use flate2::read::MultiGzDecoder;
-use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
@@ -22,17 +22,17 @@ pub(in crate::data) struct Table {
 /// Opens a file, unpacking it when its name ends in `.gz`.
 pub(in crate::data) fn open(path: &Path) -> Result<Box<dyn BufRead>, Error> {
     let io = |source| Error::Io { path: path.display().to_string(), source };
-    let file = BufReader::with_capacity(1 << 16, File::open(path).map_err(io)?);
+    let file = BufReader::with_capacity(1 << 16, source::open(path).map_err(io)?);
     let packed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
     Ok(if packed { Box::new(BufReader::new(MultiGzDecoder::new(file))) } else { Box::new(file) })
 }
 
-/// The whole text of a file.
+/// The whole text of a file; what is not UTF-8 in it (a degree sign of another encoding) is replaced.
 pub(in crate::data) fn text(path: &Path) -> Result<String, Error> {
-    let mut text = String::new();
+    let mut bytes = Vec::new();
     let io = |source| Error::Io { path: path.display().to_string(), source };
-    open(path)?.read_to_string(&mut text).map_err(io)?;
-    Ok(text)
+    open(path)?.read_to_end(&mut bytes).map_err(io)?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
 /// Which numbers a table may hold.
@@ -44,20 +44,35 @@ pub(in crate::data) enum Numbers {
     Any,
 }
 
+/// Longest line of a table (bytes).
+const LONGEST_LINE: u64 = 1 << 16;
+
 impl Table {
     /// Reads a table. Without `columns` its first line that is no comment names them; with them it has no
     /// header and its cells stand between blanks.
     pub(in crate::data) fn read(
         path: &str,
-        reader: impl BufRead,
+        mut reader: impl BufRead,
         columns: Option<&[&str]>,
         numbers: Numbers,
     ) -> Result<Self, Error> {
         let mut separator = if columns.is_some() { ' ' } else { ',' };
         let mut table = Self::of_columns(path, columns.unwrap_or_default());
-        for (index, line) in reader.lines().enumerate() {
-            let number = index as u64 + 1;
-            let line = line.map_err(|source| Error::Io { path: path.to_owned(), source })?;
+        let (mut number, mut bytes) = (0, Vec::new());
+        loop {
+            bytes.clear();
+            let read = reader.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut bytes);
+            number += 1;
+            match read.map_err(|source| Error::Io { path: path.to_owned(), source })? {
+                0 => break,
+                n if n as u64 == LONGEST_LINE => {
+                    let (path, message) =
+                        (path.to_owned(), "a line of more than 64 KiB: not a table of text");
+                    return Err(Error::Format { path, line: number, message: message.into() });
+                }
+                _ => {}
+            }
+            let line = String::from_utf8_lossy(&bytes);
             let text = line.trim_start_matches('\u{feff}').trim();
             if let Some(comment) = text.strip_prefix(['#', '%']) {
                 table.comments.push(comment.trim().to_owned());

@@ -1,0 +1,38 @@
+//! Ctrl-C, SIGTERM and a closed terminal: what is being written is removed before the process ends.
+
+use super::{Failure, Printer};
+use nav_sim::data::atomic;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+static INTERRUPTED: AtomicBool = AtomicBool::new(false);
+
+/// From now on a signal removes what is being written and ends the process: exit code 128 + signal, 130 for
+/// Ctrl-C. A signal that this process was started to ignore (by `nohup`, say) is still ignored.
+pub(super) fn watch(printer: Printer) {
+    let ignored = ignored();
+    let wanted = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
+    let Ok(mut signals) = Signals::new(wanted) else { return };
+    std::thread::spawn(move || {
+        let Some(signal) = signals.forever().next() else { return };
+        INTERRUPTED.store(true, Ordering::SeqCst);
+        atomic::remove_unfinished();
+        printer.failure(&Failure::interrupted("interrupted; what was being written is removed"));
+        std::process::exit(128 + signal);
+    });
+}
+
+/// Waits for the end if the process is being interrupted: a failure that comes of that is not told.
+pub(super) fn settle() {
+    while INTERRUPTED.load(Ordering::SeqCst) {
+        std::thread::park();
+    }
+}
+
+/// The signals that this process ignores, a bit each from the lowest on. Where that cannot be known: none.
+fn ignored() -> u64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    mask.and_then(|hex| u64::from_str_radix(hex.trim(), 16).ok()).unwrap_or(0)
+}

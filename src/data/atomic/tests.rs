@@ -1,0 +1,215 @@
+//! Outputs appear whole or not at all, whoever is killed.
+
+use super::*;
+use std::fs;
+
+fn listing(dir: &Path) -> Vec<String> {
+    let mut names: Vec<String> =
+        fs::read_dir(dir).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_file_appears_at_commit_only() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("deep/er/model.toml");
+    let mut file = AtomicFile::create(&path).unwrap();
+    file.write_all(b"whole").unwrap();
+    assert!(!path.exists());
+    file.commit().unwrap();
+    assert_eq!(fs::read(&path).unwrap(), b"whole");
+    assert_eq!(listing(path.parent().unwrap()), ["model.toml"]);
+}
+
+/// What a killed writer left is removed by the next one of the same output; what a living one writes, and
+/// what only looks like it, stays.
+#[test]
+fn what_killed_writers_left_goes_with_the_next_write() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.csv");
+    let living = AtomicFile::create(&path).unwrap();
+    fs::write(dir.path().join(".a.csv.12345-0.partial"), "half").unwrap();
+    fs::create_dir(dir.path().join(".run.12345-7.partial")).unwrap();
+    fs::write(dir.path().join(".a.csv.mine.partial"), "other").unwrap();
+    write(&path, "whole").unwrap();
+    let mut names = listing(dir.path());
+    assert_eq!(names.len(), 4, "{names:?}");
+    assert!(!names.iter().any(|n| n == ".a.csv.12345-0.partial"));
+    drop(living);
+    let mut run = AtomicDir::create(&dir.path().join("run")).unwrap();
+    run.write("b.csv", "b").unwrap();
+    run.commit().unwrap();
+    names = listing(dir.path());
+    assert_eq!(names, [".a.csv.mine.partial", "a.csv", "run"]);
+}
+
+#[test]
+fn a_dropped_file_leaves_nothing_and_the_old_one_stays() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.csv");
+    write(&path, "old").unwrap();
+    let mut file = AtomicFile::create(&path).unwrap();
+    file.write_all(b"half").unwrap();
+    drop(file);
+    assert_eq!(fs::read(&path).unwrap(), b"old");
+    assert_eq!(listing(dir.path()), ["a.csv"]);
+}
+
+#[test]
+fn what_a_killed_process_left_is_not_in_the_way() {
+    let dir = tempfile::tempdir().unwrap();
+    let pid = std::process::id();
+    for count in 0..200 {
+        fs::write(dir.path().join(format!(".a.csv.{pid}-{count}.partial")), "left").unwrap();
+    }
+    write(&dir.path().join("a.csv"), "new").unwrap();
+    assert_eq!(fs::read(dir.path().join("a.csv")).unwrap(), b"new");
+}
+
+#[test]
+fn links_are_followed_and_devices_written_directly() {
+    let dir = tempfile::tempdir().unwrap();
+    let (real, link) = (dir.path().join("real"), dir.path().join("link"));
+    write(&real, "old").unwrap();
+    std::os::unix::fs::symlink(&real, &link).unwrap();
+    write(&link, "new").unwrap();
+    assert!(link.is_symlink());
+    assert_eq!(fs::read(&real).unwrap(), b"new");
+    write(Path::new("/dev/null"), "gone").unwrap();
+}
+
+#[test]
+fn a_full_disk_is_an_error_that_names_the_output() {
+    let e = write(Path::new("/dev/full"), vec![0; 1 << 20]).unwrap_err();
+    assert!(e.to_string().starts_with("/dev/full: No space left"), "{e}");
+    assert!(!e.is_usage());
+}
+
+#[test]
+fn a_directory_is_no_file_and_a_file_no_directory() {
+    let dir = tempfile::tempdir().unwrap();
+    assert!(AtomicFile::create(dir.path()).is_err());
+    let file = dir.path().join("f");
+    write(&file, "x").unwrap();
+    assert!(AtomicDir::create(&file).is_err());
+    assert_eq!(listing(dir.path()), ["f"]);
+}
+
+#[test]
+fn inputs_are_not_overwritten_under_any_name() {
+    let dir = tempfile::tempdir().unwrap();
+    let input = dir.path().join("in.csv");
+    write(&input, "data").unwrap();
+    let alias = dir.path().join("../").join(dir.path().file_name().unwrap()).join("in.csv");
+    let e = guard_inputs(&alias, [input.as_path()]).unwrap_err();
+    assert!(e.to_string().ends_with("is an input of this command and would be overwritten"));
+    assert!(e.is_usage() && e.hint().is_some());
+    guard_inputs(&dir.path().join("out.csv"), [input.as_path()]).unwrap();
+}
+
+#[test]
+fn a_directory_appears_at_commit_only() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = dir.path().join("run");
+    let mut out = AtomicDir::create(&run).unwrap();
+    fs::write(out.path("a.csv"), "a").unwrap();
+    out.write("manifest.json", "{}").unwrap();
+    assert!(!run.exists());
+    out.commit().unwrap();
+    assert_eq!(listing(&run), ["a.csv", "manifest.json"]);
+    assert_eq!(listing(dir.path()), ["run"]);
+}
+
+#[test]
+fn an_existing_directory_keeps_what_is_not_replaced() {
+    let dir = tempfile::tempdir().unwrap();
+    fs::write(dir.path().join("notes.txt"), "mine").unwrap();
+    fs::write(dir.path().join("a.csv"), "old").unwrap();
+    let mut out = AtomicDir::create(dir.path()).unwrap();
+    out.write("a.csv", "new").unwrap();
+    assert_eq!(fs::read(dir.path().join("a.csv")).unwrap(), b"old");
+    out.commit().unwrap();
+    assert_eq!(listing(dir.path()), ["a.csv", "notes.txt"]);
+    assert_eq!(fs::read(dir.path().join("a.csv")).unwrap(), b"new");
+}
+
+#[test]
+fn a_declared_but_unwritten_file_fails_the_commit_and_nothing_is_left() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut out = AtomicDir::create(&dir.path().join("run")).unwrap();
+    let _ = out.path("never.csv");
+    let e = out.commit().unwrap_err();
+    assert!(e.to_string().contains("never.csv"), "{e}");
+    assert!(listing(dir.path()).is_empty());
+}
+
+/// Writers of one output take each other for dead at no instant: each gets its name, and nothing is left. (Of
+/// outputs made first and locked afterwards, some were removed between the two.)
+#[test]
+fn writers_of_one_output_do_not_remove_what_the_others_write() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.unit");
+    std::thread::scope(|scope| {
+        for writer in 0..8 {
+            let path = &path;
+            scope.spawn(move || {
+                for _ in 0..100 {
+                    write(path, format!("{writer}")).unwrap();
+                    drop(AtomicDir::create(&path.with_file_name("run")).unwrap());
+                }
+            });
+        }
+    });
+    assert_eq!(listing(dir.path()), ["a.unit"]);
+}
+
+/// Killed before any step of replacing a directory's files, it has the old files or, when the next command looks,
+/// the new ones; killed again while it looks, too.
+#[test]
+fn a_replacement_that_is_killed_is_finished_by_the_next_command() {
+    let old = |dir: &Path| {
+        for name in ["a.csv", "b.csv", "manifest.json", "notes.txt"] {
+            fs::write(dir.join(name), "old").unwrap();
+        }
+    };
+    for (first, second) in (0..5).flat_map(|first| (0..5).map(move |second| (first, second))) {
+        let dir = tempfile::tempdir().unwrap();
+        old(dir.path());
+        let mut out = AtomicDir::create(dir.path()).unwrap();
+        for name in ["a.csv", "b.csv", "manifest.json"] {
+            out.write(name, "new").unwrap();
+        }
+        directory::kill::after(first);
+        assert!(out.commit().is_err(), "step {first}");
+        directory::kill::after(second);
+        recover(dir.path());
+        directory::kill::after(usize::MAX);
+        recover(dir.path());
+        assert_eq!(listing(dir.path()), ["a.csv", "b.csv", "manifest.json", "notes.txt"]);
+        let contents = |name: &str| fs::read_to_string(dir.path().join(name)).unwrap();
+        assert_eq!(
+            ["a.csv", "b.csv", "manifest.json", "notes.txt"].map(contents),
+            ["new", "new", "new", "old"]
+        );
+    }
+}
+
+/// No instant of a replacement shows a manifest beside files that are not its own.
+#[test]
+fn a_manifest_stands_beside_its_own_files_only() {
+    for steps in 0..5 {
+        let dir = tempfile::tempdir().unwrap();
+        fs::write(dir.path().join("a.csv"), "old").unwrap();
+        fs::write(dir.path().join("manifest.json"), "old").unwrap();
+        let mut out = AtomicDir::create(dir.path()).unwrap();
+        out.write("a.csv", "new").unwrap();
+        out.write("manifest.json", "new").unwrap();
+        directory::kill::after(steps);
+        let _ = out.commit();
+        directory::kill::after(usize::MAX);
+        let contents = |name: &str| fs::read_to_string(dir.path().join(name)).ok();
+        let manifest = contents("manifest.json");
+        assert!(manifest.is_none() || manifest == contents("a.csv"), "{steps}: {manifest:?}");
+    }
+}
