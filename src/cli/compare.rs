@@ -20,10 +20,10 @@ use std::path::{Path, PathBuf};
 #[command(before_help = "\
 Examples:
   nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml \\
-      --runs 8 --seed 1 -o out/right
-  nav-sim run trajectories/land_vehicle.toml calib_data/tactical.toml \\
-      --truth calib_data/consumer_mems.toml --runs 8 --seed 1 -o out/wrong
-  nav-sim compare out/wrong --reference out/right --state all")]
+      --filter full --runs 8 --seed 1 -o out/full
+  nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml \\
+      --runs 8 --seed 1 -o out/reduced
+  nav-sim compare out/reduced --reference out/full --state all")]
 pub(crate) struct Args {
     /// Run directories
     #[arg(required = true, value_name = "DIR")]

@@ -41,7 +41,7 @@ pub use recording::{gnss_csv, imu_csv, initial_toml};
 pub use replicates::{
     AlarmEntry, LeftOutEntry, MovementEntry, ReplicateEntry, ScoresEntry, describe_replicates,
 };
-pub use run_directory::{OutputFile, RUN_FILES, json, run_directory};
+pub use run_directory::{OutputFile, RUN_FILES, json, run_directory, summary_json};
 pub use tables::{TableError, epochs_csv, parse_epochs, parse_runs, runs_csv};
 pub use trajectory::{TrajectorySeries, trajectory_svg};
 pub use verdict::{verdict_in_short, verdict_line, verdict_word};

@@ -37,10 +37,23 @@ pub fn run_directory<'a>(
     vec![
         OutputFile::whole(epochs_name, epochs_csv(epochs)),
         OutputFile { name: runs_name, parts: Box::new(runs_csv(result)) },
-        OutputFile::whole(summary_name, json(summary)),
+        OutputFile::whole(summary_name, summary_json(summary, manifest.throughput_epochs_per_s)),
         OutputFile::whole(page_name, html::run_page(result, epochs, summary, manifest)),
         OutputFile::whole(manifest_name, json(manifest)),
     ]
+}
+
+/// `summary.json`, with how fast it was found (IMU epochs a second, all runs together): its only number that the
+/// seed does not determine.
+#[must_use]
+pub fn summary_json(summary: &Summary, throughput_epochs_per_s: f64) -> String {
+    #[derive(serde::Serialize)]
+    struct WithThroughput<'a> {
+        #[serde(flatten)]
+        summary: &'a Summary,
+        throughput_epochs_per_s: f64,
+    }
+    json(&WithThroughput { summary, throughput_epochs_per_s })
 }
 
 /// Indented JSON with a final newline; NaN is null.

@@ -33,8 +33,8 @@ Examples:
   nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml --seed 1 --runs 20
   nav-sim run trajectories/figure_eight.toml calib_data/tactical.toml \\
       --outage 60:90 --filter full --runs 8 -o out/full
-  nav-sim run trajectories/land_vehicle.toml calib_data/tactical.toml \\
-      --truth calib_data/consumer_mems.toml --runs 8 -o out/mismatch")]
+  nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml \\
+      --truth calib_data/tactical.toml --runs 8 -o out/mismatch")]
 pub(crate) struct Args {
     /// Trajectory: motion profile (.toml) or table (.csv)
     trajectory: PathBuf,
@@ -134,11 +134,23 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let independent_windows = results[0].independent_windows;
     let manifest = Manifest { independent_windows, wall_s, throughput_epochs_per_s, ..manifest };
     let summary = write(&results[0], &manifest, reduction, &args.out)?;
-    let shown = if session.json() { output::json } else { text };
+    let shown = if session.json() { nav_sim::report::summary_json } else { text };
     session.printer.result(shown(&summary, throughput_epochs_per_s).trim_end());
     output::doubt_filter(&summary, session);
     session.printer.say(&format!("wrote {}", args.out.display()));
-    all_finite(&summary)
+    all_finite(&summary)?;
+    not_lost(&summary)
+}
+
+/// A filter whose errors are of another order than it believes did what was asked for, and is of no use.
+fn not_lost(summary: &Summary) -> Result<(), Failure> {
+    if !summary.verdict.is_lost() {
+        return Ok(());
+    }
+    let message =
+        format!("the filter is lost: NEES {:.0}, {} if it is right", summary.nees.mean, summary.nees.dof);
+    Err(Failure::bound(message)
+        .hint("the results are written; does MODEL describe the errors of --truth or --static?"))
 }
 
 /// A run that diverged is left out of every number; the exit code says that there was one.

@@ -107,17 +107,6 @@ pub(crate) fn doubt_filter(summary: &Summary, session: &Session) {
     }
 }
 
-/// The summary and how fast it was found, for programs.
-pub(crate) fn json(summary: &Summary, throughput_epochs_per_s: f64) -> String {
-    #[derive(serde::Serialize)]
-    struct Printed<'a> {
-        #[serde(flatten)]
-        summary: &'a Summary,
-        throughput_epochs_per_s: f64,
-    }
-    report::json(&Printed { summary, throughput_epochs_per_s })
-}
-
 /// The summary for people, the verdict first.
 pub(crate) fn text(summary: &Summary, throughput_epochs_per_s: f64) -> String {
     let (nees, coverage) = (&summary.nees, &summary.coverage);
