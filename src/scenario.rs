@@ -9,7 +9,7 @@ use crate::sensors::baro::BaroSettings;
 use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
 use crate::sensors::imu::Truth;
-use crate::sensors::outage::{Outage, OutagePlan, PeriodicOutages, RandomOutages};
+use crate::sensors::outage::{MisplacedOutage, Outage, OutagePlan, PeriodicOutages, RandomOutages};
 use crate::simulation::Experiment;
 use crate::trajectory::Trajectory;
 use crate::units::SettingError;
@@ -214,6 +214,26 @@ impl Scenario {
             }
         }
         doubts
+    }
+
+    /// Those of the outages asked for by their times that are cut where a trajectory ends.
+    ///
+    /// # Errors
+    /// One that does not begin on the trajectory, or withholds no fix.
+    pub fn cut_outages(&self, span_s: (f64, f64)) -> Result<Vec<Outage>, MisplacedOutage> {
+        let rate_hz = self.gnss.rate_hz;
+        // fixes come at whole intervals from the start
+        let withholds = |o: &Outage| {
+            let next = ((o.start_s - span_s.0) * rate_hz - 1e-6).ceil().max(1.0);
+            span_s.0 + next / rate_hz < o.end_s
+        };
+        let mut cut = Vec::new();
+        for asked in self.outage.iter().flatten() {
+            if asked.placed(span_s, withholds)? != *asked {
+                cut.push(*asked);
+            }
+        }
+        Ok(cut)
     }
 
     /// The outages asked for: the paper's two when nothing is said.

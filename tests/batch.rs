@@ -352,7 +352,7 @@ fn bad_studies_are_refused_by_line_before_anything_is_written() {
         ("[2, 4, 8, 16]", "[]", "the grid is empty: no outages[1]", "without values"),
         ("name = \"wrong\"", "name = \"imu\"", "two candidate entries are named \"imu\"", "\"name\""),
         ("drive.toml", "gone.toml", "gone.toml: No such file", ""),
-        ("start_s = 30", "start_s = 50", "outage 50:66 does not lie on the trajectory", "60 s"),
+        ("start_s = 30", "start_s = 70", "outage 70:72 does not lie on the data", "60 s"),
         ("\"epochs\"]", "\"epoch\"]", "\"metrics\"", "`epochs`"),
     ];
     for (from, to, message, more) in cases {

@@ -54,6 +54,8 @@ fn a_fusion_directory_holds_what_the_interface_says() {
         "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg,sd_lat_deg,"
     ));
     assert!(header.contains(",sd_yaw_deg,b_ax_m_s2,b_ay_m_s2,b_az_m_s2,b_gx_rad_s,b_gy_rad_s,b_gz_rad_s"));
+    let deviations = "sd_b_ax_m_s2,sd_b_ay_m_s2,sd_b_az_m_s2,sd_b_gx_rad_s,sd_b_gy_rad_s,sd_b_gz_rad_s";
+    assert!(header.ends_with(&format!(",sd_n_m,sd_e_m,{deviations}")));
     let summary: serde_json::Value =
         serde_json::from_str(&fs::read_to_string(out.join("summary.json")).unwrap()).unwrap();
     let outage = &summary["outages"][0];
@@ -91,18 +93,38 @@ fn rates_increments_and_kf_gins_texts_give_one_solution() {
         .collect();
     let position_only: String =
         "t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m\n".to_owned() + &fixes.replace(' ', ",");
-    for (name, contents) in
-        [("inc.csv", &csv), ("imu.txt", &text), ("gnss.txt", &fixes), ("pos.csv", &position_only)]
-    {
+    // with an odometer's speed, which is not used; with velocity, which stands before the deviations; deviations given
+    // with a flag
+    let odometer: String = text.lines().map(|l| format!("{l}  3.25\n")).collect();
+    let full: String = gnss
+        .iter()
+        .map(|r| [0, 1, 2, 3, 7, 8, 9, 4, 5, 6, 10, 11, 12].map(|i| r[i].to_string()).join(" ") + "\n")
+        .collect();
+    let four = |l: &str| l.split(',').take(4).collect::<Vec<_>>().join(",") + "\n";
+    let bare: String = position_only.lines().map(four).collect();
+    for (name, contents) in [
+        ("inc.csv", &csv),
+        ("imu.txt", &text),
+        ("gnss.txt", &fixes),
+        ("pos.csv", &position_only),
+        ("imu8.txt", &odometer),
+        ("gnss13.txt", &full),
+        ("bare.csv", &bare),
+    ] {
         fs::write(at(name), contents).unwrap();
     }
-    let pairs = [("rec/imu.csv", "pos.csv"), ("inc.csv", "pos.csv"), ("imu.txt", "gnss.txt")];
-    let ends = pairs.map(|(imu, gnss)| {
-        done(place.path(), &format!("fuse {imu} {gnss} imu.toml --initial rec/initial.toml -o out"));
+    let end = |files: &str| {
+        done(place.path(), &format!("fuse {files} imu.toml --initial rec/initial.toml -o out"));
         table(&at("out/solution.csv")).pop().unwrap()
-    });
-    for end in &ends[1..] {
-        for (column, (x, y)) in ends[0].iter().zip(end).enumerate() {
+    };
+    let sigma = format!("{},{},{}", gnss[0][4], gnss[0][5], gnss[0][6]);
+    let given = format!("--gnss-sigma {sigma} rec/imu.csv bare.csv");
+    let ends =
+        ["rec/imu.csv pos.csv", "inc.csv pos.csv", "imu.txt gnss.txt", "imu8.txt gnss.txt", &given].map(end);
+    let with_velocity = ["rec/imu.csv rec/gnss.csv", "imu.txt gnss13.txt"].map(end);
+    let pairs = ends[1..].iter().map(|e| (&ends[0], e)).chain([(&with_velocity[0], &with_velocity[1])]);
+    for (first, end) in pairs {
+        for (column, (x, y)) in first.iter().zip(end).enumerate() {
             assert!((x - y).abs() <= 2e-6 * (1.0 + x.abs()), "column {column}: {x} {y}");
         }
     }
@@ -214,16 +236,16 @@ fn bad_imu_data_and_flags_are_refused() {
     let gap = |t: &str| {
         t.lines()
             .enumerate()
-            .filter(|(i, _)| !(100..350).contains(i))
+            .filter(|(i, _)| !(100..1350).contains(i))
             .map(|(_, l)| l.to_owned() + "\n")
             .collect()
     };
-    refused(imu, gap, "", &["line 101: no samples from 0.99 s to 3.5 s"]);
+    refused(imu, gap, "", &["line 101: no samples from 0.99 s to 13.5 s: more than 5 s cannot be bridged"]);
     refused(
         imu,
         same,
         "--outage 300:400",
-        &["outage 300:400 withholds no fix", "hint: the fixes run from 1 to 100 s"],
+        &["outage 300:400 does not lie on the data", "hint: the fixes run from 1 to 100 s"],
     );
     refused(imu, same, "--lever-arm 1,2", &["expected three numbers"]);
     refused(imu, same, "--nis-gate 1.5", &["not a probability below 1"]);
@@ -299,7 +321,7 @@ fn useless_fusions_are_refused_or_said() {
     let same = |t: &str| t.to_owned();
     refused(initial, same, "--lever-arm 800,0,-1200", &["--lever-arm 800, 0, -1200: more than 100 m"]);
     refused(initial, same, "--outage none --outage 60:70", &["--outage none stands beside other outages"]);
-    refused(initial, same, "--outage 90:130", &["--outage 90:130 does not lie within the fixes"]);
+    refused(initial, same, "--outage 90.2:90.7", &["outage 90.2:90.7 withholds no fix"]);
     let place = recorded();
     let turned = "fuse rec/imu.csv rec/gnss.csv imu.toml --initial rec/initial.toml --mounting 0,0,90 -o out";
     let ran = nav_sim(place.path(), turned);
@@ -397,4 +419,63 @@ fn turned_reference(text: &str) -> String {
         cells.join(",") + "\n"
     };
     format!("{header}\n") + &text.lines().skip(1).map(row).collect::<String>()
+}
+
+/// A logger of front, left, up told as such gives the solution of front, right, down; other counts of columns without
+/// a header are refused with what is expected; a reference that jumps is compared with where it does not.
+#[test]
+fn inputs_as_loggers_and_receivers_have_them() {
+    let place = recorded();
+    let at = |name: &str| place.path().join(name);
+    let imu = fs::read_to_string(at("rec/imu.csv")).unwrap();
+    let turned = |line: &str| {
+        let cell = |(i, c): (usize, &str)| match (i, c.strip_prefix('-')) {
+            (2 | 3 | 5 | 6, Some(positive)) => positive.to_owned(),
+            (2 | 3 | 5 | 6, None) if c.parse::<f64>().is_ok() => format!("-{c}"),
+            _ => c.to_owned(),
+        };
+        line.split(',').enumerate().map(cell).collect::<Vec<_>>().join(",") + "\n"
+    };
+    fs::write(at("flu.csv"), imu.lines().map(turned).collect::<String>()).unwrap();
+    let end = |arguments: &str| {
+        done(place.path(), &format!("fuse {arguments} rec/gnss.csv imu.toml -o out"));
+        table(&at("out/solution.csv")).pop().unwrap()
+    };
+    let (frd, flu) = (end("rec/imu.csv"), end("--axes flu flu.csv"));
+    for i in 0..10 {
+        assert!((frd[i] - flu[i]).abs() < 1e-6 * (1.0 + frd[i].abs()), "column {i}: {} {}", frd[i], flu[i]);
+    }
+    let lighter = end("--gravity first-order rec/imu.csv");
+    assert!(lighter != frd && (lighter[3] - frd[3]).abs() < 0.1);
+    for (name, columns) in [("ten.txt", 10), ("six.txt", 6)] {
+        fs::write(at(name), format!("{}\n", vec!["1"; columns].join(" ")).repeat(5)).unwrap();
+        let ran = nav_sim(place.path(), &format!("fuse rec/imu.csv {name} imu.toml -o bad"));
+        assert_eq!(ran.code, 2);
+        for text in [&format!("{name}: {columns} columns without a header"), "7 columns (t_s, latitude"] {
+            assert!(ran.stderr.contains(text), "{}", ran.stderr);
+        }
+    }
+    let reference = fs::read_to_string(at("rec/reference.csv")).unwrap();
+    let glitch = |(i, l): (usize, &str)| {
+        let row = if (400..405).contains(&i) { l.replacen(",46.", ",47.", 1) } else { l.to_owned() };
+        row + "\n"
+    };
+    fs::write(at("glitch.csv"), reference.lines().enumerate().map(glitch).collect::<String>()).unwrap();
+    let ran = done(place.path(), "fuse rec/imu.csv rec/gnss.csv imu.toml --reference glitch.csv -o out");
+    assert!(ran.stderr.contains("glitch.csv, line 401: a jump of 11"), "{}", ran.stderr);
+    let largest = table(&at("out/errors.csv")).iter().map(|e| e[1].hypot(e[2])).fold(0.0, f64::max);
+    assert!(largest < 30.0, "{largest}");
+}
+
+/// Two seconds without samples are bridged and told; the outage that lasts past the last fix is cut and told.
+#[test]
+fn holes_are_bridged_and_windows_cut_with_a_word() {
+    let place = recorded();
+    let path = place.path().join("rec/imu.csv");
+    let hole = |(i, line): (usize, &str)| (!(6000..6200).contains(&i)).then(|| line.to_owned() + "\n");
+    let text = fs::read_to_string(&path).unwrap();
+    fs::write(&path, text.lines().enumerate().filter_map(hole).collect::<String>()).unwrap();
+    let ran = done(place.path(), "fuse rec/imu.csv rec/gnss.csv imu.toml --outage 90:130 -o out");
+    assert!(ran.stderr.contains("samples missing: 2.00 s before 62.00 s (line 6001)"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("outage 90:130 is cut at 101 s: the fixes end at 100 s"), "{}", ran.stderr);
 }

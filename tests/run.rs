@@ -185,8 +185,8 @@ fn refusals_name_what_is_wrong_and_leave_nothing() {
     refused("run none.toml imu.toml -o out", 1, "none.toml: No such file");
     refused("run drive.toml none.toml -o out", 1, "none.toml: No such file");
     refused("run drive.toml drive.toml -o out", 2, "drive.toml, line 2: unknown key \"start\"");
-    refused(&format!("{base} --outage 50:70"), 2, "outage 50:70 does not lie on the trajectory");
-    refused(&format!("{base} --outage=-10:20"), 2, "outage -10:20 does not lie on the trajectory");
+    refused(&format!("{base} --outage 70:90"), 2, "outage 70:90 does not lie on the data");
+    refused(&format!("{base} --outage=-10:20"), 2, "outage -10:20 does not lie on the data");
     refused(&format!("{base} --outage 30.2:30.7"), 2, "outage 30.2:30.7 withholds no fix");
     refused(&format!("{base} --outage none --outage 30:40"), 2, "--outage none stands beside other outages");
     refused(&format!("{base} --outage 40:30"), 2, "invalid value '40:30' for '--outage <START:END>'");
@@ -290,6 +290,12 @@ fn doubtful_requests_are_said() {
     let ran =
         done(place.path(), "run drive.toml imu.toml --outage 10:20 --outage 15:30 --runs 1 --seed 1 -o out");
     assert!(ran.stderr.contains("warning: outages that overlap or touch are made one"), "{}", ran.stderr);
+    let ran = done(place.path(), "run drive.toml imu.toml --outage 50:70 --runs 1 --seed 1 -o out");
+    assert!(
+        ran.stderr.contains("warning: outage 50:70 is cut: the trajectory ends at 60 s"),
+        "{}",
+        ran.stderr
+    );
     fs::write(
         place.path().join("wild.toml"),
         MODEL.replace("phi = 0.9999, sigma2 = 1e-9", "phi = 0.9999999, sigma2 = 1e-5"),

@@ -134,5 +134,5 @@ fn heights_are_looked_at() {
     let (_, _, said) = check(-800.0);
     assert!(said.contains("h.csv, line 2: height -800"), "{said}");
     let (code, _, said) = check(4e6);
-    assert!(code == 2 && said.contains("line 2: height 4000000 m is not within −12 to 1000 km"), "{said}");
+    assert!(code == 2 && said.contains("line 2: height 4000000.0 m is not within −12 to 1000 km"), "{said}");
 }

@@ -8,6 +8,9 @@ use crate::ekf::FilterStates;
 use crate::scenario::Scenario;
 use crate::sensors::gnss::GnssSettings;
 
+/// Most cells of a study: each is planned, named and checked before the first runs.
+pub(super) const MAX_CELLS: usize = 1_000_000;
+
 /// The axes of a study with what stands on them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
@@ -78,20 +81,25 @@ impl Grid {
         } else {
             sets.into_iter().map(|s| (s.name.clone(), Some(s))).collect()
         };
-        Ok(Self {
+        let grid = Self {
             trajectories: study.trajectory.iter().map(|e| e.name.clone()).collect(),
             truths: study.truth.iter().map(|e| e.name.clone()).collect(),
             scenarios: scenario_names.into_iter().zip(or_default).collect(),
             gnss: gnss_names.into_iter().zip(receivers).collect(),
             outages,
             columns: columns(study),
-        })
+        };
+        if grid.len() > MAX_CELLS {
+            let reason = format!("cells in the grid: more than {MAX_CELLS}");
+            return Err(StudyError::refused("outages", grid.len(), reason));
+        }
+        Ok(grid)
     }
 
     /// Number of cells.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.per_trajectory() * self.trajectories.len()
+        self.per_trajectory().saturating_mul(self.trajectories.len())
     }
 
     /// Whether there is no cell.

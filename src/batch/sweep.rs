@@ -2,6 +2,7 @@
 
 use super::StudyError;
 use super::check::exactly_one;
+use super::grid::MAX_CELLS;
 use super::study::OutagesEntry;
 use crate::sensors::outage::{Outage, OutagePlan, PeriodicOutages, RandomOutages};
 use schemars::JsonSchema;
@@ -73,6 +74,11 @@ pub(super) fn expand(entry: &OutagesEntry, index: usize) -> Result<Vec<OutageSet
         [entry.windows.is_some(), entry.sweep.is_some(), entry.periodic.is_some(), entry.random.is_some()];
     exactly_one("outages", index, &said, "windows, sweep, periodic, random")?;
     let key = format!("outages[{}]", index + 1);
+    let sets = combinations(entry);
+    if sets > MAX_CELLS {
+        let reason = format!("makes more than {MAX_CELLS} outage sets");
+        return Err(StudyError::refused(&key, sets, reason));
+    }
     let sets = if let Some(windows) = &entry.windows {
         vec![(Vec::new(), OutagePlan { fixed: windows.clone(), ..OutagePlan::default() })]
     } else if let Some(sweep) = &entry.sweep {
@@ -104,6 +110,17 @@ pub(super) fn expand(entry: &OutagesEntry, index: usize) -> Result<Vec<OutageSet
         Ok(OutageSet { name, plan })
     };
     sets.into_iter().map(named).collect()
+}
+
+/// How many sets an entry stands for, before any is made.
+fn combinations(entry: &OutagesEntry) -> usize {
+    let axes = match (&entry.sweep, &entry.periodic, &entry.random) {
+        (Some(s), ..) => vec![&s.start_s, &s.duration_s],
+        (_, Some(p), _) => vec![&p.first_s, &p.every_s, &p.duration_s],
+        (.., Some(r)) => vec![&r.rate_per_hour, &r.duration_s],
+        _ => Vec::new(),
+    };
+    axes.iter().fold(1, |n, axis| n.saturating_mul(axis.values().len()))
 }
 
 /// Every combination of values, the last axis fastest.

@@ -1,7 +1,7 @@
 //! `nav-sim check`: whether a file is what it should be.
 
 use super::{Failure, Session, parse, read};
-use nav_sim::data::fusion_files::{read_gnss, read_initial};
+use nav_sim::data::fusion_files::{read_gnss, read_imu, read_initial};
 use nav_sim::data::{batch_file, contamination_file, curve_file, parameters_file, scenario_file, study_file};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// segments or waypoints a motion profile, one with candidates a study of `batch`, one with sets of
 /// replicates a study of `efficiency`, one with bounds of parameters (lower, upper, fix) or operations that of
 /// `calibrate --parameters` or `synthesize --contaminate`, one with lat_deg and yaw_deg an initial
-/// state of `fuse`, any other a scenario; a table with lat_deg or n_m is a trajectory, or with standard
+/// state of `fuse`, any other a scenario; a table with lat_deg or n_m is a trajectory, as are .nav, .tum and .gpx, or with standard
 /// deviations GNSS fixes, with tau_samples (or a .wv.json) a curve, any other table or .npy a static recording.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
@@ -117,11 +117,20 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
             Ok(format!("an initial state at {} s", start.t_s))
         }
         Kind::Gnss => {
-            let (fixes, remarks) = read_gnss(path)?;
+            let (fixes, remarks) = read_gnss(path, None)?;
             remarks.iter().for_each(|remark| session.printer.warn(remark));
             let span = fixes.first().zip(fixes.last()).map_or(0.0, |(a, b)| b.t_s - a.t_s);
             let velocity = if fixes.iter().any(|f| f.velocity.is_some()) { " with velocity" } else { "" };
             Ok(format!("{} GNSS fixes{velocity} over {span} s", fixes.len()))
+        }
+        Kind::Imu => {
+            let imu = read_imu(path)?;
+            imu.remarks.iter().for_each(|remark| session.printer.warn(remark));
+            Ok(format!(
+                "an IMU recording of {} samples at {:.2} Hz, for fuse",
+                imu.samples.len(),
+                imu.rate_hz
+            ))
         }
         Kind::Recording => {
             let recordings = read::recordings_at(&[path.to_owned()], rate_hz, session)?;
@@ -145,6 +154,7 @@ enum Kind {
     Trajectory,
     Initial,
     Gnss,
+    Imu,
     Recording,
 }
 
@@ -152,6 +162,10 @@ fn kind(path: &Path) -> Result<Kind, Failure> {
     let name = path.to_string_lossy().to_lowercase();
     if path.is_dir() || name.ends_with(".npy") {
         return Ok(Kind::Recording);
+    }
+    let plain = name.strip_suffix(".gz").unwrap_or(&name);
+    if [".nav", ".tum", ".gpx"].iter().any(|ending| plain.ends_with(ending)) {
+        return Ok(Kind::Trajectory);
     }
     let error = |e| Failure::could_not(format!("{}: {e}", path.display()));
     let file = std::fs::File::open(path).map_err(error)?;
@@ -205,12 +219,29 @@ fn bounds(value: &toml::Value) -> bool {
     of_parameter || table.iter().any(|(key, value)| key != "spread" && bounds(value))
 }
 
+/// The texts of KF-GINS, numbers between blanks without a header: increments are small, latitudes are not.
+fn bare_kind(text: &str) -> Option<Kind> {
+    let mut lines = text.lines().map(str::trim);
+    let first = lines.find(|l| !(l.is_empty() || l.starts_with(['#', '%', '/'])))?;
+    let numbers: Option<Vec<f64>> = first.split_whitespace().map(|c| c.parse().ok()).collect();
+    match numbers.as_deref() {
+        Some([_, lat, lon, _, _, _, _]) if lat.abs().max(lon.abs()) > 0.5 => Some(Kind::Gnss),
+        Some(row) if row.len() == 13 => Some(Kind::Gnss),
+        Some(row) if (7..=8).contains(&row.len()) => Some(Kind::Imu),
+        _ => None,
+    }
+}
+
 fn table_kind(text: &str) -> Kind {
     let position = |line: &str| line.contains("lat_deg") || line.contains("n_m") && line.contains("e_m");
     let fixes = |line: &str| {
         position(line) && ["sd_", "std_", "sigma_"].iter().any(|s| line.contains(s)) && !line.contains("yaw")
     };
-    if text.lines().take(20).any(|line| line.contains("tau_samples")) {
+    if let Some(kind) = bare_kind(text) {
+        kind
+    } else if text.trim_start_matches('\u{feff}').trim_start().starts_with("ini lat") {
+        Kind::Trajectory
+    } else if text.lines().take(20).any(|line| line.contains("tau_samples")) {
         Kind::Curve
     } else if text.lines().take(20).any(fixes) {
         Kind::Gnss
@@ -239,6 +270,10 @@ mod tests {
         assert_eq!(toml_kind("t_s = 0\nlat_deg = 46\nyaw_deg = 3"), Kind::Initial);
         assert_eq!(table_kind("t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m"), Kind::Gnss);
         assert_eq!(table_kind("t_s,lat_deg,lon_deg,h_m,yaw_deg,sd_yaw_deg"), Kind::Trajectory);
+        assert_eq!(table_kind("ini lat (deg),ini lon (deg)"), Kind::Trajectory);
+        assert_eq!(table_kind("1 30.5 114.2 20 1 1 2\n"), Kind::Gnss);
+        assert_eq!(table_kind("1 30.5 114.2 20 0 0 0 1 1 2 0.1 0.1 0.1\n"), Kind::Gnss);
+        assert_eq!(table_kind("1 1e-5 2e-5 -1e-5 0.01 0.02 -0.098\n"), Kind::Imu);
         assert_eq!(toml_kind("= broken"), Kind::Scenario);
         assert_eq!(table_kind("# origin\nt_s, lat_deg, lon_deg"), Kind::Trajectory);
         assert_eq!(table_kind("t_s,accel_x_m_s2,gyro_z_rad_s"), Kind::Recording);

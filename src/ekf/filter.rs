@@ -112,6 +112,14 @@ impl Ekf {
         self.dt = dt;
     }
 
+    /// Adds to the white variances of a sample, accelerometer ((m/s²)²) and gyroscope ((rad/s)²), until the next
+    /// [`set_interval`](Self::set_interval): for samples that were not measured.
+    pub fn add_white(&mut self, variances: [DVec3; 2]) {
+        for (white, more) in self.white.iter_mut().zip(variances) {
+            *white += more;
+        }
+    }
+
     /// The blocks behind the navigation's.
     #[inline(always)]
     pub(super) fn sources(&self) -> Sources<'_> {

@@ -1,5 +1,6 @@
 //! The one place where recorded data meet the filter: one run, the same in all lanes.
 
+use super::gap::Spread;
 use super::{FixRecord, Nine, Row, RowError, Settings, Start, Use};
 use crate::earth::ned_difference;
 use crate::ekf::covariance::{PSI, R, V};
@@ -13,6 +14,9 @@ use crate::strapdown::Strapdown;
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
 use nalgebra::{DMatrix, DVector};
+
+/// Longest step through a gap (s): the filter is linear within one.
+const BRIDGE_STEP_S: f64 = 0.1;
 
 /// The filter in the axes of the IMU.
 pub(super) struct Filter {
@@ -39,6 +43,19 @@ impl Filter {
         let mean = ImuSample { omega_ib_b: sample.dtheta / sample.dt_s, f_ib_b: sample.dv / sample.dt_s };
         self.ekf.set_interval(seconds);
         advance(&mut self.ekf, &[mean], &[[Vec3::ZERO; 2]]);
+    }
+
+    /// Through `seconds` of a sample that bridges a gap, in steps, as uncertain as [`super::gap`] says.
+    pub(super) fn cross(&mut self, bridge: &ImuIncrement, seconds: f64, spread: Spread) {
+        let steps = (seconds / BRIDGE_STEP_S).ceil().max(1.0);
+        let step_s = seconds / steps;
+        let mean = ImuSample { omega_ib_b: bridge.dtheta / bridge.dt_s, f_ib_b: bridge.dv / bridge.dt_s };
+        self.ekf.set_interval(step_s);
+        // density σ²T over a step
+        self.ekf.add_white(spread.map(|sigma| sigma * sigma * (bridge.dt_s / step_s)));
+        for _ in 0..steps as usize {
+            advance(&mut self.ekf, &[mean], &[[Vec3::ZERO; 2]]);
+        }
     }
 
     fn fix(&self, fix: &GnssFix) -> Fix {
@@ -104,7 +121,8 @@ impl Filter {
         let sigma = [r.x.sqrt(), r.y.sqrt(), r.z.sqrt(), v.x.sqrt(), v.y.sqrt(), v.z.sqrt()];
         let sigma: Nine = std::array::from_fn(|i| if i < 6 { sigma[i] } else { angle(i - 6) });
         let bias = Sensor::ALL.map(|sensor| self.ekf.bias_of(sensor).lane(0));
-        Row { t_s, state, sigma, bias, error: None }
+        let bias_sigma = Sensor::ALL.map(|sensor| self.ekf.bias_sigma(sensor).lane(0));
+        Row { t_s, state, sigma, bias, bias_sigma, error: None }
     }
 
     /// Difference from a reference.

@@ -7,6 +7,7 @@
 pub mod alignment;
 mod assessment;
 mod filter;
+pub mod gap;
 mod outcome;
 
 use assessment::nis_bound;
@@ -22,6 +23,7 @@ use crate::sensors::outage::Outage;
 use crate::trajectory::reference::Reference;
 use crate::units::DEG;
 use filter::Filter;
+use gap::{Bridges, Spread};
 use glam::{DQuat, DVec3};
 
 /// Position (m, north, east, down), velocity (m/s), roll, pitch, yaw (degrees).
@@ -77,6 +79,8 @@ pub struct Row {
     pub sigma: Nine,
     /// Bias estimates in the axes of the IMU: accelerometer (m/s²), gyroscope (rad/s).
     pub bias: [DVec3; 2],
+    /// Standard deviations of these.
+    pub bias_sigma: [DVec3; 2],
     /// Difference from the reference, where there is one.
     pub error: Option<RowError>,
 }
@@ -232,7 +236,8 @@ fn spans(recorded: &Recorded<'_>) -> ((f64, f64), (f64, f64)) {
 }
 
 /// Runs the filter through recorded data from `start`. A fix is applied at its own time: the sample it
-/// falls into is split there. `reference` is only compared with.
+/// falls into is split there. A sample much longer than the others bridges a gap ([`gap`]). `reference` is only
+/// compared with.
 ///
 /// # Errors
 /// Clocks that do not overlap, a start outside the data, a pole, divergence.
@@ -257,16 +262,18 @@ pub fn fuse(
         next_row: start.t_s,
         solution: Solution::default(),
     };
+    let mut bridges = Bridges::new(recorded.imu);
     let mut fixes = recorded.gnss.iter().skip_while(|f| f.t_s <= start.t_s).peekable();
     run.row()?;
     for sample in recorded.imu.iter().skip_while(|s| s.t_s <= start.t_s) {
+        let spread = bridges.spread(sample);
         // a fix that is a millionth of a sample late belongs to its end
         let slack = 1e-6 * sample.dt_s;
         while let Some(fix) = fixes.next_if(|f| f.t_s <= sample.t_s + slack) {
-            run.advance(sample, fix.t_s, slack);
+            run.advance(sample, spread, fix.t_s, slack);
             run.fix(fix)?;
         }
-        run.advance(sample, sample.t_s, 0.0);
+        run.advance(sample, spread, sample.t_s, 0.0);
         run.solution.samples += 1;
         if sample.t_s + slack >= run.next_row {
             run.row()?;
@@ -303,10 +310,14 @@ struct Run<'a> {
 
 impl Run<'_> {
     /// Through the sample as far as `to`, which is taken as the sample's end when it is nearly that.
-    fn advance(&mut self, sample: &ImuIncrement, to: f64, slack: f64) {
+    /// Where it bridges a gap, with the gap's uncertainty.
+    fn advance(&mut self, sample: &ImuIncrement, spread: Option<Spread>, to: f64, slack: f64) {
         let to = if to + slack >= sample.t_s { sample.t_s } else { to };
         if to > self.now + slack {
-            self.filter.advance(sample, to - self.now);
+            match spread {
+                None => self.filter.advance(sample, to - self.now),
+                Some(spread) => self.filter.cross(sample, to - self.now, spread),
+            }
             self.now = to;
         }
     }

@@ -258,10 +258,11 @@ fn fixed(x: f64, digits: usize) -> String {
 }
 
 /// `solution.csv`: states, their standard deviations (those of latitude and longitude in degrees), bias
-/// estimates, and the horizontal standard deviations in metres.
+/// estimates, the horizontal standard deviations in metres, and those of the biases.
 #[must_use]
 pub fn solution_csv(rows: &[Row]) -> String {
-    let mut text = header(&[("", &STATE), ("sd_", &STATE), ("", &BIASES), ("sd_", &["n_m", "e_m"])]);
+    let mut text =
+        header(&[("", &STATE), ("sd_", &STATE), ("", &BIASES), ("sd_", &["n_m", "e_m"]), ("sd_", &BIASES)]);
     for row in rows {
         let (state, sd) = (values(&row.state), &row.sigma);
         let r = radii(row.state.lat.sin());
@@ -274,6 +275,7 @@ pub fn solution_csv(rows: &[Row]) -> String {
         cells.extend(sd[2..].iter().map(|x| fixed(*x, 6)));
         cells.extend(row.bias.iter().flat_map(|b| b.to_array()).map(|x| fixed(x, 9)));
         cells.extend(sd[..2].iter().map(|x| fixed(*x, 6)));
+        cells.extend(row.bias_sigma.iter().flat_map(|b| b.to_array()).map(|x| fixed(x, 9)));
         text += &(cells.join(",") + "\n");
     }
     text

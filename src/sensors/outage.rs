@@ -44,6 +44,42 @@ impl Outage {
     }
 }
 
+/// An outage that was asked for by its times and is none.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum MisplacedOutage {
+    /// It begins before the data or after them.
+    #[error("outage {}:{} does not lie on the data, which last from {} to {} s", .outage.start_s, .outage.end_s, .span_s.0, .span_s.1)]
+    Outside {
+        /// As asked for.
+        outage: Outage,
+        /// Of the data (s).
+        span_s: (f64, f64),
+    },
+    /// No fix falls into it.
+    #[error("outage {}:{} withholds no fix", .0.start_s, .0.end_s)]
+    NoFix(Outage),
+}
+
+impl Outage {
+    /// The outage on data that last from `span_s.0` to `span_s.1`, cut where they end; `withholds` tells whether a fix
+    /// falls into what is left. The one rule of runs, studies and fusions.
+    ///
+    /// # Errors
+    /// One that begins outside the data, or withholds no fix: a mistake.
+    pub fn placed(
+        self,
+        span_s: (f64, f64),
+        withholds: impl Fn(&Self) -> bool,
+    ) -> Result<Self, MisplacedOutage> {
+        // clocks and people round to a microsecond
+        if self.start_s < span_s.0 - 1e-6 || self.start_s >= span_s.1 {
+            return Err(MisplacedOutage::Outside { outage: self, span_s });
+        }
+        let placed = Self { end_s: self.end_s.min(span_s.1), ..self };
+        if withholds(&placed) { Ok(placed) } else { Err(MisplacedOutage::NoFix(self)) }
+    }
+}
+
 /// Outages of one length at regular times, to the end of the trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -74,9 +110,11 @@ impl PeriodicOutages {
         Err(SettingError::new("duration_s", self.duration_s, requirement))
     }
 
-    fn windows(&self, end_s: f64) -> Vec<Outage> {
+    fn windows(&self, (from_s, end_s): (f64, f64)) -> Vec<Outage> {
+        // those that end before the span begins are not counted through: there may be as many as there is time
+        let skipped = ((from_s - self.duration_s - self.first_s) / self.every_s).floor().max(0.0);
         (0_u32..)
-            .map(|k| self.first_s + f64::from(k) * self.every_s)
+            .map(|k| self.first_s + (skipped + f64::from(k)) * self.every_s)
             .take_while(|start| *start < end_s)
             .map(|start_s| Outage { start_s, end_s: start_s + self.duration_s })
             .collect()
@@ -146,7 +184,7 @@ impl OutagePlan {
         }
         if let Some(periodic) = &self.periodic {
             periodic.validate().map_err(|e| e.in_section("outage_periodic"))?;
-            all.extend(periodic.windows(span_s.1));
+            all.extend(periodic.windows(span_s));
         }
         if let Some(random) = &self.random {
             random.validate().map_err(|e| e.in_section("outage_random"))?;
@@ -193,6 +231,32 @@ mod tests {
         };
         let expected = vec![outage(10.0, 25.0), outage(50.0, 70.0), outage(95.0, 100.0)];
         assert_eq!(plan.windows((0.0, 100.0), 1).unwrap(), expected);
+    }
+
+    /// First one, from time immemorial: as many windows as the span has room for, at the same times.
+    #[test]
+    fn periodic_outages_begin_where_the_span_does() {
+        let plan = |first_s| OutagePlan {
+            periodic: Some(PeriodicOutages { first_s, every_s: 100.0, duration_s: 20.0 }),
+            ..OutagePlan::default()
+        };
+        let expected = vec![outage(0.0, 10.0), outage(90.0, 110.0), outage(190.0, 200.0)];
+        assert_eq!(plan(-10.0).windows((0.0, 200.0), 1).unwrap(), expected);
+        assert_eq!(plan(-1e12 - 10.0).windows((0.0, 200.0), 1).unwrap(), expected);
+        let epoch = plan(0.0).windows((1.7e9 - 10.0, 1.7e9 + 30.0), 1).unwrap();
+        assert_eq!(epoch, [outage(1.7e9, 1.7e9 + 20.0)]);
+    }
+
+    #[test]
+    fn an_outage_lies_on_the_data_and_withholds_a_fix() {
+        let fixes = [1.0, 2.0, 3.0, 4.0];
+        let place = |a, b| outage(a, b).placed((1.0, 4.5), |o| fixes.iter().any(|t| o.withholds(*t)));
+        assert_eq!(place(2.0, 3.0), Ok(outage(2.0, 3.0)));
+        assert_eq!(place(3.5, 9.0), Ok(outage(3.5, 4.5)));
+        assert_eq!(place(2.1, 2.9), Err(MisplacedOutage::NoFix(outage(2.1, 2.9))));
+        assert!(matches!(place(0.0, 3.0), Err(MisplacedOutage::Outside { .. })));
+        let e = place(5.0, 9.0).unwrap_err().to_string();
+        assert_eq!(e, "outage 5:9 does not lie on the data, which last from 1 to 4.5 s");
     }
 
     /// The number of outages in an hour of exponential waiting is close to Poisson: over 2000 seeds the

@@ -69,9 +69,14 @@ impl<'a> Inputs<'a> {
         let (plan, grid) = (&self.planned.plan, &self.planned.grid);
         let trajectory = self.trajectory(cell.trajectory)?;
         let span = (trajectory.start_s(), trajectory.end_s());
-        let found = windows(&grid.scenario(cell, plan.seed), span, plan.seed);
-        let windows = found.map_err(|e| Failure::input(format!("{}: {e}", grid.names(cell).join(", "))))?;
-        Ok(windows.iter().map(|o| (o.start_s, o.end_s)).collect())
+        let (scenario, name) = (grid.scenario(cell, plan.seed), grid.names(cell).join(", "));
+        let found =
+            windows(&scenario, span, plan.seed).map_err(|e| Failure::input(format!("{name}: {e}")))?;
+        for o in scenario.cut_outages(span).unwrap_or_default() {
+            let ends = format!("is cut: the trajectory ends at {} s", span.1);
+            self.session.printer.warn(&format!("{name}: outage {}:{} {ends}", o.start_s, o.end_s));
+        }
+        Ok(found.iter().map(|o| (o.start_s, o.end_s)).collect())
     }
 
     /// Duration of a trajectory (s).
@@ -165,16 +170,9 @@ pub(super) fn model_path(study: &Path, directory: &Path, role: &str, path: &str)
     if role == CALIBRATED { directory.join(path) } else { batch_file::beside(study, Path::new(path)) }
 }
 
-/// The outages of a scenario on a trajectory; one asked for by its times must lie on it.
+/// The outages of a scenario on a trajectory; one asked for by its times must begin on it.
 pub(super) fn windows(scenario: &Scenario, span: (f64, f64), seed: u64) -> Result<Vec<Outage>, String> {
-    let outside = |o: &&Outage| o.start_s >= span.1 || o.end_s <= span.0 || o.end_s > span.1;
-    if let Some(o) = scenario.outage.iter().flatten().find(outside) {
-        let (a, b) = span;
-        return Err(format!(
-            "outage {}:{} does not lie on the trajectory, which lasts from {a} to {b} s",
-            o.start_s, o.end_s
-        ));
-    }
+    scenario.cut_outages(span).map_err(|e| e.to_string())?;
     scenario.outages().windows(span, seed).map_err(|e| e.to_string())
 }
 

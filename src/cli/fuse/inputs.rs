@@ -2,8 +2,8 @@
 
 use super::Args;
 use crate::cli::{Failure, Session, parse, read};
-use glam::DQuat;
-use nav_sim::data::fusion_files::{FusionFileError, ImuFile, read_gnss, read_imu, read_initial};
+use glam::{DMat3, DQuat, DVec3};
+use nav_sim::data::fusion_files::{FixSigma, FusionFileError, ImuFile, read_gnss, read_imu, read_initial};
 use nav_sim::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim::frames::RollPitchYaw;
 use nav_sim::fusion::alignment::{self, Alignment};
@@ -45,7 +45,7 @@ impl Inputs {
         named.extend(args.reference.iter().map(|p| ("reference", p)));
         let files = named.iter().map(|(role, path)| read::input(role, path)).collect::<Result<_, _>>()?;
         let imu = read_imu(&args.imu)?;
-        let (mut gnss, remarks) = read_gnss(&args.gnss)?;
+        let (mut gnss, remarks) = read_gnss(&args.gnss, args.gnss_sigma.as_ref())?;
         imu.remarks.iter().chain(&remarks).for_each(|r| session.printer.warn(r));
         if let Some(parse::Pair([position, velocity])) = args.gnss_sigma_factor {
             scale(&mut gnss, position, velocity);
@@ -82,10 +82,57 @@ pub(super) fn impossible(e: FusionError) -> Failure {
     failure.maybe_hint(e.hint())
 }
 
-/// The IMU in the vehicle.
-pub(super) fn mounting(angles_deg: Option<parse::Triple>) -> DQuat {
-    let Some(parse::Triple([roll, pitch, yaw])) = angles_deg else { return DQuat::IDENTITY };
-    RollPitchYaw { roll: roll * DEG, pitch: pitch * DEG, yaw: yaw * DEG }.to_quat()
+/// What a logger calls x, y and z.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
+pub(super) enum LoggerAxes {
+    /// Front, right, down
+    #[default]
+    Frd,
+    /// Front, left, up
+    Flu,
+    /// Right, front, up: east, north, up of an IMU that points north
+    Rfu,
+    /// The same as rfu
+    Enu,
+}
+
+impl LoggerAxes {
+    /// Takes a vector in the logger's axes to front, right, down.
+    fn to_frd(self) -> DQuat {
+        let columns = match self {
+            Self::Frd => return DQuat::IDENTITY,
+            Self::Flu => [DVec3::X, DVec3::NEG_Y, DVec3::NEG_Z],
+            Self::Rfu | Self::Enu => [DVec3::Y, DVec3::X, DVec3::NEG_Z],
+        };
+        DQuat::from_mat3(&DMat3::from_cols(columns[0], columns[1], columns[2]))
+    }
+}
+
+/// `POS` or `N,E,D` in metres, then `:VEL` or `:N,E,D` in m/s.
+pub(super) fn parse_sigma(text: &str) -> Result<FixSigma, String> {
+    let three = |part: &str| {
+        let numbers: Option<Vec<f64>> = part.split(',').map(|x| x.trim().parse().ok()).collect();
+        let numbers = numbers.filter(|n| n.iter().all(|x: &f64| x.is_finite() && *x > 0.0))?;
+        match numbers[..] {
+            [all] => Some([all; 3]),
+            [n, e, d] => Some([n, e, d]),
+            _ => None,
+        }
+    };
+    let (position, velocity) = text.split_once(':').map_or((text, None), |(p, v)| (p, Some(v)));
+    let expected =
+        || "expected metres above 0, one or three (north, east, down), and after a colon m/s: 2,2,4:0.1";
+    let pos_m = three(position).ok_or_else(expected)?;
+    let vel_m_s = velocity.map(|v| three(v).ok_or_else(expected)).transpose()?;
+    Ok(FixSigma { pos_m, vel_m_s })
+}
+
+/// The IMU in the vehicle: its axes named as the logger names them, turned by the mounting.
+pub(super) fn mounting(axes: LoggerAxes, angles_deg: Option<parse::Triple>) -> DQuat {
+    let frd = angles_deg.map_or(DQuat::IDENTITY, |parse::Triple([roll, pitch, yaw])| {
+        RollPitchYaw { roll: roll * DEG, pitch: pitch * DEG, yaw: yaw * DEG }.to_quat()
+    });
+    frd * axes.to_frd()
 }
 
 /// The settings with outages as `run` has them: those that overlap or touch are one.
@@ -94,9 +141,9 @@ pub(super) fn with_outages(
     recorded: &Recorded<'_>,
     session: &Session,
 ) -> Result<Settings, Failure> {
-    check_outages(&settings.outages, recorded)?;
     let asked = settings.outages.len();
-    let plan = OutagePlan { fixed: settings.outages, ..OutagePlan::default() };
+    let fixed = placed(&settings.outages, recorded.gnss, session)?;
+    let plan = OutagePlan { fixed, ..OutagePlan::default() };
     settings.outages = plan.windows((f64::NEG_INFINITY, f64::INFINITY), 0).map_err(Failure::input)?;
     if settings.outages.len() < asked {
         session.printer.warn("outages that overlap or touch are made one");
@@ -104,28 +151,26 @@ pub(super) fn with_outages(
     Ok(settings)
 }
 
-/// An outage outside the data withholds nothing, or less than it says: that is a mistake.
-fn check_outages(outages: &[Outage], recorded: &Recorded<'_>) -> Result<(), Failure> {
-    let (first, last) = (recorded.gnss.first(), recorded.gnss.last());
-    let span = first.zip(last).map(|(a, b)| format!("the fixes run from {} to {} s", a.t_s, b.t_s));
-    let empty = |o: &&Outage| !recorded.gnss.iter().any(|f| o.withholds(f.t_s + 1e-9));
-    if let Some(o) = outages.iter().find(empty) {
-        let message = format!("--outage {}:{} withholds no fix", o.start_s, o.end_s);
-        return Err(Failure::input(message).maybe_hint(span));
-    }
-    let outside = |o: &&Outage| {
-        // an outage may last until a fix later than the last would come
-        let interval = recorded.gnss.windows(2).map(|w| w[1].t_s - w[0].t_s).fold(0.0, f64::max);
-        let over = |t: Option<&GnssFix>, sign: f64, at: f64| {
-            t.is_some_and(|f| sign * (at - f.t_s) > interval + 1e-6)
-        };
-        over(first, -1.0, o.start_s) || over(last, 1.0, o.end_s)
+/// Outages placed on the fixes; one may last until a fix later than the last would come.
+fn placed(outages: &[Outage], gnss: &[GnssFix], session: &Session) -> Result<Vec<Outage>, Failure> {
+    let Some((first, last)) = gnss.first().zip(gnss.last()) else { return Ok(Vec::new()) };
+    let interval_s = gnss.windows(2).map(|w| w[1].t_s - w[0].t_s).fold(0.0, f64::max);
+    let span = (first.t_s - interval_s, last.t_s + interval_s);
+    let withholds = |o: &Outage| gnss.iter().any(|f| o.withholds(f.t_s + 1e-9));
+    let place = |asked: &Outage| {
+        let placed = asked.placed(span, withholds).map_err(|e| {
+            Failure::input(&e).hint(format!("the fixes run from {} to {} s", first.t_s, last.t_s))
+        })?;
+        if placed != *asked {
+            let message = format!(
+                "outage {}:{} is cut at {} s: the fixes end at {} s",
+                asked.start_s, asked.end_s, placed.end_s, last.t_s
+            );
+            session.printer.warn(&message);
+        }
+        Ok(placed)
     };
-    if let Some(o) = outages.iter().find(outside) {
-        let message = format!("--outage {}:{} does not lie within the fixes", o.start_s, o.end_s);
-        return Err(Failure::input(message).maybe_hint(span));
-    }
-    Ok(())
+    outages.iter().map(place).collect()
 }
 
 fn scale(gnss: &mut [GnssFix], position: f64, velocity: f64) {
@@ -184,4 +229,32 @@ pub(super) fn guarded(out: &Path, inputs: &[Input]) -> Result<(), Failure> {
         nav_sim::data::atomic::guard_inputs(&out.join(name), paths)?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// At rest and level an accelerometer measures g upwards: −z of front, right, down.
+    #[test]
+    fn axes_of_loggers_are_rotations_to_front_right_down() {
+        let to = |axes: LoggerAxes, v: DVec3| (axes.to_frd() * v).round();
+        for axes in [LoggerAxes::Flu, LoggerAxes::Rfu, LoggerAxes::Enu] {
+            assert_eq!(to(axes, DVec3::Z), DVec3::NEG_Z, "{axes:?}");
+        }
+        assert_eq!((to(LoggerAxes::Flu, DVec3::X), to(LoggerAxes::Flu, DVec3::Y)), (DVec3::X, DVec3::NEG_Y));
+        assert_eq!((to(LoggerAxes::Rfu, DVec3::X), to(LoggerAxes::Rfu, DVec3::Y)), (DVec3::Y, DVec3::X));
+        assert_eq!(mounting(LoggerAxes::Frd, None), DQuat::IDENTITY);
+    }
+
+    #[test]
+    fn standard_deviations_of_a_receiver() {
+        let sigma = |text| parse_sigma(text).map(|s| (s.pos_m, s.vel_m_s));
+        assert_eq!(sigma("2"), Ok(([2.0; 3], None)));
+        assert_eq!(sigma("2,2,4:0.1"), Ok(([2.0, 2.0, 4.0], Some([0.1; 3]))));
+        assert_eq!(sigma("1:0.1,0.1,0.2"), Ok(([1.0; 3], Some([0.1, 0.1, 0.2]))));
+        for bad in ["", "0", "1,2", "nan", "1:", "1:2:3", "1,2,-3"] {
+            assert!(sigma(bad).is_err(), "{bad}");
+        }
+    }
 }

@@ -7,6 +7,8 @@ use super::filter::FilterArgs;
 use super::run::{parse_outage, windows_of};
 use super::{Failure, Session, parse};
 use inputs::Inputs;
+use nav_sim::data::fusion_files::FixSigma;
+use nav_sim::earth::GravityModel;
 use nav_sim::fusion::alignment::Alignment;
 use nav_sim::fusion::{self, Assessment, Recorded, Settings, Verdict};
 use nav_sim::report::FusionSummary;
@@ -15,7 +17,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// What to look at where a solution is not to be believed.
-const ADVICE: &str = "are the IMU's axes front, right, down (if not: --mounting), its units right, the start true (if not: \
+const ADVICE: &str = "are the IMU's axes front, right, down (if not: --axes, --mounting), its units right, the start true (if not: \
                       --initial FILE), the receiver's standard deviations honest (if not: --gnss-sigma-factor)?";
 /// The same where the fixes agree with the solution and the reference does not.
 const LASTING: &str = "the filter takes the errors of the fixes as white: where they last, give larger standard deviations \
@@ -27,8 +29,9 @@ const ELSEWHERE_M: f64 = 10_000.0;
 ///
 /// IMU: rates (t_s, gyro_x_rad_s … accel_z_m_s2; other units and loggers' names as for `wv`) or increments
 /// (dtheta_x_rad … dv_z_m_s, time = end of the interval). GNSS: t_s, lat_deg, lon_deg, h_m, sd_n_m, sd_e_m,
-/// sd_d_m, and v_n_m_s … sd_vd_m_s where velocity is measured. Or both as the text files of KF-GINS. Writes
-/// solution.csv, innovations.csv, errors.csv (with a reference), solution.kml, summary.json, manifest.json.
+/// sd_d_m, and v_n_m_s … sd_vd_m_s where velocity is measured. Or both as the text files of KF-GINS: 7 or 8
+/// columns of increments; 7 of position, 13 with velocity. Up to 5 s without samples are bridged, as uncertain
+/// as the recording is over such times elsewhere. Writes solution.csv, innovations.csv, errors.csv (with a reference), solution.kml, summary.json, manifest.json.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -56,7 +59,13 @@ pub(crate) struct Args {
     /// Attitude of the IMU in the vehicle, where its axes are not front, right, down (degrees)
     #[arg(long, value_name = "ROLL,PITCH,YAW", value_parser = parse::triple, allow_hyphen_values = true)]
     mounting: Option<parse::Triple>,
-    /// Trajectory to compare with
+    /// What the logger calls x, y, z; the mounting turns what is front, right, down then
+    #[arg(long, value_name = "AXES", value_enum, default_value = "frd")]
+    axes: inputs::LoggerAxes,
+    /// How gravity falls with height: wgs84 (second order) or first-order
+    #[arg(long, value_name = "MODEL", value_parser = parse_gravity, default_value = "wgs84")]
+    gravity: GravityModel,
+    /// Trajectory to compare with; stretches where it jumps are left out
     #[arg(long, value_name = "TRAJECTORY")]
     reference: Option<PathBuf>,
     /// Window in which fixes are withheld, on the clock of the data in seconds (repeatable)
@@ -64,6 +73,10 @@ pub(crate) struct Args {
     outages: Vec<super::run::OutageArg>,
     #[command(flatten)]
     filter: FilterArgs,
+    /// Standard deviations where the GNSS file states none: of the position in m, and after a colon of the velocity in
+    /// m/s; each one number or north,east,down
+    #[arg(long, value_name = "POS[:VEL]", value_parser = inputs::parse_sigma)]
+    gnss_sigma: Option<FixSigma>,
     /// Multiply the receiver's standard deviations, of position and of velocity
     #[arg(long, value_name = "POS,VEL", value_parser = parse::positive_pair)]
     gnss_sigma_factor: Option<parse::Pair>,
@@ -118,6 +131,14 @@ fn believed(assessment: &Assessment, out: &Path, nis: f64) -> Result<(), Failure
     Err(Failure::bound(message).hint(if nis < 1.0 { LASTING } else { ADVICE }))
 }
 
+fn parse_gravity(text: &str) -> Result<GravityModel, String> {
+    match text {
+        "wgs84" => Ok(GravityModel::Wgs84),
+        "first-order" => Ok(GravityModel::FirstOrder),
+        _ => Err("expected wgs84 or first-order".to_owned()),
+    }
+}
+
 fn settings(args: &Args) -> Result<Settings, Failure> {
     let lever_arm_b = args.lever_arm.map_or(glam::DVec3::ZERO, |t| t.0.into());
     if lever_arm_b.abs().max_element() > MAX_LEVER_ARM_M {
@@ -128,9 +149,9 @@ fn settings(args: &Args) -> Result<Settings, Failure> {
         return Err(Failure::input(message).hint("metres from the IMU to the antenna: front, right, down"));
     }
     Ok(Settings {
-        q_s_b: inputs::mounting(args.mounting),
+        q_s_b: inputs::mounting(args.axes, args.mounting),
         lever_arm_b,
-        gravity: nav_sim::earth::GravityModel::default(),
+        gravity: args.gravity,
         outages: windows_of(&args.outages)?,
         nis_gate: args.nis_gate,
         rows_hz: args.rate_hz,

@@ -183,7 +183,7 @@ fn scenario(args: &Args) -> Result<Scenario, Failure> {
     Ok(scenario)
 }
 
-/// The outages on this trajectory. One that was asked for by its times and lies outside is an error; the
+/// The outages on this trajectory. One that was asked for by its times and begins outside is an error; the
 /// default ones are left out where the trajectory is shorter, and that is said.
 fn outages(
     scenario: &Scenario,
@@ -191,16 +191,13 @@ fn outages(
     seed: u64,
     session: &Session,
 ) -> Result<Vec<Outage>, Failure> {
-    let outside = |o: &&Outage| o.start_s < span.0 || o.end_s > span.1;
-    let asked = scenario.outage.iter().flatten();
-    if let Some(o) = asked.clone().find(outside) {
-        let message = format!("outage {}:{} does not lie on the trajectory", o.start_s, o.end_s);
-        return Err(Failure::input(message).hint(format!("it lasts from {} to {} s", span.0, span.1)));
-    }
-    if let Some(o) = asked.clone().find(|o| !withholds_a_fix(o, span.0, scenario.gnss.rate_hz)) {
-        let message = format!("outage {}:{} withholds no fix", o.start_s, o.end_s);
+    let cut = scenario.cut_outages(span).map_err(|e| {
         let hint = format!("fixes come every {} s from {} s", 1.0 / scenario.gnss.rate_hz, span.0);
-        return Err(Failure::input(message).hint(hint));
+        Failure::input(&e).hint(hint)
+    })?;
+    for o in &cut {
+        let message = format!("outage {}:{} is cut: the trajectory ends at {} s", o.start_s, o.end_s, span.1);
+        session.printer.warn(&message);
     }
     let windows = scenario.outages().windows(span, seed).map_err(Failure::input)?;
     let shown: Vec<String> =
@@ -234,12 +231,6 @@ fn doubt_defaults(defaults: &[Outage], (start_s, end_s): (f64, f64), session: &S
             session.printer.warn(&format!("{shown} is cut: {lasts}"));
         }
     }
-}
-
-/// Whether a fix falls into an outage: they come at whole intervals from the trajectory's start.
-fn withholds_a_fix(outage: &Outage, start_s: f64, rate_hz: f64) -> bool {
-    let next = ((outage.start_s - start_s) * rate_hz - 1e-6).ceil().max(1.0);
-    start_s + next / rate_hz < outage.end_s
 }
 
 /// A Gauss-Markov process of phi ≈ 1 may have any stationary variance: a filter that starts with it believes

@@ -18,6 +18,9 @@ pub enum FusionFileError {
     /// An initial state that cannot be read.
     #[error(transparent)]
     Initial(#[from] TomlError),
+    /// Numbers that nobody names.
+    #[error("{path}: {columns} columns without a header")]
+    Bare { path: String, columns: usize, expected: &'static str },
     /// Channels that are needed.
     #[error("{path}: channel {channel} is missing; all six are needed")]
     Missing { path: String, channel: Channel },
@@ -31,8 +34,10 @@ pub enum FusionFileError {
     #[error("{path}, line {line}: time goes from {previous_s} s to {t_s} s: it must increase")]
     Time { path: String, line: u64, previous_s: f64, t_s: f64 },
     /// Too long without samples.
-    #[error("{path}, line {line}: no samples from {previous_s} s to {t_s} s: longer than can be bridged")]
-    Gap { path: String, line: u64, previous_s: f64, t_s: f64 },
+    #[error(
+        "{path}, line {line}: no samples from {previous_s} s to {t_s} s: more than {longest_s} s cannot be bridged"
+    )]
+    Gap { path: String, line: u64, previous_s: f64, t_s: f64, longest_s: f64 },
     /// A value that is none.
     #[error("{path}, line {line}: column \"{column}\": {value} {reason}")]
     Value { path: String, line: u64, column: String, value: f64, reason: &'static str },
@@ -73,7 +78,7 @@ impl FusionFileError {
         use TrajectoryFileError as T;
         const GNSS: &str = "a GNSS file has the columns t_s, lat_deg, lon_deg, h_m, sd_n_m, sd_e_m, sd_d_m and may \
                             have v_n_m_s, v_e_m_s, v_d_m_s, sd_vn_m_s, sd_ve_m_s, sd_vd_m_s; or it is a KF-GINS text \
-                            of 7 columns";
+                            of 7 columns, or of 13 with velocity";
         let text = match self {
             Self::Table(e) => match **e {
                 T::NoHeader { .. } | T::MissingColumns { .. } | T::Empty { .. } => GNSS,
@@ -83,9 +88,10 @@ impl FusionFileError {
             },
             Self::Imu(e) => return e.hint(),
             Self::Initial(e) => return e.hint(),
+            Self::Bare { expected, .. } => expected,
             Self::Missing { .. } | Self::NoTime { .. } => {
                 "name the columns t_s, gyro_x_rad_s … accel_z_m_s2 (rates) or t_s, dtheta_x_rad … dv_z_m_s \
-                 (increments, time = end of the interval), or give a KF-GINS text of 7 columns"
+                 (increments, time = end of the interval), or give a KF-GINS text of 7 or 8 columns"
             }
             Self::MissingColumns { .. } => GNSS,
             Self::Time { previous_s, t_s, .. } if previous_s - t_s > 500_000.0 => {

@@ -1,6 +1,6 @@
 //! Recorded GNSS fixes.
 
-use super::{FusionFileError as Error, is_bare, table, text};
+use super::{FusionFileError as Error, bare_columns, table, text};
 use crate::data::suggest::nearest;
 use crate::data::trajectory_file::table::Table;
 use crate::earth::{MAX_LATITUDE, geodetic_to_ecef};
@@ -37,6 +37,21 @@ const POSITION: usize = 7;
 /// Velocity and its deviations.
 const VELOCITY: std::ops::Range<usize> = 7..13;
 const WEEK: usize = 13;
+/// The columns of a KF-GINS text with velocity: its deviations stand behind the velocity.
+const KF_GINS_VELOCITY: [usize; 13] = [0, 1, 2, 3, 7, 8, 9, 4, 5, 6, 10, 11, 12];
+/// What a text without a header may be.
+const KF_GINS: &str = "a KF-GINS text has 7 columns (t_s, latitude, longitude, height, standard deviations north, east, \
+                       down), or 13 (t_s, latitude, longitude, height, velocity north, east, down, their standard \
+                       deviations: position, velocity)";
+
+/// Standard deviations of fixes whose file states none: north, east, down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FixSigma {
+    /// Of the position (m).
+    pub pos_m: [f64; 3],
+    /// Of the velocity (m/s).
+    pub vel_m_s: Option<[f64; 3]>,
+}
 /// Other names of them: stem, index of the quantity.
 const STEMS: [(&str, usize); 49] = [
     ("t", 0),
@@ -120,7 +135,7 @@ fn classify(name: &str) -> Option<(usize, f64)> {
 struct Columns([Option<(usize, f64)>; NAMES.len()]);
 
 impl Columns {
-    fn of(table: &Table) -> Result<(Self, Vec<String>), Error> {
+    fn of(table: &Table, unsaid: Option<&FixSigma>) -> Result<(Self, Vec<String>), Error> {
         let mut columns = Self([None; NAMES.len()]);
         let mut ignored = Vec::new();
         for (at, name) in table.columns.iter().enumerate() {
@@ -131,15 +146,23 @@ impl Columns {
                 _ => ignored.push(name.clone()),
             }
         }
-        columns.complete(table, &ignored)?;
+        columns.complete(table, &ignored, unsaid)?;
         Ok((columns, ignored))
     }
 
     /// Position and its deviations are needed; velocity and its deviations come together or not at all.
-    fn complete(&self, table: &Table, ignored: &[String]) -> Result<(), Error> {
+    /// What is missing in all of a position or velocity may be given for the whole file.
+    fn complete(&self, table: &Table, ignored: &[String], unsaid: Option<&FixSigma>) -> Result<(), Error> {
         let has_velocity = VELOCITY.into_iter().any(|i| self.0[i].is_some());
         let needed = if has_velocity { 0..VELOCITY.end } else { 0..POSITION };
-        let missing: Vec<&str> = needed.filter(|i| self.0[*i].is_none()).map(|i| NAMES[i]).collect();
+        let none_of = |of: std::ops::Range<usize>| of.into_iter().all(|i| self.0[i].is_none());
+        let given = |i: usize| match i {
+            4..7 => unsaid.is_some() && none_of(4..7),
+            10..13 => unsaid.is_some_and(|s| s.vel_m_s.is_some()) && none_of(10..13),
+            _ => false,
+        };
+        let missing: Vec<&str> =
+            needed.filter(|i| self.0[*i].is_none() && !given(*i)).map(|i| NAMES[i]).collect();
         if missing.is_empty() {
             return Ok(());
         }
@@ -162,18 +185,32 @@ impl Columns {
 }
 
 /// Reads fixes: a table with a header, or the text of KF-GINS (time, latitude, longitude (deg), height (m),
-/// standard deviations north, east, down (m)). Also what is doubtful about the file.
+/// standard deviations north, east, down (m); or with velocity behind the height and its deviations behind
+/// those). `unsaid` are the standard deviations where the file states none. Also what is doubtful about it.
 ///
 /// # Errors
 /// Whatever is wrong with it, with its line.
-pub fn read_gnss(path: &Path) -> Result<(Vec<GnssFix>, Vec<String>), Error> {
+pub fn read_gnss(path: &Path, unsaid: Option<&FixSigma>) -> Result<(Vec<GnssFix>, Vec<String>), Error> {
     let text = text(path)?;
-    let bare = is_bare(&text, POSITION);
-    let table = table(path, &text, bare.then_some(&NAMES[..POSITION]))?;
-    let (columns, ignored) = Columns::of(&table)?;
+    let bare = bare_columns(&text);
+    let names: Option<Vec<&str>> = match bare {
+        None => None,
+        Some(POSITION) => Some(NAMES[..POSITION].to_vec()),
+        Some(13) => Some(KF_GINS_VELOCITY.map(|i| NAMES[i]).to_vec()),
+        Some(columns) => {
+            return Err(Error::Bare { path: path.display().to_string(), columns, expected: KF_GINS });
+        }
+    };
+    let table = table(path, &text, names.as_deref())?;
+    let (columns, ignored) = Columns::of(&table, unsaid)?;
     let mut remarks = Vec::new();
-    if bare {
-        remarks.push("no header: read as KF-GINS text, position and standard deviations".to_owned());
+    if bare.is_some() {
+        let velocity = if columns.0[VELOCITY.start].is_some() { ", velocity" } else { "" };
+        remarks.push(format!("no header: read as KF-GINS text, position{velocity} and standard deviations"));
+    }
+    let unstated = |at: usize| columns.0[at].is_none();
+    if unstated(4) || columns.0[VELOCITY.start].is_some() && unstated(10) {
+        remarks.push("standard deviations as given for all fixes".to_owned());
     }
     if !ignored.is_empty() {
         remarks.push(format!("columns not used: {}", ignored.join(", ")));
@@ -181,7 +218,7 @@ pub fn read_gnss(path: &Path) -> Result<(Vec<GnssFix>, Vec<String>), Error> {
     let mut fixes: Vec<GnssFix> = Vec::with_capacity(table.rows.len());
     for (line, row) in &table.rows {
         check_values(&table, &columns, *line, row)?;
-        let fix = fix(&columns, row);
+        let fix = fix(&columns, row, unsaid);
         if let Some(before) = fixes.last() {
             check_step(&table.path, *line, before, &fix)?;
         }
@@ -196,16 +233,20 @@ pub fn read_gnss(path: &Path) -> Result<(Vec<GnssFix>, Vec<String>), Error> {
     Ok((fixes, remarks.into_iter().map(|r| format!("{}: {r}", table.path)).collect()))
 }
 
-fn fix(columns: &Columns, row: &[f64]) -> GnssFix {
+fn fix(columns: &Columns, row: &[f64], unsaid: Option<&FixSigma>) -> GnssFix {
     let value = |quantity| columns.value(quantity, row);
     let has_velocity = columns.0[VELOCITY.start].is_some();
+    let sigma = |first: usize, otherwise: Option<[f64; 3]>| match (columns.0[first], otherwise) {
+        (None, Some(sigma)) => sigma.into(),
+        _ => columns.triad(first, row),
+    };
     GnssFix {
         t_s: value(0) + value(WEEK) * WEEK_S,
         lat: value(1),
         lon: value(2),
         h: value(3),
-        pos_sigma_n: columns.triad(4, row),
-        velocity: has_velocity.then(|| (columns.triad(7, row), columns.triad(10, row))),
+        pos_sigma_n: sigma(4, unsaid.map(|s| s.pos_m)),
+        velocity: has_velocity.then(|| (columns.triad(7, row), sigma(10, unsaid.and_then(|s| s.vel_m_s)))),
     }
 }
 

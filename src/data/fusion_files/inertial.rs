@@ -1,18 +1,17 @@
 //! Recorded IMU data.
 
-use super::{FusionFileError as Error, is_bare, table, text};
+use super::{FusionFileError as Error, bare_columns, table, text};
 use crate::data::recordings::checks::{check_gravity, gravity_factor};
 use crate::data::recordings::header::{Role, Unit};
 use crate::data::recordings::timing::{median_step, unit_of_step};
 use crate::data::recordings::{self, Raw, ReadOptions, RecordingError};
+use crate::fusion::gap::{LONGEST_S, bridged};
 use crate::imu::{Axis, Channel, ImuIncrement, Sensor};
 use crate::strapdown::MAX_ROTATION;
 use crate::units::DEG;
 use glam::DVec3;
 use std::path::Path;
 
-/// Longest gap that is bridged with the mean of its neighbours (s).
-const LONGEST_GAP_S: f64 = 1.0;
 /// A step this many times the median one is a gap.
 const GAP: f64 = 1.5;
 /// Mean angular rate above which the unit is doubted (rad/s).
@@ -43,31 +42,48 @@ struct Columns {
 
 /// Reads a recording: a table whose headers are those of static recordings (rates, or increments over the
 /// interval that ends at the time given), or the text of KF-GINS: time, three angle increments (rad), three
-/// velocity increments (m/s).
+/// velocity increments (m/s), and perhaps an odometer's speed, which is left.
 ///
 /// # Errors
 /// Whatever is wrong with it, with its line.
 pub fn read_imu(path: &Path) -> Result<ImuFile, Error> {
     let packed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy"));
-    let bare = if packed { None } else { Some(text(path)?).filter(|t| is_bare(t, 7)) };
-    let columns = match bare {
-        Some(text) => kf_gins(path, &text)?,
+    let text = if packed { None } else { Some(text(path)?) };
+    let columns = match text.as_ref().and_then(|text| Some((text, bare_columns(text)?))) {
+        Some((text, 7..=8)) => kf_gins(path, text)?,
+        Some((_, columns)) => {
+            return Err(Error::Bare { path: path.display().to_string(), columns, expected: KF_GINS });
+        }
         None => headed(path)?,
     };
     columns.increments()
 }
 
+/// What a text without a header may be.
+const KF_GINS: &str = "a KF-GINS text has 7 columns (t_s, dtheta_x, dtheta_y, dtheta_z in rad, dv_x, dv_y, dv_z in m/s), \
+                       or 8 with an odometer's speed, which is not used";
+
 fn kf_gins(path: &Path, text: &str) -> Result<Columns, Error> {
-    const NAMES: [&str; 7] =
-        ["t_s", "dtheta_x_rad", "dtheta_y_rad", "dtheta_z_rad", "dv_x_m_s", "dv_y_m_s", "dv_z_m_s"];
-    let table = table(path, text, Some(&NAMES))?;
+    const NAMES: [&str; 8] = [
+        "t_s",
+        "dtheta_x_rad",
+        "dtheta_y_rad",
+        "dtheta_z_rad",
+        "dv_x_m_s",
+        "dv_y_m_s",
+        "dv_z_m_s",
+        "odometer_m_s",
+    ];
+    let columns = bare_columns(text).unwrap_or(7);
+    let table = table(path, text, Some(&NAMES[..columns]))?;
+    let odometer = if columns > 7 { "; the odometer's speed in column 8 is not used" } else { "" };
     Ok(Columns {
         path: table.path,
         t_s: table.rows.iter().map(|(_, r)| r[0]).collect(),
         values: table.rows.iter().map(|(_, r)| [r[4], r[5], r[6], r[1], r[2], r[3]]).collect(),
         increments: [true; 2],
         lines: table.rows.iter().map(|(line, _)| *line).collect(),
-        remarks: vec!["no header: read as KF-GINS text, angle then velocity increments".into()],
+        remarks: vec![format!("no header: read as KF-GINS text, angle then velocity increments{odometer}")],
     })
 }
 
@@ -131,45 +147,49 @@ impl Columns {
         let step = median_step(&self.t_s);
         self.doubt_units(step)?;
         let mut samples = Vec::with_capacity(self.t_s.len());
-        let mut gaps = Vec::new();
+        let mut holes = Vec::new();
         for k in 0..self.t_s.len() {
             let t_s = self.t_s[k];
-            let previous_s = if k == 0 { t_s - step } else { self.t_s[k - 1] };
-            let mut dt = t_s - previous_s;
-            if dt > GAP * step {
-                let (path, line) = (self.path.clone(), self.lines[k]);
-                if dt > LONGEST_GAP_S.max(3.0 * step) {
-                    return Err(Error::Gap { path, line, previous_s, t_s });
-                }
-                gaps.push(line);
-                // what is missing is made of the samples on either side; the sample itself lasts a step
-                let (before, after) = (self.sample(k - 1, step, previous_s), self.sample(k, step, t_s));
-                let share = 0.5 * (dt - step) / step;
-                let (dtheta, dv) = ((before.dtheta + after.dtheta) * share, (before.dv + after.dv) * share);
-                samples.push(ImuIncrement { t_s: t_s - step, dt_s: dt - step, dtheta, dv });
-                dt = step;
+            let since_s = if k == 0 { step } else { t_s - self.t_s[k - 1] };
+            // a sample after a hole lasts a step like any other
+            let is_hole = since_s > GAP * step;
+            let sample = self.sample(k, if is_hole { step } else { since_s }, t_s);
+            let (path, line) = (self.path.clone(), self.lines[k]);
+            if is_hole && since_s - step > LONGEST_S {
+                let previous_s = self.t_s[k - 1];
+                return Err(Error::Gap { path, line, previous_s, t_s, longest_s: LONGEST_S });
             }
-            let sample = self.sample(k, dt, t_s);
             let angle = sample.dtheta.length();
             if angle > MAX_ROTATION {
-                let (path, line) = (self.path, self.lines[k]);
-                return Err(Error::Rotation {
-                    path,
-                    line,
-                    angle_deg: angle / DEG,
-                    max_deg: MAX_ROTATION / DEG,
-                });
+                let (angle_deg, max_deg) = (angle / DEG, MAX_ROTATION / DEG);
+                return Err(Error::Rotation { path, line, angle_deg, max_deg });
+            }
+            if is_hole {
+                holes.push((k, since_s - step));
             }
             samples.push(sample);
         }
-        if let Some(first) = gaps.first() {
-            let n = gaps.len();
-            self.remarks
-                .push(format!("{n} gaps bridged with the samples beside them, the first in line {first}"));
-        }
+        self.tell_of_holes(&holes);
         let path = &self.path;
         let remarks = self.remarks.iter().map(|r| format!("{path}: {r}")).collect();
-        Ok(ImuFile { samples, rate_hz: 1.0 / step, remarks })
+        Ok(ImuFile { samples: bridged(&samples, step), rate_hz: 1.0 / step, remarks })
+    }
+
+    fn tell_of_holes(&mut self, holes: &[(usize, f64)]) {
+        const SHOWN: usize = 5;
+        let shown = |(k, seconds): &(usize, f64)| {
+            format!("{seconds:.2} s before {:.2} s (line {})", self.t_s[*k], self.lines[*k])
+        };
+        let mut list: Vec<String> = holes.iter().take(SHOWN).map(shown).collect();
+        if holes.len() > SHOWN {
+            list.push(format!("and {} more", holes.len() - SHOWN));
+        }
+        if !list.is_empty() {
+            self.remarks.push(format!(
+                "samples missing: {}; bridged with those beside them, as uncertain as this recording is over such times",
+                list.join(", ")
+            ));
+        }
     }
 
     /// Sample k over `dt` seconds that end at `t_s`.

@@ -7,20 +7,19 @@ mod inertial;
 mod initial;
 
 pub use error::FusionFileError;
-pub use fixes::read_gnss;
+pub use fixes::{FixSigma, read_gnss};
 pub use inertial::{ImuFile, read_imu};
 pub use initial::read_initial;
 
 use crate::data::trajectory_file::table::{self, Numbers, Table};
 use std::path::Path;
 
-/// Whether a text is a table of numbers between blanks without a header, of that many columns.
-fn is_bare(text: &str, columns: usize) -> bool {
-    let first = text.lines().map(str::trim).find(|l| !(l.is_empty() || l.starts_with(['#', '%', '/'])));
-    first.is_some_and(|line| {
-        let cells: Vec<&str> = line.split_whitespace().collect();
-        cells.len() == columns && cells.iter().all(|c| c.parse::<f64>().is_ok())
-    })
+/// How many columns a table of numbers between blanks without a header has; none of any other text.
+fn bare_columns(text: &str) -> Option<usize> {
+    let mut lines = text.lines().map(str::trim);
+    let first = lines.find(|l| !(l.is_empty() || l.starts_with(['#', '%', '/'])))?;
+    let cells: Vec<&str> = first.split_whitespace().collect();
+    (cells.len() > 1 && cells.iter().all(|c| c.parse::<f64>().is_ok())).then_some(cells.len())
 }
 
 /// The table of a file, its columns named when it has no header.

@@ -45,7 +45,7 @@ pub enum TrajectoryFileError {
     #[error("{path}, line {line}: {source}")]
     Samples { path: String, line: u64, source: trajectory::Error },
     /// Not a height in metres.
-    #[error("{path}, line {line}: height {h} m is not within −12 to 1000 km")]
+    #[error("{path}, line {line}: height {h:?} m is not within −12 to 1000 km")]
     Height { path: String, line: u64, h: f64 },
     /// Rows too far apart in time.
     #[error("{path}, line {line}: the rows are {step_s} s apart")]

@@ -282,7 +282,7 @@ fn jumps_and_heights_of_other_formats_are_refused_as_those_of_tables() {
     };
     let text: String = (0..6).map(point).collect();
     let e = imports::gpx("a.gpx", &text).unwrap().trajectory().unwrap_err().to_string();
-    assert_eq!(e, "a.gpx, line 4: height 40000000 m is not within −12 to 1000 km");
+    assert_eq!(e, "a.gpx, line 4: height 40000000.0 m is not within −12 to 1000 km");
     let head = "ini lat (deg),…\n32,120,5,10,0,0,90,0,0\ncommand type,…\n";
     let text = format!("{head}1,0,0,0,0,0,0,5,0\n1,0,0,0,0,0,-1e6,5,0\n");
     let e = imports::motion_definition("m.csv", &text).unwrap().trajectory().unwrap_err().to_string();
