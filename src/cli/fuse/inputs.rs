@@ -159,7 +159,7 @@ fn placed(outages: &[Outage], gnss: &[GnssFix], session: &Session) -> Result<Vec
     let withholds = |o: &Outage| gnss.iter().any(|f| o.withholds(f.t_s + 1e-9));
     let place = |asked: &Outage| {
         let placed = asked.placed(span, withholds).map_err(|e| {
-            Failure::input(&e).hint(format!("the fixes run from {} to {} s", first.t_s, last.t_s))
+            Failure::input(e).hint(format!("the fixes run from {} to {} s", first.t_s, last.t_s))
         })?;
         if placed != *asked {
             let message = format!(

@@ -193,7 +193,7 @@ fn outages(
 ) -> Result<Vec<Outage>, Failure> {
     let cut = scenario.cut_outages(span).map_err(|e| {
         let hint = format!("fixes come every {} s from {} s", 1.0 / scenario.gnss.rate_hz, span.0);
-        Failure::input(&e).hint(hint)
+        Failure::input(e).hint(hint)
     })?;
     for o in &cut {
         let message = format!("outage {}:{} is cut: the trajectory ends at {} s", o.start_s, o.end_s, span.1);

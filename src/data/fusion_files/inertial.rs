@@ -155,7 +155,7 @@ impl Columns {
             let is_hole = since_s > GAP * step;
             let sample = self.sample(k, if is_hole { step } else { since_s }, t_s);
             let (path, line) = (self.path.clone(), self.lines[k]);
-            if is_hole && since_s - step > LONGEST_S {
+            if is_hole && since_s - step > LONGEST_S + 0.5 * step {
                 let previous_s = self.t_s[k - 1];
                 return Err(Error::Gap { path, line, previous_s, t_s, longest_s: LONGEST_S });
             }
