@@ -17,8 +17,8 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// What to look at where a solution is not to be believed.
-const ADVICE: &str = "are the IMU's axes front, right, down (if not: --axes, --mounting), its units right, the start true (if not: \
-                      --initial FILE), the receiver's standard deviations honest (if not: --gnss-sigma-factor)?";
+const ADVICE: &str = "are the IMU's axes front, right, down (if not: --axes, --mounting), its units right, the start true \
+                      (if not: --initial FILE), the receiver's standard deviations honest (if not: --gnss-sigma-factor)?";
 /// The same where the fixes agree with the solution and the reference does not.
 const LASTING: &str = "the filter takes the errors of the fixes as white: where they last, give larger standard deviations \
                        (--gnss-sigma-factor); is the reference's attitude that of the vehicle (if not: --mounting)?";
@@ -31,7 +31,8 @@ const ELSEWHERE_M: f64 = 10_000.0;
 /// (dtheta_x_rad … dv_z_m_s, time = end of the interval). GNSS: t_s, lat_deg, lon_deg, h_m, sd_n_m, sd_e_m,
 /// sd_d_m, and v_n_m_s … sd_vd_m_s where velocity is measured. Or both as the text files of KF-GINS: 7 or 8
 /// columns of increments; 7 of position, 13 with velocity. Up to 5 s without samples are bridged, as uncertain
-/// as the recording is over such times elsewhere. Writes solution.csv, innovations.csv, errors.csv (with a reference), solution.kml, summary.json, manifest.json.
+/// as the recording is over such times elsewhere. Writes solution.csv, innovations.csv, errors.csv (with a
+/// reference), solution.kml, summary.json, manifest.json.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
