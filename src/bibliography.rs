@@ -36,6 +36,8 @@ sources! {
     Savage98;
     /// NIMA TR8350.2: *Department of Defense World Geodetic System 1984*, 3rd ed., 2000.
     Wgs84;
+    /// P. S. Maybeck: *Stochastic Models, Estimation, and Control*, vol. 1, Academic Press, 1979.
+    Maybeck79;
     /// C. F. van Loan: *Computing integrals involving the matrix exponential*, IEEE TAC 23, 1978.
     VanLoan78;
     /// C. L. Lawson, R. J. Hanson: *Solving Least Squares Problems*, 1974 (NNLS).

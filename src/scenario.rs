@@ -10,7 +10,8 @@ use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::{MisplacedOutage, Outage, OutagePlan, PeriodicOutages, RandomOutages};
-use crate::simulation::Experiment;
+use crate::simulation::lincov::{Track, reduced_belief};
+use crate::simulation::{Experiment, ExperimentError};
 use crate::trajectory::Trajectory;
 use crate::units::SettingError;
 use schemars::JsonSchema;
@@ -85,12 +86,26 @@ pub enum Method {
 pub struct FilterSettings {
     /// How the noise model becomes states.
     pub states: FilterStates,
+    /// How the filter of 15 states is made of a larger model.
+    pub reduction: Reduction,
     /// How gravity falls with height, for truth and filter alike.
     pub gravity: GravityModel,
     /// A fix is not used when its NIS is above the chi-square quantile of this probability; without it, every
     /// fix is used.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nis_gate: Option<f64>,
+}
+
+/// How a noise model is reduced to white noise and one Gauss-Markov bias an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reduction {
+    /// So that the filter's covariance is closest to that of its true errors along the trajectory, mostly at the
+    /// ends of the outages.
+    #[default]
+    Covariance,
+    /// The closest Haar wavelet variance. It knows nothing of the filter, which becomes overconfident.
+    Wavelet,
 }
 
 impl FilterSettings {
@@ -162,14 +177,30 @@ impl Scenario {
         Err(SettingError::new(key, rate_hz, requirement))
     }
 
-    /// What the filter believes of a model at the IMU's rate, reduced for these outages.
+    /// The reference and the fixes as a covariance analysis needs them; `model` is at the IMU's rate.
+    ///
+    /// # Errors
+    /// When trajectory, rates and fixes do not fit together.
+    pub fn track(
+        &self,
+        trajectory: &Trajectory,
+        model: &Model,
+        outages: &[Outage],
+    ) -> Result<Track, ExperimentError> {
+        Track::along(&self.experiment(trajectory, Truth::Model(model), &[], outages, 0))
+    }
+
+    /// What the filter believes of a model at the IMU's rate, reduced for these outages along the track.
     ///
     /// # Errors
     /// When the model has no such filter.
-    pub fn belief(&self, model: &Model, outages: &[Outage]) -> Result<Belief, BeliefError> {
+    pub fn belief(&self, model: &Model, outages: &[Outage], track: &Track) -> Result<Belief, BeliefError> {
         let longest = outages.iter().map(|o| o.end_s - o.start_s).fold(0.0, f64::max);
         let (interval_s, window_s) = (1.0 / self.gnss.rate_hz, reduction::window_s(longest));
-        let belief = Belief::new(model, self.filter.states, interval_s, window_s)?;
+        let mut belief = Belief::new(model, self.filter.states, interval_s, window_s)?;
+        if self.filter.states.is_reduced() && self.filter.reduction == Reduction::Covariance {
+            belief = reduced_belief(model, belief, track);
+        }
         Ok(belief.with_initial(&self.initial))
     }
 
@@ -271,6 +302,7 @@ impl RunSettings {
 mod tests {
     use super::*;
     use crate::noise::{Ar1, Composite, Process, RandomWalk};
+    use crate::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start};
 
     #[test]
     fn an_empty_file_is_the_papers_setting() {
@@ -333,6 +365,14 @@ mod tests {
         assert!(doubts("imu.scale_ppm_accel = 300\nfilter.states = 21").is_empty());
     }
 
+    /// Ten seconds at rest.
+    fn standing() -> Trajectory {
+        let start = Start { t_s: 0.0, lat: 0.8, lon: 0.1, h: 0.0, heading: 0.0, speed: 0.0 };
+        let kind = Kind::Straight(Length::Duration(10.0));
+        let segments = vec![Segment { kind, climb_m: 0.0, ramp_s: None }];
+        Profile { start, bank: Bank::None, ramp_s: 1.0, segments }.build().unwrap()
+    }
+
     /// With N1 an axis has two bias states: 9 + 12, scale factors 6, turn-on biases of the gyroscope 3.
     #[test]
     fn what_is_expected_beside_the_model_adds_states_to_any_filter() {
@@ -344,8 +384,9 @@ mod tests {
         let states = |text: &str| {
             let scenario: Scenario = toml::from_str(text).unwrap();
             assert_eq!(scenario.validate(), Ok(()));
-            let full = scenario.with_full_noise().belief(&model, &[]).unwrap().states;
-            (scenario.belief(&model, &[]).unwrap().states, full)
+            let track = scenario.track(&standing(), &model, &[]).unwrap();
+            let full = scenario.with_full_noise().belief(&model, &[], &track).unwrap().states;
+            (scenario.belief(&model, &[], &track).unwrap().states, full)
         };
         assert_eq!(states(""), (15, 21));
         assert_eq!(states("filter.states = 21"), (21, 27));

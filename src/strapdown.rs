@@ -10,6 +10,7 @@
 use crate::earth::{GravityModel, OMEGA_IE, Parallel};
 use crate::frames::{NavState, wrap_angle};
 use crate::lanes::{Lanes, Mat3, Quat, Real, Vec3, Wide};
+use glam::DVec3;
 
 /// Largest rotation of one sample interval (rad); beyond it the two-sample algorithm is not valid.
 pub const MAX_ROTATION: f64 = 0.5;
@@ -110,6 +111,25 @@ impl Strapdown {
         self.dtheta_before.store(ins.dtheta_before);
         self.dv_before.store(ins.dv_before);
         self.coriolis_before.store(ins.coriolis_before);
+    }
+}
+
+impl Strapdown<f64> {
+    /// One run alone, from a state.
+    #[must_use]
+    pub fn single(start: &NavState, gravity: GravityModel) -> Self {
+        let zero = Vec3::splat(DVec3::ZERO);
+        Self {
+            lat: start.lat,
+            lon: start.lon,
+            h: start.h,
+            v_n: Vec3::splat(start.v_n),
+            q_b_n: Quat::splat(start.q_b_n),
+            dtheta_before: zero,
+            dv_before: zero,
+            coriolis_before: zero,
+            gravity,
+        }
     }
 }
 

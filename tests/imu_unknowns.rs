@@ -59,9 +59,12 @@ fn run(
     seed: u64,
     runs: u64,
 ) -> Vec<RunResult> {
-    let belief = |(model, own): &(&Model, Scenario)| own.belief(model, &OUTAGES).unwrap();
-    let beliefs: Vec<Belief> = filters.iter().map(belief).collect();
     let trajectory = trajectory();
+    let belief = |(model, own): &(&Model, Scenario)| {
+        let track = own.track(&trajectory, model, &OUTAGES).unwrap();
+        own.belief(model, &OUTAGES, &track).unwrap()
+    };
+    let beliefs: Vec<Belief> = filters.iter().map(belief).collect();
     let experiment = imu.experiment(&trajectory, Truth::Model(truth), &beliefs, &OUTAGES, seed);
     monte_carlo::run(&experiment, runs, &|_| {}).unwrap()
 }

@@ -55,7 +55,7 @@ impl BiasGroup {
     }
 
     /// Whether it is an unknown constant.
-    fn is_constant(&self) -> bool {
+    pub fn is_constant(&self) -> bool {
         self.innovation == DVec3::ZERO && self.phi == DVec3::ONE
     }
 
@@ -163,6 +163,12 @@ impl Belief {
             let group = &mut self.groups[sensor][g];
             (group.phi[i], group.innovation[i], group.initial[i]) = (bias.phi, bias.innovation, bias.initial);
         }
+    }
+
+    /// The unknown constants of a sensor that are multiplied.
+    #[must_use]
+    pub fn unknowns(&self, sensor: Sensor) -> &[Unknown] {
+        &self.unknowns[sensor as usize]
     }
 
     /// Blocks of the covariance: R, V, PSI, the bias groups and the unknowns.

@@ -22,7 +22,7 @@ pub use gate::{nis_limit, update_within};
 pub use initial::InitialSettings;
 pub use states::FilterStates;
 pub use unknowns::{Unknown, UnknownKind};
-pub use update::{Fix, update, update_height};
+pub use update::{Fix, fix_rows, update, update_height};
 
 #[cfg(test)]
 mod tests;

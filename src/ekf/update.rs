@@ -161,7 +161,7 @@ struct Antenna<L> {
     of_bias: Mat3<L>,
 }
 
-impl<W: Wide> Antenna<W> {
+impl<W: Real> Antenna<W> {
     #[inline(always)]
     fn new(ins: &Strapdown<W>, omega_ib_b: Vec3<W>, lever_arm_b: DVec3) -> Self {
         let c_b_n = ins.q_b_n.to_matrix();
@@ -179,20 +179,6 @@ impl<W: Wide> Antenna<W> {
         }
     }
 
-    /// Estimated less measured position (m) and velocity (m/s) of the antenna, north, east, down.
-    #[inline(always)]
-    fn innovation(&self, ins: &Strapdown<W>, fix: &Fix) -> [Vec3<W>; 2] {
-        let (s, c) = ins.lat.sin_cos();
-        let r = radii(s);
-        let (lat, lon, h) = (W::load(&fix.lat), W::load(&fix.lon), W::load(&fix.h));
-        // longitudes may differ by whole turns
-        let dlon = ins.lon - lon;
-        let dlon = dlon - rounded(dlon * (1.0 / TAU)) * TAU;
-        let (north, east) = ((ins.lat - lat) * (r.meridian + ins.h), dlon * (r.transverse + ins.h) * c);
-        let velocity = fix.v_n.map(|v_n| ins.v_n + self.swing_n - v_n.load());
-        [Vec3([north, east, h - ins.h]) + self.arm_n, velocity.unwrap_or(Vec3::splat(DVec3::ZERO))]
-    }
-
     /// Position of the antenna: delta r_n − \[C l ×\] psi_n.
     #[inline(always)]
     fn position_row(&self, axis: usize) -> Row<W> {
@@ -202,7 +188,9 @@ impl<W: Wide> Antenna<W> {
         }
         row
     }
+}
 
+impl<W: Wide> Antenna<W> {
     /// Velocity of the antenna: delta v_n + `of_psi` psi_n + C \[l ×\] (delta b_g + delta u ∘ regressor), u an
     /// unknown of the gyroscope.
     #[inline(always)]
@@ -222,6 +210,37 @@ impl<W: Wide> Antenna<W> {
         }
         row
     }
+
+    /// Estimated less measured position (m) and velocity (m/s) of the antenna, north, east, down.
+    #[inline(always)]
+    fn innovation(&self, ins: &Strapdown<W>, fix: &Fix) -> [Vec3<W>; 2] {
+        let (s, c) = ins.lat.sin_cos();
+        let r = radii(s);
+        let (lat, lon, h) = (W::load(&fix.lat), W::load(&fix.lon), W::load(&fix.h));
+        // longitudes may differ by whole turns
+        let dlon = ins.lon - lon;
+        let dlon = dlon - rounded(dlon * (1.0 / TAU)) * TAU;
+        let (north, east) = ((ins.lat - lat) * (r.meridian + ins.h), dlon * (r.transverse + ins.h) * c);
+        let velocity = fix.v_n.map(|v_n| ins.v_n + self.swing_n - v_n.load());
+        [Vec3([north, east, h - ins.h]) + self.arm_n, velocity.unwrap_or(Vec3::splat(DVec3::ZERO))]
+    }
+}
+
+/// The measurement rows of a fix about a nominal state: position north, east, down, then velocity. Twelve
+/// coefficients each: R, V, PSI, and the error of the gyroscope's bias.
+#[must_use]
+pub fn fix_rows(ins: &Strapdown<f64>, omega_ib_b: DVec3, lever_arm_b: DVec3) -> [[f64; 12]; 6] {
+    let antenna = Antenna::new(ins, Vec3::splat(omega_ib_b), lever_arm_b);
+    std::array::from_fn(|i| {
+        let mut row = if i < 3 { antenna.position_row(i) } else { Row::new(3 * V + i - 3) };
+        if i >= 3 {
+            row.push3(3 * PSI, antenna.of_psi.0[i - 3]);
+            row.push3(3 * BIAS, antenna.of_bias.0[i - 3]);
+        }
+        let mut dense = [0.0; 12];
+        row.entries().iter().for_each(|(state, coefficient)| dense[*state] += coefficient);
+        dense
+    })
 }
 
 /// One measurement row: (state, coefficient), without allocation.

@@ -1,15 +1,15 @@
-//! What the reduction of a model to 15 states leaves of it, and what that does to the filter's own
-//! standard deviations.
+//! What the reduction of a model to 15 states leaves of it, and how honest the reduced filter is.
 
 use super::estimate::PerState;
+use crate::ekf::Belief;
 use crate::imu::{Channel, Sensor};
-use crate::noise::reduction::{Reduced, ReductionError, carried, reduce};
-use crate::noise::{Composite, Model, Process, continuous};
-use crate::simulation::{CovariancePass, REPORTED};
+use crate::noise::{Ar1, Composite, Model, ParameterError, Process, White, continuous, reduction};
+use crate::simulation::REPORTED;
+use crate::simulation::lincov::{Assessment, Consistency};
 use serde::Serialize;
 
-/// Off by more than this in position at the end of an outage, a reduction deserves a warning.
-pub const TOLERANCE: f64 = 0.05;
+/// A ratio of RMSE to standard deviation that is further from 1 at the end of an outage deserves a warning.
+pub const TOLERANCE: f64 = 0.1;
 
 /// The reduction of a model.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -18,8 +18,7 @@ pub struct ReductionSummary {
     pub window_s: f64,
     /// The six axes.
     pub axes: Vec<AxisReduction>,
-    /// Standard deviations of the reduced filter over those of the full one; none where the model has no full
-    /// filter.
+    /// True errors of the reduced filter against its own standard deviations; none where nothing was reduced.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub quality: Option<ReductionQuality>,
 }
@@ -53,25 +52,34 @@ pub struct AxisReduction {
     pub reduced_wv: Vec<f64>,
 }
 
-/// Standard deviations of the reduced filter over those of the full one: 1 is perfect.
+/// What the covariance analysis says of the reduced filter where the model is true.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReductionQuality {
-    /// At the end of each outage.
+    /// True RMSE over the filter's own standard deviation at the end of each outage: above 1 it is
+    /// overconfident, below 1 overcautious.
     pub outage_end: Vec<PerState<f64>>,
-    /// Mean over all epochs.
+    /// The same, mean over all epochs.
     pub mean: PerState<f64>,
+    /// Expected NEES, mean over all epochs; 9 is right.
+    pub nees: f64,
+    /// True RMSE over that of the full filter at the end of each outage; none where the model has no full filter.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rmse_over_full: Option<Vec<PerState<f64>>>,
 }
 
 impl ReductionSummary {
-    /// Reduces each axis as the filter of 15 states does.
+    /// What a belief of 15 states made of a model; `interval_s` and `window_s` are the time scales it is compared
+    /// over.
     ///
     /// # Errors
-    /// As [`reduce`].
-    pub fn of(model: &Model, interval_s: f64, window_s: f64) -> Result<Self, ReductionError> {
-        let axis = |channel: Channel| {
-            let reduced = reduce(model.axis(channel), model.rate_hz, interval_s, window_s)?;
-            Ok::<_, ReductionError>(AxisReduction::new(channel, model, &reduced, window_s))
-        };
+    /// When a parameter of the belief is outside its domain.
+    pub fn of(
+        model: &Model,
+        belief: &Belief,
+        interval_s: f64,
+        window_s: f64,
+    ) -> Result<Self, ParameterError> {
+        let axis = |channel| AxisReduction::new(channel, model, belief, [interval_s, window_s]);
         Ok(Self {
             window_s,
             axes: Channel::ALL.map(axis).into_iter().collect::<Result<_, _>>()?,
@@ -83,14 +91,6 @@ impl ReductionSummary {
     #[must_use]
     pub fn is_exact(&self) -> bool {
         self.axes.iter().all(|a| a.misfit == 0.0)
-    }
-
-    /// The largest relative difference of the horizontal position's standard deviation at the end of an
-    /// outage.
-    #[must_use]
-    pub fn worst_position(&self) -> Option<f64> {
-        let ends = &self.quality.as_ref()?.outage_end;
-        ends.iter().flat_map(|e| [e.0[0], e.0[1]]).map(|r| (r - 1.0).abs()).reduce(f64::max)
     }
 
     /// A line a sensor, or a line an axis where they differ.
@@ -121,51 +121,122 @@ impl ReductionSummary {
 }
 
 impl AxisReduction {
-    fn new(channel: Channel, model: &Model, reduced: &Reduced, window_s: f64) -> Self {
+    fn new(
+        channel: Channel,
+        model: &Model,
+        belief: &Belief,
+        scales_s: [f64; 2],
+    ) -> Result<Self, ParameterError> {
         let noise = model.axis(channel);
+        let (sensor, i) = (channel.sensor as usize, channel.axis as usize);
+        let group = &belief.groups[sensor][0];
+        let (white, bias) =
+            (White::new(belief.white[sensor][i])?, Ar1::new(group.phi[i], group.innovation[i])?);
         let is_quantization = |p: &&Process| matches!(p, Process::Quantization(_));
-        let kept = carried(noise);
-        let pair = Composite::new(vec![Process::White(reduced.white), Process::Ar1(reduced.bias)]);
-        let last = (window_s * model.rate_hz).max(2.0).log2().round().min(40.0) as u32;
+        let kept = reduction::carried(noise);
+        let pair = Composite::new(vec![Process::White(white), Process::Ar1(bias)]);
+        let level = |seconds: f64| (seconds * model.rate_hz).max(2.0).log2().round().min(40.0) as u32;
+        let [first, last] = scales_s.map(level);
+        let distance = |l: u32| (pair.haar_wv(l) / kept.haar_wv(l)).ln().abs();
+        let exact = reduction::is_exact(noise);
         let levels: Vec<u32> = (1..=last).collect();
-        Self {
+        Ok(Self {
             axis: channel.to_string(),
-            white_sigma2: reduced.white.sigma2(),
-            bias_phi: reduced.bias.phi(),
-            bias_sigma2: reduced.bias.sigma2(),
-            bias_t_corr_s: continuous::correlation_time_s(reduced.bias.phi(), model.rate_hz),
-            bias_sigma: reduced.bias.variance().sqrt(),
-            initial_sigma: reduced.initial_variance.sqrt(),
-            misfit: reduced.misfit,
+            white_sigma2: white.sigma2(),
+            bias_phi: bias.phi(),
+            bias_sigma2: bias.sigma2(),
+            bias_t_corr_s: continuous::correlation_time_s(bias.phi(), model.rate_hz),
+            bias_sigma: bias.variance().sqrt(),
+            initial_sigma: group.initial[i].sqrt(),
+            misfit: if exact { 0.0 } else { (first..=last).map(distance).fold(0.0, f64::max) },
             quantization_left_out: noise.processes.iter().any(|p| is_quantization(&p)),
             tau_s: levels.iter().map(|l| f64::from(*l).exp2() / model.rate_hz).collect(),
             model_wv: levels.iter().map(|l| kept.haar_wv(*l)).collect(),
             reduced_wv: levels.iter().map(|l| pair.haar_wv(*l)).collect(),
-        }
+        })
     }
 }
 
 impl ReductionQuality {
-    /// From a pass of each filter along the same plan.
+    /// From a covariance analysis of the reduced filter and, where there is one, of the full filter.
     #[must_use]
-    pub fn of(reduced: &CovariancePass, full: &CovariancePass) -> Self {
-        let ratio = |a: &[f64; REPORTED], b: &[f64; REPORTED]| -> [f64; REPORTED] {
-            std::array::from_fn(|i| a[i] / b[i])
+    pub fn of(reduced: &Assessment, full: Option<&Assessment>) -> Self {
+        let n = reduced.reports.len() as f64;
+        let ratios: Vec<[f64; REPORTED]> = reduced.reports.iter().map(Consistency::ratio).collect();
+        // a perfect start has no deviation to be compared with
+        let mean = |i: usize| ratios.iter().map(|r| r[i]).sum::<f64>() / n;
+        let over =
+            |(a, b): (&Consistency, &Consistency)| PerState(std::array::from_fn(|i| a.rmse[i] / b.rmse[i]));
+        Self {
+            outage_end: reduced.outage_ends.iter().map(|e| PerState(e.ratio())).collect(),
+            mean: PerState(std::array::from_fn(mean)),
+            nees: reduced.reports.iter().map(|r| r.nees).sum::<f64>() / n,
+            rmse_over_full: full.map(|f| reduced.outage_ends.iter().zip(&f.outage_ends).map(over).collect()),
+        }
+    }
+
+    /// The state and outage (counted from 1) whose ratio is furthest from 1, and the ratio.
+    fn worst(&self) -> Option<(usize, usize, f64)> {
+        let ends = self.outage_end.iter().enumerate();
+        let all = ends.flat_map(|(o, end)| end.0.iter().enumerate().map(move |(s, r)| (s, o + 1, *r)));
+        all.max_by(|a, b| a.2.ln().abs().total_cmp(&b.2.ln().abs()))
+    }
+
+    /// One line: how sure the filter is of itself, and what it loses.
+    #[must_use]
+    pub fn line(&self) -> String {
+        let all = || self.outage_end.iter().flat_map(|e| e.0);
+        let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max));
+        let ends = if self.outage_end.is_empty() {
+            String::new()
+        } else {
+            format!("RMSE over its own sigma {low:.2} to {high:.2} at the ends of outages, ")
         };
-        let ratios = |a: &[[f64; REPORTED]], b: &[[f64; REPORTED]]| -> Vec<[f64; REPORTED]> {
-            a.iter().zip(b).map(|(a, b)| ratio(a, b)).collect()
-        };
-        let all = ratios(&reduced.reports, &full.reports);
-        let mean = |i: usize| all.iter().map(|r| r[i]).sum::<f64>() / all.len() as f64;
-        let outage_end = ratios(&reduced.outage_ends, &full.outage_ends).into_iter().map(PerState).collect();
-        Self { outage_end, mean: PerState(std::array::from_fn(mean)) }
+        let lost = self.rmse_over_full.iter().flatten().flat_map(|e| e.0).reduce(f64::max);
+        let lost = lost.map_or(String::new(), |lost| {
+            format!("; errors there at most {:.0} % above those of the full filter", 100.0 * (lost - 1.0))
+        });
+        format!("the reduced filter by covariance analysis: {ends}NEES {:.2} of 9{lost}", self.nees)
+    }
+
+    /// What to be warned of: a standard deviation at an outage's end that is too small or too large.
+    #[must_use]
+    pub fn doubt(&self) -> Option<String> {
+        let (state, outage, ratio) = self.worst().filter(|(_, _, r)| r.ln().abs() > TOLERANCE.ln_1p())?;
+        let off = 100.0 * (1.0 / ratio - 1.0).abs();
+        let (size, meaning) =
+            if ratio > 1.0 { ("small", "overconfident") } else { ("large", "overcautious") };
+        Some(format!(
+            "the sigma of {} at the end of outage {outage} is {off:.0} % too {size}: the filter reduced to 15 states \
+             is {meaning}",
+            STATE_WORDS[state]
+        ))
     }
 }
+
+/// The reported states in words.
+const STATE_WORDS: [&str; REPORTED] = [
+    "position north",
+    "position east",
+    "position down",
+    "velocity north",
+    "velocity east",
+    "velocity down",
+    "roll",
+    "pitch",
+    "yaw",
+];
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::noise::{Ar1, Quantization, White};
+    use crate::ekf::FilterStates;
+    use crate::noise::Quantization;
+
+    fn summary(model: &Model) -> ReductionSummary {
+        let belief = Belief::new(model, FilterStates::Reduced15, 1.0, 800.0).unwrap();
+        ReductionSummary::of(model, &belief, 1.0, 800.0).unwrap()
+    }
 
     fn model(second: f64) -> Model {
         let mut processes = vec![
@@ -182,7 +253,7 @@ mod tests {
 
     #[test]
     fn a_model_that_needs_no_reduction_says_so() {
-        let summary = ReductionSummary::of(&model(0.0), 1.0, 800.0).unwrap();
+        let summary = summary(&model(0.0));
         assert!(summary.is_exact() && summary.axes.iter().all(|a| a.quantization_left_out));
         let a = &summary.axes[3];
         assert_eq!((a.axis.as_str(), a.model_wv == a.reduced_wv), ("gyro.x", true));
@@ -193,11 +264,32 @@ mod tests {
     /// The curves stored are those the misfit is of: its value is found again over the scales of the fit.
     #[test]
     fn the_stored_curves_have_the_misfit_that_is_stated() {
-        let summary = ReductionSummary::of(&model(1e-8), 1.0, 800.0).unwrap();
+        let summary = summary(&model(1e-8));
         let a = &summary.axes[0];
         assert!(!summary.is_exact() && a.misfit > 0.01);
         let fitted = a.tau_s.iter().zip(a.model_wv.iter().zip(&a.reduced_wv)).filter(|(tau, _)| **tau > 1.0);
         let worst = fitted.map(|(_, (m, r))| (r / m).ln().abs()).fold(0.0, f64::max);
         assert!((worst / a.misfit - 1.0).abs() < 1e-9, "{worst} {}", a.misfit);
+    }
+
+    #[test]
+    fn the_warning_names_state_outage_and_direction() {
+        let mut ends = vec![PerState([1.0; REPORTED]); 2];
+        ends[1].0[8] = 1.25;
+        ends[0].0[0] = 0.95;
+        let quality = |outage_end: Vec<PerState<f64>>| ReductionQuality {
+            outage_end,
+            mean: PerState([1.0; REPORTED]),
+            nees: 9.0,
+            rmse_over_full: None,
+        };
+        let doubt = quality(ends.clone()).doubt().unwrap();
+        assert!(doubt.contains("yaw at the end of outage 2 is 20 % too small"), "{doubt}");
+        assert!(doubt.contains("overconfident"));
+        ends[1].0[8] = 0.8;
+        let doubt = quality(ends.clone()).doubt().unwrap();
+        assert!(doubt.contains("25 % too large") && doubt.contains("overcautious"), "{doubt}");
+        ends[1].0[8] = 1.09;
+        assert_eq!(quality(ends).doubt(), None);
     }
 }

@@ -78,6 +78,13 @@ pub fn reduce(
     })
 }
 
+/// Whether the noise of an axis already is white noise and at most one stationary bias, beside what the pair does not
+/// stand for.
+#[must_use]
+pub fn is_exact(noise: &Composite) -> bool {
+    exact(&carried(noise)).is_some()
+}
+
 /// The processes that the pair stands for: without quantization noise and without drift.
 #[must_use]
 pub fn carried(noise: &Composite) -> Composite {

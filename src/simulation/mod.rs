@@ -2,12 +2,11 @@
 
 mod assessment;
 mod batch;
-mod covariance_pass;
+pub mod lincov;
 mod plan;
 mod recording;
 
 pub use batch::{Batch, run_batch};
-pub use covariance_pass::{CovariancePass, covariance_pass};
 pub use plan::{Experiment, ExperimentError, Plan};
 pub use recording::{Recording, record};
 

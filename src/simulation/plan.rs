@@ -146,14 +146,34 @@ impl<'a> Plan<'a> {
     /// # Errors
     /// What does not fit, with values.
     pub fn new(experiment: &'a Experiment<'a>) -> Result<Self, ExperimentError> {
-        let Experiment { trajectory, rate_hz, gravity, .. } = *experiment;
+        let rate_hz = experiment.rate_hz;
         for belief in experiment.beliefs {
             if !same_rate(belief.rate_hz, rate_hz) {
                 return Err(ExperimentError::BeliefRate { model_hz: belief.rate_hz, imu_hz: rate_hz });
             }
         }
+        Self::with_source(experiment, |samples| experiment.truth.source(rate_hz, samples))
+    }
+
+    /// The same for a covariance analysis, which draws no error: a model that is the truth may belong to another
+    /// rate.
+    ///
+    /// # Errors
+    /// What does not fit, with values.
+    pub(super) fn reference(experiment: &'a Experiment<'a>) -> Result<Self, ExperimentError> {
+        Self::with_source(experiment, |samples| match experiment.truth {
+            Truth::Model(model) => Ok(ErrorSource::Model(model)),
+            Truth::Static(_) => experiment.truth.source(experiment.rate_hz, samples),
+        })
+    }
+
+    fn with_source(
+        experiment: &'a Experiment<'a>,
+        source: impl FnOnce(usize) -> Result<ErrorSource<'a>, TruthError>,
+    ) -> Result<Self, ExperimentError> {
+        let Experiment { trajectory, rate_hz, gravity, .. } = *experiment;
         let ideal = ideal_imu(trajectory, rate_hz, gravity)?;
-        let errors = experiment.truth.source(rate_hz, ideal.len())?;
+        let errors = source(ideal.len())?;
         check_rotation(&ideal, trajectory.start_s(), rate_hz)?;
         let events = schedule(experiment, ideal.len())?;
         let chi2 = ChiSquared::new(super::COVERAGE_DOF as f64).expect("degrees of freedom are positive");

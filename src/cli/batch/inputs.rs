@@ -50,7 +50,7 @@ impl<'a> Inputs<'a> {
         let at = |e: &dyn std::fmt::Display| Failure::input(format!("{}: {e}", grid.names(cell).join(", ")));
         let span = (trajectory.start_s(), trajectory.end_s());
         let outages = windows(&scenario, span, plan.seed).map_err(|e| at(&e))?;
-        let beliefs = self.beliefs(cell, &scenario, &outages)?;
+        let beliefs = self.beliefs(cell, &scenario, &trajectory, &outages)?;
         let truth_model;
         let truth = match &*truth {
             Source::Recordings(recordings) => Truth::Static(recordings),
@@ -120,6 +120,7 @@ impl<'a> Inputs<'a> {
         &mut self,
         cell: Cell,
         scenario: &Scenario,
+        trajectory: &Trajectory,
         outages: &[Outage],
     ) -> Result<Vec<Belief>, Failure> {
         let grid = &self.planned.grid;
@@ -130,7 +131,8 @@ impl<'a> Inputs<'a> {
             let model = self.model(column.candidate)?;
             let at = |e: &dyn std::fmt::Display| Failure::input(format!("candidate {}: {e}", column.name));
             let model = continuous::at_rate(model, scenario.imu.rate_hz).map_err(|e| at(&e))?;
-            beliefs.push(own.belief(&model, outages).map_err(|e| at(&e))?);
+            let track = own.track(trajectory, &model, outages).map_err(|e| at(&e))?;
+            beliefs.push(own.belief(&model, outages, &track).map_err(|e| at(&e))?);
         }
         Ok(beliefs)
     }

@@ -1,6 +1,7 @@
 //! The files of a fusion.
 
 use super::Args;
+use crate::cli::run::reduced::{Made, reduction};
 use crate::cli::{Failure, Session, parse, read};
 use glam::{DMat3, DQuat, DVec3};
 use nav_sim::data::fusion_files::{FixSigma, FusionFileError, ImuFile, read_gnss, read_imu, read_initial};
@@ -11,7 +12,9 @@ use nav_sim::fusion::{FusionError, Recorded, Settings, Start, check_clocks};
 use nav_sim::gnss::GnssFix;
 use nav_sim::noise::{Composite, Model, Process, continuous, reduction};
 use nav_sim::report::Input;
+use nav_sim::sensors::gnss::GnssSettings;
 use nav_sim::sensors::outage::{Outage, OutagePlan};
+use nav_sim::simulation::lincov;
 use nav_sim::trajectory::reference::Reference;
 use nav_sim::units::DEG;
 use std::path::{Path, PathBuf};
@@ -208,7 +211,58 @@ fn belief(
     initial.validate().map_err(Failure::input)?;
     let belief = Belief::new(&model, states, interval_s, window_s)
         .map_err(|e| Failure::input(format!("{shown}: {e}")))?;
+    let belief = if states.is_reduced() {
+        let lengths: Vec<f64> = settings.outages.iter().map(|o| o.end_s - o.start_s).collect();
+        // the reference is not known: the filter is made for a built-in drive with this receiver
+        match lincov::drive(&model, &receiver(gnss, interval_s), &lengths) {
+            Some(track) => {
+                let belief = lincov::reduced_belief(&model, belief, &track).with_initial(&initial);
+                let full = Belief::new(&model, FilterStates::Full, interval_s, window_s);
+                let full = full.ok().map(|full| full.with_initial(&beside(states, &initial)));
+                let made = Made { model: &model, belief: &belief, full, track: &track, interval_s, window_s };
+                reduction(&made, session)?;
+                return Ok(belief);
+            }
+            None => belief,
+        }
+    } else {
+        belief
+    };
     Ok(belief.with_initial(&initial))
+}
+
+/// What a filter expects beside the model, with what its states say of scale factors.
+fn beside(states: FilterStates, initial: &InitialSettings) -> InitialSettings {
+    let mut all = initial.clone();
+    let ppm = states.scale_sigma() * 1e6;
+    if ppm > 0.0 {
+        all.accel_scale_sigma_ppm.get_or_insert(ppm);
+        all.gyro_scale_sigma_ppm.get_or_insert(ppm);
+    }
+    all
+}
+
+/// The receiver of the fixes: medians.
+fn receiver(gnss: &[GnssFix], interval_s: f64) -> GnssSettings {
+    let median = |values: &mut dyn Iterator<Item = f64>| {
+        let mut sorted: Vec<f64> = values.collect();
+        sorted.sort_by(f64::total_cmp);
+        sorted.get(sorted.len() / 2).copied()
+    };
+    let defaults = GnssSettings::default();
+    let position =
+        |i: usize| median(&mut gnss.iter().map(|f| f.pos_sigma_n[i])).unwrap_or(defaults.pos_sigma_m[i]);
+    let velocity = |i: usize| median(&mut gnss.iter().filter_map(|f| Some(f.velocity?.1[i])));
+    let velocities = [0, 1, 2].map(velocity);
+    GnssSettings {
+        rate_hz: 1.0 / interval_s,
+        pos_sigma_m: [0, 1, 2].map(position),
+        vel_sigma_m_s: velocities
+            .iter()
+            .all(Option::is_some)
+            .then(|| velocities.map(Option::unwrap_or_default)),
+        ..defaults
+    }
 }
 
 /// At the rate of the recording, without quantization noise: the filter leaves it out, and it belongs to

@@ -13,6 +13,8 @@ use nav_sim::fusion::alignment::Alignment;
 use nav_sim::fusion::{self, Assessment, Recorded, Settings, Verdict};
 use nav_sim::report::FusionSummary;
 use nav_sim::sensors::gnss::MAX_LEVER_ARM_M;
+use nav_sim::sensors::outage::Outage;
+use nav_sim::simulation::lincov::weak_heading;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -113,6 +115,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let (rate_hz, states) = (inputs.imu.rate_hz, inputs.belief.states);
     let assessment = fusion::assess(&solution, &outcome, &doubts);
     warn(&assessment, &outcome, session);
+    doubt_heading(&solution, &settings.outages, session);
     let summary = FusionSummary::of(&solution, (&outcome, &assessment), &start, rate_hz, states);
     let wall_s = begin.elapsed().as_secs_f64();
     output::write(&solution, &summary, inputs.files, wall_s, &args.out)?;
@@ -120,6 +123,15 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     session.printer.result(shown.trim_end());
     session.printer.say(&format!("wrote {}", args.out.display()));
     believed(&assessment, &args.out, outcome.nis_per_component)
+}
+
+/// Where the motion hardly shows the heading, no filter of this kind is to be believed.
+fn doubt_heading(solution: &fusion::Solution, outages: &[Outage], session: &Session) {
+    let start_s = solution.rows.first().map_or(0.0, |row| row.t_s);
+    let fixed = solution.rows.iter().filter(|row| !outages.iter().any(|o| o.withholds(row.t_s)));
+    if let Some(doubt) = weak_heading(fixed.map(|row| (row.t_s - start_s, row.sigma[8]))) {
+        session.printer.warn(&doubt.to_string());
+    }
 }
 
 /// Exit code 3 for a solution that is not to be believed.

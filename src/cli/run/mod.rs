@@ -2,7 +2,7 @@
 
 mod inputs;
 mod output;
-mod reduced;
+pub(super) mod reduced;
 
 use super::filter::FilterArgs;
 use super::{Failure, Session};
@@ -12,10 +12,12 @@ use nav_sim::ekf::Belief;
 use nav_sim::imu::Sensor;
 use nav_sim::metrics::Summary;
 use nav_sim::monte_carlo;
+use nav_sim::noise::reduction::window_s;
 use nav_sim::report::{Manifest, seconds};
 use nav_sim::scenario::{Method, Scenario};
 use nav_sim::sensors::imu::TruthError;
 use nav_sim::sensors::outage::Outage;
+use nav_sim::simulation::lincov::{Assessment, assess, weak_heading};
 use nav_sim::simulation::{Experiment, ExperimentError, RunResult};
 use std::path::PathBuf;
 use std::time::Instant;
@@ -117,7 +119,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let outages = outages(&scenario, span, seed, session)?;
     output::try_open(&args.out, &inputs.files)?;
     let unusable = |e| Failure::input(format!("{}: {e}", args.model.display()));
-    let belief = scenario.belief(&inputs.model, &outages).map_err(unusable)?;
+    let track = scenario.track(&inputs.trajectory, &inputs.model, &outages).map_err(impossible)?;
+    let belief = scenario.belief(&inputs.model, &outages, &track).map_err(unusable)?;
     doubt_biases(&belief, session);
     scenario.doubts().iter().for_each(|doubt| session.printer.warn(doubt));
     let experiment = scenario.experiment(
@@ -127,7 +130,17 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         &outages,
         seed,
     );
-    let reduction = reduced::reduction(&scenario, &inputs.model, &belief, &experiment, session)?;
+    let reduction = if scenario.filter.states.is_reduced() {
+        let longest = outages.iter().map(|o| o.end_s - o.start_s).fold(0.0, f64::max);
+        let (interval_s, window_s) = (1.0 / scenario.gnss.rate_hz, window_s(longest));
+        let model = &inputs.model;
+        let full = scenario.with_full_noise().belief(model, &outages, &track).ok();
+        let made = reduced::Made { model, belief: &belief, full, track: &track, interval_s, window_s };
+        Some(reduced::reduction(&made, session)?)
+    } else {
+        None
+    };
+    doubt_heading(&assess(&track, &belief, &inputs.model), session);
     let (results, wall_s) = simulate(&experiment, scenario.run.runs, session)?;
     let manifest = manifest(scenario, &outages, seed, inputs.files.clone(), inputs.note.clone(), session);
     let throughput_epochs_per_s = results[0].run_epochs as f64 / wall_s;
@@ -246,6 +259,14 @@ fn doubt_biases(belief: &Belief, session: &Session) {
                 sensor.name()
             ));
         }
+    }
+}
+
+/// Where the motion hardly shows the heading, no filter of this kind is to be believed.
+fn doubt_heading(assessment: &Assessment, session: &Session) {
+    let measured = assessment.reports.iter().filter(|r| r.measured);
+    if let Some(doubt) = weak_heading(measured.map(|r| (r.after_s, r.sigma[8]))) {
+        session.printer.warn(&doubt.to_string());
     }
 }
 

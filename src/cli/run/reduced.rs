@@ -1,45 +1,41 @@
 //! What the reduction of the model to 15 states does: said, stored, and warned of.
 
-use super::impossible;
 use crate::cli::{Failure, Session};
 use nav_sim::ekf::Belief;
-use nav_sim::metrics::{ReductionQuality, ReductionSummary, TOLERANCE};
-use nav_sim::noise::{Model, reduction};
-use nav_sim::scenario::Scenario;
-use nav_sim::simulation::{Experiment, Plan, covariance_pass};
+use nav_sim::metrics::{ReductionQuality, ReductionSummary};
+use nav_sim::noise::Model;
+use nav_sim::simulation::lincov::{Track, assess};
 
-/// The reduction and its quality, found by one covariance pass of the reduced and of the full filter along
-/// the trajectory; none for the full filter.
-pub(super) fn reduction(
-    scenario: &Scenario,
-    model: &Model,
-    belief: &Belief,
-    experiment: &Experiment<'_>,
-    session: &Session,
-) -> Result<Option<ReductionSummary>, Failure> {
-    if !scenario.filter.states.is_reduced() {
-        return Ok(None);
-    }
-    let longest = experiment.outages.iter().map(|o| o.end_s - o.start_s).fold(0.0, f64::max);
-    let (interval_s, window_s) = (1.0 / scenario.gnss.rate_hz, reduction::window_s(longest));
-    let mut summary = ReductionSummary::of(model, interval_s, window_s).map_err(Failure::input)?;
+/// What a filter of 15 states was made for, and what it is assessed along.
+pub(in crate::cli) struct Made<'a> {
+    pub(in crate::cli) model: &'a Model,
+    pub(in crate::cli) belief: &'a Belief,
+    /// The filter with a state for every process, if the model has one.
+    pub(in crate::cli) full: Option<Belief>,
+    pub(in crate::cli) track: &'a Track,
+    /// Time between fixes (s).
+    pub(in crate::cli) interval_s: f64,
+    /// Longest time scale (s).
+    pub(in crate::cli) window_s: f64,
+}
+
+/// The reduction and its quality, the model taken for the truth: one covariance analysis of the reduced and of
+/// the full filter.
+pub(in crate::cli) fn reduction(made: &Made<'_>, session: &Session) -> Result<ReductionSummary, Failure> {
+    let Made { model, belief, track, interval_s, window_s, .. } = *made;
+    let mut summary =
+        ReductionSummary::of(model, belief, interval_s, window_s).map_err(Failure::could_not)?;
     if summary.is_exact() {
-        return Ok(Some(summary));
+        return Ok(summary);
     }
     summary.lines().iter().for_each(|line| session.printer.say(line));
-    let Ok(full) = scenario.with_full_noise().belief(model, experiment.outages) else {
-        session.printer.say("the model has no full filter to compare the reduction with");
-        return Ok(Some(summary));
-    };
-    let plan = Plan::new(experiment).map_err(impossible)?;
-    let quality = ReductionQuality::of(&covariance_pass(&plan, belief), &covariance_pass(&plan, &full));
-    summary.quality = Some(quality);
-    if let Some(worst) = summary.worst_position().filter(|worst| *worst > TOLERANCE) {
-        session.printer.warn(&format!(
-            "the reduction to 15 states is off by {:.0} % in the standard deviation of position at the end of an outage; \
-             --filter full has a state for every process",
-            100.0 * worst
-        ));
+    let full = made.full.as_ref().map(|full| assess(track, full, model));
+    let quality = ReductionQuality::of(&assess(track, belief, model), full.as_ref());
+    session.printer.say(&quality.line());
+    if let Some(doubt) = quality.doubt() {
+        let remedy = if full.is_some() { "; --filter full has a state for every process" } else { "" };
+        session.printer.warn(&format!("{doubt}{remedy}"));
     }
-    Ok(Some(summary))
+    summary.quality = Some(quality);
+    Ok(summary)
 }

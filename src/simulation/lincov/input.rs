@@ -1,0 +1,207 @@
+//! The states that make inertial errors, and what they do over a step of many samples.
+
+use crate::ekf::{Belief, UnknownKind};
+use crate::imu::{Channel, Sensor};
+use crate::noise::{Model, Process};
+
+/// Signals of an IMU, and again each multiplied by its own sample: what a scale factor adds.
+pub(super) const SIGNALS: usize = 12;
+/// The first of the latter.
+pub(super) const SCALED: usize = 6;
+
+/// All kinds of unknowns.
+const UNKNOWNS: [UnknownKind; 2] = [UnknownKind::Drift, UnknownKind::ScaleFactor];
+
+/// A state behind one signal, in the form that every process of the catalogue has at the sample rate:
+/// the error of a sample is `before`·s + `after`·s⁺ + `fresh`·w, and s⁺ = `decay`·s + `drive`·w with w white
+/// of variance 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Source {
+    /// Which signal it is part of.
+    pub(super) signal: usize,
+    before: f64,
+    after: f64,
+    fresh: f64,
+    decay: f64,
+    drive: f64,
+    /// Growth of `after` with every sample: a ramp is its slope times the samples so far.
+    ramp: f64,
+    /// Mean square of s at the start.
+    pub(super) initial: f64,
+}
+
+/// What a source does over a step: the mean of its samples' errors is `mean`·s + w₁, and s⁺ = `decay`·s + w₂.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct StepOfSource {
+    pub(super) signal: usize,
+    pub(super) mean: f64,
+    /// Growth of `mean` with every sample before the step.
+    pub(super) ramp: f64,
+    pub(super) decay: f64,
+    /// Variance of w₁.
+    pub(super) q_mean: f64,
+    /// Covariance of w₁ and w₂.
+    pub(super) q_cross: f64,
+    /// Variance of w₂.
+    pub(super) q_state: f64,
+}
+
+impl Source {
+    fn bias(signal: usize, phi: f64, innovation: f64, initial: f64) -> Self {
+        Self {
+            signal,
+            before: 0.0,
+            after: 1.0,
+            fresh: 0.0,
+            decay: phi,
+            drive: innovation.sqrt(),
+            ramp: 0.0,
+            initial,
+        }
+    }
+
+    /// A state that is nothing but the last innovation of standard deviation `sigma`: the error of a sample
+    /// is `fresh`·w + `before`·(the w of the sample before).
+    fn memory(signal: usize, sigma: f64, fresh: f64, before: f64) -> Self {
+        let (before, fresh) = (before, fresh * sigma);
+        Self {
+            signal,
+            before,
+            after: 0.0,
+            fresh,
+            decay: 0.0,
+            drive: sigma,
+            ramp: 0.0,
+            initial: sigma * sigma,
+        }
+    }
+
+    /// A constant slope, known to nobody: its mean square is what second moments see of it.
+    const fn ramp(signal: usize, slope: f64) -> Self {
+        let (before, fresh, drive) = (0.0, 0.0, 0.0);
+        Self { signal, before, after: 0.0, fresh, decay: 1.0, drive, ramp: 1.0, initial: slope * slope }
+    }
+
+    /// Over `samples` samples, exactly.
+    pub(super) fn over(&self, samples: u32) -> StepOfSource {
+        let n = f64::from(samples);
+        let mut step = StepOfSource {
+            signal: self.signal,
+            mean: 0.0,
+            ramp: self.ramp,
+            decay: 1.0,
+            q_mean: 0.0,
+            q_cross: 0.0,
+            q_state: 0.0,
+        };
+        // backwards: what a unit of s before the remaining samples adds to their sum, and leaves of itself
+        for _ in 0..samples {
+            let in_sum = self.fresh + self.drive * (self.after + step.mean);
+            let in_state = self.drive * step.decay;
+            step.q_mean += in_sum * in_sum;
+            step.q_cross += in_sum * in_state;
+            step.q_state += in_state * in_state;
+            step.mean = self.before + self.decay * (self.after + step.mean);
+            step.decay *= self.decay;
+        }
+        step.mean = step.mean / n + self.ramp * 0.5 * (n + 1.0);
+        step.q_mean /= n * n;
+        step.q_cross /= n;
+        step
+    }
+
+    /// Coefficient of the error that is there at an instant: biases count, noise of single samples does not.
+    pub(super) const fn present(&self) -> f64 {
+        self.after
+    }
+
+    /// Without what drives it: a filter's estimate of the state, which starts at zero.
+    pub(super) const fn estimate(&self) -> Self {
+        Self { drive: 0.0, fresh: 0.0, initial: 0.0, ..*self }
+    }
+}
+
+/// The errors of an IMU: sources, and white noise of a sample on each signal.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Sources {
+    pub(super) states: Vec<Source>,
+    pub(super) white: [f64; SIGNALS],
+}
+
+impl Sources {
+    /// Those a filter believes in: one for each bias state.
+    pub(super) fn of_belief(belief: &Belief) -> Self {
+        let mut states = Vec::new();
+        for sensor in Sensor::ALL {
+            for group in &belief.groups[sensor as usize] {
+                for axis in 0..3 {
+                    let absent = group.initial[axis] == 0.0 && group.innovation[axis] == 0.0;
+                    let signal = 3 * sensor as usize + axis;
+                    let (phi, q) = (group.phi[axis], group.innovation[axis]);
+                    states.extend((!absent).then(|| Source::bias(signal, phi, q, group.initial[axis])));
+                }
+            }
+        }
+        let [accel, gyro] = belief.white.map(|w| w.to_array());
+        let mut white = [0.0; SIGNALS];
+        white[..3].copy_from_slice(&accel);
+        white[3..SCALED].copy_from_slice(&gyro);
+        states.extend(Self::multiplied(belief, &UNKNOWNS));
+        Self { states, white }
+    }
+
+    /// Unknown constants of a belief that are multiplied.
+    fn multiplied(belief: &Belief, kinds: &[UnknownKind]) -> Vec<Source> {
+        let mut states = Vec::new();
+        for (sensor, axis) in Sensor::ALL.into_iter().flat_map(|s| (0..3).map(move |i| (s, i))) {
+            let signal = 3 * sensor as usize + axis;
+            for unknown in belief.unknowns(sensor).iter().filter(|u| kinds.contains(&u.kind)) {
+                let sigma = unknown.sigma[axis];
+                states.extend((sigma > 0.0).then(|| match unknown.kind {
+                    UnknownKind::Drift => Source::ramp(signal, sigma),
+                    UnknownKind::ScaleFactor => Source::bias(SCALED + signal, 1.0, 0.0, sigma * sigma),
+                }));
+            }
+        }
+        states
+    }
+
+    /// What a belief expects beside its noise model, as it expects it: turn-on biases and scale factors.
+    pub(super) fn beside_model(belief: &Belief) -> Vec<Source> {
+        let mut states = Self::multiplied(belief, &[UnknownKind::ScaleFactor]);
+        for sensor in Sensor::ALL {
+            for group in belief.groups[sensor as usize].iter().filter(|g| g.is_constant()) {
+                let constant = |axis| Source::bias(3 * sensor as usize + axis, 1.0, 0.0, group.initial[axis]);
+                states.extend((0..3).map(constant).filter(|s| s.initial > 0.0));
+            }
+        }
+        states
+    }
+
+    /// Those of a noise model, each process exactly.
+    pub(super) fn of_model(model: &Model) -> Self {
+        let mut sources = Self { states: Vec::new(), white: [0.0; SIGNALS] };
+        for channel in Channel::ALL {
+            for process in &model.axis(channel).processes {
+                sources.add(channel.index(), process);
+            }
+        }
+        sources
+    }
+
+    fn add(&mut self, signal: usize, process: &Process) {
+        let state = match process {
+            Process::White(p) => {
+                self.white[signal] += p.sigma2();
+                return;
+            }
+            Process::Quantization(p) => Source::memory(signal, p.q2().sqrt(), 1.0, -1.0),
+            Process::Ma1(p) => Source::memory(signal, p.sigma2().sqrt(), 1.0, p.theta()),
+            Process::Ar1(p) => Source::bias(signal, p.phi(), p.sigma2(), p.variance()),
+            Process::GaussMarkov(p) => Source::bias(signal, p.ar1().phi(), p.ar1().sigma2(), p.s2()),
+            Process::RandomWalk(p) => Source::bias(signal, 1.0, p.gamma2(), 0.0),
+            Process::Drift(p) => Source::ramp(signal, p.slope()),
+        };
+        self.states.push(state);
+    }
+}

@@ -1,0 +1,238 @@
+//! The covariance of \[navigation error; bias estimates\] and its correlation with the states of the truth.
+
+use super::input::{SCALED, SIGNALS, Sources, StepOfSource};
+use super::track::{NAV, Nav, Row, Step};
+
+/// Covariance of z = \[x; b\] jointly with states t that no measurement corrects.
+///
+/// For the filter's own covariance b are its biases' errors and there is no t. For the true one b are its
+/// estimates, which nothing drives but the corrections, and t are the negated states of the true IMU: the
+/// error of a bias is estimate less truth, so both enter the navigation error alike. States t are independent
+/// of one another and stay so.
+#[derive(Debug, Clone)]
+pub(super) struct Joint {
+    pub(super) xx: [Nav; NAV],
+    xb: Vec<Nav>,
+    /// Row-major.
+    bb: Vec<f64>,
+    xt: Vec<Nav>,
+    /// A row for each b.
+    bt: Vec<f64>,
+    tt: Vec<f64>,
+    /// Samples so far.
+    elapsed: f64,
+    present_b: Vec<(usize, f64)>,
+    present_t: Vec<(usize, f64)>,
+}
+
+/// What sources do over steps of one length.
+#[derive(Debug, Clone)]
+pub(super) struct Inputs {
+    b: Vec<StepOfSource>,
+    t: Vec<StepOfSource>,
+    /// Variance of the mean over the step, all that is new in it.
+    q_mean: [f64; SIGNALS],
+}
+
+impl Inputs {
+    /// `b` in the filter's hands, `t` in the world's; `white` of the side that makes the errors.
+    pub(super) fn new(b: &Sources, t: &Sources, samples: u32) -> Self {
+        let over = |s: &Sources| -> Vec<StepOfSource> { s.states.iter().map(|x| x.over(samples)).collect() };
+        let (bs, ts) = (over(b), over(t));
+        let mut q_mean: [f64; SIGNALS] =
+            std::array::from_fn(|i| (b.white[i] + t.white[i]) / f64::from(samples));
+        for source in bs.iter().chain(&ts) {
+            q_mean[source.signal] += source.q_mean;
+        }
+        Self { b: bs, t: ts, q_mean }
+    }
+}
+
+impl Joint {
+    pub(super) fn new(xx: [Nav; NAV], b: &Sources, t: &Sources) -> Self {
+        let (nb, nt) = (b.states.len(), t.states.len());
+        let mut bb = vec![0.0; nb * nb];
+        for (i, source) in b.states.iter().enumerate() {
+            bb[i * nb + i] = source.initial;
+        }
+        let present = |s: &Sources| s.states.iter().map(|x| (x.signal, x.present())).collect();
+        Self {
+            xx,
+            xb: vec![[0.0; NAV]; nb],
+            bb,
+            xt: vec![[0.0; NAV]; nt],
+            bt: vec![0.0; nb * nt],
+            tt: t.states.iter().map(|s| s.initial).collect(),
+            elapsed: 0.0,
+            present_b: present(b),
+            present_t: present(t),
+        }
+    }
+
+    /// Over one step: A P Aᵀ + Q in blocks.
+    pub(super) fn step(&mut self, step: &Step, inputs: &Inputs) {
+        let (nb, nt) = (inputs.b.len(), inputs.t.len());
+        let elapsed = self.elapsed;
+        let mean = |s: &StepOfSource| s.mean + s.ramp * elapsed;
+        // A P, rows of x. Column by column: M times the column's x part, B times the means of its biases.
+        let mut gx = [[0.0; NAV]; NAV];
+        for j in 0..NAV {
+            let mut u = [0.0; SIGNALS];
+            inputs.b.iter().zip(&self.xb).for_each(|(s, x)| u[s.signal] += mean(s) * x[j]);
+            inputs.t.iter().zip(&self.xt).for_each(|(s, x)| u[s.signal] += mean(s) * x[j]);
+            gx[j] = step.map(&self.xx[j], &u);
+        }
+        for j in 0..nb {
+            let mut u = [0.0; SIGNALS];
+            inputs.b.iter().zip(&self.bb[j * nb..]).for_each(|(s, p)| u[s.signal] += mean(s) * p);
+            inputs.t.iter().zip(&self.bt[j * nt..]).for_each(|(s, p)| u[s.signal] += mean(s) * p);
+            self.xb[j] = step.map(&self.xb[j], &u);
+        }
+        for j in 0..nt {
+            let mut u = [0.0; SIGNALS];
+            inputs.b.iter().enumerate().for_each(|(i, s)| u[s.signal] += mean(s) * self.bt[i * nt + j]);
+            u[inputs.t[j].signal] += mean(&inputs.t[j]) * self.tt[j];
+            self.xt[j] = step.map(&self.xt[j], &u);
+        }
+        // (A P) Aᵀ: the same map on the rows of A P.
+        for i in 0..NAV {
+            let row: Nav = std::array::from_fn(|j| gx[j][i]);
+            let mut u = [0.0; SIGNALS];
+            inputs.b.iter().zip(&self.xb).for_each(|(s, x)| u[s.signal] += mean(s) * x[i]);
+            inputs.t.iter().zip(&self.xt).for_each(|(s, x)| u[s.signal] += mean(s) * x[i]);
+            self.xx[i] = step.map(&row, &u);
+        }
+        self.step_biases(step, inputs);
+        self.elapsed += f64::from(step.samples);
+        for (q, column) in inputs.q_mean.iter().zip(&step.b) {
+            for j in 0..NAV {
+                add_scaled(&mut self.xx[j], q * column[j], column);
+            }
+        }
+    }
+
+    fn step_biases(&mut self, step: &Step, inputs: &Inputs) {
+        let (nb, nt) = (inputs.b.len(), inputs.t.len());
+        let decay = |x: &mut Nav, s: &StepOfSource| {
+            x.iter_mut().for_each(|v| *v *= s.decay);
+            add_scaled(x, s.q_cross, &step.b[s.signal]);
+        };
+        self.xb.iter_mut().zip(&inputs.b).for_each(|(x, s)| decay(x, s));
+        self.xt.iter_mut().zip(&inputs.t).for_each(|(x, s)| decay(x, s));
+        for (i, s) in inputs.b.iter().enumerate() {
+            let (bb, bt) = (&mut self.bb[i * nb..(i + 1) * nb], &mut self.bt[i * nt..(i + 1) * nt]);
+            bb.iter_mut().zip(&inputs.b).for_each(|(p, other)| *p *= s.decay * other.decay);
+            bt.iter_mut().zip(&inputs.t).for_each(|(p, other)| *p *= s.decay * other.decay);
+            bb[i] += s.q_state;
+        }
+        for (p, s) in self.tt.iter_mut().zip(&inputs.t) {
+            *p = *p * s.decay * s.decay + s.q_state;
+        }
+    }
+
+    /// Covariance of z with what a row measures, and of t with it; the variance of that with its noise.
+    pub(super) fn innovation(&self, row: &Row) -> Innovation {
+        let (nb, nt) = (self.xb.len(), self.xt.len());
+        let mut x = [0.0; NAV];
+        for (column, h) in self.xx.iter().zip(&row.h) {
+            add_scaled(&mut x, *h, column);
+        }
+        let along = |x: &Nav| -> f64 { x.iter().zip(&row.h).map(|(a, h)| a * h).sum() };
+        let mut b: Vec<f64> = self.xb.iter().map(along).collect();
+        let mut t: Vec<f64> = self.xt.iter().map(along).collect();
+        let mut s = row.r;
+        // only a velocity on a lever arm feels the gyroscope's bias
+        if row.h[NAV..].iter().any(|h| *h != 0.0) {
+            let gyro = |signal: usize, present: f64| match signal % SCALED {
+                0..3 => 0.0,
+                axis => present * row.h[NAV + signal / SCALED * 3 + axis - 3],
+            };
+            let hb: Vec<f64> = self.present_b.iter().map(|(s, p)| gyro(*s, *p)).collect();
+            let ht: Vec<f64> = self.present_t.iter().map(|(s, p)| gyro(*s, *p)).collect();
+            for (j, h) in hb.iter().enumerate() {
+                add_scaled(&mut x, *h, &self.xb[j]);
+                (0..nb).for_each(|i| b[i] += h * self.bb[i * nb + j]);
+                (0..nt).for_each(|i| t[i] += h * self.bt[j * nt + i]);
+            }
+            for (j, h) in ht.iter().enumerate() {
+                add_scaled(&mut x, *h, &self.xt[j]);
+                (0..nb).for_each(|i| b[i] += h * self.bt[i * nt + j]);
+                t[j] += h * self.tt[j];
+            }
+            let dot = |h: &[f64], c: &[f64]| -> f64 { h.iter().zip(c).map(|(h, c)| h * c).sum() };
+            s += dot(&hb, &b) + dot(&ht, &t);
+        }
+        s += along(&x);
+        Innovation { x, b, t, s }
+    }
+
+    /// z ← z − k y for an innovation y; the gain belongs to a filter that need not be right.
+    pub(super) fn correct(&mut self, y: &Innovation, gain: &Gain) {
+        let (nb, nt) = (self.xb.len(), self.xt.len());
+        // P − k cᵀ − c kᵀ + k s kᵀ, by (s k − c) kᵀ − k cᵀ
+        let rest_x: Nav = std::array::from_fn(|i| y.s * gain.x[i] - y.x[i]);
+        for j in 0..NAV {
+            add_scaled(&mut self.xx[j], gain.x[j], &rest_x);
+            add_scaled(&mut self.xx[j], -y.x[j], &gain.x);
+        }
+        for j in 0..nb {
+            add_scaled(&mut self.xb[j], gain.b[j], &rest_x);
+            add_scaled(&mut self.xb[j], -y.b[j], &gain.x);
+            let rest = y.s * gain.b[j] - y.b[j];
+            for i in 0..nb {
+                self.bb[j * nb + i] += rest * gain.b[i] - gain.b[j] * y.b[i];
+            }
+            for i in 0..nt {
+                self.bt[j * nt + i] -= gain.b[j] * y.t[i];
+            }
+        }
+        for j in 0..nt {
+            add_scaled(&mut self.xt[j], -y.t[j], &gain.x);
+        }
+    }
+}
+
+/// Covariances with an innovation, and its variance.
+#[derive(Debug, Clone)]
+pub(super) struct Innovation {
+    x: Nav,
+    b: Vec<f64>,
+    t: Vec<f64>,
+    s: f64,
+}
+
+impl Innovation {
+    /// The gain that is best where the covariance is right.
+    pub(super) fn gain(&self) -> Gain {
+        Gain { x: self.x.map(|c| c / self.s), b: self.b.iter().map(|c| c / self.s).collect() }
+    }
+}
+
+/// A filter's gain.
+#[derive(Debug, Clone)]
+pub(super) struct Gain {
+    x: Nav,
+    b: Vec<f64>,
+}
+
+impl Step {
+    #[inline]
+    pub(super) fn map(&self, x: &Nav, e: &[f64; SIGNALS]) -> Nav {
+        let mut out = [0.0; NAV];
+        for (column, x) in self.m.iter().zip(x) {
+            add_scaled(&mut out, *x, column);
+        }
+        // most filters have no scale factors
+        for (column, e) in self.b.iter().zip(e).filter(|(_, e)| **e != 0.0) {
+            add_scaled(&mut out, *e, column);
+        }
+        out
+    }
+}
+
+#[inline]
+fn add_scaled(to: &mut Nav, factor: f64, x: &Nav) {
+    for (to, x) in to.iter_mut().zip(x) {
+        *to += factor * x;
+    }
+}

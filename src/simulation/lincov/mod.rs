@@ -1,0 +1,22 @@
+//! Linear covariance analysis: what a filter believes of its errors, and what they are, without a random
+//! number.
+//!
+//! A filter's gains do not depend on what is drawn, but for the small part in which it is linearised about
+//! its estimate. One pass along the reference therefore gives its own covariance, and beside it the covariance
+//! of the *true* error under the same gains: that of \[navigation error; the filter's bias estimates\] jointly
+//! with the states of whatever makes the inertial errors ([Maybeck](crate::bibliography::Maybeck79), sec. 6.8).
+//!
+//! The trajectory is reduced once to a [`Track`]: exact maps of the navigation error over steps of a fraction
+//! of a second. Any number of beliefs and truths are then assessed along it, in milliseconds each.
+
+mod heading;
+mod input;
+mod joint;
+mod pass;
+mod reduce;
+mod track;
+
+pub use heading::{HeadingDoubt, weak_heading};
+pub use pass::{Assessment, Consistency, assess};
+pub use reduce::{drive, reduced_belief};
+pub use track::Track;

@@ -1,0 +1,237 @@
+//! A trajectory as a linear filter sees it: maps of the navigation error, and when it is measured.
+
+use super::super::plan::{Event, Experiment, ExperimentError, Plan};
+use super::input::{SCALED, SIGNALS};
+use crate::ekf::covariance::{PSI, R, V};
+use crate::ekf::dynamics::{EARTH_STEP_S, EarthStep, EarthTerms, ErrorMap, NavError, Sample};
+use crate::ekf::fix_rows;
+use crate::ekf::initial::psi_of_angles;
+use crate::frames::RollPitchYaw;
+use crate::imu::ImuSample;
+use crate::lanes::Vec3;
+use crate::strapdown::Strapdown;
+use crate::units::DEG;
+use glam::DVec3;
+
+/// Navigation states: R, V, PSI.
+pub(super) const NAV: usize = 9;
+/// A navigation error, or a column of nine.
+pub(super) type Nav = [f64; NAV];
+
+/// Longest step (s): a bias is represented by its mean over the step.
+pub(super) const STEP_S: f64 = 0.2;
+
+/// What happens to the navigation error over a step: x⁺ = `m` x + `b` e, e the errors of the biases (estimate
+/// less truth) of the signals, their means over the step. Columns.
+#[derive(Debug, Clone)]
+pub(super) struct Step {
+    pub(super) samples: u32,
+    pub(super) m: [Nav; NAV],
+    pub(super) b: [Nav; SIGNALS],
+}
+
+/// A scalar measurement: nine coefficients of the navigation error, three of the gyroscope's bias error, three of
+/// its scale factors.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Row {
+    pub(super) h: [f64; NAV + 6],
+    /// Variance of its noise.
+    pub(super) r: f64,
+}
+
+/// An instant between steps.
+#[derive(Debug, Clone)]
+pub(super) struct Mark {
+    /// Steps from the start until here.
+    pub(super) steps: usize,
+    /// Time from the start (s).
+    pub(super) after_s: f64,
+    /// Scalar measurements, in sequence.
+    pub(super) rows: Vec<Row>,
+    pub(super) report: bool,
+    /// Outages that end here, before the measurements.
+    pub(super) outages: Vec<usize>,
+    /// Roll, pitch, yaw errors (rad) from `psi_n` (rad), at the true attitude.
+    pub(super) jacobian: [DVec3; 3],
+}
+
+/// A trajectory with its fixes, ready for any number of passes.
+#[derive(Debug, Clone)]
+pub struct Track {
+    pub(super) steps: Vec<Step>,
+    pub(super) marks: Vec<Mark>,
+    pub(super) outages: usize,
+    /// Covariance of the navigation error at the start, as the filter believes.
+    pub(super) start: [Nav; NAV],
+    /// Whether it truly starts without error.
+    pub(super) perfect: bool,
+}
+
+impl Track {
+    /// Linearises along the reference of an experiment. Of its truth, beliefs and random numbers it takes nothing;
+    /// the models that are assessed along it must belong to its rate.
+    ///
+    /// # Errors
+    /// When trajectory, rates and fixes do not fit together.
+    pub fn along(experiment: &Experiment<'_>) -> Result<Self, ExperimentError> {
+        Self::of_noise_at(experiment.rate_hz, experiment)
+    }
+
+    /// For models of another rate than that at which the motion is sampled (Hz).
+    pub(super) fn of_noise_at(noise_hz: f64, experiment: &Experiment<'_>) -> Result<Self, ExperimentError> {
+        let plan = &Plan::reference(experiment)?;
+        let mut line = Linearisation::new(plan, noise_hz);
+        let longest = ((STEP_S * experiment.rate_hz).round() as usize).max(1);
+        let (mut steps, mut marks, mut done) = (Vec::new(), Vec::with_capacity(plan.events.len()), 0);
+        for (index, event) in plan.events.iter().enumerate() {
+            let samples = &plan.ideal[done..event.sample];
+            let parts = samples.len().div_ceil(longest).max(1);
+            for part in samples.chunks(samples.len().div_ceil(parts).max(1)) {
+                steps.push(line.step(part));
+            }
+            done = event.sample;
+            let ends = |(_, (_, at)): &(usize, &(f64, usize))| *at == index;
+            marks.push(Mark {
+                steps: steps.len(),
+                after_s: event.sample as f64 / experiment.rate_hz,
+                rows: line.rows(plan, event),
+                report: event.report,
+                outages: plan.outages.iter().enumerate().filter(ends).map(|(i, _)| i).collect(),
+                jacobian: RollPitchYaw::from_quat(event.reference.q_b_n).jacobian_of_psi_n(),
+            });
+        }
+        let (outages, perfect) = (plan.outages.len(), experiment.initial.perfect);
+        Ok(Self { steps, marks, outages, start: start(plan), perfect })
+    }
+
+    /// The same with one step from mark to mark, at most a second, and a report every ten: a few times faster,
+    /// and within 1e-3 in every ratio.
+    pub(super) fn coarse(&self) -> Self {
+        let (mut steps, mut marks, mut done) = (Vec::new(), self.marks.clone(), 0);
+        let mut reports = 0;
+        for mark in &mut marks {
+            steps.extend(self.steps[done..mark.steps].iter().cloned().reduce(|a, b| a.then(&b)));
+            (done, mark.steps) = (mark.steps, steps.len());
+            reports += usize::from(mark.report);
+            mark.report &= reports % 10 == 0;
+        }
+        Self { steps, marks, ..self.clone() }
+    }
+}
+
+/// The reference as the strapdown passes through it.
+struct Linearisation {
+    ins: Strapdown<f64>,
+    omega_ib_b: DVec3,
+    dt: f64,
+    noise_hz: f64,
+}
+
+impl Linearisation {
+    fn new(plan: &Plan<'_>, noise_hz: f64) -> Self {
+        let experiment = plan.experiment;
+        let ins = Strapdown::single(&plan.start, experiment.gravity);
+        Self { ins, omega_ib_b: DVec3::ZERO, dt: 1.0 / experiment.rate_hz, noise_hz }
+    }
+
+    /// The maps of the samples one after the other, the Earth's as the filter applies them.
+    fn step(&mut self, samples: &[ImuSample]) -> Step {
+        let unit = |i: usize| std::array::from_fn(|k| if i == k { 1.0 } else { 0.0 });
+        let mut step = Step {
+            samples: (samples.len() as f64 * self.dt * self.noise_hz).round().max(1.0) as u32,
+            m: std::array::from_fn(unit),
+            b: [[0.0; NAV]; SIGNALS],
+        };
+        let mut age = 0.0;
+        for sample in samples {
+            self.omega_ib_b = sample.omega_ib_b;
+            let (dtheta, dv) = (sample.omega_ib_b * self.dt, sample.f_ib_b * self.dt);
+            let trace = self.ins.step(Vec3::splat(dtheta), Vec3::splat(dv), self.dt);
+            step.apply(&Sample::new(&trace, self.dt), sample);
+            age += self.dt;
+            if age + 0.5 * self.dt > EARTH_STEP_S {
+                step.apply(&EarthStep { terms: EarthTerms::at(&self.ins), dt: age }, sample);
+                age = 0.0;
+            }
+        }
+        if let Some(sample) = samples.last().filter(|_| age > 0.0) {
+            step.apply(&EarthStep { terms: EarthTerms::at(&self.ins), dt: age }, sample);
+        }
+        step
+    }
+
+    fn rows(&self, plan: &Plan<'_>, event: &Event) -> Vec<Row> {
+        let experiment = plan.experiment;
+        let mut rows = Vec::new();
+        if event.fix {
+            let gnss = experiment.gnss;
+            let h = fix_rows(&self.ins, self.omega_ib_b, gnss.lever_arm_m.into());
+            let sigmas = gnss.pos_sigma_m.into_iter().chain(gnss.vel_sigma_m_s.into_iter().flatten());
+            let row = |(h, sigma): ([f64; NAV + 3], f64)| Row {
+                h: std::array::from_fn(|i| match i.checked_sub(NAV + 3) {
+                    Some(axis) => h[NAV + axis] * self.omega_ib_b[axis],
+                    None => h[i],
+                }),
+                r: sigma * sigma,
+            };
+            rows.extend(h.into_iter().zip(sigmas).map(row));
+        }
+        if let Some(baro) = experiment.baro.filter(|_| event.baro) {
+            let mut h = [0.0; NAV + 6];
+            h[3 * R + 2] = 1.0;
+            rows.push(Row { h, r: baro.sigma_m * baro.sigma_m });
+        }
+        rows
+    }
+}
+
+impl Step {
+    /// This step and then another, as one.
+    fn then(self, next: &Self) -> Self {
+        let none = [0.0; SIGNALS];
+        let mut b = self.b.map(|column| next.map(&column, &none));
+        for (sum, column) in b.iter_mut().flatten().zip(next.b.iter().flatten()) {
+            *sum += column;
+        }
+        Self { samples: self.samples + next.samples, m: self.m.map(|column| next.map(&column, &none)), b }
+    }
+
+    /// The map of a sample after this one, or of the Earth, which feels no sample.
+    fn apply(&mut self, map: &impl ErrorMap<f64>, sample: &ImuSample) {
+        let zero = Vec3([0.0; 3]);
+        for column in &mut self.m {
+            *column = flat(&map.apply(triples(column), zero, zero));
+        }
+        for (signal, column) in self.b.iter_mut().enumerate() {
+            let (sensor, axis) = (signal % SCALED / 3, signal % 3);
+            let measured = [sample.f_ib_b, sample.omega_ib_b][sensor][axis];
+            let mut input = [zero, zero];
+            input[sensor].0[axis] = if signal < SCALED { 1.0 } else { measured };
+            *column = flat(&map.apply(triples(column), input[0], input[1]));
+        }
+    }
+}
+
+fn triples(x: &Nav) -> NavError<f64> {
+    [R, V, PSI].map(|block| Vec3([x[3 * block], x[3 * block + 1], x[3 * block + 2]]))
+}
+
+fn flat(x: &NavError<f64>) -> Nav {
+    std::array::from_fn(|i| x[i / 3][i % 3])
+}
+
+/// Covariance of the navigation error for the standard deviations of the start.
+fn start(plan: &Plan<'_>) -> [Nav; NAV] {
+    let initial = plan.experiment.initial;
+    let psi = psi_of_angles(plan.start.q_b_n);
+    let mut p = [[0.0; NAV]; NAV];
+    for i in 0..3 {
+        p[3 * R + i][3 * R + i] = initial.pos_sigma_m[i].powi(2);
+        p[3 * V + i][3 * V + i] = initial.vel_sigma_m_s[i].powi(2);
+        for j in 0..3 {
+            let angle = |k: usize| psi[(i, k)] * psi[(j, k)] * (initial.att_sigma_deg[k] * DEG).powi(2);
+            p[3 * PSI + i][3 * PSI + j] = (0..3).map(angle).sum();
+        }
+    }
+    p
+}
