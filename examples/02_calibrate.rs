@@ -24,7 +24,14 @@ fn replicate(k: u64, tuning: &Tuning) -> Result<Replicate, Box<dyn std::error::E
     let mut signal = vec![0.0; SAMPLES];
     Synthesizer::new(&noise, key).fill(&mut signal);
     let (classical, robust) = both(&signal, LEVELS, tuning)?;
-    Ok(Replicate { name: format!("replicate {}", k + 1), axis: None, samples: SAMPLES, classical, robust })
+    Ok(Replicate {
+        name: format!("replicate {}", k + 1),
+        axis: None,
+        samples: SAMPLES,
+        classical,
+        robust,
+        trend: f64::NAN,
+    })
 }
 
 pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {

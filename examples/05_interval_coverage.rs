@@ -30,7 +30,10 @@ fn set(design: &Design, set: u64, draws: usize) -> Result<Vec<Outcome>, Failure>
         Synthesizer::new(drawn.axis(design.channel), key).fill(&mut signal);
         let (classical, robust) = both(&signal, design.levels, &design.tuning)?;
         let (name, axis) = (run.to_string(), Some(design.channel.axis));
-        measured.push((design.channel, Replicate { name, axis, samples: design.samples, classical, robust }));
+        measured.push((
+            design.channel,
+            Replicate { name, axis, samples: design.samples, classical, robust, trend: f64::NAN },
+        ));
     }
     let settings = Settings {
         estimators: design.estimators.clone(),

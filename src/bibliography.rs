@@ -52,6 +52,9 @@ sources! {
     BestRoberts75;
     /// A. C. Davison, D. V. Hinkley: *Bootstrap Methods and their Application*, Cambridge University Press, 1997.
     DavisonHinkley97;
+    /// R. B. Davies: *Hypothesis testing when a nuisance parameter is present only under the alternative*, Biometrika 64,
+    /// 1977.
+    Davies77;
     /// J. A. Doornik: *An improved ziggurat method to generate normal random samples*, Nuffield College,
     /// Oxford, 2005.
     Doornik05;

@@ -307,7 +307,7 @@ fn parameters_can_be_fixed_and_bounded() {
     assert!(processes[0].get("sigma2_ci95").is_none(), "nothing is estimated of it");
     assert_eq!(processes[1]["phi"].to_string(), "0.9");
     let notes = out["fits"][0]["notes"].to_string();
-    assert!(notes.contains("AR1 phi = 0.9 is its bound, as given"), "{notes}");
+    assert!(notes.contains("AR1 phi = 0.9 is at the bound you gave"), "{notes}");
     assert!(!notes.contains("sigma2 ="), "{notes}");
     let scales = out["fits"][0]["scales"].as_u64().unwrap();
     assert_eq!(
@@ -517,4 +517,89 @@ fn what_is_skipped_counts_in_the_advice() {
         let seconds = advised(skip);
         assert!((50.0..=85.0).contains(&seconds), "after {skip}: {seconds}");
     }
+}
+
+/// The parameters file with its hash and every limit, how the recordings were read, and the curves' hash are in the
+/// model file; a file that was read from a pipe is hashed as it was read.
+#[test]
+fn a_model_says_what_it_was_made_with() {
+    let dir = tempfile::tempdir().unwrap();
+    recordings(dir.path(), 2);
+    let known = "[WN]\nsigma2 = { fix = 1e-4 }\n[gyro.AR1]\nphi = { lower = 0.5, upper = 0.99 }\n";
+    std::fs::write(dir.path().join("known.toml"), known).unwrap();
+    let model = |parameters: &str| -> toml::Table {
+        let command = format!(
+            "{} calibrate runs --model N1 --bootstrap 0 --parameters {parameters} --skip-s 1.5 --gaps ignore --axes \
+             gyro --scales 9 --pool sensor -o m.toml",
+            env!("CARGO_BIN_EXE_nav-sim")
+        );
+        let shell =
+            std::process::Command::new("bash").arg("-c").arg(command).current_dir(dir.path()).output();
+        let shell = shell.unwrap();
+        assert!(shell.status.success(), "{}", String::from_utf8_lossy(&shell.stderr));
+        let text = std::fs::read_to_string(dir.path().join("m.toml")).unwrap();
+        text.parse::<toml::Table>().unwrap()["provenance"].as_table().unwrap().clone()
+    };
+    for parameters in ["known.toml", "<(cat known.toml)"] {
+        let provenance = model(parameters);
+        assert_eq!(provenance["skip_s"].as_float(), Some(1.5));
+        assert_eq!(
+            (provenance["gaps"].as_str(), provenance["pool"].as_str()),
+            (Some("ignore"), Some("sensor"))
+        );
+        assert_eq!(
+            (provenance["scales"].as_integer(), provenance["weighting"].as_str()),
+            (Some(9), Some("edof"))
+        );
+        assert_eq!(provenance["axes"].as_array().unwrap().len(), 3);
+        let limits = provenance["limits"].as_array().unwrap();
+        assert_eq!((limits[0]["signals"].as_str(), limits[0]["fix"].as_float()), (Some("all"), Some(1e-4)));
+        assert_eq!(
+            (limits[1]["signals"].as_str(), limits[1]["upper"].as_float()),
+            (Some("gyro"), Some(0.99))
+        );
+        let inputs = provenance["inputs"].as_array().unwrap();
+        let own = inputs.iter().find(|i| i["role"].as_str() == Some("parameters")).unwrap();
+        assert_eq!(own["blake3"].as_str(), Some(blake3::hash(known.as_bytes()).to_hex().as_str()));
+        let curves = std::fs::read(dir.path().join("m.wv.json")).unwrap();
+        assert_eq!(provenance["curves_blake3"].as_str(), Some(blake3::hash(&curves).to_hex().as_str()));
+    }
+}
+
+/// Without a name the output is model.toml: one that no calibration wrote stays as it is.
+#[test]
+fn a_model_of_the_default_name_replaces_only_its_own_kind() {
+    let dir = tempfile::tempdir().unwrap();
+    recordings(dir.path(), 1);
+    let calibrate = ["calibrate", "runs", "--model", "WN+RW", "--bootstrap", "0"];
+    for _ in 0..2 {
+        nav_sim(dir.path()).args(calibrate).assert().success();
+    }
+    let own = "schema = 1\nrate_hz = 50.0\n[gyro]\nprocesses = [{ type = \"WN\", sigma2 = 1.0 }]\n";
+    std::fs::write(dir.path().join("model.toml"), own).unwrap();
+    let said = refusal(dir.path(), &calibrate, 2);
+    assert!(said.contains("model.toml is not a model that nav-sim calibrate wrote"), "{said}");
+    assert_eq!(std::fs::read_to_string(dir.path().join("model.toml")).unwrap(), own);
+}
+
+/// One screen: the verdict on the recordings first, then the test of the model, and no more than twenty lines for both sensors.
+#[test]
+fn what_is_printed_fits_a_screen() {
+    let dir = tempfile::tempdir().unwrap();
+    recordings(dir.path(), 4);
+    let lines = |more: &[&str]| {
+        let arguments =
+            ["calibrate", "runs", "--bootstrap", "19", "--no-progress", "--seed", "1", "-o", "m.toml"];
+        let output = nav_sim(dir.path()).args(arguments).args(more).assert().success();
+        let output = output.get_output();
+        let all = [&output.stdout, &output.stderr].map(|t| String::from_utf8(t.clone()).unwrap());
+        (all[0].lines().count() + all[1].lines().count(), all[0].clone())
+    };
+    let (count, text) = lines(&[]);
+    assert!(count <= 20, "{count} lines: {text}");
+    let first = text.lines().next().unwrap();
+    assert!(first.contains("recordings agree") || first.contains("recordings hold"), "{text}");
+    assert!(text.contains("J-test p = "), "{text}");
+    assert!(lines(&["--verbose"]).0 > count);
+    assert!(lines(&["--estimator", "all"]).0 <= 20);
 }

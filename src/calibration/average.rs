@@ -89,6 +89,8 @@ pub struct Replicate {
     pub classical: Vec<f64>,
     /// Robust wavelet variance at the same levels.
     pub robust: Vec<RobustVariance>,
+    /// Mean of its later half less that of its earlier half (units): what a slow drift moves most. NaN where not known.
+    pub trend: f64,
 }
 
 impl Replicate {
@@ -201,7 +203,8 @@ mod tests {
 
     fn replicate(samples: usize, classical: f64, robust: f64) -> Replicate {
         let robust = vec![RobustVariance { value: robust, status: Status::Ok }; 2];
-        Replicate { name: String::new(), axis: None, samples, classical: vec![classical; 2], robust }
+        let (name, classical) = (String::new(), vec![classical; 2]);
+        Replicate { name, axis: None, samples, classical, robust, trend: f64::NAN }
     }
 
     fn eight() -> Vec<Replicate> {

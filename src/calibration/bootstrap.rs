@@ -27,7 +27,7 @@ const LARGEST_BIAS: f64 = 0.2;
 pub(super) struct CurveSampler<'a> {
     replicates: &'a [Replicate],
     outcome: &'a Outcome,
-    law: SamplingLaw,
+    pub(super) law: SamplingLaw,
     /// Of replicates; none for a curve from elsewhere.
     pub(super) spread: Option<Spread>,
     /// The curve that the model implies.
@@ -145,5 +145,12 @@ impl<'a> CurveSampler<'a> {
 /// A replicate of the same length with other variances.
 pub(super) fn like(replicate: &Replicate, nu: Vec<f64>) -> Replicate {
     let robust = nu.iter().map(|value| RobustVariance { value: *value, status: Status::Ok }).collect();
-    Replicate { name: String::new(), axis: replicate.axis, samples: replicate.samples, classical: nu, robust }
+    Replicate {
+        name: String::new(),
+        axis: replicate.axis,
+        samples: replicate.samples,
+        classical: nu,
+        robust,
+        trend: f64::NAN,
+    }
 }

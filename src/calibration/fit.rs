@@ -94,8 +94,8 @@ pub enum FitError {
 
 /// Fits a model to a curve. The rate (Hz) is what a GM is sampled at.
 ///
-/// AR1 and GM processes are sought with correlation times between a sixth of a sample and twenty times the
-/// longest scale; phi is positive.
+/// AR1 and GM processes are sought with correlation times between a sixth of a sample (phi = e^−6) and twenty times the
+/// longest scale; phi is positive. A fit that ends there is told ([`Fit::at_end`]); limits that are given reach further.
 ///
 /// # Errors
 /// When the curve has fewer scales than the model parameters, or numbers that are no wavelet variances.
@@ -239,10 +239,20 @@ fn check(curve: &Curve, spec: &ModelSpec) -> Result<(), FitError> {
     Ok(())
 }
 
+/// Correlation times that are sought, in longest scales and in samples: beyond these ends the wavelet variance of an AR1
+/// is that of a random walk to 2 % (at the longest scale), and of white noise to 0.8 % (the first scale against the others).
+const LONGEST: f64 = 20.0;
+const SHORTEST: f64 = 1.0 / 6.0;
+
+/// ln κ of the correlation times that are sought, 1/κ in samples.
+pub(super) fn correlated(curve: &Curve) -> Range {
+    let longest = f64::from(curve.levels.iter().copied().max().unwrap_or(1)).exp2();
+    Range { low: -(LONGEST * longest).ln(), high: -SHORTEST.ln() }
+}
+
 /// The widest ranges in which a curve can say anything, less what the limits leave out.
 fn component(kind: Kind, limits: Limits, curve: &Curve, rate_hz: f64) -> Component {
-    let longest = f64::from(curve.levels.iter().copied().max().unwrap_or(1)).exp2();
-    let correlated = Range { low: -(20.0 * longest).ln(), high: 6.0_f64.ln() };
+    let correlated = correlated(curve);
     // Coordinates of the limits: ln κ, which falls as phi rises.
     let coordinate = match (kind, limits.shape) {
         (Kind::Ar1, Some((low, high))) => {

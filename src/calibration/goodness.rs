@@ -20,6 +20,17 @@ pub struct Goodness {
     pub p_value: f64,
 }
 
+/// Probability below which the model is said not to describe the curve.
+const LEVEL: f64 = 0.05;
+
+impl Goodness {
+    /// Whether so large a J has a probability below 5 % when the model holds.
+    #[must_use]
+    pub fn is_rejected(&self) -> bool {
+        self.p_value < LEVEL
+    }
+}
+
 /// The test of a fit, given the fits of the draws.
 pub(super) fn goodness(fit: &Fit, spec: &ModelSpec, draws: &[Fit]) -> Goodness {
     let objectives: Vec<f64> = draws.iter().map(|d| d.objective).collect();

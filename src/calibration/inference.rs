@@ -5,10 +5,13 @@
 //! Intervals of two replicates, known to one degree of freedom at every scale, cover less than they say (87 and 93 % of
 //! 300 sets, white noise and random walk); of three and more 93 to 96 %.
 
+use super::alike;
 use super::average::Estimator;
 use super::bootstrap::CurveSampler;
 use super::fit::Fit;
 use super::goodness::{Goodness, goodness};
+use super::indistinct::{Indistinct, simpler};
+use super::notes::notes_of_inference;
 use super::parameter_intervals::{ParameterInterval, intervals};
 use super::pipeline::{Outcome, Settings, estimate_again};
 use super::replicates::Group;
@@ -43,14 +46,33 @@ pub struct Inference {
     /// Levels of the curve, each with the standard deviation of ln nu of a replicate: within by the law,
     /// between beyond that. Empty for a curve from elsewhere.
     pub spread: Vec<(u32, f64, f64)>,
+    /// Probability that replicates of one noise differ as much at some scale (see [`ALIKE_LEVEL`](super::ALIKE_LEVEL)); none of a
+    /// single signal.
+    pub alike: Option<f64>,
+    /// Alike processes that cannot be told apart, and the simpler model.
+    pub indistinct: Option<Indistinct>,
 }
 
 /// Fills in the inference of every outcome. The same seed gives the same numbers on any number of threads.
 pub fn infer(groups: &[Group], outcomes: &mut [Outcome], settings: &Settings, bootstrap: Bootstrap) {
     outcomes.par_iter_mut().for_each(|outcome| {
         let group = &groups[outcome.group];
-        outcome.inference = Some(inference(group, outcome, settings, bootstrap));
+        outcome.inference = Some(with_simpler(group, outcome, settings, bootstrap));
+        outcome.notes.extend(notes_of_inference(outcome));
     });
+}
+
+/// The inference of an outcome; where alike processes cannot be told apart, with the intervals of the simpler model.
+fn with_simpler(group: &Group, outcome: &Outcome, settings: &Settings, bootstrap: Bootstrap) -> Inference {
+    let mut own = inference(group, outcome, settings, bootstrap);
+    if let Some((simple, labels, p_value)) = simpler(group, outcome, settings) {
+        let intervals = with_simpler(group, &simple, settings, bootstrap).intervals;
+        let Outcome { spec, fit: Fit { composite, .. }, .. } = simple;
+        let indistinct = Indistinct { labels, spec, composite, p_value, intervals };
+        indistinct.adopt(outcome, &mut own.intervals);
+        own.indistinct = Some(indistinct);
+    }
+    own
 }
 
 fn inference(group: &Group, outcome: &Outcome, settings: &Settings, bootstrap: Bootstrap) -> Inference {
@@ -81,6 +103,9 @@ fn inference(group: &Group, outcome: &Outcome, settings: &Settings, bootstrap: B
         goodness: (outcome.estimator != Estimator::Avlr)
             .then(|| goodness(&outcome.fit, &outcome.spec, &fits)),
         spread: spread.map_or(Vec::new(), rows),
+        alike: spread
+            .and_then(|s| alike::p_value(&group.replicates, outcome.estimator, s, &sampler.law, &name)),
+        indistinct: None,
     }
 }
 
@@ -129,6 +154,7 @@ mod tests {
                 samples: SAMPLES,
                 classical: vec![],
                 robust: vec![],
+                trend: f64::NAN,
             };
             (CHANNEL, like(&template, nu))
         };

@@ -4,6 +4,7 @@
 //! group, [`fit()`] finds the model whose theoretical wavelet variance is nearest to it; [`calibrate`] is
 //! all of it but the first.
 
+mod alike;
 mod auto;
 mod average;
 mod avlr;
@@ -13,6 +14,7 @@ mod diagnosis;
 mod fit;
 mod goodness;
 mod implied;
+mod indistinct;
 mod inference;
 mod limits;
 mod notes;
@@ -29,23 +31,26 @@ mod spec;
 mod spread;
 mod stationarity;
 
+pub use alike::LEVEL as ALIKE_LEVEL;
 pub use auto::{Candidate, Ranking};
 pub use average::{AverageError, Estimator, Replicate, Trim, average};
 pub use diagnosis::{
-    Alarm, AxisScores, CommonOutliers, Diagnosis, LeftOut, Movement, Verdict, advice, diagnose,
+    Alarm, AxisScores, CommonOutliers, Diagnosis, DriftAlarm, LeftOut, Misfit, Movement, Verdict, advice,
+    diagnose, effects,
 };
 pub use fit::{Fit, FitError, fit};
 pub use goodness::Goodness;
 pub use implied::implied;
+pub use indistinct::Indistinct;
 pub use inference::{Bootstrap, Inference, infer};
 pub use limits::{LimitError, Limits};
 pub use notes::{Share, correlation_time_s, duration, notes, percent, shares};
 pub use objective::Weighting;
 pub use optimise::Termination;
-pub use parameter_intervals::ParameterInterval;
+pub use parameter_intervals::{ParameterInterval, Undetermined};
 pub use pipeline::{
     CalibrationError, Cause, ModelChoice, Outcome, ParameterLimit, Settings, calibrate, estimate, fit_curve,
 };
-pub use replicates::{Group, Pool, SignalError, grouped, replicates};
+pub use replicates::{Group, Pool, SignalError, grouped, replicates, trend};
 pub use spec::{Kind, ModelSpec, SpecError};
 pub use stationarity::{WarmUp, warm_up};

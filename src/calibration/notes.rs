@@ -3,6 +3,7 @@
 use super::average::{Estimator, Replicate};
 use super::fit::Fit;
 use super::implied::implied;
+use super::parameter_intervals::ParameterInterval;
 use super::pipeline::Outcome;
 use crate::noise::{Composite, Process};
 use crate::wavelet::{Curve, Status};
@@ -48,8 +49,8 @@ pub fn percent(part: f64) -> String {
     }
 }
 
-/// A process that is nowhere more than this part of the whole is hardly seen.
-const FAINT: f64 = 0.2;
+/// An amplitude known to no better than this factor, either way, is told.
+const FACTOR: f64 = 3.0;
 /// Scales missed by more standard deviations than this are told.
 const MISFIT: f64 = 4.0;
 /// The wavelet variance of an AR1 peaks at this many correlation times.
@@ -73,6 +74,26 @@ pub fn notes(outcome: &Outcome, replicates: &[Replicate], rate_hz: f64) -> Vec<S
         robust_remarks(curve, replicates, &mut notes);
     }
     notes
+}
+
+/// Remarks on what the bootstrap says: what cannot be told apart, and which amplitude is hardly known, by the width of its
+/// interval.
+pub(super) fn notes_of_inference(outcome: &Outcome) -> Vec<String> {
+    let Some(inference) = &outcome.inference else { return Vec::new() };
+    let wide = |i: &&ParameterInterval| {
+        let shape = matches!(i.parameter, "phi" | "beta" | "theta");
+        !shape && i.undetermined().is_none() && i.high > FACTOR * FACTOR * i.low
+    };
+    let remark = |i: &ParameterInterval| {
+        let known = if i.low > 0.0 {
+            format!("known to a factor of {} only", three_digits((i.high / i.low).sqrt()))
+        } else {
+            "may be zero".to_owned()
+        };
+        format!("{} {} is {known} (95 %): weakly identifiable", i.process, i.parameter)
+    };
+    let apart = inference.indistinct.iter().map(super::Indistinct::note);
+    apart.chain(inference.intervals.iter().filter(wide).map(remark)).collect()
 }
 
 /// A time for people: seconds, minutes or hours.
@@ -115,12 +136,23 @@ fn not_identifiable(
         });
     }
     for bound in &fit.bounded {
-        notes.push(format!("{bound} is its bound, as given: the curve asks for a value beyond it"));
+        notes.push(format!("{bound} is at the bound you gave; the data favour a value beyond it"));
     }
     for label in &fit.at_end {
-        notes.push(format!(
-            "{label} lies at the end of what can be searched: not identifiable from these data"
-        ));
+        let process = fit.composite.processes.iter().zip(fit.composite.labels()).find(|(_, l)| l == label);
+        let kappa =
+            process.and_then(|(p, _)| correlation_time_s(p, rate_hz)).map_or(0.0, |t| 1.0 / (t * rate_hz));
+        notes.push(if kappa > 1.0 {
+            format!(
+                "{label}: its correlation time is the shortest that is sought, a sixth of a sample (phi = e^-6): it is \
+                 white noise by another name, and not identifiable from these data"
+            )
+        } else {
+            format!(
+                "{label}: its correlation time is the longest that is sought, 20 times the longest scale: it is a random \
+                 walk by another name, and not identifiable from these data"
+            )
+        });
     }
     let longest_s = curve.levels.last().map_or(0.0, |level| scale_s(*level, rate_hz));
     let labels = fit.composite.labels();
@@ -129,17 +161,10 @@ fn not_identifiable(
         if fit.zero.contains(label) || fit.at_end.contains(label) {
             continue;
         }
-        let (part, level) = share.largest;
-        if part < FAINT {
-            let (part, scale) = (percent(part), scale_s(level, rate_hz));
-            notes.push(format!(
-                "{label} is at most {part} of the wavelet variance (at {scale} s): weakly identifiable"
-            ));
-        }
         let last = curve.levels.last().copied().unwrap_or(0);
         if matches!(process, Process::RandomWalk(_) | Process::Drift(_)) && share.leads == [last] {
             notes.push(format!(
-                "{label} leads at the last scale only ({}), of which there are few independent values: a longer \
+                "{label} dominates at the last scale only ({}), of which there are few independent values: a longer \
                  record would tell it better",
                 duration(longest_s)
             ));

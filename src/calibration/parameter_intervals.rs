@@ -1,7 +1,8 @@
 //! Intervals of parameters from draws around their estimates.
 
-use super::fit::Fit;
+use super::fit::{Fit, correlated};
 use super::limits::Limits;
+use super::objective::Range;
 use super::pipeline::Outcome;
 use super::spec::ModelSpec;
 use crate::noise::Process;
@@ -17,30 +18,72 @@ pub struct ParameterInterval {
     pub low: f64,
     /// Upper end (units of the parameter); NaN where the draws do not determine it.
     pub high: f64,
-    /// Share of the draws in which its process has vanished.
+    /// Share of the draws in which its process has vanished: is zero, or has its correlation time at the end of what can be
+    /// searched, where it is another process by name only.
     pub lost: f64,
+    /// Why there is no interval, if there is none.
+    pub absent: Option<Undetermined>,
     /// Standard error by the sandwich (units of the parameter); NaN where it stands at a bound.
     pub standard_error: f64,
 }
 
+/// Why a parameter has no interval.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Undetermined {
+    /// Its process is zero at the optimum.
+    Zero,
+    /// Its process vanishes in more of the draws than the quantile leaves out.
+    Vanishes,
+    /// The draws lie to one side of the estimate.
+    OneSided,
+    /// The interval of the correlation time ends beyond what can be searched.
+    BeyondSearch,
+    /// The draws leave the amplitude of its process open by more than a factor of 100: in some of them it all but vanishes.
+    Open,
+    /// Alike processes of these labels cannot be told apart.
+    Indistinct(Vec<String>),
+}
+
 impl ParameterInterval {
-    /// Why there is no interval, if there is none.
+    /// Why there is no interval, if there is none, in words.
     #[must_use]
     pub fn undetermined(&self) -> Option<String> {
-        if self.low.is_finite() && self.high.is_finite() {
-            return None;
-        }
-        let Self { process, parameter, lost, .. } = self;
-        Some(if *lost >= 1.0 {
-            format!("{process} {parameter}: no interval, not determined: {process} is zero")
-        } else if *lost > TAIL {
-            format!(
-                "{process} {parameter}: no interval, not determined: {process} vanishes in {} of the draws",
-                super::notes::percent(*lost)
-            )
-        } else {
-            format!("{process} {parameter}: no interval: its draws lie to one side of the estimate")
-        })
+        let Self { process, parameter, lost, absent, .. } = self;
+        let why = match absent.as_ref()? {
+            Undetermined::Zero => format!("not determined: {process} is zero"),
+            Undetermined::Vanishes => {
+                format!("not determined: {process} vanishes in {} of the draws", super::notes::percent(*lost))
+            }
+            Undetermined::OneSided => {
+                return Some(format!(
+                    "{process} {parameter}: no interval: its draws lie to one side of the estimate"
+                ));
+            }
+            Undetermined::BeyondSearch => {
+                "not determined: its correlation time may be any beyond what these scales tell".to_owned()
+            }
+            Undetermined::Open => {
+                format!("not determined: the data leave {process} open by more than a factor of {WIDEST}")
+            }
+            Undetermined::Indistinct(labels) => {
+                format!("not determined: {} cannot be told apart", labels.join(" and "))
+            }
+        };
+        Some(format!("{process} {parameter}: no interval, {why}"))
+    }
+
+    /// Takes the interval away.
+    pub(super) fn refuse(&mut self, why: Undetermined) {
+        (self.low, self.high) = (f64::NAN, f64::NAN);
+        self.absent = Some(why);
+    }
+
+    /// Puts the interval of another fit, of the same parameter, in place of this one, if it holds the estimate.
+    pub(super) fn replace(&mut self, other: &Self, value: f64) {
+        [self.low, self.high] = holding(value, [other.low, other.high]);
+        (self.lost, self.standard_error) = (other.lost, other.standard_error);
+        let one_sided = self.low.is_nan().then_some(Undetermined::OneSided);
+        self.absent = other.absent.clone().or(one_sided);
     }
 }
 
@@ -54,12 +97,14 @@ pub(super) fn intervals(
 ) -> Vec<ParameterInterval> {
     let (model, spec) = (&outcome.fit.composite, &outcome.spec);
     let zero = &outcome.fit.zero;
+    let searched = correlated(&outcome.curve);
     let matched: Vec<Vec<Option<&Process>>> =
         fits.iter().map(|fit| matched(&outcome.fit, spec, fit)).collect();
     let mut intervals = Vec::new();
     for (i, (process, label)) in model.processes.iter().zip(model.labels()).enumerate() {
         let there: Vec<&Process> = matched.iter().filter_map(|m| m[i]).collect();
         let lost = if zero.contains(&label) { 1.0 } else { 1.0 - there.len() as f64 / fits.len() as f64 };
+        let first = intervals.len();
         for (p, (parameter, value)) in process.parameters().into_iter().enumerate() {
             if spec.is_fixed(i, parameter) {
                 continue;
@@ -73,12 +118,45 @@ pub(super) fn intervals(
             // The intervals of a parameter that is bounded end there.
             let (from, to) = spec.range(i, parameter);
             let [low, high] = [low, high].map(|end: f64| end.clamp(from, to));
+            let absent = match lost {
+                1.0.. => Some(Undetermined::Zero),
+                lost if lost > TAIL => Some(Undetermined::Vanishes),
+                _ => low.is_nan().then_some(Undetermined::OneSided),
+            };
             let standard_error = standard_errors[intervals.len()];
             let process = label.clone();
-            intervals.push(ParameterInterval { process, parameter, low, high, lost, standard_error });
+            intervals.push(ParameterInterval { process, parameter, low, high, lost, absent, standard_error });
+        }
+        let own = &mut intervals[first..];
+        if spec.limits()[i].shape.is_none() && own.iter().any(|i| leaves_search(searched, process, i)) {
+            own.iter_mut().for_each(|i| i.refuse(Undetermined::BeyondSearch));
+        }
+        // With its amplitude the shape is lost too.
+        let open = |i: &ParameterInterval| {
+            let amplitude = !matches!(i.parameter, "phi" | "beta" | "theta");
+            amplitude && i.absent.is_none() && i.high > i.low * WIDEST.powf(stretch.min(2.0))
+        };
+        if own.iter().any(open) {
+            own.iter_mut().for_each(|i| i.refuse(Undetermined::Open));
         }
     }
     intervals
+}
+
+/// Upper over lower quantile of the draws of an amplitude that say nothing any more; of its interval, which Student's quantile
+/// makes wider where there are few replicates, the square.
+const WIDEST: f64 = 100.0;
+
+/// Whether an interval of a correlation time ends where nothing was sought: by the draws it may be any.
+fn leaves_search(searched: Range, process: &Process, interval: &ParameterInterval) -> bool {
+    let kappa = |end: f64| match (process, interval.parameter) {
+        (Process::Ar1(_), "phi") => Some(-end.ln()),
+        (Process::GaussMarkov(p), "beta") => Some(end / p.rate_hz()),
+        _ => None,
+    };
+    // Ends beyond by rounding are not beyond.
+    let beyond = |u: f64| u < searched.low - 1e-6 || u > searched.high + 1e-6;
+    [interval.low, interval.high].into_iter().filter_map(kappa).any(|kappa| beyond(kappa.ln()))
 }
 
 /// An interval that holds its estimate; none where the estimator misses its own estimate 39 times in 40.
@@ -93,7 +171,7 @@ fn holding(value: f64, [low, high]: [f64; 2]) -> [f64; 2] {
 fn matched<'a>(estimate: &Fit, spec: &ModelSpec, fit: &'a Fit) -> Vec<Option<&'a Process>> {
     let labels = fit.composite.labels();
     let (drawn, model) = (&fit.composite.processes, &estimate.composite.processes);
-    let there = |fit: &Fit, i: usize| !fit.zero.contains(&labels[i]);
+    let there = |fit: &Fit, i: usize| !fit.zero.contains(&labels[i]) && !fit.at_end.contains(&labels[i]);
     let kinds = spec.kinds();
     let cost = |i: usize, d: usize| (log_time(&model[i]) - log_time(&drawn[d])).powi(2);
     let mut matched = vec![None; drawn.len()];

@@ -71,9 +71,20 @@ pub fn replicates(
         let error = |source| SignalError { recording: recording.name.clone(), channel, source };
         let (classical, robust) = both(&signal.samples, levels, tuning).map_err(error)?;
         let (name, axis) = (recording.name.clone(), Some(channel.axis));
-        Ok((channel, Replicate { name, axis, samples, classical, robust }))
+        let trend = trend(&signal.samples);
+        Ok((channel, Replicate { name, axis, samples, classical, robust, trend }))
     };
     recording.signals.par_iter().map(one).collect()
+}
+
+/// Mean of the later half of a signal less that of its earlier half; the middle one of an odd number is left out.
+#[must_use]
+pub fn trend(samples: &[f64]) -> f64 {
+    let half = samples.len() / 2;
+    // Half by half about their first value, so that no digits of a small change are lost.
+    let first = samples.first().copied().unwrap_or(0.0);
+    let mean = |part: &[f64]| part.iter().map(|x| x - first).sum::<f64>() / half as f64;
+    mean(&samples[samples.len() - half..]) - mean(&samples[..half])
 }
 
 /// The groups, in the order of [`Channel::ALL`].

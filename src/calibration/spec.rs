@@ -196,6 +196,14 @@ impl ModelSpec {
         others == 0 && count(self, Kind::Ar1) + white + walk <= count(other, Kind::Ar1)
     }
 
+    /// The model without the process at an index.
+    pub(super) fn without(&self, index: usize) -> Self {
+        let mut less = self.clone();
+        less.kinds.remove(index);
+        less.limits.remove(index);
+        less
+    }
+
     /// The kinds of process.
     #[must_use]
     pub fn kinds(&self) -> &[Kind] {

@@ -144,6 +144,16 @@ fn small_sample(count: usize) -> f64 {
     1.0 + 0.6 / count as f64
 }
 
+/// Mean square of the residuals of ln nu at one level, each over the deviation that its noise alone gives it: 1 on average
+/// where replicates do not differ. For DR-AWV of clipped residuals. NaN of what cannot be compared.
+pub(super) fn mean_square(logs: &[f64], noise: &[f64], estimator: Estimator) -> f64 {
+    let weights: Vec<f64> = noise.iter().map(|n| 1.0 / n).collect();
+    let clipped = estimator == Estimator::DrAwv;
+    let correction = if clipped { small_sample(logs.len()) } else { 1.0 };
+    let squares: f64 = residuals(logs, &weights, clipped).iter().map(|z| z * z).sum();
+    correction * squares / (logs.len() as f64 - 1.0)
+}
+
 /// How the ln nu of replicates scatter at one level.
 struct Scatter {
     /// Standard deviation of what they differ by beyond their noise.

@@ -76,6 +76,11 @@ impl Session {
         self.common.format == Format::Json
     }
 
+    /// Whether all is to be said.
+    pub(crate) const fn verbose(&self) -> bool {
+        self.common.verbose
+    }
+
     /// Threads that work.
     pub(crate) fn threads(&self) -> usize {
         rayon::current_num_threads()

@@ -32,10 +32,10 @@ fn without_options(e: TrajectoryFileError) -> Failure {
     failure
 }
 
-/// An input with its fingerprint.
+/// An input with its fingerprint, of the bytes that were read.
 pub(super) fn input(role: &str, path: &Path) -> Result<Input, Failure> {
     let shown = path.display().to_string();
-    let blake3 = hash::of_file(path).map_err(|e| Failure::could_not(format!("{shown}: {e}")))?;
+    let blake3 = hash::as_read(path).map_err(|e| Failure::could_not(format!("{shown}: {e}")))?;
     Ok(Input { role: role.to_owned(), path: shown, blake3 })
 }
 

@@ -2,6 +2,7 @@
 
 use super::axes::ChannelSet;
 use super::{Failure, Session};
+use clap::ValueEnum;
 use nav_sim::data::recordings::{self, Gaps, ReadOptions, Report};
 use nav_sim::imu::{Recording, Sensor};
 use std::cell::OnceCell;
@@ -49,6 +50,27 @@ impl RecordingArgs {
         self.skip_s
     }
 
+    /// What decides what is read of the files, for the provenance of a result.
+    pub(crate) fn provenance(&self) -> toml::Table {
+        let mut table = toml::Table::new();
+        let mut put = |key: &str, value: toml::Value| table.insert(key.to_owned(), value);
+        put("skip_s", self.skip_s.into());
+        if let Some(gaps) = self.gaps.to_possible_value() {
+            put("gaps", gaps.get_name().into());
+        }
+        if !self.axes.is_empty() {
+            let channels = self.axes.iter().flat_map(|set| &set.0).map(ToString::to_string);
+            put("axes", channels.collect::<Vec<_>>().into());
+        }
+        if let Some(columns) = &self.columns {
+            put("columns", columns.clone().into());
+        }
+        if let Some(rate_hz) = self.rate_hz {
+            put("rate_hz_given", rate_hz.into());
+        }
+        table
+    }
+
     /// Looks at recordings one by one, says what was found (in detail with `--verbose`) and what is doubtful.
     pub(crate) fn visit<T: Send>(
         &self,
@@ -80,8 +102,15 @@ impl RecordingArgs {
         let visited = recordings::visit(paths, &options, look, &tell);
         drop(progress);
         let (looks, report) = visited?;
+        if report.files.len() > FEW {
+            session.printer.say(&summary(&report));
+        }
         for file in &report.files {
-            session.printer.say(&file.to_string());
+            if report.files.len() > FEW {
+                session.printer.detail(&file.to_string());
+            } else {
+                session.printer.say(&file.to_string());
+            }
             if !file.ignored.is_empty() {
                 session.printer.detail(&format!("{}: passed over: {}", file.file, file.ignored.join(", ")));
             }
@@ -91,6 +120,21 @@ impl RecordingArgs {
         }
         Ok((looks, report))
     }
+}
+
+/// Files of more than this number are told in one line, unless all is to be said.
+const FEW: usize = 2;
+
+/// `8 recordings at 100 Hz, 655 s each`
+fn summary(report: &Report) -> String {
+    let seconds = report.files.iter().map(|f| f.samples.iter().sum::<usize>() as f64 / f.rate_hz);
+    let (low, high) = seconds.fold((f64::INFINITY, 0.0_f64), |(low, high), s| (low.min(s), high.max(s)));
+    let rate_hz = report.files.first().map_or(f64::NAN, |f| f.rate_hz);
+    let length =
+        if high - low < 0.5 { format!("{high:.0} s each") } else { format!("{low:.0} to {high:.0} s") };
+    let assumed = report.files.iter().any(|f| !f.assumptions.is_empty());
+    let assumed = if assumed { ", with assumptions" } else { "" };
+    format!("{} recordings at {rate_hz} Hz, {length}{assumed} (--verbose: each of them)", report.files.len())
 }
 
 /// The sensor of that name.

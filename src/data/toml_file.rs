@@ -126,7 +126,10 @@ impl Source {
     pub(crate) fn read(path: &Path) -> Result<Self, TomlError> {
         let name = path.display().to_string();
         match source::text(path) {
-            Ok(text) => Ok(Self { path: name, text }),
+            Ok(text) => {
+                super::hash::remember(path, text.as_bytes());
+                Ok(Self { path: name, text })
+            }
             Err(source) => Err(TomlError::Io { path: name, source }),
         }
     }

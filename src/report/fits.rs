@@ -3,8 +3,8 @@
 use super::curves::tau_s;
 use super::replicates::ReplicateEntry;
 use crate::calibration::{
-    Candidate, Diagnosis, Estimator, Goodness, Group, Inference, Outcome, ParameterInterval, Ranking,
-    Settings, Share, correlation_time_s, percent, shares,
+    ALIKE_LEVEL, Candidate, Diagnosis, Estimator, Goodness, Group, Indistinct, Inference, Outcome,
+    ParameterInterval, Ranking, Settings, Share, correlation_time_s, percent, shares,
 };
 use crate::imu::Sensor;
 use crate::noise::{Composite, Process};
@@ -54,6 +54,10 @@ pub struct FitEntry {
     pub goodness: Option<GoodnessEntry>,
     /// Standard deviation of ln wv of a replicate at each scale: within by theory, between beyond that.
     pub spread: Vec<SpreadEntry>,
+    /// Probability that replicates of one noise differ as much at some scale; none of a single signal.
+    pub spread_p_value: Option<f64>,
+    /// Alike processes that cannot be told apart.
+    pub indistinct: Option<IndistinctEntry>,
     /// Draws of the bootstrap.
     pub bootstrap: usize,
     /// Σ Omega_j (nu_j − nu_j(theta))².
@@ -148,6 +152,31 @@ pub struct GoodnessEntry {
     pub p_value: f64,
 }
 
+/// Processes of one kind that cannot be told apart.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct IndistinctEntry {
+    /// Their labels.
+    pub processes: Vec<String>,
+    /// The model with one of them less, which describes the curve as well.
+    pub simpler: String,
+    /// Probability of so large a gain by the further process if the simpler model is true.
+    pub p_value: f64,
+    /// The processes of the simpler model, with the keys of model files.
+    pub simpler_processes: Vec<Map<String, Value>>,
+}
+
+impl IndistinctEntry {
+    fn new(indistinct: &Indistinct) -> Self {
+        let Indistinct { labels, spec, composite, p_value, intervals } = indistinct;
+        Self {
+            processes: labels.clone(),
+            simpler: spec.to_string(),
+            p_value: *p_value,
+            simpler_processes: processes_json(composite, intervals),
+        }
+    }
+}
+
 /// How replicates differ at one scale.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SpreadEntry {
@@ -177,7 +206,7 @@ impl FitEntry {
             reasons: outcome.ranking.as_ref().map_or(Vec::new(), |r| r.reasons.clone()),
             replicates: group.replicates.len(),
             scales: outcome.curve.levels.len(),
-            processes: processes_json(outcome),
+            processes: processes_json(&outcome.fit.composite, inference.map_or(&[][..], |i| &i.intervals)),
             goodness: goodness.map(|Goodness { statistic, dof, expected, p_value }| GoodnessEntry {
                 statistic,
                 dof,
@@ -191,6 +220,8 @@ impl FitEntry {
                     between,
                 })
                 .collect(),
+            spread_p_value: inference.and_then(|i| i.alike),
+            indistinct: inference.and_then(|i| i.indistinct.as_ref()).map(IndistinctEntry::new),
             bootstrap: inference.map_or(0, |i| i.draws),
             objective: fit.objective,
             termination: fit.termination.name(),
@@ -227,17 +258,16 @@ impl FitsFile {
     }
 }
 
-fn processes_json(outcome: &Outcome) -> Vec<Map<String, Value>> {
-    let model = &outcome.fit.composite;
-    model.processes.iter().zip(model.labels()).map(|(p, label)| process_json(p, &label, outcome)).collect()
+fn processes_json(model: &Composite, intervals: &[ParameterInterval]) -> Vec<Map<String, Value>> {
+    model.processes.iter().zip(model.labels()).map(|(p, label)| process_json(p, &label, intervals)).collect()
 }
 
-fn process_json(process: &Process, label: &str, outcome: &Outcome) -> Map<String, Value> {
+fn process_json(process: &Process, label: &str, intervals: &[ParameterInterval]) -> Map<String, Value> {
     let mut map = Map::new();
     map.insert("type".to_owned(), process.code().into());
     for (name, value) in process.parameters() {
         map.insert(name.to_owned(), value.into());
-        if let Some(i) = interval_of(outcome, label, name) {
+        if let Some(i) = interval_of(intervals, label, name) {
             let ends = if i.undetermined().is_none() { vec![i.low, i.high].into() } else { Value::Null };
             map.insert(format!("{name}_ci95"), ends);
             let error = i.standard_error;
@@ -247,9 +277,12 @@ fn process_json(process: &Process, label: &str, outcome: &Outcome) -> Map<String
     map
 }
 
-fn interval_of<'a>(outcome: &'a Outcome, label: &str, parameter: &str) -> Option<&'a ParameterInterval> {
-    let mut all = outcome.inference.iter().flat_map(|i| &i.intervals);
-    all.find(|i| i.process == label && i.parameter == parameter)
+pub(super) fn interval_of<'a>(
+    intervals: &'a [ParameterInterval],
+    label: &str,
+    parameter: &str,
+) -> Option<&'a ParameterInterval> {
+    intervals.iter().find(|i| i.process == label && i.parameter == parameter)
 }
 
 /// A fit in words: a head line, a line for each process, how sure the optimum is, the remarks.
@@ -300,7 +333,7 @@ fn inference_lines(inference: &Inference, group: &Group, rate_hz: f64) -> Vec<St
 fn j_test(goodness: &Goodness) -> String {
     let Goodness { statistic, dof, expected, p_value } = goodness;
     let verdict =
-        if *p_value < 0.05 { "the model does not describe the curve" } else { "no evidence against" };
+        if goodness.is_rejected() { "the model does not describe the curve" } else { "no evidence against" };
     format!(
         "  J-test {statistic:.4e} on {dof} degrees of freedom, median {expected:.4e} if the model holds, p = \
          {p_value:.3}: {verdict}"
@@ -309,19 +342,19 @@ fn j_test(goodness: &Goodness) -> String {
 
 /// Where replicates differ most beyond what noise alone makes.
 fn spread_line(inference: &Inference, rate_hz: f64) -> Option<String> {
+    let p = inference.alike?;
+    if p > ALIKE_LEVEL {
+        return Some(format!("  no evidence that replicates differ beyond their noise (p = {p:.3})"));
+    }
     let most = |(_, within, between): &&(u32, f64, f64)| between / within;
     let (level, within, between) = *inference.spread.iter().max_by(|a, b| most(a).total_cmp(&most(b)))?;
-    let tau = tau_s(level, rate_hz);
-    Some(if between <= within {
-        "  replicates differ no more than their noise makes them at any scale, or hardly".to_owned()
-    } else {
-        format!(
-            "  replicates differ beyond their noise, most at {tau} s: by {} of the wavelet variance, noise alone \
-             makes {}",
-            percent(between),
-            percent(within)
-        )
-    })
+    Some(format!(
+        "  replicates differ beyond their noise (p = {p:.3}), most at {} s: by {} of the wavelet variance, noise alone \
+         makes {}",
+        tau_s(level, rate_hz),
+        percent(between),
+        percent(within)
+    ))
 }
 
 fn head(group: &Group, outcome: &Outcome, settings: &Settings) -> String {
@@ -357,11 +390,14 @@ fn process_lines(model: &Composite, sensor: Sensor, levels: &[u32], rate_hz: f64
         }
         let meaning = meaning(process, sensor, rate_hz);
         let governs = match (share.leads.first(), share.leads.last()) {
+            (Some(first), Some(last)) if first == last => {
+                format!("dominates at {} s", tau_s(*first, rate_hz))
+            }
             (Some(first), Some(last)) => {
-                format!("leads from {} s to {} s", tau_s(*first, rate_hz), tau_s(*last, rate_hz))
+                format!("dominates from {} s to {} s", tau_s(*first, rate_hz), tau_s(*last, rate_hz))
             }
             _ => format!(
-                "leads nowhere, at most {} at {} s",
+                "dominates at no scale ({} of the variance at most, at {} s)",
                 percent(share.largest.0),
                 tau_s(share.largest.1, rate_hz)
             ),
@@ -372,20 +408,17 @@ fn process_lines(model: &Composite, sensor: Sensor, levels: &[u32], rate_hz: f64
 }
 
 /// The parameters in the terms of data sheets.
-fn meaning(process: &Process, sensor: Sensor, rate_hz: f64) -> String {
+pub(super) fn meaning(process: &Process, sensor: Sensor, rate_hz: f64) -> String {
     let dt = 1.0 / rate_hz;
     let unit = sensor.unit();
     // Per √h, in degrees for angles.
-    let (per_root_hour, root_hour_unit) = match sensor {
-        Sensor::Accel => (60.0, "m/s/√h"),
-        Sensor::Gyro => (60.0 / DEG, "°/√h"),
+    let (name, per_root_hour, root_hour_unit) = match sensor {
+        Sensor::Accel => ("velocity random walk", 60.0, "m/s/√h"),
+        Sensor::Gyro => ("angle random walk", 60.0 / DEG, "°/√h"),
     };
     match process {
         Process::White(p) => {
-            format!(
-                "random walk of the integral {:.4e} {root_hour_unit}",
-                (p.sigma2() * dt).sqrt() * per_root_hour
-            )
+            format!("{name} {:.4e} {root_hour_unit}", (p.sigma2() * dt).sqrt() * per_root_hour)
         }
         Process::Quantization(p) => {
             format!("Q = {:.4e} {unit}, times dt {:.4e} {unit}·s", p.q2().sqrt(), p.q2().sqrt() * dt)
@@ -403,8 +436,14 @@ fn meaning(process: &Process, sensor: Sensor, rate_hz: f64) -> String {
                 p.s2().sqrt()
             )
         }
-        Process::RandomWalk(p) => format!("{:.4e} {unit}/√s", (p.gamma2() * rate_hz).sqrt()),
-        Process::Drift(p) => format!("{:.4e} {unit}/s", p.slope() * rate_hz),
+        Process::RandomWalk(p) => {
+            let name = match sensor {
+                Sensor::Accel => "acceleration random walk",
+                Sensor::Gyro => "rate random walk",
+            };
+            format!("{name} {:.4e} {unit}/√s", (p.gamma2() * rate_hz).sqrt())
+        }
+        Process::Drift(p) => format!("ramp {:.4e} {unit}/s", p.slope() * rate_hz),
         Process::Ma1(p) => {
             format!("standard deviation {:.4e} {unit}", (p.sigma2() * (1.0 + p.theta() * p.theta())).sqrt())
         }

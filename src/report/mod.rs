@@ -2,6 +2,7 @@
 //! every function makes a text, the command line writes it.
 
 mod batch;
+mod brief;
 mod comparison;
 mod curves;
 mod efficiency;
@@ -26,6 +27,7 @@ pub use batch::{
     epoch_columns, epoch_rows, measured, outage_columns, outage_rows, ratio_table, run_columns, run_rows,
     verdict, verdict_table,
 };
+pub use brief::brief;
 pub use comparison::{CandidateResult, ComparisonFile, Label, consistency_rows, table_rows, verdict_lines};
 pub use curves::{
     CONFIDENCE, CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile, intervals_note,

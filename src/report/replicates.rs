@@ -1,7 +1,7 @@
 //! Which recordings are abnormal, as JSON and as words.
 
 use super::curves::tau_s;
-use crate::calibration::{Alarm, AxisScores, Diagnosis, LeftOut, Movement, advice};
+use crate::calibration::{Alarm, AxisScores, Diagnosis, LeftOut, Movement, advice, effects};
 use crate::imu::Sensor;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -19,12 +19,25 @@ pub struct ReplicateEntry {
     pub noise: Option<AlarmEntry>,
     /// Why there are outliers within it (ln (classical / robust wv)).
     pub outliers: Option<AlarmEntry>,
+    /// Why its level is said to drift.
+    pub drift: Option<DriftEntry>,
     /// Outliers that most signals of this sensor hold, in all recordings alike.
     pub common_outliers: Option<CommonEntry>,
     /// Scores at every scale, by axis.
     pub scores: BTreeMap<&'static str, ScoresEntry>,
     /// What leaving it out does to each fit.
     pub left_out: Vec<LeftOutEntry>,
+}
+
+/// A drift that no other recording has.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DriftEntry {
+    /// Probability that the most unusual of recordings that are alike is as unusual.
+    pub p_value: f64,
+    /// Mean of the later half less that of the earlier one, by axis (units of the sensor).
+    pub change: BTreeMap<&'static str, f64>,
+    /// The same against the others, in standard deviations.
+    pub deviations: BTreeMap<&'static str, f64>,
 }
 
 /// Outliers that most signals of a sensor hold.
@@ -104,6 +117,11 @@ impl ReplicateEntry {
             verdict: diagnosis.verdict.name(),
             noise: diagnosis.noise.as_ref().map(|a| AlarmEntry::new(a, rate_hz)),
             outliers: diagnosis.outliers.as_ref().map(|a| AlarmEntry::new(a, rate_hz)),
+            drift: diagnosis.drift.as_ref().map(|d| DriftEntry {
+                p_value: d.p_value,
+                change: d.change.iter().map(|(axis, x)| (axis.name(), *x)).collect(),
+                deviations: d.deviations.iter().map(|(axis, z)| (axis.name(), *z)).collect(),
+            }),
             common_outliers: diagnosis.common.as_ref().map(|c| CommonEntry {
                 tau_s: c.levels.iter().map(|level| tau_s(*level, rate_hz)).collect(),
                 most_tau_s: tau_s(c.most, rate_hz),
@@ -149,7 +167,8 @@ impl LeftOutEntry {
 #[must_use]
 pub fn describe_replicates(diagnoses: &[Diagnosis], rate_hz: f64) -> Vec<String> {
     let of_sensor = |sensor: Sensor| {
-        let lines = advice(diagnoses, sensor, rate_hz);
+        let mut lines = advice(diagnoses, sensor, rate_hz);
+        lines.extend(effects(diagnoses, sensor, rate_hz));
         let head = format!("{}: do the recordings agree?", sensor.name());
         let text = std::iter::once(head).chain(lines.iter().map(|l| format!("  {l}")));
         (!lines.is_empty()).then(|| text.collect::<Vec<_>>().join("\n"))

@@ -26,7 +26,17 @@ fn outcome(set: u64, noise: &Composite) -> Outcome {
         let mut signal = vec![0.0; 4096];
         Synthesizer::new(noise, key).fill(&mut signal);
         let (classical, robust) = both(&signal, 9, &settings.tuning).unwrap();
-        (channel, Replicate { name: format!("run{run}"), axis: None, samples: 4096, classical, robust })
+        (
+            channel,
+            Replicate {
+                name: format!("run{run}"),
+                axis: None,
+                samples: 4096,
+                classical,
+                robust,
+                trend: f64::NAN,
+            },
+        )
     };
     let groups = grouped((0..4).map(replicate).collect(), Pool::Axes);
     calibrate(&groups, &settings).unwrap().remove(0)

@@ -43,14 +43,41 @@ impl Window {
 /// What noise alone does to one axis.
 #[derive(Debug, Clone)]
 pub(super) struct Noise {
-    law: SamplingLaw,
+    kind: NoiseKind,
     /// Degrees of freedom, `[file][level]`.
     edof: Vec<Vec<f64>>,
     /// Variance of the contrast of each window, `[window][file]`.
     variances: Vec<Vec<f64>>,
 }
 
+/// What the values of a file scatter like.
+#[derive(Debug, Clone)]
+enum NoiseKind {
+    /// Logarithms of wavelet variances.
+    Law(SamplingLaw),
+    /// One Gaussian number of unit variance, times what its deviation differs by from file to file: the standard deviation of
+    /// its logarithm.
+    Normal(f64),
+}
+
 impl Noise {
+    /// Of files of one Gaussian number each, of unit variance but for what ln of its standard deviation differs by.
+    pub(super) fn normal(files: usize, log_deviation: f64) -> Self {
+        let kind = NoiseKind::Normal(log_deviation);
+        Self { kind, edof: vec![vec![1.0]; files], variances: vec![vec![1.0; files]] }
+    }
+
+    /// What noise alone makes of a file, level by level.
+    fn draw(&self, file: usize, generator: &mut Generator) -> Vec<f64> {
+        match &self.kind {
+            NoiseKind::Law(law) => law.draw(&self.edof[file], generator).into_iter().map(f64::ln).collect(),
+            NoiseKind::Normal(log_deviation) => {
+                let mut normal = || generator.sample::<f64, _>(StandardNormal);
+                vec![(log_deviation * normal()).exp() * normal()]
+            }
+        }
+    }
+
     /// Of files with so many degrees of freedom at each level.
     pub(super) fn new(law: SamplingLaw, edof: Vec<Vec<f64>>) -> Self {
         let levels = edof.first().map_or(0, Vec::len);
@@ -65,7 +92,7 @@ impl Noise {
             deviations.iter().map(of_file).collect()
         };
         let variances = Window::all(levels).into_iter().map(of_window).collect();
-        Self { law, edof, variances }
+        Self { kind: NoiseKind::Law(law), edof, variances }
     }
 }
 
@@ -96,12 +123,12 @@ impl Table {
         let common: Vec<Vec<f64>> = (0..files).map(|_| normals()).collect();
         let mut file = |noise: &Noise, k: usize, own: &Option<Vec<f64>>| {
             own.as_ref().map(|_| {
-                let ratios = noise.law.draw(&noise.edof[k], generator);
-                let difference = |((r, b), common): ((f64, &f64), &f64)| {
+                let values = noise.draw(k, generator);
+                let difference = |((value, b), common): ((f64, &f64), &f64)| {
                     let own: f64 = generator.sample(StandardNormal);
-                    r.ln() + b * (shared.sqrt() * common + (1.0 - shared).sqrt() * own)
+                    value + b * (shared.sqrt() * common + (1.0 - shared).sqrt() * own)
                 };
-                ratios.into_iter().zip(between).zip(&common[k]).map(difference).collect()
+                values.into_iter().zip(between).zip(&common[k]).map(difference).collect()
             })
         };
         let axis = |(files, noise): (&Files, &Noise)| {

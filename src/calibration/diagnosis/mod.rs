@@ -1,8 +1,9 @@
 //! "My six recordings disagree: which do I use?" Each recording against the others, over neighbouring scales
 //! and the axes of a sensor, by the sampling law of the model that was fitted; and what leaving it out does.
 //!
-//! Two things are looked at: ln of the robust wavelet variance (is its noise another?), and ln of the
-//! classical over the robust one (are there outliers within it?). In the latter what recordings honestly differ by
+//! Three things are looked at: ln of the robust wavelet variance (is its noise another?), and ln of the
+//! classical over the robust one (are there outliers within it?), and the change of the level from its earlier to its later
+//! half, in standard deviations of the fitted model (does it drift as no other does?). In the second what recordings honestly differ by
 //! cancels, and what noise alone makes is small: a classical variance of eta degrees of freedom being
 //! efficient, its covariance with a robust one of efficiency e is its variance, so that of the ratio is
 //! (1/e − 1) times it.
@@ -15,13 +16,15 @@ mod words;
 
 pub use common::CommonOutliers;
 pub use leave_out::{LeftOut, Movement};
-pub use words::advice;
+pub use words::{advice, effects};
 
 use super::average::{Estimator, Replicate};
+use super::goodness::Goodness;
 use super::pipeline::{Outcome, Settings};
 use super::replicates::{Group, Pool};
 use super::sampling::SamplingLaw;
 use crate::imu::{Axis, Sensor};
+use crate::noise::Composite;
 use crate::wavelet::interval::edof_robust;
 use alarm::alarms;
 use contrasts::{Noise, Table, scores};
@@ -39,6 +42,8 @@ pub enum Verdict {
     Normal,
     /// Its classical wavelet variance is above its robust one, more than in the others: outliers within it.
     Outliers,
+    /// Its level drifts as that of no other does.
+    Drift,
     /// Its robust wavelet variance is: its noise is another.
     Noise,
 }
@@ -50,9 +55,21 @@ impl Verdict {
         match self {
             Self::Normal => "normal",
             Self::Outliers => "outliers",
+            Self::Drift => "drift",
             Self::Noise => "abnormal",
         }
     }
+}
+
+/// A drift that no other recording has.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DriftAlarm {
+    /// Probability that the most unusual of recordings that are alike is as unusual.
+    pub p_value: f64,
+    /// Mean of the later half less that of the earlier one, of each axis (units).
+    pub change: Vec<(Axis, f64)>,
+    /// The same against the others, in standard deviations.
+    pub deviations: Vec<(Axis, f64)>,
 }
 
 /// Why a recording is abnormal.
@@ -81,7 +98,7 @@ pub struct AxisScores {
 /// One sensor of one recording against the others.
 ///
 /// Alarms are rare in sets of alike recordings: with a probability of 2.5 % there is one of their noise, and as
-/// often one of outliers, however much alike recordings differ, if ln nu does so by Gaussian numbers
+/// often one of outliers, and one of drift, however much alike recordings differ, if ln nu does so by Gaussian numbers
 /// independent from axis to axis. Two recordings that are abnormal alike hide behind each
 /// other unless there are six or more; three do in any case.
 #[derive(Debug, Clone, PartialEq)]
@@ -98,6 +115,8 @@ pub struct Diagnosis {
     pub noise: Option<Alarm>,
     /// Why there are outliers within it.
     pub outliers: Option<Alarm>,
+    /// Why its level is said to drift.
+    pub drift: Option<DriftAlarm>,
     /// Scores; empty when there are fewer than four recordings.
     pub scores: Vec<AxisScores>,
     /// Outliers that most signals of this sensor hold, in all recordings alike.
@@ -106,6 +125,19 @@ pub struct Diagnosis {
     pub dropped: Option<(Pool, usize)>,
     /// What leaving it out does to each fit.
     pub left_out: Vec<LeftOut>,
+    /// The fits to this sensor whose model does not describe the curve, by the J-test.
+    pub misfits: Vec<Misfit>,
+}
+
+/// A fit that the J-test rejects at 5 %.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Misfit {
+    /// The group, `accel` or `accel.x`.
+    pub group: String,
+    /// The estimator.
+    pub estimator: Estimator,
+    /// Probability of such a distance if the model holds.
+    pub p_value: f64,
 }
 
 /// Diagnoses every recording, sensor by sensor. Without two recordings there is nothing to compare.
@@ -131,6 +163,7 @@ fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &
     let dropped = dropped(&own, settings);
     let [noise, outliers] = [Question::Noise, Question::Outliers]
         .map(|question| Sight::new(&pieces, sensor, question, settings.tuning.efficiency()));
+    let drift = Sight::drift(&pieces, sensor, &noise);
     let left_out = |name: &str| {
         let fits: Vec<_> = own
             .iter()
@@ -138,12 +171,15 @@ fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &
             .collect();
         fits.into_par_iter().filter_map(|(g, o)| leave_out::left_out(g, name, o, settings)).collect()
     };
+    let misfits = misfits(&own, outcomes);
     let one = |(index, name): (usize, &&str)| {
-        let alarms = (noise.alarm(index), outliers.alarm(index));
-        let verdict = match alarms {
-            (Some(_), _) => Verdict::Noise,
-            (None, Some(_)) => Verdict::Outliers,
-            (None, None) => Verdict::Normal,
+        let (of_noise, of_outliers) = (noise.alarm(index), outliers.alarm(index));
+        let of_drift = drift.drift_alarm(index, &pieces);
+        let verdict = match (&of_noise, &of_outliers, &of_drift) {
+            (Some(_), _, _) => Verdict::Noise,
+            (None, Some(_), _) => Verdict::Outliers,
+            (None, None, Some(_)) => Verdict::Drift,
+            (None, None, None) => Verdict::Normal,
         };
         let has = |r: &&Replicate| r.name == **name;
         Diagnosis {
@@ -151,15 +187,30 @@ fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &
             sensor,
             axes: own.iter().flat_map(|(_, g)| &g.replicates).filter(has).count(),
             verdict,
-            noise: alarms.0,
-            outliers: alarms.1,
+            noise: of_noise,
+            outliers: of_outliers,
+            drift: of_drift,
             scores: joined(&pieces, noise.scores(index), outliers.scores(index)),
             common: common.clone(),
             dropped,
             left_out: left_out(name),
+            misfits: misfits.clone(),
         }
     };
     names.iter().enumerate().map(one).collect()
+}
+
+/// The fits of a sensor that the J-test rejects.
+fn misfits(own: &[(usize, &Group)], outcomes: &[Outcome]) -> Vec<Misfit> {
+    let of_group = |(index, group): &(usize, &Group)| {
+        let name = group.name();
+        let rejected = |o: &Outcome| {
+            let goodness = o.inference.as_ref()?.goodness.filter(Goodness::is_rejected)?;
+            Some(Misfit { group: name.clone(), estimator: o.estimator, p_value: goodness.p_value })
+        };
+        outcomes.iter().filter(|o| o.group == *index).filter_map(rejected).collect::<Vec<_>>()
+    };
+    own.iter().flat_map(of_group).collect()
 }
 
 /// What DR-AWV drops of the smallest group of a sensor.
@@ -172,18 +223,20 @@ fn dropped(own: &[(usize, &Group)], settings: &Settings) -> Option<(Pool, usize)
 /// The replicates of one axis, by recording.
 struct Piece<'a> {
     axis: Axis,
+    model: &'a Composite,
     law: SamplingLaw,
     replicates: Vec<Option<&'a Replicate>>,
 }
 
-fn axes<'a>(own: &[(usize, &'a Group)], names: &[&str], outcomes: &[Outcome]) -> Vec<Piece<'a>> {
+fn axes<'a>(own: &[(usize, &'a Group)], names: &[&str], outcomes: &'a [Outcome]) -> Vec<Piece<'a>> {
     let levels = own.iter().flat_map(|(_, g)| &g.replicates).map(|r| r.classical.len()).min().unwrap_or(0);
     let piece = |axis: Axis| {
         let (index, group) = own.iter().find(|(_, g)| g.replicates.iter().any(|r| r.axis == Some(axis)))?;
         // The last estimator is the most robust.
         let model = &outcomes.iter().rfind(|o| o.group == *index)?.fit.composite;
         let of = |name: &&str| group.replicates.iter().find(|r| r.name == **name && r.axis == Some(axis));
-        Some(Piece { axis, law: SamplingLaw::new(model, levels), replicates: names.iter().map(of).collect() })
+        let law = SamplingLaw::new(model, levels);
+        Some(Piece { axis, model, law, replicates: names.iter().map(of).collect() })
     };
     Axis::ALL.into_iter().filter_map(piece).collect()
 }
@@ -259,6 +312,37 @@ impl Sight {
         Self { axes: pieces.iter().map(|p| p.axis).collect(), table, noise, found }
     }
 
+    /// The change of the level within each recording, in standard deviations of the fitted model; their strengths may differ as
+    /// those of the noise at the longest scales do.
+    fn drift(pieces: &[Piece<'_>], sensor: Sensor, noise: &Self) -> Self {
+        let deviations = |p: &Piece<'_>| {
+            let of = |r: &Replicate| vec![0.5 * r.trend / wv_of_length(p.model, r.samples).sqrt()];
+            p.replicates.iter().map(|r| r.map(of)).collect()
+        };
+        let table = Table { logs: pieces.iter().map(deviations).collect::<Vec<Vec<_>>>(), above_only: false };
+        let files = pieces.first().map_or(0, |p| p.replicates.len());
+        // A recording that drifts is also louder at the longest scales: it is not to hide itself.
+        let size = |file: usize| -> f64 {
+            table.logs.iter().filter_map(|axis| axis[file].as_ref()).map(|z| z[0] * z[0]).sum()
+        };
+        let largest = (0..files).max_by(|a, b| size(*a).total_cmp(&size(*b)));
+        let others: Vec<bool> = (0..files).map(|file| Some(file) != largest).collect();
+        let between = noise.table.between(&noise.noise, &others);
+        let last = &between[between.len().saturating_sub(LONGEST_SCALES)..];
+        let mean = last.iter().map(|b| b * b).sum::<f64>() / last.len().max(1) as f64;
+        // Of the standard deviation, whose logarithm is half that of the variance.
+        let own = pieces.iter().map(|_| Noise::normal(files, 0.5 * mean.sqrt())).collect::<Vec<_>>();
+        let found = alarms(&table, &own, sensor.name(), "drift");
+        Self { axes: pieces.iter().map(|p| p.axis).collect(), table, noise: own, found }
+    }
+
+    fn drift_alarm(&self, file: usize, pieces: &[Piece<'_>]) -> Option<DriftAlarm> {
+        let found = self.found.iter().find(|f| f.file == file)?;
+        let deviations = found.distance.deviations.iter().map(|(axis, z)| (self.axes[*axis], *z)).collect();
+        let change = pieces.iter().filter_map(|p| Some((p.axis, p.replicates[file]?.trend))).collect();
+        Some(DriftAlarm { p_value: found.p_value, change, deviations })
+    }
+
     fn alarm(&self, file: usize) -> Option<Alarm> {
         let found = self.found.iter().find(|f| f.file == file)?;
         let first = found.window.first as u32 + 1;
@@ -276,6 +360,17 @@ impl Sight {
         let normal = |k: usize| k == file || self.found.iter().all(|f| f.file != k);
         scores(&self.table, &self.noise, &(0..files).map(normal).collect::<Vec<_>>(), file)
     }
+}
+
+/// Scales of which the differences between recordings are those of their level's changes too.
+const LONGEST_SCALES: usize = 5;
+
+/// Haar wavelet variance of a model at a scale as long as a record, by the power law between the neighbouring powers of two.
+fn wv_of_length(model: &Composite, samples: usize) -> f64 {
+    let level = samples.max(2).ilog2();
+    let (below, above) = (model.haar_wv(level), model.haar_wv(level + 1));
+    let part = (samples as f64).log2() - f64::from(level);
+    below * (above / below).powf(part)
 }
 
 fn joined(pieces: &[Piece<'_>], noise: Vec<Vec<f64>>, outliers: Vec<Vec<f64>>) -> Vec<AxisScores> {

@@ -247,11 +247,12 @@ fn calibration(
         efficiency_convention: "exact".to_owned(),
         weighting: "model".to_owned(),
         seed: None,
+        reading: toml::Table::new(),
         inputs: inputs.collect::<Result<Vec<Input>, _>>()?,
     };
     let text = |estimator: &nav_sim::calibration::Estimator| {
         let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == *estimator).collect();
-        model_file::to_toml(&note.model_file(&groups, &own, &settings))
+        model_file::to_toml(&note.model_file(&groups, &own, &settings, None))
     };
     Ok(settings.estimators.iter().map(text).collect())
 }

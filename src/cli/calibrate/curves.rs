@@ -66,6 +66,6 @@ pub(super) fn run(
     }
     bootstrap(args, &groups, &mut outcomes, settings, session);
     let input = read::input("curve", path)?;
-    let note = output::note(args, vec![input], session);
+    let note = output::note(args, settings, vec![input], session)?;
     output::finish(&outputs, &groups, &outcomes, settings, &note, session)
 }

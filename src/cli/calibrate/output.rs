@@ -1,11 +1,14 @@
 //! The files of a calibration: one model and its curves for each estimator.
 
-use super::{Args, WeightingArg};
-use crate::cli::{Failure, Session};
+use super::{Args, PoolArg, WeightingArg};
+use crate::cli::{Failure, Session, read};
+use clap::ValueEnum;
 use nav_sim::calibration::{Estimator, Group, Outcome, Settings, diagnose};
-use nav_sim::data::atomic;
+use nav_sim::data::atomic::{self, AtomicFile};
+use nav_sim::data::hash;
 use nav_sim::data::model_file::{self, CalibrationNote};
 use nav_sim::report::{self, CurvesFile, FitsFile, Input};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// One estimator's files.
@@ -57,8 +60,34 @@ fn regular(out: &Path) -> Result<(), Failure> {
     }
 }
 
-pub(super) fn note(args: &Args, inputs: Vec<Input>, session: &Session) -> CalibrationNote {
-    CalibrationNote {
+/// How the recordings were read and grouped; of a curve nothing is known.
+fn reading(args: &Args, settings: &Settings) -> toml::Table {
+    if args.curve.is_some() {
+        return toml::Table::new();
+    }
+    let mut table = args.recordings.provenance();
+    let single = settings.estimators.iter().any(|e| e.is_single());
+    let pool = args.pool.unwrap_or(if single { PoolArg::Axes } else { PoolArg::Sensor });
+    if let Some(pool) = pool.to_possible_value() {
+        table.insert("pool".to_owned(), pool.get_name().into());
+    }
+    if let Some(scales) = args.tuning.scales {
+        table.insert("scales".to_owned(), i64::from(scales).into());
+    }
+    table
+}
+
+/// What is recorded of a calibration. `inputs`: what was fitted; the parameters file is added.
+pub(super) fn note(
+    args: &Args,
+    settings: &Settings,
+    mut inputs: Vec<Input>,
+    session: &Session,
+) -> Result<CalibrationNote, Failure> {
+    if let Some(path) = &args.parameters {
+        inputs.push(read::input("parameters", path)?);
+    }
+    Ok(CalibrationNote {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         efficiency_convention: args.tuning.convention().to_owned(),
         weighting: match args.weighting {
@@ -69,9 +98,10 @@ pub(super) fn note(args: &Args, inputs: Vec<Input>, session: &Session) -> Calibr
             WeightingArg::Full => "full",
         }
         .to_owned(),
+        reading: reading(args, settings),
         seed: (args.bootstrap > 0).then(|| session.seed(None)),
         inputs,
-    }
+    })
 }
 
 /// Writes one model and its curves for each estimator, and prints the fits.
@@ -86,8 +116,10 @@ pub(super) fn finish(
     let mut files = Vec::new();
     for Output { estimator, model, curves } in outputs {
         let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == *estimator).collect();
-        atomic::write(curves, report::json(&CurvesFile::new(groups, &own, settings)))?;
-        model_file::write(model, &note.model_file(groups, &own, settings))?;
+        let text = report::json(&CurvesFile::new(groups, &own, settings));
+        let blake3 = hash::of_bytes(text.as_bytes());
+        let file = note.model_file(groups, &own, settings, Some(&blake3));
+        pair([(curves, text), (model, model_file::to_toml(&file))])?;
         files.extend([model, curves].map(|p| p.display().to_string()));
     }
     let diagnoses = diagnose(groups, outcomes, settings);
@@ -95,14 +127,60 @@ pub(super) fn finish(
         let json = report::json(&FitsFile::new(groups, outcomes, &diagnoses, settings, files.clone()));
         session.printer.result(json.trim_end());
     } else {
-        let fits = outcomes.iter().map(|o| report::describe(&groups[o.group], o, settings));
-        let texts = fits.chain(report::describe_replicates(&diagnoses, settings.rate_hz));
-        session.printer.result(&texts.collect::<Vec<_>>().join("\n\n"));
+        let text = if session.verbose() {
+            let replicates = report::describe_replicates(&diagnoses, settings.rate_hz);
+            let fits = outcomes.iter().map(|o| report::describe(&groups[o.group], o, settings));
+            replicates.into_iter().chain(fits).collect::<Vec<_>>().join("\n\n")
+        } else {
+            report::brief(groups, outcomes, &diagnoses, settings)
+        };
+        session.printer.result(&text);
     }
-    for file in files {
-        session.printer.say(&format!("wrote {file}"));
+    if !files.is_empty() {
+        session.printer.say(&format!("wrote {}", files.join(", ")));
+    }
+    if groups.iter().any(|g| g.replicates.len() > 1) {
+        session.printer.say(WHICH);
     }
     Ok(())
+}
+
+/// Where the choice between estimators is made.
+const WHICH: &str = "\
+which model suits a filter is a question about navigation: calibrate without one of the recordings, nav-sim run each model \
+with --static that recording, and nav-sim compare";
+
+/// Writes two files that belong together: both are on the disk before either has its name. Should the second not get
+/// its name, the hash in it tells that the first is not of it.
+fn pair(files: [(&PathBuf, String); 2]) -> Result<(), atomic::WriteError> {
+    let staged = files.map(|(path, text)| -> Result<AtomicFile, atomic::WriteError> {
+        let mut file = AtomicFile::create(path)?;
+        let written = file.write_all(text.as_bytes()).and_then(|()| file.flush());
+        written.map_err(|e| atomic::WriteError::io(path, e))?;
+        Ok(file)
+    });
+    let [first, second] = staged;
+    let (first, second) = (first?, second?);
+    first.commit()?;
+    second.commit()
+}
+
+/// Refuses to replace a file of the default name that no calibration wrote: nobody asked for it by name.
+pub(super) fn not_of_others(out: &Path) -> Result<(), Failure> {
+    if !out.exists() {
+        return Ok(());
+    }
+    let provenance = model_file::read(out).ok().and_then(|file| file.provenance);
+    let calibrated = provenance.is_some_and(|p| {
+        let program = p.get("program").and_then(toml::Value::as_str);
+        program.is_some_and(|name| name.starts_with("nav-sim")) && p.contains_key("estimator")
+    });
+    if calibrated {
+        return Ok(());
+    }
+    let message =
+        format!("{} is not a model that nav-sim calibrate wrote: it is not replaced", out.display());
+    Err(Failure::input(message).hint("name the output with -o, or move that file away"))
 }
 
 fn with_suffix(path: &Path, suffix: &str) -> PathBuf {

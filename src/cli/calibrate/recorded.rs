@@ -16,6 +16,9 @@ use std::path::{Path, PathBuf};
 pub(super) fn run(args: &Args, settings: &mut Settings, session: &Session) -> Result<(), Failure> {
     let out = args.out.as_deref().unwrap_or(Path::new("model.toml"));
     output::writable(out)?;
+    if args.out.is_none() {
+        output::not_of_others(out)?;
+    }
     // As many scales as parameters, and one that the default leaves out.
     let needed = args.tuning.scales.map_or(2 << free_parameters(&settings.model), |j| 1 << j);
     let tuning = settings.tuning;
@@ -38,7 +41,7 @@ pub(super) fn run(args: &Args, settings: &mut Settings, session: &Session) -> Re
     let groups = grouped(measured, pool);
     let mut outcomes = calibrate(&groups, settings).map_err(|e| of_calibration(&e))?;
     bootstrap(args, &groups, &mut outcomes, settings, session);
-    let note = output::note(args, inputs, session);
+    let note = output::note(args, settings, inputs, session)?;
     output::finish(&outputs, &groups, &outcomes, settings, &note, session)
 }
 

@@ -1,7 +1,7 @@
 //! The model file of a calibration.
 
 use super::{Interval, ModelFile, SCHEMA};
-use crate::calibration::{Estimator, Group, Outcome, Settings};
+use crate::calibration::{Estimator, Group, Outcome, ParameterLimit, Settings};
 use crate::imu::Channel;
 use crate::noise::Model;
 use crate::report::Input;
@@ -18,14 +18,23 @@ pub struct CalibrationNote {
     pub weighting: String,
     /// Seed of the bootstrap, if there was one.
     pub seed: Option<u64>,
-    /// The recordings or the curve.
+    /// How the recordings were read and grouped, key by key: what was left out at their beginning, gaps, axes, scales, pool.
+    pub reading: Table,
+    /// The recordings or the curve, and the parameters file.
     pub inputs: Vec<Input>,
 }
 
 impl CalibrationNote {
-    /// The model file of the outcomes of one estimator. Channels of no group are missing in it.
+    /// The model file of the outcomes of one estimator. Channels of no group are missing in it. `curves`: BLAKE3, in
+    /// hexadecimal, of the file of curves that goes beside it.
     #[must_use]
-    pub fn model_file(&self, groups: &[Group], outcomes: &[&Outcome], settings: &Settings) -> ModelFile {
+    pub fn model_file(
+        &self,
+        groups: &[Group],
+        outcomes: &[&Outcome],
+        settings: &Settings,
+        curves: Option<&str>,
+    ) -> ModelFile {
         let mut file = ModelFile::new(Model { rate_hz: settings.rate_hz, axes: Default::default() });
         file.missing = Channel::ALL.to_vec();
         for outcome in outcomes {
@@ -35,7 +44,11 @@ impl CalibrationNote {
                 file.intervals.extend(intervals(outcome, channel));
             }
         }
-        file.provenance = Some(self.provenance(groups, outcomes, settings));
+        let mut provenance = self.provenance(groups, outcomes, settings);
+        if let Some(blake3) = curves {
+            provenance.insert("curves_blake3".to_owned(), blake3.into());
+        }
+        file.provenance = Some(provenance);
         file
     }
 
@@ -55,6 +68,12 @@ impl CalibrationNote {
         if estimator.is_robust() {
             put("efficiency", settings.tuning.efficiency().into());
             put("efficiency_convention", self.efficiency_convention.as_str().into());
+        }
+        for (key, value) in &self.reading {
+            put(key, value.clone());
+        }
+        if !settings.limits.is_empty() {
+            put("limits", settings.limits.iter().map(limit).collect::<Vec<_>>().into());
         }
         put("fits", outcomes.iter().map(|o| fit(&groups[o.group], o, settings)).collect::<Vec<_>>().into());
         put("inputs", self.inputs.iter().map(input).collect::<Vec<_>>().into());
@@ -103,6 +122,32 @@ fn fit(group: &Group, outcome: &Outcome, settings: &Settings) -> Table {
     }
     let undetermined = outcome.inference.iter().flat_map(|i| &i.intervals).filter_map(|i| i.undetermined());
     put("notes", outcome.notes.iter().cloned().chain(undetermined).collect::<Vec<_>>().into());
+    table
+}
+
+/// A parameter that was fixed or bounded beforehand.
+fn limit(limit: &ParameterLimit) -> Table {
+    let ParameterLimit { sensor, axis, process, parameter, low, high } = limit;
+    let signals = match (sensor, axis) {
+        (None, _) => "all".to_owned(),
+        (Some(sensor), None) => sensor.name().to_owned(),
+        (Some(sensor), Some(axis)) => Channel { sensor: *sensor, axis: *axis }.to_string(),
+    };
+    let mut table = Table::new();
+    let mut put = |key: &str, value: Value| table.insert(key.to_owned(), value);
+    put("signals", signals.into());
+    put("process", process.as_str().into());
+    put("parameter", parameter.as_str().into());
+    match (low, high) {
+        (Some(low), Some(high)) if low.to_bits() == high.to_bits() => {
+            put("fix", (*low).into());
+        }
+        _ => {
+            for (key, bound) in [("lower", low), ("upper", high)] {
+                bound.map(|value| put(key, value.into()));
+            }
+        }
+    }
     table
 }
 
