@@ -549,7 +549,7 @@ fn a_model_says_what_it_was_made_with() {
         );
         assert_eq!(
             (provenance["scales"].as_integer(), provenance["weighting"].as_str()),
-            (Some(9), Some("edof"))
+            (Some(9), Some("model"))
         );
         assert_eq!(provenance["axes"].as_array().unwrap().len(), 3);
         let limits = provenance["limits"].as_array().unwrap();
