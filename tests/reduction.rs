@@ -33,9 +33,8 @@ fn outages(seconds: f64) -> [Outage; 2] {
     starts.map(|start_s| Outage { start_s, end_s: start_s + seconds })
 }
 
-/// A tenth of one, and for one cell of the 24 (two outages of 300 s by air, 0.898) a little more on the cautious side.
 fn is_honest([low, high, nees]: [f64; 3]) -> bool {
-    low >= 0.89 && high <= 1.1 && (8.5..9.5).contains(&nees)
+    low >= 0.9 && high <= 1.1 && (8.5..9.5).contains(&nees)
 }
 
 #[test]
@@ -52,6 +51,9 @@ fn the_default_filter_is_honest_and_that_by_wavelet_variance_is_not() {
     assert!(wavelet[1] > 1.4 && wavelet[2] > 10.0, "{wavelet:?}");
 }
 
+/// The one cell that is not reached: yaw after two outages of 300 s by air is stated 11 % too large.
+const CAUTIOUS: (&str, &str, f64) = ("consumer_mems", "fixed_wing", 300.0);
+
 /// Every cell; the table is printed with `cargo test --test reduction -- --ignored --nocapture`.
 #[test]
 #[ignore = "24 cells, a minute"]
@@ -64,7 +66,9 @@ fn every_imu_trajectory_and_outage() {
                 let found = cell(model, trajectory, &outages(seconds), Reduction::Covariance);
                 let [low, high, nees] = found;
                 println!("| {model} | {trajectory} | 2 of {seconds} s | {low:.3} to {high:.3} | {nees:.2} |");
-                if !is_honest(found) {
+                let known =
+                    (model, trajectory, seconds) == CAUTIOUS && low > 0.89 && is_honest([0.9, high, nees]);
+                if !is_honest(found) && !known {
                     dishonest.push((model, trajectory, seconds, found));
                 }
             }
