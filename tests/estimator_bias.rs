@@ -3,7 +3,7 @@
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use nav_sim::calibration::{Estimator, ModelSpec, Replicate, Trim, Weighting, average, fit, implied};
+use nav_sim::calibration::{Estimator, ModelSpec, Replicate, Trim, Weighting, average, fit, implied, trend};
 use nav_sim::noise::{Ar1, Composite, Process, Quantization, RandomWalk, Synthesizer, White};
 use nav_sim::rng::StreamKey;
 use nav_sim::wavelet::{Convention, Curve, Tuning, both};
@@ -34,7 +34,14 @@ fn estimates_are_unbiased_however_much_quantization_noise_there_is() {
             let mut signal = vec![0.0; 1 << 15];
             Synthesizer::new(&truth, key).fill(&mut signal);
             let (classical, robust) = both(&signal, 13, &tuning()).unwrap();
-            Replicate { name: String::new(), axis: None, samples: signal.len(), classical, robust }
+            Replicate {
+                name: String::new(),
+                axis: None,
+                samples: signal.len(),
+                classical,
+                robust,
+                trend: trend(&signal),
+            }
         };
         let sets: Vec<Vec<Replicate>> =
             (0..SETS).into_par_iter().map(|set| (0..6).map(|run| replicate(set, run)).collect()).collect();
@@ -77,7 +84,14 @@ fn a_scale_that_is_low_by_chance_does_not_rule() {
             let mut signal = vec![0.0; 1 << 14];
             Synthesizer::new(&truth, key).fill(&mut signal);
             let (classical, robust) = both(&signal, 13, &tuning()).unwrap();
-            let one = Replicate { name: String::new(), axis: None, samples: signal.len(), classical, robust };
+            let one = Replicate {
+                name: String::new(),
+                axis: None,
+                samples: signal.len(),
+                classical,
+                robust,
+                trend: trend(&signal),
+            };
             let curve = average(&[one], estimator, Trim::Count(0), &tuning()).unwrap();
             let found = fit(&curve, &spec, 1.0, Weighting::Model).unwrap();
             found.composite.processes[1].parameters()[0].1 / 1e-5

@@ -240,7 +240,7 @@ mod tests {
             ),
             (
                 "[gyro.RW]\ngamma2 = { fix = -1 }\n",
-                "p.toml, line 2: \"gyro.RW.gamma2\" = { fix = -1 } is not possible: RW gamma2: -1 is not a finite number ≥ 0 | ",
+                "p.toml, line 2: \"gyro.RW.gamma2\" = { fix = -1 } is not possible: RW gamma2: -1 is not a number from 0 to 1e100 | ",
             ),
             ("[WN]\nsigma2 = 3\n", "p.toml, line 2: \"WN.sigma2\" = 3 is not a table | "),
         ] {

@@ -121,7 +121,7 @@ mod tests {
             "{message}"
         );
         let (message, _) = refused("[filter]\nstates = 16\n");
-        assert!(message.ends_with("= 16 is refused: expected \"15\" or \"full\""), "{message}");
+        assert!(message.ends_with("= 16 is refused: expected \"15\", \"21\" or \"full\""), "{message}");
         let (message, _) = refused("[run]\nmethod = \"lincav\"\n");
         assert!(
             message.contains("\"run.method\" = \"lincav\"") && message.contains("`monte-carlo`"),
