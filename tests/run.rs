@@ -249,7 +249,9 @@ outage = [{ start_s = 30, end_s = 45 }]
 ";
     fs::write(place.path().join("s.toml"), scenario).unwrap();
     done(place.path(), "run drive.toml imu.toml --runs 8 --seed 2 --outage 30:45 -o plain");
-    done(place.path(), "run drive.toml imu.toml --runs 8 --seed 2 --scenario s.toml -o worse");
+    // a filter that expects none of it is lost
+    let ran = nav_sim(place.path(), "run drive.toml imu.toml --runs 8 --seed 2 --scenario s.toml -o worse");
+    assert_eq!(ran.code, 3, "{}", ran.stderr);
     let (plain, worse) =
         (json(&place.path().join("plain/summary.json")), json(&place.path().join("worse/summary.json")));
     let nees = |summary: &Value| summary["nees"]["mean"].as_f64().unwrap();
