@@ -22,6 +22,13 @@ fn model(share: f64) -> Composite {
     ])
 }
 
+/// The wavelet variances of a signal.
+fn measured(signal: &[f64]) -> Replicate {
+    let (classical, robust) = both(signal, 13, &tuning()).unwrap();
+    let (samples, trend) = (signal.len(), trend(signal));
+    Replicate { name: String::new(), axis: None, samples, classical, robust, trend }
+}
+
 /// Six recordings of 2^15 samples, 16 sets: the mean of an estimate over the truth is 1 to four of its standard errors
 /// (from the scatter of the sets). Read as if Gaussian, q2 is 5 to 13 % high and sigma2 up to 4 % low, which is far more.
 #[test]
@@ -33,15 +40,7 @@ fn estimates_are_unbiased_however_much_quantization_noise_there_is() {
             let key = StreamKey { seed: set, scenario: "quantization", run, source: "", process: "" };
             let mut signal = vec![0.0; 1 << 15];
             Synthesizer::new(&truth, key).fill(&mut signal);
-            let (classical, robust) = both(&signal, 13, &tuning()).unwrap();
-            Replicate {
-                name: String::new(),
-                axis: None,
-                samples: signal.len(),
-                classical,
-                robust,
-                trend: trend(&signal),
-            }
+            measured(&signal)
         };
         let sets: Vec<Vec<Replicate>> =
             (0..SETS).into_par_iter().map(|set| (0..6).map(|run| replicate(set, run)).collect()).collect();
@@ -83,16 +82,7 @@ fn a_scale_that_is_low_by_chance_does_not_rule() {
             let key = StreamKey { seed: 5, scenario: "low", run, source: "", process: "" };
             let mut signal = vec![0.0; 1 << 14];
             Synthesizer::new(&truth, key).fill(&mut signal);
-            let (classical, robust) = both(&signal, 13, &tuning()).unwrap();
-            let one = Replicate {
-                name: String::new(),
-                axis: None,
-                samples: signal.len(),
-                classical,
-                robust,
-                trend: trend(&signal),
-            };
-            let curve = average(&[one], estimator, Trim::Count(0), &tuning()).unwrap();
+            let curve = average(&[measured(&signal)], estimator, Trim::Count(0), &tuning()).unwrap();
             let found = fit(&curve, &spec, 1.0, Weighting::Model).unwrap();
             found.composite.processes[1].parameters()[0].1 / 1e-5
         };
