@@ -14,9 +14,9 @@ nav-sim synthesize calib_data/consumer_mems.toml --samples 524284 --spread --rep
 nav-sim synthesize calib_data/consumer_mems.toml --samples 524284 --spread --seed 2 -o out/paper_section5/ninth
 
 # Three estimators for each scenario: nine models, each WN + QN + 2 AR1 + RW for both sensors.
-nav-sim calibrate out/paper_section5/I --estimator all -o out/paper_section5/models/I.toml
-nav-sim calibrate out/paper_section5/II --estimator all -o out/paper_section5/models/II.toml
-nav-sim calibrate out/paper_section5/III --estimator all -o out/paper_section5/models/III.toml
+nav-sim calibrate out/paper_section5/I --estimator all --seed 1 -o out/paper_section5/models/I.toml
+nav-sim calibrate out/paper_section5/II --estimator all --seed 1 -o out/paper_section5/models/II.toml
+nav-sim calibrate out/paper_section5/III --estimator all --seed 1 -o out/paper_section5/models/III.toml
 
 # 100 runs with each model in the filter (a state for each AR1 and random walk), on the same errors and GNSS noise.
 nav-sim run trajectories/land_vehicle.toml out/paper_section5/models/I_awv.toml --static out/paper_section5/ninth --filter full --outage 300:390 --outage 700:790 --runs 100 --seed 1 -o out/paper_section5/runs/I_awv

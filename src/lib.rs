@@ -21,43 +21,27 @@
 //! | `psd` | two-sided, units²/Hz |
 //!
 //! # Architecture
-//! Calibration (data → model) and navigation (trajectory → errors) never import each other; they meet in
-//! [`noise::Model`]. Modules are listed below in layer order; a module names only what stands above it,
-//! held by `tests/layering.rs`. Nothing below the command line reads a clock, the environment, a terminal
-//! or a source of randomness: generators and seeds are arguments.
+//! Three crates hold the mathematics, this one the files, words and commands. `nav-sim-signal` (noise, wavelet
+//! variance) is below; `nav-sim-calibration` (recordings → model) and `nav-sim-navigation` (trajectory → errors)
+//! stand on it side by side and cannot import each other: they meet in [`noise::Model`]. Their modules are
+//! re-exported here, so that `nav_sim::ekf` is the only path a user needs. Within a crate a module names only
+//! what stands above it in the list of its `lib.rs`, held by `tests/layering.rs`. Nothing below the command line
+//! reads a clock, the environment, a terminal or a source of randomness: generators and seeds are arguments.
+//!
+//! The crates are for the compiler too: a changed line in the filter recompiles `nav-sim-navigation` and what is
+//! above it, and its unit tests are `cargo test -p nav-sim-navigation`.
 
-// L0
-pub mod bibliography;
-pub mod lanes;
-pub mod linalg;
-pub mod rng;
-pub mod units;
-// L1
-pub mod earth;
-pub mod frames;
-pub mod gnss;
-pub mod imu;
-// L2
-pub mod noise;
-pub mod trajectory;
-pub mod wavelet;
-// L3
-pub mod calibration;
-pub mod sensors;
-pub mod strapdown;
-// L4
-pub mod ekf;
-// L5
-pub mod closure;
-pub mod fusion;
-pub mod monte_carlo;
-pub mod scenario;
-pub mod simulation;
-pub mod throughput;
-// L6
-pub mod metrics;
-// L7
+pub use nav_sim_calibration as calibration;
+pub use nav_sim_calibration::efficiency;
+pub use nav_sim_navigation::{
+    closure, earth, ekf, frames, fusion, gnss, lanes, linalg, metrics, monte_carlo, scenario, sensors,
+    simulation, strapdown, throughput, trajectory,
+};
+pub use nav_sim_signal::{bibliography, imu, noise, rng, units, wavelet};
+
+// The engine of studies.
 pub mod batch;
-pub mod data;
+// Words and pages.
 pub mod report;
-pub mod study;
+// Files.
+pub mod data;

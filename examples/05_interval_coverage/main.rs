@@ -13,9 +13,9 @@ use nav_sim::calibration::{
     Bootstrap, ModelChoice, Outcome, Pool, Replicate, Settings, calibrate, grouped, infer,
 };
 use nav_sim::data::study_file;
+use nav_sim::efficiency::{Design, target};
 use nav_sim::noise::Synthesizer;
 use nav_sim::rng::StreamKey;
-use nav_sim::study::{Design, target};
 use nav_sim::wavelet::both;
 use rayon::prelude::*;
 use std::error::Error;

@@ -112,11 +112,11 @@ fn inference(group: &Group, outcome: &Outcome, settings: &Settings, bootstrap: B
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::bootstrap::like;
-    use crate::calibration::{Estimator, ModelChoice, Pool, Replicate, Trim, Weighting, calibrate, grouped};
+    use crate::bootstrap::like;
     use crate::imu::{Axis, Channel, Sensor};
     use crate::noise::{Process, RandomWalk, White};
     use crate::wavelet::{Convention, Tuning, classical};
+    use crate::{Estimator, ModelChoice, Pool, Replicate, Trim, Weighting, calibrate, grouped};
     use rand::RngExt;
     use rand_distr::StandardNormal;
 

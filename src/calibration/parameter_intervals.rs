@@ -260,10 +260,10 @@ fn quantile(sorted: &[f64], p: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::{Estimator, Weighting, fit};
     use crate::noise::{Ar1, Composite};
     use crate::rng::StreamKey;
     use crate::wavelet::Curve;
+    use crate::{Estimator, Weighting, fit};
     use rand::RngExt;
     use rand_distr::ChiSquared;
 

@@ -66,7 +66,9 @@ fn commands(args: &Args, seed: u64) -> Vec<Vec<String>> {
     }
     lines.push(synthesize(format!("--seed {} -o @/ninth", seed.wrapping_add(1))));
     for scenario in SCENARIOS {
-        lines.push(format!("calibrate @/{scenario} --estimator all -o @/models/{scenario}.toml"));
+        lines.push(format!(
+            "calibrate @/{scenario} --estimator all --seed {seed} -o @/models/{scenario}.toml"
+        ));
     }
     let pairs = || SCENARIOS.iter().flat_map(|s| ESTIMATORS.iter().map(move |e| format!("{s}_{e}")));
     lines.extend(pairs().map(|name| {

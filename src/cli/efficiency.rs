@@ -3,11 +3,11 @@
 use super::{Failure, Session};
 use nav_sim::data::study_directory::{Layout, StudyDirectory, StudyDirectoryError};
 use nav_sim::data::{atomic, study_file};
-use nav_sim::noise::{Process, contamination::Contamination};
-use nav_sim::report::{self, EfficiencyFile, EfficiencyRow};
-use nav_sim::study::{
+use nav_sim::efficiency::{
     Accuracy, Design, Estimate, Movement, StudyError, Target, abnormal_curve, accuracy, outlier_curve, target,
 };
+use nav_sim::noise::{Process, contamination::Contamination};
+use nav_sim::report::{self, EfficiencyFile, EfficiencyRow};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};

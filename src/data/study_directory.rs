@@ -3,7 +3,7 @@
 
 use super::atomic;
 use super::difference::{self, Difference};
-use crate::study::Estimate;
+use crate::efficiency::Estimate;
 use serde_json::Value;
 use std::fs::{self, File};
 use std::io::Write;

@@ -21,9 +21,9 @@ use super::model_file;
 use super::suggest::nearest;
 use super::toml_file::{Section, Source, TomlError};
 use crate::calibration::{AverageError, Estimator, ModelSpec, Trim, Weighting};
+use crate::efficiency::Design;
 use crate::imu::Channel;
 use crate::noise::contamination::Contamination;
-use crate::study::Design;
 use crate::wavelet::{Convention, Tuning, default_levels, max_levels};
 use std::path::{Path, PathBuf};
 

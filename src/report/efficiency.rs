@@ -2,7 +2,7 @@
 //! the paper's Figure 2.
 
 use super::number::shortest;
-use crate::study::Accuracy;
+use crate::efficiency::Accuracy;
 use comfy_table::{ContentArrangement, Table, presets};
 use serde::Serialize;
 
@@ -134,7 +134,7 @@ fn signed(x: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::accuracy;
+    use crate::efficiency::accuracy;
 
     fn file() -> EfficiencyFile {
         let a = accuracy(&[1.8, 2.0, 2.2, 2.4, 20.0], 2.0, 1);

@@ -86,7 +86,7 @@ fn panel(parameter: &str, rows: &[&EfficiencyRow], svg: &mut String) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::accuracy;
+    use crate::efficiency::accuracy;
 
     #[test]
     fn a_bar_for_every_number() {

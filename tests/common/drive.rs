@@ -1,7 +1,5 @@
 //! A drive of a minute, a noise model, and the program as a user runs it.
 
-#![allow(dead_code, reason = "each test uses a part")]
-
 use std::path::Path;
 use std::process::Command;
 

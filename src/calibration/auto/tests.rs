@@ -1,10 +1,10 @@
 //! The model that is true is the one chosen.
 
 use super::*;
-use crate::calibration::{ModelChoice, Pool, Replicate, Trim, Weighting, calibrate, grouped};
 use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::{Ar1, Composite, Process, RandomWalk, Synthesizer, White};
 use crate::wavelet::{Convention, Tuning, both};
+use crate::{ModelChoice, Pool, Replicate, Trim, Weighting, calibrate, grouped};
 
 fn settings() -> Settings {
     Settings {

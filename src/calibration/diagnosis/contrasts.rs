@@ -7,9 +7,9 @@
 //! The spread is that of the contrast itself, so however the scales hang together, nothing is assumed of it.
 
 use super::FEWEST;
-use crate::calibration::sampling::SamplingLaw;
-use crate::calibration::spread::variance_of_log;
 use crate::rng::Generator;
+use crate::sampling::SamplingLaw;
+use crate::spread::variance_of_log;
 use rand::RngExt;
 use rand_distr::StandardNormal;
 

@@ -1,10 +1,10 @@
 //! Alarms in simulated sets: as rare as said where recordings are alike, there where one is not.
 
 use super::*;
-use crate::calibration::{ModelChoice, Pool, Trim, Weighting, calibrate, grouped, trend};
 use crate::imu::Channel;
 use crate::rng::{Generator, StreamKey};
 use crate::wavelet::{Convention, Tuning, both};
+use crate::{ModelChoice, Pool, Trim, Weighting, calibrate, grouped, trend};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 

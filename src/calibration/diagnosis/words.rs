@@ -1,8 +1,8 @@
 //! The diagnosis in words.
 
 use super::{Alarm, CommonOutliers, Diagnosis, DriftAlarm, LeftOut, Misfit, Movement, Verdict};
-use crate::calibration::replicates::Pool;
 use crate::imu::{Axis, Sensor};
+use crate::replicates::Pool;
 use std::fmt::Write;
 
 /// The answer for one sensor: what the recordings are used for, then a line for each that is abnormal, and each fit that the

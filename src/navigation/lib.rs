@@ -1,0 +1,35 @@
+//! From a noise model to navigation errors: trajectories, sensors, strapdown, error-state filter, Monte
+//! Carlo, covariance analysis, metrics.
+//!
+//! Part of [nav-sim](https://docs.rs/nav-sim), which re-exports its modules. The modules are listed in layer
+//! order: one names only what stands above it.
+
+#[allow(unused_imports, reason = "sources are named in the documentation")]
+pub(crate) use nav_sim_signal::bibliography;
+pub(crate) use nav_sim_signal::{imu, noise, rng, units, wavelet};
+
+// L0
+pub mod lanes;
+pub mod linalg;
+// L1
+pub mod frames;
+pub mod gnss;
+// L2
+pub mod earth;
+// L3
+pub mod trajectory;
+// L4
+pub mod sensors;
+pub mod strapdown;
+// L5
+pub mod ekf;
+// L6
+pub mod closure;
+pub mod fusion;
+pub mod simulation;
+pub mod throughput;
+// L7
+pub mod monte_carlo;
+pub mod scenario;
+// L8
+pub mod metrics;

@@ -1,0 +1,263 @@
+//! The reduction of a noise model to 15 states by what it does to a filter, not by its wavelet variance.
+//!
+//! A filter with one Gauss-Markov bias an axis cannot follow the processes of a larger model; the pair
+//! closest in wavelet variance leaves it overconfident. Here white noise, drive and correlation time of each
+//! sensor are chosen so that the filter's own covariance is closest to that of the errors it truly makes, in
+//! the sense of the Kullback-Leibler divergence, along a trajectory with its fixes and outages.
+
+use super::pass::{Assessment, Consistency, assess};
+use super::track::Track;
+use crate::earth::GravityModel;
+use crate::ekf::{Belief, InitialSettings};
+use crate::imu::Channel;
+use crate::noise::{Model, Process, reduction};
+use crate::sensors::defects::ImuSettings;
+use crate::sensors::gnss::GnssSettings;
+use crate::sensors::imu::Truth;
+use crate::sensors::outage::Outage;
+use crate::simulation::plan::Experiment;
+use crate::trajectory::Trajectory;
+use crate::trajectory::profile::{Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning};
+use crate::units::DEG;
+use nalgebra::{SMatrix, SVector};
+
+/// White noise, drive, correlation time of the accelerometer, then of the gyroscope.
+const FACTORS: usize = 6;
+/// Logarithms of factors on the wavelet reduction.
+type Factors = [f64; FACTORS];
+
+/// The belief of 15 states whose covariance is closest to that of the errors it makes along a track, where the
+/// errors are those of `model`; `wavelet` is the belief by wavelet variance, from which the search starts. Axes
+/// that are white noise and one bias already stay as they are.
+#[must_use]
+pub fn reduced_belief(model: &Model, wavelet: Belief, track: &Track) -> Belief {
+    let exact = Channel::ALL.map(|c| reduction::is_exact(model.axis(c)));
+    let is_free = |i: &usize| exact[i / 3 * 3..i / 3 * 3 + 3].contains(&false);
+    let free: Vec<usize> = (0..FACTORS).filter(is_free).collect();
+    if free.is_empty() {
+        return wavelet;
+    }
+    let search = Search { model, base: wavelet, track: track.coarse(), exact, free };
+    search.belief(&search.minimise())
+}
+
+/// The choice of six factors.
+struct Search<'a> {
+    model: &'a Model,
+    base: Belief,
+    track: Track,
+    /// Axes that are left as they are.
+    exact: [bool; 6],
+    /// Factors that act on an axis.
+    free: Vec<usize>,
+}
+
+impl Search<'_> {
+    fn belief(&self, ln: &Factors) -> Belief {
+        let mut belief = self.base.clone();
+        for channel in Channel::ALL.into_iter().filter(|c| !self.exact[c.index()]) {
+            let (s, i) = (channel.sensor as usize, channel.axis as usize);
+            // a factor needs something to act on: the wavelet fit may have put all white noise into the bias
+            let white = belief.white[s][i].max(white_of(self.model, channel));
+            belief.white[s][i] = white * ln[3 * s].exp();
+            let group = &mut belief.groups[s][0];
+            group.innovation[i] *= ln[3 * s + 1].exp();
+            let kappa = -(group.phi[i] - 1.0).ln_1p() * (-ln[3 * s + 2]).exp();
+            group.phi[i] = (-kappa).exp();
+        }
+        belief
+    }
+
+    fn cost(&self, ln: &Factors) -> f64 {
+        let assessment = assess(&self.track, &self.belief(ln), self.model);
+        cost(&assessment) + RIDGE * ln.iter().map(|x| x * x).sum::<f64>()
+    }
+
+    fn gradient(&self, ln: &Factors, cost: f64) -> Factors {
+        let mut gradient = [0.0; FACTORS];
+        for &i in &self.free {
+            let mut beside = *ln;
+            beside[i] += DIFFERENCE;
+            gradient[i] = (self.cost(&beside) - cost) / DIFFERENCE;
+        }
+        gradient
+    }
+
+    /// Quasi-Newton descent (BFGS) with forward differences: their error of a hundredth of a logarithm is far
+    /// below what matters.
+    fn minimise(&self) -> Factors {
+        type Matrix = SMatrix<f64, FACTORS, FACTORS>;
+        type Vector = SVector<f64, FACTORS>;
+        let mut x = [0.0; FACTORS];
+        for (i, start) in START.into_iter().enumerate() {
+            if self.free.contains(&i) {
+                x[i] = start;
+            }
+        }
+        let mut cost = self.cost(&x);
+        if !cost.is_finite() {
+            return [0.0; FACTORS];
+        }
+        let mut gradient = self.gradient(&x, cost);
+        let mut inverse = Matrix::identity() * 2.0;
+        for _ in 0..ITERATIONS {
+            let g = Vector::from(gradient);
+            let mut step = -(inverse * g);
+            let largest = step.amax();
+            if largest > MAX_STEP {
+                step *= MAX_STEP / largest;
+            }
+            let Some((next, next_cost)) = self.descend(&x, cost, &step.into(), g.dot(&step)) else { break };
+            let next_gradient = self.gradient(&next, next_cost);
+            let s = Vector::from_fn(|i, _| next[i] - x[i]);
+            let y = Vector::from(next_gradient) - g;
+            let (sy, gain) = (s.dot(&y), cost - next_cost);
+            if sy > 1e-12 {
+                let rho = 1.0 / sy;
+                let left = Matrix::identity() - s * y.transpose() * rho;
+                inverse = left * inverse * left.transpose() + s * s.transpose() * rho;
+            }
+            (x, cost, gradient) = (next, next_cost, next_gradient);
+            if gain < ENOUGH {
+                break;
+            }
+        }
+        x
+    }
+
+    /// Halves the step until it gains.
+    fn descend(&self, x: &Factors, cost: f64, step: &Factors, slope: f64) -> Option<(Factors, f64)> {
+        let mut share = 1.0;
+        for _ in 0..6 {
+            let next = std::array::from_fn(|i| (x[i] + share * step[i]).clamp(-MAX_LN, MAX_LN));
+            let next_cost = self.cost(&next);
+            if next_cost < cost + 1e-4 * share * slope {
+                return Some((next, next_cost));
+            }
+            share *= 0.4;
+        }
+        None
+    }
+}
+
+/// Where the search starts: about the mean of the optima of two IMUs on three trajectories.
+const START: Factors = [0.3, -0.3, 1.0, 0.3, 0.0, 0.4];
+/// Cost of a factor e: what the fixes do not tell stays near the wavelet reduction.
+const RIDGE: f64 = 5e-4;
+/// Step of the forward differences.
+const DIFFERENCE: f64 = 0.02;
+const ITERATIONS: usize = 12;
+/// Longest step of a factor's logarithm, and its largest value.
+const MAX_STEP: f64 = 1.0;
+const MAX_LN: f64 = 6.0;
+/// A step that gains less is the last: 2e-4 of divergence is 1 % in one standard deviation.
+const ENOUGH: f64 = 2e-4;
+/// Share of the outage ends in the cost.
+const ENDS: f64 = 0.3;
+/// A ratio whose logarithm is this far from 0 begins to count for itself, with this weight.
+const OFF: f64 = 0.1;
+const OFF_WEIGHT: f64 = 0.3;
+
+/// The divergence at the outage ends and on the average; a single state whose ratio is a tenth off counts beside
+/// it, steeply: the divergence alone gives one state away for eight.
+fn cost(assessment: &Assessment) -> f64 {
+    let mean =
+        |c: &[Consistency], f: &dyn Fn(&Consistency) -> f64| c.iter().map(f).sum::<f64>() / c.len() as f64;
+    // The first instant is the initial state, which no reduction changes. A trajectory of a few seconds has no
+    // other: the mean of none is NaN, and the search ends where it starts.
+    let all = mean(assessment.reports.get(1..).unwrap_or_default(), &|c| c.divergence);
+    if assessment.outage_ends.is_empty() {
+        return all;
+    }
+    let off = |c: &Consistency| c.ratio().iter().map(|r| (r.ln() / OFF).powi(4)).sum::<f64>();
+    let ends = mean(&assessment.outage_ends, &|c| c.divergence + OFF_WEIGHT * off(c));
+    ENDS * ends + (1.0 - ENDS) * all
+}
+
+/// White noise that the model has for certain.
+fn white_of(model: &Model, channel: Channel) -> f64 {
+    let white = |p: &Process| match p {
+        Process::White(p) => p.sigma2(),
+        Process::Ma1(p) => (1.0 + p.theta()).powi(2) * p.sigma2(),
+        _ => 0.0,
+    };
+    model.axis(channel).processes.iter().map(white).sum()
+}
+
+/// Time before the first outage, between the two and after them (s).
+const LEAD_S: [f64; 3] = [300.0, 240.0, 60.0];
+/// Longest outage that is followed along the drive (s).
+const LONGEST_S: f64 = 600.0;
+/// Samples a second along the drive: enough for its turns.
+const DRIVE_HZ: f64 = 10.0;
+
+/// A built-in drive with a receiver and two outages, as long as the shortest and the longest of `outages_s` (s):
+/// for data whose reference is not known. None where the receiver's rate does not allow it.
+#[must_use]
+pub fn drive(model: &Model, gnss: &GnssSettings, outages_s: &[f64]) -> Option<Track> {
+    let longest = outages_s.iter().copied().fold(0.0, f64::max).min(LONGEST_S);
+    let shortest = outages_s.iter().copied().fold(longest, f64::min);
+    let first = LEAD_S[0] + shortest;
+    let second = first + LEAD_S[1];
+    let duration = second + longest + LEAD_S[2];
+    let outages: Vec<Outage> = [(LEAD_S[0], first), (second, second + longest)]
+        .into_iter()
+        .filter(|(start_s, end_s)| end_s > start_s)
+        .map(|(start_s, end_s)| Outage { start_s, end_s })
+        .collect();
+    let trajectory = path(duration)?;
+    let often = gnss.rate_hz.max(1.0);
+    // many fixes a second count as one of their mean
+    let gnss = GnssSettings {
+        rate_hz: gnss.rate_hz.min(1.0),
+        pos_sigma_m: gnss.pos_sigma_m.map(|s| s / often.sqrt()),
+        vel_sigma_m_s: gnss.vel_sigma_m_s.map(|v| v.map(|s| s / often.sqrt())),
+        ..gnss.clone()
+    };
+    let rate_hz = gnss.rate_hz * (DRIVE_HZ / gnss.rate_hz).ceil();
+    let experiment = Experiment {
+        trajectory: &trajectory,
+        rate_hz,
+        gravity: GravityModel::default(),
+        truth: Truth::Model(model),
+        beliefs: &[],
+        gnss: &gnss,
+        initial: &InitialSettings::default(),
+        defects: &ImuSettings::default(),
+        baro: None,
+        nis_gate: None,
+        outages: &outages,
+        seed: 0,
+        scenario: "",
+        coverage_level: 0.95,
+    };
+    Track::of_noise_at(model.rate_hz, &experiment).ok()
+}
+
+/// A drive of at least that long: what a car meets in town and out of it, over and over.
+fn path(duration_s: f64) -> Option<Trajectory> {
+    let straight = |s: f64| Kind::Straight(Length::Duration(s));
+    let accelerate = |to_speed: f64, s: f64| Kind::Accelerate { to_speed, by: Acceleration::Duration(s) };
+    let turn = |deg: f64, s: f64| Kind::Turn { angle: deg * DEG, by: Turning::Duration(s) };
+    let cycle = [
+        accelerate(14.0, 11.0),
+        straight(12.0),
+        turn(90.0, 9.0),
+        straight(15.0),
+        accelerate(8.0, 6.0),
+        turn(-60.0, 8.0),
+        accelerate(20.0, 12.0),
+        straight(25.0),
+        turn(-100.0, 13.0),
+        turn(60.0, 11.0),
+        straight(10.0),
+        accelerate(0.0, 14.0),
+        straight(12.0),
+    ];
+    let cycle_s = 158.0;
+    let segment = |kind: &Kind| Segment { kind: kind.clone(), climb_m: 0.0, ramp_s: None };
+    let cycles = (duration_s / cycle_s).ceil() as usize;
+    let segments = cycle.iter().cycle().take(cycles * cycle.len()).map(segment).collect();
+    let start = Start { t_s: 0.0, lat: 45.0 * DEG, lon: 0.0, h: 0.0, heading: 40.0 * DEG, speed: 0.0 };
+    Profile { start, bank: Bank::None, ramp_s: 1.5, segments }.build().ok()
+}

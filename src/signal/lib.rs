@@ -1,0 +1,15 @@
+//! Signals of an inertial sensor: noise processes and models, their synthesis, and the wavelet variance.
+//!
+//! Part of [nav-sim](https://docs.rs/nav-sim), which re-exports its modules; calibration and navigation both
+//! stand on it and never import each other.
+//! The modules are listed in layer order: one names only what stands above it.
+
+// L0
+pub mod bibliography;
+pub mod rng;
+pub mod units;
+// L1
+pub mod imu;
+// L2
+pub mod noise;
+pub mod wavelet;

@@ -1,0 +1,331 @@
+//! How parameters vary between replicates: each time an IMU is switched on, its noise is drawn from a model
+//! that is itself drawn (θ_i ~ G, [Minaretzis](crate::bibliography::Minaretzis24), eq. 1).
+//!
+//! In a model file:
+//! ```toml
+//! [[spread.accel]]                  # the three axes alike; or [[spread.accel.x]], …
+//! process = "AR1_1"                 # label of the process: "WN", "AR1_1", "AR1_2", …
+//! parameter = "phi"
+//! distribution = "beta"             # low + width·B, B ~ Beta(a, b)
+//! a = 6.0
+//! b = 2.0
+//! low = 0.9835489
+//! width = 3.4476489e-3
+//!
+//! [[spread.gyro]]
+//! process = "WN"
+//! parameter = "sigma2"
+//! distribution = "normal"           # about the model's value, drawn again while outside its domain
+//! sd = 1.0e-9
+//! ```
+//! A parameter without a law keeps the model's value. Every axis of every replicate draws for itself, also
+//! where one law stands for three axes.
+
+use super::{Composite, Model, ParameterError, Process};
+use crate::imu::Channel;
+use crate::rng::{Generator, StreamKey};
+use rand::RngExt;
+use rand_distr::{Beta, StandardNormal};
+
+/// A law that cannot be.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SpreadError {
+    /// The model has no process of that label.
+    #[error("the model has no process \"{label}\" there, only {}", known.join(", "))]
+    NoProcess {
+        /// What was asked for.
+        label: String,
+        /// What there is.
+        known: Vec<String>,
+    },
+    /// The process has no parameter of that name.
+    #[error("{process} has no parameter \"{parameter}\", only {}", known.join(", "))]
+    NoParameter {
+        /// Code of the process.
+        process: &'static str,
+        /// What was asked for.
+        parameter: String,
+        /// What there is.
+        known: Vec<&'static str>,
+    },
+    /// A constant of the law is outside its domain.
+    #[error("{name} = {value} is not {domain}")]
+    Constant {
+        /// Name of the constant.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What would be accepted.
+        domain: &'static str,
+    },
+    /// The law would draw values that the process cannot have.
+    #[error("the law reaches values that are refused: {0}")]
+    Reaches(ParameterError),
+}
+
+/// A distribution.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Law {
+    /// low + width·B, B ~ Beta(a, b).
+    Beta {
+        /// First shape.
+        a: f64,
+        /// Second shape.
+        b: f64,
+        /// Least value (units of the parameter).
+        low: f64,
+        /// Greatest less least value (units of the parameter).
+        width: f64,
+    },
+    /// Normal about the model's value, truncated to the parameter's domain.
+    Normal {
+        /// Standard deviation before truncation (units of the parameter).
+        sd: f64,
+    },
+}
+
+/// The law of one parameter of one process of one axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Variation {
+    process: String,
+    parameter: String,
+    law: Law,
+}
+
+impl Variation {
+    /// The law of `parameter` of the process labelled `process` in `noise` sampled at `rate_hz`.
+    ///
+    /// # Errors
+    /// When the process or parameter does not exist, or the law is no law or leaves the domain.
+    pub fn new(
+        noise: &Composite,
+        rate_hz: f64,
+        process: &str,
+        parameter: &str,
+        law: Law,
+    ) -> Result<Self, SpreadError> {
+        let labels = noise.labels();
+        let Some(at) = labels.iter().position(|l| l == process) else {
+            return Err(SpreadError::NoProcess { label: process.to_owned(), known: labels });
+        };
+        let variation = Self { process: process.to_owned(), parameter: parameter.to_owned(), law };
+        variation.check_constants()?;
+        let (low, high) = match law {
+            Law::Beta { low, width, .. } => (low, low + width),
+            Law::Normal { .. } => {
+                let value = variation.centre(&noise.processes[at])?;
+                (value, value)
+            }
+        };
+        for end in [low, high] {
+            variation.applied(&noise.processes[at], end, rate_hz)?;
+        }
+        Ok(variation)
+    }
+
+    /// Label of the process, as [`Composite::labels`].
+    #[must_use]
+    pub fn process(&self) -> &str {
+        &self.process
+    }
+
+    /// Name of the parameter, as [`Process::parameters`].
+    #[must_use]
+    pub fn parameter(&self) -> &str {
+        &self.parameter
+    }
+
+    /// Its law.
+    #[must_use]
+    pub const fn law(&self) -> Law {
+        self.law
+    }
+
+    fn check_constants(&self) -> Result<(), SpreadError> {
+        let check = |name, value: f64, ok: bool, domain| {
+            if value.is_finite() && ok { Ok(()) } else { Err(SpreadError::Constant { name, value, domain }) }
+        };
+        match self.law {
+            Law::Beta { a, b, low, width } => {
+                check("a", a, a > 0.0, "a finite number > 0")?;
+                check("b", b, b > 0.0, "a finite number > 0")?;
+                check("low", low, true, "a finite number")?;
+                check("width", width, width >= 0.0, "a finite number ≥ 0")
+            }
+            // Below 1, at least 47 % of the draws of a coefficient in (−1, 1) are inside: redrawing ends.
+            Law::Normal { sd } if matches!(self.parameter.as_str(), "phi" | "theta") => {
+                check("sd", sd, (0.0..=1.0).contains(&sd), "between 0 and 1")
+            }
+            Law::Normal { sd } => check("sd", sd, sd >= 0.0, "a finite number ≥ 0"),
+        }
+    }
+
+    /// The error of a law for a parameter that the process does not have.
+    pub fn no_parameter(&self, process: &Process) -> SpreadError {
+        let known = process.parameters().into_iter().map(|(n, _)| n).collect();
+        SpreadError::NoParameter { process: process.code(), parameter: self.parameter.clone(), known }
+    }
+
+    fn centre(&self, process: &Process) -> Result<f64, SpreadError> {
+        let parameters = process.parameters();
+        let found = parameters.iter().find(|(n, _)| *n == self.parameter);
+        found.map(|(_, v)| *v).ok_or_else(|| self.no_parameter(process))
+    }
+
+    fn applied(&self, process: &Process, value: f64, rate_hz: f64) -> Result<Process, SpreadError> {
+        let changed = process.with_parameter(&self.parameter, value, rate_hz);
+        changed.ok_or_else(|| self.no_parameter(process))?.map_err(SpreadError::Reaches)
+    }
+
+    /// The process with this parameter drawn.
+    fn draw(&self, process: &Process, rate_hz: f64, g: &mut Generator) -> Result<Process, SpreadError> {
+        match self.law {
+            Law::Beta { a, b, low, width } => {
+                let error = |_| SpreadError::Constant { name: "a", value: a, domain: "usable with b" };
+                let share: f64 = g.sample(Beta::new(a, b).map_err(error)?);
+                self.applied(process, low + width * share, rate_hz)
+            }
+            Law::Normal { sd } => {
+                let centre = self.centre(process)?;
+                loop {
+                    match self.applied(process, centre + sd * g.sample::<f64, _>(StandardNormal), rate_hz) {
+                        Err(SpreadError::Reaches(_)) => {}
+                        done => return done,
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// The laws of the six axes, in the order of [`Channel::ALL`].
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Spread {
+    /// For each axis, the parameters that vary.
+    pub axes: [Vec<Variation>; 6],
+}
+
+impl Spread {
+    /// The model of one replicate (counted from 0): every law drawn, from streams of its own.
+    ///
+    /// # Errors
+    /// When a law does not belong to this model ([`Variation::new`] was given another one).
+    pub fn draw(&self, model: &Model, seed: u64, replicate: u64) -> Result<Model, SpreadError> {
+        let mut drawn = model.clone();
+        for channel in Channel::ALL {
+            let source = channel.to_string();
+            let noise = &mut drawn.axes[channel.index()];
+            let labels = noise.labels();
+            for variation in &self.axes[channel.index()] {
+                let Some(at) = labels.iter().position(|l| *l == variation.process) else {
+                    return Err(SpreadError::NoProcess { label: variation.process.clone(), known: labels });
+                };
+                let process = format!("spread.{}.{}", variation.process, variation.parameter);
+                let key =
+                    StreamKey { seed, scenario: "", run: replicate, source: &source, process: &process };
+                noise.processes[at] =
+                    variation.draw(&noise.processes[at], model.rate_hz, &mut key.generator())?;
+            }
+        }
+        Ok(drawn)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RATE: f64 = 100.0;
+
+    fn n1() -> Composite {
+        let process = |code, values: &[f64]| Process::from_values(code, values, RATE).unwrap().unwrap();
+        Composite::new(vec![
+            process("WN", &[5e-5]),
+            process("AR1", &[0.985, 1.5e-8]),
+            process("RW", &[3e-11]),
+        ])
+    }
+
+    fn spread(process: &str, parameter: &str, law: Law) -> Spread {
+        let variation = Variation::new(&n1(), RATE, process, parameter, law).unwrap();
+        Spread { axes: std::array::from_fn(|_| vec![variation.clone()]) }
+    }
+
+    fn drawn(spread: &Spread, replicates: u64, axis: usize, at: (usize, usize)) -> Vec<f64> {
+        let model = Model::pooled(RATE, &n1(), &n1());
+        let value = |r| spread.draw(&model, 1, r).unwrap().axes[axis].processes[at.0].parameters()[at.1].1;
+        (0..replicates).map(value).collect()
+    }
+
+    /// Mean a/(a+b) and variance ab/((a+b)²(a+b+1)) of a beta law; the mean of n draws is within 5 of its
+    /// standard deviations.
+    #[test]
+    fn beta_has_its_range_and_moments() {
+        let (a, b, low, width) = (6.0, 2.0, 0.983_548_9, 3.447_648_9e-3);
+        let x = drawn(&spread("AR1", "phi", Law::Beta { a, b, low, width }), 4000, 0, (1, 0));
+        assert!(x.iter().all(|v| (low..=low + width).contains(v)));
+        let n = x.len() as f64;
+        let mean = x.iter().sum::<f64>() / n;
+        let variance = width * width * a * b / ((a + b) * (a + b) * (a + b + 1.0));
+        assert!((mean - (low + width * 0.75)).abs() < 5.0 * (variance / n).sqrt());
+        // The law is lighter-tailed than the normal: the variance's standard deviation is below the normal's.
+        let sample = x.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
+        assert!((sample - variance).abs() < 5.0 * variance * (2.0 / n).sqrt());
+    }
+
+    /// Truncated at 0 from a standard normal about 0: mean √(2/π)·sd, variance (1 − 2/π)·sd².
+    #[test]
+    fn normal_is_truncated_to_the_domain() {
+        let mut noise = n1();
+        noise.processes[0] = Process::from_values("WN", &[0.0], RATE).unwrap().unwrap();
+        let law = Law::Normal { sd: 2.0 };
+        let variation = Variation::new(&noise, RATE, "WN", "sigma2", law).unwrap();
+        let mut spread = Spread::default();
+        spread.axes[0].push(variation);
+        let model = Model::pooled(RATE, &noise, &noise);
+        let x: Vec<f64> = (0..4000)
+            .map(|r| spread.draw(&model, 1, r).unwrap().axes[0].processes[0].parameters()[0].1)
+            .collect();
+        let n = x.len() as f64;
+        let (mean, pi) = (x.iter().sum::<f64>() / n, std::f64::consts::PI);
+        assert!(x.iter().all(|v| *v >= 0.0));
+        let bound = 5.0 * 2.0 * ((1.0 - 2.0 / pi) / n).sqrt();
+        assert!((mean - 2.0 * (2.0 / pi).sqrt()).abs() < bound, "{mean}");
+    }
+
+    #[test]
+    fn axes_and_replicates_draw_for_themselves_and_repeat() {
+        let s = spread("WN", "sigma2", Law::Beta { a: 3.0, b: 4.0, low: 5e-5, width: 5e-6 });
+        let (x, y) = (drawn(&s, 3, 0, (0, 0)), drawn(&s, 3, 1, (0, 0)));
+        assert_ne!(x[..1], x[1..2]);
+        assert_ne!(x, y);
+        assert_eq!(x, drawn(&s, 3, 0, (0, 0)));
+    }
+
+    #[test]
+    fn what_is_not_drawn_keeps_its_value() {
+        let s = spread("WN", "sigma2", Law::Normal { sd: 1e-6 });
+        assert_eq!(drawn(&s, 5, 3, (1, 0)), [0.985; 5]);
+    }
+
+    #[test]
+    fn impossible_laws_are_refused_in_words() {
+        let refusal = |process, parameter, law| {
+            Variation::new(&n1(), RATE, process, parameter, law).unwrap_err().to_string()
+        };
+        let beta = |a, low, width| Law::Beta { a, b: 1.0, low, width };
+        let normal = |sd| Law::Normal { sd };
+        assert_eq!(
+            refusal("AR1_2", "phi", normal(0.1)),
+            "the model has no process \"AR1_2\" there, only WN, AR1, RW"
+        );
+        assert_eq!(refusal("AR1", "ph", normal(0.1)), "AR1 has no parameter \"ph\", only phi, sigma2");
+        assert_eq!(refusal("WN", "sigma2", beta(0.0, 0.0, 1.0)), "a = 0 is not a finite number > 0");
+        assert_eq!(refusal("AR1", "phi", normal(2.0)), "sd = 2 is not between 0 and 1");
+        assert_eq!(refusal("WN", "sigma2", normal(f64::NAN)), "sd = NaN is not a finite number ≥ 0");
+        assert_eq!(
+            refusal("AR1", "phi", beta(1.0, 0.5, 0.5)),
+            "the law reaches values that are refused: AR1: phi = 1 is not between −1 and 1 (exclusive)"
+        );
+    }
+}

@@ -1,0 +1,471 @@
+//! `nav-sim batch` as a user runs it: sharded, stopped, damaged, misused.
+
+use crate::common::batch::*;
+use std::fs;
+use std::path::Path;
+
+const FILES: [&str; 8] = [
+    "epochs.csv",
+    "epochs.parquet",
+    "outages.csv",
+    "outages.json",
+    "outages.parquet",
+    "runs.parquet",
+    "study.json",
+    "tables.md",
+];
+
+/// Plans and runs the study in one process.
+fn whole(dir: &Path, out: &str) -> Vec<(String, Vec<u8>)> {
+    done(dir, &format!("plan study.toml -o {out}"));
+    done(dir, &format!("run study.toml -o {out} -j 1"));
+    done(dir, &format!("merge study.toml -o {out}"));
+    results(&dir.join(out))
+}
+
+#[test]
+fn shards_in_any_order_on_any_threads_merge_to_the_same_bytes() {
+    let place = place();
+    let dir = place.path();
+    let undisturbed = whole(dir, "one");
+    assert_eq!(undisturbed.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), FILES);
+    done(dir, "plan study.toml -o three");
+    for shard in ["2/3 -j 2", "0/3 -j 1", "1/3 -j 3"] {
+        let said = refused(dir, "merge study.toml -o three", 75);
+        assert!(said.contains("of 50 units are missing or damaged: "), "{said}");
+        assert!(!dir.join("three/results").exists());
+        done(dir, &format!("run study.toml -o three --shard {shard}"));
+    }
+    done(dir, "merge study.toml -o three -j 2");
+    assert_eq!(results(&dir.join("three")), undisturbed);
+    let said = done(dir, "run study.toml -o three");
+    assert!(said.contains("50 units are done already, 0 to do"), "{said}");
+    let verified = batch(dir, "verify study.toml -o three --units 5 --seed 1");
+    assert!(verified.status.success());
+    assert!(String::from_utf8_lossy(&verified.stdout).starts_with("5 of 50 finished units"));
+}
+
+/// One unit a cell is the same sums as `nav-sim run`, to the last bit.
+#[test]
+fn a_cell_is_what_run_makes() {
+    let place = place();
+    let dir = place.path();
+    let study = STUDY.replace("unit_runs = 8", "unit_runs = 77");
+    fs::write(dir.join("study.toml"), study).unwrap();
+    whole(dir, "one");
+    let arguments = "run drive.toml wrong.toml --truth imu.toml --outage 30:38 --runs 77 --seed 5 -o single";
+    let ran = std::process::Command::new(env!("CARGO_BIN_EXE_nav-sim"))
+        .current_dir(dir)
+        .args(arguments.split_whitespace())
+        .output()
+        .unwrap();
+    assert!(ran.status.success());
+    let mut single = csv::Reader::from_path(dir.join("single/epochs.csv")).unwrap();
+    let mut all = csv::Reader::from_path(dir.join("one/results/epochs.csv")).unwrap();
+    let (single_head, all_head) = (single.headers().unwrap().clone(), all.headers().unwrap().clone());
+    let at = |head: &csv::StringRecord, name: &str| head.iter().position(|h| h == name).unwrap();
+    let (set, candidate) = (at(&all_head, "outage_set"), at(&all_head, "candidate"));
+    let mine = all.records().map(Result::unwrap);
+    let mine: Vec<_> = mine.filter(|r| &r[set] == "sweep(30,8)" && &r[candidate] == "wrong").collect();
+    let single: Vec<_> = single.records().map(Result::unwrap).collect();
+    assert_eq!((mine.len(), single.len()), (61, 61));
+    for (a, b) in mine.iter().zip(&single) {
+        for (i, name) in single_head.iter().enumerate() {
+            let name = if name == "gnss" { "fix" } else { name };
+            assert_eq!(a[at(&all_head, name)], b[i], "{name}");
+        }
+    }
+}
+
+#[test]
+fn damaged_units_are_noticed_and_computed_again() {
+    let place = place();
+    let dir = place.path();
+    let undisturbed = whole(dir, "out");
+    let files = units(&dir.join("out"));
+    assert_eq!(files.len(), UNITS);
+    let bytes = fs::read(&files[3]).unwrap();
+    fs::write(&files[3], &bytes[..bytes.len() / 2]).unwrap();
+    let mut flipped = fs::read(&files[7]).unwrap();
+    flipped[500] ^= 1;
+    fs::write(&files[7], flipped).unwrap();
+    fs::write(&files[9], "").unwrap();
+    fs::copy(&files[20], &files[21]).unwrap();
+    fs::remove_dir_all(dir.join("out/results")).unwrap();
+    let said = refused(dir, "merge study.toml -o out", 75);
+    assert!(said.contains("4 of 50 units are missing or damaged"), "{said}");
+    assert!(!dir.join("out/results").exists());
+    let said = refused(dir, "verify study.toml -o out --units 1 --seed 1", 3);
+    assert!(
+        said.contains("4 units are damaged: ") && said.matches(".unit is damaged").count() == 4,
+        "{said}"
+    );
+    refused(dir, "verify study.toml -o out --units 0", 2);
+    let said = done(dir, "run study.toml -o out");
+    assert_eq!(said.matches("it is computed again").count(), 4, "{said}");
+    done(dir, "merge study.toml -o out");
+    assert_eq!(results(&dir.join("out")), undisturbed);
+}
+
+/// A directory in a unit's place, and a whole unit of other runs or other outages under its name: `merge` says they
+/// are damaged, and `run` mends them.
+#[test]
+fn what_stands_in_the_place_of_a_unit_is_computed_again() {
+    use nav_sim::data::unit_file;
+    let place = place();
+    let dir = place.path();
+    let undisturbed = whole(dir, "out");
+    let files = units(&dir.join("out"));
+    fs::remove_file(&files[3]).unwrap();
+    fs::create_dir(&files[3]).unwrap();
+    fs::write(files[3].join("note"), "mine").unwrap();
+    let forge = |file: &Path, change: &dyn Fn(&mut nav_sim::batch::UnitResult)| {
+        let id = file.file_stem().unwrap().to_str().unwrap();
+        let mut unit = unit_file::read(&dir.join("out"), id).unwrap();
+        change(&mut unit);
+        fs::write(file, unit_file::encode(&unit)).unwrap();
+    };
+    forge(&files[7], &|unit| unit.columns[1].runs[0].run += 1);
+    let has_outages = |file: &&std::path::PathBuf| {
+        let id = file.file_stem().unwrap().to_str().unwrap();
+        unit_file::read(&dir.join("out"), id).is_ok_and(|unit| !unit.columns[0].outages.is_empty())
+    };
+    let other = files[8..].iter().find(has_outages).unwrap();
+    forge(other, &|unit| unit.columns.iter_mut().for_each(|c| c.outages[0].1 += 1.0));
+    fs::remove_dir_all(dir.join("out/results")).unwrap();
+    refused(dir, "merge study.toml -o out", 75);
+    let said = done(dir, "run study.toml -o out");
+    assert_eq!(said.matches("it is computed again").count(), 3, "{said}");
+    assert!(said.contains(".unit is damaged: it is a directory; it is computed again"), "{said}");
+    assert_eq!(fs::read(files[3].with_extension("unit.damaged").join("note")).unwrap(), b"mine");
+    done(dir, "merge study.toml -o out");
+    assert_eq!(results(&dir.join("out")), undisturbed);
+}
+
+#[test]
+fn what_changed_since_the_plan_is_refused() {
+    let place = place();
+    let dir = place.path();
+    done(dir, "plan study.toml -o out");
+    assert!(done(dir, "plan study.toml -o out").contains("was planned already"));
+    fs::write(dir.join("imu.toml"), MODEL.replace("1e-9", "2e-9")).unwrap();
+    for command in ["run", "plan"] {
+        let said = refused(dir, &format!("{command} study.toml -o out"), 2);
+        assert!(said.contains("has changed since the study was planned"), "{said}");
+    }
+    fs::write(dir.join("imu.toml"), MODEL).unwrap();
+    fs::write(dir.join("study.toml"), STUDY.replace("runs = 77", "runs = 78")).unwrap();
+    for command in ["plan", "run", "merge", "status"] {
+        let said = refused(dir, &format!("{command} study.toml -o out"), 2);
+        assert!(said.contains("\"runs\" is 77 in the plan, 78 in the study"), "{said}");
+    }
+    fs::write(dir.join("study.toml"), STUDY.replace("seed = 5\n", "")).unwrap();
+    done(dir, "status study.toml -o out");
+    let said = refused(dir, "plan study.toml -o out --seed 6", 2);
+    assert!(said.contains("\"seed\" is 5 in the plan, 6 in the study"), "{said}");
+    // --seed wins over the study's, then and later
+    fs::write(dir.join("study.toml"), STUDY).unwrap();
+    done(dir, "plan study.toml -o seven --seed 7");
+    done(dir, "run study.toml -o seven --shard 0/50");
+    assert!(fs::read_to_string(dir.join("seven/plan.json")).unwrap().contains("\"seed\": 7"));
+    let plan = fs::read_to_string(dir.join("out/plan.json")).unwrap();
+    let other = plan.replace("\"version\": \"", "\"version\": \"0.0.");
+    fs::write(dir.join("out/plan.json"), other).unwrap();
+    let said = refused(dir, "run study.toml -o out", 2);
+    assert!(said.contains("the plan was made by nav-sim 0.0."), "{said}");
+}
+
+#[test]
+fn units_of_another_plan_are_named_and_left_out() {
+    let place = place();
+    let dir = place.path();
+    whole(dir, "five");
+    fs::write(dir.join("study.toml"), STUDY.replace("seed = 5", "seed = 6")).unwrap();
+    let undisturbed = whole(dir, "six");
+    let stray = units(&dir.join("five")).remove(0);
+    let inner = dir.join("six/units").join(stray.parent().unwrap().file_name().unwrap());
+    fs::create_dir_all(&inner).unwrap();
+    fs::copy(&stray, inner.join(stray.file_name().unwrap())).unwrap();
+    for command in ["plan", "run", "merge", "status"] {
+        let said = done(dir, &format!("{command} study.toml -o six"));
+        assert!(said.contains("1 unit files are of another plan and left out, such as six/units/"), "{said}");
+    }
+    assert_eq!(results(&dir.join("six")), undisturbed);
+}
+
+/// Names with a slash, several filters: every candidate and filter has a row of its own, with its numbers.
+#[test]
+fn every_candidate_and_filter_is_in_the_ratio_table() {
+    let place = place();
+    let dir = place.path();
+    let candidates = "{ name = \"clean/awv\", model = \"imu.toml\" }, { name = \"III/awv\", model = \"wrong.toml\" }, \
+         { name = \"II\", calibrate = { estimators = [\"awv\", \"dr-awv\"], fit = \"AR1+WN\", trim = 1, \
+         synthesize = { model = \"imu.toml\", replicates = 3, samples = 8192, axes = \"x\" } } }";
+    let study =
+        STUDY.replace("{ model = \"imu.toml\" }, { name = \"wrong\", model = \"wrong.toml\" }", candidates);
+    let study = study.replace("runs = 77", "runs = 8\nreference = \"III/awv\"\nfilters = [15, \"full\"]");
+    fs::write(dir.join("study.toml"), study.replace("[2, 4, 8, 16]", "[8]")).unwrap();
+    // two processes, which 15 states reduce to one
+    let two = MODEL.replace("4e-12 }", "4e-12 }, { type = \"AR1\", phi = 0.99, sigma2 = 1e-8 }");
+    fs::write(dir.join("wrong.toml"), two).unwrap();
+    whole(dir, "out");
+    let text = fs::read_to_string(dir.join("out/results/tables.md")).unwrap();
+    let (_, ratios) = text.split_once(": ASEE relative to III/awv with the same filter, mean").unwrap();
+    let ratios = ratios.split("none: ASEE").next().unwrap();
+    let filters = ["15", "full"];
+    for name in ["clean/awv", "III/awv", "II"].iter().flat_map(|c| filters.map(|f| format!("{c} {f}"))) {
+        let row: Vec<&str> = ratios.lines().filter(|l| l.contains(&name)).collect();
+        assert_eq!(row.len(), 1, "{name}: {ratios}");
+        // two states are shown, each by estimator: two for the calibrated ones, none for the others
+        let filled = row[0].matches('(').count() + row[0].matches(" –").count();
+        assert_eq!(filled, if name.starts_with("II ") { 4 } else { 2 }, "{ratios}");
+        assert_eq!(row[0].contains('–'), name.starts_with("III"), "{ratios}");
+    }
+    let text = fs::read_to_string(dir.join("out/results/outages.json")).unwrap();
+    let rows: Vec<serde_json::Value> = serde_json::from_str(&text).unwrap();
+    assert_eq!(rows.len(), 4 * 2);
+    let mut different = false;
+    for row in &rows {
+        assert_eq!(row["reference"], "III/awv");
+        let of_reference =
+            |r: &&serde_json::Value| r["candidate"] == row["reference"] && r["filter"] == row["filter"];
+        let own = rows.iter().find(of_reference).unwrap();
+        assert_eq!(row["nees_mean_reference"], own["nees_mean"]);
+        different |= own["nees_mean"] != rows[0]["nees_mean_reference"];
+    }
+    assert!(different, "the two filters are two references");
+}
+
+#[test]
+fn tables_of_an_earlier_plan_do_not_survive() {
+    let place = place();
+    let dir = place.path();
+    whole(dir, "out");
+    fs::remove_file(dir.join("out/plan.json")).unwrap();
+    let study = STUDY.replace("seed = 5", "seed = 6").replace(", \"epochs\"]", "]");
+    fs::write(dir.join("study.toml"), &study).unwrap();
+    let said = done(dir, "plan study.toml -o out");
+    assert!(said.contains("50 unit files are of another plan and left out"), "{said}");
+    assert!(said.contains("out/results holds the tables of another plan"), "{said}");
+    let said = refused(dir, "merge study.toml -o out", 75);
+    assert!(said.contains("out/results is of another plan"), "{said}");
+    let again = whole(dir, "out");
+    let names: Vec<&str> = again.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, FILES.into_iter().filter(|f| !f.starts_with("epochs")).collect::<Vec<_>>());
+    assert_eq!(again, whole(dir, "fresh"));
+}
+
+#[test]
+fn another_seed_than_the_plans_is_refused() {
+    let place = place();
+    let dir = place.path();
+    done(dir, "plan study.toml -o out");
+    for command in ["run", "merge", "status", "plan"] {
+        let said = refused(dir, &format!("{command} study.toml -o out --seed 6"), 2);
+        assert!(said.contains("\"seed\" is 5 in the plan, 6 in the study"), "{said}");
+    }
+    done(dir, "status study.toml -o out --seed 5");
+}
+
+#[test]
+fn what_is_missing_is_told_by_cell_and_runs() {
+    let place = place();
+    let dir = place.path();
+    let said = done(dir, "plan study.toml -o out");
+    assert!(said.contains("cell \"none\" has no outages: its table is empty"), "{said}");
+    done(dir, "run study.toml -o out --shard 0/2");
+    let output = batch(dir, "merge study.toml -o out --format json -v");
+    assert_eq!(output.status.code(), Some(75));
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let missing = json["missing"].as_array().unwrap();
+    assert_eq!((json["units"].as_u64(), missing.len()), (Some(50), 25));
+    assert_eq!(missing[0]["runs"], serde_json::json!([8, 16]));
+    assert_eq!(missing[24]["cell"], serde_json::json!(["drive", "imu", "default", "default", "none"]));
+    assert_eq!(missing[24]["runs"], serde_json::json!([72, 77]));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    for unit in missing {
+        assert!(said.contains(&format!("{}: drive, imu, default", unit["unit"].as_str().unwrap())), "{said}");
+    }
+    assert!(said.contains("none, runs 72 to 76"), "{said}");
+}
+
+#[test]
+fn a_time_limit_and_sigterm_end_with_75_and_two_on_one_shard_do_no_harm() {
+    let place = place();
+    let dir = place.path();
+    let undisturbed = whole(dir, "one");
+    done(dir, "plan study.toml -o out");
+    // Not one unit fits: to go on would be to go on for ever.
+    let said = refused(dir, "run study.toml -o out --time-limit 0", 1);
+    assert!(said.contains("the time limit is too short for a single unit; 50 units left"), "{said}");
+    // A study that lasts, to be stopped.
+    fs::write(dir.join("long.toml"), STUDY.replace("runs = 77", "runs = 100000")).unwrap();
+    done(dir, "plan long.toml -o long");
+    let said = refused(dir, "run long.toml -o long --time-limit 3", 75);
+    assert!(said.contains("stopped by the time limit; ") && said.contains("goes on"), "{said}");
+    units(&dir.join("long")).iter().for_each(|unit| fs::remove_file(unit).unwrap());
+    let mut child = spawn(dir, "run long.toml -o long");
+    while units(&dir.join("long")).is_empty() {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    let kill = std::process::Command::new("kill").args(["-TERM", &child.id().to_string()]).status();
+    assert!(kill.unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(75));
+    let mut twins = [spawn(dir, "run study.toml -o out -j 1"), spawn(dir, "run study.toml -o out -j 1")];
+    assert!(twins.iter_mut().all(|t| t.wait().unwrap().success()));
+    done(dir, "merge study.toml -o out");
+    assert_eq!(results(&dir.join("out")), undisturbed);
+}
+
+#[test]
+fn the_scheduler_says_which_shard() {
+    let place = place();
+    let dir = place.path();
+    done(dir, "plan study.toml -o out");
+    let slurm = |index: &str| {
+        let mut command = command(dir, "run study.toml -o out");
+        command.env("SLURM_ARRAY_TASK_ID", index).env("SLURM_ARRAY_TASK_MIN", "1");
+        command.env("SLURM_ARRAY_TASK_COUNT", "2").output().unwrap()
+    };
+    let output = slurm("2");
+    assert!(output.status.success());
+    assert!(String::from_utf8_lossy(&output.stderr).contains("shard 1/2 (SLURM_ARRAY_TASK_ID=2)"));
+    assert_eq!(units(&dir.join("out")).len(), 25);
+    assert!(slurm("1").status.success());
+    assert_eq!(units(&dir.join("out")).len(), UNITS);
+    assert_eq!(slurm("3").status.code(), Some(2));
+    let too_many = batch(dir, "run study.toml -o out -j 65535");
+    assert_eq!(too_many.status.code(), Some(2));
+}
+
+#[test]
+fn bad_studies_are_refused_by_line_before_anything_is_written() {
+    let place = place();
+    let dir = place.path();
+    let cases = [
+        ("runs = 77", "rns = 77", "study.toml, line 2: unknown key \"rns\"", "did you mean \"runs\"?"),
+        ("[2, 4, 8, 16]", "[]", "the grid is empty: no outages[1]", "without values"),
+        ("name = \"wrong\"", "name = \"imu\"", "two candidate entries are named \"imu\"", "\"name\""),
+        ("drive.toml", "gone.toml", "gone.toml: No such file", ""),
+        ("start_s = 30", "start_s = 70", "outage 70:72 does not lie on the data", "60 s"),
+        ("\"epochs\"]", "\"epoch\"]", "\"metrics\"", "`epochs`"),
+    ];
+    for (from, to, message, more) in cases {
+        fs::write(dir.join("study.toml"), STUDY.replace(from, to)).unwrap();
+        let output = batch(dir, "plan study.toml -o out");
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(matches!(output.status.code(), Some(1 | 2)), "{said}");
+        assert!(said.contains(message) && said.contains(more), "{said}");
+        assert!(!dir.join("out").exists(), "{from}");
+    }
+    fs::write(dir.join("study.toml"), STUDY).unwrap();
+    let said = refused(dir, "run study.toml -o out", 2);
+    assert!(said.contains("out holds no plan"), "{said}");
+}
+
+#[test]
+fn candidates_are_calibrated_in_place_and_a_dry_run_leaves_nothing() {
+    let place = place();
+    let dir = place.path();
+    let calibrated = "{ name = \"II\", calibrate = { estimators = [\"awv\", \"dr-awv\"], fit = \"AR1+WN\", trim = 1, \
+         synthesize = { model = \"imu.toml\", replicates = 3, samples = 8192, axes = \"x\", contaminate = \"section5-II\" } } }";
+    let study = STUDY.replace("{ name = \"wrong\", model = \"wrong.toml\" }", calibrated);
+    let study = study.replace("runs = 77", "runs = 8\nreference = \"II/awv\"\nfilters = [15, \"full\"]");
+    fs::write(dir.join("study.toml"), study).unwrap();
+    let dry = batch(dir, "plan study.toml -o out --dry-run --format json");
+    assert!(dry.status.success(), "{}", String::from_utf8_lossy(&dry.stderr));
+    let said: serde_json::Value = serde_json::from_slice(&dry.stdout).unwrap();
+    assert_eq!((&said["cells"], &said["columns"], &said["units"]), (&5.into(), &6.into(), &5.into()));
+    assert!(!dir.join("out").exists());
+    whole(dir, "out");
+    assert_eq!(fs::read_dir(dir.join("out/models")).unwrap().count(), 2);
+    // models that are lost come back as they were
+    let models = || {
+        let files = fs::read_dir(dir.join("out/models")).unwrap().map(|e| e.unwrap().path());
+        let mut files: Vec<_> = files.map(|p| (p.clone(), fs::read(&p).unwrap())).collect();
+        files.sort();
+        files
+    };
+    let made = models();
+    fs::remove_dir_all(dir.join("out/models")).unwrap();
+    let said = refused(dir, "verify study.toml -o out --seed 1", 1);
+    assert!(said.contains("`nav-sim batch plan` makes it anew"), "{said}");
+    done(dir, "plan study.toml -o out");
+    assert_eq!(models(), made);
+    done(dir, "verify study.toml -o out --seed 1");
+    let text = fs::read_to_string(dir.join("out/results/outages.json")).unwrap();
+    let rows: Vec<serde_json::Value> = serde_json::from_str(&text).unwrap();
+    assert_eq!(rows.len(), 4 * 6);
+    let is_reference = |r: &&serde_json::Value| r["candidate"] == "II/awv";
+    for row in rows.iter().filter(is_reference) {
+        assert_eq!(row["asee_ratio_error_pos_e_pct"], 0.0);
+    }
+    let bound =
+        |r: &serde_json::Value, end: &str| r[format!("asee_ratio_error_roll_ci95_{end}_pct")].as_f64();
+    assert!(rows.iter().all(|r| bound(r, "low").unwrap() <= bound(r, "high").unwrap()));
+}
+
+#[test]
+fn shipped_studies_are_studies_and_their_schema_knows_their_keys() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let nav_sim = |arguments: &[&str]| {
+        let output = std::process::Command::new(env!("CARGO_BIN_EXE_nav-sim"))
+            .current_dir(root)
+            .args(arguments)
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let schema: serde_json::Value = serde_json::from_str(&nav_sim(&["schema", "study"])).unwrap();
+    for (name, candidates, sets) in
+        [("quick_study", 2, 3), ("paper_table1", 9, 1), ("paper_table1_10000", 9, 1), ("outage_length", 4, 8)]
+    {
+        let file = format!("examples/{name}.toml");
+        let said = nav_sim(&["check", &file]);
+        assert!(said.contains(&format!("a study of {candidates} candidates, {sets} outage sets")), "{said}");
+        let table: toml::Table = fs::read_to_string(root.join(&file)).unwrap().parse().unwrap();
+        assert!(table.keys().all(|key| schema["properties"][key].is_object()), "{name}");
+    }
+}
+
+#[test]
+fn scripts_for_schedulers_are_well_formed() {
+    let place = place();
+    let dir = place.path();
+    for (target, shell) in
+        [("slurm", true), ("pbs", true), ("local", true), ("k8s", false), ("hyperqueue", false)]
+    {
+        let output = batch(dir, &format!("emit {target} study.toml -o out --shards 3 --time 90m"));
+        assert!(output.status.success());
+        let script = String::from_utf8(output.stdout).unwrap();
+        assert!(script.contains("--shards 3") || script.contains("\"--shards\", \"3\"") || target == "local");
+        fs::write(dir.join("script"), &script).unwrap();
+        if shell {
+            assert!(
+                std::process::Command::new("bash")
+                    .args(["-n", "script"])
+                    .current_dir(dir)
+                    .status()
+                    .unwrap()
+                    .success()
+            );
+        }
+    }
+    // a task that can finish no unit
+    fs::write(
+        dir.join("long.toml"),
+        STUDY.replace("_runs = 8", "_runs = 1000000").replace("= 77", "= 1000000"),
+    )
+    .unwrap();
+    done(dir, "plan long.toml -o long");
+    let said = refused(dir, "emit slurm long.toml -o long --time 2s", 2);
+    assert!(said.contains("a task works for 2 s, but a unit takes about"), "{said}");
+    fs::write(dir.join("script"), batch(dir, "emit local study.toml -o out --shards 2").stdout).unwrap();
+    let bin = Path::new(env!("CARGO_BIN_EXE_nav-sim")).parent().unwrap().display().to_string();
+    let path = format!("{bin}:{}", std::env::var("PATH").unwrap());
+    let ran =
+        std::process::Command::new("bash").arg("script").current_dir(dir).env("PATH", path).output().unwrap();
+    assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+    assert!(dir.join("out/results/outages.csv").exists());
+}

@@ -1,0 +1,183 @@
+//! What the program does as a program: exit codes, streams, messages.
+
+use assert_cmd::Command;
+use std::process::Stdio;
+
+fn nav_sim() -> Command {
+    Command::new(env!("CARGO_BIN_EXE_nav-sim"))
+}
+
+#[test]
+fn usage_errors_exit_with_2_and_suggest() {
+    let output = nav_sim().arg("compar").output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(said.contains("error: unrecognized subcommand") && said.contains("'compare'"), "{said}");
+    assert_eq!(nav_sim().output().unwrap().status.code(), Some(2));
+}
+
+#[test]
+fn a_closed_pipe_is_success() {
+    let program = env!("CARGO_BIN_EXE_nav-sim");
+    let mut child = std::process::Command::new(program)
+        .args(["completions", "bash"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), &b""[..]));
+}
+
+#[test]
+fn a_full_disk_exits_with_1() {
+    let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+    let program = env!("CARGO_BIN_EXE_nav-sim");
+    let output = std::process::Command::new(program)
+        .args(["man"])
+        .stdout(full)
+        .stderr(Stdio::piped())
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&output.stderr).starts_with("error: standard output: No space left"));
+}
+
+#[test]
+fn colour_comes_when_asked_for_only() {
+    let said = |color: &str| {
+        let args = ["--color", color, "man", "nope"];
+        String::from_utf8(nav_sim().args(args).output().unwrap().stderr).unwrap()
+    };
+    assert!(said("auto").starts_with("error: no command is named \"nope\"\n\nhint: "), "{}", said("auto"));
+    assert!(said("always").starts_with("\u{1b}[1;31merror:\u{1b}[0m no command"), "{}", said("always"));
+}
+
+#[test]
+fn a_directory_that_is_no_run_is_refused_with_advice() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().to_str().unwrap();
+    let output = nav_sim().args(["compare", path, "--reference", path]).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    let expected = format!("error: {path}/manifest.json: No such file or directory");
+    assert!(said.starts_with(&expected) && said.contains("\n\nhint: not a finished run directory"), "{said}");
+}
+
+/// Every file is looked at: one that is wrong does not hide those after it. Recordings without a clock need a
+/// rate.
+#[test]
+fn check_looks_at_every_file() {
+    let place = tempfile::tempdir().unwrap();
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    std::fs::write(place.path().join("bad.toml"), "[run]\nruns = 0\n").unwrap();
+    std::fs::write(place.path().join("worse.toml"), "[gps]\n").unwrap();
+    let timeless: String =
+        (0..100).map(|k| format!("{},{}\n", f64::from(k % 7) * 1e-3, f64::from(k % 5) * 1e-4)).collect();
+    std::fs::write(place.path().join("timeless.csv"), format!("accel_x_m_s2,gyro_x_rad_s\n{timeless}"))
+        .unwrap();
+    let check = |arguments: &[&str]| {
+        let output = nav_sim().current_dir(place.path()).arg("check").args(arguments).output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+    };
+    let good = root.join("calib_data/tactical.toml");
+    let (code, out, said) = check(&["bad.toml", "worse.toml", good.to_str().unwrap()]);
+    assert_eq!(code, 2, "{said}");
+    assert!(said.contains("bad.toml, line 2") && said.contains("worse.toml, line 1"), "{said}");
+    assert!(said.contains("2 of 3 files are not as they should be"), "{said}");
+    assert!(out.contains("tactical.toml: a noise model"), "{out}");
+    assert!(check(&["timeless.csv"]).2.contains("hint: give the rate with --rate-hz"));
+    let (code, out, said) = check(&["timeless.csv", "--rate-hz", "50"]);
+    assert!(code == 0 && out.contains("2 channels of 100 samples at 50 Hz"), "{out}{said}");
+    let array = root.join("calib_data/formats/array.npy");
+    assert_eq!(check(&[array.to_str().unwrap(), "--rate-hz", "100"]).0, 0);
+}
+
+/// What `init` makes is all that the examples of the help texts name.
+#[test]
+fn init_makes_every_file_that_the_help_names() {
+    let place = tempfile::tempdir().unwrap();
+    nav_sim().args(["init", place.path().to_str().unwrap()]).assert().success();
+    let help = String::from_utf8(nav_sim().args(["man", "--help"]).output().unwrap().stdout).unwrap();
+    assert!(help.starts_with("Examples:"));
+    let mut texts = vec![help];
+    for command in [
+        "wv",
+        "calibrate",
+        "synthesize",
+        "trajectory",
+        "run",
+        "fuse",
+        "compare",
+        "efficiency",
+        "demo",
+        "check",
+        "batch",
+    ] {
+        texts.push(String::from_utf8(nav_sim().args([command, "--help"]).output().unwrap().stdout).unwrap());
+    }
+    for sub in ["generate", "check", "convert", "plot", "record"] {
+        texts.push(
+            String::from_utf8(nav_sim().args(["trajectory", sub, "--help"]).output().unwrap().stdout)
+                .unwrap(),
+        );
+    }
+    for text in texts {
+        let examples = text.split("\n\n").next().unwrap();
+        for word in examples.split_whitespace() {
+            if ["calib_data/", "trajectories/", "examples/"].iter().any(|d| word.starts_with(d)) {
+                assert!(place.path().join(word).exists(), "{word}");
+            }
+        }
+    }
+}
+
+/// What `init` cannot finish it takes back; what was there stays.
+#[test]
+fn init_makes_all_its_files_or_none() {
+    let directory = tempfile::tempdir().unwrap();
+    let study = directory.path().join("study");
+    std::fs::create_dir(&study).unwrap();
+    std::fs::write(study.join("examples"), "in the way").unwrap();
+    let output = nav_sim().arg("init").arg(&study).output().unwrap();
+    assert_eq!((output.status.code(), output.stdout.as_slice()), (Some(1), &b""[..]));
+    let left: Vec<_> = std::fs::read_dir(&study).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert_eq!(left, ["examples"]);
+    std::fs::remove_file(study.join("examples")).unwrap();
+    assert!(nav_sim().arg("init").arg(&study).output().unwrap().status.success());
+    assert!(study.join("calib_data/formats/own.csv").exists() && study.join("examples/phone.toml").exists());
+}
+
+/// Pipes are read once and serve as files do: what is computed and what is recorded of them is of the same bytes.
+#[test]
+fn inputs_may_be_pipes() {
+    let directory = tempfile::tempdir().unwrap();
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let program = env!("CARGO_BIN_EXE_nav-sim");
+    let model = root.join("calib_data/tactical.toml").display().to_string();
+    let script = format!(
+        "set -e; {program} synthesize <(cat {model}) --samples 512 --seed 1 -o out; \
+         {program} wv <(cat out/replicate_1.csv) > piped; {program} wv out/replicate_1.csv > plain"
+    );
+    let output =
+        std::process::Command::new("bash").current_dir(&directory).args(["-c", &script]).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let read = |name: &str| std::fs::read_to_string(directory.path().join(name)).unwrap();
+    let manifest: serde_json::Value = serde_json::from_str(&read("out/manifest.json")).unwrap();
+    let bytes = std::fs::read(&model).unwrap();
+    assert_eq!(manifest["model_blake3"], blake3::hash(&bytes).to_hex().to_string());
+    assert_eq!(read("piped").replace("/dev/fd/63", "out/replicate_1.csv"), read("plain"));
+}
+
+#[test]
+fn text_that_is_not_utf_8_is_refused_with_its_line() {
+    let directory = tempfile::tempdir().unwrap();
+    let model = directory.path().join("a.toml");
+    std::fs::write(&model, b"schema = 1\n# \xe9\n").unwrap();
+    let output = nav_sim().arg("synthesize").arg(&model).args(["-o", "x"]).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(2), "{said}");
+    assert!(said.contains("a.toml: line 2 is not text in UTF-8"), "{said}");
+}

@@ -1,0 +1,210 @@
+//! `nav-sim compare` on made-up run directories whose ratios are known.
+
+use assert_cmd::Command;
+use nav_sim::metrics::{self, Summary};
+use nav_sim::report::{self, Input, Manifest, ModelNote};
+use nav_sim::scenario::Scenario;
+use nav_sim::sensors::outage::Outage;
+use nav_sim::simulation::{EpochSums, OutageRecord, RunRecord, RunResult};
+use std::path::Path;
+
+const RUNS: u32 = 20;
+
+/// Runs whose filter believes `factor` times 1 + 2 % · run; the outage is 4 to 8 s of 10.
+fn result(factor: f64) -> RunResult {
+    let sees = || (0..RUNS).map(move |run| factor * (1.0 + 0.02 * f64::from(run)));
+    let epoch = |t: u32| EpochSums {
+        t_s: f64::from(t),
+        gnss: !(4..8).contains(&t),
+        count: u64::from(RUNS),
+        see: [sees().sum(); 9],
+        see_sq: [sees().map(|s| s * s).sum(); 9],
+        error_sq: [f64::from(RUNS); 9],
+        error_4: [f64::from(RUNS); 9],
+        nees: [9.0 * f64::from(RUNS), 99.0 * f64::from(RUNS)],
+        covered: 19,
+        ..EpochSums::default()
+    };
+    let run = |(run, see): (u32, f64)| RunRecord {
+        run: u64::from(run),
+        diverged: false,
+        outages: vec![OutageRecord {
+            see_mean: [see; 9],
+            see_end: [see; 9],
+            error_end: [1.0; 9],
+            nees_end: 9.0 / (see * see),
+            ..OutageRecord::default()
+        }],
+        nis: (6.0, 6),
+        nees_mean: 9.0,
+        covered: 0.95,
+        normalised_sq: [1.0; 9],
+        ..RunRecord::default()
+    };
+    RunResult {
+        epochs: (0..10).map(epoch).collect(),
+        runs: (0..RUNS).zip(sees()).map(run).collect(),
+        outages: vec![(4.0, 8.0)],
+        filter_states: 15,
+        fix_components: 6,
+        coverage_level: 0.95,
+        run_epochs: 1000,
+        independent_windows: None,
+    }
+}
+
+fn write(directory: &Path, factor: f64, change: impl FnOnce(&mut Manifest)) {
+    let result = result(factor);
+    let epochs = metrics::epochs(&result);
+    let summary = Summary::of(&result, &epochs, 7);
+    let outage = Some(vec![Outage { start_s: 4.0, end_s: 8.0 }]);
+    let mut manifest = Manifest {
+        schema_version: Manifest::SCHEMA_VERSION,
+        version: "0".into(),
+        command: vec![],
+        seed: 7,
+        scenario: String::new(),
+        configuration: Scenario { outage, ..Scenario::default() },
+        inputs: vec![Input::new("trajectory", "t.csv", b"t"), Input::new("truth", "m.toml", b"m")],
+        model: ModelNote::default(),
+        threads: 1,
+        independent_windows: None,
+        wall_s: 1.0,
+        throughput_epochs_per_s: 1.0,
+    };
+    change(&mut manifest);
+    std::fs::create_dir_all(directory).unwrap();
+    for file in report::run_directory(&result, &epochs, &summary, &manifest) {
+        std::fs::write(directory.join(file.name), file.parts.collect::<String>()).unwrap();
+    }
+}
+
+struct Ran {
+    code: i32,
+    stdout: String,
+    stderr: String,
+}
+
+fn compare(directory: &Path, arguments: &[&str]) -> Ran {
+    let output = Command::new(env!("CARGO_BIN_EXE_nav-sim"))
+        .current_dir(directory)
+        .arg("compare")
+        .args(arguments)
+        .output()
+        .unwrap();
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+    Ran { code: output.status.code().unwrap(), stdout: text(output.stdout), stderr: text(output.stderr) }
+}
+
+#[test]
+fn ratios_are_those_that_were_made() {
+    let directory = tempfile::tempdir().unwrap();
+    write(&directory.path().join("I_awv"), 1.0, |_| {});
+    write(&directory.path().join("II_awv"), 1.75, |_| {});
+    write(&directory.path().join("II_sr-awv"), 0.9, |_| {});
+    let ran = compare(directory.path(), &["I_awv", "II_awv", "II_sr-awv", "--reference", "I_awv"]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    for cell in ["+75.00 (75.00)", "-10.00 (10.00)", "SR-AWV", "–"] {
+        assert!(ran.stdout.contains(cell), "{cell} in\n{}", ran.stdout);
+    }
+    // errors are 1; the filters believe 1, 1.75 and 0.9 times (1 to 1.38): the second is too timid for 20 runs
+    let mut lines = ran.stdout.lines();
+    assert!(lines.next().unwrap().starts_with("underconfident: II_awv (NEES 9.00, 0."), "{}", ran.stdout);
+    assert!(lines.next().unwrap().starts_with("consistent: I_awv (NEES 9.00, "), "{}", ran.stdout);
+    assert!(ran.stdout.contains("NEES, coverage, RMSE pos_e_m, RMSE roll_deg SR-AWV"), "{}", ran.stdout);
+    assert!(ran.stdout.contains("9.00, 0.950, +0.00, +0.00") && ran.stdout.lines().count() <= 20);
+    let text = std::fs::read_to_string(directory.path().join("comparison.json")).unwrap();
+    let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!((&json["reference"], &json["paired"]), (&"I_awv".into(), &true.into()));
+    let kinds: Vec<&str> =
+        json["verdicts"].as_array().unwrap().iter().map(|v| v["kind"].as_str().unwrap()).collect();
+    assert_eq!(kinds, ["ok", "underconfident", "ok"]);
+    let row =
+        json["rows"].as_array().unwrap().iter().find(|r| r["run"] == "II_awv" && r["state"] == "roll_deg");
+    let row = row.unwrap();
+    assert!((row["ratio_error_pct"].as_f64().unwrap() - 75.0).abs() < 1e-9, "{row}");
+    assert!((row["ci95_pct"][1].as_f64().unwrap() - 75.0).abs() < 1e-6, "{row}");
+    assert!(row["rmse_end_ratio_error_pct"].as_f64().unwrap().abs() < 1e-9, "{row}");
+}
+
+/// Without `--out` a file of the default's name is replaced only if it is a comparison.
+#[test]
+fn a_file_that_is_no_comparison_is_left_alone() {
+    let directory = tempfile::tempdir().unwrap();
+    write(&directory.path().join("a"), 1.0, |_| {});
+    let path = directory.path().join("comparison.json");
+    std::fs::write(&path, "{\"mine\": 1}").unwrap();
+    let ran = compare(directory.path(), &["a", "--reference", "a"]);
+    assert_eq!(ran.code, 2);
+    assert!(
+        ran.stderr.starts_with("error: comparison.json is there and is no comparison\n\nhint: "),
+        "{}",
+        ran.stderr
+    );
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "{\"mine\": 1}");
+    for arguments in
+        [["a", "--reference", "a", "-o", "comparison.json"].as_slice(), &["a", "--reference", "a"]]
+    {
+        let ran = compare(directory.path(), arguments);
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+    }
+}
+
+#[test]
+fn another_trajectory_or_other_outages_are_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    write(&directory.path().join("a"), 1.0, |_| {});
+    write(&directory.path().join("b"), 1.0, |m| m.inputs[0] = Input::new("trajectory", "u.csv", b"u"));
+    write(&directory.path().join("c"), 1.0, |m| m.configuration.outage = Some(vec![]));
+    let ran = compare(directory.path(), &["b", "--reference", "a"]);
+    assert_eq!(ran.code, 2);
+    assert!(
+        ran.stderr.starts_with("error: b: not the trajectory of the reference\n\nhint: "),
+        "{}",
+        ran.stderr
+    );
+    let ran = compare(directory.path(), &["c", "--reference", "a"]);
+    assert_eq!(ran.code, 2);
+    let expected = "error: c: the outages differ: none against 4:8 of the reference";
+    assert!(ran.stderr.starts_with(expected), "{}", ran.stderr);
+    assert!(!directory.path().join("comparison.json").exists());
+}
+
+#[test]
+fn another_seed_or_truth_is_said_and_unpaired() {
+    let directory = tempfile::tempdir().unwrap();
+    write(&directory.path().join("a"), 1.0, |_| {});
+    write(&directory.path().join("b"), 1.2, |m| {
+        m.seed = 8;
+        m.inputs.truncate(1);
+    });
+    let ran = compare(directory.path(), &["b", "--reference", "a", "--format", "json"]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(ran.stderr.contains("warning: b: the seed is not that of the reference"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("warning: b: what makes the errors is not"), "{}", ran.stderr);
+    let json: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
+    let ci = &json["rows"][0]["ci95_pct"];
+    assert!(ci[1].as_f64().unwrap() - ci[0].as_f64().unwrap() > 5.0, "{ci}");
+    assert_eq!(json["paired"], false);
+}
+
+#[test]
+fn a_damaged_table_is_refused_by_file_line_and_column() {
+    let directory = tempfile::tempdir().unwrap();
+    write(&directory.path().join("a"), 1.0, |_| {});
+    let path = directory.path().join("a/epochs.csv");
+    let text = std::fs::read_to_string(&path).unwrap().replacen("\n3,", "\nthree,", 1);
+    std::fs::write(&path, text).unwrap();
+    let ran = compare(directory.path(), &["a", "--reference", "a"]);
+    assert_eq!(ran.code, 2);
+    let expected = "error: a/epochs.csv, line 5: column \"t_s\": \"three\" is not a number";
+    assert!(ran.stderr.starts_with(expected), "{}", ran.stderr);
+}
+
+#[test]
+fn an_unknown_state_is_refused_with_the_known_ones() {
+    let directory = tempfile::tempdir().unwrap();
+    let ran = compare(directory.path(), &["a", "--reference", "a", "--state", "east"]);
+    assert_eq!(ran.code, 2);
+    assert!(ran.stderr.contains("--state east is no state\n\nhint: one of pos_n_m, "), "{}", ran.stderr);
+}

@@ -1,0 +1,27 @@
+//! The program as its users run it: commands, files, messages.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    clippy::duplicate_mod,
+    unreachable_pub,
+    reason = "tests, some with figures"
+)]
+
+#[allow(dead_code, reason = "shared with the other tests")]
+#[path = "../common/mod.rs"]
+mod common;
+
+mod batch;
+mod batch_kills;
+mod calibrate;
+mod command_line;
+mod compare;
+mod efficiency;
+mod examples;
+mod fuse;
+mod help_examples;
+mod readme;
+mod run;
+mod synthesize;
+mod trajectory_command;

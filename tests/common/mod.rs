@@ -1,0 +1,4 @@
+//! What several tests need: a study in a directory, a drive and its recording.
+
+pub mod batch;
+pub mod drive;

@@ -1,0 +1,300 @@
+//! The automatic start on drives that are slow, stop and go, or go backwards, with a phone's IMU: as good as it
+//! says, and never the wrong way round.
+
+use glam::{DQuat, DVec3};
+use nav_sim::data::model_file;
+use nav_sim::earth::{GravityModel, radii};
+use nav_sim::ekf::{Belief, FilterStates};
+use nav_sim::frames::{RollPitchYaw, wrap_angle};
+use nav_sim::fusion::alignment::{Alignment, coarse};
+use nav_sim::fusion::{Recorded, Settings, Verdict};
+use nav_sim::imu::Sensor;
+use nav_sim::noise::Model;
+use nav_sim::scenario::Scenario;
+use nav_sim::sensors::defects::ImuSettings;
+use nav_sim::sensors::gnss::GnssSettings;
+use nav_sim::sensors::imu::Truth;
+use nav_sim::sensors::outage::Outage;
+use nav_sim::simulation::{Plan, Recording, record};
+use nav_sim::trajectory::{Trajectory, TrajectorySample};
+use std::path::Path;
+
+const DEG: f64 = std::f64::consts::PI / 180.0;
+/// Turn-on biases of a phone: m/s², rad/s.
+const TURN_ON: (f64, f64) = (0.3, 0.01);
+/// How far the IMU is in front of the axle that does not steer (m).
+const AXLE_M: f64 = 1.3;
+
+/// Seconds, acceleration along the vehicle (m/s², negative brakes or gathers way backwards), curvature (1/m).
+type Step = (f64, f64, f64);
+
+const DRIVES: [(&str, &[Step]); 8] = [
+    (
+        "slow",
+        &[
+            (15.0, 0.0, 0.0),
+            (7.0, 0.6, 0.0),
+            (8.0, 0.0, 0.12),
+            (15.0, 0.0, 0.0),
+            (8.0, 0.0, -0.12),
+            (40.0, 0.0, 0.0),
+        ],
+    ),
+    (
+        "stop and go",
+        &[
+            (12.0, 0.0, 0.0),
+            (5.0, 1.0, 0.02),
+            (4.0, 0.0, 0.05),
+            (5.0, -1.0, 0.0),
+            (8.0, 0.0, 0.0),
+            (6.0, 1.2, 0.0),
+            (6.0, -1.2, 0.03),
+            (5.0, 0.0, 0.0),
+            (8.0, 1.5, 0.0),
+            (10.0, 0.0, 0.05),
+            (30.0, 0.0, 0.0),
+        ],
+    ),
+    (
+        "out of a lot backwards",
+        &[
+            (10.0, 0.0, 0.0),
+            (3.0, -0.7, 0.0),
+            (4.0, 0.0, 0.2),
+            (3.0, 0.7, 0.1),
+            (2.0, 0.0, 0.0),
+            (5.0, 1.0, -0.1),
+            (8.0, 0.0, 0.1),
+            (5.0, 0.5, 0.0),
+            (40.0, 0.0, 0.0),
+        ],
+    ),
+    (
+        "backwards fast, then forwards",
+        &[
+            (12.0, 0.0, 0.0),
+            (5.0, -0.9, 0.0),
+            (8.0, 0.0, 0.03),
+            (5.0, 0.9, 0.0),
+            (3.0, 0.0, 0.0),
+            (8.0, 1.2, 0.05),
+            (40.0, 0.0, 0.0),
+        ],
+    ),
+    (
+        "backwards for long",
+        &[(12.0, 0.0, 0.0), (6.0, -0.8, 0.0), (15.0, 0.0, 0.04), (15.0, 0.0, -0.04), (15.0, 0.0, 0.0)],
+    ),
+    ("no rest", &[(4.0, 1.2, 0.0), (8.0, 0.0, 0.06), (20.0, 0.0, -0.02), (6.0, 0.6, 0.0), (30.0, 0.0, 0.02)]),
+    (
+        "away slowly",
+        &[
+            (10.0, 0.0, 0.0),
+            (20.0, 0.2, 0.02),
+            (15.0, 0.0, 0.05),
+            (10.0, -0.3, 0.0),
+            (10.0, 0.5, 0.0),
+            (25.0, 0.0, 0.0),
+        ],
+    ),
+    (
+        "rest long ago",
+        &[
+            (6.0, 0.0, 0.0),
+            (6.0, 0.35, 0.0),
+            (30.0, 0.0, 0.1),
+            (20.0, 0.0, -0.1),
+            (5.0, 0.8, 0.0),
+            (20.0, 0.0, 0.05),
+            (20.0, 0.0, 0.0),
+        ],
+    ),
+];
+
+/// A vehicle that follows steps of acceleration and curvature, each reached within half a second.
+fn trajectory(steps: &[Step]) -> Trajectory {
+    const DT_S: f64 = 0.01;
+    let (lat, lon, h) = (46.5 * DEG, 6.5 * DEG, 400.0);
+    let r = radii(lat.sin());
+    let (mut n, mut e, mut yaw, mut speed) = (0.0, 0.0, 40.0 * DEG, 0.0);
+    let (mut accel, mut curvature, mut k) = (0.0, 0.0, 0_u32);
+    let mut samples = Vec::new();
+    for (seconds, to_accel, to_curvature) in steps {
+        for _ in 0..(seconds / DT_S).round() as u32 {
+            if k.is_multiple_of(10) {
+                let (north, east) = (n + AXLE_M * f64::cos(yaw), e + AXLE_M * f64::sin(yaw));
+                let attitude = RollPitchYaw { roll: 1.0 * DEG, pitch: -2.0 * DEG, yaw: wrap_angle(yaw) };
+                samples.push(TrajectorySample {
+                    t_s: f64::from(k) * DT_S,
+                    lat: lat + north / (r.meridian + h),
+                    lon: lon + east / ((r.transverse + h) * lat.cos()),
+                    h,
+                    q_b_n: attitude.to_quat(),
+                });
+            }
+            accel += (to_accel - accel) * DT_S / 0.25;
+            curvature += (to_curvature - curvature) * DT_S / 0.25;
+            n += speed * yaw.cos() * DT_S;
+            e += speed * yaw.sin() * DT_S;
+            yaw += speed * curvature * DT_S;
+            speed += accel * DT_S;
+            k += 1;
+        }
+    }
+    Trajectory::from_samples(&samples).unwrap()
+}
+
+/// `examples/phone.toml`.
+fn phone() -> Model {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/phone.toml");
+    model_file::read(&path).unwrap().model
+}
+
+fn belief() -> Belief {
+    let mut belief = Belief::new(&phone(), FilterStates::Reduced15, 1.0, 800.0).unwrap();
+    belief.add_constant(Sensor::Accel, TURN_ON.0);
+    belief.add_constant(Sensor::Gyro, TURN_ON.1);
+    belief
+}
+
+fn settings() -> Settings {
+    Settings {
+        q_s_b: DQuat::IDENTITY,
+        lever_arm_b: DVec3::ZERO,
+        gravity: GravityModel::default(),
+        outages: Vec::new(),
+        nis_gate: None,
+        rows_hz: 10.0,
+    }
+}
+
+/// Records a drive with a receiver of this velocity sigma (m/s), or of positions alone, and hands each run on.
+fn recorded(
+    trajectory: &Trajectory,
+    velocity: Option<f64>,
+    runs: u64,
+    mut then: impl FnMut(u64, &Recording),
+) {
+    let scenario = Scenario {
+        gnss: GnssSettings {
+            rate_hz: 2.0,
+            pos_sigma_m: [if velocity.is_some() { 3.0 } else { 1.0 }; 3],
+            vel_sigma_m_s: velocity.map(|sigma| [sigma; 3]),
+            ..GnssSettings::default()
+        },
+        imu: ImuSettings {
+            turn_on_bias_accel_m_s2: TURN_ON.0,
+            turn_on_bias_gyro_rad_s: TURN_ON.1,
+            ..ImuSettings::default()
+        },
+        ..Scenario::default()
+    };
+    let model = phone();
+    let experiment = scenario.experiment(trajectory, Truth::Model(&model), &[], &[], 11);
+    let plan = Plan::new(&experiment).unwrap();
+    (0..runs).for_each(|run| then(run, &record(&plan, run)));
+}
+
+/// Errors of roll, pitch and yaw at the start in their standard deviations.
+fn normalised(alignment: &Alignment, trajectory: &Trajectory) -> [f64; 3] {
+    let angles = |q: DQuat| {
+        let a = RollPitchYaw::from_quat(q);
+        [a.roll, a.pitch, a.yaw]
+    };
+    let start = &alignment.start;
+    let (found, truth) = (angles(start.state.q_b_n), angles(trajectory.state(start.t_s).q_b_n));
+    std::array::from_fn(|i| wrap_angle(found[i] - truth[i]) / DEG / start.sigma.att_sigma_deg[i])
+}
+
+/// Slow, stop and go, backwards, without rest, from velocities of 0.1 to 0.6 m/s or from positions alone: no
+/// angle is more than four of its standard deviations off (of 3 × 96 normal ones: p < 0.02), and the sum of the
+/// squares is below that of chi-square (p = 1e-4, normal approximation).
+#[test]
+fn every_start_is_as_good_as_it_says() {
+    let (mut sums, mut starts) = ([0.0; 3], 0.0);
+    for (name, steps) in DRIVES {
+        let trajectory = trajectory(steps);
+        for velocity in [Some(0.1), Some(0.3), Some(0.6), None] {
+            recorded(&trajectory, velocity, 3, |run, recording| {
+                let data = Recorded { imu: &recording.imu, gnss: &recording.gnss };
+                // positions alone do not always have a course
+                let Ok(alignment) = coarse(&data, &settings(), &belief()) else {
+                    assert!(velocity.is_none(), "{name} {velocity:?} {run}");
+                    return;
+                };
+                let z = normalised(&alignment, &trajectory);
+                let how = &alignment.start.how;
+                assert!(z.iter().all(|z| z.abs() < 4.0), "{name} {velocity:?} {run}: {z:?} {how:?}");
+                (0..3).for_each(|i| sums[i] += z[i] * z[i]);
+                starts += 1.0;
+            });
+        }
+    }
+    let largest = starts + 3.7 * f64::sqrt(2.0 * starts);
+    assert!(sums.iter().all(|sum| *sum < largest), "{sums:?} of {starts}");
+}
+
+/// One recording of a drive, velocities good to 0.1 m/s.
+fn one(steps: &[Step]) -> (Trajectory, Recording) {
+    let trajectory = trajectory(steps);
+    let mut found = None;
+    recorded(&trajectory, Some(0.1), 1, |_, recording| found = Some(recording.clone()));
+    (trajectory, found.unwrap())
+}
+
+fn aligned(recording: &Recording, settings: &Settings) -> Alignment {
+    coarse(&Recorded { imu: &recording.imu, gnss: &recording.gnss }, settings, &belief()).unwrap()
+}
+
+/// For twelve seconds the velocities are turned by a right angle: a start there agrees with nothing after it.
+#[test]
+fn a_start_that_the_next_minute_contradicts_is_given_up_for_a_later_one() {
+    let (trajectory, mut recording) = one(DRIVES[0].1);
+    for fix in recording.gnss.iter_mut().filter(|f| (15.0..30.0).contains(&f.t_s)) {
+        let (v, sigma) = fix.velocity.unwrap();
+        fix.velocity = Some((DVec3::new(-v.y, v.x, v.z), sigma));
+    }
+    let found = aligned(&recording, &settings());
+    let z = normalised(&found, &trajectory);
+    assert!(found.start.t_s > 30.0 && z.iter().all(|z| z.abs() < 4.0), "{z:?} {found:?}");
+    let [(verdict, text)] = &found.doubts[..] else { panic!("{found:?}") };
+    assert!(*verdict == Verdict::Doubtful && text.contains("left out"), "{text}");
+}
+
+/// An IMU that looks sideways fits no start; that its axes are no vehicle's is said where gravity shows it.
+#[test]
+fn a_wrong_mounting_is_told() {
+    let (_, recording) = one(DRIVES[1].1);
+    let turned = |q_s_b| aligned(&recording, &Settings { q_s_b, ..settings() }).doubts;
+    let sideways = turned(DQuat::from_rotation_z(90.0 * DEG));
+    assert!(
+        sideways[0].0 == Verdict::Overconfident && sideways[0].1.contains("contradicted"),
+        "{sideways:?}"
+    );
+    let down = turned(DQuat::from_rotation_x(180.0 * DEG));
+    assert!(down.iter().any(|(_, text)| text.contains("upside down")), "{down:?}");
+    let edge = turned(DQuat::from_rotation_y(-60.0 * DEG));
+    assert!(edge.iter().any(|(_, text)| text.contains("not front, right, down")), "{edge:?}");
+    assert_eq!(turned(DQuat::IDENTITY), []);
+}
+
+/// Straight on at one speed nothing tells forwards from backwards: forwards, and it is said.
+#[test]
+fn what_the_fixes_do_not_tell_is_said() {
+    let (trajectory, mut recording) = one(DRIVES[0].1);
+    recording.imu.retain(|s| s.t_s > 60.0);
+    recording.gnss.retain(|f| f.t_s > 60.0);
+    let found = aligned(&recording, &settings());
+    assert!(normalised(&found, &trajectory)[2].abs() < 4.0, "{found:?}");
+    assert!(found.doubts.iter().any(|(_, text)| text.contains("forwards or backwards")), "{found:?}");
+}
+
+/// Fixes that are withheld are not looked at.
+#[test]
+fn a_withheld_fix_starts_nothing() {
+    let (_, recording) = one(DRIVES[0].1);
+    let outages = vec![Outage { start_s: 10.0, end_s: 40.0 }];
+    assert!(aligned(&recording, &settings()).start.t_s < 30.0);
+    assert!(aligned(&recording, &Settings { outages, ..settings() }).start.t_s >= 40.0);
+}

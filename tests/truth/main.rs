@@ -1,0 +1,29 @@
+//! The library against closed forms, independent truths and statistical bounds.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    clippy::duplicate_mod,
+    unreachable_pub,
+    reason = "tests, some with figures"
+)]
+
+#[allow(dead_code, reason = "shared with the other tests")]
+#[path = "../common/mod.rs"]
+mod common;
+
+mod alignment;
+mod calibration_truth;
+mod case_study;
+mod consistency;
+mod covariance_truth;
+mod estimator_bias;
+mod formats;
+mod full_weighting;
+mod fusion;
+mod global_minimum;
+mod imu_unknowns;
+mod lincov;
+mod long_records;
+mod reduction;
+mod trajectories;

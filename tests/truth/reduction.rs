@@ -1,0 +1,76 @@
+//! The default filter of 15 states is as sure as it should be: true RMSE over its own sigma at the ends of outages,
+//! by covariance analysis, on the shipped IMUs and trajectories.
+
+use nav_sim::data::model_file;
+use nav_sim::data::trajectory_file::{Options, load};
+use nav_sim::scenario::{Reduction, Scenario};
+use nav_sim::sensors::outage::Outage;
+use nav_sim::simulation::lincov::assess;
+use std::path::Path;
+
+/// What the filter of a model does on a trajectory with outages: lowest and highest ratio of RMSE to sigma at their
+/// ends, and the mean NEES.
+fn cell(model: &str, trajectory: &str, outages: &[Outage], reduction: Reduction) -> [f64; 3] {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let model = model_file::read(&root.join(format!("calib_data/{model}.toml"))).unwrap().model;
+    let path = root.join(format!("trajectories/{trajectory}.toml"));
+    let (path, _) = load(&path, &Options::default()).unwrap();
+    let mut scenario = Scenario::default();
+    scenario.filter.reduction = reduction;
+    let track = scenario.track(&path, &model, outages).unwrap();
+    let belief = scenario.belief(&model, outages, &track).unwrap();
+    let computed = assess(&track, &belief, &model);
+    let ratios = || computed.outage_ends.iter().flat_map(|e| e.ratio());
+    let nees = computed.reports.iter().map(|r| r.nees).sum::<f64>() / computed.reports.len() as f64;
+    [ratios().fold(f64::INFINITY, f64::min), ratios().fold(0.0, f64::max), nees]
+}
+
+/// Two outages of a length.
+fn outages(seconds: f64) -> [Outage; 2] {
+    let starts: [f64; 2] = if seconds > 100.0 { [200.0, 550.0] } else { [300.0, 700.0] };
+    starts.map(|start_s| Outage { start_s, end_s: start_s + seconds })
+}
+
+fn is_honest([low, high, nees]: [f64; 3]) -> bool {
+    low >= 0.9 && high <= 1.1 && (8.5..9.5).contains(&nees)
+}
+
+#[test]
+fn the_default_filter_is_honest_and_that_by_wavelet_variance_is_not() {
+    for (model, trajectory, seconds) in [
+        ("consumer_mems", "land_vehicle", 90.0),
+        ("consumer_mems", "fixed_wing", 30.0),
+        ("tactical", "figure_eight", 90.0),
+    ] {
+        let found = cell(model, trajectory, &outages(seconds), Reduction::Covariance);
+        assert!(is_honest(found), "{model} {trajectory} {seconds} s: {found:?}");
+    }
+    let wavelet = cell("consumer_mems", "land_vehicle", &outages(90.0), Reduction::Wavelet);
+    assert!(wavelet[1] > 1.4 && wavelet[2] > 10.0, "{wavelet:?}");
+}
+
+/// The one cell that is not reached: yaw after two outages of 300 s by air is stated 11 % too large.
+const CAUTIOUS: (&str, &str, f64) = ("consumer_mems", "fixed_wing", 300.0);
+
+/// Every cell; the table is printed with `cargo test --test truth reduction -- --ignored --nocapture`.
+#[test]
+#[ignore = "24 cells, a minute"]
+fn every_imu_trajectory_and_outage() {
+    let mut dishonest = Vec::new();
+    println!("| IMU | trajectory | outages | RMSE / sigma at their ends | NEES |\n|---|---|---|---|---|");
+    for model in ["consumer_mems", "tactical"] {
+        for trajectory in ["land_vehicle", "figure_eight", "fixed_wing"] {
+            for seconds in [10.0, 30.0, 90.0, 300.0] {
+                let found = cell(model, trajectory, &outages(seconds), Reduction::Covariance);
+                let [low, high, nees] = found;
+                println!("| {model} | {trajectory} | 2 of {seconds} s | {low:.3} to {high:.3} | {nees:.2} |");
+                let known =
+                    (model, trajectory, seconds) == CAUTIOUS && low > 0.89 && is_honest([0.9, high, nees]);
+                if !is_honest(found) && !known {
+                    dishonest.push((model, trajectory, seconds, found));
+                }
+            }
+        }
+    }
+    assert!(dishonest.is_empty(), "{dishonest:?}");
+}
