@@ -2,8 +2,8 @@
 //! is ten times as steady. What they claim, and what is true.
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
-use nav_sim::data::trajectory_file::{Options, load};
 use nav_sim::ekf::{Belief, FilterStates};
+use nav_sim::formats::trajectory_file::{Options, load};
 use nav_sim::metrics::{Summary, epochs};
 use nav_sim::monte_carlo;
 use nav_sim::noise::{Ar1, Composite, Model, Process, White};

@@ -40,8 +40,8 @@ pub use nav_sim_navigation::{
 pub use nav_sim_signal::{bibliography, imu, noise, rng, units, wavelet};
 
 // The engine of studies.
-pub mod batch;
+pub mod study;
 // Words and pages.
 pub mod report;
 // Files.
-pub mod data;
+pub mod formats;

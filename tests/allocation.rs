@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, reason = "a test")]
 #![allow(unsafe_code, reason = "an allocator that counts")]
 
-use nav_sim::data::trajectory_file::{Options, load};
 use nav_sim::ekf::{Belief, FilterStates};
+use nav_sim::formats::trajectory_file::{Options, load};
 use nav_sim::scenario::Scenario;
 use nav_sim::sensors::imu::Truth;
 use nav_sim::sensors::outage::Outage;

@@ -12,8 +12,8 @@ use cases::case;
 use nav_sim::calibration::{
     Bootstrap, ModelChoice, Outcome, Pool, Replicate, Settings, calibrate, grouped, infer,
 };
-use nav_sim::data::study_file;
 use nav_sim::efficiency::{Design, target};
+use nav_sim::formats::efficiency_file;
 use nav_sim::noise::Synthesizer;
 use nav_sim::rng::StreamKey;
 use nav_sim::wavelet::both;
@@ -59,7 +59,7 @@ fn main() -> Result<(), Failure> {
     let (sets, samples, draws) = (number(0, 200)?, number(1, 1 << 16)?, number(2, 199)?);
     let name = arguments.get(3).map_or("paper", String::as_str);
     let study = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/paper_fig2.toml");
-    let design = case(name, study_file::read(&study)?.design.with_samples(samples))?;
+    let design = case(name, efficiency_file::read(&study)?.design.with_samples(samples))?;
     let aim = target(&design)?;
     let (names, truth) = (Design::parameters(&aim.fit.composite), Design::values(&aim.fit.composite));
     let all: Vec<Vec<Outcome>> =

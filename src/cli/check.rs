@@ -1,8 +1,10 @@
 //! `nav-sim check`: whether a file is what it should be.
 
 use super::{Failure, Session, parse, read};
-use nav_sim::data::fusion_files::{read_gnss, read_imu, read_initial};
-use nav_sim::data::{batch_file, contamination_file, curve_file, parameters_file, scenario_file, study_file};
+use nav_sim::formats::fusion_files::{read_gnss, read_imu, read_initial};
+use nav_sim::formats::{
+    contamination_file, curve_file, efficiency_file, parameters_file, scenario_file, study_file,
+};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -76,12 +78,12 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
             Ok(format!("a scenario of {} runs", scenario.run.runs))
         }
         Kind::Study => {
-            let study = batch_file::read(path)?.study;
+            let study = study_file::read(path)?.study;
             let (candidates, sets) = (study.candidates().len(), study.outage_sets().map_or(0, |s| s.len()));
             Ok(format!("a study of {candidates} candidates, {sets} outage sets, {} runs each", study.runs))
         }
         Kind::Efficiency => {
-            let study = study_file::read(path)?;
+            let study = efficiency_file::read(path)?;
             Ok(format!("a study of estimators on {} sets of recordings", study.sets))
         }
         Kind::Model => {

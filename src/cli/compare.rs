@@ -2,7 +2,7 @@
 
 use super::{Failure, Session};
 use comfy_table::{ContentArrangement, Table, presets};
-use nav_sim::data::{atomic, run_directory};
+use nav_sim::formats::{atomic, run_directory};
 use nav_sim::metrics::{self, Measured, Verdict};
 use nav_sim::report::{self, CandidateResult, ComparisonFile, Label, Manifest};
 use nav_sim::simulation::REPORTED_NAMES;

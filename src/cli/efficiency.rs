@@ -1,11 +1,11 @@
 //! `nav-sim efficiency`: Monte-Carlo study of the estimators themselves.
 
 use super::{Failure, Session};
-use nav_sim::data::study_directory::{Layout, StudyDirectory, StudyDirectoryError};
-use nav_sim::data::{atomic, study_file};
 use nav_sim::efficiency::{
     Accuracy, Design, Estimate, Movement, StudyError, Target, abnormal_curve, accuracy, outlier_curve, target,
 };
+use nav_sim::formats::efficiency_directory::{Layout, StudyDirectory, StudyDirectoryError};
+use nav_sim::formats::{atomic, efficiency_file};
 use nav_sim::noise::{Process, contamination::Contamination};
 use nav_sim::report::{self, EfficiencyFile, EfficiencyRow};
 use rayon::prelude::*;
@@ -44,7 +44,7 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let file = study_file::read(&args.study)?;
+    let file = efficiency_file::read(&args.study)?;
     let mut design = file.design;
     if let Some(samples) = args.samples {
         design = design.with_samples(samples as usize);

@@ -1,9 +1,9 @@
 //! What went wrong, as the user reads it, and the exit code it means.
 
 use nav_sim::calibration::SignalError;
-use nav_sim::data::atomic::WriteError;
-use nav_sim::data::recordings::RecordingError;
-use nav_sim::data::toml_file::TomlError;
+use nav_sim::formats::atomic::WriteError;
+use nav_sim::formats::recordings::RecordingError;
+use nav_sim::formats::toml_file::TomlError;
 use std::fmt;
 
 /// A failure: exit code, message and hint. 1 could not (I/O, numerics); 2 usage or configuration;

@@ -1,10 +1,10 @@
 //! Reading inputs for commands: doubts are said, refusals become failures.
 
 use super::{Failure, Session};
-use nav_sim::data::hash;
-use nav_sim::data::model_file::{self, ModelFile};
-use nav_sim::data::recordings::{self, ReadOptions};
-use nav_sim::data::trajectory_file::{self, TrajectoryFileError};
+use nav_sim::formats::hash;
+use nav_sim::formats::model_file::{self, ModelFile};
+use nav_sim::formats::recordings::{self, ReadOptions};
+use nav_sim::formats::trajectory_file::{self, TrajectoryFileError};
 use nav_sim::imu::Recording;
 use nav_sim::report::Input;
 use nav_sim::trajectory::Trajectory;

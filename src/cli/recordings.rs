@@ -3,7 +3,7 @@
 use super::axes::ChannelSet;
 use super::{Failure, Session};
 use clap::ValueEnum;
-use nav_sim::data::recordings::{self, Gaps, ReadOptions, Report};
+use nav_sim::formats::recordings::{self, Gaps, ReadOptions, Report};
 use nav_sim::imu::{Recording, Sensor};
 use std::cell::OnceCell;
 use std::path::PathBuf;

@@ -1,9 +1,9 @@
 //! `nav-sim schema`: JSON schemas of the files people write.
 
 use super::{Failure, Session};
-use nav_sim::batch::Study;
-use nav_sim::data::{parameters_file, study_file};
+use nav_sim::formats::{efficiency_file, parameters_file};
 use nav_sim::scenario::Scenario;
+use nav_sim::study::Study;
 
 /// Print the JSON schema of a file that people write, for editors and checkers
 #[derive(clap::Args, Debug)]
@@ -34,7 +34,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let schema = match args.of {
         Kind::Scenario => schemars::schema_for!(Scenario).to_value(),
         Kind::Study => schemars::schema_for!(Study).to_value(),
-        Kind::Efficiency => study_file::schema(),
+        Kind::Efficiency => efficiency_file::schema(),
         Kind::Parameters => parameters_file::schema(),
     };
     let text = serde_json::to_string_pretty(&schema).map_err(Failure::could_not)?;

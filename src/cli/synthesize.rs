@@ -3,10 +3,10 @@
 use super::axes::ChannelSet;
 use super::run::not_of_another_command;
 use super::{Failure, Session, read};
-use nav_sim::data::atomic::{AtomicDir, WriteError, guard_inputs};
-use nav_sim::data::contamination_file;
-use nav_sim::data::model_file::{self, ModelFile};
-use nav_sim::data::recordings::{FileFormat, is_recording};
+use nav_sim::formats::atomic::{AtomicDir, WriteError, guard_inputs};
+use nav_sim::formats::contamination_file;
+use nav_sim::formats::model_file::{self, ModelFile};
+use nav_sim::formats::recordings::{FileFormat, is_recording};
 use nav_sim::imu::Channel;
 use nav_sim::noise::contamination::{Contamination, Rule};
 use nav_sim::noise::{Composite, Model, Process, ReplicateError, VirtualImu};

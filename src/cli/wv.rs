@@ -4,7 +4,7 @@ use super::recordings::RecordingArgs;
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
 use nav_sim::calibration::{Replicate, replicates};
-use nav_sim::data::atomic;
+use nav_sim::formats::atomic;
 use nav_sim::imu::{Channel, Recording};
 use nav_sim::report::{self, SignalCurves, SignalsFile};
 use nav_sim::wavelet::{WaveletError, haar, interval};

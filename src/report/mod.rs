@@ -1,7 +1,6 @@
 //! Results as files: tables, JSON, one self-contained page. It computes no statistic and touches no file:
 //! every function makes a text, the command line writes it.
 
-mod batch;
 mod brief;
 mod comparison;
 mod curves;
@@ -17,16 +16,12 @@ mod replicates;
 mod run_directory;
 #[cfg(test)]
 mod sample;
+mod study;
 mod svg;
 mod tables;
 mod trajectory;
 mod verdict;
 
-pub use batch::{
-    ColumnResult, ShownCell, ShownColumn, TableColumn, TableRow, Value, ValueKind, drift_table,
-    epoch_columns, epoch_rows, measured, outage_columns, outage_rows, ratio_table, run_columns, run_rows,
-    verdict, verdict_table,
-};
 pub use brief::brief;
 pub use comparison::{CandidateResult, ComparisonFile, Label, consistency_rows, table_rows, verdict_lines};
 pub use curves::{
@@ -44,6 +39,11 @@ pub use replicates::{
     AlarmEntry, LeftOutEntry, MovementEntry, ReplicateEntry, ScoresEntry, describe_replicates,
 };
 pub use run_directory::{OutputFile, RUN_FILES, json, run_directory, summary_json};
+pub use study::{
+    ColumnResult, ShownCell, ShownColumn, TableColumn, TableRow, Value, ValueKind, drift_table,
+    epoch_columns, epoch_rows, measured, outage_columns, outage_rows, ratio_table, run_columns, run_rows,
+    verdict, verdict_table,
+};
 pub use tables::{TableError, epochs_csv, parse_epochs, parse_runs, runs_csv};
 pub use trajectory::{TrajectorySeries, trajectory_svg};
 pub use verdict::{verdict_in_short, verdict_line, verdict_word};

@@ -111,7 +111,7 @@ fn damaged_units_are_noticed_and_computed_again() {
 /// are damaged, and `run` mends them.
 #[test]
 fn what_stands_in_the_place_of_a_unit_is_computed_again() {
-    use nav_sim::data::unit_file;
+    use nav_sim::formats::unit_file;
     let place = place();
     let dir = place.path();
     let undisturbed = whole(dir, "out");
@@ -119,7 +119,7 @@ fn what_stands_in_the_place_of_a_unit_is_computed_again() {
     fs::remove_file(&files[3]).unwrap();
     fs::create_dir(&files[3]).unwrap();
     fs::write(files[3].join("note"), "mine").unwrap();
-    let forge = |file: &Path, change: &dyn Fn(&mut nav_sim::batch::UnitResult)| {
+    let forge = |file: &Path, change: &dyn Fn(&mut nav_sim::study::UnitResult)| {
         let id = file.file_stem().unwrap().to_str().unwrap();
         let mut unit = unit_file::read(&dir.join("out"), id).unwrap();
         change(&mut unit);

@@ -93,7 +93,7 @@ fn recordings_become_a_model_file_and_its_curves() {
     let model = Composite::new(truth().to_vec());
     for estimator in ["awv", "sr-awv", "dr-awv"] {
         let file =
-            nav_sim::data::model_file::read(&dir.path().join(format!("imu_{estimator}.toml"))).unwrap();
+            nav_sim::formats::model_file::read(&dir.path().join(format!("imu_{estimator}.toml"))).unwrap();
         assert_eq!(file.model.rate_hz.round() as i64, 50);
         let missing: Vec<String> = file.missing.iter().map(ToString::to_string).collect();
         assert_eq!(missing, ["accel.x", "accel.y", "accel.z"], "pooled: one model for the three axes");

@@ -357,9 +357,6 @@ fn a_trajectory_of_a_few_seconds_is_run() {
                  segment = [{ kind = \"straight\", duration_s = 4 }]\n";
     fs::write(place.path().join("short.toml"), short).unwrap();
     for outage in ["none", "1:3"] {
-        done(
-            place.path(),
-            &format!("run short.toml imu.toml --outage {outage} --runs 1 --seed 5 -o out"),
-        );
+        done(place.path(), &format!("run short.toml imu.toml --outage {outage} --runs 1 --seed 5 -o out"));
     }
 }

@@ -2,9 +2,9 @@
 //! says, and never the wrong way round.
 
 use glam::{DQuat, DVec3};
-use nav_sim::data::model_file;
 use nav_sim::earth::{GravityModel, radii};
 use nav_sim::ekf::{Belief, FilterStates};
+use nav_sim::formats::model_file;
 use nav_sim::frames::{RollPitchYaw, wrap_angle};
 use nav_sim::fusion::alignment::{Alignment, coarse};
 use nav_sim::fusion::{Recorded, Settings, Verdict};

@@ -1,8 +1,8 @@
 //! Filters whose models are right are as sure as they should be, on three shipped trajectories, with 15 states
 //! and with all states of the model; a model that is wrong by 4 in any parameter shows.
 
-use nav_sim::data::trajectory_file::{Options, load};
 use nav_sim::ekf::{Belief, FilterStates};
+use nav_sim::formats::trajectory_file::{Options, load};
 use nav_sim::monte_carlo;
 use nav_sim::noise::{Ar1, Composite, Model, Process, RandomWalk, White};
 use nav_sim::scenario::Scenario;

@@ -1,7 +1,7 @@
 //! The examples of `calib_data/`: one recording in every format, and the virtual IMUs.
 
-use nav_sim::data::model_file;
-use nav_sim::data::recordings::{ReadOptions, read};
+use nav_sim::formats::model_file;
+use nav_sim::formats::recordings::{ReadOptions, read};
 use nav_sim::imu::Recording;
 use nav_sim::noise::Composite;
 use std::path::{Path, PathBuf};

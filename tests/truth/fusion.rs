@@ -3,9 +3,9 @@
 
 use crate::common::drive::{DRIVE, MODEL, place_with};
 use glam::{DQuat, DVec3};
-use nav_sim::data::{model_file, trajectory_file};
 use nav_sim::earth::GravityModel;
 use nav_sim::ekf::{Belief, FilterStates, InitialSettings};
+use nav_sim::formats::{model_file, trajectory_file};
 use nav_sim::frames::RollPitchYaw;
 use nav_sim::fusion::gap::bridged;
 use nav_sim::fusion::{Recorded, Settings, Solution, Start, Use, fuse, outcome};

@@ -2,8 +2,8 @@
 //! be, one that does not is far too sure.
 
 use crate::common::drive::{DRIVE, MODEL, done, nav_sim, place_with};
-use nav_sim::data::trajectory_file::{Options, load};
 use nav_sim::ekf::Belief;
+use nav_sim::formats::trajectory_file::{Options, load};
 use nav_sim::monte_carlo;
 use nav_sim::noise::{Ar1, Composite, Drift, Model, Process, White};
 use nav_sim::scenario::Scenario;

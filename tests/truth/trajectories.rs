@@ -3,8 +3,8 @@
 
 use glam::DVec3;
 use nav_sim::closure::{Bounds, Closure};
-use nav_sim::data::trajectory_file::{Options, load};
 use nav_sim::earth::{GravityModel, ned_difference};
+use nav_sim::formats::trajectory_file::{Options, load};
 use nav_sim::frames::NavState;
 use nav_sim::lanes::Vec3;
 use nav_sim::sensors::ideal_imu::ideal_imu;

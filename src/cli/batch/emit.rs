@@ -3,7 +3,7 @@
 use super::Place;
 use super::plan::duration;
 use crate::cli::{Failure, Session};
-use nav_sim::data::batch_directory;
+use nav_sim::formats::study_directory;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -52,7 +52,7 @@ enum Target {
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     args.place.read()?;
     let script = Script::of(args, session.asked_seed());
-    let is_planned = batch_directory::plan(&args.place.directory())?.is_some();
+    let is_planned = study_directory::plan(&args.place.directory())?.is_some();
     if is_planned && args.target != Target::Local {
         let planned = args.place.planned(session.asked_seed())?;
         long_enough(script.limit_s() as f64, planned.unit_s(u64::from(args.cpus)), session)?;

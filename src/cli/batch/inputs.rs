@@ -2,15 +2,15 @@
 
 use super::Planned;
 use crate::cli::{Failure, Session, read};
-use nav_sim::batch::{Cell, Material, Synthesis, TruthEntry, Unit};
-use nav_sim::data::{batch_directory, batch_file, contamination_file, hash, model_file};
 use nav_sim::ekf::Belief;
+use nav_sim::formats::{contamination_file, hash, model_file, study_directory, study_file};
 use nav_sim::imu::Recording;
 use nav_sim::noise::{Model, continuous};
 use nav_sim::scenario::Scenario;
 use nav_sim::sensors::imu::Truth;
 use nav_sim::sensors::outage::Outage;
 use nav_sim::simulation;
+use nav_sim::study::{Cell, Material, Synthesis, TruthEntry, Unit};
 use nav_sim::trajectory::Trajectory;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -92,7 +92,7 @@ impl<'a> Inputs<'a> {
             return Ok(Arc::clone(trajectory));
         }
         let plan = &self.planned.plan;
-        let path = batch_file::beside(self.study, &plan.study.trajectory[index].file);
+        let path = study_file::beside(self.study, &plan.study.trajectory[index].file);
         unchanged(&path, &plan.trajectories[index])?;
         let trajectory = Arc::new(read::trajectory(&path, self.session)?);
         self.trajectory = Some((index, Arc::clone(&trajectory)));
@@ -161,7 +161,7 @@ pub(super) fn finished(
 ) -> Result<Result<bool, String>, Failure> {
     let outages = inputs.outages(planned.grid.cell(unit.cell))?;
     let columns = planned.grid.columns.len();
-    batch_directory::finished(&planned.directory, (unit, id), columns, &outages).map_err(Failure::could_not)
+    study_directory::finished(&planned.directory, (unit, id), columns, &outages).map_err(Failure::could_not)
 }
 
 /// Role of models that the plan calibrated.
@@ -169,7 +169,7 @@ pub(super) const CALIBRATED: &str = "calibrated";
 
 /// Where the model of a candidate is.
 pub(super) fn model_path(study: &Path, directory: &Path, role: &str, path: &str) -> PathBuf {
-    if role == CALIBRATED { directory.join(path) } else { batch_file::beside(study, Path::new(path)) }
+    if role == CALIBRATED { directory.join(path) } else { study_file::beside(study, Path::new(path)) }
 }
 
 /// The outages of a scenario on a trajectory; one asked for by its times must begin on it.
@@ -192,7 +192,7 @@ fn changed(what: &str) -> Failure {
 
 /// The files behind a list of recordings, directories in name order.
 pub(super) fn listed(study: &Path, recordings: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
-    let paths: Vec<PathBuf> = recordings.iter().map(|p| batch_file::beside(study, p)).collect();
+    let paths: Vec<PathBuf> = recordings.iter().map(|p| study_file::beside(study, p)).collect();
     read::listed(&paths)
 }
 
@@ -203,7 +203,7 @@ fn file_hash(path: &Path) -> Result<String, Failure> {
 /// Hash of what makes a truth: files, and how virtual recordings are made.
 pub(super) fn truth_hash(study: &Path, entry: &TruthEntry, seed: u64) -> Result<String, Failure> {
     if let Some(model) = &entry.model {
-        return file_hash(&batch_file::beside(study, model));
+        return file_hash(&study_file::beside(study, model));
     }
     let mut hasher = blake3::Hasher::new();
     for file in listed(study, &entry.recordings)? {
@@ -222,7 +222,7 @@ pub(super) const CANDIDATE_SEED: u64 = 1;
 fn synthesis_hash(study: &Path, step: &Synthesis, seed: u64) -> Result<String, Failure> {
     let mut step = step.clone();
     step.seed = Some(step.seed.unwrap_or(seed));
-    let model = batch_file::beside(study, &step.model);
+    let model = study_file::beside(study, &step.model);
     let rate_hz = model_file::read(&model)?.model.rate_hz;
     let contamination = contamination(study, &step, rate_hz)?.map(|c| format!("{:?}", c.rules));
     let text = format!("{step:?} {} {contamination:?}", file_hash(&model)?);
@@ -236,7 +236,7 @@ fn contamination(
 ) -> Result<Option<nav_sim::noise::contamination::Contamination>, Failure> {
     let Some(name) = &step.contaminate else { return Ok(None) };
     let preset = contamination_file::names().contains(&name.as_str());
-    let place = batch_file::beside(study, Path::new(name));
+    let place = study_file::beside(study, Path::new(name));
     let found = if preset {
         contamination_file::find(name, rate_hz)
     } else {
@@ -253,7 +253,7 @@ pub(super) fn synthesised(
     seed: u64,
     session: &Session,
 ) -> Result<Vec<Recording>, Failure> {
-    let file = read::model(&batch_file::beside(study, &step.model), session)?;
+    let file = read::model(&study_file::beside(study, &step.model), session)?;
     let contamination = contamination(study, step, file.model.rate_hz)?;
     let material = Material {
         step,
@@ -272,12 +272,12 @@ pub(super) fn synthesised(
 
 fn source(study: &Path, entry: &TruthEntry, seed: u64, session: &Session) -> Result<Source, Failure> {
     if let Some(model) = &entry.model {
-        return Ok(Source::Model(read::model(&batch_file::beside(study, model), session)?.model));
+        return Ok(Source::Model(read::model(&study_file::beside(study, model), session)?.model));
     }
     if let Some(step) = &entry.synthesize {
         let seed = seed.wrapping_add(TRUTH_SEED);
         return Ok(Source::Recordings(synthesised(study, step, seed, session)?));
     }
-    let paths: Vec<PathBuf> = entry.recordings.iter().map(|p| batch_file::beside(study, p)).collect();
+    let paths: Vec<PathBuf> = entry.recordings.iter().map(|p| study_file::beside(study, p)).collect();
     Ok(Source::Recordings(read::recordings_at(&paths, None, session)?))
 }

@@ -4,13 +4,13 @@ use super::status::Count;
 use super::{Place, Planned};
 use crate::cli::compare::{markdown, table};
 use crate::cli::{Failure, Session};
-use nav_sim::batch::{CellSums, Column, Kept, Metric, Study, Unit, UnitResult};
-use nav_sim::data::atomic::AtomicDir;
-use nav_sim::data::table_files::{TableFiles, TableFormat};
-use nav_sim::data::unit_file;
+use nav_sim::formats::atomic::AtomicDir;
+use nav_sim::formats::table_files::{TableFiles, TableFormat};
+use nav_sim::formats::unit_file;
 use nav_sim::metrics::{self, Measured, OutageComparison};
 use nav_sim::report::{self, ColumnResult, Label, ShownCell, ShownColumn, TableRow};
 use nav_sim::simulation::{REPORTED_NAMES, RunResult};
+use nav_sim::study::{CellSums, Column, Kept, Metric, Study, Unit, UnitResult};
 use rayon::prelude::*;
 use serde_json::json;
 

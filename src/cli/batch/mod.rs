@@ -10,9 +10,9 @@ mod status;
 mod verify;
 
 use super::{Failure, Session};
-use nav_sim::batch::{Grid, Plan, PrepareError, StudyError, Unit, fingerprint};
-use nav_sim::data::batch_directory::{self, BatchDirectoryError};
-use nav_sim::data::batch_file::{self, BatchFile};
+use nav_sim::formats::study_directory::{self, BatchDirectoryError};
+use nav_sim::formats::study_file::{self, BatchFile};
+use nav_sim::study::{Grid, Plan, PrepareError, StudyError, Unit, fingerprint};
 use std::path::{Path, PathBuf};
 
 /// Studies: grids of Monte-Carlo experiments, planned, run in pieces anywhere, merged
@@ -78,13 +78,13 @@ impl Place {
     }
 
     fn read(&self) -> Result<BatchFile, Failure> {
-        Ok(batch_file::read(&self.study)?)
+        Ok(study_file::read(&self.study)?)
     }
 
     /// The plan in the directory, which must be that of the study, and have the seed if one is asked for.
     fn planned(&self, seed: Option<u64>) -> Result<Planned, Failure> {
         let (directory, file) = (self.directory(), self.read()?);
-        let plan = batch_directory::plan_of(&directory, &file.study, seed)?;
+        let plan = study_directory::plan_of(&directory, &file.study, seed)?;
         let grid = Grid::of(&plan).map_err(|e| unusable(&self.study, &e))?;
         Ok(Planned { plan, grid, directory })
     }
@@ -126,7 +126,7 @@ impl Planned {
     }
 
     /// The names of a cell on those axes that have more than one.
-    fn cell_name(&self, cell: nav_sim::batch::Cell) -> String {
+    fn cell_name(&self, cell: nav_sim::study::Cell) -> String {
         let grid = &self.grid;
         let sizes = [
             grid.trajectories.len(),

@@ -5,16 +5,16 @@ use super::merge::stale_results;
 use super::status::Count;
 use super::{Place, Planned, unusable};
 use crate::cli::{Failure, Session, read};
-use nav_sim::batch::{
-    CalibrateStep, Estimate, Grid, Kept, Plan, Prepared, Study, calibrated, fingerprint, run_unit,
-};
 use nav_sim::calibration::Outcome;
-use nav_sim::data::batch_directory;
-use nav_sim::data::batch_file::{self, BatchFile};
-use nav_sim::data::model_file::{self, CalibrationNote};
-use nav_sim::data::{atomic, hash, unit_file};
+use nav_sim::formats::model_file::{self, CalibrationNote};
+use nav_sim::formats::study_directory;
+use nav_sim::formats::study_file::{self, BatchFile};
+use nav_sim::formats::{atomic, hash, unit_file};
 use nav_sim::lanes::LANES;
 use nav_sim::report::Input;
+use nav_sim::study::{
+    CalibrateStep, Estimate, Grid, Kept, Plan, Prepared, Study, calibrated, fingerprint, run_unit,
+};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -43,7 +43,7 @@ const UNIT_S: f64 = 120.0;
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let (directory, file) = (args.place.directory(), args.place.read()?);
-    if let Some(plan) = batch_directory::plan(&directory)?.filter(|_| !args.dry_run) {
+    if let Some(plan) = study_directory::plan(&directory)?.filter(|_| !args.dry_run) {
         return again(args, &directory, plan, &file, session);
     }
     let seed = session.seed(file.study.seed);
@@ -60,7 +60,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     probe(&mut planned, &args.place.study, session)?;
     warn_of_leftovers(&planned, session)?;
     if !args.dry_run {
-        batch_directory::write_plan(&directory, &planned.plan)?;
+        study_directory::write_plan(&directory, &planned.plan)?;
     }
     report(&planned, session);
     if !args.dry_run {
@@ -94,10 +94,10 @@ fn again(
     session: &Session,
 ) -> Result<(), Failure> {
     let wanted = session.seed(Some(plan.seed));
-    batch_directory::same(directory, &plan, &file.study, Some(wanted))?;
+    study_directory::same(directory, &plan, &file.study, Some(wanted))?;
     let study = &args.place.study;
     for input in &plan.inputs {
-        let path = batch_file::beside(study, Path::new(&input.path));
+        let path = study_file::beside(study, Path::new(&input.path));
         let shown = path.display();
         let found = hash::of_file(&path).map_err(|e| Failure::could_not(format!("{shown}: {e}")))?;
         if found != input.blake3 {
@@ -234,7 +234,7 @@ fn calibration(
             inputs::synthesised(study_path, synthesis, seed.wrapping_add(CANDIDATE_SEED), session)?
         }
         None => {
-            let beside = |p: &PathBuf| batch_file::beside(study_path, p);
+            let beside = |p: &PathBuf| study_file::beside(study_path, p);
             let paths: Vec<PathBuf> = step.recordings.iter().map(beside).collect();
             read::recordings_at(&paths, None, session)?
         }

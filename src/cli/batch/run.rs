@@ -5,10 +5,10 @@ use super::shard::{self, Shard};
 use super::status::Count;
 use super::{Place, Planned};
 use crate::cli::{Failure, Session};
-use nav_sim::batch::{Plan, Unit, UnitResult, run_unit};
-use nav_sim::data::{batch_directory, unit_file};
+use nav_sim::formats::{study_directory, unit_file};
 use nav_sim::lanes::LANES;
 use nav_sim::simulation;
+use nav_sim::study::{Plan, Unit, UnitResult, run_unit};
 use rayon::prelude::*;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use std::sync::Arc;
@@ -149,7 +149,7 @@ fn pending(
     inputs: &mut Inputs<'_>,
     session: &Session,
 ) -> Result<Vec<Named>, Failure> {
-    let names = batch_directory::units(&planned.directory)?;
+    let names = study_directory::units(&planned.directory)?;
     let mine = planned.plan.named_units(&planned.grid).filter(|(unit, _)| shard.has(unit.index));
     let (mut pending, mut there) = (Vec::new(), 0_usize);
     for (unit, id) in mine {

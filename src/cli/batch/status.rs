@@ -3,8 +3,8 @@
 use super::plan::duration;
 use super::{Place, Planned};
 use crate::cli::{Failure, Session};
-use nav_sim::batch::Unit;
-use nav_sim::data::{batch_directory, unit_file};
+use nav_sim::formats::{study_directory, unit_file};
+use nav_sim::study::Unit;
 use serde_json::json;
 
 /// What is done of a study and what is left
@@ -64,7 +64,7 @@ pub(super) struct Count {
 
 impl Count {
     pub(super) fn of(planned: &Planned) -> Result<Self, Failure> {
-        let mut there = batch_directory::units(&planned.directory)?;
+        let mut there = study_directory::units(&planned.directory)?;
         let (plan, grid) = (&planned.plan, &planned.grid);
         let mut count =
             Self { units: 0, done: 0, cells_done: 0, left_s: 0.0, missing: Vec::new(), foreign: Vec::new() };

@@ -4,9 +4,9 @@ use super::inputs::{Inputs, finished};
 use super::run::compute;
 use super::{Place, Planned};
 use crate::cli::{Failure, Session};
-use nav_sim::batch::Unit;
-use nav_sim::data::{batch_directory, unit_file};
+use nav_sim::formats::{study_directory, unit_file};
 use nav_sim::rng::StreamKey;
+use nav_sim::study::Unit;
 use rand::seq::IndexedRandom;
 
 /// Compute some finished units again and compare them bit by bit
@@ -32,7 +32,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     // --seed draws the units here
     let planned = args.place.planned(None)?;
     planned.same_numbers()?;
-    let there = batch_directory::units(&planned.directory)?;
+    let there = study_directory::units(&planned.directory)?;
     let done: Vec<Named> =
         planned.plan.named_units(&planned.grid).filter(|(_, id)| there.contains(id)).collect();
     if done.is_empty() {

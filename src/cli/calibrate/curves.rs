@@ -4,7 +4,7 @@ use super::output::{self, outputs};
 use super::{Args, bootstrap, of_calibration};
 use crate::cli::{Failure, Session, read};
 use nav_sim::calibration::{Estimator, Group, Outcome, Settings, fit_curve};
-use nav_sim::data::curve_file::{self, NamedCurve};
+use nav_sim::formats::curve_file::{self, NamedCurve};
 use nav_sim::imu::Sensor;
 use std::path::{Path, PathBuf};
 

@@ -11,8 +11,8 @@ use nav_sim::calibration::{
     AverageError, Bootstrap, CalibrationError, Cause, FitError, Group, ModelChoice, ModelSpec, Outcome,
     ParameterLimit, Settings, SpecError, Trim, Weighting, infer,
 };
-use nav_sim::data::parameters_file;
-use nav_sim::data::suggest::nearest;
+use nav_sim::formats::parameters_file;
+use nav_sim::formats::suggest::nearest;
 use nav_sim::imu::Sensor;
 use std::path::PathBuf;
 

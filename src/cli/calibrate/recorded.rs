@@ -6,8 +6,8 @@ use crate::cli::{Failure, Session, read};
 use nav_sim::calibration::{
     Estimator, Pool, Replicate, Settings, SignalError, WarmUp, calibrate, grouped, replicates, warm_up,
 };
-use nav_sim::data::hash;
-use nav_sim::data::recordings::{FileReport, Report};
+use nav_sim::formats::hash;
+use nav_sim::formats::recordings::{FileReport, Report};
 use nav_sim::imu::{Channel, Recording, Signal};
 use nav_sim::wavelet::{Tuning, default_levels};
 use rayon::prelude::*;

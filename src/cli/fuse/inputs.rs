@@ -4,8 +4,8 @@ use super::Args;
 use crate::cli::run::reduced::{Made, reduction};
 use crate::cli::{Failure, Session, parse, read};
 use glam::{DMat3, DQuat, DVec3};
-use nav_sim::data::fusion_files::{FixSigma, FusionFileError, ImuFile, read_gnss, read_imu, read_initial};
 use nav_sim::ekf::{Belief, FilterStates, InitialSettings};
+use nav_sim::formats::fusion_files::{FixSigma, FusionFileError, ImuFile, read_gnss, read_imu, read_initial};
 use nav_sim::frames::RollPitchYaw;
 use nav_sim::fusion::alignment::{self, Alignment};
 use nav_sim::fusion::{FusionError, Recorded, Settings, Start, check_clocks};
@@ -280,7 +280,7 @@ fn at_rate(model: &Model, rate_hz: f64) -> Result<Model, continuous::RateError> 
 pub(super) fn guarded(out: &Path, inputs: &[Input]) -> Result<(), Failure> {
     for name in nav_sim::report::FUSION_FILES {
         let paths = inputs.iter().map(|i| Path::new(&i.path));
-        nav_sim::data::atomic::guard_inputs(&out.join(name), paths)?;
+        nav_sim::formats::atomic::guard_inputs(&out.join(name), paths)?;
     }
     Ok(())
 }

@@ -3,7 +3,7 @@
 use super::inputs::guarded;
 use crate::cli::Failure;
 use crate::cli::run::not_of_another_command;
-use nav_sim::data::atomic::AtomicDir;
+use nav_sim::formats::atomic::AtomicDir;
 use nav_sim::fusion::Solution;
 use nav_sim::report::{FusionKind, FusionManifest, FusionSummary, Input, fusion_directory};
 use std::path::Path;

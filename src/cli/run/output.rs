@@ -2,7 +2,7 @@
 
 use crate::cli::compare::table;
 use crate::cli::{Failure, Session};
-use nav_sim::data::atomic::{self, AtomicDir};
+use nav_sim::formats::atomic::{self, AtomicDir};
 use nav_sim::metrics::{self, OutageSummary, PerState, ReductionSummary, Summary, VerdictKind};
 use nav_sim::report::{self, Input, Manifest, ModelNote, seconds};
 use nav_sim::scenario::Scenario;

@@ -6,7 +6,7 @@ mod record;
 mod write;
 
 use super::{Failure, Session};
-use nav_sim::data::trajectory_file::{Options, load};
+use nav_sim::formats::trajectory_file::{Options, load};
 use nav_sim::trajectory::Trajectory;
 use nav_sim::units::DEG;
 use std::path::{Path, PathBuf};

@@ -2,8 +2,8 @@
 
 use super::{Source, wrote};
 use crate::cli::{Failure, Session};
-use nav_sim::data::atomic;
 use nav_sim::earth::ned_difference;
+use nav_sim::formats::atomic;
 use nav_sim::frames::RollPitchYaw;
 use nav_sim::report::{TrajectorySeries, trajectory_svg};
 use nav_sim::sensors::outage::Outage;

@@ -2,9 +2,9 @@
 
 use super::{Source, wrote};
 use crate::cli::{Failure, Session, read};
-use nav_sim::data::atomic::{AtomicDir, guard_inputs, recover};
-use nav_sim::data::scenario_file;
-use nav_sim::data::trajectory_file::{Rows, write_rows};
+use nav_sim::formats::atomic::{AtomicDir, guard_inputs, recover};
+use nav_sim::formats::scenario_file;
+use nav_sim::formats::trajectory_file::{Rows, write_rows};
 use nav_sim::noise::continuous;
 use nav_sim::report::{gnss_csv, imu_csv, initial_toml};
 use nav_sim::scenario::Scenario;

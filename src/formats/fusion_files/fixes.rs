@@ -1,0 +1,285 @@
+//! Recorded GNSS fixes.
+
+use super::{FusionFileError as Error, bare_columns, table, text};
+use crate::earth::{MAX_LATITUDE, geodetic_to_ecef};
+use crate::formats::suggest::nearest;
+use crate::formats::trajectory_file::table::Table;
+use crate::gnss::GnssFix;
+use crate::units::DEG;
+use glam::DVec3;
+use std::f64::consts::PI;
+use std::path::Path;
+
+/// Seconds of a GNSS week.
+const WEEK_S: f64 = 604_800.0;
+/// Faster than this from one fix to the next is no motion (m/s).
+const MAX_SPEED: f64 = 8000.0;
+
+/// Quantities, by our own names.
+const NAMES: [&str; 14] = [
+    "t_s",
+    "lat_deg",
+    "lon_deg",
+    "h_m",
+    "sd_n_m",
+    "sd_e_m",
+    "sd_d_m",
+    "v_n_m_s",
+    "v_e_m_s",
+    "v_d_m_s",
+    "sd_vn_m_s",
+    "sd_ve_m_s",
+    "sd_vd_m_s",
+    "week",
+];
+/// Time, position and its deviations: what every file has.
+const POSITION: usize = 7;
+/// Velocity and its deviations.
+const VELOCITY: std::ops::Range<usize> = 7..13;
+const WEEK: usize = 13;
+/// The columns of a KF-GINS text with velocity: its deviations stand behind the velocity.
+const KF_GINS_VELOCITY: [usize; 13] = [0, 1, 2, 3, 7, 8, 9, 4, 5, 6, 10, 11, 12];
+/// What a text without a header may be.
+const KF_GINS: &str = "a KF-GINS text has 7 columns (t_s, latitude, longitude, height, standard deviations north, east, \
+                       down), or 13 (t_s, latitude, longitude, height, velocity north, east, down, their standard \
+                       deviations: position, velocity)";
+
+/// Standard deviations of fixes whose file states none: north, east, down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FixSigma {
+    /// Of the position (m).
+    pub pos_m: [f64; 3],
+    /// Of the velocity (m/s).
+    pub vel_m_s: Option<[f64; 3]>,
+}
+/// Other names of them: stem, index of the quantity.
+const STEMS: [(&str, usize); 49] = [
+    ("t", 0),
+    ("time", 0),
+    ("timestamp", 0),
+    ("tow", 0),
+    ("sow", 0),
+    ("lat", 1),
+    ("latitude", 1),
+    ("lon", 2),
+    ("lng", 2),
+    ("longitude", 2),
+    ("h", 3),
+    ("height", 3),
+    ("alt", 3),
+    ("altitude", 3),
+    ("sd_n", 4),
+    ("std_n", 4),
+    ("sigma_n", 4),
+    ("pos_std_n", 4),
+    ("sd_north", 4),
+    ("sd_lat", 4),
+    ("sd_e", 5),
+    ("std_e", 5),
+    ("sigma_e", 5),
+    ("pos_std_e", 5),
+    ("sd_east", 5),
+    ("sd_lon", 5),
+    ("sd_d", 6),
+    ("std_d", 6),
+    ("sigma_d", 6),
+    ("pos_std_d", 6),
+    ("sd_u", 6),
+    ("std_u", 6),
+    ("sd_h", 6),
+    ("v_n", 7),
+    ("vn", 7),
+    ("v_e", 8),
+    ("ve", 8),
+    ("v_d", 9),
+    ("vd", 9),
+    ("sd_vn", 10),
+    ("sd_v_n", 10),
+    ("vel_std_n", 10),
+    ("sd_ve", 11),
+    ("sd_v_e", 11),
+    ("vel_std_e", 11),
+    ("sd_vd", 12),
+    ("sd_v_d", 12),
+    ("vel_std_d", 12),
+    ("week", WEEK),
+];
+
+/// The quantity of a column and the factor to SI (angles: radians); none if it means nothing here.
+fn classify(name: &str) -> Option<(usize, f64)> {
+    let name = name.to_lowercase().replace([' ', '-'], "_");
+    if name == "gps_week" {
+        return Some((WEEK, 1.0));
+    }
+    let endings: [(&str, f64, std::ops::RangeInclusive<usize>); 9] = [
+        ("_m_s", 1.0, 7..=12),
+        ("_mps", 1.0, 7..=12),
+        ("_ms", 1e-3, 0..=0),
+        ("_us", 1e-6, 0..=0),
+        ("_ns", 1e-9, 0..=0),
+        ("_s", 1.0, 0..=0),
+        ("_deg", DEG, 1..=2),
+        ("_rad", 1.0, 1..=2),
+        ("_m", 1.0, 3..=6),
+    ];
+    let of_stem = |stem: &str| STEMS.iter().find(|(s, _)| *s == stem).map(|(_, i)| *i);
+    let with = endings.into_iter().find_map(|(ending, factor, legal)| {
+        let index = of_stem(name.strip_suffix(ending)?)?;
+        legal.contains(&index).then_some((index, factor))
+    });
+    // without a unit: seconds, degrees, metres, metres a second
+    with.or_else(|| of_stem(&name).map(|i| (i, if i == 1 || i == 2 { DEG } else { 1.0 })))
+}
+
+/// Where each quantity stands: column and factor.
+struct Columns([Option<(usize, f64)>; NAMES.len()]);
+
+impl Columns {
+    fn of(table: &Table, unsaid: Option<&FixSigma>) -> Result<(Self, Vec<String>), Error> {
+        let mut columns = Self([None; NAMES.len()]);
+        let mut ignored = Vec::new();
+        for (at, name) in table.columns.iter().enumerate() {
+            match classify(name) {
+                Some((quantity, factor)) if columns.0[quantity].is_none() => {
+                    columns.0[quantity] = Some((at, factor));
+                }
+                _ => ignored.push(name.clone()),
+            }
+        }
+        columns.complete(table, &ignored, unsaid)?;
+        Ok((columns, ignored))
+    }
+
+    /// Position and its deviations are needed; velocity and its deviations come together or not at all.
+    /// What is missing in all of a position or velocity may be given for the whole file.
+    fn complete(&self, table: &Table, ignored: &[String], unsaid: Option<&FixSigma>) -> Result<(), Error> {
+        let has_velocity = VELOCITY.into_iter().any(|i| self.0[i].is_some());
+        let needed = if has_velocity { 0..VELOCITY.end } else { 0..POSITION };
+        let none_of = |of: std::ops::Range<usize>| of.into_iter().all(|i| self.0[i].is_none());
+        let given = |i: usize| match i {
+            4..7 => unsaid.is_some() && none_of(4..7),
+            10..13 => unsaid.is_some_and(|s| s.vel_m_s.is_some()) && none_of(10..13),
+            _ => false,
+        };
+        let missing: Vec<&str> =
+            needed.filter(|i| self.0[*i].is_none() && !given(*i)).map(|i| NAMES[i]).collect();
+        if missing.is_empty() {
+            return Ok(());
+        }
+        let slip = ignored.iter().find_map(|name| Some((name, nearest(name, missing.iter().copied())?)));
+        let verb = if missing.len() == 1 { "is" } else { "are" };
+        let mut columns = format!("{} {verb}", missing.join(", "));
+        if let Some((name, meant)) = slip {
+            columns = format!("\"{name}\" is not known (\"{meant}\"?); {columns}");
+        }
+        Err(Error::MissingColumns { path: table.path.clone(), line: table.header_line, columns })
+    }
+
+    fn value(&self, quantity: usize, row: &[f64]) -> f64 {
+        self.0[quantity].map_or(0.0, |(at, factor)| row[at] * factor)
+    }
+
+    fn triad(&self, first: usize, row: &[f64]) -> DVec3 {
+        DVec3::new(self.value(first, row), self.value(first + 1, row), self.value(first + 2, row))
+    }
+}
+
+/// Reads fixes: a table with a header, or the text of KF-GINS (time, latitude, longitude (deg), height (m),
+/// standard deviations north, east, down (m); or with velocity behind the height and its deviations behind
+/// those). `unsaid` are the standard deviations where the file states none. Also what is doubtful about it.
+///
+/// # Errors
+/// Whatever is wrong with it, with its line.
+pub fn read_gnss(path: &Path, unsaid: Option<&FixSigma>) -> Result<(Vec<GnssFix>, Vec<String>), Error> {
+    let text = text(path)?;
+    let bare = bare_columns(&text);
+    let names: Option<Vec<&str>> = match bare {
+        None => None,
+        Some(POSITION) => Some(NAMES[..POSITION].to_vec()),
+        Some(13) => Some(KF_GINS_VELOCITY.map(|i| NAMES[i]).to_vec()),
+        Some(columns) => {
+            return Err(Error::Bare { path: path.display().to_string(), columns, expected: KF_GINS });
+        }
+    };
+    let table = table(path, &text, names.as_deref())?;
+    let (columns, ignored) = Columns::of(&table, unsaid)?;
+    let mut remarks = Vec::new();
+    if bare.is_some() {
+        let velocity = if columns.0[VELOCITY.start].is_some() { ", velocity" } else { "" };
+        remarks.push(format!("no header: read as KF-GINS text, position{velocity} and standard deviations"));
+    }
+    let unstated = |at: usize| columns.0[at].is_none();
+    if unstated(4) || columns.0[VELOCITY.start].is_some() && unstated(10) {
+        remarks.push("standard deviations as given for all fixes".to_owned());
+    }
+    if !ignored.is_empty() {
+        remarks.push(format!("columns not used: {}", ignored.join(", ")));
+    }
+    let mut fixes: Vec<GnssFix> = Vec::with_capacity(table.rows.len());
+    for (line, row) in &table.rows {
+        check_values(&table, &columns, *line, row)?;
+        let fix = fix(&columns, row, unsaid);
+        if let Some(before) = fixes.last() {
+            check_step(&table.path, *line, before, &fix)?;
+        }
+        fixes.push(fix);
+    }
+    let small = |f: &GnssFix| f.lat.abs() <= 0.5 * PI * DEG && f.lon.abs() <= 2.0 * PI * DEG;
+    if fixes.iter().all(small) {
+        remarks.push(
+            "latitude and longitude never exceed π: radians? Then name the columns lat_rad, lon_rad".into(),
+        );
+    }
+    Ok((fixes, remarks.into_iter().map(|r| format!("{}: {r}", table.path)).collect()))
+}
+
+fn fix(columns: &Columns, row: &[f64], unsaid: Option<&FixSigma>) -> GnssFix {
+    let value = |quantity| columns.value(quantity, row);
+    let has_velocity = columns.0[VELOCITY.start].is_some();
+    let sigma = |first: usize, otherwise: Option<[f64; 3]>| match (columns.0[first], otherwise) {
+        (None, Some(sigma)) => sigma.into(),
+        _ => columns.triad(first, row),
+    };
+    GnssFix {
+        t_s: value(0) + value(WEEK) * WEEK_S,
+        lat: value(1),
+        lon: value(2),
+        h: value(3),
+        pos_sigma_n: sigma(4, unsaid.map(|s| s.pos_m)),
+        velocity: has_velocity.then(|| (columns.triad(7, row), sigma(10, unsaid.and_then(|s| s.vel_m_s)))),
+    }
+}
+
+fn check_values(table: &Table, columns: &Columns, line: u64, row: &[f64]) -> Result<(), Error> {
+    let refuse = |quantity: usize, reason| {
+        let at = columns.0[quantity].map_or(0, |(at, _)| at);
+        let (path, column) = (table.path.clone(), table.columns[at].clone());
+        Err(Error::Value { path, line, column, value: row[at], reason })
+    };
+    let (lat, lon) = (columns.value(1, row), columns.value(2, row));
+    if lat.abs() > 90.0 * DEG {
+        return refuse(1, "is not a latitude");
+    }
+    if lat.abs() > MAX_LATITUDE {
+        return refuse(1, "is too near a pole to navigate in latitude and longitude");
+    }
+    if !(-180.0 * DEG - 1e-9..=360.0 * DEG + 1e-9).contains(&lon) {
+        return refuse(2, "is not a longitude");
+    }
+    for quantity in (4..POSITION).chain(10..VELOCITY.end).filter(|q| columns.0[*q].is_some()) {
+        if columns.value(quantity, row) <= 0.0 {
+            return refuse(quantity, "is not a standard deviation: it must be above 0");
+        }
+    }
+    Ok(())
+}
+
+fn check_step(path: &str, line: u64, before: &GnssFix, fix: &GnssFix) -> Result<(), Error> {
+    let (path, seconds) = (path.to_owned(), fix.t_s - before.t_s);
+    if seconds <= 0.0 {
+        return Err(Error::Time { path, line, previous_s: before.t_s, t_s: fix.t_s });
+    }
+    let place = |f: &GnssFix| geodetic_to_ecef(f.lat, f.lon, f.h);
+    let metres = place(fix).distance(place(before));
+    if metres > MAX_SPEED * seconds { Err(Error::Jump { path, line, metres, seconds }) } else { Ok(()) }
+}

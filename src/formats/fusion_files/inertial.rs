@@ -1,0 +1,227 @@
+//! Recorded IMU data.
+
+use super::{FusionFileError as Error, bare_columns, table, text};
+use crate::formats::recordings::checks::{check_gravity, gravity_factor};
+use crate::formats::recordings::header::{Role, Unit};
+use crate::formats::recordings::timing::{median_step, unit_of_step};
+use crate::formats::recordings::{self, Raw, ReadOptions, RecordingError};
+use crate::fusion::gap::{LONGEST_S, bridged};
+use crate::imu::{Axis, Channel, ImuIncrement, Sensor};
+use crate::strapdown::MAX_ROTATION;
+use crate::units::DEG;
+use glam::DVec3;
+use std::path::Path;
+
+/// A step this many times the median one is a gap.
+const GAP: f64 = 1.5;
+/// Mean angular rate above which the unit is doubted (rad/s).
+const FAST: f64 = 2.0;
+
+/// A recording, ready to be fused.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ImuFile {
+    /// Samples whose intervals follow one another.
+    pub samples: Vec<ImuIncrement>,
+    /// Samples a second, by the median step.
+    pub rate_hz: f64,
+    /// What is doubtful, and how the file was read.
+    pub remarks: Vec<String>,
+}
+
+/// Six values a sample, and the time it ends.
+struct Columns {
+    path: String,
+    t_s: Vec<f64>,
+    /// In the order of [`Channel::ALL`], SI: rates, or increments.
+    values: Vec<[f64; 6]>,
+    /// Which of the two each sensor gives.
+    increments: [bool; 2],
+    lines: Vec<u64>,
+    remarks: Vec<String>,
+}
+
+/// Reads a recording: a table whose headers are those of static recordings (rates, or increments over the
+/// interval that ends at the time given), or the text of KF-GINS: time, three angle increments (rad), three
+/// velocity increments (m/s), and perhaps an odometer's speed, which is left.
+///
+/// # Errors
+/// Whatever is wrong with it, with its line.
+pub fn read_imu(path: &Path) -> Result<ImuFile, Error> {
+    let packed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy"));
+    let text = if packed { None } else { Some(text(path)?) };
+    let columns = match text.as_ref().and_then(|text| Some((text, bare_columns(text)?))) {
+        Some((text, 7..=8)) => kf_gins(path, text)?,
+        Some((_, columns)) => {
+            return Err(Error::Bare { path: path.display().to_string(), columns, expected: KF_GINS });
+        }
+        None => headed(path)?,
+    };
+    columns.increments()
+}
+
+/// What a text without a header may be.
+const KF_GINS: &str = "a KF-GINS text has 7 columns (t_s, dtheta_x, dtheta_y, dtheta_z in rad, dv_x, dv_y, dv_z in m/s), \
+                       or 8 with an odometer's speed, which is not used";
+
+fn kf_gins(path: &Path, text: &str) -> Result<Columns, Error> {
+    const NAMES: [&str; 8] = [
+        "t_s",
+        "dtheta_x_rad",
+        "dtheta_y_rad",
+        "dtheta_z_rad",
+        "dv_x_m_s",
+        "dv_y_m_s",
+        "dv_z_m_s",
+        "odometer_m_s",
+    ];
+    let columns = bare_columns(text).unwrap_or(7);
+    let table = table(path, text, Some(&NAMES[..columns]))?;
+    let odometer = if columns > 7 { "; the odometer's speed in column 8 is not used" } else { "" };
+    Ok(Columns {
+        path: table.path,
+        t_s: table.rows.iter().map(|(_, r)| r[0]).collect(),
+        values: table.rows.iter().map(|(_, r)| [r[4], r[5], r[6], r[1], r[2], r[3]]).collect(),
+        increments: [true; 2],
+        lines: table.rows.iter().map(|(line, _)| *line).collect(),
+        remarks: vec![format!("no header: read as KF-GINS text, angle then velocity increments{odometer}")],
+    })
+}
+
+fn headed(path: &Path) -> Result<Columns, Error> {
+    let options = ReadOptions { hold_bytes: usize::MAX, ..ReadOptions::default() };
+    let mut raw = recordings::load(path, &options)?;
+    let shown = raw.path.clone();
+    let from_gravity = gravity_factor(&raw)?;
+    let mut signals = Vec::new();
+    for channel in Channel::ALL {
+        let (role, values) =
+            take(&mut raw, |role| matches!(role, Role::Signal { channel: c, .. } if *c == channel))?
+                .ok_or_else(|| Error::Missing { path: shown.clone(), channel })?;
+        let (factor, increment) = match role {
+            Role::Signal { unit: Unit::Si(factor), .. } => (factor, false),
+            Role::Signal { unit: Unit::Increment(factor), .. } => (factor, true),
+            _ => (from_gravity, false),
+        };
+        signals.push((values, factor, increment));
+    }
+    let t_s = times(&mut raw)?;
+    let sample = |k: usize| std::array::from_fn(|i| signals[i].0[k] * signals[i].1);
+    Ok(Columns {
+        values: (0..t_s.len()).map(sample).collect(),
+        increments: [signals[0].2, signals[3].2],
+        lines: (0..t_s.len()).map(|k| raw.lines.of(k)).collect(),
+        remarks: Vec::new(),
+        path: shown,
+        t_s,
+    })
+}
+
+/// The first column of such a role, with its numbers.
+fn take(raw: &mut Raw, is: impl Fn(&Role) -> bool) -> Result<Option<(Role, Vec<f64>)>, RecordingError> {
+    let Some(at) = raw.columns.iter().position(|c| is(&c.role)) else { return Ok(None) };
+    let column = raw.columns.swap_remove(at);
+    let values = column.values.into_vec();
+    let values = values.map_err(RecordingError::storage(&raw.path))?;
+    Ok(Some((column.role, values)))
+}
+
+fn times(raw: &mut Raw) -> Result<Vec<f64>, Error> {
+    let found = take(raw, |role| matches!(role, Role::Time { .. }))?;
+    let (role, values) = found.ok_or_else(|| Error::NoTime { path: raw.path.clone() })?;
+    let unit = match role {
+        Role::Time { unit_s: Some(unit) } => unit,
+        _ => unit_of_step(median_step(&values)).0,
+    };
+    Ok(values.iter().map(|t| t * unit).collect())
+}
+
+impl Columns {
+    fn increments(mut self) -> Result<ImuFile, Error> {
+        if self.t_s.len() < 3 {
+            return Err(Error::TooFew { path: self.path, found: self.t_s.len(), needed: 3 });
+        }
+        if let Some(k) = (1..self.t_s.len()).find(|k| self.t_s[*k] <= self.t_s[k - 1]) {
+            let (path, line) = (self.path.clone(), self.lines[k]);
+            return Err(Error::Time { path, line, previous_s: self.t_s[k - 1], t_s: self.t_s[k] });
+        }
+        let step = median_step(&self.t_s);
+        self.doubt_units(step)?;
+        let mut samples = Vec::with_capacity(self.t_s.len());
+        let mut holes = Vec::new();
+        for k in 0..self.t_s.len() {
+            let t_s = self.t_s[k];
+            let since_s = if k == 0 { step } else { t_s - self.t_s[k - 1] };
+            // a sample after a hole lasts a step like any other
+            let is_hole = since_s > GAP * step;
+            let sample = self.sample(k, if is_hole { step } else { since_s }, t_s);
+            let (path, line) = (self.path.clone(), self.lines[k]);
+            if is_hole && since_s - step > LONGEST_S + 0.5 * step {
+                let previous_s = self.t_s[k - 1];
+                return Err(Error::Gap { path, line, previous_s, t_s, longest_s: LONGEST_S });
+            }
+            let angle = sample.dtheta.length();
+            if angle > MAX_ROTATION {
+                let (angle_deg, max_deg) = (angle / DEG, MAX_ROTATION / DEG);
+                return Err(Error::Rotation { path, line, angle_deg, max_deg });
+            }
+            if is_hole {
+                holes.push((k, since_s - step));
+            }
+            samples.push(sample);
+        }
+        self.tell_of_holes(&holes);
+        let path = &self.path;
+        let remarks = self.remarks.iter().map(|r| format!("{path}: {r}")).collect();
+        Ok(ImuFile { samples: bridged(&samples, step), rate_hz: 1.0 / step, remarks })
+    }
+
+    fn tell_of_holes(&mut self, holes: &[(usize, f64)]) {
+        const SHOWN: usize = 5;
+        let shown = |(k, seconds): &(usize, f64)| {
+            format!("{seconds:.2} s before {:.2} s (line {})", self.t_s[*k], self.lines[*k])
+        };
+        let mut list: Vec<String> = holes.iter().take(SHOWN).map(shown).collect();
+        if holes.len() > SHOWN {
+            list.push(format!("and {} more", holes.len() - SHOWN));
+        }
+        if !list.is_empty() {
+            self.remarks.push(format!(
+                "samples missing: {}; bridged with those beside them, as uncertain as this recording is over such times",
+                list.join(", ")
+            ));
+        }
+    }
+
+    /// Sample k over `dt` seconds that end at `t_s`.
+    fn sample(&self, k: usize, dt: f64, t_s: f64) -> ImuIncrement {
+        let v = &self.values[k];
+        let seconds = |sensor: Sensor| if self.increments[sensor as usize] { 1.0 } else { dt };
+        let triad = |sensor: Sensor| {
+            let first = Channel { sensor, axis: Axis::X }.index();
+            DVec3::new(v[first], v[first + 1], v[first + 2]) * seconds(sensor)
+        };
+        ImuIncrement { t_s, dt_s: dt, dtheta: triad(Sensor::Gyro), dv: triad(Sensor::Accel) }
+    }
+
+    /// Over a whole recording the specific force is gravity in the mean, and nothing turns all the time.
+    fn doubt_units(&mut self, step: f64) -> Result<(), Error> {
+        let n = self.values.len() as f64;
+        let mean = |sensor: Sensor| {
+            let length = |k: usize| {
+                let s = self.sample(k, step, 0.0);
+                (if sensor == Sensor::Accel { s.dv } else { s.dtheta }).length() / step
+            };
+            (0..self.values.len()).map(length).sum::<f64>() / n
+        };
+        let (force, rate) = (mean(Sensor::Accel), mean(Sensor::Gyro));
+        if !(4.0..25.0).contains(&force) {
+            check_gravity(&self.path, force.max(0.3))?;
+        }
+        if rate > FAST {
+            let degrees = rate / DEG;
+            self.remarks
+                .push(format!("mean angular rate {degrees:.0} deg/s: are these degrees named radians?"));
+        }
+        Ok(())
+    }
+}

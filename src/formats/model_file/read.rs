@@ -1,0 +1,200 @@
+//! Reading model files.
+
+use super::{CI, Interval, ModelFile, SCHEMA};
+use crate::formats::suggest::nearest;
+use crate::formats::toml_file::{Section, Source, TomlError};
+use crate::imu::{Axis, Channel, Sensor};
+use crate::noise::{
+    CATALOGUE, Composite, Law, Model, ParameterError, Process, Spread, SpreadError, Variation,
+};
+use std::path::Path;
+
+/// Reads a model file.
+///
+/// # Errors
+/// When the file cannot be read, is not TOML, has unknown keys, lacks some, or has values outside their
+/// domains.
+pub fn read(path: &Path) -> Result<ModelFile, TomlError> {
+    parse(&Source::read(path)?)
+}
+
+pub(super) fn parse(source: &Source) -> Result<ModelFile, TomlError> {
+    let table = source.parse()?;
+    let root = source.root(&table);
+    root.only(&["schema", "rate_hz", "accel", "gyro", "spread", "provenance"])?;
+    check_schema(&root)?;
+    let rate_hz = root.require_f64("rate_hz")?;
+    if rate_hz <= 0.0 {
+        return Err(root.refuse("rate_hz", "is not a rate: it must be > 0", None));
+    }
+    let mut file = ModelFile::new(Model { rate_hz, axes: Default::default() });
+    for sensor in Sensor::ALL {
+        read_sensor(&root, sensor, &mut file)?;
+    }
+    if file.missing.len() == Channel::ALL.len() {
+        return Err(root.missing_one_of(&["accel", "gyro"]));
+    }
+    file.spread = root.section("spread")?.map(|s| read_spread(&s, &file)).transpose()?;
+    file.provenance = root.section("provenance")?.and_then(|_| source.owned_table("provenance"));
+    Ok(file)
+}
+
+fn check_schema(root: &Section<'_>) -> Result<(), TomlError> {
+    match root.u64("schema")? {
+        None | Some(SCHEMA) => Ok(()),
+        Some(_) => {
+            let reason = format!("is not a schema this version reads: it reads {SCHEMA}");
+            Err(root.refuse("schema", reason, Some("was the file made by a newer nav-sim?".into())))
+        }
+    }
+}
+
+fn read_sensor(root: &Section<'_>, sensor: Sensor, file: &mut ModelFile) -> Result<(), TomlError> {
+    let Some(section) = root.section(sensor.name())? else {
+        file.missing.extend(Axis::ALL.map(|axis| Channel { sensor, axis }));
+        return Ok(());
+    };
+    section.only(&["processes", "x", "y", "z"])?;
+    let pooled = section.has("processes");
+    for axis in Axis::ALL {
+        let channel = Channel { sensor, axis };
+        let own = section.section(axis.name())?;
+        if let Some(own) = &own {
+            own.only(&["processes"])?;
+        }
+        match own.as_ref().or(pooled.then_some(&section)) {
+            Some(_) if pooled && own.is_some() => {
+                let hint = format!("write either [{sensor}] or one table an axis", sensor = sensor.name());
+                let reason = "is given both for all axes and for this one";
+                return Err(section.refuse(axis.name(), reason, Some(hint)));
+            }
+            Some(table) => read_processes(table, channel, file)?,
+            None => file.missing.push(channel),
+        }
+    }
+    let found = file.missing.iter().filter(|c| c.sensor == sensor).count() < Axis::ALL.len();
+    if found { Ok(()) } else { Err(section.missing("processes")) }
+}
+
+fn read_processes(table: &Section<'_>, channel: Channel, file: &mut ModelFile) -> Result<(), TomlError> {
+    if !table.has("processes") {
+        return Err(table.missing("processes"));
+    }
+    let sections = table.sections("processes")?;
+    let rate_hz = file.model.rate_hz;
+    let processes = sections.iter().map(|s| read_process(s, rate_hz)).collect::<Result<_, _>>()?;
+    let noise = Composite::new(processes);
+    for ((section, process), label) in sections.iter().zip(&noise.processes).zip(noise.labels()) {
+        for (parameter, _) in process.parameters() {
+            if let Some([low, high]) = section.interval(&format!("{parameter}{CI}"))? {
+                let (process, parameter) = (label.clone(), parameter.to_owned());
+                file.intervals.push(Interval { channel, process, parameter, low, high });
+            }
+        }
+    }
+    file.model.axes[channel.index()] = noise;
+    Ok(())
+}
+
+fn read_process(section: &Section<'_>, rate_hz: f64) -> Result<Process, TomlError> {
+    let code = section.require_str("type")?;
+    let Some((code, names)) = CATALOGUE.iter().find(|(c, _)| *c == code) else {
+        let codes = || CATALOGUE.iter().map(|(c, _)| *c);
+        let hint = match nearest(code, codes()) {
+            Some(meant) => format!("did you mean \"{meant}\"?"),
+            None => format!("processes: {}", codes().collect::<Vec<_>>().join(", ")),
+        };
+        return Err(section.refuse("type", "is not a process", Some(hint)));
+    };
+    let ci: Vec<String> = names.iter().map(|n| format!("{n}{CI}")).collect();
+    let legal: Vec<&str> =
+        ["type"].iter().chain(*names).copied().chain(ci.iter().map(String::as_str)).collect();
+    section.only(&legal)?;
+    let values = names.iter().map(|n| section.require_f64(n)).collect::<Result<Vec<_>, _>>()?;
+    match Process::from_values(code, &values, rate_hz) {
+        Some(process) => process.map_err(|e| refuse_parameter(section, &e)),
+        None => Err(section.refuse("type", "is not a process", None)),
+    }
+}
+
+fn refuse_parameter(section: &Section<'_>, e: &ParameterError) -> TomlError {
+    let hint = match e.parameter {
+        "phi" => {
+            "phi = exp(−1/(T·rate_hz)) for a correlation time of T seconds; phi = 1 is a random walk: RW"
+        }
+        "sigma2" | "gamma2" | "q2" | "s2" => "a variance is never negative; 0 switches the process off",
+        _ => return section.refuse(e.parameter, format!("is not {}", e.domain), None),
+    };
+    section.refuse(e.parameter, format!("is not {}", e.domain), Some(hint.into()))
+}
+
+fn read_spread(section: &Section<'_>, file: &ModelFile) -> Result<Spread, TomlError> {
+    section.only(&Sensor::ALL.map(Sensor::name))?;
+    let mut spread = Spread::default();
+    for sensor in Sensor::ALL {
+        let pooled = section.is_list(sensor.name());
+        let own = if pooled { None } else { section.section(sensor.name())? };
+        if let Some(own) = &own {
+            own.only(&Axis::ALL.map(Axis::name))?;
+        }
+        for axis in Axis::ALL {
+            let channel = Channel { sensor, axis };
+            let laws = match &own {
+                _ if pooled => section.sections(sensor.name())?,
+                Some(own) => own.sections(axis.name())?,
+                None => Vec::new(),
+            };
+            let into = &mut spread.axes[channel.index()];
+            for law in laws {
+                let variation = read_variation(&law, file.model.axis(channel), file.model.rate_hz)?;
+                let same = |v: &Variation| {
+                    v.process() == variation.process() && v.parameter() == variation.parameter()
+                };
+                if into.iter().any(same) {
+                    return Err(law.refuse("parameter", "of this process already has a law", None));
+                }
+                into.push(variation);
+            }
+        }
+    }
+    Ok(spread)
+}
+
+fn read_variation(section: &Section<'_>, noise: &Composite, rate_hz: f64) -> Result<Variation, TomlError> {
+    const COMMON: [&str; 3] = ["process", "parameter", "distribution"];
+    let law = match section.require_str("distribution")? {
+        "beta" => {
+            section.only(&[&COMMON[..], &["a", "b", "low", "width"]].concat())?;
+            let get = |key| section.require_f64(key);
+            Law::Beta { a: get("a")?, b: get("b")?, low: get("low")?, width: get("width")? }
+        }
+        "normal" => {
+            section.only(&[&COMMON[..], &["sd"]].concat())?;
+            Law::Normal { sd: section.require_f64("sd")? }
+        }
+        _ => {
+            let hint = Some("distributions: beta, normal".into());
+            return Err(section.refuse("distribution", "is not a distribution known here", hint));
+        }
+    };
+    let (process, parameter) = (section.require_str("process")?, section.require_str("parameter")?);
+    Variation::new(noise, rate_hz, process, parameter, law).map_err(|e| refuse_law(section, &e))
+}
+
+fn refuse_law(section: &Section<'_>, e: &SpreadError) -> TomlError {
+    let one_of = |known: &[String]| Some(format!("there: {}", known.join(", ")));
+    match e {
+        SpreadError::NoProcess { known, .. } => {
+            section.refuse("process", "is no process of this model", one_of(known))
+        }
+        SpreadError::NoParameter { process, known, .. } => {
+            let hint = Some(format!("there: {}", known.join(", ")));
+            section.refuse("parameter", format!("is no parameter of {process}"), hint)
+        }
+        SpreadError::Constant { name, domain, .. } => section.refuse(name, format!("is not {domain}"), None),
+        SpreadError::Reaches(e) => {
+            let reason = format!("reaches {} = {}, which is not {}", e.parameter, e.value, e.domain);
+            section.refuse("distribution", reason, None)
+        }
+    }
+}

@@ -1,0 +1,153 @@
+//! Static recordings: text tables with a header (CSV, TSV, gzipped or not) and `.npy` arrays, one replicate
+//! a file, a directory being all its recordings in name order.
+//!
+//! Columns are found by their names ([`header`]), their units by the names' endings; what was found, and
+//! what was assumed, is told in the [`Report`]. What cannot be right is refused with file and line
+//! ([`RecordingError`]).
+
+pub mod header;
+
+pub(in crate::formats) mod checks;
+mod error;
+mod files;
+mod prepared;
+mod repeats;
+mod report;
+mod table;
+mod text;
+mod texture;
+pub(in crate::formats) mod timing;
+mod values;
+mod write;
+
+pub use error::RecordingError;
+pub use files::is_recording;
+pub use report::{FileReport, Report};
+pub use write::FileFormat;
+
+pub(in crate::formats) use table::{Raw, load};
+
+use crate::imu::{Channel, Recording};
+use prepared::Prepared;
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
+
+/// How recordings are read.
+#[derive(Debug, Clone)]
+pub struct ReadOptions {
+    /// Sample rate (Hz) for files without a time column; where there is one, it must agree within 1 %.
+    pub rate_hz: Option<f64>,
+    /// Seconds to leave out at the beginning (warm-up).
+    pub skip_s: f64,
+    /// What to do where the time jumps or stands still.
+    pub gaps: Gaps,
+    /// The channels wanted; none: all. Others are neither parsed nor checked nor held in memory.
+    pub channels: Option<Vec<Channel>>,
+    /// Names of the columns, for files without a header and instead of the header of those with one.
+    pub columns: Option<Vec<String>>,
+    /// Fewest samples a recording must have (at least 2).
+    pub min_samples: usize,
+    /// Bytes of one file's samples that are held in memory (512 MiB); those of a longer one wait in a temporary file.
+    pub hold_bytes: usize,
+}
+
+impl Default for ReadOptions {
+    fn default() -> Self {
+        Self {
+            rate_hz: None,
+            skip_s: 0.0,
+            gaps: Gaps::default(),
+            channels: None,
+            columns: None,
+            min_samples: 2,
+            hold_bytes: 512 << 20,
+        }
+    }
+}
+
+/// What to do where a time step is over 1.5 or under 0.5 of the median step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Gaps {
+    /// Refuse the file.
+    #[default]
+    Refuse,
+    /// Make each stretch between such steps a recording of its own.
+    Split,
+    /// Take the samples as evenly spaced all the same (late stamps, not lost samples).
+    Ignore,
+}
+
+/// Reads recordings; those of a directory in name order (numbers in names by value). All are held.
+///
+/// # Errors
+/// When a file cannot be read, or holds what no sound recording can: [`RecordingError`].
+pub fn read(paths: &[PathBuf], options: &ReadOptions) -> Result<(Vec<Recording>, Report), RecordingError> {
+    let options = ReadOptions { hold_bytes: usize::MAX, ..options.clone() };
+    visit(paths, &options, &|recording| recording, &|_, _| {})
+}
+
+/// Files that are read side by side.
+const AT_ONCE: usize = 8;
+
+/// Reads recordings and shows each to `look`, from any thread, then lets it go: no more than eight files are held at a
+/// time. The signals of a file longer than is to be held
+/// ([`ReadOptions::hold_bytes`]) are shown one by one, as recordings of the same name, no two at a time. What
+/// `look` returned is in the order of the files. `tell` is told how many files are done, and of how many, from 0 on.
+///
+/// # Errors
+/// When a file cannot be read, or holds what no sound recording can: [`RecordingError`].
+pub fn visit<T: Send>(
+    paths: &[PathBuf],
+    options: &ReadOptions,
+    look: &(dyn Fn(Recording) -> T + Sync),
+    tell: &dyn Fn(usize, usize),
+) -> Result<(Vec<T>, Report), RecordingError> {
+    let files = files::expand(paths)?;
+    let (mut looks, mut report) = (Vec::new(), Report::default());
+    tell(0, files.len());
+    let mut done = 0;
+    for some in files.chunks(AT_ONCE) {
+        let outcomes: Vec<_> = some.par_iter().map(|file| held(&file.path, options, look)).collect();
+        for (file, outcome) in some.iter().zip(outcomes) {
+            match outcome {
+                Err(RecordingError::NoChannels { .. }) if file.from_directory => {
+                    let text = format!("{}: passed over, no column is a known one", file.path.display());
+                    report.warnings.push(text);
+                }
+                outcome => {
+                    let (of_file, held, stored) = outcome?;
+                    looks.extend(held);
+                    for recording in stored.iter().flat_map(Prepared::signals) {
+                        looks.push(look(recording?));
+                    }
+                    report.files.push(of_file);
+                }
+            }
+            done += 1;
+            tell(done, files.len());
+        }
+    }
+    checks::same_rate(&report.files)?;
+    if looks.is_empty() {
+        let path = paths.first().map(|p| p.display().to_string()).unwrap_or_default();
+        return Err(RecordingError::NoFiles { path });
+    }
+    Ok((looks, report))
+}
+
+/// What `look` made of a file that is held; or the file, if it is stored.
+fn held<T>(
+    path: &Path,
+    options: &ReadOptions,
+    look: &(dyn Fn(Recording) -> T + Sync),
+) -> Result<(FileReport, Vec<T>, Option<Prepared>), RecordingError> {
+    let (prepared, mut report) = Prepared::new(load(path, options)?, options)?;
+    path.clone_into(&mut report.path);
+    if prepared.is_stored() {
+        return Ok((report, Vec::new(), Some(prepared)));
+    }
+    Ok((report, prepared.recordings()?.into_iter().map(look).collect(), None))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,256 @@
+//! Text tables: comment head, header, rows.
+
+use super::error::shown;
+use super::header::{Layout, Role, classify};
+use super::table::{BETWEEN, Column, LARGEST, Lines, Raw, relieve, settle};
+use super::values::Values;
+use super::{ReadOptions, RecordingError};
+use crate::formats::source;
+use flate2::read::MultiGzDecoder;
+use std::io::{BufRead, BufReader, Cursor, Read};
+use std::path::Path;
+
+type Reader = Box<dyn BufRead>;
+
+/// Longest line a header may be; what is longer is no text table.
+const LONGEST_HEADER: u64 = 1 << 16;
+const BUFFER: usize = 1 << 17;
+
+/// Reads a text table.
+pub(super) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, RecordingError> {
+    let name = path.display().to_string();
+    let io = |source| RecordingError::Io { path: name.clone(), source };
+    let file = source::open(path).map_err(io)?;
+    let gzipped = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
+    let reader: Reader = if gzipped {
+        Box::new(BufReader::with_capacity(
+            BUFFER,
+            MultiGzDecoder::new(BufReader::with_capacity(BUFFER, file)),
+        ))
+    } else {
+        Box::new(BufReader::with_capacity(BUFFER, file))
+    };
+    parse(&name, reader, options)
+}
+
+/// Reads a text table from its bytes.
+pub(super) fn parse(name: &str, mut reader: Reader, options: &ReadOptions) -> Result<Raw, RecordingError> {
+    let head = Head::read(name, &mut reader, options)?;
+    let error = |e| RecordingError::header(name, head.line, e);
+    let layout = Layout::new(&head.names, head.xsens, options.channels.as_deref()).map_err(error)?;
+    let (indices, mut columns) = layout.columns();
+    let lines = read_rows(name, reader, &head, &indices, &mut columns, options)?;
+    if lines.is_empty() {
+        return Err(RecordingError::Empty { path: name.to_owned() });
+    }
+    let stored = RecordingError::storage(name);
+    settle(&mut columns, options).map_err(&stored)?;
+    let mut kept = Vec::new();
+    for column in columns {
+        if column.role != Role::Ticks || all_finite(&column.values).map_err(&stored)? {
+            kept.push(column);
+        }
+    }
+    let head_rate_hz = head.rate_hz;
+    Ok(Raw { path: name.to_owned(), columns: kept, ignored: layout.ignored, head_rate_hz, lines })
+}
+
+/// What stands before the rows.
+#[derive(Debug)]
+struct Head {
+    names: Vec<String>,
+    delimiter: u8,
+    /// Line of the header, from 1.
+    line: u64,
+    /// Lines before the first row that `reader` still holds (or `first_row`).
+    lines_before: u64,
+    /// The first row, where it was read while looking for a header.
+    first_row: Vec<u8>,
+    /// Whether the head is that of an Xsens MT Manager export.
+    xsens: bool,
+    rate_hz: Option<f64>,
+}
+
+impl Head {
+    fn read(name: &str, reader: &mut Reader, options: &ReadOptions) -> Result<Self, RecordingError> {
+        let (mut line, mut xsens, mut rate_hz) = (0, false, None);
+        loop {
+            let mut bytes = Vec::new();
+            let io = |source| RecordingError::Io { path: name.to_owned(), source };
+            reader.by_ref().take(LONGEST_HEADER).read_until(b'\n', &mut bytes).map_err(io)?;
+            if bytes.is_empty() {
+                return Err(RecordingError::Empty { path: name.to_owned() });
+            }
+            if let Some(what) = no_text(&bytes) {
+                return Err(RecordingError::NotText { path: name.to_owned(), what });
+            }
+            line += 1;
+            let text = String::from_utf8_lossy(&bytes).into_owned();
+            let text = text.trim_start_matches('\u{feff}').trim();
+            if let Some(comment) = text.strip_prefix("//") {
+                xsens = true;
+                rate_hz = rate_hz.or_else(|| rate_in(comment));
+                continue;
+            }
+            if text.is_empty() || text.to_lowercase().starts_with("sep=") {
+                continue;
+            }
+            let header = text.trim_start_matches(['#', '%']).trim_start();
+            let delimiter = delimiter_of(header);
+            let cells = split(header, delimiter);
+            if text.starts_with(['#', '%']) && Layout::new(&cells, xsens, None).is_err() {
+                continue;
+            }
+            let numeric = cells.iter().all(|c| c.trim().parse::<f64>().is_ok());
+            let names = match &options.columns {
+                Some(names) => names.clone(),
+                None if numeric || (bytes.len() as u64) == LONGEST_HEADER => {
+                    let (path, found) = (name.to_owned(), shown(text, 60));
+                    return Err(RecordingError::NoHeader { path, line, found });
+                }
+                None => cells,
+            };
+            let first_row = if numeric { bytes } else { Vec::new() };
+            let lines_before = if numeric { line - 1 } else { line };
+            return Ok(Self { names, delimiter, line, lines_before, first_row, xsens, rate_hz });
+        }
+    }
+}
+
+/// The rate in a comment such as `Update Rate: 100.0Hz`.
+fn rate_in(comment: &str) -> Option<f64> {
+    let lower = comment.to_lowercase();
+    let words = ["update rate", "sample rate", "sampling rate", "output rate"];
+    let after = words.iter().find_map(|w| lower.split_once(w))?.1;
+    let value = after.trim_start_matches(|c: char| !c.is_ascii_digit());
+    let digits: String = value.chars().take_while(|c| c.is_ascii_digit() || *c == '.').collect();
+    digits.parse().ok().filter(|r: &f64| *r > 0.0)
+}
+
+fn delimiter_of(header: &str) -> u8 {
+    let count = |d: u8| header.bytes().filter(|b| *b == d).count();
+    // Of equals, the last. Spaces separate only where nothing else does and they are not inside one name.
+    let best = [b',', b';', b'\t'].into_iter().max_by_key(|d| count(*d)).filter(|d| count(*d) > 0);
+    let spaced = count(b' ') > 0 && classify(header, true).is_none();
+    best.unwrap_or(if spaced { b' ' } else { b',' })
+}
+
+/// The cells of a line, quotes removed, without empty ones at the end.
+fn split(text: &str, delimiter: u8) -> Vec<String> {
+    let mut reader =
+        csv::ReaderBuilder::new().has_headers(false).delimiter(delimiter).from_reader(text.as_bytes());
+    let mut record = csv::ByteRecord::new();
+    let read = reader.read_byte_record(&mut record);
+    let mut cells: Vec<String> = match read {
+        Ok(true) => record.iter().map(|c| String::from_utf8_lossy(c).trim().to_owned()).collect(),
+        _ => Vec::new(),
+    };
+    while cells.last().is_some_and(String::is_empty) {
+        cells.pop();
+    }
+    cells
+}
+
+/// Whether there is no NaN in a column.
+fn all_finite(values: &Values) -> std::io::Result<bool> {
+    let mut finite = true;
+    values.each_block(0..values.len(), |block| finite &= block.iter().all(|v| v.is_finite()))?;
+    Ok(finite)
+}
+
+/// Appends every row's values to their columns.
+fn read_rows(
+    name: &str,
+    reader: Reader,
+    head: &Head,
+    indices: &[usize],
+    columns: &mut [Column],
+    options: &ReadOptions,
+) -> Result<Lines, RecordingError> {
+    let mut rows = csv::ReaderBuilder::new()
+        .has_headers(false)
+        .flexible(true)
+        .delimiter(head.delimiter)
+        .buffer_capacity(BUFFER)
+        .from_reader(Cursor::new(head.first_row.clone()).chain(reader).chain(&b"\n"[..]));
+    let (mut lines, mut record, mut sample) = (Lines::default(), csv::ByteRecord::new(), 0);
+    let expected = head.names.len();
+    loop {
+        match rows.read_byte_record(&mut record) {
+            Ok(true) => {}
+            Ok(false) => return Ok(lines),
+            Err(e) => return Err(RecordingError::Io { path: name.to_owned(), source: of_csv(e) }),
+        }
+        let line = head.lines_before + line_of(&record, rows.position().line());
+        let found = record.len();
+        let trailing =
+            found == expected + 1 && record.get(expected).is_some_and(|c| c.trim_ascii().is_empty());
+        if found != expected && !trailing {
+            if record.iter().all(|c| c.trim_ascii().is_empty()) {
+                continue;
+            }
+            return Err(RecordingError::RowLength { path: name.to_owned(), line, found, expected });
+        }
+        if sample % BETWEEN == 0 {
+            relieve(columns, options).map_err(RecordingError::storage(name))?;
+        }
+        for (index, column) in indices.iter().zip(columns.iter_mut()) {
+            let cell = record.get(*index).unwrap_or_default();
+            match number(cell) {
+                Some(value) if value.abs() <= LARGEST => column.values.push(value),
+                // A clock that the exporter leaves empty is no clock: passed over below.
+                _ if column.role == Role::Ticks => column.values.push(f64::NAN),
+                parsed => return Err(bad_cell(name, line, &column.name, cell, parsed)),
+            }
+        }
+        lines.push(sample, line);
+        sample += 1;
+    }
+}
+
+/// What the system said, with its kind.
+fn of_csv(e: csv::Error) -> std::io::Error {
+    match e.into_kind() {
+        csv::ErrorKind::Io(source) => source,
+        other => std::io::Error::other(format!("{other:?}")),
+    }
+}
+
+/// What a line shows a file to be that is no text of lines, if it does.
+fn no_text(bytes: &[u8]) -> Option<&'static str> {
+    if bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff]) {
+        return Some("it is in UTF-16");
+    }
+    let control = bytes.iter().filter(|b| b.is_ascii_control() && !b"\t\r\n".contains(b)).count();
+    if bytes.contains(&0) || 20 * control > bytes.len() {
+        return Some("it is binary");
+    }
+    let lone = bytes.windows(2).any(|pair| pair[0] == b'\r' && !b"\r\n".contains(&pair[1]));
+    lone.then_some("its lines end in a carriage return only")
+}
+
+/// Line of a record that ended before line `next`. (The record's own position is that before any empty
+/// lines.)
+fn line_of(record: &csv::ByteRecord, next: u64) -> u64 {
+    let start = record.position().map_or(0, csv::Position::line);
+    if next == start + 1 {
+        return start;
+    }
+    let inside = record.as_slice().iter().filter(|b| **b == b'\n').count() as u64;
+    next.saturating_sub(1 + inside)
+}
+
+#[inline]
+fn number(cell: &[u8]) -> Option<f64> {
+    std::str::from_utf8(cell.trim_ascii()).ok()?.parse().ok()
+}
+
+fn bad_cell(path: &str, line: u64, column: &str, cell: &[u8], parsed: Option<f64>) -> RecordingError {
+    let value = shown(&String::from_utf8_lossy(cell.trim_ascii()), 40);
+    let (path, column) = (path.to_owned(), column.to_owned());
+    match parsed {
+        None => RecordingError::NotANumber { path, line, column, value },
+        Some(number) if number.is_finite() => RecordingError::Absurd { path, line, column, value },
+        Some(_) => RecordingError::NotFinite { path, line, column, value },
+    }
+}

@@ -1,0 +1,210 @@
+//! Sample rate, gaps and duplicates, from the time column or the packet counter.
+
+use super::header::Role;
+use super::table::{Column, Raw};
+use super::values::Values;
+use super::{FileReport, Gaps, ReadOptions, RecordingError};
+
+/// Rates beyond these are looked at twice (Hz).
+const USUAL_RATES_HZ: std::ops::RangeInclusive<f64> = 0.5..=20_000.0;
+
+/// All numbers of a column.
+fn of_file(raw: &Raw, values: Values) -> Result<Vec<f64>, RecordingError> {
+    values.into_vec().map_err(RecordingError::storage(&raw.path))
+}
+
+/// When the samples were taken.
+#[derive(Debug)]
+pub(super) struct Timing {
+    pub(super) rate_hz: f64,
+    /// First samples of the stretches after a gap, if the file is to be split.
+    pub(super) breaks: Vec<usize>,
+}
+
+/// Finds the rate and checks the steps; frees the time column.
+pub(super) fn timing(
+    raw: &mut Raw,
+    options: &ReadOptions,
+    report: &mut FileReport,
+) -> Result<Timing, RecordingError> {
+    if let Some(rate_hz) = options.rate_hz.filter(|r| !(r.is_finite() && *r > 0.0)) {
+        return Err(RecordingError::NotARate { rate_hz });
+    }
+    let take = |raw: &mut Raw, wanted: fn(&Role) -> bool| {
+        let at = raw.columns.iter().position(|c| wanted(&c.role))?;
+        Some(raw.columns.swap_remove(at))
+    };
+    let time = take(raw, |r| matches!(r, Role::Time { .. }));
+    let counter = take(raw, |r| *r == Role::Counter);
+    let ticks = take(raw, |r| *r == Role::Ticks);
+    let known = options.rate_hz.or(raw.head_rate_hz);
+    let clock = match (time, counter, ticks, known) {
+        (Some(time), ..) => Clock::of_time(time, raw, report)?,
+        (None, Some(counter), _, Some(rate_hz)) => {
+            let source = if options.rate_hz.is_some() { "given" } else { "head of the file" };
+            let mut clock = Clock::counting(counter, raw, 65536.0, 1.0)?;
+            // The counter tells what was lost, not the rate: with a skip factor it counts by more than one.
+            clock.unit_s = 1.0 / (rate_hz * median_step(&clock.since).max(1.0));
+            Clock { source: format!("{source}, packet counter"), ..clock }
+        }
+        (None, _, Some(ticks), _) => Clock::counting(ticks, raw, 4_294_967_296.0, 1e-4)?,
+        (None, _, None, Some(rate_hz)) => {
+            report.rate_from = if options.rate_hz.is_some() { "given" } else { "head of the file" }.into();
+            return Ok(Timing { rate_hz, breaks: Vec::new() });
+        }
+        (None, _, None, None) => return Err(RecordingError::NoRate { path: raw.path.clone() }),
+    };
+    let timing = clock.check(raw, options)?;
+    report.rate_from = clock.source;
+    if let Some(given) = options.rate_hz.filter(|given| (timing.found_hz / given - 1.0).abs() > ROUNDED) {
+        let found = timing.found_hz;
+        report.rate_from = format!("given; the {} has {found} Hz", report.rate_from);
+        report.warn(format!("{given} Hz is given, but the file runs at {found} Hz: the rate given is taken"));
+    }
+    if !USUAL_RATES_HZ.contains(&timing.rate_hz) {
+        let (rate_hz, column) = (timing.rate_hz, &clock.name);
+        report.warn(format!("{rate_hz} Hz is no usual rate of an IMU: is the unit of \"{column}\" right?"));
+    }
+    if !timing.breaks.is_empty() {
+        let first = raw.lines.of(timing.breaks[0]);
+        let n = timing.breaks.len();
+        report.warn(match options.gaps {
+            Gaps::Ignore => format!("{n} gaps or duplicates in time ignored, the first in line {first}"),
+            _ => format!("split at {n} gaps or duplicates in time, the first in line {first}"),
+        });
+    }
+    let breaks = if options.gaps == Gaps::Split { timing.breaks } else { Vec::new() };
+    Ok(Timing { rate_hz: timing.rate_hz, breaks })
+}
+
+/// What the steps of a clock say.
+struct Checked {
+    rate_hz: f64,
+    /// The clock's own rate (Hz).
+    found_hz: f64,
+    breaks: Vec<usize>,
+}
+
+/// A rate that is given may differ from the clock's by so much without a word: it was rounded.
+const ROUNDED: f64 = 1e-3;
+
+/// Time of each sample.
+#[derive(Debug)]
+struct Clock {
+    name: String,
+    /// Time of the first sample (s).
+    start: f64,
+    /// Times since then, in units.
+    since: Vec<f64>,
+    unit_s: f64,
+    source: String,
+}
+
+impl Clock {
+    fn of_time(column: Column, raw: &Raw, report: &mut FileReport) -> Result<Self, RecordingError> {
+        let (name, mut since) = (column.name, of_file(raw, column.values)?);
+        let first = since.first().copied().unwrap_or(0.0);
+        since.iter_mut().for_each(|t| *t -= first);
+        let unit_s = match column.role {
+            Role::Time { unit_s: Some(unit) } => unit,
+            _ => {
+                let (unit, word) = unit_of_step(median_step(&since));
+                if since.len() > 1 {
+                    report.assumptions.push(format!("column \"{name}\" taken as {word}, from its step"));
+                }
+                unit
+            }
+        };
+        if since.len() > 2 && median_step(&since) == 0.0 {
+            return Err(RecordingError::Still { path: raw.path.clone(), column: name });
+        }
+        Ok(Self { name, start: first * unit_s, since, unit_s, source: "time column".into() })
+    }
+
+    /// A counter that starts again at 0 when it reaches `modulus`.
+    fn counting(column: Column, raw: &Raw, modulus: f64, unit_s: f64) -> Result<Self, RecordingError> {
+        let mut since = of_file(raw, column.values)?;
+        let (mut last, mut total) = (since.first().copied().unwrap_or(0.0), 0.0);
+        for value in &mut since {
+            let step = *value - last;
+            last = *value;
+            // A fall of more than half the range is the counter starting again.
+            total += if step < -0.5 * modulus { step + modulus } else { step };
+            *value = total;
+        }
+        let source = format!("column \"{}\"", column.name);
+        Ok(Self { source, name: column.name, start: 0.0, since, unit_s })
+    }
+
+    fn time_of(&self, sample: usize) -> f64 {
+        // Nanoseconds are enough to tell one sample from the next.
+        ((self.start + self.since[sample] * self.unit_s) * 1e9).round() / 1e9
+    }
+
+    fn check(&self, raw: &Raw, options: &ReadOptions) -> Result<Checked, RecordingError> {
+        let steps = || self.since.windows(2).map(|w| w[1] - w[0]);
+        let path = || raw.path.clone();
+        let at = |i: usize| (raw.lines.of(i + 1), self.time_of(i), self.time_of(i + 1));
+        if let Some(i) = steps().position(|s| s < 0.0) {
+            let (line, from, to) = at(i);
+            return Err(RecordingError::TimeBack { path: path(), line, from, to });
+        }
+        let median = median_step(&self.since);
+        if self.since.len() < 2 {
+            return Err(RecordingError::TooShort { path: path(), samples: self.since.len(), needed: 2 });
+        }
+        if median <= 0.0 {
+            return Err(RecordingError::Still { path: path(), column: self.name.clone() });
+        }
+        let irregular = |s: f64| s > 1.5 * median || s < 0.5 * median;
+        let breaks: Vec<usize> =
+            steps().enumerate().filter(|(_, s)| irregular(*s)).map(|(i, _)| i + 1).collect();
+        if let (Gaps::Refuse, Some(first)) = (options.gaps, breaks.first()) {
+            let (line, from, to) = at(first - 1);
+            let (path, irregular, step) = (path(), breaks.len(), rounded(median * self.unit_s));
+            return Err(if self.since[*first] - self.since[*first - 1] > median {
+                RecordingError::Gap { path, line, from, to, step, irregular }
+            } else {
+                RecordingError::Duplicate { path, line, from, to, step, irregular }
+            });
+        }
+        let found = self.rate(median, breaks.is_empty());
+        let given = options.rate_hz.unwrap_or(found);
+        if (found / given - 1.0).abs() > 0.01 {
+            return Err(RecordingError::RateGiven { path: path(), found, given });
+        }
+        Ok(Checked { rate_hz: given, found_hz: found, breaks })
+    }
+
+    /// From the whole span if it has no gaps (averages the jitter), else from the median step.
+    fn rate(&self, median: f64, regular: bool) -> f64 {
+        let n = self.since.len() - 1;
+        let step = if regular { self.since[n] / n as f64 } else { median };
+        rounded(1.0 / (step * self.unit_s))
+    }
+}
+
+/// Six significant digits where the value is that within 1e-7 (stamps are rounded), else as it is.
+fn rounded(value: f64) -> f64 {
+    let short: f64 = format!("{value:.5e}").parse().unwrap_or(value);
+    if (short / value - 1.0).abs() < 1e-7 { short } else { value }
+}
+
+pub(in crate::formats) fn median_step(times: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
+    if steps.is_empty() {
+        return 0.0;
+    }
+    let middle = steps.len() / 2;
+    *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// The unit in which a step is that of 10 Hz … 10 kHz: the four ranges do not overlap.
+pub(in crate::formats) fn unit_of_step(step: f64) -> (f64, &'static str) {
+    match step {
+        s if s >= 1e5 => (1e-9, "ns"),
+        s if s >= 100.0 => (1e-6, "µs"),
+        s if s > 0.1 => (1e-3, "ms"),
+        _ => (1.0, "s"),
+    }
+}

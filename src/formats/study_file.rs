@@ -1,0 +1,219 @@
+//! Study files of `nav-sim batch` (TOML): see [`Study`].
+
+use super::scenario_file::{self, explained};
+use super::suggest::nearest;
+use super::toml_file::{Section, Source, TomlError};
+use crate::scenario::Scenario;
+use crate::sensors::gnss::GnssSettings;
+use crate::study::{Study, StudyError};
+use crate::units::SettingError;
+use std::path::{Path, PathBuf};
+
+/// A study, read, with the scenario and receiver files it names.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BatchFile {
+    /// The study, names and defaults filled in.
+    pub study: Study,
+    /// Its scenarios, in order (empty: the default).
+    pub scenarios: Vec<Scenario>,
+    /// Its receivers, in order (empty: those of the scenarios).
+    pub gnss: Vec<GnssSettings>,
+}
+
+/// What a path of a study file means: it is relative to the file.
+#[must_use]
+pub fn beside(study: &Path, path: &Path) -> PathBuf {
+    study.parent().unwrap_or(Path::new("")).join(path)
+}
+
+/// Reads and checks a study and the scenario files it names.
+///
+/// # Errors
+/// File, line, key and value of what is refused; a mistyped key with the nearest legal one.
+pub fn read(path: &Path) -> Result<BatchFile, TomlError> {
+    let source = Source::read(path)?;
+    let table = source.parse()?;
+    let root = source.root(&table);
+    let written: toml::Table = source.text().parse().unwrap_or_default();
+    let mut study: Study = toml::from_str(source.text()).map_err(|e| explained(&e, &source))?;
+    for key in ["filters", "scenario", "gnss", "outages"] {
+        let is_empty = |value: &toml::Value| value.as_array().is_some_and(Vec::is_empty);
+        if written.get(key).is_some_and(is_empty) {
+            let e = StudyError::refused(key, "[]", "makes no cell; leave the key out for the default");
+            return Err(located(&e, &source, &root));
+        }
+    }
+    study.resolve().map_err(|e| located(&e, &source, &root))?;
+    study.reference().map_err(|e| located(&e, &source, &root))?;
+    let scenarios = scenarios(&study, path, &source)?;
+    let gnss = receivers(&study, path, &source)?;
+    Ok(BatchFile { study, scenarios, gnss })
+}
+
+fn scenarios(study: &Study, path: &Path, source: &Source) -> Result<Vec<Scenario>, TomlError> {
+    let one = |(i, entry): (usize, &crate::study::ScenarioEntry)| {
+        let scenario = match (&entry.file, &entry.settings) {
+            (Some(file), _) => scenario_file::read(&beside(path, file))?,
+            (None, settings) => settings.clone().unwrap_or_default(),
+        };
+        scenario.validate().map_err(|e| refused(&e, &format!("scenario[{}].settings", i + 1), source))?;
+        Ok(scenario)
+    };
+    study.scenario.iter().enumerate().map(one).collect()
+}
+
+fn receivers(study: &Study, path: &Path, source: &Source) -> Result<Vec<GnssSettings>, TomlError> {
+    let one = |(i, entry): (usize, &crate::study::GnssEntry)| {
+        let gnss = match (&entry.file, &entry.settings) {
+            (Some(file), _) => scenario_file::read(&beside(path, file))?.gnss,
+            (None, settings) => settings.clone().unwrap_or_default(),
+        };
+        gnss.validate().map_err(|e| refused(&e, &format!("gnss[{}].settings", i + 1), source))?;
+        Ok(gnss)
+    };
+    study.gnss.iter().enumerate().map(one).collect()
+}
+
+/// A refusal by the rules of settings.
+fn refused(error: &SettingError, section: &str, source: &Source) -> TomlError {
+    let key = format!("{section}.{}", error.key);
+    let last = error.key.rsplit('.').next().unwrap_or_default();
+    TomlError::Value {
+        path: source.path().to_owned(),
+        line: line_of(source, last),
+        key,
+        value: error.value.clone(),
+        reason: format!("is refused: {}", error.requirement),
+        hint: None,
+    }
+}
+
+/// The first line that sets a key; 1 if none does.
+fn line_of(source: &Source, key: &str) -> usize {
+    let sets = |line: &str| line.split('=').next().is_some_and(|left| left.trim_end().ends_with(key));
+    source.text().lines().position(sets).map_or(1, |i| i + 1)
+}
+
+/// A refusal by [`Study::resolve`] at the line its key stands in.
+fn located(error: &StudyError, source: &Source, root: &Section<'_>) -> TomlError {
+    let path = source.path().to_owned();
+    let hint = match error {
+        StudyError::NoReference { reference, candidates } => {
+            let meant = nearest(reference, candidates.iter().map(String::as_str));
+            meant.map(|m| format!("did you mean \"{m}\"?")).or(error.hint())
+        }
+        _ => error.hint(),
+    };
+    let key = error.key();
+    let (axis, entry) = match key.split_once('[') {
+        Some((axis, rest)) => (axis, rest.split(']').next().and_then(|i| i.parse::<usize>().ok())),
+        None => (key, None),
+    };
+    let first = axis.split('.').next().unwrap_or(axis);
+    let entry = entry.or(match error {
+        StudyError::Unnamed { entry, .. } | StudyError::NotOne { entry, .. } => Some(*entry),
+        _ => None,
+    });
+    let line = if let (StudyError::Duplicate { name, .. }, true) = (error, root.has(first)) {
+        second(source, name)
+    } else if let Some(i) = entry {
+        root.sections(first).ok().and_then(|all| all.get(i - 1).map(Section::line)).unwrap_or(1)
+    } else if root.has(first) {
+        root.line_of(first)
+    } else {
+        1
+    };
+    TomlError::Study { path, line, message: error.to_string(), hint: hint.map(String::into_boxed_str) }
+}
+
+/// The line in which a text in quotes stands for the second time (else the first; else 1).
+fn second(source: &Source, text: &str) -> usize {
+    let quoted = [format!("\"{text}\""), format!("'{text}'")];
+    let with = |line: &&str| quoted.iter().any(|q| line.contains(q.as_str()));
+    let lines: Vec<usize> =
+        source.text().lines().enumerate().filter(|(_, l)| with(l)).map(|(i, _)| i + 1).collect();
+    lines.get(1).or(lines.first()).copied().unwrap_or(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const STUDY: &str = "runs = 8\n\
+        trajectory = [{ file = \"a/land.toml\" }]\n\
+        truth = [{ model = \"m.toml\" }]\n\
+        [[candidate]]\nmodel = \"m.toml\"\n\
+        [[candidate]]\nname = \"II\"\ncalibrate = { recordings = [\"r.csv\"], estimators = [\"awv\", \"dr-awv\"] }\n\
+        [[outages]]\nsweep = { start_s = 300, duration_s = [10, 20] }\n";
+
+    fn study(text: &str) -> Result<BatchFile, String> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("s.toml");
+        std::fs::write(&path, text).unwrap();
+        let place = format!("{}/", dir.path().display());
+        read(&path).map_err(|e| format!("{e} | {}", e.hint().unwrap_or_default()).replace(&place, ""))
+    }
+
+    #[test]
+    fn names_and_defaults_are_filled_in() {
+        let file = study(STUDY).unwrap();
+        let s = &file.study;
+        assert_eq!((s.trajectory[0].name.as_str(), s.truth[0].name.as_str()), ("land", "m"));
+        let candidates: Vec<String> = s.candidates().into_iter().map(|(name, ..)| name).collect();
+        assert_eq!(candidates, ["m", "II/awv", "II/dr-awv"]);
+        let sets: Vec<String> = s.outage_sets().unwrap().into_iter().map(|o| o.name).collect();
+        assert_eq!(sets, ["sweep(300,10)", "sweep(300,20)"]);
+        assert!(file.scenarios.is_empty() && file.gnss.is_empty());
+    }
+
+    #[test]
+    fn mistakes_are_named() {
+        let with = |from: &str, to: &str| study(&STUDY.replace(from, to)).unwrap_err();
+        for key in ["filters", "scenario", "gnss", "outages"] {
+            let text = format!("{key} = []\n{}", STUDY.split("[[outages]]").next().unwrap());
+            let refusal =
+                format!("s.toml, line 1: \"{key}\" = [] makes no cell; leave the key out for the default | ");
+            assert_eq!(study(&text).unwrap_err(), refusal);
+        }
+        assert_eq!(
+            with("runs = 8", "filters = [15, \"full\", \"15\"]"),
+            "s.toml, line 1: \"filters\" = [\"15\",\"full\",\"15\"] names \"15\" twice | "
+        );
+        assert_eq!(
+            with("runs = 8", "rums = 8"),
+            "s.toml, line 1: unknown key \"rums\" | did you mean \"runs\"?"
+        );
+        assert_eq!(
+            with("runs = 8", "runs = 0"),
+            "s.toml, line 1: \"runs\" = 0 must lie between 1 and 10000000 | "
+        );
+        assert_eq!(
+            with("name = \"II\"", "name = \"m\""),
+            "s.toml, line 7: two candidate entries are named \"m\" | give each entry a \"name\""
+        );
+        assert_eq!(
+            with("{ file = \"a/land.toml\" }", ""),
+            "s.toml, line 2: the grid is empty: no trajectory | add a [[trajectory]] to the study"
+        );
+        assert_eq!(
+            with("[10, 20]", "[]"),
+            "s.toml, line 9: the grid is empty: no outages[1] | a list without values makes no cell"
+        );
+        assert_eq!(
+            with("runs = 8", "reference = \"II/avw\""),
+            "s.toml, line 1: \"reference\" = \"II/avw\" is no candidate | did you mean \"II/awv\"?"
+        );
+        assert_eq!(
+            with("recordings = [\"r.csv\"], ", ""),
+            "s.toml, line 6: candidate.calibrate[2] needs exactly one of recordings, synthesize | "
+        );
+        assert_eq!(
+            with("sweep = {", "swep = {"),
+            "s.toml, line 10: unknown key \"outages.swep\" | did you mean \"sweep\"?"
+        );
+        assert_eq!(
+            with("[[outages]]", "[[gnss]]\nname = \"a\"\nsettings.rate_hz = -1\n[[outages]]"),
+            "s.toml, line 11: \"gnss[1].settings.rate_hz\" = -1 is refused: it must be a finite number > 0 | "
+        );
+    }
+}

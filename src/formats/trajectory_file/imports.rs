@@ -1,0 +1,396 @@
+//! Trajectories of other tools: KF-GINS results, TUM, GPX, motion definitions of gnss-ins-sim.
+
+use super::samples::{Attitude, Rows, local};
+use super::table::{Numbers, Table};
+use super::{Options, TrajectoryFileError as Error};
+use crate::trajectory::TrajectorySample;
+use crate::trajectory::import::{BodyMotion, Command};
+use crate::units::DEG;
+use glam::{DQuat, DVec3};
+use std::f64::consts::{FRAC_1_SQRT_2, PI};
+
+/// Seconds of a GNSS week.
+const WEEK_S: f64 = 604_800.0;
+
+/// Longest motion definition (s).
+const DAY_S: f64 = 86_400.0;
+
+/// A KF-GINS navigation result or truth: week, seconds of week, latitude, longitude (deg), height (m), velocity
+/// north, east, down (m/s), roll, pitch, yaw (deg), between blanks. Read as our own table, time counted on
+/// from the first week.
+pub(super) fn kf_gins(path: &str, text: &str, options: &Options, numbers: Numbers) -> Result<Rows, Error> {
+    let names = [
+        "week",
+        "t_s",
+        "lat_deg",
+        "lon_deg",
+        "h_m",
+        "v_n_m_s",
+        "v_e_m_s",
+        "v_d_m_s",
+        "roll_deg",
+        "pitch_deg",
+        "yaw_deg",
+    ];
+    let mut table = Table::read(path, text.as_bytes(), Some(&names), numbers)?;
+    let first = table.rows[0].1[0];
+    for (_, row) in &mut table.rows {
+        let week = row.remove(0);
+        row[0] += (week - first) * WEEK_S;
+    }
+    table.columns.remove(0);
+    super::samples::rows(table, options, numbers)
+}
+
+/// A TUM file: time, x, y, z (m), quaternion x, y, z, w, between blanks. The axes are taken as ROS has them
+/// (REP 103): position east, north, up of the origin; body forward, left, up.
+pub(super) fn tum(path: &str, text: &str, options: &Options, numbers: Numbers) -> Result<Rows, Error> {
+    let names = ["t_s", "x", "y", "z", "qx", "qy", "qz", "qw"];
+    let mut table = Table::read(path, text.as_bytes(), Some(&names), numbers)?;
+    table.rows.retain(|(_, row)| row.iter().all(|x| x.is_finite()));
+    let origin = super::samples::origin(&table, options)?;
+    // East-north-up to north-east-down, front-right-down to front-left-up: half turns.
+    let q_enu_ned = DQuat::from_xyzw(FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0, 0.0);
+    let q_frd_flu = DQuat::from_rotation_x(PI);
+    let mut samples = Vec::with_capacity(table.rows.len());
+    for (line, row) in &table.rows {
+        let q_flu_enu = DQuat::from_xyzw(row[4], row[5], row[6], row[7]);
+        if (q_flu_enu.length() - 1.0).abs() > 0.01 {
+            return Err(table.cell(
+                *line,
+                7,
+                &row[7].to_string(),
+                "does not make a unit quaternion with the others",
+            ));
+        }
+        let r_ned = q_enu_ned * DVec3::new(row[1], row[2], row[3]);
+        samples.push(local(row[0], origin, r_ned, q_enu_ned * q_flu_enu * q_frd_flu));
+    }
+    let mut rows = of_samples(path, &table, samples, Attitude::Given);
+    rows.doubt(None, "axes taken as ROS has them: position east, north, up; body forward, left, up");
+    Ok(rows)
+}
+
+/// Samples of the rows of a table, without velocities.
+fn of_samples(path: &str, table: &Table, samples: Vec<TrajectorySample>, attitude: Attitude) -> Rows {
+    Rows {
+        path: path.to_owned(),
+        lines: table.rows.iter().map(|(line, _)| *line).collect(),
+        samples,
+        attitude,
+        velocities: Vec::new(),
+        geodetic: false,
+        doubts: Vec::new(),
+    }
+}
+
+/// A GPX track: time, latitude, longitude, elevation of every `trkpt`; heading and pitch along the path.
+pub(super) fn gpx(path: &str, text: &str) -> Result<Rows, Error> {
+    let mut table = Table::of_columns(path, &["time", "lat", "lon", "ele"]);
+    for (line, point) in track_points(text) {
+        let row = [
+            element(point, "time").and_then(seconds),
+            attribute(point, "lat").and_then(|x| x.parse().ok()),
+            attribute(point, "lon").and_then(|x| x.parse().ok()),
+            element(point, "ele").and_then(|x| x.parse().ok()),
+        ];
+        let bad = |i: usize| table.cell(line, i, "the track point", "does not have it, or not as a number");
+        let row = match row {
+            [Some(t), Some(lat), Some(lon), Some(h)] => vec![t, lat, lon, h],
+            _ => return Err(bad(row.iter().position(Option::is_none).unwrap_or(0))),
+        };
+        table.rows.push((line, row));
+    }
+    let Some((_, first)) = table.rows.first() else { return Err(Error::Empty { path: path.to_owned() }) };
+    let start_s = first[0];
+    let at = |(_, row): &(u64, Vec<f64>)| TrajectorySample {
+        t_s: row[0] - start_s,
+        lat: row[1] * DEG,
+        lon: row[2] * DEG,
+        h: row[3],
+        q_b_n: DQuat::IDENTITY,
+    };
+    let samples = table.rows.iter().map(at).collect();
+    let mut rows = of_samples(path, &table, samples, Attitude::OfPath);
+    rows.doubt(None, "no attitude in GPX: heading and pitch follow the path, roll is 0");
+    rows.doubt(None, "elevations are taken as heights above the ellipsoid, times from the first point");
+    Ok(rows)
+}
+
+/// Line and text of every `<trkpt …>…</trkpt>`.
+fn track_points(text: &str) -> impl Iterator<Item = (u64, &str)> {
+    let (mut at, mut line) = (0, 1);
+    text.match_indices("<trkpt").map(move |(begin, _)| {
+        line += text[at..begin].matches('\n').count() as u64;
+        at = begin;
+        let rest = &text[begin..];
+        let end =
+            rest.find("</trkpt").or_else(|| rest[1..].find("<trkpt").map(|i| i + 1)).unwrap_or(rest.len());
+        (line, &rest[..end])
+    })
+}
+
+fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
+    let value = &tag[tag.find(&format!(" {name}="))? + name.len() + 2..];
+    let quote = value.chars().next().filter(|c| matches!(c, '"' | '\''))?;
+    value[1..].split(quote).next()
+}
+
+fn element<'a>(text: &'a str, name: &str) -> Option<&'a str> {
+    let (_, rest) = text.split_once(&format!("<{name}>"))?;
+    Some(rest.split_once(&format!("</{name}>"))?.0.trim())
+}
+
+/// Seconds of a time as GPX has it: 2024-05-01T10:20:30.5Z (or +02:00), from an arbitrary day.
+fn seconds(text: &str) -> Option<f64> {
+    let (date, time) = text.split_once('T')?;
+    let day: Vec<i64> = date.split('-').map(|x| x.parse().ok()).collect::<Option<_>>()?;
+    let zone = time.find(['Z', '+', '-']).unwrap_or(time.len());
+    let clock: Vec<f64> = time[..zone].split(':').map(|x| x.parse().ok()).collect::<Option<_>>()?;
+    let shift = match time[zone..].split_once(['+', '-']) {
+        Some((_, hm)) => {
+            let (h, m) = hm.split_once(':').unwrap_or((hm, "0"));
+            let minutes = 60.0 * h.parse::<f64>().ok()? + m.parse::<f64>().ok()?;
+            if time[zone..].starts_with('-') { 60.0 * minutes } else { -60.0 * minutes }
+        }
+        None => 0.0,
+    };
+    match (&day[..], &clock[..]) {
+        (&[y, m, d], &[h, min, s]) => {
+            let calendar = (1..=12).contains(&m) && (1..=31).contains(&d) && (1..=9999).contains(&y);
+            // 61 s: a leap second
+            let of_day = (0.0..=24.0).contains(&h) && (0.0..60.0).contains(&min) && (0.0..61.0).contains(&s);
+            (calendar && of_day && shift.abs() <= DAY_S)
+                .then(|| days(y, m, d) as f64 * DAY_S + h * 3600.0 + min * 60.0 + s + shift)
+        }
+        _ => None,
+    }
+}
+
+/// Days of the Gregorian calendar from an arbitrary one: years are taken to begin in March.
+fn days(year: i64, month: i64, day: i64) -> i64 {
+    let (y, m) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
+    365 * y + y.div_euclid(4) - y.div_euclid(100) + y.div_euclid(400) + (153 * m + 2) / 5 + day
+}
+
+/// Whether a text is a motion definition of gnss-ins-sim.
+pub(super) fn is_motion_definition(text: &str) -> bool {
+    text.trim_start_matches('\u{feff}').trim_start().starts_with("ini lat")
+}
+
+/// A motion definition of gnss-ins-sim: a start (latitude, longitude, height, body velocity, yaw, pitch, roll),
+/// then commands (type, yaw, pitch, roll, body velocity, duration): 1 rates of change; 2 values to reach;
+/// 3 changes; 4 attitude to reach, change of velocity; 5 change of attitude, velocity to reach.
+pub(super) fn motion_definition(path: &str, text: &str) -> Result<Rows, Error> {
+    let lines: Vec<(u64, &str)> = text
+        .lines()
+        .enumerate()
+        .map(|(i, l)| (i as u64 + 1, l.trim()))
+        .filter(|(_, l)| !l.is_empty())
+        .collect();
+    let row = |(line, text): (u64, &str), least: usize| numbers(path, line, text, least);
+    let Some((&start, rest)) = lines.get(1).zip(lines.get(3..)) else {
+        return Err(Error::Empty { path: path.to_owned() });
+    };
+    let ini = row(start, 9)?;
+    let mut motion = BodyMotion {
+        start: [ini[0] * DEG, ini[1] * DEG, ini[2]],
+        v_b: DVec3::new(ini[3], ini[4], ini[5]),
+        rpy: DVec3::new(ini[8], ini[7], ini[6]) * DEG,
+        commands: Vec::new(),
+    };
+    let (mut rpy, mut v_b, mut timed, mut total_s) = (motion.rpy, motion.v_b, true, 0.0);
+    for &line in rest {
+        let cells = row(line, 8)?;
+        let duration_s = cells[7];
+        let (angles, speeds) =
+            (DVec3::new(cells[3], cells[2], cells[1]) * DEG, DVec3::from_slice(&cells[4..7]));
+        let change = match cells[0] as i64 {
+            1 => (angles * duration_s, speeds * duration_s),
+            2 => (angles - rpy, speeds - v_b),
+            3 => (angles, speeds),
+            4 => (angles - rpy, speeds),
+            5 => (angles, speeds - v_b),
+            _ => return Err(bad_line(path, line.0, format!("command type {} is none of 1 to 5", cells[0]))),
+        };
+        total_s += duration_s;
+        if duration_s <= 0.0 || total_s > DAY_S {
+            let message = format!("command duration {duration_s} s is not > 0, or makes more than a day");
+            return Err(bad_line(path, line.0, message));
+        }
+        timed &= cells[0] as i64 == 1;
+        (rpy, v_b) = (rpy + change.0, v_b + change.1);
+        motion.commands.push(Command { duration_s, rpy: change.0, v_b: change.1 });
+    }
+    let samples = motion.samples();
+    let mut rows = Rows {
+        path: path.to_owned(),
+        lines: command_lines(&samples, &motion, start.0, rest),
+        samples,
+        attitude: Attitude::Given,
+        velocities: Vec::new(),
+        geodetic: false,
+        doubts: Vec::new(),
+    };
+    if !timed {
+        rows.doubt(
+            None,
+            "commands of type 2 to 5 take all of their time here, not only what a vehicle needs",
+        );
+    }
+    Ok(rows)
+}
+
+/// The line of the command that leads to each sample; that of the start for the first.
+fn command_lines(
+    samples: &[TrajectorySample],
+    motion: &BodyMotion,
+    start: u64,
+    commands: &[(u64, &str)],
+) -> Vec<u64> {
+    let (mut lines, mut end_s) = (vec![start], 0.0);
+    for (command, (line, _)) in motion.commands.iter().zip(commands) {
+        end_s += command.duration_s;
+        let within = samples[lines.len()..].iter().take_while(|s| s.t_s <= end_s + 1e-6).count();
+        lines.extend(std::iter::repeat_n(*line, within));
+    }
+    lines.resize(samples.len(), lines.last().copied().unwrap_or(start));
+    lines
+}
+
+fn numbers(path: &str, line: u64, text: &str, least: usize) -> Result<Vec<f64>, Error> {
+    let number = |cell: &str| match cell.trim().parse::<f64>() {
+        Ok(x) if x.is_finite() => Ok(x),
+        _ => Err(bad_line(path, line, format!("\"{}\" is not a number", cell.trim()))),
+    };
+    let cells = text.split(',').map(number).collect::<Result<Vec<_>, _>>()?;
+    if cells.len() < least {
+        return Err(Error::RowLength { path: path.to_owned(), line, found: cells.len(), expected: least });
+    }
+    Ok(cells)
+}
+
+fn bad_line(path: &str, line: u64, message: String) -> Error {
+    Error::Format { path: path.to_owned(), line, message }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formats::trajectory_file::Warning;
+    use crate::frames::RollPitchYaw;
+    use crate::trajectory::Trajectory;
+
+    type Loaded = Result<(Trajectory, Vec<Warning>), Error>;
+
+    fn nav(text: &str) -> Loaded {
+        kf_gins("truth.nav", text, &Options::default(), Numbers::Finite)?.trajectory()
+    }
+
+    fn tum(path: &str, text: &str, options: &Options) -> Loaded {
+        super::tum(path, text, options, Numbers::Finite)?.trajectory()
+    }
+
+    fn gpx(path: &str, text: &str) -> Loaded {
+        super::gpx(path, text)?.trajectory()
+    }
+
+    fn motion_definition(path: &str, text: &str) -> Loaded {
+        super::motion_definition(path, text)?.trajectory()
+    }
+
+    #[test]
+    fn kf_gins_results_run_on_across_the_week() {
+        let row = |k: i32| {
+            let sow = 604_798.5 + 0.5 * f64::from(k);
+            let (week, sow) = if sow >= WEEK_S { (2017, sow - WEEK_S) } else { (2016, sow) };
+            let lon = 114.0 + 1e-4 * f64::from(k);
+            format!("{week}  {sow:.3} 30.5 {lon:.6} 20.0 0.0 19.2 0.0 0.1 0.2 90.0\n")
+        };
+        let text: String = (0..9).map(row).collect();
+        let (t, warnings) = nav(&text).unwrap();
+        assert!(warnings.is_empty(), "{warnings:?}");
+        assert_eq!((t.start_s(), t.end_s()), (604_798.5, 604_802.5));
+        assert!((t.state(604_800.0).v_n.y - 19.2).abs() < 0.02, "{}", t.state(604_800.0).v_n);
+        let e = nav("2016 1 2 3\n").unwrap_err();
+        assert_eq!(e.to_string(), "truth.nav, line 1: 4 values, but 11 columns");
+    }
+
+    /// East along x at 3 m/s, facing east (ROS: no rotation): heading 90°, level.
+    #[test]
+    fn tum_files_are_read_with_the_axes_of_ros() {
+        let text: String = (0..6).map(|k| format!("{k}.5 {} 0 0 0 0 0 1\n", 3 * k)).collect();
+        let options = Options { origin: Some([0.8, 0.1, 50.0]) };
+        let (t, warnings) = tum("a.tum", &text, &options).unwrap();
+        assert!(warnings[0].message.contains("ROS"));
+        let state = t.state(2.0);
+        let rpy = RollPitchYaw::from_quat(state.q_b_n);
+        assert!((state.v_n - DVec3::Y * 3.0).length() < 1e-4, "{}", state.v_n);
+        assert!(
+            (rpy.yaw - 0.5 * PI).abs() < 1e-5 && rpy.roll.abs() < 1e-5 && rpy.pitch.abs() < 1e-5,
+            "{rpy:?}"
+        );
+        let e = tum("a.tum", &text, &Options::default()).unwrap_err();
+        assert!(e.to_string().contains("needs an origin on the Earth"), "{e}");
+        let e = tum("a.tum", "0 0 0 0 0 0 0 2\n", &options).unwrap_err().to_string();
+        assert_eq!(e, "a.tum, line 1: column \"qw\": 2 does not make a unit quaternion with the others");
+    }
+
+    #[test]
+    fn gpx_tracks_get_their_heading_from_the_path() {
+        let point = |k: u32| {
+            let lat = 46.0 + 1e-4 * f64::from(k);
+            format!(
+                "<trkpt lon='7.0' lat=\"{lat}\">\n<ele>{}</ele><time>2024-02-29T23:59:{}Z</time></trkpt>\n",
+                500 + k,
+                52 + k
+            )
+        };
+        let text: String = (0..8).map(point).collect();
+        let text = format!("<gpx>\n<trk><trkseg>\n{text}</trkseg></trk></gpx>").replace(
+            "</trkseg>",
+            "<trkpt lat=\"46.0008\" lon=\"7\"><ele>508</ele><time>2024-03-01T02:00:00+02:00</time></trkpt></trkseg>",
+        );
+        let (t, warnings) = gpx("a.gpx", &text).unwrap();
+        assert_eq!((t.start_s(), t.end_s(), warnings.len()), (0.0, 8.0, 2));
+        let (state, rpy) = (t.state(4.0), RollPitchYaw::from_quat(t.state(4.0).q_b_n));
+        assert!((state.v_n - DVec3::new(11.117, 0.0, -1.0)).length() < 0.01, "{}", state.v_n);
+        assert!(rpy.yaw.abs() < 1e-6 && (rpy.pitch - (1.0_f64 / 11.117).atan()).abs() < 1e-3, "{rpy:?}");
+        let e = gpx("a.gpx", &text.replacen("<ele>500</ele>", "", 1)).unwrap_err().to_string();
+        assert_eq!(e, "a.gpx, line 3: column \"ele\": the track point does not have it, or not as a number");
+        assert_eq!(gpx("a.gpx", "<gpx></gpx>").unwrap_err().to_string(), "a.gpx: no rows in it");
+    }
+
+    #[test]
+    fn calendar_days_follow_one_another() {
+        assert_eq!(days(2024, 3, 1) - days(2024, 2, 28), 2);
+        assert_eq!(days(2023, 3, 1) - days(2023, 2, 28), 1);
+        assert_eq!(days(2025, 1, 1) - days(2024, 12, 31), 1);
+        assert_eq!(days(2000, 3, 1) - days(1970, 1, 1), 11_017);
+    }
+
+    const HEAD: &str = "ini lat (deg),ini lon (deg),ini alt (m),ini vx_body (m/s),ini vy_body (m/s),ini vz_body \
+                        (m/s),ini yaw (deg),ini pitch (deg),ini roll (deg)\n32,120,5,10,0,0,90,0,0\ncommand type,yaw \
+                        (deg),pitch (deg),roll (deg),vx_body (m/s),vy_body (m/s),vz_body (m/s),command duration (s),GPS \
+                        visibility\n";
+
+    #[test]
+    fn motion_definitions_of_gnss_ins_sim() {
+        let text = format!("{HEAD}1,0,0,0,0,0,0,1,0\n1,-15,0,0,0,0,0,6,0\n5,0,0,0,4,0,0,8,1\n");
+        assert!(is_motion_definition(&text));
+        let (t, warnings) = motion_definition("m.csv", &text).unwrap();
+        assert!(warnings[0].message.contains("type 2 to 5"));
+        assert_eq!(t.end_s(), 15.0);
+        // Facing east, then turned left by 90°: north; slowed down to 4 m/s.
+        assert!((t.state(1.0).v_n - DVec3::Y * 10.0).length() < 1e-4);
+        assert!((t.state(15.0).v_n - DVec3::X * 4.0).length() < 1e-4, "{}", t.state(15.0).v_n);
+        let refused =
+            |line: &str| motion_definition("m.csv", &format!("{HEAD}{line}\n")).unwrap_err().to_string();
+        assert_eq!(refused("7,0,0,0,0,0,0,1,0"), "m.csv, line 4: command type 7 is none of 1 to 5");
+        assert_eq!(
+            refused("1,0,0,0,0,0,0,0,0"),
+            "m.csv, line 4: command duration 0 s is not > 0, or makes more than a day"
+        );
+        assert_eq!(refused("1,0,x,0,0,0,0,1,0"), "m.csv, line 4: \"x\" is not a number");
+    }
+}

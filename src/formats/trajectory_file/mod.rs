@@ -1,0 +1,119 @@
+//! Trajectory files: CSV, motion profiles (TOML), imports.
+
+mod columns;
+mod doubts;
+mod error;
+mod imports;
+mod profile;
+mod reference;
+mod samples;
+pub(in crate::formats) mod table;
+mod write;
+
+pub use error::TrajectoryFileError;
+pub use write::{Rows, write_csv, write_rows};
+
+use crate::trajectory::Trajectory;
+use crate::trajectory::reference::Reference;
+use std::fmt;
+use std::path::Path;
+use table::{Numbers, Table};
+
+/// How to read a trajectory file.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Options {
+    /// Where local coordinates begin: latitude, longitude (rad), height (m). Without it: the file's own
+    /// `# origin:` line.
+    pub origin: Option<[f64; 3]>,
+}
+
+/// A doubt about a trajectory file that can be used all the same.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Warning {
+    /// The file.
+    pub path: String,
+    /// The line it is about, if it is about one.
+    pub line: Option<u64>,
+    /// What is doubtful.
+    pub message: String,
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.line {
+            Some(line) => write!(f, "{}, line {line}: {}", self.path, self.message),
+            None => write!(f, "{}: {}", self.path, self.message),
+        }
+    }
+}
+
+const KNOWN: &str = ".toml (motion profile), .csv, .tsv, .txt, .nav (KF-GINS), .tum or .gpx (also .gz)";
+
+/// Reads a trajectory: a motion profile (`.toml`), or a table with a header (`.csv`, `.tsv`, `.txt`) whose columns
+/// are `t_s`, `lat_deg`, `lon_deg`, `h_m` or `n_m`, `e_m`, `d_m` (in the plane that touches the Earth at the
+/// origin), `roll_deg`, `pitch_deg`, `yaw_deg`. Columns `v_n_m_s`, `v_e_m_s`, `v_d_m_s` are compared with the
+/// positions. Without attitude, heading and pitch follow the path.
+///
+/// Of other tools: KF-GINS results (`.nav`), TUM (`.tum`), GPX (`.gpx`), motion definitions of gnss-ins-sim
+/// (`.csv`, known by their first line). All but profiles may be packed (`.gz`).
+///
+/// # Errors
+/// Whatever is wrong with the file, with its line.
+pub fn load(path: &Path, options: &Options) -> Result<(Trajectory, Vec<Warning>), TrajectoryFileError> {
+    match parse(path, options, Numbers::Finite)? {
+        Parsed::Profile(trajectory) => Ok((trajectory, Vec::new())),
+        Parsed::Rows(rows) => rows.trajectory(),
+    }
+}
+
+/// Reads a trajectory that is only compared with. Where its position or attitude jumps as no vehicle does, where
+/// rows are missing, not finite or out of range, it is left out and the rest is used; what was left out is
+/// among the warnings.
+///
+/// # Errors
+/// What cannot be read at all, with its line; rows of which no stretch is usable.
+pub fn load_reference(
+    path: &Path,
+    options: &Options,
+) -> Result<(Reference, Vec<Warning>), TrajectoryFileError> {
+    match parse(path, options, Numbers::Any)? {
+        Parsed::Profile(trajectory) => Ok((trajectory.into(), Vec::new())),
+        Parsed::Rows(rows) => rows.reference(),
+    }
+}
+
+enum Parsed {
+    Profile(Trajectory),
+    Rows(samples::Rows),
+}
+
+fn parse(path: &Path, options: &Options, numbers: Numbers) -> Result<Parsed, TrajectoryFileError> {
+    let name = path.display().to_string();
+    let lower = name.to_lowercase();
+    let plain = lower.strip_suffix(".gz").unwrap_or(&lower);
+    let text = || table::text(path);
+    let rows = match plain.rsplit_once('.').map_or("", |(_, ending)| ending) {
+        "toml" => return Ok(Parsed::Profile(profile::load(path)?)),
+        "nav" => imports::kf_gins(&name, &text()?, options, numbers),
+        "tum" => imports::tum(&name, &text()?, options, numbers),
+        "gpx" => imports::gpx(&name, &text()?),
+        "csv" | "tsv" | "txt" => parse_table(&name, &text()?, options, numbers),
+        _ => Err(TrajectoryFileError::Ending { path: name, known: KNOWN }),
+    };
+    rows.map(Parsed::Rows)
+}
+
+fn parse_table(
+    name: &str,
+    text: &str,
+    options: &Options,
+    numbers: Numbers,
+) -> Result<samples::Rows, TrajectoryFileError> {
+    if imports::is_motion_definition(text) {
+        return imports::motion_definition(name, text);
+    }
+    samples::rows(Table::read(name, text.as_bytes(), None, numbers)?, options, numbers)
+}
+
+#[cfg(test)]
+mod tests;

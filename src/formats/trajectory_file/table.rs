@@ -1,0 +1,143 @@
+//! Text tables of numbers.
+
+use super::TrajectoryFileError as Error;
+use crate::formats::source;
+use flate2::read::MultiGzDecoder;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+
+/// A text table of numbers.
+#[derive(Debug)]
+pub(in crate::formats) struct Table {
+    pub(in crate::formats) path: String,
+    /// Line of the header, from 1.
+    pub(in crate::formats) header_line: u64,
+    pub(in crate::formats) columns: Vec<String>,
+    /// The lines that begin with `#`, without it.
+    pub(in crate::formats) comments: Vec<String>,
+    /// Line in the file, values.
+    pub(in crate::formats) rows: Vec<(u64, Vec<f64>)>,
+}
+
+/// Opens a file, unpacking it when its name ends in `.gz`.
+pub(in crate::formats) fn open(path: &Path) -> Result<Box<dyn BufRead>, Error> {
+    let io = |source| Error::Io { path: path.display().to_string(), source };
+    let file = BufReader::with_capacity(1 << 16, source::open(path).map_err(io)?);
+    let packed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
+    Ok(if packed { Box::new(BufReader::new(MultiGzDecoder::new(file))) } else { Box::new(file) })
+}
+
+/// The whole text of a file; what is not UTF-8 in it (a degree sign of another encoding) is replaced.
+pub(in crate::formats) fn text(path: &Path) -> Result<String, Error> {
+    let mut bytes = Vec::new();
+    let io = |source| Error::Io { path: path.display().to_string(), source };
+    open(path)?.read_to_end(&mut bytes).map_err(io)?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+/// Which numbers a table may hold.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::formats) enum Numbers {
+    /// A cell that is not finite is refused.
+    Finite,
+    /// Any: who reads it leaves those rows out.
+    Any,
+}
+
+/// Longest line of a table (bytes).
+const LONGEST_LINE: u64 = 1 << 16;
+
+impl Table {
+    /// Reads a table. Without `columns` its first line that is no comment names them; with them it has no
+    /// header and its cells stand between blanks.
+    pub(in crate::formats) fn read(
+        path: &str,
+        mut reader: impl BufRead,
+        columns: Option<&[&str]>,
+        numbers: Numbers,
+    ) -> Result<Self, Error> {
+        let mut separator = if columns.is_some() { ' ' } else { ',' };
+        let mut table = Self::of_columns(path, columns.unwrap_or_default());
+        let (mut number, mut bytes) = (0, Vec::new());
+        loop {
+            bytes.clear();
+            let read = reader.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut bytes);
+            number += 1;
+            match read.map_err(|source| Error::Io { path: path.to_owned(), source })? {
+                0 => break,
+                n if n as u64 == LONGEST_LINE => {
+                    let (path, message) =
+                        (path.to_owned(), "a line of more than 64 KiB: not a table of text");
+                    return Err(Error::Format { path, line: number, message: message.into() });
+                }
+                _ => {}
+            }
+            let line = String::from_utf8_lossy(&bytes);
+            let text = line.trim_start_matches('\u{feff}').trim();
+            if let Some(comment) = text.strip_prefix(['#', '%']) {
+                table.comments.push(comment.trim().to_owned());
+            } else if text.is_empty() {
+            } else if table.columns.is_empty() {
+                separator = separator_of(text);
+                table.header(number, &cells(text, separator))?;
+            } else {
+                table.row(number, &cells(text, separator), numbers)?;
+            }
+        }
+        if table.rows.is_empty() { Err(Error::Empty { path: path.to_owned() }) } else { Ok(table) }
+    }
+
+    /// A table of these columns, without rows yet.
+    pub(in crate::formats) fn of_columns(path: &str, columns: &[&str]) -> Self {
+        let columns = columns.iter().map(|&name| name.to_owned()).collect();
+        Self { path: path.to_owned(), header_line: 0, columns, comments: Vec::new(), rows: Vec::new() }
+    }
+
+    fn header(&mut self, line: u64, cells: &[&str]) -> Result<(), Error> {
+        if cells.iter().all(|c| c.parse::<f64>().is_ok()) {
+            let found = cells.join(",").chars().take(60).collect();
+            return Err(Error::NoHeader { path: self.path.clone(), line, found });
+        }
+        self.header_line = line;
+        self.columns = cells.iter().map(|&c| c.to_owned()).collect();
+        Ok(())
+    }
+
+    fn row(&mut self, line: u64, cells: &[&str], numbers: Numbers) -> Result<(), Error> {
+        let (found, expected) = (cells.len(), self.columns.len());
+        if found != expected {
+            return Err(Error::RowLength { path: self.path.clone(), line, found, expected });
+        }
+        let number = |(i, cell): (usize, &&str)| match cell.parse::<f64>() {
+            Ok(value) if value.is_finite() || numbers == Numbers::Any => Ok(value),
+            Ok(_) => Err(self.cell(line, i, cell, "is not finite")),
+            Err(_) => Err(self.cell(line, i, &format!("\"{cell}\""), "is not a number")),
+        };
+        let values = cells.iter().enumerate().map(number).collect::<Result<_, _>>()?;
+        self.rows.push((line, values));
+        Ok(())
+    }
+
+    /// The refusal of a cell.
+    pub(in crate::formats) fn cell(
+        &self,
+        line: u64,
+        column: usize,
+        value: &str,
+        reason: &'static str,
+    ) -> Error {
+        let (path, column) = (self.path.clone(), self.columns[column].clone());
+        Error::Cell { path, line, column, value: value.chars().take(40).collect(), reason }
+    }
+}
+
+fn separator_of(header: &str) -> char {
+    [',', ';', '\t'].into_iter().find(|&s| header.contains(s)).unwrap_or(' ')
+}
+
+fn cells(line: &str, separator: char) -> Vec<&str> {
+    if separator == ' ' {
+        return line.split_whitespace().collect();
+    }
+    line.split(separator).map(|c| c.trim().trim_matches('"')).collect()
+}

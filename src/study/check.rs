@@ -1,0 +1,168 @@
+//! Whether a study means a grid.
+
+use super::StudyError;
+use super::description::Study;
+use crate::scenario::{MAX_RUNS, Method};
+use std::path::PathBuf;
+
+impl Study {
+    /// Fills in names and defaults, and checks all that can be checked without opening another file.
+    ///
+    /// # Errors
+    /// The key that is refused.
+    pub fn resolve(&mut self) -> Result<(), StudyError> {
+        self.name_all();
+        self.check_numbers()?;
+        self.check_axes()?;
+        for (axis, names) in self.names() {
+            unique(axis, &names)?;
+        }
+        self.check_filters()?;
+        self.outage_sets().map(|_| ())
+    }
+
+    fn name_all(&mut self) {
+        self.trajectory.iter_mut().for_each(|e| name_after(&mut e.name, Some(&e.file)));
+        for e in &mut self.truth {
+            let synthesised = e.synthesize.as_ref().map(|s| &s.model);
+            name_after(&mut e.name, e.model.as_ref().or(e.recordings.first()).or(synthesised));
+        }
+        for e in &mut self.candidate {
+            let synthesised = e.calibrate.as_ref().and_then(|c| c.synthesize.as_ref()).map(|s| &s.model);
+            let recorded = e.calibrate.as_ref().and_then(|c| c.recordings.first());
+            name_after(&mut e.name, e.model.as_ref().or(recorded).or(synthesised));
+        }
+        self.scenario.iter_mut().for_each(|e| name_after(&mut e.name, e.file.as_ref()));
+        self.gnss.iter_mut().for_each(|e| name_after(&mut e.name, e.file.as_ref()));
+        for e in self.outages.iter_mut().filter(|e| e.name.is_empty()) {
+            let kinds = [
+                ("windows", e.windows.is_some()),
+                ("sweep", e.sweep.is_some()),
+                ("periodic", e.periodic.is_some()),
+                ("random", e.random.is_some()),
+            ];
+            e.name = kinds.iter().find(|(_, there)| *there).map_or(String::new(), |(n, _)| (*n).to_owned());
+        }
+    }
+
+    fn check_numbers(&self) -> Result<(), StudyError> {
+        let refuse = |key: &str, value: String, reason: &str| Err(StudyError::refused(key, value, reason));
+        if self.schema != 1 {
+            return refuse(
+                "schema",
+                self.schema.to_string(),
+                "is not a layout this version reads: it reads 1",
+            );
+        }
+        if self.runs == 0 || self.runs > MAX_RUNS {
+            let reason = format!("must lie between 1 and {MAX_RUNS}");
+            return refuse("runs", self.runs.to_string(), &reason);
+        }
+        if self.unit_runs == Some(0) {
+            return refuse("unit_runs", "0".into(), "must be at least 1");
+        }
+        if self.method != Method::MonteCarlo {
+            return refuse(
+                "method",
+                "\"lincov\"".into(),
+                "is not available in studies yet; use \"monte-carlo\"",
+            );
+        }
+        if self.metrics.is_empty() {
+            return refuse("metrics", "[]".into(), "is empty; choose of outages, ratios, epochs");
+        }
+        Ok(())
+    }
+
+    /// Every axis has something, and every entry says one thing.
+    fn check_axes(&self) -> Result<(), StudyError> {
+        let empty = |key: &str, there: bool| match there {
+            true => Ok(()),
+            false => Err(StudyError::Empty { axis: key.to_owned() }),
+        };
+        empty("trajectory", !self.trajectory.is_empty())?;
+        empty("truth", !self.truth.is_empty())?;
+        empty("candidate", !self.candidate.is_empty())?;
+        for (i, e) in self.truth.iter().enumerate() {
+            let said = [e.model.is_some(), !e.recordings.is_empty(), e.synthesize.is_some()];
+            exactly_one("truth", i, &said, "model, recordings, synthesize")?;
+        }
+        for (i, e) in self.candidate.iter().enumerate() {
+            exactly_one("candidate", i, &[e.model.is_some(), e.calibrate.is_some()], "model, calibrate")?;
+            let Some(step) = &e.calibrate else { continue };
+            let said = [!step.recordings.is_empty(), step.synthesize.is_some()];
+            exactly_one("candidate.calibrate", i, &said, "recordings, synthesize")?;
+            empty(&format!("candidate[{}].calibrate.estimators", i + 1), !step.estimators.is_empty())?;
+        }
+        for (i, e) in self.scenario.iter().enumerate() {
+            exactly_one("scenario", i, &[e.file.is_some(), e.settings.is_some()], "file, settings")?;
+        }
+        for (i, e) in self.gnss.iter().enumerate() {
+            exactly_one("gnss", i, &[e.file.is_some(), e.settings.is_some()], "file, settings")?;
+        }
+        let syntheses = self.syntheses();
+        match syntheses.iter().find(|s| s.replicates == 0 || s.samples < 2) {
+            Some(s) => {
+                let value = format!("{} of {} samples", s.replicates, s.samples);
+                Err(StudyError::refused("synthesize", value, "are no recordings"))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// No filter twice: its columns could not be told apart.
+    fn check_filters(&self) -> Result<(), StudyError> {
+        match self.filters.iter().enumerate().find(|(i, f)| self.filters[..*i].contains(f)) {
+            Some((_, filter)) => {
+                let twice = serde_json::to_string(filter).unwrap_or_default();
+                let shown = serde_json::to_string(&self.filters).unwrap_or_default();
+                Err(StudyError::refused("filters", shown, format!("names {twice} twice")))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Names of every axis.
+    fn names(&self) -> [(&'static str, Vec<&str>); 6] {
+        [
+            ("trajectory", self.trajectory.iter().map(|e| e.name.as_str()).collect()),
+            ("truth", self.truth.iter().map(|e| e.name.as_str()).collect()),
+            ("candidate", self.candidate.iter().map(|e| e.name.as_str()).collect()),
+            ("scenario", self.scenario.iter().map(|e| e.name.as_str()).collect()),
+            ("gnss", self.gnss.iter().map(|e| e.name.as_str()).collect()),
+            ("outages", self.outages.iter().map(|e| e.name.as_str()).collect()),
+        ]
+    }
+}
+
+/// The file's name without its ending, where no name was given.
+fn name_after(name: &mut String, file: Option<&PathBuf>) {
+    if name.is_empty()
+        && let Some(stem) = file.and_then(|f| f.file_stem())
+    {
+        *name = stem.to_string_lossy().into_owned();
+    }
+}
+
+pub(super) fn unique(axis: &str, names: &[&str]) -> Result<(), StudyError> {
+    if let Some(i) = names.iter().position(|n| n.trim().is_empty()) {
+        return Err(StudyError::Unnamed { axis: axis.to_owned(), entry: i + 1 });
+    }
+    let mut seen = std::collections::HashSet::new();
+    match names.iter().find(|name| !seen.insert(**name)) {
+        Some(name) => Err(StudyError::Duplicate { axis: axis.to_owned(), name: (*name).to_owned() }),
+        None => Ok(()),
+    }
+}
+
+pub(super) fn exactly_one(
+    axis: &str,
+    entry: usize,
+    said: &[bool],
+    keys: &'static str,
+) -> Result<(), StudyError> {
+    if said.iter().filter(|s| **s).count() == 1 {
+        return Ok(());
+    }
+    Err(StudyError::NotOne { axis: axis.to_owned(), entry: entry + 1, keys })
+}

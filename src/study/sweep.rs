@@ -1,0 +1,141 @@
+//! Outage sets, one by one and swept.
+
+use super::StudyError;
+use super::check::exactly_one;
+use super::description::OutagesEntry;
+use super::grid::MAX_CELLS;
+use crate::sensors::outage::{Outage, OutagePlan, PeriodicOutages, RandomOutages};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A number or a list of numbers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "a number or a list of numbers")]
+pub enum OneOrMany {
+    /// One.
+    One(f64),
+    /// Several.
+    Many(Vec<f64>),
+}
+
+impl OneOrMany {
+    fn values(&self) -> &[f64] {
+        match self {
+            Self::One(value) => std::slice::from_ref(value),
+            Self::Many(values) => values,
+        }
+    }
+}
+
+/// A window of each start and duration.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Sweep {
+    /// First instants without a fix (s).
+    pub start_s: OneOrMany,
+    /// Durations (s).
+    pub duration_s: OneOrMany,
+}
+
+/// Regular outages of each combination.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Periodic {
+    /// Start of the first (s).
+    pub first_s: OneOrMany,
+    /// From one start to the next (s).
+    pub every_s: OneOrMany,
+    /// Length of each (s).
+    pub duration_s: OneOrMany,
+}
+
+/// Random outages of each combination.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Random {
+    /// Outages per hour of time with fixes.
+    pub rate_per_hour: OneOrMany,
+    /// Length of each (s).
+    pub duration_s: OneOrMany,
+}
+
+/// One outage set.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OutageSet {
+    /// Its name.
+    pub name: String,
+    /// Its windows.
+    pub plan: OutagePlan,
+}
+
+/// The sets an entry stands for.
+pub(super) fn expand(entry: &OutagesEntry, index: usize) -> Result<Vec<OutageSet>, StudyError> {
+    let said =
+        [entry.windows.is_some(), entry.sweep.is_some(), entry.periodic.is_some(), entry.random.is_some()];
+    exactly_one("outages", index, &said, "windows, sweep, periodic, random")?;
+    let key = format!("outages[{}]", index + 1);
+    let sets = combinations(entry);
+    if sets > MAX_CELLS {
+        let reason = format!("makes more than {MAX_CELLS} outage sets");
+        return Err(StudyError::refused(&key, sets, reason));
+    }
+    let sets = if let Some(windows) = &entry.windows {
+        vec![(Vec::new(), OutagePlan { fixed: windows.clone(), ..OutagePlan::default() })]
+    } else if let Some(sweep) = &entry.sweep {
+        product(&[&sweep.start_s, &sweep.duration_s], |v| OutagePlan {
+            fixed: vec![Outage { start_s: v[0], end_s: v[0] + v[1] }],
+            ..OutagePlan::default()
+        })
+    } else if let Some(p) = &entry.periodic {
+        product(&[&p.first_s, &p.every_s, &p.duration_s], |v| OutagePlan {
+            periodic: Some(PeriodicOutages { first_s: v[0], every_s: v[1], duration_s: v[2] }),
+            ..OutagePlan::default()
+        })
+    } else if let Some(r) = &entry.random {
+        product(&[&r.rate_per_hour, &r.duration_s], |v| OutagePlan {
+            random: Some(RandomOutages { rate_per_hour: v[0], duration_s: v[1] }),
+            ..OutagePlan::default()
+        })
+    } else {
+        Vec::new()
+    };
+    if sets.is_empty() {
+        return Err(StudyError::Empty { axis: key });
+    }
+    let several = sets.len() > 1;
+    let named = |(values, plan): (Vec<f64>, OutagePlan)| {
+        plan.windows((0.0, 1.0), 0).map_err(|e| StudyError::refused(&key, &e.value, &e.requirement))?;
+        let values: Vec<String> = values.iter().map(f64::to_string).collect();
+        let name = if several { format!("{}({})", entry.name, values.join(",")) } else { entry.name.clone() };
+        Ok(OutageSet { name, plan })
+    };
+    sets.into_iter().map(named).collect()
+}
+
+/// How many sets an entry stands for, before any is made.
+fn combinations(entry: &OutagesEntry) -> usize {
+    let axes = match (&entry.sweep, &entry.periodic, &entry.random) {
+        (Some(s), ..) => vec![&s.start_s, &s.duration_s],
+        (_, Some(p), _) => vec![&p.first_s, &p.every_s, &p.duration_s],
+        (.., Some(r)) => vec![&r.rate_per_hour, &r.duration_s],
+        _ => Vec::new(),
+    };
+    axes.iter().fold(1, |n, axis| n.saturating_mul(axis.values().len()))
+}
+
+/// Every combination of values, the last axis fastest.
+fn product(axes: &[&OneOrMany], make: impl Fn(&[f64]) -> OutagePlan) -> Vec<(Vec<f64>, OutagePlan)> {
+    let mut combinations: Vec<Vec<f64>> = vec![Vec::new()];
+    for axis in axes {
+        let longer =
+            |c: &Vec<f64>| axis.values().iter().map(|v| [&c[..], &[*v]].concat()).collect::<Vec<_>>();
+        combinations = combinations.iter().flat_map(longer).collect();
+    }
+    combinations
+        .into_iter()
+        .map(|c| {
+            let plan = make(&c);
+            (c, plan)
+        })
+        .collect()
+}
