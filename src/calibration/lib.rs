@@ -8,54 +8,43 @@
 pub(crate) use nav_sim_signal::bibliography;
 pub(crate) use nav_sim_signal::{imu, noise, rng, wavelet};
 
-mod alike;
-mod auto;
-mod average;
-mod avlr;
-mod bootstrap;
-mod bounded;
-mod diagnosis;
-pub mod efficiency;
+// Wavelet variances: of replicates, averaged, as a model implies them, and how they scatter.
+mod curve;
+// What is fitted.
+mod model;
+// A model to a curve.
 mod fit;
-mod goodness;
-mod implied;
-mod indistinct;
-mod inference;
-mod limits;
-mod notes;
-mod objective;
-mod optimise;
-mod parameter_intervals;
+// What is asked of a calibration, and what comes of it.
+mod outcome;
+// How sure a fit is.
+mod uncertainty;
+// Which model.
+mod selection;
+// Which recordings.
+mod diagnosis;
+// The same for people.
+mod words;
+// All of it.
 mod pipeline;
-mod replicates;
-mod robust_scale;
-mod sampling;
-mod sandwich;
-mod search;
-mod spec;
-mod spread;
-mod stationarity;
+// Studies of estimators.
+pub mod efficiency;
 
-pub use alike::LEVEL as ALIKE_LEVEL;
-pub use auto::{Candidate, Ranking};
-pub use average::{AverageError, Estimator, Replicate, Trim, average};
+pub use curve::{
+    AverageError, Estimator, Group, Pool, Replicate, Scope, SignalError, Trim, WarmUp, average, grouped,
+    implied, replicates, trend, warm_up,
+};
 pub use diagnosis::{
-    Alarm, AxisScores, CommonOutliers, Diagnosis, DriftAlarm, LeftOut, Misfit, Movement, Verdict, advice,
-    diagnose, effects,
+    Alarm, AxisScores, CommonOutliers, Diagnosis, DriftAlarm, LeftOut, Misfit, Movement, Verdict, diagnose,
 };
-pub use fit::{Fit, FitError, fit};
-pub use goodness::Goodness;
-pub use implied::implied;
-pub use indistinct::Indistinct;
-pub use inference::{Bootstrap, Inference, infer};
-pub use limits::{LimitError, Limits};
-pub use notes::{Share, correlation_time_s, duration, notes, percent, shares};
-pub use objective::Weighting;
-pub use optimise::Termination;
-pub use parameter_intervals::{ParameterInterval, Undetermined};
-pub use pipeline::{
-    CalibrationError, Cause, ModelChoice, Outcome, ParameterLimit, Settings, calibrate, estimate, fit_curve,
+pub use fit::{Fit, FitError, Termination, Weighting, estimate, fit};
+pub use model::{Kind, LimitError, Limits, ModelSpec, SpecError};
+pub use outcome::{
+    Bootstrap, Candidate, Goodness, Indistinct, Inference, LevelSpread, ModelChoice, Outcome,
+    ParameterInterval, ParameterLimit, Ranking, Settings, TooSimple, Undetermined,
 };
-pub use replicates::{Group, Pool, SignalError, grouped, replicates, trend};
-pub use spec::{Kind, ModelSpec, SpecError};
-pub use stationarity::{WarmUp, warm_up};
+pub use pipeline::{CalibrationError, Cause, calibrate, fit_curve, infer};
+pub use uncertainty::ALIKE_LEVEL;
+pub use words::{
+    Share, advice, correlation_time_s, duration, effects, note_of_indistinct, percent, reasons, shares,
+    undetermined,
+};

@@ -1,7 +1,7 @@
 //! A calibration on one screen: the verdict first, then each parameter with its interval.
 
 use super::fits::{interval_of, meaning};
-use crate::calibration::{Diagnosis, Group, Outcome, ParameterInterval, Settings, advice};
+use crate::calibration::{Diagnosis, Outcome, ParameterInterval, Settings, advice};
 use crate::imu::Sensor;
 use crate::noise::Process;
 
@@ -13,7 +13,7 @@ const ADVICE: usize = 4;
 
 /// What the recordings of each sensor say of one another, and every fit, shortly: two of five processes in twenty lines.
 #[must_use]
-pub fn brief(groups: &[Group], outcomes: &[Outcome], diagnoses: &[Diagnosis], settings: &Settings) -> String {
+pub fn brief(outcomes: &[Outcome], diagnoses: &[Diagnosis], settings: &Settings) -> String {
     let mut lines = Vec::new();
     for sensor in Sensor::ALL {
         let advice = advice(diagnoses, sensor, settings.rate_hz);
@@ -24,13 +24,12 @@ pub fn brief(groups: &[Group], outcomes: &[Outcome], diagnoses: &[Diagnosis], se
         }
     }
     for outcome in outcomes {
-        let group = &groups[outcome.group];
         if outcomes.len() > MOST {
-            lines.push(format!("{}: {}", head(group, outcome), one_line(outcome)));
+            lines.push(format!("{}: {}", head(outcome), one_line(outcome)));
             continue;
         }
-        lines.push(head(group, outcome));
-        lines.extend(processes(group, outcome, settings.rate_hz));
+        lines.push(head(outcome));
+        lines.extend(processes(outcome, settings.rate_hz));
         lines.extend(outcome.notes.iter().take(REMARKS).map(|note| format!("  note: {note}")));
         let left = outcome.notes.len().saturating_sub(REMARKS);
         if left > 0 {
@@ -45,8 +44,8 @@ fn more(left: usize) -> String {
 }
 
 /// `accel · dr-awv · WN+AR1 · 24 signals, J-test p = 0.711: no evidence against the model`
-fn head(group: &Group, outcome: &Outcome) -> String {
-    let signals = match group.replicates.len() {
+fn head(outcome: &Outcome) -> String {
+    let signals = match outcome.replicates {
         0 => "a curve".to_owned(),
         1 => "1 signal".to_owned(),
         count => format!("{count} signals"),
@@ -56,7 +55,7 @@ fn head(group: &Group, outcome: &Outcome) -> String {
         let verdict = if g.is_rejected() { "the model is rejected" } else { "no evidence against the model" };
         format!(", J-test p = {:.3}: {verdict}", g.p_value)
     });
-    format!("{} · {} · {} · {signals}{test}", group.name(), outcome.estimator.name(), outcome.spec)
+    format!("{} · {} · {} · {signals}{test}", outcome.scope.name(), outcome.estimator.name(), outcome.spec)
 }
 
 /// `WN sigma2 5.42e-5, AR1 phi 0.9859 sigma2 1.58e-8`
@@ -70,7 +69,7 @@ fn one_line(outcome: &Outcome) -> String {
 }
 
 /// A line for each process: its parameters with their intervals, and what they mean.
-fn processes(group: &Group, outcome: &Outcome, rate_hz: f64) -> Vec<String> {
+fn processes(outcome: &Outcome, rate_hz: f64) -> Vec<String> {
     let intervals = outcome.inference.as_ref().map_or(&[][..], |i| &i.intervals);
     let model = &outcome.fit.composite;
     let line = |(process, label): (&Process, String)| {
@@ -84,7 +83,7 @@ fn processes(group: &Group, outcome: &Outcome, rate_hz: f64) -> Vec<String> {
         let meaning = if outcome.fit.zero.contains(&label) {
             "no part in it".to_owned()
         } else {
-            meaning(process, group.sensor, rate_hz)
+            meaning(process, outcome.scope.sensor, rate_hz)
         };
         format!("  {label:<6} {}; {meaning}", all.join(", "))
     };
@@ -98,7 +97,7 @@ fn number(parameter: &str, value: f64) -> String {
 
 /// ` (5.36e-5 … 5.48e-5)`
 fn ends(interval: &ParameterInterval) -> String {
-    match interval.undetermined() {
+    match interval.absent {
         None => {
             let [low, high] = [interval.low, interval.high].map(|end| number(interval.parameter, end));
             format!(" ({low} … {high})")

@@ -204,16 +204,18 @@ pub struct ReplicateCurve {
 }
 
 impl CurvesFile {
-    /// The file of some outcomes.
+    /// The file of some outcomes and the groups they are of.
     #[must_use]
     pub fn new(groups: &[Group], outcomes: &[&Outcome], settings: &Settings) -> Self {
-        let curve = |o: &&Outcome| fitted(&groups[o.group], o, settings);
+        let replicates =
+            |o: &Outcome| groups.iter().find(|g| g.scope == o.scope).map_or(&[][..], |g| &g.replicates);
+        let curve = |o: &&Outcome| fitted(o, replicates(o), settings);
         let curves = outcomes.iter().map(curve).collect();
         Self { schema_version: SCHEMA_VERSION, rate_hz: settings.rate_hz, curves }
     }
 }
 
-fn fitted(group: &Group, outcome: &Outcome, settings: &Settings) -> FittedCurve {
+fn fitted(outcome: &Outcome, replicates: &[Replicate], settings: &Settings) -> FittedCurve {
     let Outcome { curve, fit, estimator, .. } = outcome;
     let band = Band::new(curve.wv.clone(), &curve.edof, Vec::new());
     let model = &fit.composite;
@@ -230,8 +232,8 @@ fn fitted(group: &Group, outcome: &Outcome, settings: &Settings) -> FittedCurve 
         },
     };
     FittedCurve {
-        sensor: group.sensor.name().to_owned(),
-        axis: group.axis.map_or("all", |a| a.name()).to_owned(),
+        sensor: outcome.scope.sensor.name().to_owned(),
+        axis: outcome.scope.axis.map_or("all", |a| a.name()).to_owned(),
         estimator: estimator.name().to_owned(),
         tau_s: over_levels(&|level| tau_s(level, settings.rate_hz)),
         wv: band.wv,
@@ -241,7 +243,7 @@ fn fitted(group: &Group, outcome: &Outcome, settings: &Settings) -> FittedCurve 
         ci_high: band.ci_high,
         implied: implied(model, curve),
         processes: parts.map(|(label, p)| (label, over_levels(&|level| p.haar_wv(level)))).collect(),
-        replicates: group.replicates.iter().map(replicate).collect(),
+        replicates: replicates.iter().map(replicate).collect(),
     }
 }
 

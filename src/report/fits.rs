@@ -3,8 +3,8 @@
 use super::curves::tau_s;
 use super::replicates::ReplicateEntry;
 use crate::calibration::{
-    ALIKE_LEVEL, Candidate, Diagnosis, Estimator, Goodness, Group, Indistinct, Inference, Outcome,
-    ParameterInterval, Ranking, Settings, Share, correlation_time_s, percent, shares,
+    ALIKE_LEVEL, Candidate, Diagnosis, Estimator, Goodness, Indistinct, Inference, LevelSpread, Outcome,
+    ParameterInterval, Ranking, Settings, Share, correlation_time_s, percent, reasons, shares, undetermined,
 };
 use crate::imu::Sensor;
 use crate::noise::{Composite, Process};
@@ -118,7 +118,7 @@ impl CandidateEntry {
 const SHOWN: usize = 8;
 
 /// The ranking as lines.
-fn ranking_lines(ranking: &Ranking) -> Vec<String> {
+fn ranking_lines(ranking: &Ranking, rate_hz: f64) -> Vec<String> {
     let line = |c: CandidateEntry| {
         let p = c.p_value.map_or(String::new(), |p| format!("  p ≤ {p:.3}"));
         let mark = if c.chosen { "*" } else { " " };
@@ -135,7 +135,7 @@ fn ranking_lines(ranking: &Ranking) -> Vec<String> {
         left + ranking.far,
         ranking.not_identifiable
     ));
-    lines.extend(ranking.reasons.iter().map(|r| format!("  chosen: {r}")));
+    lines.extend(reasons(ranking, rate_hz).iter().map(|r| format!("  chosen: {r}")));
     lines
 }
 
@@ -189,22 +189,22 @@ pub struct SpreadEntry {
 }
 
 impl FitEntry {
-    /// The entry of an outcome of a group.
+    /// The entry of an outcome.
     #[must_use]
-    pub fn new(group: &Group, outcome: &Outcome, rate_hz: f64) -> Self {
+    pub fn new(outcome: &Outcome, rate_hz: f64) -> Self {
         let fit = &outcome.fit;
         let inference = outcome.inference.as_ref();
         let goodness = inference.and_then(|i| i.goodness);
-        let undetermined = inference.into_iter().flat_map(|i| &i.intervals).filter_map(|i| i.undetermined());
+        let open = inference.into_iter().flat_map(|i| &i.intervals).filter_map(undetermined);
         let spread = inference.map_or(&[][..], |i| &i.spread).iter();
         Self {
-            sensor: group.sensor.name(),
-            axis: group.axis.map_or("all", |a| a.name()),
+            sensor: outcome.scope.sensor.name(),
+            axis: outcome.scope.axis.map_or("all", |a| a.name()),
             estimator: outcome.estimator.name(),
             model: outcome.spec.to_string(),
             ranking: outcome.ranking.iter().flat_map(CandidateEntry::all).collect(),
-            reasons: outcome.ranking.as_ref().map_or(Vec::new(), |r| r.reasons.clone()),
-            replicates: group.replicates.len(),
+            reasons: outcome.ranking.as_ref().map_or(Vec::new(), |r| reasons(r, rate_hz)),
+            replicates: outcome.replicates,
             scales: outcome.curve.levels.len(),
             processes: processes_json(&outcome.fit.composite, inference.map_or(&[][..], |i| &i.intervals)),
             goodness: goodness.map(|Goodness { statistic, dof, expected, p_value }| GoodnessEntry {
@@ -214,7 +214,7 @@ impl FitEntry {
                 p_value,
             }),
             spread: spread
-                .map(|&(level, within, between)| SpreadEntry {
+                .map(|&LevelSpread { level, within, between }| SpreadEntry {
                     tau_s: tau_s(level, rate_hz),
                     within,
                     between,
@@ -231,7 +231,7 @@ impl FitEntry {
             runner_up: fit.runner_up,
             zero: fit.zero.clone(),
             at_end: fit.at_end.clone(),
-            notes: outcome.notes.iter().cloned().chain(undetermined).collect(),
+            notes: outcome.notes.iter().cloned().chain(open).collect(),
         }
     }
 }
@@ -240,7 +240,6 @@ impl FitsFile {
     /// The file of some outcomes.
     #[must_use]
     pub fn new(
-        groups: &[Group],
         outcomes: &[Outcome],
         diagnoses: &[Diagnosis],
         settings: &Settings,
@@ -251,7 +250,7 @@ impl FitsFile {
             schema_version: 1,
             rate_hz,
             model: settings.model.to_string(),
-            fits: outcomes.iter().map(|o| FitEntry::new(&groups[o.group], o, rate_hz)).collect(),
+            fits: outcomes.iter().map(|o| FitEntry::new(o, rate_hz)).collect(),
             replicates: diagnoses.iter().map(|d| ReplicateEntry::new(d, rate_hz)).collect(),
             files,
         }
@@ -268,7 +267,7 @@ fn process_json(process: &Process, label: &str, intervals: &[ParameterInterval])
     for (name, value) in process.parameters() {
         map.insert(name.to_owned(), value.into());
         if let Some(i) = interval_of(intervals, label, name) {
-            let ends = if i.undetermined().is_none() { vec![i.low, i.high].into() } else { Value::Null };
+            let ends = if i.absent.is_none() { vec![i.low, i.high].into() } else { Value::Null };
             map.insert(format!("{name}_ci95"), ends);
             let error = i.standard_error;
             map.insert(format!("{name}_se"), if error.is_finite() { error.into() } else { Value::Null });
@@ -287,22 +286,24 @@ pub(super) fn interval_of<'a>(
 
 /// A fit in words: a head line, a line for each process, how sure the optimum is, the remarks.
 #[must_use]
-pub fn describe(group: &Group, outcome: &Outcome, settings: &Settings) -> String {
-    let mut lines = vec![head(group, outcome, settings)];
-    lines.extend(outcome.ranking.iter().flat_map(ranking_lines));
+pub fn describe(outcome: &Outcome, settings: &Settings) -> String {
+    let mut lines = vec![head(outcome, settings)];
+    lines.extend(outcome.ranking.iter().flat_map(|r| ranking_lines(r, settings.rate_hz)));
     lines.extend(process_lines(
         &outcome.fit.composite,
-        group.sensor,
+        outcome.scope.sensor,
         &outcome.curve.levels,
         settings.rate_hz,
     ));
     lines.push(optimum(outcome));
-    lines.extend(outcome.inference.iter().flat_map(|i| inference_lines(i, group, settings.rate_hz)));
+    lines.extend(
+        outcome.inference.iter().flat_map(|i| inference_lines(i, outcome.replicates, settings.rate_hz)),
+    );
     lines.extend(outcome.notes.iter().map(|note| format!("  note: {note}")));
     lines.join("\n")
 }
 
-fn inference_lines(inference: &Inference, group: &Group, rate_hz: f64) -> Vec<String> {
+fn inference_lines(inference: &Inference, replicates: usize, rate_hz: f64) -> Vec<String> {
     if inference.fitted < 2 {
         return vec![format!(
             "  {} of {} draws of the bootstrap had a fit: no intervals",
@@ -311,7 +312,7 @@ fn inference_lines(inference: &Inference, group: &Group, rate_hz: f64) -> Vec<St
     }
     let mut lines: Vec<String> = inference.goodness.iter().map(j_test).collect();
     for i in &inference.intervals {
-        if let Some(text) = i.undetermined() {
+        if let Some(text) = undetermined(i) {
             lines.push(format!("  95 % {text}"));
             continue;
         }
@@ -324,7 +325,7 @@ fn inference_lines(inference: &Inference, group: &Group, rate_hz: f64) -> Vec<St
             i.process, i.parameter, i.low, i.high
         ));
     }
-    if group.replicates.len() > 1 {
+    if replicates > 1 {
         lines.extend(spread_line(inference, rate_hz));
     }
     lines
@@ -346,8 +347,9 @@ fn spread_line(inference: &Inference, rate_hz: f64) -> Option<String> {
     if p > ALIKE_LEVEL {
         return Some(format!("  no evidence that replicates differ beyond their noise (p = {p:.3})"));
     }
-    let most = |(_, within, between): &&(u32, f64, f64)| between / within;
-    let (level, within, between) = *inference.spread.iter().max_by(|a, b| most(a).total_cmp(&most(b)))?;
+    let most = |s: &&LevelSpread| s.between / s.within;
+    let LevelSpread { level, within, between } =
+        *inference.spread.iter().max_by(|a, b| most(a).total_cmp(&most(b)))?;
     Some(format!(
         "  replicates differ beyond their noise (p = {p:.3}), most at {} s: by {} of the wavelet variance, noise alone \
          makes {}",
@@ -357,8 +359,8 @@ fn spread_line(inference: &Inference, rate_hz: f64) -> Option<String> {
     ))
 }
 
-fn head(group: &Group, outcome: &Outcome, settings: &Settings) -> String {
-    let count = group.replicates.len();
+fn head(outcome: &Outcome, settings: &Settings) -> String {
+    let count = outcome.replicates;
     let signals = match count {
         0 => "a curve".to_owned(),
         1 => "1 signal".to_owned(),
@@ -373,7 +375,7 @@ fn head(group: &Group, outcome: &Outcome, settings: &Settings) -> String {
     let scales = outcome.curve.levels.len();
     format!(
         "{} · {} · {} · {signals}{trimmed}, {scales} scales",
-        group.name(),
+        outcome.scope.name(),
         outcome.estimator.name(),
         outcome.spec
     )

@@ -3,7 +3,7 @@
 use super::PrepareError;
 use super::description::{CalibrateStep, Synthesis};
 use crate::calibration::{
-    Estimator, Group, ModelChoice, Outcome, Pool, Settings, Trim, Weighting, calibrate, grouped, replicates,
+    Estimator, ModelChoice, Outcome, Pool, Settings, Trim, Weighting, calibrate, grouped, replicates,
 };
 use crate::imu::{Channel, Recording};
 use crate::noise::contamination::Contamination;
@@ -95,7 +95,7 @@ pub(super) fn settings(step: &CalibrateStep, rate_hz: f64) -> Result<Settings, P
 pub fn calibrated(
     recordings: &[Recording],
     step: &CalibrateStep,
-) -> Result<(Vec<Group>, Vec<Outcome>, Settings), PrepareError> {
+) -> Result<(Vec<Outcome>, Settings), PrepareError> {
     let settings = settings(step, recordings.first().map_or(1.0, |r| r.rate_hz))?;
     let single = settings.estimators.iter().any(|e| e.is_single());
     if single && recordings.len() > 1 {
@@ -107,5 +107,5 @@ pub fn calibrated(
     let measured: Vec<_> = recordings.par_iter().map(of).collect::<Result<_, _>>()?;
     let groups = grouped(measured.concat(), if single { Pool::Axes } else { Pool::Sensor });
     let outcomes = calibrate(&groups, &settings)?;
-    Ok((groups, outcomes, settings))
+    Ok((outcomes, settings))
 }

@@ -41,7 +41,7 @@ pub(super) fn common(pieces: &[Piece<'_>], tuning: &Tuning) -> Option<CommonOutl
             }
         }
         let count = logs.len() as f64;
-        let centre = crate::robust_scale::median(&logs);
+        let centre = crate::curve::robust_scale::median(&logs);
         let deviations = centre / (MEDIAN * variance.sqrt() / count);
         let excess = centre.exp_m1();
         if !(excess.is_finite() && deviations > ALARM && excess > LEAST) {

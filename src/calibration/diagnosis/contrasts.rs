@@ -7,9 +7,9 @@
 //! The spread is that of the contrast itself, so however the scales hang together, nothing is assumed of it.
 
 use super::FEWEST;
+use crate::curve::sampling::SamplingLaw;
 use crate::rng::Generator;
-use crate::sampling::SamplingLaw;
-use crate::spread::variance_of_log;
+use crate::uncertainty::spread::variance_of_log;
 use rand::RngExt;
 use rand_distr::StandardNormal;
 

@@ -1,9 +1,8 @@
 //! What leaving a recording out does to each estimator: its curve, and every parameter.
 
-use super::super::average::{Estimator, Replicate, average};
-use super::super::pipeline::{Outcome, Settings, estimate_again};
-use super::super::replicates::Group;
-use super::super::spread::variance_of_log;
+use crate::curve::{Estimator, Group, Replicate, average};
+use crate::outcome::{Outcome, Settings};
+use crate::uncertainty::spread::variance_of_log;
 
 /// How far an estimator moves when one recording is left out.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,9 +50,17 @@ pub(super) fn left_out(group: &Group, name: &str, outcome: &Outcome, settings: &
         (*level, ratio - 1.0, ratio.ln() / variance_of_log(*edof).sqrt())
     };
     let (level, change, deviations) = moves.map(one).max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))?;
-    let parameters = estimate_again(&without, outcome, settings)
+    let parameters = outcome
+        .estimate_again(&without, settings)
         .map_or(Vec::new(), |fit| movements(outcome, &fit.composite));
-    Some(LeftOut { group: group.name(), estimator: outcome.estimator, level, change, deviations, parameters })
+    Some(LeftOut {
+        group: group.scope.name(),
+        estimator: outcome.estimator,
+        level,
+        change,
+        deviations,
+        parameters,
+    })
 }
 
 fn movements(outcome: &Outcome, without: &crate::noise::Composite) -> Vec<Movement> {

@@ -12,19 +12,15 @@ mod alarm;
 mod common;
 mod contrasts;
 mod leave_out;
-mod words;
 
 pub use common::CommonOutliers;
 pub use leave_out::{LeftOut, Movement};
-pub use words::{advice, effects};
 
-use super::average::{Estimator, Replicate};
-use super::goodness::Goodness;
-use super::pipeline::{Outcome, Settings};
-use super::replicates::{Group, Pool};
-use super::sampling::SamplingLaw;
+use crate::curve::sampling::SamplingLaw;
+use crate::curve::{Estimator, Group, Pool, Replicate};
 use crate::imu::{Axis, Sensor};
 use crate::noise::Composite;
+use crate::outcome::{Goodness, Outcome, Settings};
 use crate::wavelet::interval::edof_robust;
 use alarm::alarms;
 use contrasts::{Noise, Table, scores};
@@ -147,9 +143,9 @@ pub fn diagnose(groups: &[Group], outcomes: &[Outcome], settings: &Settings) -> 
 }
 
 fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &Settings) -> Vec<Diagnosis> {
-    let own: Vec<(usize, &Group)> = groups.iter().enumerate().filter(|(_, g)| g.sensor == sensor).collect();
+    let own: Vec<&Group> = groups.iter().filter(|g| g.scope.sensor == sensor).collect();
     let mut names: Vec<&str> = Vec::new();
-    for replicate in own.iter().flat_map(|(_, g)| &g.replicates) {
+    for replicate in own.iter().flat_map(|g| &g.replicates) {
         if !names.contains(&replicate.name.as_str()) {
             names.push(&replicate.name);
         }
@@ -167,11 +163,11 @@ fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &
     let left_out = |name: &str| {
         let fits: Vec<_> = own
             .iter()
-            .flat_map(|(i, g)| outcomes.iter().filter(|o| o.group == *i).map(move |o| (*g, o)))
+            .flat_map(|g| outcomes.iter().filter(|o| o.scope == g.scope).map(move |o| (*g, o)))
             .collect();
         fits.into_par_iter().filter_map(|(g, o)| leave_out::left_out(g, name, o, settings)).collect()
     };
-    let misfits = misfits(&own, outcomes);
+    let misfits = misfits(sensor, outcomes);
     let one = |(index, name): (usize, &&str)| {
         let (of_noise, of_outliers) = (noise.alarm(index), outliers.alarm(index));
         let of_drift = drift.drift_alarm(index, &pieces);
@@ -185,7 +181,7 @@ fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &
         Diagnosis {
             name: (*name).to_owned(),
             sensor,
-            axes: own.iter().flat_map(|(_, g)| &g.replicates).filter(has).count(),
+            axes: own.iter().flat_map(|g| &g.replicates).filter(has).count(),
             verdict,
             noise: of_noise,
             outliers: of_outliers,
@@ -201,22 +197,18 @@ fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &
 }
 
 /// The fits of a sensor that the J-test rejects.
-fn misfits(own: &[(usize, &Group)], outcomes: &[Outcome]) -> Vec<Misfit> {
-    let of_group = |(index, group): &(usize, &Group)| {
-        let name = group.name();
-        let rejected = |o: &Outcome| {
-            let goodness = o.inference.as_ref()?.goodness.filter(Goodness::is_rejected)?;
-            Some(Misfit { group: name.clone(), estimator: o.estimator, p_value: goodness.p_value })
-        };
-        outcomes.iter().filter(|o| o.group == *index).filter_map(rejected).collect::<Vec<_>>()
+fn misfits(sensor: Sensor, outcomes: &[Outcome]) -> Vec<Misfit> {
+    let rejected = |o: &Outcome| {
+        let goodness = o.inference.as_ref()?.goodness.filter(Goodness::is_rejected)?;
+        Some(Misfit { group: o.scope.name(), estimator: o.estimator, p_value: goodness.p_value })
     };
-    own.iter().flat_map(of_group).collect()
+    outcomes.iter().filter(|o| o.scope.sensor == sensor).filter_map(rejected).collect()
 }
 
 /// What DR-AWV drops of the smallest group of a sensor.
-fn dropped(own: &[(usize, &Group)], settings: &Settings) -> Option<(Pool, usize)> {
-    let trim = own.iter().map(|(_, g)| settings.trim.count(g.replicates.len())).min()?;
-    let pool = if own.iter().any(|(_, g)| g.axis.is_none()) { Pool::Sensor } else { Pool::Axes };
+fn dropped(own: &[&Group], settings: &Settings) -> Option<(Pool, usize)> {
+    let trim = own.iter().map(|g| settings.trim.count(g.replicates.len())).min()?;
+    let pool = if own.iter().any(|g| g.scope.axis.is_none()) { Pool::Sensor } else { Pool::Axes };
     settings.estimators.contains(&Estimator::DrAwv).then_some((pool, trim))
 }
 
@@ -228,12 +220,12 @@ struct Piece<'a> {
     replicates: Vec<Option<&'a Replicate>>,
 }
 
-fn axes<'a>(own: &[(usize, &'a Group)], names: &[&str], outcomes: &'a [Outcome]) -> Vec<Piece<'a>> {
-    let levels = own.iter().flat_map(|(_, g)| &g.replicates).map(|r| r.classical.len()).min().unwrap_or(0);
+fn axes<'a>(own: &[&'a Group], names: &[&str], outcomes: &'a [Outcome]) -> Vec<Piece<'a>> {
+    let levels = own.iter().flat_map(|g| &g.replicates).map(|r| r.classical.len()).min().unwrap_or(0);
     let piece = |axis: Axis| {
-        let (index, group) = own.iter().find(|(_, g)| g.replicates.iter().any(|r| r.axis == Some(axis)))?;
+        let group = own.iter().find(|g| g.replicates.iter().any(|r| r.axis == Some(axis)))?;
         // The last estimator is the most robust.
-        let model = &outcomes.iter().rfind(|o| o.group == *index)?.fit.composite;
+        let model = &outcomes.iter().rfind(|o| o.scope == group.scope)?.fit.composite;
         let of = |name: &&str| group.replicates.iter().find(|r| r.name == **name && r.axis == Some(axis));
         let law = SamplingLaw::new(model, levels);
         Some(Piece { axis, model, law, replicates: names.iter().map(of).collect() })

@@ -4,7 +4,7 @@ use super::*;
 use crate::imu::Channel;
 use crate::rng::{Generator, StreamKey};
 use crate::wavelet::{Convention, Tuning, both};
-use crate::{ModelChoice, Pool, Trim, Weighting, calibrate, grouped, trend};
+use crate::{ModelChoice, Pool, Trim, Weighting, advice, calibrate, effects, grouped, trend};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 

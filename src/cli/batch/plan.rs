@@ -239,7 +239,7 @@ fn calibration(
             read::recordings_at(&paths, None, session)?
         }
     };
-    let (groups, outcomes, settings) = calibrated(&recordings, step)?;
+    let (outcomes, settings) = calibrated(&recordings, step)?;
     let files = inputs::listed(study_path, &step.recordings)?;
     let inputs = files.iter().map(|f| read::input("recording", f));
     let note = CalibrationNote {
@@ -252,7 +252,7 @@ fn calibration(
     };
     let text = |estimator: &nav_sim::calibration::Estimator| {
         let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == *estimator).collect();
-        model_file::to_toml(&note.model_file(&groups, &own, &settings, None))
+        model_file::to_toml(&note.model_file(&own, &settings, None))
     };
     Ok(settings.estimators.iter().map(text).collect())
 }

@@ -3,7 +3,7 @@
 use super::output::{self, outputs};
 use super::{Args, bootstrap, of_calibration};
 use crate::cli::{Failure, Session, read};
-use nav_sim::calibration::{Estimator, Group, Outcome, Settings, fit_curve};
+use nav_sim::calibration::{Estimator, Group, Outcome, Scope, Settings, fit_curve};
 use nav_sim::formats::curve_file::{self, NamedCurve};
 use nav_sim::imu::Sensor;
 use std::path::{Path, PathBuf};
@@ -53,16 +53,16 @@ pub(super) fn run(
                 Failure::input(format!("{}: the curve does not say of which sensor it is", path.display()));
             return Err(failure.hint("--sensor accel or --sensor gyro"));
         };
-        let group = Group { sensor, axis: named.axis, replicates: Vec::new() };
-        let same = |o: &Outcome| o.estimator == estimator && groups[o.group].name() == group.name();
+        let group = Group { scope: Scope { sensor, axis: named.axis }, replicates: Vec::new() };
+        let same = |o: &Outcome| o.estimator == estimator && o.scope == group.scope;
         if outcomes.iter().any(same) {
-            let (name, estimator) = (group.name(), estimator.name());
+            let (name, estimator) = (group.scope.name(), estimator.name());
             let message = format!("{}: there are two curves of {name} for {estimator}", path.display());
             return Err(Failure::input(message).hint("calibrate the recordings themselves: it averages them"));
         }
-        groups.push(group);
-        let outcome = fit_curve(&groups, groups.len() - 1, estimator, named.curve, settings);
+        let outcome = fit_curve(&group, estimator, named.curve, settings);
         outcomes.push(outcome.map_err(|e| of_calibration(&e))?);
+        groups.push(group);
     }
     bootstrap(args, &groups, &mut outcomes, settings, session);
     let input = read::input("curve", path)?;

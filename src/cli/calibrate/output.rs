@@ -118,28 +118,28 @@ pub(super) fn finish(
         let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == *estimator).collect();
         let text = report::json(&CurvesFile::new(groups, &own, settings));
         let blake3 = hash::of_bytes(text.as_bytes());
-        let file = note.model_file(groups, &own, settings, Some(&blake3));
+        let file = note.model_file(&own, settings, Some(&blake3));
         pair([(curves, text), (model, model_file::to_toml(&file))])?;
         files.extend([model, curves].map(|p| p.display().to_string()));
     }
     let diagnoses = diagnose(groups, outcomes, settings);
     if session.json() {
-        let json = report::json(&FitsFile::new(groups, outcomes, &diagnoses, settings, files.clone()));
+        let json = report::json(&FitsFile::new(outcomes, &diagnoses, settings, files.clone()));
         session.printer.result(json.trim_end());
     } else {
         let text = if session.verbose() {
             let replicates = report::describe_replicates(&diagnoses, settings.rate_hz);
-            let fits = outcomes.iter().map(|o| report::describe(&groups[o.group], o, settings));
+            let fits = outcomes.iter().map(|o| report::describe(o, settings));
             replicates.into_iter().chain(fits).collect::<Vec<_>>().join("\n\n")
         } else {
-            report::brief(groups, outcomes, &diagnoses, settings)
+            report::brief(outcomes, &diagnoses, settings)
         };
         session.printer.result(&text);
     }
     if !files.is_empty() {
         session.printer.say(&format!("wrote {}", files.join(", ")));
     }
-    if groups.iter().any(|g| g.replicates.len() > 1) {
+    if outcomes.iter().any(|o| o.replicates > 1) {
         session.printer.say(WHICH);
     }
     Ok(())

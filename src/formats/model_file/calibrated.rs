@@ -1,7 +1,7 @@
 //! The model file of a calibration.
 
 use super::{Interval, ModelFile, SCHEMA};
-use crate::calibration::{Estimator, Group, Outcome, ParameterLimit, Settings};
+use crate::calibration::{Estimator, Outcome, ParameterLimit, Settings, undetermined};
 use crate::imu::Channel;
 use crate::noise::Model;
 use crate::report::Input;
@@ -28,23 +28,17 @@ impl CalibrationNote {
     /// The model file of the outcomes of one estimator. Channels of no group are missing in it. `curves`: BLAKE3, in
     /// hexadecimal, of the file of curves that goes beside it.
     #[must_use]
-    pub fn model_file(
-        &self,
-        groups: &[Group],
-        outcomes: &[&Outcome],
-        settings: &Settings,
-        curves: Option<&str>,
-    ) -> ModelFile {
+    pub fn model_file(&self, outcomes: &[&Outcome], settings: &Settings, curves: Option<&str>) -> ModelFile {
         let mut file = ModelFile::new(Model { rate_hz: settings.rate_hz, axes: Default::default() });
         file.missing = Channel::ALL.to_vec();
         for outcome in outcomes {
-            for channel in groups[outcome.group].channels() {
+            for channel in outcome.scope.channels() {
                 file.model.axes[channel.index()] = outcome.fit.composite.clone();
                 file.missing.retain(|c| *c != channel);
                 file.intervals.extend(intervals(outcome, channel));
             }
         }
-        let mut provenance = self.provenance(groups, outcomes, settings);
+        let mut provenance = self.provenance(outcomes, settings);
         if let Some(blake3) = curves {
             provenance.insert("curves_blake3".to_owned(), blake3.into());
         }
@@ -52,7 +46,7 @@ impl CalibrationNote {
         file
     }
 
-    fn provenance(&self, groups: &[Group], outcomes: &[&Outcome], settings: &Settings) -> Table {
+    fn provenance(&self, outcomes: &[&Outcome], settings: &Settings) -> Table {
         let mut table = Table::new();
         let mut put = |key: &str, value: Value| table.insert(key.to_owned(), value);
         let estimator = outcomes.first().map_or(Estimator::Given, |o| o.estimator);
@@ -75,7 +69,7 @@ impl CalibrationNote {
         if !settings.limits.is_empty() {
             put("limits", settings.limits.iter().map(limit).collect::<Vec<_>>().into());
         }
-        put("fits", outcomes.iter().map(|o| fit(&groups[o.group], o, settings)).collect::<Vec<_>>().into());
+        put("fits", outcomes.iter().map(|o| fit(o, settings)).collect::<Vec<_>>().into());
         put("inputs", self.inputs.iter().map(input).collect::<Vec<_>>().into());
         table
     }
@@ -93,16 +87,16 @@ fn intervals(outcome: &Outcome, channel: Channel) -> Vec<Interval> {
     .collect()
 }
 
-fn fit(group: &Group, outcome: &Outcome, settings: &Settings) -> Table {
+fn fit(outcome: &Outcome, settings: &Settings) -> Table {
     let fit = &outcome.fit;
     let mut table = Table::new();
     let mut put = |key: &str, value: Value| table.insert(key.to_owned(), value);
     let count = |n: usize| Value::from(n as i64);
-    put("signals", group.name().into());
+    put("signals", outcome.scope.name().into());
     put("model", outcome.spec.to_string().into());
-    put("replicates", count(group.replicates.len()));
+    put("replicates", count(outcome.replicates));
     if outcome.estimator == Estimator::DrAwv {
-        put("trim", count(settings.trim.count(group.replicates.len())));
+        put("trim", count(settings.trim.count(outcome.replicates)));
     }
     put("scales", count(outcome.curve.levels.len()));
     put("objective", fit.objective.into());
@@ -120,8 +114,8 @@ fn fit(group: &Group, outcome: &Outcome, settings: &Settings) -> Table {
             put("j_p_value", goodness.p_value.into());
         }
     }
-    let undetermined = outcome.inference.iter().flat_map(|i| &i.intervals).filter_map(|i| i.undetermined());
-    put("notes", outcome.notes.iter().cloned().chain(undetermined).collect::<Vec<_>>().into());
+    let open = outcome.inference.iter().flat_map(|i| &i.intervals).filter_map(undetermined);
+    put("notes", outcome.notes.iter().cloned().chain(open).collect::<Vec<_>>().into());
     table
 }
 

@@ -1,0 +1,13 @@
+//! Wavelet-variance curves: of replicates, averaged, as a model implies them, and how they scatter.
+
+mod average;
+pub(crate) mod implied;
+mod replicates;
+pub(crate) mod robust_scale;
+pub(crate) mod sampling;
+mod stationarity;
+
+pub use average::{AverageError, Estimator, Replicate, Trim, average};
+pub use implied::implied;
+pub use replicates::{Group, Pool, Scope, SignalError, grouped, replicates, trend};
+pub use stationarity::{WarmUp, warm_up};

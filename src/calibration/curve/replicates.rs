@@ -1,0 +1,112 @@
+//! From recordings to groups of replicates: the wavelet variances of every signal.
+
+use super::average::Replicate;
+use crate::imu::{Axis, Channel, Recording, Sensor, Signal};
+use crate::wavelet::{Tuning, WaveletError, both, default_levels};
+use rayon::prelude::*;
+
+/// What one model is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Scope {
+    /// The sensor.
+    pub sensor: Sensor,
+    /// The axis; none if the axes are pooled.
+    pub axis: Option<Axis>,
+}
+
+impl Scope {
+    /// `accel.x`, or `accel` if the axes are pooled.
+    #[must_use]
+    pub fn name(&self) -> String {
+        match self.axis {
+            None => self.sensor.name().to_owned(),
+            Some(axis) => Channel { sensor: self.sensor, axis }.to_string(),
+        }
+    }
+
+    /// The channels it covers.
+    #[must_use]
+    pub fn channels(&self) -> Vec<Channel> {
+        let axes = self.axis.map_or(Axis::ALL.to_vec(), |axis| vec![axis]);
+        axes.into_iter().map(|axis| Channel { sensor: self.sensor, axis }).collect()
+    }
+}
+
+/// What one model is fitted to: replicates of one axis, or of all axes of a sensor.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Group {
+    /// What the model is for.
+    pub scope: Scope,
+    /// The replicates, each with the axis it is of.
+    pub replicates: Vec<Replicate>,
+}
+
+/// Which signals are replicates of one another.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pool {
+    /// Those of one axis: a model an axis.
+    Axes,
+    /// Those of all axes of a sensor: one model a sensor.
+    Sensor,
+}
+
+/// A signal without a wavelet variance.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{recording}, {channel}: {source}")]
+pub struct SignalError {
+    /// The recording.
+    pub recording: String,
+    /// The signal.
+    pub channel: Channel,
+    /// Why.
+    pub source: WaveletError,
+}
+
+/// The wavelet variances of all signals of a recording, in their order. Without a number of levels there are as
+/// many as usual for its length.
+///
+/// # Errors
+/// When it is too short for the levels.
+pub fn replicates(
+    recording: &Recording,
+    levels: Option<u32>,
+    tuning: &Tuning,
+) -> Result<Vec<(Channel, Replicate)>, SignalError> {
+    let one = |signal: &Signal| {
+        let (channel, samples) = (signal.channel, signal.samples.len());
+        let levels = levels.unwrap_or_else(|| default_levels(samples));
+        let error = |source| SignalError { recording: recording.name.clone(), channel, source };
+        let (classical, robust) = both(&signal.samples, levels, tuning).map_err(error)?;
+        let (name, axis) = (recording.name.clone(), Some(channel.axis));
+        let trend = trend(&signal.samples);
+        Ok((channel, Replicate { name, axis, samples, classical, robust, trend }))
+    };
+    recording.signals.par_iter().map(one).collect()
+}
+
+/// Mean of the later half of a signal less that of its earlier half; the middle one of an odd number is left out.
+#[must_use]
+pub fn trend(samples: &[f64]) -> f64 {
+    let half = samples.len() / 2;
+    // Half by half about their first value, so that no digits of a small change are lost.
+    let first = samples.first().copied().unwrap_or(0.0);
+    let mean = |part: &[f64]| part.iter().map(|x| x - first).sum::<f64>() / half as f64;
+    mean(&samples[samples.len() - half..]) - mean(&samples[..half])
+}
+
+/// The groups, in the order of [`Channel::ALL`].
+#[must_use]
+pub fn grouped(replicates: Vec<(Channel, Replicate)>, pool: Pool) -> Vec<Group> {
+    let mut groups: Vec<Group> = Vec::new();
+    let mut replicates = replicates;
+    replicates.sort_by_key(|(channel, _)| channel.index());
+    for (channel, replicate) in replicates {
+        let axis = (pool == Pool::Axes).then_some(channel.axis);
+        let scope = Scope { sensor: channel.sensor, axis };
+        match groups.last_mut() {
+            Some(group) if group.scope == scope => group.replicates.push(replicate),
+            _ => groups.push(Group { scope, replicates: vec![replicate] }),
+        }
+    }
+    groups
+}

@@ -1,0 +1,223 @@
+//! Least squares with bounds, from the normal equations: minimises ½·xᵀGx − rᵀx over lower ≤ x ≤ upper.
+//!
+//! The active-set method of [Lawson and Hanson](crate::bibliography::LawsonHanson74) (NNLS, chapter 23),
+//! with upper bounds treated like lower ones. Columns are expected at unit length, so that G has a unit
+//! diagonal and tolerances mean the same for every parameter.
+
+/// Parameters at most.
+pub(crate) const MOST: usize = 12;
+
+/// A small symmetric matrix; rows and columns beyond the problem's size are not read.
+pub(crate) type Matrix = [[f64; MOST]; MOST];
+/// A small vector.
+pub(crate) type Vector = [f64; MOST];
+
+/// A bounded quadratic problem of size `n`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Bounded {
+    pub(crate) n: usize,
+    pub(crate) gram: Matrix,
+    pub(crate) right: Vector,
+    pub(crate) lower: Vector,
+    pub(crate) upper: Vector,
+}
+
+/// Where a parameter is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Place {
+    Free,
+    Lower,
+    Upper,
+}
+
+/// A gradient below this part of the data is rounding.
+const FLAT: f64 = 1e-15;
+/// A pivot below this part of the diagonal: the column depends on the others.
+const DEPENDENT: f64 = 1e-13;
+
+impl Bounded {
+    /// All zero: bounds 0 … ∞.
+    pub(crate) const fn new(n: usize) -> Self {
+        let zero = [0.0; MOST];
+        Self { n, gram: [zero; MOST], right: zero, lower: zero, upper: [f64::INFINITY; MOST] }
+    }
+
+    /// The minimiser. Lower bounds are finite.
+    pub(crate) fn minimise(&self) -> Vector {
+        let mut x = self.lower;
+        let mut places = [Place::Lower; MOST];
+        let mut refused = [false; MOST];
+        // Each pass lowers the objective strictly, so no set of free parameters comes twice; the limit
+        // guards against rounding.
+        for _ in 0..20 * self.n {
+            let Some(entering) = self.steepest(&x, &places, &refused) else { break };
+            let before = places[entering];
+            places[entering] = Place::Free;
+            if self.descend(&mut x, &mut places, entering) {
+                refused = [false; MOST];
+            } else {
+                places[entering] = before;
+                refused[entering] = true;
+            }
+        }
+        x
+    }
+
+    /// −gradient.
+    fn downhill(&self, x: &Vector, i: usize) -> f64 {
+        self.right[i] - (0..self.n).map(|j| self.gram[i][j] * x[j]).sum::<f64>()
+    }
+
+    /// The bound parameter that most wants to leave its bound.
+    fn steepest(&self, x: &Vector, places: &[Place; MOST], refused: &[bool; MOST]) -> Option<usize> {
+        let mut best = (FLAT, None);
+        for i in (0..self.n).filter(|i| !refused[*i]) {
+            let w = self.downhill(x, i);
+            let pull = match places[i] {
+                Place::Lower if self.upper[i] > self.lower[i] => w,
+                Place::Upper => -w,
+                _ => continue,
+            };
+            if pull > best.0 {
+                best = (pull, Some(i));
+            }
+        }
+        best.1
+    }
+
+    /// Moves to the minimum over the free parameters, binding those that meet a bound on the way; false if
+    /// the one that enters cannot move.
+    fn descend(&self, x: &mut Vector, places: &mut [Place; MOST], entering: usize) -> bool {
+        let start = x[entering];
+        loop {
+            let Some(goal) = self.solve_free(x, places) else { return false };
+            let mut blocking = (1.0, None);
+            for i in (0..self.n).filter(|i| places[*i] == Place::Free) {
+                let step = goal[i] - x[i];
+                let room = if step < 0.0 { self.lower[i] - x[i] } else { self.upper[i] - x[i] };
+                if step.abs() > room.abs() && room / step < blocking.0 {
+                    let place = if step < 0.0 { Place::Lower } else { Place::Upper };
+                    blocking = ((room / step).max(0.0), Some((i, place)));
+                }
+            }
+            for i in (0..self.n).filter(|i| places[*i] == Place::Free) {
+                x[i] += blocking.0 * (goal[i] - x[i]);
+            }
+            let Some((i, place)) = blocking.1 else { return true };
+            x[i] = if place == Place::Lower { self.lower[i] } else { self.upper[i] };
+            places[i] = place;
+            if i == entering && (x[i] - start).abs() <= 0.0 {
+                return false;
+            }
+        }
+    }
+
+    /// The unconstrained minimum over the free parameters, the others kept; none if G is singular there.
+    fn solve_free(&self, x: &Vector, places: &[Place; MOST]) -> Option<Vector> {
+        let mut free = [0; MOST];
+        let mut count = 0;
+        for i in (0..self.n).filter(|i| places[*i] == Place::Free) {
+            free[count] = i;
+            count += 1;
+        }
+        let free = &free[..count];
+        let mut right = [0.0; MOST];
+        for (a, &i) in free.iter().enumerate() {
+            let bound = (0..self.n).filter(|j| places[*j] != Place::Free);
+            right[a] = self.right[i] - bound.map(|j| self.gram[i][j] * x[j]).sum::<f64>();
+        }
+        let solution = cholesky_solve(|a, b| self.gram[free[a]][free[b]], right, count)?;
+        let mut goal = *x;
+        for (a, &i) in free.iter().enumerate() {
+            goal[i] = solution[a];
+        }
+        Some(goal)
+    }
+}
+
+/// Solves A·x = b, A symmetric of size n; none if it is not positive definite to working precision.
+pub(crate) fn cholesky_solve(a: impl Fn(usize, usize) -> f64, mut b: Vector, n: usize) -> Option<Vector> {
+    let mut l = [[0.0; MOST]; MOST];
+    for i in 0..n {
+        for j in 0..=i {
+            let dot: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
+            if i == j {
+                let pivot = a(i, i) - dot;
+                if pivot <= DEPENDENT * a(i, i) {
+                    return None;
+                }
+                l[i][i] = pivot.sqrt();
+            } else {
+                l[i][j] = (a(i, j) - dot) / l[j][j];
+            }
+        }
+    }
+    for i in 0..n {
+        b[i] = (b[i] - (0..i).map(|k| l[i][k] * b[k]).sum::<f64>()) / l[i][i];
+    }
+    for i in (0..n).rev() {
+        b[i] = (b[i] - (i + 1..n).map(|k| l[k][i] * b[k]).sum::<f64>()) / l[i][i];
+    }
+    Some(b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::Generator;
+    use rand::{RngExt, SeedableRng};
+
+    fn objective(p: &Bounded, x: &Vector) -> f64 {
+        let quadratic: f64 = (0..p.n)
+            .flat_map(|i| (0..p.n).map(move |j| (i, j)))
+            .map(|(i, j)| x[i] * p.gram[i][j] * x[j])
+            .sum();
+        0.5 * quadratic - (0..p.n).map(|i| p.right[i] * x[i]).sum::<f64>()
+    }
+
+    /// Random problems against the conditions that characterise the minimum (Karush-Kuhn-Tucker).
+    #[test]
+    fn the_minimum_satisfies_its_conditions() {
+        let mut generator = Generator::seed_from_u64(11);
+        for case in 0..500 {
+            let n = 1 + case % 7;
+            let mut p = Bounded::new(n);
+            let columns: Vec<Vec<f64>> =
+                (0..n).map(|_| (0..n + 3).map(|_| generator.random_range(-0.2..1.0)).collect()).collect();
+            let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+            for i in 0..n {
+                for j in 0..n {
+                    p.gram[i][j] = dot(&columns[i], &columns[j]);
+                }
+                p.right[i] = generator.random_range(-1.0..1.0);
+                p.lower[i] = generator.random_range(-0.3..0.1);
+                if case % 2 == 0 {
+                    p.upper[i] = p.lower[i] + generator.random_range(0.0..0.5);
+                }
+            }
+            let x = p.minimise();
+            for i in 0..n {
+                let w = p.downhill(&x, i);
+                assert!(x[i] >= p.lower[i] && x[i] <= p.upper[i]);
+                if x[i] > p.lower[i] + 1e-12 {
+                    assert!(w > -1e-9, "case {case}: {w}");
+                }
+                if x[i] < p.upper[i] - 1e-12 {
+                    assert!(w < 1e-9, "case {case}: {w}");
+                }
+            }
+            let mut corner = p.lower;
+            corner[0] = 0.5 * (p.lower[0] + p.upper[0].min(1.0));
+            assert!(objective(&p, &x) <= objective(&p, &corner) + 1e-12);
+        }
+    }
+
+    #[test]
+    fn equal_columns_do_not_hang_and_do_not_blow_up() {
+        let mut p = Bounded::new(3);
+        p.gram = [[1.0; MOST]; MOST];
+        p.right = [1.0; MOST];
+        let x = p.minimise();
+        assert!((x[0] + x[1] + x[2] - 1.0).abs() < 1e-12, "{x:?}");
+    }
+}

@@ -1,0 +1,206 @@
+//! Least squares: theta = argmin Σ Omega_j (nu_j − nu_j(theta))².
+
+use super::assemble::assemble;
+use super::objective::{Component, Objective, Range, whitening};
+use super::result::{Fit, FitError};
+use super::search::{COMBINATIONS, search};
+use super::weighting::Weighting;
+use crate::curve::implied;
+use crate::curve::sampling::SamplingLaw;
+use crate::model::{Kind, Limits, ModelSpec};
+use crate::wavelet::Curve;
+use nalgebra::DMatrix;
+use std::sync::Arc;
+
+/// Fits a model to a curve. The rate (Hz) is what a GM is sampled at.
+///
+/// AR1 and GM processes are sought with correlation times between a sixth of a sample (phi = e^−6) and twenty times the
+/// longest scale; phi is positive. A fit that ends there is told ([`Fit::at_end`]); limits that are given reach further.
+///
+/// # Errors
+/// When the curve has fewer scales than the model parameters, or numbers that are no wavelet variances.
+pub fn fit(curve: &Curve, spec: &ModelSpec, rate_hz: f64, weighting: Weighting) -> Result<Fit, FitError> {
+    let observed = Weights { weighting, nu: curve.wv.clone(), mixing: None };
+    let first = fit_near(curve, spec, rate_hz, observed, COMBINATIONS, &[])?;
+    match weighting {
+        Weighting::Model => reweighted(curve, spec, rate_hz, first, MOST_ROUNDS, COMBINATIONS),
+        Weighting::Full => {
+            fit_with_covariance(curve, spec, rate_hz, &covariance(curve, &first), expected(curve, &first))
+        }
+        Weighting::Edof | Weighting::Interval | Weighting::None => Ok(first),
+    }
+}
+
+/// Fits again at most, until the weights are those of the model itself.
+const MOST_ROUNDS: usize = 20;
+/// The same of a curve that resembles one already fitted, whose model is where the weights begin.
+const FEW_ROUNDS: usize = 3;
+/// Changes of the implied curve, relative, that are not worth another fit.
+const SETTLED: f64 = 1e-6;
+
+/// The curve that a fit implies, where it may be divided by.
+pub(crate) fn expected(curve: &Curve, fit: &Fit) -> Vec<f64> {
+    // A model without any amplitude implies nothing.
+    implied(&fit.composite, curve).iter().zip(&curve.wv).map(|(nu, wv)| nu.max(1e-6 * wv)).collect()
+}
+
+/// Fits with the weights of the last result.
+fn reweighted(
+    curve: &Curve,
+    spec: &ModelSpec,
+    rate_hz: f64,
+    first: Fit,
+    rounds: usize,
+    combinations: usize,
+) -> Result<Fit, FitError> {
+    let mut last = first;
+    for _ in 0..rounds {
+        let nu = expected(curve, &last);
+        let change = nu.iter().zip(&last.weighted_for).map(|(a, b)| (a / b - 1.0).abs());
+        if change.fold(0.0, f64::max) < SETTLED {
+            break;
+        }
+        let weights = Weights { weighting: Weighting::Model, nu, mixing: None };
+        last = fit_near(curve, spec, rate_hz, weights, combinations, &last.minima)?;
+    }
+    Ok(last)
+}
+
+/// Relative covariance of a curve of independent degrees of freedom, by the large-sample law of a model
+/// ([`SamplingLaw`]).
+fn covariance(curve: &Curve, fit: &Fit) -> DMatrix<f64> {
+    let levels = curve.levels.iter().copied().max().unwrap_or(1) as usize;
+    let law = SamplingLaw::new(&fit.composite, levels);
+    let at = |i: usize| curve.levels[i] as usize - 1;
+    let deviation = |i: usize| (2.0 / curve.edof[i]).sqrt();
+    let n = curve.levels.len();
+    DMatrix::from_fn(n, n, |i, j| law.correlation[(at(i), at(j))] * deviation(i) * deviation(j))
+}
+
+/// The fit weighted by the inverse of a covariance of the curve relative to `nu`.
+///
+/// # Errors
+/// As [`fit`].
+pub(crate) fn fit_with_covariance(
+    curve: &Curve,
+    spec: &ModelSpec,
+    rate_hz: f64,
+    covariance: &DMatrix<f64>,
+    nu: Vec<f64>,
+) -> Result<Fit, FitError> {
+    let mixing = Some(Arc::new(whitening(covariance)));
+    fit_near(curve, spec, rate_hz, Weights { weighting: Weighting::Full, nu, mixing }, COMBINATIONS, &[])
+}
+
+/// Combinations tried for a curve that resembles one already fitted.
+const FEW: usize = 300;
+
+/// The same for a curve that resembles one already fitted: a coarser grid, and the minima of that one.
+pub(crate) fn refit(
+    curve: &Curve,
+    spec: &ModelSpec,
+    rate_hz: f64,
+    weighting: Weighting,
+    like: &Fit,
+) -> Result<Fit, FitError> {
+    let nu = match weighting {
+        Weighting::Model | Weighting::Full => expected(curve, like),
+        Weighting::Edof | Weighting::Interval | Weighting::None => curve.wv.clone(),
+    };
+    let weights = Weights { weighting, nu, mixing: like.mixing.clone() };
+    let first = fit_near(curve, spec, rate_hz, weights, FEW, &like.minima)?;
+    match weighting {
+        Weighting::Model => reweighted(curve, spec, rate_hz, first, FEW_ROUNDS, NO_GRID),
+        _ => Ok(first),
+    }
+}
+
+/// Descents from the known minima only.
+const NO_GRID: usize = 0;
+
+/// What the scales of a curve count.
+struct Weights {
+    weighting: Weighting,
+    /// The variances it is made for.
+    nu: Vec<f64>,
+    mixing: Option<Arc<DMatrix<f64>>>,
+}
+
+fn fit_near(
+    curve: &Curve,
+    spec: &ModelSpec,
+    rate_hz: f64,
+    weights: Weights,
+    combinations: usize,
+    known: &[Vec<f64>],
+) -> Result<Fit, FitError> {
+    check(curve, spec)?;
+    let limited = spec.kinds().iter().zip(spec.limits());
+    let components = limited.map(|(kind, limits)| component(*kind, *limits, curve, rate_hz)).collect();
+    let Weights { weighting, nu, mixing } = weights;
+    let objective = Objective::new(curve, weighting, &nu, mixing.clone(), components);
+    let found = search(&objective, combinations, known);
+    Ok(Fit { mixing, weighted_for: nu, ..assemble(&objective, &found, spec, rate_hz)? })
+}
+
+fn check(curve: &Curve, spec: &ModelSpec) -> Result<(), FitError> {
+    let bad =
+        |values: &[f64], (low, high): (f64, f64)| values.iter().position(|v| !(*v >= low && *v <= high));
+    if let Some(i) = bad(&curve.wv, Curve::WV_RANGE) {
+        return Err(FitError::NotPositive { level: curve.levels[i], value: curve.wv[i] });
+    }
+    if let Some(i) = bad(&curve.edof, Curve::EDOF_RANGE) {
+        return Err(FitError::NoWeight { level: curve.levels[i], value: curve.edof[i] });
+    }
+    let (parameters, scales) = (spec.parameters(), curve.levels.len() - curve.ignored.len());
+    if scales < parameters {
+        return Err(FitError::TooFewScales { spec: spec.to_string(), parameters, scales });
+    }
+    Ok(())
+}
+
+/// Correlation times that are sought, in longest scales and in samples: beyond these ends the wavelet variance of an AR1
+/// is that of a random walk to 2 % (at the longest scale), and of white noise to 0.8 % (the first scale against the others).
+const LONGEST: f64 = 20.0;
+const SHORTEST: f64 = 1.0 / 6.0;
+
+/// ln κ of the correlation times that are sought, 1/κ in samples.
+pub(crate) fn correlated(curve: &Curve) -> Range {
+    let longest = f64::from(curve.levels.iter().copied().max().unwrap_or(1)).exp2();
+    Range { low: -(LONGEST * longest).ln(), high: -SHORTEST.ln() }
+}
+
+/// The widest ranges in which a curve can say anything, less what the limits leave out.
+fn component(kind: Kind, limits: Limits, curve: &Curve, rate_hz: f64) -> Component {
+    let correlated = correlated(curve);
+    // Coordinates of the limits: ln κ, which falls as phi rises.
+    let coordinate = match (kind, limits.shape) {
+        (Kind::Ar1, Some((low, high))) => {
+            let kappa = |phi: f64| (-phi.ln()).ln();
+            Some(within(correlated, (low > 0.0).then(|| kappa(low)), (high < 1.0).then(|| kappa(high))))
+        }
+        (Kind::GaussMarkov, Some((low, high))) => {
+            let kappa = |beta: f64| (beta / rate_hz).ln();
+            Some(within(correlated, high.is_finite().then(|| kappa(high)), (low > 0.0).then(|| kappa(low))))
+        }
+        (Kind::Ar1 | Kind::GaussMarkov, None) => Some(correlated),
+        (Kind::Ma1, shape) => {
+            let (low, high) = shape.unwrap_or((-1.0, 1.0));
+            Some(Range { low: low.max(-1.0), high: high.min(1.0) })
+        }
+        _ => None,
+    };
+    let (low, high) = limits.amplitude;
+    let amplitude = match kind {
+        Kind::Drift => Range { low: low * low, high: high * high },
+        _ => Range { low, high },
+    };
+    Component { kind, amplitude, coordinate }
+}
+
+/// A range with its ends replaced where they are limited; what is given counts, even beyond the range.
+fn within(range: Range, high: Option<f64>, low: Option<f64>) -> Range {
+    let high = high.unwrap_or(range.high);
+    let low = low.unwrap_or_else(|| range.low.min(high));
+    Range { low, high: high.max(low) }
+}

@@ -1,0 +1,55 @@
+//! A model fitted to a curve: theta = argmin Σ Omega_j (nu_j − nu_j(theta))².
+
+mod assemble;
+mod avlr;
+mod bounded;
+mod least_squares;
+mod objective;
+mod optimise;
+mod result;
+mod search;
+mod weighting;
+
+pub use least_squares::fit;
+pub(crate) use least_squares::{correlated, expected, fit_with_covariance, refit};
+pub(crate) use objective::Range;
+pub use optimise::Termination;
+pub use result::{Fit, FitError};
+pub use weighting::Weighting;
+
+use crate::curve::Estimator;
+use crate::model::ModelSpec;
+use crate::wavelet::Curve;
+use avlr::avlr;
+
+/// The model an estimator makes of a curve.
+///
+/// # Errors
+/// As [`fit()`]; for [`Estimator::Avlr`] when a process has no slope of its own.
+pub fn estimate(
+    estimator: Estimator,
+    curve: &Curve,
+    spec: &ModelSpec,
+    rate_hz: f64,
+    weighting: Weighting,
+) -> Result<Fit, FitError> {
+    match estimator {
+        Estimator::Avlr => avlr(curve, spec),
+        _ => fit(curve, spec, rate_hz, weighting),
+    }
+}
+
+/// The same for a curve that resembles one already fitted.
+pub(crate) fn estimate_again(
+    estimator: Estimator,
+    curve: &Curve,
+    spec: &ModelSpec,
+    rate_hz: f64,
+    weighting: Weighting,
+    like: &Fit,
+) -> Result<Fit, FitError> {
+    match estimator {
+        Estimator::Avlr => avlr(curve, spec),
+        _ => refit(curve, spec, rate_hz, weighting, like),
+    }
+}

@@ -1,0 +1,189 @@
+//! The global minimum: all combinations of a grid of shapes, each with its best amplitudes, then a descent
+//! from every local minimum of the grid.
+//!
+//! With the shapes fixed the problem is linear with non-negative amplitudes, so nothing can be missed but
+//! between grid points, and the objective is smooth there: neighbouring shapes differ by a few per cent.
+
+use super::bounded::{Bounded, MOST};
+use super::objective::{Column, NEARLY_SETTLED, Objective, Range, Shape, dot};
+use super::optimise::{End, Termination, descend};
+use rayon::prelude::*;
+
+/// Combinations of the grid at most, about.
+pub(crate) const COMBINATIONS: usize = 6000;
+/// Points of one dimension at most.
+const POINTS: usize = 160;
+/// Local minima of the grid to descend from, at most.
+const STARTS: usize = 16;
+
+/// What the search found.
+#[derive(Debug)]
+pub(crate) struct Found {
+    /// The best end.
+    pub(crate) best: End,
+    /// The ends of all starts, best first.
+    pub(crate) ends: Vec<End>,
+    /// Combinations of shapes that were tried.
+    pub(crate) combinations: usize,
+}
+
+/// Searches all coordinates, on a grid of about so many combinations at most (none for 0) and from the `known` minima of
+/// a similar curve.
+pub(crate) fn search(objective: &Objective, combinations: usize, known: &[Vec<f64>]) -> Found {
+    let dimensions: Vec<(usize, Range)> = objective.shaped().collect();
+    if dimensions.is_empty() {
+        let cost = objective.solve(&[]).cost();
+        let best = End { coordinates: Vec::new(), cost, termination: Termination::Linear };
+        return Found { ends: vec![best.clone()], best, combinations: 1 };
+    }
+    let mut starts = known.to_vec();
+    let mut tried = 0;
+    if combinations > 0 || known.is_empty() {
+        let grid = Grid::new(objective, &dimensions, combinations);
+        let choices = grid.choices();
+        tried = choices.len();
+        starts.splice(0..0, grid.starts(&choices));
+    }
+    let mut ends: Vec<End> = starts.par_iter().map(|start| descend(objective, start)).collect();
+    ends.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    Found { best: ends[0].clone(), ends, combinations: tried }
+}
+
+/// The grid: for each dimension its points and their columns; the inner products of all columns.
+struct Grid<'a> {
+    objective: &'a Objective,
+    points: Vec<Vec<f64>>,
+    /// Whether a dimension is alike the one before it, so that only ascending pairs are needed.
+    repeats: Vec<bool>,
+    /// Shapes of the components without a coordinate, then those of the points of each dimension.
+    shapes: Vec<Shape>,
+    /// Their columns.
+    columns: Vec<Column>,
+    /// Component of each column.
+    owners: Vec<usize>,
+    gram: Vec<f64>,
+    right: Vec<f64>,
+}
+
+impl<'a> Grid<'a> {
+    fn new(objective: &'a Objective, dimensions: &[(usize, Range)], combinations: usize) -> Self {
+        let count = points_per_dimension(dimensions.len(), combinations);
+        let points: Vec<Vec<f64>> = dimensions.iter().map(|(_, r)| spread(*r, count)).collect();
+        let repeats = (0..dimensions.len())
+            .map(|d| {
+                d > 0 && objective.components[dimensions[d].0] == objective.components[dimensions[d - 1].0]
+            })
+            .collect();
+        let fixed = (0..objective.components.len()).filter(|i| objective.components[*i].coordinate.is_none());
+        let mut owners: Vec<usize> = fixed.collect();
+        let mut shapes: Vec<Shape> = owners.iter().map(|i| objective.shape(*i, 0.0)).collect();
+        for ((owner, _), points) in dimensions.iter().zip(&points) {
+            shapes.extend(points.iter().map(|u| objective.shape(*owner, *u)));
+            owners.extend(points.iter().map(|_| *owner));
+        }
+        let plain = objective.plain_responses();
+        let columns: Vec<Column> = shapes.iter().map(|shape| objective.column(shape, &plain)).collect();
+        let n = columns.len();
+        let gram = (0..n * n).map(|k| dot(&columns[k / n].values, &columns[k % n].values)).collect();
+        let right = columns.iter().map(|c| dot(&c.values, &objective.target)).collect();
+        Self { objective, points, repeats, shapes, columns, owners, gram, right }
+    }
+
+    /// Least Σ residual² for a choice of points, one for each dimension.
+    fn cost(&self, choice: &[usize]) -> f64 {
+        let mut selected = [0; MOST];
+        let fixed = self.columns.len() - self.points.iter().map(Vec::len).sum::<usize>();
+        let mut n = fixed;
+        (0..fixed).for_each(|i| selected[i] = i);
+        let mut offset = fixed;
+        for (index, points) in choice.iter().zip(&self.points) {
+            selected[n] = offset + index;
+            offset += points.len();
+            n += 1;
+        }
+        if !self.objective.is_linear() {
+            let mut shapes: Vec<&Shape> = selected[..n].iter().map(|i| &self.shapes[*i]).collect();
+            shapes.sort_unstable_by_key(|shape| shape.component);
+            return self.objective.best_amplitudes(&shapes, NEARLY_SETTLED).cost();
+        }
+        let mut problem = Bounded::new(n);
+        for a in 0..n {
+            let i = selected[a];
+            for b in 0..n {
+                problem.gram[a][b] = self.gram[i * self.columns.len() + selected[b]];
+            }
+            problem.right[a] = self.right[i];
+            (problem.lower[a], problem.upper[a]) =
+                self.objective.scaled_bounds(self.owners[i], self.columns[i].length);
+        }
+        let x = problem.minimise();
+        let linear: f64 = (0..n).map(|i| problem.right[i] * x[i]).sum();
+        let quadratic: f64 =
+            (0..n).map(|i| x[i] * (0..n).map(|j| problem.gram[i][j] * x[j]).sum::<f64>()).sum();
+        1.0 - 2.0 * linear + quadratic
+    }
+
+    /// The local minima of the grid, best first.
+    fn starts(&self, choices: &[Vec<usize>]) -> Vec<Vec<f64>> {
+        let costs: Vec<f64> = choices.par_iter().with_min_len(64).map(|c| self.cost(c)).collect();
+        let table: std::collections::HashMap<&[usize], f64> =
+            choices.iter().map(Vec::as_slice).zip(costs.iter().copied()).collect();
+        let mut minima: Vec<(f64, &Vec<usize>)> = costs
+            .iter()
+            .copied()
+            .zip(choices)
+            .filter(|(cost, choice)| {
+                neighbours(choice).iter().all(|n| table.get(n.as_slice()).is_none_or(|other| cost <= other))
+            })
+            .collect();
+        minima.sort_by(|a, b| a.0.total_cmp(&b.0).then_with(|| a.1.cmp(b.1)));
+        // A flat stretch (a process without amplitude) is one minimum.
+        minima.dedup_by(|b, a| (b.0 - a.0).abs() <= 1e-9 * a.0.abs());
+        minima.truncate(STARTS);
+        let point = |choice: &Vec<usize>| choice.iter().zip(&self.points).map(|(i, p)| p[*i]).collect();
+        minima.into_iter().map(|(_, choice)| point(choice)).collect()
+    }
+
+    /// All choices of points, alike dimensions ascending.
+    fn choices(&self) -> Vec<Vec<usize>> {
+        let mut choices = vec![Vec::new()];
+        for (points, repeats) in self.points.iter().zip(&self.repeats) {
+            choices = choices
+                .into_iter()
+                .flat_map(|choice: Vec<usize>| {
+                    let first = if *repeats { choice.last().map_or(0, |i| i + 1) } else { 0 };
+                    (first..points.len()).map(move |i| [choice.as_slice(), &[i]].concat())
+                })
+                .collect();
+        }
+        choices
+    }
+}
+
+/// The choices that differ by at most one in each place.
+fn neighbours(choice: &[usize]) -> Vec<Vec<usize>> {
+    let mut all = vec![Vec::new()];
+    for &i in choice {
+        all = all
+            .into_iter()
+            .flat_map(|head: Vec<usize>| {
+                (i.saturating_sub(1)..=i + 1).map(move |k| [head.as_slice(), &[k]].concat())
+            })
+            .collect();
+    }
+    all
+}
+
+fn points_per_dimension(dimensions: usize, most: usize) -> usize {
+    // n·(n − 1)···/k! combinations of k alike dimensions.
+    let combinations = |n: usize| (0..dimensions).fold(1, |c, k| c * (n - k) / (k + 1));
+    (dimensions + 1..=POINTS).take_while(|n| combinations(*n) <= most).last().unwrap_or(dimensions + 1)
+}
+
+fn spread(range: Range, count: usize) -> Vec<f64> {
+    if range.high <= range.low {
+        return vec![range.low];
+    }
+    let step = (range.high - range.low) / (count - 1) as f64;
+    (0..count).map(|i| range.low + step * i as f64).collect()
+}

@@ -1,0 +1,450 @@
+//! What a model is made of: "2*AR1+RW+WN+QN".
+
+use super::limits::{LimitError, Limits};
+use crate::noise::{Ar1, Drift, GaussMarkov, Ma1, Quantization, RandomWalk, White};
+use crate::wavelet::Curve;
+use std::fmt;
+use std::str::FromStr;
+
+/// A kind of process, as written in specifications.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Kind {
+    /// White noise.
+    White,
+    /// Quantization noise.
+    Quantization,
+    /// First-order autoregression.
+    Ar1,
+    /// First-order Gauss-Markov process.
+    GaussMarkov,
+    /// First-order moving average.
+    Ma1,
+    /// Random walk.
+    RandomWalk,
+    /// Drift.
+    Drift,
+}
+
+impl Kind {
+    /// All kinds, in the order in which models list them.
+    pub const ALL: [Self; 7] = [
+        Self::White,
+        Self::Quantization,
+        Self::Ar1,
+        Self::GaussMarkov,
+        Self::Ma1,
+        Self::RandomWalk,
+        Self::Drift,
+    ];
+
+    /// Code in model files and specifications.
+    #[must_use]
+    pub const fn code(self) -> &'static str {
+        match self {
+            Self::White => White::CODE,
+            Self::Quantization => Quantization::CODE,
+            Self::Ar1 => Ar1::CODE,
+            Self::GaussMarkov => GaussMarkov::CODE,
+            Self::Ma1 => Ma1::CODE,
+            Self::RandomWalk => RandomWalk::CODE,
+            Self::Drift => Drift::CODE,
+        }
+    }
+
+    /// Whether its wavelet variance depends on more than an amplitude.
+    #[must_use]
+    pub const fn has_shape(self) -> bool {
+        matches!(self, Self::Ar1 | Self::GaussMarkov | Self::Ma1)
+    }
+
+    /// How many parameters it has.
+    #[must_use]
+    pub const fn parameters(self) -> usize {
+        1 + self.has_shape() as usize
+    }
+
+    /// Name of the parameter its wavelet variance grows with.
+    #[must_use]
+    pub const fn amplitude_name(self) -> &'static str {
+        match self {
+            Self::White | Self::Ar1 | Self::Ma1 => "sigma2",
+            Self::Quantization => "q2",
+            Self::GaussMarkov => "s2",
+            Self::RandomWalk => "gamma2",
+            Self::Drift => "slope",
+        }
+    }
+
+    /// Name of the parameter that gives its shape, and where that can be.
+    #[must_use]
+    pub const fn shape_name(self) -> Option<&'static str> {
+        match self {
+            Self::Ar1 => Some("phi"),
+            Self::GaussMarkov => Some("beta"),
+            Self::Ma1 => Some("theta"),
+            _ => None,
+        }
+    }
+
+    /// Whether a shape can be there, and where it can be in words.
+    fn shape_domain(self, value: f64) -> (bool, &'static str) {
+        match self {
+            // The search is over positive correlations.
+            Self::Ar1 => (value > 0.0 && value < 1.0, "between 0 and 1"),
+            Self::GaussMarkov => ((1e-100..=1e100).contains(&value), "a number from 1e-100 to 1e100 (1/s)"),
+            _ => ((-1.0..=1.0).contains(&value), "between -1 and 1"),
+        }
+    }
+
+    /// How many of it a model may have.
+    const fn most(self) -> usize {
+        match self {
+            Self::Ar1 | Self::GaussMarkov => MOST_SHAPES,
+            _ => 1,
+        }
+    }
+}
+
+/// Processes with a shape parameter that one model may have: the search is over all their combinations.
+const MOST_SHAPES: usize = 5;
+
+/// The kinds of process of a model, in the order of [`Kind::ALL`], and where their parameters may be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ModelSpec {
+    kinds: Vec<Kind>,
+    limits: Vec<Limits>,
+}
+
+/// Why a specification means no model.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum SpecError {
+    /// A term that is neither a process nor a named model.
+    #[error("model \"{spec}\": \"{term}\" is no process")]
+    Unknown {
+        /// The specification.
+        spec: String,
+        /// The term.
+        term: String,
+    },
+    /// Nothing between two plus signs, or nothing at all.
+    #[error("model \"{0}\": a process is missing")]
+    Empty(String),
+    /// "0*AR1", "x*AR1".
+    #[error("model \"{spec}\": \"{count}\" is not a number of processes")]
+    Count {
+        /// The specification.
+        spec: String,
+        /// What stands before the asterisk.
+        count: String,
+    },
+    /// Several of a kind that adds up to one of itself.
+    #[error("model \"{spec}\": {count} {code} are one {code}: their wavelet variances are proportional")]
+    Repeated {
+        /// The specification.
+        spec: String,
+        /// Code of the kind.
+        code: &'static str,
+        /// How many.
+        count: usize,
+    },
+    /// More AR1, GM and MA1 than can be searched.
+    #[error("model \"{spec}\": {count} AR1, GM and MA1 processes; at most {MOST_SHAPES} can be told apart")]
+    TooMany {
+        /// The specification.
+        spec: String,
+        /// How many.
+        count: usize,
+    },
+}
+
+impl ModelSpec {
+    /// N1 = WN + AR1 + RW of the paper.
+    #[must_use]
+    pub fn n1() -> Self {
+        Self::of([Kind::White, Kind::Ar1, Kind::RandomWalk])
+    }
+
+    /// N2 = WN + QN + 2 AR1 + RW of the paper: the usual model.
+    #[must_use]
+    pub fn n2() -> Self {
+        Self::of([Kind::White, Kind::Quantization, Kind::Ar1, Kind::Ar1, Kind::RandomWalk])
+    }
+
+    /// A sum of processes that can be told apart.
+    pub(crate) fn of(kinds: impl IntoIterator<Item = Kind>) -> Self {
+        let mut kinds: Vec<Kind> = kinds.into_iter().collect();
+        kinds.sort_unstable();
+        let limits = vec![Limits::NONE; kinds.len()];
+        Self { kinds, limits }
+    }
+
+    /// Labels of the processes, as those of a fitted model: `WN`, `AR1_1`, `AR1_2`, …
+    #[must_use]
+    pub fn labels(&self) -> Vec<String> {
+        let count = |kinds: &[Kind], kind: Kind| kinds.iter().filter(|k| **k == kind).count();
+        let label = |(i, kind): (usize, &Kind)| match count(&self.kinds, *kind) {
+            1 => kind.code().to_owned(),
+            _ => format!("{}_{}", kind.code(), count(&self.kinds[..=i], *kind)),
+        };
+        self.kinds.iter().enumerate().map(label).collect()
+    }
+
+    /// Names of the parameters of the process of that label; none of one that is not there.
+    #[must_use]
+    pub fn parameter_names(&self, label: &str) -> Vec<&'static str> {
+        let kind = self.labels().iter().position(|l| l == label).map(|i| self.kinds[i]);
+        kind.map_or(Vec::new(), |k| k.shape_name().into_iter().chain([k.amplitude_name()]).collect())
+    }
+
+    /// Restricts a parameter of the process of that label (`WN`, `AR1`, or `AR1_2` of several) to `low` … `high`;
+    /// without one of them it is not restricted on that side.
+    ///
+    /// Processes of a kind of which one has limits keep the order of their labels; others are
+    /// ordered by correlation time.
+    ///
+    /// # Errors
+    /// When there is no such process or parameter, or no value is allowed.
+    pub fn limit(
+        &mut self,
+        process: &str,
+        parameter: &str,
+        low: Option<f64>,
+        high: Option<f64>,
+    ) -> Result<(), LimitError> {
+        let labels = self.labels();
+        let Some(index) = labels.iter().position(|l| l == process) else {
+            let (spec, process) = (self.to_string(), process.to_owned());
+            return Err(LimitError::Process { spec, process, legal: labels });
+        };
+        let kind = self.kinds()[index];
+        let is_amplitude = parameter == kind.amplitude_name();
+        if !is_amplitude && kind.shape_name() != Some(parameter) {
+            let (process, parameter) = (process.to_owned(), parameter.to_owned());
+            let legal = kind.shape_name().into_iter().chain([kind.amplitude_name()]).collect();
+            return Err(LimitError::Parameter { process, parameter, legal });
+        }
+        for value in [low, high].into_iter().flatten() {
+            let amplitude = ((0.0..=Curve::WV_RANGE.1).contains(&value), "a number from 0 to 1e100");
+            let (inside, domain) = if is_amplitude { amplitude } else { kind.shape_domain(value) };
+            if !inside {
+                let (process, parameter) = (process.to_owned(), parameter.to_owned());
+                return Err(LimitError::Domain { process, parameter, value, domain });
+            }
+        }
+        let (from, to) = (low.unwrap_or(f64::NEG_INFINITY), high.unwrap_or(f64::INFINITY));
+        if from > to {
+            let (process, parameter) = (process.to_owned(), parameter.to_owned());
+            return Err(LimitError::Empty { process, parameter, low: from, high: to });
+        }
+        let limits = &mut self.limits[index];
+        if is_amplitude {
+            limits.amplitude = (from.max(0.0), to);
+        } else {
+            limits.shape = Some((from, to));
+        }
+        Ok(())
+    }
+
+    /// Where a parameter of the process at an index may be, by what was given.
+    pub(crate) fn range(&self, index: usize, parameter: &str) -> (f64, f64) {
+        let (kind, limits) = (self.kinds[index], self.limits[index]);
+        if parameter == kind.amplitude_name() {
+            limits.amplitude
+        } else {
+            limits.shape.unwrap_or((f64::NEG_INFINITY, f64::INFINITY))
+        }
+    }
+
+    /// Whether a parameter of the process at an index has one value only.
+    pub(crate) fn is_fixed(&self, index: usize, parameter: &str) -> bool {
+        let (low, high) = self.range(index, parameter);
+        low >= high
+    }
+
+    pub(crate) fn limits(&self) -> &[Limits] {
+        &self.limits
+    }
+
+    /// Whether another model, with some amplitudes zero and some AR1 at the ends of their range, is this one: an AR1
+    /// is white noise at phi = 0 and a random walk at phi = 1.
+    pub(crate) fn is_special_case_of(&self, other: &Self) -> bool {
+        let count = |spec: &Self, kind: Kind| spec.kinds.iter().filter(|k| **k == kind).count();
+        let more = |kind: Kind| count(self, kind).saturating_sub(count(other, kind));
+        let (white, walk) = (more(Kind::White), more(Kind::RandomWalk));
+        let others: usize = Kind::ALL.into_iter().map(more).sum::<usize>() - white - walk;
+        others == 0 && count(self, Kind::Ar1) + white + walk <= count(other, Kind::Ar1)
+    }
+
+    /// The model without the process at an index.
+    pub(crate) fn without(&self, index: usize) -> Self {
+        let mut less = self.clone();
+        less.kinds.remove(index);
+        less.limits.remove(index);
+        less
+    }
+
+    /// The kinds of process.
+    #[must_use]
+    pub fn kinds(&self) -> &[Kind] {
+        &self.kinds
+    }
+
+    /// Number of parameters that are not fixed.
+    #[must_use]
+    pub fn parameters(&self) -> usize {
+        let fixed = |(low, high): (f64, f64)| usize::from(low >= high);
+        let free = |(kind, limits): (&Kind, &Limits)| {
+            kind.parameters() - fixed(limits.amplitude) - limits.shape.map_or(0, fixed)
+        };
+        self.kinds.iter().zip(&self.limits).map(free).sum()
+    }
+
+    /// What may stand between plus signs.
+    pub fn legal() -> impl Iterator<Item = &'static str> {
+        Kind::ALL.iter().map(|k| k.code()).chain(["N1", "N2"])
+    }
+}
+
+impl FromStr for ModelSpec {
+    type Err = SpecError;
+
+    fn from_str(spec: &str) -> Result<Self, SpecError> {
+        let mut kinds = Vec::new();
+        for term in spec.split('+').map(str::trim) {
+            let (count, name) = match term.split_once('*') {
+                None => (1, term),
+                Some((count, name)) => (parse_count(spec, count.trim())?, name.trim()),
+            };
+            for _ in 0..count {
+                kinds.extend(named(spec, name)?);
+            }
+        }
+        kinds.sort_unstable();
+        check(spec, &kinds)?;
+        Ok(Self::of(kinds))
+    }
+}
+
+fn parse_count(spec: &str, count: &str) -> Result<usize, SpecError> {
+    match count.parse() {
+        Ok(n) if (1..=99).contains(&n) => Ok(n),
+        _ => Err(SpecError::Count { spec: spec.into(), count: count.into() }),
+    }
+}
+
+fn named(spec: &str, name: &str) -> Result<Vec<Kind>, SpecError> {
+    let upper = name.to_ascii_uppercase();
+    match upper.as_str() {
+        "" => Err(SpecError::Empty(spec.into())),
+        "N1" => Ok(ModelSpec::n1().kinds),
+        "N2" => Ok(ModelSpec::n2().kinds),
+        code => match Kind::ALL.iter().find(|k| k.code() == code) {
+            Some(kind) => Ok(vec![*kind]),
+            None => Err(SpecError::Unknown { spec: spec.into(), term: name.into() }),
+        },
+    }
+}
+
+fn check(spec: &str, kinds: &[Kind]) -> Result<(), SpecError> {
+    for kind in Kind::ALL {
+        let count = kinds.iter().filter(|k| **k == kind).count();
+        if count > 1 && kind.most() == 1 {
+            return Err(SpecError::Repeated { spec: spec.into(), code: kind.code(), count });
+        }
+    }
+    let count = kinds.iter().filter(|k| k.has_shape()).count();
+    if count > MOST_SHAPES {
+        return Err(SpecError::TooMany { spec: spec.into(), count });
+    }
+    Ok(())
+}
+
+impl fmt::Display for ModelSpec {
+    /// "WN+QN+2*AR1+RW"
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut separator = "";
+        for kind in Kind::ALL {
+            let count = self.kinds.iter().filter(|k| **k == kind).count();
+            match count {
+                0 => continue,
+                1 => write!(f, "{separator}{}", kind.code())?,
+                n => write!(f, "{separator}{n}*{}", kind.code())?,
+            }
+            separator = "+";
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_are_read_in_any_order() {
+        for text in ["2*AR1+RW+WN+QN", " qn + AR1+ rw+wn +ar1", "N2", "n2"] {
+            assert_eq!(text.parse::<ModelSpec>().unwrap(), ModelSpec::n2(), "{text}");
+        }
+        assert_eq!("AR1+RW+WN".parse::<ModelSpec>().unwrap(), ModelSpec::n1());
+        let spec: ModelSpec = "MA1+N1+DR+3*GM".parse().unwrap();
+        assert_eq!(spec.to_string(), "WN+AR1+3*GM+MA1+RW+DR");
+        assert_eq!(spec.to_string().parse::<ModelSpec>().unwrap(), spec);
+        assert_eq!((spec.parameters(), ModelSpec::n2().parameters()), (13, 7));
+    }
+
+    #[test]
+    fn special_cases() {
+        let special = |a: &str, b: &str| {
+            a.parse::<ModelSpec>().unwrap().is_special_case_of(&b.parse::<ModelSpec>().unwrap())
+        };
+        for (a, b) in [
+            ("WN", "N1"),
+            ("N1", "N1"),
+            ("WN", "AR1"),
+            ("RW", "AR1"),
+            ("WN+RW", "2*AR1"),
+            ("WN+AR1", "2*AR1"),
+        ] {
+            assert!(special(a, b), "{a} of {b}");
+        }
+        for (a, b) in [("WN+RW", "AR1"), ("N1", "2*AR1"), ("QN", "AR1"), ("AR1", "WN+RW"), ("DR", "N2")] {
+            assert!(!special(a, b), "{a} of {b}");
+        }
+    }
+
+    #[test]
+    fn what_means_no_model_is_refused() {
+        let message = |text: &str| text.parse::<ModelSpec>().unwrap_err().to_string();
+        assert_eq!(message("AR1+WM"), "model \"AR1+WM\": \"WM\" is no process");
+        assert_eq!(message(""), "model \"\": a process is missing");
+        assert_eq!(message("WN++RW"), "model \"WN++RW\": a process is missing");
+        assert_eq!(message("0*AR1"), "model \"0*AR1\": \"0\" is not a number of processes");
+        assert_eq!(message("-1*AR1"), "model \"-1*AR1\": \"-1\" is not a number of processes");
+        assert!(message("2*WN").ends_with("2 WN are one WN: their wavelet variances are proportional"));
+        assert!(message("4*AR1+2*GM").contains("6 AR1, GM and MA1 processes; at most 5"));
+        assert!(message("99*N2").contains("99 WN"));
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused() {
+        let mut spec = ModelSpec::n2();
+        let mut message = |p: &str, q: &str, l, h| spec.limit(p, q, l, h).unwrap_err().to_string();
+        assert_eq!(message("AR1", "phi", None, Some(0.9)), "WN+QN+2*AR1+RW has no process AR1");
+        assert_eq!(message("WN", "phi", None, None), "WN has no parameter phi");
+        assert_eq!(
+            message("AR1_1", "phi", Some(0.9), Some(0.8)),
+            "AR1_1 phi: nothing lies between 0.9 and 0.8"
+        );
+        assert_eq!(message("AR1_2", "phi", None, Some(1.0)), "AR1_2 phi: 1 is not between 0 and 1");
+        assert_eq!(
+            message("RW", "gamma2", Some(-1.0), None),
+            "RW gamma2: -1 is not a number from 0 to 1e100"
+        );
+        assert!(
+            message("WN", "sigma2", Some(1e308), Some(1e308)).ends_with("is not a number from 0 to 1e100")
+        );
+        assert_eq!(spec.parameters(), 7);
+        spec.limit("AR1_2", "phi", Some(0.99), Some(0.99)).unwrap();
+        assert_eq!(spec.parameters(), 6, "a fixed parameter is not free");
+    }
+}

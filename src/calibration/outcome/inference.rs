@@ -1,0 +1,122 @@
+//! How sure a fit is: the results.
+
+use crate::model::ModelSpec;
+use crate::noise::Composite;
+
+/// How to draw.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Bootstrap {
+    /// Number of draws.
+    pub draws: usize,
+    /// Seed of all of them.
+    pub seed: u64,
+}
+
+/// What the bootstrap says about a fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Inference {
+    /// Draws made.
+    pub draws: usize,
+    /// Draws that had a fit.
+    pub fitted: usize,
+    /// One interval a parameter that is not fixed, in the order of the model.
+    pub intervals: Vec<ParameterInterval>,
+    /// Whether the model describes the curve; of slopes (AVLR), which are not fitted to it, nothing is known.
+    pub goodness: Option<Goodness>,
+    /// How replicates differ at each level of the curve. Empty for a curve from elsewhere.
+    pub spread: Vec<LevelSpread>,
+    /// Probability that replicates of one noise differ as much at some scale (see [`ALIKE_LEVEL`](crate::ALIKE_LEVEL)); none of a
+    /// single signal.
+    pub alike: Option<f64>,
+    /// Alike processes that cannot be told apart, and the simpler model.
+    pub indistinct: Option<Indistinct>,
+}
+
+/// How replicates differ at one level: standard deviations of ln nu of a replicate.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LevelSpread {
+    /// Level.
+    pub level: u32,
+    /// By the law of the noise alone.
+    pub within: f64,
+    /// Beyond that.
+    pub between: f64,
+}
+
+/// The 95 % interval of one parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParameterInterval {
+    /// Label of the process.
+    pub process: String,
+    /// Name of the parameter.
+    pub parameter: &'static str,
+    /// Lower end (units of the parameter); NaN where the draws do not determine it.
+    pub low: f64,
+    /// Upper end (units of the parameter); NaN where the draws do not determine it.
+    pub high: f64,
+    /// Share of the draws in which its process has vanished: is zero, or has its correlation time at the end of what can be
+    /// searched, where it is another process by name only.
+    pub lost: f64,
+    /// Why there is no interval, if there is none.
+    pub absent: Option<Undetermined>,
+    /// Standard error by the sandwich (units of the parameter); NaN where it stands at a bound.
+    pub standard_error: f64,
+}
+
+/// Why a parameter has no interval.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Undetermined {
+    /// Its process is zero at the optimum.
+    Zero,
+    /// Its process vanishes in more of the draws than the quantile leaves out.
+    Vanishes,
+    /// The draws lie to one side of the estimate.
+    OneSided,
+    /// The interval of the correlation time ends beyond what can be searched.
+    BeyondSearch,
+    /// The draws leave the amplitude of its process open by more than a factor of 100: in some of them it all but vanishes.
+    Open,
+    /// Alike processes of these labels cannot be told apart.
+    Indistinct(Vec<String>),
+}
+
+/// The test of over-identifying restrictions. Its statistic is the least Σ Omega_j (nu_j − nu_j(theta))²; what it
+/// is when the model holds is known from the bootstrap, which repeats the whole estimation, so no weighting and
+/// no trim makes the probability wrong, and the replicates' differences are allowed for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Goodness {
+    /// J, the objective.
+    pub statistic: f64,
+    /// Scales less free parameters of processes that are there.
+    pub dof: usize,
+    /// Median of J when the model holds.
+    pub expected: f64,
+    /// Probability of a J at least this large when the model holds: (1 + draws that have one) / (1 + draws).
+    pub p_value: f64,
+}
+
+/// Probability below which the model is said not to describe the curve.
+const LEVEL: f64 = 0.05;
+
+impl Goodness {
+    /// Whether so large a J has a probability below 5 % when the model holds.
+    #[must_use]
+    pub fn is_rejected(&self) -> bool {
+        self.p_value < LEVEL
+    }
+}
+
+/// Processes of one kind that cannot be told apart.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Indistinct {
+    /// Their labels.
+    pub labels: Vec<String>,
+    /// The model with one of them less, which describes the curve as well.
+    pub spec: ModelSpec,
+    /// Its parameters.
+    pub composite: Composite,
+    /// Probability of so large a gain by the further process if the simpler model is true.
+    pub p_value: f64,
+    /// Intervals of the simpler model's parameters.
+    pub intervals: Vec<ParameterInterval>,
+}

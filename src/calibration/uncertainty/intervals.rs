@@ -1,0 +1,276 @@
+//! Intervals of parameters from draws around their estimates.
+
+use crate::fit::{Fit, Range, correlated};
+use crate::model::{Limits, ModelSpec};
+use crate::noise::Process;
+use crate::outcome::{Outcome, ParameterInterval, Undetermined};
+
+impl ParameterInterval {
+    /// Takes the interval away.
+    pub(crate) fn refuse(&mut self, why: Undetermined) {
+        (self.low, self.high) = (f64::NAN, f64::NAN);
+        self.absent = Some(why);
+    }
+
+    /// Puts the interval of another fit, of the same parameter, in place of this one, if it holds the estimate.
+    pub(crate) fn replace(&mut self, other: &Self, value: f64) {
+        [self.low, self.high] = holding(value, [other.low, other.high]);
+        (self.lost, self.standard_error) = (other.lost, other.standard_error);
+        let one_sided = self.low.is_nan().then_some(Undetermined::OneSided);
+        self.absent = other.absent.clone().or(one_sided);
+    }
+}
+
+/// The intervals of all parameters that are not fixed, in the order of the model. `stretch`: Student's quantile over
+/// the normal one, where the draws' own spread is known from few replicates. `standard_errors`: of the same parameters.
+pub(crate) fn intervals(
+    outcome: &Outcome,
+    fits: &[Fit],
+    stretch: f64,
+    standard_errors: &[f64],
+) -> Vec<ParameterInterval> {
+    let (model, spec) = (&outcome.fit.composite, &outcome.spec);
+    let zero = &outcome.fit.zero;
+    let searched = correlated(&outcome.curve);
+    let matched: Vec<Vec<Option<&Process>>> =
+        fits.iter().map(|fit| matched(&outcome.fit, spec, fit)).collect();
+    let mut intervals = Vec::new();
+    for (i, (process, label)) in model.processes.iter().zip(model.labels()).enumerate() {
+        let there: Vec<&Process> = matched.iter().filter_map(|m| m[i]).collect();
+        let lost = if zero.contains(&label) { 1.0 } else { 1.0 - there.len() as f64 / fits.len() as f64 };
+        let first = intervals.len();
+        for (p, (parameter, value)) in process.parameters().into_iter().enumerate() {
+            if spec.is_fixed(i, parameter) {
+                continue;
+            }
+            let drawn = there.iter().map(|process| process.parameters()[p].1).collect();
+            let [low, high] = match lost {
+                // The quantile is that of what has vanished.
+                lost if lost > TAIL => [f64::NAN; 2],
+                _ => holding(value, interval(parameter, value, drawn, stretch)),
+            };
+            // The intervals of a parameter that is bounded end there.
+            let (from, to) = spec.range(i, parameter);
+            let [low, high] = [low, high].map(|end: f64| end.clamp(from, to));
+            let absent = match lost {
+                1.0.. => Some(Undetermined::Zero),
+                lost if lost > TAIL => Some(Undetermined::Vanishes),
+                _ => low.is_nan().then_some(Undetermined::OneSided),
+            };
+            let standard_error = standard_errors[intervals.len()];
+            let process = label.clone();
+            intervals.push(ParameterInterval { process, parameter, low, high, lost, absent, standard_error });
+        }
+        let own = &mut intervals[first..];
+        if spec.limits()[i].shape.is_none() && own.iter().any(|i| leaves_search(searched, process, i)) {
+            own.iter_mut().for_each(|i| i.refuse(Undetermined::BeyondSearch));
+        }
+        // With its amplitude the shape is lost too.
+        let open = |i: &ParameterInterval| {
+            let amplitude = !matches!(i.parameter, "phi" | "beta" | "theta");
+            amplitude && i.absent.is_none() && i.high > i.low * WIDEST.powf(stretch.min(2.0))
+        };
+        if own.iter().any(open) {
+            own.iter_mut().for_each(|i| i.refuse(Undetermined::Open));
+        }
+    }
+    intervals
+}
+
+/// Upper over lower quantile of the draws of an amplitude that say nothing any more; of its interval, which Student's quantile
+/// makes wider where there are few replicates, the square.
+pub(crate) const WIDEST: f64 = 100.0;
+
+/// Whether an interval of a correlation time ends where nothing was sought: by the draws it may be any.
+fn leaves_search(searched: Range, process: &Process, interval: &ParameterInterval) -> bool {
+    let kappa = |end: f64| match (process, interval.parameter) {
+        (Process::Ar1(_), "phi") => Some(-end.ln()),
+        (Process::GaussMarkov(p), "beta") => Some(end / p.rate_hz()),
+        _ => None,
+    };
+    // Ends beyond by rounding are not beyond.
+    let beyond = |u: f64| u < searched.low - 1e-6 || u > searched.high + 1e-6;
+    [interval.low, interval.high].into_iter().filter_map(kappa).any(|kappa| beyond(kappa.ln()))
+}
+
+/// An interval that holds its estimate; none where the estimator misses its own estimate 39 times in 40.
+fn holding(value: f64, [low, high]: [f64; 2]) -> [f64; 2] {
+    let rounding = 1e-9 * value.abs();
+    if low <= value + rounding && value - rounding <= high { [low, high] } else { [f64::NAN; 2] }
+}
+
+/// The processes of a draw in the order of the model; none where one has vanished. Alike ones are told apart by
+/// their correlation times: those that are there, in the draw and in the model, keep their order, and so many of
+/// them are paired as can be, the nearest.
+fn matched<'a>(estimate: &Fit, spec: &ModelSpec, fit: &'a Fit) -> Vec<Option<&'a Process>> {
+    let labels = fit.composite.labels();
+    let (drawn, model) = (&fit.composite.processes, &estimate.composite.processes);
+    let there = |fit: &Fit, i: usize| !fit.zero.contains(&labels[i]) && !fit.at_end.contains(&labels[i]);
+    let kinds = spec.kinds();
+    let cost = |i: usize, d: usize| (log_time(&model[i]) - log_time(&drawn[d])).powi(2);
+    let mut matched = vec![None; drawn.len()];
+    for (first, kind) in kinds.iter().enumerate().filter(|(i, kind)| !kinds[..*i].contains(kind)) {
+        let own: Vec<usize> = (first..kinds.len()).filter(|i| kinds[*i] == *kind).collect();
+        let items: Vec<usize> = own.iter().copied().filter(|i| there(fit, *i)).collect();
+        let places: Vec<usize> = own.iter().copied().filter(|i| there(estimate, *i)).collect();
+        let pairs: Vec<(usize, usize)> = if own.iter().any(|i| spec.limits()[*i] != Limits::NONE) {
+            items.iter().map(|i| (*i, *i)).collect()
+        } else if items.len() <= places.len() {
+            nearest(&places, &items, cost).into_iter().zip(items).collect()
+        } else {
+            places.iter().copied().zip(nearest(&items, &places, |d, i| cost(i, d))).collect()
+        };
+        for (place, d) in pairs {
+            matched[place] = Some(&drawn[d]);
+        }
+    }
+    matched
+}
+
+/// The choice, in their order, of as many places as there are items with the least sum of costs.
+fn nearest(places: &[usize], items: &[usize], cost: impl Fn(usize, usize) -> f64 + Copy) -> Vec<usize> {
+    fn best(places: &[usize], items: &[usize], cost: &dyn Fn(usize, usize) -> f64) -> (f64, Vec<usize>) {
+        let Some((item, others)) = items.split_first() else { return (0.0, Vec::new()) };
+        let choose = |at: usize| {
+            let (rest, mut chosen) = best(&places[at + 1..], others, cost);
+            chosen.insert(0, places[at]);
+            (rest + cost(places[at], *item), chosen)
+        };
+        let candidates = (0..(places.len() + 1).saturating_sub(items.len())).map(choose);
+        candidates.min_by(|a, b| a.0.total_cmp(&b.0)).unwrap_or((f64::INFINITY, Vec::new()))
+    }
+    best(places, items, &cost).1
+}
+
+/// ln of the correlation time, of those that have one.
+fn log_time(process: &Process) -> f64 {
+    match process {
+        Process::Ar1(p) => -(-p.phi().max(f64::MIN_POSITIVE).ln()).ln(),
+        Process::GaussMarkov(p) => -p.beta().ln(),
+        _ => 0.0,
+    }
+}
+
+/// The 95 % interval of a parameter from draws around its estimate.
+///
+/// Amplitudes and correlation times are scale parameters: estimate over truth is distributed as draw over estimate, whatever
+/// the truth. So the ends are estimate²/draw at the quantiles of the draws (exact for a variance whose estimate
+/// is a chi-square; the same as the quantiles themselves where the draws are symmetric in the logarithm); theta
+/// of MA1 likewise with differences. The distances of the quantiles from the median are multiplied by `stretch`. Where
+/// the estimate or a quantile is at the bound, 0, the ends are the quantiles themselves.
+fn interval(parameter: &str, estimate: f64, drawn: Vec<f64>, stretch: f64) -> [f64; 2] {
+    let scale = |value: f64| match parameter {
+        "phi" => (-value.ln()).ln(),
+        "theta" => value,
+        _ => value.ln(),
+    };
+    let back = |scaled: f64| match parameter {
+        "phi" => (-scaled.exp()).exp(),
+        "theta" => scaled.clamp(-1.0, 1.0),
+        _ => scaled.exp(),
+    };
+    let mut sorted = drawn;
+    sorted.sort_by(f64::total_cmp);
+    let quantiles = [TAIL, 1.0 - TAIL].map(|p| quantile(&sorted, p));
+    let middle = scale(quantile(&sorted, 0.5));
+    let mut ends = quantiles.map(|q| back(2.0 * scale(estimate) - middle - stretch * (scale(q) - middle)));
+    ends.sort_by(f64::total_cmp);
+    if ends.iter().all(|e| e.is_finite()) && scale(estimate).is_finite() { ends } else { quantiles }
+}
+
+/// Probability beyond either end of a 95 % interval.
+const TAIL: f64 = 0.025;
+
+/// Quantile of sorted draws, interpolated; NaN of none. The k-th of n is at k/(n + 1), so that one draw more is
+/// beyond it with that probability exactly ([Davison and Hinkley](crate::bibliography::DavisonHinkley97), Section 5.2).
+fn quantile(sorted: &[f64], p: f64) -> f64 {
+    let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
+    let at = (p * (sorted.len() + 1) as f64 - 1.0).clamp(0.0, last as f64);
+    let below = at.floor() as usize;
+    let above = (below + 1).min(last);
+    sorted[below] + (at - below as f64) * (sorted[above] - sorted[below])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::imu::Sensor;
+    use crate::noise::{Ar1, Composite};
+    use crate::rng::StreamKey;
+    use crate::wavelet::Curve;
+    use crate::{Estimator, Scope, Weighting, fit, undetermined};
+    use rand::RngExt;
+    use rand_distr::ChiSquared;
+
+    /// Of two AR1 with correlation times of 10 and 1000 samples a draw keeps one of 700, its other (by label the
+    /// first, its time anything) having no amplitude: the one that is there is the second. Vanished in more draws than the
+    /// quantile leaves out, the first has no interval.
+    #[test]
+    fn a_component_that_vanishes_in_draws_takes_nothing_of_the_other() {
+        let ar1 = |time: f64, sigma2: f64| Process::Ar1(Ar1::new((-1.0 / time).exp(), sigma2).unwrap());
+        let of = |processes: Vec<Process>| {
+            let composite = Composite::new(processes);
+            let levels: Vec<u32> = (1..=12).collect();
+            let wv = levels.iter().map(|l| composite.haar_wv(*l) + 1e-12).collect();
+            let curve = Curve { edof: vec![100.0; 12], levels, wv, ..Curve::default() };
+            let spec = "2*AR1".parse().unwrap();
+            let mut fit = fit(&curve, &spec, 1.0, Weighting::Edof).unwrap();
+            (fit.composite, fit.zero) = (composite, Vec::new());
+            Outcome {
+                scope: Scope { sensor: Sensor::Accel, axis: None },
+                replicates: 0,
+                estimator: Estimator::Awv,
+                spec,
+                ranking: None,
+                curve,
+                fit,
+                notes: Vec::new(),
+                inference: None,
+            }
+        };
+        let outcome = of(vec![ar1(10.0, 1.0), ar1(1000.0, 1.0)]);
+        let whole = |factor: f64| of(vec![ar1(10.0, factor), ar1(1000.0, factor)]).fit;
+        // The one that is not there has a time beyond the other's: by order it is the second.
+        let mut lost = of(vec![ar1(700.0, 1.1), ar1(5000.0, 0.0)]).fit;
+        lost.zero = vec!["AR1_2".to_owned()];
+        let matched = matched(&outcome.fit, &outcome.spec, &lost);
+        assert!(matched[0].is_none() && matched[1].unwrap() == &lost.composite.processes[0]);
+        let draws = |lost_ones: usize| -> Vec<Fit> {
+            let whole = (0..100 - lost_ones).map(|i| whole(0.8 + 0.4 * i as f64 / 99.0));
+            whole.chain((0..lost_ones).map(|_| lost.clone())).collect()
+        };
+        let all = intervals(&outcome, &draws(2), 1.0, &[f64::NAN; 4]);
+        assert!(all.iter().all(|i| i.absent.is_none()), "{all:?}");
+        let all = intervals(&outcome, &draws(10), 1.0, &[f64::NAN; 4]);
+        let text = undetermined(&all[0]).unwrap();
+        assert_eq!(text, "AR1_1 phi: no interval, not determined: AR1_1 vanishes in 10 % of the draws");
+        assert!(
+            all[0].low.is_nan() && all[2].lost == 0.0 && all[3].low < 1.0 && all[3].high > 1.0,
+            "{all:?}"
+        );
+    }
+
+    #[test]
+    fn an_interval_holds_its_estimate_or_is_none() {
+        assert_eq!(holding(1.0, [0.5, 2.0]), [0.5, 2.0]);
+        assert!(holding(3.0, [0.5, 2.0]).iter().all(|end| end.is_nan()));
+    }
+
+    /// A variance known to be a chi-square of ν = 8 degrees of freedom over ν: 4000 draws around an estimate of 3 give the
+    /// textbook's 3ν/17.53 … 3ν/2.18 (quantiles 0.975 and 0.025), to four standard errors of the draws' quantiles q,
+    /// relative: 4·√(0.025·0.975/4000)/(q f(q)) with the densities 0.00876 and 0.0363, 6.4 and 12.5 %.
+    #[test]
+    fn the_interval_of_a_variance_is_the_textbooks() {
+        let mut generator = StreamKey { seed: 1, scenario: "", run: 0, source: "", process: "" }.generator();
+        let law = ChiSquared::new(8.0).unwrap();
+        let drawn = (0..4000).map(|_| 3.0 * generator.sample(law) / 8.0).collect();
+        let [low, high] = interval("sigma2", 3.0, drawn, 1.0);
+        assert!(
+            (low / (24.0 / 17.53) - 1.0).abs() < 0.064 && (high / (24.0 / 2.18) - 1.0).abs() < 0.125,
+            "{low} {high}"
+        );
+        assert_eq!(interval("sigma2", 0.0, vec![0.0, 0.0, 1.0], 1.0), [0.0, 1.0]);
+        let [low, high] = interval("phi", 0.9, vec![0.85, 0.9, 0.93], 1.0);
+        assert!(0.0 < low && low < 0.9 && 0.9 < high && high < 1.0, "{low} {high}");
+    }
+}

@@ -1,0 +1,13 @@
+//! How sure a fit is: curves drawn anew, intervals, tests.
+
+pub(crate) mod alike;
+pub(crate) mod bootstrap;
+mod goodness;
+mod indistinct;
+pub(crate) mod inference;
+mod intervals;
+mod sandwich;
+pub(crate) mod spread;
+
+pub use alike::LEVEL as ALIKE_LEVEL;
+pub(crate) use intervals::WIDEST;

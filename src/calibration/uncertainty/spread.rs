@@ -1,0 +1,308 @@
+//! How replicates of one noise differ: between them, beyond what each of them scatters.
+//!
+//! Their ln nu scatter as their variance from replicate to replicate shows. Of that the part `within` follows from the
+//! model and the length ([`SamplingLaw`]); `between` is what is there in excess, if anything (moments of a
+//! random-effects model, level by level: ln nu_ij = centre_j + between_ij + within_ij).
+
+use crate::curve::robust_scale::{MAD_TO_DEVIATION, median};
+use crate::curve::sampling::{SamplingLaw, chi_square_ratio};
+use crate::curve::{Estimator, Replicate};
+use crate::rng::Generator;
+use crate::wavelet::Tuning;
+use rand::RngExt;
+use rand_distr::StandardNormal;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+/// Quantile 0.975 of the normal law.
+const NORMAL_975: f64 = 1.959_963_984_540_054;
+/// Residuals further than this many deviations count as this many in DR-AWV.
+const CLIP: f64 = 3.0;
+
+/// The spread of replicates around an estimator's curve.
+#[derive(Debug, Clone)]
+pub(crate) struct Spread {
+    /// Standard deviation of ln nu of a replicate of the same noise, of each level.
+    pub(crate) within: Vec<f64>,
+    /// Standard deviation of what replicates differ by beyond that.
+    pub(crate) between: Vec<f64>,
+    /// Degrees of freedom of each replicate at each level.
+    pub(crate) edof: Vec<Vec<f64>>,
+    /// Standard deviation of ln nu of each replicate at each level, as the replicates show it: that of the replicates,
+    /// more for the shorter and less for the longer of them.
+    total: Vec<Vec<f64>>,
+    /// Residuals of each replicate over their standard deviation, so that Σ over replicates of their squares
+    /// is K − 1: their combinations with normal weights over √(K − 1) have unit variance and the replicates'
+    /// correlations between levels.
+    units: Vec<Vec<f64>>,
+    /// Degrees of freedom with which the variances are known.
+    freedom: f64,
+}
+
+impl Spread {
+    pub(crate) fn new(
+        replicates: &[Replicate],
+        estimator: Estimator,
+        law: &SamplingLaw,
+        tuning: &Tuning,
+    ) -> Self {
+        let levels = law.correlation.nrows();
+        let edof: Vec<Vec<f64>> = replicates.iter().map(|r| edof(r, estimator, law, tuning)).collect();
+        let count = replicates.len() as f64;
+        let within: Vec<f64> = (0..levels)
+            .map(|j| (edof.iter().map(|e| variance_of_log(e[j])).sum::<f64>() / count).sqrt())
+            .collect();
+        let mut units = vec![vec![0.0; levels]; replicates.len()];
+        let mut total = vec![vec![0.0; levels]; replicates.len()];
+        let mut between = vec![0.0; levels];
+        for j in 0..levels {
+            let logs: Vec<f64> = replicates.iter().map(|r| r.value(estimator, j).ln()).collect();
+            let noise: Vec<f64> = edof.iter().map(|e| variance_of_log(e[j])).collect();
+            let scatter = Scatter::new(&logs, &noise, estimator);
+            between[j] = scatter.between;
+            for (i, unit) in scatter.units.into_iter().enumerate() {
+                units[i][j] = unit;
+                total[i][j] = scatter.factor * noise[i].sqrt().hypot(between[j]);
+            }
+        }
+        let freedom = (share_of_freedom(estimator) * (count - 1.0)).max(1.0);
+        Self { within, between, edof, total, units, freedom }
+    }
+
+    /// Draws nu*/nu of as many new replicates as there are, `[replicate][level]`: with the variances of ln nu that the
+    /// replicates show, and their correlations between levels.
+    pub(crate) fn draw(&self, generator: &mut Generator) -> Vec<Vec<f64>> {
+        let of_replicate = |total: &Vec<f64>| {
+            let scores = self.scores(generator);
+            let ratio = |(score, total): (f64, &f64)| chi_square_ratio(score, edof_of_log(total * total));
+            scores.into_iter().zip(total).map(ratio).collect()
+        };
+        self.total.iter().map(of_replicate).collect()
+    }
+
+    /// What makes an interval of normal quantiles one of Student's, for the few replicates that the variances are
+    /// known from: the ratio of the quantiles 0.975. Nothing is known from a single one: its variances are the law's.
+    pub(crate) fn student(&self) -> f64 {
+        if self.units.len() < 2 {
+            return 1.0;
+        }
+        let student = StudentsT::new(0.0, 1.0, self.freedom).map_or(NORMAL_975, |law| law.inverse_cdf(0.975));
+        student / NORMAL_975
+    }
+
+    /// Draws what ln nu of as many new replicates as there are differ by, beyond the scatter of each.
+    pub(crate) fn draw_between(&self, generator: &mut Generator) -> Vec<Vec<f64>> {
+        let of_replicate = |_| self.scores(generator).iter().zip(&self.between).map(|(z, b)| z * b).collect();
+        (0..self.units.len()).map(of_replicate).collect()
+    }
+
+    /// Normal numbers with the replicates' correlations between levels.
+    fn scores(&self, generator: &mut Generator) -> Vec<f64> {
+        let freedom = (self.units.len() as f64 - 1.0).max(1.0);
+        let mut scores = vec![0.0; self.between.len()];
+        for unit in &self.units {
+            let weight = generator.sample::<f64, _>(StandardNormal) / freedom.sqrt();
+            scores.iter_mut().zip(unit).for_each(|(score, u)| *score += weight * u);
+        }
+        scores
+    }
+}
+
+/// The degrees of freedom of a chi-square whose logarithm has this variance: psi1(x) ≈ 1/x + 1/2x² at x = eta/2.
+fn edof_of_log(variance: f64) -> f64 {
+    (1.0 + (1.0 + 2.0 * variance).sqrt()) / variance
+}
+
+fn edof(replicate: &Replicate, estimator: Estimator, law: &SamplingLaw, tuning: &Tuning) -> Vec<f64> {
+    if estimator.is_robust() {
+        law.robust_edof(replicate.samples, tuning)
+    } else {
+        law.edof(replicate.samples)
+    }
+}
+
+/// Variance of ln(chi²/eta): the trigamma function at eta/2, by its asymptotic series.
+pub(crate) fn variance_of_log(edof: f64) -> f64 {
+    // psi1(x) = 1/x² + psi1(x + 1), then the series, whose error is under 1e-6 from x = 4.
+    let (mut x, mut sum) = (0.5 * edof, 0.0);
+    while x < 4.0 {
+        sum += 1.0 / (x * x);
+        x += 1.0;
+    }
+    let y = 1.0 / (x * x);
+    sum + 1.0 / x + 0.5 * y + y / x * (1.0 / 6.0 - y * (1.0 / 30.0 - y / 42.0))
+}
+
+/// The degrees of freedom of a variance over those of the plain one, K − 1. That of K Gaussian numbers of which the
+/// distant are clipped scatters as a chi-square of 0.87 (K − 1) degrees does (Satterthwaite's rule; 0.78 to 0.96 for K =
+/// 5 … 24).
+const fn share_of_freedom(estimator: Estimator) -> f64 {
+    if matches!(estimator, Estimator::DrAwv) { 0.87 } else { 1.0 }
+}
+
+/// What makes the mean of the clipped variance of K Gaussian numbers their variance: 1.075 for K = 8.
+fn small_sample(count: usize) -> f64 {
+    1.0 + 0.6 / count as f64
+}
+
+/// Mean square of the residuals of ln nu at one level, each over the deviation that its noise alone gives it: 1 on average
+/// where replicates do not differ. For DR-AWV of clipped residuals. NaN of what cannot be compared.
+pub(crate) fn mean_square(logs: &[f64], noise: &[f64], estimator: Estimator) -> f64 {
+    let weights: Vec<f64> = noise.iter().map(|n| 1.0 / n).collect();
+    let clipped = estimator == Estimator::DrAwv;
+    let correction = if clipped { small_sample(logs.len()) } else { 1.0 };
+    let squares: f64 = residuals(logs, &weights, clipped).iter().map(|z| z * z).sum();
+    correction * squares / (logs.len() as f64 - 1.0)
+}
+
+/// How the ln nu of replicates scatter at one level.
+struct Scatter {
+    /// Standard deviation of what they differ by beyond their noise.
+    between: f64,
+    /// Residuals in standard deviations, noise and differences together; Σ of their squares is K − 1.
+    units: Vec<f64>,
+    /// Those standard deviations over what noise and differences make: 1, or less where the replicates scatter less
+    /// than their noise does.
+    factor: f64,
+}
+
+impl Scatter {
+    /// `noise` is the variance of each by its length. What they differ by is what brings the mean square of the
+    /// residuals, each over its own variance, to 1
+    /// ([Paule and Mandel](crate::bibliography::PauleMandel82)); for DR-AWV clipped residuals.
+    fn new(logs: &[f64], noise: &[f64], estimator: Estimator) -> Self {
+        let freedom = logs.len() as f64 - 1.0;
+        let lowest = logs.iter().copied().fold(f64::INFINITY, f64::min);
+        let range = logs.iter().copied().fold(lowest, f64::max) - lowest;
+        if freedom < 1.0 || !range.is_finite() {
+            return Self { between: 0.0, units: vec![0.0; logs.len()], factor: 0.0 };
+        }
+        let clipped = estimator == Estimator::DrAwv;
+        let correction = if clipped { small_sample(logs.len()) } else { 1.0 };
+        let of = |between: f64| {
+            let weights: Vec<f64> = noise.iter().map(|n| 1.0 / (n + between * between)).collect();
+            let residuals = residuals(logs, &weights, clipped);
+            let length = (residuals.iter().map(|z| z * z).sum::<f64>() / freedom).sqrt();
+            (residuals, length)
+        };
+        let (mut low, mut high) = (0.0, 2.0 * range);
+        if of(low).1 * correction.sqrt() > 1.0 {
+            // Halved to rounding.
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                if of(middle).1 * correction.sqrt() > 1.0 { low = middle } else { high = middle }
+            }
+        }
+        let (mut units, length) = of(low);
+        if length > 0.0 {
+            units.iter_mut().for_each(|z| *z /= length);
+        }
+        Self { between: low, units, factor: length * correction.sqrt() }
+    }
+}
+
+/// Residuals from the weighted mean in standard deviations (weights: 1/variance); clipped ones are those from the
+/// weighted median, within [`CLIP`] deviations by their median, about their own weighted mean.
+fn residuals(values: &[f64], weights: &[f64], clipped: bool) -> Vec<f64> {
+    let mean = |values: &[f64]| {
+        let sum: f64 = values.iter().zip(weights).map(|(x, w)| x * w).sum();
+        sum / weights.iter().sum::<f64>()
+    };
+    let mut kept = values.to_vec();
+    if clipped {
+        let centre = weighted_median(values, weights);
+        let distances: Vec<f64> =
+            values.iter().zip(weights).map(|(x, w)| (x - centre).abs() * w.sqrt()).collect();
+        let most = CLIP * MAD_TO_DEVIATION * median(&distances);
+        for (x, w) in kept.iter_mut().zip(weights) {
+            let most = most / w.sqrt();
+            *x = x.clamp(centre - most, centre + most);
+        }
+    }
+    let mean = mean(&kept);
+    kept.iter().zip(weights).map(|(x, w)| (x - mean) * w.sqrt()).collect()
+}
+
+/// The value below which half of the weight lies; the mean of two where it lies between them.
+fn weighted_median(values: &[f64], weights: &[f64]) -> f64 {
+    let mut pairs: Vec<(f64, f64)> = values.iter().copied().zip(weights.iter().copied()).collect();
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * weights.iter().sum::<f64>();
+    let mut below = 0.0;
+    for (i, (value, weight)) in pairs.iter().enumerate() {
+        below += weight;
+        if below > half * (1.0 + 1e-9) {
+            return *value;
+        }
+        if below > half * (1.0 - 1e-9) {
+            return pairs.get(i + 1).map_or(*value, |next| 0.5 * (value + next.0));
+        }
+    }
+    pairs.last().map_or(f64::NAN, |last| last.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_relative_eq;
+
+    /// psi1(½) = π²/2, psi1(1) = π²/6, psi1(2) = π²/6 − 1.
+    #[test]
+    fn variance_of_the_logarithm() {
+        let pi2 = std::f64::consts::PI.powi(2);
+        assert_relative_eq!(variance_of_log(1.0), pi2 / 2.0, max_relative = 1e-6);
+        assert_relative_eq!(variance_of_log(2.0), pi2 / 6.0, max_relative = 1e-6);
+        assert_relative_eq!(variance_of_log(4.0), pi2 / 6.0 - 1.0, max_relative = 1e-5);
+    }
+
+    /// Of replicates whose noise is nothing.
+    fn noiseless(logs: &[f64], estimator: Estimator) -> Scatter {
+        Scatter::new(logs, &vec![1e-12; logs.len()], estimator)
+    }
+
+    #[test]
+    fn one_abnormal_value_moves_the_plain_residuals_and_hardly_the_clipped() {
+        let mut logs = vec![-0.1, 0.0, 0.1, 0.05, -0.05, 0.02];
+        let clean = noiseless(&logs, Estimator::DrAwv).between;
+        logs[2] = 10.0;
+        assert!(noiseless(&logs, Estimator::SrAwv).between > 3.0);
+        assert!(noiseless(&logs, Estimator::DrAwv).between < 3.0 * clean);
+        let units = noiseless(&logs, Estimator::SrAwv).units;
+        assert_relative_eq!(units.iter().map(|u| u * u).sum::<f64>(), 5.0, max_relative = 1e-9);
+    }
+
+    /// Paule and Mandel's equation by hand, two values: (x − y)²/(n₁ + n₂ + 2b²) = 1. Four within their noise: no
+    /// difference, and the scatter is that of the values.
+    #[test]
+    fn unequal_noise_is_allowed_for() {
+        let two = Scatter::new(&[0.0, 3.0], &[1.0, 4.0], Estimator::Awv);
+        assert_relative_eq!(two.between, 2.0_f64.sqrt(), max_relative = 1e-9);
+        assert_relative_eq!(two.factor, 1.0, max_relative = 1e-9);
+        let four = Scatter::new(&[0.0, 0.1, -0.1, 0.2], &[1.0; 4], Estimator::SrAwv);
+        assert_eq!(four.between, 0.0);
+        assert_relative_eq!(four.factor, (0.05_f64 / 3.0).sqrt(), max_relative = 1e-9);
+        assert_eq!(weighted_median(&[5.0, 1.0, 2.0], &[1.0, 1.0, 3.0]), 2.0);
+        assert_eq!(weighted_median(&[5.0, 1.0, 2.0, 4.0], &[1.0; 4]), 3.0);
+    }
+
+    /// 4000 draws of K Gaussian numbers: the mean of the clipped variance, corrected, is the variance (its standard
+    /// error is √(2/ν/4000) = 0.5 to 1.2 %, four of which and the 2 % by which the rule is off are allowed), and it scatters
+    /// as 0.87 (K − 1) degrees of freedom say to 15 % (that of a variance from 4000 is known to √(2/4000) = 2.2 %, the rule
+    /// is off by 0.09).
+    #[test]
+    fn a_clipped_variance_scatters_as_said() {
+        use rand::SeedableRng;
+        let mut generator = Generator::seed_from_u64(2);
+        for count in [5, 6, 8, 12, 24] {
+            let variance = |generator: &mut Generator| {
+                let x: Vec<f64> = (0..count).map(|_| generator.sample(StandardNormal)).collect();
+                noiseless(&x, Estimator::DrAwv).between.powi(2)
+            };
+            let drawn: Vec<f64> = (0..4000).map(|_| variance(&mut generator)).collect();
+            let mean = drawn.iter().sum::<f64>() / 4000.0;
+            let scatter = drawn.iter().map(|s| (s - mean).powi(2)).sum::<f64>() / 3999.0;
+            assert!((mean - 1.0).abs() < 4.0 * 0.012 + 0.02, "{count}: {mean}");
+            let freedom = 2.0 * mean * mean / scatter / (count as f64 - 1.0);
+            assert!((freedom / 0.87 - 1.0).abs() < 0.15, "{count}: {freedom}");
+        }
+    }
+}

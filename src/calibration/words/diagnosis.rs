@@ -1,0 +1,175 @@
+//! The diagnosis in words.
+
+use super::format::{signed_percent, tau_s};
+use crate::curve::Pool;
+use crate::diagnosis::{Alarm, CommonOutliers, Diagnosis, DriftAlarm, LeftOut, Misfit, Movement, Verdict};
+use crate::imu::{Axis, Sensor};
+use std::fmt::Write;
+
+/// The answer for one sensor: what the recordings are used for, then a line for each that is abnormal, and each fit that the
+/// J-test rejects. `rate_hz` turns levels into seconds.
+///
+/// It says what each estimator describes; which of them suits a filter is a question about navigation, not about
+/// wavelet variances.
+#[must_use]
+pub fn advice(diagnoses: &[Diagnosis], sensor: Sensor, rate_hz: f64) -> Vec<String> {
+    let own: Vec<&Diagnosis> = diagnoses.iter().filter(|d| d.sensor == sensor).collect();
+    let Some(first) = own.first() else { return Vec::new() };
+    let mut lines = Vec::new();
+    if own.iter().all(|d| d.scores.is_empty()) {
+        lines.push("too few recordings to tell which of them is abnormal: four are needed".to_owned());
+    } else {
+        let abnormal: Vec<&Diagnosis> =
+            own.iter().copied().filter(|d| d.verdict != Verdict::Normal).collect();
+        lines.push(answer(&own, &abnormal));
+        lines.extend(abnormal.iter().flat_map(|d| describe(d, rate_hz)));
+    }
+    lines.extend(first.common.iter().map(|c| outliers(c, own.len(), rate_hz)));
+    lines.extend(misfits(&first.misfits));
+    lines
+}
+
+/// What leaving each abnormal recording of a sensor out does to the fits, a line each.
+#[must_use]
+pub fn effects(diagnoses: &[Diagnosis], sensor: Sensor, rate_hz: f64) -> Vec<String> {
+    let abnormal = diagnoses.iter().filter(|d| d.sensor == sensor && d.verdict != Verdict::Normal);
+    abnormal.flat_map(|d| d.left_out.iter().map(|l| effect(&d.name, l, rate_hz))).collect()
+}
+
+/// What is said where the model does not describe the curve: everything else is of the wrong model.
+fn misfits(misfits: &[Misfit]) -> Option<String> {
+    if misfits.is_empty() {
+        return None;
+    }
+    let one = |m: &Misfit| format!("{} {}, p = {:.3}", m.group, m.estimator.name(), m.p_value);
+    let fits: Vec<String> = misfits.iter().map(one).collect();
+    Some(format!(
+        "the J-test rejects the model ({}): its parameters are not those of the noise, whichever recordings are used; \
+         another model, or recordings without disturbances, come first",
+        fits.join("; ")
+    ))
+}
+
+/// What is said of outliers that all recordings hold.
+fn outliers(common: &CommonOutliers, count: usize, rate_hz: f64) -> String {
+    let (first, last) = (common.levels[0], common.levels[common.levels.len() - 1]);
+    format!(
+        "outliers within all {count} recordings, or most: the classical wavelet variance is above the robust one \
+         from {} s to {} s, most at {} s: by {} in the median ({:.0} standard deviations): awv describes the noise with \
+         them, sr-awv and dr-awv without most of them (small ones pass for noise)",
+        tau_s(first, rate_hz),
+        tau_s(last, rate_hz),
+        tau_s(common.most, rate_hz),
+        signed_percent(common.excess).trim_start_matches('+'),
+        common.deviations
+    )
+}
+
+/// Whether DR-AWV, as it ran, already drops so many abnormal recordings of so many signals.
+fn suffices(own: &[&Diagnosis], recordings: usize, signals: usize) -> Option<usize> {
+    let (pool, trim) = own[0].dropped?;
+    let needed = if pool == Pool::Axes { recordings } else { signals };
+    (trim >= needed).then_some(trim)
+}
+
+fn describe(diagnosis: &Diagnosis, rate_hz: f64) -> Vec<String> {
+    let of = |alarm: &Option<Alarm>, what: &str| {
+        let line = |a: &Alarm| format!("{} is abnormal: {what}, {}", diagnosis.name, extent(a, rate_hz));
+        alarm.as_ref().map(line)
+    };
+    let noise = of(&diagnosis.noise, "its noise is not that of the others (robust wavelet variance)");
+    let outliers =
+        of(&diagnosis.outliers, "outliers within it (classical wavelet variance above the robust one)");
+    let drift = diagnosis.drift.as_ref().map(|d| drift(&diagnosis.name, diagnosis.sensor, d));
+    noise.into_iter().chain(outliers).chain(drift).collect()
+}
+
+fn drift(name: &str, sensor: Sensor, alarm: &DriftAlarm) -> String {
+    let of = |((axis, change), (_, z)): (&(Axis, f64), &(Axis, f64))| {
+        format!("{} {change:+.2e} {} ({z:+.1} deviations)", axis.name(), sensor.unit())
+    };
+    let axes: Vec<String> = alarm.change.iter().zip(&alarm.deviations).map(of).collect();
+    format!(
+        "{name} is abnormal: its level drifts as that of no other does: later half less earlier half {}, p = {:.4}",
+        axes.join(", "),
+        alarm.p_value
+    )
+}
+
+fn effect(name: &str, left: &LeftOut, rate_hz: f64) -> String {
+    let mut line = format!(
+        "without {name} {} {} moves by {} at {} s",
+        left.group,
+        left.estimator.name(),
+        signed_percent(left.change),
+        tau_s(left.level, rate_hz)
+    );
+    let moved = |m: &Movement| match m.without / m.with - 1.0 {
+        change if change.is_finite() => signed_percent(change),
+        _ => format!("from {} to {:.3e}", m.with, m.without),
+    };
+    // A process that is zero with and without has nothing to say.
+    for (i, m) in left.parameters.iter().filter(|m| m.with.max(m.without) > 0.0).enumerate() {
+        let separator = if i == 0 { ": " } else { ", " };
+        let _ = write!(line, "{separator}{} {} {}", m.process, m.parameter, moved(m));
+    }
+    line
+}
+
+/// `most from 20.48 s to 327.68 s (x +4.9, y +6.3, z +2.1 deviations), p = 0.004`
+fn extent(alarm: &Alarm, rate_hz: f64) -> String {
+    let (first, last) = alarm.levels;
+    let range = if first == last {
+        format!("at {} s", tau_s(first, rate_hz))
+    } else {
+        format!("from {} s to {} s", tau_s(first, rate_hz), tau_s(last, rate_hz))
+    };
+    let axes: Vec<String> = alarm.deviations.iter().map(|(a, z)| format!("{} {z:+.1}", a.name())).collect();
+    format!("most {range} ({} deviations), p = {:.4}", axes.join(", "), alarm.p_value)
+}
+
+fn answer(own: &[&Diagnosis], abnormal: &[&Diagnosis]) -> String {
+    let of_noise = || abnormal.iter().filter(|d| d.verdict == Verdict::Noise);
+    let signals: usize = of_noise().map(|d| d.axes).sum();
+    let all = own.len();
+    match (abnormal.len(), of_noise().count()) {
+        (0, _) => format!("the {all} recordings agree: use them all"),
+        (some, 0) if abnormal.iter().all(|d| d.verdict == Verdict::Drift) => format!(
+            "{some} of {all} recordings drift as no other does, and every estimator's random walk holds that: leave them \
+             out once you know why"
+        ),
+        (some, 0) => format!(
+            "{some} of {all} recordings hold outliers (or drift): awv describes the noise with them, sr-awv and dr-awv without most \
+             of them{}",
+            robust_moves(abnormal)
+        ),
+        (_, n) if 2 * n >= all => {
+            "half of the recordings or more are abnormal: there is no majority to trust; look at them"
+                .to_owned()
+        }
+        (_, n) => {
+            let drops = match suffices(own, n, signals) {
+                Some(trim) => format!("dr-awv, with the trim it ran with, {trim}, already does without"),
+                None if n == signals => format!("dr-awv with a trim of at least {n} does without"),
+                None => format!(
+                    "dr-awv with a trim of at least {n} (axes apart) or {signals} (axes pooled) does without"
+                ),
+            };
+            format!(
+                "the noise of {n} of {all} recordings is not that of the others: awv and sr-awv hold it, {drops}; leave \
+                 the abnormal recordings out once you know what happened to them"
+            )
+        }
+    }
+}
+
+/// How far the curves of the robust estimators move without the recordings that hold outliers, where they ran.
+fn robust_moves(abnormal: &[&Diagnosis]) -> String {
+    let robust = abnormal.iter().flat_map(|d| &d.left_out).filter(|l| l.estimator.is_robust());
+    match robust.map(|l| l.deviations.abs()).max_by(f64::total_cmp) {
+        Some(most) => format!(
+            " (without one of those recordings their curves move by at most {most:.1} standard deviations)"
+        ),
+        None => String::new(),
+    }
+}

@@ -1,0 +1,15 @@
+//! A calibration in words: remarks, reasons, advice. Numbers are decided elsewhere.
+
+mod diagnosis;
+mod format;
+mod inference;
+mod notes;
+mod ranking;
+
+pub use diagnosis::{advice, effects};
+pub use format::{duration, percent};
+pub(crate) use inference::notes_of_inference;
+pub use inference::{note_of_indistinct, undetermined};
+pub(crate) use notes::notes;
+pub use notes::{Share, correlation_time_s, shares};
+pub use ranking::reasons;

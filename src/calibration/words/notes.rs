@@ -1,0 +1,196 @@
+//! What a fit says, and what it cannot say, in words.
+
+use super::format::{duration, percent, tau_s};
+use crate::curve::{Estimator, Replicate, implied};
+use crate::fit::Fit;
+use crate::noise::{Composite, Process};
+use crate::outcome::Outcome;
+use crate::wavelet::{Curve, Status};
+
+/// What a process contributes to a model's wavelet variance.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Share {
+    /// Levels at which it is the largest part, ascending.
+    pub leads: Vec<u32>,
+    /// Its largest part of the whole, and the level of that.
+    pub largest: (f64, u32),
+}
+
+/// The share of each process of a model over some levels.
+#[must_use]
+pub fn shares(model: &Composite, levels: &[u32]) -> Vec<Share> {
+    let part = |process: &Process, level: u32| match process.haar_wv(level) / model.haar_wv(level) {
+        part if part.is_finite() => part,
+        // Of nothing nothing is a part.
+        _ => 0.0,
+    };
+    let leader = |level: u32| {
+        let parts = model.processes.iter().map(|p| part(p, level));
+        parts.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
+    };
+    let share = |(i, process): (usize, &Process)| Share {
+        leads: levels.iter().copied().filter(|level| leader(*level) == Some(i)).collect(),
+        largest: levels
+            .iter()
+            .map(|level| (part(process, *level), *level))
+            .fold((0.0, 0), |a, b| if b.0 > a.0 { b } else { a }),
+    };
+    model.processes.iter().enumerate().map(share).collect()
+}
+
+/// Scales missed by more standard deviations than this are told.
+const MISFIT: f64 = 4.0;
+/// The wavelet variance of an AR1 peaks at this many correlation times.
+const PEAK: f64 = 3.78;
+
+/// Remarks on a fit to the average of some replicates at a rate (Hz).
+#[must_use]
+pub(crate) fn notes(outcome: &Outcome, replicates: &[Replicate], rate_hz: f64) -> Vec<String> {
+    let Outcome { fit, curve, estimator, .. } = outcome;
+    let mut notes = Vec::new();
+    let record_s = replicates.iter().map(|r| r.samples as f64 / rate_hz).fold(0.0, f64::max);
+    if *estimator == Estimator::Avlr {
+        notes.push(
+            "slopes are read as if each process were alone: inconsistent where they overlap (Guerrier et al. 2016)"
+                .to_owned(),
+        );
+    }
+    not_identifiable(*estimator == Estimator::Avlr, fit, curve, record_s, rate_hz, &mut notes);
+    misfit(fit, curve, rate_hz, &mut notes);
+    if estimator.is_robust() {
+        robust_remarks(curve, replicates, &mut notes);
+    }
+    notes
+}
+
+fn not_identifiable(
+    slopes: bool,
+    fit: &Fit,
+    curve: &Curve,
+    record_s: f64,
+    rate_hz: f64,
+    notes: &mut Vec<String>,
+) {
+    for label in &fit.zero {
+        notes.push(if slopes {
+            format!("{label}: no such slope found where it could be the largest part")
+        } else {
+            format!("{label} is zero at the optimum: not identifiable from these data")
+        });
+    }
+    for bound in &fit.bounded {
+        notes.push(format!("{bound} is at the bound you gave; the data favour a value beyond it"));
+    }
+    for label in &fit.at_end {
+        let process = fit.composite.processes.iter().zip(fit.composite.labels()).find(|(_, l)| l == label);
+        let kappa =
+            process.and_then(|(p, _)| correlation_time_s(p, rate_hz)).map_or(0.0, |t| 1.0 / (t * rate_hz));
+        notes.push(if kappa > 1.0 {
+            format!(
+                "{label}: its correlation time is the shortest that is sought, a sixth of a sample (phi = e^-6): it is \
+                 white noise by another name, and not identifiable from these data"
+            )
+        } else {
+            format!(
+                "{label}: its correlation time is the longest that is sought, 20 times the longest scale: it is a random \
+                 walk by another name, and not identifiable from these data"
+            )
+        });
+    }
+    let longest_s = curve.levels.last().map_or(0.0, |level| tau_s(*level, rate_hz));
+    let labels = fit.composite.labels();
+    let all = fit.composite.processes.iter().zip(&labels).zip(shares(&fit.composite, &curve.levels));
+    for ((process, label), share) in all {
+        if fit.zero.contains(label) || fit.at_end.contains(label) {
+            continue;
+        }
+        let last = curve.levels.last().copied().unwrap_or(0);
+        if matches!(process, Process::RandomWalk(_) | Process::Drift(_)) && share.leads == [last] {
+            notes.push(format!(
+                "{label} dominates at the last scale only ({}), of which there are few independent values: a longer \
+                 record would tell it better",
+                duration(longest_s)
+            ));
+        }
+        let Some(t_corr_s) = correlation_time_s(process, rate_hz) else { continue };
+        if t_corr_s * rate_hz < 1.0 {
+            notes.push(format!(
+                "{label}: its correlation time of {t_corr_s:.4} s is shorter than a sample: white noise by another \
+                 name"
+            ));
+        }
+        if PEAK * t_corr_s > longest_s {
+            let record = match record_s {
+                r if r > 0.0 => format!("the record is {}: ", duration(r)),
+                _ => String::new(),
+            };
+            notes.push(format!(
+                "{record}{label}'s correlation time of {} is not identifiable from scales up to {}; there it looks \
+                 like a random walk",
+                duration(t_corr_s),
+                duration(longest_s)
+            ));
+        }
+    }
+}
+
+/// Correlation time of an AR1 or a GM at a rate (Hz), in seconds.
+#[must_use]
+pub fn correlation_time_s(process: &Process, rate_hz: f64) -> Option<f64> {
+    match process {
+        Process::Ar1(p) if p.phi() > 0.0 => Some(-1.0 / (p.phi().ln() * rate_hz)),
+        Process::GaussMarkov(p) => Some(1.0 / p.beta()),
+        _ => None,
+    }
+}
+
+fn misfit(fit: &Fit, curve: &Curve, rate_hz: f64, notes: &mut Vec<String>) {
+    let implied = implied(&fit.composite, curve);
+    let scales = curve.levels.iter().zip(&curve.wv).zip(&curve.edof).zip(implied);
+    let missed = scales.filter_map(|(((level, nu), edof), implied)| {
+        let relative = nu / implied - 1.0;
+        let deviations = relative * (0.5 * edof).sqrt();
+        (deviations.abs() > MISFIT).then_some((*level, relative, deviations))
+    });
+    let missed: Vec<_> = missed.collect();
+    let Some(worst) = missed.iter().max_by(|a, b| a.2.abs().total_cmp(&b.2.abs())) else { return };
+    let (level, relative, deviations) = worst;
+    let side = if *relative > 0.0 { "above" } else { "below" };
+    notes.push(format!(
+        "the data disagree with this model at {} of {} scales, most at {} s: {} {side} it, {:.0} standard deviations",
+        missed.len(),
+        curve.levels.len(),
+        tau_s(*level, rate_hz),
+        percent(relative.abs()),
+        deviations.abs()
+    ));
+}
+
+fn robust_remarks(curve: &Curve, replicates: &[Replicate], notes: &mut Vec<String>) {
+    let with = |status: Status| {
+        let has = |r: &&Replicate| r.robust[..curve.levels.len()].iter().any(|v| v.status == status);
+        replicates.iter().filter(has).count()
+    };
+    let (count, no_root, coarse) = (replicates.len(), with(Status::NoRoot), with(Status::Coarse));
+    if no_root > 0 {
+        notes.push(format!(
+            "{} scales without an admissible robust variance (too many outliers, or \
+             too few coefficients): the nearest value is used there",
+            have(no_root, count)
+        ));
+    }
+    if coarse > 0 {
+        notes.push(format!(
+            "{} scales most of whose coefficients are exactly zero (coarse quantisation)",
+            have(coarse, count)
+        ));
+    }
+}
+
+fn have(some: usize, all: usize) -> String {
+    match (some, all) {
+        (1, 1) => "the signal has".to_owned(),
+        (1, _) => format!("1 of {all} signals has"),
+        _ => format!("{some} of {all} signals have"),
+    }
+}
