@@ -4,6 +4,7 @@ use nav_sim::calibration::SignalError;
 use nav_sim::formats::atomic::WriteError;
 use nav_sim::formats::recordings::RecordingError;
 use nav_sim::formats::toml_file::TomlError;
+use nav_sim::sensors::outage::OutageError;
 use std::fmt;
 
 /// A failure: exit code, message and hint. 1 could not (I/O, numerics); 2 usage or configuration;
@@ -91,6 +92,12 @@ impl From<RecordingError> for Failure {
     fn from(e: RecordingError) -> Self {
         let failure = if e.is_io() { Self::could_not(&e) } else { Self::input(&e) };
         failure.maybe_hint(e.hint())
+    }
+}
+
+impl From<OutageError> for Failure {
+    fn from(e: OutageError) -> Self {
+        Self::input(&e).maybe_hint(e.hint().map(str::to_owned))
     }
 }
 

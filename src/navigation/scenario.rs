@@ -9,7 +9,9 @@ use crate::sensors::baro::BaroSettings;
 use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
 use crate::sensors::imu::Truth;
-use crate::sensors::outage::{MisplacedOutage, Outage, OutagePlan, PeriodicOutages, RandomOutages};
+use crate::sensors::outage::{
+    FixedData, Fixes, Outage, OutageError, OutagePlan, PeriodicOutages, PlacedOutages, RandomOutages,
+};
 use crate::simulation::lincov::{Track, reduced_belief};
 use crate::simulation::{Experiment, ExperimentError};
 use crate::trajectory::Trajectory;
@@ -158,7 +160,7 @@ impl Scenario {
         self.imu.validate().map_err(|e| e.in_section("imu"))?;
         self.gnss.validate().map_err(|e| e.in_section("gnss"))?;
         self.initial.validate().map_err(|e| e.in_section("initial"))?;
-        self.outages().windows((0.0, 1.0), 0)?;
+        self.outages().validate()?;
         self.filter.validate().map_err(|e| e.in_section("filter"))?;
         if let Some(baro) = &self.baro {
             baro.validate().map_err(|e| e.in_section("baro"))?;
@@ -247,33 +249,22 @@ impl Scenario {
         doubts
     }
 
-    /// Those of the outages asked for by their times that are cut where a trajectory ends.
+    /// The outages on a trajectory that lasts from `span_s.0` to `span_s.1`.
     ///
     /// # Errors
-    /// One that does not begin on the trajectory, or withholds no fix.
-    pub fn cut_outages(&self, span_s: (f64, f64)) -> Result<Vec<Outage>, MisplacedOutage> {
-        let rate_hz = self.gnss.rate_hz;
-        // fixes come at whole intervals from the start
-        let withholds = |o: &Outage| {
-            let next = ((o.start_s - span_s.0) * rate_hz - 1e-6).ceil().max(1.0);
-            span_s.0 + next / rate_hz < o.end_s
-        };
-        let mut cut = Vec::new();
-        for asked in self.outage.iter().flatten() {
-            if asked.placed(span_s, withholds)? != *asked {
-                cut.push(*asked);
-            }
-        }
-        Ok(cut)
+    /// One asked for that does not begin on the trajectory, or withholds no fix.
+    pub fn outages_on(&self, span_s: (f64, f64), seed: u64) -> Result<PlacedOutages, OutageError> {
+        let fixes = Fixes::Every { interval_s: 1.0 / self.gnss.rate_hz };
+        self.outages().on(&FixedData { span_s, fixes }, seed)
     }
 
     /// The outages asked for: the paper's two when nothing is said.
     #[must_use]
     pub fn outages(&self) -> OutagePlan {
-        let said = self.outage_periodic.is_some() || self.outage_random.is_some();
-        let unsaid = if said { Vec::new() } else { Outage::PAPER.to_vec() };
+        let said = self.outage.is_some() || self.outage_periodic.is_some() || self.outage_random.is_some();
         OutagePlan {
-            fixed: self.outage.clone().unwrap_or(unsaid),
+            fixed: self.outage.clone().unwrap_or_default(),
+            default: if said { Vec::new() } else { Outage::PAPER.to_vec() },
             periodic: self.outage_periodic,
             random: self.outage_random,
         }
@@ -312,7 +303,7 @@ mod tests {
         let variance = |sigma: [f64; 3]| sigma.map(|s| (s * s * 1e6).round() / 1e6);
         assert_eq!(variance(scenario.gnss.pos_sigma_m), [4.0, 4.0, 16.0]);
         assert_eq!(variance(scenario.gnss.vel_sigma_m_s.unwrap()), [0.0016, 0.0016, 0.0036]);
-        assert_eq!(scenario.outages().windows((0.0, 900.0), 1).unwrap(), Outage::PAPER);
+        assert_eq!(scenario.outages_on((0.0, 900.0), 1).unwrap().windows, Outage::PAPER);
     }
 
     #[test]
@@ -398,7 +389,7 @@ mod tests {
     #[test]
     fn no_outage_may_be_asked_for() {
         let scenario: Scenario = toml::from_str("outage = []").unwrap();
-        assert!(scenario.outages().windows((0.0, 900.0), 1).unwrap().is_empty());
+        assert!(scenario.outages_on((0.0, 900.0), 1).unwrap().windows.is_empty());
     }
 
     #[test]

@@ -104,7 +104,7 @@ pub(super) fn expand(entry: &OutagesEntry, index: usize) -> Result<Vec<OutageSet
     }
     let several = sets.len() > 1;
     let named = |(values, plan): (Vec<f64>, OutagePlan)| {
-        plan.windows((0.0, 1.0), 0).map_err(|e| StudyError::refused(&key, &e.value, &e.requirement))?;
+        plan.validate().map_err(|e| StudyError::refused(&key, &e.value, &e.requirement))?;
         let values: Vec<String> = values.iter().map(f64::to_string).collect();
         let name = if several { format!("{}({})", entry.name, values.join(",")) } else { entry.name.clone() };
         Ok(OutageSet { name, plan })

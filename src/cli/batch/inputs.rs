@@ -8,7 +8,7 @@ use nav_sim::imu::Recording;
 use nav_sim::noise::{Model, continuous};
 use nav_sim::scenario::Scenario;
 use nav_sim::sensors::imu::Truth;
-use nav_sim::sensors::outage::Outage;
+use nav_sim::sensors::outage::{Outage, PlacedOutages};
 use nav_sim::simulation;
 use nav_sim::study::{Cell, Material, Synthesis, TruthEntry, Unit};
 use nav_sim::trajectory::Trajectory;
@@ -49,7 +49,7 @@ impl<'a> Inputs<'a> {
         let truth = self.truth(cell.truth)?;
         let at = |e: &dyn std::fmt::Display| Failure::input(format!("{}: {e}", grid.names(cell).join(", ")));
         let span = (trajectory.start_s(), trajectory.end_s());
-        let outages = windows(&scenario, span, plan.seed).map_err(|e| at(&e))?;
+        let outages = self.placed(cell, span)?.windows;
         let beliefs = self.beliefs(cell, &scenario, &trajectory, &outages)?;
         let truth_model;
         let truth = match &*truth {
@@ -64,19 +64,18 @@ impl<'a> Inputs<'a> {
         f(&simulation)
     }
 
-    /// The outages of a cell (start and end, s); refuses those that do not lie on its trajectory.
-    pub(super) fn outages(&mut self, cell: Cell) -> Result<Vec<(f64, f64)>, Failure> {
-        let (plan, grid) = (&self.planned.plan, &self.planned.grid);
+    /// The outages of a cell; refuses those that do not lie on its trajectory.
+    pub(super) fn outages(&mut self, cell: Cell) -> Result<PlacedOutages, Failure> {
         let trajectory = self.trajectory(cell.trajectory)?;
-        let span = (trajectory.start_s(), trajectory.end_s());
-        let (scenario, name) = (grid.scenario(cell, plan.seed), grid.names(cell).join(", "));
-        let found =
-            windows(&scenario, span, plan.seed).map_err(|e| Failure::input(format!("{name}: {e}")))?;
-        for o in scenario.cut_outages(span).unwrap_or_default() {
-            let ends = format!("is cut: the trajectory ends at {} s", span.1);
-            self.session.printer.warn(&format!("{name}: outage {}:{} {ends}", o.start_s, o.end_s));
-        }
-        Ok(found.iter().map(|o| (o.start_s, o.end_s)).collect())
+        self.placed(cell, (trajectory.start_s(), trajectory.end_s()))
+    }
+
+    fn placed(&self, cell: Cell, span: (f64, f64)) -> Result<PlacedOutages, Failure> {
+        let (plan, grid) = (&self.planned.plan, &self.planned.grid);
+        grid.scenario(cell, plan.seed).outages_on(span, plan.seed).map_err(|e| {
+            let place = format!("{}: {}", self.study.display(), grid.names(cell).join(", "));
+            Failure::from(e).within(&place)
+        })
     }
 
     /// Duration of a trajectory (s).
@@ -159,7 +158,8 @@ pub(super) fn finished(
     (unit, id): (Unit, &str),
     inputs: &mut Inputs<'_>,
 ) -> Result<Result<bool, String>, Failure> {
-    let outages = inputs.outages(planned.grid.cell(unit.cell))?;
+    let outages = inputs.outages(planned.grid.cell(unit.cell))?.windows;
+    let outages: Vec<(f64, f64)> = outages.iter().map(|o| (o.start_s, o.end_s)).collect();
     let columns = planned.grid.columns.len();
     study_directory::finished(&planned.directory, (unit, id), columns, &outages).map_err(Failure::could_not)
 }
@@ -170,12 +170,6 @@ pub(super) const CALIBRATED: &str = "calibrated";
 /// Where the model of a candidate is.
 pub(super) fn model_path(study: &Path, directory: &Path, role: &str, path: &str) -> PathBuf {
     if role == CALIBRATED { directory.join(path) } else { study_file::beside(study, Path::new(path)) }
-}
-
-/// The outages of a scenario on a trajectory; one asked for by its times must begin on it.
-pub(super) fn windows(scenario: &Scenario, span: (f64, f64), seed: u64) -> Result<Vec<Outage>, String> {
-    scenario.cut_outages(span).map_err(|e| e.to_string())?;
-    scenario.outages().windows(span, seed).map_err(|e| e.to_string())
 }
 
 /// Refuses a file that is not what it was when the study was planned.

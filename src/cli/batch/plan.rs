@@ -269,9 +269,14 @@ fn validate(planned: &Planned, study: &Path, session: &Session) -> Result<(), Fa
         if seen.insert((cell.trajectory, cell.truth, cell.scenario, 0)) || grid.len() <= 64 {
             inputs.with_cell(cell, |_| Ok(()))?;
         }
-        if seen.insert((cell.trajectory, cell.scenario, cell.outages, 1)) && inputs.outages(cell)?.is_empty()
-        {
-            without.push(planned.cell_name(cell));
+        if seen.insert((cell.trajectory, cell.scenario, cell.outages, 1)) {
+            let outages = inputs.outages(cell)?;
+            for remark in &outages.remarks {
+                session.printer.warn(&format!("{}: {remark}", grid.names(cell).join(", ")));
+            }
+            if outages.windows.is_empty() {
+                without.push(planned.cell_name(cell));
+            }
         }
     }
     warn_of_no_outages(&without, session);

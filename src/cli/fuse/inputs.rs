@@ -13,7 +13,7 @@ use nav_sim::gnss::GnssFix;
 use nav_sim::noise::{Composite, Model, Process, continuous, reduction};
 use nav_sim::report::Input;
 use nav_sim::sensors::gnss::GnssSettings;
-use nav_sim::sensors::outage::{Outage, OutagePlan};
+use nav_sim::sensors::outage::{FixedData, OutagePlan, PlacedOutages};
 use nav_sim::simulation::lincov;
 use nav_sim::trajectory::reference::Reference;
 use nav_sim::units::DEG;
@@ -138,42 +138,17 @@ pub(super) fn mounting(axes: LoggerAxes, angles_deg: Option<parse::Triple>) -> D
     frd * axes.to_frd()
 }
 
-/// The settings with outages as `run` has them: those that overlap or touch are one.
+/// The settings with their outages placed on the fixes.
 pub(super) fn with_outages(
-    mut settings: Settings,
+    settings: Settings,
     recorded: &Recorded<'_>,
     session: &Session,
 ) -> Result<Settings, Failure> {
-    let asked = settings.outages.len();
-    let fixed = placed(&settings.outages, recorded.gnss, session)?;
-    let plan = OutagePlan { fixed, ..OutagePlan::default() };
-    settings.outages = plan.windows((f64::NEG_INFINITY, f64::INFINITY), 0).map_err(Failure::input)?;
-    if settings.outages.len() < asked {
-        session.printer.warn("outages that overlap or touch are made one");
-    }
-    Ok(settings)
-}
-
-/// Outages placed on the fixes; one may last until a fix later than the last would come.
-fn placed(outages: &[Outage], gnss: &[GnssFix], session: &Session) -> Result<Vec<Outage>, Failure> {
-    let Some((first, last)) = gnss.first().zip(gnss.last()) else { return Ok(Vec::new()) };
-    let interval_s = gnss.windows(2).map(|w| w[1].t_s - w[0].t_s).fold(0.0, f64::max);
-    let span = (first.t_s - interval_s, last.t_s + interval_s);
-    let withholds = |o: &Outage| gnss.iter().any(|f| o.withholds(f.t_s + 1e-9));
-    let place = |asked: &Outage| {
-        let placed = asked.placed(span, withholds).map_err(|e| {
-            Failure::input(e).hint(format!("the fixes run from {} to {} s", first.t_s, last.t_s))
-        })?;
-        if placed != *asked {
-            let message = format!(
-                "outage {}:{} is cut at {} s: the fixes end at {} s",
-                asked.start_s, asked.end_s, placed.end_s, last.t_s
-            );
-            session.printer.warn(&message);
-        }
-        Ok(placed)
-    };
-    outages.iter().map(place).collect()
+    let times_s: Vec<f64> = recorded.gnss.iter().map(|fix| fix.t_s).collect();
+    let plan = OutagePlan { fixed: settings.outages.clone(), ..OutagePlan::default() };
+    let PlacedOutages { windows, remarks } = plan.on(&FixedData::recorded(&times_s), 0)?;
+    remarks.iter().for_each(|remark| session.printer.warn(&remark.to_string()));
+    Ok(Settings { outages: windows, ..settings })
 }
 
 fn scale(gnss: &mut [GnssFix], position: f64, velocity: f64) {

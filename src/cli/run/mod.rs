@@ -16,7 +16,7 @@ use nav_sim::noise::reduction::window_s;
 use nav_sim::report::{Manifest, seconds};
 use nav_sim::scenario::{Method, Scenario};
 use nav_sim::sensors::imu::TruthError;
-use nav_sim::sensors::outage::Outage;
+use nav_sim::sensors::outage::{Outage, PlacedOutages};
 use nav_sim::simulation::lincov::{Assessment, assess, weak_heading};
 use nav_sim::simulation::{Experiment, ExperimentError, RunResult};
 use std::path::PathBuf;
@@ -116,7 +116,10 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let inputs = Inputs::read(args, scenario.imu.rate_hz, session)?;
     let seed = session.seed(scenario.run.seed);
     let span = (inputs.trajectory.start_s(), inputs.trajectory.end_s());
-    let outages = outages(&scenario, span, seed, session)?;
+    let outages = outages(&scenario, span, seed, session).map_err(|e| match &args.scenario {
+        Some(path) if args.outages.is_empty() => e.within(&path.display().to_string()),
+        _ => e,
+    })?;
     output::try_open(&args.out, &inputs.files)?;
     let unusable = |e| Failure::input(format!("{}: {e}", args.model.display()));
     let track = scenario.track(&inputs.trajectory, &inputs.model, &outages).map_err(impossible)?;
@@ -196,54 +199,22 @@ fn scenario(args: &Args) -> Result<Scenario, Failure> {
     Ok(scenario)
 }
 
-/// The outages on this trajectory. One that was asked for by its times and begins outside is an error; the
-/// default ones are left out where the trajectory is shorter, and that is said.
+/// The outages on this trajectory, said.
 fn outages(
     scenario: &Scenario,
     span: (f64, f64),
     seed: u64,
     session: &Session,
 ) -> Result<Vec<Outage>, Failure> {
-    let cut = scenario.cut_outages(span).map_err(|e| {
-        let hint = format!("fixes come every {} s from {} s", 1.0 / scenario.gnss.rate_hz, span.0);
-        Failure::input(e).hint(hint)
-    })?;
-    for o in &cut {
-        let message = format!("outage {}:{} is cut: the trajectory ends at {} s", o.start_s, o.end_s, span.1);
-        session.printer.warn(&message);
-    }
-    let windows = scenario.outages().windows(span, seed).map_err(Failure::input)?;
+    let PlacedOutages { windows, remarks } = scenario.outages_on(span, seed)?;
+    remarks.iter().for_each(|remark| session.printer.warn(&remark.to_string()));
     let shown: Vec<String> =
         windows.iter().map(|o| format!("{}–{} s", seconds(o.start_s), seconds(o.end_s))).collect();
     session.printer.say(&match shown.as_slice() {
         [] => "no outage".to_owned(),
         some => format!("outages {}", some.join(", ")),
     });
-    if scenario.outage.as_ref().is_some_and(|asked| asked.len() > windows.len()) {
-        session.printer.warn("outages that overlap or touch are made one");
-    }
-    if let Some(p) = scenario.outage_periodic.filter(|p| p.first_s >= span.1) {
-        let message =
-            format!("outage_periodic.first_s = {} s: the trajectory ends at {} s", p.first_s, span.1);
-        session.printer.warn(&message);
-    }
-    if scenario.outage.is_none() {
-        doubt_defaults(&scenario.outages().fixed, span, session);
-    }
     Ok(windows)
-}
-
-/// Default outages that the trajectory does not have, or has a part of.
-fn doubt_defaults(defaults: &[Outage], (start_s, end_s): (f64, f64), session: &Session) {
-    let lasts = format!("the trajectory lasts from {start_s} to {end_s} s");
-    for o in defaults {
-        let shown = format!("the default outage {}:{}", o.start_s, o.end_s);
-        if o.end_s <= start_s || o.start_s >= end_s {
-            session.printer.warn(&format!("{shown} is left out: {lasts}"));
-        } else if o.start_s < start_s || o.end_s > end_s {
-            session.printer.warn(&format!("{shown} is cut: {lasts}"));
-        }
-    }
 }
 
 /// A Gauss-Markov process of phi ≈ 1 may have any stationary variance: a filter that starts with it believes

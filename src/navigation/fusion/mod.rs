@@ -325,7 +325,7 @@ impl Run<'_> {
     fn fix(&mut self, fix: &GnssFix) -> Result<(), FusionError> {
         let mut record = self.filter.look_at(fix);
         record.error = self.error().map(|e| e.values);
-        let withheld = self.settings.outages.iter().any(|o| o.withholds(fix.t_s + 1e-9));
+        let withheld = self.settings.outages.iter().any(|o| o.withholds(fix.t_s));
         let limit = self.settings.nis_gate.map(|p| nis_limit(p, record.innovation.len()));
         record.used = match limit {
             _ if withheld => Use::Withheld,

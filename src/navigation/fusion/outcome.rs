@@ -66,7 +66,7 @@ pub fn outcome(solution: &Solution, outages: &[Outage]) -> Outcome {
 }
 
 fn drift(solution: &Solution, outage: Outage) -> OutageDrift {
-    let withheld = || solution.fixes.iter().filter(|f| outage.withholds(f.t_s + 1e-9));
+    let withheld = || solution.fixes.iter().filter(|f| outage.withholds(f.t_s));
     let after = solution.fixes.iter().find(|f| f.t_s + 1e-9 >= outage.end_s);
     let last = after.or(withheld().next_back());
     let from_fix = last.map(|f| Drift {

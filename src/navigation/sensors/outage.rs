@@ -27,6 +27,8 @@ impl Outage {
     /// Whether a fix at `t_s` is missing.
     #[must_use]
     pub fn withholds(&self, t_s: f64) -> bool {
+        // a nanosecond of slack: sample times are multiples of 1/rate, outage times are typed
+        let t_s = t_s + 1e-9;
         self.start_s <= t_s && t_s < self.end_s
     }
 
@@ -44,40 +46,170 @@ impl Outage {
     }
 }
 
-/// An outage that was asked for by its times and is none.
-#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum MisplacedOutage {
-    /// It begins before the data or after them.
-    #[error("outage {}:{} does not lie on the data, which last from {} to {} s", .outage.start_s, .outage.end_s, .span_s.0, .span_s.1)]
+/// When fixes come.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Fixes<'a> {
+    /// At whole intervals after the start of the data.
+    Every {
+        /// From one to the next (s).
+        interval_s: f64,
+    },
+    /// At these times (s), in order.
+    At(&'a [f64]),
+}
+
+/// The data that outages are placed on: the one rule of runs, studies and fusions.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FixedData<'a> {
+    /// From when to when they last (s).
+    pub span_s: (f64, f64),
+    /// Their fixes.
+    pub fixes: Fixes<'a>,
+}
+
+impl<'a> FixedData<'a> {
+    /// Recorded fixes at these times (s): an outage may last until a fix later than the last would come, and
+    /// begin as early before the first.
+    #[must_use]
+    pub fn recorded(times_s: &'a [f64]) -> Self {
+        let interval_s = times_s.windows(2).map(|w| w[1] - w[0]).fold(0.0, f64::max);
+        let (first, last) = times_s.first().zip(times_s.last()).map_or((0.0, 0.0), |(f, l)| (*f, *l));
+        Self { span_s: (first - interval_s, last + interval_s), fixes: Fixes::At(times_s) }
+    }
+
+    fn has_fix_in(&self, outage: &Outage) -> bool {
+        match self.fixes {
+            Fixes::Every { interval_s } => {
+                let since_start = (outage.start_s - self.span_s.0) / interval_s;
+                let next = (since_start - 1e-6).ceil().max(1.0);
+                self.span_s.0 + next * interval_s < outage.end_s
+            }
+            Fixes::At(times_s) => times_s.iter().any(|t_s| outage.withholds(*t_s)),
+        }
+    }
+
+    fn described(&self) -> String {
+        match self.fixes {
+            Fixes::Every { interval_s } => {
+                format!("fixes come every {interval_s} s from {} s", self.span_s.0)
+            }
+            Fixes::At([]) => "there are no fixes".to_owned(),
+            Fixes::At([first, .., last] | [first @ last]) => {
+                format!("the fixes run from {first} to {last} s")
+            }
+        }
+    }
+
+    /// An outage asked for by its times, cut where the data end.
+    fn place(&self, asked: Outage) -> Result<Outage, OutageError> {
+        let (start_s, end_s) = self.span_s;
+        // clocks and people round to a microsecond
+        if asked.start_s < start_s - 1e-6 || asked.start_s >= end_s {
+            let span_s = self.span_s;
+            return Err(OutageError::Outside { asked, span_s, fixes: self.described() });
+        }
+        let placed = Outage { end_s: asked.end_s.min(end_s), ..asked };
+        if self.has_fix_in(&placed) {
+            return Ok(placed);
+        }
+        Err(OutageError::NoFix { asked, fixes: self.described() })
+    }
+}
+
+/// An outage that is refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum OutageError {
+    /// A value that no data could have.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
+    /// One asked for by its times that begins before the data or after them.
+    #[error("outage {}:{} does not lie on the data, which last from {} to {} s", .asked.start_s, .asked.end_s, .span_s.0, .span_s.1)]
     Outside {
         /// As asked for.
-        outage: Outage,
+        asked: Outage,
+        /// Of the data (s).
+        span_s: (f64, f64),
+        /// The fixes of the data, in words.
+        fixes: String,
+    },
+    /// One asked for by its times into which no fix falls.
+    #[error("outage {}:{} withholds no fix", .asked.start_s, .asked.end_s)]
+    NoFix {
+        /// As asked for.
+        asked: Outage,
+        /// The fixes of the data, in words.
+        fixes: String,
+    },
+}
+
+impl OutageError {
+    /// What to know to correct it.
+    #[must_use]
+    pub fn hint(&self) -> Option<&str> {
+        match self {
+            Self::Setting(_) => None,
+            Self::Outside { fixes, .. } | Self::NoFix { fixes, .. } => Some(fixes),
+        }
+    }
+}
+
+/// What became of outages on data that are not as they were asked for.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum OutageRemark {
+    /// One asked for is cut where the trajectory ends.
+    #[error("outage {}:{} is cut: the trajectory ends at {end_s} s", .asked.start_s, .asked.end_s)]
+    Cut {
+        /// As asked for.
+        asked: Outage,
+        /// End of the data (s).
+        end_s: f64,
+    },
+    /// One asked for is cut where the next fix would come.
+    #[error("outage {}:{} is cut at {end_s} s: the fixes end at {last_s} s", .asked.start_s, .asked.end_s)]
+    CutAfterFixes {
+        /// As asked for.
+        asked: Outage,
+        /// Where it ends (s).
+        end_s: f64,
+        /// Last fix (s).
+        last_s: f64,
+    },
+    /// Some overlap or touch.
+    #[error("outages that overlap or touch are made one")]
+    United,
+    /// The periodic ones begin after the data.
+    #[error("outage_periodic.first_s = {first_s} s: the trajectory ends at {end_s} s")]
+    PeriodicTooLate {
+        /// Start of the first (s).
+        first_s: f64,
+        /// End of the data (s).
+        end_s: f64,
+    },
+    /// A default one is cut.
+    #[error("the default outage {}:{} is cut: the trajectory lasts from {} to {} s", .default.start_s, .default.end_s, .span_s.0, .span_s.1)]
+    DefaultCut {
+        /// As it would be.
+        default: Outage,
         /// Of the data (s).
         span_s: (f64, f64),
     },
-    /// No fix falls into it.
-    #[error("outage {}:{} withholds no fix", .0.start_s, .0.end_s)]
-    NoFix(Outage),
+    /// A default one lies outside.
+    #[error("the default outage {}:{} is left out: the trajectory lasts from {} to {} s", .default.start_s, .default.end_s, .span_s.0, .span_s.1)]
+    DefaultLeftOut {
+        /// As it would be.
+        default: Outage,
+        /// Of the data (s).
+        span_s: (f64, f64),
+    },
 }
 
-impl Outage {
-    /// The outage on data that last from `span_s.0` to `span_s.1`, cut where they end; `withholds` tells whether a fix
-    /// falls into what is left. The one rule of runs, studies and fusions.
-    ///
-    /// # Errors
-    /// One that begins outside the data, or withholds no fix: a mistake.
-    pub fn placed(
-        self,
-        span_s: (f64, f64),
-        withholds: impl Fn(&Self) -> bool,
-    ) -> Result<Self, MisplacedOutage> {
-        // clocks and people round to a microsecond
-        if self.start_s < span_s.0 - 1e-6 || self.start_s >= span_s.1 {
-            return Err(MisplacedOutage::Outside { outage: self, span_s });
-        }
-        let placed = Self { end_s: self.end_s.min(span_s.1), ..self };
-        if withholds(&placed) { Ok(placed) } else { Err(MisplacedOutage::NoFix(self)) }
-    }
+/// Outages as they are on data.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PlacedOutages {
+    /// In time order, apart from one another.
+    pub windows: Vec<Outage>,
+    /// Where they are not what was asked for.
+    pub remarks: Vec<OutageRemark>,
 }
 
 /// Outages of one length at regular times, to the end of the trajectory.
@@ -160,11 +292,13 @@ impl RandomOutages {
     }
 }
 
-/// What is asked for: the union of the three kinds.
+/// What is asked for: the union of all kinds.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct OutagePlan {
-    /// Windows given one by one.
+    /// Windows asked for by their times: they must lie on the data.
     pub fixed: Vec<Outage>,
+    /// Windows that nobody asked for: cut or left out where the data are shorter.
+    pub default: Vec<Outage>,
     /// Regular ones.
     pub periodic: Option<PeriodicOutages>,
     /// Random ones.
@@ -172,22 +306,80 @@ pub struct OutagePlan {
 }
 
 impl OutagePlan {
-    /// The windows on a trajectory that lasts from `span_s.0` to `span_s.1`: in time order, those that
-    /// overlap or touch made one, cut at the trajectory's ends, those outside left out.
+    /// Checks every value.
     ///
     /// # Errors
-    /// The key of a value that is refused.
-    pub fn windows(&self, span_s: (f64, f64), seed: u64) -> Result<Vec<Outage>, SettingError> {
-        let mut all = self.fixed.clone();
-        for (i, outage) in all.iter().enumerate() {
+    /// The key whose value is refused.
+    pub fn validate(&self) -> Result<(), SettingError> {
+        for (i, outage) in self.fixed.iter().enumerate() {
             outage.validate().map_err(|e| e.in_section(&format!("outage[{}]", i + 1)))?;
         }
         if let Some(periodic) = &self.periodic {
             periodic.validate().map_err(|e| e.in_section("outage_periodic"))?;
-            all.extend(periodic.windows(span_s));
         }
         if let Some(random) = &self.random {
             random.validate().map_err(|e| e.in_section("outage_random"))?;
+        }
+        Ok(())
+    }
+
+    /// The outages on data: windows asked for must begin on them and withhold a fix, and are cut where the data
+    /// end; of all other kinds, what lies on the data remains.
+    ///
+    /// ```
+    /// use nav_sim_navigation::sensors::outage::{FixedData, Fixes, Outage, OutagePlan};
+    ///
+    /// let data = FixedData { span_s: (0.0, 60.0), fixes: Fixes::Every { interval_s: 1.0 } };
+    /// let plan = |start_s, end_s| OutagePlan {
+    ///     fixed: vec![Outage { start_s, end_s }],
+    ///     ..OutagePlan::default()
+    /// };
+    /// let placed = plan(50.0, 70.0).on(&data, 1)?;
+    /// assert_eq!(placed.windows, [Outage { start_s: 50.0, end_s: 60.0 }]);
+    /// assert_eq!(placed.remarks[0].to_string(), "outage 50:70 is cut: the trajectory ends at 60 s");
+    /// assert!(plan(70.0, 90.0).on(&data, 1).is_err());
+    /// # Ok::<(), nav_sim_navigation::sensors::outage::OutageError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// A value that is refused, or a window asked for that does not lie on the data.
+    pub fn on(&self, data: &FixedData<'_>, seed: u64) -> Result<PlacedOutages, OutageError> {
+        self.validate()?;
+        let (start_s, end_s) = data.span_s;
+        let mut remarks = Vec::new();
+        for asked in &self.fixed {
+            if data.place(*asked)? != *asked {
+                remarks.push(match data.fixes {
+                    Fixes::At([.., last_s]) => {
+                        OutageRemark::CutAfterFixes { asked: *asked, end_s, last_s: *last_s }
+                    }
+                    _ => OutageRemark::Cut { asked: *asked, end_s },
+                });
+            }
+        }
+        let windows = self.windows(data.span_s, seed)?;
+        if self.fixed.len() > windows.len() {
+            remarks.push(OutageRemark::United);
+        }
+        if let Some(first_s) = self.periodic.map(|p| p.first_s).filter(|first_s| *first_s >= end_s) {
+            remarks.push(OutageRemark::PeriodicTooLate { first_s, end_s });
+        }
+        for default in self.default.iter().copied() {
+            if default.end_s <= start_s || default.start_s >= end_s {
+                remarks.push(OutageRemark::DefaultLeftOut { default, span_s: data.span_s });
+            } else if default.start_s < start_s || default.end_s > end_s {
+                remarks.push(OutageRemark::DefaultCut { default, span_s: data.span_s });
+            }
+        }
+        Ok(PlacedOutages { windows, remarks })
+    }
+
+    /// The windows on data that last from `span_s.0` to `span_s.1`: in time order, those that overlap or touch
+    /// made one, cut at the ends, those outside left out.
+    fn windows(&self, span_s: (f64, f64), seed: u64) -> Result<Vec<Outage>, SettingError> {
+        let mut all: Vec<Outage> = self.fixed.iter().chain(&self.default).copied().collect();
+        all.extend(self.periodic.iter().flat_map(|periodic| periodic.windows(span_s)));
+        if let Some(random) = &self.random {
             all.extend(random.windows(span_s, seed).map_err(|e| e.in_section("outage_random"))?);
         }
         Ok(united(all, span_s))
@@ -219,7 +411,10 @@ mod tests {
     #[test]
     fn a_fix_at_the_start_is_missing_and_at_the_end_is_not() {
         let o = outage(300.0, 390.0);
-        assert_eq!([299.0, 300.0, 389.0, 390.0].map(|t| o.withholds(t)), [false, true, true, false]);
+        assert_eq!(
+            [299.0, 300.0 - 1e-10, 300.0, 389.0, 390.0].map(|t| o.withholds(t)),
+            [false, true, true, true, false]
+        );
     }
 
     #[test]
@@ -227,7 +422,7 @@ mod tests {
         let plan = OutagePlan {
             fixed: vec![outage(50.0, 70.0), outage(10.0, 20.0), outage(95.0, 300.0)],
             periodic: Some(PeriodicOutages { first_s: 15.0, every_s: 40.0, duration_s: 10.0 }),
-            random: None,
+            ..OutagePlan::default()
         };
         let expected = vec![outage(10.0, 25.0), outage(50.0, 70.0), outage(95.0, 100.0)];
         assert_eq!(plan.windows((0.0, 100.0), 1).unwrap(), expected);
@@ -250,13 +445,62 @@ mod tests {
     #[test]
     fn an_outage_lies_on_the_data_and_withholds_a_fix() {
         let fixes = [1.0, 2.0, 3.0, 4.0];
-        let place = |a, b| outage(a, b).placed((1.0, 4.5), |o| fixes.iter().any(|t| o.withholds(*t)));
-        assert_eq!(place(2.0, 3.0), Ok(outage(2.0, 3.0)));
-        assert_eq!(place(3.5, 9.0), Ok(outage(3.5, 4.5)));
-        assert_eq!(place(2.1, 2.9), Err(MisplacedOutage::NoFix(outage(2.1, 2.9))));
-        assert!(matches!(place(0.0, 3.0), Err(MisplacedOutage::Outside { .. })));
-        let e = place(5.0, 9.0).unwrap_err().to_string();
-        assert_eq!(e, "outage 5:9 does not lie on the data, which last from 1 to 4.5 s");
+        let recorded = FixedData::recorded(&fixes);
+        assert_eq!(recorded.span_s, (0.0, 5.0));
+        let regular = FixedData { span_s: (0.0, 5.0), fixes: Fixes::Every { interval_s: 1.0 } };
+        for data in [recorded, regular] {
+            let place = |a, b| data.place(outage(a, b));
+            assert_eq!(place(2.0, 3.0), Ok(outage(2.0, 3.0)));
+            assert_eq!(place(3.5, 9.0), Ok(outage(3.5, 5.0)));
+            assert_eq!(place(0.0, 1.5), Ok(outage(0.0, 1.5)));
+            for (a, b) in [(2.1, 2.9), (0.0, 1.0), (2.0 + 1e-5, 3.0)] {
+                assert!(matches!(place(a, b), Err(OutageError::NoFix { .. })), "{a}:{b}");
+            }
+            assert!(matches!(place(-1.0, 3.0), Err(OutageError::Outside { .. })));
+            let e = place(5.0, 9.0).unwrap_err();
+            assert_eq!(e.to_string(), "outage 5:9 does not lie on the data, which last from 0 to 5 s");
+        }
+        let hints =
+            [recorded, regular].map(|d| d.place(outage(5.0, 9.0)).unwrap_err().hint().map(str::to_owned));
+        let expected = ["the fixes run from 1 to 4 s", "fixes come every 1 s from 0 s"];
+        assert_eq!(hints, expected.map(|hint| Some(hint.to_owned())));
+    }
+
+    /// What was asked for is refused where what is there by default is cut or left out.
+    #[test]
+    fn default_outages_are_cut_and_that_is_said() {
+        let data = FixedData { span_s: (0.0, 720.0), fixes: Fixes::Every { interval_s: 1.0 } };
+        let late = outage(800.0, 810.0);
+        let default = [Outage::PAPER.to_vec(), vec![late]].concat();
+        let placed = OutagePlan { default, ..OutagePlan::default() }.on(&data, 1).unwrap();
+        assert_eq!(placed.windows, [outage(300.0, 390.0), outage(700.0, 720.0)]);
+        let span_s = data.span_s;
+        let expected = [
+            OutageRemark::DefaultCut { default: Outage::PAPER[1], span_s },
+            OutageRemark::DefaultLeftOut { default: late, span_s },
+        ];
+        assert_eq!(placed.remarks, expected);
+        let asked = OutagePlan { fixed: vec![late], ..OutagePlan::default() };
+        assert!(asked.on(&data, 1).is_err());
+    }
+
+    #[test]
+    fn outages_that_are_not_as_asked_for_are_remarked() {
+        let remarks =
+            |plan: OutagePlan, fixes| plan.on(&FixedData { span_s: (0.0, 100.0), fixes }, 1).unwrap().remarks;
+        let plan = OutagePlan {
+            fixed: vec![outage(10.0, 20.0), outage(20.0, 30.0), outage(90.0, 300.0)],
+            periodic: Some(PeriodicOutages { first_s: 100.0, every_s: 40.0, duration_s: 10.0 }),
+            ..OutagePlan::default()
+        };
+        let common = [OutageRemark::United, OutageRemark::PeriodicTooLate { first_s: 100.0, end_s: 100.0 }];
+        let asked = outage(90.0, 300.0);
+        let found = remarks(plan.clone(), Fixes::Every { interval_s: 1.0 });
+        assert_eq!(found[0], OutageRemark::Cut { asked, end_s: 100.0 });
+        assert_eq!(found[1..], common);
+        let found = remarks(plan, Fixes::At(&[10.0, 20.0, 95.0]));
+        assert_eq!(found[0], OutageRemark::CutAfterFixes { asked, end_s: 100.0, last_s: 95.0 });
+        assert_eq!(found[1..], common);
     }
 
     /// The number of outages in an hour of exponential waiting is close to Poisson: over 2000 seeds the
@@ -284,7 +528,7 @@ mod tests {
 
     #[test]
     fn impossible_windows_are_refused_by_key() {
-        let refused = |plan: &OutagePlan| plan.windows((0.0, 100.0), 1).unwrap_err().key;
+        let refused = |plan: &OutagePlan| plan.validate().unwrap_err().key;
         let fixed = OutagePlan { fixed: vec![outage(9.0, 9.0)], ..OutagePlan::default() };
         assert_eq!(refused(&fixed), "outage[1].end_s");
         let periodic = PeriodicOutages { first_s: 0.0, every_s: 10.0, duration_s: 10.0 };

@@ -261,7 +261,7 @@ impl Candidate {
         let receiver = n.hypot(e);
         let outages = plan.experiment.outages.iter().zip(&plan.outages);
         for ((outage, (reports, _)), records) in outages.zip(&mut self.outages) {
-            let inside = outage.withholds(event.t_s + 1e-9);
+            let inside = outage.withholds(event.t_s);
             let after = event.t_s + 1e-9 - outage.end_s;
             for lane in 0..self.live {
                 let record = &mut records[lane];

@@ -197,7 +197,7 @@ impl<'a> Plan<'a> {
 }
 
 fn effects(outage: &Outage, events: &[Event]) -> (f64, usize) {
-    let reports = events.iter().filter(|e| e.report && outage.withholds(e.t_s + 1e-9)).count();
+    let reports = events.iter().filter(|e| e.report && outage.withholds(e.t_s)).count();
     let first_fix = events.iter().position(|e| e.fix && e.t_s + 1e-9 >= outage.end_s);
     (reports as f64, first_fix.unwrap_or(events.len() - 1))
 }
@@ -234,8 +234,7 @@ fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, E
             return Err(ExperimentError::Pole { t_s, lat_deg: reference.lat / DEG });
         }
         let gnss_epoch = sample > 0 && sample.is_multiple_of(per_fix);
-        // a nanosecond of slack: sample times are multiples of 1/rate, outage times are typed
-        let withheld = experiment.outages.iter().any(|o| o.withholds(t_s + 1e-9));
+        let withheld = experiment.outages.iter().any(|o| o.withholds(t_s));
         Ok(Event {
             sample,
             t_s,

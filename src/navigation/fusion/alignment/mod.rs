@@ -77,7 +77,7 @@ pub fn coarse(
     settings: &Settings,
     belief: &Belief,
 ) -> Result<Alignment, AlignmentError> {
-    let withheld = |f: &GnssFix| settings.outages.iter().any(|o| o.withholds(f.t_s + 1e-9));
+    let withheld = |f: &GnssFix| settings.outages.iter().any(|o| o.withholds(f.t_s));
     let gnss: Vec<GnssFix> = recorded.gnss.iter().filter(|f| !withheld(f)).copied().collect();
     let recorded = Recorded { gnss: &gnss, ..*recorded };
     let courses = courses(&gnss, recorded.imu);
