@@ -26,6 +26,7 @@ mod schema;
 mod synthesize;
 mod trajectory;
 mod tuning;
+mod turn_on;
 mod wv;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};

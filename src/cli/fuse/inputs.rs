@@ -2,7 +2,7 @@
 
 use super::Args;
 use crate::cli::run::reduced::{Made, reduction};
-use crate::cli::{Failure, Session, parse, read};
+use crate::cli::{Failure, Session, parse, read, turn_on};
 use glam::{DMat3, DQuat, DVec3};
 use nav_sim::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim::formats::fusion_files::{FixSigma, FusionFileError, ImuFile, read_gnss, read_imu, read_initial};
@@ -183,6 +183,7 @@ fn belief(
     let window_s = reduction::window_s(longest);
     let mut states = FilterStates::default();
     args.filter.over(&mut states, &mut initial);
+    turn_on::expect(&mut initial, &file, &args.model, session);
     initial.validate().map_err(Failure::input)?;
     let belief = Belief::new(&model, states, interval_s, window_s)
         .map_err(|e| Failure::input(format!("{shown}: {e}")))?;

@@ -1,10 +1,12 @@
 //! The files of a run.
 
 use super::Args;
-use crate::cli::{Failure, Session, read};
+use crate::cli::{Failure, Session, read, turn_on};
+use nav_sim::formats::model_file::ModelFile;
 use nav_sim::imu::{Recording, Sensor};
 use nav_sim::noise::{Model, continuous};
 use nav_sim::report::{Input, ModelNote};
+use nav_sim::scenario::Scenario;
 use nav_sim::sensors::imu::Truth;
 use nav_sim::trajectory::Trajectory;
 use std::path::{Path, PathBuf};
@@ -22,18 +24,33 @@ pub(super) struct Inputs {
 }
 
 impl Inputs {
-    pub(super) fn read(args: &Args, imu_hz: f64, session: &Session) -> Result<Self, Failure> {
+    /// Reads them; the turn-on biases that the models state go into the scenario where it is silent.
+    pub(super) fn read(args: &Args, scenario: &mut Scenario, session: &Session) -> Result<Self, Failure> {
+        let imu_hz = scenario.imu.rate_hz;
         let files = files(args)?;
         let trajectory = read::trajectory(&args.trajectory, session)?;
-        let (model, estimator) = model(&args.model, imu_hz, session)?;
+        let (model, file) = model(&args.model, imu_hz, session)?;
+        turn_on::expect(&mut scenario.initial, &file, &args.model, session);
         let truth = args.truth.as_deref().map(|path| self::model(path, imu_hz, session)).transpose()?;
+        // recordings are their own truth: what they had of a constant bias is taken from them
+        if args.recordings.is_empty() {
+            let made_by = truth.as_ref().map_or(&file, |(_, file)| file);
+            turn_on::make(&mut scenario.imu, made_by, args.truth.as_ref().unwrap_or(&args.model), session);
+        }
         let recordings = match args.recordings.as_slice() {
             [] => Vec::new(),
             paths => read::recordings_at(paths, args.static_rate_hz, session)?,
         };
         recordings.iter().filter_map(motion).for_each(|doubt| session.printer.warn(&doubt));
         let truth_model = truth.map(|(model, _)| model);
-        Ok(Self { trajectory, model, note: ModelNote { estimator }, truth_model, recordings, files })
+        Ok(Self {
+            trajectory,
+            model,
+            note: ModelNote { estimator: estimator(&file) },
+            truth_model,
+            recordings,
+            files,
+        })
     }
 
     /// What makes the errors.
@@ -79,8 +96,8 @@ fn files(args: &Args) -> Result<Vec<Input>, Failure> {
     named.iter().map(|(role, path)| read::input(role, path)).collect()
 }
 
-/// A model at the rate of the IMU, and the estimator that made it, if known.
-fn model(path: &Path, imu_hz: f64, session: &Session) -> Result<(Model, Option<String>), Failure> {
+/// A model at the rate of the IMU, and its file.
+fn model(path: &Path, imu_hz: f64, session: &Session) -> Result<(Model, ModelFile), Failure> {
     let file = read::model(path, session)?;
     let (shown, from_hz) = (path.display(), file.model.rate_hz);
     let converted = continuous::at_rate(&file.model, imu_hz).map_err(|e| {
@@ -90,6 +107,11 @@ fn model(path: &Path, imu_hz: f64, session: &Session) -> Result<(Model, Option<S
     if !continuous::same_rate(from_hz, imu_hz) {
         session.printer.say(&format!("{shown}: converted from {from_hz} Hz to {imu_hz} Hz"));
     }
-    let estimator = file.provenance.as_ref().and_then(|p| p.get("estimator"));
-    Ok((converted, estimator.and_then(toml::Value::as_str).map(str::to_owned)))
+    Ok((converted, file))
+}
+
+/// The estimator that made a model, if known.
+fn estimator(file: &ModelFile) -> Option<String> {
+    let estimator = file.provenance.as_ref()?.get("estimator")?;
+    estimator.as_str().map(str::to_owned)
 }

@@ -112,8 +112,8 @@ fn parse_method(text: &str) -> Result<Method, String> {
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let scenario = scenario(args)?;
-    let inputs = Inputs::read(args, scenario.imu.rate_hz, session)?;
+    let mut scenario = scenario(args)?;
+    let inputs = Inputs::read(args, &mut scenario, session)?;
     let seed = session.seed(scenario.run.seed);
     let span = (inputs.trajectory.start_s(), inputs.trajectory.end_s());
     let outages = outages(&scenario, span, seed, session).map_err(|e| match &args.scenario {

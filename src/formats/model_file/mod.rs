@@ -8,6 +8,9 @@
 //!   { type = "WN", sigma2 = 5.2e-5, sigma2_ci95 = [5.1e-5, 5.3e-5] },
 //!   { type = "AR1", phi = 0.9835, sigma2 = 1.3e-8 },
 //! ]
+//! [turn_on]                                 # standard deviation of the constant bias of a switching-on: one, or x, y, z
+//! accel_m_s2 = 0.02
+//! gyro_rad_s = [1e-3, 1e-3, 2e-3]
 //! [provenance]                              # free: how the model was made
 //! [[spread.accel]]                          # see `noise::spread`
 //! ```
@@ -22,7 +25,7 @@ pub use calibrated::CalibrationNote;
 pub use read::read;
 pub use write::{to_toml, write};
 
-use crate::imu::Channel;
+use crate::imu::{Channel, Sensor};
 use crate::noise::{Model, Spread};
 
 /// The version of the layout that is written; the only one that is read.
@@ -35,6 +38,8 @@ pub struct ModelFile {
     pub model: Model,
     /// Axes the file says nothing about (empty sums in the model).
     pub missing: Vec<Channel>,
+    /// The constant bias of a switching-on.
+    pub turn_on: Option<TurnOn>,
     /// How parameters vary between replicates.
     pub spread: Option<Spread>,
     /// Confidence intervals of parameters.
@@ -47,7 +52,52 @@ impl ModelFile {
     /// A model of all six axes and nothing beside.
     #[must_use]
     pub const fn new(model: Model) -> Self {
-        Self { model, missing: Vec::new(), spread: None, intervals: Vec::new(), provenance: None }
+        Self {
+            model,
+            missing: Vec::new(),
+            turn_on: None,
+            spread: None,
+            intervals: Vec::new(),
+            provenance: None,
+        }
+    }
+}
+
+/// Standard deviations of the constant bias that each switching-on draws anew, axis by axis.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct TurnOn {
+    /// Of the accelerometers (m/s²).
+    pub accel_m_s2: Option<[f64; 3]>,
+    /// Of the gyroscopes (rad/s).
+    pub gyro_rad_s: Option<[f64; 3]>,
+}
+
+impl TurnOn {
+    /// Those of a sensor's axes (m/s² or rad/s).
+    #[must_use]
+    pub const fn axes(&self, sensor: Sensor) -> Option<[f64; 3]> {
+        match sensor {
+            Sensor::Accel => self.accel_m_s2,
+            Sensor::Gyro => self.gyro_rad_s,
+        }
+    }
+
+    /// One for the three axes of a sensor, with the sum of their variances (m/s² or rad/s).
+    #[must_use]
+    pub fn sigma(&self, sensor: Sensor) -> Option<f64> {
+        let [x, y, z] = self.axes(sensor)?;
+        // like axes keep every bit
+        let alike = x.to_bits() == y.to_bits() && y.to_bits() == z.to_bits();
+        Some(if alike { x } else { ((x * x + y * y + z * z) / 3.0).sqrt() })
+    }
+
+    /// The key of a sensor.
+    #[must_use]
+    pub const fn key(sensor: Sensor) -> &'static str {
+        match sensor {
+            Sensor::Accel => "accel_m_s2",
+            Sensor::Gyro => "gyro_rad_s",
+        }
     }
 }
 

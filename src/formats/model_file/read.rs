@@ -1,12 +1,13 @@
 //! Reading model files.
 
-use super::{CI, Interval, ModelFile, SCHEMA};
+use super::{CI, Interval, ModelFile, SCHEMA, TurnOn};
 use crate::formats::suggest::nearest;
 use crate::formats::toml_file::{Section, Source, TomlError};
 use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::{
     CATALOGUE, Composite, Law, Model, ParameterError, Process, Spread, SpreadError, Variation,
 };
+use crate::sensors::defects::{MAX_BIAS_M_S2, MAX_BIAS_RAD_S};
 use std::path::Path;
 
 /// Reads a model file.
@@ -21,7 +22,7 @@ pub fn read(path: &Path) -> Result<ModelFile, TomlError> {
 pub(super) fn parse(source: &Source) -> Result<ModelFile, TomlError> {
     let table = source.parse()?;
     let root = source.root(&table);
-    root.only(&["schema", "rate_hz", "accel", "gyro", "spread", "provenance"])?;
+    root.only(&["schema", "rate_hz", "accel", "gyro", "turn_on", "spread", "provenance"])?;
     check_schema(&root)?;
     let rate_hz = root.require_f64("rate_hz")?;
     if rate_hz <= 0.0 {
@@ -34,6 +35,7 @@ pub(super) fn parse(source: &Source) -> Result<ModelFile, TomlError> {
     if file.missing.len() == Channel::ALL.len() {
         return Err(root.missing_one_of(&["accel", "gyro"]));
     }
+    file.turn_on = root.section("turn_on")?.map(|s| read_turn_on(&s)).transpose()?;
     file.spread = root.section("spread")?.map(|s| read_spread(&s, &file)).transpose()?;
     file.provenance = root.section("provenance")?.and_then(|_| source.owned_table("provenance"));
     Ok(file)
@@ -74,6 +76,32 @@ fn read_sensor(root: &Section<'_>, sensor: Sensor, file: &mut ModelFile) -> Resu
     }
     let found = file.missing.iter().filter(|c| c.sensor == sensor).count() < Axis::ALL.len();
     if found { Ok(()) } else { Err(section.missing("processes")) }
+}
+
+fn read_turn_on(section: &Section<'_>) -> Result<TurnOn, TomlError> {
+    section.only(&Sensor::ALL.map(TurnOn::key))?;
+    let [accel_m_s2, gyro_rad_s] = Sensor::ALL.map(|sensor| read_turn_on_of(section, sensor));
+    Ok(TurnOn { accel_m_s2: accel_m_s2?, gyro_rad_s: gyro_rad_s? })
+}
+
+fn read_turn_on_of(section: &Section<'_>, sensor: Sensor) -> Result<Option<[f64; 3]>, TomlError> {
+    let key = TurnOn::key(sensor);
+    let axes = match section.is_list(key) {
+        false => section.f64(key)?.map(|all| [all; 3]),
+        true => match section.f64s(key)?.as_deref() {
+            Some(&[x, y, z]) => Some([x, y, z]),
+            _ => return Err(section.refuse(key, "is not one number or three, x, y, z", None)),
+        },
+    };
+    let limit = match sensor {
+        Sensor::Accel => MAX_BIAS_M_S2,
+        Sensor::Gyro => MAX_BIAS_RAD_S,
+    };
+    if axes.iter().flatten().any(|sigma| !(0.0..=limit).contains(sigma)) {
+        let reason = format!("is not a standard deviation between 0 and {limit} {}", sensor.unit());
+        return Err(section.refuse(key, reason, None));
+    }
+    Ok(axes)
 }
 
 fn read_processes(table: &Section<'_>, channel: Channel, file: &mut ModelFile) -> Result<(), TomlError> {

@@ -65,6 +65,7 @@ fn what_is_written_reads_back_to_the_same_bits() {
     spread.axes[..3].fill(vec![pooled, normal.clone()]);
     spread.axes[5].push(normal);
     file.spread = Some(spread);
+    file.turn_on = Some(TurnOn { accel_m_s2: Some([0.02; 3]), gyro_rad_s: Some([1e-3, 0.1 + 0.2, 0.0]) });
     file.provenance =
         Some(toml::from_str("estimator = \"dr-awv\"\nobjective = 1.5e-9\n[inputs]\na = 1").unwrap());
     let text = to_toml(&file);
@@ -239,5 +240,28 @@ mod garbage {
         fn never_panics_on_noise(text in ".{0,200}") {
             let _ = read_text(&text);
         }
+    }
+}
+
+#[test]
+fn turn_on_biases_are_one_or_three_standard_deviations() {
+    let with =
+        |turn_on: &str| read_text(&format!("rate_hz = 100\n[turn_on]\n{turn_on}\n[gyro]\nprocesses = []\n"));
+    let turn_on = with("gyro_rad_s = [3e-3, 0, 4e-3]").unwrap().turn_on.unwrap();
+    assert_eq!((turn_on.sigma(Sensor::Accel), turn_on.axes(Sensor::Accel)), (None, None));
+    // the variances 9, 0 and 16 (1e-6) have the mean 25/3
+    assert!((turn_on.sigma(Sensor::Gyro).unwrap().powi(2) / 25e-6 - 1.0 / 3.0).abs() < 1e-15);
+    assert_eq!(with("accel_m_s2 = 0.1").unwrap().turn_on.unwrap().accel_m_s2, Some([0.1; 3]));
+    for (text, reason) in [
+        ("accel_m_s2 = -1", "\"turn_on.accel_m_s2\" = -1 is not a standard deviation between 0 and 10 m/s²"),
+        ("gyro_rad_s = 2", "\"turn_on.gyro_rad_s\" = 2 is not a standard deviation between 0 and 1 rad/s"),
+        (
+            "gyro_rad_s = [1e-3, 2e-3]",
+            "\"turn_on.gyro_rad_s\" = [1e-3, 2e-3] is not one number or three, x, y, z",
+        ),
+        ("gyro_deg_h = 1", "unknown key \"turn_on.gyro_deg_h\""),
+    ] {
+        let message = with(text).unwrap_err().to_string();
+        assert!(message.ends_with(reason), "{message}");
     }
 }

@@ -1,6 +1,6 @@
 //! Writing model files: numbers in the shortest form that reads back to the same bits.
 
-use super::{CI, Interval, ModelFile, SCHEMA};
+use super::{CI, Interval, ModelFile, SCHEMA, TurnOn};
 use crate::formats::atomic::{self, WriteError};
 use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::{Law, Process, Variation};
@@ -23,6 +23,7 @@ pub fn to_toml(file: &ModelFile) -> String {
         let tables = Axis::ALL.map(|axis| processes(file, Channel { sensor, axis }));
         write_axes(&mut out, sensor, &tables, |name, table| format!("\n[{name}]\n{table}"));
     }
+    out.push_str(&turn_on(file));
     for sensor in Sensor::ALL {
         let tables = Axis::ALL.map(|axis| laws(file, Channel { sensor, axis }));
         write_axes(&mut out, sensor, &tables, |name, laws| {
@@ -33,6 +34,18 @@ pub fn to_toml(file: &ModelFile) -> String {
         let mut table = toml::Table::new();
         table.insert("provenance".into(), provenance.clone().into());
         let _ = write!(out, "\n{table}");
+    }
+    out
+}
+
+fn turn_on(file: &ModelFile) -> String {
+    let Some(turn_on) = &file.turn_on else { return String::new() };
+    let mut out = String::from("\n[turn_on]\n");
+    for sensor in Sensor::ALL {
+        let Some(axes) = turn_on.axes(sensor) else { continue };
+        let alike = axes.iter().all(|sigma| *sigma == axes[0]);
+        let value = if alike { format!("{:?}", axes[0]) } else { format!("{axes:?}") };
+        let _ = writeln!(out, "{} = {value}", TurnOn::key(sensor));
     }
     out
 }
