@@ -119,14 +119,14 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
             Ok(format!("an initial state at {} s", start.t_s))
         }
         Kind::Gnss => {
-            let (fixes, remarks) = read_gnss(path, None)?;
+            let (fixes, remarks) = read_gnss(path, None).map_err(read::refused_for_fusion)?;
             remarks.iter().for_each(|remark| session.printer.warn(remark));
             let span = fixes.first().zip(fixes.last()).map_or(0.0, |(a, b)| b.t_s - a.t_s);
             let velocity = if fixes.iter().any(|f| f.velocity.is_some()) { " with velocity" } else { "" };
             Ok(format!("{} GNSS fixes{velocity} over {span} s", fixes.len()))
         }
         Kind::Imu => {
-            let imu = read_imu(path)?;
+            let imu = read_imu(path).map_err(read::refused_for_fusion)?;
             imu.remarks.iter().for_each(|remark| session.printer.warn(remark));
             Ok(format!(
                 "an IMU recording of {} samples at {:.2} Hz, for fuse",

@@ -4,7 +4,7 @@ use super::{Failure, Session};
 use nav_sim::efficiency::{
     Accuracy, Design, Estimate, Movement, StudyError, Target, abnormal_curve, accuracy, outlier_curve, target,
 };
-use nav_sim::formats::efficiency_directory::{Layout, StudyDirectory, StudyDirectoryError};
+use nav_sim::formats::efficiency_directory::{Layout, StudyDirectory};
 use nav_sim::formats::{atomic, efficiency_file};
 use nav_sim::noise::{Process, contamination::Contamination};
 use nav_sim::report::{self, EfficiencyFile, EfficiencyRow};
@@ -198,11 +198,4 @@ fn sensitivity(design: &Design, aim: &Target) -> Result<String, StudyError> {
         }
     }
     Ok(text)
-}
-
-impl From<StudyDirectoryError> for Failure {
-    fn from(e: StudyDirectoryError) -> Self {
-        let failure = if e.is_usage() { Self::input(&e) } else { Self::could_not(&e) };
-        failure.maybe_hint(e.hint())
-    }
 }

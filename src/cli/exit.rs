@@ -1,9 +1,7 @@
 //! What went wrong, as the user reads it, and the exit code it means.
 
 use nav_sim::calibration::SignalError;
-use nav_sim::formats::atomic::WriteError;
-use nav_sim::formats::recordings::RecordingError;
-use nav_sim::formats::toml_file::TomlError;
+use nav_sim::formats::{FileError, Setting};
 use nav_sim::sensors::outage::OutageError;
 use std::fmt;
 
@@ -42,6 +40,12 @@ impl Failure {
         Self { code: 130, message: message.to_string(), hint: None }
     }
 
+    /// What is wrong with a file, for a command whose options `option` knows.
+    pub(crate) fn of_file(e: &FileError, option: impl Fn(Setting) -> Option<&'static str>) -> Self {
+        let failure = if e.is_system() { Self::could_not(e) } else { Self::input(e) };
+        failure.maybe_hint(e.hint_with(option))
+    }
+
     /// The same, of a part.
     pub(crate) fn within(self, part: &str) -> Self {
         Self { message: format!("{part}: {}", self.message), ..self }
@@ -74,24 +78,29 @@ impl fmt::Display for Failure {
     }
 }
 
-impl From<TomlError> for Failure {
-    fn from(e: TomlError) -> Self {
-        let failure = if e.is_content() { Self::input(&e) } else { Self::could_not(&e) };
-        failure.maybe_hint(e.hint())
+impl From<FileError> for Failure {
+    fn from(e: FileError) -> Self {
+        Self::of_file(&e, |setting| Some(option_for(setting)))
     }
 }
 
-impl From<WriteError> for Failure {
-    fn from(e: WriteError) -> Self {
-        let failure = if e.is_usage() { Self::input(&e) } else { Self::could_not(&e) };
-        failure.maybe_hint(e.hint())
-    }
-}
-
-impl From<RecordingError> for Failure {
-    fn from(e: RecordingError) -> Self {
-        let failure = if e.is_io() { Self::could_not(&e) } else { Self::input(&e) };
-        failure.maybe_hint(e.hint())
+/// How the commands say a setting that helps.
+pub(crate) const fn option_for(setting: Setting) -> &'static str {
+    match setting {
+        Setting::ColumnNames => "give the names with --columns",
+        Setting::Channels => "leave the axis out with --axes",
+        Setting::FewerChannels => "take fewer signals at a time with --axes",
+        Setting::Gaps => {
+            "--gaps split takes the stretches between as recordings of their own; --gaps ignore takes the samples as \
+             evenly spaced (stamped late, none lost)"
+        }
+        Setting::Rate => "give the rate with --rate-hz",
+        Setting::WrongRate => "leave --rate-hz out, or correct it",
+        Setting::Skip => "a smaller --skip-s",
+        Setting::Origin => "give --origin LAT_DEG,LON_DEG,H_M",
+        Setting::Output => "choose another output with --out",
+        Setting::OutputDirectory => "choose another directory with --out",
+        Setting::StartFiles => "start from the files that nav-sim init makes",
     }
 }
 

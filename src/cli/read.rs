@@ -1,10 +1,11 @@
 //! Reading inputs for commands: doubts are said, refusals become failures.
 
+use super::exit::option_for;
 use super::{Failure, Session};
-use nav_sim::formats::hash;
 use nav_sim::formats::model_file::{self, ModelFile};
 use nav_sim::formats::recordings::{self, ReadOptions};
-use nav_sim::formats::trajectory_file::{self, TrajectoryFileError};
+use nav_sim::formats::trajectory_file;
+use nav_sim::formats::{FileError, Setting, hash};
 use nav_sim::imu::Recording;
 use nav_sim::report::Input;
 use nav_sim::trajectory::Trajectory;
@@ -12,24 +13,25 @@ use nav_sim::trajectory::reference::Reference;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-impl From<TrajectoryFileError> for Failure {
-    fn from(e: TrajectoryFileError) -> Self {
-        let failure = if e.is_content() { Self::input(&e) } else { Self::could_not(&e) };
-        failure.maybe_hint(e.hint())
-    }
+/// For commands without the option `--origin`: `trajectory convert` has it.
+fn without_options(e: FileError) -> Failure {
+    Failure::of_file(&e, |setting| {
+        Some(match setting {
+            Setting::Origin => {
+                "write it with latitude and longitude: nav-sim trajectory convert FILE --origin LAT_DEG,LON_DEG,H_M"
+            }
+            other => option_for(other),
+        })
+    })
 }
 
-/// For commands without the option `--origin`: `trajectory convert` has it.
-fn without_options(e: TrajectoryFileError) -> Failure {
-    let local = matches!(e, TrajectoryFileError::NoOrigin { .. });
-    let failure = Failure::from(e);
-    if local {
-        return failure.hint(
-            "write it with latitude and longitude: nav-sim trajectory convert FILE --origin LAT_DEG,LON_DEG,H_M; or \
-             give it a first line \"# origin: LAT_DEG, LON_DEG, H_M\"",
-        );
-    }
-    failure
+/// A recording to be fused: all six channels are needed, as the file names them: without the options of the commands for static recordings.
+pub(super) fn refused_for_fusion(e: FileError) -> Failure {
+    Failure::of_file(&e, |setting| match setting {
+        Setting::ColumnNames => Some("correct the header"),
+        Setting::Channels | Setting::FewerChannels | Setting::Gaps => None,
+        other => Some(option_for(other)),
+    })
 }
 
 /// An input with its fingerprint, of the bytes that were read.

@@ -3,10 +3,11 @@
 use super::axes::ChannelSet;
 use super::run::not_of_another_command;
 use super::{Failure, Session, read};
-use nav_sim::formats::atomic::{AtomicDir, WriteError, guard_inputs};
+use nav_sim::formats::atomic::{AtomicDir, guard_inputs};
 use nav_sim::formats::contamination_file;
 use nav_sim::formats::model_file::{self, ModelFile};
 use nav_sim::formats::recordings::{FileFormat, is_recording};
+use nav_sim::formats::{FileError, Place, Setting};
 use nav_sim::imu::Channel;
 use nav_sim::noise::contamination::{Contamination, Rule};
 use nav_sim::noise::{Composite, Model, Process, ReplicateError, VirtualImu};
@@ -149,7 +150,11 @@ fn check_directory(args: &Args, names: &[String], session: &Session) -> Result<(
         return Err(failure.hint("move it away, or choose another directory with --out"));
     }
     if let Some(stale) = inside.into_iter().find(|n| !names.contains(n)) {
-        return Err(WriteError::Stale { path: shown.to_string(), stale }.into());
+        let message = format!("already holds {stale}, which this command would leave beside its own outputs");
+        return Err(FileError::contents(shown.to_string(), Place::Itself, message)
+            .advice("remove it")
+            .setting(Setting::OutputDirectory)
+            .into());
     }
     session.printer.warn(&format!("{shown}: the replicates in it are replaced"));
     Ok(())
@@ -173,7 +178,7 @@ impl NotWritten {
     fn at(self, path: &Path) -> Failure {
         match self {
             Self::Refused(e) => Failure::input(e),
-            Self::Io(e) => WriteError::io(path, e).into(),
+            Self::Io(e) => FileError::io(path, e).into(),
         }
     }
 }
@@ -298,10 +303,10 @@ fn contamination(name: &str, rate_hz: f64) -> Result<Contamination, Failure> {
     contamination_file::find(name, rate_hz).map_err(|e| {
         let there = contamination_file::names().join(", ");
         let meant = contamination_file::meant(name);
-        let hint = match (e.is_content(), meant) {
-            (true, _) => None,
-            (false, Some(meant)) => Some(format!("did you mean \"{meant}\"?")),
-            (false, None) => Some(format!("give a file or one of {there}")),
+        let hint = match (e.is_system(), meant) {
+            (false, _) => None,
+            (true, Some(meant)) => Some(format!("did you mean \"{meant}\"?")),
+            (true, None) => Some(format!("give a file or one of {there}")),
         };
         Failure::from(e).maybe_hint(hint)
     })

@@ -19,8 +19,9 @@
 //! With `of_samples` the burst's lengths are meant for a record of so many samples and are scaled to the
 //! record's length. What the operations do, and in which order: [`crate::noise::contamination`].
 
+use super::FileError;
 use super::suggest::nearest;
-use super::toml_file::{Section, Source, TomlError};
+use super::toml_file::{Section, Source};
 use crate::imu::Sensor;
 use crate::noise::Ar1;
 use crate::noise::contamination::{Contamination, Extent, Operation, Rule};
@@ -47,7 +48,7 @@ pub fn names() -> [&'static str; 6] {
 ///
 /// # Errors
 /// When the file cannot be read or is refused.
-pub fn find(name_or_path: &str, rate_hz: f64) -> Result<Contamination, TomlError> {
+pub fn find(name_or_path: &str, rate_hz: f64) -> Result<Contamination, FileError> {
     match PRESETS.iter().find(|(name, _)| *name == name_or_path) {
         Some((name, text)) => parse(&Source::new(name, text), rate_hz),
         None => parse(&Source::read(Path::new(name_or_path))?, rate_hz),
@@ -60,7 +61,7 @@ pub fn meant(name: &str) -> Option<&'static str> {
     nearest(name, names())
 }
 
-fn parse(source: &Source, rate_hz: f64) -> Result<Contamination, TomlError> {
+fn parse(source: &Source, rate_hz: f64) -> Result<Contamination, FileError> {
     let table = source.parse()?;
     let root = source.root(&table);
     root.only(&["schema", "accel", "gyro"])?;
@@ -95,7 +96,7 @@ fn read_rules(
     sensor: Sensor,
     rate_hz: f64,
     into: &mut Vec<Rule>,
-) -> Result<(), TomlError> {
+) -> Result<(), FileError> {
     let name = section.require_str("operation")?;
     let Some(keys) = legal(name) else {
         let hint = "operations: step, replace, bursts, ar1, scale".to_owned();
@@ -139,7 +140,7 @@ impl Entry<'_> {
         key: &str,
         domain: &str,
         inside: impl Fn(f64) -> bool,
-    ) -> Result<Option<f64>, TomlError> {
+    ) -> Result<Option<f64>, FileError> {
         let value = if self.section.is_list(key) {
             let values = self.section.f64s(key)?.unwrap_or_default();
             if values.len() != self.listed {
@@ -156,20 +157,20 @@ impl Entry<'_> {
         }
     }
 
-    fn require(&self, key: &str, domain: &str, inside: impl Fn(f64) -> bool) -> Result<f64, TomlError> {
+    fn require(&self, key: &str, domain: &str, inside: impl Fn(f64) -> bool) -> Result<f64, FileError> {
         self.number(key, domain, inside)?.ok_or_else(|| self.section.missing(key))
     }
 
-    fn any(&self, key: &str) -> Result<f64, TomlError> {
+    fn any(&self, key: &str) -> Result<f64, FileError> {
         self.require(key, "a number", |_| true)
     }
 
-    fn share(&self, key: &str) -> Result<Option<f64>, TomlError> {
+    fn share(&self, key: &str) -> Result<Option<f64>, FileError> {
         self.number(key, "between 0 and 1", |v| (0.0..=1.0).contains(&v))
     }
 
     /// Refuses more than one of several ways to say the same.
-    fn at_most_one(&self, keys: &[&str]) -> Result<(), TomlError> {
+    fn at_most_one(&self, keys: &[&str]) -> Result<(), FileError> {
         let mut given = keys.iter().filter(|k| self.section.has(k));
         match (given.next(), given.next()) {
             (Some(first), Some(second)) => {
@@ -179,7 +180,7 @@ impl Entry<'_> {
         }
     }
 
-    fn step(&self, rate_hz: f64) -> Result<Operation, TomlError> {
+    fn step(&self, rate_hz: f64) -> Result<Operation, FileError> {
         self.at_most_one(&["at_share", "at_samples", "at_s"])?;
         let seconds = self.number("at_s", "a time ≥ 0", |v| v >= 0.0)?;
         let at = match (self.section.u64("at_samples")?, seconds) {
@@ -190,7 +191,7 @@ impl Entry<'_> {
         Ok(Operation::Step { at, amplitude: self.any("amplitude")? })
     }
 
-    fn replace(&self) -> Result<Operation, TomlError> {
+    fn replace(&self) -> Result<Operation, FileError> {
         self.at_most_one(&["share", "points"])?;
         let points = match (self.section.u64("points")?, self.share("share")?) {
             (Some(points), _) => Extent::Samples(points),
@@ -208,8 +209,8 @@ impl Entry<'_> {
         Ok(Operation::Replace { points, mean, sigma })
     }
 
-    fn bursts(&self) -> Result<Operation, TomlError> {
-        let whole = |key, default| Ok::<u64, TomlError>(self.section.u64(key)?.unwrap_or(default));
+    fn bursts(&self) -> Result<Operation, FileError> {
+        let whole = |key, default| Ok::<u64, FileError>(self.section.u64(key)?.unwrap_or(default));
         let (count, length) = (whole("count", 5)?, whole("length_samples", 500)?);
         let spacing = whole("spacing_samples", 90_000)?;
         let of = self.number("of_samples", "a number of samples > 0", |v| v >= 1.0)?;
@@ -227,7 +228,7 @@ impl Entry<'_> {
         })
     }
 
-    fn ar1(&self) -> Result<Operation, TomlError> {
+    fn ar1(&self) -> Result<Operation, FileError> {
         let (phi, sigma2) = (self.any("phi")?, self.any("sigma2")?);
         let refuse = |e: crate::noise::ParameterError| {
             self.section.refuse(e.parameter, format!("is not {}", e.domain), None)
@@ -235,7 +236,7 @@ impl Entry<'_> {
         Ok(Operation::Ar1(Ar1::new(phi, sigma2).map_err(refuse)?))
     }
 
-    fn scale(&self) -> Result<Operation, TomlError> {
+    fn scale(&self) -> Result<Operation, FileError> {
         let process = self.section.require_str("process")?.to_owned();
         let parameter = self.section.require_str("parameter")?.to_owned();
         let factor = self.require("factor", "a number ≥ 0", |v| v >= 0.0)?;

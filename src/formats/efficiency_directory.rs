@@ -1,83 +1,15 @@
 //! The directory of an estimator study: what it is (`study.json`), and the estimates from each set as they
 //! are finished (`sets.csv`), from which a study that was stopped goes on.
 
-use super::atomic;
 use super::difference::{self, Difference};
+use super::{FileError, Place, Setting, atomic};
 use crate::efficiency::Estimate;
 use serde_json::Value;
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// A directory that cannot be worked in.
-#[derive(Debug, thiserror::Error)]
-pub enum StudyDirectoryError {
-    /// The system refused.
-    #[error("{path}: {source}")]
-    Io {
-        /// File or directory.
-        path: String,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// An output cannot be written.
-    #[error(transparent)]
-    Write(#[from] atomic::WriteError),
-    /// It holds another study.
-    #[error("{path} holds another study: its \"{key}\" is {found}, not {wanted}")]
-    Other {
-        /// The directory.
-        path: String,
-        /// What differs.
-        key: String,
-        /// What is there.
-        found: String,
-        /// What was asked for.
-        wanted: String,
-    },
-    /// It holds no study but something else of these names.
-    #[error("{path} holds {file}, which is not of a study")]
-    Foreign {
-        /// The directory.
-        path: String,
-        /// The file.
-        file: &'static str,
-    },
-    /// A line of the estimates is damaged.
-    #[error("{path}, line {line}: {reason}")]
-    Damaged {
-        /// The file.
-        path: String,
-        /// Line, from 1.
-        line: u64,
-        /// What is wrong.
-        reason: String,
-    },
-}
-
-impl StudyDirectoryError {
-    /// Whether the contents or the request are at fault (rather than the machine).
-    #[must_use]
-    pub const fn is_usage(&self) -> bool {
-        match self {
-            Self::Io { .. } => false,
-            Self::Write(e) => e.is_usage(),
-            _ => true,
-        }
-    }
-
-    /// What to do about it.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
-        match self {
-            Self::Write(e) => e.hint(),
-            Self::Io { .. } => None,
-            _ => Some("choose another directory with --out, or remove this one".into()),
-        }
-    }
-}
-
-type Result<T> = std::result::Result<T, StudyDirectoryError>;
+type Result<T> = std::result::Result<T, FileError>;
 
 /// The names of what is estimated in each set.
 #[derive(Debug, Clone, PartialEq)]
@@ -109,17 +41,14 @@ impl StudyDirectory {
         match fs::read_to_string(&study) {
             Ok(text) => same(path, &text, identity)?,
             Err(_) if sets.exists() => {
-                return Err(StudyDirectoryError::Foreign {
-                    path: path.display().to_string(),
-                    file: "sets.csv",
-                });
+                return Err(foreign(path, "sets.csv"));
             }
             Err(_) => {
                 let text = serde_json::to_string_pretty(identity).unwrap_or_default();
                 atomic::write(&study, text + "\n")?;
             }
         }
-        let io = |source| StudyDirectoryError::Io { path: sets.display().to_string(), source };
+        let io = |source| FileError::io(&sets, source);
         let text = if sets.exists() { fs::read_to_string(&sets).map_err(io)? } else { String::new() };
         let (done, whole) = parse(&sets, &text, &layout)?;
         let mut file = File::options().create(true).write(true).truncate(false).open(&sets).map_err(io)?;
@@ -162,7 +91,7 @@ impl StudyDirectory {
 
     fn write(&mut self, text: &str) -> Result<()> {
         let written = self.sets.write_all(text.as_bytes()).and_then(|()| self.sets.sync_data());
-        written.map_err(|source| StudyDirectoryError::Io { path: self.path.display().to_string(), source })
+        written.map_err(|source| FileError::io(&self.path, source))
     }
 }
 
@@ -171,17 +100,29 @@ fn quoted(field: &str) -> String {
     if field.contains([',', '"']) { format!("\"{}\"", field.replace('"', "\"\"")) } else { field.to_owned() }
 }
 
+/// A directory that cannot be worked in, or a file in it.
+fn unusable(path: &Path, place: impl Into<Place>, message: impl Into<Box<str>>) -> FileError {
+    FileError::contents(path.display().to_string(), place, message)
+        .setting(Setting::OutputDirectory)
+        .advice("remove this one")
+}
+
+/// A directory that holds no study but something else of these names.
+fn foreign(path: &Path, file: &str) -> FileError {
+    unusable(path, Place::Itself, format!("holds {file}, which is not of a study"))
+}
+
 /// Refuses a directory whose study is another one.
 fn same(path: &Path, text: &str, wanted: &Value) -> Result<()> {
-    let path = path.display().to_string();
     let Ok(Value::Object(found)) = serde_json::from_str(text) else {
-        return Err(StudyDirectoryError::Foreign { path, file: "study.json" });
+        return Err(foreign(path, "study.json"));
     };
     let Some(wanted) = wanted.as_object() else { return Ok(()) };
     match difference::first(&found, wanted) {
         None => Ok(()),
         Some(Difference { key, found, wanted }) => {
-            Err(StudyDirectoryError::Other { path, key, found, wanted })
+            let message = format!("holds another study: its \"{key}\" is {found}, not {wanted}");
+            Err(unusable(path, Place::Itself, message))
         }
     }
 }
@@ -190,11 +131,7 @@ fn same(path: &Path, text: &str, wanted: &Value) -> Result<()> {
 fn parse(path: &Path, text: &str, layout: &Layout) -> Result<(Vec<Vec<Estimate>>, u64)> {
     let terminated = &text[..text.rfind('\n').map_or(0, |i| i + 1)];
     let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(terminated.as_bytes());
-    let damaged = |line, reason: &str| StudyDirectoryError::Damaged {
-        path: path.display().to_string(),
-        line,
-        reason: reason.to_owned(),
-    };
+    let damaged = |line: u64, reason: &str| unusable(path, line, reason);
     if terminated.is_empty() {
         return Ok((Vec::new(), 0));
     }
@@ -277,7 +214,7 @@ mod tests {
         open(dir.path()).append(vec![set(1.0)]).unwrap();
         let e = StudyDirectory::open(dir.path(), &json!({ "seed": 2 }), layout()).unwrap_err();
         assert!(e.to_string().ends_with("holds another study: its \"seed\" is 1, not 2"), "{e}");
-        assert!(e.is_usage() && e.hint().is_some());
+        assert!(!e.is_system() && e.hint().is_some());
         let file = dir.path().join("sets.csv");
         let text = fs::read_to_string(&file).unwrap().replace("dr-awv", "gmwm");
         fs::write(&file, text).unwrap();

@@ -16,10 +16,11 @@
 //! efficiency = 0.6                         # of the robust wavelet variance (default)
 //! ```
 
+use super::FileError;
 use super::contamination_file;
 use super::model_file;
 use super::suggest::nearest;
-use super::toml_file::{Section, Source, TomlError};
+use super::toml_file::{Section, Source};
 use crate::calibration::{AverageError, Estimator, ModelSpec, Trim, Weighting};
 use crate::efficiency::Design;
 use crate::imu::Channel;
@@ -60,7 +61,7 @@ const KEYS: [&str; 13] = [
 ///
 /// # Errors
 /// When a file cannot be read, has unknown keys, lacks some, or has values that mean no study.
-pub fn read(path: &Path) -> Result<StudyFile, TomlError> {
+pub fn read(path: &Path) -> Result<StudyFile, FileError> {
     let source = Source::read(path)?;
     let table = source.parse()?;
     let root = source.root(&table);
@@ -132,7 +133,7 @@ pub fn schema() -> serde_json::Value {
 }
 
 /// A required whole number in a range that fits memory and file formats.
-fn at_least(root: &Section<'_>, key: &str, least: u64) -> Result<u64, TomlError> {
+fn at_least(root: &Section<'_>, key: &str, least: u64) -> Result<u64, FileError> {
     let value = root.u64(key)?.ok_or_else(|| root.missing(key))?;
     if (least..=1 << 40).contains(&value) {
         Ok(value)
@@ -141,7 +142,7 @@ fn at_least(root: &Section<'_>, key: &str, least: u64) -> Result<u64, TomlError>
     }
 }
 
-fn channel(root: &Section<'_>, missing: &[Channel]) -> Result<Channel, TomlError> {
+fn channel(root: &Section<'_>, missing: &[Channel]) -> Result<Channel, FileError> {
     let name = root.str("axis")?.unwrap_or("accel.x");
     let names = || Channel::ALL.map(|c| c.to_string()).join(", ");
     let Some(channel) = Channel::ALL.into_iter().find(|c| c.to_string() == name) else {
@@ -154,7 +155,7 @@ fn channel(root: &Section<'_>, missing: &[Channel]) -> Result<Channel, TomlError
     Ok(channel)
 }
 
-fn levels(root: &Section<'_>, samples: usize) -> Result<u32, TomlError> {
+fn levels(root: &Section<'_>, samples: usize) -> Result<u32, FileError> {
     let most = max_levels(samples);
     match root.u64("levels")? {
         None => Ok(default_levels(samples)),
@@ -170,7 +171,7 @@ fn scenarios(
     root: &Section<'_>,
     rate_hz: f64,
     beside: impl Fn(&str) -> PathBuf,
-) -> Result<Vec<Contamination>, TomlError> {
+) -> Result<Vec<Contamination>, FileError> {
     let names = root.strs("scenarios")?.ok_or_else(|| root.missing("scenarios"))?;
     if names.is_empty() {
         return Err(root.refuse("scenarios", "names none", None));
@@ -191,7 +192,7 @@ fn scenarios(
     names.iter().map(find).collect()
 }
 
-fn estimators(root: &Section<'_>) -> Result<Vec<Estimator>, TomlError> {
+fn estimators(root: &Section<'_>) -> Result<Vec<Estimator>, FileError> {
     let several = || Estimator::ALL.into_iter().filter(|e| !e.is_single() || *e == Estimator::Avlr);
     let Some(names) = root.strs("estimators")? else {
         return Ok(several().filter(|e| !e.is_single()).collect());
@@ -213,18 +214,18 @@ fn estimators(root: &Section<'_>) -> Result<Vec<Estimator>, TomlError> {
     Ok(found)
 }
 
-fn spec(root: &Section<'_>) -> Result<ModelSpec, TomlError> {
+fn spec(root: &Section<'_>) -> Result<ModelSpec, FileError> {
     let text = root.require_str("fit")?;
     text.parse().map_err(|e| root.refuse("fit", format!("is no model: {e}"), None))
 }
 
-fn tuning(root: &Section<'_>) -> Result<Tuning, TomlError> {
+fn tuning(root: &Section<'_>) -> Result<Tuning, FileError> {
     let efficiency = root.f64("efficiency")?.unwrap_or(0.6);
     Tuning::new(efficiency, Convention::Exact)
         .map_err(|_| root.refuse("efficiency", "is not between 0.3 and 0.99", None))
 }
 
-fn enough(root: &Section<'_>, design: &Design) -> Result<(), TomlError> {
+fn enough(root: &Section<'_>, design: &Design) -> Result<(), FileError> {
     let replicates = usize::try_from(design.replicates).unwrap_or(usize::MAX);
     let trim = design.trim.count(replicates);
     // Not 2·trim: the number is the user's.
@@ -236,7 +237,7 @@ fn enough(root: &Section<'_>, design: &Design) -> Result<(), TomlError> {
 }
 
 /// AVLR reads slopes, and some processes have none.
-fn has_slopes(root: &Section<'_>, design: &Design) -> Result<(), TomlError> {
+fn has_slopes(root: &Section<'_>, design: &Design) -> Result<(), FileError> {
     let without = design.spec.kinds().iter().find(|k| k.has_shape());
     match without {
         Some(kind) if design.estimators.contains(&Estimator::Avlr) => {

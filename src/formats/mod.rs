@@ -6,6 +6,7 @@ pub mod curve_file;
 mod difference;
 pub mod efficiency_directory;
 pub mod efficiency_file;
+mod error;
 pub mod fusion_files;
 pub mod hash;
 pub mod model_file;
@@ -22,3 +23,5 @@ pub mod table_files;
 pub mod toml_file;
 pub mod trajectory_file;
 pub mod unit_file;
+
+pub use error::{FileError, Kind, Place, Remedy, Setting};

@@ -4,30 +4,10 @@
 //! by a library because a file is untrusted: sizes are checked against the bytes that are there before
 //! anything is allocated.
 
+use super::{FileError, Place};
 use std::fs::File;
 use std::io::{self, BufReader, Read, Write};
 use std::path::Path;
-
-/// What is wrong with an array file.
-#[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "fields are what the messages name")]
-pub enum NpyError {
-    /// It cannot be read.
-    #[error("{path}: {source}")]
-    Io { path: String, source: io::Error },
-    /// It does not begin like an array file, or its header cannot be understood.
-    #[error("{path}: not a NumPy array: {what}")]
-    Malformed { path: String, what: &'static str },
-    /// Its elements are no real numbers.
-    #[error("{path}: elements of type {dtype} are not read, only f4, f8, i1 … i8, u1 … u8")]
-    Type { path: String, dtype: String },
-    /// It has no or more than two dimensions.
-    #[error("{path}: an array of {dimensions} dimensions, samples × columns are needed")]
-    Dimensions { path: String, dimensions: usize },
-    /// It ends early.
-    #[error("{path}: cut off: {expected} bytes of elements expected, {found} found")]
-    Short { path: String, expected: u64, found: u64 },
-}
 
 const MAGIC: &[u8] = b"\x93NUMPY";
 
@@ -43,9 +23,9 @@ pub struct Array<R> {
 ///
 /// # Errors
 /// When it cannot be read, is no array of real numbers of one or two dimensions, or is cut off.
-pub fn open(path: &Path) -> Result<Array<BufReader<File>>, NpyError> {
+pub fn open(path: &Path) -> Result<Array<BufReader<File>>, FileError> {
     let name = path.display().to_string();
-    let io = |source| NpyError::Io { path: name.clone(), source };
+    let io = |source| FileError::io(path, source);
     let file = File::open(path).map_err(io)?;
     let size = file.metadata().map_err(io)?.len();
     parse(&name, BufReader::with_capacity(1 << 17, file), size)
@@ -62,11 +42,11 @@ struct Header {
     columns: usize,
 }
 
-fn parse<R: Read>(path: &str, mut reader: R, size: u64) -> Result<Array<R>, NpyError> {
-    let malformed = |what| NpyError::Malformed { path: path.to_owned(), what };
+fn parse<R: Read>(path: &str, mut reader: R, size: u64) -> Result<Array<R>, FileError> {
+    let malformed = |what| malformed(path, what);
     let io = |source: io::Error| match source.kind() {
         io::ErrorKind::UnexpectedEof => malformed("the header is cut off"),
-        _ => NpyError::Io { path: path.to_owned(), source },
+        _ => FileError::io(Path::new(path), source),
     };
     let mut start = [0; 8];
     reader.read_exact(&mut start).map_err(io)?;
@@ -87,22 +67,28 @@ fn parse<R: Read>(path: &str, mut reader: R, size: u64) -> Result<Array<R>, NpyE
     let elements = header.rows.checked_mul(header.columns).and_then(|n| n.checked_mul(header.width));
     let expected = elements.map_or(u64::MAX, |n| n as u64);
     if size - before < expected {
-        return Err(NpyError::Short { path: path.to_owned(), expected, found: size - before });
+        let message = format!("cut off: {expected} bytes of elements expected, {} found", size - before);
+        return Err(FileError::contents(path, Place::Within, message));
     }
     Ok(Array { path: path.to_owned(), header, elements: reader })
 }
 
+fn malformed(path: &str, what: &str) -> FileError {
+    FileError::contents(path, Place::Within, format!("not a NumPy array: {what}"))
+}
+
 impl Header {
-    fn parse(path: &str, text: &str) -> Result<Self, NpyError> {
-        let malformed = |what| NpyError::Malformed { path: path.to_owned(), what };
+    fn parse(path: &str, text: &str) -> Result<Self, FileError> {
+        let malformed = |what| malformed(path, what);
         let after = |key: &str| {
             let (_, rest) = text.split_once(key)?;
             Some(rest.trim_start_matches(['\'', '"']).trim_start().strip_prefix(':')?.trim_start())
         };
         let dtype = after("descr").ok_or_else(|| malformed("its header has no type"))?;
-        let unknown = || NpyError::Type {
-            path: path.to_owned(),
-            dtype: dtype.chars().take_while(|c| *c != ',').take(30).collect(),
+        let unknown = || {
+            let dtype: String = dtype.chars().take_while(|c| *c != ',').take(30).collect();
+            let message = format!("elements of type {dtype} are not read, only f4, f8, i1 … i8, u1 … u8");
+            FileError::contents(path, Place::Within, message)
         };
         let code = dtype.strip_prefix(['\'', '"']).and_then(|d| d.split(['\'', '"']).next());
         let (big_endian, kind, width) = element_type(code.ok_or_else(unknown)?).ok_or_else(unknown)?;
@@ -115,7 +101,8 @@ impl Header {
             Some(&[rows]) => (rows, 1),
             Some(&[rows, columns]) => (rows, columns),
             Some(other) => {
-                return Err(NpyError::Dimensions { path: path.to_owned(), dimensions: other.len() });
+                let message = format!("an array of {} dimensions, samples × columns are needed", other.len());
+                return Err(FileError::contents(path, Place::Within, message));
             }
             None => return Err(malformed("its header has no shape")),
         };
@@ -162,17 +149,17 @@ impl<R: Read> Array<R> {
     ///
     /// # Errors
     /// When it cannot be read, and what `show` returns.
-    pub fn each<E: From<NpyError>>(
+    pub fn each(
         mut self,
-        mut show: impl FnMut(usize, usize, f64) -> Result<(), E>,
-    ) -> Result<(), E> {
+        mut show: impl FnMut(usize, usize, f64) -> Result<(), FileError>,
+    ) -> Result<(), FileError> {
         let Header { rows, columns, width, fortran, .. } = self.header;
         let mut bytes = [0; 8];
         for i in 0..rows * columns {
             let element = &mut bytes[..width];
             self.elements
                 .read_exact(element)
-                .map_err(|source| NpyError::Io { path: self.path.clone(), source })?;
+                .map_err(|source| FileError::io(Path::new(&self.path), source))?;
             let (row, column) = if fortran { (i % rows, i / rows) } else { (i / columns, i % columns) };
             show(row, column, self.header.element(element))?;
         }
@@ -211,10 +198,10 @@ mod tests {
     }
 
     /// The columns.
-    fn read_bytes(bytes: &[u8]) -> Result<Vec<Vec<f64>>, NpyError> {
+    fn read_bytes(bytes: &[u8]) -> Result<Vec<Vec<f64>>, FileError> {
         let array = parse("a.npy", bytes, bytes.len() as u64)?;
         let mut columns = vec![Vec::new(); array.columns()];
-        array.each::<NpyError>(|row, column, value| {
+        array.each(|row, column, value| {
             assert_eq!(columns[column].len(), row);
             columns[column].push(value);
             Ok(())

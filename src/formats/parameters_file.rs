@@ -13,7 +13,8 @@
 //! Parameters and units are those of model files. What is said of an axis wins over what is said of its
 //! sensor, and that over what is said of all.
 
-use super::toml_file::{Section, Source, TomlError};
+use super::FileError;
+use super::toml_file::{Section, Source};
 use crate::calibration::{Kind, ModelSpec, ParameterLimit};
 use crate::imu::{Axis, Sensor};
 use std::path::Path;
@@ -22,7 +23,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// When it cannot be read, names what the model does not have, or bounds between which nothing lies.
-pub fn read(path: &Path, spec: &ModelSpec) -> Result<Vec<ParameterLimit>, TomlError> {
+pub fn read(path: &Path, spec: &ModelSpec) -> Result<Vec<ParameterLimit>, FileError> {
     limits(&Source::read(path)?, spec)
 }
 
@@ -30,7 +31,7 @@ pub fn read(path: &Path, spec: &ModelSpec) -> Result<Vec<ParameterLimit>, TomlEr
 ///
 /// # Errors
 /// As [`read`], for a model of the processes named.
-pub fn check(path: &Path) -> Result<(), TomlError> {
+pub fn check(path: &Path) -> Result<(), FileError> {
     let source = Source::read(path)?;
     source.parse()?;
     let text = std::fs::read_to_string(path).unwrap_or_default();
@@ -63,7 +64,7 @@ fn spec_of(labels: &[String]) -> Option<ModelSpec> {
     sum.join("+").parse().ok()
 }
 
-fn limits(source: &Source, spec: &ModelSpec) -> Result<Vec<ParameterLimit>, TomlError> {
+fn limits(source: &Source, spec: &ModelSpec) -> Result<Vec<ParameterLimit>, FileError> {
     let table = source.parse()?;
     let root = source.root(&table);
     if root.u64("schema")?.is_some_and(|s| s != 1) {
@@ -95,7 +96,7 @@ fn limits(source: &Source, spec: &ModelSpec) -> Result<Vec<ParameterLimit>, Toml
 }
 
 /// Refuses a process that there is, but not in this model.
-fn not_of_the_model(section: &Section<'_>, processes: &[&str], spec: &ModelSpec) -> Result<(), TomlError> {
+fn not_of_the_model(section: &Section<'_>, processes: &[&str], spec: &ModelSpec) -> Result<(), FileError> {
     let is_process = |key: &str| Kind::ALL.iter().any(|k| Some(k.code()) == key.split('_').next());
     match section.keys().into_iter().find(|key| is_process(key) && !processes.contains(key)) {
         None => Ok(()),
@@ -113,7 +114,7 @@ fn of_processes(
     axis: Option<Axis>,
     spec: &ModelSpec,
     into: &mut Vec<ParameterLimit>,
-) -> Result<(), TomlError> {
+) -> Result<(), FileError> {
     for process in processes {
         let Some(table) = section.section(process)? else { continue };
         table.only(&spec.parameter_names(process))?;
@@ -136,7 +137,7 @@ fn bounds(
     table: &Section<'_>,
     parameter: &str,
     range: &Section<'_>,
-) -> Result<(Option<f64>, Option<f64>), TomlError> {
+) -> Result<(Option<f64>, Option<f64>), FileError> {
     range.only(&["fix", "lower", "upper"])?;
     let (fix, lower, upper) = (range.f64("fix")?, range.f64("lower")?, range.f64("upper")?);
     let hint = || Some("{ fix = 0.98 }, or { lower = 0.9, upper = 0.99 }, or one of these two".to_owned());

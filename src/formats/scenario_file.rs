@@ -1,7 +1,7 @@
 //! Scenario files (TOML): see [`Scenario`].
 
-use super::suggest::nearest;
-use super::toml_file::{Section, Source, TomlError};
+use super::error::{FileError, Kind};
+use super::toml_file::{Section, Source, shown, unknown_key};
 use crate::scenario::Scenario;
 use crate::units::SettingError;
 use std::path::Path;
@@ -10,11 +10,11 @@ use std::path::Path;
 ///
 /// # Errors
 /// File, line, key and value of what is refused; a mistyped key with the nearest legal one.
-pub fn read(path: &Path) -> Result<Scenario, TomlError> {
+pub fn read(path: &Path) -> Result<Scenario, FileError> {
     from_source(&Source::read(path)?)
 }
 
-fn from_source(source: &Source) -> Result<Scenario, TomlError> {
+fn from_source(source: &Source) -> Result<Scenario, FileError> {
     let table = source.parse()?;
     let scenario: Scenario = toml::from_str(source.text()).map_err(|e| explained(&e, source))?;
     scenario.validate().map_err(|e| located(&e, source, &source.root(&table)))?;
@@ -22,33 +22,25 @@ fn from_source(source: &Source) -> Result<Scenario, TomlError> {
 }
 
 /// A refusal by serde as one by key.
-pub(super) fn explained(error: &toml::de::Error, source: &Source) -> TomlError {
+pub(super) fn explained(error: &toml::de::Error, source: &Source) -> FileError {
     let span = error.span().unwrap_or_default();
-    let (path, line) = (source.path().to_owned(), source.line(span.start));
-    let written = source.text().get(span.clone()).unwrap_or_default();
+    let line = source.line(span.start);
     let section = section_at(source.text(), span.start);
     let quoted: Vec<&str> = error.message().split('`').skip(1).step_by(2).collect();
     if error.message().starts_with("unknown field") && !quoted.is_empty() {
-        let hint = match nearest(quoted[0], quoted[1..].iter().copied()) {
-            Some(meant) => format!("did you mean \"{meant}\"?"),
-            None => format!("legal here: {}", quoted[1..].join(", ")),
-        };
-        return TomlError::UnknownKey { path, line, key: dotted(&section, quoted[0]), hint };
+        let key = dotted(&section, quoted[0]);
+        return unknown_key(source, line, key, quoted[0], quoted[1..].iter().copied());
     }
-    let value = written.split_whitespace().collect::<Vec<_>>().join(" ").chars().take(60).collect();
-    let key = dotted(&section, &key_before(source.text(), span.start));
-    TomlError::Value {
-        path,
-        line,
-        key,
-        value,
-        reason: format!("is refused: {}", error.message()),
-        hint: None,
-    }
+    let kind = Kind::Value {
+        key: dotted(&section, &key_before(source.text(), span.start)).into(),
+        value: shown(source.text().get(span).unwrap_or_default()).into(),
+        reason: format!("is refused: {}", error.message()).into(),
+    };
+    source.error(line, kind)
 }
 
 /// A refusal by [`Scenario::validate`] at the line its key stands in.
-pub(super) fn located(error: &SettingError, source: &Source, root: &Section<'_>) -> TomlError {
+pub(super) fn located(error: &SettingError, source: &Source, root: &Section<'_>) -> FileError {
     let (section, key) = error.key.rsplit_once('.').unwrap_or(("", &error.key));
     let reason = format!("is refused: {}", error.requirement);
     let (name, index) = match section.trim_end_matches(']').split_once('[') {
@@ -61,14 +53,11 @@ pub(super) fn located(error: &SettingError, source: &Source, root: &Section<'_>)
     };
     match found {
         Some(section) if section.has(key) => section.refuse(key, reason, None),
-        _ => TomlError::Value {
-            path: source.path().to_owned(),
-            line: 1,
-            key: error.key.clone(),
-            value: error.value.clone(),
-            reason,
-            hint: Some("the file does not set it: this is the default".into()),
-        },
+        _ => {
+            let (key, value) = (error.key.as_str().into(), error.value.as_str().into());
+            let kind = Kind::Value { key, value, reason: reason.into() };
+            source.error(1, kind).advice("the file does not set it: this is the default")
+        }
     }
 }
 

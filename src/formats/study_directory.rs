@@ -27,7 +27,7 @@ pub enum BatchDirectoryError {
     },
     /// An output cannot be written.
     #[error(transparent)]
-    Write(#[from] atomic::WriteError),
+    Write(#[from] super::FileError),
     /// The plan is not one.
     #[error("{path}, line {line}: {message}")]
     Damaged {
@@ -60,7 +60,7 @@ impl BatchDirectoryError {
     pub fn is_usage(&self) -> bool {
         match self {
             Self::Io { source, .. } => source::is_damage(source.kind()),
-            Self::Write(e) => e.is_usage(),
+            Self::Write(e) => !e.is_system(),
             _ => true,
         }
     }

@@ -1,8 +1,9 @@
 //! Study files of `nav-sim batch` (TOML): see [`Study`].
 
+use super::error::{FileError, Kind};
 use super::scenario_file::{self, explained};
 use super::suggest::nearest;
-use super::toml_file::{Section, Source, TomlError};
+use super::toml_file::{Section, Source};
 use crate::scenario::Scenario;
 use crate::sensors::gnss::GnssSettings;
 use crate::study::{Study, StudyError};
@@ -30,7 +31,7 @@ pub fn beside(study: &Path, path: &Path) -> PathBuf {
 ///
 /// # Errors
 /// File, line, key and value of what is refused; a mistyped key with the nearest legal one.
-pub fn read(path: &Path) -> Result<BatchFile, TomlError> {
+pub fn read(path: &Path) -> Result<BatchFile, FileError> {
     let source = Source::read(path)?;
     let table = source.parse()?;
     let root = source.root(&table);
@@ -50,7 +51,7 @@ pub fn read(path: &Path) -> Result<BatchFile, TomlError> {
     Ok(BatchFile { study, scenarios, gnss })
 }
 
-fn scenarios(study: &Study, path: &Path, source: &Source) -> Result<Vec<Scenario>, TomlError> {
+fn scenarios(study: &Study, path: &Path, source: &Source) -> Result<Vec<Scenario>, FileError> {
     let one = |(i, entry): (usize, &crate::study::ScenarioEntry)| {
         let scenario = match (&entry.file, &entry.settings) {
             (Some(file), _) => scenario_file::read(&beside(path, file))?,
@@ -62,7 +63,7 @@ fn scenarios(study: &Study, path: &Path, source: &Source) -> Result<Vec<Scenario
     study.scenario.iter().enumerate().map(one).collect()
 }
 
-fn receivers(study: &Study, path: &Path, source: &Source) -> Result<Vec<GnssSettings>, TomlError> {
+fn receivers(study: &Study, path: &Path, source: &Source) -> Result<Vec<GnssSettings>, FileError> {
     let one = |(i, entry): (usize, &crate::study::GnssEntry)| {
         let gnss = match (&entry.file, &entry.settings) {
             (Some(file), _) => scenario_file::read(&beside(path, file))?.gnss,
@@ -75,17 +76,14 @@ fn receivers(study: &Study, path: &Path, source: &Source) -> Result<Vec<GnssSett
 }
 
 /// A refusal by the rules of settings.
-fn refused(error: &SettingError, section: &str, source: &Source) -> TomlError {
-    let key = format!("{section}.{}", error.key);
+fn refused(error: &SettingError, section: &str, source: &Source) -> FileError {
     let last = error.key.rsplit('.').next().unwrap_or_default();
-    TomlError::Value {
-        path: source.path().to_owned(),
-        line: line_of(source, last),
-        key,
-        value: error.value.clone(),
-        reason: format!("is refused: {}", error.requirement),
-        hint: None,
-    }
+    let kind = Kind::Value {
+        key: format!("{section}.{}", error.key).into(),
+        value: error.value.as_str().into(),
+        reason: format!("is refused: {}", error.requirement).into(),
+    };
+    source.error(line_of(source, last), kind)
 }
 
 /// The first line that sets a key; 1 if none does.
@@ -95,8 +93,7 @@ fn line_of(source: &Source, key: &str) -> usize {
 }
 
 /// A refusal by [`Study::resolve`] at the line its key stands in.
-fn located(error: &StudyError, source: &Source, root: &Section<'_>) -> TomlError {
-    let path = source.path().to_owned();
+fn located(error: &StudyError, source: &Source, root: &Section<'_>) -> FileError {
     let hint = match error {
         StudyError::NoReference { reference, candidates } => {
             let meant = nearest(reference, candidates.iter().map(String::as_str));
@@ -123,7 +120,7 @@ fn located(error: &StudyError, source: &Source, root: &Section<'_>) -> TomlError
     } else {
         1
     };
-    TomlError::Study { path, line, message: error.to_string(), hint: hint.map(String::into_boxed_str) }
+    source.error(line, Kind::Contents(error.to_string().into())).advice_if(hint)
 }
 
 /// The line in which a text in quotes stands for the second time (else the first; else 1).

@@ -1,7 +1,8 @@
 //! Tables as files, written row by row: CSV, JSON (a list of records) and Parquet. The only module that knows
 //! the `parquet` crate.
 
-use super::atomic::{AtomicDir, WriteError};
+use super::FileError;
+use super::atomic::AtomicDir;
 use crate::report::{TableColumn, TableRow, Value, ValueKind};
 use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
 use parquet::column::writer::ColumnWriter;
@@ -60,12 +61,12 @@ impl TableFiles {
         name: &str,
         formats: &[TableFormat],
         columns: Vec<TableColumn>,
-    ) -> Result<Self, WriteError> {
+    ) -> Result<Self, FileError> {
         let mut writers = Vec::new();
         for format in formats {
             let path = directory.path(&format!("{name}.{}", format.ending()));
             let made = File::create(&path).and_then(|file| Writer::new(*format, file, &columns));
-            writers.push(made.map_err(|e| WriteError::io(&path, e))?);
+            writers.push(made.map_err(|e| FileError::io(&path, e))?);
         }
         Ok(Self { name: name.to_owned(), columns, writers, rows: Vec::new() })
     }
@@ -74,7 +75,7 @@ impl TableFiles {
     ///
     /// # Errors
     /// When the disk is full.
-    pub fn add(&mut self, rows: impl IntoIterator<Item = TableRow>) -> Result<(), WriteError> {
+    pub fn add(&mut self, rows: impl IntoIterator<Item = TableRow>) -> Result<(), FileError> {
         for row in rows {
             self.rows.push(row);
             if self.rows.len() == GROUP {
@@ -84,10 +85,10 @@ impl TableFiles {
         Ok(())
     }
 
-    fn flush(&mut self) -> Result<(), WriteError> {
+    fn flush(&mut self) -> Result<(), FileError> {
         let rows = std::mem::take(&mut self.rows);
         for writer in &mut self.writers {
-            writer.rows(&self.columns, &rows).map_err(|e| WriteError::io(Path::new(&self.name), e))?;
+            writer.rows(&self.columns, &rows).map_err(|e| FileError::io(Path::new(&self.name), e))?;
         }
         Ok(())
     }
@@ -96,11 +97,11 @@ impl TableFiles {
     ///
     /// # Errors
     /// When the disk is full.
-    pub fn finish(mut self) -> Result<(), WriteError> {
+    pub fn finish(mut self) -> Result<(), FileError> {
         self.flush()?;
         let name = self.name;
         let finished = self.writers.into_iter().try_for_each(Writer::finish);
-        finished.map_err(|e| WriteError::io(Path::new(&name), e))
+        finished.map_err(|e| FileError::io(Path::new(&name), e))
     }
 }
 

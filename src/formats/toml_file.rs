@@ -1,118 +1,43 @@
 //! TOML files read key by key: every refusal names file, line, key and value, and a mistyped key is
 //! answered with the nearest legal one.
 
-use std::io::ErrorKind;
+use super::error::{FileError, Kind, Place, Setting};
+use super::source;
+use super::suggest::nearest;
+use std::io::{self, ErrorKind};
 use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::source;
-use super::suggest::nearest;
-
-/// What is wrong with a TOML file.
-#[derive(Debug, thiserror::Error)]
-pub enum TomlError {
-    /// It cannot be read.
-    #[error("{path}: {source}")]
-    Io {
-        /// File.
-        path: String,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// It is not TOML.
-    #[error("{path}, line {line}, column {column}: {message}")]
-    Syntax {
-        /// File.
-        path: String,
-        /// Line, from 1.
-        line: usize,
-        /// Column, from 1.
-        column: usize,
-        /// What the parser said.
-        message: String,
-    },
-    /// It has a key that means nothing there.
-    #[error("{path}, line {line}: unknown key \"{key}\"")]
-    UnknownKey {
-        /// File.
-        path: String,
-        /// Line, from 1.
-        line: usize,
-        /// Key, dotted.
-        key: String,
-        /// What would be accepted there, or was meant.
-        hint: String,
-    },
-    /// It lacks a key.
-    #[error("{path}, line {line}: {key} is missing")]
-    MissingKey {
-        /// File.
-        path: String,
-        /// Line of the table that lacks it, from 1.
-        line: usize,
-        /// Key, dotted and quoted.
-        key: String,
-    },
-    /// A value is refused.
-    #[error("{path}, line {line}: \"{key}\" = {value} {reason}")]
-    Value {
-        /// File.
-        path: String,
-        /// Line, from 1.
-        line: usize,
-        /// Key, dotted.
-        key: String,
-        /// The value as written.
-        value: String,
-        /// Why, in words that follow the value: "is not …".
-        reason: String,
-        /// What to do about it.
-        hint: Option<Box<str>>,
-    },
-    /// The whole makes no sense, though each key does.
-    #[error("{path}, line {line}: {message}")]
-    Study {
-        /// File.
-        path: String,
-        /// Line, from 1.
-        line: usize,
-        /// What is wrong.
-        message: String,
-        /// What to do about it.
-        hint: Option<Box<str>>,
-    },
+/// What the system said of a file, with what helps.
+fn unreadable(path: &Path, source: io::Error) -> FileError {
+    let kind = source.kind();
+    let error = FileError::io(path, source);
+    match kind {
+        ErrorKind::NotFound => error.advice("check the path").setting(Setting::StartFiles),
+        ErrorKind::InvalidData => error.advice("a TOML file is text in UTF-8"),
+        _ => error,
+    }
 }
 
-impl TomlError {
-    /// What to do about it.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
-        match self {
-            Self::UnknownKey { hint, .. } => Some(hint.clone()),
-            Self::Value { hint, .. } | Self::Study { hint, .. } => hint.as_deref().map(str::to_owned),
-            Self::MissingKey { key, .. } if key == "\"rate_hz\"" => {
-                Some("add rate_hz = 100.0, the sample rate (Hz)".to_owned())
-            }
-            Self::MissingKey { key, .. } => Some(format!("add the key {key}")),
-            Self::Io { source, .. } if source.kind() == ErrorKind::NotFound => {
-                Some("check the path; nav-sim init makes a directory of files to start from".to_owned())
-            }
-            Self::Io { source, .. } if source.kind() == ErrorKind::InvalidData => {
-                Some("a TOML file is text in UTF-8".to_owned())
-            }
-            _ => None,
-        }
-    }
+/// A key that means nothing where it stands, with the nearest that does.
+pub(super) fn unknown_key<'a>(
+    source: &Source,
+    line: usize,
+    dotted: String,
+    key: &str,
+    legal: impl Iterator<Item = &'a str> + Clone,
+) -> FileError {
+    let hint = match nearest(key, legal.clone()) {
+        Some(meant) => format!("did you mean \"{meant}\"?"),
+        None => format!("legal here: {}", legal.collect::<Vec<_>>().join(", ")),
+    };
+    source.error(line, Kind::UnknownKey(dotted.into())).advice(hint)
+}
 
-    /// Whether the file's contents are at fault (rather than the machine, or a missing file).
-    #[must_use]
-    pub fn is_content(&self) -> bool {
-        match self {
-            Self::Io { source, .. } => source::is_damage(source.kind()),
-            _ => true,
-        }
-    }
+/// A value as it is shown: in one line, at most 60 characters of it.
+pub(super) fn shown(written: &str) -> String {
+    written.split_whitespace().collect::<Vec<_>>().join(" ").chars().take(60).collect()
 }
 
 /// A TOML text and the name it goes by in messages.
@@ -123,14 +48,14 @@ pub(crate) struct Source {
 }
 
 impl Source {
-    pub(crate) fn read(path: &Path) -> Result<Self, TomlError> {
+    pub(crate) fn read(path: &Path) -> Result<Self, FileError> {
         let name = path.display().to_string();
         match source::text(path) {
             Ok(text) => {
                 super::hash::remember(path, text.as_bytes());
                 Ok(Self { path: name, text })
             }
-            Err(source) => Err(TomlError::Io { path: name, source }),
+            Err(source) => Err(unreadable(path, source)),
         }
     }
 
@@ -149,16 +74,13 @@ impl Source {
     }
 
     /// The table of the whole file.
-    pub(crate) fn parse(&self) -> Result<Spanned<DeTable<'_>>, TomlError> {
+    pub(crate) fn parse(&self) -> Result<Spanned<DeTable<'_>>, FileError> {
         DeTable::parse(&self.text).map_err(|e| {
             let at = e.span().map_or(0, |s| s.start);
             let line_start = self.text[..at].rfind('\n').map_or(0, |i| i + 1);
-            TomlError::Syntax {
-                path: self.path.clone(),
-                line: self.line(at),
-                column: self.text[line_start..at].chars().count() + 1,
-                message: e.message().to_owned(),
-            }
+            let column = self.text[line_start..at].chars().count() + 1;
+            let place = Place::Character(self.line(at) as u64, column as u64);
+            FileError::contents(self.path.as_str(), place, e.message())
         })
     }
 
@@ -172,6 +94,11 @@ impl Source {
 
     pub(crate) fn path(&self) -> &str {
         &self.path
+    }
+
+    /// Something wrong in a line.
+    pub(crate) fn error(&self, line: usize, kind: Kind) -> FileError {
+        FileError::new(self.path.as_str(), line, kind)
     }
 
     /// The line (from 1) a byte stands in.
@@ -205,19 +132,11 @@ impl<'a> Section<'a> {
     }
 
     /// Refuses every key that is not listed.
-    pub(crate) fn only(&self, legal: &[&str]) -> Result<(), TomlError> {
+    pub(crate) fn only(&self, legal: &[&str]) -> Result<(), FileError> {
         let Some(key) = self.keys().into_iter().find(|k| !legal.contains(k)) else { return Ok(()) };
-        let hint = match nearest(key, legal.iter().copied()) {
-            Some(meant) => format!("did you mean \"{meant}\"?"),
-            None => format!("legal here: {}", legal.join(", ")),
-        };
         let at = self.table.keys().find(|k| k.get_ref() == key).map_or(self.at, |k| k.span().start);
-        Err(TomlError::UnknownKey {
-            path: self.source.path.clone(),
-            line: self.source.line(at),
-            key: self.key(key),
-            hint,
-        })
+        let line = self.source.line(at);
+        Err(unknown_key(self.source, line, self.key(key), key, legal.iter().copied()))
     }
 
     /// The line it begins in.
@@ -238,21 +157,22 @@ impl<'a> Section<'a> {
         self.table.get(key)
     }
 
-    pub(crate) fn missing(&self, key: &str) -> TomlError {
+    pub(crate) fn missing(&self, key: &str) -> FileError {
         self.missing_one_of(&[key])
     }
 
-    pub(crate) fn missing_one_of(&self, keys: &[&str]) -> TomlError {
+    pub(crate) fn missing_one_of(&self, keys: &[&str]) -> FileError {
         let keys: Vec<String> = keys.iter().map(|k| format!("\"{}\"", self.key(k))).collect();
-        TomlError::MissingKey {
-            path: self.source.path.clone(),
-            line: self.source.line(self.at),
-            key: keys.join(" or "),
-        }
+        let (line, keys) = (self.line(), keys.join(" or "));
+        let advice = match keys.as_str() {
+            "\"rate_hz\"" => "add rate_hz = 100.0, the sample rate (Hz)".to_owned(),
+            _ => format!("add the key {keys}"),
+        };
+        self.source.error(line, Kind::MissingKey(keys.into())).advice(advice)
     }
 
     /// A refusal of the value of a key that is there.
-    pub(crate) fn refuse(&self, key: &str, reason: impl Into<String>, hint: Option<String>) -> TomlError {
+    pub(crate) fn refuse(&self, key: &str, reason: impl Into<String>, hint: Option<String>) -> FileError {
         let span = self.get(key).map_or(self.at..self.at, Spanned::span);
         self.refuse_at(span, self.key(key), reason.into(), hint)
     }
@@ -263,20 +183,18 @@ impl<'a> Section<'a> {
         key: String,
         reason: String,
         hint: Option<String>,
-    ) -> TomlError {
-        let written = self.source.text.get(span.clone()).unwrap_or_default();
-        let value = written.split_whitespace().collect::<Vec<_>>().join(" ").chars().take(60).collect();
-        let (path, line) = (self.source.path.clone(), self.source.line(span.start));
-        let hint = hint.map(String::into_boxed_str);
-        TomlError::Value { path, line, key, value, reason, hint }
+    ) -> FileError {
+        let value = shown(self.source.text.get(span.clone()).unwrap_or_default());
+        let kind = Kind::Value { key: key.into(), value: value.into(), reason: reason.into() };
+        self.source.error(self.source.line(span.start), kind).advice_if(hint)
     }
 
-    fn wrong_type(&self, key: &str, expected: &str) -> TomlError {
+    fn wrong_type(&self, key: &str, expected: &str) -> FileError {
         self.refuse(key, format!("is not {expected}"), None)
     }
 
     /// A finite number.
-    pub(crate) fn f64(&self, key: &str) -> Result<Option<f64>, TomlError> {
+    pub(crate) fn f64(&self, key: &str) -> Result<Option<f64>, FileError> {
         let Some(value) = self.get(key) else { return Ok(None) };
         number(value).filter(|x| x.is_finite()).map(Some).ok_or_else(|| {
             let hint = "a number such as 1.5e-4; neither nan nor inf".to_owned();
@@ -284,12 +202,12 @@ impl<'a> Section<'a> {
         })
     }
 
-    pub(crate) fn require_f64(&self, key: &str) -> Result<f64, TomlError> {
+    pub(crate) fn require_f64(&self, key: &str) -> Result<f64, FileError> {
         self.f64(key)?.ok_or_else(|| self.missing(key))
     }
 
     /// A list of finite numbers.
-    pub(crate) fn f64s(&self, key: &str) -> Result<Option<Vec<f64>>, TomlError> {
+    pub(crate) fn f64s(&self, key: &str) -> Result<Option<Vec<f64>>, FileError> {
         let Some(value) = self.get(key) else { return Ok(None) };
         let error = || self.wrong_type(key, "a list of finite numbers");
         let items = value.get_ref().as_array().ok_or_else(error)?;
@@ -298,7 +216,7 @@ impl<'a> Section<'a> {
     }
 
     /// A pair of numbers in ascending order, infinite ones allowed.
-    pub(crate) fn interval(&self, key: &str) -> Result<Option<[f64; 2]>, TomlError> {
+    pub(crate) fn interval(&self, key: &str) -> Result<Option<[f64; 2]>, FileError> {
         let Some(value) = self.get(key) else { return Ok(None) };
         let items = value.get_ref().as_array().map_or(&[][..], |a| a);
         match items.iter().map(number).collect::<Option<Vec<f64>>>().as_deref() {
@@ -308,30 +226,30 @@ impl<'a> Section<'a> {
     }
 
     /// A whole number ≥ 0.
-    pub(crate) fn u64(&self, key: &str) -> Result<Option<u64>, TomlError> {
+    pub(crate) fn u64(&self, key: &str) -> Result<Option<u64>, FileError> {
         let Some(value) = self.get(key) else { return Ok(None) };
         integer(value).map(Some).ok_or_else(|| self.wrong_type(key, "a whole number ≥ 0"))
     }
 
     /// A list of whole numbers ≥ 0.
-    pub(crate) fn u64s(&self, key: &str) -> Result<Option<Vec<u64>>, TomlError> {
+    pub(crate) fn u64s(&self, key: &str) -> Result<Option<Vec<u64>>, FileError> {
         let Some(value) = self.get(key) else { return Ok(None) };
         let error = || self.wrong_type(key, "a list of whole numbers ≥ 0");
         let items = value.get_ref().as_array().ok_or_else(error)?;
         items.iter().map(integer).collect::<Option<Vec<u64>>>().map(Some).ok_or_else(error)
     }
 
-    pub(crate) fn str(&self, key: &str) -> Result<Option<&'a str>, TomlError> {
+    pub(crate) fn str(&self, key: &str) -> Result<Option<&'a str>, FileError> {
         let Some(value) = self.get(key) else { return Ok(None) };
         value.get_ref().as_str().map(Some).ok_or_else(|| self.wrong_type(key, "a text in quotes"))
     }
 
-    pub(crate) fn require_str(&self, key: &str) -> Result<&'a str, TomlError> {
+    pub(crate) fn require_str(&self, key: &str) -> Result<&'a str, FileError> {
         self.str(key)?.ok_or_else(|| self.missing(key))
     }
 
     /// A list of texts.
-    pub(crate) fn strs(&self, key: &str) -> Result<Option<Vec<&'a str>>, TomlError> {
+    pub(crate) fn strs(&self, key: &str) -> Result<Option<Vec<&'a str>>, FileError> {
         let Some(value) = self.get(key) else { return Ok(None) };
         let error = || self.wrong_type(key, "a list of texts in quotes");
         let items = value.get_ref().as_array().ok_or_else(error)?;
@@ -340,7 +258,7 @@ impl<'a> Section<'a> {
     }
 
     /// A table.
-    pub(crate) fn section(&self, key: &str) -> Result<Option<Section<'a>>, TomlError> {
+    pub(crate) fn section(&self, key: &str) -> Result<Option<Section<'a>>, FileError> {
         let Some(value) = self.get(key) else { return Ok(None) };
         let table = value.get_ref().as_table().ok_or_else(|| self.wrong_type(key, "a table"))?;
         Ok(Some(Section { source: self.source, name: self.key(key), at: value.span().start, table }))
@@ -351,7 +269,7 @@ impl<'a> Section<'a> {
     }
 
     /// A list of tables, named `key[1]`, `key[2]`, … in messages.
-    pub(crate) fn sections(&self, key: &str) -> Result<Vec<Section<'a>>, TomlError> {
+    pub(crate) fn sections(&self, key: &str) -> Result<Vec<Section<'a>>, FileError> {
         let Some(value) = self.get(key) else { return Ok(Vec::new()) };
         let items = value.get_ref().as_array().ok_or_else(|| self.wrong_type(key, "a list of tables"))?;
         let section = |(i, v): (usize, Value<'a>)| {
@@ -403,7 +321,7 @@ mod tests {
 
     #[test]
     fn refusals_name_file_line_key_and_value() {
-        let message = |e: TomlError| e.to_string();
+        let message = |e: FileError| e.to_string();
         with(TEXT, |root| {
             let t = root.section("t").unwrap().unwrap();
             let list = root.sections("list").unwrap().remove(0);
@@ -446,6 +364,6 @@ mod tests {
     fn a_missing_file_is_named() {
         let e = Source::read(Path::new("/no/such.toml")).unwrap_err();
         assert_eq!(e.to_string(), "/no/such.toml: No such file or directory (os error 2)");
-        assert!(!e.is_content());
+        assert!(e.is_system());
     }
 }

@@ -4,7 +4,7 @@
 //! u64: for each column its runs, then its epochs), BLAKE3 of all before. A file that is cut off or changed
 //! in one bit is no unit file.
 
-use super::atomic::{self, WriteError};
+use super::{FileError, atomic};
 use crate::simulation::{EpochSums, OutageRecord, REPORTED, RunRecord, RunResult};
 use crate::study::UnitResult;
 use serde::{Deserialize, Serialize};
@@ -84,11 +84,11 @@ pub fn size(columns: usize, runs: u64, outages: usize, epochs: usize) -> f64 {
 ///
 /// # Errors
 /// When the disk is full or the directory cannot be written to; nothing is left then.
-pub fn write(directory: &Path, unit: &UnitResult) -> Result<(), WriteError> {
+pub fn write(directory: &Path, unit: &UnitResult) -> Result<(), FileError> {
     let file = path(directory, &unit.id);
     if file.is_dir() {
         let aside = file.with_extension("unit.damaged");
-        fs::rename(&file, &aside).map_err(|e| WriteError::io(&file, e))?;
+        fs::rename(&file, &aside).map_err(|e| FileError::io(&file, e))?;
     }
     atomic::write(&file, encode(unit)).or_else(|e| match read(directory, &unit.id) {
         Ok(there) if encode(&there) == encode(unit) => Ok(()),

@@ -385,7 +385,11 @@ fn files_that_are_no_tables_are_refused_as_such() {
             "feet.csv, line 1: column \"accel_x_ft_s2\" is in a unit that is not known",
             "_m_s2, _g, _mg",
         ),
-        (&["ok.csv", "--skip-s", "10"], "--skip-s 10 leaves 0 samples of 0.64 s", "a smaller --skip-s"),
+        (
+            &["ok.csv", "--skip-s", "10"],
+            "leaving out the first 10 s leaves 0 samples of 0.64 s",
+            "a smaller --skip-s",
+        ),
     ] {
         let stderr = refusal(dir.path(), &[&["wv", "-q"], arguments].concat(), 2);
         assert!(

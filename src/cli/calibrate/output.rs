@@ -5,8 +5,8 @@ use crate::cli::{Failure, Session, read};
 use clap::ValueEnum;
 use nav_sim::calibration::{Estimator, Group, Outcome, Settings, diagnose};
 use nav_sim::formats::atomic::{self, AtomicFile};
-use nav_sim::formats::hash;
 use nav_sim::formats::model_file::{self, CalibrationNote};
+use nav_sim::formats::{FileError, hash};
 use nav_sim::report::{self, CurvesFile, FitsFile, Input};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -152,11 +152,11 @@ with --static that recording, and nav-sim compare";
 
 /// Writes two files that belong together: both are on the disk before either has its name. Should the second not get
 /// its name, the hash in it tells that the first is not of it.
-fn pair(files: [(&PathBuf, String); 2]) -> Result<(), atomic::WriteError> {
-    let staged = files.map(|(path, text)| -> Result<AtomicFile, atomic::WriteError> {
+fn pair(files: [(&PathBuf, String); 2]) -> Result<(), FileError> {
+    let staged = files.map(|(path, text)| -> Result<AtomicFile, FileError> {
         let mut file = AtomicFile::create(path)?;
         let written = file.write_all(text.as_bytes()).and_then(|()| file.flush());
-        written.map_err(|e| atomic::WriteError::io(path, e))?;
+        written.map_err(|e| FileError::io(path, e))?;
         Ok(file)
     });
     let [first, second] = staged;

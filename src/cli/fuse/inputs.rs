@@ -5,7 +5,7 @@ use crate::cli::run::reduced::{Made, reduction};
 use crate::cli::{Failure, Session, parse, read, turn_on};
 use glam::{DMat3, DQuat, DVec3};
 use nav_sim::ekf::{Belief, FilterStates, InitialSettings};
-use nav_sim::formats::fusion_files::{FixSigma, FusionFileError, ImuFile, read_gnss, read_imu, read_initial};
+use nav_sim::formats::fusion_files::{FixSigma, ImuFile, read_gnss, read_imu, read_initial};
 use nav_sim::frames::RollPitchYaw;
 use nav_sim::fusion::alignment::{self, Alignment};
 use nav_sim::fusion::{FusionError, Recorded, Settings, Start, check_clocks};
@@ -18,15 +18,6 @@ use nav_sim::simulation::lincov;
 use nav_sim::trajectory::reference::Reference;
 use nav_sim::units::DEG;
 use std::path::{Path, PathBuf};
-
-impl From<FusionFileError> for Failure {
-    fn from(e: FusionFileError) -> Self {
-        let failure = if e.is_io() { Self::could_not(&e) } else { Self::input(&e) };
-        // without the option of the commands for static recordings
-        let hint = e.hint().map(|h| h.replace("give the names with --columns", "correct the header"));
-        failure.maybe_hint(hint)
-    }
-}
 
 /// What was read, ready to use.
 pub(super) struct Inputs {
@@ -47,8 +38,9 @@ impl Inputs {
         named.extend(given.map(|p| ("initial", p)));
         named.extend(args.reference.iter().map(|p| ("reference", p)));
         let files = named.iter().map(|(role, path)| read::input(role, path)).collect::<Result<_, _>>()?;
-        let imu = read_imu(&args.imu)?;
-        let (mut gnss, remarks) = read_gnss(&args.gnss, args.gnss_sigma.as_ref())?;
+        let imu = read_imu(&args.imu).map_err(read::refused_for_fusion)?;
+        let (mut gnss, remarks) =
+            read_gnss(&args.gnss, args.gnss_sigma.as_ref()).map_err(read::refused_for_fusion)?;
         imu.remarks.iter().chain(&remarks).for_each(|r| session.printer.warn(r));
         if let Some(parse::Pair([position, velocity])) = args.gnss_sigma_factor {
             scale(&mut gnss, position, velocity);

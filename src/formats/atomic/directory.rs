@@ -1,7 +1,8 @@
 //! A directory of outputs.
 
+use super::make_parent;
 use super::temporary::{self, Temporary};
-use super::{WriteError, make_parent};
+use crate::formats::FileError;
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -27,8 +28,8 @@ impl AtomicDir {
     ///
     /// # Errors
     /// When the destination is a file, or a directory cannot be made.
-    pub fn create(destination: &Path) -> Result<Self, WriteError> {
-        let error = |e| WriteError::io(destination, e);
+    pub fn create(destination: &Path) -> Result<Self, FileError> {
+        let error = |e| FileError::io(destination, e);
         let existing = fs::metadata(destination).ok();
         if existing.as_ref().is_some_and(|m| !m.is_dir()) {
             return Err(error(io::ErrorKind::NotADirectory.into()));
@@ -54,7 +55,7 @@ impl AtomicDir {
     ///
     /// # Errors
     /// When the system refuses.
-    pub fn write(&mut self, name: &str, contents: impl AsRef<[u8]>) -> Result<(), WriteError> {
+    pub fn write(&mut self, name: &str, contents: impl AsRef<[u8]>) -> Result<(), FileError> {
         self.write_parts(name, [contents])
     }
 
@@ -66,14 +67,14 @@ impl AtomicDir {
         &mut self,
         name: &str,
         parts: impl IntoIterator<Item = impl AsRef<[u8]>>,
-    ) -> Result<(), WriteError> {
+    ) -> Result<(), FileError> {
         let path = self.path(name);
         let write = || {
             let mut file = std::io::BufWriter::new(File::create(&path)?);
             parts.into_iter().try_for_each(|part| file.write_all(part.as_ref()))?;
             file.flush()
         };
-        write().map_err(|e| WriteError::io(&self.destination.join(name), e))
+        write().map_err(|e| FileError::io(&self.destination.join(name), e))
     }
 
     /// Where the directory will appear.
@@ -86,14 +87,14 @@ impl AtomicDir {
     ///
     /// # Errors
     /// When a declared file was not written, the disk is full, or a rename is refused.
-    pub fn commit(mut self) -> Result<(), WriteError> {
+    pub fn commit(mut self) -> Result<(), FileError> {
         for name in &self.names {
             let sync = File::open(self.staging.path().join(name)).and_then(|f| f.sync_all());
-            sync.map_err(|e| WriteError::io(&self.destination.join(name), e))?;
+            sync.map_err(|e| FileError::io(&self.destination.join(name), e))?;
         }
         let moved =
             if self.destination.is_dir() { self.replace() } else { self.staging.rename(&self.destination) };
-        moved.map_err(|e| WriteError::io(&self.destination, e))
+        moved.map_err(|e| FileError::io(&self.destination, e))
     }
 
     /// From the first rename on the new files are the ones that count: who is killed later leaves a directory

@@ -1,7 +1,8 @@
 //! A single output file.
 
+use super::make_parent;
 use super::temporary::{self, Temporary};
-use super::{WriteError, make_parent};
+use crate::formats::FileError;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -24,8 +25,8 @@ impl AtomicFile {
     ///
     /// # Errors
     /// When the directory cannot be made or written to.
-    pub fn create(destination: &Path) -> Result<Self, WriteError> {
-        let error = |e| WriteError::io(destination, e);
+    pub fn create(destination: &Path) -> Result<Self, FileError> {
+        let error = |e| FileError::io(destination, e);
         let metadata = fs::metadata(destination).ok();
         if metadata.as_ref().is_some_and(fs::Metadata::is_dir) {
             return Err(error(io::ErrorKind::IsADirectory.into()));
@@ -52,8 +53,8 @@ impl AtomicFile {
     ///
     /// # Errors
     /// When the disk is full or the rename is refused; nothing is left then.
-    pub fn commit(mut self) -> Result<(), WriteError> {
-        self.finish().map_err(|e| WriteError::io(&self.destination, e))
+    pub fn commit(mut self) -> Result<(), FileError> {
+        self.finish().map_err(|e| FileError::io(&self.destination, e))
     }
 
     fn finish(&mut self) -> io::Result<()> {

@@ -1,9 +1,10 @@
 //! Recorded GNSS fixes.
 
-use super::{FusionFileError as Error, bare_columns, table, text};
+use super::{bare_columns, table, time_back};
 use crate::earth::{MAX_LATITUDE, geodetic_to_ecef};
 use crate::formats::suggest::nearest;
-use crate::formats::trajectory_file::table::Table;
+use crate::formats::trajectory_file::table::{Table, text};
+use crate::formats::{FileError as Error, Kind, Place};
 use crate::gnss::GnssFix;
 use crate::units::DEG;
 use glam::DVec3;
@@ -43,6 +44,11 @@ const KF_GINS_VELOCITY: [usize; 13] = [0, 1, 2, 3, 7, 8, 9, 4, 5, 6, 10, 11, 12]
 const KF_GINS: &str = "a KF-GINS text has 7 columns (t_s, latitude, longitude, height, standard deviations north, east, \
                        down), or 13 (t_s, latitude, longitude, height, velocity north, east, down, their standard \
                        deviations: position, velocity)";
+
+/// What the columns are called.
+pub(super) const COLUMNS: &str = "a GNSS file has the columns t_s, lat_deg, lon_deg, h_m, sd_n_m, sd_e_m, sd_d_m and may \
+                                  have v_n_m_s, v_e_m_s, v_d_m_s, sd_vn_m_s, sd_ve_m_s, sd_vd_m_s; or it is a KF-GINS \
+                                  text of 7 columns, or of 13 with velocity";
 
 /// Standard deviations of fixes whose file states none: north, east, down.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -172,7 +178,8 @@ impl Columns {
         if let Some((name, meant)) = slip {
             columns = format!("\"{name}\" is not known (\"{meant}\"?); {columns}");
         }
-        Err(Error::MissingColumns { path: table.path.clone(), line: table.header_line, columns })
+        let kind = Kind::Columns(format!("{columns} missing").into());
+        Err(Error::new(table.path.as_str(), table.header_line, kind).advice(COLUMNS))
     }
 
     fn value(&self, quantity: usize, row: &[f64]) -> f64 {
@@ -198,7 +205,8 @@ pub fn read_gnss(path: &Path, unsaid: Option<&FixSigma>) -> Result<(Vec<GnssFix>
         Some(POSITION) => Some(NAMES[..POSITION].to_vec()),
         Some(13) => Some(KF_GINS_VELOCITY.map(|i| NAMES[i]).to_vec()),
         Some(columns) => {
-            return Err(Error::Bare { path: path.display().to_string(), columns, expected: KF_GINS });
+            let message = format!("{columns} columns without a header");
+            return Err(Error::contents(path.display().to_string(), Place::Within, message).advice(KF_GINS));
         }
     };
     let table = table(path, &text, names.as_deref())?;
@@ -253,8 +261,14 @@ fn fix(columns: &Columns, row: &[f64], unsaid: Option<&FixSigma>) -> GnssFix {
 fn check_values(table: &Table, columns: &Columns, line: u64, row: &[f64]) -> Result<(), Error> {
     let refuse = |quantity: usize, reason| {
         let at = columns.0[quantity].map_or(0, |(at, _)| at);
-        let (path, column) = (table.path.clone(), table.columns[at].clone());
-        Err(Error::Value { path, line, column, value: row[at], reason })
+        let column = &table.columns[at];
+        let advice = if column.starts_with("lat") || column.starts_with("lon") {
+            "latitude within ±89.9, longitude in (−180, 180] or [0, 360), in degrees (or name the columns lat_rad, \
+             lon_rad)"
+        } else {
+            "a fix needs the standard deviations its receiver believes; remove rows without"
+        };
+        Err(Error::cell(&table.path, line, column, row[at].to_string(), reason).advice(advice))
     };
     let (lat, lon) = (columns.value(1, row), columns.value(2, row));
     if lat.abs() > 90.0 * DEG {
@@ -275,11 +289,16 @@ fn check_values(table: &Table, columns: &Columns, line: u64, row: &[f64]) -> Res
 }
 
 fn check_step(path: &str, line: u64, before: &GnssFix, fix: &GnssFix) -> Result<(), Error> {
-    let (path, seconds) = (path.to_owned(), fix.t_s - before.t_s);
+    let seconds = fix.t_s - before.t_s;
     if seconds <= 0.0 {
-        return Err(Error::Time { path, line, previous_s: before.t_s, t_s: fix.t_s });
+        return Err(time_back(path, line, before.t_s, fix.t_s));
     }
     let place = |f: &GnssFix| geodetic_to_ecef(f.lat, f.lon, f.h);
     let metres = place(fix).distance(place(before));
-    if metres > MAX_SPEED * seconds { Err(Error::Jump { path, line, metres, seconds }) } else { Ok(()) }
+    if metres <= MAX_SPEED * seconds {
+        return Ok(());
+    }
+    let message = format!("the fix is {metres:.0} m from the one {seconds} s before");
+    Err(Error::contents(path, line, message)
+        .advice("is a latitude swapped with a longitude, a sign lost, or a row damaged?"))
 }

@@ -1,10 +1,13 @@
 //! Recorded IMU data.
 
-use super::{FusionFileError as Error, bare_columns, table, text};
+use super::{bare_columns, table, time_back};
 use crate::formats::recordings::checks::{check_gravity, gravity_factor};
+use crate::formats::recordings::error::storage;
 use crate::formats::recordings::header::{Role, Unit};
 use crate::formats::recordings::timing::{median_step, unit_of_step};
-use crate::formats::recordings::{self, Raw, ReadOptions, RecordingError};
+use crate::formats::recordings::{self, Raw, ReadOptions};
+use crate::formats::trajectory_file::table::text;
+use crate::formats::{FileError as Error, Place};
 use crate::fusion::gap::{LONGEST_S, bridged};
 use crate::imu::{Axis, Channel, ImuIncrement, Sensor};
 use crate::strapdown::MAX_ROTATION;
@@ -52,7 +55,8 @@ pub fn read_imu(path: &Path) -> Result<ImuFile, Error> {
     let columns = match text.as_ref().and_then(|text| Some((text, bare_columns(text)?))) {
         Some((text, 7..=8)) => kf_gins(path, text)?,
         Some((_, columns)) => {
-            return Err(Error::Bare { path: path.display().to_string(), columns, expected: KF_GINS });
+            let message = format!("{columns} columns without a header");
+            return Err(Error::contents(path.display().to_string(), Place::Within, message).advice(KF_GINS));
         }
         None => headed(path)?,
     };
@@ -96,7 +100,9 @@ fn headed(path: &Path) -> Result<Columns, Error> {
     for channel in Channel::ALL {
         let (role, values) =
             take(&mut raw, |role| matches!(role, Role::Signal { channel: c, .. } if *c == channel))?
-                .ok_or_else(|| Error::Missing { path: shown.clone(), channel })?;
+                .ok_or_else(|| {
+                    lacking(&shown, &format!("channel {channel} is missing; all six are needed"))
+                })?;
         let (factor, increment) = match role {
             Role::Signal { unit: Unit::Si(factor), .. } => (factor, false),
             Role::Signal { unit: Unit::Increment(factor), .. } => (factor, true),
@@ -116,18 +122,26 @@ fn headed(path: &Path) -> Result<Columns, Error> {
     })
 }
 
+/// A recording without a signal or a clock that is needed.
+fn lacking(path: &str, message: &str) -> Error {
+    Error::contents(path, Place::Within, message).advice(
+        "name the columns t_s, gyro_x_rad_s … accel_z_m_s2 (rates) or t_s, dtheta_x_rad … dv_z_m_s (increments, time \
+         = end of the interval), or give a KF-GINS text of 7 or 8 columns",
+    )
+}
+
 /// The first column of such a role, with its numbers.
-fn take(raw: &mut Raw, is: impl Fn(&Role) -> bool) -> Result<Option<(Role, Vec<f64>)>, RecordingError> {
+fn take(raw: &mut Raw, is: impl Fn(&Role) -> bool) -> Result<Option<(Role, Vec<f64>)>, Error> {
     let Some(at) = raw.columns.iter().position(|c| is(&c.role)) else { return Ok(None) };
     let column = raw.columns.swap_remove(at);
     let values = column.values.into_vec();
-    let values = values.map_err(RecordingError::storage(&raw.path))?;
+    let values = values.map_err(storage(&raw.path))?;
     Ok(Some((column.role, values)))
 }
 
 fn times(raw: &mut Raw) -> Result<Vec<f64>, Error> {
     let found = take(raw, |role| matches!(role, Role::Time { .. }))?;
-    let (role, values) = found.ok_or_else(|| Error::NoTime { path: raw.path.clone() })?;
+    let (role, values) = found.ok_or_else(|| lacking(&raw.path, "no time column"))?;
     let unit = match role {
         Role::Time { unit_s: Some(unit) } => unit,
         _ => unit_of_step(median_step(&values)).0,
@@ -138,11 +152,11 @@ fn times(raw: &mut Raw) -> Result<Vec<f64>, Error> {
 impl Columns {
     fn increments(mut self) -> Result<ImuFile, Error> {
         if self.t_s.len() < 3 {
-            return Err(Error::TooFew { path: self.path, found: self.t_s.len(), needed: 3 });
+            let message = format!("{} samples, but at least 3 are needed", self.t_s.len());
+            return Err(Error::contents(self.path, Place::Within, message));
         }
         if let Some(k) = (1..self.t_s.len()).find(|k| self.t_s[*k] <= self.t_s[k - 1]) {
-            let (path, line) = (self.path.clone(), self.lines[k]);
-            return Err(Error::Time { path, line, previous_s: self.t_s[k - 1], t_s: self.t_s[k] });
+            return Err(time_back(&self.path, self.lines[k], self.t_s[k - 1], self.t_s[k]));
         }
         let step = median_step(&self.t_s);
         self.doubt_units(step)?;
@@ -154,15 +168,24 @@ impl Columns {
             // a sample after a hole lasts a step like any other
             let is_hole = since_s > GAP * step;
             let sample = self.sample(k, if is_hole { step } else { since_s }, t_s);
-            let (path, line) = (self.path.clone(), self.lines[k]);
+            let refuse = |message: String| Error::contents(self.path.as_str(), self.lines[k], message);
             if is_hole && since_s - step > LONGEST_S + 0.5 * step {
                 let previous_s = self.t_s[k - 1];
-                return Err(Error::Gap { path, line, previous_s, t_s, longest_s: LONGEST_S });
+                let message = format!(
+                    "no samples from {previous_s} s to {t_s} s: more than {LONGEST_S} s cannot be bridged"
+                );
+                return Err(refuse(message).advice("fuse the stretches before and after it one by one"));
             }
             let angle = sample.dtheta.length();
             if angle > MAX_ROTATION {
-                let (angle_deg, max_deg) = (angle / DEG, MAX_ROTATION / DEG);
-                return Err(Error::Rotation { path, line, angle_deg, max_deg });
+                let message = format!(
+                    "a rotation of {:.1}° in one sample, at most {:.1}° can be followed",
+                    angle / DEG,
+                    MAX_ROTATION / DEG
+                );
+                return Err(refuse(message).advice(
+                    "is the unit right? gyro_x_deg_s is in degrees, gyro_x_rad_s in radians a second",
+                ));
             }
             if is_hole {
                 holes.push((k, since_s - step));

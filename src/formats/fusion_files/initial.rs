@@ -1,9 +1,9 @@
 //! An initial state (TOML).
 
-use super::FusionFileError as Error;
 use crate::earth::MAX_LATITUDE;
 use crate::ekf::InitialSettings;
-use crate::formats::toml_file::{Section, Source, TomlError};
+use crate::formats::FileError;
+use crate::formats::toml_file::{Section, Source};
 use crate::frames::{NavState, RollPitchYaw};
 use crate::fusion::Start;
 use crate::units::DEG;
@@ -35,11 +35,11 @@ const KEYS: [&str; 17] = [
 ///
 /// # Errors
 /// File, line, key and value of what is refused.
-pub fn read_initial(path: &Path) -> Result<Start, Error> {
-    Ok(parse(&Source::read(path)?)?)
+pub fn read_initial(path: &Path) -> Result<Start, FileError> {
+    parse(&Source::read(path)?)
 }
 
-fn parse(source: &Source) -> Result<Start, TomlError> {
+fn parse(source: &Source) -> Result<Start, FileError> {
     let table = source.parse()?;
     let root = source.root(&table);
     root.only(&KEYS)?;
@@ -50,7 +50,7 @@ fn parse(source: &Source) -> Result<Start, TomlError> {
         }
         Ok(degrees * DEG)
     };
-    let speed = |key| Ok::<f64, TomlError>(root.f64(key)?.unwrap_or(0.0));
+    let speed = |key| Ok::<f64, FileError>(root.f64(key)?.unwrap_or(0.0));
     let lat = angle("lat_deg", 90.0)?;
     if lat.abs() > MAX_LATITUDE {
         return Err(root.refuse("lat_deg", "is too near a pole to navigate in latitude and longitude", None));
@@ -71,7 +71,7 @@ fn parse(source: &Source) -> Result<Start, TomlError> {
     Ok(Start { t_s: root.require_f64("t_s")?, state, sigma: sigma(&root)?, how })
 }
 
-fn sigma(root: &Section<'_>) -> Result<InitialSettings, TomlError> {
+fn sigma(root: &Section<'_>) -> Result<InitialSettings, FileError> {
     let d = InitialSettings::default();
     let three = |key: &str, default: [f64; 3]| match root.f64s(key)? {
         None => Ok(default),

@@ -1,17 +1,16 @@
 //! What `fuse` reads: recorded IMU data, GNSS fixes, an initial state. Our own tables, the headers that
 //! recordings may have, and the text files of KF-GINS.
 
-mod error;
 mod fixes;
 mod inertial;
 mod initial;
 
-pub use error::FusionFileError;
 pub use fixes::{FixSigma, read_gnss};
 pub use inertial::{ImuFile, read_imu};
 pub use initial::read_initial;
 
 use crate::formats::trajectory_file::table::{self, Numbers, Table};
+use crate::formats::{FileError, Kind};
 use std::path::Path;
 
 /// How many columns a table of numbers between blanks without a header has; none of any other text.
@@ -23,10 +22,22 @@ fn bare_columns(text: &str) -> Option<usize> {
 }
 
 /// The table of a file, its columns named when it has no header.
-fn table(path: &Path, text: &str, columns: Option<&[&str]>) -> Result<Table, FusionFileError> {
-    Ok(Table::read(&path.display().to_string(), text.as_bytes(), columns, Numbers::Finite)?)
+fn table(path: &Path, text: &str, columns: Option<&[&str]>) -> Result<Table, FileError> {
+    let read = Table::read(&path.display().to_string(), text.as_bytes(), columns, Numbers::Finite);
+    read.map_err(|e| match e.kind {
+        Kind::Header(_) | Kind::Empty(_) => e.advice_instead(fixes::COLUMNS),
+        Kind::Cell { .. } => e.advice_instead("remove the row: a fix that is not whole is no fix"),
+        _ => e,
+    })
 }
 
-fn text(path: &Path) -> Result<String, FusionFileError> {
-    Ok(table::text(path)?)
+/// Time that stands still or goes back.
+fn time_back(path: &str, line: u64, previous_s: f64, t_s: f64) -> FileError {
+    let advice = if previous_s - t_s > 500_000.0 {
+        "a new GPS week? Count the seconds on, in both files"
+    } else {
+        "sort the rows by time and remove repeated ones"
+    };
+    let message = format!("time goes from {previous_s} s to {t_s} s: it must increase");
+    FileError::contents(path, line, message).advice(advice)
 }

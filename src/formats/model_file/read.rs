@@ -1,8 +1,9 @@
 //! Reading model files.
 
 use super::{CI, Interval, ModelFile, SCHEMA, TurnOn};
+use crate::formats::FileError;
 use crate::formats::suggest::nearest;
-use crate::formats::toml_file::{Section, Source, TomlError};
+use crate::formats::toml_file::{Section, Source};
 use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::{
     CATALOGUE, Composite, Law, Model, ParameterError, Process, Spread, SpreadError, Variation,
@@ -15,11 +16,11 @@ use std::path::Path;
 /// # Errors
 /// When the file cannot be read, is not TOML, has unknown keys, lacks some, or has values outside their
 /// domains.
-pub fn read(path: &Path) -> Result<ModelFile, TomlError> {
+pub fn read(path: &Path) -> Result<ModelFile, FileError> {
     parse(&Source::read(path)?)
 }
 
-pub(super) fn parse(source: &Source) -> Result<ModelFile, TomlError> {
+pub(super) fn parse(source: &Source) -> Result<ModelFile, FileError> {
     let table = source.parse()?;
     let root = source.root(&table);
     root.only(&["schema", "rate_hz", "accel", "gyro", "turn_on", "spread", "provenance"])?;
@@ -41,7 +42,7 @@ pub(super) fn parse(source: &Source) -> Result<ModelFile, TomlError> {
     Ok(file)
 }
 
-fn check_schema(root: &Section<'_>) -> Result<(), TomlError> {
+fn check_schema(root: &Section<'_>) -> Result<(), FileError> {
     match root.u64("schema")? {
         None | Some(SCHEMA) => Ok(()),
         Some(_) => {
@@ -51,7 +52,7 @@ fn check_schema(root: &Section<'_>) -> Result<(), TomlError> {
     }
 }
 
-fn read_sensor(root: &Section<'_>, sensor: Sensor, file: &mut ModelFile) -> Result<(), TomlError> {
+fn read_sensor(root: &Section<'_>, sensor: Sensor, file: &mut ModelFile) -> Result<(), FileError> {
     let Some(section) = root.section(sensor.name())? else {
         file.missing.extend(Axis::ALL.map(|axis| Channel { sensor, axis }));
         return Ok(());
@@ -78,13 +79,13 @@ fn read_sensor(root: &Section<'_>, sensor: Sensor, file: &mut ModelFile) -> Resu
     if found { Ok(()) } else { Err(section.missing("processes")) }
 }
 
-fn read_turn_on(section: &Section<'_>) -> Result<TurnOn, TomlError> {
+fn read_turn_on(section: &Section<'_>) -> Result<TurnOn, FileError> {
     section.only(&Sensor::ALL.map(TurnOn::key))?;
     let [accel_m_s2, gyro_rad_s] = Sensor::ALL.map(|sensor| read_turn_on_of(section, sensor));
     Ok(TurnOn { accel_m_s2: accel_m_s2?, gyro_rad_s: gyro_rad_s? })
 }
 
-fn read_turn_on_of(section: &Section<'_>, sensor: Sensor) -> Result<Option<[f64; 3]>, TomlError> {
+fn read_turn_on_of(section: &Section<'_>, sensor: Sensor) -> Result<Option<[f64; 3]>, FileError> {
     let key = TurnOn::key(sensor);
     let axes = match section.is_list(key) {
         false => section.f64(key)?.map(|all| [all; 3]),
@@ -104,7 +105,7 @@ fn read_turn_on_of(section: &Section<'_>, sensor: Sensor) -> Result<Option<[f64;
     Ok(axes)
 }
 
-fn read_processes(table: &Section<'_>, channel: Channel, file: &mut ModelFile) -> Result<(), TomlError> {
+fn read_processes(table: &Section<'_>, channel: Channel, file: &mut ModelFile) -> Result<(), FileError> {
     if !table.has("processes") {
         return Err(table.missing("processes"));
     }
@@ -124,7 +125,7 @@ fn read_processes(table: &Section<'_>, channel: Channel, file: &mut ModelFile) -
     Ok(())
 }
 
-fn read_process(section: &Section<'_>, rate_hz: f64) -> Result<Process, TomlError> {
+fn read_process(section: &Section<'_>, rate_hz: f64) -> Result<Process, FileError> {
     let code = section.require_str("type")?;
     let Some((code, names)) = CATALOGUE.iter().find(|(c, _)| *c == code) else {
         let codes = || CATALOGUE.iter().map(|(c, _)| *c);
@@ -145,7 +146,7 @@ fn read_process(section: &Section<'_>, rate_hz: f64) -> Result<Process, TomlErro
     }
 }
 
-fn refuse_parameter(section: &Section<'_>, e: &ParameterError) -> TomlError {
+fn refuse_parameter(section: &Section<'_>, e: &ParameterError) -> FileError {
     let hint = match e.parameter {
         "phi" => {
             "phi = exp(−1/(T·rate_hz)) for a correlation time of T seconds; phi = 1 is a random walk: RW"
@@ -156,7 +157,7 @@ fn refuse_parameter(section: &Section<'_>, e: &ParameterError) -> TomlError {
     section.refuse(e.parameter, format!("is not {}", e.domain), Some(hint.into()))
 }
 
-fn read_spread(section: &Section<'_>, file: &ModelFile) -> Result<Spread, TomlError> {
+fn read_spread(section: &Section<'_>, file: &ModelFile) -> Result<Spread, FileError> {
     section.only(&Sensor::ALL.map(Sensor::name))?;
     let mut spread = Spread::default();
     for sensor in Sensor::ALL {
@@ -188,7 +189,7 @@ fn read_spread(section: &Section<'_>, file: &ModelFile) -> Result<Spread, TomlEr
     Ok(spread)
 }
 
-fn read_variation(section: &Section<'_>, noise: &Composite, rate_hz: f64) -> Result<Variation, TomlError> {
+fn read_variation(section: &Section<'_>, noise: &Composite, rate_hz: f64) -> Result<Variation, FileError> {
     const COMMON: [&str; 3] = ["process", "parameter", "distribution"];
     let law = match section.require_str("distribution")? {
         "beta" => {
@@ -209,7 +210,7 @@ fn read_variation(section: &Section<'_>, noise: &Composite, rate_hz: f64) -> Res
     Variation::new(noise, rate_hz, process, parameter, law).map_err(|e| refuse_law(section, &e))
 }
 
-fn refuse_law(section: &Section<'_>, e: &SpreadError) -> TomlError {
+fn refuse_law(section: &Section<'_>, e: &SpreadError) -> FileError {
     let one_of = |known: &[String]| Some(format!("there: {}", known.join(", ")));
     match e {
         SpreadError::NoProcess { known, .. } => {

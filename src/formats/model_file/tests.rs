@@ -1,17 +1,18 @@
 use super::read::parse;
 use super::*;
-use crate::formats::toml_file::{Source, TomlError};
+use crate::formats::FileError;
+use crate::formats::toml_file::Source;
 use crate::imu::{Axis, Sensor};
 use crate::noise::{Composite, Law, Process, Variation};
 
 const ACCEL_X: Channel = Channel { sensor: Sensor::Accel, axis: Axis::X };
 
-fn read_text(text: &str) -> Result<ModelFile, TomlError> {
+fn read_text(text: &str) -> Result<ModelFile, FileError> {
     parse(&Source::new("m.toml", text))
 }
 
 /// One process of a file otherwise sound, on line 4.
-fn with_process(process: &str) -> Result<ModelFile, TomlError> {
+fn with_process(process: &str) -> Result<ModelFile, FileError> {
     read_text(&format!("schema = 1\nrate_hz = 100.0\n[accel]\nprocesses = [{{ {process} }}]\n"))
 }
 

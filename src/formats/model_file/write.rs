@@ -1,7 +1,8 @@
 //! Writing model files: numbers in the shortest form that reads back to the same bits.
 
 use super::{CI, Interval, ModelFile, SCHEMA, TurnOn};
-use crate::formats::atomic::{self, WriteError};
+use crate::formats::FileError;
+use crate::formats::atomic;
 use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::{Law, Process, Variation};
 use std::fmt::Write;
@@ -11,7 +12,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// When the system refuses.
-pub fn write(path: &Path, file: &ModelFile) -> Result<(), WriteError> {
+pub fn write(path: &Path, file: &ModelFile) -> Result<(), FileError> {
     atomic::write(path, to_toml(file))
 }
 

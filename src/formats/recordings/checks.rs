@@ -1,9 +1,11 @@
 //! Units and plausibility of the signals.
 
+use super::FileReport;
+use super::error::{no_unit, storage};
 use super::header::{Role, Unit};
 use super::table::{Column, Raw};
 use super::values::Values;
-use super::{FileReport, RecordingError};
+use crate::formats::{FileError, Place, Setting};
 use crate::imu::{Channel, Sensor};
 use crate::units::STANDARD_GRAVITY;
 use std::io;
@@ -14,16 +16,17 @@ const LONG_STANDING: usize = 100;
 const LONG_SHARE: f64 = 0.1;
 
 /// What brings each column to SI units; refuses dead axes, tells those that stand still for long.
-pub(super) fn factors(raw: &Raw, rate_hz: f64, report: &mut FileReport) -> Result<Vec<f64>, RecordingError> {
+pub(super) fn factors(raw: &Raw, rate_hz: f64, report: &mut FileReport) -> Result<Vec<f64>, FileError> {
     let from_gravity = gravity_factor(raw)?;
     let factor = |column: &Column| {
         let Role::Signal { channel, unit } = column.role else { return Ok(1.0) };
-        let Standing { first, count, value } =
-            standing(&column.values).map_err(RecordingError::storage(&raw.path))?;
+        let Standing { first, count, value } = standing(&column.values).map_err(storage(&raw.path))?;
         let all = column.values.len();
         if count == all && all > 1 {
-            let (path, column) = (raw.path.clone(), column.name.clone());
-            return Err(RecordingError::Dead { path, channel, column, value });
+            let message = format!("{channel} (column \"{}\") is dead: every sample is {value}", column.name);
+            return Err(FileError::contents(raw.path.as_str(), Place::Within, message)
+                .setting(Setting::Channels)
+                .advice("record again"));
         }
         if count >= LONG_STANDING && count as f64 > LONG_SHARE * all as f64 {
             let (percent, line) = (100.0 * count as f64 / all as f64, raw.lines.of(first));
@@ -42,7 +45,7 @@ pub(super) fn factors(raw: &Raw, rate_hz: f64, report: &mut FileReport) -> Resul
 }
 
 /// The unit of accelerometer columns that do not say it, from the length of their mean.
-pub(in crate::formats) fn gravity_factor(raw: &Raw) -> Result<f64, RecordingError> {
+pub(in crate::formats) fn gravity_factor(raw: &Raw) -> Result<f64, FileError> {
     let unnamed: Vec<&Column> = raw
         .columns
         .iter()
@@ -51,7 +54,7 @@ pub(in crate::formats) fn gravity_factor(raw: &Raw) -> Result<f64, RecordingErro
     let Some(first) = unnamed.first() else { return Ok(1.0) };
     let means =
         unnamed.iter().map(|c| mean(&c.values, 0..c.values.len(), 1.0)).collect::<Result<Vec<_>, _>>();
-    let means = means.map_err(RecordingError::storage(&raw.path))?;
+    let means = means.map_err(storage(&raw.path))?;
     let norm = norm(&means);
     let near = |target: f64| (norm / target - 1.0).abs() < 0.1;
     if unnamed.len() == 3 {
@@ -61,11 +64,7 @@ pub(in crate::formats) fn gravity_factor(raw: &Raw) -> Result<f64, RecordingErro
             }
         }
     }
-    Err(RecordingError::NoUnit {
-        path: raw.path.clone(),
-        line: raw.lines.of(0).saturating_sub(1).max(1),
-        column: first.name.clone(),
-    })
+    Err(no_unit(&raw.path, raw.lines.of(0).saturating_sub(1).max(1), &first.name))
 }
 
 /// The longest stretch of one value.
@@ -112,7 +111,7 @@ pub(super) fn plausible(
     means: &[(Channel, f64)],
     rate_hz: f64,
     report: &mut FileReport,
-) -> Result<(), RecordingError> {
+) -> Result<(), FileError> {
     /// Room for local gravity, a scale error and a bias of 30 mg.
     const NEAR: f64 = 0.03;
     let of = |sensor| -> Vec<f64> {
@@ -137,7 +136,7 @@ pub(super) fn plausible(
     Ok(())
 }
 
-pub(in crate::formats) fn check_gravity(path: &str, norm: f64) -> Result<(), RecordingError> {
+pub(in crate::formats) fn check_gravity(path: &str, norm: f64) -> Result<(), FileError> {
     let near = |target: f64| (norm / target - 1.0).abs() < 0.1;
     // Below 0.3 m/s² the mean was removed before: nothing to be learnt from it.
     if near(STANDARD_GRAVITY) || norm < 0.3 {
@@ -152,19 +151,20 @@ pub(in crate::formats) fn check_gravity(path: &str, norm: f64) -> Result<(), Rec
     } else {
         "wrong unit, or the sensor was moving"
     };
-    Err(RecordingError::Gravity { path: path.to_owned(), found: norm, guess })
+    let message = format!("static |f| is {norm:.4} m/s², far from 9.81 m/s²: {guess}");
+    Err(FileError::contents(path, Place::Within, message)
+        .advice("name the unit in the columns: accel_x_m_s2, accel_x_g or accel_x_mg"))
 }
 
 /// Replicates of one sensor have one rate (0.5 % allows for clocks).
-pub(super) fn same_rate(files: &[FileReport]) -> Result<(), RecordingError> {
+pub(super) fn same_rate(files: &[FileReport]) -> Result<(), FileError> {
     let Some(first) = files.first() else { return Ok(()) };
     match files.iter().find(|f| (f.rate_hz / first.rate_hz - 1.0).abs() > 0.005) {
         None => Ok(()),
-        Some(other) => Err(RecordingError::RatesDiffer {
-            path: other.file.clone(),
-            rate_hz: other.rate_hz,
-            first: first.file.clone(),
-            first_hz: first.rate_hz,
-        }),
+        Some(other) => {
+            let message = format!("has {} Hz, but {} has {} Hz", other.rate_hz, first.file, first.rate_hz);
+            Err(FileError::contents(other.file.as_str(), Place::Itself, message)
+                .advice("calibrate recordings of one rate at a time, or resample them"))
+        }
     }
 }

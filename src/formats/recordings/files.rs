@@ -1,6 +1,7 @@
 //! Which files are meant: directories stand for the recordings in them.
 
-use super::RecordingError;
+use super::error::{no_files, unreadable};
+use crate::formats::{FileError, Place};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
@@ -15,14 +16,14 @@ pub(super) struct File {
 const ENDINGS: [&str; 4] = ["csv", "tsv", "txt", "npy"];
 
 /// The files, in the order given, those of a directory in name order.
-pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<File>, RecordingError> {
+pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<File>, FileError> {
     let mut files = Vec::new();
     for path in paths {
-        let io = |source| RecordingError::Io { path: path.display().to_string(), source };
+        let io = |source| unreadable(path, source);
         if std::fs::metadata(path).map_err(io)?.is_dir() {
             let inside = listing(path).map_err(io)?;
             if inside.is_empty() {
-                return Err(RecordingError::NoFiles { path: path.display().to_string() });
+                return Err(no_files(path.display().to_string()));
             }
             files.extend(inside.into_iter().map(|path| File { path, from_directory: true }));
         } else {
@@ -33,7 +34,9 @@ pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<File>, RecordingError> {
     for file in &files {
         // A pipe has no path of its own.
         if !seen.insert(file.path.canonicalize().unwrap_or_else(|_| file.path.clone())) {
-            return Err(RecordingError::GivenTwice { path: file.path.display().to_string() });
+            let message = "is given twice: it would count as two replicates";
+            return Err(FileError::contents(file.path.display().to_string(), Place::Itself, message)
+                .advice("name each file once; a directory stands for all its recordings"));
         }
     }
     Ok(files)

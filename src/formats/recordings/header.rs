@@ -10,9 +10,10 @@
 //! | Xsens MT Manager | `PacketCounter`, `SampleTimeFine`, `Acc_X`, `Gyr_X` below a `//` head: SI |
 //! | loggers | `ax_mps2`, `gx_radps`, `gyro_x_dps`, `acc_x [mg]`, … |
 
-use super::error::shown;
+use super::error::{COLUMNS, no_unit, shown};
 use super::table::Column;
 use super::values::Values;
+use crate::formats::{FileError, Kind, Setting};
 use crate::imu::{Axis, Channel, Sensor};
 use crate::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
 
@@ -63,13 +64,17 @@ pub(super) struct Layout {
     pub(super) ignored: Vec<String>,
 }
 
-/// Why a header is refused.
-#[derive(Debug)]
-pub(super) enum HeaderError {
-    NoChannels { columns: String },
-    NoUnit { column: String },
-    UnknownUnit { column: String, units: String },
-    Twice { channel: Channel, first: String, second: String },
+/// Where a header stands, for messages.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct HeaderPlace<'a> {
+    pub(super) path: &'a str,
+    pub(super) line: u64,
+}
+
+impl HeaderPlace<'_> {
+    fn refuse(self, message: String) -> FileError {
+        FileError::contents(self.path, self.line, message)
+    }
 }
 
 /// Endings of time columns and their length in seconds.
@@ -221,9 +226,14 @@ impl Layout {
     }
 
     /// The columns with a meaning among `names`, of the `wanted` channels (all if none are given).
-    pub(super) fn new(names: &[String], si: bool, wanted: Option<&[Channel]>) -> Result<Self, HeaderError> {
+    pub(super) fn new(
+        place: HeaderPlace<'_>,
+        names: &[String],
+        si: bool,
+        wanted: Option<&[Channel]>,
+    ) -> Result<Self, FileError> {
         let (mut found, mut ignored): (Vec<Found>, Vec<String>) = (Vec::new(), Vec::new());
-        let mut no_unit = None;
+        let mut without_unit = None;
         for (index, name) in names.iter().enumerate() {
             let name = name.trim().to_owned();
             match classify(&name, si) {
@@ -231,21 +241,24 @@ impl Layout {
                     ignored.push(name);
                 }
                 Some(Ok(role)) => found.push(Found { index, name, role }),
-                Some(Err(())) => no_unit = no_unit.or(Some(name)),
+                Some(Err(())) => without_unit = without_unit.or(Some(name)),
                 None => ignored.push(name),
             }
         }
-        if let Some(column) = no_unit {
-            return Err(HeaderError::NoUnit { column });
+        if let Some(column) = without_unit {
+            return Err(no_unit(place.path, place.line, &column));
         }
         let mut layout = Self { found, ignored };
         layout.one_time_column();
-        layout.no_channel_twice()?;
-        layout.no_unknown_unit(wanted)?;
+        layout.no_channel_twice(place)?;
+        layout.no_unknown_unit(place, wanted)?;
         if !layout.found.iter().any(|f| matches!(f.role, Role::Signal { .. })) {
             let quoted: Vec<String> =
                 names.iter().take(20).map(|n| format!("\"{}\"", shown(n.trim(), 40))).collect();
-            return Err(HeaderError::NoChannels { columns: quoted.join(", ") });
+            let message = format!("no accelerometer or gyroscope column among {}", quoted.join(", "));
+            return Err(FileError::new(place.path, place.line, Kind::Columns(message.into()))
+                .advice(COLUMNS)
+                .setting(Setting::ColumnNames));
         }
         Ok(layout)
     }
@@ -268,7 +281,7 @@ impl Layout {
 
     /// A column that is an axis by its name but in a unit that is not known must not be dropped in silence: unless
     /// another column is that axis, or it is not wanted.
-    fn no_unknown_unit(&self, wanted: Option<&[Channel]>) -> Result<(), HeaderError> {
+    fn no_unknown_unit(&self, place: HeaderPlace<'_>, wanted: Option<&[Channel]>) -> Result<(), FileError> {
         let is = |f: &Found, channel| matches!(f.role, Role::Signal { channel: c, .. } if c == channel);
         for name in &self.ignored {
             let Some(channel) = in_unknown_unit(&normalise(name)) else { continue };
@@ -279,18 +292,23 @@ impl Layout {
                     Sensor::Gyro => GYRO_UNITS,
                 };
                 let units: Vec<String> = units.iter().map(|(names, _)| format!("_{}", names[0])).collect();
-                return Err(HeaderError::UnknownUnit { column: name.clone(), units: units.join(", ") });
+                return Err(place
+                    .refuse(format!("column \"{name}\" is in a unit that is not known"))
+                    .advice(format!("end its name in one of {}", units.join(", ")))
+                    .setting(Setting::ColumnNames)
+                    .setting(Setting::Channels));
             }
         }
         Ok(())
     }
 
-    fn no_channel_twice(&self) -> Result<(), HeaderError> {
+    fn no_channel_twice(&self, place: HeaderPlace<'_>) -> Result<(), FileError> {
         for channel in Channel::ALL {
             let of_channel = |f: &&Found| matches!(f.role, Role::Signal { channel: c, .. } if c == channel);
             let mut names = self.found.iter().filter(of_channel).map(|f| f.name.clone());
             if let (Some(first), Some(second)) = (names.next(), names.next()) {
-                return Err(HeaderError::Twice { channel, first, second });
+                let message = format!("columns \"{first}\" and \"{second}\" are both {channel}");
+                return Err(place.refuse(message));
             }
         }
         Ok(())
@@ -321,6 +339,8 @@ pub fn column_name(channel: Channel) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const PLACE: HeaderPlace<'_> = HeaderPlace { path: "a.csv", line: 1 };
 
     fn signal_of(name: &str, si: bool) -> Option<(String, f64)> {
         match classify(name, si) {
@@ -400,11 +420,12 @@ mod tests {
     #[test]
     fn an_unknown_unit_is_not_passed_over() {
         let layout = |names: &[&str], wanted: Option<&[Channel]>| {
-            Layout::new(&names.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>(), false, wanted)
+            Layout::new(PLACE, &names.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>(), false, wanted)
         };
         for name in ["accel_x_ft_s2", "gyro_z_rpm", "Accelerometer X (counts)", "ax_lsb"] {
             let error = layout(&["t_s", "gyro_x_rad_s", name], None).unwrap_err();
-            assert!(matches!(error, HeaderError::UnknownUnit { column, .. } if column == name), "{name}");
+            let expected = format!("a.csv, line 1: column \"{name}\" is in a unit that is not known");
+            assert_eq!(error.to_string(), expected);
         }
         assert!(layout(&["accel_x_m_s2", "accel_x_sigma"], None).is_ok(), "the axis is there");
         let y = Channel { sensor: Sensor::Accel, axis: Axis::Y };
@@ -418,7 +439,7 @@ mod tests {
             ["%time", "field.header.stamp", "field.header.frame_id", "field.linear_acceleration.x"]
                 .map(String::from)
                 .to_vec();
-        let layout = Layout::new(&names, false, None).unwrap();
+        let layout = Layout::new(PLACE, &names, false, None).unwrap();
         let kept: Vec<usize> = layout.found.iter().map(|f| f.index).collect();
         assert_eq!(kept, [1, 3]);
         assert_eq!(layout.ignored, ["field.header.frame_id", "%time"]);

@@ -3,12 +3,12 @@
 //!
 //! Columns are found by their names ([`header`]), their units by the names' endings; what was found, and
 //! what was assumed, is told in the [`Report`]. What cannot be right is refused with file and line
-//! ([`RecordingError`]).
+//! ([`FileError`]).
 
 pub mod header;
 
 pub(in crate::formats) mod checks;
-mod error;
+pub(in crate::formats) mod error;
 mod files;
 mod prepared;
 mod repeats;
@@ -20,14 +20,15 @@ pub(in crate::formats) mod timing;
 mod values;
 mod write;
 
-pub use error::RecordingError;
 pub use files::is_recording;
 pub use report::{FileReport, Report};
 pub use write::FileFormat;
 
 pub(in crate::formats) use table::{Raw, load};
 
+use super::{FileError, Kind};
 use crate::imu::{Channel, Recording};
+use error::no_files;
 use prepared::Prepared;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -80,8 +81,8 @@ pub enum Gaps {
 /// Reads recordings; those of a directory in name order (numbers in names by value). All are held.
 ///
 /// # Errors
-/// When a file cannot be read, or holds what no sound recording can: [`RecordingError`].
-pub fn read(paths: &[PathBuf], options: &ReadOptions) -> Result<(Vec<Recording>, Report), RecordingError> {
+/// When a file cannot be read, or holds what no sound recording can: [`FileError`].
+pub fn read(paths: &[PathBuf], options: &ReadOptions) -> Result<(Vec<Recording>, Report), FileError> {
     let options = ReadOptions { hold_bytes: usize::MAX, ..options.clone() };
     visit(paths, &options, &|recording| recording, &|_, _| {})
 }
@@ -95,13 +96,13 @@ const AT_ONCE: usize = 8;
 /// `look` returned is in the order of the files. `tell` is told how many files are done, and of how many, from 0 on.
 ///
 /// # Errors
-/// When a file cannot be read, or holds what no sound recording can: [`RecordingError`].
+/// When a file cannot be read, or holds what no sound recording can: [`FileError`].
 pub fn visit<T: Send>(
     paths: &[PathBuf],
     options: &ReadOptions,
     look: &(dyn Fn(Recording) -> T + Sync),
     tell: &dyn Fn(usize, usize),
-) -> Result<(Vec<T>, Report), RecordingError> {
+) -> Result<(Vec<T>, Report), FileError> {
     let files = files::expand(paths)?;
     let (mut looks, mut report) = (Vec::new(), Report::default());
     tell(0, files.len());
@@ -110,7 +111,7 @@ pub fn visit<T: Send>(
         let outcomes: Vec<_> = some.par_iter().map(|file| held(&file.path, options, look)).collect();
         for (file, outcome) in some.iter().zip(outcomes) {
             match outcome {
-                Err(RecordingError::NoChannels { .. }) if file.from_directory => {
+                Err(FileError { kind: Kind::Columns(_), .. }) if file.from_directory => {
                     let text = format!("{}: passed over, no column is a known one", file.path.display());
                     report.warnings.push(text);
                 }
@@ -130,7 +131,7 @@ pub fn visit<T: Send>(
     checks::same_rate(&report.files)?;
     if looks.is_empty() {
         let path = paths.first().map(|p| p.display().to_string()).unwrap_or_default();
-        return Err(RecordingError::NoFiles { path });
+        return Err(no_files(path));
     }
     Ok((looks, report))
 }
@@ -140,7 +141,7 @@ fn held<T>(
     path: &Path,
     options: &ReadOptions,
     look: &(dyn Fn(Recording) -> T + Sync),
-) -> Result<(FileReport, Vec<T>, Option<Prepared>), RecordingError> {
+) -> Result<(FileReport, Vec<T>, Option<Prepared>), FileError> {
     let (prepared, mut report) = Prepared::new(load(path, options)?, options)?;
     path.clone_into(&mut report.path);
     if prepared.is_stored() {

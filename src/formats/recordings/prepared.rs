@@ -1,10 +1,12 @@
 //! A file whose time, units and stretches are decided: what is left is to take its samples.
 
+use super::error::{storage, too_short};
 use super::header::Role;
 use super::report::name_of;
 use super::table::{Column, Raw};
 use super::timing::{self, Timing};
-use super::{FileReport, ReadOptions, RecordingError, checks, repeats, texture};
+use super::{FileReport, ReadOptions, checks, repeats, texture};
+use crate::formats::{FileError, Place, Setting};
 use crate::imu::{Channel, Recording, Signal};
 use std::ops::Range;
 
@@ -29,7 +31,7 @@ struct Signals {
 }
 
 impl Prepared {
-    pub(super) fn new(mut raw: Raw, options: &ReadOptions) -> Result<(Self, FileReport), RecordingError> {
+    pub(super) fn new(mut raw: Raw, options: &ReadOptions) -> Result<(Self, FileReport), FileError> {
         let mut report = FileReport::new(&raw);
         let timing = timing::timing(&mut raw, options, &mut report)?;
         raw.columns.retain(|c| matches!(c.role, Role::Signal { .. }));
@@ -39,7 +41,7 @@ impl Prepared {
         repeats::doubts(&raw, &mut report)?;
         let samples = raw.columns.first().map_or(0, |c| c.values.len());
         let pieces = pieces(&raw.path, samples, &timing, options, &mut report)?;
-        let stored = RecordingError::storage(&raw.path);
+        let stored = storage(&raw.path);
         let mut columns = Vec::new();
         for (column, factor) in raw.columns.into_iter().zip(factors) {
             let Some(channel) = column.channel() else { continue };
@@ -62,12 +64,12 @@ impl Prepared {
     }
 
     /// All recordings of the file.
-    pub(super) fn recordings(self) -> Result<Vec<Recording>, RecordingError> {
+    pub(super) fn recordings(self) -> Result<Vec<Recording>, FileError> {
         let mut recordings: Vec<Recording> = (0..self.pieces.len()).map(|i| self.recording(i)).collect();
         for signals in self.columns {
             let Signals { column, channel, factor, means } = signals;
             let stretches = column.values.into_stretches(&self.pieces);
-            let stretches = stretches.map_err(RecordingError::storage(&self.path))?;
+            let stretches = stretches.map_err(storage(&self.path))?;
             for ((recording, samples), mean) in recordings.iter_mut().zip(stretches).zip(means) {
                 recording.signals.push(signal(channel, samples, factor, mean));
             }
@@ -76,10 +78,10 @@ impl Prepared {
     }
 
     /// One signal at a time, as recordings: those of the first stretch, those of the next.
-    pub(super) fn signals(&self) -> impl Iterator<Item = Result<Recording, RecordingError>> {
+    pub(super) fn signals(&self) -> impl Iterator<Item = Result<Recording, FileError>> {
         let one = |(i, piece, signals): (usize, &Range<usize>, &Signals)| {
             let samples = signals.column.values.stretch(piece.clone());
-            let samples = samples.map_err(RecordingError::storage(&self.path))?;
+            let samples = samples.map_err(storage(&self.path))?;
             let signal = signal(signals.channel, samples, signals.factor, signals.means[i]);
             Ok(Recording { signals: vec![signal], ..self.recording(i) })
         };
@@ -110,7 +112,7 @@ fn pieces(
     timing: &Timing,
     options: &ReadOptions,
     report: &mut FileReport,
-) -> Result<Vec<Range<usize>>, RecordingError> {
+) -> Result<Vec<Range<usize>>, FileError> {
     let skip = ((options.skip_s.max(0.0) * timing.rate_hz).round() as usize).min(samples);
     let inner = timing.breaks.iter().copied().filter(|b| *b > skip);
     let ends: Vec<usize> = std::iter::once(skip).chain(inner).chain([samples]).collect();
@@ -118,11 +120,16 @@ fn pieces(
     let longest = all().map(|p| p.len()).max().unwrap_or(0);
     let needed = options.min_samples.max(2);
     if longest < needed && options.skip_s > 0.0 {
-        let (path, skip_s, seconds) = (path.to_owned(), options.skip_s, samples as f64 / timing.rate_hz);
-        return Err(RecordingError::Skipped { path, skip_s, seconds, samples: longest, needed });
+        let (skip_s, seconds) = (options.skip_s, samples as f64 / timing.rate_hz);
+        let message = format!(
+            "leaving out the first {skip_s} s leaves {longest} samples of {seconds} s, but {needed} are needed"
+        );
+        return Err(FileError::contents(path, Place::Within, message)
+            .setting(Setting::Skip)
+            .advice("a longer recording"));
     }
     if longest < needed {
-        return Err(RecordingError::TooShort { path: path.to_owned(), samples: longest, needed });
+        return Err(too_short(path, longest, needed));
     }
     // A short one would cost all others their long scales.
     let needed = needed.max(longest / LONGEST_OVER_SHORTEST);

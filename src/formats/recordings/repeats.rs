@@ -1,7 +1,9 @@
 //! Stretches of rows that come twice, in one recording or in two of them.
 
+use super::FileReport;
+use super::error::storage;
 use super::table::{Column, Raw};
-use super::{FileReport, RecordingError};
+use crate::formats::FileError;
 use crate::imu::Channel;
 use std::collections::HashMap;
 use std::io;
@@ -23,9 +25,9 @@ const SKETCH: usize = 64;
 pub(super) type Sketch = Vec<u64>;
 
 /// Tells of rows that come twice, and takes a sketch of each column.
-pub(super) fn doubts(raw: &Raw, report: &mut FileReport) -> Result<(), RecordingError> {
+pub(super) fn doubts(raw: &Raw, report: &mut FileReport) -> Result<(), FileError> {
     let mut sketches = Vec::new();
-    let stored = RecordingError::storage(&raw.path);
+    let stored = storage(&raw.path);
     let mut finest: Option<(usize, &Column)> = None;
     for column in &raw.columns {
         let Some(channel) = column.channel() else { continue };

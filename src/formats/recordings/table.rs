@@ -1,9 +1,10 @@
 //! A file as columns of numbers, before anything is decided about time and units.
 
-use super::header::{self, Role};
+use super::error::{COLUMNS, row_length, sample, storage};
+use super::header::{self, HeaderPlace, Role};
 use super::values::Values;
-use super::{ReadOptions, RecordingError, text};
-use crate::formats::npy;
+use super::{ReadOptions, text};
+use crate::formats::{FileError, Place, Setting, npy};
 use crate::imu::Channel;
 use std::path::Path;
 
@@ -64,9 +65,10 @@ impl Lines {
 
 /// Beyond this a number is no measurement, and its square may be no number.
 pub(super) const LARGEST: f64 = 1e100;
+pub(super) const BEYOND: &str = "is beyond 1e100, no measurement";
 
 /// Reads a file's columns.
-pub(crate) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, RecordingError> {
+pub(crate) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) {
         load_npy(path, options)
     } else {
@@ -74,39 +76,28 @@ pub(crate) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, RecordingE
     }
 }
 
-fn load_npy(path: &Path, options: &ReadOptions) -> Result<Raw, RecordingError> {
+fn load_npy(path: &Path, options: &ReadOptions) -> Result<Raw, FileError> {
     let name = path.display().to_string();
     let array = npy::open(path)?;
     let expected = array.columns();
     let names = match &options.columns {
         Some(names) => names.clone(),
-        None => header::npy_order(expected)
-            .ok_or_else(|| RecordingError::NpyColumns { path: name.clone(), found: expected })?,
+        None => header::npy_order(expected).ok_or_else(|| unnamed(&name, expected))?,
     };
     if names.len() != expected {
-        return Err(RecordingError::RowLength {
-            path: name,
-            line: 1,
-            found: expected,
-            expected: names.len(),
-        });
+        return Err(row_length(&name, 1, expected, names.len()));
     }
-    let layout = header::Layout::new(&names, false, options.channels.as_deref())
-        .map_err(|e| RecordingError::header(&name, 1, e))?;
+    let place = HeaderPlace { path: &name, line: 1 };
+    let layout = header::Layout::new(place, &names, false, options.channels.as_deref())?;
     let (indices, mut columns) = layout.columns();
     let place: Vec<Option<usize>> =
         (0..expected).map(|index| indices.iter().position(|i| *i == index)).collect();
-    let stored = RecordingError::storage(&name);
+    let stored = storage(&name);
     let mut count = 0;
     array.each(|row, index, value| {
         let Some(at) = place[index] else { return Ok(()) };
         if !value.is_finite() || value.abs() > LARGEST {
-            let (path, line, column) = (name.clone(), row as u64 + 1, columns[at].name.clone());
-            return Err(if value.is_finite() {
-                RecordingError::Absurd { path, line, column, value: format!("{value:e}") }
-            } else {
-                RecordingError::NotFinite { path, line, column, value: value.to_string() }
-            });
+            return Err(not_a_measurement(&name, row as u64 + 1, &columns[at].name, value));
         }
         if count % BETWEEN == 0 {
             relieve(&mut columns, options).map_err(&stored)?;
@@ -123,6 +114,20 @@ fn load_npy(path: &Path, options: &ReadOptions) -> Result<Raw, RecordingError> {
         head_rate_hz: None,
         lines: Lines::default(),
     })
+}
+
+/// An array whose columns are not known.
+fn unnamed(path: &str, columns: usize) -> FileError {
+    let message = format!("an array of {columns} columns, which names are not known");
+    FileError::contents(path, Place::Within, message).advice(COLUMNS).setting(Setting::ColumnNames)
+}
+
+fn not_a_measurement(path: &str, line: u64, column: &str, value: f64) -> FileError {
+    if value.is_finite() {
+        sample(path, line, column, &format!("{value:e}"), BEYOND)
+    } else {
+        sample(path, line, column, &format!("\"{value}\""), "is not finite")
+    }
 }
 
 /// So many rows, or elements, come between one look at what is held and the next.

@@ -27,11 +27,7 @@ impl Files {
     }
 }
 
-fn read_one(
-    name: &str,
-    contents: impl AsRef<[u8]>,
-    options: &ReadOptions,
-) -> Result<Recording, RecordingError> {
+fn read_one(name: &str, contents: impl AsRef<[u8]>, options: &ReadOptions) -> Result<Recording, FileError> {
     let (_files, path) = Files::with(name, contents);
     read(&[path], options).map(|(mut r, _)| r.remove(0))
 }
@@ -171,7 +167,7 @@ fn xsens_counter_wraps_and_tells_what_was_lost() {
     let lost = xsens(RATE, (65530..65536).chain(65538..65542));
     let (message, hint) = refusal_with("mt.txt", &lost, &ReadOptions::default());
     assert_eq!(message, "mt.txt, line 12: gap in time from 0.1 s to 0.16 s, the median step is 0.02 s");
-    assert!(hint.contains("--gaps"));
+    assert!(hint.contains("split the recording at its gaps"));
     // Every second packet written: the rate is still the head's.
     let r = read_one("mt.txt", xsens(RATE, (65530..65560).step_by(2)), &ReadOptions::default()).unwrap();
     assert_close(&[r.rate_hz], &[50.0]);
@@ -297,7 +293,7 @@ fn rates() {
         refusal_with("a.csv", &text, &given(200.0)).0,
         "a.csv: the time column runs at 100 Hz, but 200 Hz is given"
     );
-    assert_eq!(refusal_with("a.csv", &text, &given(-1.0)).0, "-1 Hz is not a sample rate");
+    assert_eq!(refusal_with("a.csv", &text, &given(-1.0)).0, "a.csv: -1 Hz is not a sample rate");
     assert_eq!(refusal("gyro_x_rad_s\n1\n2\n"), "a.csv: no time column, and no rate is given");
     // Stamps rounded to 1 ms at 128 Hz: the span knows the rate, no single step does.
     let rounded: String = (0..1000).map(|k| format!("{:.3},{}\n", k as f64 / 128.0, k % 3)).collect();
@@ -359,7 +355,7 @@ fn dead_axes_and_short_recordings() {
     let dead = "gyro_x_rad_s,gyro_y_rad_s\n1,0.5\n2,0.5\n3,0.5\n";
     let (message, hint) = refusal_with("a.csv", dead, &at_100_hz());
     assert_eq!(message, "a.csv: gyro.y (column \"gyro_y_rad_s\") is dead: every sample is 0.5");
-    assert!(hint.contains("--axes"));
+    assert!(hint.contains("leave the channel out"));
     let x = Channel { sensor: crate::imu::Sensor::Gyro, axis: crate::imu::Axis::X };
     let only_x = ReadOptions { channels: Some(vec![x]), ..at_100_hz() };
     assert_eq!(read_one("a.csv", dead, &only_x).unwrap().signals.len(), 1);
@@ -406,7 +402,7 @@ fn a_directory_is_all_its_recordings_in_name_order() {
     assert!(e.to_string().ends_with(": no recordings in it"));
     let e = read(&["/no/such".into()], &ReadOptions::default()).unwrap_err();
     assert_eq!(e.to_string(), "/no/such: No such file or directory (os error 2)");
-    assert!(e.is_io());
+    assert!(e.is_system());
 }
 
 /// What is no error and yet not as it seems: told, and read.

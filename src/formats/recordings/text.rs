@@ -1,11 +1,11 @@
 //! Text tables: comment head, header, rows.
 
-use super::error::shown;
-use super::header::{Layout, Role, classify};
-use super::table::{BETWEEN, Column, LARGEST, Lines, Raw, relieve, settle};
+use super::ReadOptions;
+use super::error::{COLUMNS, empty, row_length, sample, shown, storage, unreadable};
+use super::header::{HeaderPlace, Layout, Role, classify};
+use super::table::{BETWEEN, BEYOND, Column, LARGEST, Lines, Raw, relieve, settle};
 use super::values::Values;
-use super::{ReadOptions, RecordingError};
-use crate::formats::source;
+use crate::formats::{FileError, Kind, Place, Setting, source};
 use flate2::read::MultiGzDecoder;
 use std::io::{BufRead, BufReader, Cursor, Read};
 use std::path::Path;
@@ -17,9 +17,9 @@ const LONGEST_HEADER: u64 = 1 << 16;
 const BUFFER: usize = 1 << 17;
 
 /// Reads a text table.
-pub(super) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, RecordingError> {
+pub(super) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError> {
     let name = path.display().to_string();
-    let io = |source| RecordingError::Io { path: name.clone(), source };
+    let io = |source| unreadable(path, source);
     let file = source::open(path).map_err(io)?;
     let gzipped = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
     let reader: Reader = if gzipped {
@@ -34,16 +34,16 @@ pub(super) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, RecordingE
 }
 
 /// Reads a text table from its bytes.
-pub(super) fn parse(name: &str, mut reader: Reader, options: &ReadOptions) -> Result<Raw, RecordingError> {
+pub(super) fn parse(name: &str, mut reader: Reader, options: &ReadOptions) -> Result<Raw, FileError> {
     let head = Head::read(name, &mut reader, options)?;
-    let error = |e| RecordingError::header(name, head.line, e);
-    let layout = Layout::new(&head.names, head.xsens, options.channels.as_deref()).map_err(error)?;
+    let place = HeaderPlace { path: name, line: head.line };
+    let layout = Layout::new(place, &head.names, head.xsens, options.channels.as_deref())?;
     let (indices, mut columns) = layout.columns();
     let lines = read_rows(name, reader, &head, &indices, &mut columns, options)?;
     if lines.is_empty() {
-        return Err(RecordingError::Empty { path: name.to_owned() });
+        return Err(empty(name));
     }
-    let stored = RecordingError::storage(name);
+    let stored = storage(name);
     settle(&mut columns, options).map_err(&stored)?;
     let mut kept = Vec::new();
     for column in columns {
@@ -72,17 +72,20 @@ struct Head {
 }
 
 impl Head {
-    fn read(name: &str, reader: &mut Reader, options: &ReadOptions) -> Result<Self, RecordingError> {
+    fn read(name: &str, reader: &mut Reader, options: &ReadOptions) -> Result<Self, FileError> {
         let (mut line, mut xsens, mut rate_hz) = (0, false, None);
         loop {
             let mut bytes = Vec::new();
-            let io = |source| RecordingError::Io { path: name.to_owned(), source };
+            let io = |source| unreadable(Path::new(name), source);
             reader.by_ref().take(LONGEST_HEADER).read_until(b'\n', &mut bytes).map_err(io)?;
             if bytes.is_empty() {
-                return Err(RecordingError::Empty { path: name.to_owned() });
+                return Err(empty(name));
             }
             if let Some(what) = no_text(&bytes) {
-                return Err(RecordingError::NotText { path: name.to_owned(), what });
+                let message = format!("is no table of text: {what}");
+                return Err(FileError::contents(name, Place::Itself, message).advice(
+                    "save it as CSV in UTF-8, one row a line; arrays end in .npy, gzipped tables in .gz",
+                ));
             }
             line += 1;
             let text = String::from_utf8_lossy(&bytes).into_owned();
@@ -98,15 +101,16 @@ impl Head {
             let header = text.trim_start_matches(['#', '%']).trim_start();
             let delimiter = delimiter_of(header);
             let cells = split(header, delimiter);
-            if text.starts_with(['#', '%']) && Layout::new(&cells, xsens, None).is_err() {
+            if text.starts_with(['#', '%'])
+                && Layout::new(HeaderPlace { path: name, line }, &cells, xsens, None).is_err()
+            {
                 continue;
             }
             let numeric = cells.iter().all(|c| c.trim().parse::<f64>().is_ok());
             let names = match &options.columns {
                 Some(names) => names.clone(),
                 None if numeric || (bytes.len() as u64) == LONGEST_HEADER => {
-                    let (path, found) = (name.to_owned(), shown(text, 60));
-                    return Err(RecordingError::NoHeader { path, line, found });
+                    return Err(no_header(name, line, &shown(text, 60)));
                 }
                 None => cells,
             };
@@ -115,6 +119,11 @@ impl Head {
             return Ok(Self { names, delimiter, line, lines_before, first_row, xsens, rate_hz });
         }
     }
+}
+
+fn no_header(path: &str, line: u64, found: &str) -> FileError {
+    let message = format!("a header that names the columns is missing, found \"{found}\"");
+    FileError::new(path, line, Kind::Header(message.into())).advice(COLUMNS).setting(Setting::ColumnNames)
 }
 
 /// The rate in a comment such as `Update Rate: 100.0Hz`.
@@ -166,7 +175,7 @@ fn read_rows(
     indices: &[usize],
     columns: &mut [Column],
     options: &ReadOptions,
-) -> Result<Lines, RecordingError> {
+) -> Result<Lines, FileError> {
     let mut rows = csv::ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
@@ -179,7 +188,7 @@ fn read_rows(
         match rows.read_byte_record(&mut record) {
             Ok(true) => {}
             Ok(false) => return Ok(lines),
-            Err(e) => return Err(RecordingError::Io { path: name.to_owned(), source: of_csv(e) }),
+            Err(e) => return Err(unreadable(Path::new(name), of_csv(e))),
         }
         let line = head.lines_before + line_of(&record, rows.position().line());
         let found = record.len();
@@ -189,10 +198,10 @@ fn read_rows(
             if record.iter().all(|c| c.trim_ascii().is_empty()) {
                 continue;
             }
-            return Err(RecordingError::RowLength { path: name.to_owned(), line, found, expected });
+            return Err(row_length(name, line, found, expected));
         }
         if sample % BETWEEN == 0 {
-            relieve(columns, options).map_err(RecordingError::storage(name))?;
+            relieve(columns, options).map_err(storage(name))?;
         }
         for (index, column) in indices.iter().zip(columns.iter_mut()) {
             let cell = record.get(*index).unwrap_or_default();
@@ -245,12 +254,18 @@ fn number(cell: &[u8]) -> Option<f64> {
     std::str::from_utf8(cell.trim_ascii()).ok()?.parse().ok()
 }
 
-fn bad_cell(path: &str, line: u64, column: &str, cell: &[u8], parsed: Option<f64>) -> RecordingError {
+fn bad_cell(path: &str, line: u64, column: &str, cell: &[u8], parsed: Option<f64>) -> FileError {
     let value = shown(&String::from_utf8_lossy(cell.trim_ascii()), 40);
-    let (path, column) = (path.to_owned(), column.to_owned());
+    let quoted = format!("\"{value}\"");
     match parsed {
-        None => RecordingError::NotANumber { path, line, column, value },
-        Some(number) if number.is_finite() => RecordingError::Absurd { path, line, column, value },
-        Some(_) => RecordingError::NotFinite { path, line, column, value },
+        None if decimal_comma(&value) => FileError::cell(path, line, column, quoted, "is not a number")
+            .advice("write decimals with a point: 0.5, not 0,5"),
+        None => sample(path, line, column, &quoted, "is not a number"),
+        Some(number) if number.is_finite() => sample(path, line, column, &value, BEYOND),
+        Some(_) => sample(path, line, column, &quoted, "is not finite"),
     }
+}
+
+fn decimal_comma(value: &str) -> bool {
+    value.contains(',') && value.replacen(',', ".", 1).trim().parse::<f64>().is_ok()
 }

@@ -1,7 +1,9 @@
 //! What the values of a column look like: held, clipped, of another size than its neighbours.
 
+use super::FileReport;
+use super::error::storage;
 use super::table::{Column, Raw};
-use super::{FileReport, RecordingError};
+use crate::formats::FileError;
 use crate::imu::{Channel, Sensor};
 use std::io;
 
@@ -14,11 +16,11 @@ const STANDS: f64 = 0.99;
 const MOVES: f64 = 0.8;
 
 /// Tells what no sensor gives though every number is one.
-pub(super) fn doubts(raw: &Raw, factors: &[f64], report: &mut FileReport) -> Result<(), RecordingError> {
+pub(super) fn doubts(raw: &Raw, factors: &[f64], report: &mut FileReport) -> Result<(), FileError> {
     let mut textures = Vec::new();
     for (column, factor) in raw.columns.iter().zip(factors) {
         let Some(channel) = column.channel() else { continue };
-        let texture = Texture::of(column).map_err(RecordingError::storage(&raw.path))?;
+        let texture = Texture::of(column).map_err(storage(&raw.path))?;
         for (end, place) in texture.clipped() {
             report.warn(format!(
                 "{channel} (column \"{}\") stands at its {end}, {}, in {:.0} % of the rows, first in line {}: clipped? \

@@ -1,16 +1,18 @@
 //! Sample rate, gaps and duplicates, from the time column or the packet counter.
 
+use super::error::{storage, too_short};
 use super::header::Role;
 use super::table::{Column, Raw};
 use super::values::Values;
-use super::{FileReport, Gaps, ReadOptions, RecordingError};
+use super::{FileReport, Gaps, ReadOptions};
+use crate::formats::{FileError, Place, Setting};
 
 /// Rates beyond these are looked at twice (Hz).
 const USUAL_RATES_HZ: std::ops::RangeInclusive<f64> = 0.5..=20_000.0;
 
 /// All numbers of a column.
-fn of_file(raw: &Raw, values: Values) -> Result<Vec<f64>, RecordingError> {
-    values.into_vec().map_err(RecordingError::storage(&raw.path))
+fn of_file(raw: &Raw, values: Values) -> Result<Vec<f64>, FileError> {
+    values.into_vec().map_err(storage(&raw.path))
 }
 
 /// When the samples were taken.
@@ -26,9 +28,12 @@ pub(super) fn timing(
     raw: &mut Raw,
     options: &ReadOptions,
     report: &mut FileReport,
-) -> Result<Timing, RecordingError> {
+) -> Result<Timing, FileError> {
     if let Some(rate_hz) = options.rate_hz.filter(|r| !(r.is_finite() && *r > 0.0)) {
-        return Err(RecordingError::NotARate { rate_hz });
+        let message = format!("{rate_hz} Hz is not a sample rate");
+        return Err(
+            FileError::contents(raw.path.as_str(), Place::Within, message).setting(Setting::WrongRate)
+        );
     }
     let take = |raw: &mut Raw, wanted: fn(&Role) -> bool| {
         let at = raw.columns.iter().position(|c| wanted(&c.role))?;
@@ -52,7 +57,10 @@ pub(super) fn timing(
             report.rate_from = if options.rate_hz.is_some() { "given" } else { "head of the file" }.into();
             return Ok(Timing { rate_hz, breaks: Vec::new() });
         }
-        (None, _, None, None) => return Err(RecordingError::NoRate { path: raw.path.clone() }),
+        (None, _, None, None) => {
+            let message = "no time column, and no rate is given";
+            return Err(FileError::contents(raw.path.as_str(), Place::Within, message).setting(Setting::Rate));
+        }
     };
     let timing = clock.check(raw, options)?;
     report.rate_from = clock.source;
@@ -101,7 +109,7 @@ struct Clock {
 }
 
 impl Clock {
-    fn of_time(column: Column, raw: &Raw, report: &mut FileReport) -> Result<Self, RecordingError> {
+    fn of_time(column: Column, raw: &Raw, report: &mut FileReport) -> Result<Self, FileError> {
         let (name, mut since) = (column.name, of_file(raw, column.values)?);
         let first = since.first().copied().unwrap_or(0.0);
         since.iter_mut().for_each(|t| *t -= first);
@@ -116,13 +124,13 @@ impl Clock {
             }
         };
         if since.len() > 2 && median_step(&since) == 0.0 {
-            return Err(RecordingError::Still { path: raw.path.clone(), column: name });
+            return Err(still(&raw.path, &name));
         }
         Ok(Self { name, start: first * unit_s, since, unit_s, source: "time column".into() })
     }
 
     /// A counter that starts again at 0 when it reaches `modulus`.
-    fn counting(column: Column, raw: &Raw, modulus: f64, unit_s: f64) -> Result<Self, RecordingError> {
+    fn counting(column: Column, raw: &Raw, modulus: f64, unit_s: f64) -> Result<Self, FileError> {
         let mut since = of_file(raw, column.values)?;
         let (mut last, mut total) = (since.first().copied().unwrap_or(0.0), 0.0);
         for value in &mut since {
@@ -141,37 +149,47 @@ impl Clock {
         ((self.start + self.since[sample] * self.unit_s) * 1e9).round() / 1e9
     }
 
-    fn check(&self, raw: &Raw, options: &ReadOptions) -> Result<Checked, RecordingError> {
+    fn check(&self, raw: &Raw, options: &ReadOptions) -> Result<Checked, FileError> {
         let steps = || self.since.windows(2).map(|w| w[1] - w[0]);
-        let path = || raw.path.clone();
         let at = |i: usize| (raw.lines.of(i + 1), self.time_of(i), self.time_of(i + 1));
         if let Some(i) = steps().position(|s| s < 0.0) {
             let (line, from, to) = at(i);
-            return Err(RecordingError::TimeBack { path: path(), line, from, to });
+            let message = format!("time goes back from {from} s to {to} s");
+            return Err(FileError::contents(raw.path.as_str(), line, message)
+                .advice("sort the rows by time, or split the file where the clock was set back"));
         }
         let median = median_step(&self.since);
         if self.since.len() < 2 {
-            return Err(RecordingError::TooShort { path: path(), samples: self.since.len(), needed: 2 });
+            return Err(too_short(&raw.path, self.since.len(), 2));
         }
         if median <= 0.0 {
-            return Err(RecordingError::Still { path: path(), column: self.name.clone() });
+            return Err(still(&raw.path, &self.name));
         }
         let irregular = |s: f64| s > 1.5 * median || s < 0.5 * median;
         let breaks: Vec<usize> =
             steps().enumerate().filter(|(_, s)| irregular(*s)).map(|(i, _)| i + 1).collect();
         if let (Gaps::Refuse, Some(first)) = (options.gaps, breaks.first()) {
             let (line, from, to) = at(first - 1);
-            let (path, irregular, step) = (path(), breaks.len(), rounded(median * self.unit_s));
-            return Err(if self.since[*first] - self.since[*first - 1] > median {
-                RecordingError::Gap { path, line, from, to, step, irregular }
+            let step = rounded(median * self.unit_s);
+            let what = if self.since[*first] - self.since[*first - 1] > median {
+                format!("gap in time from {from} s to {to} s")
             } else {
-                RecordingError::Duplicate { path, line, from, to, step, irregular }
-            });
+                format!("duplicate in time: {from} s to {to} s")
+            };
+            let more = match breaks.len() {
+                0 | 1 => String::new(),
+                n => format!(" ({n} such steps in all)"),
+            };
+            let message = format!("{what}, the median step is {step} s{more}");
+            return Err(FileError::contents(raw.path.as_str(), line, message).setting(Setting::Gaps));
         }
         let found = self.rate(median, breaks.is_empty());
         let given = options.rate_hz.unwrap_or(found);
         if (found / given - 1.0).abs() > 0.01 {
-            return Err(RecordingError::RateGiven { path: path(), found, given });
+            let message = format!("the time column runs at {found} Hz, but {given} Hz is given");
+            return Err(
+                FileError::contents(raw.path.as_str(), Place::Within, message).setting(Setting::WrongRate)
+            );
         }
         Ok(Checked { rate_hz: given, found_hz: found, breaks })
     }
@@ -182,6 +200,12 @@ impl Clock {
         let step = if regular { self.since[n] / n as f64 } else { median };
         rounded(1.0 / (step * self.unit_s))
     }
+}
+
+/// A clock that does not advance.
+fn still(path: &str, column: &str) -> FileError {
+    let message = format!("column \"{column}\" does not advance: its median step is 0");
+    FileError::contents(path, Place::Within, message)
 }
 
 /// Six significant digits where the value is that within 1e-7 (stamps are rounded), else as it is.

@@ -1,8 +1,8 @@
 //! What the columns of a trajectory table mean.
 
-use super::TrajectoryFileError as Error;
-use super::table::Table;
+use super::table::{COLUMNS, Table};
 use crate::formats::suggest::nearest;
+use crate::formats::{FileError as Error, Kind};
 use crate::units::DEG;
 
 /// What a column holds.
@@ -125,7 +125,6 @@ pub(super) struct Columns {
 
 impl Columns {
     pub(super) fn of(table: &Table) -> Result<Self, Error> {
-        let (path, line) = (table.path.clone(), table.header_line);
         let mut columns = Self { found: Vec::new(), ignored: Vec::new() };
         for (index, name) in table.columns.iter().enumerate() {
             let Some((quantity, factor)) = classify(name) else {
@@ -133,8 +132,10 @@ impl Columns {
                 continue;
             };
             if let Some((_, earlier, _)) = columns.get(quantity) {
-                let (first, second) = (table.columns[earlier].clone(), name.clone());
-                return Err(Error::ColumnTwice { path, line, first, second, quantity: quantity.name() });
+                let (first, quantity) = (&table.columns[earlier], quantity.name());
+                let message = format!("columns \"{first}\" and \"{name}\" both give {quantity}");
+                return Err(Error::contents(table.path.as_str(), table.header_line, message)
+                    .advice("remove one of them"));
             }
             columns.found.push((quantity, index, factor));
         }
@@ -166,8 +167,9 @@ impl Columns {
         let missing: Vec<_> = ALL.into_iter().filter(|q| !self.has(*q)).map(Quantity::name).collect();
         for column in &self.ignored {
             if let Some(meant) = nearest(column, missing.iter().copied()) {
-                let (path, line, column) = (table.path.clone(), table.header_line, column.clone());
-                return Err(Error::UnknownColumn { path, line, column, meant });
+                let message = format!("unknown column \"{column}\"");
+                return Err(Error::contents(table.path.as_str(), table.header_line, message)
+                    .advice(format!("did you mean \"{meant}\"?")));
             }
         }
         Ok(())
@@ -187,10 +189,10 @@ impl Columns {
             return Ok(());
         }
         let columns = match &missing[..] {
-            [one] => format!("column {one} is"),
-            many => format!("columns {} are", many.join(", ")),
+            [one] => format!("column {one} is missing"),
+            many => format!("columns {} are missing", many.join(", ")),
         };
-        Err(Error::MissingColumns { path: table.path.clone(), line: table.header_line, columns })
+        Err(Error::new(table.path.as_str(), table.header_line, Kind::Columns(columns.into())).advice(COLUMNS))
     }
 }
 

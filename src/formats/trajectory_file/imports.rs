@@ -1,8 +1,9 @@
-//! Trajectories of other tools: KF-GINS results, TUM, GPX, motion definitions of gnss-ins-sim.
+//! Trajectories of other tools: KF-GINS results, TUM, motion definitions of gnss-ins-sim.
 
+use super::Options;
 use super::samples::{Attitude, Rows, local};
-use super::table::{Numbers, Table};
-use super::{Options, TrajectoryFileError as Error};
+use super::table::{Numbers, Table, no_rows, row_length};
+use crate::formats::FileError as Error;
 use crate::trajectory::TrajectorySample;
 use crate::trajectory::import::{BodyMotion, Command};
 use crate::units::DEG;
@@ -84,95 +85,6 @@ fn of_samples(path: &str, table: &Table, samples: Vec<TrajectorySample>, attitud
     }
 }
 
-/// A GPX track: time, latitude, longitude, elevation of every `trkpt`; heading and pitch along the path.
-pub(super) fn gpx(path: &str, text: &str) -> Result<Rows, Error> {
-    let mut table = Table::of_columns(path, &["time", "lat", "lon", "ele"]);
-    for (line, point) in track_points(text) {
-        let row = [
-            element(point, "time").and_then(seconds),
-            attribute(point, "lat").and_then(|x| x.parse().ok()),
-            attribute(point, "lon").and_then(|x| x.parse().ok()),
-            element(point, "ele").and_then(|x| x.parse().ok()),
-        ];
-        let bad = |i: usize| table.cell(line, i, "the track point", "does not have it, or not as a number");
-        let row = match row {
-            [Some(t), Some(lat), Some(lon), Some(h)] => vec![t, lat, lon, h],
-            _ => return Err(bad(row.iter().position(Option::is_none).unwrap_or(0))),
-        };
-        table.rows.push((line, row));
-    }
-    let Some((_, first)) = table.rows.first() else { return Err(Error::Empty { path: path.to_owned() }) };
-    let start_s = first[0];
-    let at = |(_, row): &(u64, Vec<f64>)| TrajectorySample {
-        t_s: row[0] - start_s,
-        lat: row[1] * DEG,
-        lon: row[2] * DEG,
-        h: row[3],
-        q_b_n: DQuat::IDENTITY,
-    };
-    let samples = table.rows.iter().map(at).collect();
-    let mut rows = of_samples(path, &table, samples, Attitude::OfPath);
-    rows.doubt(None, "no attitude in GPX: heading and pitch follow the path, roll is 0");
-    rows.doubt(None, "elevations are taken as heights above the ellipsoid, times from the first point");
-    Ok(rows)
-}
-
-/// Line and text of every `<trkpt …>…</trkpt>`.
-fn track_points(text: &str) -> impl Iterator<Item = (u64, &str)> {
-    let (mut at, mut line) = (0, 1);
-    text.match_indices("<trkpt").map(move |(begin, _)| {
-        line += text[at..begin].matches('\n').count() as u64;
-        at = begin;
-        let rest = &text[begin..];
-        let end =
-            rest.find("</trkpt").or_else(|| rest[1..].find("<trkpt").map(|i| i + 1)).unwrap_or(rest.len());
-        (line, &rest[..end])
-    })
-}
-
-fn attribute<'a>(tag: &'a str, name: &str) -> Option<&'a str> {
-    let value = &tag[tag.find(&format!(" {name}="))? + name.len() + 2..];
-    let quote = value.chars().next().filter(|c| matches!(c, '"' | '\''))?;
-    value[1..].split(quote).next()
-}
-
-fn element<'a>(text: &'a str, name: &str) -> Option<&'a str> {
-    let (_, rest) = text.split_once(&format!("<{name}>"))?;
-    Some(rest.split_once(&format!("</{name}>"))?.0.trim())
-}
-
-/// Seconds of a time as GPX has it: 2024-05-01T10:20:30.5Z (or +02:00), from an arbitrary day.
-fn seconds(text: &str) -> Option<f64> {
-    let (date, time) = text.split_once('T')?;
-    let day: Vec<i64> = date.split('-').map(|x| x.parse().ok()).collect::<Option<_>>()?;
-    let zone = time.find(['Z', '+', '-']).unwrap_or(time.len());
-    let clock: Vec<f64> = time[..zone].split(':').map(|x| x.parse().ok()).collect::<Option<_>>()?;
-    let shift = match time[zone..].split_once(['+', '-']) {
-        Some((_, hm)) => {
-            let (h, m) = hm.split_once(':').unwrap_or((hm, "0"));
-            let minutes = 60.0 * h.parse::<f64>().ok()? + m.parse::<f64>().ok()?;
-            if time[zone..].starts_with('-') { 60.0 * minutes } else { -60.0 * minutes }
-        }
-        None => 0.0,
-    };
-    match (&day[..], &clock[..]) {
-        (&[y, m, d], &[h, min, s]) => {
-            let calendar = (1..=12).contains(&m) && (1..=31).contains(&d) && (1..=9999).contains(&y);
-            // 61 s: a leap second
-            let of_day = (0.0..=24.0).contains(&h) && (0.0..60.0).contains(&min) && (0.0..61.0).contains(&s);
-            (calendar && of_day && shift.abs() <= DAY_S)
-                .then(|| days(y, m, d) as f64 * DAY_S + h * 3600.0 + min * 60.0 + s + shift)
-        }
-        _ => None,
-    }
-}
-
-/// Days of the Gregorian calendar from an arbitrary one: years are taken to begin in March.
-fn days(year: i64, month: i64, day: i64) -> i64 {
-    let (y, m) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
-    365 * y + y.div_euclid(4) - y.div_euclid(100) + y.div_euclid(400) + (153 * m + 2) / 5 + day
-}
-
 /// Whether a text is a motion definition of gnss-ins-sim.
 pub(super) fn is_motion_definition(text: &str) -> bool {
     text.trim_start_matches('\u{feff}').trim_start().starts_with("ini lat")
@@ -190,7 +102,7 @@ pub(super) fn motion_definition(path: &str, text: &str) -> Result<Rows, Error> {
         .collect();
     let row = |(line, text): (u64, &str), least: usize| numbers(path, line, text, least);
     let Some((&start, rest)) = lines.get(1).zip(lines.get(3..)) else {
-        return Err(Error::Empty { path: path.to_owned() });
+        return Err(no_rows(path));
     };
     let ini = row(start, 9)?;
     let mut motion = BodyMotion {
@@ -265,13 +177,13 @@ fn numbers(path: &str, line: u64, text: &str, least: usize) -> Result<Vec<f64>, 
     };
     let cells = text.split(',').map(number).collect::<Result<Vec<_>, _>>()?;
     if cells.len() < least {
-        return Err(Error::RowLength { path: path.to_owned(), line, found: cells.len(), expected: least });
+        return Err(row_length(path, line, cells.len(), least));
     }
     Ok(cells)
 }
 
 fn bad_line(path: &str, line: u64, message: String) -> Error {
-    Error::Format { path: path.to_owned(), line, message }
+    Error::contents(path, line, message)
 }
 
 #[cfg(test)]
@@ -289,10 +201,6 @@ mod tests {
 
     fn tum(path: &str, text: &str, options: &Options) -> Loaded {
         super::tum(path, text, options, Numbers::Finite)?.trajectory()
-    }
-
-    fn gpx(path: &str, text: &str) -> Loaded {
-        super::gpx(path, text)?.trajectory()
     }
 
     fn motion_definition(path: &str, text: &str) -> Loaded {
@@ -334,39 +242,6 @@ mod tests {
         assert!(e.to_string().contains("needs an origin on the Earth"), "{e}");
         let e = tum("a.tum", "0 0 0 0 0 0 0 2\n", &options).unwrap_err().to_string();
         assert_eq!(e, "a.tum, line 1: column \"qw\": 2 does not make a unit quaternion with the others");
-    }
-
-    #[test]
-    fn gpx_tracks_get_their_heading_from_the_path() {
-        let point = |k: u32| {
-            let lat = 46.0 + 1e-4 * f64::from(k);
-            format!(
-                "<trkpt lon='7.0' lat=\"{lat}\">\n<ele>{}</ele><time>2024-02-29T23:59:{}Z</time></trkpt>\n",
-                500 + k,
-                52 + k
-            )
-        };
-        let text: String = (0..8).map(point).collect();
-        let text = format!("<gpx>\n<trk><trkseg>\n{text}</trkseg></trk></gpx>").replace(
-            "</trkseg>",
-            "<trkpt lat=\"46.0008\" lon=\"7\"><ele>508</ele><time>2024-03-01T02:00:00+02:00</time></trkpt></trkseg>",
-        );
-        let (t, warnings) = gpx("a.gpx", &text).unwrap();
-        assert_eq!((t.start_s(), t.end_s(), warnings.len()), (0.0, 8.0, 2));
-        let (state, rpy) = (t.state(4.0), RollPitchYaw::from_quat(t.state(4.0).q_b_n));
-        assert!((state.v_n - DVec3::new(11.117, 0.0, -1.0)).length() < 0.01, "{}", state.v_n);
-        assert!(rpy.yaw.abs() < 1e-6 && (rpy.pitch - (1.0_f64 / 11.117).atan()).abs() < 1e-3, "{rpy:?}");
-        let e = gpx("a.gpx", &text.replacen("<ele>500</ele>", "", 1)).unwrap_err().to_string();
-        assert_eq!(e, "a.gpx, line 3: column \"ele\": the track point does not have it, or not as a number");
-        assert_eq!(gpx("a.gpx", "<gpx></gpx>").unwrap_err().to_string(), "a.gpx: no rows in it");
-    }
-
-    #[test]
-    fn calendar_days_follow_one_another() {
-        assert_eq!(days(2024, 3, 1) - days(2024, 2, 28), 2);
-        assert_eq!(days(2023, 3, 1) - days(2023, 2, 28), 1);
-        assert_eq!(days(2025, 1, 1) - days(2024, 12, 31), 1);
-        assert_eq!(days(2000, 3, 1) - days(1970, 1, 1), 11_017);
     }
 
     const HEAD: &str = "ini lat (deg),ini lon (deg),ini alt (m),ini vx_body (m/s),ini vy_body (m/s),ini vz_body \

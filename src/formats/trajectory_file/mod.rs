@@ -2,7 +2,7 @@
 
 mod columns;
 mod doubts;
-mod error;
+mod gpx;
 mod imports;
 mod profile;
 mod reference;
@@ -10,9 +10,9 @@ mod samples;
 pub(in crate::formats) mod table;
 mod write;
 
-pub use error::TrajectoryFileError;
 pub use write::{Rows, write_csv, write_rows};
 
+use super::{FileError, Place};
 use crate::trajectory::Trajectory;
 use crate::trajectory::reference::Reference;
 use std::fmt;
@@ -59,7 +59,7 @@ const KNOWN: &str = ".toml (motion profile), .csv, .tsv, .txt, .nav (KF-GINS), .
 ///
 /// # Errors
 /// Whatever is wrong with the file, with its line.
-pub fn load(path: &Path, options: &Options) -> Result<(Trajectory, Vec<Warning>), TrajectoryFileError> {
+pub fn load(path: &Path, options: &Options) -> Result<(Trajectory, Vec<Warning>), FileError> {
     match parse(path, options, Numbers::Finite)? {
         Parsed::Profile(trajectory) => Ok((trajectory, Vec::new())),
         Parsed::Rows(rows) => rows.trajectory(),
@@ -72,10 +72,7 @@ pub fn load(path: &Path, options: &Options) -> Result<(Trajectory, Vec<Warning>)
 ///
 /// # Errors
 /// What cannot be read at all, with its line; rows of which no stretch is usable.
-pub fn load_reference(
-    path: &Path,
-    options: &Options,
-) -> Result<(Reference, Vec<Warning>), TrajectoryFileError> {
+pub fn load_reference(path: &Path, options: &Options) -> Result<(Reference, Vec<Warning>), FileError> {
     match parse(path, options, Numbers::Any)? {
         Parsed::Profile(trajectory) => Ok((trajectory.into(), Vec::new())),
         Parsed::Rows(rows) => rows.reference(),
@@ -87,7 +84,7 @@ enum Parsed {
     Rows(samples::Rows),
 }
 
-fn parse(path: &Path, options: &Options, numbers: Numbers) -> Result<Parsed, TrajectoryFileError> {
+fn parse(path: &Path, options: &Options, numbers: Numbers) -> Result<Parsed, FileError> {
     let name = path.display().to_string();
     let lower = name.to_lowercase();
     let plain = lower.strip_suffix(".gz").unwrap_or(&lower);
@@ -96,9 +93,9 @@ fn parse(path: &Path, options: &Options, numbers: Numbers) -> Result<Parsed, Tra
         "toml" => return Ok(Parsed::Profile(profile::load(path)?)),
         "nav" => imports::kf_gins(&name, &text()?, options, numbers),
         "tum" => imports::tum(&name, &text()?, options, numbers),
-        "gpx" => imports::gpx(&name, &text()?),
+        "gpx" => gpx::gpx(&name, &text()?),
         "csv" | "tsv" | "txt" => parse_table(&name, &text()?, options, numbers),
-        _ => Err(TrajectoryFileError::Ending { path: name, known: KNOWN }),
+        _ => Err(FileError::contents(name, Place::Within, format!("a trajectory file ends in {KNOWN}"))),
     };
     rows.map(Parsed::Rows)
 }
@@ -108,7 +105,7 @@ fn parse_table(
     text: &str,
     options: &Options,
     numbers: Numbers,
-) -> Result<samples::Rows, TrajectoryFileError> {
+) -> Result<samples::Rows, FileError> {
     if imports::is_motion_definition(text) {
         return imports::motion_definition(name, text);
     }

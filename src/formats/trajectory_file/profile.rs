@@ -1,8 +1,8 @@
 //! Motion profiles in TOML.
 
-use super::TrajectoryFileError as Error;
 use super::samples::HEIGHT;
-use crate::formats::toml_file::{Section, Source, TomlError};
+use crate::formats::FileError;
+use crate::formats::toml_file::{Section, Source};
 use crate::trajectory::Trajectory;
 use crate::trajectory::profile::{
     self, Acceleration, Bank, Kind, Length, Place, Profile, Segment, Start, Turning, Waypoint,
@@ -15,11 +15,11 @@ const RAMP_S: f64 = 2.0;
 /// Braking of a stop unless said otherwise (m/s²).
 const DECEL: f64 = 1.5;
 
-pub(super) fn load(path: &Path) -> Result<Trajectory, Error> {
+pub(super) fn load(path: &Path) -> Result<Trajectory, FileError> {
     build(&Source::read(path)?)
 }
 
-pub(super) fn build(source: &Source) -> Result<Trajectory, Error> {
+pub(super) fn build(source: &Source) -> Result<Trajectory, FileError> {
     let table = source.parse()?;
     let root = source.root(&table);
     root.only(&["start", "vehicle", "segment"])?;
@@ -27,7 +27,7 @@ pub(super) fn build(source: &Source) -> Result<Trajectory, Error> {
     let segments = if root.has("segment") {
         root.sections("segment")?
     } else {
-        return Err(root.missing("segment").into());
+        return Err(root.missing("segment"));
     };
     let (bank, ramp_s) = match root.section("vehicle")? {
         Some(vehicle) => read_vehicle(&vehicle)?,
@@ -39,11 +39,11 @@ pub(super) fn build(source: &Source) -> Result<Trajectory, Error> {
         ramp_s,
         segments: segments.iter().map(read_segment).collect::<Result<_, _>>()?,
     };
-    profile.build().map_err(|e| blame(&root, &start, &segments, &e).into())
+    profile.build().map_err(|e| blame(&root, &start, &segments, &e))
 }
 
 /// The refusal of a profile at the line of the key at fault.
-fn blame(root: &Section<'_>, start: &Section<'_>, segments: &[Section<'_>], e: &profile::Error) -> TomlError {
+fn blame(root: &Section<'_>, start: &Section<'_>, segments: &[Section<'_>], e: &profile::Error) -> FileError {
     let (reason, hint) = (e.problem.to_string(), e.problem.hint().map(str::to_owned));
     let key = e.problem.key();
     match e.segment.map(|i| &segments[i]) {
@@ -56,7 +56,7 @@ fn blame(root: &Section<'_>, start: &Section<'_>, segments: &[Section<'_>], e: &
     }
 }
 
-fn read_vehicle(vehicle: &Section<'_>) -> Result<(Bank, f64), TomlError> {
+fn read_vehicle(vehicle: &Section<'_>) -> Result<(Bank, f64), FileError> {
     vehicle.only(&["bank", "ramp_s"])?;
     let bank = match vehicle.str("bank")? {
         None | Some("none") => Bank::None,
@@ -70,7 +70,7 @@ fn read_vehicle(vehicle: &Section<'_>) -> Result<(Bank, f64), TomlError> {
     Ok((bank, ramp_s))
 }
 
-fn read_start(start: &Section<'_>) -> Result<Start, TomlError> {
+fn read_start(start: &Section<'_>) -> Result<Start, FileError> {
     start.only(&["t_s", "lat_deg", "lon_deg", "h_m", "heading_deg", "speed_m_s"])?;
     Ok(Start {
         t_s: start.f64("t_s")?.unwrap_or(0.0),
@@ -83,7 +83,7 @@ fn read_start(start: &Section<'_>) -> Result<Start, TomlError> {
 }
 
 /// A height at which the gravity model means something.
-fn height(section: &Section<'_>) -> Result<f64, TomlError> {
+fn height(section: &Section<'_>) -> Result<f64, FileError> {
     let h = section.require_f64("h_m")?;
     if HEIGHT.contains(&h) {
         return Ok(h);
@@ -93,7 +93,7 @@ fn height(section: &Section<'_>) -> Result<f64, TomlError> {
 
 const KINDS: &str = "straight, accelerate, turn, climb, stop, waypoints";
 
-fn read_segment(segment: &Section<'_>) -> Result<Segment, TomlError> {
+fn read_segment(segment: &Section<'_>) -> Result<Segment, FileError> {
     let word = segment.require_str("kind")?;
     let Some((own, read)) = reader(word) else {
         return Err(segment.refuse("kind", "is no kind of segment", Some(format!("kinds are {KINDS}"))));
@@ -108,7 +108,7 @@ fn read_segment(segment: &Section<'_>) -> Result<Segment, TomlError> {
     Ok(Segment { kind: read(segment)?, climb_m, ramp_s: segment.f64("ramp_s")? })
 }
 
-type Read = fn(&Section<'_>) -> Result<Kind, TomlError>;
+type Read = fn(&Section<'_>) -> Result<Kind, FileError>;
 
 /// The keys of a kind of segment beside the common ones, and how it is read.
 fn reader(kind: &str) -> Option<(&'static [&'static str], Read)> {
@@ -122,14 +122,14 @@ fn reader(kind: &str) -> Option<(&'static [&'static str], Read)> {
     })
 }
 
-fn straight(segment: &Section<'_>) -> Result<Kind, TomlError> {
+fn straight(segment: &Section<'_>) -> Result<Kind, FileError> {
     Ok(Kind::Straight(match one_of(segment, &["duration_s", "distance_m"])? {
         ("duration_s", s) => Length::Duration(s),
         (_, m) => Length::Distance(m),
     }))
 }
 
-fn accelerate(segment: &Section<'_>) -> Result<Kind, TomlError> {
+fn accelerate(segment: &Section<'_>) -> Result<Kind, FileError> {
     let by = match one_of(segment, &["duration_s", "accel_m_s2"])? {
         ("duration_s", s) => Acceleration::Duration(s),
         (_, a) => Acceleration::Peak(a),
@@ -137,23 +137,23 @@ fn accelerate(segment: &Section<'_>) -> Result<Kind, TomlError> {
     Ok(Kind::Accelerate { to_speed: segment.require_f64("to_speed_m_s")?, by })
 }
 
-fn turn(segment: &Section<'_>) -> Result<Kind, TomlError> {
+fn turn(segment: &Section<'_>) -> Result<Kind, FileError> {
     let by = turning(segment, &["duration_s", "rate_deg_s", "radius_m", "lateral_accel_m_s2"])?;
     Ok(Kind::Turn { angle: segment.require_f64("angle_deg")? * DEG, by })
 }
 
-fn stop(segment: &Section<'_>) -> Result<Kind, TomlError> {
+fn stop(segment: &Section<'_>) -> Result<Kind, FileError> {
     let decel = segment.f64("decel_m_s2")?.unwrap_or(DECEL);
     Ok(Kind::Stop { duration: segment.require_f64("duration_s")?, decel })
 }
 
-fn waypoints(segment: &Section<'_>) -> Result<Kind, TomlError> {
+fn waypoints(segment: &Section<'_>) -> Result<Kind, FileError> {
     let by = turning(segment, &["rate_deg_s", "radius_m", "lateral_accel_m_s2"])?;
     let points = segment.sections("points")?.iter().map(read_point).collect::<Result<_, _>>()?;
     Ok(Kind::Waypoints { points, by })
 }
 
-fn read_point(point: &Section<'_>) -> Result<Waypoint, TomlError> {
+fn read_point(point: &Section<'_>) -> Result<Waypoint, FileError> {
     point.only(&["lat_deg", "lon_deg", "n_m", "e_m", "h_m"])?;
     let place = if point.has("n_m") || point.has("e_m") {
         if let Some(extra) = ["lat_deg", "lon_deg"].into_iter().find(|k| point.has(k)) {
@@ -166,7 +166,7 @@ fn read_point(point: &Section<'_>) -> Result<Waypoint, TomlError> {
     Ok(Waypoint { place, h: if point.has("h_m") { Some(height(point)?) } else { None } })
 }
 
-fn turning(segment: &Section<'_>, keys: &[&'static str]) -> Result<Turning, TomlError> {
+fn turning(segment: &Section<'_>, keys: &[&'static str]) -> Result<Turning, FileError> {
     Ok(match one_of(segment, keys)? {
         ("duration_s", s) => Turning::Duration(s),
         ("rate_deg_s", rate) => Turning::Rate(rate * DEG),
@@ -176,7 +176,7 @@ fn turning(segment: &Section<'_>, keys: &[&'static str]) -> Result<Turning, Toml
 }
 
 /// The one key of several that is given, and its value.
-fn one_of(segment: &Section<'_>, keys: &[&'static str]) -> Result<(&'static str, f64), TomlError> {
+fn one_of(segment: &Section<'_>, keys: &[&'static str]) -> Result<(&'static str, f64), FileError> {
     let given: Vec<&'static str> = keys.iter().copied().filter(|k| segment.has(k)).collect();
     match given[..] {
         [] => Err(segment.missing_one_of(keys)),

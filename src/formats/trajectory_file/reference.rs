@@ -1,7 +1,8 @@
 //! A recorded trajectory that is only compared with: what jumps is left out.
 
-use super::samples::{Attitude, Rows, follow_path};
-use super::{TrajectoryFileError as Error, Warning};
+use super::Warning;
+use super::samples::{Attitude, Rows, follow_path, no_trajectory};
+use crate::formats::{FileError as Error, Place};
 use crate::trajectory::Trajectory;
 use crate::trajectory::reference::{Reference, breaks, usable};
 use std::ops::Range;
@@ -24,7 +25,9 @@ impl Rows {
         let parts = stretches.len();
         let Some(reference) = Reference::of_stretches(stretches) else {
             let whole = self.stretch(0..self.samples.len()).err();
-            return Err(refused.or(whole).unwrap_or(Error::NoStretch { path: self.path }));
+            let none = "no stretch of five seconds without a jump in position or attitude";
+            let none = || Error::contents(self.path.as_str(), Place::Within, none);
+            return Err(refused.or(whole).unwrap_or_else(none));
         };
         if let Some(first) = found.first() {
             let (line, at) = (self.lines[first.index], self.samples[first.index].t_s);
@@ -50,7 +53,7 @@ impl Rows {
         Trajectory::from_samples(&samples).map_err(|source| {
             let index = first + source.index().unwrap_or(0);
             let line = self.lines.get(index).copied().unwrap_or(1);
-            Error::Samples { path: self.path.clone(), line, source }
+            no_trajectory(&self.path, line, &source)
         })
     }
 }

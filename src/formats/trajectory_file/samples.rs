@@ -3,10 +3,11 @@
 use super::columns::{Columns, Quantity};
 use super::doubts;
 use super::table::{Numbers, Table};
-use super::{Options, TrajectoryFileError as Error, Warning};
+use super::{Options, Warning};
 use crate::earth::{e_to_n, ecef_to_geodetic, geodetic_to_ecef};
+use crate::formats::{FileError as Error, Place, Setting};
 use crate::frames::{RollPitchYaw, q_e_n, wrap_angle};
-use crate::trajectory::{Trajectory, TrajectorySample};
+use crate::trajectory::{self, Trajectory, TrajectorySample};
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
 
@@ -73,7 +74,7 @@ impl Rows {
         Trajectory::from_samples(samples).map_err(|source| {
             let index = source.index().unwrap_or(self.lines.len().saturating_sub(1));
             let line = self.lines.get(index).copied().unwrap_or(1);
-            Error::Samples { path: self.path.clone(), line, source }
+            no_trajectory(&self.path, line, &source)
         })
     }
 
@@ -82,7 +83,9 @@ impl Rows {
     fn check_heights(&self) -> Result<(), Error> {
         let bad = self.samples.iter().zip(&self.lines).find(|(s, _)| !HEIGHT.contains(&s.h));
         let Some((sample, line)) = bad else { return Ok(()) };
-        Err(Error::Height { path: self.path.clone(), line: *line, h: sample.h })
+        let message = format!("height {:?} m is not within −12 to 1000 km", sample.h);
+        Err(Error::contents(self.path.as_str(), *line, message)
+            .advice("is a value in the wrong column, or the row damaged?"))
     }
 
     /// Rows a minute apart are no trajectory of a vehicle, their time is in milliseconds; and one time stamp
@@ -94,16 +97,21 @@ impl Rows {
         let (Some(&middle), Some(&longest)) = (order.get(order.len() / 2), order.last()) else {
             return Ok(());
         };
-        let path = || self.path.clone();
         if step(middle) >= 50.0 {
-            return Err(Error::SlowRows { path: path(), line: self.lines[1], step_s: step(middle) });
+            let message = format!("the rows are {} s apart", step(middle));
+            return Err(Error::contents(self.path.as_str(), self.lines[1], message)
+                .advice("give at least one row a second; is the time in milliseconds (t_ms)?"));
         }
         let duration_s = self.samples[self.samples.len() - 1].t_s - self.samples[0].t_s;
         if duration_s <= MAX_DURATION_S {
             return Ok(());
         }
         let (previous_s, t_s) = (self.samples[longest - 1].t_s, self.samples[longest].t_s);
-        Err(Error::TooLong { path: path(), line: self.lines[longest], duration_s, previous_s, t_s })
+        let message =
+            format!("time goes from {previous_s} s to {t_s} s: the rows cover {duration_s} s, a day at most");
+        Err(Error::contents(self.path.as_str(), self.lines[longest], message).advice(
+            "is that time stamp damaged, on another clock, or in another unit? Split what lasts longer than a day",
+        ))
     }
 
     fn check_jumps(&self) -> Result<(), Error> {
@@ -111,11 +119,30 @@ impl Rows {
         for (pair, line) in self.samples.windows(2).zip(&self.lines[1..]) {
             let (metres, seconds) = (place(&pair[1]).distance(place(&pair[0])), pair[1].t_s - pair[0].t_s);
             if seconds > 0.0 && metres > MAX_SPEED * seconds {
-                return Err(Error::Jump { path: self.path.clone(), line: *line, metres, seconds });
+                let message = format!("position jumps by {metres:.0} m in {seconds} s");
+                return Err(Error::contents(self.path.as_str(), *line, message)
+                    .advice("is a latitude swapped with a longitude, a sign lost, or a row damaged?"));
             }
         }
         Ok(())
     }
+}
+
+/// Rows that no trajectory goes through.
+pub(super) fn no_trajectory(path: &str, line: u64, source: &trajectory::Error) -> Error {
+    use trajectory::Error as E;
+    let advice = match source {
+        E::Time { .. } => {
+            "remove repeated rows, sort by time, or split the file where the clock was set back"
+        }
+        E::Rotation { .. } => {
+            "is an angle in the wrong column or unit? If the vehicle does turn this fast, give more rows a second"
+        }
+        E::TooFew { .. } => "give at least four rows, one a second or more",
+        E::Latitude { .. } => "latitude and longitude cannot navigate at the poles; is a column swapped?",
+        _ => return Error::contents(path, line, source.to_string()),
+    };
+    Error::contents(path, line, source.to_string()).advice(advice)
 }
 
 /// The rows of a table. Cells out of range are refused, or their rows left out where not every row is needed.
@@ -199,7 +226,12 @@ pub(super) fn origin(table: &Table, options: &Options) -> Result<[f64; 3], Error
         Some(&[lat, lon, h]) if lat.abs() <= 89.9 && lon.abs() <= 360.0 && h.is_finite() => {
             Ok([lat * DEG, lon * DEG, h])
         }
-        _ => Err(Error::NoOrigin { path: table.path.clone(), what: "a trajectory in local coordinates" }),
+        _ => {
+            let message = "a trajectory in local coordinates needs an origin on the Earth";
+            Err(Error::contents(table.path.as_str(), Place::Within, message)
+                .setting(Setting::Origin)
+                .advice("a first line \"# origin: LAT_DEG, LON_DEG, H_M\""))
+        }
     }
 }
 

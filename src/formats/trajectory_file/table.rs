@@ -1,7 +1,6 @@
 //! Text tables of numbers.
 
-use super::TrajectoryFileError as Error;
-use crate::formats::source;
+use crate::formats::{FileError as Error, Kind, Place, source};
 use flate2::read::MultiGzDecoder;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
@@ -21,7 +20,7 @@ pub(in crate::formats) struct Table {
 
 /// Opens a file, unpacking it when its name ends in `.gz`.
 pub(in crate::formats) fn open(path: &Path) -> Result<Box<dyn BufRead>, Error> {
-    let io = |source| Error::Io { path: path.display().to_string(), source };
+    let io = |source| Error::io(path, source);
     let file = BufReader::with_capacity(1 << 16, source::open(path).map_err(io)?);
     let packed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
     Ok(if packed { Box::new(BufReader::new(MultiGzDecoder::new(file))) } else { Box::new(file) })
@@ -30,7 +29,7 @@ pub(in crate::formats) fn open(path: &Path) -> Result<Box<dyn BufRead>, Error> {
 /// The whole text of a file; what is not UTF-8 in it (a degree sign of another encoding) is replaced.
 pub(in crate::formats) fn text(path: &Path) -> Result<String, Error> {
     let mut bytes = Vec::new();
-    let io = |source| Error::Io { path: path.display().to_string(), source };
+    let io = |source| Error::io(path, source);
     open(path)?.read_to_end(&mut bytes).map_err(io)?;
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
@@ -63,12 +62,11 @@ impl Table {
             bytes.clear();
             let read = reader.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut bytes);
             number += 1;
-            match read.map_err(|source| Error::Io { path: path.to_owned(), source })? {
+            match read.map_err(|source| Error::io(Path::new(path), source))? {
                 0 => break,
                 n if n as u64 == LONGEST_LINE => {
-                    let (path, message) =
-                        (path.to_owned(), "a line of more than 64 KiB: not a table of text");
-                    return Err(Error::Format { path, line: number, message: message.into() });
+                    let message = "a line of more than 64 KiB: not a table of text";
+                    return Err(Error::contents(path, number, message));
                 }
                 _ => {}
             }
@@ -84,7 +82,7 @@ impl Table {
                 table.row(number, &cells(text, separator), numbers)?;
             }
         }
-        if table.rows.is_empty() { Err(Error::Empty { path: path.to_owned() }) } else { Ok(table) }
+        if table.rows.is_empty() { Err(no_rows(path)) } else { Ok(table) }
     }
 
     /// A table of these columns, without rows yet.
@@ -95,8 +93,9 @@ impl Table {
 
     fn header(&mut self, line: u64, cells: &[&str]) -> Result<(), Error> {
         if cells.iter().all(|c| c.parse::<f64>().is_ok()) {
-            let found = cells.join(",").chars().take(60).collect();
-            return Err(Error::NoHeader { path: self.path.clone(), line, found });
+            let found: String = cells.join(",").chars().take(60).collect();
+            let message = format!("a header that names the columns is missing, found \"{found}\"");
+            return Err(Error::new(self.path.as_str(), line, Kind::Header(message.into())).advice(COLUMNS));
         }
         self.header_line = line;
         self.columns = cells.iter().map(|&c| c.to_owned()).collect();
@@ -106,7 +105,7 @@ impl Table {
     fn row(&mut self, line: u64, cells: &[&str], numbers: Numbers) -> Result<(), Error> {
         let (found, expected) = (cells.len(), self.columns.len());
         if found != expected {
-            return Err(Error::RowLength { path: self.path.clone(), line, found, expected });
+            return Err(row_length(&self.path, line, found, expected));
         }
         let number = |(i, cell): (usize, &&str)| match cell.parse::<f64>() {
             Ok(value) if value.is_finite() || numbers == Numbers::Any => Ok(value),
@@ -126,9 +125,27 @@ impl Table {
         value: &str,
         reason: &'static str,
     ) -> Error {
-        let (path, column) = (self.path.clone(), self.columns[column].clone());
-        Error::Cell { path, line, column, value: value.chars().take(40).collect(), reason }
+        let (column, value) = (&self.columns[column], value.chars().take(40).collect::<String>());
+        let error = Error::cell(&self.path, line, column, value, reason);
+        if column.contains("_deg") { error.advice(DEGREES) } else { error }
     }
+}
+
+/// What the columns of a trajectory are called.
+pub(super) const COLUMNS: &str = "a trajectory has the columns t_s, lat_deg, lon_deg, h_m (or n_m, e_m, d_m with an origin), roll_deg, pitch_deg, \
+     yaw_deg, and may have v_n_m_s, v_e_m_s, v_d_m_s";
+const DEGREES: &str = "angles are in degrees: latitude within ±89.9, longitude and yaw in (−180, 180] or [0, 360), pitch \
+                       within ±90";
+
+/// A file without rows.
+pub(super) fn no_rows(path: &str) -> Error {
+    Error::new(path, Place::Within, Kind::Empty("no rows in it"))
+}
+
+/// A row with too few or too many cells.
+pub(super) fn row_length(path: &str, line: u64, found: usize, expected: usize) -> Error {
+    Error::contents(path, line, format!("{found} values, but {expected} columns"))
+        .advice("every row needs one value a column; was the file cut off?")
 }
 
 fn separator_of(header: &str) -> char {

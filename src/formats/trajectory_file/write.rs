@@ -1,6 +1,7 @@
 //! Trajectories as CSV.
 
-use crate::formats::atomic::{AtomicFile, WriteError};
+use crate::formats::FileError;
+use crate::formats::atomic::AtomicFile;
 use crate::frames::{RollPitchYaw, wrap_angle};
 use crate::trajectory::Trajectory;
 use crate::units::DEG;
@@ -36,9 +37,9 @@ impl Rows {
 ///
 /// # Errors
 /// The file cannot be written.
-pub fn write_csv(path: &Path, trajectory: &Trajectory, rows: Rows) -> Result<(), WriteError> {
+pub fn write_csv(path: &Path, trajectory: &Trajectory, rows: Rows) -> Result<(), FileError> {
     let mut file = AtomicFile::create(path)?;
-    let io = |e| WriteError::io(path, e);
+    let io = |e| FileError::io(path, e);
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) {
         let mut packed = GzEncoder::new(&mut file, Compression::default());
         write_rows(&mut packed, trajectory, rows).map_err(io)?;

@@ -1,0 +1,275 @@
+//! What is wrong with a file: where, which key or column, which value, and what helps.
+
+use super::source::is_damage;
+use std::borrow::Cow;
+use std::fmt;
+use std::io;
+use std::path::Path;
+
+/// A file that cannot be read or written, or whose contents are refused.
+#[derive(Debug)]
+pub struct FileError {
+    /// The file or directory, as it was named.
+    pub path: Box<str>,
+    /// Where in it.
+    pub place: Place,
+    /// What is wrong.
+    pub kind: Kind,
+    /// What helps: any one of these.
+    pub remedies: Vec<Remedy>,
+}
+
+/// Where in a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Place {
+    /// Anywhere in it.
+    Within,
+    /// The file as a whole: its name is the subject of the sentence.
+    Itself,
+    /// A line, from 1.
+    Line(u64),
+    /// Line and column, from 1.
+    Character(u64, u64),
+}
+
+impl From<u64> for Place {
+    fn from(line: u64) -> Self {
+        Self::Line(line)
+    }
+}
+
+impl From<usize> for Place {
+    fn from(line: usize) -> Self {
+        Self::Line(line as u64)
+    }
+}
+
+/// What is wrong with a file.
+#[derive(Debug)]
+pub enum Kind {
+    /// The system refuses: no such file, no permission, a full disk, damaged compression.
+    System(io::Error),
+    /// There is nothing in it.
+    Empty(&'static str),
+    /// It does not name its columns.
+    Header(Box<str>),
+    /// It lacks the columns that make it a file of this kind.
+    Columns(Box<str>),
+    /// A key means nothing there.
+    UnknownKey(Box<str>),
+    /// A key (dotted and quoted) is needed.
+    MissingKey(Box<str>),
+    /// The value of a key is refused.
+    Value {
+        /// Key, dotted.
+        key: Box<str>,
+        /// The value as written.
+        value: Box<str>,
+        /// Why, in words that follow the value: "is not …".
+        reason: Box<str>,
+    },
+    /// The value in a column is refused.
+    Cell {
+        /// Name of the column.
+        column: Box<str>,
+        /// The value as written.
+        value: Box<str>,
+        /// Why, in words that follow the value.
+        reason: Box<str>,
+    },
+    /// Anything else that it holds.
+    Contents(Box<str>),
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::System(source) => source.fmt(f),
+            Self::Empty(message) => f.write_str(message),
+            Self::Header(message) | Self::Columns(message) | Self::Contents(message) => f.write_str(message),
+            Self::UnknownKey(key) => write!(f, "unknown key \"{key}\""),
+            Self::MissingKey(key) => write!(f, "{key} is missing"),
+            Self::Value { key, value, reason } => write!(f, "\"{key}\" = {value} {reason}"),
+            Self::Cell { column, value, reason } => write!(f, "column \"{column}\": {value} {reason}"),
+        }
+    }
+}
+
+impl fmt::Display for FileError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { path, kind, .. } = self;
+        match self.place {
+            Place::Within => write!(f, "{path}: {kind}"),
+            Place::Itself => write!(f, "{path} {kind}"),
+            Place::Line(line) => write!(f, "{path}, line {line}: {kind}"),
+            Place::Character(line, column) => write!(f, "{path}, line {line}, column {column}: {kind}"),
+        }
+    }
+}
+
+impl std::error::Error for FileError {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match &self.kind {
+            Kind::System(source) => Some(source),
+            _ => None,
+        }
+    }
+}
+
+impl FileError {
+    /// Something wrong, without a remedy.
+    pub fn new(path: impl Into<Box<str>>, place: impl Into<Place>, kind: Kind) -> Self {
+        Self { path: path.into(), place: place.into(), kind, remedies: Vec::new() }
+    }
+
+    /// What the system said of a file.
+    pub fn io(path: &Path, source: io::Error) -> Self {
+        Self::new(path.display().to_string(), Place::Within, Kind::System(source))
+    }
+
+    /// Contents that are refused, in words.
+    pub fn contents(
+        path: impl Into<Box<str>>,
+        place: impl Into<Place>,
+        message: impl Into<Box<str>>,
+    ) -> Self {
+        Self::new(path, place, Kind::Contents(message.into()))
+    }
+
+    /// A value in a column that is refused.
+    pub fn cell(
+        path: &str,
+        line: u64,
+        column: &str,
+        value: impl Into<Box<str>>,
+        reason: impl Into<Box<str>>,
+    ) -> Self {
+        let kind = Kind::Cell { column: column.into(), value: value.into(), reason: reason.into() };
+        Self::new(path, line, kind)
+    }
+
+    /// With advice, beside what it has.
+    #[must_use]
+    pub fn advice(mut self, advice: impl Into<Cow<'static, str>>) -> Self {
+        self.remedies.push(Remedy::Advice(advice.into()));
+        self
+    }
+
+    /// With advice, if there is any.
+    #[must_use]
+    pub fn advice_if(self, advice: Option<String>) -> Self {
+        match advice {
+            Some(advice) => self.advice(advice),
+            None => self,
+        }
+    }
+
+    /// With other advice than it has.
+    #[must_use]
+    pub fn advice_instead(mut self, advice: &'static str) -> Self {
+        self.remedies.clear();
+        self.advice(advice)
+    }
+
+    /// With a setting that helps, beside what it has.
+    #[must_use]
+    pub fn setting(mut self, setting: Setting) -> Self {
+        self.remedies.push(Remedy::Setting(setting));
+        self
+    }
+
+    /// Whether the system, not the contents or the request, is at fault.
+    #[must_use]
+    pub fn is_system(&self) -> bool {
+        matches!(&self.kind, Kind::System(source) if !is_damage(source.kind()))
+    }
+
+    /// What helps, in words for users of the library.
+    #[must_use]
+    pub fn hint(&self) -> Option<String> {
+        self.hint_with(|setting| Some(setting.words()))
+    }
+
+    /// What helps, where `words` says how a setting is made. What cannot be set there is left out.
+    #[must_use]
+    pub fn hint_with(&self, words: impl Fn(Setting) -> Option<&'static str>) -> Option<String> {
+        let known = self.remedies.iter().filter_map(|remedy| match remedy {
+            Remedy::Advice(advice) => Some(advice.as_ref()),
+            Remedy::Setting(setting) => words(*setting),
+        });
+        let known: Vec<&str> = known.collect();
+        (!known.is_empty()).then(|| known.join(", or "))
+    }
+}
+
+/// One way out.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Remedy {
+    /// Something to do about the file.
+    Advice(Cow<'static, str>),
+    /// A setting of what reads or writes it.
+    Setting(Setting),
+}
+
+/// A setting that may help. The program says it as an option of the command.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[expect(missing_docs, reason = "said by `words`")]
+pub enum Setting {
+    ColumnNames,
+    Channels,
+    FewerChannels,
+    Gaps,
+    Rate,
+    WrongRate,
+    Skip,
+    Origin,
+    Output,
+    OutputDirectory,
+    StartFiles,
+}
+
+impl Setting {
+    const fn words(self) -> &'static str {
+        match self {
+            Self::ColumnNames => "give the names of the columns",
+            Self::Channels => "leave the channel out",
+            Self::FewerChannels => "take fewer channels at a time",
+            Self::Gaps => "split the recording at its gaps, or ignore them",
+            Self::Rate => "give the sample rate",
+            Self::WrongRate => "leave the given rate out, or correct it",
+            Self::Skip => "leave out less of its beginning",
+            Self::Origin => "give an origin on the Earth",
+            Self::Output => "choose another output",
+            Self::OutputDirectory => "choose another directory",
+            Self::StartFiles => "start from an example",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn remedies_are_said_in_the_words_of_who_asks() {
+        let e = FileError::contents("a.csv", 3_u64, "no unit")
+            .advice("name it")
+            .setting(Setting::ColumnNames)
+            .setting(Setting::Channels);
+        assert_eq!(e.to_string(), "a.csv, line 3: no unit");
+        assert_eq!(e.hint().unwrap(), "name it, or give the names of the columns, or leave the channel out");
+        let only_names = |setting| (setting == Setting::ColumnNames).then_some("--columns");
+        assert_eq!(e.hint_with(only_names).unwrap(), "name it, or --columns");
+        assert_eq!(
+            FileError::contents("a", Place::Within, "b").setting(Setting::Gaps).hint_with(|_| None),
+            None
+        );
+    }
+
+    #[test]
+    fn damage_is_not_the_systems_fault() {
+        let e = |kind: io::ErrorKind| FileError::io(Path::new("a.gz"), kind.into());
+        assert!(e(io::ErrorKind::NotFound).is_system() && !e(io::ErrorKind::UnexpectedEof).is_system());
+        assert!(!FileError::contents("a", Place::Itself, "is cut off").is_system());
+    }
+}
