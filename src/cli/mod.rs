@@ -25,6 +25,7 @@ mod run;
 mod schema;
 mod synthesize;
 mod trajectory;
+mod tune;
 mod tuning;
 mod turn_on;
 mod wv;
@@ -54,6 +55,7 @@ enum Command {
     Synthesize(synthesize::Args),
     Trajectory(trajectory::Args),
     Run(run::Args),
+    Tune(tune::Args),
     Fuse(fuse::Args),
     Compare(compare::Args),
     Batch(batch::Args),
@@ -81,6 +83,7 @@ impl Command {
             Self::Synthesize(args) => synthesize::run(&args, session),
             Self::Trajectory(args) => trajectory::run(&args, session),
             Self::Run(args) => run::run(&args, session),
+            Self::Tune(args) => tune::run(&args, session),
             Self::Fuse(args) => fuse::run(&args, session),
             Self::Compare(args) => compare::run(&args, session),
             Self::Batch(args) => batch::run(&args, session),

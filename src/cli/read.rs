@@ -7,6 +7,7 @@ use nav_sim::formats::recordings::{self, ReadOptions};
 use nav_sim::formats::trajectory_file;
 use nav_sim::formats::{FileError, Setting, hash};
 use nav_sim::imu::Recording;
+use nav_sim::noise::{Model, continuous};
 use nav_sim::report::Input;
 use nav_sim::trajectory::Trajectory;
 use nav_sim::trajectory::reference::Reference;
@@ -69,6 +70,19 @@ pub(super) fn model(path: &Path, session: &Session) -> Result<ModelFile, Failure
         session.printer.warn(&format!("{shown}: says nothing of {channel}, taken as free of noise"));
     }
     Ok(file)
+}
+
+/// A noise model at the rate of the IMU; that it is converted is said.
+pub(super) fn at_rate(path: &Path, model: &Model, imu_hz: f64, session: &Session) -> Result<Model, Failure> {
+    let (shown, from_hz) = (path.display(), model.rate_hz);
+    let converted = continuous::at_rate(model, imu_hz).map_err(|e| {
+        let hint = format!("set rate_hz = {from_hz} in the [imu] section of a --scenario file");
+        Failure::input(format!("{shown}: {e}")).hint(hint)
+    })?;
+    if !continuous::same_rate(from_hz, imu_hz) {
+        session.printer.say(&format!("{shown}: converted from {from_hz} Hz to {imu_hz} Hz"));
+    }
+    Ok(converted)
 }
 
 /// Static recordings, every channel of them; files without a time column at a rate that is given.

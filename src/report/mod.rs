@@ -20,6 +20,7 @@ mod study;
 mod svg;
 mod tables;
 mod trajectory;
+mod tune;
 mod verdict;
 
 pub use brief::brief;
@@ -46,4 +47,5 @@ pub use study::{
 };
 pub use tables::{TableError, epochs_csv, parse_epochs, parse_runs, runs_csv};
 pub use trajectory::{TrajectorySeries, trajectory_svg};
+pub use tune::{FactorEntry, TuneResult};
 pub use verdict::{verdict_in_short, verdict_line, verdict_word};

@@ -25,3 +25,4 @@ mod readme;
 mod run;
 mod synthesize;
 mod trajectory_command;
+mod tune;

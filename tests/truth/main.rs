@@ -27,3 +27,4 @@ mod lincov;
 mod long_records;
 mod reduction;
 mod trajectories;
+mod tune;

@@ -4,7 +4,7 @@ use super::Args;
 use crate::cli::{Failure, Session, read, turn_on};
 use nav_sim::formats::model_file::ModelFile;
 use nav_sim::imu::{Recording, Sensor};
-use nav_sim::noise::{Model, continuous};
+use nav_sim::noise::Model;
 use nav_sim::report::{Input, ModelNote};
 use nav_sim::scenario::Scenario;
 use nav_sim::sensors::imu::Truth;
@@ -99,15 +99,7 @@ fn files(args: &Args) -> Result<Vec<Input>, Failure> {
 /// A model at the rate of the IMU, and its file.
 fn model(path: &Path, imu_hz: f64, session: &Session) -> Result<(Model, ModelFile), Failure> {
     let file = read::model(path, session)?;
-    let (shown, from_hz) = (path.display(), file.model.rate_hz);
-    let converted = continuous::at_rate(&file.model, imu_hz).map_err(|e| {
-        let hint = format!("set rate_hz = {from_hz} in the [imu] section of a --scenario file");
-        Failure::input(format!("{shown}: {e}")).hint(hint)
-    })?;
-    if !continuous::same_rate(from_hz, imu_hz) {
-        session.printer.say(&format!("{shown}: converted from {from_hz} Hz to {imu_hz} Hz"));
-    }
-    Ok((converted, file))
+    Ok((read::at_rate(path, &file.model, imu_hz, session)?, file))
 }
 
 /// The estimator that made a model, if known.

@@ -18,6 +18,7 @@
 //! [`ModelFile::missing`].
 
 mod calibrated;
+mod extremes;
 mod read;
 mod write;
 

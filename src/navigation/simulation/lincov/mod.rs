@@ -9,14 +9,18 @@
 //! The trajectory is reduced once to a [`Track`]: exact maps of the navigation error over steps of a fraction
 //! of a second. Any number of beliefs and truths are then assessed along it, in milliseconds each.
 
+mod descent;
 mod heading;
 mod input;
 mod joint;
 mod pass;
 mod reduce;
+mod root;
 mod track;
+mod tune;
 
 pub use heading::{HeadingDoubt, weak_heading};
 pub use pass::{Assessment, Consistency, assess};
 pub use reduce::{drive, reduced_belief};
 pub use track::Track;
+pub use tune::{Aim, Factor, Filter, Honesty, Per, Task, scaled};

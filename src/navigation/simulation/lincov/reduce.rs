@@ -5,6 +5,7 @@
 //! sensor are chosen so that the filter's own covariance is closest to that of the errors it truly makes, in
 //! the sense of the Kullback-Leibler divergence, along a trajectory with its fixes and outages.
 
+use super::descent::Descent;
 use super::pass::{Assessment, Consistency, assess};
 use super::track::Track;
 use crate::earth::GravityModel;
@@ -19,7 +20,6 @@ use crate::simulation::plan::Experiment;
 use crate::trajectory::Trajectory;
 use crate::trajectory::profile::{Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning};
 use crate::units::DEG;
-use nalgebra::{SMatrix, SVector};
 
 /// White noise, drive, correlation time of the accelerometer, then of the gyroscope.
 const FACTORS: usize = 6;
@@ -73,70 +73,18 @@ impl Search<'_> {
         cost(&assessment) + RIDGE * ln.iter().map(|x| x * x).sum::<f64>()
     }
 
-    fn gradient(&self, ln: &Factors, cost: f64) -> Factors {
-        let mut gradient = [0.0; FACTORS];
-        for &i in &self.free {
-            let mut beside = *ln;
-            beside[i] += DIFFERENCE;
-            gradient[i] = (self.cost(&beside) - cost) / DIFFERENCE;
-        }
-        gradient
-    }
-
-    /// Quasi-Newton descent (BFGS) with forward differences: their error of a hundredth of a logarithm is far
-    /// below what matters.
+    /// The factors that are free descend from where the search starts.
     fn minimise(&self) -> Factors {
-        type Matrix = SMatrix<f64, FACTORS, FACTORS>;
-        type Vector = SVector<f64, FACTORS>;
-        let mut x = [0.0; FACTORS];
-        for (i, start) in START.into_iter().enumerate() {
-            if self.free.contains(&i) {
-                x[i] = start;
-            }
-        }
-        let mut cost = self.cost(&x);
-        if !cost.is_finite() {
-            return [0.0; FACTORS];
-        }
-        let mut gradient = self.gradient(&x, cost);
-        let mut inverse = Matrix::identity() * 2.0;
-        for _ in 0..ITERATIONS {
-            let g = Vector::from(gradient);
-            let mut step = -(inverse * g);
-            let largest = step.amax();
-            if largest > MAX_STEP {
-                step *= MAX_STEP / largest;
-            }
-            let Some((next, next_cost)) = self.descend(&x, cost, &step.into(), g.dot(&step)) else { break };
-            let next_gradient = self.gradient(&next, next_cost);
-            let s = Vector::from_fn(|i, _| next[i] - x[i]);
-            let y = Vector::from(next_gradient) - g;
-            let (sy, gain) = (s.dot(&y), cost - next_cost);
-            if sy > 1e-12 {
-                let rho = 1.0 / sy;
-                let left = Matrix::identity() - s * y.transpose() * rho;
-                inverse = left * inverse * left.transpose() + s * s.transpose() * rho;
-            }
-            (x, cost, gradient) = (next, next_cost, next_gradient);
-            if gain < ENOUGH {
-                break;
-            }
-        }
-        x
-    }
-
-    /// Halves the step until it gains.
-    fn descend(&self, x: &Factors, cost: f64, step: &Factors, slope: f64) -> Option<(Factors, f64)> {
-        let mut share = 1.0;
-        for _ in 0..6 {
-            let next = std::array::from_fn(|i| (x[i] + share * step[i]).clamp(-MAX_LN, MAX_LN));
-            let next_cost = self.cost(&next);
-            if next_cost < cost + 1e-4 * share * slope {
-                return Some((next, next_cost));
-            }
-            share *= 0.4;
-        }
-        None
+        let factors = |free: &[f64]| {
+            let mut ln = [0.0; FACTORS];
+            self.free.iter().zip(free).for_each(|(i, x)| ln[*i] = *x);
+            ln
+        };
+        let cost = |free: &[f64]| self.cost(&factors(free));
+        let descent =
+            Descent { cost: &cost, bounds: (-MAX_LN, MAX_LN), iterations: ITERATIONS, enough: ENOUGH };
+        let start = self.free.iter().map(|i| START[*i]).collect();
+        descent.minimum(start).map_or([0.0; FACTORS], |found| factors(&found))
     }
 }
 
@@ -144,11 +92,8 @@ impl Search<'_> {
 const START: Factors = [0.3, -0.3, 1.0, 0.3, 0.0, 0.4];
 /// Cost of a factor e: what the fixes do not tell stays near the wavelet reduction.
 const RIDGE: f64 = 5e-4;
-/// Step of the forward differences.
-const DIFFERENCE: f64 = 0.02;
 const ITERATIONS: usize = 12;
-/// Longest step of a factor's logarithm, and its largest value.
-const MAX_STEP: f64 = 1.0;
+/// Largest logarithm of a factor.
 const MAX_LN: f64 = 6.0;
 /// A step that gains less is the last: 2e-4 of divergence is 1 % in one standard deviation.
 const ENOUGH: f64 = 2e-4;
@@ -161,16 +106,21 @@ const OFF_WEIGHT: f64 = 0.3;
 /// The divergence at the outage ends and on the average; a single state whose ratio is a tenth off counts beside
 /// it, steeply: the divergence alone gives one state away for eight.
 fn cost(assessment: &Assessment) -> f64 {
+    let off = |c: &Consistency| c.ratio().iter().map(|r| (r.ln() / OFF).powi(4)).sum::<f64>();
+    divergence(assessment, |end| OFF_WEIGHT * off(end))
+}
+
+/// The divergence on the average and at the outage ends, where `beside` is added to it.
+pub(super) fn divergence(assessment: &Assessment, beside: impl Fn(&Consistency) -> f64) -> f64 {
     let mean =
         |c: &[Consistency], f: &dyn Fn(&Consistency) -> f64| c.iter().map(f).sum::<f64>() / c.len() as f64;
-    // The first instant is the initial state, which no reduction changes. A trajectory of a few seconds has no
-    // other: the mean of none is NaN, and the search ends where it starts.
+    // The first instant is the initial state, which no belief about the IMU changes. A trajectory of a few
+    // seconds has no other: the mean of none is NaN, and a search ends where it starts.
     let all = mean(assessment.reports.get(1..).unwrap_or_default(), &|c| c.divergence);
     if assessment.outage_ends.is_empty() {
         return all;
     }
-    let off = |c: &Consistency| c.ratio().iter().map(|r| (r.ln() / OFF).powi(4)).sum::<f64>();
-    let ends = mean(&assessment.outage_ends, &|c| c.divergence + OFF_WEIGHT * off(c));
+    let ends = mean(&assessment.outage_ends, &|c| c.divergence + beside(c));
     ENDS * ends + (1.0 - ENDS) * all
 }
 

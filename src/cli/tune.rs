@@ -1,0 +1,252 @@
+//! `nav-sim tune`: honest inflation of a noise model.
+
+use super::run::{OutageArg, parse_outage, windows_of};
+use super::{Failure, Session, read, turn_on};
+use nav_sim::ekf::FilterStates;
+use nav_sim::formats::atomic::{AtomicFile, guard_inputs};
+use nav_sim::formats::model_file::{self, ModelFile};
+use nav_sim::formats::scenario_file;
+use nav_sim::noise::Model;
+use nav_sim::report::{FactorEntry, Input, TuneResult};
+use nav_sim::scenario::Scenario;
+use nav_sim::sensors::outage::Outage;
+use nav_sim::simulation::lincov::{Aim, Factor, Per, Task, Track, drive, scaled};
+use std::path::{Path, PathBuf};
+
+/// Find the smallest factors on MODEL that make its filter honest for another truth
+///
+/// Factors multiply variances; quantization noise, which is in no filter, is left as it is. They come from linear
+/// covariance analysis along the trajectory, not from random numbers: the least divergence between what the filter
+/// states and what its errors are, then one factor on all that makes it exactly honest.
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim tune calib_data/tactical.toml --truth calib_data/consumer_mems.toml -o tuned.toml
+  nav-sim tune examples/white_and_walk.toml --truth calib_data/tactical.toml calib_data/consumer_mems.toml \\
+      --for mean --trajectory trajectories/figure_eight.toml --outage 60:90
+  nav-sim tune calib_data/tactical.toml --truth calib_data/consumer_mems.toml --per process --format json")]
+pub(crate) struct Args {
+    /// Noise model to be tuned
+    model: PathBuf,
+    /// Noise models that may make the errors, such as those of single recordings
+    #[arg(long = "truth", value_name = "MODEL2", num_args = 1..)]
+    truths: Vec<PathBuf>,
+    /// The truth may be MODEL itself with its parameters at the ends of their 95 % intervals
+    #[arg(long, conflicts_with = "truths")]
+    intervals: bool,
+    /// Trajectory: motion profile (.toml) or table (.csv) [default: a built-in drive, of outages as long]
+    #[arg(long, value_name = "FILE")]
+    trajectory: Option<PathBuf>,
+    /// Window without fixes, in seconds (repeatable), or "none" (default: 300:390 and 700:790)
+    #[arg(long = "outage", value_name = "START:END", value_parser = parse_outage)]
+    outages: Vec<OutageArg>,
+    /// When the filter is honest: worst, when in no truth an error at the end of an outage is larger than stated, in
+    /// any state; mean, when the expected NEES, averaged over truths and time, is right
+    #[arg(long = "for", value_name = "AIM", value_enum, default_value_t)]
+    aim: AimArg,
+    /// What has a factor of its own
+    #[arg(long, value_name = "WHAT", value_enum, default_value_t)]
+    per: PerArg,
+    /// The filter that is made honest: full, or that of the scenario (15 states)
+    #[arg(long, value_name = "STATES", default_value = "full")]
+    filter: FilterStates,
+    /// Factors may be below 1
+    #[arg(long)]
+    allow_smaller: bool,
+    /// Scenario file: receiver, start, IMU rate (see `nav-sim schema scenario`)
+    #[arg(long, value_name = "FILE")]
+    scenario: Option<PathBuf>,
+    /// Model file to write
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Longest schedule of outages that is looked at where no trajectory says how long (s).
+const DAY_S: f64 = 86_400.0;
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug, Default)]
+enum AimArg {
+    #[default]
+    Worst,
+    Mean,
+}
+
+#[derive(clap::ValueEnum, Clone, Copy, Debug, Default)]
+enum PerArg {
+    #[default]
+    Sensor,
+    Process,
+}
+
+impl Args {
+    const fn aim(&self) -> Aim {
+        match self.aim {
+            AimArg::Mean => Aim::Mean,
+            AimArg::Worst => Aim::Worst,
+        }
+    }
+
+    const fn per(&self) -> Per {
+        match self.per {
+            PerArg::Sensor => Per::Sensor,
+            PerArg::Process => Per::Process,
+        }
+    }
+}
+
+pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    refuse_recordings(args)?;
+    let mut scenario = scenario(args)?;
+    let files = files(args)?;
+    if let Some(out) = &args.out {
+        guard_inputs(out, files.iter().map(|f| Path::new(&f.path)))?;
+        drop(AtomicFile::create(out)?);
+    }
+    let file = read::model(&args.model, session)?;
+    let model = read::at_rate(&args.model, &file.model, scenario.imu.rate_hz, session)?;
+    turn_on::expect(&mut scenario.initial, &file, &args.model, session);
+    let (names, truths) = truths(args, &file, scenario.imu.rate_hz, session)?;
+    let (track, outages) = track(args, &scenario, &model, session)?;
+    let full = scenario.with_full_noise();
+    let mut reduced = scenario.clone();
+    if !reduced.filter.states.is_reduced() {
+        reduced.filter.states = FilterStates::default();
+    }
+    let full = |model: &Model| full.belief(model, &outages, &track);
+    let reduced = |model: &Model| reduced.belief(model, &outages, &track);
+    let task = Task {
+        model: &model,
+        truths: &truths,
+        track: &track,
+        full: &full,
+        filter: if args.filter.is_reduced() { &reduced } else { &full },
+        per: args.per(),
+        aim: args.aim(),
+        allow_smaller: args.allow_smaller,
+    };
+    let factors = task.factors().map_err(|e| Failure::input(format!("{}: {e}", args.model.display())))?;
+    let ones: Vec<Factor> = factors.iter().map(|f| Factor { on_variance: 1.0, ..f.clone() }).collect();
+    let result = TuneResult {
+        before: task.honesty(task.filter, &ones).map_err(Failure::input)?,
+        after: task.honesty(task.filter, &factors).map_err(Failure::input)?,
+        reduced: task.honesty(&reduced, &factors).map_err(Failure::input)?,
+        informed: task.informed().map_err(Failure::input)?,
+        factors,
+        truths: names,
+    };
+    let shown = if session.json() {
+        result.json()
+    } else {
+        format!("{}\n\n{}", result.verdict(), super::compare::table(&result.rows()))
+    };
+    session.printer.result(shown.trim_end());
+    if let Some(out) = &args.out {
+        model_file::write(out, &tuned(&file, &result.factors, args, &files))?;
+        session.printer.say(&format!("wrote {}", out.display()));
+    }
+    Ok(())
+}
+
+/// A directory or a table holds samples: a truth is a model.
+fn refuse_recordings(args: &Args) -> Result<(), Failure> {
+    if args.truths.is_empty() && !args.intervals {
+        return Err(Failure::input("nothing to be honest for: neither --truth nor --intervals").hint(
+            "give models of what may be true (--truth OTHER.toml, one for each recording or day), or --intervals \
+             for a MODEL that `nav-sim calibrate` wrote with intervals",
+        ));
+    }
+    let is_samples =
+        |p: &&PathBuf| p.is_dir() || p.extension().is_some_and(|e| e == "csv" || e == "npy" || e == "gz");
+    match args.truths.iter().find(is_samples) {
+        None => Ok(()),
+        Some(path) => Err(Failure::input(format!("--truth {}: recordings, not a model", path.display()))
+            .hint("make a model of each: nav-sim calibrate FILE --estimator gmwm -o FILE.toml")),
+    }
+}
+
+fn scenario(args: &Args) -> Result<Scenario, Failure> {
+    let mut scenario = args.scenario.as_deref().map(scenario_file::read).transpose()?.unwrap_or_default();
+    if !args.outages.is_empty() {
+        scenario.outage = Some(windows_of(&args.outages)?);
+        (scenario.outage_periodic, scenario.outage_random) = (None, None);
+    }
+    scenario.validate().map_err(Failure::input)?;
+    Ok(scenario)
+}
+
+fn files(args: &Args) -> Result<Vec<Input>, Failure> {
+    let mut named = vec![("model", &args.model)];
+    named.extend(args.truths.iter().map(|p| ("truth", p)));
+    named.extend(args.trajectory.iter().map(|p| ("trajectory", p)));
+    named.extend(args.scenario.iter().map(|p| ("scenario", p)));
+    named.iter().map(|(role, path)| read::input(role, path)).collect()
+}
+
+/// What may be true, by name, at the rate of the IMU.
+fn truths(
+    args: &Args,
+    file: &ModelFile,
+    imu_hz: f64,
+    session: &Session,
+) -> Result<(Vec<String>, Vec<Model>), Failure> {
+    let named = if args.intervals {
+        file.extremes().ok_or_else(|| {
+            Failure::input(format!("{}: no parameter has an interval", args.model.display()))
+                .hint("`nav-sim calibrate` writes them beside the parameters (unless --bootstrap 0)")
+        })?
+    } else {
+        let truth = |path: &PathBuf| {
+            Ok::<_, Failure>((path.display().to_string(), read::model(path, session)?.model))
+        };
+        args.truths.iter().map(truth).collect::<Result<_, _>>()?
+    };
+    let models = named.iter().map(|(name, model)| read::at_rate(Path::new(name), model, imu_hz, session));
+    let models = models.collect::<Result<_, _>>()?;
+    Ok((named.into_iter().map(|(name, _)| name).collect(), models))
+}
+
+/// The way of the analysis with its outages.
+fn track(
+    args: &Args,
+    scenario: &Scenario,
+    model: &Model,
+    session: &Session,
+) -> Result<(Track, Vec<Outage>), Failure> {
+    let seed = session.asked_seed().or(scenario.run.seed).unwrap_or(0);
+    let Some(path) = &args.trajectory else {
+        let outages = scenario.outages_on((0.0, DAY_S), seed)?.windows;
+        let lengths: Vec<f64> = outages.iter().map(|o| o.end_s - o.start_s).collect();
+        let track = drive(model, &scenario.gnss, &lengths).ok_or_else(|| {
+            Failure::input("no built-in drive for this receiver").hint("give a trajectory with --trajectory")
+        })?;
+        session.printer.say("along a built-in drive with outages as long; --trajectory takes another");
+        return Ok((track, outages));
+    };
+    let trajectory = read::trajectory(path, session)?;
+    let placed = scenario.outages_on((trajectory.start_s(), trajectory.end_s()), seed)?;
+    placed.remarks.iter().for_each(|remark| session.printer.warn(&remark.to_string()));
+    let outages = placed.windows;
+    let track = scenario.track(&trajectory, model, &outages).map_err(Failure::input)?;
+    Ok((track, outages))
+}
+
+/// The tuned model, and where it came from.
+fn tuned(file: &ModelFile, factors: &[Factor], args: &Args, files: &[Input]) -> ModelFile {
+    let mut provenance = toml::Table::new();
+    let mut put = |key: &str, value: toml::Value| provenance.insert(key.to_owned(), value);
+    put("program", format!("nav-sim {}", env!("CARGO_PKG_VERSION")).into());
+    put("made_by", "tune".into());
+    let aim = if args.intervals { "intervals" } else { "truths" };
+    put(
+        "honest_for",
+        format!("{} {aim}", if args.aim() == Aim::Mean { "mean of" } else { "worst of" }).into(),
+    );
+    let table = |t: Result<toml::Table, toml::ser::Error>| toml::Value::from(t.unwrap_or_default());
+    let factors_written: Vec<toml::Value> =
+        factors.iter().map(|f| table(toml::Table::try_from(FactorEntry::of(f)))).collect();
+    put("factors", factors_written.into());
+    put("inputs", files.iter().map(|i| table(toml::Table::try_from(i))).collect::<Vec<_>>().into());
+    let model = scaled(&file.model, factors);
+    let (missing, turn_on) = (file.missing.clone(), file.turn_on);
+    ModelFile { missing, turn_on, provenance: Some(provenance), ..ModelFile::new(model) }
+}

@@ -1,0 +1,278 @@
+//! The smallest factors on a noise model that make the filter made of it honest.
+//!
+//! What a filter believes is enlarged until it covers its true errors: where the truth is another model, one of
+//! several, or the same model with other parameters. The factors come from the least divergence between the
+//! covariance that the filter states and that of its errors ([`super::Consistency::divergence`]), then one factor
+//! on all of them makes the filter exactly honest.
+
+use super::descent::Descent;
+use super::pass::{Assessment, Consistency, assess};
+use super::reduce::divergence;
+use super::root::Crossing;
+use super::track::Track;
+use crate::ekf::{Belief, BeliefError};
+use crate::imu::{Channel, Sensor};
+use crate::noise::{Model, Process};
+use crate::simulation::{NEES_DOF, REPORTED};
+use rayon::prelude::*;
+
+/// How a model becomes a filter.
+pub type Filter<'a> = dyn Fn(&Model) -> Result<Belief, BeliefError> + Sync + 'a;
+
+/// What has a factor of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Per {
+    /// Each sensor: all its processes share one.
+    Sensor,
+    /// Each process of each sensor, its axes together.
+    Process,
+}
+
+/// When a filter counts as honest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Aim {
+    /// The expected NEES, averaged over time and truths, is what it should be.
+    Mean,
+    /// In no truth is an error larger than stated, in any state at the end of any outage.
+    Worst,
+}
+
+/// A model, and the truths that its filter is to be honest for.
+pub struct Task<'a> {
+    /// What the filter is made of.
+    pub model: &'a Model,
+    /// What may make the inertial errors; at least one.
+    pub truths: &'a [Model],
+    /// Where.
+    pub track: &'a Track,
+    /// The filter with a state for each process, for which the factors are found.
+    pub full: &'a Filter<'a>,
+    /// The filter that is made honest in the end.
+    pub filter: &'a Filter<'a>,
+    /// What has a factor.
+    pub per: Per,
+    /// When it is honest.
+    pub aim: Aim,
+    /// Whether a factor may be below 1.
+    pub allow_smaller: bool,
+}
+
+/// What is multiplied, and by what.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Factor {
+    /// The sensor.
+    pub sensor: Sensor,
+    /// Label of the process, as [`crate::noise::Composite::labels`]; none: all of the sensor's.
+    pub process: Option<String>,
+    /// On its variance.
+    pub on_variance: f64,
+}
+
+/// How honest a filter is over several truths.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Honesty {
+    /// Expected NEES, mean over time and truths; 9 is right.
+    pub nees: f64,
+    /// Largest true RMSE over stated standard deviation at an outage's end (without outages: at any time).
+    pub ratio: f64,
+    /// In which reported state.
+    pub state: usize,
+    /// In which outage, counted from 0.
+    pub outage: usize,
+    /// In which truth.
+    pub truth: usize,
+    /// When the outages end (s from the start).
+    pub end_s: Vec<f64>,
+    /// True RMSE of the reported states at these ends, root mean square over the truths.
+    pub rmse_end: Vec<[f64; REPORTED]>,
+}
+
+/// Largest logarithm of a factor.
+const MAX_LN: f64 = 12.0;
+const ITERATIONS: usize = 60;
+/// A step that gains less divergence is the last.
+const ENOUGH: f64 = 1e-6;
+/// Cost of a factor e: what no fix tells stays as it is.
+const RIDGE: f64 = 2e-5;
+/// Cost of a state at an outage's end whose error is e times what is stated, where none may be larger.
+const OVERCONFIDENT: f64 = 200.0;
+/// A filter whose measure of honesty is this close to 1 is honest.
+const TOLERANCE: f64 = 0.005;
+/// How close the last factor brings it.
+const EXACT: f64 = 1e-3;
+
+impl Task<'_> {
+    /// The factors, 1 for all where the filter is honest already.
+    ///
+    /// # Errors
+    /// When the model has no such filter.
+    pub fn factors(&self) -> Result<Vec<Factor>, BeliefError> {
+        let mut factors = multiplied(self.model, self.per);
+        (self.full)(self.model)?;
+        if self.dishonesty(&factors)?.abs() <= TOLERANCE {
+            return Ok(factors);
+        }
+        let track = self.track.coarse();
+        let cost = |ln: &[f64]| {
+            self.cost(&set(&factors, ln), &track) + RIDGE * ln.iter().map(|x| x * x).sum::<f64>()
+        };
+        let low = if self.allow_smaller { -MAX_LN } else { 0.0 };
+        let descent = Descent { cost: &cost, bounds: (low, MAX_LN), iterations: ITERATIONS, enough: ENOUGH };
+        let ln = descent.minimum(vec![0.0; factors.len()]).unwrap_or_else(|| vec![0.0; factors.len()]);
+        factors = self.exact(&factors, &ln, low)?;
+        Ok(factors)
+    }
+
+    /// Every truth under a filter made of the scaled model.
+    ///
+    /// # Errors
+    /// When the model has no such filter.
+    pub fn honesty(&self, filter: &Filter<'_>, factors: &[Factor]) -> Result<Honesty, BeliefError> {
+        let belief = filter(&scaled(self.model, factors))?;
+        Ok(Honesty::of(&self.assessments(&belief, self.track)))
+    }
+
+    /// Every truth under the filter that is made of it.
+    ///
+    /// # Errors
+    /// When a truth has no such filter.
+    pub fn informed(&self) -> Result<Honesty, BeliefError> {
+        let own = |truth: &Model| Ok(assess(self.track, &(self.full)(truth)?, truth));
+        let assessments: Result<Vec<Assessment>, BeliefError> = self.truths.par_iter().map(own).collect();
+        Ok(Honesty::of(&assessments?))
+    }
+
+    fn assessments(&self, belief: &Belief, track: &Track) -> Vec<Assessment> {
+        self.truths.par_iter().map(|truth| assess(track, belief, truth)).collect()
+    }
+
+    /// Mean divergence over the truths, and what no error may be.
+    fn cost(&self, factors: &[Factor], track: &Track) -> f64 {
+        let Ok(belief) = (self.full)(&scaled(self.model, factors)) else { return f64::INFINITY };
+        let over = |end: &Consistency| match self.aim {
+            Aim::Mean => 0.0,
+            Aim::Worst => end.ratio().iter().map(|r| OVERCONFIDENT * r.ln().max(0.0).powi(2)).sum(),
+        };
+        let costs: Vec<f64> = self.assessments(&belief, track).iter().map(|a| divergence(a, over)).collect();
+        costs.iter().sum::<f64>() / costs.len() as f64
+    }
+
+    /// Logarithm of what should be 1: above 0 the filter is overconfident.
+    fn dishonesty(&self, factors: &[Factor]) -> Result<f64, BeliefError> {
+        let honesty = self.honesty(self.filter, factors)?;
+        Ok(match self.aim {
+            Aim::Mean => (honesty.nees / NEES_DOF as f64).ln(),
+            Aim::Worst => honesty.ratio.ln(),
+        })
+    }
+
+    /// One more factor on all of them, no factor below the lowest, so that the filter is honest.
+    fn exact(&self, factors: &[Factor], ln: &[f64], low: f64) -> Result<Vec<Factor>, BeliefError> {
+        let moved = |by: f64| {
+            let ln: Vec<f64> = ln.iter().map(|x| (x + by).clamp(low, MAX_LN)).collect();
+            set(factors, &ln)
+        };
+        let highest = ln.iter().copied().fold(low, f64::max);
+        let crossing = Crossing { bounds: (low - highest, MAX_LN), step: 0.1, exact: EXACT };
+        let (by, _) = crossing.from(0.0, |by| self.dishonesty(&moved(by)))?;
+        Ok(moved(by))
+    }
+}
+
+impl Honesty {
+    /// Of the same filter under several truths.
+    fn of(assessments: &[Assessment]) -> Self {
+        let count = assessments.len() as f64;
+        let mean = |a: &Assessment| a.reports.iter().map(|r| r.nees).sum::<f64>() / a.reports.len() as f64;
+        let nees = assessments.iter().map(mean).sum::<f64>() / count;
+        let end_s: Vec<f64> = assessments[0].outage_ends.iter().map(|end| end.after_s).collect();
+        let rmse_end = vec![[0.0; REPORTED]; end_s.len()];
+        let mut honesty = Self { nees, ratio: 0.0, state: 0, outage: 0, truth: 0, end_s, rmse_end };
+        for (truth, assessment) in assessments.iter().enumerate() {
+            let ends = &assessment.outage_ends;
+            for (sum, end) in honesty.rmse_end.iter_mut().zip(ends) {
+                sum.iter_mut().zip(&end.rmse).for_each(|(sum, rmse)| *sum += rmse * rmse / count);
+            }
+            let judged = if ends.is_empty() { &assessment.reports } else { ends };
+            for (outage, instant) in judged.iter().enumerate() {
+                for (state, ratio) in instant.ratio().into_iter().enumerate() {
+                    if ratio > honesty.ratio {
+                        honesty = Self { ratio, state, outage, truth, ..honesty };
+                    }
+                }
+            }
+        }
+        honesty.rmse_end.iter_mut().flatten().for_each(|x| *x = x.sqrt());
+        honesty
+    }
+
+    /// Horizontal RMSE at the end of each outage (m).
+    pub fn horizontal_m(&self) -> impl Iterator<Item = f64> {
+        self.rmse_end.iter().map(|rmse| rmse[0].hypot(rmse[1]))
+    }
+}
+
+/// What of a model can be multiplied: what is zero stays so, and quantization noise is in no filter.
+fn multiplied(model: &Model, per: Per) -> Vec<Factor> {
+    let mut factors: Vec<Factor> = Vec::new();
+    for channel in Channel::ALL {
+        let axis = model.axis(channel);
+        for (_, label) in axis.processes.iter().zip(axis.labels()).filter(|(p, _)| is_felt(p)) {
+            let process = (per == Per::Process).then_some(label);
+            if !factors.iter().any(|f| f.sensor == channel.sensor && f.process == process) {
+                factors.push(Factor { sensor: channel.sensor, process, on_variance: 1.0 });
+            }
+        }
+    }
+    factors
+}
+
+/// Whether a filter has it, and there is something to multiply.
+fn is_felt(process: &Process) -> bool {
+    let (_, amplitude) = amplitude(process);
+    amplitude != 0.0 && !matches!(process, Process::Quantization(_))
+}
+
+/// The parameter that a process is proportional to.
+fn amplitude(process: &Process) -> (&'static str, f64) {
+    match process {
+        Process::White(p) => ("sigma2", p.sigma2()),
+        Process::Quantization(p) => ("q2", p.q2()),
+        Process::Ar1(p) => ("sigma2", p.sigma2()),
+        Process::RandomWalk(p) => ("gamma2", p.gamma2()),
+        Process::Drift(p) => ("slope", p.slope()),
+        Process::GaussMarkov(p) => ("s2", p.s2()),
+        Process::Ma1(p) => ("sigma2", p.sigma2()),
+    }
+}
+
+fn set(factors: &[Factor], ln: &[f64]) -> Vec<Factor> {
+    factors.iter().zip(ln).map(|(f, ln)| Factor { on_variance: ln.exp(), ..f.clone() }).collect()
+}
+
+/// A model whose processes are multiplied; the factors are the same at any sample rate.
+#[must_use]
+pub fn scaled(model: &Model, factors: &[Factor]) -> Model {
+    let mut scaled = model.clone();
+    for channel in Channel::ALL {
+        let axis = &mut scaled.axes[channel.index()];
+        for (process, label) in axis.processes.iter_mut().zip(model.axis(channel).labels()) {
+            let own =
+                |f: &&Factor| f.sensor == channel.sensor && f.process.as_ref().is_none_or(|p| *p == label);
+            if let Some(factor) = factors.iter().find(own).filter(|_| is_felt(process)) {
+                *process = times(process, factor.on_variance, model.rate_hz);
+            }
+        }
+    }
+    scaled
+}
+
+/// A process whose variance is multiplied.
+pub(super) fn times(process: &Process, on_variance: f64, rate_hz: f64) -> Process {
+    let (name, value) = amplitude(process);
+    // a drift has an amplitude, the others a variance
+    let factor = if matches!(process, Process::Drift(_)) { on_variance.sqrt() } else { on_variance };
+    let changed = process.with_parameter(name, value * factor, rate_hz).and_then(Result::ok);
+    // beyond the largest number nothing is left to enlarge
+    changed.unwrap_or(*process)
+}

@@ -1,0 +1,228 @@
+//! The tuning of a model, on one screen and as JSON.
+
+use super::number::{readable, seconds};
+use crate::metrics::PerState;
+use crate::simulation::REPORTED_NAMES;
+use crate::simulation::lincov::{Factor, Honesty};
+use serde::Serialize;
+
+/// A deviation of the NEES or of a ratio from what is right that is not worth a word.
+const RIGHT: f64 = 0.01;
+
+/// What a tuning found.
+#[derive(Debug, Clone)]
+pub struct TuneResult {
+    /// The factors.
+    pub factors: Vec<Factor>,
+    /// The filter as it was.
+    pub before: Honesty,
+    /// The tuned one.
+    pub after: Honesty,
+    /// The tuned model in the filter that `run` makes of it by default.
+    pub reduced: Honesty,
+    /// A filter that knows the truth, each truth its own.
+    pub informed: Honesty,
+    /// Names of the truths.
+    pub truths: Vec<String>,
+}
+
+impl TuneResult {
+    /// The verdict: how honest the filter was, with which factors it is, and what that costs.
+    #[must_use]
+    pub fn verdict(&self) -> String {
+        let before = judged(&self.before);
+        if self.factors.iter().all(|f| (f.on_variance - 1.0).abs() < RIGHT) {
+            return match excess(&self.before) {
+                Excess::Underconfident => {
+                    format!("{before}; no factor above 1 helps (--allow-smaller seeks one below)")
+                }
+                _ => format!("{before}; no factor is needed"),
+            };
+        }
+        format!(
+            "{before}; with {} {}; cost: {} of horizontal RMSE at the outage's end against a filter that knows \
+             the truth",
+            factors_in_words(&self.factors),
+            judged_after(&self.after),
+            percent(self.cost())
+        )
+    }
+
+    /// Horizontal RMSE at the outages' ends over that of a filter that knows the truth, less 1.
+    fn cost(&self) -> f64 {
+        let square = |h: &Honesty| h.horizontal_m().map(|x| x * x).sum::<f64>();
+        (square(&self.after) / square(&self.informed)).sqrt() - 1.0
+    }
+
+    /// A row for each filter under a head.
+    #[must_use]
+    pub fn rows(&self) -> Vec<Vec<String>> {
+        let mut head = vec!["filter".to_owned(), "NEES (9)".to_owned(), "largest RMSE/sigma".to_owned()];
+        head.extend(self.before.end_s.iter().map(|t| format!("horizontal RMSE at {} s (m)", seconds(*t))));
+        let several = self.truths.len() > 1;
+        let row = |(name, h): (&str, &Honesty)| {
+            let mut largest = format!("{} in {}", readable(h.ratio), REPORTED_NAMES[h.state]);
+            if let Some(end_s) = h.end_s.get(h.outage).filter(|_| h.end_s.len() > 1) {
+                largest += &format!(" at {} s", seconds(*end_s));
+            }
+            if several {
+                largest += &format!(", {}", self.truths[h.truth]);
+            }
+            let mut row = vec![name.to_owned(), readable(h.nees), largest];
+            row.extend(h.horizontal_m().map(readable));
+            row
+        };
+        std::iter::once(head).chain(self.filters().map(row)).collect()
+    }
+
+    fn filters(&self) -> impl Iterator<Item = (&'static str, &Honesty)> {
+        [
+            ("as it was", &self.before),
+            ("tuned", &self.after),
+            ("tuned, default of run", &self.reduced),
+            ("knows the truth", &self.informed),
+        ]
+        .into_iter()
+    }
+
+    /// All of it as JSON.
+    #[must_use]
+    pub fn json(&self) -> String {
+        let filter = |(name, h): (&'static str, &Honesty)| FilterEntry {
+            filter: name,
+            nees: h.nees,
+            largest_ratio: h.ratio,
+            state: REPORTED_NAMES[h.state],
+            truth: self.truths[h.truth].clone(),
+            outage_end: h
+                .end_s
+                .iter()
+                .zip(&h.rmse_end)
+                .map(|(after_s, rmse)| EndEntry {
+                    after_s: *after_s,
+                    rmse: PerState(*rmse),
+                    horizontal_rmse_m: rmse[0].hypot(rmse[1]),
+                })
+                .collect(),
+        };
+        super::json(&TuneFile {
+            schema_version: 1,
+            verdict: self.verdict(),
+            factors: self.factors.iter().map(FactorEntry::of).collect(),
+            truths: &self.truths,
+            horizontal_rmse_cost: self.cost(),
+            filters: self.filters().map(filter).collect(),
+        })
+    }
+}
+
+enum Excess {
+    None,
+    Overconfident,
+    Underconfident,
+}
+
+fn excess(h: &Honesty) -> Excess {
+    let nees = h.nees / 9.0 - 1.0;
+    if h.ratio > 1.0 + RIGHT || nees > RIGHT {
+        Excess::Overconfident
+    } else if nees < -RIGHT || h.ratio < 1.0 - RIGHT {
+        Excess::Underconfident
+    } else {
+        Excess::None
+    }
+}
+
+/// `overconfident by 1.31 in yaw_deg (NEES 13.2)`
+fn judged(h: &Honesty) -> String {
+    let nees = readable(h.nees);
+    match excess(h) {
+        Excess::None => format!("honest (NEES {nees}, 9 is right)"),
+        Excess::Overconfident if h.ratio > 1.0 + RIGHT => {
+            format!(
+                "overconfident by {} in {} (NEES {nees}, 9 is right)",
+                readable(h.ratio),
+                REPORTED_NAMES[h.state]
+            )
+        }
+        Excess::Overconfident => format!("overconfident (NEES {nees}, 9 is right)"),
+        Excess::Underconfident => format!("on the safe side (NEES {nees}, 9 is right)"),
+    }
+}
+
+/// The tuned filter: `it is honest (NEES 7.9)`
+fn judged_after(h: &Honesty) -> String {
+    let nees = readable(h.nees);
+    if h.ratio <= 1.0 + RIGHT {
+        return format!("it is honest: no error at an outage's end larger than stated (NEES {nees})");
+    }
+    let (ratio, state) = (readable(h.ratio), REPORTED_NAMES[h.state]);
+    format!("the NEES is {nees}, {state} still overconfident by {ratio} (--for worst covers every state)")
+}
+
+/// `gyro RW × 4.02 (variance; the rest × 1)`
+fn factors_in_words(factors: &[Factor]) -> String {
+    let is_changed = |f: &&Factor| (f.on_variance - 1.0).abs() >= RIGHT;
+    let word = |f: &Factor| {
+        let process = f.process.as_ref().map_or(String::new(), |p| format!(" {p}"));
+        format!("{}{process} × {}", f.sensor.name(), readable(f.on_variance))
+    };
+    let changed: Vec<String> = factors.iter().filter(is_changed).map(word).collect();
+    let rest = if changed.len() < factors.len() { "; the rest × 1" } else { "" };
+    format!("{} (variances{rest})", changed.join(", "))
+}
+
+fn percent(share: f64) -> String {
+    format!("{:.1} %", 100.0 * share)
+}
+
+#[derive(Serialize)]
+struct TuneFile<'a> {
+    schema_version: u32,
+    verdict: String,
+    factors: Vec<FactorEntry>,
+    truths: &'a [String],
+    horizontal_rmse_cost: f64,
+    filters: Vec<FilterEntry>,
+}
+
+/// A factor in files.
+#[derive(Debug, Clone, Serialize)]
+pub struct FactorEntry {
+    /// `accel` or `gyro`.
+    pub sensor: &'static str,
+    /// Label of the process; none: all of the sensor's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub process: Option<String>,
+    /// On its variance.
+    pub on_variance: f64,
+}
+
+impl FactorEntry {
+    /// Of a factor.
+    #[must_use]
+    pub fn of(factor: &Factor) -> Self {
+        Self {
+            sensor: factor.sensor.name(),
+            process: factor.process.clone(),
+            on_variance: factor.on_variance,
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct FilterEntry {
+    filter: &'static str,
+    nees: f64,
+    largest_ratio: f64,
+    state: &'static str,
+    truth: String,
+    outage_end: Vec<EndEntry>,
+}
+
+#[derive(Serialize)]
+struct EndEntry {
+    after_s: f64,
+    horizontal_rmse_m: f64,
+    rmse: PerState<f64>,
+}

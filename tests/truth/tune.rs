@@ -1,0 +1,114 @@
+//! Tuned models are honest: the factor of a process that is larger in truth is found, and sampled runs agree.
+
+use nav_sim::ekf::Belief;
+use nav_sim::metrics::Estimate;
+use nav_sim::monte_carlo;
+use nav_sim::noise::{Composite, Model, Process, RandomWalk, White};
+use nav_sim::scenario::Scenario;
+use nav_sim::sensors::imu::Truth;
+use nav_sim::sensors::outage::Outage;
+use nav_sim::simulation::lincov::{Aim, Factor, Filter, Per, Task, Track, scaled};
+use nav_sim::trajectory::Trajectory;
+use nav_sim::trajectory::profile::{Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning};
+
+const OUTAGES: [Outage; 1] = [Outage { start_s: 200.0, end_s: 260.0 }];
+
+/// White noise and random walks of a consumer IMU, the random walks times `accel` and `gyro`.
+fn model(accel: f64, gyro: f64) -> Model {
+    let axis = |white: f64, walk: f64| {
+        Composite::new(vec![
+            Process::White(White::new(white).unwrap()),
+            Process::RandomWalk(RandomWalk::new(walk).unwrap()),
+        ])
+    };
+    Model::pooled(100.0, &axis(1e-4, accel * 1e-10), &axis(1e-8, gyro * 1e-12))
+}
+
+/// Four minutes of town traffic.
+fn trajectory() -> Trajectory {
+    let faster = |to_speed: f64| Kind::Accelerate { to_speed, by: Acceleration::Duration(10.0) };
+    let turn = |deg: f64| Kind::Turn { angle: deg.to_radians(), by: Turning::Duration(9.0) };
+    let block = [faster(14.0), Kind::Straight(Length::Duration(14.0)), turn(90.0), faster(6.0), turn(-60.0)];
+    let segments = block.into_iter().cycle().take(26);
+    let segments = segments.map(|kind| Segment { kind, climb_m: 0.0, ramp_s: None }).collect();
+    let start = Start { t_s: 0.0, lat: 0.8, lon: 0.1, h: 0.0, heading: 0.7, speed: 0.0 };
+    Profile { start, bank: Bank::None, ramp_s: 1.0, segments }.build().unwrap()
+}
+
+struct Drive {
+    scenario: Scenario,
+    trajectory: Trajectory,
+    track: Track,
+}
+
+fn drive() -> Drive {
+    let (scenario, trajectory) = (Scenario::default().with_full_noise(), trajectory());
+    let track = scenario.track(&trajectory, &model(1.0, 1.0), &OUTAGES).unwrap();
+    Drive { scenario, trajectory, track }
+}
+
+impl Drive {
+    fn belief(&self, model: &Model) -> Belief {
+        self.scenario.belief(model, &OUTAGES, &self.track).unwrap()
+    }
+
+    fn factors(&self, truths: &[Model], per: Per, aim: Aim) -> Vec<Factor> {
+        let filter: &Filter<'_> = &|model: &Model| self.scenario.belief(model, &OUTAGES, &self.track);
+        let model = &model(1.0, 1.0);
+        let task =
+            Task { model, truths, track: &self.track, full: filter, filter, per, aim, allow_smaller: false };
+        let factors = task.factors().unwrap();
+        let honesty = task.honesty(filter, &factors).unwrap();
+        match aim {
+            Aim::Mean => assert!((honesty.nees / 9.0 - 1.0).abs() < 5e-3, "{honesty:?}"),
+            Aim::Worst => assert!((honesty.ratio - 1.0).abs() < 5e-3, "{honesty:?}"),
+        }
+        factors
+    }
+
+    /// NEES at the outage's end of a hundred runs.
+    fn sampled_nees(&self, belief: Belief, truth: &Model) -> Estimate {
+        let beliefs = [belief];
+        let experiment =
+            self.scenario.experiment(&self.trajectory, Truth::Model(truth), &beliefs, &OUTAGES, 11);
+        let result = &monte_carlo::run(&experiment, 100, &|_| {}).unwrap()[0];
+        Estimate::mean_of(result.runs.iter().map(|r| r.outages[0].nees_end), None)
+    }
+}
+
+/// The process that is four times as large is multiplied by four, the others are left alone. The sum of the NEES of
+/// 100 runs is chi-square of 900 degrees: 9 ± 0.42 for one, where four deviations are passed by chance with p = 1e-4.
+#[test]
+fn four_times_the_random_walk_is_found_and_runs_agree() {
+    let drive = drive();
+    let truth = model(1.0, 4.0);
+    let factors = drive.factors(std::slice::from_ref(&truth), Per::Process, Aim::Mean);
+    for factor in &factors {
+        let walk_of_gyro = factor.sensor.name() == "gyro" && factor.process.as_deref() == Some("RW");
+        let expected = if walk_of_gyro { 4.0 } else { 1.0 };
+        assert!((factor.on_variance / expected - 1.0).abs() < 0.05, "{factors:?}");
+    }
+    let before = drive.sampled_nees(drive.belief(&model(1.0, 1.0)), &truth);
+    let after = drive.sampled_nees(drive.belief(&scaled(&model(1.0, 1.0), &factors)), &truth);
+    let deviation = (18.0_f64 / 100.0).sqrt();
+    assert!((after.value - 9.0).abs() < 4.0 * deviation, "{after:?}");
+    assert!(before.value - 9.0 > 6.0 * deviation, "{before:?}");
+}
+
+#[test]
+fn a_model_that_is_true_needs_no_factor() {
+    let drive = drive();
+    for aim in [Aim::Mean, Aim::Worst] {
+        let factors = drive.factors(&[model(1.0, 1.0)], Per::Process, aim);
+        assert!(factors.iter().all(|f| f.on_variance == 1.0) && factors.len() == 4, "{factors:?}");
+    }
+}
+
+/// Of two truths, each larger in another sensor, neither is underrated; and the factors are those of the two.
+#[test]
+fn the_worst_of_two_truths_is_covered() {
+    let drive = drive();
+    let truths = [model(4.0, 1.0), model(1.0, 4.0)];
+    let factors = drive.factors(&truths, Per::Sensor, Aim::Worst);
+    assert!(factors.len() == 2 && factors.iter().all(|f| (2.0..6.0).contains(&f.on_variance)), "{factors:?}");
+}
