@@ -2,7 +2,7 @@
 //! size the simulation uses. Throughput is samples, so that its inverse is the cost of one.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use nav_sim::noise::{CATALOGUE, Composite, Process, Synthesizer};
+use nav_sim::noise::{Composite, Kind, Process, Synthesizer};
 use nav_sim::rng::StreamKey;
 use std::hint::black_box;
 
@@ -20,10 +20,11 @@ fn process(code: &str, values: &[f64]) -> Process {
 fn single_processes(c: &mut Criterion) {
     let mut group = c.benchmark_group("one process, per sample");
     group.throughput(Throughput::Elements(BLOCK as u64));
-    for (code, names) in CATALOGUE {
-        let mut source = synthesizer(vec![process(code, &[0.5, 0.5][..names.len()])], "accel.x");
+    for kind in Kind::ALL {
+        let mut source =
+            synthesizer(vec![process(kind.code(), &[0.5, 0.5][..kind.parameters().len()])], "accel.x");
         let mut block = [0.0; BLOCK];
-        group.bench_function(code, |b| b.iter(|| source.fill(black_box(&mut block))));
+        group.bench_function(kind.code(), |b| b.iter(|| source.fill(black_box(&mut block))));
     }
     group.finish();
 }

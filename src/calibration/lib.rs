@@ -37,7 +37,7 @@ pub use diagnosis::{
     Alarm, AxisScores, CommonOutliers, Diagnosis, DriftAlarm, LeftOut, Misfit, Movement, Verdict, diagnose,
 };
 pub use fit::{Fit, FitError, Termination, Weighting, estimate, fit};
-pub use model::{Kind, LimitError, Limits, ModelSpec, SpecError};
+pub use model::{LimitError, Limits, ModelSpec, SpecError};
 pub use outcome::{
     Bootstrap, Candidate, Goodness, Indistinct, Inference, LevelSpread, ModelChoice, Outcome,
     ParameterInterval, ParameterLimit, Ranking, Settings, TooSimple, Undetermined,
@@ -45,6 +45,5 @@ pub use outcome::{
 pub use pipeline::{CalibrationError, Cause, calibrate, fit_curve, infer};
 pub use uncertainty::ALIKE_LEVEL;
 pub use words::{
-    Share, advice, correlation_time_s, duration, effects, note_of_indistinct, percent, reasons, shares,
-    undetermined,
+    Share, advice, correlation_time_s, duration, effects, percent, reasons, shares, undetermined,
 };

@@ -238,7 +238,7 @@ fn enough(root: &Section<'_>, design: &Design) -> Result<(), FileError> {
 
 /// AVLR reads slopes, and some processes have none.
 fn has_slopes(root: &Section<'_>, design: &Design) -> Result<(), FileError> {
-    let without = design.spec.kinds().iter().find(|k| k.has_shape());
+    let without = design.spec.kinds().iter().find(|k| k.shape().is_some());
     match without {
         Some(kind) if design.estimators.contains(&Estimator::Avlr) => {
             let reason = format!("has avlr, which cannot tell {}: it has no slope of its own", kind.code());

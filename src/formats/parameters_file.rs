@@ -15,8 +15,9 @@
 
 use super::FileError;
 use super::toml_file::{Section, Source};
-use crate::calibration::{Kind, ModelSpec, ParameterLimit};
+use crate::calibration::{ModelSpec, ParameterLimit};
 use crate::imu::{Axis, Sensor};
+use crate::noise::Kind;
 use std::path::Path;
 
 /// Reads the limits of a file. Each is tried on the model.

@@ -72,22 +72,22 @@ fn one_line(outcome: &Outcome) -> String {
 fn processes(outcome: &Outcome, rate_hz: f64) -> Vec<String> {
     let intervals = outcome.inference.as_ref().map_or(&[][..], |i| &i.intervals);
     let model = &outcome.fit.composite;
-    let line = |(process, label): (&Process, String)| {
-        let parameters = process.parameters().into_iter();
-        let all: Vec<String> = parameters
-            .map(|(name, value)| {
-                let ends = interval_of(intervals, &label, name).map_or(String::new(), ends);
-                format!("{name} = {}{ends}", number(name, value))
+    let line = |(index, (process, label)): (usize, (&Process, String))| {
+        let own = model.parameters().filter(|(of, _)| of.process == index);
+        let all: Vec<String> = own
+            .map(|(of, value)| {
+                let ends = interval_of(intervals, of).map_or(String::new(), ends);
+                format!("{} = {}{ends}", of.parameter.name(), number(of.parameter.name(), value))
             })
             .collect();
-        let meaning = if outcome.fit.zero.contains(&label) {
+        let meaning = if outcome.fit.zero.contains(&index) {
             "no part in it".to_owned()
         } else {
             meaning(process, outcome.scope.sensor, rate_hz)
         };
         format!("  {label:<6} {}; {meaning}", all.join(", "))
     };
-    model.processes.iter().zip(model.labels()).map(line).collect()
+    model.processes.iter().zip(model.labels()).enumerate().map(line).collect()
 }
 
 /// A value as a screen needs it: phi is told by its distance from 1.
@@ -99,7 +99,8 @@ fn number(parameter: &str, value: f64) -> String {
 fn ends(interval: &ParameterInterval) -> String {
     match interval.absent {
         None => {
-            let [low, high] = [interval.low, interval.high].map(|end| number(interval.parameter, end));
+            let [low, high] =
+                [interval.low, interval.high].map(|end| number(interval.of.parameter.name(), end));
             format!(" ({low} … {high})")
         }
         Some(_) => " (not determined)".to_owned(),

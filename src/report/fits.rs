@@ -7,7 +7,7 @@ use crate::calibration::{
     ParameterInterval, Ranking, Settings, Share, correlation_time_s, percent, reasons, shares, undetermined,
 };
 use crate::imu::Sensor;
-use crate::noise::{Composite, Process};
+use crate::noise::{Composite, ParameterRef, Process};
 use crate::units::DEG;
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -166,10 +166,10 @@ pub struct IndistinctEntry {
 }
 
 impl IndistinctEntry {
-    fn new(indistinct: &Indistinct) -> Self {
-        let Indistinct { labels, spec, composite, p_value, intervals } = indistinct;
+    fn new(indistinct: &Indistinct, labels: &[String]) -> Self {
+        let Indistinct { processes, spec, composite, p_value, intervals } = indistinct;
         Self {
-            processes: labels.clone(),
+            processes: processes.iter().map(|i| labels[*i].clone()).collect(),
             simpler: spec.to_string(),
             p_value: *p_value,
             simpler_processes: processes_json(composite, intervals),
@@ -195,7 +195,10 @@ impl FitEntry {
         let fit = &outcome.fit;
         let inference = outcome.inference.as_ref();
         let goodness = inference.and_then(|i| i.goodness);
-        let open = inference.into_iter().flat_map(|i| &i.intervals).filter_map(undetermined);
+        let labels = fit.composite.labels();
+        let labelled = |processes: &[usize]| processes.iter().map(|i| labels[*i].clone()).collect();
+        let intervals = inference.into_iter().flat_map(|i| &i.intervals);
+        let open = intervals.filter_map(|i| undetermined(i, &labels));
         let spread = inference.map_or(&[][..], |i| &i.spread).iter();
         Self {
             sensor: outcome.scope.sensor.name(),
@@ -221,7 +224,9 @@ impl FitEntry {
                 })
                 .collect(),
             spread_p_value: inference.and_then(|i| i.alike),
-            indistinct: inference.and_then(|i| i.indistinct.as_ref()).map(IndistinctEntry::new),
+            indistinct: inference
+                .and_then(|i| i.indistinct.as_ref())
+                .map(|i| IndistinctEntry::new(i, &labels)),
             bootstrap: inference.map_or(0, |i| i.draws),
             objective: fit.objective,
             termination: fit.termination.name(),
@@ -229,8 +234,8 @@ impl FitEntry {
             starts: fit.starts,
             agreeing: fit.agreeing,
             runner_up: fit.runner_up,
-            zero: fit.zero.clone(),
-            at_end: fit.at_end.clone(),
+            zero: labelled(&fit.zero),
+            at_end: labelled(&fit.at_end),
             notes: outcome.notes.iter().cloned().chain(open).collect(),
         }
     }
@@ -258,15 +263,16 @@ impl FitsFile {
 }
 
 fn processes_json(model: &Composite, intervals: &[ParameterInterval]) -> Vec<Map<String, Value>> {
-    model.processes.iter().zip(model.labels()).map(|(p, label)| process_json(p, &label, intervals)).collect()
+    model.processes.iter().enumerate().map(|(i, p)| process_json(p, i, intervals)).collect()
 }
 
-fn process_json(process: &Process, label: &str, intervals: &[ParameterInterval]) -> Map<String, Value> {
+fn process_json(process: &Process, index: usize, intervals: &[ParameterInterval]) -> Map<String, Value> {
     let mut map = Map::new();
     map.insert("type".to_owned(), process.code().into());
-    for (name, value) in process.parameters() {
+    for (&parameter, value) in process.kind().parameters().iter().zip(process.values()) {
+        let name = parameter.name();
         map.insert(name.to_owned(), value.into());
-        if let Some(i) = interval_of(intervals, label, name) {
+        if let Some(i) = interval_of(intervals, ParameterRef { process: index, parameter }) {
             let ends = if i.absent.is_none() { vec![i.low, i.high].into() } else { Value::Null };
             map.insert(format!("{name}_ci95"), ends);
             let error = i.standard_error;
@@ -276,12 +282,8 @@ fn process_json(process: &Process, label: &str, intervals: &[ParameterInterval])
     map
 }
 
-pub(super) fn interval_of<'a>(
-    intervals: &'a [ParameterInterval],
-    label: &str,
-    parameter: &str,
-) -> Option<&'a ParameterInterval> {
-    intervals.iter().find(|i| i.process == label && i.parameter == parameter)
+pub(super) fn interval_of(intervals: &[ParameterInterval], of: ParameterRef) -> Option<&ParameterInterval> {
+    intervals.iter().find(|i| i.of == of)
 }
 
 /// A fit in words: a head line, a line for each process, how sure the optimum is, the remarks.
@@ -296,14 +298,12 @@ pub fn describe(outcome: &Outcome, settings: &Settings) -> String {
         settings.rate_hz,
     ));
     lines.push(optimum(outcome));
-    lines.extend(
-        outcome.inference.iter().flat_map(|i| inference_lines(i, outcome.replicates, settings.rate_hz)),
-    );
+    lines.extend(outcome.inference.iter().flat_map(|i| inference_lines(i, outcome, settings.rate_hz)));
     lines.extend(outcome.notes.iter().map(|note| format!("  note: {note}")));
     lines.join("\n")
 }
 
-fn inference_lines(inference: &Inference, replicates: usize, rate_hz: f64) -> Vec<String> {
+fn inference_lines(inference: &Inference, outcome: &Outcome, rate_hz: f64) -> Vec<String> {
     if inference.fitted < 2 {
         return vec![format!(
             "  {} of {} draws of the bootstrap had a fit: no intervals",
@@ -311,8 +311,9 @@ fn inference_lines(inference: &Inference, replicates: usize, rate_hz: f64) -> Ve
         )];
     }
     let mut lines: Vec<String> = inference.goodness.iter().map(j_test).collect();
+    let labels = outcome.fit.composite.labels();
     for i in &inference.intervals {
-        if let Some(text) = undetermined(i) {
+        if let Some(text) = undetermined(i, &labels) {
             lines.push(format!("  95 % {text}"));
             continue;
         }
@@ -322,10 +323,13 @@ fn inference_lines(inference: &Inference, replicates: usize, rate_hz: f64) -> Ve
         };
         lines.push(format!(
             "  95 % {:<6} {:<7} {:.6e} … {:.6e}{error}",
-            i.process, i.parameter, i.low, i.high
+            labels[i.of.process],
+            i.of.parameter.name(),
+            i.low,
+            i.high
         ));
     }
-    if replicates > 1 {
+    if outcome.replicates > 1 {
         lines.extend(spread_line(inference, rate_hz));
     }
     lines

@@ -72,8 +72,9 @@ fn weighted<'a>(
     let mut all = vec![(*process, 1.0)];
     for law in laws {
         let name = law.parameter();
-        let centre = process.parameters().iter().find(|(n, _)| *n == name).map_or(f64::NAN, |(_, v)| *v);
-        let nodes = nodes(law.law(), centre, domain(name));
+        let own = process.kind().parameters().iter().zip(process.values()).find(|(p, _)| p.name() == name);
+        let (parameter, centre) = own.ok_or_else(|| law.no_parameter(process))?;
+        let nodes = nodes(law.law(), centre, parameter.domain());
         let mut next = Vec::with_capacity(all.len() * nodes.len());
         for (process, weight) in &all {
             for (value, node) in &nodes {
@@ -85,15 +86,6 @@ fn weighted<'a>(
         all = next;
     }
     Ok(all)
-}
-
-/// Where a parameter of that name lives.
-fn domain(parameter: &str) -> (f64, f64) {
-    match parameter {
-        "phi" | "theta" => (-1.0, 1.0),
-        "slope" => (f64::NEG_INFINITY, f64::INFINITY),
-        _ => (0.0, f64::INFINITY),
-    }
 }
 
 #[cfg(test)]

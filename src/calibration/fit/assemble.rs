@@ -3,10 +3,8 @@
 use super::objective::{Component, Objective, Range};
 use super::result::{Fit, FitError};
 use super::search::Found;
-use crate::model::{Kind, Limits, ModelSpec};
-use crate::noise::{
-    Ar1, Composite, Drift, GaussMarkov, Ma1, ParameterError, Process, Quantization, RandomWalk, White,
-};
+use crate::model::{Limits, ModelSpec};
+use crate::noise::{Composite, Kind, ParameterError, ParameterRef, Process};
 use std::cmp::Ordering;
 
 /// The fit that a search has found, but for its weights.
@@ -34,10 +32,7 @@ pub(super) fn assemble(
     terms.sort_by(|a, b| a.kind.cmp(&b.kind).then_with(|| by_time(a, b)));
     let processes = terms.iter().map(|t| t.process(rate_hz)).collect::<Result<_, _>>()?;
     let composite = Composite::new(processes);
-    let labels = composite.labels();
-    let labelled = |test: fn(&Term) -> bool| {
-        terms.iter().zip(&labels).filter(|(t, _)| test(t)).map(|(_, label)| label.clone()).collect()
-    };
+    let those = |test: fn(&Term) -> bool| (0..terms.len()).filter(|i| test(&terms[*i])).collect();
     let agreeing = |cost: f64| cost <= best.cost * (1.0 + 1e-6) + f64::EPSILON * f64::EPSILON;
     Ok(Fit {
         objective: best.cost * unit,
@@ -46,9 +41,9 @@ pub(super) fn assemble(
         starts: found.ends.len(),
         agreeing: found.ends.iter().filter(|e| agreeing(e.cost)).count(),
         runner_up: found.ends.iter().find(|e| !agreeing(e.cost)).map(|e| e.cost * unit),
-        zero: labelled(|t| t.amplitude <= 0.0),
-        at_end: labelled(|t| t.amplitude > 0.0 && t.at_end),
-        bounded: terms.iter().zip(&labels).flat_map(|(t, label)| t.bounded(label, rate_hz)).collect(),
+        zero: those(|t| t.amplitude <= 0.0),
+        at_end: those(|t| t.amplitude > 0.0 && t.at_end),
+        bounded: terms.iter().enumerate().flat_map(|(process, t)| t.bounded(process, rate_hz)).collect(),
         minima: minima(found),
         weighted_for: Vec::new(),
         mixing: None,
@@ -105,15 +100,8 @@ fn terms(objective: &Objective, coordinates: &[f64], amplitudes: &[f64]) -> Vec<
 impl Term {
     fn process(&self, rate_hz: f64) -> Result<Process, ParameterError> {
         let (amplitude, shape) = self.values(rate_hz);
-        Ok(match self.kind {
-            Kind::White => Process::White(White::new(amplitude)?),
-            Kind::Quantization => Process::Quantization(Quantization::new(amplitude)?),
-            Kind::Ar1 => Process::Ar1(Ar1::new(shape, amplitude)?),
-            Kind::GaussMarkov => Process::GaussMarkov(GaussMarkov::new(shape, amplitude, rate_hz)?),
-            Kind::Ma1 => Process::Ma1(Ma1::new(shape, amplitude)?),
-            Kind::RandomWalk => Process::RandomWalk(RandomWalk::new(amplitude)?),
-            Kind::Drift => Process::Drift(Drift::new(amplitude)?),
-        })
+        let values = if self.kind.shape().is_some() { vec![shape, amplitude] } else { vec![amplitude] };
+        self.kind.process(&values, rate_hz).expect("as many values as the kind has parameters")
     }
 
     /// Amplitude and shape in the units of the parameters; on a bound, the bound as it was given.
@@ -129,8 +117,8 @@ impl Term {
         (at_bound(amplitude, self.limits.amplitude, amplitude), at_bound(shape, limits, scale))
     }
 
-    /// The parameters that lie on a bound given, in words; those that are fixed have nowhere else to be.
-    fn bounded(&self, label: &str, rate_hz: f64) -> Vec<String> {
+    /// The parameters that lie on a bound given; those that are fixed have nowhere else to be.
+    fn bounded(&self, process: usize, rate_hz: f64) -> Vec<ParameterRef> {
         let (amplitude, shape) = self.values(rate_hz);
         let on = |value: f64, (low, high): (f64, f64)| {
             low < high
@@ -139,14 +127,14 @@ impl Term {
         };
         let mut bounded = Vec::new();
         if on(amplitude, self.limits.amplitude) {
-            bounded.push(format!("{label} {} = {amplitude}", self.kind.amplitude_name()));
+            bounded.push(ParameterRef { process, parameter: self.kind.amplitude() });
         }
         // What is not there has its shape anywhere.
-        if let (Some(name), Some(limits)) = (self.kind.shape_name(), self.limits.shape)
+        if let (Some(parameter), Some(limits)) = (self.kind.shape(), self.limits.shape)
             && amplitude > 0.0
             && on(shape, limits)
         {
-            bounded.push(format!("{label} {name} = {shape}"));
+            bounded.push(ParameterRef { process, parameter });
         }
         bounded
     }

@@ -10,8 +10,7 @@
 use super::bounded::{Bounded, MOST, Matrix, Vector, cholesky_solve};
 use super::weighting::Weighting;
 use crate::curve::implied::Response;
-use crate::model::Kind;
-use crate::noise::{Ar1, Drift, GaussMarkov, Ma1, Quantization, RandomWalk, White};
+use crate::noise::{Ar1, Drift, GaussMarkov, Kind, Ma1, Quantization, RandomWalk, White};
 use crate::wavelet::{Curve, QuantizationResponse};
 use nalgebra::DMatrix;
 use std::sync::Arc;

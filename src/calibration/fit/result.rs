@@ -1,14 +1,14 @@
 //! A model fitted to a curve.
 
 use super::optimise::Termination;
-use crate::noise::{Composite, ParameterError};
+use crate::noise::{Composite, ParameterError, ParameterRef};
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
 /// A fitted model. That the iterations did not converge is told, not an error.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fit {
-    /// The model: processes in the order of [`Kind::ALL`], alike ones by ascending correlation time (or in the
+    /// The model: processes in the order of [`Kind::ALL`](crate::noise::Kind::ALL), alike ones by ascending correlation time (or in the
     /// order of their limits, if they have any).
     pub composite: Composite,
     /// Σ Omega_j (nu_j − nu_j(theta))² at theta.
@@ -23,12 +23,12 @@ pub struct Fit {
     pub agreeing: usize,
     /// The next best local minimum's objective, if there is one.
     pub runner_up: Option<f64>,
-    /// Labels of the processes whose amplitude is zero: not identifiable from this curve.
-    pub zero: Vec<String>,
-    /// Labels of the processes whose shape lies at the end of its range: not identifiable either.
-    pub at_end: Vec<String>,
-    /// Parameters on a bound that was given (not fixed), such as `AR1_1 phi = 0.99`.
-    pub bounded: Vec<String>,
+    /// The processes whose amplitude is zero: not identifiable from this curve.
+    pub zero: Vec<usize>,
+    /// The processes whose shape lies at the end of its range: not identifiable either.
+    pub at_end: Vec<usize>,
+    /// Parameters on a bound that was given (not fixed).
+    pub bounded: Vec<ParameterRef>,
     /// √Omega_j (nu_j − nu_j(theta)) of each scale; in standard deviations when weighted by edof. With the full
     /// covariance the scales are mixed so that these are uncorrelated.
     pub residuals: Vec<f64>,

@@ -1,107 +1,16 @@
 //! What a model is made of: "2*AR1+RW+WN+QN".
 
 use super::limits::{LimitError, Limits};
-use crate::noise::{Ar1, Drift, GaussMarkov, Ma1, Quantization, RandomWalk, White};
+use crate::noise::{Kind, ParameterRef, labels};
 use crate::wavelet::Curve;
 use std::fmt;
 use std::str::FromStr;
 
-/// A kind of process, as written in specifications.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Kind {
-    /// White noise.
-    White,
-    /// Quantization noise.
-    Quantization,
-    /// First-order autoregression.
-    Ar1,
-    /// First-order Gauss-Markov process.
-    GaussMarkov,
-    /// First-order moving average.
-    Ma1,
-    /// Random walk.
-    RandomWalk,
-    /// Drift.
-    Drift,
-}
-
-impl Kind {
-    /// All kinds, in the order in which models list them.
-    pub const ALL: [Self; 7] = [
-        Self::White,
-        Self::Quantization,
-        Self::Ar1,
-        Self::GaussMarkov,
-        Self::Ma1,
-        Self::RandomWalk,
-        Self::Drift,
-    ];
-
-    /// Code in model files and specifications.
-    #[must_use]
-    pub const fn code(self) -> &'static str {
-        match self {
-            Self::White => White::CODE,
-            Self::Quantization => Quantization::CODE,
-            Self::Ar1 => Ar1::CODE,
-            Self::GaussMarkov => GaussMarkov::CODE,
-            Self::Ma1 => Ma1::CODE,
-            Self::RandomWalk => RandomWalk::CODE,
-            Self::Drift => Drift::CODE,
-        }
-    }
-
-    /// Whether its wavelet variance depends on more than an amplitude.
-    #[must_use]
-    pub const fn has_shape(self) -> bool {
-        matches!(self, Self::Ar1 | Self::GaussMarkov | Self::Ma1)
-    }
-
-    /// How many parameters it has.
-    #[must_use]
-    pub const fn parameters(self) -> usize {
-        1 + self.has_shape() as usize
-    }
-
-    /// Name of the parameter its wavelet variance grows with.
-    #[must_use]
-    pub const fn amplitude_name(self) -> &'static str {
-        match self {
-            Self::White | Self::Ar1 | Self::Ma1 => "sigma2",
-            Self::Quantization => "q2",
-            Self::GaussMarkov => "s2",
-            Self::RandomWalk => "gamma2",
-            Self::Drift => "slope",
-        }
-    }
-
-    /// Name of the parameter that gives its shape, and where that can be.
-    #[must_use]
-    pub const fn shape_name(self) -> Option<&'static str> {
-        match self {
-            Self::Ar1 => Some("phi"),
-            Self::GaussMarkov => Some("beta"),
-            Self::Ma1 => Some("theta"),
-            _ => None,
-        }
-    }
-
-    /// Whether a shape can be there, and where it can be in words.
-    fn shape_domain(self, value: f64) -> (bool, &'static str) {
-        match self {
-            // The search is over positive correlations.
-            Self::Ar1 => (value > 0.0 && value < 1.0, "between 0 and 1"),
-            Self::GaussMarkov => ((1e-100..=1e100).contains(&value), "a number from 1e-100 to 1e100 (1/s)"),
-            _ => ((-1.0..=1.0).contains(&value), "between -1 and 1"),
-        }
-    }
-
-    /// How many of it a model may have.
-    const fn most(self) -> usize {
-        match self {
-            Self::Ar1 | Self::GaussMarkov => MOST_SHAPES,
-            _ => 1,
-        }
+/// How many of a kind a model may have.
+const fn most(kind: Kind) -> usize {
+    match kind {
+        Kind::Ar1 | Kind::GaussMarkov => MOST_SHAPES,
+        _ => 1,
     }
 }
 
@@ -181,19 +90,14 @@ impl ModelSpec {
     /// Labels of the processes, as those of a fitted model: `WN`, `AR1_1`, `AR1_2`, …
     #[must_use]
     pub fn labels(&self) -> Vec<String> {
-        let count = |kinds: &[Kind], kind: Kind| kinds.iter().filter(|k| **k == kind).count();
-        let label = |(i, kind): (usize, &Kind)| match count(&self.kinds, *kind) {
-            1 => kind.code().to_owned(),
-            _ => format!("{}_{}", kind.code(), count(&self.kinds[..=i], *kind)),
-        };
-        self.kinds.iter().enumerate().map(label).collect()
+        labels(&self.kinds)
     }
 
     /// Names of the parameters of the process of that label; none of one that is not there.
     #[must_use]
     pub fn parameter_names(&self, label: &str) -> Vec<&'static str> {
         let kind = self.labels().iter().position(|l| l == label).map(|i| self.kinds[i]);
-        kind.map_or(Vec::new(), |k| k.shape_name().into_iter().chain([k.amplitude_name()]).collect())
+        kind.map_or(Vec::new(), names)
     }
 
     /// Restricts a parameter of the process of that label (`WN`, `AR1`, or `AR1_2` of several) to `low` … `high`;
@@ -211,21 +115,11 @@ impl ModelSpec {
         low: Option<f64>,
         high: Option<f64>,
     ) -> Result<(), LimitError> {
-        let labels = self.labels();
-        let Some(index) = labels.iter().position(|l| l == process) else {
-            let (spec, process) = (self.to_string(), process.to_owned());
-            return Err(LimitError::Process { spec, process, legal: labels });
-        };
-        let kind = self.kinds()[index];
-        let is_amplitude = parameter == kind.amplitude_name();
-        if !is_amplitude && kind.shape_name() != Some(parameter) {
-            let (process, parameter) = (process.to_owned(), parameter.to_owned());
-            let legal = kind.shape_name().into_iter().chain([kind.amplitude_name()]).collect();
-            return Err(LimitError::Parameter { process, parameter, legal });
-        }
+        let ParameterRef { process: index, parameter: named } = self.parameter(process, parameter)?;
+        let kind = self.kinds[index];
         for value in [low, high].into_iter().flatten() {
             let amplitude = ((0.0..=Curve::WV_RANGE.1).contains(&value), "a number from 0 to 1e100");
-            let (inside, domain) = if is_amplitude { amplitude } else { kind.shape_domain(value) };
+            let (inside, domain) = if named.is_shape() { shape_domain(kind, value) } else { amplitude };
             if !inside {
                 let (process, parameter) = (process.to_owned(), parameter.to_owned());
                 return Err(LimitError::Domain { process, parameter, value, domain });
@@ -237,27 +131,47 @@ impl ModelSpec {
             return Err(LimitError::Empty { process, parameter, low: from, high: to });
         }
         let limits = &mut self.limits[index];
-        if is_amplitude {
-            limits.amplitude = (from.max(0.0), to);
-        } else {
+        if named.is_shape() {
             limits.shape = Some((from, to));
+        } else {
+            limits.amplitude = (from.max(0.0), to);
         }
         Ok(())
     }
 
-    /// Where a parameter of the process at an index may be, by what was given.
-    pub(crate) fn range(&self, index: usize, parameter: &str) -> (f64, f64) {
-        let (kind, limits) = (self.kinds[index], self.limits[index]);
-        if parameter == kind.amplitude_name() {
-            limits.amplitude
-        } else {
-            limits.shape.unwrap_or((f64::NEG_INFINITY, f64::INFINITY))
+    /// The parameter of that name of the process of that label.
+    ///
+    /// # Errors
+    /// When there is no such process or parameter.
+    pub fn parameter(&self, process: &str, parameter: &str) -> Result<ParameterRef, LimitError> {
+        let labels = self.labels();
+        let Some(index) = labels.iter().position(|l| l == process) else {
+            let (spec, process) = (self.to_string(), process.to_owned());
+            return Err(LimitError::Process { spec, process, legal: labels });
+        };
+        let kind = self.kinds[index];
+        match kind.parameters().iter().find(|p| p.name() == parameter) {
+            Some(named) => Ok(ParameterRef { process: index, parameter: *named }),
+            None => {
+                let (process, parameter) = (process.to_owned(), parameter.to_owned());
+                Err(LimitError::Parameter { process, parameter, legal: names(kind) })
+            }
         }
     }
 
-    /// Whether a parameter of the process at an index has one value only.
-    pub(crate) fn is_fixed(&self, index: usize, parameter: &str) -> bool {
-        let (low, high) = self.range(index, parameter);
+    /// Where a parameter may be, by what was given.
+    pub(crate) fn range(&self, of: ParameterRef) -> (f64, f64) {
+        let limits = self.limits[of.process];
+        if of.parameter.is_shape() {
+            limits.shape.unwrap_or((f64::NEG_INFINITY, f64::INFINITY))
+        } else {
+            limits.amplitude
+        }
+    }
+
+    /// Whether a parameter has one value only.
+    pub(crate) fn is_fixed(&self, of: ParameterRef) -> bool {
+        let (low, high) = self.range(of);
         low >= high
     }
 
@@ -294,7 +208,7 @@ impl ModelSpec {
     pub fn parameters(&self) -> usize {
         let fixed = |(low, high): (f64, f64)| usize::from(low >= high);
         let free = |(kind, limits): (&Kind, &Limits)| {
-            kind.parameters() - fixed(limits.amplitude) - limits.shape.map_or(0, fixed)
+            kind.parameters().len() - fixed(limits.amplitude) - limits.shape.map_or(0, fixed)
         };
         self.kinds.iter().zip(&self.limits).map(free).sum()
     }
@@ -325,6 +239,20 @@ impl FromStr for ModelSpec {
     }
 }
 
+fn names(kind: Kind) -> Vec<&'static str> {
+    kind.parameters().iter().map(|p| p.name()).collect()
+}
+
+/// Whether a shape can be there, and where it can be in words.
+fn shape_domain(kind: Kind, value: f64) -> (bool, &'static str) {
+    match kind {
+        // The search is over positive correlations.
+        Kind::Ar1 => (value > 0.0 && value < 1.0, "between 0 and 1"),
+        Kind::GaussMarkov => ((1e-100..=1e100).contains(&value), "a number from 1e-100 to 1e100 (1/s)"),
+        _ => ((-1.0..=1.0).contains(&value), "between -1 and 1"),
+    }
+}
+
 fn parse_count(spec: &str, count: &str) -> Result<usize, SpecError> {
     match count.parse() {
         Ok(n) if (1..=99).contains(&n) => Ok(n),
@@ -338,8 +266,8 @@ fn named(spec: &str, name: &str) -> Result<Vec<Kind>, SpecError> {
         "" => Err(SpecError::Empty(spec.into())),
         "N1" => Ok(ModelSpec::n1().kinds),
         "N2" => Ok(ModelSpec::n2().kinds),
-        code => match Kind::ALL.iter().find(|k| k.code() == code) {
-            Some(kind) => Ok(vec![*kind]),
+        code => match Kind::named(code) {
+            Some(kind) => Ok(vec![kind]),
             None => Err(SpecError::Unknown { spec: spec.into(), term: name.into() }),
         },
     }
@@ -348,11 +276,11 @@ fn named(spec: &str, name: &str) -> Result<Vec<Kind>, SpecError> {
 fn check(spec: &str, kinds: &[Kind]) -> Result<(), SpecError> {
     for kind in Kind::ALL {
         let count = kinds.iter().filter(|k| **k == kind).count();
-        if count > 1 && kind.most() == 1 {
+        if count > 1 && most(kind) == 1 {
             return Err(SpecError::Repeated { spec: spec.into(), code: kind.code(), count });
         }
     }
-    let count = kinds.iter().filter(|k| k.has_shape()).count();
+    let count = kinds.iter().filter(|k| k.shape().is_some()).count();
     if count > MOST_SHAPES {
         return Err(SpecError::TooMany { spec: spec.into(), count });
     }

@@ -1,7 +1,7 @@
 //! How sure a fit is: the results.
 
 use crate::model::ModelSpec;
-use crate::noise::Composite;
+use crate::noise::{Composite, ParameterRef};
 
 /// How to draw.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,10 +46,8 @@ pub struct LevelSpread {
 /// The 95 % interval of one parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterInterval {
-    /// Label of the process.
-    pub process: String,
-    /// Name of the parameter.
-    pub parameter: &'static str,
+    /// The parameter.
+    pub of: ParameterRef,
     /// Lower end (units of the parameter); NaN where the draws do not determine it.
     pub low: f64,
     /// Upper end (units of the parameter); NaN where the draws do not determine it.
@@ -76,8 +74,8 @@ pub enum Undetermined {
     BeyondSearch,
     /// The draws leave the amplitude of its process open by more than a factor of 100: in some of them it all but vanishes.
     Open,
-    /// Alike processes of these labels cannot be told apart.
-    Indistinct(Vec<String>),
+    /// These processes, which are alike, cannot be told apart.
+    Indistinct(Vec<usize>),
 }
 
 /// The test of over-identifying restrictions. Its statistic is the least Σ Omega_j (nu_j − nu_j(theta))²; what it
@@ -109,8 +107,8 @@ impl Goodness {
 /// Processes of one kind that cannot be told apart.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Indistinct {
-    /// Their labels.
-    pub labels: Vec<String>,
+    /// Their positions in the model.
+    pub processes: Vec<usize>,
     /// The model with one of them less, which describes the curve as well.
     pub spec: ModelSpec,
     /// Its parameters.

@@ -13,7 +13,8 @@
 
 use crate::curve::{Estimator, Group, implied};
 use crate::fit::{Fit, FitError, Weighting, fit, refit};
-use crate::model::{Kind, ModelSpec};
+use crate::model::ModelSpec;
+use crate::noise::Kind;
 use crate::outcome::{Candidate, Ranking, Settings, TooSimple};
 use crate::rng::StreamKey;
 use crate::uncertainty::bootstrap::CurveSampler;

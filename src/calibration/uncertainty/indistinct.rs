@@ -8,7 +8,8 @@
 use super::bootstrap::CurveSampler;
 use crate::curve::{Estimator, Group};
 use crate::fit::{Fit, refit};
-use crate::model::{Kind, Limits, ModelSpec};
+use crate::model::{Limits, ModelSpec};
+use crate::noise::{Kind, ParameterRef};
 use crate::outcome::{Indistinct, Outcome, ParameterInterval, Settings, Undetermined};
 use crate::rng::StreamKey;
 use rayon::prelude::*;
@@ -21,13 +22,13 @@ const STAGES: [usize; 3] = [19, 99, 199];
 /// Seed of the draws: a test is an answer, the same each time.
 const SEED: u64 = 1;
 
-/// The simpler model, if there is one that the data do not tell from this, as an outcome; with the labels of what cannot be
+/// The simpler model, if there is one that the data do not tell from this, as an outcome; with the processes that cannot be
 /// told apart and the probability of the gain.
 pub(crate) fn simpler(
     group: &Group,
     outcome: &Outcome,
     settings: &Settings,
-) -> Option<(Outcome, Vec<String>, f64)> {
+) -> Option<(Outcome, Vec<usize>, f64)> {
     if outcome.estimator == Estimator::Avlr {
         return None;
     }
@@ -43,8 +44,7 @@ pub(crate) fn simpler(
         let fit = again(outcome, &less, &outcome.curve, settings, None)?;
         let simple = Outcome { spec: less, fit, ..outcome.clone() };
         let p_value = probability(group, outcome, &simple, settings);
-        let labels = spec.labels();
-        (p_value > LEVEL).then(|| (simple, own.iter().map(|i| labels[*i].clone()).collect(), p_value))
+        (p_value > LEVEL).then_some((simple, own, p_value))
     })
 }
 
@@ -92,21 +92,21 @@ fn probability(group: &Group, outcome: &Outcome, simple: &Outcome, settings: &Se
 impl Indistinct {
     /// The intervals of the larger model: none of those that cannot be told apart, the simpler model's of the others.
     pub(crate) fn adopt(&self, outcome: &Outcome, intervals: &mut [ParameterInterval]) {
-        let larger = &outcome.fit.composite;
-        let values: Vec<(String, &'static str, f64)> = (larger.processes.iter().zip(larger.labels()))
-            .flat_map(|(p, label)| p.parameters().into_iter().map(move |(n, v)| (label.clone(), n, v)))
-            .collect();
+        let removed = self.processes.last().copied().unwrap_or(usize::MAX);
         for interval in intervals {
-            if self.labels.contains(&interval.process) {
+            let ParameterRef { process, parameter } = interval.of;
+            if self.processes.contains(&process) {
                 interval.standard_error = f64::NAN;
-                interval.refuse(Undetermined::Indistinct(self.labels.clone()));
+                interval.refuse(Undetermined::Indistinct(self.processes.clone()));
                 continue;
             }
-            let same =
-                |i: &&ParameterInterval| i.parameter == interval.parameter && i.process == interval.process;
-            let value = values.iter().find(|(l, n, _)| *l == interval.process && *n == interval.parameter);
-            if let (Some(found), Some((_, _, value))) = (self.intervals.iter().find(same), value) {
-                interval.replace(found, *value);
+            // The simpler model is this one without the last of those that are alike.
+            let there = ParameterRef { process: process - usize::from(process > removed), parameter };
+            let mut values = outcome.fit.composite.parameters();
+            let value = values.find(|(of, _)| *of == interval.of).map(|(_, value)| value);
+            let found = self.intervals.iter().find(|i| i.of == there);
+            if let (Some(found), Some(value)) = (found, value) {
+                interval.replace(found, value);
             }
         }
     }
@@ -115,6 +115,7 @@ impl Indistinct {
 #[cfg(test)]
 mod tests {
     use crate::imu::{Axis, Channel, Sensor};
+    use crate::noise::{Parameter, ParameterRef};
     use crate::rng::StreamKey;
     use crate::wavelet::{Convention, Tuning, classical};
     use crate::*;
@@ -187,16 +188,16 @@ mod tests {
                 inference.indistinct.is_some(),
                 outcome.notes.iter().any(|n| n.contains("cannot be told"))
             );
-            for (label, phi) in ["AR1_1", "AR1_2"].into_iter().zip(phis) {
-                for (parameter, value) in [("phi", phi), ("sigma2", 1.0 - phi * phi)] {
-                    let own = |i: &&ParameterInterval| i.process == label && i.parameter == parameter;
+            for (process, phi) in [1, 2].into_iter().zip(phis) {
+                for (parameter, value) in [(Parameter::Phi, phi), (Parameter::Sigma2, 1.0 - phi * phi)] {
+                    let own = |i: &&ParameterInterval| i.of == ParameterRef { process, parameter };
                     let interval = inference.intervals.iter().find(own).unwrap();
                     if interval.absent.is_some() {
                         continue;
                     }
                     there += 1;
                     held += u32::from(interval.low < value && value < interval.high);
-                    let scale = |end: f64| if parameter == "phi" { -1.0 / end.ln() } else { end };
+                    let scale = |end: f64| if parameter == Parameter::Phi { -1.0 / end.ln() } else { end };
                     let (low, high) = (scale(interval.low), scale(interval.high));
                     widest = widest.max(high / low);
                 }
@@ -216,9 +217,9 @@ mod tests {
             let Some(one) = inference.indistinct else { continue };
             assert_eq!(one.spec.to_string(), "WN+AR1");
             for (held, (parameter, value)) in
-                held.iter_mut().zip([("phi", phi), ("sigma2", 2.0 * (1.0 - phi * phi))])
+                held.iter_mut().zip([(Parameter::Phi, phi), (Parameter::Sigma2, 2.0 * (1.0 - phi * phi))])
             {
-                let interval = one.intervals.iter().find(|i| i.process == "AR1" && i.parameter == parameter);
+                let interval = one.intervals.iter().find(|i| i.of == ParameterRef { process: 1, parameter });
                 *held += u32::from(interval.is_some_and(|i| i.low < value && value < i.high));
             }
         }

@@ -29,10 +29,10 @@ pub(crate) fn inference(
     bootstrap: Bootstrap,
 ) -> Inference {
     let mut own = by_bootstrap(group, outcome, settings, bootstrap);
-    if let Some((simple, labels, p_value)) = simpler(group, outcome, settings) {
+    if let Some((simple, processes, p_value)) = simpler(group, outcome, settings) {
         let intervals = inference(group, &simple, settings, bootstrap).intervals;
         let Outcome { spec, fit: Fit { composite, .. }, .. } = simple;
-        let indistinct = Indistinct { labels, spec, composite, p_value, intervals };
+        let indistinct = Indistinct { processes, spec, composite, p_value, intervals };
         indistinct.adopt(outcome, &mut own.intervals);
         own.indistinct = Some(indistinct);
     }

@@ -2,7 +2,7 @@
 
 use crate::fit::{Fit, Range, correlated};
 use crate::model::{Limits, ModelSpec};
-use crate::noise::Process;
+use crate::noise::{Parameter, ParameterRef, Process};
 use crate::outcome::{Outcome, ParameterInterval, Undetermined};
 
 impl ParameterInterval {
@@ -30,27 +30,28 @@ pub(crate) fn intervals(
     standard_errors: &[f64],
 ) -> Vec<ParameterInterval> {
     let (model, spec) = (&outcome.fit.composite, &outcome.spec);
-    let zero = &outcome.fit.zero;
     let searched = correlated(&outcome.curve);
     let matched: Vec<Vec<Option<&Process>>> =
         fits.iter().map(|fit| matched(&outcome.fit, spec, fit)).collect();
     let mut intervals = Vec::new();
-    for (i, (process, label)) in model.processes.iter().zip(model.labels()).enumerate() {
+    for (i, process) in model.processes.iter().enumerate() {
         let there: Vec<&Process> = matched.iter().filter_map(|m| m[i]).collect();
-        let lost = if zero.contains(&label) { 1.0 } else { 1.0 - there.len() as f64 / fits.len() as f64 };
+        let is_zero = outcome.fit.zero.contains(&i);
+        let lost = if is_zero { 1.0 } else { 1.0 - there.len() as f64 / fits.len() as f64 };
         let first = intervals.len();
-        for (p, (parameter, value)) in process.parameters().into_iter().enumerate() {
-            if spec.is_fixed(i, parameter) {
+        for (p, (&parameter, value)) in process.kind().parameters().iter().zip(process.values()).enumerate() {
+            let of = ParameterRef { process: i, parameter };
+            if spec.is_fixed(of) {
                 continue;
             }
-            let drawn = there.iter().map(|process| process.parameters()[p].1).collect();
+            let drawn = there.iter().map(|process| process.values()[p]).collect();
             let [low, high] = match lost {
                 // The quantile is that of what has vanished.
                 lost if lost > TAIL => [f64::NAN; 2],
                 _ => holding(value, interval(parameter, value, drawn, stretch)),
             };
             // The intervals of a parameter that is bounded end there.
-            let (from, to) = spec.range(i, parameter);
+            let (from, to) = spec.range(of);
             let [low, high] = [low, high].map(|end: f64| end.clamp(from, to));
             let absent = match lost {
                 1.0.. => Some(Undetermined::Zero),
@@ -58,8 +59,7 @@ pub(crate) fn intervals(
                 _ => low.is_nan().then_some(Undetermined::OneSided),
             };
             let standard_error = standard_errors[intervals.len()];
-            let process = label.clone();
-            intervals.push(ParameterInterval { process, parameter, low, high, lost, absent, standard_error });
+            intervals.push(ParameterInterval { of, low, high, lost, absent, standard_error });
         }
         let own = &mut intervals[first..];
         if spec.limits()[i].shape.is_none() && own.iter().any(|i| leaves_search(searched, process, i)) {
@@ -67,8 +67,7 @@ pub(crate) fn intervals(
         }
         // With its amplitude the shape is lost too.
         let open = |i: &ParameterInterval| {
-            let amplitude = !matches!(i.parameter, "phi" | "beta" | "theta");
-            amplitude && i.absent.is_none() && i.high > i.low * WIDEST.powf(stretch.min(2.0))
+            !i.of.parameter.is_shape() && i.absent.is_none() && i.high > i.low * WIDEST.powf(stretch.min(2.0))
         };
         if own.iter().any(open) {
             own.iter_mut().for_each(|i| i.refuse(Undetermined::Open));
@@ -83,9 +82,9 @@ pub(crate) const WIDEST: f64 = 100.0;
 
 /// Whether an interval of a correlation time ends where nothing was sought: by the draws it may be any.
 fn leaves_search(searched: Range, process: &Process, interval: &ParameterInterval) -> bool {
-    let kappa = |end: f64| match (process, interval.parameter) {
-        (Process::Ar1(_), "phi") => Some(-end.ln()),
-        (Process::GaussMarkov(p), "beta") => Some(end / p.rate_hz()),
+    let kappa = |end: f64| match (process, interval.of.parameter) {
+        (Process::Ar1(_), Parameter::Phi) => Some(-end.ln()),
+        (Process::GaussMarkov(p), Parameter::Beta) => Some(end / p.rate_hz()),
         _ => None,
     };
     // Ends beyond by rounding are not beyond.
@@ -103,9 +102,8 @@ fn holding(value: f64, [low, high]: [f64; 2]) -> [f64; 2] {
 /// their correlation times: those that are there, in the draw and in the model, keep their order, and so many of
 /// them are paired as can be, the nearest.
 fn matched<'a>(estimate: &Fit, spec: &ModelSpec, fit: &'a Fit) -> Vec<Option<&'a Process>> {
-    let labels = fit.composite.labels();
     let (drawn, model) = (&fit.composite.processes, &estimate.composite.processes);
-    let there = |fit: &Fit, i: usize| !fit.zero.contains(&labels[i]) && !fit.at_end.contains(&labels[i]);
+    let there = |fit: &Fit, i: usize| !fit.zero.contains(&i) && !fit.at_end.contains(&i);
     let kinds = spec.kinds();
     let cost = |i: usize, d: usize| (log_time(&model[i]) - log_time(&drawn[d])).powi(2);
     let mut matched = vec![None; drawn.len()];
@@ -158,15 +156,15 @@ fn log_time(process: &Process) -> f64 {
 /// is a chi-square; the same as the quantiles themselves where the draws are symmetric in the logarithm); theta
 /// of MA1 likewise with differences. The distances of the quantiles from the median are multiplied by `stretch`. Where
 /// the estimate or a quantile is at the bound, 0, the ends are the quantiles themselves.
-fn interval(parameter: &str, estimate: f64, drawn: Vec<f64>, stretch: f64) -> [f64; 2] {
+fn interval(parameter: Parameter, estimate: f64, drawn: Vec<f64>, stretch: f64) -> [f64; 2] {
     let scale = |value: f64| match parameter {
-        "phi" => (-value.ln()).ln(),
-        "theta" => value,
+        Parameter::Phi => (-value.ln()).ln(),
+        Parameter::Theta => value,
         _ => value.ln(),
     };
     let back = |scaled: f64| match parameter {
-        "phi" => (-scaled.exp()).exp(),
-        "theta" => scaled.clamp(-1.0, 1.0),
+        Parameter::Phi => (-scaled.exp()).exp(),
+        Parameter::Theta => scaled.clamp(-1.0, 1.0),
         _ => scaled.exp(),
     };
     let mut sorted = drawn;
@@ -232,7 +230,7 @@ mod tests {
         let whole = |factor: f64| of(vec![ar1(10.0, factor), ar1(1000.0, factor)]).fit;
         // The one that is not there has a time beyond the other's: by order it is the second.
         let mut lost = of(vec![ar1(700.0, 1.1), ar1(5000.0, 0.0)]).fit;
-        lost.zero = vec!["AR1_2".to_owned()];
+        lost.zero = vec![1];
         let matched = matched(&outcome.fit, &outcome.spec, &lost);
         assert!(matched[0].is_none() && matched[1].unwrap() == &lost.composite.processes[0]);
         let draws = |lost_ones: usize| -> Vec<Fit> {
@@ -242,7 +240,7 @@ mod tests {
         let all = intervals(&outcome, &draws(2), 1.0, &[f64::NAN; 4]);
         assert!(all.iter().all(|i| i.absent.is_none()), "{all:?}");
         let all = intervals(&outcome, &draws(10), 1.0, &[f64::NAN; 4]);
-        let text = undetermined(&all[0]).unwrap();
+        let text = undetermined(&all[0], &outcome.fit.composite.labels()).unwrap();
         assert_eq!(text, "AR1_1 phi: no interval, not determined: AR1_1 vanishes in 10 % of the draws");
         assert!(
             all[0].low.is_nan() && all[2].lost == 0.0 && all[3].low < 1.0 && all[3].high > 1.0,
@@ -264,13 +262,13 @@ mod tests {
         let mut generator = StreamKey { seed: 1, scenario: "", run: 0, source: "", process: "" }.generator();
         let law = ChiSquared::new(8.0).unwrap();
         let drawn = (0..4000).map(|_| 3.0 * generator.sample(law) / 8.0).collect();
-        let [low, high] = interval("sigma2", 3.0, drawn, 1.0);
+        let [low, high] = interval(Parameter::Sigma2, 3.0, drawn, 1.0);
         assert!(
             (low / (24.0 / 17.53) - 1.0).abs() < 0.064 && (high / (24.0 / 2.18) - 1.0).abs() < 0.125,
             "{low} {high}"
         );
-        assert_eq!(interval("sigma2", 0.0, vec![0.0, 0.0, 1.0], 1.0), [0.0, 1.0]);
-        let [low, high] = interval("phi", 0.9, vec![0.85, 0.9, 0.93], 1.0);
+        assert_eq!(interval(Parameter::Sigma2, 0.0, vec![0.0, 0.0, 1.0], 1.0), [0.0, 1.0]);
+        let [low, high] = interval(Parameter::Phi, 0.9, vec![0.85, 0.9, 0.93], 1.0);
         assert!(0.0 < low && low < 0.9 && 0.9 < high && high < 1.0, "{low} {high}");
     }
 }

@@ -14,19 +14,16 @@ use nalgebra::DMatrix;
 pub(crate) fn standard_errors(outcome: &Outcome, settings: &Settings, covariance: &DMatrix<f64>) -> Vec<f64> {
     let (fit, spec, curve) = (&outcome.fit, &outcome.spec, &outcome.curve);
     let least_squares = outcome.estimator != Estimator::Avlr;
-    let parameters = fit.composite.processes.iter().zip(fit.composite.labels()).enumerate();
     // Of each parameter: whether it is fixed, whether it moves, and its value.
-    let all: Vec<(bool, bool, f64)> = parameters
-        .flat_map(|(i, (process, label))| {
-            let stands = fit.zero.contains(&label);
-            let of = move |(name, value): (&'static str, f64)| {
-                let known = format!("{label} {name}");
-                let at_bound = fit.bounded.iter().any(|text| text.starts_with(&known))
-                    || (fit.at_end.contains(&label) && name != spec.kinds()[i].amplitude_name());
-                let fixed = spec.is_fixed(i, name);
-                (fixed, least_squares && !(fixed || stands || at_bound), value)
-            };
-            process.parameters().into_iter().map(of)
+    let all: Vec<(bool, bool, f64)> = fit
+        .composite
+        .parameters()
+        .map(|(of, value)| {
+            let stands = fit.zero.contains(&of.process);
+            let at_bound =
+                fit.bounded.contains(&of) || (fit.at_end.contains(&of.process) && of.parameter.is_shape());
+            let fixed = spec.is_fixed(of);
+            (fixed, least_squares && !(fixed || stands || at_bound), value)
         })
         .collect();
     let moving: Vec<usize> = (0..all.len()).filter(|p| all[*p].1).collect();

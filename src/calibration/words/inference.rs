@@ -11,9 +11,9 @@ const FACTOR: f64 = 3.0;
 /// interval.
 pub(crate) fn notes_of_inference(outcome: &Outcome) -> Vec<String> {
     let Some(inference) = &outcome.inference else { return Vec::new() };
+    let labels = outcome.fit.composite.labels();
     let wide = |i: &&ParameterInterval| {
-        let shape = matches!(i.parameter, "phi" | "beta" | "theta");
-        !shape && i.absent.is_none() && i.high > FACTOR * FACTOR * i.low
+        !i.of.parameter.is_shape() && i.absent.is_none() && i.high > FACTOR * FACTOR * i.low
     };
     let remark = |i: &ParameterInterval| {
         let known = if i.low > 0.0 {
@@ -21,16 +21,17 @@ pub(crate) fn notes_of_inference(outcome: &Outcome) -> Vec<String> {
         } else {
             "may be zero".to_owned()
         };
-        format!("{} {} is {known} (95 %): weakly identifiable", i.process, i.parameter)
+        format!("{} is {known} (95 %): weakly identifiable", outcome.fit.composite.name_of(i.of))
     };
-    let apart = inference.indistinct.iter().map(note_of_indistinct);
+    let apart = inference.indistinct.iter().map(|i| note_of_indistinct(i, &labels));
     apart.chain(inference.intervals.iter().filter(wide).map(remark)).collect()
 }
 
-/// Why a parameter has no interval, if it has none.
+/// Why a parameter of a model with processes of these labels has no interval, if it has none.
 #[must_use]
-pub fn undetermined(interval: &ParameterInterval) -> Option<String> {
-    let ParameterInterval { process, parameter, lost, absent, .. } = interval;
+pub fn undetermined(interval: &ParameterInterval, labels: &[String]) -> Option<String> {
+    let ParameterInterval { of, lost, absent, .. } = interval;
+    let (process, parameter) = (&labels[of.process], of.parameter.name());
     let why = match absent.as_ref()? {
         Undetermined::Zero => format!("not determined: {process} is zero"),
         Undetermined::Vanishes => {
@@ -47,35 +48,31 @@ pub fn undetermined(interval: &ParameterInterval) -> Option<String> {
         Undetermined::Open => {
             format!("not determined: the data leave {process} open by more than a factor of {WIDEST}")
         }
-        Undetermined::Indistinct(labels) => {
-            format!("not determined: {} cannot be told apart", labels.join(" and "))
+        Undetermined::Indistinct(alike) => {
+            format!("not determined: {} cannot be told apart", joined(alike, labels))
         }
     };
     Some(format!("{process} {parameter}: no interval, {why}"))
 }
 
-/// What cannot be told apart, and what is known instead.
-#[must_use]
-pub fn note_of_indistinct(indistinct: &Indistinct) -> String {
-    let code = indistinct.labels[0].split('_').next().unwrap_or_default();
-    let alone = indistinct.composite.processes.iter().zip(indistinct.composite.labels());
-    let own = alone.filter(|(process, _)| process.code() == code);
-    let of = |label: &str, name: &str, value: f64| {
-        let interval = indistinct.intervals.iter().find(|i| i.process == label && i.parameter == name);
-        let ends = interval.filter(|i| i.absent.is_none());
-        let ends = ends.map_or(String::new(), |i| format!(" ({:.5e} … {:.5e})", i.low, i.high));
-        format!("{name} = {value:.5e}{ends}")
-    };
-    let found: Vec<String> = own
-        .flat_map(|(p, l)| p.parameters().into_iter().map(move |(n, v)| (l.clone(), n, v)))
-        .map(|(label, name, value)| of(&label, name, value))
-        .collect();
+fn joined(processes: &[usize], labels: &[String]) -> String {
+    processes.iter().map(|i| labels[*i].as_str()).collect::<Vec<_>>().join(" and ")
+}
+
+/// What of a model with processes of these labels cannot be told apart, and what is known instead.
+fn note_of_indistinct(indistinct: &Indistinct, labels: &[String]) -> String {
+    let Indistinct { processes, spec, composite, p_value, intervals } = indistinct;
+    let kind = spec.kinds()[processes[0]];
+    let own = composite.parameters().filter(|(of, _)| composite.processes[of.process].kind() == kind);
+    let known = own.map(|(of, value)| {
+        let interval = intervals.iter().find(|i| i.of == of && i.absent.is_none());
+        let ends = interval.map_or(String::new(), |i| format!(" ({:.5e} … {:.5e})", i.low, i.high));
+        format!("{} = {value:.5e}{ends}", of.parameter.name())
+    });
     format!(
-        "{} cannot be told apart: {} describes the curve as well (p = {:.2}), with {}; the intervals of the other \
-             parameters are those of that model",
-        indistinct.labels.join(" and "),
-        indistinct.spec,
-        indistinct.p_value,
-        found.join(", ")
+        "{} cannot be told apart: {spec} describes the curve as well (p = {p_value:.2}), with {}; the intervals of the \
+         other parameters are those of that model",
+        joined(processes, labels),
+        known.collect::<Vec<_>>().join(", ")
     )
 }

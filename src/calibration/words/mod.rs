@@ -9,7 +9,7 @@ mod ranking;
 pub use diagnosis::{advice, effects};
 pub use format::{duration, percent};
 pub(crate) use inference::notes_of_inference;
-pub use inference::{note_of_indistinct, undetermined};
+pub use inference::undetermined;
 pub(crate) use notes::notes;
 pub use notes::{Share, correlation_time_s, shares};
 pub use ranking::reasons;

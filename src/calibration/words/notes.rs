@@ -55,7 +55,8 @@ pub(crate) fn notes(outcome: &Outcome, replicates: &[Replicate], rate_hz: f64) -
                 .to_owned(),
         );
     }
-    not_identifiable(*estimator == Estimator::Avlr, fit, curve, record_s, rate_hz, &mut notes);
+    at_ends(outcome, rate_hz, &mut notes);
+    beyond_the_scales(outcome, record_s, rate_hz, &mut notes);
     misfit(fit, curve, rate_hz, &mut notes);
     if estimator.is_robust() {
         robust_remarks(curve, replicates, &mut notes);
@@ -63,29 +64,26 @@ pub(crate) fn notes(outcome: &Outcome, replicates: &[Replicate], rate_hz: f64) -
     notes
 }
 
-fn not_identifiable(
-    slopes: bool,
-    fit: &Fit,
-    curve: &Curve,
-    record_s: f64,
-    rate_hz: f64,
-    notes: &mut Vec<String>,
-) {
-    for label in &fit.zero {
-        notes.push(if slopes {
+/// What stands at the end of where it may be.
+fn at_ends(outcome: &Outcome, rate_hz: f64, notes: &mut Vec<String>) {
+    let fit = &outcome.fit;
+    let labels = fit.composite.labels();
+    for label in fit.zero.iter().map(|i| &labels[*i]) {
+        notes.push(if outcome.estimator == Estimator::Avlr {
             format!("{label}: no such slope found where it could be the largest part")
         } else {
             format!("{label} is zero at the optimum: not identifiable from these data")
         });
     }
-    for bound in &fit.bounded {
-        notes.push(format!("{bound} is at the bound you gave; the data favour a value beyond it"));
+    for of in &fit.bounded {
+        let value = fit.composite.parameters().find(|(p, _)| p == of).map_or(f64::NAN, |(_, value)| value);
+        let name = fit.composite.name_of(*of);
+        notes.push(format!("{name} = {value} is at the bound you gave; the data favour a value beyond it"));
     }
-    for label in &fit.at_end {
-        let process = fit.composite.processes.iter().zip(fit.composite.labels()).find(|(_, l)| l == label);
-        let kappa =
-            process.and_then(|(p, _)| correlation_time_s(p, rate_hz)).map_or(0.0, |t| 1.0 / (t * rate_hz));
-        notes.push(if kappa > 1.0 {
+    for i in &fit.at_end {
+        let (process, label) = (&fit.composite.processes[*i], &labels[*i]);
+        let is_short = correlation_time_s(process, rate_hz).is_some_and(|t| 1.0 / (t * rate_hz) > 1.0);
+        notes.push(if is_short {
             format!(
                 "{label}: its correlation time is the shortest that is sought, a sixth of a sample (phi = e^-6): it is \
                  white noise by another name, and not identifiable from these data"
@@ -97,14 +95,19 @@ fn not_identifiable(
             )
         });
     }
-    let longest_s = curve.levels.last().map_or(0.0, |level| tau_s(*level, rate_hz));
+}
+
+/// What the scales there are tell little of.
+fn beyond_the_scales(outcome: &Outcome, record_s: f64, rate_hz: f64, notes: &mut Vec<String>) {
+    let (fit, levels) = (&outcome.fit, &outcome.curve.levels);
+    let last = levels.last().copied().unwrap_or(0);
+    let longest_s = levels.last().map_or(0.0, |level| tau_s(*level, rate_hz));
     let labels = fit.composite.labels();
-    let all = fit.composite.processes.iter().zip(&labels).zip(shares(&fit.composite, &curve.levels));
-    for ((process, label), share) in all {
-        if fit.zero.contains(label) || fit.at_end.contains(label) {
+    let all = fit.composite.processes.iter().zip(&labels).zip(shares(&fit.composite, levels));
+    for (i, ((process, label), share)) in all.enumerate() {
+        if fit.zero.contains(&i) || fit.at_end.contains(&i) {
             continue;
         }
-        let last = curve.levels.last().copied().unwrap_or(0);
         if matches!(process, Process::RandomWalk(_) | Process::Drift(_)) && share.leads == [last] {
             notes.push(format!(
                 "{label} dominates at the last scale only ({}), of which there are few independent values: a longer \
@@ -120,9 +123,10 @@ fn not_identifiable(
             ));
         }
         if PEAK * t_corr_s > longest_s {
-            let record = match record_s {
-                r if r > 0.0 => format!("the record is {}: ", duration(r)),
-                _ => String::new(),
+            let record = if record_s > 0.0 {
+                format!("the record is {}: ", duration(record_s))
+            } else {
+                String::new()
             };
             notes.push(format!(
                 "{record}{label}'s correlation time of {} is not identifiable from scales up to {}; there it looks \

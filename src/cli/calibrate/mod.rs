@@ -168,7 +168,7 @@ fn model(args: &Args) -> Result<ModelChoice, Failure> {
         return Ok(chosen);
     }
     let without = match &chosen {
-        ModelChoice::Given(spec) => spec.kinds().iter().find(|k| k.has_shape()).map(|k| k.code()),
+        ModelChoice::Given(spec) => spec.kinds().iter().find(|k| k.shape().is_some()).map(|k| k.code()),
         ModelChoice::Auto => Some("the AR1 of auto"),
     };
     match without {

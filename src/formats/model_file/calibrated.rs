@@ -76,11 +76,12 @@ impl CalibrationNote {
 }
 
 fn intervals(outcome: &Outcome, channel: Channel) -> Vec<Interval> {
+    let labels = outcome.fit.composite.labels();
     let all = outcome.inference.iter().flat_map(|i| &i.intervals).filter(|i| i.low.is_finite());
     all.map(|i| Interval {
         channel,
-        process: i.process.clone(),
-        parameter: i.parameter.to_owned(),
+        process: labels[i.of.process].clone(),
+        parameter: i.of.parameter.name().to_owned(),
         low: i.low,
         high: i.high,
     })
@@ -114,7 +115,9 @@ fn fit(outcome: &Outcome, settings: &Settings) -> Table {
             put("j_p_value", goodness.p_value.into());
         }
     }
-    let open = outcome.inference.iter().flat_map(|i| &i.intervals).filter_map(undetermined);
+    let labels = fit.composite.labels();
+    let intervals = outcome.inference.iter().flat_map(|i| &i.intervals);
+    let open = intervals.filter_map(|i| undetermined(i, &labels));
     put("notes", outcome.notes.iter().cloned().chain(open).collect::<Vec<_>>().into());
     table
 }

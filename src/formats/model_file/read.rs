@@ -5,9 +5,7 @@ use crate::formats::FileError;
 use crate::formats::suggest::nearest;
 use crate::formats::toml_file::{Section, Source};
 use crate::imu::{Axis, Channel, Sensor};
-use crate::noise::{
-    CATALOGUE, Composite, Law, Model, ParameterError, Process, Spread, SpreadError, Variation,
-};
+use crate::noise::{Composite, Kind, Law, Model, ParameterError, Process, Spread, SpreadError, Variation};
 use crate::sensors::defects::{MAX_BIAS_M_S2, MAX_BIAS_RAD_S};
 use std::path::Path;
 
@@ -127,23 +125,22 @@ fn read_processes(table: &Section<'_>, channel: Channel, file: &mut ModelFile) -
 
 fn read_process(section: &Section<'_>, rate_hz: f64) -> Result<Process, FileError> {
     let code = section.require_str("type")?;
-    let Some((code, names)) = CATALOGUE.iter().find(|(c, _)| *c == code) else {
-        let codes = || CATALOGUE.iter().map(|(c, _)| *c);
+    let Some(kind) = Kind::named(code) else {
+        let codes = || Kind::ALL.iter().map(|kind| kind.code());
         let hint = match nearest(code, codes()) {
             Some(meant) => format!("did you mean \"{meant}\"?"),
             None => format!("processes: {}", codes().collect::<Vec<_>>().join(", ")),
         };
         return Err(section.refuse("type", "is not a process", Some(hint)));
     };
+    let names: Vec<&str> = kind.parameters().iter().map(|p| p.name()).collect();
     let ci: Vec<String> = names.iter().map(|n| format!("{n}{CI}")).collect();
     let legal: Vec<&str> =
-        ["type"].iter().chain(*names).copied().chain(ci.iter().map(String::as_str)).collect();
+        ["type"].iter().chain(&names).copied().chain(ci.iter().map(String::as_str)).collect();
     section.only(&legal)?;
     let values = names.iter().map(|n| section.require_f64(n)).collect::<Result<Vec<_>, _>>()?;
-    match Process::from_values(code, &values, rate_hz) {
-        Some(process) => process.map_err(|e| refuse_parameter(section, &e)),
-        None => Err(section.refuse("type", "is not a process", None)),
-    }
+    let process = kind.process(&values, rate_hz).expect("as many values as the kind has parameters");
+    process.map_err(|e| refuse_parameter(section, &e))
 }
 
 fn refuse_parameter(section: &Section<'_>, e: &ParameterError) -> FileError {

@@ -162,7 +162,7 @@ fn wrong_keys_are_refused_with_what_was_meant() {
     assert_eq!(
         process_refusal("type = \"flicker\""),
         "m.toml, line 4: \"accel.processes[1].type\" = \"flicker\" is not a process | \
-         processes: WN, QN, AR1, RW, DR, GM, MA1"
+         processes: WN, QN, AR1, GM, MA1, RW, DR"
     );
     assert_eq!(
         process_refusal("sigma2 = 1"),

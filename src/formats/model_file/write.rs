@@ -80,7 +80,12 @@ fn processes(file: &ModelFile, channel: Channel) -> Option<String> {
     for (process, label) in noise.processes.iter().zip(noise.labels()) {
         let own = |i: &&Interval| i.channel == channel && i.process == label;
         let intervals: Vec<&Interval> = file.intervals.iter().filter(own).collect();
-        let _ = writeln!(out, "  {{ {} }}, # {}", keys(process, &intervals), unit(process, channel.sensor));
+        let _ = writeln!(
+            out,
+            "  {{ {} }}, # {}",
+            keys(process, &intervals),
+            process.kind().units(channel.sensor.unit())
+        );
     }
     out.push_str("]\n");
     Some(out)
@@ -95,18 +100,6 @@ fn keys(process: &Process, intervals: &[&Interval]) -> String {
         }
     }
     out
-}
-
-fn unit(process: &Process, sensor: Sensor) -> String {
-    let u = sensor.unit();
-    match process {
-        Process::White(_) => format!("({u})², per sample"),
-        Process::Quantization(_) => format!("({u})²"),
-        Process::Ar1(_) | Process::Ma1(_) => format!("({u})², innovation variance per sample"),
-        Process::RandomWalk(_) => format!("({u})², increment variance per sample"),
-        Process::Drift(_) => format!("{u} per sample"),
-        Process::GaussMarkov(_) => format!("1/s, ({u})²"),
-    }
 }
 
 fn laws(file: &ModelFile, channel: Channel) -> Option<Vec<String>> {

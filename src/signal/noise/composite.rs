@@ -1,6 +1,6 @@
 //! The sum of processes that one axis carries.
 
-use super::Process;
+use super::{ParameterRef, Process, labels};
 
 /// A sum of independent processes, in the order given.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -30,16 +30,30 @@ impl Composite {
         self.processes.iter().flat_map(|p| p.haar_wv_gradient(level)).collect()
     }
 
-    /// A label for each summand, unique within the sum: "WN", "AR1_1", "AR1_2", … (numbered only where a
-    /// code occurs more than once, in order of appearance).
+    /// A label for each summand, unique within the sum (see [`labels`]).
     #[must_use]
     pub fn labels(&self) -> Vec<String> {
-        let codes: Vec<&str> = self.processes.iter().map(Process::code).collect();
-        let count = |slice: &[&str], code: &str| slice.iter().filter(|c| **c == code).count();
-        let label = |(i, code): (usize, &&str)| match count(&codes, code) {
-            1 => (*code).to_owned(),
-            _ => format!("{code}_{}", count(&codes[..=i], code)),
-        };
-        codes.iter().enumerate().map(label).collect()
+        labels(&self.processes.iter().map(Process::kind).collect::<Vec<_>>())
+    }
+
+    /// A parameter as it is printed: "AR1_1 phi".
+    ///
+    /// # Panics
+    /// When there is no such process.
+    #[must_use]
+    pub fn name_of(&self, of: ParameterRef) -> String {
+        format!("{} {}", self.labels()[of.process], of.parameter.name())
+    }
+
+    /// All parameters with their values, process by process.
+    pub fn parameters(&self) -> impl Iterator<Item = (ParameterRef, f64)> + '_ {
+        self.processes.iter().enumerate().flat_map(|(process, p)| {
+            let refs = p
+                .kind()
+                .parameters()
+                .iter()
+                .map(move |parameter| ParameterRef { process, parameter: *parameter });
+            refs.zip(p.values())
+        })
     }
 }

@@ -4,11 +4,11 @@
 //! carries; a [`Model`] is the six axes of an IMU at a sample rate. Parameters are per sample at that rate.
 
 mod ar1;
-mod catalogue;
 mod composite;
 pub mod continuous;
 mod drift;
 mod gauss_markov;
+mod kind;
 mod ma1;
 mod normal;
 mod quantization;
@@ -23,10 +23,10 @@ mod synthesis;
 mod white;
 
 pub use ar1::Ar1;
-pub use catalogue::CATALOGUE;
 pub use composite::Composite;
 pub use drift::Drift;
 pub use gauss_markov::GaussMarkov;
+pub use kind::{Kind, Parameter, ParameterRef, labels};
 pub use ma1::Ma1;
 pub use quantization::Quantization;
 pub use random_walk::RandomWalk;
@@ -80,31 +80,31 @@ pub enum Process {
 }
 
 impl Process {
-    /// Code in model files and specifications.
+    /// Its kind.
     #[must_use]
-    pub const fn code(&self) -> &'static str {
+    pub const fn kind(&self) -> Kind {
         match self {
-            Self::White(_) => White::CODE,
-            Self::Quantization(_) => Quantization::CODE,
-            Self::Ar1(_) => Ar1::CODE,
-            Self::RandomWalk(_) => RandomWalk::CODE,
-            Self::Drift(_) => Drift::CODE,
-            Self::GaussMarkov(_) => GaussMarkov::CODE,
-            Self::Ma1(_) => Ma1::CODE,
+            Self::White(_) => Kind::White,
+            Self::Quantization(_) => Kind::Quantization,
+            Self::Ar1(_) => Kind::Ar1,
+            Self::RandomWalk(_) => Kind::RandomWalk,
+            Self::Drift(_) => Kind::Drift,
+            Self::GaussMarkov(_) => Kind::GaussMarkov,
+            Self::Ma1(_) => Kind::Ma1,
         }
     }
 
-    /// The parameters as (name in model files, value).
+    /// The values of its parameters, in the order of [`Kind::parameters`].
     #[must_use]
-    pub fn parameters(&self) -> Vec<(&'static str, f64)> {
+    pub fn values(&self) -> Vec<f64> {
         match self {
-            Self::White(p) => vec![("sigma2", p.sigma2())],
-            Self::Quantization(p) => vec![("q2", p.q2())],
-            Self::Ar1(p) => vec![("phi", p.phi()), ("sigma2", p.sigma2())],
-            Self::RandomWalk(p) => vec![("gamma2", p.gamma2())],
-            Self::Drift(p) => vec![("slope", p.slope())],
-            Self::GaussMarkov(p) => vec![("beta", p.beta()), ("s2", p.s2())],
-            Self::Ma1(p) => vec![("theta", p.theta()), ("sigma2", p.sigma2())],
+            Self::White(p) => vec![p.sigma2()],
+            Self::Quantization(p) => vec![p.q2()],
+            Self::Ar1(p) => vec![p.phi(), p.sigma2()],
+            Self::RandomWalk(p) => vec![p.gamma2()],
+            Self::Drift(p) => vec![p.slope()],
+            Self::GaussMarkov(p) => vec![p.beta(), p.s2()],
+            Self::Ma1(p) => vec![p.theta(), p.sigma2()],
         }
     }
 

@@ -1,0 +1,274 @@
+//! The kinds of process and their parameters: what files, specifications and fits call them, in one table.
+
+use super::{Ar1, Drift, GaussMarkov, Ma1, ParameterError, Process, Quantization, RandomWalk, White};
+
+/// A kind of process.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Kind {
+    /// White noise.
+    White,
+    /// Quantization noise.
+    Quantization,
+    /// First-order autoregression.
+    Ar1,
+    /// First-order Gauss-Markov process.
+    GaussMarkov,
+    /// First-order moving average.
+    Ma1,
+    /// Random walk.
+    RandomWalk,
+    /// Drift.
+    Drift,
+}
+
+/// A parameter of a process.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Parameter {
+    /// Coefficient of an AR1.
+    Phi,
+    /// Inverse correlation time of a GM (1/s).
+    Beta,
+    /// Coefficient of an MA1.
+    Theta,
+    /// White or innovation variance per sample.
+    Sigma2,
+    /// Stationary variance of a GM.
+    S2,
+    /// Quantization Q².
+    Q2,
+    /// Increment variance of a random walk.
+    Gamma2,
+    /// Drift per sample.
+    Slope,
+}
+
+/// A parameter of one process of a sum.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct ParameterRef {
+    /// Position of the process in the sum.
+    pub process: usize,
+    /// Which of its parameters.
+    pub parameter: Parameter,
+}
+
+/// What is to be said of a kind.
+struct Row {
+    code: &'static str,
+    /// In the order of files: the shape, if it has one, before the amplitude.
+    parameters: &'static [Parameter],
+    /// Units of the parameters; `{u}` is that of the signal.
+    units: &'static str,
+}
+
+/// One row a kind, in the order of [`Kind::ALL`].
+const TABLE: [Row; 7] = [
+    Row { code: White::CODE, parameters: &[Parameter::Sigma2], units: "({u})², per sample" },
+    Row { code: Quantization::CODE, parameters: &[Parameter::Q2], units: "({u})²" },
+    Row {
+        code: Ar1::CODE,
+        parameters: &[Parameter::Phi, Parameter::Sigma2],
+        units: "({u})², innovation variance per sample",
+    },
+    Row { code: GaussMarkov::CODE, parameters: &[Parameter::Beta, Parameter::S2], units: "1/s, ({u})²" },
+    Row {
+        code: Ma1::CODE,
+        parameters: &[Parameter::Theta, Parameter::Sigma2],
+        units: "({u})², innovation variance per sample",
+    },
+    Row {
+        code: RandomWalk::CODE,
+        parameters: &[Parameter::Gamma2],
+        units: "({u})², increment variance per sample",
+    },
+    Row { code: Drift::CODE, parameters: &[Parameter::Slope], units: "{u} per sample" },
+];
+
+impl Kind {
+    /// All kinds, in the order in which models list them.
+    pub const ALL: [Self; 7] = [
+        Self::White,
+        Self::Quantization,
+        Self::Ar1,
+        Self::GaussMarkov,
+        Self::Ma1,
+        Self::RandomWalk,
+        Self::Drift,
+    ];
+
+    const fn row(self) -> &'static Row {
+        &TABLE[self as usize]
+    }
+
+    /// The kind of that code.
+    #[must_use]
+    pub fn named(code: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.code() == code)
+    }
+
+    /// Code in model files and specifications.
+    #[must_use]
+    pub const fn code(self) -> &'static str {
+        self.row().code
+    }
+
+    /// Its parameters in the order of [`Process::parameters`].
+    #[must_use]
+    pub const fn parameters(self) -> &'static [Parameter] {
+        self.row().parameters
+    }
+
+    /// The parameter its wavelet variance grows with.
+    #[must_use]
+    pub const fn amplitude(self) -> Parameter {
+        let parameters = self.parameters();
+        parameters[parameters.len() - 1]
+    }
+
+    /// The parameter that gives its shape, if its wavelet variance depends on more than an amplitude.
+    #[must_use]
+    pub const fn shape(self) -> Option<Parameter> {
+        match self.parameters() {
+            [shape, _] => Some(*shape),
+            _ => None,
+        }
+    }
+
+    /// Units of its parameters, where those of the signal are `unit`.
+    #[must_use]
+    pub fn units(self, unit: &str) -> String {
+        self.row().units.replace("{u}", unit)
+    }
+
+    /// A process of this kind from the values of its parameters, in their order; none if their number is another.
+    /// The rate (Hz) is what a GM is sampled at.
+    ///
+    /// # Errors
+    /// When a value is outside its domain.
+    #[must_use]
+    pub fn process(self, values: &[f64], rate_hz: f64) -> Option<Result<Process, ParameterError>> {
+        Some(match (self, values) {
+            (Self::White, &[sigma2]) => White::new(sigma2).map(Process::White),
+            (Self::Quantization, &[q2]) => Quantization::new(q2).map(Process::Quantization),
+            (Self::Ar1, &[phi, sigma2]) => Ar1::new(phi, sigma2).map(Process::Ar1),
+            (Self::GaussMarkov, &[beta, s2]) => GaussMarkov::new(beta, s2, rate_hz).map(Process::GaussMarkov),
+            (Self::Ma1, &[theta, sigma2]) => Ma1::new(theta, sigma2).map(Process::Ma1),
+            (Self::RandomWalk, &[gamma2]) => RandomWalk::new(gamma2).map(Process::RandomWalk),
+            (Self::Drift, &[slope]) => Drift::new(slope).map(Process::Drift),
+            _ => return None,
+        })
+    }
+}
+
+impl Parameter {
+    /// Name in files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Phi => "phi",
+            Self::Beta => "beta",
+            Self::Theta => "theta",
+            Self::Sigma2 => "sigma2",
+            Self::S2 => "s2",
+            Self::Q2 => "q2",
+            Self::Gamma2 => "gamma2",
+            Self::Slope => "slope",
+        }
+    }
+
+    /// Whether it gives the shape of a wavelet variance rather than its size.
+    #[must_use]
+    pub const fn is_shape(self) -> bool {
+        matches!(self, Self::Phi | Self::Beta | Self::Theta)
+    }
+
+    /// Where it lives.
+    #[must_use]
+    pub const fn domain(self) -> (f64, f64) {
+        match self {
+            Self::Phi | Self::Theta => (-1.0, 1.0),
+            Self::Slope => (f64::NEG_INFINITY, f64::INFINITY),
+            Self::Beta | Self::Sigma2 | Self::S2 | Self::Q2 | Self::Gamma2 => (0.0, f64::INFINITY),
+        }
+    }
+}
+
+impl Process {
+    /// From its code and the values of its parameters in the order of [`Kind::parameters`]; none if there is no
+    /// such process or the number of values is another. The rate (Hz) is what a GM is sampled at.
+    ///
+    /// # Errors
+    /// When a value is outside its domain.
+    #[must_use]
+    pub fn from_values(code: &str, values: &[f64], rate_hz: f64) -> Option<Result<Self, ParameterError>> {
+        Kind::named(code)?.process(values, rate_hz)
+    }
+
+    /// Code in model files and specifications.
+    #[must_use]
+    pub const fn code(&self) -> &'static str {
+        self.kind().code()
+    }
+
+    /// The parameters as (name in model files, value).
+    #[must_use]
+    pub fn parameters(&self) -> Vec<(&'static str, f64)> {
+        self.kind().parameters().iter().map(|p| p.name()).zip(self.values()).collect()
+    }
+
+    /// The same process with one parameter changed; none if it has no parameter of that name.
+    ///
+    /// # Errors
+    /// When the value is outside its domain.
+    #[must_use]
+    pub fn with_parameter(
+        &self,
+        name: &str,
+        value: f64,
+        rate_hz: f64,
+    ) -> Option<Result<Self, ParameterError>> {
+        let mut values = self.values();
+        values[self.kind().parameters().iter().position(|p| p.name() == name)?] = value;
+        self.kind().process(&values, rate_hz)
+    }
+}
+
+/// A label for each process of a sum, unique within it: "WN", "AR1_1", "AR1_2", … (numbered only where a kind occurs
+/// more than once, in order of appearance).
+#[must_use]
+pub fn labels(kinds: &[Kind]) -> Vec<String> {
+    let count = |kinds: &[Kind], kind: Kind| kinds.iter().filter(|k| **k == kind).count();
+    let label = |(i, kind): (usize, &Kind)| match count(kinds, *kind) {
+        1 => kind.code().to_owned(),
+        _ => format!("{}_{}", kind.code(), count(&kinds[..=i], *kind)),
+    };
+    kinds.iter().enumerate().map(label).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_process_comes_back_from_its_parameters() {
+        for kind in Kind::ALL {
+            let names: Vec<&str> = kind.parameters().iter().map(|p| p.name()).collect();
+            let values: Vec<f64> = (1..=names.len()).map(|i| 0.25 * i as f64).collect();
+            let process = Process::from_values(kind.code(), &values, 100.0).unwrap().unwrap();
+            assert_eq!((process.code(), process.kind()), (kind.code(), kind));
+            let expected: Vec<(&str, f64)> = names.into_iter().zip(values).collect();
+            assert_eq!(process.parameters(), expected);
+            assert!(!kind.amplitude().is_shape() && kind.shape().is_none_or(Parameter::is_shape));
+        }
+        assert!(Process::from_values("XX", &[1.0], 100.0).is_none());
+        assert!(Process::from_values("WN", &[1.0, 2.0], 100.0).is_none());
+    }
+
+    #[test]
+    fn one_parameter_changes() {
+        let ar1 = Process::from_values("AR1", &[0.5, 2.0], 100.0).unwrap().unwrap();
+        let changed = ar1.with_parameter("phi", 0.75, 100.0).unwrap().unwrap();
+        assert_eq!(changed.parameters(), [("phi", 0.75), ("sigma2", 2.0)]);
+        assert!(ar1.with_parameter("gamma2", 1.0, 100.0).is_none());
+        assert!(ar1.with_parameter("phi", 1.0, 100.0).unwrap().is_err());
+    }
+}
