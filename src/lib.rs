@@ -45,3 +45,5 @@ pub mod study;
 pub mod report;
 // Files.
 pub mod formats;
+// What a command does, as one call.
+pub mod jobs;

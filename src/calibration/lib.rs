@@ -8,6 +8,8 @@
 pub(crate) use nav_sim_signal::bibliography;
 pub(crate) use nav_sim_signal::{imu, noise, rng, wavelet};
 
+// What the members of closed sets are called.
+mod names;
 // Wavelet variances: of replicates, averaged, as a model implies them, and how they scatter.
 mod curve;
 // What is fitted.
@@ -30,14 +32,15 @@ mod pipeline;
 pub mod efficiency;
 
 pub use curve::{
-    AverageError, Estimator, Group, Pool, Replicate, Scope, SignalError, Trim, WarmUp, average, grouped,
-    implied, replicates, trend, warm_up,
+    AverageError, Estimator, Group, Pool, Replicate, Scope, SignalError, Trim, TrimError, WarmUp, average,
+    grouped, implied, replicates, trend, warm_up,
 };
 pub use diagnosis::{
     Alarm, AxisScores, CommonOutliers, Diagnosis, DriftAlarm, LeftOut, Misfit, Movement, Verdict, diagnose,
 };
 pub use fit::{Fit, FitError, Termination, Weighting, estimate, fit};
 pub use model::{LimitError, Limits, ModelSpec, SpecError};
+pub use names::UnknownName;
 pub use outcome::{
     Bootstrap, Candidate, Goodness, Indistinct, Inference, LevelSpread, ModelChoice, Outcome,
     ParameterInterval, ParameterLimit, Ranking, Settings, TooSimple, Undetermined,

@@ -15,6 +15,7 @@ mod filter;
 mod fuse;
 mod init;
 mod interrupt;
+mod jobs;
 mod man;
 mod parse;
 mod printer;

@@ -1,6 +1,18 @@
 //! Values of flags.
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use nav_sim::imu::MAX_RATE_HZ;
+use std::fmt::Debug;
+use std::str::FromStr;
+
+/// One of some words, each with what it means.
+pub(super) fn words<T>(words: &'static [(&'static str, &'static str)]) -> impl TypedValueParser<Value = T>
+where
+    T: FromStr<Err: Debug> + Clone + Send + Sync + 'static,
+{
+    let values = words.iter().map(|(word, meaning)| PossibleValue::new(*word).help(*meaning));
+    PossibleValuesParser::new(values).map(|word| word.parse().expect("a word of the list"))
+}
 
 /// A finite number ≥ 0.
 pub(super) fn non_negative(text: &str) -> Result<f64, String> {

@@ -1,12 +1,12 @@
 //! Flags for static recordings, and reading them.
 
 use super::axes::ChannelSet;
-use super::{Failure, Session};
+use super::{Progress, Session};
 use clap::ValueEnum;
-use nav_sim::formats::recordings::{self, Gaps, ReadOptions, Report};
-use nav_sim::imu::{Recording, Sensor};
-use std::cell::OnceCell;
-use std::path::PathBuf;
+use nav_sim::calibration::WarmUp;
+use nav_sim::formats::recordings::{Gaps, ReadOptions, Report};
+use nav_sim::imu::{Channel, Sensor};
+use nav_sim::jobs::{Remark, Remarks};
 
 /// How recordings are read.
 #[derive(clap::Args, Debug)]
@@ -45,11 +45,6 @@ impl RecordingArgs {
         self.rate_hz
     }
 
-    /// Seconds left out at the beginning of each file.
-    pub(crate) const fn skip_s(&self) -> f64 {
-        self.skip_s
-    }
-
     /// What decides what is read of the files, for the provenance of a result.
     pub(crate) fn provenance(&self) -> toml::Table {
         let mut table = toml::Table::new();
@@ -71,15 +66,9 @@ impl RecordingArgs {
         table
     }
 
-    /// Looks at recordings one by one, says what was found (in detail with `--verbose`) and what is doubtful.
-    pub(crate) fn visit<T: Send>(
-        &self,
-        paths: &[PathBuf],
-        min_samples: usize,
-        session: &Session,
-        look: &(dyn Fn(Recording) -> T + Sync),
-    ) -> Result<(Vec<T>, Report), Failure> {
-        let options = ReadOptions {
+    /// How the files are to be read.
+    pub(crate) fn options(&self) -> ReadOptions {
+        ReadOptions {
             rate_hz: self.rate_hz,
             skip_s: self.skip_s,
             gaps: match self.gaps {
@@ -89,36 +78,70 @@ impl RecordingArgs {
             },
             channels: (!self.axes.is_empty()).then(|| self.axes.iter().flat_map(|s| s.0.clone()).collect()),
             columns: self.columns.clone(),
-            min_samples,
             ..ReadOptions::default()
-        };
-        let progress = OnceCell::new();
-        let tell = |done: usize, all: usize| {
-            let progress = progress.get_or_init(|| session.progress("recordings", all as u64));
-            if done > 0 {
-                progress.add(1);
-            }
-        };
-        let visited = recordings::visit(paths, &options, look, &tell);
-        drop(progress);
-        let (looks, report) = visited?;
+        }
+    }
+}
+
+/// Says what is found in recordings (in detail with `--verbose`) and what is doubtful.
+pub(crate) struct Said<'a> {
+    session: &'a Session,
+    progress: Option<Progress>,
+}
+
+impl<'a> Said<'a> {
+    pub(crate) const fn new(session: &'a Session) -> Self {
+        Self { session, progress: None }
+    }
+
+    fn report(&self, report: &Report) {
+        let printer = &self.session.printer;
         if report.files.len() > FEW {
-            session.printer.say(&summary(&report));
+            printer.say(&summary(report));
         }
         for file in &report.files {
             if report.files.len() > FEW {
-                session.printer.detail(&file.to_string());
+                printer.detail(&file.to_string());
             } else {
-                session.printer.say(&file.to_string());
+                printer.say(&file.to_string());
             }
             if !file.ignored.is_empty() {
-                session.printer.detail(&format!("{}: passed over: {}", file.file, file.ignored.join(", ")));
+                printer.detail(&format!("{}: passed over: {}", file.file, file.ignored.join(", ")));
             }
         }
         for warning in report.all_warnings() {
-            session.printer.warn(&warning);
+            printer.warn(&warning);
         }
-        Ok((looks, report))
+    }
+}
+
+impl Remarks for Said<'_> {
+    fn progress(&mut self, done: usize, all: usize) {
+        let progress = self.progress.get_or_insert_with(|| self.session.progress("recordings", all as u64));
+        if done > 0 {
+            progress.add(1);
+        }
+    }
+
+    fn remark(&mut self, remark: Remark<'_>) {
+        self.progress = None;
+        match remark {
+            Remark::Read(report) => self.report(report),
+            Remark::WarmUp { recording, found, skip_s } => {
+                let signal = |(channel, w): &(Channel, WarmUp)| {
+                    let what = if w.mean { "its mean moves" } else { "its noise is another" };
+                    format!("{channel} ({what}, {:+.0} deviations)", w.deviations)
+                };
+                let signals = found.iter().map(signal).collect::<Vec<_>>().join(", ");
+                self.session.printer.warn(&format!(
+                    "{recording}: not stationary at its beginning: {signals}; warm-up? --skip-s {skip_s} leaves that out"
+                ));
+            }
+            Remark::Shortest { recording, samples, scales, usual } => self.session.printer.warn(&format!(
+                "{recording}: its {samples} samples limit all recordings to {scales} scales; without it there would be \
+                 more (half of them have {usual}): leave it out for those"
+            )),
+        }
     }
 }
 

@@ -8,7 +8,7 @@ use nav_sim::wavelet::{Convention, Tuning};
 #[command(next_help_heading = "Wavelet variance")]
 pub(crate) struct TuningArgs {
     /// Efficiency of the robust wavelet variance at the Gaussian model, 0.3 to 0.99
-    #[arg(long, value_name = "E", default_value_t = 0.6)]
+    #[arg(long, value_name = "E", default_value_t = Tuning::DEFAULT_EFFICIENCY)]
     efficiency: f64,
     /// How the tuning constant follows from the efficiency
     #[arg(long, value_enum, default_value_t = ConventionArg::Exact)]
@@ -41,10 +41,5 @@ impl TuningArgs {
             ConventionArg::Exact => "exact",
             ConventionArg::Wv => "wv",
         }
-    }
-
-    /// Samples a recording needs for the scales asked for.
-    pub(crate) fn min_samples(&self) -> usize {
-        self.scales.map_or(4, |j| 1 << j)
     }
 }

@@ -83,7 +83,7 @@ pub fn read(path: &Path) -> Result<StudyFile, FileError> {
         scenarios: scenarios(&root, file.model.rate_hz, beside)?,
         estimators: estimators(&root)?,
         spec: spec(&root)?,
-        trim: root.u64("trim")?.map_or(Trim::Fraction(0.3), |a| Trim::Count(a as usize)),
+        trim: root.u64("trim")?.map_or(Trim::default(), |a| Trim::Count(a as usize)),
         tuning: tuning(&root)?,
         weighting: Weighting::Edof,
         spread: file.spread.unwrap_or_default(),
@@ -220,7 +220,7 @@ fn spec(root: &Section<'_>) -> Result<ModelSpec, FileError> {
 }
 
 fn tuning(root: &Section<'_>) -> Result<Tuning, FileError> {
-    let efficiency = root.f64("efficiency")?.unwrap_or(0.6);
+    let efficiency = root.f64("efficiency")?.unwrap_or(Tuning::DEFAULT_EFFICIENCY);
     Tuning::new(efficiency, Convention::Exact)
         .map_err(|_| root.refuse("efficiency", "is not between 0.3 and 0.99", None))
 }

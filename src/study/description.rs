@@ -3,10 +3,12 @@
 use super::StudyError;
 use super::check::unique;
 use super::sweep::{OutageSet, Periodic, Random, Sweep, expand};
+use crate::calibration::{Estimator, ModelSpec};
 use crate::ekf::FilterStates;
 use crate::scenario::{Method, Scenario};
 use crate::sensors::gnss::GnssSettings;
 use crate::sensors::outage::Outage;
+use crate::wavelet::Tuning;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -175,10 +177,10 @@ pub struct CalibrateStep {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub synthesize: Option<Synthesis>,
     /// awv, sr-awv, dr-awv; gmwm, rgmwm with a single recording.
-    #[serde(default = "dr_awv")]
+    #[serde(default = "estimators")]
     pub estimators: Vec<String>,
     /// What is fitted: N1, N2 or any sum.
-    #[serde(default = "n2")]
+    #[serde(default = "usual_model")]
     pub fit: String,
     /// Replicates that dr-awv drops at each end of each scale (default: 30 %).
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -188,16 +190,16 @@ pub struct CalibrateStep {
     pub efficiency: f64,
 }
 
-fn dr_awv() -> Vec<String> {
-    vec!["dr-awv".to_owned()]
+fn estimators() -> Vec<String> {
+    vec![Estimator::default().to_string()]
 }
 
-fn n2() -> String {
-    "N2".to_owned()
+fn usual_model() -> String {
+    ModelSpec::USUAL.to_owned()
 }
 
 const fn efficiency() -> f64 {
-    0.6
+    Tuning::DEFAULT_EFFICIENCY
 }
 
 /// `[[scenario]]`: a scenario file or its keys. Of its `[run]` only `coverage_level` is used.

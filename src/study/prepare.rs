@@ -2,9 +2,7 @@
 
 use super::PrepareError;
 use super::description::{CalibrateStep, Synthesis};
-use crate::calibration::{
-    Estimator, ModelChoice, Outcome, Pool, Settings, Trim, Weighting, calibrate, grouped, replicates,
-};
+use crate::calibration::{Estimator, Outcome, Settings, Trim, calibrate, grouped, replicates};
 use crate::imu::{Channel, Recording};
 use crate::noise::contamination::Contamination;
 use crate::noise::{Model, Spread, VirtualImu};
@@ -68,23 +66,17 @@ pub(super) fn settings(step: &CalibrateStep, rate_hz: f64) -> Result<Settings, P
         let found = Estimator::ALL.into_iter().find(takes_many);
         found.ok_or_else(|| word("estimators", name, "is not awv, sr-awv, dr-awv, gmwm or rgmwm".to_owned()))
     };
-    let model = if step.fit.eq_ignore_ascii_case("auto") {
-        ModelChoice::Auto
-    } else {
-        let spec = step.fit.parse().map_err(|e| word("fit", &step.fit, format!("is no model: {e}")))?;
-        ModelChoice::Given(spec)
-    };
+    let model = step.fit.parse().map_err(|e| word("fit", &step.fit, format!("is no model: {e}")))?;
     let tuning = Tuning::new(step.efficiency, Convention::Exact).map_err(|_| {
         word("efficiency", &step.efficiency.to_string(), "is not between 0.3 and 0.99".to_owned())
     })?;
     Ok(Settings {
         estimators: step.estimators.iter().map(estimator).collect::<Result<_, _>>()?,
         model,
-        limits: Vec::new(),
-        trim: step.trim.map_or(Trim::Fraction(0.3), Trim::Count),
+        trim: step.trim.map_or(Trim::default(), Trim::Count),
         tuning,
-        weighting: Weighting::Model,
         rate_hz,
+        ..Settings::default()
     })
 }
 
@@ -105,7 +97,7 @@ pub fn calibrated(
     }
     let of = |recording| replicates(recording, None, &settings.tuning);
     let measured: Vec<_> = recordings.par_iter().map(of).collect::<Result<_, _>>()?;
-    let groups = grouped(measured.concat(), if single { Pool::Axes } else { Pool::Sensor });
+    let groups = grouped(measured.concat(), settings.pool());
     let outcomes = calibrate(&groups, &settings)?;
     Ok((outcomes, settings))
 }

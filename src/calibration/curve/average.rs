@@ -2,16 +2,20 @@
 //! ([Minaretzis](crate::bibliography::Minaretzis24), eqs. 4–8).
 
 use crate::imu::Axis;
+use crate::names::named;
 use crate::wavelet::{Curve, RobustVariance, Status, Tuning, interval};
+use std::fmt;
+use std::str::FromStr;
 
 /// Which curve a model is fitted to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Estimator {
     /// Average of the classical wavelet variances.
     Awv,
     /// Average of the robust ones: safe from outliers within replicates.
     SrAwv,
     /// Trimmed average, scale by scale, of the robust ones: safe from abnormal replicates too.
+    #[default]
     DrAwv,
     /// Classical wavelet variance of one replicate.
     Gmwm,
@@ -55,6 +59,8 @@ impl Estimator {
     }
 }
 
+named!(Estimator);
+
 /// How many replicates DR-AWV drops at each end, scale by scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Trim {
@@ -72,6 +78,42 @@ impl Trim {
             Self::Count(a) => a,
             // An exact product must not fall short: 0.3·10 is 2.9999999999999996.
             Self::Fraction(f) => (f * replicates as f64 + 1e-9).floor() as usize,
+        }
+    }
+}
+
+impl Default for Trim {
+    /// 30 %.
+    fn default() -> Self {
+        Self::Fraction(0.3)
+    }
+}
+
+impl fmt::Display for Trim {
+    /// "2", "30%"
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Count(count) => count.fmt(f),
+            Self::Fraction(fraction) => write!(f, "{}%", 100.0 * fraction),
+        }
+    }
+}
+
+/// A trim that means nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("not a number of replicates such as 2, or a percentage under 50 such as 30%")]
+pub struct TrimError;
+
+impl FromStr for Trim {
+    type Err = TrimError;
+
+    fn from_str(text: &str) -> Result<Self, TrimError> {
+        match text.strip_suffix('%') {
+            None => text.parse().map(Self::Count).map_err(|_| TrimError),
+            Some(percent) => match percent.trim().parse() {
+                Ok(p) if (0.0..50.0).contains(&p) => Ok(Self::Fraction(p / 100.0)),
+                _ => Err(TrimError),
+            },
         }
     }
 }

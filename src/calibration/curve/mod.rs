@@ -7,7 +7,7 @@ pub(crate) mod robust_scale;
 pub(crate) mod sampling;
 mod stationarity;
 
-pub use average::{AverageError, Estimator, Replicate, Trim, average};
+pub use average::{AverageError, Estimator, Replicate, Trim, TrimError, average};
 pub use implied::implied;
 pub use replicates::{Group, Pool, Scope, SignalError, grouped, replicates, trend};
 pub use stationarity::{WarmUp, warm_up};

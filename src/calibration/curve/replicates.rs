@@ -2,6 +2,7 @@
 
 use super::average::Replicate;
 use crate::imu::{Axis, Channel, Recording, Sensor, Signal};
+use crate::names::named;
 use crate::wavelet::{Tuning, WaveletError, both, default_levels};
 use rayon::prelude::*;
 
@@ -49,6 +50,22 @@ pub enum Pool {
     /// Those of all axes of a sensor: one model a sensor.
     Sensor,
 }
+
+impl Pool {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Axes, Self::Sensor];
+
+    /// Name in files and on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Axes => "axes",
+            Self::Sensor => "sensor",
+        }
+    }
+}
+
+named!(Pool);
 
 /// A signal without a wavelet variance.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -1,13 +1,15 @@
 //! What a scale counts in a fit.
 
+use crate::names::named;
 use crate::wavelet::{Curve, interval};
 
 /// Omega: what a scale counts.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Weighting {
     /// edof/(2 nu(theta)²), the inverse variance of nu_hat where the model holds. The fit is repeated until the weights
     /// are those of its own result, which makes it the maximum-likelihood estimate of independent chi-squares; a
     /// variance that is low by chance weighs no more than others.
+    #[default]
     Model,
     /// edof/(2 nu_hat²), the convention of the literature: what is low by chance weighs most.
     Edof,
@@ -20,6 +22,21 @@ pub enum Weighting {
 }
 
 impl Weighting {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Model, Self::Edof, Self::Interval, Self::None, Self::Full];
+
+    /// Name in files and on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Model => "model",
+            Self::Edof => "edof",
+            Self::Interval => "ci",
+            Self::None => "none",
+            Self::Full => "full",
+        }
+    }
+
     /// √Omega_j of each scale (1/units²), where its variance is taken to be `nu`.
     pub(crate) fn roots(self, curve: &Curve, nu: &[f64]) -> Vec<f64> {
         let root = |((nu, edof), level): ((&f64, &f64), &u32)| match self {
@@ -34,3 +51,5 @@ impl Weighting {
         nu.iter().zip(&curve.edof).zip(&curve.levels).map(root).collect()
     }
 }
+
+named!(Weighting);

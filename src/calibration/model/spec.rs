@@ -67,6 +67,9 @@ pub enum SpecError {
 }
 
 impl ModelSpec {
+    /// Name of the usual model.
+    pub const USUAL: &str = "N2";
+
     /// N1 = WN + AR1 + RW of the paper.
     #[must_use]
     pub fn n1() -> Self {

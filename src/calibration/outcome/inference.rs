@@ -12,6 +12,17 @@ pub struct Bootstrap {
     pub seed: u64,
 }
 
+impl Bootstrap {
+    /// Draws, usually: the ends of a 95 % interval are the fifth of them at either side.
+    pub const DRAWS: usize = 200;
+}
+
+impl Default for Bootstrap {
+    fn default() -> Self {
+        Self { draws: Self::DRAWS, seed: 1 }
+    }
+}
+
 /// What the bootstrap says about a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Inference {

@@ -1,10 +1,11 @@
 //! What is asked of a calibration.
 
-use crate::curve::{Estimator, Scope, Trim};
+use crate::curve::{Estimator, Pool, Scope, Trim};
 use crate::fit::Weighting;
 use crate::imu::{Axis, Sensor};
-use crate::model::{LimitError, ModelSpec};
+use crate::model::{LimitError, ModelSpec, SpecError};
 use crate::wavelet::Tuning;
+use std::str::FromStr;
 
 /// How to calibrate.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,6 +35,32 @@ pub enum ModelChoice {
     Auto,
 }
 
+impl Default for ModelChoice {
+    fn default() -> Self {
+        Self::Given(ModelSpec::n2())
+    }
+}
+
+impl FromStr for ModelChoice {
+    type Err = SpecError;
+
+    /// "auto", or a sum of processes.
+    fn from_str(text: &str) -> Result<Self, SpecError> {
+        if text.eq_ignore_ascii_case("auto") { Ok(Self::Auto) } else { text.parse().map(Self::Given) }
+    }
+}
+
+impl ModelChoice {
+    /// Parameters that are to be found, at least.
+    #[must_use]
+    pub fn parameters(&self) -> usize {
+        match self {
+            Self::Given(spec) => spec.parameters(),
+            Self::Auto => 2,
+        }
+    }
+}
+
 impl std::fmt::Display for ModelChoice {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
@@ -60,7 +87,29 @@ pub struct ParameterLimit {
     pub high: Option<f64>,
 }
 
+impl Default for Settings {
+    /// What suits most recordings: DR-AWV, N2. At 1 Hz, until a rate is known.
+    fn default() -> Self {
+        Self {
+            estimators: vec![Estimator::default()],
+            model: ModelChoice::default(),
+            limits: Vec::new(),
+            trim: Trim::default(),
+            tuning: Tuning::default(),
+            weighting: Weighting::default(),
+            rate_hz: 1.0,
+        }
+    }
+}
+
 impl Settings {
+    /// Which signals the estimators take as replicates of one another, unless told otherwise: those of single recordings
+    /// pool nothing.
+    #[must_use]
+    pub fn pool(&self) -> Pool {
+        if self.estimators.iter().any(|e| e.is_single()) { Pool::Axes } else { Pool::Sensor }
+    }
+
     /// A model with the limits of what it is for.
     pub(crate) fn limited(&self, spec: &ModelSpec, scope: Scope) -> Result<ModelSpec, LimitError> {
         let mut spec = spec.clone();

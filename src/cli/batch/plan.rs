@@ -245,7 +245,6 @@ fn calibration(
     let note = CalibrationNote {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         efficiency_convention: "exact".to_owned(),
-        weighting: "model".to_owned(),
         seed: None,
         reading: toml::Table::new(),
         inputs: inputs.collect::<Result<Vec<Input>, _>>()?,

@@ -1,20 +1,20 @@
 //! `nav-sim calibrate`: replicate static recordings → noise model.
 
-mod curves;
 mod output;
-mod recorded;
 
-use super::recordings::{RecordingArgs, sensor};
+use super::parse::words;
+use super::recordings::{RecordingArgs, Said, sensor};
 use super::tuning::TuningArgs;
-use super::{Failure, Session, parse};
+use super::{Failure, Session, read};
 use nav_sim::calibration::{
-    AverageError, Bootstrap, CalibrationError, Cause, FitError, Group, ModelChoice, ModelSpec, Outcome,
-    ParameterLimit, Settings, SpecError, Trim, Weighting, infer,
+    Bootstrap, Estimator, ModelChoice, ModelSpec, ParameterLimit, Pool, Settings, SpecError, Trim, Weighting,
 };
 use nav_sim::formats::parameters_file;
 use nav_sim::formats::suggest::nearest;
 use nav_sim::imu::Sensor;
-use std::path::PathBuf;
+use nav_sim::jobs::{self, CalibrationOptions, EstimatorChoice};
+use output::outputs;
+use std::path::{Path, PathBuf};
 
 /// Replicate static recordings -> noise model
 ///
@@ -40,26 +40,26 @@ pub(crate) struct Args {
     sensor: Option<Sensor>,
     /// Which curve is fitted: averages over the replicates (awv; sr-awv robust to outliers; dr-awv robust to
     /// abnormal replicates too), or that of a single recording (gmwm, rgmwm; avlr: slopes of its Allan deviation)
-    #[arg(long, value_enum, default_value_t = EstimatorArg::DrAwv)]
-    estimator: EstimatorArg,
+    #[arg(long, value_parser = words::<EstimatorChoice>(&ESTIMATORS), default_value_t)]
+    estimator: EstimatorChoice,
     /// Sum of WN QN AR1 GM MA1 RW DR such as 2*AR1+RW+WN+QN, N1 = AR1+RW+WN, N2 = 2*AR1+RW+WN+QN, or auto: the
     /// simplest sum of WN QN RW DR and up to two AR1 that does as well as the best, with its reasons
-    #[arg(long, value_name = "SUM", default_value = "N2")]
+    #[arg(long, value_name = "SUM", default_value = ModelSpec::USUAL)]
     model: String,
     /// What is known of the parameters: a TOML file that fixes or bounds them (nav-sim schema parameters)
     #[arg(long, value_name = "FILE")]
     parameters: Option<PathBuf>,
     /// Replicates that dr-awv drops at each end of each scale: a number, or a percentage of all
-    #[arg(long, value_name = "A", default_value = "30%", value_parser = trim)]
+    #[arg(long, value_name = "A", default_value_t)]
     trim: Trim,
     /// What a scale counts in the fit
-    #[arg(long, value_enum, default_value_t = WeightingArg::Model)]
-    weighting: WeightingArg,
+    #[arg(long, value_parser = words::<Weighting>(&WEIGHTINGS), default_value_t)]
+    weighting: Weighting,
     /// Which signals are replicates of one another (default: sensor; axes for gmwm, rgmwm and avlr)
-    #[arg(long, value_enum)]
-    pool: Option<PoolArg>,
+    #[arg(long, value_parser = words::<Pool>(&POOLS))]
+    pool: Option<Pool>,
     /// Draws of the parametric bootstrap behind intervals and goodness of fit (0: neither)
-    #[arg(long, value_name = "B", default_value_t = 200, value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    #[arg(long, value_name = "B", default_value_t = Bootstrap::DRAWS as u32, value_parser = clap::value_parser!(u32).range(0..=100_000))]
     bootstrap: u32,
     /// The model file (default: model.toml; none for --curve)
     #[arg(long, short, value_name = "FILE")]
@@ -84,87 +84,104 @@ const OF_RECORDINGS: [&str; 10] = [
     "scales",
 ];
 
-#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
-enum EstimatorArg {
-    /// Average of the classical wavelet variances
-    Awv,
-    /// Average of the robust wavelet variances
-    SrAwv,
-    /// Trimmed average of the robust wavelet variances
-    DrAwv,
-    /// Classical wavelet variance of one recording
-    Gmwm,
-    /// Robust wavelet variance of one recording
-    Rgmwm,
-    /// Slopes of the Allan deviation of one recording, read off one by one: WN, QN, RW, DR
-    Avlr,
-    /// The three averages (of one recording: gmwm and rgmwm)
-    All,
-}
+const ESTIMATORS: [(&str, &str); 7] = [
+    (Estimator::Awv.name(), "Average of the classical wavelet variances"),
+    (Estimator::SrAwv.name(), "Average of the robust wavelet variances"),
+    (Estimator::DrAwv.name(), "Trimmed average of the robust wavelet variances"),
+    (Estimator::Gmwm.name(), "Classical wavelet variance of one recording"),
+    (Estimator::Rgmwm.name(), "Robust wavelet variance of one recording"),
+    (
+        Estimator::Avlr.name(),
+        "Slopes of the Allan deviation of one recording, read off one by one: WN, QN, RW, DR",
+    ),
+    ("all", "The three averages (of one recording: gmwm and rgmwm)"),
+];
 
-#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
-enum WeightingArg {
-    /// Degrees of freedom / (2 wv²), wv that of the fitted model: the inverse variance
-    Model,
-    /// The same with the observed wv: the convention of the literature, low where wv is low by chance
-    Edof,
-    /// 1 / (width of the 95 % interval)²
-    Ci,
-    /// 1
-    None,
-    /// The inverse of the covariance between scales, by bootstrap
-    Full,
-}
+const WEIGHTINGS: [(&str, &str); 5] = [
+    (
+        Weighting::Model.name(),
+        "Degrees of freedom / (2 wv²), wv that of the fitted model: the inverse variance",
+    ),
+    (
+        Weighting::Edof.name(),
+        "The same with the observed wv: the convention of the literature, low where wv is low by chance",
+    ),
+    (Weighting::Interval.name(), "1 / (width of the 95 % interval)²"),
+    (Weighting::None.name(), "1"),
+    (Weighting::Full.name(), "The inverse of the covariance between scales, by bootstrap"),
+];
 
-#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
-enum PoolArg {
-    /// Those of one axis: a model an axis
-    Axes,
-    /// Those of all axes of a sensor: a model a sensor
-    Sensor,
-}
-
-fn trim(text: &str) -> Result<Trim, String> {
-    let expected = || "not a number of replicates such as 2, or a percentage under 50 such as 30%".to_owned();
-    match text.strip_suffix('%') {
-        None => text.parse().map(Trim::Count).map_err(|_| expected()),
-        Some(percent) => match parse::non_negative(percent.trim()) {
-            Ok(p) if p < 50.0 => Ok(Trim::Fraction(p / 100.0)),
-            _ => Err(expected()),
-        },
-    }
-}
+const POOLS: [(&str, &str); 2] = [
+    (Pool::Axes.name(), "Those of one axis: a model an axis"),
+    (Pool::Sensor.name(), "Those of all axes of a sensor: a model a sensor"),
+];
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let mut settings = Settings {
-        estimators: Vec::new(),
-        model: model(args)?,
-        limits: Vec::new(),
+    let model = model(args)?;
+    let settings = Settings {
+        limits: limits(args, &model)?,
+        model,
         trim: args.trim,
         tuning: args.tuning.tuning()?,
-        weighting: match args.weighting {
-            WeightingArg::Model => Weighting::Model,
-            WeightingArg::Edof => Weighting::Edof,
-            WeightingArg::Ci => Weighting::Interval,
-            WeightingArg::None => Weighting::None,
-            WeightingArg::Full => Weighting::Full,
-        },
-        rate_hz: 1.0,
+        weighting: args.weighting,
+        ..Settings::default()
     };
-    settings.limits = limits(args, &settings.model)?;
     match &args.curve {
-        Some(path) => curves::run(args, path, &mut settings, session),
-        None => recorded::run(args, &mut settings, session),
+        Some(path) => curves(args, path, &settings, session),
+        None => recordings(args, settings, session),
     }
+}
+
+fn recordings(args: &Args, settings: Settings, session: &Session) -> Result<(), Failure> {
+    let out = args.out.as_deref().unwrap_or(Path::new("model.toml"));
+    output::writable(out)?;
+    if args.out.is_none() {
+        output::not_of_others(out)?;
+    }
+    let options = CalibrationOptions {
+        reading: args.recordings.options(),
+        scales: args.tuning.scales,
+        estimators: args.estimator,
+        pool: args.pool,
+        settings,
+        bootstrap: bootstrap(args, session),
+    };
+    let measured = jobs::measure(&args.inputs, &options, &mut Said::new(session))?;
+    let files: Vec<PathBuf> = measured.report.files.iter().map(|f| f.path.clone()).collect();
+    let guarded: Vec<PathBuf> = files.iter().chain(&args.parameters).cloned().collect();
+    let outputs = outputs(out, &measured.settings.estimators, &guarded)?;
+    let inputs = files.iter().map(|f| read::input("recording", f)).collect::<Result<Vec<_>, _>>()?;
+    let calibration = measured.calibrate()?;
+    let note = output::note(args, &calibration.settings, inputs, session)?;
+    output::finish(&outputs, &calibration, &note, session)
+}
+
+/// Fitting curves that come from elsewhere.
+fn curves(args: &Args, path: &Path, settings: &Settings, session: &Session) -> Result<(), Failure> {
+    // What is only printed needs no sensor.
+    let sensor = args.sensor.or(args.out.is_none().then_some(Sensor::Accel));
+    let curves = jobs::read_curves(path, args.recordings.rate_hz(), sensor, settings)?;
+    let outputs = match &args.out {
+        Some(out) => {
+            let inputs: Vec<PathBuf> =
+                [path].into_iter().map(Path::to_owned).chain(args.parameters.clone()).collect();
+            outputs(out, &curves.settings.estimators, &inputs)?
+        }
+        None => Vec::new(),
+    };
+    let calibration = curves.calibrate(bootstrap(args, session))?;
+    let input = read::input("curve", path)?;
+    let note = output::note(args, &calibration.settings, vec![input], session)?;
+    output::finish(&outputs, &calibration, &note, session)
+}
+
+fn bootstrap(args: &Args, session: &Session) -> Option<Bootstrap> {
+    (args.bootstrap > 0).then(|| Bootstrap { draws: args.bootstrap as usize, seed: session.seed(None) })
 }
 
 fn model(args: &Args) -> Result<ModelChoice, Failure> {
-    let chosen = if args.model.eq_ignore_ascii_case("auto") {
-        ModelChoice::Auto
-    } else {
-        ModelChoice::Given(args.model.parse().map_err(unknown_model)?)
-    };
-    if args.estimator != EstimatorArg::Avlr {
+    let chosen: ModelChoice = args.model.parse().map_err(unknown_model)?;
+    if args.estimator != EstimatorChoice::One(Estimator::Avlr) {
         return Ok(chosen);
     }
     let without = match &chosen {
@@ -188,14 +205,14 @@ fn limits(args: &Args, model: &ModelChoice) -> Result<Vec<ParameterLimit>, Failu
         ModelChoice::Auto => {
             conflict("--parameters with --model auto: whose parameters?", "name the --model, such as N2")
         }
-        ModelChoice::Given(_) if args.estimator == EstimatorArg::Avlr => {
+        ModelChoice::Given(_) if args.estimator == EstimatorChoice::One(Estimator::Avlr) => {
             conflict("--parameters: avlr reads slopes, it cannot be bounded", "--estimator gmwm")
         }
         ModelChoice::Given(spec) => {
             let limits = parameters_file::read(path, spec)?;
             let of_axis = limits.iter().find(|l| l.axis.is_some());
             match of_axis {
-                Some(l) if args.pool != Some(PoolArg::Axes) && !args.estimator.is_single() => {
+                Some(l) if args.pool != Some(Pool::Axes) && !args.estimator.is_single() => {
                     let axis = l.axis.map_or("x", |a| a.name());
                     let message =
                         format!("{}: the axis {axis} is named, but the axes are pooled", path.display());
@@ -204,20 +221,6 @@ fn limits(args: &Args, model: &ModelChoice) -> Result<Vec<ParameterLimit>, Failu
                 _ => Ok(limits),
             }
         }
-    }
-}
-
-impl EstimatorArg {
-    const fn is_single(self) -> bool {
-        matches!(self, Self::Gmwm | Self::Rgmwm | Self::Avlr)
-    }
-}
-
-/// Parameters to be found, at least.
-fn free_parameters(model: &ModelChoice) -> usize {
-    match model {
-        ModelChoice::Given(spec) => spec.parameters(),
-        ModelChoice::Auto => 2,
     }
 }
 
@@ -232,34 +235,4 @@ fn unknown_model(e: SpecError) -> Failure {
         _ => "a model is a sum such as 2*AR1+RW+WN+QN".into(),
     };
     Failure::input(format!("--model: {e}")).hint(hint)
-}
-
-fn of_calibration(e: &CalibrationError) -> Failure {
-    let hint = match &e.source {
-        Cause::Fit(FitError::TooFewScales { .. }) => {
-            Some("record for longer, or a --model with fewer processes")
-        }
-        Cause::Fit(FitError::NoSlope { .. }) => {
-            Some("--model WN+RW, a sum of WN, RW and DR (and QN where the curve begins with its slope)")
-        }
-        Cause::Fit(FitError::NotPositive { .. }) => Some(
-            "the signal is quantised so coarsely that scales are silent: --estimator awv, or another range",
-        ),
-        Cause::Average(AverageError::Trim { .. }) => Some("a smaller --trim, or --estimator sr-awv"),
-        _ => None,
-    };
-    Failure::input(e).maybe_hint(hint.map(str::to_owned))
-}
-
-fn bootstrap(
-    args: &Args,
-    groups: &[Group],
-    outcomes: &mut [Outcome],
-    settings: &Settings,
-    session: &Session,
-) {
-    if args.bootstrap > 0 {
-        let bootstrap = Bootstrap { draws: args.bootstrap as usize, seed: session.seed(None) };
-        infer(groups, outcomes, settings, bootstrap);
-    }
 }

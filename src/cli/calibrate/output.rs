@@ -1,12 +1,12 @@
 //! The files of a calibration: one model and its curves for each estimator.
 
-use super::{Args, PoolArg, WeightingArg};
+use super::Args;
 use crate::cli::{Failure, Session, read};
-use clap::ValueEnum;
-use nav_sim::calibration::{Estimator, Group, Outcome, Settings, diagnose};
+use nav_sim::calibration::{Estimator, Outcome, Settings, diagnose};
 use nav_sim::formats::atomic::{self, AtomicFile};
 use nav_sim::formats::model_file::{self, CalibrationNote};
 use nav_sim::formats::{FileError, hash};
+use nav_sim::jobs::Calibration;
 use nav_sim::report::{self, CurvesFile, FitsFile, Input};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -66,11 +66,7 @@ fn reading(args: &Args, settings: &Settings) -> toml::Table {
         return toml::Table::new();
     }
     let mut table = args.recordings.provenance();
-    let single = settings.estimators.iter().any(|e| e.is_single());
-    let pool = args.pool.unwrap_or(if single { PoolArg::Axes } else { PoolArg::Sensor });
-    if let Some(pool) = pool.to_possible_value() {
-        table.insert("pool".to_owned(), pool.get_name().into());
-    }
+    table.insert("pool".to_owned(), args.pool.unwrap_or(settings.pool()).name().into());
     if let Some(scales) = args.tuning.scales {
         table.insert("scales".to_owned(), i64::from(scales).into());
     }
@@ -90,14 +86,6 @@ pub(super) fn note(
     Ok(CalibrationNote {
         version: env!("CARGO_PKG_VERSION").to_owned(),
         efficiency_convention: args.tuning.convention().to_owned(),
-        weighting: match args.weighting {
-            WeightingArg::Model => "model",
-            WeightingArg::Edof => "edof",
-            WeightingArg::Ci => "ci",
-            WeightingArg::None => "none",
-            WeightingArg::Full => "full",
-        }
-        .to_owned(),
         reading: reading(args, settings),
         seed: (args.bootstrap > 0).then(|| session.seed(None)),
         inputs,
@@ -107,12 +95,11 @@ pub(super) fn note(
 /// Writes one model and its curves for each estimator, and prints the fits.
 pub(super) fn finish(
     outputs: &[Output],
-    groups: &[Group],
-    outcomes: &[Outcome],
-    settings: &Settings,
+    calibration: &Calibration,
     note: &CalibrationNote,
     session: &Session,
 ) -> Result<(), Failure> {
+    let Calibration { groups, outcomes, settings } = calibration;
     let mut files = Vec::new();
     for Output { estimator, model, curves } in outputs {
         let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == *estimator).collect();

@@ -14,8 +14,6 @@ pub struct CalibrationNote {
     pub version: String,
     /// How the tuning constant follows from the efficiency: `exact` or `wv`.
     pub efficiency_convention: String,
-    /// What a scale counts: `model`, `edof`, `ci`, `none` or `full`.
-    pub weighting: String,
     /// Seed of the bootstrap, if there was one.
     pub seed: Option<u64>,
     /// How the recordings were read and grouped, key by key: what was left out at their beginning, gaps, axes, scales, pool.
@@ -54,7 +52,7 @@ impl CalibrationNote {
         put("schema", (SCHEMA as i64).into());
         put("estimator", estimator.name().into());
         put("model", settings.model.to_string().into());
-        put("weighting", self.weighting.as_str().into());
+        put("weighting", settings.weighting.name().into());
         if let Some(seed) = self.seed {
             // TOML integers are signed; larger seeds go as text.
             put("seed", i64::try_from(seed).map_or_else(|_| seed.to_string().into(), Value::from));

@@ -32,7 +32,16 @@ pub struct Tuning {
     quantization: QuantizationResponse,
 }
 
+impl Default for Tuning {
+    fn default() -> Self {
+        Self::new(Self::DEFAULT_EFFICIENCY, Convention::Exact).expect("an efficiency in the range")
+    }
+}
+
 impl Tuning {
+    /// The usual efficiency: robust to a tenth of outliers and more, at two thirds longer records.
+    pub const DEFAULT_EFFICIENCY: f64 = 0.6;
+
     /// For a wanted efficiency at the Gaussian model, 0.3 to 0.99.
     ///
     /// # Errors

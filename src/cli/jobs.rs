@@ -1,0 +1,56 @@
+//! Why a job has no result, in the words of the command line: which flag helps.
+
+use super::Failure;
+use nav_sim::calibration::{AverageError, CalibrationError, Cause, FitError};
+use nav_sim::jobs::JobError;
+
+impl From<JobError> for Failure {
+    fn from(e: JobError) -> Self {
+        match e {
+            JobError::File(e) => e.into(),
+            JobError::Signal(e) => e.into(),
+            JobError::Wavelet(e) => Self::could_not(e),
+            JobError::Calibration(e) => of_calibration(&e),
+            JobError::Curve(e) => {
+                let failure = if e.is_content() { Self::input(&e) } else { Self::could_not(&e) };
+                failure.maybe_hint(e.hint())
+            }
+            JobError::Copy { .. } => Self::input(e).hint("leave one of them out"),
+            JobError::Overlap { .. } => {
+                Self::input(e).hint("leave one of them out, or cut off the rows that both have")
+            }
+            JobError::Single { .. } => {
+                Self::input(format!("--estimator {e}")).hint("awv, sr-awv and dr-awv take several")
+            }
+            JobError::Pooled => Self::input(format!("--pool sensor: {e}")).hint("--pool axes"),
+            JobError::TwoRates { path, own, given } => {
+                let message =
+                    format!("{path}: the curve says its rate, {own} Hz; --rate-hz {given} is another");
+                Self::input(message).hint("leave --rate-hz out: it is for a CSV curve")
+            }
+            JobError::NoRate { .. } => Self::input(e)
+                .hint("give the rate with --rate-hz: correlation times and the model file need it"),
+            JobError::NoSensor { .. } => Self::input(e).hint("--sensor accel or --sensor gyro"),
+            JobError::TwoCurves { .. } => {
+                Self::input(e).hint("calibrate the recordings themselves: it averages them")
+            }
+        }
+    }
+}
+
+fn of_calibration(e: &CalibrationError) -> Failure {
+    let hint = match &e.source {
+        Cause::Fit(FitError::TooFewScales { .. }) => {
+            Some("record for longer, or a --model with fewer processes")
+        }
+        Cause::Fit(FitError::NoSlope { .. }) => {
+            Some("--model WN+RW, a sum of WN, RW and DR (and QN where the curve begins with its slope)")
+        }
+        Cause::Fit(FitError::NotPositive { .. }) => Some(
+            "the signal is quantised so coarsely that scales are silent: --estimator awv, or another range",
+        ),
+        Cause::Average(AverageError::Trim { .. }) => Some("a smaller --trim, or --estimator sr-awv"),
+        _ => None,
+    };
+    Failure::input(e).maybe_hint(hint.map(str::to_owned))
+}

@@ -1,0 +1,263 @@
+//! Static recordings, or directories of them → a noise model for each sensor or axis.
+
+use super::{JobError, Remark, Remarks};
+use crate::calibration::{
+    self, Bootstrap, Estimator, Group, Outcome, Pool, Replicate, Settings, SignalError, WarmUp, grouped,
+    infer, replicates, warm_up,
+};
+use crate::formats::hash;
+use crate::formats::recordings::{self, FileReport, ReadOptions, Report};
+use crate::imu::{Channel, Recording, Signal};
+use crate::wavelet::{Tuning, default_levels};
+use rayon::prelude::*;
+use std::cell::RefCell;
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// Which estimators.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum EstimatorChoice {
+    /// This one.
+    One(Estimator),
+    /// The three averages; of a single recording GMWM and RGMWM.
+    All,
+}
+
+impl Default for EstimatorChoice {
+    fn default() -> Self {
+        Self::One(Estimator::default())
+    }
+}
+
+impl fmt::Display for EstimatorChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::One(estimator) => estimator.fmt(f),
+            Self::All => f.write_str("all"),
+        }
+    }
+}
+
+impl FromStr for EstimatorChoice {
+    type Err = calibration::UnknownName;
+
+    fn from_str(word: &str) -> Result<Self, Self::Err> {
+        if word == "all" { Ok(Self::All) } else { word.parse().map(Self::One) }
+    }
+}
+
+impl EstimatorChoice {
+    /// Whether it takes one recording at a time, however many there are.
+    #[must_use]
+    pub fn is_single(self) -> bool {
+        matches!(self, Self::One(estimator) if estimator.is_single())
+    }
+
+    /// The estimators for so many recordings.
+    fn estimators(self, recordings: usize) -> Result<Vec<Estimator>, JobError> {
+        match self {
+            Self::One(estimator) if estimator.is_single() && recordings > 1 => {
+                Err(JobError::Single { estimator, recordings })
+            }
+            Self::One(estimator) => Ok(vec![estimator]),
+            Self::All if recordings == 1 => Ok(vec![Estimator::Gmwm, Estimator::Rgmwm]),
+            Self::All => Ok(vec![Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv]),
+        }
+    }
+}
+
+/// How to calibrate recordings.
+#[derive(Debug, Clone)]
+pub struct CalibrationOptions {
+    /// How they are read.
+    pub reading: ReadOptions,
+    /// Number of scales; none: one less than the shortest signal allows.
+    pub scales: Option<u32>,
+    /// Which estimators.
+    pub estimators: EstimatorChoice,
+    /// Which signals are replicates of one another; none: as the estimators need it ([`Settings::pool`]).
+    pub pool: Option<Pool>,
+    /// How models are fitted; its estimators and its rate follow from the recordings.
+    pub settings: Settings,
+    /// The draws behind intervals and goodness of fit; none: neither.
+    pub bootstrap: Option<Bootstrap>,
+}
+
+impl Default for CalibrationOptions {
+    fn default() -> Self {
+        Self {
+            reading: ReadOptions::default(),
+            scales: None,
+            estimators: EstimatorChoice::default(),
+            pool: None,
+            settings: Settings::default(),
+            bootstrap: Some(Bootstrap::default()),
+        }
+    }
+}
+
+/// Recordings that were measured and found to be replicates of one another.
+#[derive(Debug, Clone)]
+pub struct Measured {
+    /// What was found in the files.
+    pub report: Report,
+    /// The wavelet variances.
+    pub groups: Vec<Group>,
+    /// How models are fitted.
+    pub settings: Settings,
+    /// The draws behind intervals.
+    pub bootstrap: Option<Bootstrap>,
+}
+
+/// Models and what they were made of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Calibration {
+    /// The wavelet variances.
+    pub groups: Vec<Group>,
+    /// The models, group by group, in each estimator by estimator.
+    pub outcomes: Vec<Outcome>,
+    /// How they were fitted.
+    pub settings: Settings,
+}
+
+/// From recordings, or directories of them, to models.
+///
+/// # Errors
+/// As [`measure`] and [`Measured::calibrate`].
+pub fn calibrate(
+    paths: &[PathBuf],
+    options: &CalibrationOptions,
+    remarks: &mut dyn Remarks,
+) -> Result<Calibration, JobError> {
+    measure(paths, options, remarks)?.calibrate()
+}
+
+/// The first half, which reads: what is wrong with the files is known before the long half begins.
+///
+/// # Errors
+/// When a recording cannot be read, is too short, or is no replicate of its own; when the estimator takes one recording only.
+pub fn measure(
+    paths: &[PathBuf],
+    options: &CalibrationOptions,
+    remarks: &mut dyn Remarks,
+) -> Result<Measured, JobError> {
+    let CalibrationOptions { reading, scales, estimators, pool, settings, bootstrap } = options;
+    // As many scales as parameters, and one that the default leaves out.
+    let needed = scales.map_or(2 << settings.model.parameters(), |j| 1 << j);
+    let reading = ReadOptions { min_samples: needed, ..reading.clone() };
+    let look = |recording: Recording| Look::new(&recording, *scales, &settings.tuning);
+    let (looks, report) = visit(paths, &reading, &look, remarks)?;
+    let looks = looks.into_iter().collect::<Result<Vec<_>, _>>()?;
+    distinct(&looks)?;
+    if let Some((first, later, share)) = report.overlap() {
+        return Err(JobError::Overlap { later: later.to_owned(), first: first.to_owned(), share });
+    }
+    let rate_hz = report.files[0].rate_hz;
+    warm_ups(&looks, reading.skip_s, rate_hz, remarks);
+    shortest(&report, *scales, remarks);
+    let estimators = estimators.estimators(report.files.iter().map(|f| f.samples.len()).sum())?;
+    let settings = Settings { estimators, rate_hz, ..settings.clone() };
+    if *pool == Some(Pool::Sensor) && settings.pool() == Pool::Axes {
+        return Err(JobError::Pooled);
+    }
+    let measured = looks.into_iter().flat_map(|look| look.replicates).collect();
+    let groups = grouped(measured, pool.unwrap_or(settings.pool()));
+    Ok(Measured { report, groups, settings, bootstrap: *bootstrap })
+}
+
+impl Measured {
+    /// The second half, which fits.
+    ///
+    /// # Errors
+    /// When a trim leaves no replicate, or a curve is too short for the model.
+    pub fn calibrate(self) -> Result<Calibration, JobError> {
+        let Self { groups, settings, bootstrap, .. } = self;
+        let outcomes = calibration::calibrate(&groups, &settings)?;
+        Ok(Calibration { groups, outcomes, settings }.with_inference(bootstrap))
+    }
+}
+
+impl Calibration {
+    /// The same with intervals and goodness of fit, if they are asked for.
+    pub(super) fn with_inference(mut self, bootstrap: Option<Bootstrap>) -> Self {
+        if let Some(bootstrap) = bootstrap {
+            infer(&self.groups, &mut self.outcomes, &self.settings, bootstrap);
+        }
+        self
+    }
+}
+
+/// Shows recordings one by one; what was found in them is remarked.
+pub(super) fn visit<T: Send>(
+    paths: &[PathBuf],
+    reading: &ReadOptions,
+    look: &(dyn Fn(Recording) -> T + Sync),
+    remarks: &mut dyn Remarks,
+) -> Result<(Vec<T>, Report), JobError> {
+    let listener = RefCell::new(&mut *remarks);
+    let tell = |done, all| listener.borrow_mut().progress(done, all);
+    let (looks, report) = recordings::visit(paths, reading, look, &tell)?;
+    remarks.remark(Remark::Read(&report));
+    Ok((looks, report))
+}
+
+/// What is kept of a recording, or of one signal of it.
+struct Look {
+    recording: String,
+    /// What tells the samples of each signal from others.
+    signals: Vec<(Channel, String)>,
+    warm_ups: Vec<(Channel, WarmUp)>,
+    replicates: Vec<(Channel, Replicate)>,
+}
+
+impl Look {
+    fn new(recording: &Recording, levels: Option<u32>, tuning: &Tuning) -> Result<Self, SignalError> {
+        let begins_otherwise = |s: &Signal| warm_up(&s.samples).map(|w| (s.channel, w));
+        Ok(Self {
+            recording: recording.name.clone(),
+            signals: recording.signals.par_iter().map(|s| (s.channel, hash::samples(&s.samples))).collect(),
+            warm_ups: recording.signals.par_iter().filter_map(begins_otherwise).collect(),
+            replicates: replicates(recording, levels, tuning)?,
+        })
+    }
+}
+
+/// Refuses copies of a recording.
+fn distinct(looks: &[Look]) -> Result<(), JobError> {
+    for (i, look) in looks.iter().enumerate() {
+        let copy = |other: &&Look| {
+            other.recording != look.recording && other.signals.iter().any(|s| look.signals.contains(s))
+        };
+        if let Some(first) = looks[..i].iter().find(copy) {
+            return Err(JobError::Copy { copy: look.recording.clone(), first: first.recording.clone() });
+        }
+    }
+    Ok(())
+}
+
+/// Remarks which recordings do not begin as they go on after what was skipped.
+fn warm_ups(looks: &[Look], skipped_s: f64, rate_hz: f64, remarks: &mut dyn Remarks) {
+    // The signals of a long recording are looked at one by one.
+    for of_one in looks.chunk_by(|a, b| a.recording == b.recording) {
+        let found: Vec<(Channel, WarmUp)> = of_one.iter().flat_map(|look| &look.warm_ups).copied().collect();
+        let Some((_, longest)) = found.iter().max_by_key(|(_, w)| w.samples) else { continue };
+        let skip_s = (skipped_s + longest.samples as f64 / rate_hz).ceil();
+        remarks.remark(Remark::WarmUp { recording: &of_one[0].recording, found: &found, skip_s });
+    }
+}
+
+/// Remarks which recording is so much shorter than the others that it costs all of them scales.
+fn shortest(report: &Report, scales: Option<u32>, remarks: &mut dyn Remarks) {
+    let levels = |samples: usize| scales.unwrap_or(u32::MAX).min(default_levels(samples));
+    let recordings = report.files.iter().flat_map(FileReport::recordings);
+    let Some((recording, samples)) = recordings.clone().min_by_key(|(_, samples)| levels(*samples)) else {
+        return;
+    };
+    let mut found: Vec<u32> = recordings.map(|(_, samples)| levels(samples)).collect();
+    found.sort_unstable();
+    let (scales, usual) = (found[0], found[found.len() / 2]);
+    if scales < usual {
+        remarks.remark(Remark::Shortest { recording: &recording, samples, scales, usual });
+    }
+}

@@ -1,0 +1,90 @@
+//! Why a job has no result.
+
+use crate::calibration::{CalibrationError, Estimator, SignalError};
+use crate::formats::FileError;
+use crate::formats::curve_file::CurveError;
+use crate::wavelet::WaveletError;
+
+/// Why a job has no result.
+#[derive(Debug, thiserror::Error)]
+pub enum JobError {
+    /// A file that cannot be read.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// A signal without a wavelet variance.
+    #[error(transparent)]
+    Signal(#[from] SignalError),
+    /// Degrees of freedom that cannot be estimated.
+    #[error(transparent)]
+    Wavelet(#[from] WaveletError),
+    /// No fit.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
+    /// A curve that cannot be read.
+    #[error(transparent)]
+    Curve(#[from] CurveError),
+    /// Copies: one replicate would count as two, and intervals come out too narrow.
+    #[error("{copy} is a copy of {first}: it would count as two replicates")]
+    Copy {
+        /// The recording.
+        copy: String,
+        /// The one it is a copy of.
+        first: String,
+    },
+    /// Recordings that have samples in common, such as a copy less its first rows.
+    #[error(
+        "{later} and {first} have samples in common, about {:.0} % of each: they are no two replicates",
+        100.0 * share
+    )]
+    Overlap {
+        /// The later recording.
+        later: String,
+        /// The one before.
+        first: String,
+        /// Which part of one is in the other.
+        share: f64,
+    },
+    /// An estimator of one recording was given several.
+    #[error("{estimator} takes one recording at a time; there are {recordings}")]
+    Single {
+        /// The estimator.
+        estimator: Estimator,
+        /// How many recordings there are.
+        recordings: usize,
+    },
+    /// An estimator of one signal was to pool the axes.
+    #[error("gmwm, rgmwm and avlr take one signal at a time")]
+    Pooled,
+    /// A curve that says its rate, and another one given.
+    #[error("{path}: the curve says its rate, {own} Hz; {given} Hz is another")]
+    TwoRates {
+        /// File.
+        path: String,
+        /// Its rate.
+        own: f64,
+        /// The rate given.
+        given: f64,
+    },
+    /// A curve without a rate.
+    #[error("{path}: the curve does not say its sample rate")]
+    NoRate {
+        /// File.
+        path: String,
+    },
+    /// A curve without a sensor.
+    #[error("{path}: the curve does not say of which sensor it is")]
+    NoSensor {
+        /// File.
+        path: String,
+    },
+    /// Two curves for one model.
+    #[error("{path}: there are two curves of {name} for {estimator}")]
+    TwoCurves {
+        /// File.
+        path: String,
+        /// What they are of.
+        name: String,
+        /// The estimator.
+        estimator: Estimator,
+    },
+}

@@ -1,0 +1,50 @@
+//! What is found on the way to a result.
+
+use crate::calibration::WarmUp;
+use crate::formats::recordings::Report;
+use crate::imu::Channel;
+
+/// What a user may want to know beside the result.
+#[derive(Debug, Clone, Copy)]
+pub enum Remark<'a> {
+    /// What was found in the recordings, and what is doubtful about them.
+    Read(&'a Report),
+    /// A recording does not begin as it goes on.
+    WarmUp {
+        /// The recording.
+        recording: &'a str,
+        /// Its signals of which that is so.
+        found: &'a [(Channel, WarmUp)],
+        /// Seconds to leave out at its beginning, with those that are left out already.
+        skip_s: f64,
+    },
+    /// A recording is so much shorter than the others that it costs all of them scales.
+    Shortest {
+        /// The recording.
+        recording: &'a str,
+        /// Its samples.
+        samples: usize,
+        /// The scales that all have for it.
+        scales: u32,
+        /// The scales that half of them would have.
+        usual: u32,
+    },
+}
+
+/// Listens to remarks.
+pub trait Remarks {
+    /// So many of all recordings are read, 0 at the beginning.
+    fn progress(&mut self, done: usize, all: usize);
+    /// Something was found.
+    fn remark(&mut self, remark: Remark<'_>);
+}
+
+/// Listens to nothing.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Silence;
+
+impl Remarks for Silence {
+    fn progress(&mut self, _: usize, _: usize) {}
+
+    fn remark(&mut self, _: Remark<'_>) {}
+}

@@ -1,0 +1,104 @@
+//! Static recordings → their wavelet variances.
+
+use super::calibrate::visit;
+use super::{JobError, Remarks};
+use crate::calibration::{Replicate, UnknownName, replicates};
+use crate::formats::recordings::ReadOptions;
+use crate::imu::{Channel, Recording};
+use crate::report::{SignalCurves, SignalsFile};
+use crate::wavelet::{Tuning, WaveletError, haar, interval};
+use rayon::prelude::*;
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// Where the degrees of freedom of intervals are from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Intervals {
+    /// The field's usual ones, conservative beyond the first scale.
+    #[default]
+    Eta3,
+    /// From the autocovariance of the coefficients: cover at their level.
+    LargeSample,
+}
+
+impl Intervals {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Eta3, Self::LargeSample];
+
+    /// Name in files and on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Eta3 => "eta3",
+            Self::LargeSample => "large-sample",
+        }
+    }
+}
+
+impl fmt::Display for Intervals {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Intervals {
+    type Err = UnknownName;
+
+    fn from_str(word: &str) -> Result<Self, UnknownName> {
+        UnknownName::find(word, &Self::ALL, Self::name)
+    }
+}
+
+/// How wavelet variances are taken.
+#[derive(Debug, Clone, Default)]
+pub struct WaveletOptions {
+    /// How the recordings are read.
+    pub reading: ReadOptions,
+    /// Number of scales; none: one less than each signal allows.
+    pub scales: Option<u32>,
+    /// Tuning of the robust ones.
+    pub tuning: Tuning,
+    /// Where the intervals' degrees of freedom are from.
+    pub intervals: Intervals,
+}
+
+/// The wavelet variances of all signals of recordings, or directories of them.
+///
+/// # Errors
+/// When a recording cannot be read, or is too short for the scales.
+pub fn wavelet_variances(
+    paths: &[PathBuf],
+    options: &WaveletOptions,
+    remarks: &mut dyn Remarks,
+) -> Result<SignalsFile, JobError> {
+    let WaveletOptions { reading, scales, tuning, intervals } = options;
+    // Four samples have a scale.
+    let reading = ReadOptions { min_samples: scales.map_or(4, |j| 1 << j), ..reading.clone() };
+    let look = |recording: Recording| -> Result<Vec<SignalCurves>, JobError> {
+        let measured = replicates(&recording, *scales, tuning)?;
+        let curves = |(channel, replicate): &(Channel, Replicate)| {
+            let edof = degrees_of_freedom(*intervals, &recording, *channel, replicate)?;
+            Ok(SignalCurves::new(*channel, replicate, recording.rate_hz, edof, tuning.efficiency()))
+        };
+        Ok(measured.par_iter().map(curves).collect::<Result<_, WaveletError>>()?)
+    };
+    let (looks, report) = visit(paths, &reading, &look, remarks)?;
+    let signals = looks.into_iter().collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect();
+    Ok(SignalsFile::new(report.files[0].rate_hz, tuning.efficiency(), intervals.name(), signals))
+}
+
+fn degrees_of_freedom(
+    intervals: Intervals,
+    recording: &Recording,
+    channel: Channel,
+    replicate: &Replicate,
+) -> Result<Vec<f64>, WaveletError> {
+    let levels = 1..=replicate.classical.len() as u32;
+    match (intervals, recording.signal(channel)) {
+        (Intervals::LargeSample, Some(signal)) => levels
+            .map(|level| Ok(interval::edof_large_sample(&haar::coefficients(&signal.samples, level)?, level)))
+            .collect(),
+        _ => Ok(levels.map(|level| interval::edof_eta3(replicate.samples, level)).collect()),
+    }
+}
