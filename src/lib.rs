@@ -28,6 +28,8 @@
 //! what stands above it in the list of its `lib.rs`, held by `tests/layering.rs`. Nothing below the command line
 //! reads a clock, the environment, a terminal or a source of randomness: generators and seeds are arguments.
 //!
+//! What a command does is one call of [`jobs`]: files in, results out, remarks on the way as values.
+//!
 //! The crates are for the compiler too: a changed line in the filter recompiles `nav-sim-navigation` and what is
 //! above it, and its unit tests are `cargo test -p nav-sim-navigation`.
 

@@ -48,5 +48,5 @@ pub use outcome::{
 pub use pipeline::{CalibrationError, Cause, calibrate, fit_curve, infer};
 pub use uncertainty::ALIKE_LEVEL;
 pub use words::{
-    Share, advice, correlation_time_s, duration, effects, percent, reasons, shares, undetermined,
+    Share, advice, correlation_time_s, duration, effects, percent, reasons, shares, tau_s, undetermined,
 };

@@ -1,7 +1,8 @@
 //! Why a job has no result, in the words of the command line: which flag helps.
 
 use super::Failure;
-use nav_sim::calibration::{AverageError, CalibrationError, Cause, FitError};
+use nav_sim::calibration::{AverageError, CalibrationError, Cause, FitError, ModelSpec, SpecError};
+use nav_sim::formats::suggest::nearest;
 use nav_sim::jobs::JobError;
 
 impl From<JobError> for Failure {
@@ -53,4 +54,18 @@ fn of_calibration(e: &CalibrationError) -> Failure {
         _ => None,
     };
     Failure::input(e).maybe_hint(hint.map(str::to_owned))
+}
+
+/// A `--model` that is none.
+pub(super) fn unknown_model(e: SpecError) -> Failure {
+    let hint = match &e {
+        SpecError::Unknown { term, .. } => match nearest(term, ModelSpec::legal()) {
+            Some(meant) => format!("did you mean \"{meant}\"?"),
+            None => {
+                format!("processes and models: {}, auto", ModelSpec::legal().collect::<Vec<_>>().join(", "))
+            }
+        },
+        _ => "a model is a sum such as 2*AR1+RW+WN+QN".into(),
+    };
+    Failure::input(format!("--model: {e}")).hint(hint)
 }

@@ -25,11 +25,13 @@
 mod calibrate;
 mod curves;
 mod error;
+mod files;
 mod remarks;
 mod wavelet;
 
 pub use calibrate::{Calibration, CalibrationOptions, EstimatorChoice, Measured, calibrate, measure};
 pub use curves::{Curves, read_curves};
 pub use error::JobError;
+pub use files::ModelFiles;
 pub use remarks::{Remark, Remarks, Silence};
 pub use wavelet::{Intervals, WaveletOptions, wavelet_variances};

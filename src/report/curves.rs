@@ -1,6 +1,6 @@
 //! Wavelet-variance curves as JSON: of signals (`wv`), and of fits (`<model>.wv.json`).
 
-use crate::calibration::{Estimator, Group, Outcome, Replicate, Settings, implied};
+use crate::calibration::{Estimator, Group, Outcome, Replicate, Settings, implied, tau_s};
 use crate::imu::Channel;
 use crate::wavelet::{Tuning, interval};
 use serde::{Deserialize, Serialize};
@@ -77,11 +77,6 @@ impl SignalCurves {
             edof,
         }
     }
-}
-
-/// Scale of a level (s).
-pub(super) fn tau_s(level: u32, rate_hz: f64) -> f64 {
-    f64::from(level).exp2() / rate_hz
 }
 
 /// What `wv` prints.

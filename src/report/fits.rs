@@ -1,10 +1,10 @@
 //! Fitted models as JSON and as words.
 
-use super::curves::tau_s;
 use super::replicates::ReplicateEntry;
 use crate::calibration::{
     ALIKE_LEVEL, Candidate, Diagnosis, Estimator, Goodness, Indistinct, Inference, LevelSpread, Outcome,
-    ParameterInterval, Ranking, Settings, Share, correlation_time_s, percent, reasons, shares, undetermined,
+    ParameterInterval, Ranking, Settings, Share, correlation_time_s, percent, reasons, shares, tau_s,
+    undetermined,
 };
 use crate::imu::Sensor;
 use crate::noise::{Composite, ParameterRef, Process};

@@ -1,7 +1,6 @@
 //! Which recordings are abnormal, as JSON and as words.
 
-use super::curves::tau_s;
-use crate::calibration::{Alarm, AxisScores, Diagnosis, LeftOut, Movement, advice, effects};
+use crate::calibration::{Alarm, AxisScores, Diagnosis, LeftOut, Movement, advice, effects, tau_s};
 use crate::imu::Sensor;
 use serde::Serialize;
 use std::collections::BTreeMap;

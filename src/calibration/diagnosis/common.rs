@@ -3,7 +3,7 @@
 //! ln (classical / robust) of every signal has, when the noise is Gaussian, the mean (1/e − 1)/eta and the variance
 //! (1/e − 1)·2/eta (see [`super`]); quantization noise, which the robust variance reads high, is allowed for. Looked at is the median over the signals, so that a minority makes no alarm.
 
-use super::{Piece, Question};
+use super::piece::{Piece, Test};
 use crate::wavelet::Tuning;
 
 /// Standard deviations of the median: 1 in 10⁶ by chance, at each of some ten scales.
@@ -28,15 +28,15 @@ pub struct CommonOutliers {
 
 /// Looks at all signals of a sensor together.
 pub(super) fn common(pieces: &[Piece<'_>], tuning: &Tuning) -> Option<CommonOutliers> {
-    let question = Question::Outliers;
+    let test = Test::Outliers;
     let mut found: Option<CommonOutliers> = None;
-    for level in 0..question.levels(pieces) {
+    for level in 0..test.levels(pieces) {
         let (mut logs, mut variance) = (Vec::new(), 0.0);
         for piece in pieces {
             for replicate in piece.replicates.iter().flatten() {
-                let eta = question.edof(piece.law.edof(replicate.samples)[level], tuning.efficiency());
+                let eta = test.edof(piece.law.edof(replicate.samples)[level], tuning.efficiency());
                 let (read_high, _) = tuning.quantization().factor(piece.law.quantization[level]);
-                logs.push(question.value(replicate, level) + read_high.ln() - 1.0 / eta);
+                logs.push(test.value(replicate, level) + read_high.ln() - 1.0 / eta);
                 variance += 2.0 / eta;
             }
         }

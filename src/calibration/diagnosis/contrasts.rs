@@ -6,12 +6,14 @@
 //! numbers, alike on the axes, F follows Fisher's law with A and A(n − 1) degrees of freedom, or lies below.
 //! The spread is that of the contrast itself, so however the scales hang together, nothing is assumed of it.
 
-use super::FEWEST;
 use crate::curve::sampling::SamplingLaw;
 use crate::rng::Generator;
 use crate::uncertainty::spread::variance_of_log;
 use rand::RngExt;
 use rand_distr::StandardNormal;
+
+/// Fewer recordings cannot say which of them is abnormal.
+pub(super) const FEWEST: usize = 4;
 
 /// Numbers of neighbouring scales that are taken together.
 const WIDTHS: [usize; 3] = [1, 3, 5];

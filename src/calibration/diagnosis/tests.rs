@@ -1,7 +1,10 @@
 //! Alarms in simulated sets: as rare as said where recordings are alike, there where one is not.
 
 use super::*;
+use crate::curve::{Estimator, Replicate};
 use crate::imu::Channel;
+use crate::imu::{Axis, Sensor};
+use crate::outcome::Settings;
 use crate::rng::{Generator, StreamKey};
 use crate::wavelet::{Convention, Tuning, both};
 use crate::{ModelChoice, Pool, Trim, Weighting, advice, calibrate, effects, grouped, trend};

@@ -41,6 +41,7 @@ pub(super) fn three_digits(x: f64) -> String {
 }
 
 /// Scale of a level (s).
-pub(super) fn tau_s(level: u32, rate_hz: f64) -> f64 {
+#[must_use]
+pub fn tau_s(level: u32, rate_hz: f64) -> f64 {
     f64::from(level).exp2() / rate_hz
 }

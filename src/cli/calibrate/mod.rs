@@ -2,15 +2,15 @@
 
 mod output;
 
+use super::jobs::unknown_model;
 use super::parse::words;
 use super::recordings::{RecordingArgs, Said, sensor};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
 use nav_sim::calibration::{
-    Bootstrap, Estimator, ModelChoice, ModelSpec, ParameterLimit, Pool, Settings, SpecError, Trim, Weighting,
+    Bootstrap, Estimator, ModelChoice, ModelSpec, ParameterLimit, Pool, Settings, Trim, Weighting,
 };
 use nav_sim::formats::parameters_file;
-use nav_sim::formats::suggest::nearest;
 use nav_sim::imu::Sensor;
 use nav_sim::jobs::{self, CalibrationOptions, EstimatorChoice};
 use output::outputs;
@@ -222,17 +222,4 @@ fn limits(args: &Args, model: &ModelChoice) -> Result<Vec<ParameterLimit>, Failu
             }
         }
     }
-}
-
-fn unknown_model(e: SpecError) -> Failure {
-    let hint = match &e {
-        SpecError::Unknown { term, .. } => match nearest(term, ModelSpec::legal()) {
-            Some(meant) => format!("did you mean \"{meant}\"?"),
-            None => {
-                format!("processes and models: {}, auto", ModelSpec::legal().collect::<Vec<_>>().join(", "))
-            }
-        },
-        _ => "a model is a sum such as 2*AR1+RW+WN+QN".into(),
-    };
-    Failure::input(format!("--model: {e}")).hint(hint)
 }

@@ -2,21 +2,12 @@
 
 use super::Args;
 use crate::cli::{Failure, Session, read};
-use nav_sim::calibration::{Estimator, Outcome, Settings, diagnose};
-use nav_sim::formats::atomic::{self, AtomicFile};
+use nav_sim::calibration::{Estimator, Settings, diagnose};
+use nav_sim::formats::atomic;
 use nav_sim::formats::model_file::{self, CalibrationNote};
-use nav_sim::formats::{FileError, hash};
-use nav_sim::jobs::Calibration;
-use nav_sim::report::{self, CurvesFile, FitsFile, Input};
-use std::io::Write;
+use nav_sim::jobs::{Calibration, ModelFiles};
+use nav_sim::report::{self, FitsFile, Input};
 use std::path::{Path, PathBuf};
-
-/// One estimator's files.
-pub(super) struct Output {
-    estimator: Estimator,
-    model: PathBuf,
-    curves: PathBuf,
-}
 
 /// Fails before the work is done, not after, if nothing can be written there.
 pub(super) fn writable(out: &Path) -> Result<(), Failure> {
@@ -30,18 +21,13 @@ pub(super) fn outputs(
     out: &Path,
     estimators: &[Estimator],
     inputs: &[PathBuf],
-) -> Result<Vec<Output>, Failure> {
-    let output = |estimator: &Estimator| {
-        let suffix = if estimators.len() > 1 { format!("_{}", estimator.name()) } else { String::new() };
-        let model = with_suffix(out, &suffix);
-        let curves = model.with_extension("wv.json");
-        for path in [&model, &curves] {
-            writable(path)?;
-            atomic::guard_inputs(path, inputs.iter().map(PathBuf::as_path))?;
-        }
-        Ok(Output { estimator: *estimator, model, curves })
-    };
-    estimators.iter().map(output).collect()
+) -> Result<Vec<ModelFiles>, Failure> {
+    let outputs = ModelFiles::of(out, estimators);
+    for path in outputs.iter().flat_map(|files| [&files.model, &files.curves]) {
+        writable(path)?;
+        atomic::guard_inputs(path, inputs.iter().map(PathBuf::as_path))?;
+    }
+    Ok(outputs)
 }
 
 /// Refuses an output that cannot be replaced by a file: several are made of it, by its name.
@@ -94,21 +80,17 @@ pub(super) fn note(
 
 /// Writes one model and its curves for each estimator, and prints the fits.
 pub(super) fn finish(
-    outputs: &[Output],
+    outputs: &[ModelFiles],
     calibration: &Calibration,
     note: &CalibrationNote,
     session: &Session,
 ) -> Result<(), Failure> {
-    let Calibration { groups, outcomes, settings } = calibration;
     let mut files = Vec::new();
-    for Output { estimator, model, curves } in outputs {
-        let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == *estimator).collect();
-        let text = report::json(&CurvesFile::new(groups, &own, settings));
-        let blake3 = hash::of_bytes(text.as_bytes());
-        let file = note.model_file(&own, settings, Some(&blake3));
-        pair([(curves, text), (model, model_file::to_toml(&file))])?;
-        files.extend([model, curves].map(|p| p.display().to_string()));
+    for output in outputs {
+        output.write(calibration, note)?;
+        files.extend([&output.model, &output.curves].map(|p| p.display().to_string()));
     }
+    let Calibration { groups, outcomes, settings } = calibration;
     let diagnoses = diagnose(groups, outcomes, settings);
     if session.json() {
         let json = report::json(&FitsFile::new(outcomes, &diagnoses, settings, files.clone()));
@@ -137,21 +119,6 @@ const WHICH: &str = "\
 which model suits a filter is a question about navigation: calibrate without one of the recordings, nav-sim run each model \
 with --static that recording, and nav-sim compare";
 
-/// Writes two files that belong together: both are on the disk before either has its name. Should the second not get
-/// its name, the hash in it tells that the first is not of it.
-fn pair(files: [(&PathBuf, String); 2]) -> Result<(), FileError> {
-    let staged = files.map(|(path, text)| -> Result<AtomicFile, FileError> {
-        let mut file = AtomicFile::create(path)?;
-        let written = file.write_all(text.as_bytes()).and_then(|()| file.flush());
-        written.map_err(|e| FileError::io(path, e))?;
-        Ok(file)
-    });
-    let [first, second] = staged;
-    let (first, second) = (first?, second?);
-    first.commit()?;
-    second.commit()
-}
-
 /// Refuses to replace a file of the default name that no calibration wrote: nobody asked for it by name.
 pub(super) fn not_of_others(out: &Path) -> Result<(), Failure> {
     if !out.exists() {
@@ -168,10 +135,4 @@ pub(super) fn not_of_others(out: &Path) -> Result<(), Failure> {
     let message =
         format!("{} is not a model that nav-sim calibrate wrote: it is not replaced", out.display());
     Err(Failure::input(message).hint("name the output with -o, or move that file away"))
-}
-
-fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
-    let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    let extension = path.extension().map_or_else(String::new, |e| format!(".{}", e.to_string_lossy()));
-    path.with_file_name(format!("{stem}{suffix}{extension}"))
 }

@@ -1,0 +1,76 @@
+//! The replicates of one axis, and what is looked at in them.
+
+use crate::curve::sampling::SamplingLaw;
+use crate::curve::{Estimator, Group, Replicate};
+use crate::imu::Axis;
+use crate::noise::Composite;
+use crate::outcome::Outcome;
+use crate::wavelet::interval::edof_robust;
+
+/// Degrees of freedom from which the scatter of classical over robust follows its large-sample law.
+const LARGE_SAMPLE: f64 = 30.0;
+
+/// The replicates of one axis, by recording.
+pub(super) struct Piece<'a> {
+    pub(super) axis: Axis,
+    pub(super) model: &'a Composite,
+    pub(super) law: SamplingLaw,
+    pub(super) replicates: Vec<Option<&'a Replicate>>,
+}
+
+/// The pieces of a sensor's groups.
+pub(super) fn axes<'a>(own: &[&'a Group], names: &[&str], outcomes: &'a [Outcome]) -> Vec<Piece<'a>> {
+    let levels = own.iter().flat_map(|g| &g.replicates).map(|r| r.classical.len()).min().unwrap_or(0);
+    let piece = |axis: Axis| {
+        let group = own.iter().find(|g| g.replicates.iter().any(|r| r.axis == Some(axis)))?;
+        // The last estimator is the most robust.
+        let model = &outcomes.iter().rfind(|o| o.scope == group.scope)?.fit.composite;
+        let of = |name: &&str| group.replicates.iter().find(|r| r.name == **name && r.axis == Some(axis));
+        let law = SamplingLaw::new(model, levels);
+        Some(Piece { axis, model, law, replicates: names.iter().map(of).collect() })
+    };
+    Axis::ALL.into_iter().filter_map(piece).collect()
+}
+
+/// What is looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Test {
+    /// ln robust wavelet variance.
+    Noise,
+    /// ln (classical / robust): only more than in the others is suspect.
+    Outliers,
+}
+
+impl Test {
+    pub(super) fn value(self, r: &Replicate, level: usize) -> f64 {
+        let robust = r.value(Estimator::SrAwv, level).ln();
+        match self {
+            Self::Noise => robust,
+            Self::Outliers => r.value(Estimator::Awv, level).ln() - robust,
+        }
+    }
+
+    /// Degrees of freedom of a chi-square that scatters as much, given those of the classical variance.
+    pub(super) fn edof(self, classical: f64, efficiency: f64) -> f64 {
+        match self {
+            Self::Noise => edof_robust(classical, efficiency),
+            Self::Outliers => classical * efficiency / (1.0 - efficiency),
+        }
+    }
+
+    /// How many levels can be looked at.
+    pub(super) fn levels(self, pieces: &[Piece<'_>]) -> usize {
+        let enough = |p: &Piece<'_>| {
+            let edof = p.law.edof(p.replicates.iter().flatten().map(|r| r.samples).min().unwrap_or(0));
+            edof.iter().take_while(|e| self == Self::Noise || **e >= LARGE_SAMPLE).count()
+        };
+        pieces.iter().map(enough).min().unwrap_or(0)
+    }
+
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Self::Noise => "noise",
+            Self::Outliers => "outliers",
+        }
+    }
+}

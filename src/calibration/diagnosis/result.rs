@@ -1,0 +1,111 @@
+//! What is said of each recording.
+
+use super::common::CommonOutliers;
+use super::leave_out::LeftOut;
+use crate::curve::{Estimator, Pool};
+use crate::imu::{Axis, Sensor};
+
+/// What is abnormal about a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// Nothing.
+    Normal,
+    /// Its classical wavelet variance is above its robust one, more than in the others: outliers within it.
+    Outliers,
+    /// Its level drifts as that of no other does.
+    Drift,
+    /// Its robust wavelet variance is: its noise is another.
+    Noise,
+}
+
+impl Verdict {
+    /// Name in files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Normal => "normal",
+            Self::Outliers => "outliers",
+            Self::Drift => "drift",
+            Self::Noise => "abnormal",
+        }
+    }
+}
+
+/// A drift that no other recording has.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DriftAlarm {
+    /// Probability that the most unusual of recordings that are alike is as unusual.
+    pub p_value: f64,
+    /// Mean of the later half less that of the earlier one, of each axis (units).
+    pub change: Vec<(Axis, f64)>,
+    /// The same against the others, in standard deviations.
+    pub deviations: Vec<(Axis, f64)>,
+}
+
+/// Why a recording is abnormal.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Alarm {
+    /// Probability that the most unusual of recordings that are alike is as unusual.
+    pub p_value: f64,
+    /// First and last level of the neighbouring scales at which it is most unusual.
+    pub levels: (u32, u32),
+    /// What was looked at there, on all axes, against the others, in standard deviations.
+    pub deviations: Vec<(Axis, f64)>,
+}
+
+/// The scores of a recording at every scale, on one axis: against the mean of the others that are not abnormal, in
+/// standard deviations (those of the others, pooled over the axes, but no less than noise alone makes).
+#[derive(Debug, Clone, PartialEq)]
+pub struct AxisScores {
+    /// Axis.
+    pub axis: Axis,
+    /// Of ln robust wavelet variance, level 1 first.
+    pub noise: Vec<f64>,
+    /// Of ln (classical / robust), of as many levels as have 30 degrees of freedom.
+    pub outliers: Vec<f64>,
+}
+
+/// One sensor of one recording against the others.
+///
+/// Alarms are rare in sets of alike recordings: with a probability of 2.5 % there is one of their noise, and as
+/// often one of outliers, and one of drift, however much alike recordings differ, if ln nu does so by Gaussian numbers
+/// independent from axis to axis. Two recordings that are abnormal alike hide behind each
+/// other unless there are six or more; three do in any case.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Diagnosis {
+    /// Recording.
+    pub name: String,
+    /// Sensor.
+    pub sensor: Sensor,
+    /// Axes of the sensor that it has.
+    pub axes: usize,
+    /// What is said of it.
+    pub verdict: Verdict,
+    /// Why its noise is not that of the others.
+    pub noise: Option<Alarm>,
+    /// Why there are outliers within it.
+    pub outliers: Option<Alarm>,
+    /// Why its level is said to drift.
+    pub drift: Option<DriftAlarm>,
+    /// Scores; empty when there are fewer than four recordings.
+    pub scores: Vec<AxisScores>,
+    /// Outliers that most signals of this sensor hold, in all recordings alike.
+    pub common: Option<CommonOutliers>,
+    /// Whether the axes of the sensor were pooled, and what DR-AWV dropped at each end of each scale, if it ran.
+    pub dropped: Option<(Pool, usize)>,
+    /// What leaving it out does to each fit.
+    pub left_out: Vec<LeftOut>,
+    /// The fits to this sensor whose model does not describe the curve, by the J-test.
+    pub misfits: Vec<Misfit>,
+}
+
+/// A fit that the J-test rejects at 5 %.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Misfit {
+    /// The group, `accel` or `accel.x`.
+    pub group: String,
+    /// The estimator.
+    pub estimator: Estimator,
+    /// Probability of such a distance if the model holds.
+    pub p_value: f64,
+}

@@ -1,0 +1,65 @@
+//! The files of a calibration: for each estimator a model and the curves behind it.
+
+use super::Calibration;
+use crate::calibration::{Estimator, Outcome};
+use crate::formats::atomic::AtomicFile;
+use crate::formats::model_file::{self, CalibrationNote};
+use crate::formats::{FileError, hash};
+use crate::report::{self, CurvesFile};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// The files of one estimator.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ModelFiles {
+    /// The estimator.
+    pub estimator: Estimator,
+    /// The model file.
+    pub model: PathBuf,
+    /// The curves, `<model>.wv.json` beside it.
+    pub curves: PathBuf,
+}
+
+impl ModelFiles {
+    /// The files of each estimator: of several `<out>_<estimator>.toml`.
+    #[must_use]
+    pub fn of(out: &Path, estimators: &[Estimator]) -> Vec<Self> {
+        let files = |estimator: &Estimator| {
+            let suffix = if estimators.len() > 1 { format!("_{estimator}") } else { String::new() };
+            let model = with_suffix(out, &suffix);
+            Self { estimator: *estimator, curves: model.with_extension("wv.json"), model }
+        };
+        estimators.iter().map(files).collect()
+    }
+
+    /// Writes the models of the estimator, with the hash of their curves in them.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub fn write(&self, calibration: &Calibration, note: &CalibrationNote) -> Result<(), FileError> {
+        let Calibration { groups, outcomes, settings } = calibration;
+        let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == self.estimator).collect();
+        let curves = report::json(&CurvesFile::new(groups, &own, settings));
+        let blake3 = hash::of_bytes(curves.as_bytes());
+        let model = model_file::to_toml(&note.model_file(&own, settings, Some(&blake3)));
+        // Both are on the disk before either has its name. Should the second not get its name, the hash in it tells
+        // that the first is not of it.
+        let (curves, model) = (staged(&self.curves, &curves)?, staged(&self.model, &model)?);
+        curves.commit()?;
+        model.commit()
+    }
+}
+
+/// A file that is written but does not have its name yet.
+fn staged(path: &Path, text: &str) -> Result<AtomicFile, FileError> {
+    let mut file = AtomicFile::create(path)?;
+    let written = file.write_all(text.as_bytes()).and_then(|()| file.flush());
+    written.map_err(|e| FileError::io(path, e))?;
+    Ok(file)
+}
+
+fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
+    let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+    let extension = path.extension().map_or_else(String::new, |e| format!(".{}", e.to_string_lossy()));
+    path.with_file_name(format!("{stem}{suffix}{extension}"))
+}
