@@ -3,6 +3,7 @@
 //! A [`Process`] is one latent stochastic process; a [`Composite`] is the sum of processes that one axis
 //! carries; a [`Model`] is the six axes of an IMU at a sample rate. Parameters are per sample at that rate.
 
+mod allan;
 mod ar1;
 mod composite;
 pub mod continuous;
@@ -11,6 +12,7 @@ mod gauss_markov;
 mod kind;
 mod ma1;
 mod normal;
+pub mod practical;
 mod quantization;
 mod random_walk;
 pub mod reduction;

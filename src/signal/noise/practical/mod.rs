@@ -1,0 +1,335 @@
+//! Practitioners' parameters: what other programs call N, K, B and T, from a noise model.
+//!
+//! Filters elsewhere know white noise of density N (units/√Hz; "angle" or "velocity random walk") and a bias that is a
+//! random walk of density K (units/s/√Hz; "rate random walk") or a Gauss-Markov process of standard deviation sigma_b
+//! and correlation time T. With the averaging time τ their Allan variances are ([IEEE 952](crate::bibliography::Ieee952),
+//! annex C)
+//!
+//! ```text
+//! N²/τ      K²τ/3      (q T)²/τ·[1 − (T/2τ)(3 − 4e^(−τ/T) + e^(−2τ/T))],  q² = 2 sigma_b²/T
+//! ```
+//!
+//! N²/τ rules below τ = √3 N/K, K²τ/3 above. Models with several AR1 are more than such a pair; a [`Policy`] says which
+//! pair stands for them over a [`Horizon`] of averaging times, and [`Pair::closure`] by how much it is off.
+//!
+//! ```
+//! use nav_sim_signal::noise::{practical::*, Ar1, Composite, Process};
+//! // no WN at all: an AR1 of a few milliseconds is the white noise
+//! let axis = Composite::new(vec![Process::Ar1(Ar1::new(0.5, 1e-4)?)]);
+//! let curve = Curve::largest(&[&axis], 100.0, Horizon::default())?;
+//! assert_eq!(curve.pair(Policy::Strict, Bias::Walk).density, 0.0);
+//! let matched = curve.pair(Policy::Matched, Bias::Walk);
+//! // its low-frequency density is sqrt(sigma2 dt)/(1 − phi)
+//! assert!((matched.density / 2e-3 - 1.0).abs() < 0.02);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod fit;
+mod reading;
+
+pub use reading::{AxisParameters, CorrelatedProcess, Minimum};
+
+use super::continuous::{correlation_time_s, walk_density, white_density};
+use super::{Composite, Process};
+
+/// Allan deviation over B of pure flicker noise: √(2 ln 2/π) = 0.664.
+pub const FLICKER_FLOOR: f64 = 0.664_282_8;
+
+/// Averaging times per octave at which curves are compared.
+const PER_OCTAVE: f64 = 16.0;
+
+/// Averaging times over which a pair stands for a model (s).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Horizon {
+    /// Shortest (s).
+    pub from_s: f64,
+    /// Longest (s).
+    pub to_s: f64,
+}
+
+impl Default for Horizon {
+    /// 1 s to 100 s: from one GNSS or camera interval to an outage.
+    fn default() -> Self {
+        Self { from_s: 1.0, to_s: 100.0 }
+    }
+}
+
+/// Which pair stands for a model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Policy {
+    /// Only what the model has under that name: WN is N, RW is K, the slowest AR1 or GM is the Gauss-Markov bias.
+    Strict,
+    /// The model's Allan deviation at 1 s exactly, and the bias by least squares of the logarithm of the Allan deviation
+    /// over the horizon. Quantization noise and drift, which such a pair cannot carry, are left out.
+    Matched,
+    /// The smallest pair whose Allan deviation is nowhere below the model's over the horizon, quantization noise and
+    /// drift included.
+    Envelope,
+}
+
+impl Policy {
+    /// Name in files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Strict => "strict",
+            Self::Matched => "matched",
+            Self::Envelope => "envelope",
+        }
+    }
+}
+
+/// What the other program takes a bias for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Bias {
+    /// A random walk.
+    Walk,
+    /// A Gauss-Markov process, its correlation time sought too.
+    Markov,
+    /// A Gauss-Markov process of a given correlation time (s).
+    MarkovOf(f64),
+}
+
+/// A Gauss-Markov process.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Markov {
+    /// Standard deviation (units).
+    pub sigma: f64,
+    /// Correlation time (s).
+    pub t_corr_s: f64,
+}
+
+impl Markov {
+    /// Density of the white noise that drives it, sigma √(2/T) (units/s/√Hz).
+    #[must_use]
+    pub fn drive(&self) -> f64 {
+        self.sigma * (2.0 / self.t_corr_s).sqrt()
+    }
+}
+
+/// White noise and a bias: what is exported.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pair {
+    /// White noise density N (units/√Hz).
+    pub density: f64,
+    /// Random-walk density K (units/s/√Hz).
+    pub walk: f64,
+    /// Gauss-Markov bias.
+    pub markov: Option<Markov>,
+}
+
+impl Pair {
+    /// Its Allan variance (units²) for averages over `samples` at `rate_hz`, sampled as the model is.
+    #[must_use]
+    pub fn allan_variance(&self, samples: u32, rate_hz: f64) -> f64 {
+        let n2 = self.density * self.density * fit::white(samples, rate_hz);
+        let k2 = self.walk * self.walk * fit::bias(None, samples, rate_hz);
+        let gm = |m: Markov| m.sigma * m.sigma * fit::bias(Some(m.t_corr_s), samples, rate_hz);
+        n2 + k2 + self.markov.map_or(0.0, gm)
+    }
+
+    /// Where the random walk takes over from the white noise, τ = √3 N/K (s); none without a random walk.
+    #[must_use]
+    pub fn crossover_s(&self) -> Option<f64> {
+        (self.walk > 0.0).then(|| 3.0_f64.sqrt() * self.density / self.walk)
+    }
+
+    /// How far its Allan deviation is from that of the model.
+    #[must_use]
+    pub fn closure(&self, curve: &Curve) -> Closure {
+        let ratio = |p: &Point| Ratio {
+            ratio: (self.allan_variance(p.samples, curve.rate_hz) / p.whole).sqrt(),
+            tau_s: f64::from(p.samples) / curve.rate_hz,
+        };
+        let ratios: Vec<Ratio> = curve.points.iter().map(ratio).collect();
+        let by = |a: &&Ratio, b: &&Ratio| a.ratio.total_cmp(&b.ratio);
+        let first = ratios[0];
+        Closure {
+            lowest: *ratios.iter().min_by(by).unwrap_or(&first),
+            highest: *ratios.iter().max_by(by).unwrap_or(&first),
+        }
+    }
+}
+
+/// Exported over model: Allan deviations at one averaging time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ratio {
+    /// Allan deviation of the pair over that of the model.
+    pub ratio: f64,
+    /// Averaging time (s).
+    pub tau_s: f64,
+}
+
+/// The closure certificate: how an exported pair compares with the model over the horizon.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Closure {
+    /// Where the pair is most below the model, or least above.
+    pub lowest: Ratio,
+    /// Where it is most above.
+    pub highest: Ratio,
+}
+
+/// The Allan variance that a pair has to stand for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Curve {
+    axes: Vec<Composite>,
+    rate_hz: f64,
+    points: Vec<Point>,
+    /// At 1 s, or the sample nearest to it.
+    reference: Point,
+    horizon: Horizon,
+}
+
+/// The largest axis at one averaging time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Point {
+    samples: u32,
+    /// Allan variance of the whole model.
+    whole: f64,
+    /// The same without quantization noise and drift.
+    carried: f64,
+}
+
+/// Why there is no curve.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum CurveError {
+    /// Too few averaging times.
+    #[error(
+        "the horizon {from_s} s to {to_s} s is refused: at {rate_hz} Hz it must begin at {shortest_s} s or later, span a \
+         factor of four and end below {longest_s:.0} s"
+    )]
+    Horizon {
+        /// Begin (s).
+        from_s: f64,
+        /// End (s).
+        to_s: f64,
+        /// Sample rate (Hz).
+        rate_hz: f64,
+        /// One sample (s).
+        shortest_s: f64,
+        /// What a count of samples holds (s).
+        longest_s: f64,
+    },
+    /// The Allan variance vanishes.
+    #[error("the model has no noise at an averaging time of {tau_s} s")]
+    NoNoise {
+        /// Averaging time (s).
+        tau_s: f64,
+    },
+}
+
+impl Curve {
+    /// The Allan variance of the largest of some axes at each averaging time of the horizon.
+    ///
+    /// # Errors
+    /// When the horizon is too short or too long for the rate, or the axes have no noise there.
+    pub fn largest(axes: &[&Composite], rate_hz: f64, horizon: Horizon) -> Result<Self, CurveError> {
+        let Horizon { from_s, to_s } = horizon;
+        let (shortest_s, longest_s) = (1.0 / rate_hz, f64::from(1_u32 << 30) / rate_hz);
+        let usable = from_s >= shortest_s * (1.0 - 1e-9) && to_s >= 4.0 * from_s && to_s <= longest_s;
+        if !usable {
+            return Err(CurveError::Horizon { from_s, to_s, rate_hz, shortest_s, longest_s });
+        }
+        let point = |samples| point(axes, samples);
+        let points: Vec<Point> = averages(from_s * rate_hz, to_s * rate_hz).into_iter().map(point).collect();
+        if let Some(p) = points.iter().find(|p| p.whole <= 0.0) {
+            return Err(CurveError::NoNoise { tau_s: f64::from(p.samples) / rate_hz });
+        }
+        let reference = point((rate_hz.round() as u32).max(1));
+        let axes = axes.iter().map(|a| (*a).clone()).collect();
+        Ok(Self { axes, rate_hz, points, reference, horizon })
+    }
+
+    /// The pair that stands for the model.
+    #[must_use]
+    pub fn pair(&self, policy: Policy, bias: Bias) -> Pair {
+        let walk = bias == Bias::Walk;
+        // A model that is such a pair is itself the best one, exactly and not to the accuracy of a search.
+        if policy == Policy::Strict || (walk && self.is_white_and_walk()) {
+            return self.strict(walk);
+        }
+        fit::pair(self, policy, bias)
+    }
+
+    /// Whether all axes are the same white noise and random walk, so that the largest is one of them.
+    fn is_white_and_walk(&self) -> bool {
+        let pair = |p: &Process| matches!(p, Process::White(_) | Process::RandomWalk(_));
+        self.axes.iter().all(|a| *a == self.axes[0] && a.processes.iter().all(pair))
+    }
+
+    fn strict(&self, walk: bool) -> Pair {
+        let largest = |f: &dyn Fn(&Composite) -> f64| self.axes.iter().map(f).fold(0.0, f64::max);
+        let density = largest(&|axis| white_density(white_sigma2(axis), self.rate_hz));
+        let k = largest(&|axis| walk_density(walk_gamma2(axis), self.rate_hz));
+        let slowest = self.axes.iter().filter_map(|axis| {
+            let of_axis = reading::correlated(axis, self.rate_hz);
+            of_axis.into_iter().map(|c| c.markov).max_by(|a, b| a.t_corr_s.total_cmp(&b.t_corr_s))
+        });
+        let markov = slowest.max_by(|a, b| a.sigma.total_cmp(&b.sigma));
+        Pair { density, walk: if walk { k } else { 0.0 }, markov: markov.filter(|_| !walk) }
+    }
+
+    /// Largest share that quantization noise and drift have of the Allan variance over the horizon, and where (s): what
+    /// [`Policy::Matched`] leaves out.
+    #[must_use]
+    pub fn left_out(&self) -> Ratio {
+        let share = |p: &Point| Ratio {
+            ratio: 1.0 - p.carried / p.whole,
+            tau_s: f64::from(p.samples) / self.rate_hz,
+        };
+        let none = Ratio { ratio: 0.0, tau_s: self.horizon.from_s };
+        self.points.iter().map(share).fold(none, |a, b| if b.ratio > a.ratio { b } else { a })
+    }
+
+    /// The horizon.
+    #[must_use]
+    pub const fn horizon(&self) -> Horizon {
+        self.horizon
+    }
+}
+
+fn point(axes: &[&Composite], samples: u32) -> Point {
+    let largest = |f: &dyn Fn(&Process) -> bool| {
+        let of_axis = |axis: &&Composite| -> f64 {
+            axis.processes.iter().filter(|p| f(p)).map(|p| p.allan_variance(samples)).sum()
+        };
+        axes.iter().map(of_axis).fold(0.0, f64::max)
+    };
+    let carried = |p: &Process| !matches!(p, Process::Quantization(_) | Process::Drift(_));
+    Point { samples, whole: largest(&|_| true), carried: largest(&carried) }
+}
+
+/// Whole numbers of samples from one to another, evenly in the logarithm.
+fn averages(from: f64, to: f64) -> Vec<u32> {
+    let steps = ((to / from).log2() * PER_OCTAVE).ceil();
+    let at = |i: u32| (from * (to / from).powf(f64::from(i) / steps)).round().max(1.0) as u32;
+    let mut all: Vec<u32> = (0..=steps as u32).map(at).collect();
+    all.dedup();
+    all
+}
+
+fn white_sigma2(axis: &Composite) -> f64 {
+    let sigma2 = |p: &Process| if let Process::White(p) = p { p.sigma2() } else { 0.0 };
+    axis.processes.iter().map(sigma2).sum()
+}
+
+fn walk_gamma2(axis: &Composite) -> f64 {
+    let gamma2 = |p: &Process| if let Process::RandomWalk(p) = p { p.gamma2() } else { 0.0 };
+    axis.processes.iter().map(gamma2).sum()
+}
+
+/// Standard deviation and correlation time of an AR1 or GM that has them.
+fn markov_of(process: &Process, rate_hz: f64) -> Option<Markov> {
+    match process {
+        Process::Ar1(p) if p.phi() > 0.0 && p.sigma2() > 0.0 => {
+            Some(Markov { sigma: p.variance().sqrt(), t_corr_s: correlation_time_s(p.phi(), rate_hz) })
+        }
+        Process::GaussMarkov(p) if p.s2() > 0.0 => {
+            Some(Markov { sigma: p.s2().sqrt(), t_corr_s: 1.0 / p.beta() })
+        }
+        _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests;
