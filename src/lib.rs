@@ -41,6 +41,8 @@ pub use nav_sim_navigation::{
 };
 pub use nav_sim_signal::{bibliography, imu, noise, rng, units, wavelet};
 
+// Parameters for other programs.
+pub mod export;
 // The engine of studies.
 pub mod study;
 // Words and pages.

@@ -11,6 +11,7 @@ mod completions;
 mod demo;
 mod efficiency;
 mod exit;
+mod export;
 mod filter;
 mod fuse;
 mod init;
@@ -59,6 +60,7 @@ enum Command {
     Tune(tune::Args),
     Fuse(fuse::Args),
     Compare(compare::Args),
+    Export(export::Args),
     Batch(batch::Args),
     Efficiency(efficiency::Args),
     Demo(demo::Args),
@@ -87,6 +89,7 @@ impl Command {
             Self::Tune(args) => tune::run(&args, session),
             Self::Fuse(args) => fuse::run(&args, session),
             Self::Compare(args) => compare::run(&args, session),
+            Self::Export(args) => export::run(&args, session),
             Self::Batch(args) => batch::run(&args, session),
             Self::Efficiency(args) => efficiency::run(&args, session),
             Self::Demo(args) => demo::run(&args, session),

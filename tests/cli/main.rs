@@ -19,6 +19,7 @@ mod command_line;
 mod compare;
 mod efficiency;
 mod examples;
+mod export;
 mod fuse;
 mod help_examples;
 mod readme;

@@ -39,9 +39,9 @@ fn a_pair_comes_back_from_every_policy() {
 /// of 10⁴ times the horizon (a random walk over it to 1e-4).
 #[test]
 fn the_search_finds_a_pair_by_another_name() {
-    let (n, k, t) = (2e-3, 4e-4, 1e6);
+    let (n, k, t): (f64, f64, f64) = (2e-3, 4e-4, 1e6);
     let white = Process::Ar1(Ar1::new(0.0, n * n * RATE).unwrap());
-    let slow = gm(k * (0.5 * t as f64).sqrt(), t);
+    let slow = gm(k * (0.5 * t).sqrt(), t);
     for policy in [Policy::Matched, Policy::Envelope] {
         let pair = curve(vec![white, slow]).pair(policy, Bias::Walk);
         assert!((pair.density / n - 1.0).abs() < 1e-4 && (pair.walk / k - 1.0).abs() < 1e-4, "{pair:?}");

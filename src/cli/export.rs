@@ -1,0 +1,116 @@
+//! `nav-sim export`: a noise model as the parameters of other programs.
+
+use super::{Failure, Session};
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use nav_sim::export::{Export, ExportError, Settings, Target};
+use nav_sim::formats::atomic::{self, guard_inputs};
+use nav_sim::formats::model_file::{self, ModelFile};
+use nav_sim::imu::Sensor;
+use nav_sim::noise::practical::{Horizon, Policy};
+use std::path::PathBuf;
+
+/// Write a noise model as the parameters of another program
+///
+/// Filters elsewhere know white noise (N) and one bias, a random walk (K) or a Gauss-Markov process. --policy says which
+/// such pair stands for the model's largest axis over --horizon; head and stderr say by how much the two differ.
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim export calib_data/consumer_mems.toml --target kalibr -o imu.yaml
+  nav-sim export calib_data/consumer_mems.toml --target px4 --policy envelope --horizon 1s:30s
+  nav-sim export calib_data/tactical.toml --target kf-gins --format json")]
+pub(crate) struct Args {
+    /// Noise model (TOML)
+    #[arg(value_name = "MODEL")]
+    model: PathBuf,
+    /// The program
+    #[arg(long, value_name = "PROGRAM", value_parser = target())]
+    target: Target,
+    /// strict: WN and RW as they are; matched: the model's Allan deviation at 1 s and the closest bias; envelope: the
+    /// smallest pair that is nowhere below the model
+    #[arg(long, value_name = "POLICY", value_parser = policy(), default_value = Policy::Matched.name())]
+    policy: Policy,
+    /// Averaging times over which the pair stands for the model
+    #[arg(long, value_name = "FROM:TO", value_parser = horizon, default_value = "1s:100s")]
+    horizon: Horizon,
+    /// File to write to (default: stdout)
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+fn target() -> impl TypedValueParser<Value = Target> {
+    PossibleValuesParser::new(Target::ALL.map(Target::name)).try_map(|name| {
+        Target::ALL.into_iter().find(|t| t.name() == name).ok_or("not a program that is known")
+    })
+}
+
+fn policy() -> impl TypedValueParser<Value = Policy> {
+    const ALL: [Policy; 3] = [Policy::Strict, Policy::Matched, Policy::Envelope];
+    PossibleValuesParser::new(ALL.map(Policy::name))
+        .try_map(|name| ALL.into_iter().find(|p| p.name() == name).ok_or("not a policy"))
+}
+
+/// `1s:100s`, also without the unit.
+fn horizon(text: &str) -> Result<Horizon, String> {
+    let seconds = |t: &str| super::parse::positive(t.trim().trim_end_matches('s')).ok();
+    let (from, to) = text.split_once(':').ok_or("expected two times, such as 1s:100s")?;
+    match (seconds(from), seconds(to)) {
+        (Some(from_s), Some(to_s)) => Ok(Horizon { from_s, to_s }),
+        _ => Err("expected two times in seconds, such as 1s:100s".into()),
+    }
+}
+
+pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let file = model_file::read(&args.model)?;
+    let shown = args.model.display().to_string();
+    if let Some(out) = &args.out {
+        guard_inputs(out, [args.model.as_path()])?;
+    }
+    let turn_on = file.turn_on.unwrap_or_default();
+    let settings = Settings {
+        policy: args.policy,
+        horizon: args.horizon,
+        range_s: observed_s(&file).unwrap_or(LONGEST_S).max(args.horizon.to_s),
+        turn_on: Sensor::ALL.map(|sensor| turn_on.sigma(sensor)),
+    };
+    let export = Export::new(args.target, &file.model, &file.missing, settings)
+        .map_err(|e| Failure::input(format!("{shown}: {e}")).maybe_hint(advice(&e)))?;
+    let text = export.text(&shown);
+    if let Some(out) = &args.out {
+        atomic::write(out, text.clone() + "\n")?;
+    }
+    for line in export.summary() {
+        session.printer.say(&line);
+    }
+    for doubt in export.doubts() {
+        session.printer.warn(&doubt);
+    }
+    match &args.out {
+        _ if session.json() => {
+            let json = serde_json::to_string_pretty(&export.json(&shown)).map_err(Failure::could_not)?;
+            session.printer.result(&json);
+        }
+        Some(out) => session.printer.result(&format!("{}: {}", out.display(), args.target.name())),
+        None => session.printer.result(&text),
+    }
+    Ok(())
+}
+
+/// Longest averaging time at which a minimum is believed of a model that no calibration made (s).
+const LONGEST_S: f64 = 10_000.0;
+
+/// The longest averaging time that the calibration saw: half its longest scale.
+fn observed_s(file: &ModelFile) -> Option<f64> {
+    let fits = file.provenance.as_ref()?.get("fits")?.as_array()?;
+    let scales = fits.iter().filter_map(|fit| fit.get("scales")?.as_integer()).max()?;
+    (1..63).contains(&scales).then(|| (scales as f64 - 1.0).exp2() / file.model.rate_hz)
+}
+
+fn advice(e: &ExportError) -> Option<String> {
+    match e {
+        ExportError::NoSensor { .. } => {
+            Some("calibrate recordings of both sensors, or write the other one's section by hand".into())
+        }
+        ExportError::Curve { .. } => None,
+    }
+}

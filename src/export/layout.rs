@@ -1,0 +1,71 @@
+//! How a target's file is laid out.
+
+use super::{Entry, Export};
+
+/// The syntax of a target's file.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Layout {
+    /// What begins a comment.
+    pub(super) comment: &'static str,
+    /// A line that must be the very first.
+    pub(super) first: Option<&'static str>,
+    /// Lines before the entries.
+    pub(super) open: &'static str,
+    /// Lines after them.
+    pub(super) close: &'static str,
+    /// One entry.
+    pub(super) line: fn(&Entry) -> String,
+    /// The document that keys and units are from.
+    pub(super) source: &'static str,
+}
+
+impl Export {
+    /// The file: a head of comments that says what it is and how good it is, then the parameters. `model` is the name of
+    /// the model file.
+    #[must_use]
+    pub fn text(&self, model: &str) -> String {
+        let layout = self.target.layout();
+        let mut lines: Vec<String> = layout.first.iter().map(|l| (*l).to_owned()).collect();
+        let head = self.head(model);
+        lines.extend(head.iter().map(|l| format!("{} {l}", layout.comment)));
+        lines.push(format!("{} Keys and units: {}", layout.comment, layout.source));
+        lines.extend((!layout.open.is_empty()).then(|| layout.open.to_owned()));
+        lines.extend(self.entries.iter().map(layout.line));
+        lines.extend((!layout.close.is_empty()).then(|| layout.close.to_owned()));
+        lines.join("\n")
+    }
+}
+
+/// A number that reads back to the same, with a point: YAML 1.1 takes `2e-5` for a text.
+#[must_use]
+pub fn number(value: f64) -> String {
+    if value == 0.0 {
+        return "0.0".to_owned();
+    }
+    if (1e-3..1e6).contains(&value.abs()) {
+        let plain = format!("{value}");
+        return if plain.contains('.') { plain } else { plain + ".0" };
+    }
+    let text = format!("{value:e}");
+    match text.split_once('e') {
+        Some((digits, exponent)) if !digits.contains('.') => format!("{digits}.0e{exponent}"),
+        _ => text,
+    }
+}
+
+/// Unit, meaning, and what the range of the target does not hold.
+pub(super) fn remark(entry: &Entry) -> String {
+    let wanted =
+        entry.wanted.map(|w| format!("; the model says {}, outside the documented range", number(w)));
+    format!("{}; {}{}", entry.unit, entry.meaning, wanted.unwrap_or_default())
+}
+
+/// Three equal axes, between commas.
+pub(super) fn triple(value: f64) -> String {
+    [number(value), number(value), number(value)].join(", ")
+}
+
+/// `key: value  # unit; meaning`
+pub(super) fn yaml(entry: &Entry) -> String {
+    format!("{}: {}  # {}", entry.key, number(entry.value), remark(entry))
+}

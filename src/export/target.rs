@@ -1,0 +1,118 @@
+//! The programs that are known.
+
+use super::layout::Layout;
+use super::{Entry, Values, autopilots, filters, simulators, vision};
+use crate::noise::practical::Bias;
+
+/// A program that parameters are written for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Target {
+    /// Kalibr, imu.yaml.
+    Kalibr,
+    /// `OpenVINS`, `kalibr_imu_chain.yaml`.
+    OpenVins,
+    /// VINS-Mono and VINS-Fusion.
+    Vins,
+    /// GTSAM, `PreintegrationCombinedParams`.
+    Gtsam,
+    /// PX4, EKF2.
+    Px4,
+    /// `ArduPilot`, EKF3.
+    ArduPilot,
+    /// KF-GINS.
+    KfGins,
+    /// `NaveGo`.
+    NaveGo,
+    /// PSINS.
+    Psins,
+    /// gnss-ins-sim.
+    GnssInsSim,
+    /// pyins.
+    Pyins,
+    /// MATLAB, `imuSensor`.
+    Matlab,
+}
+
+impl Target {
+    /// All of them.
+    pub const ALL: [Self; 12] = [
+        Self::Kalibr,
+        Self::OpenVins,
+        Self::Vins,
+        Self::Gtsam,
+        Self::Px4,
+        Self::ArduPilot,
+        Self::KfGins,
+        Self::NaveGo,
+        Self::Psins,
+        Self::GnssInsSim,
+        Self::Pyins,
+        Self::Matlab,
+    ];
+
+    /// Name on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Kalibr => "kalibr",
+            Self::OpenVins => "openvins",
+            Self::Vins => "vins",
+            Self::Gtsam => "gtsam",
+            Self::Px4 => "px4",
+            Self::ArduPilot => "ardupilot",
+            Self::KfGins => "kf-gins",
+            Self::NaveGo => "navego",
+            Self::Psins => "psins",
+            Self::GnssInsSim => "gnss-ins-sim",
+            Self::Pyins => "pyins",
+            Self::Matlab => "matlab",
+        }
+    }
+
+    /// What it takes a bias for.
+    pub(super) const fn bias(self) -> Bias {
+        match self {
+            Self::KfGins | Self::NaveGo | Self::Psins | Self::GnssInsSim | Self::Matlab => Bias::Markov,
+            _ => Bias::Walk,
+        }
+    }
+
+    /// Whether it flies a vehicle, whose vibration no static recording holds.
+    pub(super) const fn is_autopilot(self) -> bool {
+        matches!(self, Self::Px4 | Self::ArduPilot)
+    }
+
+    pub(super) fn entries(self, values: &Values) -> Vec<Entry> {
+        match self {
+            Self::Kalibr => vision::kalibr(values),
+            Self::OpenVins => vision::openvins(values),
+            Self::Vins => vision::vins(values),
+            Self::Gtsam => vision::gtsam(values),
+            Self::Px4 => autopilots::px4(values),
+            Self::ArduPilot => autopilots::ardupilot(values),
+            Self::KfGins => filters::kf_gins(values),
+            Self::NaveGo => filters::navego(values),
+            Self::Psins => filters::psins(values),
+            Self::Pyins => filters::pyins(values),
+            Self::GnssInsSim => simulators::gnss_ins_sim(values),
+            Self::Matlab => simulators::matlab(values),
+        }
+    }
+
+    pub(super) const fn layout(self) -> Layout {
+        match self {
+            Self::Kalibr => vision::KALIBR,
+            Self::OpenVins => vision::OPENVINS,
+            Self::Vins => vision::VINS,
+            Self::Gtsam => vision::GTSAM,
+            Self::Px4 => autopilots::PX4,
+            Self::ArduPilot => autopilots::ARDUPILOT,
+            Self::KfGins => filters::KF_GINS,
+            Self::NaveGo => filters::NAVEGO,
+            Self::Psins => filters::PSINS,
+            Self::Pyins => filters::PYINS,
+            Self::GnssInsSim => simulators::GNSS_INS_SIM,
+            Self::Matlab => simulators::MATLAB,
+        }
+    }
+}

@@ -1,0 +1,263 @@
+use super::*;
+use crate::noise::{Ar1, GaussMarkov, Process, RandomWalk, White};
+use crate::units::{DEG, STANDARD_GRAVITY};
+
+const RATE: f64 = 200.0;
+/// Data sheet: 0.02 m/s/√h and 0.15 °/√h.
+const N_A: f64 = 0.02 / 60.0;
+const N_G: f64 = 0.15 * DEG / 60.0;
+const K_A: f64 = 3e-5;
+const K_G: f64 = 2e-7;
+
+fn white(density: f64) -> Process {
+    Process::White(White::new(density * density * RATE).unwrap())
+}
+
+fn walk(density: f64) -> Process {
+    Process::RandomWalk(RandomWalk::new(density * density / RATE).unwrap())
+}
+
+fn markov(sigma: f64, t_corr_s: f64) -> Process {
+    Process::GaussMarkov(GaussMarkov::new(1.0 / t_corr_s, sigma * sigma, RATE).unwrap())
+}
+
+fn settings(policy: Policy) -> Settings {
+    let turn_on = [Some(0.05), Some(10.0 * DEG / 3600.0)];
+    Settings { policy, horizon: Horizon::default(), range_s: 1e4, turn_on }
+}
+
+fn export(target: Target, accel: Vec<Process>, gyro: Vec<Process>, policy: Policy) -> Export {
+    let model = Model::pooled(RATE, &Composite::new(accel), &Composite::new(gyro));
+    Export::new(target, &model, &[], settings(policy)).unwrap()
+}
+
+fn walks(target: Target) -> Export {
+    export(target, vec![white(N_A), walk(K_A)], vec![white(N_G), walk(K_G)], Policy::Matched)
+}
+
+/// Biases of 40 µg and 5 °/h, 300 s each.
+fn markovs(target: Target) -> Export {
+    let (accel, gyro) = (markov(40e-6 * STANDARD_GRAVITY, 300.0), markov(5.0 * DEG / 3600.0, 300.0));
+    export(target, vec![white(N_A), accel], vec![white(N_G), gyro], Policy::Strict)
+}
+
+fn value(export: &Export, key: &str) -> f64 {
+    export.entries.iter().find(|e| e.key == key).unwrap_or_else(|| panic!("{key}")).value
+}
+
+fn assert_values(export: &Export, expected: &[(&str, f64)]) {
+    for (key, expected) in expected {
+        let found = value(export, key);
+        assert!((found / expected - 1.0).abs() < 1e-12, "{key}: {found:e} {expected:e}");
+    }
+}
+
+/// What Kalibr reads back from the text is what the model has: 0.15 °/√h = 4.363e-5 rad/s/√Hz.
+#[test]
+fn kalibr_reads_back_the_densities() {
+    for target in [Target::Kalibr, Target::OpenVins] {
+        let text = walks(target).text("model.toml");
+        let read = |key: &str| -> f64 {
+            let line = text.lines().find_map(|l| l.trim().strip_prefix(key)?.strip_prefix(": ")).unwrap();
+            line.split('#').next().unwrap().trim().parse().unwrap()
+        };
+        let expected = [
+            ("accelerometer_noise_density", N_A),
+            ("accelerometer_random_walk", K_A),
+            ("gyroscope_noise_density", N_G),
+            ("gyroscope_random_walk", K_G),
+            ("update_rate", RATE),
+        ];
+        for (key, expected) in expected {
+            assert!((read(key) / expected - 1.0).abs() < 1e-12, "{key}");
+        }
+        assert!((read("gyroscope_noise_density") - 4.363_323_13e-5).abs() < 1e-13);
+    }
+}
+
+/// Standard deviations of a sample at 200 Hz: N √200.
+#[test]
+fn vins_has_noise_of_a_sample() {
+    let root = 200.0_f64.sqrt();
+    let expected =
+        [("acc_n", N_A * root), ("gyr_n", N_G * root), ("acc_w", K_A * root), ("gyr_w", K_G * root)];
+    assert_values(&walks(Target::Vins), &expected);
+}
+
+#[test]
+fn gtsam_has_covariances() {
+    let expected = [
+        ("setAccelerometerCovariance", N_A * N_A),
+        ("setGyroscopeCovariance", N_G * N_G),
+        ("setBiasAccCovariance", K_A * K_A),
+        ("setBiasOmegaCovariance", K_G * K_G),
+    ];
+    assert_values(&walks(Target::Gtsam), &expected);
+}
+
+/// In one second of steps, velocity and bias must grow by N² and K²: 1/dt steps of (dt·noise)² each.
+#[test]
+fn autopilots_grow_as_the_noise_does() {
+    let (n_a, n_g, k_a, k_g) = (0.02, 1e-3, 1e-4, 2e-6);
+    let noise =
+        |target| export(target, vec![white(n_a), walk(k_a)], vec![white(n_g), walk(k_g)], Policy::Matched);
+    let px4 = [
+        ("EKF2_ACC_NOISE", n_a),
+        ("EKF2_GYR_NOISE", n_g),
+        ("EKF2_ACC_B_NOISE", k_a),
+        ("EKF2_GYR_B_NOISE", k_g),
+    ];
+    let ardupilot =
+        [("EK3_ACC_P_NSE", n_a), ("EK3_GYRO_P_NSE", n_g), ("EK3_ABIAS_P_NSE", k_a), ("EK3_GBIAS_P_NSE", k_g)];
+    for (target, dt, keys) in [(Target::Px4, 0.01_f64, px4), (Target::ArduPilot, 0.012, ardupilot)] {
+        let export = noise(target);
+        for (key, density) in keys {
+            let variance_of_a_second = (dt * value(&export, key)).powi(2) / dt;
+            assert!((variance_of_a_second / (density * density) - 1.0).abs() < 1e-12, "{key}");
+        }
+        assert!(export.doubts().iter().any(|d| d.contains("vibration")), "{:?}", export.doubts());
+    }
+}
+
+/// 3.3e-4/√0.01 = 3.3e-3 m/s² is below PX4's 0.01.
+#[test]
+fn values_outside_documented_ranges_are_told() {
+    let export = walks(Target::Px4);
+    let accel = export.entries.iter().find(|e| e.key == "EKF2_ACC_NOISE").unwrap();
+    assert!((accel.wanted.unwrap() / (N_A / 0.1) - 1.0).abs() < 1e-12);
+    assert_eq!(accel.value, 0.01);
+    let told = "EKF2_ACC_NOISE is set to 1.000e-2, the end of its documented range; the model says 3.333e-3";
+    assert!(export.doubts().iter().any(|d| d == told), "{:?}", export.doubts());
+    assert!(export.text("m").contains("param set EKF2_ACC_NOISE 0.01  # m/s^2; "), "{}", export.text("m"));
+}
+
+/// Every Gauss-Markov target in the units of its documents: 0.15 °/√h, 0.02 m/s/√h, 5 °/h, 40 µg, 300 s.
+#[test]
+fn gauss_markov_targets_have_data_sheet_units() {
+    let milligal = 40e-6 * STANDARD_GRAVITY / 1e-5;
+    let kf_gins =
+        [("arw", 0.15), ("vrw", 0.02), ("gbstd", 5.0), ("abstd", milligal), ("corrtime", 300.0 / 3600.0)];
+    assert_values(&markovs(Target::KfGins), &kf_gins);
+    let simulator = [
+        ("gyro_arw", 0.15),
+        ("accel_vrw", 0.02),
+        ("gyro_b_stability", 5.0),
+        ("accel_b_stability", 40e-6 * STANDARD_GRAVITY),
+        ("gyro_b_corr", 300.0),
+        ("accel_b_corr", 300.0),
+        ("gyro_b", 10.0),
+        ("accel_b", 0.05),
+    ];
+    assert_values(&markovs(Target::GnssInsSim), &simulator);
+    // PSINS's µg is of its own g0
+    let ug = 9.780_326_771_4e-6;
+    let psins = [
+        ("web", 0.15),
+        ("wdb", N_A / ug),
+        ("eb", 10.0),
+        ("db", 0.05 / ug),
+        ("sqrtR0G", 5.0),
+        ("TauG", 300.0),
+        ("sqrtR0A", 40e-6 * STANDARD_GRAVITY / ug),
+        ("TauA", 300.0),
+    ];
+    assert_values(&markovs(Target::Psins), &psins);
+    let sigma = 5.0 * DEG / 3600.0;
+    let navego = [
+        ("imu.arw", N_G),
+        ("imu.vrw", N_A),
+        ("imu.g_std", N_G * RATE.sqrt()),
+        ("imu.gb_dyn", sigma),
+        ("imu.gb_corr", 300.0),
+        // white noise of this density through 1/(s + 1/T) has variance q²T/2
+        ("imu.gb_psd", sigma * (2.0_f64 / 300.0).sqrt()),
+        ("imu.gb_sta", 10.0 * DEG / 3600.0),
+        ("imu.ab_sta", 0.05),
+    ];
+    assert_values(&markovs(Target::NaveGo), &navego);
+}
+
+#[test]
+fn pyins_has_si_units() {
+    let expected = [
+        ("accel_bias_sd", 0.05),
+        ("accel_noise", N_A),
+        ("accel_bias_walk", K_A),
+        ("gyro_bias_sd", 10.0 * DEG / 3600.0),
+        ("gyro_noise", N_G),
+        ("gyro_bias_walk", K_G),
+    ];
+    assert_values(&walks(Target::Pyins), &expected);
+}
+
+/// White noise of BiasInstability through 1/(1 − phi z⁻¹) has variance B²/(1 − phi²) and decays as phi^k.
+#[test]
+fn matlabs_filter_is_the_gauss_markov_bias() {
+    let export = markovs(Target::Matlab);
+    let (b, phi) =
+        (value(&export, "gyro.BiasInstability"), value(&export, "gyro.BiasInstabilityCoefficients"));
+    let sigma = 5.0 * DEG / 3600.0;
+    assert!((b / (1.0 - phi * phi).sqrt() / sigma - 1.0).abs() < 1e-10);
+    assert!((phi.ln() * 300.0 * RATE + 1.0).abs() < 1e-10);
+    assert_values(&export, &[("gyro.NoiseDensity", N_G), ("accel.NoiseDensity", N_A)]);
+}
+
+/// Each line of every target carries its unit; head and certificate are comments.
+#[test]
+fn every_value_has_its_unit_on_its_line() {
+    for target in Target::ALL {
+        let export = if target.bias() == Bias::Walk { walks(target) } else { markovs(target) };
+        let text = export.text("model.toml");
+        assert!(text.contains("times the Allan deviation of the model") && text.contains("200 Hz"), "{text}");
+        for entry in &export.entries {
+            let line = text.lines().find(|l| l.contains(entry.key) && l.contains(&number(entry.value.abs())));
+            assert!(line.is_some() && text.contains(&format!("{}; ", entry.unit)), "{}:\n{text}", entry.key);
+        }
+    }
+}
+
+/// KF-GINS has one correlation time: with 100 s and 400 s, their geometric mean, and the certificate is of that pair.
+#[test]
+fn kf_gins_has_one_correlation_time() {
+    let (accel, gyro) = (vec![white(1e-4), markov(1e-3, 10.0)], vec![white(1e-5), markov(1e-4, 40.0)]);
+    let export = export(Target::KfGins, accel, gyro, Policy::Matched);
+    assert!((value(&export, "corrtime") * 3600.0 / 20.0 - 1.0).abs() < 1e-2, "{:?}", export.entries);
+    assert!(export.sensors[0].exported.markov.unwrap().t_corr_s > 19.0);
+}
+
+#[test]
+fn doubts_are_told() {
+    let fast = Process::Ar1(Ar1::new(0.5, 1e-6).unwrap());
+    let strict = export(Target::Kalibr, vec![fast, walk(K_A)], vec![white(N_G), walk(K_G)], Policy::Strict);
+    let doubts = strict.doubts().join("\n");
+    assert!(doubts.contains("accel: N is 0") && doubts.contains("--policy matched"), "{doubts}");
+    // K²/3 over K²/3 + sigma2 dt/(1 − phi)²: √(3e-10/(3e-10 + 2e-8)) = 0.122
+    assert!(doubts.contains("accel: at 1.00 s the exported pair has 0.12 times"), "{doubts}");
+    assert_eq!(walks(Target::Kalibr).doubts(), Vec::<String>::new());
+}
+
+#[test]
+fn axes_that_differ_are_told() {
+    let axis = |scale: f64| Composite::new(vec![white(scale * N_A), walk(K_A)]);
+    let gyro = Composite::new(vec![white(N_G), walk(K_G)]);
+    let mut model = Model::pooled(RATE, &axis(1.0), &gyro);
+    model.axes[2] = axis(2.0);
+    let export = Export::new(Target::Kalibr, &model, &[], settings(Policy::Strict)).unwrap();
+    assert_values(&export, &[("accelerometer_noise_density", 2.0 * N_A)]);
+    let told = export.doubts().join("\n");
+    assert!(
+        told.contains(
+            "accel: the axes differ (Allan deviation at 1 s over the largest: x 0.50, y 0.50, z 1.00)"
+        ),
+        "{told}"
+    );
+    let missing: Vec<Channel> = Channel::named("gyro");
+    let refused = Export::new(Target::Kalibr, &model, &missing, settings(Policy::Strict)).unwrap_err();
+    assert_eq!(refused.to_string(), "the model has no gyro, and kalibr needs both sensors");
+}
+
+#[test]
+fn numbers_are_numbers_in_yaml() {
+    let shown = [2e-5, 1.25e-7, 100.0, 0.02, 0.0, 1e7].map(number);
+    assert_eq!(shown, ["2.0e-5", "1.25e-7", "100.0", "0.02", "0.0", "1.0e7"]);
+}

@@ -1,0 +1,114 @@
+//! Visual-inertial programs: white noise and random walk, per sensor.
+
+use super::layout::{Layout, number, remark, yaml};
+use super::{Entry, Values};
+
+pub(super) const KALIBR: Layout = Layout {
+    comment: "#",
+    first: None,
+    open: "rostopic: /imu0  # the topic of your recording",
+    close: "",
+    line: yaml,
+    source: "Kalibr wiki, \"IMU Noise Model\" and \"YAML formats\"",
+};
+
+/// Kalibr's imu.yaml: continuous-time densities, which it makes discrete by `update_rate`
+/// (<https://github.com/ethz-asl/kalibr/wiki/IMU-Noise-Model>).
+pub(super) fn kalibr(v: &Values) -> Vec<Entry> {
+    let rate = format!("continuous-time, IMU at {} Hz", v.rate_hz);
+    vec![
+        Entry::new(
+            "accelerometer_noise_density",
+            v.accel.density,
+            "m/s^2/sqrt(Hz)",
+            format!("white noise N, {rate}"),
+        ),
+        Entry::new(
+            "accelerometer_random_walk",
+            v.accel.walk,
+            "m/s^3/sqrt(Hz)",
+            format!("bias random walk K, {rate}"),
+        ),
+        Entry::new(
+            "gyroscope_noise_density",
+            v.gyro.density,
+            "rad/s/sqrt(Hz)",
+            format!("white noise N, {rate}"),
+        ),
+        Entry::new(
+            "gyroscope_random_walk",
+            v.gyro.walk,
+            "rad/s^2/sqrt(Hz)",
+            format!("bias random walk K, {rate}"),
+        ),
+        Entry::new("update_rate", v.rate_hz, "Hz", "rate of the IMU"),
+    ]
+}
+
+pub(super) const OPENVINS: Layout = Layout {
+    comment: "#",
+    first: Some("%YAML:1.0"),
+    open: "imu0:\n  rostopic: /imu0  # the topic of your recording",
+    close: "",
+    line: |entry| format!("  {}", yaml(entry)),
+    source: "OpenVINS, kalibr_imu_chain.yaml; keep T_i_b, time_offset and the model of your own file",
+};
+
+/// `OpenVINS` reads the same four keys below `imu0` and divides by the time step itself
+/// (<https://docs.openvins.com/gs-calibration.html>).
+pub(super) fn openvins(v: &Values) -> Vec<Entry> {
+    kalibr(v)
+}
+
+pub(super) const VINS: Layout = Layout {
+    comment: "#",
+    first: None,
+    open: "",
+    close: "",
+    line: yaml,
+    source: "VINS-Mono and VINS-Fusion, config/*.yaml; paste in the place of the same keys",
+};
+
+/// VINS-Mono and VINS-Fusion: standard deviations of a sample, N√f, and of the bias's slope over one sample interval, K√f:
+/// the integration multiplies both by dt (<https://github.com/HKUST-Aerial-Robotics/VINS-Mono>,
+/// `vins_estimator/src/factor/integration_base.h`). Its midpoint rule takes the noise of the two ends of an interval as
+/// independent from interval to interval, which counts half the variance; nothing is added for that here.
+pub(super) fn vins(v: &Values) -> Vec<Entry> {
+    let root = v.rate_hz.sqrt();
+    let per = |what: &str| format!("{what}, at {} Hz", v.rate_hz);
+    vec![
+        Entry::new("acc_n", v.accel.density * root, "m/s^2", per("N sqrt(f), noise of a sample")),
+        Entry::new("gyr_n", v.gyro.density * root, "rad/s", per("N sqrt(f), noise of a sample")),
+        Entry::new("acc_w", v.accel.walk * root, "m/s^3", per("K sqrt(f), bias random walk of a sample")),
+        Entry::new("gyr_w", v.gyro.walk * root, "rad/s^2", per("K sqrt(f), bias random walk of a sample")),
+    ]
+}
+
+pub(super) const GTSAM: Layout = Layout {
+    comment: "//",
+    first: None,
+    open: "auto params = gtsam::PreintegrationCombinedParams::MakeSharedU(9.80665);  // m/s^2; gravity, z up",
+    close: "",
+    line: |entry| {
+        format!("params->{}({} * gtsam::I_3x3);  // {}", entry.key, number(entry.value), remark(entry))
+    },
+    source: "GTSAM, PreintegrationParams.h and PreintegrationCombinedParams.h; setIntegrationCovariance is not a matter of the IMU",
+};
+
+/// GTSAM: covariances of continuous-time noise, the squares of N and K
+/// (<https://docs.ros.org/en/api/gtsam/html/structgtsam_1_1PreintegrationCombinedParams.html>).
+pub(super) fn gtsam(v: &Values) -> Vec<Entry> {
+    let square = |x: f64| x * x;
+    let rate = format!("continuous-time, IMU at {} Hz", v.rate_hz);
+    vec![
+        Entry::new(
+            "setAccelerometerCovariance",
+            square(v.accel.density),
+            "(m/s^2)^2/Hz",
+            format!("N^2, {rate}"),
+        ),
+        Entry::new("setGyroscopeCovariance", square(v.gyro.density), "(rad/s)^2/Hz", format!("N^2, {rate}")),
+        Entry::new("setBiasAccCovariance", square(v.accel.walk), "(m/s^3)^2/Hz", format!("K^2, {rate}")),
+        Entry::new("setBiasOmegaCovariance", square(v.gyro.walk), "(rad/s^2)^2/Hz", format!("K^2, {rate}")),
+    ]
+}
