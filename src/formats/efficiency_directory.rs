@@ -56,7 +56,7 @@ impl StudyDirectory {
         std::io::Seek::seek(&mut file, std::io::SeekFrom::End(0)).map_err(io)?;
         let mut directory = Self { path: sets.clone(), layout, sets: file, done };
         if whole == 0 {
-            directory.write(&directory.header())?;
+            directory.write(directory.header().as_bytes())?;
         }
         Ok(directory)
     }
@@ -66,21 +66,18 @@ impl StudyDirectory {
     /// # Errors
     /// When the disk is full.
     pub fn append(&mut self, sets: Vec<Vec<Estimate>>) -> Result<()> {
-        let mut text = String::new();
+        let mut rows = csv::Writer::from_writer(Vec::new());
         for set in sets {
+            let number = (self.done.len() + 1).to_string();
             for ((scenario, estimator), e) in self.layout.rows.iter().zip(&set) {
-                let theta: Vec<String> = e.theta.iter().map(|v| format!("{v:e}")).collect();
-                text += &format!(
-                    "{},{},{estimator},{},{:e},{}\n",
-                    self.done.len() + 1,
-                    quoted(scenario),
-                    theta.join(","),
-                    e.objective,
-                    e.without_root
-                );
+                let mut row = vec![number.clone(), scenario.clone(), estimator.clone()];
+                row.extend(e.theta.iter().map(|v| format!("{v:e}")));
+                row.extend([format!("{:e}", e.objective), e.without_root.to_string()]);
+                rows.write_record(&row).map_err(|e| FileError::io(&self.path, e.into()))?;
             }
             self.done.push(set);
         }
+        let text = rows.into_inner().map_err(|e| FileError::io(&self.path, e.into_error()))?;
         self.write(&text)
     }
 
@@ -89,15 +86,10 @@ impl StudyDirectory {
         format!("set,scenario,estimator,{},objective,without_root\n", names.join(","))
     }
 
-    fn write(&mut self, text: &str) -> Result<()> {
-        let written = self.sets.write_all(text.as_bytes()).and_then(|()| self.sets.sync_data());
+    fn write(&mut self, text: &[u8]) -> Result<()> {
+        let written = self.sets.write_all(text).and_then(|()| self.sets.sync_data());
         written.map_err(|source| FileError::io(&self.path, source))
     }
-}
-
-/// A field that may hold commas or quotes.
-fn quoted(field: &str) -> String {
-    if field.contains([',', '"']) { format!("\"{}\"", field.replace('"', "\"\"")) } else { field.to_owned() }
 }
 
 /// A directory that cannot be worked in, or a file in it.

@@ -19,13 +19,15 @@
 use super::FileError;
 use super::contamination_file;
 use super::model_file;
-use super::suggest::nearest;
+use super::toml_described;
 use super::toml_file::{Section, Source};
-use crate::calibration::{AverageError, Estimator, ModelSpec, Trim, Weighting};
+use crate::calibration::{AverageError, Estimator, Trim, Weighting};
 use crate::efficiency::Design;
 use crate::imu::Channel;
 use crate::noise::contamination::Contamination;
 use crate::wavelet::{Convention, Tuning, default_levels, max_levels};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// A study, read.
@@ -41,21 +43,89 @@ pub struct StudyFile {
     pub model: PathBuf,
 }
 
-const KEYS: [&str; 13] = [
-    "schema",
-    "model",
-    "axis",
-    "fit",
-    "replicates",
-    "samples",
-    "levels",
-    "sets",
-    "seed",
-    "scenarios",
-    "estimators",
-    "trim",
-    "efficiency",
-];
+/// Monte-Carlo study of estimators: nav-sim efficiency
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "Study")]
+struct Description {
+    /// Version of the layout
+    #[schemars(range(min = 1, max = 1))]
+    schema: Option<u64>,
+    /// Model file with [spread], relative to this file
+    model: String,
+    /// The axis studied: accel.x (default) … gyro.z
+    #[serde(default = "accel_x")]
+    axis: String,
+    /// What is fitted, such as N1
+    fit: String,
+    /// Replicates of a set, K
+    #[schemars(range(min = 1))]
+    replicates: u64,
+    /// Samples of a replicate, T
+    #[schemars(range(min = 4))]
+    samples: u64,
+    /// Scales, J (default: floor(log2 T) - 1)
+    #[schemars(range(min = 1))]
+    levels: Option<u64>,
+    /// Sets of replicates, H
+    #[schemars(range(min = 1))]
+    sets: u64,
+    /// Seed (default: --seed, or drawn)
+    seed: Option<u64>,
+    /// Contaminations: names, or files relative to this one
+    #[schemars(length(min = 1), extend("uniqueItems" = true))]
+    scenarios: Vec<String>,
+    /// Estimators (default: awv, sr-awv, dr-awv)
+    #[serde(default = "of_models")]
+    #[schemars(length(min = 1), extend("uniqueItems" = true))]
+    estimators: Vec<Several>,
+    /// Replicates that dr-awv drops at each end (default: 30 %)
+    trim: Option<u64>,
+    /// Efficiency of the robust wavelet variance
+    #[serde(default = "efficiency")]
+    #[schemars(range(min = 0.3, max = 0.99))]
+    efficiency: f64,
+}
+
+/// An estimator that averages several replicates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+#[schemars(inline)]
+enum Several {
+    Awv,
+    SrAwv,
+    DrAwv,
+    Avlr,
+}
+
+impl From<Several> for Estimator {
+    fn from(estimator: Several) -> Self {
+        match estimator {
+            Several::Awv => Self::Awv,
+            Several::SrAwv => Self::SrAwv,
+            Several::DrAwv => Self::DrAwv,
+            Several::Avlr => Self::Avlr,
+        }
+    }
+}
+
+fn accel_x() -> String {
+    "accel.x".to_owned()
+}
+
+fn of_models() -> Vec<Several> {
+    vec![Several::Awv, Several::SrAwv, Several::DrAwv]
+}
+
+const fn efficiency() -> f64 {
+    Tuning::DEFAULT_EFFICIENCY
+}
+
+/// The JSON schema of a study file.
+#[must_use]
+pub fn schema() -> serde_json::Value {
+    schemars::schema_for!(Description).to_value()
+}
 
 /// Reads a study, its model and its contaminations.
 ///
@@ -63,87 +133,49 @@ const KEYS: [&str; 13] = [
 /// When a file cannot be read, has unknown keys, lacks some, or has values that mean no study.
 pub fn read(path: &Path) -> Result<StudyFile, FileError> {
     let source = Source::read(path)?;
+    let d: Description = toml_described::read(&source)?;
     let table = source.parse()?;
     let root = source.root(&table);
-    root.only(&KEYS)?;
-    if root.u64("schema")?.is_some_and(|s| s != 1) {
+    if d.schema.is_some_and(|s| s != 1) {
         return Err(root.refuse("schema", "is not a schema this version reads: it reads 1", None));
     }
+    at_least(&root, "samples", d.samples, 4)?;
+    at_least(&root, "replicates", d.replicates, 1)?;
+    at_least(&root, "sets", d.sets, 1)?;
     let beside = |name: &str| path.parent().unwrap_or(Path::new("")).join(name);
-    let model = beside(root.require_str("model")?);
+    let model = beside(&d.model);
     let file = model_file::read(&model)?;
-    let channel = channel(&root, &file.missing)?;
-    let samples = at_least(&root, "samples", 4)? as usize;
+    let samples = d.samples as usize;
     let design = Design {
         seed: 0,
-        channel,
-        replicates: at_least(&root, "replicates", 1)?,
+        channel: channel(&root, &d.axis, &file.missing)?,
+        replicates: d.replicates,
         samples,
-        levels: levels(&root, samples)?,
-        scenarios: scenarios(&root, file.model.rate_hz, beside)?,
-        estimators: estimators(&root)?,
-        spec: spec(&root)?,
-        trim: root.u64("trim")?.map_or(Trim::default(), |a| Trim::Count(a as usize)),
-        tuning: tuning(&root)?,
+        levels: levels(&root, d.levels, samples)?,
+        scenarios: scenarios(&root, &d.scenarios, file.model.rate_hz, beside)?,
+        estimators: estimators(&root, d.estimators)?,
+        spec: d.fit.parse().map_err(|e| root.refuse("fit", format!("is no model: {e}"), None))?,
+        trim: d.trim.map_or(Trim::default(), |a| Trim::Count(a as usize)),
+        tuning: Tuning::new(d.efficiency, Convention::Exact)
+            .map_err(|_| root.refuse("efficiency", "is not between 0.3 and 0.99", None))?,
         weighting: Weighting::Edof,
         spread: file.spread.unwrap_or_default(),
         model: file.model,
     };
     enough(&root, &design)?;
     has_slopes(&root, &design)?;
-    Ok(StudyFile { design, seed: root.u64("seed")?, sets: at_least(&root, "sets", 1)?, model })
+    Ok(StudyFile { design, seed: d.seed, sets: d.sets, model })
 }
 
-/// The JSON schema of a study file.
-#[must_use]
-pub fn schema() -> serde_json::Value {
-    use serde_json::json;
-    let whole = |least: u64| json!({ "type": "integer", "minimum": least });
-    let described = |text: &str, mut of: serde_json::Value| {
-        of["description"] = text.into();
-        of
-    };
-    let text = || json!({ "type": "string" });
-    let several: Vec<&str> = ["awv", "sr-awv", "dr-awv", "avlr"].to_vec();
-    json!({
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "Study",
-        "description": "Monte-Carlo study of estimators: nav-sim efficiency",
-        "type": "object",
-        "properties": {
-            "schema": { "const": 1 },
-            "model": described("Model file with [spread], relative to this file", text()),
-            "axis": described("The axis studied: accel.x (default) … gyro.z", text()),
-            "fit": described("What is fitted, such as N1", text()),
-            "replicates": described("Replicates of a set, K", whole(1)),
-            "samples": described("Samples of a replicate, T", whole(4)),
-            "levels": described("Scales, J (default: floor(log2 T) - 1)", whole(1)),
-            "sets": described("Sets of replicates, H", whole(1)),
-            "seed": whole(0),
-            "scenarios": described("Contaminations: names, or files relative to this one",
-                json!({ "type": "array", "items": text(), "minItems": 1, "uniqueItems": true })),
-            "estimators": json!({ "type": "array", "items": { "enum": several }, "minItems": 1, "uniqueItems": true }),
-            "trim": described("Replicates that dr-awv drops at each end (default: 30 %)", whole(0)),
-            "efficiency": { "type": "number", "minimum": 0.3, "maximum": 0.99,
-                "description": "Efficiency of the robust wavelet variance (default 0.6)" }
-        },
-        "required": ["model", "fit", "replicates", "samples", "sets", "scenarios"],
-        "additionalProperties": false
-    })
-}
-
-/// A required whole number in a range that fits memory and file formats.
-fn at_least(root: &Section<'_>, key: &str, least: u64) -> Result<u64, FileError> {
-    let value = root.u64(key)?.ok_or_else(|| root.missing(key))?;
+/// Refuses a whole number that is too small, or more than fits memory and file formats.
+fn at_least(root: &Section<'_>, key: &str, value: u64, least: u64) -> Result<(), FileError> {
     if (least..=1 << 40).contains(&value) {
-        Ok(value)
-    } else {
-        Err(root.refuse(key, format!("is not a whole number ≥ {least}"), None))
+        return Ok(());
     }
+    Err(root.refuse(key, format!("is not a whole number ≥ {least}"), None))
 }
 
-fn channel(root: &Section<'_>, missing: &[Channel]) -> Result<Channel, FileError> {
-    let name = root.str("axis")?.unwrap_or("accel.x");
+fn channel(root: &Section<'_>, name: &str, missing: &[Channel]) -> Result<Channel, FileError> {
     let names = || Channel::ALL.map(|c| c.to_string()).join(", ");
     let Some(channel) = Channel::ALL.into_iter().find(|c| c.to_string() == name) else {
         return Err(root.refuse("axis", "is no axis", Some(format!("axes: {}", names()))));
@@ -155,9 +187,9 @@ fn channel(root: &Section<'_>, missing: &[Channel]) -> Result<Channel, FileError
     Ok(channel)
 }
 
-fn levels(root: &Section<'_>, samples: usize) -> Result<u32, FileError> {
+fn levels(root: &Section<'_>, levels: Option<u64>, samples: usize) -> Result<u32, FileError> {
     let most = max_levels(samples);
-    match root.u64("levels")? {
+    match levels {
         None => Ok(default_levels(samples)),
         Some(levels) if (1..=u64::from(most)).contains(&levels) => Ok(levels as u32),
         Some(_) => {
@@ -169,60 +201,35 @@ fn levels(root: &Section<'_>, samples: usize) -> Result<u32, FileError> {
 
 fn scenarios(
     root: &Section<'_>,
+    names: &[String],
     rate_hz: f64,
     beside: impl Fn(&str) -> PathBuf,
 ) -> Result<Vec<Contamination>, FileError> {
-    let names = root.strs("scenarios")?.ok_or_else(|| root.missing("scenarios"))?;
     if names.is_empty() {
         return Err(root.refuse("scenarios", "names none", None));
     }
     if let Some(twice) = (1..names.len()).find(|i| names[..*i].contains(&names[*i])) {
         return Err(root.refuse("scenarios", format!("names {} twice", names[twice]), None));
     }
-    let find = |name: &&str| {
+    let find = |name: &String| {
         let file = beside(name);
-        if !contamination_file::names().contains(name) && !file.is_file() {
+        let preset = contamination_file::names().contains(&name.as_str());
+        if !preset && !file.is_file() {
             let hint = contamination_file::meant(name).map(|m| format!("did you mean \"{m}\"?"));
             return Err(root.refuse("scenarios", format!("names {name}, which is not there"), hint));
         }
-        let preset = contamination_file::names().contains(name);
-        let place = if preset { (*name).to_owned() } else { file.display().to_string() };
-        Ok(Contamination { name: (*name).to_owned(), ..contamination_file::find(&place, rate_hz)? })
+        let place = if preset { name.clone() } else { file.display().to_string() };
+        Ok(Contamination { name: name.clone(), ..contamination_file::find(&place, rate_hz)? })
     };
     names.iter().map(find).collect()
 }
 
-fn estimators(root: &Section<'_>) -> Result<Vec<Estimator>, FileError> {
-    let several = || Estimator::ALL.into_iter().filter(|e| !e.is_single() || *e == Estimator::Avlr);
-    let Some(names) = root.strs("estimators")? else {
-        return Ok(several().filter(|e| !e.is_single()).collect());
-    };
-    let find = |name: &&str| {
-        several().find(|e| e.name() == *name).ok_or_else(|| {
-            let hint = nearest(name, several().map(Estimator::name)).map_or_else(
-                || format!("estimators: {}", several().map(Estimator::name).collect::<Vec<_>>().join(", ")),
-                |meant| format!("did you mean \"{meant}\"?"),
-            );
-            root.refuse("estimators", format!("names {name}, which is no average of replicates"), Some(hint))
-        })
-    };
-    let found: Vec<Estimator> = names.iter().map(find).collect::<Result<_, _>>()?;
-    let repeated = (1..found.len()).any(|i| found[..i].contains(&found[i]));
-    if found.is_empty() || repeated {
+fn estimators(root: &Section<'_>, named: Vec<Several>) -> Result<Vec<Estimator>, FileError> {
+    let repeated = (1..named.len()).any(|i| named[..i].contains(&named[i]));
+    if named.is_empty() || repeated {
         return Err(root.refuse("estimators", "is not a list of different estimators", None));
     }
-    Ok(found)
-}
-
-fn spec(root: &Section<'_>) -> Result<ModelSpec, FileError> {
-    let text = root.require_str("fit")?;
-    text.parse().map_err(|e| root.refuse("fit", format!("is no model: {e}"), None))
-}
-
-fn tuning(root: &Section<'_>) -> Result<Tuning, FileError> {
-    let efficiency = root.f64("efficiency")?.unwrap_or(Tuning::DEFAULT_EFFICIENCY);
-    Tuning::new(efficiency, Convention::Exact)
-        .map_err(|_| root.refuse("efficiency", "is not between 0.3 and 0.99", None))
+    Ok(named.into_iter().map(Estimator::from).collect())
 }
 
 fn enough(root: &Section<'_>, design: &Design) -> Result<(), FileError> {
@@ -286,6 +293,10 @@ mod tests {
         );
         assert_eq!(with("fit = ", "fits = "), "s.toml, line 2: unknown key \"fits\" | did you mean \"fit\"?");
         assert_eq!(with("sets = 3\n", ""), "s.toml, line 1: \"sets\" is missing | add the key \"sets\"");
+        assert_eq!(
+            with("sets = 3", "sets = -1"),
+            "s.toml, line 5: \"sets\" = -1 is not a whole number ≥ 0 | "
+        );
         assert_eq!(with("sets = 3", "sets = 0"), "s.toml, line 5: \"sets\" = 0 is not a whole number ≥ 1 | ");
         assert_eq!(
             with("samples = 64", "samples = 64\nlevels = 7"),
@@ -293,7 +304,7 @@ mod tests {
         );
         assert_eq!(
             with("sets", "estimators = [\"gmwm\"]\nsets"),
-            "s.toml, line 5: \"estimators\" = [\"gmwm\"] names gmwm, which is no average of replicates | estimators: awv, sr-awv, dr-awv, avlr"
+            "s.toml, line 5: \"estimators\" = \"gmwm\" is not one of \"awv\", \"sr-awv\", \"dr-awv\", \"avlr\" | "
         );
         assert_eq!(
             with("sets", "axis = \"gyro.x\"\nsets"),

@@ -148,6 +148,12 @@ impl FileError {
         Self::new(path, line, kind)
     }
 
+    /// A row with too few or too many values.
+    pub(super) fn row_length(path: &str, line: u64, found: usize, expected: usize) -> Self {
+        Self::contents(path, line, format!("{found} values, but {expected} columns"))
+            .advice("every row needs one value a column; was the file cut off?")
+    }
+
     /// With advice, beside what it has.
     #[must_use]
     pub fn advice(mut self, advice: impl Into<Cow<'static, str>>) -> Self {

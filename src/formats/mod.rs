@@ -20,6 +20,7 @@ pub mod study_directory;
 pub mod study_file;
 pub mod suggest;
 pub mod table_files;
+mod toml_described;
 pub mod toml_file;
 pub mod trajectory_file;
 pub mod unit_file;

@@ -1,8 +1,9 @@
 //! Study files of `nav-sim batch` (TOML): see [`Study`].
 
 use super::error::{FileError, Kind};
-use super::scenario_file::{self, explained};
+use super::scenario_file;
 use super::suggest::nearest;
+use super::toml_described;
 use super::toml_file::{Section, Source};
 use crate::scenario::Scenario;
 use crate::sensors::gnss::GnssSettings;
@@ -36,7 +37,7 @@ pub fn read(path: &Path) -> Result<BatchFile, FileError> {
     let table = source.parse()?;
     let root = source.root(&table);
     let written: toml::Table = source.text().parse().unwrap_or_default();
-    let mut study: Study = toml::from_str(source.text()).map_err(|e| explained(&e, &source))?;
+    let mut study: Study = toml_described::read(&source)?;
     for key in ["filters", "scenario", "gnss", "outages"] {
         let is_empty = |value: &toml::Value| value.as_array().is_some_and(Vec::is_empty);
         if written.get(key).is_some_and(is_empty) {

@@ -35,6 +35,17 @@ pub(super) fn unknown_key<'a>(
     source.error(line, Kind::UnknownKey(dotted.into())).advice(hint)
 }
 
+/// A key that is needed, of one or several (dotted) that would do.
+pub(super) fn missing_key(source: &Source, line: usize, keys: &[String]) -> FileError {
+    let keys: Vec<String> = keys.iter().map(|key| format!("\"{key}\"")).collect();
+    let keys = keys.join(" or ");
+    let advice = match keys.as_str() {
+        "\"rate_hz\"" => "add rate_hz = 100.0, the sample rate (Hz)".to_owned(),
+        _ => format!("add the key {keys}"),
+    };
+    source.error(line, Kind::MissingKey(keys.into())).advice(advice)
+}
+
 /// A value as it is shown: in one line, at most 60 characters of it.
 pub(super) fn shown(written: &str) -> String {
     written.split_whitespace().collect::<Vec<_>>().join(" ").chars().take(60).collect()
@@ -162,13 +173,8 @@ impl<'a> Section<'a> {
     }
 
     pub(crate) fn missing_one_of(&self, keys: &[&str]) -> FileError {
-        let keys: Vec<String> = keys.iter().map(|k| format!("\"{}\"", self.key(k))).collect();
-        let (line, keys) = (self.line(), keys.join(" or "));
-        let advice = match keys.as_str() {
-            "\"rate_hz\"" => "add rate_hz = 100.0, the sample rate (Hz)".to_owned(),
-            _ => format!("add the key {keys}"),
-        };
-        self.source.error(line, Kind::MissingKey(keys.into())).advice(advice)
+        let keys: Vec<String> = keys.iter().map(|key| self.key(key)).collect();
+        missing_key(self.source, self.line(), &keys)
     }
 
     /// A refusal of the value of a key that is there.
@@ -246,15 +252,6 @@ impl<'a> Section<'a> {
 
     pub(crate) fn require_str(&self, key: &str) -> Result<&'a str, FileError> {
         self.str(key)?.ok_or_else(|| self.missing(key))
-    }
-
-    /// A list of texts.
-    pub(crate) fn strs(&self, key: &str) -> Result<Option<Vec<&'a str>>, FileError> {
-        let Some(value) = self.get(key) else { return Ok(None) };
-        let error = || self.wrong_type(key, "a list of texts in quotes");
-        let items = value.get_ref().as_array().ok_or_else(error)?;
-        let texts = items.iter().map(|v| v.get_ref().as_str());
-        texts.collect::<Option<Vec<&str>>>().map(Some).ok_or_else(error)
     }
 
     /// A table.

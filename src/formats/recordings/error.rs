@@ -41,12 +41,6 @@ pub(super) fn sample(path: &str, line: u64, column: &str, value: &str, reason: &
     FileError::cell(path, line, column, value, reason).advice(advice)
 }
 
-/// A row with too few or too many cells.
-pub(super) fn row_length(path: &str, line: u64, found: usize, expected: usize) -> FileError {
-    FileError::contents(path, line, format!("{found} values, but {expected} columns"))
-        .advice("every row needs one value a column; was the file cut off?")
-}
-
 /// A column without a unit that cannot be known.
 pub(super) fn no_unit(path: &str, line: u64, column: &str) -> FileError {
     let units = if column.to_lowercase().starts_with('a') {

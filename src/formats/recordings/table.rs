@@ -1,6 +1,6 @@
 //! A file as columns of numbers, before anything is decided about time and units.
 
-use super::error::{COLUMNS, row_length, sample, storage};
+use super::error::{COLUMNS, sample, storage};
 use super::header::{self, HeaderPlace, Role};
 use super::values::Values;
 use super::{ReadOptions, text};
@@ -85,7 +85,7 @@ fn load_npy(path: &Path, options: &ReadOptions) -> Result<Raw, FileError> {
         None => header::npy_order(expected).ok_or_else(|| unnamed(&name, expected))?,
     };
     if names.len() != expected {
-        return Err(row_length(&name, 1, expected, names.len()));
+        return Err(FileError::row_length(&name, 1, expected, names.len()));
     }
     let place = HeaderPlace { path: &name, line: 1 };
     let layout = header::Layout::new(place, &names, false, options.channels.as_deref())?;

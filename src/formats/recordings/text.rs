@@ -1,7 +1,7 @@
 //! Text tables: comment head, header, rows.
 
 use super::ReadOptions;
-use super::error::{COLUMNS, empty, row_length, sample, shown, storage, unreadable};
+use super::error::{COLUMNS, empty, sample, shown, storage, unreadable};
 use super::header::{HeaderPlace, Layout, Role, classify};
 use super::table::{BETWEEN, BEYOND, Column, LARGEST, Lines, Raw, relieve, settle};
 use super::values::Values;
@@ -198,7 +198,7 @@ fn read_rows(
             if record.iter().all(|c| c.trim_ascii().is_empty()) {
                 continue;
             }
-            return Err(row_length(name, line, found, expected));
+            return Err(FileError::row_length(name, line, found, expected));
         }
         if sample % BETWEEN == 0 {
             relieve(columns, options).map_err(storage(name))?;

@@ -2,7 +2,7 @@
 
 use super::Options;
 use super::samples::{Attitude, Rows, local};
-use super::table::{Numbers, Table, no_rows, row_length};
+use super::table::{Numbers, Table, no_rows};
 use crate::formats::FileError as Error;
 use crate::trajectory::TrajectorySample;
 use crate::trajectory::import::{BodyMotion, Command};
@@ -177,7 +177,7 @@ fn numbers(path: &str, line: u64, text: &str, least: usize) -> Result<Vec<f64>, 
     };
     let cells = text.split(',').map(number).collect::<Result<Vec<_>, _>>()?;
     if cells.len() < least {
-        return Err(row_length(path, line, cells.len(), least));
+        return Err(Error::row_length(path, line, cells.len(), least));
     }
     Ok(cells)
 }

@@ -105,7 +105,7 @@ impl Table {
     fn row(&mut self, line: u64, cells: &[&str], numbers: Numbers) -> Result<(), Error> {
         let (found, expected) = (cells.len(), self.columns.len());
         if found != expected {
-            return Err(row_length(&self.path, line, found, expected));
+            return Err(Error::row_length(&self.path, line, found, expected));
         }
         let number = |(i, cell): (usize, &&str)| match cell.parse::<f64>() {
             Ok(value) if value.is_finite() || numbers == Numbers::Any => Ok(value),
@@ -140,12 +140,6 @@ const DEGREES: &str = "angles are in degrees: latitude within ±89.9, longitude 
 /// A file without rows.
 pub(super) fn no_rows(path: &str) -> Error {
     Error::new(path, Place::Within, Kind::Empty("no rows in it"))
-}
-
-/// A row with too few or too many cells.
-pub(super) fn row_length(path: &str, line: u64, found: usize, expected: usize) -> Error {
-    Error::contents(path, line, format!("{found} values, but {expected} columns"))
-        .advice("every row needs one value a column; was the file cut off?")
 }
 
 fn separator_of(header: &str) -> char {
