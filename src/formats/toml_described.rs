@@ -5,6 +5,7 @@ use super::error::{FileError, Kind};
 use super::suggest::nearest;
 use super::toml_file::{Source, missing_key, shown, unknown_key};
 use serde::de::DeserializeOwned;
+use std::ops::Range;
 
 /// A file as its description has it.
 ///
@@ -27,7 +28,7 @@ fn explained(error: &toml::de::Error, source: &Source) -> FileError {
         return unknown_key(source, line, key, quoted[0], quoted[1..].iter().copied());
     }
     if message.starts_with("missing field") && !quoted.is_empty() {
-        return missing_key(source, line, &[dotted(&section, quoted[0])]);
+        return missing_key(source, line, &[dotted(&table_at(source.text(), span), quoted[0])]);
     }
     let kind = Kind::Value {
         key: dotted(&section, &key_before(source.text(), span.start)).into(),
@@ -55,6 +56,18 @@ fn reason(message: &str, quoted: &[&str]) -> String {
         Some(other) if !other.contains(' ') => format!("is refused: {message}"),
         Some(other) => format!("is not {}", other.strip_prefix("struct").map_or(other, |_| "a table")),
         None => format!("is refused: {message}"),
+    }
+}
+
+/// Name of the table that a span is: its head, an inline table, or the rest of the file.
+fn table_at(text: &str, span: Range<usize>) -> String {
+    let (section, written) = (section_at(text, span.start), text.get(span.clone()).unwrap_or_default());
+    if written.starts_with('[') && written.ends_with(']') {
+        written.trim_matches(['[', ']', ' ']).to_owned()
+    } else if written.starts_with('{') {
+        dotted(&section, &key_before(text, span.start))
+    } else {
+        section
     }
 }
 
@@ -114,6 +127,7 @@ mod tests {
             ("count = \"many\"", "line 1: \"count\" = \"many\" is not a whole number ≥ 0 | "),
             ("\n[part]\nx = 1\n", "line 1: \"count\" is missing | add the key \"count\""),
             ("count = 1\n[part]\n", "line 2: \"part.x\" is missing | add the key \"part.x\""),
+            ("count = 1\npart = {}\n", "line 2: \"part.x\" is missing | add the key \"part.x\""),
             ("count = 1\n[part]\nx = \"a\"\n", "line 3: \"part.x\" = \"a\" is not a number | "),
             ("count = 1\npart = 3\n", "line 2: \"part\" = 3 is not a table | "),
             (
