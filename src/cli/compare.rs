@@ -3,8 +3,9 @@
 use super::{Failure, Session};
 use comfy_table::{ContentArrangement, Table, presets};
 use nav_sim::formats::{atomic, run_directory};
-use nav_sim::metrics::{self, Measured, Verdict};
+use nav_sim::metrics;
 use nav_sim::report::{self, CandidateResult, ComparisonFile, Label, Manifest};
+use nav_sim::scenario::Method;
 use nav_sim::simulation::REPORTED_NAMES;
 use std::path::{Path, PathBuf};
 
@@ -67,11 +68,11 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         let run = path.display().to_string();
         let label = Label::of(&run, candidate.manifest.model.estimator.as_deref());
         let is_reference = same_place(path, &args.reference);
-        let verdict = verdict(&candidate.experiment);
+        let verdict = candidate.experiment.verdict();
         candidates.push(CandidateResult { run, label, is_reference, verdict, outages });
     }
     let name = args.reference.display().to_string();
-    let file = ComparisonFile::new((&name, &verdict(&reference.experiment)), all_paired, &candidates);
+    let file = ComparisonFile::new((&name, &reference.experiment.verdict()), all_paired, &candidates);
     let json = report::json(&file);
     atomic::write(out, &json)?;
     if session.json() {
@@ -81,10 +82,6 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     session.printer.say(&format!("wrote {}", out.display()));
     Ok(())
-}
-
-fn verdict(experiment: &Measured) -> Verdict {
-    Verdict::of(&experiment.runs, experiment.outages.len(), experiment.independent_windows)
 }
 
 /// The verdicts, the table of ASEE ratios, and what stands beside them.
@@ -153,7 +150,12 @@ fn differences(candidate: &Manifest, reference: &Manifest) -> Vec<String> {
             found.push(format!("{what} not that of the reference; the runs are not paired"));
         }
     };
-    differ("the seed is", candidate.seed != reference.seed || candidate.scenario != reference.scenario);
+    let is_expected = [c, r].map(|of| of.run.method == Method::Lincov);
+    let (seeds, scenarios) = ([candidate.seed, reference.seed], [&candidate.scenario, &reference.scenario]);
+    // covariance analysis draws nothing, and so differs in nothing by its seed
+    let differently = seeds[0] != seeds[1] || scenarios[0] != scenarios[1];
+    differ("the method is", is_expected[0] != is_expected[1]);
+    differ("the seed is", is_expected == [false, false] && differently);
     differ("what makes the errors is", truth(candidate) != truth(reference));
     differ("[imu] is", c.imu != r.imu);
     differ("[gnss] is", c.gnss != r.gnss);

@@ -1,8 +1,10 @@
 //! Run directories read back, as far as comparisons need them.
 
 use super::{atomic, source};
-use crate::metrics::Measured;
+use crate::metrics::{EpochRow, Measured, PerState};
 use crate::report::{Manifest, TableError, parse_epochs, parse_runs};
+use crate::scenario::Method;
+use crate::simulation::{OutageRecord, RunRecord};
 use std::path::Path;
 
 /// A run directory that cannot be read.
@@ -16,7 +18,7 @@ pub enum RunDirectoryError {
         /// What the system said.
         source: std::io::Error,
     },
-    /// The manifest is not one.
+    /// Manifest or summary is not one.
     #[error("{path}, line {line}: {message}")]
     Manifest {
         /// File.
@@ -87,27 +89,63 @@ pub fn read(directory: &Path) -> Result<RunDirectory, RunDirectoryError> {
     atomic::recover(directory);
     let manifest = manifest(directory)?;
     let (epochs_path, epochs) = text(directory, "epochs.csv")?;
-    let (runs_path, runs) = text(directory, "runs.csv")?;
     let table = |path: String| move |source| RunDirectoryError::Table { path, source };
-    let outages = manifest.configuration.outage.iter().flatten().map(|o| (o.start_s, o.end_s)).collect();
-    let experiment = Measured {
-        epochs: parse_epochs(&epochs).map_err(table(epochs_path))?,
-        runs: parse_runs(&runs).map_err(table(runs_path))?,
-        outages,
-        independent_windows: manifest.independent_windows,
+    let epochs = parse_epochs(&epochs).map_err(table(epochs_path))?;
+    let is_expected = manifest.configuration.run.method == Method::Lincov;
+    let runs = if is_expected {
+        vec![expected_run(directory, &epochs)?]
+    } else {
+        let (runs_path, runs) = text(directory, "runs.csv")?;
+        parse_runs(&runs).map_err(table(runs_path))?
     };
+    let outages = manifest.configuration.outage.iter().flatten().map(|o| (o.start_s, o.end_s)).collect();
+    let independent_windows = manifest.independent_windows;
+    let experiment = Measured { epochs, runs, outages, independent_windows, is_expected };
     Ok(RunDirectory { manifest, experiment })
+}
+
+/// The run that stands for what covariance analysis expects, from its epochs and its summary.
+fn expected_run(directory: &Path, epochs: &[EpochRow]) -> Result<RunRecord, RunDirectoryError> {
+    #[derive(serde::Deserialize)]
+    struct Expected {
+        outages: Vec<ExpectedOutage>,
+    }
+    #[derive(serde::Deserialize)]
+    struct ExpectedOutage {
+        asee_mean: PerState<f64>,
+        asee_end: PerState<f64>,
+        rmse_end: PerState<f64>,
+        nees_end: f64,
+    }
+    let (path, json) = text(directory, "summary.json")?;
+    let expected: Expected = serde_json::from_str(&json).map_err(|e| not_json(&path, &e))?;
+    let outage = |o: ExpectedOutage| OutageRecord {
+        see_mean: o.asee_mean.0,
+        see_end: o.asee_end.0,
+        error_end: o.rmse_end.0,
+        nees_end: o.nees_end,
+        ..OutageRecord::default()
+    };
+    let mean = |value: &dyn Fn(&EpochRow) -> f64| epochs.iter().map(value).sum::<f64>() / epochs.len() as f64;
+    Ok(RunRecord {
+        outages: expected.outages.into_iter().map(outage).collect(),
+        nees_mean: mean(&|e| e.nees),
+        covered: mean(&|e| e.coverage),
+        normalised_sq: std::array::from_fn(|i| mean(&|e| (e.rmse[i] / e.asee[i]).powi(2))),
+        ..RunRecord::default()
+    })
 }
 
 fn manifest(directory: &Path) -> Result<Manifest, RunDirectoryError> {
     let (path, json) = text(directory, "manifest.json")?;
-    let manifest: Manifest = serde_json::from_str(&json).map_err(|e| RunDirectoryError::Manifest {
-        path: path.clone(),
-        line: e.line(),
-        message: e.to_string().split(" at line ").next().unwrap_or_default().to_owned(),
-    })?;
+    let manifest: Manifest = serde_json::from_str(&json).map_err(|e| not_json(&path, &e))?;
     let (found, expected) = (manifest.schema_version, Manifest::SCHEMA_VERSION);
     if found == expected { Ok(manifest) } else { Err(RunDirectoryError::Version { path, found, expected }) }
+}
+
+fn not_json(path: &str, e: &serde_json::Error) -> RunDirectoryError {
+    let message = e.to_string().split(" at line ").next().unwrap_or_default().to_owned();
+    RunDirectoryError::Manifest { path: path.to_owned(), line: e.line(), message }
 }
 
 fn text(directory: &Path, name: &str) -> Result<(String, String), RunDirectoryError> {

@@ -26,6 +26,8 @@ mod calibrate;
 mod curves;
 mod error;
 mod files;
+mod navigate;
+mod reduction;
 mod remarks;
 mod wavelet;
 
@@ -33,5 +35,7 @@ pub use calibrate::{Calibration, CalibrationOptions, EstimatorChoice, Measured, 
 pub use curves::{Curves, read_curves};
 pub use error::JobError;
 pub use files::ModelFiles;
+pub use navigate::{NavigateError, NavigateInputs, Navigation, Note, Observer, TrueImu, navigate};
+pub use reduction::Reduced;
 pub use remarks::{Remark, Remarks, Silence};
 pub use wavelet::{Intervals, WaveletOptions, wavelet_variances};

@@ -5,7 +5,7 @@ use super::number::{readable, seconds};
 use super::svg::{Line, Plot, Scale, escape};
 use super::verdict::{verdict_line, verdict_word};
 use crate::metrics::{EpochMetrics, Estimate, OutageSummary, PerState, Summary};
-use crate::simulation::{REPORTED, RunResult};
+use crate::simulation::REPORTED;
 use std::fmt::Write as _;
 
 /// The reported states, in words.
@@ -24,18 +24,14 @@ const TITLES: [&str; REPORTED] = [
 const STYLE: &str = include_str!("report.css");
 
 /// The page of a run directory.
-pub(super) fn run_page(
-    result: &RunResult,
-    epochs: &[EpochMetrics],
-    summary: &Summary,
-    manifest: &Manifest,
-) -> String {
+pub(super) fn run_page(epochs: &[EpochMetrics], summary: &Summary, manifest: &Manifest) -> String {
     let mut body = String::new();
     head(manifest, summary, &mut body);
     accuracy(summary, &mut body);
     outages(&summary.outages, &mut body);
     consistency(summary, &mut body);
-    let plots = Plots { result, epochs };
+    let stripes = summary.outages.iter().map(|o| (o.start_s, o.end_s)).collect();
+    let plots = Plots { stripes, epochs };
     plots.states("Position", 0, &mut body);
     plots.states("Attitude", 6, &mut body);
     plots.states("Velocity", 3, &mut body);
@@ -65,18 +61,25 @@ fn head(manifest: &Manifest, summary: &Summary, body: &mut String) {
         ("trajectory", input("trajectory").to_owned()),
         ("model of the filter", input("model").to_owned()),
         ("what makes the errors", truth.to_owned()),
+    ];
+    let runs = [
         ("runs", format!("{} ({} diverged)", summary.runs, summary.diverged)),
         ("independent runs", readable(summary.independent_runs)),
-        ("filter states", summary.filter_states.to_string()),
-        ("seed", summary.seed.to_string()),
     ];
+    let rest = [("filter states", summary.filter_states.to_string()), ("seed", summary.seed.to_string())];
+    let is_sampled = summary.runs > 0;
+    let runs = runs.into_iter().filter(|_| is_sampled);
     let windows: Vec<(f64, f64)> = summary.outages.iter().map(|o| (o.start_s, o.end_s)).collect();
     let verdict = verdict_line(&summary.verdict, &windows, summary.runs, summary.diverged);
-    *body += "<h1>INS/GNSS Monte-Carlo run</h1>\n";
+    *body += if is_sampled {
+        "<h1>INS/GNSS Monte-Carlo run</h1>\n"
+    } else {
+        "<h1>INS/GNSS covariance analysis</h1>\n"
+    };
     let class = verdict_word(summary.verdict.kind);
     let _ = writeln!(body, "<p class=\"verdict {class}\">The filter is {}</p>", escape(&verdict));
     *body += "<dl>\n";
-    for (name, value) in figures {
+    for (name, value) in figures.into_iter().chain(runs).chain(rest) {
         let _ = writeln!(body, "<dt>{name}</dt><dd>{}</dd>", escape(&value));
     }
     *body += "</dl>\n";
@@ -107,7 +110,11 @@ fn outages(outages: &[OutageSummary], body: &mut String) {
         let h = &o.horizontal_error_end_m;
         format!("{} {}", readable(h.p95), interval(h.p95_ci95))
     });
-    row("horizontal error, largest (m)", &|o| readable(o.horizontal_error_end_m.max));
+    if outages.iter().any(|o| o.horizontal_error_end_m.p999.is_some()) {
+        row("horizontal error, 99.9 % (m)", &|o| readable(o.horizontal_error_end_m.p999.unwrap_or(f64::NAN)));
+    } else {
+        row("horizontal error, largest (m)", &|o| readable(o.horizontal_error_end_m.max));
+    }
     row("re-convergence, median (s)", &|o| readable(o.reconvergence_s.p50));
     table(&rows, body);
     *body += "<h3>Just before the first fix after the outage</h3>\n";
@@ -205,7 +212,8 @@ fn consistency(summary: &Summary, body: &mut String) {
 }
 
 struct Plots<'a> {
-    result: &'a RunResult,
+    /// Outages.
+    stripes: Vec<(f64, f64)>,
     epochs: &'a [EpochMetrics],
 }
 
@@ -242,7 +250,7 @@ impl Plots<'_> {
     }
 
     fn plot(&self, title: &str, scale: Scale, lines: Vec<Line>) -> Plot {
-        let stripes = self.result.outages.clone();
+        let stripes = self.stripes.clone();
         Plot { title: title.to_owned(), scale, include: None, stripes, band: None, lines }
     }
 }

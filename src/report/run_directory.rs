@@ -25,22 +25,25 @@ impl OutputFile<'_> {
 /// Names of the files of a run directory.
 pub const RUN_FILES: [&str; 5] = ["epochs.csv", "runs.csv", "summary.json", "report.html", "manifest.json"];
 
-/// The files of a run directory, the manifest last: where it is, the rest is whole.
+/// The files of a run directory, the manifest last: where it is, the rest is whole. Without runs (covariance
+/// analysis) there is no table of them.
 #[must_use]
 pub fn run_directory<'a>(
-    result: &'a RunResult,
+    runs: Option<&'a RunResult>,
     epochs: &[EpochMetrics],
     summary: &Summary,
     manifest: &Manifest,
 ) -> Vec<OutputFile<'a>> {
     let [epochs_name, runs_name, summary_name, page_name, manifest_name] = RUN_FILES;
-    vec![
-        OutputFile::whole(epochs_name, epochs_csv(epochs)),
-        OutputFile { name: runs_name, parts: Box::new(runs_csv(result)) },
+    let runs = runs.map(|result| OutputFile { name: runs_name, parts: Box::new(runs_csv(result)) });
+    let mut files = vec![OutputFile::whole(epochs_name, epochs_csv(epochs))];
+    files.extend(runs);
+    files.extend([
         OutputFile::whole(summary_name, summary_json(summary, manifest.throughput_epochs_per_s)),
-        OutputFile::whole(page_name, html::run_page(result, epochs, summary, manifest)),
+        OutputFile::whole(page_name, html::run_page(epochs, summary, manifest)),
         OutputFile::whole(manifest_name, json(manifest)),
-    ]
+    ]);
+    files
 }
 
 /// `summary.json`, with how fast it was found (IMU epochs a second, all runs together): its only number that the
@@ -88,7 +91,7 @@ mod tests {
             wall_s: 2.0,
             throughput_epochs_per_s: 2400.0,
         };
-        let files = run_directory(&result, &epochs, &summary, &manifest);
+        let files = run_directory(Some(&result), &epochs, &summary, &manifest);
         files.into_iter().map(|file| (file.name, file.parts.collect())).collect()
     }
 

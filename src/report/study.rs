@@ -248,6 +248,7 @@ pub fn measured(result: &RunResult) -> Measured {
         runs: result.runs.clone(),
         outages: result.outages.clone(),
         independent_windows: result.independent_windows,
+        is_expected: false,
     }
 }
 

@@ -7,6 +7,7 @@ use crate::metrics::{Verdict, VerdictKind};
 /// experiment (start, end) in seconds; `runs` and `diverged` count its runs.
 #[must_use]
 pub fn verdict_line(verdict: &Verdict, outages: &[(f64, f64)], runs: u64, diverged: u64) -> String {
+    let is_expected = verdict.independent_runs.is_infinite();
     let figures = format!(
         "NEES {} (9 if right), coverage {:.3}",
         with_error(verdict.nees, verdict.nees_std_error),
@@ -23,6 +24,11 @@ pub fn verdict_line(verdict: &Verdict, outages: &[(f64, f64)], runs: u64, diverg
         }
         VerdictKind::Overconfident => format!("overconfident: {departure}; {figures}"),
         VerdictKind::Underconfident => format!("underconfident: {departure}; {figures}"),
+        VerdictKind::Ok if is_expected => format!(
+            "consistent: {figures}; by covariance analysis no state is off by more than {:.0} %, over the run or at the \
+             end of an outage",
+            100.0 * verdict.tolerance
+        ),
         VerdictKind::Ok => {
             let percent = |ratio: f64| readable(100.0 * (ratio - 1.0));
             format!(

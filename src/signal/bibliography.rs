@@ -38,6 +38,11 @@ sources! {
     Wgs84;
     /// P. S. Maybeck: *Stochastic Models, Estimation, and Control*, vol. 1, Academic Press, 1979.
     Maybeck79;
+    /// J. P. Imhof: *Computing the distribution of quadratic forms in normal variables*, Biometrika 48, 1961.
+    Imhof61;
+    /// J. A. C. Weideman, L. N. Trefethen: *Parabolic and hyperbolic contours for computing the Bromwich integral*,
+    /// Math. Comp. 76, 2007.
+    WeidemanTrefethen07;
     /// C. F. van Loan: *Computing integrals involving the matrix exponential*, IEEE TAC 23, 1978.
     VanLoan78;
     /// C. L. Lawson, R. J. Hanson: *Solving Least Squares Problems*, 1974 (NNLS).

@@ -64,7 +64,7 @@ impl Study {
         if self.method != Method::MonteCarlo {
             return refuse(
                 "method",
-                "\"lincov\"".into(),
+                format!("\"{}\"", self.method.name()),
                 "is not available in studies yet; use \"monte-carlo\"",
             );
         }

@@ -188,7 +188,6 @@ fn refusals_name_what_is_wrong_and_leave_nothing() {
     refused(&format!("{base} --outage soon"), 2, "invalid value 'soon' for '--outage <START:END>'");
     refused(&format!("{base} --runs 0"), 2, "run.runs = 0 is refused: at least one run");
     refused(&format!("{base} --filter 16"), 2, "invalid value '16' for '--filter <STATES>'");
-    refused(&format!("{base} --method lincov"), 2, "run.method = \"lincov\" is refused");
     refused(&format!("{base} --threads 0"), 2, "invalid value '0' for '--threads <N>'");
     refused(&format!("{base} --truth a --static b"), 2, "the argument '--truth <MODEL2>' cannot be used");
     refused("run drive.toml imu.toml --outage none --seed 1 -o imu.toml", 1, "imu.toml: ");
@@ -359,4 +358,67 @@ fn a_trajectory_of_a_few_seconds_is_run() {
     for outage in ["none", "1:3"] {
         done(place.path(), &format!("run short.toml imu.toml --outage {outage} --runs 1 --seed 5 -o out"));
     }
+}
+
+/// Covariance analysis makes the same directory, but for the table of runs; it needs no seed, and `compare` reads it.
+#[test]
+fn covariance_analysis_is_a_method_of_run() {
+    let place = place();
+    let ran = done(place.path(), "run drive.toml imu.toml --method lincov --outage 30:45 -o expected");
+    assert!(ran.stdout.starts_with("verdict: consistent: NEES 9.0"), "{}", ran.stdout);
+    assert!(ran.stdout.contains("covariance analysis without runs, 15 states"), "{}", ran.stdout);
+    assert!(!ran.stderr.contains("seed"), "{}", ran.stderr);
+    let out = place.path().join("expected");
+    let summary = json(&out.join("summary.json"));
+    assert_eq!((&summary["method"], &summary["runs"]), (&"lincov".into(), &0.into()));
+    let outage = &summary["outages"][0];
+    for key in ["asee_mean", "asee_end", "rmse_mean", "rmse_end"] {
+        assert!(outage[key]["pos_e_m"].as_f64().unwrap() > 0.1, "{key}");
+    }
+    let horizontal = &outage["horizontal_error_end_m"];
+    let quantile = |name: &str| horizontal[name].as_f64().unwrap();
+    assert!(quantile("p50") < quantile("p95") && quantile("p95") < quantile("p999"));
+    assert!(horizontal["max"].is_null() && !out.join("runs.csv").exists());
+    assert!((summary["coverage"]["mean"].as_f64().unwrap() - 0.95).abs() < 0.01);
+    assert!(fs::read_to_string(out.join("report.html")).unwrap().contains("INS/GNSS covariance analysis"));
+
+    done(place.path(), "run drive.toml imu.toml --runs 16 --outage 30:45 --seed 2 -o sampled");
+    let ran = done(place.path(), "compare sampled --reference expected");
+    assert!(ran.stderr.contains("the method is not that of the reference"), "{}", ran.stderr);
+    let row = json(&place.path().join("comparison.json"))["rows"][0].clone();
+    assert!(row["ratio_error_pct"].as_f64().unwrap().abs() < 1.0, "{row}");
+    done(place.path(), "run drive.toml imu.toml --method lincov --filter full --outage 30:45 -o full");
+    done(place.path(), "compare full --reference expected -o exact.json");
+    let row = json(&place.path().join("exact.json"))["rows"][0].clone();
+    assert_eq!(row["ci95_pct"][0], row["ci95_pct"][1], "{row}");
+}
+
+#[test]
+fn runs_stand_beside_what_is_expected_of_them() {
+    let place = place();
+    let command = "run drive.toml imu.toml --method both --runs 40 --outage 30:45 --seed 2 -o out";
+    let ran = done(place.path(), command);
+    assert!(ran.stdout.contains("runs against the covariance analysis: largest z "), "{}", ran.stdout);
+    assert!(!ran.stderr.contains("contradict"), "{}", ran.stderr);
+    let summary = json(&place.path().join("out/summary.json"));
+    assert_eq!((&summary["method"], &summary["lincov"]["method"]), (&"both".into(), &"lincov".into()));
+    assert_eq!(summary["verdict"], summary["lincov"]["verdict"]);
+    let agreement = &summary["agreement"];
+    assert_eq!(agreement["figures"], 12);
+    assert!(agreement["largest_z"].as_f64().unwrap().abs() < agreement["bound_z"].as_f64().unwrap());
+    assert!(place.path().join("out/runs.csv").exists());
+}
+
+#[test]
+fn what_covariance_analysis_cannot_do_is_refused() {
+    let place = place();
+    fs::write(place.path().join("gate.toml"), "filter.nis_gate = 0.99\n").unwrap();
+    let command = "run drive.toml imu.toml --method lincov --outage none --scenario gate.toml -o out";
+    let ran = nav_sim(place.path(), command);
+    assert!(ran.code == 2 && ran.stderr.contains("covariance analysis has no gate"), "{}", ran.stderr);
+    done(place.path(), "synthesize imu.toml --replicates 1 --samples 7000 --seed 1 -o made");
+    let command = "run drive.toml imu.toml --method both --outage none --static made/replicate_1.csv -o out";
+    let ran = nav_sim(place.path(), command);
+    assert!(ran.code == 2 && ran.stderr.contains("covariance analysis needs a model"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("hint: calibrate the recordings"), "{}", ran.stderr);
 }

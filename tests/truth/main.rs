@@ -24,6 +24,7 @@ mod fusion;
 mod global_minimum;
 mod imu_unknowns;
 mod lincov;
+mod lincov_sampled;
 mod long_records;
 mod reduction;
 mod trajectories;

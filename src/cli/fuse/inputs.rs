@@ -1,7 +1,7 @@
 //! The files of a fusion.
 
 use super::Args;
-use crate::cli::run::reduced::{Made, reduction};
+use crate::cli::run::Words;
 use crate::cli::{Failure, Session, parse, read, turn_on};
 use glam::{DMat3, DQuat, DVec3};
 use nav_sim::ekf::{Belief, FilterStates, InitialSettings};
@@ -10,6 +10,7 @@ use nav_sim::frames::RollPitchYaw;
 use nav_sim::fusion::alignment::{self, Alignment};
 use nav_sim::fusion::{FusionError, Recorded, Settings, Start, check_clocks};
 use nav_sim::gnss::GnssFix;
+use nav_sim::jobs::Reduced;
 use nav_sim::noise::{Composite, Model, Process, continuous, reduction};
 use nav_sim::report::Input;
 use nav_sim::sensors::gnss::GnssSettings;
@@ -187,8 +188,9 @@ fn belief(
                 let belief = lincov::reduced_belief(&model, belief, &track).with_initial(&initial);
                 let full = Belief::new(&model, FilterStates::Full, interval_s, window_s);
                 let full = full.ok().map(|full| full.with_initial(&beside(states, &initial)));
-                let made = Made { model: &model, belief: &belief, full, track: &track, interval_s, window_s };
-                reduction(&made, session)?;
+                let reduced =
+                    Reduced { model: &model, belief: &belief, full, track: &track, interval_s, window_s };
+                reduced.summary(&Words::new(session)).map_err(Failure::could_not)?;
                 return Ok(belief);
             }
             None => belief,

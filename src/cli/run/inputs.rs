@@ -4,21 +4,16 @@ use super::Args;
 use crate::cli::{Failure, Session, read, turn_on};
 use nav_sim::formats::model_file::ModelFile;
 use nav_sim::imu::{Recording, Sensor};
+use nav_sim::jobs::{NavigateInputs, TrueImu};
 use nav_sim::noise::Model;
 use nav_sim::report::{Input, ModelNote};
 use nav_sim::scenario::Scenario;
-use nav_sim::sensors::imu::Truth;
-use nav_sim::trajectory::Trajectory;
 use std::path::{Path, PathBuf};
 
 /// What was read, ready to use.
 pub(super) struct Inputs {
-    pub(super) trajectory: Trajectory,
-    /// At the rate of the IMU.
-    pub(super) model: Model,
+    pub(super) job: NavigateInputs,
     pub(super) note: ModelNote,
-    truth_model: Option<Model>,
-    recordings: Vec<Recording>,
     /// Every file with its hash.
     pub(super) files: Vec<Input>,
 }
@@ -42,24 +37,13 @@ impl Inputs {
             paths => read::recordings_at(paths, args.static_rate_hz, session)?,
         };
         recordings.iter().filter_map(motion).for_each(|doubt| session.printer.warn(&doubt));
-        let truth_model = truth.map(|(model, _)| model);
-        Ok(Self {
-            trajectory,
-            model,
-            note: ModelNote { estimator: estimator(&file) },
-            truth_model,
-            recordings,
-            files,
-        })
-    }
-
-    /// What makes the errors.
-    pub(super) fn truth(&self) -> Truth<'_> {
-        match &self.truth_model {
-            _ if !self.recordings.is_empty() => Truth::Static(&self.recordings),
-            Some(model) => Truth::Model(model),
-            None => Truth::Model(&self.model),
-        }
+        let truth = match truth {
+            _ if !recordings.is_empty() => TrueImu::Recordings(recordings),
+            Some((model, _)) => TrueImu::Model(model),
+            None => TrueImu::AsBelieved,
+        };
+        let note = ModelNote { estimator: estimator(&file) };
+        Ok(Self { job: NavigateInputs { trajectory, model, truth }, note, files })
     }
 }
 

@@ -2,27 +2,24 @@
 
 mod inputs;
 mod output;
-pub(super) mod reduced;
+mod words;
 
 use super::filter::FilterArgs;
 use super::{Failure, Session};
 use inputs::Inputs;
-use nav_sim::ekf::Belief;
 use nav_sim::formats::scenario_file;
-use nav_sim::imu::Sensor;
+use nav_sim::jobs::{self, NavigateError};
 use nav_sim::metrics::Summary;
-use nav_sim::monte_carlo;
-use nav_sim::noise::reduction::window_s;
 use nav_sim::report::{Manifest, seconds};
 use nav_sim::scenario::{Method, Scenario};
 use nav_sim::sensors::imu::TruthError;
 use nav_sim::sensors::outage::{Outage, PlacedOutages};
-use nav_sim::simulation::lincov::{Assessment, assess, weak_heading};
-use nav_sim::simulation::{Experiment, ExperimentError, RunResult};
-use std::path::PathBuf;
-use std::time::Instant;
+use nav_sim::simulation::ExperimentError;
+use std::path::{Path, PathBuf};
 
-pub(super) use output::{empty_or_new, manifest, not_of_another_command, text, write};
+pub(super) use output::{empty_or_new, not_of_another_command};
+use output::{manifest, text, write};
+pub(super) use words::Words;
 
 /// Monte-Carlo INS/GNSS navigation along TRAJECTORY with MODEL in the filter
 ///
@@ -59,7 +56,8 @@ pub(crate) struct Args {
     runs: Option<u64>,
     #[command(flatten)]
     filter: FilterArgs,
-    /// How statistics are found: monte-carlo
+    /// How statistics are found: monte-carlo (sampled runs), lincov (linear covariance analysis, no sampling) or
+    /// both, the runs beside what is expected of them
     #[arg(long, value_name = "METHOD", value_parser = parse_method)]
     method: Option<Method>,
     /// Scenario file whose [gnss] section is used
@@ -104,58 +102,45 @@ pub(super) fn windows_of(outages: &[OutageArg]) -> Result<Vec<Outage>, Failure> 
 }
 
 fn parse_method(text: &str) -> Result<Method, String> {
-    match text {
-        "monte-carlo" => Ok(Method::MonteCarlo),
-        "lincov" => Ok(Method::Lincov),
-        _ => Err("expected monte-carlo".to_owned()),
-    }
+    let all = [Method::MonteCarlo, Method::Lincov, Method::Both];
+    all.into_iter().find(|m| m.name() == text).ok_or("expected monte-carlo, lincov or both".to_owned())
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut scenario = scenario(args)?;
     let inputs = Inputs::read(args, &mut scenario, session)?;
-    let seed = session.seed(scenario.run.seed);
-    let span = (inputs.trajectory.start_s(), inputs.trajectory.end_s());
+    let seed = seed(&scenario, session);
+    let span = (inputs.job.trajectory.start_s(), inputs.job.trajectory.end_s());
     let outages = outages(&scenario, span, seed, session).map_err(|e| match &args.scenario {
         Some(path) if args.outages.is_empty() => e.within(&path.display().to_string()),
         _ => e,
     })?;
     output::try_open(&args.out, &inputs.files)?;
-    let unusable = |e| Failure::input(format!("{}: {e}", args.model.display()));
-    let track = scenario.track(&inputs.trajectory, &inputs.model, &outages).map_err(impossible)?;
-    let belief = scenario.belief(&inputs.model, &outages, &track).map_err(unusable)?;
-    doubt_biases(&belief, session);
-    scenario.doubts().iter().for_each(|doubt| session.printer.warn(doubt));
-    let experiment = scenario.experiment(
-        &inputs.trajectory,
-        inputs.truth(),
-        std::slice::from_ref(&belief),
-        &outages,
-        seed,
-    );
-    let reduction = if scenario.filter.states.is_reduced() {
-        let longest = outages.iter().map(|o| o.end_s - o.start_s).fold(0.0, f64::max);
-        let (interval_s, window_s) = (1.0 / scenario.gnss.rate_hz, window_s(longest));
-        let model = &inputs.model;
-        let full = scenario.with_full_noise().belief(model, &outages, &track).ok();
-        let made = reduced::Made { model, belief: &belief, full, track: &track, interval_s, window_s };
-        Some(reduced::reduction(&made, session)?)
-    } else {
-        None
-    };
-    doubt_heading(&assess(&track, &belief, &inputs.model), session);
-    let (results, wall_s) = simulate(&experiment, scenario.run.runs, session)?;
+    let words = Words::new(session);
+    let found = jobs::navigate(&inputs.job, &scenario, &outages, seed, &words);
+    let found = found.map_err(|e| impossible(e, &args.model))?;
     let manifest = manifest(scenario, &outages, seed, inputs.files.clone(), inputs.note.clone(), session);
-    let throughput_epochs_per_s = results[0].run_epochs as f64 / wall_s;
-    let independent_windows = results[0].independent_windows;
+    let epochs = found.runs.as_ref().map_or(0, |runs| runs.run_epochs) as f64;
+    let independent_windows = found.runs.as_ref().and_then(|runs| runs.independent_windows);
+    let wall_s = words.runs_s();
+    let throughput_epochs_per_s = if wall_s > 0.0 { epochs / wall_s } else { 0.0 };
     let manifest = Manifest { independent_windows, wall_s, throughput_epochs_per_s, ..manifest };
-    let summary = write(&results[0], &manifest, reduction, &args.out)?;
+    write(&found, &manifest, &args.out)?;
     let shown = if session.json() { nav_sim::report::summary_json } else { text };
-    session.printer.result(shown(&summary, throughput_epochs_per_s).trim_end());
-    output::doubt_filter(&summary, session);
+    session.printer.result(shown(&found.summary, throughput_epochs_per_s).trim_end());
+    output::doubt_filter(&found.summary, session);
     session.printer.say(&format!("wrote {}", args.out.display()));
-    all_finite(&summary)?;
-    not_lost(&summary)
+    all_finite(&found.summary)?;
+    not_lost(&found.summary)
+}
+
+/// The seed of all random numbers: drawn where nobody gives one and there are any.
+fn seed(scenario: &Scenario, session: &Session) -> u64 {
+    let draws = scenario.run.method != Method::Lincov || scenario.outage_random.is_some();
+    if draws {
+        return session.seed(scenario.run.seed);
+    }
+    session.asked_seed().or(scenario.run.seed).unwrap_or(0)
 }
 
 /// A filter whose errors are of another order than it believes did what was asked for, and is of no use.
@@ -217,52 +202,24 @@ fn outages(
     Ok(windows)
 }
 
-/// A Gauss-Markov process of phi ≈ 1 may have any stationary variance: a filter that starts with it believes
-/// nothing of its first sensor readings.
-fn doubt_biases(belief: &Belief, session: &Session) {
-    for (sensor, limit) in [(Sensor::Accel, 1.0), (Sensor::Gyro, 0.1)] {
-        let sigma = belief.process_sigma(sensor);
-        if sigma > limit {
-            session.printer.warn(&format!(
-                "the filter starts with a bias of {sigma:.3} {} ({} of the model, its correlated processes together): \
-                 an AR1 of phi near 1? `nav-sim calibrate --parameters` bounds it",
-                sensor.unit(),
-                sensor.name()
-            ));
-        }
-    }
-}
-
-/// Where the motion hardly shows the heading, no filter of this kind is to be believed.
-fn doubt_heading(assessment: &Assessment, session: &Session) {
-    let measured = assessment.reports.iter().filter(|r| r.measured);
-    if let Some(doubt) = weak_heading(measured.map(|r| (r.after_s, r.sigma[8]))) {
-        session.printer.warn(&doubt.to_string());
-    }
-}
-
-/// An experiment that does not fit together.
-fn impossible(e: ExperimentError) -> Failure {
+/// A job that cannot be done.
+fn impossible(e: NavigateError, model: &Path) -> Failure {
     let failure = Failure::input(&e);
     match e {
-        ExperimentError::Truth(TruthError::TooShort { .. }) => {
+        NavigateError::Experiment(ExperimentError::Truth(TruthError::TooShort { .. })) => {
             failure.hint("each run takes a window as long as the trajectory: record for longer")
         }
-        ExperimentError::Truth(TruthError::Rate { rate_hz, .. }) => {
+        NavigateError::Experiment(ExperimentError::Truth(TruthError::Rate { rate_hz, .. })) => {
             failure.hint(format!("set rate_hz = {rate_hz} in the [imu] section of a --scenario file"))
         }
-        _ => failure,
+        NavigateError::Experiment(_) => failure,
+        NavigateError::Belief(e) => Failure::input(format!("{}: {e}", model.display())),
+        NavigateError::Reduction(e) => Failure::could_not(e),
+        NavigateError::RecordedTruth => failure.hint(
+            "calibrate the recordings and give the model with --truth in the place of --static, or use --method \
+             monte-carlo",
+        ),
+        NavigateError::Gate(_) => failure.hint("remove the key, or use --method monte-carlo"),
+        NavigateError::NotFinite => Failure::could_not(e).hint("do the models fit the IMU, are [imu] and [initial] plausible?"),
     }
-}
-
-/// All runs, and how long they took (s).
-pub(super) fn simulate(
-    experiment: &Experiment<'_>,
-    runs: u64,
-    session: &Session,
-) -> Result<(Vec<RunResult>, f64), Failure> {
-    let start = Instant::now();
-    let progress = session.progress("runs", runs);
-    let results = monte_carlo::run(experiment, runs, &|n| progress.add(n)).map_err(impossible)?;
-    Ok((results, start.elapsed().as_secs_f64()))
 }

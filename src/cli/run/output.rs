@@ -1,13 +1,15 @@
 //! The run directory and what is printed of it.
 
+use super::words::agreement_line;
 use crate::cli::compare::table;
 use crate::cli::{Failure, Session};
 use nav_sim::formats::atomic::{self, AtomicDir};
-use nav_sim::metrics::{self, OutageSummary, PerState, ReductionSummary, Summary, VerdictKind};
+use nav_sim::jobs::Navigation;
+use nav_sim::metrics::{OutageSummary, PerState, Summary, VerdictKind};
 use nav_sim::report::{self, Input, Manifest, ModelNote, seconds};
-use nav_sim::scenario::Scenario;
+use nav_sim::scenario::{Method, Scenario};
 use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::{REPORTED_NAMES, RunResult};
+use nav_sim::simulation::REPORTED_NAMES;
 use std::path::Path;
 
 /// The manifest of a run: every key as it was used, outages one by one, the seed.
@@ -78,20 +80,12 @@ pub(crate) fn empty_or_new(path: &Path) -> Result<(), Failure> {
 }
 
 /// Writes a run directory.
-pub(crate) fn write(
-    result: &RunResult,
-    manifest: &Manifest,
-    reduction: Option<ReductionSummary>,
-    path: &Path,
-) -> Result<Summary, Failure> {
-    let epochs = metrics::epochs(result);
-    let summary = Summary { reduction, ..Summary::of(result, &epochs, manifest.seed) };
+pub(super) fn write(found: &Navigation, manifest: &Manifest, path: &Path) -> Result<(), Failure> {
     let mut directory = AtomicDir::create(path)?;
-    for file in report::run_directory(result, &epochs, &summary, manifest) {
+    for file in report::run_directory(found.runs.as_ref(), &found.epochs, &found.summary, manifest) {
         directory.write_parts(file.name, file.parts)?;
     }
-    directory.commit()?;
-    Ok(summary)
+    Ok(directory.commit()?)
 }
 
 /// The verdict in words.
@@ -109,21 +103,8 @@ pub(crate) fn doubt_filter(summary: &Summary, session: &Session) {
 
 /// The summary for people, the verdict first.
 pub(crate) fn text(summary: &Summary, throughput_epochs_per_s: f64) -> String {
-    let (nees, coverage) = (&summary.nees, &summary.coverage);
-    let shared = match summary.independent_runs < (summary.runs - summary.diverged) as f64 {
-        true => format!(", worth {:.1} independent ones", summary.independent_runs),
-        false => String::new(),
-    };
-    let mut text = format!(
-        "verdict: {}\n{} runs ({} diverged){shared}, {} states, seed {}, {:.2} million IMU epochs/s\n",
-        verdict(summary),
-        summary.runs,
-        summary.diverged,
-        summary.filter_states,
-        summary.seed,
-        throughput_epochs_per_s / 1e6
-    );
-    if summary.diverged == summary.runs {
+    let mut text = format!("verdict: {}\n{}\n", verdict(summary), how(summary, throughput_epochs_per_s));
+    if summary.runs > 0 && summary.diverged == summary.runs {
         return text.trim_end().to_owned();
     }
     text += &if summary.outages.is_empty() {
@@ -132,31 +113,55 @@ pub(crate) fn text(summary: &Summary, throughput_epochs_per_s: f64) -> String {
         format!("{}\njust before the first fix after the outage: RMSE and ", outage_table(&summary.outages))
     };
     text += "ASEE (averaged standard estimation error: the filter's own standard deviation)\n";
+    let (nees, coverage) = (&summary.nees, &summary.coverage);
+    let inside = |share: f64, low: f64, high: f64| match share.is_finite() {
+        true => format!(", {:.0} % of epochs within [{low:.2}, {high:.2}]", share * 100.0),
+        false => String::new(),
+    };
     text += &format!(
-        "NEES {:.2} ({} if the filter is right), {:.0} % of epochs within [{:.2}, {:.2}]\n",
+        "NEES {:.2} ({} if the filter is right){}\n",
         nees.mean,
         nees.dof,
-        nees.fraction_inside * 100.0,
-        nees.lower95,
-        nees.upper95
+        inside(nees.fraction_inside, nees.lower95, nees.upper95)
     );
     text += &format!(
-        "coverage {:.3} at level {}, {:.0} % of epochs within [{:.2}, {:.2}]",
+        "coverage {:.3} at level {}{}",
         coverage.mean,
         coverage.level,
-        coverage.fraction_inside * 100.0,
-        coverage.lower95,
-        coverage.upper95
+        inside(coverage.fraction_inside, coverage.lower95, coverage.upper95)
     );
+    if let Some(agreement) = &summary.agreement {
+        text += &format!("\nruns against the covariance analysis: {}", agreement_line(agreement));
+    }
     text
 }
 
+/// How the figures were found.
+fn how(summary: &Summary, throughput_epochs_per_s: f64) -> String {
+    if summary.method == Method::Lincov.name() {
+        return format!("covariance analysis without runs, {} states", summary.filter_states);
+    }
+    let shared = match summary.independent_runs < (summary.runs - summary.diverged) as f64 {
+        true => format!(", worth {:.1} independent ones", summary.independent_runs),
+        false => String::new(),
+    };
+    format!(
+        "{} runs ({} diverged){shared}, {} states, seed {}, {:.2} million IMU epochs/s",
+        summary.runs,
+        summary.diverged,
+        summary.filter_states,
+        summary.seed,
+        throughput_epochs_per_s / 1e6
+    )
+}
+
 fn outage_table(outages: &[OutageSummary]) -> String {
+    let is_expected = outages.iter().any(|o| o.horizontal_error_end_m.p999.is_some());
     let head = [
         "outage",
         "horizontal p50 (m)",
         "p95",
-        "max",
+        if is_expected { "p99.9" } else { "max" },
         "RMSE pos_e_m",
         "ASEE",
         "ratio",
@@ -169,7 +174,7 @@ fn outage_table(outages: &[OutageSummary]) -> String {
     for o in outages {
         let h = &o.horizontal_error_end_m;
         let mut row = vec![format!("{}–{} s", seconds(o.start_s), seconds(o.end_s))];
-        row.extend([h.p50, h.p95, h.max].map(|v| format!("{v:.1}")));
+        row.extend([h.p50, h.p95, h.p999.unwrap_or(h.max)].map(|v| format!("{v:.1}")));
         let ratios = ratios(&o.rmse_end, &o.asee_end);
         for state in [1, 6] {
             let values = [o.rmse_end.0[state], o.asee_end.0[state]].map(|v| format!("{v:.3}"));

@@ -1,9 +1,11 @@
 //! Estimates from a finite number of runs, with their uncertainty.
 
 use crate::simulation::{REPORTED, REPORTED_NAMES};
+use serde::de::Error as _;
 use serde::ser::SerializeMap;
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use statrs::distribution::{Binomial, DiscreteCDF};
+use std::collections::HashMap;
 
 /// A value estimated from runs and its Monte-Carlo standard error (NaN when one run cannot tell).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -90,6 +92,16 @@ impl<T: Serialize> Serialize for PerState<T> {
             map.serialize_entry(name, value)?;
         }
         map.end()
+    }
+}
+
+impl<'de, T: Deserialize<'de> + Copy> Deserialize<'de> for PerState<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let by_name = HashMap::<String, T>::deserialize(deserializer)?;
+        let value =
+            |name: &&'static str| by_name.get(*name).copied().ok_or_else(|| D::Error::missing_field(name));
+        let values = REPORTED_NAMES.iter().map(value).collect::<Result<Vec<T>, _>>()?;
+        Ok(Self(std::array::from_fn(|i| values[i])))
     }
 }
 

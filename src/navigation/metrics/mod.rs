@@ -4,19 +4,25 @@
 //! Everything here is a pure function of a [`RunResult`](crate::simulation::RunResult) or of what a run
 //! directory keeps of it.
 
+mod agreement;
 mod consistency;
 mod epoch;
 mod estimate;
+mod expected;
 mod outage;
+mod quadratic_form;
 mod ratio;
 mod reduction;
 mod summary;
 mod verdict;
 
+pub use agreement::Agreement;
 pub use consistency::{Band, chi_square_band, chi_square_interval, coverage_band};
 pub use epoch::{Accuracy, EpochMetrics, epochs};
 pub use estimate::{Estimate, PerState, Quantile, SampleSize, quantile};
+pub use expected::{Expected, Frame};
 pub use outage::{OutageMetrics, Reconvergence, outages};
+pub use quadratic_form::QuadraticForm;
 pub use ratio::{ComparisonError, EpochRow, Measured, OutageComparison, RatioError, StateRatio, compare};
 pub use reduction::{AxisReduction, ReductionQuality, ReductionSummary, TOLERANCE};
 pub use summary::{AccuracySummary, Consistency, Coverage, Nis, OutageSummary, Recovery, Spread, Summary};

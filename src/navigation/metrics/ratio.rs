@@ -2,6 +2,7 @@
 //! believes, relative to the other ([Minaretzis et al.](crate::bibliography::Minaretzis24), Table I).
 
 use super::estimate::{Estimate, SampleSize};
+use super::verdict::Verdict;
 use crate::simulation::{OutageRecord, REPORTED, RunRecord};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -31,6 +32,19 @@ pub struct Measured {
     pub outages: Vec<(f64, f64)>,
     /// As in [`RunResult`](crate::simulation::RunResult): runs beyond these share their noise.
     pub independent_windows: Option<f64>,
+    /// Whether the one run stands for what covariance analysis expects: it has no Monte-Carlo error.
+    pub is_expected: bool,
+}
+
+impl Measured {
+    /// Whether the filter is as good as it believes.
+    #[must_use]
+    pub fn verdict(&self) -> Verdict {
+        match self.runs.as_slice() {
+            [record] if self.is_expected => Verdict::expected(record),
+            runs => Verdict::of(runs, self.outages.len(), self.independent_windows),
+        }
+    }
 }
 
 /// Why two experiments have no ratio.
@@ -150,7 +164,8 @@ fn outage(
     let (c, r) = (pick(candidate), pick(reference));
     let records = records(candidate, reference, index, paired);
     let windows = [candidate.independent_windows, reference.independent_windows].into_iter().flatten();
-    let pairing = Pairing { paired, windows: windows.reduce(f64::min) };
+    let is_expected = [candidate.is_expected, reference.is_expected];
+    let pairing = Pairing { paired, windows: windows.reduce(f64::min), is_expected };
     let state = |i: usize| {
         let ratios: Vec<f64> = c.iter().zip(&r).map(|(c, r)| (c.asee[i] / r.asee[i] - 1.0) * 100.0).collect();
         let see = |side: &[&OutageRecord]| side.iter().map(|o| o.see_mean[i]).collect::<Vec<_>>();
@@ -209,19 +224,32 @@ struct Pairing {
     paired: bool,
     /// Independent windows of noise, where they are limited.
     windows: Option<f64>,
+    /// Which side, candidate or reference, has no Monte-Carlo error.
+    is_expected: [bool; 2],
 }
 
 impl Pairing {
     fn mean_ratio(&self, a: &[f64], b: &[f64]) -> MeanRatio {
         let (mean_a, mean_b) = (mean(a.iter().copied()), mean(b.iter().copied()));
         let ratio = mean_a / mean_b;
-        let variance = if self.paired {
+        let sampled: Vec<&[f64]> = [a, b]
+            .into_iter()
+            .zip(self.is_expected)
+            .filter_map(|(side, exact)| (!exact).then_some(side))
+            .collect();
+        let Some(fewest) = sampled.iter().map(|side| side.len()).min() else {
+            return MeanRatio { ratio, half_width_pct: 0.0 };
+        };
+        let variance = if sampled.len() == 1 {
+            let scale = if self.is_expected[0] { ratio * ratio } else { 1.0 };
+            scale * self.variance_of_mean(sampled[0])
+        } else if self.paired {
             let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - ratio * b).collect();
             self.variance_of_mean(&differences)
         } else {
             self.variance_of_mean(a) + ratio * ratio * self.variance_of_mean(b)
         };
-        let freedom = SampleSize::of(a.len().min(b.len()) as u64, self.windows).independent - 1.0;
+        let freedom = SampleSize::of(fewest as u64, self.windows).independent - 1.0;
         let t = StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |t| t.inverse_cdf(0.975));
         MeanRatio { ratio, half_width_pct: t * variance.sqrt() / mean_b * 100.0 }
     }

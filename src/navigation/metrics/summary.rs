@@ -1,23 +1,24 @@
 //! The summary of an experiment: what `summary.json` holds.
 
+use super::agreement::Agreement;
 use super::consistency::{Band, chi_square_band, coverage_band};
 use super::epoch::{Accuracy, EpochMetrics};
 use super::estimate::{Estimate, PerState, Quantile, SampleSize};
 use super::outage::{self, OutageMetrics};
 use super::reduction::ReductionSummary;
-use super::verdict::Verdict;
+use super::verdict::{Verdict, VerdictKind};
 use crate::simulation::{NEES_DOF, RunResult};
 use serde::Serialize;
 
 /// Version of the layout of `summary.json`.
-const SCHEMA_VERSION: u32 = 1;
+pub(super) const SCHEMA_VERSION: u32 = 1;
 
 /// What the user reads first.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
     /// Layout version.
     pub schema_version: u32,
-    /// "monte-carlo".
+    /// "monte-carlo", "lincov" or "both".
     pub method: &'static str,
     /// Whether the filter is as good as it believes.
     pub verdict: Verdict,
@@ -47,6 +48,12 @@ pub struct Summary {
     /// What the reduction to 15 states leaves of the model; none for the full filter.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub reduction: Option<ReductionSummary>,
+    /// What covariance analysis expects, where it stands beside runs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lincov: Option<Box<Summary>>,
+    /// How far the runs are from it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub agreement: Option<Agreement>,
 }
 
 /// ASEE and RMSE as means over epochs.
@@ -100,7 +107,10 @@ pub struct Spread {
     pub p50: f64,
     /// 95 % quantile.
     pub p95: f64,
-    /// Largest.
+    /// 99.9 % quantile; of a covariance analysis only.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub p999: Option<f64>,
+    /// Largest; NaN (null) of a covariance analysis, whose law has no end.
     pub max: f64,
     /// Interval of the median.
     pub p50_ci95: (Option<f64>, Option<f64>),
@@ -115,8 +125,8 @@ pub struct Recovery {
     pub p50: f64,
     /// 95 % quantile.
     pub p95: f64,
-    /// Runs that never recover.
-    pub never: u64,
+    /// Runs that never recover; none of a covariance analysis, which follows no run.
+    pub never: Option<u64>,
 }
 
 /// Whether a chi-square statistic is where a correct filter puts it.
@@ -189,7 +199,20 @@ impl Summary {
             nis: nis(result),
             coverage: coverage(epochs, result.coverage_level, windows),
             reduction: None,
+            lincov: None,
+            agreement: None,
         }
+    }
+
+    /// With what covariance analysis expects beside the runs. The verdict becomes that of the expected figures, of
+    /// which chance has no part; runs that diverged remain its first word.
+    pub fn expect(&mut self, expected: Self, agreement: Agreement) {
+        self.method = "both";
+        let diverged = self.verdict.kind == VerdictKind::Diverged;
+        let kind = if diverged { VerdictKind::Diverged } else { expected.verdict.kind };
+        self.verdict = Verdict { kind, ..expected.verdict };
+        self.lincov = Some(Box::new(expected));
+        self.agreement = Some(agreement);
     }
 }
 
@@ -231,7 +254,7 @@ impl From<&OutageMetrics> for OutageSummary {
             reconvergence_s: Recovery {
                 p50: o.reconvergence.p50_s.value,
                 p95: o.reconvergence.p95_s.value,
-                never: o.reconvergence.never,
+                never: Some(o.reconvergence.never),
             },
         }
     }
@@ -239,7 +262,7 @@ impl From<&OutageMetrics> for OutageSummary {
 
 impl Spread {
     const fn new(p50: Quantile, p95: Quantile, max: f64) -> Self {
-        Self { p50: p50.value, p95: p95.value, max, p50_ci95: p50.ci95, p95_ci95: p95.ci95 }
+        Self { p50: p50.value, p95: p95.value, p999: None, max, p50_ci95: p50.ci95, p95_ci95: p95.ci95 }
     }
 }
 

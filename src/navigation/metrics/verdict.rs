@@ -54,7 +54,7 @@ pub struct Verdict {
     pub ratio: f64,
     /// Its Monte-Carlo standard error.
     pub ratio_std_error: f64,
-    /// Runs that count as independent.
+    /// Runs that count as independent; infinitely many (null) of a covariance analysis.
     pub independent_runs: f64,
     /// The error over standard deviation, common to all states, from which on these runs would tell it.
     pub detectable_ratio: f64,
@@ -77,7 +77,27 @@ impl Verdict {
         let independent_runs = independent_windows.unwrap_or(f64::INFINITY).min(kept.len() as f64);
         let judge = Judge::new(independent_runs, LEVEL / (2.0 * statistics.len() as f64));
         let kind = if kept.len() < runs.len() { VerdictKind::Diverged } else { judge.kind(&statistics) };
-        let worst = judge.worst(&statistics, kind);
+        Self::by(&judge, kind, &evidence, &statistics, independent_runs)
+    }
+
+    /// From the run whose squares are the expected ones: nothing is left to chance, and what is off by more than
+    /// the tolerance is wrong.
+    #[must_use]
+    pub fn expected(record: &RunRecord) -> Self {
+        let evidence = Evidence { runs: &[record], windows: None };
+        let statistics = evidence.statistics(record.outages.len());
+        let judge = Judge { limits: [(1.0, 1.0); 2] };
+        Self::by(&judge, judge.kind(&statistics), &evidence, &statistics, f64::INFINITY)
+    }
+
+    fn by(
+        judge: &Judge,
+        kind: VerdictKind,
+        evidence: &Evidence<'_>,
+        statistics: &[Statistic],
+        independent_runs: f64,
+    ) -> Self {
+        let worst = judge.worst(statistics, kind);
         let nees = evidence.mean(&|r| r.nees_mean);
         let coverage = evidence.mean(&|r| r.covered);
         Self {

@@ -1,13 +1,29 @@
 //! The states that make inertial errors, and what they do over a step of many samples.
 
+use crate::ekf::belief::BiasGroup;
 use crate::ekf::{Belief, UnknownKind};
 use crate::imu::{Channel, Sensor};
 use crate::noise::{Model, Process};
 
-/// Signals of an IMU, and again each multiplied by its own sample: what a scale factor adds.
-pub(super) const SIGNALS: usize = 12;
-/// The first of the latter.
+/// Signals of an IMU; again each multiplied by its own sample, what a scale factor adds; and each multiplied by
+/// the samples of the other two axes of its sensor, what a misalignment adds.
+pub(super) const SIGNALS: usize = 24;
+/// The first that is multiplied by its own sample.
 pub(super) const SCALED: usize = 6;
+/// The first that is multiplied by another axis's sample.
+pub(super) const CROSSED: usize = 12;
+
+/// Where a signal acts: sensor, axis, and the axis of the sample that it is multiplied by, if any.
+pub(super) const fn place(signal: usize) -> (usize, usize, Option<usize>) {
+    match signal {
+        0..SCALED => (signal / 3, signal % 3, None),
+        SCALED..CROSSED => (signal % SCALED / 3, signal % 3, Some(signal % 3)),
+        _ => {
+            let (sensor, pair) = ((signal - CROSSED) / 6, (signal - CROSSED) % 6);
+            (sensor, pair / 2, Some((pair / 2 + 1 + pair % 2) % 3))
+        }
+    }
+}
 
 /// All kinds of unknowns.
 const UNKNOWNS: [UnknownKind; 2] = [UnknownKind::Drift, UnknownKind::ScaleFactor];
@@ -26,9 +42,27 @@ pub(super) struct Source {
     drive: f64,
     /// Growth of `after` with every sample: a ramp is its slope times the samples so far.
     ramp: f64,
-    /// Mean square of s at the start.
+    /// Variance of s at the start.
     pub(super) initial: f64,
+    /// Mean of s at the start.
+    pub(super) level: f64,
+    /// The component of a fix's position that it is part of; such a source is no inertial error.
+    pub(super) position: Option<usize>,
 }
+
+/// Nothing at all.
+const NONE: Source = Source {
+    signal: 0,
+    before: 0.0,
+    after: 0.0,
+    fresh: 0.0,
+    decay: 1.0,
+    drive: 0.0,
+    ramp: 0.0,
+    initial: 0.0,
+    level: 0.0,
+    position: None,
+};
 
 /// What a source does over a step: the mean of its samples' errors is `mean`·s + w₁, and s⁺ = `decay`·s + w₂.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,38 +82,36 @@ pub(super) struct StepOfSource {
 
 impl Source {
     fn bias(signal: usize, phi: f64, innovation: f64, initial: f64) -> Self {
-        Self {
-            signal,
-            before: 0.0,
-            after: 1.0,
-            fresh: 0.0,
-            decay: phi,
-            drive: innovation.sqrt(),
-            ramp: 0.0,
-            initial,
-        }
+        Self { signal, after: 1.0, decay: phi, drive: innovation.sqrt(), initial, ..NONE }
+    }
+
+    /// An unknown constant of a standard deviation.
+    pub(super) fn constant(signal: usize, sigma: f64) -> Self {
+        Self::bias(signal, 1.0, 0.0, sigma * sigma)
     }
 
     /// A state that is nothing but the last innovation of standard deviation `sigma`: the error of a sample
     /// is `fresh`·w + `before`·(the w of the sample before).
     fn memory(signal: usize, sigma: f64, fresh: f64, before: f64) -> Self {
         let (before, fresh) = (before, fresh * sigma);
-        Self {
-            signal,
-            before,
-            after: 0.0,
-            fresh,
-            decay: 0.0,
-            drive: sigma,
-            ramp: 0.0,
-            initial: sigma * sigma,
-        }
+        Self { signal, before, fresh, decay: 0.0, drive: sigma, initial: sigma * sigma, ..NONE }
     }
 
     /// A constant slope, known to nobody: its mean square is what second moments see of it.
     const fn ramp(signal: usize, slope: f64) -> Self {
-        let (before, fresh, drive) = (0.0, 0.0, 0.0);
-        Self { signal, before, after: 0.0, fresh, decay: 1.0, drive, ramp: 1.0, initial: slope * slope }
+        Self { signal, ramp: 1.0, initial: slope * slope, ..NONE }
+    }
+
+    /// A slope that is the same in every run. The states of the truth are negated, and so is its mean.
+    pub(super) fn drift(signal: usize, slope: f64) -> Self {
+        Self { initial: 0.0, level: -slope, ..Self::ramp(signal, slope) }
+    }
+
+    /// A correlated error of a component of a fix's position: stationary, of standard deviation `sigma`, with
+    /// the coefficient `phi` from sample to sample.
+    pub(super) fn of_position(component: usize, phi: f64, sigma: f64) -> Self {
+        let drive = sigma * (1.0 - phi * phi).sqrt();
+        Self { decay: phi, drive, initial: sigma * sigma, position: Some(component), ..NONE }
     }
 
     /// Over `samples` samples, exactly.
@@ -116,7 +148,7 @@ impl Source {
     }
 
     /// Without what drives it: a filter's estimate of the state, which starts at zero.
-    pub(super) const fn estimate(&self) -> Self {
+    const fn estimate(&self) -> Self {
         Self { drive: 0.0, fresh: 0.0, initial: 0.0, ..*self }
     }
 }
@@ -128,19 +160,29 @@ pub(super) struct Sources {
     pub(super) white: [f64; SIGNALS],
 }
 
+impl Default for Sources {
+    fn default() -> Self {
+        Self { states: Vec::new(), white: [0.0; SIGNALS] }
+    }
+}
+
 impl Sources {
+    /// Adds those of another, independent.
+    pub(super) fn extend(&mut self, other: &Self) {
+        self.states.extend_from_slice(&other.states);
+        self.white.iter_mut().zip(&other.white).for_each(|(white, more)| *white += more);
+    }
+
+    /// What a filter estimates of them: nothing at the start, and nothing drives its estimates but corrections.
+    pub(super) fn estimates(&self) -> Self {
+        Self { states: self.states.iter().map(Source::estimate).collect(), ..Self::default() }
+    }
+
     /// Those a filter believes in: one for each bias state.
     pub(super) fn of_belief(belief: &Belief) -> Self {
         let mut states = Vec::new();
         for sensor in Sensor::ALL {
-            for group in &belief.groups[sensor as usize] {
-                for axis in 0..3 {
-                    let absent = group.initial[axis] == 0.0 && group.innovation[axis] == 0.0;
-                    let signal = 3 * sensor as usize + axis;
-                    let (phi, q) = (group.phi[axis], group.innovation[axis]);
-                    states.extend((!absent).then(|| Source::bias(signal, phi, q, group.initial[axis])));
-                }
-            }
+            states.extend(belief.groups[sensor as usize].iter().flat_map(|g| Self::of_group(sensor, g)));
         }
         let [accel, gyro] = belief.white.map(|w| w.to_array());
         let mut white = [0.0; SIGNALS];
@@ -150,8 +192,17 @@ impl Sources {
         Self { states, white }
     }
 
+    /// The bias states of a group.
+    pub(super) fn of_group(sensor: Sensor, group: &BiasGroup) -> Vec<Source> {
+        let state = |axis: usize| {
+            let (phi, q, initial) = (group.phi[axis], group.innovation[axis], group.initial[axis]);
+            (initial != 0.0 || q != 0.0).then(|| Source::bias(3 * sensor as usize + axis, phi, q, initial))
+        };
+        (0..3).filter_map(state).collect()
+    }
+
     /// Unknown constants of a belief that are multiplied.
-    fn multiplied(belief: &Belief, kinds: &[UnknownKind]) -> Vec<Source> {
+    pub(super) fn multiplied(belief: &Belief, kinds: &[UnknownKind]) -> Vec<Source> {
         let mut states = Vec::new();
         for (sensor, axis) in Sensor::ALL.into_iter().flat_map(|s| (0..3).map(move |i| (s, i))) {
             let signal = 3 * sensor as usize + axis;
@@ -159,7 +210,7 @@ impl Sources {
                 let sigma = unknown.sigma[axis];
                 states.extend((sigma > 0.0).then(|| match unknown.kind {
                     UnknownKind::Drift => Source::ramp(signal, sigma),
-                    UnknownKind::ScaleFactor => Source::bias(SCALED + signal, 1.0, 0.0, sigma * sigma),
+                    UnknownKind::ScaleFactor => Source::constant(SCALED + signal, sigma),
                 }));
             }
         }
@@ -180,7 +231,7 @@ impl Sources {
 
     /// Those of a noise model, each process exactly.
     pub(super) fn of_model(model: &Model) -> Self {
-        let mut sources = Self { states: Vec::new(), white: [0.0; SIGNALS] };
+        let mut sources = Self::default();
         for channel in Channel::ALL {
             for process in &model.axis(channel).processes {
                 sources.add(channel.index(), process);
@@ -189,7 +240,7 @@ impl Sources {
         sources
     }
 
-    fn add(&mut self, signal: usize, process: &Process) {
+    pub(super) fn add(&mut self, signal: usize, process: &Process) {
         let state = match process {
             Process::White(p) => {
                 self.white[signal] += p.sigma2();

@@ -1,6 +1,6 @@
 //! The covariance of \[navigation error; bias estimates\] and its correlation with the states of the truth.
 
-use super::input::{SCALED, SIGNALS, Sources, StepOfSource};
+use super::input::{SIGNALS, Source, Sources, StepOfSource};
 use super::track::{NAV, Nav, Row, Step};
 
 /// Covariance of z = \[x; b\] jointly with states t that no measurement corrects.
@@ -21,15 +21,15 @@ pub(super) struct Joint {
     tt: Vec<f64>,
     /// Samples so far.
     elapsed: f64,
-    present_b: Vec<(usize, f64)>,
-    present_t: Vec<(usize, f64)>,
+    sources_b: Vec<Source>,
+    sources_t: Vec<Source>,
 }
 
 /// What sources do over steps of one length.
 #[derive(Debug, Clone)]
 pub(super) struct Inputs {
-    b: Vec<StepOfSource>,
-    t: Vec<StepOfSource>,
+    pub(super) b: Vec<StepOfSource>,
+    pub(super) t: Vec<StepOfSource>,
     /// Variance of the mean over the step, all that is new in it.
     q_mean: [f64; SIGNALS],
 }
@@ -55,7 +55,6 @@ impl Joint {
         for (i, source) in b.states.iter().enumerate() {
             bb[i * nb + i] = source.initial;
         }
-        let present = |s: &Sources| s.states.iter().map(|x| (x.signal, x.present())).collect();
         Self {
             xx,
             xb: vec![[0.0; NAV]; nb],
@@ -64,8 +63,8 @@ impl Joint {
             bt: vec![0.0; nb * nt],
             tt: t.states.iter().map(|s| s.initial).collect(),
             elapsed: 0.0,
-            present_b: present(b),
-            present_t: present(t),
+            sources_b: b.states.clone(),
+            sources_t: t.states.clone(),
         }
     }
 
@@ -104,7 +103,7 @@ impl Joint {
         }
         self.step_biases(step, inputs);
         self.elapsed += f64::from(step.samples);
-        for (q, column) in inputs.q_mean.iter().zip(&step.b) {
+        for (q, column) in inputs.q_mean.iter().zip(&step.b).filter(|(q, _)| **q != 0.0) {
             for j in 0..NAV {
                 add_scaled(&mut self.xx[j], q * column[j], column);
             }
@@ -130,8 +129,8 @@ impl Joint {
         }
     }
 
-    /// Covariance of z with what a row measures, and of t with it; the variance of that with its noise.
-    pub(super) fn innovation(&self, row: &Row) -> Innovation {
+    /// Covariance of z with what a row measures, and of t with it; the variance of that with its noise, `r`.
+    pub(super) fn innovation(&self, row: &Row, r: f64) -> Innovation {
         let (nb, nt) = (self.xb.len(), self.xt.len());
         let mut x = [0.0; NAV];
         for (column, h) in self.xx.iter().zip(&row.h) {
@@ -140,15 +139,11 @@ impl Joint {
         let along = |x: &Nav| -> f64 { x.iter().zip(&row.h).map(|(a, h)| a * h).sum() };
         let mut b: Vec<f64> = self.xb.iter().map(along).collect();
         let mut t: Vec<f64> = self.xt.iter().map(along).collect();
-        let mut s = row.r;
-        // only a velocity on a lever arm feels the gyroscope's bias
-        if row.h[NAV..].iter().any(|h| *h != 0.0) {
-            let gyro = |signal: usize, present: f64| match signal % SCALED {
-                0..3 => 0.0,
-                axis => present * row.h[NAV + signal / SCALED * 3 + axis - 3],
-            };
-            let hb: Vec<f64> = self.present_b.iter().map(|(s, p)| gyro(*s, *p)).collect();
-            let ht: Vec<f64> = self.present_t.iter().map(|(s, p)| gyro(*s, *p)).collect();
+        let mut s = r;
+        let coefficients = |s: &[Source]| -> Vec<f64> { s.iter().map(|x| row.coefficient(x)).collect() };
+        let (hb, ht) = (coefficients(&self.sources_b), coefficients(&self.sources_t));
+        // only a velocity on a lever arm feels the gyroscope, only a position the receiver's correlated error
+        if hb.iter().chain(&ht).any(|h| *h != 0.0) {
             for (j, h) in hb.iter().enumerate() {
                 add_scaled(&mut x, *h, &self.xb[j]);
                 (0..nb).for_each(|i| b[i] += h * self.bb[i * nb + j]);
@@ -198,7 +193,8 @@ pub(super) struct Innovation {
     x: Nav,
     b: Vec<f64>,
     t: Vec<f64>,
-    s: f64,
+    /// Its variance.
+    pub(super) s: f64,
 }
 
 impl Innovation {
@@ -211,8 +207,8 @@ impl Innovation {
 /// A filter's gain.
 #[derive(Debug, Clone)]
 pub(super) struct Gain {
-    x: Nav,
-    b: Vec<f64>,
+    pub(super) x: Nav,
+    pub(super) b: Vec<f64>,
 }
 
 impl Step {
@@ -231,7 +227,7 @@ impl Step {
 }
 
 #[inline]
-fn add_scaled(to: &mut Nav, factor: f64, x: &Nav) {
+pub(super) fn add_scaled(to: &mut Nav, factor: f64, x: &Nav) {
     for (to, x) in to.iter_mut().zip(x) {
         *to += factor * x;
     }

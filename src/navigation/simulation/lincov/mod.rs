@@ -13,14 +13,17 @@ mod descent;
 mod heading;
 mod input;
 mod joint;
+mod mean;
 mod pass;
 mod reduce;
 mod root;
 mod track;
+mod truth;
 mod tune;
 
 pub use heading::{HeadingDoubt, weak_heading};
-pub use pass::{Assessment, Consistency, assess};
+pub use pass::{Assessment, Consistency, ErrorLaw, FilterPass, Instant, assess};
 pub use reduce::{drive, reduced_belief};
 pub use track::Track;
+pub use truth::{NamedSource, TruthSide};
 pub use tune::{Aim, Factor, Filter, Honesty, Per, Task, scaled};

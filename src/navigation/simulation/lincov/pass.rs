@@ -1,8 +1,10 @@
-//! One filter and one truth along a track.
+//! One filter along a track, and what makes its true errors.
 
-use super::input::{SIGNALS, Sources};
-use super::joint::{Inputs, Joint};
-use super::track::{Mark, NAV, Nav, Track};
+use super::input::Sources;
+use super::joint::{Gain, Inputs, Joint};
+use super::mean::Mean;
+use super::track::{Mark, Measured, NAV, Nav, Track};
+use super::truth::TruthSide;
 use crate::ekf::Belief;
 use crate::ekf::covariance::PSI;
 use crate::noise::Model;
@@ -50,90 +52,278 @@ pub struct Assessment {
 /// inertial errors, turn-on biases and scale factors are as the filter expects them, and the receiver is as the filter believes.
 #[must_use]
 pub fn assess(track: &Track, belief: &Belief, truth: &Model) -> Assessment {
-    let believed = Sources::of_belief(belief);
-    let mut real = Sources::of_model(truth);
-    real.states.extend(Sources::beside_model(belief));
-    let estimates =
-        Sources { states: believed.states.iter().map(|s| s.estimate()).collect(), white: [0.0; SIGNALS] };
-    let none = Sources { states: Vec::new(), white: [0.0; SIGNALS] };
-    let begin = if track.perfect { [[0.0; NAV]; NAV] } else { track.start };
-    let mut filter = Joint::new(track.start, &believed, &none);
-    let mut errors = Joint::new(begin, &estimates, &real);
-    let mut inputs = StepInputs { made: Vec::new() };
-    let mut assessment = Assessment::default();
-    let mut ends = vec![None; track.outages];
-    let mut done = 0;
-    for mark in &track.marks {
-        for step in &track.steps[done..mark.steps] {
-            let (of_filter, of_errors) = inputs
-                .of(step.samples, |n| (Inputs::new(&believed, &none, n), Inputs::new(&estimates, &real, n)));
-            filter.step(step, of_filter);
-            errors.step(step, of_errors);
+    let truth = TruthSide::as_expected(belief, truth, !track.perfect);
+    let law = FilterPass::new(track, belief).errors(&truth);
+    let consistency = |all: &[Instant]| all.iter().map(Instant::consistency).collect();
+    Assessment { reports: consistency(&law.reports), outage_ends: consistency(&law.outage_ends) }
+}
+
+/// The law of errors at one instant: normal, with this mean and covariance, in the filter's navigation states
+/// (position m, velocity m/s, attitude rad, in n).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Instant {
+    /// Time from the start (s).
+    pub after_s: f64,
+    /// Time on the trajectory (s).
+    pub t_s: f64,
+    /// Whether a measurement is used here.
+    pub measured: bool,
+    /// Whether a fix is used here.
+    pub fix: bool,
+    /// The covariance that the filter states.
+    pub believed: [Nav; NAV],
+    /// That of its true errors.
+    pub covariance: [Nav; NAV],
+    /// Mean of its true errors.
+    pub mean: Nav,
+    jacobian: [DVec3; 3],
+}
+
+/// The law of a filter's errors along a track.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ErrorLaw {
+    /// At every report (1 Hz), after the measurements.
+    pub reports: Vec<Instant>,
+    /// Just before the first fix after each outage (or at the end).
+    pub outage_ends: Vec<Instant>,
+    /// Sum of the expected squares of the innovations of fixes over the variances that the filter states, and how
+    /// many fixes.
+    pub nis: (f64, u64),
+}
+
+/// A filter along a track: its gains, which no draw changes, and its own covariance.
+#[derive(Debug, Clone)]
+pub struct FilterPass<'a> {
+    track: &'a Track,
+    believed: Sources,
+    /// Of every scalar measurement in sequence, with the variance that the filter states of its innovation.
+    gains: Vec<(Gain, f64)>,
+    reports: Vec<[Nav; NAV]>,
+    /// Of each outage.
+    ends: Vec<[Nav; NAV]>,
+}
+
+impl<'a> FilterPass<'a> {
+    /// Takes a filter along a track.
+    #[must_use]
+    pub fn new(track: &'a Track, belief: &Belief) -> Self {
+        let (believed, none) = (Sources::of_belief(belief), Sources::default());
+        let mut filter = Joint::new(track.start, &believed, &none);
+        let mut inputs = StepInputs { b: &believed, t: &none, made: Vec::new() };
+        let (mut gains, mut reports, mut done) = (Vec::new(), Vec::new(), 0);
+        let mut ends = vec![[[0.0; NAV]; NAV]; track.outages];
+        for mark in &track.marks {
+            for step in &track.steps[done..mark.steps] {
+                filter.step(step, inputs.over(step.samples));
+            }
+            done = mark.steps;
+            mark.outages.iter().for_each(|outage| ends[*outage] = filter.xx);
+            for row in &mark.rows {
+                let y = filter.innovation(row, row.r);
+                let gain = y.gain();
+                filter.correct(&y, &gain);
+                gains.push((gain, y.s));
+            }
+            if mark.report {
+                reports.push(filter.xx);
+            }
         }
-        done = mark.steps;
-        for outage in &mark.outages {
-            ends[*outage] = Some(consistency(&filter.xx, &errors.xx, mark));
+        Self { track, believed, gains, reports, ends }
+    }
+
+    /// The true errors of the filter.
+    #[must_use]
+    pub fn errors(&self, truth: &TruthSide) -> ErrorLaw {
+        let mut law = ErrorLaw::default();
+        let mut ends = vec![None; self.track.outages];
+        let mut reports = self.reports.iter();
+        let marks = &self.track.marks;
+        law.nis = self.follow(truth, marks.len(), &mut |mark, moment, errors| {
+            let instant = |believed: &[Nav; NAV]| errors.instant(mark, believed);
+            match moment {
+                Moment::Ends => mark.outages.iter().for_each(|o| ends[*o] = Some(instant(&self.ends[*o]))),
+                Moment::Report => law.reports.extend(reports.next().map(instant)),
+            }
+        });
+        law.outage_ends = ends.into_iter().flatten().collect();
+        law
+    }
+
+    /// The same at the ends of outages alone: what comes after the last is not computed.
+    #[must_use]
+    pub fn errors_at_ends(&self, truth: &TruthSide) -> Vec<Instant> {
+        let marks = &self.track.marks;
+        let last = marks.iter().rposition(|m| !m.outages.is_empty()).map_or(0, |at| at + 1);
+        let mut ends = vec![None; self.track.outages];
+        self.follow(truth, last, &mut |mark, moment, errors| {
+            if moment == Moment::Ends {
+                mark.outages.iter().for_each(|o| ends[*o] = Some(errors.instant(mark, &self.ends[*o])));
+            }
+        });
+        ends.into_iter().flatten().collect()
+    }
+
+    /// Takes the true errors along the first `marks` marks and shows them where outages end and where reports are
+    /// due; returns the sum of the expected NIS, and the fixes.
+    fn follow(
+        &self,
+        truth: &TruthSide,
+        marks: usize,
+        show: &mut dyn FnMut(&Mark, Moment, &Errors),
+    ) -> (f64, u64) {
+        let (estimates, real) = (self.believed.estimates(), &truth.inertial);
+        let begin = if truth.starts_off { self.track.start } else { [[0.0; NAV]; NAV] };
+        let mut errors =
+            Errors { joint: Joint::new(begin, &estimates, real), mean: Mean::new(&estimates, real) };
+        let mut inputs = StepInputs { b: &estimates, t: real, made: Vec::new() };
+        let mut gains = self.gains.iter();
+        let (mut nis, mut fixes, mut done) = (0.0, 0, 0);
+        for mark in &self.track.marks[..marks] {
+            for step in &self.track.steps[done..mark.steps] {
+                let inputs = inputs.over(step.samples);
+                errors.joint.step(step, inputs);
+                errors.mean.iter_mut().for_each(|mean| mean.step(step, inputs));
+            }
+            done = mark.steps;
+            if !mark.outages.is_empty() {
+                show(mark, Moment::Ends, &errors);
+            }
+            fixes += u64::from(mark.fix);
+            for (row, (gain, believed)) in mark.rows.iter().zip(&mut gains) {
+                let y = errors.joint.innovation(row, if truth.has_noise(row.what) { row.r } else { 0.0 });
+                let mean = errors.mean.as_ref().map_or(0.0, |mean| mean.innovation(row));
+                if row.what != Measured::Height {
+                    nis += (y.s + mean * mean) / believed;
+                }
+                errors.joint.correct(&y, gain);
+                errors.mean.iter_mut().for_each(|m| m.correct(mean, gain));
+            }
+            if mark.report {
+                show(mark, Moment::Report, &errors);
+            }
         }
-        for row in &mark.rows {
-            let y = filter.innovation(row);
-            let gain = y.gain();
-            filter.correct(&y, &gain);
-            errors.correct(&errors.innovation(row), &gain);
-        }
-        if mark.report {
-            assessment.reports.push(consistency(&filter.xx, &errors.xx, mark));
+        (nis, fixes)
+    }
+}
+
+/// When errors are looked at: before the measurements of a mark or after them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Moment {
+    Ends,
+    Report,
+}
+
+/// The true errors at an instant.
+struct Errors {
+    joint: Joint,
+    mean: Option<Mean>,
+}
+
+impl Errors {
+    fn instant(&self, mark: &Mark, believed: &[Nav; NAV]) -> Instant {
+        Instant {
+            after_s: mark.after_s,
+            t_s: mark.t_s,
+            measured: !mark.rows.is_empty(),
+            fix: mark.fix,
+            believed: *believed,
+            covariance: self.joint.xx,
+            mean: self.mean.as_ref().map_or([0.0; NAV], |mean| mean.x),
+            jacobian: mark.jacobian,
         }
     }
-    assessment.outage_ends = ends.into_iter().flatten().collect();
-    assessment
 }
 
 /// Inputs by the number of samples of a step; few numbers occur.
-struct StepInputs {
-    made: Vec<(u32, (Inputs, Inputs))>,
+struct StepInputs<'a> {
+    b: &'a Sources,
+    t: &'a Sources,
+    made: Vec<(u32, Inputs)>,
 }
 
-impl StepInputs {
-    fn of(&mut self, samples: u32, make: impl Fn(u32) -> (Inputs, Inputs)) -> (&Inputs, &Inputs) {
+impl StepInputs<'_> {
+    fn over(&mut self, samples: u32) -> &Inputs {
         let found = self.made.iter().position(|(n, _)| *n == samples);
         let at = found.unwrap_or_else(|| {
-            self.made.push((samples, make(samples)));
+            self.made.push((samples, Inputs::new(self.b, self.t, samples)));
             self.made.len() - 1
         });
-        let (_, (filter, errors)) = &self.made[at];
-        (filter, errors)
+        &self.made[at].1
     }
 }
 
-fn consistency(filter: &[Nav; NAV], errors: &[Nav; NAV], mark: &Mark) -> Consistency {
-    let p = SMatrix::<f64, NAV, NAV>::from_fn(|i, j| filter[j][i]);
-    let t = SMatrix::<f64, NAV, NAV>::from_fn(|i, j| errors[j][i]);
-    let (nees, log_det) = match (p.cholesky(), t.cholesky()) {
-        (Some(p), Some(t_factor)) => {
-            let log_det = |l: SMatrix<f64, NAV, NAV>| 2.0 * l.diagonal().map(f64::ln).sum();
-            (p.solve(&t).trace(), log_det(t_factor.l()) - log_det(p.l()))
-        }
-        (Some(p), None) => (p.solve(&t).trace(), f64::NEG_INFINITY),
-        _ => (f64::NAN, f64::NAN),
-    };
-    Consistency {
-        after_s: mark.after_s,
-        measured: !mark.rows.is_empty(),
-        sigma: deviations(filter, &mark.jacobian),
-        rmse: deviations(errors, &mark.jacobian),
-        nees,
-        divergence: nees - log_det - NAV as f64,
+impl Instant {
+    /// Mean squares and products of the true errors.
+    #[must_use]
+    pub fn moments(&self) -> [Nav; NAV] {
+        let m = &self.mean;
+        std::array::from_fn(|j| std::array::from_fn(|i| self.covariance[j][i] + m[i] * m[j]))
     }
-}
 
-/// Standard deviations in the reported states (m, m/s, degrees).
-fn deviations(p: &[Nav; NAV], jacobian: &[DVec3; 3]) -> [f64; REPORTED] {
-    std::array::from_fn(|i| match i {
-        0..6 => p[i][i].sqrt(),
-        _ => {
-            let j = jacobian[i - 6];
-            let terms = (0..9).map(|k| p[3 * PSI + k / 3][3 * PSI + k % 3] * j[k / 3] * j[k % 3]);
-            terms.sum::<f64>().sqrt() / DEG
+    /// The reported states (m, m/s, degrees) of a vector of the filter's states.
+    #[must_use]
+    pub fn reported(&self, x: &Nav) -> [f64; REPORTED] {
+        let psi = DVec3::new(x[3 * PSI], x[3 * PSI + 1], x[3 * PSI + 2]);
+        std::array::from_fn(|i| if i < 6 { x[i] } else { self.jacobian[i - 6].dot(psi) / DEG })
+    }
+
+    /// Variances of the reported states of a covariance of the filter's states, angles in radians.
+    fn squares(&self, p: &[Nav; NAV]) -> [f64; REPORTED] {
+        std::array::from_fn(|i| match i {
+            0..6 => p[i][i],
+            _ => {
+                let j = self.jacobian[i - 6];
+                let terms = (0..9).map(|k| p[3 * PSI + k / 3][3 * PSI + k % 3] * j[k / 3] * j[k % 3]);
+                terms.sum::<f64>()
+            }
+        })
+    }
+
+    /// Variances of the reported states (m², (m/s)², degrees²) of a covariance of the filter's states.
+    #[must_use]
+    pub fn variances(&self, p: &[Nav; NAV]) -> [f64; REPORTED] {
+        let squares = self.squares(p);
+        std::array::from_fn(|i| if i < 6 { squares[i] } else { squares[i] / (DEG * DEG) })
+    }
+
+    fn deviations(&self, p: &[Nav; NAV]) -> [f64; REPORTED] {
+        let roots = self.squares(p).map(f64::sqrt);
+        std::array::from_fn(|i| if i < 6 { roots[i] } else { roots[i] / DEG })
+    }
+
+    /// Standard deviations that the filter states of the reported states.
+    #[must_use]
+    pub fn sigma(&self) -> [f64; REPORTED] {
+        self.deviations(&self.believed)
+    }
+
+    /// Root mean squares of the true errors of the reported states.
+    #[must_use]
+    pub fn rmse(&self) -> [f64; REPORTED] {
+        self.deviations(&self.moments())
+    }
+
+    /// How the filter's covariance stands to that of its true errors.
+    #[must_use]
+    pub fn consistency(&self) -> Consistency {
+        let moments = self.moments();
+        let p = SMatrix::<f64, NAV, NAV>::from_fn(|i, j| self.believed[j][i]);
+        let t = SMatrix::<f64, NAV, NAV>::from_fn(|i, j| moments[j][i]);
+        let (nees, log_det) = match (p.cholesky(), t.cholesky()) {
+            (Some(p), Some(t_factor)) => {
+                let log_det = |l: SMatrix<f64, NAV, NAV>| 2.0 * l.diagonal().map(f64::ln).sum();
+                (p.solve(&t).trace(), log_det(t_factor.l()) - log_det(p.l()))
+            }
+            (Some(p), None) => (p.solve(&t).trace(), f64::NEG_INFINITY),
+            _ => (f64::NAN, f64::NAN),
+        };
+        Consistency {
+            after_s: self.after_s,
+            measured: self.measured,
+            sigma: self.sigma(),
+            rmse: self.rmse(),
+            nees,
+            divergence: nees - log_det - NAV as f64,
         }
-    })
+    }
 }

@@ -1,7 +1,7 @@
 //! A trajectory as a linear filter sees it: maps of the navigation error, and when it is measured.
 
 use super::super::plan::{Event, Experiment, ExperimentError, Plan};
-use super::input::{SCALED, SIGNALS};
+use super::input::{CROSSED, SIGNALS, Source, place};
 use crate::ekf::covariance::{PSI, R, V};
 use crate::ekf::dynamics::{EARTH_STEP_S, EarthStep, EarthTerms, ErrorMap, NavError, Sample};
 use crate::ekf::fix_rows;
@@ -30,13 +30,40 @@ pub(super) struct Step {
     pub(super) b: [Nav; SIGNALS],
 }
 
-/// A scalar measurement: nine coefficients of the navigation error, three of the gyroscope's bias error, three of
-/// its scale factors.
+/// What is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Measured {
+    /// This component of a fix's position.
+    Position(usize),
+    /// The velocity of a fix.
+    Velocity,
+    /// The height of a barometer.
+    Height,
+}
+
+/// A scalar measurement: nine coefficients of the navigation error, three of the gyroscope's error.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
-    pub(super) h: [f64; NAV + 6],
-    /// Variance of its noise.
+    pub(super) h: [f64; NAV + 3],
+    /// The rate that scale factors and misalignments of the gyroscope multiply (rad/s).
+    omega_ib_b: DVec3,
+    /// Variance of its white noise.
     pub(super) r: f64,
+    pub(super) what: Measured,
+}
+
+impl Row {
+    /// How the measurement feels the state of a source beside what the navigation error has of it.
+    pub(super) fn coefficient(&self, source: &Source) -> f64 {
+        if let Some(component) = source.position {
+            return f64::from(u8::from(self.what == Measured::Position(component)));
+        }
+        match place(source.signal) {
+            (0, ..) => 0.0,
+            (_, axis, None) => source.present() * self.h[NAV + axis],
+            (_, axis, Some(by)) => source.present() * (self.h[NAV + axis] * self.omega_ib_b[by]),
+        }
+    }
 }
 
 /// An instant between steps.
@@ -46,6 +73,10 @@ pub(super) struct Mark {
     pub(super) steps: usize,
     /// Time from the start (s).
     pub(super) after_s: f64,
+    /// Time on the trajectory (s).
+    pub(super) t_s: f64,
+    /// Whether a fix is used.
+    pub(super) fix: bool,
     /// Scalar measurements, in sequence.
     pub(super) rows: Vec<Row>,
     pub(super) report: bool,
@@ -94,6 +125,8 @@ impl Track {
             marks.push(Mark {
                 steps: steps.len(),
                 after_s: event.sample as f64 / experiment.rate_hz,
+                t_s: event.t_s,
+                fix: event.fix,
                 rows: line.rows(plan, event),
                 report: event.report,
                 outages: plan.outages.iter().enumerate().filter(ends).map(|(i, _)| i).collect(),
@@ -125,13 +158,16 @@ struct Linearisation {
     omega_ib_b: DVec3,
     dt: f64,
     noise_hz: f64,
+    /// Signals that are followed: those of misalignments only where there are any.
+    signals: usize,
 }
 
 impl Linearisation {
     fn new(plan: &Plan<'_>, noise_hz: f64) -> Self {
         let experiment = plan.experiment;
         let ins = Strapdown::single(&plan.start, experiment.gravity);
-        Self { ins, omega_ib_b: DVec3::ZERO, dt: 1.0 / experiment.rate_hz, noise_hz }
+        let signals = if experiment.defects.misalignment_rad > 0.0 { SIGNALS } else { CROSSED };
+        Self { ins, omega_ib_b: DVec3::ZERO, dt: 1.0 / experiment.rate_hz, noise_hz, signals }
     }
 
     /// The maps of the samples one after the other, the Earth's as the filter applies them.
@@ -147,15 +183,15 @@ impl Linearisation {
             self.omega_ib_b = sample.omega_ib_b;
             let (dtheta, dv) = (sample.omega_ib_b * self.dt, sample.f_ib_b * self.dt);
             let trace = self.ins.step(Vec3::splat(dtheta), Vec3::splat(dv), self.dt);
-            step.apply(&Sample::new(&trace, self.dt), sample);
+            step.apply(&Sample::new(&trace, self.dt), sample, self.signals);
             age += self.dt;
             if age + 0.5 * self.dt > EARTH_STEP_S {
-                step.apply(&EarthStep { terms: EarthTerms::at(&self.ins), dt: age }, sample);
+                step.apply(&EarthStep { terms: EarthTerms::at(&self.ins), dt: age }, sample, self.signals);
                 age = 0.0;
             }
         }
         if let Some(sample) = samples.last().filter(|_| age > 0.0) {
-            step.apply(&EarthStep { terms: EarthTerms::at(&self.ins), dt: age }, sample);
+            step.apply(&EarthStep { terms: EarthTerms::at(&self.ins), dt: age }, sample, self.signals);
         }
         step
     }
@@ -167,19 +203,16 @@ impl Linearisation {
             let gnss = experiment.gnss;
             let h = fix_rows(&self.ins, self.omega_ib_b, gnss.lever_arm_m.into());
             let sigmas = gnss.pos_sigma_m.into_iter().chain(gnss.vel_sigma_m_s.into_iter().flatten());
-            let row = |(h, sigma): ([f64; NAV + 3], f64)| Row {
-                h: std::array::from_fn(|i| match i.checked_sub(NAV + 3) {
-                    Some(axis) => h[NAV + axis] * self.omega_ib_b[axis],
-                    None => h[i],
-                }),
-                r: sigma * sigma,
-            };
-            rows.extend(h.into_iter().zip(sigmas).map(row));
+            for (i, (h, sigma)) in h.into_iter().zip(sigmas).enumerate() {
+                let what = if i < 3 { Measured::Position(i) } else { Measured::Velocity };
+                rows.push(Row { h, omega_ib_b: self.omega_ib_b, r: sigma * sigma, what });
+            }
         }
         if let Some(baro) = experiment.baro.filter(|_| event.baro) {
-            let mut h = [0.0; NAV + 6];
+            let mut h = [0.0; NAV + 3];
             h[3 * R + 2] = 1.0;
-            rows.push(Row { h, r: baro.sigma_m * baro.sigma_m });
+            let r = baro.sigma_m * baro.sigma_m;
+            rows.push(Row { h, omega_ib_b: DVec3::ZERO, r, what: Measured::Height });
         }
         rows
     }
@@ -196,17 +229,17 @@ impl Step {
         Self { samples: self.samples + next.samples, m: self.m.map(|column| next.map(&column, &none)), b }
     }
 
-    /// The map of a sample after this one, or of the Earth, which feels no sample.
-    fn apply(&mut self, map: &impl ErrorMap<f64>, sample: &ImuSample) {
+    /// The map of a sample after this one, or of the Earth, which feels no sample; of the first `signals` signals.
+    fn apply(&mut self, map: &impl ErrorMap<f64>, sample: &ImuSample, signals: usize) {
         let zero = Vec3([0.0; 3]);
         for column in &mut self.m {
             *column = flat(&map.apply(triples(column), zero, zero));
         }
-        for (signal, column) in self.b.iter_mut().enumerate() {
-            let (sensor, axis) = (signal % SCALED / 3, signal % 3);
-            let measured = [sample.f_ib_b, sample.omega_ib_b][sensor][axis];
+        for (signal, column) in self.b.iter_mut().enumerate().take(signals) {
+            let (sensor, axis, by) = place(signal);
+            let measured = [sample.f_ib_b, sample.omega_ib_b][sensor];
             let mut input = [zero, zero];
-            input[sensor].0[axis] = if signal < SCALED { 1.0 } else { measured };
+            input[sensor].0[axis] = by.map_or(1.0, |by| measured[by]);
             *column = flat(&map.apply(triples(column), input[0], input[1]));
         }
     }

@@ -1,0 +1,268 @@
+//! The main job: a trajectory, what the filter believes and what makes the errors → navigation errors, by runs, by
+//! covariance analysis, or by both.
+
+use super::reduction::Reduced;
+use crate::ekf::{Belief, BeliefError};
+use crate::imu::{Recording, Sensor};
+use crate::metrics::{
+    Agreement, EpochMetrics, Expected, Frame, ReductionQuality, ReductionSummary, Summary, epochs,
+};
+use crate::monte_carlo;
+use crate::noise::reduction::window_s;
+use crate::noise::{Model, ParameterError};
+use crate::scenario::{Method, Scenario};
+use crate::sensors::imu::Truth;
+use crate::sensors::outage::Outage;
+use crate::simulation::lincov::{
+    Assessment, FilterPass, HeadingDoubt, Track, TruthSide, assess, weak_heading,
+};
+use crate::simulation::{Experiment, ExperimentError, RunResult};
+use crate::trajectory::Trajectory;
+
+/// What is navigated, with what.
+#[derive(Debug)]
+pub struct NavigateInputs {
+    /// The reference.
+    pub trajectory: Trajectory,
+    /// The noise model that the filter believes, at the rate of the IMU.
+    pub model: Model,
+    /// What makes the errors of the true IMU.
+    pub truth: TrueImu,
+}
+
+/// What makes the errors of the true IMU, beside the defects of the scenario.
+#[derive(Debug)]
+pub enum TrueImu {
+    /// The model that the filter believes.
+    AsBelieved,
+    /// Another model, at the rate of the IMU.
+    Model(Model),
+    /// Windows of static recordings.
+    Recordings(Vec<Recording>),
+}
+
+/// What was found.
+#[derive(Debug)]
+pub struct Navigation {
+    /// The runs; none of a covariance analysis.
+    pub runs: Option<RunResult>,
+    /// Statistics of every reporting epoch: of the runs, if there are any.
+    pub epochs: Vec<EpochMetrics>,
+    /// The summary.
+    pub summary: Summary,
+}
+
+/// What is worth telling while the job runs.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Note {
+    /// The filter starts with a bias of this standard deviation (m/s² or rad/s), too large to be meant.
+    LargeBias(Sensor, f64),
+    /// What the true IMU has and the filter does not expect.
+    Unexpected(String),
+    /// How the model was reduced to 15 states.
+    Reduction(ReductionSummary),
+    /// How sure the reduced filter is of itself; whether the model has a full filter.
+    ReductionQuality(ReductionQuality, bool),
+    /// The motion hardly shows the heading.
+    Heading(HeadingDoubt),
+    /// What the runs say beside what the covariance analysis expects.
+    Agreement(Agreement),
+}
+
+/// Who follows a job.
+pub trait Observer: Sync {
+    /// Something worth telling.
+    fn note(&self, note: &Note);
+    /// So many runs are about to be made.
+    fn runs_begin(&self, _runs: u64) {}
+    /// So many more have been made.
+    fn runs_done(&self, _runs: u64) {}
+    /// All have been made.
+    fn runs_end(&self) {}
+}
+
+/// Why a job cannot be done.
+#[derive(Debug, thiserror::Error)]
+pub enum NavigateError {
+    /// The experiment does not fit together.
+    #[error(transparent)]
+    Experiment(#[from] ExperimentError),
+    /// The believed model has no such filter.
+    #[error(transparent)]
+    Belief(#[from] BeliefError),
+    /// The reduced model is none.
+    #[error(transparent)]
+    Reduction(#[from] ParameterError),
+    /// Recordings have no covariance.
+    #[error("covariance analysis needs a model of what makes the errors; static recordings have none")]
+    RecordedTruth,
+    /// A gate makes gains random.
+    #[error("covariance analysis has no gate: filter.nis_gate = {0} makes the gains depend on what is drawn")]
+    Gate(f64),
+    /// Numbers ran away.
+    #[error("the covariance analysis did not stay finite and positive definite")]
+    NotFinite,
+}
+
+/// Navigates along a trajectory, with these outages and this seed.
+///
+/// # Errors
+/// What does not fit together, what the method cannot do, or a covariance that runs away.
+pub fn navigate(
+    inputs: &NavigateInputs,
+    scenario: &Scenario,
+    outages: &[Outage],
+    seed: u64,
+    observer: &dyn Observer,
+) -> Result<Navigation, NavigateError> {
+    let method = scenario.run.method;
+    if method != Method::MonteCarlo {
+        possible(inputs, scenario)?;
+    }
+    let track = scenario.track(&inputs.trajectory, &inputs.model, outages)?;
+    let belief = scenario.belief(&inputs.model, outages, &track)?;
+    doubt(&belief, scenario, observer);
+    let reduction = reduction(inputs, scenario, outages, &belief, &track, observer)?;
+    let assessment = assess(&track, &belief, &inputs.model);
+    heading(&assessment).iter().for_each(|doubt| observer.note(&Note::Heading(*doubt)));
+    let experiment =
+        scenario.experiment(&inputs.trajectory, inputs.truth(), std::slice::from_ref(&belief), outages, seed);
+    let analysis = Analysis::new(&experiment, inputs, &track);
+    let expected =
+        (method != Method::MonteCarlo).then(|| analysis.expected(&belief).ok_or(NavigateError::NotFinite));
+    let expected = expected.transpose()?;
+    let mut navigation = match method {
+        Method::Lincov => expected.map(|(epochs, summary)| Navigation { runs: None, epochs, summary }),
+        Method::MonteCarlo | Method::Both => {
+            let sampled = sampled(&experiment, scenario.run.runs, seed, observer)?;
+            Some(
+                expected.into_iter().fold(sampled, |sampled, (_, summary)| sampled.beside(summary, observer)),
+            )
+        }
+    }
+    .ok_or(NavigateError::NotFinite)?;
+    navigation.summary.reduction = reduction;
+    Ok(navigation)
+}
+
+/// Whether covariance analysis can do what is asked for.
+fn possible(inputs: &NavigateInputs, scenario: &Scenario) -> Result<(), NavigateError> {
+    if let TrueImu::Recordings(_) = inputs.truth {
+        return Err(NavigateError::RecordedTruth);
+    }
+    scenario.filter.nis_gate.map_or(Ok(()), |p| Err(NavigateError::Gate(p)))
+}
+
+/// What speaks against the filter before anything was computed.
+fn doubt(belief: &Belief, scenario: &Scenario, observer: &dyn Observer) {
+    // A Gauss-Markov process of phi ≈ 1 may have any stationary variance: a filter that starts with it believes
+    // nothing of its first sensor readings.
+    for (sensor, limit) in [(Sensor::Accel, 1.0), (Sensor::Gyro, 0.1)] {
+        let sigma = belief.process_sigma(sensor);
+        if sigma > limit {
+            observer.note(&Note::LargeBias(sensor, sigma));
+        }
+    }
+    scenario.doubts().into_iter().for_each(|doubt| observer.note(&Note::Unexpected(doubt)));
+}
+
+/// The reduction of the model for these outages; none where nothing is reduced.
+fn reduction(
+    inputs: &NavigateInputs,
+    scenario: &Scenario,
+    outages: &[Outage],
+    belief: &Belief,
+    track: &Track,
+    observer: &dyn Observer,
+) -> Result<Option<ReductionSummary>, NavigateError> {
+    if !scenario.filter.states.is_reduced() {
+        return Ok(None);
+    }
+    let longest = outages.iter().map(|o| o.end_s - o.start_s).fold(0.0, f64::max);
+    let (interval_s, window_s) = (1.0 / scenario.gnss.rate_hz, window_s(longest));
+    let full = scenario.with_full_noise().belief(&inputs.model, outages, track).ok();
+    let reduced = Reduced { model: &inputs.model, belief, full, track, interval_s, window_s };
+    Ok(Some(reduced.summary(observer)?))
+}
+
+/// Where the motion hardly shows the heading, no filter of this kind is to be believed.
+fn heading(assessment: &Assessment) -> Option<HeadingDoubt> {
+    let measured = assessment.reports.iter().filter(|r| r.measured);
+    weak_heading(measured.map(|r| (r.after_s, r.sigma[8])))
+}
+
+/// All runs.
+fn sampled(
+    experiment: &Experiment<'_>,
+    runs: u64,
+    seed: u64,
+    observer: &dyn Observer,
+) -> Result<Navigation, NavigateError> {
+    observer.runs_begin(runs);
+    let mut results = monte_carlo::run(experiment, runs, &|n| observer.runs_done(n))?;
+    observer.runs_end();
+    let result = results.swap_remove(0);
+    let epochs = epochs(&result);
+    let summary = Summary::of(&result, &epochs, seed);
+    Ok(Navigation { runs: Some(result), epochs, summary })
+}
+
+/// What a covariance analysis is made of.
+struct Analysis<'a> {
+    experiment: &'a Experiment<'a>,
+    track: &'a Track,
+    /// None: what makes the errors has no model.
+    model: Option<&'a Model>,
+    windows: Vec<(f64, f64)>,
+}
+
+impl<'a> Analysis<'a> {
+    fn new(experiment: &'a Experiment<'a>, inputs: &'a NavigateInputs, track: &'a Track) -> Self {
+        let windows = experiment.outages.iter().map(|o| (o.start_s, o.end_s)).collect();
+        Self { experiment, track, model: inputs.truth_model(), windows }
+    }
+
+    /// The expected figures; none where the covariance runs away.
+    fn expected(&self, belief: &Belief) -> Option<(Vec<EpochMetrics>, Summary)> {
+        let frame = Frame {
+            outages: &self.windows,
+            filter_states: belief.states,
+            fix_components: self.experiment.gnss.components(),
+            coverage_level: self.experiment.coverage_level,
+            seed: self.experiment.seed,
+        };
+        let truth = TruthSide::together(&TruthSide::sources(self.experiment, self.model?));
+        let expected = Expected::of(&FilterPass::new(self.track, belief).errors(&truth), &frame)?;
+        let summary = expected.summary(&frame);
+        Some((expected.epochs, summary))
+    }
+}
+
+impl Navigation {
+    /// Runs beside what was expected of them: the verdict is that of the expected figures.
+    fn beside(mut self, expected: Summary, observer: &dyn Observer) -> Self {
+        let agreement = Agreement::of(&self.summary, &expected);
+        observer.note(&Note::Agreement(agreement.clone()));
+        self.summary.expect(expected, agreement);
+        self
+    }
+}
+
+impl NavigateInputs {
+    fn truth(&self) -> Truth<'_> {
+        match &self.truth {
+            TrueImu::AsBelieved => Truth::Model(&self.model),
+            TrueImu::Model(model) => Truth::Model(model),
+            TrueImu::Recordings(recordings) => Truth::Static(recordings),
+        }
+    }
+
+    /// The model behind the errors, if there is one.
+    const fn truth_model(&self) -> Option<&Model> {
+        match &self.truth {
+            TrueImu::AsBelieved => Some(&self.model),
+            TrueImu::Model(model) => Some(model),
+            TrueImu::Recordings(_) => None,
+        }
+    }
+}

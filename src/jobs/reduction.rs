@@ -1,0 +1,45 @@
+//! What the reduction of a model to 15 states does.
+
+use super::navigate::{Note, Observer};
+use crate::ekf::Belief;
+use crate::metrics::{ReductionQuality, ReductionSummary};
+use crate::noise::{Model, ParameterError};
+use crate::simulation::lincov::{Track, assess};
+
+/// What a filter of 15 states was made for, and what it is assessed along.
+#[derive(Debug)]
+pub struct Reduced<'a> {
+    /// The model that was reduced.
+    pub model: &'a Model,
+    /// The filter.
+    pub belief: &'a Belief,
+    /// The filter with a state for every process, if the model has one.
+    pub full: Option<Belief>,
+    /// What both are assessed along.
+    pub track: &'a Track,
+    /// Time between fixes (s).
+    pub interval_s: f64,
+    /// Longest time scale (s).
+    pub window_s: f64,
+}
+
+impl Reduced<'_> {
+    /// The reduction and its quality, the model taken for the truth: one covariance analysis of the reduced and of
+    /// the full filter.
+    ///
+    /// # Errors
+    /// When a parameter of the belief is outside its domain.
+    pub fn summary(&self, observer: &dyn Observer) -> Result<ReductionSummary, ParameterError> {
+        let Self { model, belief, track, interval_s, window_s, .. } = *self;
+        let mut summary = ReductionSummary::of(model, belief, interval_s, window_s)?;
+        if summary.is_exact() {
+            return Ok(summary);
+        }
+        observer.note(&Note::Reduction(summary.clone()));
+        let full = self.full.as_ref().map(|full| assess(track, full, model));
+        let quality = ReductionQuality::of(&assess(track, belief, model), full.as_ref());
+        observer.note(&Note::ReductionQuality(quality.clone(), full.is_some()));
+        summary.quality = Some(quality);
+        Ok(summary)
+    }
+}

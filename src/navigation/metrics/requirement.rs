@@ -1,0 +1,126 @@
+//! Limits that the errors must keep.
+
+use super::summary::Summary;
+use crate::simulation::REPORTED_NAMES;
+use serde::Serialize;
+use std::fmt;
+use std::str::FromStr;
+
+/// What a limit is of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Figure {
+    /// Median of the horizontal error at the end of an outage.
+    P50,
+    /// Its 95 % quantile.
+    P95,
+    /// RMSE of a reported state at the end of an outage; without outages its mean over the run.
+    Rmse(usize),
+}
+
+/// A figure and the most it may be, at the end of every outage: `p95_m<=5`, `rmse_pos_e_m<=2`, `yaw_deg<=1`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Requirement {
+    figure: Figure,
+    limit: f64,
+}
+
+/// A requirement that is none.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("expected NAME<=LIMIT with a positive limit, NAME one of p50_m, p95_m, rmse_pos_e_m, yaw_deg and the other states")]
+pub struct UnknownRequirement;
+
+/// Whether a requirement is met, and by how much.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Met {
+    /// The figure.
+    pub name: String,
+    /// The most it may be.
+    pub limit: f64,
+    /// What it is, at its worst.
+    pub value: f64,
+    /// The outage at whose end that is (from 0); none: the mean over the run.
+    pub outage: Option<usize>,
+    /// Whether it is within the limit.
+    pub met: bool,
+}
+
+impl FromStr for Requirement {
+    type Err = UnknownRequirement;
+
+    fn from_str(text: &str) -> Result<Self, UnknownRequirement> {
+        let (name, limit) = text.split_once("<=").or_else(|| text.split_once('<')).ok_or(UnknownRequirement)?;
+        let limit: f64 = limit.trim().parse().map_err(|_| UnknownRequirement)?;
+        let name = name.trim();
+        let state = || REPORTED_NAMES.iter().position(|known| *known == name.strip_prefix("rmse_").unwrap_or(name));
+        let figure = match name {
+            "p50_m" => Figure::P50,
+            "p95_m" => Figure::P95,
+            _ => Figure::Rmse(state().ok_or(UnknownRequirement)?),
+        };
+        if limit > 0.0 && limit.is_finite() { Ok(Self { figure, limit }) } else { Err(UnknownRequirement) }
+    }
+}
+
+impl Requirement {
+    /// Whether it says anything only of outages.
+    #[must_use]
+    pub const fn needs_outage(&self) -> bool {
+        matches!(self.figure, Figure::P50 | Figure::P95)
+    }
+
+    /// Its name.
+    #[must_use]
+    pub fn name(&self) -> String {
+        match self.figure {
+            Figure::P50 => "p50_m".to_owned(),
+            Figure::P95 => "p95_m".to_owned(),
+            Figure::Rmse(state) => format!("rmse_{}", REPORTED_NAMES[state]),
+        }
+    }
+
+    /// Against what was found: what covariance analysis expects, where there is such, else what the runs say.
+    #[must_use]
+    pub fn check(&self, summary: &Summary) -> Met {
+        let summary = summary.lincov.as_deref().unwrap_or(summary);
+        let of_outage = |o: &super::OutageSummary| match self.figure {
+            Figure::P50 => o.horizontal_error_end_m.p50,
+            Figure::P95 => o.horizontal_error_end_m.p95,
+            Figure::Rmse(state) => o.rmse_end.0[state],
+        };
+        let ends = summary.outages.iter().map(of_outage).enumerate();
+        // a figure that is not a number is the worst of all
+        let worst = ends.max_by(|a, b| a.1.total_cmp(&b.1));
+        let (outage, value) = match (worst, self.figure) {
+            (Some((outage, value)), _) => (Some(outage), value),
+            (None, Figure::Rmse(state)) => (None, summary.accuracy.rmse_mean.0[state]),
+            (None, _) => (None, f64::NAN),
+        };
+        Met { name: self.name(), limit: self.limit, value, outage, met: value <= self.limit }
+    }
+}
+
+impl fmt::Display for Requirement {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}<={}", self.name(), self.limit)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn requirements_are_read_as_they_are_written() {
+        for (text, shown) in [
+            ("p95_m<=5", "p95_m<=5"),
+            ("p50_m < 2.5", "p50_m<=2.5"),
+            ("rmse_pos_e_m<=1", "rmse_pos_e_m<=1"),
+            ("yaw_deg<=0.5", "rmse_yaw_deg<=0.5"),
+        ] {
+            assert_eq!(text.parse::<Requirement>().unwrap().to_string(), shown);
+        }
+        for wrong in ["p95_m", "p95_m>=5", "p95<=5", "p95_m<=-1", "p95_m<=nan", "p95_m<=", "rmse_p95_m<=1"] {
+            assert_eq!(wrong.parse::<Requirement>(), Err(UnknownRequirement), "{wrong}");
+        }
+    }
+}

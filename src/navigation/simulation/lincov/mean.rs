@@ -1,0 +1,64 @@
+//! The mean of the true errors: what is the same in every run.
+
+use super::input::{SIGNALS, Source, Sources, StepOfSource};
+use super::joint::{Gain, Inputs};
+use super::track::{NAV, Nav, Row, Step};
+
+/// Mean of z = \[navigation error; bias estimates\] and of the truth's states, as [`Joint`](super::joint::Joint)
+/// has their covariance.
+#[derive(Debug, Clone)]
+pub(super) struct Mean {
+    pub(super) x: Nav,
+    b: Vec<f64>,
+    t: Vec<f64>,
+    /// Samples so far.
+    elapsed: f64,
+    sources_b: Vec<Source>,
+    sources_t: Vec<Source>,
+}
+
+impl Mean {
+    /// Errors that are zero at the start, with the estimates of `b` and the truth's states `t`; none where all of
+    /// them have mean zero and so has everything else.
+    pub(super) fn new(b: &Sources, t: &Sources) -> Option<Self> {
+        t.states.iter().any(|s| s.level != 0.0).then(|| Self {
+            x: [0.0; NAV],
+            b: vec![0.0; b.states.len()],
+            t: t.states.iter().map(|s| s.level).collect(),
+            elapsed: 0.0,
+            sources_b: b.states.clone(),
+            sources_t: t.states.clone(),
+        })
+    }
+
+    /// Over one step.
+    pub(super) fn step(&mut self, step: &Step, inputs: &Inputs) {
+        let elapsed = self.elapsed;
+        let mut error = [0.0; SIGNALS];
+        let mut add = |states: &mut [f64], steps: &[StepOfSource]| {
+            for (state, s) in states.iter_mut().zip(steps) {
+                error[s.signal] += (s.mean + s.ramp * elapsed) * *state;
+                *state *= s.decay;
+            }
+        };
+        add(&mut self.b, &inputs.b);
+        add(&mut self.t, &inputs.t);
+        self.x = step.map(&self.x, &error);
+        self.elapsed += f64::from(step.samples);
+    }
+
+    /// Mean of what a row measures less what is expected.
+    pub(super) fn innovation(&self, row: &Row) -> f64 {
+        let of_x: f64 = self.x.iter().zip(&row.h).map(|(x, h)| x * h).sum();
+        let beside = |states: &[f64], sources: &[Source]| -> f64 {
+            states.iter().zip(sources).map(|(x, s)| x * row.coefficient(s)).sum()
+        };
+        of_x + beside(&self.b, &self.sources_b) + beside(&self.t, &self.sources_t)
+    }
+
+    /// z ← z − k y.
+    pub(super) fn correct(&mut self, y: f64, gain: &Gain) {
+        self.x.iter_mut().zip(&gain.x).for_each(|(x, k)| *x -= k * y);
+        self.b.iter_mut().zip(&gain.b).for_each(|(b, k)| *b -= k * y);
+    }
+}

@@ -1,0 +1,178 @@
+//! What makes the true errors: independent sources, alone or together.
+
+use super::input::SIGNALS;
+use super::input::{CROSSED, SCALED, Source, Sources, place};
+use super::track::Measured;
+use crate::ekf::{Belief, UnknownKind};
+use crate::imu::{Axis, Channel, Sensor};
+use crate::noise::{Model, Process};
+use crate::sensors::gnss::GnssSettings;
+use crate::simulation::plan::Experiment;
+
+/// What makes the true errors along a track, whatever the filter believes.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TruthSide {
+    pub(super) inertial: Sources,
+    /// Whether the start is off, as the filter believes it to be.
+    pub(super) starts_off: bool,
+    /// Whether the white noise of positions, velocities and heights is there.
+    noise: [bool; 3],
+}
+
+/// A source by its name: `accel.AR1_1`, `gyro.turn_on_bias`, `gnss.position`, `initial` …
+pub type NamedSource = (String, TruthSide);
+
+impl TruthSide {
+    /// Several independent sources together.
+    #[must_use]
+    pub fn together(parts: &[NamedSource]) -> Self {
+        let mut all = Self::default();
+        for (_, part) in parts {
+            all.inertial.extend(&part.inertial);
+            all.starts_off |= part.starts_off;
+            all.noise.iter_mut().zip(part.noise).for_each(|(there, more)| *there |= more);
+        }
+        all
+    }
+
+    /// Every source of an experiment whose inertial noise is that of `model`, at the IMU's rate: its processes
+    /// sensor by sensor, the defects of the true IMU, start, receiver and barometer. All drifts are one source:
+    /// they are the same in every run, so that their errors add, not their variances.
+    #[must_use]
+    pub fn sources(experiment: &Experiment<'_>, model: &Model) -> Vec<NamedSource> {
+        let mut parts = beside_the_imu(experiment, !experiment.initial.perfect);
+        let mut drifts = Vec::new();
+        for sensor in Sensor::ALL {
+            parts.extend(processes(model, sensor, &mut drifts));
+            parts.extend(defects(experiment, sensor));
+        }
+        parts.extend(inertial("drift".to_owned(), drifts));
+        parts.extend(correlated(experiment.gnss, experiment.rate_hz));
+        parts
+    }
+
+    /// The sources that a filter believes in: its bias states instead of a model's processes.
+    #[must_use]
+    pub fn believed(experiment: &Experiment<'_>, belief: &Belief) -> Vec<NamedSource> {
+        let mut parts = beside_the_imu(experiment, true);
+        for sensor in Sensor::ALL {
+            parts.extend(believed_of(belief, sensor));
+        }
+        parts
+    }
+
+    /// The errors of a model, turn-on biases and scale factors as a filter expects them, start and receiver as it
+    /// believes.
+    pub(super) fn as_expected(belief: &Belief, model: &Model, starts_off: bool) -> Self {
+        let mut inertial = Sources::of_model(model);
+        inertial.states.extend(Sources::beside_model(belief));
+        Self { inertial, starts_off, noise: [true; 3] }
+    }
+
+    /// Whether a measurement has its white noise.
+    pub(super) const fn has_noise(&self, measured: Measured) -> bool {
+        match measured {
+            Measured::Position(_) => self.noise[0],
+            Measured::Velocity => self.noise[1],
+            Measured::Height => self.noise[2],
+        }
+    }
+}
+
+/// Start, receiver and barometer.
+fn beside_the_imu(experiment: &Experiment<'_>, starts_off: bool) -> Vec<NamedSource> {
+    let noise = |at: usize| TruthSide { noise: std::array::from_fn(|i| i == at), ..TruthSide::default() };
+    let start = TruthSide { starts_off: true, ..TruthSide::default() };
+    let all = [
+        ("initial", start, starts_off),
+        ("gnss.position", noise(0), true),
+        ("gnss.velocity", noise(1), experiment.gnss.vel_sigma_m_s.is_some()),
+        ("baro", noise(2), experiment.baro.is_some()),
+    ];
+    all.into_iter()
+        .filter(|(_, _, is_there)| *is_there)
+        .map(|(name, side, _)| (name.to_owned(), side))
+        .collect()
+}
+
+/// A source of states alone; none where there are none.
+fn inertial(name: String, states: Vec<Source>) -> Option<NamedSource> {
+    let inertial = Sources { states, white: [0.0; SIGNALS] };
+    (!inertial.states.is_empty()).then(|| (name, TruthSide { inertial, ..TruthSide::default() }))
+}
+
+/// The processes of a sensor: those of the same label are one source on all axes. Drifts are set apart.
+fn processes(model: &Model, sensor: Sensor, drifts: &mut Vec<Source>) -> Vec<NamedSource> {
+    let mut found: Vec<NamedSource> = Vec::new();
+    for channel in Axis::ALL.map(|axis| Channel { sensor, axis }) {
+        let noise = model.axis(channel);
+        for (process, label) in noise.processes.iter().zip(noise.labels()) {
+            if let Process::Drift(p) = process {
+                drifts.push(Source::drift(channel.index(), p.slope()));
+                continue;
+            }
+            let name = format!("{}.{label}", sensor.name());
+            let at = found.iter().position(|(known, _)| *known == name).unwrap_or_else(|| {
+                found.push((name, TruthSide::default()));
+                found.len() - 1
+            });
+            found[at].1.inertial.add(channel.index(), process);
+        }
+    }
+    found
+}
+
+/// Turn-on bias, scale factors and misalignment of a sensor of the true IMU.
+fn defects(experiment: &Experiment<'_>, sensor: Sensor) -> Vec<NamedSource> {
+    let (bias, ppm) = experiment.defects.deviations(sensor);
+    let first = 3 * sensor as usize;
+    let of_sensor = |signal: &usize| *signal >= CROSSED && place(*signal).0 == sensor as usize;
+    let all: [(&str, f64, Vec<usize>); 3] = [
+        ("turn_on_bias", bias, (first..first + 3).collect()),
+        ("scale", ppm * 1e-6, (SCALED + first..SCALED + first + 3).collect()),
+        ("misalignment", experiment.defects.misalignment_rad, (0..SIGNALS).filter(of_sensor).collect()),
+    ];
+    let source = |(name, sigma, signals): (&str, f64, Vec<usize>)| {
+        let states = signals.into_iter().map(|signal| Source::constant(signal, sigma));
+        inertial(format!("{}.{name}", sensor.name()), states.filter(|s| s.initial > 0.0).collect())
+    };
+    all.into_iter().filter_map(source).collect()
+}
+
+/// The correlated part of the receiver's error. It has a value at every epoch of the receiver; between two of them
+/// it goes on from sample to sample, which is the same at the epochs.
+fn correlated(gnss: &GnssSettings, imu_hz: f64) -> Option<NamedSource> {
+    let phi = (-1.0 / (imu_hz * gnss.correlation_time_s)).exp();
+    let state = |(component, sigma): (usize, f64)| Source::of_position(component, phi, sigma);
+    let sigmas = gnss.correlated_pos_sigma_m.into_iter().enumerate().filter(|(_, sigma)| *sigma > 0.0);
+    inertial("gnss.correlated".to_owned(), sigmas.map(state).collect())
+}
+
+/// What a filter believes of a sensor.
+fn believed_of(belief: &Belief, sensor: Sensor) -> Vec<NamedSource> {
+    let first = 3 * sensor as usize;
+    let mut white = Sources::default();
+    white.white[first..first + 3].copy_from_slice(&belief.white[sensor as usize].to_array());
+    let mut all = Vec::new();
+    if white.white.iter().any(|w| *w > 0.0) {
+        all.push((format!("{}.WN", sensor.name()), TruthSide { inertial: white, ..TruthSide::default() }));
+    }
+    let groups = &belief.groups[sensor as usize];
+    let biases = groups.iter().filter(|g| !g.is_constant()).count();
+    let mut number = 0;
+    for group in groups {
+        let name = if group.is_constant() {
+            "turn_on_bias".to_owned()
+        } else {
+            number += 1;
+            if biases == 1 { "bias".to_owned() } else { format!("bias_{number}") }
+        };
+        all.extend(inertial(format!("{}.{name}", sensor.name()), Sources::of_group(sensor, group)));
+    }
+    for (kind, name) in [(UnknownKind::Drift, "drift"), (UnknownKind::ScaleFactor, "scale")] {
+        let states = Sources::multiplied(belief, &[kind]);
+        let of_sensor = states.into_iter().filter(|s| place(s.signal).0 == sensor as usize).collect();
+        all.extend(inertial(format!("{}.{name}", sensor.name()), of_sensor));
+    }
+    all
+}

@@ -1,0 +1,196 @@
+//! What covariance analysis expects, against runs that are drawn: a drive of two minutes with an outage, for what
+//! the true IMU and the receiver can have and filters do or do not expect.
+
+use nav_sim::ekf::FilterStates;
+use nav_sim::metrics::{Estimate, Expected, Frame, epochs};
+use nav_sim::monte_carlo;
+use nav_sim::noise::{Ar1, Composite, Drift, Model, Process, Quantization, RandomWalk, White};
+use nav_sim::scenario::Scenario;
+use nav_sim::sensors::imu::Truth;
+use nav_sim::sensors::outage::Outage;
+use nav_sim::simulation::RunResult;
+use nav_sim::simulation::lincov::{FilterPass, TruthSide};
+use nav_sim::trajectory::Trajectory;
+use nav_sim::trajectory::profile::{Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning};
+
+const RATE_HZ: f64 = 100.0;
+const RUNS: u64 = 400;
+const OUTAGE: Outage = Outage { start_s: 70.0, end_s: 100.0 };
+/// Standard errors that a figure may be off: 117 RMSE of a case beyond it with probability 1e-4 (Bonferroni; the
+/// scatter of 400 squares is nearly normal).
+const BOUND: f64 = 4.9;
+
+fn drive() -> Trajectory {
+    let still = |s: f64| Kind::Straight(Length::Duration(s));
+    let faster = |to_speed: f64| Kind::Accelerate { to_speed, by: Acceleration::Duration(8.0) };
+    let turn = |deg: f64| Kind::Turn { angle: deg.to_radians(), by: Turning::Duration(9.0) };
+    let kinds = [
+        faster(12.0),
+        turn(90.0),
+        still(6.0),
+        turn(-80.0),
+        faster(5.0),
+        turn(70.0),
+        faster(15.0),
+        turn(-60.0),
+        still(12.0),
+        faster(8.0),
+        turn(100.0),
+        still(5.0),
+        faster(14.0),
+        turn(-45.0),
+        still(8.0),
+    ];
+    let start = Start { t_s: 0.0, lat: 0.8, lon: 0.1, h: 300.0, heading: 0.7, speed: 6.0 };
+    let segment = |kind| Segment { kind, climb_m: 1.0, ramp_s: None };
+    let segments = kinds.map(segment).into();
+    Profile { start, bank: Bank::None, ramp_s: 1.0, segments }.build().unwrap()
+}
+
+/// White and quantization noise, a fast and a slow correlated bias, a random walk; all variances times `scale`.
+fn model(scale: f64) -> Model {
+    let axis = |unit: f64| {
+        let s = scale * unit;
+        Composite::new(vec![
+            Process::White(White::new(5e-5 * s).unwrap()),
+            Process::Quantization(Quantization::new(1e-6 * s).unwrap()),
+            Process::Ar1(Ar1::new(0.98, 1e-7 * s).unwrap()),
+            Process::Ar1(Ar1::new(0.9997, 6e-9 * s).unwrap()),
+            Process::RandomWalk(RandomWalk::new(1e-10 * s).unwrap()),
+        ])
+    };
+    Model::pooled(RATE_HZ, &axis(1.0), &axis(1e-3))
+}
+
+/// A filter that believes in `model(1.0)`, with errors of `truth`: runs and expectation agree.
+fn assert_agree(name: &str, scenario: &str, truth: &Model) {
+    let scenario: Scenario = toml::from_str(scenario).unwrap();
+    scenario.validate().unwrap();
+    let (path, believed, outages) = (drive(), model(1.0), [OUTAGE]);
+    let track = scenario.track(&path, &believed, &outages).unwrap();
+    let beliefs = [scenario.belief(&believed, &outages, &track).unwrap()];
+    let experiment = scenario.experiment(&path, Truth::Model(truth), &beliefs, &outages, 11);
+    let sampled = &monte_carlo::run(&experiment, RUNS, &|_| {}).unwrap()[0];
+    let frame = Frame {
+        outages: &sampled.outages,
+        filter_states: beliefs[0].states,
+        fix_components: 6,
+        coverage_level: 0.95,
+        seed: 11,
+    };
+    let sources = TruthSide::together(&TruthSide::sources(&experiment, truth));
+    let expected = Expected::of(&FilterPass::new(&track, &beliefs[0]).errors(&sources), &frame).unwrap();
+    assert_epochs_agree(name, sampled, &expected);
+    assert_outage_agrees(name, sampled, &expected, &frame);
+    let nis = Estimate::mean_of(sampled.runs.iter().map(|r| r.nis.0), None);
+    let z = (nis.value - expected.record.nis.0) / nis.std_error;
+    assert!(z.abs() < BOUND, "{name}: NIS {} {}", nis.value, expected.record.nis.0);
+}
+
+/// Every ten seconds: ASEE within half a percent, RMSE and bias within their standard errors, NEES and coverage.
+fn assert_epochs_agree(name: &str, sampled: &RunResult, expected: &Expected) {
+    for (s, e) in epochs(sampled).iter().zip(&expected.epochs).step_by(10) {
+        assert_eq!((s.t_s, s.gnss, s.count), (e.t_s, e.gnss, RUNS));
+        let near = |what: &str, sampled: Estimate, expected: f64| {
+            let z = (sampled.value - expected) / sampled.std_error;
+            assert!(z.abs() < BOUND, "{name}, {what} at {} s: {} {expected}, z {z}", s.t_s, sampled.value);
+        };
+        for i in 0..9 {
+            let ratio = s.asee.0[i].value / e.asee.0[i].value;
+            assert!((ratio - 1.0).abs() < 5e-3, "{name}, ASEE {i} at {} s: {ratio}", s.t_s);
+            near(&format!("RMSE {i}"), s.rmse.0[i], e.rmse.0[i].value);
+            near(&format!("bias {i}"), s.bias.0[i], e.bias.0[i].value);
+        }
+        near("NEES", s.nees, e.nees.value);
+        near("position error", s.mean_pos_err_m, e.mean_pos_err_m.value);
+        near("attitude error", s.mean_att_err_deg, e.mean_att_err_deg.value);
+        let binomial = (e.coverage * (1.0 - e.coverage) / RUNS as f64).sqrt();
+        // where nearly nothing is left outside, the law of the few is Poisson's: two of them more
+        let slack = BOUND * binomial + 2.0 / RUNS as f64;
+        assert!(
+            (s.coverage - e.coverage).abs() < slack,
+            "{name}: {} {} at {} s",
+            s.coverage,
+            e.coverage,
+            s.t_s
+        );
+    }
+}
+
+/// At the outage's end: RMSE, NEES, and as many runs below each quantile as a binomial law allows.
+fn assert_outage_agrees(name: &str, sampled: &RunResult, expected: &Expected, frame: &Frame<'_>) {
+    let summary = expected.summary(frame);
+    let outage = &summary.outages[0];
+    let records = || sampled.runs.iter().map(|r| &r.outages[0]);
+    for i in 0..9 {
+        let rmse = Estimate::root_mean_square_of(records().map(|o| o.error_end[i]), None);
+        let z = (rmse.value - outage.rmse_end.0[i]) / rmse.std_error;
+        assert!(z.abs() < BOUND, "{name}, RMSE {i} at the end: {} {}", rmse.value, outage.rmse_end.0[i]);
+    }
+    let nees = Estimate::mean_of(records().map(|o| o.nees_end), None);
+    assert!(((nees.value - outage.nees_end) / nees.std_error).abs() < BOUND, "{name}: {}", nees.value);
+    let h = &outage.horizontal_error_end_m;
+    for (p, quantile) in [(0.5, h.p50), (0.95, h.p95)] {
+        let below = records().filter(|o| o.horizontal_error_end_m <= quantile).count() as f64;
+        let (mean, deviation) = (p * RUNS as f64, (p * (1.0 - p) * RUNS as f64).sqrt());
+        assert!((below - mean).abs() < 4.0 * deviation, "{name}: {below} of {RUNS} below p = {p}");
+    }
+}
+
+#[test]
+fn matched_filters_of_15_21_and_full_states() {
+    for states in FilterStates::ALL {
+        assert_agree(states.name(), &format!("filter.states = '{states}'"), &model(1.0));
+    }
+}
+
+#[test]
+fn a_truth_four_times_as_bad_as_believed() {
+    assert_agree("x4", "", &model(4.0));
+    assert_agree("x4 full", "filter.states = 'full'", &model(4.0));
+}
+
+#[test]
+fn turn_on_biases_that_a_filter_expects_or_not() {
+    let imu = "imu = { turn_on_bias_accel_m_s2 = 0.02, turn_on_bias_gyro_rad_s = 2e-4 }";
+    assert_agree("unexpected bias", imu, &model(1.0));
+    let expected = "initial = { accel_bias_sigma_m_s2 = 0.02, gyro_bias_sigma_rad_s = 2e-4 }";
+    assert_agree("bias", &format!("{imu}\n{expected}"), &model(1.0));
+    assert_agree("absent bias", expected, &model(1.0));
+}
+
+#[test]
+fn scale_factors_and_misalignments_that_a_filter_expects_or_not() {
+    let imu = "imu = { scale_ppm_accel = 2000, scale_ppm_gyro = 2000 }";
+    assert_agree("unexpected scale", imu, &model(1.0));
+    assert_agree(
+        "scale",
+        &format!(
+            "{imu}\nfilter.states = '21'\ninitial = {{ accel_scale_sigma_ppm = 2000, gyro_scale_sigma_ppm = 1000 }}"
+        ),
+        &model(1.0),
+    );
+    assert_agree("misalignment", "imu.misalignment_rad = 1e-3", &model(1.0));
+}
+
+#[test]
+fn a_lever_arm_a_barometer_and_a_receiver_with_memory() {
+    let arm = "lever_arm_m = [1.0, -0.5, -1.2]";
+    let gyro = "imu = { scale_ppm_gyro = 2000, misalignment_rad = 1e-3, turn_on_bias_gyro_rad_s = 2e-4 }";
+    assert_agree("lever arm", &format!("gnss = {{ {arm} }}\n{gyro}"), &model(1.0));
+    let gnss = "correlated_pos_sigma_m = [3, 2, 5], correlation_time_s = 30, rate_hz = 2";
+    let baro = "baro = { rate_hz = 1, sigma_m = 0.5 }";
+    assert_agree("coloured", &format!("gnss = {{ {gnss} }}\n{baro}"), &model(1.0));
+    assert_agree("position only", "gnss.vel_sigma_m_s = 'none'\ninitial.perfect = true", &model(1.0));
+}
+
+/// A drift is the same in every run: it is in the mean of the errors, with its sign.
+#[test]
+fn drifts_are_in_the_mean_of_the_errors() {
+    let mut truth = model(1.0);
+    for (axis, slope) in [(0, 2e-6), (1, -3e-6), (4, 3e-9), (5, -5e-9)] {
+        truth.axes[axis].processes.push(Process::Drift(Drift::new(slope).unwrap()));
+    }
+    assert_agree("drift", "", &truth);
+    assert_agree("drift full", "filter.states = 'full'", &truth);
+}
