@@ -12,10 +12,17 @@ use kinavis_kernel::{
     Angle, Distance, GeodeticPoint, Height, Instant, Position, Speed, TrueCourse, Utc, Vector3,
 };
 use nalgebra::SMatrix;
-use nav_sim::ekf::FilterStates;
+use nav_sim::ekf::{Belief, FilterStates};
+use nav_sim::formats::trajectory_file;
 use nav_sim::lanes::Level;
+use nav_sim::metrics::Budget;
+use nav_sim::scenario::Scenario;
+use nav_sim::sensors::imu::Truth;
+use nav_sim::sensors::outage::Outage;
+use nav_sim::simulation::lincov::{FilterPass, TruthSide};
 use nav_sim::throughput::{Load, RUN_EPOCHS, SAMPLES, model};
 use std::hint::black_box;
+use std::path::Path;
 use std::time::Duration;
 
 const VALID: &str = "the parameters are in their domains";
@@ -50,6 +57,27 @@ fn run_epochs(c: &mut Criterion) {
     group.throughput(Throughput::Elements(SAMPLES as u64));
     dense_reference(&mut group);
     public_filter(&mut group);
+    group.finish();
+}
+
+/// A quarter of an hour at 100 Hz with two outages: the reference linearised, a filter's gains, its true errors,
+/// and what they are made of.
+fn covariance_analysis(c: &mut Criterion) {
+    let model = model().expect(VALID);
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("trajectories/land_vehicle.toml");
+    let (path, _) = trajectory_file::load(&file, &trajectory_file::Options::default()).expect(VALID);
+    let (scenario, outages) = (Scenario::default(), Outage::PAPER);
+    let track = scenario.track(&path, &model, &outages).expect(VALID);
+    let beliefs = [Belief::new(&model, FilterStates::Reduced15, 1.0, 800.0).expect(VALID)];
+    let experiment = scenario.experiment(&path, Truth::Model(&model), &beliefs, &outages, 1);
+    let sources = TruthSide::sources(&experiment, &model);
+    let (filter, truth) = (FilterPass::new(&track, &beliefs[0]), TruthSide::together(&sources));
+    let mut group = c.benchmark_group("lincov-900-s");
+    group.sample_size(10);
+    group.bench_function("track", |b| b.iter(|| scenario.track(black_box(&path), &model, &outages)));
+    group.bench_function("gains-15", |b| b.iter(|| FilterPass::new(black_box(&track), &beliefs[0])));
+    group.bench_function("true-errors", |b| b.iter(|| black_box(&filter).errors(&truth)));
+    group.bench_function("budget", |b| b.iter(|| Budget::at_outage_ends(black_box(&filter), &sources)));
     group.finish();
 }
 
@@ -89,5 +117,5 @@ fn public_filter(group: &mut BenchmarkGroup<'_, WallTime>) {
     });
 }
 
-criterion_group!(benches, run_epochs);
+criterion_group!(benches, run_epochs, covariance_analysis);
 criterion_main!(benches);

@@ -5,7 +5,7 @@ use super::reduction::Reduced;
 use crate::ekf::{Belief, BeliefError};
 use crate::imu::{Recording, Sensor};
 use crate::metrics::{
-    Agreement, EpochMetrics, Expected, Frame, ReductionQuality, ReductionSummary, Summary, epochs,
+    Agreement, Budget, EpochMetrics, Expected, Frame, ReductionQuality, ReductionSummary, Summary, epochs,
 };
 use crate::monte_carlo;
 use crate::noise::reduction::window_s;
@@ -14,7 +14,7 @@ use crate::scenario::{Method, Scenario};
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::Outage;
 use crate::simulation::lincov::{
-    Assessment, FilterPass, HeadingDoubt, Track, TruthSide, assess, weak_heading,
+    Assessment, FilterPass, HeadingDoubt, NamedSource, Track, TruthSide, assess, weak_heading,
 };
 use crate::simulation::{Experiment, ExperimentError, RunResult};
 use crate::trajectory::Trajectory;
@@ -142,6 +142,7 @@ pub fn navigate(
     }
     .ok_or(NavigateError::NotFinite)?;
     navigation.summary.reduction = reduction;
+    analysis.add_budgets(&mut navigation.summary, &belief);
     Ok(navigation)
 }
 
@@ -235,6 +236,18 @@ impl<'a> Analysis<'a> {
         let expected = Expected::of(&FilterPass::new(self.track, belief).errors(&truth), &frame)?;
         let summary = expected.summary(&frame);
         Some((expected.epochs, summary))
+    }
+
+    /// What the errors at the ends of outages are made of, and what the filter believes they are.
+    fn add_budgets(&self, summary: &mut Summary, belief: &Belief) {
+        let filter = FilterPass::new(self.track, belief);
+        let at_ends = |sources: &[NamedSource]| Budget::at_outage_ends(&filter, sources).into_iter();
+        let mut truth = self.model.map(|model| at_ends(&TruthSide::sources(self.experiment, model)));
+        let believed = at_ends(&TruthSide::believed(self.experiment, belief));
+        for (outage, believed) in summary.outages.iter_mut().zip(believed) {
+            outage.budget = truth.as_mut().and_then(Iterator::next);
+            outage.believed_budget = Some(believed);
+        }
     }
 }
 

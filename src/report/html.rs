@@ -133,6 +133,25 @@ fn outages(outages: &[OutageSummary], body: &mut String) {
         asee: o.asee_mean,
     };
     pairs(&outages.iter().map(over_all).collect::<Vec<_>>(), body);
+    budgets(outages, body);
+}
+
+/// What the errors at the ends of outages are made of, beside what the filter believes.
+fn budgets(outages: &[OutageSummary], body: &mut String) {
+    for o in outages {
+        let both = [("true errors", &o.budget), ("what the filter believes", &o.believed_budget)];
+        for (of, budget) in both {
+            let Some(budget) = budget else { continue };
+            let _ = writeln!(body, "<h3>Sources of errors at the end of {}: {of} (%)</h3>", window(o));
+            let head = std::iter::once("").chain(TITLES).map(str::to_owned).collect();
+            let percent = |share: &f64| format!("{:.1}", 100.0 * share);
+            let row = |(name, of): &(String, PerState<f64>)| {
+                std::iter::once(name.clone()).chain(of.0.iter().map(percent)).collect()
+            };
+            let rows: Vec<Vec<String>> = std::iter::once(head).chain(budget.shares.iter().map(row)).collect();
+            table(&rows, body);
+        }
+    }
 }
 
 fn window(o: &OutageSummary) -> String {

@@ -34,7 +34,7 @@ pub use efficiency_svg::efficiency_svg;
 pub use fits::{CandidateEntry, FitEntry, FitsFile, describe};
 pub use fusion::{FUSION_FILES, FusionKind, FusionManifest, FusionSummary, fusion_directory, solution_csv};
 pub use manifest::{Input, Manifest, ModelNote};
-pub use number::seconds;
+pub use number::{readable, seconds};
 pub use recording::{gnss_csv, imu_csv, initial_toml};
 pub use replicates::{
     AlarmEntry, LeftOutEntry, MovementEntry, ReplicateEntry, ScoresEntry, describe_replicates,

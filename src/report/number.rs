@@ -14,7 +14,8 @@ pub fn seconds(t_s: f64) -> String {
 }
 
 /// A number for people: three significant digits, or four figures before the point.
-pub(super) fn readable(x: f64) -> String {
+#[must_use]
+pub fn readable(x: f64) -> String {
     if !x.is_finite() {
         return "–".to_owned();
     }

@@ -422,3 +422,53 @@ fn what_covariance_analysis_cannot_do_is_refused() {
     assert!(ran.code == 2 && ran.stderr.contains("covariance analysis needs a model"), "{}", ran.stderr);
     assert!(ran.stderr.contains("hint: calibrate the recordings"), "{}", ran.stderr);
 }
+
+/// Three requirements: one that is met, two that are not; told after the verdict, kept, and exit code 3.
+#[test]
+fn requirements_decide_the_exit_code() {
+    let place = place();
+    let command = "run drive.toml imu.toml --method lincov --outage 30:45 -o out";
+    let ran = nav_sim(place.path(), &format!("{command} --require p95_m<=1000 --require rmse_yaw_deg<=90"));
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(ran.stdout.lines().nth(1).unwrap().starts_with("required p95_m<=1000: met, "), "{}", ran.stdout);
+    let ran = nav_sim(place.path(), &format!("{command} --require p95_m<=0.1 --require yaw_deg<=90"));
+    assert_eq!(ran.code, 3, "{}", ran.stderr);
+    assert!(ran.stderr.contains("error: required p95_m<=0.1: NOT MET, "), "{}", ran.stderr);
+    let kept = &json(&place.path().join("out/summary.json"))["require"];
+    assert_eq!((&kept[0]["met"], &kept[1]["met"]), (&false.into(), &true.into()));
+    refused(
+        "run drive.toml imu.toml --outage none --seed 1 --require p95_m<=5 -o out",
+        2,
+        "--require p95_m<=5: p95_m is of",
+    );
+    refused("run drive.toml imu.toml --require p95<=5 -o out", 2, "invalid value 'p95<=5'");
+}
+
+/// What errors are made of is in the summary, in the page and, the largest sources, on the screen, with runs and
+/// without; of recordings nobody knows it.
+#[test]
+fn the_sources_of_errors_are_told() {
+    let place = place();
+    for method in ["lincov", "monte-carlo"] {
+        let command =
+            format!("run drive.toml imu.toml --method {method} --runs 2 --seed 1 --outage 30:45 -o out");
+        let ran = done(place.path(), &command);
+        assert!(ran.stdout.contains("| sources of errors | horizontal position"), "{}", ran.stdout);
+        assert!(ran.stdout.lines().count() <= 20, "{}", ran.stdout);
+        let outage = json(&place.path().join("out/summary.json"))["outages"][0].clone();
+        let sum = |budget: &Value| -> f64 {
+            budget.as_object().unwrap().values().map(|shares| shares["yaw_deg"].as_f64().unwrap()).sum()
+        };
+        assert!((sum(&outage["budget"]) - 1.0).abs() < 1e-9);
+        assert!((sum(&outage["believed_budget"]) - 1.0).abs() < 1e-9);
+        let page = fs::read_to_string(place.path().join("out/report.html")).unwrap();
+        assert!(page.contains("Sources of errors at the end of 30–45 s: true errors"));
+    }
+    done(place.path(), "synthesize imu.toml --replicates 1 --samples 7000 --seed 1 -o made");
+    let command =
+        "run drive.toml imu.toml --runs 2 --seed 1 --outage 30:45 --static made/replicate_1.csv -o out";
+    let ran = done(place.path(), command);
+    assert!(!ran.stdout.contains("sources of errors"), "{}", ran.stdout);
+    let outage = json(&place.path().join("out/summary.json"))["outages"][0].clone();
+    assert!(outage["budget"].is_null() && outage["believed_budget"].is_object());
+}

@@ -1,8 +1,9 @@
 //! What covariance analysis expects, against runs that are drawn: a drive of two minutes with an outage, for what
 //! the true IMU and the receiver can have and filters do or do not expect.
 
+use nav_sim::earth::{GravityModel, gravity_down};
 use nav_sim::ekf::FilterStates;
-use nav_sim::metrics::{Estimate, Expected, Frame, epochs};
+use nav_sim::metrics::{Budget, Estimate, Expected, Frame, epochs};
 use nav_sim::monte_carlo;
 use nav_sim::noise::{Ar1, Composite, Drift, Model, Process, Quantization, RandomWalk, White};
 use nav_sim::scenario::Scenario;
@@ -193,4 +194,96 @@ fn drifts_are_in_the_mean_of_the_errors() {
     }
     assert_agree("drift", "", &truth);
     assert_agree("drift full", "filter.states = 'full'", &truth);
+}
+
+/// Standing still for 20 s without a fix from a perfect start: a turn-on bias of deviation b makes b t²/2 down, a
+/// scale factor s makes s g t²/2, a drift of slope k per sample k f t³/6 (known sign: all of it is mean). The
+/// gravity gradient (time constant 570 s) adds (20/570)²/6, and the step of the covariance (0.2 s) is exact here.
+#[test]
+fn constants_of_the_true_imu_have_their_closed_forms() {
+    let still = Segment { kind: Kind::Straight(Length::Duration(20.0)), climb_m: 0.0, ramp_s: None };
+    let start = Start { t_s: 0.0, lat: 0.8, lon: 0.1, h: 0.0, heading: 0.7, speed: 0.0 };
+    let path = Profile { start, bank: Bank::None, ramp_s: 1.0, segments: vec![still] }.build().unwrap();
+    let outages = [Outage { start_s: 0.0, end_s: 20.0 }];
+    let white = Composite::new(vec![Process::White(White::new(1e-4).unwrap())]);
+    let believed = Model::pooled(RATE_HZ, &white, &white);
+    let down = |imu: &str, truth: &Model| {
+        let scenario: Scenario = toml::from_str(&format!("initial.perfect = true\n{imu}")).unwrap();
+        let track = scenario.track(&path, &believed, &outages).unwrap();
+        let beliefs = [scenario.belief(&believed, &outages, &track).unwrap()];
+        let experiment = scenario.experiment(&path, Truth::Model(truth), &beliefs, &outages, 1);
+        let sources = TruthSide::together(&TruthSide::sources(&experiment, truth));
+        let end = FilterPass::new(&track, &beliefs[0]).errors(&sources).outage_ends[0];
+        (end.rmse()[2], end.mean[2])
+    };
+    let none = Model { rate_hz: RATE_HZ, axes: Default::default() };
+    let (bias, mean) = down("imu.turn_on_bias_accel_m_s2 = 0.01", &none);
+    assert!((bias / 2.0 - 1.0).abs() < 1.5e-3 && mean == 0.0, "{bias}");
+    let (scale, _) = down("imu.scale_ppm_accel = 1000", &none);
+    let g = gravity_down(GravityModel::default(), 0.8_f64.sin(), 0.0);
+    assert!((scale / (1e-3 * g * 200.0) - 1.0).abs() < 1.5e-3, "{scale}");
+    let mut drifting = none.clone();
+    drifting.axes[2].processes.push(Process::Drift(Drift::new(1e-6).unwrap()));
+    let (rmse, mean) = down("", &drifting);
+    // 100 a second, each a hundredth of a second later: k f t³/6 (1 + 3/(2n))
+    assert!((mean / (1e-6 * RATE_HZ * 8000.0 / 6.0) - 1.0).abs() < 2e-3, "{mean}");
+    assert!((rmse / mean.abs() - 1.0).abs() < 1e-12, "{rmse} {mean}");
+}
+
+/// Shares of every state sum to 1; together the sources make the mean squares of the whole truth, and those that
+/// the filter believes in make its own variances: covariances add over independent sources.
+#[test]
+fn budgets_add_up_to_the_true_errors_and_to_the_believed_ones() {
+    let text = "
+        imu = { turn_on_bias_accel_m_s2 = 0.01, scale_ppm_gyro = 500, misalignment_rad = 1e-3 }
+        gnss = { lever_arm_m = [1.0, -0.5, -1.2], correlated_pos_sigma_m = [3, 2, 5] }
+        baro = { rate_hz = 1, sigma_m = 0.5 }
+        initial = { accel_bias_sigma_m_s2 = 0.02 }
+        filter.states = '21'
+    ";
+    let scenario: Scenario = toml::from_str(text).unwrap();
+    let (path, believed, outages) = (drive(), model(1.0), [OUTAGE]);
+    let mut truth = model(4.0);
+    truth.axes[3].processes.push(Process::Drift(Drift::new(1e-9).unwrap()));
+    let track = scenario.track(&path, &believed, &outages).unwrap();
+    let beliefs = [scenario.belief(&believed, &outages, &track).unwrap()];
+    let experiment = scenario.experiment(&path, Truth::Model(&truth), &beliefs, &outages, 1);
+    let filter = FilterPass::new(&track, &beliefs[0]);
+    let sources = TruthSide::sources(&experiment, &truth);
+    let end = filter.errors(&TruthSide::together(&sources)).outage_ends[0];
+    let believed = TruthSide::believed(&experiment, &beliefs[0]);
+    for (sources, deviations) in [(&sources, end.rmse()), (&believed, end.sigma())] {
+        let budget = &Budget::at_outage_ends(&filter, sources)[0];
+        for i in 0..9 {
+            let sum: f64 = budget.shares.iter().map(|(_, shares)| shares.0[i]).sum();
+            assert!((sum - 1.0).abs() < 1e-9, "state {i}: {sum}");
+            let ratio = budget.total[i] / deviations[i].powi(2);
+            assert!((ratio - 1.0).abs() < 1e-9, "state {i}: {ratio}");
+            assert!(budget.shares.iter().all(|(_, shares)| shares.0[i] >= -1e-12));
+        }
+    }
+    let names: Vec<&str> = sources.iter().map(|(name, _)| name.as_str()).collect();
+    let expected = [
+        "initial",
+        "gnss.position",
+        "gnss.velocity",
+        "baro",
+        "accel.WN",
+        "accel.QN",
+        "accel.AR1_1",
+        "accel.AR1_2",
+        "accel.RW",
+        "accel.turn_on_bias",
+        "accel.misalignment",
+        "gyro.WN",
+        "gyro.QN",
+        "gyro.AR1_1",
+        "gyro.AR1_2",
+        "gyro.RW",
+        "gyro.scale",
+        "gyro.misalignment",
+        "drift",
+        "gnss.correlated",
+    ];
+    assert_eq!(names, expected);
 }

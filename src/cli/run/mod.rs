@@ -9,7 +9,7 @@ use super::{Failure, Session};
 use inputs::Inputs;
 use nav_sim::formats::scenario_file;
 use nav_sim::jobs::{self, NavigateError};
-use nav_sim::metrics::Summary;
+use nav_sim::metrics::{Requirement, Summary};
 use nav_sim::report::{Manifest, seconds};
 use nav_sim::scenario::{Method, Scenario};
 use nav_sim::sensors::imu::TruthError;
@@ -60,6 +60,10 @@ pub(crate) struct Args {
     /// both, the runs beside what is expected of them
     #[arg(long, value_name = "METHOD", value_parser = parse_method)]
     method: Option<Method>,
+    /// Most that an error may be, as NAME<=LIMIT (repeatable), at the end of every outage: p50_m, p95_m (horizontal),
+    /// rmse_pos_e_m, yaw_deg and the other states; else exit code 3
+    #[arg(long, value_name = "NAME<=LIMIT")]
+    require: Vec<Requirement>,
     /// Scenario file whose [gnss] section is used
     #[arg(long, value_name = "FILE")]
     gnss: Option<PathBuf>,
@@ -115,10 +119,12 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         Some(path) if args.outages.is_empty() => e.within(&path.display().to_string()),
         _ => e,
     })?;
+    requirable(&args.require, outages.is_empty())?;
     output::try_open(&args.out, &inputs.files)?;
     let words = Words::new(session);
     let found = jobs::navigate(&inputs.job, &scenario, &outages, seed, &words);
-    let found = found.map_err(|e| impossible(e, &args.model))?;
+    let mut found = found.map_err(|e| impossible(e, &args.model))?;
+    found.summary.require = args.require.iter().map(|r| r.check(&found.summary)).collect();
     let manifest = manifest(scenario, &outages, seed, inputs.files.clone(), inputs.note.clone(), session);
     let epochs = found.runs.as_ref().map_or(0, |runs| runs.run_epochs) as f64;
     let independent_windows = found.runs.as_ref().and_then(|runs| runs.independent_windows);
@@ -131,7 +137,25 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     output::doubt_filter(&found.summary, session);
     session.printer.say(&format!("wrote {}", args.out.display()));
     all_finite(&found.summary)?;
-    not_lost(&found.summary)
+    not_lost(&found.summary)?;
+    required(&found.summary)
+}
+
+/// Refuses requirements of outages where there is none.
+fn requirable(all: &[Requirement], no_outage: bool) -> Result<(), Failure> {
+    match all.iter().find(|r| no_outage && r.needs_outage()) {
+        Some(r) => {
+            let message = format!("--require {r}: {} is of the ends of outages, and there is none", r.name());
+            Err(Failure::input(message).hint("give an outage with --outage START:END"))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Whether everything required is met.
+fn required(summary: &Summary) -> Result<(), Failure> {
+    let missed: Vec<String> = summary.require.iter().filter(|r| !r.met).map(output::met_line).collect();
+    if missed.is_empty() { Ok(()) } else { Err(Failure::bound(missed.join("; "))) }
 }
 
 /// The seed of all random numbers: drawn where nobody gives one and there are any.

@@ -5,7 +5,7 @@ use crate::cli::compare::table;
 use crate::cli::{Failure, Session};
 use nav_sim::formats::atomic::{self, AtomicDir};
 use nav_sim::jobs::Navigation;
-use nav_sim::metrics::{OutageSummary, PerState, Summary, VerdictKind};
+use nav_sim::metrics::{Budget, Met, OutageSummary, PerState, Summary, VerdictKind};
 use nav_sim::report::{self, Input, Manifest, ModelNote, seconds};
 use nav_sim::scenario::{Method, Scenario};
 use nav_sim::sensors::outage::Outage;
@@ -103,7 +103,9 @@ pub(crate) fn doubt_filter(summary: &Summary, session: &Session) {
 
 /// The summary for people, the verdict first.
 pub(crate) fn text(summary: &Summary, throughput_epochs_per_s: f64) -> String {
-    let mut text = format!("verdict: {}\n{}\n", verdict(summary), how(summary, throughput_epochs_per_s));
+    let mut text = format!("verdict: {}\n", verdict(summary));
+    summary.require.iter().for_each(|met| text += &format!("{}\n", met_line(met)));
+    text += &format!("{}\n", how(summary, throughput_epochs_per_s));
     if summary.runs > 0 && summary.diverged == summary.runs {
         return text.trim_end().to_owned();
     }
@@ -130,10 +132,46 @@ pub(crate) fn text(summary: &Summary, throughput_epochs_per_s: f64) -> String {
         coverage.level,
         inside(coverage.fraction_inside, coverage.lower95, coverage.upper95)
     );
+    text += &budget_table(summary);
     if let Some(agreement) = &summary.agreement {
         text += &format!("\nruns against the covariance analysis: {}", agreement_line(agreement));
     }
     text
+}
+
+/// `required p95_m<=5: NOT MET, 7.41 at the end of outage 1`
+pub(super) fn met_line(met: &Met) -> String {
+    let verdict = if met.met { "met" } else { "NOT MET" };
+    let place = met.outage.map_or("over the run".to_owned(), |k| format!("at the end of outage {}", k + 1));
+    format!("required {}<={}: {verdict}, {} {place}", met.name, met.limit, report::readable(met.value))
+}
+
+/// Most outages whose sources are shown; of more, those with the largest errors.
+const BUDGETS: usize = 3;
+/// Sources that are shown of a state.
+const SOURCES: usize = 3;
+
+/// The three largest sources of the horizontal position and of yaw at the ends of outages.
+fn budget_table(summary: &Summary) -> String {
+    let horizontal = |b: &Budget| b.total[0] + b.total[1];
+    let mut known: Vec<(&OutageSummary, &Budget)> =
+        summary.outages.iter().filter_map(|o| Some((o, o.budget.as_ref()?))).collect();
+    if known.is_empty() {
+        return String::new();
+    }
+    known.sort_by(|a, b| horizontal(b.1).total_cmp(&horizontal(a.1)));
+    known.truncate(BUDGETS);
+    known.sort_by(|a, b| a.0.start_s.total_cmp(&b.0.start_s));
+    let sources = |budget: &Budget, states: &[usize]| -> String {
+        let shares = budget.ranked(states).into_iter().take(SOURCES);
+        shares.map(|(name, share)| format!("{name} {:.0} %", 100.0 * share)).collect::<Vec<_>>().join(", ")
+    };
+    let mut rows = vec![["sources of errors", "horizontal position", "yaw"].map(str::to_owned).to_vec()];
+    for (o, budget) in known {
+        let window = format!("{}–{} s", seconds(o.start_s), seconds(o.end_s));
+        rows.push(vec![window, sources(budget, &[0, 1]), sources(budget, &[8])]);
+    }
+    format!("\n{}", table(&rows))
 }
 
 /// How the figures were found.

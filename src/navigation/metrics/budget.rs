@@ -31,7 +31,8 @@ impl Budget {
             for ends in &of_source {
                 total.iter_mut().zip(&ends[k]).for_each(|(sum, square)| *sum += square);
             }
-            let share = |ends: &Vec<[f64; REPORTED]>| PerState(std::array::from_fn(|i| ends[k][i] / total[i]));
+            let share =
+                |ends: &Vec<[f64; REPORTED]>| PerState(std::array::from_fn(|i| ends[k][i] / total[i]));
             let shares = sources.iter().zip(&of_source).map(|((name, _), ends)| (name.clone(), share(ends)));
             Self { shares: shares.collect(), total }
         };
@@ -42,8 +43,10 @@ impl Budget {
     #[must_use]
     pub fn ranked(&self, states: &[usize]) -> Vec<(&str, f64)> {
         let whole: f64 = states.iter().map(|i| self.total[*i]).sum();
-        let share = |of: &PerState<f64>| states.iter().map(|i| of.0[*i] * self.total[*i]).sum::<f64>() / whole;
-        let mut all: Vec<(&str, f64)> = self.shares.iter().map(|(name, of)| (name.as_str(), share(of))).collect();
+        let share =
+            |of: &PerState<f64>| states.iter().map(|i| of.0[*i] * self.total[*i]).sum::<f64>() / whole;
+        let mut all: Vec<(&str, f64)> =
+            self.shares.iter().map(|(name, of)| (name.as_str(), share(of))).collect();
         all.sort_by(|a, b| b.1.total_cmp(&a.1));
         all
     }

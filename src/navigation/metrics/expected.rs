@@ -100,6 +100,7 @@ impl Expected {
             reduction: None,
             lincov: None,
             agreement: None,
+            require: Vec::new(),
         }
     }
 }
@@ -176,6 +177,8 @@ fn outage((start_s, end_s): (f64, f64), end: &Instant, epochs: &[EpochMetrics]) 
             p95_ci95: (None, None),
         },
         reconvergence_s: Recovery { p50: f64::NAN, p95: f64::NAN, never: None },
+        budget: None,
+        believed_budget: None,
     }
 }
 

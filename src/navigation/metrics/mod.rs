@@ -5,6 +5,7 @@
 //! directory keeps of it.
 
 mod agreement;
+mod budget;
 mod consistency;
 mod epoch;
 mod estimate;
@@ -13,10 +14,12 @@ mod outage;
 mod quadratic_form;
 mod ratio;
 mod reduction;
+mod requirement;
 mod summary;
 mod verdict;
 
 pub use agreement::Agreement;
+pub use budget::Budget;
 pub use consistency::{Band, chi_square_band, chi_square_interval, coverage_band};
 pub use epoch::{Accuracy, EpochMetrics, epochs};
 pub use estimate::{Estimate, PerState, Quantile, SampleSize, quantile};
@@ -25,5 +28,6 @@ pub use outage::{OutageMetrics, Reconvergence, outages};
 pub use quadratic_form::QuadraticForm;
 pub use ratio::{ComparisonError, EpochRow, Measured, OutageComparison, RatioError, StateRatio, compare};
 pub use reduction::{AxisReduction, ReductionQuality, ReductionSummary, TOLERANCE};
+pub use requirement::{Met, Requirement, UnknownRequirement};
 pub use summary::{AccuracySummary, Consistency, Coverage, Nis, OutageSummary, Recovery, Spread, Summary};
 pub use verdict::{Verdict, VerdictKind};

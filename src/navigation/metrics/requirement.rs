@@ -26,7 +26,9 @@ pub struct Requirement {
 
 /// A requirement that is none.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("expected NAME<=LIMIT with a positive limit, NAME one of p50_m, p95_m, rmse_pos_e_m, yaw_deg and the other states")]
+#[error(
+    "expected NAME<=LIMIT with a positive limit, NAME one of p50_m, p95_m, rmse_pos_e_m, yaw_deg and the other states"
+)]
 pub struct UnknownRequirement;
 
 /// Whether a requirement is met, and by how much.
@@ -48,10 +50,12 @@ impl FromStr for Requirement {
     type Err = UnknownRequirement;
 
     fn from_str(text: &str) -> Result<Self, UnknownRequirement> {
-        let (name, limit) = text.split_once("<=").or_else(|| text.split_once('<')).ok_or(UnknownRequirement)?;
+        let (name, limit) =
+            text.split_once("<=").or_else(|| text.split_once('<')).ok_or(UnknownRequirement)?;
         let limit: f64 = limit.trim().parse().map_err(|_| UnknownRequirement)?;
         let name = name.trim();
-        let state = || REPORTED_NAMES.iter().position(|known| *known == name.strip_prefix("rmse_").unwrap_or(name));
+        let state =
+            || REPORTED_NAMES.iter().position(|known| *known == name.strip_prefix("rmse_").unwrap_or(name));
         let figure = match name {
             "p50_m" => Figure::P50,
             "p95_m" => Figure::P95,

@@ -1,11 +1,13 @@
 //! The summary of an experiment: what `summary.json` holds.
 
 use super::agreement::Agreement;
+use super::budget::Budget;
 use super::consistency::{Band, chi_square_band, coverage_band};
 use super::epoch::{Accuracy, EpochMetrics};
 use super::estimate::{Estimate, PerState, Quantile, SampleSize};
 use super::outage::{self, OutageMetrics};
 use super::reduction::ReductionSummary;
+use super::requirement::Met;
 use super::verdict::{Verdict, VerdictKind};
 use crate::simulation::{NEES_DOF, RunResult};
 use serde::Serialize;
@@ -54,6 +56,9 @@ pub struct Summary {
     /// How far the runs are from it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub agreement: Option<Agreement>,
+    /// What was required, and whether it is met.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub require: Vec<Met>,
 }
 
 /// ASEE and RMSE as means over epochs.
@@ -98,6 +103,13 @@ pub struct OutageSummary {
     pub horizontal_error_end_m: Spread,
     /// Time until the error is back to what it was before.
     pub reconvergence_s: Recovery,
+    /// Shares of the sources of the true errors in their mean squares just before the first fix after the outage,
+    /// by covariance analysis; none where nothing models them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub budget: Option<Budget>,
+    /// The same of what the filter believes in.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub believed_budget: Option<Budget>,
 }
 
 /// Quantiles of a distribution over runs, with distribution-free 95 % intervals (null: too few runs).
@@ -201,6 +213,7 @@ impl Summary {
             reduction: None,
             lincov: None,
             agreement: None,
+            require: Vec::new(),
         }
     }
 
@@ -256,6 +269,8 @@ impl From<&OutageMetrics> for OutageSummary {
                 p95: o.reconvergence.p95_s.value,
                 never: Some(o.reconvergence.never),
             },
+            budget: None,
+            believed_budget: None,
         }
     }
 }
