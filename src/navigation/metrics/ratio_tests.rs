@@ -59,7 +59,7 @@ fn paired_intervals_cover_at_their_level() {
             a.push(1.2 * (10.0 + common) + 0.3 * normal());
             b.push(10.0 + common);
         }
-        let ratio = Pairing { paired: true, windows: None }.mean_ratio(&a, &b);
+        let ratio = Pairing { paired: true, windows: None, is_expected: [false; 2] }.mean_ratio(&a, &b);
         covered += u32::from(((ratio.ratio - 1.2) * 100.0).abs() <= ratio.half_width_pct);
     }
     let share = f64::from(covered) / f64::from(repetitions);
@@ -70,14 +70,14 @@ fn paired_intervals_cover_at_their_level() {
 /// 3/2 with variance (14/12 + (3/2)²/3)/2² = 23/48. Student's t of 2 degrees of freedom (tables): 4.302653.
 #[test]
 fn an_unpaired_interval_in_closed_form() {
-    let unpaired = Pairing { paired: false, windows: None };
+    let unpaired = Pairing { paired: false, windows: None, is_expected: [false; 2] };
     let found = unpaired.mean_ratio(&[1.0, 2.0, 3.0, 6.0], &[1.0, 2.0, 3.0]);
     let expected = 100.0 * 4.302_653 * (23.0_f64 / 48.0).sqrt();
     assert_eq!(found.ratio, 1.5);
     assert!((found.half_width_pct / expected - 1.0).abs() < 1e-6, "{} {expected}", found.half_width_pct);
     // the same from every value twice, of which as many are independent as before
     let twice = |values: &[f64]| values.iter().flat_map(|x| [*x, *x]).collect::<Vec<_>>();
-    let shared = Pairing { paired: false, windows: Some(3.0) };
+    let shared = Pairing { paired: false, windows: Some(3.0), is_expected: [false; 2] };
     let (a, b) = ([1.0, 2.0, 6.0], [1.0, 2.0, 3.0]);
     let (once, doubled) = (unpaired.mean_ratio(&a, &b), shared.mean_ratio(&twice(&a), &twice(&b)));
     assert!((doubled.half_width_pct / once.half_width_pct - 1.0).abs() < 1e-12);
@@ -86,7 +86,8 @@ fn an_unpaired_interval_in_closed_form() {
 /// Differences a − ρ b = −1, 0, 1 with ρ = 1, b̄ = 2: standard error 1/√3 of a mean of 2; t of 2: 4.302653.
 #[test]
 fn a_paired_interval_in_closed_form() {
-    let found = Pairing { paired: true, windows: None }.mean_ratio(&[0.0, 2.0, 4.0], &[1.0, 2.0, 3.0]);
+    let found = Pairing { paired: true, windows: None, is_expected: [false; 2] }
+        .mean_ratio(&[0.0, 2.0, 4.0], &[1.0, 2.0, 3.0]);
     let expected = 100.0 * 4.302_653 / 3.0_f64.sqrt() / 2.0;
     assert!((found.half_width_pct / expected - 1.0).abs() < 1e-6, "{} {expected}", found.half_width_pct);
 }
