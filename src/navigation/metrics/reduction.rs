@@ -2,10 +2,12 @@
 
 use super::estimate::PerState;
 use crate::ekf::Belief;
+use crate::ekf::belief::BiasGroup;
 use crate::imu::{Channel, Sensor};
 use crate::noise::{Ar1, Composite, Model, ParameterError, Process, White, continuous, reduction};
 use crate::simulation::REPORTED;
 use crate::simulation::lincov::{Assessment, Consistency};
+use glam::DVec3;
 use serde::Serialize;
 
 /// A ratio of RMSE to standard deviation that is further from 1 at the end of an outage deserves a warning.
@@ -129,7 +131,9 @@ impl AxisReduction {
     ) -> Result<Self, ParameterError> {
         let noise = model.axis(channel);
         let (sensor, i) = (channel.sensor as usize, channel.axis as usize);
-        let group = &belief.groups[sensor][0];
+        // white noise alone has no bias: the first group, if any, is then what the filter expects beside the model
+        let none = BiasGroup { phi: DVec3::ZERO, ..BiasGroup::constant(0.0) };
+        let group = belief.groups[sensor].first().filter(|group| !group.is_constant()).unwrap_or(&none);
         let (white, bias) =
             (White::new(belief.white[sensor][i])?, Ar1::new(group.phi[i], group.innovation[i])?);
         let is_quantization = |p: &&Process| matches!(p, Process::Quantization(_));
@@ -230,7 +234,7 @@ const STATE_WORDS: [&str; REPORTED] = [
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ekf::FilterStates;
+    use crate::ekf::{FilterStates, InitialSettings};
     use crate::noise::Quantization;
 
     fn summary(model: &Model) -> ReductionSummary {
@@ -259,6 +263,23 @@ mod tests {
         assert_eq!((a.axis.as_str(), a.model_wv == a.reduced_wv), ("gyro.x", true));
         assert!((a.bias_t_corr_s - 0.01 / 0.9995_f64.ln().abs()).abs() < 1e-6);
         assert_eq!(summary.lines().len(), 2);
+    }
+
+    /// The states of a turn-on bias are no bias of the model.
+    #[test]
+    fn white_noise_alone_stays_without_a_bias_where_a_turn_on_bias_is_expected() {
+        let axis = Composite::new(vec![Process::White(White::new(5e-5).unwrap())]);
+        let model = Model::pooled(100.0, &axis, &axis);
+        let initial = InitialSettings {
+            accel_bias_sigma_m_s2: Some(0.1),
+            gyro_bias_sigma_rad_s: Some(1e-3),
+            ..InitialSettings::default()
+        };
+        let belief = Belief::new(&model, FilterStates::Reduced15, 1.0, 800.0).unwrap().with_initial(&initial);
+        let summary = ReductionSummary::of(&model, &belief, 1.0, 800.0).unwrap();
+        assert!(
+            summary.is_exact() && summary.axes.iter().all(|a| a.bias_sigma == 0.0 && a.initial_sigma == 0.0)
+        );
     }
 
     /// The curves stored are those the misfit is of: its value is found again over the scales of the fit.
