@@ -8,6 +8,7 @@ mod check;
 mod common;
 mod compare;
 mod completions;
+mod datasheet;
 mod demo;
 mod efficiency;
 mod exit;
@@ -54,6 +55,7 @@ struct Cli {
 enum Command {
     Wv(wv::Args),
     Calibrate(calibrate::Args),
+    Datasheet(datasheet::Args),
     Synthesize(synthesize::Args),
     Trajectory(trajectory::Args),
     Run(run::Args),
@@ -83,6 +85,7 @@ impl Command {
         match self {
             Self::Wv(args) => wv::run(&args, session),
             Self::Calibrate(args) => calibrate::run(&args, session),
+            Self::Datasheet(args) => datasheet::run(&args, session),
             Self::Synthesize(args) => synthesize::run(&args, session),
             Self::Trajectory(args) => trajectory::run(&args, session),
             Self::Run(args) => run::run(&args, session),

@@ -3,6 +3,7 @@
 pub mod atomic;
 pub mod contamination_file;
 pub mod curve_file;
+pub mod datasheet;
 mod difference;
 pub mod efficiency_directory;
 pub mod efficiency_file;

@@ -17,6 +17,7 @@ mod batch_kills;
 mod calibrate;
 mod command_line;
 mod compare;
+mod datasheet;
 mod efficiency;
 mod examples;
 mod export;

@@ -1,0 +1,202 @@
+//! `nav-sim datasheet`: a datasheet's figures → a model file.
+
+use super::{Failure, Session, parse};
+use nav_sim::formats::datasheet::{self, CATALOGUE, Datasheet, Entry, Figure, Quantity};
+use nav_sim::formats::suggest::nearest;
+use nav_sim::formats::{atomic, model_file};
+use nav_sim::imu::Sensor;
+use std::path::{Path, PathBuf};
+
+/// Noise model from the figures of a datasheet, in the datasheet's units: an assumption, not a calibration
+///
+/// White noise of the density given; a Gauss-Markov process whose largest Allan deviation is the bias
+/// instability; a random walk. [provenance] of the model file holds every figure as given and what it became.
+/// Flags win over the entry of the catalogue.
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim datasheet --unit stim300 --rate-hz 100 -o stim300.toml
+  nav-sim datasheet calib_data/catalogue/adis16470.toml --corr-time 100s -o adis16470.toml
+  nav-sim datasheet --list")]
+pub(crate) struct Args {
+    /// Catalogue entry (TOML)
+    #[arg(value_name = "ENTRY", conflicts_with = "unit")]
+    entry: Option<PathBuf>,
+    /// Catalogue entry by name (see --list)
+    #[arg(long, value_name = "NAME")]
+    unit: Option<String>,
+    /// List the catalogue
+    #[arg(long)]
+    list: bool,
+    #[command(flatten)]
+    figures: Figures,
+    /// Sample rate of the model
+    #[arg(long, value_name = "HZ", value_parser = parse::rate_hz, default_value = "100")]
+    rate_hz: f64,
+    /// Model file to write (default: to stdout)
+    #[arg(long, short, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Figures: a number and its unit, such as '0.15 deg/sqrt(h)'.
+#[derive(clap::Args, Debug)]
+#[command(next_help_heading = "Figures, a number and its unit ('0.15 deg/sqrt(h)')")]
+struct Figures {
+    /// Velocity random walk or noise density of the accelerometers: m/s/sqrt(h), ug/sqrt(Hz), …
+    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::Noise))]
+    vrw: Option<Quantity>,
+    /// Angle random walk or noise density of the gyroscopes: deg/sqrt(h), deg/s/sqrt(Hz), …
+    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::Noise))]
+    arw: Option<Quantity>,
+    /// Bias instability of the accelerometers: ug, mg, m/s²
+    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::Bias))]
+    accel_bias: Option<Quantity>,
+    /// Bias instability of the gyroscopes: deg/h, deg/s, rad/s
+    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::Bias))]
+    gyro_bias: Option<Quantity>,
+    /// Correlation time of both biases: s, min, h [default: 300 s, which is said]
+    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::CorrelationTime))]
+    corr_time: Option<Quantity>,
+    /// Correlation time of the accelerometers' bias
+    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::CorrelationTime))]
+    accel_corr_time: Option<Quantity>,
+    /// Correlation time of the gyroscopes' bias
+    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::CorrelationTime))]
+    gyro_corr_time: Option<Quantity>,
+    /// Rate random walk of the accelerometers: m/s²/sqrt(s), ug/sqrt(h), …
+    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::Walk))]
+    accel_rrw: Option<Quantity>,
+    /// Rate random walk of the gyroscopes: deg/h/sqrt(h), rad/s/sqrt(s), …
+    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::Walk))]
+    gyro_rrw: Option<Quantity>,
+    /// Turn-on bias of the accelerometers, as a standard deviation: mg, m/s²
+    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::TurnOn))]
+    accel_turn_on: Option<Quantity>,
+    /// Turn-on bias of the gyroscopes, as a standard deviation: deg/s, deg/h
+    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::TurnOn))]
+    gyro_turn_on: Option<Quantity>,
+    /// Scale-factor error of the accelerometers: ppm, %
+    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::Scale))]
+    accel_scale: Option<Quantity>,
+    /// Scale-factor error of the gyroscopes: ppm, %
+    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::Scale))]
+    gyro_scale: Option<Quantity>,
+}
+
+/// Reads a figure of a sensor.
+fn figure(sensor: Sensor, figure: Figure) -> impl Fn(&str) -> Result<Quantity, String> + Clone {
+    move |text| Quantity::parse(text, figure.units(sensor)).map_err(|e| e.to_string())
+}
+
+impl Figures {
+    /// Those that are given, in the place of those of an entry.
+    fn over(&self, sheet: &mut Datasheet) {
+        let [accel, gyro] = [&self.accel_corr_time, &self.gyro_corr_time];
+        let given = [
+            (Sensor::Accel, Figure::Noise, &self.vrw),
+            (Sensor::Gyro, Figure::Noise, &self.arw),
+            (Sensor::Accel, Figure::Bias, &self.accel_bias),
+            (Sensor::Gyro, Figure::Bias, &self.gyro_bias),
+            (Sensor::Accel, Figure::CorrelationTime, if accel.is_some() { accel } else { &self.corr_time }),
+            (Sensor::Gyro, Figure::CorrelationTime, if gyro.is_some() { gyro } else { &self.corr_time }),
+            (Sensor::Accel, Figure::Walk, &self.accel_rrw),
+            (Sensor::Gyro, Figure::Walk, &self.gyro_rrw),
+            (Sensor::Accel, Figure::TurnOn, &self.accel_turn_on),
+            (Sensor::Gyro, Figure::TurnOn, &self.gyro_turn_on),
+            (Sensor::Accel, Figure::Scale, &self.accel_scale),
+            (Sensor::Gyro, Figure::Scale, &self.gyro_scale),
+        ];
+        for (sensor, figure, quantity) in given {
+            if let Some(quantity) = quantity.clone() {
+                sheet.set(Entry {
+                    sensor,
+                    figure,
+                    quantity,
+                    source: Some("command line".into()),
+                    quote: None,
+                });
+            }
+        }
+    }
+}
+
+pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    if args.list {
+        return list(session);
+    }
+    if let (Some(out), Some(entry)) = (&args.out, &args.entry) {
+        atomic::guard_inputs(out, std::iter::once(Path::new(entry)))?;
+    }
+    let mut sheet = match (&args.entry, &args.unit) {
+        (Some(path), _) => datasheet::read(path)?,
+        (None, Some(name)) => named(name)?,
+        (None, None) => Datasheet::default(),
+    };
+    args.figures.over(&mut sheet);
+    let program = format!("nav-sim {}", env!("CARGO_PKG_VERSION"));
+    let made = sheet.model_file(args.rate_hz, &program).map_err(Failure::input)?;
+    if made.file.missing.len() == made.file.model.axes.len() {
+        let failure = Failure::input("no figure is given that makes a noise model");
+        return Err(failure.hint("give --vrw and --arw, or --unit NAME (nav-sim datasheet --list)"));
+    }
+    for sensor in Sensor::ALL {
+        doubt(&sheet, sensor, session);
+    }
+    made.doubts.iter().for_each(|doubt| session.printer.warn(doubt));
+    let Some(out) = &args.out else {
+        session.printer.result(model_file::to_toml(&made.file).trim_end());
+        return Ok(());
+    };
+    model_file::write(out, &made.file)?;
+    session.printer.say(&format!("wrote {}: an assumption, not a calibration", out.display()));
+    Ok(())
+}
+
+/// What the figures lack, and what a model file does not hold.
+fn doubt(sheet: &Datasheet, sensor: Sensor, session: &Session) {
+    let name = sensor.name();
+    let flag = if sensor == Sensor::Accel { "--vrw" } else { "--arw" };
+    if sheet.value(sensor, Figure::Noise).is_none() {
+        session.printer.warn(&format!("{name}: no white noise is given ({flag}): the model has none"));
+    }
+    if sheet.value(sensor, Figure::Bias).is_none() {
+        session
+            .printer
+            .warn(&format!("{name}: no bias instability is given (--{name}-bias): the bias does not wander"));
+    }
+    if let Some(ppm) = sheet.value(sensor, Figure::Scale) {
+        session.printer.say(&format!(
+            "{name}: a scale factor of {ppm} ppm is not noise; the filter expects it with `run --scale-ppm`, the true \
+             IMU has it with [imu] scale_ppm_{name} of a scenario"
+        ));
+    }
+}
+
+fn named(name: &str) -> Result<Datasheet, Failure> {
+    if let Some(sheet) = datasheet::catalogued(name) {
+        return Ok(sheet?);
+    }
+    let failure = Failure::input(format!("--unit {name}: the catalogue has no such unit"));
+    Err(failure.hint(match nearest(name, CATALOGUE.iter().map(|(known, _)| *known)) {
+        Some(meant) => format!("did you mean {meant}?"),
+        None => "nav-sim datasheet --list shows what there is".to_owned(),
+    }))
+}
+
+/// The catalogue: name, class, and the figures of both sensors as given.
+fn list(session: &Session) -> Result<(), Failure> {
+    for (name, _) in CATALOGUE {
+        let sheet = named(name)?;
+        let class = sheet.class.as_deref().unwrap_or_default();
+        session
+            .printer
+            .result(&format!("{name:<12} {class:<12} {}", sheet.name.as_deref().unwrap_or_default()));
+        for sensor in Sensor::ALL {
+            let of_sensor = sheet.entries.iter().filter(|e| e.sensor == sensor);
+            let shown: Vec<String> =
+                of_sensor.map(|e| format!("{} {}", e.figure.key(), e.quantity.given)).collect();
+            session.printer.result(&format!("  {:<5} {}", sensor.name(), shown.join(", ")));
+        }
+    }
+    Ok(())
+}

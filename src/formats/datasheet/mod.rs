@@ -1,0 +1,212 @@
+//! Datasheets: their figures in their units, and the noise model they are assumed to mean.
+//!
+//! | figure | becomes |
+//! |---|---|
+//! | noise density N | white noise, sigma2 = N²·rate |
+//! | bias instability B, correlation time T | a Gauss-Markov process whose largest Allan deviation is B |
+//! | rate random walk K | a random walk, gamma2 = K²/rate |
+//! | turn-on bias | `[turn_on]` of the model file, taken as a standard deviation |
+//! | scale factor | said, not part of a noise model |
+//!
+//! **Bias instability.** Manufacturers read B off the lowest point of the Allan deviation (Sensonor's FAQ: "the
+//! minimum point of the Allan Variance curve"); [IEEE 952](crate::bibliography::Ieee952) calls that point 0.664
+//! times the coefficient of a flicker noise, which no process of finitely many states is. A Gauss-Markov
+//! process of standard deviation σ and correlation time T has the Allan variance, with x = τ/T,
+//!
+//! σ²·(2/x)·[1 − (3 − 4e^(−x) + e^(−2x))/(2x)],
+//!
+//! whose root is largest, 0.6174 σ, at x = 1.8926. The process is chosen so that this largest value is B: σ = B/0.6174.
+//! (Farrell, Silva, Rahman, Wendel: *IMU error modeling tutorial*, IEEE Control Systems 42(6), 2022: the same choice,
+//! as B/(0.4365 √T) for the root of the driving noise's density.) White noise comes on top: where it is above B at
+//! 1.89 T, the sum has no floor at B, which is said.
+
+mod catalogue;
+mod figure;
+
+pub use catalogue::{CATALOGUE, catalogued, read};
+pub use figure::{Figure, Quantity, QuantityError};
+
+use crate::formats::model_file::{ModelFile, SCHEMA, TurnOn};
+use crate::imu::{Channel, Sensor};
+use crate::noise::{Composite, GaussMarkov, Model, ParameterError, Process, RandomWalk, White, continuous};
+use toml::Table;
+
+/// The largest Allan deviation of a Gauss-Markov process per unit of its standard deviation.
+pub const GAUSS_MARKOV_PEAK: f64 = 0.617_364_283_144_441_3;
+/// Where it has it, in correlation times.
+pub const GAUSS_MARKOV_PEAK_AT: f64 = 1.892_617_8;
+/// The correlation time that is assumed where none is given (s).
+pub const ASSUMED_CORRELATION_TIME_S: f64 = 300.0;
+
+/// One figure of one sensor, and where it was read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// Whose.
+    pub sensor: Sensor,
+    /// Which.
+    pub figure: Figure,
+    /// How much.
+    pub quantity: Quantity,
+    /// Document and place.
+    pub source: Option<String>,
+    /// The line that was read.
+    pub quote: Option<String>,
+}
+
+/// What is known of an IMU from its datasheet.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Datasheet {
+    /// Manufacturer and name, if known.
+    pub name: Option<String>,
+    /// Consumer, industrial, tactical or navigation.
+    pub class: Option<String>,
+    /// At most one entry for each figure of each sensor.
+    pub entries: Vec<Entry>,
+    /// What was assumed beside the figures.
+    pub assumptions: Vec<String>,
+}
+
+/// A model made of a datasheet, and what to say of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Made {
+    /// The model.
+    pub file: ModelFile,
+    /// What had to be assumed, or does not fit together.
+    pub doubts: Vec<String>,
+}
+
+impl Datasheet {
+    /// A figure in SI (ppm for scale factors).
+    #[must_use]
+    pub fn value(&self, sensor: Sensor, figure: Figure) -> Option<f64> {
+        let entry = self.entries.iter().find(|e| e.sensor == sensor && e.figure == figure)?;
+        Some(entry.quantity.value)
+    }
+
+    /// Puts a figure in the place of what was known of it.
+    pub fn set(&mut self, entry: Entry) {
+        self.entries.retain(|e| (e.sensor, e.figure) != (entry.sensor, entry.figure));
+        self.entries.push(entry);
+    }
+
+    /// The model at a rate; `program` names what made it.
+    ///
+    /// # Errors
+    /// When a figure is beyond what a process can have.
+    pub fn model_file(&self, rate_hz: f64, program: &str) -> Result<Made, ParameterError> {
+        let mut doubts = Vec::new();
+        let mut noise = |sensor| self.noise(sensor, rate_hz, &mut doubts);
+        let (accel, gyro) = (noise(Sensor::Accel)?, noise(Sensor::Gyro)?);
+        let mut file = ModelFile::new(Model::pooled(rate_hz, &accel, &gyro));
+        let silent = |channel: &Channel| file.model.axis(*channel).processes.is_empty();
+        file.missing = Channel::ALL.into_iter().filter(silent).collect();
+        let turn_on = |sensor| self.value(sensor, Figure::TurnOn).map(|sigma| [sigma; 3]);
+        let turn_on = TurnOn { accel_m_s2: turn_on(Sensor::Accel), gyro_rad_s: turn_on(Sensor::Gyro) };
+        file.turn_on = (turn_on != TurnOn::default()).then_some(turn_on);
+        file.provenance = Some(self.provenance(program, &doubts));
+        Ok(Made { file, doubts })
+    }
+
+    fn noise(
+        &self,
+        sensor: Sensor,
+        rate_hz: f64,
+        doubts: &mut Vec<String>,
+    ) -> Result<Composite, ParameterError> {
+        let mut processes = Vec::new();
+        let density = self.value(sensor, Figure::Noise);
+        if let Some(density) = density {
+            let sigma2 = continuous::white_sigma2(density, rate_hz);
+            processes.push(Process::White(White::new(sigma2)?));
+        }
+        if let Some(floor) = self.value(sensor, Figure::Bias) {
+            let given = self.value(sensor, Figure::CorrelationTime);
+            let t_corr_s = given.unwrap_or(ASSUMED_CORRELATION_TIME_S);
+            processes.push(Process::GaussMarkov(gauss_markov(floor, t_corr_s, rate_hz)?));
+            doubts.extend(doubt_floor(sensor, floor, density.unwrap_or(0.0), given));
+        }
+        if let Some(density) = self.value(sensor, Figure::Walk) {
+            let gamma2 = continuous::walk_gamma2(density, rate_hz);
+            processes.push(Process::RandomWalk(RandomWalk::new(gamma2)?));
+        }
+        Ok(Composite::new(processes))
+    }
+
+    fn provenance(&self, program: &str, doubts: &[String]) -> Table {
+        let mut table = Table::new();
+        table.insert("program".into(), program.into());
+        table.insert("schema".into(), (SCHEMA as i64).into());
+        table.insert("estimator".into(), "datasheet".into());
+        table.insert("label".into(), "an assumption: figures of a datasheet, not a calibration".into());
+        if let Some(name) = &self.name {
+            table.insert("unit".into(), name.as_str().into());
+        }
+        let assumptions: Vec<toml::Value> =
+            self.assumptions.iter().chain(doubts).map(|text| text.as_str().into()).collect();
+        table.insert("assumptions".into(), assumptions.into());
+        let figures: Vec<toml::Value> = self.entries.iter().map(|e| e.provenance().into()).collect();
+        table.insert("figures".into(), figures.into());
+        table
+    }
+}
+
+impl Entry {
+    fn provenance(&self) -> Table {
+        let mut table = Table::new();
+        table.insert("figure".into(), format!("{}.{}", self.sensor.name(), self.figure.key()).into());
+        table.insert("given".into(), self.quantity.given.as_str().into());
+        table.insert("became".into(), became(self.figure).into());
+        for (key, text) in [("source", &self.source), ("quote", &self.quote)] {
+            if let Some(text) = text {
+                table.insert(key.into(), text.as_str().into());
+            }
+        }
+        table
+    }
+}
+
+/// Which assumption turns a figure into parameters.
+const fn became(figure: Figure) -> &'static str {
+    match figure {
+        Figure::Noise => "white noise of this density: sigma2 = N² rate_hz",
+        Figure::Bias => "a Gauss-Markov process whose largest Allan deviation it is: s2 = (B / 0.6174)²",
+        Figure::CorrelationTime => "the correlation time of that process: beta = 1/T",
+        Figure::Walk => "a random walk of this density: gamma2 = K² / rate_hz",
+        Figure::TurnOn => "the standard deviation of a constant bias, alike on three axes",
+        Figure::Scale => {
+            "nothing: a scale factor is not noise (run --scale-ppm, [imu] scale_ppm of a scenario)"
+        }
+    }
+}
+
+/// The Gauss-Markov process whose largest Allan deviation is `floor` (units).
+///
+/// # Errors
+/// When a number is not positive.
+pub fn gauss_markov(floor: f64, t_corr_s: f64, rate_hz: f64) -> Result<GaussMarkov, ParameterError> {
+    let sigma = floor / GAUSS_MARKOV_PEAK;
+    GaussMarkov::new(1.0 / t_corr_s, sigma * sigma, rate_hz)
+}
+
+fn doubt_floor(sensor: Sensor, floor: f64, density: f64, given_s: Option<f64>) -> Vec<String> {
+    let name = sensor.name();
+    let t_corr_s = given_s.unwrap_or(ASSUMED_CORRELATION_TIME_S);
+    let mut doubts = Vec::new();
+    if given_s.is_none() {
+        doubts.push(format!(
+            "{name}: no correlation time is given; {ASSUMED_CORRELATION_TIME_S} s is assumed for the bias instability"
+        ));
+    }
+    let tau_s = GAUSS_MARKOV_PEAK_AT * t_corr_s;
+    if density > floor * tau_s.sqrt() {
+        doubts.push(format!(
+            "{name}: at {tau_s:.0} s the white noise alone is above the bias instability, which the Allan deviation then \
+             does not show; a correlation time above {:.0} s would",
+            (density / floor).powi(2) / GAUSS_MARKOV_PEAK_AT
+        ));
+    }
+    doubts
+}
+
+#[cfg(test)]
+mod tests;

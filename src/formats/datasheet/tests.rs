@@ -1,0 +1,153 @@
+use super::catalogue::parse;
+use super::*;
+use crate::formats::model_file;
+use crate::formats::toml_file::Source;
+use std::path::Path;
+
+const CLASSES: [&str; 4] = ["consumer", "industrial", "tactical", "navigation"];
+
+fn sheet(entries: &[(Sensor, Figure, &str)]) -> Datasheet {
+    let mut sheet = Datasheet::default();
+    for (sensor, figure, text) in entries {
+        let quantity = Quantity::parse(text, figure.units(*sensor)).unwrap();
+        sheet.set(Entry { sensor: *sensor, figure: *figure, quantity, source: None, quote: None });
+    }
+    sheet
+}
+
+/// Allan deviation of averages over 2^(level − 1) samples: twice the Haar wavelet variance is its square.
+fn allan_deviation(noise: &Composite, level: u32) -> f64 {
+    (2.0 * noise.haar_wv(level)).sqrt()
+}
+
+/// At 1 s the Allan deviation of white noise is its density, that of a random walk its density over √3.
+#[test]
+fn densities_are_where_the_allan_deviation_is_read() {
+    let sheet = sheet(&[
+        (Sensor::Gyro, Figure::Noise, "0.15 deg/sqrt(h)"),
+        (Sensor::Accel, Figure::Walk, "60 ug/sqrt(h)"),
+    ]);
+    // 128 samples a second: 1 s is 2^7 samples, level 8
+    let made = sheet.model_file(128.0, "test").unwrap().file.model;
+    let density = 0.15 / 60.0 * std::f64::consts::PI / 180.0;
+    assert!((allan_deviation(&made.axes[3], 8) / density - 1.0).abs() < 1e-12);
+    // K² τ/3 in continuous time; sampled, a share 1/(2·128²) more
+    let walk = 1e-6 * 9.806_65;
+    let expected = walk * (1.0_f64 / 3.0).sqrt();
+    assert!((allan_deviation(&made.axes[0], 8) / expected - 1.0).abs() < 1e-4);
+}
+
+/// The closed form of the Allan variance of a Gauss-Markov process, scanned for its largest value.
+#[test]
+fn the_largest_allan_deviation_is_the_bias_instability() {
+    let (floor, t_corr_s) = (3e-5, 250.0);
+    let process = gauss_markov(floor, t_corr_s, 100.0).unwrap();
+    let allan = |x: f64| {
+        let bracket = 1.0 - (3.0 - 4.0 * (-x).exp() + (-2.0 * x).exp()) / (2.0 * x);
+        (process.s2() * 2.0 / x * bracket).sqrt()
+    };
+    let scan = (1..=400_000).map(|i| f64::from(i) * 1e-5);
+    let (at, largest) = scan.map(|x| (x, allan(x))).fold((0.0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
+    assert!((largest / floor - 1.0).abs() < 1e-9, "{largest:e}");
+    assert!((at - GAUSS_MARKOV_PEAK_AT).abs() < 1e-4, "{at}");
+    // the sampled process: the dyadic scale nearest to the peak is below it and within 4 % (x from 1.3 to 2.7)
+    let rate_hz = 100.0;
+    let noise = Composite::new(vec![Process::GaussMarkov(gauss_markov(floor, t_corr_s, rate_hz).unwrap())]);
+    let largest = (1..30).map(|level| allan_deviation(&noise, level)).fold(0.0, f64::max);
+    assert!((0.96..=1.0 + 1e-9).contains(&(largest / floor)), "{}", largest / floor);
+}
+
+#[test]
+fn what_is_assumed_is_said() {
+    let bias = [(Sensor::Gyro, Figure::Bias, "10 deg/h"), (Sensor::Gyro, Figure::Noise, "0.3 deg/sqrt(h)")];
+    let made = sheet(&bias).model_file(100.0, "test").unwrap();
+    let assumed = "gyro: no correlation time is given; 300 s is assumed for the bias instability";
+    assert_eq!(made.doubts, [assumed]);
+    // 0.3 °/√h is above 10 °/h until (0.3·60/10)² = 3.24 s: a peak at 1.89·1 s is below that
+    let mut short = sheet(&bias);
+    short.set(sheet(&[(Sensor::Gyro, Figure::CorrelationTime, "1 s")]).entries.remove(0));
+    let doubts = short.model_file(100.0, "test").unwrap().doubts;
+    assert!(
+        doubts[0].starts_with("gyro: at 2 s the white noise alone is above the bias instability"),
+        "{doubts:?}"
+    );
+    assert!(doubts[0].ends_with("a correlation time above 2 s would"), "{doubts:?}");
+}
+
+#[test]
+fn provenance_holds_every_figure_as_given() {
+    let made = sheet(&[
+        (Sensor::Gyro, Figure::Noise, "0.3 °/√h"),
+        (Sensor::Gyro, Figure::TurnOn, "0.1 deg/s"),
+        (Sensor::Gyro, Figure::Scale, "300 ppm"),
+    ]);
+    let file = made.model_file(100.0, "nav-sim 1").unwrap().file;
+    let provenance = file.provenance.as_ref().unwrap();
+    let figures = provenance["figures"].as_array().unwrap();
+    let given: Vec<&str> = figures.iter().map(|f| f["given"].as_str().unwrap()).collect();
+    assert_eq!(given, ["0.3 °/√h", "0.1 deg/s", "300 ppm"]);
+    assert_eq!(provenance["estimator"].as_str(), Some("datasheet"));
+    let sigma = 0.1 * std::f64::consts::PI / 180.0;
+    assert!((file.turn_on.unwrap().gyro_rad_s.unwrap()[2] / sigma - 1.0).abs() < 1e-14);
+    assert_eq!(file.missing.len(), 3);
+}
+
+/// Every entry of the catalogue: known by its name, sourced, positive, and a model file that reads back.
+#[test]
+fn the_catalogue_is_sound() {
+    let directory = Path::new(env!("CARGO_MANIFEST_DIR")).join("calib_data/catalogue");
+    let files = std::fs::read_dir(&directory).unwrap().map(|f| f.unwrap().path());
+    let mut names: Vec<String> = files.map(|f| f.file_stem().unwrap().to_str().unwrap().to_owned()).collect();
+    names.sort();
+    assert!(names.len() >= 10, "{}", names.len());
+    assert_eq!(names, CATALOGUE.iter().map(|(name, _)| *name).collect::<Vec<_>>());
+    for name in &names {
+        let sheet = read(&directory.join(format!("{name}.toml"))).unwrap();
+        assert_eq!(catalogued(&name.to_uppercase()).unwrap().unwrap(), sheet);
+        assert!(CLASSES.contains(&sheet.class.as_deref().unwrap()), "{name}");
+        assert!(!sheet.assumptions.is_empty(), "{name}");
+        for entry in &sheet.entries {
+            let place = format!("{name} {:?}", entry.figure);
+            assert!(entry.quantity.value > 0.0, "{place}");
+            assert!(
+                entry.source.as_ref().is_some_and(|s| s.contains("read ")),
+                "{place}: where was it read?"
+            );
+            // the figure as given stands in the line that was read, whatever the unit's spelling
+            let number = entry.quantity.given.split(' ').next().unwrap();
+            assert!(entry.quote.as_ref().is_some_and(|q| q.contains(number)), "{place}: {number}");
+        }
+        for sensor in Sensor::ALL {
+            assert!(sheet.value(sensor, Figure::Noise).is_some(), "{name}");
+        }
+        let file = sheet.model_file(100.0, "test").unwrap().file;
+        assert!(file.missing.is_empty());
+        let text = model_file::to_toml(&file);
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("model.toml");
+        model_file::write(&path, &file).unwrap();
+        assert_eq!(model_file::read(&path).unwrap(), file, "{text}");
+    }
+}
+
+#[test]
+fn entries_are_refused_with_line_key_and_value() {
+    let refused = |text: &str| {
+        let head = "[unit]\nmanufacturer = \"A\"\nname = \"B\"\nclass = \"consumer\"\n";
+        parse(&Source::new("u.toml", &format!("{head}{text}"))).unwrap_err().to_string()
+    };
+    assert_eq!(
+        refused("[gyro]\nbias = { value = \"10\", source = \"s\" }\n"),
+        "u.toml, line 6: \"gyro.bias\" = \"10\" has no unit; units that fit: deg/h, deg/s, mdeg/s, rad/s"
+    );
+    assert_eq!(
+        refused("[accel]\nnoise = { value = \"1 deg/h\", source = \"s\" }\n"),
+        "u.toml, line 6: \"accel.noise\" = \"1 deg/h\" has the unit deg/h, which does not fit; units that fit: \
+         m/s/sqrt(h), m/s/sqrt(s), ft/s/sqrt(h), m/s²/sqrt(Hz), mg/sqrt(Hz), ug/sqrt(Hz)"
+    );
+    assert_eq!(
+        refused("[gyro]\nnoises = { value = \"1 deg/sqrt(h)\", source = \"s\" }\n"),
+        "u.toml, line 6: unknown key \"gyro.noises\""
+    );
+    assert!(refused("[gyro]\nnoise = { value = \"1 deg/sqrt(h)\" }\n").contains("missing field `source`"));
+}
