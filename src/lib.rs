@@ -36,8 +36,8 @@
 pub use nav_sim_calibration as calibration;
 pub use nav_sim_calibration::efficiency;
 pub use nav_sim_navigation::{
-    closure, earth, ekf, frames, fusion, gnss, lanes, linalg, metrics, monte_carlo, scenario, sensors,
-    simulation, strapdown, throughput, trajectory,
+    closure, earth, ekf, frames, fusion, gnss, lanes, linalg, metrics, monte_carlo, require, scenario,
+    sensors, simulation, strapdown, throughput, trajectory,
 };
 pub use nav_sim_signal::{bibliography, imu, noise, rng, units, wavelet};
 

@@ -24,6 +24,7 @@ mod printer;
 mod progress;
 mod read;
 mod recordings;
+mod require;
 mod run;
 mod schema;
 mod synthesize;
@@ -60,6 +61,7 @@ enum Command {
     Trajectory(trajectory::Args),
     Run(run::Args),
     Tune(tune::Args),
+    Require(require::Args),
     Fuse(fuse::Args),
     Compare(compare::Args),
     Export(export::Args),
@@ -89,6 +91,7 @@ impl Command {
             Self::Synthesize(args) => synthesize::run(&args, session),
             Self::Trajectory(args) => trajectory::run(&args, session),
             Self::Run(args) => run::run(&args, session),
+            Self::Require(args) => require::run(&args, session),
             Self::Tune(args) => tune::run(&args, session),
             Self::Fuse(args) => fuse::run(&args, session),
             Self::Compare(args) => compare::run(&args, session),

@@ -33,3 +33,5 @@ pub mod monte_carlo;
 pub mod scenario;
 // L8
 pub mod metrics;
+// L9
+pub mod require;

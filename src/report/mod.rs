@@ -13,6 +13,7 @@ mod manifest;
 mod number;
 mod recording;
 mod replicates;
+pub mod require;
 mod run_directory;
 #[cfg(test)]
 mod sample;

@@ -24,6 +24,7 @@ mod export;
 mod fuse;
 mod help_examples;
 mod readme;
+mod require;
 mod run;
 mod synthesize;
 mod trajectory_command;

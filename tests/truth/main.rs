@@ -27,5 +27,6 @@ mod lincov;
 mod lincov_sampled;
 mod long_records;
 mod reduction;
+mod require;
 mod trajectories;
 mod tune;

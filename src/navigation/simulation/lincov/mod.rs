@@ -9,6 +9,7 @@
 //! The trajectory is reduced once to a [`Track`]: exact maps of the navigation error over steps of a fraction
 //! of a second. Any number of beliefs and truths are then assessed along it, in milliseconds each.
 
+mod cut;
 mod descent;
 mod heading;
 mod input;
@@ -24,6 +25,8 @@ mod tune;
 pub use heading::{HeadingDoubt, weak_heading};
 pub use pass::{Assessment, Consistency, ErrorLaw, FilterPass, Instant, assess};
 pub use reduce::{drive, reduced_belief};
+pub(crate) use root::Crossing;
 pub use track::Track;
 pub use truth::{NamedSource, TruthSide};
+pub(crate) use tune::times;
 pub use tune::{Aim, Factor, Filter, Honesty, Per, Task, scaled};

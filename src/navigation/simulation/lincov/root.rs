@@ -1,13 +1,13 @@
 //! Where a function that falls crosses zero.
 
 /// How a crossing is sought.
-pub(super) struct Crossing {
+pub(crate) struct Crossing {
     /// Where the variable may go.
-    pub(super) bounds: (f64, f64),
+    pub(crate) bounds: (f64, f64),
     /// First step away from the start; it doubles until there is a bracket.
-    pub(super) step: f64,
+    pub(crate) step: f64,
     /// A value this close to zero is zero.
-    pub(super) exact: f64,
+    pub(crate) exact: f64,
 }
 
 /// Evaluations within a bracket. The Illinois rule gains a digit in two of them.
@@ -17,7 +17,7 @@ impl Crossing {
     /// The variable and its value: within `exact` of zero, or at a bound where there is no crossing. From a value
     /// above zero the variable goes up. A bracket first, then regula falsi with the Illinois rule, which
     /// keeps it.
-    pub(super) fn from<E>(
+    pub(crate) fn from<E>(
         &self,
         start: f64,
         mut value: impl FnMut(f64) -> Result<f64, E>,

@@ -268,7 +268,7 @@ pub fn scaled(model: &Model, factors: &[Factor]) -> Model {
 }
 
 /// A process whose variance is multiplied.
-pub(super) fn times(process: &Process, on_variance: f64, rate_hz: f64) -> Process {
+pub(crate) fn times(process: &Process, on_variance: f64, rate_hz: f64) -> Process {
     let (name, value) = amplitude(process);
     // a drift has an amplitude, the others a variance
     let factor = if matches!(process, Process::Drift(_)) { on_variance.sqrt() } else { on_variance };

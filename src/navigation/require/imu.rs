@@ -1,0 +1,214 @@
+//! The IMU that a limit needs: white noise and one Gauss-Markov bias a sensor, each with a quarter of the budget.
+
+use super::{Course, Limit, RequireError, Worst};
+use crate::ekf::BeliefError;
+use crate::noise::{Composite, GaussMarkov, Model, Process, White, continuous};
+use crate::scenario::Scenario;
+use crate::simulation::lincov::Crossing;
+use crate::units::DEG;
+
+/// How many intensities an IMU has here.
+pub const IMU_PARAMETERS: usize = 4;
+
+/// Intensities of an IMU, all axes alike.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ImuParameters {
+    /// Velocity random walk (m/s/√s), standard deviation of the accelerometer's bias (m/s²), angle random walk
+    /// (rad/√s), standard deviation of the gyroscope's bias (rad/s).
+    pub values: [f64; IMU_PARAMETERS],
+    /// Correlation time of the biases (s).
+    pub t_corr_s: f64,
+}
+
+/// The largest Allan deviation of a Gauss-Markov process over its standard deviation, at 1.89 correlation times.
+const ALLAN_PEAK: f64 = 0.617_364_283_144_441_3;
+const HOUR_S: f64 = 3600.0;
+/// (m/s²)
+const STANDARD_GRAVITY: f64 = 9.806_65;
+
+/// A consumer IMU, from which searches start.
+const START: [f64; IMU_PARAMETERS] = [1e-3, 5e-4, 5e-5, 2e-5];
+/// An intensity times this is as good as none.
+const NONE: f64 = 1e-5;
+/// How far from the start an intensity is sought, as a logarithm: beyond, any will do.
+const RANGE: f64 = 9.0;
+/// Where the logarithm of limit over error is zero.
+const EXACT: f64 = 1e-4;
+/// Rounds of the allocation, the share of a correction that is applied, and when it is done.
+const ROUNDS: usize = 25;
+const DAMPING: f64 = 0.35;
+const EVEN: f64 = 0.02;
+
+impl ImuParameters {
+    /// Names of the processes, as sources of errors.
+    const SOURCES: [&'static str; IMU_PARAMETERS] = ["accel.WN", "accel.GM", "gyro.WN", "gyro.GM"];
+
+    /// The noise model.
+    #[must_use]
+    pub fn model(&self, rate_hz: f64) -> Model {
+        let [accel_white, accel_bias, gyro_white, gyro_bias] = self.values;
+        let axis = |density: f64, bias: f64| {
+            let white = White::new(continuous::white_sigma2(density, rate_hz));
+            let bias = GaussMarkov::new(1.0 / self.t_corr_s, bias * bias, rate_hz);
+            let [white, bias] = [white.map(Process::White), bias.map(Process::GaussMarkov)];
+            Composite::new(vec![white.expect("a finite variance"), bias.expect("a finite variance")])
+        };
+        Model::pooled(rate_hz, &axis(accel_white, accel_bias), &axis(gyro_white, gyro_bias))
+    }
+
+    /// An intensity in the unit of datasheets; biases as bias instabilities, the largest Allan deviation that the
+    /// process has.
+    #[must_use]
+    pub fn in_datasheets(which: usize, value: f64) -> f64 {
+        match which {
+            0 => value * HOUR_S.sqrt(),
+            1 => value * ALLAN_PEAK / STANDARD_GRAVITY * 1e6,
+            2 => value / DEG * HOUR_S.sqrt(),
+            _ => value * ALLAN_PEAK / DEG * HOUR_S,
+        }
+    }
+
+    /// Names and units of the intensities.
+    pub const NAMES: [&'static str; IMU_PARAMETERS] = [
+        "velocity random walk (m/s/√h)",
+        "accelerometer bias instability (µg)",
+        "angle random walk (deg/√h)",
+        "gyroscope bias instability (deg/h)",
+    ];
+
+    fn times(&self, factors: [f64; IMU_PARAMETERS]) -> Self {
+        Self { values: std::array::from_fn(|i| self.values[i] * factors[i]), ..*self }
+    }
+}
+
+/// An intensity that keeps the limits, or none that matters.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Answer {
+    /// At most this.
+    AtMost(f64),
+    /// Any value will do.
+    Any,
+    /// Not even zero is enough.
+    Never,
+}
+
+/// What is asked of an IMU.
+pub struct Need<'a> {
+    /// Where.
+    pub course: &'a Course<'a>,
+    /// Receiver, start and IMU rate.
+    pub scenario: &'a Scenario,
+    /// At least one.
+    pub limits: &'a [Limit],
+    /// Correlation time of the biases (s).
+    pub t_corr_s: f64,
+}
+
+/// Velocity random walks that keep the limits beside a gyroscope's bias, the other two as allocated.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IsoDrift {
+    /// Standard deviation of the gyroscope's bias (rad/s), and what is left for the accelerometer (m/s/√s).
+    pub points: Vec<(f64, Answer)>,
+}
+
+impl Need<'_> {
+    /// The IMU that meets the limits exactly, its four intensities with equal shares in the variance that GNSS and
+    /// start leave, and these shares with that of GNSS and start at the end.
+    ///
+    /// # Errors
+    /// When not even a perfect IMU meets them.
+    pub fn allocated(&self) -> Result<(ImuParameters, [f64; IMU_PARAMETERS + 1]), RequireError> {
+        let start = ImuParameters { values: START, t_corr_s: self.t_corr_s };
+        let perfect = self.worst(&start.times([NONE; IMU_PARAMETERS]))?;
+        if perfect.margin() <= 0.0 {
+            return Err(RequireError::Floor { limit: perfect.limit, value: perfect.value });
+        }
+        let mut imu = self.at_limit(&start, [1.0; IMU_PARAMETERS])?.1;
+        for _ in 0..ROUNDS {
+            let (worst, squares) = self.squares(&imu)?;
+            let total: f64 = squares.iter().sum();
+            // what the limit leaves when GNSS and start have taken their part
+            let allowed = total * (2.0 * worst.margin()).exp() - squares[IMU_PARAMETERS];
+            let quarter = allowed.max(0.05 * total) / IMU_PARAMETERS as f64;
+            let off: [f64; IMU_PARAMETERS] = std::array::from_fn(|i| (quarter / squares[i]).ln());
+            if off.iter().all(|x| x.abs() < EVEN) {
+                break;
+            }
+            imu = imu.times(off.map(|x| (DAMPING * x).clamp(-1.0, 1.0).exp()));
+        }
+        imu = self.at_limit(&imu, [1.0; IMU_PARAMETERS])?.1;
+        let (_, squares) = self.squares(&imu)?;
+        let total: f64 = squares.iter().sum();
+        Ok((imu, squares.map(|s| s / total)))
+    }
+
+    /// What an intensity may be where the others are multiplied by `others`.
+    ///
+    /// # Errors
+    /// When the model has no filter.
+    pub fn alone(&self, imu: &ImuParameters, which: usize, others: f64) -> Result<Answer, BeliefError> {
+        let base = imu.times(std::array::from_fn(|i| if i == which { 1.0 } else { others }));
+        let mut varied = [0.0; IMU_PARAMETERS];
+        varied[which] = 1.0;
+        let (margin, found) = self.at_limit(&base, varied)?;
+        Ok(match margin {
+            m if m.abs() <= 10.0 * EXACT => Answer::AtMost(found.values[which]),
+            m if m > 0.0 => Answer::Any,
+            _ => Answer::Never,
+        })
+    }
+
+    /// As [`Self::alone`], the others as good as none.
+    ///
+    /// # Errors
+    /// When the model has no filter.
+    pub fn quite_alone(&self, imu: &ImuParameters, which: usize) -> Result<Answer, BeliefError> {
+        self.alone(imu, which, NONE)
+    }
+
+    /// For `count` biases of the gyroscope, from a tenth of the allocated to the largest that leaves anything.
+    ///
+    /// # Errors
+    /// When the model has no filter.
+    pub fn iso_drift(&self, imu: &ImuParameters, count: u32) -> Result<IsoDrift, BeliefError> {
+        let largest = match self.alone(&imu.times([NONE, 1.0, 1.0, 1.0]), 3, 1.0)? {
+            Answer::AtMost(bias) => 0.99 * bias,
+            Answer::Any | Answer::Never => imu.values[3],
+        };
+        let smallest = 0.1 * imu.values[3];
+        let point = |k: u32| {
+            let bias = smallest * (largest / smallest).powf(f64::from(k) / f64::from(count.max(2) - 1));
+            let beside = imu.times([1.0, 1.0, 1.0, bias / imu.values[3]]);
+            Ok((bias, self.alone(&beside, 0, 1.0)?))
+        };
+        Ok(IsoDrift { points: (0..count).map(point).collect::<Result<_, BeliefError>>()? })
+    }
+
+    fn worst(&self, imu: &ImuParameters) -> Result<Worst, BeliefError> {
+        self.course.worst(self.scenario, &imu.model(self.scenario.imu.rate_hz), self.limits)
+    }
+
+    /// The IMU whose intensities with a weight are multiplied until the hardest limit is met, and the margin that is
+    /// left: not zero where no factor within the range meets it.
+    fn at_limit(
+        &self,
+        imu: &ImuParameters,
+        weights: [f64; IMU_PARAMETERS],
+    ) -> Result<(f64, ImuParameters), BeliefError> {
+        let at = |ln: f64| imu.times(weights.map(|w| (w * ln).exp()));
+        let crossing = Crossing { bounds: (-RANGE, RANGE), step: 0.7, exact: EXACT };
+        let (ln, margin) = crossing.from(0.0, |ln| Ok::<_, BeliefError>(self.worst(&at(ln))?.margin()))?;
+        Ok((margin, at(ln)))
+    }
+
+    /// Mean squares of the four sources and of everything else in what is limited the hardest.
+    fn squares(&self, imu: &ImuParameters) -> Result<(Worst, [f64; IMU_PARAMETERS + 1]), BeliefError> {
+        let worst = self.worst(imu)?;
+        let model = imu.model(self.scenario.imu.rate_hz);
+        let group = |name: &str| {
+            ImuParameters::SOURCES.iter().position(|source| *source == name).unwrap_or(IMU_PARAMETERS)
+        };
+        let parts = self.course.parts(worst.place, self.scenario, &model, &group, IMU_PARAMETERS + 1)?;
+        Ok((worst, std::array::from_fn(|i| parts[i].square(worst.limit.quantity))))
+    }
+}

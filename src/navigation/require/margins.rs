@@ -1,0 +1,126 @@
+//! By how much a given IMU keeps a limit or misses it, and what of it decides.
+
+use super::{Course, Limit, Worst};
+use crate::ekf::BeliefError;
+use crate::imu::{Channel, Sensor};
+use crate::noise::{Model, Process};
+use crate::scenario::Scenario;
+use crate::simulation::lincov::{Crossing, times};
+
+/// A part of an IMU's noise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Group {
+    /// Whose.
+    pub sensor: Sensor,
+    /// Whether it is what is correlated, or what is new in every sample.
+    pub correlated: bool,
+}
+
+impl Group {
+    /// All four.
+    pub const ALL: [Self; 4] = [
+        Self { sensor: Sensor::Accel, correlated: false },
+        Self { sensor: Sensor::Accel, correlated: true },
+        Self { sensor: Sensor::Gyro, correlated: false },
+        Self { sensor: Sensor::Gyro, correlated: true },
+    ];
+
+    /// `gyro, correlated`
+    #[must_use]
+    pub fn name(self) -> String {
+        format!("{}, {}", self.sensor.name(), if self.correlated { "correlated" } else { "white" })
+    }
+
+    const fn has(process: &Process) -> bool {
+        matches!(
+            process,
+            Process::Ar1(_) | Process::GaussMarkov(_) | Process::RandomWalk(_) | Process::Drift(_)
+        )
+    }
+
+    /// Whether a source of errors, by its name, belongs to it.
+    fn includes(self, source: &str) -> bool {
+        let Some((sensor, process)) = source.split_once('.') else {
+            return false;
+        };
+        let is_correlated = ["AR1", "GM", "RW"].iter().any(|code| process.starts_with(code));
+        let is_white = ["WN", "QN", "MA1"].iter().any(|code| process.starts_with(code));
+        sensor == self.sensor.name() && if self.correlated { is_correlated } else { is_white }
+    }
+
+    /// The model with this part's standard deviations multiplied.
+    fn multiplied(self, model: &Model, factor: f64) -> Model {
+        let mut changed = model.clone();
+        for channel in Channel::ALL.into_iter().filter(|c| c.sensor == self.sensor) {
+            for process in &mut changed.axes[channel.index()].processes {
+                if Self::has(process) == self.correlated {
+                    *process = times(process, factor * factor, model.rate_hz);
+                }
+            }
+        }
+        changed
+    }
+}
+
+/// What a part of an IMU's noise does to a limit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GroupMargin {
+    /// Which part.
+    pub group: Group,
+    /// Its share in the mean square of what is limited.
+    pub share: f64,
+    /// The factor on its standard deviations that alone meets the limit exactly; none where none does: too little or
+    /// too much whatever it is.
+    pub factor: Option<f64>,
+}
+
+/// How an IMU stands to its limits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Margins {
+    /// The hardest limit.
+    pub worst: Worst,
+    /// The parts of the IMU that it has.
+    pub groups: Vec<GroupMargin>,
+    /// Share of GNSS, start and what the noise model does not have (turn-on biases).
+    pub rest: f64,
+}
+
+/// How far a factor is sought, as a logarithm.
+const RANGE: f64 = 9.0;
+
+impl Margins {
+    /// Of the filter that knows the model.
+    ///
+    /// # Errors
+    /// When the model has no such filter.
+    pub fn of(
+        course: &Course<'_>,
+        scenario: &Scenario,
+        model: &Model,
+        limits: &[Limit],
+    ) -> Result<Self, BeliefError> {
+        let worst = course.worst(scenario, model, limits)?;
+        let group = |name: &str| Group::ALL.iter().position(|g| g.includes(name)).unwrap_or(Group::ALL.len());
+        let parts = course.parts(worst.place, scenario, model, &group, Group::ALL.len() + 1)?;
+        let squares: Vec<f64> = parts.iter().map(|part| part.square(worst.limit.quantity)).collect();
+        let total: f64 = squares.iter().sum();
+        let mut groups = Vec::new();
+        for (group, square) in Group::ALL.into_iter().zip(&squares).filter(|(_, square)| **square > 0.0) {
+            let margin = |ln: f64| {
+                let changed = group.multiplied(model, ln.exp());
+                Ok::<_, BeliefError>(course.worst(scenario, &changed, limits)?.margin())
+            };
+            let (ln, left) =
+                Crossing { bounds: (-RANGE, RANGE), step: 0.7, exact: 1e-3 }.from(0.0, margin)?;
+            let factor = (left.abs() <= 1e-2).then(|| ln.exp());
+            groups.push(GroupMargin { group, share: square / total, factor });
+        }
+        Ok(Self { worst, groups, rest: squares[Group::ALL.len()] / total })
+    }
+
+    /// Whether the limits are kept.
+    #[must_use]
+    pub fn met(&self) -> bool {
+        self.worst.margin() >= 0.0
+    }
+}

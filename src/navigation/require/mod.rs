@@ -1,0 +1,95 @@
+//! Which IMU a limit on the errors at an outage's end needs, and by how much a given one keeps it.
+//!
+//! Everything here is linear covariance analysis of the filter that knows its IMU: a state for every process, gains
+//! to match. Errors grow with every intensity, so that each answer is where a monotone function crosses zero.
+
+mod course;
+mod imu;
+mod margins;
+
+pub use course::{Course, Detail, Drift, evenly};
+pub use imu::{Answer, IMU_PARAMETERS, ImuParameters, IsoDrift, Need};
+pub use margins::{Group, GroupMargin, Margins};
+
+use crate::ekf::BeliefError;
+
+/// What is limited at the end of an outage.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Median of the horizontal error (m).
+    P50,
+    /// 95 % quantile of the horizontal error (m).
+    P95,
+    /// Root mean square of the horizontal error (m).
+    Rmse,
+    /// RMSE of roll, pitch or yaw (degrees): 0, 1, 2.
+    Angle(usize),
+}
+
+impl Quantity {
+    /// Its name, unit included.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::P50 => "p50_m",
+            Self::P95 => "p95_m",
+            Self::Rmse => "rmse_m",
+            Self::Angle(0) => "roll_deg",
+            Self::Angle(1) => "pitch_deg",
+            Self::Angle(_) => "yaw_deg",
+        }
+    }
+}
+
+/// A quantity and the most it may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limit {
+    /// Which.
+    pub quantity: Quantity,
+    /// How much (its unit).
+    pub most: f64,
+}
+
+/// The limit that is the hardest to keep, and where.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Worst {
+    /// Which limit.
+    pub limit: Limit,
+    /// The error there.
+    pub value: f64,
+    /// At which place of the outage, counted from 0.
+    pub place: usize,
+}
+
+impl Worst {
+    /// Logarithm of limit over error: above 0 there is a reserve.
+    #[must_use]
+    pub fn margin(&self) -> f64 {
+        (self.limit.most / self.value).ln()
+    }
+
+    /// The hardest of some limits for the errors at several places; none without limits or places.
+    #[must_use]
+    pub fn of(limits: &[Limit], drifts: &[Drift]) -> Option<Self> {
+        let each = drifts.iter().enumerate().flat_map(|(place, drift)| {
+            limits.iter().map(move |limit| Self { limit: *limit, value: drift.value(limit.quantity), place })
+        });
+        each.min_by(|a, b| a.margin().total_cmp(&b.margin()))
+    }
+}
+
+/// Why there is no answer.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum RequireError {
+    /// Not even an IMU without errors keeps a limit.
+    #[error("no IMU keeps {} ≤ {}: without any error of it, it is {value:.3}, from GNSS and the start", .limit.quantity.name(), .limit.most)]
+    Floor {
+        /// The limit.
+        limit: Limit,
+        /// The error with a perfect IMU.
+        value: f64,
+    },
+    /// The model has no filter.
+    #[error(transparent)]
+    Belief(#[from] BeliefError),
+}

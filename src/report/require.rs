@@ -1,0 +1,299 @@
+//! What a limit needs of an IMU, and what a given one makes of it, on one screen and as JSON.
+
+use super::number::{readable, seconds};
+use crate::require::{Answer, GroupMargin, IMU_PARAMETERS, ImuParameters, IsoDrift, Limit, Margins, Worst};
+use crate::sensors::outage::Outage;
+use serde_json::{Value, json};
+
+/// Lengths of an outage in the table of units (s).
+pub const CURVE_S: [u32; 7] = [1, 3, 10, 30, 60, 120, 300];
+
+/// The IMU that a limit needs.
+#[derive(Debug, Clone)]
+pub struct NeededImu {
+    /// With equal shares.
+    pub imu: ImuParameters,
+    /// The shares at the limit, and that of GNSS and start.
+    pub shares: [f64; IMU_PARAMETERS + 1],
+    /// What each intensity may be if there were no other.
+    pub alone: [Answer; IMU_PARAMETERS],
+    /// What each may be if the others are ten times better.
+    pub others_better: [Answer; IMU_PARAMETERS],
+    /// The curve of equal drift.
+    pub iso_drift: Option<IsoDrift>,
+}
+
+/// The longest outage that keeps the limits.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Longest {
+    /// So long (s).
+    Seconds(f64),
+    /// All that was looked at (s).
+    AtLeast(f64),
+}
+
+/// A unit of a catalogue.
+#[derive(Debug, Clone)]
+pub struct RankedUnit {
+    /// Its name.
+    pub name: String,
+    /// The hardest limit for the outage asked for.
+    pub worst: Worst,
+    /// The quantity of that limit, at its worst place, after [`CURVE_S`]; none where the trajectory is too short.
+    pub curve: [Option<f64>; CURVE_S.len()],
+    /// The longest outage within the limits.
+    pub longest: Longest,
+}
+
+/// What was asked, and where.
+#[derive(Debug, Clone)]
+pub struct Question {
+    /// The limits.
+    pub limits: Vec<Limit>,
+    /// The places of the outage.
+    pub outages: Vec<Outage>,
+}
+
+impl Question {
+    /// `p95_m ≤ 5 after 60 s without fixes (from 300 s on)`
+    #[must_use]
+    pub fn in_words(&self) -> String {
+        let first = self.outages[0];
+        let places = match self.outages.as_slice() {
+            [_] => format!("from {} s on", seconds(first.start_s)),
+            several => {
+                let starts: Vec<String> = several.iter().map(|o| seconds(o.start_s)).collect();
+                format!("from {} s on, the worst of which counts", starts.join(", "))
+            }
+        };
+        let length = seconds(first.end_s - first.start_s);
+        format!("{} after {length} s without fixes ({places})", self.limits_in_words())
+    }
+
+    fn limits_in_words(&self) -> String {
+        let limit = |l: &Limit| format!("{} ≤ {}", l.quantity.name(), readable(l.most));
+        self.limits.iter().map(limit).collect::<Vec<_>>().join(", ")
+    }
+
+    fn json(&self) -> Value {
+        let limit = |l: &Limit| json!({ "quantity": l.quantity.name(), "most": l.most });
+        let outage = |o: &Outage| json!({ "start_s": o.start_s, "end_s": o.end_s });
+        json!({
+            "limits": self.limits.iter().map(limit).collect::<Vec<_>>(),
+            "outages": self.outages.iter().map(outage).collect::<Vec<_>>(),
+        })
+    }
+
+    fn worst(&self, worst: &Worst) -> String {
+        let outage = self.outages.get(worst.place).unwrap_or(&self.outages[0]);
+        format!(
+            "{} {} at the end of the outage {}–{} s",
+            worst.limit.quantity.name(),
+            readable(worst.value),
+            seconds(outage.start_s),
+            seconds(outage.end_s)
+        )
+    }
+}
+
+fn answer(which: usize, found: &Answer) -> String {
+    match found {
+        Answer::AtMost(value) => readable(ImuParameters::in_datasheets(which, *value)),
+        Answer::Any => "any".to_owned(),
+        Answer::Never => "–".to_owned(),
+    }
+}
+
+fn answer_json(which: usize, found: &Answer) -> Value {
+    match found {
+        Answer::AtMost(value) => json!(ImuParameters::in_datasheets(which, *value)),
+        Answer::Any => json!("any"),
+        Answer::Never => Value::Null,
+    }
+}
+
+fn share(x: f64) -> String {
+    format!("{:.0} %", 100.0 * x)
+}
+
+impl NeededImu {
+    /// What is needed, in a sentence.
+    #[must_use]
+    pub fn verdict(&self, question: &Question) -> String {
+        format!(
+            "needed for {}: an IMU as allocated below (biases with a correlation time of {} s); GNSS and the start \
+             take {} of the variance",
+            question.in_words(),
+            readable(self.imu.t_corr_s),
+            share(self.shares[IMU_PARAMETERS])
+        )
+    }
+
+    /// The figures, and the curve of equal drift if it was asked for.
+    #[must_use]
+    pub fn tables(&self) -> Vec<Vec<Vec<String>>> {
+        let head = ["figure, at most", "allocated", "share", "if alone", "others 10 × better"];
+        let mut rows = vec![head.map(str::to_owned).to_vec()];
+        for i in 0..IMU_PARAMETERS {
+            rows.push(vec![
+                ImuParameters::NAMES[i].to_owned(),
+                answer(i, &Answer::AtMost(self.imu.values[i])),
+                share(self.shares[i]),
+                answer(i, &self.alone[i]),
+                answer(i, &self.others_better[i]),
+            ]);
+        }
+        let mut tables = vec![rows];
+        if let Some(curve) = &self.iso_drift {
+            let mut rows = vec![vec![ImuParameters::NAMES[3].to_owned(), ImuParameters::NAMES[0].to_owned()]];
+            let row = |(bias, walk): &(f64, Answer)| vec![answer(3, &Answer::AtMost(*bias)), answer(0, walk)];
+            rows.extend(curve.points.iter().map(row));
+            tables.push(rows);
+        }
+        tables
+    }
+
+    /// All of it.
+    #[must_use]
+    pub fn json(&self, question: &Question) -> String {
+        let figure = |i: usize| {
+            json!({
+                "figure": ImuParameters::NAMES[i],
+                "allocated": ImuParameters::in_datasheets(i, self.imu.values[i]),
+                "share": self.shares[i],
+                "alone": answer_json(i, &self.alone[i]),
+                "others_10_times_better": answer_json(i, &self.others_better[i]),
+            })
+        };
+        let point = |(bias, walk): &(f64, Answer)| {
+            json!([ImuParameters::in_datasheets(3, *bias), answer_json(0, walk)])
+        };
+        super::json(&json!({
+            "schema_version": 1,
+            "question": question.json(),
+            "t_corr_s": self.imu.t_corr_s,
+            "figures": (0..IMU_PARAMETERS).map(figure).collect::<Vec<_>>(),
+            "share_of_gnss_and_start": self.shares[IMU_PARAMETERS],
+            "iso_drift": self.iso_drift.as_ref().map(|c| c.points.iter().map(point).collect::<Vec<_>>()),
+        }))
+    }
+}
+
+impl Longest {
+    fn in_words(self) -> String {
+        match self {
+            Self::Seconds(s) => format!("{} s", seconds(s)),
+            Self::AtLeast(s) => format!("at least {} s", seconds(s)),
+        }
+    }
+
+    fn json(self) -> Value {
+        match self {
+            Self::Seconds(s) => json!({ "longest_s": s }),
+            Self::AtLeast(s) => json!({ "at_least_s": s }),
+        }
+    }
+}
+
+/// The longest outage, in a sentence.
+#[must_use]
+pub fn longest_verdict(longest: Longest, question: &Question) -> String {
+    format!("longest outage within the limits: {} ({})", longest.in_words(), question.limits_in_words())
+}
+
+/// The longest outage.
+#[must_use]
+pub fn longest_json(longest: Longest, question: &Question) -> String {
+    super::json(&json!({ "schema_version": 1, "question": question.json(), "outage": longest.json() }))
+}
+
+/// Whether a model keeps its limits, in a sentence.
+#[must_use]
+pub fn margins_verdict(margins: &Margins, question: &Question, longest: Longest) -> String {
+    let times = readable(margins.worst.value / margins.worst.limit.most);
+    let word = if margins.met() { "met" } else { "NOT met" };
+    format!(
+        "{word}: {}; {}, {times} of the limit; longest outage within the limits: {}",
+        question.in_words(),
+        question.worst(&margins.worst),
+        longest.in_words()
+    )
+}
+
+/// A row for each part of the IMU.
+#[must_use]
+pub fn margins_rows(margins: &Margins) -> Vec<Vec<String>> {
+    let mut rows = vec![
+        ["part of the error", "share", "factor on its sigma that alone meets the limit"]
+            .map(str::to_owned)
+            .to_vec(),
+    ];
+    let largest = margins.groups.iter().map(|g| g.share).fold(0.0, f64::max);
+    let binding = |g: &GroupMargin| if g.share == largest { " (binding)" } else { "" };
+    for g in &margins.groups {
+        let factor = match g.factor {
+            Some(f) if f >= 1.0 => format!("× {} (slack: so much worse it may be)", readable(f)),
+            Some(f) => format!("× {}", readable(f)),
+            None if margins.met() => "any value".to_owned(),
+            None => "none: the rest is too large".to_owned(),
+        };
+        rows.push(vec![format!("{}{}", g.group.name(), binding(g)), share(g.share), factor]);
+    }
+    rows.push(vec!["GNSS, start, turn-on biases".to_owned(), share(margins.rest), String::new()]);
+    rows
+}
+
+/// All of it.
+#[must_use]
+pub fn margins_json(margins: &Margins, question: &Question, longest: Longest) -> String {
+    let group = |g: &GroupMargin| json!({ "part": g.group.name(), "share": g.share, "factor": g.factor });
+    super::json(&json!({
+        "schema_version": 1,
+        "question": question.json(),
+        "met": margins.met(),
+        "quantity": margins.worst.limit.quantity.name(),
+        "value": margins.worst.value,
+        "limit": margins.worst.limit.most,
+        "place": margins.worst.place,
+        "groups": margins.groups.iter().map(group).collect::<Vec<_>>(),
+        "share_of_the_rest": margins.rest,
+        "outage": longest.json(),
+    }))
+}
+
+/// The units of a catalogue, the best first.
+#[must_use]
+pub fn catalogue_rows(units: &[RankedUnit]) -> Vec<Vec<String>> {
+    let name = units.first().map_or("", |u| u.worst.limit.quantity.name());
+    let mut head = vec!["unit".to_owned(), "limit".to_owned(), "longest outage".to_owned()];
+    head.extend(CURVE_S.iter().map(|s| format!("{name} at {s} s")));
+    let row = |unit: &RankedUnit| {
+        let met = if unit.worst.margin() >= 0.0 { "met" } else { "not met" };
+        let mut row = vec![unit.name.clone(), met.to_owned(), unit.longest.in_words()];
+        row.extend(unit.curve.iter().map(|x| x.map_or_else(|| "–".to_owned(), readable)));
+        row
+    };
+    std::iter::once(head).chain(units.iter().map(row)).collect()
+}
+
+/// All of it.
+#[must_use]
+pub fn catalogue_json(units: &[RankedUnit], question: &Question) -> String {
+    let unit = |u: &RankedUnit| {
+        let curve: Vec<Value> =
+            CURVE_S.iter().zip(&u.curve).map(|(s, x)| json!({ "outage_s": s, "value": x })).collect();
+        json!({
+            "unit": u.name,
+            "met": u.worst.margin() >= 0.0,
+            "quantity": u.worst.limit.quantity.name(),
+            "value": u.worst.value,
+            "outage": u.longest.json(),
+            "curve": curve,
+        })
+    };
+    super::json(&json!({
+        "schema_version": 1,
+        "question": question.json(),
+        "units": units.iter().map(unit).collect::<Vec<_>>(),
+    }))
+}

@@ -1,0 +1,70 @@
+//! `require` as a user runs it.
+
+use assert_cmd::Command;
+use serde_json::Value;
+use std::path::Path;
+
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+
+fn require(dir: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
+    let trajectory = format!("{ROOT}/trajectories/figure_eight.toml");
+    let mut command = Command::cargo_bin("nav-sim").unwrap();
+    command.current_dir(dir).args(["require", &trajectory]).args(arguments).assert()
+}
+
+fn stdout(assert: &assert_cmd::assert::Assert) -> String {
+    String::from_utf8(assert.get_output().stdout.clone()).unwrap()
+}
+
+#[test]
+fn the_imu_that_is_named_meets_the_limit_and_a_tighter_one_not() {
+    let dir = tempfile::tempdir().unwrap();
+    let outage = ["--outage", "60:90"];
+    let asked = ["--p95-m", "10", "-o", "needed.toml", "--format", "json"];
+    let found = require(dir.path(), &[&outage[..], &asked].concat()).success();
+    let found: Value = serde_json::from_str(&stdout(&found)).unwrap();
+    assert_eq!(found["figures"].as_array().unwrap().len(), 4);
+    let given =
+        |limit: &str| require(dir.path(), &[&["needed.toml"], &outage[..], &["--p95-m", limit]].concat());
+    let met = stdout(&given("10.1").success());
+    assert!(met.starts_with("met: p95_m ≤ 10.1 after 30 s") && met.contains("(binding)"), "{met}");
+    let missed = stdout(&given("9.9").code(3));
+    assert!(missed.starts_with("NOT met") && missed.lines().count() <= 20, "{missed}");
+    // the outage that it bridges is the one that it was made for, to the second
+    let longest =
+        require(dir.path(), &["needed.toml", "--outage", "60:61", "--p95-m", "10", "--format", "json"]);
+    let longest: Value = serde_json::from_str(&stdout(&longest.success())).unwrap();
+    let seconds = longest["outage"]["longest_s"].as_f64().unwrap();
+    assert!((29.0..=31.0).contains(&seconds), "{longest}");
+}
+
+#[test]
+fn a_directory_of_models_is_ranked() {
+    let dir = tempfile::tempdir().unwrap();
+    let units = dir.path().join("units");
+    std::fs::create_dir(&units).unwrap();
+    for name in ["consumer_mems", "tactical"] {
+        let file = format!("{name}.toml");
+        std::fs::copy(format!("{ROOT}/calib_data/{file}"), units.join(file)).unwrap();
+    }
+    let ranked = require(dir.path(), &["--outage", "30", "--p95-m", "20", "--catalogue", "units"]).success();
+    let shown = stdout(&ranked);
+    let place = |name: &str| shown.find(name).unwrap();
+    assert!(place("tactical") < place("consumer_mems") && shown.contains("p95_m at 30 s"), "{shown}");
+}
+
+#[test]
+fn requests_that_mean_nothing_are_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let refused = |arguments: &[&str], words: [&str; 2]| {
+        let output = require(dir.path(), arguments).code(2);
+        let said = String::from_utf8(output.get_output().stderr.clone()).unwrap();
+        assert!(words.iter().all(|word| said.contains(word)), "{said}");
+    };
+    refused(&["--outage", "30"], ["no limit is given", "hint: give one, such as --p95-m 5"]);
+    refused(&["--outage", "longest", "--p95-m", "5"], ["needs a MODEL", "hint"]);
+    refused(&["--outage", "1e5", "--p95-m", "5"], ["is not on the trajectory", "a shorter --outage"]);
+    refused(&["--outage", "60:90", "--p95-m", "0.01"], ["no IMU keeps p95_m ≤ 0.01", "a larger limit"]);
+    let model = format!("{ROOT}/calib_data/tactical.toml");
+    refused(&[&model, "--outage", "30", "--p95-m", "5", "-o", "x.toml"], ["cannot be used with", "--out"]);
+}

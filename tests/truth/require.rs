@@ -1,0 +1,106 @@
+//! The IMU that a limit needs meets it in sampled runs, and answers are monotone.
+
+use nav_sim::monte_carlo;
+use nav_sim::require::{
+    Answer, Course, Detail, IMU_PARAMETERS, Limit, Margins, Need, Quantity, RequireError,
+};
+use nav_sim::scenario::Scenario;
+use nav_sim::sensors::imu::Truth;
+use nav_sim::sensors::outage::Outage;
+use nav_sim::trajectory::Trajectory;
+use nav_sim::trajectory::profile::{Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning};
+
+const OUTAGE: Outage = Outage { start_s: 150.0, end_s: 190.0 };
+
+/// Three minutes of town traffic.
+fn trajectory() -> Trajectory {
+    let faster = |to_speed: f64| Kind::Accelerate { to_speed, by: Acceleration::Duration(10.0) };
+    let turn = |deg: f64| Kind::Turn { angle: deg.to_radians(), by: Turning::Duration(9.0) };
+    let block = [faster(14.0), Kind::Straight(Length::Duration(14.0)), turn(90.0), faster(6.0), turn(-60.0)];
+    let segments = block.into_iter().cycle().take(20);
+    let segments = segments.map(|kind| Segment { kind, climb_m: 0.0, ramp_s: None }).collect();
+    let start = Start { t_s: 0.0, lat: 0.8, lon: 0.1, h: 0.0, heading: 0.7, speed: 0.0 };
+    Profile { start, bank: Bank::None, ramp_s: 1.0, segments }.build().unwrap()
+}
+
+fn limit(quantity: Quantity, most: f64) -> [Limit; 1] {
+    [Limit { quantity, most }]
+}
+
+/// 400 runs of the filter with all states: the share within the 95 % quantile that was asked for is 0.95 within four
+/// standard errors of a binomial share, 4 √(0.95·0.05/400) = 0.044; each intensity has its quarter; and the factor
+/// that alone meets the limit is 1 for each part of the IMU that meets it.
+#[test]
+fn the_imu_that_is_named_meets_the_limit_in_sampled_runs() {
+    let (scenario, trajectory) = (Scenario::default(), trajectory());
+    let course = Course::new(&scenario, &trajectory, &[OUTAGE], Detail::End).unwrap();
+    let limits = limit(Quantity::P95, 12.0);
+    let need = Need { course: &course, scenario: &scenario, limits: &limits, t_corr_s: 300.0 };
+    let (imu, shares) = need.allocated().unwrap();
+    let quarter = (1.0 - shares[IMU_PARAMETERS]) / 4.0;
+    assert!(shares[..IMU_PARAMETERS].iter().all(|share| (share / quarter - 1.0).abs() < 0.1), "{shares:?}");
+    let model = imu.model(scenario.imu.rate_hz);
+    let full = scenario.with_full_noise();
+    let track = scenario.track(&trajectory, &model, &[OUTAGE]).unwrap();
+    let beliefs = [full.belief(&model, &[OUTAGE], &track).unwrap()];
+    let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &beliefs, &[OUTAGE], 5);
+    let result = &monte_carlo::run(&experiment, 400, &|_| {}).unwrap()[0];
+    let within = result.runs.iter().filter(|r| r.outages[0].horizontal_error_end_m <= 12.0).count();
+    assert!((within as f64 / 400.0 - 0.95).abs() < 0.044, "{within} of 400, {imu:?}");
+    let margins = Margins::of(&course, &scenario, &model, &limits).unwrap();
+    assert!((margins.worst.value / 12.0 - 1.0).abs() < 1e-3 && margins.groups.len() == 4, "{margins:?}");
+    assert!(margins.groups.iter().all(|g| g.factor.is_some_and(|f| (f - 1.0).abs() < 0.02)), "{margins:?}");
+}
+
+/// A tighter limit needs a better IMU in every intensity; one intensity alone may be larger than beside others; on the
+/// curve of equal drift a larger bias leaves less white noise.
+#[test]
+fn answers_are_monotone() {
+    let (scenario, trajectory) = (Scenario::default(), trajectory());
+    let course = Course::new(&scenario, &trajectory, &[OUTAGE], Detail::End).unwrap();
+    let limits = [limit(Quantity::P95, 30.0), limit(Quantity::P95, 10.0)];
+    let need = |k: usize| Need { course: &course, scenario: &scenario, limits: &limits[k], t_corr_s: 300.0 };
+    let [loose, tight] = [0, 1].map(|k| need(k).allocated().unwrap().0);
+    assert!(loose.values.iter().zip(tight.values).all(|(l, t)| *l > t), "{loose:?} {tight:?}");
+    for i in 0..IMU_PARAMETERS {
+        let beside = need(0).alone(&loose, i, 0.1).unwrap();
+        let alone = need(0).quite_alone(&loose, i).unwrap();
+        let (Answer::AtMost(beside), Answer::AtMost(alone)) = (beside, alone) else {
+            panic!("{beside:?} {alone:?}")
+        };
+        assert!(loose.values[i] < beside && beside <= alone, "{i}: {} {beside} {alone}", loose.values[i]);
+    }
+    let curve = need(0).iso_drift(&loose, 4).unwrap().points;
+    let walks: Vec<f64> = curve
+        .iter()
+        .map(|(_, walk)| if let Answer::AtMost(walk) = walk { *walk } else { panic!("{curve:?}") })
+        .collect();
+    assert!(walks.windows(2).all(|w| w[1] < w[0]) && curve.windows(2).all(|c| c[1].0 > c[0].0), "{curve:?}");
+}
+
+#[test]
+fn what_gnss_alone_misses_is_refused() {
+    let (scenario, trajectory) = (Scenario::default(), trajectory());
+    let course = Course::new(&scenario, &trajectory, &[OUTAGE], Detail::End).unwrap();
+    let limits = limit(Quantity::Rmse, 0.05);
+    let need = Need { course: &course, scenario: &scenario, limits: &limits, t_corr_s: 300.0 };
+    let Err(RequireError::Floor { value, .. }) = need.allocated() else { panic!("an IMU for 5 cm") };
+    assert!(value > 0.05);
+}
+
+/// The error after a part of a long outage is that at the end of a short one, to what coarse steps change.
+#[test]
+fn a_curve_holds_the_ends_of_all_shorter_outages() {
+    let (scenario, trajectory) = (Scenario::default(), trajectory());
+    let limits = limit(Quantity::P95, 20.0);
+    let course = |end_s: f64, detail| {
+        Course::new(&scenario, &trajectory, &[Outage { end_s, ..OUTAGE }], detail).unwrap()
+    };
+    let at_end = course(170.0, Detail::End);
+    let need = Need { course: &at_end, scenario: &scenario, limits: &limits, t_corr_s: 300.0 };
+    let model = need.allocated().unwrap().0.model(scenario.imu.rate_hz);
+    let curve = &course(190.0, Detail::Seconds).curves(&scenario, &model).unwrap()[0];
+    let short = curve.iter().find(|drift| drift.after_s == 20.0).unwrap();
+    assert!((short.value(Quantity::P95) / 20.0 - 1.0).abs() < 5e-3, "{short:?}");
+    assert!(curve.last().is_some_and(|drift| drift.after_s == 40.0) && curve.len() == 40);
+}
