@@ -12,7 +12,7 @@
 
 use super::{Datasheet, Entry, Figure, Quantity};
 use crate::formats::error::{FileError, Kind};
-use crate::formats::scenario_file::explained;
+use crate::formats::toml_described;
 use crate::formats::toml_file::{Source, unknown_key};
 use crate::imu::Sensor;
 use serde::Deserialize;
@@ -90,7 +90,7 @@ pub fn catalogued(name: &str) -> Option<Result<Datasheet, FileError>> {
 }
 
 pub(super) fn parse(source: &Source) -> Result<Datasheet, FileError> {
-    let file: File = toml::from_str(source.text()).map_err(|e| explained(&e, source))?;
+    let file: File = toml_described::read(source)?;
     let mut entries = Vec::new();
     for (sensor, table) in [(Sensor::Accel, file.accel), (Sensor::Gyro, file.gyro)] {
         for (key, given) in table {

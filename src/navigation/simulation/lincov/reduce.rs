@@ -100,7 +100,7 @@ const ENOUGH: f64 = 2e-4;
 /// Share of the outage ends in the cost.
 const ENDS: f64 = 0.3;
 /// A ratio whose logarithm is this far from 0 begins to count for itself, with this weight.
-const OFF: f64 = 0.1;
+const OFF: f64 = 0.08;
 const OFF_WEIGHT: f64 = 0.3;
 
 /// The divergence at the outage ends and on the average; a single state whose ratio is a tenth off counts beside
