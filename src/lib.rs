@@ -43,11 +43,11 @@ pub use nav_sim_signal::{bibliography, imu, noise, rng, units, wavelet};
 
 // Parameters for other programs.
 pub mod export;
-// The engine of studies.
-pub mod study;
 // Words and pages.
 pub mod report;
 // Files.
 pub mod formats;
+// The engine of studies.
+pub mod study;
 // What a command does, as one call.
 pub mod jobs;

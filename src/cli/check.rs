@@ -2,9 +2,7 @@
 
 use super::{Failure, Session, parse, read};
 use nav_sim::formats::fusion_files::{read_gnss, read_imu, read_initial};
-use nav_sim::formats::{
-    contamination_file, curve_file, efficiency_file, parameters_file, scenario_file, study_file,
-};
+use nav_sim::formats::{contamination_file, curve_file, efficiency_file, parameters_file, scenario_file};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -78,7 +76,7 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
             Ok(format!("a scenario of {} runs", scenario.run.runs))
         }
         Kind::Study => {
-            let study = study_file::read(path)?.study;
+            let study = nav_sim::study::file::read(path)?.study;
             let (candidates, sets) = (study.candidates().len(), study.outage_sets().map_or(0, |s| s.len()));
             Ok(format!("a study of {candidates} candidates, {sets} outage sets, {} runs each", study.runs))
         }

@@ -1,9 +1,9 @@
 //! `nav-sim compare`: ratios between runs.
 
 use super::{Failure, Session};
-use comfy_table::{ContentArrangement, Table, presets};
 use nav_sim::formats::{atomic, run_directory};
 use nav_sim::metrics;
+pub(super) use nav_sim::report::markdown_table as table;
 use nav_sim::report::{self, CandidateResult, ComparisonFile, Label, Manifest};
 use nav_sim::scenario::Method;
 use nav_sim::simulation::REPORTED_NAMES;
@@ -171,31 +171,4 @@ fn truth(manifest: &Manifest) -> Vec<&str> {
 
 fn same_place(a: &Path, b: &Path) -> bool {
     a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
-}
-
-/// A table whose first row is its head, as text that is Markdown too.
-pub(super) fn table(rows: &[Vec<String>]) -> String {
-    let mut table = Table::new();
-    table.load_style(presets::ASCII_MARKDOWN).set_content_arrangement(ContentArrangement::Disabled);
-    let escaped = |row: &Vec<String>| row.iter().map(|cell| markdown(cell)).collect::<Vec<_>>();
-    if let Some((head, rows)) = rows.split_first() {
-        table.set_header(escaped(head)).add_rows(rows.iter().map(escaped));
-    }
-    table.to_string()
-}
-
-/// A text in Markdown, of which no part is taken for a cell's end, a line's end or HTML.
-pub(super) fn markdown(text: &str) -> String {
-    text.replace('|', "\\|").replace('<', "&lt;").replace(['\n', '\r'], " ")
-}
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    fn names_stay_in_their_cells() {
-        let rows = [vec!["run".to_owned()], vec!["a|b\n<script>".to_owned()]];
-        let table = super::table(&rows);
-        assert_eq!(table.lines().count(), 3, "{table}");
-        assert!(table.contains("a\\|b &lt;script>"), "{table}");
-    }
 }

@@ -2,20 +2,20 @@
 
 use super::exit::option_for;
 use super::{Failure, Session};
+use nav_sim::formats::input;
 use nav_sim::formats::model_file::{self, ModelFile};
 use nav_sim::formats::recordings::{self, ReadOptions};
 use nav_sim::formats::trajectory_file;
-use nav_sim::formats::{FileError, Setting, hash};
+use nav_sim::formats::{FileError, Setting};
 use nav_sim::imu::Recording;
 use nav_sim::noise::{Model, continuous};
 use nav_sim::report::Input;
 use nav_sim::trajectory::Trajectory;
 use nav_sim::trajectory::reference::Reference;
-use std::fs;
 use std::path::{Path, PathBuf};
 
 /// For commands without the option `--origin`: `trajectory convert` has it.
-fn without_options(e: FileError) -> Failure {
+pub(super) fn without_options(e: FileError) -> Failure {
     Failure::of_file(&e, |setting| {
         Some(match setting {
             Setting::Origin => {
@@ -37,9 +37,12 @@ pub(super) fn refused_for_fusion(e: FileError) -> Failure {
 
 /// An input with its fingerprint, of the bytes that were read.
 pub(super) fn input(role: &str, path: &Path) -> Result<Input, Failure> {
-    let shown = path.display().to_string();
-    let blake3 = hash::as_read(path).map_err(|e| Failure::could_not(format!("{shown}: {e}")))?;
-    Ok(Input { role: role.to_owned(), path: shown, blake3 })
+    Ok(input::input(role, path)?)
+}
+
+/// The files themselves and those of directories, in name order.
+pub(super) fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+    Ok(input::listed(paths)?)
 }
 
 /// A trajectory.
@@ -65,10 +68,7 @@ pub(super) fn reference(path: &Path, session: &Session) -> Result<Reference, Fai
 /// A model; axes that it does not name are said.
 pub(super) fn model(path: &Path, session: &Session) -> Result<ModelFile, Failure> {
     let file = model_file::read(path)?;
-    for channel in &file.missing {
-        let shown = path.display();
-        session.printer.warn(&format!("{shown}: says nothing of {channel}, taken as free of noise"));
-    }
+    file.doubts(path).iter().for_each(|doubt| session.printer.warn(doubt));
     Ok(file)
 }
 
@@ -92,32 +92,9 @@ pub(super) fn recordings_at(
     session: &Session,
 ) -> Result<Vec<Recording>, Failure> {
     let (recordings, report) = recordings::read(paths, &ReadOptions { rate_hz, ..ReadOptions::default() })?;
-    for warning in report.all_warnings() {
-        session.printer.warn(&warning);
-    }
-    if let Some((one, other, _)) = report.overlap() {
-        session.printer.warn(&format!("{other} and {one} have samples in common"));
-    }
+    report.doubts().iter().for_each(|doubt| session.printer.warn(doubt));
     for file in &report.files {
         session.printer.detail(&file.to_string());
     }
     Ok(recordings)
-}
-
-/// The files themselves and those of directories, in name order.
-pub(super) fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
-    let mut files = Vec::new();
-    for path in paths {
-        if !path.is_dir() {
-            files.push(path.clone());
-            continue;
-        }
-        let error = |e| Failure::could_not(format!("{}: {e}", path.display()));
-        let entries = fs::read_dir(path).map_err(error)?.collect::<Result<Vec<_>, _>>().map_err(error)?;
-        let mut within: Vec<PathBuf> =
-            entries.iter().map(fs::DirEntry::path).filter(|p| p.is_file()).collect();
-        within.sort();
-        files.extend(within);
-    }
-    Ok(files)
 }

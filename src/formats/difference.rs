@@ -7,14 +7,14 @@ const LONGEST: usize = 80;
 
 /// A key with two values, as they are shown.
 #[derive(Debug, PartialEq)]
-pub(super) struct Difference {
-    pub(super) key: String,
-    pub(super) found: String,
-    pub(super) wanted: String,
+pub(crate) struct Difference {
+    pub(crate) key: String,
+    pub(crate) found: String,
+    pub(crate) wanted: String,
 }
 
 /// The first key that differs: of those wanted, then of those found.
-pub(super) fn first(found: &Map<String, Value>, wanted: &Map<String, Value>) -> Option<Difference> {
+pub(crate) fn first(found: &Map<String, Value>, wanted: &Map<String, Value>) -> Option<Difference> {
     let key = wanted.keys().chain(found.keys()).find(|key| found.get(*key) != wanted.get(*key))?;
     Some(Difference { key: key.clone(), found: shown(found.get(key)), wanted: shown(wanted.get(key)) })
 }

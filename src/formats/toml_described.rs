@@ -11,7 +11,7 @@ use std::ops::Range;
 ///
 /// # Errors
 /// File, line, key and value of what is refused; a mistyped key with the nearest legal one.
-pub(super) fn read<T: DeserializeOwned>(source: &Source) -> Result<T, FileError> {
+pub(crate) fn read<T: DeserializeOwned>(source: &Source) -> Result<T, FileError> {
     source.parse()?;
     toml::from_str(source.text()).map_err(|e| explained(&e, source))
 }

@@ -10,6 +10,7 @@ mod fits;
 mod fusion;
 mod html;
 mod manifest;
+mod markdown;
 mod number;
 mod recording;
 mod replicates;
@@ -35,6 +36,7 @@ pub use efficiency_svg::efficiency_svg;
 pub use fits::{CandidateEntry, FitEntry, FitsFile, describe};
 pub use fusion::{FUSION_FILES, FusionKind, FusionManifest, FusionSummary, fusion_directory, solution_csv};
 pub use manifest::{Input, Manifest, ModelNote};
+pub use markdown::{markdown, markdown_table};
 pub use number::{readable, seconds};
 pub use recording::{gnss_csv, imu_csv, initial_toml};
 pub use replicates::{

@@ -1,7 +1,8 @@
 //! Whether a study means a grid.
 
-use super::StudyError;
 use super::description::Study;
+use super::error::DescriptionError;
+use super::rules::{exactly_one, unique};
 use crate::scenario::{MAX_RUNS, Method};
 use std::path::PathBuf;
 
@@ -10,7 +11,7 @@ impl Study {
     ///
     /// # Errors
     /// The key that is refused.
-    pub fn resolve(&mut self) -> Result<(), StudyError> {
+    pub fn resolve(&mut self) -> Result<(), DescriptionError> {
         self.name_all();
         self.check_numbers()?;
         self.check_axes()?;
@@ -45,8 +46,9 @@ impl Study {
         }
     }
 
-    fn check_numbers(&self) -> Result<(), StudyError> {
-        let refuse = |key: &str, value: String, reason: &str| Err(StudyError::refused(key, value, reason));
+    fn check_numbers(&self) -> Result<(), DescriptionError> {
+        let refuse =
+            |key: &str, value: String, reason: &str| Err(DescriptionError::refused(key, value, reason));
         if self.schema != 1 {
             return refuse(
                 "schema",
@@ -75,10 +77,10 @@ impl Study {
     }
 
     /// Every axis has something, and every entry says one thing.
-    fn check_axes(&self) -> Result<(), StudyError> {
+    fn check_axes(&self) -> Result<(), DescriptionError> {
         let empty = |key: &str, there: bool| match there {
             true => Ok(()),
-            false => Err(StudyError::Empty { axis: key.to_owned() }),
+            false => Err(DescriptionError::Empty { axis: key.to_owned() }),
         };
         empty("trajectory", !self.trajectory.is_empty())?;
         empty("truth", !self.truth.is_empty())?;
@@ -104,19 +106,19 @@ impl Study {
         match syntheses.iter().find(|s| s.replicates == 0 || s.samples < 2) {
             Some(s) => {
                 let value = format!("{} of {} samples", s.replicates, s.samples);
-                Err(StudyError::refused("synthesize", value, "are no recordings"))
+                Err(DescriptionError::refused("synthesize", value, "are no recordings"))
             }
             None => Ok(()),
         }
     }
 
     /// No filter twice: its columns could not be told apart.
-    fn check_filters(&self) -> Result<(), StudyError> {
+    fn check_filters(&self) -> Result<(), DescriptionError> {
         match self.filters.iter().enumerate().find(|(i, f)| self.filters[..*i].contains(f)) {
             Some((_, filter)) => {
                 let twice = serde_json::to_string(filter).unwrap_or_default();
                 let shown = serde_json::to_string(&self.filters).unwrap_or_default();
-                Err(StudyError::refused("filters", shown, format!("names {twice} twice")))
+                Err(DescriptionError::refused("filters", shown, format!("names {twice} twice")))
             }
             None => Ok(()),
         }
@@ -142,27 +144,4 @@ fn name_after(name: &mut String, file: Option<&PathBuf>) {
     {
         *name = stem.to_string_lossy().into_owned();
     }
-}
-
-pub(super) fn unique(axis: &str, names: &[&str]) -> Result<(), StudyError> {
-    if let Some(i) = names.iter().position(|n| n.trim().is_empty()) {
-        return Err(StudyError::Unnamed { axis: axis.to_owned(), entry: i + 1 });
-    }
-    let mut seen = std::collections::HashSet::new();
-    match names.iter().find(|name| !seen.insert(**name)) {
-        Some(name) => Err(StudyError::Duplicate { axis: axis.to_owned(), name: (*name).to_owned() }),
-        None => Ok(()),
-    }
-}
-
-pub(super) fn exactly_one(
-    axis: &str,
-    entry: usize,
-    said: &[bool],
-    keys: &'static str,
-) -> Result<(), StudyError> {
-    if said.iter().filter(|s| **s).count() == 1 {
-        return Ok(());
-    }
-    Err(StudyError::NotOne { axis: axis.to_owned(), entry: entry + 1, keys })
 }

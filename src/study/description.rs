@@ -1,13 +1,12 @@
 //! The study file: what a grid of experiments is made of.
 
-use super::StudyError;
-use super::check::unique;
-use super::sweep::{OutageSet, Periodic, Random, Sweep, expand};
+use super::error::DescriptionError;
+use super::rules::unique;
+use super::sweep::{OutageSet, OutagesEntry, expand};
 use crate::calibration::{Estimator, ModelSpec};
 use crate::ekf::FilterStates;
 use crate::scenario::{Method, Scenario};
 use crate::sensors::gnss::GnssSettings;
-use crate::sensors::outage::Outage;
 use crate::wavelet::Tuning;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -232,28 +231,6 @@ pub struct GnssEntry {
     pub settings: Option<GnssSettings>,
 }
 
-/// `[[outages]]`: one of `windows`, `sweep`, `periodic`, `random`. The latter three take numbers or lists
-/// of numbers and make one set for each combination.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct OutagesEntry {
-    /// Name in the results; a sweep adds its values: `name(300,60)`.
-    #[serde(default)]
-    pub name: String,
-    /// Windows one by one, together one set; an empty list is the set without outages.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub windows: Option<Vec<Outage>>,
-    /// A window of each start and duration.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sweep: Option<Sweep>,
-    /// Regular outages.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub periodic: Option<Periodic>,
-    /// Random outages, drawn once a set.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub random: Option<Random>,
-}
-
 impl Study {
     /// All virtual recordings.
     pub(super) fn syntheses(&self) -> Vec<&Synthesis> {
@@ -265,7 +242,7 @@ impl Study {
     ///
     /// # Errors
     /// The set that is refused.
-    pub fn outage_sets(&self) -> Result<Vec<OutageSet>, StudyError> {
+    pub fn outage_sets(&self) -> Result<Vec<OutageSet>, DescriptionError> {
         let mut sets = Vec::new();
         for (i, entry) in self.outages.iter().enumerate() {
             sets.extend(expand(entry, i)?);
@@ -296,13 +273,13 @@ impl Study {
     ///
     /// # Errors
     /// When no candidate has that name.
-    pub fn reference(&self) -> Result<usize, StudyError> {
+    pub fn reference(&self) -> Result<usize, DescriptionError> {
         let candidates = self.candidates();
         let names: Vec<&str> = candidates.iter().map(|(name, ..)| name.as_str()).collect();
         unique("candidate", &names)?;
         let Some(wanted) = &self.reference else { return Ok(0) };
         let found = names.iter().position(|name| name == wanted);
-        found.ok_or_else(|| StudyError::NoReference {
+        found.ok_or_else(|| DescriptionError::NoReference {
             reference: wanted.clone(),
             candidates: names.into_iter().map(str::to_owned).collect(),
         })

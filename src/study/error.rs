@@ -5,7 +5,7 @@ use crate::noise::ReplicateError;
 
 /// A study that means no grid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum StudyError {
+pub enum DescriptionError {
     /// A value is refused.
     #[error("\"{key}\" = {value} {reason}")]
     Refused {
@@ -58,7 +58,7 @@ pub enum StudyError {
     },
 }
 
-impl StudyError {
+impl DescriptionError {
     /// The refusal of a value.
     #[must_use]
     pub fn refused(key: &str, value: impl ToString, reason: impl Into<String>) -> Self {

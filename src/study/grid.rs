@@ -1,15 +1,12 @@
 //! The cells of a study: every combination of its axes.
 
-use super::StudyError;
 use super::description::Study;
-use super::plan::Plan;
+use super::error::DescriptionError;
+use super::rules::MAX_CELLS;
 use super::sweep::OutageSet;
 use crate::ekf::FilterStates;
 use crate::scenario::Scenario;
 use crate::sensors::gnss::GnssSettings;
-
-/// Most cells of a study: each is planned, named and checked before the first runs.
-pub(super) const MAX_CELLS: usize = 1_000_000;
 
 /// The axes of a study with what stands on them.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,19 +54,15 @@ pub struct Cell {
 }
 
 impl Grid {
-    /// The grid of a plan.
-    ///
-    /// # Errors
-    /// When the study's outage sets are refused.
-    pub fn of(plan: &Plan) -> Result<Self, StudyError> {
-        Self::new(&plan.study, &plan.scenarios, &plan.gnss)
-    }
-
     /// The grid of a study whose scenario and receiver files have been read.
     ///
     /// # Errors
     /// When its outage sets are refused.
-    pub fn new(study: &Study, scenarios: &[Scenario], gnss: &[GnssSettings]) -> Result<Self, StudyError> {
+    pub fn new(
+        study: &Study,
+        scenarios: &[Scenario],
+        gnss: &[GnssSettings],
+    ) -> Result<Self, DescriptionError> {
         let named = |names: Vec<String>| if names.is_empty() { vec!["default".to_owned()] } else { names };
         let scenario_names = named(study.scenario.iter().map(|e| e.name.clone()).collect());
         let or_default = if scenarios.is_empty() { vec![Scenario::default()] } else { scenarios.to_vec() };
@@ -91,7 +84,7 @@ impl Grid {
         };
         if grid.len() > MAX_CELLS {
             let reason = format!("cells in the grid: more than {MAX_CELLS}");
-            return Err(StudyError::refused("outages", grid.len(), reason));
+            return Err(DescriptionError::refused("outages", grid.len(), reason));
         }
         Ok(grid)
     }
@@ -142,6 +135,21 @@ impl Grid {
             &self.gnss[cell.gnss].0,
             &self.outages[cell.outages].0,
         ]
+    }
+
+    /// The names of a cell on those axes that have more than one, in words.
+    #[must_use]
+    pub fn short_name(&self, cell: Cell) -> String {
+        let sizes = [
+            self.trajectories.len(),
+            self.truths.len(),
+            self.scenarios.len(),
+            self.gnss.len(),
+            self.outages.len(),
+        ];
+        let names = self.names(cell).into_iter().zip(sizes).filter(|(_, n)| *n > 1).map(|(name, _)| name);
+        let name = names.collect::<Vec<_>>().join(", ");
+        if name.is_empty() { self.names(cell)[0].to_owned() } else { name }
     }
 
     /// The resolved scenario of a cell, without runs.

@@ -8,33 +8,77 @@
 //! recognised wherever it was done, and work of another study never passes for it.
 //!
 //! ```text
-//! STUDY.toml ── check, prepare, probe ─► plan.json ─► units/xx/<id>.unit … (any order, any machine)
-//!                                                  └► merge, in run order ─► outages, ratios, epochs, runs
+//! STUDY.toml ── plan: check, calibrate, probe ─► plan.json ─► run ─► units/xx/<id>.unit (any order, any machine)
+//!                                                          └► merge, in run order ─► results/
 //! ```
 //!
 //! Nothing goes by time stamps: clocks that disagree do no harm. Sums of a unit are made in run order, sums of a cell in the order of its units; the plan fixes the
 //! units, so the merged result is the same to the last bit for any number of shards, threads or restarts.
+//!
+//! ```no_run
+//! use nav_sim::study::{self, MergeOptions, PlanOptions, Planned, RunOptions, Shard, Writing};
+//! use std::path::Path;
+//!
+//! let (file, directory) = (Path::new("examples/quick_study.toml"), Path::new("out/quick"));
+//! let seed = |of_study: Option<u64>| of_study.unwrap_or(1);
+//! let options = PlanOptions { seed: &seed, threads: 2, clock: None, writing: Writing::Write };
+//! study::plan(file, directory, &options, &())?;
+//!
+//! // here or elsewhere, in any order, as often as it takes
+//! let planned = Planned::open(file, directory, None)?;
+//! for index in 0..2 {
+//!     let shard = Shard::new(index, 2).expect("0 and 1 are below 2");
+//!     study::run(&planned, &RunOptions { shard, threads: 2 }, &())?;
+//! }
+//! let merged = study::merge(&planned, &MergeOptions { states: vec![1, 6], threads: 2 }, &())?;
+//! println!("{}", merged.text);
+//! # Ok::<(), study::StudyError>(())
+//! ```
 
+mod cell_tables;
 mod check;
 mod description;
+pub mod directory;
 mod error;
+mod failure;
+pub mod file;
 mod fingerprint;
 mod grid;
-mod merge;
+mod inputs;
+mod merging;
+mod observer;
 mod plan;
+mod planned;
+mod planning;
 mod prepare;
+mod reader;
+mod remedy;
+mod rules;
+mod running;
+mod sums;
 mod sweep;
+mod tables;
 mod unit;
+pub mod unit_file;
+mod verification;
 
 pub use description::{
-    CalibrateStep, CandidateEntry, GnssEntry, Metric, OutagesEntry, ScenarioEntry, Study, Synthesis,
-    TrajectoryEntry, TruthEntry,
+    CalibrateStep, CandidateEntry, GnssEntry, Metric, ScenarioEntry, Study, Synthesis, TrajectoryEntry,
+    TruthEntry,
 };
-pub use error::{PrepareError, StudyError};
+pub use error::{DescriptionError, PrepareError};
+pub use failure::StudyError;
 pub use fingerprint::fingerprint;
 pub use grid::{Cell, Column, Grid};
-pub use merge::CellSums;
-pub use plan::{Estimate, Plan, Prepared, Unit};
+pub use merging::{MergeOptions, MergeReport, merge};
+pub use observer::{Importance, Observer, Remark};
+pub use plan::{Estimate, Kept, Plan, Prepared, Unit};
+pub use planned::{Planned, Status};
+pub use planning::{PlanOptions, PlanReport, Writing, plan};
 pub use prepare::{Material, calibrated, channels};
-pub use sweep::{OneOrMany, OutageSet, Periodic, Random, Sweep};
-pub use unit::{Kept, UnitResult, run_unit};
+pub use remedy::Remedy;
+pub use running::{RunOptions, RunReport, Shard, run};
+pub use sums::CellSums;
+pub use sweep::{OneOrMany, OutageSet, OutagesEntry, Periodic, Random, Sweep};
+pub use unit::{UnitResult, run_unit};
+pub use verification::{VerifyOptions, VerifyReport, verify};

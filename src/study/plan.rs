@@ -1,8 +1,8 @@
 //! The plan: what a study's files were when it was planned, and how its runs are cut into units.
 
-use super::description::Study;
+use super::description::{Metric, Study};
+use super::error::DescriptionError;
 use super::grid::{Cell, Grid};
-use super::unit::Kept;
 use crate::lanes::LANES;
 use crate::scenario::Scenario;
 use crate::sensors::gnss::GnssSettings;
@@ -61,6 +61,32 @@ pub struct Estimate {
     pub bytes: f64,
 }
 
+/// What is kept of the sums at epochs; records of runs are always kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kept {
+    /// None.
+    Runs,
+    /// Those of epochs inside outages.
+    OutageEpochs,
+    /// All.
+    AllEpochs,
+}
+
+impl Kept {
+    /// What the metrics of a study need.
+    #[must_use]
+    pub fn of(study: &Study) -> Self {
+        if study.keeps(Metric::Epochs) {
+            Self::AllEpochs
+        } else if study.keeps(Metric::Ratios) {
+            Self::OutageEpochs
+        } else {
+            Self::Runs
+        }
+    }
+}
+
 /// A unit of work: runs `first..first + runs` of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Unit {
@@ -89,6 +115,14 @@ struct CellKey<'a> {
 impl Plan {
     /// Version of the layout.
     pub const SCHEMA_VERSION: u32 = 1;
+
+    /// The grid of the plan.
+    ///
+    /// # Errors
+    /// When the study's outage sets are refused.
+    pub fn grid(&self) -> Result<Grid, DescriptionError> {
+        Grid::new(&self.study, &self.scenarios, &self.gnss)
+    }
 
     /// What units keep of the runs.
     #[must_use]
@@ -215,7 +249,7 @@ mod tests {
             unit_runs: vec![100, 8],
             estimate: Estimate::default(),
         };
-        let grid = Grid::of(&plan).unwrap();
+        let grid = plan.grid().unwrap();
         (plan, grid)
     }
 
@@ -271,7 +305,7 @@ mod tests {
         assert_eq!(with(&|p| p.version = "1".into()), 0);
         assert_eq!(with(&|p| p.truths[0] = "u".into()), 0);
         assert_eq!(with(&|p| p.models[1].blake3 = "o".into()), 0);
-        assert_eq!(with(&|p| p.study.metrics = vec![super::super::Metric::Outages]), 0);
+        assert_eq!(with(&|p| p.study.metrics = vec![Metric::Outages]), 0);
         assert_eq!(with(&|p| p.trajectories[1] = "c".into()), 6 * 3);
         // another candidate's name changes no number, and more runs keep the units there are
         assert_eq!(shared(&plan(|s| s.candidate[1].name = "other".into())), names.len());

@@ -1,7 +1,7 @@
 //! Calibration steps and virtual recordings of a study.
 
-use super::PrepareError;
 use super::description::{CalibrateStep, Synthesis};
+use super::error::PrepareError;
 use crate::calibration::{Estimator, Outcome, Settings, Trim, calibrate, grouped, replicates};
 use crate::imu::{Channel, Recording};
 use crate::noise::contamination::Contamination;

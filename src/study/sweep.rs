@@ -1,9 +1,7 @@
 //! Outage sets, one by one and swept.
 
-use super::StudyError;
-use super::check::exactly_one;
-use super::description::OutagesEntry;
-use super::grid::MAX_CELLS;
+use super::error::DescriptionError;
+use super::rules::{MAX_CELLS, exactly_one};
 use crate::sensors::outage::{Outage, OutagePlan, PeriodicOutages, RandomOutages};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -59,6 +57,28 @@ pub struct Random {
     pub duration_s: OneOrMany,
 }
 
+/// `[[outages]]`: one of `windows`, `sweep`, `periodic`, `random`. The latter three take numbers or lists
+/// of numbers and make one set for each combination.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OutagesEntry {
+    /// Name in the results; a sweep adds its values: `name(300,60)`.
+    #[serde(default)]
+    pub name: String,
+    /// Windows one by one, together one set; an empty list is the set without outages.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub windows: Option<Vec<Outage>>,
+    /// A window of each start and duration.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sweep: Option<Sweep>,
+    /// Regular outages.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub periodic: Option<Periodic>,
+    /// Random outages, drawn once a set.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub random: Option<Random>,
+}
+
 /// One outage set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OutageSet {
@@ -69,7 +89,7 @@ pub struct OutageSet {
 }
 
 /// The sets an entry stands for.
-pub(super) fn expand(entry: &OutagesEntry, index: usize) -> Result<Vec<OutageSet>, StudyError> {
+pub(super) fn expand(entry: &OutagesEntry, index: usize) -> Result<Vec<OutageSet>, DescriptionError> {
     let said =
         [entry.windows.is_some(), entry.sweep.is_some(), entry.periodic.is_some(), entry.random.is_some()];
     exactly_one("outages", index, &said, "windows, sweep, periodic, random")?;
@@ -77,7 +97,7 @@ pub(super) fn expand(entry: &OutagesEntry, index: usize) -> Result<Vec<OutageSet
     let sets = combinations(entry);
     if sets > MAX_CELLS {
         let reason = format!("makes more than {MAX_CELLS} outage sets");
-        return Err(StudyError::refused(&key, sets, reason));
+        return Err(DescriptionError::refused(&key, sets, reason));
     }
     let sets = if let Some(windows) = &entry.windows {
         vec![(Vec::new(), OutagePlan { fixed: windows.clone(), ..OutagePlan::default() })]
@@ -100,11 +120,11 @@ pub(super) fn expand(entry: &OutagesEntry, index: usize) -> Result<Vec<OutageSet
         Vec::new()
     };
     if sets.is_empty() {
-        return Err(StudyError::Empty { axis: key });
+        return Err(DescriptionError::Empty { axis: key });
     }
     let several = sets.len() > 1;
     let named = |(values, plan): (Vec<f64>, OutagePlan)| {
-        plan.validate().map_err(|e| StudyError::refused(&key, &e.value, &e.requirement))?;
+        plan.validate().map_err(|e| DescriptionError::refused(&key, &e.value, &e.requirement))?;
         let values: Vec<String> = values.iter().map(f64::to_string).collect();
         let name = if several { format!("{}({})", entry.name, values.join(",")) } else { entry.name.clone() };
         Ok(OutageSet { name, plan })

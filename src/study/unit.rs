@@ -1,46 +1,8 @@
 //! One unit of work: some runs of one cell, through all its columns.
 
-use super::description::{Metric, Study};
-use super::plan::Unit;
+use super::plan::{Kept, Plan, Unit};
 use crate::monte_carlo;
-use crate::simulation::{Plan, RunResult};
-use serde::{Deserialize, Serialize};
-
-/// What is kept of the sums at epochs; records of runs are always kept.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Kept {
-    /// None.
-    Runs,
-    /// Those of epochs inside outages.
-    OutageEpochs,
-    /// All.
-    AllEpochs,
-}
-
-impl Kept {
-    /// What the metrics of a study need.
-    #[must_use]
-    pub fn of(study: &Study) -> Self {
-        if study.keeps(Metric::Epochs) {
-            Self::AllEpochs
-        } else if study.keeps(Metric::Ratios) {
-            Self::OutageEpochs
-        } else {
-            Self::Runs
-        }
-    }
-
-    fn reduce(self, result: &mut RunResult) {
-        let outages = result.outages.clone();
-        let inside = |t_s: f64| outages.iter().any(|(start, end)| *start <= t_s && t_s < *end);
-        match self {
-            Self::AllEpochs => {}
-            Self::OutageEpochs => result.epochs.retain(|e| inside(e.t_s)),
-            Self::Runs => result.epochs.clear(),
-        }
-    }
-}
+use crate::simulation::{self, RunResult};
 
 /// What a unit found: a result for each column, its epochs reduced to what is kept.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,13 +33,35 @@ impl UnitResult {
 /// completed.
 #[must_use]
 pub fn run_unit(
-    plan: &Plan<'_>,
+    plan: &simulation::Plan<'_>,
     (first, runs): (u64, u64),
     kept: Kept,
     go_on: &(dyn Fn() -> bool + Sync),
     progress: &(dyn Fn(u64) + Sync),
 ) -> Option<Vec<RunResult>> {
     let mut results = monte_carlo::run_range(plan, first, runs, go_on, progress)?;
-    results.iter_mut().for_each(|r| kept.reduce(r));
+    results.iter_mut().for_each(|r| reduce(kept, r));
     Some(results)
+}
+
+/// The result of a unit; `None` if `go_on` said no on the way.
+pub(super) fn compute(
+    plan: &Plan,
+    simulation: &simulation::Plan<'_>,
+    (unit, id): (Unit, &str),
+    go_on: &(dyn Fn() -> bool + Sync),
+    progress: &(dyn Fn(u64) + Sync),
+) -> Option<UnitResult> {
+    let columns = run_unit(simulation, (unit.first, unit.runs), plan.kept(), go_on, progress)?;
+    Some(UnitResult { id: id.to_owned(), first: unit.first, runs: unit.runs, columns })
+}
+
+fn reduce(kept: Kept, result: &mut RunResult) {
+    let outages = result.outages.clone();
+    let inside = |t_s: f64| outages.iter().any(|(start, end)| *start <= t_s && t_s < *end);
+    match kept {
+        Kept::AllEpochs => {}
+        Kept::OutageEpochs => result.epochs.retain(|e| inside(e.t_s)),
+        Kept::Runs => result.epochs.clear(),
+    }
 }

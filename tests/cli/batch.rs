@@ -111,7 +111,7 @@ fn damaged_units_are_noticed_and_computed_again() {
 /// are damaged, and `run` mends them.
 #[test]
 fn what_stands_in_the_place_of_a_unit_is_computed_again() {
-    use nav_sim::formats::unit_file;
+    use nav_sim::study::unit_file;
     let place = place();
     let dir = place.path();
     let undisturbed = whole(dir, "out");

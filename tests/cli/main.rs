@@ -26,6 +26,7 @@ mod help_examples;
 mod readme;
 mod require;
 mod run;
+mod study;
 mod synthesize;
 mod trajectory_command;
 mod tune;

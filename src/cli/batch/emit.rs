@@ -1,10 +1,8 @@
 //! `nav-sim batch emit`: scripts for schedulers.
 
-use super::Place;
-use super::plan::duration;
+use super::{Place, duration};
 use crate::cli::{Failure, Session};
-use nav_sim::formats::study_directory;
-use std::fmt::Write;
+use nav_sim::study::{directory, file};
 use std::path::Path;
 
 /// Print a script that runs a planned study on a cluster or here
@@ -50,12 +48,12 @@ enum Target {
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    args.place.read()?;
+    file::read(&args.place.study)?;
     let script = Script::of(args, session.asked_seed());
-    let is_planned = study_directory::plan(&args.place.directory())?.is_some();
+    let is_planned = directory::plan(&args.place.directory())?.is_some();
     if is_planned && args.target != Target::Local {
         let planned = args.place.planned(session.asked_seed())?;
-        long_enough(script.limit_s() as f64, planned.unit_s(u64::from(args.cpus)), session)?;
+        long_enough(script.limit_s() as f64, planned.longest_unit_s(u64::from(args.cpus)), session)?;
     }
     session.printer.result(script.text(args.target).trim_end());
     Ok(())
@@ -102,13 +100,40 @@ impl Script {
     }
 
     fn text(&self, target: Target) -> String {
-        match target {
-            Target::Hyperqueue => self.hyperqueue(),
-            Target::Slurm => self.slurm(),
-            Target::Pbs => self.pbs(),
-            Target::K8s => self.k8s(),
-            Target::Local => self.local(),
-        }
+        let template = match target {
+            Target::Hyperqueue => include_str!("templates/hyperqueue.py"),
+            Target::Slurm => include_str!("templates/slurm.sh"),
+            Target::Pbs => include_str!("templates/pbs.sh"),
+            Target::K8s => include_str!("templates/k8s.yaml"),
+            Target::Local => include_str!("templates/local.sh"),
+        };
+        filled(template, &self.values())
+    }
+
+    /// What stands for each name in the templates.
+    fn values(&self) -> Vec<(&'static str, String)> {
+        let quoted = |words: &[String]| words.iter().map(|w| json_quoted(w)).collect::<Vec<_>>().join(", ");
+        // an array of one is no array to PBS
+        let is_array = self.shards > 1;
+        let last = self.shards - 1;
+        vec![
+            ("name", self.name.clone()),
+            ("short_name", self.name.chars().take(15).collect()),
+            ("shards", self.shards.to_string()),
+            ("last", last.to_string()),
+            ("cpus", self.cpus.to_string()),
+            ("clock", self.clock()),
+            ("array", if is_array { format!("#PBS -J 0-{last}\n") } else { String::new() }),
+            ("index", if is_array { String::new() } else { "export PBS_ARRAY_INDEX=0\n".to_owned() }),
+            ("plan", shell(&self.words("plan"))),
+            ("run", shell(&self.words("run"))),
+            ("merge", shell(&self.words("merge"))),
+            ("task", shell(&self.task())),
+            ("command", quoted(&["sh".into(), "-c".into(), format!("exec {}", shell(&self.task()))])),
+            ("run_words", quoted(&self.task())),
+            ("plan_words", quoted(&self.words("plan"))),
+            ("merge_words", quoted(&self.words("merge"))),
+        ]
     }
 
     /// Words of a command of the study.
@@ -123,188 +148,36 @@ impl Script {
         self.seconds - (self.seconds / 10).min(120)
     }
 
-    fn shell(&self, command: &str) -> String {
-        self.words(command).iter().map(|w| shell_quoted(w)).collect::<Vec<_>>().join(" ")
-    }
-
-    /// The working command of a task whose index the scheduler gives.
-    fn task(&self) -> String {
-        let limit = self.limit_s();
-        format!(
-            "{} --shards {} -j {} --time-limit {limit}s --no-progress",
-            self.shell("run"),
-            self.shards,
-            self.cpus
-        )
-    }
-
-    const fn last(&self) -> u64 {
-        self.shards - 1
+    /// Words of the working command of a task whose index the scheduler gives.
+    fn task(&self) -> Vec<String> {
+        let mut words = self.words("run");
+        let (shards, cpus, limit) =
+            (self.shards.to_string(), self.cpus.to_string(), format!("{}s", self.limit_s()));
+        let options = ["--shards", &shards, "-j", &cpus, "--time-limit", &limit, "--no-progress"];
+        words.extend(options.map(str::to_owned));
+        words
     }
 
     fn clock(&self) -> String {
         format!("{:02}:{:02}:{:02}", self.seconds / 3600, self.seconds / 60 % 60, self.seconds % 60)
     }
+}
 
-    fn slurm(&self) -> String {
-        format!(
-            "#!/usr/bin/env bash\n\
-             # sbatch this file after `{plan}`; then `{merge}`.\n\
-             #SBATCH --job-name={name}\n\
-             #SBATCH --array=0-{last}\n\
-             #SBATCH --cpus-per-task={cpus}\n\
-             #SBATCH --time={clock}\n\
-             #SBATCH --requeue\n\
-             #SBATCH --open-mode=append\n\
-             #SBATCH --output=%x_%a.log\n\
-             {task}\n\
-             code=$?\n\
-             # 75: stopped in time, to be resumed\n\
-             if [ $code -eq 75 ]; then scontrol requeue \"${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}\"; fi\n\
-             exit $code\n",
-            plan = self.shell("plan"),
-            merge = self.shell("merge"),
-            name = self.name,
-            last = self.last(),
-            cpus = self.cpus,
-            clock = self.clock(),
-            task = self.task(),
-        )
+/// A template with values in place of `{{name}}`. Values are not searched: a study's path may hold anything.
+fn filled(template: &str, values: &[(&str, String)]) -> String {
+    let mut text = String::new();
+    let mut rest = template;
+    while let Some((before, after)) = rest.split_once("{{") {
+        let (name, after) = after.split_once("}}").unwrap_or((after, ""));
+        text += before;
+        text += values.iter().find(|(known, _)| *known == name).map_or("", |(_, value)| value);
+        rest = after;
     }
+    text + rest
+}
 
-    fn pbs(&self) -> String {
-        // an array of one is no array to PBS
-        let array = if self.shards > 1 { format!("#PBS -J 0-{}\n", self.last()) } else { String::new() };
-        let index = if self.shards > 1 { "" } else { "export PBS_ARRAY_INDEX=0\n" };
-        format!(
-            "#!/usr/bin/env bash\n\
-             # qsub this file after `{plan}`; then `{merge}`.\n\
-             #PBS -N {name}\n\
-             {array}\
-             #PBS -l select=1:ncpus={cpus}\n\
-             #PBS -l walltime={clock}\n\
-             #PBS -r y\n\
-             cd \"$PBS_O_WORKDIR\" || exit 1\n\
-             {index}\
-             {task}\n\
-             # exit code 75: stopped in time; qsub the file again to go on\n",
-            plan = self.shell("plan"),
-            merge = self.shell("merge"),
-            name = self.name.chars().take(15).collect::<String>(),
-            cpus = self.cpus,
-            clock = self.clock(),
-            task = self.task(),
-        )
-    }
-
-    fn k8s(&self) -> String {
-        let command = ["sh", "-c", &format!("exec {}", self.task())].map(json_quoted).join(", ");
-        format!(
-            "# kubectl apply -f this file, after `{plan}` in the volume; then `{merge}` there.\n\
-             # Put your image with nav-sim and the claim of a volume that all pods can write to.\n\
-             apiVersion: batch/v1\n\
-             kind: Job\n\
-             metadata:\n  name: {name}\n\
-             spec:\n\
-             \x20 completionMode: Indexed\n\
-             \x20 completions: {shards}\n\
-             \x20 parallelism: {shards}\n\
-             \x20 backoffLimitPerIndex: 3\n\
-             \x20 podFailurePolicy:\n\
-             \x20   rules:\n\
-             \x20     # stopped in time, or a node drained: start the pod again without counting a failure\n\
-             \x20     - action: Ignore\n\
-             \x20       onExitCodes: {{ containerName: nav-sim, operator: In, values: [75] }}\n\
-             \x20     - action: Ignore\n\
-             \x20       onPodConditions: [{{ type: DisruptionTarget }}]\n\
-             \x20 template:\n\
-             \x20   spec:\n\
-             \x20     restartPolicy: Never\n\
-             \x20     terminationGracePeriodSeconds: 60\n\
-             \x20     containers:\n\
-             \x20       - name: nav-sim\n\
-             \x20         image: nav-sim:latest\n\
-             \x20         workingDir: /study\n\
-             \x20         command: [{command}]\n\
-             \x20         resources: {{ requests: {{ cpu: \"{cpus}\" }} }}\n\
-             \x20         volumeMounts: [{{ name: study, mountPath: /study }}]\n\
-             \x20     volumes:\n\
-             \x20       - name: study\n\
-             \x20         persistentVolumeClaim: {{ claimName: study }}\n",
-            plan = self.shell("plan"),
-            merge = self.shell("merge"),
-            name = self.name,
-            shards = self.shards,
-            cpus = self.cpus,
-        )
-    }
-
-    fn local(&self) -> String {
-        format!(
-            "#!/usr/bin/env bash\n\
-             # {shards} processes on this machine, then the tables. Stop and repeat at will.\n\
-             set -eu\n\
-             {plan}\n\
-             for i in $(seq 0 {last}); do\n\
-             \x20 {run} --shard \"$i/{shards}\" -j {cpus} --no-progress &\n\
-             done\n\
-             wait\n\
-             {merge}\n",
-            shards = self.shards,
-            last = self.last(),
-            plan = self.shell("plan"),
-            run = self.shell("run"),
-            cpus = self.cpus,
-            merge = self.shell("merge"),
-        )
-    }
-
-    fn hyperqueue(&self) -> String {
-        let mut words = self.words("run");
-        let limit = self.limit_s();
-        words.extend([
-            "--shards".to_owned(),
-            self.shards.to_string(),
-            "-j".to_owned(),
-            self.cpus.to_string(),
-        ]);
-        words.extend(["--time-limit".to_owned(), format!("{limit}s"), "--no-progress".to_owned()]);
-        let list = |words: &[String]| words.iter().map(|w| json_quoted(w)).collect::<Vec<_>>().join(", ");
-        let mut text = String::new();
-        let _ = write!(
-            text,
-            "#!/usr/bin/env python3\n\
-             \"\"\"pip install hyperqueue, then run this file where the study is: with the directory of a running\n\
-             HyperQueue server as argument, or without, and a server and a worker are started here.\"\"\"\n\
-             import subprocess\n\
-             import sys\n\
-             from pathlib import Path\n\n\
-             from hyperqueue import Client, Job, LocalCluster\n\
-             from hyperqueue.cluster import WorkerConfig\n\
-             from hyperqueue.ffi.protocol import ResourceRequest\n\n\
-             RUN = [{run}]\n\n\n\
-             def work(client):\n\
-             \x20   job = Job(default_workdir=Path.cwd(), max_fails={shards})\n\
-             \x20   for _ in range({shards}):  # HQ_TASK_ID counts them from 0\n\
-             \x20       job.program(RUN, resources=ResourceRequest(cpus={cpus}))\n\
-             \x20   return client.wait_for_jobs([client.submit(job)], raise_on_error=False)\n\n\n\
-             subprocess.run([{plan}], check=True)\n\
-             if len(sys.argv) > 1:\n\
-             \x20   work(Client(sys.argv[1]))\n\
-             else:\n\
-             \x20   with LocalCluster() as cluster:\n\
-             \x20       cluster.start_worker(WorkerConfig())\n\
-             \x20       work(cluster.client())\n\
-             # exit code 75 of the merge: units are missing; run this file again\n\
-             sys.exit(subprocess.run([{merge}]).returncode)\n",
-            run = list(&words),
-            shards = self.shards,
-            cpus = self.cpus,
-            plan = list(&self.words("plan")),
-            merge = list(&self.words("merge")),
-        );
-        text
-    }
+fn shell(words: &[String]) -> String {
+    words.iter().map(|w| shell_quoted(w)).collect::<Vec<_>>().join(" ")
 }
 
 fn shell_quoted(word: &str) -> String {

@@ -1,18 +1,16 @@
 //! `nav-sim batch`: grids of experiments in units that survive, resume and spread over machines.
 
 mod emit;
-mod inputs;
 mod merge;
 mod plan;
 mod run;
 mod shard;
 mod status;
 mod verify;
+mod watch;
 
-use super::{Failure, Session};
-use nav_sim::formats::study_directory::{self, BatchDirectoryError};
-use nav_sim::formats::study_file::{self, BatchFile};
-use nav_sim::study::{Grid, Plan, PrepareError, StudyError, Unit, fingerprint};
+use super::{Failure, Session, read};
+use nav_sim::study::{Planned, Remedy, StudyError};
 use std::path::{Path, PathBuf};
 
 /// Studies: grids of Monte-Carlo experiments, planned, run in pieces anywhere, merged
@@ -77,84 +75,46 @@ impl Place {
         self.out.clone().unwrap_or_else(stem)
     }
 
-    fn read(&self) -> Result<BatchFile, Failure> {
-        Ok(study_file::read(&self.study)?)
-    }
-
     /// The plan in the directory, which must be that of the study, and have the seed if one is asked for.
     fn planned(&self, seed: Option<u64>) -> Result<Planned, Failure> {
-        let (directory, file) = (self.directory(), self.read()?);
-        let plan = study_directory::plan_of(&directory, &file.study, seed)?;
-        let grid = Grid::of(&plan).map_err(|e| unusable(&self.study, &e))?;
-        Ok(Planned { plan, grid, directory })
+        Ok(Planned::open(&self.study, &self.directory(), seed)?)
     }
 }
 
-/// A plan, read.
-struct Planned {
-    plan: Plan,
-    grid: Grid,
-    directory: PathBuf,
-}
-
-impl Planned {
-    /// Refuses to compute with a build or on a machine that makes other numbers than the one that planned.
-    fn same_numbers(&self) -> Result<(), Failure> {
-        let (version, numerics) = (env!("CARGO_PKG_VERSION"), fingerprint());
-        let same = self.plan.version == version && self.plan.numerics == numerics;
-        if same {
-            return Ok(());
+impl From<StudyError> for Failure {
+    fn from(e: StudyError) -> Self {
+        let hint = e.remedy().map(|remedy| words(&remedy).to_owned());
+        match e {
+            StudyError::File(e) => read::without_options(*e),
+            StudyError::Candidate { candidate, source } => Self::from(*source).within(&candidate),
+            e if e.is_usage() => Self::input(e).maybe_hint(hint),
+            e => Self::could_not(e).maybe_hint(hint),
         }
-        let failure = Failure::input(format!(
-            "the plan was made by nav-sim {} whose numbers are {}; this is {version}, whose numbers are {numerics}",
-            self.plan.version, self.plan.numerics
-        ));
-        Err(failure.hint(
-            "use one build on machines of one kind (same processor features and system library), or plan anew",
-        ))
     }
 }
 
-impl Planned {
-    /// What the longest unit takes by the plan's probe (s) on so many threads.
-    fn unit_s(&self, threads: u64) -> f64 {
-        let wall_s = |unit: Unit| {
-            let batches = unit.runs.div_ceil(nav_sim::lanes::LANES as u64);
-            self.plan.unit_s(&self.grid, unit) / threads.clamp(1, batches.max(1)) as f64
-        };
-        self.plan.units(&self.grid).map(wall_s).fold(0.0, f64::max)
-    }
-
-    /// The names of a cell on those axes that have more than one.
-    fn cell_name(&self, cell: nav_sim::study::Cell) -> String {
-        let grid = &self.grid;
-        let sizes = [
-            grid.trajectories.len(),
-            grid.truths.len(),
-            grid.scenarios.len(),
-            grid.gnss.len(),
-            grid.outages.len(),
-        ];
-        let names = grid.names(cell).into_iter().zip(sizes).filter(|(_, n)| *n > 1).map(|(name, _)| name);
-        let name = names.collect::<Vec<_>>().join(", ");
-        if name.is_empty() { grid.names(cell)[0].to_owned() } else { name }
+/// A remedy in the words of this command line.
+fn words(remedy: &Remedy) -> &str {
+    match remedy {
+        Remedy::Advice(advice) => advice,
+        Remedy::Plan => "make one with `nav-sim batch plan STUDY.toml`",
+        Remedy::PlanElsewhere => "plan into another directory with --out, or remove this one",
+        Remedy::PutBack => "put it back, or plan into another directory with --out",
+        Remedy::PlanAgain => "`nav-sim batch plan` makes it anew",
+        Remedy::UsePlanningBuild => "use the build that planned, or plan into another directory with --out",
+        Remedy::UseOneBuild => {
+            "use one build on machines of one kind (same processor features and system library), or plan anew"
+        }
+        Remedy::Run => "see `nav-sim batch run`",
     }
 }
 
-/// A refusal of the study as a whole.
-fn unusable(study: &Path, e: &StudyError) -> Failure {
-    Failure::input(format!("{}: {e}", study.display())).maybe_hint(e.hint())
-}
-
-impl From<BatchDirectoryError> for Failure {
-    fn from(e: BatchDirectoryError) -> Self {
-        let failure = if e.is_usage() { Self::input(&e) } else { Self::could_not(&e) };
-        failure.maybe_hint(e.hint())
-    }
-}
-
-impl From<PrepareError> for Failure {
-    fn from(e: PrepareError) -> Self {
-        Self::input(e)
+/// A duration for people.
+fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 90.0 => format!("{s:.0} s"),
+        s if s < 5400.0 => format!("{:.0} min", s / 60.0),
+        s if s < 172_800.0 => format!("{:.1} h", s / 3600.0),
+        s => format!("{:.1} days", s / 86400.0),
     }
 }

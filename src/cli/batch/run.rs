@@ -1,15 +1,10 @@
 //! `nav-sim batch run`: the units of a shard that are not done yet.
 
-use super::inputs::{Inputs, finished};
-use super::shard::{self, Shard};
-use super::status::Count;
-use super::{Place, Planned};
+use super::Place;
+use super::shard;
+use super::watch::Watch;
 use crate::cli::{Failure, Session};
-use nav_sim::formats::{study_directory, unit_file};
-use nav_sim::lanes::LANES;
-use nav_sim::simulation;
-use nav_sim::study::{Plan, Unit, UnitResult, run_unit};
-use rayon::prelude::*;
+use nav_sim::study::{self, RunOptions, Shard};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -104,117 +99,22 @@ impl Stop {
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let stop = Stop::new(args.time_limit)?;
     let planned = args.place.planned(session.asked_seed())?;
-    planned.same_numbers()?;
-    Count::of(&planned)?.warn_of_foreign(&planned, session);
     let variable = |name: &str| std::env::var(name).ok();
     let (shard, from) = shard::find(args.shard, args.shards, &variable)?;
     if let Some(remark) = shard::mismatch(args.shard, args.shards, &variable) {
         session.printer.warn(&remark);
     }
-    session.printer.say(&format!("shard {}/{} ({from})", shard.index, shard.count));
-    let mut inputs = Inputs::new(&planned, &args.place.study, session);
-    let pending = pending(&planned, shard, &mut inputs, session)?;
-    let runs = pending.iter().map(|(unit, _)| unit.runs).sum();
-    let progress = session.progress("runs", runs);
-    let mut left = pending.len();
-    for of_cell in pending.chunk_by(|a, b| a.0.cell == b.0.cell) {
-        if !stop.go_on() {
-            break;
-        }
-        let cell = planned.grid.cell(of_cell[0].0.cell);
-        inputs.with_cell(cell, |simulation| {
-            let job = Job { planned: &planned, simulation, stop: &stop, progress: &|n| progress.add(n) };
-            for some in of_cell.chunks(together(of_cell, session.threads())) {
-                left -= job.run(some)?;
-            }
-            Ok(())
-        })?;
-    }
-    drop(progress);
-    match (left, stop.failure(left, pending.len() - left)) {
+    let (index, count) = shard.parts();
+    session.printer.say(&format!("shard {index}/{count} ({from})"));
+    let options = RunOptions { shard, threads: session.threads() };
+    let ran = study::run(&planned, &options, &Watch::new(session, || stop.go_on()))?;
+    match (ran.left, stop.failure(ran.left, ran.finished)) {
         (1.., Some(failure)) => Err(failure),
         _ => {
-            session.printer.say(&format!("{} units done, none left in this shard", pending.len()));
+            session.printer.say(&format!("{} units done, none left in this shard", ran.finished + ran.left));
             Ok(())
         }
     }
-}
-
-type Named = (Unit, String);
-
-/// The units of a shard that are not there, or damaged.
-fn pending(
-    planned: &Planned,
-    shard: Shard,
-    inputs: &mut Inputs<'_>,
-    session: &Session,
-) -> Result<Vec<Named>, Failure> {
-    let names = study_directory::units(&planned.directory)?;
-    let mine = planned.plan.named_units(&planned.grid).filter(|(unit, _)| shard.has(unit.index));
-    let (mut pending, mut there) = (Vec::new(), 0_usize);
-    for (unit, id) in mine {
-        // Without the unit's file its trajectory need not be read yet.
-        let found = if names.contains(&id) { finished(planned, (unit, &id), inputs)? } else { Ok(false) };
-        match found {
-            Ok(true) => there += 1,
-            Ok(false) => pending.push((unit, id)),
-            Err(damage) => {
-                session.printer.warn(&format!("{damage}; it is computed again"));
-                pending.push((unit, id));
-            }
-        }
-    }
-    if there > 0 {
-        session.printer.say(&format!("{there} units are done already, {} to do", pending.len()));
-    }
-    Ok(pending)
-}
-
-/// How many units are computed at once: more than one where each has too few batches for the threads.
-fn together(units: &[Named], threads: usize) -> usize {
-    let batches = units[0].0.runs.div_ceil(LANES as u64) as usize;
-    (16 * threads / batches).max(1)
-}
-
-/// Units of one cell.
-struct Job<'a> {
-    planned: &'a Planned,
-    simulation: &'a simulation::Plan<'a>,
-    stop: &'a Stop,
-    progress: &'a (dyn Fn(u64) + Sync),
-}
-
-impl Job<'_> {
-    /// Computes and writes units; how many were finished.
-    fn run(&self, units: &[Named]) -> Result<usize, Failure> {
-        let outcomes: Vec<Result<bool, Failure>> = units.par_iter().map(|unit| self.one(unit)).collect();
-        let mut done = 0;
-        for outcome in outcomes {
-            done += usize::from(outcome?);
-        }
-        Ok(done)
-    }
-
-    fn one(&self, (unit, id): &Named) -> Result<bool, Failure> {
-        let go_on = || self.stop.go_on();
-        match compute(&self.planned.plan, self.simulation, *unit, id, &go_on, self.progress) {
-            Some(result) => Ok(unit_file::write(&self.planned.directory, &result).map(|()| true)?),
-            None => Ok(false),
-        }
-    }
-}
-
-/// What a unit finds.
-pub(super) fn compute(
-    plan: &Plan,
-    simulation: &simulation::Plan<'_>,
-    unit: Unit,
-    id: &str,
-    go_on: &(dyn Fn() -> bool + Sync),
-    progress: &(dyn Fn(u64) + Sync),
-) -> Option<UnitResult> {
-    let columns = run_unit(simulation, (unit.first, unit.runs), plan.kept(), go_on, progress)?;
-    Some(UnitResult { id: id.to_owned(), first: unit.first, runs: unit.runs, columns })
 }
 
 #[cfg(test)]

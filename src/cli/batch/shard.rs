@@ -1,27 +1,13 @@
 //! Which part of a plan a process does: by flag, or by what the scheduler says.
 
 use crate::cli::Failure;
-
-/// Units whose position leaves `index` when divided by `count`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Shard {
-    pub(super) index: u64,
-    pub(super) count: u64,
-}
-
-impl Shard {
-    pub(super) const fn has(self, unit: usize) -> bool {
-        unit as u64 % self.count == self.index
-    }
-}
+use nav_sim::study::Shard;
 
 /// `i/n`, i from 0.
 pub(super) fn parse(text: &str) -> Result<Shard, String> {
     let numbers = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
-    match numbers {
-        Some((index, count)) if index < count => Ok(Shard { index, count }),
-        _ => Err("expected i/n with i from 0 to n − 1, such as 0/4".to_owned()),
-    }
+    let shard = numbers.and_then(|(index, count)| Shard::new(index, count));
+    shard.ok_or_else(|| "expected i/n with i from 0 to n − 1, such as 0/4".to_owned())
 }
 
 /// Variables that give an index, and those that give the first one, the step and how many there are.
@@ -48,7 +34,7 @@ pub(super) fn find(
     let set = SCHEDULERS.iter().find_map(|(name, more)| Some((*name, *more, variable(name)?)));
     let Some((name, more, text)) = set else {
         return match shards {
-            None | Some(1) => Ok((Shard { index: 0, count: 1 }, "no scheduler".to_owned())),
+            None | Some(1) => Ok((Shard::ALL, "no scheduler".to_owned())),
             Some(n) => {
                 let failure =
                     Failure::input(format!("--shards {n}: no scheduler says which of them this is"));
@@ -71,9 +57,9 @@ pub(super) fn find(
         let failure = Failure::input(format!("{name}={id} says which shard this is, but not of how many"));
         return Err(failure.hint("add --shards n (indices from 0 to n − 1)"));
     };
-    match index {
-        Some(index) if index < count => Ok((Shard { index, count }, format!("{name}={id}"))),
-        _ => {
+    match index.and_then(|index| Shard::new(index, count)) {
+        Some(shard) => Ok((shard, format!("{name}={id}"))),
+        None => {
             let failure = Failure::input(format!("{name}={id} is not one of {count} shards"));
             Err(failure.hint(format!("number the tasks from 0 to {}", count.saturating_sub(1))))
         }
@@ -108,7 +94,9 @@ mod tests {
         let set: HashMap<&str, &str> = set.iter().copied().collect();
         let variable = |name: &str| set.get(name).map(|v| (*v).to_owned());
         let flag = flag.map(|f| parse(f).unwrap());
-        find(flag, shards, &variable).map(|(s, from)| (s.index, s.count, from)).map_err(|e| e.to_string())
+        find(flag, shards, &variable)
+            .map(|(s, from)| (s.parts().0, s.parts().1, from))
+            .map_err(|e| e.to_string())
     }
 
     #[test]
@@ -155,12 +143,5 @@ mod tests {
         assert!(said(None, "4").is_none() && said(Some(4), "4").is_none());
         assert!(said(Some(8), "4").unwrap().contains("the Slurm array has 4 tasks: the other shards"));
         assert!(said(Some(2), "4").unwrap().contains("some have no shard"));
-    }
-
-    #[test]
-    fn shards_share_out_the_units() {
-        for unit in 0..20 {
-            assert_eq!((0..3).filter(|i| Shard { index: *i, count: 3 }.has(unit)).count(), 1);
-        }
     }
 }

@@ -1,10 +1,9 @@
 //! `nav-sim batch status`: what is done and what is left.
 
-use super::plan::duration;
-use super::{Place, Planned};
+use super::watch::Watch;
+use super::{Place, duration};
 use crate::cli::{Failure, Session};
-use nav_sim::formats::{study_directory, unit_file};
-use nav_sim::study::Unit;
+use nav_sim::study::Observer;
 use serde_json::json;
 
 /// What is done of a study and what is left
@@ -25,74 +24,28 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let planned = args.place.planned(session.asked_seed())?;
-    let count = Count::of(&planned)?;
+    let status = planned.status()?;
     let (plan, grid) = (&planned.plan, &planned.grid);
-    let wall_s = count.left_s / plan.estimate.threads.max(1) as f64;
     if session.json() {
         let json = json!({
-            "schema_version": 1, "plan": plan.id(), "cells": grid.len(), "cells_done": count.cells_done,
-            "units": count.units, "done": count.done, "foreign": count.foreign.len(),
-            "processor_s_left": count.left_s,
+            "schema_version": 1, "plan": plan.id(), "cells": grid.len(), "cells_done": status.cells_done,
+            "units": status.units, "done": status.done, "foreign": status.foreign.len(),
+            "processor_s_left": status.left_s,
         });
         session.printer.result(&json.to_string());
         return Ok(());
     }
     session.printer.result(&format!(
         "{} of {} units done, {} of {} cells complete; about {} left on {} threads",
-        count.done,
-        count.units,
-        count.cells_done,
+        status.done,
+        status.units,
+        status.cells_done,
         grid.len(),
-        duration(wall_s),
+        duration(status.left_s / plan.estimate.threads.max(1) as f64),
         plan.estimate.threads
     ));
-    count.warn_of_foreign(&planned, session);
+    if let Some(remark) = planned.foreign_units(&status) {
+        Watch::new(session, || true).remark(&remark);
+    }
     Ok(())
-}
-
-/// What is there of a plan.
-pub(super) struct Count {
-    pub(super) units: usize,
-    done: usize,
-    cells_done: usize,
-    left_s: f64,
-    /// The units that are not there.
-    pub(super) missing: Vec<(Unit, String)>,
-    /// Units of another plan.
-    foreign: Vec<String>,
-}
-
-impl Count {
-    pub(super) fn of(planned: &Planned) -> Result<Self, Failure> {
-        let mut there = study_directory::units(&planned.directory)?;
-        let (plan, grid) = (&planned.plan, &planned.grid);
-        let mut count =
-            Self { units: 0, done: 0, cells_done: 0, left_s: 0.0, missing: Vec::new(), foreign: Vec::new() };
-        let mut cell_whole = true;
-        for (unit, id) in plan.named_units(grid) {
-            let done = there.remove(&id);
-            count.units += 1;
-            count.done += usize::from(done);
-            cell_whole &= done;
-            if !done {
-                count.left_s += plan.unit_s(grid, unit);
-                count.missing.push((unit, id));
-            }
-            if unit.first + unit.runs == plan.study.runs {
-                count.cells_done += usize::from(cell_whole);
-                cell_whole = true;
-            }
-        }
-        count.foreign = there.into_iter().collect();
-        Ok(count)
-    }
-
-    /// Says how many unit files are not of this plan, and where.
-    pub(super) fn warn_of_foreign(&self, planned: &Planned, session: &Session) {
-        if let Some(id) = self.foreign.first() {
-            let (n, path) = (self.foreign.len(), unit_file::path(&planned.directory, id));
-            let path = path.display();
-            session.printer.warn(&format!("{n} unit files are of another plan and left out, such as {path}"));
-        }
-    }
 }

@@ -23,7 +23,7 @@ mod read;
 mod write;
 
 pub use calibrated::CalibrationNote;
-pub use read::read;
+pub use read::{from_text, read};
 pub use write::{to_toml, write};
 
 use crate::imu::{Channel, Sensor};
@@ -50,6 +50,15 @@ pub struct ModelFile {
 }
 
 impl ModelFile {
+    /// What the file at this path leaves open, in words.
+    #[must_use]
+    pub fn doubts(&self, path: &std::path::Path) -> Vec<String> {
+        let shown = path.display();
+        let unsaid =
+            |channel: &Channel| format!("{shown}: says nothing of {channel}, taken as free of noise");
+        self.missing.iter().map(unsaid).collect()
+    }
+
     /// A model of all six axes and nothing beside.
     #[must_use]
     pub const fn new(model: Model) -> Self {

@@ -18,6 +18,14 @@ pub fn read(path: &Path) -> Result<ModelFile, FileError> {
     parse(&Source::read(path)?)
 }
 
+/// A model file's text, at the path that messages show.
+///
+/// # Errors
+/// As [`read`].
+pub fn from_text(path: &Path, text: &str) -> Result<ModelFile, FileError> {
+    parse(&Source::new(&path.display().to_string(), text))
+}
+
 pub(super) fn parse(source: &Source) -> Result<ModelFile, FileError> {
     let table = source.parse()?;
     let root = source.root(&table);

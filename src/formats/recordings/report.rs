@@ -30,6 +30,14 @@ impl Report {
         })
     }
 
+    /// Every doubt, and which files have samples in common.
+    #[must_use]
+    pub fn doubts(&self) -> Vec<String> {
+        let common =
+            self.overlap().map(|(one, other, _)| format!("{other} and {one} have samples in common"));
+        self.all_warnings().into_iter().chain(common).collect()
+    }
+
     /// Every doubt, those about a file with its name.
     #[must_use]
     pub fn all_warnings(&self) -> Vec<String> {

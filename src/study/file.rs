@@ -1,19 +1,20 @@
 //! Study files of `nav-sim batch` (TOML): see [`Study`].
 
-use super::error::{FileError, Kind};
-use super::scenario_file;
-use super::suggest::nearest;
-use super::toml_described;
-use super::toml_file::{Section, Source};
+use super::description::{GnssEntry, ScenarioEntry, Study};
+use super::error::DescriptionError;
+use crate::formats::scenario_file;
+use crate::formats::suggest::nearest;
+use crate::formats::toml_described;
+use crate::formats::toml_file::{Section, Source};
+use crate::formats::{FileError, Kind};
 use crate::scenario::Scenario;
 use crate::sensors::gnss::GnssSettings;
-use crate::study::{Study, StudyError};
 use crate::units::SettingError;
 use std::path::{Path, PathBuf};
 
 /// A study, read, with the scenario and receiver files it names.
 #[derive(Debug, Clone, PartialEq)]
-pub struct BatchFile {
+pub struct StudyFile {
     /// The study, names and defaults filled in.
     pub study: Study,
     /// Its scenarios, in order (empty: the default).
@@ -32,7 +33,7 @@ pub fn beside(study: &Path, path: &Path) -> PathBuf {
 ///
 /// # Errors
 /// File, line, key and value of what is refused; a mistyped key with the nearest legal one.
-pub fn read(path: &Path) -> Result<BatchFile, FileError> {
+pub fn read(path: &Path) -> Result<StudyFile, FileError> {
     let source = Source::read(path)?;
     let table = source.parse()?;
     let root = source.root(&table);
@@ -41,7 +42,7 @@ pub fn read(path: &Path) -> Result<BatchFile, FileError> {
     for key in ["filters", "scenario", "gnss", "outages"] {
         let is_empty = |value: &toml::Value| value.as_array().is_some_and(Vec::is_empty);
         if written.get(key).is_some_and(is_empty) {
-            let e = StudyError::refused(key, "[]", "makes no cell; leave the key out for the default");
+            let e = DescriptionError::refused(key, "[]", "makes no cell; leave the key out for the default");
             return Err(located(&e, &source, &root));
         }
     }
@@ -49,11 +50,11 @@ pub fn read(path: &Path) -> Result<BatchFile, FileError> {
     study.reference().map_err(|e| located(&e, &source, &root))?;
     let scenarios = scenarios(&study, path, &source)?;
     let gnss = receivers(&study, path, &source)?;
-    Ok(BatchFile { study, scenarios, gnss })
+    Ok(StudyFile { study, scenarios, gnss })
 }
 
 fn scenarios(study: &Study, path: &Path, source: &Source) -> Result<Vec<Scenario>, FileError> {
-    let one = |(i, entry): (usize, &crate::study::ScenarioEntry)| {
+    let one = |(i, entry): (usize, &ScenarioEntry)| {
         let scenario = match (&entry.file, &entry.settings) {
             (Some(file), _) => scenario_file::read(&beside(path, file))?,
             (None, settings) => settings.clone().unwrap_or_default(),
@@ -65,7 +66,7 @@ fn scenarios(study: &Study, path: &Path, source: &Source) -> Result<Vec<Scenario
 }
 
 fn receivers(study: &Study, path: &Path, source: &Source) -> Result<Vec<GnssSettings>, FileError> {
-    let one = |(i, entry): (usize, &crate::study::GnssEntry)| {
+    let one = |(i, entry): (usize, &GnssEntry)| {
         let gnss = match (&entry.file, &entry.settings) {
             (Some(file), _) => scenario_file::read(&beside(path, file))?.gnss,
             (None, settings) => settings.clone().unwrap_or_default(),
@@ -94,9 +95,9 @@ fn line_of(source: &Source, key: &str) -> usize {
 }
 
 /// A refusal by [`Study::resolve`] at the line its key stands in.
-fn located(error: &StudyError, source: &Source, root: &Section<'_>) -> FileError {
+fn located(error: &DescriptionError, source: &Source, root: &Section<'_>) -> FileError {
     let hint = match error {
-        StudyError::NoReference { reference, candidates } => {
+        DescriptionError::NoReference { reference, candidates } => {
             let meant = nearest(reference, candidates.iter().map(String::as_str));
             meant.map(|m| format!("did you mean \"{m}\"?")).or(error.hint())
         }
@@ -109,10 +110,10 @@ fn located(error: &StudyError, source: &Source, root: &Section<'_>) -> FileError
     };
     let first = axis.split('.').next().unwrap_or(axis);
     let entry = entry.or(match error {
-        StudyError::Unnamed { entry, .. } | StudyError::NotOne { entry, .. } => Some(*entry),
+        DescriptionError::Unnamed { entry, .. } | DescriptionError::NotOne { entry, .. } => Some(*entry),
         _ => None,
     });
-    let line = if let (StudyError::Duplicate { name, .. }, true) = (error, root.has(first)) {
+    let line = if let (DescriptionError::Duplicate { name, .. }, true) = (error, root.has(first)) {
         second(source, name)
     } else if let Some(i) = entry {
         root.sections(first).ok().and_then(|all| all.get(i - 1).map(Section::line)).unwrap_or(1)
@@ -144,7 +145,7 @@ mod tests {
         [[candidate]]\nname = \"II\"\ncalibrate = { recordings = [\"r.csv\"], estimators = [\"awv\", \"dr-awv\"] }\n\
         [[outages]]\nsweep = { start_s = 300, duration_s = [10, 20] }\n";
 
-    fn study(text: &str) -> Result<BatchFile, String> {
+    fn study(text: &str) -> Result<StudyFile, String> {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("s.toml");
         std::fs::write(&path, text).unwrap();

@@ -4,9 +4,9 @@
 //! u64: for each column its runs, then its epochs), BLAKE3 of all before. A file that is cut off or changed
 //! in one bit is no unit file.
 
-use super::{FileError, atomic};
+use super::unit::UnitResult;
+use crate::formats::{FileError, atomic};
 use crate::simulation::{EpochSums, OutageRecord, REPORTED, RunRecord, RunResult};
-use crate::study::UnitResult;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::io;

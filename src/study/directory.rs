@@ -1,82 +1,14 @@
 //! The directory of a study: `plan.json`, `models/` calibrated by the plan, `units/`, and `results/`.
 
-use super::atomic;
-use super::difference::{self, Difference};
-use super::{source, unit_file};
-use crate::study::{Plan, Study, Unit};
+use super::description::Study;
+use super::failure::StudyError;
+use super::plan::{Plan, Unit};
+use super::unit_file;
+use crate::formats::difference::{self, Difference};
+use crate::formats::{FileError, atomic, source};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-
-/// A study directory that cannot be worked in.
-#[derive(Debug, thiserror::Error)]
-pub enum BatchDirectoryError {
-    /// There is no plan.
-    #[error("{path} holds no plan")]
-    NoPlan {
-        /// The directory.
-        path: String,
-    },
-    /// The system refused.
-    #[error("{path}: {source}")]
-    Io {
-        /// File or directory.
-        path: String,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// An output cannot be written.
-    #[error(transparent)]
-    Write(#[from] super::FileError),
-    /// The plan is not one.
-    #[error("{path}, line {line}: {message}")]
-    Damaged {
-        /// File.
-        path: String,
-        /// Line, from 1.
-        line: usize,
-        /// What the parser said.
-        message: String,
-    },
-    /// It is the plan of another study, or the study has changed since.
-    #[error(
-        "{path} is the plan of another study, or the study has changed since: \"{key}\" is {found} in the plan, {wanted} in the study"
-    )]
-    Other {
-        /// The plan's file.
-        path: String,
-        /// What differs.
-        key: String,
-        /// What is in the plan.
-        found: String,
-        /// What is in the study.
-        wanted: String,
-    },
-}
-
-impl BatchDirectoryError {
-    /// Whether the contents or the request are at fault (rather than the machine).
-    #[must_use]
-    pub fn is_usage(&self) -> bool {
-        match self {
-            Self::Io { source, .. } => source::is_damage(source.kind()),
-            Self::Write(e) => !e.is_system(),
-            _ => true,
-        }
-    }
-
-    /// What to do about it.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
-        match self {
-            Self::NoPlan { .. } => Some("make one with `nav-sim batch plan STUDY.toml`".into()),
-            Self::Write(e) => e.hint(),
-            Self::Io { .. } => None,
-            Self::Damaged { .. } => Some("remove the directory and plan again".into()),
-            Self::Other { .. } => Some("plan into another directory with --out, or remove this one".into()),
-        }
-    }
-}
 
 fn file(directory: &Path) -> PathBuf {
     directory.join("plan.json")
@@ -86,15 +18,17 @@ fn file(directory: &Path) -> PathBuf {
 ///
 /// # Errors
 /// When it cannot be read or is none.
-pub fn plan(directory: &Path) -> Result<Option<Plan>, BatchDirectoryError> {
+pub fn plan(directory: &Path) -> Result<Option<Plan>, FileError> {
     let path = file(directory);
     let shown = path.display().to_string();
     let text = match source::text(&path) {
         Ok(text) => text,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        Err(source) => return Err(BatchDirectoryError::Io { path: shown, source }),
+        Err(e) => return Err(FileError::io(&path, e)),
     };
-    let damaged = |line, message: String| BatchDirectoryError::Damaged { path: shown.clone(), line, message };
+    let damaged = |line: usize, message: String| {
+        FileError::contents(shown.as_str(), line, message).advice("remove the directory and plan again")
+    };
     let plan: Plan = serde_json::from_str(&text).map_err(|e| {
         damaged(e.line(), e.to_string().split(" at line ").next().unwrap_or_default().to_owned())
     })?;
@@ -109,9 +43,8 @@ pub fn plan(directory: &Path) -> Result<Option<Plan>, BatchDirectoryError> {
 ///
 /// # Errors
 /// When there is none, or the study is not the one that was planned, or `seed` is given and not the plan's.
-pub fn plan_of(directory: &Path, study: &Study, seed: Option<u64>) -> Result<Plan, BatchDirectoryError> {
-    let plan = plan(directory)?
-        .ok_or_else(|| BatchDirectoryError::NoPlan { path: directory.display().to_string() })?;
+pub fn plan_of(directory: &Path, study: &Study, seed: Option<u64>) -> Result<Plan, StudyError> {
+    let plan = plan(directory)?.ok_or_else(|| StudyError::NoPlan { directory: directory.to_owned() })?;
     same(directory, &plan, study, seed)?;
     Ok(plan)
 }
@@ -120,16 +53,12 @@ pub fn plan_of(directory: &Path, study: &Study, seed: Option<u64>) -> Result<Pla
 ///
 /// # Errors
 /// The key that differs.
-pub fn same(
-    directory: &Path,
-    plan: &Plan,
-    study: &Study,
-    seed: Option<u64>,
-) -> Result<(), BatchDirectoryError> {
-    let path = file(directory).display().to_string();
+pub fn same(directory: &Path, plan: &Plan, study: &Study, seed: Option<u64>) -> Result<(), StudyError> {
+    let refused = |key: &str, found: String, wanted: String| {
+        Err(StudyError::OtherStudy { plan: file(directory), key: key.to_owned(), found, wanted })
+    };
     if let Some(seed) = seed.filter(|seed| *seed != plan.seed) {
-        let (found, wanted) = (plan.seed.to_string(), seed.to_string());
-        return Err(BatchDirectoryError::Other { path, key: "seed".into(), found, wanted });
+        return refused("seed", plan.seed.to_string(), seed.to_string());
     }
     let study = Study { seed: study.seed.or(plan.study.seed), ..study.clone() };
     let value = |s: &Study| serde_json::to_value(s).unwrap_or_default();
@@ -137,9 +66,7 @@ pub fn same(
     let (Some(found), Some(wanted)) = (found.as_object(), wanted.as_object()) else { return Ok(()) };
     match difference::first(found, wanted) {
         None => Ok(()),
-        Some(Difference { key, found, wanted }) => {
-            Err(BatchDirectoryError::Other { path, key, found, wanted })
-        }
+        Some(Difference { key, found, wanted }) => refused(&key, found, wanted),
     }
 }
 
@@ -147,16 +74,16 @@ pub fn same(
 ///
 /// # Errors
 /// When the directory cannot be written to.
-pub fn write_plan(directory: &Path, plan: &Plan) -> Result<(), BatchDirectoryError> {
+pub fn write_plan(directory: &Path, plan: &Plan) -> Result<(), FileError> {
     let json = serde_json::to_string_pretty(plan).expect("plain structs are always JSON") + "\n";
-    Ok(atomic::write(&file(directory), json)?)
+    atomic::write(&file(directory), json)
 }
 
 /// The names of the units in a directory; whether they are whole is not looked at.
 ///
 /// # Errors
 /// When the directory cannot be read.
-pub fn units(directory: &Path) -> Result<BTreeSet<String>, BatchDirectoryError> {
+pub fn units(directory: &Path) -> Result<BTreeSet<String>, FileError> {
     let top = directory.join("units");
     let mut names = BTreeSet::new();
     for inner in entries(&top)? {
@@ -168,8 +95,8 @@ pub fn units(directory: &Path) -> Result<BTreeSet<String>, BatchDirectoryError> 
     Ok(names)
 }
 
-fn entries(path: &Path) -> Result<Vec<PathBuf>, BatchDirectoryError> {
-    let io = |source| BatchDirectoryError::Io { path: path.display().to_string(), source };
+fn entries(path: &Path) -> Result<Vec<PathBuf>, FileError> {
+    let io = |e| FileError::io(path, e);
     match fs::read_dir(path) {
         Ok(entries) => entries.map(|e| e.map(|e| e.path()).map_err(io)).collect(),
         Err(e) if matches!(e.kind(), std::io::ErrorKind::NotFound | std::io::ErrorKind::NotADirectory) => {
@@ -179,7 +106,7 @@ fn entries(path: &Path) -> Result<Vec<PathBuf>, BatchDirectoryError> {
     }
 }
 
-/// Whether a unit is there, whole and what the plan says (see [`fits`](crate::study::UnitResult::fits)); why not, if it is damaged.
+/// Whether a unit is there, whole and what the plan says (see [`fits`](super::UnitResult::fits)); why not, if it is damaged.
 ///
 /// # Errors
 /// When the system refuses.

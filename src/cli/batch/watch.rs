@@ -1,0 +1,44 @@
+//! What the engine of studies says, on the terminal.
+
+use crate::cli::{Progress, Session};
+use nav_sim::study::{Importance, Observer, Remark};
+use std::sync::OnceLock;
+
+/// Prints remarks and shows progress.
+pub(super) struct Watch<'a, F: Fn() -> bool + Sync> {
+    session: &'a Session,
+    go_on: F,
+    progress: OnceLock<Progress>,
+}
+
+impl<'a, F: Fn() -> bool + Sync> Watch<'a, F> {
+    /// Of work that goes on as long as `go_on` says so.
+    pub(super) const fn new(session: &'a Session, go_on: F) -> Self {
+        Self { session, go_on, progress: OnceLock::new() }
+    }
+}
+
+impl<F: Fn() -> bool + Sync> Observer for Watch<'_, F> {
+    fn remark(&self, remark: &Remark) {
+        let text = remark.to_string();
+        match remark.importance() {
+            Importance::Detail => self.session.printer.detail(&text),
+            Importance::Note => self.session.printer.say(&text),
+            Importance::Warning => self.session.printer.warn(&text),
+        }
+    }
+
+    fn begin(&self, runs: u64) {
+        let _ = self.progress.set(self.session.progress("runs", runs));
+    }
+
+    fn advance(&self, runs: u64) {
+        if let Some(progress) = self.progress.get() {
+            progress.add(runs);
+        }
+    }
+
+    fn go_on(&self) -> bool {
+        (self.go_on)()
+    }
+}

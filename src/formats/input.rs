@@ -1,0 +1,43 @@
+//! Files as inputs: which ones are meant, and their fingerprints.
+
+use super::{FileError, hash};
+use crate::report::Input;
+use std::path::{Path, PathBuf};
+
+/// An input with its fingerprint, of the bytes that were read.
+///
+/// # Errors
+/// When the system refuses.
+pub fn input(role: &str, path: &Path) -> Result<Input, FileError> {
+    let blake3 = hash::as_read(path).map_err(|e| FileError::io(path, e))?;
+    Ok(Input { role: role.to_owned(), path: path.display().to_string(), blake3 })
+}
+
+/// BLAKE3 of a file as it is now, in hexadecimal.
+///
+/// # Errors
+/// When the system refuses.
+pub fn fingerprint(path: &Path) -> Result<String, FileError> {
+    hash::of_file(path).map_err(|e| FileError::io(path, e))
+}
+
+/// The files themselves and those of directories, in name order.
+///
+/// # Errors
+/// When a directory cannot be read.
+pub fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, FileError> {
+    let mut files = Vec::new();
+    for path in paths {
+        if !path.is_dir() {
+            files.push(path.clone());
+            continue;
+        }
+        let refused = |e| FileError::io(path, e);
+        let entries = std::fs::read_dir(path).map_err(refused)?;
+        let entries = entries.collect::<Result<Vec<_>, _>>().map_err(refused)?;
+        let mut within: Vec<PathBuf> = entries.iter().map(|e| e.path()).filter(|p| p.is_file()).collect();
+        within.sort();
+        files.extend(within);
+    }
+    Ok(files)
+}

@@ -1,0 +1,188 @@
+//! What the cells of a plan are made of, loaded when first needed and checked against the plan's hashes.
+
+use super::directory;
+use super::failure::StudyError;
+use super::file::beside;
+use super::grid::Cell;
+use super::observer::Observer;
+use super::plan::{Prepared, Unit};
+use super::planned::Planned;
+use super::reader::{Reader, TruthSource};
+use crate::ekf::Belief;
+use crate::formats::{input, model_file};
+use crate::noise::{Model, continuous};
+use crate::scenario::Scenario;
+use crate::sensors::imu::Truth;
+use crate::sensors::outage::{Outage, PlacedOutages};
+use crate::simulation;
+use crate::trajectory::Trajectory;
+use std::collections::HashMap;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Role of models that the plan calibrated.
+pub(super) const CALIBRATED: &str = "calibrated";
+
+/// Model files that are made and not written yet: path in the study's directory, contents.
+pub(super) type ModelTexts = Vec<(String, String)>;
+
+/// Files of a plan; the last trajectory and truth are kept, since neighbouring cells share them.
+pub(super) struct Inputs<'a> {
+    planned: &'a Planned,
+    reader: Reader<'a>,
+    made: &'a [(String, String)],
+    trajectory: Option<(usize, Arc<Trajectory>)>,
+    truth: Option<(usize, Arc<TruthSource>)>,
+    models: HashMap<usize, Model>,
+}
+
+impl<'a> Inputs<'a> {
+    pub(super) fn new(planned: &'a Planned, observer: &'a dyn Observer) -> Self {
+        let reader = Reader { study: &planned.study, observer };
+        Self { planned, reader, made: &[], trajectory: None, truth: None, models: HashMap::new() }
+    }
+
+    /// With calibrated models that are not in the directory yet.
+    pub(super) fn with_models(self, made: &'a ModelTexts) -> Self {
+        Self { made, ..self }
+    }
+
+    /// Calls `f` with the simulation of a cell.
+    pub(super) fn with_cell<T>(
+        &mut self,
+        cell: Cell,
+        f: impl FnOnce(&simulation::Plan<'_>) -> Result<T, StudyError>,
+    ) -> Result<T, StudyError> {
+        let (plan, grid) = (&self.planned.plan, &self.planned.grid);
+        let scenario = grid.scenario(cell, plan.seed);
+        let trajectory = self.trajectory(cell.trajectory)?;
+        let truth = self.truth(cell.truth)?;
+        let outages = self.outages(cell)?.windows;
+        let beliefs = self.beliefs(cell, &scenario, &trajectory, &outages)?;
+        let part = || grid.names(cell).join(", ");
+        let truth_model;
+        let truth = match &*truth {
+            TruthSource::Recordings(recordings) => Truth::Static(recordings),
+            TruthSource::Model(model) => {
+                truth_model =
+                    continuous::at_rate(model, scenario.imu.rate_hz).map_err(|e| unfit(part(), e))?;
+                Truth::Model(&truth_model)
+            }
+        };
+        let experiment = scenario.experiment(&trajectory, truth, &beliefs, &outages, plan.seed);
+        let simulation = simulation::Plan::new(&experiment).map_err(|e| unfit(part(), e))?;
+        f(&simulation)
+    }
+
+    /// The outages of a cell; refuses those that do not lie on its trajectory.
+    pub(super) fn outages(&mut self, cell: Cell) -> Result<PlacedOutages, StudyError> {
+        let trajectory = self.trajectory(cell.trajectory)?;
+        let span_s = (trajectory.start_s(), trajectory.end_s());
+        let Planned { plan, grid, study, .. } = self.planned;
+        grid.scenario(cell, plan.seed).outages_on(span_s, plan.seed).map_err(|source| StudyError::Outage {
+            place: format!("{}: {}", study.display(), grid.names(cell).join(", ")),
+            source,
+        })
+    }
+
+    /// Duration of a trajectory (s).
+    pub(super) fn duration_s(&mut self, trajectory: usize) -> Result<f64, StudyError> {
+        let trajectory = self.trajectory(trajectory)?;
+        Ok(trajectory.end_s() - trajectory.start_s())
+    }
+
+    /// Whether a unit is there and what the plan says; what is wrong with it, if it is damaged.
+    pub(super) fn finished(&mut self, (unit, id): (Unit, &str)) -> Result<Result<bool, String>, StudyError> {
+        let outages = self.outages(self.planned.grid.cell(unit.cell))?.windows;
+        let outages: Vec<(f64, f64)> = outages.iter().map(|o| (o.start_s, o.end_s)).collect();
+        let columns = self.planned.grid.columns.len();
+        Ok(directory::finished(&self.planned.directory, (unit, id), columns, &outages)?)
+    }
+
+    fn trajectory(&mut self, index: usize) -> Result<Arc<Trajectory>, StudyError> {
+        if let Some((kept, trajectory)) = &self.trajectory
+            && *kept == index
+        {
+            return Ok(Arc::clone(trajectory));
+        }
+        let plan = &self.planned.plan;
+        let path = beside(&self.planned.study, &plan.study.trajectory[index].file);
+        unchanged(&path, &plan.trajectories[index])?;
+        let trajectory = Arc::new(self.reader.trajectory(&path)?);
+        self.trajectory = Some((index, Arc::clone(&trajectory)));
+        Ok(trajectory)
+    }
+
+    fn truth(&mut self, index: usize) -> Result<Arc<TruthSource>, StudyError> {
+        if let Some((kept, truth)) = &self.truth
+            && *kept == index
+        {
+            return Ok(Arc::clone(truth));
+        }
+        let plan = &self.planned.plan;
+        let entry = &plan.study.truth[index];
+        if self.reader.truth_hash(entry, plan.seed)? != plan.truths[index] {
+            return Err(StudyError::Changed { what: format!("the truth \"{}\"", entry.name) });
+        }
+        let truth = Arc::new(self.reader.truth(entry, plan.seed)?);
+        self.truth = Some((index, Arc::clone(&truth)));
+        Ok(truth)
+    }
+
+    fn beliefs(
+        &mut self,
+        cell: Cell,
+        scenario: &Scenario,
+        trajectory: &Trajectory,
+        outages: &[Outage],
+    ) -> Result<Vec<Belief>, StudyError> {
+        let grid = &self.planned.grid;
+        let mut beliefs = Vec::new();
+        for column in &grid.columns {
+            let mut own = scenario.clone();
+            own.filter.states = grid.filter(cell, column);
+            let model = self.model(column.candidate)?;
+            let part = || format!("candidate {}", column.name);
+            let model = continuous::at_rate(model, scenario.imu.rate_hz).map_err(|e| unfit(part(), e))?;
+            let track = own.track(trajectory, &model, outages).map_err(|e| unfit(part(), e))?;
+            beliefs.push(own.belief(&model, outages, &track).map_err(|e| unfit(part(), e))?);
+        }
+        Ok(beliefs)
+    }
+
+    fn model(&mut self, candidate: usize) -> Result<&Model, StudyError> {
+        if !self.models.contains_key(&candidate) {
+            let model = self.read_model(&self.planned.plan.models[candidate])?;
+            self.models.insert(candidate, model);
+        }
+        Ok(&self.models[&candidate])
+    }
+
+    fn read_model(&self, model: &Prepared) -> Result<Model, StudyError> {
+        if model.role != CALIBRATED {
+            let path = beside(&self.planned.study, Path::new(&model.path));
+            unchanged(&path, &model.blake3)?;
+            return Ok(self.reader.model(&path)?.model);
+        }
+        let path = self.planned.directory.join(&model.path);
+        if let Some((_, text)) = self.made.iter().find(|(made, _)| *made == model.path) {
+            let file = model_file::from_text(&path, text)?;
+            self.reader.doubt(file.doubts(&path));
+            return Ok(file.model);
+        }
+        unchanged(&path, &model.blake3).map_err(|e| StudyError::CalibratedModel(Box::new(e)))?;
+        Ok(self.reader.model(&path)?.model)
+    }
+}
+
+fn unfit(part: String, e: impl std::error::Error + Send + Sync + 'static) -> StudyError {
+    StudyError::Unfit { part, source: Box::new(e) }
+}
+
+/// Refuses a file that is not what it was when the study was planned.
+pub(super) fn unchanged(path: &Path, blake3: &str) -> Result<(), StudyError> {
+    if input::fingerprint(path)? == blake3 {
+        return Ok(());
+    }
+    Err(StudyError::Changed { what: path.display().to_string() })
+}

@@ -1,0 +1,136 @@
+//! Merging: units to tables.
+
+use super::cell_tables::{CellTables, DamagedUnits};
+use super::failure::StudyError;
+use super::observer::Observer;
+use super::plan::Unit;
+use super::planned::Planned;
+use super::tables::{Tables, Texts};
+use crate::formats::FileError;
+use crate::formats::atomic::AtomicDir;
+use crate::report;
+use crate::simulation::REPORTED_NAMES;
+use rayon::prelude::*;
+use serde_json::json;
+use std::io::ErrorKind;
+use std::path::PathBuf;
+
+/// How to merge.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct MergeOptions {
+    /// States (positions in [`REPORTED_NAMES`]) in the tables for people; the files have all.
+    pub states: Vec<usize>,
+    /// Threads that work.
+    pub threads: usize,
+}
+
+/// What a merge made.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MergeReport {
+    /// The directory of the tables.
+    pub results: PathBuf,
+    /// Tables for people: those of `tables.md`.
+    pub text: String,
+    /// `study.json`: where the results are from.
+    pub summary: serde_json::Value,
+    /// Runs that diverged; they are in no number.
+    pub diverged: u64,
+}
+
+/// Makes the tables of a finished study in `results/`, the same bytes however it was run.
+///
+/// # Errors
+/// When units are missing or damaged ([`StudyError::Incomplete`]): nothing is written then.
+pub fn merge(
+    planned: &Planned,
+    options: &MergeOptions,
+    observer: &dyn Observer,
+) -> Result<MergeReport, StudyError> {
+    let status = planned.status()?;
+    if let Some(remark) = planned.foreign_units(&status) {
+        observer.remark(&remark);
+    }
+    if !status.missing.is_empty() {
+        return Err(incomplete(planned, status.units, status.missing));
+    }
+    let results = planned.directory.join("results");
+    let mut out = AtomicDir::create(&results)?;
+    let mut tables = Tables::create(&mut out, planned)?;
+    let mut texts = Texts::new(planned)?;
+    let units: Vec<(Unit, String)> = planned.plan.named_units(&planned.grid).collect();
+    let cells: Vec<&[(Unit, String)]> = units.chunk_by(|a, b| a.0.cell == b.0.cell).collect();
+    let mut damaged = Vec::new();
+    let mut diverged = 0;
+    for wave in cells.chunks(cells_at_once(planned, options.threads)) {
+        let found: Vec<Result<Result<CellTables, DamagedUnits>, StudyError>> =
+            wave.par_iter().map(|units| CellTables::make(planned, units)).collect();
+        for cell in found {
+            match cell? {
+                Ok(cell) if damaged.is_empty() => {
+                    diverged += cell.diverged;
+                    tables.add(&cell)?;
+                    texts.add(cell.shown);
+                }
+                Ok(_) => {}
+                Err(DamagedUnits(units)) => damaged.extend(units),
+            }
+        }
+    }
+    if !damaged.is_empty() {
+        return Err(incomplete(planned, units.len(), damaged));
+    }
+    tables.finish()?;
+    let text = texts.render(&options.states);
+    out.write("tables.md", format!("{text}\n"))?;
+    let summary = summary(planned, units.len(), diverged);
+    out.write("study.json", report::json(&summary))?;
+    remove_stale(planned)?;
+    out.commit()?;
+    Ok(MergeReport { results, text, summary, diverged })
+}
+
+fn incomplete(planned: &Planned, units: usize, missing: Vec<(Unit, String)>) -> StudyError {
+    StudyError::Incomplete { units, missing, stale: planned.stale_results() }
+}
+
+/// Cells that are held in memory together.
+fn cells_at_once(planned: &Planned, threads: usize) -> usize {
+    const MEMORY: f64 = 1e8;
+    let cells = planned.grid.len().max(1) as f64;
+    let bytes_of_cell = 3.0 * planned.plan.estimate.bytes / cells + 1e4;
+    ((MEMORY / bytes_of_cell) as usize).clamp(1, 64 * threads.max(1))
+}
+
+/// Removes tables of an earlier plan that this one does not write; all others are replaced.
+fn remove_stale(planned: &Planned) -> Result<(), StudyError> {
+    if planned.keeps_epochs() {
+        return Ok(());
+    }
+    for name in ["epochs.csv", "epochs.parquet"] {
+        let path = planned.directory.join("results").join(name);
+        match std::fs::remove_file(&path) {
+            Err(e) if e.kind() != ErrorKind::NotFound => return Err(FileError::io(&path, e).into()),
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+fn summary(planned: &Planned, units: usize, diverged: u64) -> serde_json::Value {
+    let plan = &planned.plan;
+    json!({
+        "schema_version": 1,
+        "plan": plan.id(),
+        "version": plan.version,
+        "numerics": plan.numerics,
+        "seed": plan.seed,
+        "cells": planned.grid.len(),
+        "units": units,
+        "runs": plan.study.runs,
+        "diverged": diverged,
+        "states": REPORTED_NAMES,
+        "study": plan.study,
+        "inputs": plan.inputs,
+        "models": plan.models,
+    })
+}

@@ -1,0 +1,137 @@
+//! A study that has been planned, opened again.
+
+use super::directory;
+use super::failure::StudyError;
+use super::file;
+use super::fingerprint::fingerprint;
+use super::grid::Grid;
+use super::observer::{Observer, Remark};
+use super::plan::{Plan, Unit};
+use super::unit_file;
+use crate::lanes::LANES;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// A plan with its grid and its places.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Planned {
+    /// The plan.
+    pub plan: Plan,
+    /// Its grid.
+    pub grid: Grid,
+    /// The study's file.
+    pub study: PathBuf,
+    /// The study's directory.
+    pub directory: PathBuf,
+}
+
+impl Planned {
+    /// The plan in a directory, which must be that of the study, and have the seed if one is asked for.
+    ///
+    /// # Errors
+    /// When there is no plan, or that of another study.
+    pub fn open(study: &Path, directory: &Path, seed: Option<u64>) -> Result<Self, StudyError> {
+        let file = file::read(study)?;
+        Self::new(study, directory, directory::plan_of(directory, &file.study, seed)?)
+    }
+
+    pub(super) fn new(study: &Path, directory: &Path, plan: Plan) -> Result<Self, StudyError> {
+        let refused = |source| StudyError::Description { study: study.to_owned(), source };
+        let grid = plan.grid().map_err(refused)?;
+        Ok(Self { plan, grid, study: study.to_owned(), directory: directory.to_owned() })
+    }
+
+    /// Refuses to compute with a build or on a machine that makes other numbers than the one that planned.
+    pub(super) fn same_numbers(&self) -> Result<(), StudyError> {
+        let planned = (self.plan.version.clone(), self.plan.numerics.clone());
+        let here = (env!("CARGO_PKG_VERSION").to_owned(), fingerprint());
+        if planned == here { Ok(()) } else { Err(StudyError::OtherNumbers { planned, here }) }
+    }
+
+    /// Processor time of all units by the plan's probe (s).
+    #[must_use]
+    pub fn processor_s(&self) -> f64 {
+        self.plan.units(&self.grid).map(|unit| self.plan.unit_s(&self.grid, unit)).sum()
+    }
+
+    /// What the longest unit takes by the plan's probe (s) on so many threads.
+    #[must_use]
+    pub fn longest_unit_s(&self, threads: u64) -> f64 {
+        let wall_s = |unit: Unit| {
+            let batches = unit.runs.div_ceil(LANES as u64);
+            self.plan.unit_s(&self.grid, unit) / threads.clamp(1, batches.max(1)) as f64
+        };
+        self.plan.units(&self.grid).map(wall_s).fold(0.0, f64::max)
+    }
+
+    /// What is there of the units; whether they are whole is not looked at.
+    ///
+    /// # Errors
+    /// When the directory cannot be read.
+    pub fn status(&self) -> Result<Status, StudyError> {
+        let mut there = directory::units(&self.directory)?;
+        let (plan, grid) = (&self.plan, &self.grid);
+        let mut status = Status::default();
+        let mut cell_whole = true;
+        for (unit, id) in plan.named_units(grid) {
+            let done = there.remove(&id);
+            status.units += 1;
+            status.done += usize::from(done);
+            cell_whole &= done;
+            if !done {
+                status.left_s += plan.unit_s(grid, unit);
+                status.missing.push((unit, id));
+            }
+            if unit.first + unit.runs == plan.study.runs {
+                status.cells_done += usize::from(cell_whole);
+                cell_whole = true;
+            }
+        }
+        status.foreign = there;
+        Ok(status)
+    }
+
+    /// How many unit files are not of this plan, and where.
+    #[must_use]
+    pub fn foreign_units(&self, status: &Status) -> Option<Remark> {
+        let first = status.foreign.first()?;
+        let example = unit_file::path(&self.directory, first);
+        Some(Remark::ForeignUnits { units: status.foreign.len(), example })
+    }
+
+    /// The results that another plan left here, if there are any.
+    pub(super) fn stale_results(&self) -> Option<PathBuf> {
+        let path = self.directory.join("results");
+        let text = std::fs::read_to_string(path.join("study.json")).ok()?;
+        let summary: serde_json::Value = serde_json::from_str(&text).ok()?;
+        (summary["plan"] != self.plan.id().as_str()).then_some(path)
+    }
+
+    /// Remarks what other plans left in the directory.
+    pub(super) fn remark_leftovers(&self, observer: &dyn Observer) -> Result<(), StudyError> {
+        if let Some(remark) = self.foreign_units(&self.status()?) {
+            observer.remark(&remark);
+        }
+        if let Some(path) = self.stale_results() {
+            observer.remark(&Remark::StaleResults { path });
+        }
+        Ok(())
+    }
+}
+
+/// What is there of a plan.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Status {
+    /// Units of the plan.
+    pub units: usize,
+    /// Those that are there.
+    pub done: usize,
+    /// Cells all of whose units are there.
+    pub cells_done: usize,
+    /// Processor time of the units that are not there (s).
+    pub left_s: f64,
+    /// These units, with their names.
+    pub missing: Vec<(Unit, String)>,
+    /// Names of units of another plan.
+    pub foreign: BTreeSet<String>,
+}

@@ -1,0 +1,311 @@
+//! Planning: inputs checked and hashed, candidates calibrated, units cut.
+
+use super::description::{CalibrateStep, Study};
+use super::directory;
+use super::failure::StudyError;
+use super::file::{self, StudyFile, beside};
+use super::fingerprint::fingerprint;
+use super::inputs::{CALIBRATED, Inputs, ModelTexts, unchanged};
+use super::observer::{Observer, Remark};
+use super::plan::{Estimate, Kept, Plan, Prepared};
+use super::planned::Planned;
+use super::prepare::calibrated;
+use super::reader::{CANDIDATE_SEED, Reader};
+use super::unit::run_unit;
+use super::unit_file;
+use crate::calibration::{Estimator, Outcome};
+use crate::formats::model_file::{self, CalibrationNote};
+use crate::formats::{atomic, hash, input};
+use crate::lanes::LANES;
+use crate::report::Input;
+use std::collections::HashSet;
+use std::path::Path;
+
+/// What a unit is made to last (s).
+const UNIT_S: f64 = 120.0;
+
+/// How to plan.
+#[derive(Clone, Copy)]
+pub struct PlanOptions<'a> {
+    /// The seed, given the one of the study (or of the plan that is there), if it has one.
+    pub seed: &'a dyn Fn(Option<u64>) -> u64,
+    /// Threads that will work on a unit.
+    pub threads: usize,
+    /// Seconds since some instant, to time the probe with. Without it nothing is estimated, and units are as large as
+    /// the study says: else all runs of a cell.
+    pub clock: Option<&'a dyn Fn() -> f64>,
+    /// Whether the plan and the calibrated models are written.
+    pub writing: Writing,
+}
+
+/// Whether a plan is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Writing {
+    /// To the directory.
+    Write,
+    /// Only made.
+    DryRun,
+}
+
+/// What planning found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PlanReport {
+    /// The plan.
+    pub planned: Planned,
+    /// Whether it was there already: then nothing was written but models that were lost.
+    pub was_there: bool,
+}
+
+/// Checks a study and everything it names, calibrates its candidates, times a probe (eight runs of the first cell)
+/// and cuts the study into units. A plan of the same study that is there already is left as it is.
+///
+/// # Errors
+/// When an input is refused, or another study was planned there.
+pub fn plan(
+    study: &Path,
+    directory: &Path,
+    options: &PlanOptions<'_>,
+    observer: &dyn Observer,
+) -> Result<PlanReport, StudyError> {
+    let file = file::read(study)?;
+    let reader = Reader { study, observer };
+    if options.writing == Writing::Write
+        && let Some(plan) = directory::plan(directory)?
+    {
+        let seed = (options.seed)(Some(plan.seed));
+        directory::same(directory, &plan, &file.study, Some(seed))?;
+        let planned = Planned::new(study, directory, plan)?;
+        restore(&planned, reader)?;
+        return Ok(PlanReport { planned, was_there: true });
+    }
+    let seed = (options.seed)(file.study.seed);
+    let (plan, texts) = prepared(file, seed, reader)?;
+    let mut planned = Planned::new(study, directory, plan)?;
+    validate(&planned, &texts, observer)?;
+    probe(&mut planned, &texts, options, observer)?;
+    planned.remark_leftovers(observer)?;
+    if options.writing == Writing::Write {
+        for (path, text) in &texts {
+            atomic::write(&directory.join(path), text)?;
+        }
+        directory::write_plan(directory, &planned.plan)?;
+    }
+    Ok(PlanReport { planned, was_there: false })
+}
+
+/// The plan is there: its inputs must be what they were; models that are lost are made again.
+fn restore(planned: &Planned, reader: Reader<'_>) -> Result<(), StudyError> {
+    for input in &planned.plan.inputs {
+        unchanged(&beside(&planned.study, Path::new(&input.path)), &input.blake3)?;
+    }
+    restore_models(planned, reader)?;
+    planned.remark_leftovers(reader.observer)
+}
+
+/// Calibrates again what is lost or damaged in models/; it must be what the plan says.
+fn restore_models(planned: &Planned, reader: Reader<'_>) -> Result<(), StudyError> {
+    let Planned { plan, directory, .. } = planned;
+    let whole = |m: &Prepared| hash::of_file(&directory.join(&m.path)).is_ok_and(|found| found == m.blake3);
+    let lost: Vec<&Prepared> = plan.models.iter().filter(|m| m.role == CALIBRATED && !whole(m)).collect();
+    if lost.is_empty() {
+        return Ok(());
+    }
+    // models that are files of their own do not matter here
+    let (_, texts) = models(&plan.study, plan.seed, &[], reader)?;
+    for model in lost {
+        let Some((path, text)) = texts.iter().find(|(path, _)| *path == model.path) else {
+            return Err(StudyError::NotMadeAgain { model: model.path.clone() });
+        };
+        let path = directory.join(path);
+        atomic::write(&path, text)?;
+        reader.observer.remark(&Remark::ModelRestored { path });
+    }
+    Ok(())
+}
+
+/// The plan without its units, and the texts of the models calibrated for it.
+fn prepared(file: StudyFile, seed: u64, reader: Reader<'_>) -> Result<(Plan, ModelTexts), StudyError> {
+    let StudyFile { study, scenarios, gnss } = file;
+    let inputs = input_hashes(&study, reader)?;
+    let trajectories = study.trajectory.iter().map(|e| hash_of(&inputs, &e.file)).collect();
+    let truths = study.truth.iter().map(|e| reader.truth_hash(e, seed)).collect::<Result<_, _>>()?;
+    let (models, texts) = models(&study, seed, &inputs, reader)?;
+    let plan = Plan {
+        schema_version: Plan::SCHEMA_VERSION,
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        numerics: fingerprint(),
+        seed,
+        unit_runs: vec![study.unit_runs.unwrap_or(study.runs); study.trajectory.len()],
+        study,
+        scenarios,
+        gnss,
+        trajectories,
+        truths,
+        models,
+        inputs,
+        estimate: Estimate::default(),
+    };
+    Ok((plan, texts))
+}
+
+/// Every file of the study with its hash, directories of recordings file by file.
+fn input_hashes(study: &Study, reader: Reader<'_>) -> Result<Vec<Prepared>, StudyError> {
+    let base = reader.study.parent().unwrap_or(Path::new(""));
+    let mut found: Vec<Prepared> = Vec::new();
+    for (role, path) in study.files() {
+        for file in reader.listed(&[path.to_owned()])? {
+            let relative = file.strip_prefix(base).unwrap_or(&file).display().to_string();
+            let blake3 = input::input(role, &file)?.blake3;
+            let known = found.iter().any(|i| i.path == relative && i.role == role);
+            if !known {
+                found.push(Prepared { role: role.to_owned(), path: relative, blake3 });
+            }
+        }
+    }
+    Ok(found)
+}
+
+/// The hash of one of the inputs.
+fn hash_of(inputs: &[Prepared], path: &Path) -> String {
+    let wanted = path.display().to_string();
+    inputs.iter().find(|i| i.path == wanted).map(|i| i.blake3.clone()).unwrap_or_default()
+}
+
+/// The model of each candidate; those of calibration steps are made here.
+fn models(
+    study: &Study,
+    seed: u64,
+    inputs: &[Prepared],
+    reader: Reader<'_>,
+) -> Result<(Vec<Prepared>, ModelTexts), StudyError> {
+    let (mut models, mut texts) = (Vec::new(), Vec::new());
+    for entry in &study.candidate {
+        if let Some(path) = &entry.model {
+            let blake3 = hash_of(inputs, path);
+            models.push(Prepared { role: "model".into(), path: path.display().to_string(), blake3 });
+        }
+        let Some(step) = &entry.calibrate else { continue };
+        let (candidate, estimators) = (entry.name.clone(), step.estimators.clone());
+        reader.observer.remark(&Remark::Calibrating { candidate, estimators });
+        let made = calibration(step, seed, reader).map_err(|source| StudyError::Candidate {
+            candidate: entry.name.clone(),
+            source: Box::new(source),
+        })?;
+        for (estimator, text) in step.estimators.iter().zip(made) {
+            let blake3 = hash::of_bytes(text.as_bytes());
+            let tame = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' };
+            let name: String = format!("{}_{estimator}", entry.name).chars().map(tame).collect();
+            let path = format!("models/{name}_{}.toml", &blake3[..8]);
+            texts.push((path.clone(), text));
+            models.push(Prepared { role: CALIBRATED.into(), path, blake3 });
+        }
+    }
+    Ok((models, texts))
+}
+
+/// Model files of a calibration step, one an estimator.
+fn calibration(step: &CalibrateStep, seed: u64, reader: Reader<'_>) -> Result<Vec<String>, StudyError> {
+    let recordings = match &step.synthesize {
+        Some(synthesis) => reader.synthesised(synthesis, seed.wrapping_add(CANDIDATE_SEED))?,
+        None => reader.recordings(&step.recordings)?,
+    };
+    let (outcomes, settings) = calibrated(&recordings, step)?;
+    let files = reader.listed(&step.recordings)?;
+    let inputs = files.iter().map(|file| input::input("recording", file));
+    let note = CalibrationNote {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        efficiency_convention: "exact".to_owned(),
+        seed: None,
+        reading: toml::Table::new(),
+        inputs: inputs.collect::<Result<Vec<Input>, _>>()?,
+    };
+    let text = |estimator: &Estimator| {
+        let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == *estimator).collect();
+        model_file::to_toml(&note.model_file(&own, &settings, None))
+    };
+    Ok(settings.estimators.iter().map(text).collect())
+}
+
+/// Everything that would stop a run later: one cell of each trajectory, truth and scenario is set up, and
+/// every outage set must lie on every trajectory.
+fn validate(planned: &Planned, texts: &ModelTexts, observer: &dyn Observer) -> Result<(), StudyError> {
+    let grid = &planned.grid;
+    let mut inputs = Inputs::new(planned, observer).with_models(texts);
+    let (mut set_up, mut placed) = (HashSet::new(), HashSet::new());
+    let mut without = Vec::new();
+    for index in 0..grid.len() {
+        let cell = grid.cell(index);
+        if set_up.insert((cell.trajectory, cell.truth, cell.scenario)) || grid.len() <= 64 {
+            inputs.with_cell(cell, |_| Ok(()))?;
+        }
+        if placed.insert((cell.trajectory, cell.scenario, cell.outages)) {
+            let outages = inputs.outages(cell)?;
+            for remark in outages.remarks {
+                observer.remark(&Remark::Outage { cell: grid.names(cell).join(", "), remark });
+            }
+            if outages.windows.is_empty() {
+                without.push(grid.short_name(cell));
+            }
+        }
+    }
+    remark_no_outages(without, observer);
+    grid.doubts().into_iter().for_each(|doubt| observer.remark(&Remark::FilterDoubt(doubt)));
+    Ok(())
+}
+
+fn remark_no_outages(mut cells: Vec<String>, observer: &dyn Observer) {
+    const SHOWN: usize = 5;
+    let more = cells.len().saturating_sub(SHOWN);
+    cells.truncate(SHOWN);
+    cells.into_iter().for_each(|cell| observer.remark(&Remark::NoOutages { cell }));
+    if more > 0 {
+        observer.remark(&Remark::MoreWithoutOutages { cells: more });
+    }
+}
+
+/// Times eight runs of the first cell, and sizes the units by it.
+fn probe(
+    planned: &mut Planned,
+    texts: &ModelTexts,
+    options: &PlanOptions<'_>,
+    observer: &dyn Observer,
+) -> Result<(), StudyError> {
+    let Some(clock) = options.clock else { return Ok(()) };
+    let mut inputs = Inputs::new(planned, observer).with_models(texts);
+    let (grid, plan) = (&planned.grid, &planned.plan);
+    let probed = inputs.with_cell(grid.cell(0), |simulation| {
+        let start_s = clock();
+        let runs = plan.study.runs.min(LANES as u64);
+        let results = run_unit(simulation, (0, runs), plan.kept(), &|| true, &|_| {}).unwrap_or_default();
+        let epochs = results.first().map_or(0, |r| r.epochs.len());
+        // Eight runs take as long as one: the lanes of the processor.
+        Ok(((clock() - start_s) / LANES as f64, epochs, simulation.experiment().outages.len()))
+    })?;
+    let (run_s, epochs, outages) = probed;
+    let durations = (0..grid.trajectories.len()).map(|t| inputs.duration_s(t));
+    let durations = durations.collect::<Result<Vec<f64>, _>>()?;
+    let scale: Vec<f64> = durations.iter().map(|d| d / durations[0]).collect();
+    let run_s: Vec<f64> = scale.iter().map(|s| s * run_s).collect();
+    let unit_runs: Vec<u64> = match plan.study.unit_runs {
+        Some(runs) => vec![runs; run_s.len()],
+        None => run_s.iter().map(|s| unit_runs(*s, plan.study.runs, options.threads)).collect(),
+    };
+    // epochs inside outages are as many on any trajectory
+    let is_all = plan.kept() == Kept::AllEpochs;
+    let bytes_per_cell = |t: usize| {
+        let units = plan.study.runs.div_ceil(unit_runs[t]) as f64;
+        let epochs = if is_all { (epochs as f64 * scale[t]) as usize } else { epochs };
+        units * unit_file::size(grid.columns.len(), unit_runs[t].min(plan.study.runs), outages, epochs)
+    };
+    let bytes = (0..run_s.len()).map(bytes_per_cell).sum::<f64>() * grid.per_trajectory() as f64;
+    planned.plan.estimate = Estimate { run_s, threads: options.threads, bytes };
+    planned.plan.unit_runs = unit_runs;
+    Ok(())
+}
+
+/// Runs of a unit that lasts about two minutes on these threads: a multiple of eight.
+fn unit_runs(run_s: f64, runs: u64, threads: usize) -> u64 {
+    let lanes = LANES as f64;
+    let fit = (UNIT_S * threads as f64 / run_s / lanes).floor().max(1.0) * lanes;
+    (fit.min(1e9) as u64).min(runs)
+}

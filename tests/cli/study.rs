@@ -1,0 +1,94 @@
+//! A study planned, run and merged by library calls only.
+
+use crate::common::batch::*;
+use nav_sim::study::{
+    self, MergeOptions, Observer, PlanOptions, Planned, Remark, RunOptions, Shard, StudyError, VerifyOptions,
+    Writing,
+};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+const SEED: &dyn Fn(Option<u64>) -> u64 = &|of_study| of_study.unwrap_or(1);
+
+fn options(writing: Writing) -> PlanOptions<'static> {
+    PlanOptions { seed: SEED, threads: 2, clock: None, writing }
+}
+
+/// Keeps what it is told, and stops after so many runs.
+struct Watch {
+    remarks: Mutex<Vec<Remark>>,
+    done: AtomicU64,
+    stop_after: u64,
+}
+
+impl Watch {
+    fn until(stop_after: u64) -> Self {
+        Self { remarks: Mutex::default(), done: AtomicU64::new(0), stop_after }
+    }
+}
+
+impl Observer for Watch {
+    fn remark(&self, remark: &Remark) {
+        self.remarks.lock().unwrap().push(remark.clone());
+    }
+
+    fn advance(&self, runs: u64) {
+        self.done.fetch_add(runs, Ordering::Relaxed);
+    }
+
+    fn go_on(&self) -> bool {
+        self.done.load(Ordering::Relaxed) < self.stop_after
+    }
+}
+
+/// Two shards by the library, the first of them stopped once, make the bytes of the command.
+#[test]
+fn the_library_makes_the_bytes_of_the_command() {
+    let place = place();
+    let dir = place.path();
+    for arguments in
+        ["plan study.toml -o command", "run study.toml -o command", "merge study.toml -o command"]
+    {
+        done(dir, arguments);
+    }
+    let (file, directory) = (dir.join("study.toml"), dir.join("library"));
+    let made = study::plan(&file, &directory, &options(Writing::Write), &()).unwrap();
+    assert!(
+        !made.was_there && study::plan(&file, &directory, &options(Writing::Write), &()).unwrap().was_there
+    );
+    let planned = Planned::open(&file, &directory, Some(5)).unwrap();
+    let run = |index, observer: &dyn Observer| {
+        let shard = Shard::new(index, 2).unwrap();
+        study::run(&planned, &RunOptions { shard, threads: 1 }, observer).unwrap()
+    };
+    let first = run(0, &Watch::until(100));
+    assert!(first.left > 0 && first.finished + first.left == UNITS / 2, "{first:?}");
+    let watch = Watch::until(u64::MAX);
+    let rest = run(0, &watch);
+    assert_eq!((rest.finished, rest.left), (first.left, 0));
+    let already = Remark::DoneAlready { done: first.finished, pending: first.left };
+    assert_eq!(*watch.remarks.lock().unwrap(), [already]);
+    let merge = || study::merge(&planned, &MergeOptions { states: vec![1, 6], threads: 2 }, &());
+    match merge() {
+        Err(StudyError::Incomplete { units: UNITS, missing, stale: None }) => {
+            assert_eq!(missing.len(), UNITS / 2);
+        }
+        other => panic!("{other:?}"),
+    }
+    assert_eq!((planned.status().unwrap().done, run(1, &()).finished), (UNITS / 2, UNITS / 2));
+    let merged = merge().unwrap();
+    assert_eq!(merged.diverged, 0);
+    assert_eq!(results(&directory), results(&dir.join("command")));
+    let verified = study::verify(&planned, &VerifyOptions { units: 3, seed: 1 }, &()).unwrap();
+    assert_eq!((verified.whole, verified.compared, verified.different.len()), (UNITS, 3, 0));
+}
+
+#[test]
+fn a_dry_run_writes_nothing() {
+    let place = place();
+    let (file, directory) = (place.path().join("study.toml"), place.path().join("dry"));
+    let made = study::plan(&file, &directory, &options(Writing::DryRun), &()).unwrap();
+    assert_eq!(made.planned.plan.unit_count(&made.planned.grid), UNITS);
+    assert!(!directory.exists());
+    assert!(matches!(Planned::open(&file, &directory, None), Err(StudyError::NoPlan { .. })));
+}
