@@ -103,8 +103,9 @@ fn only_the_command_line_sees_clock_environment_terminal() {
         .iter()
         .filter(|(f, _)| !f.contains("/cli/") && !f.ends_with("main.rs") && !f.ends_with("tests.rs"))
     {
+        let code: String = text.lines().filter(|l| !l.trim_start().starts_with("//")).collect();
         for word in ["std::env", "std::time", "Instant::now", "println!", "rand::rng()", "num_threads"] {
-            assert!(!text.contains(word), "{file} uses {word}");
+            assert!(!code.contains(word), "{file} uses {word}");
         }
     }
 }

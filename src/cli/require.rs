@@ -26,8 +26,10 @@ use std::path::{Path, PathBuf};
 #[command(before_help = "\
 Examples:
   nav-sim require trajectories/figure_eight.toml --outage 60 --p95-m 50 -o needed.toml
-  nav-sim require trajectories/figure_eight.toml calib_data/tactical.toml --outage 60:120 --rmse-m 100
-  nav-sim require trajectories/figure_eight.toml calib_data/tactical.toml --outage longest --p95-m 20")]
+  nav-sim require trajectories/figure_eight.toml calib_data/tactical.toml \\
+      --outage 60:120 --rmse-m 100
+  nav-sim require trajectories/figure_eight.toml calib_data/tactical.toml \\
+      --outage longest --p95-m 20")]
 pub(crate) struct Args {
     /// Trajectory: motion profile (.toml) or table (.csv)
     trajectory: PathBuf,

@@ -22,9 +22,11 @@ use std::path::{Path, PathBuf};
 #[command(before_help = "\
 Examples:
   nav-sim tune calib_data/tactical.toml --truth calib_data/consumer_mems.toml -o tuned.toml
-  nav-sim tune examples/white_and_walk.toml --truth calib_data/tactical.toml calib_data/consumer_mems.toml \\
-      --for mean --trajectory trajectories/figure_eight.toml --outage 60:90
-  nav-sim tune calib_data/tactical.toml --truth calib_data/consumer_mems.toml --per process --format json")]
+  nav-sim tune examples/white_and_walk.toml --for mean \\
+      --truth calib_data/tactical.toml calib_data/consumer_mems.toml \\
+      --trajectory trajectories/figure_eight.toml --outage 60:90
+  nav-sim tune calib_data/tactical.toml --per process --format json \\
+      --truth calib_data/consumer_mems.toml")]
 pub(crate) struct Args {
     /// Noise model to be tuned
     model: PathBuf,

@@ -348,7 +348,7 @@ fn bad_studies_are_refused_by_line_before_anything_is_written() {
         ("name = \"wrong\"", "name = \"imu\"", "two candidate entries are named \"imu\"", "\"name\""),
         ("drive.toml", "gone.toml", "gone.toml: No such file", ""),
         ("start_s = 30", "start_s = 70", "outage 70:72 does not lie on the data", "60 s"),
-        ("\"epochs\"]", "\"epoch\"]", "\"metrics\"", "`epochs`"),
+        ("\"epochs\"]", "\"epoch\"]", "\"metrics\"", "did you mean \"epochs\"?"),
     ];
     for (from, to, message, more) in cases {
         fs::write(dir.join("study.toml"), STUDY.replace(from, to)).unwrap();

@@ -149,5 +149,5 @@ fn entries_are_refused_with_line_key_and_value() {
         refused("[gyro]\nnoises = { value = \"1 deg/sqrt(h)\", source = \"s\" }\n"),
         "u.toml, line 6: unknown key \"gyro.noises\""
     );
-    assert!(refused("[gyro]\nnoise = { value = \"1 deg/sqrt(h)\" }\n").contains("missing field `source`"));
+    assert!(refused("[gyro]\nnoise = { value = \"1 deg/sqrt(h)\" }\n").contains("source\" is missing"));
 }
