@@ -301,6 +301,8 @@ fn given(path: &Path, setting: &Setting, session: &Session) -> Result<(), Failur
     let outages = setting.outages();
     let course = setting.course(&outages, Detail::End)?;
     let margins = Margins::of(&course, &scenario, &model, &setting.limits).map_err(unusable)?;
+    let length_s = outages.iter().map(|o| o.end_s - o.start_s).fold(0.0, f64::max);
+    let longest = longest.beside(length_s, margins.met());
     let question = setting.question(outages);
     let verdict = words::margins_verdict(&margins, &question, longest);
     let shown = if session.json() {

@@ -191,6 +191,11 @@ impl Job {
             let hint = "see the head of calib_data/consumer_mems.toml, or leave --spread out";
             return Err(Failure::input(format!("{shown}: no [spread] to draw parameters from")).hint(hint));
         }
+        if file.turn_on.is_some() {
+            session.printer.say(&format!(
+                "{shown}: its turn-on biases are not drawn: recordings are of noise about their mean"
+            ));
+        }
         let contamination = args.contaminate.as_deref().map(|c| contamination(c, file.model.rate_hz));
         let contamination = contamination.transpose()?;
         let channels = wanted(args, &file, session)?;

@@ -20,7 +20,7 @@ use crate::imu::{Channel, Sensor};
 use crate::noise::practical::{
     AxisParameters, Bias, Closure, Curve, CurveError, Horizon, Markov, Pair, Policy,
 };
-use crate::noise::{Composite, Model};
+use crate::noise::{Composite, Model, Process};
 
 /// How a model is turned into parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,6 +45,22 @@ pub enum ExportError {
         sensor: Sensor,
         /// The target.
         target: &'static str,
+    },
+    /// A random walk is to be taken as it is, and the target has none.
+    #[error("{target} has no random walk, and the model's {} has one", .sensor.name())]
+    NoWalk {
+        /// The sensor.
+        sensor: Sensor,
+        /// The target.
+        target: &'static str,
+    },
+    /// Two correlation times are to be taken as they are, and the target has one.
+    #[error("KF-GINS has one correlation time, the model's sensors have {accel_s:.3} s and {gyro_s:.3} s")]
+    TwoTimes {
+        /// Of the accelerometer (s).
+        accel_s: f64,
+        /// Of the gyroscope (s).
+        gyro_s: f64,
     },
     /// Its noise cannot be described.
     #[error("{}: {source}", .sensor.name())]
@@ -143,6 +159,13 @@ impl Export {
                 return Err(ExportError::NoSensor { sensor, target: target.name() });
             }
             let axes: Vec<&Composite> = channels.iter().map(|c| model.axis(*c)).collect();
+            let walks = |p: &Process| matches!(p, Process::RandomWalk(_));
+            if settings.policy == Policy::Strict
+                && target.bias() != Bias::Walk
+                && axes.iter().any(|a| a.processes.iter().any(walks))
+            {
+                return Err(ExportError::NoWalk { sensor, target: target.name() });
+            }
             let curve = Curve::largest(&axes, model.rate_hz, settings.horizon)
                 .map_err(|source| ExportError::Curve { sensor, source })?;
             curves.push((channels, curve));
@@ -153,6 +176,12 @@ impl Export {
             sensors.push(SensorExport::new(model, channels, curve, bias, settings)?);
         }
         let sensors: [SensorExport; 2] = sensors.try_into().expect("two sensors");
+        if let (Target::KfGins, [Some(accel), Some(gyro)]) =
+            (target, sensors.each_ref().map(|s| s.exported.markov))
+            && (accel.t_corr_s / gyro.t_corr_s - 1.0).abs() > 1e-9
+        {
+            return Err(ExportError::TwoTimes { accel_s: accel.t_corr_s, gyro_s: gyro.t_corr_s });
+        }
         let entries = target.entries(&Values::new(model.rate_hz, &sensors));
         Ok(Self { target, rate_hz: model.rate_hz, settings, sensors, entries })
     }

@@ -207,6 +207,21 @@ pub fn longest_json(longest: Longest, question: &Question) -> String {
     super::json(&json!({ "schema_version": 1, "question": question.json(), "outage": longest.json() }))
 }
 
+impl Longest {
+    /// In agreement with what was found of an outage of a length: the longest is sought from places of its own, that
+    /// the trajectory holds for all lengths.
+    #[must_use]
+    pub fn beside(self, length_s: f64, met: bool) -> Self {
+        match self {
+            Self::Seconds(s) if met => Self::Seconds(s.max(length_s)),
+            Self::Seconds(s) | Self::AtLeast(s) if !met && s >= length_s => {
+                Self::Seconds((length_s.ceil() - 1.0).max(0.0))
+            }
+            other => other,
+        }
+    }
+}
+
 /// Whether a model keeps its limits, in a sentence.
 #[must_use]
 pub fn margins_verdict(margins: &Margins, question: &Question, longest: Longest) -> String {

@@ -69,6 +69,9 @@ impl Observer for Words<'_> {
 
 /// `largest z -2.31 (RMSE of yaw_deg at the end of outage 1) of 22 figures, up to 4.4 by chance; NEES z +0.52, …`
 pub(super) fn agreement_line(a: &Agreement) -> String {
+    if a.figures == 0 {
+        return "too few to compare: a scatter takes two runs".to_owned();
+    }
     format!(
         "largest z {:+.2} ({}) of {} figures, up to {:.1} by chance; NEES z {:+.2}, coverage z {:+.2}",
         a.largest_z, a.largest, a.figures, a.bound_z, a.nees_z, a.coverage_z

@@ -1,7 +1,7 @@
 //! `nav-sim trajectory record`.
 
 use super::{Source, wrote};
-use crate::cli::{Failure, Session, read};
+use crate::cli::{Failure, Session, read, turn_on};
 use nav_sim::formats::atomic::{AtomicDir, guard_inputs, recover};
 use nav_sim::formats::scenario_file;
 use nav_sim::formats::trajectory_file::{Rows, write_rows};
@@ -19,7 +19,7 @@ const FILES: [&str; 4] = ["imu.csv", "gnss.csv", "reference.csv", "initial.toml"
 ///
 /// The files are those that `fuse` reads: imu.csv (rates), gnss.csv, reference.csv (the truth, 10 Hz),
 /// initial.toml (a start drawn from the initial standard deviations). The noise is that of the first run of
-/// `run` with the same seed.
+/// `run` with the same seed; a turn-on bias that MODEL states is drawn too.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -50,11 +50,13 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if !FILES.iter().all(|name| args.out.join(name).is_file()) {
         crate::cli::run::empty_or_new(&args.out)?; // not a recording made before
     }
-    let scenario = args.scenario.as_deref().map(scenario_file::read).transpose()?.unwrap_or_default();
+    let mut scenario = args.scenario.as_deref().map(scenario_file::read).transpose()?.unwrap_or_default();
     let (trajectory, _) = args.source.read(session)?;
     let shown = args.model.display();
-    let model = continuous::at_rate(&read::model(&args.model, session)?.model, scenario.imu.rate_hz)
+    let file = read::model(&args.model, session)?;
+    let model = continuous::at_rate(&file.model, scenario.imu.rate_hz)
         .map_err(|e| Failure::input(format!("{shown}: {e}")))?;
+    turn_on::make(&mut scenario.imu, &file, &args.model, session);
     let seed = session.seed(scenario.run.seed);
     // a recording is what IMU and receiver give: no barometer, no filter
     let scenario = Scenario { baro: None, ..scenario };

@@ -129,7 +129,13 @@ impl Datasheet {
             let gamma2 = continuous::walk_gamma2(density, rate_hz);
             processes.push(Process::RandomWalk(RandomWalk::new(gamma2)?));
         }
-        Ok(Composite::new(processes))
+        let noise = Composite::new(processes);
+        if let Some(floor) = self.value(sensor, Figure::Bias) {
+            let given = self.value(sensor, Figure::CorrelationTime);
+            let t_corr_s = given.unwrap_or(ASSUMED_CORRELATION_TIME_S);
+            doubts.extend(doubt_minimum(sensor, floor, &noise, t_corr_s, rate_hz));
+        }
+        Ok(noise)
     }
 
     fn provenance(&self, program: &str, doubts: &[String]) -> Table {
@@ -206,6 +212,32 @@ fn doubt_floor(sensor: Sensor, floor: f64, density: f64, given_s: Option<f64>) -
         ));
     }
     doubts
+}
+
+/// Shortest averaging time at which the minimum of an Allan deviation is sought (s).
+const MINIMUM_FROM_S: f64 = 1.0;
+
+/// Manufacturers read a bias instability where the Allan deviation is lowest. A Gauss-Markov process of this peak beside
+/// little white noise is lower before its peak.
+fn doubt_minimum(
+    sensor: Sensor,
+    floor: f64,
+    noise: &Composite,
+    t_corr_s: f64,
+    rate_hz: f64,
+) -> Option<String> {
+    let peak_s = GAUSS_MARKOV_PEAK_AT * t_corr_s;
+    let times = (0..=80).map(|k| MINIMUM_FROM_S * (peak_s / MINIMUM_FROM_S).powf(f64::from(k) / 80.0));
+    let deviations = times.map(|t| (t, noise.allan_variance((t * rate_hz).round() as u32).sqrt()));
+    let (at_s, lowest) = deviations.min_by(|a, b| a.1.total_cmp(&b.1))?;
+    (lowest < 0.8 * floor).then(|| {
+        format!(
+            "{}: the Allan deviation of this model is lowest at {at_s:.0} s, with {:.2} of the bias instability, which it \
+             reaches at {peak_s:.0} s: where the datasheet means the lowest point, the model is optimistic there",
+            sensor.name(),
+            lowest / floor
+        )
+    })
 }
 
 #[cfg(test)]

@@ -62,7 +62,10 @@ fn what_is_assumed_is_said() {
     let bias = [(Sensor::Gyro, Figure::Bias, "10 deg/h"), (Sensor::Gyro, Figure::Noise, "0.3 deg/sqrt(h)")];
     let made = sheet(&bias).model_file(100.0, "test").unwrap();
     let assumed = "gyro: no correlation time is given; 300 s is assumed for the bias instability";
-    assert_eq!(made.doubts, [assumed]);
+    assert_eq!(made.doubts[0], assumed);
+    // Before its peak the process is a random walk of K = σ √(2/T): with N it is lowest at √3 N/K = 24 s, where the
+    // Allan variance is 2 N K/√3, in °/h 2·18·1.32/√3 = 5.24².
+    assert!(made.doubts.len() == 2 && made.doubts[1].contains("with 0.52 of the bias"), "{:?}", made.doubts);
     // 0.3 °/√h is above 10 °/h until (0.3·60/10)² = 3.24 s: a peak at 1.89·1 s is below that
     let mut short = sheet(&bias);
     short.set(sheet(&[(Sensor::Gyro, Figure::CorrelationTime, "1 s")]).entries.remove(0));

@@ -93,7 +93,7 @@ impl Requirement {
         };
         let ends = summary.outages.iter().map(of_outage).enumerate();
         // a figure that is not a number is the worst of all
-        let worst = ends.max_by(|a, b| a.1.total_cmp(&b.1));
+        let worst = ends.max_by(|a, b| (a.1.is_nan().cmp(&b.1.is_nan())).then(a.1.total_cmp(&b.1)));
         let (outage, value) = match (worst, self.figure) {
             (Some((outage, value)), _) => (Some(outage), value),
             (None, Figure::Rmse(state)) => (None, summary.accuracy.rmse_mean.0[state]),

@@ -74,7 +74,12 @@ impl Worst {
         let each = drifts.iter().enumerate().flat_map(|(place, drift)| {
             limits.iter().map(move |limit| Self { limit: *limit, value: drift.value(limit.quantity), place })
         });
-        each.min_by(|a, b| a.margin().total_cmp(&b.margin()))
+        let margins = |worst: &Self| (worst.margin(), worst.margin().is_nan());
+        each.min_by(|a, b| {
+            let ((a, a_is_nan), (b, b_is_nan)) = (margins(a), margins(b));
+            // what is not a number is the hardest
+            b_is_nan.cmp(&a_is_nan).then(a.total_cmp(&b))
+        })
     }
 }
 
@@ -82,7 +87,7 @@ impl Worst {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RequireError {
     /// Not even an IMU without errors keeps a limit.
-    #[error("no IMU keeps {} ≤ {}: without any error of it, it is {value:.3}, from GNSS and the start", .limit.quantity.name(), .limit.most)]
+    #[error("no IMU keeps {} ≤ {}: without any noise of it, it is {value:.3}, from GNSS, the start and what else the scenario has", .limit.quantity.name(), .limit.most)]
     Floor {
         /// The limit.
         limit: Limit,

@@ -49,7 +49,9 @@ pub struct Assessment {
 }
 
 /// Takes a filter along a track with its own covariance and that of its true errors, where `truth` makes the
-/// inertial errors, turn-on biases and scale factors are as the filter expects them, and the receiver is as the filter believes.
+/// inertial errors, turn-on biases and scale factors are as the filter expects them, and the receiver is as the filter
+/// believes. A drift (DR) is taken as the filter takes it: of that magnitude, either sign, each axis by itself; where
+/// the same drift is in every run, [`super::TruthSide`] adds the errors instead of their variances.
 #[must_use]
 pub fn assess(track: &Track, belief: &Belief, truth: &Model) -> Assessment {
     let truth = TruthSide::as_expected(belief, truth, !track.perfect);
