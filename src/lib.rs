@@ -51,3 +51,5 @@ pub mod formats;
 pub mod study;
 // What a command does, as one call.
 pub mod jobs;
+// All that most programs need.
+pub mod prelude;

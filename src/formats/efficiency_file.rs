@@ -51,7 +51,7 @@ struct Description {
     /// Version of the layout
     #[schemars(range(min = 1, max = 1))]
     schema: Option<u64>,
-    /// Model file with [spread], relative to this file
+    /// Model file with `[spread]`, relative to this file
     model: String,
     /// The axis studied: accel.x (default) … gyro.z
     #[serde(default = "accel_x")]

@@ -8,6 +8,7 @@ use crate::calibration::{
 use crate::formats::hash;
 use crate::formats::recordings::{self, FileReport, ReadOptions, Report};
 use crate::imu::{Channel, Recording, Signal};
+use crate::noise::Model;
 use crate::wavelet::{Tuning, default_levels};
 use rayon::prelude::*;
 use std::cell::RefCell;
@@ -179,6 +180,18 @@ impl Measured {
 }
 
 impl Calibration {
+    /// The noise model of an estimator, at the rate of the recordings; axes without a recording have no noise.
+    #[must_use]
+    pub fn model(&self, estimator: Estimator) -> Model {
+        let mut model = Model { rate_hz: self.settings.rate_hz, axes: Default::default() };
+        for outcome in self.outcomes.iter().filter(|o| o.estimator == estimator) {
+            for channel in outcome.scope.channels() {
+                model.axes[channel.index()] = outcome.fit.composite.clone();
+            }
+        }
+        model
+    }
+
     /// The same with intervals and goodness of fit, if they are asked for.
     pub(super) fn with_inference(mut self, bootstrap: Option<Bootstrap>) -> Self {
         if let Some(bootstrap) = bootstrap {

@@ -81,6 +81,11 @@ pub trait Observer: Sync {
     fn runs_end(&self) {}
 }
 
+/// Follows nothing.
+impl Observer for () {
+    fn note(&self, _: &Note) {}
+}
+
 /// Why a job cannot be done.
 #[derive(Debug, thiserror::Error)]
 pub enum NavigateError {

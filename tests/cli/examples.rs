@@ -16,12 +16,43 @@ mod ideal_imu;
 #[path = "../../examples/04_monte_carlo.rs"]
 mod monte_carlo;
 
+#[path = "../../examples/06_library.rs"]
+#[allow(dead_code, reason = "its command line is not called")]
+mod library;
+
 #[test]
 fn examples_run() {
     robust_wavelet_variance::main().unwrap();
     calibrate::main().unwrap();
     ideal_imu::main().unwrap();
     monte_carlo::main().unwrap();
+}
+
+/// White noise of a tactical gyroscope and an accelerometer drifts by metres in 90 s, not by kilometres.
+#[test]
+fn a_program_calibrates_a_directory_and_runs() {
+    let place = tempfile::tempdir().unwrap();
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let made = assert_cmd::Command::cargo_bin("nav-sim")
+        .unwrap()
+        .args([
+            "synthesize",
+            "calib_data/tactical.toml",
+            "--replicates",
+            "3",
+            "--samples",
+            "16384",
+            "--seed",
+            "1",
+            "-o",
+        ])
+        .arg(place.path().join("recordings"))
+        .current_dir(root)
+        .output();
+    assert!(made.unwrap().status.success());
+    let drift =
+        library::drift(&place.path().join("recordings"), &root.join("trajectories/land_vehicle.toml"));
+    assert!((0.1..1000.0).contains(&drift.unwrap()));
 }
 
 #[test]

@@ -2,7 +2,7 @@
 //! ([Guerrier](crate::bibliography::Guerrier13), eq. 6).
 //!
 //! Every process contributes an amplitude times a shape, so with the shapes fixed the model is linear. Not quite so for
-//! robust variances, which read quantization noise high by a factor of its share ([`crate::curve::implied`]): there the linear
+//! robust variances, which read quantization noise high by a factor of its share ([`crate::curve::implied()`]): there the linear
 //! problem is solved for the derivatives at the last solution until the shares settle. The implied curve is homogeneous in
 //! the amplitudes, so that its linear expansion at a solution has no constant, and where the shares have settled the
 //! conditions of the linear problem are those of the true one.
