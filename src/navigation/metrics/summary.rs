@@ -218,12 +218,14 @@ impl Summary {
     }
 
     /// With what covariance analysis expects beside the runs. The verdict becomes that of the expected figures, of
-    /// which chance has no part; runs that diverged remain its first word.
+    /// which chance has no part, unless the runs contradict them: then errors are no longer small, and the runs are right.
     pub fn expect(&mut self, expected: Self, agreement: Agreement) {
         self.method = "both";
         let diverged = self.verdict.kind == VerdictKind::Diverged;
-        let kind = if diverged { VerdictKind::Diverged } else { expected.verdict.kind };
-        self.verdict = Verdict { kind, ..expected.verdict };
+        if !agreement.is_broken() {
+            let kind = if diverged { VerdictKind::Diverged } else { expected.verdict.kind };
+            self.verdict = Verdict { kind, ..expected.verdict };
+        }
         self.lincov = Some(Box::new(expected));
         self.agreement = Some(agreement);
     }
