@@ -18,10 +18,11 @@
 pub use crate::calibration::Estimator;
 pub use crate::formats::trajectory_file::{Options as TrajectoryOptions, load as load_trajectory};
 pub use crate::jobs::{
-    Calibration, CalibrationOptions, NavigateInputs, Navigation, Observer, Remarks, Silence, TrueImu,
-    calibrate, navigate,
+    Calibration, CalibrationOptions, NavigateInputs, Navigation, Note, Remarks, Silence, TrueImu, calibrate,
+    navigate,
 };
 pub use crate::noise::{Composite, Model, Process, White};
+pub use crate::observer::Observer;
 pub use crate::scenario::{Method, Scenario};
 pub use crate::sensors::outage::Outage;
 pub use crate::trajectory::Trajectory;

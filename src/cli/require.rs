@@ -2,19 +2,15 @@
 
 use super::{Failure, Session, parse, read, turn_on};
 use nav_sim::formats::atomic::{AtomicFile, guard_inputs};
+use nav_sim::formats::datasheet::{self, CATALOGUE, Datasheet};
 use nav_sim::formats::model_file::{self, ModelFile};
 use nav_sim::formats::scenario_file;
+use nav_sim::jobs::{Ask, CatalogueUnit, Misplaced, Requirements};
 use nav_sim::noise::Model;
 use nav_sim::report::require as words;
-use nav_sim::report::require::{CURVE_S, Longest, NeededImu, Question, RankedUnit};
-use nav_sim::require::{
-    Answer, Course, Detail, Drift, IMU_PARAMETERS, ImuParameters, Limit, Margins, Need, Quantity,
-    RequireError, Worst, evenly,
-};
-use nav_sim::scenario::Scenario;
+use nav_sim::report::require::{Question, RankedUnit};
+use nav_sim::require::{ImuParameters, Limit, Quantity, RequireError};
 use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::ExperimentError;
-use nav_sim::trajectory::Trajectory;
 use std::path::{Path, PathBuf};
 
 /// Say which IMU keeps the errors at the end of an outage within limits, or what MODEL makes of them
@@ -55,9 +51,9 @@ pub(crate) struct Args {
     /// Also a curve of equal drift: eight gyroscope biases, and the velocity random walk that each leaves
     #[arg(long, conflicts_with = "model")]
     iso_drift: bool,
-    /// Rank the IMUs of a directory of model files
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["model", "iso_drift", "out"])]
-    catalogue: Option<PathBuf>,
+    /// Rank the catalogued IMUs (`nav-sim datasheet --list`), or those of a directory of entries and model files
+    #[arg(long, value_name = "DIR", num_args = 0..=1, conflicts_with_all = ["model", "iso_drift", "out"])]
+    catalogue: Option<Option<PathBuf>>,
     /// Model file of the IMU that is sought
     #[arg(long, short, value_name = "FILE", conflicts_with = "model")]
     out: Option<PathBuf>,
@@ -108,14 +104,6 @@ impl Limits {
     }
 }
 
-/// The outage that is asked for.
-#[derive(Debug, Clone, Copy)]
-enum Ask {
-    Length(f64),
-    Window(Outage),
-    Longest,
-}
-
 fn parse_ask(text: &str) -> Result<Ask, String> {
     let expected = "expected a length in seconds, START:END or longest";
     if text == "longest" {
@@ -130,130 +118,45 @@ fn parse_ask(text: &str) -> Result<Ask, String> {
     Ok(Ask::Window(outage))
 }
 
-/// Earliest start of an outage where nothing else is said (s): by then a filter has aligned itself.
-const SETTLED_S: f64 = 300.0;
-/// Places of an outage of which only the length is given.
-const PLACES: u32 = 4;
-/// Longest outage that is looked at (s).
-const LONGEST_S: f64 = 600.0;
-/// Points of a curve of equal drift.
-const POINTS: u32 = 8;
-
 /// What is asked, with the files read.
-struct Setting {
-    scenario: Scenario,
-    trajectory: Trajectory,
-    limits: Vec<Limit>,
-    ask: Ask,
-    first_s: f64,
-}
-
-impl Setting {
-    fn read(args: &Args, session: &Session) -> Result<Self, Failure> {
-        let limits = args.limits.given()?;
-        let mut scenario = args.scenario.as_deref().map(scenario_file::read).transpose()?.unwrap_or_default();
-        if let Some(path) = &args.gnss {
-            scenario.gnss = scenario_file::read(path)?.gnss;
-        }
-        scenario.validate().map_err(Failure::input)?;
-        let trajectory = read::trajectory(&args.trajectory, session)?;
-        let (start_s, end_s) = (trajectory.start_s(), trajectory.end_s());
-        let length_s = match args.outage {
-            Ask::Length(length_s) => length_s,
-            Ask::Window(outage) => outage.end_s - outage.start_s,
-            Ask::Longest => 1.0,
-        };
-        let first_s =
-            args.start.unwrap_or_else(|| start_s + SETTLED_S.min(0.5 * (end_s - start_s - length_s)));
-        let begins_s = if let Ask::Window(outage) = args.outage { outage.start_s } else { first_s };
-        if begins_s < start_s || begins_s + length_s > end_s {
-            let message = format!("an outage of {length_s} s from {begins_s} s on is not on the trajectory");
-            let hint =
-                format!("it lasts from {start_s} to {end_s} s: a shorter --outage, or an earlier --start");
-            return Err(Failure::input(message).hint(hint));
-        }
-        Ok(Self { scenario, trajectory, limits, ask: args.outage, first_s })
+fn requirements(args: &Args, session: &Session) -> Result<Requirements, Failure> {
+    let limits = args.limits.given()?;
+    let mut scenario = args.scenario.as_deref().map(scenario_file::read).transpose()?.unwrap_or_default();
+    if let Some(path) = &args.gnss {
+        scenario.gnss = scenario_file::read(path)?.gnss;
     }
-
-    /// The places of the outage; those of one second where the longest is sought.
-    fn outages(&self) -> Vec<Outage> {
-        let length_s = match self.ask {
-            Ask::Window(outage) => return vec![outage],
-            Ask::Length(length_s) => length_s,
-            Ask::Longest => 1.0,
-        };
-        evenly(self.first_s, self.trajectory.end_s(), length_s, PLACES)
-    }
-
-    /// Outages as long as the trajectory allows at several places.
-    fn long_outages(&self) -> Vec<Outage> {
-        let end_s = self.trajectory.end_s();
-        if let Ask::Window(outage) = self.ask {
-            let end_s = end_s.min(outage.start_s + LONGEST_S);
-            return vec![Outage { end_s, ..outage }];
-        }
-        let asked = if let Ask::Length(length_s) = self.ask { length_s } else { 1.0 };
-        let length_s = (0.5 * (end_s - self.first_s)).floor().min(LONGEST_S).max(asked);
-        evenly(self.first_s, end_s, length_s, PLACES)
-    }
-
-    fn course(&self, outages: &[Outage], detail: Detail) -> Result<Course<'_>, Failure> {
-        let course = Course::new(&self.scenario, &self.trajectory, outages, detail);
-        course.map_err(|e: ExperimentError| Failure::input(e))
-    }
-
-    fn question(&self, outages: Vec<Outage>) -> Question {
-        Question { limits: self.limits.clone(), outages }
-    }
+    scenario.validate().map_err(Failure::input)?;
+    let trajectory = read::trajectory(&args.trajectory, session)?;
+    Requirements::new(scenario, trajectory, limits, args.outage, args.start).map_err(|e: Misplaced| {
+        let earlier = if args.start.is_some() { ", or an earlier --start" } else { "" };
+        Failure::input(e).hint(format!("a shorter --outage{earlier}"))
+    })
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    if args.model.is_none() && matches!(args.outage, Ask::Longest) {
+    if args.model.is_none() && args.outage == Ask::Longest {
         return Err(
             Failure::input("--outage longest needs a MODEL").hint("without one, give a length in seconds")
         );
     }
-    let setting = Setting::read(args, session)?;
+    let asked = requirements(args, session)?;
     match (&args.model, &args.catalogue) {
-        (Some(path), _) => given(path, &setting, session),
-        (None, Some(directory)) => ranked(directory, &setting, session),
-        (None, None) => sought(args, &setting, session),
+        (Some(path), _) => given(path, args.outage, &asked, session),
+        (None, Some(directory)) => ranked(directory.as_deref(), &asked, session),
+        (None, None) => sought(args, &asked, session),
     }
 }
 
 /// The IMU that is needed.
-fn sought(args: &Args, setting: &Setting, session: &Session) -> Result<(), Failure> {
+fn sought(args: &Args, asked: &Requirements, session: &Session) -> Result<(), Failure> {
     if let Some(out) = &args.out {
         guard_inputs(out, [args.trajectory.as_path()])?;
         drop(AtomicFile::create(out)?);
     }
-    let outages = setting.outages();
-    let course = setting.course(&outages, Detail::End)?;
-    let (scenario, limits) = (&setting.scenario, setting.limits.as_slice());
-    let need = Need { course: &course, scenario, limits, t_corr_s: args.corr_time_s };
-    let found = || -> Result<NeededImu, RequireError> {
-        let (imu, shares) = need.allocated()?;
-        let mut needed = NeededImu {
-            imu,
-            shares,
-            alone: [Answer::Any; IMU_PARAMETERS],
-            others_better: [Answer::Any; IMU_PARAMETERS],
-            iso_drift: None,
-        };
-        for i in 0..needed.alone.len() {
-            needed.alone[i] = need.quite_alone(&imu, i)?;
-            needed.others_better[i] = need.alone(&imu, i, 0.1)?;
-        }
-        if args.iso_drift {
-            needed.iso_drift = Some(need.iso_drift(&imu, POINTS)?);
-        }
-        Ok(needed)
-    };
-    let needed = found().map_err(|e| {
+    let (needed, question) = asked.needed(args.corr_time_s, args.iso_drift).map_err(|e| {
         Failure::input(e)
             .hint("a larger limit, a shorter outage, or a better receiver ([gnss] of --scenario)")
     })?;
-    let question = setting.question(outages);
     let shown = if session.json() {
         needed.json(&question)
     } else {
@@ -262,7 +165,7 @@ fn sought(args: &Args, setting: &Setting, session: &Session) -> Result<(), Failu
     };
     session.printer.result(shown.trim_end());
     if let Some(out) = &args.out {
-        model_file::write(out, &needed_file(&needed.imu, &question, scenario.imu.rate_hz))?;
+        model_file::write(out, &needed_file(&needed.imu, &question, asked.scenario.imu.rate_hz))?;
         session.printer.say(&format!("wrote {}", out.display()));
     }
     Ok(())
@@ -271,7 +174,7 @@ fn sought(args: &Args, setting: &Setting, session: &Session) -> Result<(), Failu
 fn needed_file(imu: &ImuParameters, question: &Question, rate_hz: f64) -> ModelFile {
     let mut provenance = toml::Table::new();
     let mut put = |key: &str, value: toml::Value| provenance.insert(key.to_owned(), value);
-    put("program", format!("nav-sim {}", env!("CARGO_PKG_VERSION")).into());
+    put("program", program().into());
     put("made_by", "require".into());
     put("label", "what a limit needs: not a calibration".into());
     put("question", question.in_words().into());
@@ -281,29 +184,29 @@ fn needed_file(imu: &ImuParameters, question: &Question, rate_hz: f64) -> ModelF
     ModelFile { provenance: Some(provenance), ..ModelFile::new(imu.model(rate_hz)) }
 }
 
+fn program() -> String {
+    format!("nav-sim {}", env!("CARGO_PKG_VERSION"))
+}
+
 /// What a given IMU makes of the limits.
-fn given(path: &Path, setting: &Setting, session: &Session) -> Result<(), Failure> {
-    let unusable = |e| Failure::input(format!("{}: {e}", path.display()));
+fn given(path: &Path, ask: Ask, asked: &Requirements, session: &Session) -> Result<(), Failure> {
+    let unusable = |e: RequireError| Failure::input(format!("{}: {e}", path.display()));
     let file = read::model(path, session)?;
-    let (scenario, model) = unit(path, &file, setting, session)?;
-    let long = setting.course(&setting.long_outages(), Detail::Seconds)?;
-    let longest = longest(&long.curves(&scenario, &model).map_err(unusable)?, &setting.limits);
-    if matches!(setting.ask, Ask::Longest) {
-        let question = setting.question(long.outages().collect());
+    let mut scenario = asked.scenario.clone();
+    turn_on::expect(&mut scenario.initial, &file, path, session);
+    turn_on::make(&mut scenario.imu, &file, path, session);
+    let model = read::at_rate(path, &file.model, scenario.imu.rate_hz, session)?;
+    let (longest, places) = asked.longest(&scenario, &model).map_err(unusable)?;
+    if ask == Ask::Longest {
         let shown = if session.json() {
-            words::longest_json(longest, &question)
+            words::longest_json(longest, &places)
         } else {
-            words::longest_verdict(longest, &question)
+            words::longest_verdict(longest, &places)
         };
         session.printer.result(shown.trim_end());
         return Ok(());
     }
-    let outages = setting.outages();
-    let course = setting.course(&outages, Detail::End)?;
-    let margins = Margins::of(&course, &scenario, &model, &setting.limits).map_err(unusable)?;
-    let length_s = outages.iter().map(|o| o.end_s - o.start_s).fold(0.0, f64::max);
-    let longest = longest.beside(length_s, margins.met());
-    let question = setting.question(outages);
+    let (margins, question) = asked.margins(&scenario, &model).map_err(unusable)?;
     let verdict = words::margins_verdict(&margins, &question, longest);
     let shown = if session.json() {
         words::margins_json(&margins, &question, longest)
@@ -319,86 +222,81 @@ fn given(path: &Path, setting: &Setting, session: &Session) -> Result<(), Failur
     Err(Failure::bound(format!("{name} is {:.3}, the limit is {most}", worst.value)))
 }
 
-/// A model at the rate of the IMU, and the scenario of that unit: its turn-on biases are there and expected.
-fn unit(
-    path: &Path,
-    file: &ModelFile,
-    setting: &Setting,
-    session: &Session,
-) -> Result<(Scenario, Model), Failure> {
-    let mut scenario = setting.scenario.clone();
-    turn_on::expect(&mut scenario.initial, file, path, session);
-    turn_on::make(&mut scenario.imu, file, path, session);
-    let model = read::at_rate(path, &file.model, scenario.imu.rate_hz, session)?;
-    Ok((scenario, model))
-}
-
-/// The errors after a time without fixes at every place where the outage lasts so long.
-fn after(curves: &[Vec<Drift>], length_s: f64) -> Vec<Drift> {
-    let there = |curve: &Vec<Drift>| curve.iter().find(|d| (d.after_s - length_s).abs() < 1e-3).copied();
-    curves.iter().filter_map(there).collect()
-}
-
-/// The longest outage within the limits, in whole seconds.
-fn longest(curves: &[Vec<Drift>], limits: &[Limit]) -> Longest {
-    let lengths: Vec<f64> = curves.first().map_or_else(Vec::new, |c| c.iter().map(|d| d.after_s).collect());
-    let is_missed = |length_s: &f64| {
-        Worst::of(limits, &after(curves, *length_s)).is_some_and(|worst| worst.margin() < 0.0)
+/// The units of the catalogue or of a directory, the best first.
+fn ranked(directory: Option<&Path>, asked: &Requirements, session: &Session) -> Result<(), Failure> {
+    let units = match directory {
+        Some(directory) => units_of(directory, asked, session)?,
+        None => catalogue(asked)?,
     };
-    match lengths.iter().position(is_missed) {
-        Some(0) => Longest::Seconds(0.0),
-        Some(first) => Longest::Seconds(lengths[first - 1]),
-        None => Longest::AtLeast(lengths.last().copied().unwrap_or(0.0)),
-    }
-}
-
-/// The units of a directory, the best first.
-fn ranked(directory: &Path, setting: &Setting, session: &Session) -> Result<(), Failure> {
-    let length_s = match setting.ask {
-        Ask::Length(length_s) => length_s,
-        Ask::Window(outage) => outage.end_s - outage.start_s,
-        Ask::Longest => 1.0,
-    };
-    let paths: Vec<PathBuf> = read::listed(&[directory.to_owned()])?
-        .into_iter()
-        .filter(|p| p.extension().is_some_and(|e| e == "toml"))
-        .collect();
-    if paths.is_empty() {
-        let message = format!("{}: no model file (.toml)", directory.display());
-        return Err(Failure::input(message).hint("make them with `nav-sim calibrate` or `nav-sim datasheet`"));
-    }
-    let outages = setting.long_outages();
-    let course = setting.course(&outages, Detail::Seconds)?;
-    let mut units = Vec::new();
-    for path in &paths {
-        let file = read::model(path, session)?;
-        let (scenario, model) = unit(path, &file, setting, session)?;
-        let curves = course
-            .curves(&scenario, &model)
-            .map_err(|e| Failure::input(format!("{}: {e}", path.display())))?;
-        let hardest = |length_s: f64| Worst::of(&setting.limits, &after(&curves, length_s));
-        let worst = hardest(length_s)
-            .ok_or_else(|| Failure::input(format!("{length_s} s is not a whole number of seconds")))?;
-        let quantity = worst.limit.quantity;
-        let value = |s: u32| {
-            let drifts = after(&curves, f64::from(s));
-            drifts.iter().map(|d| d.value(quantity)).reduce(f64::max)
-        };
-        units.push(RankedUnit {
-            name: path.file_stem().map_or_else(String::new, |n| n.to_string_lossy().into_owned()),
-            worst,
-            curve: CURVE_S.map(value),
-            longest: longest(&curves, &setting.limits),
-        });
-    }
-    units.sort_by(|a, b| b.worst.margin().total_cmp(&a.worst.margin()));
-    let cut = outages.iter().map(|o| Outage { end_s: o.start_s + length_s, ..*o }).collect();
-    let question = setting.question(cut);
+    let (units, question) = asked.ranked(&units).map_err(Failure::input)?;
     let shown = if session.json() {
         words::catalogue_json(&units, &question)
     } else {
         format!("{}:\n\n{}", question.in_words(), super::compare::table(&words::catalogue_rows(&units)))
     };
     session.printer.result(shown.trim_end());
-    Ok(())
+    if units.iter().any(|unit| !unit.not_stated.is_empty()) {
+        session
+            .printer
+            .warn("figures that are not stated count as none: such a unit looks better than it is (open)");
+    }
+    if units.iter().any(RankedUnit::is_met) {
+        return Ok(());
+    }
+    Err(Failure::bound("no unit keeps the limits by figures that are all stated"))
+}
+
+/// The units that are known by name.
+fn catalogue(asked: &Requirements) -> Result<Vec<CatalogueUnit>, Failure> {
+    let unit = |(name, _): &(&str, &str)| {
+        let sheet = datasheet::catalogued(name).expect("a name of the catalogue")?;
+        of_sheet((*name).to_owned(), &sheet, asked)
+    };
+    CATALOGUE.iter().map(unit).collect()
+}
+
+/// The model files and catalogue entries of a directory.
+fn units_of(
+    directory: &Path,
+    asked: &Requirements,
+    session: &Session,
+) -> Result<Vec<CatalogueUnit>, Failure> {
+    let mut paths = read::listed(&[directory.to_owned()])?;
+    paths.retain(|p| p.extension().is_some_and(|e| e == "toml"));
+    if paths.is_empty() {
+        let message = format!("{}: no model file (.toml)", directory.display());
+        return Err(Failure::input(message).hint("make them with `nav-sim calibrate` or `nav-sim datasheet`"));
+    }
+    let unit = |path: &PathBuf| {
+        let name = path.file_stem().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
+        if datasheet::is_entry(path) {
+            return of_sheet(name, &datasheet::read(path)?, asked);
+        }
+        let file = read::model(path, session)?;
+        let model = read::at_rate(path, &file.model, asked.scenario.imu.rate_hz, session)?;
+        let not_stated = file.missing.iter().map(ToString::to_string).collect();
+        Ok(of_model(name, &file, model, not_stated, asked))
+    };
+    paths.iter().map(unit).collect()
+}
+
+fn of_sheet(name: String, sheet: &Datasheet, asked: &Requirements) -> Result<CatalogueUnit, Failure> {
+    let made = sheet.model_file(asked.scenario.imu.rate_hz, &program());
+    let file = made.map_err(|e| Failure::input(format!("{name}: {e}")))?.file;
+    let model = file.model.clone();
+    Ok(of_model(name, &file, model, sheet.not_stated(), asked))
+}
+
+/// A unit whose turn-on biases are there and expected.
+fn of_model(
+    name: String,
+    file: &ModelFile,
+    model: Model,
+    not_stated: Vec<String>,
+    asked: &Requirements,
+) -> CatalogueUnit {
+    let mut scenario = asked.scenario.clone();
+    turn_on::expected(&mut scenario.initial, file);
+    turn_on::made(&mut scenario.imu, file);
+    CatalogueUnit { name, model, scenario, not_stated }
 }

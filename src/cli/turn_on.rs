@@ -4,45 +4,62 @@ use super::Session;
 use nav_sim::ekf::InitialSettings;
 use nav_sim::formats::model_file::ModelFile;
 use nav_sim::imu::Sensor;
+use nav_sim::report::readable;
 use nav_sim::sensors::defects::ImuSettings;
 use std::path::Path;
 
 /// Lets the filter expect the turn-on bias of its model; `--turn-on-bias` and `[initial]` win.
 pub(super) fn expect(initial: &mut InitialSettings, file: &ModelFile, path: &Path, session: &Session) {
-    for (sensor, sigma) in stated(file) {
-        let setting = match sensor {
-            Sensor::Accel => &mut initial.accel_bias_sigma_m_s2,
-            Sensor::Gyro => &mut initial.gyro_bias_sigma_rad_s,
-        };
-        if setting.is_none() {
-            *setting = Some(sigma);
-            say("the filter expects", sensor, sigma, path, session);
-        }
-    }
+    say("the filter expects", &expected(initial, file), path, session);
 }
 
 /// Gives the true IMU the turn-on bias of the model that makes its errors; `[imu]` wins unless it is 0.
 pub(super) fn make(imu: &mut ImuSettings, file: &ModelFile, path: &Path, session: &Session) {
-    for (sensor, sigma) in stated(file) {
+    say("the true IMU has", &made(imu, file), path, session);
+}
+
+/// As [`expect`], silently: what was set.
+pub(super) fn expected(initial: &mut InitialSettings, file: &ModelFile) -> Vec<(Sensor, f64)> {
+    let mut set = stated(file);
+    set.retain(|(sensor, sigma)| {
+        let setting = match sensor {
+            Sensor::Accel => &mut initial.accel_bias_sigma_m_s2,
+            Sensor::Gyro => &mut initial.gyro_bias_sigma_rad_s,
+        };
+        let is_open = setting.is_none();
+        setting.get_or_insert(*sigma);
+        is_open
+    });
+    set
+}
+
+/// As [`make`], silently: what was set.
+pub(super) fn made(imu: &mut ImuSettings, file: &ModelFile) -> Vec<(Sensor, f64)> {
+    let mut set = stated(file);
+    set.retain(|(sensor, sigma)| {
         let setting = match sensor {
             Sensor::Accel => &mut imu.turn_on_bias_accel_m_s2,
             Sensor::Gyro => &mut imu.turn_on_bias_gyro_rad_s,
         };
-        if *setting == 0.0 {
-            *setting = sigma;
-            say("the true IMU has", sensor, sigma, path, session);
+        let is_open = *setting == 0.0;
+        if is_open {
+            *setting = *sigma;
         }
-    }
+        is_open
+    });
+    set
 }
 
-fn stated(file: &ModelFile) -> impl Iterator<Item = (Sensor, f64)> {
+fn stated(file: &ModelFile) -> Vec<(Sensor, f64)> {
     let turn_on = file.turn_on.unwrap_or_default();
-    Sensor::ALL.into_iter().filter_map(move |sensor| Some((sensor, turn_on.sigma(sensor)?)))
+    Sensor::ALL.into_iter().filter_map(|sensor| Some((sensor, turn_on.sigma(sensor)?))).collect()
 }
 
-fn say(who: &str, sensor: Sensor, sigma: f64, path: &Path, session: &Session) {
-    let (shown, name, unit) = (path.display(), sensor.name(), sensor.unit());
-    session
-        .printer
-        .say(&format!("{shown}: {who} a turn-on bias of {sigma} {unit} ({name}, standard deviation)"));
+fn say(who: &str, set: &[(Sensor, f64)], path: &Path, session: &Session) {
+    for (sensor, sigma) in set {
+        let (shown, sigma) = (path.display(), readable(*sigma));
+        let (name, unit) = (sensor.name(), sensor.unit());
+        let message = format!("{shown}: {who} a turn-on bias of {sigma} {unit} ({name}, standard deviation)");
+        session.printer.say(&message);
+    }
 }

@@ -2,6 +2,7 @@
 
 use super::layout::{Layout, number, remark, triple};
 use super::{Entry, Values};
+use crate::ekf::FilterStates;
 use crate::units::{DEG, DEG_PER_HOUR};
 
 /// One milligal (m/s²).
@@ -10,9 +11,6 @@ const MILLIGAL: f64 = 1e-5;
 const ROOT_HOUR: f64 = 60.0;
 /// PSINS has a gravity of its own, `glv.g0` (m/s²).
 const PSINS_G0: f64 = 9.780_326_771_4;
-/// Scale factor that KF-GINS is told of: it always has such states, and a noise model knows nothing of them (ppm).
-const ASSUMED_SCALE_PPM: f64 = 300.0;
-
 pub(super) const KF_GINS: Layout = Layout {
     comment: "#",
     first: None,
@@ -31,14 +29,16 @@ pub(super) fn kf_gins(v: &Values) -> Vec<Entry> {
     let rate = format!("IMU at {} Hz", v.rate_hz);
     let sigma = "Gauss-Markov bias, standard deviation";
     let hours = v.gyro.markov.t_corr_s.min(v.accel.markov.t_corr_s) / 3600.0;
+    // KF-GINS always has such states, and a noise model knows nothing of them
+    let scale_ppm = FilterStates::Reduced21.scale_sigma() * 1e6;
     let assumed = "an assumption: a noise model has no scale factor";
     vec![
         Entry::new("arw", v.gyro.density / DEG * ROOT_HOUR, "deg/sqrt(hr)", format!("white noise N, {rate}")),
         Entry::new("vrw", v.accel.density * ROOT_HOUR, "m/s/sqrt(hr)", format!("white noise N, {rate}")),
         Entry::new("gbstd", v.gyro.markov.sigma / DEG_PER_HOUR, "deg/hr", sigma),
         Entry::new("abstd", v.accel.markov.sigma / MILLIGAL, "mGal", sigma),
-        Entry::new("gsstd", ASSUMED_SCALE_PPM, "ppm", assumed),
-        Entry::new("asstd", ASSUMED_SCALE_PPM, "ppm", assumed),
+        Entry::new("gsstd", scale_ppm, "ppm", assumed),
+        Entry::new("asstd", scale_ppm, "ppm", assumed),
         Entry::new(
             "corrtime",
             if hours.is_finite() { hours } else { 1.0 },

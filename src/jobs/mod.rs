@@ -29,13 +29,15 @@ mod files;
 mod navigate;
 mod reduction;
 mod remarks;
+mod require;
 mod wavelet;
 
 pub use calibrate::{Calibration, CalibrationOptions, EstimatorChoice, Measured, calibrate, measure};
 pub use curves::{Curves, read_curves};
 pub use error::JobError;
 pub use files::ModelFiles;
-pub use navigate::{NavigateError, NavigateInputs, Navigation, Note, Observer, TrueImu, navigate};
+pub use navigate::{NavigateError, NavigateInputs, Navigation, Note, TrueImu, navigate};
 pub use reduction::Reduced;
 pub use remarks::{Remark, Remarks, Silence};
+pub use require::{Ask, CatalogueUnit, Misplaced, Requirements};
 pub use wavelet::{Intervals, WaveletOptions, wavelet_variances};

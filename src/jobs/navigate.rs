@@ -10,6 +10,7 @@ use crate::metrics::{
 use crate::monte_carlo;
 use crate::noise::reduction::window_s;
 use crate::noise::{Model, ParameterError};
+use crate::observer::Observer;
 use crate::scenario::{Method, Scenario};
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::Outage;
@@ -69,23 +70,6 @@ pub enum Note {
     Agreement(Agreement),
 }
 
-/// Who follows a job.
-pub trait Observer: Sync {
-    /// Something worth telling.
-    fn note(&self, note: &Note);
-    /// So many runs are about to be made.
-    fn runs_begin(&self, _runs: u64) {}
-    /// So many more have been made.
-    fn runs_done(&self, _runs: u64) {}
-    /// All have been made.
-    fn runs_end(&self) {}
-}
-
-/// Follows nothing.
-impl Observer for () {
-    fn note(&self, _: &Note) {}
-}
-
 /// Why a job cannot be done.
 #[derive(Debug, thiserror::Error)]
 pub enum NavigateError {
@@ -118,7 +102,7 @@ pub fn navigate(
     scenario: &Scenario,
     outages: &[Outage],
     seed: u64,
-    observer: &dyn Observer,
+    observer: &dyn Observer<Note>,
 ) -> Result<Navigation, NavigateError> {
     let method = scenario.run.method;
     if method != Method::MonteCarlo {
@@ -129,7 +113,7 @@ pub fn navigate(
     doubt(&belief, scenario, observer);
     let reduction = reduction(inputs, scenario, outages, &belief, &track, observer)?;
     let assessment = assess(&track, &belief, &inputs.model);
-    heading(&assessment).iter().for_each(|doubt| observer.note(&Note::Heading(*doubt)));
+    heading(&assessment).iter().for_each(|doubt| observer.remark(&Note::Heading(*doubt)));
     let experiment =
         scenario.experiment(&inputs.trajectory, inputs.truth(), std::slice::from_ref(&belief), outages, seed);
     let analysis = Analysis::new(&experiment, inputs, &track);
@@ -160,16 +144,16 @@ fn possible(inputs: &NavigateInputs, scenario: &Scenario) -> Result<(), Navigate
 }
 
 /// What speaks against the filter before anything was computed.
-fn doubt(belief: &Belief, scenario: &Scenario, observer: &dyn Observer) {
+fn doubt(belief: &Belief, scenario: &Scenario, observer: &dyn Observer<Note>) {
     // A Gauss-Markov process of phi ≈ 1 may have any stationary variance: a filter that starts with it believes
     // nothing of its first sensor readings.
     for (sensor, limit) in [(Sensor::Accel, 1.0), (Sensor::Gyro, 0.1)] {
         let sigma = belief.process_sigma(sensor);
         if sigma > limit {
-            observer.note(&Note::LargeBias(sensor, sigma));
+            observer.remark(&Note::LargeBias(sensor, sigma));
         }
     }
-    scenario.doubts().into_iter().for_each(|doubt| observer.note(&Note::Unexpected(doubt)));
+    scenario.doubts().into_iter().for_each(|doubt| observer.remark(&Note::Unexpected(doubt)));
 }
 
 /// The reduction of the model for these outages; none where nothing is reduced.
@@ -179,7 +163,7 @@ fn reduction(
     outages: &[Outage],
     belief: &Belief,
     track: &Track,
-    observer: &dyn Observer,
+    observer: &dyn Observer<Note>,
 ) -> Result<Option<ReductionSummary>, NavigateError> {
     if !scenario.filter.states.is_reduced() {
         return Ok(None);
@@ -202,11 +186,11 @@ fn sampled(
     experiment: &Experiment<'_>,
     runs: u64,
     seed: u64,
-    observer: &dyn Observer,
+    observer: &dyn Observer<Note>,
 ) -> Result<Navigation, NavigateError> {
-    observer.runs_begin(runs);
-    let mut results = monte_carlo::run(experiment, runs, &|n| observer.runs_done(n))?;
-    observer.runs_end();
+    observer.begin(runs);
+    let mut results = monte_carlo::run(experiment, runs, &|n| observer.advance(n))?;
+    observer.end();
     let result = results.swap_remove(0);
     let epochs = epochs(&result);
     let summary = Summary::of(&result, &epochs, seed);
@@ -258,9 +242,9 @@ impl<'a> Analysis<'a> {
 
 impl Navigation {
     /// Runs beside what was expected of them: the verdict is that of the expected figures.
-    fn beside(mut self, expected: Summary, observer: &dyn Observer) -> Self {
+    fn beside(mut self, expected: Summary, observer: &dyn Observer<Note>) -> Self {
         let agreement = Agreement::of(&self.summary, &expected);
-        observer.note(&Note::Agreement(agreement.clone()));
+        observer.remark(&Note::Agreement(agreement.clone()));
         self.summary.expect(expected, agreement);
         self
     }

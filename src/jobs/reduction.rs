@@ -1,9 +1,10 @@
 //! What the reduction of a model to 15 states does.
 
-use super::navigate::{Note, Observer};
+use super::navigate::Note;
 use crate::ekf::Belief;
 use crate::metrics::{ReductionQuality, ReductionSummary};
 use crate::noise::{Model, ParameterError};
+use crate::observer::Observer;
 use crate::simulation::lincov::{Track, assess};
 
 /// What a filter of 15 states was made for, and what it is assessed along.
@@ -29,16 +30,16 @@ impl Reduced<'_> {
     ///
     /// # Errors
     /// When a parameter of the belief is outside its domain.
-    pub fn summary(&self, observer: &dyn Observer) -> Result<ReductionSummary, ParameterError> {
+    pub fn summary(&self, observer: &dyn Observer<Note>) -> Result<ReductionSummary, ParameterError> {
         let Self { model, belief, track, interval_s, window_s, .. } = *self;
         let mut summary = ReductionSummary::of(model, belief, interval_s, window_s)?;
         if summary.is_exact() {
             return Ok(summary);
         }
-        observer.note(&Note::Reduction(summary.clone()));
+        observer.remark(&Note::Reduction(summary.clone()));
         let full = self.full.as_ref().map(|full| assess(track, full, model));
         let quality = ReductionQuality::of(&assess(track, belief, model), full.as_ref());
-        observer.note(&Note::ReductionQuality(quality.clone(), full.is_some()));
+        observer.remark(&Note::ReductionQuality(quality.clone(), full.is_some()));
         summary.quality = Some(quality);
         Ok(summary)
     }

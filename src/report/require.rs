@@ -37,12 +37,28 @@ pub enum Longest {
 pub struct RankedUnit {
     /// Its name.
     pub name: String,
+    /// Figures that its datasheet does not state: they count as zero.
+    pub not_stated: Vec<String>,
     /// The hardest limit for the outage asked for.
     pub worst: Worst,
     /// The quantity of that limit, at its worst place, after [`CURVE_S`]; none where the trajectory is too short.
     pub curve: [Option<f64>; CURVE_S.len()],
     /// The longest outage within the limits.
     pub longest: Longest,
+}
+
+impl RankedUnit {
+    /// Whether its errors are within the limits, as far as its figures are stated.
+    #[must_use]
+    pub fn is_within(&self) -> bool {
+        self.worst.margin() >= 0.0
+    }
+
+    /// Whether it keeps the limits, by figures that are all stated.
+    #[must_use]
+    pub fn is_met(&self) -> bool {
+        self.is_within() && self.not_stated.is_empty()
+    }
 }
 
 /// What was asked, and where.
@@ -207,21 +223,6 @@ pub fn longest_json(longest: Longest, question: &Question) -> String {
     super::json(&json!({ "schema_version": 1, "question": question.json(), "outage": longest.json() }))
 }
 
-impl Longest {
-    /// In agreement with what was found of an outage of a length: the longest is sought from places of its own, that
-    /// the trajectory holds for all lengths.
-    #[must_use]
-    pub fn beside(self, length_s: f64, met: bool) -> Self {
-        match self {
-            Self::Seconds(s) if met => Self::Seconds(s.max(length_s)),
-            Self::Seconds(s) | Self::AtLeast(s) if !met && s >= length_s => {
-                Self::Seconds((length_s.ceil() - 1.0).max(0.0))
-            }
-            other => other,
-        }
-    }
-}
-
 /// Whether a model keeps its limits, in a sentence.
 #[must_use]
 pub fn margins_verdict(margins: &Margins, question: &Question, longest: Longest) -> String {
@@ -282,10 +283,16 @@ pub fn catalogue_rows(units: &[RankedUnit]) -> Vec<Vec<String>> {
     let name = units.first().map_or("", |u| u.worst.limit.quantity.name());
     let mut head = vec!["unit".to_owned(), "limit".to_owned(), "longest outage".to_owned()];
     head.extend(CURVE_S.iter().map(|s| format!("{name} at {s} s")));
+    head.push("not stated".to_owned());
     let row = |unit: &RankedUnit| {
-        let met = if unit.worst.margin() >= 0.0 { "met" } else { "not met" };
+        let met = match (unit.is_met(), unit.is_within()) {
+            (true, _) => "met",
+            (false, true) => "open",
+            (false, false) => "not met",
+        };
         let mut row = vec![unit.name.clone(), met.to_owned(), unit.longest.in_words()];
         row.extend(unit.curve.iter().map(|x| x.map_or_else(|| "–".to_owned(), readable)));
+        row.push(unit.not_stated.join(", "));
         row
     };
     std::iter::once(head).chain(units.iter().map(row)).collect()
@@ -299,7 +306,8 @@ pub fn catalogue_json(units: &[RankedUnit], question: &Question) -> String {
             CURVE_S.iter().zip(&u.curve).map(|(s, x)| json!({ "outage_s": s, "value": x })).collect();
         json!({
             "unit": u.name,
-            "met": u.worst.margin() >= 0.0,
+            "met": u.is_met(),
+            "not_stated": u.not_stated,
             "quantity": u.worst.limit.quantity.name(),
             "value": u.worst.value,
             "outage": u.longest.json(),

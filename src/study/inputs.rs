@@ -4,13 +4,14 @@ use super::directory;
 use super::failure::StudyError;
 use super::file::beside;
 use super::grid::Cell;
-use super::observer::Observer;
 use super::plan::{Prepared, Unit};
 use super::planned::Planned;
 use super::reader::{Reader, TruthSource};
+use super::remark::Remark;
 use crate::ekf::Belief;
 use crate::formats::{input, model_file};
 use crate::noise::{Model, continuous};
+use crate::observer::Observer;
 use crate::scenario::Scenario;
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::{Outage, PlacedOutages};
@@ -37,7 +38,7 @@ pub(super) struct Inputs<'a> {
 }
 
 impl<'a> Inputs<'a> {
-    pub(super) fn new(planned: &'a Planned, observer: &'a dyn Observer) -> Self {
+    pub(super) fn new(planned: &'a Planned, observer: &'a dyn Observer<Remark>) -> Self {
         let reader = Reader { study: &planned.study, observer };
         Self { planned, reader, made: &[], trajectory: None, truth: None, models: HashMap::new() }
     }

@@ -2,12 +2,13 @@
 
 use super::cell_tables::{CellTables, DamagedUnits};
 use super::failure::StudyError;
-use super::observer::Observer;
 use super::plan::Unit;
 use super::planned::Planned;
+use super::remark::Remark;
 use super::tables::{Tables, Texts};
 use crate::formats::FileError;
 use crate::formats::atomic::AtomicDir;
+use crate::observer::Observer;
 use crate::report;
 use crate::simulation::REPORTED_NAMES;
 use rayon::prelude::*;
@@ -44,7 +45,7 @@ pub struct MergeReport {
 pub fn merge(
     planned: &Planned,
     options: &MergeOptions,
-    observer: &dyn Observer,
+    observer: &dyn Observer<Remark>,
 ) -> Result<MergeReport, StudyError> {
     let status = planned.status()?;
     if let Some(remark) = planned.foreign_units(&status) {

@@ -5,10 +5,11 @@ use super::failure::StudyError;
 use super::file;
 use super::fingerprint::fingerprint;
 use super::grid::Grid;
-use super::observer::{Observer, Remark};
 use super::plan::{Plan, Unit};
+use super::remark::Remark;
 use super::unit_file;
 use crate::lanes::LANES;
+use crate::observer::Observer;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -108,7 +109,7 @@ impl Planned {
     }
 
     /// Remarks what other plans left in the directory.
-    pub(super) fn remark_leftovers(&self, observer: &dyn Observer) -> Result<(), StudyError> {
+    pub(super) fn remark_leftovers(&self, observer: &dyn Observer<Remark>) -> Result<(), StudyError> {
         if let Some(remark) = self.foreign_units(&self.status()?) {
             observer.remark(&remark);
         }

@@ -6,17 +6,18 @@ use super::failure::StudyError;
 use super::file::{self, StudyFile, beside};
 use super::fingerprint::fingerprint;
 use super::inputs::{CALIBRATED, Inputs, ModelTexts, unchanged};
-use super::observer::{Observer, Remark};
 use super::plan::{Estimate, Kept, Plan, Prepared};
 use super::planned::Planned;
 use super::prepare::calibrated;
 use super::reader::{CANDIDATE_SEED, Reader};
+use super::remark::Remark;
 use super::unit::run_unit;
 use super::unit_file;
 use crate::calibration::{Estimator, Outcome};
 use crate::formats::model_file::{self, CalibrationNote};
 use crate::formats::{atomic, hash, input};
 use crate::lanes::LANES;
+use crate::observer::Observer;
 use crate::report::Input;
 use std::collections::HashSet;
 use std::path::Path;
@@ -65,7 +66,7 @@ pub fn plan(
     study: &Path,
     directory: &Path,
     options: &PlanOptions<'_>,
-    observer: &dyn Observer,
+    observer: &dyn Observer<Remark>,
 ) -> Result<PlanReport, StudyError> {
     let file = file::read(study)?;
     let reader = Reader { study, observer };
@@ -228,7 +229,11 @@ fn calibration(step: &CalibrateStep, seed: u64, reader: Reader<'_>) -> Result<Ve
 
 /// Everything that would stop a run later: one cell of each trajectory, truth and scenario is set up, and
 /// every outage set must lie on every trajectory.
-fn validate(planned: &Planned, texts: &ModelTexts, observer: &dyn Observer) -> Result<(), StudyError> {
+fn validate(
+    planned: &Planned,
+    texts: &ModelTexts,
+    observer: &dyn Observer<Remark>,
+) -> Result<(), StudyError> {
     let grid = &planned.grid;
     let mut inputs = Inputs::new(planned, observer).with_models(texts);
     let (mut set_up, mut placed) = (HashSet::new(), HashSet::new());
@@ -253,7 +258,7 @@ fn validate(planned: &Planned, texts: &ModelTexts, observer: &dyn Observer) -> R
     Ok(())
 }
 
-fn remark_no_outages(mut cells: Vec<String>, observer: &dyn Observer) {
+fn remark_no_outages(mut cells: Vec<String>, observer: &dyn Observer<Remark>) {
     const SHOWN: usize = 5;
     let more = cells.len().saturating_sub(SHOWN);
     cells.truncate(SHOWN);
@@ -268,7 +273,7 @@ fn probe(
     planned: &mut Planned,
     texts: &ModelTexts,
     options: &PlanOptions<'_>,
-    observer: &dyn Observer,
+    observer: &dyn Observer<Remark>,
 ) -> Result<(), StudyError> {
     let Some(clock) = options.clock else { return Ok(()) };
     let mut inputs = Inputs::new(planned, observer).with_models(texts);

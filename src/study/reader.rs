@@ -3,14 +3,15 @@
 use super::description::{Synthesis, TruthEntry};
 use super::failure::StudyError;
 use super::file::beside;
-use super::observer::{Observer, Remark};
 use super::prepare::Material;
+use super::remark::Remark;
 use crate::formats::model_file::{self, ModelFile};
 use crate::formats::recordings::{self, ReadOptions};
 use crate::formats::{contamination_file, input, trajectory_file};
 use crate::imu::Recording;
 use crate::noise::Model;
 use crate::noise::contamination::Contamination;
+use crate::observer::Observer;
 use crate::trajectory::Trajectory;
 use std::path::{Path, PathBuf};
 
@@ -28,7 +29,7 @@ pub(super) enum TruthSource {
 #[derive(Clone, Copy)]
 pub(super) struct Reader<'a> {
     pub(super) study: &'a Path,
-    pub(super) observer: &'a dyn Observer,
+    pub(super) observer: &'a dyn Observer<Remark>,
 }
 
 impl Reader<'_> {

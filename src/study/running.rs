@@ -3,12 +3,13 @@
 use super::directory;
 use super::failure::StudyError;
 use super::inputs::Inputs;
-use super::observer::{Observer, Remark};
 use super::plan::Unit;
 use super::planned::Planned;
+use super::remark::Remark;
 use super::unit::compute;
 use super::unit_file;
 use crate::lanes::LANES;
+use crate::observer::Observer;
 use crate::simulation;
 use rayon::prelude::*;
 
@@ -68,7 +69,7 @@ pub struct RunReport {
 pub fn run(
     planned: &Planned,
     options: &RunOptions,
-    observer: &dyn Observer,
+    observer: &dyn Observer<Remark>,
 ) -> Result<RunReport, StudyError> {
     planned.same_numbers()?;
     if let Some(remark) = planned.foreign_units(&planned.status()?) {
@@ -100,7 +101,7 @@ fn pending(
     planned: &Planned,
     shard: Shard,
     inputs: &mut Inputs<'_>,
-    observer: &dyn Observer,
+    observer: &dyn Observer<Remark>,
 ) -> Result<Vec<Named>, StudyError> {
     let names = directory::units(&planned.directory)?;
     let mine = planned.plan.named_units(&planned.grid).filter(|(unit, _)| shard.has(unit.index));
@@ -134,7 +135,7 @@ fn run_units(
     planned: &Planned,
     simulation: &simulation::Plan<'_>,
     units: &[Named],
-    observer: &dyn Observer,
+    observer: &dyn Observer<Remark>,
 ) -> Result<usize, StudyError> {
     let run_one = |(unit, id): &Named| -> Result<bool, StudyError> {
         let (go_on, progress) = (|| observer.go_on(), |runs| observer.advance(runs));

@@ -3,11 +3,12 @@
 use super::directory;
 use super::failure::StudyError;
 use super::inputs::Inputs;
-use super::observer::Observer;
 use super::plan::Unit;
 use super::planned::Planned;
+use super::remark::Remark;
 use super::unit::compute;
 use super::unit_file;
+use crate::observer::Observer;
 use crate::rng::StreamKey;
 use rand::seq::IndexedRandom;
 
@@ -40,7 +41,7 @@ pub struct VerifyReport {
 pub fn verify(
     planned: &Planned,
     options: &VerifyOptions,
-    observer: &dyn Observer,
+    observer: &dyn Observer<Remark>,
 ) -> Result<VerifyReport, StudyError> {
     planned.same_numbers()?;
     let mut inputs = Inputs::new(planned, observer);

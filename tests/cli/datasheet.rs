@@ -88,11 +88,15 @@ fn a_run_takes_the_turn_on_bias_of_the_model_file() {
     };
     let (said, used) = configuration("");
     assert!(
-        said.contains("imu.toml: the filter expects a turn-on bias of 0.02 m/s² (accel, standard deviation)"),
+        said.contains(
+            "imu.toml: the filter expects a turn-on bias of 0.0200 m/s² (accel, standard deviation)"
+        ),
         "{said}"
     );
     assert!(
-        said.contains("imu.toml: the true IMU has a turn-on bias of 0.0001 rad/s (gyro, standard deviation)"),
+        said.contains(
+            "imu.toml: the true IMU has a turn-on bias of 1.00e-4 rad/s (gyro, standard deviation)"
+        ),
         "{said}"
     );
     assert_eq!(used["initial"]["accel_bias_sigma_m_s2"], 0.02);

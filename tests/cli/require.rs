@@ -47,10 +47,27 @@ fn a_directory_of_models_is_ranked() {
         let file = format!("{name}.toml");
         std::fs::copy(format!("{ROOT}/calib_data/{file}"), units.join(file)).unwrap();
     }
-    let ranked = require(dir.path(), &["--outage", "30", "--p95-m", "20", "--catalogue", "units"]).success();
-    let shown = stdout(&ranked);
+    // a catalogue entry that states no bias: as good as it looks it cannot be called
+    let entry = "[unit]\nmanufacturer = \"A\"\nname = \"B\"\nclass = \"consumer\"\n\
+                 [accel]\nnoise = { value = \"1e-6 m/s/sqrt(h)\", source = \"s\" }\n\
+                 [gyro]\nnoise = { value = \"1e-6 deg/sqrt(h)\", source = \"s\" }\n";
+    std::fs::write(units.join("silent.toml"), entry).unwrap();
+    let arguments = |limit| ["--outage", "30", "--p95-m", limit, "--catalogue", "units"];
+    let shown = stdout(&require(dir.path(), &arguments("10")).success());
     let place = |name: &str| shown.find(name).unwrap();
-    assert!(place("tactical") < place("consumer_mems") && shown.contains("p95_m at 30 s"), "{shown}");
+    assert!(place("tactical") < place("silent") && place("silent") < place("consumer_mems"), "{shown}");
+    assert!(shown.contains("| open") && shown.contains("accel bias, gyro bias"), "{shown}");
+    // only the unit that states too little is within 1.7 m: none meets the limit
+    let none = stdout(&require(dir.path(), &arguments("1.7")).code(3));
+    assert!(none.contains("| open") && !none.contains("| met"), "{none}");
+}
+
+#[test]
+fn the_catalogue_is_ranked_without_a_directory() {
+    let dir = tempfile::tempdir().unwrap();
+    let shown = stdout(&require(dir.path(), &["--outage", "30", "--p95-m", "20", "--catalogue"]).success());
+    assert_eq!(shown.lines().filter(|l| l.contains(" s ")).count(), 1 + 17 + 1, "{shown}");
+    assert!(shown.find("stim300").unwrap() < shown.find("mpu6050").unwrap(), "{shown}");
 }
 
 #[test]

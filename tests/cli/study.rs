@@ -1,9 +1,9 @@
 //! A study planned, run and merged by library calls only.
 
 use crate::common::batch::*;
+use nav_sim::observer::Observer;
 use nav_sim::study::{
-    self, MergeOptions, Observer, PlanOptions, Planned, Remark, RunOptions, Shard, StudyError, VerifyOptions,
-    Writing,
+    self, MergeOptions, PlanOptions, Planned, Remark, RunOptions, Shard, StudyError, VerifyOptions, Writing,
 };
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -27,7 +27,7 @@ impl Watch {
     }
 }
 
-impl Observer for Watch {
+impl Observer<Remark> for Watch {
     fn remark(&self, remark: &Remark) {
         self.remarks.lock().unwrap().push(remark.clone());
     }
@@ -57,7 +57,7 @@ fn the_library_makes_the_bytes_of_the_command() {
         !made.was_there && study::plan(&file, &directory, &options(Writing::Write), &()).unwrap().was_there
     );
     let planned = Planned::open(&file, &directory, Some(5)).unwrap();
-    let run = |index, observer: &dyn Observer| {
+    let run = |index, observer: &dyn Observer<Remark>| {
         let shard = Shard::new(index, 2).unwrap();
         study::run(&planned, &RunOptions { shard, threads: 1 }, observer).unwrap()
     };

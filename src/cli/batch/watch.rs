@@ -1,7 +1,8 @@
 //! What the engine of studies says, on the terminal.
 
 use crate::cli::{Progress, Session};
-use nav_sim::study::{Importance, Observer, Remark};
+use nav_sim::observer::Observer;
+use nav_sim::study::{Importance, Remark};
 use std::sync::OnceLock;
 
 /// Prints remarks and shows progress.
@@ -18,7 +19,7 @@ impl<'a, F: Fn() -> bool + Sync> Watch<'a, F> {
     }
 }
 
-impl<F: Fn() -> bool + Sync> Observer for Watch<'_, F> {
+impl<F: Fn() -> bool + Sync> Observer<Remark> for Watch<'_, F> {
     fn remark(&self, remark: &Remark) {
         let text = remark.to_string();
         match remark.importance() {

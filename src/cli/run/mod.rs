@@ -120,6 +120,11 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         _ => e,
     })?;
     requirable(&args.require, outages.is_empty())?;
+    if scenario.run.method == Method::Lincov && args.runs.is_some() {
+        session
+            .printer
+            .warn("--runs counts nothing here: --method lincov makes none; both makes them beside it");
+    }
     output::try_open(&args.out, &inputs.files)?;
     let words = Words::new(session);
     let found = jobs::navigate(&inputs.job, &scenario, &outages, seed, &words);

@@ -1,8 +1,9 @@
 //! What a job tells, in words.
 
 use crate::cli::{Progress, Session};
-use nav_sim::jobs::{Note, Observer};
+use nav_sim::jobs::Note;
 use nav_sim::metrics::Agreement;
+use nav_sim::observer::Observer;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
@@ -24,8 +25,8 @@ impl<'a> Words<'a> {
     }
 }
 
-impl Observer for Words<'_> {
-    fn note(&self, note: &Note) {
+impl Observer<Note> for Words<'_> {
+    fn remark(&self, note: &Note) {
         let printer = &self.session.printer;
         match note {
             Note::LargeBias(sensor, sigma) => printer.warn(&format!(
@@ -50,17 +51,17 @@ impl Observer for Words<'_> {
         }
     }
 
-    fn runs_begin(&self, runs: u64) {
+    fn begin(&self, runs: u64) {
         let progress = self.session.progress("runs", runs);
         *self.runs.lock().unwrap_or_else(PoisonError::into_inner) = Some((progress, Instant::now()));
     }
 
-    fn runs_done(&self, runs: u64) {
+    fn advance(&self, runs: u64) {
         let running = self.runs.lock().unwrap_or_else(PoisonError::into_inner);
         running.iter().for_each(|(progress, _)| progress.add(runs));
     }
 
-    fn runs_end(&self) {
+    fn end(&self) {
         if let Some((_, start)) = self.runs.lock().unwrap_or_else(PoisonError::into_inner).take() {
             *self.runs_s.lock().unwrap_or_else(PoisonError::into_inner) = start.elapsed().as_secs_f64();
         }

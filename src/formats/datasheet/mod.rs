@@ -23,7 +23,7 @@
 mod catalogue;
 mod figure;
 
-pub use catalogue::{CATALOGUE, catalogued, read};
+pub use catalogue::{CATALOGUE, catalogued, is_entry, read};
 pub use figure::{Figure, Quantity, QuantityError};
 
 use crate::formats::model_file::{ModelFile, SCHEMA, TurnOn};
@@ -31,10 +31,6 @@ use crate::imu::{Channel, Sensor};
 use crate::noise::{Composite, GaussMarkov, Model, ParameterError, Process, RandomWalk, White, continuous};
 use toml::Table;
 
-/// The largest Allan deviation of a Gauss-Markov process per unit of its standard deviation.
-pub const GAUSS_MARKOV_PEAK: f64 = 0.617_364_283_144_441_3;
-/// Where it has it, in correlation times.
-pub const GAUSS_MARKOV_PEAK_AT: f64 = 1.892_617_8;
 /// The correlation time that is assumed where none is given (s).
 pub const ASSUMED_CORRELATION_TIME_S: f64 = 300.0;
 
@@ -83,6 +79,15 @@ impl Datasheet {
         Some(entry.quantity.value)
     }
 
+    /// The figures that a noise model needs and the datasheet does not state: the model has no such noise.
+    #[must_use]
+    pub fn not_stated(&self) -> Vec<String> {
+        let figures = |sensor: Sensor| [Figure::Noise, Figure::Bias].map(|figure| (sensor, figure));
+        let needed = Sensor::ALL.into_iter().flat_map(figures);
+        let lacking = needed.filter(|(sensor, figure)| self.value(*sensor, *figure).is_none());
+        lacking.map(|(sensor, figure)| format!("{} {}", sensor.name(), figure.key())).collect()
+    }
+
     /// Puts a figure in the place of what was known of it.
     pub fn set(&mut self, entry: Entry) {
         self.entries.retain(|e| (e.sensor, e.figure) != (entry.sensor, entry.figure));
@@ -119,22 +124,19 @@ impl Datasheet {
             let sigma2 = continuous::white_sigma2(density, rate_hz);
             processes.push(Process::White(White::new(sigma2)?));
         }
-        if let Some(floor) = self.value(sensor, Figure::Bias) {
-            let given = self.value(sensor, Figure::CorrelationTime);
-            let t_corr_s = given.unwrap_or(ASSUMED_CORRELATION_TIME_S);
+        let given_s = self.value(sensor, Figure::CorrelationTime);
+        let t_corr_s = given_s.unwrap_or(ASSUMED_CORRELATION_TIME_S);
+        let floor = self.value(sensor, Figure::Bias);
+        if let Some(floor) = floor {
             processes.push(Process::GaussMarkov(gauss_markov(floor, t_corr_s, rate_hz)?));
-            doubts.extend(doubt_floor(sensor, floor, density.unwrap_or(0.0), given));
+            doubts.extend(doubt_floor(sensor, floor, density.unwrap_or(0.0), given_s));
         }
         if let Some(density) = self.value(sensor, Figure::Walk) {
             let gamma2 = continuous::walk_gamma2(density, rate_hz);
             processes.push(Process::RandomWalk(RandomWalk::new(gamma2)?));
         }
         let noise = Composite::new(processes);
-        if let Some(floor) = self.value(sensor, Figure::Bias) {
-            let given = self.value(sensor, Figure::CorrelationTime);
-            let t_corr_s = given.unwrap_or(ASSUMED_CORRELATION_TIME_S);
-            doubts.extend(doubt_minimum(sensor, floor, &noise, t_corr_s, rate_hz));
-        }
+        doubts.extend(floor.and_then(|floor| doubt_minimum(sensor, floor, &noise, t_corr_s, rate_hz)));
         Ok(noise)
     }
 
@@ -190,7 +192,7 @@ const fn became(figure: Figure) -> &'static str {
 /// # Errors
 /// When a number is not positive.
 pub fn gauss_markov(floor: f64, t_corr_s: f64, rate_hz: f64) -> Result<GaussMarkov, ParameterError> {
-    let sigma = floor / GAUSS_MARKOV_PEAK;
+    let sigma = floor / GaussMarkov::ALLAN_PEAK;
     GaussMarkov::new(1.0 / t_corr_s, sigma * sigma, rate_hz)
 }
 
@@ -203,12 +205,12 @@ fn doubt_floor(sensor: Sensor, floor: f64, density: f64, given_s: Option<f64>) -
             "{name}: no correlation time is given; {ASSUMED_CORRELATION_TIME_S} s is assumed for the bias instability"
         ));
     }
-    let tau_s = GAUSS_MARKOV_PEAK_AT * t_corr_s;
+    let tau_s = GaussMarkov::ALLAN_PEAK_AT * t_corr_s;
     if density > floor * tau_s.sqrt() {
         doubts.push(format!(
             "{name}: at {tau_s:.0} s the white noise alone is above the bias instability, which the Allan deviation then \
              does not show; a correlation time above {:.0} s would",
-            (density / floor).powi(2) / GAUSS_MARKOV_PEAK_AT
+            (density / floor).powi(2) / GaussMarkov::ALLAN_PEAK_AT
         ));
     }
     doubts
@@ -226,7 +228,7 @@ fn doubt_minimum(
     t_corr_s: f64,
     rate_hz: f64,
 ) -> Option<String> {
-    let peak_s = GAUSS_MARKOV_PEAK_AT * t_corr_s;
+    let peak_s = GaussMarkov::ALLAN_PEAK_AT * t_corr_s;
     let times = (0..=80).map(|k| MINIMUM_FROM_S * (peak_s / MINIMUM_FROM_S).powf(f64::from(k) / 80.0));
     let deviations = times.map(|t| (t, noise.allan_variance((t * rate_hz).round() as u32).sqrt()));
     let (at_s, lowest) = deviations.min_by(|a, b| a.1.total_cmp(&b.1))?;

@@ -49,7 +49,7 @@ fn the_largest_allan_deviation_is_the_bias_instability() {
     let scan = (1..=400_000).map(|i| f64::from(i) * 1e-5);
     let (at, largest) = scan.map(|x| (x, allan(x))).fold((0.0, 0.0), |a, b| if b.1 > a.1 { b } else { a });
     assert!((largest / floor - 1.0).abs() < 1e-9, "{largest:e}");
-    assert!((at - GAUSS_MARKOV_PEAK_AT).abs() < 1e-4, "{at}");
+    assert!((at - GaussMarkov::ALLAN_PEAK_AT).abs() < 1e-4, "{at}");
     // the sampled process: the dyadic scale nearest to the peak is below it and within 4 % (x from 1.3 to 2.7)
     let rate_hz = 100.0;
     let noise = Composite::new(vec![Process::GaussMarkov(gauss_markov(floor, t_corr_s, rate_hz).unwrap())]);

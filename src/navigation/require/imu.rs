@@ -5,7 +5,7 @@ use crate::ekf::BeliefError;
 use crate::noise::{Composite, GaussMarkov, Model, Process, White, continuous};
 use crate::scenario::Scenario;
 use crate::simulation::lincov::Crossing;
-use crate::units::DEG;
+use crate::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
 
 /// How many intensities an IMU has here.
 pub const IMU_PARAMETERS: usize = 4;
@@ -20,11 +20,7 @@ pub struct ImuParameters {
     pub t_corr_s: f64,
 }
 
-/// The largest Allan deviation of a Gauss-Markov process over its standard deviation, at 1.89 correlation times.
-const ALLAN_PEAK: f64 = 0.617_364_283_144_441_3;
 const HOUR_S: f64 = 3600.0;
-/// (m/s²)
-const STANDARD_GRAVITY: f64 = 9.806_65;
 
 /// A consumer IMU, from which searches start.
 const START: [f64; IMU_PARAMETERS] = [1e-3, 5e-4, 5e-5, 2e-5];
@@ -62,9 +58,9 @@ impl ImuParameters {
     pub fn in_datasheets(which: usize, value: f64) -> f64 {
         match which {
             0 => value * HOUR_S.sqrt(),
-            1 => value * ALLAN_PEAK / STANDARD_GRAVITY * 1e6,
+            1 => value * GaussMarkov::ALLAN_PEAK / STANDARD_GRAVITY * 1e6,
             2 => value / DEG * HOUR_S.sqrt(),
-            _ => value * ALLAN_PEAK / DEG * HOUR_S,
+            _ => value * GaussMarkov::ALLAN_PEAK / DEG_PER_HOUR,
         }
     }
 

@@ -12,6 +12,7 @@ pub use imu::{Answer, IMU_PARAMETERS, ImuParameters, IsoDrift, Need};
 pub use margins::{Group, GroupMargin, Margins};
 
 use crate::ekf::BeliefError;
+use crate::simulation::ExperimentError;
 
 /// What is limited at the end of an outage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -84,17 +85,34 @@ impl Worst {
 }
 
 /// Why there is no answer.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, thiserror::Error)]
 pub enum RequireError {
     /// Not even an IMU without errors keeps a limit.
-    #[error("no IMU keeps {} ≤ {}: without any noise of it, it is {value:.3}, from GNSS, the start and what else the scenario has", .limit.quantity.name(), .limit.most)]
+    #[error("no IMU keeps {} ≤ {}: without any noise of it, the error is {value:.3}, from GNSS, the start and what else the scenario has", .limit.quantity.name(), .limit.most)]
     Floor {
         /// The limit.
         limit: Limit,
         /// The error with a perfect IMU.
         value: f64,
     },
+    /// Curves have a value each second.
+    #[error("{length_s} s is not a whole number of seconds")]
+    PartOfASecond {
+        /// The length asked for (s).
+        length_s: f64,
+    },
+    /// A unit of several cannot be judged.
+    #[error("{name}: {source}")]
+    Unit {
+        /// Which.
+        name: String,
+        /// Why.
+        source: Box<RequireError>,
+    },
     /// The model has no filter.
     #[error(transparent)]
     Belief(#[from] BeliefError),
+    /// Trajectory, rates and fixes do not fit together.
+    #[error(transparent)]
+    Experiment(#[from] ExperimentError),
 }

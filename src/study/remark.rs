@@ -1,27 +1,7 @@
-//! What a caller of the engine is told on the way, and asked.
+//! What a caller of the engine is told on the way.
 
 use crate::sensors::outage::OutageRemark;
 use std::path::PathBuf;
-
-/// Who runs a study: remarks, progress, whether to go on. Every method has a default that does nothing, and `()` is
-/// the observer that says nothing and never stops.
-pub trait Observer: Sync {
-    /// Something to know.
-    fn remark(&self, _remark: &Remark) {}
-
-    /// So many runs begin.
-    fn begin(&self, _runs: u64) {}
-
-    /// So many more of them are done; called from any thread.
-    fn advance(&self, _runs: u64) {}
-
-    /// Whether to go on; asked from any thread, several times a second.
-    fn go_on(&self) -> bool {
-        true
-    }
-}
-
-impl Observer for () {}
 
 /// How much a remark matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,0 +1,246 @@
+//! Which IMU a limit on the errors after an outage needs, what a given one makes of it, and a ranking.
+
+use crate::noise::Model;
+use crate::report::require::{CURVE_S, Longest, NeededImu, Question, RankedUnit};
+use crate::require::{
+    Answer, Course, Detail, Drift, IMU_PARAMETERS, Limit, Margins, Need, RequireError, Worst, evenly,
+};
+use crate::scenario::Scenario;
+use crate::sensors::outage::Outage;
+use crate::simulation::ExperimentError;
+use crate::trajectory::Trajectory;
+
+/// The outage that is asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Ask {
+    /// One of this length (s), at several places.
+    Length(f64),
+    /// This one.
+    Window(Outage),
+    /// The longest within the limits.
+    Longest,
+}
+
+impl Ask {
+    /// How long it lasts at least (s).
+    fn length_s(self) -> f64 {
+        match self {
+            Self::Length(length_s) => length_s,
+            Self::Window(outage) => outage.end_s - outage.start_s,
+            Self::Longest => 1.0,
+        }
+    }
+}
+
+/// Earliest start of an outage where nothing else is said (s): by then a filter has aligned itself.
+const SETTLED_S: f64 = 300.0;
+/// Places of an outage of which only the length is given.
+const PLACES: u32 = 4;
+/// Longest outage that is looked at (s).
+const LONGEST_S: f64 = 600.0;
+/// Points of a curve of equal drift.
+const POINTS: u32 = 8;
+/// Steps of a second and of a part of it differ in the error by a thousandth: a limit is missed beyond that.
+const MISSED: f64 = -2e-3;
+
+/// An outage that does not lie on the trajectory.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error("an outage of {length_s} s from {begins_s} s on is not on the trajectory, which lasts from {} to {} s", .span_s.0, .span_s.1)]
+pub struct Misplaced {
+    /// How long it lasts (s).
+    pub length_s: f64,
+    /// When it begins (s).
+    pub begins_s: f64,
+    /// Of the trajectory (s).
+    pub span_s: (f64, f64),
+}
+
+/// What is asked of an IMU, and where.
+#[derive(Debug)]
+pub struct Requirements {
+    /// Receiver, start and rate.
+    pub scenario: Scenario,
+    /// The reference.
+    pub trajectory: Trajectory,
+    /// What the errors at the outage's end may be.
+    pub limits: Vec<Limit>,
+    ask: Ask,
+    first_s: f64,
+}
+
+impl Requirements {
+    /// `first_s`: the earliest start of an outage of which only the length is given (none: 300 s, less where the
+    /// trajectory is short).
+    ///
+    /// # Errors
+    /// When the outage does not lie on the trajectory.
+    pub fn new(
+        scenario: Scenario,
+        trajectory: Trajectory,
+        limits: Vec<Limit>,
+        ask: Ask,
+        first_s: Option<f64>,
+    ) -> Result<Self, Misplaced> {
+        let span_s = (trajectory.start_s(), trajectory.end_s());
+        let (lasts_s, length_s) = (span_s.1 - span_s.0, ask.length_s());
+        let settled_s = span_s.0 + SETTLED_S.min(0.5 * (lasts_s - length_s)).max(0.0);
+        let first_s = first_s.unwrap_or(settled_s);
+        let begins_s = if let Ask::Window(outage) = ask { outage.start_s } else { first_s };
+        if begins_s < span_s.0 || begins_s + length_s > span_s.1 {
+            return Err(Misplaced { length_s, begins_s, span_s });
+        }
+        Ok(Self { scenario, trajectory, limits, ask, first_s })
+    }
+
+    /// The IMU that is needed, biases with this correlation time (s), and a curve of equal drift if wished.
+    ///
+    /// # Errors
+    /// When no IMU keeps the limits, or trajectory and rates do not fit together.
+    pub fn needed(&self, t_corr_s: f64, iso_drift: bool) -> Result<(NeededImu, Question), RequireError> {
+        let outages = self.outages();
+        let course = self.course(&outages, Detail::End)?;
+        let need = Need { course: &course, scenario: &self.scenario, limits: &self.limits, t_corr_s };
+        let (imu, shares) = need.allocated()?;
+        let mut needed = NeededImu {
+            imu,
+            shares,
+            alone: [Answer::Any; IMU_PARAMETERS],
+            others_better: [Answer::Any; IMU_PARAMETERS],
+            iso_drift: None,
+        };
+        for i in 0..IMU_PARAMETERS {
+            needed.alone[i] = need.quite_alone(&imu, i)?;
+            needed.others_better[i] = need.alone(&imu, i, 0.1)?;
+        }
+        if iso_drift {
+            needed.iso_drift = Some(need.iso_drift(&imu, POINTS)?);
+        }
+        Ok((needed, self.question(outages)))
+    }
+
+    /// What a model makes of the limits; `scenario` is that of the unit, with its turn-on biases.
+    ///
+    /// # Errors
+    /// When the model has no filter.
+    pub fn margins(&self, scenario: &Scenario, model: &Model) -> Result<(Margins, Question), RequireError> {
+        let outages = self.outages();
+        let course = self.course(&outages, Detail::End)?;
+        Ok((Margins::of(&course, scenario, model, &self.limits)?, self.question(outages)))
+    }
+
+    /// The longest outage that a model bridges within the limits, and where: at the places that the outage asked for
+    /// has, each as far as the trajectory goes.
+    ///
+    /// # Errors
+    /// When the model has no filter.
+    pub fn longest(&self, scenario: &Scenario, model: &Model) -> Result<(Longest, Question), RequireError> {
+        let outages = match self.ask {
+            Ask::Longest => self.long_outages(),
+            Ask::Length(_) | Ask::Window(_) => {
+                let end_s = self.trajectory.end_s();
+                let lasting =
+                    |o: Outage| Outage { end_s: end_s.min(o.start_s + LONGEST_S).max(o.end_s), ..o };
+                self.outages().into_iter().map(lasting).collect()
+            }
+        };
+        let course = self.course(&outages, Detail::Seconds)?;
+        let longest = longest(&course.curves(scenario, model)?, &self.limits);
+        Ok((longest, self.question(outages)))
+    }
+
+    /// How units do after the outage and after those of [`CURVE_S`], the best first: those that keep the limits, those
+    /// that would if figures that are not stated were zero, those that do not.
+    ///
+    /// # Errors
+    /// When a model has no filter, with its name, or the length is not a whole number of seconds.
+    pub fn ranked(&self, units: &[CatalogueUnit]) -> Result<(Vec<RankedUnit>, Question), RequireError> {
+        let outages = self.long_outages();
+        let course = self.course(&outages, Detail::Seconds)?;
+        let named =
+            |unit: &CatalogueUnit, e| RequireError::Unit { name: unit.name.clone(), source: Box::new(e) };
+        let ranked = |unit: &CatalogueUnit| self.rank(&course, unit).map_err(|e| named(unit, e));
+        let mut ranked = units.iter().map(ranked).collect::<Result<Vec<_>, _>>()?;
+        let class = |u: &RankedUnit| (!u.is_within(), !u.not_stated.is_empty());
+        ranked.sort_by(|a, b| class(a).cmp(&class(b)).then(b.worst.margin().total_cmp(&a.worst.margin())));
+        let length_s = self.ask.length_s();
+        let asked = outages.iter().map(|o| Outage { end_s: o.start_s + length_s, ..*o }).collect();
+        Ok((ranked, self.question(asked)))
+    }
+
+    fn rank(&self, course: &Course<'_>, unit: &CatalogueUnit) -> Result<RankedUnit, RequireError> {
+        let curves = course.curves(&unit.scenario, &unit.model)?;
+        let length_s = self.ask.length_s();
+        let worst = Worst::of(&self.limits, &after(&curves, length_s));
+        let worst = worst.ok_or(RequireError::PartOfASecond { length_s })?;
+        let value = |s: u32| {
+            let drifts = after(&curves, f64::from(s));
+            drifts.iter().map(|d| d.value(worst.limit.quantity)).reduce(f64::max)
+        };
+        Ok(RankedUnit {
+            name: unit.name.clone(),
+            not_stated: unit.not_stated.clone(),
+            worst,
+            curve: CURVE_S.map(value),
+            longest: longest(&curves, &self.limits),
+        })
+    }
+
+    /// The places of the outage; those of one second where the longest is sought.
+    fn outages(&self) -> Vec<Outage> {
+        match self.ask {
+            Ask::Window(outage) => vec![outage],
+            ask => evenly(self.first_s, self.trajectory.end_s(), ask.length_s(), PLACES),
+        }
+    }
+
+    /// Outages as long as the trajectory allows at several places.
+    fn long_outages(&self) -> Vec<Outage> {
+        let end_s = self.trajectory.end_s();
+        if let Ask::Window(outage) = self.ask {
+            let end_s = end_s.min(outage.start_s + LONGEST_S).max(outage.end_s);
+            return vec![Outage { end_s, ..outage }];
+        }
+        let length_s = (0.5 * (end_s - self.first_s)).floor().min(LONGEST_S).max(self.ask.length_s());
+        evenly(self.first_s, end_s, length_s, PLACES)
+    }
+
+    fn course(&self, outages: &[Outage], detail: Detail) -> Result<Course<'_>, ExperimentError> {
+        Course::new(&self.scenario, &self.trajectory, outages, detail)
+    }
+
+    fn question(&self, outages: Vec<Outage>) -> Question {
+        Question { limits: self.limits.clone(), outages }
+    }
+}
+
+/// A unit to be ranked.
+#[derive(Debug, Clone)]
+pub struct CatalogueUnit {
+    /// Its name.
+    pub name: String,
+    /// At the rate of the IMU.
+    pub model: Model,
+    /// The scenario with its turn-on biases.
+    pub scenario: Scenario,
+    /// Figures that its datasheet does not state, and the model therefore has not.
+    pub not_stated: Vec<String>,
+}
+
+/// The errors after a time without fixes at every place where the outage lasts so long.
+fn after(curves: &[Vec<Drift>], length_s: f64) -> Vec<Drift> {
+    let there = |curve: &Vec<Drift>| curve.iter().find(|d| (d.after_s - length_s).abs() < 1e-3).copied();
+    curves.iter().filter_map(there).collect()
+}
+
+/// The longest outage within the limits, in whole seconds. The first place holds the longest.
+fn longest(curves: &[Vec<Drift>], limits: &[Limit]) -> Longest {
+    let lengths: Vec<f64> = curves.first().map_or_else(Vec::new, |c| c.iter().map(|d| d.after_s).collect());
+    let is_missed = |length_s: &f64| {
+        Worst::of(limits, &after(curves, *length_s)).is_some_and(|worst| worst.margin() < MISSED)
+    };
+    match lengths.iter().position(is_missed) {
+        Some(0) => Longest::Seconds(0.0),
+        Some(first) => Longest::Seconds(lengths[first - 1]),
+        None => Longest::AtLeast(lengths.last().copied().unwrap_or(0.0)),
+    }
+}

@@ -1,0 +1,92 @@
+//! Outages at regular and at random times.
+
+use super::Outage;
+use crate::rng::StreamKey;
+use crate::units::{SettingError, require_finite, require_positive};
+use rand_distr::{Distribution, Exp};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Outages of one length at regular times, to the end of the trajectory.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PeriodicOutages {
+    /// Start of the first (s).
+    pub first_s: f64,
+    /// From one start to the next (s).
+    pub every_s: f64,
+    /// Length of each (s).
+    pub duration_s: f64,
+}
+
+impl PeriodicOutages {
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The key whose value is refused.
+    pub fn validate(&self) -> Result<(), SettingError> {
+        require_finite("first_s", &[self.first_s])?;
+        require_positive("duration_s", &[self.duration_s])?;
+        if !(self.every_s.is_finite() && self.every_s >= 0.1) {
+            return Err(SettingError::new("every_s", self.every_s, "it must be a finite number ≥ 0.1"));
+        }
+        if self.duration_s < self.every_s {
+            return Ok(());
+        }
+        let requirement = format!("it must be shorter than every_s = {}", self.every_s);
+        Err(SettingError::new("duration_s", self.duration_s, requirement))
+    }
+
+    pub(super) fn windows(&self, (from_s, end_s): (f64, f64)) -> Vec<Outage> {
+        // those that end before the span begins are not counted through: there may be as many as there is time
+        let skipped = ((from_s - self.duration_s - self.first_s) / self.every_s).floor().max(0.0);
+        (0_u32..)
+            .map(|k| self.first_s + (skipped + f64::from(k)) * self.every_s)
+            .take_while(|start| *start < end_s)
+            .map(|start_s| Outage { start_s, end_s: start_s + self.duration_s })
+            .collect()
+    }
+}
+
+/// Outages of one length at random times: from the end of one to the start of the next, an exponential
+/// waiting time. One draw for the whole experiment, so that every run has the same outages.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RandomOutages {
+    /// Outages per hour of time with fixes.
+    pub rate_per_hour: f64,
+    /// Length of each (s).
+    pub duration_s: f64,
+}
+
+impl RandomOutages {
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The key whose value is refused.
+    pub fn validate(&self) -> Result<(), SettingError> {
+        require_positive("rate_per_hour", &[self.rate_per_hour])?;
+        if self.rate_per_hour > 3600.0 {
+            return Err(SettingError::new("rate_per_hour", self.rate_per_hour, "it must be at most 3600"));
+        }
+        require_positive("duration_s", &[self.duration_s])
+    }
+
+    pub(super) fn windows(
+        &self,
+        (start_s, end_s): (f64, f64),
+        seed: u64,
+    ) -> Result<Vec<Outage>, SettingError> {
+        let refused = |_| SettingError::new("rate_per_hour", self.rate_per_hour, "it must be a number > 0");
+        let waiting = Exp::new(self.rate_per_hour / 3600.0).map_err(refused)?;
+        let key = StreamKey { seed, scenario: "", run: 0, source: "gnss.outage", process: "waiting" };
+        let mut generator = key.generator();
+        let mut windows = Vec::new();
+        let mut t = start_s + waiting.sample(&mut generator);
+        while t < end_s {
+            windows.push(Outage { start_s: t, end_s: t + self.duration_s });
+            t += self.duration_s + waiting.sample(&mut generator);
+        }
+        Ok(windows)
+    }
+}

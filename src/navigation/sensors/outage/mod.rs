@@ -1,0 +1,56 @@
+//! When GNSS is missing: fixed windows, periodic ones, random ones.
+//!
+//! A fix at t is missing when start ≤ t < end of any outage. Times are on the trajectory's own clock.
+
+mod data;
+mod kinds;
+mod plan;
+
+pub use data::{FixedData, Fixes, OutageError, OutageRemark, PlacedOutages};
+pub use kinds::{PeriodicOutages, RandomOutages};
+pub use plan::OutagePlan;
+
+use crate::units::{SettingError, require_finite};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A window without fixes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Outage {
+    /// First instant without a fix (s).
+    pub start_s: f64,
+    /// First instant with a fix again (s).
+    pub end_s: f64,
+}
+
+impl Outage {
+    /// The two outages of [Minaretzis et al.](crate::bibliography::Minaretzis24), Section V: one on a
+    /// straight stretch, one with turns.
+    pub const PAPER: [Self; 2] =
+        [Self { start_s: 300.0, end_s: 390.0 }, Self { start_s: 700.0, end_s: 790.0 }];
+
+    /// Whether a fix at `t_s` is missing.
+    #[must_use]
+    pub fn withholds(&self, t_s: f64) -> bool {
+        // a nanosecond of slack: sample times are multiples of 1/rate, outage times are typed
+        let t_s = t_s + 1e-9;
+        self.start_s <= t_s && t_s < self.end_s
+    }
+
+    /// Checks that it is finite and lasts.
+    ///
+    /// # Errors
+    /// The key whose value is refused.
+    pub fn validate(&self) -> Result<(), SettingError> {
+        require_finite("start_s", &[self.start_s])?;
+        require_finite("end_s", &[self.end_s])?;
+        if self.end_s > self.start_s {
+            return Ok(());
+        }
+        Err(SettingError::new("end_s", self.end_s, format!("it must come after start_s = {}", self.start_s)))
+    }
+}
+
+#[cfg(test)]
+mod tests;
