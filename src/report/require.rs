@@ -255,6 +255,9 @@ pub fn margins_rows(margins: &Margins) -> Vec<Vec<String>> {
         };
         rows.push(vec![format!("{}{}", g.group.name(), binding(g)), share(g.share), factor]);
     }
+    if margins.drift > 0.0 {
+        rows.push(vec!["drift".to_owned(), share(margins.drift), String::new()]);
+    }
     rows.push(vec!["GNSS, start, turn-on biases".to_owned(), share(margins.rest), String::new()]);
     rows
 }
@@ -272,6 +275,7 @@ pub fn margins_json(margins: &Margins, question: &Question, longest: Longest) ->
         "limit": margins.worst.limit.most,
         "place": margins.worst.place,
         "groups": margins.groups.iter().map(group).collect::<Vec<_>>(),
+        "share_of_drifts": margins.drift,
         "share_of_the_rest": margins.rest,
         "outage": longest.json(),
     }))

@@ -269,7 +269,7 @@ fn budgets_add_up_to_the_true_errors_and_to_the_believed_ones() {
             assert!(budget.shares.iter().all(|(_, shares)| shares.0[i] >= -1e-12));
         }
     }
-    let names: Vec<&str> = sources.iter().map(|(name, _)| name.as_str()).collect();
+    let names: Vec<&str> = sources.iter().map(|source| source.name.as_str()).collect();
     let expected = [
         "initial",
         "gnss.position",

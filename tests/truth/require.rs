@@ -1,8 +1,9 @@
 //! The IMU that a limit needs meets it in sampled runs, and answers are monotone.
 
 use nav_sim::monte_carlo;
+use nav_sim::noise::{Ar1, Composite, Drift as NoiseDrift, Model, Process, White};
 use nav_sim::require::{
-    Answer, Course, Detail, IMU_PARAMETERS, Limit, Margins, Need, Quantity, RequireError,
+    Answer, Course, Detail, Drift, IMU_PARAMETERS, Limit, Margins, Need, Quantity, RequireError,
 };
 use nav_sim::scenario::Scenario;
 use nav_sim::sensors::imu::Truth;
@@ -103,4 +104,41 @@ fn a_curve_holds_the_ends_of_all_shorter_outages() {
     let short = curve.iter().find(|drift| drift.after_s == 20.0).unwrap();
     assert!((short.value(Quantity::P95) / 20.0 - 1.0).abs() < 5e-3, "{short:?}");
     assert!(curve.last().is_some_and(|drift| drift.after_s == 40.0) && curve.len() == 40);
+}
+
+/// A Rayleigh variable without a mean, its length where the mean is all there is.
+#[test]
+fn quantiles_of_a_horizontal_error_have_their_closed_forms() {
+    let drift = |mean_m, variance: f64| Drift {
+        after_s: 1.0,
+        mean_m,
+        covariance_m2: [[variance, 0.0], [0.0, variance]],
+        angles_deg: [0.0; 3],
+    };
+    for (found, probability) in [(Quantity::P50, 0.5_f64), (Quantity::P95, 0.95)] {
+        let rayleigh = 2.0 * (-2.0 * (1.0 - probability).ln()).sqrt();
+        assert!((drift([0.0; 2], 4.0).value(found) / rayleigh - 1.0).abs() < 1e-9);
+        assert!((drift([3.0, -4.0], 0.0).value(found) - 5.0).abs() < 1e-9);
+        // along a mean of 500 σ it is normal; across, it adds σ²/(2·5), 1e-5 m
+        let normal = [0.0, 1.644_853_627][usize::from(probability > 0.9)];
+        assert!((drift([3.0, -4.0], 1e-4).value(found) - 5.0 - 0.01 * normal).abs() < 2e-5);
+    }
+    assert!((drift([3.0, -4.0], 2.0).value(Quantity::Rmse) - 29.0_f64.sqrt()).abs() < 1e-12);
+}
+
+/// Every source of the errors is in one part, drifts in their own.
+#[test]
+fn the_shares_of_an_imu_with_a_drift_sum_to_one() {
+    let (scenario, trajectory) = (Scenario::default(), trajectory());
+    let course = Course::new(&scenario, &trajectory, &[OUTAGE], Detail::End).unwrap();
+    let axis = Composite::new(vec![
+        Process::White(White::new(1e-6).unwrap()),
+        Process::Ar1(Ar1::new(0.9999, 1e-12).unwrap()),
+        Process::Drift(NoiseDrift::new(1e-7).unwrap()),
+    ]);
+    let model = Model::pooled(scenario.imu.rate_hz, &axis, &axis);
+    let margins = Margins::of(&course, &scenario, &model, &limit(Quantity::Rmse, 50.0)).unwrap();
+    let groups: f64 = margins.groups.iter().map(|g| g.share).sum();
+    assert!(margins.groups.len() == 4 && margins.drift > 0.0, "{margins:?}");
+    assert!((groups + margins.drift + margins.rest - 1.0).abs() < 1e-9, "{margins:?}");
 }

@@ -21,8 +21,8 @@ impl Budget {
     /// Just before the first fix after each outage: every source goes alone through the gains of one filter.
     #[must_use]
     pub fn at_outage_ends(filter: &FilterPass<'_>, sources: &[NamedSource]) -> Vec<Self> {
-        let squares = |(_, side): &NamedSource| -> Vec<[f64; REPORTED]> {
-            filter.errors_at_ends(side).iter().map(|end| end.variances(&end.moments())).collect()
+        let squares = |source: &NamedSource| -> Vec<[f64; REPORTED]> {
+            filter.errors_at_ends(&source.side).iter().map(|end| end.variances(&end.moments())).collect()
         };
         let of_source: Vec<Vec<[f64; REPORTED]>> = sources.par_iter().map(squares).collect();
         let outages = of_source.first().map_or(0, Vec::len);
@@ -33,7 +33,8 @@ impl Budget {
             }
             let share =
                 |ends: &Vec<[f64; REPORTED]>| PerState(std::array::from_fn(|i| ends[k][i] / total[i]));
-            let shares = sources.iter().zip(&of_source).map(|((name, _), ends)| (name.clone(), share(ends)));
+            let shares =
+                sources.iter().zip(&of_source).map(|(source, ends)| (source.name.clone(), share(ends)));
             Self { shares: shares.collect(), total }
         };
         (0..outages).map(budget).collect()

@@ -18,19 +18,22 @@ use rayon::prelude::*;
 pub struct Drift {
     /// How long there has been no fix (s).
     pub after_s: f64,
-    /// Covariance of the position error, north and east (m²).
-    pub horizontal_m2: [[f64; 2]; 2],
+    /// Mean of the position error, north and east (m).
+    pub mean_m: [f64; 2],
+    /// Its covariance (m²).
+    pub covariance_m2: [[f64; 2]; 2],
     /// RMSE of roll, pitch, yaw (degrees).
     pub angles_deg: [f64; 3],
 }
 
 impl Drift {
     fn of(instant: &Instant, after_s: f64) -> Self {
-        let p = instant.moments();
+        let p = &instant.covariance;
         let rmse = instant.rmse();
         Self {
             after_s,
-            horizontal_m2: [[p[0][0], p[0][1]], [p[1][0], p[1][1]]],
+            mean_m: [instant.mean[0], instant.mean[1]],
+            covariance_m2: [[p[0][0], p[0][1]], [p[1][0], p[1][1]]],
             angles_deg: [rmse[6], rmse[7], rmse[8]],
         }
     }
@@ -50,13 +53,13 @@ impl Drift {
     pub(super) fn square(&self, quantity: Quantity) -> f64 {
         match quantity {
             Quantity::Angle(i) => self.angles_deg[i].powi(2),
-            _ => self.horizontal_m2[0][0] + self.horizontal_m2[1][1],
+            _ => (0..2).map(|i| self.covariance_m2[i][i] + self.mean_m[i].powi(2)).sum(),
         }
     }
 
     fn quantile(&self, probability: f64) -> f64 {
-        let covariance = DMatrix::from_fn(2, 2, |i, j| self.horizontal_m2[j][i]);
-        QuadraticForm::of_square(&covariance, &[0.0, 0.0]).quantile(probability).sqrt()
+        let covariance = DMatrix::from_fn(2, 2, |i, j| self.covariance_m2[j][i]);
+        QuadraticForm::of_square(&covariance, &self.mean_m).quantile(probability).sqrt()
     }
 }
 
@@ -144,15 +147,14 @@ impl<'a> Course<'a> {
         place: usize,
         scenario: &Scenario,
         model: &Model,
-        group: &(dyn Fn(&str) -> usize + Sync),
+        group: &(dyn Fn(&NamedSource) -> usize + Sync),
         groups: usize,
     ) -> Result<Vec<Drift>, BeliefError> {
         let place = &self.places[place];
         let filter = place.filter(scenario, model)?;
         let sources = self.sources(place, scenario, model);
         let part = |g: usize| {
-            let own: Vec<NamedSource> =
-                sources.iter().filter(|(name, _)| group(name) == g).cloned().collect();
+            let own: Vec<NamedSource> = sources.iter().filter(|source| group(source) == g).cloned().collect();
             place.drift(filter.errors_at_ends(&TruthSide::together(&own)).first().copied())
         };
         Ok((0..groups).into_par_iter().map(part).collect())

@@ -2,9 +2,10 @@
 
 use super::{Course, Limit, RequireError, Worst};
 use crate::ekf::BeliefError;
-use crate::noise::{Composite, GaussMarkov, Model, Process, White, continuous};
+use crate::imu::Sensor;
+use crate::noise::{Composite, GaussMarkov, Kind, Model, Process, White, continuous};
 use crate::scenario::Scenario;
-use crate::simulation::lincov::Crossing;
+use crate::simulation::lincov::{Crossing, NamedSource};
 use crate::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
 
 /// How many intensities an IMU has here.
@@ -36,8 +37,13 @@ const DAMPING: f64 = 0.35;
 const EVEN: f64 = 0.02;
 
 impl ImuParameters {
-    /// Names of the processes, as sources of errors.
-    const SOURCES: [&'static str; IMU_PARAMETERS] = ["accel.WN", "accel.GM", "gyro.WN", "gyro.GM"];
+    /// The processes.
+    const PROCESSES: [(Sensor, Kind); IMU_PARAMETERS] = [
+        (Sensor::Accel, Kind::White),
+        (Sensor::Accel, Kind::GaussMarkov),
+        (Sensor::Gyro, Kind::White),
+        (Sensor::Gyro, Kind::GaussMarkov),
+    ];
 
     /// The noise model.
     #[must_use]
@@ -201,8 +207,9 @@ impl Need<'_> {
     fn squares(&self, imu: &ImuParameters) -> Result<(Worst, [f64; IMU_PARAMETERS + 1]), BeliefError> {
         let worst = self.worst(imu)?;
         let model = imu.model(self.scenario.imu.rate_hz);
-        let group = |name: &str| {
-            ImuParameters::SOURCES.iter().position(|source| *source == name).unwrap_or(IMU_PARAMETERS)
+        let group = |source: &NamedSource| {
+            let own = ImuParameters::PROCESSES.iter().position(|process| source.process == Some(*process));
+            own.unwrap_or(IMU_PARAMETERS)
         };
         let parts = self.course.parts(worst.place, self.scenario, &model, &group, IMU_PARAMETERS + 1)?;
         Ok((worst, std::array::from_fn(|i| parts[i].square(worst.limit.quantity))))

@@ -3,9 +3,9 @@
 use super::{Course, Limit, Worst};
 use crate::ekf::BeliefError;
 use crate::imu::{Channel, Sensor};
-use crate::noise::{Model, Process};
+use crate::noise::{Kind, Model};
 use crate::scenario::Scenario;
-use crate::simulation::lincov::{Crossing, times};
+use crate::simulation::lincov::{Crossing, DRIFT, NamedSource, times};
 
 /// A part of an IMU's noise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,21 +31,14 @@ impl Group {
         format!("{}, {}", self.sensor.name(), if self.correlated { "correlated" } else { "white" })
     }
 
-    const fn has(process: &Process) -> bool {
-        matches!(
-            process,
-            Process::Ar1(_) | Process::GaussMarkov(_) | Process::RandomWalk(_) | Process::Drift(_)
-        )
-    }
-
-    /// Whether a source of errors, by its name, belongs to it.
-    fn includes(self, source: &str) -> bool {
-        let Some((sensor, process)) = source.split_once('.') else {
-            return false;
+    /// Whether a process of a sensor belongs to it. A drift belongs to none: it is the same in every run.
+    fn includes(self, sensor: Sensor, kind: Kind) -> bool {
+        let correlated = match kind {
+            Kind::Ar1 | Kind::GaussMarkov | Kind::RandomWalk => true,
+            Kind::White | Kind::Quantization | Kind::Ma1 => false,
+            Kind::Drift => return false,
         };
-        let is_correlated = ["AR1", "GM", "RW"].iter().any(|code| process.starts_with(code));
-        let is_white = ["WN", "QN", "MA1"].iter().any(|code| process.starts_with(code));
-        sensor == self.sensor.name() && if self.correlated { is_correlated } else { is_white }
+        sensor == self.sensor && correlated == self.correlated
     }
 
     /// The model with this part's standard deviations multiplied.
@@ -53,7 +46,7 @@ impl Group {
         let mut changed = model.clone();
         for channel in Channel::ALL.into_iter().filter(|c| c.sensor == self.sensor) {
             for process in &mut changed.axes[channel.index()].processes {
-                if Self::has(process) == self.correlated {
+                if self.includes(self.sensor, process.kind()) {
                     *process = times(process, factor * factor, model.rate_hz);
                 }
             }
@@ -81,6 +74,8 @@ pub struct Margins {
     pub worst: Worst,
     /// The parts of the IMU that it has.
     pub groups: Vec<GroupMargin>,
+    /// Share of the drifts of the noise model.
+    pub drift: f64,
     /// Share of GNSS, start and what the noise model does not have (turn-on biases).
     pub rest: f64,
 }
@@ -100,8 +95,13 @@ impl Margins {
         limits: &[Limit],
     ) -> Result<Self, BeliefError> {
         let worst = course.worst(scenario, model, limits)?;
-        let group = |name: &str| Group::ALL.iter().position(|g| g.includes(name)).unwrap_or(Group::ALL.len());
-        let parts = course.parts(worst.place, scenario, model, &group, Group::ALL.len() + 1)?;
+        let [drift, rest] = [Group::ALL.len(), Group::ALL.len() + 1];
+        let part = |source: &NamedSource| match source.process {
+            Some((sensor, kind)) => Group::ALL.iter().position(|g| g.includes(sensor, kind)).unwrap_or(rest),
+            None if source.name == DRIFT => drift,
+            None => rest,
+        };
+        let parts = course.parts(worst.place, scenario, model, &part, rest + 1)?;
         let squares: Vec<f64> = parts.iter().map(|part| part.square(worst.limit.quantity)).collect();
         let total: f64 = squares.iter().sum();
         let mut groups = Vec::new();
@@ -115,7 +115,7 @@ impl Margins {
             let factor = (left.abs() <= 1e-2).then(|| ln.exp());
             groups.push(GroupMargin { group, share: square / total, factor });
         }
-        Ok(Self { worst, groups, rest: squares[Group::ALL.len()] / total })
+        Ok(Self { worst, groups, drift: squares[drift] / total, rest: squares[rest] / total })
     }
 
     /// Whether the limits are kept.

@@ -27,6 +27,6 @@ pub use pass::{Assessment, Consistency, ErrorLaw, FilterPass, Instant, assess};
 pub use reduce::{drive, reduced_belief};
 pub(crate) use root::Crossing;
 pub use track::Track;
-pub use truth::{NamedSource, TruthSide};
+pub use truth::{DRIFT, NamedSource, TruthSide};
 pub(crate) use tune::times;
 pub use tune::{Aim, Factor, Filter, Honesty, Per, Task, scaled};

@@ -5,7 +5,7 @@ use super::input::{CROSSED, SCALED, Source, Sources, place};
 use super::track::Measured;
 use crate::ekf::{Belief, UnknownKind};
 use crate::imu::{Axis, Channel, Sensor};
-use crate::noise::{Model, Process};
+use crate::noise::{Kind, Model, Process};
 use crate::sensors::gnss::GnssSettings;
 use crate::simulation::plan::Experiment;
 
@@ -19,15 +19,33 @@ pub struct TruthSide {
     noise: [bool; 3],
 }
 
-/// A source by its name: `accel.AR1_1`, `gyro.turn_on_bias`, `gnss.position`, `initial` …
-pub type NamedSource = (String, TruthSide);
+/// One source of errors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedSource {
+    /// `accel.AR1_1`, `gyro.turn_on_bias`, `gnss.position`, `initial` …
+    pub name: String,
+    /// The process of a sensor's noise model that it is; none of what no noise model has, and of drifts, which are one
+    /// source for both sensors.
+    pub process: Option<(Sensor, Kind)>,
+    /// What it does.
+    pub side: TruthSide,
+}
+
+impl NamedSource {
+    fn new(name: impl Into<String>, side: TruthSide) -> Self {
+        Self { name: name.into(), process: None, side }
+    }
+}
+
+/// The name of the source that all drifts are.
+pub const DRIFT: &str = "drift";
 
 impl TruthSide {
     /// Several independent sources together.
     #[must_use]
     pub fn together(parts: &[NamedSource]) -> Self {
         let mut all = Self::default();
-        for (_, part) in parts {
+        for NamedSource { side: part, .. } in parts {
             all.inertial.extend(&part.inertial);
             all.starts_off |= part.starts_off;
             all.noise.iter_mut().zip(part.noise).for_each(|(there, more)| *there |= more);
@@ -46,7 +64,7 @@ impl TruthSide {
             parts.extend(processes(model, sensor, &mut drifts));
             parts.extend(defects(experiment, sensor));
         }
-        parts.extend(inertial("drift".to_owned(), drifts));
+        parts.extend(inertial(DRIFT.to_owned(), drifts));
         parts.extend(correlated(experiment.gnss, experiment.rate_hz));
         parts
     }
@@ -91,14 +109,15 @@ fn beside_the_imu(experiment: &Experiment<'_>, starts_off: bool) -> Vec<NamedSou
     ];
     all.into_iter()
         .filter(|(_, _, is_there)| *is_there)
-        .map(|(name, side, _)| (name.to_owned(), side))
+        .map(|(name, side, _)| NamedSource::new(name, side))
         .collect()
 }
 
 /// A source of states alone; none where there are none.
 fn inertial(name: String, states: Vec<Source>) -> Option<NamedSource> {
     let inertial = Sources { states, white: [0.0; SIGNALS] };
-    (!inertial.states.is_empty()).then(|| (name, TruthSide { inertial, ..TruthSide::default() }))
+    let side = TruthSide { inertial, ..TruthSide::default() };
+    (!side.inertial.states.is_empty()).then(|| NamedSource::new(name, side))
 }
 
 /// The processes of a sensor: those of the same label are one source on all axes. Drifts are set apart.
@@ -112,11 +131,12 @@ fn processes(model: &Model, sensor: Sensor, drifts: &mut Vec<Source>) -> Vec<Nam
                 continue;
             }
             let name = format!("{}.{label}", sensor.name());
-            let at = found.iter().position(|(known, _)| *known == name).unwrap_or_else(|| {
-                found.push((name, TruthSide::default()));
+            let at = found.iter().position(|known| known.name == name).unwrap_or_else(|| {
+                let process = Some((sensor, process.kind()));
+                found.push(NamedSource { process, ..NamedSource::new(name, TruthSide::default()) });
                 found.len() - 1
             });
-            found[at].1.inertial.add(channel.index(), process);
+            found[at].side.inertial.add(channel.index(), process);
         }
     }
     found
@@ -155,7 +175,8 @@ fn believed_of(belief: &Belief, sensor: Sensor) -> Vec<NamedSource> {
     white.white[first..first + 3].copy_from_slice(&belief.white[sensor as usize].to_array());
     let mut all = Vec::new();
     if white.white.iter().any(|w| *w > 0.0) {
-        all.push((format!("{}.WN", sensor.name()), TruthSide { inertial: white, ..TruthSide::default() }));
+        let side = TruthSide { inertial: white, ..TruthSide::default() };
+        all.push(NamedSource::new(format!("{}.WN", sensor.name()), side));
     }
     let groups = &belief.groups[sensor as usize];
     let biases = groups.iter().filter(|g| !g.is_constant()).count();
