@@ -95,6 +95,7 @@ struct OutageRow {
     start_s: f64,
     end_s: f64,
     fixes_withheld: usize,
+    followed_by_fix: bool,
     end_from_fix: Option<DriftRow>,
     #[serde(skip_serializing_if = "Option::is_none")]
     end_from_reference: Option<DriftRow>,
@@ -136,6 +137,7 @@ impl FusionSummary {
             start_s: o.outage.start_s,
             end_s: o.outage.end_s,
             fixes_withheld: o.withheld,
+            followed_by_fix: o.is_followed,
             end_from_fix: o.from_fix.map(Into::into),
             end_from_reference: o.from_reference.map(Into::into),
         };
@@ -198,7 +200,8 @@ impl FusionSummary {
                     format!("{:.2} m from the {name} (1 sigma {:.2} m)", d.horizontal_m, d.expected_sigma_m)
                 })
             };
-            let ends = [of("next fix", o.end_from_fix), of("reference", o.end_from_reference)];
+            let fix = if o.followed_by_fix { "next fix" } else { "last fix withheld" };
+            let ends = [of(fix, o.end_from_fix), of("reference", o.end_from_reference)];
             let ends: Vec<String> = ends.into_iter().flatten().collect();
             lines.push(format!(
                 "outage {}–{} s, {} fixes withheld: at its end {}",

@@ -21,6 +21,8 @@ pub struct OutageDrift {
     pub outage: Outage,
     /// Fixes that were withheld.
     pub withheld: usize,
+    /// Whether a fix follows it.
+    pub is_followed: bool,
     /// Against the first fix after it (the last withheld one, when none follows).
     pub from_fix: Option<Drift>,
     /// Against the reference at that time.
@@ -79,5 +81,11 @@ fn drift(solution: &Solution, outage: Outage) -> OutageDrift {
         let horizontal_m = error[0].hypot(error[1]);
         Some(Drift { horizontal_m, down_m: error[2], sigma_m: f.horizontal_sigma_m })
     });
-    OutageDrift { outage, withheld: withheld().count(), from_fix, from_reference }
+    OutageDrift {
+        outage,
+        withheld: withheld().count(),
+        is_followed: after.is_some(),
+        from_fix,
+        from_reference,
+    }
 }
