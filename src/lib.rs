@@ -43,6 +43,8 @@ pub use nav_sim_signal::{bibliography, imu, noise, rng, units, wavelet};
 
 // Parameters for other programs.
 pub mod export;
+// Which model, on the user's own recordings.
+pub mod choose;
 // What follows a job.
 pub mod observer;
 // Words and pages.

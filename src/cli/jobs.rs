@@ -2,8 +2,10 @@
 
 use super::Failure;
 use nav_sim::calibration::{AverageError, CalibrationError, Cause, FitError, ModelSpec, SpecError};
+use nav_sim::choose::ChoiceError;
 use nav_sim::formats::suggest::nearest;
 use nav_sim::jobs::JobError;
+use nav_sim::simulation::ExperimentError;
 
 impl From<JobError> for Failure {
     fn from(e: JobError) -> Self {
@@ -23,6 +25,11 @@ impl From<JobError> for Failure {
             JobError::Single { .. } => {
                 Self::input(format!("--estimator {e}")).hint("awv, sr-awv and dr-awv take several")
             }
+            JobError::TooFew { .. } => Self::input(e).hint(
+                "each recording is a file; nav-sim calibrate takes fewer, and nav-sim tune makes its model honest for \
+                 another truth",
+            ),
+            JobError::Choice(e) => of_choice(&e),
             JobError::Pooled => Self::input(format!("--pool sensor: {e}")).hint("--pool axes"),
             JobError::TwoRates { path, own, given } => {
                 let message =
@@ -36,6 +43,18 @@ impl From<JobError> for Failure {
                 Self::input(e).hint("calibrate the recordings themselves: it averages them")
             }
         }
+    }
+}
+
+fn of_choice(e: &ChoiceError) -> Failure {
+    match e {
+        ChoiceError::Calibration { candidate, source } => of_calibration(source).within(candidate),
+        ChoiceError::Own { source, .. } => {
+            Failure::input(e).maybe_hint(of_calibration(source).advice().map(str::to_owned))
+        }
+        ChoiceError::Experiment(ExperimentError::FixBetweenSamples { .. }) => Failure::input(e)
+            .hint("the IMU has the rate of the recordings: another [gnss] rate_hz in --scenario"),
+        ChoiceError::Experiment(_) | ChoiceError::Belief { .. } => Failure::input(e),
     }
 }
 

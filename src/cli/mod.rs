@@ -5,6 +5,7 @@ mod batch;
 mod bench;
 mod calibrate;
 mod check;
+mod choose;
 mod common;
 mod compare;
 mod completions;
@@ -62,6 +63,7 @@ enum Command {
     Run(run::Args),
     Tune(tune::Args),
     Require(require::Args),
+    Choose(choose::Args),
     Fuse(fuse::Args),
     Compare(compare::Args),
     Export(export::Args),
@@ -92,6 +94,7 @@ impl Command {
             Self::Trajectory(args) => trajectory::run(&args, session),
             Self::Run(args) => run::run(&args, session),
             Self::Require(args) => require::run(&args, session),
+            Self::Choose(args) => choose::run(&args, session),
             Self::Tune(args) => tune::run(&args, session),
             Self::Fuse(args) => fuse::run(&args, session),
             Self::Compare(args) => compare::run(&args, session),

@@ -1,6 +1,7 @@
 //! Why a job has no result.
 
 use crate::calibration::{CalibrationError, Estimator, SignalError};
+use crate::choose::ChoiceError;
 use crate::formats::FileError;
 use crate::formats::curve_file::CurveError;
 use crate::wavelet::WaveletError;
@@ -44,6 +45,17 @@ pub enum JobError {
         /// Which part of one is in the other.
         share: f64,
     },
+    /// Too few recordings to leave one out.
+    #[error("{recordings} recordings are too few to leave one out: {needed} or more are needed")]
+    TooFew {
+        /// How many there are.
+        recordings: usize,
+        /// How many are needed.
+        needed: usize,
+    },
+    /// Candidates that cannot be compared.
+    #[error(transparent)]
+    Choice(#[from] ChoiceError),
     /// An estimator of one recording was given several.
     #[error("{estimator} takes one recording at a time; there are {recordings}")]
     Single {

@@ -23,6 +23,7 @@
 //! ```
 
 mod calibrate;
+mod choose;
 mod curves;
 mod error;
 mod files;
@@ -33,6 +34,7 @@ mod require;
 mod wavelet;
 
 pub use calibrate::{Calibration, CalibrationOptions, EstimatorChoice, Measured, calibrate, measure};
+pub use choose::{ChoiceDrive, Chosen, choose};
 pub use curves::{Curves, read_curves};
 pub use error::JobError;
 pub use files::ModelFiles;

@@ -2,6 +2,7 @@
 //! every function makes a text, the command line writes it.
 
 mod brief;
+mod choose;
 mod comparison;
 mod curves;
 mod efficiency;
@@ -26,6 +27,7 @@ mod tune;
 mod verdict;
 
 pub use brief::brief;
+pub use choose::ChoiceReport;
 pub use comparison::{CandidateResult, ComparisonFile, Label, consistency_rows, table_rows, verdict_lines};
 pub use curves::{
     CONFIDENCE, CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile, intervals_note,

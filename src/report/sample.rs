@@ -31,6 +31,7 @@ pub(super) fn result() -> RunResult {
             see_mean: [7.5 + 0.01 * f64::from(run); 9],
             see_end: [16.3 + 0.01 * f64::from(run); 9],
             nees_end: 8.0 + f64::from(run),
+            log_density_end: -7.0 - 0.3 * f64::from(run),
             error_end: [3.0 - f64::from(run); 9],
             horizontal_error_end_m: 2.0 + f64::from(run),
             reconvergence_s: 1.0 + f64::from(run),

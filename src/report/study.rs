@@ -211,7 +211,8 @@ pub fn epoch_rows(of: &ColumnResult<'_>, epochs: &[EpochMetrics]) -> Vec<TableRo
 pub fn run_columns() -> Vec<TableColumn> {
     let mut names: Vec<String> = ["nis_mean", "nees_mean", "coverage"].map(str::to_owned).into();
     names.extend(["see_mean", "see_end", "error_end"].into_iter().flat_map(prefixed));
-    names.extend(["nees_end", "horizontal_error_end_m", "reconvergence_s"].map(str::to_owned));
+    let ends = ["nees_end", "log_density_end", "horizontal_error_end_m", "reconvergence_s"];
+    names.extend(ends.map(str::to_owned));
     columns(ints(["run", "outage", "diverged", "fixes"]).chain(floats(names)))
 }
 
@@ -225,7 +226,7 @@ pub fn run_rows(of: &ColumnResult<'_>) -> Vec<TableRow> {
             row.extend([run.run, i as u64, u64::from(run.diverged), run.nis.1].map(Value::Int));
             let whole = [run.nis.0, run.nees_mean, run.covered].into_iter();
             let states = whole.chain(o.see_mean).chain(o.see_end).chain(o.error_end);
-            let ends = [o.nees_end, o.horizontal_error_end_m, o.reconvergence_s];
+            let ends = [o.nees_end, o.log_density_end, o.horizontal_error_end_m, o.reconvergence_s];
             row.extend(states.chain(ends).map(Value::Float));
             rows.push(row);
         }

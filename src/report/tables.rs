@@ -65,7 +65,8 @@ pub fn epochs_csv(epochs: &[EpochMetrics]) -> String {
 fn run_columns() -> Vec<String> {
     let start = ["run", "diverged", "nis_mean", "fixes", "nees_mean", "coverage"].map(str::to_owned);
     let whole = start.into_iter().chain(named("normalised_sq_")).chain(["outage".to_owned()]);
-    let ends = ["nees_end", "horizontal_error_end_m", "reconvergence_s"].map(str::to_owned);
+    let ends =
+        ["nees_end", "log_density_end", "horizontal_error_end_m", "reconvergence_s"].map(str::to_owned);
     let states = ["see_mean_", "see_end_", "error_end_"].into_iter().flat_map(named);
     whole.chain(states).chain(ends).collect()
 }
@@ -87,7 +88,8 @@ pub fn runs_csv(result: &RunResult) -> impl Iterator<Item = String> {
 
 fn outage_cells(outage: &OutageRecord) -> Vec<String> {
     let states = outage.see_mean.iter().chain(&outage.see_end).chain(&outage.error_end);
-    let ends = [outage.nees_end, outage.horizontal_error_end_m, outage.reconvergence_s];
+    let ends =
+        [outage.nees_end, outage.log_density_end, outage.horizontal_error_end_m, outage.reconvergence_s];
     states.chain(&ends).copied().map(shortest).collect()
 }
 
@@ -129,7 +131,7 @@ pub fn parse_runs(text: &str) -> Result<Vec<RunRecord>, TableError> {
     let (see, see_end, error) =
         (table.states("see_mean_")?, table.states("see_end_")?, table.states("error_end_")?);
     let normalised = table.states("normalised_sq_")?;
-    let [run, diverged, nis, fixes, nees, coverage, outage, nees_end, horizontal, recovery] =
+    let [run, diverged, nis, fixes, nees, coverage, outage, nees_end, log_density, horizontal, recovery] =
         table.columns([
             "run",
             "diverged",
@@ -139,6 +141,7 @@ pub fn parse_runs(text: &str) -> Result<Vec<RunRecord>, TableError> {
             "coverage",
             "outage",
             "nees_end",
+            "log_density_end",
             "horizontal_error_end_m",
             "reconvergence_s",
         ])?;
@@ -164,6 +167,7 @@ pub fn parse_runs(text: &str) -> Result<Vec<RunRecord>, TableError> {
             see_mean: table.numbers(row, see)?,
             see_end: table.numbers(row, see_end)?,
             nees_end: table.number(row, nees_end)?,
+            log_density_end: table.number(row, log_density)?,
             error_end: table.numbers(row, error)?,
             horizontal_error_end_m: table.number(row, horizontal)?,
             reconvergence_s: table.number(row, recovery)?,

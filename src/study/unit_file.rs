@@ -1,6 +1,6 @@
 //! Unit files of studies: what a unit found, as bytes with a checksum.
 //!
-//! `nav-sim unit 2\n`, the length of the head (u32), the head (JSON), the numbers (little-endian f64 and
+//! `nav-sim unit 3\n`, the length of the head (u32), the head (JSON), the numbers (little-endian f64 and
 //! u64: for each column its runs, then its epochs), BLAKE3 of all before. A file that is cut off or changed
 //! in one bit is no unit file.
 
@@ -12,10 +12,10 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-const MAGIC: &[u8] = b"nav-sim unit 2\n";
+const MAGIC: &[u8] = b"nav-sim unit 3\n";
 const CHECKSUM: usize = 32;
 /// Numbers of an outage record, an epoch, and a run without its outages.
-const OUTAGE: usize = 3 * REPORTED + 3;
+const OUTAGE: usize = 3 * REPORTED + 4;
 const EPOCH: usize = 4 + 5 * REPORTED + 6;
 const RUN: usize = 7 + REPORTED;
 
@@ -156,7 +156,7 @@ fn put_run(bytes: &mut Vec<u8>, run: &RunRecord) {
         put(bytes, &o.see_mean);
         put(bytes, &o.see_end);
         put(bytes, &o.error_end);
-        put(bytes, &[o.nees_end, o.horizontal_error_end_m, o.reconvergence_s]);
+        put(bytes, &[o.nees_end, o.log_density_end, o.horizontal_error_end_m, o.reconvergence_s]);
     }
 }
 
@@ -250,6 +250,7 @@ fn run(outages: usize, words: &mut Words<'_>) -> RunRecord {
         see_end: words.floats(),
         error_end: words.floats(),
         nees_end: words.float(),
+        log_density_end: words.float(),
         horizontal_error_end_m: words.float(),
         reconvergence_s: words.float(),
     };
@@ -285,6 +286,7 @@ mod tests {
             see_mean: [value(k); 9],
             see_end: [value(k + 5); 9],
             nees_end: value(k + 6),
+            log_density_end: -value(k + 4),
             error_end: std::array::from_fn(|i| -value(i + k)),
             horizontal_error_end_m: 1e-300,
             reconvergence_s: if k == 1 { f64::INFINITY } else { -0.0 },

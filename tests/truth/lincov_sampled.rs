@@ -137,6 +137,9 @@ fn assert_outage_agrees(name: &str, sampled: &RunResult, expected: &Expected, fr
     }
     let nees = Estimate::mean_of(records().map(|o| o.nees_end), None);
     assert!(((nees.value - outage.nees_end) / nees.std_error).abs() < BOUND, "{name}: {}", nees.value);
+    let density = Estimate::mean_of(records().map(|o| o.log_density_end), None);
+    let off = (density.value - outage.log_density_end) / density.std_error;
+    assert!(off.abs() < BOUND, "{name}: {} against {}", density.value, outage.log_density_end);
     let h = &outage.horizontal_error_end_m;
     for (p, quantile) in [(0.5, h.p50), (0.95, h.p95)] {
         let below = records().filter(|o| o.horizontal_error_end_m <= quantile).count() as f64;

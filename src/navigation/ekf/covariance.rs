@@ -11,7 +11,7 @@ use super::belief::{Belief, BiasGroup, MAX_BLOCKS};
 use super::dynamics::{ErrorMap, NavError};
 use super::unknowns::Regressor;
 use crate::imu::Sensor;
-use crate::lanes::{Lanes, Mat3, Real, Vec3, Wide};
+use crate::lanes::{LANES, Lanes, Mat3, Real, Vec3, Wide};
 use glam::DVec3;
 use std::ops::Range;
 
@@ -282,9 +282,27 @@ impl Covariance {
     #[inline(always)]
     #[must_use]
     pub fn normalised_square<const N: usize>(&self, states: [usize; N], x: [Lanes; N]) -> Lanes {
+        self.whitened(states, x).0
+    }
+
+    /// Logarithm of the normal density of mean zero and this covariance at `x` (nats; the units of the density are
+    /// those of the states, inverse).
+    #[must_use]
+    pub fn log_density<const N: usize>(&self, states: [usize; N], x: [Lanes; N]) -> Lanes {
+        let (square, root_of_det) = self.whitened(states, x);
+        let constant = N as f64 * std::f64::consts::TAU.ln();
+        let mut density = Lanes::ZERO;
+        for lane in 0..LANES {
+            density[lane] = -0.5 * (square[lane] + 2.0 * root_of_det[lane].ln() + constant);
+        }
+        density
+    }
+
+    /// The square of `L⁻¹ x` and the determinant of L, where P = L Lᵀ over these states.
+    fn whitened<const N: usize>(&self, states: [usize; N], x: [Lanes; N]) -> (Lanes, Lanes) {
         let mut l = [[Lanes::ZERO; N]; N];
         let mut y = x;
-        let mut sum = Lanes::ZERO;
+        let (mut sum, mut det) = (Lanes::ZERO, Lanes::splat(1.0));
         for i in 0..N {
             for j in 0..=i {
                 let mut a: Lanes = self.get(states[i], states[j]);
@@ -299,8 +317,9 @@ impl Covariance {
             }
             y[i] = y[i] / l[i][i];
             sum += y[i] * y[i];
+            det = det * l[i][i];
         }
-        sum
+        (sum, det)
     }
 
     /// The matrix of one lane.
@@ -403,6 +422,19 @@ mod tests {
         let v = DVector::from_fn(9, |i, _| 0.1 * i as f64 - 0.3);
         let expected = (v.transpose() * m.try_inverse().unwrap() * v)[0];
         let got = p.normalised_square(std::array::from_fn(|i| i), x)[6];
+        assert!((got / expected - 1.0).abs() < 1e-10, "{got} against {expected}");
+    }
+
+    /// ln N(x; 0, P) = −½ (xᵀ P⁻¹ x + ln det 2πP).
+    #[test]
+    fn log_density_agrees_with_the_determinant() {
+        let (p, m) = example(3);
+        let x: [Lanes; 9] = std::array::from_fn(|i| Lanes::splat(0.1 * i as f64 - 0.3));
+        let v = DVector::from_fn(9, |i, _| 0.1 * i as f64 - 0.3);
+        let block = m.view((0, 0), (9, 9)).into_owned();
+        let square = (v.transpose() * block.clone().try_inverse().unwrap() * v)[0];
+        let expected = -0.5 * (square + (block * std::f64::consts::TAU).determinant().ln());
+        let got = p.log_density(std::array::from_fn(|i| i), x)[6];
         assert!((got / expected - 1.0).abs() < 1e-10, "{got} against {expected}");
     }
 }

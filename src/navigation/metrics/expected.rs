@@ -168,6 +168,8 @@ fn outage((start_s, end_s): (f64, f64), end: &Instant, epochs: &[EpochMetrics]) 
         rmse_end_std_error: none,
         nees_end: end.consistency().nees,
         nees_end_std_error: 0.0,
+        log_density_end: end.consistency().log_density,
+        log_density_end_std_error: 0.0,
         horizontal_error_end_m: Spread {
             p50: quantile(0.5),
             p95: quantile(0.95),
@@ -191,6 +193,7 @@ fn record(epochs: &[EpochMetrics], law: &ErrorLaw, outages: &[OutageSummary]) ->
         see_end: o.asee_end.0,
         error_end: o.rmse_end.0,
         nees_end: o.nees_end,
+        log_density_end: o.log_density_end,
         horizontal_error_end_m: f64::NAN,
         reconvergence_s: f64::NAN,
     };

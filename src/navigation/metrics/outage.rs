@@ -19,6 +19,8 @@ pub struct OutageMetrics {
     pub asee_end: PerState<Estimate>,
     /// Mean NEES at the same instant.
     pub nees_end: Estimate,
+    /// Mean logarithm of the density of the errors under the filter's belief there (nats).
+    pub log_density_end: Estimate,
     /// Root mean square error just before the first fix after the outage.
     pub rmse_end: PerState<Estimate>,
     /// Horizontal error there: median.
@@ -73,6 +75,7 @@ fn outage((start_s, end_s): (f64, f64), records: &[&OutageRecord], windows: Opti
         rmse_mean: PerState([Estimate { value: f64::NAN, std_error: f64::NAN }; REPORTED]),
         asee_end: per_state(&|i| mean(&|r| r.see_end[i])),
         nees_end: mean(&|r| r.nees_end),
+        log_density_end: mean(&|r| r.log_density_end),
         rmse_end: per_state(&|i| mean(&|r| r.error_end[i].powi(2)).root()),
         horizontal_p50_m: quantile(&horizontal, 0.5, windows),
         horizontal_p95_m: quantile(&horizontal, 0.95, windows),
@@ -104,6 +107,7 @@ mod tests {
             reconvergence_s: if value > 4.0 { f64::NAN } else { value },
             see_end: [2.0 * value; 9],
             nees_end: 9.0 * value,
+            log_density_end: -value,
         };
         RunRecord { run, diverged, outages: vec![record], nis: (6.0, 1), ..RunRecord::default() }
     }
@@ -116,6 +120,7 @@ mod tests {
         assert_eq!(metrics.asee_mean.0[1].value, 3.0);
         assert!((metrics.rmse_end.0[4].value - (35.0_f64 / 3.0).sqrt()).abs() < 1e-15);
         assert_eq!((metrics.asee_end.0[1].value, metrics.nees_end.value), (6.0, 27.0));
+        assert_eq!(metrics.log_density_end.value, -3.0);
         assert_eq!((metrics.horizontal_p50_m.value, metrics.horizontal_max_m), (3.0, 5.0));
         assert_eq!((metrics.reconvergence.p50_s.value, metrics.reconvergence.never), (2.0, 1));
     }

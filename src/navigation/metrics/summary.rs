@@ -99,6 +99,11 @@ pub struct OutageSummary {
     pub nees_end: f64,
     /// Its Monte-Carlo standard error.
     pub nees_end_std_error: f64,
+    /// Mean logarithm of the density of the nine errors (m, m/s, rad) under the filter's belief there (nats): a proper
+    /// score, by which filters on the same errors can be ranked. Higher is better.
+    pub log_density_end: f64,
+    /// Its Monte-Carlo standard error.
+    pub log_density_end_std_error: f64,
     /// Horizontal error at the same instant.
     pub horizontal_error_end_m: Spread,
     /// Time until the error is back to what it was before.
@@ -265,6 +270,8 @@ impl From<&OutageMetrics> for OutageSummary {
             rmse_end_std_error: errors(&o.rmse_end),
             nees_end: o.nees_end.value,
             nees_end_std_error: o.nees_end.std_error,
+            log_density_end: o.log_density_end.value,
+            log_density_end_std_error: o.log_density_end.std_error,
             horizontal_error_end_m: Spread::new(p50, p95, o.horizontal_max_m),
             reconvergence_s: Recovery {
                 p50: o.reconvergence.p50_s.value,

@@ -26,6 +26,11 @@ pub(super) struct Assessment {
 }
 
 impl Assessment {
+    /// Logarithm of the density of the errors under the filter's belief.
+    pub(super) fn log_density(&self, ekf: &Ekf) -> Lanes {
+        ekf.p.log_density(std::array::from_fn(|i| i), self.navigation)
+    }
+
     /// Of the first `live` lanes; the others are zero.
     pub(super) fn of(ekf: &Ekf, live: usize, reference: &NavState) -> Self {
         let jacobian = RollPitchYaw::from_quat(reference.q_b_n).jacobian_of_psi_n();

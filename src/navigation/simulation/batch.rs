@@ -245,11 +245,13 @@ impl Candidate {
         }
         settle(&mut self.ekf);
         let found = Assessment::of(&self.ekf, self.live, &event.reference);
+        let log_density = found.log_density(&self.ekf);
         for (_, records) in plan.outages.iter().zip(&mut self.outages).filter(|((_, end), _)| *end == index) {
             for (lane, record) in records.iter_mut().enumerate().take(self.live) {
                 record.see_end = found.see.map(|s| s[lane]);
                 record.error_end = found.error.map(|e| e[lane]);
                 record.nees_end = found.nees[lane];
+                record.log_density_end = log_density[lane];
                 record.horizontal_error_end_m = record.error_end[0].hypot(record.error_end[1]);
             }
         }

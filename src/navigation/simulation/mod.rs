@@ -72,6 +72,9 @@ pub struct OutageRecord {
     pub error_end: [f64; REPORTED],
     /// NEES over [`NEES_DOF`] states at the same instant.
     pub nees_end: f64,
+    /// Logarithm of the density of the same errors (m, m/s, rad) under the filter's belief, a normal law (nats): a
+    /// proper score, highest in the mean for the filter that is right.
+    pub log_density_end: f64,
     /// Horizontal position error at the same instant (m).
     pub horizontal_error_end_m: f64,
     /// Time from the outage's end until the first report at which the horizontal error is within the

@@ -170,6 +170,12 @@ impl Trajectory {
         self.curve.knots()
     }
 
+    /// The same motion as far as its first sample at or after `t_s`.
+    #[must_use]
+    pub fn until(&self, t_s: f64) -> Self {
+        Self { origin_e: self.origin_e, curve: self.curve.until(t_s) }
+    }
+
     /// The motion with respect to the Earth. Outside start and end the first and last pieces continue.
     #[must_use]
     pub fn kinematics(&self, t_s: f64) -> Kinematics {

@@ -54,6 +54,12 @@ impl<const N: usize> Spline<N> {
         &self.t
     }
 
+    /// The same curve as far as the first knot at or after `t`.
+    pub(super) fn until(&self, t: f64) -> Self {
+        let kept = (self.t.partition_point(|&knot| knot < t) + 1).clamp(2, self.t.len());
+        Self { t: self.t[..kept].to_vec(), y: self.y[..kept].to_vec(), m: self.m[..kept].to_vec() }
+    }
+
     /// Value, first and second derivative. Outside the knots the first and last pieces continue.
     pub(super) fn at(&self, t: f64) -> ([f64; N], [f64; N], [f64; N]) {
         let i = self.t.partition_point(|&knot| knot <= t).clamp(1, self.t.len() - 1) - 1;

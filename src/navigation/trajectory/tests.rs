@@ -142,3 +142,19 @@ fn unusable_samples_are_refused_by_name() {
     s[3].q_b_n = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
     assert!(matches!(refused(&s), Error::NotFinite { index: 3, what: "attitude", .. }));
 }
+
+#[test]
+fn what_is_left_of_a_trajectory_is_the_same_motion() {
+    let turning = |i: i32| {
+        let t_s = f64::from(i);
+        sample(t_s, 45.0 + 1e-4 * t_s, 7.0 + 1e-6 * t_s * t_s, 100.0, [0.0, 1.0, 3.0 * t_s])
+    };
+    let whole = Trajectory::from_samples(&(0..40).map(turning).collect::<Vec<_>>()).unwrap();
+    let part = whole.until(20.5);
+    assert_eq!((part.start_s(), part.end_s()), (0.0, 21.0));
+    assert_eq!(whole.until(99.0).end_s(), 39.0);
+    for i in 0..=210 {
+        let t_s = 0.1 * f64::from(i);
+        assert_eq!(part.kinematics(t_s), whole.kinematics(t_s), "{t_s} s");
+    }
+}

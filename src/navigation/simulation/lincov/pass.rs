@@ -29,6 +29,8 @@ pub struct Consistency {
     /// tr(P⁻¹ P_true) − ln det(P⁻¹ P_true) − 9: twice the Kullback-Leibler divergence of the believed law of
     /// the errors from the true one. 0 for a filter that is right.
     pub divergence: f64,
+    /// Expected logarithm of the density of the true error under the filter's belief (nats, of m, m/s, rad).
+    pub log_density: f64,
 }
 
 impl Consistency {
@@ -311,21 +313,21 @@ impl Instant {
         let moments = self.moments();
         let p = SMatrix::<f64, NAV, NAV>::from_fn(|i, j| self.believed[j][i]);
         let t = SMatrix::<f64, NAV, NAV>::from_fn(|i, j| moments[j][i]);
-        let (nees, log_det) = match (p.cholesky(), t.cholesky()) {
-            (Some(p), Some(t_factor)) => {
-                let log_det = |l: SMatrix<f64, NAV, NAV>| 2.0 * l.diagonal().map(f64::ln).sum();
-                (p.solve(&t).trace(), log_det(t_factor.l()) - log_det(p.l()))
-            }
-            (Some(p), None) => (p.solve(&t).trace(), f64::NEG_INFINITY),
-            _ => (f64::NAN, f64::NAN),
+        let log_det = |l: SMatrix<f64, NAV, NAV>| 2.0 * l.diagonal().map(f64::ln).sum();
+        let (nees, believed, real) = match (p.cholesky(), t.cholesky()) {
+            (Some(p), Some(t_factor)) => (p.solve(&t).trace(), log_det(p.l()), log_det(t_factor.l())),
+            (Some(p), None) => (p.solve(&t).trace(), log_det(p.l()), f64::NEG_INFINITY),
+            _ => (f64::NAN, f64::NAN, f64::NAN),
         };
+        let dof = NAV as f64;
         Consistency {
             after_s: self.after_s,
             measured: self.measured,
             sigma: self.sigma(),
             rmse: self.rmse(),
             nees,
-            divergence: nees - log_det - NAV as f64,
+            divergence: nees - (real - believed) - dof,
+            log_density: -0.5 * (nees + believed + dof * std::f64::consts::TAU.ln()),
         }
     }
 }

@@ -1,0 +1,259 @@
+//! Where candidates navigate, and what they do on a recording that they have not seen.
+
+use super::candidate::{Candidate, Inflation};
+use super::laboratory::Laboratory;
+use super::score::Score;
+use crate::calibration::CalibrationError;
+use crate::ekf::{Belief, BeliefError};
+use crate::imu::{Recording, Sensor};
+use crate::monte_carlo;
+use crate::noise::Model;
+use crate::noise::continuous::same_rate;
+use crate::scenario::Scenario;
+use crate::sensors::imu::{Truth, TruthError};
+use crate::sensors::outage::Outage;
+use crate::simulation::ExperimentError;
+use crate::simulation::lincov::{Aim, Factor, FilterPass, Per, Task, Track, TruthSide, scaled};
+use crate::trajectory::Trajectory;
+use rayon::prelude::*;
+
+/// A trajectory with its fixes, outages and random numbers.
+#[derive(Debug)]
+pub struct Drive {
+    trajectory: Trajectory,
+    scenario: Scenario,
+    outages: Vec<Outage>,
+    seed: u64,
+    track: Track,
+}
+
+/// Why candidates cannot be compared.
+#[derive(Debug, thiserror::Error)]
+pub enum ChoiceError {
+    /// Trajectory, rates, fixes and recordings do not fit together.
+    #[error(transparent)]
+    Experiment(#[from] ExperimentError),
+    /// A model cannot be made.
+    #[error("{candidate}: {source}")]
+    Calibration {
+        /// The candidate.
+        candidate: String,
+        /// Why.
+        source: Box<CalibrationError>,
+    },
+    /// The noise of one recording cannot be described.
+    #[error("the noise of {recording} alone: {source}")]
+    Own {
+        /// The recording.
+        recording: String,
+        /// Why.
+        source: Box<CalibrationError>,
+    },
+    /// A model has no such filter.
+    #[error("{candidate}: {source}")]
+    Belief {
+        /// The candidate.
+        candidate: String,
+        /// Why.
+        source: BeliefError,
+    },
+}
+
+/// One recording left out.
+#[derive(Debug, Clone)]
+pub struct Fold {
+    /// Scores of the candidates, in their order: on windows of the recording, or what is expected where it is shorter
+    /// than the trajectory.
+    pub scores: Vec<Score>,
+    /// What covariance analysis expects of each where the recording's own N2 makes the errors.
+    pub expected: Vec<Score>,
+    /// Windows that were navigated; 0 where the recording is shorter than the trajectory.
+    pub windows: u64,
+    /// How many windows lie side by side in it.
+    pub independent: f64,
+}
+
+impl Drive {
+    /// Along a trajectory as far as the end of the last outage, with the rate of the recordings (Hz), which becomes that
+    /// of the IMU.
+    ///
+    /// # Errors
+    /// When trajectory, rates and fixes do not fit together.
+    pub fn new(
+        trajectory: &Trajectory,
+        mut scenario: Scenario,
+        outages: Vec<Outage>,
+        rate_hz: f64,
+        seed: u64,
+    ) -> Result<Self, ExperimentError> {
+        if !same_rate(scenario.imu.rate_hz, rate_hz) {
+            scenario.imu.rate_hz = rate_hz;
+        }
+        // what comes after the last outage is not judged
+        let judged_s = outages.iter().map(|o| o.end_s).fold(f64::NEG_INFINITY, f64::max);
+        let trajectory = trajectory.until(judged_s + 1.0 / scenario.gnss.rate_hz);
+        let none = Model { rate_hz, axes: Default::default() };
+        let track = scenario.track(&trajectory, &none, &outages)?;
+        Ok(Self { trajectory, scenario, outages, seed, track })
+    }
+
+    /// The outages.
+    #[must_use]
+    pub fn outages(&self) -> &[Outage] {
+        &self.outages
+    }
+
+    /// How many windows as long as the trajectory lie side by side in so many samples.
+    #[must_use]
+    pub fn independent_windows(&self, samples: usize) -> f64 {
+        let lasts_s = self.trajectory.end_s() - self.trajectory.start_s();
+        samples as f64 / (lasts_s * self.scenario.imu.rate_hz)
+    }
+
+    /// Leaves out recording `k`, whose samples are `recordings` (several stretches of a file that has gaps), and
+    /// takes every candidate along the trajectory `runs` times. `progress` is told how many runs are done.
+    ///
+    /// # Errors
+    /// When a model cannot be made, has no such filter, or rates do not fit together.
+    pub fn leave_out(
+        &self,
+        laboratory: &Laboratory,
+        k: usize,
+        recordings: &[Recording],
+        candidates: &[Candidate],
+        runs: u64,
+        progress: &(dyn Fn(u64) + Sync),
+    ) -> Result<Fold, ChoiceError> {
+        let models = self.models(laboratory, Some(k), candidates)?;
+        let beliefs = self.beliefs(candidates, &models)?;
+        let own = own_model(laboratory, k)?;
+        let expected = self.expected(&beliefs, &own);
+        let usable: Vec<Recording> =
+            recordings.iter().filter(|r| self.independent_windows(r.len()) >= 1.0).cloned().collect();
+        let samples: usize = usable.iter().map(Recording::len).sum();
+        let independent = self.independent_windows(samples);
+        let sampled = if usable.is_empty() { None } else { self.sampled(&beliefs, &usable, runs, progress)? };
+        if sampled.is_none() {
+            progress(runs);
+        }
+        let windows = if sampled.is_some() { runs } else { 0 };
+        Ok(Fold { scores: sampled.unwrap_or_else(|| expected.clone()), expected, windows, independent })
+    }
+
+    /// The model of every candidate, of all recordings but one, inflated as it says.
+    ///
+    /// # Errors
+    /// When a model cannot be made or tuned.
+    pub fn models(
+        &self,
+        laboratory: &Laboratory,
+        without: Option<usize>,
+        candidates: &[Candidate],
+    ) -> Result<Vec<Model>, ChoiceError> {
+        let mut made: Vec<(&Candidate, Model)> = Vec::new();
+        for candidate in candidates {
+            let alike = |c: &&Candidate| c.estimator == candidate.estimator && c.model == candidate.model;
+            if !made.iter().any(|(c, _)| alike(c)) {
+                let model = laboratory.model(candidate, without).map_err(|source| {
+                    ChoiceError::Calibration { candidate: candidate.to_string(), source: Box::new(source) }
+                })?;
+                made.push((candidate, model));
+            }
+        }
+        let truths = if candidates.iter().any(|c| c.inflation == Inflation::Tuned) {
+            let others: Vec<usize> = laboratory.others(without).map(|(k, _)| k).collect();
+            others.par_iter().map(|k| own_model(laboratory, *k)).collect::<Result<Vec<_>, _>>()?
+        } else {
+            Vec::new()
+        };
+        let inflated = |candidate: &Candidate| {
+            let alike = |c: &&Candidate| c.estimator == candidate.estimator && c.model == candidate.model;
+            let model = made.iter().find(|(c, _)| alike(c)).map(|(_, model)| model).expect("made above");
+            match candidate.inflation {
+                Inflation::None => Ok(model.clone()),
+                Inflation::Tenfold => Ok(tenfold(model)),
+                Inflation::Tuned => self.tuned(candidate, model, &truths),
+            }
+        };
+        candidates.iter().map(inflated).collect()
+    }
+
+    fn tuned(&self, candidate: &Candidate, model: &Model, truths: &[Model]) -> Result<Model, ChoiceError> {
+        let full = self.scenario.with_full_noise();
+        let full = |model: &Model| full.belief(model, &self.outages, &self.track);
+        let task = Task {
+            model,
+            truths,
+            track: &self.track,
+            full: &full,
+            // a reduced filter is made so that it is as honest as the full one
+            filter: &full,
+            per: Per::Sensor,
+            aim: Aim::Mean,
+            allow_smaller: true,
+        };
+        let factors = task.factors().map_err(|source| unfit(candidate, source))?;
+        Ok(scaled(model, &factors))
+    }
+
+    /// What each candidate's filter believes.
+    fn beliefs(&self, candidates: &[Candidate], models: &[Model]) -> Result<Vec<Belief>, ChoiceError> {
+        let pairs: Vec<(&Candidate, &Model)> = candidates.iter().zip(models).collect();
+        let belief = |(candidate, model): &(&Candidate, &Model)| {
+            let mut scenario = self.scenario.clone();
+            scenario.filter.states = candidate.filter;
+            scenario.belief(model, &self.outages, &self.track).map_err(|source| unfit(candidate, source))
+        };
+        pairs.par_iter().map(belief).collect()
+    }
+
+    /// Every filter on the same windows; none where the recordings are shorter than the trajectory.
+    fn sampled(
+        &self,
+        beliefs: &[Belief],
+        recordings: &[Recording],
+        runs: u64,
+        progress: &(dyn Fn(u64) + Sync),
+    ) -> Result<Option<Vec<Score>>, ExperimentError> {
+        let truth = Truth::Static(recordings);
+        let experiment = self.scenario.experiment(&self.trajectory, truth, beliefs, &self.outages, self.seed);
+        match monte_carlo::run(&experiment, runs, progress) {
+            Ok(results) => Ok(Some(results.iter().map(Score::of_runs).collect())),
+            // a window counts the last sample too
+            Err(ExperimentError::Truth(TruthError::TooShort { .. })) => Ok(None),
+            Err(e) => Err(e),
+        }
+    }
+
+    /// Every filter where a model makes the errors.
+    fn expected(&self, beliefs: &[Belief], truth: &Model) -> Vec<Score> {
+        let experiment = self.scenario.experiment(
+            &self.trajectory,
+            Truth::Model(truth),
+            beliefs,
+            &self.outages,
+            self.seed,
+        );
+        let sources = TruthSide::together(&TruthSide::sources(&experiment, truth));
+        let score =
+            |belief: &Belief| Score::expected(&FilterPass::new(&self.track, belief).errors_at_ends(&sources));
+        beliefs.par_iter().map(score).collect()
+    }
+}
+
+fn own_model(laboratory: &Laboratory, k: usize) -> Result<Model, ChoiceError> {
+    laboratory.own_model(k).map_err(|source| ChoiceError::Own {
+        recording: laboratory.units[k].name.clone(),
+        source: Box::new(source),
+    })
+}
+
+/// Ten times every standard deviation.
+fn tenfold(model: &Model) -> Model {
+    let factors = Sensor::ALL.map(|sensor| Factor { sensor, process: None, on_variance: 100.0 });
+    scaled(model, &factors)
+}
+
+fn unfit(candidate: &Candidate, source: BeliefError) -> ChoiceError {
+    ChoiceError::Belief { candidate: candidate.to_string(), source }
+}

@@ -1,0 +1,257 @@
+//! Candidates beside one another, recording by recording.
+
+use super::candidate::Candidate;
+use super::drive::Fold;
+use super::score::Score;
+use serde::Serialize;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+/// Fewest recordings of which an interval over recordings says anything: with three, its half-width is 2.5 times their
+/// standard deviation.
+pub(super) const FEWEST: usize = 4;
+/// A recording whose errors are this many times as large in NEES as any filter believes is described by no candidate.
+const FAILS: f64 = 2.0 * 9.0;
+
+/// A mean over recordings.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Mean {
+    /// Its value.
+    pub value: f64,
+    /// 95 % interval (Student's t, the recording as unit); not finite (null) of one recording.
+    pub ci95: (f64, f64),
+}
+
+/// A candidate beside the winner, on the same recordings.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Difference {
+    /// Its log score less the winner's (nats an outage end); negative is worse.
+    pub log_score: Mean,
+    /// The same interval, true of all candidates together at 95 % (Bonferroni).
+    pub joint95: (f64, f64),
+    /// Its horizontal RMSE above the winner's (%), mean of the logarithms of the ratios.
+    pub rmse_pct: Mean,
+}
+
+/// A candidate on one recording.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FoldScore {
+    /// The recording that was left out.
+    pub recording: String,
+    /// Windows of it; 0 where it is shorter than the trajectory, and the score is the expected one.
+    pub windows: u64,
+    /// How it did.
+    #[serde(flatten)]
+    pub score: Score,
+    /// What covariance analysis expects where the recording's own N2 makes the errors.
+    pub expected: Score,
+}
+
+/// A candidate with its place.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Placed {
+    /// In words.
+    pub candidate: String,
+    /// Its index among those that were given.
+    pub index: usize,
+    /// Whether it may be chosen; others are shown for comparison.
+    pub eligible: bool,
+    /// Whether it is the winner, or cannot be told from it.
+    pub tied: bool,
+    /// Mean log score (nats an outage end).
+    pub log_score: Mean,
+    /// Horizontal RMSE at the ends of outages (m), root mean square over recordings.
+    pub rmse_m: f64,
+    /// What its filter believes of it (m).
+    pub believed_m: f64,
+    /// Mean NEES at the ends of outages; 9 is right.
+    pub nees: Mean,
+    /// Share of the ends within the filter's 95 % ellipsoid.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coverage: Option<f64>,
+    /// Beside the winner.
+    pub difference: Difference,
+    /// Recording by recording.
+    pub folds: Vec<FoldScore>,
+}
+
+/// All candidates, the best first, those that may be chosen before the others.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Ranking {
+    /// The candidates.
+    pub candidates: Vec<Placed>,
+    /// Recordings without which another candidate would win.
+    pub decisive: Vec<String>,
+    /// Recordings that no candidate describes: the least NEES of all is above 18 where 9 is right.
+    pub undescribed: Vec<String>,
+    /// Whether the data tell the winner from any other that may be chosen.
+    pub tells: bool,
+}
+
+impl Ranking {
+    /// Of what every recording, left out, says of every candidate.
+    ///
+    /// # Panics
+    /// Without a candidate that may be chosen, or without a recording.
+    #[must_use]
+    pub fn new(candidates: &[Candidate], folds: &[(String, Fold)]) -> Self {
+        let eligible: Vec<usize> = (0..candidates.len()).filter(|c| candidates[*c].is_eligible()).collect();
+        let all: Vec<&Fold> = folds.iter().map(|(_, fold)| fold).collect();
+        let winner = best(&eligible, &all).expect("one may be chosen, of one recording at least");
+        let rivals = eligible.len().saturating_sub(1).max(1);
+        let mut placed: Vec<Placed> =
+            (0..candidates.len()).map(|c| place(c, &candidates[c], winner, rivals, folds)).collect();
+        placed.sort_by(|a, b| {
+            let order = b.log_score.value.total_cmp(&a.log_score.value);
+            b.eligible.cmp(&a.eligible).then(order)
+        });
+        let without = |left_out: usize| {
+            let rest: Vec<&Fold> =
+                all.iter().enumerate().filter(|(k, _)| *k != left_out).map(|(_, f)| *f).collect();
+            best(&eligible, &rest).is_some_and(|other| other != winner)
+        };
+        let named = |k: usize| folds[k].0.clone();
+        let least = |fold: &Fold| fold.scores.iter().map(|s| s.nees).fold(f64::INFINITY, f64::min);
+        let fails = |k: &usize| !(least(all[*k]) <= FAILS);
+        let tells = folds.len() >= FEWEST && placed.iter().any(|p| p.eligible && !p.tied);
+        Self {
+            candidates: placed,
+            decisive: (0..folds.len()).filter(|k| without(*k)).map(named).collect(),
+            undescribed: (0..folds.len()).filter(fails).map(named).collect(),
+            tells,
+        }
+    }
+
+    /// The candidate with the highest mean score of those that may be chosen.
+    #[must_use]
+    pub fn winner(&self) -> &Placed {
+        &self.candidates[0]
+    }
+}
+
+/// The candidate of the highest mean log score; none without a recording.
+fn best(eligible: &[usize], folds: &[&Fold]) -> Option<usize> {
+    let score = |c: usize| folds.iter().map(|f| f.scores[c].log_score).sum::<f64>();
+    // the first of equals
+    let higher = |best: usize, c: usize| if score(c) > score(best) { c } else { best };
+    eligible.iter().copied().reduce(higher).filter(|_| !folds.is_empty())
+}
+
+fn place(c: usize, candidate: &Candidate, winner: usize, rivals: usize, folds: &[(String, Fold)]) -> Placed {
+    let scores = || folds.iter().map(|(_, fold)| &fold.scores[c]);
+    let per_recording = |value: &dyn Fn(&Score) -> f64| scores().map(value).collect::<Vec<f64>>();
+    let paired = |value: &dyn Fn(&Score) -> f64| -> Vec<f64> {
+        folds.iter().map(|(_, f)| value(&f.scores[c]) - value(&f.scores[winner])).collect()
+    };
+    let density = paired(&|s| s.log_score);
+    let (log_score, joint95) = (interval(&density, 0.05), interval(&density, 0.05 / rivals as f64).ci95);
+    let ratio = interval(&paired(&|s| s.rmse_m.ln()), 0.05);
+    let percent = |ln: f64| 100.0 * ln.exp_m1();
+    let rmse_pct = Mean { value: percent(ratio.value), ci95: (percent(ratio.ci95.0), percent(ratio.ci95.1)) };
+    let root_mean_square =
+        |values: Vec<f64>| (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt();
+    let fold = |(recording, fold): &(String, Fold)| FoldScore {
+        recording: recording.clone(),
+        windows: fold.windows,
+        score: fold.scores[c].clone(),
+        expected: fold.expected[c].clone(),
+    };
+    let coverage: Option<Vec<f64>> = scores().map(|s| s.coverage).collect();
+    Placed {
+        candidate: candidate.to_string(),
+        index: c,
+        eligible: candidate.is_eligible(),
+        // where nothing is known of the difference, nothing tells them apart
+        tied: c == winner || (log_score.value > f64::NEG_INFINITY && !(joint95.1 < 0.0)),
+        log_score: interval(&per_recording(&|s| s.log_score), 0.05),
+        rmse_m: root_mean_square(per_recording(&|s| s.rmse_m)),
+        believed_m: root_mean_square(per_recording(&|s| s.believed_m)),
+        nees: interval(&per_recording(&|s| s.nees), 0.05),
+        coverage: coverage.map(|all| all.iter().sum::<f64>() / all.len() as f64),
+        difference: Difference { log_score, joint95, rmse_pct },
+        folds: folds.iter().map(fold).collect(),
+    }
+}
+
+/// Mean of values, one a recording, and its interval at level 1 − `alpha`. Models of different folds share all but two
+/// recordings, so that their scores hang together a little; the simulated laboratories of the documentation measure
+/// how often the interval holds the truth all the same.
+fn interval(values: &[f64], alpha: f64) -> Mean {
+    let n = values.len() as f64;
+    let value = values.iter().sum::<f64>() / n;
+    let variance = values.iter().map(|x| (x - value).powi(2)).sum::<f64>() / (n - 1.0);
+    let t = StudentsT::new(0.0, 1.0, n - 1.0).map_or(f64::NAN, |law| law.inverse_cdf(1.0 - 0.5 * alpha));
+    let half = t * (variance / n).sqrt();
+    Mean { value, ci95: (value - half, value + half) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibration::Estimator;
+
+    fn fold(scores: &[f64]) -> Fold {
+        let score = |&log_score: &f64| Score {
+            rmse_m: 10.0 - log_score,
+            believed_m: 10.0,
+            nees: 9.0,
+            coverage: Some(0.95),
+            log_score,
+            diverged: 0,
+            outages: Vec::new(),
+        };
+        let scores: Vec<Score> = scores.iter().map(score).collect();
+        Fold { expected: scores.clone(), scores, windows: 16, independent: 5.0 }
+    }
+
+    fn ranked(estimators: &[Estimator], folds: &[&[f64]]) -> Ranking {
+        let candidates: Vec<Candidate> =
+            estimators.iter().map(|e| Candidate::new(*e, "WN".parse().unwrap())).collect();
+        let folds: Vec<(String, Fold)> =
+            folds.iter().enumerate().map(|(k, s)| (format!("r{k}"), fold(s))).collect();
+        Ranking::new(&candidates, &folds)
+    }
+
+    /// Student's t with three degrees of freedom: 3.182446 at 0.975.
+    #[test]
+    fn intervals_are_those_of_student() {
+        let found = interval(&[1.0, 2.0, 3.0, 4.0], 0.05);
+        let half = 3.182_446_305_284_263 * (5.0_f64 / 3.0 / 4.0).sqrt();
+        assert!((found.value - 2.5).abs() < 1e-15);
+        assert!((found.ci95.1 - 2.5 - half).abs() < 1e-9, "{found:?}");
+    }
+
+    /// Recordings differ by far more than candidates; what counts is the difference on each.
+    #[test]
+    fn differences_are_paired() {
+        let two = [Estimator::Awv, Estimator::SrAwv];
+        let found = ranked(&two, &[&[-10.0, -11.0], &[-50.0, -51.1], &[-20.0, -20.9], &[-90.0, -91.0]]);
+        assert!(found.tells && found.winner().index == 0 && !found.candidates[1].tied);
+        assert!((found.candidates[1].difference.log_score.value + 1.0).abs() < 1e-12);
+    }
+
+    /// One recording against three: it decides, and the interval says that nothing is known.
+    #[test]
+    fn a_recording_that_decides_is_named() {
+        let two = [Estimator::Awv, Estimator::SrAwv];
+        let found = ranked(&two, &[&[-10.0, -11.0], &[-10.0, -11.0], &[-10.0, -11.0], &[-30.0, -10.0]]);
+        assert_eq!((found.winner().index, found.tells), (1, false));
+        assert_eq!(found.decisive, ["r3"]);
+        assert!(found.candidates.iter().all(|c| c.tied));
+    }
+
+    #[test]
+    fn three_recordings_tell_nothing_and_single_estimators_never_win() {
+        let two = [Estimator::Awv, Estimator::Gmwm];
+        let found = ranked(&two, &[&[-10.0, -1.0], &[-10.0, -1.1], &[-10.0, -0.9]]);
+        assert!(!found.tells && found.winner().index == 0 && !found.candidates[1].eligible);
+    }
+
+    #[test]
+    fn a_candidate_that_diverges_is_last() {
+        let two = [Estimator::Awv, Estimator::SrAwv];
+        let diverged = f64::NEG_INFINITY;
+        let found = ranked(&two, &[&[diverged, -11.0], &[-1.0, -11.0], &[-1.0, -11.0], &[-1.0, -11.0]]);
+        assert_eq!((found.winner().index, found.candidates[1].index), (1, 0));
+        assert!(!found.candidates[1].tied);
+    }
+}

@@ -1,0 +1,209 @@
+//! `nav-sim choose`: which noise model, on the user's own recordings.
+
+use super::jobs::unknown_model;
+use super::recordings::{RecordingArgs, Said};
+use super::run::{OutageArg, Words, empty_or_new, parse_outage, windows_of};
+use super::tuning::TuningArgs;
+use super::{Failure, Session, read};
+use nav_sim::calibration::{Bootstrap, Estimator, ModelChoice, Pool, Settings, Trim};
+use nav_sim::choose::{Candidate, Inflation};
+use nav_sim::ekf::FilterStates;
+use nav_sim::formats::atomic::AtomicDir;
+use nav_sim::formats::model_file::{self, CalibrationNote, ModelFile};
+use nav_sim::formats::scenario_file;
+use nav_sim::jobs::{self, CalibrationOptions, ChoiceDrive, Chosen, EstimatorChoice, ModelFiles};
+use nav_sim::report::ChoiceReport;
+use nav_sim::scenario::Scenario;
+use nav_sim::sensors::outage::Outage;
+use std::path::{Path, PathBuf};
+
+/// Choose the noise model for a filter by what it does on recordings that it has not seen
+///
+/// Leaves out one recording after the other, calibrates every candidate on the others and takes it along TRAJECTORY on
+/// windows of the one left out. Ranks candidates by the mean log density of their true errors at the ends of outages,
+/// which rewards accuracy and honesty together; beside it RMSE, NEES and coverage, with intervals over recordings.
+/// Writes ranking.json and model.toml, the winner calibrated on all recordings.
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim choose recordings --trajectory trajectories/figure_eight.toml --outage 60:90 -o out/choice
+  nav-sim choose recordings --trajectory trajectories/figure_eight.toml --outage 60:90 \\
+      --estimator awv,dr-awv --model N2,WN+RW --filter 15,full
+  nav-sim choose recordings --trajectory trajectories/figure_eight.toml --outage 60:90 \\
+      --inflate none,tuned,x10 --format json")]
+pub(crate) struct Args {
+    /// Static recordings, three or more files, or directories of them
+    #[arg(required = true, value_name = "RECORDINGS")]
+    inputs: Vec<PathBuf>,
+    /// Trajectory: motion profile (.toml) or table (.csv)
+    #[arg(long, value_name = "FILE")]
+    trajectory: PathBuf,
+    /// Window without fixes, in seconds (repeatable) (default: 300:390 and 700:790)
+    #[arg(long = "outage", value_name = "START:END", value_parser = parse_outage)]
+    outages: Vec<OutageArg>,
+    /// Estimators to compare [default: awv, sr-awv, dr-awv and, for comparison, gmwm and avlr of single recordings]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    estimator: Vec<Estimator>,
+    /// Models to compare, such as N2,N1,WN+RW,auto [default: N2, and WN+RW with awv]
+    #[arg(long, value_name = "MODELS", value_delimiter = ',')]
+    model: Vec<String>,
+    /// Filters to compare: 15, 21, full [default: 15, and full with awv]
+    #[arg(long, value_name = "STATES", value_delimiter = ',')]
+    filter: Vec<FilterStates>,
+    /// What is done to models: none, tuned (honest in the mean for the models of the single recordings), x10 (ten times
+    /// the standard deviations) [default: none, and all three with awv]
+    #[arg(long, value_name = "HOW", value_delimiter = ',')]
+    inflate: Vec<Inflation>,
+    /// Runs on each recording (default: two on each window that lies in it side by side, 16 to 64)
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    runs: Option<u64>,
+    /// What DR-AWV drops at each end of each scale: a number, or a share such as 30%
+    #[arg(long, value_name = "A", default_value_t)]
+    trim: Trim,
+    /// Which signals are replicates of one another: sensor or axes [default: sensor]
+    #[arg(long, value_name = "HOW")]
+    pool: Option<Pool>,
+    /// Scenario file: receiver, start, what filters expect (see `nav-sim schema scenario`)
+    #[arg(long, value_name = "FILE")]
+    scenario: Option<PathBuf>,
+    /// Directory to make
+    #[arg(long, short, value_name = "DIR", default_value = "out/choice")]
+    out: PathBuf,
+    #[command(flatten)]
+    recordings: RecordingArgs,
+    #[command(flatten)]
+    tuning: TuningArgs,
+}
+
+pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    let candidates = candidates(args)?;
+    empty_or_new(&args.out)?;
+    drop(AtomicDir::create(&args.out)?);
+    let scenario = scenario(args)?;
+    let trajectory = read::trajectory(&args.trajectory, session)?;
+    let seed = session.seed(scenario.run.seed);
+    let outages = outages(&scenario, (trajectory.start_s(), trajectory.end_s()), seed, session)?;
+    let options = CalibrationOptions {
+        reading: args.recordings.options(),
+        scales: args.tuning.scales,
+        estimators: EstimatorChoice::default(),
+        pool: args.pool,
+        settings: Settings { trim: args.trim, tuning: args.tuning.tuning()?, ..Settings::default() },
+        bootstrap: Some(Bootstrap { seed, ..Bootstrap::default() }),
+    };
+    let drive = ChoiceDrive { trajectory, scenario, outages: outages.clone(), seed, runs: args.runs };
+    let words = Words::new(session);
+    let chosen = jobs::choose(&args.inputs, &options, &candidates, drive, &mut Said::new(session), &words)?;
+    let shown = args.trajectory.display().to_string();
+    let report = ChoiceReport { ranking: &chosen.ranking, outages: &outages, trajectory: &shown, seed };
+    write(args, &chosen, &report, seed)?;
+    let text = if session.json() { report.json() } else { text(&report, session) };
+    session.printer.result(text.trim_end());
+    session.printer.say(&format!(
+        "wrote {0}: ranking.json, model.toml (nav-sim export {0}/model.toml)",
+        args.out.display()
+    ));
+    Ok(())
+}
+
+fn text(report: &ChoiceReport<'_>, session: &Session) -> String {
+    let mut parts = vec![
+        report.verdict().join("\n"),
+        format!("{}\n{}", super::compare::table(&report.rows()), report.legend()),
+    ];
+    if session.verbose() {
+        parts.push(super::compare::table(&report.fold_rows()));
+    }
+    parts.join("\n\n")
+}
+
+/// Those that are usual, or all combinations of what is given.
+fn candidates(args: &Args) -> Result<Vec<Candidate>, Failure> {
+    let Args { estimator, model, filter, inflate, .. } = args;
+    if estimator.is_empty() && model.is_empty() && filter.is_empty() && inflate.is_empty() {
+        return Ok(Candidate::usual());
+    }
+    if estimator.contains(&Estimator::Given) {
+        return Err(Failure::input("--estimator given: it is of curves that come from elsewhere"));
+    }
+    let mut models = model
+        .iter()
+        .map(|m| m.parse().map_err(unknown_model))
+        .collect::<Result<Vec<ModelChoice>, Failure>>()?;
+    if models.is_empty() {
+        models.push(ModelChoice::default());
+    }
+    let averages = [Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv];
+    let candidates = Candidate::product(
+        if estimator.is_empty() { &averages } else { estimator },
+        &models,
+        if filter.is_empty() { &[FilterStates::Reduced15] } else { filter },
+        if inflate.is_empty() { &[Inflation::None] } else { inflate },
+    );
+    if candidates.iter().any(Candidate::is_eligible) {
+        return Ok(candidates);
+    }
+    Err(Failure::input("no candidate uses all recordings: gmwm, rgmwm and avlr take one at a time")
+        .hint("add awv, sr-awv or dr-awv to --estimator"))
+}
+
+fn scenario(args: &Args) -> Result<Scenario, Failure> {
+    let mut scenario = args.scenario.as_deref().map(scenario_file::read).transpose()?.unwrap_or_default();
+    if !args.outages.is_empty() {
+        scenario.outage = Some(windows_of(&args.outages)?);
+        (scenario.outage_periodic, scenario.outage_random) = (None, None);
+    }
+    scenario.validate().map_err(Failure::input)?;
+    Ok(scenario)
+}
+
+fn outages(
+    scenario: &Scenario,
+    span_s: (f64, f64),
+    seed: u64,
+    session: &Session,
+) -> Result<Vec<Outage>, Failure> {
+    let placed = scenario.outages_on(span_s, seed)?;
+    placed.remarks.iter().for_each(|remark| session.printer.warn(&remark.to_string()));
+    if placed.windows.is_empty() {
+        return Err(Failure::input("there is no outage, and candidates are judged at the ends of outages")
+            .hint("give one with --outage START:END"));
+    }
+    Ok(placed.windows)
+}
+
+fn write(args: &Args, chosen: &Chosen, report: &ChoiceReport<'_>, seed: u64) -> Result<(), Failure> {
+    let mut directory = AtomicDir::create(&args.out)?;
+    let (model, _) = (directory.path("model.toml"), directory.path("model.wv.json"));
+    let mut inputs = vec![read::input("trajectory", &args.trajectory)?];
+    for file in &chosen.files {
+        inputs.push(read::input("recording", file)?);
+    }
+    let note = CalibrationNote {
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+        efficiency_convention: args.tuning.convention().to_owned(),
+        reading: args.recordings.provenance(),
+        seed: Some(seed),
+        inputs,
+    };
+    let files = ModelFiles::of(&model, &[chosen.winner.estimator]);
+    files[0].write(&chosen.calibration, &note)?;
+    if chosen.winner.inflation != Inflation::None {
+        inflated(&model, chosen)?;
+    }
+    directory.write("ranking.json", report.json())?;
+    Ok(directory.commit()?)
+}
+
+/// The model as calibrated, with the inflated parameters in the place of its own; intervals are of those before.
+fn inflated(path: &Path, chosen: &Chosen) -> Result<(), Failure> {
+    let calibrated = model_file::read(path)?;
+    let mut provenance = calibrated.provenance.unwrap_or_default();
+    provenance.insert("inflation".to_owned(), chosen.winner.inflation.name().into());
+    let file = ModelFile {
+        missing: calibrated.missing,
+        provenance: Some(provenance),
+        ..ModelFile::new(chosen.model.clone())
+    };
+    Ok(model_file::write(path, &file)?)
+}

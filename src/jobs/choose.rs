@@ -1,0 +1,132 @@
+//! Static recordings and a trajectory → the noise model that a filter is best made of.
+
+use super::{Calibration, CalibrationOptions, EstimatorChoice, JobError, Measured, Note, Remarks, measure};
+use crate::calibration::{Estimator, Pool, Settings};
+use crate::choose::{Candidate, ChoiceError, Drive, Fold, Laboratory, Ranking, Unit};
+use crate::formats::recordings::{self, FileReport, ReadOptions};
+use crate::imu::{Axis, Channel, Recording};
+use crate::noise::Model;
+use crate::observer::Observer;
+use crate::scenario::Scenario;
+use crate::sensors::outage::Outage;
+use crate::trajectory::Trajectory;
+use std::path::PathBuf;
+
+/// Where candidates navigate.
+#[derive(Debug)]
+pub struct ChoiceDrive {
+    /// The reference.
+    pub trajectory: Trajectory,
+    /// Receiver, start, what filters expect beside the noise model.
+    pub scenario: Scenario,
+    /// When there are no fixes; at least one.
+    pub outages: Vec<Outage>,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Runs on each recording; none: two on each window that lies in it side by side, between 16 and 64.
+    pub runs: Option<u64>,
+}
+
+/// What was found.
+#[derive(Debug)]
+pub struct Chosen {
+    /// The candidates, the winner first.
+    pub ranking: Ranking,
+    /// What the winner is.
+    pub winner: Candidate,
+    /// The winner's calibration of all recordings, before any inflation.
+    pub calibration: Calibration,
+    /// Its noise model.
+    pub model: Model,
+    /// The files that were read, in the order of the recordings.
+    pub files: Vec<PathBuf>,
+}
+
+/// Fewest recordings of which one can be left out: two remain to be averaged.
+const FEWEST: usize = 3;
+
+/// Leaves out one recording after the other and ranks candidates by what they do on it. Files are read twice, so that
+/// no more than a few are in memory. `options.estimators` and the model of `options.settings` count nothing: the
+/// candidates have theirs.
+///
+/// # Errors
+/// When recordings cannot be read or are fewer than three, a model cannot be made, or trajectory and rates do not fit
+/// together.
+pub fn choose(
+    paths: &[PathBuf],
+    options: &CalibrationOptions,
+    candidates: &[Candidate],
+    drive: ChoiceDrive,
+    remarks: &mut dyn Remarks,
+    observer: &dyn Observer<Note>,
+) -> Result<Chosen, JobError> {
+    let options = CalibrationOptions { estimators: EstimatorChoice::One(Estimator::Awv), ..options.clone() };
+    let asked_pool = options.pool;
+    let measured = measure(paths, &CalibrationOptions { pool: None, ..options.clone() }, remarks)?;
+    let files = measured.report.files.clone();
+    if files.len() < FEWEST {
+        return Err(JobError::TooFew { recordings: files.len(), needed: FEWEST });
+    }
+    let laboratory = Laboratory { units: units(&measured), settings: measured.settings, pool: asked_pool };
+    let rate_hz = laboratory.settings.rate_hz;
+    let ChoiceDrive { trajectory, scenario, outages, seed, runs } = drive;
+    let drive = Drive::new(&trajectory, scenario, outages, rate_hz, seed).map_err(ChoiceError::from)?;
+    let runs: Vec<u64> = files.iter().map(|file| runs.unwrap_or_else(|| runs_on(&drive, file))).collect();
+    observer.begin(runs.iter().sum());
+    let mut folds: Vec<(String, Fold)> = Vec::new();
+    for (k, file) in files.iter().enumerate() {
+        let read = samples_of(file, &options.reading)?;
+        let advance = |n| observer.advance(n);
+        let fold = drive.leave_out(&laboratory, k, &read, candidates, runs[k], &advance)?;
+        folds.push((file.file.clone(), fold));
+    }
+    observer.end();
+    let ranking = Ranking::new(candidates, &folds);
+    let winner = candidates[ranking.winner().index].clone();
+    let model = drive.models(&laboratory, None, std::slice::from_ref(&winner))?.remove(0);
+    let calibration = final_calibration(laboratory, &winner, &options)?;
+    let files = files.into_iter().map(|file| file.path).collect();
+    Ok(Chosen { ranking, winner, calibration, model, files })
+}
+
+/// The recordings, each with its signals' wavelet variances.
+fn units(measured: &Measured) -> Vec<Unit> {
+    let signals = || {
+        measured.groups.iter().flat_map(|group| {
+            let axis_of = move |axis: Option<Axis>| axis.or(group.scope.axis).unwrap_or(Axis::X);
+            let channel = move |axis| Channel { sensor: group.scope.sensor, axis: axis_of(axis) };
+            group.replicates.iter().map(move |r| (channel(r.axis), r))
+        })
+    };
+    let unit = |file: &FileReport| {
+        let own: Vec<String> = file.recordings().map(|(name, _)| name).collect();
+        let replicates = signals().filter(|(_, r)| own.contains(&r.name)).map(|(c, r)| (c, r.clone()));
+        Unit { name: file.file.clone(), replicates: replicates.collect() }
+    };
+    measured.report.files.iter().map(unit).collect()
+}
+
+/// Two runs on each window that lies in a file side by side; whole batches.
+fn runs_on(drive: &Drive, file: &FileReport) -> u64 {
+    let windows = drive.independent_windows(file.samples.iter().sum());
+    ((2.0 * windows / 8.0).ceil() as u64 * 8).clamp(16, 64)
+}
+
+fn samples_of(file: &FileReport, reading: &ReadOptions) -> Result<Vec<Recording>, JobError> {
+    Ok(recordings::read(std::slice::from_ref(&file.path), reading)?.0)
+}
+
+/// The winner's calibration of all recordings; an estimator of single ones never wins.
+fn final_calibration(
+    laboratory: Laboratory,
+    winner: &Candidate,
+    options: &CalibrationOptions,
+) -> Result<Calibration, JobError> {
+    let Laboratory { units, settings, pool } = laboratory;
+    let settings = Settings { estimators: vec![winner.estimator], model: winner.model.clone(), ..settings };
+    let replicates = units.into_iter().flat_map(|unit| unit.replicates).collect();
+    let pool: Pool = pool.unwrap_or(settings.pool());
+    let groups = crate::calibration::grouped(replicates, pool);
+    let outcomes = crate::calibration::calibrate(&groups, &settings)?;
+    Ok(Calibration { groups, outcomes, settings }.with_inference(options.bootstrap))
+}

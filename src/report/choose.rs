@@ -1,0 +1,192 @@
+//! The ranking of candidates, on one screen and as JSON.
+
+use super::number::{readable, seconds};
+use crate::choose::{Mean, Placed, Ranking};
+use crate::sensors::outage::Outage;
+use serde::Serialize;
+
+/// Version of the layout of `ranking.json`.
+const SCHEMA_VERSION: u32 = 1;
+
+/// What was compared, where, and what came of it.
+#[derive(Debug, Clone)]
+pub struct ChoiceReport<'a> {
+    /// The candidates.
+    pub ranking: &'a Ranking,
+    /// The outages at whose ends they are judged.
+    pub outages: &'a [Outage],
+    /// The trajectory, as it was named.
+    pub trajectory: &'a str,
+    /// Seed of all random numbers.
+    pub seed: u64,
+}
+
+/// `ranking.json`.
+#[derive(Serialize)]
+struct RankingFile<'a> {
+    schema_version: u32,
+    verdict: Vec<String>,
+    winner: &'a str,
+    /// Candidates that the data cannot tell from the winner.
+    tied: Vec<&'a str>,
+    trajectory: &'a str,
+    outages: &'a [Outage],
+    seed: u64,
+    #[serde(flatten)]
+    ranking: &'a Ranking,
+}
+
+impl ChoiceReport<'_> {
+    /// The verdict, a sentence or two a line: the winner, what cannot be told from it, which recordings decide.
+    #[must_use]
+    pub fn verdict(&self) -> Vec<String> {
+        let ranking = self.ranking;
+        let winner = ranking.winner();
+        let recordings = winner.folds.len();
+        let figures = format!(
+            "{} m of horizontal RMSE at the end of an outage where its filter believes {} m, NEES {} (9 if right)",
+            readable(winner.rmse_m),
+            readable(winner.believed_m),
+            readable(winner.nees.value)
+        );
+        let eligible = ranking.candidates.iter().filter(|p| p.eligible).count();
+        let mut lines = vec![match (ranking.tells, eligible) {
+            (_, 1) => format!("{}: {figures}; there is no other candidate", winner.candidate),
+            (true, _) => format!("{} is the best: {figures}", winner.candidate),
+            (false, _) if recordings < 4 => format!(
+                "{recordings} recordings cannot tell the candidates apart; {} has the highest score: {figures}",
+                winner.candidate
+            ),
+            (false, _) => format!(
+                "the recordings differ more than the candidates do: the data cannot tell; {} has the highest score: \
+                 {figures}",
+                winner.candidate
+            ),
+        }];
+        let tied: Vec<&str> = self.tied().collect();
+        if ranking.tells && !tied.is_empty() {
+            lines.push(format!("cannot be told from it: {}", tied.join("; ")));
+        }
+        if !ranking.undescribed.is_empty() {
+            lines.push(format!(
+                "no candidate describes {}: its errors are far larger than every filter believes; look at it with \
+                 nav-sim calibrate --verbose, and run again without it",
+                ranking.undescribed.join(", ")
+            ));
+        }
+        if !ranking.decisive.is_empty() {
+            lines.push(format!(
+                "without {} another candidate would win",
+                ranking.decisive.join(", or without ")
+            ));
+        }
+        if winner.folds.iter().any(|fold| fold.windows == 0) {
+            lines.push(
+                "recordings shorter than the trajectory are judged by covariance analysis with their own N2 as truth"
+                    .to_owned(),
+            );
+        }
+        lines
+    }
+
+    /// A row for each candidate under a head.
+    #[must_use]
+    pub fn rows(&self) -> Vec<Vec<String>> {
+        let head = [
+            "candidate",
+            "RMSE at outage end (m)",
+            "against the best (%)",
+            "believed (m)",
+            "NEES (9)",
+            "coverage (0.95)",
+            "log score (nats)",
+        ];
+        let mut rows = vec![head.map(str::to_owned).to_vec()];
+        rows.extend(self.ranking.candidates.iter().map(|p| self.row(p)));
+        rows
+    }
+
+    fn row(&self, placed: &Placed) -> Vec<String> {
+        let is_winner = placed.index == self.ranking.winner().index;
+        let mark = match (is_winner, placed.eligible, placed.tied) {
+            (true, ..) => " *",
+            (_, false, _) => " (one recording)",
+            (_, _, true) => " =",
+            _ => "",
+        };
+        let against = |mean: &Mean| {
+            if is_winner {
+                "–".to_owned()
+            } else {
+                format!("{} [{}, {}]", signed(mean.value), signed(mean.ci95.0), signed(mean.ci95.1))
+            }
+        };
+        vec![
+            format!("{}{mark}", placed.candidate),
+            readable(placed.rmse_m),
+            against(&placed.difference.rmse_pct),
+            readable(placed.believed_m),
+            readable(placed.nees.value),
+            placed.coverage.map_or("–".to_owned(), |c| format!("{c:.2}")),
+            if is_winner {
+                format!("{:.2}", placed.log_score.value)
+            } else {
+                against(&placed.difference.log_score)
+            },
+        ]
+    }
+
+    /// What the marks of the table mean.
+    #[must_use]
+    pub fn legend(&self) -> String {
+        let recordings = self.ranking.winner().folds.len();
+        let ends: Vec<String> =
+            self.outages.iter().map(|o| format!("{}–{} s", seconds(o.start_s), seconds(o.end_s))).collect();
+        format!(
+            "{recordings} recordings, each left out once; outages {}; * the best by log score, = cannot be told from \
+             it; [95 % over recordings]; log score: of the best, and of the others less the best",
+            ends.join(", ")
+        )
+    }
+
+    /// Recording by recording: NEES and log score of every candidate.
+    #[must_use]
+    pub fn fold_rows(&self) -> Vec<Vec<String>> {
+        let winner = self.ranking.winner();
+        let mut head = vec!["NEES (log score, nats)".to_owned()];
+        head.extend(winner.folds.iter().map(|fold| fold.recording.clone()));
+        let row = |p: &Placed| {
+            let cell = |fold: &crate::choose::FoldScore| {
+                format!("{} ({:.1})", readable(fold.score.nees), fold.score.log_score)
+            };
+            std::iter::once(p.candidate.clone()).chain(p.folds.iter().map(cell)).collect()
+        };
+        std::iter::once(head).chain(self.ranking.candidates.iter().map(row)).collect()
+    }
+
+    fn tied(&self) -> impl Iterator<Item = &str> {
+        let others = self.ranking.candidates.iter().skip(1);
+        others.filter(|p| p.eligible && p.tied).map(|p| p.candidate.as_str())
+    }
+
+    /// `ranking.json`.
+    #[must_use]
+    pub fn json(&self) -> String {
+        super::json(&RankingFile {
+            schema_version: SCHEMA_VERSION,
+            verdict: self.verdict(),
+            winner: &self.ranking.winner().candidate,
+            tied: self.tied().collect(),
+            trajectory: self.trajectory,
+            outages: self.outages,
+            seed: self.seed,
+            ranking: self.ranking,
+        })
+    }
+}
+
+/// A number with its sign.
+fn signed(x: f64) -> String {
+    let shown = readable(x);
+    if x > 0.0 && x.is_finite() { format!("+{shown}") } else { shown }
+}
