@@ -207,6 +207,20 @@ impl Drive {
         pairs.par_iter().map(belief).collect()
     }
 
+    /// Scores of the candidates' models on windows of recordings; none where these are shorter than the trajectory.
+    ///
+    /// # Errors
+    /// When a model has no such filter, or rates do not fit together.
+    pub fn scores(
+        &self,
+        candidates: &[Candidate],
+        models: &[Model],
+        recordings: &[Recording],
+        runs: u64,
+    ) -> Result<Option<Vec<Score>>, ChoiceError> {
+        Ok(self.sampled(&self.beliefs(candidates, models)?, recordings, runs, &|_| ())?)
+    }
+
     /// Every filter on the same windows; none where the recordings are shorter than the trajectory.
     fn sampled(
         &self,

@@ -111,7 +111,7 @@ impl Ranking {
         };
         let named = |k: usize| folds[k].0.clone();
         let least = |fold: &Fold| fold.scores.iter().map(|s| s.nees).fold(f64::INFINITY, f64::min);
-        let fails = |k: &usize| !(least(all[*k]) <= FAILS);
+        let fails = |k: &usize| least(all[*k]) > FAILS;
         let tells = folds.len() >= FEWEST && placed.iter().any(|p| p.eligible && !p.tied);
         Self {
             candidates: placed,
@@ -156,12 +156,13 @@ fn place(c: usize, candidate: &Candidate, winner: usize, rivals: usize, folds: &
         expected: fold.expected[c].clone(),
     };
     let coverage: Option<Vec<f64>> = scores().map(|s| s.coverage).collect();
+    // where nothing is known of the difference, nothing tells them apart
+    let is_worse = joint95.1 < 0.0 || log_score.value == f64::NEG_INFINITY;
     Placed {
         candidate: candidate.to_string(),
         index: c,
         eligible: candidate.is_eligible(),
-        // where nothing is known of the difference, nothing tells them apart
-        tied: c == winner || (log_score.value > f64::NEG_INFINITY && !(joint95.1 < 0.0)),
+        tied: c == winner || !is_worse,
         log_score: interval(&per_recording(&|s| s.log_score), 0.05),
         rmse_m: root_mean_square(per_recording(&|s| s.rmse_m)),
         believed_m: root_mean_square(per_recording(&|s| s.believed_m)),
