@@ -3,6 +3,7 @@
 use super::number::{readable, seconds};
 use crate::choose::{Mean, Placed, Ranking};
 use crate::sensors::outage::Outage;
+use crate::simulation::NEES_DOF;
 use serde::Serialize;
 
 /// Version of the layout of `ranking.json`.
@@ -67,6 +68,19 @@ impl ChoiceReport<'_> {
         if ranking.tells && !tied.is_empty() {
             lines.push(format!("cannot be told from it: {}", tied.join("; ")));
         }
+        let right = NEES_DOF as f64;
+        let named = |of: &dyn Fn(&Placed) -> bool| {
+            let all = ranking.candidates.iter().filter(|p| p.eligible && of(p));
+            all.map(|p| p.candidate.as_str()).collect::<Vec<_>>().join("; ")
+        };
+        for (word, of) in [
+            ("overconfident", named(&|p| p.nees.ci95.0 > right)),
+            ("underconfident", named(&|p| p.nees.ci95.1 < right)),
+        ] {
+            if !of.is_empty() {
+                lines.push(format!("{word} (NEES over the recordings): {of}"));
+            }
+        }
         if !ranking.undescribed.is_empty() {
             lines.push(format!(
                 "no candidate describes {}: its errors are far larger than every filter believes; look at it with \
@@ -126,7 +140,12 @@ impl ChoiceReport<'_> {
             readable(placed.rmse_m),
             against(&placed.difference.rmse_pct),
             readable(placed.believed_m),
-            readable(placed.nees.value),
+            format!(
+                "{} [{}, {}]",
+                readable(placed.nees.value),
+                readable(placed.nees.ci95.0),
+                readable(placed.nees.ci95.1)
+            ),
             placed.coverage.map_or("–".to_owned(), |c| format!("{c:.2}")),
             if is_winner {
                 format!("{:.2}", placed.log_score.value)

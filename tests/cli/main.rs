@@ -15,6 +15,7 @@ mod common;
 mod batch;
 mod batch_kills;
 mod calibrate;
+mod choose;
 mod command_line;
 mod compare;
 mod datasheet;

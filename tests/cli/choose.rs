@@ -1,0 +1,125 @@
+//! `choose` as a user runs it.
+
+use assert_cmd::Command;
+use serde_json::Value;
+use std::path::Path;
+
+/// A gyroscope whose random walk is most of the error after ten seconds: white noise alone cannot describe it.
+const MODEL: &str = r#"rate_hz = 100.0
+[accel]
+processes = [{ type = "WN", sigma2 = 1e-5 }, { type = "RW", gamma2 = 1e-10 }]
+[gyro]
+processes = [{ type = "WN", sigma2 = 1e-8 }, { type = "RW", gamma2 = 1e-10 }]
+"#;
+
+const DRIVE: [&str; 6] =
+    ["--trajectory", "trajectories/figure_eight.toml", "--outage", "40:60", "--seed", "1"];
+
+fn nav_sim(directory: &Path, arguments: &[&str]) -> assert_cmd::assert::Assert {
+    Command::cargo_bin("nav-sim").unwrap().current_dir(directory).args(arguments).assert()
+}
+
+/// Recordings of [`MODEL`], long enough for the way to the end of the outage, or not.
+fn recordings(samples: &str, replicates: &str) -> tempfile::TempDir {
+    let directory = tempfile::tempdir().unwrap();
+    let target = Path::new(env!("CARGO_MANIFEST_DIR")).join("trajectories");
+    std::os::unix::fs::symlink(target, directory.path().join("trajectories")).unwrap();
+    std::fs::write(directory.path().join("model.toml"), MODEL).unwrap();
+    let arguments = [
+        "synthesize",
+        "model.toml",
+        "--replicates",
+        replicates,
+        "--samples",
+        samples,
+        "--seed",
+        "1",
+        "-o",
+        "r",
+    ];
+    nav_sim(directory.path(), &arguments).success();
+    directory
+}
+
+fn choose(directory: &Path, more: &[&str]) -> assert_cmd::assert::Assert {
+    nav_sim(directory, &[&["choose", "r"], &DRIVE[..], more].concat())
+}
+
+fn said(assert: &assert_cmd::assert::Assert) -> String {
+    String::from_utf8(assert.get_output().stderr.clone()).unwrap()
+}
+
+#[test]
+fn the_model_that_made_the_recordings_is_chosen_and_written() {
+    let directory = recordings("16384", "4");
+    let arguments = ["--estimator", "awv,gmwm", "--model", "WN,WN+RW", "--inflate", "none,x10", "-o", "out"];
+    let output = choose(directory.path(), &[&arguments[..], &["--format", "json"]].concat()).success();
+    let found: Value = serde_json::from_slice(&output.get_output().stdout).unwrap();
+    assert_eq!(found["winner"], "awv WN+RW, 15", "{found}");
+    let candidates = found["candidates"].as_array().unwrap();
+    assert_eq!(candidates.len(), 8);
+    let of = |name: &str| candidates.iter().find(|c| c["candidate"] == name).unwrap();
+    // without the random walk the filter is lost, ten times the deviations are far too many
+    let nees = |name: &str| of(name)["nees"]["value"].as_f64().unwrap();
+    assert!(nees("awv WN, 15") > 90.0 && nees("awv WN+RW, 15, x10") < 3.0, "{found}");
+    assert!((nees("awv WN+RW, 15") - 9.0).abs() < 4.0, "{found}");
+    assert_eq!(
+        (&of("awv WN, 15")["tied"], &of("gmwm WN+RW, 15")["eligible"]),
+        (&false.into(), &false.into())
+    );
+    // the runs are on windows, what is expected stands beside them
+    for fold in of("awv WN+RW, 15")["folds"].as_array().unwrap() {
+        let (sampled, expected) = (&fold["rmse_m"], &fold["expected"]["rmse_m"]);
+        let ratio = sampled.as_f64().unwrap() / expected.as_f64().unwrap();
+        assert!(fold["windows"] == 16 && (0.4..2.5).contains(&ratio), "{fold}");
+    }
+    let file = std::fs::read_to_string(directory.path().join("out/ranking.json")).unwrap();
+    assert_eq!(serde_json::from_str::<Value>(&file).unwrap(), found);
+    let model: toml::Table =
+        std::fs::read_to_string(directory.path().join("out/model.toml")).unwrap().parse().unwrap();
+    // the random walk of 4 × 3 signals of 16384 samples is known to some 10 %
+    let walk = model["gyro"]["processes"][1]["gamma2"].as_float().unwrap();
+    assert!((walk / 1e-10 - 1.0).abs() < 0.4, "{walk}");
+    assert_eq!(model["provenance"]["estimator"].as_str(), Some("awv"));
+    // what is there is not replaced
+    let again = choose(directory.path(), &["-o", "out"]).code(2);
+    assert!(said(&again).contains("is not empty"), "{}", said(&again));
+}
+
+#[test]
+fn recordings_shorter_than_the_drive_are_judged_by_covariance_analysis() {
+    let directory = recordings("4096", "3");
+    let arguments = ["--estimator", "awv", "--model", "WN,WN+RW", "-j", "1"];
+    let output = choose(directory.path(), &arguments).success();
+    let shown = String::from_utf8(output.get_output().stdout.clone()).unwrap();
+    assert!(shown.starts_with("3 recordings cannot tell the candidates apart; awv WN+RW, 15"), "{shown}");
+    assert!(shown.contains("judged by covariance analysis") && shown.lines().count() <= 20, "{shown}");
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
+    let directory = recordings("8192", "3");
+    let ranking = |threads: &str| {
+        let arguments = ["--estimator", "awv", "--model", "WN+RW", "-j", threads, "-o", threads];
+        choose(directory.path(), &arguments).success();
+        std::fs::read(directory.path().join(threads).join("ranking.json")).unwrap()
+    };
+    assert_eq!(ranking("1"), ranking("2"));
+}
+
+#[test]
+fn what_cannot_be_compared_is_refused() {
+    let directory = recordings("8192", "2");
+    let refused = |arguments: &[&str], words: [&str; 2]| {
+        let said = said(&choose(directory.path(), arguments).code(2));
+        assert!(words.iter().all(|word| said.contains(word)), "{said}");
+        assert!(!directory.path().join("out/choice").exists());
+    };
+    refused(&[], ["2 recordings are too few to leave one out", "hint: each recording is a file"]);
+    refused(&["--estimator", "gmwm"], ["no candidate uses all recordings", "add awv"]);
+    refused(&["--model", "N3"], ["--model", "hint"]);
+    refused(&["--inflate", "more"], ["more", "\"none\", \"tuned\" or \"x10\""]);
+    let none = ["choose", "r", "--trajectory", "trajectories/figure_eight.toml", "--outage", "none"];
+    let message = said(&nav_sim(directory.path(), &none).code(2));
+    assert!(message.contains("judged at the ends of outages"), "{message}");
+}
