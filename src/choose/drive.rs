@@ -97,6 +97,17 @@ impl Drive {
         Ok(Self { trajectory, scenario, outages, seed, track })
     }
 
+    pub(super) const fn track(&self) -> &Track {
+        &self.track
+    }
+
+    /// What the filter of all states believes of a model.
+    pub(super) fn full_belief(&self, model: &Model) -> Result<Belief, ChoiceError> {
+        let full = self.scenario.with_full_noise();
+        full.belief(model, &self.outages, &self.track)
+            .map_err(|source| ChoiceError::Belief { candidate: "all states".to_owned(), source })
+    }
+
     /// The outages.
     #[must_use]
     pub fn outages(&self) -> &[Outage] {

@@ -36,12 +36,14 @@
 
 mod candidate;
 mod drive;
+mod influence;
 mod laboratory;
 mod ranking;
 mod score;
 
 pub use candidate::{Candidate, Inflation, UnknownInflation};
 pub use drive::{ChoiceError, Drive, Fold};
+pub use influence::{Influence, RecordingInfluence, ScaleInfluence};
 pub use laboratory::{Laboratory, Unit};
 pub use ranking::{Difference, FoldScore, Mean, Placed, Ranking};
 pub use score::{EndScore, Score};

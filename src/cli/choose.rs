@@ -95,7 +95,13 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let words = Words::new(session);
     let chosen = jobs::choose(&args.inputs, &options, &candidates, drive, &mut Said::new(session), &words)?;
     let shown = args.trajectory.display().to_string();
-    let report = ChoiceReport { ranking: &chosen.ranking, outages: &outages, trajectory: &shown, seed };
+    let report = ChoiceReport {
+        ranking: &chosen.ranking,
+        influence: &chosen.influence,
+        outages: &outages,
+        trajectory: &shown,
+        seed,
+    };
     write(args, &chosen, &report, seed)?;
     let text = if session.json() { report.json() } else { text(&report, session) };
     session.printer.result(text.trim_end());
@@ -108,11 +114,12 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 fn text(report: &ChoiceReport<'_>, session: &Session) -> String {
     let mut parts = vec![
-        report.verdict().join("\n"),
+        report.verdict().into_iter().chain(report.decisive_scales()).collect::<Vec<_>>().join("\n"),
         format!("{}\n{}", super::compare::table(&report.rows()), report.legend()),
     ];
     if session.verbose() {
-        parts.push(super::compare::table(&report.fold_rows()));
+        let more = [report.fold_rows(), report.recording_rows(), report.scale_rows()];
+        parts.extend(more.iter().map(|rows| super::compare::table(rows)));
     }
     parts.join("\n\n")
 }

@@ -81,7 +81,9 @@ fn parse(source: &Source, rate_hz: f64) -> Result<Contamination, FileError> {
 fn legal(operation: &str) -> Option<&'static [&'static str]> {
     Some(match operation {
         "step" => &["amplitude", "at_share", "at_samples", "at_s"],
-        "replace" => &["share", "points", "sigma", "mean"],
+        "replace" => &["share", "points", "length_samples", "sigma", "mean"],
+        "drift" => &["amplitude"],
+        "heavy-tails" => &["freedom", "sigma"],
         "bursts" => {
             &["count", "length_samples", "spacing_samples", "of_samples", "amplitude", "frequency_hz"]
         }
@@ -99,7 +101,7 @@ fn read_rules(
 ) -> Result<(), FileError> {
     let name = section.require_str("operation")?;
     let Some(keys) = legal(name) else {
-        let hint = "operations: step, replace, bursts, ar1, scale".to_owned();
+        let hint = "operations: step, drift, replace, bursts, ar1, heavy-tails, scale".to_owned();
         return Err(section.refuse("operation", "is not an operation", Some(hint)));
     };
     section.only(&[&["operation", "replicates"], keys].concat())?;
@@ -119,6 +121,8 @@ fn read_rules(
             "replace" => entry.replace()?,
             "bursts" => entry.bursts()?,
             "ar1" => entry.ar1()?,
+            "drift" => Operation::Drift { amplitude: entry.any("amplitude")? },
+            "heavy-tails" => entry.heavy_tails()?,
             _ => entry.scale()?,
         };
         into.push(Rule { sensor, replicate: replicates.as_ref().map(|r| r[i]), operation });
@@ -206,7 +210,11 @@ impl Entry<'_> {
             Err(_) => Some(self.any("mean")?),
         };
         let sigma = self.require("sigma", "a number ≥ 0", |v| v >= 0.0)?;
-        Ok(Operation::Replace { points, mean, sigma })
+        let block = Extent::Samples(self.section.u64("length_samples")?.unwrap_or(1));
+        if block == Extent::Samples(0) {
+            return Err(self.section.refuse("length_samples", "is not a number of samples > 0", None));
+        }
+        Ok(Operation::Replace { points, block, mean, sigma })
     }
 
     fn bursts(&self) -> Result<Operation, FileError> {
@@ -234,6 +242,12 @@ impl Entry<'_> {
             self.section.refuse(e.parameter, format!("is not {}", e.domain), None)
         };
         Ok(Operation::Ar1(Ar1::new(phi, sigma2).map_err(refuse)?))
+    }
+
+    fn heavy_tails(&self) -> Result<Operation, FileError> {
+        let freedom = self.require("freedom", "a number > 2: fewer degrees have no variance", |v| v > 2.0)?;
+        let sigma = self.require("sigma", "a number ≥ 0", |v| v >= 0.0)?;
+        Ok(Operation::HeavyTails { freedom, sigma })
     }
 
     fn scale(&self) -> Result<Operation, FileError> {
@@ -264,7 +278,8 @@ mod tests {
     fn presets_are_the_papers() {
         assert!(rules("section5-I", Sensor::Accel, 1).is_empty());
         let half = Extent::Share(0.5);
-        let replace = |sigma| Operation::Replace { points: Extent::Share(0.01), mean: None, sigma };
+        let (points, block) = (Extent::Share(0.01), Extent::Samples(1));
+        let replace = |sigma| Operation::Replace { points, block, mean: None, sigma };
         let second = rules("section5-II", Sensor::Accel, 6);
         assert_eq!(second[0], Operation::Step { at: half, amplitude: 0.0060 });
         assert_eq!(second[1], replace(0.16));
@@ -315,7 +330,8 @@ mod tests {
         let rules = parse(&Source::new("c.toml", text), 50.0).unwrap().rules;
         assert_eq!(rules[0].operation, Operation::Step { at: Extent::Samples(100), amplitude: 1.0 });
         assert_eq!(rules[0].replicate, None);
-        let replace = Operation::Replace { points: Extent::Samples(7), mean: Some(3.0), sigma: 1.0 };
+        let (points, block) = (Extent::Samples(7), Extent::Samples(1));
+        let replace = Operation::Replace { points, block, mean: Some(3.0), sigma: 1.0 };
         assert_eq!(rules[1].operation, replace);
     }
 
@@ -348,7 +364,7 @@ mod tests {
         );
         assert_eq!(
             refusal("[[gyro]]\noperation = \"jump\"\n"),
-            "c.toml, line 2: \"gyro[1].operation\" = \"jump\" is not an operation | operations: step, replace, bursts, ar1, scale"
+            "c.toml, line 2: \"gyro[1].operation\" = \"jump\" is not an operation | operations: step, drift, replace, bursts, ar1, heavy-tails, scale"
         );
         assert_eq!(
             refusal("[[gyro]]\noperation = \"replace\"\nsigma = 1\n"),
@@ -357,6 +373,14 @@ mod tests {
         assert_eq!(
             refusal("[[gyro]]\noperation = \"ar1\"\nphi = 1\nsigma2 = 1\n"),
             "c.toml, line 3: \"gyro[1].phi\" = 1 is not between −1 and 1 (exclusive) | "
+        );
+        assert_eq!(
+            refusal("[[gyro]]\noperation = \"heavy-tails\"\nfreedom = 2\nsigma = 1\n"),
+            "c.toml, line 3: \"gyro[1].freedom\" = 2 is not a number > 2: fewer degrees have no variance | "
+        );
+        assert_eq!(
+            refusal("[[gyro]]\noperation = \"replace\"\npoints = 9\nsigma = 1\nlength_samples = 0\n"),
+            "c.toml, line 5: \"gyro[1].length_samples\" = 0 is not a number of samples > 0 | "
         );
         assert_eq!(meant("section5-2"), Some("section5-I"));
     }

@@ -2,7 +2,7 @@
 
 use super::{Calibration, CalibrationOptions, EstimatorChoice, JobError, Measured, Note, Remarks, measure};
 use crate::calibration::{Estimator, Pool, Settings};
-use crate::choose::{Candidate, ChoiceError, Drive, Fold, Laboratory, Ranking, Unit};
+use crate::choose::{Candidate, ChoiceError, Drive, Fold, Influence, Laboratory, Ranking, Unit};
 use crate::formats::recordings::{self, FileReport, ReadOptions};
 use crate::imu::{Axis, Channel, Recording};
 use crate::noise::Model;
@@ -36,6 +36,8 @@ pub struct Chosen {
     pub winner: Candidate,
     /// The winner's calibration of all recordings, before any inflation.
     pub calibration: Calibration,
+    /// What decides the error: scales of its curves, and recordings.
+    pub influence: Influence,
     /// Its noise model.
     pub model: Model,
     /// The files that were read, in the order of the recordings.
@@ -84,9 +86,11 @@ pub fn choose(
     let ranking = Ranking::new(candidates, &folds);
     let winner = candidates[ranking.winner().index].clone();
     let model = drive.models(&laboratory, None, std::slice::from_ref(&winner))?.remove(0);
-    let calibration = final_calibration(laboratory, &winner, &options)?;
+    let calibration = final_calibration(&laboratory, &winner, &options)?;
+    let Calibration { groups, outcomes, settings } = &calibration;
+    let influence = drive.influence(&laboratory, groups, outcomes, settings)?;
     let files = files.into_iter().map(|file| file.path).collect();
-    Ok(Chosen { ranking, winner, calibration, model, files })
+    Ok(Chosen { ranking, winner, calibration, influence, model, files })
 }
 
 /// The recordings, each with its signals' wavelet variances.
@@ -118,11 +122,11 @@ fn samples_of(file: &FileReport, reading: &ReadOptions) -> Result<Vec<Recording>
 
 /// The winner's calibration of all recordings; an estimator of single ones never wins.
 fn final_calibration(
-    laboratory: Laboratory,
+    laboratory: &Laboratory,
     winner: &Candidate,
     options: &CalibrationOptions,
 ) -> Result<Calibration, JobError> {
-    let Laboratory { units, settings, pool } = laboratory;
+    let Laboratory { units, settings, pool } = laboratory.clone();
     let settings = Settings { estimators: vec![winner.estimator], model: winner.model.clone(), ..settings };
     let replicates = units.into_iter().flat_map(|unit| unit.replicates).collect();
     let pool: Pool = pool.unwrap_or(settings.pool());

@@ -1,11 +1,13 @@
 //! The ranking of candidates, on one screen and as JSON.
 
 use super::number::{readable, seconds};
-use crate::choose::{Mean, Placed, Ranking};
+use crate::choose::{Influence, Mean, Placed, Ranking};
 use crate::sensors::outage::Outage;
 use crate::simulation::NEES_DOF;
 use serde::Serialize;
 
+/// Share of the largest influence from which on a scale decides.
+const DECISIVE: f64 = 0.25;
 /// Version of the layout of `ranking.json`.
 const SCHEMA_VERSION: u32 = 1;
 
@@ -14,6 +16,8 @@ const SCHEMA_VERSION: u32 = 1;
 pub struct ChoiceReport<'a> {
     /// The candidates.
     pub ranking: &'a Ranking,
+    /// What decides the error.
+    pub influence: &'a Influence,
     /// The outages at whose ends they are judged.
     pub outages: &'a [Outage],
     /// The trajectory, as it was named.
@@ -35,6 +39,7 @@ struct RankingFile<'a> {
     seed: u64,
     #[serde(flatten)]
     ranking: &'a Ranking,
+    influence: &'a Influence,
 }
 
 impl ChoiceReport<'_> {
@@ -183,6 +188,57 @@ impl ChoiceReport<'_> {
         std::iter::once(head).chain(self.ranking.candidates.iter().map(row)).collect()
     }
 
+    /// Which scales of which sensors decide: a line each, those of a quarter of the largest influence or more.
+    #[must_use]
+    pub fn decisive_scales(&self) -> Vec<String> {
+        let scales = &self.influence.scales;
+        let largest = scales.iter().map(|s| s.on_error.abs()).fold(0.0, f64::max);
+        let mut lines: Vec<String> = Vec::new();
+        for (i, first) in scales.iter().enumerate() {
+            if scales[..i].iter().any(|s| s.signals == first.signals) {
+                continue;
+            }
+            let own: Vec<_> = scales.iter().filter(|s| s.signals == first.signals).collect();
+            let felt: Vec<_> = own.iter().filter(|s| s.on_error >= DECISIVE * largest).collect();
+            let sum: f64 = own.iter().map(|s| s.on_error).sum();
+            let range = match (felt.first(), felt.last()) {
+                (Some(from), Some(to)) => {
+                    format!("mostly from {} to {} s", readable(from.tau_s), readable(to.tau_s))
+                }
+                _ => "and no scale decides".to_owned(),
+            };
+            lines.push(format!(
+                "{}: 1 % more wavelet variance at all scales is {} % more horizontal error, {range}",
+                first.signals,
+                signed(sum)
+            ));
+        }
+        lines
+    }
+
+    /// Scale by scale under a head.
+    #[must_use]
+    pub fn scale_rows(&self) -> Vec<Vec<String>> {
+        let head = ["signals", "scale (s)", "% of horizontal error for 1 % of wavelet variance"];
+        let row = |s: &crate::choose::ScaleInfluence| {
+            vec![s.signals.clone(), readable(s.tau_s), signed(s.on_error)]
+        };
+        let head = head.map(str::to_owned).to_vec();
+        std::iter::once(head).chain(self.influence.scales.iter().map(row)).collect()
+    }
+
+    /// Recording by recording under a head.
+    #[must_use]
+    pub fn recording_rows(&self) -> Vec<Vec<String>> {
+        let head = ["adds to the expected horizontal error (%)", "awv", "sr-awv", "dr-awv"];
+        let row = |r: &crate::choose::RecordingInfluence| {
+            let adds = [r.awv_pct, r.sr_awv_pct, r.dr_awv_pct].map(signed);
+            std::iter::once(r.recording.clone()).chain(adds).collect()
+        };
+        let head = head.map(str::to_owned).to_vec();
+        std::iter::once(head).chain(self.influence.recordings.iter().map(row)).collect()
+    }
+
     fn tied(&self) -> impl Iterator<Item = &str> {
         let others = self.ranking.candidates.iter().skip(1);
         others.filter(|p| p.eligible && p.tied).map(|p| p.candidate.as_str())
@@ -200,6 +256,7 @@ impl ChoiceReport<'_> {
             outages: self.outages,
             seed: self.seed,
             ranking: self.ranking,
+            influence: self.influence,
         })
     }
 }

@@ -15,6 +15,7 @@ mod common;
 mod alignment;
 mod calibration_truth;
 mod case_study;
+mod choose;
 mod consistency;
 mod covariance_truth;
 mod estimator_bias;

@@ -250,7 +250,12 @@ pub(super) mod tests {
     }
 
     fn three() -> Vec<Contamination> {
-        let replace = Operation::Replace { points: Extent::Samples(20), mean: None, sigma: 30.0 };
+        let replace = Operation::Replace {
+            points: Extent::Samples(20),
+            block: Extent::Samples(1),
+            mean: None,
+            sigma: 30.0,
+        };
         let (process, parameter) = ("RW".to_owned(), "gamma2".to_owned());
         let scale = Operation::Scale { process, parameter, factor: 100.0 };
         let second = vec![rule(None, replace)];

@@ -5,9 +5,11 @@ pub(crate) mod bootstrap;
 mod goodness;
 mod indistinct;
 pub(crate) mod inference;
+mod influence;
 mod intervals;
 mod sandwich;
 pub(crate) mod spread;
 
 pub use alike::LEVEL as ALIKE_LEVEL;
+pub use influence::CurveInfluence;
 pub(crate) use intervals::WIDEST;

@@ -2,13 +2,13 @@
 //!
 //! Steps, replaced points and vibrations as in [Minaretzis](crate::bibliography::Minaretzis24), Sections IV
 //! and V. Whatever the order in which rules are given, they are applied in this one: scaled parameters
-//! (before synthesis), added AR1, step, replacement, bursts.
+//! (before synthesis), added AR1, heavy tails, step, drift, replacement, bursts.
 
 use super::{Ar1, Composite, Process, Synthesizer};
 use crate::imu::{Channel, Sensor};
 use crate::rng::StreamKey;
 use rand::RngExt;
-use rand_distr::StandardNormal;
+use rand_distr::{Distribution, StandardNormal, StudentT};
 
 /// A number of samples, given as such or as a share of the record.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,6 +45,13 @@ pub enum Operation {
     },
     /// Adds an AR1.
     Ar1(Ar1),
+    /// Adds white noise of heavy tails: Student's t.
+    HeavyTails {
+        /// Degrees of freedom, above 2: the variance is sigma²·freedom/(freedom − 2).
+        freedom: f64,
+        /// Scale (m/s² or rad/s).
+        sigma: f64,
+    },
     /// Adds a constant from a sample on.
     Step {
         /// First sample with it.
@@ -52,10 +59,17 @@ pub enum Operation {
         /// The constant (m/s² or rad/s).
         amplitude: f64,
     },
+    /// Adds a ramp, from 0 at the first sample to its amplitude at the last.
+    Drift {
+        /// At the end (m/s² or rad/s).
+        amplitude: f64,
+    },
     /// Replaces samples, chosen at random, by white noise.
     Replace {
         /// How many.
         points: Extent,
+        /// How many stand together; the last block may be shorter.
+        block: Extent,
         /// Mean of the noise; none: the signal's mean.
         mean: Option<f64>,
         /// Standard deviation of the noise (m/s² or rad/s).
@@ -112,6 +126,9 @@ pub enum ContaminationError {
         /// What there is.
         known: Vec<String>,
     },
+    /// A law that does not exist.
+    #[error("heavy tails of {0} degrees of freedom: more than 2 are needed")]
+    Freedom(f64),
     /// The scaled parameter leaves its domain.
     #[error("scaled: {0}")]
     Scaled(#[from] super::ParameterError),
@@ -197,7 +214,9 @@ impl Operation {
         match self {
             Self::Scale { .. } => "scale",
             Self::Ar1(_) => "ar1",
+            Self::HeavyTails { .. } => "heavy-tails",
             Self::Step { .. } => "step",
+            Self::Drift { .. } => "drift",
             Self::Replace { .. } => "replace",
             Self::Bursts { .. } => "bursts",
         }
@@ -207,9 +226,11 @@ impl Operation {
         match self {
             Self::Scale { .. } => 0,
             Self::Ar1(_) => 1,
-            Self::Step { .. } => 2,
-            Self::Replace { .. } => 3,
-            Self::Bursts { .. } => 4,
+            Self::HeavyTails { .. } => 2,
+            Self::Step { .. } => 3,
+            Self::Drift { .. } => 4,
+            Self::Replace { .. } => 5,
+            Self::Bursts { .. } => 6,
         }
     }
 
@@ -221,16 +242,25 @@ impl Operation {
         match self {
             Self::Scale { .. } => {}
             Self::Ar1(ar1) => add_ar1(x, *ar1, key),
+            Self::HeavyTails { freedom, sigma } => {
+                let law = StudentT::new(*freedom).map_err(|_| ContaminationError::Freedom(*freedom))?;
+                let mut g = key.generator();
+                x.iter_mut().for_each(|v| *v += sigma * law.sample(&mut g));
+            }
+            Self::Drift { amplitude } => {
+                let last = x.len().saturating_sub(1).max(1) as f64;
+                x.iter_mut().enumerate().for_each(|(k, v)| *v += amplitude * k as f64 / last);
+            }
             Self::Step { at, amplitude } => {
                 let at = at.of(x.len());
                 fits("a step", at)?;
                 x[at..].iter_mut().for_each(|v| *v += amplitude);
             }
-            Self::Replace { points, mean, sigma } => {
-                let points = points.of(x.len());
+            Self::Replace { points, block, mean, sigma } => {
+                let (points, block) = (points.of(x.len()), block.of(x.len()).max(1));
                 fits("the replacement of points", points)?;
                 let mean = mean.unwrap_or_else(|| x.iter().sum::<f64>() / x.len().max(1) as f64);
-                replace(x, points, mean, *sigma, key);
+                replace(x, (points, block), mean, *sigma, key);
             }
             Self::Bursts { count, length, spacing, amplitude, frequency_hz } => {
                 let (length, spacing) = (length.of(x.len()), spacing.of(x.len()));
@@ -287,19 +317,26 @@ fn add_ar1(x: &mut [f64], ar1: Ar1, key: StreamKey<'_>) {
     }
 }
 
-/// Replaces `points` distinct samples, every choice equally likely (selection sampling, Knuth's
-/// algorithm S: the numbers drawn do not depend on a library's method).
-fn replace(x: &mut [f64], points: usize, mean: f64, sigma: f64, key: StreamKey<'_>) {
+/// Replaces `points` distinct samples in blocks that do not overlap, every choice equally likely: the starts are drawn
+/// among as many places as there are with each block taken for one (selection sampling, Knuth's algorithm S: the
+/// numbers drawn do not depend on a library's method).
+fn replace(x: &mut [f64], (points, block): (usize, usize), mean: f64, sigma: f64, key: StreamKey<'_>) {
     let mut g = key.generator();
-    let mut wanted = points;
-    let n = x.len();
-    for (i, v) in x.iter_mut().enumerate() {
+    let (mut wanted, mut left) = (points.div_ceil(block), points);
+    let places = x.len() - points + wanted;
+    let mut at = 0;
+    for place in 0..places {
         if wanted == 0 {
             break;
         }
-        if g.random::<f64>() * ((n - i) as f64) < wanted as f64 {
-            *v = mean + sigma * g.sample::<f64, _>(StandardNormal);
-            wanted -= 1;
+        if g.random::<f64>() * ((places - place) as f64) < wanted as f64 {
+            let length = block.min(left);
+            for v in &mut x[at..at + length] {
+                *v = mean + sigma * g.sample::<f64, _>(StandardNormal);
+            }
+            (at, left, wanted) = (at + length, left - length, wanted - 1);
+        } else {
+            at += 1;
         }
     }
 }

@@ -34,7 +34,12 @@ fn a_step_is_from_the_middle_on() {
 #[test]
 fn replacement_is_exact_in_number_and_random_in_place() {
     let mut x = vec![100.0; 200_000];
-    let replace = Operation::Replace { points: Extent::Share(0.1), mean: Some(-1.0), sigma: 0.5 };
+    let replace = Operation::Replace {
+        points: Extent::Share(0.1),
+        block: Extent::Samples(1),
+        mean: Some(-1.0),
+        sigma: 0.5,
+    };
     one(replace).apply(&mut x, X, 2, 100.0, 1).unwrap();
     let replaced: Vec<f64> = x.iter().copied().filter(|v| *v < 50.0).collect();
     assert_eq!(replaced.len(), 20_000);
@@ -50,9 +55,14 @@ fn replacement_is_exact_in_number_and_random_in_place() {
 #[test]
 fn replacement_keeps_the_mean_of_the_signal_if_none_is_given() {
     let mut x = vec![7.0; 1000];
-    one(Operation::Replace { points: Extent::Samples(1000), mean: None, sigma: 0.0 })
-        .apply(&mut x, X, 2, 100.0, 1)
-        .unwrap();
+    one(Operation::Replace {
+        points: Extent::Samples(1000),
+        block: Extent::Samples(1),
+        mean: None,
+        sigma: 0.0,
+    })
+    .apply(&mut x, X, 2, 100.0, 1)
+    .unwrap();
     assert_eq!(x, [7.0; 1000]);
 }
 
@@ -90,7 +100,12 @@ fn the_added_ar1_has_its_variance() {
 
 #[test]
 fn the_order_is_fixed_and_other_signals_are_untouched() {
-    let replace = Operation::Replace { points: Extent::Share(1.0), mean: Some(0.0), sigma: 0.0 };
+    let replace = Operation::Replace {
+        points: Extent::Share(1.0),
+        block: Extent::Samples(1),
+        mean: Some(0.0),
+        sigma: 0.0,
+    };
     let step = Operation::Step { at: Extent::Samples(0), amplitude: 1.0 };
     let rule = |operation| Rule { sensor: Sensor::Accel, replicate: Some(2), operation };
     let both = Contamination { name: String::new(), rules: vec![rule(replace), rule(step)] };
@@ -127,7 +142,12 @@ fn parameters_are_scaled_for_their_replicate_only() {
 
 #[test]
 fn the_same_points_are_replaced_whatever_else_is_done() {
-    let replace = Operation::Replace { points: Extent::Samples(10), mean: Some(0.0), sigma: 1.0 };
+    let replace = Operation::Replace {
+        points: Extent::Samples(10),
+        block: Extent::Samples(1),
+        mean: Some(0.0),
+        sigma: 1.0,
+    };
     let alone = applied(replace.clone(), 1000);
     let mut with_bursts = one(replace);
     let (length, spacing) = (Extent::Samples(1), Extent::Samples(999));
@@ -136,4 +156,46 @@ fn the_same_points_are_replaced_whatever_else_is_done() {
     let mut x = vec![0.0; 1000];
     with_bursts.apply(&mut x, X, 2, 100.0, 1).unwrap();
     assert_eq!(x, alone);
+}
+
+/// 1000 points in blocks of 64: fifteen whole ones and one of 40, apart or side by side; every place as likely (the
+/// mean position of 16 blocks is known to n/√(12·16)).
+#[test]
+fn blocks_are_whole_and_anywhere() {
+    let n = 100_000;
+    let mut centre = 0.0;
+    for seed in 0..40 {
+        let mut x = vec![1.0; n];
+        let (points, block) = (Extent::Samples(1000), Extent::Samples(64));
+        one(Operation::Replace { points, block, mean: Some(0.0), sigma: 0.0 })
+            .apply(&mut x, X, 2, 100.0, seed)
+            .unwrap();
+        let replaced: Vec<usize> = (0..n).filter(|k| x[*k] == 0.0).collect();
+        assert_eq!(replaced.len(), 1000);
+        let lengths: Vec<usize> =
+            x.chunk_by(|a, b| a == b).filter(|run| run[0] == 0.0).map(<[f64]>::len).collect();
+        assert!(lengths.iter().filter(|l| **l % 64 != 0).all(|l| *l % 64 == 40), "{lengths:?}");
+        centre += replaced.iter().map(|k| *k as f64).sum::<f64>() / 1000.0 / 40.0;
+    }
+    let deviation = n as f64 / (12.0_f64 * 16.0 * 40.0).sqrt();
+    assert!((centre - 0.5 * n as f64).abs() < 5.0 * deviation, "{centre}");
+}
+
+#[test]
+fn a_drift_goes_from_nothing_to_its_amplitude() {
+    assert_eq!(applied(Operation::Drift { amplitude: 2.0 }, 5), [0.0, 0.5, 1.0, 1.5, 2.0]);
+    assert_eq!(applied(Operation::Drift { amplitude: 2.0 }, 1), [0.0]);
+}
+
+/// Student's t with 10 degrees of freedom: variance 10/8, kurtosis 4 (6/(10 − 4) above normal's 3), of which the variance of
+/// 200 000 samples is known to √(3/n) of itself; two degrees have none.
+#[test]
+fn heavy_tails_are_students() {
+    let n = 200_000;
+    let x = applied(Operation::HeavyTails { freedom: 10.0, sigma: 3.0 }, n);
+    let variance = x.iter().map(|v| v * v).sum::<f64>() / n as f64;
+    assert!((variance / (9.0 * 1.25) - 1.0).abs() < 5.0 * (3.0 / n as f64).sqrt(), "{variance}");
+    let beyond = x.iter().filter(|v| v.abs() > 3.0 * 4.587).count() as f64;
+    // P(|t| > 4.587) = 0.001 with ten degrees of freedom
+    assert!((beyond - 200.0).abs() < 5.0 * 200.0_f64.sqrt(), "{beyond}");
 }
