@@ -5,7 +5,7 @@ use super::reduction::Reduced;
 use crate::ekf::{Belief, BeliefError};
 use crate::imu::{Recording, Sensor};
 use crate::metrics::{
-    Agreement, Budget, EpochMetrics, Expected, Frame, ReductionQuality, ReductionSummary, Summary, epochs,
+    Agreement, Budget, EpochMetrics, Expected, ReductionQuality, ReductionSummary, Summary, epochs,
 };
 use crate::monte_carlo;
 use crate::noise::reduction::window_s;
@@ -203,27 +203,17 @@ struct Analysis<'a> {
     track: &'a Track,
     /// None: what makes the errors has no model.
     model: Option<&'a Model>,
-    windows: Vec<(f64, f64)>,
 }
 
 impl<'a> Analysis<'a> {
     fn new(experiment: &'a Experiment<'a>, inputs: &'a NavigateInputs, track: &'a Track) -> Self {
-        let windows = experiment.outages.iter().map(|o| (o.start_s, o.end_s)).collect();
-        Self { experiment, track, model: inputs.truth_model(), windows }
+        Self { experiment, track, model: inputs.truth_model() }
     }
 
     /// The expected figures; none where the covariance runs away.
     fn expected(&self, belief: &Belief) -> Option<(Vec<EpochMetrics>, Summary)> {
-        let frame = Frame {
-            outages: &self.windows,
-            filter_states: belief.states,
-            fix_components: self.experiment.gnss.components(),
-            coverage_level: self.experiment.coverage_level,
-            seed: self.experiment.seed,
-        };
-        let truth = TruthSide::together(&TruthSide::sources(self.experiment, self.model?));
-        let expected = Expected::of(&FilterPass::new(self.track, belief).errors(&truth), &frame)?;
-        let summary = expected.summary(&frame);
+        let expected = Expected::along(self.track, self.experiment, belief, self.model?)?;
+        let summary = expected.summary();
         Some((expected.epochs, summary))
     }
 

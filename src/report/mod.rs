@@ -47,8 +47,8 @@ pub use replicates::{
 pub use run_directory::{OutputFile, RUN_FILES, json, run_directory, summary_json};
 pub use study::{
     ColumnResult, ShownCell, ShownColumn, TableColumn, TableRow, Value, ValueKind, drift_table,
-    epoch_columns, epoch_rows, measured, outage_columns, outage_rows, ratio_table, run_columns, run_rows,
-    verdict, verdict_table,
+    epoch_columns, epoch_rows, outage_columns, outage_rows, ratio_table, run_columns, run_rows,
+    verdict_table,
 };
 pub use tables::{TableError, epochs_csv, parse_epochs, parse_runs, runs_csv};
 pub use trajectory::{TrajectorySeries, trajectory_svg};

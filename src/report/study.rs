@@ -4,8 +4,8 @@
 use super::comparison::{CandidateResult, Label, table_rows};
 use super::number::{readable, seconds};
 use super::verdict::verdict_word;
-use crate::metrics::{self, EpochMetrics, EpochRow, Measured, OutageComparison, OutageMetrics, Verdict};
-use crate::simulation::{REPORTED, REPORTED_NAMES, RunResult};
+use crate::metrics::{self, EpochMetrics, Measured, OutageComparison, OutageMetrics, Verdict};
+use crate::simulation::{REPORTED, REPORTED_NAMES};
 
 /// A value of a table.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,8 +46,8 @@ pub struct ColumnResult<'a> {
     pub filter: &'a str,
     /// The candidate its ratios refer to, with the same filter; empty without ratios.
     pub reference: &'a str,
-    /// The sums of all runs.
-    pub result: &'a RunResult,
+    /// All runs, or what is expected of them.
+    pub measured: &'a Measured,
 }
 
 const KEYS: [&str; 7] = ["trajectory", "truth", "scenario", "gnss", "outage_set", "candidate", "filter"];
@@ -125,9 +125,9 @@ pub fn outage_rows(
     outages: &[OutageMetrics],
     comparison: Option<&[OutageComparison]>,
 ) -> Vec<TableRow> {
-    let runs = of.result.runs.len() as u64;
-    let diverged = of.result.runs.iter().filter(|r| r.diverged).count() as u64;
-    let verdict = verdict(of.result);
+    let runs = of.measured.sampled().len() as u64;
+    let diverged = of.measured.sampled().iter().filter(|r| r.diverged).count() as u64;
+    let verdict = of.measured.verdict();
     let words = [of.reference, verdict_word(verdict.kind), verdict.worst_state];
     let row = |(i, outage): (usize, &OutageMetrics)| {
         let mut row = keys(of);
@@ -145,12 +145,6 @@ pub fn outage_rows(
     outages.iter().enumerate().map(row).collect()
 }
 
-/// The verdict on a column: of the whole experiment, not of one outage.
-#[must_use]
-pub fn verdict(result: &RunResult) -> Verdict {
-    Verdict::of(&result.runs, result.outages.len(), result.independent_windows)
-}
-
 fn outage_values(o: &OutageMetrics, verdict_ratio: f64, kept: u64) -> Vec<f64> {
     let mut values = vec![o.start_s, o.end_s, o.end_s - o.start_s];
     for estimates in [&o.asee_mean, &o.rmse_mean, &o.asee_end, &o.rmse_end] {
@@ -163,7 +157,8 @@ fn outage_values(o: &OutageMetrics, verdict_ratio: f64, kept: u64) -> Vec<f64> {
         values.extend([quantile.value, low.unwrap_or(f64::NAN), high.unwrap_or(f64::NAN)]);
     }
     let r = &o.reconvergence;
-    values.extend([o.horizontal_max_m, r.p50_s.value, r.p95_s.value, r.never as f64 / kept as f64]);
+    let never = r.never.map_or(f64::NAN, |never| never as f64 / kept as f64);
+    values.extend([o.horizontal_max_m, r.p50_s.value, r.p95_s.value, never]);
     values
 }
 
@@ -216,11 +211,11 @@ pub fn run_columns() -> Vec<TableColumn> {
     columns(ints(["run", "outage", "diverged", "fixes"]).chain(floats(names)))
 }
 
-/// One row a run and outage.
+/// One row a run and outage; a covariance analysis has none.
 #[must_use]
 pub fn run_rows(of: &ColumnResult<'_>) -> Vec<TableRow> {
     let mut rows = Vec::new();
-    for run in &of.result.runs {
+    for run in of.measured.sampled() {
         for (i, o) in run.outages.iter().enumerate() {
             let mut row = keys(of);
             row.extend([run.run, i as u64, u64::from(run.diverged), run.nis.1].map(Value::Int));
@@ -232,25 +227,6 @@ pub fn run_rows(of: &ColumnResult<'_>) -> Vec<TableRow> {
         }
     }
     rows
-}
-
-/// What ratios are made of.
-#[must_use]
-pub fn measured(result: &RunResult) -> Measured {
-    let row = |e: &EpochMetrics| EpochRow {
-        t_s: e.t_s,
-        asee: e.asee.0.map(|e| e.value),
-        rmse: e.rmse.0.map(|e| e.value),
-        nees: e.nees.value,
-        coverage: e.coverage,
-    };
-    Measured {
-        epochs: metrics::epochs(result).iter().map(row).collect(),
-        runs: result.runs.clone(),
-        outages: result.outages.clone(),
-        independent_windows: result.independent_windows,
-        is_expected: false,
-    }
 }
 
 /// A column of a cell as people read it.
@@ -347,22 +323,22 @@ mod tests {
     use super::super::sample;
     use super::*;
 
-    fn of(result: &RunResult) -> ColumnResult<'_> {
+    fn of(measured: &Measured) -> ColumnResult<'_> {
         let cell = ["land", "m", "s", "g", "o"];
-        ColumnResult { cell, candidate: "I/awv", filter: "15", reference: "I/awv", result }
+        ColumnResult { cell, candidate: "I/awv", filter: "15", reference: "I/awv", measured }
     }
 
     #[test]
     fn rows_fit_their_columns_and_names_carry_units() {
         let result = sample::result();
         let (outages, epochs) = (metrics::outages(&result), metrics::epochs(&result));
-        let experiment = measured(&result);
+        let experiment = Measured::from(&result);
         let comparison = metrics::compare(&experiment, &experiment, true).unwrap();
         let tables = [
-            (outage_columns(), outage_rows(&of(&result), &outages, Some(&comparison))),
-            (outage_columns(), outage_rows(&of(&result), &outages, None)),
-            (epoch_columns(), epoch_rows(&of(&result), &epochs)),
-            (run_columns(), run_rows(&of(&result))),
+            (outage_columns(), outage_rows(&of(&experiment), &outages, Some(&comparison))),
+            (outage_columns(), outage_rows(&of(&experiment), &outages, None)),
+            (epoch_columns(), epoch_rows(&of(&experiment), &epochs)),
+            (run_columns(), run_rows(&of(&experiment))),
         ];
         for (columns, rows) in tables {
             assert!(!rows.is_empty());
@@ -402,8 +378,8 @@ mod tests {
     #[test]
     fn values_stand_under_their_names() {
         let result = sample::result();
-        let outages = metrics::outages(&result);
-        let rows = outage_rows(&of(&result), &outages, None);
+        let (outages, experiment) = (metrics::outages(&result), Measured::from(&result));
+        let rows = outage_rows(&of(&experiment), &outages, None);
         let at = |name: &str| {
             let i = outage_columns().iter().position(|(n, _)| n == name).unwrap();
             rows[0][i].clone()

@@ -7,11 +7,10 @@ use super::grid::Column;
 use super::plan::{Kept, Unit};
 use super::planned::Planned;
 use super::sums::CellSums;
-use super::unit::UnitResult;
+use super::unit::{Finding, UnitResult};
 use super::unit_file::{self, UnitFileError};
 use crate::metrics::{self, Measured, OutageComparison};
 use crate::report::{self, ColumnResult, Label, ShownCell, ShownColumn, TableRow};
-use crate::simulation::RunResult;
 
 /// What a cell contributes.
 pub(super) struct CellTables {
@@ -52,7 +51,8 @@ impl CellTables {
         let grid = &planned.grid;
         let cell = grid.cell(units[0].0.cell);
         let reference = planned.reference()?;
-        let comparisons = comparisons(planned, &sums.columns, reference.0)?;
+        let measured: Vec<Measured> = sums.columns.iter().map(Finding::measured).collect();
+        let comparisons = comparisons(planned, &measured, reference.0)?;
         let mut tables = Self {
             shown: ShownCell { name: grid.short_name(cell), columns: Vec::new() },
             outages: Vec::new(),
@@ -60,22 +60,21 @@ impl CellTables {
             runs: Vec::new(),
             diverged: 0,
         };
-        for ((column, result), (comparison, is_reference)) in
-            grid.columns.iter().zip(&sums.columns).zip(comparisons)
-        {
+        let columns = grid.columns.iter().zip(&sums.columns).zip(&measured).zip(comparisons);
+        for (((column, finding), measured), (comparison, is_reference)) in columns {
             let filter = grid.filter(cell, column).name();
             let reference = if comparison.is_some() { reference.1.as_str() } else { "" };
-            let shown =
-                ColumnResult { cell: grid.names(cell), candidate: &column.name, filter, reference, result };
-            let outages = metrics::outages(result);
+            let (cell, candidate) = (grid.names(cell), column.name.as_str());
+            let shown = ColumnResult { cell, candidate, filter, reference, measured };
+            let outages = finding.outages();
             tables.outages.extend(report::outage_rows(&shown, &outages, comparison.as_deref()));
             tables.runs.extend(report::run_rows(&shown));
             if planned.keeps_epochs() {
-                tables.epochs.extend(report::epoch_rows(&shown, &metrics::epochs(result)));
+                tables.epochs.extend(report::epoch_rows(&shown, &finding.epochs()));
             }
-            tables.diverged += result.runs.iter().filter(|r| r.diverged).count() as u64;
+            tables.diverged += measured.sampled().iter().filter(|r| r.diverged).count() as u64;
             let (name, label) = shown_names(&planned.plan.study, column, filter);
-            let verdict = report::verdict(result);
+            let verdict = measured.verdict();
             tables.shown.columns.push(ShownColumn {
                 name,
                 label,
@@ -107,8 +106,8 @@ fn shown_names(study: &Study, column: &Column, filter: &str) -> (String, Label) 
 
 /// Whether a unit is what the plan says; that its outages are those of the cell's others is seen when it is added.
 fn fits(planned: &Planned, unit: Unit, result: &UnitResult) -> bool {
-    let outages = result.columns.first().map_or([].as_slice(), |c| &c.outages);
-    result.fits(unit, planned.grid.columns.len(), outages)
+    let outages = result.columns.first().map_or(Vec::new(), Finding::windows);
+    result.fits(unit, planned.grid.columns.len(), &outages)
 }
 
 fn sums(planned: &Planned, units: &[(Unit, String)]) -> Result<Result<CellSums, DamagedUnits>, StudyError> {
@@ -133,14 +132,13 @@ type Compared = (Option<Vec<OutageComparison>>, bool);
 /// The comparison of each column with the reference that has the same filter, if ratios are kept.
 fn comparisons(
     planned: &Planned,
-    results: &[RunResult],
+    experiments: &[Measured],
     reference: usize,
 ) -> Result<Vec<Compared>, StudyError> {
     let columns = &planned.grid.columns;
     if planned.plan.kept() == Kept::Runs {
         return Ok(vec![(None, false); columns.len()]);
     }
-    let experiments: Vec<Measured> = results.iter().map(report::measured).collect();
     let compared = |i: usize| {
         let filter = columns[i].filter;
         let own = columns.iter().position(|c| c.candidate == reference && c.filter == filter).unwrap_or(0);

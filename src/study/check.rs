@@ -63,12 +63,9 @@ impl Study {
         if self.unit_runs == Some(0) {
             return refuse("unit_runs", "0".into(), "must be at least 1");
         }
-        if self.method != Method::MonteCarlo {
-            return refuse(
-                "method",
-                format!("\"{}\"", self.method.name()),
-                "is not available in studies yet; use \"monte-carlo\"",
-            );
+        if self.method == Method::Both {
+            let reason = "is not a method of studies; use \"monte-carlo\" or \"lincov\"";
+            return refuse("method", format!("\"{}\"", self.method.name()), reason);
         }
         if self.metrics.is_empty() {
             return refuse("metrics", "[]".into(), "is empty; choose of outages, ratios, epochs");
@@ -89,6 +86,7 @@ impl Study {
             let said = [e.model.is_some(), !e.recordings.is_empty(), e.synthesize.is_some()];
             exactly_one("truth", i, &said, "model, recordings, synthesize")?;
         }
+        self.check_truth_is_modelled()?;
         for (i, e) in self.candidate.iter().enumerate() {
             exactly_one("candidate", i, &[e.model.is_some(), e.calibrate.is_some()], "model, calibrate")?;
             let Some(step) = &e.calibrate else { continue };
@@ -109,6 +107,15 @@ impl Study {
                 Err(DescriptionError::refused("synthesize", value, "are no recordings"))
             }
             None => Ok(()),
+        }
+    }
+
+    /// Covariance analysis needs the law of the errors, which recordings do not have.
+    fn check_truth_is_modelled(&self) -> Result<(), DescriptionError> {
+        let recorded = self.truth.iter().position(|e| e.model.is_none());
+        match recorded {
+            Some(i) if !self.is_sampled() => Err(DescriptionError::NoModel { entry: i + 1 }),
+            _ => Ok(()),
         }
     }
 

@@ -19,13 +19,13 @@ pub struct Study {
     /// Layout version: 1.
     #[serde(default = "one")]
     pub schema: u64,
-    /// Monte-Carlo runs of each cell.
+    /// Monte-Carlo runs of each cell; a covariance analysis needs none.
     #[serde(default = "hundred")]
     pub runs: u64,
     /// Seed of all random numbers; without it --seed, or one is drawn and kept in the plan.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
-    /// How the statistics are found.
+    /// How the statistics are found: by runs, or by covariance analysis, which needs models of what makes the errors.
     #[serde(default)]
     pub method: Method,
     /// What is kept and tabled; outages and their ratios by default.
@@ -303,6 +303,18 @@ impl Study {
         files.extend(self.scenario.iter().filter_map(|e| Some(("scenario", e.file.as_deref()?))));
         files.extend(self.gnss.iter().filter_map(|e| Some(("gnss", e.file.as_deref()?))));
         files
+    }
+
+    /// Whether runs are made.
+    #[must_use]
+    pub const fn is_sampled(&self) -> bool {
+        !matches!(self.method, Method::Lincov)
+    }
+
+    /// Runs of each cell; a covariance analysis counts as one.
+    #[must_use]
+    pub const fn runs_of_cell(&self) -> u64 {
+        if self.is_sampled() { self.runs } else { 1 }
     }
 
     /// Whether sums are kept at epochs outside outages too.

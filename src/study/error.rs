@@ -48,6 +48,12 @@ pub enum DescriptionError {
         /// The keys.
         keys: &'static str,
     },
+    /// Recordings make the errors, and covariance analysis needs their law.
+    #[error("truth[{entry}] has no model, which covariance analysis (method = \"lincov\") needs")]
+    NoModel {
+        /// Which, from 1.
+        entry: usize,
+    },
     /// The reference is no candidate.
     #[error("\"reference\" = \"{reference}\" is no candidate")]
     NoReference {
@@ -72,6 +78,7 @@ impl DescriptionError {
             Self::Refused { key, .. } => key,
             Self::Empty { axis } | Self::Duplicate { axis, .. } => axis,
             Self::Unnamed { axis, .. } | Self::NotOne { axis, .. } => axis,
+            Self::NoModel { .. } => "truth",
             Self::NoReference { .. } => "reference",
         }
     }
@@ -83,6 +90,9 @@ impl DescriptionError {
             Self::Empty { axis } if axis.contains('[') => Some("a list without values makes no cell".into()),
             Self::Empty { axis } => Some(format!("add a [[{axis}]] to the study")),
             Self::Duplicate { .. } | Self::Unnamed { .. } => Some("give each entry a \"name\"".into()),
+            Self::NoModel { .. } => {
+                Some("calibrate a model of the recordings and name it with \"model\", or sample".into())
+            }
             Self::NoReference { candidates, .. } => Some(format!("candidates: {}", candidates.join(", "))),
             _ => None,
         }

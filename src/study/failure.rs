@@ -77,6 +77,14 @@ pub enum StudyError {
         /// Why.
         source: Source,
     },
+    /// A covariance that ran away.
+    #[error("{cell}: the covariance analysis of {column} did not stay finite and positive definite")]
+    NotFinite {
+        /// Names of the cell.
+        cell: String,
+        /// The candidate.
+        column: String,
+    },
     /// A model without the spread that virtual recordings draw from.
     #[error("{}: has no [spread], which \"spread = true\" draws from", .model.display())]
     NoSpread {
@@ -140,7 +148,7 @@ impl StudyError {
         match self {
             Self::File(e) => !e.is_system(),
             Self::Candidate { source, .. } | Self::CalibratedModel(source) => source.is_usage(),
-            Self::Unit(_) | Self::Comparison(_) => false,
+            Self::Unit(_) | Self::Comparison(_) | Self::NotFinite { .. } => false,
             _ => true,
         }
     }

@@ -59,8 +59,12 @@ fn scenarios(study: &Study, path: &Path, source: &Source) -> Result<Vec<Scenario
             (Some(file), _) => scenario_file::read(&beside(path, file))?,
             (None, settings) => settings.clone().unwrap_or_default(),
         };
-        scenario.validate().map_err(|e| refused(&e, &format!("scenario[{}].settings", i + 1), source))?;
-        Ok(scenario)
+        let section = format!("scenario[{}].settings", i + 1);
+        scenario.validate().map_err(|e| refused(&e, &section, source))?;
+        match analysable(study, &scenario) {
+            Err(e) => Err(refused(&e, &section, source).advice(SAMPLE)),
+            Ok(()) => Ok(scenario),
+        }
     };
     study.scenario.iter().enumerate().map(one).collect()
 }
@@ -75,6 +79,20 @@ fn receivers(study: &Study, path: &Path, source: &Source) -> Result<Vec<GnssSett
         Ok(gnss)
     };
     study.gnss.iter().enumerate().map(one).collect()
+}
+
+const SAMPLE: &str = "leave it out, or sample with method = \"monte-carlo\"";
+
+/// Gains that depend on what is drawn have no covariance analysis.
+fn analysable(study: &Study, scenario: &Scenario) -> Result<(), SettingError> {
+    match scenario.filter.nis_gate {
+        Some(p) if !study.is_sampled() => {
+            let reason =
+                "a gate makes the gains depend on what is drawn, and covariance analysis has no draws";
+            Err(SettingError::new("filter.nis_gate", p, reason))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// A refusal by the rules of settings.
@@ -110,7 +128,9 @@ fn located(error: &DescriptionError, source: &Source, root: &Section<'_>) -> Fil
     };
     let first = axis.split('.').next().unwrap_or(axis);
     let entry = entry.or(match error {
-        DescriptionError::Unnamed { entry, .. } | DescriptionError::NotOne { entry, .. } => Some(*entry),
+        DescriptionError::Unnamed { entry, .. }
+        | DescriptionError::NotOne { entry, .. }
+        | DescriptionError::NoModel { entry } => Some(*entry),
         _ => None,
     });
     let line = if let (DescriptionError::Duplicate { name, .. }, true) = (error, root.has(first)) {

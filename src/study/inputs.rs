@@ -3,20 +3,23 @@
 use super::directory;
 use super::failure::StudyError;
 use super::file::beside;
-use super::grid::Cell;
+use super::grid::{Cell, Column};
 use super::plan::{Prepared, Unit};
 use super::planned::Planned;
 use super::reader::{Reader, TruthSource};
 use super::remark::Remark;
 use crate::ekf::Belief;
 use crate::formats::{input, model_file};
+use crate::metrics::Expected;
 use crate::noise::{Model, continuous};
 use crate::observer::Observer;
-use crate::scenario::Scenario;
+use crate::scenario::{Method, Reduction, Scenario};
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::{Outage, PlacedOutages};
-use crate::simulation;
+use crate::simulation::lincov::Track;
+use crate::simulation::{self, Experiment};
 use crate::trajectory::Trajectory;
+use rayon::prelude::*;
 use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
@@ -26,6 +29,35 @@ pub(super) const CALIBRATED: &str = "calibrated";
 
 /// Model files that are made and not written yet: path in the study's directory, contents.
 pub(super) type ModelTexts = Vec<(String, String)>;
+
+/// A cell, set up.
+pub(super) enum Work<'a> {
+    /// For runs.
+    Sampling(simulation::Plan<'a>),
+    /// For covariance analysis.
+    Analysis(Analysis<'a>),
+}
+
+/// A covariance analysis of a cell.
+pub(super) struct Analysis<'a> {
+    track: &'a Track,
+    experiment: &'a Experiment<'a>,
+    truth: &'a Model,
+    /// Names of the cell, and of its columns.
+    names: (String, Vec<String>),
+}
+
+impl Analysis<'_> {
+    /// What is expected of each column.
+    pub(super) fn expected(&self) -> Result<Vec<Expected>, StudyError> {
+        let of_column = |(belief, column): (&Belief, &String)| {
+            let expected = Expected::along(self.track, self.experiment, belief, self.truth);
+            expected
+                .ok_or_else(|| StudyError::NotFinite { cell: self.names.0.clone(), column: column.clone() })
+        };
+        self.experiment.beliefs.par_iter().zip(&self.names.1).map(of_column).collect()
+    }
+}
 
 /// Files of a plan; the last trajectory and truth are kept, since neighbouring cells share them.
 pub(super) struct Inputs<'a> {
@@ -48,18 +80,33 @@ impl<'a> Inputs<'a> {
         Self { made, ..self }
     }
 
-    /// Calls `f` with the simulation of a cell.
+    /// Calls `f` with a cell, set up.
     pub(super) fn with_cell<T>(
         &mut self,
         cell: Cell,
-        f: impl FnOnce(&simulation::Plan<'_>) -> Result<T, StudyError>,
+        f: impl FnOnce(&Work<'_>) -> Result<T, StudyError>,
+    ) -> Result<T, StudyError> {
+        let scenario = self.planned.grid.scenario(cell, self.planned.plan.seed);
+        self.set_up(cell, &scenario, f)
+    }
+
+    /// Refuses a cell whose parts do not fit together. Filters are reduced the quick way: what is refused is the same.
+    pub(super) fn check_cell(&mut self, cell: Cell) -> Result<(), StudyError> {
+        let mut scenario = self.planned.grid.scenario(cell, self.planned.plan.seed);
+        scenario.filter.reduction = Reduction::Wavelet;
+        self.set_up(cell, &scenario, |_| Ok(()))
+    }
+
+    fn set_up<T>(
+        &mut self,
+        cell: Cell,
+        scenario: &Scenario,
+        f: impl FnOnce(&Work<'_>) -> Result<T, StudyError>,
     ) -> Result<T, StudyError> {
         let (plan, grid) = (&self.planned.plan, &self.planned.grid);
-        let scenario = grid.scenario(cell, plan.seed);
         let trajectory = self.trajectory(cell.trajectory)?;
         let truth = self.truth(cell.truth)?;
         let outages = self.outages(cell)?.windows;
-        let beliefs = self.beliefs(cell, &scenario, &trajectory, &outages)?;
         let part = || grid.names(cell).join(", ");
         let truth_model;
         let truth = match &*truth {
@@ -70,9 +117,23 @@ impl<'a> Inputs<'a> {
                 Truth::Model(&truth_model)
             }
         };
-        let experiment = scenario.experiment(&trajectory, truth, &beliefs, &outages, plan.seed);
-        let simulation = simulation::Plan::new(&experiment).map_err(|e| unfit(part(), e))?;
-        f(&simulation)
+        let bare = scenario.experiment(&trajectory, truth, &[], &outages, plan.seed);
+        let track = Track::along(&bare).map_err(|e| unfit(part(), e))?;
+        let beliefs = self.beliefs(cell, scenario, &track, &outages)?;
+        let experiment = Experiment { beliefs: &beliefs, ..bare };
+        let work = match (plan.study.method, truth) {
+            (Method::Lincov, Truth::Model(truth)) => {
+                let columns = grid.columns.iter().map(|c| c.name.clone()).collect();
+                Work::Analysis(Analysis {
+                    track: &track,
+                    experiment: &experiment,
+                    truth,
+                    names: (part(), columns),
+                })
+            }
+            _ => Work::Sampling(simulation::Plan::new(&experiment).map_err(|e| unfit(part(), e))?),
+        };
+        f(&work)
     }
 
     /// The outages of a cell; refuses those that do not lie on its trajectory.
@@ -134,29 +195,31 @@ impl<'a> Inputs<'a> {
         &mut self,
         cell: Cell,
         scenario: &Scenario,
-        trajectory: &Trajectory,
+        track: &Track,
         outages: &[Outage],
     ) -> Result<Vec<Belief>, StudyError> {
         let grid = &self.planned.grid;
-        let mut beliefs = Vec::new();
         for column in &grid.columns {
+            self.load_model(column.candidate)?;
+        }
+        let models = &self.models;
+        let belief = |column: &Column| {
             let mut own = scenario.clone();
             own.filter.states = grid.filter(cell, column);
-            let model = self.model(column.candidate)?;
             let part = || format!("candidate {}", column.name);
+            let model = &models[&column.candidate];
             let model = continuous::at_rate(model, scenario.imu.rate_hz).map_err(|e| unfit(part(), e))?;
-            let track = own.track(trajectory, &model, outages).map_err(|e| unfit(part(), e))?;
-            beliefs.push(own.belief(&model, outages, &track).map_err(|e| unfit(part(), e))?);
-        }
-        Ok(beliefs)
+            own.belief(&model, outages, track).map_err(|e| unfit(part(), e))
+        };
+        grid.columns.par_iter().map(belief).collect()
     }
 
-    fn model(&mut self, candidate: usize) -> Result<&Model, StudyError> {
+    fn load_model(&mut self, candidate: usize) -> Result<(), StudyError> {
         if !self.models.contains_key(&candidate) {
             let model = self.read_model(&self.planned.plan.models[candidate])?;
             self.models.insert(candidate, model);
         }
-        Ok(&self.models[&candidate])
+        Ok(())
     }
 
     fn read_model(&self, model: &Prepared) -> Result<Model, StudyError> {

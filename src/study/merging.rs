@@ -127,7 +127,7 @@ fn summary(planned: &Planned, units: usize, diverged: u64) -> serde_json::Value 
         "seed": plan.seed,
         "cells": planned.grid.len(),
         "units": units,
-        "runs": plan.study.runs,
+        "runs": if plan.study.is_sampled() { plan.study.runs } else { 0 },
         "diverged": diverged,
         "states": REPORTED_NAMES,
         "study": plan.study,

@@ -60,6 +60,7 @@ mod sweep;
 mod tables;
 mod unit;
 pub mod unit_file;
+mod unit_words;
 mod verification;
 
 pub use description::{
@@ -80,5 +81,5 @@ pub use remedy::Remedy;
 pub use running::{RunOptions, RunReport, Shard, run};
 pub use sums::CellSums;
 pub use sweep::{OneOrMany, OutageSet, OutagesEntry, Periodic, Random, Sweep};
-pub use unit::{UnitResult, run_unit};
+pub use unit::{Finding, UnitResult, run_unit};
 pub use verification::{VerifyOptions, VerifyReport, verify};

@@ -4,7 +4,7 @@ use super::description::{Metric, Study};
 use super::error::DescriptionError;
 use super::grid::{Cell, Grid};
 use crate::lanes::LANES;
-use crate::scenario::Scenario;
+use crate::scenario::{Method, Scenario};
 use crate::sensors::gnss::GnssSettings;
 use serde::{Deserialize, Serialize};
 
@@ -87,7 +87,7 @@ impl Kept {
     }
 }
 
-/// A unit of work: runs `first..first + runs` of a cell.
+/// A unit of work: runs `first..first + runs` of a cell; a covariance analysis counts as one run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Unit {
     /// Position in the plan.
@@ -105,6 +105,7 @@ pub struct Unit {
 struct CellKey<'a> {
     version: &'a str,
     numerics: &'a str,
+    method: Method,
     kept: Kept,
     trajectory: &'a str,
     truth: &'a str,
@@ -130,10 +131,16 @@ impl Plan {
         Kept::of(&self.study)
     }
 
+    /// Runs of each cell; a covariance analysis counts as one.
+    #[must_use]
+    pub const fn runs(&self) -> u64 {
+        self.study.runs_of_cell()
+    }
+
     /// Units of each cell of a trajectory.
     fn units_per_cell(&self, trajectory: usize) -> usize {
         let runs = self.unit_runs.get(trajectory).copied().unwrap_or(1).max(1);
-        usize::try_from(self.study.runs.div_ceil(runs)).unwrap_or(usize::MAX)
+        usize::try_from(self.runs().div_ceil(runs)).unwrap_or(usize::MAX)
     }
 
     /// All units, in cell and run order.
@@ -143,7 +150,7 @@ impl Plan {
             let size = self.unit_runs[trajectory].max(1);
             (0..self.units_per_cell(trajectory) as u64).map(move |k| {
                 let first = k * size;
-                (cell, first, size.min(self.study.runs - first))
+                (cell, first, size.min(self.runs() - first))
             })
         };
         let all = (0..grid.len()).flat_map(of_cell).enumerate();
@@ -162,7 +169,13 @@ impl Plan {
     #[must_use]
     pub fn unit_s(&self, grid: &Grid, unit: Unit) -> f64 {
         let run_s = self.estimate.run_s.get(grid.cell(unit.cell).trajectory).copied().unwrap_or(0.0);
-        run_s * unit.runs.next_multiple_of(LANES as u64) as f64
+        run_s * unit.runs.next_multiple_of(self.lanes()) as f64
+    }
+
+    /// Runs that are computed together.
+    #[must_use]
+    pub const fn lanes(&self) -> u64 {
+        if self.study.is_sampled() { LANES as u64 } else { 1 }
     }
 
     /// Hash of everything that decides the bytes of a cell's units.
@@ -172,6 +185,7 @@ impl Plan {
         let key = CellKey {
             version: &self.version,
             numerics: &self.numerics,
+            method: self.study.method,
             kept: self.kept(),
             trajectory: &self.trajectories[cell.trajectory],
             truth: &self.truths[cell.truth],

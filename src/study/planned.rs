@@ -8,7 +8,6 @@ use super::grid::Grid;
 use super::plan::{Plan, Unit};
 use super::remark::Remark;
 use super::unit_file;
-use crate::lanes::LANES;
 use crate::observer::Observer;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -59,7 +58,7 @@ impl Planned {
     #[must_use]
     pub fn longest_unit_s(&self, threads: u64) -> f64 {
         let wall_s = |unit: Unit| {
-            let batches = unit.runs.div_ceil(LANES as u64);
+            let batches = unit.runs.div_ceil(self.plan.lanes());
             self.plan.unit_s(&self.grid, unit) / threads.clamp(1, batches.max(1)) as f64
         };
         self.plan.units(&self.grid).map(wall_s).fold(0.0, f64::max)
@@ -83,7 +82,7 @@ impl Planned {
                 status.left_s += plan.unit_s(grid, unit);
                 status.missing.push((unit, id));
             }
-            if unit.first + unit.runs == plan.study.runs {
+            if unit.first + unit.runs == plan.runs() {
                 status.cells_done += usize::from(cell_whole);
                 cell_whole = true;
             }

@@ -5,13 +5,14 @@ use super::directory;
 use super::failure::StudyError;
 use super::file::{self, StudyFile, beside};
 use super::fingerprint::fingerprint;
-use super::inputs::{CALIBRATED, Inputs, ModelTexts, unchanged};
-use super::plan::{Estimate, Kept, Plan, Prepared};
+use super::grid::Grid;
+use super::inputs::{CALIBRATED, Inputs, ModelTexts, Work, unchanged};
+use super::plan::{Estimate, Kept, Plan, Prepared, Unit};
 use super::planned::Planned;
 use super::prepare::calibrated;
 use super::reader::{CANDIDATE_SEED, Reader};
 use super::remark::Remark;
-use super::unit::run_unit;
+use super::unit::{UnitResult, compute};
 use super::unit_file;
 use crate::calibration::{Estimator, Outcome};
 use crate::formats::model_file::{self, CalibrationNote};
@@ -136,7 +137,7 @@ fn prepared(file: StudyFile, seed: u64, reader: Reader<'_>) -> Result<(Plan, Mod
         version: env!("CARGO_PKG_VERSION").to_owned(),
         numerics: fingerprint(),
         seed,
-        unit_runs: vec![study.unit_runs.unwrap_or(study.runs); study.trajectory.len()],
+        unit_runs: vec![unit_runs_asked(&study).unwrap_or(study.runs_of_cell()); study.trajectory.len()],
         study,
         scenarios,
         gnss,
@@ -241,7 +242,7 @@ fn validate(
     for index in 0..grid.len() {
         let cell = grid.cell(index);
         if set_up.insert((cell.trajectory, cell.truth, cell.scenario)) || grid.len() <= 64 {
-            inputs.with_cell(cell, |_| Ok(()))?;
+            inputs.check_cell(cell)?;
         }
         if placed.insert((cell.trajectory, cell.scenario, cell.outages)) {
             let outages = inputs.outages(cell)?;
@@ -268,7 +269,7 @@ fn remark_no_outages(mut cells: Vec<String>, observer: &dyn Observer<Remark>) {
     }
 }
 
-/// Times eight runs of the first cell, and sizes the units by it.
+/// Times the covariance analysis of the first cell, or eight runs of it, and sizes the units by it.
 fn probe(
     planned: &mut Planned,
     texts: &ModelTexts,
@@ -278,34 +279,60 @@ fn probe(
     let Some(clock) = options.clock else { return Ok(()) };
     let mut inputs = Inputs::new(planned, observer).with_models(texts);
     let (grid, plan) = (&planned.grid, &planned.plan);
-    let probed = inputs.with_cell(grid.cell(0), |simulation| {
-        let start_s = clock();
-        let runs = plan.study.runs.min(LANES as u64);
-        let results = run_unit(simulation, (0, runs), plan.kept(), &|| true, &|_| {}).unwrap_or_default();
-        let epochs = results.first().map_or(0, |r| r.epochs.len());
-        // Eight runs take as long as one: the lanes of the processor.
-        Ok(((clock() - start_s) / LANES as f64, epochs, simulation.experiment().outages.len()))
-    })?;
-    let (run_s, epochs, outages) = probed;
+    let Probe { run_s, unit } = probed(plan, grid, &mut inputs, (clock, options.threads))?;
+    let epochs = unit.columns.first().map_or(0, |c| c.epochs().len());
     let durations = (0..grid.trajectories.len()).map(|t| inputs.duration_s(t));
     let durations = durations.collect::<Result<Vec<f64>, _>>()?;
     let scale: Vec<f64> = durations.iter().map(|d| d / durations[0]).collect();
     let run_s: Vec<f64> = scale.iter().map(|s| s * run_s).collect();
-    let unit_runs: Vec<u64> = match plan.study.unit_runs {
+    let unit_runs: Vec<u64> = match unit_runs_asked(&plan.study) {
         Some(runs) => vec![runs; run_s.len()],
-        None => run_s.iter().map(|s| unit_runs(*s, plan.study.runs, options.threads)).collect(),
+        None => run_s.iter().map(|s| unit_runs(*s, plan.runs(), options.threads)).collect(),
     };
     // epochs inside outages are as many on any trajectory
     let is_all = plan.kept() == Kept::AllEpochs;
     let bytes_per_cell = |t: usize| {
-        let units = plan.study.runs.div_ceil(unit_runs[t]) as f64;
+        let units = plan.runs().div_ceil(unit_runs[t]) as f64;
         let epochs = if is_all { (epochs as f64 * scale[t]) as usize } else { epochs };
-        units * unit_file::size(grid.columns.len(), unit_runs[t].min(plan.study.runs), outages, epochs)
+        units * unit_file::size(&unit, unit_runs[t].min(plan.runs()), epochs)
     };
     let bytes = (0..run_s.len()).map(bytes_per_cell).sum::<f64>() * grid.per_trajectory() as f64;
     planned.plan.estimate = Estimate { run_s, threads: options.threads, bytes };
     planned.plan.unit_runs = unit_runs;
     Ok(())
+}
+
+/// A first unit, and the processor time of one of its runs (s).
+struct Probe {
+    run_s: f64,
+    unit: UnitResult,
+}
+
+fn probed(
+    plan: &Plan,
+    grid: &Grid,
+    inputs: &mut Inputs<'_>,
+    (clock, threads): (&dyn Fn() -> f64, usize),
+) -> Result<Probe, StudyError> {
+    let runs = plan.runs().min(LANES as u64);
+    let unit = Unit { index: 0, cell: 0, first: 0, runs };
+    let before_s = clock();
+    inputs.with_cell(grid.cell(0), |work| {
+        let start_s = clock();
+        let unit = compute(plan, work, (unit, ""), &|| true, &|_| {})?.expect("nothing stops it");
+        let run_s = match work {
+            // Eight runs take as long as one: the lanes of the processor.
+            Work::Sampling(_) => (clock() - start_s) / LANES as f64,
+            // Setting up takes most of it; columns share the threads.
+            Work::Analysis(_) => (clock() - before_s) * threads.min(grid.columns.len()).max(1) as f64,
+        };
+        Ok(Probe { run_s, unit })
+    })
+}
+
+/// What the study says of the size of units; covariance analysis has one unit a cell.
+const fn unit_runs_asked(study: &Study) -> Option<u64> {
+    if study.is_sampled() { study.unit_runs } else { Some(1) }
 }
 
 /// Runs of a unit that lasts about two minutes on these threads: a multiple of eight.

@@ -2,7 +2,7 @@
 
 use super::directory;
 use super::failure::StudyError;
-use super::inputs::Inputs;
+use super::inputs::{Inputs, Work};
 use super::plan::Unit;
 use super::planned::Planned;
 use super::remark::Remark;
@@ -10,7 +10,6 @@ use super::unit::compute;
 use super::unit_file;
 use crate::lanes::LANES;
 use crate::observer::Observer;
-use crate::simulation;
 use rayon::prelude::*;
 
 /// Units whose position leaves `index` when divided by `count`.
@@ -84,9 +83,9 @@ pub fn run(
             break;
         }
         let cell = planned.grid.cell(of_cell[0].0.cell);
-        inputs.with_cell(cell, |simulation| {
+        inputs.with_cell(cell, |work| {
             for together in of_cell.chunks(at_once(of_cell, options.threads)) {
-                finished += run_units(planned, simulation, together, observer)?;
+                finished += run_units(planned, work, together, observer)?;
             }
             Ok(())
         })?;
@@ -133,13 +132,13 @@ fn at_once(units: &[Named], threads: usize) -> usize {
 /// Computes and writes units of one cell; how many were finished.
 fn run_units(
     planned: &Planned,
-    simulation: &simulation::Plan<'_>,
+    work: &Work<'_>,
     units: &[Named],
     observer: &dyn Observer<Remark>,
 ) -> Result<usize, StudyError> {
     let run_one = |(unit, id): &Named| -> Result<bool, StudyError> {
         let (go_on, progress) = (|| observer.go_on(), |runs| observer.advance(runs));
-        match compute(&planned.plan, simulation, (*unit, id), &go_on, &progress) {
+        match compute(&planned.plan, work, (*unit, id), &go_on, &progress)? {
             Some(result) => Ok(unit_file::write(&planned.directory, &result).map(|()| true)?),
             None => Ok(false),
         }

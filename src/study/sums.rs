@@ -1,13 +1,13 @@
 //! Units added up to cells.
 
-use super::unit::UnitResult;
+use super::unit::{Finding, UnitResult};
 use crate::simulation::RunResult;
 
 /// The sums of a cell as its units come in, in run order.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct CellSums {
-    /// One result a column.
-    pub columns: Vec<RunResult>,
+    /// One finding a column.
+    pub columns: Vec<Finding>,
     /// Runs so far.
     pub runs: u64,
 }
@@ -27,14 +27,20 @@ impl CellSums {
             if !alike {
                 return false;
             }
-            self.columns.iter_mut().zip(unit.columns).for_each(|(sum, part)| sum.append(part));
+            for (sum, part) in self.columns.iter_mut().zip(unit.columns) {
+                if let (Finding::Sampled(sum), Finding::Sampled(part)) = (sum, part) {
+                    sum.append(part);
+                }
+            }
         }
         self.runs += unit.runs;
         true
     }
 }
 
-fn alike(a: &RunResult, b: &RunResult) -> bool {
+/// Whether there is a sum: what is expected of all runs has no second part.
+fn alike(a: &Finding, b: &Finding) -> bool {
+    let (Finding::Sampled(a), Finding::Sampled(b)) = (a, b) else { return false };
     let times = |r: &RunResult| r.epochs.iter().map(|e| e.t_s.to_bits()).collect::<Vec<_>>();
     a.outages == b.outages && a.filter_states == b.filter_states && times(a) == times(b)
 }
@@ -54,7 +60,7 @@ mod tests {
             filter_states: 15,
             ..RunResult::default()
         };
-        UnitResult { id: String::new(), first, runs: 2, columns: vec![column] }
+        UnitResult { id: String::new(), first, runs: 2, columns: vec![Finding::Sampled(column)] }
     }
 
     #[test]
@@ -65,25 +71,32 @@ mod tests {
         for wrong in [0, 2, 6] {
             assert!(!sums.add(unit(wrong)) && sums == before, "runs from {wrong} after 4");
         }
-        assert_eq!((sums.runs, sums.columns[0].epochs[0].count), (4, 4));
-        assert_eq!(sums.columns[0].epochs[0].error_4, [3.0; 9]);
+        let Finding::Sampled(column) = &sums.columns[0] else { unreachable!("runs make sums") };
+        assert_eq!((sums.runs, column.epochs[0].count), (4, 4));
+        assert_eq!(column.epochs[0].error_4, [3.0; 9]);
         assert!(!CellSums::default().add(unit(2)), "the first unit is missing");
     }
 
     #[test]
     fn units_of_another_form_are_refused() {
-        let changes: [fn(&mut UnitResult); 5] = [
-            |u| u.columns[0].outages[0].1 = 391.0,
-            |u| u.columns[0].outages.clear(),
-            |u| u.columns[0].filter_states = 27,
-            |u| u.columns[0].epochs[0].t_s = 2.0,
-            |u| u.columns.clear(),
+        let changes: [fn(&mut RunResult); 4] = [
+            |c| c.outages[0].1 = 391.0,
+            |c| c.outages.clear(),
+            |c| c.filter_states = 27,
+            |c| c.epochs[0].t_s = 2.0,
         ];
-        for (k, change) in changes.iter().enumerate() {
+        let changed = |change: &fn(&mut RunResult)| {
+            let mut other = unit(2);
+            if let Finding::Sampled(column) = &mut other.columns[0] {
+                change(column);
+            }
+            other
+        };
+        let without_columns = UnitResult { columns: Vec::new(), ..unit(2) };
+        for (k, other) in changes.iter().map(changed).chain([without_columns]).enumerate() {
             let mut sums = CellSums::default();
             assert!(sums.add(unit(0)));
-            let (before, mut other) = (sums.clone(), unit(2));
-            change(&mut other);
+            let before = sums.clone();
             assert!(!sums.add(other) && sums == before, "change {k}");
         }
     }

@@ -45,6 +45,8 @@ impl Tables {
 pub(super) struct Texts {
     /// What ratios refer to, in words.
     reference: String,
+    /// The words for its Monte-Carlo intervals, where there are any.
+    intervals: &'static str,
     cells: Vec<ShownCell>,
     more: usize,
 }
@@ -55,7 +57,8 @@ impl Texts {
     pub(super) fn new(planned: &Planned) -> Result<Self, StudyError> {
         let same = if planned.plan.study.filters.len() > 1 { " with the same filter" } else { "" };
         let reference = format!("{}{same}", planned.reference()?.1);
-        Ok(Self { reference, cells: Vec::new(), more: 0 })
+        let intervals = if planned.plan.study.is_sampled() { " ± half the 95 % interval" } else { "" };
+        Ok(Self { reference, intervals, cells: Vec::new(), more: 0 })
     }
 
     pub(super) fn add(&mut self, cell: ShownCell) {
@@ -76,10 +79,10 @@ impl Texts {
         let has_ratios = |cell: &&ShownCell| cell.columns.len() > 1 && cell.columns[0].comparison.is_some();
         for cell in self.cells.iter().filter(has_ratios) {
             text += &format!(
-                "\n\n{}: ASEE relative to {}, mean over the outage of (ratio − 1)·100 ± half the 95 % \
-                 interval (mean of the absolute value), %\n\n",
+                "\n\n{}: ASEE relative to {}, mean over the outage of (ratio − 1)·100{} (mean of the absolute value), %\n\n",
                 markdown(&cell.name),
-                markdown(&self.reference)
+                markdown(&self.reference),
+                self.intervals
             );
             text += &markdown_table(&report::ratio_table(cell, states));
         }

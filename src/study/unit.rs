@@ -1,8 +1,20 @@
-//! One unit of work: some runs of one cell, through all its columns.
+//! One unit of work: some runs of one cell, or its covariance analysis, through all its columns.
 
+use super::failure::StudyError;
+use super::inputs::Work;
 use super::plan::{Kept, Plan, Unit};
+use crate::metrics::{self, EpochMetrics, Expected, Measured, OutageMetrics};
 use crate::monte_carlo;
-use crate::simulation::{self, RunResult};
+use crate::simulation::{self, RunRecord, RunResult};
+
+/// What is found of one column.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Finding {
+    /// By runs: their sums.
+    Sampled(RunResult),
+    /// By covariance analysis: what runs are expected to give.
+    Expected(Expected),
+}
 
 /// What a unit found: a result for each column, its epochs reduced to what is kept.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,8 +25,8 @@ pub struct UnitResult {
     pub first: u64,
     /// Number of runs.
     pub runs: u64,
-    /// One result a column.
-    pub columns: Vec<RunResult>,
+    /// One finding a column.
+    pub columns: Vec<Finding>,
 }
 
 impl UnitResult {
@@ -23,9 +35,67 @@ impl UnitResult {
     #[must_use]
     pub fn fits(&self, unit: Unit, columns: usize, outages: &[(f64, f64)]) -> bool {
         let numbers = || unit.first..unit.first + unit.runs;
-        let column_fits = |c: &RunResult| c.outages == outages && c.runs.iter().map(|r| r.run).eq(numbers());
+        let column_fits =
+            |c: &Finding| c.windows() == outages && c.records().iter().map(|r| r.run).eq(numbers());
         (self.first, self.runs, self.columns.len()) == (unit.first, unit.runs, columns)
             && self.columns.iter().all(column_fits)
+    }
+}
+
+impl Finding {
+    /// Outages (start, end) (s).
+    #[must_use]
+    pub fn windows(&self) -> Vec<(f64, f64)> {
+        match self {
+            Self::Sampled(result) => result.outages.clone(),
+            Self::Expected(expected) => expected.outages.iter().map(|o| (o.start_s, o.end_s)).collect(),
+        }
+    }
+
+    /// One record a run; that which stands for all runs in a covariance analysis.
+    #[must_use]
+    pub fn records(&self) -> &[RunRecord] {
+        match self {
+            Self::Sampled(result) => &result.runs,
+            Self::Expected(expected) => std::slice::from_ref(&expected.record),
+        }
+    }
+
+    /// Statistics of the outages.
+    #[must_use]
+    pub fn outages(&self) -> Vec<OutageMetrics> {
+        match self {
+            Self::Sampled(result) => metrics::outages(result),
+            Self::Expected(expected) => expected.outages.clone(),
+        }
+    }
+
+    /// Statistics of the epochs that were kept.
+    #[must_use]
+    pub fn epochs(&self) -> Vec<EpochMetrics> {
+        match self {
+            Self::Sampled(result) => metrics::epochs(result),
+            Self::Expected(expected) => expected.epochs.clone(),
+        }
+    }
+
+    /// What ratios and the verdict are made of.
+    #[must_use]
+    pub fn measured(&self) -> Measured {
+        match self {
+            Self::Sampled(result) => result.into(),
+            Self::Expected(expected) => expected.into(),
+        }
+    }
+
+    fn reduce(&mut self, kept: Kept) {
+        let windows = self.windows();
+        let inside = |t_s: f64| windows.iter().any(|(start, end)| *start <= t_s && t_s < *end);
+        let keeps = |t_s: f64| kept == Kept::AllEpochs || (kept == Kept::OutageEpochs && inside(t_s));
+        match self {
+            Self::Sampled(result) => result.epochs.retain(|e| keeps(e.t_s)),
+            Self::Expected(expected) => expected.epochs.retain(|e| keeps(e.t_s)),
+        }
     }
 }
 
@@ -38,30 +108,35 @@ pub fn run_unit(
     kept: Kept,
     go_on: &(dyn Fn() -> bool + Sync),
     progress: &(dyn Fn(u64) + Sync),
-) -> Option<Vec<RunResult>> {
-    let mut results = monte_carlo::run_range(plan, first, runs, go_on, progress)?;
-    results.iter_mut().for_each(|r| reduce(kept, r));
-    Some(results)
+) -> Option<Vec<Finding>> {
+    let results = monte_carlo::run_range(plan, first, runs, go_on, progress)?;
+    Some(reduced(kept, results.into_iter().map(Finding::Sampled)))
+}
+
+fn reduced(kept: Kept, findings: impl Iterator<Item = Finding>) -> Vec<Finding> {
+    let mut findings: Vec<Finding> = findings.collect();
+    findings.iter_mut().for_each(|finding| finding.reduce(kept));
+    findings
 }
 
 /// The result of a unit; `None` if `go_on` said no on the way.
 pub(super) fn compute(
     plan: &Plan,
-    simulation: &simulation::Plan<'_>,
+    work: &Work<'_>,
     (unit, id): (Unit, &str),
     go_on: &(dyn Fn() -> bool + Sync),
     progress: &(dyn Fn(u64) + Sync),
-) -> Option<UnitResult> {
-    let columns = run_unit(simulation, (unit.first, unit.runs), plan.kept(), go_on, progress)?;
-    Some(UnitResult { id: id.to_owned(), first: unit.first, runs: unit.runs, columns })
-}
-
-fn reduce(kept: Kept, result: &mut RunResult) {
-    let outages = result.outages.clone();
-    let inside = |t_s: f64| outages.iter().any(|(start, end)| *start <= t_s && t_s < *end);
-    match kept {
-        Kept::AllEpochs => {}
-        Kept::OutageEpochs => result.epochs.retain(|e| inside(e.t_s)),
-        Kept::Runs => result.epochs.clear(),
-    }
+) -> Result<Option<UnitResult>, StudyError> {
+    let columns = match work {
+        Work::Sampling(simulation) => {
+            run_unit(simulation, (unit.first, unit.runs), plan.kept(), go_on, progress)
+        }
+        Work::Analysis(analysis) => {
+            let expected = analysis.expected()?;
+            progress(unit.runs);
+            Some(reduced(plan.kept(), expected.into_iter().map(Finding::Expected)))
+        }
+    };
+    let named = |columns| UnitResult { id: id.to_owned(), first: unit.first, runs: unit.runs, columns };
+    Ok(columns.map(named))
 }

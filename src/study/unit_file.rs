@@ -1,12 +1,17 @@
 //! Unit files of studies: what a unit found, as bytes with a checksum.
 //!
 //! `nav-sim unit 3\n`, the length of the head (u32), the head (JSON), the numbers (little-endian f64 and
-//! u64: for each column its runs, then its epochs), BLAKE3 of all before. A file that is cut off or changed
+//! u64: for each column its runs, then its epochs; of a covariance analysis what it expects), BLAKE3 of all before. A file that is cut off or changed
 //! in one bit is no unit file.
 
-use super::unit::UnitResult;
+use super::unit::{Finding, UnitResult};
+use super::unit_words::{
+    EPOCH, EXPECTED_EPOCH, EXPECTED_OUTAGE, OUTAGE, RUN, Words, epoch, expected_epoch, expected_outage,
+    put_epoch, put_expected, put_run, run,
+};
 use crate::formats::{FileError, atomic};
-use crate::simulation::{EpochSums, OutageRecord, REPORTED, RunRecord, RunResult};
+use crate::metrics::Expected;
+use crate::simulation::RunResult;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::io;
@@ -14,10 +19,6 @@ use std::path::{Path, PathBuf};
 
 const MAGIC: &[u8] = b"nav-sim unit 3\n";
 const CHECKSUM: usize = 32;
-/// Numbers of an outage record, an epoch, and a run without its outages.
-const OUTAGE: usize = 3 * REPORTED + 4;
-const EPOCH: usize = 4 + 5 * REPORTED + 6;
-const RUN: usize = 7 + REPORTED;
 
 /// A unit file that cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -54,15 +55,78 @@ struct Head {
     columns: Vec<ColumnHead>,
 }
 
+#[derive(Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Method {
+    Sampled,
+    Expected,
+}
+
 #[derive(Serialize, Deserialize)]
 struct ColumnHead {
+    method: Method,
     outages: Vec<(f64, f64)>,
     filter_states: usize,
     fix_components: usize,
     coverage_level: f64,
     run_epochs: u64,
     independent_windows: Option<f64>,
+    seed: u64,
     epochs: usize,
+}
+
+impl From<&RunResult> for ColumnHead {
+    fn from(r: &RunResult) -> Self {
+        Self {
+            method: Method::Sampled,
+            outages: r.outages.clone(),
+            filter_states: r.filter_states,
+            fix_components: r.fix_components,
+            coverage_level: r.coverage_level,
+            run_epochs: r.run_epochs,
+            independent_windows: r.independent_windows,
+            seed: 0,
+            epochs: r.epochs.len(),
+        }
+    }
+}
+
+impl From<&Expected> for ColumnHead {
+    fn from(e: &Expected) -> Self {
+        Self {
+            method: Method::Expected,
+            outages: e.outages.iter().map(|o| (o.start_s, o.end_s)).collect(),
+            filter_states: e.filter_states,
+            fix_components: e.fix_components,
+            coverage_level: e.coverage_level,
+            run_epochs: 0,
+            independent_windows: None,
+            seed: e.seed,
+            epochs: e.epochs.len(),
+        }
+    }
+}
+
+impl From<&Finding> for ColumnHead {
+    fn from(finding: &Finding) -> Self {
+        match finding {
+            Finding::Sampled(result) => result.into(),
+            Finding::Expected(expected) => expected.into(),
+        }
+    }
+}
+
+impl ColumnHead {
+    /// How many numbers follow for so many runs; `None` beyond what memory has.
+    fn words(&self, runs: usize) -> Option<usize> {
+        let outages = self.outages.len();
+        let (outage, epoch) = match self.method {
+            Method::Sampled => (0, EPOCH),
+            Method::Expected => (outages * EXPECTED_OUTAGE, EXPECTED_EPOCH),
+        };
+        let of_runs = runs.checked_mul(RUN + outages * OUTAGE)?;
+        of_runs.checked_add(outage)?.checked_add(self.epochs.checked_mul(epoch)?)
+    }
 }
 
 /// Where a unit's file stands in a study directory: `units/ab/abcd….unit`.
@@ -71,11 +135,12 @@ pub fn path(directory: &Path, id: &str) -> PathBuf {
     directory.join("units").join(id.get(..2).unwrap_or("00")).join(format!("{id}.unit"))
 }
 
-/// Size of a unit's file (bytes, without the head): `outages` and `epochs` of one run in each column.
+/// Size (bytes, without the head) of the file of a unit like this one, with so many runs, and so many epochs in each
+/// column.
 #[must_use]
-pub fn size(columns: usize, runs: u64, outages: usize, epochs: usize) -> f64 {
-    let numbers = runs as f64 * (RUN + outages * OUTAGE) as f64 + (epochs * EPOCH) as f64;
-    400.0 + columns as f64 * (100.0 + 8.0 * numbers)
+pub fn size(like: &UnitResult, runs: u64, epochs: usize) -> f64 {
+    let words = |finding: &Finding| ColumnHead { epochs, ..finding.into() }.words(runs as usize).unwrap_or(0);
+    400.0 + like.columns.iter().map(|column| 100.0 + 8.0 * words(column) as f64).sum::<f64>()
 }
 
 /// Writes a unit; a directory in its place is set aside as `….unit.damaged`. Where another process has written the
@@ -118,59 +183,24 @@ pub fn read(directory: &Path, id: &str) -> Result<UnitResult, UnitFileError> {
 /// The bytes of a unit.
 #[must_use]
 pub fn encode(unit: &UnitResult) -> Vec<u8> {
-    let head = |r: &RunResult| ColumnHead {
-        outages: r.outages.clone(),
-        filter_states: r.filter_states,
-        fix_components: r.fix_components,
-        coverage_level: r.coverage_level,
-        run_epochs: r.run_epochs,
-        independent_windows: r.independent_windows,
-        epochs: r.epochs.len(),
-    };
-    let columns = unit.columns.iter().map(head).collect();
+    let columns = unit.columns.iter().map(ColumnHead::from).collect();
     let head = Head { id: unit.id.clone(), first: unit.first, runs: unit.runs, columns };
     let json = serde_json::to_vec(&head).expect("plain structs are always JSON");
     let mut bytes = MAGIC.to_vec();
     bytes.extend((json.len() as u32).to_le_bytes());
     bytes.extend(json);
     for column in &unit.columns {
-        column.runs.iter().for_each(|run| put_run(&mut bytes, run));
-        column.epochs.iter().for_each(|epoch| put_epoch(&mut bytes, epoch));
+        match column {
+            Finding::Sampled(result) => {
+                result.runs.iter().for_each(|run| put_run(&mut bytes, run));
+                result.epochs.iter().for_each(|epoch| put_epoch(&mut bytes, epoch));
+            }
+            Finding::Expected(expected) => put_expected(&mut bytes, expected),
+        }
     }
     let checksum = blake3::hash(&bytes);
     bytes.extend(checksum.as_bytes());
     bytes
-}
-
-fn put(bytes: &mut Vec<u8>, values: &[f64]) {
-    values.iter().for_each(|v| bytes.extend(v.to_le_bytes()));
-}
-
-fn put_run(bytes: &mut Vec<u8>, run: &RunRecord) {
-    for word in [run.run, u64::from(run.diverged), run.nis.1, run.rejected] {
-        bytes.extend(word.to_le_bytes());
-    }
-    put(bytes, &[run.nis.0, run.nees_mean, run.covered]);
-    put(bytes, &run.normalised_sq);
-    for o in &run.outages {
-        put(bytes, &o.see_mean);
-        put(bytes, &o.see_end);
-        put(bytes, &o.error_end);
-        put(bytes, &[o.nees_end, o.log_density_end, o.horizontal_error_end_m, o.reconvergence_s]);
-    }
-}
-
-fn put_epoch(bytes: &mut Vec<u8>, e: &EpochSums) {
-    for word in [u64::from(e.gnss), e.count, e.covered] {
-        bytes.extend(word.to_le_bytes());
-    }
-    put(bytes, &[e.t_s]);
-    for sums in [&e.see, &e.see_sq, &e.error, &e.error_sq, &e.error_4] {
-        put(bytes, sums);
-    }
-    for sums in [&e.pos_error, &e.att_error, &e.nees] {
-        put(bytes, sums);
-    }
 }
 
 /// A unit from its bytes.
@@ -199,15 +229,18 @@ pub fn decode(bytes: &[u8]) -> Result<UnitResult, &'static str> {
 /// Bytes of the numbers that the head announces; `None` beyond what memory has.
 fn announced(head: &Head) -> Option<usize> {
     let runs = usize::try_from(head.runs).ok()?;
-    let words_of_column = |c: &ColumnHead| {
-        let words_of_runs = runs.checked_mul(RUN + c.outages.len() * OUTAGE)?;
-        words_of_runs.checked_add(c.epochs.checked_mul(EPOCH)?)
-    };
-    let mut columns = head.columns.iter().map(words_of_column);
+    let mut columns = head.columns.iter().map(|column| column.words(runs));
     columns.try_fold(0_usize, |sum, words| sum.checked_add(words?))?.checked_mul(8)
 }
 
-fn column(head: ColumnHead, runs: u64, words: &mut Words<'_>) -> RunResult {
+fn column(head: ColumnHead, runs: u64, words: &mut Words<'_>) -> Finding {
+    match head.method {
+        Method::Sampled => Finding::Sampled(sampled(head, runs, words)),
+        Method::Expected => Finding::Expected(expected(&head, words)),
+    }
+}
+
+fn sampled(head: ColumnHead, runs: u64, words: &mut Words<'_>) -> RunResult {
     let runs = (0..runs).map(|_| run(head.outages.len(), words)).collect();
     let epochs = (0..head.epochs).map(|_| epoch(words)).collect();
     RunResult {
@@ -222,63 +255,24 @@ fn column(head: ColumnHead, runs: u64, words: &mut Words<'_>) -> RunResult {
     }
 }
 
-/// Eight bytes at a time; the length was checked before.
-struct Words<'a>(&'a [u8]);
-
-impl Words<'_> {
-    fn int(&mut self) -> u64 {
-        let Some((word, rest)) = self.0.split_first_chunk::<8>() else { return 0 };
-        self.0 = rest;
-        u64::from_le_bytes(*word)
-    }
-
-    fn float(&mut self) -> f64 {
-        f64::from_bits(self.int())
-    }
-
-    fn floats<const N: usize>(&mut self) -> [f64; N] {
-        std::array::from_fn(|_| self.float())
-    }
-}
-
-fn run(outages: usize, words: &mut Words<'_>) -> RunRecord {
-    let (run, diverged, fixes, rejected) = (words.int(), words.int() != 0, words.int(), words.int());
-    let nis = (words.float(), fixes);
-    let (nees_mean, covered, normalised_sq) = (words.float(), words.float(), words.floats());
-    let outage = |_| OutageRecord {
-        see_mean: words.floats(),
-        see_end: words.floats(),
-        error_end: words.floats(),
-        nees_end: words.float(),
-        log_density_end: words.float(),
-        horizontal_error_end_m: words.float(),
-        reconvergence_s: words.float(),
-    };
-    let outages = (0..outages).map(outage).collect();
-    RunRecord { run, diverged, outages, nis, rejected, nees_mean, covered, normalised_sq }
-}
-
-fn epoch(words: &mut Words<'_>) -> EpochSums {
-    let (gnss, count, covered) = (words.int() != 0, words.int(), words.int());
-    EpochSums {
-        gnss,
-        count,
-        covered,
-        t_s: words.float(),
-        see: words.floats(),
-        see_sq: words.floats(),
-        error: words.floats(),
-        error_sq: words.floats(),
-        error_4: words.floats(),
-        pos_error: words.floats(),
-        att_error: words.floats(),
-        nees: words.floats(),
+fn expected(head: &ColumnHead, words: &mut Words<'_>) -> Expected {
+    let record = run(head.outages.len(), words);
+    let outages = head.outages.iter().map(|window| expected_outage(*window, words)).collect();
+    Expected {
+        epochs: (0..head.epochs).map(|_| expected_epoch(words)).collect(),
+        record,
+        outages,
+        filter_states: head.filter_states,
+        fix_components: head.fix_components,
+        coverage_level: head.coverage_level,
+        seed: head.seed,
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::simulation::{EpochSums, OutageRecord, RunRecord};
 
     fn unit() -> UnitResult {
         let value = |k: usize| (k as f64 + 0.1).sqrt();
@@ -311,15 +305,17 @@ mod tests {
             covered: 1,
             ..EpochSums::default()
         };
-        let column = |states: usize| RunResult {
-            epochs: (0..3).map(epoch).collect(),
-            runs: (0..2).map(run).collect(),
-            outages: vec![(0.1, 0.3), (1.0 / 3.0, 5.0)],
-            filter_states: states,
-            fix_components: 6,
-            coverage_level: 0.95,
-            run_epochs: 180_000,
-            independent_windows: Some(5.8),
+        let column = |states: usize| {
+            Finding::Sampled(RunResult {
+                epochs: (0..3).map(epoch).collect(),
+                runs: (0..2).map(run).collect(),
+                outages: vec![(0.1, 0.3), (1.0 / 3.0, 5.0)],
+                filter_states: states,
+                fix_components: 6,
+                coverage_level: 0.95,
+                run_epochs: 180_000,
+                independent_windows: Some(5.8),
+            })
         };
         UnitResult { id: "ab12".into(), first: 16, runs: 2, columns: vec![column(15), column(27)] }
     }
@@ -336,7 +332,7 @@ mod tests {
     #[test]
     fn the_size_is_foretold() {
         let bytes = encode(&unit()).len() as f64;
-        assert!((size(2, 2, 2, 3) / bytes - 1.0).abs() < 0.1, "{bytes}");
+        assert!((size(&unit(), 2, 3) / bytes - 1.0).abs() < 0.1, "{bytes}");
     }
 
     #[test]
@@ -357,6 +353,8 @@ mod tests {
     fn a_head_that_announces_more_than_there_is_is_refused() {
         let forged = |runs: u64, epochs: usize| {
             let mut column = ColumnHead {
+                method: Method::Sampled,
+                seed: 0,
                 outages: Vec::new(),
                 filter_states: 15,
                 fix_components: 6,

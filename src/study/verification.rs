@@ -55,9 +55,9 @@ pub fn verify(
     for (unit, id) in &chosen {
         let found = unit_file::read(&planned.directory, id)?;
         let cell = planned.grid.cell(unit.cell);
-        let again = inputs.with_cell(cell, |simulation| {
+        let again = inputs.with_cell(cell, |work| {
             let progress = |runs| observer.advance(runs);
-            Ok(compute(&planned.plan, simulation, (*unit, id), &|| true, &progress))
+            compute(&planned.plan, work, (*unit, id), &|| true, &progress)
         })?;
         if again.is_none_or(|again| unit_file::encode(&again) != unit_file::encode(&found)) {
             different.push(format!("{id} ({})", planned.grid.names(cell).join(", ")));

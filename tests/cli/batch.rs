@@ -111,7 +111,13 @@ fn damaged_units_are_noticed_and_computed_again() {
 /// are damaged, and `run` mends them.
 #[test]
 fn what_stands_in_the_place_of_a_unit_is_computed_again() {
-    use nav_sim::study::unit_file;
+    use nav_sim::study::{Finding, unit_file};
+    fn sampled(finding: &mut Finding) -> &mut nav_sim::simulation::RunResult {
+        match finding {
+            Finding::Sampled(result) => result,
+            Finding::Expected(_) => panic!("a study of runs"),
+        }
+    }
     let place = place();
     let dir = place.path();
     let undisturbed = whole(dir, "out");
@@ -125,13 +131,13 @@ fn what_stands_in_the_place_of_a_unit_is_computed_again() {
         change(&mut unit);
         fs::write(file, unit_file::encode(&unit)).unwrap();
     };
-    forge(&files[7], &|unit| unit.columns[1].runs[0].run += 1);
+    forge(&files[7], &|unit| sampled(&mut unit.columns[1]).runs[0].run += 1);
     let has_outages = |file: &&std::path::PathBuf| {
         let id = file.file_stem().unwrap().to_str().unwrap();
-        unit_file::read(&dir.join("out"), id).is_ok_and(|unit| !unit.columns[0].outages.is_empty())
+        unit_file::read(&dir.join("out"), id).is_ok_and(|unit| !unit.columns[0].windows().is_empty())
     };
     let other = files[8..].iter().find(has_outages).unwrap();
-    forge(other, &|unit| unit.columns.iter_mut().for_each(|c| c.outages[0].1 += 1.0));
+    forge(other, &|unit| unit.columns.iter_mut().for_each(|c| sampled(c).outages[0].1 += 1.0));
     fs::remove_dir_all(dir.join("out/results")).unwrap();
     refused(dir, "merge study.toml -o out", 75);
     let said = done(dir, "run study.toml -o out");

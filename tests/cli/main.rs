@@ -14,6 +14,7 @@ mod common;
 
 mod batch;
 mod batch_kills;
+mod batch_lincov;
 mod calibrate;
 mod choose;
 mod command_line;

@@ -3,7 +3,7 @@
 
 use nav_sim::earth::{GravityModel, gravity_down};
 use nav_sim::ekf::FilterStates;
-use nav_sim::metrics::{Budget, Estimate, Expected, Frame, epochs};
+use nav_sim::metrics::{Budget, Estimate, Expected, epochs};
 use nav_sim::monte_carlo;
 use nav_sim::noise::{Ar1, Composite, Drift, Model, Process, Quantization, RandomWalk, White};
 use nav_sim::scenario::Scenario;
@@ -72,17 +72,9 @@ fn assert_agree(name: &str, scenario: &str, truth: &Model) {
     let beliefs = [scenario.belief(&believed, &outages, &track).unwrap()];
     let experiment = scenario.experiment(&path, Truth::Model(truth), &beliefs, &outages, 11);
     let sampled = &monte_carlo::run(&experiment, RUNS, &|_| {}).unwrap()[0];
-    let frame = Frame {
-        outages: &sampled.outages,
-        filter_states: beliefs[0].states,
-        fix_components: 6,
-        coverage_level: 0.95,
-        seed: 11,
-    };
-    let sources = TruthSide::together(&TruthSide::sources(&experiment, truth));
-    let expected = Expected::of(&FilterPass::new(&track, &beliefs[0]).errors(&sources), &frame).unwrap();
+    let expected = Expected::along(&track, &experiment, &beliefs[0], truth).unwrap();
     assert_epochs_agree(name, sampled, &expected);
-    assert_outage_agrees(name, sampled, &expected, &frame);
+    assert_outage_agrees(name, sampled, &expected);
     let nis = Estimate::mean_of(sampled.runs.iter().map(|r| r.nis.0), None);
     let z = (nis.value - expected.record.nis.0) / nis.std_error;
     assert!(z.abs() < BOUND, "{name}: NIS {} {}", nis.value, expected.record.nis.0);
@@ -126,8 +118,8 @@ fn assert_epochs_agree(name: &str, sampled: &RunResult, expected: &Expected) {
 }
 
 /// At the outage's end: RMSE, NEES, and as many runs below each quantile as a binomial law allows.
-fn assert_outage_agrees(name: &str, sampled: &RunResult, expected: &Expected, frame: &Frame<'_>) {
-    let summary = expected.summary(frame);
+fn assert_outage_agrees(name: &str, sampled: &RunResult, expected: &Expected) {
+    let summary = expected.summary();
     let outage = &summary.outages[0];
     let records = || sampled.runs.iter().map(|r| &r.outages[0]);
     for i in 0..9 {

@@ -50,23 +50,26 @@ fn report(planned: &Planned, session: &Session) {
     let units = plan.unit_count(grid);
     let total_s = planned.processor_s();
     let wall_s = total_s / plan.estimate.threads.max(1) as f64;
+    let runs = if plan.study.is_sampled() { plan.study.runs } else { 0 };
     if session.json() {
         let json = json!({
             "schema_version": 1, "plan": plan.id(), "seed": plan.seed, "cells": grid.len(),
-            "columns": grid.columns.len(), "runs": plan.study.runs, "units": units, "unit_runs": plan.unit_runs,
+            "columns": grid.columns.len(), "method": plan.study.method, "runs": runs, "units": units, "unit_runs": plan.unit_runs,
             "processor_s": total_s, "wall_s": wall_s, "threads": plan.estimate.threads,
             "disk_bytes": plan.estimate.bytes,
         });
         session.printer.result(&json.to_string());
         return;
     }
+    let seed = plan.seed;
+    let (work, cut) = match plan.study.is_sampled() {
+        true => (format!("× {runs} runs"), format!(" of {} runs", range(&plan.unit_runs))),
+        false => ("by covariance analysis".to_owned(), String::new()),
+    };
     session.printer.result(&format!(
-        "{} cells × {} columns × {} runs, seed {}: {units} units of {} runs\nabout {} on {} threads, {} on disk",
+        "{} cells × {} columns {work}, seed {seed}: {units} units{cut}\nabout {} on {} threads, {} on disk",
         grid.len(),
         grid.columns.len(),
-        plan.study.runs,
-        plan.seed,
-        range(&plan.unit_runs),
         duration(wall_s),
         plan.estimate.threads,
         size(plan.estimate.bytes)

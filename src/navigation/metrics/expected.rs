@@ -1,14 +1,15 @@
 //! What a covariance analysis says: the figures that runs would scatter about, without a run.
 
 use super::epoch::{Accuracy, EpochMetrics};
-use super::estimate::{Estimate, PerState};
+use super::estimate::{Estimate, PerState, Quantile};
+use super::outage::{OutageMetrics, Reconvergence};
 use super::quadratic_form::QuadraticForm;
-use super::summary::{
-    AccuracySummary, Consistency, Coverage, Nis, OutageSummary, Recovery, SCHEMA_VERSION, Spread, Summary,
-};
+use super::summary::{AccuracySummary, Consistency, Coverage, Nis, OutageSummary, SCHEMA_VERSION, Summary};
 use super::verdict::Verdict;
-use crate::simulation::lincov::{ErrorLaw, Instant};
-use crate::simulation::{COVERAGE_DOF, NEES_DOF, OutageRecord, REPORTED, RunRecord};
+use crate::ekf::Belief;
+use crate::noise::Model;
+use crate::simulation::lincov::{ErrorLaw, FilterPass, Instant, Track, TruthSide};
+use crate::simulation::{COVERAGE_DOF, Experiment, NEES_DOF, OutageRecord, REPORTED, RunRecord};
 use crate::units::DEG;
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -25,15 +26,8 @@ pub struct Expected {
     pub epochs: Vec<EpochMetrics>,
     /// A run whose squares are the expected ones: it stands for all runs where runs are compared.
     pub record: RunRecord,
-    outages: Vec<OutageSummary>,
-    nis: (f64, u64),
-}
-
-/// What a covariance analysis does not know of its experiment.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame<'a> {
-    /// Outages (start, end) (s).
-    pub outages: &'a [(f64, f64)],
+    /// Outages in time order.
+    pub outages: Vec<OutageMetrics>,
     /// States of the filter.
     pub filter_states: usize,
     /// Components of a fix.
@@ -45,22 +39,34 @@ pub struct Frame<'a> {
 }
 
 impl Expected {
-    /// From the law of the errors along the track; none where a covariance did not stay finite and positive.
+    /// Of a filter in an experiment whose inertial errors `truth` makes, along the experiment's track; none where a
+    /// covariance did not stay finite and positive.
     #[must_use]
-    pub fn of(law: &ErrorLaw, frame: &Frame<'_>) -> Option<Self> {
+    pub fn along(track: &Track, experiment: &Experiment<'_>, belief: &Belief, truth: &Model) -> Option<Self> {
+        let truth = TruthSide::together(&TruthSide::sources(experiment, truth));
+        let law = FilterPass::new(track, belief).errors(&truth);
         let chi2 = ChiSquared::new(COVERAGE_DOF as f64).expect("degrees of freedom are positive");
-        let limit = chi2.inverse_cdf(frame.coverage_level);
+        let limit = chi2.inverse_cdf(experiment.coverage_level);
         let epochs: Vec<EpochMetrics> =
             law.reports.iter().map(|instant| epoch(instant, limit)).collect::<Option<_>>()?;
-        let ends = frame.outages.iter().zip(&law.outage_ends);
-        let outages: Vec<OutageSummary> = ends.map(|(window, end)| outage(*window, end, &epochs)).collect();
-        let record = record(&epochs, law, &outages);
-        record.nees_mean.is_finite().then_some(Self { epochs, record, outages, nis: law.nis })
+        let ends = experiment.outages.iter().zip(&law.outage_ends);
+        let outages: Vec<OutageMetrics> =
+            ends.map(|(window, end)| outage((window.start_s, window.end_s), end, &epochs)).collect();
+        let record = record(&epochs, &law, &outages);
+        record.nees_mean.is_finite().then_some(Self {
+            epochs,
+            record,
+            outages,
+            filter_states: belief.states,
+            fix_components: experiment.gnss.components(),
+            coverage_level: experiment.coverage_level,
+            seed: experiment.seed,
+        })
     }
 
     /// The summary: as that of runs, without what only runs have (null).
     #[must_use]
-    pub fn summary(&self, frame: &Frame<'_>) -> Summary {
+    pub fn summary(&self) -> Summary {
         let verdict = Verdict::expected(&self.record);
         let unknown = f64::NAN;
         Summary {
@@ -71,10 +77,10 @@ impl Expected {
             diverged: 0,
             diverged_runs: Vec::new(),
             independent_runs: verdict.independent_runs,
-            filter_states: frame.filter_states,
-            seed: frame.seed,
+            filter_states: self.filter_states,
+            seed: self.seed,
             accuracy: AccuracySummary::from(&Accuracy::over(self.epochs.iter())),
-            outages: self.outages.clone(),
+            outages: self.outages.iter().map(OutageSummary::from).collect(),
             nees: Consistency {
                 dof: NEES_DOF,
                 mean: self.record.nees_mean,
@@ -83,15 +89,15 @@ impl Expected {
                 fraction_inside: unknown,
             },
             nis: Nis {
-                dof: frame.fix_components,
-                mean: self.nis.0 / self.nis.1 as f64,
+                dof: self.fix_components,
+                mean: if self.record.nis.1 > 0 { self.record.nis.0 } else { unknown },
                 lower95: unknown,
                 upper95: unknown,
-                fixes: self.nis.1,
+                fixes: self.record.nis.1,
                 rejected: 0,
             },
             coverage: Coverage {
-                level: frame.coverage_level,
+                level: self.coverage_level,
                 mean: self.record.covered,
                 lower95: unknown,
                 upper95: unknown,
@@ -147,53 +153,41 @@ fn epoch(instant: &Instant, limit: f64) -> Option<EpochMetrics> {
     })
 }
 
-fn outage((start_s, end_s): (f64, f64), end: &Instant, epochs: &[EpochMetrics]) -> OutageSummary {
+fn outage((start_s, end_s): (f64, f64), end: &Instant, epochs: &[EpochMetrics]) -> OutageMetrics {
     // a nanosecond of slack: sample times are multiples of 1/rate, outage times are typed
     let inside = epochs.iter().filter(|e| start_s <= e.t_s + 1e-9 && e.t_s + 1e-9 < end_s);
     let mean = Accuracy::over(inside);
-    let values = |all: &PerState<Estimate>| PerState(all.0.map(|e| e.value));
-    let none = PerState([0.0; REPORTED]);
+    let without_error = |all: &PerState<Estimate>| PerState(all.0.map(|e| exact(e.value)));
     let horizontal = square(end, &[0, 1]);
-    let quantile = |p: f64| horizontal.quantile(p).sqrt();
-    OutageSummary {
+    let root = |p: f64| horizontal.quantile(p).sqrt();
+    let quantile = |value: f64| Quantile { value, ci95: (None, None) };
+    OutageMetrics {
         start_s,
         end_s,
-        asee_mean: values(&mean.asee_mean),
-        asee_mean_std_error: none,
-        rmse_mean: values(&mean.rmse_mean),
-        rmse_mean_std_error: none,
-        asee_end: PerState(end.sigma()),
-        asee_end_std_error: none,
-        rmse_end: PerState(end.rmse()),
-        rmse_end_std_error: none,
-        nees_end: end.consistency().nees,
-        nees_end_std_error: 0.0,
-        log_density_end: end.consistency().log_density,
-        log_density_end_std_error: 0.0,
-        horizontal_error_end_m: Spread {
-            p50: quantile(0.5),
-            p95: quantile(0.95),
-            p999: Some(quantile(NEARLY_ALL)),
-            max: f64::NAN,
-            p50_ci95: (None, None),
-            p95_ci95: (None, None),
-        },
-        reconvergence_s: Recovery { p50: f64::NAN, p95: f64::NAN, never: None },
-        budget: None,
-        believed_budget: None,
+        asee_mean: without_error(&mean.asee_mean),
+        rmse_mean: without_error(&mean.rmse_mean),
+        asee_end: exactly(end.sigma()),
+        rmse_end: exactly(end.rmse()),
+        nees_end: exact(end.consistency().nees),
+        log_density_end: exact(end.consistency().log_density),
+        horizontal_p50_m: quantile(root(0.5)),
+        horizontal_p95_m: quantile(root(0.95)),
+        horizontal_p999_m: Some(root(NEARLY_ALL)),
+        horizontal_max_m: f64::NAN,
+        reconvergence: Reconvergence { p50_s: quantile(f64::NAN), p95_s: quantile(f64::NAN), never: None },
     }
 }
 
 /// The run whose squares are the expected ones.
-fn record(epochs: &[EpochMetrics], law: &ErrorLaw, outages: &[OutageSummary]) -> RunRecord {
+fn record(epochs: &[EpochMetrics], law: &ErrorLaw, outages: &[OutageMetrics]) -> RunRecord {
     let mean =
         |value: &dyn Fn(&EpochMetrics) -> f64| epochs.iter().map(value).sum::<f64>() / epochs.len() as f64;
-    let of_outage = |o: &OutageSummary| OutageRecord {
-        see_mean: o.asee_mean.0,
-        see_end: o.asee_end.0,
-        error_end: o.rmse_end.0,
-        nees_end: o.nees_end,
-        log_density_end: o.log_density_end,
+    let of_outage = |o: &OutageMetrics| OutageRecord {
+        see_mean: o.asee_mean.0.map(|e| e.value),
+        see_end: o.asee_end.0.map(|e| e.value),
+        error_end: o.rmse_end.0.map(|e| e.value),
+        nees_end: o.nees_end.value,
+        log_density_end: o.log_density_end.value,
         horizontal_error_end_m: f64::NAN,
         reconvergence_s: f64::NAN,
     };

@@ -23,7 +23,7 @@ pub use budget::Budget;
 pub use consistency::{Band, chi_square_band, chi_square_interval, coverage_band};
 pub use epoch::{Accuracy, EpochMetrics, epochs};
 pub use estimate::{Estimate, PerState, Quantile, SampleSize, quantile};
-pub use expected::{Expected, Frame};
+pub use expected::Expected;
 pub use outage::{OutageMetrics, Reconvergence, outages};
 pub use quadratic_form::QuadraticForm;
 pub use ratio::{ComparisonError, EpochRow, Measured, OutageComparison, RatioError, StateRatio, compare};

@@ -27,7 +27,9 @@ pub struct OutageMetrics {
     pub horizontal_p50_m: Quantile,
     /// 95 % quantile.
     pub horizontal_p95_m: Quantile,
-    /// Largest.
+    /// 99.9 % quantile; of a covariance analysis only.
+    pub horizontal_p999_m: Option<f64>,
+    /// Largest; NaN of a covariance analysis, whose law has no end.
     pub horizontal_max_m: f64,
     /// How soon the runs recover.
     pub reconvergence: Reconvergence,
@@ -40,8 +42,9 @@ pub struct Reconvergence {
     pub p50_s: Quantile,
     /// 95 % quantile over the runs that recover.
     pub p95_s: Quantile,
-    /// Runs that do not recover before the trajectory or the next outage ends their chance.
-    pub never: u64,
+    /// Runs that do not recover before the trajectory or the next outage ends their chance; none of a covariance
+    /// analysis, which follows no run.
+    pub never: Option<u64>,
 }
 
 /// Statistics of every outage, diverged runs left out.
@@ -79,11 +82,12 @@ fn outage((start_s, end_s): (f64, f64), records: &[&OutageRecord], windows: Opti
         rmse_end: per_state(&|i| mean(&|r| r.error_end[i].powi(2)).root()),
         horizontal_p50_m: quantile(&horizontal, 0.5, windows),
         horizontal_p95_m: quantile(&horizontal, 0.95, windows),
+        horizontal_p999_m: None,
         horizontal_max_m: horizontal.last().copied().unwrap_or(f64::NAN),
         reconvergence: Reconvergence {
             p50_s: quantile(&recovery, 0.5, windows),
             p95_s: quantile(&recovery, 0.95, windows),
-            never: (records.len() - recovery.len()) as u64,
+            never: Some((records.len() - recovery.len()) as u64),
         },
     }
 }
@@ -122,7 +126,7 @@ mod tests {
         assert_eq!((metrics.asee_end.0[1].value, metrics.nees_end.value), (6.0, 27.0));
         assert_eq!(metrics.log_density_end.value, -3.0);
         assert_eq!((metrics.horizontal_p50_m.value, metrics.horizontal_max_m), (3.0, 5.0));
-        assert_eq!((metrics.reconvergence.p50_s.value, metrics.reconvergence.never), (2.0, 1));
+        assert_eq!((metrics.reconvergence.p50_s.value, metrics.reconvergence.never), (2.0, Some(1)));
     }
 
     #[test]

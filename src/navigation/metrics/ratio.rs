@@ -1,9 +1,11 @@
 //! Ratios between two experiments on the same trajectory with the same outages: what the filter of one
 //! believes, relative to the other ([Minaretzis et al.](crate::bibliography::Minaretzis24), Table I).
 
+use super::epoch::{EpochMetrics, epochs};
 use super::estimate::{Estimate, SampleSize};
+use super::expected::Expected;
 use super::verdict::Verdict;
-use crate::simulation::{OutageRecord, REPORTED, RunRecord};
+use crate::simulation::{OutageRecord, REPORTED, RunRecord, RunResult};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// The statistics of one epoch that ratios are made of.
@@ -21,6 +23,18 @@ pub struct EpochRow {
     pub coverage: f64,
 }
 
+impl From<&EpochMetrics> for EpochRow {
+    fn from(e: &EpochMetrics) -> Self {
+        Self {
+            t_s: e.t_s,
+            asee: e.asee.0.map(|e| e.value),
+            rmse: e.rmse.0.map(|e| e.value),
+            nees: e.nees.value,
+            coverage: e.coverage,
+        }
+    }
+}
+
 /// What was measured in an experiment, as far as ratios need it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Measured {
@@ -36,7 +50,37 @@ pub struct Measured {
     pub is_expected: bool,
 }
 
+impl From<&RunResult> for Measured {
+    fn from(result: &RunResult) -> Self {
+        Self {
+            epochs: epochs(result).iter().map(EpochRow::from).collect(),
+            runs: result.runs.clone(),
+            outages: result.outages.clone(),
+            independent_windows: result.independent_windows,
+            is_expected: false,
+        }
+    }
+}
+
+impl From<&Expected> for Measured {
+    fn from(expected: &Expected) -> Self {
+        Self {
+            epochs: expected.epochs.iter().map(EpochRow::from).collect(),
+            runs: vec![expected.record.clone()],
+            outages: expected.outages.iter().map(|o| (o.start_s, o.end_s)).collect(),
+            independent_windows: None,
+            is_expected: true,
+        }
+    }
+}
+
 impl Measured {
+    /// The runs that were made; none of a covariance analysis.
+    #[must_use]
+    pub fn sampled(&self) -> &[RunRecord] {
+        if self.is_expected { &[] } else { &self.runs }
+    }
+
     /// Whether the filter is as good as it believes.
     #[must_use]
     pub fn verdict(&self) -> Verdict {

@@ -256,7 +256,6 @@ impl From<&Accuracy> for AccuracySummary {
 
 impl From<&OutageMetrics> for OutageSummary {
     fn from(o: &OutageMetrics) -> Self {
-        let (p50, p95) = (o.horizontal_p50_m, o.horizontal_p95_m);
         Self {
             start_s: o.start_s,
             end_s: o.end_s,
@@ -272,11 +271,14 @@ impl From<&OutageMetrics> for OutageSummary {
             nees_end_std_error: o.nees_end.std_error,
             log_density_end: o.log_density_end.value,
             log_density_end_std_error: o.log_density_end.std_error,
-            horizontal_error_end_m: Spread::new(p50, p95, o.horizontal_max_m),
+            horizontal_error_end_m: Spread {
+                p999: o.horizontal_p999_m,
+                ..Spread::new(o.horizontal_p50_m, o.horizontal_p95_m, o.horizontal_max_m)
+            },
             reconvergence_s: Recovery {
                 p50: o.reconvergence.p50_s.value,
                 p95: o.reconvergence.p95_s.value,
-                never: Some(o.reconvergence.never),
+                never: o.reconvergence.never,
             },
             budget: None,
             believed_budget: None,
