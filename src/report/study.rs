@@ -102,7 +102,8 @@ pub fn outage_columns() -> Vec<TableColumn> {
         names.extend(prefixed(prefix));
         names.extend(prefixed(&format!("{prefix}_std_error")));
     }
-    names.extend(["nees_end", "nees_end_std_error", "verdict_ratio"].map(str::to_owned));
+    names.extend(["nees_end", "nees_end_std_error", "log_density_end", "log_density_end_std_error"].map(str::to_owned));
+    names.push("verdict_ratio".to_owned());
     names.extend(HORIZONTAL.map(str::to_owned));
     for (state, _) in states() {
         let ratio = |name: &str| format!("{name}_{state}_pct");
@@ -151,7 +152,8 @@ fn outage_values(o: &OutageMetrics, verdict_ratio: f64, kept: u64) -> Vec<f64> {
         values.extend(estimates.0.map(|e| e.value));
         values.extend(estimates.0.map(|e| e.std_error));
     }
-    values.extend([o.nees_end.value, o.nees_end.std_error, verdict_ratio]);
+    values.extend([o.nees_end.value, o.nees_end.std_error]);
+    values.extend([o.log_density_end.value, o.log_density_end.std_error, verdict_ratio]);
     for quantile in [&o.horizontal_p50_m, &o.horizontal_p95_m] {
         let (low, high) = quantile.ci95;
         values.extend([quantile.value, low.unwrap_or(f64::NAN), high.unwrap_or(f64::NAN)]);
@@ -368,6 +370,7 @@ mod tests {
             "coverage",
             "nees_end",
             "nees_end_std_error",
+            "log_density_end",
             "_ratio",
         ];
         for (name, kind) in outage_columns().iter().chain(&epoch_columns()).chain(&run_columns()) {
