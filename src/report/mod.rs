@@ -12,6 +12,7 @@ mod html;
 mod manifest;
 mod markdown;
 mod number;
+pub mod page;
 mod recording;
 mod replicates;
 pub mod require;
