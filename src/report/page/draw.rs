@@ -1,7 +1,7 @@
 //! Charts as SVG: layout, axes, stripes; for a screen and for a phone, so that text is never scaled.
 
 use super::axis::{Ruler, extremes, is_shown, minor_ticks, range, ticks};
-use super::chart::{Chart, Mark, Panel, Scale};
+use super::chart::{Chart, Mark, Panel, Scale, Stroke};
 use super::escape;
 use super::legend::{Legend, text_width};
 use super::marks::{Frame, short};
@@ -28,7 +28,7 @@ pub(super) const WIDE: Canvas =
 pub(super) const NARROW: Canvas =
     Canvas { class: "narrow", width: 358.0, panel: 200.0, font: 12.0, labels: 5, map: 340.0 };
 pub(super) const SMALL: Canvas =
-    Canvas { class: "small", width: 310.0, panel: 150.0, font: 12.0, labels: 4, map: 260.0 };
+    Canvas { class: "small", width: 310.0, panel: 150.0, font: 12.0, labels: 5, map: 260.0 };
 
 /// Between panels, and at the right of all.
 const GAP: f64 = 14.0;
@@ -39,7 +39,7 @@ pub(super) fn draw(chart: &Chart, canvas: &Canvas) -> Option<(String, f64)> {
     let legend = Legend::of(chart);
     let mut top = 0.0;
     let x_values = chart.panels.iter().flat_map(|p| p.series.iter()).flat_map(|s| xs(&s.mark));
-    let shown_y: Vec<Option<(f64, f64)>> = chart.panels.iter().map(|p| y_range(p, chart)).collect();
+    let shown_y: Vec<Option<(f64, f64)>> = chart.panels.iter().map(y_range).collect();
     if shown_y.iter().all(Option::is_none) {
         return None;
     }
@@ -51,6 +51,9 @@ pub(super) fn draw(chart: &Chart, canvas: &Canvas) -> Option<(String, f64)> {
     });
     let left = 10.0 + widest.map(|(_, label)| text_width(&label, canvas.font)).fold(24.0, f64::max);
     let right = canvas.width - GAP;
+    // the first of slanted names begins left of its place
+    let left = slanted_names(chart, canvas, right - left)
+        .map_or(left, |(longest, slot)| left.max(0.79 * longest - 0.4 * slot));
     for (i, (panel, range)) in chart.panels.iter().zip(&shown_y).enumerate() {
         let Some(range) = *range else { continue };
         let mut x = Ruler { range: shown_x, is_log: chart.x.scale == Scale::Log, pixels: (left, right) };
@@ -64,7 +67,7 @@ pub(super) fn draw(chart: &Chart, canvas: &Canvas) -> Option<(String, f64)> {
         let sketch = Sketch {
             chart,
             panel,
-            frame: Frame { x, y, scales: [&chart.x.scale, &panel.y.scale], most: 2 * canvas.width as usize },
+            frame: Frame { x, y, scales: [&chart.x.scale, &panel.y.scale], most: canvas.width as usize },
         };
         let is_last = i + 1 == chart.panels.len();
         let y_ticks = y_ticks(panel, sketch.frame.y.range, height);
@@ -191,9 +194,7 @@ impl Sketch<'_> {
         let (x, y) = (&self.frame.x, &self.frame.y);
         let ticks = ticks(&self.chart.x, x.range, canvas.labels);
         let is_named = matches!(self.chart.x.scale, Scale::Names(_));
-        let longest = ticks.iter().map(|(_, label)| text_width(label, canvas.font)).fold(0.0, f64::max);
-        let slot = (x.pixels.1 - x.pixels.0) / ticks.len().max(1) as f64;
-        let is_slanted = is_named && longest > slot - 6.0;
+        let slanted_name = slanted_names(self.chart, canvas, x.pixels.1 - x.pixels.0);
         for (value, label) in &ticks {
             let at = x.at(*value);
             if !is_named {
@@ -205,13 +206,13 @@ impl Sketch<'_> {
                     short(y.pixels.1)
                 );
             }
-            if is_last && is_slanted {
+            if is_last && slanted_name.is_some() {
                 slanted(svg, (at + 4.0, y.pixels.0 + 16.0), label);
             } else if is_last {
                 text(svg, "tick", (at, y.pixels.0 + canvas.font + 5.0), "middle", label);
             }
         }
-        let labels = if is_slanted { 0.62 * longest + 22.0 } else { canvas.font + 9.0 };
+        let labels = slanted_name.map_or(canvas.font + 9.0, |(longest, _)| 0.62 * longest + 22.0);
         if self.chart.x.label.is_empty() {
             return labels + 4.0;
         }
@@ -260,6 +261,14 @@ impl Sketch<'_> {
     }
 }
 
+/// Where the names of the x axis have no room beside one another: the width of the longest, and the room of each.
+fn slanted_names(chart: &Chart, canvas: &Canvas, width: f64) -> Option<(f64, f64)> {
+    let Scale::Names(names) = &chart.x.scale else { return None };
+    let longest = names.iter().map(|name| text_width(name, canvas.font)).fold(0.0, f64::max);
+    let slot = width / names.len().max(1) as f64;
+    (longest > slot - 6.0).then_some((longest, slot))
+}
+
 fn xs(mark: &Mark) -> Vec<f64> {
     match mark {
         Mark::Line(points, _) => points.iter().map(|p| p.0).collect(),
@@ -271,7 +280,6 @@ fn xs(mark: &Mark) -> Vec<f64> {
     }
 }
 
-/// What decides on the range of y: of a band its lower curve only where it is not far below everything else.
 fn ys(mark: &Mark) -> Vec<f64> {
     match mark {
         Mark::Line(points, _) => points.iter().map(|p| p.1).collect(),
@@ -284,31 +292,33 @@ fn ys(mark: &Mark) -> Vec<f64> {
     }
 }
 
-/// What a panel shows; uncertainty is cut two decades beyond the curves, so that it does not flatten them.
-fn y_range(panel: &Panel, chart: &Chart) -> Option<(f64, f64)> {
-    let air = if matches!(chart.x.scale, Scale::Names(_))
-        && panel.series.iter().any(|s| matches!(s.mark, Mark::Bars(_)))
-    {
-        0.0
-    } else {
-        0.04
-    };
-    let values = || panel.series.iter().flat_map(|s| ys(&s.mark));
-    if panel.y.scale != Scale::Log {
-        return range(&panel.y, values().collect::<Vec<_>>().into_iter(), air);
-    }
-    let is_curve = |mark: &Mark| matches!(mark, Mark::Line(..) | Mark::Level(_) | Mark::Place(..));
-    let curves = panel.series.iter().filter(|s| is_curve(&s.mark)).flat_map(|s| ys(&s.mark));
-    let dots = panel.series.iter().flat_map(|s| match &s.mark {
-        Mark::Points(points) => points.iter().map(|p| p.y).collect(),
-        _ => Vec::new(),
+/// Whether a mark must be seen whole: bands, bars and auxiliary lines may leave the panel.
+fn is_main(mark: &Mark) -> bool {
+    matches!(mark, Mark::Line(_, Stroke::Plain) | Mark::Level(_) | Mark::Points(_) | Mark::Place(..))
+}
+
+/// How far beyond the main curves a logarithmic axis follows others.
+const BEYOND: f64 = 30.0;
+
+/// What a panel shows: what is far beyond the main curves is cut, so that it does not flatten them.
+fn y_range(panel: &Panel) -> Option<(f64, f64)> {
+    let has_bars = panel.series.iter().any(|s| matches!(s.mark, Mark::Bars(_)));
+    let air = if has_bars { 0.0 } else { 0.04 };
+    let values: Vec<f64> = panel.series.iter().flat_map(|s| ys(&s.mark)).collect();
+    let main = panel.series.iter().filter(|s| is_main(&s.mark)).flat_map(|s| match &s.mark {
+        Mark::Points(points) if panel.y.scale == Scale::Log => points.iter().map(|p| p.y).collect(),
+        mark => ys(mark),
     });
-    let (low, high) =
-        extremes(curves.chain(dots).filter(|y| *y > 0.0 && y.is_finite())).unwrap_or((0.0, f64::INFINITY));
-    let cut = values()
-        .filter(|y| y.is_finite())
-        .map(|y| if y > 0.0 { y.clamp(low / 100.0, high * 100.0) } else { y });
-    range(&panel.y, cut.collect::<Vec<_>>().into_iter(), air)
+    let Some((low, high)) = extremes(main.filter(|y| is_shown(*y, &panel.y.scale))) else {
+        return range(&panel.y, values.into_iter(), air);
+    };
+    let (low, high) = match panel.y.scale {
+        Scale::Log => (low / BEYOND, high * BEYOND),
+        _ if low < high => (low - (high - low), high + (high - low)),
+        _ => (f64::NEG_INFINITY, f64::INFINITY),
+    };
+    let shown = values.into_iter().filter(|y| is_shown(*y, &panel.y.scale));
+    range(&panel.y, shown.map(|y| y.clamp(low, high)), air)
 }
 
 pub(super) fn text(svg: &mut String, class: &str, (x, y): (f64, f64), anchor: &str, words: &str) {

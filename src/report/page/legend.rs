@@ -5,9 +5,15 @@ use super::draw::{Canvas, text};
 use super::marks::short;
 use std::fmt::Write as _;
 
-/// Width of a text (pixels), rather too much.
+/// Width of a text (pixels), rather too much: that of a wide typeface.
 pub(super) fn text_width(text: &str, font: f64) -> f64 {
-    0.57 * font * text.chars().count() as f64
+    let width = |c: char| match c {
+        'i' | 'j' | 'l' | 'f' | 't' | 'r' | '.' | ',' | ':' | '(' | ')' | '|' | '/' | ' ' => 0.42,
+        'm' | 'w' | 'M' | 'W' | '%' | '−' => 0.95,
+        c if c.is_uppercase() => 0.72,
+        _ => 0.64,
+    };
+    font * text.chars().map(width).sum::<f64>()
 }
 
 const SWATCH: f64 = 24.0;
@@ -65,7 +71,8 @@ impl<'a> Legend<'a> {
         if self.entries.len() + usize::from(self.stripes.is_some()) < 2 {
             return top + line;
         }
-        let mut pen = Pen { x: left + text_width(title, canvas.font) + SPACE, y: top, line, canvas };
+        let x = left + text_width(title, canvas.font) + SPACE;
+        let mut pen = Pen { left, x, y: top, line, canvas };
         for (k, entry) in self.entries.iter().enumerate().filter(|(_, e)| e.panel == panel) {
             let (x, y) = pen.place(entry.name);
             let _ = write!(svg, "<g class=\"key {}\" data-k=\"{k}\">", entry.series[0].colour.class());
@@ -88,6 +95,7 @@ impl<'a> Legend<'a> {
 
 /// Where the next entry begins.
 struct Pen<'a> {
+    left: f64,
     x: f64,
     y: f64,
     line: f64,
@@ -97,8 +105,8 @@ struct Pen<'a> {
 impl Pen<'_> {
     fn place(&mut self, name: &str) -> (f64, f64) {
         let width = SWATCH + 6.0 + text_width(name, self.canvas.font);
-        if self.x > 0.0 && self.x + width > self.canvas.width {
-            (self.x, self.y) = (0.0, self.y + self.line);
+        if self.x > self.left && self.x + width > self.canvas.width {
+            (self.x, self.y) = (self.left, self.y + self.line);
         }
         let here = (self.x, self.y);
         self.x += width + SPACE;

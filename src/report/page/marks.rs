@@ -5,6 +5,9 @@ use super::chart::{Interval, Mark, Scale, Series};
 use super::escape;
 use std::fmt::Write as _;
 
+/// Points beyond which each is small.
+const MANY: usize = 150;
+
 /// Rulers and scales of one panel.
 pub(super) struct Frame<'a> {
     pub(super) x: Ruler,
@@ -86,7 +89,8 @@ impl Frame<'_> {
             format!("M{} {low}V{high}", short(self.x.at(p.x)))
         };
         path(svg, "whisker", &shown().map(bar).collect::<String>());
-        path(svg, "dot", &shown().map(|p| format!("M{}h0", self.point(p.x, p.y))).collect::<String>());
+        let class = if points.len() > MANY { "dot small" } else { "dot" };
+        path(svg, class, &shown().map(|p| format!("M{}h0", self.point(p.x, p.y))).collect::<String>());
     }
 
     /// As wide as 0.7 of the distance of two names.

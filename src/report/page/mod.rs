@@ -116,10 +116,16 @@ impl Page {
         self.body += &table.html();
     }
 
+    /// A text as it stands in a file.
+    pub fn code(&mut self, text: &str) {
+        let _ = writeln!(self.body, "<pre>{}</pre>", escape(text));
+    }
+
     /// What few want to see, folded.
-    pub fn folded(&mut self, title: &str, text: &str) {
-        let (title, text) = (escape(title), escape(text));
-        let _ = writeln!(self.body, "<details><summary>{title}</summary><pre>{text}</pre></details>");
+    pub fn folded(&mut self, title: &str, inside: impl FnOnce(&mut Self)) {
+        let _ = writeln!(self.body, "<details><summary>{}</summary>", escape(title));
+        inside(self);
+        self.body += "</details>\n";
     }
 
     /// The file.
@@ -128,11 +134,20 @@ impl Page {
         let Self { title, body } = self;
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
-             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{title}</title>\n\
+             {GENERATOR}\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{title}</title>\n\
              <style>\n{CHART_STYLE}{PAGE_STYLE}</style>\n</head>\n<body>\n<main>\n{body}</main>\n\
              <script>\n{SCRIPT}</script>\n</body>\n</html>\n"
         )
     }
+}
+
+/// Tells our pages from those of others.
+const GENERATOR: &str = "<meta name=\"generator\" content=\"nav-sim\">";
+
+/// Whether a text is a page of this module.
+#[must_use]
+pub fn is_own(html: &str) -> bool {
+    html.contains(GENERATOR)
 }
 
 /// The tone of a good or a bad result.

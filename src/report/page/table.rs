@@ -4,6 +4,9 @@ use super::escape;
 use crate::report::number::readable;
 use std::fmt::Write as _;
 
+/// Characters beyond which a text has more than one line.
+const LONG: usize = 40;
+
 /// A cell.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cell {
@@ -81,7 +84,11 @@ impl Table {
         for row in &self.rows {
             html += "<tr>";
             for cell in row {
-                let class = if cell.is_number { " class=\"number\"" } else { "" };
+                let class = match cell.is_number {
+                    true => " class=\"number\"",
+                    false if cell.text.chars().count() > LONG => " class=\"long\"",
+                    false => "",
+                };
                 let source = match cell.source.as_str() {
                     "" => String::new(),
                     pointer => format!(" data-json=\"{}\"", escape(pointer)),
