@@ -1,10 +1,11 @@
 //! `nav-sim compare`: ratios between runs.
 
+use super::pictures::{PlotArgs, replaceable};
 use super::{Failure, Session};
 use nav_sim::formats::{atomic, run_directory};
 use nav_sim::metrics;
 pub(super) use nav_sim::report::markdown_table as table;
-use nav_sim::report::{self, CandidateResult, ComparisonFile, Label, Manifest};
+use nav_sim::report::{self, CandidateResult, ComparisonFile, Label, Manifest, RatioCurves};
 use nav_sim::scenario::Method;
 use nav_sim::simulation::REPORTED_NAMES;
 use std::path::{Path, PathBuf};
@@ -16,7 +17,7 @@ use std::path::{Path, PathBuf};
 /// (ASEE ratio − 1)·100, ± half its 95 % Monte-Carlo interval, and in brackets the mean of its absolute
 /// value. ASEE is the averaged standard estimation error: what the filter believes, not how wrong it is. So the
 /// verdict on every filter comes first, and a second table has NEES, coverage and the ratios of the RMSE at the
-/// end of the outage. All states are in the JSON file.
+/// end of the outage. All states are in the JSON file; a page with figures is written beside it.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -38,65 +39,104 @@ pub(crate) struct Args {
     /// Where to write the comparison [default: comparison.json, unless that is something else]
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    plot: PlotArgs,
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let states = states(&args.states)?;
     let out = &args.out.clone().map_or_else(unasked_output, Ok)?;
+    let page = out.with_extension("html");
     let read_from = args.runs.iter().chain([&args.reference]);
     let inputs: Vec<PathBuf> =
         read_from.flat_map(|run| report::RUN_FILES.map(|name| run.join(name))).collect();
     atomic::guard_inputs(out, inputs.iter().map(PathBuf::as_path))?;
-    let reference = read(&args.reference)?;
-    let mut candidates = Vec::new();
-    let mut all_paired = true;
-    for path in &args.runs {
-        let candidate = read(path)?;
-        comparable(path, &candidate.manifest, &reference.manifest)?;
-        let differences = differences(&candidate.manifest, &reference.manifest);
-        for difference in &differences {
-            session.printer.warn(&format!("{}: {difference}", path.display()));
-        }
-        let paired = differences.is_empty();
-        all_paired &= paired;
-        let outages =
-            metrics::compare(&candidate.experiment, &reference.experiment, paired).map_err(|e| {
-                let failure = Failure::input(format!("{}: {e}", path.display()));
-                let runs = matches!(e, metrics::ComparisonError::Runs { .. });
-                failure.maybe_hint(runs.then(|| "make both with one number of --runs".to_owned()))
-            })?;
-        let run = path.display().to_string();
-        let label = Label::of(&run, candidate.manifest.model.estimator.as_deref());
-        let is_reference = same_place(path, &args.reference);
-        let verdict = candidate.experiment.verdict();
-        candidates.push(CandidateResult { run, label, is_reference, verdict, outages });
-    }
-    let name = args.reference.display().to_string();
-    let file = ComparisonFile::new((&name, &reference.experiment.verdict()), all_paired, &candidates);
-    let json = report::json(&file);
+    atomic::guard_inputs(&page, inputs.iter().map(PathBuf::as_path))?;
+    args.plot.guard(&inputs)?;
+    replaceable(&page)?;
+    let compared = Compared::new(args, session)?;
+    let json = report::json(&compared.file);
     atomic::write(out, &json)?;
+    atomic::write(&page, compared.page(&[]))?;
+    args.plot.write(|| compared.picture(), session)?;
     if session.json() {
         session.printer.result(json.trim_end());
     } else {
-        session.printer.result(&text(&file, &candidates, &states));
+        session.printer.result(&compared.text());
     }
-    session.printer.say(&format!("wrote {}", out.display()));
+    session.printer.say(&format!("wrote {}, {}", out.display(), page.display()));
     Ok(())
 }
 
-/// The verdicts, the table of ASEE ratios, and what stands beside them.
-fn text(file: &ComparisonFile, candidates: &[CandidateResult], states: &[usize]) -> String {
-    let mut lines = report::verdict_lines(&file.verdicts);
-    if candidates.iter().any(|c| !c.outages.is_empty()) {
-        lines.push(format!("ASEE against {}, mean over the outage, %:", file.reference));
-        lines.push(table(&report::table_rows(candidates, states)));
-        lines.push(
-            "NEES (9 if right) and coverage over the outage, RMSE at its end against the reference, %:"
-                .to_owned(),
-        );
-        lines.push(table(&report::consistency_rows(candidates, states)));
+/// What was found, and how it is shown.
+pub(super) struct Compared {
+    file: ComparisonFile,
+    candidates: Vec<CandidateResult>,
+    /// One a candidate.
+    curves: Vec<RatioCurves>,
+    /// Start and end (s).
+    outages: Vec<(f64, f64)>,
+    /// The states that are shown.
+    states: Vec<usize>,
+}
+
+impl Compared {
+    /// Reads the runs and compares them.
+    pub(super) fn new(args: &Args, session: &Session) -> Result<Self, Failure> {
+        let states = states(&args.states)?;
+        let reference = read(&args.reference)?;
+        let (mut candidates, mut curves) = (Vec::new(), Vec::new());
+        let mut all_paired = true;
+        for path in &args.runs {
+            let candidate = read(path)?;
+            comparable(path, &candidate.manifest, &reference.manifest)?;
+            let differences = differences(&candidate.manifest, &reference.manifest);
+            for difference in &differences {
+                session.printer.warn(&format!("{}: {difference}", path.display()));
+            }
+            let paired = differences.is_empty();
+            all_paired &= paired;
+            let outages =
+                metrics::compare(&candidate.experiment, &reference.experiment, paired).map_err(|e| {
+                    let failure = Failure::input(format!("{}: {e}", path.display()));
+                    let runs = matches!(e, metrics::ComparisonError::Runs { .. });
+                    failure.maybe_hint(runs.then(|| "make both with one number of --runs".to_owned()))
+                })?;
+            curves.push(RatioCurves::of(&candidate.experiment, &reference.experiment));
+            let run = path.display().to_string();
+            let label = Label::of(&run, candidate.manifest.model.estimator.as_deref());
+            let is_reference = same_place(path, &args.reference);
+            let verdict = candidate.experiment.verdict();
+            candidates.push(CandidateResult { run, label, is_reference, verdict, outages });
+        }
+        let name = args.reference.display().to_string();
+        let file = ComparisonFile::new((&name, &reference.experiment.verdict()), all_paired, &candidates);
+        Ok(Self { file, candidates, curves, outages: reference.experiment.outages, states })
     }
-    lines.join("\n")
+
+    /// The page, with links to those beneath it.
+    pub(super) fn page(&self, links: &[(String, String)]) -> String {
+        let Self { file, candidates, curves, outages, states } = self;
+        report::comparison_page(file, candidates, curves, outages, states, links)
+    }
+
+    fn picture(&self) -> String {
+        report::comparison_svg(&self.candidates, &self.curves, &self.outages, &self.states)
+    }
+
+    /// The verdicts, the table of ASEE ratios, and what stands beside them.
+    fn text(&self) -> String {
+        let mut lines = report::verdict_lines(&self.file.verdicts);
+        if self.candidates.iter().any(|c| !c.outages.is_empty()) {
+            lines.push(format!("ASEE against {}, mean over the outage, %:", self.file.reference));
+            lines.push(table(&report::table_rows(&self.candidates, &self.states)));
+            lines.push(
+                "NEES (9 if right) and coverage over the outage, RMSE at its end against the reference, %:"
+                    .to_owned(),
+            );
+            lines.push(table(&report::consistency_rows(&self.candidates, &self.states)));
+        }
+        lines.join("\n")
+    }
 }
 
 /// The output that nobody named: a file there that is no comparison is somebody's own.

@@ -1,7 +1,10 @@
 //! `nav-sim demo`: the case study of the paper, command by command.
 
-use super::{Cli, Failure, Session};
+use super::compare::{self, Compared};
+use super::{Cli, Command, Failure, Session};
 use clap::Parser;
+use nav_sim::formats::atomic;
+use std::path::{Path, PathBuf};
 
 /// The case study of Minaretzis et al. 2024, Section V, on a virtual IMU: calibrate with three estimators
 /// on clean and corrupted recordings, navigate with each model, compare (their Table I)
@@ -50,9 +53,38 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         session.printer.say(&format!("$ {}", typed(command)));
         let words = std::iter::once("nav-sim").chain(command.iter().map(String::as_str));
         let cli = Cli::try_parse_from(words).map_err(Failure::input)?;
-        cli.command.run(&session.within(&cli.common, i < last))?;
+        let inner = session.within(&cli.common, i < last);
+        if let Command::Compare(compare) = &cli.command {
+            index(compare, &args.out, session)?;
+        }
+        cli.command.run(&inner)?;
     }
+    session.printer.say(&format!("all results on one page: {}", page(&args.out).display()));
     Ok(())
+}
+
+/// The page that leads to all others.
+fn page(out: &str) -> PathBuf {
+    Path::new(out).join("report.html")
+}
+
+/// Writes that page: the comparison, with links to the pages of its models and runs.
+fn index(compare: &compare::Args, out: &str, session: &Session) -> Result<(), Failure> {
+    let mut links = Vec::new();
+    for name in names() {
+        links.push((format!("models/{name}.html"), format!("model {name}: curves and parameters")));
+        links.push((
+            format!("runs/{name}/report.html"),
+            format!("navigation with {name}: errors and consistency"),
+        ));
+    }
+    let compared = Compared::new(compare, session)?;
+    Ok(atomic::write(&page(out), compared.page(&links))?)
+}
+
+/// Scenario and estimator of each model.
+fn names() -> Vec<String> {
+    SCENARIOS.iter().flat_map(|s| ESTIMATORS.iter().map(move |e| format!("{s}_{e}"))).collect()
 }
 
 /// The commands, as words.
@@ -70,15 +102,14 @@ fn commands(args: &Args, seed: u64) -> Vec<Vec<String>> {
             "calibrate @/{scenario} --estimator all --seed {seed} -o @/models/{scenario}.toml"
         ));
     }
-    let pairs = || SCENARIOS.iter().flat_map(|s| ESTIMATORS.iter().map(move |e| format!("{s}_{e}")));
-    lines.extend(pairs().map(|name| {
+    lines.extend(names().into_iter().map(|name| {
         format!(
             "run {TRAJECTORY} @/models/{name}.toml --static @/ninth --filter full --outage 300:390 --outage 700:790 \
              --runs {} --seed {seed} -o @/runs/{name}",
             args.runs
         )
     }));
-    let candidates: Vec<String> = pairs().map(|name| format!("@/runs/{name}")).collect();
+    let candidates: Vec<String> = names().iter().map(|name| format!("@/runs/{name}")).collect();
     lines.push(format!("compare {} --reference @/runs/I_awv -o @/comparison.json", candidates.join(" ")));
     // The directory takes its place after the words are apart: its name may hold blanks.
     let words = |line: &String| line.split_whitespace().map(|word| word.replace('@', &args.out)).collect();

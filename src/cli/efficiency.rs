@@ -164,6 +164,7 @@ fn write(out: &Path, results: &EfficiencyFile, session: &Session) -> Result<(), 
     atomic::write(&out.join("results.txt"), format!("{table}\n"))?;
     atomic::write(&out.join("results.json"), &json)?;
     atomic::write(&out.join("rmse.svg"), report::efficiency_svg(results))?;
+    atomic::write(&out.join("report.html"), report::efficiency_page(results))?;
     session.printer.result(if session.json() { json.trim_end() } else { &table });
     Ok(())
 }

@@ -21,6 +21,7 @@ mod interrupt;
 mod jobs;
 mod man;
 mod parse;
+mod pictures;
 mod printer;
 mod progress;
 mod read;

@@ -1,6 +1,7 @@
 //! `nav-sim wv`: wavelet variance of static recordings.
 
 use super::parse::words;
+use super::pictures::PlotArgs;
 use super::recordings::{RecordingArgs, Said};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
@@ -30,6 +31,11 @@ pub(crate) struct Args {
     /// Write the curves as JSON
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Write a page with figures
+    #[arg(long, value_name = "FILE.html")]
+    page: Option<PathBuf>,
+    #[command(flatten)]
+    plot: PlotArgs,
 }
 
 const INTERVALS: [(&str, &str); 2] = [
@@ -39,9 +45,11 @@ const INTERVALS: [(&str, &str); 2] = [
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let tuning = args.tuning.tuning()?;
-    if let Some(out) = &args.out {
-        atomic::guard_inputs(out, read::listed(&args.files)?.iter().map(PathBuf::as_path))?;
+    let inputs = read::listed(&args.files)?;
+    for out in args.out.iter().chain(&args.page) {
+        atomic::guard_inputs(out, inputs.iter().map(PathBuf::as_path))?;
     }
+    args.plot.guard(&inputs)?;
     let intervals = args.intervals;
     let options =
         WaveletOptions { reading: args.recordings.options(), scales: args.tuning.scales, tuning, intervals };
@@ -51,6 +59,11 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         atomic::write(out, &json)?;
         session.printer.say(&format!("wrote {}", out.display()));
     }
+    if let Some(page) = &args.page {
+        atomic::write(page, report::wavelet_page(&file))?;
+        session.printer.say(&format!("wrote {}", page.display()));
+    }
+    args.plot.write(|| report::wavelet_svg(&file), session)?;
     if session.json() {
         session.printer.result(json.trim_end());
         return Ok(());

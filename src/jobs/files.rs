@@ -1,8 +1,8 @@
 //! The files of a calibration: for each estimator a model and the curves behind it.
 
 use super::Calibration;
-use crate::calibration::{Estimator, Outcome};
-use crate::formats::atomic::AtomicFile;
+use crate::calibration::{Diagnosis, Estimator, Outcome};
+use crate::formats::atomic::{self, AtomicFile};
 use crate::formats::model_file::{self, CalibrationNote};
 use crate::formats::{FileError, hash};
 use crate::report::{self, CurvesFile};
@@ -18,6 +18,8 @@ pub struct ModelFiles {
     pub model: PathBuf,
     /// The curves, `<model>.wv.json` beside it.
     pub curves: PathBuf,
+    /// The page, `<model>.html` beside it.
+    pub page: PathBuf,
 }
 
 impl ModelFiles {
@@ -27,7 +29,8 @@ impl ModelFiles {
         let files = |estimator: &Estimator| {
             let suffix = if estimators.len() > 1 { format!("_{estimator}") } else { String::new() };
             let model = with_suffix(out, &suffix);
-            Self { estimator: *estimator, curves: model.with_extension("wv.json"), model }
+            let (curves, page) = (model.with_extension("wv.json"), model.with_extension("html"));
+            Self { estimator: *estimator, model, curves, page }
         };
         estimators.iter().map(files).collect()
     }
@@ -47,6 +50,20 @@ impl ModelFiles {
         let (curves, model) = (staged(&self.curves, &curves)?, staged(&self.model, &model)?);
         curves.commit()?;
         model.commit()
+    }
+}
+
+impl ModelFiles {
+    /// Writes the page of the models of the estimator.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub fn write_page(&self, calibration: &Calibration, diagnoses: &[Diagnosis]) -> Result<(), FileError> {
+        let Calibration { groups, outcomes, settings } = calibration;
+        let own = outcomes.iter().enumerate().filter(|(_, o)| o.estimator == self.estimator);
+        let own: Vec<(usize, &Outcome)> = own.collect();
+        let curves = CurvesFile::new(groups, &own.iter().map(|(_, o)| *o).collect::<Vec<_>>(), settings);
+        atomic::write(&self.page, report::calibration_page(&curves, &own, diagnoses, settings))
     }
 }
 

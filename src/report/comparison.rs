@@ -284,7 +284,8 @@ fn signed(error: &RatioError) -> String {
     format!("{:+.2}{interval}", error.pct)
 }
 
-fn in_order<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
+/// Each name once, where it stood first.
+pub(super) fn in_order<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
     let mut unique = Vec::new();
     for name in names {
         if !unique.contains(&name) {

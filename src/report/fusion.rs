@@ -2,7 +2,9 @@
 
 use super::json;
 use super::manifest::Input;
-use super::number::shortest;
+use super::number::{seconds, shortest};
+use super::page::{Cell, Table, Tone};
+use super::pages::fusion_page;
 use super::run_directory::OutputFile;
 use crate::earth::radii;
 use crate::ekf::InitialSettings;
@@ -15,8 +17,15 @@ use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 
 /// Names of the files of a fusion directory, the manifest last.
-pub const FUSION_FILES: [&str; 6] =
-    ["solution.csv", "innovations.csv", "errors.csv", "solution.kml", "summary.json", "manifest.json"];
+pub const FUSION_FILES: [&str; 7] = [
+    "solution.csv",
+    "innovations.csv",
+    "errors.csv",
+    "solution.kml",
+    "summary.json",
+    "report.html",
+    "manifest.json",
+];
 
 const STATE: [&str; 9] =
     ["lat_deg", "lon_deg", "h_m", "v_n_m_s", "v_e_m_s", "v_d_m_s", "roll_deg", "pitch_deg", "yaw_deg"];
@@ -172,7 +181,49 @@ impl FusionSummary {
         }
     }
 
-    fn verdict_line(&self) -> String {
+    /// How the page colours the verdict.
+    pub(super) fn tone(&self) -> Tone {
+        match self.verdict {
+            word if word == Verdict::Ok.name() => Tone::Good,
+            word if word == Verdict::Overconfident.name() => Tone::Bad,
+            _ => Tone::Doubtful,
+        }
+    }
+
+    /// Outages (start, end) (s).
+    pub(super) fn windows(&self) -> Vec<(f64, f64)> {
+        self.outages.iter().map(|o| (o.start_s, o.end_s)).collect()
+    }
+
+    /// The outages as the page shows them.
+    pub(super) fn outage_table(&self) -> Table {
+        let mut table = Table::new(["outage", "fixes withheld", "horizontal from the fix (m)", "1 σ (m)"])
+            .and(["horizontal from the reference (m)", "1 σ (m)"].map(str::to_owned));
+        for (i, o) in self.outages.iter().enumerate() {
+            let mut cells = vec![
+                Cell::from(format!("{}–{} s", seconds(o.start_s), seconds(o.end_s))),
+                Cell::figures(o.fixes_withheld.to_string()),
+            ];
+            for (end, key) in [(o.end_from_fix, "end_from_fix"), (o.end_from_reference, "end_from_reference")]
+            {
+                let number =
+                    |value: f64, name: &str| Cell::number(value, &format!("/outages/{i}/{key}/{name}"));
+                cells.extend(end.map_or_else(
+                    || [Cell::figures("–"), Cell::figures("–")],
+                    |d| {
+                        [
+                            number(d.horizontal_m, "horizontal_m"),
+                            number(d.expected_sigma_m, "expected_sigma_m"),
+                        ]
+                    },
+                ));
+            }
+            table.row(cells);
+        }
+        table
+    }
+
+    pub(super) fn verdict_line(&self) -> String {
         let words = match self.verdict {
             word if word == Verdict::Ok.name() => "consistent with its fixes",
             word if word == Verdict::Underconfident.name() => "consistent with its fixes, and cautious",
@@ -238,6 +289,11 @@ pub fn fusion_directory(
         errors_csv(&solution.rows),
         kml(solution, title),
         json(summary),
+        fusion_page(
+            solution,
+            summary,
+            &manifest.inputs.iter().map(|i| (i.role.clone(), i.path.clone())).collect::<Vec<_>>(),
+        ),
         json(manifest),
     ];
     FUSION_FILES.into_iter().zip(contents).map(|(name, text)| OutputFile::whole(name, text)).collect()
@@ -330,7 +386,7 @@ fn kml(solution: &Solution, title: &str) -> String {
             last = row.t_s;
         }
     }
-    let title = super::svg::escape(title);
+    let title = super::page::escape(title);
     format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<kml xmlns=\"http://www.opengis.net/kml/2.2\">\n<Document>\n\
          <name>{title}</name>\n<Placemark>\n<name>solution</name>\n<Style><LineStyle><color>ff0050ff</color>\

@@ -6,13 +6,13 @@ mod choose;
 mod comparison;
 mod curves;
 mod efficiency;
-mod efficiency_svg;
 mod fits;
 mod fusion;
-mod html;
 mod manifest;
 mod markdown;
 mod number;
+pub mod page;
+mod pages;
 mod recording;
 mod replicates;
 pub mod require;
@@ -20,7 +20,6 @@ mod run_directory;
 #[cfg(test)]
 mod sample;
 mod study;
-mod svg;
 mod tables;
 mod trajectory;
 mod tune;
@@ -34,12 +33,15 @@ pub use curves::{
     signal_rows,
 };
 pub use efficiency::{EfficiencyFile, EfficiencyRow, efficiency_csv, efficiency_table};
-pub use efficiency_svg::efficiency_svg;
 pub use fits::{CandidateEntry, FitEntry, FitsFile, describe};
 pub use fusion::{FUSION_FILES, FusionKind, FusionManifest, FusionSummary, fusion_directory, solution_csv};
 pub use manifest::{Input, Manifest, ModelNote};
 pub use markdown::{markdown, markdown_table};
 pub use number::{readable, seconds};
+pub use pages::{
+    RatioCurves, calibration_page, calibration_svg, comparison_page, comparison_svg, efficiency_page,
+    efficiency_svg, run_svg, study_page, wavelet_page, wavelet_svg,
+};
 pub use recording::{gnss_csv, imu_csv, initial_toml};
 pub use replicates::{
     AlarmEntry, LeftOutEntry, MovementEntry, ReplicateEntry, ScoresEntry, describe_replicates,

@@ -102,7 +102,9 @@ pub fn outage_columns() -> Vec<TableColumn> {
         names.extend(prefixed(prefix));
         names.extend(prefixed(&format!("{prefix}_std_error")));
     }
-    names.extend(["nees_end", "nees_end_std_error", "log_density_end", "log_density_end_std_error"].map(str::to_owned));
+    names.extend(
+        ["nees_end", "nees_end_std_error", "log_density_end", "log_density_end_std_error"].map(str::to_owned),
+    );
     names.push("verdict_ratio".to_owned());
     names.extend(HORIZONTAL.map(str::to_owned));
     for (state, _) in states() {

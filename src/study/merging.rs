@@ -83,6 +83,7 @@ pub fn merge(
     tables.finish()?;
     let text = texts.render(&options.states);
     out.write("tables.md", format!("{text}\n"))?;
+    out.write("report.html", texts.page(&options.states))?;
     let summary = summary(planned, units.len(), diverged);
     out.write("study.json", report::json(&summary))?;
     remove_stale(planned)?;

@@ -69,6 +69,10 @@ impl Texts {
         }
     }
 
+    pub(super) fn page(&self, states: &[usize]) -> String {
+        report::study_page(&self.cells, &self.reference, states, self.more)
+    }
+
     pub(super) fn render(&self, states: &[usize]) -> String {
         let mut text = "Verdict on each filter: NEES over the run (9 if right), error over its standard deviation in the \
                         state that is farthest off\n\n"

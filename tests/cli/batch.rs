@@ -4,12 +4,13 @@ use crate::common::batch::*;
 use std::fs;
 use std::path::Path;
 
-const FILES: [&str; 8] = [
+const FILES: [&str; 9] = [
     "epochs.csv",
     "epochs.parquet",
     "outages.csv",
     "outages.json",
     "outages.parquet",
+    "report.html",
     "runs.parquet",
     "study.json",
     "tables.md",

@@ -74,7 +74,8 @@ fn write(directory: &Path, factor: f64, change: impl FnOnce(&mut Manifest)) {
     };
     change(&mut manifest);
     std::fs::create_dir_all(directory).unwrap();
-    for file in report::run_directory(Some(&result), &epochs, &summary, &manifest) {
+    let track = report::TrajectorySeries::default();
+    for file in report::run_directory(Some(&result), &epochs, &summary, &manifest, &track) {
         std::fs::write(directory.join(file.name), file.parts.collect::<String>()).unwrap();
     }
 }

@@ -103,7 +103,7 @@ fn a_filter_that_is_lost_is_told_first() {
         "{verdict}"
     );
     let page = fs::read_to_string(place.path().join("out/report.html")).unwrap();
-    assert!(page.contains("<p class=\"verdict overconfident\">The filter is OVERCONFIDENT BY FAR"));
+    assert!(page.contains("<p class=\"verdict bad\">The filter is OVERCONFIDENT BY FAR"));
 }
 
 /// Without outages the accuracy over the run is told, RMSE beside ASEE.

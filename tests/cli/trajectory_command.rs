@@ -93,8 +93,8 @@ fn plot_draws_one_self_contained_picture() {
     let args = ["plot", DRIVE, "--outage", "300:390", "--outage", "700:790", "-o", path.to_str().unwrap()];
     assert_eq!(trajectory(&args).0, 0);
     let svg = std::fs::read_to_string(path).unwrap();
-    assert!(svg.starts_with("<svg xmlns=") && svg.contains("land_vehicle.toml: north over east (m)"));
-    assert_eq!(svg.matches("class=\"outage\"").count(), 8); // two stripes in four panels
+    assert!(svg.starts_with("<svg xmlns=") && svg.contains("<title>land_vehicle.toml</title>"));
+    assert_eq!(svg.matches("class=\"outage\"").count(), 9); // two stripes in four panels, and the legend
     let (code, _, err) = trajectory(&["plot", DRIVE, "--outage", "390:300", "-o", "x.svg"]);
     assert!(code == 2 && err.contains("it must come after start_s = 390"), "{err}");
 }

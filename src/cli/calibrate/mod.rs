@@ -4,6 +4,7 @@ mod output;
 
 use super::jobs::unknown_model;
 use super::parse::words;
+use super::pictures::PlotArgs;
 use super::recordings::{RecordingArgs, Said, sensor};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
@@ -20,7 +21,8 @@ use std::path::{Path, PathBuf};
 ///
 /// Each recording is one replicate. By default the three axes of a sensor are pooled: one model a sensor,
 /// their signals replicates of one another. The model goes to a TOML file, the curves behind it to
-/// <model>.wv.json beside it; with `--estimator all` to one pair an estimator, <model>_<estimator>.toml.
+/// <model>.wv.json and a page with figures to <model>.html beside it; with `--estimator all` there are three files an
+/// estimator, <model>_<estimator>.toml and so on.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -64,6 +66,8 @@ pub(crate) struct Args {
     /// The model file (default: model.toml; none for --curve)
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    plot: PlotArgs,
     #[command(flatten)]
     recordings: RecordingArgs,
     #[command(flatten)]
@@ -149,11 +153,12 @@ fn recordings(args: &Args, settings: Settings, session: &Session) -> Result<(), 
     let measured = jobs::measure(&args.inputs, &options, &mut Said::new(session))?;
     let files: Vec<PathBuf> = measured.report.files.iter().map(|f| f.path.clone()).collect();
     let guarded: Vec<PathBuf> = files.iter().chain(&args.parameters).cloned().collect();
+    args.plot.guard(&guarded)?;
     let outputs = outputs(out, &measured.settings.estimators, &guarded)?;
     let inputs = files.iter().map(|f| read::input("recording", f)).collect::<Result<Vec<_>, _>>()?;
     let calibration = measured.calibrate()?;
     let note = output::note(args, &calibration.settings, inputs, session)?;
-    output::finish(&outputs, &calibration, &note, session)
+    output::finish(&outputs, &calibration, &note, &args.plot, session)
 }
 
 /// Fitting curves that come from elsewhere.
@@ -172,7 +177,7 @@ fn curves(args: &Args, path: &Path, settings: &Settings, session: &Session) -> R
     let calibration = curves.calibrate(bootstrap(args, session))?;
     let input = read::input("curve", path)?;
     let note = output::note(args, &calibration.settings, vec![input], session)?;
-    output::finish(&outputs, &calibration, &note, session)
+    output::finish(&outputs, &calibration, &note, &args.plot, session)
 }
 
 fn bootstrap(args: &Args, session: &Session) -> Option<Bootstrap> {

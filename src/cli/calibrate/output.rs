@@ -1,12 +1,13 @@
 //! The files of a calibration: one model and its curves for each estimator.
 
 use super::Args;
+use crate::cli::pictures::{PlotArgs, replaceable};
 use crate::cli::{Failure, Session, read};
-use nav_sim::calibration::{Estimator, Settings, diagnose};
+use nav_sim::calibration::{Estimator, Outcome, Settings, diagnose};
 use nav_sim::formats::atomic;
 use nav_sim::formats::model_file::{self, CalibrationNote};
 use nav_sim::jobs::{Calibration, ModelFiles};
-use nav_sim::report::{self, FitsFile, Input};
+use nav_sim::report::{self, CurvesFile, FitsFile, Input};
 use std::path::{Path, PathBuf};
 
 /// Fails before the work is done, not after, if nothing can be written there.
@@ -23,10 +24,11 @@ pub(super) fn outputs(
     inputs: &[PathBuf],
 ) -> Result<Vec<ModelFiles>, Failure> {
     let outputs = ModelFiles::of(out, estimators);
-    for path in outputs.iter().flat_map(|files| [&files.model, &files.curves]) {
+    for path in outputs.iter().flat_map(|files| [&files.model, &files.curves, &files.page]) {
         writable(path)?;
         atomic::guard_inputs(path, inputs.iter().map(PathBuf::as_path))?;
     }
+    outputs.iter().try_for_each(|files| replaceable(&files.page))?;
     Ok(outputs)
 }
 
@@ -83,15 +85,19 @@ pub(super) fn finish(
     outputs: &[ModelFiles],
     calibration: &Calibration,
     note: &CalibrationNote,
+    plot: &PlotArgs,
     session: &Session,
 ) -> Result<(), Failure> {
+    let Calibration { groups, outcomes, settings } = calibration;
+    let diagnoses = diagnose(groups, outcomes, settings);
     let mut files = Vec::new();
     for output in outputs {
         output.write(calibration, note)?;
-        files.extend([&output.model, &output.curves].map(|p| p.display().to_string()));
+        output.write_page(calibration, &diagnoses)?;
+        files.extend([&output.model, &output.curves, &output.page].map(|p| p.display().to_string()));
     }
-    let Calibration { groups, outcomes, settings } = calibration;
-    let diagnoses = diagnose(groups, outcomes, settings);
+    let all: Vec<&Outcome> = outcomes.iter().collect();
+    plot.write(|| report::calibration_svg(&CurvesFile::new(groups, &all, settings), &diagnoses), session)?;
     if session.json() {
         let json = report::json(&FitsFile::new(outcomes, &diagnoses, settings, files.clone()));
         session.printer.result(json.trim_end());

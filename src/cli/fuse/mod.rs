@@ -34,7 +34,7 @@ const ELSEWHERE_M: f64 = 10_000.0;
 /// sd_d_m, and v_n_m_s … sd_vd_m_s where velocity is measured. Or both as the text files of KF-GINS: 7 or 8
 /// columns of increments; 7 of position, 13 with velocity. Up to 5 s without samples are bridged, as uncertain
 /// as the recording is over such times elsewhere. Writes solution.csv, innovations.csv, errors.csv (with a
-/// reference), solution.kml, summary.json, manifest.json.
+/// reference), solution.kml, summary.json, report.html, manifest.json.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:

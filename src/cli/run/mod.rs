@@ -5,12 +5,13 @@ mod output;
 mod words;
 
 use super::filter::FilterArgs;
+use super::pictures::PlotArgs;
 use super::{Failure, Session};
 use inputs::Inputs;
 use nav_sim::formats::scenario_file;
 use nav_sim::jobs::{self, NavigateError};
 use nav_sim::metrics::{Requirement, Summary};
-use nav_sim::report::{Manifest, seconds};
+use nav_sim::report::{Manifest, TrajectorySeries, seconds};
 use nav_sim::scenario::{Method, Scenario};
 use nav_sim::sensors::imu::TruthError;
 use nav_sim::sensors::outage::{Outage, PlacedOutages};
@@ -70,6 +71,8 @@ pub(crate) struct Args {
     /// Everything of the run in one TOML file; flags win over it (see `nav-sim schema scenario`)
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
+    #[command(flatten)]
+    plot: PlotArgs,
     /// Run directory to make
     #[arg(long, short, value_name = "DIR", default_value = "out/run")]
     out: PathBuf,
@@ -126,6 +129,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             .warn("--runs counts nothing here: --method lincov makes none; both makes them beside it");
     }
     output::try_open(&args.out, &inputs.files)?;
+    args.plot.guard(&inputs.files.iter().map(|i| PathBuf::from(&i.path)).collect::<Vec<_>>())?;
     let words = Words::new(session);
     let found = jobs::navigate(&inputs.job, &scenario, &outages, seed, &words);
     let mut found = found.map_err(|e| impossible(e, &args.model))?;
@@ -136,7 +140,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let wall_s = words.runs_s();
     let throughput_epochs_per_s = if wall_s > 0.0 { epochs / wall_s } else { 0.0 };
     let manifest = Manifest { independent_windows, wall_s, throughput_epochs_per_s, ..manifest };
-    write(&found, &manifest, &args.out)?;
+    write(&found, &manifest, &TrajectorySeries::of(&inputs.job.trajectory), &args.out)?;
+    args.plot.write(|| nav_sim::report::run_svg(&found.epochs, &found.summary), session)?;
     let shown = if session.json() { nav_sim::report::summary_json } else { text };
     session.printer.result(shown(&found.summary, throughput_epochs_per_s).trim_end());
     output::doubt_filter(&found.summary, session);

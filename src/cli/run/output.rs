@@ -6,7 +6,7 @@ use crate::cli::{Failure, Session};
 use nav_sim::formats::atomic::{self, AtomicDir};
 use nav_sim::jobs::Navigation;
 use nav_sim::metrics::{Budget, Met, OutageSummary, PerState, Summary, VerdictKind};
-use nav_sim::report::{self, Input, Manifest, ModelNote, seconds};
+use nav_sim::report::{self, Input, Manifest, ModelNote, TrajectorySeries, seconds};
 use nav_sim::scenario::{Method, Scenario};
 use nav_sim::sensors::outage::Outage;
 use nav_sim::simulation::REPORTED_NAMES;
@@ -80,9 +80,14 @@ pub(crate) fn empty_or_new(path: &Path) -> Result<(), Failure> {
 }
 
 /// Writes a run directory.
-pub(super) fn write(found: &Navigation, manifest: &Manifest, path: &Path) -> Result<(), Failure> {
+pub(super) fn write(
+    found: &Navigation,
+    manifest: &Manifest,
+    track: &TrajectorySeries,
+    path: &Path,
+) -> Result<(), Failure> {
     let mut directory = AtomicDir::create(path)?;
-    for file in report::run_directory(found.runs.as_ref(), &found.epochs, &found.summary, manifest) {
+    for file in report::run_directory(found.runs.as_ref(), &found.epochs, &found.summary, manifest, track) {
         directory.write_parts(file.name, file.parts)?;
     }
     Ok(directory.commit()?)

@@ -2,13 +2,9 @@
 
 use super::{Source, wrote};
 use crate::cli::{Failure, Session};
-use nav_sim::earth::ned_difference;
 use nav_sim::formats::atomic;
-use nav_sim::frames::RollPitchYaw;
 use nav_sim::report::{TrajectorySeries, trajectory_svg};
 use nav_sim::sensors::outage::Outage;
-use nav_sim::trajectory::Trajectory;
-use nav_sim::units::DEG;
 use std::path::PathBuf;
 
 /// Draw a trajectory: map, height, speed, attitude, outages marked
@@ -37,33 +33,12 @@ fn outage(text: &str) -> Result<Outage, String> {
     outage.validate().map(|()| outage).map_err(|e| e.to_string())
 }
 
-/// Instants drawn: more do not show.
-const INSTANTS: u32 = 4000;
-
 pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     atomic::guard_inputs(&args.out, [args.source.path.as_path()])?;
     let (trajectory, _) = args.source.read(session)?;
     let outages: Vec<_> = args.outages.iter().map(|o| (o.start_s, o.end_s)).collect();
     let name = args.source.path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    atomic::write(&args.out, trajectory_svg(&name, &series(&trajectory), &outages))?;
+    atomic::write(&args.out, trajectory_svg(&name, &TrajectorySeries::of(&trajectory), &outages))?;
     wrote(&args.out, session);
     Ok(())
-}
-
-fn series(trajectory: &Trajectory) -> TrajectorySeries {
-    let start = trajectory.state(trajectory.start_s());
-    let step = (trajectory.end_s() - trajectory.start_s()) / f64::from(INSTANTS);
-    let mut series = TrajectorySeries::default();
-    for k in 0..=INSTANTS {
-        let t_s = trajectory.start_s() + step * f64::from(k);
-        let state = trajectory.state(t_s);
-        let moved = ned_difference(&start, state.lat, state.lon, state.h);
-        let rpy = RollPitchYaw::from_quat(state.q_b_n);
-        series.t_s.push(t_s);
-        series.north_east_m.push([moved.x, moved.y]);
-        series.height_m.push(state.h);
-        series.speed_m_s.push(state.v_n.length());
-        series.rpy_deg.push([rpy.roll, rpy.pitch, rpy.yaw].map(|a| a / DEG));
-    }
-    series
 }

@@ -1,0 +1,262 @@
+//! What a chart shows, before it is drawn.
+
+/// How an axis runs.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Scale {
+    /// Evenly.
+    Linear,
+    /// By powers of ten; what is not positive is not shown.
+    Log,
+    /// One place for each of these names: the k-th stands at k.
+    Names(Vec<String>),
+}
+
+/// An axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    /// Quantity and unit, such as `time (s)`.
+    pub label: String,
+    /// How it runs.
+    pub scale: Scale,
+    /// What it shows at least.
+    pub include: Option<(f64, f64)>,
+}
+
+impl Axis {
+    /// A linear axis.
+    #[must_use]
+    pub fn linear(label: &str) -> Self {
+        Self { label: label.to_owned(), scale: Scale::Linear, include: None }
+    }
+
+    /// A logarithmic axis.
+    #[must_use]
+    pub fn log(label: &str) -> Self {
+        Self { scale: Scale::Log, ..Self::linear(label) }
+    }
+
+    /// An axis of names.
+    #[must_use]
+    pub fn names(names: Vec<String>) -> Self {
+        Self { scale: Scale::Names(names), ..Self::linear("") }
+    }
+
+    /// The same, showing at least the values from `low` to `high`.
+    #[must_use]
+    pub fn including(self, low: f64, high: f64) -> Self {
+        Self { include: Some((low, high)), ..self }
+    }
+}
+
+/// A colour of the palette, which the blind to red or green can tell apart too (Okabe and Ito).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Colour {
+    /// That of the text: measurements.
+    Ink,
+    /// Grey: what stands in the background.
+    Soft,
+    /// One of [`Colour::HUES`]; more begin anew.
+    Hue(usize),
+}
+
+impl Colour {
+    /// Hues of the palette.
+    pub const HUES: usize = 8;
+    /// What a filter or a model believes.
+    pub const BELIEVED: Self = Self::Hue(0);
+    /// What is true.
+    pub const REAL: Self = Self::Hue(1);
+    /// Where a right filter or model stays.
+    pub const RIGHT: Self = Self::Hue(2);
+
+    /// Class of the style sheet.
+    pub(super) fn class(self) -> String {
+        match self {
+            Self::Ink => "ink".to_owned(),
+            Self::Soft => "soft".to_owned(),
+            Self::Hue(k) => format!("h{}", k % Self::HUES),
+        }
+    }
+}
+
+/// How a line is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stroke {
+    /// As most are.
+    Plain,
+    /// One of many.
+    Thin,
+    /// In strokes.
+    Dashed,
+    /// Beneath another one, to mark a stretch of it.
+    Bold,
+}
+
+impl Stroke {
+    /// Class of the style sheet.
+    pub(super) const fn class(self) -> &'static str {
+        match self {
+            Self::Plain => "line",
+            Self::Thin => "line thin",
+            Self::Dashed => "line dashed",
+            Self::Bold => "line bold",
+        }
+    }
+}
+
+/// A point and its interval.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interval {
+    /// Where.
+    pub x: f64,
+    /// The value.
+    pub y: f64,
+    /// Lower end; NaN: none.
+    pub low: f64,
+    /// Upper end; NaN: none.
+    pub high: f64,
+}
+
+/// What is drawn of a series.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Mark {
+    /// A line through points (x, y); a value that cannot be shown breaks it.
+    Line(Vec<(f64, f64)>, Stroke),
+    /// The area between two curves (x, low, high).
+    Band(Vec<(f64, f64, f64)>),
+    /// Points with error bars.
+    Points(Vec<Interval>),
+    /// Bars from one value to another (x, from, to), on a linear axis.
+    Bars(Vec<(f64, f64, f64)>),
+    /// A line at one value of y.
+    Level(f64),
+    /// The area between two values of y.
+    Zone(f64, f64),
+    /// A dot with its name beside it, at (x, y); not in the legend.
+    Place(f64, f64),
+}
+
+/// Something to see and its name in the legend. Series of one name, in all panels, are one entry there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Name; of an empty one the legend says nothing.
+    pub name: String,
+    /// Colour.
+    pub colour: Colour,
+    /// What is drawn.
+    pub mark: Mark,
+}
+
+impl Series {
+    /// A series.
+    #[must_use]
+    pub fn new(name: &str, colour: Colour, mark: Mark) -> Self {
+        Self { name: name.to_owned(), colour, mark }
+    }
+
+    /// A line.
+    #[must_use]
+    pub fn line(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
+        Self::new(name, colour, Mark::Line(points, Stroke::Plain))
+    }
+
+    /// A thin line.
+    #[must_use]
+    pub fn thin(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
+        Self::new(name, colour, Mark::Line(points, Stroke::Thin))
+    }
+
+    /// A dashed line.
+    #[must_use]
+    pub fn dashed(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
+        Self::new(name, colour, Mark::Line(points, Stroke::Dashed))
+    }
+}
+
+/// One plot of a chart, all of which share their x axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Panel {
+    /// Its own axis.
+    pub y: Axis,
+    /// What is in it, the first at the bottom.
+    pub series: Vec<Series>,
+    /// Its height as a share of the usual one.
+    pub height: f64,
+}
+
+impl Panel {
+    /// A panel of the usual height.
+    #[must_use]
+    pub fn new(y: Axis, series: Vec<Series>) -> Self {
+        Self { y, series, height: 1.0 }
+    }
+}
+
+/// How much room a chart takes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Size {
+    /// The whole width: drawn twice, for a screen and for a phone.
+    Full,
+    /// One of several side by side ([`super::Page::charts`]).
+    Small,
+}
+
+/// Panels above one another with one x axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chart {
+    /// What it shows, in words.
+    pub title: String,
+    /// The axis of all panels.
+    pub x: Axis,
+    /// From top to bottom.
+    pub panels: Vec<Panel>,
+    /// Vertical stripes (from, to), such as outages, and what they are.
+    pub stripes: (String, Vec<(f64, f64)>),
+    /// Whether x and y have one scale, as on a map.
+    pub is_map: bool,
+    /// Charts of one group are zoomed together, and show their values at the same x.
+    pub group: String,
+    /// How much room it takes.
+    pub size: Size,
+}
+
+impl Chart {
+    /// A chart of one or more panels, of the whole width.
+    #[must_use]
+    pub fn new(title: &str, x: Axis, panels: Vec<Panel>) -> Self {
+        Self {
+            title: title.to_owned(),
+            x,
+            panels,
+            stripes: (String::new(), Vec::new()),
+            is_map: false,
+            group: String::new(),
+            size: Size::Full,
+        }
+    }
+
+    /// A map: east to the right, north up, in metres, one scale.
+    #[must_use]
+    pub fn map(title: &str, series: Vec<Series>) -> Self {
+        let panel = Panel::new(Axis::linear("north (m)"), series);
+        Self { is_map: true, ..Self::new(title, Axis::linear("east (m)"), vec![panel]) }
+    }
+
+    /// The same with outages (start, end) marked.
+    #[must_use]
+    pub fn with_outages(self, outages: &[(f64, f64)]) -> Self {
+        Self { stripes: ("outage".to_owned(), outages.to_vec()), ..self }
+    }
+
+    /// The same in a group of charts that are zoomed together.
+    #[must_use]
+    pub fn in_group(self, group: &str) -> Self {
+        Self { group: group.to_owned(), ..self }
+    }
+
+    /// The same, small.
+    #[must_use]
+    pub fn small(self) -> Self {
+        Self { size: Size::Small, ..self }
+    }
+}

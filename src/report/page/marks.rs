@@ -1,0 +1,206 @@
+//! Marks as SVG paths.
+
+use super::axis::{Ruler, is_shown};
+use super::chart::{Interval, Mark, Scale, Series};
+use super::escape;
+use std::fmt::Write as _;
+
+/// Points beyond which each is small.
+const MANY: usize = 150;
+
+/// Rulers and scales of one panel.
+pub(super) struct Frame<'a> {
+    pub(super) x: Ruler,
+    pub(super) y: Ruler,
+    pub(super) scales: [&'a Scale; 2],
+    /// Points of a line that can be told apart.
+    pub(super) most: usize,
+}
+
+impl Frame<'_> {
+    fn shows(&self, x: f64, y: f64) -> bool {
+        is_shown(x, self.scales[0]) && is_shown(y, self.scales[1])
+    }
+
+    fn point(&self, x: f64, y: f64) -> String {
+        format!("{} {}", short(self.x.at(x)), short(self.y.at(y)))
+    }
+
+    /// The series as a group of paths.
+    pub(super) fn series(&self, series: &Series, key: usize, svg: &mut String) {
+        let _ = write!(
+            svg,
+            "<g class=\"series {}\" data-k=\"{key}\" data-name=\"{}\">",
+            series.colour.class(),
+            escape(&series.name)
+        );
+        match &series.mark {
+            Mark::Line(points, stroke) => {
+                path(svg, stroke.class(), &self.line(points));
+            }
+            Mark::Band(points) => path(svg, "area", &self.band(points)),
+            Mark::Points(points) => self.points(points, svg),
+            Mark::Bars(bars) => path(svg, "bar", &self.bars(bars)),
+            Mark::Level(y) => path(svg, "line level", &self.span(*y)),
+            Mark::Zone(low, high) => {
+                let (a, b) = self.x.range;
+                path(svg, "area", &self.band(&[(a, *low, *high), (b, *low, *high)]));
+            }
+            Mark::Place(x, y) => {
+                path(svg, "dot", &format!("M{}h0", self.point(*x, *y)));
+            }
+        }
+        *svg += "</g>\n";
+    }
+
+    fn line(&self, points: &[(f64, f64)]) -> String {
+        let mut d = String::new();
+        let mut pen_up = true;
+        for (x, y) in thinned(points, self.most) {
+            if self.shows(x, y) {
+                let _ = write!(d, "{}{}", if pen_up { 'M' } else { 'L' }, self.point(x, y));
+            }
+            pen_up = !self.shows(x, y);
+        }
+        d
+    }
+
+    /// There along the upper curve and back along the lower one; where one of them cannot be shown, it ends.
+    fn band(&self, points: &[(f64, f64, f64)]) -> String {
+        let points = thinned_band(points, self.most);
+        let is_drawn = |p: &(f64, f64, f64)| {
+            is_shown(p.0, self.scales[0]) && is_shown(p.2, self.scales[1]) && !p.1.is_nan()
+        };
+        let pieces = points.split(|p| !is_drawn(p)).filter(|piece| !piece.is_empty());
+        let closed = |piece: &[(f64, f64, f64)]| {
+            let at = |x: f64, y: f64| format!("{} {}", short(self.x.at(x)), short(self.y.within(y)));
+            let there = piece.iter().map(|p| at(p.0, p.2));
+            let back = piece.iter().rev().map(|p| at(p.0, p.1));
+            format!("M{}Z", there.chain(back).collect::<Vec<_>>().join("L"))
+        };
+        pieces.map(closed).collect()
+    }
+
+    fn points(&self, points: &[Interval], svg: &mut String) {
+        let shown = || points.iter().filter(|p| self.shows(p.x, p.y));
+        let bar = |p: &Interval| {
+            let [low, high] =
+                [p.low, p.high].map(|end| short(self.y.within(if end.is_nan() { p.y } else { end })));
+            format!("M{} {low}V{high}", short(self.x.at(p.x)))
+        };
+        path(svg, "whisker", &shown().map(bar).collect::<String>());
+        let class = if points.len() > MANY { "dot small" } else { "dot" };
+        path(svg, class, &shown().map(|p| format!("M{}h0", self.point(p.x, p.y))).collect::<String>());
+    }
+
+    /// As wide as 0.7 of the distance of two names.
+    fn bars(&self, bars: &[(f64, f64, f64)]) -> String {
+        let bar = |(x, from, to): &(f64, f64, f64)| {
+            let [left, right] = [x - 0.35, x + 0.35].map(|x| short(self.x.at(x)));
+            let [low, high] = [*from, *to].map(|y| short(self.y.within(y)));
+            format!("M{left} {low}H{right}V{high}H{left}Z")
+        };
+        bars.iter().filter(|(_, from, to)| from != to).map(bar).collect()
+    }
+
+    fn span(&self, y: f64) -> String {
+        if !is_shown(y, self.scales[1]) {
+            return String::new();
+        }
+        let (a, b) = self.x.range;
+        format!("M{}L{}", self.point(a, y), self.point(b, y))
+    }
+}
+
+fn path(svg: &mut String, class: &str, d: &str) {
+    if !d.is_empty() {
+        let _ = write!(svg, "<path class=\"{class}\" d=\"{d}\"/>");
+    }
+}
+
+/// A coordinate to a hundredth of a pixel, without idle zeros.
+pub(super) fn short(pixels: f64) -> String {
+    let text = format!("{pixels:.2}");
+    text.trim_end_matches('0').trim_end_matches('.').to_owned()
+}
+
+/// At most about so many points: of each bucket its lowest and its highest one, so that peaks stay; a gap stays
+/// a gap.
+fn thinned(points: &[(f64, f64)], most: usize) -> Vec<(f64, f64)> {
+    if points.len() <= most {
+        return points.to_vec();
+    }
+    let bucket = points.len().div_ceil(most / 2);
+    if !points.is_sorted_by(|a, b| a.0 <= b.0) {
+        // a track: what is lowest in y says nothing of its shape
+        return points.iter().step_by(bucket.div_ceil(2)).chain(points.last()).copied().collect();
+    }
+    let extremes = |chunk: &[(f64, f64)]| {
+        let by_y = |a: &&(f64, f64), b: &&(f64, f64)| a.1.total_cmp(&b.1);
+        let gap = chunk.iter().find(|p| !p.1.is_finite()).copied();
+        let known = || chunk.iter().filter(|p| p.1.is_finite());
+        let mut pair: Vec<(f64, f64)> =
+            known().min_by(by_y).into_iter().chain(known().max_by(by_y)).copied().chain(gap).collect();
+        pair.sort_by(|a, b| a.0.total_cmp(&b.0));
+        pair.dedup();
+        pair
+    };
+    points.chunks(bucket).flat_map(extremes).collect()
+}
+
+/// The same of a band: of each bucket all that it covers.
+fn thinned_band(points: &[(f64, f64, f64)], most: usize) -> Vec<(f64, f64, f64)> {
+    if points.len() <= most {
+        return points.to_vec();
+    }
+    let cover = |chunk: &[(f64, f64, f64)]| {
+        let low = chunk.iter().fold(f64::INFINITY, |low, p| low.min(p.1));
+        let high = chunk.iter().fold(f64::NEG_INFINITY, |high, p| high.max(p.2));
+        (chunk[chunk.len() / 2].0, low, high)
+    };
+    points.chunks(points.len().div_ceil(most)).map(cover).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame(y: &Scale) -> Frame<'_> {
+        let ruler = |pixels| Ruler { range: (1.0, 11.0), is_log: false, pixels };
+        Frame { x: ruler((0.0, 100.0)), y: ruler((100.0, 0.0)), scales: [&Scale::Linear, y], most: 100 }
+    }
+
+    #[test]
+    fn what_cannot_be_shown_breaks_the_line() {
+        let points = [(1.0, 1.0), (2.0, f64::NAN), (3.0, 2.0), (4.0, 3.0), (5.0, -1.0), (6.0, 3.0)];
+        assert_eq!(frame(&Scale::Log).line(&points), "M0 100M20 90L30 80M50 80");
+        assert_eq!(frame(&Scale::Linear).line(&points[2..]), "M20 90L30 80L40 120L50 80");
+    }
+
+    #[test]
+    fn a_band_goes_there_and_back() {
+        assert_eq!(
+            frame(&Scale::Linear).band(&[(1.0, 2.0, 3.0), (11.0, 2.0, 30.0)]),
+            "M0 80L100 0L100 90L0 90Z"
+        );
+        assert_eq!(
+            frame(&Scale::Linear).bars(&[(6.0, 1.0, 2.0), (7.0, 2.0, 2.0)]),
+            "M46.5 100H53.5V90H46.5Z"
+        );
+    }
+
+    #[test]
+    fn thinning_keeps_peaks_and_gaps() {
+        let value = |i| match i {
+            77_777 => 9.0,
+            50_000 => f64::NAN,
+            _ => 0.0,
+        };
+        let points: Vec<(f64, f64)> = (0..100_000).map(|i| (f64::from(i), value(i))).collect();
+        let thin = thinned(&points, 1000);
+        assert!(thin.len() <= 1501 && thin.iter().any(|p| p.1 == 9.0) && thin.iter().any(|p| p.1.is_nan()));
+        let band: Vec<_> = points.iter().map(|(x, y)| (*x, -y, *y)).collect();
+        let thin = thinned_band(&band, 1000);
+        assert!(thin.len() <= 1000 && thin.iter().any(|p| (p.1, p.2) == (-9.0, 9.0)));
+    }
+}

@@ -1,0 +1,212 @@
+//! Pages of results: one self-contained HTML file each (no network, complete without scripts, for a screen, a phone,
+//! paper, by day and by night), and charts as files. A page is a function of the results alone: same seed, same bytes.
+//!
+//! ```
+//! use nav_sim::report::page::{Axis, Chart, Colour, Page, Panel, Series, Table, Tone};
+//! let drift = Series::line("RMSE", Colour::REAL, vec![(0.0, 1.0), (30.0, 4.0), (60.0, 20.0)]);
+//! let belief = Series::line("ASEE", Colour::BELIEVED, vec![(0.0, 1.0), (30.0, 5.0), (60.0, 18.0)]);
+//! let panel = Panel::new(Axis::log("position error (m)"), vec![drift, belief]);
+//! let chart = Chart::new("Drift", Axis::linear("time (s)"), vec![panel]).with_outages(&[(10.0, 50.0)]);
+//! let mut page = Page::new("A drive", Tone::Good, "The filter is consistent.");
+//! page.section("Results");
+//! page.chart(&chart, "RMSE: how wrong the runs were. ASEE: how wrong the filter believed to be.");
+//! let mut table = Table::new(["state", "RMSE (m)"]);
+//! table.row(["north".into(), nav_sim::report::page::Cell::number(20.0, "/rmse_end/pos_n_m")]);
+//! page.table(&table);
+//! assert!(page.html().starts_with("<!DOCTYPE html>"));
+//! assert!(nav_sim::report::page::svg("Drift", &[chart]).starts_with("<svg xmlns="));
+//! ```
+
+mod axis;
+mod chart;
+mod draw;
+mod legend;
+mod marks;
+mod table;
+
+pub use chart::{Axis, Chart, Colour, Interval, Mark, Panel, Scale, Series, Size, Stroke};
+pub use table::{Cell, Table};
+
+use draw::{Canvas, NARROW, SMALL, WIDE, draw, text};
+use std::fmt::Write as _;
+
+const CHART_STYLE: &str = include_str!("chart.css");
+const PAGE_STYLE: &str = include_str!("page.css");
+const SCRIPT: &str = include_str!("page.js");
+
+/// How a verdict is coloured.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tone {
+    /// As it should be.
+    Good,
+    /// To be looked at.
+    Doubtful,
+    /// Not to be believed.
+    Bad,
+}
+
+/// A page: a title, a verdict, then sections of words, charts and tables.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Page {
+    title: String,
+    body: String,
+}
+
+impl Page {
+    /// A page that begins with its verdict, one or two sentences.
+    #[must_use]
+    pub fn new(title: &str, tone: Tone, verdict: &str) -> Self {
+        let class = match tone {
+            Tone::Good => "",
+            Tone::Doubtful => " doubtful",
+            Tone::Bad => " bad",
+        };
+        let (title, verdict) = (escape(title), escape(verdict));
+        let body = format!("<h1>{title}</h1>\n<p class=\"verdict{class}\">{verdict}</p>\n");
+        Self { title, body }
+    }
+
+    /// Begins a section.
+    pub fn section(&mut self, title: &str) {
+        let _ = writeln!(self.body, "<h2>{}</h2>", escape(title));
+    }
+
+    /// A heading within a section.
+    pub fn heading(&mut self, title: &str) {
+        let _ = writeln!(self.body, "<h3>{}</h3>", escape(title));
+    }
+
+    /// A paragraph.
+    pub fn text(&mut self, words: &str) {
+        let _ = writeln!(self.body, "<p>{}</p>", escape(words));
+    }
+
+    /// Names and what they are, line by line.
+    pub fn facts(&mut self, facts: &[(&str, String)]) {
+        self.body += "<dl>\n";
+        for (name, value) in facts {
+            let _ = writeln!(self.body, "<dt>{}</dt><dd>{}</dd>", escape(name), escape(value));
+        }
+        self.body += "</dl>\n";
+    }
+
+    /// Links to files beside the page: relative path and what is there.
+    pub fn links(&mut self, links: &[(String, String)]) {
+        self.body += "<ul>\n";
+        for (path, name) in links {
+            let _ = writeln!(self.body, "<li><a href=\"{}\">{}</a></li>", escape(path), escape(name));
+        }
+        self.body += "</ul>\n";
+    }
+
+    /// A chart and what is to be seen in it.
+    pub fn chart(&mut self, chart: &Chart, caption: &str) {
+        self.body += &figure(chart, caption);
+    }
+
+    /// Small charts side by side; one below the other on a phone.
+    pub fn charts(&mut self, charts: &[Chart], caption: &str) {
+        self.body += "<div class=\"charts\">\n";
+        charts.iter().for_each(|chart| self.body += &figure(chart, ""));
+        let _ = writeln!(self.body, "</div>\n<figcaption>{}</figcaption>", escape(caption));
+    }
+
+    /// A table.
+    pub fn table(&mut self, table: &Table) {
+        self.body += &table.html();
+    }
+
+    /// A text as it stands in a file.
+    pub fn code(&mut self, text: &str) {
+        let _ = writeln!(self.body, "<pre>{}</pre>", escape(text));
+    }
+
+    /// What few want to see, folded.
+    pub fn folded(&mut self, title: &str, inside: impl FnOnce(&mut Self)) {
+        let _ = writeln!(self.body, "<details><summary>{}</summary>", escape(title));
+        inside(self);
+        self.body += "</details>\n";
+    }
+
+    /// The file.
+    #[must_use]
+    pub fn html(&self) -> String {
+        let Self { title, body } = self;
+        format!(
+            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+             {GENERATOR}\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{title}</title>\n\
+             <style>\n{CHART_STYLE}{PAGE_STYLE}</style>\n</head>\n<body>\n<main>\n{body}</main>\n\
+             <script>\n{SCRIPT}</script>\n</body>\n</html>\n"
+        )
+    }
+}
+
+/// Tells our pages from those of others.
+const GENERATOR: &str = "<meta name=\"generator\" content=\"nav-sim\">";
+
+/// Whether a text is a page of this module.
+#[must_use]
+pub fn is_own(html: &str) -> bool {
+    html.contains(GENERATOR)
+}
+
+/// The tone of a good or a bad result.
+impl From<bool> for Tone {
+    fn from(is_good: bool) -> Self {
+        if is_good { Self::Good } else { Self::Bad }
+    }
+}
+
+fn figure(chart: &Chart, caption: &str) -> String {
+    let title = escape(&chart.title);
+    let canvases: &[Canvas] = if chart.size == Size::Small { &[SMALL] } else { &[WIDE, NARROW] };
+    let drawn: String = canvases.iter().filter_map(|canvas| element(chart, canvas)).collect();
+    let inside = if drawn.is_empty() { "<p>No value to show.</p>\n" } else { &drawn };
+    let caption = if caption.is_empty() {
+        String::new()
+    } else {
+        format!("<figcaption>{}</figcaption>\n", escape(caption))
+    };
+    format!("<figure>\n<h3>{title}</h3>\n{inside}{caption}</figure>\n")
+}
+
+fn element(chart: &Chart, canvas: &Canvas) -> Option<String> {
+    let (inside, height) = draw(chart, canvas)?;
+    let group = if chart.is_map { "map" } else { &chart.group };
+    Some(format!(
+        "<svg class=\"chart {}\" viewBox=\"0 0 {} {height}\" role=\"img\" aria-label=\"{}\" data-group=\"{}\">\n{inside}</svg>\n",
+        canvas.class,
+        canvas.width,
+        escape(&chart.title),
+        escape(group)
+    ))
+}
+
+/// Charts below one another as an SVG file; those without a value are left out.
+#[must_use]
+pub fn svg(title: &str, charts: &[Chart]) -> String {
+    const MARGIN: f64 = 16.0;
+    let line = 2.0 * WIDE.font;
+    let (mut body, mut top) = (String::new(), MARGIN);
+    for chart in charts {
+        let Some((inside, height)) = draw(chart, &WIDE) else { continue };
+        let _ = writeln!(body, "<g transform=\"translate({MARGIN} {top})\">");
+        text(&mut body, "title", (0.0, WIDE.font), "start", &chart.title);
+        let _ = writeln!(body, "<g transform=\"translate(0 {line})\">\n{inside}</g></g>");
+        top += line + height + MARGIN;
+    }
+    let (width, title) = (WIDE.width + 2.0 * MARGIN, escape(title));
+    format!(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"chart wide\" viewBox=\"0 0 {width} {top}\" width=\"{width}\" \
+         height=\"{top}\" role=\"img\">\n<title>{title}</title>\n<style>\n{CHART_STYLE}</style>\n\
+         <rect class=\"paper\" width=\"{width}\" height=\"{top}\"/>\n{body}</svg>\n"
+    )
+}
+
+/// Text made safe inside HTML and SVG.
+pub(crate) fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,83 @@
+use super::*;
+
+fn chart() -> Chart {
+    let curve = (0..50).map(|i| (f64::from(i), 1.0 + f64::from(i))).collect();
+    let band = (0..50).map(|i| (f64::from(i), 0.5, 2.0 + f64::from(i))).collect();
+    let upper = vec![
+        Series::new("confidence <95 %>", Colour::BELIEVED, Mark::Band(band)),
+        Series::line("RMSE", Colour::REAL, curve),
+        Series::new("", Colour::Soft, Mark::Level(9.0)),
+    ];
+    let lower = vec![Series::line("RMSE", Colour::REAL, vec![(0.0, 1.0), (49.0, f64::NAN)])];
+    let panels = vec![Panel::new(Axis::log("error (m)"), upper), Panel::new(Axis::linear("ratio"), lower)];
+    Chart::new("a<b", Axis::linear("time (s)"), panels).with_outages(&[(10.0, 20.0), (80.0, 90.0)])
+}
+
+fn page(chart: &Chart) -> String {
+    let mut page = Page::new("x & y", Tone::Bad, "It is <bad>.");
+    page.chart(chart, "A caption.");
+    page.html()
+}
+
+/// A screen's drawing and a phone's, each with two panels, the outage within the time shown in each, one name in the
+/// legend for both panels.
+#[test]
+fn a_chart_is_drawn_for_a_screen_and_for_a_phone() {
+    let html = page(&chart());
+    assert_eq!(html.matches("<svg class=\"chart wide\"").count(), 1);
+    assert_eq!(html.matches("<svg class=\"chart narrow\"").count(), 1);
+    assert_eq!(html.matches("<svg class=\"plot\"").count(), 4);
+    assert_eq!(html.matches("class=\"outage\" x").count(), 6); // and one in each legend
+    assert_eq!(html.matches("<g class=\"key h1\"").count(), 2);
+    assert!(html.contains(">a&lt;b</h3>") && html.contains("It is &lt;bad&gt;.") && !html.contains("NaN"));
+}
+
+/// The page asks nothing of the network.
+#[test]
+fn a_page_is_self_contained() {
+    let html = page(&chart());
+    let without_names = html.replace("http://www.w3.org/2000/svg", "");
+    for word in ["http:", "https:", "src=", "@import", "url(", "<link"] {
+        assert!(!without_names.contains(word), "{word}");
+    }
+    assert!(html.ends_with("</html>\n"));
+}
+
+#[test]
+fn nothing_to_show_is_said() {
+    let empty = Chart::new("t", Axis::linear("x"), vec![Panel::new(Axis::log("y"), vec![])]);
+    assert!(page(&empty).contains("No value to show."));
+    let picture = svg("title", &[empty, chart()]);
+    assert!(picture.starts_with("<svg xmlns=") && picture.ends_with("</svg>\n"));
+    assert_eq!(picture.matches("class=\"title\"").count(), 1);
+}
+
+/// A square of 100 m by 100 m is drawn as one.
+#[test]
+fn a_map_has_one_scale() {
+    let corners = vec![(0.0, 0.0), (100.0, 0.0), (100.0, 100.0), (0.0, 100.0)];
+    let series = vec![
+        Series::line("way", Colour::Ink, corners),
+        Series::new("start", Colour::RIGHT, Mark::Place(0.0, 0.0)),
+    ];
+    let html = page(&Chart::map("map", series));
+    let from = html.find("class=\"line\" d=\"M").unwrap() + 17;
+    let path = &html[from..from + html[from..].find('"').unwrap()];
+    let points: Vec<Vec<f64>> =
+        path.split('L').map(|p| p.split(' ').map(|c| c.parse().unwrap()).collect()).collect();
+    let (east, north) = (points[1][0] - points[0][0], points[1][1] - points[2][1]);
+    assert!((east - north).abs() < 0.02 && east > 100.0, "{path}");
+    assert!(html.contains(">start</text>") && html.contains(">20 m</text>"), "{path}");
+}
+
+#[test]
+fn tables_say_where_their_numbers_are_from() {
+    let mut table = Table::new(["state", "RMSE (m)"]).and(["note".to_owned()]);
+    table.row(["<north>".into(), Cell::number(1.2345, "/rmse/pos_n_m"), "x".into()]);
+    let html = table.html();
+    assert!(html.contains("<th class=\"number\">RMSE (m)</th>"), "{html}");
+    assert!(
+        html.contains("<td>&lt;north&gt;</td><td class=\"number\" data-json=\"/rmse/pos_n_m\">1.23</td>"),
+        "{html}"
+    );
+}

@@ -1,0 +1,193 @@
+//! The page of a comparison: what the filters believe over time beside the reference, the paper's Figure 7 and Table I.
+
+use super::{STATES, tone, window};
+use crate::metrics::{Measured, VerdictKind};
+use crate::report::comparison::{CandidateResult, ComparisonFile, Row, in_order, table_rows, verdict_lines};
+use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, Table, svg};
+use crate::simulation::{REPORTED, REPORTED_NAMES};
+
+/// How the ASEE of a run departs from that of the reference over time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RatioCurves {
+    /// Time (s).
+    pub t_s: Vec<f64>,
+    /// (ratio − 1)·100 of each reported state.
+    pub asee_pct: Vec<[f64; REPORTED]>,
+}
+
+impl RatioCurves {
+    /// Of two experiments with the same epochs.
+    #[must_use]
+    pub fn of(candidate: &Measured, reference: &Measured) -> Self {
+        let both = candidate.epochs.iter().zip(&reference.epochs);
+        let pct = |i: usize, a: &[f64; REPORTED], b: &[f64; REPORTED]| 100.0 * (a[i] / b[i] - 1.0);
+        Self {
+            t_s: candidate.epochs.iter().map(|e| e.t_s).collect(),
+            asee_pct: both.map(|(c, r)| std::array::from_fn(|i| pct(i, &c.asee, &r.asee))).collect(),
+        }
+    }
+}
+
+/// The page. `curves`: one a candidate; `outages` are (start, end) in seconds; `links`: pages beneath, path and name.
+#[must_use]
+pub fn comparison_page(
+    file: &ComparisonFile,
+    candidates: &[CandidateResult],
+    curves: &[RatioCurves],
+    outages: &[(f64, f64)],
+    states: &[usize],
+    links: &[(String, String)],
+) -> String {
+    let gravest = [VerdictKind::Diverged, VerdictKind::Overconfident, VerdictKind::Underconfident];
+    let has = |kind: &VerdictKind| file.verdicts.iter().any(|row| row.verdict.kind == *kind);
+    let kind = gravest.into_iter().find(has).unwrap_or(VerdictKind::Ok);
+    let mut page = Page::new("What the filters believe, compared", tone(kind), &verdict(file));
+    let paired = if file.paired {
+        "; the runs saw the same noise, intervals are those of paired differences"
+    } else {
+        ""
+    };
+    page.text(&format!("Reference: {}{paired}.", file.reference));
+    for chart in charts(candidates, curves, outages, states) {
+        page.chart(&chart, CAPTION);
+    }
+    if !outages.is_empty() {
+        page.section("ASEE against the reference, mean over the outage (%)");
+        page.text(
+            "The layout of the paper's Table I: mean of (ASEE ratio − 1)·100 ± half its 95 % Monte-Carlo interval, in brackets \
+             the mean of its absolute value.",
+        );
+        page.table(&Table::of_rows(&with_times(table_rows(candidates, states), outages)));
+        page.section("Consistency and errors");
+        page.text("NEES (9 if right) and coverage over the outage; RMSE at its end against the reference, (ratio − 1)·100.");
+        page.table(&consistency(file, outages, states));
+    }
+    if !links.is_empty() {
+        page.section("Pages of the single results");
+        page.links(links);
+    }
+    page.html()
+}
+
+/// Which filters are not as good as they believe, or better.
+fn verdict(file: &ComparisonFile) -> String {
+    let (right, wrong): (Vec<_>, Vec<_>) =
+        file.verdicts.iter().cloned().partition(|row| row.verdict.kind == VerdictKind::Ok);
+    let lines = verdict_lines(&wrong);
+    match (right.len(), lines.as_slice()) {
+        (n, []) => format!("All {n} filters are consistent: their errors are as large as they believe."),
+        (0, lines) => format!("{}.", lines.join(". ")),
+        (n, lines) => format!("{}. The other {n} filters are consistent.", lines.join(". ")),
+    }
+}
+
+/// The paper's Figure 7 as a picture.
+#[must_use]
+pub fn comparison_svg(
+    candidates: &[CandidateResult],
+    curves: &[RatioCurves],
+    outages: &[(f64, f64)],
+    states: &[usize],
+) -> String {
+    svg("ASEE against the reference", &charts(candidates, curves, outages, states))
+}
+
+const CAPTION: &str = "ASEE (averaged standard estimation error): the filter's own standard deviation. 0 % is as the reference believes; \
+                       below it a filter is surer of itself.";
+
+/// Scenarios that have a chart each; of more, one chart has all runs.
+const SCENARIOS: usize = 6;
+
+/// A chart a scenario, with a curve an estimator; where the names of the runs tell neither, one with all runs.
+fn charts(
+    candidates: &[CandidateResult],
+    curves: &[RatioCurves],
+    outages: &[(f64, f64)],
+    states: &[usize],
+) -> Vec<Chart> {
+    let all: Vec<(&CandidateResult, &RatioCurves)> =
+        candidates.iter().zip(curves).filter(|(c, _)| !c.is_reference).collect();
+    let scenarios = in_order(candidates.iter().map(|c| c.label.scenario.as_str()));
+    let estimators = in_order(candidates.iter().map(|c| c.label.estimator.as_str()));
+    let is_laid_out = estimators.len() > 1 && scenarios.len() <= SCENARIOS && !estimators.contains(&"");
+    if !is_laid_out {
+        let own: Vec<Curve<'_>> =
+            all.iter().enumerate().map(|(hue, (c, curves))| Curve { name: &c.run, hue, curves }).collect();
+        return vec![chart("ASEE against the reference", &own, outages, states)];
+    }
+    let hue = |estimator: &str| estimators.iter().position(|e| *e == estimator).unwrap_or(0);
+    let of_scenario = |scenario: &&str| {
+        let own = all.iter().filter(|(c, _)| c.label.scenario == *scenario);
+        let curves: Vec<Curve<'_>> = own
+            .map(|(c, curves)| Curve { name: &c.label.estimator, hue: hue(&c.label.estimator), curves })
+            .collect();
+        let title = format!("ASEE against the reference, scenario {scenario}");
+        (!curves.is_empty()).then(|| chart(&title, &curves, outages, states))
+    };
+    scenarios.iter().filter_map(of_scenario).collect()
+}
+
+/// One run in a chart.
+struct Curve<'a> {
+    name: &'a str,
+    hue: usize,
+    curves: &'a RatioCurves,
+}
+
+fn chart(title: &str, own: &[Curve<'_>], outages: &[(f64, f64)], states: &[usize]) -> Chart {
+    let panel = |state: &usize| {
+        let line = |c: &Curve<'_>| {
+            let points = c.curves.t_s.iter().zip(&c.curves.asee_pct).map(|(t, pct)| (*t, pct[*state]));
+            Series::line(c.name, Colour::Hue(c.hue), points.collect())
+        };
+        let zero = Series::new("", Colour::Ink, Mark::Level(0.0));
+        let name = STATES[*state].split(" (").next().unwrap_or_default();
+        let axis = Axis::linear(&format!("{name}: (ratio − 1)·100 (%)")).including(-1.0, 1.0);
+        let series = std::iter::once(zero).chain(own.iter().map(line)).collect();
+        Panel { height: 0.8, ..Panel::new(axis, series) }
+    };
+    let panels = states.iter().map(panel).collect();
+    Chart::new(title, Axis::linear("time (s)"), panels).with_outages(outages).in_group("time")
+}
+
+/// Outages by their times in the place of their numbers.
+fn with_times(mut rows: Vec<Vec<String>>, outages: &[(f64, f64)]) -> Vec<Vec<String>> {
+    for row in rows.iter_mut().skip(1) {
+        let time = row[1].parse::<usize>().ok().and_then(|k| outages.get(k - 1));
+        row[1] = time.map_or_else(String::new, |w| window(*w));
+    }
+    rows
+}
+
+/// A row a run and outage, as they stand in comparison.json.
+fn consistency(file: &ComparisonFile, outages: &[(f64, f64)], states: &[usize]) -> Table {
+    let errors =
+        states.iter().map(|s| format!("RMSE {} (%)", STATES[*s].split(" (").next().unwrap_or_default()));
+    let mut table = Table::new(["run", "outage", "NEES", "NEES of the reference", "coverage"]).and(errors);
+    for (i, row) in file.consistency.iter().enumerate() {
+        let at = |key: &str| format!("/consistency/{i}/{key}");
+        let mut cells: Vec<Cell> = vec![
+            row.run.clone().into(),
+            outages.get(row.outage).map_or_else(String::new, |w| window(*w)).into(),
+            Cell::number(row.nees_mean, &at("nees_mean")),
+            Cell::number(row.nees_mean_reference, &at("nees_mean_reference")),
+            Cell::number(row.coverage_mean, &at("coverage_mean")),
+        ];
+        for state in states {
+            let own =
+                |r: &&Row| r.run == row.run && r.outage == row.outage && r.state == REPORTED_NAMES[*state];
+            let place = file.rows.iter().position(|r| own(&r));
+            cells.push(place.map_or_else(
+                || Cell::figures("–"),
+                |k| {
+                    Cell::number(
+                        file.rows[k].rmse_end_ratio_error_pct,
+                        &format!("/rows/{k}/rmse_end_ratio_error_pct"),
+                    )
+                },
+            ));
+        }
+        table.row(cells);
+    }
+    table
+}

@@ -1,0 +1,145 @@
+//! The page of a fusion: the way, errors against a reference, innovations.
+
+use super::STATES;
+use crate::earth::ned_difference;
+use crate::fusion::{FixRecord, Row, Solution, Use};
+use crate::metrics::chi_square_band;
+use crate::report::fusion::FusionSummary;
+use crate::report::page::{Axis, Chart, Colour, Interval, Mark, Page, Panel, Series, Stroke};
+
+/// The page of a fusion directory.
+pub(crate) fn fusion_page(
+    solution: &Solution,
+    summary: &FusionSummary,
+    inputs: &[(String, String)],
+) -> String {
+    let outages = summary.windows();
+    let mut page = Page::new(
+        "INS/GNSS fusion of recorded data",
+        summary.tone(),
+        &format!("The solution is {}.", summary.verdict_line().trim_start_matches("verdict: ")),
+    );
+    let facts: Vec<(&str, String)> =
+        inputs.iter().map(|(role, path)| (role.as_str(), path.clone())).collect();
+    page.facts(&facts);
+    page.chart(
+        &map(solution, &outages),
+        "Solution, and reference where there is one; north and east of the start.",
+    );
+    page.section("Figures");
+    summary.text().lines().skip(1).for_each(|line| page.text(line));
+    if !outages.is_empty() {
+        page.table(&summary.outage_table());
+    }
+    page.section("Position");
+    page.chart(&position(&solution.rows, &outages), POSITION);
+    if solution.rows.iter().any(|row| row.error.is_some()) {
+        page.section("Errors against the reference");
+        page.charts(&errors(&solution.rows, &outages), "Estimate less reference, and ±3 σ of the filter.");
+    }
+    page.section("Fixes");
+    page.chart(&innovations(solution, &outages), INNOVATIONS);
+    page.chart(&nis(&solution.fixes, &outages), NIS);
+    page.html()
+}
+
+const POSITION: &str = "Standard deviation of the horizontal position that the filter states; with a reference, the distance from it.";
+const INNOVATIONS: &str =
+    "Estimated less measured position over its standard deviation; 95 % of used fixes belong into the band.";
+const NIS: &str = "Normalised innovation squared of each fix; 95 % belong into the band of a right filter.";
+
+fn timed(title: &str, panels: Vec<Panel>, outages: &[(f64, f64)]) -> Chart {
+    Chart::new(title, Axis::linear("time (s)"), panels).with_outages(outages).in_group("time")
+}
+
+fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
+    let Some(first) = solution.rows.first() else { return Chart::map("Way", Vec::new()) };
+    let place = |row: &Row| {
+        let moved = ned_difference(&first.state, row.state.lat, row.state.lon, row.state.h);
+        (moved.y, moved.x)
+    };
+    let reference = |row: &Row| row.error.map(|e| (place(row).0 - e.values[1], place(row).1 - e.values[0]));
+    let missing = (f64::NAN, f64::NAN);
+    let mut series = Vec::new();
+    for (start_s, end_s) in outages {
+        let within =
+            solution.rows.iter().filter(|row| (start_s..end_s).contains(&&row.t_s)).map(place).collect();
+        series.push(Series::new("outage", Colour::Hue(4), Mark::Line(within, Stroke::Bold)));
+    }
+    if solution.rows.iter().any(|row| row.error.is_some()) {
+        let way = solution.rows.iter().map(|row| reference(row).unwrap_or(missing)).collect();
+        series.push(Series::line("reference", Colour::Ink, way));
+    }
+    series.push(Series::line("solution", Colour::REAL, solution.rows.iter().map(place).collect()));
+    let ends = [("start", Some(first)), ("end", solution.rows.last())];
+    series.extend(ends.into_iter().filter_map(|(name, row)| {
+        let (east, north) = place(row?);
+        Some(Series::new(name, Colour::RIGHT, Mark::Place(east, north)))
+    }));
+    Chart::map("Way", series)
+}
+
+fn position(rows: &[Row], outages: &[(f64, f64)]) -> Chart {
+    let sigma = rows.iter().map(|row| (row.t_s, row.sigma[0].hypot(row.sigma[1]))).collect();
+    let error = |row: &Row| row.error.map_or(f64::NAN, |e| e.values[0].hypot(e.values[1]));
+    let mut series = vec![Series::line("σ of the filter", Colour::BELIEVED, sigma)];
+    if rows.iter().any(|row| row.error.is_some()) {
+        let errors = rows.iter().map(|row| (row.t_s, error(row))).collect();
+        series.push(Series::line("error against the reference", Colour::REAL, errors));
+    }
+    timed("Horizontal position", vec![Panel::new(Axis::log("horizontal (m)"), series)], outages)
+}
+
+fn errors(rows: &[Row], outages: &[(f64, f64)]) -> Vec<Chart> {
+    let chart = |(i, state): (usize, &&str)| {
+        let error = rows.iter().map(|row| (row.t_s, row.error.map_or(f64::NAN, |e| e.values[i]))).collect();
+        let believed = rows.iter().map(|row| (row.t_s, -3.0 * row.sigma[i], 3.0 * row.sigma[i])).collect();
+        let series = vec![
+            Series::new("±3 σ", Colour::BELIEVED, Mark::Band(believed)),
+            Series::line("error", Colour::REAL, error),
+        ];
+        timed(state, vec![Panel::new(Axis::linear(""), series)], outages).small()
+    };
+    STATES.iter().enumerate().map(chart).collect()
+}
+
+/// What became of fixes, and its colour.
+const KINDS: [(Use, &str, Colour); 3] = [
+    (Use::Used, "used", Colour::BELIEVED),
+    (Use::Withheld, "withheld", Colour::Soft),
+    (Use::Rejected, "rejected", Colour::REAL),
+];
+
+/// A series for each thing that became of fixes.
+fn fixes(fixes: &[FixRecord], value: &dyn Fn(&FixRecord) -> f64) -> Vec<Series> {
+    let of_kind = |(kind, name, colour): (Use, &str, Colour)| {
+        let point = |f: &FixRecord| Interval { x: f.t_s, y: value(f), low: f64::NAN, high: f64::NAN };
+        let points: Vec<Interval> = fixes.iter().filter(|f| f.used == kind).map(point).collect();
+        (!points.is_empty()).then(|| Series::new(name, colour, Mark::Points(points)))
+    };
+    KINDS.into_iter().filter_map(of_kind).collect()
+}
+
+fn innovations(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
+    let panel = |(i, name): (usize, &str)| {
+        let normalised =
+            |f: &FixRecord| f.innovation.get(i).zip(f.sigma.get(i)).map_or(f64::NAN, |(x, s)| x / s);
+        let mut series = vec![Series::new("95 % band", Colour::RIGHT, Mark::Zone(-1.96, 1.96))];
+        series.extend(fixes(&solution.fixes, &normalised));
+        Panel {
+            height: 0.55,
+            ..Panel::new(Axis::linear(&format!("{name} (σ)")).including(-3.0, 3.0), series)
+        }
+    };
+    let panels = ["north", "east", "down"].into_iter().enumerate().map(panel).collect();
+    timed("Innovations of position, normalised", panels, outages)
+}
+
+fn nis(records: &[FixRecord], outages: &[(f64, f64)]) -> Chart {
+    let dof = records.iter().map(|f| f.innovation.len()).max().unwrap_or(0);
+    let band = chi_square_band(dof, 1.0);
+    let mut series =
+        vec![Series::new("95 % band of a right filter", Colour::RIGHT, Mark::Zone(band.lower, band.upper))];
+    series.extend(fixes(records, &|f| f.nis));
+    timed("NIS", vec![Panel::new(Axis::log(&format!("NIS ({dof} if right)")), series)], outages)
+}

@@ -1,0 +1,54 @@
+//! The page of each result.
+
+mod calibration;
+mod comparison;
+mod efficiency;
+mod fusion;
+mod run;
+mod run_charts;
+mod study;
+mod wavelet;
+
+pub use calibration::{calibration_page, calibration_svg};
+pub use comparison::{RatioCurves, comparison_page, comparison_svg};
+pub use efficiency::{efficiency_page, efficiency_svg};
+pub(super) use fusion::fusion_page;
+pub(super) use run::run_page;
+pub use run_charts::run_svg;
+pub use study::study_page;
+pub use wavelet::{wavelet_page, wavelet_svg};
+
+use super::number::seconds;
+use super::page::Tone;
+use crate::metrics::VerdictKind;
+use crate::simulation::REPORTED;
+
+/// The reported states and their units, in words.
+const STATES: [&str; REPORTED] = [
+    "position north (m)",
+    "position east (m)",
+    "position down (m)",
+    "velocity north (m/s)",
+    "velocity east (m/s)",
+    "velocity down (m/s)",
+    "roll (°)",
+    "pitch (°)",
+    "yaw (°)",
+];
+
+/// What ASEE and RMSE are, where they are shown.
+const RMSE_AND_ASEE: &str = "RMSE: how wrong the runs were. ASEE (averaged standard estimation error): the filter's own standard \
+                             deviation, averaged over the runs. Their ratio is 1 if the filter is right.";
+
+fn tone(kind: VerdictKind) -> Tone {
+    match kind {
+        VerdictKind::Ok => Tone::Good,
+        VerdictKind::Underconfident => Tone::Doubtful,
+        VerdictKind::Overconfident | VerdictKind::Diverged => Tone::Bad,
+    }
+}
+
+/// `300–390 s`
+fn window((start_s, end_s): (f64, f64)) -> String {
+    format!("{}–{} s", seconds(start_s), seconds(end_s))
+}

@@ -1,0 +1,318 @@
+//! The page of a run directory.
+
+use super::run_charts::{budget_chart, horizontal, nees, states, windows};
+use super::{RMSE_AND_ASEE, STATES, tone, window};
+use crate::metrics::{Budget, EpochMetrics, OutageSummary, PerState, Summary};
+use crate::report::manifest::Manifest;
+use crate::report::number::readable;
+use crate::report::page::{Cell, Page, Table};
+use crate::report::trajectory::TrajectorySeries;
+use crate::report::verdict::verdict_line;
+use crate::simulation::REPORTED_NAMES;
+
+/// Outages whose tables are shown: of more, those with the largest errors.
+const OUTAGES: usize = 4;
+
+/// The page of a run directory.
+pub(crate) fn run_page(
+    epochs: &[EpochMetrics],
+    summary: &Summary,
+    manifest: &Manifest,
+    track: &TrajectorySeries,
+) -> String {
+    let windows = windows(summary);
+    let verdict = verdict_line(&summary.verdict, &windows, summary.runs, summary.diverged);
+    let title = if summary.runs > 0 { "INS/GNSS Monte-Carlo run" } else { "INS/GNSS covariance analysis" };
+    let mut page = Page::new(title, tone(summary.verdict.kind), &format!("The filter is {verdict}"));
+    requirements(summary, &mut page);
+    page.facts(&assumptions(summary, manifest));
+    page.chart(&track.map("Reference trajectory", &windows), "");
+    page.chart(&horizontal(epochs, summary), HORIZONTAL);
+    outages(summary, &mut page);
+    page.section("Errors over time");
+    page.charts(&states(epochs, &windows), RMSE_AND_ASEE);
+    consistency(epochs, summary, &mut page);
+    budgets(summary, &mut page);
+    provenance(manifest, &mut page);
+    page.html()
+}
+
+const HORIZONTAL: &str = "Horizontal RMSE of the runs, and what the filter believes: its own standard deviation (ASEE, north and \
+                          east together) and the range up to three times that. Dots: median of the runs at the end of an \
+                          outage, the bar up to their 95 % quantile.";
+
+fn requirements(summary: &Summary, page: &mut Page) {
+    for met in &summary.require {
+        let word = if met.met { "met" } else { "NOT MET" };
+        page.text(&format!("Required {} ≤ {}: {word}, found {}.", met.name, met.limit, readable(met.value)));
+    }
+}
+
+/// What the results rest on.
+fn assumptions(summary: &Summary, manifest: &Manifest) -> Vec<(&'static str, String)> {
+    let input = |role: &str| manifest.inputs.iter().find(|i| i.role == role).map_or("", |i| i.path.as_str());
+    let truth = match (input("static"), input("truth")) {
+        ("", "") => format!("{} (the model of the filter)", input("model")),
+        ("", model) => model.to_owned(),
+        (recording, _) => format!("windows of {recording}"),
+    };
+    let scenario = &manifest.configuration;
+    let (imu, gnss, initial) = (&scenario.imu, &scenario.gnss, &scenario.initial);
+    let three = |sigma: &[f64; 3]| sigma.map(readable).join(", ");
+    let velocity =
+        gnss.vel_sigma_m_s.map_or("no velocity".to_owned(), |v| format!("velocity {} m/s", three(&v)));
+    let [bias_a, bias_g] = [imu.turn_on_bias_accel_m_s2, imu.turn_on_bias_gyro_rad_s].map(readable);
+    let mut facts = vec![
+        ("trajectory", input("trajectory").to_owned()),
+        ("model of the filter", format!("{}, {} states", input("model"), summary.filter_states)),
+        ("what makes the errors", truth),
+        (
+            "IMU",
+            format!(
+                "{} Hz; turn-on bias {bias_a} m/s², {bias_g} rad/s (1 σ); scale factors {}, {} ppm; misalignment {} rad",
+                imu.rate_hz,
+                readable(imu.scale_ppm_accel),
+                readable(imu.scale_ppm_gyro),
+                readable(imu.misalignment_rad)
+            ),
+        ),
+        (
+            "GNSS",
+            format!(
+                "{} Hz; 1 σ north, east, down: position {} m, {velocity}",
+                gnss.rate_hz,
+                three(&gnss.pos_sigma_m)
+            ),
+        ),
+        (
+            "start (1 σ)",
+            if initial.perfect {
+                "the true state".to_owned()
+            } else {
+                format!(
+                    "position {} m, velocity {} m/s, attitude {} °",
+                    three(&initial.pos_sigma_m),
+                    three(&initial.vel_sigma_m_s),
+                    three(&initial.att_sigma_deg)
+                )
+            },
+        ),
+    ];
+    if summary.runs > 0 {
+        let worth = readable(summary.independent_runs);
+        facts.push((
+            "runs",
+            format!("{} ({} diverged), worth {worth} independent ones", summary.runs, summary.diverged),
+        ));
+    }
+    facts.push(("seed", summary.seed.to_string()));
+    facts
+}
+
+/// Positions of the outages with the largest errors, in time order.
+fn largest(summary: &Summary) -> Vec<usize> {
+    let error = |i: &usize| summary.outages[*i].rmse_end.0[0].hypot(summary.outages[*i].rmse_end.0[1]);
+    let mut all: Vec<usize> = (0..summary.outages.len()).collect();
+    all.sort_by(|a, b| error(b).total_cmp(&error(a)));
+    all.truncate(OUTAGES);
+    all.sort_unstable();
+    all
+}
+
+fn outages(summary: &Summary, page: &mut Page) {
+    if summary.outages.is_empty() {
+        page.section("Accuracy over the run");
+        let a = &summary.accuracy;
+        page.table(&pairs(&[("mean", "/accuracy".to_owned(), &a.rmse_mean, &a.asee_mean)], "mean"));
+        return;
+    }
+    page.section("At the ends of outages");
+    page.text("Just before the first fix after the outage; brackets are 95 % intervals.");
+    let mut table = Table::new([
+        "outage",
+        "horizontal, median (m)",
+        "95 % interval",
+        "horizontal, 95 % (m)",
+        "95 % interval",
+    ])
+    .and(["largest (m)".to_owned(), "re-convergence, median (s)".to_owned()]);
+    let interval = |ci: (Option<f64>, Option<f64>)| {
+        let bound = |b: Option<f64>| b.map_or("–".to_owned(), readable);
+        Cell::figures(format!("[{}, {}]", bound(ci.0), bound(ci.1)))
+    };
+    for (i, o) in summary.outages.iter().enumerate() {
+        let h = &o.horizontal_error_end_m;
+        let at = |key: &str| format!("/outages/{i}/{key}");
+        table.row([
+            window((o.start_s, o.end_s)).into(),
+            Cell::number(h.p50, &at("horizontal_error_end_m/p50")),
+            interval(h.p50_ci95),
+            Cell::number(h.p95, &at("horizontal_error_end_m/p95")),
+            interval(h.p95_ci95),
+            Cell::number(h.max, &at("horizontal_error_end_m/max")),
+            Cell::number(o.reconvergence_s.p50, &at("reconvergence_s/p50")),
+        ]);
+    }
+    page.table(&table);
+    let shown = largest(summary);
+    let names: Vec<String> = shown.iter().map(|i| window(windows(summary)[*i])).collect();
+    let table = |suffix: &str| {
+        let of = |i: &usize| {
+            let o = &summary.outages[*i];
+            let (rmse, asee) =
+                if suffix == "end" { (&o.rmse_end, &o.asee_end) } else { (&o.rmse_mean, &o.asee_mean) };
+            (format!("/outages/{i}"), rmse, asee)
+        };
+        let columns: Vec<Pair<'_>> = names
+            .iter()
+            .zip(shown.iter().map(of))
+            .map(|(name, (place, rmse, asee))| (name.as_str(), place, rmse, asee))
+            .collect();
+        pairs(&columns, suffix)
+    };
+    page.heading("RMSE and ASEE at the end");
+    page.table(&table("end"));
+    page.text(RMSE_AND_ASEE);
+    page.folded("Means over the outage", |page| page.table(&table("mean")));
+    if summary.outages.len() > shown.len() {
+        page.text(&format!(
+            "The {OUTAGES} outages with the largest errors of {}; summary.json has all.",
+            summary.outages.len()
+        ));
+    }
+}
+
+/// A name, where the figures stand in summary.json, RMSE, ASEE.
+type Pair<'a> = (&'a str, String, &'a PerState<f64>, &'a PerState<f64>);
+
+/// State by state, both at the same time.
+fn pairs(columns: &[Pair<'_>], suffix: &str) -> Table {
+    let heads =
+        columns.iter().flat_map(|(name, ..)| ["RMSE", "ASEE", "ratio"].map(|what| format!("{what}, {name}")));
+    let mut table = Table::new(["state"]).and(heads);
+    for (i, state) in STATES.iter().enumerate() {
+        let cells = columns.iter().flat_map(|(_, place, rmse, asee)| {
+            let source = |what: &str| format!("{place}/{what}_{suffix}/{}", REPORTED_NAMES[i]);
+            let (rmse, asee) = (rmse.0[i], asee.0[i]);
+            [
+                Cell::number(rmse, &source("rmse")),
+                Cell::number(asee, &source("asee")),
+                Cell::figures(readable(rmse / asee)),
+            ]
+        });
+        table.row(std::iter::once(Cell::from(*state)).chain(cells));
+    }
+    table
+}
+
+fn consistency(epochs: &[EpochMetrics], summary: &Summary, page: &mut Page) {
+    page.section("Consistency");
+    page.chart(
+        &nees(epochs, summary),
+        "NEES: normalised estimation error squared of position, velocity and attitude. Coverage: share of runs inside the filter's \
+         ellipsoid of position and attitude.",
+    );
+    let (nees, nis, coverage) = (&summary.nees, &summary.nis, &summary.coverage);
+    let share = |x: f64| if x.is_finite() { format!("{:.0} %", x * 100.0) } else { "–".to_owned() };
+    let mut table =
+        Table::new(["", "mean", "if the filter is right", "95 % band from", "to", "epochs inside"]);
+    let mut row =
+        |name: &str, key: &str, mean: f64, right: String, (low, high): (f64, f64), inside: String| {
+            let at = |what: &str| format!("/{key}/{what}");
+            table.row([
+                name.into(),
+                Cell::number(mean, &at("mean")),
+                Cell::figures(right),
+                Cell::number(low, &at("lower95")),
+                Cell::number(high, &at("upper95")),
+                Cell::figures(inside),
+            ]);
+        };
+    row(
+        "NEES, per epoch",
+        "nees",
+        nees.mean,
+        nees.dof.to_string(),
+        (nees.lower95, nees.upper95),
+        share(nees.fraction_inside),
+    );
+    row(
+        &format!("NIS, all {} fixes", nis.fixes),
+        "nis",
+        nis.mean,
+        nis.dof.to_string(),
+        (nis.lower95, nis.upper95),
+        "–".to_owned(),
+    );
+    let inside = share(coverage.fraction_inside);
+    row(
+        "coverage, per epoch",
+        "coverage",
+        coverage.mean,
+        coverage.level.to_string(),
+        (coverage.lower95, coverage.upper95),
+        inside,
+    );
+    page.table(&table);
+}
+
+/// What the errors at the ends of outages are made of, beside what the filter believes.
+fn budgets(summary: &Summary, page: &mut Page) {
+    let shown = largest(summary);
+    let kinds = |o: &'_ OutageSummary| {
+        [
+            ("true errors", o.budget.clone(), "budget"),
+            ("what the filter believes", o.believed_budget.clone(), "believed_budget"),
+        ]
+    };
+    let mut bars: Vec<(String, Budget)> = Vec::new();
+    for i in &shown {
+        let o = &summary.outages[*i];
+        let word = |kind: &str| if kind == "true errors" { "true" } else { "believed" };
+        let known = kinds(o).into_iter().filter_map(|(kind, budget, _)| {
+            Some((format!("{}, {}", window((o.start_s, o.end_s)), word(kind)), budget?))
+        });
+        bars.extend(known);
+    }
+    if bars.is_empty() {
+        return;
+    }
+    page.section("Sources of errors");
+    page.chart(&budget_chart(&bars), "Shares in the mean square at the end of each outage: of the true errors, by covariance analysis, and of those that the filter believes in.");
+    for i in &shown {
+        let o = &summary.outages[*i];
+        for (kind, budget, key) in kinds(o) {
+            let Some(budget) = budget else { continue };
+            let title =
+                format!("Sources of errors at the end of {}: {kind} (shares)", window((o.start_s, o.end_s)));
+            let table = budget_table(&budget, &format!("/outages/{i}/{key}"));
+            page.folded(&title, |page| page.table(&table));
+        }
+    }
+}
+
+fn budget_table(budget: &Budget, place: &str) -> Table {
+    let names = STATES.iter().map(|state| state.split(" (").next().unwrap_or(state).to_owned());
+    let mut table = Table::new(["source"]).and(names);
+    for (source, shares) in &budget.shares {
+        let key = source.replace('~', "~0").replace('/', "~1");
+        let cell = |(share, state): (&f64, &&str)| Cell::number(*share, &format!("{place}/{key}/{state}"));
+        table.row(
+            std::iter::once(Cell::from(source.clone())).chain(shares.0.iter().zip(&REPORTED_NAMES).map(cell)),
+        );
+    }
+    table
+}
+
+fn provenance(manifest: &Manifest, page: &mut Page) {
+    page.section("Provenance");
+    // the command, the threads and the time taken are in manifest.json: this page is the same for the same seed
+    page.text(&format!("nav-sim {}; the command is in manifest.json.", manifest.version));
+    let mut table = Table::new(["input", "file", "BLAKE3"]);
+    for i in &manifest.inputs {
+        table.row([i.role.clone(), i.path.clone(), i.blake3.clone()].map(Cell::from));
+    }
+    page.table(&table);
+    let configuration = toml::to_string_pretty(&manifest.configuration).unwrap_or_default();
+    page.folded("Configuration", |page| page.code(&configuration));
+}

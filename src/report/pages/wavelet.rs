@@ -1,0 +1,127 @@
+//! The page of `wv`, and what pages of wavelet variances share.
+
+use crate::imu::Sensor;
+use crate::report::curves::{SignalCurves, SignalsFile};
+use crate::report::page::{Axis, Chart, Colour, Mark, Page, Panel, Series, Table, Tone, svg};
+
+/// The axis of scales.
+pub(super) fn scale_axis() -> Axis {
+    Axis::log("scale τ (s)")
+}
+
+/// The axis of wavelet variances of a sensor.
+pub(super) fn variance_axis(sensor: &str) -> Axis {
+    Axis::log(&format!("wavelet variance (({})²)", unit(sensor)))
+}
+
+/// Unit of a sensor, by its name in files.
+pub(super) fn unit(sensor: &str) -> &'static str {
+    Sensor::ALL.into_iter().find(|s| s.name() == sensor).map_or("", Sensor::unit)
+}
+
+/// A sensor in words.
+pub(super) fn sensor_name(sensor: &str) -> &'static str {
+    if sensor == Sensor::Accel.name() { "Accelerometer" } else { "Gyroscope" }
+}
+
+pub(super) fn curve(tau_s: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
+    tau_s.iter().copied().zip(values.iter().copied()).collect()
+}
+
+pub(super) fn band(tau_s: &[f64], low: &[f64], high: &[f64]) -> Mark {
+    Mark::Band(tau_s.iter().zip(low).zip(high).map(|((t, a), b)| (*t, *a, *b)).collect())
+}
+
+/// The page of the wavelet variances of some signals.
+#[must_use]
+pub fn wavelet_page(file: &SignalsFile) -> String {
+    let worst = file.signals.iter().filter_map(|s| Some((excess(s)?, s)));
+    let worst = worst.max_by(|a, b| a.0.1.total_cmp(&b.0.1));
+    let (tone, verdict) = match worst {
+        Some(((tau_s, ratio), s)) if ratio > OUTLIERS => (
+            Tone::Doubtful,
+            format!(
+                "Outliers? The classical wavelet variance of {} {}.{} is {ratio:.2} times the robust one at {tau_s} s.",
+                s.file, s.sensor, s.axis
+            ),
+        ),
+        _ => (
+            Tone::Good,
+            format!(
+                "{} signals; classical and robust wavelet variances agree within {:.0} % wherever 30 degrees of freedom or \
+                 more tell them.",
+                file.signals.len(),
+                100.0 * (OUTLIERS - 1.0)
+            ),
+        ),
+    };
+    let mut page = Page::new("Wavelet variance of static recordings", tone, &verdict);
+    let caption = "Lines: robust wavelet variance with its 95 % band; dashed: classical, which outliers raise. White noise falls by 1 a decade, a random walk rises by 1; a flat stretch is bias \
+                   instability. τ is twice the averaging time of the Allan deviation, which is √(2 ν).";
+    page.text(caption);
+    for chart in charts(file) {
+        page.chart(&chart, "");
+    }
+    for signal in &file.signals {
+        page.heading(&name(signal));
+        page.table(&Table::of_rows(&crate::report::signal_rows(signal)));
+    }
+    page.html()
+}
+
+/// The same as a picture.
+#[must_use]
+pub fn wavelet_svg(file: &SignalsFile) -> String {
+    svg("Wavelet variance of static recordings", &charts(file))
+}
+
+/// Classical over robust beyond which outliers are suspected.
+const OUTLIERS: f64 = 1.5;
+/// Degrees of freedom that such a ratio takes.
+const TELLING: f64 = 30.0;
+
+/// The scale at which classical over robust is largest, and that ratio.
+fn excess(s: &SignalCurves) -> Option<(f64, f64)> {
+    let ratio = |i: usize| (s.tau_s[i], s.classical.wv[i] / s.robust.wv[i]);
+    let told = (0..s.tau_s.len()).filter(|i| s.edof[*i] >= TELLING).map(ratio).filter(|r| r.1.is_finite());
+    told.max_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// `run1.csv · accel.x · 600000 samples`
+fn name(s: &SignalCurves) -> String {
+    format!("{} · {}.{} · {} samples", s.file, s.sensor, s.axis, s.samples)
+}
+
+/// Signals of a chart, beyond which it is full.
+const MOST: usize = 8;
+
+/// A chart a sensor, or several where there are many signals.
+fn charts(file: &SignalsFile) -> Vec<Chart> {
+    let mut charts: Vec<Chart> = Vec::new();
+    let is_only_file = file.signals.windows(2).all(|pair| pair[0].file == pair[1].file);
+    for sensor in Sensor::ALL {
+        let own: Vec<&SignalCurves> = file.signals.iter().filter(|s| s.sensor == sensor.name()).collect();
+        let title = sensor_name(sensor.name());
+        for (k, signals) in own.chunks(MOST).enumerate() {
+            let series = signals
+                .iter()
+                .enumerate()
+                .flat_map(|(hue, s)| of_signal(s, is_only_file, Colour::Hue(hue)))
+                .collect();
+            let title = if k == 0 { title.to_owned() } else { format!("{title}, continued") };
+            let panel = Panel { height: 1.4, ..Panel::new(variance_axis(sensor.name()), series) };
+            charts.push(Chart::new(&title, scale_axis(), vec![panel]).in_group("scales"));
+        }
+    }
+    charts
+}
+
+/// Robust as a line in its band, classical dashed.
+fn of_signal(s: &SignalCurves, is_only_file: bool, colour: Colour) -> Vec<Series> {
+    let name = if is_only_file { s.axis.clone() } else { format!("{} {}", s.file, s.axis) };
+    vec![
+        Series::new(&name, colour, band(&s.tau_s, &s.robust.ci_low, &s.robust.ci_high)),
+        Series::line(&name, colour, curve(&s.tau_s, &s.robust.wv)),
+        Series::dashed(&format!("{name}, classical"), colour, curve(&s.tau_s, &s.classical.wv)),
+    ]
+}

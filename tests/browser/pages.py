@@ -1,0 +1,226 @@
+#!/usr/bin/env python3
+"""Opens pages of results in a headless browser, as a screen and as a phone, by day and by night.
+
+    python3 tests/browser/pages.py target/debug/nav-sim          makes results with that program and opens their pages
+    python3 tests/browser/pages.py --page page.html [results.json]   opens one page
+
+Held of each page: the browser has nothing to say of it, nothing is asked of the network, the page is no wider than the
+window, no text of a figure is smaller than 11 pixels, every number of a table that says where it stands in the results
+stands there, and the figures answer to the mouse. Without a browser (chromium, google-chrome) the test is skipped; then
+the exit code is 0 and the last line says so.
+"""
+
+import json
+import math
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+BROWSERS = ["chromium", "chromium-browser", "google-chrome"]
+WIDTHS = [1280, 390]
+# blink's preferredColorScheme
+SCHEMES = {"light": 1, "dark": 0}
+SMALLEST_PX = 11.0
+
+# Runs in the page's frame once it is loaded; its results are the text of the frame's parent.
+MEASURE = """
+const frame = document.querySelector("iframe");
+frame.addEventListener("load", () => {
+  const page = frame.contentDocument, view = frame.contentWindow;
+  const shown = (e) => e.getClientRects().length > 0;
+  const texts = [...page.querySelectorAll("svg text")].filter(shown);
+  const scale = (text) => Math.hypot(text.getScreenCTM().a, text.getScreenCTM().b);
+  const sizes = texts.map((text) => parseFloat(view.getComputedStyle(text).fontSize) * scale(text));
+  const outside = texts.filter((t) => {
+    const [a, b] = [t.getBoundingClientRect(), t.closest("svg.chart").getBoundingClientRect()];
+    return a.left < b.left - 2 || a.right > b.right + 2;
+  }).map((t) => t.textContent);
+  const dark = view.matchMedia("(prefers-color-scheme: dark)").matches;
+  const background = view.getComputedStyle(page.body).backgroundColor;
+  // the mouse over the middle of the first plot that is no map: a line and values; its first key: a curve less
+  const chart = [...page.querySelectorAll("svg.chart:not([data-group=map])")].find(shown);
+  const answers = {};
+  if (chart) {
+    chart.scrollIntoView();
+    const box = chart.querySelector("svg.plot");
+    const corner = new view.DOMPoint(Number(box.getAttribute("x")) + 0.5 * Number(box.getAttribute("width")),
+      Number(box.getAttribute("y")) + 0.5 * Number(box.getAttribute("height"))).matrixTransform(chart.getScreenCTM());
+    const mouse = (kind, dx, dy) => chart.dispatchEvent(new view.PointerEvent(kind, { bubbles: true, pointerType: "mouse", button: 0,
+      clientX: corner.x + dx, clientY: corner.y + dy }));
+    mouse("pointermove", 0, 0);
+    answers.cross = chart.querySelectorAll(".cross").length;
+    mouse("pointerdown", -40, -30);
+    mouse("pointermove", 40, 30);
+    mouse("pointerup", 40, 30);
+    answers.zoomed = box.getAttribute("viewBox") !== box.dataset.whole;
+    chart.dispatchEvent(new view.MouseEvent("dblclick", { bubbles: true }));
+    answers.reset = box.getAttribute("viewBox") === box.dataset.whole;
+    const key = chart.querySelector(".key");
+    if (key) {
+      key.dispatchEvent(new view.MouseEvent("click", { bubbles: true }));
+      answers.hidden = chart.querySelectorAll(".series.off").length;
+      key.dispatchEvent(new view.MouseEvent("click", { bubbles: true }));
+    }
+  }
+  const charts = [...page.querySelectorAll("svg.chart")].filter(shown).length;
+  const cells = [...page.querySelectorAll("td[data-json]")].map((td) => [td.dataset.json, td.textContent]);
+  document.body.innerHTML = "<pre></pre>";
+  document.querySelector("pre").textContent = JSON.stringify({
+    width: view.innerWidth, needed: page.documentElement.scrollWidth, smallest: Math.min(...sizes, 99), texts: texts.length,
+    outside, dark, background, charts, answers, cells,
+  });
+});
+"""
+
+
+def browser():
+    """The first browser there is."""
+    return next((path for name in BROWSERS if (path := shutil.which(name))), None)
+
+
+def readable(x):
+    """Numbers as the pages show them: three significant digits, or four figures before the point."""
+    if x is None or not math.isfinite(x):
+        return "–"
+    size = abs(x)
+    if size == 0:
+        return "0"
+    if not 1e-3 <= size < 1e6:
+        mantissa, exponent = f"{x:.2e}".split("e")
+        return f"{mantissa}e{int(exponent)}"
+    digits = 0 if size >= 100 else 1 if size >= 10 else 2 if size >= 1 else int(2 - math.floor(math.log10(size)))
+    return f"{x:.{digits}f}"
+
+
+def value_at(results, pointer):
+    """What stands at a JSON pointer."""
+    for part in pointer.split("/")[1:]:
+        part = part.replace("~1", "/").replace("~0", "~")
+        results = results[int(part)] if isinstance(results, list) else results[part]
+    return results
+
+
+def open_page(program, page, width, scheme):
+    """What the page looks like in a window of this width, and what the browser said."""
+    with tempfile.TemporaryDirectory() as place:
+        harness = Path(place) / "harness.html"
+        harness.write_text(
+            f'<body><iframe src="{page.resolve().as_uri()}" style="border:0;width:{width}px;height:900px"></iframe>'
+            f"<script>{MEASURE}</script></body>"
+        )
+        command = [program, "--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files",
+                   "--disable-background-networking", f"--user-data-dir={place}/profile", "--enable-logging=stderr",
+                   f"--blink-settings=preferredColorScheme={SCHEMES[scheme]}", f"--window-size={max(width, 520)},1000",
+                   "--virtual-time-budget=4000", "--dump-dom", harness.as_uri()]
+        ran = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    said = [line for line in ran.stderr.splitlines() if "CONSOLE" in line]
+    found = re.search(r"<pre>(.*?)</pre>", ran.stdout, re.S)
+    if not found:
+        raise SystemExit(f"{page}: the browser did not open it\n{ran.stdout[:300]}\n{ran.stderr[:600]}")
+    text = found[1]
+    for entity, sign in [("&lt;", "<"), ("&gt;", ">"), ("&quot;", '"'), ("&amp;", "&")]:
+        text = text.replace(entity, sign)
+    return json.loads(text), said
+
+
+def check(program, page, results):
+    """Everything that is wrong with a page."""
+    wrong = []
+    html = page.read_text()
+    if re.search(r'(?:src|href)="(?:https?:)?//|@import|url\(', html):
+        wrong.append("asks something of the network")
+    for width in WIDTHS:
+        for scheme in SCHEMES:
+            seen, said = open_page(program, page, width, scheme)
+            place = f"{width} px, {scheme}"
+            wrong += [f"{place}: {line}" for line in said]
+            if seen["needed"] > seen["width"]:
+                wrong.append(f"{place}: needs {seen['needed']} px")
+            if seen["smallest"] < SMALLEST_PX:
+                wrong.append(f"{place}: text of {seen['smallest']:.1f} px in a figure")
+            if seen["outside"]:
+                wrong.append(f"{place}: text beyond its figure: {seen['outside'][:5]}")
+            if seen["dark"] != (scheme == "dark") or (seen["background"] == "rgb(255, 255, 255)") == seen["dark"]:
+                wrong.append(f"{place}: background {seen['background']}")
+            if seen["charts"] == 0 or seen["texts"] == 0:
+                wrong.append(f"{place}: no figure")
+            answers = seen["answers"]
+            if answers and not (answers["cross"] and answers["zoomed"] and answers["reset"] and answers.get("hidden", 1)):
+                wrong.append(f"{place}: the figures do not answer to the mouse: {answers}")
+    if results:
+        parsed = json.loads(results.read_text())
+        for pointer, text in seen["cells"]:
+            try:
+                value = value_at(parsed, pointer)
+            except (KeyError, IndexError):
+                wrong.append(f"{pointer} is not in {results.name}")
+                continue
+            if readable(value) != text:
+                wrong.append(f"{pointer}: {text} on the page, {value} in {results.name}")
+        print(f"  {len(seen['cells'])} numbers as in {results.name}")
+    return wrong
+
+
+def make(nav_sim, place):
+    """Results of every command that makes a page: page and, where there is one, the JSON it shows."""
+    here = Path(__file__).resolve().parents[2]
+
+    def run(words, keep=None, codes=(0,)):
+        ran = subprocess.run([nav_sim, "-q", *words.split()], cwd=place, capture_output=True, text=True)
+        if ran.returncode not in codes:
+            raise SystemExit(f"nav-sim {words}: exit code {ran.returncode}\n{ran.stderr}")
+        if keep:
+            (place / keep).write_text(ran.stdout)
+
+    for name in ["calib_data", "trajectories", "examples"]:
+        os.symlink(here / name, place / name)
+    model = "calib_data/consumer_mems.toml"
+    run(f"synthesize {model} --replicates 4 --samples 32768 --spread --seed 1 -o static")
+    run("wv static/replicate_1.csv --page wv.html")
+    run("calibrate static --seed 1 --bootstrap 50 --format json -o model.toml", keep="fits.json")
+    for run_of, extra in [("I_awv", ""), ("I_dr-awv", f"--truth {model}")]:
+        made = "model.toml" if run_of == "I_dr-awv" else model
+        run(f"run trajectories/land_vehicle.toml {made} {extra} --runs 4 --seed 1 -o runs/{run_of}", codes=(0, 3))
+    run(f"run trajectories/land_vehicle.toml {model} --method lincov --outage none -o runs/lincov")
+    run("compare runs/I_dr-awv --reference runs/I_awv -o comparison.json")
+    run("trajectory record trajectories/land_vehicle.toml calib_data/tactical.toml --seed 3 -o drive")
+    run("fuse drive/imu.csv drive/gnss.csv calib_data/tactical.toml --reference drive/reference.csv --outage 300:360 "
+        "-o fused", codes=(0, 3))
+    run("efficiency examples/paper_fig2.toml --sets 2 --samples 4096 --seed 1 -o efficiency")
+    run("batch plan examples/quick_study.toml --seed 1 -o study")
+    run("batch run examples/quick_study.toml -o study")
+    run("batch merge examples/quick_study.toml -o study", codes=(0, 3))
+    pages = [("wv.html", None), ("model.html", "fits.json"), ("runs/I_awv/report.html", "runs/I_awv/summary.json"),
+             ("runs/lincov/report.html", "runs/lincov/summary.json"), ("comparison.html", "comparison.json"),
+             ("fused/report.html", "fused/summary.json"), ("efficiency/report.html", "efficiency/results.json"),
+             ("study/results/report.html", None)]
+    return [(place / page, results and place / results) for page, results in pages]
+
+
+def main(words):
+    program = browser()
+    if not program:
+        print("skipped: no browser here (one of " + ", ".join(BROWSERS) + ")")
+        return 0
+    with tempfile.TemporaryDirectory() as place:
+        if words[0] == "--page":
+            pages = [(Path(words[1]), Path(words[2]) if len(words) > 2 else None)]
+        else:
+            pages = make(os.path.abspath(words[0]), Path(place))
+        failed = 0
+        for page, results in pages:
+            print(f"{page} ({page.stat().st_size // 1000} kB)", flush=True)
+            wrong = check(program, page, results)
+            failed += bool(wrong)
+            for line in wrong[:20]:
+                print(f"  WRONG: {line}")
+    print(f"{len(pages) - failed} of {len(pages)} pages are right")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:] or ["target/debug/nav-sim"]))
