@@ -5,14 +5,16 @@ use super::recordings::{RecordingArgs, Said};
 use super::run::{OutageArg, Words, empty_or_new, parse_outage, windows_of};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
-use nav_sim::calibration::{Bootstrap, Estimator, ModelChoice, Pool, Settings, Trim};
+use nav_sim::calibration::{Bootstrap, Estimator, ModelChoice, Pool, Settings, Trim, diagnose};
 use nav_sim::choose::{Candidate, Inflation};
 use nav_sim::ekf::FilterStates;
 use nav_sim::formats::atomic::AtomicDir;
 use nav_sim::formats::model_file::{self, CalibrationNote, ModelFile};
 use nav_sim::formats::scenario_file;
-use nav_sim::jobs::{self, CalibrationOptions, ChoiceDrive, Chosen, EstimatorChoice, ModelFiles};
-use nav_sim::report::ChoiceReport;
+use nav_sim::jobs::{
+    self, Calibration, CalibrationOptions, ChoiceDrive, Chosen, EstimatorChoice, ModelFiles,
+};
+use nav_sim::report::{ChoiceReport, choice_page};
 use nav_sim::scenario::Scenario;
 use nav_sim::sensors::outage::Outage;
 use std::path::{Path, PathBuf};
@@ -22,7 +24,7 @@ use std::path::{Path, PathBuf};
 /// Leaves out one recording after the other, calibrates every candidate on the others and takes it along TRAJECTORY on
 /// windows of the one left out. Ranks candidates by the mean log density of their true errors at the ends of outages,
 /// which rewards accuracy and honesty together; beside it RMSE, NEES and coverage, with intervals over recordings.
-/// Writes ranking.json and model.toml, the winner calibrated on all recordings.
+/// Writes report.html, ranking.json and model.toml, the winner calibrated on all recordings.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -106,7 +108,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let text = if session.json() { report.json() } else { text(&report, session) };
     session.printer.result(text.trim_end());
     session.printer.say(&format!(
-        "wrote {0}: ranking.json, model.toml (nav-sim export {0}/model.toml)",
+        "wrote {0}: report.html, ranking.json, model.toml (nav-sim export {0}/model.toml)",
         args.out.display()
     ));
     Ok(())
@@ -181,7 +183,8 @@ fn outages(
 
 fn write(args: &Args, chosen: &Chosen, report: &ChoiceReport<'_>, seed: u64) -> Result<(), Failure> {
     let mut directory = AtomicDir::create(&args.out)?;
-    let (model, _) = (directory.path("model.toml"), directory.path("model.wv.json"));
+    let model = directory.path("model.toml");
+    let (_curves, _page) = (directory.path("model.wv.json"), directory.path("model.html"));
     let mut inputs = vec![read::input("trajectory", &args.trajectory)?];
     for file in &chosen.files {
         inputs.push(read::input("recording", file)?);
@@ -195,10 +198,13 @@ fn write(args: &Args, chosen: &Chosen, report: &ChoiceReport<'_>, seed: u64) -> 
     };
     let files = ModelFiles::of(&model, &[chosen.winner.estimator]);
     files[0].write(&chosen.calibration, &note)?;
+    let Calibration { groups, outcomes, settings } = &chosen.calibration;
+    files[0].write_page(&chosen.calibration, &diagnose(groups, outcomes, settings))?;
     if chosen.winner.inflation != Inflation::None {
         inflated(&model, chosen)?;
     }
     directory.write("ranking.json", report.json())?;
+    directory.write("report.html", choice_page(report))?;
     Ok(directory.commit()?)
 }
 

@@ -39,8 +39,8 @@ pub use manifest::{Input, Manifest, ModelNote};
 pub use markdown::{markdown, markdown_table};
 pub use number::{readable, seconds};
 pub use pages::{
-    RatioCurves, calibration_page, calibration_svg, comparison_page, comparison_svg, efficiency_page,
-    efficiency_svg, run_svg, study_page, wavelet_page, wavelet_svg,
+    RatioCurves, calibration_page, calibration_svg, choice_page, comparison_page, comparison_svg,
+    efficiency_page, efficiency_svg, run_svg, study_page, wavelet_page, wavelet_svg,
 };
 pub use recording::{gnss_csv, imu_csv, initial_toml};
 pub use replicates::{

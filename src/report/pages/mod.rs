@@ -1,6 +1,7 @@
 //! The page of each result.
 
 mod calibration;
+mod choice;
 mod comparison;
 mod efficiency;
 mod fusion;
@@ -10,6 +11,7 @@ mod study;
 mod wavelet;
 
 pub use calibration::{calibration_page, calibration_svg};
+pub use choice::choice_page;
 pub use comparison::{RatioCurves, comparison_page, comparison_svg};
 pub use efficiency::{efficiency_page, efficiency_svg};
 pub(super) use fusion::fusion_page;
