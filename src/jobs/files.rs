@@ -1,8 +1,9 @@
-//! The files of a calibration: for each estimator a model and the curves behind it.
+//! The files of a calibration: for each estimator a model, the curves behind it and the draws behind its intervals.
 
 use super::Calibration;
 use crate::calibration::{Estimator, Outcome};
 use crate::formats::atomic::AtomicFile;
+use crate::formats::draws_file::{self, DrawsFile};
 use crate::formats::model_file::{self, CalibrationNote};
 use crate::formats::{FileError, hash};
 use crate::report::{self, CurvesFile};
@@ -18,6 +19,8 @@ pub struct ModelFiles {
     pub model: PathBuf,
     /// The curves, `<model>.wv.json` beside it.
     pub curves: PathBuf,
+    /// The draws behind its intervals, `<model>.draws.json` beside it.
+    pub draws: PathBuf,
 }
 
 impl ModelFiles {
@@ -27,7 +30,8 @@ impl ModelFiles {
         let files = |estimator: &Estimator| {
             let suffix = if estimators.len() > 1 { format!("_{estimator}") } else { String::new() };
             let model = with_suffix(out, &suffix);
-            Self { estimator: *estimator, curves: model.with_extension("wv.json"), model }
+            let (curves, draws) = (model.with_extension("wv.json"), draws_file::beside(&model));
+            Self { estimator: *estimator, curves, draws, model }
         };
         estimators.iter().map(files).collect()
     }
@@ -42,9 +46,14 @@ impl ModelFiles {
         let curves = report::json(&CurvesFile::new(groups, &own, settings));
         let blake3 = hash::of_bytes(curves.as_bytes());
         let model = model_file::to_toml(&note.model_file(&own, settings, Some(&blake3)));
-        // Both are on the disk before either has its name. Should the second not get its name, the hash in it tells
-        // that the first is not of it.
+        let draws = DrawsFile::of(&own, settings.rate_hz);
+        let draws =
+            draws.map(|draws| serde_json::to_string(&draws).expect("plain structs are always JSON") + "\n");
+        // All are on the disk before any has its name. Should the model not get its name, the hash in it tells that the
+        // curves are not of it, and its parameters that the draws are not.
+        let draws = draws.map(|text| staged(&self.draws, &text)).transpose()?;
         let (curves, model) = (staged(&self.curves, &curves)?, staged(&self.model, &model)?);
+        draws.map_or(Ok(()), AtomicFile::commit)?;
         curves.commit()?;
         model.commit()
     }

@@ -20,7 +20,8 @@ use std::path::{Path, PathBuf};
 ///
 /// Each recording is one replicate. By default the three axes of a sensor are pooled: one model a sensor,
 /// their signals replicates of one another. The model goes to a TOML file, the curves behind it to
-/// <model>.wv.json beside it; with `--estimator all` to one pair an estimator, <model>_<estimator>.toml.
+/// <model>.wv.json beside it, the draws behind its intervals to <model>.draws.json; with `--estimator all` to one set an
+/// estimator, <model>_<estimator>.toml.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:

@@ -23,7 +23,7 @@ pub(super) fn outputs(
     inputs: &[PathBuf],
 ) -> Result<Vec<ModelFiles>, Failure> {
     let outputs = ModelFiles::of(out, estimators);
-    for path in outputs.iter().flat_map(|files| [&files.model, &files.curves]) {
+    for path in outputs.iter().flat_map(|files| [&files.model, &files.curves, &files.draws]) {
         writable(path)?;
         atomic::guard_inputs(path, inputs.iter().map(PathBuf::as_path))?;
     }
@@ -88,7 +88,9 @@ pub(super) fn finish(
     let mut files = Vec::new();
     for output in outputs {
         output.write(calibration, note)?;
-        files.extend([&output.model, &output.curves].map(|p| p.display().to_string()));
+        let draws = calibration.outcomes.iter().any(|o| o.inference.is_some()).then_some(&output.draws);
+        let written = [&output.model, &output.curves].into_iter().chain(draws);
+        files.extend(written.map(|p| p.display().to_string()));
     }
     let Calibration { groups, outcomes, settings } = calibration;
     let diagnoses = diagnose(groups, outcomes, settings);
