@@ -8,7 +8,7 @@ pub(crate) fn drift(recordings: &Path, drive: &Path) -> Result<f64, Box<dyn std:
     let options = CalibrationOptions { bootstrap: None, ..CalibrationOptions::default() };
     let model = calibrate(&[recordings.to_owned()], &options, &mut Silence)?.model(Estimator::DrAwv);
     let (trajectory, _) = load_trajectory(drive, &TrajectoryOptions::default())?;
-    let inputs = NavigateInputs { trajectory, model, truth: TrueImu::AsBelieved };
+    let inputs = NavigateInputs::new(trajectory, model, TrueImu::AsBelieved);
     let mut scenario = Scenario::default();
     scenario.run.runs = 16;
     let outage = Outage { start_s: 300.0, end_s: 390.0 };

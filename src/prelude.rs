@@ -5,7 +5,7 @@
 //!
 //! let white = Composite::new(vec![Process::White(White::new(1e-6)?)]);
 //! let (trajectory, _) = load_trajectory("trajectories/figure_eight.toml".as_ref(), &TrajectoryOptions::default())?;
-//! let inputs = NavigateInputs { trajectory, model: Model::pooled(100.0, &white, &white), truth: TrueImu::AsBelieved };
+//! let inputs = NavigateInputs::new(trajectory, Model::pooled(100.0, &white, &white), TrueImu::AsBelieved);
 //! let mut scenario = Scenario::default();
 //! scenario.run.method = Method::Lincov;
 //! let outage = Outage { start_s: 60.0, end_s: 90.0 };

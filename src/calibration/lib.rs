@@ -46,7 +46,9 @@ pub use outcome::{
     ParameterInterval, ParameterLimit, Ranking, Settings, TooSimple, Undetermined,
 };
 pub use pipeline::{CalibrationError, Cause, calibrate, fit_curve, infer};
-pub use uncertainty::{ALIKE_LEVEL, CurveInfluence};
+pub use uncertainty::{
+    ALIKE_LEVEL, Anticipated, AnticipationError, CurveInfluence, Scattering, derived_interval,
+};
 pub use words::{
     Share, advice, correlation_time_s, duration, effects, percent, reasons, shares, tau_s, undetermined,
 };

@@ -24,6 +24,11 @@ pub struct CalibrationError {
 }
 
 impl CalibrationError {
+    /// Of a group without a curve.
+    pub(crate) fn of(group: &Group, estimator: Estimator, source: AverageError) -> Self {
+        Self::new(group, estimator, source)
+    }
+
     fn new(group: &Group, estimator: Estimator, source: impl Into<Cause>) -> Self {
         Self { group: group.scope.name(), estimator: estimator.name(), source: source.into() }
     }

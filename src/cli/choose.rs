@@ -17,7 +17,7 @@ use nav_sim::jobs::{
 use nav_sim::report::{ChoiceReport, choice_page};
 use nav_sim::scenario::Scenario;
 use nav_sim::sensors::outage::Outage;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Choose the noise model for a filter by what it does on recordings that it has not seen
 ///
@@ -184,7 +184,8 @@ fn outages(
 fn write(args: &Args, chosen: &Chosen, report: &ChoiceReport<'_>, seed: u64) -> Result<(), Failure> {
     let mut directory = AtomicDir::create(&args.out)?;
     let model = directory.path("model.toml");
-    let (_curves, _page) = (directory.path("model.wv.json"), directory.path("model.html"));
+    directory.path("model.wv.json");
+    directory.path("model.html");
     let mut inputs = vec![read::input("trajectory", &args.trajectory)?];
     for file in &chosen.files {
         inputs.push(read::input("recording", file)?);
@@ -200,17 +201,21 @@ fn write(args: &Args, chosen: &Chosen, report: &ChoiceReport<'_>, seed: u64) -> 
     files[0].write(&chosen.calibration, &note)?;
     let Calibration { groups, outcomes, settings } = &chosen.calibration;
     files[0].write_page(&chosen.calibration, &diagnose(groups, outcomes, settings))?;
-    if chosen.winner.inflation != Inflation::None {
-        inflated(&model, chosen)?;
+    if chosen.winner.inflation == Inflation::None {
+        directory.path("model.draws.json");
+    } else {
+        inflated(&files[0], chosen)?;
     }
     directory.write("ranking.json", report.json())?;
     directory.write("report.html", choice_page(report))?;
     Ok(directory.commit()?)
 }
 
-/// The model as calibrated, with the inflated parameters in the place of its own; intervals are of those before.
-fn inflated(path: &Path, chosen: &Chosen) -> Result<(), Failure> {
-    let calibrated = model_file::read(path)?;
+/// The model as calibrated, with the inflated parameters in the place of its own: intervals and draws are of those before.
+fn inflated(files: &ModelFiles, chosen: &Chosen) -> Result<(), Failure> {
+    let drawn = std::fs::remove_file(&files.draws);
+    drawn.map_err(|e| Failure::could_not(format!("{}: {e}", files.draws.display())))?;
+    let calibrated = model_file::read(&files.model)?;
     let mut provenance = calibrated.provenance.unwrap_or_default();
     provenance.insert("inflation".to_owned(), chosen.winner.inflation.name().into());
     let file = ModelFile {
@@ -218,5 +223,5 @@ fn inflated(path: &Path, chosen: &Chosen) -> Result<(), Failure> {
         provenance: Some(provenance),
         ..ModelFile::new(chosen.model.clone())
     };
-    Ok(model_file::write(path, &file)?)
+    Ok(model_file::write(&files.model, &file)?)
 }

@@ -5,6 +5,7 @@ pub mod contamination_file;
 pub mod curve_file;
 pub mod datasheet;
 pub(crate) mod difference;
+pub mod draws_file;
 pub mod efficiency_directory;
 pub mod efficiency_file;
 mod error;

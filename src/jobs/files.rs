@@ -1,8 +1,9 @@
-//! The files of a calibration: for each estimator a model and the curves behind it.
+//! The files of a calibration: for each estimator a model, the curves behind it and the draws behind its intervals.
 
 use super::Calibration;
 use crate::calibration::{Diagnosis, Estimator, Outcome};
 use crate::formats::atomic::{self, AtomicFile};
+use crate::formats::draws_file::{self, DrawsFile};
 use crate::formats::model_file::{self, CalibrationNote};
 use crate::formats::{FileError, hash};
 use crate::report::{self, CurvesFile};
@@ -20,6 +21,8 @@ pub struct ModelFiles {
     pub curves: PathBuf,
     /// The page, `<model>.html` beside it.
     pub page: PathBuf,
+    /// The draws behind its intervals, `<model>.draws.json` beside it.
+    pub draws: PathBuf,
 }
 
 impl ModelFiles {
@@ -30,7 +33,7 @@ impl ModelFiles {
             let suffix = if estimators.len() > 1 { format!("_{estimator}") } else { String::new() };
             let model = with_suffix(out, &suffix);
             let (curves, page) = (model.with_extension("wv.json"), model.with_extension("html"));
-            Self { estimator: *estimator, model, curves, page }
+            Self { estimator: *estimator, curves, draws: draws_file::beside(&model), page, model }
         };
         estimators.iter().map(files).collect()
     }
@@ -45,9 +48,14 @@ impl ModelFiles {
         let curves = report::json(&CurvesFile::new(groups, &own, settings));
         let blake3 = hash::of_bytes(curves.as_bytes());
         let model = model_file::to_toml(&note.model_file(&own, settings, Some(&blake3)));
-        // Both are on the disk before either has its name. Should the second not get its name, the hash in it tells
-        // that the first is not of it.
+        let draws = DrawsFile::of(&own, settings.rate_hz);
+        let draws =
+            draws.map(|draws| serde_json::to_string(&draws).expect("plain structs are always JSON") + "\n");
+        // All are on the disk before any has its name. Should the model not get its name, the hash in it tells that the
+        // curves are not of it, and its parameters that the draws are not.
+        let draws = draws.map(|text| staged(&self.draws, &text)).transpose()?;
         let (curves, model) = (staged(&self.curves, &curves)?, staged(&self.model, &model)?);
+        draws.map_or(Ok(()), AtomicFile::commit)?;
         curves.commit()?;
         model.commit()
     }

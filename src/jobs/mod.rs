@@ -31,6 +31,7 @@ mod navigate;
 mod reduction;
 mod remarks;
 mod require;
+mod uncertainty;
 mod wavelet;
 
 pub use calibrate::{Calibration, CalibrationOptions, EstimatorChoice, Measured, calibrate, measure};

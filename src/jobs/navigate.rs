@@ -2,10 +2,13 @@
 //! covariance analysis, or by both.
 
 use super::reduction::Reduced;
+use super::uncertainty::Analysed;
 use crate::ekf::{Belief, BeliefError};
+use crate::formats::draws_file::Draws;
 use crate::imu::{Recording, Sensor};
 use crate::metrics::{
-    Agreement, Budget, EpochMetrics, Expected, ReductionQuality, ReductionSummary, Summary, epochs,
+    Agreement, Budget, EpochMetrics, Expected, ReductionQuality, ReductionSummary, Sensitivities, Summary,
+    epochs,
 };
 use crate::monte_carlo;
 use crate::noise::reduction::window_s;
@@ -29,6 +32,10 @@ pub struct NavigateInputs {
     pub model: Model,
     /// What makes the errors of the true IMU.
     pub truth: TrueImu,
+    /// What the calibration of the model left open, at the rate of the IMU.
+    pub model_draws: Option<Draws>,
+    /// What the calibration of the truth left open, where it is another model.
+    pub truth_draws: Option<Draws>,
 }
 
 /// What makes the errors of the true IMU, beside the defects of the scenario.
@@ -132,6 +139,11 @@ pub fn navigate(
     .ok_or(NavigateError::NotFinite)?;
     navigation.summary.reduction = reduction;
     analysis.add_budgets(&mut navigation.summary, &belief);
+    if method == Method::Lincov {
+        analysis.add_sensitivities(&mut navigation.summary, &belief);
+        let full = |model: &Model| scenario.with_full_noise().belief(model, outages, &track).ok();
+        analysis.add_intervals(&mut navigation.summary, &belief, inputs, &full);
+    }
     Ok(navigation)
 }
 
@@ -217,6 +229,36 @@ impl<'a> Analysis<'a> {
         Some((expected.epochs, summary))
     }
 
+    /// How the errors at the ends of outages follow from the parameters of what makes them.
+    fn add_sensitivities(&self, summary: &mut Summary, belief: &Belief) {
+        let (Some(model), track) = (self.model, self.track.coarse()) else { return };
+        let ends = Sensitivities::at_outage_ends(&FilterPass::new(&track, belief), self.experiment, model);
+        for (outage, sensitivity) in summary.outages.iter_mut().zip(ends) {
+            outage.sensitivity = Some(sensitivity);
+        }
+    }
+
+    /// What the calibrations leave open in the figures at the ends of outages.
+    fn add_intervals(
+        &self,
+        summary: &mut Summary,
+        belief: &Belief,
+        inputs: &NavigateInputs,
+        full: &(dyn Fn(&Model) -> Option<Belief> + Sync),
+    ) {
+        let analysed = Analysed { experiment: self.experiment, track: self.track, belief };
+        let truth_draws = match inputs.truth {
+            TrueImu::AsBelieved => inputs.model_draws.as_ref(),
+            _ => inputs.truth_draws.as_ref(),
+        };
+        if let (Some(truth), Some(draws)) = (self.model, truth_draws) {
+            analysed.errors(truth, draws, &mut summary.outages);
+        }
+        if let Some(draws) = &inputs.model_draws {
+            analysed.beliefs(&inputs.model, draws, full, &mut summary.outages);
+        }
+    }
+
     /// What the errors at the ends of outages are made of, and what the filter believes they are.
     fn add_budgets(&self, summary: &mut Summary, belief: &Belief) {
         let filter = FilterPass::new(self.track, belief);
@@ -241,6 +283,12 @@ impl Navigation {
 }
 
 impl NavigateInputs {
+    /// Along a trajectory, with models that are known for certain.
+    #[must_use]
+    pub const fn new(trajectory: Trajectory, model: Model, truth: TrueImu) -> Self {
+        Self { trajectory, model, truth, model_draws: None, truth_draws: None }
+    }
+
     fn truth(&self) -> Truth<'_> {
         match &self.truth {
             TrueImu::AsBelieved => Truth::Model(&self.model),

@@ -32,3 +32,4 @@ mod study;
 mod synthesize;
 mod trajectory_command;
 mod tune;
+mod uncertainty;

@@ -3,7 +3,7 @@
 
 use nav_sim::earth::{GravityModel, gravity_down};
 use nav_sim::ekf::FilterStates;
-use nav_sim::metrics::{Budget, Estimate, Expected, epochs};
+use nav_sim::metrics::{Budget, Estimate, Expected, Sensitivities, epochs};
 use nav_sim::monte_carlo;
 use nav_sim::noise::{Ar1, Composite, Drift, Model, Process, Quantization, RandomWalk, White};
 use nav_sim::scenario::Scenario;
@@ -21,7 +21,7 @@ const OUTAGE: Outage = Outage { start_s: 70.0, end_s: 100.0 };
 /// scatter of 400 squares is nearly normal).
 const BOUND: f64 = 4.9;
 
-fn drive() -> Trajectory {
+pub(super) fn drive() -> Trajectory {
     let still = |s: f64| Kind::Straight(Length::Duration(s));
     let faster = |to_speed: f64| Kind::Accelerate { to_speed, by: Acceleration::Duration(8.0) };
     let turn = |deg: f64| Kind::Turn { angle: deg.to_radians(), by: Turning::Duration(9.0) };
@@ -230,6 +230,37 @@ fn constants_of_the_true_imu_have_their_closed_forms() {
     // 100 a second, each a hundredth of a second later: k f t³/6 (1 + 3/(2n))
     assert!((mean / (1e-6 * RATE_HZ * 8000.0 / 6.0) - 1.0).abs() < 2e-3, "{mean}");
     assert!((rmse / mean.abs() - 1.0).abs() < 1e-12, "{rmse} {mean}");
+}
+
+/// A mean square is linear in every variance: d ln RMSE / d ln variance is half the share of its source, whatever the
+/// share; to the square of the step, 1e-4. A longer correlation time at the same innovation variance is a larger error.
+#[test]
+fn sensitivities_to_variances_are_half_the_shares() {
+    let scenario: Scenario = toml::from_str("").unwrap();
+    let (path, believed, outages) = (drive(), model(1.0), [OUTAGE]);
+    let truth = model(4.0);
+    let track = scenario.track(&path, &believed, &outages).unwrap();
+    let beliefs = [scenario.belief(&believed, &outages, &track).unwrap()];
+    let experiment = scenario.experiment(&path, Truth::Model(&truth), &beliefs, &outages, 1);
+    let filter = FilterPass::new(&track, &beliefs[0]);
+    let budget = &Budget::at_outage_ends(&filter, &TruthSide::sources(&experiment, &truth))[0];
+    let sensitivities = &Sensitivities::at_outage_ends(&filter, &experiment, &truth)[0];
+    let of = |name: &str| sensitivities.0.iter().find(|(n, _)| n == name).unwrap().1;
+    let mut compared = 0;
+    for (source, shares) in &budget.shares {
+        let parameter = ["WN.sigma2", "QN.q2", "AR1_1.sigma2", "AR1_2.sigma2", "RW.gamma2"]
+            .into_iter()
+            .find(|p| source.split_once('.').is_some_and(|(_, label)| p.split('.').next() == Some(label)));
+        let Some(parameter) = parameter else { continue };
+        let sensor = source.split('.').next().unwrap();
+        let slopes = of(&format!("{sensor}.{parameter}"));
+        for i in 0..9 {
+            assert!((slopes.0[i] - 0.5 * shares.0[i]).abs() < 1e-4, "{source}, state {i}: {}", slopes.0[i]);
+        }
+        compared += 1;
+    }
+    assert_eq!((compared, sensitivities.0.len()), (10, 14));
+    assert!(of("gyro.AR1_2.correlation_time").0.iter().all(|s| *s > 0.0));
 }
 
 /// Shares of every state sum to 1; together the sources make the mean squares of the whole truth, and those that

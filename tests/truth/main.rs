@@ -13,6 +13,7 @@
 mod common;
 
 mod alignment;
+mod calibration_intervals;
 mod calibration_truth;
 mod case_study;
 mod choose;

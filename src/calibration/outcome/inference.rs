@@ -30,6 +30,11 @@ pub struct Inference {
     pub draws: usize,
     /// Draws that had a fit.
     pub fitted: usize,
+    /// The models of these draws: what other recordings of the same IMU would have given.
+    pub drawn: Vec<Composite>,
+    /// What the distances of quantiles of the draws from their median are multiplied by, where few replicates leave their
+    /// own scatter unknown: Student's quantile over the normal one.
+    pub stretch: f64,
     /// One interval a parameter that is not fixed, in the order of the model.
     pub intervals: Vec<ParameterInterval>,
     /// Whether the model describes the curve; of slopes (AVLR), which are not fitted to it, nothing is known.

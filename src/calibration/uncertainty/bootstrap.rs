@@ -10,6 +10,7 @@
 //! The estimator is applied to the new replicates, trim and all. No signal is simulated. A curve from elsewhere
 //! scatters by its own degrees of freedom.
 
+use super::anticipated::Scattering;
 use super::spread::Spread;
 use crate::curve::sampling::SamplingLaw;
 use crate::curve::{Estimator, Group, Replicate, average, implied};
@@ -114,6 +115,27 @@ impl<'a> CurveSampler<'a> {
             Some(spread) => self.curve(self.random_effects(spread, &mut generator), settings),
             None => Some(self.elsewhere(&mut generator)),
         }
+    }
+
+    /// A new curve of the same estimator, of replicates that differ by `between` (`[replicate][level]`, over the model)
+    /// and, unless they are endless, scatter by the law.
+    pub(crate) fn draw_with(
+        &self,
+        key: &StreamKey<'_>,
+        between: &[Vec<f64>],
+        scattering: Scattering,
+        settings: &Settings,
+    ) -> Option<Curve> {
+        let mut generator = key.generator();
+        let with = |(edof, between): (&Vec<f64>, &Vec<f64>)| match scattering {
+            Scattering::All => {
+                let within = self.law.draw(edof, &mut generator);
+                within.into_iter().zip(between).map(|(ratio, b)| ratio * b).collect()
+            }
+            Scattering::BetweenRecordings => between.clone(),
+        };
+        let ratios = self.spread.as_ref()?.edof.iter().zip(between).map(with).collect();
+        self.curve(ratios, settings)
     }
 
     /// nu*/nu of new replicates: what they differ by, and the scatter of each.

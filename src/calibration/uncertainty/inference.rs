@@ -64,10 +64,13 @@ fn by_bootstrap(group: &Group, outcome: &Outcome, settings: &Settings, bootstrap
             .map(|(level, (within, between))| LevelSpread { level, within: *within, between: *between })
             .collect()
     };
+    let stretch = spread.map_or(1.0, Spread::student);
     Inference {
         draws: bootstrap.draws,
         fitted: fits.len(),
-        intervals: intervals(outcome, &fits, spread.map_or(1.0, Spread::student), &errors),
+        drawn: fits.iter().map(|fit| fit.composite.clone()).collect(),
+        stretch,
+        intervals: intervals(outcome, &fits, stretch, &errors),
         goodness: (outcome.estimator != Estimator::Avlr)
             .then(|| goodness(&outcome.fit, &outcome.spec, &fits)),
         spread: spread.map_or(Vec::new(), rows),

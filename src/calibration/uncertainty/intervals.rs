@@ -176,6 +176,13 @@ fn interval(parameter: Parameter, estimate: f64, drawn: Vec<f64>, stretch: f64) 
     if ends.iter().all(|e| e.is_finite()) && scale(estimate).is_finite() { ends } else { quantiles }
 }
 
+/// The 95 % interval of what is positive and follows from the parameters, from what follows from the models of draws:
+/// as that of an amplitude.
+#[must_use]
+pub fn derived_interval(estimate: f64, drawn: Vec<f64>, stretch: f64) -> [f64; 2] {
+    interval(Parameter::Sigma2, estimate, drawn, stretch)
+}
+
 /// Probability beyond either end of a 95 % interval.
 const TAIL: f64 = 0.025;
 

@@ -21,8 +21,8 @@ use std::path::{Path, PathBuf};
 ///
 /// Each recording is one replicate. By default the three axes of a sensor are pooled: one model a sensor,
 /// their signals replicates of one another. The model goes to a TOML file, the curves behind it to
-/// <model>.wv.json and a page with figures to <model>.html beside it; with `--estimator all` there are three files an
-/// estimator, <model>_<estimator>.toml and so on.
+/// <model>.wv.json beside it, the draws behind its intervals to <model>.draws.json, a page with figures to
+/// <model>.html; with `--estimator all` there is such a set for each estimator, <model>_<estimator>.toml and so on.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:

@@ -24,7 +24,7 @@ pub(super) fn outputs(
     inputs: &[PathBuf],
 ) -> Result<Vec<ModelFiles>, Failure> {
     let outputs = ModelFiles::of(out, estimators);
-    for path in outputs.iter().flat_map(|files| [&files.model, &files.curves, &files.page]) {
+    for path in outputs.iter().flat_map(|f| [&f.model, &f.curves, &f.draws, &f.page]) {
         writable(path)?;
         atomic::guard_inputs(path, inputs.iter().map(PathBuf::as_path))?;
     }
@@ -94,7 +94,9 @@ pub(super) fn finish(
     for output in outputs {
         output.write(calibration, note)?;
         output.write_page(calibration, &diagnoses)?;
-        files.extend([&output.model, &output.curves, &output.page].map(|p| p.display().to_string()));
+        let draws = calibration.outcomes.iter().any(|o| o.inference.is_some()).then_some(&output.draws);
+        let written = [&output.model, &output.curves].into_iter().chain(draws).chain([&output.page]);
+        files.extend(written.map(|p| p.display().to_string()));
     }
     let all: Vec<&Outcome> = outcomes.iter().collect();
     plot.write(|| report::calibration_svg(&CurvesFile::new(groups, &all, settings), &diagnoses), session)?;

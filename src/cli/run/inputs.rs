@@ -2,12 +2,13 @@
 
 use super::Args;
 use crate::cli::{Failure, Session, read, turn_on};
+use nav_sim::formats::draws_file::{self, Draws};
 use nav_sim::formats::model_file::ModelFile;
 use nav_sim::imu::{Recording, Sensor};
 use nav_sim::jobs::{NavigateInputs, TrueImu};
 use nav_sim::noise::Model;
 use nav_sim::report::{Input, ModelNote};
-use nav_sim::scenario::Scenario;
+use nav_sim::scenario::{Method, Scenario};
 use std::path::{Path, PathBuf};
 
 /// What was read, ready to use.
@@ -37,13 +38,21 @@ impl Inputs {
             paths => read::recordings_at(paths, args.static_rate_hz, session)?,
         };
         recordings.iter().filter_map(motion).for_each(|doubt| session.printer.warn(&doubt));
-        let truth = match truth {
-            _ if !recordings.is_empty() => TrueImu::Recordings(recordings),
-            Some((model, _)) => TrueImu::Model(model),
-            None => TrueImu::AsBelieved,
+        let (truth, truth_file) = match truth {
+            _ if !recordings.is_empty() => (TrueImu::Recordings(recordings), None),
+            Some((model, file)) => (TrueImu::Model(model), Some(file)),
+            None => (TrueImu::AsBelieved, None),
         };
+        let analysed = scenario.run.method == Method::Lincov;
+        let draws = |path: &Path, file: &ModelFile| {
+            if analysed { self::draws(path, file, imu_hz, session) } else { None }
+        };
+        let model_draws = draws(&args.model, &file);
+        let truth_draws = args.truth.as_deref().zip(truth_file.as_ref());
+        let truth_draws = truth_draws.and_then(|(path, file)| draws(path, file));
         let note = ModelNote { estimator: estimator(&file) };
-        Ok(Self { job: NavigateInputs { trajectory, model, truth }, note, files })
+        let job = NavigateInputs { trajectory, model, truth, model_draws, truth_draws };
+        Ok(Self { job, note, files })
     }
 }
 
@@ -84,6 +93,25 @@ fn files(args: &Args) -> Result<Vec<Input>, Failure> {
 fn model(path: &Path, imu_hz: f64, session: &Session) -> Result<(Model, ModelFile), Failure> {
     let file = read::model(path, session)?;
     Ok((read::at_rate(path, &file.model, imu_hz, session)?, file))
+}
+
+/// The draws beside a calibrated model, at the rate of the IMU. The analysis does without those it cannot use.
+fn draws(path: &Path, file: &ModelFile, imu_hz: f64, session: &Session) -> Option<Draws> {
+    let beside = draws_file::beside(path).display().to_string();
+    let draws = match draws_file::read(path) {
+        Ok(draws) => draws?,
+        Err(e) => {
+            session.printer.warn(&format!("{e}: no intervals from the calibration"));
+            return None;
+        }
+    };
+    let found = draws.draws(&file.model).and_then(|draws| draws.at_rate(imu_hz).ok());
+    if found.is_none() {
+        session
+            .printer
+            .warn(&format!("{beside} is not of {}: no intervals from the calibration", path.display()));
+    }
+    found
 }
 
 /// The estimator that made a model, if known.

@@ -144,6 +144,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     args.plot.write(|| nav_sim::report::run_svg(&found.epochs, &found.summary), session)?;
     let shown = if session.json() { nav_sim::report::summary_json } else { text };
     session.printer.result(shown(&found.summary, throughput_epochs_per_s).trim_end());
+    if session.verbose() && !session.json() {
+        session.printer.result(output::sensitivity_table(&found.summary).trim_end());
+    }
     output::doubt_filter(&found.summary, session);
     session.printer.say(&format!("wrote {}", args.out.display()));
     all_finite(&found.summary)?;

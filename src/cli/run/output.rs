@@ -137,6 +137,7 @@ pub(crate) fn text(summary: &Summary, throughput_epochs_per_s: f64) -> String {
         coverage.level,
         inside(coverage.fraction_inside, coverage.lower95, coverage.upper95)
     );
+    text += &calibration_lines(&summary.outages);
     text += &budget_table(summary);
     if let Some(agreement) = &summary.agreement {
         text += &format!("\nruns against the covariance analysis: {}", agreement_line(agreement));
@@ -149,6 +150,33 @@ pub(super) fn met_line(met: &Met) -> String {
     let verdict = if met.met { "met" } else { "NOT MET" };
     let place = met.outage.map_or("over the run".to_owned(), |k| format!("at the end of outage {}", k + 1));
     format!("required {}<={}: {verdict}, {} {place}", met.name, met.limit, report::readable(met.value))
+}
+
+/// What the calibrations leave open: a line for each of the first outages.
+fn calibration_lines(outages: &[OutageSummary]) -> String {
+    let shown = |value: f64, (low, high): (f64, f64)| {
+        let [value, low, high] = [value, low, high].map(report::readable);
+        format!("{value} [{low}, {high}]")
+    };
+    let line = |o: &OutageSummary| {
+        let h = &o.horizontal_error_end_m;
+        let p95 =
+            (h.p95_ci95.0.zip(h.p95_ci95.1)).map(|ends| format!("horizontal p95 {} m", shown(h.p95, ends)));
+        let of = |name: &str, value: &PerState<f64>, interval: &Option<PerState<(f64, f64)>>| {
+            interval.map(|interval| format!("{name} pos_e_m {}", shown(value.0[1], interval.0[1])))
+        };
+        let rmse = of("RMSE", &o.rmse_end, &o.rmse_end_ci95);
+        let asee = of("ASEE", &o.asee_end, &o.asee_end_ci95);
+        let all: Vec<String> = [p95, rmse, asee].into_iter().flatten().collect();
+        let window = format!("{}–{} s", seconds(o.start_s), seconds(o.end_s));
+        (!all.is_empty()).then(|| format!("\nby the calibration, 95 %, {window}: {}", all.join(", ")))
+    };
+    outages
+        .iter()
+        .filter(|o| o.asee_end_ci95.is_some() || o.rmse_end_ci95.is_some())
+        .take(BUDGETS)
+        .filter_map(line)
+        .collect()
 }
 
 /// Most outages whose sources are shown; of more, those with the largest errors.
@@ -177,6 +205,24 @@ fn budget_table(summary: &Summary) -> String {
         rows.push(vec![window, sources(budget, &[0, 1]), sources(budget, &[8])]);
     }
     format!("\n{}", table(&rows))
+}
+
+/// How horizontal position (east) and yaw at the end of the outage with the largest errors follow from each parameter.
+pub(super) fn sensitivity_table(summary: &Summary) -> String {
+    let known = summary.outages.iter().filter_map(|o| Some((o, o.sensitivity.as_ref()?)));
+    let east = |o: &OutageSummary| o.rmse_end.0[1];
+    let Some((outage, of)) = known.max_by(|a, b| east(a.0).total_cmp(&east(b.0))) else {
+        return String::new();
+    };
+    let states = [1, 6, 8];
+    let window = format!("{}–{} s", seconds(outage.start_s), seconds(outage.end_s));
+    let head = std::iter::once("d ln RMSE / d ln parameter".to_owned());
+    let mut rows: Vec<Vec<String>> = vec![head.chain(states.map(|i| REPORTED_NAMES[i].to_owned())).collect()];
+    for (name, slopes) in &of.0 {
+        let slopes = states.map(|i| format!("{:+.3}", slopes.0[i]));
+        rows.push(std::iter::once(name.clone()).chain(slopes).collect());
+    }
+    format!("at the end of the outage {window}\n{}", table(&rows))
 }
 
 /// How the figures were found.

@@ -1,10 +1,9 @@
 //! Error budgets: which share of the mean square of the errors each of their sources has.
 
-use super::estimate::PerState;
+use super::estimate::{PerState, serialize_named};
 use crate::simulation::REPORTED;
 use crate::simulation::lincov::{FilterPass, NamedSource};
 use rayon::prelude::*;
-use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 
 /// Shares of independent sources in the mean square of each reported state; of a state they sum to 1. In files an
@@ -55,10 +54,6 @@ impl Budget {
 
 impl Serialize for Budget {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut map = serializer.serialize_map(Some(self.shares.len()))?;
-        for (name, shares) in &self.shares {
-            map.serialize_entry(name, shares)?;
-        }
-        map.end()
+        serialize_named(&self.shares, serializer)
     }
 }

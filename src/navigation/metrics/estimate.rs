@@ -95,6 +95,18 @@ impl<T: Serialize> Serialize for PerState<T> {
     }
 }
 
+/// An object with these names as keys, in their order.
+pub(super) fn serialize_named<T: Serialize, S: Serializer>(
+    named: &[(String, T)],
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    let mut map = serializer.serialize_map(Some(named.len()))?;
+    for (name, value) in named {
+        map.serialize_entry(name, value)?;
+    }
+    map.end()
+}
+
 impl<'de, T: Deserialize<'de> + Copy> Deserialize<'de> for PerState<T> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let by_name = HashMap::<String, T>::deserialize(deserializer)?;

@@ -129,6 +129,13 @@ fn mean_size(instant: &Instant, states: &[usize]) -> f64 {
     square(instant, states).mean_root()
 }
 
+/// Quantiles of the horizontal error (m).
+#[must_use]
+pub fn horizontal_quantiles<const N: usize>(instant: &Instant, probabilities: [f64; N]) -> [f64; N] {
+    let horizontal = square(instant, &[0, 1]);
+    probabilities.map(|p| horizontal.quantile(p).sqrt())
+}
+
 /// The square of that part.
 fn square(instant: &Instant, states: &[usize]) -> QuadraticForm {
     let mean: Vec<f64> = states.iter().map(|s| instant.mean[*s]).collect();
@@ -158,8 +165,7 @@ fn outage((start_s, end_s): (f64, f64), end: &Instant, epochs: &[EpochMetrics]) 
     let inside = epochs.iter().filter(|e| start_s <= e.t_s + 1e-9 && e.t_s + 1e-9 < end_s);
     let mean = Accuracy::over(inside);
     let without_error = |all: &PerState<Estimate>| PerState(all.0.map(|e| exact(e.value)));
-    let horizontal = square(end, &[0, 1]);
-    let root = |p: f64| horizontal.quantile(p).sqrt();
+    let [p50, p95, p999] = horizontal_quantiles(end, [0.5, 0.95, NEARLY_ALL]);
     let quantile = |value: f64| Quantile { value, ci95: (None, None) };
     OutageMetrics {
         start_s,
@@ -170,9 +176,9 @@ fn outage((start_s, end_s): (f64, f64), end: &Instant, epochs: &[EpochMetrics]) 
         rmse_end: exactly(end.rmse()),
         nees_end: exact(end.consistency().nees),
         log_density_end: exact(end.consistency().log_density),
-        horizontal_p50_m: quantile(root(0.5)),
-        horizontal_p95_m: quantile(root(0.95)),
-        horizontal_p999_m: Some(root(NEARLY_ALL)),
+        horizontal_p50_m: quantile(p50),
+        horizontal_p95_m: quantile(p95),
+        horizontal_p999_m: Some(p999),
         horizontal_max_m: f64::NAN,
         reconvergence: Reconvergence { p50_s: quantile(f64::NAN), p95_s: quantile(f64::NAN), never: None },
     }

@@ -8,6 +8,7 @@ use super::estimate::{Estimate, PerState, Quantile, SampleSize};
 use super::outage::{self, OutageMetrics};
 use super::reduction::ReductionSummary;
 use super::requirement::Met;
+use super::sensitivity::Sensitivities;
 use super::verdict::{Verdict, VerdictKind};
 use crate::simulation::{NEES_DOF, RunResult};
 use serde::Serialize;
@@ -95,6 +96,13 @@ pub struct OutageSummary {
     pub rmse_end: PerState<f64>,
     /// Its Monte-Carlo standard error.
     pub rmse_end_std_error: PerState<f64>,
+    /// 95 % interval of the ASEE that the calibration of the model leaves: what a filter would state whose model were
+    /// known for certain; of a covariance analysis whose model has its draws beside it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub asee_end_ci95: Option<PerState<(f64, f64)>>,
+    /// 95 % interval of the RMSE of this filter that the calibration of what makes the errors leaves; as above.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rmse_end_ci95: Option<PerState<(f64, f64)>>,
     /// Mean NEES at the same instant.
     pub nees_end: f64,
     /// Its Monte-Carlo standard error.
@@ -115,9 +123,14 @@ pub struct OutageSummary {
     /// The same of what the filter believes in.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub believed_budget: Option<Budget>,
+    /// How the RMSE just before the first fix after the outage follows from the parameters of the true noise; of a
+    /// covariance analysis.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sensitivity: Option<Sensitivities>,
 }
 
-/// Quantiles of a distribution over runs, with distribution-free 95 % intervals (null: too few runs).
+/// Quantiles of a distribution over runs, with distribution-free 95 % intervals (null: too few runs); of a covariance
+/// analysis with the intervals that the calibration of what makes the errors leaves (null: its draws are not there).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Spread {
     /// Median.
@@ -267,6 +280,8 @@ impl From<&OutageMetrics> for OutageSummary {
             asee_end_std_error: errors(&o.asee_end),
             rmse_end: values(&o.rmse_end),
             rmse_end_std_error: errors(&o.rmse_end),
+            asee_end_ci95: None,
+            rmse_end_ci95: None,
             nees_end: o.nees_end.value,
             nees_end_std_error: o.nees_end.std_error,
             log_density_end: o.log_density_end.value,
@@ -281,6 +296,7 @@ impl From<&OutageMetrics> for OutageSummary {
                 never: o.reconvergence.never,
             },
             budget: None,
+            sensitivity: None,
             believed_budget: None,
         }
     }

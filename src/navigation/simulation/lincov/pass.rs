@@ -135,6 +135,21 @@ impl<'a> FilterPass<'a> {
         Self { track, believed, gains, reports, ends }
     }
 
+    /// Standard deviations that the filter states of the reported states (m, m/s, degrees), just before the first fix
+    /// after each outage (or at the end).
+    #[must_use]
+    pub fn sigma_at_ends(&self) -> Vec<[f64; REPORTED]> {
+        let mut sigmas = vec![[0.0; REPORTED]; self.track.outages];
+        let none = Errors {
+            joint: Joint::new([[0.0; NAV]; NAV], &Sources::default(), &Sources::default()),
+            mean: None,
+        };
+        for mark in &self.track.marks {
+            mark.outages.iter().for_each(|o| sigmas[*o] = none.instant(mark, &self.ends[*o]).sigma());
+        }
+        sigmas
+    }
+
     /// The true errors of the filter.
     #[must_use]
     pub fn errors(&self, truth: &TruthSide) -> ErrorLaw {

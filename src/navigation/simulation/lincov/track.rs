@@ -139,7 +139,8 @@ impl Track {
 
     /// The same with one step from mark to mark, at most a second, and a report every ten: a few times faster,
     /// and within 1e-3 in every ratio.
-    pub(crate) fn coarse(&self) -> Self {
+    #[must_use]
+    pub fn coarse(&self) -> Self {
         let (mut steps, mut marks, mut done) = (Vec::new(), self.marks.clone(), 0);
         let mut reports = 0;
         for mark in &mut marks {

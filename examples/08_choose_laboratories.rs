@@ -2,7 +2,7 @@
 //! IMU, whose parameters differ from recording to recording, clean or contaminated as in the paper's scenarios II and
 //! III, and what is true of each candidate on fresh recordings, of the same kind and clean.
 //!
-//! `cargo run --release --example 07_choose_laboratories -- LABORATORIES RECORDINGS CASE` (default 100 6 clean). Cases:
+//! `cargo run --release --example 08_choose_laboratories -- LABORATORIES RECORDINGS CASE` (default 100 6 clean). Cases:
 //! `clean`; `II`, `III`: the recordings are contaminated, operation too; `II-clean`, `III-clean`: operation is clean.
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 

@@ -1,0 +1,130 @@
+//! Covariance analysis held against Monte-Carlo runs: three trajectories, three filters, a truth as believed, one process
+//! of it four times as strong, and what the true IMU and the receiver can have beside noise.
+//!
+//! `cargo run --release --example 07_lincov_against_runs -- RUNS TRAJECTORY…` (default 2000, the three shipped ones). Every ten
+//! seconds: the largest departure of the ASEE in per cent; the largest departures of RMSE (nine states), NEES and
+//! coverage in Monte-Carlo standard errors, and how many of how many RMSE are beyond four of them.
+#![expect(clippy::print_stdout, reason = "an example shows its results")]
+
+use nav_sim::ekf::FilterStates;
+use nav_sim::formats::{model_file, trajectory_file};
+use nav_sim::imu::Channel;
+use nav_sim::metrics::{Expected, epochs};
+use nav_sim::monte_carlo;
+use nav_sim::noise::{Kind, Model};
+use nav_sim::scenario::Scenario;
+use nav_sim::sensors::imu::Truth;
+use nav_sim::sensors::outage::Outage;
+use nav_sim::simulation::RunResult;
+use nav_sim::trajectory::Trajectory;
+use std::error::Error;
+use std::path::Path;
+
+type Failure = Box<dyn Error>;
+
+/// A process whose variance is four times what is believed: kind, and which of its kind.
+const STRONGER: [(&str, Kind, usize); 5] = [
+    ("WN × 4", Kind::White, 0),
+    ("QN × 4", Kind::Quantization, 0),
+    ("AR1_1 × 4", Kind::Ar1, 0),
+    ("AR1_2 × 4", Kind::Ar1, 1),
+    ("RW × 4", Kind::RandomWalk, 0),
+];
+
+/// What is there beside noise; the filter of 21 states expects scale factors.
+const BESIDE: [(&str, &str); 5] = [
+    ("as believed", ""),
+    ("turn-on bias", "imu = { turn_on_bias_accel_m_s2 = 0.02, turn_on_bias_gyro_rad_s = 2e-4 }"),
+    ("scale factor", "imu = { scale_ppm_accel = 1000, scale_ppm_gyro = 1000 }"),
+    ("coloured GNSS", "gnss = { correlated_pos_sigma_m = [3, 3, 5], correlation_time_s = 60 }"),
+    ("lever arm", "gnss = { lever_arm_m = [1.0, -0.5, -1.2] }"),
+];
+
+/// All axes with the variance of one process times four.
+fn stronger(model: &Model, kind: Kind, which: usize) -> Result<Model, Failure> {
+    let mut stronger = model.clone();
+    for channel in Channel::ALL {
+        let mut own = stronger.axes[channel.index()].processes.iter_mut().filter(|p| p.kind() == kind);
+        let process = own.nth(which).ok_or("the model has no such process")?;
+        let parameter = kind.amplitude().name();
+        let value = process.values().last().copied().unwrap_or(0.0);
+        let changed = process.with_parameter(parameter, 4.0 * value, model.rate_hz);
+        *process = changed.ok_or("the process has no such parameter")??;
+    }
+    Ok(stronger)
+}
+
+/// One truth in three filters.
+fn compare(
+    (trajectory, name): (&Trajectory, &str),
+    (case, settings): (&str, &str),
+    (model, truth): (&Model, &Model),
+    runs: u64,
+) -> Result<(), Failure> {
+    let scenario: Scenario = toml::from_str(settings)?;
+    let outages = Outage::PAPER;
+    let track = scenario.track(trajectory, model, &outages)?;
+    let mut beliefs = Vec::new();
+    for states in FilterStates::ALL {
+        let mut own = scenario.clone();
+        own.filter.states = states;
+        beliefs.push(own.belief(model, &outages, &track)?);
+    }
+    let experiment = scenario.experiment(trajectory, Truth::Model(truth), &beliefs, &outages, 1);
+    let sampled = monte_carlo::run(&experiment, runs, &|_| {})?;
+    for ((states, belief), sampled) in FilterStates::ALL.iter().zip(&beliefs).zip(&sampled) {
+        let expected =
+            Expected::along(&track, &experiment, belief, truth).ok_or("the covariance ran away")?;
+        println!("| {name} | {case} | {states} | {} |", departures(sampled, &expected));
+    }
+    Ok(())
+}
+
+/// How far runs are from what is expected of them.
+fn departures(sampled: &RunResult, expected: &Expected) -> String {
+    let (mut asee, mut rmse, mut nees, mut coverage) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
+    let (mut beyond, mut all, mut worst) = (0, 0, 0.0_f64);
+    let farther = |a: f64, b: f64| if b.abs() > a.abs() { b } else { a };
+    for (s, e) in epochs(sampled).iter().zip(&expected.epochs).step_by(10) {
+        for i in 0..9 {
+            asee = farther(asee, 100.0 * (s.asee.0[i].value / e.asee.0[i].value - 1.0));
+            let z = (s.rmse.0[i].value - e.rmse.0[i].value) / s.rmse.0[i].std_error;
+            (rmse, all, beyond) = (farther(rmse, z), all + 1, beyond + u32::from(z.abs() > 4.0));
+            worst = farther(worst, 100.0 * (s.rmse.0[i].value / e.rmse.0[i].value - 1.0));
+        }
+        nees = farther(nees, (s.nees.value - e.nees.value) / s.nees.std_error);
+        // where nearly nothing is left outside, one run more or less is the scatter
+        let share = e.coverage.clamp(0.0, 1.0);
+        let error = (share * (1.0 - share) / s.count as f64).sqrt().max(1.0 / s.count as f64);
+        coverage = farther(coverage, (s.coverage - e.coverage) / error);
+    }
+    format!("{asee:+.2} | {rmse:+.1} | {beyond} of {all} | {worst:+.1} | {nees:+.1} | {coverage:+.1}")
+}
+
+fn main() -> Result<(), Failure> {
+    let mut arguments = std::env::args().skip(1);
+    let runs: u64 = arguments.next().map_or(Ok(2000), |a| a.parse())?;
+    let mut names: Vec<String> = arguments.collect();
+    if names.is_empty() {
+        names = ["land_vehicle", "figure_eight", "fixed_wing"].map(str::to_owned).to_vec();
+    }
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let model = model_file::read(&here.join("calib_data/consumer_mems.toml"))?.model;
+    println!("{runs} runs\n");
+    println!(
+        "| trajectory | truth | filter | ASEE, % | RMSE, z | beyond 4 | RMSE, % | NEES, z | coverage, z |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|");
+    for name in &names {
+        let file = here.join(format!("trajectories/{name}.toml"));
+        let (trajectory, _) = trajectory_file::load(&file, &trajectory_file::Options::default())?;
+        for (case, settings) in BESIDE {
+            compare((&trajectory, name), (case, settings), (&model, &model), runs)?;
+        }
+        for (case, kind, which) in STRONGER {
+            let truth = stronger(&model, kind, which)?;
+            compare((&trajectory, name), (case, ""), (&model, &truth), runs)?;
+        }
+    }
+    Ok(())
+}

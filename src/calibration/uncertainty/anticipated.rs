@@ -1,0 +1,208 @@
+//! A calibration that is not made yet: what recordings of a known IMU would tell, so many of such a length.
+//!
+//! The wavelet variances of each recording are drawn by the law of those of the model (as behind the intervals of a
+//! calibration that was made, [`super::bootstrap`]); where parameters vary between recordings, those of each are drawn
+//! first. The estimator and the fit are applied to the draws: their scatter is what an interval would be made of.
+
+use super::bootstrap::{CurveSampler, like};
+use super::intervals::intervals;
+use super::spread::Spread as Scatter;
+use crate::curve::{Estimator, Group, Replicate, Scope, average, implied};
+use crate::fit::Fit;
+use crate::imu::{Axis, Channel, Sensor};
+use crate::model::ModelSpec;
+use crate::noise::{Composite, Model, Process, Spread, SpreadError};
+use crate::outcome::{Bootstrap, Inference, ModelChoice, Outcome, Settings};
+use crate::pipeline::{CalibrationError, fit_curve};
+use crate::rng::StreamKey;
+use crate::wavelet::default_levels;
+use rayon::prelude::*;
+
+/// Recordings of an IMU, not made yet.
+#[derive(Debug, Clone, Copy)]
+pub struct Anticipated<'a> {
+    /// The noise.
+    pub model: &'a Model,
+    /// How its parameters vary between recordings; none: they do not.
+    pub spread: Option<&'a Spread>,
+    /// How many recordings.
+    pub recordings: usize,
+    /// Samples of each.
+    pub samples: usize,
+}
+
+/// What scatters in the draws.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scattering {
+    /// Recordings differ, and each scatters for its length.
+    All,
+    /// Recordings differ, each of them endless.
+    BetweenRecordings,
+}
+
+/// Why no calibration can be anticipated.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum AnticipationError {
+    /// No curve, or no fit.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
+    /// The spread does not belong to the model.
+    #[error(transparent)]
+    Spread(#[from] SpreadError),
+}
+
+impl Anticipated<'_> {
+    /// The outcomes of each sensor (of each axis where the axes differ): the model itself, with the intervals that
+    /// would be expected, in the inference.
+    ///
+    /// # Errors
+    /// When the recordings are too few for the estimator or too short for the model.
+    pub fn outcomes(
+        &self,
+        estimator: Estimator,
+        settings: &Settings,
+        scattering: Scattering,
+        bootstrap: Bootstrap,
+    ) -> Result<Vec<Outcome>, AnticipationError> {
+        let settings =
+            Settings { estimators: vec![estimator], rate_hz: self.model.rate_hz, ..settings.clone() };
+        let scopes = self.scopes();
+        let of_scope = |scope: &Scope| self.outcome(*scope, estimator, &settings, scattering, bootstrap);
+        scopes.par_iter().map(of_scope).collect()
+    }
+
+    /// The sensors, or their axes where these differ; those without noise are left out.
+    fn scopes(&self) -> Vec<Scope> {
+        let axis = |sensor, axis| self.model.axis(Channel { sensor, axis });
+        let of_sensor = |sensor: Sensor| {
+            let alike = Axis::ALL.iter().all(|a| axis(sensor, *a) == axis(sensor, Axis::X));
+            match alike {
+                true => vec![Scope { sensor, axis: None }],
+                false => Axis::ALL.map(|a| Scope { sensor, axis: Some(a) }).to_vec(),
+            }
+        };
+        let all = Sensor::ALL.into_iter().flat_map(of_sensor);
+        all.filter(|scope| !self.model.axis(scope.channels()[0]).processes.is_empty()).collect()
+    }
+
+    fn outcome(
+        &self,
+        scope: Scope,
+        estimator: Estimator,
+        settings: &Settings,
+        scattering: Scattering,
+        bootstrap: Bootstrap,
+    ) -> Result<Outcome, AnticipationError> {
+        let composite = in_order(self.model.axis(scope.channels()[0]));
+        let group = self.expected(scope, &composite, estimator, settings)?;
+        let spec = ModelSpec::of(composite.processes.iter().map(Process::kind));
+        let settings = &Settings { model: ModelChoice::Given(spec), ..settings.clone() };
+        let failed = |source| CalibrationError::of(&group, estimator, source);
+        let curve = average(&group.replicates, estimator, settings.trim, &settings.tuning).map_err(failed)?;
+        let mut outcome = fit_curve(&group, estimator, curve, settings)?;
+        outcome.fit.composite = composite;
+        let sampler = CurveSampler::of_outcome(&group, &outcome, settings);
+        let name = scope.name();
+        let draw = |run: usize| -> Result<Option<Fit>, AnticipationError> {
+            let between = self.between(scope, run, &outcome, bootstrap)?;
+            let key = StreamKey {
+                seed: bootstrap.seed,
+                scenario: "anticipated",
+                run: run as u64,
+                source: &name,
+                process: estimator.name(),
+            };
+            let curve = sampler.draw_with(&key, &between, scattering, settings);
+            Ok(curve.and_then(|curve| outcome.estimate_again(&curve, settings).ok()))
+        };
+        let fits: Vec<Option<Fit>> =
+            (0..bootstrap.draws).into_par_iter().map(draw).collect::<Result<_, _>>()?;
+        let fits: Vec<Fit> = fits.into_iter().flatten().collect();
+        let stretch = sampler.spread.as_ref().map_or(1.0, Scatter::student);
+        let unknown = vec![f64::NAN; outcome.fit.composite.parameters().count()];
+        outcome.inference = Some(Inference {
+            draws: bootstrap.draws,
+            fitted: fits.len(),
+            drawn: fits.iter().map(|fit| fit.composite.clone()).collect(),
+            stretch,
+            intervals: intervals(&outcome, &fits, stretch, &unknown),
+            goodness: None,
+            spread: Vec::new(),
+            alike: None,
+            indistinct: None,
+        });
+        Ok(outcome)
+    }
+
+    /// Recordings whose wavelet variances are the expected ones.
+    fn expected(
+        &self,
+        scope: Scope,
+        composite: &Composite,
+        estimator: Estimator,
+        settings: &Settings,
+    ) -> Result<Group, CalibrationError> {
+        let levels = 1..=default_levels(self.samples);
+        let classical: Vec<f64> = levels.map(|level| composite.haar_wv(level)).collect();
+        let template = Replicate {
+            name: String::new(),
+            axis: None,
+            samples: self.samples,
+            classical: Vec::new(),
+            robust: Vec::new(),
+            trend: f64::NAN,
+        };
+        let group = |values: &[f64]| {
+            let one = |k: usize, channel: &Channel| Replicate {
+                name: (k + 1).to_string(),
+                axis: Some(channel.axis),
+                ..like(&template, values.to_vec())
+            };
+            let channels = scope.channels();
+            let replicates = channels.iter().flat_map(|c| (0..self.recordings).map(move |k| (k, c)));
+            Group { scope, replicates: replicates.map(|(k, c)| one(k, c)).collect() }
+        };
+        let first = group(&classical);
+        // what a robust variance reads of quantization noise is known once there is a curve
+        let curve = average(&first.replicates, estimator, settings.trim, &settings.tuning)
+            .map_err(|source| CalibrationError::of(&first, estimator, source))?;
+        Ok(group(&implied(composite, &curve)))
+    }
+
+    /// What each signal has more or less of than the model, `[signal][level]`, in a draw.
+    fn between(
+        &self,
+        scope: Scope,
+        run: usize,
+        outcome: &Outcome,
+        bootstrap: Bootstrap,
+    ) -> Result<Vec<Vec<f64>>, SpreadError> {
+        let curve = &outcome.curve;
+        let centre = implied(&outcome.fit.composite, curve);
+        let Some(spread) = self.spread else {
+            return Ok(vec![vec![1.0; centre.len()]; self.recordings * scope.channels().len()]);
+        };
+        let recorded = (0..self.recordings)
+            .map(|k| spread.draw(self.model, bootstrap.seed, (run * self.recordings + k) as u64));
+        let recorded: Vec<Model> = recorded.collect::<Result<_, _>>()?;
+        let ratio = |model: &Model, channel: Channel| {
+            let own = implied(&in_order(model.axis(channel)), curve);
+            own.iter().zip(&centre).map(|(own, centre)| own / centre).collect()
+        };
+        let channels = scope.channels();
+        Ok(channels.iter().flat_map(|c| recorded.iter().map(move |m| ratio(m, *c))).collect())
+    }
+}
+
+/// The processes in the order of fitted models: by kind, those of a kind by correlation time.
+fn in_order(composite: &Composite) -> Composite {
+    let mut processes = composite.processes.clone();
+    processes.sort_by(|a, b| {
+        let time = |p: &Process| match p {
+            Process::GaussMarkov(p) => -p.beta(),
+            other => other.kind().shape().map_or(0.0, |_| other.values()[0]),
+        };
+        a.kind().cmp(&b.kind()).then(time(a).total_cmp(&time(b)))
+    });
+    Composite::new(processes)
+}

@@ -1,0 +1,210 @@
+//! Draws of a calibration (JSON, `<model>.draws.json`): the models that other recordings of the same IMU would have
+//! given, by the parametric bootstrap behind the intervals of the parameters.
+//!
+//! They carry the uncertainty of a calibration on into what is computed from its model.
+
+use super::{FileError, source};
+use crate::calibration::Outcome;
+use crate::imu::Channel;
+use crate::noise::continuous::{self, RateError};
+use crate::noise::{Composite, Model};
+use serde::{Deserialize, Serialize};
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+/// The version of the layout.
+const SCHEMA_VERSION: u32 = 1;
+
+/// What the file holds.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DrawsFile {
+    /// Layout version.
+    pub schema_version: u32,
+    /// Sample rate (Hz).
+    pub rate_hz: f64,
+    /// One entry a fit.
+    pub signals: Vec<SignalDraws>,
+}
+
+/// The draws of one fit.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SignalDraws {
+    /// What was fitted: `accel`, or `accel.x` alone.
+    pub signals: String,
+    /// What distances from the median of the draws are multiplied by.
+    pub stretch: f64,
+    /// What the columns are: process and parameter, as in the model file.
+    pub parameters: Vec<String>,
+    /// The fit itself: a model file that has other values is not of these draws.
+    pub estimate: Vec<f64>,
+    /// One row a draw.
+    pub draws: Vec<Vec<f64>>,
+}
+
+/// Models that other recordings would have given.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Draws {
+    /// One model a draw.
+    pub models: Vec<Model>,
+    /// What distances from the median of whatever follows from them are multiplied by.
+    pub stretch: f64,
+}
+
+/// Where the draws of a model file stand.
+#[must_use]
+pub fn beside(model: &Path) -> PathBuf {
+    model.with_extension("draws.json")
+}
+
+/// The draws beside a model file; none where there is no such file.
+///
+/// # Errors
+/// When it cannot be read, or is not of this layout.
+pub fn read(model: &Path) -> Result<Option<DrawsFile>, FileError> {
+    let path = beside(model);
+    let text = match source::text(&path) {
+        Ok(text) => text,
+        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(e) => return Err(FileError::io(&path, e)),
+    };
+    let refused = |line: usize, message: String| {
+        FileError::contents(path.display().to_string(), line as u64, message)
+            .advice("calibrate again, or remove the file")
+    };
+    let file: DrawsFile = serde_json::from_str(&text).map_err(|e| refused(e.line(), e.to_string()))?;
+    match file.schema_version {
+        SCHEMA_VERSION => Ok(Some(file)),
+        other => {
+            Err(refused(1, format!("\"schema_version\" is {other}; this nav-sim reads {SCHEMA_VERSION}")))
+        }
+    }
+}
+
+fn values(composite: &Composite) -> Vec<f64> {
+    composite.parameters().map(|(_, value)| value).collect()
+}
+
+impl DrawsFile {
+    /// Of some outcomes; none where one of them has no draws.
+    #[must_use]
+    pub fn of(outcomes: &[&Outcome], rate_hz: f64) -> Option<Self> {
+        let signals = |outcome: &&Outcome| {
+            let (inference, composite) = (outcome.inference.as_ref()?, &outcome.fit.composite);
+            Some(SignalDraws {
+                signals: outcome.scope.name(),
+                stretch: inference.stretch,
+                parameters: composite.parameters().map(|(of, _)| composite.name_of(of)).collect(),
+                estimate: values(composite),
+                draws: inference.drawn.iter().map(values).collect(),
+            })
+        };
+        let signals = outcomes.iter().map(signals).collect::<Option<_>>()?;
+        Some(Self { schema_version: SCHEMA_VERSION, rate_hz, signals })
+    }
+
+    /// The models of the draws of `model`, as it is in the file beside; none where the draws are not of it.
+    #[must_use]
+    pub fn draws(&self, model: &Model) -> Option<Draws> {
+        let is_of = |s: &SignalDraws, channel: Channel| Channel::named(&s.signals).contains(&channel);
+        let count = self.signals.iter().map(|s| s.draws.len()).min().filter(|count| *count > 0)?;
+        let mut models = vec![model.clone(); count];
+        for channel in Channel::ALL {
+            let axis = model.axis(channel);
+            let Some(signals) = self.signals.iter().find(|s| is_of(s, channel)) else {
+                // what was not calibrated is known for certain: it has no noise
+                if axis.processes.is_empty() {
+                    continue;
+                } else {
+                    return None;
+                };
+            };
+            if signals.estimate != values(axis) {
+                return None;
+            }
+            for (model, row) in models.iter_mut().zip(&signals.draws) {
+                model.axes[channel.index()] = with_values(axis, row, self.rate_hz)?;
+            }
+        }
+        let stretch = self.signals.iter().map(|s| s.stretch).fold(1.0, f64::max);
+        Some(Draws { models, stretch })
+    }
+}
+
+impl Draws {
+    /// The same at another rate (Hz).
+    ///
+    /// # Errors
+    /// As [`continuous::at_rate`].
+    pub fn at_rate(&self, rate_hz: f64) -> Result<Self, RateError> {
+        let models = self.models.iter().map(|model| continuous::at_rate(model, rate_hz));
+        Ok(Self { models: models.collect::<Result<_, _>>()?, stretch: self.stretch })
+    }
+}
+
+/// The same processes with other parameters.
+fn with_values(axis: &Composite, values: &[f64], rate_hz: f64) -> Option<Composite> {
+    let mut rest = values;
+    let mut processes = Vec::new();
+    for process in &axis.processes {
+        let (own, others) = rest.split_at_checked(process.values().len())?;
+        processes.push(process.kind().process(own, rate_hz)?.ok()?);
+        rest = others;
+    }
+    rest.is_empty().then(|| Composite::new(processes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::{Ar1, Process, White};
+
+    fn axis(scale: f64) -> Composite {
+        let ar1 = Ar1::new(1.0 - 1e-4 * scale, 1e-9 * scale).unwrap();
+        Composite::new(vec![Process::White(White::new(1e-6 * scale).unwrap()), Process::Ar1(ar1)])
+    }
+
+    fn file() -> (Model, DrawsFile) {
+        let signals = |signals: &str, base: f64| SignalDraws {
+            signals: signals.to_owned(),
+            stretch: 1.0 + base / 10.0,
+            parameters: vec!["WN sigma2".into(), "AR1 phi".into(), "AR1 sigma2".into()],
+            estimate: values(&axis(base)),
+            draws: [0.9, 1.2].map(|factor| values(&axis(base * factor))).to_vec(),
+        };
+        let signals = vec![signals("accel", 1.0), signals("gyro", 2.0)];
+        (
+            Model::pooled(100.0, &axis(1.0), &axis(2.0)),
+            DrawsFile { schema_version: 1, rate_hz: 100.0, signals },
+        )
+    }
+
+    #[test]
+    fn draws_come_back_as_models_to_the_last_bit() {
+        let (model, file) = file();
+        let place = tempfile::tempdir().unwrap();
+        let path = place.path().join("m.toml");
+        assert!(read(&path).unwrap().is_none());
+        std::fs::write(beside(&path), serde_json::to_string(&file).unwrap()).unwrap();
+        let found = read(&path).unwrap().unwrap();
+        assert_eq!(found, file);
+        let draws = found.draws(&model).unwrap();
+        assert_eq!(draws.models[1], Model::pooled(100.0, &axis(1.2), &axis(2.4)));
+        assert_eq!((draws.models.len(), draws.stretch), (2, 1.2));
+    }
+
+    #[test]
+    fn draws_of_another_model_are_not_taken() {
+        let (model, file) = file();
+        let mut edited = model.clone();
+        edited.axes[3] = axis(2.0001);
+        assert_eq!(file.draws(&edited), None);
+        let mut cut = file.clone();
+        cut.signals[1].draws[0].pop();
+        assert_eq!(cut.draws(&model), None);
+        let mut accel_alone = file;
+        accel_alone.signals.pop();
+        assert_eq!(accel_alone.draws(&model), None);
+        let without = Model::pooled(100.0, &axis(1.0), &Composite::new(Vec::new()));
+        assert!(accel_alone.draws(&without).is_some());
+    }
+}
