@@ -25,6 +25,7 @@ mod examples;
 mod export;
 mod fuse;
 mod help_examples;
+mod pages;
 mod readme;
 mod require;
 mod run;

@@ -48,9 +48,11 @@ pub fn comparison_page(
         ""
     };
     page.text(&format!("Reference: {}{paired}.", file.reference));
-    for chart in charts(candidates, curves, outages, states) {
-        page.chart(&chart, CAPTION);
+    if !links.is_empty() {
+        page.folded("Pages of the single results", |page| page.links(links));
     }
+    page.text(CAPTION);
+    charts(candidates, curves, outages, states).iter().for_each(|chart| page.chart(chart, ""));
     if !outages.is_empty() {
         page.section("ASEE against the reference, mean over the outage (%)");
         page.text(
@@ -61,10 +63,6 @@ pub fn comparison_page(
         page.section("Consistency and errors");
         page.text("NEES (9 if right) and coverage over the outage; RMSE at its end against the reference, (ratio − 1)·100.");
         page.table(&consistency(file, outages, states));
-    }
-    if !links.is_empty() {
-        page.section("Pages of the single results");
-        page.links(links);
     }
     page.html()
 }
@@ -151,7 +149,7 @@ fn chart(title: &str, own: &[Curve<'_>], outages: &[(f64, f64)], states: &[usize
 }
 
 /// Outages by their times in the place of their numbers.
-fn with_times(mut rows: Vec<Vec<String>>, outages: &[(f64, f64)]) -> Vec<Vec<String>> {
+pub(super) fn with_times(mut rows: Vec<Vec<String>>, outages: &[(f64, f64)]) -> Vec<Vec<String>> {
     for row in rows.iter_mut().skip(1) {
         let time = row[1].parse::<usize>().ok().and_then(|k| outages.get(k - 1));
         row[1] = time.map_or_else(String::new, |w| window(*w));

@@ -1,22 +1,19 @@
 //! The page of a study: verdicts, drift against the length of outages.
 
+use super::comparison::with_times;
 use crate::metrics::{OutageMetrics, VerdictKind};
 use crate::report::page::{Axis, Chart, Colour, Interval, Mark, Page, Panel, Series, Table};
 use crate::report::study::{ShownCell, drift_table, ratio_table, verdict_table};
+use crate::report::verdict::verdict_word;
 
 /// The page of a merged study. `reference`: what ratios refer to; `more`: cells that are in outages.csv only.
 #[must_use]
 pub fn study_page(cells: &[ShownCell], reference: &str, states: &[usize], more: usize) -> String {
     let all = || cells.iter().flat_map(|cell| &cell.columns);
-    let wrong = all().filter(|c| c.verdict.kind != VerdictKind::Ok).count();
     let gravest = [VerdictKind::Diverged, VerdictKind::Overconfident, VerdictKind::Underconfident];
     let has = |kind: &VerdictKind| all().any(|c| c.verdict.kind == *kind);
     let kind = gravest.into_iter().find(has).unwrap_or(VerdictKind::Ok);
-    let verdict = match wrong {
-        0 => format!("All {} filters are consistent.", all().count()),
-        n => format!("{n} of {} filters are not as good as they believe, or better.", all().count()),
-    };
-    let mut page = Page::new("Study", super::tone(kind), &verdict);
+    let mut page = Page::new("Study", super::tone(kind), &verdict(cells));
     if let Some(chart) = drift(cells) {
         page.chart(&chart, "Horizontal error just before the first fix after an outage: median over the runs, the bar up to the 95 % quantile.");
     }
@@ -30,13 +27,32 @@ pub fn study_page(cells: &[ShownCell], reference: &str, states: &[usize], more: 
         page.text(
             "Mean over the outage of (ratio − 1)·100 ± half the 95 % interval (mean of the absolute value).",
         );
-        page.table(&Table::of_rows(&ratio_table(cell, states)));
+        let outages: Vec<(f64, f64)> = cell.columns[0].outages.iter().map(|o| (o.start_s, o.end_s)).collect();
+        page.table(&Table::of_rows(&with_times(ratio_table(cell, states), &outages)));
     }
     if more > 0 {
         page.text(&format!("{more} more cells are in outages.csv."));
     }
     page.text("All numbers: outages.csv, outages.json, runs.parquet.");
     page.html()
+}
+
+/// Candidate by candidate: in how many cells its filter is as good as it believes, and what it is in the others.
+fn verdict(cells: &[ShownCell]) -> String {
+    let Some(first) = cells.first() else { return "The study has no cell.".to_owned() };
+    let kinds =
+        [VerdictKind::Ok, VerdictKind::Overconfident, VerdictKind::Underconfident, VerdictKind::Diverged];
+    let of_column = |(k, name): (usize, &str)| {
+        let own = || cells.iter().filter_map(|cell| cell.columns.get(k));
+        let count = |kind: VerdictKind| own().filter(|c| c.verdict.kind == kind).count();
+        let told = kinds.into_iter().filter(|kind| count(*kind) > 0);
+        let words: Vec<String> =
+            told.map(|kind| format!("{} in {}", verdict_word(kind), count(kind))).collect();
+        format!("{name}: {}", words.join(", "))
+    };
+    let all: Vec<String> = first.columns.iter().map(|c| c.name.as_str()).enumerate().map(of_column).collect();
+    let cells = if cells.len() == 1 { "one cell".to_owned() } else { format!("{} cells", cells.len()) };
+    format!("Of {cells}, {}.", all.join("; "))
 }
 
 /// Error against length, where there are several lengths: points a candidate, and a line through them where each length

@@ -1,0 +1,111 @@
+//! Pages and pictures beside results: where they appear, what they hold, what they never replace. How they look is held by
+//! `tests/browser/pages.py`.
+
+use crate::common::drive::*;
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+fn text(path: &Path) -> String {
+    fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
+}
+
+/// Every number of the page that says where it stands in the results stands there; returns how many there are.
+fn numbers_as_in(page: &str, results: &Value) -> usize {
+    let cells: Vec<(&str, &str)> = page
+        .split("data-json=\"")
+        .skip(1)
+        .map(|rest| (rest.split('"').next().unwrap(), rest.split(['>', '<']).nth(1).unwrap()))
+        .collect();
+    for (source, shown) in &cells {
+        let value = results.pointer(source).unwrap_or_else(|| panic!("{source} is not in the results"));
+        assert_eq!(*shown, nav_sim::report::readable(value.as_f64().unwrap_or(f64::NAN)), "{source}");
+    }
+    cells.len()
+}
+
+fn is_whole(page: &str) {
+    assert!(page.starts_with("<!DOCTYPE html>") && page.ends_with("</html>\n"));
+    assert!(page.contains("<svg class=\"chart wide\"") && page.contains("<svg class=\"chart narrow\""));
+    assert!(
+        !page.contains("NaN") && !page.contains("inf ") && !page.contains("=\"http"),
+        "not a number, or a link"
+    );
+}
+
+/// Noise of 4096 samples, three recordings.
+fn recordings(place: &Path) {
+    done(place, "synthesize imu.toml --replicates 3 --samples 4096 --seed 1 -o static");
+}
+
+#[test]
+fn calibrate_writes_its_page_beside_the_model_the_same_on_any_number_of_threads() {
+    let place = place_with(DRIVE, MODEL);
+    let dir = place.path();
+    recordings(dir);
+    let command =
+        "calibrate static --model WN+RW --seed 1 --bootstrap 20 --format json -o m.toml --plot m.svg";
+    let ran = done(dir, &format!("{command} -j 1"));
+    assert!(ran.stderr.contains("wrote m.svg") && ran.stderr.contains("m.wv.json, m.html"), "{}", ran.stderr);
+    let page = text(&dir.join("m.html"));
+    is_whole(&page);
+    assert!(page.contains("Accelerometer, all axes") && page.contains("data / model"));
+    assert_eq!(numbers_as_in(&page, &serde_json::from_str(&ran.stdout).unwrap()), 4); // WN and RW of two sensors
+    let picture = text(&dir.join("m.svg"));
+    assert!(picture.starts_with("<svg xmlns=") && picture.ends_with("</svg>\n"));
+    done(dir, &format!("{command} -j 2"));
+    assert_eq!((page, picture), (text(&dir.join("m.html")), text(&dir.join("m.svg"))));
+}
+
+#[test]
+fn a_page_of_somebody_else_is_not_replaced() {
+    let place = place_with(DRIVE, MODEL);
+    let dir = place.path();
+    recordings(dir);
+    fs::write(dir.join("m.html"), "<p>mine</p>").unwrap();
+    let ran = nav_sim(dir, "calibrate static --model WN --seed 1 --bootstrap 0 -o m.toml");
+    assert!(
+        ran.code == 2 && ran.stderr.contains("m.html is there and is no page of nav-sim"),
+        "{}",
+        ran.stderr
+    );
+    assert!(text(&dir.join("m.html")) == "<p>mine</p>" && !dir.join("m.toml").exists());
+}
+
+#[test]
+fn wv_writes_a_page_and_a_picture_where_it_is_told() {
+    let place = place_with(DRIVE, MODEL);
+    let dir = place.path();
+    recordings(dir);
+    done(dir, "wv static --page curves.html --plot curves.svg");
+    is_whole(&text(&dir.join("curves.html")));
+    assert!(text(&dir.join("curves.svg")).contains("Gyroscope"));
+    let ran = nav_sim(dir, "wv static --plot curves.png");
+    assert!(ran.code == 2 && ran.stderr.contains("name a file that ends in .svg"), "{}", ran.stderr);
+    let ran = nav_sim(dir, "wv static --page static/replicate_1.csv");
+    assert!(ran.code == 2 && ran.stderr.contains("would be overwritten"), "{}", ran.stderr);
+}
+
+#[test]
+fn runs_and_their_comparison_have_pages_with_the_numbers_of_their_results() {
+    let place = place_with(DRIVE, MODEL);
+    let dir = place.path();
+    let run = "run drive.toml imu.toml --runs 4 --outage 30:40 --seed 5";
+    done(dir, &format!("{run} -o I_awv --plot run.svg"));
+    done(dir, &format!("{run} --filter full -o I_dr-awv"));
+    let page = text(&dir.join("I_awv/report.html"));
+    is_whole(&page);
+    let summary: Value = serde_json::from_str(&text(&dir.join("I_awv/summary.json"))).unwrap();
+    assert!(numbers_as_in(&page, &summary) > 40);
+    for word in ["GNSS", "start (1 σ)", "Reference trajectory", "NEES (9 if right)", "30–40 s"] {
+        assert!(page.contains(word), "{word}");
+    }
+    assert!(text(&dir.join("run.svg")).contains("Horizontal position error"));
+    let ran = done(dir, "compare I_dr-awv --reference I_awv -o out/c.json --plot c.svg");
+    assert!(ran.stderr.contains("wrote out/c.json, out/c.html"), "{}", ran.stderr);
+    let page = text(&dir.join("out/c.html"));
+    is_whole(&page);
+    let comparison: Value = serde_json::from_str(&text(&dir.join("out/c.json"))).unwrap();
+    assert_eq!(numbers_as_in(&page, &comparison), 5); // one run, one outage: NEES, its reference, coverage, two RMSE
+    assert!(page.contains("30–40 s") && text(&dir.join("c.svg")).contains("position east"));
+}
