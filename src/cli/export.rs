@@ -50,14 +50,9 @@ fn policy() -> impl TypedValueParser<Value = Policy> {
         .try_map(|name| ALL.into_iter().find(|p| p.name() == name).ok_or("not a policy"))
 }
 
-/// `1s:100s`, also without the unit.
 fn horizon(text: &str) -> Result<Horizon, String> {
-    let seconds = |t: &str| super::parse::positive(t.trim().trim_end_matches('s')).ok();
-    let (from, to) = text.split_once(':').ok_or("expected two times, such as 1s:100s")?;
-    match (seconds(from), seconds(to)) {
-        (Some(from_s), Some(to_s)) => Ok(Horizon { from_s, to_s }),
-        _ => Err("expected two times in seconds, such as 1s:100s".into()),
-    }
+    let (from_s, to_s) = super::parse::seconds_range(text)?;
+    Ok(Horizon { from_s, to_s })
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {

@@ -51,8 +51,13 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     args.plot.guard(&inputs)?;
     let intervals = args.intervals;
-    let options =
-        WaveletOptions { reading: args.recordings.options(), scales: args.tuning.scales, tuning, intervals };
+    let options = WaveletOptions {
+        reading: args.recordings.options(),
+        skip_warm_up: args.recordings.skips_warm_up(),
+        scales: args.tuning.scales,
+        tuning,
+        intervals,
+    };
     let file = jobs::wavelet_variances(&args.files, &options, &mut Said::new(session))?;
     let json = report::json(&file);
     if let Some(out) = &args.out {
@@ -71,19 +76,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     for signal in &file.signals {
         let title =
             format!("{} · {}.{} · {} samples", signal.file, signal.sensor, signal.axis, signal.samples);
-        session.printer.result(&format!("{title}\n{}", compact(&report::signal_rows(signal))));
+        session.printer.result(&format!("{title}\n{}", report::columns(&report::signal_rows(signal))));
     }
     session.printer.result(&report::intervals_note(intervals.name(), &tuning));
     Ok(())
-}
-
-/// A table whose first row is its head, without lines.
-fn compact(rows: &[Vec<String>]) -> String {
-    let width = |column: usize| rows.iter().map(|r| r[column].chars().count()).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..rows[0].len()).map(width).collect();
-    let line = |row: &Vec<String>| {
-        let cells: Vec<String> = row.iter().zip(&widths).map(|(cell, w)| format!("{cell:<w$}")).collect();
-        format!("  {}", cells.join("  ")).trim_end().to_owned()
-    };
-    rows.iter().map(line).collect::<Vec<_>>().join("\n")
 }

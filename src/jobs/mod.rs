@@ -40,6 +40,6 @@ pub use error::JobError;
 pub use files::ModelFiles;
 pub use navigate::{NavigateError, NavigateInputs, Navigation, Note, TrueImu, navigate};
 pub use reduction::Reduced;
-pub use remarks::{Remark, Remarks, Silence};
+pub use remarks::{BeginsOtherwise, Remark, Remarks, Silence};
 pub use require::{Ask, CatalogueUnit, Misplaced, Requirements};
 pub use wavelet::{Intervals, WaveletOptions, wavelet_variances};

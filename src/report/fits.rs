@@ -2,10 +2,11 @@
 
 use super::replicates::ReplicateEntry;
 use crate::calibration::{
-    ALIKE_LEVEL, Candidate, Diagnosis, Estimator, Goodness, Indistinct, Inference, LevelSpread, Outcome,
-    ParameterInterval, Ranking, Settings, Share, correlation_time_s, percent, reasons, shares, tau_s,
-    undetermined,
+    ALIKE_LEVEL, Candidate, Diagnosis, Estimator, Goodness, Indistinct, Inference, LevelSpread, Miss,
+    Outcome, ParameterInterval, Practical, Ranking, Settings, Share, correlation_time_s, percent, reasons,
+    shares, signals, tau_s, undetermined,
 };
+use crate::export::parameters_json;
 use crate::imu::Sensor;
 use crate::noise::{Composite, ParameterRef, Process};
 use crate::units::DEG;
@@ -58,6 +59,10 @@ pub struct FitEntry {
     pub spread_p_value: Option<f64>,
     /// Alike processes that cannot be told apart.
     pub indistinct: Option<IndistinctEntry>,
+    /// N, K, B and T, each in SI and in the unit of data sheets, with 95 % intervals where the bootstrap determines them.
+    pub parameters: Value,
+    /// Scales at which curve and model differ by more than four standard deviations.
+    pub missed: Vec<MissEntry>,
     /// Draws of the bootstrap.
     pub bootstrap: usize,
     /// Σ Omega_j (nu_j − nu_j(theta))².
@@ -177,6 +182,17 @@ impl IndistinctEntry {
     }
 }
 
+/// A scale at which curve and model differ.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MissEntry {
+    /// Scale (s).
+    pub tau_s: f64,
+    /// Wavelet variance of the data over that of the model.
+    pub ratio: f64,
+    /// The normal score of that ratio.
+    pub deviations: f64,
+}
+
 /// How replicates differ at one scale.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SpreadEntry {
@@ -200,6 +216,8 @@ impl FitEntry {
         let intervals = inference.into_iter().flat_map(|i| &i.intervals);
         let open = intervals.filter_map(|i| undetermined(i, &labels));
         let spread = inference.map_or(&[][..], |i| &i.spread).iter();
+        let miss =
+            |m: &Miss| MissEntry { tau_s: tau_s(m.level, rate_hz), ratio: m.ratio, deviations: m.deviations };
         Self {
             sensor: outcome.scope.sensor.name(),
             axis: outcome.scope.axis.map_or("all", |a| a.name()),
@@ -227,6 +245,8 @@ impl FitEntry {
             indistinct: inference
                 .and_then(|i| i.indistinct.as_ref())
                 .map(|i| IndistinctEntry::new(i, &labels)),
+            parameters: parameters(outcome, rate_hz),
+            missed: outcome.departure().missed.iter().map(miss).collect(),
             bootstrap: inference.map_or(0, |i| i.draws),
             objective: fit.objective,
             termination: fit.termination.name(),
@@ -239,6 +259,22 @@ impl FitEntry {
             notes: outcome.notes.iter().cloned().chain(open).collect(),
         }
     }
+}
+
+/// N, K, B and T as exports have them, with their intervals (SI); null where there are none.
+fn parameters(outcome: &Outcome, rate_hz: f64) -> Value {
+    let Some(Practical { parameters, intervals, range_s }) = outcome.practical(rate_hz) else {
+        return Value::Null;
+    };
+    let mut value = parameters_json(&parameters, outcome.scope.sensor);
+    let ends = |interval: Option<[f64; 2]>| interval.map_or(Value::Null, |ends| ends.to_vec().into());
+    value["white_and_walk"]["n"]["ci95"] = ends(intervals.density);
+    value["white_and_walk"]["k"]["ci95"] = ends(intervals.walk);
+    if value["minimum"].is_object() {
+        value["minimum"]["bias_instability"]["ci95"] = ends(intervals.instability);
+    }
+    value["observed_to_s"] = range_s.into();
+    value
 }
 
 impl FitsFile {
@@ -310,7 +346,7 @@ fn inference_lines(inference: &Inference, outcome: &Outcome, rate_hz: f64) -> Ve
             inference.fitted, inference.draws
         )];
     }
-    let mut lines: Vec<String> = inference.goodness.iter().map(j_test).collect();
+    let mut lines: Vec<String> = inference.goodness.iter().map(|g| j_test(g, outcome)).collect();
     let labels = outcome.fit.composite.labels();
     for i in &inference.intervals {
         if let Some(text) = undetermined(i, &labels) {
@@ -330,32 +366,42 @@ fn inference_lines(inference: &Inference, outcome: &Outcome, rate_hz: f64) -> Ve
         ));
     }
     if outcome.replicates > 1 {
-        lines.extend(spread_line(inference, rate_hz));
+        lines.extend(spread_line(inference, outcome, rate_hz));
     }
     lines
 }
 
-fn j_test(goodness: &Goodness) -> String {
+fn j_test(goodness: &Goodness, outcome: &Outcome) -> String {
     let Goodness { statistic, dof, expected, p_value } = goodness;
-    let verdict =
-        if goodness.is_rejected() { "the model does not describe the curve" } else { "no evidence against" };
+    let verdict = if goodness.is_rejected() {
+        "the model does not describe the curve"
+    } else if outcome.departure().missed.is_empty() {
+        "no evidence against"
+    } else {
+        "not rejected, in view of how much the signals differ among themselves; by their noise alone it misses scales (note)"
+    };
     format!(
         "  J-test {statistic:.4e} on {dof} degrees of freedom, median {expected:.4e} if the model holds, p = \
          {p_value:.3}: {verdict}"
     )
 }
 
-/// Where replicates differ most beyond what noise alone makes.
-fn spread_line(inference: &Inference, rate_hz: f64) -> Option<String> {
+/// Where the signals that are averaged differ most beyond what noise alone makes.
+fn spread_line(inference: &Inference, outcome: &Outcome, rate_hz: f64) -> Option<String> {
     let p = inference.alike?;
+    let signals = match (outcome.recordings, outcome.replicates) {
+        (1, _) => "the axes",
+        (recordings, replicates) if recordings == replicates => "the recordings",
+        _ => "the signals (recordings and axes)",
+    };
     if p > ALIKE_LEVEL {
-        return Some(format!("  no evidence that replicates differ beyond their noise (p = {p:.3})"));
+        return Some(format!("  no evidence that {signals} differ beyond their noise (p = {p:.3})"));
     }
     let most = |s: &&LevelSpread| s.between / s.within;
     let LevelSpread { level, within, between } =
         *inference.spread.iter().max_by(|a, b| most(a).total_cmp(&most(b)))?;
     Some(format!(
-        "  replicates differ beyond their noise (p = {p:.3}), most at {} s: by {} of the wavelet variance, noise alone \
+        "  {signals} differ beyond their noise (p = {p:.3}), most at {} s: by {} of the wavelet variance, noise alone \
          makes {}",
         tau_s(level, rate_hz),
         percent(between),
@@ -364,12 +410,7 @@ fn spread_line(inference: &Inference, rate_hz: f64) -> Option<String> {
 }
 
 fn head(outcome: &Outcome, settings: &Settings) -> String {
-    let count = outcome.replicates;
-    let signals = match count {
-        0 => "a curve".to_owned(),
-        1 => "1 signal".to_owned(),
-        _ => format!("{count} signals"),
-    };
+    let (count, signals) = (outcome.replicates, signals(outcome));
     let trimmed = match settings.trim.count(count) {
         a if outcome.estimator == Estimator::DrAwv && count > 0 => {
             format!(", {a} dropped at each end of each scale")
@@ -392,7 +433,7 @@ fn process_lines(model: &Composite, sensor: Sensor, levels: &[u32], rate_hz: f64
             process.parameters().iter().map(|(name, value)| format!("{name} = {value:.6e}")).collect();
         let parameters = parameters.join(", ");
         if share.largest.0 <= 0.0 {
-            return format!("  {label:<6} {parameters:<42} no part in it");
+            return format!("  {label:<6} {parameters:<42} zero at the optimum");
         }
         let meaning = meaning(process, sensor, rate_hz);
         let governs = match (share.leads.first(), share.leads.last()) {

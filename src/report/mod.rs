@@ -3,6 +3,7 @@
 
 mod brief;
 mod choose;
+mod columns;
 mod comparison;
 mod curves;
 mod efficiency;
@@ -27,6 +28,7 @@ mod verdict;
 
 pub use brief::brief;
 pub use choose::ChoiceReport;
+pub use columns::columns;
 pub use comparison::{CandidateResult, ComparisonFile, Label, consistency_rows, table_rows, verdict_lines};
 pub use curves::{
     CONFIDENCE, CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile, intervals_note,

@@ -1,12 +1,14 @@
 //! How sure a fit is: curves drawn anew, intervals, tests.
 
 pub(crate) mod alike;
+pub(crate) mod axes;
 pub(crate) mod bootstrap;
 mod goodness;
 mod indistinct;
 pub(crate) mod inference;
 mod influence;
 mod intervals;
+mod practical;
 mod sandwich;
 pub(crate) mod spread;
 

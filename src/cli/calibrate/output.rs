@@ -114,8 +114,8 @@ pub(super) fn finish(
     if !files.is_empty() {
         session.printer.say(&format!("wrote {}", files.join(", ")));
     }
-    if outcomes.iter().any(|o| o.replicates > 1) {
-        session.printer.say(WHICH);
+    if outcomes.iter().any(|o| o.recordings > 1) {
+        session.printer.detail(WHICH);
     }
     Ok(())
 }
