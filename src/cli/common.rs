@@ -43,6 +43,8 @@ pub(crate) enum Format {
     #[default]
     Text,
     Json,
+    /// Of wv: all scales of all signals
+    Csv,
 }
 
 /// What every command is given: where to print, the seed, progress.
@@ -74,6 +76,11 @@ impl Session {
     /// Whether stdout gets JSON rather than text.
     pub(crate) fn json(&self) -> bool {
         self.common.format == Format::Json
+    }
+
+    /// Whether stdout gets CSV rather than text.
+    pub(crate) fn csv(&self) -> bool {
+        self.common.format == Format::Csv
     }
 
     /// Whether all is to be said.

@@ -7,7 +7,7 @@ use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
 use nav_sim::formats::atomic;
 use nav_sim::jobs::{self, Intervals, WaveletOptions};
-use nav_sim::report;
+use nav_sim::report::{self, SignalCurves, SignalsFile};
 use std::path::PathBuf;
 
 /// Wavelet variance of static recordings: classical, robust, Allan, with confidence intervals
@@ -28,6 +28,9 @@ pub(crate) struct Args {
     /// Where the intervals' degrees of freedom are from
     #[arg(long, value_parser = words::<Intervals>(&INTERVALS), default_value_t, help_heading = "Wavelet variance")]
     intervals: Intervals,
+    /// One table for each sensor and axis, the recordings side by side
+    #[arg(long, conflicts_with = "verbose")]
+    per_file: bool,
     /// Write the curves as JSON
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -73,11 +76,43 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         session.printer.result(json.trim_end());
         return Ok(());
     }
-    for signal in &file.signals {
-        let title =
-            format!("{} · {}.{} · {} samples", signal.file, signal.sensor, signal.axis, signal.samples);
-        session.printer.result(&format!("{title}\n{}", report::columns(&report::signal_rows(signal))));
-    }
-    session.printer.result(&report::intervals_note(intervals.name(), &tuning));
+    let text = match () {
+        () if session.csv() => report::signals_csv(&file).trim_end().to_owned(),
+        () if args.per_file => side_by_side(&file),
+        () if session.verbose() => all_scales(&file, &report::intervals_note(intervals.name(), &tuning)),
+        () => digest(&file),
+    };
+    session.printer.result(&text);
     Ok(())
+}
+
+/// A row for each sensor and axis.
+fn digest(file: &SignalsFile) -> String {
+    let mut recordings: Vec<&str> = file.signals.iter().map(|s| s.file.as_str()).collect();
+    recordings.dedup();
+    let of = if recordings.len() > 1 {
+        format!(", median of {} recordings", recordings.len())
+    } else {
+        String::new()
+    };
+    format!(
+        "Allan deviation over averages of{of}:\n{}\nrobust/classical: least ratio of the wavelet variances, below 1 where \
+         outliers are; all scales with intervals: --verbose, --format csv; recordings side by side: --per-file",
+        report::columns(&report::signals_digest(file))
+    )
+}
+
+fn side_by_side(file: &SignalsFile) -> String {
+    let table = |(title, rows): (String, Vec<Vec<String>>)| format!("{title}\n{}", report::columns(&rows));
+    report::signals_per_file(file).into_iter().map(table).collect::<Vec<_>>().join("\n")
+}
+
+fn all_scales(file: &SignalsFile, note: &str) -> String {
+    let table = |signal: &SignalCurves| {
+        let SignalCurves { file, sensor, axis, samples, .. } = signal;
+        let rows = report::columns(&report::signal_rows(signal));
+        format!("{file} · {sensor}.{axis} · {samples} samples\n{rows}")
+    };
+    let tables = file.signals.iter().map(table).chain([note.to_owned()]);
+    tables.collect::<Vec<_>>().join("\n")
 }

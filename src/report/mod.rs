@@ -20,6 +20,7 @@ pub mod require;
 mod run_directory;
 #[cfg(test)]
 mod sample;
+mod signals;
 mod study;
 mod tables;
 mod trajectory;
@@ -30,10 +31,7 @@ pub use brief::brief;
 pub use choose::ChoiceReport;
 pub use columns::columns;
 pub use comparison::{CandidateResult, ComparisonFile, Label, consistency_rows, table_rows, verdict_lines};
-pub use curves::{
-    CONFIDENCE, CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile, intervals_note,
-    signal_rows,
-};
+pub use curves::{Band, CONFIDENCE, CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile};
 pub use efficiency::{EfficiencyFile, EfficiencyRow, efficiency_csv, efficiency_table};
 pub use fits::{CandidateEntry, FitEntry, FitsFile, describe};
 pub use fusion::{FUSION_FILES, FusionKind, FusionManifest, FusionSummary, fusion_directory, solution_csv};
@@ -49,6 +47,7 @@ pub use replicates::{
     AlarmEntry, LeftOutEntry, MovementEntry, ReplicateEntry, ScoresEntry, describe_replicates,
 };
 pub use run_directory::{OutputFile, RUN_FILES, json, run_directory, summary_json};
+pub use signals::{intervals_note, signal_rows, signals_csv, signals_digest, signals_per_file};
 pub use study::{
     ColumnResult, ShownCell, ShownColumn, TableColumn, TableRow, Value, ValueKind, drift_table,
     epoch_columns, epoch_rows, outage_columns, outage_rows, ratio_table, run_columns, run_rows,

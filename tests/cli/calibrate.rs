@@ -286,9 +286,20 @@ fn wv_prints_the_curves_of_every_signal() {
     let narrow = numbers(&out["signals"][0]["classical"]["ci_high"]);
     assert_eq!((narrow.len(), out["edof_method"].as_str()), (5, Some("large-sample")));
     assert!(narrow[4] < wide[4]);
-    let text = nav_sim(dir.path()).args(["wv", "runs", "-q"]).assert().success();
-    let text = String::from_utf8(text.get_output().stdout.clone()).unwrap();
-    assert!(text.contains("run0.csv · gyro.x · 16384 samples") && text.contains("Allan deviation"), "{text}");
+    let text = |more: &[&str]| {
+        let output = nav_sim(dir.path()).args(["wv", "runs"]).args(more).assert().success();
+        String::from_utf8(output.get_output().stdout.clone()).unwrap()
+    };
+    let (digest, all) = (text(&[]), text(&["--verbose"]));
+    assert!(digest.lines().count() <= 20 && digest.contains("gyro.x  rad/s"), "{digest}");
+    assert!(
+        all.contains("run0.csv · gyro.x · 16384 samples") && all.contains("Allan deviation (rad/s)"),
+        "{all}"
+    );
+    assert!(text(&["--per-file"]).contains("run0.csv   run1.csv"));
+    assert_eq!(text(&["--format", "csv"]).lines().count(), 1 + 4 * 13);
+    let stderr = refusal(dir.path(), &["check", "runs/run0.csv", "--format", "csv"], 2);
+    assert!(stderr.contains("--format csv is a format of wv alone"), "{stderr}");
 }
 
 /// sigma2 is fixed at the truth, phi bounded away from it: the fit is where it was told to be.
