@@ -212,5 +212,5 @@ fn inflated(path: &Path, chosen: &Chosen) -> Result<(), Failure> {
         provenance: Some(provenance),
         ..ModelFile::new(chosen.model.clone())
     };
-    Ok(model_file::write(path, &file)?)
+    Ok(model_file::write(path, &file, Existing::Replace)?)
 }

@@ -147,7 +147,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         session.printer.result(model_file::to_toml(&made.file).trim_end());
         return Ok(());
     };
-    model_file::write(out, &made.file)?;
+    model_file::write(out, &made.file, session.existing())?;
     session.printer.say(&format!("wrote {}: an assumption, not a calibration", out.display()));
     Ok(())
 }

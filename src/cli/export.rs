@@ -72,7 +72,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         .map_err(|e| Failure::input(format!("{shown}: {e}")).maybe_hint(advice(&e)))?;
     let text = export.text(&shown);
     if let Some(out) = &args.out {
-        atomic::write(out, text.clone() + "\n")?;
+        atomic::write_result(out, text.clone() + "\n", session.existing())?;
     }
     for line in export.summary() {
         session.printer.say(&line);

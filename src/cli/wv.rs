@@ -64,11 +64,11 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let file = jobs::wavelet_variances(&args.files, &options, &mut Said::new(session))?;
     let json = report::json(&file);
     if let Some(out) = &args.out {
-        atomic::write(out, &json)?;
+        atomic::write_result(out, &json, session.existing())?;
         session.printer.say(&format!("wrote {}", out.display()));
     }
     if let Some(page) = &args.page {
-        atomic::write(page, report::wavelet_page(&file))?;
+        atomic::write_result(page, report::wavelet_page(&file), session.existing())?;
         session.printer.say(&format!("wrote {}", page.display()));
     }
     args.plot.write(|| report::wavelet_svg(&file), session)?;

@@ -50,9 +50,10 @@ fn recordings(dir: &Path, count: u64) -> PathBuf {
     runs
 }
 
+/// What an earlier command of a test left is replaced.
 fn nav_sim(dir: &Path) -> Command {
     let mut command = Command::cargo_bin("nav-sim").unwrap();
-    command.current_dir(dir);
+    command.current_dir(dir).arg("--force");
     command
 }
 
@@ -296,7 +297,7 @@ fn wv_prints_the_curves_of_every_signal() {
         all.contains("run0.csv · gyro.x · 16384 samples") && all.contains("Allan deviation (rad/s)"),
         "{all}"
     );
-    assert!(text(&["--per-file"]).contains("run0.csv   run1.csv"));
+    assert!(text(&["--per-file"]).contains("run0.csv  run1.csv"));
     assert_eq!(text(&["--format", "csv"]).lines().count(), 1 + 4 * 13);
     let stderr = refusal(dir.path(), &["check", "runs/run0.csv", "--format", "csv"], 2);
     assert!(stderr.contains("--format csv is a format of wv alone"), "{stderr}");
@@ -611,7 +612,7 @@ fn what_is_printed_fits_a_screen() {
     let (count, text) = lines(&[]);
     assert!(count <= 20, "{count} lines: {text}");
     let first = text.lines().next().unwrap();
-    assert!(first.contains(" fit") && first.contains("4 recordings × 3 axes"), "{text}");
+    assert!(first.contains(" fit") && first.contains("4 recordings × 2 axes"), "{text}");
     assert!(text.contains("angle random walk N") && text.contains("deg/sqrt(h)"), "{text}");
     assert!(text.contains("J-test p = "), "{text}");
     assert!(lines(&["--verbose"]).0 > count);

@@ -160,6 +160,9 @@ fn recordings(args: &Args, settings: Settings, session: &Session) -> Result<(), 
         settings,
         bootstrap: bootstrap(args, session),
     };
+    if args.estimator != EstimatorChoice::All {
+        output::not_anew(out, args.bootstrap > 0, session)?;
+    }
     let measured = jobs::measure(&args.inputs, &options, &mut Said::new(session))?;
     let files: Vec<PathBuf> = measured.report.files.iter().map(|f| f.path.clone()).collect();
     let guarded: Vec<PathBuf> = files.iter().chain(&args.parameters).cloned().collect();
