@@ -544,7 +544,7 @@ fn a_model_says_what_it_was_made_with() {
     let model = |parameters: &str| -> toml::Table {
         let command = format!(
             "{} calibrate runs --model N1 --bootstrap 0 --parameters {parameters} --skip-s 1.5 --gaps ignore --axes \
-             gyro --scales 9 --pool sensor -o m.toml",
+             gyro --scales 9 --pool sensor --force -o m.toml",
             env!("CARGO_BIN_EXE_nav-sim")
         );
         let shell =

@@ -25,7 +25,7 @@ fn another_result_is_refused() {
     let fuse = "fuse log/imu.csv log/gnss.csv imu.toml --initial log/initial.toml -o fused";
     for (command, change, file) in [
         ("run drive.toml imu.toml --runs 2 --outage none --seed 1 -o run", "--runs 3", "run/summary.json"),
-        (fuse, "--filter full", "fused/solution.csv"),
+        (fuse, "--lever-arm 1,0,0", "fused/solution.csv"),
         ("synthesize imu.toml --samples 64 --seed 1 -o made", "--samples 65", "made/replicate_1.csv"),
         (calibrate, "--weighting edof", "out.toml"),
         ("export imu.toml --target kalibr -o imu.yaml", "--policy envelope", "imu.yaml"),
@@ -49,10 +49,10 @@ fn another_result_is_refused() {
             None => format!("{command} {change}"),
         };
         refused(&plain(place.path(), &other), "holds");
-        assert_eq!(fs::read(at(file)).unwrap(), before, "{other}");
+        assert!(fs::read(at(file)).unwrap() == before, "{other}");
         let ran = plain(place.path(), &format!("{other} --force"));
         assert_eq!(ran.code, 0, "{other}\n{}", ran.stderr);
-        assert_ne!(fs::read(at(file)).unwrap(), before, "{other}");
+        assert!(fs::read(at(file)).unwrap() != before, "{other}");
     }
     // A seed that is drawn makes another model: known before the work.
     let ran = plain(place.path(), "calibrate rec --model WN+RW --bootstrap 19 -o out.toml");

@@ -53,7 +53,11 @@ fn run(page: &Path) -> Option<String> {
         let output =
             Command::new("bash").args(arguments).current_dir(&directory).env("PATH", &path).output().unwrap();
         if !output.status.success() {
-            return Some(format!("{}\n{script}\n{}", page.display(), String::from_utf8_lossy(&output.stderr)));
+            return Some(format!(
+                "{}\n{script}\n{}",
+                page.display(),
+                String::from_utf8_lossy(&output.stderr)
+            ));
         }
     }
     None

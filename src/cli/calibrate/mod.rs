@@ -125,6 +125,9 @@ const POOLS: [(&str, &str); 2] = [
 
 fn fit_range(text: &str) -> Result<FitRange, String> {
     let (from_s, to_s) = super::parse::seconds_range(text)?;
+    if from_s >= to_s {
+        return Err("the shorter scale comes first".into());
+    }
     Ok(FitRange { from_s, to_s })
 }
 
