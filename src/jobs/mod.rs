@@ -24,6 +24,7 @@
 
 mod calibrate;
 mod choose;
+mod certify;
 mod curves;
 mod error;
 mod files;
@@ -35,6 +36,7 @@ mod wavelet;
 
 pub use calibrate::{Calibration, CalibrationOptions, EstimatorChoice, Measured, calibrate, measure};
 pub use choose::{ChoiceDrive, Chosen, choose};
+pub use certify::{Certificate, CertifiedScale, CertifyError, Recorded, certify};
 pub use curves::{Curves, read_curves};
 pub use error::JobError;
 pub use files::ModelFiles;
