@@ -49,6 +49,6 @@ pub use outcome::{
 pub use pipeline::{CalibrationError, Cause, calibrate, fit_curve, infer};
 pub use uncertainty::{ALIKE_LEVEL, CurveInfluence};
 pub use words::{
-    Share, advice, correlation_time_s, duration, effects, percent, reasons, shares, signals, tau_s,
-    undetermined, worst_in_words,
+    Share, advice, axes_remark, correlation_time_s, duration, effects, percent, reasons, shares, signals,
+    tau_s, undetermined, worst_in_words,
 };

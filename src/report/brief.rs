@@ -3,7 +3,7 @@
 use super::columns::columns;
 use super::number::readable;
 use crate::calibration::{
-    Diagnosis, Outcome, Practical, Settings, advice, duration, percent, shares, signals, tau_s,
+    Diagnosis, Outcome, Practical, Settings, advice, axes_remark, duration, percent, shares, signals, tau_s,
     worst_in_words,
 };
 use crate::export::Quantity;
@@ -22,6 +22,7 @@ pub fn brief(outcomes: &[Outcome], diagnoses: &[Diagnosis], settings: &Settings)
     let of_sensor = |sensor: Sensor| {
         let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.scope.sensor == sensor).collect();
         let mut parts: Vec<String> = if own.len() == 1 { vec![verdict(own[0], rate_hz)] } else { Vec::new() };
+        parts.extend(own.iter().find_map(|o| axes_remark(o, rate_hz)));
         let mut advice = advice(diagnoses, sensor, rate_hz).into_iter();
         parts.extend(advice.next());
         let first = (!parts.is_empty()).then(|| format!("{}: {}", sensor.name(), parts.join("; ")));
@@ -48,7 +49,8 @@ pub fn brief(outcomes: &[Outcome], diagnoses: &[Diagnosis], settings: &Settings)
 
 /// Remarks that the verdict does not hold already.
 fn notes(outcome: &Outcome) -> Vec<String> {
-    outcome.notes.iter().filter(|note| !note.starts_with("the data disagree")).cloned().collect()
+    let told = |note: &&String| note.starts_with("the data disagree") || note.starts_with("the axes differ");
+    outcome.notes.iter().filter(|note| !told(note)).cloned().collect()
 }
 
 /// Whether the model fits, and where it does not.
@@ -65,7 +67,7 @@ fn verdict(outcome: &Outcome, rate_hz: f64) -> String {
             ""
         };
         return format!(
-            "{spec} does not fit {signals} at {} of {} scales: {}{test}{allowed}",
+            "{spec} does not fit {signals} at {} of {} scales: the data have {}{test}{allowed}",
             departure.missed.len(),
             departure.scales,
             worst_in_words(outcome, worst, rate_hz)

@@ -24,7 +24,7 @@ fn another_result_is_refused() {
     let calibrate = "calibrate rec --model WN+RW --bootstrap 0 -o out.toml";
     let fuse = "fuse log/imu.csv log/gnss.csv imu.toml --initial log/initial.toml -o fused";
     for (command, change, file) in [
-        ("run drive.toml imu.toml --runs 2 --outage none --seed 1 -o run", "--runs 3", "run/summary.json"),
+        ("run drive.toml imu.toml --runs 2 --outage none --seed 1 -o run", "--seed 2", "run/summary.json"),
         (fuse, "--lever-arm 1,0,0", "fused/solution.csv"),
         ("synthesize imu.toml --samples 64 --seed 1 -o made", "--samples 65", "made/replicate_1.csv"),
         (calibrate, "--weighting edof", "out.toml"),

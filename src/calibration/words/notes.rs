@@ -151,7 +151,7 @@ fn misfit(outcome: &Outcome, rate_hz: f64) -> Option<String> {
     let (worst, surest) = (departure.worst()?, departure.surest()?);
     let side = if surest.ratio > 1.0 { "above" } else { "below" };
     Some(format!(
-        "the data disagree with this model at {} of {} scales: {}; most certainly at {} s, {} {side} it, {:.0} standard \
+        "the data disagree with this model at {} of {} scales: they have {}; most certainly at {} s, {} {side} it, {:.0} standard \
          deviations",
         departure.missed.len(),
         departure.scales,
@@ -162,7 +162,7 @@ fn misfit(outcome: &Outcome, rate_hz: f64) -> Option<String> {
     ))
 }
 
-/// `2.5 times its wavelet variance at 164 s (off from 41 s to 330 s)`
+/// `2.5 times the model's wavelet variance at 164 s (to the same side from 41 s to 330 s)`
 #[must_use]
 pub fn worst_in_words(outcome: &Outcome, worst: Miss, rate_hz: f64) -> String {
     let (first, last) = outcome.stretch(worst);
@@ -176,13 +176,15 @@ pub fn worst_in_words(outcome: &Outcome, worst: Miss, rate_hz: f64) -> String {
         )
     };
     format!(
-        "they have {} times its wavelet variance at {}{range}",
+        "{} times the model's wavelet variance at {}{range}",
         three_digits(worst.ratio),
         duration(tau_s(worst.level, rate_hz))
     )
 }
 
-fn axes_remark(outcome: &Outcome, rate_hz: f64) -> Option<String> {
+/// That the axes differ, and where most; none where they do not.
+#[must_use]
+pub fn axes_remark(outcome: &Outcome, rate_hz: f64) -> Option<String> {
     let AxesDiffer { level, largest, smallest, ratio, .. } = outcome.axes_differ?;
     Some(format!(
         "the axes differ: at {} {} has {} times the wavelet variance of {}; --pool axes gives each its own model",
