@@ -618,3 +618,52 @@ fn what_is_printed_fits_a_screen() {
     assert!(lines(&["--verbose"]).0 > count);
     assert!(lines(&["--estimator", "all"]).0 <= 20);
 }
+
+/// N, K and B of the JSON are those that `export` has of the model file, to the last bit; N is that of the noise: sigma2 of nine
+/// signals of 16384 samples is known to √(2/(9·16384·0.6)) = 0.5 % or so, N to half of that, eight of which are allowed.
+#[test]
+fn practitioners_parameters_are_those_of_export() {
+    let dir = tempfile::tempdir().unwrap();
+    let processes = "processes = [{ type = \"WN\", sigma2 = 4e-6 }, { type = \"RW\", gamma2 = 1e-12 }]";
+    let model = format!("schema = 1\nrate_hz = 50.0\n[accel]\n{processes}\n[gyro]\n{processes}\n");
+    std::fs::write(dir.path().join("imu.toml"), model).unwrap();
+    let synthesize =
+        ["synthesize", "imu.toml", "--replicates", "3", "--samples", "16384", "--seed", "1", "-o", "made"];
+    nav_sim(dir.path()).args(synthesize).assert().success();
+    let calibrate =
+        ["calibrate", "made", "--model", "WN+RW", "--bootstrap", "39", "--seed", "1", "-o", "m.toml"];
+    let out = json(dir.path(), &calibrate);
+    let exported = json(dir.path(), &["export", "m.toml", "--target", "kalibr"]);
+    for fit in out["fits"].as_array().unwrap() {
+        let own = &fit["parameters"]["white_and_walk"];
+        let of_export = &exported["sensors"][fit["sensor"].as_str().unwrap()]["axes"]["x"]["white_and_walk"];
+        for key in ["n", "k"] {
+            assert_eq!(own[key]["value"], of_export[key]["value"], "{fit}");
+            assert_eq!(own[key]["data_sheet"], of_export[key]["data_sheet"]);
+        }
+        let density = own["n"]["value"].as_f64().unwrap();
+        assert!((density / (4e-6_f64 / 50.0).sqrt() - 1.0).abs() < 0.02, "{density}");
+        let ends = numbers(&own["n"]["ci95"]);
+        assert!(ends[0] < density && density < ends[1] && ends[1] / ends[0] < 1.05, "{ends:?}");
+        assert!(fit["missed"].as_array().unwrap().is_empty());
+    }
+}
+
+/// Scales outside count nothing and are recorded: of a fit with a range that holds two scales for two parameters nothing is left
+/// to test.
+#[test]
+fn a_range_of_scales_is_recorded() {
+    let dir = tempfile::tempdir().unwrap();
+    recordings(dir.path(), 2);
+    let fit = ["calibrate", "runs", "--model", "WN+RW", "--bootstrap", "0", "--fit-range", "0.04s:20.48s"];
+    let out = json(dir.path(), &[&fit[..], &["-o", "m.toml"]].concat());
+    assert_eq!(out["fits"][0]["scales"], 13, "all are in the file");
+    let text = std::fs::read_to_string(dir.path().join("m.toml")).unwrap();
+    let provenance = &text.parse::<toml::Table>().unwrap()["provenance"];
+    let range: Vec<f64> =
+        provenance["fit_range_s"].as_array().unwrap().iter().filter_map(toml::Value::as_float).collect();
+    assert_eq!(range, [0.04, 20.48]);
+    let short = ["calibrate", "runs", "--model", "N1", "--fit-range", "1s:2s", "-o", "n.toml"];
+    assert!(refusal(dir.path(), &short, 2).contains("scales"));
+    assert!(refusal(dir.path(), &["calibrate", "runs", "--fit-range", "2s:1s"], 2).contains("shorter scale"));
+}
