@@ -21,10 +21,10 @@ pub const MAX_BIAS_RAD_S: f64 = 1.0;
 pub struct ImuSettings {
     /// Samples per second.
     pub rate_hz: f64,
-    /// Turn-on bias of the accelerometers (m/s²); without it that of the model's [turn_on], or none.
+    /// Turn-on bias of the accelerometers (m/s²); without it that of the model's `[turn_on]`, or none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub turn_on_bias_accel_m_s2: Option<f64>,
-    /// Turn-on bias of the gyroscopes (rad/s); without it that of the model's [turn_on], or none.
+    /// Turn-on bias of the gyroscopes (rad/s); without it that of the model's `[turn_on]`, or none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub turn_on_bias_gyro_rad_s: Option<f64>,
     /// Scale-factor error of the accelerometers (parts per million).
