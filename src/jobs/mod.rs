@@ -23,8 +23,8 @@
 //! ```
 
 mod calibrate;
-mod choose;
 mod certify;
+mod choose;
 mod curves;
 mod error;
 mod files;
@@ -35,8 +35,8 @@ mod require;
 mod wavelet;
 
 pub use calibrate::{Calibration, CalibrationOptions, EstimatorChoice, Measured, calibrate, measure};
-pub use choose::{ChoiceDrive, Chosen, choose};
 pub use certify::{Certificate, CertifiedScale, CertifyError, Recorded, certify};
+pub use choose::{ChoiceDrive, Chosen, choose};
 pub use curves::{Curves, read_curves};
 pub use error::JobError;
 pub use files::ModelFiles;

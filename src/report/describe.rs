@@ -142,7 +142,7 @@ fn process_lines(model: &Composite, sensor: Sensor, levels: &[u32], rate_hz: f64
 }
 
 /// The parameters in the terms of data sheets.
-fn meaning(process: &Process, sensor: Sensor, rate_hz: f64) -> String {
+pub(super) fn meaning(process: &Process, sensor: Sensor, rate_hz: f64) -> String {
     let dt = 1.0 / rate_hz;
     let unit = sensor.unit();
     // Per √h, in degrees for angles.
