@@ -45,6 +45,7 @@ fn set(design: &Design, set: u64, draws: usize) -> Result<Vec<Outcome>, Failure>
         trim: design.trim,
         tuning: design.tuning,
         weighting: design.weighting,
+        fit_range: None,
         rate_hz: design.model.rate_hz,
     };
     let groups = grouped(measured, Pool::Axes);

@@ -32,8 +32,8 @@ mod pipeline;
 pub mod efficiency;
 
 pub use curve::{
-    AverageError, Estimator, Group, Pool, Replicate, Scope, SignalError, Trim, TrimError, WarmUp, average,
-    grouped, implied, replicates, trend, warm_up,
+    AverageError, Change, Estimator, Group, Pool, Replicate, Scope, SignalError, Trim, TrimError, WarmUp,
+    average, grouped, implied, replicates, trend, warm_up,
 };
 pub use diagnosis::{
     Alarm, AxisScores, CommonOutliers, Diagnosis, DriftAlarm, LeftOut, Misfit, Movement, Verdict, diagnose,
@@ -42,13 +42,15 @@ pub use fit::{Fit, FitError, Termination, Weighting, estimate, fit};
 pub use model::{LimitError, Limits, ModelSpec, SpecError};
 pub use names::UnknownName;
 pub use outcome::{
-    Bootstrap, Candidate, Goodness, Indistinct, Inference, LevelSpread, ModelChoice, Outcome,
-    ParameterInterval, ParameterLimit, Ranking, Settings, TooSimple, Undetermined,
+    AxesDiffer, Bootstrap, Candidate, Departure, FitRange, Goodness, Indistinct, Inference, LevelSpread,
+    Miss, ModelChoice, Outcome, ParameterInterval, ParameterLimit, Practical, PracticalIntervals, Ranking,
+    Settings, TooSimple, Undetermined,
 };
 pub use pipeline::{CalibrationError, Cause, calibrate, fit_curve, infer};
 pub use uncertainty::{
     ALIKE_LEVEL, Anticipated, AnticipationError, CurveInfluence, Scattering, derived_interval,
 };
 pub use words::{
-    Share, advice, correlation_time_s, duration, effects, percent, reasons, shares, tau_s, undetermined,
+    Share, advice, axes_remark, correlation_time_s, duration, effects, percent, reasons, shares, signals,
+    tau_s, undetermined, worst_in_words,
 };

@@ -5,6 +5,7 @@ use crate::fit::{FitError, Weighting, estimate, expected, fit_with_covariance};
 use crate::model::LimitError;
 use crate::outcome::{Bootstrap, ModelChoice, Outcome, Settings};
 use crate::selection::choose;
+use crate::uncertainty::axes::axes_differ;
 use crate::uncertainty::bootstrap::CurveSampler;
 use crate::uncertainty::inference::inference;
 use crate::wavelet::Curve;
@@ -69,10 +70,11 @@ pub fn calibrate(groups: &[Group], settings: &Settings) -> Result<Vec<Outcome>, 
 pub fn fit_curve(
     group: &Group,
     estimator: Estimator,
-    curve: Curve,
+    mut curve: Curve,
     settings: &Settings,
 ) -> Result<Outcome, CalibrationError> {
     let error = |source: Cause| CalibrationError::new(group, estimator, source);
+    leave_out(&mut curve, settings);
     let (spec, ranking) = match &settings.model {
         ModelChoice::Given(spec) => (settings.limited(spec, group.scope).map_err(|e| error(e.into()))?, None),
         ModelChoice::Auto => {
@@ -82,15 +84,32 @@ pub fn fit_curve(
     };
     let fit = estimate(estimator, &curve, &spec, settings.rate_hz, settings.weighting)
         .map_err(|e| error(e.into()))?;
-    let (scope, replicates) = (group.scope, group.replicates.len());
-    let (notes_later, inference) = (Vec::new(), None);
-    let mut outcome =
-        Outcome { scope, replicates, estimator, spec, ranking, curve, fit, notes: notes_later, inference };
+    let mut outcome = Outcome {
+        scope: group.scope,
+        replicates: group.replicates.len(),
+        recordings: group.recordings(),
+        estimator,
+        spec,
+        ranking,
+        curve,
+        fit,
+        axes_differ: axes_differ(&group.replicates, estimator, &settings.tuning),
+        notes: Vec::new(),
+        inference: None,
+    };
     if settings.weighting == Weighting::Full && estimator != Estimator::Avlr {
         weigh_fully(group, &mut outcome, settings).map_err(|e| error(e.into()))?;
     }
     outcome.notes = notes(&outcome, &group.replicates, settings.rate_hz);
     Ok(outcome)
+}
+
+/// Lets the scales outside the range of a fit count nothing.
+fn leave_out(curve: &mut Curve, settings: &Settings) {
+    let Some(range) = settings.fit_range else { return };
+    let outside = |level: &&u32| !range.holds(**level, settings.rate_hz) && !curve.ignored.contains(*level);
+    let outside: Vec<u32> = curve.levels.iter().filter(outside).copied().collect();
+    curve.ignored.extend(outside);
 }
 
 /// Draws behind the covariance of a curve.
@@ -123,4 +142,55 @@ pub fn infer(groups: &[Group], outcomes: &mut [Outcome], settings: &Settings, bo
         outcome.inference = Some(inference(group, outcome, settings, bootstrap));
         outcome.notes.extend(notes_of_inference(outcome));
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::curve::Scope;
+    use crate::imu::Sensor;
+    use crate::noise::{Ar1, Composite, Process, RandomWalk, White};
+    use crate::outcome::FitRange;
+    use approx::assert_relative_eq;
+
+    /// A curve that no sum of WN, AR1 and RW describes; of the scales 2 to 13 alone, given as a range or as all that there
+    /// are, the fit is the same.
+    #[test]
+    fn a_range_of_scales_is_the_curve_without_the_others() {
+        let model = Composite::new(vec![
+            Process::White(White::new(1.0).unwrap()),
+            Process::Ar1(Ar1::new(0.99, 1e-3).unwrap()),
+            Process::RandomWalk(RandomWalk::new(1e-7).unwrap()),
+        ]);
+        let levels: Vec<u32> = (1..=16).collect();
+        // Off by a few per cent from scale to scale, and by a factor of two at the first one.
+        let off = |level: u32| 1.0 + 0.03 * f64::from(level).sin() + f64::from(u8::from(level == 1));
+        let wv = levels.iter().map(|level| model.haar_wv(*level) * off(*level)).collect();
+        let edof = levels.iter().map(|level| 1e6 / f64::from(*level).exp2()).collect();
+        let whole = Curve { levels, wv, edof, ..Curve::default() };
+        let part = |values: &[f64]| values[1..13].to_vec();
+        let short = Curve {
+            levels: (2..=13).collect(),
+            wv: part(&whole.wv),
+            edof: part(&whole.edof),
+            ..Curve::default()
+        };
+        let group = Group { scope: Scope { sensor: Sensor::Accel, axis: None }, replicates: Vec::new() };
+        let settings = |fit_range| Settings {
+            model: ModelChoice::Given("WN+AR1+RW".parse().unwrap()),
+            rate_hz: 100.0,
+            fit_range,
+            ..Settings::default()
+        };
+        let range = FitRange { from_s: 0.04, to_s: 81.92 };
+        let fit = |curve, range| fit_curve(&group, Estimator::Given, curve, &settings(range)).unwrap();
+        let (ranged, shortened, all) = (fit(whole.clone(), Some(range)), fit(short, None), fit(whole, None));
+        assert_eq!((ranged.counted_levels().len(), ranged.departure().scales), (12, 12));
+        assert_relative_eq!(ranged.fit.objective, shortened.fit.objective, max_relative = 1e-9);
+        let values = |o: &Outcome| o.fit.composite.parameters().map(|(_, x)| x).collect::<Vec<_>>();
+        for (a, b) in values(&ranged).into_iter().zip(values(&shortened)) {
+            assert_relative_eq!(a, b, max_relative = 1e-6);
+        }
+        assert!(all.fit.objective > 10.0 * ranged.fit.objective);
+    }
 }

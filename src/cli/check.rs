@@ -2,7 +2,9 @@
 
 use super::{Failure, Session, parse, read};
 use nav_sim::formats::fusion_files::{read_gnss, read_imu, read_initial};
-use nav_sim::formats::{contamination_file, curve_file, efficiency_file, parameters_file, scenario_file};
+use nav_sim::formats::{
+    contamination_file, curve_file, efficiency_file, model_file, parameters_file, scenario_file,
+};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -27,6 +29,9 @@ pub(crate) struct Args {
     /// Sample rate of recordings without a time column
     #[arg(long, value_name = "HZ", value_parser = parse::rate_hz)]
     rate_hz: Option<f64>,
+    /// Also print what a file comes to: scenarios and studies with every key, defaults included; models axis by axis
+    #[arg(long)]
+    dry_run: bool,
 }
 
 /// What is said of a file in JSON.
@@ -46,7 +51,12 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         let file = path.display().to_string();
         match check(path, args.rate_hz, session) {
             Ok(found) if session.json() => checked.push(Checked { file, ok: true, found }),
-            Ok(found) => session.printer.result(&format!("{file}: {found}")),
+            Ok(found) => {
+                session.printer.result(&format!("{file}: {found}"));
+                if args.dry_run {
+                    resolved(path)?.into_iter().for_each(|text| session.printer.result(text.trim_end()));
+                }
+            }
             Err(failure) => {
                 checked.push(Checked { file, ok: false, found: failure.to_string() });
                 failures.push(failure);
@@ -66,6 +76,19 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let message = format!("{wrong} of {all} files are not as they should be");
     let unreadable = failures.iter().chain([&last]).any(|failure| failure.code() == 1);
     Err(if unreadable { Failure::could_not(message) } else { Failure::input(message) })
+}
+
+/// The configuration that a file stands for, every key of it.
+fn resolved(path: &Path) -> Result<Option<String>, Failure> {
+    let text = match kind(path)? {
+        Kind::Scenario => toml::to_string(&scenario_file::read(path)?).map_err(Failure::could_not)?,
+        Kind::Study => {
+            toml::to_string(&nav_sim::study::file::read(path)?.study).map_err(Failure::could_not)?
+        }
+        Kind::Model => model_file::to_toml(&model_file::read(path)?),
+        _ => return Ok(None),
+    };
+    Ok(Some(text))
 }
 
 /// Reads a file as what it is, and says what was found.

@@ -8,7 +8,7 @@ use super::{Failure, Session, read};
 use nav_sim::calibration::{Bootstrap, Estimator, ModelChoice, Pool, Settings, Trim, diagnose};
 use nav_sim::choose::{Candidate, Inflation};
 use nav_sim::ekf::FilterStates;
-use nav_sim::formats::atomic::AtomicDir;
+use nav_sim::formats::atomic::{AtomicDir, Existing};
 use nav_sim::formats::model_file::{self, CalibrationNote, ModelFile};
 use nav_sim::formats::scenario_file;
 use nav_sim::jobs::{
@@ -85,8 +85,14 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let trajectory = read::trajectory(&args.trajectory, session)?;
     let seed = session.seed(scenario.run.seed);
     let outages = outages(&scenario, (trajectory.start_s(), trajectory.end_s()), seed, session)?;
+    if args.recordings.skips_warm_up() {
+        // Windows of the recordings themselves make the errors, from the same beginning.
+        return Err(Failure::input("--skip-s auto is an option of calibrate and wv")
+            .hint("--skip-s with the longest that nav-sim calibrate advises"));
+    }
     let options = CalibrationOptions {
         reading: args.recordings.options(),
+        skip_warm_up: false,
         scales: args.tuning.scales,
         estimators: EstimatorChoice::default(),
         pool: args.pool,
@@ -223,5 +229,5 @@ fn inflated(files: &ModelFiles, chosen: &Chosen) -> Result<(), Failure> {
         provenance: Some(provenance),
         ..ModelFile::new(chosen.model.clone())
     };
-    Ok(model_file::write(&files.model, &file)?)
+    Ok(model_file::write(&files.model, &file, Existing::Replace)?)
 }

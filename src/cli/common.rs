@@ -1,6 +1,7 @@
 //! Flags that mean the same in every command, and what follows from them.
 
 use super::{Failure, Printer, Progress};
+use nav_sim::formats::atomic::Existing;
 use std::sync::OnceLock;
 
 /// Flags that mean the same in every command.
@@ -22,6 +23,9 @@ pub(crate) struct Common {
     /// No progress, neither bars nor lines
     #[arg(long, global = true)]
     pub(crate) no_progress: bool,
+    /// Replace results that are there already and differ
+    #[arg(long, global = true)]
+    pub(crate) force: bool,
     /// Colour
     #[arg(long, global = true, value_name = "WHEN", value_enum, default_value_t)]
     pub(crate) color: Color,
@@ -43,6 +47,8 @@ pub(crate) enum Format {
     #[default]
     Text,
     Json,
+    /// Of wv: all scales of all signals
+    Csv,
 }
 
 /// What every command is given: where to print, the seed, progress.
@@ -74,6 +80,16 @@ impl Session {
     /// Whether stdout gets JSON rather than text.
     pub(crate) fn json(&self) -> bool {
         self.common.format == Format::Json
+    }
+
+    /// What may become of results that are there already.
+    pub(crate) const fn existing(&self) -> Existing {
+        if self.common.force { Existing::Replace } else { Existing::Keep }
+    }
+
+    /// Whether stdout gets CSV rather than text.
+    pub(crate) fn csv(&self) -> bool {
+        self.common.format == Format::Csv
     }
 
     /// Whether all is to be said.

@@ -55,7 +55,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     replaceable(&page)?;
     let compared = Compared::new(args, session)?;
     let json = report::json(&compared.file);
-    atomic::write(out, &json)?;
+    atomic::write_result(out, &json, session.existing())?;
     atomic::write(&page, compared.page(&[]))?;
     args.plot.write(|| compared.picture(), session)?;
     if session.json() {

@@ -144,12 +144,19 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     made.doubts.iter().for_each(|doubt| session.printer.warn(doubt));
     let Some(out) = &args.out else {
-        session.printer.result(model_file::to_toml(&made.file).trim_end());
+        let toml = model_file::to_toml(&made.file);
+        session.printer.result(&if session.json() { as_json(&toml)? } else { toml.trim_end().to_owned() });
         return Ok(());
     };
-    model_file::write(out, &made.file)?;
+    model_file::write(out, &made.file, session.existing())?;
     session.printer.say(&format!("wrote {}: an assumption, not a calibration", out.display()));
     Ok(())
+}
+
+/// A model file with the same keys as JSON.
+fn as_json(toml: &str) -> Result<String, Failure> {
+    let table: toml::Table = toml.parse().map_err(Failure::could_not)?;
+    serde_json::to_string_pretty(&table).map_err(Failure::could_not)
 }
 
 /// What the figures lack, and what a model file does not hold.

@@ -2,10 +2,12 @@
 
 use super::{Failure, Session};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use nav_sim::calibration::duration;
 use nav_sim::export::{Export, ExportError, Settings, Target};
 use nav_sim::formats::atomic::{self, guard_inputs};
 use nav_sim::formats::model_file::{self, ModelFile};
 use nav_sim::imu::Sensor;
+use nav_sim::jobs::{self, Recorded};
 use nav_sim::noise::practical::{Horizon, Policy};
 use std::path::PathBuf;
 
@@ -33,6 +35,10 @@ pub(crate) struct Args {
     /// Averaging times over which the pair stands for the model
     #[arg(long, value_name = "FROM:TO", value_parser = horizon, default_value = "1s:100s")]
     horizon: Horizon,
+    /// Synthesise recordings of the exported pair, as many and as long as were calibrated, and say where the model lies
+    /// outside the band of their wavelet variance
+    #[arg(long)]
+    certify: bool,
     /// File to write to (default: stdout)
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -50,14 +56,9 @@ fn policy() -> impl TypedValueParser<Value = Policy> {
         .try_map(|name| ALL.into_iter().find(|p| p.name() == name).ok_or("not a policy"))
 }
 
-/// `1s:100s`, also without the unit.
 fn horizon(text: &str) -> Result<Horizon, String> {
-    let seconds = |t: &str| super::parse::positive(t.trim().trim_end_matches('s')).ok();
-    let (from, to) = text.split_once(':').ok_or("expected two times, such as 1s:100s")?;
-    match (seconds(from), seconds(to)) {
-        (Some(from_s), Some(to_s)) => Ok(Horizon { from_s, to_s }),
-        _ => Err("expected two times in seconds, such as 1s:100s".into()),
-    }
+    let (from_s, to_s) = super::parse::seconds_range(text)?;
+    Ok(Horizon { from_s, to_s })
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
@@ -77,13 +78,16 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         .map_err(|e| Failure::input(format!("{shown}: {e}")).maybe_hint(advice(&e)))?;
     let text = export.text(&shown);
     if let Some(out) = &args.out {
-        atomic::write(out, text.clone() + "\n")?;
+        atomic::write_result(out, text.clone() + "\n", session.existing())?;
     }
     for line in export.summary() {
         session.printer.say(&line);
     }
     for doubt in export.doubts() {
         session.printer.warn(&doubt);
+    }
+    if args.certify {
+        certificate(&export, &file, session)?;
     }
     match &args.out {
         _ if session.json() => {
@@ -94,6 +98,53 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         None => session.printer.result(&text),
     }
     Ok(())
+}
+
+/// Says where the model lies outside the band of recordings of the exported pair.
+fn certificate(export: &Export, file: &ModelFile, session: &Session) -> Result<(), Failure> {
+    let recorded = recorded(file, session.seed(None), export.settings.horizon.to_s);
+    let certificates =
+        jobs::certify(export, &file.model, &file.missing, recorded).map_err(Failure::could_not)?;
+    let made = format!(
+        "{} recordings of {:.0} s",
+        recorded.recordings,
+        recorded.samples as f64 / file.model.rate_hz
+    );
+    for certificate in certificates {
+        let name = certificate.sensor.name();
+        let all = certificate.scales.len();
+        let outside = certificate.scales.iter().filter(|s| !s.inside).count();
+        match certificate.worst() {
+            None => session.printer.say(&format!(
+                "{name}: certified: the model lies within the 95 % band of {made} of the exported pair at all {all} \
+                 scales of the horizon"
+            )),
+            Some(worst) => session.printer.warn(&format!(
+                "{name}: not certified: the model lies outside the 95 % band of {made} of the exported pair at {outside} of \
+                 {all} scales of the horizon, most over averages of {}: {:.2} times their Allan deviation",
+                duration(worst.average_s),
+                worst.ratio
+            )),
+        }
+    }
+    Ok(())
+}
+
+/// As many recordings, and as long, as a calibration had; else four of 16 times the horizon.
+fn recorded(file: &ModelFile, seed: u64, horizon_s: f64) -> Recorded {
+    const MOST: usize = 1 << 22;
+    let rate_hz = file.model.rate_hz;
+    let fit = |key: &str| {
+        let fits = file.provenance.as_ref()?.get("fits")?.as_array()?;
+        fits.iter().filter_map(|fit| fit.get(key)?.as_integer()).max()
+    };
+    let recordings = fit("recordings").filter(|n| *n > 0).map_or(4, |n| n.unsigned_abs());
+    // A recording has one scale more than is used.
+    let samples = fit("scales").filter(|n| (1..40).contains(n)).map_or_else(
+        || ((16.0 * horizon_s * rate_hz) as usize).next_power_of_two(),
+        |scales| 1_usize << (scales + 1),
+    );
+    Recorded { recordings, samples: samples.min(MOST), seed }
 }
 
 /// Longest averaging time at which a minimum is believed of a model that no calibration made (s).

@@ -5,9 +5,10 @@ use nav_sim::formats::atomic;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Make a directory with everything to start from: trajectories, virtual IMUs, a scenario
+/// Make a directory with everything to start from: a commented file of every kind, trajectories, virtual IMUs
 ///
-/// The files are those of the repository; the examples of every --help work inside the directory. Files
+/// scenario.toml, model.toml, motion.toml, parameters.toml, contamination.toml, initial.toml and examples/quick_study.toml say
+/// what each key means. The others are those of the repository; the examples of every --help work inside the directory. Files
 /// that are there already are left alone.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
@@ -30,6 +31,11 @@ macro_rules! repository_files {
 
 const FILES: &[(&str, &[u8])] = repository_files![
     "examples/scenario.toml" => "scenario.toml",
+    "examples/model.toml" => "model.toml",
+    "examples/parameters.toml" => "parameters.toml",
+    "examples/contamination.toml" => "contamination.toml",
+    "examples/initial.toml" => "initial.toml",
+    "examples/motion.toml" => "motion.toml",
     "trajectories/land_vehicle.toml" => "trajectories/land_vehicle.toml",
     "trajectories/figure_eight.toml" => "trajectories/figure_eight.toml",
     "trajectories/fixed_wing.toml" => "trajectories/fixed_wing.toml",

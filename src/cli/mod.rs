@@ -87,6 +87,10 @@ impl Command {
     }
 
     fn run(self, session: &Session) -> Result<(), Failure> {
+        if session.csv() && !matches!(self, Self::Wv(_)) {
+            let failure = Failure::input("--format csv is a format of wv alone");
+            return Err(failure.hint("--format json, or the CSV files that the command writes"));
+        }
         match self {
             Self::Wv(args) => wv::run(&args, session),
             Self::Calibrate(args) => calibrate::run(&args, session),

@@ -38,6 +38,15 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Two times (s): `1s:100s`, also without the unit.
+pub(super) fn seconds_range(text: &str) -> Result<(f64, f64), String> {
+    let seconds = |t: &str| positive(t.trim().trim_end_matches('s')).ok();
+    match text.split_once(':').map(|(from, to)| (seconds(from), seconds(to))) {
+        Some((Some(from_s), Some(to_s))) => Ok((from_s, to_s)),
+        _ => Err("expected two times in seconds, such as 1s:100s".into()),
+    }
+}
+
 /// Three finite numbers.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Triple(pub(super) [f64; 3]);

@@ -29,7 +29,7 @@ impl PlotArgs {
     /// Writes the picture, if one is asked for.
     pub(super) fn write(&self, picture: impl FnOnce() -> String, session: &Session) -> Result<(), Failure> {
         let Some(path) = &self.plot else { return Ok(()) };
-        atomic::write(path, picture())?;
+        atomic::write_result(path, picture(), session.existing())?;
         session.printer.say(&format!("wrote {}", path.display()));
         Ok(())
     }

@@ -3,10 +3,10 @@
 use super::axes::ChannelSet;
 use super::{Progress, Session};
 use clap::ValueEnum;
-use nav_sim::calibration::WarmUp;
+use nav_sim::calibration::{Change, WarmUp, duration, tau_s};
 use nav_sim::formats::recordings::{Gaps, ReadOptions, Report};
 use nav_sim::imu::{Channel, Sensor};
-use nav_sim::jobs::{Remark, Remarks};
+use nav_sim::jobs::{BeginsOtherwise, Remark, Remarks};
 
 /// How recordings are read.
 #[derive(clap::Args, Debug)]
@@ -15,9 +15,9 @@ pub(crate) struct RecordingArgs {
     /// Sample rate (Hz) of files without a time column
     #[arg(long, value_name = "HZ", value_parser = super::parse::rate_hz)]
     rate_hz: Option<f64>,
-    /// Seconds to leave out at the beginning of each file (warm-up)
-    #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = super::parse::non_negative)]
-    skip_s: f64,
+    /// Seconds to leave out at the beginning of each file (warm-up); auto: of each what does not begin as it goes on
+    #[arg(long, value_name = "S|auto", default_value = "0", value_parser = skip)]
+    skip_s: Skip,
     /// What to do where the time jumps or stands still
     #[arg(long, value_enum, default_value_t = GapsArg::Refuse)]
     gaps: GapsArg,
@@ -39,7 +39,28 @@ enum GapsArg {
     Ignore,
 }
 
+/// What is left out at the beginning.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Skip {
+    /// So many seconds.
+    Seconds(f64),
+    /// What is found not to be as the rest.
+    Auto,
+}
+
+fn skip(text: &str) -> Result<Skip, String> {
+    match text {
+        "auto" => Ok(Skip::Auto),
+        _ => super::parse::non_negative(text).map(Skip::Seconds).map_err(|e| format!("{e}, nor auto")),
+    }
+}
+
 impl RecordingArgs {
+    /// Whether each recording's own warm-up is left out.
+    pub(crate) fn skips_warm_up(&self) -> bool {
+        self.skip_s == Skip::Auto
+    }
+
     /// Rate given on the command line (Hz).
     pub(crate) const fn rate_hz(&self) -> Option<f64> {
         self.rate_hz
@@ -49,7 +70,13 @@ impl RecordingArgs {
     pub(crate) fn provenance(&self) -> toml::Table {
         let mut table = toml::Table::new();
         let mut put = |key: &str, value: toml::Value| table.insert(key.to_owned(), value);
-        put("skip_s", self.skip_s.into());
+        put(
+            "skip_s",
+            match self.skip_s {
+                Skip::Seconds(s) => s.into(),
+                Skip::Auto => "auto".into(),
+            },
+        );
         if let Some(gaps) = self.gaps.to_possible_value() {
             put("gaps", gaps.get_name().into());
         }
@@ -70,7 +97,10 @@ impl RecordingArgs {
     pub(crate) fn options(&self) -> ReadOptions {
         ReadOptions {
             rate_hz: self.rate_hz,
-            skip_s: self.skip_s,
+            skip_s: match self.skip_s {
+                Skip::Seconds(s) => s,
+                Skip::Auto => 0.0,
+            },
             gaps: match self.gaps {
                 GapsArg::Refuse => Gaps::Refuse,
                 GapsArg::Split => Gaps::Split,
@@ -127,15 +157,11 @@ impl Remarks for Said<'_> {
         self.progress = None;
         match remark {
             Remark::Read(report) => self.report(report),
-            Remark::WarmUp { recording, found, skip_s } => {
-                let signal = |(channel, w): &(Channel, WarmUp)| {
-                    let what = if w.mean { "its mean moves" } else { "its noise is another" };
-                    format!("{channel} ({what}, {:+.0} deviations)", w.deviations)
-                };
-                let signals = found.iter().map(signal).collect::<Vec<_>>().join(", ");
-                self.session.printer.warn(&format!(
-                    "{recording}: not stationary at its beginning: {signals}; warm-up? --skip-s {skip_s} leaves that out"
-                ));
+            Remark::WarmUp { found, recordings, left_out, rate_hz } => {
+                for line in warm_up_lines(found, rate_hz) {
+                    self.session.printer.detail(&line);
+                }
+                self.session.printer.warn(&warm_up_in_short(found, recordings, left_out, rate_hz));
             }
             Remark::Shortest { recording, samples, scales, usual } => self.session.printer.warn(&format!(
                 "{recording}: its {samples} samples limit all recordings to {scales} scales; without it there would be \
@@ -143,6 +169,51 @@ impl Remarks for Said<'_> {
             )),
         }
     }
+}
+
+/// A line for each recording that does not begin as it goes on.
+fn warm_up_lines(found: &[BeginsOtherwise], rate_hz: f64) -> Vec<String> {
+    let signal = |(channel, w): &(Channel, WarmUp)| {
+        let what = if w.mean { "its mean moves" } else { "its noise is another" };
+        let change = w.change.map_or(String::new(), |c| format!(", {}", changes(&c, rate_hz)));
+        format!("{channel} ({what}, {:+.0} deviations{change})", w.deviations)
+    };
+    let line = |of_one: &BeginsOtherwise| {
+        let signals = of_one.signals.iter().map(signal).collect::<Vec<_>>().join(", ");
+        format!("{}: not stationary at its beginning: {signals}", of_one.recording)
+    };
+    found.iter().map(line).collect()
+}
+
+/// `wavelet variance -35 % at 164 s without it`
+fn changes(change: &Change, rate_hz: f64) -> String {
+    format!(
+        "wavelet variance {:+.0} % at {} without it",
+        100.0 * (change.ratio - 1.0),
+        duration(tau_s(change.level, rate_hz))
+    )
+}
+
+/// One line: what to leave out of each recording, and what that changes.
+fn warm_up_in_short(found: &[BeginsOtherwise], recordings: usize, left_out: bool, rate_hz: f64) -> String {
+    let advice = |of_one: &BeginsOtherwise| {
+        let surest =
+            of_one.signals.iter().max_by(|a, b| a.1.deviations.abs().total_cmp(&b.1.deviations.abs()));
+        let change =
+            surest.and_then(|(channel, w)| Some(format!("{channel}: {}", changes(&w.change?, rate_hz))));
+        match (of_one.skip_s, change) {
+            (Some(s), Some(change)) if left_out => format!("{} {s} s ({change})", of_one.recording),
+            (Some(s), Some(change)) => format!("{} --skip-s {s} ({change})", of_one.recording),
+            _ => format!("{} (not even its later half settles: left whole)", of_one.recording),
+        }
+    };
+    let all = found.iter().map(advice).collect::<Vec<_>>().join("; ");
+    let head = match (found.len(), recordings) {
+        (1, 1) => "not stationary at its beginning".to_owned(),
+        (some, all) => format!("{some} of {all} recordings not stationary at the beginning"),
+    };
+    let end = if left_out { ", left out" } else { "; --skip-s auto leaves out each one's own" };
+    format!("{head}: {all}{end}")
 }
 
 /// Files of more than this number are told in one line, unless all is to be said.

@@ -165,7 +165,11 @@ fn sought(args: &Args, asked: &Requirements, session: &Session) -> Result<(), Fa
     };
     session.printer.result(shown.trim_end());
     if let Some(out) = &args.out {
-        model_file::write(out, &needed_file(&needed.imu, &question, asked.scenario.imu.rate_hz))?;
+        model_file::write(
+            out,
+            &needed_file(&needed.imu, &question, asked.scenario.imu.rate_hz),
+            session.existing(),
+        )?;
         session.printer.say(&format!("wrote {}", out.display()));
     }
     Ok(())

@@ -26,6 +26,8 @@ enum Kind {
     Study,
     /// A study of the estimators (`nav-sim efficiency`)
     Efficiency,
+    /// A noise model (what `nav-sim calibrate` writes)
+    Model,
     /// What is known of parameters before a fit (`nav-sim calibrate --parameters`)
     Parameters,
 }
@@ -35,6 +37,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         Kind::Scenario => schemars::schema_for!(Scenario).to_value(),
         Kind::Study => schemars::schema_for!(Study).to_value(),
         Kind::Efficiency => efficiency_file::schema(),
+        Kind::Model => nav_sim::formats::model_file::schema(),
         Kind::Parameters => parameters_file::schema(),
     };
     let text = serde_json::to_string_pretty(&schema).map_err(Failure::could_not)?;

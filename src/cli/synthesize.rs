@@ -3,7 +3,7 @@
 use super::axes::ChannelSet;
 use super::run::not_of_another_command;
 use super::{Failure, Session, read};
-use nav_sim::formats::atomic::{AtomicDir, guard_inputs};
+use nav_sim::formats::atomic::{AtomicDir, guard_directory, guard_inputs};
 use nav_sim::formats::contamination_file;
 use nav_sim::formats::model_file::{self, ModelFile};
 use nav_sim::formats::recordings::{FileFormat, is_recording};
@@ -91,7 +91,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let job = Job::new(args, session)?;
     let names: Vec<String> =
         (1..=args.replicates).map(|k| format!("replicate_{k}.{}", job.format.ending())).collect();
-    check_directory(args, &names, session)?;
+    check_directory(args, &job, &names, session)?;
     let mut out = AtomicDir::create(&args.out)?;
     let paths: Vec<PathBuf> = names.iter().map(|n| out.path(n)).collect();
     let progress = session.progress("replicates", args.replicates);
@@ -130,7 +130,7 @@ fn report(args: &Args, job: &Job, manifest: &str, session: &Session) {
 
 /// Refuses to overwrite an input or what this command did not make, and to leave recordings of another job beside
 /// this one's.
-fn check_directory(args: &Args, names: &[String], session: &Session) -> Result<(), Failure> {
+fn check_directory(args: &Args, job: &Job, names: &[String], session: &Session) -> Result<(), Failure> {
     let contamination = args.contaminate.as_deref().map(Path::new);
     for name in names.iter().map(String::as_str).chain(["manifest.json"]) {
         guard_inputs(&args.out.join(name), contamination.into_iter().chain([args.model.as_path()]))?;
@@ -156,8 +156,13 @@ fn check_directory(args: &Args, names: &[String], session: &Session) -> Result<(
             .setting(Setting::OutputDirectory)
             .into());
     }
-    session.printer.warn(&format!("{shown}: the replicates in it are replaced"));
-    Ok(())
+    let own = job.identity(args)?;
+    let same = |text: &str| {
+        let there: Value = serde_json::from_str(text).unwrap_or_default();
+        own.as_object().is_some_and(|own| own.iter().all(|(key, value)| there[key] == *value))
+            && made == names
+    };
+    Ok(guard_directory(&args.out, session.existing(), same)?)
 }
 
 /// The recordings that a manifest of this command names; `None` if it is another's.
@@ -237,7 +242,6 @@ impl Job {
 
     /// What was drawn.
     fn manifest(&self, args: &Args, names: &[String], models: &[Model]) -> Result<Value, Failure> {
-        let model = read::input("model", &args.model)?;
         let entry = |(i, (name, model)): (usize, (&String, &Model))| {
             let contaminated = self.contamination.as_ref().is_some_and(|c| c.touches(i as u64 + 1));
             let axes: Map<String, Value> =
@@ -245,18 +249,26 @@ impl Job {
             json!({ "file": name, "contaminated": contaminated, "axes": axes })
         };
         let replicates: Vec<Value> = names.iter().zip(models).enumerate().map(entry).collect();
+        let mut manifest = self.identity(args)?;
+        manifest["model"] = args.model.display().to_string().into();
+        manifest["replicates"] = replicates.into();
+        Ok(manifest)
+    }
+
+    /// What decides the replicates, but for their number.
+    fn identity(&self, args: &Args) -> Result<Value, Failure> {
+        let model = read::input("model", &args.model)?;
         Ok(json!({
             "schema_version": 1,
             "command": "synthesize",
             "version": env!("CARGO_PKG_VERSION"),
             "seed": self.seed,
-            "model": args.model.display().to_string(),
             "model_blake3": model.blake3,
             "rate_hz": self.file.model.rate_hz,
             "samples": self.samples,
             "spread": self.spread,
+            "axes": self.channels.iter().map(Channel::to_string).collect::<Vec<_>>(),
             "contamination": self.contamination.as_ref().map(|c| c.name.as_str()),
-            "replicates": replicates,
         }))
     }
 }

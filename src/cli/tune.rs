@@ -143,7 +143,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     };
     session.printer.result(shown.trim_end());
     if let Some(out) = &args.out {
-        model_file::write(out, &tuned(&file, &result.factors, args, &files))?;
+        model_file::write(out, &tuned(&file, &result.factors, args, &files), session.existing())?;
         session.printer.say(&format!("wrote {}", out.display()));
     }
     Ok(())

@@ -13,38 +13,29 @@ pub(super) fn expect(initial: &mut InitialSettings, file: &ModelFile, path: &Pat
     say("the filter expects", &expected(initial, file), path, session);
 }
 
-/// Gives the true IMU the turn-on bias of the model that makes its errors; `[imu]` wins unless it is 0.
+/// Gives the true IMU the turn-on bias of the model that makes its errors; `[imu]` wins, a 0 too.
 pub(super) fn make(imu: &mut ImuSettings, file: &ModelFile, path: &Path, session: &Session) {
     say("the true IMU has", &made(imu, file), path, session);
 }
 
 /// As [`expect`], silently: what was set.
 pub(super) fn expected(initial: &mut InitialSettings, file: &ModelFile) -> Vec<(Sensor, f64)> {
-    let mut set = stated(file);
-    set.retain(|(sensor, sigma)| {
-        let setting = match sensor {
-            Sensor::Accel => &mut initial.accel_bias_sigma_m_s2,
-            Sensor::Gyro => &mut initial.gyro_bias_sigma_rad_s,
-        };
-        let is_open = setting.is_none();
-        setting.get_or_insert(*sigma);
-        is_open
-    });
-    set
+    set([&mut initial.accel_bias_sigma_m_s2, &mut initial.gyro_bias_sigma_rad_s], file)
 }
 
 /// As [`make`], silently: what was set.
 pub(super) fn made(imu: &mut ImuSettings, file: &ModelFile) -> Vec<(Sensor, f64)> {
+    set([&mut imu.turn_on_bias_accel_m_s2, &mut imu.turn_on_bias_gyro_rad_s], file)
+}
+
+/// Fills in the settings of both sensors that are not given.
+fn set(settings: [&mut Option<f64>; 2], file: &ModelFile) -> Vec<(Sensor, f64)> {
     let mut set = stated(file);
+    let [accel, gyro] = settings;
     set.retain(|(sensor, sigma)| {
-        let setting = match sensor {
-            Sensor::Accel => &mut imu.turn_on_bias_accel_m_s2,
-            Sensor::Gyro => &mut imu.turn_on_bias_gyro_rad_s,
-        };
-        let is_open = *setting == 0.0;
-        if is_open {
-            *setting = *sigma;
-        }
+        let setting = if *sensor == Sensor::Accel { &mut *accel } else { &mut *gyro };
+        let is_open = setting.is_none();
+        setting.get_or_insert(*sigma);
         is_open
     });
     set

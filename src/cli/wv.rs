@@ -7,7 +7,7 @@ use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
 use nav_sim::formats::atomic;
 use nav_sim::jobs::{self, Intervals, WaveletOptions};
-use nav_sim::report;
+use nav_sim::report::{self, SignalCurves, SignalsFile};
 use std::path::PathBuf;
 
 /// Wavelet variance of static recordings: classical, robust, Allan, with confidence intervals
@@ -28,6 +28,9 @@ pub(crate) struct Args {
     /// Where the intervals' degrees of freedom are from
     #[arg(long, value_parser = words::<Intervals>(&INTERVALS), default_value_t, help_heading = "Wavelet variance")]
     intervals: Intervals,
+    /// One table for each sensor and axis, the recordings side by side
+    #[arg(long, conflicts_with = "verbose")]
+    per_file: bool,
     /// Write the curves as JSON
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -51,16 +54,21 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     args.plot.guard(&inputs)?;
     let intervals = args.intervals;
-    let options =
-        WaveletOptions { reading: args.recordings.options(), scales: args.tuning.scales, tuning, intervals };
+    let options = WaveletOptions {
+        reading: args.recordings.options(),
+        skip_warm_up: args.recordings.skips_warm_up(),
+        scales: args.tuning.scales,
+        tuning,
+        intervals,
+    };
     let file = jobs::wavelet_variances(&args.files, &options, &mut Said::new(session))?;
     let json = report::json(&file);
     if let Some(out) = &args.out {
-        atomic::write(out, &json)?;
+        atomic::write_result(out, &json, session.existing())?;
         session.printer.say(&format!("wrote {}", out.display()));
     }
     if let Some(page) = &args.page {
-        atomic::write(page, report::wavelet_page(&file))?;
+        atomic::write_result(page, report::wavelet_page(&file), session.existing())?;
         session.printer.say(&format!("wrote {}", page.display()));
     }
     args.plot.write(|| report::wavelet_svg(&file), session)?;
@@ -68,22 +76,43 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         session.printer.result(json.trim_end());
         return Ok(());
     }
-    for signal in &file.signals {
-        let title =
-            format!("{} · {}.{} · {} samples", signal.file, signal.sensor, signal.axis, signal.samples);
-        session.printer.result(&format!("{title}\n{}", compact(&report::signal_rows(signal))));
-    }
-    session.printer.result(&report::intervals_note(intervals.name(), &tuning));
+    let text = match () {
+        () if session.csv() => report::signals_csv(&file).trim_end().to_owned(),
+        () if args.per_file => side_by_side(&file),
+        () if session.verbose() => all_scales(&file, &report::intervals_note(intervals.name(), &tuning)),
+        () => digest(&file),
+    };
+    session.printer.result(&text);
     Ok(())
 }
 
-/// A table whose first row is its head, without lines.
-fn compact(rows: &[Vec<String>]) -> String {
-    let width = |column: usize| rows.iter().map(|r| r[column].chars().count()).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..rows[0].len()).map(width).collect();
-    let line = |row: &Vec<String>| {
-        let cells: Vec<String> = row.iter().zip(&widths).map(|(cell, w)| format!("{cell:<w$}")).collect();
-        format!("  {}", cells.join("  ")).trim_end().to_owned()
+/// A row for each sensor and axis.
+fn digest(file: &SignalsFile) -> String {
+    let mut recordings: Vec<&str> = file.signals.iter().map(|s| s.file.as_str()).collect();
+    recordings.dedup();
+    let of = if recordings.len() > 1 {
+        format!(", median of {} recordings", recordings.len())
+    } else {
+        String::new()
     };
-    rows.iter().map(line).collect::<Vec<_>>().join("\n")
+    format!(
+        "Allan deviation over averages of{of}:\n{}\nrobust/classical: least ratio of the wavelet variances, below 1 where \
+         outliers are; all scales with intervals: --verbose, --format csv; recordings side by side: --per-file",
+        report::columns(&report::signals_digest(file))
+    )
+}
+
+fn side_by_side(file: &SignalsFile) -> String {
+    let table = |(title, rows): (String, Vec<Vec<String>>)| format!("{title}\n{}", report::columns(&rows));
+    report::signals_per_file(file).into_iter().map(table).collect::<Vec<_>>().join("\n")
+}
+
+fn all_scales(file: &SignalsFile, note: &str) -> String {
+    let table = |signal: &SignalCurves| {
+        let SignalCurves { file, sensor, axis, samples, .. } = signal;
+        let rows = report::columns(&report::signal_rows(signal));
+        format!("{file} · {sensor}.{axis} · {samples} samples\n{rows}")
+    };
+    let tables = file.signals.iter().map(table).chain([note.to_owned()]);
+    tables.collect::<Vec<_>>().join("\n")
 }

@@ -1,9 +1,8 @@
 //! All the numbers of an export, with units.
 
-use super::{Entry, Export, SensorExport};
+use super::{Entry, Export, Quantity, SensorExport};
 use crate::imu::Sensor;
 use crate::noise::practical::{AxisParameters, CorrelatedProcess, Markov, Pair, Ratio};
-use crate::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
 use serde_json::{Map, Value, json};
 
 impl Export {
@@ -48,7 +47,9 @@ fn sensor(s: &SensorExport) -> Value {
     })
 }
 
-fn parameters(p: &AxisParameters, sensor: Sensor) -> Value {
+/// The parameters of an axis, each in SI and in the unit of data sheets.
+#[must_use]
+pub fn parameters(p: &AxisParameters, sensor: Sensor) -> Value {
     let minimum = p.minimum.map(|m| {
         let b = m.bias_instability();
         json!({ "tau_s": m.tau_s, "allan_deviation": m.deviation, "bias_instability": bias(b, sensor) })
@@ -68,26 +69,15 @@ fn parameters(p: &AxisParameters, sensor: Sensor) -> Value {
 
 fn pair(p: &Pair, sensor: Sensor) -> Value {
     let crossover = p.crossover_s();
-    let (n_unit, n_sheet, k_unit, k_sheet) = match sensor {
-        Sensor::Accel => (
-            "m/s^2/sqrt(Hz)",
-            ("m/s/sqrt(h)", p.density * 60.0),
-            "m/s^3/sqrt(Hz)",
-            ("m/s^2/sqrt(h)", p.walk * 60.0),
-        ),
-        Sensor::Gyro => (
-            "rad/s/sqrt(Hz)",
-            ("deg/sqrt(h)", p.density / DEG * 60.0),
-            "rad/s^2/sqrt(Hz)",
-            ("deg/h/sqrt(h)", p.walk / DEG_PER_HOUR * 60.0),
-        ),
-    };
     let governs = |from: Option<f64>, to: Option<f64>| json!({ "from_s": from, "to_s": to });
+    let density = |x: f64, what: Quantity, governs: Value| {
+        let mut value = quantity(x, what, sensor);
+        value["governs"] = governs;
+        value
+    };
     json!({
-        "n": { "value": p.density, "unit": n_unit, "data_sheet": { "value": n_sheet.1, "unit": n_sheet.0 },
-               "governs": governs(None, crossover) },
-        "k": { "value": p.walk, "unit": k_unit, "data_sheet": { "value": k_sheet.1, "unit": k_sheet.0 },
-               "governs": governs(crossover, None) },
+        "n": density(p.density, Quantity::Density, governs(None, crossover)),
+        "k": density(p.walk, Quantity::Walk, governs(crossover, None)),
         "markov": p.markov.as_ref().map(|m| markov(m, sensor)),
     })
 }
@@ -96,11 +86,15 @@ fn markov(m: &Markov, sensor: Sensor) -> Value {
     json!({ "sigma": bias(m.sigma, sensor), "t_corr_s": m.t_corr_s })
 }
 
-/// In SI and in the unit of data sheets.
 fn bias(x: f64, sensor: Sensor) -> Value {
-    let (value, unit) = match sensor {
-        Sensor::Accel => (x / STANDARD_GRAVITY * 1e6, "ug"),
-        Sensor::Gyro => (x / DEG_PER_HOUR, "deg/h"),
-    };
-    json!({ "value": x, "unit": sensor.unit(), "data_sheet": { "value": value, "unit": unit } })
+    quantity(x, Quantity::Bias, sensor)
+}
+
+/// In SI and in the unit of data sheets.
+fn quantity(x: f64, what: Quantity, sensor: Sensor) -> Value {
+    let (unit, factor) = what.sheet(sensor);
+    json!({
+        "value": x, "unit": what.si_unit(sensor),
+        "data_sheet": { "value": x * factor, "unit": unit },
+    })
 }

@@ -7,12 +7,15 @@ mod autopilots;
 mod filters;
 mod json;
 mod layout;
+mod sheet;
 mod simulators;
 mod target;
 mod vision;
 mod words;
 
+pub use json::parameters as parameters_json;
 pub use layout::number;
+pub use sheet::Quantity;
 pub use target::Target;
 pub use words::closure_in_words;
 

@@ -231,6 +231,7 @@ pub enum Setting {
     Origin,
     Output,
     OutputDirectory,
+    Force,
     StartFiles,
 }
 
@@ -247,6 +248,7 @@ impl Setting {
             Self::Origin => "give an origin on the Earth",
             Self::Output => "choose another output",
             Self::OutputDirectory => "choose another directory",
+            Self::Force => "choose another place, or replace it",
             Self::StartFiles => "start from an example",
         }
     }

@@ -1,6 +1,6 @@
 //! Static recordings, or directories of them → a noise model for each sensor or axis.
 
-use super::{JobError, Remark, Remarks};
+use super::{BeginsOtherwise, JobError, Remark, Remarks};
 use crate::calibration::{
     self, Bootstrap, Estimator, Group, Outcome, Pool, Replicate, Settings, SignalError, WarmUp, grouped,
     infer, replicates, warm_up,
@@ -73,6 +73,8 @@ impl EstimatorChoice {
 pub struct CalibrationOptions {
     /// How they are read.
     pub reading: ReadOptions,
+    /// Whether each recording's warm-up, as it is found, is left out.
+    pub skip_warm_up: bool,
     /// Number of scales; none: one less than the shortest signal allows.
     pub scales: Option<u32>,
     /// Which estimators.
@@ -89,6 +91,7 @@ impl Default for CalibrationOptions {
     fn default() -> Self {
         Self {
             reading: ReadOptions::default(),
+            skip_warm_up: false,
             scales: None,
             estimators: EstimatorChoice::default(),
             pool: None,
@@ -143,11 +146,11 @@ pub fn measure(
     options: &CalibrationOptions,
     remarks: &mut dyn Remarks,
 ) -> Result<Measured, JobError> {
-    let CalibrationOptions { reading, scales, estimators, pool, settings, bootstrap } = options;
+    let CalibrationOptions { reading, skip_warm_up, scales, estimators, pool, settings, bootstrap } = options;
     // As many scales as parameters, and one that the default leaves out.
     let needed = scales.map_or(2 << settings.model.parameters(), |j| 1 << j);
     let reading = ReadOptions { min_samples: needed, ..reading.clone() };
-    let look = |recording: Recording| Look::new(&recording, *scales, &settings.tuning);
+    let look = |recording: Recording| Look::new(recording, *skip_warm_up, *scales, &settings.tuning);
     let (looks, report) = visit(paths, &reading, &look, remarks)?;
     let looks = looks.into_iter().collect::<Result<Vec<_>, _>>()?;
     distinct(&looks)?;
@@ -155,7 +158,8 @@ pub fn measure(
         return Err(JobError::Overlap { later: later.to_owned(), first: first.to_owned(), share });
     }
     let rate_hz = report.files[0].rate_hz;
-    warm_ups(&looks, reading.skip_s, rate_hz, remarks);
+    let beginnings = looks.iter().map(|look| (look.recording.as_str(), &look.warm_ups[..]));
+    warm_ups(beginnings, (reading.skip_s, *skip_warm_up), rate_hz, remarks);
     shortest(&report, *scales, remarks);
     let estimators = estimators.estimators(report.files.iter().map(|f| f.samples.len()).sum())?;
     let settings = Settings { estimators, rate_hz, ..settings.clone() };
@@ -225,14 +229,16 @@ struct Look {
 }
 
 impl Look {
-    fn new(recording: &Recording, levels: Option<u32>, tuning: &Tuning) -> Result<Self, SignalError> {
-        let begins_otherwise = |s: &Signal| warm_up(&s.samples).map(|w| (s.channel, w));
-        Ok(Self {
-            recording: recording.name.clone(),
-            signals: recording.signals.par_iter().map(|s| (s.channel, hash::samples(&s.samples))).collect(),
-            warm_ups: recording.signals.par_iter().filter_map(begins_otherwise).collect(),
-            replicates: replicates(recording, levels, tuning)?,
-        })
+    fn new(
+        recording: Recording,
+        skip_warm_up: bool,
+        levels: Option<u32>,
+        tuning: &Tuning,
+    ) -> Result<Self, SignalError> {
+        let signals = recording.signals.par_iter().map(|s| (s.channel, hash::samples(&s.samples))).collect();
+        let (recording, warm_ups) = without_warm_up(recording, skip_warm_up);
+        let replicates = replicates(&recording, levels, tuning)?;
+        Ok(Self { recording: recording.name, signals, warm_ups, replicates })
     }
 }
 
@@ -250,14 +256,56 @@ fn distinct(looks: &[Look]) -> Result<(), JobError> {
 }
 
 /// Remarks which recordings do not begin as they go on after what was skipped.
-fn warm_ups(looks: &[Look], skipped_s: f64, rate_hz: f64, remarks: &mut dyn Remarks) {
+pub(super) fn warm_ups<'a>(
+    looks: impl Iterator<Item = (&'a str, &'a [(Channel, WarmUp)])>,
+    (skipped_s, left_out): (f64, bool),
+    rate_hz: f64,
+    remarks: &mut dyn Remarks,
+) {
+    let mut found: Vec<BeginsOtherwise> = Vec::new();
+    let mut names: Vec<&str> = Vec::new();
     // The signals of a long recording are looked at one by one.
-    for of_one in looks.chunk_by(|a, b| a.recording == b.recording) {
-        let found: Vec<(Channel, WarmUp)> = of_one.iter().flat_map(|look| &look.warm_ups).copied().collect();
-        let Some((_, longest)) = found.iter().max_by_key(|(_, w)| w.samples) else { continue };
-        let skip_s = (skipped_s + longest.samples as f64 / rate_hz).ceil();
-        remarks.remark(Remark::WarmUp { recording: &of_one[0].recording, found: &found, skip_s });
+    for (recording, signals) in looks {
+        if names.last() != Some(&recording) {
+            names.push(recording);
+        }
+        match found.last_mut() {
+            Some(last) if last.recording == recording => last.signals.extend(signals),
+            _ if signals.is_empty() => {}
+            _ => found.push(BeginsOtherwise {
+                recording: recording.to_owned(),
+                signals: signals.to_vec(),
+                skip_s: None,
+            }),
+        }
     }
+    for of_one in &mut found {
+        of_one.skip_s = longest(&of_one.signals).map(|n| (skipped_s + n as f64 / rate_hz).ceil());
+    }
+    if !found.is_empty() {
+        remarks.remark(Remark::WarmUp { found: &found, recordings: names.len(), left_out, rate_hz });
+    }
+}
+
+/// Samples to leave out of a recording for all its signals; none where that does not help one of them.
+fn longest(signals: &[(Channel, WarmUp)]) -> Option<usize> {
+    let helps = signals.iter().all(|(_, w)| w.change.is_some());
+    signals.iter().map(|(_, w)| w.samples).max().filter(|_| helps)
+}
+
+/// How the signals of a recording begin; if it is to be left out, the recording without that.
+pub(super) fn without_warm_up(
+    mut recording: Recording,
+    leave_out: bool,
+) -> (Recording, Vec<(Channel, WarmUp)>) {
+    let begins_otherwise = |s: &Signal| warm_up(&s.samples).map(|w| (s.channel, w));
+    let found: Vec<_> = recording.signals.par_iter().filter_map(begins_otherwise).collect();
+    if let Some(samples) = longest(&found).filter(|_| leave_out) {
+        for signal in &mut recording.signals {
+            signal.samples.drain(..samples);
+        }
+    }
+    (recording, found)
 }
 
 /// Remarks which recording is so much shorter than the others that it costs all of them scales.

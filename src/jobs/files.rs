@@ -2,7 +2,7 @@
 
 use super::Calibration;
 use crate::calibration::{Diagnosis, Estimator, Outcome};
-use crate::formats::atomic::{self, AtomicFile};
+use crate::formats::atomic::{self, AtomicFile, Existing};
 use crate::formats::draws_file::{self, DrawsFile};
 use crate::formats::model_file::{self, CalibrationNote};
 use crate::formats::{FileError, hash};
@@ -38,17 +38,39 @@ impl ModelFiles {
         estimators.iter().map(files).collect()
     }
 
-    /// Writes the models of the estimator, with the hash of their curves in them.
+    /// Refuses to put other models in the place of those that are there.
     ///
     /// # Errors
-    /// When the system refuses.
-    pub fn write(&self, calibration: &Calibration, note: &CalibrationNote) -> Result<(), FileError> {
+    /// When there are others, and they are to stay.
+    pub fn guard(
+        &self,
+        calibration: &Calibration,
+        note: &CalibrationNote,
+        existing: Existing,
+    ) -> Result<(), FileError> {
+        let (curves, model) = self.contents(calibration, note);
+        atomic::guard_contents(&self.model, model.as_bytes(), existing)?;
+        atomic::guard_contents(&self.curves, curves.as_bytes(), existing)
+    }
+
+    fn contents(&self, calibration: &Calibration, note: &CalibrationNote) -> (String, String) {
         let Calibration { groups, outcomes, settings } = calibration;
         let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == self.estimator).collect();
         let curves = report::json(&CurvesFile::new(groups, &own, settings));
         let blake3 = hash::of_bytes(curves.as_bytes());
         let model = model_file::to_toml(&note.model_file(&own, settings, Some(&blake3)));
-        let draws = DrawsFile::of(&own, settings.rate_hz);
+        (curves, model)
+    }
+
+    /// Writes the models of the estimator, with the hash of their curves in them.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub fn write(&self, calibration: &Calibration, note: &CalibrationNote) -> Result<(), FileError> {
+        let (curves, model) = self.contents(calibration, note);
+        let own: Vec<&Outcome> =
+            calibration.outcomes.iter().filter(|o| o.estimator == self.estimator).collect();
+        let draws = DrawsFile::of(&own, calibration.settings.rate_hz);
         let draws =
             draws.map(|draws| serde_json::to_string(&draws).expect("plain structs are always JSON") + "\n");
         // All are on the disk before any has its name. Should the model not get its name, the hash in it tells that the

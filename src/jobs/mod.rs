@@ -23,6 +23,7 @@
 //! ```
 
 mod calibrate;
+mod certify;
 mod choose;
 mod curves;
 mod error;
@@ -35,12 +36,13 @@ mod uncertainty;
 mod wavelet;
 
 pub use calibrate::{Calibration, CalibrationOptions, EstimatorChoice, Measured, calibrate, measure};
+pub use certify::{Certificate, CertifiedScale, CertifyError, Recorded, certify};
 pub use choose::{ChoiceDrive, Chosen, choose};
 pub use curves::{Curves, read_curves};
 pub use error::JobError;
 pub use files::ModelFiles;
 pub use navigate::{NavigateError, NavigateInputs, Navigation, Note, TrueImu, navigate};
 pub use reduction::Reduced;
-pub use remarks::{Remark, Remarks, Silence};
+pub use remarks::{BeginsOtherwise, Remark, Remarks, Silence};
 pub use require::{Ask, CatalogueUnit, Misplaced, Requirements};
 pub use wavelet::{Intervals, WaveletOptions, wavelet_variances};

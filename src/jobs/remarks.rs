@@ -9,14 +9,16 @@ use crate::imu::Channel;
 pub enum Remark<'a> {
     /// What was found in the recordings, and what is doubtful about them.
     Read(&'a Report),
-    /// A recording does not begin as it goes on.
+    /// Recordings that do not begin as they go on.
     WarmUp {
-        /// The recording.
-        recording: &'a str,
-        /// Its signals of which that is so.
-        found: &'a [(Channel, WarmUp)],
-        /// Seconds to leave out at its beginning, with those that are left out already.
-        skip_s: f64,
+        /// Each of them.
+        found: &'a [BeginsOtherwise],
+        /// Of so many recordings.
+        recordings: usize,
+        /// Whether that was left out of each.
+        left_out: bool,
+        /// Sample rate (Hz).
+        rate_hz: f64,
     },
     /// A recording is so much shorter than the others that it costs all of them scales.
     Shortest {
@@ -29,6 +31,17 @@ pub enum Remark<'a> {
         /// The scales that half of them would have.
         usual: u32,
     },
+}
+
+/// A recording that does not begin as it goes on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BeginsOtherwise {
+    /// The recording.
+    pub recording: String,
+    /// Its signals of which that is so.
+    pub signals: Vec<(Channel, WarmUp)>,
+    /// Seconds to leave out at its beginning, with those that are left out already; none where that does not help.
+    pub skip_s: Option<f64>,
 }
 
 /// Listens to remarks.

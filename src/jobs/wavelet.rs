@@ -1,6 +1,6 @@
 //! Static recordings → their wavelet variances.
 
-use super::calibrate::visit;
+use super::calibrate::{visit, without_warm_up};
 use super::{JobError, Remarks};
 use crate::calibration::{Replicate, UnknownName, replicates};
 use crate::formats::recordings::ReadOptions;
@@ -55,6 +55,8 @@ impl FromStr for Intervals {
 pub struct WaveletOptions {
     /// How the recordings are read.
     pub reading: ReadOptions,
+    /// Whether each recording's warm-up, as it is found, is left out.
+    pub skip_warm_up: bool,
     /// Number of scales; none: one less than each signal allows.
     pub scales: Option<u32>,
     /// Tuning of the robust ones.
@@ -72,10 +74,11 @@ pub fn wavelet_variances(
     options: &WaveletOptions,
     remarks: &mut dyn Remarks,
 ) -> Result<SignalsFile, JobError> {
-    let WaveletOptions { reading, scales, tuning, intervals } = options;
+    let WaveletOptions { reading, skip_warm_up, scales, tuning, intervals } = options;
     // Four samples have a scale.
     let reading = ReadOptions { min_samples: scales.map_or(4, |j| 1 << j), ..reading.clone() };
     let look = |recording: Recording| -> Result<Vec<SignalCurves>, JobError> {
+        let recording = if *skip_warm_up { without_warm_up(recording, true).0 } else { recording };
         let measured = replicates(&recording, *scales, tuning)?;
         let curves = |(channel, replicate): &(Channel, Replicate)| {
             let edof = degrees_of_freedom(*intervals, &recording, *channel, replicate)?;

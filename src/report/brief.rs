@@ -1,108 +1,262 @@
-//! A calibration on one screen: the verdict first, then each parameter with its interval.
+//! A calibration on one screen: the verdict first, then the parameters in the terms of practitioners.
 
-use super::fits::{interval_of, meaning};
-use crate::calibration::{Diagnosis, Outcome, ParameterInterval, Settings, advice};
+use super::columns::columns;
+use super::number::readable;
+use crate::calibration::{
+    Diagnosis, Outcome, Practical, Settings, advice, axes_remark, duration, percent, shares, signals, tau_s,
+    worst_in_words,
+};
+use crate::export::Quantity;
 use crate::imu::Sensor;
 use crate::noise::Process;
 
 /// With more fits than this each has one line.
 const MOST: usize = 2;
-/// Remarks that are shown of a fit, and lines of advice of a sensor.
-const REMARKS: usize = 2;
-const ADVICE: usize = 4;
+/// Lines of it all; three more go to stderr.
+const LINES: usize = 17;
 
 /// What the recordings of each sensor say of one another, and every fit, shortly: two of five processes in twenty lines.
 #[must_use]
 pub fn brief(outcomes: &[Outcome], diagnoses: &[Diagnosis], settings: &Settings) -> String {
-    let mut lines = Vec::new();
-    for sensor in Sensor::ALL {
-        let advice = advice(diagnoses, sensor, settings.rate_hz);
-        let left = advice.len().saturating_sub(ADVICE);
-        lines.extend(advice.into_iter().take(ADVICE).map(|line| format!("{}: {line}", sensor.name())));
-        if left > 0 {
-            lines.push(format!("{}: {}", sensor.name(), more(left)));
-        }
+    let rate_hz = settings.rate_hz;
+    let of_sensor = |sensor: Sensor| {
+        let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.scope.sensor == sensor).collect();
+        let mut parts: Vec<String> = if own.len() == 1 { vec![verdict(own[0], rate_hz)] } else { Vec::new() };
+        parts.extend(own.iter().find_map(|o| axes_remark(o, rate_hz)));
+        let mut advice = advice(diagnoses, sensor, rate_hz).into_iter();
+        parts.extend(advice.next());
+        let first = (!parts.is_empty()).then(|| format!("{}: {}", sensor.name(), parts.join("; ")));
+        let notes = own.iter().filter(|_| outcomes.len() <= MOST).flat_map(|o| notes(o));
+        let others = advice.chain(notes).map(move |line| format!("{}: {line}", sensor.name()));
+        (first, others.collect::<Vec<_>>())
+    };
+    let (mut lines, mut remarks) = (Vec::new(), Vec::new());
+    for (first, others) in Sensor::ALL.map(of_sensor) {
+        lines.extend(first);
+        remarks.extend(others);
     }
-    for outcome in outcomes {
-        if outcomes.len() > MOST {
-            lines.push(format!("{}: {}", head(outcome), one_line(outcome)));
-            continue;
-        }
-        lines.push(head(outcome));
-        lines.extend(processes(outcome, settings.rate_hz));
-        lines.extend(outcome.notes.iter().take(REMARKS).map(|note| format!("  note: {note}")));
-        let left = outcome.notes.len().saturating_sub(REMARKS);
-        if left > 0 {
-            lines.push(format!("  note: {}", more(left)));
-        }
+    let table = if outcomes.len() > MOST { joint(outcomes, rate_hz) } else { full(outcomes, rate_hz) };
+    let room = LINES.saturating_sub(lines.len() + table.len() + 1).max(1);
+    let left = remarks.len().saturating_sub(room);
+    lines.push(columns(&table));
+    let shown = if left > 0 { room - 1 } else { remarks.len() };
+    lines.extend(remarks.iter().take(shown).map(|remark| format!("note: {remark}")));
+    if left > 0 {
+        lines.push(format!("note: {} more with --verbose", remarks.len() - shown));
     }
     lines.join("\n")
 }
 
-fn more(left: usize) -> String {
-    format!("{left} more with --verbose")
+/// Remarks that the verdict does not hold already.
+fn notes(outcome: &Outcome) -> Vec<String> {
+    let told = |note: &&String| note.starts_with("the data disagree") || note.starts_with("the axes differ");
+    outcome.notes.iter().filter(|note| !told(note)).cloned().collect()
 }
 
-/// `accel · dr-awv · WN+AR1 · 24 signals, J-test p = 0.711: no evidence against the model`
-fn head(outcome: &Outcome) -> String {
-    let signals = match outcome.replicates {
-        0 => "a curve".to_owned(),
-        1 => "1 signal".to_owned(),
-        count => format!("{count} signals"),
-    };
+/// Whether the model fits, and where it does not.
+fn verdict(outcome: &Outcome, rate_hz: f64) -> String {
+    let departure = outcome.departure();
     let goodness = outcome.inference.as_ref().and_then(|i| i.goodness);
-    let test = goodness.map_or(String::new(), |g| {
-        let verdict = if g.is_rejected() { "the model is rejected" } else { "no evidence against the model" };
-        format!(", J-test p = {:.3}: {verdict}", g.p_value)
-    });
-    format!("{} · {} · {} · {signals}{test}", outcome.scope.name(), outcome.estimator.name(), outcome.spec)
-}
-
-/// `WN sigma2 5.42e-5, AR1 phi 0.9859 sigma2 1.58e-8`
-fn one_line(outcome: &Outcome) -> String {
-    let model = &outcome.fit.composite;
-    let process = |(process, label): (&Process, String)| {
-        let values = process.parameters().into_iter().map(|(name, x)| format!(" {name} {}", number(name, x)));
-        format!("{label}{}", values.collect::<String>())
-    };
-    model.processes.iter().zip(model.labels()).map(process).collect::<Vec<_>>().join(", ")
-}
-
-/// A line for each process: its parameters with their intervals, and what they mean.
-fn processes(outcome: &Outcome, rate_hz: f64) -> Vec<String> {
-    let intervals = outcome.inference.as_ref().map_or(&[][..], |i| &i.intervals);
-    let model = &outcome.fit.composite;
-    let line = |(index, (process, label)): (usize, (&Process, String))| {
-        let own = model.parameters().filter(|(of, _)| of.process == index);
-        let all: Vec<String> = own
-            .map(|(of, value)| {
-                let ends = interval_of(intervals, of).map_or(String::new(), ends);
-                format!("{} = {}{ends}", of.parameter.name(), number(of.parameter.name(), value))
-            })
-            .collect();
-        let meaning = if outcome.fit.zero.contains(&index) {
-            "no part in it".to_owned()
+    let test = goodness.map_or(String::new(), |g| format!(", J-test p = {:.3}", g.p_value));
+    let rejected = goodness.is_some_and(|g| g.is_rejected());
+    let (spec, signals) = (&outcome.spec, signals(outcome));
+    if let Some(worst) = departure.worst() {
+        let allowed = if goodness.is_some() && !rejected {
+            ", which allows for how much they differ among themselves"
         } else {
-            meaning(process, outcome.scope.sensor, rate_hz)
+            ""
         };
-        format!("  {label:<6} {}; {meaning}", all.join(", "))
+        return format!(
+            "{spec} does not fit {signals} at {} of {} scales: the data have {}{test}{allowed}",
+            departure.missed.len(),
+            departure.scales,
+            worst_in_words(outcome, worst, rate_hz)
+        );
+    }
+    let furthest = departure.furthest.map_or(String::new(), |m| {
+        format!(", at most {} off, at {}", percent((m.ratio - 1.0).abs()), duration(tau_s(m.level, rate_hz)))
+    });
+    if rejected {
+        return format!("{spec} does not fit {signals} as a whole{furthest}{test}");
+    }
+    format!("{spec} fits {signals}{furthest}{test}")
+}
+
+/// Rows for a parameter each.
+fn full(outcomes: &[Outcome], rate_hz: f64) -> Vec<Vec<String>> {
+    let head = ["", "parameter", "value", "95 % interval", "unit", "in SI", "governs"];
+    let rows = outcomes.iter().flat_map(|o| rows_of(o, rate_hz));
+    std::iter::once(head.map(str::to_owned).to_vec()).chain(rows).collect()
+}
+
+fn rows_of(outcome: &Outcome, rate_hz: f64) -> Vec<Vec<String>> {
+    let sensor = outcome.scope.sensor;
+    let practical = outcome.practical(rate_hz);
+    let mut rows: Vec<Vec<String>> = practical.iter().flat_map(|p| practical_rows(p, sensor)).collect();
+    rows.extend(process_rows(outcome, rate_hz));
+    for row in &mut rows {
+        row.insert(0, outcome.scope.name());
+    }
+    rows
+}
+
+/// Velocity or angle random walk, bias instability, acceleration or rate random walk.
+fn practical_rows(practical: &Practical, sensor: Sensor) -> Vec<Vec<String>> {
+    let Practical { parameters, intervals, range_s } = practical;
+    let pair = &parameters.walk;
+    let [white, walk] = match sensor {
+        Sensor::Accel => ["velocity random walk N", "acceleration random walk K"],
+        Sensor::Gyro => ["angle random walk N", "rate random walk K"],
     };
-    model.processes.iter().zip(model.labels()).enumerate().map(line).collect()
-}
-
-/// A value as a screen needs it: phi is told by its distance from 1.
-fn number(parameter: &str, value: f64) -> String {
-    if parameter == "phi" { format!("{value:.6}") } else { format!("{value:.4e}") }
-}
-
-/// ` (5.36e-5 … 5.48e-5)`
-fn ends(interval: &ParameterInterval) -> String {
-    match interval.absent {
+    let row = |name: &str, what: Quantity, x: f64, ends: Option<[f64; 2]>, governs: String| {
+        let (unit, factor) = what.sheet(sensor);
+        let cells = [name, &readable(x * factor), &interval(ends, factor), unit];
+        let si = format!("{x:.2e} {}", what.si_unit(sensor));
+        cells.into_iter().map(str::to_owned).chain([si, governs]).collect::<Vec<_>>()
+    };
+    let crossover = pair.crossover_s().map(duration);
+    let to = crossover.as_ref().map_or(String::new(), |t| format!("averages up to {t}"));
+    let from = crossover.map_or(String::new(), |t| format!("averages from {t}"));
+    let instability = match parameters.minimum {
+        Some(m) => row(
+            "bias instability B",
+            Quantity::Bias,
+            m.bias_instability(),
+            intervals.instability,
+            format!("the floor, at {}", duration(m.tau_s)),
+        ),
         None => {
-            let [low, high] =
-                [interval.low, interval.high].map(|end| number(interval.of.parameter.name(), end));
-            format!(" ({low} … {high})")
+            let cells = ["bias instability B", "not reached", "", "", ""];
+            let why = format!("no floor up to {}", duration(*range_s));
+            cells.into_iter().map(str::to_owned).chain([why]).collect()
         }
-        Some(_) => " (not determined)".to_owned(),
+    };
+    vec![
+        row(white, Quantity::Density, pair.density, intervals.density, to),
+        instability,
+        row(walk, Quantity::Walk, pair.walk, intervals.walk, from),
+    ]
+}
+
+/// Correlation times, quantization, ramps: what a pair of N and K does not carry.
+fn process_rows(outcome: &Outcome, rate_hz: f64) -> Vec<Vec<String>> {
+    let model = &outcome.fit.composite;
+    let sensor = outcome.scope.sensor;
+    let shares = shares(model, &outcome.counted_levels());
+    let intervals = outcome.inference.as_ref().map_or(&[][..], |i| &i.intervals);
+    let row = |(index, (process, label)): (usize, (&Process, String))| {
+        let ends = |name: &str| {
+            let own = intervals.iter().find(|i| i.of.process == index && i.of.parameter.name() == name);
+            own.map(|i| i.absent.is_none().then_some([i.low, i.high]))
+        };
+        let mapped = |name: &str, f: &dyn Fn(f64) -> f64| match ends(name) {
+            None => String::new(),
+            Some(None) => "not determined".to_owned(),
+            Some(Some(ends)) => {
+                let mut ends = ends.map(f);
+                ends.sort_by(f64::total_cmp);
+                interval(Some(ends), 1.0)
+            }
+        };
+        let (name, value, ends, unit, si) = match process {
+            _ if outcome.fit.zero.contains(&index) => return None,
+            Process::Ar1(p) if p.phi() > 0.0 => {
+                let time = |phi: f64| -1.0 / (phi.ln() * rate_hz);
+                let ends = mapped("phi", &time);
+                (
+                    "correlation time T",
+                    time(p.phi()),
+                    ends,
+                    "s",
+                    format!("sigma {:.2e} {}", p.variance().sqrt(), sensor.unit()),
+                )
+            }
+            Process::GaussMarkov(p) => {
+                let ends = mapped("beta", &f64::recip);
+                (
+                    "correlation time T",
+                    1.0 / p.beta(),
+                    ends,
+                    "s",
+                    format!("sigma {:.2e} {}", p.s2().sqrt(), sensor.unit()),
+                )
+            }
+            Process::Quantization(p) => {
+                let ends = mapped("q2", &f64::sqrt);
+                ("quantization Q", p.q2().sqrt(), ends, sensor.unit(), String::new())
+            }
+            Process::Drift(p) => {
+                let ends = mapped("slope", &|x| x * rate_hz);
+                ("ramp", p.slope() * rate_hz, ends, "per s", sensor.unit().to_owned())
+            }
+            _ => return None,
+        };
+        let governs = governs(&shares[index], rate_hz);
+        Some(vec![format!("{label} {name}"), readable(value), ends, unit.to_owned(), si, governs])
+    };
+    model.processes.iter().zip(model.labels()).enumerate().filter_map(row).collect()
+}
+
+/// Scales at which a process is the largest part of the wavelet variance.
+fn governs(share: &crate::calibration::Share, rate_hz: f64) -> String {
+    let at = |level: u32| duration(tau_s(level, rate_hz));
+    match (share.leads.first(), share.leads.last()) {
+        (Some(first), Some(last)) if first == last => format!("scale {}", at(*first)),
+        (Some(first), Some(last)) => format!("scales {} to {}", at(*first), at(*last)),
+        _ => format!("none ({} at most, at {})", percent(share.largest.0), at(share.largest.1)),
+    }
+}
+
+/// `5.36e-5 … 5.48e-5`
+fn interval(ends: Option<[f64; 2]>, factor: f64) -> String {
+    ends.map_or_else(
+        || "not determined".to_owned(),
+        |[low, high]| format!("{} … {}", readable(low * factor), readable(high * factor)),
+    )
+}
+
+/// A row for a fit each.
+fn joint(outcomes: &[Outcome], rate_hz: f64) -> Vec<Vec<String>> {
+    let head = ["fit", "N (95 %)", "B", "K", "T (s)", "fits?"];
+    let row = |outcome: &Outcome| {
+        let sensor = outcome.scope.sensor;
+        let practical = outcome.practical(rate_hz);
+        let value = |what: Quantity, x: Option<f64>| {
+            let (unit, factor) = what.sheet(sensor);
+            x.map_or_else(|| "–".to_owned(), |x| format!("{} {unit}", readable(x * factor)))
+        };
+        let density = practical.as_ref().map_or_else(
+            || "–".to_owned(),
+            |p| {
+                let (unit, factor) = Quantity::Density.sheet(sensor);
+                let ends = p.intervals.density.map(|ends| format!(" ({})", interval(Some(ends), factor)));
+                let n = readable(p.parameters.walk.density * factor);
+                format!("{n}{} {unit}", ends.unwrap_or_default())
+            },
+        );
+        let times = practical.iter().flat_map(|p| &p.parameters.correlated);
+        let times: Vec<String> = times.map(|c| readable(c.markov.t_corr_s)).collect();
+        let minimum = practical.as_ref().and_then(|p| p.parameters.minimum);
+        vec![
+            format!("{} {} {}", outcome.scope.name(), outcome.estimator.name(), outcome.spec),
+            density,
+            minimum.map_or_else(
+                || "not reached".to_owned(),
+                |m| value(Quantity::Bias, Some(m.bias_instability())),
+            ),
+            value(Quantity::Walk, practical.as_ref().map(|p| p.parameters.walk.walk)),
+            times.join(", "),
+            in_short(outcome, rate_hz),
+        ]
+    };
+    std::iter::once(head.map(str::to_owned).to_vec()).chain(outcomes.iter().map(row)).collect()
+}
+
+fn in_short(outcome: &Outcome, rate_hz: f64) -> String {
+    let rejected = outcome.inference.as_ref().and_then(|i| i.goodness).is_some_and(|g| g.is_rejected());
+    match outcome.departure().worst() {
+        Some(m) => format!("no: data/model {} at {}", readable(m.ratio), duration(tau_s(m.level, rate_hz))),
+        None if rejected => "no (J-test)".to_owned(),
+        None => "yes".to_owned(),
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::calibration::{Estimator, Group, Outcome, Replicate, Settings, implied, tau_s};
 use crate::imu::Channel;
-use crate::wavelet::{Tuning, interval};
+use crate::wavelet::interval;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -240,38 +240,4 @@ fn fitted(outcome: &Outcome, replicates: &[Replicate], settings: &Settings) -> F
         processes: parts.map(|(label, p)| (label, over_levels(&|level| p.haar_wv(level)))).collect(),
         replicates: replicates.iter().map(replicate).collect(),
     }
-}
-
-/// A signal's curves as a table: rows of text, the first its head.
-#[must_use]
-pub fn signal_rows(curves: &SignalCurves) -> Vec<Vec<String>> {
-    let head =
-        ["tau (s)", "classical", "95 % interval", "robust", "95 % interval", "", "Allan deviation at tau/2"];
-    let number = |x: f64| format!("{x:.4e}");
-    let range = |band: &Band, i: usize| format!("{} – {}", number(band.ci_low[i]), number(band.ci_high[i]));
-    let row = |i: usize| {
-        let (classical, robust) = (&curves.classical, &curves.robust);
-        let status =
-            if robust.status[i] == "ok" { String::new() } else { robust.status[i].replace('_', " ") };
-        vec![
-            format!("{}", curves.tau_s[i]),
-            number(classical.wv[i]),
-            range(classical, i),
-            number(robust.wv[i]),
-            range(robust, i),
-            status,
-            number((2.0 * classical.wv[i]).sqrt()),
-        ]
-    };
-    std::iter::once(head.map(str::to_owned).to_vec()).chain((0..curves.tau_s.len()).map(row)).collect()
-}
-
-/// What a file of signals says about its intervals.
-#[must_use]
-pub fn intervals_note(edof_method: &str, tuning: &Tuning) -> String {
-    let kind = match edof_method {
-        "large-sample" => "large-sample degrees of freedom (eta1)",
-        _ => "degrees of freedom eta3, conservative beyond the first scale",
-    };
-    format!("intervals: 95 %, {kind}; robust: times the efficiency {:.3}", tuning.efficiency())
 }

@@ -65,6 +65,17 @@ impl Manifest {
     /// Version of the layout.
     pub const SCHEMA_VERSION: u32 = 2;
 
+    /// Whether a run of the one is a run of the other: all that decides the results is the same.
+    #[must_use]
+    pub fn is_same_run(&self, other: &Self) -> bool {
+        let inputs = |m: &Self| -> Vec<(String, String)> {
+            m.inputs.iter().map(|i| (i.role.clone(), i.blake3.clone())).collect()
+        };
+        (&self.version, self.seed, &self.scenario) == (&other.version, other.seed, &other.scenario)
+            && (&self.configuration, &self.model) == (&other.configuration, &other.model)
+            && inputs(self) == inputs(other)
+    }
+
     /// The hashes of the inputs of a role, in the order given.
     #[must_use]
     pub fn hashes(&self, role: &str) -> Vec<&str> {

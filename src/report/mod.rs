@@ -3,8 +3,10 @@
 
 mod brief;
 mod choose;
+mod columns;
 mod comparison;
 mod curves;
+mod describe;
 mod efficiency;
 mod fits;
 mod fusion;
@@ -19,6 +21,7 @@ pub mod require;
 mod run_directory;
 #[cfg(test)]
 mod sample;
+mod signals;
 mod study;
 mod tables;
 mod trajectory;
@@ -27,13 +30,12 @@ mod verdict;
 
 pub use brief::brief;
 pub use choose::ChoiceReport;
+pub use columns::columns;
 pub use comparison::{CandidateResult, ComparisonFile, Label, consistency_rows, table_rows, verdict_lines};
-pub use curves::{
-    CONFIDENCE, CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile, intervals_note,
-    signal_rows,
-};
+pub use curves::{Band, CONFIDENCE, CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile};
+pub use describe::describe;
 pub use efficiency::{EfficiencyFile, EfficiencyRow, efficiency_csv, efficiency_table};
-pub use fits::{CandidateEntry, FitEntry, FitsFile, describe};
+pub use fits::{CandidateEntry, FitEntry, FitsFile, MissEntry};
 pub use fusion::{FUSION_FILES, FusionKind, FusionManifest, FusionSummary, fusion_directory, solution_csv};
 pub use manifest::{Input, Manifest, ModelNote};
 pub use markdown::{markdown, markdown_table};
@@ -47,6 +49,7 @@ pub use replicates::{
     AlarmEntry, LeftOutEntry, MovementEntry, ReplicateEntry, ScoresEntry, describe_replicates,
 };
 pub use run_directory::{OutputFile, RUN_FILES, json, run_directory, summary_json};
+pub use signals::{intervals_note, signal_rows, signals_csv, signals_digest, signals_per_file};
 pub use study::{
     ColumnResult, ShownCell, ShownColumn, TableColumn, TableRow, Value, ValueKind, drift_table,
     epoch_columns, epoch_rows, outage_columns, outage_rows, ratio_table, run_columns, run_rows,

@@ -69,13 +69,27 @@ impl Planned {
     /// # Errors
     /// When the directory cannot be read.
     pub fn status(&self) -> Result<Status, StudyError> {
+        self.status_by(&|_| true)
+    }
+
+    /// What is there of the units and whole: all of them are read.
+    ///
+    /// # Errors
+    /// When the directory cannot be read.
+    pub fn status_of_whole(&self) -> Result<Status, StudyError> {
+        self.status_by(&|id| unit_file::read(&self.directory, id).is_ok())
+    }
+
+    fn status_by(&self, is_whole: &dyn Fn(&str) -> bool) -> Result<Status, StudyError> {
         let mut there = directory::units(&self.directory)?;
         let (plan, grid) = (&self.plan, &self.grid);
         let mut status = Status::default();
         let mut cell_whole = true;
         for (unit, id) in plan.named_units(grid) {
-            let done = there.remove(&id);
+            let is_there = there.remove(&id);
+            let done = is_there && is_whole(&id);
             status.units += 1;
+            status.damaged += usize::from(is_there && !done);
             status.done += usize::from(done);
             cell_whole &= done;
             if !done {
@@ -126,6 +140,8 @@ pub struct Status {
     pub units: usize,
     /// Those that are there.
     pub done: usize,
+    /// Those that are there and not whole, where that was looked at.
+    pub damaged: usize,
     /// Cells all of whose units are there.
     pub cells_done: usize,
     /// Processor time of the units that are not there (s).

@@ -95,6 +95,9 @@ fn damaged_units_are_noticed_and_computed_again() {
     fs::remove_dir_all(dir.join("out/results")).unwrap();
     let said = refused(dir, "merge study.toml -o out", 75);
     assert!(said.contains("4 of 50 units are missing or damaged"), "{said}");
+    let status = batch(dir, "status study.toml -o out --format json").stdout;
+    let status: serde_json::Value = serde_json::from_slice(&status).unwrap();
+    assert_eq!((status["done"].as_u64(), status["damaged"].as_u64()), (Some(46), Some(4)));
     assert!(!dir.join("out/results").exists());
     let said = refused(dir, "verify study.toml -o out --units 1 --seed 1", 3);
     assert!(

@@ -50,9 +50,10 @@ fn recordings(dir: &Path, count: u64) -> PathBuf {
     runs
 }
 
+/// What an earlier command of a test left is replaced.
 fn nav_sim(dir: &Path) -> Command {
     let mut command = Command::cargo_bin("nav-sim").unwrap();
-    command.current_dir(dir);
+    command.current_dir(dir).arg("--force");
     command
 }
 
@@ -286,9 +287,20 @@ fn wv_prints_the_curves_of_every_signal() {
     let narrow = numbers(&out["signals"][0]["classical"]["ci_high"]);
     assert_eq!((narrow.len(), out["edof_method"].as_str()), (5, Some("large-sample")));
     assert!(narrow[4] < wide[4]);
-    let text = nav_sim(dir.path()).args(["wv", "runs", "-q"]).assert().success();
-    let text = String::from_utf8(text.get_output().stdout.clone()).unwrap();
-    assert!(text.contains("run0.csv · gyro.x · 16384 samples") && text.contains("Allan deviation"), "{text}");
+    let text = |more: &[&str]| {
+        let output = nav_sim(dir.path()).args(["wv", "runs"]).args(more).assert().success();
+        String::from_utf8(output.get_output().stdout.clone()).unwrap()
+    };
+    let (digest, all) = (text(&[]), text(&["--verbose"]));
+    assert!(digest.lines().count() <= 20 && digest.contains("gyro.x  rad/s"), "{digest}");
+    assert!(
+        all.contains("run0.csv · gyro.x · 16384 samples") && all.contains("Allan deviation (rad/s)"),
+        "{all}"
+    );
+    assert!(text(&["--per-file"]).contains("run0.csv  run1.csv"));
+    assert_eq!(text(&["--format", "csv"]).lines().count(), 1 + 4 * 13);
+    let stderr = refusal(dir.path(), &["check", "runs/run0.csv", "--format", "csv"], 2);
+    assert!(stderr.contains("--format csv is a format of wv alone"), "{stderr}");
 }
 
 /// sigma2 is fixed at the truth, phi bounded away from it: the fit is where it was told to be.
@@ -512,7 +524,7 @@ fn what_is_skipped_counts_in_the_advice() {
             ["calibrate", "warm.csv", "--estimator", "gmwm", "--model", "WN+RW", "--bootstrap", "0"];
         let output = nav_sim(dir.path()).args(arguments).args(["--skip-s", skip]).assert().success();
         let said = String::from_utf8(output.get_output().stderr.clone()).unwrap();
-        let seconds = said.split("warm-up? --skip-s ").nth(1).unwrap_or_else(|| panic!("{said}"));
+        let seconds = said.split("--skip-s ").nth(1).unwrap_or_else(|| panic!("{said}"));
         seconds.split(' ').next().unwrap().parse::<f64>().unwrap()
     };
     for skip in ["0", "20"] {
@@ -532,7 +544,7 @@ fn a_model_says_what_it_was_made_with() {
     let model = |parameters: &str| -> toml::Table {
         let command = format!(
             "{} calibrate runs --model N1 --bootstrap 0 --parameters {parameters} --skip-s 1.5 --gaps ignore --axes \
-             gyro --scales 9 --pool sensor -o m.toml",
+             gyro --scales 9 --pool sensor --force -o m.toml",
             env!("CARGO_BIN_EXE_nav-sim")
         );
         let shell =
@@ -600,8 +612,58 @@ fn what_is_printed_fits_a_screen() {
     let (count, text) = lines(&[]);
     assert!(count <= 20, "{count} lines: {text}");
     let first = text.lines().next().unwrap();
-    assert!(first.contains("recordings agree") || first.contains("recordings hold"), "{text}");
+    assert!(first.contains(" fit") && first.contains("4 recordings × 2 axes"), "{text}");
+    assert!(text.contains("angle random walk N") && text.contains("deg/sqrt(h)"), "{text}");
     assert!(text.contains("J-test p = "), "{text}");
     assert!(lines(&["--verbose"]).0 > count);
     assert!(lines(&["--estimator", "all"]).0 <= 20);
+}
+
+/// N, K and B of the JSON are those that `export` has of the model file, to the last bit; N is that of the noise: sigma2 of nine
+/// signals of 16384 samples is known to √(2/(9·16384·0.6)) = 0.5 % or so, N to half of that, eight of which are allowed.
+#[test]
+fn practitioners_parameters_are_those_of_export() {
+    let dir = tempfile::tempdir().unwrap();
+    let processes = "processes = [{ type = \"WN\", sigma2 = 4e-6 }, { type = \"RW\", gamma2 = 1e-12 }]";
+    let model = format!("schema = 1\nrate_hz = 50.0\n[accel]\n{processes}\n[gyro]\n{processes}\n");
+    std::fs::write(dir.path().join("imu.toml"), model).unwrap();
+    let synthesize =
+        ["synthesize", "imu.toml", "--replicates", "3", "--samples", "16384", "--seed", "1", "-o", "made"];
+    nav_sim(dir.path()).args(synthesize).assert().success();
+    let calibrate =
+        ["calibrate", "made", "--model", "WN+RW", "--bootstrap", "39", "--seed", "1", "-o", "m.toml"];
+    let out = json(dir.path(), &calibrate);
+    let exported = json(dir.path(), &["export", "m.toml", "--target", "kalibr"]);
+    for fit in out["fits"].as_array().unwrap() {
+        let own = &fit["parameters"]["white_and_walk"];
+        let of_export = &exported["sensors"][fit["sensor"].as_str().unwrap()]["axes"]["x"]["white_and_walk"];
+        for key in ["n", "k"] {
+            assert_eq!(own[key]["value"], of_export[key]["value"], "{fit}");
+            assert_eq!(own[key]["data_sheet"], of_export[key]["data_sheet"]);
+        }
+        let density = own["n"]["value"].as_f64().unwrap();
+        assert!((density / (4e-6_f64 / 50.0).sqrt() - 1.0).abs() < 0.02, "{density}");
+        let ends = numbers(&own["n"]["ci95"]);
+        assert!(ends[0] < density && density < ends[1] && ends[1] / ends[0] < 1.05, "{ends:?}");
+        assert!(fit["missed"].as_array().unwrap().is_empty());
+    }
+}
+
+/// Scales outside count nothing and are recorded: of a fit with a range that holds two scales for two parameters nothing is left
+/// to test.
+#[test]
+fn a_range_of_scales_is_recorded() {
+    let dir = tempfile::tempdir().unwrap();
+    recordings(dir.path(), 2);
+    let fit = ["calibrate", "runs", "--model", "WN+RW", "--bootstrap", "0", "--fit-range", "0.04s:20.48s"];
+    let out = json(dir.path(), &[&fit[..], &["-o", "m.toml"]].concat());
+    assert_eq!(out["fits"][0]["scales"], 13, "all are in the file");
+    let text = std::fs::read_to_string(dir.path().join("m.toml")).unwrap();
+    let provenance = &text.parse::<toml::Table>().unwrap()["provenance"];
+    let range: Vec<f64> =
+        provenance["fit_range_s"].as_array().unwrap().iter().filter_map(toml::Value::as_float).collect();
+    assert_eq!(range, [0.04, 20.48]);
+    let short = ["calibrate", "runs", "--model", "N1", "--fit-range", "1s:2s", "-o", "n.toml"];
+    assert!(refusal(dir.path(), &short, 2).contains("scales"));
+    assert!(refusal(dir.path(), &["calibrate", "runs", "--fit-range", "2s:1s"], 2).contains("shorter scale"));
 }

@@ -95,6 +95,50 @@ fn check_looks_at_every_file() {
     assert_eq!(check(&[array.to_str().unwrap(), "--rate-hz", "100"]).0, 0);
 }
 
+/// A file of every kind, each of which is what it says it is; what a scenario and a model come to is printed.
+#[test]
+fn the_files_of_init_are_what_they_should_be() {
+    let place = tempfile::tempdir().unwrap();
+    let ran = |arguments: &[&str]| {
+        let output = nav_sim().current_dir(place.path()).args(arguments).output().unwrap();
+        assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    ran(&["init", "."]);
+    let kinds = [
+        ("scenario.toml", "a scenario"),
+        ("model.toml", "a noise model"),
+        ("motion.toml", "a trajectory"),
+        ("parameters.toml", "bounds of parameters"),
+        ("contamination.toml", "a contamination"),
+        ("initial.toml", "an initial state"),
+        ("examples/quick_study.toml", "a study"),
+    ];
+    for (file, kind) in kinds {
+        let said = ran(&["check", file]);
+        assert!(said.starts_with(&format!("{file}: {kind}")), "{said}");
+    }
+    let resolved = ran(&["check", "scenario.toml", "--dry-run"]);
+    let scenario = resolved.split_once('\n').unwrap().1.parse::<toml::Table>().unwrap();
+    assert_eq!(scenario["gnss"]["rate_hz"].as_float(), Some(1.0));
+    assert!(ran(&["check", "model.toml", "--dry-run"]).contains("beta = 0.0033333"));
+    // Every key of the file is in the schema, each of its processes is one of the schema's.
+    let schema: serde_json::Value = serde_json::from_str(&ran(&["schema", "model"])).unwrap();
+    let model: toml::Table =
+        std::fs::read_to_string(place.path().join("model.toml")).unwrap().parse().unwrap();
+    for (key, _) in &model {
+        assert!(schema["properties"][key].is_object(), "{key}");
+    }
+    let kinds = schema["properties"]["gyro"]["properties"]["processes"]["items"]["oneOf"].as_array().unwrap();
+    for process in model["gyro"]["processes"].as_array().unwrap() {
+        let process = process.as_table().unwrap();
+        let is_own =
+            |k: &&serde_json::Value| k["properties"]["type"]["const"] == process["type"].as_str().unwrap();
+        let kind = kinds.iter().find(is_own).unwrap();
+        assert!(process.keys().all(|key| kind["properties"][key].is_object()), "{process}");
+    }
+}
+
 /// What `init` makes is all that the examples of the help texts name.
 #[test]
 fn init_makes_every_file_that_the_help_names() {

@@ -89,7 +89,7 @@ struct Ran {
 fn compare(directory: &Path, arguments: &[&str]) -> Ran {
     let output = Command::new(env!("CARGO_BIN_EXE_nav-sim"))
         .current_dir(directory)
-        .arg("compare")
+        .args(["compare", "--force"])
         .args(arguments)
         .output()
         .unwrap();

@@ -67,6 +67,12 @@ fn flags_win_over_an_entry_and_what_is_assumed_is_said() {
     assert!(!ran.stdout.contains("0.15 deg/sqrt(h)"), "{}", ran.stdout);
     assert!(ran.stderr.contains("accel: no correlation time is given; 300 s is assumed"), "{}", ran.stderr);
     assert!(!ran.stderr.contains("gyro: no correlation time"), "{}", ran.stderr);
+    let json: Value =
+        serde_json::from_str(&done(place.path(), "datasheet --unit stim300 --format json").stdout).unwrap();
+    assert_eq!(
+        (json["gyro"]["processes"][0]["type"].as_str(), json["schema"].as_i64()),
+        (Some("WN"), Some(1))
+    );
     let list = done(place.path(), "datasheet --list").stdout;
     assert!(list.contains("stim300      tactical     Sensonor (Safran) STIM300\n"), "{list}");
     assert!(list.contains("noise 0.15 deg/sqrt(h)"), "{list}");
@@ -106,5 +112,11 @@ fn a_run_takes_the_turn_on_bias_of_the_model_file() {
     assert_eq!(used["imu"]["turn_on_bias_accel_m_s2"], 0.02);
     let (said, used) = configuration("--truth quiet.toml");
     assert!(!said.contains("the true IMU has"), "{said}");
-    assert_eq!(used["imu"]["turn_on_bias_accel_m_s2"], 0.0);
+    assert!(used["imu"]["turn_on_bias_accel_m_s2"].is_null(), "{used}");
+    // what a scenario says wins, zero too
+    fs::write(place.path().join("zero.toml"), "imu.turn_on_bias_gyro_rad_s = 0\n").unwrap();
+    let (said, used) = configuration("--scenario zero.toml");
+    assert!(said.contains("the true IMU has a turn-on bias of 0.0200 m/s²"), "{said}");
+    assert!(!said.contains("the true IMU has a turn-on bias of 1.00e-4"), "{said}");
+    assert_eq!(used["imu"]["turn_on_bias_gyro_rad_s"], 0.0);
 }

@@ -22,6 +22,7 @@ mod compare;
 mod datasheet;
 mod efficiency;
 mod examples;
+mod existing;
 mod export;
 mod fuse;
 mod help_examples;

@@ -1,15 +1,31 @@
-//! The README's shell blocks work: each `sh` block is run, those marked `slow` are only looked at.
+//! The shell blocks of README and book work: each `sh` block is run, those marked `slow` are only looked at; links lead
+//! somewhere.
 
-use std::path::Path;
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const README: &str = include_str!("../../README.md");
+const ROOT: &str = env!("CARGO_MANIFEST_DIR");
+
+/// README and the pages of the book.
+fn pages() -> Vec<PathBuf> {
+    let inside = |directory: &str| {
+        let entries = std::fs::read_dir(Path::new(ROOT).join(directory)).unwrap();
+        entries.map(|e| e.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "md"))
+    };
+    let readme = Path::new(ROOT).join("README.md");
+    let mut pages: Vec<PathBuf> =
+        std::iter::once(readme).chain(inside("docs")).chain(inside("docs/how-to")).collect();
+    pages.sort();
+    pages
+}
 
 /// (info string, contents) of every fenced block.
-fn blocks() -> Vec<(String, String)> {
+fn blocks(page: &str) -> Vec<(String, String)> {
     let mut found: Vec<(String, String)> = Vec::new();
     let mut open = false;
-    for line in README.lines() {
+    for line in page.lines() {
         match line.strip_prefix("```") {
             Some(info) if !open => {
                 found.push((info.to_owned(), String::new()));
@@ -23,22 +39,50 @@ fn blocks() -> Vec<(String, String)> {
     found
 }
 
-#[test]
-fn shell_blocks_run() {
+/// The blocks of a page, one after the other in a directory of their own; what went wrong.
+fn run(page: &Path) -> Option<String> {
     let directory = tempfile::tempdir().unwrap();
     for name in ["trajectories", "calib_data", "examples"] {
-        let target = Path::new(env!("CARGO_MANIFEST_DIR")).join(name);
-        std::os::unix::fs::symlink(target, directory.path().join(name)).unwrap();
+        std::os::unix::fs::symlink(Path::new(ROOT).join(name), directory.path().join(name)).unwrap();
     }
     let bin = Path::new(env!("CARGO_BIN_EXE_nav-sim")).parent().unwrap().display().to_string();
     let path = format!("{bin}:{}", std::env::var("PATH").unwrap());
-    let quick: Vec<_> = blocks().into_iter().filter(|(info, _)| info == "sh").collect();
-    assert!(!quick.is_empty());
-    for (_, script) in quick {
+    let text = std::fs::read_to_string(page).unwrap();
+    for (_, script) in blocks(&text).into_iter().filter(|(info, _)| info == "sh") {
         let arguments = ["-euc", &script];
         let output =
             Command::new("bash").args(arguments).current_dir(&directory).env("PATH", &path).output().unwrap();
-        assert!(output.status.success(), "{script}\n{}", String::from_utf8_lossy(&output.stderr));
+        if !output.status.success() {
+            return Some(format!(
+                "{}\n{script}\n{}",
+                page.display(),
+                String::from_utf8_lossy(&output.stderr)
+            ));
+        }
+    }
+    None
+}
+
+#[test]
+fn shell_blocks_run() {
+    let pages = pages();
+    assert!(pages.len() > 12, "{pages:?}");
+    let failures: Vec<String> = pages.par_iter().filter_map(|page| run(page)).collect();
+    assert!(failures.is_empty(), "{}", failures.join("\n\n"));
+}
+
+/// Every relative link of README and book leads to a file.
+#[test]
+fn links_lead_somewhere() {
+    for page in pages() {
+        let text = std::fs::read_to_string(&page).unwrap();
+        for link in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            let file = link.split('#').next().unwrap();
+            if file.is_empty() || file.starts_with("http") {
+                continue;
+            }
+            assert!(page.parent().unwrap().join(file).exists(), "{}: {link}", page.display());
+        }
     }
 }
 

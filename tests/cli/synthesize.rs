@@ -188,8 +188,12 @@ fn recordings_of_another_job_are_not_mixed_in_and_inputs_not_overwritten() {
     place.make("out", &["--replicates", "3", "--samples", "10"]);
     let again = ["model.toml", "--replicates", "3", "--samples", "20", "--seed", "5", "-o", "out"];
     let (code, said) = place.run(&again);
+    assert_eq!(code, 2);
+    assert!(said.contains("out holds the result of another configuration"), "{said}");
+    let (code, said) = place.run(&[&again[..], &["--force"]].concat());
     assert_eq!(code, 0, "{said}");
-    assert!(said.contains("warning: out: the replicates in it are replaced"), "{said}");
+    let (code, said) = place.run(&again);
+    assert_eq!(code, 0, "the same once more: {said}");
     let (recordings, _) = read(&[place.path("out")], &ReadOptions::default()).unwrap();
     assert_eq!(recordings[0].len(), 20);
     let (code, said) = place.run(&["model.toml", "--replicates", "2", "--samples", "10", "-o", "out"]);

@@ -36,7 +36,13 @@ pub struct Ran {
     pub stderr: String,
 }
 
+/// With `--force`: what earlier commands of a test left is replaced (that it is refused otherwise: tests/cli/existing.rs).
 pub fn nav_sim(directory: &Path, arguments: &str) -> Ran {
+    plain(directory, &format!("{arguments} --force"))
+}
+
+/// As written.
+pub fn plain(directory: &Path, arguments: &str) -> Ran {
     let output = Command::new(env!("CARGO_BIN_EXE_nav-sim"))
         .current_dir(directory)
         .args(arguments.split_whitespace())

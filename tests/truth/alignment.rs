@@ -184,8 +184,8 @@ fn recorded(
             ..GnssSettings::default()
         },
         imu: ImuSettings {
-            turn_on_bias_accel_m_s2: TURN_ON.0,
-            turn_on_bias_gyro_rad_s: TURN_ON.1,
+            turn_on_bias_accel_m_s2: Some(TURN_ON.0),
+            turn_on_bias_gyro_rad_s: Some(TURN_ON.1),
             ..ImuSettings::default()
         },
         ..Scenario::default()

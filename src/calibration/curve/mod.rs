@@ -10,4 +10,4 @@ mod stationarity;
 pub use average::{AverageError, Estimator, Replicate, Trim, TrimError, average};
 pub use implied::implied;
 pub use replicates::{Group, Pool, Scope, SignalError, grouped, replicates, trend};
-pub use stationarity::{WarmUp, warm_up};
+pub use stationarity::{Change, WarmUp, warm_up};

@@ -42,6 +42,17 @@ pub struct Group {
     pub replicates: Vec<Replicate>,
 }
 
+impl Group {
+    /// Recordings that the replicates are of.
+    #[must_use]
+    pub fn recordings(&self) -> usize {
+        let mut names: Vec<&str> = self.replicates.iter().map(|r| r.name.as_str()).collect();
+        names.sort_unstable();
+        names.dedup();
+        names.len()
+    }
+}
+
 /// Which signals are replicates of one another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pool {

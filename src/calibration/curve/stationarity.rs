@@ -4,8 +4,11 @@
 //! their mean squared differences (the wavelet variance at the first scale). The first of each is compared with the
 //! last eight by Student's law (their mean and deviation): steps of the mean of any noise with stationary
 //! increments (random walk and all the others of this crate) are exchangeable or nearly so. Where the
-//! first is out of place at 1 in 10⁴, the first part is given up and the next looked at.
+//! first is out of place at 1 in 10⁴, the first part is given up and the next looked at. What remains is cut into sixteen
+//! again, until nothing is out of place: whoever leaves out what is said is not told of more.
 
+use crate::wavelet::interval::edof_eta3;
+use crate::wavelet::{classical, default_levels};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Parts of a record.
@@ -20,17 +23,57 @@ const LEVEL: f64 = 1e-4;
 /// What is unlike at the beginning of a record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WarmUp {
-    /// Samples to leave out.
+    /// Samples to leave out: what remains begins as it goes on.
     pub samples: usize,
     /// Whether the mean moves (rather than the noise being another).
     pub mean: bool,
     /// The first part against the last eight, in their standard deviations.
     pub deviations: f64,
+    /// What leaving them out changes; none where not even the later half begins as it goes on, and nothing is to be left out.
+    pub change: Option<Change>,
 }
 
-/// Looks at a signal; none where it begins as it goes on, or is too short to tell.
+/// What a warm-up does to the classical wavelet variance, at the scale where that is surest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Change {
+    /// Level.
+    pub level: u32,
+    /// Wavelet variance without the warm-up over that with it.
+    pub ratio: f64,
+}
+
+/// Looks at a signal, again after what would be left out, until what remains begins as it goes on; none where it does from
+/// the start, or is too short to tell.
 #[must_use]
 pub fn warm_up(samples: &[f64]) -> Option<WarmUp> {
+    let first = look(samples)?;
+    let mut left = first.samples;
+    while left <= samples.len() / 2 {
+        match look(&samples[left..]) {
+            Some(more) => left += more.samples,
+            None => return Some(WarmUp { samples: left, change: change(samples, left), ..first }),
+        }
+    }
+    Some(WarmUp { samples: left, ..first })
+}
+
+/// The scale at which the wavelet variance without the first samples differs most from that with them, in standard
+/// deviations of the difference (the variance of a part less that of the whole).
+fn change(samples: &[f64], left: usize) -> Option<Change> {
+    let part = &samples[left..];
+    let levels = default_levels(part.len());
+    let (with, without) = (classical(samples, levels).ok()?, classical(part, levels).ok()?);
+    let of_level = |level: u32| {
+        let ratio = without[level as usize - 1] / with[level as usize - 1];
+        let noise = 2.0 / edof_eta3(part.len(), level) - 2.0 / edof_eta3(samples.len(), level);
+        (ratio.ln().abs() / noise.max(f64::MIN_POSITIVE).sqrt(), Change { level, ratio })
+    };
+    let surest = (1..=levels).map(of_level).filter(|(z, _)| z.is_finite());
+    surest.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, change)| change)
+}
+
+/// One look: the parts that are out of place.
+fn look(samples: &[f64]) -> Option<WarmUp> {
     let length = samples.len() / PARTS;
     if length < SHORTEST {
         return None;
@@ -48,7 +91,7 @@ pub fn warm_up(samples: &[f64]) -> Option<WarmUp> {
             break;
         };
         let (mean, deviations) = found.map_or((mean, deviations), |f: WarmUp| (f.mean, f.deviations));
-        found = Some(WarmUp { samples: (first + 1) * length, mean, deviations });
+        found = Some(WarmUp { samples: (first + 1) * length, mean, deviations, change: None });
     }
     found
 }
@@ -117,6 +160,23 @@ mod tests {
         signal[..SAMPLES / 8].iter_mut().for_each(|x| *x += 2.0 * normal());
         let found = warm_up(&signal).unwrap();
         assert_eq!((found.samples, found.mean), (SAMPLES / 8, false), "{found:?}");
+        // An eighth with five times the variance at the first scale: without it 1/(1 + 4/8) = 0.67.
+        let change = found.change.unwrap();
+        assert!(change.level == 1 && (change.ratio - 0.67).abs() < 0.03, "{change:?}");
+    }
+
+    /// What is advised is all there is to leave out.
+    #[test]
+    fn one_round_is_enough() {
+        for seed in 0..20 {
+            let mut generator = Generator::seed_from_u64(seed);
+            let mut signal = signal(&mut generator);
+            let mut normal = || generator.sample::<f64, _>(StandardNormal);
+            let fades = |t: usize| 3.0 * (-(t as f64) / (0.05 * SAMPLES as f64)).exp();
+            signal.iter_mut().enumerate().for_each(|(t, x)| *x += fades(t) * normal());
+            let found = warm_up(&signal).unwrap();
+            assert!(found.change.is_none() || warm_up(&signal[found.samples..]).is_none(), "{found:?}");
+        }
     }
 
     #[test]

@@ -42,8 +42,9 @@ pub(super) fn left_out(group: &Group, name: &str, outcome: &Outcome, settings: &
         replicate.classical.truncate(outcome.curve.levels.len());
         replicate.robust.truncate(outcome.curve.levels.len());
     }
-    let without = average(&rest, outcome.estimator, settings.trim, &settings.tuning).ok()?;
+    let mut without = average(&rest, outcome.estimator, settings.trim, &settings.tuning).ok()?;
     let with = &outcome.curve;
+    without.ignored.clone_from(&with.ignored);
     let moves = with.levels.iter().zip(&with.wv).zip(&with.edof).zip(&without.wv);
     let one = |(((level, with), edof), without): (((&u32, &f64), &f64), &f64)| {
         let ratio = without / with;

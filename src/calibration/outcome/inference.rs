@@ -1,6 +1,8 @@
 //! How sure a fit is: the results.
 
+use crate::imu::Axis;
 use crate::model::ModelSpec;
+use crate::noise::practical::AxisParameters;
 use crate::noise::{Composite, ParameterRef};
 
 /// How to draw.
@@ -46,6 +48,45 @@ pub struct Inference {
     pub alike: Option<f64>,
     /// Alike processes that cannot be told apart, and the simpler model.
     pub indistinct: Option<Indistinct>,
+    /// Intervals of N, K and B.
+    pub practical: PracticalIntervals,
+}
+
+/// What practitioners ask of a fit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Practical {
+    /// N, K, B and T, of the policy "matched" over the default horizon.
+    pub parameters: AxisParameters,
+    /// 95 % intervals of N, K and B.
+    pub intervals: PracticalIntervals,
+    /// Longest averaging time that was observed (s): how far a minimum was looked for.
+    pub range_s: f64,
+}
+
+/// 95 % intervals (units of the parameter); none where the draws do not determine it.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct PracticalIntervals {
+    /// Of the white noise density N.
+    pub density: Option<[f64; 2]>,
+    /// Of the random-walk density K.
+    pub walk: Option<[f64; 2]>,
+    /// Of the bias instability B.
+    pub instability: Option<[f64; 2]>,
+}
+
+/// The axes of a pooled sensor, where they differ.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AxesDiffer {
+    /// Level at which they differ by the largest ratio.
+    pub level: u32,
+    /// Probability that alike axes differ so at some scale.
+    pub p_value: f64,
+    /// The axis with the largest wavelet variance there.
+    pub largest: Axis,
+    /// The one with the smallest.
+    pub smallest: Axis,
+    /// The one over the other.
+    pub ratio: f64,
 }
 
 /// How replicates differ at one level: standard deviations of ln nu of a replicate.

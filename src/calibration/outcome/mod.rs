@@ -1,14 +1,17 @@
 //! What is asked of a calibration, and what comes of it: data that estimation, tests and words share.
 
+mod departure;
 mod inference;
 mod ranking;
 mod settings;
 
+pub use departure::{Departure, Miss};
 pub use inference::{
-    Bootstrap, Goodness, Indistinct, Inference, LevelSpread, ParameterInterval, Undetermined,
+    AxesDiffer, Bootstrap, Goodness, Indistinct, Inference, LevelSpread, ParameterInterval, Practical,
+    PracticalIntervals, Undetermined,
 };
 pub use ranking::{Candidate, Ranking, TooSimple};
-pub use settings::{ModelChoice, ParameterLimit, Settings};
+pub use settings::{FitRange, ModelChoice, ParameterLimit, Settings};
 
 use crate::curve::{Estimator, Scope};
 use crate::fit::{Fit, FitError, estimate_again};
@@ -22,6 +25,8 @@ pub struct Outcome {
     pub scope: Scope,
     /// Replicates averaged; 0 for a curve from elsewhere.
     pub replicates: usize,
+    /// Recordings that these are of.
+    pub recordings: usize,
     /// The estimator.
     pub estimator: Estimator,
     /// What the model is made of.
@@ -32,6 +37,8 @@ pub struct Outcome {
     pub curve: Curve,
     /// The model.
     pub fit: Fit,
+    /// How the axes that are pooled differ, where they do.
+    pub axes_differ: Option<AxesDiffer>,
     /// Remarks, in words.
     pub notes: Vec<String>,
     /// Intervals of its parameters and goodness of fit, once [`infer`](crate::infer) was asked for them.

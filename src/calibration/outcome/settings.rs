@@ -22,8 +22,28 @@ pub struct Settings {
     pub tuning: Tuning,
     /// What a scale counts.
     pub weighting: Weighting,
+    /// The scales that count (s); none: all.
+    pub fit_range: Option<FitRange>,
     /// Sample rate (Hz).
     pub rate_hz: f64,
+}
+
+/// Scales that count in a fit, both ends included (s).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FitRange {
+    /// Shortest (s).
+    pub from_s: f64,
+    /// Longest (s).
+    pub to_s: f64,
+}
+
+impl FitRange {
+    /// Whether a level counts at a rate (Hz); ends may be off by rounding.
+    #[must_use]
+    pub fn holds(&self, level: u32, rate_hz: f64) -> bool {
+        let scale_s = f64::from(level).exp2() / rate_hz;
+        scale_s >= self.from_s * (1.0 - 1e-9) && scale_s <= self.to_s * (1.0 + 1e-9)
+    }
 }
 
 /// Who says what the model is made of.
@@ -97,6 +117,7 @@ impl Default for Settings {
             trim: Trim::default(),
             tuning: Tuning::default(),
             weighting: Weighting::default(),
+            fit_range: None,
             rate_hz: 1.0,
         }
     }

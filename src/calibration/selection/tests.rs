@@ -14,6 +14,7 @@ fn settings() -> Settings {
         trim: Trim::Count(0),
         tuning: Tuning::new(0.6, Convention::Exact).unwrap(),
         weighting: Weighting::Edof,
+        fit_range: None,
         rate_hz: 1.0,
     }
 }

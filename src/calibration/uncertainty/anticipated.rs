@@ -6,6 +6,7 @@
 
 use super::bootstrap::{CurveSampler, like};
 use super::intervals::intervals;
+use super::practical;
 use super::spread::Spread as Scatter;
 use crate::curve::{Estimator, Group, Replicate, Scope, average, implied};
 use crate::fit::Fit;
@@ -126,6 +127,7 @@ impl Anticipated<'_> {
             drawn: fits.iter().map(|fit| fit.composite.clone()).collect(),
             stretch,
             intervals: intervals(&outcome, &fits, stretch, &unknown),
+            practical: practical::intervals(&outcome, &fits, stretch, settings.rate_hz),
             goodness: None,
             spread: Vec::new(),
             alike: None,

@@ -133,6 +133,7 @@ mod tests {
             trim: Trim::Count(0),
             tuning: Tuning::new(0.6, Convention::Exact).unwrap(),
             weighting: Weighting::Edof,
+            fit_range: None,
             rate_hz: 1.0,
         }
     }

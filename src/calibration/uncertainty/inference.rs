@@ -10,6 +10,7 @@ use super::bootstrap::CurveSampler;
 use super::goodness::goodness;
 use super::indistinct::simpler;
 use super::intervals::intervals;
+use super::practical;
 use super::sandwich::standard_errors;
 use super::spread::Spread;
 use crate::curve::{Estimator, Group};
@@ -71,12 +72,12 @@ fn by_bootstrap(group: &Group, outcome: &Outcome, settings: &Settings, bootstrap
         drawn: fits.iter().map(|fit| fit.composite.clone()).collect(),
         stretch,
         intervals: intervals(outcome, &fits, stretch, &errors),
-        goodness: (outcome.estimator != Estimator::Avlr)
-            .then(|| goodness(&outcome.fit, &outcome.spec, &fits)),
+        goodness: (outcome.estimator != Estimator::Avlr).then(|| goodness(outcome, &fits)),
         spread: spread.map_or(Vec::new(), rows),
         alike: spread
             .and_then(|s| alike::p_value(&group.replicates, outcome.estimator, s, &sampler.law, &name)),
         indistinct: None,
+        practical: practical::intervals(outcome, &fits, stretch, settings.rate_hz),
     }
 }
 
@@ -102,6 +103,7 @@ mod tests {
             trim: Trim::Count(0),
             tuning: Tuning::new(0.6, Convention::Exact).unwrap(),
             weighting: Weighting::Edof,
+            fit_range: None,
             rate_hz: 1.0,
         }
     }

@@ -183,6 +183,16 @@ pub fn derived_interval(estimate: f64, drawn: Vec<f64>, stretch: f64) -> [f64; 2
     interval(Parameter::Sigma2, estimate, drawn, stretch)
 }
 
+/// The 95 % interval of a positive quantity that some of `draws` draws have; none where more of them lack it than the
+/// quantile leaves out, or its draws lie to one side of the estimate.
+pub(crate) fn scale_interval(estimate: f64, drawn: Vec<f64>, draws: usize, stretch: f64) -> Option<[f64; 2]> {
+    if (drawn.len() as f64) < (1.0 - TAIL) * draws as f64 || drawn.is_empty() {
+        return None;
+    }
+    let ends = holding(estimate, interval(Parameter::Sigma2, estimate, drawn, stretch));
+    ends.iter().all(|end| end.is_finite()).then_some(ends)
+}
+
 /// Probability beyond either end of a 95 % interval.
 const TAIL: f64 = 0.025;
 
@@ -224,6 +234,8 @@ mod tests {
             Outcome {
                 scope: Scope { sensor: Sensor::Accel, axis: None },
                 replicates: 0,
+                recordings: 0,
+                axes_differ: None,
                 estimator: Estimator::Awv,
                 spec,
                 ranking: None,

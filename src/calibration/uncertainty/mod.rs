@@ -2,12 +2,14 @@
 
 pub(crate) mod alike;
 mod anticipated;
+pub(crate) mod axes;
 pub(crate) mod bootstrap;
 mod goodness;
 mod indistinct;
 pub(crate) mod inference;
 mod influence;
 mod intervals;
+mod practical;
 mod sandwich;
 pub(crate) mod spread;
 

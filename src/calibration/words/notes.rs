@@ -1,10 +1,9 @@
 //! What a fit says, and what it cannot say, in words.
 
-use super::format::{duration, percent, tau_s};
-use crate::curve::{Estimator, Replicate, implied};
-use crate::fit::Fit;
+use super::format::{duration, percent, tau_s, three_digits};
+use crate::curve::{Estimator, Replicate};
 use crate::noise::{Composite, Process};
-use crate::outcome::Outcome;
+use crate::outcome::{AxesDiffer, Miss, Outcome};
 use crate::wavelet::{Curve, Status};
 
 /// What a process contributes to a model's wavelet variance.
@@ -38,15 +37,13 @@ pub fn shares(model: &Composite, levels: &[u32]) -> Vec<Share> {
     model.processes.iter().enumerate().map(share).collect()
 }
 
-/// Scales missed by more standard deviations than this are told.
-const MISFIT: f64 = 4.0;
 /// The wavelet variance of an AR1 peaks at this many correlation times.
 const PEAK: f64 = 3.78;
 
 /// Remarks on a fit to the average of some replicates at a rate (Hz).
 #[must_use]
 pub(crate) fn notes(outcome: &Outcome, replicates: &[Replicate], rate_hz: f64) -> Vec<String> {
-    let Outcome { fit, curve, estimator, .. } = outcome;
+    let Outcome { curve, estimator, .. } = outcome;
     let mut notes = Vec::new();
     let record_s = replicates.iter().map(|r| r.samples as f64 / rate_hz).fold(0.0, f64::max);
     if *estimator == Estimator::Avlr {
@@ -57,7 +54,8 @@ pub(crate) fn notes(outcome: &Outcome, replicates: &[Replicate], rate_hz: f64) -
     }
     at_ends(outcome, rate_hz, &mut notes);
     beyond_the_scales(outcome, record_s, rate_hz, &mut notes);
-    misfit(fit, curve, rate_hz, &mut notes);
+    notes.extend(misfit(outcome, rate_hz));
+    notes.extend(axes_remark(outcome, rate_hz));
     if estimator.is_robust() {
         robust_remarks(curve, replicates, &mut notes);
     }
@@ -99,7 +97,7 @@ fn at_ends(outcome: &Outcome, rate_hz: f64, notes: &mut Vec<String>) {
 
 /// What the scales there are tell little of.
 fn beyond_the_scales(outcome: &Outcome, record_s: f64, rate_hz: f64, notes: &mut Vec<String>) {
-    let (fit, levels) = (&outcome.fit, &outcome.curve.levels);
+    let (fit, levels) = (&outcome.fit, &outcome.counted_levels());
     let last = levels.last().copied().unwrap_or(0);
     let longest_s = levels.last().map_or(0.0, |level| tau_s(*level, rate_hz));
     let labels = fit.composite.labels();
@@ -148,26 +146,68 @@ pub fn correlation_time_s(process: &Process, rate_hz: f64) -> Option<f64> {
     }
 }
 
-fn misfit(fit: &Fit, curve: &Curve, rate_hz: f64, notes: &mut Vec<String>) {
-    let implied = implied(&fit.composite, curve);
-    let scales = curve.levels.iter().zip(&curve.wv).zip(&curve.edof).zip(implied);
-    let missed = scales.filter_map(|(((level, nu), edof), implied)| {
-        let relative = nu / implied - 1.0;
-        let deviations = relative * (0.5 * edof).sqrt();
-        (deviations.abs() > MISFIT).then_some((*level, relative, deviations))
-    });
-    let missed: Vec<_> = missed.collect();
-    let Some(worst) = missed.iter().max_by(|a, b| a.2.abs().total_cmp(&b.2.abs())) else { return };
-    let (level, relative, deviations) = worst;
-    let side = if *relative > 0.0 { "above" } else { "below" };
-    notes.push(format!(
-        "the data disagree with this model at {} of {} scales, most at {} s: {} {side} it, {:.0} standard deviations",
-        missed.len(),
-        curve.levels.len(),
-        tau_s(*level, rate_hz),
-        percent(relative.abs()),
-        deviations.abs()
-    ));
+fn misfit(outcome: &Outcome, rate_hz: f64) -> Option<String> {
+    let departure = outcome.departure();
+    let (worst, surest) = (departure.worst()?, departure.surest()?);
+    let side = if surest.ratio > 1.0 { "above" } else { "below" };
+    Some(format!(
+        "the data disagree with this model at {} of {} scales: they have {}; most certainly at {} s, {} {side} it, {:.0} standard \
+         deviations",
+        departure.missed.len(),
+        departure.scales,
+        worst_in_words(outcome, worst, rate_hz),
+        tau_s(surest.level, rate_hz),
+        percent((surest.ratio - 1.0).abs()),
+        surest.deviations.abs()
+    ))
+}
+
+/// `2.5 times the model's wavelet variance at 164 s (to the same side from 41 s to 330 s)`
+#[must_use]
+pub fn worst_in_words(outcome: &Outcome, worst: Miss, rate_hz: f64) -> String {
+    let (first, last) = outcome.stretch(worst);
+    let range = if first == last {
+        String::new()
+    } else {
+        format!(
+            " (to the same side from {} to {})",
+            duration(tau_s(first, rate_hz)),
+            duration(tau_s(last, rate_hz))
+        )
+    };
+    format!(
+        "{} times the model's wavelet variance at {}{range}",
+        three_digits(worst.ratio),
+        duration(tau_s(worst.level, rate_hz))
+    )
+}
+
+/// That the axes differ, and where most; none where they do not.
+#[must_use]
+pub fn axes_remark(outcome: &Outcome, rate_hz: f64) -> Option<String> {
+    let AxesDiffer { level, largest, smallest, ratio, .. } = outcome.axes_differ?;
+    Some(format!(
+        "the axes differ: at {} {} has {} times the wavelet variance of {}; --pool axes gives each its own model",
+        duration(tau_s(level, rate_hz)),
+        largest.name(),
+        three_digits(ratio),
+        smallest.name()
+    ))
+}
+
+/// What was averaged: "6 recordings × 3 axes", "1 recording".
+#[must_use]
+pub fn signals(outcome: &Outcome) -> String {
+    let recordings = match outcome.recordings {
+        0 => return "a curve".to_owned(),
+        1 => "1 recording".to_owned(),
+        count => format!("{count} recordings"),
+    };
+    match outcome.replicates / outcome.recordings {
+        1 => recordings,
+        axes if axes * outcome.recordings == outcome.replicates => format!("{recordings} × {axes} axes"),
+        _ => format!("{recordings}, {} signals", outcome.replicates),
+    }
 }
 
 fn robust_remarks(curve: &Curve, replicates: &[Replicate], notes: &mut Vec<String>) {

@@ -40,7 +40,11 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         }
         e => e.into(),
     })?;
-    let shown = if session.json() { merged.summary.to_string() } else { merged.text };
+    let shown = match () {
+        () if session.json() => merged.summary.to_string(),
+        () if session.verbose() => merged.text,
+        () => beginning(merged.text.trim_end()),
+    };
     session.printer.result(shown.trim_end());
     session.printer.say(&format!("wrote {}", merged.results.display()));
     if merged.diverged == 0 {
@@ -48,6 +52,19 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     let failure = Failure::bound(format!("{} runs diverged", merged.diverged));
     Err(failure.hint("they are in runs.parquet, diverged = 1, and in no other number"))
+}
+
+/// Lines that are shown unless all are asked for.
+const LINES: usize = 18;
+
+/// The beginning of a text that is longer than a screen.
+fn beginning(text: &str) -> String {
+    let all = text.lines().count();
+    if all <= LINES {
+        return text.to_owned();
+    }
+    let shown: Vec<&str> = text.lines().take(LINES - 1).collect();
+    format!("{}\n… {} lines more: --verbose, or tables.md", shown.join("\n"), all - shown.len())
 }
 
 /// Units that are missing or damaged, all of them on stdout as JSON or with --verbose.

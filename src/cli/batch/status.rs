@@ -8,7 +8,7 @@ use serde_json::json;
 
 /// What is done of a study and what is left
 ///
-/// Counts unit files by name; whether they are whole is seen by `run` and `merge`.
+/// Every unit file is read: one that is damaged is not done, and `run` computes it again.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -24,16 +24,22 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let planned = args.place.planned(session.asked_seed())?;
-    let status = planned.status()?;
+    let status = planned.status_of_whole()?;
     let (plan, grid) = (&planned.plan, &planned.grid);
     if session.json() {
         let json = json!({
             "schema_version": 1, "plan": plan.id(), "cells": grid.len(), "cells_done": status.cells_done,
-            "units": status.units, "done": status.done, "foreign": status.foreign.len(),
+            "units": status.units, "done": status.done, "damaged": status.damaged, "foreign": status.foreign.len(),
             "processor_s_left": status.left_s,
         });
         session.printer.result(&json.to_string());
         return Ok(());
+    }
+    if status.damaged > 0 {
+        session.printer.warn(&format!(
+            "{} unit files are damaged; `nav-sim batch run` computes them again",
+            status.damaged
+        ));
     }
     session.printer.result(&format!(
         "{} of {} units done, {} of {} cells complete; about {} left on {} threads",

@@ -9,7 +9,7 @@ use super::recordings::{RecordingArgs, Said, sensor};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
 use nav_sim::calibration::{
-    Bootstrap, Estimator, ModelChoice, ModelSpec, ParameterLimit, Pool, Settings, Trim, Weighting,
+    Bootstrap, Estimator, FitRange, ModelChoice, ModelSpec, ParameterLimit, Pool, Settings, Trim, Weighting,
 };
 use nav_sim::formats::parameters_file;
 use nav_sim::imu::Sensor;
@@ -57,6 +57,9 @@ pub(crate) struct Args {
     /// What a scale counts in the fit
     #[arg(long, value_parser = words::<Weighting>(&WEIGHTINGS), default_value_t)]
     weighting: Weighting,
+    /// Scales that count in the fit, such as 1s:1000s; the others are shown and count nothing
+    #[arg(long, value_name = "FROM:TO", value_parser = fit_range)]
+    fit_range: Option<FitRange>,
     /// Which signals are replicates of one another (default: sensor; axes for gmwm, rgmwm and avlr)
     #[arg(long, value_parser = words::<Pool>(&POOLS))]
     pool: Option<Pool>,
@@ -120,6 +123,14 @@ const POOLS: [(&str, &str); 2] = [
     (Pool::Sensor.name(), "Those of all axes of a sensor: a model a sensor"),
 ];
 
+fn fit_range(text: &str) -> Result<FitRange, String> {
+    let (from_s, to_s) = super::parse::seconds_range(text)?;
+    if from_s >= to_s {
+        return Err("the shorter scale comes first".into());
+    }
+    Ok(FitRange { from_s, to_s })
+}
+
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let model = model(args)?;
     let settings = Settings {
@@ -128,6 +139,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         trim: args.trim,
         tuning: args.tuning.tuning()?,
         weighting: args.weighting,
+        fit_range: args.fit_range,
         ..Settings::default()
     };
     match &args.curve {
@@ -144,12 +156,16 @@ fn recordings(args: &Args, settings: Settings, session: &Session) -> Result<(), 
     }
     let options = CalibrationOptions {
         reading: args.recordings.options(),
+        skip_warm_up: args.recordings.skips_warm_up(),
         scales: args.tuning.scales,
         estimators: args.estimator,
         pool: args.pool,
         settings,
         bootstrap: bootstrap(args, session),
     };
+    if args.estimator != EstimatorChoice::All {
+        output::not_anew(out, args.bootstrap > 0, session)?;
+    }
     let measured = jobs::measure(&args.inputs, &options, &mut Said::new(session))?;
     let files: Vec<PathBuf> = measured.report.files.iter().map(|f| f.path.clone()).collect();
     let guarded: Vec<PathBuf> = files.iter().chain(&args.parameters).cloned().collect();
@@ -186,6 +202,10 @@ fn bootstrap(args: &Args, session: &Session) -> Option<Bootstrap> {
 
 fn model(args: &Args) -> Result<ModelChoice, Failure> {
     let chosen: ModelChoice = args.model.parse().map_err(unknown_model)?;
+    if args.estimator == EstimatorChoice::One(Estimator::Avlr) && args.fit_range.is_some() {
+        let message = "--fit-range with --estimator avlr: slopes are read where they are found";
+        return Err(Failure::input(message).hint("--estimator gmwm fits the same curve over a range"));
+    }
     if args.estimator != EstimatorChoice::One(Estimator::Avlr) {
         return Ok(chosen);
     }

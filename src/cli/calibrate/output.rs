@@ -10,6 +10,14 @@ use nav_sim::jobs::{Calibration, ModelFiles};
 use nav_sim::report::{self, CurvesFile, FitsFile, Input};
 use std::path::{Path, PathBuf};
 
+/// Refuses at once what would be refused after the work: with a seed that is drawn the bootstrap, and so the file, is another.
+pub(super) fn not_anew(out: &Path, draws: bool, session: &Session) -> Result<(), Failure> {
+    if draws && session.asked_seed().is_none() {
+        atomic::guard_contents(out, &[], session.existing())?;
+    }
+    Ok(())
+}
+
 /// Fails before the work is done, not after, if nothing can be written there.
 pub(super) fn writable(out: &Path) -> Result<(), Failure> {
     regular(out)?;
@@ -88,6 +96,9 @@ pub(super) fn finish(
     plot: &PlotArgs,
     session: &Session,
 ) -> Result<(), Failure> {
+    for output in outputs {
+        output.guard(calibration, note, session.existing())?;
+    }
     let Calibration { groups, outcomes, settings } = calibration;
     let diagnoses = diagnose(groups, outcomes, settings);
     let mut files = Vec::new();
@@ -116,8 +127,8 @@ pub(super) fn finish(
     if !files.is_empty() {
         session.printer.say(&format!("wrote {}", files.join(", ")));
     }
-    if outcomes.iter().any(|o| o.replicates > 1) {
-        session.printer.say(WHICH);
+    if outcomes.iter().any(|o| o.recordings > 1) {
+        session.printer.detail(WHICH);
     }
     Ok(())
 }

@@ -1,19 +1,32 @@
 //! The directory of a fusion.
 
 use super::inputs::guarded;
-use crate::cli::Failure;
 use crate::cli::run::not_of_another_command;
-use nav_sim::formats::atomic::AtomicDir;
+use crate::cli::{Failure, Session};
+use nav_sim::formats::atomic::{self, AtomicDir};
 use nav_sim::fusion::Solution;
 use nav_sim::report::{FusionKind, FusionManifest, FusionSummary, Input, fusion_directory};
 use std::path::Path;
 
 /// Whether the directory can be made, found out before the work.
-pub(super) fn try_open(out: &Path, inputs: &[Input]) -> Result<(), Failure> {
+pub(super) fn try_open(out: &Path, inputs: &[Input], session: &Session) -> Result<(), Failure> {
     guarded(out, inputs)?;
     not_of_another_command(out, |text| serde_json::from_str::<FusionManifest>(text).is_ok())?;
+    // Options are kept in the command alone.
+    let is_same = |there: FusionManifest| {
+        (there.command, there.version) == (command(), version()) && there.inputs == inputs
+    };
+    atomic::guard_directory(out, session.existing(), |text| serde_json::from_str(text).is_ok_and(is_same))?;
     drop(AtomicDir::create(out)?);
     Ok(())
+}
+
+fn version() -> String {
+    env!("CARGO_PKG_VERSION").to_owned()
+}
+
+fn command() -> Vec<String> {
+    std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect()
 }
 
 /// Writes all files, the manifest last.
@@ -28,8 +41,8 @@ pub(super) fn write(
     let manifest = FusionManifest {
         schema_version: 1,
         kind: FusionKind::Fusion,
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        command: std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect(),
+        version: version(),
+        command: command(),
         inputs,
         wall_s,
     };

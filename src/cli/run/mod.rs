@@ -128,13 +128,14 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             .printer
             .warn("--runs counts nothing here: --method lincov makes none; both makes them beside it");
     }
-    output::try_open(&args.out, &inputs.files)?;
+    let manifest =
+        manifest(scenario.clone(), &outages, seed, inputs.files.clone(), inputs.note.clone(), session);
+    output::try_open(&args.out, &manifest, session)?;
     args.plot.guard(&inputs.files.iter().map(|i| PathBuf::from(&i.path)).collect::<Vec<_>>())?;
     let words = Words::new(session);
     let found = jobs::navigate(&inputs.job, &scenario, &outages, seed, &words);
     let mut found = found.map_err(|e| impossible(e, &args.model))?;
     found.summary.require = args.require.iter().map(|r| r.check(&found.summary)).collect();
-    let manifest = manifest(scenario, &outages, seed, inputs.files.clone(), inputs.note.clone(), session);
     let epochs = found.runs.as_ref().map_or(0, |runs| runs.run_epochs) as f64;
     let independent_windows = found.runs.as_ref().and_then(|runs| runs.independent_windows);
     let wall_s = words.runs_s();

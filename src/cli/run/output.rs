@@ -42,11 +42,13 @@ pub(crate) fn manifest(
 
 /// Whether a run directory can be made, found out before the long computation; none of its files may be an
 /// input. Nothing is left: a run that is interrupted leaves no trace.
-pub(crate) fn try_open(path: &Path, inputs: &[Input]) -> Result<(), Failure> {
+pub(crate) fn try_open(path: &Path, manifest: &Manifest, session: &Session) -> Result<(), Failure> {
     for name in report::RUN_FILES {
-        atomic::guard_inputs(&path.join(name), inputs.iter().map(|i| Path::new(&i.path)))?;
+        atomic::guard_inputs(&path.join(name), manifest.inputs.iter().map(|i| Path::new(&i.path)))?;
     }
     not_of_another_command(path, |text| serde_json::from_str::<Manifest>(text).is_ok())?;
+    let same = |text: &str| serde_json::from_str(text).is_ok_and(|there| manifest.is_same_run(&there));
+    atomic::guard_directory(path, session.existing(), same)?;
     drop(AtomicDir::create(path)?);
     Ok(())
 }

@@ -38,7 +38,8 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let (trajectory, _) = args.source.read(session)?;
     let outages: Vec<_> = args.outages.iter().map(|o| (o.start_s, o.end_s)).collect();
     let name = args.source.path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-    atomic::write(&args.out, trajectory_svg(&name, &TrajectorySeries::of(&trajectory), &outages))?;
+    let picture = trajectory_svg(&name, &TrajectorySeries::of(&trajectory), &outages);
+    atomic::write_result(&args.out, picture, session.existing())?;
     wrote(&args.out, session);
     Ok(())
 }

@@ -27,6 +27,61 @@ pub fn guard_inputs<'a>(output: &Path, inputs: impl IntoIterator<Item = &'a Path
     Err(FileError::contents(output.display().to_string(), Place::Itself, message).setting(Setting::Output))
 }
 
+/// What may become of a result that is there already.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Existing {
+    /// It stays, unless what would take its place is the same.
+    Keep,
+    /// Another takes its place.
+    Replace,
+}
+
+/// Refuses to put something else in the place of a regular file.
+///
+/// # Errors
+/// When the file holds something else and is to stay.
+pub fn guard_contents(path: &Path, contents: &[u8], existing: Existing) -> Result<(), FileError> {
+    let regular = std::fs::metadata(path).is_ok_and(|m| m.is_file());
+    let same = || std::fs::read(path).is_ok_and(|there| there == contents);
+    if existing == Existing::Replace || !regular || same() {
+        return Ok(());
+    }
+    Err(kept(path, "holds another result"))
+}
+
+/// Refuses to put another result in the place of that of a directory, which its manifest tells.
+///
+/// # Errors
+/// When there is a manifest, `is_same` does not know its own in it, and the result is to stay.
+pub fn guard_directory(
+    directory: &Path,
+    existing: Existing,
+    is_same: impl FnOnce(&str) -> bool,
+) -> Result<(), FileError> {
+    let Ok(manifest) = std::fs::read_to_string(directory.join("manifest.json")) else { return Ok(()) };
+    if existing == Existing::Replace || is_same(&manifest) {
+        return Ok(());
+    }
+    Err(kept(directory, "holds the result of another configuration, other inputs or another seed"))
+}
+
+fn kept(path: &Path, why: &str) -> FileError {
+    FileError::contents(path.display().to_string(), Place::Itself, why).setting(Setting::Force)
+}
+
+/// Writes a result as a file, but not in the place of another one.
+///
+/// # Errors
+/// As [`guard_contents`] and [`write()`].
+pub fn write_result(
+    destination: &Path,
+    contents: impl AsRef<[u8]>,
+    existing: Existing,
+) -> Result<(), FileError> {
+    guard_contents(destination, contents.as_ref(), existing)?;
+    write(destination, contents)
+}
+
 /// Writes a whole file.
 ///
 /// # Errors

@@ -53,6 +53,9 @@ impl CalibrationNote {
         put("estimator", estimator.name().into());
         put("model", settings.model.to_string().into());
         put("weighting", settings.weighting.name().into());
+        if let Some(range) = settings.fit_range {
+            put("fit_range_s", vec![range.from_s, range.to_s].into());
+        }
         if let Some(seed) = self.seed {
             // TOML integers are signed; larger seeds go as text.
             put("seed", i64::try_from(seed).map_or_else(|_| seed.to_string().into(), Value::from));
@@ -94,6 +97,7 @@ fn fit(outcome: &Outcome, settings: &Settings) -> Table {
     put("signals", outcome.scope.name().into());
     put("model", outcome.spec.to_string().into());
     put("replicates", count(outcome.replicates));
+    put("recordings", count(outcome.recordings));
     if outcome.estimator == Estimator::DrAwv {
         put("trim", count(settings.trim.count(outcome.replicates)));
     }

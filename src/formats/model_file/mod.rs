@@ -20,10 +20,12 @@
 mod calibrated;
 mod extremes;
 mod read;
+mod schema;
 mod write;
 
 pub use calibrated::CalibrationNote;
 pub use read::{from_text, read};
+pub use schema::schema;
 pub use write::{to_toml, write};
 
 use crate::imu::{Channel, Sensor};

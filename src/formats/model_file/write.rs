@@ -2,7 +2,7 @@
 
 use super::{CI, Interval, ModelFile, SCHEMA, TurnOn};
 use crate::formats::FileError;
-use crate::formats::atomic;
+use crate::formats::atomic::{self, Existing};
 use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::{Law, Process, Variation};
 use std::fmt::Write;
@@ -11,9 +11,9 @@ use std::path::Path;
 /// Writes a model file, whole or not at all.
 ///
 /// # Errors
-/// When the system refuses.
-pub fn write(path: &Path, file: &ModelFile) -> Result<(), FileError> {
-    atomic::write(path, to_toml(file))
+/// When the system refuses, or another model is there and is to stay.
+pub fn write(path: &Path, file: &ModelFile, existing: Existing) -> Result<(), FileError> {
+    atomic::write_result(path, to_toml(file), existing)
 }
 
 /// The text of a model file. A sensor whose three axes are alike is written once.

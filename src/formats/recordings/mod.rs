@@ -111,6 +111,10 @@ pub fn visit<T: Send>(
         let outcomes: Vec<_> = some.par_iter().map(|file| held(&file.path, options, look)).collect();
         for (file, outcome) in some.iter().zip(outcomes) {
             match outcome {
+                // The output of this very command, say, when it goes to a file in the directory.
+                Err(FileError { kind: Kind::Empty(_), .. }) if file.from_directory => {
+                    report.warnings.push(format!("{}: passed over, it is empty", file.path.display()));
+                }
                 Err(FileError { kind: Kind::Columns(_), .. }) if file.from_directory => {
                     let text = format!("{}: passed over, no column is a known one", file.path.display());
                     report.warnings.push(text);

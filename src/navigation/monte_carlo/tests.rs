@@ -183,8 +183,11 @@ fn bias_and_scale_factor_of_the_true_imu_act_as_in_closed_form() {
         TrajectorySample { t_s, lat: 0.0, lon: 0.5 * a * t_s * t_s / crate::earth::A, h: 0.0, q_b_n }
     };
     let samples: Vec<_> = (0..=80).map(straight).collect();
-    let defects =
-        ImuSettings { turn_on_bias_accel_m_s2: 0.05, scale_ppm_accel: 20_000.0, ..ImuSettings::default() };
+    let defects = ImuSettings {
+        turn_on_bias_accel_m_s2: Some(0.05),
+        scale_ppm_accel: 20_000.0,
+        ..ImuSettings::default()
+    };
     let setting = Setting {
         trajectory: Trajectory::from_samples(&samples).unwrap(),
         model: Model { rate_hz: 100.0, axes: Default::default() },

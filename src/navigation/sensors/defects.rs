@@ -21,10 +21,12 @@ pub const MAX_BIAS_RAD_S: f64 = 1.0;
 pub struct ImuSettings {
     /// Samples per second.
     pub rate_hz: f64,
-    /// Turn-on bias of the accelerometers (m/s²).
-    pub turn_on_bias_accel_m_s2: f64,
-    /// Turn-on bias of the gyroscopes (rad/s).
-    pub turn_on_bias_gyro_rad_s: f64,
+    /// Turn-on bias of the accelerometers (m/s²); without it that of the model's `[turn_on]`, or none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub turn_on_bias_accel_m_s2: Option<f64>,
+    /// Turn-on bias of the gyroscopes (rad/s); without it that of the model's `[turn_on]`, or none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub turn_on_bias_gyro_rad_s: Option<f64>,
     /// Scale-factor error of the accelerometers (parts per million).
     pub scale_ppm_accel: f64,
     /// Scale-factor error of the gyroscopes (parts per million).
@@ -37,8 +39,8 @@ impl Default for ImuSettings {
     fn default() -> Self {
         Self {
             rate_hz: 100.0,
-            turn_on_bias_accel_m_s2: 0.0,
-            turn_on_bias_gyro_rad_s: 0.0,
+            turn_on_bias_accel_m_s2: None,
+            turn_on_bias_gyro_rad_s: None,
             scale_ppm_accel: 0.0,
             scale_ppm_gyro: 0.0,
             misalignment_rad: 0.0,
@@ -57,23 +59,16 @@ impl ImuSettings {
             let requirement = format!("at most {MAX_RATE_HZ} samples a second");
             return Err(SettingError::new("rate_hz", self.rate_hz, requirement));
         }
-        require_non_negative("turn_on_bias_accel_m_s2", &[self.turn_on_bias_accel_m_s2])?;
-        require_non_negative("turn_on_bias_gyro_rad_s", &[self.turn_on_bias_gyro_rad_s])?;
-        if self.turn_on_bias_accel_m_s2 > MAX_BIAS_M_S2 {
+        let [(accel, _), (gyro, _)] = Sensor::ALL.map(|sensor| self.deviations(sensor));
+        require_non_negative("turn_on_bias_accel_m_s2", &[accel])?;
+        require_non_negative("turn_on_bias_gyro_rad_s", &[gyro])?;
+        if accel > MAX_BIAS_M_S2 {
             let requirement = format!("at most {MAX_BIAS_M_S2} m/s² (mg named m/s²?)");
-            return Err(SettingError::new(
-                "turn_on_bias_accel_m_s2",
-                self.turn_on_bias_accel_m_s2,
-                requirement,
-            ));
+            return Err(SettingError::new("turn_on_bias_accel_m_s2", accel, requirement));
         }
-        if self.turn_on_bias_gyro_rad_s > MAX_BIAS_RAD_S {
+        if gyro > MAX_BIAS_RAD_S {
             let requirement = format!("at most {MAX_BIAS_RAD_S} rad/s (degrees an hour named rad/s?)");
-            return Err(SettingError::new(
-                "turn_on_bias_gyro_rad_s",
-                self.turn_on_bias_gyro_rad_s,
-                requirement,
-            ));
+            return Err(SettingError::new("turn_on_bias_gyro_rad_s", gyro, requirement));
         }
         for (key, ppm) in [("scale_ppm_accel", self.scale_ppm_accel), ("scale_ppm_gyro", self.scale_ppm_gyro)]
         {
@@ -92,10 +87,10 @@ impl ImuSettings {
 
     /// Standard deviations of turn-on bias (m/s² or rad/s) and scale factor (parts per million) of a sensor.
     #[must_use]
-    pub const fn deviations(&self, sensor: Sensor) -> (f64, f64) {
+    pub fn deviations(&self, sensor: Sensor) -> (f64, f64) {
         match sensor {
-            Sensor::Accel => (self.turn_on_bias_accel_m_s2, self.scale_ppm_accel),
-            Sensor::Gyro => (self.turn_on_bias_gyro_rad_s, self.scale_ppm_gyro),
+            Sensor::Accel => (self.turn_on_bias_accel_m_s2.unwrap_or(0.0), self.scale_ppm_accel),
+            Sensor::Gyro => (self.turn_on_bias_gyro_rad_s.unwrap_or(0.0), self.scale_ppm_gyro),
         }
     }
 
@@ -160,8 +155,8 @@ mod tests {
     #[test]
     fn every_element_has_the_deviation_that_was_asked_for() {
         let settings = ImuSettings {
-            turn_on_bias_accel_m_s2: 0.1,
-            turn_on_bias_gyro_rad_s: 0.01,
+            turn_on_bias_accel_m_s2: Some(0.1),
+            turn_on_bias_gyro_rad_s: Some(0.01),
             scale_ppm_accel: 500.0,
             scale_ppm_gyro: 200.0,
             misalignment_rad: 1e-3,
@@ -196,7 +191,7 @@ mod tests {
             (ImuSettings { scale_ppm_gyro: -1.0, ..d.clone() }, "scale_ppm_gyro"),
             (ImuSettings { scale_ppm_accel: 2e5, ..d.clone() }, "scale_ppm_accel"),
             (ImuSettings { misalignment_rad: 1.0, ..d.clone() }, "misalignment_rad"),
-            (ImuSettings { turn_on_bias_gyro_rad_s: f64::NAN, ..d.clone() }, "turn_on_bias_gyro_rad_s"),
+            (ImuSettings { turn_on_bias_gyro_rad_s: Some(f64::NAN), ..d.clone() }, "turn_on_bias_gyro_rad_s"),
         ];
         for (settings, key) in refused {
             assert_eq!(settings.validate().unwrap_err().key, key);

@@ -4,7 +4,8 @@ use super::wavelet::{band, curve, scale_axis, sensor_name, unit, variance_axis};
 use crate::calibration::{Diagnosis, Outcome, Settings, Verdict, advice, shares, tau_s};
 use crate::imu::Sensor;
 use crate::report::curves::{CurvesFile, FittedCurve};
-use crate::report::fits::{interval_of, meaning};
+use crate::report::describe::meaning;
+use crate::report::fits::interval_of;
 use crate::report::number::readable;
 use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, Table, Tone, svg};
 

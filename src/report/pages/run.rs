@@ -2,6 +2,7 @@
 
 use super::run_charts::{budget_chart, horizontal, nees, states, windows};
 use super::{RMSE_AND_ASEE, STATES, tone, window};
+use crate::imu::Sensor;
 use crate::metrics::{Budget, EpochMetrics, OutageSummary, PerState, Summary};
 use crate::report::manifest::Manifest;
 use crate::report::number::readable;
@@ -61,7 +62,7 @@ fn assumptions(summary: &Summary, manifest: &Manifest) -> Vec<(&'static str, Str
     let three = |sigma: &[f64; 3]| sigma.map(readable).join(", ");
     let velocity =
         gnss.vel_sigma_m_s.map_or("no velocity".to_owned(), |v| format!("velocity {} m/s", three(&v)));
-    let [bias_a, bias_g] = [imu.turn_on_bias_accel_m_s2, imu.turn_on_bias_gyro_rad_s].map(readable);
+    let [bias_a, bias_g] = Sensor::ALL.map(|sensor| readable(imu.deviations(sensor).0));
     let mut facts = vec![
         ("trajectory", input("trajectory").to_owned()),
         ("model of the filter", format!("{}, {} states", input("model"), summary.filter_states)),

@@ -13,6 +13,19 @@ pub struct Minimum {
 }
 
 impl Minimum {
+    /// The lowest minimum of the largest Allan deviation of some axes, strictly within one sample and `range_s`; none where it
+    /// still falls, or rises from the start.
+    #[must_use]
+    pub fn of(axes: &[&Composite], rate_hz: f64, range_s: f64) -> Option<Self> {
+        let samples = averages(1.0, (range_s * rate_hz).clamp(2.0, f64::from(1_u32 << 30)));
+        let variance = |m: &u32| axes.iter().map(|a| a.allan_variance(*m)).fold(0.0, f64::max);
+        let variances: Vec<f64> = samples.iter().map(variance).collect();
+        let inner = (1..samples.len().saturating_sub(1))
+            .filter(|i| variances[*i] < variances[i - 1] && variances[*i] <= variances[i + 1]);
+        let lowest = inner.min_by(|a, b| variances[*a].total_cmp(&variances[*b]))?;
+        Some(Self { tau_s: f64::from(samples[lowest]) / rate_hz, deviation: variances[lowest].sqrt() })
+    }
+
     /// Bias instability B = Allan deviation/0.664 (units).
     #[must_use]
     pub fn bias_instability(&self) -> f64 {
@@ -58,21 +71,10 @@ impl AxisParameters {
         Ok(Self {
             walk: curve.pair(policy, Bias::Walk),
             markov: curve.pair(policy, Bias::Markov),
-            minimum: minimum(axes, rate_hz, range_s),
+            minimum: Minimum::of(axes, rate_hz, range_s),
             correlated: axes.iter().take(1).flat_map(|axis| correlated(axis, rate_hz)).collect(),
         })
     }
-}
-
-/// The lowest minimum of the largest Allan deviation strictly within one sample and `range_s`.
-fn minimum(axes: &[&Composite], rate_hz: f64, range_s: f64) -> Option<Minimum> {
-    let samples = averages(1.0, (range_s * rate_hz).clamp(2.0, f64::from(1_u32 << 30)));
-    let variance = |m: &u32| axes.iter().map(|a| a.allan_variance(*m)).fold(0.0, f64::max);
-    let variances: Vec<f64> = samples.iter().map(variance).collect();
-    let inner = (1..samples.len().saturating_sub(1))
-        .filter(|i| variances[*i] < variances[i - 1] && variances[*i] <= variances[i + 1]);
-    let lowest = inner.min_by(|a, b| variances[*a].total_cmp(&variances[*b]))?;
-    Some(Minimum { tau_s: f64::from(samples[lowest]) / rate_hz, deviation: variances[lowest].sqrt() })
 }
 
 /// The AR1 and GM of an axis that have a correlation time.

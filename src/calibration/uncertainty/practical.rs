@@ -1,0 +1,64 @@
+//! N, K and B of a fit, and their intervals from the draws of the bootstrap.
+
+use super::intervals::scale_interval;
+use crate::fit::Fit;
+use crate::noise::Composite;
+use crate::noise::practical::{AxisParameters, Bias, Curve, Horizon, Minimum, Policy};
+use crate::outcome::{Outcome, Practical, PracticalIntervals};
+
+/// Longest averaging time that the scales of a fit tell of (s): a scale is two averages long.
+fn observed_s(outcome: &Outcome, rate_hz: f64) -> Option<f64> {
+    let longest = outcome.counted_levels().into_iter().max()?;
+    Some(f64::from(longest - 1).exp2() / rate_hz)
+}
+
+impl Outcome {
+    /// What practitioners call N, K, B and T, as exports have them; none at a rate without averages of 1 s, and of no noise.
+    #[must_use]
+    pub fn practical(&self, rate_hz: f64) -> Option<Practical> {
+        let (horizon, policy) = (Horizon::default(), Policy::Matched);
+        let range_s = observed_s(self, rate_hz)?;
+        let model = &self.fit.composite;
+        let parameters = AxisParameters::of(&[model], rate_hz, horizon, policy, range_s).ok()?;
+        let intervals = self.inference.as_ref().map_or(PracticalIntervals::default(), |i| i.practical);
+        Some(Practical { parameters, intervals, range_s })
+    }
+}
+
+/// The 95 % intervals from the fits of the draws; `stretch` as in [`super::intervals::intervals`].
+pub(crate) fn intervals(outcome: &Outcome, fits: &[Fit], stretch: f64, rate_hz: f64) -> PracticalIntervals {
+    let none = PracticalIntervals::default();
+    let Some(range_s) = observed_s(outcome, rate_hz) else { return none };
+    let reading = |model: &Composite| Reading::of(model, rate_hz, range_s);
+    let Some(own) = reading(&outcome.fit.composite) else { return none };
+    let drawn: Vec<Reading> = fits.iter().filter_map(|fit| reading(&fit.composite)).collect();
+    let of = |value: &dyn Fn(&Reading) -> Option<f64>| {
+        let there: Vec<f64> = drawn.iter().filter_map(value).filter(|x| *x > 0.0).collect();
+        scale_interval(value(&own)?, there, fits.len(), stretch)
+    };
+    PracticalIntervals {
+        density: of(&|r| Some(r.density)),
+        walk: of(&|r| Some(r.walk)),
+        instability: of(&|r| r.instability),
+    }
+}
+
+/// What is read off one model.
+struct Reading {
+    density: f64,
+    walk: f64,
+    instability: Option<f64>,
+}
+
+impl Reading {
+    fn of(model: &Composite, rate_hz: f64, range_s: f64) -> Option<Self> {
+        let curve = Curve::largest(&[model], rate_hz, Horizon::default()).ok()?;
+        let pair = curve.pair(Policy::Matched, Bias::Walk);
+        let minimum = Minimum::of(&[model], rate_hz, range_s);
+        Some(Self {
+            density: pair.density,
+            walk: pair.walk,
+            instability: minimum.map(|m| m.bias_instability()),
+        })
+    }
+}

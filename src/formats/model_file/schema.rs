@@ -1,0 +1,72 @@
+//! The JSON schema of model files.
+
+use crate::noise::Kind;
+use serde_json::{Map, Value, json};
+
+/// The JSON schema of a model file, for editors and checkers.
+#[must_use]
+pub fn schema() -> Value {
+    let process = |kind: &Kind| {
+        let mut properties = Map::new();
+        properties.insert("type".to_owned(), json!({ "const": kind.code() }));
+        let interval =
+            json!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 });
+        let mut required = vec!["type"];
+        for parameter in kind.parameters() {
+            properties.insert(
+                parameter.name().to_owned(),
+                json!({ "type": "number", "description": meaning(parameter.name()) }),
+            );
+            properties.insert(format!("{}_ci95", parameter.name()), interval.clone());
+            required.push(parameter.name());
+        }
+        json!({ "type": "object", "properties": properties, "required": required, "additionalProperties": false })
+    };
+    let processes =
+        json!({ "type": "array", "items": { "oneOf": Kind::ALL.iter().map(process).collect::<Vec<_>>() } });
+    let axis = json!({
+        "type": "object", "properties": { "processes": processes }, "required": ["processes"],
+        "additionalProperties": false
+    });
+    let sensor = json!({
+        "description": "All three axes by `processes`, or each by x, y, z",
+        "type": "object",
+        "properties": { "processes": processes, "x": axis, "y": axis, "z": axis },
+        "additionalProperties": false
+    });
+    let deviation = |unit: &str| json!({ "description": format!("Standard deviation of the constant bias ({unit}), or one for each axis") });
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Noise model",
+        "description": "What nav-sim calibrate writes and run, fuse, synthesize, export read",
+        "type": "object",
+        "required": ["rate_hz"],
+        "properties": {
+            "schema": { "const": super::SCHEMA },
+            "rate_hz": { "type": "number", "exclusiveMinimum": 0, "description": "Sample rate that the variances are of (Hz)" },
+            "accel": sensor,
+            "gyro": sensor,
+            "turn_on": {
+                "type": "object",
+                "properties": { "accel_m_s2": deviation("m/s²"), "gyro_rad_s": deviation("rad/s") },
+                "additionalProperties": false
+            },
+            "spread": { "type": "object", "description": "How parameters vary between recordings" },
+            "provenance": { "type": "object", "description": "How the model was made" }
+        },
+        "additionalProperties": false
+    })
+}
+
+fn meaning(parameter: &str) -> &'static str {
+    match parameter {
+        "sigma2" => "variance a sample (units²); of AR1 that of the innovation",
+        "q2" => "quantization noise, Q² (units²)",
+        "phi" => "AR(1) coefficient: e^(−1/(rate × correlation time))",
+        "gamma2" => "variance of an increment (units²)",
+        "slope" => "drift (units a sample)",
+        "beta" => "reciprocal correlation time (1/s)",
+        "s2" => "variance of the process (units²)",
+        _ => "coefficient of the moving average",
+    }
+}

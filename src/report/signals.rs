@@ -1,0 +1,252 @@
+//! Wavelet variances of recordings for people: a digest, recordings side by side, all scales.
+
+use super::curves::{Band, SignalCurves, SignalsFile};
+use super::number::shortest;
+use crate::calibration::duration;
+use crate::wavelet::Tuning;
+
+/// Degrees of freedom from which on robust over classical tells of outliers rather than of chance.
+const LEAST: f64 = 100.0;
+
+/// One table for all recordings: a row for each sensor and axis, its Allan deviation at one averaging time a decade (the
+/// median over the recordings), the lowest of all averaging times, and how far the robust wavelet variance is below the
+/// classical one.
+#[must_use]
+pub fn signals_digest(file: &SignalsFile) -> Vec<Vec<String>> {
+    let decades = decades(file);
+    let times = decades.iter().map(|i| duration(allan_time_s(&longest(file).tau_s, *i)));
+    let head = ["", "unit"].map(str::to_owned).into_iter().chain(times);
+    let head = head.chain(["lowest", "robust/classical"].map(str::to_owned)).collect();
+    let row = |(sensor, axis): (&str, &str)| {
+        let own = of(file, sensor, axis);
+        let median_at = |i: usize| {
+            median(own.iter().filter_map(|s| Some(allan_deviation(*s.classical.wv.get(i)?))).collect())
+        };
+        let cells = decades.iter().map(|i| median_at(*i).map_or(String::new(), |x| format!("{x:.3e}")));
+        let name = [format!("{sensor}.{axis}"), unit(sensor).to_owned()];
+        let scales = own.iter().map(|s| s.tau_s.len()).max().unwrap_or(0);
+        let lowest = (0..scales).filter_map(|i| Some((i, median_at(i)?))).min_by(|a, b| a.1.total_cmp(&b.1));
+        let lowest = lowest.map_or(String::new(), |(i, deviation)| {
+            format!("{deviation:.3e} at {}", duration(allan_time_s(&longest(file).tau_s, i)))
+        });
+        let ratio = own.iter().filter_map(|s| least_ratio(s)).min_by(f64::total_cmp);
+        let ratio = ratio.map_or(String::new(), |r| format!("{r:.2}"));
+        name.into_iter().chain(cells).chain([lowest, ratio]).collect()
+    };
+    std::iter::once(head).chain(channels(file).into_iter().map(row)).collect()
+}
+
+/// For each sensor and axis a title and a table: a row an averaging time, one a decade, a column a recording.
+#[must_use]
+pub fn signals_per_file(file: &SignalsFile) -> Vec<(String, Vec<Vec<String>>)> {
+    let decades = decades(file);
+    let table = |(sensor, axis): (&str, &str)| {
+        let own = of(file, sensor, axis);
+        let names = own.iter().map(|s| short_name(&s.file));
+        let head = std::iter::once("averages of".to_owned()).chain(names).collect::<Vec<_>>();
+        let row = |i: &usize| {
+            let cell = |s: &&SignalCurves| {
+                s.classical.wv.get(*i).map_or(String::new(), |wv| format!("{:.3e}", allan_deviation(*wv)))
+            };
+            let time = duration(allan_time_s(&longest(file).tau_s, *i));
+            std::iter::once(time).chain(own.iter().map(cell)).collect::<Vec<_>>()
+        };
+        let title = format!("{sensor}.{axis}: Allan deviation ({})", unit(sensor));
+        (title, std::iter::once(head).chain(decades.iter().map(row)).collect())
+    };
+    channels(file).into_iter().map(table).collect()
+}
+
+/// All scales of all signals as CSV.
+#[must_use]
+pub fn signals_csv(file: &SignalsFile) -> String {
+    let mut text = "file,sensor,axis,tau_s,edof,classical_wv,classical_ci_low,classical_ci_high,robust_wv,robust_ci_low,\
+                    robust_ci_high,robust_status,allan_tau_s,allan_deviation\n"
+        .to_owned();
+    for s in &file.signals {
+        let name = if s.file.contains([',', '"', '\n']) {
+            format!("\"{}\"", s.file.replace('"', "\"\""))
+        } else {
+            s.file.clone()
+        };
+        for i in 0..s.tau_s.len() {
+            let band = |b: &Band| [b.wv[i], b.ci_low[i], b.ci_high[i]].map(shortest).join(",");
+            let allan =
+                [allan_time_s(&s.tau_s, i), allan_deviation(s.classical.wv[i])].map(shortest).join(",");
+            text += &format!(
+                "{name},{},{},{},{},{},{},{},{allan}\n",
+                s.sensor,
+                s.axis,
+                shortest(s.tau_s[i]),
+                shortest(s.edof[i]),
+                band(&s.classical),
+                band(&s.robust),
+                s.robust.status[i]
+            );
+        }
+    }
+    text
+}
+
+/// A signal's curves as a table: rows of text, the first its head.
+#[must_use]
+pub fn signal_rows(curves: &SignalCurves) -> Vec<Vec<String>> {
+    let unit = unit(&curves.sensor);
+    let head = [
+        "scale tau (s)".to_owned(),
+        format!("classical (({unit})²)"),
+        "95 % interval".to_owned(),
+        format!("robust (({unit})²)"),
+        "95 % interval".to_owned(),
+        String::new(),
+        "averages of (s)".to_owned(),
+        format!("Allan deviation ({unit})"),
+    ];
+    let number = |x: f64| format!("{x:.4e}");
+    let range = |band: &Band, i: usize| format!("{} – {}", number(band.ci_low[i]), number(band.ci_high[i]));
+    let row = |i: usize| {
+        let (classical, robust) = (&curves.classical, &curves.robust);
+        let status =
+            if robust.status[i] == "ok" { String::new() } else { robust.status[i].replace('_', " ") };
+        vec![
+            format!("{}", curves.tau_s[i]),
+            number(classical.wv[i]),
+            range(classical, i),
+            number(robust.wv[i]),
+            range(robust, i),
+            status,
+            format!("{}", allan_time_s(&curves.tau_s, i)),
+            number(allan_deviation(classical.wv[i])),
+        ]
+    };
+    std::iter::once(head.to_vec()).chain((0..curves.tau_s.len()).map(row)).collect()
+}
+
+/// What a file of signals says about its intervals.
+#[must_use]
+pub fn intervals_note(edof_method: &str, tuning: &Tuning) -> String {
+    let kind = match edof_method {
+        "large-sample" => "large-sample degrees of freedom (eta1)",
+        _ => "degrees of freedom eta3, conservative beyond the first scale",
+    };
+    format!("intervals: 95 %, {kind}; robust: times the efficiency {:.3}", tuning.efficiency())
+}
+
+/// A scale is two averages long.
+fn allan_time_s(tau_s: &[f64], index: usize) -> f64 {
+    0.5 * tau_s[index]
+}
+
+/// The wavelet variance is half the Allan variance.
+fn allan_deviation(wv: f64) -> f64 {
+    (2.0 * wv).sqrt()
+}
+
+fn unit(sensor: &str) -> &'static str {
+    if sensor == "accel" { "m/s²" } else { "rad/s" }
+}
+
+fn of<'a>(file: &'a SignalsFile, sensor: &str, axis: &str) -> Vec<&'a SignalCurves> {
+    file.signals.iter().filter(|s| s.sensor == sensor && s.axis == axis).collect()
+}
+
+/// Sensors and axes, as they first appear.
+fn channels(file: &SignalsFile) -> Vec<(&str, &str)> {
+    let mut channels: Vec<(&str, &str)> = Vec::new();
+    for s in &file.signals {
+        if !channels.contains(&(&s.sensor, &s.axis)) {
+            channels.push((&s.sensor, &s.axis));
+        }
+    }
+    channels
+}
+
+/// The signal with the most scales.
+fn longest(file: &SignalsFile) -> &SignalCurves {
+    let most = file.signals.iter().max_by_key(|s| s.tau_s.len());
+    most.expect("a file of signals has one")
+}
+
+/// The scales whose averaging times are nearest to powers of ten (s), each once.
+fn decades(file: &SignalsFile) -> Vec<usize> {
+    let tau_s = &longest(file).tau_s;
+    let log = |i: usize| allan_time_s(tau_s, i).log10();
+    let (first, last) = (log(0).floor() as i32, log(tau_s.len() - 1).ceil() as i32);
+    let nearest = |decade: i32| {
+        let distance = |i: &usize| (log(*i) - f64::from(decade)).abs();
+        (0..tau_s.len()).min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0)
+    };
+    let mut found: Vec<usize> = (first..=last).map(nearest).collect();
+    found.dedup();
+    found
+}
+
+/// The least of robust over classical, of the scales that are well known.
+fn least_ratio(s: &SignalCurves) -> Option<f64> {
+    let known = (0..s.tau_s.len()).filter(|i| s.edof[*i] >= LEAST && s.robust.status[*i] == "ok");
+    known.map(|i| s.robust.wv[i] / s.classical.wv[i]).min_by(f64::total_cmp)
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    match values.len() {
+        0 => None,
+        n if n % 2 == 1 => Some(values[middle]),
+        _ => Some(0.5 * (values[middle - 1] + values[middle])),
+    }
+}
+
+fn short_name(file: &str) -> String {
+    std::path::Path::new(file)
+        .file_name()
+        .map_or_else(|| file.to_owned(), |n| n.to_string_lossy().into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file(count: usize) -> SignalsFile {
+        // 100 Hz, 14 scales: white noise of density 1, wv = 1/(2·tau/2)/… so that the Allan deviation at t is 1/√t.
+        let tau_s: Vec<f64> = (1..=14).map(|j| f64::from(j).exp2() / 100.0).collect();
+        let wv: Vec<f64> = tau_s.iter().map(|tau| 1.0 / tau).collect();
+        let edof: Vec<f64> = (1..=14).map(|j| 1e5 / f64::from(j).exp2()).collect();
+        let band = |factor: f64, status: &str| Band {
+            wv: wv.iter().map(|x| x * factor).collect(),
+            ci_low: wv.clone(),
+            ci_high: wv.clone(),
+            status: vec![status.to_owned(); 14],
+        };
+        let signal = |k: usize| SignalCurves {
+            file: format!("rec/run{k}.csv"),
+            sensor: "gyro".to_owned(),
+            axis: "z".to_owned(),
+            samples: 1 << 15,
+            tau_s: tau_s.clone(),
+            edof: edof.clone(),
+            classical: band(1.0, ""),
+            robust: band(0.9, "ok"),
+        };
+        SignalsFile::new(100.0, 0.6, "eta3", (0..count).map(signal).collect())
+    }
+
+    /// 1/√t at the octaves nearest to the decades: 0.01, 0.08, 1.28 and 10.24 s (81.92 s is the last).
+    #[test]
+    fn a_digest_has_a_row_a_channel() {
+        let rows = signals_digest(&file(3));
+        assert_eq!(rows.len(), 2);
+        assert_eq!(rows[0][2..7], ["0.01 s", "0.08 s", "1.28 s", "10.2 s", "81.9 s"]);
+        assert_eq!(rows[1][..3], ["gyro.z", "rad/s", "1.000e1"]);
+        assert_eq!(rows[1][6..], ["1.105e-1", "1.105e-1 at 81.9 s", "0.90"]);
+    }
+
+    #[test]
+    fn recordings_stand_side_by_side() {
+        let tables = signals_per_file(&file(2));
+        assert_eq!(tables.len(), 1);
+        assert_eq!(tables[0].1[0], ["averages of", "run0.csv", "run1.csv"]);
+        assert_eq!(tables[0].1.len(), 6);
+        assert_eq!(signals_csv(&file(2)).lines().count(), 1 + 2 * 14);
+    }
+}

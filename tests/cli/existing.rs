@@ -1,0 +1,72 @@
+//! Results are never replaced silently: what holds another result is refused, the same is written again.
+
+use crate::common::drive::{MODEL, Ran, done, place_with, plain};
+use std::fs;
+
+const DRIVE: &str = "
+start = { lat_deg = 46.5, lon_deg = 6.5, h_m = 400, heading_deg = 40 }
+segment = [{ kind = \"straight\", duration_s = 5 }, { kind = \"accelerate\", to_speed_m_s = 10, duration_s = 10 }]
+";
+
+fn refused(ran: &Ran, what: &str) {
+    assert_eq!(ran.code, 2, "{what}: {}", ran.stderr);
+    assert!(ran.stderr.contains(what) && ran.stderr.contains("--force"), "{}", ran.stderr);
+}
+
+/// Each command twice (the same: fine), then as it makes something else (refused, the old stays), then with --force.
+#[test]
+fn another_result_is_refused() {
+    let place = place_with(DRIVE, MODEL);
+    let at = |name: &str| place.path().join(name);
+    done(place.path(), "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec");
+    done(place.path(), "trajectory record drive.toml imu.toml --seed 3 -o log");
+    done(place.path(), "run drive.toml imu.toml --runs 2 --outage none --seed 1 -o reference");
+    let calibrate = "calibrate rec --model WN+RW --bootstrap 0 -o out.toml";
+    let fuse = "fuse log/imu.csv log/gnss.csv imu.toml --initial log/initial.toml -o fused";
+    for (command, change, file) in [
+        ("run drive.toml imu.toml --runs 2 --outage none --seed 1 -o run", "--seed 2", "run/summary.json"),
+        (fuse, "--lever-arm 1,0,0", "fused/solution.csv"),
+        ("synthesize imu.toml --samples 64 --seed 1 -o made", "--samples 65", "made/replicate_1.csv"),
+        (calibrate, "--weighting edof", "out.toml"),
+        ("export imu.toml --target kalibr -o imu.yaml", "--policy envelope", "imu.yaml"),
+        ("datasheet --unit stim300 -o sheet.toml", "--rate-hz 200", "sheet.toml"),
+        ("compare run --reference reference", "--reference run", "comparison.json"),
+        ("wv rec -o wv.json", "--scales 5", "wv.json"),
+    ] {
+        for _ in 0..2 {
+            let ran = plain(place.path(), command);
+            assert_eq!(ran.code, 0, "{command}\n{}", ran.stderr);
+        }
+        let before = fs::read(at(file)).unwrap();
+        let flag = change.split(' ').next().unwrap();
+        let other = match command.split_once(&format!("{flag} ")) {
+            Some((start, rest)) => {
+                format!(
+                    "{start}{change}{}",
+                    rest.split_once(' ').map_or(String::new(), |(_, end)| format!(" {end}"))
+                )
+            }
+            None => format!("{command} {change}"),
+        };
+        refused(&plain(place.path(), &other), "holds");
+        assert!(fs::read(at(file)).unwrap() == before, "{other}");
+        let ran = plain(place.path(), &format!("{other} --force"));
+        assert_eq!(ran.code, 0, "{other}\n{}", ran.stderr);
+        assert!(fs::read(at(file)).unwrap() != before, "{other}");
+    }
+    // A seed that is drawn makes another model: known before the work.
+    let ran = plain(place.path(), "calibrate rec --model WN+RW --bootstrap 19 -o out.toml");
+    refused(&ran, "out.toml");
+    assert!(!ran.stderr.contains("recordings at"), "{}", ran.stderr);
+}
+
+/// The output of the command itself, redirected into the directory of its recordings, is no recording.
+#[test]
+fn an_empty_file_in_a_directory_is_passed_over() {
+    let place = place_with(DRIVE, MODEL);
+    done(place.path(), "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec");
+    fs::write(place.path().join("rec/all.txt"), "").unwrap();
+    let ran = plain(place.path(), "wv rec");
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(ran.stderr.contains("all.txt: passed over, it is empty"), "{}", ran.stderr);
+}
