@@ -111,6 +111,11 @@ impl Page {
         let _ = writeln!(self.body, "</div>\n<figcaption>{}</figcaption>", escape(caption));
     }
 
+    /// The last line of a page: what its figures were checked against, to which tolerance, by which test.
+    pub fn checked(&mut self, words: &str) {
+        let _ = writeln!(self.body, "<p class=\"checked\">Checked: {}</p>", escape(words));
+    }
+
     /// A table.
     pub fn table(&mut self, table: &Table) {
         self.body += &table.html();

@@ -66,6 +66,10 @@ pub fn wavelet_page(file: &SignalsFile) -> String {
         page.heading(&name(signal));
         page.table(&Table::of_rows(&crate::report::signal_rows(signal)));
     }
+    page.checked(
+        "wavelet variances to 1e-12, ends of intervals to 1e-9 of an independent implementation, relative \
+         (tests/truth/calibration_truth.rs).",
+    );
     page.html()
 }
 
