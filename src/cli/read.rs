@@ -16,12 +16,26 @@ use std::path::{Path, PathBuf};
 
 /// For commands without the option `--origin`: `trajectory convert` has it.
 pub(super) fn without_options(e: FileError) -> Failure {
-    Failure::of_file(&e, |setting| {
+    Failure::of_file(&e, |setting| Some(elsewhere(setting)))
+}
+
+/// What helps where the setting is no option of the command.
+const fn elsewhere(setting: Setting) -> &'static str {
+    match setting {
+        Setting::Origin => {
+            "write it with latitude and longitude: nav-sim trajectory convert FILE --origin LAT_DEG,LON_DEG,H_M"
+        }
+        other => option_for(other),
+    }
+}
+
+/// For files that a study names: its keys have the place of options.
+pub(super) fn of_study(e: &FileError) -> Failure {
+    Failure::of_file(e, |setting| {
         Some(match setting {
-            Setting::Origin => {
-                "write it with latitude and longitude: nav-sim trajectory convert FILE --origin LAT_DEG,LON_DEG,H_M"
-            }
-            other => option_for(other),
+            Setting::Rate => "set rate_hz beside the recordings in the study file",
+            Setting::WrongRate => "leave rate_hz out of the study file, or correct it",
+            other => elsewhere(other),
         })
     })
 }

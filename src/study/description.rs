@@ -97,7 +97,7 @@ pub struct TrajectoryEntry {
 }
 
 /// `[[truth]]`: one of `model`, `recordings`, `synthesize`.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TruthEntry {
     /// Name in the results (default: that of the file).
@@ -109,6 +109,9 @@ pub struct TruthEntry {
     /// Static recordings: each run takes a window of one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub recordings: Vec<PathBuf>,
+    /// Sample rate of recordings without a time column (Hz).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rate_hz: Option<f64>,
     /// Recordings of a virtual IMU: each run takes a window of one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub synthesize: Option<Synthesis>,
@@ -172,6 +175,9 @@ pub struct CalibrateStep {
     /// Static recordings, or directories of them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub recordings: Vec<PathBuf>,
+    /// Sample rate of recordings without a time column (Hz).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rate_hz: Option<f64>,
     /// Recordings of a virtual IMU instead.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub synthesize: Option<Synthesis>,
@@ -187,6 +193,18 @@ pub struct CalibrateStep {
     /// Efficiency of the robust wavelet variance.
     #[serde(default = "efficiency")]
     pub efficiency: f64,
+    /// How the tuning constant follows from it: exact, or wv as the R packages have it (default: exact).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub efficiency_convention: Option<String>,
+    /// What a scale counts: model, edof, ci, none or full (default: model).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weighting: Option<String>,
+    /// Which signals are replicates of one another: sensor or axes (default: sensor; of a single recording axes).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pool: Option<String>,
+    /// Number of scales (default: one less than the shortest signal allows).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub scales: Option<u32>,
 }
 
 fn estimators() -> Vec<String> {

@@ -209,14 +209,14 @@ fn models(
 fn calibration(step: &CalibrateStep, seed: u64, reader: Reader<'_>) -> Result<Vec<String>, StudyError> {
     let recordings = match &step.synthesize {
         Some(synthesis) => reader.synthesised(synthesis, seed.wrapping_add(CANDIDATE_SEED))?,
-        None => reader.recordings(&step.recordings)?,
+        None => reader.recordings(&step.recordings, step.rate_hz)?,
     };
     let (outcomes, settings) = calibrated(&recordings, step)?;
     let files = reader.listed(&step.recordings)?;
     let inputs = files.iter().map(|file| input::input("recording", file));
     let note = CalibrationNote {
         version: env!("CARGO_PKG_VERSION").to_owned(),
-        efficiency_convention: "exact".to_owned(),
+        efficiency_convention: step.efficiency_convention.clone().unwrap_or_else(|| "exact".to_owned()),
         seed: None,
         reading: toml::Table::new(),
         inputs: inputs.collect::<Result<Vec<Input>, _>>()?,

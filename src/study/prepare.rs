@@ -2,7 +2,9 @@
 
 use super::description::{CalibrateStep, Synthesis};
 use super::error::PrepareError;
-use crate::calibration::{Estimator, Outcome, Settings, Trim, calibrate, grouped, replicates};
+use crate::calibration::{
+    Estimator, Outcome, Pool, Settings, Trim, Weighting, calibrate, grouped, replicates,
+};
 use crate::imu::{Channel, Recording};
 use crate::noise::contamination::Contamination;
 use crate::noise::{Model, Spread, VirtualImu};
@@ -67,7 +69,17 @@ pub(super) fn settings(step: &CalibrateStep, rate_hz: f64) -> Result<Settings, P
         found.ok_or_else(|| word("estimators", name, "is not awv, sr-awv, dr-awv, gmwm or rgmwm".to_owned()))
     };
     let model = step.fit.parse().map_err(|e| word("fit", &step.fit, format!("is no model: {e}")))?;
-    let tuning = Tuning::new(step.efficiency, Convention::Exact).map_err(|_| {
+    let convention = match step.efficiency_convention.as_deref() {
+        None | Some("exact") => Convention::Exact,
+        Some("wv") => Convention::Wv,
+        Some(other) => return Err(word("efficiency_convention", other, "is not exact or wv".to_owned())),
+    };
+    let unknown = |key, value: &str, expected: String| word(key, value, format!("is not {expected}"));
+    let weighting = step.weighting.as_deref().map_or(Ok(Weighting::default()), |text| {
+        let found = Weighting::ALL.into_iter().find(|w| w.name() == text);
+        found.ok_or_else(|| unknown("weighting", text, Weighting::ALL.map(Weighting::name).join(", ")))
+    })?;
+    let tuning = Tuning::new(step.efficiency, convention).map_err(|_| {
         word("efficiency", &step.efficiency.to_string(), "is not between 0.3 and 0.99".to_owned())
     })?;
     Ok(Settings {
@@ -75,6 +87,7 @@ pub(super) fn settings(step: &CalibrateStep, rate_hz: f64) -> Result<Settings, P
         model,
         trim: step.trim.map_or(Trim::default(), Trim::Count),
         tuning,
+        weighting,
         rate_hz,
         ..Settings::default()
     })
@@ -95,9 +108,17 @@ pub fn calibrated(
         let reason = format!("gmwm and rgmwm take a single recording; there are {}", recordings.len());
         return Err(PrepareError::Word { key: "estimators", value, reason });
     }
-    let of = |recording| replicates(recording, None, &settings.tuning);
+    let pool = step.pool.as_deref().map_or(Ok(settings.pool()), |text| {
+        let found = Pool::ALL.into_iter().find(|pool| pool.name() == text);
+        found.filter(|pool| !single || *pool == Pool::Axes).ok_or_else(|| PrepareError::Word {
+            key: "pool",
+            value: text.to_owned(),
+            reason: "is not axes, or sensor (for estimators of several recordings)".to_owned(),
+        })
+    })?;
+    let of = |recording| replicates(recording, step.scales, &settings.tuning);
     let measured: Vec<_> = recordings.par_iter().map(of).collect::<Result<_, _>>()?;
-    let groups = grouped(measured.concat(), settings.pool());
+    let groups = grouped(measured.concat(), pool);
     let outcomes = calibrate(&groups, &settings)?;
     Ok((outcomes, settings))
 }

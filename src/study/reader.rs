@@ -45,9 +45,14 @@ impl Reader<'_> {
         Ok(file)
     }
 
-    pub(super) fn recordings(&self, paths: &[PathBuf]) -> Result<Vec<Recording>, StudyError> {
+    pub(super) fn recordings(
+        &self,
+        paths: &[PathBuf],
+        rate_hz: Option<f64>,
+    ) -> Result<Vec<Recording>, StudyError> {
         let paths = self.beside_all(paths);
-        let (recordings, report) = recordings::read(&paths, &ReadOptions::default())?;
+        let (recordings, report) =
+            recordings::read(&paths, &ReadOptions { rate_hz, ..ReadOptions::default() })?;
         self.doubt(report.doubts());
         for file in &report.files {
             self.observer.remark(&Remark::InputRead(file.to_string()));
@@ -105,7 +110,7 @@ impl Reader<'_> {
         }
         let recordings = match &entry.synthesize {
             Some(step) => self.synthesised(step, seed.wrapping_add(TRUTH_SEED))?,
-            None => self.recordings(&entry.recordings)?,
+            None => self.recordings(&entry.recordings, entry.rate_hz)?,
         };
         Ok(TruthSource::Recordings(recordings))
     }
@@ -116,6 +121,9 @@ impl Reader<'_> {
             return Ok(input::fingerprint(&beside(self.study, model))?);
         }
         let mut hasher = blake3::Hasher::new();
+        if let Some(rate_hz) = entry.rate_hz {
+            hasher.update(&rate_hz.to_bits().to_le_bytes());
+        }
         for file in self.listed(&entry.recordings)? {
             hasher.update(input::fingerprint(&file)?.as_bytes());
         }

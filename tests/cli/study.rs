@@ -92,3 +92,47 @@ fn a_dry_run_writes_nothing() {
     assert!(!directory.exists());
     assert!(matches!(Planned::open(&file, &directory, None), Err(StudyError::NoPlan { .. })));
 }
+
+/// Recordings without a time column, calibrated as the keys say: the model of `calibrate` with the same options.
+#[test]
+fn a_study_reads_and_calibrates_recordings_as_the_command_does() {
+    let place = place();
+    let dir = place.path();
+    let nav_sim = |arguments: &str| {
+        let mut command = assert_cmd::Command::cargo_bin("nav-sim").unwrap();
+        command.current_dir(dir).args(arguments.split_whitespace()).assert().success();
+    };
+    nav_sim("synthesize imu.toml --replicates 3 --samples 8192 --seed 4 -o timed");
+    std::fs::create_dir(dir.join("bare")).unwrap();
+    for k in 1..=3 {
+        let timed = std::fs::read_to_string(dir.join(format!("timed/replicate_{k}.csv"))).unwrap();
+        let bare: Vec<&str> = timed.lines().map(|line| line.split_once(',').unwrap().1).collect();
+        std::fs::write(dir.join(format!("bare/{k}.csv")), bare.join("\n") + "\n").unwrap();
+    }
+    let recorded = |keys: &str| {
+        let step = format!("{{ recordings = [\"bare\"], fit = \"WN\", estimators = [\"awv\"]{keys} }}");
+        let candidate = format!("candidate = [{{ name = \"recorded\", calibrate = {step} }}, ");
+        std::fs::write(dir.join("recorded.toml"), STUDY.replace("candidate = [", &candidate)).unwrap();
+    };
+    recorded("");
+    let said = refused(dir, "plan recorded.toml -o planned", 2);
+    assert!(said.contains("set rate_hz beside the recordings in the study file"), "{said}");
+    recorded(", rate_hz = 100, weighting = \"edofs\"");
+    let said = refused(dir, "plan recorded.toml -o planned", 2);
+    assert!(said.contains("is not model, edof, ci, none, full"), "{said}");
+    recorded(", rate_hz = 100, weighting = \"edof\", pool = \"axes\", scales = 6");
+    done(dir, "plan recorded.toml -o planned");
+    nav_sim(
+        "calibrate bare --rate-hz 100 --estimator awv --model WN --weighting edof --pool axes --scales 6 \
+         --bootstrap 0 -o alone.toml",
+    );
+    let read =
+        |path: &std::path::Path| -> toml::Table { std::fs::read_to_string(path).unwrap().parse().unwrap() };
+    let models = std::fs::read_dir(dir.join("planned/models")).unwrap();
+    let made = models.map(|e| e.unwrap().path()).find(|p| p.display().to_string().contains("recorded_awv"));
+    let (planned, alone) = (read(&made.unwrap()), read(&dir.join("alone.toml")));
+    for sensor in ["accel", "gyro"] {
+        assert_eq!(planned[sensor], alone[sensor]);
+        assert!(alone[sensor].get("x").is_some(), "{alone}");
+    }
+}

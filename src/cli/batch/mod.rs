@@ -85,7 +85,7 @@ impl From<StudyError> for Failure {
     fn from(e: StudyError) -> Self {
         let hint = e.remedy().map(|remedy| words(&remedy).to_owned());
         match e {
-            StudyError::File(e) => read::without_options(*e),
+            StudyError::File(e) => read::of_study(&e),
             StudyError::Candidate { candidate, source } => Self::from(*source).within(&candidate),
             e if e.is_usage() => Self::input(e).maybe_hint(hint),
             e => Self::could_not(e).maybe_hint(hint),

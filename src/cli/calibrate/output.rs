@@ -135,8 +135,8 @@ pub(super) fn finish(
 
 /// Where the choice between estimators is made.
 const WHICH: &str = "\
-which model suits a filter is a question about navigation: calibrate without one of the recordings, nav-sim run each model \
-with --static that recording, and nav-sim compare";
+which model suits a filter is a question about navigation: nav-sim choose RECORDINGS --trajectory FILE leaves out one recording \
+after the other";
 
 /// Refuses to replace a file of the default name that no calibration wrote: nobody asked for it by name.
 pub(super) fn not_of_others(out: &Path) -> Result<(), Failure> {
