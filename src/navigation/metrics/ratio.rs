@@ -44,7 +44,7 @@ pub struct Measured {
     pub runs: Vec<RunRecord>,
     /// Outages (start, end) (s).
     pub outages: Vec<(f64, f64)>,
-    /// As in [`RunResult`](crate::simulation::RunResult): runs beyond these share their noise.
+    /// As in [`RunResult`]: runs beyond these share their noise.
     pub independent_windows: Option<f64>,
     /// Whether the one run stands for what covariance analysis expects: it has no Monte-Carlo error.
     pub is_expected: bool,
