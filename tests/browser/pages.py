@@ -191,13 +191,15 @@ def make(nav_sim, place):
     run("fuse drive/imu.csv drive/gnss.csv calib_data/tactical.toml --reference drive/reference.csv --outage 300:360 "
         "-o fused", codes=(0, 3))
     run("efficiency examples/paper_fig2.toml --sets 2 --samples 4096 --seed 1 -o efficiency")
+    run("choose static --trajectory trajectories/figure_eight.toml --outage 60:90 --estimator awv --model WN+RW --filter 15 "
+        "--inflate none,x10 --seed 1 -o choice")
     run("batch plan examples/quick_study.toml --seed 1 -o study")
     run("batch run examples/quick_study.toml -o study")
     run("batch merge examples/quick_study.toml -o study", codes=(0, 3))
     pages = [("wv.html", None), ("model.html", "fits.json"), ("runs/I_awv/report.html", "runs/I_awv/summary.json"),
              ("runs/lincov/report.html", "runs/lincov/summary.json"), ("comparison.html", "comparison.json"),
              ("fused/report.html", "fused/summary.json"), ("efficiency/report.html", "efficiency/results.json"),
-             ("study/results/report.html", None)]
+             ("choice/report.html", "choice/ranking.json"), ("study/results/report.html", None)]
     return [(place / page, results and place / results) for page, results in pages]
 
 
