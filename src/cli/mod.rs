@@ -11,6 +11,7 @@ mod compare;
 mod completions;
 mod datasheet;
 mod demo;
+mod design;
 mod efficiency;
 mod exit;
 mod export;
@@ -65,6 +66,7 @@ enum Command {
     Tune(tune::Args),
     Require(require::Args),
     Choose(choose::Args),
+    Design(design::Args),
     Fuse(fuse::Args),
     Compare(compare::Args),
     Export(export::Args),
@@ -100,6 +102,7 @@ impl Command {
             Self::Run(args) => run::run(&args, session),
             Self::Require(args) => require::run(&args, session),
             Self::Choose(args) => choose::run(&args, session),
+            Self::Design(args) => design::run(&args, session),
             Self::Tune(args) => tune::run(&args, session),
             Self::Fuse(args) => fuse::run(&args, session),
             Self::Compare(args) => compare::run(&args, session),

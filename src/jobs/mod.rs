@@ -26,6 +26,7 @@ mod calibrate;
 mod certify;
 mod choose;
 mod curves;
+mod design;
 mod error;
 mod files;
 mod navigate;
@@ -39,6 +40,9 @@ pub use calibrate::{Calibration, CalibrationOptions, EstimatorChoice, Measured, 
 pub use certify::{Certificate, CertifiedScale, CertifyError, Recorded, certify};
 pub use choose::{ChoiceDrive, Chosen, choose};
 pub use curves::{Curves, read_curves};
+pub use design::{
+    Design, DesignError, DesignInputs, DesignedParameter, DesignedQuantile, Destination, design,
+};
 pub use error::JobError;
 pub use files::ModelFiles;
 pub use navigate::{NavigateError, NavigateInputs, Navigation, Note, TrueImu, navigate};

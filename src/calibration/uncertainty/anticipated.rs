@@ -208,3 +208,79 @@ fn in_order(composite: &Composite) -> Composite {
     });
     Composite::new(processes)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::{RandomWalk, Variation, VirtualImu, White};
+    use crate::{Pool, calibrate, grouped, replicates};
+
+    const RECORDINGS: usize = 4;
+    const SAMPLES: usize = 2048;
+
+    fn model() -> Model {
+        let white = Process::White(White::new(1.0).unwrap());
+        let walk = Process::RandomWalk(RandomWalk::new(1e-3).unwrap());
+        let axis = Composite::new(vec![white, walk]);
+        Model::pooled(1.0, &axis, &axis)
+    }
+
+    fn settings() -> Settings {
+        Settings {
+            estimators: vec![Estimator::Awv],
+            model: ModelChoice::Given("WN+RW".parse().unwrap()),
+            ..Settings::default()
+        }
+    }
+
+    /// Standard deviations of the logarithms of sigma2 and gamma2.
+    fn scatter(composites: &[Composite]) -> [f64; 2] {
+        std::array::from_fn(|i| {
+            let logs: Vec<f64> = composites.iter().map(|c| c.processes[i].values()[0].ln()).collect();
+            let mean = logs.iter().sum::<f64>() / logs.len() as f64;
+            (logs.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (logs.len() as f64 - 1.0)).sqrt()
+        })
+    }
+
+    fn anticipated(spread: Option<&Spread>, samples: usize, scattering: Scattering) -> Outcome {
+        let model = model();
+        let plan = Anticipated { model: &model, spread, recordings: RECORDINGS, samples };
+        let bootstrap = Bootstrap { draws: 400, seed: 1 };
+        plan.outcomes(Estimator::Awv, &settings(), scattering, bootstrap).unwrap().remove(0)
+    }
+
+    /// By force: recordings made and calibrated, 150 times. Its scatter is known to 1/√300 = 5.8 %, that of 400 draws to
+    /// 3.5 %: four of both together are 27 %.
+    #[test]
+    fn fits_scatter_as_those_of_recordings_that_are_made() {
+        let model = model();
+        let made = |seed: u64| {
+            let imu = VirtualImu { model: &model, spread: None, contamination: None, seed };
+            let accel = Channel::named("accel");
+            let mut signals = Vec::new();
+            for run in 1..=RECORDINGS as u64 {
+                let recording = imu.recording(run, &accel, SAMPLES).unwrap();
+                signals.extend(replicates(&recording, None, &settings().tuning).unwrap());
+            }
+            calibrate(&grouped(signals, Pool::Sensor), &settings()).unwrap().remove(0).fit.composite
+        };
+        let forced = scatter(&(0..150).map(made).collect::<Vec<_>>());
+        let drawn = scatter(&anticipated(None, SAMPLES, Scattering::All).inference.unwrap().drawn);
+        for (drawn, forced) in drawn.into_iter().zip(forced) {
+            assert!((drawn / forced - 1.0).abs() < 0.27, "{drawn} {forced}");
+        }
+    }
+
+    /// A white noise that differs by 10 % from recording to recording, on each axis for itself: the mean of 12 is known to
+    /// 0.1/√12 = 2.9 %, however long they are; 400 draws know that to 3.5 %, four times.
+    #[test]
+    fn endless_recordings_leave_what_they_differ_by() {
+        let law = crate::noise::Law::Normal { sd: 0.1 };
+        let axis = model().axes[0].clone();
+        let vary = || vec![Variation::new(&axis, 1.0, "WN", "sigma2", law).unwrap()];
+        let spread = Spread { axes: std::array::from_fn(|_| vary()) };
+        let endless = anticipated(Some(&spread), 1 << 16, Scattering::BetweenRecordings);
+        let deviation = scatter(&endless.inference.unwrap().drawn)[0];
+        assert!((deviation / (0.1 / 12.0_f64.sqrt()) - 1.0).abs() < 0.14, "{deviation}");
+    }
+}

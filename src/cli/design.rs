@@ -1,0 +1,188 @@
+//! `nav-sim design`: how many recordings, and how long.
+
+use super::parse;
+use super::run::{OutageArg, parse_outage, windows_of};
+use super::{Failure, Session, read};
+use nav_sim::calibration::{Bootstrap, Estimator, Settings};
+use nav_sim::ekf::FilterStates;
+use nav_sim::jobs::{self, Design, DesignInputs, Destination, NavigateInputs, TrueImu};
+use nav_sim::report::{readable, seconds};
+use nav_sim::scenario::{Method, Scenario};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Say how well recordings of an IMU like MODEL would determine it: so many, so long each
+///
+/// The wavelet variances of recordings are drawn by their law, with the [spread] of MODEL between them, and calibrated as
+/// `nav-sim calibrate` would: the scatter of the fits is the interval to expect. With --trajectory also that of the
+/// horizontal error (95 % quantile) at the end of each outage, in a filter that knows the IMU. Without --recordings or
+/// --hours: a table of several.
+#[derive(clap::Args, Debug)]
+#[command(before_help = "\
+Examples:
+  nav-sim design calib_data/tactical.toml --recordings 6 --hours 2
+  nav-sim design calib_data/consumer_mems.toml --recordings 6 --hours 1 --draws 50 --estimator awv
+  nav-sim design calib_data/tactical.toml --recordings 4 --hours 1 --draws 50 \\
+      --trajectory trajectories/figure_eight.toml --outage 300:360")]
+pub(crate) struct Args {
+    /// Noise model of the IMU, as it is believed to be
+    model: PathBuf,
+    /// Recordings [default: a table of 3, 6 and 12]
+    #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(2..=1000))]
+    recordings: Option<u32>,
+    /// Length of each in hours [default: a table of 1, 3 and 10]
+    #[arg(long, value_name = "HOURS", value_parser = parse::positive)]
+    hours: Option<f64>,
+    /// How they will be calibrated: awv, sr-awv or dr-awv
+    #[arg(long, value_name = "ESTIMATOR", default_value_t)]
+    estimator: Estimator,
+    /// Draws of the bootstrap
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(40..=10_000))]
+    draws: u32,
+    /// Trajectory: motion profile (.toml) or table (.csv)
+    #[arg(long, value_name = "FILE")]
+    trajectory: Option<PathBuf>,
+    /// Window without fixes, in seconds (repeatable; default: 300:390 and 700:790)
+    #[arg(long = "outage", value_name = "START:END", value_parser = parse_outage, requires = "trajectory")]
+    outages: Vec<OutageArg>,
+}
+
+/// Longest recording that is planned (h): a year.
+const LONGEST_H: f64 = 8766.0;
+
+pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    if args.estimator.is_single() {
+        let message = format!("--estimator {}: takes one recording at a time", args.estimator);
+        return Err(Failure::input(message).hint("awv, sr-awv or dr-awv average several"));
+    }
+    if args.hours.is_some_and(|hours| hours > LONGEST_H) {
+        return Err(Failure::input("--hours: longer than a year"));
+    }
+    let file = read::model(&args.model, session)?;
+    let mut scenario = Scenario::default();
+    scenario.run.method = Method::Lincov;
+    scenario.filter.states = FilterStates::Full;
+    if !args.outages.is_empty() {
+        scenario.outage = Some(windows_of(&args.outages)?);
+    }
+    let mut navigation = None;
+    if let Some(path) = &args.trajectory {
+        let trajectory = read::trajectory(path, session)?;
+        let span = (trajectory.start_s(), trajectory.end_s());
+        let outages = scenario.outages_on(span, 0)?.windows;
+        scenario.imu.rate_hz = file.model.rate_hz;
+        scenario.validate().map_err(Failure::input)?;
+        let inputs = NavigateInputs::new(trajectory, file.model.clone(), TrueImu::AsBelieved);
+        navigation = Some((inputs, outages));
+    }
+    let bootstrap = Bootstrap { draws: args.draws as usize, seed: session.asked_seed().unwrap_or(1) };
+    let settings = Settings::default();
+    let mut inputs = DesignInputs {
+        file: &file,
+        estimator: args.estimator,
+        settings: &settings,
+        bootstrap,
+        navigation: navigation.as_mut().map(|(inputs, outages)| Destination {
+            inputs,
+            scenario: &scenario,
+            outages,
+        }),
+    };
+    let recordings = args.recordings.map_or(vec![3, 6, 12], |k| vec![k as usize]);
+    let hours = args.hours.map_or(vec![1.0, 3.0, 10.0], |h| vec![h]);
+    let mut designs = Vec::new();
+    for k in recordings {
+        for h in &hours {
+            let design = jobs::design(&mut inputs, k, *h);
+            designs.push(design.map_err(|e| Failure::input(e).hint("more, or longer recordings"))?);
+        }
+    }
+    let shown = match designs.as_slice() {
+        _ if session.json() => json!({ "schema_version": 1, "designs": designs }).to_string(),
+        [design] => single(design),
+        several => grid(several),
+    };
+    session.printer.result(shown.trim_end());
+    Ok(())
+}
+
+fn percent(half_width: Option<f64>) -> String {
+    half_width.map_or("not determined".to_owned(), |half| format!("± {} %", readable(half)))
+}
+
+/// The parameter that would be known least: its name, and how well.
+fn least_known(design: &Design) -> String {
+    let open = design.parameters.iter().filter(|p| p.half_width_pct.is_none()).count();
+    let widest = design.parameters.iter().filter(|p| p.half_width_pct.is_some());
+    let widest = widest.max_by(|a, b| a.half_width_pct.partial_cmp(&b.half_width_pct).expect("numbers"));
+    let widest = widest.map(|p| format!("{} {} {}", p.signals, p.parameter, percent(p.half_width_pct)));
+    match (open, widest) {
+        (0, Some(widest)) => widest,
+        (open, Some(widest)) => format!("{widest}; {open} not determined"),
+        (_, None) => "not determined".to_owned(),
+    }
+}
+
+/// What lengths do not help, in words.
+fn floor(design: &Design) -> Option<String> {
+    let names: Vec<String> =
+        design.lengths_do_not_help().map(|p| format!("{} {}", p.signals, p.parameter)).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "more hours will not help {} of {} parameters ({}, …): the recordings differ among themselves; more \
+             recordings will",
+            names.len(),
+            design.parameters.len(),
+            names[0]
+        )
+    })
+}
+
+fn p95(design: &Design) -> Vec<String> {
+    let line = |q: &jobs::DesignedQuantile| {
+        let [low, high] = q.ci95.map(readable);
+        let window = format!("{}–{} s", seconds(q.start_s), seconds(q.end_s));
+        let half = readable(q.half_width_pct);
+        format!("horizontal p95 at the end of {window}: {} m ± {half} % [{low}, {high}]", readable(q.p95_m))
+    };
+    design.horizontal_p95.iter().map(line).collect()
+}
+
+/// One design: the verdict, then every parameter.
+fn single(design: &Design) -> String {
+    let head = format!("{} recordings of {} h: {}", design.recordings, design.hours, least_known(design));
+    let mut lines = vec![head];
+    lines.extend(p95(design));
+    lines.extend(floor(design));
+    let varies = design.parameters.iter().any(|p| p.endless_half_width_pct.is_some());
+    let mut titles = vec!["parameter", "value", "95 % interval to expect", ""];
+    titles.extend(varies.then_some("of endless recordings"));
+    let mut rows: Vec<Vec<String>> = vec![titles.into_iter().map(str::to_owned).collect()];
+    for p in &design.parameters {
+        let ends =
+            p.ci95.map_or(String::new(), |[low, high]| format!("{} … {}", readable(low), readable(high)));
+        let name = format!("{} {}", p.signals, p.parameter);
+        let mut row = vec![name, readable(p.value), ends, percent(p.half_width_pct)];
+        if varies {
+            row.push(p.endless_half_width_pct.map_or("0 %".to_owned(), |half| percent(Some(half))));
+        }
+        rows.push(row);
+    }
+    format!("{}\n{}", lines.join("\n"), super::compare::table(&rows))
+}
+
+/// Several designs, a row each.
+fn grid(designs: &[Design]) -> String {
+    let windows = designs[0].horizontal_p95.iter();
+    let windows = windows.map(|q| format!("p95 at {} s", seconds(q.end_s)));
+    let titles = ["recordings", "hours", "parameter known least"].map(str::to_owned);
+    let mut rows: Vec<Vec<String>> = vec![titles.into_iter().chain(windows).collect()];
+    for design in designs {
+        let mut row = vec![design.recordings.to_string(), readable(design.hours), least_known(design)];
+        row.extend(design.horizontal_p95.iter().map(|q| percent(Some(q.half_width_pct))));
+        rows.push(row);
+    }
+    let last = designs.last().and_then(floor);
+    let last = last.map_or(String::new(), |floor| format!("with the most hours, {floor}\n"));
+    format!("half of the 95 % intervals to expect\n{last}{}", super::compare::table(&rows))
+}

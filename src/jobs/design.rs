@@ -1,0 +1,195 @@
+//! What a calibration that is not made yet would tell: so many recordings of an IMU, so long each.
+
+use super::navigate::{NavigateError, NavigateInputs, navigate};
+use crate::calibration::{
+    Anticipated, AnticipationError, Bootstrap, Estimator, Outcome, ParameterInterval, Scattering, Settings,
+};
+use crate::formats::draws_file::DrawsFile;
+use crate::formats::model_file::ModelFile;
+use crate::metrics::OutageSummary;
+use crate::noise::Parameter;
+use crate::scenario::Scenario;
+use crate::sensors::outage::Outage;
+use serde::Serialize;
+
+/// What is planned with.
+pub struct DesignInputs<'a> {
+    /// The IMU as it is believed to be, with its spread where recordings differ.
+    pub file: &'a ModelFile,
+    /// How it will be calibrated.
+    pub estimator: Estimator,
+    /// Trim, tuning and weighting of it.
+    pub settings: &'a Settings,
+    /// Draws and their seed.
+    pub bootstrap: Bootstrap,
+    /// A navigation to which the calibration leads, if there is one.
+    pub navigation: Option<Destination<'a>>,
+}
+
+/// A navigation with the model that will be calibrated.
+pub struct Destination<'a> {
+    /// Trajectory and model.
+    pub inputs: &'a mut NavigateInputs,
+    /// Filter and receiver; the method is covariance analysis.
+    pub scenario: &'a Scenario,
+    /// The outages.
+    pub outages: &'a [Outage],
+}
+
+/// Why nothing can be said.
+#[derive(Debug, thiserror::Error)]
+pub enum DesignError {
+    /// No such calibration.
+    #[error(transparent)]
+    Anticipation(#[from] AnticipationError),
+    /// No such navigation.
+    #[error(transparent)]
+    Navigate(#[from] NavigateError),
+}
+
+/// What so many recordings, so long each, would tell.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Design {
+    /// Recordings.
+    pub recordings: usize,
+    /// Length of each (h).
+    pub hours: f64,
+    /// Every parameter.
+    pub parameters: Vec<DesignedParameter>,
+    /// The horizontal p95 at the end of each outage.
+    pub horizontal_p95: Vec<DesignedQuantile>,
+}
+
+/// The interval that a parameter would have.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DesignedParameter {
+    /// `accel`, or `accel.x` alone.
+    pub signals: String,
+    /// `WN sigma2`, `AR1_1 correlation_time_s`.
+    pub parameter: String,
+    /// Its value (units of the model file; s).
+    pub value: f64,
+    /// Expected 95 % interval; none where the recordings would not determine it.
+    pub ci95: Option<[f64; 2]>,
+    /// Half of its width over the value (%).
+    pub half_width_pct: Option<f64>,
+    /// The same of endless recordings, where parameters vary between them: what no length takes away.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub endless_half_width_pct: Option<f64>,
+}
+
+/// The interval that the horizontal p95 at an outage's end would have.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DesignedQuantile {
+    /// First instant without a fix (s).
+    pub start_s: f64,
+    /// First instant with a fix again (s).
+    pub end_s: f64,
+    /// The quantile with the model as it is (m).
+    pub p95_m: f64,
+    /// Expected 95 % interval (m).
+    pub ci95: [f64; 2],
+    /// Half of its width over the value (%).
+    pub half_width_pct: f64,
+}
+
+/// A part of an interval this large is nearly all of it.
+const NEARLY_ALL: f64 = 0.8;
+
+impl Design {
+    /// The parameters whose intervals are nearly all due to what recordings differ by: longer ones tell no more.
+    pub fn lengths_do_not_help(&self) -> impl Iterator<Item = &DesignedParameter> {
+        let is_floor = |p: &&DesignedParameter| {
+            p.endless_half_width_pct
+                .zip(p.half_width_pct)
+                .is_some_and(|(floor, all)| floor >= NEARLY_ALL * all)
+        };
+        self.parameters.iter().filter(is_floor)
+    }
+}
+
+/// What `recordings` of `hours` each would tell.
+///
+/// # Errors
+/// When the recordings are too few or too short, or the navigation cannot be analysed.
+pub fn design(inputs: &mut DesignInputs<'_>, recordings: usize, hours: f64) -> Result<Design, DesignError> {
+    let model = &inputs.file.model;
+    let samples = (hours * 3600.0 * model.rate_hz).round() as usize;
+    let anticipated = Anticipated { model, spread: inputs.file.spread.as_ref(), recordings, samples };
+    let outcomes =
+        |scattering| anticipated.outcomes(inputs.estimator, inputs.settings, scattering, inputs.bootstrap);
+    let all = outcomes(Scattering::All)?;
+    let mut parameters: Vec<DesignedParameter> =
+        all.iter().flat_map(|o| designed(o, model.rate_hz)).collect();
+    if inputs.file.spread.is_some() {
+        let endless = outcomes(Scattering::BetweenRecordings)?;
+        for (parameter, endless) in
+            parameters.iter_mut().zip(endless.iter().flat_map(|o| designed(o, model.rate_hz)))
+        {
+            parameter.endless_half_width_pct = endless.half_width_pct;
+        }
+    }
+    let horizontal_p95 = match &mut inputs.navigation {
+        Some(destination) => quantiles(destination, &all, model.rate_hz)?,
+        None => Vec::new(),
+    };
+    Ok(Design { recordings, hours, parameters, horizontal_p95 })
+}
+
+/// The parameters of an outcome; correlation times in the place of phi and beta, of which a per cent says nothing.
+fn designed(outcome: &Outcome, rate_hz: f64) -> Vec<DesignedParameter> {
+    let composite = &outcome.fit.composite;
+    let values: Vec<_> = composite.parameters().collect();
+    let one = |interval: &ParameterInterval| {
+        let (_, value) = *values.iter().find(|(of, _)| *of == interval.of)?;
+        let (name, label) = (composite.name_of(interval.of), &composite.labels()[interval.of.process]);
+        let (parameter, shown): (String, &dyn Fn(f64) -> f64) = match interval.of.parameter {
+            Parameter::Phi => (format!("{label} correlation_time_s"), &|phi| -1.0 / (rate_hz * phi.ln())),
+            Parameter::Beta => (format!("{label} correlation_time_s"), &|beta| 1.0 / beta),
+            _ => (name, &|value| value),
+        };
+        let value = shown(value);
+        let ci95 = interval.absent.is_none().then(|| {
+            let (a, b) = (shown(interval.low), shown(interval.high));
+            [a.min(b), a.max(b)]
+        });
+        Some(DesignedParameter {
+            signals: outcome.scope.name(),
+            parameter,
+            value,
+            ci95,
+            half_width_pct: ci95.map(|ends| half_width_pct(value, ends)),
+            endless_half_width_pct: None,
+        })
+    };
+    outcome.inference.iter().flat_map(|i| &i.intervals).filter_map(one).collect()
+}
+
+fn half_width_pct(value: f64, [low, high]: [f64; 2]) -> f64 {
+    50.0 * (high - low) / value.abs()
+}
+
+/// The draws of the calibration, taken through the analysis.
+fn quantiles(
+    destination: &mut Destination<'_>,
+    outcomes: &[Outcome],
+    rate_hz: f64,
+) -> Result<Vec<DesignedQuantile>, DesignError> {
+    let mut model = destination.inputs.model.clone();
+    for outcome in outcomes {
+        for channel in outcome.scope.channels() {
+            model.axes[channel.index()] = outcome.fit.composite.clone();
+        }
+    }
+    let draws = DrawsFile::of(&outcomes.iter().collect::<Vec<_>>(), rate_hz);
+    destination.inputs.model_draws = draws.and_then(|draws| draws.draws(&model));
+    destination.inputs.model = model;
+    let found = navigate(destination.inputs, destination.scenario, destination.outages, 0, &())?;
+    let quantile = |o: &OutageSummary| {
+        let h = &o.horizontal_error_end_m;
+        let ci95: [f64; 2] = h.p95_ci95.0.zip(h.p95_ci95.1)?.into();
+        let half_width_pct = half_width_pct(h.p95, ci95);
+        Some(DesignedQuantile { start_s: o.start_s, end_s: o.end_s, p95_m: h.p95, ci95, half_width_pct })
+    };
+    Ok(found.summary.outages.iter().filter_map(quantile).collect())
+}
