@@ -28,9 +28,12 @@ mod diagnosis;
 mod words;
 // All of it.
 mod pipeline;
+// What a calibration that is not made yet would tell.
+mod anticipated;
 // Studies of estimators.
 pub mod efficiency;
 
+pub use anticipated::{Anticipated, AnticipationError};
 pub use curve::{
     AverageError, Change, Estimator, Group, Pool, Replicate, Scope, SignalError, Trim, TrimError, WarmUp,
     average, grouped, implied, replicates, trend, warm_up,
@@ -47,9 +50,7 @@ pub use outcome::{
     Settings, TooSimple, Undetermined,
 };
 pub use pipeline::{CalibrationError, Cause, calibrate, fit_curve, infer};
-pub use uncertainty::{
-    ALIKE_LEVEL, Anticipated, AnticipationError, CurveInfluence, Scattering, derived_interval,
-};
+pub use uncertainty::{ALIKE_LEVEL, CurveInfluence, Scattering, derived_interval};
 pub use words::{
     Share, advice, axes_remark, correlation_time_s, duration, effects, percent, reasons, shares, signals,
     tau_s, undetermined, worst_in_words,

@@ -28,11 +28,11 @@ use std::path::PathBuf;
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
-  nav-sim choose recordings --trajectory trajectories/figure_eight.toml --outage 60:90 -o out/choice
+  nav-sim synthesize calib_data/consumer_mems.toml --replicates 4 --samples 16384 -o recordings
   nav-sim choose recordings --trajectory trajectories/figure_eight.toml --outage 60:90 \\
-      --estimator awv,dr-awv --model N2,WN+RW --filter 15,full
+      --estimator awv,dr-awv --inflate none,x10
   nav-sim choose recordings --trajectory trajectories/figure_eight.toml --outage 60:90 \\
-      --inflate none,tuned,x10 --format json")]
+      --estimator awv --model N1,WN+RW --filter 15,full -o out/models --format json")]
 pub(crate) struct Args {
     /// Static recordings, three or more files, or directories of them
     #[arg(required = true, value_name = "RECORDINGS")]

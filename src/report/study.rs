@@ -373,6 +373,7 @@ mod tests {
             "nees_end",
             "nees_end_std_error",
             "log_density_end",
+            "log_density_end_std_error",
             "_ratio",
         ];
         for (name, kind) in outage_columns().iter().chain(&epoch_columns()).chain(&run_columns()) {

@@ -46,7 +46,11 @@ fn calibrate_writes_its_page_beside_the_model_the_same_on_any_number_of_threads(
     let command =
         "calibrate static --model WN+RW --seed 1 --bootstrap 20 --format json -o m.toml --plot m.svg";
     let ran = done(dir, &format!("{command} -j 1"));
-    assert!(ran.stderr.contains("wrote m.svg") && ran.stderr.contains("m.wv.json, m.html"), "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("wrote m.svg") && ran.stderr.contains("m.wv.json, m.draws.json, m.html"),
+        "{}",
+        ran.stderr
+    );
     let page = text(&dir.join("m.html"));
     is_whole(&page);
     assert!(page.contains("Accelerometer, all axes") && page.contains("data / model"));

@@ -10,7 +10,6 @@
 //! The estimator is applied to the new replicates, trim and all. No signal is simulated. A curve from elsewhere
 //! scatters by its own degrees of freedom.
 
-use super::anticipated::Scattering;
 use super::spread::Spread;
 use crate::curve::sampling::SamplingLaw;
 use crate::curve::{Estimator, Group, Replicate, average, implied};
@@ -20,7 +19,16 @@ use crate::rng::{Generator, StreamKey};
 use crate::wavelet::{Curve, RobustVariance, Status};
 use nalgebra::DMatrix;
 
-/// Beyond this the expansion of the bias of a robust variance ends: the most that was measured (README, Limits: 21 % with
+/// What scatters in the draws.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Scattering {
+    /// Recordings differ, and each scatters for its length.
+    All,
+    /// Recordings differ, each of them endless.
+    BetweenRecordings,
+}
+
+/// Beyond this the expansion of the bias of a robust variance ends: the most that was measured (docs/limits.md: 21 % with
 /// two lengths of the scale in the record).
 const LARGEST_BIAS: f64 = 0.2;
 

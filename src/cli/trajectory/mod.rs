@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 Examples:
   nav-sim trajectory check trajectories/land_vehicle.toml
   nav-sim trajectory generate trajectories/fixed_wing.toml --rate-hz 10 -o flight.csv
-  nav-sim trajectory plot trajectories/land_vehicle.toml --outage 300:390 -o drive.svg")]
+  nav-sim trajectory plot trajectories/land_vehicle.toml --outage 300:390 -o tunnel.svg")]
 pub(crate) struct Args {
     #[command(subcommand)]
     command: Command,

@@ -12,7 +12,7 @@ use std::path::PathBuf;
 #[command(before_help = "\
 Examples:
   nav-sim trajectory plot trajectories/land_vehicle.toml -o drive.svg
-  nav-sim trajectory plot trajectories/land_vehicle.toml --outage 300:390 -o drive.svg
+  nav-sim trajectory plot trajectories/land_vehicle.toml --outage 300:390 -o outage.svg
   nav-sim trajectory plot trajectories/fixed_wing.toml -o flight.svg")]
 pub(super) struct Args {
     #[command(flatten)]

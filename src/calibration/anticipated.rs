@@ -1,13 +1,9 @@
 //! A calibration that is not made yet: what recordings of a known IMU would tell, so many of such a length.
 //!
 //! The wavelet variances of each recording are drawn by the law of those of the model (as behind the intervals of a
-//! calibration that was made, [`super::bootstrap`]); where parameters vary between recordings, those of each are drawn
+//! calibration that was made, `uncertainty::bootstrap`); where parameters vary between recordings, those of each are drawn
 //! first. The estimator and the fit are applied to the draws: their scatter is what an interval would be made of.
 
-use super::bootstrap::{CurveSampler, like};
-use super::intervals::intervals;
-use super::practical;
-use super::spread::Spread as Scatter;
 use crate::curve::{Estimator, Group, Replicate, Scope, average, implied};
 use crate::fit::Fit;
 use crate::imu::{Axis, Channel, Sensor};
@@ -16,6 +12,10 @@ use crate::noise::{Composite, Model, Process, Spread, SpreadError};
 use crate::outcome::{Bootstrap, Inference, ModelChoice, Outcome, Settings};
 use crate::pipeline::{CalibrationError, fit_curve};
 use crate::rng::StreamKey;
+use crate::uncertainty::bootstrap::{CurveSampler, Scattering, like};
+use crate::uncertainty::intervals::intervals;
+use crate::uncertainty::practical;
+use crate::uncertainty::spread::Spread as Scatter;
 use crate::wavelet::default_levels;
 use rayon::prelude::*;
 
@@ -30,15 +30,6 @@ pub struct Anticipated<'a> {
     pub recordings: usize,
     /// Samples of each.
     pub samples: usize,
-}
-
-/// What scatters in the draws.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scattering {
-    /// Recordings differ, and each scatters for its length.
-    All,
-    /// Recordings differ, each of them endless.
-    BetweenRecordings,
 }
 
 /// Why no calibration can be anticipated.
