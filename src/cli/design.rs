@@ -150,7 +150,12 @@ fn p95(design: &Design) -> Vec<String> {
 
 /// One design: the verdict, then every parameter.
 fn single(design: &Design) -> String {
-    let head = format!("{} recordings of {} h: {}", design.recordings, design.hours, least_known(design));
+    let head = format!(
+        "{} recordings of {} h; the parameter known least: {}",
+        design.recordings,
+        design.hours,
+        least_known(design)
+    );
     let mut lines = vec![head];
     lines.extend(p95(design));
     lines.extend(floor(design));

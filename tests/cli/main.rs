@@ -20,6 +20,7 @@ mod choose;
 mod command_line;
 mod compare;
 mod datasheet;
+mod design;
 mod efficiency;
 mod examples;
 mod existing;
