@@ -39,8 +39,20 @@ pub(crate) struct Args {
     /// Where to write the comparison [default: comparison.json, unless that is something else]
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
+    /// Print the table of ASEE ratios alone, in this form
+    #[arg(long, value_enum, value_name = "FORM", conflicts_with = "format")]
+    table: Option<TableForm>,
     #[command(flatten)]
     plot: PlotArgs,
+}
+
+/// How a table is written.
+#[derive(clap::ValueEnum, Clone, Copy, Debug)]
+enum TableForm {
+    Markdown,
+    Csv,
+    /// A `tabular` with the rules of booktabs
+    Latex,
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
@@ -61,7 +73,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if session.json() {
         session.printer.result(json.trim_end());
     } else {
-        session.printer.result(&compared.text());
+        let shown = args.table.map_or_else(|| compared.text(), |form| compared.table(form));
+        session.printer.result(shown.trim_end());
     }
     session.printer.say(&format!("wrote {}, {}", out.display(), page.display()));
     Ok(())
@@ -123,17 +136,32 @@ impl Compared {
         report::comparison_svg(&self.candidates, &self.curves, &self.outages, &self.states)
     }
 
+    /// The table of ASEE ratios.
+    fn rows(&self) -> Vec<Vec<String>> {
+        report::with_times(report::table_rows(&self.candidates, &self.states), &self.outages)
+    }
+
+    fn table(&self, form: TableForm) -> String {
+        let write = match form {
+            TableForm::Markdown => report::markdown_table,
+            TableForm::Csv => report::csv_table,
+            TableForm::Latex => report::latex_table,
+        };
+        write(&self.rows())
+    }
+
     /// The verdicts, the table of ASEE ratios, and what stands beside them.
     fn text(&self) -> String {
         let mut lines = report::verdict_lines(&self.file.verdicts);
         if self.candidates.iter().any(|c| !c.outages.is_empty()) {
             lines.push(format!("ASEE against {}, mean over the outage, %:", self.file.reference));
-            lines.push(table(&report::table_rows(&self.candidates, &self.states)));
+            lines.push(table(&self.rows()));
             lines.push(
                 "NEES (9 if right) and coverage over the outage, RMSE at its end against the reference, %:"
                     .to_owned(),
             );
-            lines.push(table(&report::consistency_rows(&self.candidates, &self.states)));
+            let rows = report::consistency_rows(&self.candidates, &self.states);
+            lines.push(table(&report::with_times(rows, &self.outages)));
         }
         lines.join("\n")
     }

@@ -1,6 +1,6 @@
 //! `comparison.json` and the layout of the paper's Table I.
 
-use super::number::readable;
+use super::number::{readable, seconds};
 use super::verdict::{verdict_in_short, verdict_word};
 use crate::metrics::{OutageComparison, RatioError, Verdict, VerdictKind};
 use crate::simulation::REPORTED_NAMES;
@@ -189,6 +189,16 @@ pub fn verdict_lines(verdicts: &[VerdictRow]) -> Vec<String> {
 pub fn table_rows(candidates: &[CandidateResult], states: &[usize]) -> Vec<Vec<String>> {
     let heads: Vec<String> = states.iter().map(|s| REPORTED_NAMES[*s].to_owned()).collect();
     laid_out(candidates, &heads, &|candidate, outage, column| cell(candidate, outage, states[column]))
+}
+
+/// Outages by their times in the place of their numbers.
+#[must_use]
+pub fn with_times(mut rows: Vec<Vec<String>>, outages: &[(f64, f64)]) -> Vec<Vec<String>> {
+    for row in rows.iter_mut().skip(1) {
+        let time = row[1].parse::<usize>().ok().and_then(|k| outages.get(k - 1));
+        row[1] = time.map_or_else(String::new, |w| format!("{}–{} s", seconds(w.0), seconds(w.1)));
+    }
+    rows
 }
 
 /// Beside Table I, in its layout: mean NEES and coverage over the outage, and (ratio − 1)·100 of the RMSE at

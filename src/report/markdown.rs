@@ -1,4 +1,4 @@
-//! Tables in Markdown.
+//! Tables in Markdown, CSV and LaTeX.
 
 use comfy_table::{ContentArrangement, Table, presets};
 
@@ -20,6 +20,48 @@ pub fn markdown(text: &str) -> String {
     text.replace('|', "\\|").replace('<', "&lt;").replace(['\n', '\r'], " ")
 }
 
+/// A table of rows, of which the first is the head, as CSV.
+#[must_use]
+pub fn csv_table(rows: &[Vec<String>]) -> String {
+    let mut writer = csv::WriterBuilder::new().flexible(true).from_writer(Vec::new());
+    let written = rows.iter().try_for_each(|row| writer.write_record(row)).and_then(|()| Ok(writer.flush()?));
+    written.expect("memory takes every row");
+    String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default()
+}
+
+/// A table of rows, of which the first is the head, as a `tabular` of LaTeX (package booktabs), the first column to the left.
+#[must_use]
+pub fn latex_table(rows: &[Vec<String>]) -> String {
+    let columns = rows.first().map_or(0, Vec::len);
+    let line = |row: &Vec<String>| {
+        let cells: Vec<String> = row.iter().map(|cell| latex(cell)).collect();
+        format!("{} \\\\\n", cells.join(" & "))
+    };
+    let (head, body) = rows
+        .split_first()
+        .map_or((String::new(), String::new()), |(head, rows)| (line(head), rows.iter().map(line).collect()));
+    let layout = format!("l{}", "r".repeat(columns.saturating_sub(1)));
+    format!(
+        "\\begin{{tabular}}{{{layout}}}\n\\toprule\n{head}\\midrule\n{body}\\bottomrule\n\\end{{tabular}}\n"
+    )
+}
+
+/// A text in LaTeX.
+fn latex(text: &str) -> String {
+    let letter = |c: char| match c {
+        '&' | '%' | '$' | '#' | '_' | '{' | '}' => format!("\\{c}"),
+        '\\' => "\\textbackslash{}".to_owned(),
+        '~' => "\\textasciitilde{}".to_owned(),
+        '^' => "\\textasciicircum{}".to_owned(),
+        '±' => "$\\pm$".to_owned(),
+        '−' => "$-$".to_owned(),
+        '–' => "--".to_owned(),
+        '\n' | '\r' => " ".to_owned(),
+        c => c.to_string(),
+    };
+    text.chars().map(letter).collect()
+}
+
 #[cfg(test)]
 mod tests {
     #[test]
@@ -28,5 +70,17 @@ mod tests {
         let table = super::markdown_table(&rows);
         assert_eq!(table.lines().count(), 3, "{table}");
         assert!(table.contains("a\\|b &lt;script>"), "{table}");
+    }
+    #[test]
+    fn tables_of_other_programs_are_escaped() {
+        let rows =
+            [vec!["run".to_owned(), "a, b".to_owned()], vec!["x_1 & 5 %".to_owned(), "1 ± 2".to_owned()]];
+        assert_eq!(super::csv_table(&rows), "run,\"a, b\"\nx_1 & 5 %,1 ± 2\n");
+        let latex = super::latex_table(&rows);
+        assert!(
+            latex.starts_with("\\begin{tabular}{lr}\n\\toprule\nrun & a, b \\\\\n\\midrule\n"),
+            "{latex}"
+        );
+        assert!(latex.contains("x\\_1 \\& 5 \\% & 1 $\\pm$ 2 \\\\\n\\bottomrule"), "{latex}");
     }
 }

@@ -31,14 +31,16 @@ mod verdict;
 pub use brief::brief;
 pub use choose::ChoiceReport;
 pub use columns::columns;
-pub use comparison::{CandidateResult, ComparisonFile, Label, consistency_rows, table_rows, verdict_lines};
+pub use comparison::{
+    CandidateResult, ComparisonFile, Label, consistency_rows, table_rows, verdict_lines, with_times,
+};
 pub use curves::{Band, CONFIDENCE, CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile};
 pub use describe::describe;
 pub use efficiency::{EfficiencyFile, EfficiencyRow, efficiency_csv, efficiency_table};
 pub use fits::{CandidateEntry, FitEntry, FitsFile, MissEntry};
 pub use fusion::{FUSION_FILES, FusionKind, FusionManifest, FusionSummary, fusion_directory, solution_csv};
 pub use manifest::{Input, Manifest, ModelNote};
-pub use markdown::{markdown, markdown_table};
+pub use markdown::{csv_table, latex_table, markdown, markdown_table};
 pub use number::{readable, seconds};
 pub use pages::{
     RatioCurves, calibration_page, calibration_svg, choice_page, comparison_page, comparison_svg,

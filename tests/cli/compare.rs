@@ -114,6 +114,16 @@ fn ratios_are_those_that_were_made() {
     assert!(lines.next().unwrap().starts_with("consistent: I_awv (NEES 9.00, "), "{}", ran.stdout);
     assert!(ran.stdout.contains("NEES, coverage, RMSE pos_e_m, RMSE roll_deg SR-AWV"), "{}", ran.stdout);
     assert!(ran.stdout.contains("9.00, 0.950, +0.00, +0.00") && ran.stdout.lines().count() <= 20);
+    // the same table for other programs, outages by their times
+    let table = |form| {
+        let runs = ["I_awv", "II_awv", "II_sr-awv", "--reference", "I_awv", "--state", "pos_e_m"];
+        compare(directory.path(), &[&runs[..], &["--table", form]].concat()).stdout
+    };
+    let csv = table("csv");
+    assert!(csv.starts_with("scenario,outage,pos_e_m AWV,pos_e_m SR-AWV\nI,4–8 s,–,"), "{csv}");
+    assert!(csv.contains("\nII,4–8 s,+75.00 (75.00)") && csv.lines().count() == 3, "{csv}");
+    let latex = table("latex");
+    assert!(latex.starts_with("\\begin{tabular}{lrrr}") && latex.contains("II & 4--8 s & +75.00"), "{latex}");
     let text = std::fs::read_to_string(directory.path().join("comparison.json")).unwrap();
     let json: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!((&json["reference"], &json["paired"]), (&"I_awv".into(), &true.into()));

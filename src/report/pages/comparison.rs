@@ -2,7 +2,9 @@
 
 use super::{STATES, tone, window};
 use crate::metrics::{Measured, VerdictKind};
-use crate::report::comparison::{CandidateResult, ComparisonFile, Row, in_order, table_rows, verdict_lines};
+use crate::report::comparison::{
+    CandidateResult, ComparisonFile, Row, in_order, table_rows, verdict_lines, with_times,
+};
 use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, Table, svg};
 use crate::simulation::{REPORTED, REPORTED_NAMES};
 
@@ -146,15 +148,6 @@ fn chart(title: &str, own: &[Curve<'_>], outages: &[(f64, f64)], states: &[usize
     };
     let panels = states.iter().map(panel).collect();
     Chart::new(title, Axis::linear("time (s)"), panels).with_outages(outages).in_group("time")
-}
-
-/// Outages by their times in the place of their numbers.
-pub(super) fn with_times(mut rows: Vec<Vec<String>>, outages: &[(f64, f64)]) -> Vec<Vec<String>> {
-    for row in rows.iter_mut().skip(1) {
-        let time = row[1].parse::<usize>().ok().and_then(|k| outages.get(k - 1));
-        row[1] = time.map_or_else(String::new, |w| window(*w));
-    }
-    rows
 }
 
 /// A row a run and outage, as they stand in comparison.json.

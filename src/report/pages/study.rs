@@ -1,7 +1,7 @@
 //! The page of a study: verdicts, drift against the length of outages.
 
-use super::comparison::with_times;
 use crate::metrics::{OutageMetrics, VerdictKind};
+use crate::report::comparison::with_times;
 use crate::report::page::{Axis, Chart, Colour, Interval, Mark, Page, Panel, Series, Table};
 use crate::report::study::{ShownCell, drift_table, ratio_table, verdict_table};
 use crate::report::verdict::verdict_word;
