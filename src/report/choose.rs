@@ -199,7 +199,12 @@ impl ChoiceReport<'_> {
                 continue;
             }
             let own: Vec<_> = scales.iter().filter(|s| s.signals == first.signals).collect();
-            let felt: Vec<_> = own.iter().filter(|s| s.on_error >= DECISIVE * largest).collect();
+            // the scales around the one that counts most
+            let decides = |s: &&crate::choose::ScaleInfluence| s.on_error >= DECISIVE * largest;
+            let peak =
+                (0..own.len()).max_by(|a, b| own[*a].on_error.total_cmp(&own[*b].on_error)).unwrap_or(0);
+            let before = own[..peak].iter().rev().take_while(|s| decides(s)).count();
+            let felt: Vec<_> = own[peak - before..].iter().take_while(|s| decides(s)).collect();
             let sum: f64 = own.iter().map(|s| s.on_error).sum();
             let range = match (felt.first(), felt.last()) {
                 (Some(from), Some(to)) => {
