@@ -62,7 +62,8 @@ fn the_model_that_made_the_recordings_is_chosen_and_written() {
     // without the random walk the filter is lost, ten times the deviations are far too many
     let nees = |name: &str| of(name)["nees"]["value"].as_f64().unwrap();
     assert!(nees("awv WN, 15") > 90.0 && nees("awv WN+RW, 15, x10") < 3.0, "{found}");
-    assert!((nees("awv WN+RW, 15") - 9.0).abs() < 4.0, "{found}");
+    // four recordings hold some nine windows side by side: 9 ± √(18/9), of which three are allowed
+    assert!((nees("awv WN+RW, 15") - 9.0).abs() < 4.3, "{found}");
     assert_eq!(
         (&of("awv WN, 15")["tied"], &of("gmwm WN+RW, 15")["eligible"]),
         (&false.into(), &false.into())
@@ -71,13 +72,14 @@ fn the_model_that_made_the_recordings_is_chosen_and_written() {
     for fold in of("awv WN+RW, 15")["folds"].as_array().unwrap() {
         let (sampled, expected) = (&fold["rmse_m"], &fold["expected"]["rmse_m"]);
         let ratio = sampled.as_f64().unwrap() / expected.as_f64().unwrap();
-        assert!(fold["windows"] == 16 && (0.4..2.5).contains(&ratio), "{fold}");
+        // two windows of two components: the root of a chi-square of four degrees over four, outside in 1e-3
+        assert!(fold["windows"] == 16 && (0.15..2.4).contains(&ratio), "{fold}");
     }
     let file = std::fs::read_to_string(directory.path().join("out/ranking.json")).unwrap();
     assert_eq!(serde_json::from_str::<Value>(&file).unwrap(), found);
     let model: toml::Table =
         std::fs::read_to_string(directory.path().join("out/model.toml")).unwrap().parse().unwrap();
-    // the random walk of 4 × 3 signals of 16384 samples is known to some 10 %
+    // a random walk of 12 signals of 164 s, seen from some 3 s on: 12 × 50 steps, known to √(2/600) = 6 %; six of these
     let walk = model["gyro"]["processes"][1]["gamma2"].as_float().unwrap();
     assert!((walk / 1e-10 - 1.0).abs() < 0.4, "{walk}");
     assert_eq!(model["provenance"]["estimator"].as_str(), Some("awv"));
