@@ -71,7 +71,7 @@ impl Study {
             Ok::<_, Failure>(Unit { name: r.name.clone(), replicates })
         };
         let units = recordings.iter().map(unit).collect::<Result<_, _>>()?;
-        let laboratory = Laboratory { units, settings, pool: None };
+        let laboratory = Laboratory::new(units, settings, None);
         let leave_out = |k: usize, r: &Recording| {
             self.drive.leave_out(&laboratory, k, std::slice::from_ref(r), &self.candidates, RUNS, &|_| ())
         };

@@ -47,7 +47,7 @@ pub use names::UnknownName;
 pub use outcome::{
     AxesDiffer, Bootstrap, Candidate, Departure, FitRange, Goodness, Indistinct, Inference, LevelSpread,
     Miss, ModelChoice, Outcome, ParameterInterval, ParameterLimit, Practical, PracticalIntervals, Ranking,
-    Settings, TooSimple, Undetermined,
+    Settings, TooSimple, Undetermined, model_of, put,
 };
 pub use pipeline::{CalibrationError, Cause, calibrate, fit_curve, infer};
 pub use uncertainty::{ALIKE_LEVEL, CurveInfluence, Scattering, derived_interval};

@@ -116,6 +116,12 @@ impl Candidate {
         all
     }
 
+    /// Whether another one has the same model, before any inflation.
+    #[must_use]
+    pub fn is_calibrated_as(&self, other: &Self) -> bool {
+        self.estimator == other.estimator && self.model == other.model
+    }
+
     /// Whether it may be chosen. What is made of a single recording, while there are several, is shown for comparison.
     #[must_use]
     pub const fn is_eligible(&self) -> bool {

@@ -3,7 +3,7 @@
 use super::candidate::{Candidate, Inflation};
 use super::laboratory::Laboratory;
 use super::score::Score;
-use crate::calibration::CalibrationError;
+use crate::calibration::{CalibrationError, model_of};
 use crate::ekf::{Belief, BeliefError};
 use crate::imu::{Recording, Sensor};
 use crate::monte_carlo;
@@ -16,6 +16,7 @@ use crate::simulation::ExperimentError;
 use crate::simulation::lincov::{Aim, Factor, FilterPass, Per, Task, Track, TruthSide, scaled};
 use crate::trajectory::Trajectory;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// A trajectory with its fixes, outages and random numbers.
 #[derive(Debug)]
@@ -138,9 +139,13 @@ impl Drive {
         let models = self.models(laboratory, Some(k), candidates)?;
         let beliefs = self.beliefs(candidates, &models)?;
         let own = own_model(laboratory, k)?;
-        let expected = self.expected(&beliefs, &own);
-        let usable: Vec<Recording> =
-            recordings.iter().filter(|r| self.independent_windows(r.len()) >= 1.0).cloned().collect();
+        let expected = self.expected(&beliefs, own);
+        let is_long = |r: &Recording| self.independent_windows(r.len()) >= 1.0;
+        let usable: Cow<'_, [Recording]> = if recordings.iter().all(is_long) {
+            recordings.into()
+        } else {
+            recordings.iter().filter(|r| is_long(r)).cloned().collect()
+        };
         let samples: usize = usable.iter().map(Recording::len).sum();
         let independent = self.independent_windows(samples);
         let sampled = if usable.is_empty() { None } else { self.sampled(&beliefs, &usable, runs, progress)? };
@@ -163,30 +168,40 @@ impl Drive {
     ) -> Result<Vec<Model>, ChoiceError> {
         let mut made: Vec<(&Candidate, Model)> = Vec::new();
         for candidate in candidates {
-            let alike = |c: &&Candidate| c.estimator == candidate.estimator && c.model == candidate.model;
-            if !made.iter().any(|(c, _)| alike(c)) {
-                let model = laboratory.model(candidate, without).map_err(|source| {
-                    ChoiceError::Calibration { candidate: candidate.to_string(), source: Box::new(source) }
-                })?;
-                made.push((candidate, model));
+            if !made.iter().any(|(other, _)| other.is_calibrated_as(candidate)) {
+                let calibrated = laboratory.calibrate(candidate, without);
+                let (_, outcomes, settings) = calibrated.map_err(|source| uncalibrated(candidate, source))?;
+                made.push((candidate, model_of(&outcomes, settings.rate_hz)));
             }
         }
-        let truths = if candidates.iter().any(|c| c.inflation == Inflation::Tuned) {
-            let others: Vec<usize> = laboratory.others(without).map(|(k, _)| k).collect();
-            others.par_iter().map(|k| own_model(laboratory, *k)).collect::<Result<Vec<_>, _>>()?
-        } else {
-            Vec::new()
-        };
         let inflated = |candidate: &Candidate| {
-            let alike = |c: &&Candidate| c.estimator == candidate.estimator && c.model == candidate.model;
-            let model = made.iter().find(|(c, _)| alike(c)).map(|(_, model)| model).expect("made above");
-            match candidate.inflation {
-                Inflation::None => Ok(model.clone()),
-                Inflation::Tenfold => Ok(tenfold(model)),
-                Inflation::Tuned => self.tuned(candidate, model, &truths),
-            }
+            let (_, model) = made.iter().find(|(c, _)| c.is_calibrated_as(candidate)).expect("made above");
+            self.inflated(laboratory, without, candidate, model)
         };
         candidates.iter().map(inflated).collect()
+    }
+
+    /// A candidate's calibrated model, inflated as it says; tuned for the recordings but one.
+    ///
+    /// # Errors
+    /// When the noise of a recording cannot be described, or a model has no filter.
+    pub fn inflated(
+        &self,
+        laboratory: &Laboratory,
+        without: Option<usize>,
+        candidate: &Candidate,
+        model: &Model,
+    ) -> Result<Model, ChoiceError> {
+        match candidate.inflation {
+            Inflation::None => Ok(model.clone()),
+            Inflation::Tenfold => Ok(tenfold(model)),
+            Inflation::Tuned => {
+                let others: Vec<usize> = laboratory.others(without).collect();
+                let own = |k: &usize| own_model(laboratory, *k).cloned();
+                let truths: Vec<Model> = others.par_iter().map(own).collect::<Result<_, _>>()?;
+                self.tuned(candidate, model, &truths)
+            }
+        }
     }
 
     fn tuned(&self, candidate: &Candidate, model: &Model, truths: &[Model]) -> Result<Model, ChoiceError> {
@@ -266,11 +281,15 @@ impl Drive {
     }
 }
 
-fn own_model(laboratory: &Laboratory, k: usize) -> Result<Model, ChoiceError> {
+fn own_model(laboratory: &Laboratory, k: usize) -> Result<&Model, ChoiceError> {
     laboratory.own_model(k).map_err(|source| ChoiceError::Own {
-        recording: laboratory.units[k].name.clone(),
+        recording: laboratory.units()[k].name.clone(),
         source: Box::new(source),
     })
+}
+
+fn uncalibrated(candidate: &Candidate, source: CalibrationError) -> ChoiceError {
+    ChoiceError::Calibration { candidate: candidate.to_string(), source: Box::new(source) }
 }
 
 /// Ten times every standard deviation.

@@ -6,8 +6,10 @@
 
 use super::drive::{ChoiceError, Drive};
 use super::laboratory::Laboratory;
-use crate::calibration::{CurveInfluence, Estimator, Group, Outcome, Settings, average, tau_s};
-use crate::noise::{Composite, Model};
+use crate::calibration::{
+    CurveInfluence, Estimator, Group, Outcome, Settings, average, model_of, put, tau_s,
+};
+use crate::noise::Model;
 use crate::simulation::lincov::assess;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -61,44 +63,36 @@ impl Drive {
         outcomes: &[Outcome],
         settings: &Settings,
     ) -> Result<Influence, ChoiceError> {
-        let mut model = Model { rate_hz: settings.rate_hz, axes: Default::default() };
-        for outcome in outcomes {
-            put(&mut model, outcome, &outcome.fit.composite);
+        let model = model_of(outcomes, settings.rate_hz);
+        let mut scales = Vec::new();
+        let mut by_group: Vec<(&Group, Vec<f64>)> = Vec::new();
+        for (group, outcome) in groups.iter().zip(outcomes) {
+            let Some(influence) = CurveInfluence::of(outcome, settings) else { continue };
+            let on_error = self.on_error(&model, outcome, &influence, settings)?;
+            let levels = outcome.curve.levels.iter().zip(&on_error);
+            scales.extend(levels.map(|(level, on_error)| ScaleInfluence {
+                signals: outcome.scope.name(),
+                tau_s: tau_s(*level, settings.rate_hz),
+                on_error: *on_error,
+            }));
+            by_group.push((group, on_error));
         }
-        let mut per_level: Vec<(usize, Vec<f64>)> = Vec::new();
-        for (o, outcome) in outcomes.iter().enumerate() {
-            if let Some(influence) = CurveInfluence::of(outcome, settings) {
-                per_level.push((o, self.on_error(&model, outcome, &influence, settings)?));
-            }
-        }
-        let of_outcome = |(o, on_error): &(usize, Vec<f64>)| {
-            let outcome = &outcomes[*o];
-            let levels = outcome.curve.levels.clone().into_iter();
-            let pairs: Vec<(u32, f64)> = levels.zip(on_error.clone()).collect();
-            let signals = outcome.scope.name();
-            pairs.into_iter().map(move |(level, on_error)| ScaleInfluence {
-                signals: signals.clone(),
-                tau_s: tau_s(level, settings.rate_hz),
-                on_error,
-            })
-        };
-        let scales = per_level.iter().flat_map(of_outcome).collect();
         let recording = |k: usize| {
             let adds = |estimator| {
-                let ln: f64 = per_level
-                    .iter()
-                    .map(|(o, i)| added(laboratory, k, &groups[*o], i, estimator, settings))
-                    .sum();
+                let of_group = |(group, on_error): &(&Group, Vec<f64>)| {
+                    added(laboratory, k, group, on_error, estimator, settings)
+                };
+                let ln: f64 = by_group.iter().map(of_group).sum();
                 100.0 * ln.exp_m1()
             };
             RecordingInfluence {
-                recording: laboratory.units[k].name.clone(),
+                recording: laboratory.units()[k].name.clone(),
                 awv_pct: adds(Estimator::Awv),
                 sr_awv_pct: adds(Estimator::SrAwv),
                 dr_awv_pct: adds(Estimator::DrAwv),
             }
         };
-        Ok(Influence { scales, recordings: (0..laboratory.units.len()).map(recording).collect() })
+        Ok(Influence { scales, recordings: (0..laboratory.units().len()).map(recording).collect() })
     }
 
     /// d ln(error) / d ln(nu_j), scale by scale of one fit.
@@ -111,19 +105,10 @@ impl Drive {
     ) -> Result<Vec<f64>, ChoiceError> {
         let slope = |m: usize| {
             let at = |by: f64| {
-                let of = influence.parameters[m];
-                let mut composite = outcome.fit.composite.clone();
-                let process = &mut composite.processes[of.process];
-                let value = process.values()[parameter_index(process, of.parameter.name())];
-                let moved = process.with_parameter(
-                    of.parameter.name(),
-                    value + by * influence.units[m],
-                    settings.rate_hz,
-                );
-                // within a thousandth of the way to the end of its domain
-                *process = moved.and_then(Result::ok).unwrap_or(*process);
+                let moved = influence.moved(&outcome.fit.composite, m, by, settings.rate_hz);
+                let composite = moved.expect("a thousandth of the way to the end of its domain is within it");
                 let mut changed = model.clone();
-                put(&mut changed, outcome, &composite);
+                put(&composite, outcome.scope, &mut changed);
                 self.horizontal_rmse(&changed).map(f64::ln)
             };
             Ok::<f64, ChoiceError>((at(STEP)? - at(-STEP)?) / (2.0 * STEP))
@@ -146,17 +131,6 @@ impl Drive {
     }
 }
 
-fn parameter_index(process: &crate::noise::Process, name: &str) -> usize {
-    process.kind().parameters().iter().position(|p| p.name() == name).expect("a parameter of the process")
-}
-
-/// Puts the noise of an outcome's signals into a model.
-fn put(model: &mut Model, outcome: &Outcome, composite: &Composite) {
-    for channel in outcome.scope.channels() {
-        model.axes[channel.index()] = composite.clone();
-    }
-}
-
 /// ln of what a recording's presence in the average does to the error: Σ (d ln error / d ln nu_j) Δ ln nu_j.
 fn added(
     laboratory: &Laboratory,
@@ -166,7 +140,7 @@ fn added(
     estimator: Estimator,
     settings: &Settings,
 ) -> f64 {
-    let own: Vec<&str> = laboratory.units[k].replicates.iter().map(|(_, r)| r.name.as_str()).collect();
+    let own: Vec<&str> = laboratory.units()[k].replicates.iter().map(|(_, r)| r.name.as_str()).collect();
     let others: Vec<_> =
         group.replicates.iter().filter(|r| !own.contains(&r.name.as_str())).cloned().collect();
     let curve = |replicates: &[_]| average(replicates, estimator, settings.trim, &settings.tuning).ok();

@@ -2,10 +2,12 @@
 
 use super::candidate::Candidate;
 use crate::calibration::{
-    CalibrationError, Estimator, Group, ModelChoice, ModelSpec, Pool, Replicate, Settings, calibrate, grouped,
+    CalibrationError, Estimator, Group, ModelChoice, ModelSpec, Outcome, Pool, Replicate, Settings,
+    calibrate, grouped, model_of,
 };
 use crate::imu::Channel;
 use crate::noise::Model;
+use std::sync::OnceLock;
 
 /// One recording: what is kept of it. The stretches of a file that has gaps are one.
 #[derive(Debug, Clone)]
@@ -17,44 +19,75 @@ pub struct Unit {
 }
 
 /// All recordings and how models are made of them.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Laboratory {
-    /// The recordings.
-    pub units: Vec<Unit>,
-    /// How models are fitted; estimators and model are those of the candidates.
-    pub settings: Settings,
-    /// Which signals are replicates of one another; none: the axes of a sensor, but for single recordings.
-    pub pool: Option<Pool>,
+    units: Vec<Unit>,
+    settings: Settings,
+    pool: Option<Pool>,
+    /// The noise of each recording alone, once it was asked for.
+    own: Vec<OnceLock<Model>>,
 }
 
+/// The groups of recordings that were calibrated, their fits, and how these were made.
+pub type Calibrated = (Vec<Group>, Vec<Outcome>, Settings);
+
 impl Laboratory {
-    /// The model of a candidate, of all recordings but one, before any inflation. An estimator of single recordings
-    /// takes that after the one left out (the first, where none is), so that each is taken once.
+    /// Estimators and model of the settings count nothing: those of the candidates do. `pool`: which signals are
+    /// replicates of one another; none: the axes of a sensor, but for single recordings.
+    #[must_use]
+    pub fn new(units: Vec<Unit>, settings: Settings, pool: Option<Pool>) -> Self {
+        let own = units.iter().map(|_| OnceLock::new()).collect();
+        Self { units, settings, pool, own }
+    }
+
+    /// The recordings.
+    #[must_use]
+    pub fn units(&self) -> &[Unit] {
+        &self.units
+    }
+
+    /// Sample rate (Hz).
+    #[must_use]
+    pub const fn rate_hz(&self) -> f64 {
+        self.settings.rate_hz
+    }
+
+    /// Calibrates a candidate on all recordings but one, before any inflation. An estimator of single recordings takes
+    /// that after the one left out (the first, where none is), so that each is taken once.
     ///
     /// # Errors
     /// When a trim leaves no replicate, or a curve is too short for the model.
-    pub fn model(&self, candidate: &Candidate, without: Option<usize>) -> Result<Model, CalibrationError> {
+    pub fn calibrate(
+        &self,
+        candidate: &Candidate,
+        without: Option<usize>,
+    ) -> Result<Calibrated, CalibrationError> {
         let of_units: Vec<&Unit> = if candidate.estimator.is_single() {
             vec![&self.units[without.map_or(0, |k| (k + 1) % self.units.len())]]
         } else {
-            self.others(without).map(|(_, unit)| unit).collect()
+            self.others(without).map(|k| &self.units[k]).collect()
         };
-        let Candidate { estimator, ref model, .. } = *candidate;
-        self.fit(&of_units, estimator, model, self.pool)
+        self.fit(&of_units, candidate.estimator, &candidate.model, self.pool)
     }
 
-    /// The recordings but one, with their indices.
-    pub(super) fn others(&self, without: Option<usize>) -> impl Iterator<Item = (usize, &Unit)> {
-        self.units.iter().enumerate().filter(move |(k, _)| Some(*k) != without)
+    /// The recordings but one.
+    pub(super) fn others(&self, without: Option<usize>) -> impl Iterator<Item = usize> {
+        (0..self.units.len()).filter(move |k| Some(*k) != without)
     }
 
     /// The noise of one recording as it was met: N2 fitted to the classical wavelet variance of each axis.
     ///
     /// # Errors
     /// When a curve is too short for the model.
-    pub fn own_model(&self, k: usize) -> Result<Model, CalibrationError> {
-        let n2 = ModelChoice::Given(ModelSpec::n2());
-        self.fit(&[&self.units[k]], Estimator::Awv, &n2, Some(Pool::Axes))
+    pub fn own_model(&self, k: usize) -> Result<&Model, CalibrationError> {
+        if self.own[k].get().is_none() {
+            let n2 = ModelChoice::Given(ModelSpec::n2());
+            let (_, outcomes, settings) =
+                self.fit(&[&self.units[k]], Estimator::Awv, &n2, Some(Pool::Axes))?;
+            // another thread may have been as quick, with the same model
+            let _ = self.own[k].set(model_of(&outcomes, settings.rate_hz));
+        }
+        Ok(self.own[k].get().expect("set above"))
     }
 
     fn fit(
@@ -63,19 +96,13 @@ impl Laboratory {
         estimator: Estimator,
         model: &ModelChoice,
         pool: Option<Pool>,
-    ) -> Result<Model, CalibrationError> {
+    ) -> Result<Calibrated, CalibrationError> {
         let settings =
             Settings { estimators: vec![estimator], model: model.clone(), ..self.settings.clone() };
         // an estimator of single recordings cannot pool axes
         let pool = if estimator.is_single() { Pool::Axes } else { pool.unwrap_or(settings.pool()) };
-        let replicates = units.iter().flat_map(|unit| unit.replicates.clone()).collect();
-        let groups: Vec<Group> = grouped(replicates, pool);
-        let mut fitted = Model { rate_hz: settings.rate_hz, axes: Default::default() };
-        for outcome in calibrate(&groups, &settings)? {
-            for channel in outcome.scope.channels() {
-                fitted.axes[channel.index()] = outcome.fit.composite.clone();
-            }
-        }
-        Ok(fitted)
+        let groups = grouped(units.iter().flat_map(|unit| unit.replicates.clone()).collect(), pool);
+        let outcomes = calibrate(&groups, &settings)?;
+        Ok((groups, outcomes, settings))
     }
 }

@@ -24,7 +24,7 @@
 //!     Ok::<_, Box<dyn std::error::Error>>(Unit { name: r.name.clone(), replicates: replicates(r, Some(10), &settings.tuning)? })
 //! };
 //! let units = recordings.iter().map(unit).collect::<Result<Vec<_>, _>>()?;
-//! let laboratory = Laboratory { units, settings, pool: None };
+//! let laboratory = Laboratory::new(units, settings, None);
 //!
 //! let (trajectory, _) = load_trajectory("trajectories/figure_eight.toml".as_ref(), &TrajectoryOptions::default())?;
 //! let drive = Drive::new(&trajectory, Scenario::default(), vec![Outage { start_s: 60.0, end_s: 90.0 }], 100.0, 1)?;
@@ -44,6 +44,6 @@ mod score;
 pub use candidate::{Candidate, Inflation, UnknownInflation};
 pub use drive::{ChoiceError, Drive, Fold};
 pub use influence::{Influence, RecordingInfluence, ScaleInfluence};
-pub use laboratory::{Laboratory, Unit};
+pub use laboratory::{Calibrated, Laboratory, Unit};
 pub use ranking::{Difference, FoldScore, Mean, Placed, Ranking};
 pub use score::{EndScore, Score};

@@ -2,7 +2,7 @@
 
 use super::jobs::unknown_model;
 use super::recordings::{RecordingArgs, Said};
-use super::run::{OutageArg, Words, empty_or_new, parse_outage, windows_of};
+use super::run::{OutageArg, Words, empty_or_new, parse_outage, scenario_with};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
 use nav_sim::calibration::{Bootstrap, Estimator, ModelChoice, Pool, Settings, Trim, diagnose};
@@ -10,7 +10,6 @@ use nav_sim::choose::{Candidate, Inflation};
 use nav_sim::ekf::FilterStates;
 use nav_sim::formats::atomic::{AtomicDir, Existing};
 use nav_sim::formats::model_file::{self, CalibrationNote, ModelFile};
-use nav_sim::formats::scenario_file;
 use nav_sim::jobs::{
     self, Calibration, CalibrationOptions, ChoiceDrive, Chosen, EstimatorChoice, ModelFiles,
 };
@@ -163,11 +162,7 @@ fn candidates(args: &Args) -> Result<Vec<Candidate>, Failure> {
 }
 
 fn scenario(args: &Args) -> Result<Scenario, Failure> {
-    let mut scenario = args.scenario.as_deref().map(scenario_file::read).transpose()?.unwrap_or_default();
-    if !args.outages.is_empty() {
-        scenario.outage = Some(windows_of(&args.outages)?);
-        (scenario.outage_periodic, scenario.outage_random) = (None, None);
-    }
+    let scenario = scenario_with(args.scenario.as_deref(), &args.outages)?;
     scenario.validate().map_err(Failure::input)?;
     Ok(scenario)
 }

@@ -1,11 +1,10 @@
 //! `nav-sim tune`: honest inflation of a noise model.
 
-use super::run::{OutageArg, parse_outage, windows_of};
+use super::run::{OutageArg, parse_outage, scenario_with};
 use super::{Failure, Session, read, turn_on};
 use nav_sim::ekf::FilterStates;
 use nav_sim::formats::atomic::{AtomicFile, guard_inputs};
 use nav_sim::formats::model_file::{self, ModelFile};
-use nav_sim::formats::scenario_file;
 use nav_sim::noise::Model;
 use nav_sim::report::{FactorEntry, Input, TuneResult};
 use nav_sim::scenario::Scenario;
@@ -167,11 +166,7 @@ fn refuse_recordings(args: &Args) -> Result<(), Failure> {
 }
 
 fn scenario(args: &Args) -> Result<Scenario, Failure> {
-    let mut scenario = args.scenario.as_deref().map(scenario_file::read).transpose()?.unwrap_or_default();
-    if !args.outages.is_empty() {
-        scenario.outage = Some(windows_of(&args.outages)?);
-        (scenario.outage_periodic, scenario.outage_random) = (None, None);
-    }
+    let scenario = scenario_with(args.scenario.as_deref(), &args.outages)?;
     scenario.validate().map_err(Failure::input)?;
     Ok(scenario)
 }

@@ -187,13 +187,8 @@ impl Calibration {
     /// The noise model of an estimator, at the rate of the recordings; axes without a recording have no noise.
     #[must_use]
     pub fn model(&self, estimator: Estimator) -> Model {
-        let mut model = Model { rate_hz: self.settings.rate_hz, axes: Default::default() };
-        for outcome in self.outcomes.iter().filter(|o| o.estimator == estimator) {
-            for channel in outcome.scope.channels() {
-                model.axes[channel.index()] = outcome.fit.composite.clone();
-            }
-        }
-        model
+        let own = self.outcomes.iter().filter(|o| o.estimator == estimator);
+        calibration::model_of(own, self.settings.rate_hz)
     }
 
     /// The same with intervals and goodness of fit, if they are asked for.

@@ -1,7 +1,7 @@
 //! Static recordings and a trajectory → the noise model that a filter is best made of.
 
 use super::{Calibration, CalibrationOptions, EstimatorChoice, JobError, Measured, Note, Remarks, measure};
-use crate::calibration::{Estimator, Pool, Settings};
+use crate::calibration::{Estimator, model_of};
 use crate::choose::{Candidate, ChoiceError, Drive, Fold, Influence, Laboratory, Ranking, Unit};
 use crate::formats::recordings::{self, FileReport, ReadOptions};
 use crate::imu::{Axis, Channel, Recording};
@@ -69,8 +69,8 @@ pub fn choose(
     if files.len() < FEWEST {
         return Err(JobError::TooFew { recordings: files.len(), needed: FEWEST });
     }
-    let laboratory = Laboratory { units: units(&measured), settings: measured.settings, pool: asked_pool };
-    let rate_hz = laboratory.settings.rate_hz;
+    let laboratory = Laboratory::new(units(&measured), measured.settings, asked_pool);
+    let rate_hz = laboratory.rate_hz();
     let ChoiceDrive { trajectory, scenario, outages, seed, runs } = drive;
     let drive = Drive::new(&trajectory, scenario, outages, rate_hz, seed).map_err(ChoiceError::from)?;
     let runs: Vec<u64> = files.iter().map(|file| runs.unwrap_or_else(|| runs_on(&drive, file))).collect();
@@ -85,10 +85,12 @@ pub fn choose(
     observer.end();
     let ranking = Ranking::new(candidates, &folds);
     let winner = candidates[ranking.winner().index].clone();
-    let model = drive.models(&laboratory, None, std::slice::from_ref(&winner))?.remove(0);
-    let calibration = final_calibration(&laboratory, &winner, &options)?;
-    let Calibration { groups, outcomes, settings } = &calibration;
-    let influence = drive.influence(&laboratory, groups, outcomes, settings)?;
+    // an estimator of single recordings never wins: this is of all of them
+    let (groups, outcomes, settings) = laboratory.calibrate(&winner, None)?;
+    let calibrated = model_of(&outcomes, settings.rate_hz);
+    let model = drive.inflated(&laboratory, None, &winner, &calibrated)?;
+    let influence = drive.influence(&laboratory, &groups, &outcomes, &settings)?;
+    let calibration = Calibration { groups, outcomes, settings }.with_inference(options.bootstrap);
     let files = files.into_iter().map(|file| file.path).collect();
     Ok(Chosen { ranking, winner, calibration, influence, model, files })
 }
@@ -118,19 +120,4 @@ fn runs_on(drive: &Drive, file: &FileReport) -> u64 {
 
 fn samples_of(file: &FileReport, reading: &ReadOptions) -> Result<Vec<Recording>, JobError> {
     Ok(recordings::read(std::slice::from_ref(&file.path), reading)?.0)
-}
-
-/// The winner's calibration of all recordings; an estimator of single ones never wins.
-fn final_calibration(
-    laboratory: &Laboratory,
-    winner: &Candidate,
-    options: &CalibrationOptions,
-) -> Result<Calibration, JobError> {
-    let Laboratory { units, settings, pool } = laboratory.clone();
-    let settings = Settings { estimators: vec![winner.estimator], model: winner.model.clone(), ..settings };
-    let replicates = units.into_iter().flat_map(|unit| unit.replicates).collect();
-    let pool: Pool = pool.unwrap_or(settings.pool());
-    let groups = crate::calibration::grouped(replicates, pool);
-    let outcomes = crate::calibration::calibrate(&groups, &settings)?;
-    Ok(Calibration { groups, outcomes, settings }.with_inference(options.bootstrap))
 }

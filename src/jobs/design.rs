@@ -176,11 +176,7 @@ fn quantiles(
     rate_hz: f64,
 ) -> Result<Vec<DesignedQuantile>, DesignError> {
     let mut model = destination.inputs.model.clone();
-    for outcome in outcomes {
-        for channel in outcome.scope.channels() {
-            model.axes[channel.index()] = outcome.fit.composite.clone();
-        }
-    }
+    outcomes.iter().for_each(|outcome| outcome.put_into(&mut model));
     let draws = DrawsFile::of(&outcomes.iter().collect::<Vec<_>>(), rate_hz);
     destination.inputs.model_draws = draws.and_then(|draws| draws.draws(&model));
     destination.inputs.model = model;

@@ -47,7 +47,7 @@ fn influence_in_navigation_is_that_of_brute_force() {
     let fitted =
         |sensor, curve: &Curve| fit_curve(&group(sensor), Estimator::Awv, curve.clone(), &settings).unwrap();
     let outcomes = sensors.clone().map(|(sensor, curve)| fitted(sensor, &curve));
-    let laboratory = Laboratory { units: Vec::new(), settings: settings.clone(), pool: None };
+    let laboratory = Laboratory::new(Vec::new(), settings.clone(), None);
     let groups = sensors.clone().map(|(sensor, _)| group(sensor));
     for (name, start_s) in [("figure_eight", 60.0), ("land_vehicle", 300.0), ("fixed_wing", 200.0)] {
         let path = format!("trajectories/{name}.toml");

@@ -16,7 +16,22 @@ pub use settings::{FitRange, ModelChoice, ParameterLimit, Settings};
 use crate::curve::{Estimator, Scope};
 use crate::fit::{Fit, FitError, estimate_again};
 use crate::model::ModelSpec;
+use crate::noise::{Composite, Model, ParameterRef};
 use crate::wavelet::Curve;
+
+/// The noise model of outcomes, at a rate (Hz); axes of none have no noise.
+pub fn model_of<'a>(outcomes: impl IntoIterator<Item = &'a Outcome>, rate_hz: f64) -> Model {
+    let mut model = Model { rate_hz, axes: Default::default() };
+    outcomes.into_iter().for_each(|outcome| outcome.put_into(&mut model));
+    model
+}
+
+/// Gives noise to the axes of a model.
+pub fn put(composite: &Composite, scope: Scope, model: &mut Model) {
+    for channel in scope.channels() {
+        model.axes[channel.index()] = composite.clone();
+    }
+}
 
 /// One fit.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,6 +61,18 @@ pub struct Outcome {
 }
 
 impl Outcome {
+    /// Gives its noise to the axes of a model that it is for.
+    pub fn put_into(&self, model: &mut Model) {
+        put(&self.fit.composite, self.scope, model);
+    }
+
+    /// Whether a parameter follows the curve: it is not fixed, stands at no bound, and its process has an amplitude.
+    pub(crate) fn moves(&self, of: ParameterRef) -> bool {
+        let at_bound = self.fit.bounded.contains(&of)
+            || (self.fit.at_end.contains(&of.process) && of.parameter.is_shape());
+        !(self.spec.is_fixed(of) || self.fit.zero.contains(&of.process) || at_bound)
+    }
+
     /// The fit to a curve that resembles this one.
     pub(crate) fn estimate_again(&self, curve: &Curve, settings: &Settings) -> Result<Fit, FitError> {
         estimate_again(self.estimator, curve, &self.spec, settings.rate_hz, settings.weighting, &self.fit)

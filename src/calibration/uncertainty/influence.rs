@@ -9,7 +9,7 @@
 use crate::curve::Estimator;
 use crate::curve::implied::{implied, implied_gradients};
 use crate::fit::Weighting;
-use crate::noise::{Composite, ParameterRef};
+use crate::noise::{Composite, Parameter, ParameterRef};
 use crate::outcome::{Outcome, Settings};
 use crate::wavelet::Curve;
 use nalgebra::{DMatrix, DVector};
@@ -19,7 +19,7 @@ use nalgebra::{DMatrix, DVector};
 pub struct CurveInfluence {
     /// Which.
     pub parameters: Vec<ParameterRef>,
-    /// A natural step of each, in its units: an amplitude itself, 1 − phi of a coefficient.
+    /// A natural step of each, in its units: 1 − |phi| of a coefficient, the parameter itself of any other.
     pub units: Vec<f64>,
     /// d theta_m / d ln nu_j over that step, parameter by parameter (rows), scale by scale.
     pub passed_on: DMatrix<f64>,
@@ -37,30 +37,24 @@ impl CurveInfluence {
         if outcome.estimator == Estimator::Avlr || fit.mixing.is_some() {
             return None;
         }
-        let moves = |of: ParameterRef| {
-            let at_end = fit.at_end.contains(&of.process) && of.parameter.is_shape();
-            let stands = fit.zero.contains(&of.process) || at_end || fit.bounded.contains(&of);
-            !stands && !outcome.spec.is_fixed(of)
-        };
-        let all: Vec<(usize, ParameterRef, f64)> =
-            fit.composite.parameters().enumerate().map(|(i, (of, value))| (i, of, value)).collect();
-        let moving: Vec<(usize, ParameterRef, f64)> =
-            all.into_iter().filter(|(_, of, _)| moves(*of)).collect();
+        let all = fit.composite.parameters().enumerate();
+        let moving: Vec<(usize, (ParameterRef, f64))> =
+            all.filter(|(_, (of, _))| outcome.moves(*of)).collect();
         if moving.is_empty() {
             return None;
         }
-        let unit = |of: ParameterRef, value: f64| if of.parameter.is_shape() { 1.0 - value } else { value };
-        let units: Vec<f64> = moving.iter().map(|(_, of, value)| unit(*of, *value)).collect();
-        let equation = Equation {
-            columns: moving.iter().map(|(i, ..)| *i).collect(),
-            units: units.clone(),
-            weighting: settings.weighting,
+        let unit = |(_, (of, value)): &(usize, (ParameterRef, f64))| match of.parameter {
+            Parameter::Phi | Parameter::Theta => 1.0 - value.abs(),
+            _ => *value,
         };
+        let units: Vec<f64> = moving.iter().map(unit).collect();
+        let columns = moving.iter().map(|(i, _)| *i).collect();
+        let equation = Equation { columns, units: units.clone(), weighting: settings.weighting };
         let curve = &outcome.curve;
-        let parameters: Vec<ParameterRef> = moving.iter().map(|(_, of, _)| *of).collect();
-        let moved = |m: usize, by: f64| {
-            with(&fit.composite, parameters[m], moving[m].2 + by * units[m], settings.rate_hz)
-        };
+        let parameters: Vec<ParameterRef> = moving.iter().map(|(_, (of, _))| *of).collect();
+        let steps = Self { parameters, units, passed_on: DMatrix::zeros(0, 0) };
+        let Self { parameters, .. } = &steps;
+        let moved = |m: usize, by: f64| steps.moved(&fit.composite, m, by, settings.rate_hz);
         let mut by_parameter = DMatrix::zeros(parameters.len(), parameters.len());
         for m in 0..parameters.len() {
             let (up, down) = (moved(m, STEP)?, moved(m, -STEP)?);
@@ -77,16 +71,19 @@ impl CurveInfluence {
             by_curve.set_column(j, &((scaled(STEP) - scaled(-STEP)) / (2.0 * STEP)));
         }
         let passed_on = by_parameter.lu().solve(&-by_curve)?;
-        Some(Self { parameters, units, passed_on })
+        Some(Self { passed_on, ..steps })
     }
-}
 
-/// The composite with one parameter changed; none outside its domain.
-fn with(composite: &Composite, of: ParameterRef, value: f64, rate_hz: f64) -> Option<Composite> {
-    let mut changed = composite.clone();
-    let process = &mut changed.processes[of.process];
-    *process = process.with_parameter(of.parameter.name(), value, rate_hz)?.ok()?;
-    Some(changed)
+    /// A composite whose `m`-th moving parameter is moved by so many of its natural steps; none outside its domain.
+    #[must_use]
+    pub fn moved(&self, composite: &Composite, m: usize, by: f64, rate_hz: f64) -> Option<Composite> {
+        let of = self.parameters[m];
+        let (_, value) = composite.parameters().find(|(other, _)| *other == of)?;
+        let mut changed = composite.clone();
+        let process = &mut changed.processes[of.process];
+        *process = process.with_parameter(of.parameter.name(), value + by * self.units[m], rate_hz)?.ok()?;
+        Some(changed)
+    }
 }
 
 /// What a fit makes zero.
@@ -115,11 +112,11 @@ impl Equation {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ModelChoice;
     use crate::curve::{Group, Scope};
     use crate::imu::Sensor;
     use crate::noise::{Ar1, Process, RandomWalk, White};
     use crate::pipeline::fit_curve;
-    use crate::{ModelChoice, ModelSpec};
 
     /// The fit of a curve that no model describes exactly, and of the same with one scale 0.1 % up and down.
     #[test]
@@ -138,9 +135,12 @@ mod tests {
             ..Curve::default()
         };
         let group = Group { scope: Scope { sensor: Sensor::Gyro, axis: None }, replicates: Vec::new() };
-        for weighting in [Weighting::Model, Weighting::Edof] {
-            let settings =
-                Settings { model: ModelChoice::Given(ModelSpec::n1()), weighting, ..Settings::default() };
+        // a Gauss-Markov process is an AR1 whose shape is an inverse time
+        for (weighting, spec) in
+            [(Weighting::Model, "N1"), (Weighting::Edof, "N1"), (Weighting::Model, "WN+GM+RW")]
+        {
+            let model = ModelChoice::Given(spec.parse().unwrap());
+            let settings = Settings { model, weighting, ..Settings::default() };
             let fitted = |curve: Curve| fit_curve(&group, Estimator::Awv, curve, &settings).unwrap();
             let outcome = fitted(curve.clone());
             let influence = CurveInfluence::of(&outcome, &settings).unwrap();

@@ -18,13 +18,7 @@ pub(crate) fn standard_errors(outcome: &Outcome, settings: &Settings, covariance
     let all: Vec<(bool, bool, f64)> = fit
         .composite
         .parameters()
-        .map(|(of, value)| {
-            let stands = fit.zero.contains(&of.process);
-            let at_bound =
-                fit.bounded.contains(&of) || (fit.at_end.contains(&of.process) && of.parameter.is_shape());
-            let fixed = spec.is_fixed(of);
-            (fixed, least_squares && !(fixed || stands || at_bound), value)
-        })
+        .map(|(of, value)| (spec.is_fixed(of), least_squares && outcome.moves(of), value))
         .collect();
     let moving: Vec<usize> = (0..all.len()).filter(|p| all[*p].1).collect();
     if moving.is_empty() {

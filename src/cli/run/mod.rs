@@ -205,15 +205,21 @@ pub(super) fn all_finite(summary: &Summary) -> Result<(), Failure> {
     Err(failure.hint("their indices are in summary.json, under diverged_runs; they are in no other number"))
 }
 
+/// A scenario file, the default without one, with the outages of the command line in the place of its own.
+pub(super) fn scenario_with(path: Option<&Path>, outages: &[OutageArg]) -> Result<Scenario, Failure> {
+    let mut scenario = path.map(scenario_file::read).transpose()?.unwrap_or_default();
+    if !outages.is_empty() {
+        scenario.outage = Some(windows_of(outages)?);
+        (scenario.outage_periodic, scenario.outage_random) = (None, None);
+    }
+    Ok(scenario)
+}
+
 /// The scenario file with the flags over it, checked.
 fn scenario(args: &Args) -> Result<Scenario, Failure> {
-    let mut scenario = args.scenario.as_deref().map(scenario_file::read).transpose()?.unwrap_or_default();
+    let mut scenario = scenario_with(args.scenario.as_deref(), &args.outages)?;
     if let Some(path) = &args.gnss {
         scenario.gnss = scenario_file::read(path)?.gnss;
-    }
-    if !args.outages.is_empty() {
-        scenario.outage = Some(windows_of(&args.outages)?);
-        (scenario.outage_periodic, scenario.outage_random) = (None, None);
     }
     scenario.run.runs = args.runs.unwrap_or(scenario.run.runs);
     scenario.run.method = args.method.unwrap_or(scenario.run.method);
