@@ -7,7 +7,7 @@
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
 use nav_sim::calibration::{Settings, replicates};
-use nav_sim::choose::{Candidate, Drive, Fold, Laboratory, Ranking, Unit};
+use nav_sim::choose::{Candidate, Contender, Drive, Fold, Laboratory, Ranking, Unit};
 use nav_sim::formats::{contamination_file, model_file};
 use nav_sim::imu::{Channel, Recording};
 use nav_sim::noise::VirtualImu;
@@ -80,7 +80,8 @@ impl Study {
             .enumerate()
             .map(|(k, r)| Ok((r.name.clone(), leave_out(k, r)?)))
             .collect::<Result<_, Failure>>()?;
-        let ranking = Ranking::new(&self.candidates, &folds);
+        let contenders: Vec<Contender> = self.candidates.iter().map(Contender::from).collect();
+        let ranking = Ranking::new(&contenders, &folds);
         let truth = self.truth(seed, &laboratory)?;
         Ok(self.judged(&ranking, truth))
     }

@@ -66,12 +66,10 @@ pub struct Fold {
     /// Scores of the candidates, in their order: on windows of the recording, or what is expected where it is shorter
     /// than the trajectory.
     pub scores: Vec<Score>,
-    /// What covariance analysis expects of each where the recording's own N2 makes the errors.
-    pub expected: Vec<Score>,
+    /// What covariance analysis expects of each where the recording's own N2 makes the errors, if it was asked.
+    pub expected: Option<Vec<Score>>,
     /// Windows that were navigated; 0 where the recording is shorter than the trajectory.
     pub windows: u64,
-    /// How many windows lie side by side in it.
-    pub independent: f64,
 }
 
 impl Drive {
@@ -146,14 +144,12 @@ impl Drive {
         } else {
             recordings.iter().filter(|r| is_long(r)).cloned().collect()
         };
-        let samples: usize = usable.iter().map(Recording::len).sum();
-        let independent = self.independent_windows(samples);
         let sampled = if usable.is_empty() { None } else { self.sampled(&beliefs, &usable, runs, progress)? };
         if sampled.is_none() {
             progress(runs);
         }
         let windows = if sampled.is_some() { runs } else { 0 };
-        Ok(Fold { scores: sampled.unwrap_or_else(|| expected.clone()), expected, windows, independent })
+        Ok(Fold { scores: sampled.unwrap_or_else(|| expected.clone()), expected: Some(expected), windows })
     }
 
     /// The model of every candidate, of all recordings but one, inflated as it says.
@@ -258,7 +254,9 @@ impl Drive {
         let truth = Truth::Static(recordings);
         let experiment = self.scenario.experiment(&self.trajectory, truth, beliefs, &self.outages, self.seed);
         match monte_carlo::run(&experiment, runs, progress) {
-            Ok(results) => Ok(Some(results.iter().map(Score::of_runs).collect())),
+            Ok(results) => {
+                Ok(Some(results.iter().map(|r| Score::of_runs(&r.runs, r.outages.len())).collect()))
+            }
             // a window counts the last sample too
             Err(ExperimentError::Truth(TruthError::TooShort { .. })) => Ok(None),
             Err(e) => Err(e),

@@ -45,5 +45,5 @@ pub use candidate::{Candidate, Inflation, UnknownInflation};
 pub use drive::{ChoiceError, Drive, Fold};
 pub use influence::{Influence, RecordingInfluence, ScaleInfluence};
 pub use laboratory::{Calibrated, Laboratory, Unit};
-pub use ranking::{Difference, FoldScore, Mean, Placed, Ranking};
+pub use ranking::{Contender, Difference, FoldScore, Mean, Placed, Ranking};
 pub use score::{EndScore, Score};

@@ -12,6 +12,21 @@ pub(super) const FEWEST: usize = 4;
 /// A recording whose errors are this many times as large in NEES as any filter believes is described by no candidate.
 const FAILS: f64 = 2.0 * 9.0;
 
+/// Who is compared.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Contender {
+    /// In words.
+    pub name: String,
+    /// Whether it may be chosen.
+    pub eligible: bool,
+}
+
+impl From<&Candidate> for Contender {
+    fn from(candidate: &Candidate) -> Self {
+        Self { name: candidate.to_string(), eligible: candidate.is_eligible() }
+    }
+}
+
 /// A mean over recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Mean {
@@ -43,8 +58,9 @@ pub struct FoldScore {
     /// How it did.
     #[serde(flatten)]
     pub score: Score,
-    /// What covariance analysis expects where the recording's own N2 makes the errors.
-    pub expected: Score,
+    /// What covariance analysis expects where the recording's own N2 makes the errors, if it was asked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub expected: Option<Score>,
 }
 
 /// A candidate with its place.
@@ -94,8 +110,8 @@ impl Ranking {
     /// # Panics
     /// Without a candidate that may be chosen, or without a recording.
     #[must_use]
-    pub fn new(candidates: &[Candidate], folds: &[(String, Fold)]) -> Self {
-        let eligible: Vec<usize> = (0..candidates.len()).filter(|c| candidates[*c].is_eligible()).collect();
+    pub fn new(candidates: &[Contender], folds: &[(String, Fold)]) -> Self {
+        let eligible: Vec<usize> = (0..candidates.len()).filter(|c| candidates[*c].eligible).collect();
         let all: Vec<&Fold> = folds.iter().map(|(_, fold)| fold).collect();
         let winner = best(&eligible, &all).expect("one may be chosen, of one recording at least");
         let rivals = eligible.len().saturating_sub(1).max(1);
@@ -137,7 +153,7 @@ fn best(eligible: &[usize], folds: &[&Fold]) -> Option<usize> {
     eligible.iter().copied().reduce(higher).filter(|_| !folds.is_empty())
 }
 
-fn place(c: usize, candidate: &Candidate, winner: usize, rivals: usize, folds: &[(String, Fold)]) -> Placed {
+fn place(c: usize, candidate: &Contender, winner: usize, rivals: usize, folds: &[(String, Fold)]) -> Placed {
     let scores = || folds.iter().map(|(_, fold)| &fold.scores[c]);
     let per_recording = |value: &dyn Fn(&Score) -> f64| scores().map(value).collect::<Vec<f64>>();
     let paired = |value: &dyn Fn(&Score) -> f64| -> Vec<f64> {
@@ -154,15 +170,15 @@ fn place(c: usize, candidate: &Candidate, winner: usize, rivals: usize, folds: &
         recording: recording.clone(),
         windows: fold.windows,
         score: fold.scores[c].clone(),
-        expected: fold.expected[c].clone(),
+        expected: fold.expected.as_ref().map(|of| of[c].clone()),
     };
     let coverage: Option<Vec<f64>> = scores().map(|s| s.coverage).collect();
     // where nothing is known of the difference, nothing tells them apart
     let is_worse = joint95.1 < 0.0 || log_score.value == f64::NEG_INFINITY;
     Placed {
-        candidate: candidate.to_string(),
+        candidate: candidate.name.clone(),
         index: c,
-        eligible: candidate.is_eligible(),
+        eligible: candidate.eligible,
         tied: c == winner || !is_worse,
         log_score: interval(&per_recording(&|s| s.log_score), 0.05),
         rmse_m: root_mean_square(per_recording(&|s| s.rmse_m)),
@@ -203,12 +219,12 @@ mod tests {
             outages: Vec::new(),
         };
         let scores: Vec<Score> = scores.iter().map(score).collect();
-        Fold { expected: scores.clone(), scores, windows: 16, independent: 5.0 }
+        Fold { expected: None, scores, windows: 16 }
     }
 
     fn ranked(estimators: &[Estimator], folds: &[&[f64]]) -> Ranking {
-        let candidates: Vec<Candidate> =
-            estimators.iter().map(|e| Candidate::new(*e, "WN".parse().unwrap())).collect();
+        let candidates: Vec<Contender> =
+            estimators.iter().map(|e| Contender::from(&Candidate::new(*e, "WN".parse().unwrap()))).collect();
         let folds: Vec<(String, Fold)> =
             folds.iter().enumerate().map(|(k, s)| (format!("r{k}"), fold(s))).collect();
         Ranking::new(&candidates, &folds)

@@ -1,7 +1,7 @@
 //! How good a filter was at the ends of outages.
 
 use crate::simulation::lincov::Instant;
-use crate::simulation::{NEES_DOF, OutageRecord, RunResult};
+use crate::simulation::{NEES_DOF, OutageRecord, RunRecord};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -40,12 +40,12 @@ pub struct EndScore {
 }
 
 impl Score {
-    /// Of runs.
+    /// Of runs with so many outages.
     #[must_use]
-    pub fn of_runs(result: &RunResult) -> Self {
+    pub fn of_runs(runs: &[RunRecord], outages: usize) -> Self {
         let kept: Vec<&[OutageRecord]> =
-            result.runs.iter().filter(|r| !r.diverged).map(|r| r.outages.as_slice()).collect();
-        let diverged = result.runs.len() - kept.len();
+            runs.iter().filter(|r| !r.diverged).map(|r| r.outages.as_slice()).collect();
+        let diverged = runs.len() - kept.len();
         let end = |i: usize| {
             let mean = |value: &dyn Fn(&OutageRecord) -> f64| mean(kept.iter().map(|run| value(&run[i])));
             EndScore {
@@ -58,7 +58,7 @@ impl Score {
         let limit = ChiSquared::new(NEES_DOF as f64).map_or(f64::NAN, |law| law.inverse_cdf(0.95));
         let inside = |o: &OutageRecord| f64::from(u8::from(o.nees_end <= limit));
         let coverage = mean(kept.iter().flat_map(|run| run.iter()).map(inside));
-        let outages = (0..result.outages.len()).map(end).collect();
+        let outages = (0..outages).map(end).collect();
         let score = Self { coverage: Some(coverage), diverged, ..Self::of_ends(outages) };
         Self { log_score: if diverged > 0 { f64::NEG_INFINITY } else { score.log_score }, ..score }
     }

@@ -104,7 +104,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let shown = args.trajectory.display().to_string();
     let report = ChoiceReport {
         ranking: &chosen.ranking,
-        influence: &chosen.influence,
+        influence: Some(&chosen.influence),
         outages: &outages,
         trajectory: &shown,
         seed,

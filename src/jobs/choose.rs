@@ -2,7 +2,7 @@
 
 use super::{Calibration, CalibrationOptions, EstimatorChoice, JobError, Measured, Note, Remarks, measure};
 use crate::calibration::{Estimator, model_of};
-use crate::choose::{Candidate, ChoiceError, Drive, Fold, Influence, Laboratory, Ranking, Unit};
+use crate::choose::{Candidate, ChoiceError, Contender, Drive, Fold, Influence, Laboratory, Ranking, Unit};
 use crate::formats::recordings::{self, FileReport, ReadOptions};
 use crate::imu::{Axis, Channel, Recording};
 use crate::noise::Model;
@@ -83,7 +83,8 @@ pub fn choose(
         folds.push((file.file.clone(), fold));
     }
     observer.end();
-    let ranking = Ranking::new(candidates, &folds);
+    let contenders: Vec<Contender> = candidates.iter().map(Contender::from).collect();
+    let ranking = Ranking::new(&contenders, &folds);
     let winner = candidates[ranking.winner().index].clone();
     // an estimator of single recordings never wins: this is of all of them
     let (groups, outcomes, settings) = laboratory.calibrate(&winner, None)?;

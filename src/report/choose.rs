@@ -16,14 +16,29 @@ const SCHEMA_VERSION: u32 = 1;
 pub struct ChoiceReport<'a> {
     /// The candidates.
     pub ranking: &'a Ranking,
-    /// What decides the error.
-    pub influence: &'a Influence,
+    /// What decides the error, where it was asked.
+    pub influence: Option<&'a Influence>,
     /// The outages at whose ends they are judged.
     pub outages: &'a [Outage],
     /// The trajectory, as it was named.
     pub trajectory: &'a str,
     /// Seed of all random numbers.
     pub seed: u64,
+}
+
+/// One ranking of a study, in words and as JSON.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RankedPlace {
+    /// Trajectory, scenario, receiver and outages.
+    pub name: String,
+    /// What the data say.
+    pub verdict: Vec<String>,
+    /// A row for each candidate under a head.
+    pub rows: Vec<Vec<String>>,
+    /// What the marks of the table mean.
+    pub legend: String,
+    /// As in `ranking.json`, and `place`.
+    pub json: serde_json::Value,
 }
 
 /// `ranking.json`.
@@ -39,7 +54,8 @@ struct RankingFile<'a> {
     seed: u64,
     #[serde(flatten)]
     ranking: &'a Ranking,
-    influence: &'a Influence,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    influence: Option<&'a Influence>,
 }
 
 impl ChoiceReport<'_> {
@@ -191,7 +207,7 @@ impl ChoiceReport<'_> {
     /// Which scales of which sensors decide: a line each, those of a quarter of the largest influence or more.
     #[must_use]
     pub fn decisive_scales(&self) -> Vec<String> {
-        let scales = &self.influence.scales;
+        let scales = self.influence.map_or(&[][..], |influence| &influence.scales);
         let largest = scales.iter().map(|s| s.on_error.abs()).fold(0.0, f64::max);
         let mut lines: Vec<String> = Vec::new();
         for (i, first) in scales.iter().enumerate() {
@@ -229,7 +245,7 @@ impl ChoiceReport<'_> {
             vec![s.signals.clone(), readable(s.tau_s), signed(s.on_error)]
         };
         let head = head.map(str::to_owned).to_vec();
-        std::iter::once(head).chain(self.influence.scales.iter().map(row)).collect()
+        std::iter::once(head).chain(self.influence.iter().flat_map(|i| &i.scales).map(row)).collect()
     }
 
     /// Recording by recording under a head.
@@ -241,7 +257,7 @@ impl ChoiceReport<'_> {
             std::iter::once(r.recording.clone()).chain(adds).collect()
         };
         let head = head.map(str::to_owned).to_vec();
-        std::iter::once(head).chain(self.influence.recordings.iter().map(row)).collect()
+        std::iter::once(head).chain(self.influence.iter().flat_map(|i| &i.recordings).map(row)).collect()
     }
 
     fn tied(&self) -> impl Iterator<Item = &str> {
@@ -252,7 +268,19 @@ impl ChoiceReport<'_> {
     /// `ranking.json`.
     #[must_use]
     pub fn json(&self) -> String {
-        super::json(&RankingFile {
+        super::json(&self.file())
+    }
+
+    /// The same as one of several rankings.
+    #[must_use]
+    pub fn of_place(&self, name: String) -> RankedPlace {
+        let mut json = serde_json::to_value(self.file()).expect("plain structs are always JSON");
+        json["place"] = name.as_str().into();
+        RankedPlace { name, verdict: self.verdict(), rows: self.rows(), legend: self.legend(), json }
+    }
+
+    fn file(&self) -> RankingFile<'_> {
+        RankingFile {
             schema_version: SCHEMA_VERSION,
             verdict: self.verdict(),
             winner: &self.ranking.winner().candidate,
@@ -262,7 +290,7 @@ impl ChoiceReport<'_> {
             seed: self.seed,
             ranking: self.ranking,
             influence: self.influence,
-        })
+        }
     }
 }
 

@@ -29,7 +29,7 @@ mod tune;
 mod verdict;
 
 pub use brief::brief;
-pub use choose::ChoiceReport;
+pub use choose::{ChoiceReport, RankedPlace};
 pub use columns::columns;
 pub use comparison::{
     CandidateResult, ComparisonFile, Label, consistency_rows, table_rows, verdict_lines, with_times,

@@ -3,7 +3,7 @@
 use super::description::{Metric, Study};
 use super::error::DescriptionError;
 use super::failure::StudyError;
-use super::grid::Column;
+use super::grid::{Cell, Column};
 use super::plan::{Kept, Unit};
 use super::planned::Planned;
 use super::sums::CellSums;
@@ -11,9 +11,15 @@ use super::unit::{Finding, UnitResult};
 use super::unit_file::{self, UnitFileError};
 use crate::metrics::{self, Measured, OutageComparison};
 use crate::report::{self, ColumnResult, Label, ShownCell, ShownColumn, TableRow};
+use crate::simulation::RunRecord;
 
 /// What a cell contributes.
 pub(super) struct CellTables {
+    pub(super) cell: Cell,
+    /// Its outages (start, end) (s).
+    pub(super) windows: Vec<(f64, f64)>,
+    /// Column by column, in studies that leave out recordings.
+    pub(super) runs_of_columns: Vec<Vec<RunRecord>>,
     pub(super) shown: ShownCell,
     pub(super) outages: Vec<TableRow>,
     pub(super) epochs: Vec<TableRow>,
@@ -54,6 +60,9 @@ impl CellTables {
         let measured: Vec<Measured> = sums.columns.iter().map(Finding::measured).collect();
         let comparisons = comparisons(planned, &measured, reference.0)?;
         let mut tables = Self {
+            cell,
+            windows: measured.first().map_or(Vec::new(), |m| m.outages.clone()),
+            runs_of_columns: Vec::new(),
             shown: ShownCell { name: grid.short_name(cell), columns: Vec::new() },
             outages: Vec::new(),
             epochs: Vec::new(),
@@ -83,6 +92,9 @@ impl CellTables {
                 is_reference,
                 verdict,
             });
+        }
+        if planned.plan.study.leaves_out() {
+            tables.runs_of_columns = measured.into_iter().map(|m| m.runs).collect();
         }
         Ok(Ok(tables))
     }

@@ -1,6 +1,6 @@
 //! Whether a study means a grid.
 
-use super::description::Study;
+use super::description::{CalibrateStep, Study};
 use super::error::DescriptionError;
 use super::rules::{exactly_one, unique};
 use crate::scenario::{MAX_RUNS, Method};
@@ -85,6 +85,9 @@ impl Study {
         for (i, e) in self.truth.iter().enumerate() {
             let said = [e.model.is_some(), !e.recordings.is_empty(), e.synthesize.is_some()];
             exactly_one("truth", i, &said, "model, recordings, synthesize")?;
+            if e.each && e.recordings.is_empty() {
+                return Err(DescriptionError::refused("truth", "each = true", "is of recordings"));
+            }
         }
         self.check_truth_is_modelled()?;
         for (i, e) in self.candidate.iter().enumerate() {
@@ -92,6 +95,7 @@ impl Study {
             let Some(step) = &e.calibrate else { continue };
             let said = [!step.recordings.is_empty(), step.synthesize.is_some()];
             exactly_one("candidate.calibrate", i, &said, "recordings, synthesize")?;
+            self.check_leave_out(step)?;
             empty(&format!("candidate[{}].calibrate.estimators", i + 1), !step.estimators.is_empty())?;
         }
         for (i, e) in self.scenario.iter().enumerate() {
@@ -107,6 +111,20 @@ impl Study {
                 Err(DescriptionError::refused("synthesize", value, "are no recordings"))
             }
             None => Ok(()),
+        }
+    }
+
+    /// What is left out of recordings must be recordings.
+    fn check_leave_out(&self, step: &CalibrateStep) -> Result<(), DescriptionError> {
+        let refuse = |reason: &str| Err(DescriptionError::refused("candidate", "leave_out = true", reason));
+        match step.leave_out {
+            true if step.recordings.is_empty() => {
+                refuse("is of recordings; those of synthesize have no files")
+            }
+            true if self.truth.iter().any(|e| e.recordings.is_empty()) => {
+                refuse("needs recordings in every truth: they are what is left out")
+            }
+            _ => Ok(()),
         }
     }
 

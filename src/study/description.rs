@@ -69,6 +69,11 @@ const fn hundred() -> u64 {
     100
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks by reference")]
+const fn is_false(value: &bool) -> bool {
+    !*value
+}
+
 fn default_metrics() -> Vec<Metric> {
     vec![Metric::Outages, Metric::Ratios]
 }
@@ -109,6 +114,9 @@ pub struct TruthEntry {
     /// Static recordings: each run takes a window of one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub recordings: Vec<PathBuf>,
+    /// Whether each of the recordings is a truth of its own, named after its file.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub each: bool,
     /// Sample rate of recordings without a time column (Hz).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
@@ -175,6 +183,9 @@ pub struct CalibrateStep {
     /// Static recordings, or directories of them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub recordings: Vec<PathBuf>,
+    /// Whether the recordings that make the errors of a cell are left out: one calibration a truth.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub leave_out: bool,
     /// Sample rate of recordings without a time column (Hz).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
@@ -249,6 +260,13 @@ pub struct GnssEntry {
     pub settings: Option<GnssSettings>,
 }
 
+impl CandidateEntry {
+    /// Whether it is calibrated without the recordings that make the errors.
+    pub(super) fn leaves_out(&self) -> bool {
+        self.calibrate.as_ref().is_some_and(|step| step.leave_out)
+    }
+}
+
 impl Study {
     /// All virtual recordings.
     pub(super) fn syntheses(&self) -> Vec<&Synthesis> {
@@ -285,6 +303,12 @@ impl Study {
             }
         };
         self.candidate.iter().enumerate().flat_map(of).collect()
+    }
+
+    /// Whether a candidate is calibrated without the recordings that make the errors.
+    #[must_use]
+    pub fn leaves_out(&self) -> bool {
+        self.candidate.iter().any(CandidateEntry::leaves_out)
     }
 
     /// Position of the reference among the candidates.

@@ -61,6 +61,17 @@ pub enum StudyError {
         /// Why.
         source: Box<StudyError>,
     },
+    /// A candidate that leaves out the recordings of a truth, and has none of them, or no other.
+    #[error("leave_out: {}", match .left {
+        0 => format!("without those of the truth \"{}\" no recording is left", .truth),
+        _ => format!("none of its recordings makes the errors of the truth \"{}\"", .truth),
+    })]
+    NothingLeftOut {
+        /// Name of the truth.
+        truth: String,
+        /// How many recordings are left.
+        left: usize,
+    },
     /// Outages that do not lie on a trajectory.
     #[error("{place}: {source}")]
     Outage {

@@ -1,12 +1,12 @@
 //! Study files of `nav-sim batch` (TOML): see [`Study`].
 
-use super::description::{GnssEntry, ScenarioEntry, Study};
+use super::description::{GnssEntry, ScenarioEntry, Study, TruthEntry};
 use super::error::DescriptionError;
-use crate::formats::scenario_file;
 use crate::formats::suggest::nearest;
 use crate::formats::toml_described;
 use crate::formats::toml_file::{Section, Source};
 use crate::formats::{FileError, Kind};
+use crate::formats::{recordings, scenario_file};
 use crate::scenario::Scenario;
 use crate::sensors::gnss::GnssSettings;
 use crate::units::SettingError;
@@ -46,11 +46,38 @@ pub fn read(path: &Path) -> Result<StudyFile, FileError> {
             return Err(located(&e, &source, &root));
         }
     }
+    one_truth_each(&mut study, path)?;
     study.resolve().map_err(|e| located(&e, &source, &root))?;
     study.reference().map_err(|e| located(&e, &source, &root))?;
     let scenarios = scenarios(&study, path, &source)?;
     let gnss = receivers(&study, path, &source)?;
     Ok(StudyFile { study, scenarios, gnss })
+}
+
+/// Puts a truth for each recording in the place of one that says so.
+fn one_truth_each(study: &mut Study, path: &Path) -> Result<(), FileError> {
+    let mut truths = Vec::new();
+    for entry in study.truth.drain(..) {
+        if !entry.each || entry.recordings.is_empty() {
+            truths.push(entry);
+            continue;
+        }
+        for given in &entry.recordings {
+            let place = beside(path, given);
+            let is_directory = place.is_dir();
+            for file in recordings::listed(&[place])? {
+                let named = match file.file_name() {
+                    Some(name) if is_directory => given.join(name),
+                    _ => given.clone(),
+                };
+                let stem = named.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+                let name = if entry.name.is_empty() { stem } else { format!("{}/{stem}", entry.name) };
+                truths.push(TruthEntry { name, recordings: vec![named], each: false, ..entry.clone() });
+            }
+        }
+    }
+    study.truth = truths;
+    Ok(())
 }
 
 fn scenarios(study: &Study, path: &Path, source: &Source) -> Result<Vec<Scenario>, FileError> {

@@ -66,7 +66,8 @@ pub(super) struct Inputs<'a> {
     made: &'a [(String, String)],
     trajectory: Option<(usize, Arc<Trajectory>)>,
     truth: Option<(usize, Arc<TruthSource>)>,
-    models: HashMap<usize, Model>,
+    /// By path: a candidate that leaves out the truth's recordings has one a truth.
+    models: HashMap<&'a str, Model>,
 }
 
 impl<'a> Inputs<'a> {
@@ -199,25 +200,26 @@ impl<'a> Inputs<'a> {
         outages: &[Outage],
     ) -> Result<Vec<Belief>, StudyError> {
         let grid = &self.planned.grid;
+        let plan = &self.planned.plan;
         for column in &grid.columns {
-            self.load_model(column.candidate)?;
+            self.load_model(plan.model(column.candidate, cell.truth))?;
         }
         let models = &self.models;
         let belief = |column: &Column| {
             let mut own = scenario.clone();
             own.filter.states = grid.filter(cell, column);
             let part = || format!("candidate {}", column.name);
-            let model = &models[&column.candidate];
+            let model = &models[plan.model(column.candidate, cell.truth).path.as_str()];
             let model = continuous::at_rate(model, scenario.imu.rate_hz).map_err(|e| unfit(part(), e))?;
             own.belief(&model, outages, track).map_err(|e| unfit(part(), e))
         };
         grid.columns.par_iter().map(belief).collect()
     }
 
-    fn load_model(&mut self, candidate: usize) -> Result<(), StudyError> {
-        if !self.models.contains_key(&candidate) {
-            let model = self.read_model(&self.planned.plan.models[candidate])?;
-            self.models.insert(candidate, model);
+    fn load_model(&mut self, prepared: &'a Prepared) -> Result<(), StudyError> {
+        if !self.models.contains_key(prepared.path.as_str()) {
+            let model = self.read_model(prepared)?;
+            self.models.insert(&prepared.path, model);
         }
         Ok(())
     }

@@ -2,6 +2,7 @@
 
 use super::cell_tables::{CellTables, DamagedUnits};
 use super::failure::StudyError;
+use super::leave_one_out::Folds;
 use super::plan::Unit;
 use super::planned::Planned;
 use super::remark::Remark;
@@ -58,6 +59,7 @@ pub fn merge(
     let mut out = AtomicDir::create(&results)?;
     let mut tables = Tables::create(&mut out, planned)?;
     let mut texts = Texts::new(planned)?;
+    let mut folds = Folds::default();
     let units: Vec<(Unit, String)> = planned.plan.named_units(&planned.grid).collect();
     let cells: Vec<&[(Unit, String)]> = units.chunk_by(|a, b| a.0.cell == b.0.cell).collect();
     let mut damaged = Vec::new();
@@ -70,6 +72,7 @@ pub fn merge(
                 Ok(cell) if damaged.is_empty() => {
                     diverged += cell.diverged;
                     tables.add(&cell)?;
+                    folds.add(planned, &cell);
                     texts.add(cell.shown);
                 }
                 Ok(_) => {}
@@ -81,9 +84,14 @@ pub fn merge(
         return Err(incomplete(planned, units.len(), damaged));
     }
     tables.finish()?;
+    texts.rankings = folds.ranked(planned);
     let text = texts.render(&options.states);
     out.write("tables.md", format!("{text}\n"))?;
     out.write("report.html", texts.page(&options.states))?;
+    if !texts.rankings.is_empty() {
+        let rankings: Vec<&serde_json::Value> = texts.rankings.iter().map(|place| &place.json).collect();
+        out.write("ranking.json", report::json(&json!({ "schema_version": 1, "rankings": rankings })))?;
+    }
     let summary = summary(planned, units.len(), diverged);
     out.write("study.json", report::json(&summary))?;
     remove_stale(planned)?;
@@ -105,10 +113,9 @@ fn cells_at_once(planned: &Planned, threads: usize) -> usize {
 
 /// Removes tables of an earlier plan that this one does not write; all others are replaced.
 fn remove_stale(planned: &Planned) -> Result<(), StudyError> {
-    if planned.keeps_epochs() {
-        return Ok(());
-    }
-    for name in ["epochs.csv", "epochs.parquet"] {
+    let epochs: &[&str] = if planned.keeps_epochs() { &[] } else { &["epochs.csv", "epochs.parquet"] };
+    let ranking: &[&str] = if planned.plan.study.leaves_out() { &[] } else { &["ranking.json"] };
+    for name in epochs.iter().chain(ranking) {
         let path = planned.directory.join("results").join(name);
         match std::fs::remove_file(&path) {
             Err(e) if e.kind() != ErrorKind::NotFound => return Err(FileError::io(&path, e).into()),

@@ -45,6 +45,7 @@ pub mod file;
 mod fingerprint;
 mod grid;
 mod inputs;
+mod leave_one_out;
 mod merging;
 mod plan;
 mod planned;

@@ -29,8 +29,8 @@ pub struct Plan {
     pub trajectories: Vec<String>,
     /// Hash of what makes each truth.
     pub truths: Vec<String>,
-    /// The model file of each candidate.
-    pub models: Vec<Prepared>,
+    /// The model file of each candidate; of one that leaves out what makes the errors, one a truth.
+    pub models: Vec<Vec<Prepared>>,
     /// Every file the study reads, with its hash.
     pub inputs: Vec<Prepared>,
     /// Runs of a unit, for each trajectory.
@@ -115,7 +115,7 @@ struct CellKey<'a> {
 
 impl Plan {
     /// Version of the layout.
-    pub const SCHEMA_VERSION: u32 = 1;
+    pub const SCHEMA_VERSION: u32 = 2;
 
     /// The grid of the plan.
     ///
@@ -123,6 +123,12 @@ impl Plan {
     /// When the study's outage sets are refused.
     pub fn grid(&self) -> Result<Grid, DescriptionError> {
         Grid::new(&self.study, &self.scenarios, &self.gnss)
+    }
+
+    /// The model file of a candidate where this truth makes the errors.
+    pub(super) fn model(&self, candidate: usize, truth: usize) -> &Prepared {
+        let files = &self.models[candidate];
+        files.get(truth).unwrap_or(&files[0])
     }
 
     /// What units keep of the runs.
@@ -193,7 +199,7 @@ impl Plan {
             columns: grid
                 .columns
                 .iter()
-                .map(|c| (self.models[c.candidate].blake3.as_str(), grid.filter(cell, c)))
+                .map(|c| (self.model(c.candidate, cell.truth).blake3.as_str(), grid.filter(cell, c)))
                 .collect(),
         };
         let json = serde_json::to_vec(&key).expect("plain structs are always JSON");
@@ -249,7 +255,7 @@ mod tests {
         let prepared =
             |blake3: &str| Prepared { role: String::new(), path: String::new(), blake3: blake3.into() };
         let plan = Plan {
-            schema_version: 1,
+            schema_version: 2,
             version: "0".into(),
             numerics: "n".into(),
             seed: 1,
@@ -258,7 +264,7 @@ mod tests {
             gnss: Vec::new(),
             trajectories: vec!["a".into(), "b".into()],
             truths: vec!["t".into()],
-            models: vec![prepared("m"), prepared("n")],
+            models: vec![vec![prepared("m")], vec![prepared("n")]],
             inputs: Vec::new(),
             unit_runs: vec![100, 8],
             estimate: Estimate::default(),
@@ -318,7 +324,7 @@ mod tests {
         assert_eq!(with(&|p| p.numerics = "o".into()), 0);
         assert_eq!(with(&|p| p.version = "1".into()), 0);
         assert_eq!(with(&|p| p.truths[0] = "u".into()), 0);
-        assert_eq!(with(&|p| p.models[1].blake3 = "o".into()), 0);
+        assert_eq!(with(&|p| p.models[1][0].blake3 = "o".into()), 0);
         assert_eq!(with(&|p| p.study.metrics = vec![Metric::Outages]), 0);
         assert_eq!(with(&|p| p.trajectories[1] = "c".into()), 6 * 3);
         // another candidate's name changes no number, and more runs keep the units there are

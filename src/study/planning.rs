@@ -1,6 +1,6 @@
 //! Planning: inputs checked and hashed, candidates calibrated, units cut.
 
-use super::description::{CalibrateStep, Study};
+use super::description::{CalibrateStep, Study, TruthEntry};
 use super::directory;
 use super::failure::StudyError;
 use super::file::{self, StudyFile, beside};
@@ -108,7 +108,8 @@ fn restore(planned: &Planned, reader: Reader<'_>) -> Result<(), StudyError> {
 fn restore_models(planned: &Planned, reader: Reader<'_>) -> Result<(), StudyError> {
     let Planned { plan, directory, .. } = planned;
     let whole = |m: &Prepared| hash::of_file(&directory.join(&m.path)).is_ok_and(|found| found == m.blake3);
-    let lost: Vec<&Prepared> = plan.models.iter().filter(|m| m.role == CALIBRATED && !whole(m)).collect();
+    let lost: Vec<&Prepared> =
+        plan.models.iter().flatten().filter(|m| m.role == CALIBRATED && !whole(m)).collect();
     if lost.is_empty() {
         return Ok(());
     }
@@ -173,46 +174,70 @@ fn hash_of(inputs: &[Prepared], path: &Path) -> String {
     inputs.iter().find(|i| i.path == wanted).map(|i| i.blake3.clone()).unwrap_or_default()
 }
 
-/// The model of each candidate; those of calibration steps are made here.
+/// The model of each candidate, or its models, one a truth; those of calibration steps are made here.
 fn models(
     study: &Study,
     seed: u64,
     inputs: &[Prepared],
     reader: Reader<'_>,
-) -> Result<(Vec<Prepared>, ModelTexts), StudyError> {
+) -> Result<(Vec<Vec<Prepared>>, ModelTexts), StudyError> {
     let (mut models, mut texts) = (Vec::new(), Vec::new());
     for entry in &study.candidate {
         if let Some(path) = &entry.model {
             let blake3 = hash_of(inputs, path);
-            models.push(Prepared { role: "model".into(), path: path.display().to_string(), blake3 });
+            models.push(vec![Prepared { role: "model".into(), path: path.display().to_string(), blake3 }]);
         }
         let Some(step) = &entry.calibrate else { continue };
         let (candidate, estimators) = (entry.name.clone(), step.estimators.clone());
         reader.observer.remark(&Remark::Calibrating { candidate, estimators });
-        let made = calibration(step, seed, reader).map_err(|source| StudyError::Candidate {
-            candidate: entry.name.clone(),
-            source: Box::new(source),
-        })?;
-        for (estimator, text) in step.estimators.iter().zip(made) {
-            let blake3 = hash::of_bytes(text.as_bytes());
-            let tame = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' };
-            let name: String = format!("{}_{estimator}", entry.name).chars().map(tame).collect();
-            let path = format!("models/{name}_{}.toml", &blake3[..8]);
-            texts.push((path.clone(), text));
-            models.push(Prepared { role: CALIBRATED.into(), path, blake3 });
+        let folds: Vec<Option<&TruthEntry>> =
+            if step.leave_out { study.truth.iter().map(Some).collect() } else { vec![None] };
+        let mut of_estimators = vec![Vec::new(); step.estimators.len()];
+        for without in folds {
+            let made = calibration(step, without, seed, reader).map_err(|source| StudyError::Candidate {
+                candidate: entry.name.clone(),
+                source: Box::new(source),
+            })?;
+            for ((estimator, text), files) in step.estimators.iter().zip(made).zip(&mut of_estimators) {
+                let fold = without.map_or(String::new(), |truth| format!("_without_{}", truth.name));
+                let prepared = calibrated_file(&format!("{}_{estimator}{fold}", entry.name), &text);
+                texts.push((prepared.path.clone(), text));
+                files.push(prepared);
+            }
         }
+        models.extend(of_estimators);
     }
     Ok((models, texts))
 }
 
-/// Model files of a calibration step, one an estimator.
-fn calibration(step: &CalibrateStep, seed: u64, reader: Reader<'_>) -> Result<Vec<String>, StudyError> {
-    let recordings = match &step.synthesize {
-        Some(synthesis) => reader.synthesised(synthesis, seed.wrapping_add(CANDIDATE_SEED))?,
-        None => reader.recordings(&step.recordings, step.rate_hz)?,
+/// Where a calibrated model will lie.
+fn calibrated_file(name: &str, text: &str) -> Prepared {
+    let blake3 = hash::of_bytes(text.as_bytes());
+    let tame = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' };
+    let name: String = name.chars().map(tame).collect();
+    Prepared { role: CALIBRATED.into(), path: format!("models/{name}_{}.toml", &blake3[..8]), blake3 }
+}
+
+/// Model files of a calibration step, one an estimator, without the recordings of a truth.
+fn calibration(
+    step: &CalibrateStep,
+    without: Option<&TruthEntry>,
+    seed: u64,
+    reader: Reader<'_>,
+) -> Result<Vec<String>, StudyError> {
+    let (recordings, files) = match (&step.synthesize, without) {
+        (Some(synthesis), _) => {
+            (reader.synthesised(synthesis, seed.wrapping_add(CANDIDATE_SEED))?, Vec::new())
+        }
+        (None, Some(truth)) => {
+            let files = reader.others(&step.recordings, truth)?;
+            (reader.recordings_in(&files, step.rate_hz)?, files)
+        }
+        (None, None) => {
+            (reader.recordings(&step.recordings, step.rate_hz)?, reader.listed(&step.recordings)?)
+        }
     };
     let (outcomes, settings) = calibrated(&recordings, step)?;
-    let files = reader.listed(&step.recordings)?;
     let inputs = files.iter().map(|file| input::input("recording", file));
     let note = CalibrationNote {
         version: env!("CARGO_PKG_VERSION").to_owned(),

@@ -45,14 +45,23 @@ impl Reader<'_> {
         Ok(file)
     }
 
+    /// The recordings that the study names.
     pub(super) fn recordings(
         &self,
         paths: &[PathBuf],
         rate_hz: Option<f64>,
     ) -> Result<Vec<Recording>, StudyError> {
-        let paths = self.beside_all(paths);
+        self.recordings_in(&self.beside_all(paths), rate_hz)
+    }
+
+    /// The recordings in files and directories.
+    pub(super) fn recordings_in(
+        &self,
+        paths: &[PathBuf],
+        rate_hz: Option<f64>,
+    ) -> Result<Vec<Recording>, StudyError> {
         let (recordings, report) =
-            recordings::read(&paths, &ReadOptions { rate_hz, ..ReadOptions::default() })?;
+            recordings::read(paths, &ReadOptions { rate_hz, ..ReadOptions::default() })?;
         self.doubt(report.doubts());
         for file in &report.files {
             self.observer.remark(&Remark::InputRead(file.to_string()));
@@ -67,6 +76,25 @@ impl Reader<'_> {
     /// The files behind a list of recordings, directories in name order.
     pub(super) fn listed(&self, recordings: &[PathBuf]) -> Result<Vec<PathBuf>, StudyError> {
         Ok(input::listed(&self.beside_all(recordings))?)
+    }
+
+    /// The files behind a list of recordings that do not make the errors of a truth.
+    pub(super) fn others(
+        &self,
+        recordings: &[PathBuf],
+        truth: &TruthEntry,
+    ) -> Result<Vec<PathBuf>, StudyError> {
+        let own: Vec<String> = hashes(&recordings::listed(&self.beside_all(&truth.recordings))?)?;
+        let mut files = recordings::listed(&self.beside_all(recordings))?;
+        let all = files.len();
+        // by their contents: the same file may be named in two ways
+        let same = hashes(&files)?;
+        let mut is_other = same.iter().map(|hash| !own.contains(hash));
+        files.retain(|_| is_other.next().unwrap_or(true));
+        if files.is_empty() || files.len() == all {
+            return Err(StudyError::NothingLeftOut { truth: truth.name.clone(), left: files.len() });
+        }
+        Ok(files)
     }
 
     fn beside_all(&self, paths: &[PathBuf]) -> Vec<PathBuf> {
@@ -142,4 +170,8 @@ impl Reader<'_> {
         let text = format!("{step:?} {} {contamination:?}", input::fingerprint(&model)?);
         Ok(blake3::hash(text.as_bytes()).to_hex().to_string())
     }
+}
+
+fn hashes(files: &[PathBuf]) -> Result<Vec<String>, StudyError> {
+    files.iter().map(|file| Ok(input::fingerprint(file)?)).collect()
 }

@@ -5,7 +5,7 @@ use super::failure::StudyError;
 use super::planned::Planned;
 use crate::formats::atomic::AtomicDir;
 use crate::formats::table_files::{TableFiles, TableFormat};
-use crate::report::{self, ShownCell, markdown, markdown_table};
+use crate::report::{self, RankedPlace, ShownCell, markdown, markdown_table};
 
 /// The tables being written.
 pub(super) struct Tables {
@@ -49,6 +49,8 @@ pub(super) struct Texts {
     intervals: &'static str,
     cells: Vec<ShownCell>,
     more: usize,
+    /// Where recordings are left out: which candidate is best, place by place.
+    pub(super) rankings: Vec<RankedPlace>,
 }
 
 const SHOWN: usize = 24;
@@ -58,7 +60,7 @@ impl Texts {
         let same = if planned.plan.study.filters.len() > 1 { " with the same filter" } else { "" };
         let reference = format!("{}{same}", planned.reference()?.1);
         let intervals = if planned.plan.study.is_sampled() { " ± half the 95 % interval" } else { "" };
-        Ok(Self { reference, intervals, cells: Vec::new(), more: 0 })
+        Ok(Self { reference, intervals, cells: Vec::new(), more: 0, rankings: Vec::new() })
     }
 
     pub(super) fn add(&mut self, cell: ShownCell) {
@@ -70,13 +72,18 @@ impl Texts {
     }
 
     pub(super) fn page(&self, states: &[usize]) -> String {
-        report::study_page(&self.cells, &self.reference, states, self.more)
+        report::study_page(&self.cells, &self.reference, states, self.more, &self.rankings)
     }
 
     pub(super) fn render(&self, states: &[usize]) -> String {
-        let mut text = "Verdict on each filter: NEES over the run (9 if right), error over its standard deviation in the \
-                        state that is farthest off\n\n"
-            .to_owned();
+        let mut text = String::new();
+        for place in &self.rankings {
+            let RankedPlace { name, verdict, rows, legend, .. } = place;
+            let said = verdict.join("\n");
+            text += &format!("{}\n\n{said}\n\n{}\n{legend}\n\n", markdown(name), markdown_table(rows));
+        }
+        text += "Verdict on each filter: NEES over the run (9 if right), error over its standard deviation in the \
+                 state that is farthest off\n\n";
         text += &markdown_table(&report::verdict_table(&self.cells));
         text += "\n\nHorizontal error before the first fix after the outage, median (95 %), m\n\n";
         text += &markdown_table(&report::drift_table(&self.cells));

@@ -125,3 +125,71 @@ fn what_cannot_be_compared_is_refused() {
     let message = said(&nav_sim(directory.path(), &none).code(2));
     assert!(message.contains("judged at the ends of outages"), "{message}");
 }
+
+/// The same folds as a study, which can be spread and resumed: the same models on the same windows, so the same scores.
+#[test]
+fn a_study_that_leaves_out_recordings_says_what_choose_says() {
+    let directory = recordings("12288", "4");
+    let at = directory.path();
+    let drive = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/quick_drive.toml");
+    std::fs::copy(drive, at.join("drive.toml")).unwrap();
+    let study = r#"runs = 16
+seed = 1
+unit_runs = 8
+trajectory = [{ file = "drive.toml" }]
+truth = [{ recordings = ["r"], each = true }]
+outages = [{ windows = [[40, 59]] }]
+[[candidate]]
+name = "WN"
+calibrate = { recordings = ["r"], leave_out = true, estimators = ["awv"], fit = "WN" }
+[[candidate]]
+name = "WN+RW"
+calibrate = { recordings = ["r"], leave_out = true, estimators = ["awv"], fit = "WN+RW" }
+"#;
+    std::fs::write(at.join("study.toml"), study).unwrap();
+    for arguments in ["plan", "run --shard 0/2", "run --shard 1/2", "merge"] {
+        let arguments: Vec<&str> =
+            ["batch"].into_iter().chain(arguments.split(' ')).chain(["study.toml", "-o", "s"]).collect();
+        nav_sim(at, &arguments).success();
+    }
+    let output = nav_sim(
+        at,
+        &"choose r --trajectory drive.toml --outage 40:59 --seed 1 --estimator awv --model WN,WN+RW --runs 16"
+            .split(' ')
+            .collect::<Vec<_>>(),
+    );
+    output.success();
+    let read = |name: &str| -> Value {
+        serde_json::from_str(&std::fs::read_to_string(at.join(name)).unwrap()).unwrap()
+    };
+    let (chosen, studied) = (read("out/choice/ranking.json"), read("s/results/ranking.json"));
+    let studied = &studied["rankings"][0];
+    assert_eq!(studied["place"], "drive, default, default, windows");
+    for (a, b) in
+        chosen["candidates"].as_array().unwrap().iter().zip(studied["candidates"].as_array().unwrap())
+    {
+        for key in ["index", "log_score", "rmse_m", "nees", "difference", "tied"] {
+            assert_eq!(a[key], b[key], "{key}: {a} {b}");
+        }
+    }
+    // a recording is left out of nothing that it is not in
+    std::fs::write(
+        at.join("study.toml"),
+        study.replace("recordings = [\"r\"], each", "recordings = [\"model.csv\"], each"),
+    )
+    .unwrap();
+    nav_sim(at, &["synthesize", "model.toml", "--samples", "12288", "--seed", "2", "-o", "other"]).success();
+    let name = std::fs::read_dir(at.join("other"))
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .find(|p| p.extension().is_some_and(|e| e == "csv"))
+        .unwrap();
+    std::fs::copy(name, at.join("model.csv")).unwrap();
+    let refused = nav_sim(at, &["batch", "plan", "study.toml", "-o", "t"]).code(2);
+    assert!(
+        said(&refused).contains("none of its recordings makes the errors of the truth \"model\""),
+        "{}",
+        said(&refused)
+    );
+    assert!(!at.join("t").exists());
+}

@@ -42,6 +42,14 @@ pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<File>, FileError> {
     Ok(files)
 }
 
+/// The recordings that are meant: files as given, those of a directory in name order.
+///
+/// # Errors
+/// When a path cannot be read, or one is given twice.
+pub fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, FileError> {
+    Ok(expand(paths)?.into_iter().map(|file| file.path).collect())
+}
+
 fn listing(directory: &Path) -> std::io::Result<Vec<PathBuf>> {
     let mut paths = Vec::new();
     for entry in std::fs::read_dir(directory)? {

@@ -20,7 +20,7 @@ pub(in crate::formats) mod timing;
 mod values;
 mod write;
 
-pub use files::is_recording;
+pub use files::{is_recording, listed};
 pub use report::{FileReport, Report};
 pub use write::FileFormat;
 

@@ -1,6 +1,6 @@
 //! The page of a choice: scores of the candidates with their intervals, recording by recording, and what decides.
 
-use crate::choose::{Mean, Placed, ScaleInfluence};
+use crate::choose::{Influence, Mean, Placed, ScaleInfluence};
 use crate::report::choose::ChoiceReport;
 use crate::report::comparison::in_order;
 use crate::report::page::{
@@ -32,17 +32,25 @@ pub fn choice_page(report: &ChoiceReport<'_>) -> String {
     );
     page.chart(&folds(placed), "A recording whose points all stand high is described by no candidate.");
     page.table(&Table::of_rows(&report.fold_rows()));
+    if let Some(influence) = report.influence {
+        decides(&mut page, report, influence);
+    }
+    page.html()
+}
+
+/// Which scales and recordings decide.
+fn decides(page: &mut Page, report: &ChoiceReport<'_>, influence: &Influence) {
     page.section("What decides");
     report.decisive_scales().iter().for_each(|line| page.text(&sentence(line)));
-    if !report.influence.scales.is_empty() {
-        page.chart(&influence(&report.influence.scales), INFLUENCE);
+    if !influence.scales.is_empty() {
+        page.chart(&over_scales(&influence.scales), INFLUENCE);
     }
     page.text(
         "What the presence of each recording adds to the expected horizontal error at the end of an outage (%), to first order, \
          with each way of averaging:",
     );
     let mut table = Table::new(["recording", "awv", "sr-awv", "dr-awv"]);
-    for (i, r) in report.influence.recordings.iter().enumerate() {
+    for (i, r) in influence.recordings.iter().enumerate() {
         let cell = |value: f64, key: &str| Cell::number(value, &format!("/influence/recordings/{i}/{key}"));
         table.row([
             r.recording.clone().into(),
@@ -52,7 +60,6 @@ pub fn choice_page(report: &ChoiceReport<'_>) -> String {
         ]);
     }
     page.table(&table);
-    page.html()
 }
 
 const SCORE: &str = "Log score: the mean logarithm of the density of the true errors under the filter's belief, less that of the best; \
@@ -63,7 +70,7 @@ const INFLUENCE: &str = "Growth of the horizontal error at the ends of outages w
                          passes a change of the curve on to the parameters, covariance analysis these to the error.";
 
 /// With a capital letter and a full stop.
-fn sentence(line: &str) -> String {
+pub(super) fn sentence(line: &str) -> String {
     let mut letters = line.chars();
     let first: String = letters.next().into_iter().flat_map(char::to_uppercase).collect();
     format!("{first}{}.", letters.as_str())
@@ -125,7 +132,7 @@ fn folds(placed: &[Placed]) -> Chart {
 }
 
 /// Influence over scales, a line a sensor or axis.
-fn influence(scales: &[ScaleInfluence]) -> Chart {
+fn over_scales(scales: &[ScaleInfluence]) -> Chart {
     let signals = in_order(scales.iter().map(|s| s.signals.as_str()));
     let mut series = vec![Series::new("", Colour::Soft, Mark::Level(0.0))];
     series.extend(signals.iter().enumerate().map(|(hue, name)| {

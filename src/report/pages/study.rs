@@ -1,19 +1,34 @@
 //! The page of a study: verdicts, drift against the length of outages.
 
+use super::choice::sentence;
 use crate::metrics::{OutageMetrics, VerdictKind};
+use crate::report::choose::RankedPlace;
 use crate::report::comparison::with_times;
 use crate::report::page::{Axis, Chart, Colour, Interval, Mark, Page, Panel, Series, Table};
 use crate::report::study::{ShownCell, drift_table, ratio_table, verdict_table};
 use crate::report::verdict::verdict_word;
 
-/// The page of a merged study. `reference`: what ratios refer to; `more`: cells that are in outages.csv only.
+/// The page of a merged study. `reference`: what ratios refer to; `more`: cells that are in outages.csv only; `rankings`:
+/// of candidates calibrated without the recordings that make the errors.
 #[must_use]
-pub fn study_page(cells: &[ShownCell], reference: &str, states: &[usize], more: usize) -> String {
+pub fn study_page(
+    cells: &[ShownCell],
+    reference: &str,
+    states: &[usize],
+    more: usize,
+    rankings: &[RankedPlace],
+) -> String {
     let all = || cells.iter().flat_map(|cell| &cell.columns);
     let gravest = [VerdictKind::Diverged, VerdictKind::Overconfident, VerdictKind::Underconfident];
     let has = |kind: &VerdictKind| all().any(|c| c.verdict.kind == *kind);
     let kind = gravest.into_iter().find(has).unwrap_or(VerdictKind::Ok);
     let mut page = Page::new("Study", super::tone(kind), &verdict(cells));
+    for place in rankings {
+        page.section(&format!("Candidates on recordings left out: {}", place.name));
+        place.verdict.iter().for_each(|line| page.text(&sentence(line)));
+        page.table(&Table::of_rows(&place.rows));
+        page.text(&sentence(&place.legend));
+    }
     if let Some(chart) = drift(cells) {
         page.chart(&chart, "Horizontal error just before the first fix after an outage: median over the runs, the bar up to the 95 % quantile.");
     }
