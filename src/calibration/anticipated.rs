@@ -15,7 +15,6 @@ use crate::rng::StreamKey;
 use crate::uncertainty::bootstrap::{CurveSampler, Scattering, like};
 use crate::uncertainty::intervals::intervals;
 use crate::uncertainty::practical;
-use crate::uncertainty::spread::Spread as Scatter;
 use crate::wavelet::default_levels;
 use rayon::prelude::*;
 
@@ -110,7 +109,8 @@ impl Anticipated<'_> {
         let fits: Vec<Option<Fit>> =
             (0..bootstrap.draws).into_par_iter().map(draw).collect::<Result<_, _>>()?;
         let fits: Vec<Fit> = fits.into_iter().flatten().collect();
-        let stretch = sampler.spread.as_ref().map_or(1.0, Scatter::student);
+        let differ = self.differ_by(scope, &outcome, bootstrap)?;
+        let stretch = sampler.spread.as_ref().map_or(1.0, |spread| spread.student_where(&differ));
         let unknown = vec![f64::NAN; outcome.fit.composite.parameters().count()];
         outcome.inference = Some(Inference {
             draws: bootstrap.draws,
@@ -160,6 +160,23 @@ impl Anticipated<'_> {
         let curve = average(&first.replicates, estimator, settings.trim, &settings.tuning)
             .map_err(|source| CalibrationError::of(&first, estimator, source))?;
         Ok(group(&implied(composite, &curve)))
+    }
+
+    /// Standard deviation of ln nu by which recordings differ, level by level, from a few draws of them.
+    fn differ_by(
+        &self,
+        scope: Scope,
+        outcome: &Outcome,
+        bootstrap: Bootstrap,
+    ) -> Result<Vec<f64>, AnticipationError> {
+        const DRAWS: usize = 50;
+        let drawn = (0..DRAWS).map(|run| self.between(scope, run, outcome, bootstrap));
+        let signals: Vec<Vec<f64>> = drawn.collect::<Result<Vec<_>, _>>()?.concat();
+        let deviation = |j: usize| {
+            let squares: f64 = signals.iter().map(|ratios| ratios[j].ln().powi(2)).sum();
+            (squares / signals.len() as f64).sqrt()
+        };
+        Ok((0..outcome.curve.levels.len()).map(deviation).collect())
     }
 
     /// What each signal has more or less of than the model, `[signal][level]`, in a draw.

@@ -39,7 +39,8 @@ pub use curve::{
     average, grouped, implied, replicates, trend, warm_up,
 };
 pub use diagnosis::{
-    Alarm, AxisScores, CommonOutliers, Diagnosis, DriftAlarm, LeftOut, Misfit, Movement, Verdict, diagnose,
+    Alarm, AxisScores, CommonOutliers, Diagnosis, Differing, DriftAlarm, LeftOut, Misfit, Movement, Verdict,
+    diagnose,
 };
 pub use fit::{Fit, FitError, Termination, Weighting, estimate, fit};
 pub use model::{LimitError, Limits, ModelSpec, SpecError};

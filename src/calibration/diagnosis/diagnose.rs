@@ -5,10 +5,11 @@ use super::comparison::Comparison;
 use super::contrasts::FEWEST;
 use super::leave_out::left_out;
 use super::piece::{Piece, Test, axes};
-use super::result::{AxisScores, Diagnosis, Misfit, Verdict};
+use super::result::{AxisScores, Diagnosis, Differing, Misfit, Verdict};
 use crate::curve::{Estimator, Group, Pool, Replicate};
 use crate::imu::Sensor;
-use crate::outcome::{Goodness, Outcome, Settings};
+use crate::outcome::{Goodness, LevelSpread, Outcome, Settings};
+use crate::uncertainty::ALIKE_LEVEL;
 use rayon::prelude::*;
 
 /// Diagnoses every recording, sensor by sensor. Without two recordings there is nothing to compare.
@@ -42,7 +43,7 @@ fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &
             .collect();
         fits.into_par_iter().filter_map(|(g, o)| left_out(g, name, o, settings)).collect()
     };
-    let misfits = misfits(sensor, outcomes);
+    let (misfits, differing) = (misfits(sensor, outcomes), differing(sensor, outcomes));
     let one = |(index, name): (usize, &&str)| {
         let (of_noise, of_outliers) = (noise.alarm(index), outliers.alarm(index));
         let of_drift = drift.drift_alarm(index, &pieces);
@@ -66,6 +67,7 @@ fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &
             dropped,
             left_out: without(name),
             misfits: misfits.clone(),
+            differing,
         }
     };
     names.iter().enumerate().map(one).collect()
@@ -78,6 +80,19 @@ fn misfits(sensor: Sensor, outcomes: &[Outcome]) -> Vec<Misfit> {
         Some(Misfit { group: o.scope.name(), estimator: o.estimator, p_value: goodness.p_value })
     };
     outcomes.iter().filter(|o| o.scope.sensor == sensor).filter_map(rejected).collect()
+}
+
+/// By the fit whose test is the surest.
+fn differing(sensor: Sensor, outcomes: &[Outcome]) -> Option<Differing> {
+    let of_fit = |o: &Outcome| {
+        let inference = o.inference.as_ref()?;
+        let p_value = inference.alike.filter(|p| *p <= ALIKE_LEVEL)?;
+        let ratio = |s: &LevelSpread| s.between / s.within;
+        let most = *inference.spread.iter().max_by(|a, b| ratio(a).total_cmp(&ratio(b)))?;
+        Some(Differing { p_value, most })
+    };
+    let own = outcomes.iter().filter(|o| o.scope.sensor == sensor);
+    own.filter_map(of_fit).min_by(|a, b| a.p_value.total_cmp(&b.p_value))
 }
 
 /// What DR-AWV drops of the smallest group of a sensor.

@@ -20,7 +20,7 @@ mod result;
 pub use common::CommonOutliers;
 pub use diagnose::diagnose;
 pub use leave_out::{LeftOut, Movement};
-pub use result::{Alarm, AxisScores, Diagnosis, DriftAlarm, Misfit, Verdict};
+pub use result::{Alarm, AxisScores, Diagnosis, Differing, DriftAlarm, Misfit, Verdict};
 
 #[cfg(test)]
 mod tests;

@@ -4,6 +4,7 @@ use super::common::CommonOutliers;
 use super::leave_out::LeftOut;
 use crate::curve::{Estimator, Pool};
 use crate::imu::{Axis, Sensor};
+use crate::outcome::LevelSpread;
 
 /// What is abnormal about a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -97,6 +98,17 @@ pub struct Diagnosis {
     pub left_out: Vec<LeftOut>,
     /// The fits to this sensor whose model does not describe the curve, by the J-test.
     pub misfits: Vec<Misfit>,
+    /// How the recordings of this sensor differ beyond their noise, if a fit's test says that they do.
+    pub differing: Option<Differing>,
+}
+
+/// Recordings that differ beyond their noise, though none of them need stand out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Differing {
+    /// Probability that recordings of one noise differ so at some scale.
+    pub p_value: f64,
+    /// Where they do most.
+    pub most: LevelSpread,
 }
 
 /// A fit that the J-test rejects at 5 %.

@@ -4,7 +4,7 @@ use super::*;
 use crate::curve::{Estimator, Replicate};
 use crate::imu::Channel;
 use crate::imu::{Axis, Sensor};
-use crate::outcome::Settings;
+use crate::outcome::{LevelSpread, Settings};
 use crate::rng::{Generator, StreamKey};
 use crate::wavelet::{Convention, Tuning, both};
 use crate::{ModelChoice, Pool, Trim, Weighting, advice, calibrate, effects, grouped, trend};
@@ -213,6 +213,18 @@ fn a_trim_that_suffices_is_not_asked_for() {
     assert!(advice(&one, Sensor::Accel, 1.0)[0].contains("trim of at least 1"));
     one[0].dropped = Some((Pool::Sensor, 3));
     assert!(advice(&one, Sensor::Accel, 1.0)[0].contains("with the trim it ran with, 3, already"));
+}
+
+/// That none stands out is not that they agree.
+#[test]
+fn recordings_that_differ_are_not_said_to_agree() {
+    let mut all = set(7, 6, NONE, |_, _, _| ());
+    let most = LevelSpread { level: 3, within: 0.01, between: 0.36 };
+    all.iter_mut().for_each(|d| d.differing = Some(Differing { p_value: 0.002, most }));
+    let words = advice(&all, Sensor::Accel, 1.0);
+    let expected = "none of the 6 recordings stands out, but they differ among themselves beyond their noise, by 36 % of the \
+                    wavelet variance at 8 s (p = 0.002)";
+    assert!(words[0].starts_with(expected), "{words:?}");
 }
 
 /// A model that the J-test rejects is told whatever the recordings say of one another; no estimator is advised for a filter.

@@ -2,8 +2,11 @@
 
 use super::format::{signed_percent, tau_s};
 use crate::curve::Pool;
-use crate::diagnosis::{Alarm, CommonOutliers, Diagnosis, DriftAlarm, LeftOut, Misfit, Movement, Verdict};
+use crate::diagnosis::{
+    Alarm, CommonOutliers, Diagnosis, Differing, DriftAlarm, LeftOut, Misfit, Movement, Verdict,
+};
 use crate::imu::{Axis, Sensor};
+use crate::outcome::LevelSpread;
 use std::fmt::Write;
 
 /// The answer for one sensor: what the recordings are used for, then a line for each that is abnormal, and each fit that the
@@ -21,7 +24,7 @@ pub fn advice(diagnoses: &[Diagnosis], sensor: Sensor, rate_hz: f64) -> Vec<Stri
     } else {
         let abnormal: Vec<&Diagnosis> =
             own.iter().copied().filter(|d| d.verdict != Verdict::Normal).collect();
-        lines.push(answer(&own, &abnormal));
+        lines.push(answer(&own, &abnormal, rate_hz));
         lines.extend(abnormal.iter().flat_map(|d| describe(d, rate_hz)));
     }
     lines.extend(first.common.iter().map(|c| outliers(c, own.len(), rate_hz)));
@@ -128,12 +131,20 @@ fn extent(alarm: &Alarm, rate_hz: f64) -> String {
     format!("most {range} ({} deviations), p = {:.4}", axes.join(", "), alarm.p_value)
 }
 
-fn answer(own: &[&Diagnosis], abnormal: &[&Diagnosis]) -> String {
+fn answer(own: &[&Diagnosis], abnormal: &[&Diagnosis], rate_hz: f64) -> String {
     let of_noise = || abnormal.iter().filter(|d| d.verdict == Verdict::Noise);
     let signals: usize = of_noise().map(|d| d.axes).sum();
     let all = own.len();
     match (abnormal.len(), of_noise().count()) {
-        (0, _) => format!("the {all} recordings agree: use them all"),
+        (0, _) => match own[0].differing {
+            None => format!("the {all} recordings agree: use them all"),
+            Some(Differing { p_value, most: LevelSpread { level, between, .. } }) => format!(
+                "none of the {all} recordings stands out, but they differ among themselves beyond their noise, by {} of the \
+                 wavelet variance at {} s (p = {p_value:.3}): the model is their average, and each of them is another",
+                signed_percent(between).trim_start_matches('+'),
+                tau_s(level, rate_hz)
+            ),
+        },
         (some, 0) if abnormal.iter().all(|d| d.verdict == Verdict::Drift) => format!(
             "{some} of {all} recordings drift as no other does, and every estimator's random walk holds that: leave them \
              out once you know why"

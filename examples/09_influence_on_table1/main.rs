@@ -1,0 +1,136 @@
+//! What each disturbance of the paper's scenarios II and III does to the error after an outage, and what the influence
+//! of the clean curve's scales predicts of it: first order, d ln(error) = Σ influence · d ln(wavelet variance), and in
+//! steps, the influence taken anew at the middle of each.
+//!
+//! `cargo run --release --example 09_influence_on_table1 -- SAMPLES STEPS` (default 524284 4)
+#![expect(clippy::print_stdout, reason = "an example shows its results")]
+
+use nav_sim::calibration::{
+    Estimator, Group, Outcome, Pool, Settings, calibrate, fit_curve, grouped, model_of, replicates,
+};
+use nav_sim::choose::{Drive, Laboratory};
+use nav_sim::formats::{contamination_file, model_file};
+use nav_sim::imu::{Axis, Channel, Sensor};
+use nav_sim::noise::VirtualImu;
+use nav_sim::noise::contamination::{Contamination, Operation};
+use nav_sim::prelude::*;
+use nav_sim::wavelet::Curve;
+use std::error::Error;
+
+const REPLICATES: u64 = 8;
+
+/// The disturbances, each alone.
+fn disturbances(rate_hz: f64) -> Result<Vec<(&'static str, Contamination)>, Box<dyn Error>> {
+    type Is = fn(&Operation) -> bool;
+    let alone = |name: &str, is: Is| -> Result<Contamination, Box<dyn Error>> {
+        let mut all = contamination_file::find(name, rate_hz)?;
+        all.rules.retain(|rule| is(&rule.operation));
+        Ok(all)
+    };
+    Ok(vec![
+        ("steps", alone("section5-II", |o| matches!(o, Operation::Step { .. }))?),
+        ("replaced points", alone("section5-II", |o| matches!(o, Operation::Replace { .. }))?),
+        ("vibration", alone("section5-II", |o| matches!(o, Operation::Bursts { .. }))?),
+        ("abnormal replicates", alone("section5-III", |o| matches!(o, Operation::Ar1 { .. }))?),
+        ("scenario II", contamination_file::find("section5-II", rate_hz)?),
+        ("scenario III", contamination_file::find("section5-III", rate_hz)?),
+    ])
+}
+
+/// A curve part of the way from one to another, on a logarithmic scale.
+fn between(from: &Curve, to: &Curve, part: f64) -> Curve {
+    let wv = from.wv.iter().zip(&to.wv).map(|(a, b)| a * (b / a).powf(part)).collect();
+    Curve { wv, ..from.clone() }
+}
+
+struct Study<'a> {
+    imu: VirtualImu<'a>,
+    samples: usize,
+    drive: Drive,
+    laboratory: Laboratory,
+    settings: Settings,
+}
+
+impl Study<'_> {
+    fn groups(&self, contamination: Option<&Contamination>) -> Result<Vec<Group>, Box<dyn Error>> {
+        let imu = VirtualImu { contamination, ..self.imu };
+        let channels = Sensor::ALL.map(|sensor| Channel { sensor, axis: Axis::X });
+        let mut all = Vec::new();
+        for k in 1..=REPLICATES {
+            all.extend(replicates(&imu.recording(k, &channels, self.samples)?, None, &self.settings.tuning)?);
+        }
+        Ok(grouped(all, Pool::Sensor))
+    }
+
+    fn settings(&self, estimator: Estimator) -> Settings {
+        Settings { estimators: vec![estimator], ..self.settings.clone() }
+    }
+
+    /// ln of the error that the influence predicts, in so many steps from one set of curves to another.
+    fn predicted(
+        &self,
+        estimator: Estimator,
+        groups: &[Group],
+        (from, to): (&[Outcome], &[Outcome]),
+        steps: u32,
+    ) -> Result<f64, Box<dyn Error>> {
+        let settings = self.settings(estimator);
+        let mut sum = 0.0;
+        for step in 0..steps {
+            // one step is of first order, from the beginning; of several each is taken from its middle
+            let part = if steps == 1 { 0.0 } else { (f64::from(step) + 0.5) / f64::from(steps) };
+            let fitted = |((group, from), to): ((&Group, &Outcome), &Outcome)| {
+                fit_curve(group, estimator, between(&from.curve, &to.curve, part), &settings)
+            };
+            let outcomes = groups.iter().zip(from).zip(to).map(fitted).collect::<Result<Vec<_>, _>>()?;
+            let influence = self.drive.influence(&self.laboratory, groups, &outcomes, &settings)?;
+            let ratios = from.iter().zip(to).flat_map(|(from, to)| {
+                from.curve.wv.iter().zip(&to.curve.wv).map(|(a, b)| (b / a).ln()).collect::<Vec<_>>()
+            });
+            sum += influence.scales.iter().zip(ratios).map(|(s, ln)| s.on_error * ln).sum::<f64>()
+                / f64::from(steps);
+        }
+        Ok(sum)
+    }
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let samples = arguments.first().map_or(Ok(524_284), |a| a.parse::<usize>())?;
+    let steps = arguments.get(1).map_or(Ok(4), |a| a.parse::<u32>())?;
+    let file = model_file::read("calib_data/consumer_mems.toml".as_ref())?;
+    let rate_hz = file.model.rate_hz;
+    let (trajectory, _) =
+        load_trajectory("trajectories/land_vehicle.toml".as_ref(), &TrajectoryOptions::default())?;
+    let outage = Outage { start_s: 300.0, end_s: 390.0 };
+    let settings = Settings { rate_hz, ..Settings::default() };
+    let study = Study {
+        imu: VirtualImu { model: &file.model, spread: file.spread.as_ref(), contamination: None, seed: 1 },
+        samples,
+        drive: Drive::new(&trajectory, Scenario::default(), vec![outage], rate_hz, 1)?,
+        laboratory: Laboratory::new(Vec::new(), settings.clone(), None),
+        settings,
+    };
+    let clean = study.groups(None)?;
+    println!("disturbance, estimator: error after {steps} steps, first order, refitted (%)");
+    for (name, contamination) in disturbances(rate_hz)? {
+        let disturbed = study.groups(Some(&contamination))?;
+        for estimator in [Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv] {
+            let settings = study.settings(estimator);
+            let (from, to) = (calibrate(&clean, &settings)?, calibrate(&disturbed, &settings)?);
+            let ln_error =
+                |outcomes: &[Outcome]| study.drive.horizontal_rmse(&model_of(outcomes, rate_hz)).map(f64::ln);
+            let found = ln_error(&to)? - ln_error(&from)?;
+            let percent = |ln: f64| 100.0 * ln.exp_m1();
+            let first = study.predicted(estimator, &clean, (&from, &to), 1)?;
+            let in_steps = study.predicted(estimator, &clean, (&from, &to), steps)?;
+            println!(
+                "{name}, {estimator}: {:.1}, {:.1}, {:.1}",
+                percent(in_steps),
+                percent(first),
+                percent(found)
+            );
+        }
+    }
+    Ok(())
+}
