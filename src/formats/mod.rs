@@ -23,6 +23,7 @@ pub mod suggest;
 pub mod table_files;
 pub(crate) mod toml_described;
 pub mod toml_file;
+mod toml_path;
 pub mod trajectory_file;
 
 pub use error::{FileError, Kind, Place, Remedy, Setting};

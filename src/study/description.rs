@@ -268,10 +268,18 @@ impl CandidateEntry {
 }
 
 impl Study {
-    /// All virtual recordings.
-    pub(super) fn syntheses(&self) -> Vec<&Synthesis> {
-        let of_candidates = self.candidate.iter().filter_map(|e| e.calibrate.as_ref()?.synthesize.as_ref());
-        of_candidates.chain(self.truth.iter().filter_map(|e| e.synthesize.as_ref())).collect()
+    /// All virtual recordings, with their keys.
+    pub(super) fn syntheses(&self) -> Vec<(String, &Synthesis)> {
+        let of_candidates = self.candidate.iter().enumerate().filter_map(|(i, e)| {
+            Some((
+                format!("candidate[{}].calibrate.synthesize", i + 1),
+                e.calibrate.as_ref()?.synthesize.as_ref()?,
+            ))
+        });
+        let of_truths = self.truth.iter().enumerate();
+        let of_truths = of_truths
+            .filter_map(|(i, e)| Some((format!("truth[{}].synthesize", i + 1), e.synthesize.as_ref()?)));
+        of_candidates.chain(of_truths).collect()
     }
 
     /// The outage sets, sweeps written out; empty: those of the scenarios.
@@ -281,11 +289,11 @@ impl Study {
     pub fn outage_sets(&self) -> Result<Vec<OutageSet>, DescriptionError> {
         let mut sets = Vec::new();
         for (i, entry) in self.outages.iter().enumerate() {
-            sets.extend(expand(entry, i)?);
+            sets.extend(expand(entry, i)?.into_iter().map(|set| (i, set)));
         }
-        let names: Vec<&str> = sets.iter().map(|s| s.name.as_str()).collect();
+        let names: Vec<(usize, &str)> = sets.iter().map(|(i, set)| (*i, set.name.as_str())).collect();
         unique("outages", &names)?;
-        Ok(sets)
+        Ok(sets.into_iter().map(|(_, set)| set).collect())
     }
 
     /// The candidates, one a column: its entry and, for calibrations, its estimator.
@@ -317,13 +325,13 @@ impl Study {
     /// When no candidate has that name.
     pub fn reference(&self) -> Result<usize, DescriptionError> {
         let candidates = self.candidates();
-        let names: Vec<&str> = candidates.iter().map(|(name, ..)| name.as_str()).collect();
+        let names: Vec<(usize, &str)> = candidates.iter().map(|(name, i, _)| (*i, name.as_str())).collect();
         unique("candidate", &names)?;
         let Some(wanted) = &self.reference else { return Ok(0) };
-        let found = names.iter().position(|name| name == wanted);
+        let found = candidates.iter().position(|(name, ..)| name == wanted);
         found.ok_or_else(|| DescriptionError::NoReference {
             reference: wanted.clone(),
-            candidates: names.into_iter().map(str::to_owned).collect(),
+            candidates: candidates.into_iter().map(|(name, ..)| name).collect(),
         })
     }
 
@@ -341,7 +349,7 @@ impl Study {
             let recordings = e.calibrate.iter().flat_map(|c| &c.recordings);
             files.extend(recordings.map(|p| ("recording", p.as_path())));
         }
-        files.extend(self.syntheses().into_iter().map(|s| ("virtual IMU", s.model.as_path())));
+        files.extend(self.syntheses().into_iter().map(|(_, s)| ("virtual IMU", s.model.as_path())));
         files.extend(self.scenario.iter().filter_map(|e| Some(("scenario", e.file.as_deref()?))));
         files.extend(self.gnss.iter().filter_map(|e| Some(("gnss", e.file.as_deref()?))));
         files

@@ -12,7 +12,7 @@
 
 use super::{Datasheet, Entry, Figure, Quantity};
 use crate::formats::error::{FileError, Kind};
-use crate::formats::toml_described;
+use crate::formats::toml_described::Document;
 use crate::formats::toml_file::{Source, unknown_key};
 use crate::imu::Sensor;
 use serde::Deserialize;
@@ -97,7 +97,7 @@ pub fn catalogued(name: &str) -> Option<Result<Datasheet, FileError>> {
 }
 
 pub(super) fn parse(source: &Source) -> Result<Datasheet, FileError> {
-    let file: File = toml_described::read(source)?;
+    let file: File = Document::parse(source)?.read()?;
     let mut entries = Vec::new();
     for (sensor, table) in [(Sensor::Accel, file.accel), (Sensor::Gyro, file.gyro)] {
         for (key, given) in table {
