@@ -1,9 +1,8 @@
 //! `nav-sim synthesize`: replicate recordings from a noise model.
 
 use super::axes::ChannelSet;
-use super::run::not_of_another_command;
 use super::{Failure, Session, read};
-use nav_sim::formats::atomic::{AtomicDir, guard_directory, guard_inputs};
+use nav_sim::formats::atomic::{AtomicDir, Found, claim_directory};
 use nav_sim::formats::contamination_file;
 use nav_sim::formats::model_file::{self, ModelFile};
 use nav_sim::formats::recordings::{FileFormat, is_recording};
@@ -91,7 +90,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let job = Job::new(args, session)?;
     let names: Vec<String> =
         (1..=args.replicates).map(|k| format!("replicate_{k}.{}", job.format.ending())).collect();
-    check_directory(args, &job, &names, session)?;
+    claim(args, &job, &names, session)?;
     let mut out = AtomicDir::create(&args.out)?;
     let paths: Vec<PathBuf> = names.iter().map(|n| out.path(n)).collect();
     let progress = session.progress("replicates", args.replicates);
@@ -130,39 +129,42 @@ fn report(args: &Args, job: &Job, manifest: &str, session: &Session) {
 
 /// Refuses to overwrite an input or what this command did not make, and to leave recordings of another job beside
 /// this one's.
-fn check_directory(args: &Args, job: &Job, names: &[String], session: &Session) -> Result<(), Failure> {
+fn claim(args: &Args, job: &Job, names: &[String], session: &Session) -> Result<(), Failure> {
+    let files: Vec<&str> = names.iter().map(String::as_str).chain(["manifest.json"]).collect();
     let contamination = args.contaminate.as_deref().map(Path::new);
-    for name in names.iter().map(String::as_str).chain(["manifest.json"]) {
-        guard_inputs(&args.out.join(name), contamination.into_iter().chain([args.model.as_path()]))?;
-    }
-    not_of_another_command(&args.out, |text| made(text).is_some())?;
-    let Ok(manifest) = std::fs::read_to_string(args.out.join("manifest.json")) else { return Ok(()) };
-    let made = made(&manifest).unwrap_or_default();
-    let mut inside: Vec<String> = std::fs::read_dir(&args.out)
-        .into_iter()
-        .flat_map(|entries| entries.flatten().filter_map(|e| e.file_name().into_string().ok()))
-        .filter(|n| is_recording(n) && !n.starts_with('.'))
-        .collect();
-    inside.sort();
-    let shown = args.out.display();
-    if let Some(other) = inside.iter().find(|n| !made.contains(n) && names.contains(n)) {
-        let failure = Failure::input(format!("{shown} holds {other}, which this command did not make"));
-        return Err(failure.hint("move it away, or choose another directory with --out"));
-    }
-    if let Some(stale) = inside.into_iter().find(|n| !names.contains(n)) {
-        let message = format!("already holds {stale}, which this command would leave beside its own outputs");
-        return Err(FileError::contents(shown.to_string(), Place::Itself, message)
-            .advice("remove it")
-            .setting(Setting::OutputDirectory)
-            .into());
-    }
+    let inputs = contamination.into_iter().chain([args.model.as_path()]);
     let own = job.identity(args)?;
-    let same = |text: &str| {
+    let recognise = |text: &str| {
+        let Some(made) = made(text) else { return Ok(Found::Foreign) };
+        no_others(&args.out, names, &made)?;
         let there: Value = serde_json::from_str(text).unwrap_or_default();
-        own.as_object().is_some_and(|own| own.iter().all(|(key, value)| there[key] == *value))
-            && made == names
+        let is_same = own.as_object().is_some_and(|own| own.iter().all(|(key, value)| there[key] == *value));
+        Ok(Found::result(is_same && made == names))
     };
-    Ok(guard_directory(&args.out, session.existing(), same)?)
+    Ok(claim_directory(&args.out, &files, inputs, session.existing(), recognise)?)
+}
+
+/// Refuses recordings in a directory that this command did not make, or would leave beside its own.
+fn no_others(directory: &Path, names: &[String], made: &[String]) -> Result<(), FileError> {
+    let entries = std::fs::read_dir(directory).into_iter().flatten().flatten();
+    let inside = entries.filter_map(|e| e.file_name().into_string().ok());
+    let mut inside: Vec<String> = inside.filter(|n| is_recording(n) && !n.starts_with('.')).collect();
+    inside.sort();
+    let refusal = |message: String, advice: &'static str| {
+        let path = directory.display().to_string();
+        FileError::contents(path, Place::Itself, message).advice(advice).setting(Setting::OutputDirectory)
+    };
+    if let Some(other) = inside.iter().find(|n| !made.contains(n) && names.contains(n)) {
+        return Err(refusal(format!("holds {other}, which this command did not make"), "move it away"));
+    }
+    match inside.iter().find(|n| !names.contains(n)) {
+        None => Ok(()),
+        Some(stale) => {
+            let message =
+                format!("already holds {stale}, which this command would leave beside its own outputs");
+            Err(refusal(message, "remove it"))
+        }
+    }
 }
 
 /// The recordings that a manifest of this command names; `None` if it is another's.

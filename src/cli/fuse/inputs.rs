@@ -18,7 +18,7 @@ use nav_sim::sensors::outage::{FixedData, OutagePlan, PlacedOutages};
 use nav_sim::simulation::lincov;
 use nav_sim::trajectory::reference::Reference;
 use nav_sim::units::DEG;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// What was read, ready to use.
 pub(super) struct Inputs {
@@ -244,15 +244,6 @@ fn at_rate(model: &Model, rate_hz: f64) -> Result<Model, continuous::RateError> 
     };
     let axes = std::array::from_fn(|i| kept(&model.axes[i]));
     continuous::at_rate(&Model { rate_hz: model.rate_hz, axes }, rate_hz)
-}
-
-/// Where an output would fall on an input.
-pub(super) fn guarded(out: &Path, inputs: &[Input]) -> Result<(), Failure> {
-    for name in nav_sim::report::FUSION_FILES {
-        let paths = inputs.iter().map(|i| Path::new(&i.path));
-        nav_sim::formats::atomic::guard_inputs(&out.join(name), paths)?;
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -98,7 +98,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let begin = Instant::now();
     let settings = settings(args)?;
     let inputs = Inputs::read(args, &settings, session)?;
-    output::try_open(&args.out, &inputs.files, session)?;
+    output::claim(&args.out, &inputs.files, session)?;
     let recorded = Recorded { imu: &inputs.imu.samples, gnss: &inputs.gnss };
     let settings = inputs::with_outages(settings, &recorded, session)?;
     let Alignment { start, doubts } = inputs.start(args, &recorded, &settings)?;

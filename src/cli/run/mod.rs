@@ -18,7 +18,6 @@ use nav_sim::sensors::outage::{Outage, PlacedOutages};
 use nav_sim::simulation::ExperimentError;
 use std::path::{Path, PathBuf};
 
-pub(super) use output::{empty_or_new, not_of_another_command};
 use output::{manifest, text, write};
 pub(super) use words::Words;
 
@@ -130,7 +129,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     let manifest =
         manifest(scenario.clone(), &outages, seed, inputs.files.clone(), inputs.note.clone(), session);
-    output::try_open(&args.out, &manifest, session)?;
+    output::claim(&args.out, &manifest, session)?;
     args.plot.guard(&inputs.files.iter().map(|i| PathBuf::from(&i.path)).collect::<Vec<_>>())?;
     let words = Words::new(session);
     let found = jobs::navigate(&inputs.job, &scenario, &outages, seed, &words);

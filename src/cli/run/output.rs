@@ -3,7 +3,7 @@
 use super::words::agreement_line;
 use crate::cli::compare::table;
 use crate::cli::{Failure, Session};
-use nav_sim::formats::atomic::{self, AtomicDir};
+use nav_sim::formats::atomic::{AtomicDir, Found, claim_directory};
 use nav_sim::jobs::Navigation;
 use nav_sim::metrics::{Budget, Met, OutageSummary, PerState, Summary, VerdictKind};
 use nav_sim::report::{self, Input, Manifest, ModelNote, TrajectorySeries, seconds};
@@ -40,45 +40,14 @@ pub(crate) fn manifest(
     }
 }
 
-/// Whether a run directory can be made, found out before the long computation; none of its files may be an
-/// input. Nothing is left: a run that is interrupted leaves no trace.
-pub(crate) fn try_open(path: &Path, manifest: &Manifest, session: &Session) -> Result<(), Failure> {
-    for name in report::RUN_FILES {
-        atomic::guard_inputs(&path.join(name), manifest.inputs.iter().map(|i| Path::new(&i.path)))?;
-    }
-    not_of_another_command(path, |text| serde_json::from_str::<Manifest>(text).is_ok())?;
-    let same = |text: &str| serde_json::from_str(text).is_ok_and(|there| manifest.is_same_run(&there));
-    atomic::guard_directory(path, session.existing(), same)?;
-    drop(AtomicDir::create(path)?);
-    Ok(())
-}
-
-/// Refuses a directory whose manifest is that of another command: its own would take its place. What a killed
-/// command had begun to replace is finished first.
-pub(crate) fn not_of_another_command(path: &Path, is_ours: fn(&str) -> bool) -> Result<(), Failure> {
-    atomic::recover(path);
-    let manifest = path.join("manifest.json");
-    let Ok(text) = std::fs::read_to_string(&manifest) else { return empty_or_new(path) };
-    if is_ours(&text) {
-        return Ok(());
-    }
-    let message = format!("{} is of another command, or of another version", manifest.display());
-    Err(Failure::input(message).hint("choose another directory with --out, or remove it"))
-}
-
-/// Refuses a directory that holds anything: files of the same names would be lost.
-pub(crate) fn empty_or_new(path: &Path) -> Result<(), Failure> {
-    let Ok(entries) = std::fs::read_dir(path) else { return Ok(()) };
-    let visible = |name: &std::ffi::OsString| !name.to_string_lossy().starts_with('.');
-    let mut names: Vec<_> = entries.flatten().map(|e| e.file_name()).filter(visible).collect();
-    names.sort();
-    let Some(first) = names.first() else { return Ok(()) };
-    let message = format!(
-        "{} is not empty, and not of this command: it holds {}",
-        path.display(),
-        first.to_string_lossy()
-    );
-    Err(Failure::input(message).hint("choose a new directory with --out"))
+/// Whether a run directory can be made, found out before the long computation.
+pub(crate) fn claim(path: &Path, manifest: &Manifest, session: &Session) -> Result<(), Failure> {
+    let inputs = manifest.inputs.iter().map(|i| Path::new(&i.path));
+    let recognise = |text: &str| {
+        let there = serde_json::from_str::<Manifest>(text);
+        Ok(there.map_or(Found::Foreign, |there| Found::result(manifest.is_same_run(&there))))
+    };
+    Ok(claim_directory(path, &report::RUN_FILES, inputs, session.existing(), recognise)?)
 }
 
 /// Writes a run directory.
