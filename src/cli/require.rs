@@ -3,6 +3,7 @@
 use super::{Failure, Session, parse, read, turn_on};
 use nav_sim::formats::atomic::{AtomicFile, guard_inputs};
 use nav_sim::formats::datasheet::{self, CATALOGUE, Datasheet};
+use nav_sim::formats::file_kind::{self, FileKind};
 use nav_sim::formats::model_file::{self, ModelFile};
 use nav_sim::formats::scenario_file;
 use nav_sim::jobs::{Ask, CatalogueUnit, Misplaced, Requirements};
@@ -273,7 +274,7 @@ fn units_of(
     }
     let unit = |path: &PathBuf| {
         let name = path.file_stem().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        if datasheet::is_entry(path) {
+        if file_kind::of(path)? == FileKind::CatalogueEntry {
             return of_sheet(name, &datasheet::read(path)?, asked);
         }
         let file = read::model(path, session)?;

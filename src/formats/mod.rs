@@ -9,6 +9,7 @@ pub mod draws_file;
 pub mod efficiency_directory;
 pub mod efficiency_file;
 mod error;
+pub mod file_kind;
 pub mod fusion_files;
 pub mod hash;
 pub mod input;

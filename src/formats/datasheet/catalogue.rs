@@ -82,13 +82,6 @@ pub fn read(path: &Path) -> Result<Datasheet, FileError> {
     parse(&Source::read(path)?)
 }
 
-/// Whether a file is an entry of a catalogue, not a model: it has a `[unit]`. A file that is no TOML is neither.
-#[must_use]
-pub fn is_entry(path: &Path) -> bool {
-    let table = Source::read(path).ok().and_then(|source| source.text().parse::<toml::Table>().ok());
-    table.is_some_and(|table| table.contains_key("unit"))
-}
-
 /// The entry of that name, if the catalogue has it; capitals do not matter.
 #[must_use]
 pub fn catalogued(name: &str) -> Option<Result<Datasheet, FileError>> {
