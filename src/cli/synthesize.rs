@@ -1,6 +1,7 @@
 //! `nav-sim synthesize`: replicate recordings from a noise model.
 
 use super::axes::ChannelSet;
+use super::parse::one_of;
 use super::{Failure, Session, read};
 use nav_sim::formats::atomic::{AtomicDir, Found, claim_directory};
 use nav_sim::formats::contamination_file;
@@ -9,7 +10,7 @@ use nav_sim::formats::recordings::{FileFormat, is_recording};
 use nav_sim::formats::{FileError, Place, Setting};
 use nav_sim::imu::Channel;
 use nav_sim::noise::contamination::{Contamination, Rule};
-use nav_sim::noise::{Composite, Model, Process, ReplicateError, VirtualImu};
+use nav_sim::noise::{Model, ReplicateError, VirtualImu};
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use std::fs::File;
@@ -50,29 +51,11 @@ pub(crate) struct Args {
     #[arg(long, value_name = "AXES", value_delimiter = ',', value_parser = ChannelSet::named, default_value = "all")]
     axes: Vec<ChannelSet>,
     /// Format of the recordings: csv has ten digits and the time, npy all digits (samples × signals)
-    #[arg(long, value_enum, default_value_t = OutputFormat::Csv)]
-    output_format: OutputFormat,
+    #[arg(long, value_name = "FORMAT", value_parser = one_of::<FileFormat>(&FileFormat::NAMES), default_value_t)]
+    output_format: FileFormat,
     /// Directory to write to
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
-}
-
-#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
-enum OutputFormat {
-    Csv,
-    #[value(name = "csv.gz")]
-    CsvGz,
-    Npy,
-}
-
-impl OutputFormat {
-    const fn file_format(self) -> FileFormat {
-        match self {
-            Self::Csv => FileFormat::Csv,
-            Self::CsvGz => FileFormat::CsvGz,
-            Self::Npy => FileFormat::Npy,
-        }
-    }
 }
 
 /// Everything about the job that is decided before the first number is drawn.
@@ -88,8 +71,7 @@ struct Job {
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let job = Job::new(args, session)?;
-    let names: Vec<String> =
-        (1..=args.replicates).map(|k| format!("replicate_{k}.{}", job.format.ending())).collect();
+    let names: Vec<String> = (1..=args.replicates).map(|k| format!("replicate_{k}.{}", job.format)).collect();
     claim(args, &job, &names, session)?;
     let mut out = AtomicDir::create(&args.out)?;
     let paths: Vec<PathBuf> = names.iter().map(|n| out.path(n)).collect();
@@ -219,7 +201,7 @@ impl Job {
             let gigabytes = bytes / 1e9;
             return Err(Failure::could_not(format!("{samples} samples need {gigabytes:.0} GB of memory")));
         }
-        let (samples, format) = (samples as usize, args.output_format.file_format());
+        let (samples, format) = (samples as usize, args.output_format);
         let (spread, seed) = (args.spread, session.seed(None));
         Ok(Self { file, contamination, channels, samples, format, spread, seed })
     }
@@ -247,7 +229,7 @@ impl Job {
         let entry = |(i, (name, model)): (usize, (&String, &Model))| {
             let contaminated = self.contamination.as_ref().is_some_and(|c| c.touches(i as u64 + 1));
             let axes: Map<String, Value> =
-                self.channels.iter().map(|c| (c.to_string(), parameters(model.axis(*c)))).collect();
+                self.channels.iter().map(|c| (c.to_string(), json!(model.axis(*c).processes))).collect();
             json!({ "file": name, "contaminated": contaminated, "axes": axes })
         };
         let replicates: Vec<Value> = names.iter().zip(models).enumerate().map(entry).collect();
@@ -273,16 +255,6 @@ impl Job {
             "contamination": self.contamination.as_ref().map(|c| c.name.as_str()),
         }))
     }
-}
-
-/// The processes of an axis, as in model files.
-fn parameters(noise: &Composite) -> Value {
-    let process = |p: &Process| {
-        let code = ("type".to_owned(), json!(p.code()));
-        let values = p.parameters().into_iter().map(|(name, value)| (name.to_owned(), json!(value)));
-        Value::Object(std::iter::once(code).chain(values).collect())
-    };
-    noise.processes.iter().map(process).collect()
 }
 
 /// The channels to make: those asked for that the model has.

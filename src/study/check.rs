@@ -3,6 +3,7 @@
 use super::description::{CalibrateStep, Study};
 use super::error::DescriptionError;
 use super::rules::{exactly_one, unique};
+use crate::calibration::Estimator;
 use crate::scenario::{MAX_RUNS, Method};
 use std::path::PathBuf;
 
@@ -98,7 +99,12 @@ impl Study {
             let said = [!step.recordings.is_empty(), step.synthesize.is_some()];
             exactly_one(format!("{key}.calibrate"), &said, "recordings, synthesize")?;
             self.check_leave_out(&format!("{key}.calibrate.leave_out"), step)?;
-            empty(&format!("{key}.calibrate.estimators"), !step.estimators.is_empty())?;
+            let key = format!("{key}.calibrate.estimators");
+            empty(&key, !step.estimators.is_empty())?;
+            if step.estimators.contains(&Estimator::Given) {
+                let reason = "is of curves that come from elsewhere";
+                return Err(DescriptionError::refused(&key, "\"given\"", reason));
+            }
         }
         for (i, e) in self.scenario.iter().enumerate() {
             let said = [e.file.is_some(), e.settings.is_some()];

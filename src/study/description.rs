@@ -3,11 +3,11 @@
 use super::error::DescriptionError;
 use super::rules::unique;
 use super::sweep::{OutageSet, OutagesEntry, expand};
-use crate::calibration::{Estimator, ModelSpec};
+use crate::calibration::{Estimator, ModelSpec, Pool, Weighting};
 use crate::ekf::FilterStates;
 use crate::scenario::{Method, Scenario};
 use crate::sensors::gnss::GnssSettings;
-use crate::wavelet::Tuning;
+use crate::wavelet::{Convention, Tuning};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -192,9 +192,9 @@ pub struct CalibrateStep {
     /// Recordings of a virtual IMU instead.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub synthesize: Option<Synthesis>,
-    /// awv, sr-awv, dr-awv; gmwm, rgmwm with a single recording.
+    /// awv, sr-awv, dr-awv; gmwm, rgmwm, avlr with a single recording.
     #[serde(default = "estimators")]
-    pub estimators: Vec<String>,
+    pub estimators: Vec<Estimator>,
     /// What is fitted: N1, N2 or any sum.
     #[serde(default = "usual_model")]
     pub fit: String,
@@ -206,20 +206,20 @@ pub struct CalibrateStep {
     pub efficiency: f64,
     /// How the tuning constant follows from it: exact, or wv as the R packages have it (default: exact).
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub efficiency_convention: Option<String>,
+    pub efficiency_convention: Option<Convention>,
     /// What a scale counts: model, edof, ci, none or full (default: model).
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub weighting: Option<String>,
+    pub weighting: Option<Weighting>,
     /// Which signals are replicates of one another: sensor or axes (default: sensor; of a single recording axes).
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub pool: Option<String>,
+    pub pool: Option<Pool>,
     /// Number of scales (default: one less than the shortest signal allows).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scales: Option<u32>,
 }
 
-fn estimators() -> Vec<String> {
-    vec![Estimator::default().to_string()]
+fn estimators() -> Vec<Estimator> {
+    vec![Estimator::default()]
 }
 
 fn usual_model() -> String {
@@ -298,15 +298,14 @@ impl Study {
 
     /// The candidates, one a column: its entry and, for calibrations, its estimator.
     #[must_use]
-    pub fn candidates(&self) -> Vec<(String, usize, Option<String>)> {
+    pub fn candidates(&self) -> Vec<(String, usize, Option<Estimator>)> {
         let of = |(i, e): (usize, &CandidateEntry)| match &e.calibrate {
             None => vec![(e.name.clone(), i, None)],
             Some(step) if step.estimators.len() == 1 => {
-                vec![(e.name.clone(), i, Some(step.estimators[0].clone()))]
+                vec![(e.name.clone(), i, Some(step.estimators[0]))]
             }
             Some(step) => {
-                let one =
-                    |estimator: &String| (format!("{}/{estimator}", e.name), i, Some(estimator.clone()));
+                let one = |estimator: &Estimator| (format!("{}/{estimator}", e.name), i, Some(*estimator));
                 step.estimators.iter().map(one).collect()
             }
         };

@@ -210,6 +210,15 @@ mod tests {
             "s.toml, line 8: candidate[2].calibrate needs exactly one of recordings, synthesize | "
         );
         assert_eq!(
+            with("\"awv\", \"dr-awv\"", "\"dr_awv\""),
+            "s.toml, line 8: \"candidate[2].calibrate.estimators\" = \"dr_awv\" is not one of \"awv\", \"sr-awv\", \
+             \"dr-awv\", \"gmwm\", \"rgmwm\", \"avlr\", \"given\" | did you mean \"dr-awv\"?"
+        );
+        assert_eq!(
+            with("\"awv\", \"dr-awv\"", "\"given\""),
+            "s.toml, line 8: \"candidate[2].calibrate.estimators\" = \"given\" is of curves that come from elsewhere | "
+        );
+        assert_eq!(
             with("sweep = {", "swep = {"),
             "s.toml, line 10: unknown key \"outages[1].swep\" | did you mean \"sweep\"?"
         );

@@ -124,7 +124,7 @@ fn what_cannot_be_compared_is_refused() {
     refused(&[], ["2 recordings are too few to leave one out", "hint: each recording is a file"]);
     refused(&["--estimator", "gmwm"], ["no candidate uses all recordings", "add awv"]);
     refused(&["--model", "N3"], ["--model", "hint"]);
-    refused(&["--inflate", "more"], ["more", "\"none\", \"tuned\" or \"x10\""]);
+    refused(&["--inflate", "more"], ["more", "none, tuned, x10"]);
     let none = ["choose", "r", "--trajectory", "trajectories/figure_eight.toml", "--outage", "none"];
     let message = said(&nav_sim(directory.path(), &none).code(2));
     assert!(message.contains("judged at the ends of outages"), "{message}");

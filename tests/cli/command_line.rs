@@ -93,7 +93,10 @@ fn check_looks_at_every_file() {
     assert!(code == 0 && out.contains("2 channels of 100 samples at 50 Hz"), "{out}{said}");
     let entry = root.join("calib_data/catalogue/stim300.toml");
     let (code, out, said) = check(&[entry.to_str().unwrap()]);
-    assert!(code == 0 && out.contains("stim300.toml: a catalogue entry, Sensonor (Safran) STIM300"), "{out}{said}");
+    assert!(
+        code == 0 && out.contains("stim300.toml: a catalogue entry, Sensonor (Safran) STIM300"),
+        "{out}{said}"
+    );
     let array = root.join("calib_data/formats/array.npy");
     assert_eq!(check(&[array.to_str().unwrap(), "--rate-hz", "100"]).0, 0);
 }
