@@ -71,15 +71,15 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 /// What makes a study this one and no other. The number of sets does not: a study can be extended.
 fn identity(design: &Design) -> Value {
-    let hash = |text: String| blake3::hash(text.as_bytes()).to_hex()[..16].to_owned();
-    let scenario = |s: &Contamination| json!({ "name": s.name, "hash": hash(format!("{:?}", s.rules)) });
+    let hash = |what: Value| blake3::hash(what.to_string().as_bytes()).to_hex()[..16].to_owned();
+    let scenario = |s: &Contamination| json!({ "name": s.name, "hash": hash(json!(s.rules)) });
     let axis = design.channel.index();
     json!({
         "schema_version": 1,
         "nav_sim": env!("CARGO_PKG_VERSION"),
         "seed": design.seed,
         "axis": design.channel.to_string(),
-        "model": hash(format!("{:?} {:?}", design.model.axes[axis], design.spread.axes[axis])),
+        "model": hash(json!([design.model.axes[axis], design.spread.axes[axis]])),
         "rate_hz": design.model.rate_hz,
         "replicates": design.replicates,
         "samples": design.samples,
