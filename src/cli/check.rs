@@ -128,10 +128,7 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
             Ok(format!("a contamination of {} operations", rules.len()))
         }
         FileKind::Curve => {
-            let curves = curve_file::read(path).map_err(|e| {
-                let failure = if e.is_content() { Failure::input(&e) } else { Failure::could_not(&e) };
-                failure.maybe_hint(e.hint())
-            })?;
+            let curves = curve_file::read(path)?;
             let scales: Vec<String> = curves.iter().map(|c| c.curve.levels.len().to_string()).collect();
             Ok(format!("wavelet-variance curves, of {} scales", scales.join(", ")))
         }

@@ -182,10 +182,7 @@ fn unasked_output() -> Result<PathBuf, Failure> {
 }
 
 fn read(path: &Path) -> Result<run_directory::RunDirectory, Failure> {
-    run_directory::read(path).map_err(|e| {
-        let failure = if e.is_content() { Failure::input(&e) } else { Failure::could_not(&e) };
-        failure.maybe_hint(e.hint())
-    })
+    Ok(run_directory::read(path)?)
 }
 
 pub(super) fn states(names: &[String]) -> Result<Vec<usize>, Failure> {

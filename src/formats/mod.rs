@@ -18,6 +18,7 @@ pub mod npy;
 pub mod parameters_file;
 pub mod recordings;
 pub mod run_directory;
+mod run_tables;
 pub mod scenario_file;
 pub(crate) mod source;
 pub mod suggest;
