@@ -25,6 +25,7 @@
 mod calibrate;
 mod certify;
 mod choose;
+mod compare;
 mod curves;
 mod design;
 mod error;
@@ -39,6 +40,7 @@ mod wavelet;
 pub use calibrate::{Calibration, CalibrationOptions, EstimatorChoice, Measured, calibrate, measure};
 pub use certify::{Certificate, CertifiedScale, CertifyError, Recorded, certify};
 pub use choose::{ChoiceDrive, Chosen, choose};
+pub use compare::{CompareError, Comparison, compare};
 pub use curves::{Curves, read_curves};
 pub use design::{
     Design, DesignError, DesignInputs, DesignedParameter, DesignedQuantile, Destination, design,
