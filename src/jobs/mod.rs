@@ -30,6 +30,7 @@ mod curves;
 mod design;
 mod error;
 mod files;
+mod fuse;
 mod navigate;
 mod reduction;
 mod remarks;
@@ -47,6 +48,7 @@ pub use design::{
 };
 pub use error::JobError;
 pub use files::ModelFiles;
+pub use fuse::{FusionFilter, FusionFilterError};
 pub use navigate::{NavigateError, NavigateInputs, Navigation, Note, TrueImu, navigate};
 pub use reduction::Reduced;
 pub use remarks::{BeginsOtherwise, Remark, Remarks, Silence};
