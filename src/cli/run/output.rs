@@ -29,7 +29,6 @@ pub(crate) fn manifest(
         version: env!("CARGO_PKG_VERSION").to_owned(),
         command: std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect(),
         seed,
-        scenario: String::new(),
         configuration,
         inputs,
         model,
