@@ -29,6 +29,7 @@ mod compare;
 mod curves;
 mod design;
 mod error;
+mod estimator_study;
 mod files;
 mod fuse;
 mod navigate;
@@ -47,6 +48,7 @@ pub use design::{
     Design, DesignError, DesignInputs, DesignedParameter, DesignedQuantile, Destination, design,
 };
 pub use error::JobError;
+pub use estimator_study::{EstimatorStudy, EstimatorStudyError};
 pub use files::ModelFiles;
 pub use fuse::{FusionFilter, FusionFilterError};
 pub use navigate::{NavigateError, NavigateInputs, Navigation, Note, TrueImu, navigate};
