@@ -71,7 +71,7 @@ fn of_calibration(e: &CalibrationError) -> Failure {
     Failure::input(e).maybe_hint(hint.map(str::to_owned))
 }
 
-/// A `--model` that is none.
+/// Not a `--model`.
 pub(super) fn unknown_model(e: SpecError) -> Failure {
     let hint = match &e {
         SpecError::Unknown { term, .. } => match nearest(term, ModelSpec::legal()) {

@@ -195,7 +195,7 @@ impl Job {
         };
         let bytes = samples * channels.len() as f64 * 8.0;
         if samples < 2.0 {
-            return Err(Failure::input(format!("{samples} samples are no recording")));
+            return Err(Failure::input(format!("a recording needs at least 2 samples; these are {samples}")));
         }
         if bytes >= isize::MAX as f64 || Vec::<u8>::new().try_reserve_exact(bytes as usize).is_err() {
             let gigabytes = bytes / 1e9;
@@ -264,10 +264,12 @@ fn wanted(args: &Args, file: &ModelFile, session: &Session) -> Result<Vec<Channe
         Channel::ALL.into_iter().filter(asked).partition(|c| file.missing.contains(c));
     let shown = args.model.display();
     if there.is_empty() {
-        return Err(Failure::input(format!("{shown}: says nothing of the axes asked for")));
+        return Err(Failure::input(format!("{shown} has no noise model for the axes asked for")));
     }
     for channel in missing {
-        session.printer.warn(&format!("{shown}: says nothing of {channel}: not made"));
+        session
+            .printer
+            .warn(&format!("{shown} has no noise model for {channel}; no signal is written for that axis"));
     }
     Ok(there)
 }

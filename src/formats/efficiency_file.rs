@@ -154,7 +154,7 @@ pub fn read(path: &Path) -> Result<StudyFile, FileError> {
         levels: levels(&root, d.levels, samples)?,
         scenarios: scenarios(&root, &d.scenarios, file.model.rate_hz, beside)?,
         estimators: estimators(&root, d.estimators)?,
-        spec: d.fit.parse().map_err(|e| root.refuse("fit", format!("is no model: {e}"), None))?,
+        spec: d.fit.parse().map_err(|e| root.refuse("fit", format!("is not a model: {e}"), None))?,
         trim: d.trim.map_or(Trim::default(), |a| Trim::Count(a as usize)),
         tuning: Tuning::new(d.efficiency, Convention::Exact)
             .map_err(|_| root.refuse("efficiency", "is not between 0.3 and 0.99", None))?,

@@ -144,7 +144,7 @@ fn bounds(
     match (fix, lower, upper) {
         (Some(value), None, None) => Ok((Some(value), Some(value))),
         (Some(_), ..) => Err(table.refuse(parameter, "is both fixed and bounded", hint())),
-        (None, None, None) => Err(table.refuse(parameter, "says nothing", hint())),
+        (None, None, None) => Err(table.refuse(parameter, "neither fixes nor bounds the parameter", hint())),
         (None, lower, upper) => Ok((lower, upper)),
     }
 }

@@ -41,7 +41,7 @@ pub use fits::{CandidateEntry, FitEntry, FitsFile, MissEntry};
 pub use fusion::{FUSION_FILES, FusionKind, FusionManifest, FusionSummary, fusion_directory, solution_csv};
 pub use manifest::{Input, Manifest, ModelNote};
 pub use markdown::{csv_table, latex_table, markdown, markdown_table};
-pub use number::{readable, seconds};
+pub use number::{readable, seconds, window};
 pub use pages::{
     RatioCurves, calibration_page, calibration_svg, choice_page, comparison_page, comparison_svg,
     efficiency_page, efficiency_svg, run_svg, study_page, wavelet_page, wavelet_svg,

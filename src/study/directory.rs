@@ -18,7 +18,7 @@ fn file(directory: &Path) -> PathBuf {
 /// The plan in a directory, if there is one.
 ///
 /// # Errors
-/// When it cannot be read or is none.
+/// When it cannot be read or is not a plan.
 pub fn plan(directory: &Path) -> Result<Option<Plan>, FileError> {
     let path = file(directory);
     let shown = path.display().to_string();
@@ -39,7 +39,7 @@ pub fn plan(directory: &Path) -> Result<Option<Plan>, FileError> {
         || plan.models.len() != plan.study.candidates().len()
         || !plan.models.iter().all(fits)
     {
-        return Err(damaged(1, "its lists do not fit together".into()));
+        return Err(damaged(1, "its numbers of trajectories and models are not those of its study".into()));
     }
     Ok(Some(plan))
 }

@@ -61,7 +61,8 @@ pub fn channels(word: &str) -> Result<Vec<Channel>, PrepareError> {
 /// A word that means nothing.
 pub(super) fn settings(step: &CalibrateStep, rate_hz: f64) -> Result<Settings, PrepareError> {
     let word = |key, value: String, reason: String| PrepareError::Word { key, value, reason };
-    let model = step.fit.parse().map_err(|e| word("fit", step.fit.clone(), format!("is no model: {e}")))?;
+    let model =
+        step.fit.parse().map_err(|e| word("fit", step.fit.clone(), format!("is not a model: {e}")))?;
     let tuning =
         Tuning::new(step.efficiency, step.efficiency_convention.unwrap_or_default()).map_err(|_| {
             word("efficiency", step.efficiency.to_string(), "is not between 0.3 and 0.99".to_owned())

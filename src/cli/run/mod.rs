@@ -12,7 +12,7 @@ use inputs::Inputs;
 use nav_sim::formats::scenario_file;
 use nav_sim::jobs::{self, NavigateError};
 use nav_sim::metrics::{Requirement, Summary};
-use nav_sim::report::{Manifest, TrajectorySeries, seconds};
+use nav_sim::report::{Manifest, TrajectorySeries, window};
 use nav_sim::scenario::{Method, Scenario};
 use nav_sim::sensors::imu::TruthError;
 use nav_sim::sensors::outage::{NotAnOutage, Outage, PlacedOutages};
@@ -146,7 +146,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     required(&found.summary)
 }
 
-/// Refuses requirements of outages where there is none.
+/// Refuses requirements of the ends of outages without an outage.
 fn requirable(all: &[Requirement], no_outage: bool) -> Result<(), Failure> {
     match all.iter().find(|r| no_outage && r.needs_outage()) {
         Some(r) => {
@@ -228,8 +228,7 @@ fn outages(
 ) -> Result<Vec<Outage>, Failure> {
     let PlacedOutages { windows, remarks } = scenario.outages_on(span, seed)?;
     remarks.iter().for_each(|remark| session.printer.warn(&remark.to_string()));
-    let shown: Vec<String> =
-        windows.iter().map(|o| format!("{}–{} s", seconds(o.start_s), seconds(o.end_s))).collect();
+    let shown: Vec<String> = windows.iter().map(|o| window(o.start_s, o.end_s)).collect();
     session.printer.say(&match shown.as_slice() {
         [] => "no outage".to_owned(),
         some => format!("outages {}", some.join(", ")),

@@ -6,7 +6,7 @@ use crate::cli::{Failure, Session};
 use nav_sim::formats::atomic::{AtomicDir, Found, claim_directory};
 use nav_sim::jobs::Navigation;
 use nav_sim::metrics::{Budget, Met, OutageSummary, PerState, Summary, VerdictKind};
-use nav_sim::report::{self, Input, Manifest, ModelNote, TrajectorySeries, seconds};
+use nav_sim::report::{self, Input, Manifest, ModelNote, TrajectorySeries, window};
 use nav_sim::scenario::{Method, Scenario};
 use nav_sim::sensors::outage::Outage;
 use nav_sim::simulation::REPORTED_NAMES;
@@ -138,7 +138,7 @@ fn calibration_lines(outages: &[OutageSummary]) -> String {
         let rmse = of("RMSE", &o.rmse_end, &o.rmse_end_ci95);
         let asee = of("ASEE", &o.asee_end, &o.asee_end_ci95);
         let all: Vec<String> = [p95, rmse, asee].into_iter().flatten().collect();
-        let window = format!("{}–{} s", seconds(o.start_s), seconds(o.end_s));
+        let window = window(o.start_s, o.end_s);
         (!all.is_empty()).then(|| format!("\nby the calibration, 95 %, {window}: {}", all.join(", ")))
     };
     outages
@@ -171,7 +171,7 @@ fn budget_table(summary: &Summary) -> String {
     };
     let mut rows = vec![["sources of errors", "horizontal position", "yaw"].map(str::to_owned).to_vec()];
     for (o, budget) in known {
-        let window = format!("{}–{} s", seconds(o.start_s), seconds(o.end_s));
+        let window = window(o.start_s, o.end_s);
         rows.push(vec![window, sources(budget, &[0, 1]), sources(budget, &[8])]);
     }
     format!("\n{}", table(&rows))
@@ -185,7 +185,7 @@ pub(super) fn sensitivity_table(summary: &Summary) -> String {
         return String::new();
     };
     let states = [1, 6, 8];
-    let window = format!("{}–{} s", seconds(outage.start_s), seconds(outage.end_s));
+    let window = window(outage.start_s, outage.end_s);
     let head = std::iter::once("d ln RMSE / d ln parameter".to_owned());
     let mut rows: Vec<Vec<String>> = vec![head.chain(states.map(|i| REPORTED_NAMES[i].to_owned())).collect()];
     for (name, slopes) in &of.0 {
@@ -232,7 +232,7 @@ fn outage_table(outages: &[OutageSummary]) -> String {
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for o in outages {
         let h = &o.horizontal_error_end_m;
-        let mut row = vec![format!("{}–{} s", seconds(o.start_s), seconds(o.end_s))];
+        let mut row = vec![window(o.start_s, o.end_s)];
         row.extend([h.p50, h.p95, h.p999.unwrap_or(h.max)].map(|v| format!("{v:.1}")));
         let ratios = ratios(&o.rmse_end, &o.asee_end);
         for state in [1, 6] {
