@@ -39,7 +39,7 @@ pub use nav_sim_navigation::{
     closure, earth, ekf, frames, fusion, gnss, lanes, linalg, metrics, monte_carlo, require, scenario,
     sensors, simulation, strapdown, throughput, trajectory,
 };
-pub use nav_sim_signal::{bibliography, imu, noise, rng, units, wavelet};
+pub use nav_sim_signal::{bibliography, imu, names, noise, rng, units, wavelet};
 
 // Parameters for other programs.
 pub mod export;

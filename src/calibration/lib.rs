@@ -8,8 +8,6 @@
 pub(crate) use nav_sim_signal::bibliography;
 pub(crate) use nav_sim_signal::{imu, noise, rng, wavelet};
 
-// What the members of closed sets are called.
-mod names;
 // Wavelet variances: of replicates, averaged, as a model implies them, and how they scatter.
 mod curve;
 // What is fitted.
@@ -44,7 +42,6 @@ pub use diagnosis::{
 };
 pub use fit::{Fit, FitError, Termination, Weighting, estimate, fit};
 pub use model::{LimitError, Limits, ModelSpec, SpecError};
-pub use names::UnknownName;
 pub use outcome::{
     AxesDiffer, Bootstrap, Candidate, Departure, FitRange, Goodness, Indistinct, Inference, LevelSpread,
     Miss, ModelChoice, Outcome, ParameterInterval, ParameterLimit, Practical, PracticalIntervals, Ranking,

@@ -4,7 +4,6 @@ use crate::calibration::{Estimator, ModelChoice, ModelSpec};
 use crate::ekf::FilterStates;
 use crate::noise::Kind;
 use std::fmt;
-use std::str::FromStr;
 
 /// A way from recordings to a filter.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,11 +31,6 @@ pub enum Inflation {
     Tenfold,
 }
 
-/// A word that is no inflation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("expected \"none\", \"tuned\" or \"x10\"")]
-pub struct UnknownInflation;
-
 impl Inflation {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::None, Self::Tuned, Self::Tenfold];
@@ -52,13 +46,7 @@ impl Inflation {
     }
 }
 
-impl FromStr for Inflation {
-    type Err = UnknownInflation;
-
-    fn from_str(text: &str) -> Result<Self, UnknownInflation> {
-        Self::ALL.into_iter().find(|i| i.name() == text).ok_or(UnknownInflation)
-    }
-}
+nav_sim_signal::named!(Inflation);
 
 impl Candidate {
     /// The estimator's model as it is, in the default filter of 15 states.

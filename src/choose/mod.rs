@@ -41,7 +41,7 @@ mod laboratory;
 mod ranking;
 mod score;
 
-pub use candidate::{Candidate, Inflation, UnknownInflation};
+pub use candidate::{Candidate, Inflation};
 pub use drive::{ChoiceError, Drive, Fold};
 pub use influence::{Influence, RecordingInfluence, ScaleInfluence};
 pub use laboratory::{Calibrated, Laboratory, Unit};

@@ -2,13 +2,13 @@
 
 use super::jobs::unknown_model;
 use super::recordings::{RecordingArgs, Said};
-use super::run::{OutageArg, Words, empty_or_new, parse_outage, scenario_with};
+use super::run::{OutageArg, Words, parse_outage, scenario_with};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
 use nav_sim::calibration::{Bootstrap, Estimator, ModelChoice, Pool, Settings, Trim, diagnose};
 use nav_sim::choose::{Candidate, Inflation};
 use nav_sim::ekf::FilterStates;
-use nav_sim::formats::atomic::{AtomicDir, Existing};
+use nav_sim::formats::atomic::{AtomicDir, Existing, Found, claim_directory};
 use nav_sim::formats::model_file::{self, CalibrationNote, ModelFile};
 use nav_sim::jobs::{
     self, Calibration, CalibrationOptions, ChoiceDrive, Chosen, EstimatorChoice, ModelFiles,
@@ -78,8 +78,7 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let candidates = candidates(args)?;
-    empty_or_new(&args.out)?;
-    drop(AtomicDir::create(&args.out)?);
+    claim(args, session)?;
     let scenario = scenario(args)?;
     let trajectory = read::trajectory(&args.trajectory, session)?;
     let seed = session.seed(scenario.run.seed);
@@ -182,6 +181,21 @@ fn outages(
     Ok(placed.windows)
 }
 
+/// The files of a choice, in the order of writing.
+const FILES: [&str; 6] =
+    ["model.toml", "model.wv.json", "model.html", "model.draws.json", "report.html", "ranking.json"];
+
+/// Whether the directory can be made, found out before the work. A ranking does not tell what it was made of.
+fn claim(args: &Args, session: &Session) -> Result<(), Failure> {
+    let inputs = args.inputs.iter().chain([&args.trajectory]).chain(&args.scenario).map(PathBuf::as_path);
+    let recognise = |text: &str| {
+        let there = serde_json::from_str::<serde_json::Value>(text).unwrap_or_default();
+        let is_ours = there["candidates"].is_array() && there["influence"].is_object();
+        Ok(if is_ours { Found::Other("holds the result of an earlier choose") } else { Found::Foreign })
+    };
+    Ok(claim_directory(&args.out, &FILES, inputs, session.existing(), recognise)?)
+}
+
 fn write(args: &Args, chosen: &Chosen, report: &ChoiceReport<'_>, seed: u64) -> Result<(), Failure> {
     let mut directory = AtomicDir::create(&args.out)?;
     let model = directory.path("model.toml");
@@ -207,8 +221,8 @@ fn write(args: &Args, chosen: &Chosen, report: &ChoiceReport<'_>, seed: u64) -> 
     } else {
         inflated(&files[0], chosen)?;
     }
-    directory.write("ranking.json", report.json())?;
     directory.write("report.html", choice_page(report))?;
+    directory.write("ranking.json", report.json())?;
     Ok(directory.commit()?)
 }
 

@@ -2,13 +2,13 @@
 
 use super::pictures::{PlotArgs, replaceable};
 use super::{Failure, Session};
-use nav_sim::formats::{atomic, run_directory};
-use nav_sim::metrics;
+use nav_sim::formats::atomic;
+use nav_sim::jobs::{self, CompareError, Comparison};
+use nav_sim::metrics::ComparisonError;
+use nav_sim::report;
 pub(super) use nav_sim::report::markdown_table as table;
-use nav_sim::report::{self, CandidateResult, ComparisonFile, Label, Manifest, RatioCurves};
-use nav_sim::scenario::Method;
 use nav_sim::simulation::REPORTED_NAMES;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Ratios of ASEE (and RMSE, NEES, coverage) between runs, per outage and state
 ///
@@ -66,7 +66,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     args.plot.guard(&inputs)?;
     replaceable(&page)?;
     let compared = Compared::new(args, session)?;
-    let json = report::json(&compared.file);
+    let json = report::json(&compared.found.file);
     atomic::write_result(out, &json, session.existing())?;
     atomic::write(&page, compared.page(&[]))?;
     args.plot.write(|| compared.picture(), session)?;
@@ -82,12 +82,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 /// What was found, and how it is shown.
 pub(super) struct Compared {
-    file: ComparisonFile,
-    candidates: Vec<CandidateResult>,
-    /// One a candidate.
-    curves: Vec<RatioCurves>,
-    /// Start and end (s).
-    outages: Vec<(f64, f64)>,
+    found: Comparison,
     /// The states that are shown.
     states: Vec<usize>,
 }
@@ -96,49 +91,26 @@ impl Compared {
     /// Reads the runs and compares them.
     pub(super) fn new(args: &Args, session: &Session) -> Result<Self, Failure> {
         let states = states(&args.states)?;
-        let reference = read(&args.reference)?;
-        let (mut candidates, mut curves) = (Vec::new(), Vec::new());
-        let mut all_paired = true;
-        for path in &args.runs {
-            let candidate = read(path)?;
-            comparable(path, &candidate.manifest, &reference.manifest)?;
-            let differences = differences(&candidate.manifest, &reference.manifest);
-            for difference in &differences {
-                session.printer.warn(&format!("{}: {difference}", path.display()));
-            }
-            let paired = differences.is_empty();
-            all_paired &= paired;
-            let outages =
-                metrics::compare(&candidate.experiment, &reference.experiment, paired).map_err(|e| {
-                    let failure = Failure::input(format!("{}: {e}", path.display()));
-                    let runs = matches!(e, metrics::ComparisonError::Runs { .. });
-                    failure.maybe_hint(runs.then(|| "make both with one number of --runs".to_owned()))
-                })?;
-            curves.push(RatioCurves::of(&candidate.experiment, &reference.experiment));
-            let run = path.display().to_string();
-            let label = Label::of(&run, candidate.manifest.model.estimator.as_deref());
-            let is_reference = same_place(path, &args.reference);
-            let verdict = candidate.experiment.verdict();
-            candidates.push(CandidateResult { run, label, is_reference, verdict, outages });
-        }
-        let name = args.reference.display().to_string();
-        let file = ComparisonFile::new((&name, &reference.experiment.verdict()), all_paired, &candidates);
-        Ok(Self { file, candidates, curves, outages: reference.experiment.outages, states })
+        let found = jobs::compare(&args.runs, &args.reference)?;
+        found.doubts.iter().for_each(|doubt| session.printer.warn(doubt));
+        Ok(Self { found, states })
     }
 
     /// The page, with links to those beneath it.
     pub(super) fn page(&self, links: &[(String, String)]) -> String {
-        let Self { file, candidates, curves, outages, states } = self;
-        report::comparison_page(file, candidates, curves, outages, states, links)
+        let Comparison { file, candidates, curves, outages, .. } = &self.found;
+        report::comparison_page(file, candidates, curves, outages, &self.states, links)
     }
 
     fn picture(&self) -> String {
-        report::comparison_svg(&self.candidates, &self.curves, &self.outages, &self.states)
+        let Comparison { candidates, curves, outages, .. } = &self.found;
+        report::comparison_svg(candidates, curves, outages, &self.states)
     }
 
     /// The table of ASEE ratios.
     fn rows(&self) -> Vec<Vec<String>> {
-        report::with_times(report::table_rows(&self.candidates, &self.states), &self.outages)
+        let rows = report::table_rows(&self.found.candidates, &self.states);
+        report::with_times(rows, &self.found.outages)
     }
 
     fn table(&self, form: TableForm) -> String {
@@ -152,16 +124,17 @@ impl Compared {
 
     /// The verdicts, the table of ASEE ratios, and what stands beside them.
     fn text(&self) -> String {
-        let mut lines = report::verdict_lines(&self.file.verdicts);
-        if self.candidates.iter().any(|c| !c.outages.is_empty()) {
-            lines.push(format!("ASEE against {}, mean over the outage, %:", self.file.reference));
+        let Comparison { file, candidates, outages, .. } = &self.found;
+        let mut lines = report::verdict_lines(&file.verdicts);
+        if candidates.iter().any(|c| !c.outages.is_empty()) {
+            lines.push(format!("ASEE against {}, mean over the outage, %:", file.reference));
             lines.push(table(&self.rows()));
             lines.push(
                 "NEES (9 if right) and coverage over the outage, RMSE at its end against the reference, %:"
                     .to_owned(),
             );
-            let rows = report::consistency_rows(&self.candidates, &self.states);
-            lines.push(table(&report::with_times(rows, &self.outages)));
+            let rows = report::consistency_rows(candidates, &self.states);
+            lines.push(table(&report::with_times(rows, outages)));
         }
         lines.join("\n")
     }
@@ -181,11 +154,19 @@ fn unasked_output() -> Result<PathBuf, Failure> {
     Err(failure.hint("name the output with --out"))
 }
 
-fn read(path: &Path) -> Result<run_directory::RunDirectory, Failure> {
-    run_directory::read(path).map_err(|e| {
-        let failure = if e.is_content() { Failure::input(&e) } else { Failure::could_not(&e) };
-        failure.maybe_hint(e.hint())
-    })
+impl From<CompareError> for Failure {
+    fn from(e: CompareError) -> Self {
+        match e {
+            CompareError::File(e) => e.into(),
+            CompareError::Trajectory { .. } => {
+                Self::input(e).hint("compare runs along one and the same trajectory file")
+            }
+            CompareError::Ratio { source: ComparisonError::Runs { .. }, .. } => {
+                Self::input(e).hint("make both with one number of --runs")
+            }
+            CompareError::Ratio { .. } => Self::input(e),
+        }
+    }
 }
 
 pub(super) fn states(names: &[String]) -> Result<Vec<usize>, Failure> {
@@ -198,45 +179,4 @@ pub(super) fn states(names: &[String]) -> Result<Vec<usize>, Failure> {
         found.ok_or_else(|| Failure::input(format!("--state {name} is no state")).hint(known()))
     };
     names.iter().map(index).collect()
-}
-
-/// Without the same trajectory a ratio means nothing.
-fn comparable(path: &Path, candidate: &Manifest, reference: &Manifest) -> Result<(), Failure> {
-    if candidate.hashes("trajectory") == reference.hashes("trajectory") {
-        return Ok(());
-    }
-    let failure = Failure::input(format!("{}: not the trajectory of the reference", path.display()));
-    Err(failure.hint("compare runs along one and the same trajectory file"))
-}
-
-/// What makes two runs differ beside the model in the filter; then run k did not see the same noise.
-fn differences(candidate: &Manifest, reference: &Manifest) -> Vec<String> {
-    let (c, r) = (&candidate.configuration, &reference.configuration);
-    let mut found = Vec::new();
-    let mut differ = |what: &str, different: bool| {
-        if different {
-            found.push(format!("{what} not that of the reference; the runs are not paired"));
-        }
-    };
-    let is_expected = [c, r].map(|of| of.run.method == Method::Lincov);
-    let (seeds, scenarios) = ([candidate.seed, reference.seed], [&candidate.scenario, &reference.scenario]);
-    // covariance analysis draws nothing, and so differs in nothing by its seed
-    let differently = seeds[0] != seeds[1] || scenarios[0] != scenarios[1];
-    differ("the method is", is_expected[0] != is_expected[1]);
-    differ("the seed is", is_expected == [false, false] && differently);
-    differ("what makes the errors is", truth(candidate) != truth(reference));
-    differ("[imu] is", c.imu != r.imu);
-    differ("[gnss] is", c.gnss != r.gnss);
-    differ("[initial] is", c.initial != r.initial);
-    found
-}
-
-/// What made the INS errors: a recording, a model, or the filter's own.
-fn truth(manifest: &Manifest) -> Vec<&str> {
-    let given = ["static", "truth", "model"].map(|role| manifest.hashes(role));
-    given.into_iter().find(|hashes| !hashes.is_empty()).unwrap_or_default()
-}
-
-fn same_place(a: &Path, b: &Path) -> bool {
-    a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
 }

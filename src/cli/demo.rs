@@ -1,5 +1,6 @@
 //! `nav-sim demo`: the case study of the paper, command by command.
 
+use super::batch::shell_words;
 use super::compare::{self, Compared};
 use super::{Cli, Command, Failure, Session};
 use clap::Parser;
@@ -118,10 +119,5 @@ fn commands(args: &Args, seed: u64) -> Vec<Vec<String>> {
 
 /// A command as it would be typed.
 fn typed(command: &[String]) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:,+=".contains(c);
-    let quoted = |word: &String| {
-        if word.chars().all(plain) { word.clone() } else { format!("'{}'", word.replace('\'', "'\\''")) }
-    };
-    let words: Vec<String> = command.iter().map(quoted).collect();
-    format!("nav-sim {}", words.join(" "))
+    format!("nav-sim {}", shell_words(command))
 }

@@ -6,7 +6,7 @@ use super::{Failure, Session, read};
 use nav_sim::calibration::{Bootstrap, Estimator, Settings};
 use nav_sim::ekf::FilterStates;
 use nav_sim::jobs::{self, Design, DesignInputs, Destination, NavigateInputs, TrueImu};
-use nav_sim::report::{readable, seconds};
+use nav_sim::report::{readable, seconds, window};
 use nav_sim::scenario::{Method, Scenario};
 use serde_json::json;
 use std::path::PathBuf;
@@ -141,7 +141,7 @@ fn floor(design: &Design) -> Option<String> {
 fn p95(design: &Design) -> Vec<String> {
     let line = |q: &jobs::DesignedQuantile| {
         let [low, high] = q.ci95.map(readable);
-        let window = format!("{}–{} s", seconds(q.start_s), seconds(q.end_s));
+        let window = window(q.start_s, q.end_s);
         let half = readable(q.half_width_pct);
         format!("horizontal p95 at the end of {window}: {} m ± {half} % [{low}, {high}]", readable(q.p95_m))
     };

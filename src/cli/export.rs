@@ -1,7 +1,7 @@
 //! `nav-sim export`: a noise model as the parameters of other programs.
 
+use super::parse::one_of;
 use super::{Failure, Session};
-use clap::builder::{PossibleValuesParser, TypedValueParser};
 use nav_sim::calibration::duration;
 use nav_sim::export::{Export, ExportError, Settings, Target};
 use nav_sim::formats::atomic::{self, guard_inputs};
@@ -26,11 +26,11 @@ pub(crate) struct Args {
     #[arg(value_name = "MODEL")]
     model: PathBuf,
     /// The program
-    #[arg(long, value_name = "PROGRAM", value_parser = target())]
+    #[arg(long, value_name = "PROGRAM", value_parser = one_of::<Target>(&Target::NAMES))]
     target: Target,
     /// strict: WN and RW as they are; matched: the model's Allan deviation at 1 s and the closest bias; envelope: the
     /// smallest pair that is nowhere below the model
-    #[arg(long, value_name = "POLICY", value_parser = policy(), default_value = Policy::Matched.name())]
+    #[arg(long, value_name = "POLICY", value_parser = one_of::<Policy>(&Policy::NAMES), default_value = Policy::Matched.name())]
     policy: Policy,
     /// Averaging times over which the pair stands for the model
     #[arg(long, value_name = "FROM:TO", value_parser = horizon, default_value = "1s:100s")]
@@ -42,18 +42,6 @@ pub(crate) struct Args {
     /// File to write to (default: stdout)
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
-}
-
-fn target() -> impl TypedValueParser<Value = Target> {
-    PossibleValuesParser::new(Target::ALL.map(Target::name)).try_map(|name| {
-        Target::ALL.into_iter().find(|t| t.name() == name).ok_or("not a program that is known")
-    })
-}
-
-fn policy() -> impl TypedValueParser<Value = Policy> {
-    const ALL: [Policy; 3] = [Policy::Strict, Policy::Matched, Policy::Envelope];
-    PossibleValuesParser::new(ALL.map(Policy::name))
-        .try_map(|name| ALL.into_iter().find(|p| p.name() == name).ok_or("not a policy"))
 }
 
 fn horizon(text: &str) -> Result<Horizon, String> {

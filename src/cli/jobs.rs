@@ -14,10 +14,6 @@ impl From<JobError> for Failure {
             JobError::Signal(e) => e.into(),
             JobError::Wavelet(e) => Self::could_not(e),
             JobError::Calibration(e) => of_calibration(&e),
-            JobError::Curve(e) => {
-                let failure = if e.is_content() { Self::input(&e) } else { Self::could_not(&e) };
-                failure.maybe_hint(e.hint())
-            }
             JobError::Copy { .. } => Self::input(e).hint("leave one of them out"),
             JobError::Overlap { .. } => {
                 Self::input(e).hint("leave one of them out, or cut off the rows that both have")
@@ -75,7 +71,7 @@ fn of_calibration(e: &CalibrationError) -> Failure {
     Failure::input(e).maybe_hint(hint.map(str::to_owned))
 }
 
-/// A `--model` that is none.
+/// Not a `--model`.
 pub(super) fn unknown_model(e: SpecError) -> Failure {
     let hint = match &e {
         SpecError::Unknown { term, .. } => match nearest(term, ModelSpec::legal()) {

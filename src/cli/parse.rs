@@ -2,6 +2,7 @@
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use nav_sim::imu::MAX_RATE_HZ;
+use nav_sim::names::UnknownName;
 use std::fmt::Debug;
 use std::str::FromStr;
 
@@ -84,4 +85,11 @@ pub(super) fn probability(text: &str) -> Result<f64, String> {
 /// `A,B`, both above 0.
 pub(super) fn positive_pair(text: &str) -> Result<Pair, String> {
     pair(text).ok().filter(|p| p.0.iter().all(|x| *x > 0.0)).ok_or_else(|| "expected two numbers > 0".into())
+}
+/// A member of a closed set by its name; help and completions list the names.
+pub(super) fn one_of<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
+where
+    T: FromStr<Err = UnknownName> + Clone + Send + Sync + 'static,
+{
+    PossibleValuesParser::new(names).try_map(|name| name.parse())
 }

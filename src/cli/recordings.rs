@@ -1,11 +1,11 @@
 //! Flags for static recordings, and reading them.
 
 use super::axes::ChannelSet;
+use super::parse::words;
 use super::{Progress, Session};
-use clap::ValueEnum;
 use nav_sim::calibration::{Change, WarmUp, duration, tau_s};
 use nav_sim::formats::recordings::{Gaps, ReadOptions, Report};
-use nav_sim::imu::{Channel, Sensor};
+use nav_sim::imu::Channel;
 use nav_sim::jobs::{BeginsOtherwise, Remark, Remarks};
 
 /// How recordings are read.
@@ -19,8 +19,8 @@ pub(crate) struct RecordingArgs {
     #[arg(long, value_name = "S|auto", default_value = "0", value_parser = skip)]
     skip_s: Skip,
     /// What to do where the time jumps or stands still
-    #[arg(long, value_enum, default_value_t = GapsArg::Refuse)]
-    gaps: GapsArg,
+    #[arg(long, value_parser = words::<Gaps>(GAPS), default_value_t)]
+    gaps: Gaps,
     /// Signals to use: all, accel, gyro, x, accel.x, … (repeatable or comma-separated; default: all)
     #[arg(long, value_name = "AXES", value_delimiter = ',', value_parser = ChannelSet::named)]
     axes: Vec<ChannelSet>,
@@ -29,15 +29,14 @@ pub(crate) struct RecordingArgs {
     columns: Option<Vec<String>>,
 }
 
-#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
-enum GapsArg {
-    /// Refuse the file
-    Refuse,
-    /// Make each stretch between gaps a recording of its own (but not one 16 times shorter than the longest)
-    Split,
-    /// Take the samples as evenly spaced
-    Ignore,
-}
+const GAPS: &[(&str, &str)] = &[
+    ("refuse", "Refuse the file"),
+    (
+        "split",
+        "Make each stretch between gaps a recording of its own (but not one 16 times shorter than the longest)",
+    ),
+    ("ignore", "Take the samples as evenly spaced"),
+];
 
 /// What is left out at the beginning.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,9 +76,7 @@ impl RecordingArgs {
                 Skip::Auto => "auto".into(),
             },
         );
-        if let Some(gaps) = self.gaps.to_possible_value() {
-            put("gaps", gaps.get_name().into());
-        }
+        put("gaps", self.gaps.name().into());
         if !self.axes.is_empty() {
             let channels = self.axes.iter().flat_map(|set| &set.0).map(ToString::to_string);
             put("axes", channels.collect::<Vec<_>>().into());
@@ -101,11 +98,7 @@ impl RecordingArgs {
                 Skip::Seconds(s) => s,
                 Skip::Auto => 0.0,
             },
-            gaps: match self.gaps {
-                GapsArg::Refuse => Gaps::Refuse,
-                GapsArg::Split => Gaps::Split,
-                GapsArg::Ignore => Gaps::Ignore,
-            },
+            gaps: self.gaps,
             channels: (!self.axes.is_empty()).then(|| self.axes.iter().flat_map(|s| s.0.clone()).collect()),
             columns: self.columns.clone(),
             ..ReadOptions::default()
@@ -229,9 +222,4 @@ fn summary(report: &Report) -> String {
     let assumed = report.files.iter().any(|f| !f.assumptions.is_empty());
     let assumed = if assumed { ", with assumptions" } else { "" };
     format!("{} recordings at {rate_hz} Hz, {length}{assumed} (--verbose: each of them)", report.files.len())
-}
-
-/// The sensor of that name.
-pub(crate) fn sensor(word: &str) -> Result<Sensor, String> {
-    Sensor::ALL.into_iter().find(|s| s.name() == word).ok_or_else(|| "not accel or gyro".into())
 }

@@ -3,6 +3,7 @@
 use super::{Failure, Session, parse, read, turn_on};
 use nav_sim::formats::atomic::{AtomicFile, guard_inputs};
 use nav_sim::formats::datasheet::{self, CATALOGUE, Datasheet};
+use nav_sim::formats::file_kind::{self, FileKind};
 use nav_sim::formats::model_file::{self, ModelFile};
 use nav_sim::formats::scenario_file;
 use nav_sim::jobs::{Ask, CatalogueUnit, Misplaced, Requirements};
@@ -10,7 +11,7 @@ use nav_sim::noise::Model;
 use nav_sim::report::require as words;
 use nav_sim::report::require::{Question, RankedUnit};
 use nav_sim::require::{ImuParameters, Limit, Quantity, RequireError};
-use nav_sim::sensors::outage::Outage;
+use nav_sim::sensors::outage::NotAnOutage;
 use std::path::{Path, PathBuf};
 
 /// Say which IMU keeps the errors at the end of an outage within limits, or what MODEL makes of them
@@ -105,17 +106,15 @@ impl Limits {
 }
 
 fn parse_ask(text: &str) -> Result<Ask, String> {
-    let expected = "expected a length in seconds, START:END or longest";
-    if text == "longest" {
-        return Ok(Ask::Longest);
+    match text {
+        "longest" => Ok(Ask::Longest),
+        window if window.contains(':') => {
+            window.parse().map(Ask::Window).map_err(|e: NotAnOutage| e.to_string())
+        }
+        length => parse::positive(length)
+            .map(Ask::Length)
+            .map_err(|_| "expected a length in seconds, START:END or longest".to_owned()),
     }
-    let Some((start, end)) = text.split_once(':') else {
-        return parse::positive(text).map(Ask::Length).map_err(|_| expected.to_owned());
-    };
-    let numbers = start.parse().ok().zip(end.parse().ok()).ok_or(expected)?;
-    let outage = Outage { start_s: numbers.0, end_s: numbers.1 };
-    outage.validate().map_err(|e| e.to_string())?;
-    Ok(Ask::Window(outage))
 }
 
 /// What is asked, with the files read.
@@ -273,7 +272,7 @@ fn units_of(
     }
     let unit = |path: &PathBuf| {
         let name = path.file_stem().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        if datasheet::is_entry(path) {
+        if file_kind::of(path)? == FileKind::CatalogueEntry {
             return of_sheet(name, &datasheet::read(path)?, asked);
         }
         let file = read::model(path, session)?;

@@ -1,16 +1,16 @@
 //! `nav-sim synthesize`: replicate recordings from a noise model.
 
 use super::axes::ChannelSet;
-use super::run::not_of_another_command;
+use super::parse::one_of;
 use super::{Failure, Session, read};
-use nav_sim::formats::atomic::{AtomicDir, guard_directory, guard_inputs};
+use nav_sim::formats::atomic::{AtomicDir, Found, claim_directory};
 use nav_sim::formats::contamination_file;
 use nav_sim::formats::model_file::{self, ModelFile};
 use nav_sim::formats::recordings::{FileFormat, is_recording};
 use nav_sim::formats::{FileError, Place, Setting};
 use nav_sim::imu::Channel;
 use nav_sim::noise::contamination::{Contamination, Rule};
-use nav_sim::noise::{Composite, Model, Process, ReplicateError, VirtualImu};
+use nav_sim::noise::{Model, ReplicateError, VirtualImu};
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use std::fs::File;
@@ -51,29 +51,11 @@ pub(crate) struct Args {
     #[arg(long, value_name = "AXES", value_delimiter = ',', value_parser = ChannelSet::named, default_value = "all")]
     axes: Vec<ChannelSet>,
     /// Format of the recordings: csv has ten digits and the time, npy all digits (samples × signals)
-    #[arg(long, value_enum, default_value_t = OutputFormat::Csv)]
-    output_format: OutputFormat,
+    #[arg(long, value_name = "FORMAT", value_parser = one_of::<FileFormat>(&FileFormat::NAMES), default_value_t)]
+    output_format: FileFormat,
     /// Directory to write to
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
-}
-
-#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
-enum OutputFormat {
-    Csv,
-    #[value(name = "csv.gz")]
-    CsvGz,
-    Npy,
-}
-
-impl OutputFormat {
-    const fn file_format(self) -> FileFormat {
-        match self {
-            Self::Csv => FileFormat::Csv,
-            Self::CsvGz => FileFormat::CsvGz,
-            Self::Npy => FileFormat::Npy,
-        }
-    }
 }
 
 /// Everything about the job that is decided before the first number is drawn.
@@ -89,9 +71,8 @@ struct Job {
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let job = Job::new(args, session)?;
-    let names: Vec<String> =
-        (1..=args.replicates).map(|k| format!("replicate_{k}.{}", job.format.ending())).collect();
-    check_directory(args, &job, &names, session)?;
+    let names: Vec<String> = (1..=args.replicates).map(|k| format!("replicate_{k}.{}", job.format)).collect();
+    claim(args, &job, &names, session)?;
     let mut out = AtomicDir::create(&args.out)?;
     let paths: Vec<PathBuf> = names.iter().map(|n| out.path(n)).collect();
     let progress = session.progress("replicates", args.replicates);
@@ -130,39 +111,42 @@ fn report(args: &Args, job: &Job, manifest: &str, session: &Session) {
 
 /// Refuses to overwrite an input or what this command did not make, and to leave recordings of another job beside
 /// this one's.
-fn check_directory(args: &Args, job: &Job, names: &[String], session: &Session) -> Result<(), Failure> {
+fn claim(args: &Args, job: &Job, names: &[String], session: &Session) -> Result<(), Failure> {
+    let files: Vec<&str> = names.iter().map(String::as_str).chain(["manifest.json"]).collect();
     let contamination = args.contaminate.as_deref().map(Path::new);
-    for name in names.iter().map(String::as_str).chain(["manifest.json"]) {
-        guard_inputs(&args.out.join(name), contamination.into_iter().chain([args.model.as_path()]))?;
-    }
-    not_of_another_command(&args.out, |text| made(text).is_some())?;
-    let Ok(manifest) = std::fs::read_to_string(args.out.join("manifest.json")) else { return Ok(()) };
-    let made = made(&manifest).unwrap_or_default();
-    let mut inside: Vec<String> = std::fs::read_dir(&args.out)
-        .into_iter()
-        .flat_map(|entries| entries.flatten().filter_map(|e| e.file_name().into_string().ok()))
-        .filter(|n| is_recording(n) && !n.starts_with('.'))
-        .collect();
-    inside.sort();
-    let shown = args.out.display();
-    if let Some(other) = inside.iter().find(|n| !made.contains(n) && names.contains(n)) {
-        let failure = Failure::input(format!("{shown} holds {other}, which this command did not make"));
-        return Err(failure.hint("move it away, or choose another directory with --out"));
-    }
-    if let Some(stale) = inside.into_iter().find(|n| !names.contains(n)) {
-        let message = format!("already holds {stale}, which this command would leave beside its own outputs");
-        return Err(FileError::contents(shown.to_string(), Place::Itself, message)
-            .advice("remove it")
-            .setting(Setting::OutputDirectory)
-            .into());
-    }
+    let inputs = contamination.into_iter().chain([args.model.as_path()]);
     let own = job.identity(args)?;
-    let same = |text: &str| {
+    let recognise = |text: &str| {
+        let Some(made) = made(text) else { return Ok(Found::Foreign) };
+        no_others(&args.out, names, &made)?;
         let there: Value = serde_json::from_str(text).unwrap_or_default();
-        own.as_object().is_some_and(|own| own.iter().all(|(key, value)| there[key] == *value))
-            && made == names
+        let is_same = own.as_object().is_some_and(|own| own.iter().all(|(key, value)| there[key] == *value));
+        Ok(Found::result(is_same && made == names))
     };
-    Ok(guard_directory(&args.out, session.existing(), same)?)
+    Ok(claim_directory(&args.out, &files, inputs, session.existing(), recognise)?)
+}
+
+/// Refuses recordings in a directory that this command did not make, or would leave beside its own.
+fn no_others(directory: &Path, names: &[String], made: &[String]) -> Result<(), FileError> {
+    let entries = std::fs::read_dir(directory).into_iter().flatten().flatten();
+    let inside = entries.filter_map(|e| e.file_name().into_string().ok());
+    let mut inside: Vec<String> = inside.filter(|n| is_recording(n) && !n.starts_with('.')).collect();
+    inside.sort();
+    let refusal = |message: String, advice: &'static str| {
+        let path = directory.display().to_string();
+        FileError::contents(path, Place::Itself, message).advice(advice).setting(Setting::OutputDirectory)
+    };
+    if let Some(other) = inside.iter().find(|n| !made.contains(n) && names.contains(n)) {
+        return Err(refusal(format!("holds {other}, which this command did not make"), "move it away"));
+    }
+    match inside.iter().find(|n| !names.contains(n)) {
+        None => Ok(()),
+        Some(stale) => {
+            let message =
+                format!("already holds {stale}, which this command would leave beside its own outputs");
+            Err(refusal(message, "remove it"))
+        }
+    }
 }
 
 /// The recordings that a manifest of this command names; `None` if it is another's.
@@ -211,13 +195,13 @@ impl Job {
         };
         let bytes = samples * channels.len() as f64 * 8.0;
         if samples < 2.0 {
-            return Err(Failure::input(format!("{samples} samples are no recording")));
+            return Err(Failure::input(format!("a recording needs at least 2 samples; these are {samples}")));
         }
         if bytes >= isize::MAX as f64 || Vec::<u8>::new().try_reserve_exact(bytes as usize).is_err() {
             let gigabytes = bytes / 1e9;
             return Err(Failure::could_not(format!("{samples} samples need {gigabytes:.0} GB of memory")));
         }
-        let (samples, format) = (samples as usize, args.output_format.file_format());
+        let (samples, format) = (samples as usize, args.output_format);
         let (spread, seed) = (args.spread, session.seed(None));
         Ok(Self { file, contamination, channels, samples, format, spread, seed })
     }
@@ -245,7 +229,7 @@ impl Job {
         let entry = |(i, (name, model)): (usize, (&String, &Model))| {
             let contaminated = self.contamination.as_ref().is_some_and(|c| c.touches(i as u64 + 1));
             let axes: Map<String, Value> =
-                self.channels.iter().map(|c| (c.to_string(), parameters(model.axis(*c)))).collect();
+                self.channels.iter().map(|c| (c.to_string(), json!(model.axis(*c).processes))).collect();
             json!({ "file": name, "contaminated": contaminated, "axes": axes })
         };
         let replicates: Vec<Value> = names.iter().zip(models).enumerate().map(entry).collect();
@@ -273,16 +257,6 @@ impl Job {
     }
 }
 
-/// The processes of an axis, as in model files.
-fn parameters(noise: &Composite) -> Value {
-    let process = |p: &Process| {
-        let code = ("type".to_owned(), json!(p.code()));
-        let values = p.parameters().into_iter().map(|(name, value)| (name.to_owned(), json!(value)));
-        Value::Object(std::iter::once(code).chain(values).collect())
-    };
-    noise.processes.iter().map(process).collect()
-}
-
 /// The channels to make: those asked for that the model has.
 fn wanted(args: &Args, file: &ModelFile, session: &Session) -> Result<Vec<Channel>, Failure> {
     let asked = |c: &Channel| args.axes.iter().any(|set| set.0.contains(c));
@@ -290,10 +264,12 @@ fn wanted(args: &Args, file: &ModelFile, session: &Session) -> Result<Vec<Channe
         Channel::ALL.into_iter().filter(asked).partition(|c| file.missing.contains(c));
     let shown = args.model.display();
     if there.is_empty() {
-        return Err(Failure::input(format!("{shown}: says nothing of the axes asked for")));
+        return Err(Failure::input(format!("{shown} has no noise model for the axes asked for")));
     }
     for channel in missing {
-        session.printer.warn(&format!("{shown}: says nothing of {channel}: not made"));
+        session
+            .printer
+            .warn(&format!("{shown} has no noise model for {channel}; no signal is written for that axis"));
     }
     Ok(there)
 }

@@ -1,5 +1,6 @@
 //! `nav-sim tune`: honest inflation of a noise model.
 
+use super::parse::one_of;
 use super::run::{OutageArg, parse_outage, scenario_with};
 use super::{Failure, Session, read, turn_on};
 use nav_sim::ekf::FilterStates;
@@ -43,11 +44,11 @@ pub(crate) struct Args {
     outages: Vec<OutageArg>,
     /// When the filter is honest: worst, when in no truth an error at the end of an outage is larger than stated, in
     /// any state; mean, when the expected NEES, averaged over truths and time, is right
-    #[arg(long = "for", value_name = "AIM", value_enum, default_value_t)]
-    aim: AimArg,
+    #[arg(long = "for", value_name = "AIM", value_parser = one_of::<Aim>(&Aim::NAMES), default_value_t)]
+    aim: Aim,
     /// What has a factor of its own
-    #[arg(long, value_name = "WHAT", value_enum, default_value_t)]
-    per: PerArg,
+    #[arg(long, value_name = "WHAT", value_parser = one_of::<Per>(&Per::NAMES), default_value_t)]
+    per: Per,
     /// The filter that is made honest: full, or that of the scenario (15 states)
     #[arg(long, value_name = "STATES", default_value = "full")]
     filter: FilterStates,
@@ -64,36 +65,6 @@ pub(crate) struct Args {
 
 /// Longest schedule of outages that is looked at where no trajectory says how long (s).
 const DAY_S: f64 = 86_400.0;
-
-#[derive(clap::ValueEnum, Clone, Copy, Debug, Default)]
-enum AimArg {
-    #[default]
-    Worst,
-    Mean,
-}
-
-#[derive(clap::ValueEnum, Clone, Copy, Debug, Default)]
-enum PerArg {
-    #[default]
-    Sensor,
-    Process,
-}
-
-impl Args {
-    const fn aim(&self) -> Aim {
-        match self.aim {
-            AimArg::Mean => Aim::Mean,
-            AimArg::Worst => Aim::Worst,
-        }
-    }
-
-    const fn per(&self) -> Per {
-        match self.per {
-            PerArg::Sensor => Per::Sensor,
-            PerArg::Process => Per::Process,
-        }
-    }
-}
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     refuse_recordings(args)?;
@@ -121,8 +92,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         track: &track,
         full: &full,
         filter: if args.filter.is_reduced() { &reduced } else { &full },
-        per: args.per(),
-        aim: args.aim(),
+        per: args.per,
+        aim: args.aim,
         allow_smaller: args.allow_smaller,
     };
     let factors = task.factors().map_err(|e| Failure::input(format!("{}: {e}", args.model.display())))?;
@@ -234,10 +205,7 @@ fn tuned(file: &ModelFile, factors: &[Factor], args: &Args, files: &[Input]) -> 
     put("program", format!("nav-sim {}", env!("CARGO_PKG_VERSION")).into());
     put("made_by", "tune".into());
     let aim = if args.intervals { "intervals" } else { "truths" };
-    put(
-        "honest_for",
-        format!("{} {aim}", if args.aim() == Aim::Mean { "mean of" } else { "worst of" }).into(),
-    );
+    put("honest_for", format!("{} {aim}", if args.aim == Aim::Mean { "mean of" } else { "worst of" }).into());
     let table = |t: Result<toml::Table, toml::ser::Error>| toml::Value::from(t.unwrap_or_default());
     let factors_written: Vec<toml::Value> =
         factors.iter().map(|f| table(toml::Table::try_from(FactorEntry::of(f)))).collect();

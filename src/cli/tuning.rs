@@ -1,6 +1,7 @@
 //! Flags of the robust wavelet variance.
 
 use super::Failure;
+use super::parse::words;
 use nav_sim::wavelet::{Convention, Tuning};
 
 /// How the robust wavelet variance is tuned.
@@ -11,35 +12,29 @@ pub(crate) struct TuningArgs {
     #[arg(long, value_name = "E", default_value_t = Tuning::DEFAULT_EFFICIENCY)]
     efficiency: f64,
     /// How the tuning constant follows from the efficiency
-    #[arg(long, value_enum, default_value_t = ConventionArg::Exact)]
-    efficiency_convention: ConventionArg,
+    #[arg(long, value_parser = words::<Convention>(CONVENTIONS), default_value_t)]
+    efficiency_convention: Convention,
     /// Number of scales, 2, 4, 8, … samples (default: one less than the shortest signal allows)
     #[arg(long, value_name = "J", value_parser = clap::value_parser!(u32).range(1..=62))]
     pub(crate) scales: Option<u32>,
 }
 
-#[derive(clap::ValueEnum, Clone, Copy, Debug, PartialEq, Eq)]
-enum ConventionArg {
-    /// From the definition
-    Exact,
-    /// As the R packages wv, gmwm and simts do (a sign error: their 0.6 is 0.727), to reproduce their numbers
-    Wv,
-}
+const CONVENTIONS: &[(&str, &str)] = &[
+    ("exact", "From the definition"),
+    (
+        "wv",
+        "As the R packages wv, gmwm and simts do (a sign error: their 0.6 is 0.727), to reproduce their numbers",
+    ),
+];
 
 impl TuningArgs {
     pub(crate) fn tuning(&self) -> Result<Tuning, Failure> {
-        let convention = match self.efficiency_convention {
-            ConventionArg::Exact => Convention::Exact,
-            ConventionArg::Wv => Convention::Wv,
-        };
-        Tuning::new(self.efficiency, convention).map_err(|e| Failure::input(format!("--efficiency: {e}")))
+        Tuning::new(self.efficiency, self.efficiency_convention)
+            .map_err(|e| Failure::input(format!("--efficiency: {e}")))
     }
 
     /// Name of the convention in files.
     pub(crate) const fn convention(&self) -> &'static str {
-        match self.efficiency_convention {
-            ConventionArg::Exact => "exact",
-            ConventionArg::Wv => "wv",
-        }
+        self.efficiency_convention.name()
     }
 }

@@ -116,3 +116,5 @@ impl Target {
         }
     }
 }
+
+nav_sim_signal::named!(Target);

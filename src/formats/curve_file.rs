@@ -1,10 +1,11 @@
 //! Wavelet-variance curves to fit: CSV with columns `tau_samples,wv,edof`, or the JSON that `calibrate` or `wv`
 //! writes (the classical curve of a signal is GMWM's, the robust one RGMWM's).
 
-use super::source;
+use super::{FileError, Kind, Place, source};
 use crate::imu::{Axis, Sensor};
-use crate::report::{CurvesFile, SignalsFile};
+use crate::report::{CurvesFile, FittedCurve, SignalsFile};
 use crate::wavelet::{Convention, Curve, QuantizationResponse, Tuning};
+use std::fmt::Display;
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -23,247 +24,146 @@ pub struct NamedCurve {
     pub curve: Curve,
 }
 
-/// A curve file that is none.
-#[derive(Debug, thiserror::Error)]
-pub enum CurveError {
-    /// It cannot be read.
-    #[error("{path}: {source}")]
-    Io {
-        /// File.
-        path: String,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// It is not CSV or JSON of this layout.
-    #[error("{path}, line {line}: {message}")]
-    Syntax {
-        /// File.
-        path: String,
-        /// Line, from 1.
-        line: u64,
-        /// What is wrong.
-        message: String,
-    },
-    /// A column is missing.
-    #[error("{path}, line 1: no column is named \"{column}\"")]
-    Column {
-        /// File.
-        path: String,
-        /// Column.
-        column: &'static str,
-    },
-    /// A value means nothing.
-    #[error("{path}, {place}: {column} = {value} is not {expected}")]
-    Value {
-        /// File.
-        path: String,
-        /// Line, or which curve and entry.
-        place: String,
-        /// Column or key.
-        column: &'static str,
-        /// The value.
-        value: String,
-        /// What would be accepted.
-        expected: &'static str,
-    },
-    /// Vectors of different lengths, or empty.
-    #[error("{path}: curve {index} has {tau} scales, {wv} wavelet variances and {edof} degrees of freedom")]
-    Lengths {
-        /// File.
-        path: String,
-        /// Which curve, from 1.
-        index: usize,
-        /// Scales.
-        tau: usize,
-        /// Wavelet variances.
-        wv: usize,
-        /// Degrees of freedom.
-        edof: usize,
-    },
-    /// No curve.
-    #[error("{path}: no curve in it")]
-    Empty {
-        /// File.
-        path: String,
-    },
-}
+/// What a curve file is.
+const LAYOUT: &str = "a curve is a CSV with the columns tau_samples,wv,edof (tau_samples = 2, 4, 8, …), or a .wv.json \
+                      written by calibrate or wv";
 
-impl CurveError {
-    /// Whether the contents are at fault (rather than the machine, or a missing file).
-    #[must_use]
-    pub fn is_content(&self) -> bool {
-        match self {
-            Self::Io { source, .. } => source::is_damage(source.kind()),
-            _ => true,
-        }
-    }
-
-    /// What to do about it.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
-        match self {
-            Self::Io { source, .. } if source.kind() == ErrorKind::NotFound => Some("check the path".into()),
-            Self::Io { source, .. } if source.kind() != ErrorKind::InvalidData => None,
-            _ => Some(
-                "a curve is a CSV with the columns tau_samples,wv,edof (tau_samples = 2, 4, 8, …), or a .wv.json \
-                 written by calibrate or wv"
-                    .into(),
-            ),
-        }
-    }
+/// A value of a column or key that means nothing.
+fn refused(path: &str, place: &Place, column: &str, value: impl Display, expected: &str) -> FileError {
+    FileError::contents(path, place.clone(), format!("{column} = {value} is not {expected}"))
 }
 
 /// Reads the curves of a file.
 ///
 /// # Errors
 /// When it cannot be read, or is no curve file.
-pub fn read(path: &Path) -> Result<Vec<NamedCurve>, CurveError> {
-    let name = path.display().to_string();
-    let text = source::text(path).map_err(|source| CurveError::Io { path: name.clone(), source })?;
+pub fn read(path: &Path) -> Result<Vec<NamedCurve>, FileError> {
+    let text = source::text(path).map_err(|e| FileError::io(path, e));
+    let curves = text.and_then(|text| parse(&path.display().to_string(), &text));
+    curves.map_err(|e| match &e.kind {
+        Kind::System(source) if source.kind() == ErrorKind::NotFound => e.advice("check the path"),
+        _ if e.is_system() => e,
+        _ => e.advice(LAYOUT),
+    })
+}
+
+fn parse(path: &str, text: &str) -> Result<Vec<NamedCurve>, FileError> {
     let text = text.trim_start_matches('\u{feff}');
-    let curves =
-        if text.trim_start().starts_with('{') { json(&name, text)? } else { vec![csv(&name, text)?] };
+    let curves = if text.trim_start().starts_with('{') { json(path, text)? } else { vec![csv(path, text)?] };
     if curves.iter().any(|c| c.curve.levels.is_empty()) || curves.is_empty() {
-        return Err(CurveError::Empty { path: name });
+        return Err(FileError::contents(path, Place::Within, "no curve in it"));
     }
     Ok(curves)
 }
 
-fn csv(path: &str, text: &str) -> Result<NamedCurve, CurveError> {
+fn csv(path: &str, text: &str) -> Result<NamedCurve, FileError> {
     let mut reader =
         csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
-    let syntax = |e: csv::Error| {
-        let line = e.position().map_or(1, csv::Position::line);
-        CurveError::Syntax { path: path.to_owned(), line, message: e.to_string() }
-    };
+    let syntax =
+        |e: csv::Error| FileError::contents(path, e.position().map_or(1, csv::Position::line), e.to_string());
     let head = reader.headers().map_err(syntax)?.clone();
     let column = |name: &'static str| {
-        head.iter()
-            .position(|c| c == name)
-            .map(|i| (name, i))
-            .ok_or_else(|| CurveError::Column { path: path.to_owned(), column: name })
+        let missing = || Kind::Columns(format!("no column is named \"{name}\"").into());
+        let at = head.iter().position(|c| c == name);
+        at.map(|at| (name, at)).ok_or_else(|| FileError::new(path, 1_u64, missing()))
     };
-    let (tau, wv, edof) = (column("tau_samples")?, column("wv")?, column("edof")?);
+    let columns = [column("tau_samples")?, column("wv")?, column("edof")?];
     let mut curve = Curve::default();
     for record in reader.records() {
         let record = record.map_err(syntax)?;
-        let place = format!("line {}", record.position().map_or(0, csv::Position::line));
-        let number = |(column, i): (&'static str, usize)| {
-            let value = record.get(i).unwrap_or_default();
-            value.parse::<f64>().map_err(|_| CurveError::Value {
-                path: path.to_owned(),
-                place: place.clone(),
-                column,
-                value: format!("\"{value}\""),
-                expected: "a number",
-            })
-        };
-        push(&mut curve, path, &place, number(tau)?, number(wv)?, number(edof)?)?;
+        let place = Place::Line(record.position().map_or(0, csv::Position::line));
+        let mut point = [0.0; 3];
+        for (number, (column, at)) in point.iter_mut().zip(columns) {
+            let value = record.get(at).unwrap_or_default();
+            let not_a_number = |_| refused(path, &place, column, format!("\"{value}\""), "a number");
+            *number = value.parse().map_err(not_a_number)?;
+        }
+        push(&mut curve, path, &place, point)?;
     }
     Ok(NamedCurve { sensor: None, axis: None, rate_hz: None, estimator: None, curve })
 }
 
 /// What tells the file of `wv` from that of `calibrate`.
 #[derive(serde::Deserialize)]
-struct Kind {
+struct Signals {
     signals: Option<serde::de::IgnoredAny>,
 }
 
-fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, CurveError> {
-    let syntax = |e: serde_json::Error| CurveError::Syntax {
-        path: path.to_owned(),
-        line: e.line() as u64,
-        message: e.to_string(),
-    };
-    let Kind { signals } = serde_json::from_str(text).map_err(syntax)?;
-    let refuse = |place: &str, column, value: &str, expected| CurveError::Value {
-        path: path.to_owned(),
-        place: place.to_owned(),
-        column,
-        value: value.to_owned(),
-        expected,
-    };
-    let file = match signals {
-        None => serde_json::from_str(text).map_err(syntax)?,
-        Some(_) => {
-            let file: SignalsFile = serde_json::from_str(text).map_err(syntax)?;
-            quantization(path, "head", Some(file.efficiency))?;
-            CurvesFile::from(file)
-        }
+fn json(path: &str, text: &str) -> Result<Vec<NamedCurve>, FileError> {
+    let syntax = |e: serde_json::Error| FileError::contents(path, e.line(), e.to_string());
+    let is_of_wv = serde_json::from_str::<Signals>(text).map_err(syntax)?.signals.is_some();
+    let head = Place::Part("head".into());
+    let file = if is_of_wv {
+        let file: SignalsFile = serde_json::from_str(text).map_err(syntax)?;
+        quantization(path, &head, Some(file.efficiency))?;
+        CurvesFile::from(file)
+    } else {
+        serde_json::from_str(text).map_err(syntax)?
     };
     if file.schema_version != 1 {
-        return Err(refuse(
-            "head",
+        return Err(refused(
+            path,
+            &head,
             "schema_version",
-            &file.schema_version.to_string(),
+            file.schema_version,
             "1, which this version reads",
         ));
     }
     if !(file.rate_hz.is_finite() && file.rate_hz > 0.0) {
-        return Err(refuse("rate", "rate_hz", &file.rate_hz.to_string(), "a finite number > 0"));
+        let rate = Place::Part("rate".into());
+        return Err(refused(path, &rate, "rate_hz", file.rate_hz, "a finite number > 0"));
     }
-    let mut curves = Vec::new();
-    for (index, entry) in (1..).zip(&file.curves) {
-        let (tau, wv, edof) = (entry.tau_s.len(), entry.wv.len(), entry.edof.len());
-        if tau != wv || tau != edof {
-            return Err(CurveError::Lengths { path: path.to_owned(), index, tau, wv, edof });
-        }
-        let place = format!("curve {index}");
-        let sensor = Sensor::ALL.into_iter().find(|s| s.name() == entry.sensor);
-        let sensor = sensor.ok_or_else(|| refuse(&place, "sensor", &entry.sensor, "accel or gyro"))?;
-        let axis = Axis::ALL.into_iter().find(|a| a.name() == entry.axis);
-        if axis.is_none() && entry.axis != "all" {
-            return Err(refuse(&place, "axis", &entry.axis, "x, y, z or all"));
-        }
-        let mut curve =
-            Curve { quantization: quantization(path, &place, entry.efficiency)?, ..Curve::default() };
-        for i in 0..tau {
-            let place = format!("curve {index}, scale {}", i + 1);
-            push(&mut curve, path, &place, entry.tau_s[i] * file.rate_hz, entry.wv[i], entry.edof[i])?;
-        }
-        curves.push(NamedCurve {
-            sensor: Some(sensor),
-            axis,
-            rate_hz: Some(file.rate_hz),
-            estimator: (!entry.estimator.is_empty()).then(|| entry.estimator.clone()),
-            curve,
-        });
+    let numbered = (1..).zip(&file.curves);
+    numbered.map(|(number, entry)| named_curve(path, number, entry, file.rate_hz)).collect()
+}
+
+/// One curve of a JSON file.
+fn named_curve(
+    path: &str,
+    number: usize,
+    entry: &FittedCurve,
+    rate_hz: f64,
+) -> Result<NamedCurve, FileError> {
+    let (tau, wv, edof) = (entry.tau_s.len(), entry.wv.len(), entry.edof.len());
+    if tau != wv || tau != edof {
+        let message =
+            format!("curve {number} has {tau} scales, {wv} wavelet variances and {edof} degrees of freedom");
+        return Err(FileError::contents(path, Place::Within, message));
     }
-    Ok(curves)
+    let place = Place::Part(format!("curve {number}").into());
+    let sensor = entry.sensor.parse();
+    let sensor = sensor.map_err(|_| refused(path, &place, "sensor", &entry.sensor, "accel or gyro"))?;
+    let axis = Axis::ALL.into_iter().find(|a| a.name() == entry.axis);
+    if axis.is_none() && entry.axis != "all" {
+        return Err(refused(path, &place, "axis", &entry.axis, "x, y, z or all"));
+    }
+    let mut curve = Curve { quantization: quantization(path, &place, entry.efficiency)?, ..Curve::default() };
+    for i in 0..tau {
+        let place = Place::Part(format!("curve {number}, scale {}", i + 1).into());
+        push(&mut curve, path, &place, [entry.tau_s[i] * rate_hz, entry.wv[i], entry.edof[i]])?;
+    }
+    let estimator = (!entry.estimator.is_empty()).then(|| entry.estimator.clone());
+    Ok(NamedCurve { sensor: Some(sensor), axis, rate_hz: Some(rate_hz), estimator, curve })
 }
 
 /// How robust variances of an efficiency read quantization noise.
 fn quantization(
     path: &str,
-    place: &str,
+    place: &Place,
     efficiency: Option<f64>,
-) -> Result<Option<QuantizationResponse>, CurveError> {
+) -> Result<Option<QuantizationResponse>, FileError> {
     let Some(efficiency) = efficiency else { return Ok(None) };
     // The efficiency in a file is the true one, which the other convention puts a little beyond the range.
     let tuning = Tuning::new(efficiency.clamp(0.3, 0.99), Convention::Exact);
     match tuning {
         Ok(tuning) if efficiency > 0.0 && efficiency <= 1.0 => Ok(Some(*tuning.quantization())),
-        _ => Err(CurveError::Value {
-            path: path.to_owned(),
-            place: place.to_owned(),
-            column: "efficiency",
-            value: efficiency.to_string(),
-            expected: "a number above 0, up to 1",
-        }),
+        _ => Err(refused(path, place, "efficiency", efficiency, "a number above 0, up to 1")),
     }
 }
 
-/// Appends a point; scales are powers of two, ascending.
-fn push(curve: &mut Curve, path: &str, place: &str, tau: f64, wv: f64, edof: f64) -> Result<(), CurveError> {
-    let refuse = |column, value: f64, expected| {
-        Err(CurveError::Value {
-            path: path.to_owned(),
-            place: place.to_owned(),
-            column,
-            value: value.to_string(),
-            expected,
-        })
-    };
+/// Appends a point (scale in samples, wavelet variance, degrees of freedom); scales are powers of two, ascending.
+fn push(curve: &mut Curve, path: &str, place: &Place, [tau, wv, edof]: [f64; 3]) -> Result<(), FileError> {
+    let refuse = |column, value: f64, expected| Err(refused(path, place, column, value, expected));
     let level = tau.log2().round();
     // Scales in seconds come back from a division by the rate.
     let is_power = (1.0..=62.0).contains(&level) && (tau / level.exp2() - 1.0).abs() < 1e-6;
@@ -289,7 +189,7 @@ fn push(curve: &mut Curve, path: &str, place: &str, tau: f64, wv: f64, edof: f64
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::{FittedCurve, json as to_json};
+    use crate::report::json as to_json;
 
     #[test]
     fn a_table_of_scales() {

@@ -19,7 +19,7 @@
 use super::FileError;
 use super::contamination_file;
 use super::model_file;
-use super::toml_described;
+use super::toml_described::Document;
 use super::toml_file::{Section, Source};
 use crate::calibration::{AverageError, Estimator, Trim, Weighting};
 use crate::efficiency::Design;
@@ -133,9 +133,9 @@ pub fn schema() -> serde_json::Value {
 /// When a file cannot be read, has unknown keys, lacks some, or has values that mean no study.
 pub fn read(path: &Path) -> Result<StudyFile, FileError> {
     let source = Source::read(path)?;
-    let d: Description = toml_described::read(&source)?;
-    let table = source.parse()?;
-    let root = source.root(&table);
+    let document = Document::parse(&source)?;
+    let d: Description = document.read()?;
+    let root = document.root();
     if d.schema.is_some_and(|s| s != 1) {
         return Err(root.refuse("schema", "is not a schema this version reads: it reads 1", None));
     }
@@ -154,7 +154,7 @@ pub fn read(path: &Path) -> Result<StudyFile, FileError> {
         levels: levels(&root, d.levels, samples)?,
         scenarios: scenarios(&root, &d.scenarios, file.model.rate_hz, beside)?,
         estimators: estimators(&root, d.estimators)?,
-        spec: d.fit.parse().map_err(|e| root.refuse("fit", format!("is no model: {e}"), None))?,
+        spec: d.fit.parse().map_err(|e| root.refuse("fit", format!("is not a model: {e}"), None))?,
         trim: d.trim.map_or(Trim::default(), |a| Trim::Count(a as usize)),
         tuning: Tuning::new(d.efficiency, Convention::Exact)
             .map_err(|_| root.refuse("efficiency", "is not between 0.3 and 0.99", None))?,

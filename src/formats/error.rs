@@ -30,6 +30,8 @@ pub enum Place {
     Line(u64),
     /// Line and column, from 1.
     Character(u64, u64),
+    /// A part that is no line: which.
+    Part(Box<str>),
 }
 
 impl From<u64> for Place {
@@ -98,11 +100,12 @@ impl fmt::Display for Kind {
 impl fmt::Display for FileError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { path, kind, .. } = self;
-        match self.place {
+        match &self.place {
             Place::Within => write!(f, "{path}: {kind}"),
             Place::Itself => write!(f, "{path} {kind}"),
             Place::Line(line) => write!(f, "{path}, line {line}: {kind}"),
             Place::Character(line, column) => write!(f, "{path}, line {line}, column {column}: {kind}"),
+            Place::Part(part) => write!(f, "{path}, {part}: {kind}"),
         }
     }
 }

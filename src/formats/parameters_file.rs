@@ -19,6 +19,7 @@ use crate::calibration::{ModelSpec, ParameterLimit};
 use crate::imu::{Axis, Sensor};
 use crate::noise::Kind;
 use std::path::Path;
+use toml::de::DeTable;
 
 /// Reads the limits of a file. Each is tried on the model.
 ///
@@ -34,21 +35,19 @@ pub fn read(path: &Path, spec: &ModelSpec) -> Result<Vec<ParameterLimit>, FileEr
 /// As [`read`], for a model of the processes named.
 pub fn check(path: &Path) -> Result<(), FileError> {
     let source = Source::read(path)?;
-    source.parse()?;
-    let text = std::fs::read_to_string(path).unwrap_or_default();
-    let table: toml::Table = text.trim_start_matches('\u{feff}').parse().unwrap_or_default();
+    let table = source.parse()?;
     let mut names = Vec::new();
-    named(&table, &mut names);
+    named(table.get_ref(), &mut names);
     let spec = spec_of(&names).unwrap_or_else(ModelSpec::n2);
     limits(&source, &spec).map(|_| ())
 }
 
 /// Labels of processes that a table names, at any depth.
-fn named(table: &toml::Table, into: &mut Vec<String>) {
+fn named(table: &DeTable<'_>, into: &mut Vec<String>) {
     for (key, value) in table {
-        let Some(inner) = value.as_table() else { continue };
+        let (key, Some(inner)) = (key.get_ref(), value.get_ref().as_table()) else { continue };
         let outer = Sensor::ALL.iter().any(|s| s.name() == key) || Axis::ALL.iter().any(|a| a.name() == key);
-        if outer { named(inner, into) } else { into.push(key.clone()) }
+        if outer { named(inner, into) } else { into.push(key.to_string()) }
     }
 }
 
@@ -145,7 +144,7 @@ fn bounds(
     match (fix, lower, upper) {
         (Some(value), None, None) => Ok((Some(value), Some(value))),
         (Some(_), ..) => Err(table.refuse(parameter, "is both fixed and bounded", hint())),
-        (None, None, None) => Err(table.refuse(parameter, "says nothing", hint())),
+        (None, None, None) => Err(table.refuse(parameter, "neither fixes nor bounds the parameter", hint())),
         (None, lower, upper) => Ok((lower, upper)),
     }
 }

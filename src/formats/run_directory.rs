@@ -1,76 +1,12 @@
 //! Run directories read back, as far as comparisons need them.
 
-use super::{atomic, source};
+use super::run_tables::{parse_epochs, parse_runs};
+use super::{FileError, Place, atomic, source};
 use crate::metrics::{EpochRow, Measured, PerState};
-use crate::report::{Manifest, TableError, parse_epochs, parse_runs};
+use crate::report::Manifest;
 use crate::scenario::Method;
 use crate::simulation::{OutageRecord, RunRecord};
 use std::path::Path;
-
-/// A run directory that cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub enum RunDirectoryError {
-    /// A file cannot be read.
-    #[error("{path}: {source}")]
-    Io {
-        /// File.
-        path: String,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// Manifest or summary is not one.
-    #[error("{path}, line {line}: {message}")]
-    Manifest {
-        /// File.
-        path: String,
-        /// Line, from 1.
-        line: usize,
-        /// What the parser said.
-        message: String,
-    },
-    /// A table is not one.
-    #[error("{path}, {source}")]
-    Table {
-        /// File.
-        path: String,
-        /// What is wrong with it.
-        source: TableError,
-    },
-    /// It comes from another layout.
-    #[error("{path}: \"schema_version\" is {found}; this nav-sim reads {expected}")]
-    Version {
-        /// File.
-        path: String,
-        /// Version found.
-        found: u32,
-        /// Version read.
-        expected: u32,
-    },
-}
-
-impl RunDirectoryError {
-    /// Whether the contents are at fault (rather than the machine, or a missing file).
-    #[must_use]
-    pub fn is_content(&self) -> bool {
-        match self {
-            Self::Io { source, .. } => source::is_damage(source.kind()),
-            _ => true,
-        }
-    }
-
-    /// What to do about it.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
-        let unfinished = "not a finished run directory: make one with `nav-sim run … -o DIR`";
-        match self {
-            Self::Io { source, .. } if source.kind() == std::io::ErrorKind::NotFound => {
-                Some(unfinished.into())
-            }
-            Self::Version { .. } => Some("repeat the run with this version".into()),
-            _ => None,
-        }
-    }
-}
 
 /// A run directory.
 #[derive(Debug, Clone, PartialEq)]
@@ -85,18 +21,17 @@ pub struct RunDirectory {
 ///
 /// # Errors
 /// The file, and what is wrong with it.
-pub fn read(directory: &Path) -> Result<RunDirectory, RunDirectoryError> {
+pub fn read(directory: &Path) -> Result<RunDirectory, FileError> {
     atomic::recover(directory);
     let manifest = manifest(directory)?;
     let (epochs_path, epochs) = text(directory, "epochs.csv")?;
-    let table = |path: String| move |source| RunDirectoryError::Table { path, source };
-    let epochs = parse_epochs(&epochs).map_err(table(epochs_path))?;
+    let epochs = parse_epochs(&epochs_path, &epochs)?;
     let is_expected = manifest.configuration.run.method == Method::Lincov;
     let runs = if is_expected {
         vec![expected_run(directory, &epochs)?]
     } else {
         let (runs_path, runs) = text(directory, "runs.csv")?;
-        parse_runs(&runs).map_err(table(runs_path))?
+        parse_runs(&runs_path, &runs)?
     };
     let outages = manifest.configuration.outage.iter().flatten().map(|o| (o.start_s, o.end_s)).collect();
     let independent_windows = manifest.independent_windows;
@@ -105,7 +40,7 @@ pub fn read(directory: &Path) -> Result<RunDirectory, RunDirectoryError> {
 }
 
 /// The run that stands for what covariance analysis expects, from its epochs and its summary.
-fn expected_run(directory: &Path, epochs: &[EpochRow]) -> Result<RunRecord, RunDirectoryError> {
+fn expected_run(directory: &Path, epochs: &[EpochRow]) -> Result<RunRecord, FileError> {
     #[derive(serde::Deserialize)]
     struct Expected {
         outages: Vec<ExpectedOutage>,
@@ -136,23 +71,30 @@ fn expected_run(directory: &Path, epochs: &[EpochRow]) -> Result<RunRecord, RunD
     })
 }
 
-fn manifest(directory: &Path) -> Result<Manifest, RunDirectoryError> {
+fn manifest(directory: &Path) -> Result<Manifest, FileError> {
     let (path, json) = text(directory, "manifest.json")?;
     let manifest: Manifest = serde_json::from_str(&json).map_err(|e| not_json(&path, &e))?;
     let (found, expected) = (manifest.schema_version, Manifest::SCHEMA_VERSION);
-    if found == expected { Ok(manifest) } else { Err(RunDirectoryError::Version { path, found, expected }) }
+    if found == expected {
+        return Ok(manifest);
+    }
+    let message = format!("\"schema_version\" is {found}; this nav-sim reads {expected}");
+    Err(FileError::contents(path, Place::Within, message).advice("repeat the run with this version"))
 }
 
-fn not_json(path: &str, e: &serde_json::Error) -> RunDirectoryError {
+fn not_json(path: &str, e: &serde_json::Error) -> FileError {
     let message = e.to_string().split(" at line ").next().unwrap_or_default().to_owned();
-    RunDirectoryError::Manifest { path: path.to_owned(), line: e.line(), message }
+    FileError::contents(path, e.line(), message)
 }
 
-fn text(directory: &Path, name: &str) -> Result<(String, String), RunDirectoryError> {
+fn text(directory: &Path, name: &str) -> Result<(String, String), FileError> {
     let path = directory.join(name);
-    let shown = path.display().to_string();
     match source::text(&path) {
-        Ok(text) => Ok((shown, text)),
-        Err(source) => Err(RunDirectoryError::Io { path: shown, source }),
+        Ok(text) => Ok((path.display().to_string(), text)),
+        Err(source) => {
+            let unfinished = "not a finished run directory: make one with `nav-sim run … -o DIR`";
+            let is_missing = source.kind() == std::io::ErrorKind::NotFound;
+            Err(FileError::io(&path, source).advice_if(is_missing.then(|| unfinished.to_owned())))
+        }
     }
 }

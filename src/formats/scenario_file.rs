@@ -1,8 +1,8 @@
 //! Scenario files (TOML): see [`Scenario`].
 
-use super::error::{FileError, Kind};
-use super::toml_described;
-use super::toml_file::{Section, Source};
+use super::FileError;
+use super::toml_described::Document;
+use super::toml_file::Source;
 use crate::scenario::Scenario;
 use crate::units::SettingError;
 use std::path::Path;
@@ -12,36 +12,28 @@ use std::path::Path;
 /// # Errors
 /// File, line, key and value of what is refused; a mistyped key with the nearest legal one.
 pub fn read(path: &Path) -> Result<Scenario, FileError> {
-    from_source(&Source::read(path)?)
+    read_for(path, |_| Ok(()))
 }
 
-fn from_source(source: &Source) -> Result<Scenario, FileError> {
-    let scenario: Scenario = toml_described::read(source)?;
-    let table = source.parse()?;
-    scenario.validate().map_err(|e| located(&e, source, &source.root(&table)))?;
+/// Reads and checks a scenario, also by a rule of the study it is for.
+///
+/// # Errors
+/// As [`read`].
+pub(crate) fn read_for(
+    path: &Path,
+    rule: impl FnOnce(&Scenario) -> Result<(), SettingError>,
+) -> Result<Scenario, FileError> {
+    from_source(&Source::read(path)?, rule)
+}
+
+fn from_source(
+    source: &Source,
+    rule: impl FnOnce(&Scenario) -> Result<(), SettingError>,
+) -> Result<Scenario, FileError> {
+    let document = Document::parse(source)?;
+    let scenario: Scenario = document.read()?;
+    scenario.validate().and_then(|()| rule(&scenario)).map_err(|e| document.refused(&e))?;
     Ok(scenario)
-}
-
-/// A refusal by [`Scenario::validate`] at the line its key stands in.
-pub(super) fn located(error: &SettingError, source: &Source, root: &Section<'_>) -> FileError {
-    let (section, key) = error.key.rsplit_once('.').unwrap_or(("", &error.key));
-    let reason = format!("is refused: {}", error.requirement);
-    let (name, index) = match section.trim_end_matches(']').split_once('[') {
-        Some((name, index)) => (name, index.parse::<usize>().ok()),
-        None => (section, None),
-    };
-    let found = match index {
-        Some(i) => root.sections(name).ok().and_then(|all| all.into_iter().nth(i - 1)),
-        None => root.section(name).ok().flatten(),
-    };
-    match found {
-        Some(section) if section.has(key) => section.refuse(key, reason, None),
-        _ => {
-            let (key, value) = (error.key.as_str().into(), error.value.as_str().into());
-            let kind = Kind::Value { key, value, reason: reason.into() };
-            source.error(1, kind).advice("the file does not set it: this is the default")
-        }
-    }
 }
 
 #[cfg(test)]
@@ -49,7 +41,7 @@ mod tests {
     use super::*;
 
     fn refused(text: &str) -> (String, Option<String>) {
-        let error = from_source(&Source::new("s.toml", text)).unwrap_err();
+        let error = from_source(&Source::new("s.toml", text), |_| Ok(())).unwrap_err();
         (error.to_string(), error.hint())
     }
 
@@ -96,6 +88,6 @@ mod tests {
 
     #[test]
     fn states_may_be_a_number() {
-        assert!(from_source(&Source::new("s.toml", "filter.states = 15")).is_ok());
+        assert!(from_source(&Source::new("s.toml", "filter.states = 15"), |_| Ok(())).is_ok());
     }
 }

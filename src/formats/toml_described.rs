@@ -3,41 +3,79 @@
 
 use super::error::{FileError, Kind};
 use super::suggest::nearest;
-use super::toml_file::{Source, missing_key, shown, unknown_key};
+use super::toml_file::{Section, Source, missing_key, shown, unknown_key};
+use super::toml_path::{dotted, path_at, span_of};
+use crate::units::SettingError;
 use serde::de::DeserializeOwned;
-use std::ops::Range;
+use toml::Spanned;
+use toml::de::{DeTable, Deserializer};
 
-/// A file as its description has it.
-///
-/// # Errors
-/// File, line, key and value of what is refused; a mistyped key with the nearest legal one.
-pub(crate) fn read<T: DeserializeOwned>(source: &Source) -> Result<T, FileError> {
-    source.parse()?;
-    toml::from_str(source.text()).map_err(|e| explained(&e, source))
+/// A parsed file, for its description and for rules that name keys.
+#[derive(Debug)]
+pub(crate) struct Document<'a> {
+    source: &'a Source,
+    table: Spanned<DeTable<'a>>,
 }
 
-/// A refusal by serde as one by key.
-fn explained(error: &toml::de::Error, source: &Source) -> FileError {
-    let span = error.span().unwrap_or_default();
-    let line = source.line(span.start);
-    let section = section_at(source.text(), span.start);
-    let message = error.message();
-    let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
-    if message.starts_with("unknown field") && !quoted.is_empty() {
-        let key = dotted(&section, quoted[0]);
-        return unknown_key(source, line, key, quoted[0], quoted[1..].iter().copied());
+impl<'a> Document<'a> {
+    /// The file, parsed once.
+    ///
+    /// # Errors
+    /// Line and column of what is not TOML.
+    pub(crate) fn parse(source: &'a Source) -> Result<Self, FileError> {
+        Ok(Self { source, table: source.parse()? })
     }
-    if message.starts_with("missing field") && !quoted.is_empty() {
-        return missing_key(source, line, &[dotted(&table_at(source.text(), span), quoted[0])]);
+
+    /// The whole file as one section.
+    pub(crate) fn root(&'a self) -> Section<'a> {
+        self.source.root(&self.table)
     }
-    let kind = Kind::Value {
-        key: dotted(&section, &key_before(source.text(), span.start)).into(),
-        value: shown(source.text().get(span).unwrap_or_default()).into(),
-        reason: reason(message, &quoted).into(),
-    };
-    let meant = quoted.split_first().filter(|_| message.starts_with("unknown variant"));
-    let meant = meant.and_then(|(word, legal)| nearest(word, legal.iter().copied()));
-    source.error(line, kind).advice_if(meant.map(|meant| format!("did you mean \"{meant}\"?")))
+
+    /// The file as its description has it.
+    ///
+    /// # Errors
+    /// File, line, key and value of what is refused; a mistyped key with the nearest legal one.
+    pub(crate) fn read<T: DeserializeOwned>(&self) -> Result<T, FileError> {
+        T::deserialize(Deserializer::from(self.table.clone())).map_err(|e| self.explained(&e))
+    }
+
+    /// The line of a dotted key, or of the innermost table around it that the file has.
+    pub(crate) fn line_of(&self, path: &str) -> usize {
+        self.source.line(span_of(self.table.get_ref(), path).0.start)
+    }
+
+    /// The refusal of a key by a rule of the settings, in the line in which it is set.
+    pub(crate) fn refused(&self, error: &SettingError) -> FileError {
+        let (span, is_set) = span_of(self.table.get_ref(), &error.key);
+        let value = if is_set { shown(&self.source.text()[span.clone()]) } else { error.value.clone() };
+        let reason = format!("is refused: {}", error.requirement);
+        let (key, value) = (error.key.as_str().into(), value.into());
+        let error = self
+            .source
+            .error(self.source.line(span.start), Kind::Value { key, value, reason: reason.into() });
+        if is_set { error } else { error.advice("the file does not set it: this is the default") }
+    }
+
+    /// A refusal by serde as one by key.
+    fn explained(&self, error: &toml::de::Error) -> FileError {
+        let (source, span) = (self.source, error.span().unwrap_or_default());
+        let line = source.line(span.start);
+        let path = path_at(self.table.get_ref(), &span);
+        let message = error.message();
+        let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
+        if message.starts_with("unknown field") && !quoted.is_empty() {
+            return unknown_key(source, line, path, quoted[0], quoted[1..].iter().copied());
+        }
+        if message.starts_with("missing field") && !quoted.is_empty() {
+            return missing_key(source, line, &[dotted(&path, quoted[0])]);
+        }
+        let value = shown(source.text().get(span).unwrap_or_default()).into();
+        let reason = reason(message, &quoted).into();
+        let meant = quoted.split_first().filter(|_| message.starts_with("unknown variant"));
+        let meant = meant.and_then(|(word, legal)| nearest(word, legal.iter().copied()));
+        let kind = Kind::Value { key: path.into(), value, reason };
+        source.error(line, kind).advice_if(meant.map(|meant| format!("did you mean \"{meant}\"?")))
+    }
 }
 
 /// Why a value is refused, in words that follow it: serde's types in ours.
@@ -59,38 +97,6 @@ fn reason(message: &str, quoted: &[&str]) -> String {
     }
 }
 
-/// Name of the table that a span is: its head, an inline table, or the rest of the file.
-fn table_at(text: &str, span: Range<usize>) -> String {
-    let (section, written) = (section_at(text, span.start), text.get(span.clone()).unwrap_or_default());
-    if written.starts_with('[') && written.ends_with(']') {
-        written.trim_matches(['[', ']', ' ']).to_owned()
-    } else if written.starts_with('{') {
-        dotted(&section, &key_before(text, span.start))
-    } else {
-        section
-    }
-}
-
-/// Name of the table a byte stands in: the last head before it.
-fn section_at(text: &str, at: usize) -> String {
-    let head = |line: &str| {
-        let name = line.trim().strip_prefix('[')?.trim_start_matches('[').split(']').next()?;
-        Some(name.trim().to_owned())
-    };
-    text[..at].lines().rev().find_map(head).unwrap_or_default()
-}
-
-/// The key whose value begins at a byte: what stands before the last `=`.
-fn key_before(text: &str, at: usize) -> String {
-    let before = text[..at].rsplit('\n').next().unwrap_or_default();
-    let left = before.rsplit_once('=').map_or(before, |(left, _)| left);
-    left.rsplit(['{', ',']).next().unwrap_or_default().trim().to_owned()
-}
-
-fn dotted(section: &str, key: &str) -> String {
-    if section.is_empty() { key.to_owned() } else { format!("{section}.{key}") }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -102,6 +108,7 @@ mod tests {
     struct File {
         count: u64,
         part: Option<Part>,
+        parts: Option<Vec<Part>>,
         words: Option<Vec<Word>>,
     }
 
@@ -139,9 +146,23 @@ mod tests {
                 "count = 1\nwords = [\"south\", \"nroth\"]",
                 "line 2: \"words\" = \"nroth\" is not one of \"north\", \"south\" | did you mean \"north\"?",
             ),
+            (
+                "count = 1\n[part]\nx = 1\nxyz = [\n  1, # = 2\n  \"a\",\n  3]\n",
+                "line 6: \"part.xyz\" = \"a\" is not a number | ",
+            ),
+            (
+                "count = 1\n[[parts]]\nx = 1\n[[parts]]\nx = \"b\"\n",
+                "line 5: \"parts[2].x\" = \"b\" is not a number | ",
+            ),
+            (
+                "count = 1\nparts = [{ x = 1 }, { xzy = 1 }]\n",
+                "line 2: unknown key \"parts[2].xzy\" | did you mean \"xyz\"?",
+            ),
+            ("count = 1\n[[parts]]\n", "line 2: \"parts[1].x\" is missing | add the key \"parts[1].x\""),
             ("count = 1\nconut = 1", "line 2: unknown key \"conut\" | did you mean \"count\"?"),
         ] {
-            let e = read::<File>(&Source::new("f.toml", text)).unwrap_err();
+            let source = Source::new("f.toml", text);
+            let e = Document::parse(&source).unwrap().read::<File>().unwrap_err();
             assert_eq!(format!("{e} | {}", e.hint().unwrap_or_default()), format!("f.toml, {expected}"));
         }
     }

@@ -151,13 +151,8 @@ impl<'a> Section<'a> {
     }
 
     /// The line it begins in.
-    pub(crate) fn line(&self) -> usize {
+    fn line(&self) -> usize {
         self.source.line(self.at)
-    }
-
-    /// The line in which the value of a key begins.
-    pub(crate) fn line_of(&self, key: &str) -> usize {
-        self.source.line(self.get(key).map_or(self.at, |v| v.span().start))
     }
 
     pub(crate) fn has(&self, key: &str) -> bool {
@@ -263,6 +258,10 @@ impl<'a> Section<'a> {
 
     pub(crate) fn is_list(&self, key: &str) -> bool {
         self.get(key).is_some_and(|v| v.get_ref().is_array())
+    }
+
+    pub(crate) fn is_empty_list(&self, key: &str) -> bool {
+        self.get(key).is_some_and(|v| v.get_ref().as_array().is_some_and(|items| items.is_empty()))
     }
 
     /// A list of tables, named `key[1]`, `key[2]`, … in messages.

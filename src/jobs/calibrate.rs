@@ -8,6 +8,7 @@ use crate::calibration::{
 use crate::formats::hash;
 use crate::formats::recordings::{self, FileReport, ReadOptions, Report};
 use crate::imu::{Channel, Recording, Signal};
+use crate::names::UnknownName;
 use crate::noise::Model;
 use crate::wavelet::{Tuning, default_levels};
 use rayon::prelude::*;
@@ -41,7 +42,7 @@ impl fmt::Display for EstimatorChoice {
 }
 
 impl FromStr for EstimatorChoice {
-    type Err = calibration::UnknownName;
+    type Err = UnknownName;
 
     fn from_str(word: &str) -> Result<Self, Self::Err> {
         if word == "all" { Ok(Self::All) } else { word.parse().map(Self::One) }

@@ -3,7 +3,6 @@
 use crate::calibration::{CalibrationError, Estimator, SignalError};
 use crate::choose::ChoiceError;
 use crate::formats::FileError;
-use crate::formats::curve_file::CurveError;
 use crate::wavelet::WaveletError;
 
 /// Why a job has no result.
@@ -21,9 +20,6 @@ pub enum JobError {
     /// No fit.
     #[error(transparent)]
     Calibration(#[from] CalibrationError),
-    /// A curve that cannot be read.
-    #[error(transparent)]
-    Curve(#[from] CurveError),
     /// Copies: one replicate would count as two, and intervals come out too narrow.
     #[error("{copy} is a copy of {first}: it would count as two replicates")]
     Copy {

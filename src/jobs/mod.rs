@@ -25,10 +25,13 @@
 mod calibrate;
 mod certify;
 mod choose;
+mod compare;
 mod curves;
 mod design;
 mod error;
+mod estimator_study;
 mod files;
+mod fuse;
 mod navigate;
 mod reduction;
 mod remarks;
@@ -39,12 +42,15 @@ mod wavelet;
 pub use calibrate::{Calibration, CalibrationOptions, EstimatorChoice, Measured, calibrate, measure};
 pub use certify::{Certificate, CertifiedScale, CertifyError, Recorded, certify};
 pub use choose::{ChoiceDrive, Chosen, choose};
+pub use compare::{CompareError, Comparison, compare};
 pub use curves::{Curves, read_curves};
 pub use design::{
     Design, DesignError, DesignInputs, DesignedParameter, DesignedQuantile, Destination, design,
 };
 pub use error::JobError;
+pub use estimator_study::{EstimatorStudy, EstimatorStudyError};
 pub use files::ModelFiles;
+pub use fuse::{FusionFilter, FusionFilterError};
 pub use navigate::{NavigateError, NavigateInputs, Navigation, Note, TrueImu, navigate};
 pub use reduction::Reduced;
 pub use remarks::{BeginsOtherwise, Remark, Remarks, Silence};

@@ -86,7 +86,7 @@ pub enum NavigateError {
     /// The believed model has no such filter.
     #[error(transparent)]
     Belief(#[from] BeliefError),
-    /// The reduced model is none.
+    /// The reduction of the model cannot be assessed.
     #[error(transparent)]
     Reduction(#[from] ParameterError),
     /// Recordings have no covariance.

@@ -2,15 +2,13 @@
 
 use super::calibrate::{visit, without_warm_up};
 use super::{JobError, Remarks};
-use crate::calibration::{Replicate, UnknownName, replicates};
+use crate::calibration::{Replicate, replicates};
 use crate::formats::recordings::ReadOptions;
 use crate::imu::{Channel, Recording};
 use crate::report::{SignalCurves, SignalsFile};
 use crate::wavelet::{Tuning, WaveletError, haar, interval};
 use rayon::prelude::*;
-use std::fmt;
 use std::path::PathBuf;
-use std::str::FromStr;
 
 /// Where the degrees of freedom of intervals are from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -36,19 +34,7 @@ impl Intervals {
     }
 }
 
-impl fmt::Display for Intervals {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Intervals {
-    type Err = UnknownName;
-
-    fn from_str(word: &str) -> Result<Self, UnknownName> {
-        UnknownName::find(word, &Self::ALL, Self::name)
-    }
-}
+nav_sim_signal::named!(Intervals);
 
 /// How wavelet variances are taken.
 #[derive(Debug, Clone, Default)]

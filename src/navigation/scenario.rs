@@ -85,6 +85,9 @@ pub enum Method {
 }
 
 impl Method {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::MonteCarlo, Self::Lincov, Self::Both];
+
     /// As it is written.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -95,6 +98,8 @@ impl Method {
         }
     }
 }
+
+nav_sim_signal::named!(Method);
 
 /// `[filter]`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]

@@ -1,6 +1,6 @@
 //! `comparison.json` and the layout of the paper's Table I.
 
-use super::number::{readable, seconds};
+use super::number::{readable, window};
 use super::verdict::{verdict_in_short, verdict_word};
 use crate::metrics::{OutageComparison, RatioError, Verdict, VerdictKind};
 use crate::simulation::REPORTED_NAMES;
@@ -196,7 +196,7 @@ pub fn table_rows(candidates: &[CandidateResult], states: &[usize]) -> Vec<Vec<S
 pub fn with_times(mut rows: Vec<Vec<String>>, outages: &[(f64, f64)]) -> Vec<Vec<String>> {
     for row in rows.iter_mut().skip(1) {
         let time = row[1].parse::<usize>().ok().and_then(|k| outages.get(k - 1));
-        row[1] = time.map_or_else(String::new, |w| format!("{}–{} s", seconds(w.0), seconds(w.1)));
+        row[1] = time.map_or_else(String::new, |w| window(w.0, w.1));
     }
     rows
 }

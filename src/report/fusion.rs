@@ -2,7 +2,7 @@
 
 use super::json;
 use super::manifest::Input;
-use super::number::{seconds, shortest};
+use super::number::{shortest, window};
 use super::page::{Cell, Table, Tone};
 use super::pages::fusion_page;
 use super::run_directory::OutputFile;
@@ -200,10 +200,8 @@ impl FusionSummary {
         let mut table = Table::new(["outage", "fixes withheld", "horizontal from the fix (m)", "1 σ (m)"])
             .and(["horizontal from the reference (m)", "1 σ (m)"].map(str::to_owned));
         for (i, o) in self.outages.iter().enumerate() {
-            let mut cells = vec![
-                Cell::from(format!("{}–{} s", seconds(o.start_s), seconds(o.end_s))),
-                Cell::figures(o.fixes_withheld.to_string()),
-            ];
+            let mut cells =
+                vec![Cell::from(window(o.start_s, o.end_s)), Cell::figures(o.fixes_withheld.to_string())];
             for (end, key) in [(o.end_from_fix, "end_from_fix"), (o.end_from_reference, "end_from_reference")]
             {
                 let number =
@@ -255,9 +253,8 @@ impl FusionSummary {
             let ends = [of(fix, o.end_from_fix), of("reference", o.end_from_reference)];
             let ends: Vec<String> = ends.into_iter().flatten().collect();
             lines.push(format!(
-                "outage {}–{} s, {} fixes withheld: at its end {}",
-                o.start_s,
-                o.end_s,
+                "outage {}, {} fixes withheld: at its end {}",
+                window(o.start_s, o.end_s),
                 o.fixes_withheld,
                 if ends.is_empty() { "nothing to compare with".to_owned() } else { ends.join(", ") }
             ));

@@ -14,8 +14,6 @@ pub struct Manifest {
     pub command: Vec<String>,
     /// Seed of all random numbers.
     pub seed: u64,
-    /// Name of the truth, part of the key of every random stream.
-    pub scenario: String,
     /// The resolved configuration: every key, outages one by one.
     pub configuration: Scenario,
     /// Every file that was read.
@@ -44,15 +42,6 @@ pub struct Input {
     pub blake3: String,
 }
 
-impl Input {
-    /// An input with the hash of its contents.
-    #[must_use]
-    pub fn new(role: &str, path: &str, contents: &[u8]) -> Self {
-        let blake3 = blake3::hash(contents).to_hex().to_string();
-        Self { role: role.to_owned(), path: path.to_owned(), blake3 }
-    }
-}
-
 /// What the model file says about its making.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ModelNote {
@@ -71,7 +60,7 @@ impl Manifest {
         let inputs = |m: &Self| -> Vec<(String, String)> {
             m.inputs.iter().map(|i| (i.role.clone(), i.blake3.clone())).collect()
         };
-        (&self.version, self.seed, &self.scenario) == (&other.version, other.seed, &other.scenario)
+        (&self.version, self.seed) == (&other.version, other.seed)
             && (&self.configuration, &self.model) == (&other.configuration, &other.model)
             && inputs(self) == inputs(other)
     }

@@ -20,7 +20,7 @@ mod replicates;
 pub mod require;
 mod run_directory;
 #[cfg(test)]
-mod sample;
+pub(crate) mod sample;
 mod signals;
 mod study;
 mod tables;
@@ -41,7 +41,7 @@ pub use fits::{CandidateEntry, FitEntry, FitsFile, MissEntry};
 pub use fusion::{FUSION_FILES, FusionKind, FusionManifest, FusionSummary, fusion_directory, solution_csv};
 pub use manifest::{Input, Manifest, ModelNote};
 pub use markdown::{csv_table, latex_table, markdown, markdown_table};
-pub use number::{readable, seconds};
+pub use number::{readable, seconds, window};
 pub use pages::{
     RatioCurves, calibration_page, calibration_svg, choice_page, comparison_page, comparison_svg,
     efficiency_page, efficiency_svg, run_svg, study_page, wavelet_page, wavelet_svg,
@@ -57,7 +57,7 @@ pub use study::{
     epoch_columns, epoch_rows, outage_columns, outage_rows, ratio_table, run_columns, run_rows,
     verdict_table,
 };
-pub use tables::{TableError, epochs_csv, parse_epochs, parse_runs, runs_csv};
+pub use tables::{epochs_csv, runs_csv};
 pub use trajectory::{TrajectorySeries, trajectory_svg};
 pub use tune::{FactorEntry, TuneResult};
 pub use verdict::{verdict_in_short, verdict_line, verdict_word};

@@ -13,6 +13,12 @@ pub fn seconds(t_s: f64) -> String {
     format!("{}", (t_s * 100.0).round() / 100.0)
 }
 
+/// A window of a schedule: `300–390 s`.
+#[must_use]
+pub fn window(start_s: f64, end_s: f64) -> String {
+    format!("{}–{} s", seconds(start_s), seconds(end_s))
+}
+
 /// A number for people: three significant digits, or four figures before the point.
 #[must_use]
 pub fn readable(x: f64) -> String {

@@ -1,6 +1,6 @@
 //! What a limit needs of an IMU, and what a given one makes of it, on one screen and as JSON.
 
-use super::number::{readable, seconds};
+use super::number::{readable, seconds, window};
 use crate::require::{Answer, GroupMargin, IMU_PARAMETERS, ImuParameters, IsoDrift, Limit, Margins, Worst};
 use crate::sensors::outage::Outage;
 use serde_json::{Value, json};
@@ -103,11 +103,10 @@ impl Question {
     fn worst(&self, worst: &Worst) -> String {
         let outage = self.outages.get(worst.place).unwrap_or(&self.outages[0]);
         format!(
-            "{} {} at the end of the outage {}–{} s",
+            "{} {} at the end of the outage {}",
             worst.limit.quantity.name(),
             readable(worst.value),
-            seconds(outage.start_s),
-            seconds(outage.end_s)
+            window(outage.start_s, outage.end_s)
         )
     }
 }

@@ -3,7 +3,7 @@
 use crate::simulation::{EpochSums, OutageRecord, RunRecord, RunResult};
 
 /// Four runs of 12 epochs, one outage from 4 to 8 s, errors as large as the filter believes.
-pub(super) fn result() -> RunResult {
+pub(crate) fn result() -> RunResult {
     let runs = 4;
     let epoch = |t: u32| {
         let outage = (4..8).contains(&t);

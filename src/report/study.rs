@@ -2,7 +2,7 @@
 //! its name; numbers that do not exist are NaN (null in JSON).
 
 use super::comparison::{CandidateResult, Label, table_rows};
-use super::number::{readable, seconds};
+use super::number::{readable, window};
 use super::verdict::verdict_word;
 use crate::metrics::{self, EpochMetrics, Measured, OutageComparison, OutageMetrics, Verdict};
 use crate::simulation::{REPORTED, REPORTED_NAMES};
@@ -309,7 +309,7 @@ pub fn drift_table(cells: &[ShownCell]) -> Vec<Vec<String>> {
     for ShownCell { name, columns } in cells {
         let Some(first) = columns.first() else { continue };
         for (i, o) in first.outages.iter().enumerate() {
-            let mut row = vec![name.clone(), format!("{}–{} s", seconds(o.start_s), seconds(o.end_s))];
+            let mut row = vec![name.clone(), window(o.start_s, o.end_s)];
             let shown = |column: &ShownColumn| {
                 let o = &column.outages[i];
                 let (p50, p95) = (o.horizontal_p50_m.value, o.horizontal_p95_m.value);

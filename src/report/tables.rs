@@ -1,38 +1,8 @@
-//! `epochs.csv` and `runs.csv` of a run directory, written and read back.
+//! `epochs.csv` and `runs.csv` of a run directory.
 
 use super::number::shortest;
-use crate::metrics::{EpochMetrics, EpochRow, PerState};
-use crate::simulation::{OutageRecord, REPORTED, REPORTED_NAMES, RunRecord, RunResult};
-use std::collections::HashMap;
-
-/// A table that cannot be read back.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum TableError {
-    /// A column is not there.
-    #[error("line 1: no column is named \"{column}\"")]
-    Column {
-        /// The column.
-        column: String,
-    },
-    /// A value is not what its column holds.
-    #[error("line {line}: column \"{column}\": \"{value}\" is not a number")]
-    Value {
-        /// Line, from 1.
-        line: u64,
-        /// Column.
-        column: String,
-        /// The text found.
-        value: String,
-    },
-    /// Not a table.
-    #[error("line {line}: {message}")]
-    Syntax {
-        /// Line, from 1.
-        line: u64,
-        /// What the reader said.
-        message: String,
-    },
-}
+use crate::metrics::{EpochMetrics, PerState};
+use crate::simulation::{OutageRecord, REPORTED, REPORTED_NAMES, RunResult};
 
 const EPOCH_ENDS: [&str; 4] = ["mean_pos_err_m", "mean_att_err_deg", "nees", "coverage"];
 
@@ -102,141 +72,9 @@ fn lines(header: String, rows: impl Iterator<Item = String>) -> String {
     text
 }
 
-/// Reads `epochs.csv` back, as far as comparisons need it.
-///
-/// # Errors
-/// A missing column or a value that is not a number.
-pub fn parse_epochs(text: &str) -> Result<Vec<EpochRow>, TableError> {
-    let table = Table::read(text)?;
-    let (asee, rmse) = (table.states("asee_")?, table.states("rmse_")?);
-    let [t_s, nees, coverage] = table.columns(["t_s", "nees", "coverage"])?;
-    let row = |row: usize| {
-        Ok(EpochRow {
-            t_s: table.number(row, t_s)?,
-            asee: table.numbers(row, asee)?,
-            rmse: table.numbers(row, rmse)?,
-            nees: table.number(row, nees)?,
-            coverage: table.number(row, coverage)?,
-        })
-    };
-    (0..table.rows.len()).map(row).collect()
-}
-
-/// Reads `runs.csv` back.
-///
-/// # Errors
-/// A missing column or a value that is not a number.
-pub fn parse_runs(text: &str) -> Result<Vec<RunRecord>, TableError> {
-    let table = Table::read(text)?;
-    let (see, see_end, error) =
-        (table.states("see_mean_")?, table.states("see_end_")?, table.states("error_end_")?);
-    let normalised = table.states("normalised_sq_")?;
-    let [run, diverged, nis, fixes, nees, coverage, outage, nees_end, log_density, horizontal, recovery] =
-        table.columns([
-            "run",
-            "diverged",
-            "nis_mean",
-            "fixes",
-            "nees_mean",
-            "coverage",
-            "outage",
-            "nees_end",
-            "log_density_end",
-            "horizontal_error_end_m",
-            "reconvergence_s",
-        ])?;
-    let mut runs: Vec<RunRecord> = Vec::new();
-    for row in 0..table.rows.len() {
-        let number = table.number(row, run)? as u64;
-        if runs.last().is_none_or(|r| r.run != number) {
-            runs.push(RunRecord {
-                run: number,
-                diverged: table.number(row, diverged)? > 0.0,
-                outages: Vec::new(),
-                nis: (table.number(row, nis)?, table.number(row, fixes)? as u64),
-                rejected: 0, // known to the summary only
-                nees_mean: table.number(row, nees)?,
-                covered: table.number(row, coverage)?,
-                normalised_sq: table.numbers(row, normalised)?,
-            });
-        }
-        if table.rows[row][outage].is_empty() {
-            continue;
-        }
-        let record = OutageRecord {
-            see_mean: table.numbers(row, see)?,
-            see_end: table.numbers(row, see_end)?,
-            nees_end: table.number(row, nees_end)?,
-            log_density_end: table.number(row, log_density)?,
-            error_end: table.numbers(row, error)?,
-            horizontal_error_end_m: table.number(row, horizontal)?,
-            reconvergence_s: table.number(row, recovery)?,
-        };
-        if let Some(last) = runs.last_mut() {
-            last.outages.push(record);
-        }
-    }
-    Ok(runs)
-}
-
-/// A table in memory, its columns by name.
-struct Table {
-    index: HashMap<String, usize>,
-    names: Vec<String>,
-    rows: Vec<csv::StringRecord>,
-}
-
-impl Table {
-    fn read(text: &str) -> Result<Self, TableError> {
-        let syntax = |e: csv::Error| TableError::Syntax {
-            line: e.position().map_or(1, csv::Position::line),
-            message: e.to_string(),
-        };
-        let mut reader = csv::Reader::from_reader(text.as_bytes());
-        let names: Vec<String> = reader.headers().map_err(syntax)?.iter().map(str::to_owned).collect();
-        let rows = reader.into_records().collect::<Result<_, _>>().map_err(syntax)?;
-        Ok(Self { index: names.iter().cloned().zip(0..).collect(), names, rows })
-    }
-
-    fn column(&self, name: &str) -> Result<usize, TableError> {
-        self.index.get(name).copied().ok_or_else(|| TableError::Column { column: name.to_owned() })
-    }
-
-    fn columns<const N: usize>(&self, names: [&str; N]) -> Result<[usize; N], TableError> {
-        let mut found = [0; N];
-        for (place, name) in found.iter_mut().zip(names) {
-            *place = self.column(name)?;
-        }
-        Ok(found)
-    }
-
-    fn states(&self, prefix: &str) -> Result<[usize; REPORTED], TableError> {
-        self.columns(REPORTED_NAMES.map(|n| format!("{prefix}{n}")).each_ref().map(String::as_str))
-    }
-
-    fn number(&self, row: usize, column: usize) -> Result<f64, TableError> {
-        let text = &self.rows[row][column];
-        text.parse().map_err(|_| TableError::Value {
-            line: self.rows[row].position().map_or(0, csv::Position::line),
-            column: self.names[column].clone(),
-            value: text.to_owned(),
-        })
-    }
-
-    fn numbers(&self, row: usize, columns: [usize; REPORTED]) -> Result<[f64; REPORTED], TableError> {
-        let mut values = [0.0; REPORTED];
-        for (value, column) in values.iter_mut().zip(columns) {
-            *value = self.number(row, column)?;
-        }
-        Ok(values)
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::sample;
     use super::*;
-    use crate::metrics::epochs;
 
     #[test]
     fn the_columns_are_those_of_the_interface() {
@@ -246,45 +84,5 @@ mod tests {
             header.contains("asee_yaw_deg, rmse_pos_n_m") && header.contains("rmse_yaw_deg, bias_pos_n_m")
         );
         assert!(header.ends_with("bias_yaw_deg, mean_pos_err_m, mean_att_err_deg, nees, coverage"));
-    }
-
-    #[test]
-    fn epochs_read_back_exactly() {
-        let result = sample::result();
-        let metrics = epochs(&result);
-        let text = epochs_csv(&metrics);
-        let rows = parse_epochs(&text).unwrap();
-        assert_eq!(rows.len(), result.epochs.len());
-        for (row, metric) in rows.iter().zip(&metrics) {
-            assert_eq!((row.t_s, row.nees, row.coverage), (metric.t_s, metric.nees.value, metric.coverage));
-            assert_eq!(row.asee, metric.asee.0.map(|e| e.value));
-            assert_eq!(row.rmse, metric.rmse.0.map(|e| e.value));
-        }
-        assert_eq!(text.lines().nth(1).unwrap().split(',').nth(1), Some("1"));
-    }
-
-    #[test]
-    fn runs_read_back_exactly() {
-        let mut result = sample::result();
-        result.runs[1].outages[0].reconvergence_s = 2.5e-9;
-        assert_eq!(parse_runs(&runs_csv(&result).collect::<String>()).unwrap(), result.runs);
-        for run in &mut result.runs {
-            run.outages.clear();
-        }
-        assert_eq!(parse_runs(&runs_csv(&result).collect::<String>()).unwrap(), result.runs);
-    }
-
-    #[test]
-    fn unreadable_tables_are_refused_by_line_and_column() {
-        let text = epochs_csv(&epochs(&sample::result()));
-        let error = parse_epochs(&text.replacen("rmse_yaw_deg", "rmse_yow_deg", 1)).unwrap_err();
-        assert_eq!(error.to_string(), "line 1: no column is named \"rmse_yaw_deg\"");
-        let broken: String = text
-            .lines()
-            .enumerate()
-            .map(|(i, l)| if i == 2 { format!("x{l}\n") } else { format!("{l}\n") })
-            .collect();
-        let error = parse_epochs(&broken).unwrap_err();
-        assert_eq!(error.to_string(), "line 3: column \"t_s\": \"x1\" is not a number");
     }
 }

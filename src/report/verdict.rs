@@ -1,6 +1,6 @@
 //! Verdicts in words.
 
-use super::number::{readable, seconds};
+use super::number::{readable, window};
 use crate::metrics::{Verdict, VerdictKind};
 
 /// One line: the verdict, by how much and where, the figures it rests on. `outages` are those of the
@@ -51,7 +51,7 @@ fn independent(runs: f64) -> String {
 fn departure(verdict: &Verdict, outages: &[(f64, f64)]) -> String {
     let place = match verdict.worst_outage.and_then(|k| outages.get(k)) {
         Some((start_s, end_s)) => {
-            format!("at the end of the outage {}–{} s", seconds(*start_s), seconds(*end_s))
+            format!("at the end of the outage {}", window(*start_s, *end_s))
         }
         None => "over the run".to_owned(),
     };

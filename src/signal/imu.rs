@@ -36,6 +36,8 @@ impl Sensor {
     }
 }
 
+crate::named!(Sensor, in files);
+
 /// Axis of the sensor triad (body frame: front, right, down).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Axis {

@@ -111,7 +111,7 @@ fn shown_names(study: &Study, column: &Column, filter: &str) -> (String, Label) 
     let of_several = estimator.filter(|_| name != study.candidate[entry].name);
     let label = Label {
         scenario: with_filter(&study.candidate[entry].name),
-        estimator: of_several.unwrap_or_default().to_uppercase(),
+        estimator: of_several.map_or_else(String::new, |e| e.name().to_uppercase()),
     };
     (with_filter(&name), label)
 }

@@ -3,6 +3,7 @@
 use super::description::{CalibrateStep, Study};
 use super::error::DescriptionError;
 use super::rules::{exactly_one, unique};
+use crate::calibration::Estimator;
 use crate::scenario::{MAX_RUNS, Method};
 use std::path::PathBuf;
 
@@ -16,7 +17,7 @@ impl Study {
         self.check_numbers()?;
         self.check_axes()?;
         for (axis, names) in self.names() {
-            unique(axis, &names)?;
+            unique(axis, &names.into_iter().enumerate().collect::<Vec<_>>())?;
         }
         self.check_filters()?;
         self.outage_sets().map(|_| ())
@@ -84,39 +85,48 @@ impl Study {
         empty("candidate", !self.candidate.is_empty())?;
         for (i, e) in self.truth.iter().enumerate() {
             let said = [e.model.is_some(), !e.recordings.is_empty(), e.synthesize.is_some()];
-            exactly_one("truth", i, &said, "model, recordings, synthesize")?;
+            let key = format!("truth[{}]", i + 1);
+            exactly_one(key.clone(), &said, "model, recordings, synthesize")?;
             if e.each && e.recordings.is_empty() {
-                return Err(DescriptionError::refused("truth", "each = true", "is of recordings"));
+                return Err(DescriptionError::refused(&format!("{key}.each"), true, "is of recordings"));
             }
         }
         self.check_truth_is_modelled()?;
         for (i, e) in self.candidate.iter().enumerate() {
-            exactly_one("candidate", i, &[e.model.is_some(), e.calibrate.is_some()], "model, calibrate")?;
+            let key = format!("candidate[{}]", i + 1);
+            exactly_one(key.clone(), &[e.model.is_some(), e.calibrate.is_some()], "model, calibrate")?;
             let Some(step) = &e.calibrate else { continue };
             let said = [!step.recordings.is_empty(), step.synthesize.is_some()];
-            exactly_one("candidate.calibrate", i, &said, "recordings, synthesize")?;
-            self.check_leave_out(step)?;
-            empty(&format!("candidate[{}].calibrate.estimators", i + 1), !step.estimators.is_empty())?;
+            exactly_one(format!("{key}.calibrate"), &said, "recordings, synthesize")?;
+            self.check_leave_out(&format!("{key}.calibrate.leave_out"), step)?;
+            let key = format!("{key}.calibrate.estimators");
+            empty(&key, !step.estimators.is_empty())?;
+            if step.estimators.contains(&Estimator::Given) {
+                let reason = "is of curves that come from elsewhere";
+                return Err(DescriptionError::refused(&key, "\"given\"", reason));
+            }
         }
         for (i, e) in self.scenario.iter().enumerate() {
-            exactly_one("scenario", i, &[e.file.is_some(), e.settings.is_some()], "file, settings")?;
+            let said = [e.file.is_some(), e.settings.is_some()];
+            exactly_one(format!("scenario[{}]", i + 1), &said, "file, settings")?;
         }
         for (i, e) in self.gnss.iter().enumerate() {
-            exactly_one("gnss", i, &[e.file.is_some(), e.settings.is_some()], "file, settings")?;
+            let said = [e.file.is_some(), e.settings.is_some()];
+            exactly_one(format!("gnss[{}]", i + 1), &said, "file, settings")?;
         }
         let syntheses = self.syntheses();
-        match syntheses.iter().find(|s| s.replicates == 0 || s.samples < 2) {
-            Some(s) => {
+        match syntheses.iter().find(|(_, s)| s.replicates == 0 || s.samples < 2) {
+            Some((key, s)) => {
                 let value = format!("{} of {} samples", s.replicates, s.samples);
-                Err(DescriptionError::refused("synthesize", value, "are no recordings"))
+                Err(DescriptionError::refused(key, value, "cannot be made: at least 1 of 2 samples"))
             }
             None => Ok(()),
         }
     }
 
     /// What is left out of recordings must be recordings.
-    fn check_leave_out(&self, step: &CalibrateStep) -> Result<(), DescriptionError> {
-        let refuse = |reason: &str| Err(DescriptionError::refused("candidate", "leave_out = true", reason));
+    fn check_leave_out(&self, key: &str, step: &CalibrateStep) -> Result<(), DescriptionError> {
+        let refuse = |reason: &str| Err(DescriptionError::refused(key, true, reason));
         match step.leave_out {
             true if step.recordings.is_empty() => {
                 refuse("is of recordings; those of synthesize have no files")

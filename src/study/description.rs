@@ -3,11 +3,11 @@
 use super::error::DescriptionError;
 use super::rules::unique;
 use super::sweep::{OutageSet, OutagesEntry, expand};
-use crate::calibration::{Estimator, ModelSpec};
+use crate::calibration::{Estimator, ModelSpec, Pool, Weighting};
 use crate::ekf::FilterStates;
 use crate::scenario::{Method, Scenario};
 use crate::sensors::gnss::GnssSettings;
-use crate::wavelet::Tuning;
+use crate::wavelet::{Convention, Tuning};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -192,9 +192,9 @@ pub struct CalibrateStep {
     /// Recordings of a virtual IMU instead.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub synthesize: Option<Synthesis>,
-    /// awv, sr-awv, dr-awv; gmwm, rgmwm with a single recording.
+    /// awv, sr-awv, dr-awv; gmwm, rgmwm, avlr with a single recording.
     #[serde(default = "estimators")]
-    pub estimators: Vec<String>,
+    pub estimators: Vec<Estimator>,
     /// What is fitted: N1, N2 or any sum.
     #[serde(default = "usual_model")]
     pub fit: String,
@@ -206,20 +206,20 @@ pub struct CalibrateStep {
     pub efficiency: f64,
     /// How the tuning constant follows from it: exact, or wv as the R packages have it (default: exact).
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub efficiency_convention: Option<String>,
+    pub efficiency_convention: Option<Convention>,
     /// What a scale counts: model, edof, ci, none or full (default: model).
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub weighting: Option<String>,
+    pub weighting: Option<Weighting>,
     /// Which signals are replicates of one another: sensor or axes (default: sensor; of a single recording axes).
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub pool: Option<String>,
+    pub pool: Option<Pool>,
     /// Number of scales (default: one less than the shortest signal allows).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scales: Option<u32>,
 }
 
-fn estimators() -> Vec<String> {
-    vec![Estimator::default().to_string()]
+fn estimators() -> Vec<Estimator> {
+    vec![Estimator::default()]
 }
 
 fn usual_model() -> String {
@@ -268,10 +268,18 @@ impl CandidateEntry {
 }
 
 impl Study {
-    /// All virtual recordings.
-    pub(super) fn syntheses(&self) -> Vec<&Synthesis> {
-        let of_candidates = self.candidate.iter().filter_map(|e| e.calibrate.as_ref()?.synthesize.as_ref());
-        of_candidates.chain(self.truth.iter().filter_map(|e| e.synthesize.as_ref())).collect()
+    /// All virtual recordings, with their keys.
+    pub(super) fn syntheses(&self) -> Vec<(String, &Synthesis)> {
+        let of_candidates = self.candidate.iter().enumerate().filter_map(|(i, e)| {
+            Some((
+                format!("candidate[{}].calibrate.synthesize", i + 1),
+                e.calibrate.as_ref()?.synthesize.as_ref()?,
+            ))
+        });
+        let of_truths = self.truth.iter().enumerate();
+        let of_truths = of_truths
+            .filter_map(|(i, e)| Some((format!("truth[{}].synthesize", i + 1), e.synthesize.as_ref()?)));
+        of_candidates.chain(of_truths).collect()
     }
 
     /// The outage sets, sweeps written out; empty: those of the scenarios.
@@ -281,24 +289,23 @@ impl Study {
     pub fn outage_sets(&self) -> Result<Vec<OutageSet>, DescriptionError> {
         let mut sets = Vec::new();
         for (i, entry) in self.outages.iter().enumerate() {
-            sets.extend(expand(entry, i)?);
+            sets.extend(expand(entry, i)?.into_iter().map(|set| (i, set)));
         }
-        let names: Vec<&str> = sets.iter().map(|s| s.name.as_str()).collect();
+        let names: Vec<(usize, &str)> = sets.iter().map(|(i, set)| (*i, set.name.as_str())).collect();
         unique("outages", &names)?;
-        Ok(sets)
+        Ok(sets.into_iter().map(|(_, set)| set).collect())
     }
 
     /// The candidates, one a column: its entry and, for calibrations, its estimator.
     #[must_use]
-    pub fn candidates(&self) -> Vec<(String, usize, Option<String>)> {
+    pub fn candidates(&self) -> Vec<(String, usize, Option<Estimator>)> {
         let of = |(i, e): (usize, &CandidateEntry)| match &e.calibrate {
             None => vec![(e.name.clone(), i, None)],
             Some(step) if step.estimators.len() == 1 => {
-                vec![(e.name.clone(), i, Some(step.estimators[0].clone()))]
+                vec![(e.name.clone(), i, Some(step.estimators[0]))]
             }
             Some(step) => {
-                let one =
-                    |estimator: &String| (format!("{}/{estimator}", e.name), i, Some(estimator.clone()));
+                let one = |estimator: &Estimator| (format!("{}/{estimator}", e.name), i, Some(*estimator));
                 step.estimators.iter().map(one).collect()
             }
         };
@@ -317,13 +324,13 @@ impl Study {
     /// When no candidate has that name.
     pub fn reference(&self) -> Result<usize, DescriptionError> {
         let candidates = self.candidates();
-        let names: Vec<&str> = candidates.iter().map(|(name, ..)| name.as_str()).collect();
+        let names: Vec<(usize, &str)> = candidates.iter().map(|(name, i, _)| (*i, name.as_str())).collect();
         unique("candidate", &names)?;
         let Some(wanted) = &self.reference else { return Ok(0) };
-        let found = names.iter().position(|name| name == wanted);
+        let found = candidates.iter().position(|(name, ..)| name == wanted);
         found.ok_or_else(|| DescriptionError::NoReference {
             reference: wanted.clone(),
-            candidates: names.into_iter().map(str::to_owned).collect(),
+            candidates: candidates.into_iter().map(|(name, ..)| name).collect(),
         })
     }
 
@@ -341,7 +348,7 @@ impl Study {
             let recordings = e.calibrate.iter().flat_map(|c| &c.recordings);
             files.extend(recordings.map(|p| ("recording", p.as_path())));
         }
-        files.extend(self.syntheses().into_iter().map(|s| ("virtual IMU", s.model.as_path())));
+        files.extend(self.syntheses().into_iter().map(|(_, s)| ("virtual IMU", s.model.as_path())));
         files.extend(self.scenario.iter().filter_map(|e| Some(("scenario", e.file.as_deref()?))));
         files.extend(self.gnss.iter().filter_map(|e| Some(("gnss", e.file.as_deref()?))));
         files

@@ -2,10 +2,11 @@
 
 use super::description::Study;
 use super::failure::StudyError;
-use super::plan::{Plan, Prepared, Unit};
+use super::plan::{Plan, Unit};
 use super::unit_file;
 use crate::formats::difference::{self, Difference};
 use crate::formats::{FileError, atomic, source};
+use crate::report::Input;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,7 +18,7 @@ fn file(directory: &Path) -> PathBuf {
 /// The plan in a directory, if there is one.
 ///
 /// # Errors
-/// When it cannot be read or is none.
+/// When it cannot be read or is not a plan.
 pub fn plan(directory: &Path) -> Result<Option<Plan>, FileError> {
     let path = file(directory);
     let shown = path.display().to_string();
@@ -33,12 +34,12 @@ pub fn plan(directory: &Path) -> Result<Option<Plan>, FileError> {
         damaged(e.line(), e.to_string().split(" at line ").next().unwrap_or_default().to_owned())
     })?;
     let sizes = [plan.unit_runs.len(), plan.trajectories.len()];
-    let fits = |files: &Vec<Prepared>| files.len() == 1 || files.len() == plan.study.truth.len();
+    let fits = |files: &Vec<Input>| files.len() == 1 || files.len() == plan.study.truth.len();
     if sizes != [plan.study.trajectory.len(); 2]
         || plan.models.len() != plan.study.candidates().len()
         || !plan.models.iter().all(fits)
     {
-        return Err(damaged(1, "its lists do not fit together".into()));
+        return Err(damaged(1, "its numbers of trajectories and models are not those of its study".into()));
     }
     Ok(Some(plan))
 }

@@ -1,6 +1,7 @@
 //! What is wrong with a study.
 
 use crate::calibration::{CalibrationError, SignalError};
+use crate::formats::suggest::nearest;
 use crate::noise::ReplicateError;
 
 /// A study that means no grid.
@@ -27,6 +28,8 @@ pub enum DescriptionError {
     Duplicate {
         /// Key of the axis.
         axis: String,
+        /// The second of them, from 1.
+        entry: usize,
         /// The name.
         name: String,
     },
@@ -39,12 +42,10 @@ pub enum DescriptionError {
         entry: usize,
     },
     /// Too little or too much said.
-    #[error("{axis}[{entry}] needs exactly one of {keys}")]
+    #[error("{key} needs exactly one of {keys}")]
     NotOne {
-        /// Key of the axis.
-        axis: String,
-        /// Which, from 1.
-        entry: usize,
+        /// The point, dotted.
+        key: String,
         /// The keys.
         keys: &'static str,
     },
@@ -71,15 +72,17 @@ impl DescriptionError {
         Self::Refused { key: key.to_owned(), value: value.to_string(), reason: reason.into() }
     }
 
-    /// The key to look for in the file.
+    /// The key to look for in the file, dotted.
     #[must_use]
-    pub fn key(&self) -> &str {
+    pub fn key(&self) -> String {
         match self {
-            Self::Refused { key, .. } => key,
-            Self::Empty { axis } | Self::Duplicate { axis, .. } => axis,
-            Self::Unnamed { axis, .. } | Self::NotOne { axis, .. } => axis,
-            Self::NoModel { .. } => "truth",
-            Self::NoReference { .. } => "reference",
+            Self::Refused { key, .. } | Self::NotOne { key, .. } => key.clone(),
+            Self::Empty { axis } => axis.clone(),
+            Self::Duplicate { axis, entry, .. } | Self::Unnamed { axis, entry } => {
+                format!("{axis}[{entry}].name")
+            }
+            Self::NoModel { entry } => format!("truth[{entry}]"),
+            Self::NoReference { .. } => "reference".to_owned(),
         }
     }
 
@@ -93,7 +96,12 @@ impl DescriptionError {
             Self::NoModel { .. } => {
                 Some("calibrate a model of the recordings and name it with \"model\", or sample".into())
             }
-            Self::NoReference { candidates, .. } => Some(format!("candidates: {}", candidates.join(", "))),
+            Self::NoReference { reference, candidates } => {
+                Some(match nearest(reference, candidates.iter().map(String::as_str)) {
+                    Some(meant) => format!("did you mean \"{meant}\"?"),
+                    None => format!("candidates: {}", candidates.join(", ")),
+                })
+            }
             _ => None,
         }
     }

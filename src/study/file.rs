@@ -2,9 +2,8 @@
 
 use super::description::{GnssEntry, ScenarioEntry, Study, TruthEntry};
 use super::error::DescriptionError;
-use crate::formats::suggest::nearest;
-use crate::formats::toml_described;
-use crate::formats::toml_file::{Section, Source};
+use crate::formats::toml_described::Document;
+use crate::formats::toml_file::Source;
 use crate::formats::{FileError, Kind};
 use crate::formats::{recordings, scenario_file};
 use crate::scenario::Scenario;
@@ -35,31 +34,31 @@ pub fn beside(study: &Path, path: &Path) -> PathBuf {
 /// File, line, key and value of what is refused; a mistyped key with the nearest legal one.
 pub fn read(path: &Path) -> Result<StudyFile, FileError> {
     let source = Source::read(path)?;
-    let table = source.parse()?;
-    let root = source.root(&table);
-    let written: toml::Table = source.text().parse().unwrap_or_default();
-    let mut study: Study = toml_described::read(&source)?;
+    let document = Document::parse(&source)?;
+    let mut study: Study = document.read()?;
+    let root = document.root();
     for key in ["filters", "scenario", "gnss", "outages"] {
-        let is_empty = |value: &toml::Value| value.as_array().is_some_and(Vec::is_empty);
-        if written.get(key).is_some_and(is_empty) {
-            let e = DescriptionError::refused(key, "[]", "makes no cell; leave the key out for the default");
-            return Err(located(&e, &source, &root));
+        if root.is_empty_list(key) {
+            return Err(root.refuse(key, "makes no cell; leave the key out for the default", None));
         }
     }
-    one_truth_each(&mut study, path)?;
-    study.resolve().map_err(|e| located(&e, &source, &root))?;
-    study.reference().map_err(|e| located(&e, &source, &root))?;
-    let scenarios = scenarios(&study, path, &source)?;
-    let gnss = receivers(&study, path, &source)?;
+    let written = one_truth_each(&mut study, path)?;
+    let checked = study.resolve().and_then(|()| study.reference());
+    checked.map_err(|e| located(&e, &written, &document, &source))?;
+    let scenarios = scenarios(&study, path, &document)?;
+    let gnss = receivers(&study, path, &document)?;
     Ok(StudyFile { study, scenarios, gnss })
 }
 
 /// Puts a truth for each recording in the place of one that says so.
-fn one_truth_each(study: &mut Study, path: &Path) -> Result<(), FileError> {
-    let mut truths = Vec::new();
-    for entry in study.truth.drain(..) {
+///
+/// Returns, for each truth, the number of its entry in the file.
+fn one_truth_each(study: &mut Study, path: &Path) -> Result<Vec<usize>, FileError> {
+    let (mut truths, mut written) = (Vec::new(), Vec::new());
+    for (number, entry) in (1..).zip(study.truth.drain(..)) {
         if !entry.each || entry.recordings.is_empty() {
             truths.push(entry);
+            written.push(number);
             continue;
         }
         for given in &entry.recordings {
@@ -73,112 +72,69 @@ fn one_truth_each(study: &mut Study, path: &Path) -> Result<(), FileError> {
                 let stem = named.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
                 let name = if entry.name.is_empty() { stem } else { format!("{}/{stem}", entry.name) };
                 truths.push(TruthEntry { name, recordings: vec![named], each: false, ..entry.clone() });
+                written.push(number);
             }
         }
     }
     study.truth = truths;
-    Ok(())
+    Ok(written)
 }
 
-fn scenarios(study: &Study, path: &Path, source: &Source) -> Result<Vec<Scenario>, FileError> {
-    let one = |(i, entry): (usize, &ScenarioEntry)| {
-        let scenario = match (&entry.file, &entry.settings) {
-            (Some(file), _) => scenario_file::read(&beside(path, file))?,
-            (None, settings) => settings.clone().unwrap_or_default(),
-        };
-        let section = format!("scenario[{}].settings", i + 1);
-        scenario.validate().map_err(|e| refused(&e, &section, source))?;
-        match analysable(study, &scenario) {
-            Err(e) => Err(refused(&e, &section, source).advice(SAMPLE)),
-            Ok(()) => Ok(scenario),
+fn scenarios(study: &Study, path: &Path, document: &Document<'_>) -> Result<Vec<Scenario>, FileError> {
+    let scenario = |(i, entry): (usize, &ScenarioEntry)| match (&entry.file, &entry.settings) {
+        (Some(file), _) => {
+            scenario_file::read_for(&beside(path, file), |scenario| analysable(study, scenario))
+        }
+        (None, settings) => {
+            let scenario = settings.clone().unwrap_or_default();
+            let checked = scenario.validate().and_then(|()| analysable(study, &scenario));
+            let section = format!("scenario[{}].settings", i + 1);
+            checked.map_err(|e| document.refused(&e.in_section(&section)))?;
+            Ok(scenario)
         }
     };
-    study.scenario.iter().enumerate().map(one).collect()
+    study.scenario.iter().enumerate().map(scenario).collect()
 }
 
-fn receivers(study: &Study, path: &Path, source: &Source) -> Result<Vec<GnssSettings>, FileError> {
-    let one = |(i, entry): (usize, &GnssEntry)| {
-        let gnss = match (&entry.file, &entry.settings) {
-            (Some(file), _) => scenario_file::read(&beside(path, file))?.gnss,
-            (None, settings) => settings.clone().unwrap_or_default(),
-        };
-        gnss.validate().map_err(|e| refused(&e, &format!("gnss[{}].settings", i + 1), source))?;
-        Ok(gnss)
+fn receivers(study: &Study, path: &Path, document: &Document<'_>) -> Result<Vec<GnssSettings>, FileError> {
+    let receiver = |(i, entry): (usize, &GnssEntry)| match (&entry.file, &entry.settings) {
+        (Some(file), _) => Ok(scenario_file::read(&beside(path, file))?.gnss),
+        (None, settings) => {
+            let gnss = settings.clone().unwrap_or_default();
+            let section = format!("gnss[{}].settings", i + 1);
+            gnss.validate().map_err(|e| document.refused(&e.in_section(&section)))?;
+            Ok(gnss)
+        }
     };
-    study.gnss.iter().enumerate().map(one).collect()
+    study.gnss.iter().enumerate().map(receiver).collect()
 }
-
-const SAMPLE: &str = "leave it out, or sample with method = \"monte-carlo\"";
 
 /// Gains that depend on what is drawn have no covariance analysis.
 fn analysable(study: &Study, scenario: &Scenario) -> Result<(), SettingError> {
     match scenario.filter.nis_gate {
         Some(p) if !study.is_sampled() => {
-            let reason =
-                "a gate makes the gains depend on what is drawn, and covariance analysis has no draws";
+            let reason = "a gate makes the gains depend on what is drawn, and covariance analysis has no draws; \
+                          leave it out, or sample with method = \"monte-carlo\"";
             Err(SettingError::new("filter.nis_gate", p, reason))
         }
         _ => Ok(()),
     }
 }
 
-/// A refusal by the rules of settings.
-fn refused(error: &SettingError, section: &str, source: &Source) -> FileError {
-    let last = error.key.rsplit('.').next().unwrap_or_default();
-    let kind = Kind::Value {
-        key: format!("{section}.{}", error.key).into(),
-        value: error.value.as_str().into(),
-        reason: format!("is refused: {}", error.requirement).into(),
-    };
-    source.error(line_of(source, last), kind)
-}
-
-/// The first line that sets a key; 1 if none does.
-fn line_of(source: &Source, key: &str) -> usize {
-    let sets = |line: &str| line.split('=').next().is_some_and(|left| left.trim_end().ends_with(key));
-    source.text().lines().position(sets).map_or(1, |i| i + 1)
-}
-
-/// A refusal by [`Study::resolve`] at the line its key stands in.
-fn located(error: &DescriptionError, source: &Source, root: &Section<'_>) -> FileError {
-    let hint = match error {
-        DescriptionError::NoReference { reference, candidates } => {
-            let meant = nearest(reference, candidates.iter().map(String::as_str));
-            meant.map(|m| format!("did you mean \"{m}\"?")).or(error.hint())
-        }
-        _ => error.hint(),
-    };
-    let key = error.key();
-    let (axis, entry) = match key.split_once('[') {
-        Some((axis, rest)) => (axis, rest.split(']').next().and_then(|i| i.parse::<usize>().ok())),
-        None => (key, None),
-    };
-    let first = axis.split('.').next().unwrap_or(axis);
-    let entry = entry.or(match error {
-        DescriptionError::Unnamed { entry, .. }
-        | DescriptionError::NotOne { entry, .. }
-        | DescriptionError::NoModel { entry } => Some(*entry),
-        _ => None,
-    });
-    let line = if let (DescriptionError::Duplicate { name, .. }, true) = (error, root.has(first)) {
-        second(source, name)
-    } else if let Some(i) = entry {
-        root.sections(first).ok().and_then(|all| all.get(i - 1).map(Section::line)).unwrap_or(1)
-    } else if root.has(first) {
-        root.line_of(first)
-    } else {
-        1
-    };
-    source.error(line, Kind::Contents(error.to_string().into())).advice_if(hint)
-}
-
-/// The line in which a text in quotes stands for the second time (else the first; else 1).
-fn second(source: &Source, text: &str) -> usize {
-    let quoted = [format!("\"{text}\""), format!("'{text}'")];
-    let with = |line: &&str| quoted.iter().any(|q| line.contains(q.as_str()));
-    let lines: Vec<usize> =
-        source.text().lines().enumerate().filter(|(_, l)| with(l)).map(|(i, _)| i + 1).collect();
-    lines.get(1).or(lines.first()).copied().unwrap_or(1)
+/// A refusal by [`Study::resolve`] at the line its key stands in; `truths`: the entry of the file that each truth is of.
+fn located(
+    error: &DescriptionError,
+    truths: &[usize],
+    document: &Document<'_>,
+    source: &Source,
+) -> FileError {
+    let mut key = error.key();
+    if let Some((number, rest)) = key.strip_prefix("truth[").and_then(|rest| rest.split_once(']')) {
+        let written = number.parse().ok().and_then(|i: usize| truths.get(i.checked_sub(1)?));
+        key = written.map_or_else(|| "truth".to_owned(), |number| format!("truth[{number}]{rest}"));
+    }
+    let line = document.line_of(&key);
+    source.error(line, Kind::Contents(error.to_string().into())).advice_if(error.hint())
 }
 
 #[cfg(test)]
@@ -251,11 +207,27 @@ mod tests {
         );
         assert_eq!(
             with("recordings = [\"r.csv\"], ", ""),
-            "s.toml, line 6: candidate.calibrate[2] needs exactly one of recordings, synthesize | "
+            "s.toml, line 8: candidate[2].calibrate needs exactly one of recordings, synthesize | "
+        );
+        assert_eq!(
+            with("\"awv\", \"dr-awv\"", "\"dr_awv\""),
+            "s.toml, line 8: \"candidate[2].calibrate.estimators\" = \"dr_awv\" is not one of \"awv\", \"sr-awv\", \
+             \"dr-awv\", \"gmwm\", \"rgmwm\", \"avlr\", \"given\" | did you mean \"dr-awv\"?"
+        );
+        assert_eq!(
+            with("\"awv\", \"dr-awv\"", "\"given\""),
+            "s.toml, line 8: \"candidate[2].calibrate.estimators\" = \"given\" is of curves that come from elsewhere | "
         );
         assert_eq!(
             with("sweep = {", "swep = {"),
-            "s.toml, line 10: unknown key \"outages.swep\" | did you mean \"sweep\"?"
+            "s.toml, line 10: unknown key \"outages[1].swep\" | did you mean \"sweep\"?"
+        );
+        assert_eq!(
+            with(
+                "[[outages]]",
+                "[[scenario]]\nname = \"a\"\nsettings.gnss.rate_hz = 1\n[[scenario]]\nname = \"b\"\nsettings.gnss.rate_hz = -1\n[[outages]]"
+            ),
+            "s.toml, line 14: \"scenario[2].settings.gnss.rate_hz\" = -1 is refused: it must be a finite number > 0 | "
         );
         assert_eq!(
             with("[[outages]]", "[[gnss]]\nname = \"a\"\nsettings.rate_hz = -1\n[[outages]]"),

@@ -1,5 +1,7 @@
 //! Whether this build on this machine makes the same numbers as the one that planned.
 
+use super::unit::{Finding, UnitResult};
+use super::unit_file::encode;
 use crate::ekf::{Belief, FilterStates};
 use crate::frames::RollPitchYaw;
 use crate::monte_carlo;
@@ -9,25 +11,28 @@ use crate::sensors::imu::Truth;
 use crate::sensors::outage::Outage;
 use crate::trajectory::{Trajectory, TrajectorySample};
 
+/// Runs of the experiment.
+const RUNS: u64 = 3;
+
 /// Hash of the bits that a small experiment makes here: 4 s of a climbing turn, synthesised errors, both
 /// filters, a fix, an outage. Another processor, system library or compiler may round the last digit of a
 /// sine otherwise; units of the two would make a table that neither of them makes.
 #[must_use]
 pub fn fingerprint() -> String {
-    let bits = results().unwrap_or_else(|| "this build runs no experiment".to_owned());
-    blake3::hash(bits.as_bytes()).to_hex()[..16].to_owned()
+    let bits = results().map_or_else(|| b"this build runs no experiment".to_vec(), |found| encode(&found));
+    blake3::hash(&bits).to_hex()[..16].to_owned()
 }
 
-fn results() -> Option<String> {
+fn results() -> Option<UnitResult> {
     let trajectory = Trajectory::from_samples(&samples()).ok()?;
     let model = model()?;
     let (scenario, outages) = (Scenario::default(), [Outage { start_s: 1.5, end_s: 2.5 }]);
     let belief = |states| Belief::new(&model, states, 1.0, 800.0).ok();
     let beliefs = [belief(FilterStates::Reduced15)?, belief(FilterStates::Full)?];
     let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &beliefs, &outages, 1);
-    let results = monte_carlo::run(&experiment, 3, &|_| {}).ok()?;
-    // Debug prints as many digits of a number as tell it from every other one
-    Some(format!("{results:?}"))
+    let results = monte_carlo::run(&experiment, RUNS, &|_| {}).ok()?;
+    let columns = results.into_iter().map(Finding::Sampled).collect();
+    Some(UnitResult { id: String::new(), first: 0, runs: RUNS, columns })
 }
 
 fn samples() -> Vec<TrajectorySample> {
@@ -63,8 +68,9 @@ mod tests {
 
     #[test]
     fn the_experiment_runs_and_repeats() {
-        let bits = results().unwrap();
-        assert!(bits.contains("filter_states: 15") && bits.contains("diverged: false"));
+        let found = results().unwrap();
+        assert!(found.columns.len() == 2 && found.columns.iter().all(|c| c.records().len() == RUNS as usize));
+        assert!(found.columns.iter().all(|c| c.records().iter().all(|run| !run.diverged)));
         assert_eq!(fingerprint(), fingerprint());
     }
 }

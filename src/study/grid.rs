@@ -4,6 +4,7 @@ use super::description::Study;
 use super::error::DescriptionError;
 use super::rules::MAX_CELLS;
 use super::sweep::OutageSet;
+use crate::calibration::Estimator;
 use crate::ekf::FilterStates;
 use crate::scenario::Scenario;
 use crate::sensors::gnss::GnssSettings;
@@ -201,7 +202,7 @@ fn columns(study: &Study) -> Vec<Column> {
         all => all.iter().copied().map(Some).collect(),
     };
     let candidates = study.candidates().into_iter().enumerate();
-    let of = |(candidate, (name, ..)): (usize, (String, usize, Option<String>))| {
+    let of = |(candidate, (name, ..)): (usize, (String, usize, Option<Estimator>))| {
         filters.iter().map(move |f| Column { candidate, name: name.clone(), filter: *f }).collect::<Vec<_>>()
     };
     candidates.flat_map(of).collect()

@@ -4,7 +4,7 @@ use super::directory;
 use super::failure::StudyError;
 use super::file::beside;
 use super::grid::{Cell, Column};
-use super::plan::{Prepared, Unit};
+use super::plan::Unit;
 use super::planned::Planned;
 use super::reader::{Reader, TruthSource};
 use super::remark::Remark;
@@ -13,6 +13,7 @@ use crate::formats::{input, model_file};
 use crate::metrics::Expected;
 use crate::noise::{Model, continuous};
 use crate::observer::Observer;
+use crate::report::Input;
 use crate::scenario::{Method, Reduction, Scenario};
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::{Outage, PlacedOutages};
@@ -216,7 +217,7 @@ impl<'a> Inputs<'a> {
         grid.columns.par_iter().map(belief).collect()
     }
 
-    fn load_model(&mut self, prepared: &'a Prepared) -> Result<(), StudyError> {
+    fn load_model(&mut self, prepared: &'a Input) -> Result<(), StudyError> {
         if !self.models.contains_key(prepared.path.as_str()) {
             let model = self.read_model(prepared)?;
             self.models.insert(&prepared.path, model);
@@ -224,7 +225,7 @@ impl<'a> Inputs<'a> {
         Ok(())
     }
 
-    fn read_model(&self, model: &Prepared) -> Result<Model, StudyError> {
+    fn read_model(&self, model: &Input) -> Result<Model, StudyError> {
         if model.role != CALIBRATED {
             let path = beside(&self.planned.study, Path::new(&model.path));
             unchanged(&path, &model.blake3)?;

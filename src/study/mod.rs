@@ -73,7 +73,7 @@ pub use failure::StudyError;
 pub use fingerprint::fingerprint;
 pub use grid::{Cell, Column, Grid};
 pub use merging::{MergeOptions, MergeReport, merge};
-pub use plan::{Estimate, Kept, Plan, Prepared, Unit};
+pub use plan::{Estimate, Kept, Plan, Unit};
 pub use planned::{Planned, Status};
 pub use planning::{PlanOptions, PlanReport, Writing, plan};
 pub use prepare::{Material, calibrated, channels};

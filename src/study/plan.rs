@@ -4,6 +4,7 @@ use super::description::{Metric, Study};
 use super::error::DescriptionError;
 use super::grid::{Cell, Grid};
 use crate::lanes::LANES;
+use crate::report::Input;
 use crate::scenario::{Method, Scenario};
 use crate::sensors::gnss::GnssSettings;
 use serde::{Deserialize, Serialize};
@@ -30,24 +31,13 @@ pub struct Plan {
     /// Hash of what makes each truth.
     pub truths: Vec<String>,
     /// The model file of each candidate; of one that leaves out what makes the errors, one a truth.
-    pub models: Vec<Vec<Prepared>>,
+    pub models: Vec<Vec<Input>>,
     /// Every file the study reads, with its hash.
-    pub inputs: Vec<Prepared>,
+    pub inputs: Vec<Input>,
     /// Runs of a unit, for each trajectory.
     pub unit_runs: Vec<u64>,
     /// What it will take.
     pub estimate: Estimate,
-}
-
-/// A file and its hash.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Prepared {
-    /// What for.
-    pub role: String,
-    /// Path, relative to the study file (or, for models calibrated by the plan, to the plan's directory).
-    pub path: String,
-    /// BLAKE3 of its bytes, in hexadecimal.
-    pub blake3: String,
 }
 
 /// What a probe found.
@@ -126,7 +116,7 @@ impl Plan {
     }
 
     /// The model file of a candidate where this truth makes the errors.
-    pub(super) fn model(&self, candidate: usize, truth: usize) -> &Prepared {
+    pub(super) fn model(&self, candidate: usize, truth: usize) -> &Input {
         let files = &self.models[candidate];
         files.get(truth).unwrap_or(&files[0])
     }
@@ -253,7 +243,7 @@ mod tests {
         change(&mut study);
         study.resolve().unwrap();
         let prepared =
-            |blake3: &str| Prepared { role: String::new(), path: String::new(), blake3: blake3.into() };
+            |blake3: &str| Input { role: String::new(), path: String::new(), blake3: blake3.into() };
         let plan = Plan {
             schema_version: 2,
             version: "0".into(),

@@ -7,7 +7,7 @@ use super::file::{self, StudyFile, beside};
 use super::fingerprint::fingerprint;
 use super::grid::Grid;
 use super::inputs::{CALIBRATED, Inputs, ModelTexts, Work, unchanged};
-use super::plan::{Estimate, Kept, Plan, Prepared, Unit};
+use super::plan::{Estimate, Kept, Plan, Unit};
 use super::planned::Planned;
 use super::prepare::calibrated;
 use super::reader::{CANDIDATE_SEED, Reader};
@@ -107,8 +107,8 @@ fn restore(planned: &Planned, reader: Reader<'_>) -> Result<(), StudyError> {
 /// Calibrates again what is lost or damaged in models/; it must be what the plan says.
 fn restore_models(planned: &Planned, reader: Reader<'_>) -> Result<(), StudyError> {
     let Planned { plan, directory, .. } = planned;
-    let whole = |m: &Prepared| hash::of_file(&directory.join(&m.path)).is_ok_and(|found| found == m.blake3);
-    let lost: Vec<&Prepared> =
+    let whole = |m: &Input| hash::of_file(&directory.join(&m.path)).is_ok_and(|found| found == m.blake3);
+    let lost: Vec<&Input> =
         plan.models.iter().flatten().filter(|m| m.role == CALIBRATED && !whole(m)).collect();
     if lost.is_empty() {
         return Ok(());
@@ -152,16 +152,16 @@ fn prepared(file: StudyFile, seed: u64, reader: Reader<'_>) -> Result<(Plan, Mod
 }
 
 /// Every file of the study with its hash, directories of recordings file by file.
-fn input_hashes(study: &Study, reader: Reader<'_>) -> Result<Vec<Prepared>, StudyError> {
+fn input_hashes(study: &Study, reader: Reader<'_>) -> Result<Vec<Input>, StudyError> {
     let base = reader.study.parent().unwrap_or(Path::new(""));
-    let mut found: Vec<Prepared> = Vec::new();
+    let mut found: Vec<Input> = Vec::new();
     for (role, path) in study.files() {
         for file in reader.listed(&[path.to_owned()])? {
             let relative = file.strip_prefix(base).unwrap_or(&file).display().to_string();
             let blake3 = input::input(role, &file)?.blake3;
             let known = found.iter().any(|i| i.path == relative && i.role == role);
             if !known {
-                found.push(Prepared { role: role.to_owned(), path: relative, blake3 });
+                found.push(Input { role: role.to_owned(), path: relative, blake3 });
             }
         }
     }
@@ -169,7 +169,7 @@ fn input_hashes(study: &Study, reader: Reader<'_>) -> Result<Vec<Prepared>, Stud
 }
 
 /// The hash of one of the inputs.
-fn hash_of(inputs: &[Prepared], path: &Path) -> String {
+fn hash_of(inputs: &[Input], path: &Path) -> String {
     let wanted = path.display().to_string();
     inputs.iter().find(|i| i.path == wanted).map(|i| i.blake3.clone()).unwrap_or_default()
 }
@@ -178,17 +178,18 @@ fn hash_of(inputs: &[Prepared], path: &Path) -> String {
 fn models(
     study: &Study,
     seed: u64,
-    inputs: &[Prepared],
+    inputs: &[Input],
     reader: Reader<'_>,
-) -> Result<(Vec<Vec<Prepared>>, ModelTexts), StudyError> {
+) -> Result<(Vec<Vec<Input>>, ModelTexts), StudyError> {
     let (mut models, mut texts) = (Vec::new(), Vec::new());
     for entry in &study.candidate {
         if let Some(path) = &entry.model {
             let blake3 = hash_of(inputs, path);
-            models.push(vec![Prepared { role: "model".into(), path: path.display().to_string(), blake3 }]);
+            models.push(vec![Input { role: "model".into(), path: path.display().to_string(), blake3 }]);
         }
         let Some(step) = &entry.calibrate else { continue };
-        let (candidate, estimators) = (entry.name.clone(), step.estimators.clone());
+        let (candidate, estimators) =
+            (entry.name.clone(), step.estimators.iter().map(Estimator::to_string).collect());
         reader.observer.remark(&Remark::Calibrating { candidate, estimators });
         let folds: Vec<Option<&TruthEntry>> =
             if step.leave_out { study.truth.iter().map(Some).collect() } else { vec![None] };
@@ -211,11 +212,11 @@ fn models(
 }
 
 /// Where a calibrated model will lie.
-fn calibrated_file(name: &str, text: &str) -> Prepared {
+fn calibrated_file(name: &str, text: &str) -> Input {
     let blake3 = hash::of_bytes(text.as_bytes());
     let tame = |c: char| if c.is_alphanumeric() || "-_.".contains(c) { c } else { '_' };
     let name: String = name.chars().map(tame).collect();
-    Prepared { role: CALIBRATED.into(), path: format!("models/{name}_{}.toml", &blake3[..8]), blake3 }
+    Input { role: CALIBRATED.into(), path: format!("models/{name}_{}.toml", &blake3[..8]), blake3 }
 }
 
 /// Model files of a calibration step, one an estimator, without the recordings of a truth.
@@ -241,7 +242,7 @@ fn calibration(
     let inputs = files.iter().map(|file| input::input("recording", file));
     let note = CalibrationNote {
         version: env!("CARGO_PKG_VERSION").to_owned(),
-        efficiency_convention: step.efficiency_convention.clone().unwrap_or_else(|| "exact".to_owned()),
+        efficiency_convention: step.efficiency_convention.unwrap_or_default().to_string(),
         seed: None,
         reading: toml::Table::new(),
         inputs: inputs.collect::<Result<Vec<Input>, _>>()?,

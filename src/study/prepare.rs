@@ -2,13 +2,11 @@
 
 use super::description::{CalibrateStep, Synthesis};
 use super::error::PrepareError;
-use crate::calibration::{
-    Estimator, Outcome, Pool, Settings, Trim, Weighting, calibrate, grouped, replicates,
-};
+use crate::calibration::{Outcome, Pool, Settings, Trim, calibrate, grouped, replicates};
 use crate::imu::{Channel, Recording};
 use crate::noise::contamination::Contamination;
 use crate::noise::{Model, Spread, VirtualImu};
-use crate::wavelet::{Convention, Tuning};
+use crate::wavelet::Tuning;
 use rayon::prelude::*;
 
 /// What virtual recordings are made of.
@@ -62,32 +60,19 @@ pub fn channels(word: &str) -> Result<Vec<Channel>, PrepareError> {
 /// # Errors
 /// A word that means nothing.
 pub(super) fn settings(step: &CalibrateStep, rate_hz: f64) -> Result<Settings, PrepareError> {
-    let word = |key, value: &str, reason: String| PrepareError::Word { key, value: value.to_owned(), reason };
-    let estimator = |name: &String| {
-        let takes_many = |e: &Estimator| *e != Estimator::Given && e.name() == name;
-        let found = Estimator::ALL.into_iter().find(takes_many);
-        found.ok_or_else(|| word("estimators", name, "is not awv, sr-awv, dr-awv, gmwm or rgmwm".to_owned()))
-    };
-    let model = step.fit.parse().map_err(|e| word("fit", &step.fit, format!("is no model: {e}")))?;
-    let convention = match step.efficiency_convention.as_deref() {
-        None | Some("exact") => Convention::Exact,
-        Some("wv") => Convention::Wv,
-        Some(other) => return Err(word("efficiency_convention", other, "is not exact or wv".to_owned())),
-    };
-    let unknown = |key, value: &str, expected: String| word(key, value, format!("is not {expected}"));
-    let weighting = step.weighting.as_deref().map_or(Ok(Weighting::default()), |text| {
-        let found = Weighting::ALL.into_iter().find(|w| w.name() == text);
-        found.ok_or_else(|| unknown("weighting", text, Weighting::ALL.map(Weighting::name).join(", ")))
-    })?;
-    let tuning = Tuning::new(step.efficiency, convention).map_err(|_| {
-        word("efficiency", &step.efficiency.to_string(), "is not between 0.3 and 0.99".to_owned())
-    })?;
+    let word = |key, value: String, reason: String| PrepareError::Word { key, value, reason };
+    let model =
+        step.fit.parse().map_err(|e| word("fit", step.fit.clone(), format!("is not a model: {e}")))?;
+    let tuning =
+        Tuning::new(step.efficiency, step.efficiency_convention.unwrap_or_default()).map_err(|_| {
+            word("efficiency", step.efficiency.to_string(), "is not between 0.3 and 0.99".to_owned())
+        })?;
     Ok(Settings {
-        estimators: step.estimators.iter().map(estimator).collect::<Result<_, _>>()?,
+        estimators: step.estimators.clone(),
         model,
         trim: step.trim.map_or(Trim::default(), Trim::Count),
         tuning,
-        weighting,
+        weighting: step.weighting.unwrap_or_default(),
         rate_hz,
         ..Settings::default()
     })
@@ -102,20 +87,16 @@ pub fn calibrated(
     step: &CalibrateStep,
 ) -> Result<(Vec<Outcome>, Settings), PrepareError> {
     let settings = settings(step, recordings.first().map_or(1.0, |r| r.rate_hz))?;
-    let single = settings.estimators.iter().any(|e| e.is_single());
-    if single && recordings.len() > 1 {
-        let value = step.estimators.join(", ");
-        let reason = format!("gmwm and rgmwm take a single recording; there are {}", recordings.len());
-        return Err(PrepareError::Word { key: "estimators", value, reason });
+    let single = settings.estimators.iter().find(|e| e.is_single());
+    let refused = |key, value: String, reason: String| Err(PrepareError::Word { key, value, reason });
+    if let Some(estimator) = single.filter(|_| recordings.len() > 1) {
+        let reason = format!("takes a single recording; there are {}", recordings.len());
+        return refused("estimators", estimator.to_string(), reason);
     }
-    let pool = step.pool.as_deref().map_or(Ok(settings.pool()), |text| {
-        let found = Pool::ALL.into_iter().find(|pool| pool.name() == text);
-        found.filter(|pool| !single || *pool == Pool::Axes).ok_or_else(|| PrepareError::Word {
-            key: "pool",
-            value: text.to_owned(),
-            reason: "is not axes, or sensor (for estimators of several recordings)".to_owned(),
-        })
-    })?;
+    let pool = step.pool.unwrap_or_else(|| settings.pool());
+    if let Some(estimator) = single.filter(|_| pool != Pool::Axes) {
+        return refused("pool", pool.to_string(), format!("is not axes, as {estimator} needs"));
+    }
     let of = |recording| replicates(recording, step.scales, &settings.tuning);
     let measured: Vec<_> = recordings.par_iter().map(of).collect::<Result<_, _>>()?;
     let groups = grouped(measured.concat(), pool);

@@ -7,7 +7,7 @@ use super::prepare::Material;
 use super::remark::Remark;
 use crate::formats::model_file::{self, ModelFile};
 use crate::formats::recordings::{self, ReadOptions};
-use crate::formats::{contamination_file, input, trajectory_file};
+use crate::formats::{contamination_file, hash, input, trajectory_file};
 use crate::imu::Recording;
 use crate::noise::Model;
 use crate::noise::contamination::Contamination;
@@ -166,9 +166,9 @@ impl Reader<'_> {
         step.seed = Some(step.seed.unwrap_or(seed));
         let model = beside(self.study, &step.model);
         let rate_hz = model_file::read(&model)?.model.rate_hz;
-        let contamination = self.contamination(&step, rate_hz)?.map(|c| format!("{:?}", c.rules));
-        let text = format!("{step:?} {} {contamination:?}", input::fingerprint(&model)?);
-        Ok(blake3::hash(text.as_bytes()).to_hex().to_string())
+        let rules = self.contamination(&step, rate_hz)?.map(|contamination| contamination.rules);
+        let identity = serde_json::json!([step, input::fingerprint(&model)?, rules]);
+        Ok(hash::of_bytes(identity.to_string().as_bytes()))
     }
 }
 

@@ -6,26 +6,26 @@ use super::error::DescriptionError;
 pub(super) const MAX_CELLS: usize = 1_000_000;
 
 /// Every entry of an axis has a name, and a name of its own.
-pub(super) fn unique(axis: &str, names: &[&str]) -> Result<(), DescriptionError> {
-    if let Some(i) = names.iter().position(|n| n.trim().is_empty()) {
-        return Err(DescriptionError::Unnamed { axis: axis.to_owned(), entry: i + 1 });
+///
+/// `names`: with the positions of their entries.
+pub(super) fn unique(axis: &str, names: &[(usize, &str)]) -> Result<(), DescriptionError> {
+    let axis = || axis.to_owned();
+    if let Some((i, _)) = names.iter().find(|(_, name)| name.trim().is_empty()) {
+        return Err(DescriptionError::Unnamed { axis: axis(), entry: i + 1 });
     }
     let mut seen = std::collections::HashSet::new();
-    match names.iter().find(|name| !seen.insert(**name)) {
-        Some(name) => Err(DescriptionError::Duplicate { axis: axis.to_owned(), name: (*name).to_owned() }),
+    match names.iter().find(|(_, name)| !seen.insert(*name)) {
+        Some((i, name)) => {
+            Err(DescriptionError::Duplicate { axis: axis(), entry: i + 1, name: (*name).to_owned() })
+        }
         None => Ok(()),
     }
 }
 
 /// An entry says one of several things.
-pub(super) fn exactly_one(
-    axis: &str,
-    entry: usize,
-    said: &[bool],
-    keys: &'static str,
-) -> Result<(), DescriptionError> {
-    if said.iter().filter(|s| **s).count() == 1 {
-        return Ok(());
+pub(super) fn exactly_one(key: String, said: &[bool], keys: &'static str) -> Result<(), DescriptionError> {
+    match said.iter().filter(|s| **s).count() {
+        1 => Ok(()),
+        _ => Err(DescriptionError::NotOne { key, keys }),
     }
-    Err(DescriptionError::NotOne { axis: axis.to_owned(), entry: entry + 1, keys })
 }

@@ -92,8 +92,8 @@ pub struct OutageSet {
 pub(super) fn expand(entry: &OutagesEntry, index: usize) -> Result<Vec<OutageSet>, DescriptionError> {
     let said =
         [entry.windows.is_some(), entry.sweep.is_some(), entry.periodic.is_some(), entry.random.is_some()];
-    exactly_one("outages", index, &said, "windows, sweep, periodic, random")?;
     let key = format!("outages[{}]", index + 1);
+    exactly_one(key.clone(), &said, "windows, sweep, periodic, random")?;
     let sets = combinations(entry);
     if sets > MAX_CELLS {
         let reason = format!("makes more than {MAX_CELLS} outage sets");

@@ -213,11 +213,11 @@ pub fn decode(bytes: &[u8]) -> Result<UnitResult, &'static str> {
     if blake3::hash(content).as_bytes() != checksum {
         return Err("its checksum is wrong");
     }
-    let rest = content.strip_prefix(MAGIC).ok_or("it is of another version")?;
-    let (length, rest) = rest.split_first_chunk::<4>().ok_or("it has no head")?;
+    let rest = content.strip_prefix(MAGIC).ok_or("its version is not supported")?;
+    let (length, rest) = rest.split_first_chunk::<4>().ok_or("its header is cut off")?;
     let (json, numbers) =
-        rest.split_at_checked(u32::from_le_bytes(*length) as usize).ok_or("it has no head")?;
-    let head: Head = serde_json::from_slice(json).map_err(|_| "its head is not valid JSON")?;
+        rest.split_at_checked(u32::from_le_bytes(*length) as usize).ok_or("its header is cut off")?;
+    let head: Head = serde_json::from_slice(json).map_err(|_| "its header is not valid JSON")?;
     if announced(&head) != Some(numbers.len()) {
         return Err("its length is wrong");
     }

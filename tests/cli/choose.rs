@@ -85,7 +85,11 @@ fn the_model_that_made_the_recordings_is_chosen_and_written() {
     assert_eq!(model["provenance"]["estimator"].as_str(), Some("awv"));
     // what is there is not replaced
     let again = choose(directory.path(), &["-o", "out"]).code(2);
-    assert!(said(&again).contains("is not empty"), "{}", said(&again));
+    assert!(said(&again).contains("holds the result of an earlier choose"), "{}", said(&again));
+    let force = ["--estimator", "awv", "--model", "WN+RW", "-o", "out", "--force"];
+    choose(directory.path(), &force).success();
+    let replaced = std::fs::read_to_string(directory.path().join("out/ranking.json")).unwrap();
+    assert_eq!(serde_json::from_str::<Value>(&replaced).unwrap()["candidates"].as_array().unwrap().len(), 1);
 }
 
 #[test]
@@ -120,7 +124,7 @@ fn what_cannot_be_compared_is_refused() {
     refused(&[], ["2 recordings are too few to leave one out", "hint: each recording is a file"]);
     refused(&["--estimator", "gmwm"], ["no candidate uses all recordings", "add awv"]);
     refused(&["--model", "N3"], ["--model", "hint"]);
-    refused(&["--inflate", "more"], ["more", "\"none\", \"tuned\" or \"x10\""]);
+    refused(&["--inflate", "more"], ["more", "none, tuned, x10"]);
     let none = ["choose", "r", "--trajectory", "trajectories/figure_eight.toml", "--outage", "none"];
     let message = said(&nav_sim(directory.path(), &none).code(2));
     assert!(message.contains("judged at the ends of outages"), "{message}");

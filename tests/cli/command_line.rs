@@ -86,11 +86,17 @@ fn check_looks_at_every_file() {
     let (code, out, said) = check(&["bad.toml", "worse.toml", good.to_str().unwrap()]);
     assert_eq!(code, 2, "{said}");
     assert!(said.contains("bad.toml, line 2") && said.contains("worse.toml, line 1"), "{said}");
-    assert!(said.contains("2 of 3 files are not as they should be"), "{said}");
+    assert!(said.contains("2 of 3 files are refused"), "{said}");
     assert!(out.contains("tactical.toml: a noise model"), "{out}");
     assert!(check(&["timeless.csv"]).2.contains("hint: give the rate with --rate-hz"));
     let (code, out, said) = check(&["timeless.csv", "--rate-hz", "50"]);
     assert!(code == 0 && out.contains("2 channels of 100 samples at 50 Hz"), "{out}{said}");
+    let entry = root.join("calib_data/catalogue/stim300.toml");
+    let (code, out, said) = check(&[entry.to_str().unwrap()]);
+    assert!(
+        code == 0 && out.contains("stim300.toml: a catalogue entry, Sensonor (Safran) STIM300"),
+        "{out}{said}"
+    );
     let array = root.join("calib_data/formats/array.npy");
     assert_eq!(check(&[array.to_str().unwrap(), "--rate-hz", "100"]).0, 0);
 }

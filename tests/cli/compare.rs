@@ -11,6 +11,12 @@ use std::path::Path;
 const RUNS: u32 = 20;
 
 /// Runs whose filter believes `factor` times 1 + 2 % · run; the outage is 4 to 8 s of 10.
+/// An input with the hash of its contents.
+fn input(role: &str, path: &str, contents: &[u8]) -> Input {
+    let blake3 = blake3::hash(contents).to_hex().to_string();
+    Input { role: role.to_owned(), path: path.to_owned(), blake3 }
+}
+
 fn result(factor: f64) -> RunResult {
     let sees = || (0..RUNS).map(move |run| factor * (1.0 + 0.02 * f64::from(run)));
     let epoch = |t: u32| EpochSums {
@@ -63,9 +69,8 @@ fn write(directory: &Path, factor: f64, change: impl FnOnce(&mut Manifest)) {
         version: "0".into(),
         command: vec![],
         seed: 7,
-        scenario: String::new(),
         configuration: Scenario { outage, ..Scenario::default() },
-        inputs: vec![Input::new("trajectory", "t.csv", b"t"), Input::new("truth", "m.toml", b"m")],
+        inputs: vec![input("trajectory", "t.csv", b"t"), input("truth", "m.toml", b"m")],
         model: ModelNote::default(),
         threads: 1,
         independent_windows: None,
@@ -165,7 +170,7 @@ fn a_file_that_is_no_comparison_is_left_alone() {
 fn another_trajectory_or_other_outages_are_refused() {
     let directory = tempfile::tempdir().unwrap();
     write(&directory.path().join("a"), 1.0, |_| {});
-    write(&directory.path().join("b"), 1.0, |m| m.inputs[0] = Input::new("trajectory", "u.csv", b"u"));
+    write(&directory.path().join("b"), 1.0, |m| m.inputs[0] = input("trajectory", "u.csv", b"u"));
     write(&directory.path().join("c"), 1.0, |m| m.configuration.outage = Some(vec![]));
     let ran = compare(directory.path(), &["b", "--reference", "a"]);
     assert_eq!(ran.code, 2);

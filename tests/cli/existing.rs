@@ -27,6 +27,7 @@ fn another_result_is_refused() {
         ("run drive.toml imu.toml --runs 2 --outage none --seed 1 -o run", "--seed 2", "run/summary.json"),
         (fuse, "--lever-arm 1,0,0", "fused/solution.csv"),
         ("synthesize imu.toml --samples 64 --seed 1 -o made", "--samples 65", "made/replicate_1.csv"),
+        ("trajectory record drive.toml imu.toml --seed 1 -o again", "--seed 2", "again/imu.csv"),
         (calibrate, "--weighting edof", "out.toml"),
         ("export imu.toml --target kalibr -o imu.yaml", "--policy envelope", "imu.yaml"),
         ("datasheet --unit stim300 -o sheet.toml", "--rate-hz 200", "sheet.toml"),

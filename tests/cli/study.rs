@@ -119,7 +119,7 @@ fn a_study_reads_and_calibrates_recordings_as_the_command_does() {
     assert!(said.contains("set rate_hz beside the recordings in the study file"), "{said}");
     recorded(", rate_hz = 100, weighting = \"edofs\"");
     let said = refused(dir, "plan recorded.toml -o planned", 2);
-    assert!(said.contains("is not model, edof, ci, none, full"), "{said}");
+    assert!(said.contains("is not one of \"model\", \"edof\", \"ci\", \"none\", \"full\""), "{said}");
     recorded(", rate_hz = 100, weighting = \"edof\", pool = \"axes\", scales = 6");
     done(dir, "plan recorded.toml -o planned");
     nav_sim(

@@ -145,8 +145,8 @@ fn mistakes_are_refused_and_leave_nothing() {
         "plain.toml: no [spread] to draw parameters from",
         "leave --spread out",
     );
-    refused(&["plain.toml", "--axes", "accel"], "plain.toml: says nothing of the axes asked for", "");
-    refused(&["model.toml", "--duration", "0.01"], "1 samples are no recording", "");
+    refused(&["plain.toml", "--axes", "accel"], "plain.toml has no noise model for the axes asked for", "");
+    refused(&["model.toml", "--duration", "0.01"], "a recording needs at least 2 samples; these are 1", "");
     refused(&["model.toml", "--samples", "1"], "invalid value '1'", "");
     refused(&["model.toml", "--axes", "wheel"], "invalid value 'wheel'", "such as accel.x");
     fs::write(place.path("plain.toml"), "[[accel]]\noperation = \"replace\"\npoints = 500\nsigma = 1\n")

@@ -2,7 +2,6 @@
 //! ([Minaretzis](crate::bibliography::Minaretzis24), eqs. 4–8).
 
 use crate::imu::Axis;
-use crate::names::named;
 use crate::wavelet::{Curve, RobustVariance, Status, Tuning, interval};
 use std::fmt;
 use std::str::FromStr;
@@ -59,7 +58,7 @@ impl Estimator {
     }
 }
 
-named!(Estimator);
+nav_sim_signal::named!(Estimator, in files);
 
 /// How many replicates DR-AWV drops at each end, scale by scale.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,7 +2,6 @@
 
 use super::average::Replicate;
 use crate::imu::{Axis, Channel, Recording, Sensor, Signal};
-use crate::names::named;
 use crate::wavelet::{Tuning, WaveletError, both, default_levels};
 use rayon::prelude::*;
 
@@ -76,7 +75,7 @@ impl Pool {
     }
 }
 
-named!(Pool);
+nav_sim_signal::named!(Pool, in files);
 
 /// A signal without a wavelet variance.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

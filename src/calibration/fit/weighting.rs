@@ -1,6 +1,5 @@
 //! What a scale counts in a fit.
 
-use crate::names::named;
 use crate::wavelet::{Curve, interval};
 
 /// Omega: what a scale counts.
@@ -52,4 +51,4 @@ impl Weighting {
     }
 }
 
-named!(Weighting);
+nav_sim_signal::named!(Weighting, in files);

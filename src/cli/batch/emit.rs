@@ -125,11 +125,11 @@ impl Script {
             ("clock", self.clock()),
             ("array", if is_array { format!("#PBS -J 0-{last}\n") } else { String::new() }),
             ("index", if is_array { String::new() } else { "export PBS_ARRAY_INDEX=0\n".to_owned() }),
-            ("plan", shell(&self.words("plan"))),
-            ("run", shell(&self.words("run"))),
-            ("merge", shell(&self.words("merge"))),
-            ("task", shell(&self.task())),
-            ("command", quoted(&["sh".into(), "-c".into(), format!("exec {}", shell(&self.task()))])),
+            ("plan", shell_words(&self.words("plan"))),
+            ("run", shell_words(&self.words("run"))),
+            ("merge", shell_words(&self.words("merge"))),
+            ("task", shell_words(&self.task())),
+            ("command", quoted(&["sh".into(), "-c".into(), format!("exec {}", shell_words(&self.task()))])),
             ("run_words", quoted(&self.task())),
             ("plan_words", quoted(&self.words("plan"))),
             ("merge_words", quoted(&self.words("merge"))),
@@ -176,7 +176,8 @@ fn filled(template: &str, values: &[(&str, String)]) -> String {
     text + rest
 }
 
-fn shell(words: &[String]) -> String {
+/// Words as a shell reads them.
+pub(in crate::cli) fn shell_words(words: &[String]) -> String {
     words.iter().map(|w| shell_quoted(w)).collect::<Vec<_>>().join(" ")
 }
 

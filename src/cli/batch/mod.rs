@@ -9,6 +9,8 @@ mod status;
 mod verify;
 mod watch;
 
+pub(super) use emit::shell_words;
+
 use super::{Failure, Session, read};
 use nav_sim::study::{Planned, Remedy, StudyError};
 use std::path::{Path, PathBuf};

@@ -3,9 +3,10 @@
 mod output;
 
 use super::jobs::unknown_model;
+use super::parse::one_of;
 use super::parse::words;
 use super::pictures::PlotArgs;
-use super::recordings::{RecordingArgs, Said, sensor};
+use super::recordings::{RecordingArgs, Said};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
 use nav_sim::calibration::{
@@ -38,7 +39,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE", conflicts_with_all = OF_RECORDINGS)]
     curve: Option<PathBuf>,
     /// Sensor of a CSV curve, for the model file
-    #[arg(long, value_name = "SENSOR", value_parser = sensor, requires = "curve")]
+    #[arg(long, value_name = "SENSOR", value_parser = one_of::<Sensor>(&Sensor::NAMES), requires = "curve")]
     sensor: Option<Sensor>,
     /// Which curve is fitted: averages over the replicates (awv; sr-awv robust to outliers; dr-awv robust to
     /// abnormal replicates too), or that of a single recording (gmwm, rgmwm; avlr: slopes of its Allan deviation)

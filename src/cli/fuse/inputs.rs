@@ -10,15 +10,12 @@ use nav_sim::frames::RollPitchYaw;
 use nav_sim::fusion::alignment::{self, Alignment};
 use nav_sim::fusion::{FusionError, Recorded, Settings, Start, check_clocks};
 use nav_sim::gnss::GnssFix;
-use nav_sim::jobs::Reduced;
-use nav_sim::noise::{Composite, Model, Process, continuous, reduction};
+use nav_sim::jobs::{FusionFilter, FusionFilterError};
 use nav_sim::report::Input;
-use nav_sim::sensors::gnss::GnssSettings;
 use nav_sim::sensors::outage::{FixedData, OutagePlan, PlacedOutages};
-use nav_sim::simulation::lincov;
 use nav_sim::trajectory::reference::Reference;
 use nav_sim::units::DEG;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// What was read, ready to use.
 pub(super) struct Inputs {
@@ -153,7 +150,7 @@ fn scale(gnss: &mut [GnssFix], position: f64, velocity: f64) {
     }
 }
 
-/// The filter's states for the model at the rate of the recording, with what it expects at the start.
+/// The filter for the model, with what it expects at the start.
 fn belief(
     args: &Args,
     mut initial: InitialSettings,
@@ -164,95 +161,19 @@ fn belief(
 ) -> Result<Belief, Failure> {
     let shown = args.model.display();
     let file = read::model(&args.model, session)?;
-    let model = at_rate(&file.model, imu.rate_hz).map_err(|e| Failure::input(format!("{shown}: {e}")))?;
-    if (imu.rate_hz / file.model.rate_hz - 1.0).abs() > 0.01 {
-        let (from, to) = (file.model.rate_hz, imu.rate_hz);
+    let (from, to) = (file.model.rate_hz, imu.rate_hz);
+    if (to / from - 1.0).abs() > 0.01 {
         session.printer.say(&format!("{shown}: converted from {from} Hz to {to:.3} Hz"));
     }
-    let longest = settings.outages.iter().map(|o| o.end_s - o.start_s).fold(0.0, f64::max);
-    let mut steps: Vec<f64> = gnss.windows(2).map(|w| w[1].t_s - w[0].t_s).collect();
-    steps.sort_by(f64::total_cmp);
-    let interval_s = steps.get(steps.len() / 2).copied().unwrap_or(1.0);
-    let window_s = reduction::window_s(longest);
     let mut states = FilterStates::default();
     args.filter.over(&mut states, &mut initial);
     turn_on::expect(&mut initial, &file, &args.model, session);
     initial.validate().map_err(Failure::input)?;
-    let belief = Belief::new(&model, states, interval_s, window_s)
-        .map_err(|e| Failure::input(format!("{shown}: {e}")))?;
-    let belief = if states.is_reduced() {
-        let lengths: Vec<f64> = settings.outages.iter().map(|o| o.end_s - o.start_s).collect();
-        // the reference is not known: the filter is made for a built-in drive with this receiver
-        match lincov::drive(&model, &receiver(gnss, interval_s), &lengths) {
-            Some(track) => {
-                let belief = lincov::reduced_belief(&model, belief, &track).with_initial(&initial);
-                let full = Belief::new(&model, FilterStates::Full, interval_s, window_s);
-                let full = full.ok().map(|full| full.with_initial(&beside(states, &initial)));
-                let reduced =
-                    Reduced { model: &model, belief: &belief, full, track: &track, interval_s, window_s };
-                reduced.summary(&Words::new(session)).map_err(Failure::could_not)?;
-                return Ok(belief);
-            }
-            None => belief,
-        }
-    } else {
-        belief
-    };
-    Ok(belief.with_initial(&initial))
-}
-
-/// What a filter expects beside the model, with what its states say of scale factors.
-fn beside(states: FilterStates, initial: &InitialSettings) -> InitialSettings {
-    let mut all = initial.clone();
-    let ppm = states.scale_sigma() * 1e6;
-    if ppm > 0.0 {
-        all.accel_scale_sigma_ppm.get_or_insert(ppm);
-        all.gyro_scale_sigma_ppm.get_or_insert(ppm);
-    }
-    all
-}
-
-/// The receiver of the fixes: medians.
-fn receiver(gnss: &[GnssFix], interval_s: f64) -> GnssSettings {
-    let median = |values: &mut dyn Iterator<Item = f64>| {
-        let mut sorted: Vec<f64> = values.collect();
-        sorted.sort_by(f64::total_cmp);
-        sorted.get(sorted.len() / 2).copied()
-    };
-    let defaults = GnssSettings::default();
-    let position =
-        |i: usize| median(&mut gnss.iter().map(|f| f.pos_sigma_n[i])).unwrap_or(defaults.pos_sigma_m[i]);
-    let velocity = |i: usize| median(&mut gnss.iter().filter_map(|f| Some(f.velocity?.1[i])));
-    let velocities = [0, 1, 2].map(velocity);
-    GnssSettings {
-        rate_hz: 1.0 / interval_s,
-        pos_sigma_m: [0, 1, 2].map(position),
-        vel_sigma_m_s: velocities
-            .iter()
-            .all(Option::is_some)
-            .then(|| velocities.map(Option::unwrap_or_default)),
-        ..defaults
-    }
-}
-
-/// At the rate of the recording, without quantization noise: the filter leaves it out, and it belongs to
-/// its own rate.
-fn at_rate(model: &Model, rate_hz: f64) -> Result<Model, continuous::RateError> {
-    let kept = |axis: &Composite| {
-        let processes = axis.processes.iter().filter(|p| !matches!(p, Process::Quantization(_)));
-        Composite::new(processes.copied().collect())
-    };
-    let axes = std::array::from_fn(|i| kept(&model.axes[i]));
-    continuous::at_rate(&Model { rate_hz: model.rate_hz, axes }, rate_hz)
-}
-
-/// Where an output would fall on an input.
-pub(super) fn guarded(out: &Path, inputs: &[Input]) -> Result<(), Failure> {
-    for name in nav_sim::report::FUSION_FILES {
-        let paths = inputs.iter().map(|i| Path::new(&i.path));
-        nav_sim::formats::atomic::guard_inputs(&out.join(name), paths)?;
-    }
-    Ok(())
+    let filter = FusionFilter { model: &file.model, states, initial: &initial };
+    filter.belief(to, gnss, &settings.outages, &Words::new(session)).map_err(|e| match e {
+        FusionFilterError::Reduction(e) => Failure::could_not(e),
+        e => Failure::input(format!("{shown}: {e}")),
+    })
 }
 
 #[cfg(test)]

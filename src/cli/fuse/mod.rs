@@ -4,6 +4,7 @@ mod inputs;
 mod output;
 
 use super::filter::FilterArgs;
+use super::parse::one_of;
 use super::run::{parse_outage, windows_of};
 use super::{Failure, Session, parse};
 use inputs::Inputs;
@@ -66,7 +67,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "AXES", value_enum, default_value = "frd")]
     axes: inputs::LoggerAxes,
     /// How gravity falls with height: wgs84 (second order) or first-order
-    #[arg(long, value_name = "MODEL", value_parser = parse_gravity, default_value = "wgs84")]
+    #[arg(long, value_name = "MODEL", value_parser = one_of::<GravityModel>(&GravityModel::NAMES), default_value = "wgs84")]
     gravity: GravityModel,
     /// Trajectory to compare with; stretches where it jumps are left out
     #[arg(long, value_name = "TRAJECTORY")]
@@ -98,7 +99,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let begin = Instant::now();
     let settings = settings(args)?;
     let inputs = Inputs::read(args, &settings, session)?;
-    output::try_open(&args.out, &inputs.files, session)?;
+    output::claim(&args.out, &inputs.files, session)?;
     let recorded = Recorded { imu: &inputs.imu.samples, gnss: &inputs.gnss };
     let settings = inputs::with_outages(settings, &recorded, session)?;
     let Alignment { start, doubts } = inputs.start(args, &recorded, &settings)?;
@@ -142,14 +143,6 @@ fn believed(assessment: &Assessment, out: &Path, nis: f64) -> Result<(), Failure
     let message = format!("the solution in {} is not to be believed (see the warnings above)", out.display());
     // where the innovations are as small as they should be, it is the reference that contradicts
     Err(Failure::bound(message).hint(if nis < 1.0 { LASTING } else { ADVICE }))
-}
-
-fn parse_gravity(text: &str) -> Result<GravityModel, String> {
-    match text {
-        "wgs84" => Ok(GravityModel::Wgs84),
-        "first-order" => Ok(GravityModel::FirstOrder),
-        _ => Err("expected wgs84 or first-order".to_owned()),
-    }
 }
 
 fn settings(args: &Args) -> Result<Settings, Failure> {

@@ -1,24 +1,23 @@
 //! The directory of a fusion.
 
-use super::inputs::guarded;
-use crate::cli::run::not_of_another_command;
 use crate::cli::{Failure, Session};
-use nav_sim::formats::atomic::{self, AtomicDir};
+use nav_sim::formats::atomic::{AtomicDir, Found, claim_directory};
 use nav_sim::fusion::Solution;
-use nav_sim::report::{FusionKind, FusionManifest, FusionSummary, Input, fusion_directory};
+use nav_sim::report::{FUSION_FILES, FusionKind, FusionManifest, FusionSummary, Input, fusion_directory};
 use std::path::Path;
 
 /// Whether the directory can be made, found out before the work.
-pub(super) fn try_open(out: &Path, inputs: &[Input], session: &Session) -> Result<(), Failure> {
-    guarded(out, inputs)?;
-    not_of_another_command(out, |text| serde_json::from_str::<FusionManifest>(text).is_ok())?;
+pub(super) fn claim(out: &Path, inputs: &[Input], session: &Session) -> Result<(), Failure> {
     // Options are kept in the command alone.
     let is_same = |there: FusionManifest| {
         (there.command, there.version) == (command(), version()) && there.inputs == inputs
     };
-    atomic::guard_directory(out, session.existing(), |text| serde_json::from_str(text).is_ok_and(is_same))?;
-    drop(AtomicDir::create(out)?);
-    Ok(())
+    let recognise = |text: &str| {
+        let there = serde_json::from_str(text);
+        Ok(there.map_or(Found::Foreign, |there| Found::result(is_same(there))))
+    };
+    let paths = inputs.iter().map(|i| Path::new(&i.path));
+    Ok(claim_directory(out, &FUSION_FILES, paths, session.existing(), recognise)?)
 }
 
 fn version() -> String {

@@ -5,20 +5,20 @@ mod output;
 mod words;
 
 use super::filter::FilterArgs;
+use super::parse::one_of;
 use super::pictures::PlotArgs;
 use super::{Failure, Session};
 use inputs::Inputs;
 use nav_sim::formats::scenario_file;
 use nav_sim::jobs::{self, NavigateError};
 use nav_sim::metrics::{Requirement, Summary};
-use nav_sim::report::{Manifest, TrajectorySeries, seconds};
+use nav_sim::report::{Manifest, TrajectorySeries, window};
 use nav_sim::scenario::{Method, Scenario};
 use nav_sim::sensors::imu::TruthError;
-use nav_sim::sensors::outage::{Outage, PlacedOutages};
+use nav_sim::sensors::outage::{NotAnOutage, Outage, PlacedOutages};
 use nav_sim::simulation::ExperimentError;
 use std::path::{Path, PathBuf};
 
-pub(super) use output::{empty_or_new, not_of_another_command};
 use output::{manifest, text, write};
 pub(super) use words::Words;
 
@@ -59,7 +59,7 @@ pub(crate) struct Args {
     filter: FilterArgs,
     /// How statistics are found: monte-carlo (sampled runs), lincov (linear covariance analysis, no sampling) or
     /// both, the runs beside what is expected of them
-    #[arg(long, value_name = "METHOD", value_parser = parse_method)]
+    #[arg(long, value_name = "METHOD", value_parser = one_of::<Method>(&Method::NAMES))]
     method: Option<Method>,
     /// Most that an error may be, as NAME<=LIMIT (repeatable), at the end of every outage: p50_m, p95_m (horizontal),
     /// rmse_pos_e_m, yaw_deg and the other states; else exit code 3
@@ -88,11 +88,7 @@ pub(super) fn parse_outage(text: &str) -> Result<OutageArg, String> {
     if text == "none" {
         return Ok(OutageArg::None);
     }
-    let numbers = text.split_once(':').and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
-    let (start_s, end_s) = numbers.ok_or("expected START:END in seconds, such as 300:390, or none")?;
-    let outage = Outage { start_s, end_s };
-    outage.validate().map_err(|e| e.to_string())?;
-    Ok(OutageArg::Window(outage))
+    text.parse().map(OutageArg::Window).map_err(|e: NotAnOutage| e.to_string())
 }
 
 /// The windows among the values of `--outage`, of which "none" stands alone.
@@ -106,11 +102,6 @@ pub(super) fn windows_of(outages: &[OutageArg]) -> Result<Vec<Outage>, Failure> 
         OutageArg::Window(outage) => Some(*outage),
     };
     Ok(outages.iter().filter_map(window).collect())
-}
-
-fn parse_method(text: &str) -> Result<Method, String> {
-    let all = [Method::MonteCarlo, Method::Lincov, Method::Both];
-    all.into_iter().find(|m| m.name() == text).ok_or("expected monte-carlo, lincov or both".to_owned())
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
@@ -130,7 +121,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     let manifest =
         manifest(scenario.clone(), &outages, seed, inputs.files.clone(), inputs.note.clone(), session);
-    output::try_open(&args.out, &manifest, session)?;
+    output::claim(&args.out, &manifest, session)?;
     args.plot.guard(&inputs.files.iter().map(|i| PathBuf::from(&i.path)).collect::<Vec<_>>())?;
     let words = Words::new(session);
     let found = jobs::navigate(&inputs.job, &scenario, &outages, seed, &words);
@@ -155,7 +146,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     required(&found.summary)
 }
 
-/// Refuses requirements of outages where there is none.
+/// Refuses requirements of the ends of outages without an outage.
 fn requirable(all: &[Requirement], no_outage: bool) -> Result<(), Failure> {
     match all.iter().find(|r| no_outage && r.needs_outage()) {
         Some(r) => {
@@ -237,8 +228,7 @@ fn outages(
 ) -> Result<Vec<Outage>, Failure> {
     let PlacedOutages { windows, remarks } = scenario.outages_on(span, seed)?;
     remarks.iter().for_each(|remark| session.printer.warn(&remark.to_string()));
-    let shown: Vec<String> =
-        windows.iter().map(|o| format!("{}–{} s", seconds(o.start_s), seconds(o.end_s))).collect();
+    let shown: Vec<String> = windows.iter().map(|o| window(o.start_s, o.end_s)).collect();
     session.printer.say(&match shown.as_slice() {
         [] => "no outage".to_owned(),
         some => format!("outages {}", some.join(", ")),

@@ -3,10 +3,10 @@
 use super::words::agreement_line;
 use crate::cli::compare::table;
 use crate::cli::{Failure, Session};
-use nav_sim::formats::atomic::{self, AtomicDir};
+use nav_sim::formats::atomic::{AtomicDir, Found, claim_directory};
 use nav_sim::jobs::Navigation;
 use nav_sim::metrics::{Budget, Met, OutageSummary, PerState, Summary, VerdictKind};
-use nav_sim::report::{self, Input, Manifest, ModelNote, TrajectorySeries, seconds};
+use nav_sim::report::{self, Input, Manifest, ModelNote, TrajectorySeries, window};
 use nav_sim::scenario::{Method, Scenario};
 use nav_sim::sensors::outage::Outage;
 use nav_sim::simulation::REPORTED_NAMES;
@@ -29,7 +29,6 @@ pub(crate) fn manifest(
         version: env!("CARGO_PKG_VERSION").to_owned(),
         command: std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect(),
         seed,
-        scenario: String::new(),
         configuration,
         inputs,
         model,
@@ -40,45 +39,14 @@ pub(crate) fn manifest(
     }
 }
 
-/// Whether a run directory can be made, found out before the long computation; none of its files may be an
-/// input. Nothing is left: a run that is interrupted leaves no trace.
-pub(crate) fn try_open(path: &Path, manifest: &Manifest, session: &Session) -> Result<(), Failure> {
-    for name in report::RUN_FILES {
-        atomic::guard_inputs(&path.join(name), manifest.inputs.iter().map(|i| Path::new(&i.path)))?;
-    }
-    not_of_another_command(path, |text| serde_json::from_str::<Manifest>(text).is_ok())?;
-    let same = |text: &str| serde_json::from_str(text).is_ok_and(|there| manifest.is_same_run(&there));
-    atomic::guard_directory(path, session.existing(), same)?;
-    drop(AtomicDir::create(path)?);
-    Ok(())
-}
-
-/// Refuses a directory whose manifest is that of another command: its own would take its place. What a killed
-/// command had begun to replace is finished first.
-pub(crate) fn not_of_another_command(path: &Path, is_ours: fn(&str) -> bool) -> Result<(), Failure> {
-    atomic::recover(path);
-    let manifest = path.join("manifest.json");
-    let Ok(text) = std::fs::read_to_string(&manifest) else { return empty_or_new(path) };
-    if is_ours(&text) {
-        return Ok(());
-    }
-    let message = format!("{} is of another command, or of another version", manifest.display());
-    Err(Failure::input(message).hint("choose another directory with --out, or remove it"))
-}
-
-/// Refuses a directory that holds anything: files of the same names would be lost.
-pub(crate) fn empty_or_new(path: &Path) -> Result<(), Failure> {
-    let Ok(entries) = std::fs::read_dir(path) else { return Ok(()) };
-    let visible = |name: &std::ffi::OsString| !name.to_string_lossy().starts_with('.');
-    let mut names: Vec<_> = entries.flatten().map(|e| e.file_name()).filter(visible).collect();
-    names.sort();
-    let Some(first) = names.first() else { return Ok(()) };
-    let message = format!(
-        "{} is not empty, and not of this command: it holds {}",
-        path.display(),
-        first.to_string_lossy()
-    );
-    Err(Failure::input(message).hint("choose a new directory with --out"))
+/// Whether a run directory can be made, found out before the long computation.
+pub(crate) fn claim(path: &Path, manifest: &Manifest, session: &Session) -> Result<(), Failure> {
+    let inputs = manifest.inputs.iter().map(|i| Path::new(&i.path));
+    let recognise = |text: &str| {
+        let there = serde_json::from_str::<Manifest>(text);
+        Ok(there.map_or(Found::Foreign, |there| Found::result(manifest.is_same_run(&there))))
+    };
+    Ok(claim_directory(path, &report::RUN_FILES, inputs, session.existing(), recognise)?)
 }
 
 /// Writes a run directory.
@@ -170,7 +138,7 @@ fn calibration_lines(outages: &[OutageSummary]) -> String {
         let rmse = of("RMSE", &o.rmse_end, &o.rmse_end_ci95);
         let asee = of("ASEE", &o.asee_end, &o.asee_end_ci95);
         let all: Vec<String> = [p95, rmse, asee].into_iter().flatten().collect();
-        let window = format!("{}–{} s", seconds(o.start_s), seconds(o.end_s));
+        let window = window(o.start_s, o.end_s);
         (!all.is_empty()).then(|| format!("\nby the calibration, 95 %, {window}: {}", all.join(", ")))
     };
     outages
@@ -203,7 +171,7 @@ fn budget_table(summary: &Summary) -> String {
     };
     let mut rows = vec![["sources of errors", "horizontal position", "yaw"].map(str::to_owned).to_vec()];
     for (o, budget) in known {
-        let window = format!("{}–{} s", seconds(o.start_s), seconds(o.end_s));
+        let window = window(o.start_s, o.end_s);
         rows.push(vec![window, sources(budget, &[0, 1]), sources(budget, &[8])]);
     }
     format!("\n{}", table(&rows))
@@ -217,7 +185,7 @@ pub(super) fn sensitivity_table(summary: &Summary) -> String {
         return String::new();
     };
     let states = [1, 6, 8];
-    let window = format!("{}–{} s", seconds(outage.start_s), seconds(outage.end_s));
+    let window = window(outage.start_s, outage.end_s);
     let head = std::iter::once("d ln RMSE / d ln parameter".to_owned());
     let mut rows: Vec<Vec<String>> = vec![head.chain(states.map(|i| REPORTED_NAMES[i].to_owned())).collect()];
     for (name, slopes) in &of.0 {
@@ -264,7 +232,7 @@ fn outage_table(outages: &[OutageSummary]) -> String {
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for o in outages {
         let h = &o.horizontal_error_end_m;
-        let mut row = vec![format!("{}–{} s", seconds(o.start_s), seconds(o.end_s))];
+        let mut row = vec![window(o.start_s, o.end_s)];
         row.extend([h.p50, h.p95, h.p999.unwrap_or(h.max)].map(|v| format!("{v:.1}")));
         let ratios = ratios(&o.rmse_end, &o.asee_end);
         for state in [1, 6] {

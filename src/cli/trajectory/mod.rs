@@ -6,9 +6,8 @@ mod record;
 mod write;
 
 use super::{Failure, Session};
-use nav_sim::formats::trajectory_file::{Options, load};
+use nav_sim::formats::trajectory_file::{Options, load, parse_origin};
 use nav_sim::trajectory::Trajectory;
-use nav_sim::units::DEG;
 use std::path::{Path, PathBuf};
 
 /// Make, check, convert and draw reference trajectories
@@ -64,13 +63,8 @@ impl Source {
 struct Origin([f64; 3]);
 
 fn origin(text: &str) -> Result<Origin, String> {
-    let numbers: Option<Vec<f64>> = text.split(',').map(|x| x.trim().parse().ok()).collect();
-    match numbers.as_deref() {
-        Some(&[lat, lon, h]) if lat.abs() <= 89.9 && lon.abs() <= 360.0 && h.is_finite() => {
-            Ok(Origin([lat * DEG, lon * DEG, h]))
-        }
-        _ => Err("not LAT_DEG,LON_DEG,H_M with a latitude within ±89.9".into()),
-    }
+    let expected = || "not LAT_DEG,LON_DEG,H_M with a latitude within ±89.9".to_owned();
+    parse_origin(text).map(Origin).ok_or_else(expected)
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {

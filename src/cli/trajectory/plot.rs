@@ -18,19 +18,11 @@ pub(super) struct Args {
     #[command(flatten)]
     source: Source,
     /// A stretch without GNSS to mark, in seconds (repeatable)
-    #[arg(long = "outage", value_name = "START:END", value_parser = outage)]
+    #[arg(long = "outage", value_name = "START:END")]
     outages: Vec<Outage>,
     /// SVG to write
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
-}
-
-fn outage(text: &str) -> Result<Outage, String> {
-    let number = |x: &str| x.trim().parse::<f64>().ok();
-    let pair = text.split_once(':').and_then(|(start, end)| Some((number(start)?, number(end)?)));
-    let (start_s, end_s) = pair.ok_or("not START:END in seconds")?;
-    let outage = Outage { start_s, end_s };
-    outage.validate().map(|()| outage).map_err(|e| e.to_string())
 }
 
 pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {

@@ -2,7 +2,7 @@
 
 use super::{Source, wrote};
 use crate::cli::{Failure, Session, read, turn_on};
-use nav_sim::formats::atomic::{AtomicDir, guard_inputs, recover};
+use nav_sim::formats::atomic::{AtomicDir, Found, claim_directory};
 use nav_sim::formats::scenario_file;
 use nav_sim::formats::trajectory_file::{Rows, write_rows};
 use nav_sim::noise::continuous;
@@ -42,14 +42,6 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let inputs = [Some(&args.source.path), Some(&args.model), args.scenario.as_ref()];
-    for name in FILES {
-        guard_inputs(&args.out.join(name), inputs.iter().flatten().map(|p| p.as_path()))?;
-    }
-    recover(&args.out);
-    if !FILES.iter().all(|name| args.out.join(name).is_file()) {
-        crate::cli::run::empty_or_new(&args.out)?; // not a recording made before
-    }
     let mut scenario = args.scenario.as_deref().map(scenario_file::read).transpose()?.unwrap_or_default();
     let (trajectory, _) = args.source.read(session)?;
     let shown = args.model.display();
@@ -66,12 +58,31 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut reference = Vec::new();
     write_rows(&mut reference, &trajectory, Rows::Rate(10.0)).map_err(Failure::could_not)?;
     let initial = initial_toml(trajectory.start_s(), &recording.start, &scenario.initial);
+    let contents = [
+        imu_csv(&recording.imu).into_bytes(),
+        gnss_csv(&recording.gnss).into_bytes(),
+        reference,
+        initial.into_bytes(),
+    ];
+    claim(args, &contents, session)?;
     let mut directory = AtomicDir::create(&args.out)?;
-    directory.write(FILES[0], imu_csv(&recording.imu))?;
-    directory.write(FILES[1], gnss_csv(&recording.gnss))?;
-    directory.write(FILES[2], reference)?;
-    directory.write(FILES[3], initial)?;
+    for (name, contents) in FILES.iter().zip(contents) {
+        directory.write(name, contents)?;
+    }
     directory.commit()?;
     wrote(&args.out, session);
     Ok(())
+}
+
+/// Refuses to overwrite an input, what this command did not make, or a recording that is not this one.
+fn claim(args: &Args, contents: &[Vec<u8>; 4], session: &Session) -> Result<(), Failure> {
+    let inputs = [Some(&args.source.path), Some(&args.model), args.scenario.as_ref()];
+    let inputs = inputs.into_iter().flatten().map(|path| path.as_path());
+    let recognise = |_: &str| {
+        let there = FILES.map(|name| std::fs::read(args.out.join(name)).ok());
+        let is_whole = there.iter().all(Option::is_some);
+        let is_same = there.iter().zip(contents).all(|(there, own)| there.as_ref() == Some(own));
+        Ok(if is_whole { Found::result(is_same) } else { Found::Foreign })
+    };
+    Ok(claim_directory(&args.out, &FILES, inputs, session.existing(), recognise)?)
 }

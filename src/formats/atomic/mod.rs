@@ -1,10 +1,12 @@
 //! Outputs that appear whole or not at all: written under a temporary name in the same directory, flushed
 //! to the disk, then renamed.
 
+mod claim;
 mod directory;
 mod file;
 mod temporary;
 
+pub use claim::{Found, claim_directory};
 pub use directory::{AtomicDir, recover};
 pub use file::AtomicFile;
 pub use temporary::remove_unfinished;
@@ -47,22 +49,6 @@ pub fn guard_contents(path: &Path, contents: &[u8], existing: Existing) -> Resul
         return Ok(());
     }
     Err(kept(path, "holds another result"))
-}
-
-/// Refuses to put another result in the place of that of a directory, which its manifest tells.
-///
-/// # Errors
-/// When there is a manifest, `is_same` does not know its own in it, and the result is to stay.
-pub fn guard_directory(
-    directory: &Path,
-    existing: Existing,
-    is_same: impl FnOnce(&str) -> bool,
-) -> Result<(), FileError> {
-    let Ok(manifest) = std::fs::read_to_string(directory.join("manifest.json")) else { return Ok(()) };
-    if existing == Existing::Replace || is_same(&manifest) {
-        return Ok(());
-    }
-    Err(kept(directory, "holds the result of another configuration, other inputs or another seed"))
 }
 
 fn kept(path: &Path, why: &str) -> FileError {

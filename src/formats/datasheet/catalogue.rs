@@ -12,7 +12,7 @@
 
 use super::{Datasheet, Entry, Figure, Quantity};
 use crate::formats::error::{FileError, Kind};
-use crate::formats::toml_described;
+use crate::formats::toml_described::Document;
 use crate::formats::toml_file::{Source, unknown_key};
 use crate::imu::Sensor;
 use serde::Deserialize;
@@ -82,13 +82,6 @@ pub fn read(path: &Path) -> Result<Datasheet, FileError> {
     parse(&Source::read(path)?)
 }
 
-/// Whether a file is an entry of a catalogue, not a model: it has a `[unit]`. A file that is no TOML is neither.
-#[must_use]
-pub fn is_entry(path: &Path) -> bool {
-    let table = Source::read(path).ok().and_then(|source| source.text().parse::<toml::Table>().ok());
-    table.is_some_and(|table| table.contains_key("unit"))
-}
-
 /// The entry of that name, if the catalogue has it; capitals do not matter.
 #[must_use]
 pub fn catalogued(name: &str) -> Option<Result<Datasheet, FileError>> {
@@ -97,7 +90,7 @@ pub fn catalogued(name: &str) -> Option<Result<Datasheet, FileError>> {
 }
 
 pub(super) fn parse(source: &Source) -> Result<Datasheet, FileError> {
-    let file: File = toml_described::read(source)?;
+    let file: File = Document::parse(source)?.read()?;
     let mut entries = Vec::new();
     for (sensor, table) in [(Sensor::Accel, file.accel), (Sensor::Gyro, file.gyro)] {
         for (key, given) in table {

@@ -23,7 +23,7 @@
 mod catalogue;
 mod figure;
 
-pub use catalogue::{CATALOGUE, catalogued, is_entry, read};
+pub use catalogue::{CATALOGUE, catalogued, read};
 pub use figure::{Figure, Quantity, QuantityError};
 
 use crate::formats::model_file::{ModelFile, SCHEMA, TurnOn};

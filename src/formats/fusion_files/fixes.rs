@@ -145,11 +145,12 @@ impl Columns {
         let mut columns = Self([None; NAMES.len()]);
         let mut ignored = Vec::new();
         for (at, name) in table.columns.iter().enumerate() {
-            match classify(name) {
-                Some((quantity, factor)) if columns.0[quantity].is_none() => {
-                    columns.0[quantity] = Some((at, factor));
-                }
-                _ => ignored.push(name.clone()),
+            let Some((quantity, factor)) = classify(name) else {
+                ignored.push(name.clone());
+                continue;
+            };
+            if let Some((earlier, _)) = columns.0[quantity].replace((at, factor)) {
+                return Err(table.given_twice([earlier, at], NAMES[quantity]));
             }
         }
         columns.complete(table, &ignored, unsaid)?;
@@ -301,4 +302,20 @@ fn check_step(path: &str, line: u64, before: &GnssFix, fix: &GnssFix) -> Result<
     let message = format!("the fix is {metres:.0} m from the one {seconds} s before");
     Err(Error::contents(path, line, message)
         .advice("is a latitude swapped with a longitude, a sign lost, or a row damaged?"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quantity_in_two_columns_is_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("gnss.csv");
+        let text = "t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m,altitude\n0,46,7,400,1,1,2,450\n";
+        std::fs::write(&path, text).unwrap();
+        let e = read_gnss(&path, None).unwrap_err();
+        assert!(e.to_string().ends_with("line 1: columns \"h_m\" and \"altitude\" both give h_m"), "{e}");
+        assert_eq!(e.hint().unwrap(), "remove one of them");
+    }
 }

@@ -13,12 +13,17 @@ use crate::formats::trajectory_file::table::{self, Numbers, Table};
 use crate::formats::{FileError, Kind};
 use std::path::Path;
 
-/// How many columns a table of numbers between blanks without a header has; none of any other text.
-fn bare_columns(text: &str) -> Option<usize> {
+/// The first row of a table of numbers between blanks without a header; none of any other text.
+pub(super) fn bare_row(text: &str) -> Option<Vec<f64>> {
     let mut lines = text.lines().map(str::trim);
     let first = lines.find(|l| !(l.is_empty() || l.starts_with(['#', '%', '/'])))?;
-    let cells: Vec<&str> = first.split_whitespace().collect();
-    (cells.len() > 1 && cells.iter().all(|c| c.parse::<f64>().is_ok())).then_some(cells.len())
+    let row: Option<Vec<f64>> = first.split_whitespace().map(|cell| cell.parse().ok()).collect();
+    row.filter(|row| row.len() > 1)
+}
+
+/// How many columns such a table has.
+fn bare_columns(text: &str) -> Option<usize> {
+    bare_row(text).map(|row| row.len())
 }
 
 /// The table of a file, its columns named when it has no header.

@@ -39,7 +39,7 @@ pub const SCHEMA: u64 = 1;
 pub struct ModelFile {
     /// The noise.
     pub model: Model,
-    /// Axes the file says nothing about (empty sums in the model).
+    /// Axes that the file does not have (empty sums in the model).
     pub missing: Vec<Channel>,
     /// The constant bias of a switching-on.
     pub turn_on: Option<TurnOn>,
@@ -56,8 +56,9 @@ impl ModelFile {
     #[must_use]
     pub fn doubts(&self, path: &std::path::Path) -> Vec<String> {
         let shown = path.display();
-        let unsaid =
-            |channel: &Channel| format!("{shown}: says nothing of {channel}, taken as free of noise");
+        let unsaid = |channel: &Channel| {
+            format!("{shown} has no noise model for {channel}; it is taken as free of noise")
+        };
         self.missing.iter().map(unsaid).collect()
     }
 

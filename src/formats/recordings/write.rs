@@ -7,9 +7,10 @@ use flate2::{Compression, write::GzEncoder};
 use std::io::{self, BufWriter, Write};
 
 /// A format of recordings.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum FileFormat {
     /// Text, ten significant digits.
+    #[default]
     Csv,
     /// The same, compressed.
     CsvGz,
@@ -17,10 +18,15 @@ pub enum FileFormat {
     Npy,
 }
 
+nav_sim_signal::named!(FileFormat);
+
 impl FileFormat {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Csv, Self::CsvGz, Self::Npy];
+
     /// Ending of file names.
     #[must_use]
-    pub const fn ending(self) -> &'static str {
+    pub const fn name(self) -> &'static str {
         match self {
             Self::Csv => "csv",
             Self::CsvGz => "csv.gz",
@@ -92,7 +98,7 @@ mod tests {
         for (format, digits) in
             [(FileFormat::Csv, 1e-11), (FileFormat::CsvGz, 1e-11), (FileFormat::Npy, 1e-17)]
         {
-            let path = directory.path().join(format!("a.{}", format.ending()));
+            let path = directory.path().join(format!("a.{}", format));
             format.write(std::fs::File::create(&path).unwrap(), 128.0, &signals).unwrap();
             let options = ReadOptions { rate_hz: Some(128.0), ..ReadOptions::default() };
             let (recordings, _) = read(&[path], &options).unwrap();

@@ -132,10 +132,7 @@ impl Columns {
                 continue;
             };
             if let Some((_, earlier, _)) = columns.get(quantity) {
-                let (first, quantity) = (&table.columns[earlier], quantity.name());
-                let message = format!("columns \"{first}\" and \"{name}\" both give {quantity}");
-                return Err(Error::contents(table.path.as_str(), table.header_line, message)
-                    .advice("remove one of them"));
+                return Err(table.given_twice([earlier, index], quantity.name()));
             }
             columns.found.push((quantity, index, factor));
         }

@@ -10,6 +10,7 @@ mod samples;
 pub(in crate::formats) mod table;
 mod write;
 
+pub use samples::parse_origin;
 pub use write::{Rows, write_csv, write_rows};
 
 use super::{FileError, Place};

@@ -219,19 +219,23 @@ pub(super) fn origin(table: &Table, options: &Options) -> Result<[f64; 3], Error
         return Ok(origin);
     }
     let line = table.comments.iter().find_map(|c| c.strip_prefix("origin"));
-    let numbers: Option<Vec<f64>> = line.and_then(|l| {
-        l.trim_start_matches([':', '=', ' ']).split(',').map(|x| x.trim().parse().ok()).collect()
-    });
-    match numbers.as_deref() {
-        Some(&[lat, lon, h]) if lat.abs() <= 89.9 && lon.abs() <= 360.0 && h.is_finite() => {
-            Ok([lat * DEG, lon * DEG, h])
+    line.and_then(|line| parse_origin(line.trim_start_matches([':', '=', ' ']))).ok_or_else(|| {
+        let message = "a trajectory in local coordinates needs an origin on the Earth";
+        Error::contents(table.path.as_str(), Place::Within, message)
+            .setting(Setting::Origin)
+            .advice("a first line \"# origin: LAT_DEG, LON_DEG, H_M\"")
+    })
+}
+
+/// An origin as it is written, `LAT_DEG,LON_DEG,H_M`: latitude, longitude (rad), height (m).
+#[must_use]
+pub fn parse_origin(text: &str) -> Option<[f64; 3]> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|x| x.trim().parse().ok()).collect();
+    match numbers?[..] {
+        [lat, lon, h] if lat.abs() <= 89.9 && lon.abs() <= 360.0 && h.is_finite() => {
+            Some([lat * DEG, lon * DEG, h])
         }
-        _ => {
-            let message = "a trajectory in local coordinates needs an origin on the Earth";
-            Err(Error::contents(table.path.as_str(), Place::Within, message)
-                .setting(Setting::Origin)
-                .advice("a first line \"# origin: LAT_DEG, LON_DEG, H_M\""))
-        }
+        _ => None,
     }
 }
 

@@ -47,6 +47,13 @@ pub(in crate::formats) enum Numbers {
 const LONGEST_LINE: u64 = 1 << 16;
 
 impl Table {
+    /// Two columns of one quantity.
+    pub(in crate::formats) fn given_twice(&self, columns: [usize; 2], quantity: &str) -> Error {
+        let [first, second] = columns.map(|at| &self.columns[at]);
+        let message = format!("columns \"{first}\" and \"{second}\" both give {quantity}");
+        Error::contents(self.path.as_str(), self.header_line, message).advice("remove one of them")
+    }
+
     /// Reads a table. Without `columns` its first line that is no comment names them; with them it has no
     /// header and its cells stand between blanks.
     pub(in crate::formats) fn read(

@@ -5,7 +5,7 @@ use super::{ParameterError, non_negative};
 use std::f64::consts::LN_2;
 
 /// First-order autoregressive process, stationary: |phi| < 1.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Ar1 {
     phi: f64,
     sigma2: f64,

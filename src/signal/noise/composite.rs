@@ -3,7 +3,7 @@
 use super::{ParameterRef, Process, labels};
 
 /// A sum of independent processes, in the order given.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize)]
 pub struct Composite {
     /// The summands.
     pub processes: Vec<Process>,

@@ -38,6 +38,7 @@ pub use synthesis::Synthesizer;
 pub use white::White;
 
 use crate::imu::{Channel, Sensor};
+use serde::ser::{Serialize, SerializeMap, Serializer};
 
 /// A parameter outside its domain.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -79,6 +80,17 @@ pub enum Process {
     GaussMarkov(GaussMarkov),
     /// First-order moving average, "MA1".
     Ma1(Ma1),
+}
+
+/// As in model files: its code as `type`, and its parameters.
+impl Serialize for Process {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        let parameters = self.parameters();
+        let mut map = to.serialize_map(Some(1 + parameters.len()))?;
+        map.serialize_entry("type", self.code())?;
+        parameters.iter().try_for_each(|(name, value)| map.serialize_entry(name, value))?;
+        map.end()
+    }
 }
 
 impl Process {

@@ -64,7 +64,7 @@ pub enum SpreadError {
 }
 
 /// A distribution.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub enum Law {
     /// low + width·B, B ~ Beta(a, b).
     Beta {
@@ -85,7 +85,7 @@ pub enum Law {
 }
 
 /// The law of one parameter of one process of one axis.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Variation {
     process: String,
     parameter: String,

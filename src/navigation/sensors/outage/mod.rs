@@ -13,6 +13,7 @@ pub use plan::OutagePlan;
 use crate::units::{SettingError, require_finite};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::str::FromStr;
 
 /// A window without fixes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -49,6 +50,30 @@ impl Outage {
             return Ok(());
         }
         Err(SettingError::new("end_s", self.end_s, format!("it must come after start_s = {}", self.start_s)))
+    }
+}
+
+/// A text that is no outage.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NotAnOutage {
+    /// It does not have two times.
+    #[error("expected START:END in seconds, such as 300:390")]
+    Form,
+    /// They are refused.
+    #[error(transparent)]
+    Times(#[from] SettingError),
+}
+
+impl FromStr for Outage {
+    type Err = NotAnOutage;
+
+    /// `START:END`, in seconds.
+    fn from_str(text: &str) -> Result<Self, NotAnOutage> {
+        let time = |text: &str| text.trim().parse().map_err(|_| NotAnOutage::Form);
+        let (start, end) = text.split_once(':').ok_or(NotAnOutage::Form)?;
+        let outage = Self { start_s: time(start)?, end_s: time(end)? };
+        outage.validate()?;
+        Ok(outage)
     }
 }
 

@@ -133,3 +133,16 @@ fn impossible_windows_are_refused_by_key() {
     let random = OutagePlan { random: Some(random), ..OutagePlan::default() };
     assert_eq!(refused(&random), "outage_random.rate_per_hour");
 }
+
+#[test]
+fn an_outage_is_read_from_its_times() {
+    for text in ["60:90", "60: 90", " 60 :90.0"] {
+        assert_eq!(text.parse(), Ok(Outage { start_s: 60.0, end_s: 90.0 }), "{text}");
+    }
+    for text in ["", "60", "60:", "60:90:100", "a:b"] {
+        assert_eq!(text.parse::<Outage>(), Err(NotAnOutage::Form), "{text}");
+    }
+    for text in ["90:60", "60:60", "60:inf", "nan:60"] {
+        assert!(matches!(text.parse::<Outage>(), Err(NotAnOutage::Times(_))), "{text}");
+    }
+}

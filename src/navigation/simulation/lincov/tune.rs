@@ -20,22 +20,56 @@ use rayon::prelude::*;
 pub type Filter<'a> = dyn Fn(&Model) -> Result<Belief, BeliefError> + Sync + 'a;
 
 /// What has a factor of its own.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Per {
     /// Each sensor: all its processes share one.
+    #[default]
     Sensor,
     /// Each process of each sensor, its axes together.
     Process,
 }
 
+impl Per {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Sensor, Self::Process];
+
+    /// As it is written.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Sensor => "sensor",
+            Self::Process => "process",
+        }
+    }
+}
+
+nav_sim_signal::named!(Per);
+
 /// When a filter counts as honest.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Aim {
     /// The expected NEES, averaged over time and truths, is what it should be.
     Mean,
     /// In no truth is an error larger than stated, in any state at the end of any outage.
+    #[default]
     Worst,
 }
+
+impl Aim {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Worst, Self::Mean];
+
+    /// As it is written.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Mean => "mean",
+            Self::Worst => "worst",
+        }
+    }
+}
+
+nav_sim_signal::named!(Aim);
 
 /// A model, and the truths that its filter is to be honest for.
 pub struct Task<'a> {

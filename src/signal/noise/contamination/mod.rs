@@ -9,9 +9,10 @@ use crate::imu::{Channel, Sensor};
 use crate::rng::StreamKey;
 use rand::RngExt;
 use rand_distr::{Distribution, StandardNormal, StudentT};
+use serde::Serialize;
 
 /// A number of samples, given as such or as a share of the record.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum Extent {
     /// That many samples.
     Samples(u64),
@@ -32,7 +33,7 @@ impl Extent {
 }
 
 /// What is done to a signal.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum Operation {
     /// Multiplies a parameter of the model, before synthesis.
     Scale {
@@ -91,7 +92,7 @@ pub enum Operation {
 }
 
 /// An operation and the signals it is done to.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rule {
     /// Sensor, all its axes.
     pub sensor: Sensor,

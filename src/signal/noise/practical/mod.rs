@@ -68,6 +68,9 @@ pub enum Policy {
 }
 
 impl Policy {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Strict, Self::Matched, Self::Envelope];
+
     /// Name in files.
     #[must_use]
     pub const fn name(self) -> &'static str {
@@ -78,6 +81,8 @@ impl Policy {
         }
     }
 }
+
+crate::named!(Policy);
 
 /// What the other program takes a bias for.
 #[derive(Debug, Clone, Copy, PartialEq)]

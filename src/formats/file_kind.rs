@@ -1,0 +1,197 @@
+//! What kind of file a path holds, by its ending and its contents.
+
+use super::fusion_files::bare_row;
+use super::{FileError, source};
+use flate2::read::GzDecoder;
+use std::io::Read;
+use std::path::Path;
+
+/// The kinds of files that commands read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FileKind {
+    /// A scenario of `run`.
+    Scenario,
+    /// A study of `batch`.
+    Study,
+    /// A study of `efficiency`.
+    Efficiency,
+    /// A noise model.
+    Model,
+    /// An entry of the catalogue of IMUs.
+    CatalogueEntry,
+    /// Bounds of parameters.
+    Parameters,
+    /// A contamination of recordings.
+    Contamination,
+    /// Wavelet-variance curves.
+    Curve,
+    /// A trajectory.
+    Trajectory,
+    /// The initial state of a fusion.
+    Initial,
+    /// Recorded GNSS fixes.
+    Gnss,
+    /// A recording of an IMU under way.
+    Imu,
+    /// A static recording, or a directory of them.
+    Recording,
+}
+
+/// Bytes of a file that tell what it is: all of a TOML, the header of a table.
+const HEAD: u64 = 1 << 20;
+
+/// What a path holds. A pipe is read, and reads the same again.
+///
+/// # Errors
+/// When the system refuses.
+pub fn of(path: &Path) -> Result<FileKind, FileError> {
+    let name = path.to_string_lossy().to_lowercase();
+    if path.is_dir() || name.ends_with(".npy") {
+        return Ok(FileKind::Recording);
+    }
+    let plain = name.strip_suffix(".gz").unwrap_or(&name);
+    if [".nav", ".tum", ".gpx"].iter().any(|ending| plain.ends_with(ending)) {
+        return Ok(FileKind::Trajectory);
+    }
+    let error = |e| FileError::io(path, e);
+    let file = source::open(path).map_err(error)?;
+    let is_compressed = plain != name;
+    let reader: Box<dyn Read> = if is_compressed { Box::new(GzDecoder::new(file)) } else { file };
+    let mut head = Vec::new();
+    match reader.take(HEAD).read_to_end(&mut head) {
+        // A damaged one: the reader of recordings says how.
+        Err(_) if is_compressed => return Ok(FileKind::Recording),
+        read => read.map_err(error)?,
+    };
+    let text = String::from_utf8_lossy(&head);
+    if name.ends_with(".json") || text.trim_start().starts_with('{') {
+        return Ok(FileKind::Curve);
+    }
+    // No table of numbers is TOML, which needs no ending then: a pipe has none.
+    let table = table_of(&text).filter(|table| !table.is_empty());
+    Ok(match table {
+        None if !name.ends_with(".toml") => table_kind(&text),
+        table => toml_kind(&table.unwrap_or_default()),
+    })
+}
+
+fn table_of(text: &str) -> Option<toml::Table> {
+    text.trim_start_matches('\u{feff}').parse().ok()
+}
+
+/// What does not parse is read as a scenario, whose reader says where it is wrong.
+fn toml_kind(table: &toml::Table) -> FileKind {
+    let has = |keys: &[&str]| keys.iter().any(|key| table.contains_key(*key));
+    let sensors = || ["accel", "gyro"].iter().filter_map(|sensor| table.get(*sensor));
+    if has(&["unit"]) {
+        FileKind::CatalogueEntry
+    } else if sensors().any(toml::Value::is_array) {
+        FileKind::Contamination
+    } else if table.values().any(bounds) {
+        FileKind::Parameters
+    } else if has(&["accel", "gyro"]) {
+        FileKind::Model
+    } else if has(&["lat_deg", "yaw_deg"]) {
+        FileKind::Initial
+    } else if has(&["segment", "waypoint", "start", "vehicle"]) {
+        FileKind::Trajectory
+    } else if has(&["candidate", "trajectory", "truth"]) {
+        FileKind::Study
+    } else if has(&["sets", "replicates", "estimators"]) {
+        FileKind::Efficiency
+    } else {
+        FileKind::Scenario
+    }
+}
+
+/// Whether there is a bound of a parameter in it.
+fn bounds(value: &toml::Value) -> bool {
+    let Some(table) = value.as_table() else { return false };
+    let of_parameter =
+        ["lower", "upper", "fix"].iter().any(|key| table.get(*key).is_some_and(|v| !v.is_table()));
+    of_parameter || table.iter().any(|(key, value)| key != "spread" && bounds(value))
+}
+
+/// The texts of KF-GINS, numbers between blanks without a header: increments are small, latitudes are not.
+fn bare_kind(text: &str) -> Option<FileKind> {
+    match bare_row(text)?[..] {
+        [_, lat, lon, _, _, _, _] if lat.abs().max(lon.abs()) > 0.5 => Some(FileKind::Gnss),
+        [_, _, _, _, _, _, _] | [_, _, _, _, _, _, _, _] => Some(FileKind::Imu),
+        [_, _, _, _, _, _, _, _, _, _, _, _, _] => Some(FileKind::Gnss),
+        _ => None,
+    }
+}
+
+fn table_kind(text: &str) -> FileKind {
+    let position = |line: &str| line.contains("lat_deg") || line.contains("n_m") && line.contains("e_m");
+    let fixes = |line: &str| {
+        position(line) && ["sd_", "std_", "sigma_"].iter().any(|s| line.contains(s)) && !line.contains("yaw")
+    };
+    if let Some(kind) = bare_kind(text) {
+        kind
+    } else if text.trim_start_matches('\u{feff}').trim_start().starts_with("ini lat") {
+        FileKind::Trajectory
+    } else if text.lines().take(20).any(|line| line.contains("tau_samples")) {
+        FileKind::Curve
+    } else if text.lines().take(20).any(fixes) {
+        FileKind::Gnss
+    } else if text.lines().take(20).any(position) {
+        FileKind::Trajectory
+    } else {
+        FileKind::Recording
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of_toml(text: &str) -> FileKind {
+        toml_kind(&table_of(text).unwrap_or_default())
+    }
+
+    #[test]
+    fn contents_tell_the_kind() {
+        assert_eq!(of_toml("[accel]\nprocesses = []"), FileKind::Model);
+        assert_eq!(of_toml("[unit]\nname = 'a'\n[gyro]\nnoise = {}"), FileKind::CatalogueEntry);
+        assert_eq!(of_toml("start = {}\nsegment = []"), FileKind::Trajectory);
+        assert_eq!(of_toml("runs = 3\n[[candidate]]"), FileKind::Study);
+        assert_eq!(of_toml("sets = 500\nmodel = 'n1.toml'"), FileKind::Efficiency);
+        assert_eq!(of_toml("[run]\nruns = 3"), FileKind::Scenario);
+        assert_eq!(of_toml("[gyro.AR1_1]\nphi = { fix = 0.98 }"), FileKind::Parameters);
+        assert_eq!(of_toml("[WN]\nsigma2 = { lower = 0.1 }"), FileKind::Parameters);
+        assert_eq!(of_toml("[[accel]]\noperation = 'ar1'"), FileKind::Contamination);
+        assert_eq!(table_kind("tau_samples,wv,edof"), FileKind::Curve);
+        assert_eq!(of_toml("t_s = 0\nlat_deg = 46\nyaw_deg = 3"), FileKind::Initial);
+        assert_eq!(table_kind("t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m"), FileKind::Gnss);
+        assert_eq!(table_kind("t_s,lat_deg,lon_deg,h_m,yaw_deg,sd_yaw_deg"), FileKind::Trajectory);
+        assert_eq!(table_kind("ini lat (deg),ini lon (deg)"), FileKind::Trajectory);
+        assert_eq!(table_kind("1 30.5 114.2 20 1 1 2\n"), FileKind::Gnss);
+        assert_eq!(table_kind("1 30.5 114.2 20 0 0 0 1 1 2 0.1 0.1 0.1\n"), FileKind::Gnss);
+        assert_eq!(table_kind("1 1e-5 2e-5 -1e-5 0.01 0.02 -0.098\n"), FileKind::Imu);
+        assert_eq!(of_toml("= broken"), FileKind::Scenario);
+        assert_eq!(table_kind("# origin\nt_s, lat_deg, lon_deg"), FileKind::Trajectory);
+        assert_eq!(table_kind("t_s,accel_x_m_s2,gyro_z_rad_s"), FileKind::Recording);
+    }
+
+    #[test]
+    fn a_pipe_without_an_ending_is_known_by_its_contents() {
+        let dir = tempfile::tempdir().unwrap();
+        for (name, text, kind) in [
+            ("63", "[run]\nruns = 3\n", FileKind::Scenario),
+            ("64", "[unit]\nname = 'a'\n", FileKind::CatalogueEntry),
+            ("65", "t_s,accel_x_m_s2\n0,1\n", FileKind::Recording),
+            ("66", "{ \"curves\": [] }", FileKind::Curve),
+        ] {
+            let path = dir.path().join(name);
+            assert!(std::process::Command::new("mkfifo").arg(&path).status().unwrap().success());
+            let writer = std::thread::spawn({
+                let path = path.clone();
+                move || std::fs::write(path, text).unwrap()
+            });
+            assert_eq!(of(&path).unwrap(), kind);
+            writer.join().unwrap();
+            assert_eq!(of(&path).unwrap(), kind, "what was read is kept");
+        }
+    }
+}

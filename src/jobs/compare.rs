@@ -1,0 +1,116 @@
+//! Run directories → ratios between runs.
+
+use crate::formats::FileError;
+use crate::formats::run_directory::{self, RunDirectory};
+use crate::metrics::{self, ComparisonError};
+use crate::report::{CandidateResult, ComparisonFile, Label, Manifest, RatioCurves};
+use crate::scenario::Method;
+use std::path::{Path, PathBuf};
+
+/// What was found.
+#[derive(Debug)]
+pub struct Comparison {
+    /// All of it, as it is written to a file.
+    pub file: ComparisonFile,
+    /// The runs.
+    pub candidates: Vec<CandidateResult>,
+    /// How their ratios go with time, run by run.
+    pub curves: Vec<RatioCurves>,
+    /// Start and end of each outage (s).
+    pub outages: Vec<(f64, f64)>,
+    /// Why runs are not paired with the reference.
+    pub doubts: Vec<String>,
+}
+
+/// Why runs cannot be compared.
+#[derive(Debug, thiserror::Error)]
+pub enum CompareError {
+    /// A run directory that cannot be read.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// Without the same trajectory a ratio means nothing.
+    #[error("{run}: not the trajectory of the reference")]
+    Trajectory {
+        /// The run.
+        run: String,
+    },
+    /// Runs that have no ratio.
+    #[error("{run}: {source}")]
+    Ratio {
+        /// The run.
+        run: String,
+        /// Why.
+        source: ComparisonError,
+    },
+}
+
+/// Compares runs with a reference.
+///
+/// # Errors
+/// When a directory cannot be read, or is of something else.
+pub fn compare(runs: &[PathBuf], reference: &Path) -> Result<Comparison, CompareError> {
+    let name = reference.display().to_string();
+    let directory = run_directory::read(reference)?;
+    let (mut candidates, mut curves, mut doubts) = (Vec::new(), Vec::new(), Vec::new());
+    for path in runs {
+        let run = path.display().to_string();
+        let candidate = run_directory::read(path)?;
+        let differences = differences(&candidate.manifest, &directory.manifest);
+        doubts.extend(
+            differences
+                .iter()
+                .map(|what| format!("{run}: {what} not that of the reference; the runs are not paired")),
+        );
+        let is_paired = differences.is_empty();
+        let is_reference = is_same_place(path, reference);
+        candidates.push(compared(run, &candidate, &directory, is_paired, is_reference)?);
+        curves.push(RatioCurves::of(&candidate.experiment, &directory.experiment));
+    }
+    let verdict = directory.experiment.verdict();
+    let file = ComparisonFile::new((&name, &verdict), doubts.is_empty(), &candidates);
+    Ok(Comparison { file, candidates, curves, outages: directory.experiment.outages, doubts })
+}
+
+/// One run.
+fn compared(
+    run: String,
+    candidate: &RunDirectory,
+    reference: &RunDirectory,
+    is_paired: bool,
+    is_reference: bool,
+) -> Result<CandidateResult, CompareError> {
+    if candidate.manifest.hashes("trajectory") != reference.manifest.hashes("trajectory") {
+        return Err(CompareError::Trajectory { run });
+    }
+    let outages = metrics::compare(&candidate.experiment, &reference.experiment, is_paired);
+    let outages = outages.map_err(|source| CompareError::Ratio { run: run.clone(), source })?;
+    let label = Label::of(&run, candidate.manifest.model.estimator.as_deref());
+    let verdict = candidate.experiment.verdict();
+    Ok(CandidateResult { run, label, is_reference, verdict, outages })
+}
+
+/// What makes two runs differ beside the model in the filter; then run k did not see the same noise.
+fn differences(candidate: &Manifest, reference: &Manifest) -> Vec<&'static str> {
+    let (c, r) = (&candidate.configuration, &reference.configuration);
+    let is_expected = [c, r].map(|of| of.run.method == Method::Lincov);
+    let all = [
+        ("the method is", is_expected[0] != is_expected[1]),
+        // covariance analysis draws nothing, and so differs in nothing by its seed
+        ("the seed is", is_expected == [false, false] && candidate.seed != reference.seed),
+        ("what makes the errors is", truth(candidate) != truth(reference)),
+        ("[imu] is", c.imu != r.imu),
+        ("[gnss] is", c.gnss != r.gnss),
+        ("[initial] is", c.initial != r.initial),
+    ];
+    all.into_iter().filter_map(|(what, differs)| differs.then_some(what)).collect()
+}
+
+/// What made the INS errors: a recording, a model, or the filter's own.
+fn truth(manifest: &Manifest) -> Vec<&str> {
+    let given = ["static", "truth", "model"].map(|role| manifest.hashes(role));
+    given.into_iter().find(|hashes| !hashes.is_empty()).unwrap_or_default()
+}
+
+fn is_same_place(a: &Path, b: &Path) -> bool {
+    a.canonicalize().ok().zip(b.canonicalize().ok()).is_some_and(|(a, b)| a == b)
+}

@@ -1,0 +1,112 @@
+//! The filter of a fusion: made for a recording whose trajectory is not known.
+
+use super::navigate::Note;
+use super::reduction::Reduced;
+use crate::ekf::{Belief, BeliefError, FilterStates, InitialSettings};
+use crate::gnss::GnssFix;
+use crate::noise::{Composite, Model, ParameterError, Process, continuous, reduction};
+use crate::observer::Observer;
+use crate::sensors::gnss::GnssSettings;
+use crate::sensors::outage::Outage;
+use crate::simulation::lincov;
+
+/// What the filter of a fusion is made of.
+#[derive(Debug, Clone, Copy)]
+pub struct FusionFilter<'a> {
+    /// The model of the IMU.
+    pub model: &'a Model,
+    /// The filter's states.
+    pub states: FilterStates,
+    /// What it expects at the start, and of the IMU beside the model.
+    pub initial: &'a InitialSettings,
+}
+
+/// A filter that cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum FusionFilterError {
+    /// The model cannot be converted to the rate of the recording.
+    #[error(transparent)]
+    Rate(#[from] continuous::RateError),
+    /// The model has no such filter.
+    #[error(transparent)]
+    Belief(#[from] BeliefError),
+    /// The reduction cannot be assessed.
+    #[error(transparent)]
+    Reduction(#[from] ParameterError),
+}
+
+impl FusionFilter<'_> {
+    /// The filter for an IMU of that rate, these fixes and outages. A reduced filter is made for a built-in drive with
+    /// the receiver of the fixes; what the reduction does is told to `observer`.
+    ///
+    /// # Errors
+    /// When the model cannot be converted to the rate, or has no such filter.
+    pub fn belief(
+        &self,
+        rate_hz: f64,
+        gnss: &[GnssFix],
+        outages: &[Outage],
+        observer: &dyn Observer<Note>,
+    ) -> Result<Belief, FusionFilterError> {
+        let Self { states, initial, .. } = *self;
+        let model = at_rate(self.model, rate_hz)?;
+        let lengths: Vec<f64> = outages.iter().map(|o| o.end_s - o.start_s).collect();
+        let steps = gnss.windows(2).map(|w| w[1].t_s - w[0].t_s);
+        let interval_s = middle(steps.collect()).unwrap_or(1.0);
+        let window_s = reduction::window_s(lengths.iter().copied().fold(0.0, f64::max));
+        let belief = Belief::new(&model, states, interval_s, window_s)?;
+        let drive = || lincov::drive(&model, &receiver(gnss, interval_s), &lengths);
+        let Some(track) = states.is_reduced().then(drive).flatten() else {
+            return Ok(belief.with_initial(initial));
+        };
+        let belief = lincov::reduced_belief(&model, belief, &track).with_initial(initial);
+        let full = Belief::new(&model, FilterStates::Full, interval_s, window_s);
+        let full = full.ok().map(|full| full.with_initial(&beside(states, initial)));
+        let reduced = Reduced { model: &model, belief: &belief, full, track: &track, interval_s, window_s };
+        reduced.summary(observer)?;
+        Ok(belief)
+    }
+}
+
+/// The value in the middle, in order.
+fn middle(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+/// What a filter expects beside the model, with what its states say of scale factors.
+fn beside(states: FilterStates, initial: &InitialSettings) -> InitialSettings {
+    let mut all = initial.clone();
+    let ppm = states.scale_sigma() * 1e6;
+    if ppm > 0.0 {
+        all.accel_scale_sigma_ppm.get_or_insert(ppm);
+        all.gyro_scale_sigma_ppm.get_or_insert(ppm);
+    }
+    all
+}
+
+/// The receiver of the fixes: medians.
+fn receiver(gnss: &[GnssFix], interval_s: f64) -> GnssSettings {
+    let defaults = GnssSettings::default();
+    let position = |i: usize| middle(gnss.iter().map(|fix| fix.pos_sigma_n[i]).collect());
+    let velocity = |i: usize| middle(gnss.iter().filter_map(|fix| Some(fix.velocity?.1[i])).collect());
+    let velocities = [0, 1, 2].map(velocity);
+    let has_velocity = velocities.iter().all(Option::is_some);
+    GnssSettings {
+        rate_hz: 1.0 / interval_s,
+        pos_sigma_m: [0, 1, 2].map(|i| position(i).unwrap_or(defaults.pos_sigma_m[i])),
+        vel_sigma_m_s: has_velocity.then(|| velocities.map(Option::unwrap_or_default)),
+        ..defaults
+    }
+}
+
+/// At the rate of the recording, without quantization noise: the filter leaves it out, and it belongs to
+/// its own rate.
+fn at_rate(model: &Model, rate_hz: f64) -> Result<Model, continuous::RateError> {
+    let kept = |axis: &Composite| {
+        let processes = axis.processes.iter().filter(|p| !matches!(p, Process::Quantization(_)));
+        Composite::new(processes.copied().collect())
+    };
+    let axes = std::array::from_fn(|i| kept(&model.axes[i]));
+    continuous::at_rate(&Model { rate_hz: model.rate_hz, axes }, rate_hz)
+}
