@@ -107,12 +107,7 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
             let study = efficiency_file::read(path)?;
             Ok(format!("a study of estimators on {} sets of recordings", study.sets))
         }
-        FileKind::Model => {
-            let file = read::model(path, session)?;
-            let labels: Vec<String> = file.model.axes.iter().map(|axis| axis.labels().join(" + ")).collect();
-            let (accel, gyro) = (&labels[0], &labels[3]);
-            Ok(format!("a noise model at {} Hz, accel {accel}, gyro {gyro}", file.model.rate_hz))
-        }
+        FileKind::Model => model(path, session),
         FileKind::CatalogueEntry => {
             let sheet = datasheet::read(path)?;
             let name = sheet.name.unwrap_or_default();
@@ -141,28 +136,37 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
             let start = read_initial(path)?;
             Ok(format!("an initial state at {} s", start.t_s))
         }
-        FileKind::Gnss => {
-            let (fixes, remarks) = read_gnss(path, None).map_err(read::refused_for_fusion)?;
-            remarks.iter().for_each(|remark| session.printer.warn(remark));
-            let span = fixes.first().zip(fixes.last()).map_or(0.0, |(a, b)| b.t_s - a.t_s);
-            let velocity = if fixes.iter().any(|f| f.velocity.is_some()) { " with velocity" } else { "" };
-            Ok(format!("{} GNSS fixes{velocity} over {span} s", fixes.len()))
-        }
-        FileKind::Imu => {
-            let imu = read_imu(path).map_err(read::refused_for_fusion)?;
-            imu.remarks.iter().for_each(|remark| session.printer.warn(remark));
-            Ok(format!(
-                "an IMU recording of {} samples at {:.2} Hz, for fuse",
-                imu.samples.len(),
-                imu.rate_hz
-            ))
-        }
-        FileKind::Recording => {
-            let recordings = read::recordings_at(&[path.to_owned()], rate_hz, session)?;
-            let one = |r: &nav_sim::imu::Recording| {
-                format!("{} channels of {} samples at {} Hz", r.signals.len(), r.len(), r.rate_hz)
-            };
-            Ok(format!("static, {}", recordings.iter().map(one).collect::<Vec<_>>().join("; ")))
-        }
+        FileKind::Gnss => gnss(path, session),
+        FileKind::Imu => imu(path, session),
+        FileKind::Recording => recording(path, rate_hz, session),
     }
+}
+
+fn model(path: &Path, session: &Session) -> Result<String, Failure> {
+    let file = read::model(path, session)?;
+    let labels: Vec<String> = file.model.axes.iter().map(|axis| axis.labels().join(" + ")).collect();
+    let (accel, gyro) = (&labels[0], &labels[3]);
+    Ok(format!("a noise model at {} Hz, accel {accel}, gyro {gyro}", file.model.rate_hz))
+}
+
+fn gnss(path: &Path, session: &Session) -> Result<String, Failure> {
+    let (fixes, remarks) = read_gnss(path, None).map_err(read::refused_for_fusion)?;
+    remarks.iter().for_each(|remark| session.printer.warn(remark));
+    let span = fixes.first().zip(fixes.last()).map_or(0.0, |(a, b)| b.t_s - a.t_s);
+    let velocity = if fixes.iter().any(|f| f.velocity.is_some()) { " with velocity" } else { "" };
+    Ok(format!("{} GNSS fixes{velocity} over {span} s", fixes.len()))
+}
+
+fn imu(path: &Path, session: &Session) -> Result<String, Failure> {
+    let imu = read_imu(path).map_err(read::refused_for_fusion)?;
+    imu.remarks.iter().for_each(|remark| session.printer.warn(remark));
+    Ok(format!("an IMU recording of {} samples at {:.2} Hz, for fuse", imu.samples.len(), imu.rate_hz))
+}
+
+fn recording(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String, Failure> {
+    let recordings = read::recordings_at(&[path.to_owned()], rate_hz, session)?;
+    let described = recordings
+        .iter()
+        .map(|r| format!("{} channels of {} samples at {} Hz", r.signals.len(), r.len(), r.rate_hz));
+    Ok(format!("static, {}", described.collect::<Vec<_>>().join("; ")))
 }

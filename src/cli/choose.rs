@@ -8,8 +8,8 @@ use super::{Failure, Session, read};
 use nav_sim::calibration::{Bootstrap, Estimator, ModelChoice, Pool, Settings, Trim, diagnose};
 use nav_sim::choose::{Candidate, Inflation};
 use nav_sim::ekf::FilterStates;
-use nav_sim::formats::atomic::{AtomicDir, Existing, Found, claim_directory};
-use nav_sim::formats::model_file::{self, CalibrationNote, ModelFile};
+use nav_sim::formats::atomic::{AtomicDir, Found, claim_directory};
+use nav_sim::formats::model_file::CalibrationNote;
 use nav_sim::jobs::{
     self, Calibration, CalibrationOptions, ChoiceDrive, Chosen, EstimatorChoice, ModelFiles,
 };
@@ -213,30 +213,16 @@ fn write(args: &Args, chosen: &Chosen, report: &ChoiceReport<'_>, seed: u64) -> 
         inputs,
     };
     let files = ModelFiles::of(&model, &[chosen.winner.estimator]);
-    files[0].write(&chosen.calibration, &note)?;
-    let Calibration { groups, outcomes, settings } = &chosen.calibration;
-    files[0].write_page(&chosen.calibration, &diagnose(groups, outcomes, settings))?;
-    if chosen.winner.inflation == Inflation::None {
+    let Chosen { calibration, model, winner, .. } = chosen;
+    if winner.inflation == Inflation::None {
+        files[0].write(calibration, &note)?;
         directory.path("model.draws.json");
     } else {
-        inflated(&files[0], chosen)?;
+        files[0].write_inflated(calibration, &note, model, winner.inflation.name())?;
     }
+    let Calibration { groups, outcomes, settings } = calibration;
+    files[0].write_page(calibration, &diagnose(groups, outcomes, settings))?;
     directory.write("report.html", choice_page(report))?;
     directory.write("ranking.json", report.json())?;
     Ok(directory.commit()?)
-}
-
-/// The model as calibrated, with the inflated parameters in the place of its own: intervals and draws are of those before.
-fn inflated(files: &ModelFiles, chosen: &Chosen) -> Result<(), Failure> {
-    let drawn = std::fs::remove_file(&files.draws);
-    drawn.map_err(|e| Failure::could_not(format!("{}: {e}", files.draws.display())))?;
-    let calibrated = model_file::read(&files.model)?;
-    let mut provenance = calibrated.provenance.unwrap_or_default();
-    provenance.insert("inflation".to_owned(), chosen.winner.inflation.name().into());
-    let file = ModelFile {
-        missing: calibrated.missing,
-        provenance: Some(provenance),
-        ..ModelFile::new(chosen.model.clone())
-    };
-    Ok(model_file::write(&files.model, &file, Existing::Replace)?)
 }

@@ -54,7 +54,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         session.printer.say(&format!("{done} sets are there already"));
     }
     let progress = session.progress("sets", sets.saturating_sub(done));
-    study.estimate(sets, &mut directory, &|sets| progress.add(sets)).map_err(|e| match e {
+    // Long enough that no thread waits for the last set of a block for a large part of it.
+    let block = 8 * session.threads() as u64;
+    study.estimate(sets, block, &mut directory, &|sets| progress.add(sets)).map_err(|e| match e {
         EstimatorStudyError::File(e) => e.into(),
         EstimatorStudyError::Study(e) => Failure::input(e),
     })?;

@@ -48,18 +48,17 @@ impl EstimatorStudy {
         StudyDirectory::open(path, &identity(&self.design), layout(&self.design, &self.aim))
     }
 
-    /// Estimates from the sets that are not done yet, block by block: a block is kept as soon as it is done.
+    /// Estimates from the sets that are not done yet, block by block of so many: a block is kept as soon as it is done.
     ///
     /// # Errors
     /// When a set has no estimates, or the disk is full.
     pub fn estimate(
         &self,
         sets: u64,
+        block: u64,
         directory: &mut StudyDirectory,
         progress: &(dyn Fn(u64) + Sync),
     ) -> Result<(), EstimatorStudyError> {
-        // Long enough that no thread waits for the last set of a block for a large part of it.
-        let block = 8 * rayon::current_num_threads() as u64;
         let mut next = directory.done.len() as u64;
         while next < sets {
             let end = sets.min(next + block);

@@ -4,8 +4,9 @@ use super::Calibration;
 use crate::calibration::{Diagnosis, Estimator, Outcome};
 use crate::formats::atomic::{self, AtomicFile, Existing};
 use crate::formats::draws_file::{self, DrawsFile};
-use crate::formats::model_file::{self, CalibrationNote};
+use crate::formats::model_file::{self, CalibrationNote, ModelFile};
 use crate::formats::{FileError, hash};
+use crate::noise::Model;
 use crate::report::{self, CurvesFile};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -49,16 +50,16 @@ impl ModelFiles {
         existing: Existing,
     ) -> Result<(), FileError> {
         let (curves, model) = self.contents(calibration, note);
-        atomic::guard_contents(&self.model, model.as_bytes(), existing)?;
+        atomic::guard_contents(&self.model, model_file::to_toml(&model).as_bytes(), existing)?;
         atomic::guard_contents(&self.curves, curves.as_bytes(), existing)
     }
 
-    fn contents(&self, calibration: &Calibration, note: &CalibrationNote) -> (String, String) {
+    fn contents(&self, calibration: &Calibration, note: &CalibrationNote) -> (String, ModelFile) {
         let Calibration { groups, outcomes, settings } = calibration;
         let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == self.estimator).collect();
         let curves = report::json(&CurvesFile::new(groups, &own, settings));
         let blake3 = hash::of_bytes(curves.as_bytes());
-        let model = model_file::to_toml(&note.model_file(&own, settings, Some(&blake3)));
+        let model = note.model_file(&own, settings, Some(&blake3));
         (curves, model)
     }
 
@@ -76,8 +77,32 @@ impl ModelFiles {
         // All are on the disk before any has its name. Should the model not get its name, the hash in it tells that the
         // curves are not of it, and its parameters that the draws are not.
         let draws = draws.map(|text| staged(&self.draws, &text)).transpose()?;
-        let (curves, model) = (staged(&self.curves, &curves)?, staged(&self.model, &model)?);
+        let (curves, model) =
+            (staged(&self.curves, &curves)?, staged(&self.model, &model_file::to_toml(&model))?);
         draws.map_or(Ok(()), AtomicFile::commit)?;
+        curves.commit()?;
+        model.commit()
+    }
+
+    /// Writes the curves of the estimator, and in the place of its own model one with inflated parameters: intervals and
+    /// draws, which are of its own, are left out.
+    ///
+    /// # Errors
+    /// When the system refuses.
+    pub fn write_inflated(
+        &self,
+        calibration: &Calibration,
+        note: &CalibrationNote,
+        inflated: &Model,
+        inflation: &str,
+    ) -> Result<(), FileError> {
+        let (curves, own) = self.contents(calibration, note);
+        let mut provenance = own.provenance.unwrap_or_default();
+        provenance.insert("inflation".to_owned(), inflation.into());
+        let provenance = Some(provenance);
+        let model = ModelFile { missing: own.missing, provenance, ..ModelFile::new(inflated.clone()) };
+        let (curves, model) =
+            (staged(&self.curves, &curves)?, staged(&self.model, &model_file::to_toml(&model))?);
         curves.commit()?;
         model.commit()
     }

@@ -19,6 +19,7 @@ mod recording;
 mod replicates;
 pub mod require;
 mod run_directory;
+pub mod run_words;
 #[cfg(test)]
 pub(crate) mod sample;
 mod signals;

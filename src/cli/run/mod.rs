@@ -12,14 +12,14 @@ use inputs::Inputs;
 use nav_sim::formats::scenario_file;
 use nav_sim::jobs::{self, NavigateError};
 use nav_sim::metrics::{Requirement, Summary};
-use nav_sim::report::{Manifest, TrajectorySeries, window};
+use nav_sim::report::{Manifest, TrajectorySeries, run_words, window};
 use nav_sim::scenario::{Method, Scenario};
 use nav_sim::sensors::imu::TruthError;
 use nav_sim::sensors::outage::{NotAnOutage, Outage, PlacedOutages};
 use nav_sim::simulation::ExperimentError;
 use std::path::{Path, PathBuf};
 
-use output::{manifest, text, write};
+use output::{manifest, write};
 pub(super) use words::Words;
 
 /// Monte-Carlo INS/GNSS navigation along TRAJECTORY with MODEL in the filter
@@ -134,10 +134,10 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let manifest = Manifest { independent_windows, wall_s, throughput_epochs_per_s, ..manifest };
     write(&found, &manifest, &TrajectorySeries::of(&inputs.job.trajectory), &args.out)?;
     args.plot.write(|| nav_sim::report::run_svg(&found.epochs, &found.summary), session)?;
-    let shown = if session.json() { nav_sim::report::summary_json } else { text };
+    let shown = if session.json() { nav_sim::report::summary_json } else { run_words::text };
     session.printer.result(shown(&found.summary, throughput_epochs_per_s).trim_end());
     if session.verbose() && !session.json() {
-        session.printer.result(output::sensitivity_table(&found.summary).trim_end());
+        session.printer.result(run_words::sensitivity_table(&found.summary).trim_end());
     }
     output::doubt_filter(&found.summary, session);
     session.printer.say(&format!("wrote {}", args.out.display()));
@@ -159,7 +159,7 @@ fn requirable(all: &[Requirement], no_outage: bool) -> Result<(), Failure> {
 
 /// Whether everything required is met.
 fn required(summary: &Summary) -> Result<(), Failure> {
-    let missed: Vec<String> = summary.require.iter().filter(|r| !r.met).map(output::met_line).collect();
+    let missed: Vec<String> = summary.require.iter().filter(|r| !r.met).map(run_words::met_line).collect();
     if missed.is_empty() { Ok(()) } else { Err(Failure::bound(missed.join("; "))) }
 }
 

@@ -2,8 +2,8 @@
 
 use crate::cli::{Progress, Session};
 use nav_sim::jobs::Note;
-use nav_sim::metrics::Agreement;
 use nav_sim::observer::Observer;
+use nav_sim::report::run_words;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
@@ -45,7 +45,7 @@ impl Observer<Note> for Words<'_> {
             Note::Heading(doubt) => printer.warn(&doubt.to_string()),
             Note::Agreement(agreement) if agreement.is_broken() => printer.warn(&format!(
                 "the runs contradict the covariance analysis: {}; errors are no longer small",
-                agreement_line(agreement)
+                run_words::agreement_line(agreement)
             )),
             Note::Agreement(_) => {}
         }
@@ -66,15 +66,4 @@ impl Observer<Note> for Words<'_> {
             *self.runs_s.lock().unwrap_or_else(PoisonError::into_inner) = start.elapsed().as_secs_f64();
         }
     }
-}
-
-/// `largest z -2.31 (RMSE of yaw_deg at the end of outage 1) of 22 figures, up to 4.4 by chance; NEES z +0.52, …`
-pub(super) fn agreement_line(a: &Agreement) -> String {
-    if a.figures == 0 {
-        return "too few to compare: a scatter takes two runs".to_owned();
-    }
-    format!(
-        "largest z {:+.2} ({}) of {} figures, up to {:.1} by chance; NEES z {:+.2}, coverage z {:+.2}",
-        a.largest_z, a.largest, a.figures, a.bound_z, a.nees_z, a.coverage_z
-    )
 }

@@ -64,13 +64,20 @@ pub(super) fn timing(
     };
     let timing = clock.check(raw, options)?;
     report.rate_from = clock.source;
+    doubt(&timing, &clock.name, raw, options, report);
+    let breaks = if options.gaps == Gaps::Split { timing.breaks } else { Vec::new() };
+    Ok(Timing { rate_hz: timing.rate_hz, breaks })
+}
+
+/// Says what is doubtful about a clock.
+fn doubt(timing: &Checked, column: &str, raw: &Raw, options: &ReadOptions, report: &mut FileReport) {
     if let Some(given) = options.rate_hz.filter(|given| (timing.found_hz / given - 1.0).abs() > ROUNDED) {
         let found = timing.found_hz;
         report.rate_from = format!("given; the {} has {found} Hz", report.rate_from);
         report.warn(format!("{given} Hz is given, but the file runs at {found} Hz: the rate given is taken"));
     }
     if !USUAL_RATES_HZ.contains(&timing.rate_hz) {
-        let (rate_hz, column) = (timing.rate_hz, &clock.name);
+        let rate_hz = timing.rate_hz;
         report.warn(format!("{rate_hz} Hz is no usual rate of an IMU: is the unit of \"{column}\" right?"));
     }
     if !timing.breaks.is_empty() {
@@ -81,8 +88,6 @@ pub(super) fn timing(
             _ => format!("split at {n} gaps or duplicates in time, the first in line {first}"),
         });
     }
-    let breaks = if options.gaps == Gaps::Split { timing.breaks } else { Vec::new() };
-    Ok(Timing { rate_hz: timing.rate_hz, breaks })
 }
 
 /// What the steps of a clock say.
