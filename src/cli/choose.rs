@@ -96,6 +96,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         pool: args.pool,
         settings: Settings { trim: args.trim, tuning: args.tuning.tuning()?, ..Settings::default() },
         bootstrap: Some(Bootstrap { seed, ..Bootstrap::default() }),
+        turn_on: false,
     };
     let drive = ChoiceDrive { trajectory, scenario, outages: outages.clone(), seed, runs: args.runs };
     let words = Words::new(session);
@@ -214,7 +215,7 @@ fn write(args: &Args, chosen: &Chosen, report: &ChoiceReport<'_>, seed: u64) -> 
     };
     let files = ModelFiles::of(&model, &[chosen.winner.estimator]);
     files[0].write(&chosen.calibration, &note)?;
-    let Calibration { groups, outcomes, settings } = &chosen.calibration;
+    let Calibration { groups, outcomes, settings, .. } = &chosen.calibration;
     files[0].write_page(&chosen.calibration, &diagnose(groups, outcomes, settings))?;
     if chosen.winner.inflation == Inflation::None {
         directory.path("model.draws.json");
