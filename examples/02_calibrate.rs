@@ -31,6 +31,7 @@ fn replicate(k: u64, tuning: &Tuning) -> Result<Replicate, Box<dyn std::error::E
         classical,
         robust,
         trend: f64::NAN,
+        mean: f64::NAN,
     })
 }
 

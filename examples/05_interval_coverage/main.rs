@@ -35,7 +35,15 @@ fn set(design: &Design, set: u64, draws: usize) -> Result<Vec<Outcome>, Failure>
         let (name, axis) = (run.to_string(), Some(design.channel.axis));
         measured.push((
             design.channel,
-            Replicate { name, axis, samples: design.samples, classical, robust, trend: f64::NAN },
+            Replicate {
+                name,
+                axis,
+                samples: design.samples,
+                classical,
+                robust,
+                trend: f64::NAN,
+                mean: f64::NAN,
+            },
         ));
     }
     let settings = Settings {

@@ -144,6 +144,7 @@ impl Anticipated<'_> {
             classical: Vec::new(),
             robust: Vec::new(),
             trend: f64::NAN,
+            mean: f64::NAN,
         };
         let group = |values: &[f64]| {
             let one = |k: usize, channel: &Channel| Replicate {

@@ -26,6 +26,8 @@ mod diagnosis;
 mod words;
 // All of it.
 mod pipeline;
+// What the means of recordings say.
+mod turn_on;
 // What a calibration that is not made yet would tell.
 mod anticipated;
 // Studies of estimators.
@@ -48,6 +50,7 @@ pub use outcome::{
     Settings, TooSimple, Undetermined, model_of, put,
 };
 pub use pipeline::{CalibrationError, Cause, calibrate, fit_curve, infer};
+pub use turn_on::{MeansOfAxis, TURN_ON_LEVEL, TurnOnFinding, TurnOnSpread, turn_on};
 pub use uncertainty::{ALIKE_LEVEL, CurveInfluence, Scattering, derived_interval};
 pub use words::{
     Share, advice, axes_remark, correlation_time_s, duration, effects, percent, reasons, shares, signals,

@@ -96,6 +96,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         pool: args.pool,
         settings: Settings { trim: args.trim, tuning: args.tuning.tuning()?, ..Settings::default() },
         bootstrap: Some(Bootstrap { seed, ..Bootstrap::default() }),
+        turn_on: false,
     };
     let drive = ChoiceDrive { trajectory, scenario, outages: outages.clone(), seed, runs: args.runs };
     let words = Words::new(session);
@@ -220,7 +221,7 @@ fn write(args: &Args, chosen: &Chosen, report: &ChoiceReport<'_>, seed: u64) -> 
     } else {
         files[0].write_inflated(calibration, &note, model, winner.inflation.name())?;
     }
-    let Calibration { groups, outcomes, settings } = calibration;
+    let Calibration { groups, outcomes, settings, .. } = calibration;
     files[0].write_page(calibration, &diagnose(groups, outcomes, settings))?;
     directory.write("report.html", choice_page(report))?;
     directory.write("ranking.json", report.json())?;

@@ -5,8 +5,8 @@ use super::{Failure, Session};
 use nav_sim::formats::atomic;
 use nav_sim::jobs::{self, CompareError, Comparison};
 use nav_sim::metrics::ComparisonError;
-use nav_sim::report;
 pub(super) use nav_sim::report::markdown_table as table;
+use nav_sim::report::{self, PaperFigure};
 use nav_sim::simulation::REPORTED_NAMES;
 use std::path::PathBuf;
 
@@ -100,6 +100,17 @@ impl Compared {
     pub(super) fn page(&self, links: &[(String, String)]) -> String {
         let Comparison { file, candidates, curves, outages, .. } = &self.found;
         report::comparison_page(file, candidates, curves, outages, &self.states, links)
+    }
+
+    /// The paper's Figure 7.
+    pub(super) fn figure(&self) -> PaperFigure {
+        let Comparison { candidates, curves, outages, .. } = &self.found;
+        report::comparison_figure(candidates, curves, outages, &self.states)
+    }
+
+    /// The outages (start, end) (s).
+    pub(super) fn outages(&self) -> &[(f64, f64)] {
+        &self.found.outages
     }
 
     fn picture(&self) -> String {

@@ -1,10 +1,11 @@
 //! `nav-sim demo`: the case study of the paper, command by command.
 
 use super::batch::shell_words;
-use super::compare::{self, Compared};
-use super::{Cli, Command, Failure, Session};
+use super::compare::Compared;
+use super::{Cli, Command, Failure, Session, read};
 use clap::Parser;
-use nav_sim::formats::atomic;
+use nav_sim::formats::{FileError, atomic};
+use nav_sim::report::{StudyCurves, TrajectorySeries, paper_figures, paper_page};
 use std::path::{Path, PathBuf};
 
 /// The case study of Minaretzis et al. 2024, Section V, on a virtual IMU: calibrate with three estimators
@@ -56,7 +57,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         let cli = Cli::try_parse_from(words).map_err(Failure::input)?;
         let inner = session.within(&cli.common, i < last);
         if let Command::Compare(compare) = &cli.command {
-            index(compare, &args.out, session)?;
+            let compared = Compared::new(compare, session)?;
+            index(&compared, &args.out)?;
+            figures(&compared, &args.out, session)?;
         }
         cli.command.run(&inner)?;
     }
@@ -70,8 +73,8 @@ fn page(out: &str) -> PathBuf {
 }
 
 /// Writes that page: the comparison, with links to the pages of its models and runs.
-fn index(compare: &compare::Args, out: &str, session: &Session) -> Result<(), Failure> {
-    let mut links = Vec::new();
+fn index(compared: &Compared, out: &str) -> Result<(), Failure> {
+    let mut links = vec![("figures/index.html".to_owned(), "the paper's figures".to_owned())];
     for name in names() {
         links.push((format!("models/{name}.html"), format!("model {name}: curves and parameters")));
         links.push((
@@ -79,8 +82,33 @@ fn index(compare: &compare::Args, out: &str, session: &Session) -> Result<(), Fa
             format!("navigation with {name}: errors and consistency"),
         ));
     }
-    let compared = Compared::new(compare, session)?;
     Ok(atomic::write(&page(out), compared.page(&links))?)
+}
+
+/// Writes the paper's figures and a page of them; Figure 2 is of `nav-sim efficiency`.
+fn figures(compared: &Compared, out: &str, session: &Session) -> Result<(), Failure> {
+    let mut curves = Vec::new();
+    for (scenario, estimator) in
+        SCENARIOS.iter().flat_map(|scenario| ESTIMATORS.iter().map(move |estimator| (scenario, estimator)))
+    {
+        let path = Path::new(out).join(format!("models/{scenario}_{estimator}.wv.json"));
+        let text = std::fs::read_to_string(&path).map_err(|e| FileError::io(&path, e))?;
+        let file = serde_json::from_str(&text).map_err(Failure::could_not)?;
+        let (scenario, estimator) = ((*scenario).to_owned(), (*estimator).to_owned());
+        curves.push(StudyCurves { scenario, estimator, file });
+    }
+    let trajectory = read::trajectory(Path::new(TRAJECTORY), session)?;
+    let track = TrajectorySeries::of(&trajectory);
+    let mut figures = paper_figures(&curves, &track, compared.outages());
+    figures.push(compared.figure());
+    let directory = Path::new(out).join("figures");
+    std::fs::create_dir_all(&directory).map_err(|e| FileError::io(&directory, e))?;
+    for figure in &figures {
+        atomic::write(&directory.join(figure.file_name()), figure.svg())?;
+    }
+    atomic::write(&directory.join("index.html"), paper_page(&figures))?;
+    session.printer.say(&format!("the paper's figures: {}", directory.display()));
+    Ok(())
 }
 
 /// Scenario and estimator of each model.

@@ -5,8 +5,9 @@ use super::run::{OutageArg, parse_outage, windows_of};
 use super::{Failure, Session, read};
 use nav_sim::calibration::{Bootstrap, Estimator, Settings};
 use nav_sim::ekf::FilterStates;
-use nav_sim::jobs::{self, Design, DesignInputs, Destination, NavigateInputs, TrueImu};
-use nav_sim::report::{readable, seconds, window};
+use nav_sim::formats::atomic::guard_inputs;
+use nav_sim::jobs::{self, DesignInputs, Destination, NavigateInputs, TrueImu};
+use nav_sim::report::{design_page, design_rows, design_verdict};
 use nav_sim::scenario::{Method, Scenario};
 use serde_json::json;
 use std::path::PathBuf;
@@ -45,6 +46,9 @@ pub(crate) struct Args {
     /// Window without fixes, in seconds (repeatable; default: 300:390 and 700:790)
     #[arg(long = "outage", value_name = "START:END", value_parser = parse_outage, requires = "trajectory")]
     outages: Vec<OutageArg>,
+    /// Write a page with figures
+    #[arg(long, value_name = "FILE.html")]
+    page: Option<PathBuf>,
 }
 
 /// Longest recording that is planned (h): a year.
@@ -57,6 +61,10 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     if args.hours.is_some_and(|hours| hours > LONGEST_H) {
         return Err(Failure::input("--hours: longer than a year"));
+    }
+    if let Some(page) = &args.page {
+        let inputs = std::iter::once(&args.model).chain(&args.trajectory);
+        guard_inputs(page, inputs.map(PathBuf::as_path))?;
     }
     let file = read::model(&args.model, session)?;
     let mut scenario = Scenario::default();
@@ -99,95 +107,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     let shown = match designs.as_slice() {
         _ if session.json() => json!({ "schema_version": 1, "designs": designs }).to_string(),
-        [design] => single(design),
-        several => grid(several),
+        designs => format!("{}\n{}", design_verdict(designs), super::compare::table(&design_rows(designs))),
     };
     session.printer.result(shown.trim_end());
-    Ok(())
-}
-
-fn percent(half_width: Option<f64>) -> String {
-    half_width.map_or("not determined".to_owned(), |half| format!("± {} %", readable(half)))
-}
-
-/// The parameter that would be known least: its name, and how well.
-fn least_known(design: &Design) -> String {
-    let open = design.parameters.iter().filter(|p| p.half_width_pct.is_none()).count();
-    let widest = design.parameters.iter().filter(|p| p.half_width_pct.is_some());
-    let widest = widest.max_by(|a, b| a.half_width_pct.partial_cmp(&b.half_width_pct).expect("numbers"));
-    let widest = widest.map(|p| format!("{} {} {}", p.signals, p.parameter, percent(p.half_width_pct)));
-    match (open, widest) {
-        (0, Some(widest)) => widest,
-        (open, Some(widest)) => format!("{widest}; {open} not determined"),
-        (_, None) => "not determined".to_owned(),
-    }
-}
-
-/// What lengths do not help, in words.
-fn floor(design: &Design) -> Option<String> {
-    let names: Vec<String> =
-        design.lengths_do_not_help().map(|p| format!("{} {}", p.signals, p.parameter)).collect();
-    (!names.is_empty()).then(|| {
-        format!(
-            "more hours will not help {} of {} parameters ({}, …): the recordings differ among themselves; more \
-             recordings will",
-            names.len(),
-            design.parameters.len(),
-            names[0]
-        )
-    })
-}
-
-fn p95(design: &Design) -> Vec<String> {
-    let line = |q: &jobs::DesignedQuantile| {
-        let [low, high] = q.ci95.map(readable);
-        let window = window(q.start_s, q.end_s);
-        let half = readable(q.half_width_pct);
-        format!("horizontal p95 at the end of {window}: {} m ± {half} % [{low}, {high}]", readable(q.p95_m))
-    };
-    design.horizontal_p95.iter().map(line).collect()
-}
-
-/// One design: the verdict, then every parameter.
-fn single(design: &Design) -> String {
-    let head = format!(
-        "{} recordings of {} h; the parameter known least: {}",
-        design.recordings,
-        design.hours,
-        least_known(design)
-    );
-    let mut lines = vec![head];
-    lines.extend(p95(design));
-    lines.extend(floor(design));
-    let varies = design.parameters.iter().any(|p| p.endless_half_width_pct.is_some());
-    let mut titles = vec!["parameter", "value", "95 % interval to expect", ""];
-    titles.extend(varies.then_some("of endless recordings"));
-    let mut rows: Vec<Vec<String>> = vec![titles.into_iter().map(str::to_owned).collect()];
-    for p in &design.parameters {
-        let ends =
-            p.ci95.map_or(String::new(), |[low, high]| format!("{} … {}", readable(low), readable(high)));
-        let name = format!("{} {}", p.signals, p.parameter);
-        let mut row = vec![name, readable(p.value), ends, percent(p.half_width_pct)];
-        if varies {
-            row.push(p.endless_half_width_pct.map_or("0 %".to_owned(), |half| percent(Some(half))));
-        }
-        rows.push(row);
-    }
-    format!("{}\n{}", lines.join("\n"), super::compare::table(&rows))
-}
-
-/// Several designs, a row each.
-fn grid(designs: &[Design]) -> String {
-    let windows = designs[0].horizontal_p95.iter();
-    let windows = windows.map(|q| format!("p95 at {} s", seconds(q.end_s)));
-    let titles = ["recordings", "hours", "parameter known least"].map(str::to_owned);
-    let mut rows: Vec<Vec<String>> = vec![titles.into_iter().chain(windows).collect()];
-    for design in designs {
-        let mut row = vec![design.recordings.to_string(), readable(design.hours), least_known(design)];
-        row.extend(design.horizontal_p95.iter().map(|q| percent(Some(q.half_width_pct))));
-        rows.push(row);
-    }
-    let last = designs.last().and_then(floor);
-    let last = last.map_or(String::new(), |floor| format!("with the most hours, {floor}\n"));
-    format!("half of the 95 % intervals to expect\n{last}{}", super::compare::table(&rows))
+    super::pictures::page(args.page.as_deref(), || design_page(&designs), session)
 }

@@ -35,6 +35,7 @@ mod trajectory;
 mod tune;
 mod tuning;
 mod turn_on;
+mod version;
 mod wv;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
@@ -126,8 +127,7 @@ fn command() -> clap::Command {
 }
 
 /// `--color` as written, for the help and usage errors, which clap prints before it has read the flags.
-fn color_choice() -> clap::ColorChoice {
-    let words: Vec<String> = std::env::args_os().map(|w| w.to_string_lossy().into_owned()).collect();
+fn color_choice(words: &[String]) -> clap::ColorChoice {
     let after = words.iter().skip_while(|w| *w != "--color").nth(1).map(String::as_str);
     match words.iter().find_map(|w| w.strip_prefix("--color=")).or(after) {
         Some("always") => clap::ColorChoice::Always,
@@ -137,7 +137,9 @@ fn color_choice() -> clap::ColorChoice {
 }
 
 pub(crate) fn main() -> ExitCode {
-    let matches = command().color(color_choice()).get_matches();
+    let words: Vec<String> = std::env::args_os().map(|w| w.to_string_lossy().into_owned()).collect();
+    let known = command().color(color_choice(&words)).version(&*version::version(&words).leak());
+    let matches = known.get_matches();
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
     let printer = Printer::new(&cli.common);
     if !cli.command.heeds_signals() {

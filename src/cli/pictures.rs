@@ -35,6 +35,18 @@ impl PlotArgs {
     }
 }
 
+/// Writes a page, if one is asked for.
+pub(super) fn page(
+    path: Option<&Path>,
+    html: impl FnOnce() -> String,
+    session: &Session,
+) -> Result<(), Failure> {
+    let Some(path) = path else { return Ok(()) };
+    atomic::write_result(path, html(), session.existing())?;
+    session.printer.say(&format!("wrote {}", path.display()));
+    Ok(())
+}
+
 /// Refuses to replace a page of somebody else by one that nobody named.
 pub(super) fn replaceable(path: &Path) -> Result<(), Failure> {
     match std::fs::read_to_string(path) {

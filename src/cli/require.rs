@@ -1,6 +1,6 @@
 //! `nav-sim require`: which IMU a limit needs, and what a given one makes of it.
 
-use super::{Failure, Session, parse, read, turn_on};
+use super::{Failure, Session, parse, pictures, read, turn_on};
 use nav_sim::formats::atomic::{AtomicFile, guard_inputs};
 use nav_sim::formats::datasheet::{self, CATALOGUE, Datasheet};
 use nav_sim::formats::file_kind::{self, FileKind};
@@ -10,6 +10,7 @@ use nav_sim::jobs::{Ask, CatalogueUnit, Misplaced, Requirements};
 use nav_sim::noise::Model;
 use nav_sim::report::require as words;
 use nav_sim::report::require::{Question, RankedUnit};
+use nav_sim::report::{catalogue_page, model_page, needed_page};
 use nav_sim::require::{ImuParameters, Limit, Quantity, RequireError};
 use nav_sim::sensors::outage::NotAnOutage;
 use std::path::{Path, PathBuf};
@@ -55,6 +56,9 @@ pub(crate) struct Args {
     /// Rank the catalogued IMUs (`nav-sim datasheet --list`), or those of a directory of entries and model files
     #[arg(long, value_name = "DIR", num_args = 0..=1, conflicts_with_all = ["model", "iso_drift", "out"])]
     catalogue: Option<Option<PathBuf>>,
+    /// Write a page with figures
+    #[arg(long, value_name = "FILE.html")]
+    page: Option<PathBuf>,
     /// Model file of the IMU that is sought
     #[arg(long, short, value_name = "FILE", conflicts_with = "model")]
     out: Option<PathBuf>,
@@ -138,10 +142,13 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             Failure::input("--outage longest needs a MODEL").hint("without one, give a length in seconds")
         );
     }
+    if let Some(page) = &args.page {
+        guard_inputs(page, std::iter::once(&args.trajectory).chain(&args.model).map(PathBuf::as_path))?;
+    }
     let asked = requirements(args, session)?;
     match (&args.model, &args.catalogue) {
-        (Some(path), _) => given(path, args.outage, &asked, session),
-        (None, Some(directory)) => ranked(directory.as_deref(), &asked, session),
+        (Some(path), _) => given(path, args, &asked, session),
+        (None, Some(directory)) => ranked(directory.as_deref(), args, &asked, session),
         (None, None) => sought(args, &asked, session),
     }
 }
@@ -163,6 +170,7 @@ fn sought(args: &Args, asked: &Requirements, session: &Session) -> Result<(), Fa
         format!("{}\n\n{}", needed.verdict(&question), tables.join("\n\n"))
     };
     session.printer.result(shown.trim_end());
+    pictures::page(args.page.as_deref(), || needed_page(&needed, &question), session)?;
     if let Some(out) = &args.out {
         model_file::write(
             out,
@@ -192,31 +200,32 @@ fn program() -> String {
 }
 
 /// What a given IMU makes of the limits.
-fn given(path: &Path, ask: Ask, asked: &Requirements, session: &Session) -> Result<(), Failure> {
+fn given(path: &Path, args: &Args, asked: &Requirements, session: &Session) -> Result<(), Failure> {
     let unusable = |e: RequireError| Failure::input(format!("{}: {e}", path.display()));
     let file = read::model(path, session)?;
     let mut scenario = asked.scenario.clone();
     turn_on::expect(&mut scenario.initial, &file, path, session);
     turn_on::make(&mut scenario.imu, &file, path, session);
     let model = read::at_rate(path, &file.model, scenario.imu.rate_hz, session)?;
-    let (longest, places) = asked.longest(&scenario, &model).map_err(unusable)?;
-    if ask == Ask::Longest {
+    let (bridged, places) = asked.longest(&scenario, &model).map_err(unusable)?;
+    if args.outage == Ask::Longest {
         let shown = if session.json() {
-            words::longest_json(longest, &places)
+            words::longest_json(&bridged, &places)
         } else {
-            words::longest_verdict(longest, &places)
+            words::longest_verdict(bridged.longest, &places)
         };
         session.printer.result(shown.trim_end());
-        return Ok(());
+        return pictures::page(args.page.as_deref(), || model_page(None, &places, &bridged), session);
     }
     let (margins, question) = asked.margins(&scenario, &model).map_err(unusable)?;
-    let verdict = words::margins_verdict(&margins, &question, longest);
+    let verdict = words::margins_verdict(&margins, &question, bridged.longest);
     let shown = if session.json() {
-        words::margins_json(&margins, &question, longest)
+        words::margins_json(&margins, &question, &bridged)
     } else {
         format!("{verdict}\n\n{}", super::compare::table(&words::margins_rows(&margins)))
     };
     session.printer.result(shown.trim_end());
+    pictures::page(args.page.as_deref(), || model_page(Some(&margins), &question, &bridged), session)?;
     if margins.met() {
         return Ok(());
     }
@@ -226,7 +235,12 @@ fn given(path: &Path, ask: Ask, asked: &Requirements, session: &Session) -> Resu
 }
 
 /// The units of the catalogue or of a directory, the best first.
-fn ranked(directory: Option<&Path>, asked: &Requirements, session: &Session) -> Result<(), Failure> {
+fn ranked(
+    directory: Option<&Path>,
+    args: &Args,
+    asked: &Requirements,
+    session: &Session,
+) -> Result<(), Failure> {
     let units = match directory {
         Some(directory) => units_of(directory, asked, session)?,
         None => catalogue(asked)?,
@@ -238,6 +252,7 @@ fn ranked(directory: Option<&Path>, asked: &Requirements, session: &Session) -> 
         format!("{}:\n\n{}", question.in_words(), super::compare::table(&words::catalogue_rows(&units)))
     };
     session.printer.result(shown.trim_end());
+    pictures::page(args.page.as_deref(), || catalogue_page(&units, &question), session)?;
     if units.iter().any(|unit| !unit.not_stated.is_empty()) {
         session
             .printer

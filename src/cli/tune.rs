@@ -7,10 +7,10 @@ use nav_sim::ekf::FilterStates;
 use nav_sim::formats::atomic::{AtomicFile, guard_inputs};
 use nav_sim::formats::model_file::{self, ModelFile};
 use nav_sim::noise::Model;
-use nav_sim::report::{FactorEntry, Input, TuneResult};
+use nav_sim::report::{FactorEntry, Input, TuneResult, tune_page};
 use nav_sim::scenario::Scenario;
 use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::lincov::{Aim, Factor, Per, Task, Track, drive, scaled};
+use nav_sim::simulation::lincov::{Aim, Factor, Honesty, Per, Task, Track, drive, scaled};
 use std::path::{Path, PathBuf};
 
 /// Find the smallest factors on MODEL that make its filter honest for another truth
@@ -58,6 +58,9 @@ pub(crate) struct Args {
     /// Scenario file: receiver, start, IMU rate (see `nav-sim schema scenario`)
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
+    /// Write a page with figures
+    #[arg(long, value_name = "FILE.html")]
+    page: Option<PathBuf>,
     /// Model file to write
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -70,7 +73,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     refuse_recordings(args)?;
     let mut scenario = scenario(args)?;
     let files = files(args)?;
-    if let Some(out) = &args.out {
+    for out in args.out.iter().chain(&args.page) {
         guard_inputs(out, files.iter().map(|f| Path::new(&f.path)))?;
         drop(AtomicFile::create(out)?);
     }
@@ -103,6 +106,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         after: task.honesty(task.filter, &factors).map_err(Failure::input)?,
         reduced: task.honesty(&reduced, &factors).map_err(Failure::input)?,
         informed: task.informed().map_err(Failure::input)?,
+        sweep: sweep(&task, &factors)?,
         factors,
         truths: names,
     };
@@ -112,11 +116,23 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         format!("{}\n\n{}", result.verdict(), super::compare::table(&result.rows()))
     };
     session.printer.result(shown.trim_end());
+    super::pictures::page(args.page.as_deref(), || tune_page(&result), session)?;
     if let Some(out) = &args.out {
         model_file::write(out, &tuned(&file, &result.factors, args, &files), session.existing())?;
         session.printer.say(&format!("wrote {}", out.display()));
     }
     Ok(())
+}
+
+/// The tuned filter with all its variances times 1/16, 1/8, … 16.
+fn sweep(task: &Task<'_>, factors: &[Factor]) -> Result<Vec<(f64, Honesty)>, Failure> {
+    let times = |power: i32| {
+        let on_variances = f64::from(power).exp2();
+        let scaled = |f: &Factor| Factor { on_variance: f.on_variance * on_variances, ..f.clone() };
+        let factors: Vec<Factor> = factors.iter().map(scaled).collect();
+        Ok((on_variances, task.honesty(task.filter, &factors).map_err(Failure::input)?))
+    };
+    (-4..=4).map(times).collect()
 }
 
 /// A directory or a table holds samples: a truth is a model.

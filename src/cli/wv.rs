@@ -1,7 +1,7 @@
 //! `nav-sim wv`: wavelet variance of static recordings.
 
 use super::parse::words;
-use super::pictures::PlotArgs;
+use super::pictures::{self, PlotArgs};
 use super::recordings::{RecordingArgs, Said};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
@@ -37,6 +37,9 @@ pub(crate) struct Args {
     /// Write a page with figures
     #[arg(long, value_name = "FILE.html")]
     page: Option<PathBuf>,
+    /// Also draw the wavelet deviations in the terminal
+    #[arg(long)]
+    chart: bool,
     #[command(flatten)]
     plot: PlotArgs,
 }
@@ -67,10 +70,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         atomic::write_result(out, &json, session.existing())?;
         session.printer.say(&format!("wrote {}", out.display()));
     }
-    if let Some(page) = &args.page {
-        atomic::write_result(page, report::wavelet_page(&file), session.existing())?;
-        session.printer.say(&format!("wrote {}", page.display()));
-    }
+    pictures::page(args.page.as_deref(), || report::wavelet_page(&file), session)?;
     args.plot.write(|| report::wavelet_svg(&file), session)?;
     if session.json() {
         session.printer.result(json.trim_end());
@@ -83,6 +83,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         () => digest(&file),
     };
     session.printer.result(&text);
+    if args.chart {
+        session.printer.result(&report::wavelet_text(&file));
+    }
     Ok(())
 }
 

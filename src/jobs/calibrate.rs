@@ -2,8 +2,8 @@
 
 use super::{BeginsOtherwise, JobError, Remark, Remarks};
 use crate::calibration::{
-    self, Bootstrap, Estimator, Group, Outcome, Pool, Replicate, Settings, SignalError, WarmUp, grouped,
-    infer, replicates, warm_up,
+    self, Bootstrap, Estimator, Group, Outcome, Pool, Replicate, Settings, SignalError, TurnOnSpread, WarmUp,
+    grouped, infer, replicates, turn_on, warm_up,
 };
 use crate::formats::hash;
 use crate::formats::recordings::{self, FileReport, ReadOptions, Report};
@@ -86,6 +86,8 @@ pub struct CalibrationOptions {
     pub settings: Settings,
     /// The draws behind intervals and goodness of fit; none: neither.
     pub bootstrap: Option<Bootstrap>,
+    /// Whether the recordings' means are asked for a turn-on bias.
+    pub turn_on: bool,
 }
 
 impl Default for CalibrationOptions {
@@ -98,6 +100,7 @@ impl Default for CalibrationOptions {
             pool: None,
             settings: Settings::default(),
             bootstrap: Some(Bootstrap::default()),
+            turn_on: true,
         }
     }
 }
@@ -113,6 +116,8 @@ pub struct Measured {
     pub settings: Settings,
     /// The draws behind intervals.
     pub bootstrap: Option<Bootstrap>,
+    /// Whether the recordings' means are asked for a turn-on bias.
+    pub turn_on: bool,
 }
 
 /// Models and what they were made of.
@@ -124,6 +129,9 @@ pub struct Calibration {
     pub outcomes: Vec<Outcome>,
     /// How they were fitted.
     pub settings: Settings,
+    /// What the recordings' means say of a turn-on bias, estimator by estimator and sensor by sensor; empty where they were not
+    /// asked.
+    pub turn_on: Vec<TurnOnSpread>,
 }
 
 /// From recordings, or directories of them, to models.
@@ -147,7 +155,8 @@ pub fn measure(
     options: &CalibrationOptions,
     remarks: &mut dyn Remarks,
 ) -> Result<Measured, JobError> {
-    let CalibrationOptions { reading, skip_warm_up, scales, estimators, pool, settings, bootstrap } = options;
+    let CalibrationOptions { reading, skip_warm_up, scales, estimators, pool, settings, bootstrap, turn_on } =
+        options;
     // As many scales as parameters, and one that the default leaves out.
     let needed = scales.map_or(2 << settings.model.parameters(), |j| 1 << j);
     let reading = ReadOptions { min_samples: needed, ..reading.clone() };
@@ -167,9 +176,10 @@ pub fn measure(
     if *pool == Some(Pool::Sensor) && settings.pool() == Pool::Axes {
         return Err(JobError::Pooled);
     }
-    let measured = looks.into_iter().flat_map(|look| look.replicates).collect();
+    let mut measured: Vec<_> = looks.into_iter().flat_map(|look| look.replicates).collect();
+    one_switching_on(&report, &mut measured);
     let groups = grouped(measured, pool.unwrap_or(settings.pool()));
-    Ok(Measured { report, groups, settings, bootstrap: *bootstrap })
+    Ok(Measured { report, groups, settings, bootstrap: *bootstrap, turn_on: *turn_on })
 }
 
 impl Measured {
@@ -178,9 +188,11 @@ impl Measured {
     /// # Errors
     /// When a trim leaves no replicate, or a curve is too short for the model.
     pub fn calibrate(self) -> Result<Calibration, JobError> {
-        let Self { groups, settings, bootstrap, .. } = self;
+        let Self { groups, settings, bootstrap, turn_on, .. } = self;
         let outcomes = calibration::calibrate(&groups, &settings)?;
-        Ok(Calibration { groups, outcomes, settings }.with_inference(bootstrap))
+        let calibration = Calibration { groups, outcomes, settings, turn_on: Vec::new() };
+        let calibration = if turn_on { calibration.with_turn_on() } else { calibration };
+        Ok(calibration.with_inference(bootstrap))
     }
 }
 
@@ -190,6 +202,16 @@ impl Calibration {
     pub fn model(&self, estimator: Estimator) -> Model {
         let own = self.outcomes.iter().filter(|o| o.estimator == estimator);
         calibration::model_of(own, self.settings.rate_hz)
+    }
+
+    /// The same with what the recordings' means say.
+    fn with_turn_on(mut self) -> Self {
+        let of_estimator = |e: &Estimator| {
+            let own: Vec<&Outcome> = self.outcomes.iter().filter(|o| o.estimator == *e).collect();
+            turn_on(&self.groups, &own)
+        };
+        self.turn_on = self.settings.estimators.iter().flat_map(of_estimator).collect();
+        self
     }
 
     /// The same with intervals and goodness of fit, if they are asked for.
@@ -236,6 +258,14 @@ impl Look {
         let replicates = replicates(&recording, levels, tuning)?;
         Ok(Self { recording: recording.name, signals, warm_ups, replicates })
     }
+}
+
+/// The stretches of one file are of one switching-on: the mean of the first of them counts.
+fn one_switching_on(report: &Report, measured: &mut [(Channel, Replicate)]) {
+    let later: Vec<String> =
+        report.files.iter().flat_map(|file| file.recordings().skip(1)).map(|(name, _)| name).collect();
+    let of_later = measured.iter_mut().filter(|(_, replicate)| later.contains(&replicate.name));
+    of_later.for_each(|(_, replicate)| replicate.mean = f64::NAN);
 }
 
 /// Refuses copies of a recording.

@@ -61,6 +61,6 @@ impl Curves {
             outcomes.push(fit_curve(&group, estimator, curve, &settings)?);
             groups.push(group);
         }
-        Ok(Calibration { groups, outcomes, settings }.with_inference(bootstrap))
+        Ok(Calibration { groups, outcomes, settings, turn_on: Vec::new() }.with_inference(bootstrap))
     }
 }

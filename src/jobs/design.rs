@@ -8,9 +8,9 @@ use crate::formats::draws_file::DrawsFile;
 use crate::formats::model_file::ModelFile;
 use crate::metrics::OutageSummary;
 use crate::noise::Parameter;
+use crate::report::{Design, DesignedParameter, DesignedQuantile};
 use crate::scenario::Scenario;
 use crate::sensors::outage::Outage;
-use serde::Serialize;
 
 /// What is planned with.
 pub struct DesignInputs<'a> {
@@ -45,67 +45,6 @@ pub enum DesignError {
     /// No such navigation.
     #[error(transparent)]
     Navigate(#[from] NavigateError),
-}
-
-/// What so many recordings, so long each, would tell.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Design {
-    /// Recordings.
-    pub recordings: usize,
-    /// Length of each (h).
-    pub hours: f64,
-    /// Every parameter.
-    pub parameters: Vec<DesignedParameter>,
-    /// The horizontal p95 at the end of each outage.
-    pub horizontal_p95: Vec<DesignedQuantile>,
-}
-
-/// The interval that a parameter would have.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct DesignedParameter {
-    /// `accel`, or `accel.x` alone.
-    pub signals: String,
-    /// `WN sigma2`, `AR1_1 correlation_time_s`.
-    pub parameter: String,
-    /// Its value (units of the model file; s).
-    pub value: f64,
-    /// Expected 95 % interval; none where the recordings would not determine it.
-    pub ci95: Option<[f64; 2]>,
-    /// Half of its width over the value (%).
-    pub half_width_pct: Option<f64>,
-    /// The same of endless recordings, where parameters vary between them: what no length takes away.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub endless_half_width_pct: Option<f64>,
-}
-
-/// The interval that the horizontal p95 at an outage's end would have.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct DesignedQuantile {
-    /// First instant without a fix (s).
-    pub start_s: f64,
-    /// First instant with a fix again (s).
-    pub end_s: f64,
-    /// The quantile with the model as it is (m).
-    pub p95_m: f64,
-    /// Expected 95 % interval (m).
-    pub ci95: [f64; 2],
-    /// Half of its width over the value (%).
-    pub half_width_pct: f64,
-}
-
-/// A part of an interval this large is nearly all of it.
-const NEARLY_ALL: f64 = 0.8;
-
-impl Design {
-    /// The parameters whose intervals are nearly all due to what recordings differ by: longer ones tell no more.
-    pub fn lengths_do_not_help(&self) -> impl Iterator<Item = &DesignedParameter> {
-        let is_floor = |p: &&DesignedParameter| {
-            p.endless_half_width_pct
-                .zip(p.half_width_pct)
-                .is_some_and(|(floor, all)| floor >= NEARLY_ALL * all)
-        };
-        self.parameters.iter().filter(is_floor)
-    }
 }
 
 /// What `recordings` of `hours` each would tell.

@@ -55,11 +55,12 @@ impl ModelFiles {
     }
 
     fn contents(&self, calibration: &Calibration, note: &CalibrationNote) -> (String, ModelFile) {
-        let Calibration { groups, outcomes, settings } = calibration;
+        let Calibration { groups, outcomes, settings, turn_on } = calibration;
         let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == self.estimator).collect();
         let curves = report::json(&CurvesFile::new(groups, &own, settings));
         let blake3 = hash::of_bytes(curves.as_bytes());
-        let model = note.model_file(&own, settings, Some(&blake3));
+        let means = turn_on.iter().filter(|t| t.estimator == self.estimator);
+        let model = note.model_file(&own, settings, Some(&blake3)).with_turn_on(means);
         (curves, model)
     }
 
@@ -114,11 +115,11 @@ impl ModelFiles {
     /// # Errors
     /// When the system refuses.
     pub fn write_page(&self, calibration: &Calibration, diagnoses: &[Diagnosis]) -> Result<(), FileError> {
-        let Calibration { groups, outcomes, settings } = calibration;
+        let Calibration { groups, outcomes, settings, turn_on } = calibration;
         let own = outcomes.iter().enumerate().filter(|(_, o)| o.estimator == self.estimator);
         let own: Vec<(usize, &Outcome)> = own.collect();
         let curves = CurvesFile::new(groups, &own.iter().map(|(_, o)| *o).collect::<Vec<_>>(), settings);
-        atomic::write(&self.page, report::calibration_page(&curves, &own, diagnoses, settings))
+        atomic::write(&self.page, report::calibration_page(&curves, &own, diagnoses, turn_on, settings))
     }
 }
 

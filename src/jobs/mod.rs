@@ -44,9 +44,7 @@ pub use certify::{Certificate, CertifiedScale, CertifyError, Recorded, certify};
 pub use choose::{ChoiceDrive, Chosen, choose};
 pub use compare::{CompareError, Comparison, compare};
 pub use curves::{Curves, read_curves};
-pub use design::{
-    Design, DesignError, DesignInputs, DesignedParameter, DesignedQuantile, Destination, design,
-};
+pub use design::{DesignError, DesignInputs, Destination, design};
 pub use error::JobError;
 pub use estimator_study::{EstimatorStudy, EstimatorStudyError};
 pub use files::ModelFiles;

@@ -1,9 +1,10 @@
 //! Which IMU a limit on the errors after an outage needs, what a given one makes of it, and a ranking.
 
 use crate::noise::Model;
-use crate::report::require::{CURVE_S, Longest, NeededImu, Question, RankedUnit};
+use crate::report::require::{Bridged, CURVE_S, Longest, NeededImu, Question, RankedUnit};
 use crate::require::{
-    Answer, Course, Detail, Drift, IMU_PARAMETERS, Limit, Margins, Need, RequireError, Worst, evenly,
+    Answer, Course, Detail, Drift, IMU_PARAMETERS, Limit, Margins, Need, Quantity, RequireError, Worst,
+    evenly,
 };
 use crate::scenario::Scenario;
 use crate::sensors::outage::Outage;
@@ -133,7 +134,7 @@ impl Requirements {
     ///
     /// # Errors
     /// When the model has no filter.
-    pub fn longest(&self, scenario: &Scenario, model: &Model) -> Result<(Longest, Question), RequireError> {
+    pub fn longest(&self, scenario: &Scenario, model: &Model) -> Result<(Bridged, Question), RequireError> {
         let outages = match self.ask {
             Ask::Longest => self.long_outages(),
             Ask::Length(_) | Ask::Window(_) => {
@@ -144,8 +145,13 @@ impl Requirements {
             }
         };
         let course = self.course(&outages, Detail::Seconds)?;
-        let longest = longest(&course.curves(scenario, model)?, &self.limits);
-        Ok((longest, self.question(outages)))
+        let curves = course.curves(scenario, model)?;
+        let of_limit = |limit: &Limit| CURVE_S.map(|s| worst_after(&curves, s, limit.quantity));
+        let bridged = Bridged {
+            longest: longest(&curves, &self.limits),
+            curves: self.limits.iter().map(of_limit).collect(),
+        };
+        Ok((bridged, self.question(outages)))
     }
 
     /// How units do after the outage and after those of [`CURVE_S`], the best first: those that keep the limits, those
@@ -172,15 +178,11 @@ impl Requirements {
         let length_s = self.ask.length_s();
         let worst = Worst::of(&self.limits, &after(&curves, length_s));
         let worst = worst.ok_or(RequireError::PartOfASecond { length_s })?;
-        let value = |s: u32| {
-            let drifts = after(&curves, f64::from(s));
-            drifts.iter().map(|d| d.value(worst.limit.quantity)).reduce(f64::max)
-        };
         Ok(RankedUnit {
             name: unit.name.clone(),
             not_stated: unit.not_stated.clone(),
             worst,
-            curve: CURVE_S.map(value),
+            curve: CURVE_S.map(|s| worst_after(&curves, s, worst.limit.quantity)),
             longest: longest(&curves, &self.limits),
         })
     }
@@ -230,6 +232,11 @@ pub struct CatalogueUnit {
 fn after(curves: &[Vec<Drift>], length_s: f64) -> Vec<Drift> {
     let there = |curve: &Vec<Drift>| curve.iter().find(|d| (d.after_s - length_s).abs() < 1e-3).copied();
     curves.iter().filter_map(there).collect()
+}
+
+/// The largest value of a quantity after a time without fixes.
+fn worst_after(curves: &[Vec<Drift>], length_s: u32, quantity: Quantity) -> Option<f64> {
+    after(curves, f64::from(length_s)).iter().map(|d| d.value(quantity)).reduce(f64::max)
 }
 
 /// The longest outage within the limits, in whole seconds. The first place holds the longest.

@@ -2,9 +2,10 @@
 
 use super::columns::columns;
 use super::number::readable;
+use super::turn_on::turn_on_lines;
 use crate::calibration::{
-    Diagnosis, Outcome, Practical, Settings, advice, axes_remark, duration, percent, shares, signals, tau_s,
-    worst_in_words,
+    Diagnosis, Outcome, Practical, Settings, TurnOnSpread, advice, axes_remark, duration, percent, shares,
+    signals, tau_s, worst_in_words,
 };
 use crate::export::Quantity;
 use crate::imu::Sensor;
@@ -17,7 +18,12 @@ const LINES: usize = 17;
 
 /// What the recordings of each sensor say of one another, and every fit, shortly: two of five processes in twenty lines.
 #[must_use]
-pub fn brief(outcomes: &[Outcome], diagnoses: &[Diagnosis], settings: &Settings) -> String {
+pub fn brief(
+    outcomes: &[Outcome],
+    diagnoses: &[Diagnosis],
+    turn_on: &[TurnOnSpread],
+    settings: &Settings,
+) -> String {
     let rate_hz = settings.rate_hz;
     let of_sensor = |sensor: Sensor| {
         let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.scope.sensor == sensor).collect();
@@ -35,6 +41,9 @@ pub fn brief(outcomes: &[Outcome], diagnoses: &[Diagnosis], settings: &Settings)
         lines.extend(first);
         remarks.extend(others);
     }
+    // What goes into the model comes first.
+    let place = if turn_on.iter().any(|t| t.sigmas().is_some()) { 0 } else { remarks.len() };
+    remarks.splice(place..place, turn_on_lines(turn_on));
     let table = if outcomes.len() > MOST { joint(outcomes, rate_hz) } else { full(outcomes, rate_hz) };
     let room = LINES.saturating_sub(lines.len() + table.len() + 1).max(1);
     let left = remarks.len().saturating_sub(room);

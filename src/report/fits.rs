@@ -1,9 +1,10 @@
 //! Fitted models as JSON.
 
 use super::replicates::ReplicateEntry;
+use super::turn_on::TurnOnEntry;
 use crate::calibration::{
     Candidate, Diagnosis, Goodness, Indistinct, LevelSpread, Miss, Outcome, ParameterInterval, Practical,
-    Ranking, Settings, reasons, tau_s, undetermined,
+    Ranking, Settings, TurnOnSpread, reasons, tau_s, undetermined,
 };
 use crate::export::parameters_json;
 use crate::noise::{Composite, ParameterRef, Process};
@@ -23,6 +24,8 @@ pub struct FitsFile {
     pub fits: Vec<FitEntry>,
     /// One entry a recording and sensor: whether it is abnormal.
     pub replicates: Vec<ReplicateEntry>,
+    /// One entry a sensor and estimator: what the recordings' means say of a turn-on bias.
+    pub turn_on: Vec<TurnOnEntry>,
     /// Files written.
     pub files: Vec<String>,
 }
@@ -255,6 +258,7 @@ impl FitsFile {
     pub fn new(
         outcomes: &[Outcome],
         diagnoses: &[Diagnosis],
+        turn_on: &[TurnOnSpread],
         settings: &Settings,
         files: Vec<String>,
     ) -> Self {
@@ -265,6 +269,7 @@ impl FitsFile {
             model: settings.model.to_string(),
             fits: outcomes.iter().map(|o| FitEntry::new(o, rate_hz)).collect(),
             replicates: diagnoses.iter().map(|d| ReplicateEntry::new(d, rate_hz)).collect(),
+            turn_on: turn_on.iter().map(TurnOnEntry::new).collect(),
             files,
         }
     }

@@ -7,6 +7,7 @@ mod columns;
 mod comparison;
 mod curves;
 mod describe;
+mod design;
 mod efficiency;
 mod fits;
 mod fusion;
@@ -27,6 +28,7 @@ mod study;
 mod tables;
 mod trajectory;
 mod tune;
+mod turn_on;
 mod verdict;
 
 pub use brief::brief;
@@ -37,6 +39,7 @@ pub use comparison::{
 };
 pub use curves::{Band, CONFIDENCE, CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile};
 pub use describe::describe;
+pub use design::{Design, DesignedParameter, DesignedQuantile, design_rows, design_verdict};
 pub use efficiency::{EfficiencyFile, EfficiencyRow, efficiency_csv, efficiency_table};
 pub use fits::{CandidateEntry, FitEntry, FitsFile, MissEntry};
 pub use fusion::{FUSION_FILES, FusionKind, FusionManifest, FusionSummary, fusion_directory, solution_csv};
@@ -44,8 +47,10 @@ pub use manifest::{Input, Manifest, ModelNote};
 pub use markdown::{csv_table, latex_table, markdown, markdown_table};
 pub use number::{readable, seconds, window};
 pub use pages::{
-    RatioCurves, calibration_page, calibration_svg, choice_page, comparison_page, comparison_svg,
-    efficiency_page, efficiency_svg, run_svg, study_page, wavelet_page, wavelet_svg,
+    PaperFigure, RatioCurves, StudyCurves, calibration_page, calibration_svg, catalogue_page, choice_page,
+    comparison_figure, comparison_page, comparison_svg, design_page, efficiency_page, efficiency_svg,
+    model_page, needed_page, paper_figures, paper_page, run_svg, run_text, study_page, tune_page,
+    wavelet_page, wavelet_svg, wavelet_text,
 };
 pub use recording::{gnss_csv, imu_csv, initial_toml};
 pub use replicates::{
@@ -61,4 +66,5 @@ pub use study::{
 pub use tables::{epochs_csv, runs_csv};
 pub use trajectory::{TrajectorySeries, trajectory_svg};
 pub use tune::{FactorEntry, TuneResult};
+pub use turn_on::{MeansEntry, TurnOnEntry, turn_on_lines, turn_on_remark};
 pub use verdict::{verdict_in_short, verdict_line, verdict_word};

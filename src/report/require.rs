@@ -32,6 +32,26 @@ pub enum Longest {
     AtLeast(f64),
 }
 
+/// What a model bridges.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bridged {
+    /// The longest outage within the limits.
+    pub longest: Longest,
+    /// The quantity of each limit, at its worst place, after [`CURVE_S`]; none where the trajectory is too short.
+    pub curves: Vec<[Option<f64>; CURVE_S.len()]>,
+}
+
+impl Bridged {
+    fn json(&self, question: &Question) -> Value {
+        let curve = |(limit, curve): (&Limit, &[Option<f64>; CURVE_S.len()])| json!({ "quantity": limit.quantity.name(), "points": points_json(curve) });
+        question.limits.iter().zip(&self.curves).map(curve).collect()
+    }
+}
+
+fn points_json(curve: &[Option<f64>; CURVE_S.len()]) -> Vec<Value> {
+    CURVE_S.iter().zip(curve).map(|(s, x)| json!({ "outage_s": s, "value": x })).collect()
+}
+
 /// A unit of a catalogue.
 #[derive(Debug, Clone)]
 pub struct RankedUnit {
@@ -195,7 +215,7 @@ impl NeededImu {
 }
 
 impl Longest {
-    fn in_words(self) -> String {
+    pub(super) fn in_words(self) -> String {
         match self {
             Self::Seconds(s) => format!("{} s", seconds(s)),
             Self::AtLeast(s) => format!("at least {} s", seconds(s)),
@@ -218,8 +238,13 @@ pub fn longest_verdict(longest: Longest, question: &Question) -> String {
 
 /// The longest outage.
 #[must_use]
-pub fn longest_json(longest: Longest, question: &Question) -> String {
-    super::json(&json!({ "schema_version": 1, "question": question.json(), "outage": longest.json() }))
+pub fn longest_json(bridged: &Bridged, question: &Question) -> String {
+    super::json(&json!({
+        "schema_version": 1,
+        "question": question.json(),
+        "outage": bridged.longest.json(),
+        "curves": bridged.json(question),
+    }))
 }
 
 /// Whether a model keeps its limits, in a sentence.
@@ -263,7 +288,7 @@ pub fn margins_rows(margins: &Margins) -> Vec<Vec<String>> {
 
 /// All of it.
 #[must_use]
-pub fn margins_json(margins: &Margins, question: &Question, longest: Longest) -> String {
+pub fn margins_json(margins: &Margins, question: &Question, bridged: &Bridged) -> String {
     let group = |g: &GroupMargin| json!({ "part": g.group.name(), "share": g.share, "factor": g.factor });
     super::json(&json!({
         "schema_version": 1,
@@ -276,7 +301,8 @@ pub fn margins_json(margins: &Margins, question: &Question, longest: Longest) ->
         "groups": margins.groups.iter().map(group).collect::<Vec<_>>(),
         "share_of_drifts": margins.drift,
         "share_of_the_rest": margins.rest,
-        "outage": longest.json(),
+        "outage": bridged.longest.json(),
+        "curves": bridged.json(question),
     }))
 }
 
@@ -305,8 +331,6 @@ pub fn catalogue_rows(units: &[RankedUnit]) -> Vec<Vec<String>> {
 #[must_use]
 pub fn catalogue_json(units: &[RankedUnit], question: &Question) -> String {
     let unit = |u: &RankedUnit| {
-        let curve: Vec<Value> =
-            CURVE_S.iter().zip(&u.curve).map(|(s, x)| json!({ "outage_s": s, "value": x })).collect();
         json!({
             "unit": u.name,
             "met": u.is_met(),
@@ -314,7 +338,7 @@ pub fn catalogue_json(units: &[RankedUnit], question: &Question) -> String {
             "quantity": u.worst.limit.quantity.name(),
             "value": u.worst.value,
             "outage": u.longest.json(),
-            "curve": curve,
+            "curve": points_json(&u.curve),
         })
     };
     super::json(&json!({

@@ -66,33 +66,33 @@ impl TrajectorySeries {
         }));
         Chart::map(title, series)
     }
+
+    /// Height, speed and attitude. At least so much is shown that rounding does not fill a panel.
+    pub(super) fn over_time(&self, outages: &[(f64, f64)]) -> Chart {
+        let values = |value: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> {
+            self.t_s.iter().enumerate().map(|(i, t)| (*t, value(i))).collect()
+        };
+        let rpy = |k: usize| values(&|i| self.rpy_deg[i][k]);
+        let line = |name: &str, hue: usize, points| Series::line(name, Colour::Hue(hue), points);
+        let panel = |label: &str, (low, high): (f64, f64), series| Panel {
+            height: 0.6,
+            ..Panel::new(Axis::linear(label).including(low, high), series)
+        };
+        let height = self.height_m.first().map_or((0.0, 1.0), |h| (h - 1.0, h + 1.0));
+        let panels = vec![
+            panel("height (m)", height, vec![line("", 0, values(&|i| self.height_m[i]))]),
+            panel("speed (m/s)", (0.0, 1.0), vec![line("", 0, values(&|i| self.speed_m_s[i]))]),
+            panel("roll, pitch (°)", (-1.0, 1.0), vec![line("roll", 0, rpy(0)), line("pitch", 1, rpy(1))]),
+            panel("yaw (°)", (-1.0, 1.0), vec![line("", 0, broken(&rpy(2)))]),
+        ];
+        Chart::new("Height, speed and attitude", Axis::linear("time (s)"), panels).with_outages(outages)
+    }
 }
 
 /// The picture; `outages` are (start, end) in seconds.
 #[must_use]
 pub fn trajectory_svg(title: &str, series: &TrajectorySeries, outages: &[(f64, f64)]) -> String {
-    svg(title, &[series.map(title, outages), over_time(series, outages)])
-}
-
-/// Height, speed and attitude. At least so much is shown that rounding does not fill a panel.
-fn over_time(series: &TrajectorySeries, outages: &[(f64, f64)]) -> Chart {
-    let values = |value: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> {
-        series.t_s.iter().enumerate().map(|(i, t)| (*t, value(i))).collect()
-    };
-    let rpy = |k: usize| values(&|i| series.rpy_deg[i][k]);
-    let line = |name: &str, hue: usize, points| Series::line(name, Colour::Hue(hue), points);
-    let panel = |label: &str, (low, high): (f64, f64), series| Panel {
-        height: 0.6,
-        ..Panel::new(Axis::linear(label).including(low, high), series)
-    };
-    let height = series.height_m.first().map_or((0.0, 1.0), |h| (h - 1.0, h + 1.0));
-    let panels = vec![
-        panel("height (m)", height, vec![line("", 0, values(&|i| series.height_m[i]))]),
-        panel("speed (m/s)", (0.0, 1.0), vec![line("", 0, values(&|i| series.speed_m_s[i]))]),
-        panel("roll, pitch (°)", (-1.0, 1.0), vec![line("roll", 0, rpy(0)), line("pitch", 1, rpy(1))]),
-        panel("yaw (°)", (-1.0, 1.0), vec![line("", 0, broken(&rpy(2)))]),
-    ];
-    Chart::new("Height, speed and attitude", Axis::linear("time (s)"), panels).with_outages(outages)
+    svg(title, &[series.map(title, outages), series.over_time(outages)])
 }
 
 /// The line is broken where the heading passes ±180°.

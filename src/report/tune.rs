@@ -22,6 +22,8 @@ pub struct TuneResult {
     pub reduced: Honesty,
     /// A filter that knows the truth, each truth its own.
     pub informed: Honesty,
+    /// The tuned filter with all its variances times a factor: how sharp the answer is.
+    pub sweep: Vec<(f64, Honesty)>,
     /// Names of the truths.
     pub truths: Vec<String>,
 }
@@ -56,8 +58,18 @@ impl TuneResult {
 
     /// Horizontal RMSE at the outages' ends over that of a filter that knows the truth, less 1.
     fn cost(&self) -> f64 {
+        self.cost_of(&self.after)
+    }
+
+    /// The same of another filter.
+    pub(super) fn cost_of(&self, honesty: &Honesty) -> f64 {
         let square = |h: &Honesty| h.horizontal_m().map(|x| x * x).sum::<f64>();
-        (square(&self.after) / square(&self.informed)).sqrt() - 1.0
+        (square(honesty) / square(&self.informed)).sqrt() - 1.0
+    }
+
+    /// Whether the tuned filter is honest.
+    pub(super) fn is_honest(&self) -> bool {
+        self.after.ratio <= 1.0 + RIGHT && self.after.nees <= 9.0 * (1.0 + RIGHT)
     }
 
     /// A row for each filter under a head.
@@ -81,7 +93,7 @@ impl TuneResult {
         std::iter::once(head).chain(self.filters().map(row)).collect()
     }
 
-    fn filters(&self) -> impl Iterator<Item = (&'static str, &Honesty)> {
+    pub(super) fn filters(&self) -> impl Iterator<Item = (&'static str, &Honesty)> {
         [
             ("as it was", &self.before),
             ("tuned", &self.after),
@@ -111,6 +123,12 @@ impl TuneResult {
                 })
                 .collect(),
         };
+        let swept = |(on_variances, h): &(f64, Honesty)| SweepEntry {
+            on_variances: *on_variances,
+            nees: h.nees,
+            largest_ratio: h.ratio,
+            horizontal_rmse_cost: self.cost_of(h),
+        };
         super::json(&TuneFile {
             schema_version: 1,
             verdict: self.verdict(),
@@ -118,6 +136,7 @@ impl TuneResult {
             truths: &self.truths,
             horizontal_rmse_cost: self.cost(),
             filters: self.filters().map(filter).collect(),
+            sweep: self.sweep.iter().map(swept).collect(),
         })
     }
 }
@@ -194,6 +213,16 @@ struct TuneFile<'a> {
     truths: &'a [String],
     horizontal_rmse_cost: f64,
     filters: Vec<FilterEntry>,
+    sweep: Vec<SweepEntry>,
+}
+
+/// The tuned filter with all its variances times a factor.
+#[derive(Serialize)]
+struct SweepEntry {
+    on_variances: f64,
+    nees: f64,
+    largest_ratio: f64,
+    horizontal_rmse_cost: f64,
 }
 
 /// A factor in files.

@@ -196,10 +196,24 @@ def make(nav_sim, place):
     run("batch plan examples/quick_study.toml --seed 1 -o study")
     run("batch run examples/quick_study.toml -o study")
     run("batch merge examples/quick_study.toml -o study", codes=(0, 3))
+    tuned = "tune calib_data/tactical.toml --truth calib_data/consumer_mems.toml --outage 60:90"
+    run(f"{tuned} --page tuned.html --format json", keep="tuned.json")
+    asked = "require trajectories/figure_eight.toml"
+    run(f"{asked} --outage 60 --p95-m 50 --iso-drift --page needed.html --format json", keep="needed.json")
+    run(f"{asked} calib_data/tactical.toml --outage 60:120 --rmse-m 100 --page given.html --format json",
+        keep="given.json", codes=(0, 3))
+    run(f"{asked} --outage 60 --p95-m 50 --catalogue --page ranked.html --format json", keep="ranked.json",
+        codes=(0, 3))
+    run("design calib_data/consumer_mems.toml --draws 40 --estimator awv --page designs.html --format json",
+        keep="designs.json")
+    run("design calib_data/tactical.toml --recordings 4 --hours 1 --draws 40 --trajectory trajectories/figure_eight.toml "
+        "--outage 300:360 --page design.html --format json", keep="design.json")
     pages = [("wv.html", None), ("model.html", "fits.json"), ("runs/I_awv/report.html", "runs/I_awv/summary.json"),
              ("runs/lincov/report.html", "runs/lincov/summary.json"), ("comparison.html", "comparison.json"),
              ("fused/report.html", "fused/summary.json"), ("efficiency/report.html", "efficiency/results.json"),
-             ("choice/report.html", "choice/ranking.json"), ("study/results/report.html", None)]
+             ("choice/report.html", "choice/ranking.json"), ("study/results/report.html", None), ("tuned.html", "tuned.json"), ("needed.html", "needed.json"),
+             ("given.html", "given.json"), ("ranked.html", "ranked.json"), ("designs.html", "designs.json"),
+             ("design.html", "design.json")]
     return [(place / page, results and place / results) for page, results in pages]
 
 

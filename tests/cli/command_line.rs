@@ -231,3 +231,23 @@ fn text_that_is_not_utf_8_is_refused_with_its_line() {
     assert_eq!(output.status.code(), Some(2), "{said}");
     assert!(said.contains("a.toml: line 2 is not text in UTF-8"), "{said}");
 }
+
+#[test]
+fn the_version_says_more_if_asked() {
+    let said = |words: &[&str]| {
+        let output = nav_sim().args(words).output().unwrap();
+        assert_eq!(output.status.code(), Some(0));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    let short = format!("nav-sim {}\n", env!("CARGO_PKG_VERSION"));
+    assert_eq!([said(&["--version"]), said(&["-V"])], [short.clone(), short]);
+    for words in [&["--version", "-v"][..], &["--verbose", "-V"], &["-vV"]] {
+        let long = said(words);
+        assert!(
+            long.contains("build  ")
+                && long.contains("vector units  ")
+                && long.contains(std::env::consts::ARCH),
+            "{long}"
+        );
+    }
+}

@@ -35,4 +35,5 @@ mod study;
 mod synthesize;
 mod trajectory_command;
 mod tune;
+mod turn_on;
 mod uncertainty;

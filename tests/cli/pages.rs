@@ -54,7 +54,8 @@ fn calibrate_writes_its_page_beside_the_model_the_same_on_any_number_of_threads(
     let page = text(&dir.join("m.html"));
     is_whole(&page);
     assert!(page.contains("Accelerometer, all axes") && page.contains("data / model"));
-    assert_eq!(numbers_as_in(&page, &serde_json::from_str(&ran.stdout).unwrap()), 4); // WN and RW of two sensors
+    // WN and RW of two sensors; recordings, spread and noise of the means of six axes
+    assert_eq!(numbers_as_in(&page, &serde_json::from_str(&ran.stdout).unwrap()), 4 + 18);
     let picture = text(&dir.join("m.svg"));
     assert!(picture.starts_with("<svg xmlns=") && picture.ends_with("</svg>\n"));
     done(dir, &format!("{command} -j 2"));
@@ -112,4 +113,60 @@ fn runs_and_their_comparison_have_pages_with_the_numbers_of_their_results() {
     let comparison: Value = serde_json::from_str(&text(&dir.join("out/c.json"))).unwrap();
     assert_eq!(numbers_as_in(&page, &comparison), 5); // one run, one outage: NEES, its reference, coverage, two RMSE
     assert!(page.contains("30–40 s") && text(&dir.join("c.svg")).contains("position east"));
+}
+
+#[test]
+fn tune_require_and_design_write_a_page_with_the_numbers_they_print() {
+    let place = place_with(DRIVE, MODEL);
+    let dir = place.path();
+    fs::write(dir.join("worse.toml"), MODEL.replace("sigma2 = ", "sigma2 = 4")).unwrap();
+    let commands = [
+        ("tune imu.toml --truth worse.toml --trajectory drive.toml --outage 30:40", 4 * 3 + 2),
+        ("require drive.toml --outage 10 --p95-m 50 --iso-drift", 4 * 3 + 1 + 8),
+        ("require drive.toml imu.toml --outage 30:40 --p95-m 50", 4 + 2 + 2),
+        ("require drive.toml imu.toml --outage longest --p95-m 50", 2),
+        ("require drive.toml --outage 10 --p95-m 50 --catalogue", 17 * 2),
+        ("design imu.toml --recordings 3 --hours 0.2 --draws 40", 2),
+    ];
+    for (k, (command, least)) in commands.into_iter().enumerate() {
+        let ran = nav_sim(dir, &format!("{command} --format json --page {k}.html"));
+        assert!(ran.code == 0 || ran.code == 3, "{command}: {}", ran.stderr);
+        assert!(ran.stderr.contains(&format!("wrote {k}.html")), "{}", ran.stderr);
+        let page = text(&dir.join(format!("{k}.html")));
+        is_whole(&page);
+        let numbers = numbers_as_in(&page, &serde_json::from_str(&ran.stdout).unwrap());
+        assert!(numbers >= least, "{command}: {numbers}");
+    }
+    let ran = nav_sim(dir, "tune imu.toml --truth worse.toml --page worse.toml");
+    assert!(ran.code == 2 && ran.stderr.contains("would be overwritten"), "{}", ran.stderr);
+}
+
+#[test]
+fn small_plots_stand_in_the_terminal() {
+    let place = place_with(DRIVE, MODEL);
+    let dir = place.path();
+    recordings(dir);
+    let (plain, drawn) = (done(dir, "wv static"), done(dir, "wv static --chart"));
+    let plot: Vec<&str> = drawn.stdout.strip_prefix(&plain.stdout).unwrap().lines().collect();
+    assert!(
+        plot.len() <= 15
+            && plot[1].contains("accel (m/s²): x, y, z")
+            && plot[1].contains("gyro (rad/s): x, y, z"),
+        "{plot:#?}"
+    );
+    assert!(
+        plot[2..].iter().any(|row| row.contains('x') || row.contains('z'))
+            && plot[14 - 1].contains("scale τ (s)"),
+        "{plot:#?}"
+    );
+    let run = "run drive.toml imu.toml --runs 2 --outage 30:40 --seed 5 -o out";
+    let (plain, drawn) = (done(dir, run), done(dir, &format!("{run} --chart")));
+    let more = drawn.stdout.lines().count() - plain.stdout.lines().count();
+    assert!(
+        more == 15 && drawn.stdout.contains("horizontal error (m): believed (ASEE), true (RMSE)"),
+        "{}",
+        drawn.stdout
+    );
+    let json = done(dir, &format!("{run} --chart --format json"));
+    assert!(serde_json::from_str::<Value>(&json.stdout).is_ok());
 }

@@ -132,6 +132,8 @@ pub struct Replicate {
     pub robust: Vec<RobustVariance>,
     /// Mean of its later half less that of its earlier half (units): what a slow drift moves most. NaN where not known.
     pub trend: f64,
+    /// Mean of the signal (units): gravity, Earth rate and the bias of this switching-on. NaN where not known.
+    pub mean: f64,
 }
 
 impl Replicate {
@@ -245,7 +247,7 @@ mod tests {
     fn replicate(samples: usize, classical: f64, robust: f64) -> Replicate {
         let robust = vec![RobustVariance { value: robust, status: Status::Ok }; 2];
         let (name, classical) = (String::new(), vec![classical; 2]);
-        Replicate { name, axis: None, samples, classical, robust, trend: f64::NAN }
+        Replicate { name, axis: None, samples, classical, robust, trend: f64::NAN, mean: f64::NAN }
     }
 
     fn eight() -> Vec<Replicate> {

@@ -106,7 +106,9 @@ pub fn replicates(
         let (classical, robust) = both(&signal.samples, levels, tuning).map_err(error)?;
         let (name, axis) = (recording.name.clone(), Some(channel.axis));
         let trend = trend(&signal.samples);
-        Ok((channel, Replicate { name, axis, samples, classical, robust, trend }))
+        // Of the samples themselves too: a warm-up may have been left out after the mean was taken.
+        let mean = signal.mean + signal.samples.iter().sum::<f64>() / samples as f64;
+        Ok((channel, Replicate { name, axis, samples, classical, robust, trend, mean }))
     };
     recording.signals.par_iter().map(one).collect()
 }

@@ -65,7 +65,8 @@ fn set(
             let (classical, robust) = both(&signal, LEVELS, &settings().tuning).unwrap();
             let name = format!("run{file}");
             let (samples, trend) = (SAMPLES, trend(&signal));
-            let replicate = Replicate { name, axis: Some(axis), samples, classical, robust, trend };
+            let replicate =
+                Replicate { name, axis: Some(axis), samples, classical, robust, trend, mean: f64::NAN };
             replicates.push((Channel { sensor: Sensor::Accel, axis }, replicate));
         }
     }

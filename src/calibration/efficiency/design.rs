@@ -181,7 +181,15 @@ impl Design {
     pub(super) fn measure(&self, samples: &[f64]) -> Result<Replicate, StudyError> {
         let (classical, robust) = both(samples, self.levels, &self.tuning)?;
         let (name, axis) = (String::new(), Some(self.channel.axis));
-        Ok(Replicate { name, axis, samples: samples.len(), classical, robust, trend: f64::NAN })
+        Ok(Replicate {
+            name,
+            axis,
+            samples: samples.len(),
+            classical,
+            robust,
+            trend: f64::NAN,
+            mean: f64::NAN,
+        })
     }
 
     /// What the estimators make of replicates.

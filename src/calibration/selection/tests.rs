@@ -36,6 +36,7 @@ fn outcome(set: u64, noise: &Composite) -> Outcome {
                 classical,
                 robust,
                 trend: f64::NAN,
+                mean: f64::NAN,
             },
         )
     };

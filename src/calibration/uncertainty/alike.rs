@@ -88,6 +88,7 @@ mod tests {
                 classical,
                 robust,
                 trend: f64::NAN,
+                mean: f64::NAN,
             }
         };
         (0..count).map(one).collect()

@@ -109,7 +109,7 @@ mod tests {
             let signal: Vec<f64> = (0..2048).map(|_| normal()).collect();
             let (classical, robust) = both(&signal, 8, &Tuning::default()).unwrap();
             let (name, trend) = (format!("run{}", k / 3), f64::NAN);
-            Replicate { name, axis: Some(axis), samples: 2048, classical, robust, trend }
+            Replicate { name, axis: Some(axis), samples: 2048, classical, robust, trend, mean: f64::NAN }
         };
         (0..3 * recordings).map(one).collect()
     }

@@ -195,5 +195,6 @@ pub(crate) fn like(replicate: &Replicate, nu: Vec<f64>) -> Replicate {
         classical: nu,
         robust,
         trend: f64::NAN,
+        mean: f64::NAN,
     }
 }

@@ -167,6 +167,7 @@ mod tests {
                 classical: vec![],
                 robust: vec![],
                 trend: f64::NAN,
+                mean: f64::NAN,
             };
             (channel, crate::uncertainty::bootstrap::like(&template, nu))
         };

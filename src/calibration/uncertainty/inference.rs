@@ -128,6 +128,7 @@ mod tests {
                 classical: vec![],
                 robust: vec![],
                 trend: f64::NAN,
+                mean: f64::NAN,
             };
             (CHANNEL, like(&template, nu))
         };

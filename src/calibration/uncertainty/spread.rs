@@ -417,6 +417,7 @@ mod tests {
                         classical: vec![(differs + own).exp()],
                         robust: Vec::new(),
                         trend: f64::NAN,
+                        mean: f64::NAN,
                     });
                 }
             }

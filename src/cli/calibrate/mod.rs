@@ -67,6 +67,10 @@ pub(crate) struct Args {
     /// Draws of the parametric bootstrap behind intervals and goodness of fit (0: neither)
     #[arg(long, value_name = "B", default_value_t = Bootstrap::DRAWS as u32, value_parser = clap::value_parser!(u32).range(0..=100_000))]
     bootstrap: u32,
+    /// Ask the recordings' means for no turn-on bias (that of recordings of one fixed mounting, switched off in between, is
+    /// stored as [turn_on] where it shows)
+    #[arg(long)]
+    no_turn_on: bool,
     /// The model file (default: model.toml; none for --curve)
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -79,7 +83,7 @@ pub(crate) struct Args {
 }
 
 /// Flags about recordings and their averages, which a curve has behind it.
-const OF_RECORDINGS: [&str; 10] = [
+const OF_RECORDINGS: [&str; 11] = [
     "estimator",
     "trim",
     "pool",
@@ -90,6 +94,7 @@ const OF_RECORDINGS: [&str; 10] = [
     "efficiency",
     "efficiency_convention",
     "scales",
+    "no_turn_on",
 ];
 
 const ESTIMATORS: [(&str, &str); 7] = [
@@ -163,6 +168,7 @@ fn recordings(args: &Args, settings: Settings, session: &Session) -> Result<(), 
         pool: args.pool,
         settings,
         bootstrap: bootstrap(args, session),
+        turn_on: !args.no_turn_on,
     };
     if args.estimator != EstimatorChoice::All {
         output::not_anew(out, args.bootstrap > 0, session)?;

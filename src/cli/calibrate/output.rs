@@ -99,7 +99,7 @@ pub(super) fn finish(
     for output in outputs {
         output.guard(calibration, note, session.existing())?;
     }
-    let Calibration { groups, outcomes, settings } = calibration;
+    let Calibration { groups, outcomes, settings, turn_on } = calibration;
     let diagnoses = diagnose(groups, outcomes, settings);
     let mut files = Vec::new();
     for output in outputs {
@@ -112,15 +112,16 @@ pub(super) fn finish(
     let all: Vec<&Outcome> = outcomes.iter().collect();
     plot.write(|| report::calibration_svg(&CurvesFile::new(groups, &all, settings), &diagnoses), session)?;
     if session.json() {
-        let json = report::json(&FitsFile::new(outcomes, &diagnoses, settings, files.clone()));
+        let json = report::json(&FitsFile::new(outcomes, &diagnoses, turn_on, settings, files.clone()));
         session.printer.result(json.trim_end());
     } else {
         let text = if session.verbose() {
             let replicates = report::describe_replicates(&diagnoses, settings.rate_hz);
             let fits = outcomes.iter().map(|o| report::describe(o, settings));
-            replicates.into_iter().chain(fits).collect::<Vec<_>>().join("\n\n")
+            let means = report::turn_on_lines(turn_on);
+            replicates.into_iter().chain(fits).chain(means).collect::<Vec<_>>().join("\n\n")
         } else {
-            report::brief(outcomes, &diagnoses, settings)
+            report::brief(outcomes, &diagnoses, turn_on, settings)
         };
         session.printer.result(&text);
     }

@@ -71,6 +71,9 @@ pub(crate) struct Args {
     /// Everything of the run in one TOML file; flags win over it (see `nav-sim schema scenario`)
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
+    /// Also draw the horizontal error over time in the terminal
+    #[arg(long)]
+    chart: bool,
     #[command(flatten)]
     plot: PlotArgs,
     /// Run directory to make
@@ -136,6 +139,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     args.plot.write(|| nav_sim::report::run_svg(&found.epochs, &found.summary), session)?;
     let shown = if session.json() { nav_sim::report::summary_json } else { run_words::text };
     session.printer.result(shown(&found.summary, throughput_epochs_per_s).trim_end());
+    if args.chart && !session.json() {
+        session.printer.result(&nav_sim::report::run_text(&found.epochs, &found.summary));
+    }
     if session.verbose() && !session.json() {
         session.printer.result(run_words::sensitivity_table(&found.summary).trim_end());
     }

@@ -1,10 +1,10 @@
 //! The model file of a calibration.
 
-use super::{Interval, ModelFile, SCHEMA};
-use crate::calibration::{Estimator, Outcome, ParameterLimit, Settings, undetermined};
-use crate::imu::Channel;
+use super::{Interval, ModelFile, SCHEMA, TurnOn};
+use crate::calibration::{Estimator, Outcome, ParameterLimit, Settings, TurnOnSpread, undetermined};
+use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::Model;
-use crate::report::Input;
+use crate::report::{Input, turn_on_remark};
 use toml::{Table, Value};
 
 /// What a calibration leaves in the file beside the model.
@@ -73,6 +73,33 @@ impl CalibrationNote {
         put("fits", outcomes.iter().map(|o| fit(o, settings)).collect::<Vec<_>>().into());
         put("inputs", self.inputs.iter().map(input).collect::<Vec<_>>().into());
         table
+    }
+}
+
+impl ModelFile {
+    /// The same with the turn-on biases that the recordings' means show; why or why not stands in the provenance.
+    #[must_use]
+    pub fn with_turn_on<'a>(mut self, means: impl Iterator<Item = &'a TurnOnSpread>) -> Self {
+        let mut turn_on = TurnOn::default();
+        let mut remarks = Table::new();
+        for found in means {
+            remarks.insert(found.sensor.name().to_owned(), turn_on_remark(found).into());
+            let Some(sigmas) = found.sigmas() else { continue };
+            let of_axis = |axis: Axis| {
+                let channel = Channel { sensor: found.sensor, axis };
+                if self.missing.contains(&channel) { 0.0 } else { sigmas[axis as usize] }
+            };
+            let sigmas = Some(Axis::ALL.map(of_axis));
+            match found.sensor {
+                Sensor::Accel => turn_on.accel_m_s2 = sigmas,
+                Sensor::Gyro => turn_on.gyro_rad_s = sigmas,
+            }
+        }
+        self.turn_on = (turn_on != TurnOn::default()).then_some(turn_on);
+        if let Some(provenance) = self.provenance.as_mut().filter(|_| !remarks.is_empty()) {
+            provenance.insert("turn_on".to_owned(), remarks.into());
+        }
+        self
     }
 }
 

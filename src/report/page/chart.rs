@@ -166,6 +166,13 @@ impl Series {
         Self::new(name, colour, Mark::Line(points, Stroke::Thin))
     }
 
+    /// Points (x, y, half of the interval; NaN: none).
+    #[must_use]
+    pub fn points(name: &str, colour: Colour, points: impl IntoIterator<Item = (f64, f64, f64)>) -> Self {
+        let point = |(x, y, half): (f64, f64, f64)| Interval { x, y, low: y - half, high: y + half };
+        Self::new(name, colour, Mark::Points(points.into_iter().map(point).collect()))
+    }
+
     /// A dashed line.
     #[must_use]
     pub fn dashed(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {

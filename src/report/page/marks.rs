@@ -67,7 +67,8 @@ impl Frame<'_> {
 
     /// There along the upper curve and back along the lower one; where one of them cannot be shown, it ends.
     fn band(&self, points: &[(f64, f64, f64)]) -> String {
-        let points = thinned_band(points, self.most);
+        // A line of as many points has the lowest and the highest of every two pixels.
+        let points = thinned_band(points, self.most / 2);
         let is_drawn = |p: &(f64, f64, f64)| {
             is_shown(p.0, self.scales[0]) && is_shown(p.2, self.scales[1]) && !p.1.is_nan()
         };
@@ -83,14 +84,17 @@ impl Frame<'_> {
 
     fn points(&self, points: &[Interval], svg: &mut String) {
         let shown = || points.iter().filter(|p| self.shows(p.x, p.y));
+        let with_bar = |p: &&Interval| !(p.low.is_nan() && p.high.is_nan());
         let bar = |p: &Interval| {
             let [low, high] =
                 [p.low, p.high].map(|end| short(self.y.within(if end.is_nan() { p.y } else { end })));
             format!("M{} {low}V{high}", short(self.x.at(p.x)))
         };
-        path(svg, "whisker", &shown().map(bar).collect::<String>());
+        path(svg, "whisker", &shown().filter(with_bar).map(bar).collect::<String>());
         let class = if points.len() > MANY { "dot small" } else { "dot" };
-        path(svg, class, &shown().map(|p| format!("M{}h0", self.point(p.x, p.y))).collect::<String>());
+        let mut dots: Vec<String> = shown().map(|p| format!("M{}h0", self.point(p.x, p.y))).collect();
+        dots.dedup();
+        path(svg, class, &dots.concat());
     }
 
     /// As wide as 0.7 of the distance of two names.
@@ -118,9 +122,9 @@ fn path(svg: &mut String, class: &str, d: &str) {
     }
 }
 
-/// A coordinate to a hundredth of a pixel, without idle zeros.
+/// A coordinate to a tenth of a pixel, without idle zeros.
 pub(super) fn short(pixels: f64) -> String {
-    let text = format!("{pixels:.2}");
+    let text = format!("{pixels:.1}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 

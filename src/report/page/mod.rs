@@ -23,9 +23,11 @@ mod draw;
 mod legend;
 mod marks;
 mod table;
+mod terminal;
 
 pub use chart::{Axis, Chart, Colour, Interval, Mark, Panel, Scale, Series, Size, Stroke};
 pub use table::{Cell, Table};
+pub use terminal::{beside, terminal};
 
 use draw::{Canvas, NARROW, SMALL, WIDE, draw, text};
 use std::fmt::Write as _;

@@ -66,7 +66,8 @@ fn a_map_has_one_scale() {
     let points: Vec<Vec<f64>> =
         path.split('L').map(|p| p.split(' ').map(|c| c.parse().unwrap()).collect()).collect();
     let (east, north) = (points[1][0] - points[0][0], points[1][1] - points[2][1]);
-    assert!((east - north).abs() < 0.02 && east > 100.0, "{path}");
+    // Four coordinates in tenths of a pixel.
+    assert!((east - north).abs() < 0.21 && east > 100.0, "{path}");
     assert!(html.contains(">start</text>") && html.contains(">20 m</text>"), "{path}");
 }
 

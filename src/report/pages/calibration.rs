@@ -1,13 +1,16 @@
 //! The page of a calibrated model: curves, model, what is left over, parameters, recordings.
 
 use super::wavelet::{band, curve, scale_axis, sensor_name, unit, variance_axis};
-use crate::calibration::{Diagnosis, Goodness, Outcome, Settings, Verdict, advice, shares, tau_s};
+use crate::calibration::{
+    Diagnosis, Goodness, Outcome, Settings, TurnOnSpread, Verdict, advice, shares, tau_s,
+};
 use crate::imu::Sensor;
 use crate::report::curves::{CurvesFile, FittedCurve};
 use crate::report::describe::meaning;
 use crate::report::fits::interval_of;
 use crate::report::number::readable;
 use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, Table, Tone, svg};
+use crate::report::turn_on::turn_on_remark;
 
 /// The page of the models of one estimator. `outcomes`: each with its place among all fits of the command; `curves`: of the
 /// same outcomes.
@@ -16,6 +19,7 @@ pub fn calibration_page(
     curves: &CurvesFile,
     outcomes: &[(usize, &Outcome)],
     diagnoses: &[Diagnosis],
+    turn_on: &[TurnOnSpread],
     settings: &Settings,
 ) -> String {
     let (tone, verdict) = verdict(curves, outcomes, diagnoses);
@@ -36,11 +40,36 @@ pub fn calibration_page(
         let lines = advice(diagnoses, sensor, settings.rate_hz);
         lines.iter().for_each(|line| page.text(&format!("{}: {line}", sensor_name(sensor.name()))));
     }
+    means(&mut page, turn_on, outcomes);
     page.checked(
         "wavelet variances of models to 1e-13 of an independent implementation (tests/truth/calibration_truth.rs); the optimum to 1e-6 \
          of an exhaustive search that shares no code with it (tests/truth/global_minimum.rs), all relative.",
     );
     page.html()
+}
+
+/// What the recordings' means say of a turn-on bias. Sources of the numbers are places in the JSON of the command.
+fn means(page: &mut Page, turn_on: &[TurnOnSpread], outcomes: &[(usize, &Outcome)]) {
+    let own = |t: &&TurnOnSpread| outcomes.iter().any(|(_, o)| o.estimator == t.estimator);
+    if !turn_on.iter().any(|t| own(&t)) {
+        return;
+    }
+    page.section("Turn-on bias");
+    let mut table = Table::new(["axis", "recordings", "spread of the means", "by noise alone", "unit"]);
+    for (i, found) in turn_on.iter().enumerate().filter(|(_, t)| own(t)) {
+        page.text(&format!("{}: {}.", sensor_name(found.sensor.name()), turn_on_remark(found)));
+        for (k, axis) in found.axes.iter().enumerate() {
+            let number = |value: f64, key: &str| Cell::number(value, &format!("/turn_on/{i}/axes/{k}/{key}"));
+            table.row([
+                format!("{} {}", found.sensor.name(), axis.axis.name()).into(),
+                number(axis.recordings as f64, "recordings"),
+                number(axis.spread, "spread"),
+                number(axis.noise, "noise"),
+                found.sensor.unit().into(),
+            ]);
+        }
+    }
+    page.table(&table);
 }
 
 /// The same as a picture.
@@ -50,7 +79,7 @@ pub fn calibration_svg(curves: &CurvesFile, diagnoses: &[Diagnosis]) -> String {
     svg("Stochastic calibration", &charts)
 }
 
-const CAPTION: &str = "Above: the wavelet variance that the model was fitted to with its 95 % band, that of each recording, what the \
+pub(super) const CAPTION: &str = "Above: the wavelet variance that the model was fitted to with its 95 % band, that of each recording, what the \
                        model implies and each of its processes. Below: data over model; the band should hold 1.";
 const ALLAN: &str = "√(2 ν) at half the scale: the Allan deviation of the data (the robust one, where the estimator is), of the \
                      model and of its processes.";
@@ -124,7 +153,7 @@ fn farthest(fitted: &FittedCurve) -> Option<(f64, f64)> {
     all.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, tau, ratio)| (tau, ratio))
 }
 
-fn chart(fitted: &FittedCurve, diagnoses: &[Diagnosis]) -> Chart {
+pub(super) fn chart(fitted: &FittedCurve, diagnoses: &[Diagnosis]) -> Chart {
     let FittedCurve { tau_s, wv, ci_low, ci_high, implied, .. } = fitted;
     let ratio =
         |values: &[f64]| -> Vec<f64> { values.iter().zip(implied).map(|(nu, model)| nu / model).collect() };

@@ -1,5 +1,6 @@
 //! The page of a choice: scores of the candidates with their intervals, recording by recording, and what decides.
 
+use super::sentence;
 use crate::choose::{Influence, Mean, Placed, ScaleInfluence};
 use crate::report::choose::ChoiceReport;
 use crate::report::comparison::in_order;
@@ -68,13 +69,6 @@ const HONESTY: &str = "NEES: the squared error in units of the filter's own cova
                        timid. Horizontal error: what it is and what the filter believes.";
 const INFLUENCE: &str = "Growth of the horizontal error at the ends of outages with the wavelet variance of each scale (% for 1 %): the fit \
                          passes a change of the curve on to the parameters, covariance analysis these to the error.";
-
-/// With a capital letter and a full stop.
-pub(super) fn sentence(line: &str) -> String {
-    let mut letters = line.chars();
-    let first: String = letters.next().into_iter().flat_map(char::to_uppercase).collect();
-    format!("{first}{}.", letters.as_str())
-}
 
 fn names(placed: &[Placed]) -> Axis {
     Axis::names(placed.iter().map(|p| p.candidate.clone()).collect())

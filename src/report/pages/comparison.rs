@@ -1,5 +1,6 @@
 //! The page of a comparison: what the filters believe over time beside the reference, the paper's Figure 7 and Table I.
 
+use super::paper::PaperFigure;
 use super::{STATES, tone, window};
 use crate::metrics::{Measured, VerdictKind};
 use crate::report::comparison::{
@@ -80,6 +81,20 @@ fn verdict(file: &ComparisonFile) -> String {
         (n, lines) => format!("{}. The other {n} filters are consistent.", lines.join(". ")),
     }
 }
+
+/// The paper's Figure 7, beside its other ones.
+#[must_use]
+pub fn comparison_figure(
+    candidates: &[CandidateResult],
+    curves: &[RatioCurves],
+    outages: &[(f64, f64)],
+    states: &[usize],
+) -> PaperFigure {
+    PaperFigure::new(7, FIGURE, charts(candidates, curves, outages, states))
+}
+
+const FIGURE: &str = "Departure of the ASEE of each filter from that of AWV in scenario I, (ratio − 1)·100, scenario by scenario; \
+                      outages shaded.";
 
 /// The paper's Figure 7 as a picture.
 #[must_use]

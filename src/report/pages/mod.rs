@@ -3,22 +3,30 @@
 mod calibration;
 mod choice;
 mod comparison;
+mod design;
 mod efficiency;
 mod fusion;
+mod paper;
+mod require;
 mod run;
 mod run_charts;
 mod study;
+mod tune;
 mod wavelet;
 
 pub use calibration::{calibration_page, calibration_svg};
 pub use choice::choice_page;
-pub use comparison::{RatioCurves, comparison_page, comparison_svg};
+pub use comparison::{RatioCurves, comparison_figure, comparison_page, comparison_svg};
+pub use design::design_page;
 pub use efficiency::{efficiency_page, efficiency_svg};
 pub(super) use fusion::fusion_page;
+pub use paper::{PaperFigure, StudyCurves, paper_figures, paper_page};
+pub use require::{catalogue_page, model_page, needed_page};
 pub(super) use run::run_page;
-pub use run_charts::run_svg;
+pub use run_charts::{run_svg, run_text};
 pub use study::study_page;
-pub use wavelet::{wavelet_page, wavelet_svg};
+pub use tune::tune_page;
+pub use wavelet::{wavelet_page, wavelet_svg, wavelet_text};
 
 use super::number::seconds;
 use super::page::Tone;
@@ -48,6 +56,13 @@ fn tone(kind: VerdictKind) -> Tone {
         VerdictKind::Underconfident => Tone::Doubtful,
         VerdictKind::Overconfident | VerdictKind::Diverged => Tone::Bad,
     }
+}
+
+/// With a capital letter and a full stop.
+fn sentence(line: &str) -> String {
+    let mut letters = line.chars();
+    let first: String = letters.next().into_iter().flat_map(char::to_uppercase).collect();
+    format!("{first}{}.", letters.as_str())
 }
 
 /// `300–390 s`

@@ -2,12 +2,18 @@
 
 use super::STATES;
 use crate::metrics::{Budget, EpochMetrics, OutageSummary, Summary};
-use crate::report::page::{Axis, Chart, Colour, Interval, Mark, Panel, Series, svg};
+use crate::report::page::{Axis, Chart, Colour, Interval, Mark, Panel, Series, svg, terminal};
 
 /// What of it most people want as a picture.
 #[must_use]
 pub fn run_svg(epochs: &[EpochMetrics], summary: &Summary) -> String {
     svg("Navigation errors", &[horizontal(epochs, summary), nees(epochs, summary)])
+}
+
+/// The horizontal error over time for a terminal.
+#[must_use]
+pub fn run_text(epochs: &[EpochMetrics], summary: &Summary) -> String {
+    terminal(&horizontal(epochs, summary), 86, 15).join("\n")
 }
 
 /// The outages (start, end) (s).

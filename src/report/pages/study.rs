@@ -1,6 +1,6 @@
 //! The page of a study: verdicts, drift against the length of outages.
 
-use super::choice::sentence;
+use super::sentence;
 use crate::metrics::{OutageMetrics, VerdictKind};
 use crate::report::choose::RankedPlace;
 use crate::report::comparison::with_times;

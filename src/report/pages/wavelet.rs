@@ -2,7 +2,9 @@
 
 use crate::imu::Sensor;
 use crate::report::curves::{SignalCurves, SignalsFile};
-use crate::report::page::{Axis, Chart, Colour, Mark, Page, Panel, Series, Table, Tone, svg};
+use crate::report::page::{
+    Axis, Chart, Colour, Mark, Page, Panel, Series, Table, Tone, beside, svg, terminal,
+};
 
 /// The axis of scales.
 pub(super) fn scale_axis() -> Axis {
@@ -78,6 +80,26 @@ pub fn wavelet_page(file: &SignalsFile) -> String {
 pub fn wavelet_svg(file: &SignalsFile) -> String {
     svg("Wavelet variance of static recordings", &charts(file))
 }
+
+/// The robust wavelet deviations for a terminal, a plot a sensor: each axis with its letter.
+#[must_use]
+pub fn wavelet_text(file: &SignalsFile) -> String {
+    let plot = |sensor: Sensor| {
+        let own = file.signals.iter().filter(|s| s.sensor == sensor.name());
+        let deviation = |s: &SignalCurves| -> Vec<(f64, f64)> {
+            s.tau_s.iter().zip(&s.robust.wv).map(|(tau, nu)| (*tau, nu.sqrt())).collect()
+        };
+        let series = own.map(|s| Series::line(&s.axis, Colour::Ink, deviation(s))).collect();
+        let panel = Panel::new(Axis::log(&format!("{} ({})", sensor.name(), sensor.unit())), series);
+        terminal(&Chart::new("", scale_axis(), vec![panel]), TEXT.0, TEXT.1)
+    };
+    let [accel, gyro] = Sensor::ALL.map(plot);
+    let plots = if accel.is_empty() { gyro } else { beside(&accel, &gyro, TEXT.0) };
+    format!("wavelet deviation √ν, robust\n{}", plots.join("\n"))
+}
+
+/// Columns and rows of a plot in a terminal.
+const TEXT: (usize, usize) = (42, 13);
 
 /// Classical over robust beyond which outliers are suspected.
 const OUTLIERS: f64 = 1.5;

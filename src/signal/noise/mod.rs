@@ -11,6 +11,7 @@ mod drift;
 mod gauss_markov;
 mod kind;
 mod ma1;
+mod mean;
 mod normal;
 pub mod practical;
 mod quantization;

@@ -1,0 +1,101 @@
+//! Simulated laboratories: recordings of known noise and known turn-on bias, calibrated.
+
+use super::*;
+use crate::curve::{Pool, grouped, replicates};
+use crate::noise::{Ar1, Composite, Model, Process, RandomWalk, VirtualImu, White};
+use crate::outcome::{ModelChoice, Settings};
+use crate::pipeline::calibrate;
+use crate::rng::StreamKey;
+use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
+
+const RECORDINGS: usize = 6;
+const SAMPLES: usize = 2048;
+
+fn model(processes: Vec<Process>) -> Model {
+    let noise = Composite::new(processes);
+    Model::pooled(100.0, &noise, &noise)
+}
+
+fn white() -> Process {
+    Process::White(White::new(1e-4).unwrap())
+}
+
+/// The gyroscopes of six recordings, their biases of a standard deviation; fitted with a sum of processes.
+fn laboratory(noise: &Model, bias: f64, spec: &str, seed: u64) -> TurnOnSpread {
+    let imu = VirtualImu { model: noise, spread: None, contamination: None, seed };
+    let gyros: Vec<Channel> = Channel::ALL.into_iter().filter(|c| c.sensor == Sensor::Gyro).collect();
+    let settings = Settings { model: ModelChoice::Given(spec.parse().unwrap()), ..Settings::default() };
+    let mut signals = Vec::new();
+    for replicate in 1..=RECORDINGS as u64 {
+        let mut recording = imu.recording(replicate, &gyros, SAMPLES).unwrap();
+        let key = StreamKey { seed, scenario: "", run: replicate, source: "gyro", process: "turn_on" };
+        let mut generator = key.generator();
+        for signal in &mut recording.signals {
+            let normal: f64 = StandardNormal.sample(&mut generator);
+            signal.mean += 1e-3 + bias * normal;
+        }
+        signals.extend(replicates(&recording, None, &settings.tuning).unwrap());
+    }
+    let groups = grouped(signals, Pool::Sensor);
+    let outcomes = calibrate(&groups, &settings).unwrap();
+    let found = turn_on(&groups, &outcomes.iter().collect::<Vec<_>>());
+    assert_eq!(found.len(), 1);
+    found[0].clone()
+}
+
+fn laboratories(count: u64, noise: &Model, bias: f64, spec: &str) -> Vec<TurnOnSpread> {
+    (1..=count).into_par_iter().map(|seed| laboratory(noise, bias, spec, seed)).collect()
+}
+
+/// S² is unbiased for σ² and what the noise adds: 15 degrees of freedom a laboratory, relative standard error
+/// √(2/15/200) = 2.6 % over 200.
+#[test]
+fn the_spread_is_the_turn_on_bias_and_what_the_noise_adds() {
+    let walk = Process::RandomWalk(RandomWalk::new(1e-9).unwrap());
+    let noise = model(vec![white(), walk]);
+    let bias = 3e-3;
+    let found = laboratories(200, &noise, bias, "WN+RW");
+    let exact = bias * bias + noise.axes[3].mean_variance(SAMPLES);
+    let mean = found.iter().map(|f| f.spread().powi(2)).sum::<f64>() / found.len() as f64;
+    assert!((mean / exact - 1.0).abs() < 4.0 * 0.026, "{mean} for {exact}");
+    assert!(found.iter().all(|f| f.finding == TurnOnFinding::Seen && f.sigmas().is_some()));
+}
+
+/// At most 1 % of 400 laboratories; twelve have a probability below 1e-3 even at exactly 1 %.
+#[test]
+fn noise_alone_is_no_turn_on_bias() {
+    let walk = Process::RandomWalk(RandomWalk::new(1e-8).unwrap());
+    let slow = Process::Ar1(Ar1::new(0.9995, 1e-8).unwrap());
+    let cases = [
+        ("WN", vec![white()]),
+        ("WN+RW", vec![white(), walk]),
+        ("WN+AR1", vec![white(), slow]),
+        // a fit that knows nothing of the walk
+        ("WN", vec![white(), walk]),
+    ];
+    for (spec, processes) in cases {
+        let found = laboratories(400, &model(processes), 0.0, spec);
+        let alarms = found.iter().filter(|f| f.finding == TurnOnFinding::Seen).count();
+        assert!(alarms < 12, "{spec}: {alarms}");
+    }
+}
+
+#[test]
+fn another_mounting_is_no_bias_and_means_removed_are_none() {
+    let noise = model(vec![white()]);
+    assert_eq!(laboratory(&noise, 0.3, "WN", 1).finding, TurnOnFinding::Moved);
+    let (imu, settings) = (VirtualImu { model: &noise, spread: None, contamination: None, seed: 1 }, {
+        Settings { model: ModelChoice::Given("WN".parse().unwrap()), ..Settings::default() }
+    });
+    let mut signals = Vec::new();
+    for replicate in 1..=3 {
+        let mut recording = imu.recording(replicate, &Channel::ALL, SAMPLES).unwrap();
+        recording.signals.iter_mut().for_each(|s| s.mean = 0.0);
+        signals.extend(replicates(&recording, None, &settings.tuning).unwrap());
+    }
+    let groups = grouped(signals, Pool::Axes);
+    let outcomes = calibrate(&groups, &settings).unwrap();
+    let found = turn_on(&groups, &outcomes.iter().collect::<Vec<_>>());
+    assert!(found.len() == 2 && found.iter().all(|f| f.finding == TurnOnFinding::Removed), "{found:?}");
+}
