@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 
 /// Noise model from the figures of a datasheet, in the datasheet's units: an assumption, not a calibration
 ///
-/// White noise of the density given; a Gauss-Markov process whose largest Allan deviation is the bias
-/// instability; a random walk. [provenance] of the model file holds every figure as given and what it became.
+/// White noise of the density given; Gauss-Markov processes whose Allan deviation has the bias instability as its
+/// floor; a random walk. [provenance] of the model file holds every figure as given and what it became.
 /// Flags win over the entry of the catalogue.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
@@ -54,7 +54,7 @@ struct Figures {
     /// Bias instability of the gyroscopes: deg/h, deg/s, rad/s
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::Bias))]
     gyro_bias: Option<Quantity>,
-    /// Correlation time of both biases: s, min, h [default: 300 s, which is said]
+    /// Longest correlation time of both biases: s, min, h [default: 300 s, which is said]
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::CorrelationTime))]
     corr_time: Option<Quantity>,
     /// Correlation time of the accelerometers' bias

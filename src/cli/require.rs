@@ -47,7 +47,7 @@ pub(crate) struct Args {
     /// Scenario file: receiver, start, IMU rate (see `nav-sim schema scenario`)
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
-    /// Correlation time of the biases of the IMU that is sought
+    /// Longest correlation time of the biases of the IMU that is sought
     #[arg(long, value_name = "SECONDS", value_parser = parse::positive, default_value = "300", conflicts_with = "model")]
     corr_time_s: f64,
     /// Also a curve of equal drift: eight gyroscope biases, and the velocity random walk that each leaves

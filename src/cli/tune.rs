@@ -49,7 +49,7 @@ pub(crate) struct Args {
     /// What has a factor of its own
     #[arg(long, value_name = "WHAT", value_parser = one_of::<Per>(&Per::NAMES), default_value_t)]
     per: Per,
-    /// The filter that is made honest: full, or that of the scenario (15 states)
+    /// The filter that is made honest: full, or that of the scenario (15 states; takes longer); the verdict judges both
     #[arg(long, value_name = "STATES", default_value = "full")]
     filter: FilterStates,
     /// Factors may be below 1
@@ -87,6 +87,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if !reduced.filter.states.is_reduced() {
         reduced.filter.states = FilterStates::default();
     }
+    let filter_of_run = reduced.filter.states;
     let full = |model: &Model| full.belief(model, &outages, &track);
     let reduced = |model: &Model| reduced.belief(model, &outages, &track);
     let task = Task {
@@ -102,6 +103,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let factors = task.factors().map_err(|e| Failure::input(format!("{}: {e}", args.model.display())))?;
     let ones: Vec<Factor> = factors.iter().map(|f| Factor { on_variance: 1.0, ..f.clone() }).collect();
     let result = TuneResult {
+        filter: if args.filter.is_reduced() { filter_of_run } else { args.filter },
+        filter_of_run,
         before: task.honesty(task.filter, &ones).map_err(Failure::input)?,
         after: task.honesty(task.filter, &factors).map_err(Failure::input)?,
         reduced: task.honesty(&reduced, &factors).map_err(Failure::input)?,

@@ -173,7 +173,7 @@ impl Export {
                 .map_err(|source| ExportError::Curve { sensor, source })?;
             curves.push((channels, curve));
         }
-        let bias = common_bias(target, settings.policy, &curves);
+        let bias = common_bias(target, settings.policy, [&curves[0].1, &curves[1].1]);
         let mut sensors = Vec::new();
         for (channels, curve) in &curves {
             sensors.push(SensorExport::new(model, channels, curve, bias, settings)?);
@@ -190,18 +190,12 @@ impl Export {
     }
 }
 
-/// The bias that the target knows. KF-GINS has one correlation time for both sensors: the geometric mean of theirs.
-fn common_bias(target: Target, policy: Policy, curves: &[(Vec<Channel>, Curve)]) -> Bias {
-    if target != Target::KfGins {
-        return target.bias();
+/// The bias that the target knows. KF-GINS has one correlation time for both sensors.
+fn common_bias(target: Target, policy: Policy, [accel, gyro]: [&Curve; 2]) -> Bias {
+    if target == Target::KfGins && policy != Policy::Strict {
+        return Bias::MarkovOf(accel.shared_correlation_time_s(gyro, policy));
     }
-    let times: Vec<f64> = curves
-        .iter()
-        .filter_map(|(_, curve)| curve.pair(policy, Bias::Markov).markov)
-        .map(|m| m.t_corr_s)
-        .collect();
-    let ln: f64 = times.iter().map(|t| t.ln()).sum();
-    if times.is_empty() { Bias::Markov } else { Bias::MarkovOf((ln / times.len() as f64).exp()) }
+    target.bias()
 }
 
 impl SensorExport {
@@ -266,13 +260,16 @@ struct SensorValues {
     bias_meaning: &'static str,
 }
 
+/// The correlation time that a search leaves to a bias of no size means nothing.
+const NO_BIAS: Markov = Markov { sigma: 0.0, t_corr_s: f64::INFINITY };
+
 impl Values {
     fn new(rate_hz: f64, sensors: &[SensorExport; 2]) -> Self {
         let of_sensor = |s: &SensorExport| SensorValues {
             density: s.exported.density,
             // Programs that list K beside a Gauss-Markov bias do not use it; it is that of the other pair.
             walk: s.largest.walk.walk,
-            markov: s.exported.markov.unwrap_or(Markov { sigma: 0.0, t_corr_s: f64::INFINITY }),
+            markov: s.exported.markov.filter(|m| m.sigma > 0.0).unwrap_or(NO_BIAS),
             bias_sd: s.bias_sd,
             turn_on: s.turn_on,
             bias_meaning: if s.turn_on.is_some() {

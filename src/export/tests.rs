@@ -216,13 +216,53 @@ fn every_value_has_its_unit_on_its_line() {
     }
 }
 
-/// KF-GINS has one correlation time: with 100 s and 400 s, their geometric mean, and the certificate is of that pair.
+/// KF-GINS has one correlation time: of all times from 2 s to 200 s the one with the least sum of squares of both
+/// sensors, and the certificate is of that pair.
 #[test]
 fn kf_gins_has_one_correlation_time() {
     let (accel, gyro) = (vec![white(1e-4), markov(1e-3, 10.0)], vec![white(1e-5), markov(1e-4, 40.0)]);
-    let export = export(Target::KfGins, accel, gyro, Policy::Matched);
-    assert!((value(&export, "corrtime") * 3600.0 / 20.0 - 1.0).abs() < 1e-2, "{:?}", export.entries);
-    assert!(export.sensors[0].exported.markov.unwrap().t_corr_s > 19.0);
+    let export = export(Target::KfGins, accel.clone(), gyro.clone(), Policy::Matched);
+    let curves =
+        [accel, gyro].map(|p| Curve::largest(&[&Composite::new(p)], RATE, Horizon::default()).unwrap());
+    let misfit = |t_corr_s: f64| -> f64 {
+        let samples: Vec<u32> =
+            (0..=106).map(|k| (RATE * 2.0_f64.powf(f64::from(k) / 16.0)).round() as u32).collect();
+        let of_sensor = |curve: &Curve, processes: &[Process]| -> f64 {
+            let pair = curve.pair(Policy::Matched, Bias::MarkovOf(t_corr_s));
+            let model = Composite::new(processes.to_vec());
+            let log = |m: &u32| 0.5 * (pair.allan_variance(*m, RATE) / model.allan_variance(*m)).ln();
+            samples.iter().map(|m| log(m).powi(2)).sum()
+        };
+        of_sensor(&curves[0], &[white(1e-4), markov(1e-3, 10.0)])
+            + of_sensor(&curves[1], &[white(1e-5), markov(1e-4, 40.0)])
+    };
+    let found_s = value(&export, "corrtime") * 3600.0;
+    let best =
+        (0..=60).map(|i| 2.0 * 100.0_f64.powf(f64::from(i) / 60.0)).map(misfit).fold(f64::MAX, f64::min);
+    assert!(10.0 < found_s && found_s < 40.0 && misfit(found_s) < 1.001 * best, "{found_s} s");
+    assert!((export.sensors[0].exported.markov.unwrap().t_corr_s / found_s - 1.0).abs() < 1e-12);
+}
+
+/// A sensor whose noise is white leaves the correlation time to the other, whichever it is: the pair comes back exactly,
+/// a random walk as the longest time that the search knows (thirty horizons).
+#[test]
+fn a_sensor_without_a_bias_has_no_say_in_the_correlation_time() {
+    let (bias, t_s) = (5.0 * DEG / 3600.0, 300.0);
+    let (still, moving) = (vec![white(N_A)], vec![white(N_G), markov(bias, t_s)]);
+    for policy in [Policy::Matched, Policy::Envelope] {
+        let gyro_moves = export(Target::KfGins, still.clone(), moving.clone(), policy);
+        let accel_moves = export(Target::KfGins, moving.clone(), still.clone(), policy);
+        for (export, sensor) in [(gyro_moves, 1), (accel_moves, 0)] {
+            let markov = export.sensors[sensor].exported.markov.unwrap();
+            assert!((value(&export, "corrtime") * 3600.0 / t_s - 1.0).abs() < 1e-2, "{policy:?} {markov:?}");
+            assert!((markov.sigma / bias - 1.0).abs() < 1e-2, "{policy:?} {markov:?}");
+        }
+        let walk = export(Target::KfGins, vec![white(N_A), walk(K_A)], still.clone(), policy);
+        assert!((value(&walk, "corrtime") * 3600.0 / 3000.0 - 1.0).abs() < 1e-6, "{policy:?}");
+    }
+    // where nothing wanders, no time is said
+    let white = export(Target::NaveGo, still.clone(), still, Policy::Matched);
+    assert!(value(&white, "imu.gb_corr").is_infinite());
 }
 
 #[test]

@@ -72,6 +72,7 @@ pub struct FusionSummary {
     start_s: f64,
     end_s: f64,
     filter_states: usize,
+    turn_on_states: usize,
     initial: Initial,
     fixes: Fixes,
     nis_per_component: f64,
@@ -140,7 +141,7 @@ impl FusionSummary {
         (outcome, assessment): (&Outcome, &Assessment),
         start: &Start,
         imu_rate_hz: f64,
-        filter_states: usize,
+        [filter_states, turn_on_states]: [usize; 2],
     ) -> Self {
         let outage = |o: &crate::fusion::OutageDrift| OutageRow {
             start_s: o.outage.start_s,
@@ -168,6 +169,7 @@ impl FusionSummary {
             start_s: start.t_s,
             end_s: solution.rows.last().map_or(start.t_s, |r| r.t_s),
             filter_states,
+            turn_on_states,
             initial: Initial {
                 t_s: start.t_s,
                 state: PerName(STATE.into_iter().zip(values(&start.state)).collect()),
@@ -238,9 +240,14 @@ impl FusionSummary {
     pub fn text(&self) -> String {
         let Fixes { used, withheld, rejected } = self.fixes;
         let mut lines = vec![self.verdict_line()];
+        let turn_on = match self.turn_on_states {
+            0 => String::new(),
+            n => format!(" + {n} turn-on"),
+        };
+        let states = self.filter_states - self.turn_on_states;
         lines.push(format!(
-            "{} IMU samples at {:.2} Hz, {} to {:.2} s, {} states; {used} fixes used, {withheld} withheld, {rejected} rejected",
-            self.imu_samples, self.imu_rate_hz, self.start_s, self.end_s, self.filter_states
+            "{} IMU samples at {:.2} Hz, {} to {:.2} s, {states}{turn_on} states; {used} fixes used, {withheld} withheld, {rejected} rejected",
+            self.imu_samples, self.imu_rate_hz, self.start_s, self.end_s
         ));
         lines.push(format!("NIS {:.2} per component (1 if all is as believed)", self.nis_per_component));
         for o in &self.outages {
@@ -373,13 +380,8 @@ fn kml(solution: &Solution, title: &str) -> String {
     let mut last = f64::NEG_INFINITY;
     for row in &solution.rows {
         if row.t_s - last >= 1.0 - 1e-6 || std::ptr::eq(row, &solution.rows[solution.rows.len() - 1]) {
-            let _ = write!(
-                line,
-                "{:.8},{:.8},{:.2} ",
-                wrap_angle(row.state.lon) / DEG,
-                row.state.lat / DEG,
-                row.state.h
-            );
+            let (lon, lat, h) = (wrap_angle(row.state.lon) / DEG, row.state.lat / DEG, row.state.h);
+            let _ = write!(line, "{lon:.8},{lat:.8},{h:.2} ");
             last = row.t_s;
         }
     }

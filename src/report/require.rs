@@ -155,11 +155,13 @@ impl NeededImu {
     /// What is needed, in a sentence.
     #[must_use]
     pub fn verdict(&self, question: &Question) -> String {
+        let (from_s, to_s) = self.imu.floor_s();
         format!(
-            "needed for {}: an IMU as allocated below (biases with a correlation time of {} s); GNSS and the start \
-             take {} of the variance",
+            "needed for {}: an IMU as allocated below (bias instability: the floor of the Allan deviation, here from {} s \
+             to {} s); GNSS and the start take {} of the variance",
             question.in_words(),
-            readable(self.imu.t_corr_s),
+            readable(from_s),
+            readable(to_s),
             share(self.shares[IMU_PARAMETERS])
         )
     }

@@ -29,8 +29,8 @@ pub fn signals_digest(file: &SignalsFile) -> Vec<Vec<String>> {
         let lowest = lowest.map_or(String::new(), |(i, deviation)| {
             format!("{deviation:.3e} at {}", duration(allan_time_s(&longest(file).tau_s, i)))
         });
-        let ratio = own.iter().filter_map(|s| least_ratio(s)).min_by(f64::total_cmp);
-        let ratio = ratio.map_or(String::new(), |r| format!("{r:.2}"));
+        let ratios: Vec<Ratio> = own.iter().flat_map(|s| ratios(s, file.efficiency)).collect();
+        let ratio = least_ratio(&ratios).map_or(String::new(), |(r, mark)| format!("{r:.2}{mark}"));
         name.into_iter().chain(cells).chain([lowest, ratio]).collect()
     };
     std::iter::once(head).chain(channels(file).into_iter().map(row)).collect()
@@ -181,10 +181,32 @@ fn decades(file: &SignalsFile) -> Vec<usize> {
     found
 }
 
-/// The least of robust over classical, of the scales that are well known.
-fn least_ratio(s: &SignalCurves) -> Option<f64> {
+/// Robust over classical at one scale, and the standard deviation of its logarithm that chance has.
+struct Ratio {
+    ratio: f64,
+    deviation: f64,
+}
+
+/// At the scales that are well known. Of Gaussian coefficients the classical variance is efficient, so that the variance of
+/// the robust one is 1/e times its, their covariance is its, and that of their ratio 1/e − 1 times its, 2/edof.
+fn ratios(s: &SignalCurves, efficiency: f64) -> impl Iterator<Item = Ratio> {
     let known = (0..s.tau_s.len()).filter(|i| s.edof[*i] >= LEAST && s.robust.status[*i] == "ok");
-    known.map(|i| s.robust.wv[i] / s.classical.wv[i]).min_by(f64::total_cmp)
+    known.map(move |i| Ratio {
+        ratio: s.robust.wv[i] / s.classical.wv[i],
+        deviation: ((1.0 / efficiency - 1.0) * 2.0 / s.edof[i]).sqrt(),
+    })
+}
+
+/// How often a row without outliers is marked, at most.
+const FALSE_ALARMS: f64 = 0.025;
+
+/// The least of the ratios, which is below 1 by chance too, and a mark where one of them is lower than chance makes the
+/// least of so many: a normal variable is below −z with a probability of at most e^(−z²/2).
+fn least_ratio(ratios: &[Ratio]) -> Option<(f64, &'static str)> {
+    let z = (2.0 * (ratios.len() as f64 / FALSE_ALARMS).ln()).sqrt();
+    let is_marked = ratios.iter().any(|r| r.ratio.ln() < -z * r.deviation);
+    let least = ratios.iter().map(|r| r.ratio).min_by(f64::total_cmp)?;
+    Some((least, if is_marked { " *" } else { "" }))
 }
 
 fn median(mut values: Vec<f64>) -> Option<f64> {
@@ -206,6 +228,10 @@ fn short_name(file: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::rng::Generator;
+    use crate::wavelet::{Convention, interval};
+    use rand::{RngExt, SeedableRng};
+    use rand_distr::StandardNormal;
 
     fn file(count: usize) -> SignalsFile {
         // 100 Hz, 14 scales: white noise of density 1, wv = 1/(2·tau/2)/… so that the Allan deviation at t is 1/√t.
@@ -238,7 +264,35 @@ mod tests {
         assert_eq!(rows.len(), 2);
         assert_eq!(rows[0][2..7], ["0.01 s", "0.08 s", "1.28 s", "10.2 s", "81.9 s"]);
         assert_eq!(rows[1][..3], ["gyro.z", "rad/s", "1.000e1"]);
-        assert_eq!(rows[1][6..], ["1.105e-1", "1.105e-1 at 81.9 s", "0.90"]);
+        assert_eq!(rows[1][6..], ["1.105e-1", "1.105e-1 at 81.9 s", "0.90 *"]);
+    }
+
+    /// 200 recordings of white noise, 4096 samples each: at most 2.5 % have a mark, four deviations of a binomial share more,
+    /// 4 √(0.025·0.975/200) = 0.044, while the least ratio is below 1 in nearly all. With 2 % of the samples ten times as
+    /// large all have one.
+    #[test]
+    fn outliers_are_marked_and_chance_is_not() {
+        let tuning = Tuning::new(0.6, Convention::Exact).unwrap();
+        let row = |seed: u64, outliers: usize| {
+            let mut generator = Generator::seed_from_u64(seed);
+            let mut signal: Vec<f64> = (0..4096).map(|_| generator.sample(StandardNormal)).collect();
+            signal.iter_mut().step_by(50).take(outliers).for_each(|x| *x *= 10.0);
+            let (classical, robust) = crate::wavelet::both(&signal, 8, &tuning).unwrap();
+            let ratios: Vec<Ratio> = (1..=8_u32)
+                .map(|level| (level, interval::edof_eta3(4096, level)))
+                .filter(|(_, edof)| *edof >= LEAST)
+                .map(|(level, edof)| Ratio {
+                    ratio: robust[level as usize - 1].value / classical[level as usize - 1],
+                    deviation: ((1.0 / 0.6 - 1.0) * 2.0 / edof).sqrt(),
+                })
+                .collect();
+            least_ratio(&ratios).unwrap()
+        };
+        let clean: Vec<(f64, &str)> = (0..200).map(|seed| row(seed, 0)).collect();
+        let marked = clean.iter().filter(|(_, mark)| !mark.is_empty()).count();
+        assert!(marked as f64 / 200.0 <= 0.025 + 0.044, "{marked} of 200");
+        assert!(clean.iter().filter(|(ratio, _)| *ratio < 1.0).count() > 180);
+        assert!((0..20).all(|seed| row(seed, 82).1 == " *"));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The tuning of a model, on one screen and as JSON.
 
 use super::number::{readable, seconds};
+use crate::ekf::FilterStates;
 use crate::metrics::PerState;
 use crate::simulation::REPORTED_NAMES;
 use crate::simulation::lincov::{Factor, Honesty};
@@ -12,6 +13,10 @@ const RIGHT: f64 = 0.01;
 /// What a tuning found.
 #[derive(Debug, Clone)]
 pub struct TuneResult {
+    /// The filter that was made honest.
+    pub filter: FilterStates,
+    /// The filter that `run` makes of the model unless told otherwise.
+    pub filter_of_run: FilterStates,
     /// The factors.
     pub factors: Vec<Factor>,
     /// The filter as it was.
@@ -32,13 +37,13 @@ impl TuneResult {
     /// The verdict: how honest the filter was, with which factors it is, and what that costs.
     #[must_use]
     pub fn verdict(&self) -> String {
-        let before = judged(&self.before);
+        let before = format!("the {} is {}", filter_name(self.filter), judged(&self.before));
         if self.factors.iter().all(|f| (f.on_variance - 1.0).abs() < RIGHT) {
             return match excess(&self.before) {
                 Excess::Underconfident => {
                     format!("{before}; no factor above 1 helps (--allow-smaller seeks one below)")
                 }
-                _ => format!("{before}; no factor is needed"),
+                _ => format!("{before}; no factor is needed{}", self.default_of_run()),
             };
         }
         let mut verdict =
@@ -49,11 +54,26 @@ impl TuneResult {
                 percent(self.cost())
             );
         }
+        verdict += &self.default_of_run();
         if self.factors.iter().any(Factor::is_at_limit) {
             verdict += "; a factor is the largest that is tried: larger noise alone does not make this model honest \
                         in this sense (--for worst, or another model)";
         }
         verdict
+    }
+
+    /// What `run` makes of the tuned model unless told otherwise, where that is not the filter that was tuned.
+    fn default_of_run(&self) -> String {
+        let states = self.filter_of_run;
+        if self.filter == states {
+            return String::new();
+        }
+        let judged = judged_after(&self.reduced);
+        let tunes = match is_honest(&self.reduced) {
+            true => String::new(),
+            false => format!(" (--filter {states} tunes that one)"),
+        };
+        format!("; in the {}, which run makes of it by default: {judged}{tunes}", filter_name(states))
     }
 
     /// Horizontal RMSE at the outages' ends over that of a filter that knows the truth, less 1.
@@ -175,11 +195,21 @@ fn judged(h: &Honesty) -> String {
     }
 }
 
+/// `filter of 15 states`
+fn filter_name(states: FilterStates) -> String {
+    if states == FilterStates::Full { "full filter".to_owned() } else { format!("filter of {states} states") }
+}
+
+/// No error larger than stated, in any state or all together.
+fn is_honest(h: &Honesty) -> bool {
+    h.ratio <= 1.0 + RIGHT && h.nees <= 9.0 * (1.0 + RIGHT)
+}
+
 /// The tuned filter: `it is honest (NEES 7.9)`
 fn judged_after(h: &Honesty) -> String {
     let nees = readable(h.nees);
     let place = if h.end_s.is_empty() { "" } else { " at an outage's end" };
-    if h.ratio <= 1.0 + RIGHT && h.nees <= 9.0 * (1.0 + RIGHT) {
+    if is_honest(h) {
         return format!("it is honest: no error{place} larger than stated (NEES {nees})");
     }
     if h.ratio <= 1.0 + RIGHT {
@@ -264,4 +294,48 @@ struct EndEntry {
     after_s: f64,
     horizontal_rmse_m: f64,
     rmse: PerState<f64>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::imu::Sensor;
+
+    fn honesty(ratio: f64, nees: f64) -> Honesty {
+        let (end_s, rmse_end) = (vec![90.0], vec![[1.0; 9]]);
+        Honesty { nees, ratio, state: 8, outage: 0, truth: 0, end_s, rmse_end }
+    }
+
+    fn result(filter: FilterStates, reduced: Honesty) -> TuneResult {
+        TuneResult {
+            filter,
+            filter_of_run: FilterStates::Reduced15,
+            factors: vec![Factor { sensor: Sensor::Gyro, process: None, on_variance: 4.0 }],
+            before: honesty(2.0, 30.0),
+            after: honesty(1.0, 8.8),
+            reduced,
+            informed: honesty(1.0, 9.0),
+            truths: vec!["truth.toml".to_owned()],
+        }
+    }
+
+    /// The filter that was tuned is named, and what `run` does by default is judged too: a verdict on the full filter is
+    /// not one on that of 15 states.
+    #[test]
+    fn the_verdict_names_the_filter_and_judges_the_default_of_run() {
+        let verdict = result(FilterStates::Full, honesty(1.19, 9.51)).verdict();
+        assert!(verdict.starts_with("the full filter is overconfident by 2.00 in yaw_deg"), "{verdict}");
+        let default = "; in the filter of 15 states, which run makes of it by default: the NEES is 9.51, yaw_deg still overconfident by 1.19";
+        assert!(verdict.contains(default) && verdict.ends_with("(--filter 15 tunes that one)"), "{verdict}");
+        let verdict = result(FilterStates::Full, honesty(0.98, 8.9)).verdict();
+        assert!(
+            verdict.contains("the by default: it is honest") && !verdict.contains("--filter"),
+            "{verdict}"
+        );
+        let verdict = result(FilterStates::Reduced15, honesty(1.0, 8.8)).verdict();
+        assert!(
+            verdict.starts_with("the filter of 15 states is") && !verdict.contains("default"),
+            "{verdict}"
+        );
+    }
 }

@@ -24,8 +24,12 @@ fn figures_in_the_units_of_a_datasheet_become_a_model() {
     let accel = file.model.axes[0].processes.iter().flat_map(|p| p.parameters()).collect::<Vec<_>>();
     near(accel[0].1, (0.02_f64 / 60.0).powi(2) * 200.0);
     near(accel[1].1, 1.0 / 300.0);
-    near(accel[2].1, (40e-6 * G / 0.617_364_283_144_441_3).powi(2));
-    assert_eq!(accel.iter().map(|(name, _)| *name).collect::<Vec<_>>(), ["sigma2", "beta", "s2"]);
+    // three processes a factor of 16 apart: their Allan variance is lowest at 0.4480 of the variance of one
+    near(accel[5].1, 256.0 / 300.0);
+    let s2 = (40e-6 * G).powi(2) / 0.448_028_281_7;
+    assert!([2, 4, 6].iter().all(|i| (accel[*i].1 / s2 - 1.0).abs() < 1e-9), "{accel:?}");
+    let names = ["sigma2", "beta", "s2", "beta", "s2", "beta", "s2"];
+    assert_eq!(accel.iter().map(|(name, _)| *name).collect::<Vec<_>>(), names);
     near(file.turn_on.unwrap().accel_m_s2.unwrap()[0], 2e-3 * G);
     assert_eq!(file.turn_on.unwrap().gyro_rad_s, None);
     let provenance = file.provenance.unwrap();

@@ -37,7 +37,10 @@ fn the_tuned_file_has_the_factor_and_says_where_it_came_from() {
     assert_eq!(tuned["provenance"]["inputs"].as_array().unwrap().len(), 2);
     let shown =
         String::from_utf8(tune(dir.path(), &arguments).success().get_output().stdout.clone()).unwrap();
-    assert!(shown.starts_with("overconfident by") && shown.lines().count() <= 20, "{shown}");
+    assert!(
+        shown.starts_with("the full filter is overconfident by") && shown.lines().count() <= 20,
+        "{shown}"
+    );
 }
 
 #[test]

@@ -113,7 +113,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return Err(Failure::input(message).hint("both need one clock"));
     }
     let outcome = fusion::outcome(&solution, &settings.outages);
-    let (rate_hz, states) = (inputs.imu.rate_hz, inputs.belief.states);
+    let constants = inputs.belief.groups.iter().flatten().filter(|g| g.is_constant()).count();
+    let (rate_hz, states) = (inputs.imu.rate_hz, [inputs.belief.states, 3 * constants]);
     let assessment = fusion::assess(&solution, &outcome, &doubts);
     warn(&assessment, &outcome, session);
     doubt_heading(&solution, &settings.outages, session);

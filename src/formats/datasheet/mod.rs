@@ -3,22 +3,19 @@
 //! | figure | becomes |
 //! |---|---|
 //! | noise density N | white noise, sigma2 = N²·rate |
-//! | bias instability B, correlation time T | a Gauss-Markov process whose largest Allan deviation is B |
+//! | bias instability B, correlation time T | Gauss-Markov processes whose Allan deviation has the floor B |
 //! | rate random walk K | a random walk, gamma2 = K²/rate |
 //! | turn-on bias | `[turn_on]` of the model file, taken as a standard deviation |
 //! | scale factor | said, not part of a noise model |
 //!
 //! **Bias instability.** Manufacturers read B off the lowest point of the Allan deviation (Sensonor's FAQ: "the
 //! minimum point of the Allan Variance curve"); [IEEE 952](crate::bibliography::Ieee952) calls that point 0.664
-//! times the coefficient of a flicker noise, which no process of finitely many states is. A Gauss-Markov
-//! process of standard deviation σ and correlation time T has the Allan variance, with x = τ/T,
-//!
-//! σ²·(2/x)·[1 − (3 − 4e^(−x) + e^(−2x))/(2x)],
-//!
-//! whose root is largest, 0.6174 σ, at x = 1.8926. The process is chosen so that this largest value is B: σ = B/0.6174.
-//! (Farrell, Silva, Rahman, Wendel: *IMU error modeling tutorial*, IEEE Control Systems 42(6), 2022: the same choice,
-//! as B/(0.4365 √T) for the root of the driving noise's density.) White noise comes on top: where it is above B at
-//! 1.89 T, the sum has no floor at B, which is said.
+//! times the coefficient of a flicker noise. B is read as that floor: [`Flicker`] has correlation times T, T/16, T/256, …
+//! down to 1 s, and its Allan deviation is at least B and at most 1.08 B from 1.9 times the shortest to 1.9 times T.
+//! White noise comes on top, so that the model is nowhere in that range below the datasheet; by how much its lowest point
+//! is above B is said where it is more than a fifth. (A single Gauss-Markov process whose largest Allan deviation is B, as in
+//! Farrell, Silva, Rahman, Wendel: *IMU error modeling tutorial*, IEEE Control Systems 42(6), 2022, is below B at every
+//! other averaging time: errors after an outage come out up to two times too small.)
 
 mod catalogue;
 mod figure;
@@ -28,7 +25,7 @@ pub use figure::{Figure, Quantity, QuantityError};
 
 use crate::formats::model_file::{ModelFile, SCHEMA, TurnOn};
 use crate::imu::{Channel, Sensor};
-use crate::noise::{Composite, GaussMarkov, Model, ParameterError, Process, RandomWalk, White, continuous};
+use crate::noise::{Composite, Flicker, Model, ParameterError, Process, RandomWalk, White, continuous};
 use toml::Table;
 
 /// The correlation time that is assumed where none is given (s).
@@ -126,18 +123,16 @@ impl Datasheet {
         }
         let given_s = self.value(sensor, Figure::CorrelationTime);
         let t_corr_s = given_s.unwrap_or(ASSUMED_CORRELATION_TIME_S);
-        let floor = self.value(sensor, Figure::Bias);
-        if let Some(floor) = floor {
-            processes.push(Process::GaussMarkov(gauss_markov(floor, t_corr_s, rate_hz)?));
-            doubts.extend(doubt_floor(sensor, floor, density.unwrap_or(0.0), given_s));
+        if let Some(floor) = self.value(sensor, Figure::Bias) {
+            let flicker = Flicker { floor, t_corr_s };
+            processes.extend(flicker.processes(rate_hz)?.into_iter().map(Process::GaussMarkov));
+            doubts.extend(doubt_floor(sensor, flicker, density.unwrap_or(0.0), given_s.is_some()));
         }
         if let Some(density) = self.value(sensor, Figure::Walk) {
             let gamma2 = continuous::walk_gamma2(density, rate_hz);
             processes.push(Process::RandomWalk(RandomWalk::new(gamma2)?));
         }
-        let noise = Composite::new(processes);
-        doubts.extend(floor.and_then(|floor| doubt_minimum(sensor, floor, &noise, t_corr_s, rate_hz)));
-        Ok(noise)
+        Ok(Composite::new(processes))
     }
 
     fn provenance(&self, program: &str, doubts: &[String]) -> Table {
@@ -177,8 +172,11 @@ impl Entry {
 const fn became(figure: Figure) -> &'static str {
     match figure {
         Figure::Noise => "white noise of this density: sigma2 = N² rate_hz",
-        Figure::Bias => "a Gauss-Markov process whose largest Allan deviation it is: s2 = (B / 0.6174)²",
-        Figure::CorrelationTime => "the correlation time of that process: beta = 1/T",
+        Figure::Bias => {
+            "Gauss-Markov processes of correlation times T, T/16, T/256, … down to 1 s whose Allan deviation is nowhere \
+             below it from 1.9 times the shortest to 1.9 T"
+        }
+        Figure::CorrelationTime => "the longest correlation time T of these processes: beta = 1/T",
         Figure::Walk => "a random walk of this density: gamma2 = K² / rate_hz",
         Figure::TurnOn => "the standard deviation of a constant bias, alike on three axes",
         Figure::Scale => {
@@ -187,59 +185,34 @@ const fn became(figure: Figure) -> &'static str {
     }
 }
 
-/// The Gauss-Markov process whose largest Allan deviation is `floor` (units).
-///
-/// # Errors
-/// When a number is not positive.
-pub fn gauss_markov(floor: f64, t_corr_s: f64, rate_hz: f64) -> Result<GaussMarkov, ParameterError> {
-    let sigma = floor / GaussMarkov::ALLAN_PEAK;
-    GaussMarkov::new(1.0 / t_corr_s, sigma * sigma, rate_hz)
-}
+/// How far the lowest point of the whole Allan deviation may be above the bias instability, as a ratio.
+const NOTABLE: f64 = 1.2;
 
-fn doubt_floor(sensor: Sensor, floor: f64, density: f64, given_s: Option<f64>) -> Vec<String> {
+fn doubt_floor(sensor: Sensor, flicker: Flicker, density: f64, is_time_given: bool) -> Vec<String> {
     let name = sensor.name();
-    let t_corr_s = given_s.unwrap_or(ASSUMED_CORRELATION_TIME_S);
     let mut doubts = Vec::new();
-    if given_s.is_none() {
+    if !is_time_given {
         doubts.push(format!(
             "{name}: no correlation time is given; {ASSUMED_CORRELATION_TIME_S} s is assumed for the bias instability"
         ));
     }
-    let tau_s = GaussMarkov::ALLAN_PEAK_AT * t_corr_s;
-    if density > floor * tau_s.sqrt() {
+    // the white noise falls throughout, so that both together are lowest where the floor ends
+    let tau_s = flicker.range_s().1;
+    let white = density / tau_s.sqrt() / flicker.floor;
+    let lowest = white.hypot(1.0);
+    if white > 1.0 {
         doubts.push(format!(
             "{name}: at {tau_s:.0} s the white noise alone is above the bias instability, which the Allan deviation then \
              does not show; a correlation time above {:.0} s would",
-            (density / floor).powi(2) / GaussMarkov::ALLAN_PEAK_AT
+            flicker.t_corr_s * white * white
+        ));
+    } else if lowest > NOTABLE {
+        doubts.push(format!(
+            "{name}: with the white noise the lowest Allan deviation of this model is {lowest:.2} times the bias instability, \
+             at {tau_s:.0} s: the model is cautious; a longer correlation time is less so"
         ));
     }
     doubts
-}
-
-/// Shortest averaging time at which the minimum of an Allan deviation is sought (s).
-const MINIMUM_FROM_S: f64 = 1.0;
-
-/// Manufacturers read a bias instability where the Allan deviation is lowest. A Gauss-Markov process of this peak beside
-/// little white noise is lower before its peak.
-fn doubt_minimum(
-    sensor: Sensor,
-    floor: f64,
-    noise: &Composite,
-    t_corr_s: f64,
-    rate_hz: f64,
-) -> Option<String> {
-    let peak_s = GaussMarkov::ALLAN_PEAK_AT * t_corr_s;
-    let times = (0..=80).map(|k| MINIMUM_FROM_S * (peak_s / MINIMUM_FROM_S).powf(f64::from(k) / 80.0));
-    let deviations = times.map(|t| (t, noise.allan_variance((t * rate_hz).round() as u32).sqrt()));
-    let (at_s, lowest) = deviations.min_by(|a, b| a.1.total_cmp(&b.1))?;
-    (lowest < 0.8 * floor).then(|| {
-        format!(
-            "{}: the Allan deviation of this model is lowest at {at_s:.0} s, with {:.2} of the bias instability, which it \
-             reaches at {peak_s:.0} s: where the datasheet means the lowest point, the model is optimistic there",
-            sensor.name(),
-            lowest / floor
-        )
-    })
 }
 
 #[cfg(test)]

@@ -1,9 +1,9 @@
-//! The IMU that a limit needs: white noise and one Gauss-Markov bias a sensor, each with a quarter of the budget.
+//! The IMU that a limit needs: white noise and bias instability of each sensor, each with a quarter of the budget.
 
 use super::{Course, Limit, RequireError, Worst};
 use crate::ekf::BeliefError;
 use crate::imu::Sensor;
-use crate::noise::{Composite, GaussMarkov, Kind, Model, Process, White, continuous};
+use crate::noise::{Composite, Flicker, Kind, Model, Process, White, continuous};
 use crate::scenario::Scenario;
 use crate::simulation::lincov::{Crossing, NamedSource};
 use crate::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
@@ -14,17 +14,17 @@ pub const IMU_PARAMETERS: usize = 4;
 /// Intensities of an IMU, all axes alike.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImuParameters {
-    /// Velocity random walk (m/s/√s), standard deviation of the accelerometer's bias (m/s²), angle random walk
-    /// (rad/√s), standard deviation of the gyroscope's bias (rad/s).
+    /// Velocity random walk (m/s/√s), bias instability of the accelerometer (m/s²), angle random walk (rad/√s), bias
+    /// instability of the gyroscope (rad/s).
     pub values: [f64; IMU_PARAMETERS],
-    /// Correlation time of the biases (s).
+    /// Longest correlation time of the biases (s).
     pub t_corr_s: f64,
 }
 
 const HOUR_S: f64 = 3600.0;
 
 /// A consumer IMU, from which searches start.
-const START: [f64; IMU_PARAMETERS] = [1e-3, 5e-4, 5e-5, 2e-5];
+const START: [f64; IMU_PARAMETERS] = [1e-3, 3e-4, 5e-5, 1e-5];
 /// An intensity times this is as good as none.
 const NONE: f64 = 1e-5;
 /// How far from the start an intensity is sought, as a logarithm: beyond, any will do.
@@ -51,22 +51,28 @@ impl ImuParameters {
         let [accel_white, accel_bias, gyro_white, gyro_bias] = self.values;
         let axis = |density: f64, bias: f64| {
             let white = White::new(continuous::white_sigma2(density, rate_hz));
-            let bias = GaussMarkov::new(1.0 / self.t_corr_s, bias * bias, rate_hz);
-            let [white, bias] = [white.map(Process::White), bias.map(Process::GaussMarkov)];
-            Composite::new(vec![white.expect("a finite variance"), bias.expect("a finite variance")])
+            let bias = Flicker { floor: bias, t_corr_s: self.t_corr_s }.processes(rate_hz);
+            let mut processes = vec![Process::White(white.expect("a finite variance"))];
+            processes.extend(bias.expect("finite variances").into_iter().map(Process::GaussMarkov));
+            Composite::new(processes)
         };
         Model::pooled(rate_hz, &axis(accel_white, accel_bias), &axis(gyro_white, gyro_bias))
     }
 
-    /// An intensity in the unit of datasheets; biases as bias instabilities, the largest Allan deviation that the
-    /// process has.
+    /// Between which averaging times the Allan deviation of a bias is nowhere below its bias instability (s).
+    #[must_use]
+    pub fn floor_s(&self) -> (f64, f64) {
+        Flicker { floor: 1.0, t_corr_s: self.t_corr_s }.range_s()
+    }
+
+    /// An intensity in the unit of datasheets.
     #[must_use]
     pub fn in_datasheets(which: usize, value: f64) -> f64 {
         match which {
             0 => value * HOUR_S.sqrt(),
-            1 => value * GaussMarkov::ALLAN_PEAK / STANDARD_GRAVITY * 1e6,
+            1 => value / STANDARD_GRAVITY * 1e6,
             2 => value / DEG * HOUR_S.sqrt(),
-            _ => value * GaussMarkov::ALLAN_PEAK / DEG_PER_HOUR,
+            _ => value / DEG_PER_HOUR,
         }
     }
 
@@ -102,14 +108,14 @@ pub struct Need<'a> {
     pub scenario: &'a Scenario,
     /// At least one.
     pub limits: &'a [Limit],
-    /// Correlation time of the biases (s).
+    /// Longest correlation time of the biases (s).
     pub t_corr_s: f64,
 }
 
 /// Velocity random walks that keep the limits beside a gyroscope's bias, the other two as allocated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct IsoDrift {
-    /// Standard deviation of the gyroscope's bias (rad/s), and what is left for the accelerometer (m/s/√s).
+    /// Bias instability of the gyroscope (rad/s), and what is left for the accelerometer (m/s/√s).
     pub points: Vec<(f64, Answer)>,
 }
 

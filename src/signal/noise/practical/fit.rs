@@ -23,12 +23,7 @@ pub(super) fn pair(curve: &Curve, policy: Policy, kind: Bias) -> Pair {
     let t_corr_s = match kind {
         Bias::Walk => None,
         Bias::MarkovOf(t_corr_s) => Some(t_corr_s),
-        Bias::Markov => {
-            // A quarter of the horizon's begin looks white over it, thirty times its end like a random walk.
-            let (low, high) = (curve.horizon.from_s / 4.0, curve.horizon.to_s * 30.0);
-            let misfit = |ln_t: f64| Problem::new(curve, policy, Some(ln_t.exp())).solve().misfit;
-            Some(least(low.ln(), high.ln(), 60, misfit).0.exp())
-        }
+        Bias::Markov => Some(correlation_time_s(&[curve], policy)),
     };
     let found = Problem::new(curve, policy, t_corr_s).solve();
     let (density, amplitude) = (found.white.sqrt(), found.bias.sqrt());
@@ -36,6 +31,18 @@ pub(super) fn pair(curve: &Curve, policy: Policy, kind: Bias) -> Pair {
         None => Pair { density, walk: amplitude, markov: None },
         Some(t_corr_s) => Pair { density, walk: 0.0, markov: Some(Markov { sigma: amplitude, t_corr_s }) },
     }
+}
+
+/// The correlation time whose pairs are the closest to the curves together (s). A curve without a bias is as close with
+/// any: it has no say.
+pub(super) fn correlation_time_s(curves: &[&Curve], policy: Policy) -> f64 {
+    // A quarter of the horizon's begin looks white over it, thirty times its end like a random walk.
+    let horizon = curves[0].horizon;
+    let (low, high) = (horizon.from_s / 4.0, horizon.to_s * 30.0);
+    let misfit = |ln_t: f64| -> f64 {
+        curves.iter().map(|curve| Problem::new(curve, policy, Some(ln_t.exp())).solve().misfit).sum()
+    };
+    least(low.ln(), high.ln(), 60, misfit).0.exp()
 }
 
 /// Squares of N and of K (or sigma_b), and the sum of squares of the logarithms of the Allan deviation ratios.

@@ -256,6 +256,13 @@ impl Curve {
         fit::pair(self, policy, bias)
     }
 
+    /// The one correlation time of Gauss-Markov biases that suits this curve and another together (s), by least squares
+    /// over both: a curve without a bias leaves it to the other. Not for [`Policy::Strict`], which takes times as they are.
+    #[must_use]
+    pub fn shared_correlation_time_s(&self, other: &Self, policy: Policy) -> f64 {
+        fit::correlation_time_s(&[self, other], policy)
+    }
+
     /// Whether all axes are the same white noise and random walk, so that the largest is one of them.
     fn is_white_and_walk(&self) -> bool {
         let pair = |p: &Process| matches!(p, Process::White(_) | Process::RandomWalk(_));
