@@ -316,6 +316,7 @@ mod tests {
             reduced,
             informed: honesty(1.0, 9.0),
             truths: vec!["truth.toml".to_owned()],
+            sweep: Vec::new(),
         }
     }
 
