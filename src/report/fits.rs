@@ -52,7 +52,7 @@ pub struct FitEntry {
     /// The processes, with the keys of model files.
     pub processes: Vec<Map<String, Value>>,
     /// J-test; none without bootstrap.
-    pub goodness: Option<GoodnessEntry>,
+    pub goodness: Option<Goodness>,
     /// Standard deviation of ln wv of a replicate at each scale: within by theory, between beyond that.
     pub spread: Vec<SpreadEntry>,
     /// Probability that replicates of one noise differ as much at some scale; none of a single signal.
@@ -119,19 +119,6 @@ impl CandidateEntry {
     }
 }
 
-/// The J-test of a fit.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct GoodnessEntry {
-    /// J, the objective.
-    pub statistic: f64,
-    /// Scales less parameters.
-    pub dof: usize,
-    /// Median of J when the model holds.
-    pub expected: f64,
-    /// Probability of such a J when the model holds.
-    pub p_value: f64,
-}
-
 /// Processes of one kind that cannot be told apart.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct IndistinctEntry {
@@ -185,7 +172,6 @@ impl FitEntry {
     pub fn new(outcome: &Outcome, rate_hz: f64) -> Self {
         let fit = &outcome.fit;
         let inference = outcome.inference.as_ref();
-        let goodness = inference.and_then(|i| i.goodness);
         let labels = fit.composite.labels();
         let labelled = |processes: &[usize]| processes.iter().map(|i| labels[*i].clone()).collect();
         let intervals = inference.into_iter().flat_map(|i| &i.intervals);
@@ -203,12 +189,7 @@ impl FitEntry {
             replicates: outcome.replicates,
             scales: outcome.curve.levels.len(),
             processes: processes_json(&outcome.fit.composite, inference.map_or(&[][..], |i| &i.intervals)),
-            goodness: goodness.map(|Goodness { statistic, dof, expected, p_value }| GoodnessEntry {
-                statistic,
-                dof,
-                expected,
-                p_value,
-            }),
+            goodness: inference.and_then(|i| i.goodness),
             spread: spread
                 .map(|&LevelSpread { level, within, between }| SpreadEntry {
                     tau_s: tau_s(level, rate_hz),

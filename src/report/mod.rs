@@ -53,9 +53,7 @@ pub use pages::{
     wavelet_page, wavelet_svg, wavelet_text,
 };
 pub use recording::{gnss_csv, imu_csv, initial_toml};
-pub use replicates::{
-    AlarmEntry, LeftOutEntry, MovementEntry, ReplicateEntry, ScoresEntry, describe_replicates,
-};
+pub use replicates::{AlarmEntry, LeftOutEntry, ReplicateEntry, ScoresEntry, describe_replicates};
 pub use run_directory::{OutputFile, RUN_FILES, json, run_directory, summary_json};
 pub use signals::{intervals_note, signal_rows, signals_csv, signals_digest, signals_per_file};
 pub use study::{

@@ -86,20 +86,7 @@ pub struct LeftOutEntry {
     /// The same in standard deviations of ln wv of the curve.
     pub deviations: f64,
     /// Every parameter without it.
-    pub parameters: Vec<MovementEntry>,
-}
-
-/// A parameter with and without a recording.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct MovementEntry {
-    /// Label of the process.
-    pub process: String,
-    /// Name of the parameter.
-    pub parameter: &'static str,
-    /// With all recordings.
-    pub with: f64,
-    /// Without this one.
-    pub without: f64,
+    pub parameters: Vec<Movement>,
 }
 
 impl ReplicateEntry {
@@ -145,19 +132,13 @@ impl AlarmEntry {
 
 impl LeftOutEntry {
     fn new(left_out: &LeftOut, rate_hz: f64) -> Self {
-        let movement = |m: &Movement| MovementEntry {
-            process: m.process.clone(),
-            parameter: m.parameter,
-            with: m.with,
-            without: m.without,
-        };
         Self {
             signals: left_out.group.clone(),
             estimator: left_out.estimator.name(),
             tau_s: tau_s(left_out.level, rate_hz),
             change: left_out.change,
             deviations: left_out.deviations,
-            parameters: left_out.parameters.iter().map(movement).collect(),
+            parameters: left_out.parameters.clone(),
         }
     }
 }

@@ -22,7 +22,7 @@ pub struct LeftOut {
 }
 
 /// How one parameter moves.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Movement {
     /// Label of the process.
     pub process: String,

@@ -138,7 +138,7 @@ pub enum Undetermined {
 /// The test of over-identifying restrictions. Its statistic is the least Σ Omega_j (nu_j − nu_j(theta))²; what it
 /// is when the model holds is known from the bootstrap, which repeats the whole estimation, so no weighting and
 /// no trim makes the probability wrong, and the replicates' differences are allowed for.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Goodness {
     /// J, the objective.
     pub statistic: f64,
