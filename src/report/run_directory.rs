@@ -85,7 +85,7 @@ mod tests {
             command: ["nav-sim", "run", "a<b.toml"].map(str::to_owned).to_vec(),
             seed: 7,
             configuration: Scenario::default(),
-            inputs: vec![Input { role: "trajectory".into(), path: "a<b.toml".into(), blake3: String::new() }],
+            inputs: vec![Input { role: "trajectory".into(), path: "a<b.toml".into(), blake3: "ab".into() }],
             model: ModelNote { estimator: Some("dr-awv".into()) },
             threads: 2,
             independent_windows: None,
@@ -101,7 +101,7 @@ mod tests {
         let files = files();
         assert_eq!(files.iter().map(|f| f.0).collect::<Vec<_>>(), RUN_FILES);
         let manifest: Manifest = serde_json::from_str(&files[4].1).unwrap();
-        assert_eq!(manifest.hashes("trajectory"), [blake3::hash(b"x").to_hex().as_str()]);
+        assert_eq!(manifest.hashes("trajectory"), ["ab"]);
         assert_eq!(manifest.configuration, Scenario::default());
     }
 

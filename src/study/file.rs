@@ -211,7 +211,7 @@ mod tests {
         );
         assert_eq!(
             with("\"awv\", \"dr-awv\"", "\"dr_awv\""),
-            "s.toml, line 8: \"candidate[2].calibrate.estimators\" = \"dr_awv\" is not one of \"awv\", \"sr-awv\", \
+            "s.toml, line 8: \"candidate[2].calibrate.estimators\" = [\"dr_awv\"] is not one of \"awv\", \"sr-awv\", \
              \"dr-awv\", \"gmwm\", \"rgmwm\", \"avlr\", \"given\" | did you mean \"dr-awv\"?"
         );
         assert_eq!(
