@@ -45,11 +45,11 @@ pub use diagnosis::{
 pub use fit::{Fit, FitError, Termination, Weighting, estimate, fit};
 pub use model::{LimitError, Limits, ModelSpec, SpecError};
 pub use outcome::{
-    AxesDiffer, Bootstrap, Candidate, Departure, FitRange, Goodness, Indistinct, Inference, LevelSpread,
-    Miss, ModelChoice, Outcome, ParameterInterval, ParameterLimit, Practical, PracticalIntervals, Ranking,
-    Settings, TooSimple, Undetermined, model_of, put,
+    Advance, AxesDiffer, Bootstrap, Candidate, Departure, FitRange, Goodness, Indistinct, Inference,
+    LevelSpread, Miss, ModelChoice, Outcome, ParameterInterval, ParameterLimit, Practical,
+    PracticalIntervals, Ranking, Settings, TooSimple, Undetermined, model_of, put,
 };
-pub use pipeline::{CalibrationError, Cause, calibrate, fit_curve, infer};
+pub use pipeline::{CalibrationError, Cause, calibrate, calibrate_telling, fit_curve, infer, infer_telling};
 pub use turn_on::{MeansOfAxis, TURN_ON_LEVEL, TurnOnFinding, TurnOnSpread, turn_on};
 pub use uncertainty::{ALIKE_LEVEL, CurveInfluence, Scattering, derived_interval};
 pub use words::{

@@ -3,7 +3,7 @@
 use crate::curve::{AverageError, Estimator, Group, average};
 use crate::fit::{FitError, Weighting, estimate, expected, fit_with_covariance};
 use crate::model::LimitError;
-use crate::outcome::{Bootstrap, ModelChoice, Outcome, Settings};
+use crate::outcome::{Advance, Bootstrap, ModelChoice, Outcome, Settings};
 use crate::selection::choose;
 use crate::uncertainty::axes::axes_differ;
 use crate::uncertainty::bootstrap::CurveSampler;
@@ -54,11 +54,23 @@ pub enum Cause {
 /// # Errors
 /// When a trim leaves no replicate, or a curve is too short for the model.
 pub fn calibrate(groups: &[Group], settings: &Settings) -> Result<Vec<Outcome>, CalibrationError> {
+    calibrate_telling(groups, settings, &|_| {})
+}
+
+/// The same, which tells how many more steps are done, of [`ModelChoice::steps`] a fit.
+///
+/// # Errors
+/// As [`calibrate`].
+pub fn calibrate_telling(
+    groups: &[Group],
+    settings: &Settings,
+    advance: Advance<'_>,
+) -> Result<Vec<Outcome>, CalibrationError> {
     let jobs: Vec<_> = groups.iter().flat_map(|g| settings.estimators.iter().map(move |e| (g, *e))).collect();
     let run = |&(group, estimator): &(&Group, Estimator)| {
         let curve = average(&group.replicates, estimator, settings.trim, &settings.tuning)
             .map_err(|source| CalibrationError::new(group, estimator, source))?;
-        fit_curve(group, estimator, curve, settings)
+        fit_telling(group, estimator, curve, settings, advance)
     };
     jobs.par_iter().map(run).collect()
 }
@@ -70,15 +82,29 @@ pub fn calibrate(groups: &[Group], settings: &Settings) -> Result<Vec<Outcome>, 
 pub fn fit_curve(
     group: &Group,
     estimator: Estimator,
+    curve: Curve,
+    settings: &Settings,
+) -> Result<Outcome, CalibrationError> {
+    fit_telling(group, estimator, curve, settings, &|_| {})
+}
+
+fn fit_telling(
+    group: &Group,
+    estimator: Estimator,
     mut curve: Curve,
     settings: &Settings,
+    advance: Advance<'_>,
 ) -> Result<Outcome, CalibrationError> {
     let error = |source: Cause| CalibrationError::new(group, estimator, source);
     leave_out(&mut curve, settings);
     let (spec, ranking) = match &settings.model {
-        ModelChoice::Given(spec) => (settings.limited(spec, group.scope).map_err(|e| error(e.into()))?, None),
+        ModelChoice::Given(spec) => {
+            advance(settings.model.steps());
+            (settings.limited(spec, group.scope).map_err(|e| error(e.into()))?, None)
+        }
         ModelChoice::Auto => {
-            let (spec, ranking) = choose(group, estimator, &curve, settings).map_err(|e| error(e.into()))?;
+            let (spec, ranking) =
+                choose(group, estimator, &curve, settings, advance).map_err(|e| error(e.into()))?;
             (spec, Some(ranking))
         }
     };
@@ -137,9 +163,20 @@ fn weigh_fully(group: &Group, outcome: &mut Outcome, settings: &Settings) -> Res
 /// Fills in the inference of every outcome from its group. The same seed gives the same numbers on any number of
 /// threads.
 pub fn infer(groups: &[Group], outcomes: &mut [Outcome], settings: &Settings, bootstrap: Bootstrap) {
+    infer_telling(groups, outcomes, settings, bootstrap, &|_| {});
+}
+
+/// The same, which tells how many more draws are done.
+pub fn infer_telling(
+    groups: &[Group],
+    outcomes: &mut [Outcome],
+    settings: &Settings,
+    bootstrap: Bootstrap,
+    advance: Advance<'_>,
+) {
     outcomes.par_iter_mut().for_each(|outcome| {
         let Some(group) = groups.iter().find(|g| g.scope == outcome.scope) else { return };
-        outcome.inference = Some(inference(group, outcome, settings, bootstrap));
+        outcome.inference = Some(inference(group, outcome, settings, bootstrap, advance));
         outcome.notes.extend(notes_of_inference(outcome));
     });
 }

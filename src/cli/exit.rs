@@ -101,6 +101,10 @@ pub(crate) const fn option_for(setting: Setting) -> &'static str {
         Setting::Output => "choose another output with --out",
         Setting::Force => "choose another place with --out, or replace it with --force",
         Setting::OutputDirectory => "choose another directory with --out",
+        Setting::RemoveLine => {
+            "remove the line, and give --gaps ignore or --gaps split for the gap that it leaves"
+        }
+        Setting::FixSigma => "give them for all fixes with --gnss-sigma POS[:VEL]",
         Setting::StartFiles => "start from the files that nav-sim init makes",
     }
 }

@@ -11,6 +11,7 @@ use nav_sim::imu::Recording;
 use nav_sim::noise::{Model, continuous};
 use nav_sim::report::Input;
 use nav_sim::trajectory::Trajectory;
+use nav_sim::trajectory::plausibility::{Excess, Limits, examine};
 use nav_sim::trajectory::reference::Reference;
 use std::path::{Path, PathBuf};
 
@@ -45,6 +46,7 @@ pub(super) fn refused_for_fusion(e: FileError) -> Failure {
     Failure::of_file(&e, |setting| match setting {
         Setting::ColumnNames => Some("correct the header"),
         Setting::Channels | Setting::FewerChannels | Setting::Gaps => None,
+        Setting::RemoveLine => Some("remove the line: gaps of up to 5 s are bridged"),
         other => Some(option_for(other)),
     })
 }
@@ -66,7 +68,24 @@ pub(super) fn trajectory(path: &Path, session: &Session) -> Result<Trajectory, F
     for warning in warnings {
         session.printer.warn(&warning.to_string());
     }
+    implausible(path, &trajectory, session);
     Ok(trajectory)
+}
+
+/// Says where no vehicle moves so.
+fn implausible(path: &Path, trajectory: &Trajectory, session: &Session) {
+    let (_, beyond) = examine(trajectory, &Limits::default());
+    let farthest = |e: &&Excess| e.worst / e.limit;
+    if let Some(worst) = beyond.iter().max_by(|a, b| farthest(a).total_cmp(&farthest(b))) {
+        let shown = path.display();
+        let more = match beyond.len() - 1 {
+            0 => String::new(),
+            n => format!(", and {n} more such stretches"),
+        };
+        session
+            .printer
+            .warn(&format!("{shown}: {worst}{more} (nav-sim trajectory check {shown} lists them)"));
+    }
 }
 
 /// A trajectory to compare with; what is left out of it is said.

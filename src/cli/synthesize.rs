@@ -286,7 +286,7 @@ fn reaches(
     let Some(Rule { sensor, .. }) = rules.iter().find(|rule| !made(rule)) else { return Ok(()) };
     let message = format!("--contaminate {name}: it corrupts the {}, which is not made", sensor.name());
     if rules.iter().any(made) {
-        session.printer.warn(&message);
+        session.printer.detail(&message);
         return Ok(());
     }
     Err(Failure::input(message).hint("another contamination, or --axes with that sensor"))

@@ -236,6 +236,8 @@ pub enum Setting {
     OutputDirectory,
     Force,
     StartFiles,
+    FixSigma,
+    RemoveLine,
 }
 
 impl Setting {
@@ -253,6 +255,10 @@ impl Setting {
             Self::OutputDirectory => "choose another directory",
             Self::Force => "choose another place, or replace it",
             Self::StartFiles => "start from an example",
+            Self::RemoveLine => {
+                "remove the line, and split the recording at the gap that it leaves, or ignore that"
+            }
+            Self::FixSigma => "give standard deviations for all fixes",
         }
     }
 }

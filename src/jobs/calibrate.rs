@@ -2,8 +2,8 @@
 
 use super::{BeginsOtherwise, JobError, Remark, Remarks};
 use crate::calibration::{
-    self, Bootstrap, Estimator, Group, Outcome, Pool, Replicate, Settings, SignalError, TurnOnSpread, WarmUp,
-    grouped, infer, replicates, turn_on, warm_up,
+    self, Advance, Bootstrap, Estimator, Group, Outcome, Pool, Replicate, Settings, SignalError,
+    TurnOnSpread, WarmUp, grouped, infer_telling, replicates, turn_on, warm_up,
 };
 use crate::formats::hash;
 use crate::formats::recordings::{self, FileReport, ReadOptions, Report};
@@ -143,7 +143,7 @@ pub fn calibrate(
     options: &CalibrationOptions,
     remarks: &mut dyn Remarks,
 ) -> Result<Calibration, JobError> {
-    measure(paths, options, remarks)?.calibrate()
+    measure(paths, options, remarks)?.calibrate(&|_| {})
 }
 
 /// The first half, which reads: what is wrong with the files is known before the long half begins.
@@ -183,16 +183,23 @@ pub fn measure(
 }
 
 impl Measured {
-    /// The second half, which fits.
+    /// How many steps the second half is.
+    #[must_use]
+    pub fn steps(&self) -> u64 {
+        let draws = self.bootstrap.map_or(0, |bootstrap| bootstrap.draws as u64);
+        (self.groups.len() * self.settings.estimators.len()) as u64 * (self.settings.model.steps() + draws)
+    }
+
+    /// The second half, which fits; `advance` is told how many more of its [`Measured::steps`] are done.
     ///
     /// # Errors
     /// When a trim leaves no replicate, or a curve is too short for the model.
-    pub fn calibrate(self) -> Result<Calibration, JobError> {
+    pub fn calibrate(self, advance: Advance<'_>) -> Result<Calibration, JobError> {
         let Self { groups, settings, bootstrap, turn_on, .. } = self;
-        let outcomes = calibration::calibrate(&groups, &settings)?;
+        let outcomes = calibration::calibrate_telling(&groups, &settings, advance)?;
         let calibration = Calibration { groups, outcomes, settings, turn_on: Vec::new() };
         let calibration = if turn_on { calibration.with_turn_on() } else { calibration };
-        Ok(calibration.with_inference(bootstrap))
+        Ok(calibration.with_inference(bootstrap, advance))
     }
 }
 
@@ -215,9 +222,9 @@ impl Calibration {
     }
 
     /// The same with intervals and goodness of fit, if they are asked for.
-    pub(super) fn with_inference(mut self, bootstrap: Option<Bootstrap>) -> Self {
+    pub(super) fn with_inference(mut self, bootstrap: Option<Bootstrap>, advance: Advance<'_>) -> Self {
         if let Some(bootstrap) = bootstrap {
-            infer(&self.groups, &mut self.outcomes, &self.settings, bootstrap);
+            infer_telling(&self.groups, &mut self.outcomes, &self.settings, bootstrap, advance);
         }
         self
     }

@@ -61,6 +61,7 @@ impl Curves {
             outcomes.push(fit_curve(&group, estimator, curve, &settings)?);
             groups.push(group);
         }
-        Ok(Calibration { groups, outcomes, settings, turn_on: Vec::new() }.with_inference(bootstrap))
+        let calibration = Calibration { groups, outcomes, settings, turn_on: Vec::new() };
+        Ok(calibration.with_inference(bootstrap, &|_| {}))
     }
 }

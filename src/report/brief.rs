@@ -2,10 +2,11 @@
 
 use super::columns::columns;
 use super::number::readable;
+use super::practical::{PracticalRow, interval, policy, practical_rows};
 use super::turn_on::turn_on_lines;
 use crate::calibration::{
-    Diagnosis, Outcome, Practical, Settings, TurnOnSpread, advice, axes_remark, duration, percent, shares,
-    signals, tau_s, worst_in_words,
+    Diagnosis, Outcome, Settings, TurnOnSpread, advice, axes_remark, duration, percent, shares, signals,
+    tau_s, worst_in_words,
 };
 use crate::export::Quantity;
 use crate::imu::Sensor;
@@ -93,7 +94,8 @@ fn verdict(outcome: &Outcome, rate_hz: f64) -> String {
 
 /// Rows for a parameter each.
 fn full(outcomes: &[Outcome], rate_hz: f64) -> Vec<Vec<String>> {
-    let head = ["", "parameter", "value", "95 % interval", "unit", "in SI", "governs"];
+    let matched = format!("N, K {}", policy());
+    let head = ["", &matched, "value", "95 % interval", "unit", "in SI", "governs"];
     let rows = outcomes.iter().flat_map(|o| rows_of(o, rate_hz));
     std::iter::once(head.map(str::to_owned).to_vec()).chain(rows).collect()
 }
@@ -101,50 +103,17 @@ fn full(outcomes: &[Outcome], rate_hz: f64) -> Vec<Vec<String>> {
 fn rows_of(outcome: &Outcome, rate_hz: f64) -> Vec<Vec<String>> {
     let sensor = outcome.scope.sensor;
     let practical = outcome.practical(rate_hz);
-    let mut rows: Vec<Vec<String>> = practical.iter().flat_map(|p| practical_rows(p, sensor)).collect();
+    let cells = |row: PracticalRow| {
+        let value = row.shown();
+        vec![row.name.to_owned(), value, row.interval, row.unit.to_owned(), row.si, row.governs]
+    };
+    let rows = practical.iter().flat_map(|p| practical_rows(p, sensor)).map(cells);
+    let mut rows: Vec<Vec<String>> = rows.collect();
     rows.extend(process_rows(outcome, rate_hz));
     for row in &mut rows {
         row.insert(0, outcome.scope.name());
     }
     rows
-}
-
-/// Velocity or angle random walk, bias instability, acceleration or rate random walk.
-fn practical_rows(practical: &Practical, sensor: Sensor) -> Vec<Vec<String>> {
-    let Practical { parameters, intervals, range_s } = practical;
-    let pair = &parameters.walk;
-    let [white, walk] = match sensor {
-        Sensor::Accel => ["velocity random walk N", "acceleration random walk K"],
-        Sensor::Gyro => ["angle random walk N", "rate random walk K"],
-    };
-    let row = |name: &str, what: Quantity, x: f64, ends: Option<[f64; 2]>, governs: String| {
-        let (unit, factor) = what.sheet(sensor);
-        let cells = [name, &readable(x * factor), &interval(ends, factor), unit];
-        let si = format!("{x:.2e} {}", what.si_unit(sensor));
-        cells.into_iter().map(str::to_owned).chain([si, governs]).collect::<Vec<_>>()
-    };
-    let crossover = pair.crossover_s().map(duration);
-    let to = crossover.as_ref().map_or(String::new(), |t| format!("averages up to {t}"));
-    let from = crossover.map_or(String::new(), |t| format!("averages from {t}"));
-    let instability = match parameters.minimum {
-        Some(m) => row(
-            "bias instability B",
-            Quantity::Bias,
-            m.bias_instability(),
-            intervals.instability,
-            format!("the floor, at {}", duration(m.tau_s)),
-        ),
-        None => {
-            let cells = ["bias instability B", "not reached", "", "", ""];
-            let why = format!("no floor up to {}", duration(*range_s));
-            cells.into_iter().map(str::to_owned).chain([why]).collect()
-        }
-    };
-    vec![
-        row(white, Quantity::Density, pair.density, intervals.density, to),
-        instability,
-        row(walk, Quantity::Walk, pair.walk, intervals.walk, from),
-    ]
 }
 
 /// Correlation times, quantization, ramps: what a pair of N and K does not carry.
@@ -216,14 +185,6 @@ fn governs(share: &crate::calibration::Share, rate_hz: f64) -> String {
     }
 }
 
-/// `5.36e-5 … 5.48e-5`
-fn interval(ends: Option<[f64; 2]>, factor: f64) -> String {
-    ends.map_or_else(
-        || "not determined".to_owned(),
-        |[low, high]| format!("{} … {}", readable(low * factor), readable(high * factor)),
-    )
-}
-
 /// A row for a fit each.
 fn joint(outcomes: &[Outcome], rate_hz: f64) -> Vec<Vec<String>> {
     let head = ["fit", "N (95 %)", "B", "K", "T (s)", "fits?"];
@@ -253,7 +214,10 @@ fn joint(outcomes: &[Outcome], rate_hz: f64) -> Vec<Vec<String>> {
                 || "not reached".to_owned(),
                 |m| value(Quantity::Bias, Some(m.bias_instability())),
             ),
-            value(Quantity::Walk, practical.as_ref().map(|p| p.parameters.walk.walk)),
+            match practical.as_ref() {
+                Some(p) if !p.walk_is_observed() => "not observed".to_owned(),
+                known => value(Quantity::Walk, known.map(|p| p.parameters.walk.walk)),
+            },
             times.join(", "),
             in_short(outcome, rate_hz),
         ]

@@ -1,6 +1,7 @@
 //! Fitted models in words.
 
 use super::fits::CandidateEntry;
+use super::practical::{policy, practical_rows};
 use crate::calibration::{
     ALIKE_LEVEL, Estimator, Goodness, Inference, LevelSpread, Outcome, Ranking, Settings, Share,
     correlation_time_s, percent, reasons, shares, signals, tau_s, undetermined,
@@ -20,6 +21,7 @@ pub fn describe(outcome: &Outcome, settings: &Settings) -> String {
         &outcome.curve.levels,
         settings.rate_hz,
     ));
+    lines.extend(practical_line(outcome, settings.rate_hz));
     lines.push(optimum(outcome));
     lines.extend(outcome.inference.iter().flat_map(|i| inference_lines(i, outcome, settings.rate_hz)));
     lines.extend(outcome.notes.iter().map(|note| format!("  note: {note}")));
@@ -141,7 +143,16 @@ fn process_lines(model: &Composite, sensor: Sensor, levels: &[u32], rate_hz: f64
     model.processes.iter().zip(model.labels()).zip(&shares).map(line).collect()
 }
 
-/// The parameters in the terms of data sheets.
+/// N, B and K, which are those of all processes together.
+fn practical_line(outcome: &Outcome, rate_hz: f64) -> Option<String> {
+    let practical = outcome.practical(rate_hz)?;
+    let rows = practical_rows(&practical, outcome.scope.sensor);
+    let told =
+        rows.iter().map(|row| format!("{} {} {}", row.name, row.shown(), row.unit).trim_end().to_owned());
+    Some(format!("  all processes together, N and K {}: {}", policy(), told.collect::<Vec<_>>().join(", ")))
+}
+
+/// A process in the terms of data sheets; N and K of the whole model are another matter ([`practical_rows`]).
 pub(super) fn meaning(process: &Process, sensor: Sensor, rate_hz: f64) -> String {
     let dt = 1.0 / rate_hz;
     let unit = sensor.unit();
@@ -152,7 +163,7 @@ pub(super) fn meaning(process: &Process, sensor: Sensor, rate_hz: f64) -> String
     };
     match process {
         Process::White(p) => {
-            format!("{name} {:.4e} {root_hour_unit}", (p.sigma2() * dt).sqrt() * per_root_hour)
+            format!("{name} of WN alone {:.4e} {root_hour_unit}", (p.sigma2() * dt).sqrt() * per_root_hour)
         }
         Process::Quantization(p) => {
             format!("Q = {:.4e} {unit}, times dt {:.4e} {unit}·s", p.q2().sqrt(), p.q2().sqrt() * dt)
@@ -175,7 +186,7 @@ pub(super) fn meaning(process: &Process, sensor: Sensor, rate_hz: f64) -> String
                 Sensor::Accel => "acceleration random walk",
                 Sensor::Gyro => "rate random walk",
             };
-            format!("{name} {:.4e} {unit}/√s", (p.gamma2() * rate_hz).sqrt())
+            format!("{name} of RW alone {:.4e} {unit}/√s", (p.gamma2() * rate_hz).sqrt())
         }
         Process::Drift(p) => format!("ramp {:.4e} {unit}/s", p.slope() * rate_hz),
         Process::Ma1(p) => {
@@ -209,9 +220,10 @@ const SHOWN: usize = 8;
 fn ranking_lines(ranking: &Ranking, rate_hz: f64) -> Vec<String> {
     let line = |c: CandidateEntry| {
         let p = c.p_value.map_or(String::new(), |p| format!("  p ≤ {p:.3}"));
+        let j_test = c.j_test_p_value.map_or(String::new(), |p| format!("  J-test p = {p:.3}"));
         let mark = if c.chosen { "*" } else { " " };
         format!(
-            "  {mark} {:<18} WVIC {:>10.4} = {:.4} + {:.4}, {} parameters{p}",
+            "  {mark} {:<18} WVIC {:>10.4} = {:.4} + {:.4}, {} parameters{p}{j_test}",
             c.model, c.wvic, c.objective, c.optimism, c.parameters
         )
     };

@@ -100,6 +100,8 @@ pub struct CandidateEntry {
     pub wvic: f64,
     /// Probability of so large a distance from the best if this one is true, where it was asked for.
     pub p_value: Option<f64>,
+    /// Probability of so large an objective if it is true, where it was asked for: the J-test, by the draws of the choice.
+    pub j_test_p_value: Option<f64>,
     /// Whether it was chosen.
     pub chosen: bool,
 }
@@ -113,6 +115,7 @@ impl CandidateEntry {
             optimism: c.optimism,
             wvic: c.wvic(),
             p_value: c.p_value,
+            j_test_p_value: c.j_p_value,
             chosen: i == ranking.chosen,
         };
         ranking.candidates.iter().enumerate().map(entry).collect()
@@ -219,17 +222,17 @@ impl FitEntry {
 
 /// N, K, B and T as exports have them, with their intervals (SI); null where there are none.
 fn parameters(outcome: &Outcome, rate_hz: f64) -> Value {
-    let Some(Practical { parameters, intervals, range_s }) = outcome.practical(rate_hz) else {
-        return Value::Null;
-    };
-    let mut value = parameters_json(&parameters, outcome.scope.sensor);
+    let Some(practical) = outcome.practical(rate_hz) else { return Value::Null };
+    let Practical { parameters, intervals, range_s } = &practical;
+    let mut value = parameters_json(parameters, outcome.scope.sensor);
     let ends = |interval: Option<[f64; 2]>| interval.map_or(Value::Null, |ends| ends.to_vec().into());
     value["white_and_walk"]["n"]["ci95"] = ends(intervals.density);
     value["white_and_walk"]["k"]["ci95"] = ends(intervals.walk);
+    value["white_and_walk"]["k"]["observed"] = practical.walk_is_observed().into();
     if value["minimum"].is_object() {
         value["minimum"]["bias_instability"]["ci95"] = ends(intervals.instability);
     }
-    value["observed_to_s"] = range_s.into();
+    value["observed_to_s"] = (*range_s).into();
     value
 }
 

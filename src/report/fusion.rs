@@ -2,7 +2,7 @@
 
 use super::json;
 use super::manifest::Input;
-use super::number::{shortest, window};
+use super::number::{seconds, shortest, window};
 use super::page::{Cell, Table, Tone};
 use super::pages::fusion_page;
 use super::run_directory::OutputFile;
@@ -246,8 +246,8 @@ impl FusionSummary {
         };
         let states = self.filter_states - self.turn_on_states;
         lines.push(format!(
-            "{} IMU samples at {:.2} Hz, {} to {:.2} s, {states}{turn_on} states; {used} fixes used, {withheld} withheld, {rejected} rejected",
-            self.imu_samples, self.imu_rate_hz, self.start_s, self.end_s
+            "{} IMU samples at {:.2} Hz, {} to {} s, {states}{turn_on} states; {used} fixes used, {withheld} withheld, {rejected} rejected",
+            self.imu_samples, self.imu_rate_hz, seconds(self.start_s), seconds(self.end_s)
         ));
         lines.push(format!("NIS {:.2} per component (1 if all is as believed)", self.nis_per_component));
         for o in &self.outages {

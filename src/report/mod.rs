@@ -16,6 +16,7 @@ mod markdown;
 mod number;
 pub mod page;
 mod pages;
+mod practical;
 mod recording;
 mod replicates;
 pub mod require;

@@ -6,7 +6,7 @@
 
 Held of each page: the browser has nothing to say of it, nothing is asked of the network, the page is no wider than the
 window, no text of a figure is smaller than 11 pixels, every number of a table that says where it stands in the results
-stands there, and the figures answer to the mouse. Without a browser (chromium, google-chrome) the test is skipped; then
+stands there, no table is wider than its place on a desk, and the figures answer to the mouse. Without a browser (chromium, google-chrome) the test is skipped; then
 the exit code is 0 and the last line says so.
 """
 
@@ -25,6 +25,8 @@ WIDTHS = [1280, 390]
 # blink's preferredColorScheme
 SCHEMES = {"light": 1, "dark": 0}
 SMALLEST_PX = 11.0
+# a window at least so wide holds every table
+DESK_PX = 1280
 
 # Runs in the page's frame once it is loaded; its results are the text of the frame's parent.
 MEASURE = """
@@ -68,10 +70,13 @@ frame.addEventListener("load", () => {
   }
   const charts = [...page.querySelectorAll("svg.chart")].filter(shown).length;
   const cells = [...page.querySelectorAll("td[data-json]")].map((td) => [td.dataset.json, td.textContent]);
+  // what is measured is measured while the page is still there
+  const width = view.innerWidth, needed = page.documentElement.scrollWidth;
+  const cut = [...page.querySelectorAll(".scroll")].filter((e) => e.scrollWidth > e.clientWidth + 1)
+    .map((e) => e.innerText.slice(0, 40));
   document.body.innerHTML = "<pre></pre>";
   document.querySelector("pre").textContent = JSON.stringify({
-    width: view.innerWidth, needed: page.documentElement.scrollWidth, smallest: Math.min(...sizes, 99), texts: texts.length,
-    outside, dark, background, charts, answers, cells,
+    width, needed, smallest: Math.min(...sizes, 99), texts: texts.length, outside, dark, background, charts, answers, cells, cut,
   });
 });
 """
@@ -146,6 +151,8 @@ def check(program, page, results):
                 wrong.append(f"{place}: text beyond its figure: {seen['outside'][:5]}")
             if seen["dark"] != (scheme == "dark") or (seen["background"] == "rgb(255, 255, 255)") == seen["dark"]:
                 wrong.append(f"{place}: background {seen['background']}")
+            if width >= DESK_PX and seen["cut"]:
+                wrong.append(f"{place}: tables are cut: {seen['cut']}")
             if seen["charts"] == 0 or seen["texts"] == 0:
                 wrong.append(f"{place}: no figure")
             answers = seen["answers"]

@@ -472,3 +472,29 @@ fn the_sources_of_errors_are_told() {
     let outage = json(&place.path().join("out/summary.json"))["outages"][0].clone();
     assert!(outage["budget"].is_null() && outage["believed_budget"].is_object());
 }
+
+/// A table of positions with a metre of noise now and then is no motion of a vehicle: said before the run, once, with the command
+/// that tells more.
+#[test]
+fn a_motion_that_nothing_makes_is_doubted() {
+    let place = place();
+    let dir = place.path();
+    done(dir, "trajectory convert drive.toml --rate-hz 10 -o rough.csv");
+    let text = fs::read_to_string(dir.join("rough.csv")).unwrap();
+    let column = text.lines().next().unwrap().split(',').position(|name| name == "h_m").unwrap();
+    let rough = |(i, line): (usize, &str)| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if i > 0 && i % 20 == 0 {
+            cells[column] = (cells[column].parse::<f64>().unwrap() + 1.0).to_string();
+        }
+        cells.join(",") + "\n"
+    };
+    fs::write(dir.join("rough.csv"), text.lines().enumerate().map(rough).collect::<String>()).unwrap();
+    let run = |drive: &str| {
+        done(dir, &format!("run {drive} imu.toml --runs 1 --outage none --seed 1 -o out")).stderr
+    };
+    let said = run("rough.csv");
+    assert_eq!(said.matches("nav-sim trajectory check rough.csv lists them").count(), 1, "{said}");
+    assert!(said.contains(", beyond ") && said.contains("more such stretches"), "{said}");
+    assert!(!run("drive.toml").contains("trajectory check"));
+}

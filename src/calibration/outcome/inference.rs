@@ -63,6 +63,15 @@ pub struct Practical {
     pub range_s: f64,
 }
 
+impl Practical {
+    /// Whether the data hold averages so long that the random walk is the larger part of them: where they do not, K is what
+    /// the model says of times that nobody saw.
+    #[must_use]
+    pub fn walk_is_observed(&self) -> bool {
+        self.parameters.walk.crossover_s().is_some_and(|t| t <= self.range_s)
+    }
+}
+
 /// 95 % intervals (units of the parameter); none where the draws do not determine it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PracticalIntervals {
@@ -151,7 +160,7 @@ pub struct Goodness {
 }
 
 /// Probability below which the model is said not to describe the curve.
-const LEVEL: f64 = 0.05;
+pub(super) const LEVEL: f64 = 0.05;
 
 impl Goodness {
     /// Whether so large a J has a probability below 5 % when the model holds.

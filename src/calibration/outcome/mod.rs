@@ -11,7 +11,7 @@ pub use inference::{
     PracticalIntervals, Undetermined,
 };
 pub use ranking::{Candidate, Ranking, TooSimple};
-pub use settings::{FitRange, ModelChoice, ParameterLimit, Settings};
+pub use settings::{Advance, FitRange, ModelChoice, ParameterLimit, Settings};
 
 use crate::curve::{Estimator, Scope};
 use crate::fit::{Fit, FitError, estimate_again};

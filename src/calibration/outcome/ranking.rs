@@ -1,5 +1,6 @@
 //! How a model was chosen: the results.
 
+use super::inference::LEVEL;
 use crate::model::ModelSpec;
 
 /// A model that was tried.
@@ -14,9 +15,17 @@ pub struct Candidate {
     /// For a simpler one than the best that was tested against it: the probability of so large a difference of
     /// their objectives if it is true.
     pub p_value: Option<f64>,
+    /// Probability of so large an objective if it is true, where that was asked: the J-test.
+    pub j_p_value: Option<f64>,
 }
 
 impl Candidate {
+    /// Whether it was tested and does not describe the curve.
+    #[must_use]
+    pub fn is_rejected(&self) -> bool {
+        self.j_p_value.is_some_and(|p| p < LEVEL)
+    }
+
     /// The criterion.
     #[must_use]
     pub fn wvic(&self) -> f64 {

@@ -70,7 +70,23 @@ impl FromStr for ModelChoice {
     }
 }
 
+/// Is told how many more steps of a long computation are done, from any thread.
+pub type Advance<'a> = &'a (dyn Fn(u64) + Sync);
+
 impl ModelChoice {
+    /// Stages of a choice.
+    pub(crate) const STAGES: u64 = 3;
+
+    /// How many steps a fit is, where a draw of the bootstrap is one.
+    #[must_use]
+    pub const fn steps(&self) -> u64 {
+        match self {
+            Self::Given(_) => 10,
+            // dozens of candidates, each fitted to as many draws
+            Self::Auto => Self::STAGES * 300,
+        }
+    }
+
     /// Parameters that are to be found, at least.
     #[must_use]
     pub fn parameters(&self) -> usize {

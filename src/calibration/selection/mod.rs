@@ -9,13 +9,14 @@
 //!
 //! A criterion of this kind keeps a superfluous process now and then however long the record. So the simplest
 //! candidate nested in the best is taken whose distance is not larger than that of the best beyond chance: by a bootstrap from
-//! it, at 1 %: the best is the most fortunate of several.
+//! it, at 1 %: the best is the most fortunate of several; and which the J-test does not reject at 5 %, by draws that
+//! scatter as the recordings do. Where it rejects the best too, the first by WVIC that passes is taken.
 
 use crate::curve::{Estimator, Group, implied};
 use crate::fit::{Fit, FitError, Weighting, fit, refit};
 use crate::model::ModelSpec;
 use crate::noise::Kind;
-use crate::outcome::{Candidate, Ranking, Settings, TooSimple};
+use crate::outcome::{Advance, Candidate, ModelChoice, Ranking, Settings, TooSimple};
 use crate::rng::StreamKey;
 use crate::uncertainty::bootstrap::CurveSampler;
 use crate::wavelet::Curve;
@@ -29,6 +30,8 @@ const FIRST: usize = 99;
 /// A simpler model is given up when chance makes so large a difference with no more than this probability. Under 5 %, for
 /// what it is compared with is the best of several larger ones: at 5 % white noise was given up in 8 of 30 sets.
 const LEVEL: f64 = 0.01;
+/// The J-test rejects below this probability, as that of the fit does.
+const J_LEVEL: f64 = 0.05;
 /// Seed of the draws: a choice is an answer, the same each time.
 const SEED: u64 = 1;
 
@@ -58,7 +61,9 @@ pub(crate) fn choose(
     estimator: Estimator,
     curve: &Curve,
     settings: &Settings,
+    advance: Advance<'_>,
 ) -> Result<(ModelSpec, Ranking), FitError> {
+    let stage = ModelChoice::Auto.steps() / ModelChoice::STAGES;
     // One weighting for all candidates, whatever their models expect.
     let weighting = match settings.weighting {
         Weighting::Full | Weighting::Model => Weighting::Edof,
@@ -74,12 +79,37 @@ pub(crate) fn choose(
     let fits: Vec<(ModelSpec, Fit)> =
         fits.into_iter().filter(|(_, f)| f.zero.is_empty() && f.at_end.is_empty()).collect();
     let not_identifiable = tried - fits.len();
+    advance(stage);
     let field = Field { group, estimator, curve, settings, fits };
-    field.rank(not_identifiable).ok_or_else(|| FitError::TooFewScales {
+    field.rank(not_identifiable, &|| advance(stage)).ok_or_else(|| FitError::TooFewScales {
         spec: "auto".to_owned(),
         parameters: 2,
         scales: curve.levels.len(),
     })
+}
+
+/// How a curve is drawn.
+type Draw = fn(&CurveSampler<'_>, &StreamKey<'_>, &Settings) -> Option<Curve>;
+
+/// The probabilities of the candidates that were tested.
+#[derive(Default)]
+struct Trials {
+    /// Against the best, of which they are special cases.
+    simpler: Vec<(usize, f64)>,
+    /// Against the curve: the J-test.
+    whole: Vec<(usize, f64)>,
+}
+
+impl Trials {
+    /// What the ranking tells of, however far it is: the chosen one, and those that would have been but for the J-test.
+    fn told(&self, chosen: usize) -> Vec<usize> {
+        let rejected = self.whole.iter().map(|(i, _)| *i);
+        rejected.chain([chosen]).collect()
+    }
+}
+
+fn found(tested: &[(usize, f64)], i: usize) -> Option<f64> {
+    tested.iter().find(|(t, _)| *t == i).map(|(_, p)| *p)
 }
 
 /// What is compared.
@@ -92,7 +122,7 @@ struct Field<'a> {
 }
 
 impl Field<'_> {
-    fn rank(&self, not_identifiable: usize) -> Option<(ModelSpec, Ranking)> {
+    fn rank(&self, not_identifiable: usize, stage_done: &dyn Fn()) -> Option<(ModelSpec, Ranking)> {
         let nearest =
             (0..self.fits.len()).min_by(|a, b| self.objective(*a).total_cmp(&self.objective(*b)))?;
         let curves = self.draws(nearest);
@@ -106,20 +136,26 @@ impl Field<'_> {
         };
         order(&mut ranked);
         let best = ranked.first()?.0;
-        let (chosen, tested) = self.simplest(best);
-        if !ranked.iter().any(|(i, _)| *i == chosen) {
-            ranked.push((chosen, self.optimism(chosen, &curves)));
-            order(&mut ranked);
+        stage_done();
+        let mut trials = Trials::default();
+        let chosen = self.take(best, &ranked, &mut trials);
+        stage_done();
+        for tested in trials.told(chosen) {
+            if !ranked.iter().any(|(i, _)| *i == tested) {
+                ranked.push((tested, self.optimism(tested, &curves)));
+            }
         }
+        order(&mut ranked);
         let candidate = |&(i, optimism): &(usize, f64)| Candidate {
             spec: self.fits[i].0.clone(),
             objective: self.objective(i),
             optimism,
-            p_value: tested.iter().find(|(t, _)| *t == i).map(|(_, p)| *p),
+            p_value: found(&trials.simpler, i),
+            j_p_value: found(&trials.whole, i),
         };
         let candidates: Vec<Candidate> = ranked.iter().map(candidate).collect();
         let place = ranked.iter().position(|(i, _)| *i == chosen)?;
-        let too_simple = self.too_simple(chosen, &tested);
+        let too_simple = self.too_simple(chosen, &trials.simpler);
         let spec = self.fits[chosen].0.clone();
         let far = self.fits.len() - candidates.len();
         Some((spec, Ranking { candidates, chosen: place, not_identifiable, far, too_simple }))
@@ -129,8 +165,53 @@ impl Field<'_> {
         self.fits[i].1.objective
     }
 
+    /// The simplest that does as well as the best and that the J-test does not reject; else the best, else the first by WVIC
+    /// that it does not reject; where it rejects all, the simplest that does as well.
+    fn take(&self, best: usize, ranked: &[(usize, f64)], trials: &mut Trials) -> usize {
+        let mut simplest = None;
+        // Ascending in their number of parameters.
+        for i in (0..self.fits.len()).filter(|i| self.fits[*i].0.is_special_case_of(&self.fits[best].0)) {
+            if i != best {
+                let p = self.p_value(i, best);
+                trials.simpler.push((i, p));
+                if p <= LEVEL {
+                    continue;
+                }
+            }
+            simplest.get_or_insert(i);
+            if self.passes(i, trials) {
+                return i;
+            }
+        }
+        let passing = ranked.iter().map(|(i, _)| *i).find(|i| self.passes(*i, trials));
+        passing.or(simplest).unwrap_or(best)
+    }
+
+    /// Whether the J-test does not reject a candidate.
+    fn passes(&self, i: usize, trials: &mut Trials) -> bool {
+        let p = found(&trials.whole, i).unwrap_or_else(|| {
+            let p = self.j_p_value(i);
+            trials.whole.push((i, p));
+            p
+        });
+        p >= J_LEVEL
+    }
+
+    /// Probability of so large an objective if the candidate is true.
+    fn j_p_value(&self, i: usize) -> f64 {
+        let curves =
+            self.curves(i, "auto J-test", |sampler, key, settings| sampler.draw_as_recorded(key, settings));
+        let drawn: Vec<f64> = curves.par_iter().filter_map(|c| Some(self.again(i, c)?.objective)).collect();
+        let larger = drawn.iter().filter(|objective| **objective >= self.objective(i)).count();
+        (1 + larger) as f64 / (1 + drawn.len()) as f64
+    }
+
     /// New curves of a candidate.
     fn draws(&self, i: usize) -> Vec<Curve> {
+        self.curves(i, "auto", |sampler, key, settings| sampler.draw(key, settings))
+    }
+
+    fn curves(&self, i: usize, scenario: &str, draw: Draw) -> Vec<Curve> {
         let (_, fit) = &self.fits[i];
         let sampler = CurveSampler::new(
             &self.group.replicates,
@@ -140,11 +221,11 @@ impl Field<'_> {
             self.settings,
         );
         let (name, process) = (self.group.scope.name(), self.estimator.name());
-        let draw = |run: usize| {
-            let key = StreamKey { seed: SEED, scenario: "auto", run: run as u64, source: &name, process };
-            sampler.draw(&key, self.settings)
+        let curve = |run: usize| {
+            let key = StreamKey { seed: SEED, scenario, run: run as u64, source: &name, process };
+            draw(&sampler, &key, self.settings)
         };
-        (0..DRAWS).filter_map(draw).collect()
+        (0..DRAWS).filter_map(curve).collect()
     }
 
     fn again(&self, i: usize, curve: &Curve) -> Option<Fit> {
@@ -170,23 +251,6 @@ impl Field<'_> {
             2.0 * (ab - a * b / count) / (count - 1.0)
         };
         if pairs.len() < 2 { f64::INFINITY } else { roots.iter().enumerate().map(term).sum() }
-    }
-
-    /// The simplest candidate nested in the best that does as well, and the probabilities of those tested.
-    fn simplest(&self, best: usize) -> (usize, Vec<(usize, f64)>) {
-        let mut tested = Vec::new();
-        // Ascending in their number of parameters.
-        for i in (0..self.fits.len()).filter(|i| self.fits[*i].0.is_special_case_of(&self.fits[best].0)) {
-            if i == best {
-                continue;
-            }
-            let p = self.p_value(i, best);
-            tested.push((i, p));
-            if p > LEVEL {
-                return (i, tested);
-            }
-        }
-        (best, tested)
     }
 
     /// Probability that the objectives differ by so much if the simpler is true (an upper bound where it is

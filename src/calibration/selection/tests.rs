@@ -75,3 +75,28 @@ fn reasons_are_given() {
     assert!(reasons(&ranking, 1.0)[0].contains("WN+RW"), "{ranking:?}");
     assert!(ranking.not_identifiable > 0);
 }
+
+/// The best is three processes of which the data show two plainly: whatever is taken passes the J-test, or all that were tried
+/// are told to fail. Of 12 sets of recordings that the sums describe, none may choose one that was tested and rejected.
+#[test]
+fn a_rejected_model_is_not_preferred_to_one_that_passes() {
+    let noise = Composite::new(vec![
+        Process::White(White::new(1.0).unwrap()),
+        Process::Ar1(Ar1::new(0.9, 0.02).unwrap()),
+        Process::RandomWalk(RandomWalk::new(1e-4).unwrap()),
+    ]);
+    let mut refused = 0;
+    for set in 0..12 {
+        let ranking = outcome(set, &noise).ranking.unwrap();
+        let chosen = &ranking.candidates[ranking.chosen];
+        assert!(chosen.j_p_value.is_some());
+        let passes = |c: &Candidate| c.j_p_value.is_some_and(|_| !c.is_rejected());
+        assert!(!chosen.is_rejected() || !ranking.candidates.iter().any(passes), "{ranking:?}");
+        let told = reasons(&ranking, 1.0).join("\n");
+        for c in ranking.candidates.iter().filter(|c| c.is_rejected() && c.spec != chosen.spec) {
+            refused += 1;
+            assert!(told.contains(&format!("{} is not taken: the J-test rejects it", c.spec)), "{told}");
+        }
+    }
+    println!("{refused} refused");
+}

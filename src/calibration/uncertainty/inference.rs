@@ -15,7 +15,7 @@ use super::sandwich::standard_errors;
 use super::spread::Spread;
 use crate::curve::{Estimator, Group};
 use crate::fit::Fit;
-use crate::outcome::{Bootstrap, Indistinct, Inference, LevelSpread, Outcome, Settings};
+use crate::outcome::{Advance, Bootstrap, Indistinct, Inference, LevelSpread, Outcome, Settings};
 use crate::rng::StreamKey;
 use rayon::prelude::*;
 
@@ -28,10 +28,11 @@ pub(crate) fn inference(
     outcome: &Outcome,
     settings: &Settings,
     bootstrap: Bootstrap,
+    advance: Advance<'_>,
 ) -> Inference {
-    let mut own = by_bootstrap(group, outcome, settings, bootstrap);
+    let mut own = by_bootstrap(group, outcome, settings, bootstrap, advance);
     if let Some((simple, processes, p_value)) = simpler(group, outcome, settings) {
-        let intervals = inference(group, &simple, settings, bootstrap).intervals;
+        let intervals = inference(group, &simple, settings, bootstrap, &|_| {}).intervals;
         let Outcome { spec, fit: Fit { composite, .. }, .. } = simple;
         let indistinct = Indistinct { processes, spec, composite, p_value, intervals };
         indistinct.adopt(outcome, &mut own.intervals);
@@ -40,7 +41,13 @@ pub(crate) fn inference(
     own
 }
 
-fn by_bootstrap(group: &Group, outcome: &Outcome, settings: &Settings, bootstrap: Bootstrap) -> Inference {
+fn by_bootstrap(
+    group: &Group,
+    outcome: &Outcome,
+    settings: &Settings,
+    bootstrap: Bootstrap,
+    advance: Advance<'_>,
+) -> Inference {
     let sampler = CurveSampler::of_outcome(group, outcome, settings);
     let name = group.scope.name();
     let draw = |run: usize| {
@@ -51,8 +58,10 @@ fn by_bootstrap(group: &Group, outcome: &Outcome, settings: &Settings, bootstrap
             source: &name,
             process: outcome.estimator.name(),
         };
-        let curve = sampler.draw_as_recorded(&key, settings)?;
-        outcome.estimate_again(&curve, settings).ok()
+        let curve = sampler.draw_as_recorded(&key, settings);
+        let fit = curve.and_then(|curve| outcome.estimate_again(&curve, settings).ok());
+        advance(1);
+        fit
     };
     let fits: Vec<Fit> = (0..bootstrap.draws).into_par_iter().filter_map(draw).collect();
     let errors = standard_errors(outcome, settings, &sampler.covariance_as_recorded(CURVES, &name, settings));

@@ -179,7 +179,10 @@ fn recordings(args: &Args, settings: Settings, session: &Session) -> Result<(), 
     args.plot.guard(&guarded)?;
     let outputs = outputs(out, &measured.settings.estimators, &guarded)?;
     let inputs = files.iter().map(|f| read::input("recording", f)).collect::<Result<Vec<_>, _>>()?;
-    let calibration = measured.calibrate()?;
+    let calibration = {
+        let progress = session.progress("steps of the fits", measured.steps());
+        measured.calibrate(&|steps| progress.add(steps))?
+    };
     let note = output::note(args, &calibration.settings, inputs, session)?;
     output::finish(&outputs, &calibration, &note, &args.plot, session)
 }

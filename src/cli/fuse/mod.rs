@@ -12,7 +12,7 @@ use nav_sim::earth::GravityModel;
 use nav_sim::formats::fusion_files::FixSigma;
 use nav_sim::fusion::alignment::Alignment;
 use nav_sim::fusion::{self, Assessment, Recorded, Settings, Verdict};
-use nav_sim::report::FusionSummary;
+use nav_sim::report::{FusionSummary, seconds};
 use nav_sim::sensors::gnss::MAX_LEVER_ARM_M;
 use nav_sim::sensors::outage::Outage;
 use nav_sim::simulation::lincov::weak_heading;
@@ -21,7 +21,8 @@ use std::time::Instant;
 
 /// What to look at where a solution is not to be believed.
 const ADVICE: &str = "are the IMU's axes front, right, down (if not: --axes, --mounting), its units right, the start true \
-                      (if not: --initial FILE), the receiver's standard deviations honest (if not: --gnss-sigma-factor)?";
+                      (if not: --initial FILE), the receiver's standard deviations honest (if not: --gnss-sigma-factor), the clocks of \
+                      the two files one, to milliseconds, and the antenna where the IMU is (if not: --lever-arm)?";
 /// The same where the fixes agree with the solution and the reference does not.
 const LASTING: &str = "the filter takes the errors of the fixes as white: where they last, give larger standard deviations \
                        (--gnss-sigma-factor); is the reference's attitude that of the vehicle (if not: --mounting)?";
@@ -33,7 +34,7 @@ const ELSEWHERE_M: f64 = 10_000.0;
 /// IMU: rates (t_s, gyro_x_rad_s … accel_z_m_s2; other units and loggers' names as for `wv`) or increments
 /// (dtheta_x_rad … dv_z_m_s, time = end of the interval). GNSS: t_s, lat_deg, lon_deg, h_m, sd_n_m, sd_e_m,
 /// sd_d_m, and v_n_m_s … sd_vd_m_s where velocity is measured. Or both as the text files of KF-GINS: 7 or 8
-/// columns of increments; 7 of position, 13 with velocity. Up to 5 s without samples are bridged, as uncertain
+/// columns of increments; 7 of position, 13 with velocity; GNSS also as a solution of RTKLIB (.pos, GPST). Up to 5 s without samples are bridged, as uncertain
 /// as the recording is over such times elsewhere. Writes solution.csv, innovations.csv, errors.csv (with a
 /// reference), solution.kml, summary.json, report.html, manifest.json.
 #[derive(clap::Args, Debug)]
@@ -48,7 +49,7 @@ pub(crate) struct Args {
     /// IMU recording (.csv, .tsv, .txt, .npy, also .gz)
     #[arg(value_name = "IMU")]
     imu: PathBuf,
-    /// GNSS fixes (.csv, .txt, also .gz)
+    /// GNSS fixes (.csv, .txt, .pos, also .gz)
     #[arg(value_name = "GNSS")]
     gnss: PathBuf,
     /// Noise model that the filter believes
@@ -104,8 +105,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let settings = inputs::with_outages(settings, &recorded, session)?;
     let Alignment { start, doubts } = inputs.start(args, &recorded, &settings)?;
     for line in &start.how {
-        session.printer.say(&format!("initial state at {} s: {line}", start.t_s));
+        session.printer.say(&format!("initial state at {} s: {line}", seconds(start.t_s)));
     }
+    let settings = without_early_outages(settings, start.t_s, session);
     let solution = fusion::fuse(&recorded, &inputs.belief, &start, &settings, inputs.reference.as_ref())
         .map_err(inputs::impossible)?;
     if inputs.reference.is_some() && solution.rows.iter().all(|row| row.error.is_none()) {
@@ -125,6 +127,21 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     session.printer.result(shown.trim_end());
     session.printer.say(&format!("wrote {}", args.out.display()));
     believed(&assessment, &args.out, outcome.nis_per_component)
+}
+
+/// Windows that end before the filter starts withhold nothing: no outages.
+fn without_early_outages(mut settings: Settings, start_s: f64, session: &Session) -> Settings {
+    let is_early = |o: &Outage| o.end_s <= start_s;
+    for o in settings.outages.iter().filter(|o| is_early(o)) {
+        session.printer.warn(&format!(
+            "outage {}:{} lies before the start of the solution at {} s: it is not an outage",
+            seconds(o.start_s),
+            seconds(o.end_s),
+            seconds(start_s)
+        ));
+    }
+    settings.outages.retain(|o| !is_early(o));
+    settings
 }
 
 /// Where the motion hardly shows the heading, no filter of this kind is to be believed.

@@ -1,10 +1,11 @@
 //! Recorded GNSS fixes.
 
+use super::rtklib::{self, is_rtklib};
 use super::{bare_columns, table, time_back};
 use crate::earth::{MAX_LATITUDE, geodetic_to_ecef};
 use crate::formats::suggest::nearest;
 use crate::formats::trajectory_file::table::{Table, text};
-use crate::formats::{FileError as Error, Kind, Place};
+use crate::formats::{FileError as Error, Kind, Place, Setting};
 use crate::gnss::GnssFix;
 use crate::units::DEG;
 use glam::DVec3;
@@ -12,7 +13,7 @@ use std::f64::consts::PI;
 use std::path::Path;
 
 /// Seconds of a GNSS week.
-const WEEK_S: f64 = 604_800.0;
+pub(super) const WEEK_S: f64 = 604_800.0;
 /// Faster than this from one fix to the next is no motion (m/s).
 const MAX_SPEED: f64 = 8000.0;
 
@@ -34,7 +35,7 @@ const NAMES: [&str; 14] = [
     "week",
 ];
 /// Time, position and its deviations: what every file has.
-const POSITION: usize = 7;
+pub(super) const POSITION: usize = 7;
 /// Velocity and its deviations.
 const VELOCITY: std::ops::Range<usize> = 7..13;
 const WEEK: usize = 13;
@@ -48,7 +49,7 @@ const KF_GINS: &str = "a KF-GINS text has 7 columns (t_s, latitude, longitude, h
 /// What the columns are called.
 pub(super) const COLUMNS: &str = "a GNSS file has the columns t_s, lat_deg, lon_deg, h_m, sd_n_m, sd_e_m, sd_d_m and may \
                                   have v_n_m_s, v_e_m_s, v_d_m_s, sd_vn_m_s, sd_ve_m_s, sd_vd_m_s; or it is a KF-GINS \
-                                  text of 7 columns, or of 13 with velocity";
+                                  text of 7 columns, or of 13 with velocity, or a solution of RTKLIB";
 
 /// Standard deviations of fixes whose file states none: north, east, down.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -180,7 +181,10 @@ impl Columns {
             columns = format!("\"{name}\" is not known (\"{meant}\"?); {columns}");
         }
         let kind = Kind::Columns(format!("{columns} missing").into());
-        Err(Error::new(table.path.as_str(), table.header_line, kind).advice(COLUMNS))
+        let error = Error::new(table.path.as_str(), table.header_line, kind).advice(COLUMNS);
+        // a receiver's log that has all but these
+        let only_sigma = slip.is_none() && missing.iter().all(|name| name.starts_with("sd_"));
+        Err(if only_sigma { error.setting(Setting::FixSigma) } else { error })
     }
 
     fn value(&self, quantity: usize, row: &[f64]) -> f64 {
@@ -192,6 +196,27 @@ impl Columns {
     }
 }
 
+/// A file of fixes that is not read, told by its first characters.
+fn of_another_kind(path: &str, text: &str) -> Option<Error> {
+    let text = text.trim_start_matches('\u{feff}').trim_start();
+    let (message, advice) = if text.starts_with("$G") || text.starts_with("$B") {
+        (
+            "NMEA sentences, which state no standard deviations of the position north, east and down",
+            "convert the receiver's raw log to an RTKLIB solution (.pos), which is read; or write the GGA sentences as a table t_s, \
+             lat_deg, lon_deg, h_m in degrees, and give the standard deviations with --gnss-sigma",
+        )
+    } else if text.starts_with('<') {
+        (
+            "XML, as GPX and KML are, not a table of fixes",
+            "write its points as a table t_s, lat_deg, lon_deg, h_m on the clock of the IMU, and give their standard deviations \
+             with --gnss-sigma",
+        )
+    } else {
+        return None;
+    };
+    Some(Error::contents(path, 1_u64, message).advice(advice))
+}
+
 /// Reads fixes: a table with a header, or the text of KF-GINS (time, latitude, longitude (deg), height (m),
 /// standard deviations north, east, down (m); or with velocity behind the height and its deviations behind
 /// those). `unsaid` are the standard deviations where the file states none. Also what is doubtful about it.
@@ -199,7 +224,16 @@ impl Columns {
 /// # Errors
 /// Whatever is wrong with it, with its line.
 pub fn read_gnss(path: &Path, unsaid: Option<&FixSigma>) -> Result<(Vec<GnssFix>, Vec<String>), Error> {
-    let text = text(path)?;
+    let mut text = text(path)?;
+    if let Some(error) = of_another_kind(&path.display().to_string(), &text) {
+        return Err(error);
+    }
+    let mut remarks = Vec::new();
+    let is_rtklib = is_rtklib(&text);
+    if is_rtklib {
+        let (table, remark) = rtklib::rows(&path.display().to_string(), &text)?;
+        (text, remarks) = (table, vec![remark]);
+    }
     let bare = bare_columns(&text);
     let names: Option<Vec<&str>> = match bare {
         None => None,
@@ -212,8 +246,7 @@ pub fn read_gnss(path: &Path, unsaid: Option<&FixSigma>) -> Result<(Vec<GnssFix>
     };
     let table = table(path, &text, names.as_deref())?;
     let (columns, ignored) = Columns::of(&table, unsaid)?;
-    let mut remarks = Vec::new();
-    if bare.is_some() {
+    if bare.is_some() && !is_rtklib {
         let velocity = if columns.0[VELOCITY.start].is_some() { ", velocity" } else { "" };
         remarks.push(format!("no header: read as KF-GINS text, position{velocity} and standard deviations"));
     }
@@ -299,7 +332,7 @@ fn check_step(path: &str, line: u64, before: &GnssFix, fix: &GnssFix) -> Result<
     if metres <= MAX_SPEED * seconds {
         return Ok(());
     }
-    let message = format!("the fix is {metres:.0} m from the one {seconds} s before");
+    let message = format!("the fix is {metres:.0} m from the one {} s before", (1e6 * seconds).round() / 1e6);
     Err(Error::contents(path, line, message)
         .advice("is a latitude swapped with a longitude, a sign lost, or a row damaged?"))
 }

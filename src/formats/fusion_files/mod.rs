@@ -1,9 +1,10 @@
 //! What `fuse` reads: recorded IMU data, GNSS fixes, an initial state. Our own tables, the headers that
-//! recordings may have, and the text files of KF-GINS.
+//! recordings may have, the text files of KF-GINS, the solutions of RTKLIB.
 
 mod fixes;
 mod inertial;
 mod initial;
+mod rtklib;
 
 pub use fixes::{FixSigma, read_gnss};
 pub use inertial::{ImuFile, read_imu};

@@ -15,8 +15,15 @@ use std::path::Path;
 /// When the file cannot be read, is not TOML, has unknown keys, lacks some, or has values outside their
 /// domains.
 pub fn read(path: &Path) -> Result<ModelFile, FileError> {
-    parse(&Source::read(path)?)
+    parse(&Source::read(path)?).map_err(|e| {
+        let is_toml = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+        if is_toml || !e.remedies.is_empty() { e } else { e.advice(NOT_A_MODEL) }
+    })
 }
+
+/// For a file of another kind in the place of a model.
+const NOT_A_MODEL: &str =
+    "a model is a TOML file, as calibrate and datasheet write them: are the arguments in another order?";
 
 /// A model file's text, at the path that messages show.
 ///

@@ -37,8 +37,11 @@ pub(in crate::formats) fn storage(path: &str) -> impl Fn(io::Error) -> FileError
 
 /// A sample that is no measurement.
 pub(super) fn sample(path: &str, line: u64, column: &str, value: &str, reason: &str) -> FileError {
-    let advice = "remove the line, or record again: a sample that is made up would change the noise";
-    FileError::cell(path, line, column, value, reason).advice(advice)
+    let error = FileError::cell(path, line, column, value, reason);
+    if value.matches(':').count() > 1 {
+        return error.advice("write the time in seconds, from any instant on, and name the column t_s");
+    }
+    error.setting(Setting::RemoveLine).advice("record again: a sample that is made up would change the noise")
 }
 
 /// A column without a unit that cannot be known.

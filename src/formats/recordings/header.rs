@@ -155,6 +155,7 @@ fn increment(name: &str) -> Option<Result<Role, ()>> {
     for axis in Axis::ALL {
         for (stem, sensor, factor) in [
             (format!("dv_{}_m_s", axis.name()), Sensor::Accel, 1.0),
+            (format!("dv_{}_mps", axis.name()), Sensor::Accel, 1.0),
             (format!("dtheta_{}_rad", axis.name()), Sensor::Gyro, 1.0),
             (format!("dtheta_{}_deg", axis.name()), Sensor::Gyro, DEG),
         ] {
@@ -282,9 +283,22 @@ impl Layout {
     /// A column that is an axis by its name but in a unit that is not known must not be dropped in silence: unless
     /// another column is that axis, or it is not wanted.
     fn no_unknown_unit(&self, place: HeaderPlace<'_>, wanted: Option<&[Channel]>) -> Result<(), FileError> {
+        let refuse = |name: &str, endings: &str| {
+            place
+                .refuse(format!("column \"{name}\" is in a unit that is not known"))
+                .advice(format!("end its name in one of {endings}"))
+                .setting(Setting::ColumnNames)
+                .setting(Setting::Channels)
+        };
         let is = |f: &Found, channel| matches!(f.role, Role::Signal { channel: c, .. } if c == channel);
         for name in &self.ignored {
-            let Some(channel) = in_unknown_unit(&normalise(name)) else { continue };
+            let plain = normalise(name);
+            for (stem, endings) in [("dv_", "_m_s, _mps"), ("dtheta_", "_rad, _deg")] {
+                if ["x_", "y_", "z_"].iter().any(|axis| plain.starts_with(&format!("{stem}{axis}"))) {
+                    return Err(refuse(name, endings));
+                }
+            }
+            let Some(channel) = in_unknown_unit(&plain) else { continue };
             let missed = wanted.is_none_or(|w| w.contains(&channel));
             if missed && !self.found.iter().any(|f| is(f, channel)) {
                 let units = match channel.sensor {
@@ -292,11 +306,7 @@ impl Layout {
                     Sensor::Gyro => GYRO_UNITS,
                 };
                 let units: Vec<String> = units.iter().map(|(names, _)| format!("_{}", names[0])).collect();
-                return Err(place
-                    .refuse(format!("column \"{name}\" is in a unit that is not known"))
-                    .advice(format!("end its name in one of {}", units.join(", ")))
-                    .setting(Setting::ColumnNames)
-                    .setting(Setting::Channels));
+                return Err(refuse(name, &units.join(", ")));
             }
         }
         Ok(())
@@ -422,7 +432,14 @@ mod tests {
         let layout = |names: &[&str], wanted: Option<&[Channel]>| {
             Layout::new(PLACE, &names.iter().map(|n| (*n).to_owned()).collect::<Vec<_>>(), false, wanted)
         };
-        for name in ["accel_x_ft_s2", "gyro_z_rpm", "Accelerometer X (counts)", "ax_lsb"] {
+        for name in [
+            "accel_x_ft_s2",
+            "gyro_z_rpm",
+            "Accelerometer X (counts)",
+            "ax_lsb",
+            "dv_x_ft_s",
+            "dtheta_y_mrad",
+        ] {
             let error = layout(&["t_s", "gyro_x_rad_s", name], None).unwrap_err();
             let expected = format!("a.csv, line 1: column \"{name}\" is in a unit that is not known");
             assert_eq!(error.to_string(), expected);

@@ -2,7 +2,7 @@
 
 use super::wavelet::{band, curve, scale_axis, sensor_name, unit, variance_axis};
 use crate::calibration::{
-    Diagnosis, Goodness, Outcome, Settings, TurnOnSpread, Verdict, advice, shares, tau_s,
+    Diagnosis, Goodness, Outcome, Practical, Settings, TurnOnSpread, Verdict, advice, shares, tau_s,
 };
 use crate::imu::Sensor;
 use crate::report::curves::{CurvesFile, FittedCurve};
@@ -10,6 +10,7 @@ use crate::report::describe::meaning;
 use crate::report::fits::interval_of;
 use crate::report::number::readable;
 use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, Table, Tone, svg};
+use crate::report::practical::{policy, practical_rows};
 use crate::report::turn_on::turn_on_remark;
 
 /// The page of the models of one estimator. `outcomes`: each with its place among all fits of the command; `curves`: of the
@@ -27,8 +28,12 @@ pub fn calibration_page(
     let mut page = Page::new(&format!("Stochastic calibration, {estimator}"), tone, &verdict);
     for (fitted, (index, outcome)) in curves.curves.iter().zip(outcomes) {
         page.section(&format!("{} · {}", group_name(fitted), outcome.spec));
+        if let Some(practical) = outcome.practical(settings.rate_hz) {
+            page.heading(&format!("N, B and K: all processes together, N and K {}", policy()));
+            page.table(&practical_table(&practical, outcome.scope.sensor, *index));
+        }
         page.chart(&chart(fitted, diagnoses), CAPTION);
-        page.heading("Parameters");
+        page.heading("Parameters of each process");
         page.table(&parameters(outcome, *index, settings.rate_hz));
         outcome.notes.iter().for_each(|note| page.text(&format!("Note: {note}")));
         page.folded("Allan deviation", |page| page.chart(&allan(fitted), ALLAN));
@@ -237,6 +242,26 @@ fn allan(fitted: &FittedCurve) -> Chart {
         Axis::log("averaging time (s)"),
         vec![panel],
     )
+}
+
+/// N, B and K as the terminal prints them.
+fn practical_table(practical: &Practical, sensor: Sensor, index: usize) -> Table {
+    let mut table = Table::new(["parameter", "value", "95 % interval", "unit", "in SI", "governs"]);
+    for row in practical_rows(practical, sensor) {
+        let value = match row.value {
+            Ok(value) => Cell::number(value, &format!("/fits/{index}/parameters/{}", row.source)),
+            Err(why) => Cell::figures(why),
+        };
+        table.row([
+            row.name.into(),
+            value,
+            Cell::figures(row.interval),
+            row.unit.into(),
+            Cell::figures(row.si),
+            row.governs.into(),
+        ]);
+    }
+    table
 }
 
 /// A row a parameter. Values and intervals stand in the JSON of `calibrate` under /fits/`index`.
