@@ -24,7 +24,7 @@ pub struct Requirement {
     limit: f64,
 }
 
-/// A requirement that is none.
+/// Not a requirement.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "expected NAME<=LIMIT with a positive limit, NAME one of p50_m, p95_m, rmse_pos_e_m, yaw_deg and the other states"
