@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 /// Make a directory with everything to start from: a commented file of every kind, trajectories, virtual IMUs
 ///
-/// scenario.toml, model.toml, motion.toml, parameters.toml, contamination.toml, initial.toml and examples/quick_study.toml say
+/// scenario.toml, imu.toml, motion.toml, parameters.toml, contamination.toml, initial.toml and examples/quick_study.toml say
 /// what each key means. The others are those of the repository; the examples of every --help work inside the directory. Files
 /// that are there already are left alone.
 #[derive(clap::Args, Debug)]
@@ -31,7 +31,7 @@ macro_rules! repository_files {
 
 const FILES: &[(&str, &[u8])] = repository_files![
     "examples/scenario.toml" => "scenario.toml",
-    "examples/model.toml" => "model.toml",
+    "examples/model.toml" => "imu.toml",
     "examples/parameters.toml" => "parameters.toml",
     "examples/contamination.toml" => "contamination.toml",
     "examples/initial.toml" => "initial.toml",

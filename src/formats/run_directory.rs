@@ -1,6 +1,6 @@
 //! Run directories read back, as far as comparisons need them.
 
-use super::{atomic, source};
+use super::{atomic, hash, source};
 use crate::metrics::{EpochRow, Measured, PerState};
 use crate::report::{Manifest, TableError, parse_epochs, parse_runs};
 use crate::scenario::Method;
@@ -36,6 +36,12 @@ pub enum RunDirectoryError {
         /// What is wrong with it.
         source: TableError,
     },
+    /// A file is not the one that was written.
+    #[error("{path}: is not what its manifest.json says (BLAKE3): it is damaged, or was changed")]
+    Changed {
+        /// File.
+        path: String,
+    },
     /// It comes from another layout.
     #[error("{path}: \"schema_version\" is {found}; this nav-sim reads {expected}")]
     Version {
@@ -67,6 +73,7 @@ impl RunDirectoryError {
                 Some(unfinished.into())
             }
             Self::Version { .. } => Some("repeat the run with this version".into()),
+            Self::Table { .. } | Self::Changed { .. } => Some("repeat the run, or put back its files".into()),
             _ => None,
         }
     }
@@ -88,15 +95,21 @@ pub struct RunDirectory {
 pub fn read(directory: &Path) -> Result<RunDirectory, RunDirectoryError> {
     atomic::recover(directory);
     let manifest = manifest(directory)?;
-    let (epochs_path, epochs) = text(directory, "epochs.csv")?;
     let table = |path: String| move |source| RunDirectoryError::Table { path, source };
-    let epochs = parse_epochs(&epochs).map_err(table(epochs_path))?;
+    let (path, epochs_text) = text(directory, "epochs.csv")?;
+    let epochs = parse_epochs(&epochs_text).map_err(table(path))?;
+    as_written(directory, &manifest, "epochs.csv", &epochs_text)?;
     let is_expected = manifest.configuration.run.method == Method::Lincov;
     let runs = if is_expected {
-        vec![expected_run(directory, &epochs)?]
+        let (path, summary) = text(directory, "summary.json")?;
+        let run = expected_run(&path, &summary, &epochs)?;
+        as_written(directory, &manifest, "summary.json", &summary)?;
+        vec![run]
     } else {
-        let (runs_path, runs) = text(directory, "runs.csv")?;
-        parse_runs(&runs).map_err(table(runs_path))?
+        let (path, runs_text) = text(directory, "runs.csv")?;
+        let runs = parse_runs(&runs_text).map_err(table(path))?;
+        as_written(directory, &manifest, "runs.csv", &runs_text)?;
+        runs
     };
     let outages = manifest.configuration.outage.iter().flatten().map(|o| (o.start_s, o.end_s)).collect();
     let independent_windows = manifest.independent_windows;
@@ -104,8 +117,23 @@ pub fn read(directory: &Path) -> Result<RunDirectory, RunDirectoryError> {
     Ok(RunDirectory { manifest, experiment })
 }
 
+/// Refuses a file that is not the one the manifest tells of; what can be read of it was, for a more exact message.
+fn as_written(
+    directory: &Path,
+    manifest: &Manifest,
+    name: &str,
+    text: &str,
+) -> Result<(), RunDirectoryError> {
+    match manifest.outputs.get(name) {
+        Some(blake3) if *blake3 != hash::of_bytes(text.as_bytes()) => {
+            Err(RunDirectoryError::Changed { path: directory.join(name).display().to_string() })
+        }
+        _ => Ok(()),
+    }
+}
+
 /// The run that stands for what covariance analysis expects, from its epochs and its summary.
-fn expected_run(directory: &Path, epochs: &[EpochRow]) -> Result<RunRecord, RunDirectoryError> {
+fn expected_run(path: &str, summary: &str, epochs: &[EpochRow]) -> Result<RunRecord, RunDirectoryError> {
     #[derive(serde::Deserialize)]
     struct Expected {
         outages: Vec<ExpectedOutage>,
@@ -117,8 +145,7 @@ fn expected_run(directory: &Path, epochs: &[EpochRow]) -> Result<RunRecord, RunD
         rmse_end: PerState<f64>,
         nees_end: f64,
     }
-    let (path, json) = text(directory, "summary.json")?;
-    let expected: Expected = serde_json::from_str(&json).map_err(|e| not_json(&path, &e))?;
+    let expected: Expected = serde_json::from_str(summary).map_err(|e| not_json(path, &e))?;
     let outage = |o: ExpectedOutage| OutageRecord {
         see_mean: o.asee_mean.0,
         see_end: o.asee_end.0,

@@ -14,6 +14,22 @@ pub enum TableError {
         /// The column.
         column: String,
     },
+    /// Two columns have one name.
+    #[error("line 1: two columns are named \"{column}\"")]
+    Twice {
+        /// The column.
+        column: String,
+    },
+    /// A row is not as long as the header.
+    #[error("line {line}: {found} values, but {expected} columns")]
+    Length {
+        /// Line, from 1.
+        line: u64,
+        /// Values of the row.
+        found: usize,
+        /// Columns of the table.
+        expected: usize,
+    },
     /// A value is not what its column holds.
     #[error("line {line}: column \"{column}\": \"{value}\" is not a number")]
     Value {
@@ -105,12 +121,14 @@ fn lines(header: String, rows: impl Iterator<Item = String>) -> String {
 /// Reads `epochs.csv` back, as far as comparisons need it.
 ///
 /// # Errors
-/// A missing column or a value that is not a number.
+/// A missing or doubled column, or a value that is not a finite number (unless no run is left at the epoch).
 pub fn parse_epochs(text: &str) -> Result<Vec<EpochRow>, TableError> {
     let table = Table::read(text)?;
     let (asee, rmse) = (table.states("asee_")?, table.states("rmse_")?);
     let [t_s, nees, coverage] = table.columns(["t_s", "nees", "coverage"])?;
+    let values: Vec<usize> = asee.iter().chain(&rmse).copied().chain([nees, coverage]).collect();
     let row = |row: usize| {
+        table.finite_or_lost(row, &values)?;
         Ok(EpochRow {
             t_s: table.number(row, t_s)?,
             asee: table.numbers(row, asee)?,
@@ -192,10 +210,20 @@ impl Table {
             line: e.position().map_or(1, csv::Position::line),
             message: e.to_string(),
         };
-        let mut reader = csv::Reader::from_reader(text.as_bytes());
+        let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(text.as_bytes());
         let names: Vec<String> = reader.headers().map_err(syntax)?.iter().map(str::to_owned).collect();
-        let rows = reader.into_records().collect::<Result<_, _>>().map_err(syntax)?;
-        Ok(Self { index: names.iter().cloned().zip(0..).collect(), names, rows })
+        let mut index = HashMap::new();
+        for (i, name) in names.iter().enumerate() {
+            if index.insert(name.clone(), i).is_some() {
+                return Err(TableError::Twice { column: name.clone() });
+            }
+        }
+        let rows: Vec<csv::StringRecord> = reader.into_records().collect::<Result<_, _>>().map_err(syntax)?;
+        let expected = names.len();
+        match rows.iter().find(|row| row.len() != expected) {
+            Some(row) => Err(TableError::Length { line: line(row), found: row.len(), expected }),
+            None => Ok(Self { index, names, rows }),
+        }
     }
 
     fn column(&self, name: &str) -> Result<usize, TableError> {
@@ -215,12 +243,28 @@ impl Table {
     }
 
     fn number(&self, row: usize, column: usize) -> Result<f64, TableError> {
-        let text = &self.rows[row][column];
-        text.parse().map_err(|_| TableError::Value {
-            line: self.rows[row].position().map_or(0, csv::Position::line),
-            column: self.names[column].clone(),
-            value: text.to_owned(),
-        })
+        self.rows[row][column].parse().map_err(|_| self.no_number(row, column))
+    }
+
+    /// Refuses a row of an epoch in which some values are finite and others not. Where no run is left, all are NaN.
+    fn finite_or_lost(&self, row: usize, columns: &[usize]) -> Result<(), TableError> {
+        let mut odd = Vec::new();
+        for &column in columns {
+            let value = self.number(row, column)?;
+            if !value.is_finite() {
+                odd.push((column, value));
+            }
+        }
+        let is_lost = odd.len() == columns.len() && odd.iter().all(|(_, value)| value.is_nan());
+        match odd.first() {
+            Some((column, _)) if !is_lost => Err(self.no_number(row, *column)),
+            _ => Ok(()),
+        }
+    }
+
+    fn no_number(&self, row: usize, column: usize) -> TableError {
+        let value = self.rows[row][column].to_owned();
+        TableError::Value { line: line(&self.rows[row]), column: self.names[column].clone(), value }
     }
 
     fn numbers(&self, row: usize, columns: [usize; REPORTED]) -> Result<[f64; REPORTED], TableError> {
@@ -232,11 +276,16 @@ impl Table {
     }
 }
 
+fn line(row: &csv::StringRecord) -> u64 {
+    row.position().map_or(0, csv::Position::line)
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::sample;
     use super::*;
     use crate::metrics::epochs;
+    use crate::simulation::EpochSums;
 
     #[test]
     fn the_columns_are_those_of_the_interface() {
@@ -286,5 +335,25 @@ mod tests {
             .collect();
         let error = parse_epochs(&broken).unwrap_err();
         assert_eq!(error.to_string(), "line 3: column \"t_s\": \"x1\" is not a number");
+        let error = parse_epochs(&text.replacen("rmse_yaw_deg", "rmse_roll_deg", 1)).unwrap_err();
+        assert_eq!(error.to_string(), "line 1: two columns are named \"rmse_roll_deg\"");
+        let cut = &text[..text.trim_end().rfind(',').unwrap()];
+        let error = parse_epochs(cut).unwrap_err().to_string();
+        assert!(error.ends_with("32 values, but 33 columns"), "{error}");
+    }
+
+    /// One value that is none is damage; a row of them is an epoch that no run reached.
+    #[test]
+    fn only_an_epoch_without_runs_may_be_no_number() {
+        let mut result = sample::result();
+        let text = epochs_csv(&epochs(&result));
+        let mut cells: Vec<&str> = text.lines().nth(2).unwrap().split(',').collect();
+        cells[3] = "nan";
+        let damaged = text.replacen(text.lines().nth(2).unwrap(), &cells.join(","), 1);
+        let error = parse_epochs(&damaged).unwrap_err();
+        assert_eq!(error.to_string(), "line 3: column \"asee_pos_e_m\": \"nan\" is not a number");
+        result.epochs[1] = EpochSums { t_s: result.epochs[1].t_s, ..EpochSums::default() };
+        let rows = parse_epochs(&epochs_csv(&epochs(&result))).unwrap();
+        assert!(rows[1].asee[1].is_nan() && rows[1].nees.is_nan());
     }
 }

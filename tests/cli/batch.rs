@@ -185,6 +185,23 @@ fn what_changed_since_the_plan_is_refused() {
     assert!(said.contains("the plan was made by nav-sim 0.0."), "{said}");
 }
 
+/// With every unit done there is nothing to compute, and yet the results would not be of the inputs that stand there.
+#[test]
+fn an_input_that_changed_when_all_was_done_is_told() {
+    let place = place();
+    let dir = place.path();
+    let undisturbed = whole(dir, "out");
+    fs::write(dir.join("wrong.toml"), MODEL.replace("4e-12", "5e-13")).unwrap();
+    for command in ["run", "status", "merge", "verify"] {
+        let said = refused(dir, &format!("{command} study.toml -o out"), 2);
+        assert!(said.contains("wrong.toml has changed since the study was planned"), "{said}");
+    }
+    // what is not on this machine has not changed
+    fs::remove_file(dir.join("wrong.toml")).unwrap();
+    done(dir, "merge study.toml -o out");
+    assert_eq!(results(&dir.join("out")), undisturbed);
+}
+
 #[test]
 fn units_of_another_plan_are_named_and_left_out() {
     let place = place();

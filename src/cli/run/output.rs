@@ -32,6 +32,7 @@ pub(crate) fn manifest(
         scenario: String::new(),
         configuration,
         inputs,
+        outputs: std::collections::BTreeMap::new(),
         model,
         threads: session.threads(),
         independent_windows: None,
