@@ -99,6 +99,7 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
             Ok(format!("a scenario of {} runs", scenario.run.runs))
         }
         Kind::Study => {
+            nav_sim::study::named_files::exist(path)?;
             let study = nav_sim::study::file::read(path)?.study;
             let (candidates, sets) = (study.candidates().len(), study.outage_sets().map_or(0, |s| s.len()));
             Ok(format!("a study of {candidates} candidates, {sets} outage sets, {} runs each", study.runs))
@@ -160,7 +161,10 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
             let one = |r: &nav_sim::imu::Recording| {
                 format!("{} channels of {} samples at {} Hz", r.signals.len(), r.len(), r.rate_hz)
             };
-            Ok(format!("static, {}", recordings.iter().map(one).collect::<Vec<_>>().join("; ")))
+            Ok(format!(
+                "read as a static recording, {}",
+                recordings.iter().map(one).collect::<Vec<_>>().join("; ")
+            ))
         }
     }
 }

@@ -154,7 +154,10 @@ impl Compared {
     fn text(&self) -> String {
         let mut lines = report::verdict_lines(&self.file.verdicts);
         if self.candidates.iter().any(|c| !c.outages.is_empty()) {
-            lines.push(format!("ASEE against {}, mean over the outage, %:", self.file.reference));
+            lines.push(format!(
+                "ASEE against {}, mean over the outage, % (in parentheses: mean size of the deviations):",
+                self.file.reference
+            ));
             lines.push(table(&self.rows()));
             lines.push(
                 "NEES (9 if right) and coverage over the outage, RMSE at its end against the reference, %:"

@@ -2,6 +2,7 @@
 
 use super::{Failure, Session};
 use nav_sim::formats::atomic;
+use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -55,18 +56,25 @@ const FILES: &[(&str, &[u8])] = repository_files![
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut made = Made::default();
+    let mut kept = Vec::new();
     for (name, contents) in FILES {
         let path = args.directory.join(name);
         if path.exists() {
             session.printer.say(&format!("kept {}", path.display()));
+            kept.push(path.display().to_string());
             continue;
         }
         made.directories.extend(path.ancestors().skip(1).filter(|p| !p.exists()).map(Path::to_owned));
         made.write(path, contents)?;
     }
     made.directories.clear();
-    for path in std::mem::take(&mut made.files) {
-        session.printer.result(&path.display().to_string());
+    let written: Vec<String> =
+        std::mem::take(&mut made.files).iter().map(|path| path.display().to_string()).collect();
+    if session.json() {
+        let json = json!({ "schema_version": 1, "written": written, "kept": kept });
+        session.printer.result(&json.to_string());
+    } else {
+        written.iter().for_each(|path| session.printer.result(path));
     }
     Ok(())
 }

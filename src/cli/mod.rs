@@ -38,6 +38,8 @@ mod turn_on;
 mod wv;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use nav_sim::lanes::Level;
+use std::ffi::{OsStr, OsString};
 use std::process::ExitCode;
 
 pub(crate) use common::{Common, Session};
@@ -136,8 +138,53 @@ fn color_choice() -> clap::ColorChoice {
     }
 }
 
+/// The words of the command line. A negative number after an option is its value, not a flag: no flag begins with a
+/// digit, and what is wrong with the number is for the option to say.
+fn words(given: impl Iterator<Item = OsString>) -> Vec<OsString> {
+    let mut words: Vec<OsString> = Vec::new();
+    for word in given {
+        let text = word.to_string_lossy();
+        let is_negative = text
+            .strip_prefix('-')
+            .is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit() || c == '.'));
+        match words.last_mut() {
+            Some(last) if is_negative && is_bare_option(last) => {
+                last.push("=");
+                last.push(&word);
+            }
+            _ => words.push(word),
+        }
+    }
+    words
+}
+
+/// `--option` without a value.
+fn is_bare_option(word: &OsStr) -> bool {
+    let text = word.to_string_lossy();
+    text.len() > 2 && text.starts_with("--") && !text.contains('=')
+}
+
+/// Whether the version is asked for with all that decides the numbers.
+fn asks_for_build(words: &[OsString]) -> bool {
+    let has = |names: [&str; 2]| words.iter().any(|word| names.iter().any(|name| word == name));
+    words.len() == 3 && has(["--version", "-V"]) && has(["--verbose", "-v"])
+}
+
+/// Version, vector unit, build, and the fingerprint of the numbers that it makes on this machine.
+fn build() -> String {
+    let version = env!("CARGO_PKG_VERSION");
+    let profile = if cfg!(debug_assertions) { "debug" } else { "release" };
+    let (arch, os) = (std::env::consts::ARCH, std::env::consts::OS);
+    let numbers = nav_sim::study::fingerprint();
+    format!("{version}\nvector unit: {}\nbuild: {profile}, {arch} {os}, numbers {numbers}", Level::best())
+}
+
 pub(crate) fn main() -> ExitCode {
-    let matches = command().color(color_choice()).get_matches();
+    let words = words(std::env::args_os());
+    if asks_for_build(&words) {
+        command().version(&*build().leak()).get_matches_from(["nav-sim", "--version"]);
+    }
+    let matches = command().color(color_choice()).get_matches_from(&words);
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
     let printer = Printer::new(&cli.common);
     if !cli.command.heeds_signals() {
@@ -159,5 +206,15 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         super::command().debug_assert();
+    }
+
+    #[test]
+    fn negative_numbers_belong_to_the_option_before_them() {
+        let joined = |text: &str| {
+            let words = super::words(text.split(' ').map(Into::into));
+            words.iter().map(|w| w.to_string_lossy().into_owned()).collect::<Vec<_>>().join(" ")
+        };
+        assert_eq!(joined("run --seed -1 --outage -5:3 -v"), "run --seed=-1 --outage=-5:3 -v");
+        assert_eq!(joined("run a --p95-m=3 -.5 -- -3"), "run a --p95-m=3 -.5 -- -3");
     }
 }

@@ -2,7 +2,7 @@
 
 use super::number::shortest;
 use crate::metrics::{EpochMetrics, EpochRow, PerState};
-use crate::simulation::{OutageRecord, REPORTED, REPORTED_NAMES, RunRecord, RunResult};
+use crate::simulation::{BIAS_NAMES, OutageRecord, REPORTED, REPORTED_NAMES, RunRecord, RunResult};
 use std::collections::HashMap;
 
 /// A table that cannot be read back.
@@ -60,7 +60,8 @@ fn named(prefix: &str) -> impl Iterator<Item = String> {
 fn epoch_columns() -> Vec<String> {
     let states = ["asee_", "rmse_", "bias_"].into_iter().flat_map(named);
     let ends = EPOCH_ENDS.map(str::to_owned);
-    ["t_s", "gnss"].map(str::to_owned).into_iter().chain(states).chain(ends).collect()
+    let biases = BIAS_NAMES.iter().map(|name| format!("asee_{name}"));
+    ["t_s", "gnss"].map(str::to_owned).into_iter().chain(states).chain(ends).chain(biases).collect()
 }
 
 /// `epochs.csv`: one row a reporting epoch (1 Hz), means over runs.
@@ -71,7 +72,7 @@ pub fn epochs_csv(epochs: &[EpochMetrics]) -> String {
         let mut row = vec![shortest(e.t_s), u8::from(e.gnss).to_string()];
         row.extend([&e.asee, &e.rmse, &e.bias].into_iter().flat_map(values));
         let ends = [e.mean_pos_err_m.value, e.mean_att_err_deg.value, e.nees.value, e.coverage];
-        row.extend(ends.map(shortest));
+        row.extend(ends.into_iter().chain(e.bias_asee).map(shortest));
         row.join(",")
     };
     lines(epoch_columns().join(","), epochs.iter().map(row))
@@ -294,7 +295,10 @@ mod tests {
         assert!(
             header.contains("asee_yaw_deg, rmse_pos_n_m") && header.contains("rmse_yaw_deg, bias_pos_n_m")
         );
-        assert!(header.ends_with("bias_yaw_deg, mean_pos_err_m, mean_att_err_deg, nees, coverage"));
+        assert!(
+            header.contains("bias_yaw_deg, mean_pos_err_m, mean_att_err_deg, nees, coverage, asee_b_ax_m_s2")
+        );
+        assert!(header.ends_with("asee_b_az_m_s2, asee_b_gx_rad_s, asee_b_gy_rad_s, asee_b_gz_rad_s"));
     }
 
     #[test]
@@ -337,9 +341,9 @@ mod tests {
         assert_eq!(error.to_string(), "line 3: column \"t_s\": \"x1\" is not a number");
         let error = parse_epochs(&text.replacen("rmse_yaw_deg", "rmse_roll_deg", 1)).unwrap_err();
         assert_eq!(error.to_string(), "line 1: two columns are named \"rmse_roll_deg\"");
-        let cut = &text[..text.trim_end().rfind(',').unwrap()];
+        let cut = &text[..text.rfind(',').unwrap()];
         let error = parse_epochs(cut).unwrap_err().to_string();
-        assert!(error.ends_with("32 values, but 33 columns"), "{error}");
+        assert!(error.ends_with("38 values, but 39 columns"), "{error}");
     }
 
     /// One value that is none is damage; a row of them is an epoch that no run reached.

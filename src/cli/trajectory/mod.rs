@@ -9,6 +9,7 @@ use super::{Failure, Session};
 use nav_sim::formats::trajectory_file::{Options, load};
 use nav_sim::trajectory::Trajectory;
 use nav_sim::units::DEG;
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// Make, check, convert and draw reference trajectories
@@ -85,5 +86,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 /// Says where an output is.
 fn wrote(path: &Path, session: &Session) {
+    if session.json() {
+        let json = json!({ "schema_version": 1, "written": [path.display().to_string()] });
+        session.printer.result(&json.to_string());
+    }
     session.printer.say(&format!("wrote {}", path.display()));
 }

@@ -120,6 +120,8 @@ fn rows_without_a_trajectory_through_them_are_refused_with_their_line() {
         refused(&drive(Some((5, "2.5,6.60018125,46.500125,400,0,0,45")))).0,
         "a.csv, line 7: position jumps by 5635241 m in 0.5 s"
     );
+    let (text, _) = refused(&format!("{HEADER}0.2,1,2,3,0,0,0\n0.3,1,2,3,0,0,0\n0.4,2,2,3,0,0,0\n"));
+    assert!(text.ends_with(" m in 0.1 s"), "{text}");
     let (text, _) = refused(&format!("{HEADER}0,1,2,3,0,0,0\n1,1,2,3,0,0,0\n2,1,2,3,0,0,0\n"));
     assert_eq!(text, "a.csv, line 4: 3 samples: a trajectory needs at least 4");
     let rows: String = (0..5).map(|k| format!("{k},89.95,2,3,0,0,0\n")).collect();

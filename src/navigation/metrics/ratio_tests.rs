@@ -102,7 +102,7 @@ fn the_interval_of_an_rmse_ratio_is_positive() {
     let candidate = experiment(&[1.0; 3], runs(errors));
     let reference = experiment(&[1.0; 3], runs([1.0; 2]));
     let rmse = compare(&candidate, &reference, true).unwrap()[0].states[0].rmse_end;
-    let half = 12.706_205 * 0.98 / 2.0;
+    let half: f64 = 12.706_205 * 0.98 / 2.0;
     for (found, expected) in rmse.ci95_pct.into_iter().zip([-half, half].map(|x| (x.exp() - 1.0) * 100.0)) {
         assert!((found / expected - 1.0).abs() < 1e-6, "{rmse:?}");
     }
