@@ -99,6 +99,7 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
             Ok(format!("a scenario of {} runs", scenario.run.runs))
         }
         FileKind::Study => {
+            nav_sim::study::named_files::exist(path)?;
             let study = nav_sim::study::file::read(path)?.study;
             let (candidates, sets) = (study.candidates().len(), study.outage_sets().map_or(0, |s| s.len()));
             Ok(format!("a study of {candidates} candidates, {sets} outage sets, {} runs each", study.runs))
@@ -168,5 +169,5 @@ fn recording(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<Str
     let described = recordings
         .iter()
         .map(|r| format!("{} channels of {} samples at {} Hz", r.signals.len(), r.len(), r.rate_hz));
-    Ok(format!("static, {}", described.collect::<Vec<_>>().join("; ")))
+    Ok(format!("read as a static recording, {}", described.collect::<Vec<_>>().join("; ")))
 }

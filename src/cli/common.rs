@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 #[command(next_help_heading = "Common options")]
 pub(crate) struct Common {
     /// Seed of all random numbers; without it one is drawn, printed and recorded
-    #[arg(long, global = true, value_name = "N")]
+    #[arg(long, global = true, value_name = "N", value_parser = seed)]
     pub(crate) seed: Option<u64>,
     /// Worker threads, at most 1024 (default: one per core)
     #[arg(long, short = 'j', global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
@@ -32,6 +32,10 @@ pub(crate) struct Common {
     /// Format of what goes to stdout
     #[arg(long, global = true, value_enum, default_value_t)]
     pub(crate) format: Format,
+}
+
+fn seed(text: &str) -> Result<u64, String> {
+    text.parse().map_err(|_| format!("not a whole number from 0 to {}", u64::MAX))
 }
 
 #[derive(clap::ValueEnum, Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -138,7 +138,10 @@ impl Compared {
         let Comparison { file, candidates, outages, .. } = &self.found;
         let mut lines = report::verdict_lines(&file.verdicts);
         if candidates.iter().any(|c| !c.outages.is_empty()) {
-            lines.push(format!("ASEE against {}, mean over the outage, %:", file.reference));
+            lines.push(format!(
+                "ASEE against {}, mean over the outage, % (in parentheses: mean size of the deviations):",
+                file.reference
+            ));
             lines.push(table(&self.rows()));
             lines.push(
                 "NEES (9 if right) and coverage over the outage, RMSE at its end against the reference, %:"

@@ -5,6 +5,8 @@ use nav_sim::formats::datasheet::{self, CATALOGUE, Datasheet, Entry, Figure, Qua
 use nav_sim::formats::suggest::nearest;
 use nav_sim::formats::{atomic, model_file};
 use nav_sim::imu::Sensor;
+use nav_sim::report;
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// Noise model from the figures of a datasheet, in the datasheet's units: an assumption, not a calibration
@@ -192,6 +194,13 @@ fn named(name: &str) -> Result<Datasheet, Failure> {
 
 /// The catalogue: name, class, and the figures of both sensors as given.
 fn list(session: &Session) -> Result<(), Failure> {
+    if session.json() {
+        let units = CATALOGUE.iter().map(|(name, _)| Ok(listed(name, &named(name)?)));
+        let units = units.collect::<Result<Vec<_>, Failure>>()?;
+        let json = json!({ "schema_version": 1, "units": units });
+        session.printer.result(report::json(&json).trim_end());
+        return Ok(());
+    }
     for (name, _) in CATALOGUE {
         let sheet = named(name)?;
         let class = sheet.class.as_deref().unwrap_or_default();
@@ -206,4 +215,11 @@ fn list(session: &Session) -> Result<(), Failure> {
         }
     }
     Ok(())
+}
+
+/// A unit of the catalogue in JSON.
+fn listed(name: &str, sheet: &Datasheet) -> serde_json::Value {
+    let figure = |e: &Entry| json!({ "sensor": e.sensor.name(), "figure": e.figure.key(), "given": e.quantity.given, "source": e.source });
+    let figures: Vec<serde_json::Value> = sheet.entries.iter().map(figure).collect();
+    json!({ "unit": name, "name": sheet.name, "class": sheet.class, "figures": figures })
 }

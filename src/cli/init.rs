@@ -2,12 +2,13 @@
 
 use super::{Failure, Session};
 use nav_sim::formats::atomic;
+use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Make a directory with everything to start from: a commented file of every kind, trajectories, virtual IMUs
 ///
-/// scenario.toml, model.toml, motion.toml, parameters.toml, contamination.toml, initial.toml and examples/quick_study.toml say
+/// scenario.toml, imu.toml, motion.toml, parameters.toml, contamination.toml, initial.toml and examples/quick_study.toml say
 /// what each key means. The others are those of the repository; the examples of every --help work inside the directory. Files
 /// that are there already are left alone.
 #[derive(clap::Args, Debug)]
@@ -31,7 +32,7 @@ macro_rules! repository_files {
 
 const FILES: &[(&str, &[u8])] = repository_files![
     "examples/scenario.toml" => "scenario.toml",
-    "examples/model.toml" => "model.toml",
+    "examples/model.toml" => "imu.toml",
     "examples/parameters.toml" => "parameters.toml",
     "examples/contamination.toml" => "contamination.toml",
     "examples/initial.toml" => "initial.toml",
@@ -55,18 +56,25 @@ const FILES: &[(&str, &[u8])] = repository_files![
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut made = Made::default();
+    let mut kept = Vec::new();
     for (name, contents) in FILES {
         let path = args.directory.join(name);
         if path.exists() {
             session.printer.say(&format!("kept {}", path.display()));
+            kept.push(path.display().to_string());
             continue;
         }
         made.directories.extend(path.ancestors().skip(1).filter(|p| !p.exists()).map(Path::to_owned));
         made.write(path, contents)?;
     }
     made.directories.clear();
-    for path in std::mem::take(&mut made.files) {
-        session.printer.result(&path.display().to_string());
+    let written: Vec<String> =
+        std::mem::take(&mut made.files).iter().map(|path| path.display().to_string()).collect();
+    if session.json() {
+        let json = json!({ "schema_version": 1, "written": written, "kept": kept });
+        session.printer.result(&json.to_string());
+    } else {
+        written.iter().for_each(|path| session.printer.result(path));
     }
     Ok(())
 }

@@ -39,6 +39,7 @@ mod version;
 mod wv;
 
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use std::ffi::{OsStr, OsString};
 use std::process::ExitCode;
 
 pub(crate) use common::{Common, Session};
@@ -136,10 +137,37 @@ fn color_choice(words: &[String]) -> clap::ColorChoice {
     }
 }
 
+/// The words of the command line. A negative number after an option is its value, not a flag: no flag begins with a
+/// digit, and what is wrong with the number is for the option to say.
+fn words(given: impl Iterator<Item = OsString>) -> Vec<OsString> {
+    let mut words: Vec<OsString> = Vec::new();
+    for word in given {
+        let text = word.to_string_lossy();
+        let is_negative = text
+            .strip_prefix('-')
+            .is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit() || c == '.'));
+        match words.last_mut() {
+            Some(last) if is_negative && is_bare_option(last) => {
+                last.push("=");
+                last.push(&word);
+            }
+            _ => words.push(word),
+        }
+    }
+    words
+}
+
+/// `--option` without a value.
+fn is_bare_option(word: &OsStr) -> bool {
+    let text = word.to_string_lossy();
+    text.len() > 2 && text.starts_with("--") && !text.contains('=')
+}
+
 pub(crate) fn main() -> ExitCode {
-    let words: Vec<String> = std::env::args_os().map(|w| w.to_string_lossy().into_owned()).collect();
-    let known = command().color(color_choice(&words)).version(&*version::version(&words).leak());
-    let matches = known.get_matches();
+    let words = words(std::env::args_os());
+    let text: Vec<String> = words.iter().map(|w| w.to_string_lossy().into_owned()).collect();
+    let known = command().color(color_choice(&text)).version(&*version::version(&text).leak());
+    let matches = known.get_matches_from(&words);
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
     let printer = Printer::new(&cli.common);
     if !cli.command.heeds_signals() {
@@ -161,5 +189,15 @@ mod tests {
     #[test]
     fn the_command_line_is_consistent() {
         super::command().debug_assert();
+    }
+
+    #[test]
+    fn negative_numbers_belong_to_the_option_before_them() {
+        let joined = |text: &str| {
+            let words = super::words(text.split(' ').map(Into::into));
+            words.iter().map(|w| w.to_string_lossy().into_owned()).collect::<Vec<_>>().join(" ")
+        };
+        assert_eq!(joined("run --seed -1 --outage -5:3 -v"), "run --seed=-1 --outage=-5:3 -v");
+        assert_eq!(joined("run a --p95-m=3 -.5 -- -3"), "run a --p95-m=3 -.5 -- -3");
     }
 }

@@ -124,7 +124,16 @@ pub(super) fn recordings_at(
     rate_hz: Option<f64>,
     session: &Session,
 ) -> Result<Vec<Recording>, Failure> {
-    let (recordings, report) = recordings::read(paths, &ReadOptions { rate_hz, ..ReadOptions::default() })?;
+    let hint = |setting| {
+        Some(match setting {
+            Setting::Gaps => {
+                "wv and calibrate read it with --gaps split or --gaps ignore; fuse bridges gaps of up to 5 s"
+            }
+            other => option_for(other),
+        })
+    };
+    let (recordings, report) = recordings::read(paths, &ReadOptions { rate_hz, ..ReadOptions::default() })
+        .map_err(|e| Failure::of_file(&e, hint))?;
     report.doubts().iter().for_each(|doubt| session.printer.warn(doubt));
     for file in &report.files {
         session.printer.detail(&file.to_string());

@@ -24,7 +24,8 @@ pub(crate) struct RecordingArgs {
     /// Signals to use: all, accel, gyro, x, accel.x, … (repeatable or comma-separated; default: all)
     #[arg(long, value_name = "AXES", value_delimiter = ',', value_parser = ChannelSet::named)]
     axes: Vec<ChannelSet>,
-    /// Names of the columns, comma-separated, instead of the header (and for files without one)
+    /// Names of the columns, comma-separated, instead of the header (and for files without one: an .npy has, if nothing is
+    /// said, the accelerometers' x, y, z first and then the gyroscopes')
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     columns: Option<Vec<String>>,
 }

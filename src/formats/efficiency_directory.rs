@@ -11,6 +11,10 @@ use std::path::{Path, PathBuf};
 
 type Result<T> = std::result::Result<T, FileError>;
 
+/// What a study writes beside `study.json`.
+const FILES: [&str; 7] =
+    ["sets.csv", "results.csv", "results.txt", "results.json", "rmse.svg", "report.html", "sensitivity.csv"];
+
 /// The names of what is estimated in each set.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Layout {
@@ -35,15 +39,16 @@ impl StudyDirectory {
     /// at the end, left by a run that was stopped, is removed.
     ///
     /// # Errors
-    /// When the directory is of another study, damaged, or cannot be written to.
+    /// When the directory is of another study, holds somebody else's file of a name that the study writes, is damaged, or
+    /// cannot be written to.
     pub fn open(path: &Path, identity: &Value, layout: Layout) -> Result<Self> {
         let (study, sets) = (path.join("study.json"), path.join("sets.csv"));
         match fs::read_to_string(&study) {
             Ok(text) => same(path, &text, identity)?,
-            Err(_) if sets.exists() => {
-                return Err(foreign(path, "sets.csv"));
-            }
             Err(_) => {
+                if let Some(name) = FILES.into_iter().find(|name| path.join(name).exists()) {
+                    return Err(foreign(path, name));
+                }
                 let text = serde_json::to_string_pretty(identity).unwrap_or_default();
                 atomic::write(&study, text + "\n")?;
             }

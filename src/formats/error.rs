@@ -127,7 +127,9 @@ impl FileError {
 
     /// What the system said of a file.
     pub fn io(path: &Path, source: io::Error) -> Self {
-        Self::new(path.display().to_string(), Place::Within, Kind::System(source))
+        let cut_off = matches!(source.kind(), io::ErrorKind::UnexpectedEof);
+        let error = Self::new(path.display().to_string(), Place::Within, Kind::System(source));
+        if cut_off { error.advice("the file is cut off: copy or pack it again") } else { error }
     }
 
     /// Contents that are refused, in words.
@@ -288,5 +290,6 @@ mod tests {
         let e = |kind: io::ErrorKind| FileError::io(Path::new("a.gz"), kind.into());
         assert!(e(io::ErrorKind::NotFound).is_system() && !e(io::ErrorKind::UnexpectedEof).is_system());
         assert!(!FileError::contents("a", Place::Itself, "is cut off").is_system());
+        assert!(e(io::ErrorKind::UnexpectedEof).hint().is_some());
     }
 }

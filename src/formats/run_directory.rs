@@ -1,7 +1,7 @@
 //! Run directories read back, as far as comparisons need them.
 
-use super::run_tables::{parse_epochs, parse_runs};
-use super::{FileError, Place, atomic, source};
+use super::run_tables::{PUT_BACK, parse_epochs, parse_runs};
+use super::{FileError, Place, atomic, hash, source};
 use crate::metrics::{EpochRow, Measured, PerState};
 use crate::report::Manifest;
 use crate::scenario::Method;
@@ -24,14 +24,20 @@ pub struct RunDirectory {
 pub fn read(directory: &Path) -> Result<RunDirectory, FileError> {
     atomic::recover(directory);
     let manifest = manifest(directory)?;
-    let (epochs_path, epochs) = text(directory, "epochs.csv")?;
-    let epochs = parse_epochs(&epochs_path, &epochs)?;
+    let (path, epochs_text) = text(directory, "epochs.csv")?;
+    let epochs = parse_epochs(&path, &epochs_text)?;
+    as_written(directory, &manifest, "epochs.csv", &epochs_text)?;
     let is_expected = manifest.configuration.run.method == Method::Lincov;
     let runs = if is_expected {
-        vec![expected_run(directory, &epochs)?]
+        let (path, summary) = text(directory, "summary.json")?;
+        let run = expected_run(&path, &summary, &epochs)?;
+        as_written(directory, &manifest, "summary.json", &summary)?;
+        vec![run]
     } else {
-        let (runs_path, runs) = text(directory, "runs.csv")?;
-        parse_runs(&runs_path, &runs)?
+        let (path, runs_text) = text(directory, "runs.csv")?;
+        let runs = parse_runs(&path, &runs_text)?;
+        as_written(directory, &manifest, "runs.csv", &runs_text)?;
+        runs
     };
     let outages = manifest.configuration.outage.iter().flatten().map(|o| (o.start_s, o.end_s)).collect();
     let independent_windows = manifest.independent_windows;
@@ -39,8 +45,20 @@ pub fn read(directory: &Path) -> Result<RunDirectory, FileError> {
     Ok(RunDirectory { manifest, experiment })
 }
 
+/// Refuses a file that is not the one the manifest tells of; what can be read of it was, for a more exact message.
+fn as_written(directory: &Path, manifest: &Manifest, name: &str, text: &str) -> Result<(), FileError> {
+    match manifest.outputs.get(name) {
+        Some(blake3) if *blake3 != hash::of_bytes(text.as_bytes()) => {
+            let reason = "is not what its manifest.json says (BLAKE3): it is damaged, or was changed";
+            let path = directory.join(name).display().to_string();
+            Err(FileError::contents(path, Place::Within, reason).advice(PUT_BACK))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// The run that stands for what covariance analysis expects, from its epochs and its summary.
-fn expected_run(directory: &Path, epochs: &[EpochRow]) -> Result<RunRecord, FileError> {
+fn expected_run(path: &str, summary: &str, epochs: &[EpochRow]) -> Result<RunRecord, FileError> {
     #[derive(serde::Deserialize)]
     struct Expected {
         outages: Vec<ExpectedOutage>,
@@ -52,8 +70,7 @@ fn expected_run(directory: &Path, epochs: &[EpochRow]) -> Result<RunRecord, File
         rmse_end: PerState<f64>,
         nees_end: f64,
     }
-    let (path, json) = text(directory, "summary.json")?;
-    let expected: Expected = serde_json::from_str(&json).map_err(|e| not_json(&path, &e))?;
+    let expected: Expected = serde_json::from_str(summary).map_err(|e| not_json(path, &e))?;
     let outage = |o: ExpectedOutage| OutageRecord {
         see_mean: o.asee_mean.0,
         see_end: o.asee_end.0,

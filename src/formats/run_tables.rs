@@ -5,15 +5,20 @@ use crate::metrics::EpochRow;
 use crate::simulation::{OutageRecord, REPORTED, REPORTED_NAMES, RunRecord};
 use std::collections::HashMap;
 
+/// What to do about a table that is not the one that was written.
+pub(super) const PUT_BACK: &str = "repeat the run, or put back its files";
+
 /// Reads `epochs.csv` back, as far as comparisons need it.
 ///
 /// # Errors
-/// A missing column or a value that is not a number.
+/// A missing or doubled column, or a value that is not a finite number (unless no run is left at the epoch).
 pub(super) fn parse_epochs(path: &str, text: &str) -> Result<Vec<EpochRow>, FileError> {
     let table = Table::read(path, text)?;
     let (asee, rmse) = (table.states("asee_")?, table.states("rmse_")?);
     let [t_s, nees, coverage] = table.columns(["t_s", "nees", "coverage"])?;
+    let values: Vec<usize> = asee.iter().chain(&rmse).copied().chain([nees, coverage]).collect();
     let row = |row: usize| {
+        table.finite_or_lost(row, &values)?;
         Ok(EpochRow {
             t_s: table.number(row, t_s)?,
             asee: table.numbers(row, asee)?,
@@ -95,16 +100,29 @@ impl<'a> Table<'a> {
         let syntax = |e: csv::Error| {
             FileError::contents(path, e.position().map_or(1, csv::Position::line), e.to_string())
         };
-        let mut reader = csv::Reader::from_reader(text.as_bytes());
+        let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(text.as_bytes());
         let names: Vec<String> = reader.headers().map_err(syntax)?.iter().map(str::to_owned).collect();
-        let rows = reader.into_records().collect::<Result<_, _>>().map_err(syntax)?;
-        Ok(Self { index: names.iter().cloned().zip(0..).collect(), path, names, rows })
+        let mut index = HashMap::new();
+        for (i, name) in names.iter().enumerate() {
+            if index.insert(name.clone(), i).is_some() {
+                let twice = format!("two columns are named \"{name}\"");
+                return Err(FileError::contents(path, 1_u64, twice).advice(PUT_BACK));
+            }
+        }
+        let rows: Vec<csv::StringRecord> = reader.into_records().collect::<Result<_, _>>().map_err(syntax)?;
+        match rows.iter().find(|row| row.len() != names.len()) {
+            Some(row) => {
+                let message = format!("{} values, but {} columns", row.len(), names.len());
+                Err(FileError::contents(path, line(row), message).advice(PUT_BACK))
+            }
+            None => Ok(Self { path, index, names, rows }),
+        }
     }
 
     fn column(&self, name: &str) -> Result<usize, FileError> {
         let missing = || {
             let kind = Kind::Columns(format!("no column is named \"{name}\"").into());
-            FileError::new(self.path, 1_u64, kind)
+            FileError::new(self.path, 1_u64, kind).advice(PUT_BACK)
         };
         self.index.get(name).copied().ok_or_else(missing)
     }
@@ -122,12 +140,29 @@ impl<'a> Table<'a> {
     }
 
     fn number(&self, row: usize, column: usize) -> Result<f64, FileError> {
-        let text = &self.rows[row][column];
-        text.parse().map_err(|_| {
-            let line = self.rows[row].position().map_or(0, csv::Position::line);
-            let value = format!("\"{text}\"");
-            FileError::cell(self.path, line, &self.names[column], value, "is not a number")
-        })
+        self.rows[row][column].parse().map_err(|_| self.no_number(row, column))
+    }
+
+    /// Refuses a row of an epoch in which some values are finite and others not. Where no run is left, all are NaN.
+    fn finite_or_lost(&self, row: usize, columns: &[usize]) -> Result<(), FileError> {
+        let mut odd = Vec::new();
+        for &column in columns {
+            let value = self.number(row, column)?;
+            if !value.is_finite() {
+                odd.push((column, value));
+            }
+        }
+        let is_lost = odd.len() == columns.len() && odd.iter().all(|(_, value)| value.is_nan());
+        match odd.first() {
+            Some((column, _)) if !is_lost => Err(self.no_number(row, *column)),
+            _ => Ok(()),
+        }
+    }
+
+    fn no_number(&self, row: usize, column: usize) -> FileError {
+        let (row, name) = (&self.rows[row], &self.names[column]);
+        let value = format!("\"{}\"", &row[column]);
+        FileError::cell(self.path, line(row), name, value, "is not a number").advice(PUT_BACK)
     }
 
     fn numbers(&self, row: usize, columns: [usize; REPORTED]) -> Result<[f64; REPORTED], FileError> {
@@ -139,11 +174,16 @@ impl<'a> Table<'a> {
     }
 }
 
+fn line(row: &csv::StringRecord) -> u64 {
+    row.position().map_or(0, csv::Position::line)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::metrics::epochs;
     use crate::report::{epochs_csv, runs_csv, sample};
+    use crate::simulation::EpochSums;
 
     #[test]
     fn epochs_read_back_exactly() {
@@ -183,5 +223,25 @@ mod tests {
             .collect();
         let error = parse_epochs("e.csv", &broken).unwrap_err();
         assert_eq!(error.to_string(), "e.csv, line 3: column \"t_s\": \"x1\" is not a number");
+        let error = parse_epochs("e.csv", &text.replacen("rmse_yaw_deg", "rmse_roll_deg", 1)).unwrap_err();
+        assert_eq!(error.to_string(), "e.csv, line 1: two columns are named \"rmse_roll_deg\"");
+        let cut = &text[..text.rfind(',').unwrap()];
+        let error = parse_epochs("e.csv", cut).unwrap_err().to_string();
+        assert!(error.ends_with("38 values, but 39 columns"), "{error}");
+    }
+
+    /// One value that is none is damage; a row of them is an epoch that no run reached.
+    #[test]
+    fn only_an_epoch_without_runs_may_be_no_number() {
+        let mut result = sample::result();
+        let text = epochs_csv(&epochs(&result));
+        let mut cells: Vec<&str> = text.lines().nth(2).unwrap().split(',').collect();
+        cells[3] = "nan";
+        let damaged = text.replacen(text.lines().nth(2).unwrap(), &cells.join(","), 1);
+        let error = parse_epochs("e.csv", &damaged).unwrap_err();
+        assert_eq!(error.to_string(), "e.csv, line 3: column \"asee_pos_e_m\": \"nan\" is not a number");
+        result.epochs[1] = EpochSums { t_s: result.epochs[1].t_s, ..EpochSums::default() };
+        let rows = parse_epochs("e.csv", &epochs_csv(&epochs(&result))).unwrap();
+        assert!(rows[1].asee[1].is_nan() && rows[1].nees.is_nan());
     }
 }

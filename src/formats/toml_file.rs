@@ -28,7 +28,12 @@ pub(super) fn unknown_key<'a>(
     key: &str,
     legal: impl Iterator<Item = &'a str> + Clone,
 ) -> FileError {
-    let hint = match nearest(key, legal.clone()) {
+    // what profiles call heading, tables and initial states call yaw
+    let other_name = [("yaw_deg", "heading_deg"), ("heading_deg", "yaw_deg")]
+        .into_iter()
+        .find(|(name, meant)| *name == key && legal.clone().any(|word| word == *meant));
+    let meant = other_name.map(|(_, meant)| meant).or_else(|| nearest(key, legal.clone()));
+    let hint = match meant {
         Some(meant) => format!("did you mean \"{meant}\"?"),
         None => format!("legal here: {}", legal.collect::<Vec<_>>().join(", ")),
     };
@@ -243,6 +248,12 @@ impl<'a> Section<'a> {
     pub(crate) fn str(&self, key: &str) -> Result<Option<&'a str>, FileError> {
         let Some(value) = self.get(key) else { return Ok(None) };
         value.get_ref().as_str().map(Some).ok_or_else(|| self.wrong_type(key, "a text in quotes"))
+    }
+
+    /// The texts of a list; those that are none are left out.
+    pub(crate) fn texts(&self, key: &str) -> Vec<&'a str> {
+        let items = self.get(key).and_then(|v| v.get_ref().as_array());
+        items.into_iter().flat_map(|items| items.iter()).filter_map(|v| v.get_ref().as_str()).collect()
     }
 
     pub(crate) fn require_str(&self, key: &str) -> Result<&'a str, FileError> {

@@ -124,19 +124,25 @@ pub fn navigate(
     let experiment =
         scenario.experiment(&inputs.trajectory, inputs.truth(), std::slice::from_ref(&belief), outages, seed);
     let analysis = Analysis::new(&experiment, inputs, &track);
-    let expected =
-        (method != Method::MonteCarlo).then(|| analysis.expected(&belief).ok_or(NavigateError::NotFinite));
-    let expected = expected.transpose()?;
-    let mut navigation = match method {
-        Method::Lincov => expected.map(|(epochs, summary)| Navigation { runs: None, epochs, summary }),
-        Method::MonteCarlo | Method::Both => {
-            let sampled = sampled(&experiment, scenario.run.runs, seed, observer)?;
-            Some(
-                expected.into_iter().fold(sampled, |sampled, (_, summary)| sampled.beside(summary, observer)),
-            )
+    let expected = match method {
+        // beside runs that were asked for alone it may be impossible
+        Method::MonteCarlo => possible(inputs, scenario).ok().and_then(|()| analysis.expected(&belief)),
+        Method::Lincov | Method::Both => Some(analysis.expected(&belief).ok_or(NavigateError::NotFinite)?),
+    };
+    let mut navigation = match (method, expected) {
+        (Method::Lincov, Some((epochs, summary))) => Navigation { runs: None, epochs, summary },
+        (_, expected) => {
+            let mut sampled = sampled(&experiment, scenario.run.runs, seed, observer)?;
+            match (method, expected) {
+                (Method::Both, Some((_, expected))) => sampled.beside(expected, observer),
+                (_, Some((_, expected))) => {
+                    sampled.summary.doubt_by(&expected);
+                    sampled
+                }
+                (_, None) => sampled,
+            }
         }
-    }
-    .ok_or(NavigateError::NotFinite)?;
+    };
     navigation.summary.reduction = reduction;
     analysis.add_budgets(&mut navigation.summary, &belief);
     if method == Method::Lincov {

@@ -11,7 +11,7 @@ use crate::ekf::InitialSettings;
 use crate::frames::{NavState, RollPitchYaw, wrap_angle};
 use crate::fusion::{Assessment, Drift, Outcome, Row, Solution, Start, Use, Verdict};
 use crate::metrics::PerState;
-use crate::simulation::REPORTED_NAMES;
+use crate::simulation::{BIAS_NAMES, REPORTED_NAMES};
 use crate::units::DEG;
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
@@ -30,7 +30,6 @@ pub const FUSION_FILES: [&str; 7] = [
 const STATE: [&str; 9] =
     ["lat_deg", "lon_deg", "h_m", "v_n_m_s", "v_e_m_s", "v_d_m_s", "roll_deg", "pitch_deg", "yaw_deg"];
 const COMPONENTS: [&str; 6] = ["pos_n_m", "pos_e_m", "pos_d_m", "vel_n_m_s", "vel_e_m_s", "vel_d_m_s"];
-const BIASES: [&str; 6] = ["b_ax_m_s2", "b_ay_m_s2", "b_az_m_s2", "b_gx_rad_s", "b_gy_rad_s", "b_gz_rad_s"];
 const SCHEMA_VERSION: u32 = 1;
 
 /// Where a fusion came from: `manifest.json`.
@@ -324,8 +323,13 @@ fn fixed(x: f64, digits: usize) -> String {
 /// estimates, the horizontal standard deviations in metres, and those of the biases.
 #[must_use]
 pub fn solution_csv(rows: &[Row]) -> String {
-    let mut text =
-        header(&[("", &STATE), ("sd_", &STATE), ("", &BIASES), ("sd_", &["n_m", "e_m"]), ("sd_", &BIASES)]);
+    let mut text = header(&[
+        ("", &STATE),
+        ("sd_", &STATE),
+        ("", &BIAS_NAMES),
+        ("sd_", &["n_m", "e_m"]),
+        ("sd_", &BIAS_NAMES),
+    ]);
     for row in rows {
         let (state, sd) = (values(&row.state), &row.sigma);
         let r = radii(row.state.lat.sin());

@@ -2,6 +2,7 @@
 
 use crate::scenario::Scenario;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Where a run directory came from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -18,6 +19,9 @@ pub struct Manifest {
     pub configuration: Scenario,
     /// Every file that was read.
     pub inputs: Vec<Input>,
+    /// BLAKE3 of the tables and the summary, by their names. (Directories made before have none.)
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub outputs: BTreeMap<String, String>,
     /// The model the filter believes.
     pub model: ModelNote,
     /// Worker threads.

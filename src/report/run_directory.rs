@@ -37,15 +37,30 @@ pub fn run_directory<'a>(
     track: &TrajectorySeries,
 ) -> Vec<OutputFile<'a>> {
     let [epochs_name, runs_name, summary_name, page_name, manifest_name] = RUN_FILES;
+    let summary_text = summary_json(summary, manifest.throughput_epochs_per_s);
+    let epochs_text = epochs_csv(epochs);
+    let tables = [(epochs_name, digest([&epochs_text])), (summary_name, digest([&summary_text]))];
+    let runs_digest = runs.map(|result| (runs_name, digest(runs_csv(result))));
+    let outputs = tables.into_iter().chain(runs_digest).map(|(name, hash)| (name.to_owned(), hash)).collect();
+    let with_outputs = Manifest { outputs, ..manifest.clone() };
     let runs = runs.map(|result| OutputFile { name: runs_name, parts: Box::new(runs_csv(result)) });
-    let mut files = vec![OutputFile::whole(epochs_name, epochs_csv(epochs))];
+    let mut files = vec![OutputFile::whole(epochs_name, epochs_text)];
     files.extend(runs);
     files.extend([
-        OutputFile::whole(summary_name, summary_json(summary, manifest.throughput_epochs_per_s)),
+        OutputFile::whole(summary_name, summary_text),
         OutputFile::whole(page_name, run_page(epochs, summary, manifest, track)),
-        OutputFile::whole(manifest_name, json(manifest)),
+        OutputFile::whole(manifest_name, json(&with_outputs)),
     ]);
     files
+}
+
+/// BLAKE3 of a text, part by part, in hexadecimal.
+fn digest(parts: impl IntoIterator<Item = impl AsRef<str>>) -> String {
+    let mut hasher = blake3::Hasher::new();
+    for part in parts {
+        hasher.update(part.as_ref().as_bytes());
+    }
+    hasher.finalize().to_hex().to_string()
 }
 
 /// `summary.json`, with how fast it was found (IMU epochs a second, all runs together): its only number that the
@@ -86,6 +101,7 @@ mod tests {
             seed: 7,
             configuration: Scenario::default(),
             inputs: vec![Input { role: "trajectory".into(), path: "a<b.toml".into(), blake3: "ab".into() }],
+            outputs: Default::default(),
             model: ModelNote { estimator: Some("dr-awv".into()) },
             threads: 2,
             independent_windows: None,
@@ -103,6 +119,10 @@ mod tests {
         let manifest: Manifest = serde_json::from_str(&files[4].1).unwrap();
         assert_eq!(manifest.hashes("trajectory"), ["ab"]);
         assert_eq!(manifest.configuration, Scenario::default());
+        for (name, text) in files.iter().filter(|(name, _)| !["report.html", "manifest.json"].contains(name))
+        {
+            assert_eq!(manifest.outputs[*name], blake3::hash(text.as_bytes()).to_hex().as_str(), "{name}");
+        }
     }
 
     /// Every number that says where it stands in summary.json stands there.

@@ -16,10 +16,10 @@ pub fn verdict(summary: &Summary) -> String {
 
 /// The summary for people, the verdict first.
 #[must_use]
-pub fn text(summary: &Summary, throughput_epochs_per_s: f64) -> String {
+pub fn text(summary: &Summary) -> String {
     let mut text = format!("verdict: {}\n", verdict(summary));
     summary.require.iter().for_each(|met| text += &format!("{}\n", met_line(met)));
-    text += &format!("{}\n", how(summary, throughput_epochs_per_s));
+    text += &format!("{}\n", how(summary));
     if summary.runs > 0 && summary.diverged == summary.runs {
         return text.trim_end().to_owned();
     }
@@ -137,7 +137,7 @@ pub fn sensitivity_table(summary: &Summary) -> String {
 }
 
 /// How the figures were found.
-fn how(summary: &Summary, throughput_epochs_per_s: f64) -> String {
+fn how(summary: &Summary) -> String {
     if summary.method == Method::Lincov.name() {
         return format!("covariance analysis without runs, {} states", summary.filter_states);
     }
@@ -146,12 +146,8 @@ fn how(summary: &Summary, throughput_epochs_per_s: f64) -> String {
         false => String::new(),
     };
     format!(
-        "{} runs ({} diverged){shared}, {} states, seed {}, {:.2} million IMU epochs/s",
-        summary.runs,
-        summary.diverged,
-        summary.filter_states,
-        summary.seed,
-        throughput_epochs_per_s / 1e6
+        "{} runs ({} diverged){shared}, {} states, seed {}",
+        summary.runs, summary.diverged, summary.filter_states, summary.seed
     )
 }
 

@@ -15,6 +15,7 @@ pub(crate) fn result() -> RunResult {
             count: u64::from(runs),
             see: [n * sigma; 9],
             see_sq: [n * sigma * sigma * 1.01; 9],
+            bias_see: [n * 1e-4; 6],
             error: [0.2 * sigma; 9],
             error_sq: [n * 1.1 * sigma * sigma; 9],
             error_4: [n * 3.0 * sigma.powi(4); 9],

@@ -5,7 +5,7 @@ use super::comparison::{CandidateResult, Label, table_rows};
 use super::number::{readable, window};
 use super::verdict::verdict_word;
 use crate::metrics::{self, EpochMetrics, Measured, OutageComparison, OutageMetrics, Verdict};
-use crate::simulation::{REPORTED, REPORTED_NAMES};
+use crate::simulation::{BIAS_NAMES, REPORTED, REPORTED_NAMES};
 
 /// A value of a table.
 #[derive(Debug, Clone, PartialEq)]
@@ -183,6 +183,7 @@ pub fn epoch_columns() -> Vec<TableColumn> {
         names.extend(prefixed(prefix));
     }
     names.extend(["mean_pos_err_m", "mean_att_err_deg", "nees", "coverage"].map(str::to_owned));
+    names.extend(BIAS_NAMES.map(|name| format!("asee_{name}")));
     columns(ints(["fix", "runs"]).chain(floats(names)))
 }
 
@@ -199,6 +200,7 @@ pub fn epoch_rows(of: &ColumnResult<'_>, epochs: &[EpochMetrics]) -> Vec<TableRo
         }
         values.extend(e.bias.0.map(|e| e.value));
         values.extend([e.mean_pos_err_m.value, e.mean_att_err_deg.value, e.nees.value, e.coverage]);
+        values.extend(e.bias_asee);
         row.extend(values.into_iter().map(Value::Float));
         row
     };
@@ -363,6 +365,7 @@ mod tests {
         let units = [
             "_s",
             "_m",
+            "_m_s2",
             "_deg",
             "_pct",
             "_share",

@@ -2,7 +2,7 @@
 
 use super::number::shortest;
 use crate::metrics::{EpochMetrics, PerState};
-use crate::simulation::{OutageRecord, REPORTED, REPORTED_NAMES, RunResult};
+use crate::simulation::{BIAS_NAMES, OutageRecord, REPORTED, REPORTED_NAMES, RunResult};
 
 const EPOCH_ENDS: [&str; 4] = ["mean_pos_err_m", "mean_att_err_deg", "nees", "coverage"];
 
@@ -14,7 +14,8 @@ fn named(prefix: &str) -> impl Iterator<Item = String> {
 fn epoch_columns() -> Vec<String> {
     let states = ["asee_", "rmse_", "bias_"].into_iter().flat_map(named);
     let ends = EPOCH_ENDS.map(str::to_owned);
-    ["t_s", "gnss"].map(str::to_owned).into_iter().chain(states).chain(ends).collect()
+    let biases = BIAS_NAMES.iter().map(|name| format!("asee_{name}"));
+    ["t_s", "gnss"].map(str::to_owned).into_iter().chain(states).chain(ends).chain(biases).collect()
 }
 
 /// `epochs.csv`: one row a reporting epoch (1 Hz), means over runs.
@@ -25,7 +26,7 @@ pub fn epochs_csv(epochs: &[EpochMetrics]) -> String {
         let mut row = vec![shortest(e.t_s), u8::from(e.gnss).to_string()];
         row.extend([&e.asee, &e.rmse, &e.bias].into_iter().flat_map(values));
         let ends = [e.mean_pos_err_m.value, e.mean_att_err_deg.value, e.nees.value, e.coverage];
-        row.extend(ends.map(shortest));
+        row.extend(ends.into_iter().chain(e.bias_asee).map(shortest));
         row.join(",")
     };
     lines(epoch_columns().join(","), epochs.iter().map(row))
@@ -83,6 +84,9 @@ mod tests {
         assert!(
             header.contains("asee_yaw_deg, rmse_pos_n_m") && header.contains("rmse_yaw_deg, bias_pos_n_m")
         );
-        assert!(header.ends_with("bias_yaw_deg, mean_pos_err_m, mean_att_err_deg, nees, coverage"));
+        assert!(
+            header.contains("bias_yaw_deg, mean_pos_err_m, mean_att_err_deg, nees, coverage, asee_b_ax_m_s2")
+        );
+        assert!(header.ends_with("asee_b_az_m_s2, asee_b_gx_rad_s, asee_b_gy_rad_s, asee_b_gz_rad_s"));
     }
 }

@@ -13,6 +13,7 @@ pub fn verdict_line(verdict: &Verdict, outages: &[(f64, f64)], runs: u64, diverg
         with_error(verdict.nees, verdict.nees_std_error),
         verdict.coverage
     );
+    let by = if is_expected { ", by covariance analysis" } else { "" };
     let departure = departure(verdict, outages);
     match verdict.kind {
         VerdictKind::Diverged if diverged == runs => format!("diverged: all {runs} runs"),
@@ -22,8 +23,8 @@ pub fn verdict_line(verdict: &Verdict, outages: &[(f64, f64)], runs: u64, diverg
         VerdictKind::Overconfident if verdict.is_lost() => {
             format!("OVERCONFIDENT BY FAR, the filter is lost: {departure}; {figures}")
         }
-        VerdictKind::Overconfident => format!("overconfident: {departure}; {figures}"),
-        VerdictKind::Underconfident => format!("underconfident: {departure}; {figures}"),
+        VerdictKind::Overconfident => format!("overconfident: {departure}; {figures}{by}"),
+        VerdictKind::Underconfident => format!("underconfident: {departure}; {figures}{by}"),
         VerdictKind::Ok if is_expected => format!(
             "consistent: {figures}; by covariance analysis no state is off by more than {:.0} %, over the run or at the \
              end of an outage",

@@ -42,12 +42,13 @@ pub struct MergeReport {
 /// Makes the tables of a finished study in `results/`, the same bytes however it was run.
 ///
 /// # Errors
-/// When units are missing or damaged ([`StudyError::Incomplete`]): nothing is written then.
+/// When an input has changed, or units are missing or damaged ([`StudyError::Incomplete`]): nothing is written then.
 pub fn merge(
     planned: &Planned,
     options: &MergeOptions,
     observer: &dyn Observer<Remark>,
 ) -> Result<MergeReport, StudyError> {
+    planned.inputs_unchanged()?;
     let status = planned.status()?;
     if let Some(remark) = planned.foreign_units(&status) {
         observer.remark(&remark);

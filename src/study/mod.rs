@@ -47,6 +47,7 @@ mod grid;
 mod inputs;
 mod leave_one_out;
 mod merging;
+pub mod named_files;
 mod plan;
 mod planned;
 mod planning;

@@ -2,9 +2,10 @@
 
 use super::directory;
 use super::failure::StudyError;
-use super::file;
+use super::file::{self, beside};
 use super::fingerprint::fingerprint;
 use super::grid::Grid;
+use super::inputs::unchanged;
 use super::plan::{Plan, Unit};
 use super::remark::Remark;
 use super::unit_file;
@@ -46,6 +47,16 @@ impl Planned {
         let planned = (self.plan.version.clone(), self.plan.numerics.clone());
         let here = (env!("CARGO_PKG_VERSION").to_owned(), fingerprint());
         if planned == here { Ok(()) } else { Err(StudyError::OtherNumbers { planned, here }) }
+    }
+
+    /// Refuses a study one of whose files is not what it was when the study was planned: what is done is no result of it.
+    /// A file that is not here (on another machine, say) has not changed.
+    ///
+    /// # Errors
+    /// The file.
+    pub fn inputs_unchanged(&self) -> Result<(), StudyError> {
+        let files = self.plan.inputs.iter().map(|i| (beside(&self.study, Path::new(&i.path)), &i.blake3));
+        files.filter(|(path, _)| path.exists()).try_for_each(|(path, blake3)| unchanged(&path, blake3))
     }
 
     /// Processor time of all units by the plan's probe (s).

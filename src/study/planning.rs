@@ -7,6 +7,7 @@ use super::file::{self, StudyFile, beside};
 use super::fingerprint::fingerprint;
 use super::grid::Grid;
 use super::inputs::{CALIBRATED, Inputs, ModelTexts, Work, unchanged};
+use super::named_files;
 use super::plan::{Estimate, Kept, Plan, Unit};
 use super::planned::Planned;
 use super::prepare::calibrated;
@@ -69,6 +70,7 @@ pub fn plan(
     options: &PlanOptions<'_>,
     observer: &dyn Observer<Remark>,
 ) -> Result<PlanReport, StudyError> {
+    named_files::exist(study)?;
     let file = file::read(study)?;
     let reader = Reader { study, observer };
     if options.writing == Writing::Write

@@ -71,6 +71,7 @@ pub fn run(
     observer: &dyn Observer<Remark>,
 ) -> Result<RunReport, StudyError> {
     planned.same_numbers()?;
+    planned.inputs_unchanged()?;
     if let Some(remark) = planned.foreign_units(&planned.status()?) {
         observer.remark(&remark);
     }

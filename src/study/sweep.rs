@@ -3,6 +3,7 @@
 use super::error::DescriptionError;
 use super::rules::{MAX_CELLS, exactly_one};
 use crate::sensors::outage::{Outage, OutagePlan, PeriodicOutages, RandomOutages};
+use crate::units::SettingError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -124,7 +125,10 @@ pub(super) fn expand(entry: &OutagesEntry, index: usize) -> Result<Vec<OutageSet
     }
     let several = sets.len() > 1;
     let named = |(values, plan): (Vec<f64>, OutagePlan)| {
-        plan.validate().map_err(|e| DescriptionError::refused(&key, &e.value, &e.requirement))?;
+        let refused = |e: SettingError| {
+            DescriptionError::refused(&key, e.value, format!("is refused: {}", e.requirement))
+        };
+        plan.validate().map_err(refused)?;
         let values: Vec<String> = values.iter().map(f64::to_string).collect();
         let name = if several { format!("{}({})", entry.name, values.join(",")) } else { entry.name.clone() };
         Ok(OutageSet { name, plan })
@@ -158,4 +162,16 @@ fn product(axes: &[&OneOrMany], make: impl Fn(&[f64]) -> OutagePlan) -> Vec<(Vec
             (c, plan)
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refused_window_is_told_in_a_sentence() {
+        let entry: OutagesEntry = toml::from_str("windows = [{ start_s = 25, end_s = 24 }]").unwrap();
+        let refusal = expand(&entry, 0).unwrap_err().to_string();
+        assert_eq!(refusal, "\"outages[1]\" = 24 is refused: it must come after start_s = 25");
+    }
 }

@@ -1,15 +1,15 @@
 //! The numbers of a unit file, eight bytes each: integers and floating point, little-endian.
 
 use crate::metrics::{EpochMetrics, Estimate, Expected, OutageMetrics, PerState, Quantile, Reconvergence};
-use crate::simulation::{EpochSums, OutageRecord, REPORTED, RunRecord};
+use crate::simulation::{BIASES, EpochSums, OutageRecord, REPORTED, RunRecord};
 
 /// Numbers of an outage record, an epoch, and a run without its outages.
 pub(super) const OUTAGE: usize = 3 * REPORTED + 4;
-pub(super) const EPOCH: usize = 4 + 5 * REPORTED + 6;
+pub(super) const EPOCH: usize = 4 + 5 * REPORTED + BIASES + 6;
 pub(super) const RUN: usize = 7 + REPORTED;
 /// Numbers of an outage and an epoch of a covariance analysis.
 pub(super) const EXPECTED_OUTAGE: usize = 4 * REPORTED + 5;
-pub(super) const EXPECTED_EPOCH: usize = 3 * REPORTED + 6;
+pub(super) const EXPECTED_EPOCH: usize = 3 * REPORTED + BIASES + 6;
 
 fn put(bytes: &mut Vec<u8>, values: &[f64]) {
     values.iter().for_each(|v| bytes.extend(v.to_le_bytes()));
@@ -37,6 +37,7 @@ pub(super) fn put_epoch(bytes: &mut Vec<u8>, e: &EpochSums) {
     for sums in [&e.see, &e.see_sq, &e.error, &e.error_sq, &e.error_4] {
         put(bytes, sums);
     }
+    put(bytes, &e.bias_see);
     for sums in [&e.pos_error, &e.att_error, &e.nees] {
         put(bytes, sums);
     }
@@ -59,6 +60,7 @@ pub(super) fn put_expected(bytes: &mut Vec<u8>, expected: &Expected) {
         for states in [&e.asee, &e.rmse, &e.bias] {
             put(bytes, &states.0.map(|e| e.value));
         }
+        put(bytes, &e.bias_asee);
         put(bytes, &[e.mean_pos_err_m.value, e.mean_att_err_deg.value, e.nees.value, e.coverage]);
     }
 }
@@ -123,6 +125,7 @@ pub(super) fn epoch(words: &mut Words<'_>) -> EpochSums {
         error: words.floats(),
         error_sq: words.floats(),
         error_4: words.floats(),
+        bias_see: words.floats(),
         pos_error: words.floats(),
         att_error: words.floats(),
         nees: words.floats(),
@@ -158,6 +161,7 @@ pub(super) fn expected_epoch(words: &mut Words<'_>) -> EpochMetrics {
         asee: words.states(),
         rmse: words.states(),
         bias: words.states(),
+        bias_asee: words.floats(),
         mean_pos_err_m: words.exact(),
         mean_att_err_deg: words.exact(),
         nees: words.exact(),

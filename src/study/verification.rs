@@ -44,6 +44,7 @@ pub fn verify(
     observer: &dyn Observer<Remark>,
 ) -> Result<VerifyReport, StudyError> {
     planned.same_numbers()?;
+    planned.inputs_unchanged()?;
     let mut inputs = Inputs::new(planned, observer);
     let (whole, damaged) = whole(planned, &mut inputs)?;
     let key =

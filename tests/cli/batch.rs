@@ -185,6 +185,46 @@ fn what_changed_since_the_plan_is_refused() {
     assert!(said.contains("the plan was made by nav-sim 0.0."), "{said}");
 }
 
+/// A file that a study names and that is not there is told by line and key, before anything is planned.
+#[test]
+fn a_named_file_that_is_missing_is_told_by_its_key() {
+    let place = place();
+    let dir = place.path();
+    fs::write(dir.join("study.toml"), STUDY.replace("wrong.toml", "wrnog.toml")).unwrap();
+    let expected = "error: study.toml, line 8: \"candidate[2].model\" = \"wrnog.toml\" names wrnog.toml, which does not exist";
+    let said = refused(dir, "plan study.toml -o out", 2);
+    assert!(said.starts_with(expected) && said.contains("hint: paths are relative"), "{said}");
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_nav-sim"))
+        .current_dir(dir)
+        .args(["check", "study.toml"])
+        .output();
+    let output = output.unwrap();
+    assert_eq!(output.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&output.stderr).starts_with(expected), "{output:?}");
+    assert!(!dir.join("out").exists());
+}
+
+/// With every unit done there is nothing to compute, and yet the results would not be of the inputs that stand there.
+#[test]
+fn an_input_that_changed_when_all_was_done_is_told() {
+    let place = place();
+    let dir = place.path();
+    let undisturbed = whole(dir, "out");
+    fs::write(dir.join("wrong.toml"), MODEL.replace("4e-12", "5e-13")).unwrap();
+    for command in ["run", "status", "merge", "verify"] {
+        let said = refused(dir, &format!("{command} study.toml -o out"), 2);
+        assert!(said.contains("wrong.toml has changed since the study was planned"), "{said}");
+    }
+    fs::write(dir.join("wrong.toml"), MODEL.replace("4e-12", "4e-13")).unwrap();
+    let output = batch(dir, "verify study.toml -o out --units 1 --seed 1 --format json");
+    let found: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((found["whole"].as_u64(), found["compared"].as_u64()), (Some(UNITS as u64), Some(1)));
+    // what is not on this machine has not changed
+    fs::remove_file(dir.join("wrong.toml")).unwrap();
+    done(dir, "merge study.toml -o out");
+    assert_eq!(results(&dir.join("out")), undisturbed);
+}
+
 #[test]
 fn units_of_another_plan_are_named_and_left_out() {
     let place = place();

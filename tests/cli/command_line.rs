@@ -113,7 +113,7 @@ fn the_files_of_init_are_what_they_should_be() {
     ran(&["init", "."]);
     let kinds = [
         ("scenario.toml", "a scenario"),
-        ("model.toml", "a noise model"),
+        ("imu.toml", "a noise model"),
         ("motion.toml", "a trajectory"),
         ("parameters.toml", "bounds of parameters"),
         ("contamination.toml", "a contamination"),
@@ -127,11 +127,10 @@ fn the_files_of_init_are_what_they_should_be() {
     let resolved = ran(&["check", "scenario.toml", "--dry-run"]);
     let scenario = resolved.split_once('\n').unwrap().1.parse::<toml::Table>().unwrap();
     assert_eq!(scenario["gnss"]["rate_hz"].as_float(), Some(1.0));
-    assert!(ran(&["check", "model.toml", "--dry-run"]).contains("beta = 0.0033333"));
+    assert!(ran(&["check", "imu.toml", "--dry-run"]).contains("beta = 0.0033333"));
     // Every key of the file is in the schema, each of its processes is one of the schema's.
     let schema: serde_json::Value = serde_json::from_str(&ran(&["schema", "model"])).unwrap();
-    let model: toml::Table =
-        std::fs::read_to_string(place.path().join("model.toml")).unwrap().parse().unwrap();
+    let model: toml::Table = std::fs::read_to_string(place.path().join("imu.toml")).unwrap().parse().unwrap();
     for (key, _) in &model {
         assert!(schema["properties"][key].is_object(), "{key}");
     }
@@ -250,4 +249,70 @@ fn the_version_says_more_if_asked() {
             "{long}"
         );
     }
+}
+
+/// A negative number is the value of the option before it, and the option says what is wrong with it.
+#[test]
+fn negative_values_are_refused_in_the_words_of_their_option() {
+    for (arguments, reason) in [
+        ("run a.toml b.toml --seed -1", "not a whole number from 0 to"),
+        ("calibrate a --skip-s -5", "not a finite number ≥ 0"),
+        ("design a --recordings 3 --hours -2", "not a finite number > 0"),
+        ("require a.toml --outage 60 --p95-m -3", "not a finite number > 0"),
+        ("run a.toml b.toml --turn-on-bias -0.3,0.01", "expected two numbers ≥ 0"),
+        ("datasheet --arw -0.15deg/h", "does not begin with a number > 0"),
+    ] {
+        let output = nav_sim().args(arguments.split(' ')).output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(2), "{arguments}: {said}");
+        assert!(said.contains(reason) && !said.contains("tip:"), "{arguments}: {said}");
+    }
+}
+
+/// Commands that only write files tell them in JSON too.
+#[test]
+fn json_is_spoken_by_commands_that_write_files() {
+    let place = tempfile::tempdir().unwrap();
+    let json = |arguments: &str| -> serde_json::Value {
+        let arguments = arguments.split(' ').chain(["--format", "json"]);
+        let output = nav_sim().current_dir(place.path()).args(arguments).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        serde_json::from_slice(&output.stdout).unwrap()
+    };
+    let made = json("init .");
+    assert!(made["written"].as_array().unwrap().iter().any(|f| f == "./imu.toml"), "{made}");
+    assert_eq!(json("init .")["kept"], made["written"]);
+    let drive = "trajectories/figure_eight.toml";
+    for (command, file) in [("plot", "eight.svg"), ("convert", "eight.csv"), ("generate", "rows.csv")] {
+        assert_eq!(json(&format!("trajectory {command} {drive} -o {file}"))["written"][0], file);
+    }
+    let units = json("datasheet --list");
+    assert!(
+        units["units"].as_array().unwrap().len() >= 17
+            && units["units"][0]["figures"][0]["given"].is_string()
+    );
+}
+
+/// What heading is called elsewhere; a recording with a gap, which `check` has no option for; what `check` took it for.
+#[test]
+fn check_hints_at_what_helps() {
+    let place = tempfile::tempdir().unwrap();
+    let check = |name: &str, text: &str| {
+        std::fs::write(place.path().join(name), text).unwrap();
+        let output = nav_sim().current_dir(place.path()).args(["check", name]).output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
+    };
+    let profile = "start = { lat_deg = 46, lon_deg = 6, h_m = 0, yaw_deg = 3 }\nsegment = []\n";
+    let (code, _, said) = check("drive.toml", profile);
+    assert!(code == 2 && said.contains("did you mean \"heading_deg\"?"), "{said}");
+    let table = |skipped: std::ops::Range<u32>| -> String {
+        let rows = (0..2000_u32).filter(|k| !skipped.contains(k));
+        let rows = rows.map(|k| format!("{},{}\n", f64::from(k) / 100.0, f64::from(k % 7) * 1e-3));
+        "t_s,gyro_x_rad_s\n".to_owned() + &rows.collect::<String>()
+    };
+    let (code, _, said) = check("gap.csv", &table(500..800));
+    assert!(code == 2 && said.contains("fuse bridges gaps of up to 5 s"), "{said}");
+    let (_, found, _) = check("whole.csv", &table(0..0));
+    assert!(found.starts_with("whole.csv: read as a static recording, 1 channels"), "{found}");
 }

@@ -71,6 +71,7 @@ fn write(directory: &Path, factor: f64, change: impl FnOnce(&mut Manifest)) {
         seed: 7,
         configuration: Scenario { outage, ..Scenario::default() },
         inputs: vec![input("trajectory", "t.csv", b"t"), input("truth", "m.toml", b"m")],
+        outputs: Default::default(),
         model: ModelNote::default(),
         threads: 1,
         independent_windows: None,
@@ -215,6 +216,38 @@ fn a_damaged_table_is_refused_by_file_line_and_column() {
     assert_eq!(ran.code, 2);
     let expected = "error: a/epochs.csv, line 5: column \"t_s\": \"three\" is not a number";
     assert!(ran.stderr.starts_with(expected), "{}", ran.stderr);
+}
+
+/// A table whose numbers are numbers, but not those that were written; where the manifest says nothing of it, it is taken.
+#[test]
+fn a_table_that_was_changed_is_refused() {
+    let directory = tempfile::tempdir().unwrap();
+    write(&directory.path().join("a"), 1.0, |_| {});
+    let (epochs, manifest) =
+        (directory.path().join("a/epochs.csv"), directory.path().join("a/manifest.json"));
+    let text = std::fs::read_to_string(&epochs).unwrap();
+    let row = text.lines().nth(6).unwrap();
+    let changed = |cell: &str| {
+        let mut cells: Vec<&str> = row.split(',').collect();
+        cells[3] = cell;
+        text.replacen(row, &cells.join(","), 1)
+    };
+    let refused = |expected: &str| {
+        let ran = compare(directory.path(), &["a", "--reference", "a"]);
+        assert_eq!(ran.code, 2);
+        assert!(ran.stderr.starts_with(expected) && ran.stderr.contains("\n\nhint: "), "{}", ran.stderr);
+        assert!(!directory.path().join("comparison.json").exists());
+    };
+    std::fs::write(&epochs, changed("nan")).unwrap();
+    refused("error: a/epochs.csv, line 7: column \"asee_pos_e_m\": \"nan\" is not a number");
+    std::fs::write(&epochs, changed("2.5")).unwrap();
+    refused("error: a/epochs.csv: is not what its manifest.json says");
+    let mut old: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(&manifest).unwrap()).unwrap();
+    assert_eq!(old.as_object_mut().unwrap().remove("outputs").unwrap().as_object().unwrap().len(), 3);
+    std::fs::write(&manifest, old.to_string()).unwrap();
+    let ran = compare(directory.path(), &["a", "--reference", "a"]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
 }
 
 #[test]

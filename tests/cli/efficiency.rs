@@ -55,6 +55,19 @@ fn a_directory_of_another_study_is_refused_and_left_alone() {
     assert_eq!(before, FILES.map(|f| read(&dir.path().join("out"), f)));
 }
 
+/// Somebody's own file of a name that the study writes.
+#[test]
+fn a_foreign_file_is_left_alone() {
+    let dir = tempfile::tempdir().unwrap();
+    fs::create_dir(dir.path().join("out")).unwrap();
+    fs::write(dir.path().join("out/results.csv"), "mine").unwrap();
+    let assert = efficiency(dir.path(), "--sets 1 -o out").assert().code(2);
+    let message = "error: out holds results.csv, which is not of a study";
+    assert!(said(&assert).starts_with(message), "{}", said(&assert));
+    assert_eq!(read(&dir.path().join("out"), "results.csv"), "mine");
+    assert_eq!(fs::read_dir(dir.path().join("out")).unwrap().count(), 1);
+}
+
 #[test]
 fn sensitivity_curves_have_a_row_a_size_estimator_and_parameter() {
     let dir = tempfile::tempdir().unwrap();

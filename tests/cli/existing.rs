@@ -33,6 +33,8 @@ fn another_result_is_refused() {
         ("datasheet --unit stim300 -o sheet.toml", "--rate-hz 200", "sheet.toml"),
         ("compare run --reference reference", "--reference run", "comparison.json"),
         ("wv rec -o wv.json", "--scales 5", "wv.json"),
+        ("trajectory convert drive.toml --rate-hz 1 -o drive.csv", "--rate-hz 2", "drive.csv"),
+        ("trajectory generate drive.toml --rate-hz 1 -o drive.csv.gz", "--rate-hz 2", "drive.csv.gz"),
     ] {
         for _ in 0..2 {
             let ran = plain(place.path(), command);
@@ -59,6 +61,25 @@ fn another_result_is_refused() {
     let ran = plain(place.path(), "calibrate rec --model WN+RW --bootstrap 19 -o out.toml");
     refused(&ran, "out.toml");
     assert!(!ran.stderr.contains("recordings at"), "{}", ran.stderr);
+}
+
+/// What `init` makes is not in the way of `calibrate`; a file that is no calibration is told before the work.
+#[test]
+fn calibrate_begins_where_init_ended_and_replaces_no_other_model() {
+    let place = tempfile::tempdir().unwrap();
+    let calibrate = "calibrate rec --model WN+RW --bootstrap 0 --seed 1";
+    for command in ["init .", "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec", calibrate]
+    {
+        let ran = plain(place.path(), command);
+        assert_eq!(ran.code, 0, "{command}\n{}", ran.stderr);
+    }
+    let own = fs::read(place.path().join("imu.toml")).unwrap();
+    let ran = plain(place.path(), &format!("{calibrate} -o imu.toml"));
+    refused(&ran, "imu.toml holds another result");
+    assert!(!ran.stderr.contains("4096 samples"), "{}", ran.stderr);
+    assert!(fs::read(place.path().join("imu.toml")).unwrap() == own);
+    let ran = plain(place.path(), &format!("{calibrate} -o imu.toml --force"));
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
 }
 
 /// The output of the command itself, redirected into the directory of its recordings, is no recording.

@@ -41,6 +41,11 @@ fn a_run_directory_holds_what_the_interface_says() {
     assert_eq!(summary["verdict"]["kind"], "ok");
     let manifest = json(&out.join("manifest.json"));
     assert!(summary["throughput_epochs_per_s"].as_f64().unwrap() > 0.0);
+    for outage in summary["outages"].as_array().unwrap() {
+        let verdict = &outage["verdict"];
+        assert!(verdict["kind"].is_string() && verdict["worst_state"].is_string(), "{verdict}");
+        assert!(verdict["ratio"].as_f64().unwrap() > 0.0, "{verdict}");
+    }
     assert!(manifest["throughput_epochs_per_s"].as_f64().unwrap() > 0.0);
     assert_eq!(manifest["configuration"]["run"]["seed"], 5);
     assert_eq!(manifest["inputs"][0]["blake3"], blake3::hash(DRIVE.as_bytes()).to_hex().as_str());
@@ -56,8 +61,10 @@ fn a_run_directory_holds_what_the_interface_says() {
 fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
     let place = place();
     let command = "run drive.toml imu.toml --runs 20 --outage 30:40 --seed 9";
-    done(place.path(), &format!("{command} -j 1 -o one"));
-    done(place.path(), &format!("{command} -j 2 -o two"));
+    let one = done(place.path(), &format!("{command} -j 1 -o one"));
+    let two = done(place.path(), &format!("{command} -j 2 -o two"));
+    assert_eq!(one.stdout, two.stdout);
+    assert!(one.stderr.contains("million IMU epochs/s"), "{}", one.stderr);
     for name in ["epochs.csv", "runs.csv", "summary.json", "report.html"] {
         // how fast it was found is the one number that the seed does not determine
         let timeless = |run: &str| {
@@ -407,6 +414,27 @@ fn runs_stand_beside_what_is_expected_of_them() {
     assert_eq!(agreement["figures"], 12);
     assert!(agreement["largest_z"].as_f64().unwrap().abs() < agreement["bound_z"].as_f64().unwrap());
     assert!(place.path().join("out/runs.csv").exists());
+}
+
+/// Two runs tell nothing of a filter whose accelerometer is twice as bad as it believes: covariance analysis does.
+#[test]
+fn few_runs_do_not_hide_a_filter_that_is_wrong() {
+    let place = place();
+    fs::write(place.path().join("rough.toml"), MODEL.replace("1e-9", "4e-9")).unwrap();
+    let command = "run drive.toml imu.toml --truth rough.toml --outage 20:50 --seed 2";
+    let sampled = done(place.path(), &format!("{command} --runs 2 -o out"));
+    assert!(sampled.stdout.starts_with("verdict: overconfident: errors are 1."), "{}", sampled.stdout);
+    assert!(
+        sampled.stdout.lines().next().unwrap().ends_with(", by covariance analysis"),
+        "{}",
+        sampled.stdout
+    );
+    done(place.path(), &format!("{command} --method lincov -o expected"));
+    let summary = |run: &str| json(&place.path().join(run).join("summary.json"));
+    let (sampled, expected) = (summary("out"), summary("expected"));
+    assert_eq!(sampled["verdict"], expected["verdict"]);
+    assert_eq!(sampled["outages"][0]["verdict"], expected["outages"][0]["verdict"]);
+    assert_eq!((&sampled["method"], &sampled["lincov"]), (&"monte-carlo".into(), &Value::Null));
 }
 
 #[test]

@@ -8,7 +8,7 @@ use nav_sim::noise::{Ar1, Composite, Ma1, Model, Process, Quantization, RandomWa
 use nav_sim::scenario::Scenario;
 use nav_sim::sensors::imu::Truth;
 use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::lincov::assess;
+use nav_sim::simulation::lincov::{FilterPass, assess};
 use nav_sim::trajectory::Trajectory;
 use nav_sim::trajectory::profile::{Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning};
 
@@ -131,6 +131,11 @@ fn sampled_runs_scatter_as_computed() {
         assert!(end < 4.2 && far(later, report.rmse[i]) < 4.2, "state {i}: {end}");
         let see = sampled.see[i] / sampled.count as f64;
         assert!((see / report.sigma[i] - 1.0).abs() < 5e-3, "state {i}: {see} {}", report.sigma[i]);
+    }
+    let biases = FilterPass::new(&track, &beliefs[0]).bias_sigmas()[at];
+    for (sum, sigma) in sampled.bias_see.iter().zip(biases) {
+        let see = sum / sampled.count as f64;
+        assert!(sigma > 0.0 && (see / sigma - 1.0).abs() < 5e-3, "{see} {sigma}");
     }
     let nees = Estimate::mean(SampleSize::of(sampled.count, None), sampled.nees[0], sampled.nees[1]);
     assert!(far(nees, report.nees) < 4.2, "{} {}", nees.value, report.nees);

@@ -24,6 +24,7 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let planned = args.place.planned(session.asked_seed())?;
+    planned.inputs_unchanged()?;
     let status = planned.status_of_whole()?;
     let (plan, grid) = (&planned.plan, &planned.grid);
     if session.json() {

@@ -4,6 +4,7 @@ use super::Place;
 use super::watch::Watch;
 use crate::cli::{Failure, Session};
 use nav_sim::study::{self, VerifyOptions};
+use serde_json::json;
 
 /// Compute some finished units again and compare them bit by bit
 ///
@@ -30,11 +31,20 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let units = usize::try_from(args.units).unwrap_or(usize::MAX);
     let options = VerifyOptions { units, seed: session.seed(None) };
     let found = study::verify(&planned, &options, &Watch::new(session, || true))?;
+    if session.json() {
+        let json = json!({
+            "schema_version": 1, "plan": planned.plan.id(), "whole": found.whole, "compared": found.compared,
+            "damaged": found.damaged, "different": found.different,
+        });
+        session.printer.result(&json.to_string());
+    }
     if found.different.is_empty() && found.damaged.is_empty() {
-        session.printer.result(&format!(
-            "{} of {} finished units computed again: the same bits",
-            found.compared, found.whole
-        ));
+        if !session.json() {
+            session.printer.result(&format!(
+                "{} of {} finished units computed again: the same bits",
+                found.compared, found.whole
+            ));
+        }
         return Ok(());
     }
     let listed = |what: &str, units: &[String]| match units.len() {

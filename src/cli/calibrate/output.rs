@@ -10,9 +10,10 @@ use nav_sim::jobs::{Calibration, ModelFiles};
 use nav_sim::report::{self, CurvesFile, FitsFile, Input};
 use std::path::{Path, PathBuf};
 
-/// Refuses at once what would be refused after the work: with a seed that is drawn the bootstrap, and so the file, is another.
+/// Refuses at once what would be refused after the work: a file that is no calibration is another result, and with a seed
+/// that is drawn the bootstrap, and so the file, is another too.
 pub(super) fn not_anew(out: &Path, draws: bool, session: &Session) -> Result<(), Failure> {
-    if draws && session.asked_seed().is_none() {
+    if (draws && session.asked_seed().is_none()) || !is_calibrated(out) {
         atomic::guard_contents(out, &[], session.existing())?;
     }
     Ok(())
@@ -144,15 +145,19 @@ pub(super) fn not_of_others(out: &Path) -> Result<(), Failure> {
     if !out.exists() {
         return Ok(());
     }
-    let provenance = model_file::read(out).ok().and_then(|file| file.provenance);
-    let calibrated = provenance.is_some_and(|p| {
-        let program = p.get("program").and_then(toml::Value::as_str);
-        program.is_some_and(|name| name.starts_with("nav-sim")) && p.contains_key("estimator")
-    });
-    if calibrated {
+    if is_calibrated(out) {
         return Ok(());
     }
     let message =
         format!("{} is not a model that nav-sim calibrate wrote: it is not replaced", out.display());
     Err(Failure::input(message).hint("name the output with -o, or move that file away"))
+}
+
+/// Whether a file is a model that a calibration wrote.
+fn is_calibrated(path: &Path) -> bool {
+    let provenance = model_file::read(path).ok().and_then(|file| file.provenance);
+    provenance.is_some_and(|p| {
+        let program = p.get("program").and_then(toml::Value::as_str);
+        program.is_some_and(|name| name.starts_with("nav-sim")) && p.contains_key("estimator")
+    })
 }

@@ -137,8 +137,15 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let manifest = Manifest { independent_windows, wall_s, throughput_epochs_per_s, ..manifest };
     write(&found, &manifest, &TrajectorySeries::of(&inputs.job.trajectory), &args.out)?;
     args.plot.write(|| nav_sim::report::run_svg(&found.epochs, &found.summary), session)?;
-    let shown = if session.json() { nav_sim::report::summary_json } else { run_words::text };
-    session.printer.result(shown(&found.summary, throughput_epochs_per_s).trim_end());
+    let summary = &found.summary;
+    let shown = match session.json() {
+        true => nav_sim::report::summary_json(summary, throughput_epochs_per_s),
+        false => run_words::text(summary),
+    };
+    session.printer.result(shown.trim_end());
+    if throughput_epochs_per_s > 0.0 {
+        session.printer.say(&format!("{:.2} million IMU epochs/s", throughput_epochs_per_s / 1e6));
+    }
     if args.chart && !session.json() {
         session.printer.result(&nav_sim::report::run_text(&found.epochs, &found.summary));
     }

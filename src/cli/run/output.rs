@@ -28,6 +28,7 @@ pub(crate) fn manifest(
         seed,
         configuration,
         inputs,
+        outputs: std::collections::BTreeMap::new(),
         model,
         threads: session.threads(),
         independent_windows: None,

@@ -8,6 +8,7 @@ mod write;
 use super::{Failure, Session};
 use nav_sim::formats::trajectory_file::{Options, load, parse_origin};
 use nav_sim::trajectory::Trajectory;
+use serde_json::json;
 use std::path::{Path, PathBuf};
 
 /// Make, check, convert and draw reference trajectories
@@ -79,5 +80,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 /// Says where an output is.
 fn wrote(path: &Path, session: &Session) {
+    if session.json() {
+        let json = json!({ "schema_version": 1, "written": [path.display().to_string()] });
+        session.printer.result(&json.to_string());
+    }
     session.printer.say(&format!("wrote {}", path.display()));
 }

@@ -67,7 +67,7 @@ pub(super) fn convert(args: &ConvertArgs, session: &Session) -> Result<(), Failu
 fn write(source: &Source, out: &Path, rows: Rows, session: &Session) -> Result<(), Failure> {
     guard_inputs(out, [source.path.as_path()])?;
     let (trajectory, _) = source.read(session)?;
-    write_csv(out, &trajectory, rows)?;
+    write_csv(out, &trajectory, rows, session.existing())?;
     wrote(out, session);
     Ok(())
 }

@@ -1,8 +1,8 @@
 //! A single output file.
 
-use super::make_parent;
 use super::temporary::{self, Temporary};
-use crate::formats::FileError;
+use super::{Existing, kept, make_parent};
+use crate::formats::{FileError, hash};
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -55,6 +55,22 @@ impl AtomicFile {
     /// When the disk is full or the rename is refused; nothing is left then.
     pub fn commit(mut self) -> Result<(), FileError> {
         self.finish().map_err(|e| FileError::io(&self.destination, e))
+    }
+
+    /// As [`AtomicFile::commit`], but not in the place of another result; `shown` is the destination as the user
+    /// named it.
+    ///
+    /// # Errors
+    /// When the destination holds something else and is to stay, too.
+    pub fn commit_result(mut self, shown: &Path, existing: Existing) -> Result<(), FileError> {
+        self.file.flush().map_err(|e| FileError::io(shown, e))?;
+        if let (Existing::Keep, Some(temporary)) = (existing, &self.temporary) {
+            let digest = |path: &Path| hash::of_file(path).ok();
+            if self.destination.is_file() && digest(temporary.path()) != digest(&self.destination) {
+                return Err(kept(shown, "holds another result"));
+            }
+        }
+        self.commit()
     }
 
     fn finish(&mut self) -> io::Result<()> {

@@ -154,7 +154,8 @@ impl Quantity {
 
 /// A unit without the freedom of its spelling.
 fn plain(unit: &str) -> String {
-    let mut text: String = unit.chars().filter(|c| !c.is_whitespace()).collect();
+    let bare = |c: &char| !c.is_whitespace() && !"()".contains(*c);
+    let mut text = unit.chars().filter(bare).collect::<String>().to_lowercase();
     for (written, meant) in [
         ("µ", "u"),
         ("μ", "u"),
@@ -167,10 +168,13 @@ fn plain(unit: &str) -> String {
         ("fps", "ft/s"),
         ("hr", "h"),
         ("√", "sqrt"),
+        ("/rthz", "/sqrthz"),
+        ("/rth", "/sqrth"),
+        ("/rts", "/sqrts"),
     ] {
         text = text.replace(written, meant);
     }
-    text.replace(['(', ')'], "").to_lowercase()
+    text
 }
 
 #[cfg(test)]
@@ -188,6 +192,8 @@ mod tests {
         let cases = [
             (Sensor::Accel, Figure::Noise, "0.06 m/s/√h", 0.001),
             (Sensor::Accel, Figure::Noise, "60 µg/√Hz", 60e-6 * g),
+            (Sensor::Accel, Figure::Noise, "60 ug/rtHz", 60e-6 * g),
+            (Sensor::Gyro, Figure::Noise, "0.6 deg/rt(hr)", 0.01 * deg),
             (Sensor::Accel, Figure::Noise, "0.14mg/sqrt(Hz)", 0.14e-3 * g),
             (Sensor::Accel, Figure::Noise, "1e-3 (m/s²)/sqrt(Hz)", 1e-3),
             (Sensor::Accel, Figure::Noise, "0.065 fps/sqrt(hr)", 0.065 * 0.3048 / 60.0),

@@ -14,6 +14,8 @@ use std::ops::Range;
 /// From so many samples of one value on, and such a share of the record, a signal stands still.
 const LONG_STANDING: usize = 100;
 const LONG_SHARE: f64 = 0.1;
+/// Below this (m/s²) the mean was removed before: nothing to be learnt from it.
+const NO_GRAVITY: f64 = 0.3;
 
 /// What brings each column to SI units; refuses dead axes, tells those that stand still for long.
 pub(super) fn factors(raw: &Raw, rate_hz: f64, report: &mut FileReport) -> Result<Vec<f64>, FileError> {
@@ -118,6 +120,17 @@ pub(super) fn plausible(
         means.iter().filter(|(channel, _)| channel.sensor == sensor).map(|(_, mean)| *mean).collect()
     };
     let (accel, gyro) = (of(Sensor::Accel), of(Sensor::Gyro));
+    let is_gravity = |mean: &[f64]| (norm(mean) / STANDARD_GRAVITY - 1.0).abs() < 0.1;
+    if accel.len() == 3 && gyro.len() == 3 && norm(&accel) < NO_GRAVITY && is_gravity(&gyro) {
+        let message = format!(
+            "static |f| is {:.4} m/s² and the mean angular rate {:.4} rad/s: accelerometers and gyroscopes are exchanged",
+            norm(&accel),
+            norm(&gyro)
+        );
+        return Err(FileError::contents(report.file.as_str(), Place::Within, message)
+            .advice("without names the first three columns are the accelerometers")
+            .setting(Setting::ColumnNames));
+    }
     if accel.len() == 3 {
         check_gravity(&report.file, norm(&accel))?;
         let in_an_interval = STANDARD_GRAVITY / rate_hz;
@@ -138,8 +151,7 @@ pub(super) fn plausible(
 
 pub(in crate::formats) fn check_gravity(path: &str, norm: f64) -> Result<(), FileError> {
     let near = |target: f64| (norm / target - 1.0).abs() < 0.1;
-    // Below 0.3 m/s² the mean was removed before: nothing to be learnt from it.
-    if near(STANDARD_GRAVITY) || norm < 0.3 {
+    if near(STANDARD_GRAVITY) || norm < NO_GRAVITY {
         return Ok(());
     }
     let guess = if near(1.0) {

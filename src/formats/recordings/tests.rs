@@ -338,6 +338,28 @@ fn gravity_tells_wrong_units() {
     read_one("a.csv", six_axes(0.0, "_m_s2"), &at_100_hz()).unwrap();
 }
 
+/// An array with the gyroscopes first: gravity stands in the columns that are taken for theirs.
+#[test]
+fn exchanged_sensors_are_refused() {
+    let mut bytes = Vec::new();
+    npy::write_header(&mut bytes, 200, 6).unwrap();
+    for i in 0..200 {
+        let small = f64::from(i % 7) * 1e-4;
+        for x in [small, -small, small, small, -small, 9.8 + small] {
+            bytes.extend(x.to_le_bytes());
+        }
+    }
+    let (message, hint) = refusal_with("a.npy", &bytes, &at_100_hz());
+    assert!(
+        message.starts_with("a.npy: static |f| is 0.000") && message.ends_with("gyroscopes are exchanged"),
+        "{message}"
+    );
+    assert!(hint.contains("give the names of the columns"), "{hint}");
+    let named = |sensor: &str, unit: &str| ["x", "y", "z"].map(|axis| format!("{sensor}_{axis}_{unit}"));
+    let columns = [named("gyro", "rad_s"), named("accel", "m_s2")].concat();
+    read_one("a.npy", bytes, &ReadOptions { columns: Some(columns), ..at_100_hz() }).unwrap();
+}
+
 #[test]
 fn gravity_tells_units_that_are_not_said() {
     for scale in [1.0, 1.0 / STANDARD_GRAVITY, 1000.0 / STANDARD_GRAVITY] {

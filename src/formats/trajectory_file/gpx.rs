@@ -31,7 +31,9 @@ pub(super) fn gpx(path: &str, text: &str) -> Result<Rows, Error> {
     let mut start = None;
     for Point { line, texts } in track_points(path, text)? {
         let absent = |column: usize| {
-            table.cell(line, column, "the track point", "does not have it, or not as a number")
+            table.cell(line, column, "the track point", "does not have it, or not as a number").advice(
+                "every <trkpt> needs lat, lon, <ele> and <time>: export the track with heights and times",
+            )
         };
         let number = |column: usize| texts[column].trim().parse::<f64>().map_err(|_| absent(column));
         let time = instant(texts[0].trim()).ok_or_else(|| absent(0))?;
@@ -158,7 +160,9 @@ mod tests {
         let (state, rpy) = (t.state(4.0), RollPitchYaw::from_quat(t.state(4.0).q_b_n));
         assert!((state.v_n - DVec3::new(11.117, 0.0, -1.0)).length() < 0.01, "{}", state.v_n);
         assert!(rpy.yaw.abs() < 1e-6 && (rpy.pitch - (1.0_f64 / 11.117).atan()).abs() < 1e-3, "{rpy:?}");
-        let e = load("a.gpx", &text.replacen("<ele>500</ele>", "", 1)).unwrap_err().to_string();
+        let e = load("a.gpx", &text.replacen("<ele>500</ele>", "", 1)).unwrap_err();
+        assert!(e.hint().unwrap().contains("<ele> and <time>"), "{e:?}");
+        let e = e.to_string();
         assert_eq!(e, "a.gpx, line 3: column \"ele\": the track point does not have it, or not as a number");
         assert_eq!(load("a.gpx", "<gpx></gpx>").unwrap_err().to_string(), "a.gpx: no rows in it");
     }

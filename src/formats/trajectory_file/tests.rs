@@ -1,4 +1,5 @@
 use super::*;
+use crate::formats::atomic::Existing;
 use crate::formats::toml_file::Source;
 use crate::frames::RollPitchYaw;
 use crate::units::DEG;
@@ -119,6 +120,8 @@ fn rows_without_a_trajectory_through_them_are_refused_with_their_line() {
         refused(&drive(Some((5, "2.5,6.60018125,46.500125,400,0,0,45")))).0,
         "a.csv, line 7: position jumps by 5635241 m in 0.5 s"
     );
+    let (text, _) = refused(&format!("{HEADER}0.2,1,2,3,0,0,0\n0.3,1,2,3,0,0,0\n0.4,2,2,3,0,0,0\n"));
+    assert!(text.ends_with(" m in 0.1 s"), "{text}");
     let (text, _) = refused(&format!("{HEADER}0,1,2,3,0,0,0\n1,1,2,3,0,0,0\n2,1,2,3,0,0,0\n"));
     assert_eq!(text, "a.csv, line 4: 3 samples: a trajectory needs at least 4");
     let rows: String = (0..5).map(|k| format!("{k},89.95,2,3,0,0,0\n")).collect();
@@ -220,7 +223,7 @@ fn what_is_written_reads_back_the_same() {
     let (t, _) = read(&drive(None)).unwrap();
     for name in ["t.csv", "t.csv.gz"] {
         let path = dir.path().join(name);
-        write_csv(&path, &t, Rows::Rate(10.0)).unwrap();
+        write_csv(&path, &t, Rows::Rate(10.0), Existing::Replace).unwrap();
         let (back, warnings) = load(&path, &Options::default()).unwrap();
         assert!(warnings.is_empty(), "{warnings:?}");
         assert_eq!((back.knots().len(), back.end_s()), (96, 9.5));
@@ -228,7 +231,7 @@ fn what_is_written_reads_back_the_same() {
         assert!((a.v_n - b.v_n).length() < 1e-6 && (a.lat - b.lat).abs() < 1e-14, "{}", a.v_n - b.v_n);
     }
     let path = dir.path().join("knots.csv");
-    write_csv(&path, &t, Rows::Knots).unwrap();
+    write_csv(&path, &t, Rows::Knots, Existing::Replace).unwrap();
     assert_eq!(load(&path, &Options::default()).unwrap().0.knots(), t.knots());
     let e = load(&dir.path().join("t.xyz"), &Options::default()).unwrap_err();
     assert!(e.to_string().contains("t.xyz: a trajectory file ends in .toml"), "{e}");

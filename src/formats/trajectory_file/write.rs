@@ -1,7 +1,7 @@
 //! Trajectories as CSV.
 
 use crate::formats::FileError;
-use crate::formats::atomic::AtomicFile;
+use crate::formats::atomic::{AtomicFile, Existing};
 use crate::frames::{RollPitchYaw, wrap_angle};
 use crate::trajectory::Trajectory;
 use crate::units::DEG;
@@ -36,8 +36,13 @@ impl Rows {
 /// velocities to 1e-9 m/s, angles to 1e-12 degrees.
 ///
 /// # Errors
-/// The file cannot be written.
-pub fn write_csv(path: &Path, trajectory: &Trajectory, rows: Rows) -> Result<(), FileError> {
+/// The file cannot be written, or holds another result that is to stay.
+pub fn write_csv(
+    path: &Path,
+    trajectory: &Trajectory,
+    rows: Rows,
+    existing: Existing,
+) -> Result<(), FileError> {
     let mut file = AtomicFile::create(path)?;
     let io = |e| FileError::io(path, e);
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) {
@@ -47,7 +52,7 @@ pub fn write_csv(path: &Path, trajectory: &Trajectory, rows: Rows) -> Result<(),
     } else {
         write_rows(&mut file, trajectory, rows).map_err(io)?;
     }
-    file.commit()
+    file.commit_result(path, existing)
 }
 
 /// Writes the header and the rows.

@@ -1,7 +1,7 @@
 //! Statistics at one reporting epoch.
 
 use super::estimate::{Estimate, PerState, SampleSize};
-use crate::simulation::{EpochSums, RunResult};
+use crate::simulation::{BIASES, EpochSums, RunResult};
 
 /// What the runs say at one epoch (m, m/s, degrees).
 #[derive(Debug, Clone, PartialEq)]
@@ -15,6 +15,8 @@ pub struct EpochMetrics {
     /// Averaged standard estimation error: mean over runs of the filter's own standard deviation
     /// ([Minaretzis et al.](crate::bibliography::Minaretzis24), Section V).
     pub asee: PerState<Estimate>,
+    /// The same of each sensor's bias (m/s², rad/s).
+    pub bias_asee: [f64; BIASES],
     /// Root mean square error.
     pub rmse: PerState<Estimate>,
     /// Mean error, estimate − truth.
@@ -39,6 +41,7 @@ impl EpochMetrics {
             gnss: s.gnss,
             count: s.count,
             asee: per_state(&|i| mean(s.see[i], s.see_sq[i])),
+            bias_asee: s.bias_see.map(|sum| sum / s.count as f64),
             rmse: per_state(&|i| Estimate::root_mean_square(size, s.error_sq[i], s.error_4[i])),
             bias: per_state(&|i| mean(s.error[i], s.error_sq[i])),
             mean_pos_err_m: mean(s.pos_error[0], s.pos_error[1]),
@@ -93,6 +96,7 @@ mod tests {
             count: 2,
             see: [4.0; REPORTED],
             see_sq: [10.0; REPORTED],
+            bias_see: [0.5; BIASES],
             error: [-6.0; REPORTED],
             error_sq: [50.0; REPORTED],
             error_4: [2402.0; REPORTED],
@@ -107,6 +111,7 @@ mod tests {
         let e = EpochMetrics::of(&two_runs(), None);
         assert_eq!((e.asee.0[3].value, e.rmse.0[3].value, e.bias.0[3].value), (2.0, 5.0, -3.0));
         assert!((e.asee.0[3].std_error - 1.0).abs() < 1e-15);
+        assert_eq!(e.bias_asee, [0.25; BIASES]);
         // squares 1 and 49: standard deviation 24 √2, of their mean 24, of its root 24/(2·5)
         assert!((e.rmse.0[3].std_error - 2.4).abs() < 1e-14, "{:?}", e.rmse.0[3]);
         assert_eq!((e.nees.value, e.nees.std_error, e.coverage), (10.0, 2.0, 0.5));

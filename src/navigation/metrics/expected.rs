@@ -5,11 +5,11 @@ use super::estimate::{Estimate, PerState, Quantile};
 use super::outage::{OutageMetrics, Reconvergence};
 use super::quadratic_form::QuadraticForm;
 use super::summary::{AccuracySummary, Consistency, Coverage, Nis, OutageSummary, SCHEMA_VERSION, Summary};
-use super::verdict::Verdict;
+use super::verdict::{OutageVerdict, Verdict};
 use crate::ekf::Belief;
 use crate::noise::Model;
 use crate::simulation::lincov::{ErrorLaw, FilterPass, Instant, Track, TruthSide};
-use crate::simulation::{COVERAGE_DOF, Experiment, NEES_DOF, OutageRecord, REPORTED, RunRecord};
+use crate::simulation::{BIASES, COVERAGE_DOF, Experiment, NEES_DOF, OutageRecord, REPORTED, RunRecord};
 use crate::units::DEG;
 use nalgebra::DMatrix;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -44,11 +44,13 @@ impl Expected {
     #[must_use]
     pub fn along(track: &Track, experiment: &Experiment<'_>, belief: &Belief, truth: &Model) -> Option<Self> {
         let truth = TruthSide::together(&TruthSide::sources(experiment, truth));
-        let law = FilterPass::new(track, belief).errors(&truth);
+        let filter = FilterPass::new(track, belief);
+        let law = filter.errors(&truth);
         let chi2 = ChiSquared::new(COVERAGE_DOF as f64).expect("degrees of freedom are positive");
         let limit = chi2.inverse_cdf(experiment.coverage_level);
+        let reports = law.reports.iter().zip(filter.bias_sigmas());
         let epochs: Vec<EpochMetrics> =
-            law.reports.iter().map(|instant| epoch(instant, limit)).collect::<Option<_>>()?;
+            reports.map(|(instant, bias)| epoch(instant, *bias, limit)).collect::<Option<_>>()?;
         let ends = experiment.outages.iter().zip(&law.outage_ends);
         let outages: Vec<OutageMetrics> =
             ends.map(|(window, end)| outage((window.start_s, window.end_s), end, &epochs)).collect();
@@ -80,7 +82,7 @@ impl Expected {
             filter_states: self.filter_states,
             seed: self.seed,
             accuracy: AccuracySummary::from(&Accuracy::over(self.epochs.iter())),
-            outages: self.outages.iter().map(OutageSummary::from).collect(),
+            outages: OutageSummary::all(&self.outages, OutageVerdict::expected(&self.record)),
             nees: Consistency {
                 dof: NEES_DOF,
                 mean: self.record.nees_mean,
@@ -142,7 +144,7 @@ fn square(instant: &Instant, states: &[usize]) -> QuadraticForm {
     QuadraticForm::of_square(&block(&instant.covariance, states), &mean)
 }
 
-fn epoch(instant: &Instant, limit: f64) -> Option<EpochMetrics> {
+fn epoch(instant: &Instant, bias_asee: [f64; BIASES], limit: f64) -> Option<EpochMetrics> {
     let believed = block(&instant.believed, &COVERED);
     let mean = COVERED.map(|s| instant.mean[s]);
     let inside = QuadraticForm::of_normalised(&believed, &block(&instant.covariance, &COVERED), &mean)?;
@@ -151,6 +153,7 @@ fn epoch(instant: &Instant, limit: f64) -> Option<EpochMetrics> {
         gnss: instant.fix,
         count: 0,
         asee: exactly(instant.sigma()),
+        bias_asee,
         rmse: exactly(instant.rmse()),
         bias: exactly(instant.reported(&instant.mean)),
         mean_pos_err_m: exact(mean_size(instant, &[0, 1, 2])),

@@ -32,4 +32,4 @@ pub use reduction::{AxisReduction, ReductionQuality, ReductionSummary, TOLERANCE
 pub use requirement::{Met, Requirement, UnknownRequirement};
 pub use sensitivity::Sensitivities;
 pub use summary::{AccuracySummary, Consistency, Coverage, Nis, OutageSummary, Recovery, Spread, Summary};
-pub use verdict::{Verdict, VerdictKind};
+pub use verdict::{OutageVerdict, Verdict, VerdictKind};

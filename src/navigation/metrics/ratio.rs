@@ -254,11 +254,13 @@ struct MeanRatio {
 }
 
 impl MeanRatio {
-    /// The square root of the ratio, its interval by linearisation.
+    /// The square root of the ratio, its interval by linearisation of the logarithm: a ratio of squares is skewed, and
+    /// none is below zero.
     fn root(&self) -> RatioError {
         let root = self.ratio.sqrt();
-        let (pct, half) = ((root - 1.0) * 100.0, self.half_width_pct / (2.0 * root));
-        RatioError { pct, ci95_pct: [pct - half, pct + half] }
+        let half = self.half_width_pct / 100.0 / (2.0 * self.ratio);
+        let pct = |root: f64| (root - 1.0) * 100.0;
+        RatioError { pct: pct(root), ci95_pct: [-half, half].map(|x| pct(root * x.exp())) }
     }
 }
 

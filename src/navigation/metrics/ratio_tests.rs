@@ -92,6 +92,23 @@ fn a_paired_interval_in_closed_form() {
     assert!((found.half_width_pct / expected - 1.0).abs() < 1e-6, "{} {expected}", found.half_width_pct);
 }
 
+/// Two runs, squared errors of the candidate 0.02 and 1.98, of the reference 1: ratio 1 with standard error 0.98, and
+/// t of 1 degree of freedom is 12.7062: by logarithms the root lies between e^(∓12.7062·0.98/2), never below zero (the
+/// linearisation had −523 %).
+#[test]
+fn the_interval_of_an_rmse_ratio_is_positive() {
+    let errors = [0.02_f64.sqrt(), 1.98_f64.sqrt()];
+    let runs = |errors: [f64; 2]| (0..2).map(|k| run(k, 1.0, errors[k as usize])).collect();
+    let candidate = experiment(&[1.0; 3], runs(errors));
+    let reference = experiment(&[1.0; 3], runs([1.0; 2]));
+    let rmse = compare(&candidate, &reference, true).unwrap()[0].states[0].rmse_end;
+    let half: f64 = 12.706_205 * 0.98 / 2.0;
+    for (found, expected) in rmse.ci95_pct.into_iter().zip([-half, half].map(|x| (x.exp() - 1.0) * 100.0)) {
+        assert!((found / expected - 1.0).abs() < 1e-6, "{rmse:?}");
+    }
+    assert!(rmse.ci95_pct[0] > -100.0 && rmse.pct.abs() < 1e-12, "{rmse:?}");
+}
+
 #[test]
 fn runs_that_either_side_lost_are_not_paired() {
     let mut candidate = experiment(&[1.0; 3], (0..4).map(|k| run(k, 2.0, 1.0)).collect());

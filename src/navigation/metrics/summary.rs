@@ -9,7 +9,7 @@ use super::outage::{self, OutageMetrics};
 use super::reduction::ReductionSummary;
 use super::requirement::Met;
 use super::sensitivity::Sensitivities;
-use super::verdict::{Verdict, VerdictKind};
+use super::verdict::{OutageVerdict, Verdict, VerdictKind};
 use crate::simulation::{NEES_DOF, RunResult};
 use serde::Serialize;
 
@@ -80,6 +80,8 @@ pub struct OutageSummary {
     pub start_s: f64,
     /// First instant with a fix again (s).
     pub end_s: f64,
+    /// Whether the filter is as good at its end as it believes.
+    pub verdict: OutageVerdict,
     /// Mean over the outage's epochs of the ASEE.
     pub asee_mean: PerState<f64>,
     /// Its Monte-Carlo standard error.
@@ -212,6 +214,7 @@ impl Summary {
     pub fn of(result: &RunResult, epochs: &[EpochMetrics], seed: u64) -> Self {
         let windows = result.independent_windows;
         let verdict = Verdict::of(&result.runs, result.outages.len(), windows);
+        let verdicts = OutageVerdict::of(&result.runs, result.outages.len(), windows);
         let diverged_runs: Vec<u64> = result.runs.iter().filter(|r| r.diverged).map(|r| r.run).collect();
         Self {
             schema_version: SCHEMA_VERSION,
@@ -224,7 +227,7 @@ impl Summary {
             filter_states: result.filter_states,
             seed,
             accuracy: AccuracySummary::from(&Accuracy::over(epochs.iter())),
-            outages: outage::outages(result).iter().map(OutageSummary::from).collect(),
+            outages: OutageSummary::all(&outage::outages(result), verdicts),
             nees: nees(epochs, windows),
             nis: nis(result),
             coverage: coverage(epochs, result.coverage_level, windows),
@@ -241,11 +244,30 @@ impl Summary {
         self.method = "both";
         let diverged = self.verdict.kind == VerdictKind::Diverged;
         if !agreement.is_broken() {
-            let kind = if diverged { VerdictKind::Diverged } else { expected.verdict.kind };
-            self.verdict = Verdict { kind, ..expected.verdict };
+            self.take_verdicts(&expected);
+            if diverged {
+                self.verdict.kind = VerdictKind::Diverged;
+                self.outages.iter_mut().for_each(|o| o.verdict.kind = VerdictKind::Diverged);
+            }
         }
         self.lincov = Some(Box::new(expected));
         self.agreement = Some(agreement);
+    }
+
+    /// A filter that runs do not find wrong, being too few, is wrong where covariance analysis finds it so and the runs
+    /// do not contradict that.
+    pub fn doubt_by(&mut self, expected: &Self) {
+        let is_told = self.verdict.kind != VerdictKind::Ok || expected.verdict.kind == VerdictKind::Ok;
+        if !is_told && !Agreement::of(self, expected).is_broken() {
+            self.take_verdicts(expected);
+        }
+    }
+
+    fn take_verdicts(&mut self, expected: &Self) {
+        self.verdict = expected.verdict;
+        for (own, expected) in self.outages.iter_mut().zip(&expected.outages) {
+            own.verdict = expected.verdict;
+        }
     }
 }
 
@@ -267,11 +289,17 @@ impl From<&Accuracy> for AccuracySummary {
     }
 }
 
-impl From<&OutageMetrics> for OutageSummary {
-    fn from(o: &OutageMetrics) -> Self {
+impl OutageSummary {
+    /// All outages with their verdicts.
+    pub(super) fn all(outages: &[OutageMetrics], verdicts: Vec<OutageVerdict>) -> Vec<Self> {
+        outages.iter().zip(verdicts).map(|(outage, verdict)| Self::new(outage, verdict)).collect()
+    }
+
+    fn new(o: &OutageMetrics, verdict: OutageVerdict) -> Self {
         Self {
             start_s: o.start_s,
             end_s: o.end_s,
+            verdict,
             asee_mean: values(&o.asee_mean),
             asee_mean_std_error: errors(&o.asee_mean),
             rmse_mean: values(&o.rmse_mean),

@@ -66,6 +66,39 @@ pub struct Verdict {
     pub tolerance: f64,
 }
 
+/// The verdict on the filter at the end of one outage.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct OutageVerdict {
+    /// In one word.
+    pub kind: VerdictKind,
+    /// The state that is farthest off there in the direction of the verdict.
+    pub worst_state: &'static str,
+    /// Root mean square there of error over standard deviation: 1 if the filter is right.
+    pub ratio: f64,
+    /// Its Monte-Carlo standard error.
+    pub ratio_std_error: f64,
+}
+
+impl OutageVerdict {
+    /// From the records of the runs, as [`Verdict::of`]: with the same limits, so that no outage is called wrong
+    /// where the filter is not. A run that diverged did so in every outage, since nobody knows when.
+    #[must_use]
+    pub fn of(runs: &[RunRecord], outages: usize, independent_windows: Option<f64>) -> Vec<Self> {
+        let kept: Vec<&RunRecord> = runs.iter().filter(|r| !r.diverged).collect();
+        let statistics = Evidence { runs: &kept, windows: independent_windows }.statistics(outages);
+        let independent_runs = independent_windows.unwrap_or(f64::INFINITY).min(kept.len() as f64);
+        let judge = Judge::new(independent_runs, LEVEL / (2.0 * statistics.len() as f64));
+        judge.outages(&statistics, outages, kept.len() < runs.len())
+    }
+
+    /// From the run whose squares are the expected ones, as [`Verdict::expected`].
+    #[must_use]
+    pub fn expected(record: &RunRecord) -> Vec<Self> {
+        let statistics = Evidence { runs: &[record], windows: None }.statistics(record.outages.len());
+        Judge { limits: [(1.0, 1.0); 2] }.outages(&statistics, record.outages.len(), false)
+    }
+}
+
 impl Verdict {
     /// From the records of the runs through a number of outages, those that diverged left out;
     /// `independent_windows` as in [`RunResult`](crate::simulation::RunResult).
@@ -205,6 +238,22 @@ impl Judge {
         let found: Vec<VerdictKind> = all.iter().map(|s| self.of(s)).collect();
         let faults = [VerdictKind::Overconfident, VerdictKind::Underconfident];
         faults.into_iter().find(|fault| found.contains(fault)).unwrap_or(VerdictKind::Ok)
+    }
+
+    /// The verdicts on outages, from the statistics at their ends.
+    fn outages(&self, all: &[Statistic], outages: usize, diverged: bool) -> Vec<OutageVerdict> {
+        let of = |outage: usize| {
+            let own: Vec<Statistic> = all.iter().filter(|s| s.outage == Some(outage)).copied().collect();
+            let kind = if diverged { VerdictKind::Diverged } else { self.kind(&own) };
+            let worst = self.worst(&own, kind);
+            OutageVerdict {
+                kind,
+                worst_state: REPORTED_NAMES[worst.state.unwrap_or(0)],
+                ratio: worst.ratio.value,
+                ratio_std_error: worst.ratio.std_error,
+            }
+        };
+        (0..outages).map(of).collect()
     }
 
     /// The state that is farthest off in the direction of the verdict; of those that alarm, if any does.

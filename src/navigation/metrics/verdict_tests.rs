@@ -67,6 +67,23 @@ fn too_little_confidence_is_told_and_too_much_comes_first() {
     assert_eq!((both.kind, both.worst_state), (VerdictKind::Overconfident, "yaw_deg"));
 }
 
+/// Each outage has its own: a filter that is right at the end of the one and wrong by 1.5 at that of the other.
+#[test]
+fn each_outage_has_a_verdict_of_its_own() {
+    let mut scale = [1.0; 9];
+    scale[6] = 1.5;
+    let mut all = runs(200, 20, 3, [1.0; 9]);
+    let wrong = runs(200, 20, 4, scale);
+    all.iter_mut().zip(wrong).for_each(|(run, wrong)| run.outages.extend(wrong.outages));
+    let found = OutageVerdict::of(&all, 2, None);
+    assert_eq!(found[0].kind, VerdictKind::Ok);
+    assert_eq!((found[1].kind, found[1].worst_state), (VerdictKind::Overconfident, "roll_deg"));
+    assert!((found[1].ratio - 1.5).abs() < 5.0 * 1.5 / 20.0, "{found:?}");
+    assert_eq!(Verdict::of(&all, 2, None).worst_outage, Some(1));
+    all[7].diverged = true;
+    assert!(OutageVerdict::of(&all, 2, None).iter().all(|v| v.kind == VerdictKind::Diverged));
+}
+
 /// What is significant and small is let pass: 5 % with 20 000 runs.
 #[test]
 fn a_small_difference_is_no_verdict() {

@@ -116,6 +116,9 @@ impl EpochSums {
             self.error_sq[i] += other.error_sq[i];
             self.error_4[i] += other.error_4[i];
         }
+        for (sum, more) in self.bias_see.iter_mut().zip(other.bias_see) {
+            *sum += more;
+        }
         for i in 0..2 {
             self.pos_error[i] += other.pos_error[i];
             self.att_error[i] += other.att_error[i];

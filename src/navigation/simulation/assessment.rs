@@ -2,11 +2,12 @@
 
 use super::batch::standard_deviations;
 use super::plan::{Event, Plan};
-use super::{COVERAGE_DOF, EpochSums, NEES_DOF, REPORTED};
+use super::{BIASES, COVERAGE_DOF, EpochSums, NEES_DOF, REPORTED};
 use crate::earth::ned_difference;
 use crate::ekf::Ekf;
 use crate::ekf::covariance::{PSI, R};
 use crate::frames::{NavState, RollPitchYaw};
+use crate::imu::Sensor;
 use crate::lanes::{LANES, Lanes};
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
@@ -64,6 +65,8 @@ pub(super) struct EpochLanes {
     t_s: f64,
     gnss: bool,
     pub(super) see: [Lanes; REPORTED],
+    /// The filter's own standard deviation of each sensor's bias (m/s², rad/s).
+    bias_see: [Lanes; BIASES],
     pub(super) error: [Lanes; REPORTED],
     att_error_deg: Lanes,
     pub(super) nees: Lanes,
@@ -77,10 +80,13 @@ impl EpochLanes {
         let states: [usize; COVERAGE_DOF] =
             std::array::from_fn(|i| if i < 3 { 3 * R + i } else { 3 * PSI + i - 3 });
         let coverage = ekf.p.normalised_square(states, states.map(|s| found.navigation[s]));
+        let [accel, gyro] = Sensor::ALL.map(|sensor| ekf.bias_sigma(sensor).0);
+        let bias_see = std::array::from_fn(|i| if i < 3 { accel[i] } else { gyro[i - 3] });
         Self {
             t_s: event.t_s,
             gnss: event.fix,
             see: found.see,
+            bias_see,
             error: found.error,
             att_error_deg: found.att_error_deg,
             nees: found.nees,
@@ -99,6 +105,9 @@ impl EpochLanes {
                 sums.error[i] += error;
                 sums.error_sq[i] += error * error;
                 sums.error_4[i] += error.powi(4);
+            }
+            for (sum, see) in sums.bias_see.iter_mut().zip(&self.bias_see) {
+                *sum += see[lane];
             }
             let position = DVec3::new(self.error[0][lane], self.error[1][lane], self.error[2][lane]).length();
             for (sum, value) in [

@@ -26,6 +26,13 @@ pub const REPORTED_NAMES: [&str; REPORTED] = [
     "yaw_deg",
 ];
 
+/// Biases of an IMU: three accelerometers, three gyroscopes.
+pub const BIASES: usize = 6;
+
+/// Column names of the biases, units included.
+pub const BIAS_NAMES: [&str; BIASES] =
+    ["b_ax_m_s2", "b_ay_m_s2", "b_az_m_s2", "b_gx_rad_s", "b_gy_rad_s", "b_gz_rad_s"];
+
 /// Degrees of freedom of the NEES: position, velocity, attitude.
 pub const NEES_DOF: usize = 9;
 /// Degrees of freedom of the coverage statistic: position, attitude
@@ -45,6 +52,8 @@ pub struct EpochSums {
     pub see: [f64; REPORTED],
     /// Σ SEE².
     pub see_sq: [f64; REPORTED],
+    /// Σ SEE of each sensor's bias (m/s², rad/s).
+    pub bias_see: [f64; BIASES],
     /// Σ error, estimate − truth (m, m/s, degrees).
     pub error: [f64; REPORTED],
     /// Σ error².

@@ -114,6 +114,11 @@ impl Source {
         Self { decay: phi, drive, initial: sigma * sigma, position: Some(component), ..NONE }
     }
 
+    /// What a unit of it is in the error of the last of so many samples.
+    pub(super) fn share(&self, samples: f64) -> f64 {
+        self.after + self.ramp * samples
+    }
+
     /// Over `samples` samples, exactly.
     pub(super) fn over(&self, samples: u32) -> StepOfSource {
         let n = f64::from(samples);

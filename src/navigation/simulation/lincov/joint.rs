@@ -2,6 +2,7 @@
 
 use super::input::{SIGNALS, Source, Sources, StepOfSource};
 use super::track::{NAV, Nav, Row, Step};
+use crate::simulation::BIASES;
 
 /// Covariance of z = \[x; b\] jointly with states t that no measurement corrects.
 ///
@@ -66,6 +67,18 @@ impl Joint {
             sources_b: b.states.clone(),
             sources_t: t.states.clone(),
         }
+    }
+
+    /// Variances of the biases of the signals: of the sum of the states b of each, drifts at their age.
+    pub(super) fn bias_variances(&self) -> [f64; BIASES] {
+        let factors: Vec<f64> = self.sources_b.iter().map(|s| s.share(self.elapsed)).collect();
+        let (nb, mut variances) = (factors.len(), [0.0; BIASES]);
+        for (i, a) in self.sources_b.iter().enumerate().filter(|(_, a)| a.signal < BIASES) {
+            let of_signal = self.sources_b.iter().enumerate().filter(|(_, b)| b.signal == a.signal);
+            variances[a.signal] +=
+                of_signal.map(|(j, _)| factors[i] * factors[j] * self.bb[i * nb + j]).sum::<f64>();
+        }
+        variances
     }
 
     /// Over one step: A P Aᵀ + Q in blocks.

@@ -8,7 +8,7 @@ use super::truth::TruthSide;
 use crate::ekf::Belief;
 use crate::ekf::covariance::PSI;
 use crate::noise::Model;
-use crate::simulation::REPORTED;
+use crate::simulation::{BIASES, REPORTED};
 use crate::units::DEG;
 use glam::DVec3;
 use nalgebra::SMatrix;
@@ -103,6 +103,8 @@ pub struct FilterPass<'a> {
     /// Of every scalar measurement in sequence, with the variance that the filter states of its innovation.
     gains: Vec<(Gain, f64)>,
     reports: Vec<[Nav; NAV]>,
+    /// Standard deviations that the filter states of the biases, at every report.
+    biases: Vec<[f64; BIASES]>,
     /// Of each outage.
     ends: Vec<[Nav; NAV]>,
 }
@@ -114,7 +116,7 @@ impl<'a> FilterPass<'a> {
         let (believed, none) = (Sources::of_belief(belief), Sources::default());
         let mut filter = Joint::new(track.start, &believed, &none);
         let mut inputs = StepInputs { b: &believed, t: &none, made: Vec::new() };
-        let (mut gains, mut reports, mut done) = (Vec::new(), Vec::new(), 0);
+        let (mut gains, mut reports, mut biases, mut done) = (Vec::new(), Vec::new(), Vec::new(), 0);
         let mut ends = vec![[[0.0; NAV]; NAV]; track.outages];
         for mark in &track.marks {
             for step in &track.steps[done..mark.steps] {
@@ -130,9 +132,16 @@ impl<'a> FilterPass<'a> {
             }
             if mark.report {
                 reports.push(filter.xx);
+                biases.push(filter.bias_variances().map(f64::sqrt));
             }
         }
-        Self { track, believed, gains, reports, ends }
+        Self { track, believed, gains, reports, biases, ends }
+    }
+
+    /// Standard deviations that the filter states of the sensors' biases (m/s², rad/s), at every report.
+    #[must_use]
+    pub fn bias_sigmas(&self) -> &[[f64; BIASES]] {
+        &self.biases
     }
 
     /// Standard deviations that the filter states of the reported states (m, m/s, degrees), just before the first fix

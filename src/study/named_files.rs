@@ -1,0 +1,48 @@
+//! Whether the files that a study names are there.
+
+use super::file::beside;
+use crate::formats::FileError;
+use crate::formats::toml_file::{Section, Source};
+use std::path::Path;
+
+/// Refuses a study that names a file which does not exist, by line and key. Other mistakes are for
+/// [`super::file::read`] to tell.
+///
+/// # Errors
+/// The first key that names such a file, or a study that cannot be read.
+pub fn exist(study: &Path) -> Result<(), FileError> {
+    let source = Source::read(study)?;
+    let table = source.parse()?;
+    let root = source.root(&table);
+    for axis in ["trajectory", "truth", "candidate", "scenario", "gnss"] {
+        for entry in root.sections(axis).unwrap_or_default() {
+            of_entry(study, &entry)?;
+        }
+    }
+    Ok(())
+}
+
+/// The files of an entry, and of the steps within it.
+fn of_entry(study: &Path, entry: &Section<'_>) -> Result<(), FileError> {
+    for key in ["file", "model"] {
+        let named = entry.str(key).ok().flatten();
+        named.map_or(Ok(()), |named| exists(study, entry, key, named))?;
+    }
+    for named in entry.texts("recordings") {
+        exists(study, entry, "recordings", named)?;
+    }
+    for step in ["calibrate", "synthesize"] {
+        let step = entry.section(step).ok().flatten();
+        step.map_or(Ok(()), |step| of_entry(study, &step))?;
+    }
+    Ok(())
+}
+
+fn exists(study: &Path, entry: &Section<'_>, key: &str, named: &str) -> Result<(), FileError> {
+    let path = beside(study, Path::new(named));
+    if path.exists() {
+        return Ok(());
+    }
+    let reason = format!("names {}, which does not exist", path.display());
+    Err(entry.refuse(key, reason, Some("paths are relative to the study file".to_owned())))
+}
