@@ -99,8 +99,7 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
             Ok(format!("a scenario of {} runs", scenario.run.runs))
         }
         FileKind::Study => {
-            nav_sim::study::named_files::exist(path)?;
-            let study = nav_sim::study::file::read(path)?.study;
+            let study = nav_sim::study::named_files::read(path)?.study;
             let (candidates, sets) = (study.candidates().len(), study.outage_sets().map_or(0, |s| s.len()));
             Ok(format!("a study of {candidates} candidates, {sets} outage sets, {} runs each", study.runs))
         }

@@ -164,10 +164,10 @@ fn is_bare_option(word: &OsStr) -> bool {
 }
 
 pub(crate) fn main() -> ExitCode {
-    let words = words(std::env::args_os());
-    let text: Vec<String> = words.iter().map(|w| w.to_string_lossy().into_owned()).collect();
-    let known = command().color(color_choice(&text)).version(&*version::version(&text).leak());
-    let matches = known.get_matches_from(&words);
+    let given = words(std::env::args_os());
+    let words: Vec<String> = given.iter().map(|w| w.to_string_lossy().into_owned()).collect();
+    let known = command().color(color_choice(&words)).version(&*version::version(&words).leak());
+    let matches = known.get_matches_from(&given);
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
     let printer = Printer::new(&cli.common);
     if !cli.command.heeds_signals() {

@@ -1,6 +1,6 @@
 //! Run directories read back, as far as comparisons need them.
 
-use super::run_tables::{PUT_BACK, parse_epochs, parse_runs};
+use super::run_tables::{REPEAT, parse_epochs, parse_runs};
 use super::{FileError, Place, atomic, hash, source};
 use crate::metrics::{EpochRow, Measured, PerState};
 use crate::report::Manifest;
@@ -49,9 +49,9 @@ pub fn read(directory: &Path) -> Result<RunDirectory, FileError> {
 fn as_written(directory: &Path, manifest: &Manifest, name: &str, text: &str) -> Result<(), FileError> {
     match manifest.outputs.get(name) {
         Some(blake3) if *blake3 != hash::of_bytes(text.as_bytes()) => {
-            let reason = "is not what its manifest.json says (BLAKE3): it is damaged, or was changed";
             let path = directory.join(name).display().to_string();
-            Err(FileError::contents(path, Place::Within, reason).advice(PUT_BACK))
+            let message = "is not what its manifest.json says (BLAKE3): it is damaged, or was changed";
+            Err(FileError::contents(path, Place::Within, message).advice(REPEAT))
         }
         _ => Ok(()),
     }

@@ -5,8 +5,8 @@ use crate::metrics::EpochRow;
 use crate::simulation::{OutageRecord, REPORTED, REPORTED_NAMES, RunRecord};
 use std::collections::HashMap;
 
-/// What to do about a table that is not the one that was written.
-pub(super) const PUT_BACK: &str = "repeat the run, or put back its files";
+/// What to do about a damaged table.
+pub(super) const REPEAT: &str = "repeat the run, or put back its files";
 
 /// Reads `epochs.csv` back, as far as comparisons need it.
 ///
@@ -98,32 +98,26 @@ struct Table<'a> {
 impl<'a> Table<'a> {
     fn read(path: &'a str, text: &str) -> Result<Self, FileError> {
         let syntax = |e: csv::Error| {
-            FileError::contents(path, e.position().map_or(1, csv::Position::line), e.to_string())
+            let line = e.position().map_or(1, csv::Position::line);
+            FileError::contents(path, line, e.to_string()).advice(REPEAT)
         };
         let mut reader = csv::ReaderBuilder::new().flexible(true).from_reader(text.as_bytes());
         let names: Vec<String> = reader.headers().map_err(syntax)?.iter().map(str::to_owned).collect();
         let mut index = HashMap::new();
         for (i, name) in names.iter().enumerate() {
             if index.insert(name.clone(), i).is_some() {
-                let twice = format!("two columns are named \"{name}\"");
-                return Err(FileError::contents(path, 1_u64, twice).advice(PUT_BACK));
+                return Err(columns_error(path, format!("two columns are named \"{name}\"")));
             }
         }
         let rows: Vec<csv::StringRecord> = reader.into_records().collect::<Result<_, _>>().map_err(syntax)?;
         match rows.iter().find(|row| row.len() != names.len()) {
-            Some(row) => {
-                let message = format!("{} values, but {} columns", row.len(), names.len());
-                Err(FileError::contents(path, line(row), message).advice(PUT_BACK))
-            }
+            Some(row) => Err(FileError::row_length(path, line(row), row.len(), names.len())),
             None => Ok(Self { path, index, names, rows }),
         }
     }
 
     fn column(&self, name: &str) -> Result<usize, FileError> {
-        let missing = || {
-            let kind = Kind::Columns(format!("no column is named \"{name}\"").into());
-            FileError::new(self.path, 1_u64, kind).advice(PUT_BACK)
-        };
+        let missing = || columns_error(self.path, format!("no column is named \"{name}\""));
         self.index.get(name).copied().ok_or_else(missing)
     }
 
@@ -160,9 +154,9 @@ impl<'a> Table<'a> {
     }
 
     fn no_number(&self, row: usize, column: usize) -> FileError {
-        let (row, name) = (&self.rows[row], &self.names[column]);
-        let value = format!("\"{}\"", &row[column]);
-        FileError::cell(self.path, line(row), name, value, "is not a number").advice(PUT_BACK)
+        let value = format!("\"{}\"", &self.rows[row][column]);
+        FileError::cell(self.path, line(&self.rows[row]), &self.names[column], value, "is not a number")
+            .advice(REPEAT)
     }
 
     fn numbers(&self, row: usize, columns: [usize; REPORTED]) -> Result<[f64; REPORTED], FileError> {
@@ -176,6 +170,10 @@ impl<'a> Table<'a> {
 
 fn line(row: &csv::StringRecord) -> u64 {
     row.position().map_or(0, csv::Position::line)
+}
+
+fn columns_error(path: &str, message: String) -> FileError {
+    FileError::new(path, 1_u64, Kind::Columns(message.into())).advice(REPEAT)
 }
 
 #[cfg(test)]

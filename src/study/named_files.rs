@@ -1,16 +1,22 @@
 //! Whether the files that a study names are there.
 
-use super::file::beside;
+use super::file::{self, StudyFile, beside};
 use crate::formats::FileError;
 use crate::formats::toml_file::{Section, Source};
 use std::path::Path;
 
-/// Refuses a study that names a file which does not exist, by line and key. Other mistakes are for
-/// [`super::file::read`] to tell.
+/// Reads a study as [`file::read`] does, and refuses one that names a file which does not exist, by line and key.
 ///
 /// # Errors
-/// The first key that names such a file, or a study that cannot be read.
-pub fn exist(study: &Path) -> Result<(), FileError> {
+/// Those of reading, or the first key that names such a file.
+pub fn read(study: &Path) -> Result<StudyFile, FileError> {
+    match file::read(study) {
+        Err(e) if !e.is_system() => Err(e),
+        read => exist(study).and(read), // a scenario that is not there is told by its key, too
+    }
+}
+
+fn exist(study: &Path) -> Result<(), FileError> {
     let source = Source::read(study)?;
     let table = source.parse()?;
     let root = source.root(&table);

@@ -3,7 +3,7 @@
 use super::description::{CalibrateStep, Study, TruthEntry};
 use super::directory;
 use super::failure::StudyError;
-use super::file::{self, StudyFile, beside};
+use super::file::{StudyFile, beside};
 use super::fingerprint::fingerprint;
 use super::grid::Grid;
 use super::inputs::{CALIBRATED, Inputs, ModelTexts, Work, unchanged};
@@ -70,8 +70,7 @@ pub fn plan(
     options: &PlanOptions<'_>,
     observer: &dyn Observer<Remark>,
 ) -> Result<PlanReport, StudyError> {
-    named_files::exist(study)?;
-    let file = file::read(study)?;
+    let file = named_files::read(study)?;
     let reader = Reader { study, observer };
     if options.writing == Writing::Write
         && let Some(plan) = directory::plan(directory)?

@@ -396,7 +396,7 @@ fn bad_studies_are_refused_by_line_before_anything_is_written() {
         ("runs = 77", "rns = 77", "study.toml, line 2: unknown key \"rns\"", "did you mean \"runs\"?"),
         ("[2, 4, 8, 16]", "[]", "the grid is empty: no outages[1]", "without values"),
         ("name = \"wrong\"", "name = \"imu\"", "two candidate entries are named \"imu\"", "\"name\""),
-        ("drive.toml", "gone.toml", "gone.toml: No such file", ""),
+        ("drive.toml", "gone.toml", "line 6: \"trajectory[1].file\" = \"gone.toml\"", "does not exist"),
         ("start_s = 30", "start_s = 70", "outage 70:72 does not lie on the data", "60 s"),
         ("\"epochs\"]", "\"epoch\"]", "\"metrics\"", "did you mean \"epochs\"?"),
     ];

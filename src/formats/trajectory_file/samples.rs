@@ -119,7 +119,7 @@ impl Rows {
         for (pair, line) in self.samples.windows(2).zip(&self.lines[1..]) {
             let (metres, seconds) = (place(&pair[1]).distance(place(&pair[0])), pair[1].t_s - pair[0].t_s);
             if seconds > 0.0 && metres > MAX_SPEED * seconds {
-                let seconds = (seconds * 1e6).round() * 1e-6;
+                let seconds = (seconds * 1e6).round() / 1e6;
                 let message = format!("position jumps by {metres:.0} m in {seconds} s");
                 return Err(Error::contents(self.path.as_str(), *line, message)
                     .advice("is a latitude swapped with a longitude, a sign lost, or a row damaged?"));
