@@ -69,8 +69,7 @@ fn a_fusion_directory_holds_what_the_interface_says() {
     assert!(fs::read_to_string(out.join("manifest.json")).unwrap().contains("\"kind\": \"fusion\""));
     // states of the turn-on bias are not the scale factors of `--filter 21`
     let states = |flags: &str| {
-        let ran =
-            done(place.path(), &format!("fuse rec/imu.csv rec/gnss.csv imu.toml {flags} -o other --force"));
+        let ran = done(place.path(), &format!("fuse rec/imu.csv rec/gnss.csv imu.toml {flags} -o other"));
         ran.stdout.lines().find_map(|l| Some(l.split_once(" s, ")?.1.split_once(';')?.0.to_owned())).unwrap()
     };
     assert_eq!(states(""), "15 states");
