@@ -329,10 +329,7 @@ mod tests {
         let default = "; in the filter of 15 states, which run makes of it by default: the NEES is 9.51, yaw_deg still overconfident by 1.19";
         assert!(verdict.contains(default) && verdict.ends_with("(--filter 15 tunes that one)"), "{verdict}");
         let verdict = result(FilterStates::Full, honesty(0.98, 8.9)).verdict();
-        assert!(
-            verdict.contains("the by default: it is honest") && !verdict.contains("--filter"),
-            "{verdict}"
-        );
+        assert!(verdict.contains("by default: it is honest") && !verdict.contains("--filter"), "{verdict}");
         let verdict = result(FilterStates::Reduced15, honesty(1.0, 8.8)).verdict();
         assert!(
             verdict.starts_with("the filter of 15 states is") && !verdict.contains("default"),
