@@ -14,7 +14,8 @@ use std::path::PathBuf;
 ///
 /// The table has the layout of the paper's Table I: rows scenario × outage, columns state × estimator, both
 /// from the names of the directories (II_sr-awv, or II/sr-awv). Each cell: the mean over the outage of
-/// (ASEE ratio − 1)·100, ± half its 95 % Monte-Carlo interval, and in brackets the mean of its absolute
+/// (ASEE ratio − 1)·100, ± half its 95 % interval (Monte Carlo, and what the calibrations leave open where both runs are
+/// of --method lincov or both, with models of calibrate), and in brackets the mean of its absolute
 /// value. ASEE is the averaged standard estimation error: what the filter believes, not how wrong it is. So the
 /// verdict on every filter comes first, and a second table has NEES, coverage and the ratios of the RMSE at the
 /// end of the outage. All states are in the JSON file; a page with figures is written beside it.
@@ -139,8 +140,9 @@ impl Compared {
         let mut lines = report::verdict_lines(&file.verdicts);
         if candidates.iter().any(|c| !c.outages.is_empty()) {
             lines.push(format!(
-                "ASEE against {}, mean over the outage, % (in parentheses: mean size of the deviations):",
-                file.reference
+                "ASEE against {}, mean over the outage, % (in parentheses: mean size of the deviations; {}):",
+                file.reference,
+                report::meaning_of_intervals(candidates)
             ));
             lines.push(table(&self.rows()));
             lines.push(

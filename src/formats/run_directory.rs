@@ -15,6 +15,8 @@ pub struct RunDirectory {
     pub manifest: Manifest,
     /// What was found.
     pub experiment: Measured,
+    /// 95 % interval of the ASEE at the end of each outage by what the calibration leaves open, where it is known.
+    pub asee_end_ci95: Vec<Option<PerState<(f64, f64)>>>,
 }
 
 /// Reads a run directory; what a killed command had begun to replace in it is finished first.
@@ -39,10 +41,26 @@ pub fn read(directory: &Path) -> Result<RunDirectory, FileError> {
         as_written(directory, &manifest, "runs.csv", &runs_text)?;
         runs
     };
+    let asee_end_ci95 = open_by_calibration(directory)?;
     let outages = manifest.configuration.outage.iter().flatten().map(|o| (o.start_s, o.end_s)).collect();
     let independent_windows = manifest.independent_windows;
     let experiment = Measured { epochs, runs, outages, independent_windows, is_expected };
-    Ok(RunDirectory { manifest, experiment })
+    Ok(RunDirectory { manifest, experiment, asee_end_ci95 })
+}
+
+/// What the calibration leaves open, outage by outage, from the summary.
+fn open_by_calibration(directory: &Path) -> Result<Vec<Option<PerState<(f64, f64)>>>, FileError> {
+    #[derive(serde::Deserialize)]
+    struct Open {
+        outages: Vec<OpenOutage>,
+    }
+    #[derive(serde::Deserialize)]
+    struct OpenOutage {
+        asee_end_ci95: Option<PerState<(f64, f64)>>,
+    }
+    let (path, summary) = text(directory, "summary.json")?;
+    let open: Open = serde_json::from_str(&summary).map_err(|e| not_json(&path, &e))?;
+    Ok(open.outages.into_iter().map(|outage| outage.asee_end_ci95).collect())
 }
 
 /// Refuses a file that is not the one the manifest tells of; what can be read of it was, for a more exact message.

@@ -83,7 +83,16 @@ fn compared(
         return Err(CompareError::Trajectory { run });
     }
     let outages = metrics::compare(&candidate.experiment, &reference.experiment, is_paired);
-    let outages = outages.map_err(|source| CompareError::Ratio { run: run.clone(), source })?;
+    let mut outages = outages.map_err(|source| CompareError::Ratio { run: run.clone(), source })?;
+    // the reference is itself, whatever its calibration leaves open
+    if !is_reference {
+        let open = candidate.asee_end_ci95.iter().zip(&reference.asee_end_ci95);
+        for (outage, ends) in outages.iter_mut().zip(open) {
+            if let (Some(own), Some(others)) = ends {
+                outage.widen(own, others);
+            }
+        }
+    }
     let label = Label::of(&run, candidate.manifest.model.estimator.as_deref());
     let verdict = candidate.experiment.verdict();
     Ok(CandidateResult { run, label, is_reference, verdict, outages })

@@ -98,8 +98,10 @@ pub struct Row {
     pub ratio_error_pct: f64,
     /// Mean of its absolute value.
     pub abs_ratio_error_pct: f64,
-    /// 95 % Monte-Carlo interval of the signed mean.
+    /// 95 % interval of the signed mean: Monte Carlo and, where it is known, what the calibrations leave open.
     pub ci95_pct: [f64; 2],
+    /// Half the interval that the calibrations alone leave (points); null where it is not known.
+    pub calibration_half_pct: Option<f64>,
     /// (ratio − 1)·100 of the RMSE at the outage's end.
     pub rmse_end_ratio_error_pct: f64,
     /// Its 95 % Monte-Carlo interval.
@@ -163,6 +165,7 @@ fn rows<'a>(run: &'a str, outage: usize, comparison: &'a OutageComparison) -> im
         ratio_error_pct: ratio.asee.pct,
         abs_ratio_error_pct: ratio.asee_abs_pct,
         ci95_pct: ratio.asee.ci95_pct,
+        calibration_half_pct: ratio.calibration_half_pct,
         rmse_end_ratio_error_pct: ratio.rmse_end.pct,
         rmse_end_ci95_pct: ratio.rmse_end.ci95_pct,
     })
@@ -180,6 +183,17 @@ pub fn verdict_lines(verdicts: &[VerdictRow]) -> Vec<String> {
         (!runs.is_empty()).then(|| format!("{}: {}", verdict_word(kind), runs.join(", ")))
     };
     kinds.into_iter().filter_map(line).collect()
+}
+
+/// What the ± of the table are.
+#[must_use]
+pub fn meaning_of_intervals(candidates: &[CandidateResult]) -> &'static str {
+    let mut states = candidates.iter().flat_map(|c| &c.outages).flat_map(|outage| &outage.states);
+    if states.any(|state| state.calibration_half_pct.is_some()) {
+        "± half the 95 % interval, Monte Carlo and calibrations together"
+    } else {
+        "± half the 95 % interval of Monte Carlo; what the calibrations leave open (run --method lincov) is not in it"
+    }
 }
 
 /// The paper's Table I: rows scenario × outage, columns state × estimator; each cell the signed mean ratio
@@ -333,7 +347,12 @@ mod tests {
 
     fn candidate(run: &str, pct: f64, is_reference: bool) -> CandidateResult {
         let error = RatioError { pct, ci95_pct: [pct - 0.5, pct + 0.5] };
-        let state = StateRatio { asee: error, asee_abs_pct: pct.abs() + 1.0, rmse_end: error };
+        let state = StateRatio {
+            asee: error,
+            asee_abs_pct: pct.abs() + 1.0,
+            calibration_half_pct: None,
+            rmse_end: error,
+        };
         let outage = OutageComparison { states: [state; 9], nees: [9.5, 9.0], coverage: [0.9, 0.95] };
         let outages = vec![outage.clone(), outage];
         let verdict = Verdict::of(&[], 2, None);

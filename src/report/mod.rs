@@ -36,7 +36,8 @@ pub use brief::brief;
 pub use choose::{ChoiceReport, RankedPlace};
 pub use columns::columns;
 pub use comparison::{
-    CandidateResult, ComparisonFile, Label, consistency_rows, table_rows, verdict_lines, with_times,
+    CandidateResult, ComparisonFile, Label, consistency_rows, meaning_of_intervals, table_rows,
+    verdict_lines, with_times,
 };
 pub use curves::{Band, CONFIDENCE, CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile};
 pub use describe::describe;

@@ -2,7 +2,7 @@
 //! believes, relative to the other ([Minaretzis et al.](crate::bibliography::Minaretzis24), Table I).
 
 use super::epoch::{EpochMetrics, epochs};
-use super::estimate::{Estimate, SampleSize};
+use super::estimate::{Estimate, PerState, SampleSize};
 use super::expected::Expected;
 use super::verdict::Verdict;
 use crate::simulation::{OutageRecord, REPORTED, RunRecord, RunResult};
@@ -125,7 +125,8 @@ pub enum ComparisonError {
 pub struct RatioError {
     /// (ratio − 1)·100.
     pub pct: f64,
-    /// Its Monte-Carlo interval.
+    /// Its interval: of Monte Carlo, and of what the calibrations leave open where that is known
+    /// ([`OutageComparison::widen`]).
     pub ci95_pct: [f64; 2],
 }
 
@@ -136,6 +137,8 @@ pub struct StateRatio {
     pub asee: RatioError,
     /// Mean over the outage's epochs of |ASEE ratio − 1|·100.
     pub asee_abs_pct: f64,
+    /// Half the 95 % interval of the ASEE ratio that the calibrations alone leave (points), where that is known.
+    pub calibration_half_pct: Option<f64>,
     /// (ratio − 1)·100 of the RMSE just before the first fix after the outage.
     pub rmse_end: RatioError,
 }
@@ -219,6 +222,7 @@ fn outage(
         StateRatio {
             asee: RatioError { pct, ci95_pct: [pct - asee.half_width_pct, pct + asee.half_width_pct] },
             asee_abs_pct: mean(ratios.iter().map(|e| e.abs())),
+            calibration_half_pct: None,
             rmse_end: pairing.mean_ratio(&square(&records.0), &square(&records.1)).root(),
         }
     };
@@ -226,6 +230,22 @@ fn outage(
         states: std::array::from_fn(state),
         nees: [mean(c.iter().map(|row| row.nees)), mean(r.iter().map(|row| row.nees))],
         coverage: [mean(c.iter().map(|row| row.coverage)), mean(r.iter().map(|row| row.coverage))],
+    }
+}
+
+impl OutageComparison {
+    /// Adds to the intervals of the ASEE ratios what the calibrations leave open: the 95 % intervals of the ASEE at the end
+    /// of the outage, of candidate and reference. The two are taken as independent: of models of the same recordings,
+    /// whose errors hang together, the interval is too wide rather than too narrow.
+    pub fn widen(&mut self, candidate: &PerState<(f64, f64)>, reference: &PerState<(f64, f64)>) {
+        let half_of_log = |(low, high): (f64, f64)| 0.5 * (high / low).ln();
+        for (state, (c, r)) in self.states.iter_mut().zip(candidate.0.iter().zip(&reference.0)) {
+            let RatioError { pct, ci95_pct: [low, high] } = state.asee;
+            let calibration = (100.0 + pct) * half_of_log(*c).hypot(half_of_log(*r));
+            let half = (0.5 * (high - low)).hypot(calibration);
+            state.asee.ci95_pct = [pct - half, pct + half];
+            state.calibration_half_pct = Some(calibration);
+        }
     }
 }
 

@@ -133,3 +133,21 @@ fn other_outages_or_epochs_are_refused_in_words() {
         "the reporting epochs differ: 4 from 0 to 3 s against 3 from 0 to 2 s of the reference"
     );
 }
+
+/// By hand: calibrations leave (e^−0.3, e^0.3) and (e^−0.4, e^0.4) of an ASEE, together e^±0.5, of a ratio of 1.05 and
+/// nothing by Monte Carlo 52.5 points.
+#[test]
+fn what_calibrations_leave_open_widens_the_interval() {
+    let runs = || vec![run(0, 1.0, 1.0), run(1, 1.0, 1.0)];
+    let (candidate, reference) = (experiment(&[1.05; 4], runs()), experiment(&[1.0; 4], runs()));
+    let mut outage = compare(&candidate, &reference, true).unwrap().remove(0);
+    let half = 0.5 * (outage.states[3].asee.ci95_pct[1] - outage.states[3].asee.ci95_pct[0]);
+    let open = |half: f64| PerState([((-half).exp(), half.exp()); REPORTED]);
+    outage.widen(&open(0.3), &open(0.4));
+    let state = outage.states[3];
+    assert!(half < 1e-9 && (state.calibration_half_pct.unwrap() - 52.5).abs() < 1e-9, "{state:?}");
+    assert!(
+        (state.asee.ci95_pct[0] + 47.5).abs() < 1e-9 && (state.asee.ci95_pct[1] - 57.5).abs() < 1e-9,
+        "{state:?}"
+    );
+}

@@ -4,7 +4,8 @@ use super::paper::PaperFigure;
 use super::{STATES, tone, window};
 use crate::metrics::{Measured, VerdictKind};
 use crate::report::comparison::{
-    CandidateResult, ComparisonFile, Row, in_order, table_rows, verdict_lines, with_times,
+    CandidateResult, ComparisonFile, Row, in_order, meaning_of_intervals, table_rows, verdict_lines,
+    with_times,
 };
 use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, Table, svg};
 use crate::simulation::{REPORTED, REPORTED_NAMES};
@@ -58,10 +59,10 @@ pub fn comparison_page(
     charts(candidates, curves, outages, states).iter().for_each(|chart| page.chart(chart, ""));
     if !outages.is_empty() {
         page.section("ASEE against the reference, mean over the outage (%)");
-        page.text(
-            "The layout of the paper's Table I: mean of (ASEE ratio − 1)·100 ± half its 95 % Monte-Carlo interval, in brackets \
-             the mean of its absolute value.",
-        );
+        page.text(&format!(
+            "The layout of the paper's Table I: mean of (ASEE ratio − 1)·100, in brackets the mean of its absolute value; {}.",
+            meaning_of_intervals(candidates)
+        ));
         page.table(&Table::of_rows(&with_times(table_rows(candidates, states), outages)));
         page.section("Consistency and errors");
         page.text("NEES (9 if right) and coverage over the outage; RMSE at its end against the reference, (ratio − 1)·100.");
