@@ -8,6 +8,9 @@ use crate::scenario::Method;
 use crate::simulation::{OutageRecord, RunRecord};
 use std::path::Path;
 
+/// Lower and upper end of each state's interval, where it is known.
+pub type OpenEnds = Option<PerState<(f64, f64)>>;
+
 /// A run directory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunDirectory {
@@ -16,7 +19,7 @@ pub struct RunDirectory {
     /// What was found.
     pub experiment: Measured,
     /// 95 % interval of the ASEE at the end of each outage by what the calibration leaves open, where it is known.
-    pub asee_end_ci95: Vec<Option<PerState<(f64, f64)>>>,
+    pub asee_end_ci95: Vec<OpenEnds>,
 }
 
 /// Reads a run directory; what a killed command had begun to replace in it is finished first.
@@ -49,7 +52,7 @@ pub fn read(directory: &Path) -> Result<RunDirectory, FileError> {
 }
 
 /// What the calibration leaves open, outage by outage, from the summary.
-fn open_by_calibration(directory: &Path) -> Result<Vec<Option<PerState<(f64, f64)>>>, FileError> {
+fn open_by_calibration(directory: &Path) -> Result<Vec<OpenEnds>, FileError> {
     #[derive(serde::Deserialize)]
     struct Open {
         outages: Vec<OpenOutage>,

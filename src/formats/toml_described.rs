@@ -49,10 +49,11 @@ impl<'a> Document<'a> {
         let (span, is_set) = span_of(self.table.get_ref(), &error.key);
         let value = if is_set { shown(&self.source.text()[span.clone()]) } else { error.value.clone() };
         let reason = format!("is refused: {}", error.requirement);
-        let (key, value) = (error.key.as_str().into(), value.into());
+        let (key, value, advice) = (error.key.as_str().into(), value.into(), error.advice);
         let error = self
             .source
             .error(self.source.line(span.start), Kind::Value { key, value, reason: reason.into() });
+        let error = error.advice_if(advice.map(str::to_owned));
         if is_set { error } else { error.advice("the file does not set it: this is the default") }
     }
 

@@ -18,13 +18,22 @@ pub struct SettingError {
     pub value: String,
     /// What would be accepted, in words.
     pub requirement: String,
+    /// What to do about it, where the requirement does not say that.
+    pub advice: Option<&'static str>,
 }
 
 impl SettingError {
     /// The refusal of a value.
     #[must_use]
     pub fn new(key: &str, value: impl ToString, requirement: impl Into<String>) -> Self {
-        Self { key: key.to_owned(), value: value.to_string(), requirement: requirement.into() }
+        Self { key: key.to_owned(), value: value.to_string(), requirement: requirement.into(), advice: None }
+    }
+
+    /// The same with what to do about it.
+    #[must_use]
+    pub const fn advising(mut self, advice: &'static str) -> Self {
+        self.advice = Some(advice);
+        self
     }
 
     /// The same with the section's name before the key.

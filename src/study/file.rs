@@ -113,9 +113,10 @@ fn receivers(study: &Study, path: &Path, document: &Document<'_>) -> Result<Vec<
 fn analysable(study: &Study, scenario: &Scenario) -> Result<(), SettingError> {
     match scenario.filter.nis_gate {
         Some(p) if !study.is_sampled() => {
-            let reason = "a gate makes the gains depend on what is drawn, and covariance analysis has no draws; \
-                          leave it out, or sample with method = \"monte-carlo\"";
-            Err(SettingError::new("filter.nis_gate", p, reason))
+            let reason =
+                "a gate makes the gains depend on what is drawn, and covariance analysis has no draws";
+            let refusal = SettingError::new("filter.nis_gate", p, reason);
+            Err(refusal.advising("leave it out, or sample with method = \"monte-carlo\""))
         }
         _ => Ok(()),
     }

@@ -68,9 +68,8 @@ impl Ekf {
         let [accel, gyro] = sources.biases;
         let blocks = if sensor == Sensor::Accel { 0..accel } else { accel..accel + gyro };
         let one = Vec3::splat(DVec3::ONE);
-        let groups = blocks.map(|g| (BIAS + g, one));
-        let terms: Vec<Term> = groups.chain(self.drift_term(sensor)).collect();
-        self.deviation(&terms)
+        let groups = blocks.map(move |g| (BIAS + g, one));
+        self.deviation(groups.chain(self.drift_term(sensor)))
     }
 
     /// The estimated scale-factor error of a sensor (1); none where the filter has no state for it.
@@ -83,7 +82,7 @@ impl Ekf {
     #[must_use]
     pub fn scale_sigma(&self, sensor: Sensor) -> Option<Vec3> {
         let block = self.unknown_block(sensor, UnknownKind::ScaleFactor)?;
-        Some(self.deviation(&[(block, Vec3::splat(DVec3::ONE))]))
+        Some(self.deviation(std::iter::once((block, Vec3::splat(DVec3::ONE)))))
     }
 
     /// The block of an unknown of a sensor, if there is one.
@@ -101,9 +100,9 @@ impl Ekf {
     }
 
     /// Standard deviations of the sum of the terms on the three axes.
-    fn deviation(&self, terms: &[Term]) -> Vec3 {
+    fn deviation(&self, terms: impl Iterator<Item = Term> + Clone) -> Vec3 {
         let variance = |axis: usize| {
-            let pairs = terms.iter().flat_map(|a| terms.iter().map(move |b| (a, b)));
+            let pairs = terms.clone().flat_map(|a| terms.clone().map(move |b| (a, b)));
             pairs.fold(Lanes::ZERO, |sum, ((a, of_a), (b, of_b))| {
                 sum + self.p.get::<Lanes>(3 * a + axis, 3 * b + axis) * of_a[axis] * of_b[axis]
             })
