@@ -59,7 +59,10 @@ fn the_spread_is_the_turn_on_bias_and_what_the_noise_adds() {
     let exact = bias * bias + noise.axes[3].mean_variance(SAMPLES);
     let mean = found.iter().map(|f| f.spread().powi(2)).sum::<f64>() / found.len() as f64;
     assert!((mean / exact - 1.0).abs() < 4.0 * 0.026, "{mean} for {exact}");
-    assert!(found.iter().all(|f| f.finding == TurnOnFinding::Seen && f.sigmas().is_some()));
+    // The F of a scatter 14 times that of the trends is below the bound (3.23 × 1.58) in 2.6 % of laboratories: 195 ± 2.3 are seen,
+    // four deviations are allowed for.
+    let seen = found.iter().filter(|f| f.finding == TurnOnFinding::Seen && f.sigmas().is_some()).count();
+    assert!(seen >= 185, "{seen}");
 }
 
 /// At most 1 % of 400 laboratories; twelve have a probability below 1e-3 even at exactly 1 %.
