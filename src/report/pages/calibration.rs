@@ -5,6 +5,7 @@ use crate::calibration::{
     Diagnosis, Goodness, Outcome, Practical, Settings, TurnOnSpread, Verdict, advice, shares, tau_s,
 };
 use crate::imu::Sensor;
+use crate::report::comparison::in_order;
 use crate::report::curves::{CurvesFile, FittedCurve};
 use crate::report::describe::meaning;
 use crate::report::fits::interval_of;
@@ -112,9 +113,9 @@ fn verdict(curves: &CurvesFile, outcomes: &[(usize, &Outcome)], diagnoses: &[Dia
     }
     let mut parts: Vec<String> =
         found.into_iter().map(|(told, groups)| format!("{}: {told}.", groups.join("; "))).collect();
-    let mut abnormal: Vec<&str> =
-        diagnoses.iter().filter(|d| d.verdict != Verdict::Normal).map(|d| d.name.as_str()).collect();
-    abnormal.dedup();
+    let named = diagnoses.iter().filter(|d| d.verdict != Verdict::Normal).map(|d| d.name.as_str());
+    // both sensors may name a recording
+    let abnormal = in_order(named);
     if !abnormal.is_empty() {
         tone = if tone == Tone::Good { Tone::Doubtful } else { tone };
         parts.push(format!("Not like the other recordings: {}.", abnormal.join(", ")));
