@@ -16,6 +16,7 @@ mod batch;
 mod batch_kills;
 mod batch_lincov;
 mod calibrate;
+mod calibrate_words;
 mod choose;
 mod command_line;
 mod compare;
