@@ -42,7 +42,7 @@ pub use nav_sim_navigation::{
 pub use nav_sim_signal::{bibliography, imu, names, noise, rng, units, wavelet};
 
 // Parameters for other programs.
-pub mod export;
+mod export;
 // Which model, on the user's own recordings.
 pub mod choose;
 // What follows a job.
@@ -57,3 +57,5 @@ pub mod study;
 pub mod jobs;
 // All that most programs need.
 pub mod prelude;
+// Arguments, words and exit codes.
+pub mod cli;

@@ -1,7 +1,5 @@
-//! `nav-sim`: parse, dispatch, map the outcome to an exit code.
-
-mod cli;
+//! `nav-sim`: the command line of the library.
 
 fn main() -> std::process::ExitCode {
-    cli::main()
+    nav_sim::cli::main()
 }

@@ -59,7 +59,7 @@ impl Candidate {
     /// What is compared where nothing else is said: the three averages of N2, and beside AWV what else is done in
     /// practice, from all states to the rule of thumb, and single recordings.
     #[must_use]
-    pub fn usual() -> Vec<Self> {
+    pub(crate) fn usual() -> Vec<Self> {
         let n2 = |estimator| Self::new(estimator, ModelSpec::n2());
         let two_slopes = |estimator| Self::new(estimator, white_and_walk());
         vec![
@@ -77,7 +77,7 @@ impl Candidate {
 
     /// All combinations; AVLR, which reads slopes, with the models that have nothing else, or WN+RW.
     #[must_use]
-    pub fn product(
+    pub(crate) fn product(
         estimators: &[Estimator],
         models: &[ModelChoice],
         filters: &[FilterStates],
@@ -106,7 +106,7 @@ impl Candidate {
 
     /// Whether another one has the same model, before any inflation.
     #[must_use]
-    pub fn is_calibrated_as(&self, other: &Self) -> bool {
+    pub(crate) fn is_calibrated_as(&self, other: &Self) -> bool {
         self.estimator == other.estimator && self.model == other.model
     }
 

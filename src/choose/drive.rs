@@ -181,7 +181,7 @@ impl Drive {
     ///
     /// # Errors
     /// When the noise of a recording cannot be described, or a model has no filter.
-    pub fn inflated(
+    pub(crate) fn inflated(
         &self,
         laboratory: &Laboratory,
         without: Option<usize>,

@@ -79,7 +79,7 @@ impl Laboratory {
     ///
     /// # Errors
     /// When a curve is too short for the model.
-    pub fn own_model(&self, k: usize) -> Result<&Model, CalibrationError> {
+    pub(crate) fn own_model(&self, k: usize) -> Result<&Model, CalibrationError> {
         if self.own[k].get().is_none() {
             let n2 = ModelChoice::Given(ModelSpec::n2());
             let (_, outcomes, settings) =

@@ -42,7 +42,7 @@ pub struct EndScore {
 impl Score {
     /// Of runs with so many outages.
     #[must_use]
-    pub fn of_runs(runs: &[RunRecord], outages: usize) -> Self {
+    pub(crate) fn of_runs(runs: &[RunRecord], outages: usize) -> Self {
         let kept: Vec<&[OutageRecord]> =
             runs.iter().filter(|r| !r.diverged).map(|r| r.outages.as_slice()).collect();
         let diverged = runs.len() - kept.len();

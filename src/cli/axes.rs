@@ -1,6 +1,6 @@
 //! Signals by name, as `--axes` takes them.
 
-use nav_sim::imu::Channel;
+use crate::imu::Channel;
 
 /// What one word of `--axes` stands for.
 #[derive(Debug, Clone)]

@@ -1,9 +1,9 @@
 //! `nav-sim bench`: what a run-epoch costs on this machine (hidden).
 
 use super::{Failure, Session};
-use nav_sim::ekf::FilterStates;
-use nav_sim::lanes::Level;
-use nav_sim::throughput::{Load, RUN_EPOCHS, model};
+use crate::ekf::FilterStates;
+use crate::lanes::Level;
+use crate::throughput::{Load, RUN_EPOCHS, model};
 use std::time::Instant;
 
 /// Print what a run-epoch costs on this machine, and which vector units are used

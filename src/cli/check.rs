@@ -1,9 +1,9 @@
 //! `nav-sim check`: whether a file is what it should be.
 
 use super::{Failure, Session, parse, read};
-use nav_sim::formats::file_kind::{self, FileKind};
-use nav_sim::formats::fusion_files::{read_gnss, read_imu, read_initial};
-use nav_sim::formats::{
+use crate::formats::file_kind::{self, FileKind};
+use crate::formats::fusion_files::{read_gnss, read_imu, read_initial};
+use crate::formats::{
     contamination_file, curve_file, datasheet, efficiency_file, model_file, parameters_file, scenario_file,
 };
 use std::path::{Path, PathBuf};
@@ -64,7 +64,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         }
     }
     if session.json() {
-        session.printer.result(nav_sim::report::json(&checked).trim_end());
+        session.printer.result(crate::report::json(&checked).trim_end());
     }
     let (Some(last), wrong, all) = (failures.pop(), failures.len() + 1, args.files.len()) else {
         return Ok(());
@@ -83,7 +83,7 @@ fn resolved(path: &Path) -> Result<Option<String>, Failure> {
     let text = match file_kind::of(path)? {
         FileKind::Scenario => toml::to_string(&scenario_file::read(path)?).map_err(Failure::could_not)?,
         FileKind::Study => {
-            toml::to_string(&nav_sim::study::file::read(path)?.study).map_err(Failure::could_not)?
+            toml::to_string(&crate::study::file::read(path)?.study).map_err(Failure::could_not)?
         }
         FileKind::Model => model_file::to_toml(&model_file::read(path)?),
         _ => return Ok(None),
@@ -99,7 +99,7 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
             Ok(format!("a scenario of {} runs", scenario.run.runs))
         }
         FileKind::Study => {
-            let study = nav_sim::study::named_files::read(path)?.study;
+            let study = crate::study::named_files::read(path)?.study;
             let (candidates, sets) = (study.candidates().len(), study.outage_sets().map_or(0, |s| s.len()));
             Ok(format!("a study of {candidates} candidates, {sets} outage sets, {} runs each", study.runs))
         }

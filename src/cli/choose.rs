@@ -5,17 +5,15 @@ use super::recordings::{RecordingArgs, Said};
 use super::run::{OutageArg, Words, parse_outage, scenario_with};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
-use nav_sim::calibration::{Bootstrap, Estimator, ModelChoice, Pool, Settings, Trim, diagnose};
-use nav_sim::choose::{Candidate, Inflation};
-use nav_sim::ekf::FilterStates;
-use nav_sim::formats::atomic::{AtomicDir, Found, claim_directory};
-use nav_sim::formats::model_file::CalibrationNote;
-use nav_sim::jobs::{
-    self, Calibration, CalibrationOptions, ChoiceDrive, Chosen, EstimatorChoice, ModelFiles,
-};
-use nav_sim::report::{ChoiceReport, choice_page};
-use nav_sim::scenario::Scenario;
-use nav_sim::sensors::outage::Outage;
+use crate::calibration::{Bootstrap, Estimator, ModelChoice, Pool, Settings, Trim, diagnose};
+use crate::choose::{Candidate, Inflation};
+use crate::ekf::FilterStates;
+use crate::formats::atomic::{AtomicDir, Found, claim_directory};
+use crate::formats::model_file::CalibrationNote;
+use crate::jobs::{self, Calibration, CalibrationOptions, ChoiceDrive, Chosen, EstimatorChoice, ModelFiles};
+use crate::report::{ChoiceReport, choice_page};
+use crate::scenario::Scenario;
+use crate::sensors::outage::Outage;
 use std::path::PathBuf;
 
 /// Choose the noise model for a filter by what it does on recordings that it has not seen

@@ -1,7 +1,7 @@
 //! Flags that mean the same in every command, and what follows from them.
 
 use super::{Failure, Printer, Progress};
-use nav_sim::formats::atomic::Existing;
+use crate::formats::atomic::Existing;
 use std::sync::OnceLock;
 
 /// Flags that mean the same in every command.

@@ -2,12 +2,12 @@
 
 use super::pictures::{PlotArgs, replaceable};
 use super::{Failure, Session};
-use nav_sim::formats::atomic;
-use nav_sim::jobs::{self, CompareError, Comparison};
-use nav_sim::metrics::ComparisonError;
-pub(super) use nav_sim::report::markdown_table as table;
-use nav_sim::report::{self, PaperFigure};
-use nav_sim::simulation::REPORTED_NAMES;
+use crate::formats::atomic;
+use crate::jobs::{self, CompareError, Comparison};
+use crate::metrics::ComparisonError;
+pub(super) use crate::report::markdown_table as table;
+use crate::report::{self, PaperFigure};
+use crate::simulation::REPORTED_NAMES;
 use std::path::PathBuf;
 
 /// Ratios of ASEE (and RMSE, NEES, coverage) between runs, per outage and state

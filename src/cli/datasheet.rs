@@ -1,11 +1,11 @@
 //! `nav-sim datasheet`: a datasheet's figures → a model file.
 
 use super::{Failure, Session, parse};
-use nav_sim::formats::datasheet::{self, CATALOGUE, Datasheet, Entry, Figure, Quantity};
-use nav_sim::formats::suggest::nearest;
-use nav_sim::formats::{atomic, model_file};
-use nav_sim::imu::Sensor;
-use nav_sim::report;
+use crate::formats::datasheet::{self, CATALOGUE, Datasheet, Entry, Figure, Quantity};
+use crate::formats::suggest::nearest;
+use crate::formats::{atomic, model_file};
+use crate::imu::Sensor;
+use crate::report;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 

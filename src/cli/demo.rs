@@ -3,9 +3,9 @@
 use super::batch::shell_words;
 use super::compare::Compared;
 use super::{Cli, Command, Failure, Session, read};
+use crate::formats::{FileError, atomic};
+use crate::report::{StudyCurves, TrajectorySeries, paper_figures, paper_page};
 use clap::Parser;
-use nav_sim::formats::{FileError, atomic};
-use nav_sim::report::{StudyCurves, TrajectorySeries, paper_figures, paper_page};
 use std::path::{Path, PathBuf};
 
 /// The case study of Minaretzis et al. 2024, Section V, on a virtual IMU: calibrate with three estimators

@@ -3,12 +3,12 @@
 use super::parse;
 use super::run::{OutageArg, parse_outage, windows_of};
 use super::{Failure, Session, read};
-use nav_sim::calibration::{Bootstrap, Estimator, Settings};
-use nav_sim::ekf::FilterStates;
-use nav_sim::formats::atomic::guard_inputs;
-use nav_sim::jobs::{self, DesignInputs, Destination, NavigateInputs, TrueImu};
-use nav_sim::report::{design_page, design_rows, design_verdict};
-use nav_sim::scenario::{Method, Scenario};
+use crate::calibration::{Bootstrap, Estimator, Settings};
+use crate::ekf::FilterStates;
+use crate::formats::atomic::guard_inputs;
+use crate::jobs::{self, DesignInputs, Destination, NavigateInputs, TrueImu};
+use crate::report::{design_page, design_rows, design_verdict};
+use crate::scenario::{Method, Scenario};
 use serde_json::json;
 use std::path::PathBuf;
 

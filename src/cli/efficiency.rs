@@ -1,10 +1,10 @@
 //! `nav-sim efficiency`: Monte-Carlo study of the estimators themselves.
 
 use super::{Failure, Session};
-use nav_sim::efficiency::StudyError;
-use nav_sim::formats::{atomic, efficiency_file};
-use nav_sim::jobs::{EstimatorStudy, EstimatorStudyError};
-use nav_sim::report::{self, EfficiencyFile};
+use crate::efficiency::StudyError;
+use crate::formats::{atomic, efficiency_file};
+use crate::jobs::{EstimatorStudy, EstimatorStudyError};
+use crate::report::{self, EfficiencyFile};
 use std::path::{Path, PathBuf};
 
 /// Study the estimators themselves by Monte Carlo

@@ -2,13 +2,13 @@
 
 use super::parse::one_of;
 use super::{Failure, Session};
-use nav_sim::calibration::duration;
-use nav_sim::export::{Export, ExportError, Settings, Target};
-use nav_sim::formats::atomic::{self, guard_inputs};
-use nav_sim::formats::model_file::{self, ModelFile};
-use nav_sim::imu::Sensor;
-use nav_sim::jobs::{self, Recorded};
-use nav_sim::noise::practical::{Horizon, Policy};
+use crate::calibration::duration;
+use crate::export::{Export, ExportError, Settings, Target};
+use crate::formats::atomic::{self, guard_inputs};
+use crate::formats::model_file::{self, ModelFile};
+use crate::imu::Sensor;
+use crate::jobs::{self, Recorded};
+use crate::noise::practical::{Horizon, Policy};
 use std::path::PathBuf;
 
 /// Write a noise model as the parameters of another program

@@ -1,7 +1,7 @@
 //! `nav-sim init`: a directory to start from.
 
 use super::{Failure, Session};
-use nav_sim::formats::atomic;
+use crate::formats::atomic;
 use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};

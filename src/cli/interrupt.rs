@@ -1,7 +1,7 @@
 //! Ctrl-C, SIGTERM and a closed terminal: what is being written is removed before the process ends.
 
 use super::{Failure, Printer};
-use nav_sim::formats::atomic;
+use crate::formats::atomic;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 use std::sync::atomic::{AtomicBool, Ordering};

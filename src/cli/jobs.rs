@@ -1,11 +1,11 @@
 //! Why a job has no result, in the words of the command line: which flag helps.
 
 use super::Failure;
-use nav_sim::calibration::{AverageError, CalibrationError, Cause, FitError, ModelSpec, SpecError};
-use nav_sim::choose::ChoiceError;
-use nav_sim::formats::suggest::nearest;
-use nav_sim::jobs::JobError;
-use nav_sim::simulation::ExperimentError;
+use crate::calibration::{AverageError, CalibrationError, Cause, FitError, ModelSpec, SpecError};
+use crate::choose::ChoiceError;
+use crate::formats::suggest::nearest;
+use crate::jobs::JobError;
+use crate::simulation::ExperimentError;
 
 impl From<JobError> for Failure {
     fn from(e: JobError) -> Self {

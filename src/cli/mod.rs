@@ -163,7 +163,9 @@ fn is_bare_option(word: &OsStr) -> bool {
     text.len() > 2 && text.starts_with("--") && !text.contains('=')
 }
 
-pub(crate) fn main() -> ExitCode {
+/// Parses the arguments of the process, does what they ask for and maps the outcome to an exit code.
+#[must_use]
+pub fn main() -> ExitCode {
     let given = words(std::env::args_os());
     let words: Vec<String> = given.iter().map(|w| w.to_string_lossy().into_owned()).collect();
     let known = command().color(color_choice(&words)).version(&*version::version(&words).leak());

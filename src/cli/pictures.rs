@@ -1,8 +1,8 @@
 //! Pictures and pages that commands write beside their results.
 
 use super::{Failure, Session};
-use nav_sim::formats::atomic;
-use nav_sim::report::page;
+use crate::formats::atomic;
+use crate::report::page;
 use std::path::{Path, PathBuf};
 
 /// The main figure as a file.

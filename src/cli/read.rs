@@ -2,17 +2,17 @@
 
 use super::exit::option_for;
 use super::{Failure, Session};
-use nav_sim::formats::input;
-use nav_sim::formats::model_file::{self, ModelFile};
-use nav_sim::formats::recordings::{self, ReadOptions};
-use nav_sim::formats::trajectory_file;
-use nav_sim::formats::{FileError, Setting};
-use nav_sim::imu::Recording;
-use nav_sim::noise::{Model, continuous};
-use nav_sim::report::Input;
-use nav_sim::trajectory::Trajectory;
-use nav_sim::trajectory::plausibility::{Excess, Limits, examine};
-use nav_sim::trajectory::reference::Reference;
+use crate::formats::input;
+use crate::formats::model_file::{self, ModelFile};
+use crate::formats::recordings::{self, ReadOptions};
+use crate::formats::trajectory_file;
+use crate::formats::{FileError, Setting};
+use crate::imu::Recording;
+use crate::noise::{Model, continuous};
+use crate::report::Input;
+use crate::trajectory::Trajectory;
+use crate::trajectory::plausibility::{Excess, Limits, examine};
+use crate::trajectory::reference::Reference;
 use std::path::{Path, PathBuf};
 
 /// For commands without the option `--origin`: `trajectory convert` has it.

@@ -3,10 +3,10 @@
 use super::axes::ChannelSet;
 use super::parse::words;
 use super::{Progress, Session};
-use nav_sim::calibration::{Change, WarmUp, duration, tau_s};
-use nav_sim::formats::recordings::{Gaps, ReadOptions, Report};
-use nav_sim::imu::Channel;
-use nav_sim::jobs::{BeginsOtherwise, Remark, Remarks};
+use crate::calibration::{Change, WarmUp, duration, tau_s};
+use crate::formats::recordings::{Gaps, ReadOptions, Report};
+use crate::imu::Channel;
+use crate::jobs::{BeginsOtherwise, Remark, Remarks};
 
 /// How recordings are read.
 #[derive(clap::Args, Debug)]

@@ -1,18 +1,18 @@
 //! `nav-sim require`: which IMU a limit needs, and what a given one makes of it.
 
 use super::{Failure, Session, parse, pictures, read, turn_on};
-use nav_sim::formats::atomic::{AtomicFile, guard_inputs};
-use nav_sim::formats::datasheet::{self, CATALOGUE, Datasheet};
-use nav_sim::formats::file_kind::{self, FileKind};
-use nav_sim::formats::model_file::{self, ModelFile};
-use nav_sim::formats::scenario_file;
-use nav_sim::jobs::{Ask, CatalogueUnit, Misplaced, Requirements};
-use nav_sim::noise::Model;
-use nav_sim::report::require as words;
-use nav_sim::report::require::{Question, RankedUnit};
-use nav_sim::report::{catalogue_page, model_page, needed_page};
-use nav_sim::require::{ImuParameters, Limit, Quantity, RequireError};
-use nav_sim::sensors::outage::NotAnOutage;
+use crate::formats::atomic::{AtomicFile, guard_inputs};
+use crate::formats::datasheet::{self, CATALOGUE, Datasheet};
+use crate::formats::file_kind::{self, FileKind};
+use crate::formats::model_file::{self, ModelFile};
+use crate::formats::scenario_file;
+use crate::jobs::{Ask, CatalogueUnit, Misplaced, Requirements};
+use crate::noise::Model;
+use crate::report::require as words;
+use crate::report::require::{Question, RankedUnit};
+use crate::report::{catalogue_page, model_page, needed_page};
+use crate::require::{ImuParameters, Limit, Quantity, RequireError};
+use crate::sensors::outage::NotAnOutage;
 use std::path::{Path, PathBuf};
 
 /// Say which IMU keeps the errors at the end of an outage within limits, or what MODEL makes of them

@@ -1,9 +1,9 @@
 //! `nav-sim schema`: JSON schemas of the files people write.
 
 use super::{Failure, Session};
-use nav_sim::formats::{efficiency_file, parameters_file};
-use nav_sim::scenario::Scenario;
-use nav_sim::study::Study;
+use crate::formats::{efficiency_file, parameters_file};
+use crate::scenario::Scenario;
+use crate::study::Study;
 
 /// Print the JSON schema of a file that people write, for editors and checkers
 #[derive(clap::Args, Debug)]
@@ -37,7 +37,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         Kind::Scenario => schemars::schema_for!(Scenario).to_value(),
         Kind::Study => schemars::schema_for!(Study).to_value(),
         Kind::Efficiency => efficiency_file::schema(),
-        Kind::Model => nav_sim::formats::model_file::schema(),
+        Kind::Model => crate::formats::model_file::schema(),
         Kind::Parameters => parameters_file::schema(),
     };
     let text = serde_json::to_string_pretty(&schema).map_err(Failure::could_not)?;

@@ -3,14 +3,14 @@
 use super::parse::one_of;
 use super::run::{OutageArg, parse_outage, scenario_with};
 use super::{Failure, Session, read, turn_on};
-use nav_sim::ekf::FilterStates;
-use nav_sim::formats::atomic::{AtomicFile, guard_inputs};
-use nav_sim::formats::model_file::{self, ModelFile};
-use nav_sim::noise::Model;
-use nav_sim::report::{FactorEntry, Input, TuneResult, tune_page};
-use nav_sim::scenario::Scenario;
-use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::lincov::{Aim, Factor, Honesty, Per, Task, Track, drive, scaled};
+use crate::ekf::FilterStates;
+use crate::formats::atomic::{AtomicFile, guard_inputs};
+use crate::formats::model_file::{self, ModelFile};
+use crate::noise::Model;
+use crate::report::{FactorEntry, Input, TuneResult, tune_page};
+use crate::scenario::Scenario;
+use crate::sensors::outage::Outage;
+use crate::simulation::lincov::{Aim, Factor, Honesty, Per, Task, Track, drive, scaled};
 use std::path::{Path, PathBuf};
 
 /// Find the smallest factors on MODEL that make its filter honest for another truth

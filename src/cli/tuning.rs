@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::parse::words;
-use nav_sim::wavelet::{Convention, Tuning};
+use crate::wavelet::{Convention, Tuning};
 
 /// How the robust wavelet variance is tuned.
 #[derive(clap::Args, Debug)]

@@ -1,11 +1,11 @@
 //! The constant bias of a switching-on that a model file states, used where flags and scenario are silent.
 
 use super::Session;
-use nav_sim::ekf::InitialSettings;
-use nav_sim::formats::model_file::ModelFile;
-use nav_sim::imu::Sensor;
-use nav_sim::report::readable;
-use nav_sim::sensors::defects::ImuSettings;
+use crate::ekf::InitialSettings;
+use crate::formats::model_file::ModelFile;
+use crate::imu::Sensor;
+use crate::report::readable;
+use crate::sensors::defects::ImuSettings;
 use std::path::Path;
 
 /// Lets the filter expect the turn-on bias of its model; `--turn-on-bias` and `[initial]` win.

@@ -5,9 +5,9 @@ use super::pictures::{self, PlotArgs};
 use super::recordings::{RecordingArgs, Said};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
-use nav_sim::formats::atomic;
-use nav_sim::jobs::{self, Intervals, WaveletOptions};
-use nav_sim::report::{self, SignalCurves, SignalsFile};
+use crate::formats::atomic;
+use crate::jobs::{self, Intervals, WaveletOptions};
+use crate::report::{self, SignalCurves, SignalsFile};
 use std::path::PathBuf;
 
 /// Wavelet variance of static recordings: classical, robust, Allan, with confidence intervals

@@ -49,7 +49,7 @@ fn sensor(s: &SensorExport) -> Value {
 
 /// The parameters of an axis, each in SI and in the unit of data sheets.
 #[must_use]
-pub fn parameters(p: &AxisParameters, sensor: Sensor) -> Value {
+pub(crate) fn parameters(p: &AxisParameters, sensor: Sensor) -> Value {
     let minimum = p.minimum.map(|m| {
         let b = m.bias_instability();
         json!({ "tau_s": m.tau_s, "allan_deviation": m.deviation, "bias_instability": bias(b, sensor) })

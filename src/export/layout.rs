@@ -38,7 +38,7 @@ impl Export {
 
 /// A number that reads back to the same, with a point: YAML 1.1 takes `2e-5` for a text.
 #[must_use]
-pub fn number(value: f64) -> String {
+pub(crate) fn number(value: f64) -> String {
     if value == 0.0 {
         return "0.0".to_owned();
     }

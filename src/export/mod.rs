@@ -13,11 +13,9 @@ mod target;
 mod vision;
 mod words;
 
-pub use json::parameters as parameters_json;
-pub use layout::number;
-pub use sheet::Quantity;
-pub use target::Target;
-pub use words::closure_in_words;
+pub(crate) use json::parameters as parameters_json;
+pub(crate) use sheet::Quantity;
+pub(crate) use target::Target;
 
 use crate::imu::{Channel, Sensor};
 use crate::noise::practical::{

@@ -5,7 +5,7 @@ use crate::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
 
 /// A quantity of a sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
+pub(crate) enum Quantity {
     /// White noise density N: velocity or angle random walk.
     Density,
     /// Random-walk density K: acceleration or rate random walk.
@@ -17,7 +17,7 @@ pub enum Quantity {
 impl Quantity {
     /// Its SI unit.
     #[must_use]
-    pub const fn si_unit(self, sensor: Sensor) -> &'static str {
+    pub(crate) const fn si_unit(self, sensor: Sensor) -> &'static str {
         match (self, sensor) {
             (Self::Density, Sensor::Accel) => "m/s^2/sqrt(Hz)",
             (Self::Density, Sensor::Gyro) => "rad/s/sqrt(Hz)",
@@ -29,7 +29,7 @@ impl Quantity {
 
     /// Its unit on data sheets, and how many of them one SI unit is.
     #[must_use]
-    pub const fn sheet(self, sensor: Sensor) -> (&'static str, f64) {
+    pub(crate) const fn sheet(self, sensor: Sensor) -> (&'static str, f64) {
         const ROOT_HOUR: f64 = 60.0;
         match (self, sensor) {
             (Self::Density, Sensor::Accel) => ("m/s/sqrt(h)", ROOT_HOUR),

@@ -1,3 +1,4 @@
+use super::layout::number;
 use super::*;
 use crate::noise::{Ar1, GaussMarkov, Process, RandomWalk, White};
 use crate::units::{DEG, STANDARD_GRAVITY};

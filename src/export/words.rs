@@ -123,7 +123,7 @@ fn axes_differ(s: &SensorExport) -> Option<String> {
 
 /// "0.97 (at 3.2 s) to 1.04 (at 80 s) times the model's Allan deviation".
 #[must_use]
-pub fn closure_in_words(closure: Closure) -> String {
+pub(crate) fn closure_in_words(closure: Closure) -> String {
     let Closure { lowest, highest } = closure;
     format!(
         "{:.2} (at {}) to {:.2} (at {}) times the Allan deviation of the model",

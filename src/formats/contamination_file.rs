@@ -57,7 +57,7 @@ pub fn find(name_or_path: &str, rate_hz: f64) -> Result<Contamination, FileError
 
 /// The name of a preset that was meant by what is neither a preset nor a file.
 #[must_use]
-pub fn meant(name: &str) -> Option<&'static str> {
+pub(crate) fn meant(name: &str) -> Option<&'static str> {
     nearest(name, names())
 }
 

@@ -11,7 +11,7 @@ use std::path::Path;
 
 /// A curve and what it is of.
 #[derive(Debug, Clone, PartialEq)]
-pub struct NamedCurve {
+pub(crate) struct NamedCurve {
     /// The sensor, if the file says it.
     pub sensor: Option<Sensor>,
     /// The axis, if it is of one.
@@ -37,7 +37,7 @@ fn refused(path: &str, place: &Place, column: &str, value: impl Display, expecte
 ///
 /// # Errors
 /// When it cannot be read, or is no curve file.
-pub fn read(path: &Path) -> Result<Vec<NamedCurve>, FileError> {
+pub(crate) fn read(path: &Path) -> Result<Vec<NamedCurve>, FileError> {
     let text = source::text(path).map_err(|e| FileError::io(path, e));
     let curves = text.and_then(|text| parse(&path.display().to_string(), &text));
     curves.map_err(|e| match &e.kind {

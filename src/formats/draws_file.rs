@@ -135,7 +135,7 @@ impl Draws {
     ///
     /// # Errors
     /// As [`continuous::at_rate`].
-    pub fn at_rate(&self, rate_hz: f64) -> Result<Self, RateError> {
+    pub(crate) fn at_rate(&self, rate_hz: f64) -> Result<Self, RateError> {
         let models = self.models.iter().map(|model| continuous::at_rate(model, rate_hz));
         Ok(Self { models: models.collect::<Result<_, _>>()?, stretch: self.stretch })
     }

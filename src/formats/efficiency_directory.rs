@@ -70,7 +70,7 @@ impl StudyDirectory {
     ///
     /// # Errors
     /// When the disk is full.
-    pub fn append(&mut self, sets: Vec<Vec<Estimate>>) -> Result<()> {
+    pub(crate) fn append(&mut self, sets: Vec<Vec<Estimate>>) -> Result<()> {
         let mut rows = csv::Writer::from_writer(Vec::new());
         for set in sets {
             let number = (self.done.len() + 1).to_string();

@@ -161,14 +161,14 @@ impl FileError {
 
     /// With advice, beside what it has.
     #[must_use]
-    pub fn advice(mut self, advice: impl Into<Cow<'static, str>>) -> Self {
+    pub(crate) fn advice(mut self, advice: impl Into<Cow<'static, str>>) -> Self {
         self.remedies.push(Remedy::Advice(advice.into()));
         self
     }
 
     /// With advice, if there is any.
     #[must_use]
-    pub fn advice_if(self, advice: Option<String>) -> Self {
+    pub(crate) fn advice_if(self, advice: Option<String>) -> Self {
         match advice {
             Some(advice) => self.advice(advice),
             None => self,
@@ -177,21 +177,21 @@ impl FileError {
 
     /// With other advice than it has.
     #[must_use]
-    pub fn advice_instead(mut self, advice: &'static str) -> Self {
+    pub(crate) fn advice_instead(mut self, advice: &'static str) -> Self {
         self.remedies.clear();
         self.advice(advice)
     }
 
     /// With a setting that helps, beside what it has.
     #[must_use]
-    pub fn setting(mut self, setting: Setting) -> Self {
+    pub(crate) fn setting(mut self, setting: Setting) -> Self {
         self.remedies.push(Remedy::Setting(setting));
         self
     }
 
     /// Whether the system, not the contents or the request, is at fault.
     #[must_use]
-    pub fn is_system(&self) -> bool {
+    pub(crate) fn is_system(&self) -> bool {
         matches!(&self.kind, Kind::System(source) if !is_damage(source.kind()))
     }
 

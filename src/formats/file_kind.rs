@@ -8,7 +8,7 @@ use std::path::Path;
 
 /// The kinds of files that commands read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum FileKind {
+pub(crate) enum FileKind {
     /// A scenario of `run`.
     Scenario,
     /// A study of `batch`.
@@ -44,7 +44,7 @@ const HEAD: u64 = 1 << 20;
 ///
 /// # Errors
 /// When the system refuses.
-pub fn of(path: &Path) -> Result<FileKind, FileError> {
+pub(crate) fn of(path: &Path) -> Result<FileKind, FileError> {
     let name = path.to_string_lossy().to_lowercase();
     if path.is_dir() || name.ends_with(".npy") {
         return Ok(FileKind::Recording);

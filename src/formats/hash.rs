@@ -22,7 +22,7 @@ pub(crate) fn remember(path: &Path, contents: &[u8]) {
 ///
 /// # Errors
 /// When the system refuses.
-pub fn as_read(path: &Path) -> io::Result<String> {
+pub(crate) fn as_read(path: &Path) -> io::Result<String> {
     let known = READ.lock().ok().and_then(|read| read.get(path).cloned());
     known.map_or_else(|| of_file(path), Ok)
 }
@@ -31,7 +31,7 @@ pub fn as_read(path: &Path) -> io::Result<String> {
 ///
 /// # Errors
 /// When the system refuses.
-pub fn of_file(path: &Path) -> io::Result<String> {
+pub(crate) fn of_file(path: &Path) -> io::Result<String> {
     let mut hasher = blake3::Hasher::new();
     hasher.update_reader(source::open(path)?)?;
     Ok(hasher.finalize().to_hex().to_string())
@@ -39,13 +39,13 @@ pub fn of_file(path: &Path) -> io::Result<String> {
 
 /// BLAKE3 of bytes, in hexadecimal.
 #[must_use]
-pub fn of_bytes(bytes: &[u8]) -> String {
+pub(crate) fn of_bytes(bytes: &[u8]) -> String {
     blake3::hash(bytes).to_hex().to_string()
 }
 
 /// BLAKE3 of samples, in hexadecimal.
 #[must_use]
-pub fn samples(samples: &[f64]) -> String {
+pub(crate) fn samples(samples: &[f64]) -> String {
     let mut hasher = blake3::Hasher::new();
     for block in samples.chunks(4096) {
         let bytes: Vec<u8> = block.iter().flat_map(|x| x.to_le_bytes()).collect();

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// When the system refuses.
-pub fn input(role: &str, path: &Path) -> Result<Input, FileError> {
+pub(crate) fn input(role: &str, path: &Path) -> Result<Input, FileError> {
     let blake3 = hash::as_read(path).map_err(|e| FileError::io(path, e))?;
     Ok(Input { role: role.to_owned(), path: path.display().to_string(), blake3 })
 }
@@ -17,7 +17,7 @@ pub fn input(role: &str, path: &Path) -> Result<Input, FileError> {
 ///
 /// # Errors
 /// When the system refuses.
-pub fn fingerprint(path: &Path) -> Result<String, FileError> {
+pub(crate) fn fingerprint(path: &Path) -> Result<String, FileError> {
     hash::of_file(path).map_err(|e| FileError::io(path, e))
 }
 
@@ -25,7 +25,7 @@ pub fn fingerprint(path: &Path) -> Result<String, FileError> {
 ///
 /// # Errors
 /// When a directory cannot be read.
-pub fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, FileError> {
+pub(crate) fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, FileError> {
     let mut files = Vec::new();
     for path in paths {
         if !path.is_dir() {

@@ -13,7 +13,7 @@ const MAGIC: &[u8] = b"\x93NUMPY";
 
 /// An array of real numbers: its header read, its elements to come.
 #[derive(Debug)]
-pub struct Array<R> {
+pub(crate) struct Array<R> {
     path: String,
     header: Header,
     elements: R,
@@ -23,7 +23,7 @@ pub struct Array<R> {
 ///
 /// # Errors
 /// When it cannot be read, is no array of real numbers of one or two dimensions, or is cut off.
-pub fn open(path: &Path) -> Result<Array<BufReader<File>>, FileError> {
+pub(crate) fn open(path: &Path) -> Result<Array<BufReader<File>>, FileError> {
     let name = path.display().to_string();
     let io = |source| FileError::io(path, source);
     let file = File::open(path).map_err(io)?;
@@ -141,7 +141,7 @@ fn element_type(code: &str) -> Option<(bool, u8, usize)> {
 impl<R: Read> Array<R> {
     /// Its columns.
     #[must_use]
-    pub const fn columns(&self) -> usize {
+    pub(crate) const fn columns(&self) -> usize {
         self.header.columns
     }
 
@@ -149,7 +149,7 @@ impl<R: Read> Array<R> {
     ///
     /// # Errors
     /// When it cannot be read, and what `show` returns.
-    pub fn each(
+    pub(crate) fn each(
         mut self,
         mut show: impl FnMut(usize, usize, f64) -> Result<(), FileError>,
     ) -> Result<(), FileError> {
@@ -171,7 +171,7 @@ impl<R: Read> Array<R> {
 ///
 /// # Errors
 /// When the system refuses.
-pub fn write_header(to: &mut impl Write, rows: usize, columns: usize) -> io::Result<()> {
+pub(crate) fn write_header(to: &mut impl Write, rows: usize, columns: usize) -> io::Result<()> {
     let mut text = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({rows}, {columns}), }}");
     // Elements begin at a multiple of 64 bytes; the header ends in a newline.
     while !(10 + text.len() + 1).is_multiple_of(64) {

@@ -25,7 +25,7 @@ use toml::de::DeTable;
 ///
 /// # Errors
 /// When it cannot be read, names what the model does not have, or bounds between which nothing lies.
-pub fn read(path: &Path, spec: &ModelSpec) -> Result<Vec<ParameterLimit>, FileError> {
+pub(crate) fn read(path: &Path, spec: &ModelSpec) -> Result<Vec<ParameterLimit>, FileError> {
     limits(&Source::read(path)?, spec)
 }
 
@@ -33,7 +33,7 @@ pub fn read(path: &Path, spec: &ModelSpec) -> Result<Vec<ParameterLimit>, FileEr
 ///
 /// # Errors
 /// As [`read`], for a model of the processes named.
-pub fn check(path: &Path) -> Result<(), FileError> {
+pub(crate) fn check(path: &Path) -> Result<(), FileError> {
     let source = Source::read(path)?;
     let table = source.parse()?;
     let mut names = Vec::new();
@@ -151,7 +151,7 @@ fn bounds(
 
 /// The JSON schema of such a file.
 #[must_use]
-pub fn schema() -> serde_json::Value {
+pub(crate) fn schema() -> serde_json::Value {
     use serde_json::json;
     let number = json!({ "type": "number" });
     let range = json!({

@@ -9,11 +9,11 @@ use crate::simulation::{OutageRecord, RunRecord};
 use std::path::Path;
 
 /// Lower and upper end of each state's interval, where it is known.
-pub type OpenEnds = Option<PerState<(f64, f64)>>;
+pub(crate) type OpenEnds = Option<PerState<(f64, f64)>>;
 
 /// A run directory.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RunDirectory {
+pub(crate) struct RunDirectory {
     /// Where it came from.
     pub manifest: Manifest,
     /// What was found.
@@ -26,7 +26,7 @@ pub struct RunDirectory {
 ///
 /// # Errors
 /// The file, and what is wrong with it.
-pub fn read(directory: &Path) -> Result<RunDirectory, FileError> {
+pub(crate) fn read(directory: &Path) -> Result<RunDirectory, FileError> {
     atomic::recover(directory);
     let manifest = manifest(directory)?;
     let (path, epochs_text) = text(directory, "epochs.csv")?;

@@ -180,7 +180,10 @@ fn columns_error(path: &str, message: String) -> FileError {
 mod tests {
     use super::*;
     use crate::metrics::epochs;
-    use crate::report::{epochs_csv, runs_csv, sample};
+    use crate::report::{
+        sample,
+        tables::{epochs_csv, runs_csv},
+    };
     use crate::simulation::EpochSums;
 
     #[test]

@@ -11,7 +11,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// File, line, key and value of what is refused; a mistyped key with the nearest legal one.
-pub fn read(path: &Path) -> Result<Scenario, FileError> {
+pub(crate) fn read(path: &Path) -> Result<Scenario, FileError> {
     read_for(path, |_| Ok(()))
 }
 

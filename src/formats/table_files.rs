@@ -18,7 +18,7 @@ use std::sync::Arc;
 
 /// Formats of a table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TableFormat {
+pub(crate) enum TableFormat {
     /// Text with a header.
     Csv,
     /// A list of objects.
@@ -29,7 +29,7 @@ pub enum TableFormat {
 
 impl TableFormat {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Csv, Self::Json, Self::Parquet];
+    pub(crate) const ALL: [Self; 3] = [Self::Csv, Self::Json, Self::Parquet];
 
     const fn ending(self) -> &'static str {
         match self {
@@ -41,7 +41,7 @@ impl TableFormat {
 }
 
 /// A table being written, in one or more formats.
-pub struct TableFiles {
+pub(crate) struct TableFiles {
     name: String,
     columns: Vec<TableColumn>,
     writers: Vec<Writer>,
@@ -56,7 +56,7 @@ impl TableFiles {
     ///
     /// # Errors
     /// When a file cannot be made.
-    pub fn create(
+    pub(crate) fn create(
         directory: &mut AtomicDir,
         name: &str,
         formats: &[TableFormat],
@@ -75,7 +75,7 @@ impl TableFiles {
     ///
     /// # Errors
     /// When the disk is full.
-    pub fn add(&mut self, rows: impl IntoIterator<Item = TableRow>) -> Result<(), FileError> {
+    pub(crate) fn add(&mut self, rows: impl IntoIterator<Item = TableRow>) -> Result<(), FileError> {
         for row in rows {
             self.rows.push(row);
             if self.rows.len() == GROUP {
@@ -97,7 +97,7 @@ impl TableFiles {
     ///
     /// # Errors
     /// When the disk is full.
-    pub fn finish(mut self) -> Result<(), FileError> {
+    pub(crate) fn finish(mut self) -> Result<(), FileError> {
         self.flush()?;
         let name = self.name;
         let finished = self.writers.into_iter().try_for_each(Writer::finish);

@@ -19,7 +19,7 @@ const LINES: usize = 17;
 
 /// What the recordings of each sensor say of one another, and every fit, shortly: two of five processes in twenty lines.
 #[must_use]
-pub fn brief(
+pub(crate) fn brief(
     outcomes: &[Outcome],
     diagnoses: &[Diagnosis],
     turn_on: &[TurnOnSpread],

@@ -13,7 +13,7 @@ const SCHEMA_VERSION: u32 = 1;
 
 /// What was compared, where, and what came of it.
 #[derive(Debug, Clone)]
-pub struct ChoiceReport<'a> {
+pub(crate) struct ChoiceReport<'a> {
     /// The candidates.
     pub ranking: &'a Ranking,
     /// What decides the error, where it was asked.
@@ -28,7 +28,7 @@ pub struct ChoiceReport<'a> {
 
 /// One ranking of a study, in words and as JSON.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RankedPlace {
+pub(crate) struct RankedPlace {
     /// Trajectory, scenario, receiver and outages.
     pub name: String,
     /// What the data say.
@@ -61,7 +61,7 @@ struct RankingFile<'a> {
 impl ChoiceReport<'_> {
     /// The verdict, a sentence or two a line: the winner, what cannot be told from it, which recordings decide.
     #[must_use]
-    pub fn verdict(&self) -> Vec<String> {
+    pub(crate) fn verdict(&self) -> Vec<String> {
         let ranking = self.ranking;
         let winner = ranking.winner();
         let recordings = winner.folds.len();
@@ -126,7 +126,7 @@ impl ChoiceReport<'_> {
 
     /// A row for each candidate under a head.
     #[must_use]
-    pub fn rows(&self) -> Vec<Vec<String>> {
+    pub(crate) fn rows(&self) -> Vec<Vec<String>> {
         let head = [
             "candidate",
             "RMSE at outage end (m)",
@@ -178,7 +178,7 @@ impl ChoiceReport<'_> {
 
     /// What the marks of the table mean.
     #[must_use]
-    pub fn legend(&self) -> String {
+    pub(crate) fn legend(&self) -> String {
         let recordings = self.ranking.winner().folds.len();
         let ends: Vec<String> =
             self.outages.iter().map(|o| format!("{}–{} s", seconds(o.start_s), seconds(o.end_s))).collect();
@@ -191,7 +191,7 @@ impl ChoiceReport<'_> {
 
     /// Recording by recording: NEES and log score of every candidate.
     #[must_use]
-    pub fn fold_rows(&self) -> Vec<Vec<String>> {
+    pub(crate) fn fold_rows(&self) -> Vec<Vec<String>> {
         let winner = self.ranking.winner();
         let mut head = vec!["NEES (log score, nats)".to_owned()];
         head.extend(winner.folds.iter().map(|fold| fold.recording.clone()));
@@ -206,7 +206,7 @@ impl ChoiceReport<'_> {
 
     /// Which scales of which sensors decide: a line each, those of a quarter of the largest influence or more.
     #[must_use]
-    pub fn decisive_scales(&self) -> Vec<String> {
+    pub(crate) fn decisive_scales(&self) -> Vec<String> {
         let scales = self.influence.map_or(&[][..], |influence| &influence.scales);
         let largest = scales.iter().map(|s| s.on_error.abs()).fold(0.0, f64::max);
         let mut lines: Vec<String> = Vec::new();
@@ -239,7 +239,7 @@ impl ChoiceReport<'_> {
 
     /// Scale by scale under a head.
     #[must_use]
-    pub fn scale_rows(&self) -> Vec<Vec<String>> {
+    pub(crate) fn scale_rows(&self) -> Vec<Vec<String>> {
         let head = ["signals", "scale (s)", "% of horizontal error for 1 % of wavelet variance"];
         let row = |s: &crate::choose::ScaleInfluence| {
             vec![s.signals.clone(), readable(s.tau_s), signed(s.on_error)]
@@ -250,7 +250,7 @@ impl ChoiceReport<'_> {
 
     /// Recording by recording under a head.
     #[must_use]
-    pub fn recording_rows(&self) -> Vec<Vec<String>> {
+    pub(crate) fn recording_rows(&self) -> Vec<Vec<String>> {
         let head = ["adds to the expected horizontal error (%)", "awv", "sr-awv", "dr-awv"];
         let row = |r: &crate::choose::RecordingInfluence| {
             let adds = [r.awv_pct, r.sr_awv_pct, r.dr_awv_pct].map(signed);
@@ -267,13 +267,13 @@ impl ChoiceReport<'_> {
 
     /// `ranking.json`.
     #[must_use]
-    pub fn json(&self) -> String {
+    pub(crate) fn json(&self) -> String {
         super::json(&self.file())
     }
 
     /// The same as one of several rankings.
     #[must_use]
-    pub fn of_place(&self, name: String) -> RankedPlace {
+    pub(crate) fn of_place(&self, name: String) -> RankedPlace {
         let mut json = serde_json::to_value(self.file()).expect("plain structs are always JSON");
         json["place"] = name.as_str().into();
         RankedPlace { name, verdict: self.verdict(), rows: self.rows(), legend: self.legend(), json }

@@ -173,7 +173,7 @@ fn rows<'a>(run: &'a str, outage: usize, comparison: &'a OutageComparison) -> im
 
 /// Which filters are as good as they believe: a line a kind of verdict, the gravest first.
 #[must_use]
-pub fn verdict_lines(verdicts: &[VerdictRow]) -> Vec<String> {
+pub(crate) fn verdict_lines(verdicts: &[VerdictRow]) -> Vec<String> {
     let kinds =
         [VerdictKind::Diverged, VerdictKind::Overconfident, VerdictKind::Underconfident, VerdictKind::Ok];
     let line = |kind: VerdictKind| {
@@ -187,7 +187,7 @@ pub fn verdict_lines(verdicts: &[VerdictRow]) -> Vec<String> {
 
 /// What the ± of the table are.
 #[must_use]
-pub fn meaning_of_intervals(candidates: &[CandidateResult]) -> &'static str {
+pub(crate) fn meaning_of_intervals(candidates: &[CandidateResult]) -> &'static str {
     let mut states = candidates.iter().flat_map(|c| &c.outages).flat_map(|outage| &outage.states);
     if states.any(|state| state.calibration_half_pct.is_some()) {
         "± half the 95 % interval, Monte Carlo and calibrations together"
@@ -200,14 +200,14 @@ pub fn meaning_of_intervals(candidates: &[CandidateResult]) -> &'static str {
 /// error with half its 95 % interval, and in brackets the mean of the absolute ratio error (%). The first
 /// row is the head; an interval below half a hundredth has one digit; `states` are indices of reported states.
 #[must_use]
-pub fn table_rows(candidates: &[CandidateResult], states: &[usize]) -> Vec<Vec<String>> {
+pub(crate) fn table_rows(candidates: &[CandidateResult], states: &[usize]) -> Vec<Vec<String>> {
     let heads: Vec<String> = states.iter().map(|s| REPORTED_NAMES[*s].to_owned()).collect();
     laid_out(candidates, &heads, &|candidate, outage, column| cell(candidate, outage, states[column]))
 }
 
 /// Outages by their times in the place of their numbers.
 #[must_use]
-pub fn with_times(mut rows: Vec<Vec<String>>, outages: &[(f64, f64)]) -> Vec<Vec<String>> {
+pub(crate) fn with_times(mut rows: Vec<Vec<String>>, outages: &[(f64, f64)]) -> Vec<Vec<String>> {
     for row in rows.iter_mut().skip(1) {
         let time = row[1].parse::<usize>().ok().and_then(|k| outages.get(k - 1));
         row[1] = time.map_or_else(String::new, |w| window(w.0, w.1));
@@ -218,7 +218,7 @@ pub fn with_times(mut rows: Vec<Vec<String>>, outages: &[(f64, f64)]) -> Vec<Vec
 /// Beside Table I, in its layout: mean NEES and coverage over the outage, and (ratio − 1)·100 of the RMSE at
 /// its end with half its 95 % interval, for each of the `states`.
 #[must_use]
-pub fn consistency_rows(candidates: &[CandidateResult], states: &[usize]) -> Vec<Vec<String>> {
+pub(crate) fn consistency_rows(candidates: &[CandidateResult], states: &[usize]) -> Vec<Vec<String>> {
     let names: Vec<&str> = states.iter().map(|s| REPORTED_NAMES[*s]).collect();
     let head = format!("NEES, coverage, RMSE {}", names.join(", RMSE "));
     let consistency = |candidate: &CandidateResult, outage: usize, _: usize| {

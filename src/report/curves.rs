@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 /// Layout version of both files.
 const SCHEMA_VERSION: u32 = 1;
 /// Confidence of all intervals.
-pub const CONFIDENCE: f64 = 0.95;
+pub(crate) const CONFIDENCE: f64 = 0.95;
 
 /// A wavelet variance with its intervals.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -138,7 +138,7 @@ impl From<SignalsFile> for CurvesFile {
 
 /// The curves behind a model, and what the model makes of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct CurvesFile {
+pub(crate) struct CurvesFile {
     /// Layout version.
     pub schema_version: u32,
     /// Sample rate (Hz).
@@ -150,7 +150,7 @@ pub struct CurvesFile {
 /// A curve, the model fitted to it, and the replicates it is the average of. Only sensor, axis, tau_s, wv
 /// and edof are needed to fit a model to it again.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct FittedCurve {
+pub(crate) struct FittedCurve {
     /// `accel` or `gyro`.
     pub sensor: String,
     /// `x`, `y`, `z`, or `all`.
@@ -186,7 +186,7 @@ pub struct FittedCurve {
 
 /// The wavelet variance of one replicate: robust where the estimator is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ReplicateCurve {
+pub(crate) struct ReplicateCurve {
     /// Recording.
     pub file: String,
     /// Axis.
@@ -201,7 +201,7 @@ pub struct ReplicateCurve {
 impl CurvesFile {
     /// The file of some outcomes and the groups they are of.
     #[must_use]
-    pub fn new(groups: &[Group], outcomes: &[&Outcome], settings: &Settings) -> Self {
+    pub(crate) fn new(groups: &[Group], outcomes: &[&Outcome], settings: &Settings) -> Self {
         let replicates =
             |o: &Outcome| groups.iter().find(|g| g.scope == o.scope).map_or(&[][..], |g| &g.replicates);
         let curve = |o: &&Outcome| fitted(o, replicates(o), settings);

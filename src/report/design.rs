@@ -132,7 +132,7 @@ fn percent(half_width: Option<f64>) -> String {
 
 /// The verdict on one design, or on several.
 #[must_use]
-pub fn design_verdict(designs: &[Design]) -> String {
+pub(crate) fn design_verdict(designs: &[Design]) -> String {
     if let [design] = designs {
         return design.verdict().join("\n");
     }
@@ -143,7 +143,7 @@ pub fn design_verdict(designs: &[Design]) -> String {
 
 /// Every parameter of one design, or a row for each of several; the first row is the head.
 #[must_use]
-pub fn design_rows(designs: &[Design]) -> Vec<Vec<String>> {
+pub(crate) fn design_rows(designs: &[Design]) -> Vec<Vec<String>> {
     if let [design] = designs { parameter_rows(design) } else { grid_rows(designs) }
 }
 

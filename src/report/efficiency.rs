@@ -75,7 +75,7 @@ impl EfficiencyRow {
 
 /// All numbers, one line for each scenario, estimator and parameter (also the data of a plot).
 #[must_use]
-pub fn efficiency_csv(file: &EfficiencyFile) -> String {
+pub(crate) fn efficiency_csv(file: &EfficiencyFile) -> String {
     let mut text = "scenario,estimator,parameter,target,bias,bias_se,spread,rmse,rmse_se,ratio,ratio_se,zeros,without_root\n".to_owned();
     for r in &file.results {
         let numbers =
@@ -90,7 +90,7 @@ pub fn efficiency_csv(file: &EfficiencyFile) -> String {
 
 /// The table for people: rows scenario × estimator, columns the parameters.
 #[must_use]
-pub fn efficiency_table(file: &EfficiencyFile) -> String {
+pub(crate) fn efficiency_table(file: &EfficiencyFile) -> String {
     let mut parameters: Vec<(&str, f64)> = Vec::new();
     for r in &file.results {
         if !parameters.iter().any(|(name, _)| *name == r.parameter) {

@@ -13,7 +13,7 @@ use serde_json::{Map, Value};
 
 /// What `calibrate --format json` prints.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct FitsFile {
+pub(crate) struct FitsFile {
     /// Layout version.
     pub schema_version: u32,
     /// Sample rate (Hz).
@@ -32,7 +32,7 @@ pub struct FitsFile {
 
 /// One fit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct FitEntry {
+pub(crate) struct FitEntry {
     /// `accel` or `gyro`.
     pub sensor: &'static str,
     /// `x`, `y`, `z`, or `all`.
@@ -87,7 +87,7 @@ pub struct FitEntry {
 
 /// A model that was tried.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct CandidateEntry {
+pub(crate) struct CandidateEntry {
     /// The model.
     pub model: String,
     /// Its parameters.
@@ -124,7 +124,7 @@ impl CandidateEntry {
 
 /// Processes of one kind that cannot be told apart.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct IndistinctEntry {
+pub(crate) struct IndistinctEntry {
     /// Their labels.
     pub processes: Vec<String>,
     /// The model with one of them less, which describes the curve as well.
@@ -149,7 +149,7 @@ impl IndistinctEntry {
 
 /// A scale at which curve and model differ.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct MissEntry {
+pub(crate) struct MissEntry {
     /// Scale (s).
     pub tau_s: f64,
     /// Wavelet variance of the data over that of the model.
@@ -160,7 +160,7 @@ pub struct MissEntry {
 
 /// How replicates differ at one scale.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct SpreadEntry {
+pub(crate) struct SpreadEntry {
     /// Scale (s).
     pub tau_s: f64,
     /// Standard deviation of ln wv that noise alone makes.
@@ -172,7 +172,7 @@ pub struct SpreadEntry {
 impl FitEntry {
     /// The entry of an outcome.
     #[must_use]
-    pub fn new(outcome: &Outcome, rate_hz: f64) -> Self {
+    pub(crate) fn new(outcome: &Outcome, rate_hz: f64) -> Self {
         let fit = &outcome.fit;
         let inference = outcome.inference.as_ref();
         let labels = fit.composite.labels();
@@ -239,7 +239,7 @@ fn parameters(outcome: &Outcome, rate_hz: f64) -> Value {
 impl FitsFile {
     /// The file of some outcomes.
     #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         outcomes: &[Outcome],
         diagnoses: &[Diagnosis],
         turn_on: &[TurnOnSpread],

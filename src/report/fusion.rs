@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 
 /// Names of the files of a fusion directory, the manifest last.
-pub const FUSION_FILES: [&str; 7] = [
+pub(crate) const FUSION_FILES: [&str; 7] = [
     "solution.csv",
     "innovations.csv",
     "errors.csv",
@@ -34,7 +34,7 @@ const SCHEMA_VERSION: u32 = 1;
 
 /// Where a fusion came from: `manifest.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct FusionManifest {
+pub(crate) struct FusionManifest {
     /// Layout version.
     pub schema_version: u32,
     /// What made the directory.
@@ -52,14 +52,14 @@ pub struct FusionManifest {
 /// Tells the directory of a fusion from that of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum FusionKind {
+pub(crate) enum FusionKind {
     /// `nav-sim fuse`.
     Fusion,
 }
 
 /// `summary.json` of a fusion.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct FusionSummary {
+pub(crate) struct FusionSummary {
     schema_version: u32,
     method: &'static str,
     /// `ok`, `underconfident`, `doubtful` or `overconfident` (not to be believed).
@@ -135,7 +135,7 @@ struct Reference {
 impl FusionSummary {
     /// The summary of a fusion.
     #[must_use]
-    pub fn of(
+    pub(crate) fn of(
         solution: &Solution,
         (outcome, assessment): (&Outcome, &Assessment),
         start: &Start,
@@ -236,7 +236,7 @@ impl FusionSummary {
 
     /// The summary for people, the verdict first.
     #[must_use]
-    pub fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         let Fixes { used, withheld, rejected } = self.fixes;
         let mut lines = vec![self.verdict_line()];
         let turn_on = match self.turn_on_states {
@@ -280,7 +280,7 @@ impl FusionSummary {
 /// The files of a fusion directory, the manifest last; `errors.csv` is empty but for its header without a
 /// reference.
 #[must_use]
-pub fn fusion_directory(
+pub(crate) fn fusion_directory(
     solution: &Solution,
     summary: &FusionSummary,
     manifest: &FusionManifest,
@@ -322,7 +322,7 @@ fn fixed(x: f64, digits: usize) -> String {
 /// `solution.csv`: states, their standard deviations (those of latitude and longitude in degrees), bias
 /// estimates, the horizontal standard deviations in metres, and those of the biases.
 #[must_use]
-pub fn solution_csv(rows: &[Row]) -> String {
+pub(crate) fn solution_csv(rows: &[Row]) -> String {
     let mut text = header(&[
         ("", &STATE),
         ("sd_", &STATE),

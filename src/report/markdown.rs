@@ -4,7 +4,7 @@ use comfy_table::{ContentArrangement, Table, presets};
 
 /// A table of rows, of which the first is the head.
 #[must_use]
-pub fn markdown_table(rows: &[Vec<String>]) -> String {
+pub(crate) fn markdown_table(rows: &[Vec<String>]) -> String {
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN).set_content_arrangement(ContentArrangement::Disabled);
     let escaped = |row: &Vec<String>| row.iter().map(|cell| markdown(cell)).collect::<Vec<_>>();
@@ -16,13 +16,13 @@ pub fn markdown_table(rows: &[Vec<String>]) -> String {
 
 /// A text in Markdown, of which no part is taken for a cell's end, a line's end or HTML.
 #[must_use]
-pub fn markdown(text: &str) -> String {
+pub(crate) fn markdown(text: &str) -> String {
     text.replace('|', "\\|").replace('<', "&lt;").replace(['\n', '\r'], " ")
 }
 
 /// A table of rows, of which the first is the head, as CSV.
 #[must_use]
-pub fn csv_table(rows: &[Vec<String>]) -> String {
+pub(crate) fn csv_table(rows: &[Vec<String>]) -> String {
     let mut writer = csv::WriterBuilder::new().flexible(true).from_writer(Vec::new());
     let written = rows.iter().try_for_each(|row| writer.write_record(row)).and_then(|()| Ok(writer.flush()?));
     written.expect("memory takes every row");
@@ -31,7 +31,7 @@ pub fn csv_table(rows: &[Vec<String>]) -> String {
 
 /// A table of rows, of which the first is the head, as a `tabular` of LaTeX (package booktabs), the first column to the left.
 #[must_use]
-pub fn latex_table(rows: &[Vec<String>]) -> String {
+pub(crate) fn latex_table(rows: &[Vec<String>]) -> String {
     let columns = rows.first().map_or(0, Vec::len);
     let line = |row: &Vec<String>| {
         let cells: Vec<String> = row.iter().map(|cell| latex(cell)).collect();

@@ -9,13 +9,13 @@ pub(super) fn shortest(x: f64) -> String {
 
 /// A time of a schedule, to a hundredth of a second.
 #[must_use]
-pub fn seconds(t_s: f64) -> String {
+pub(crate) fn seconds(t_s: f64) -> String {
     format!("{}", (t_s * 100.0).round() / 100.0)
 }
 
 /// A window of a schedule: `300–390 s`.
 #[must_use]
-pub fn window(start_s: f64, end_s: f64) -> String {
+pub(crate) fn window(start_s: f64, end_s: f64) -> String {
     format!("{}–{} s", seconds(start_s), seconds(end_s))
 }
 

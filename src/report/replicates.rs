@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 
 /// One sensor of one recording against the others.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ReplicateEntry {
+pub(crate) struct ReplicateEntry {
     /// Recording.
     pub file: String,
     /// `accel` or `gyro`.
@@ -30,7 +30,7 @@ pub struct ReplicateEntry {
 
 /// A drift that no other recording has.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct DriftEntry {
+pub(crate) struct DriftEntry {
     /// Probability that the most unusual of recordings that are alike is as unusual.
     pub p_value: f64,
     /// Mean of the later half less that of the earlier one, by axis (units of the sensor).
@@ -41,7 +41,7 @@ pub struct DriftEntry {
 
 /// Outliers that most signals of a sensor hold.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct CommonEntry {
+pub(crate) struct CommonEntry {
     /// The scales (s) at which there are.
     pub tau_s: Vec<f64>,
     /// The one where they weigh most.
@@ -54,7 +54,7 @@ pub struct CommonEntry {
 
 /// Why a recording is abnormal.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct AlarmEntry {
+pub(crate) struct AlarmEntry {
     /// Probability that the most unusual of recordings that are alike is as unusual.
     pub p_value: f64,
     /// First and last of the neighbouring scales (s) at which it is most unusual.
@@ -65,7 +65,7 @@ pub struct AlarmEntry {
 
 /// Scores of one axis against the others at every scale, in standard deviations.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ScoresEntry {
+pub(crate) struct ScoresEntry {
     /// Of ln robust wv.
     pub noise: Vec<f64>,
     /// Of ln (classical / robust wv).
@@ -74,7 +74,7 @@ pub struct ScoresEntry {
 
 /// How far a fit moves without a recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct LeftOutEntry {
+pub(crate) struct LeftOutEntry {
     /// What was fitted: `accel`, `accel.x`, …
     pub signals: String,
     /// Estimator.
@@ -92,7 +92,7 @@ pub struct LeftOutEntry {
 impl ReplicateEntry {
     /// The entry of a diagnosis at a rate (Hz).
     #[must_use]
-    pub fn new(diagnosis: &Diagnosis, rate_hz: f64) -> Self {
+    pub(crate) fn new(diagnosis: &Diagnosis, rate_hz: f64) -> Self {
         let scores = |s: &AxisScores| {
             let entry = ScoresEntry { noise: s.noise.clone(), outliers: s.outliers.clone() };
             (s.axis.name(), entry)
@@ -145,7 +145,7 @@ impl LeftOutEntry {
 
 /// What the recordings of each sensor say of one another, in words; nothing of a single one.
 #[must_use]
-pub fn describe_replicates(diagnoses: &[Diagnosis], rate_hz: f64) -> Vec<String> {
+pub(crate) fn describe_replicates(diagnoses: &[Diagnosis], rate_hz: f64) -> Vec<String> {
     let of_sensor = |sensor: Sensor| {
         let mut lines = advice(diagnoses, sensor, rate_hz);
         lines.extend(effects(diagnoses, sensor, rate_hz));

@@ -6,7 +6,7 @@ use crate::sensors::outage::Outage;
 use serde_json::{Value, json};
 
 /// Lengths of an outage in the table of units (s).
-pub const CURVE_S: [u32; 7] = [1, 3, 10, 30, 60, 120, 300];
+pub(crate) const CURVE_S: [u32; 7] = [1, 3, 10, 30, 60, 120, 300];
 
 /// The IMU that a limit needs.
 #[derive(Debug, Clone)]
@@ -234,13 +234,13 @@ impl Longest {
 
 /// The longest outage, in a sentence.
 #[must_use]
-pub fn longest_verdict(longest: Longest, question: &Question) -> String {
+pub(crate) fn longest_verdict(longest: Longest, question: &Question) -> String {
     format!("longest outage within the limits: {} ({})", longest.in_words(), question.limits_in_words())
 }
 
 /// The longest outage.
 #[must_use]
-pub fn longest_json(bridged: &Bridged, question: &Question) -> String {
+pub(crate) fn longest_json(bridged: &Bridged, question: &Question) -> String {
     super::json(&json!({
         "schema_version": 1,
         "question": question.json(),
@@ -251,7 +251,7 @@ pub fn longest_json(bridged: &Bridged, question: &Question) -> String {
 
 /// Whether a model keeps its limits, in a sentence.
 #[must_use]
-pub fn margins_verdict(margins: &Margins, question: &Question, longest: Longest) -> String {
+pub(crate) fn margins_verdict(margins: &Margins, question: &Question, longest: Longest) -> String {
     let times = readable(margins.worst.value / margins.worst.limit.most);
     let word = if margins.met() { "met" } else { "NOT met" };
     format!(
@@ -264,7 +264,7 @@ pub fn margins_verdict(margins: &Margins, question: &Question, longest: Longest)
 
 /// A row for each part of the IMU.
 #[must_use]
-pub fn margins_rows(margins: &Margins) -> Vec<Vec<String>> {
+pub(crate) fn margins_rows(margins: &Margins) -> Vec<Vec<String>> {
     let mut rows = vec![
         ["part of the error", "share", "factor on its sigma that alone meets the limit"]
             .map(str::to_owned)
@@ -290,7 +290,7 @@ pub fn margins_rows(margins: &Margins) -> Vec<Vec<String>> {
 
 /// All of it.
 #[must_use]
-pub fn margins_json(margins: &Margins, question: &Question, bridged: &Bridged) -> String {
+pub(crate) fn margins_json(margins: &Margins, question: &Question, bridged: &Bridged) -> String {
     let group = |g: &GroupMargin| json!({ "part": g.group.name(), "share": g.share, "factor": g.factor });
     super::json(&json!({
         "schema_version": 1,
@@ -310,7 +310,7 @@ pub fn margins_json(margins: &Margins, question: &Question, bridged: &Bridged) -
 
 /// The units of a catalogue, the best first.
 #[must_use]
-pub fn catalogue_rows(units: &[RankedUnit]) -> Vec<Vec<String>> {
+pub(crate) fn catalogue_rows(units: &[RankedUnit]) -> Vec<Vec<String>> {
     let name = units.first().map_or("", |u| u.worst.limit.quantity.name());
     let mut head = vec!["unit".to_owned(), "limit".to_owned(), "longest outage".to_owned()];
     head.extend(CURVE_S.iter().map(|s| format!("{name} at {s} s")));
@@ -331,7 +331,7 @@ pub fn catalogue_rows(units: &[RankedUnit]) -> Vec<Vec<String>> {
 
 /// All of it.
 #[must_use]
-pub fn catalogue_json(units: &[RankedUnit], question: &Question) -> String {
+pub(crate) fn catalogue_json(units: &[RankedUnit], question: &Question) -> String {
     let unit = |u: &RankedUnit| {
         json!({
             "unit": u.name,

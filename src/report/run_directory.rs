@@ -18,13 +18,14 @@ pub struct OutputFile<'a> {
 impl OutputFile<'_> {
     /// A small file.
     #[must_use]
-    pub fn whole(name: &'static str, text: String) -> Self {
+    pub(crate) fn whole(name: &'static str, text: String) -> Self {
         Self { name, parts: Box::new(std::iter::once(text)) }
     }
 }
 
 /// Names of the files of a run directory.
-pub const RUN_FILES: [&str; 5] = ["epochs.csv", "runs.csv", "summary.json", "report.html", "manifest.json"];
+pub(crate) const RUN_FILES: [&str; 5] =
+    ["epochs.csv", "runs.csv", "summary.json", "report.html", "manifest.json"];
 
 /// The files of a run directory, the manifest last: where it is, the rest is whole. Without runs (covariance
 /// analysis) there is no table of them. `track`: the reference trajectory.
@@ -66,7 +67,7 @@ fn digest(parts: impl IntoIterator<Item = impl AsRef<str>>) -> String {
 /// `summary.json`, with how fast it was found (IMU epochs a second, all runs together): its only number that the
 /// seed does not determine.
 #[must_use]
-pub fn summary_json(summary: &Summary, throughput_epochs_per_s: f64) -> String {
+pub(crate) fn summary_json(summary: &Summary, throughput_epochs_per_s: f64) -> String {
     #[derive(serde::Serialize)]
     struct WithThroughput<'a> {
         #[serde(flatten)]
@@ -78,7 +79,7 @@ pub fn summary_json(summary: &Summary, throughput_epochs_per_s: f64) -> String {
 
 /// Indented JSON with a final newline; NaN is null.
 #[must_use]
-pub fn json(value: &impl serde::Serialize) -> String {
+pub(crate) fn json(value: &impl serde::Serialize) -> String {
     serde_json::to_string_pretty(value).expect("plain structs with text keys are always JSON") + "\n"
 }
 

@@ -9,14 +9,14 @@ use crate::simulation::REPORTED_NAMES;
 
 /// The verdict in words.
 #[must_use]
-pub fn verdict(summary: &Summary) -> String {
+pub(crate) fn verdict(summary: &Summary) -> String {
     let windows: Vec<(f64, f64)> = summary.outages.iter().map(|o| (o.start_s, o.end_s)).collect();
     verdict_line(&summary.verdict, &windows, summary.runs, summary.diverged)
 }
 
 /// The summary for people, the verdict first.
 #[must_use]
-pub fn text(summary: &Summary) -> String {
+pub(crate) fn text(summary: &Summary) -> String {
     let mut text = format!("verdict: {}\n", verdict(summary));
     summary.require.iter().for_each(|met| text += &format!("{}\n", met_line(met)));
     text += &format!("{}\n", how(summary));
@@ -56,7 +56,7 @@ pub fn text(summary: &Summary) -> String {
 
 /// `required p95_m<=5: NOT MET, 7.41 at the end of outage 1`
 #[must_use]
-pub fn met_line(met: &Met) -> String {
+pub(crate) fn met_line(met: &Met) -> String {
     let verdict = if met.met { "met" } else { "NOT MET" };
     let place = met.outage.map_or("over the run".to_owned(), |k| format!("at the end of outage {}", k + 1));
     format!("required {}<={}: {verdict}, {} {place}", met.name, met.limit, readable(met.value))
@@ -119,7 +119,7 @@ fn budget_table(summary: &Summary) -> String {
 
 /// How horizontal position (east) and yaw at the end of the outage with the largest errors follow from each parameter.
 #[must_use]
-pub fn sensitivity_table(summary: &Summary) -> String {
+pub(crate) fn sensitivity_table(summary: &Summary) -> String {
     let known = summary.outages.iter().filter_map(|o| Some((o, o.sensitivity.as_ref()?)));
     let east = |o: &OutageSummary| o.rmse_end.0[1];
     let Some((outage, of)) = known.max_by(|a, b| east(a.0).total_cmp(&east(b.0))) else {
@@ -198,7 +198,7 @@ fn whole_run_table(summary: &Summary) -> String {
 
 /// `largest z -2.31 (RMSE of yaw_deg at the end of outage 1) of 22 figures, up to 4.4 by chance; NEES z +0.52, …`
 #[must_use]
-pub fn agreement_line(a: &Agreement) -> String {
+pub(crate) fn agreement_line(a: &Agreement) -> String {
     if a.figures == 0 {
         return "too few to compare: a scatter takes two runs".to_owned();
     }

@@ -12,7 +12,7 @@ const LEAST: f64 = 100.0;
 /// median over the recordings), the lowest of all averaging times, and how far the robust wavelet variance is below the
 /// classical one.
 #[must_use]
-pub fn signals_digest(file: &SignalsFile) -> Vec<Vec<String>> {
+pub(crate) fn signals_digest(file: &SignalsFile) -> Vec<Vec<String>> {
     let decades = decades(file);
     let times = decades.iter().map(|i| duration(allan_time_s(&longest(file).tau_s, *i)));
     let head = ["", "unit"].map(str::to_owned).into_iter().chain(times);
@@ -38,7 +38,7 @@ pub fn signals_digest(file: &SignalsFile) -> Vec<Vec<String>> {
 
 /// For each sensor and axis a title and a table: a row an averaging time, one a decade, a column a recording.
 #[must_use]
-pub fn signals_per_file(file: &SignalsFile) -> Vec<(String, Vec<Vec<String>>)> {
+pub(crate) fn signals_per_file(file: &SignalsFile) -> Vec<(String, Vec<Vec<String>>)> {
     let decades = decades(file);
     let table = |(sensor, axis): (&str, &str)| {
         let own = of(file, sensor, axis);
@@ -59,7 +59,7 @@ pub fn signals_per_file(file: &SignalsFile) -> Vec<(String, Vec<Vec<String>>)> {
 
 /// All scales of all signals as CSV.
 #[must_use]
-pub fn signals_csv(file: &SignalsFile) -> String {
+pub(crate) fn signals_csv(file: &SignalsFile) -> String {
     let mut text = "file,sensor,axis,tau_s,edof,classical_wv,classical_ci_low,classical_ci_high,robust_wv,robust_ci_low,\
                     robust_ci_high,robust_status,allan_tau_s,allan_deviation\n"
         .to_owned();
@@ -90,7 +90,7 @@ pub fn signals_csv(file: &SignalsFile) -> String {
 
 /// A signal's curves as a table: rows of text, the first its head.
 #[must_use]
-pub fn signal_rows(curves: &SignalCurves) -> Vec<Vec<String>> {
+pub(crate) fn signal_rows(curves: &SignalCurves) -> Vec<Vec<String>> {
     let unit = unit(&curves.sensor);
     let head = [
         "scale tau (s)".to_owned(),
@@ -124,7 +124,7 @@ pub fn signal_rows(curves: &SignalCurves) -> Vec<Vec<String>> {
 
 /// What a file of signals says about its intervals.
 #[must_use]
-pub fn intervals_note(edof_method: &str, tuning: &Tuning) -> String {
+pub(crate) fn intervals_note(edof_method: &str, tuning: &Tuning) -> String {
     let kind = match edof_method {
         "large-sample" => "large-sample degrees of freedom (eta1)",
         _ => "degrees of freedom eta3, conservative beyond the first scale",

@@ -9,7 +9,7 @@ use crate::simulation::{BIAS_NAMES, REPORTED, REPORTED_NAMES};
 
 /// A value of a table.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Value {
+pub(crate) enum Value {
     /// A name.
     Text(String),
     /// A count.
@@ -20,7 +20,7 @@ pub enum Value {
 
 /// What a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ValueKind {
+pub(crate) enum ValueKind {
     /// Names.
     Text,
     /// Counts.
@@ -30,14 +30,14 @@ pub enum ValueKind {
 }
 
 /// Name of a column and what it holds.
-pub type TableColumn = (String, ValueKind);
+pub(crate) type TableColumn = (String, ValueKind);
 
 /// A row: one value a column.
-pub type TableRow = Vec<Value>;
+pub(crate) type TableRow = Vec<Value>;
 
 /// A column of a cell by name, and what its runs gave.
 #[derive(Debug, Clone, Copy)]
-pub struct ColumnResult<'a> {
+pub(crate) struct ColumnResult<'a> {
     /// Trajectory, truth, scenario, receiver, outage set.
     pub cell: [&'a str; 5],
     /// Candidate.
@@ -96,7 +96,7 @@ const HORIZONTAL: [&str; 10] = [
 
 /// Columns of the table of outages.
 #[must_use]
-pub fn outage_columns() -> Vec<TableColumn> {
+pub(crate) fn outage_columns() -> Vec<TableColumn> {
     let mut names: Vec<String> = ["start_s", "end_s", "duration_s"].map(str::to_owned).into();
     for prefix in ["asee_mean", "rmse_mean", "asee_end", "rmse_end"] {
         names.extend(prefixed(prefix));
@@ -123,7 +123,7 @@ pub fn outage_columns() -> Vec<TableColumn> {
 
 /// One row an outage; a set without outages has no row.
 #[must_use]
-pub fn outage_rows(
+pub(crate) fn outage_rows(
     of: &ColumnResult<'_>,
     outages: &[OutageMetrics],
     comparison: Option<&[OutageComparison]>,
@@ -177,7 +177,7 @@ fn ratio_values(comparison: Option<&OutageComparison>) -> Vec<f64> {
 
 /// Columns of the table of epochs.
 #[must_use]
-pub fn epoch_columns() -> Vec<TableColumn> {
+pub(crate) fn epoch_columns() -> Vec<TableColumn> {
     let mut names = vec!["t_s".to_owned()];
     for prefix in ["asee", "asee_std_error", "rmse", "rmse_std_error", "bias"] {
         names.extend(prefixed(prefix));
@@ -189,7 +189,7 @@ pub fn epoch_columns() -> Vec<TableColumn> {
 
 /// One row an epoch.
 #[must_use]
-pub fn epoch_rows(of: &ColumnResult<'_>, epochs: &[EpochMetrics]) -> Vec<TableRow> {
+pub(crate) fn epoch_rows(of: &ColumnResult<'_>, epochs: &[EpochMetrics]) -> Vec<TableRow> {
     let row = |e: &EpochMetrics| {
         let mut row = keys(of);
         row.extend([u64::from(e.gnss), e.count].map(Value::Int));
@@ -209,7 +209,7 @@ pub fn epoch_rows(of: &ColumnResult<'_>, epochs: &[EpochMetrics]) -> Vec<TableRo
 
 /// Columns of the table of runs.
 #[must_use]
-pub fn run_columns() -> Vec<TableColumn> {
+pub(crate) fn run_columns() -> Vec<TableColumn> {
     let mut names: Vec<String> = ["nis_mean", "nees_mean", "coverage"].map(str::to_owned).into();
     names.extend(["see_mean", "see_end", "error_end"].into_iter().flat_map(prefixed));
     let ends = ["nees_end", "log_density_end", "horizontal_error_end_m", "reconvergence_s"];
@@ -219,7 +219,7 @@ pub fn run_columns() -> Vec<TableColumn> {
 
 /// One row a run and outage; a covariance analysis has none.
 #[must_use]
-pub fn run_rows(of: &ColumnResult<'_>) -> Vec<TableRow> {
+pub(crate) fn run_rows(of: &ColumnResult<'_>) -> Vec<TableRow> {
     let mut rows = Vec::new();
     for run in of.measured.sampled() {
         for (i, o) in run.outages.iter().enumerate() {
@@ -237,7 +237,7 @@ pub fn run_rows(of: &ColumnResult<'_>) -> Vec<TableRow> {
 
 /// A column of a cell as people read it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ShownColumn {
+pub(crate) struct ShownColumn {
     /// Candidate, and filter where there are several.
     pub name: String,
     /// Its place in the table of ratios.
@@ -254,7 +254,7 @@ pub struct ShownColumn {
 
 /// A cell as people read it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ShownCell {
+pub(crate) struct ShownCell {
     /// Its name.
     pub name: String,
     /// Its columns.
@@ -263,7 +263,7 @@ pub struct ShownCell {
 
 /// The layout of the paper's Table I for one cell; `states` are indices of reported states.
 #[must_use]
-pub fn ratio_table(cell: &ShownCell, states: &[usize]) -> Vec<Vec<String>> {
+pub(crate) fn ratio_table(cell: &ShownCell, states: &[usize]) -> Vec<Vec<String>> {
     let candidate = |column: &ShownColumn| CandidateResult {
         run: column.name.clone(),
         label: column.label.clone(),
@@ -277,7 +277,7 @@ pub fn ratio_table(cell: &ShownCell, states: &[usize]) -> Vec<Vec<String>> {
 /// Whether the filters are as good as they believe: a row a cell, a column a candidate; the ratio is that of
 /// error to standard deviation in the state that is farthest off.
 #[must_use]
-pub fn verdict_table(cells: &[ShownCell]) -> Vec<Vec<String>> {
+pub(crate) fn verdict_table(cells: &[ShownCell]) -> Vec<Vec<String>> {
     let mut rows = vec![vec!["cell".to_owned()]];
     if let Some(cell) = cells.first() {
         rows[0].extend(cell.columns.iter().map(|c| c.name.clone()));
@@ -303,7 +303,7 @@ pub fn verdict_table(cells: &[ShownCell]) -> Vec<Vec<String>> {
 /// Horizontal error just before the first fix after each outage, median and (95 %) in metres: a row an
 /// outage, a column a candidate.
 #[must_use]
-pub fn drift_table(cells: &[ShownCell]) -> Vec<Vec<String>> {
+pub(crate) fn drift_table(cells: &[ShownCell]) -> Vec<Vec<String>> {
     let mut rows = vec![["cell", "outage"].map(str::to_owned).to_vec()];
     if let Some(cell) = cells.first() {
         rows[0].extend(cell.columns.iter().map(|c| c.name.clone()));

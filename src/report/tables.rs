@@ -20,7 +20,7 @@ fn epoch_columns() -> Vec<String> {
 
 /// `epochs.csv`: one row a reporting epoch (1 Hz), means over runs.
 #[must_use]
-pub fn epochs_csv(epochs: &[EpochMetrics]) -> String {
+pub(crate) fn epochs_csv(epochs: &[EpochMetrics]) -> String {
     let values = |all: &PerState<crate::metrics::Estimate>| all.0.map(|e| shortest(e.value));
     let row = |e: &EpochMetrics| {
         let mut row = vec![shortest(e.t_s), u8::from(e.gnss).to_string()];
@@ -43,7 +43,7 @@ fn run_columns() -> Vec<String> {
 }
 
 /// `runs.csv`, line by line: one row a run and outage (one row a run, outage empty, when there is none).
-pub fn runs_csv(result: &RunResult) -> impl Iterator<Item = String> {
+pub(crate) fn runs_csv(result: &RunResult) -> impl Iterator<Item = String> {
     let columns = run_columns();
     let of_an_outage = columns.len() - 6 - REPORTED;
     let rows = result.runs.iter().flat_map(move |run| {

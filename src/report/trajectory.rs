@@ -27,7 +27,7 @@ const INSTANTS: u32 = 4000;
 impl TrajectorySeries {
     /// A trajectory at evenly spaced instants.
     #[must_use]
-    pub fn of(trajectory: &Trajectory) -> Self {
+    pub(crate) fn of(trajectory: &Trajectory) -> Self {
         let start = trajectory.state(trajectory.start_s());
         let step = (trajectory.end_s() - trajectory.start_s()) / f64::from(INSTANTS);
         let mut series = Self::default();
@@ -91,7 +91,7 @@ impl TrajectorySeries {
 
 /// The picture; `outages` are (start, end) in seconds.
 #[must_use]
-pub fn trajectory_svg(title: &str, series: &TrajectorySeries, outages: &[(f64, f64)]) -> String {
+pub(crate) fn trajectory_svg(title: &str, series: &TrajectorySeries, outages: &[(f64, f64)]) -> String {
     svg(title, &[series.map(title, outages), series.over_time(outages)])
 }
 

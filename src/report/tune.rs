@@ -12,7 +12,7 @@ const RIGHT: f64 = 0.01;
 
 /// What a tuning found.
 #[derive(Debug, Clone)]
-pub struct TuneResult {
+pub(crate) struct TuneResult {
     /// The filter that was made honest.
     pub filter: FilterStates,
     /// The filter that `run` makes of the model unless told otherwise.
@@ -36,7 +36,7 @@ pub struct TuneResult {
 impl TuneResult {
     /// The verdict: how honest the filter was, with which factors it is, and what that costs.
     #[must_use]
-    pub fn verdict(&self) -> String {
+    pub(crate) fn verdict(&self) -> String {
         let before = format!("the {} is {}", filter_name(self.filter), judged(&self.before));
         if self.factors.iter().all(|f| (f.on_variance - 1.0).abs() < RIGHT) {
             return match excess(&self.before) {
@@ -94,7 +94,7 @@ impl TuneResult {
 
     /// A row for each filter under a head.
     #[must_use]
-    pub fn rows(&self) -> Vec<Vec<String>> {
+    pub(crate) fn rows(&self) -> Vec<Vec<String>> {
         let mut head = vec!["filter".to_owned(), "NEES (9)".to_owned(), "largest RMSE/sigma".to_owned()];
         head.extend(self.before.end_s.iter().map(|t| format!("horizontal RMSE at {} s (m)", seconds(*t))));
         let several = self.truths.len() > 1;
@@ -125,7 +125,7 @@ impl TuneResult {
 
     /// All of it as JSON.
     #[must_use]
-    pub fn json(&self) -> String {
+    pub(crate) fn json(&self) -> String {
         let filter = |(name, h): (&'static str, &Honesty)| FilterEntry {
             filter: name,
             nees: h.nees,
@@ -257,7 +257,7 @@ struct SweepEntry {
 
 /// A factor in files.
 #[derive(Debug, Clone, Serialize)]
-pub struct FactorEntry {
+pub(crate) struct FactorEntry {
     /// `accel` or `gyro`.
     pub sensor: &'static str,
     /// Label of the process; none: all of the sensor's.
@@ -270,7 +270,7 @@ pub struct FactorEntry {
 impl FactorEntry {
     /// Of a factor.
     #[must_use]
-    pub fn of(factor: &Factor) -> Self {
+    pub(crate) fn of(factor: &Factor) -> Self {
         Self {
             sensor: factor.sensor.name(),
             process: factor.process.clone(),

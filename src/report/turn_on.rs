@@ -6,7 +6,7 @@ use serde::Serialize;
 
 /// What the means of one sensor say, by the model of one estimator.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct TurnOnEntry {
+pub(crate) struct TurnOnEntry {
     /// `accel` or `gyro`.
     pub sensor: &'static str,
     /// Whose model says what the noise makes.
@@ -35,7 +35,7 @@ pub struct TurnOnEntry {
 
 /// The means of one axis.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct MeansEntry {
+pub(crate) struct MeansEntry {
     /// `x`, `y` or `z`.
     pub axis: &'static str,
     /// Recordings.
@@ -51,7 +51,7 @@ pub struct MeansEntry {
 impl TurnOnEntry {
     /// The entry of a sensor.
     #[must_use]
-    pub fn new(found: &TurnOnSpread) -> Self {
+    pub(crate) fn new(found: &TurnOnSpread) -> Self {
         let of_axis = |&MeansOfAxis { axis, recordings, spread, noise, range }: &MeansOfAxis| MeansEntry {
             axis: axis.name(),
             recordings,
@@ -78,7 +78,7 @@ impl TurnOnEntry {
 
 /// What follows from the means of one sensor, without its name.
 #[must_use]
-pub fn turn_on_remark(found: &TurnOnSpread) -> String {
+pub(crate) fn turn_on_remark(found: &TurnOnSpread) -> String {
     let unit = found.sensor.unit();
     let (spread, noise) = (readable(found.spread()), readable(found.noise()));
     match found.finding {
@@ -110,7 +110,7 @@ pub fn turn_on_remark(found: &TurnOnSpread) -> String {
 
 /// A line a sensor; with the name of the estimator where the models of several disagree.
 #[must_use]
-pub fn turn_on_lines(found: &[TurnOnSpread]) -> Vec<String> {
+pub(crate) fn turn_on_lines(found: &[TurnOnSpread]) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for one in found {
         let same = |other: &&TurnOnSpread| other.sensor == one.sensor;

@@ -6,7 +6,7 @@ use crate::metrics::{Verdict, VerdictKind};
 /// One line: the verdict, by how much and where, the figures it rests on. `outages` are those of the
 /// experiment (start, end) in seconds; `runs` and `diverged` count its runs.
 #[must_use]
-pub fn verdict_line(verdict: &Verdict, outages: &[(f64, f64)], runs: u64, diverged: u64) -> String {
+pub(crate) fn verdict_line(verdict: &Verdict, outages: &[(f64, f64)], runs: u64, diverged: u64) -> String {
     let is_expected = verdict.independent_runs.is_infinite();
     let figures = format!(
         "NEES {} (9 if right), coverage {:.3}",
@@ -69,13 +69,13 @@ fn with_error(value: f64, error: f64) -> String {
 
 /// For a line that names several runs: "NEES 1189, 34.6 × in yaw_deg".
 #[must_use]
-pub fn verdict_in_short(verdict: &Verdict) -> String {
+pub(crate) fn verdict_in_short(verdict: &Verdict) -> String {
     format!("NEES {}, {} × in {}", readable(verdict.nees), readable(verdict.ratio), verdict.worst_state)
 }
 
 /// The verdict in one word.
 #[must_use]
-pub const fn verdict_word(kind: VerdictKind) -> &'static str {
+pub(crate) const fn verdict_word(kind: VerdictKind) -> &'static str {
     match kind {
         VerdictKind::Ok => "consistent",
         VerdictKind::Overconfident => "overconfident",

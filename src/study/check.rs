@@ -12,7 +12,7 @@ impl Study {
     ///
     /// # Errors
     /// The key that is refused.
-    pub fn resolve(&mut self) -> Result<(), DescriptionError> {
+    pub(crate) fn resolve(&mut self) -> Result<(), DescriptionError> {
         self.name_all();
         self.check_numbers()?;
         self.check_axes()?;

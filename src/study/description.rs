@@ -286,7 +286,7 @@ impl Study {
     ///
     /// # Errors
     /// The set that is refused.
-    pub fn outage_sets(&self) -> Result<Vec<OutageSet>, DescriptionError> {
+    pub(crate) fn outage_sets(&self) -> Result<Vec<OutageSet>, DescriptionError> {
         let mut sets = Vec::new();
         for (i, entry) in self.outages.iter().enumerate() {
             sets.extend(expand(entry, i)?.into_iter().map(|set| (i, set)));
@@ -314,7 +314,7 @@ impl Study {
 
     /// Whether a candidate is calibrated without the recordings that make the errors.
     #[must_use]
-    pub fn leaves_out(&self) -> bool {
+    pub(crate) fn leaves_out(&self) -> bool {
         self.candidate.iter().any(CandidateEntry::leaves_out)
     }
 
@@ -356,13 +356,13 @@ impl Study {
 
     /// Whether runs are made.
     #[must_use]
-    pub const fn is_sampled(&self) -> bool {
+    pub(crate) const fn is_sampled(&self) -> bool {
         !matches!(self.method, Method::Lincov)
     }
 
     /// Runs of each cell; a covariance analysis counts as one.
     #[must_use]
-    pub const fn runs_of_cell(&self) -> u64 {
+    pub(crate) const fn runs_of_cell(&self) -> u64 {
         if self.is_sampled() { self.runs } else { 1 }
     }
 

@@ -48,7 +48,7 @@ pub fn plan(directory: &Path) -> Result<Option<Plan>, FileError> {
 ///
 /// # Errors
 /// When there is none, or the study is not the one that was planned, or `seed` is given and not the plan's.
-pub fn plan_of(directory: &Path, study: &Study, seed: Option<u64>) -> Result<Plan, StudyError> {
+pub(crate) fn plan_of(directory: &Path, study: &Study, seed: Option<u64>) -> Result<Plan, StudyError> {
     let plan = plan(directory)?.ok_or_else(|| StudyError::NoPlan { directory: directory.to_owned() })?;
     same(directory, &plan, study, seed)?;
     Ok(plan)
@@ -79,7 +79,7 @@ pub fn same(directory: &Path, plan: &Plan, study: &Study, seed: Option<u64>) -> 
 ///
 /// # Errors
 /// When the directory cannot be written to.
-pub fn write_plan(directory: &Path, plan: &Plan) -> Result<(), FileError> {
+pub(crate) fn write_plan(directory: &Path, plan: &Plan) -> Result<(), FileError> {
     let json = serde_json::to_string_pretty(plan).expect("plain structs are always JSON") + "\n";
     atomic::write(&file(directory), json)
 }

@@ -155,7 +155,7 @@ impl From<FileError> for StudyError {
 impl StudyError {
     /// Whether contents or the request are at fault (rather than the machine).
     #[must_use]
-    pub fn is_usage(&self) -> bool {
+    pub(crate) fn is_usage(&self) -> bool {
         match self {
             Self::File(e) => !e.is_system(),
             Self::Candidate { source, .. } | Self::CalibratedModel(source) => source.is_usage(),
@@ -166,7 +166,7 @@ impl StudyError {
 
     /// What to do about it.
     #[must_use]
-    pub fn remedy(&self) -> Option<Remedy> {
+    pub(crate) fn remedy(&self) -> Option<Remedy> {
         match self {
             Self::File(e) => e.hint().map(Remedy::Advice),
             Self::Description { source, .. } => source.hint().map(Remedy::Advice),

@@ -104,7 +104,7 @@ impl Grid {
 
     /// Cells of each trajectory.
     #[must_use]
-    pub fn per_trajectory(&self) -> usize {
+    pub(crate) fn per_trajectory(&self) -> usize {
         [self.truths.len(), self.scenarios.len(), self.gnss.len(), self.outages.len()]
             .into_iter()
             .fold(1, usize::saturating_mul)
@@ -140,7 +140,7 @@ impl Grid {
 
     /// The names of a cell on those axes that have more than one, in words.
     #[must_use]
-    pub fn short_name(&self, cell: Cell) -> String {
+    pub(crate) fn short_name(&self, cell: Cell) -> String {
         let sizes = [
             self.trajectories.len(),
             self.truths.len(),

@@ -83,5 +83,5 @@ pub use remedy::Remedy;
 pub use running::{RunOptions, RunReport, Shard, run};
 pub use sums::CellSums;
 pub use sweep::{OneOrMany, OutageSet, OutagesEntry, Periodic, Random, Sweep};
-pub use unit::{Finding, UnitResult, run_unit};
+pub use unit::{Finding, UnitResult};
 pub use verification::{VerifyOptions, VerifyReport, verify};

@@ -163,7 +163,7 @@ impl Plan {
     /// Processor time of a unit by the estimate (s). Runs are computed as many at a time as there are lanes: a unit of
     /// one run lasts as long as one of eight.
     #[must_use]
-    pub fn unit_s(&self, grid: &Grid, unit: Unit) -> f64 {
+    pub(crate) fn unit_s(&self, grid: &Grid, unit: Unit) -> f64 {
         let run_s = self.estimate.run_s.get(grid.cell(unit.cell).trajectory).copied().unwrap_or(0.0);
         run_s * unit.runs.next_multiple_of(self.lanes()) as f64
     }
@@ -176,7 +176,7 @@ impl Plan {
 
     /// Hash of everything that decides the bytes of a cell's units.
     #[must_use]
-    pub fn cell_hash(&self, grid: &Grid, cell: Cell) -> blake3::Hash {
+    pub(crate) fn cell_hash(&self, grid: &Grid, cell: Cell) -> blake3::Hash {
         let scenario = grid.scenario(cell, self.seed);
         let key = CellKey {
             version: &self.version,
@@ -198,7 +198,7 @@ impl Plan {
 
     /// The name of a unit: hash of its cell's hash and its run range, 32 hexadecimal digits.
     #[must_use]
-    pub fn unit_id(cell_hash: &blake3::Hash, unit: Unit) -> String {
+    pub(crate) fn unit_id(cell_hash: &blake3::Hash, unit: Unit) -> String {
         let mut hasher = blake3::Hasher::new();
         hasher.update(cell_hash.as_bytes());
         hasher.update(&unit.first.to_le_bytes()).update(&unit.runs.to_le_bytes());
@@ -206,7 +206,7 @@ impl Plan {
     }
 
     /// All units with their names, in order; each cell is hashed once.
-    pub fn named_units<'a>(&'a self, grid: &'a Grid) -> impl Iterator<Item = (Unit, String)> + 'a {
+    pub(crate) fn named_units<'a>(&'a self, grid: &'a Grid) -> impl Iterator<Item = (Unit, String)> + 'a {
         let mut last: Option<(usize, blake3::Hash)> = None;
         self.units(grid).map(move |unit| {
             let hash = match last {

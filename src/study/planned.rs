@@ -54,20 +54,20 @@ impl Planned {
     ///
     /// # Errors
     /// The file.
-    pub fn inputs_unchanged(&self) -> Result<(), StudyError> {
+    pub(crate) fn inputs_unchanged(&self) -> Result<(), StudyError> {
         let files = self.plan.inputs.iter().map(|i| (beside(&self.study, Path::new(&i.path)), &i.blake3));
         files.filter(|(path, _)| path.exists()).try_for_each(|(path, blake3)| unchanged(&path, blake3))
     }
 
     /// Processor time of all units by the plan's probe (s).
     #[must_use]
-    pub fn processor_s(&self) -> f64 {
+    pub(crate) fn processor_s(&self) -> f64 {
         self.plan.units(&self.grid).map(|unit| self.plan.unit_s(&self.grid, unit)).sum()
     }
 
     /// What the longest unit takes by the plan's probe (s) on so many threads.
     #[must_use]
-    pub fn longest_unit_s(&self, threads: u64) -> f64 {
+    pub(crate) fn longest_unit_s(&self, threads: u64) -> f64 {
         let wall_s = |unit: Unit| {
             let batches = unit.runs.div_ceil(self.plan.lanes());
             self.plan.unit_s(&self.grid, unit) / threads.clamp(1, batches.max(1)) as f64
@@ -87,7 +87,7 @@ impl Planned {
     ///
     /// # Errors
     /// When the directory cannot be read.
-    pub fn status_of_whole(&self) -> Result<Status, StudyError> {
+    pub(crate) fn status_of_whole(&self) -> Result<Status, StudyError> {
         self.status_by(&|id| unit_file::read(&self.directory, id).is_ok())
     }
 
@@ -118,7 +118,7 @@ impl Planned {
 
     /// How many unit files are not of this plan, and where.
     #[must_use]
-    pub fn foreign_units(&self, status: &Status) -> Option<Remark> {
+    pub(crate) fn foreign_units(&self, status: &Status) -> Option<Remark> {
         let first = status.foreign.first()?;
         let example = unit_file::path(&self.directory, first);
         Some(Remark::ForeignUnits { units: status.foreign.len(), example })

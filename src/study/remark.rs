@@ -93,7 +93,7 @@ pub enum Remark {
 impl Remark {
     /// How much it matters.
     #[must_use]
-    pub const fn importance(&self) -> Importance {
+    pub(crate) const fn importance(&self) -> Importance {
         match self {
             Self::InputRead(_) => Importance::Detail,
             Self::Calibrating { .. } | Self::ModelRestored { .. } | Self::DoneAlready { .. } => {

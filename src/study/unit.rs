@@ -102,7 +102,7 @@ impl Finding {
 /// Computes runs `first..first + runs`; `None` if `go_on` said no on the way. `progress` is told of runs
 /// completed.
 #[must_use]
-pub fn run_unit(
+pub(crate) fn run_unit(
     plan: &simulation::Plan<'_>,
     (first, runs): (u64, u64),
     kept: Kept,

@@ -2,7 +2,7 @@
 
 use super::{Place, duration};
 use crate::cli::{Failure, Session};
-use nav_sim::study::{directory, file};
+use crate::study::{directory, file};
 use std::path::Path;
 
 /// Print a script that runs a planned study on a cluster or here

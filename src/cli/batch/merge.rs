@@ -3,7 +3,7 @@
 use super::Place;
 use super::watch::Watch;
 use crate::cli::{Failure, Session};
-use nav_sim::study::{self, MergeOptions, Planned, StudyError, Unit};
+use crate::study::{self, MergeOptions, Planned, StudyError, Unit};
 use serde_json::json;
 use std::path::PathBuf;
 

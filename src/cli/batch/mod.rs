@@ -12,7 +12,7 @@ mod watch;
 pub(super) use emit::shell_words;
 
 use super::{Failure, Session, read};
-use nav_sim::study::{Planned, Remedy, StudyError};
+use crate::study::{Planned, Remedy, StudyError};
 use std::path::{Path, PathBuf};
 
 /// Studies: grids of Monte-Carlo experiments, planned, run in pieces anywhere, merged

@@ -3,7 +3,7 @@
 use super::watch::Watch;
 use super::{Place, duration};
 use crate::cli::{Failure, Session};
-use nav_sim::study::{self, PlanOptions, Planned, Writing};
+use crate::study::{self, PlanOptions, Planned, Writing};
 use serde_json::json;
 use std::time::Instant;
 

@@ -4,7 +4,7 @@ use super::Place;
 use super::shard;
 use super::watch::Watch;
 use crate::cli::{Failure, Session};
-use nav_sim::study::{self, RunOptions, Shard};
+use crate::study::{self, RunOptions, Shard};
 use signal_hook::consts::{SIGINT, SIGTERM};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -1,7 +1,7 @@
 //! Which part of a plan a process does: by flag, or by what the scheduler says.
 
 use crate::cli::Failure;
-use nav_sim::study::Shard;
+use crate::study::Shard;
 
 /// `i/n`, i from 0.
 pub(super) fn parse(text: &str) -> Result<Shard, String> {

@@ -3,7 +3,7 @@
 use super::watch::Watch;
 use super::{Place, duration};
 use crate::cli::{Failure, Session};
-use nav_sim::observer::Observer;
+use crate::observer::Observer;
 use serde_json::json;
 
 /// What is done of a study and what is left

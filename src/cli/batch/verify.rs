@@ -3,7 +3,7 @@
 use super::Place;
 use super::watch::Watch;
 use crate::cli::{Failure, Session};
-use nav_sim::study::{self, VerifyOptions};
+use crate::study::{self, VerifyOptions};
 use serde_json::json;
 
 /// Compute some finished units again and compare them bit by bit

@@ -1,8 +1,8 @@
 //! What the engine of studies says, on the terminal.
 
 use crate::cli::{Progress, Session};
-use nav_sim::observer::Observer;
-use nav_sim::study::{Importance, Remark};
+use crate::observer::Observer;
+use crate::study::{Importance, Remark};
 use std::sync::OnceLock;
 
 /// Prints remarks and shows progress.

@@ -9,12 +9,12 @@ use super::pictures::PlotArgs;
 use super::recordings::{RecordingArgs, Said};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
-use nav_sim::calibration::{
+use crate::calibration::{
     Bootstrap, Estimator, FitRange, ModelChoice, ModelSpec, ParameterLimit, Pool, Settings, Trim, Weighting,
 };
-use nav_sim::formats::parameters_file;
-use nav_sim::imu::Sensor;
-use nav_sim::jobs::{self, CalibrationOptions, EstimatorChoice};
+use crate::formats::parameters_file;
+use crate::imu::Sensor;
+use crate::jobs::{self, CalibrationOptions, EstimatorChoice};
 use output::outputs;
 use std::path::{Path, PathBuf};
 

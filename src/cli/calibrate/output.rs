@@ -1,13 +1,13 @@
 //! The files of a calibration: one model and its curves for each estimator.
 
 use super::Args;
+use crate::calibration::{Estimator, Outcome, Settings, diagnose};
 use crate::cli::pictures::{PlotArgs, replaceable};
 use crate::cli::{Failure, Session, read};
-use nav_sim::calibration::{Estimator, Outcome, Settings, diagnose};
-use nav_sim::formats::atomic;
-use nav_sim::formats::model_file::{self, CalibrationNote};
-use nav_sim::jobs::{Calibration, ModelFiles};
-use nav_sim::report::{self, CurvesFile, FitsFile, Input};
+use crate::formats::atomic;
+use crate::formats::model_file::{self, CalibrationNote};
+use crate::jobs::{Calibration, ModelFiles};
+use crate::report::{self, CurvesFile, FitsFile, Input};
 use std::path::{Path, PathBuf};
 
 /// Refuses at once what would be refused after the work: a file that is no calibration is another result, and with a seed

@@ -3,18 +3,18 @@
 use super::Args;
 use crate::cli::run::Words;
 use crate::cli::{Failure, Session, parse, read, turn_on};
+use crate::ekf::{Belief, FilterStates, InitialSettings};
+use crate::formats::fusion_files::{FixSigma, ImuFile, read_gnss, read_imu, read_initial};
+use crate::frames::RollPitchYaw;
+use crate::fusion::alignment::{self, Alignment};
+use crate::fusion::{FusionError, Recorded, Settings, Start, check_clocks};
+use crate::gnss::GnssFix;
+use crate::jobs::{FusionFilter, FusionFilterError};
+use crate::report::Input;
+use crate::sensors::outage::{FixedData, OutagePlan, PlacedOutages};
+use crate::trajectory::reference::Reference;
+use crate::units::DEG;
 use glam::{DMat3, DQuat, DVec3};
-use nav_sim::ekf::{Belief, FilterStates, InitialSettings};
-use nav_sim::formats::fusion_files::{FixSigma, ImuFile, read_gnss, read_imu, read_initial};
-use nav_sim::frames::RollPitchYaw;
-use nav_sim::fusion::alignment::{self, Alignment};
-use nav_sim::fusion::{FusionError, Recorded, Settings, Start, check_clocks};
-use nav_sim::gnss::GnssFix;
-use nav_sim::jobs::{FusionFilter, FusionFilterError};
-use nav_sim::report::Input;
-use nav_sim::sensors::outage::{FixedData, OutagePlan, PlacedOutages};
-use nav_sim::trajectory::reference::Reference;
-use nav_sim::units::DEG;
 use std::path::PathBuf;
 
 /// What was read, ready to use.

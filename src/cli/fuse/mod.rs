@@ -7,15 +7,15 @@ use super::filter::FilterArgs;
 use super::parse::one_of;
 use super::run::{parse_outage, windows_of};
 use super::{Failure, Session, parse};
+use crate::earth::GravityModel;
+use crate::formats::fusion_files::FixSigma;
+use crate::fusion::alignment::Alignment;
+use crate::fusion::{self, Assessment, Recorded, Settings, Verdict};
+use crate::report::{FusionSummary, seconds};
+use crate::sensors::gnss::MAX_LEVER_ARM_M;
+use crate::sensors::outage::Outage;
+use crate::simulation::lincov::weak_heading;
 use inputs::Inputs;
-use nav_sim::earth::GravityModel;
-use nav_sim::formats::fusion_files::FixSigma;
-use nav_sim::fusion::alignment::Alignment;
-use nav_sim::fusion::{self, Assessment, Recorded, Settings, Verdict};
-use nav_sim::report::{FusionSummary, seconds};
-use nav_sim::sensors::gnss::MAX_LEVER_ARM_M;
-use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::lincov::weak_heading;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -123,7 +123,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let summary = FusionSummary::of(&solution, (&outcome, &assessment), &start, rate_hz, states);
     let wall_s = begin.elapsed().as_secs_f64();
     output::write(&solution, &summary, inputs.files, wall_s, &args.out)?;
-    let shown = if session.json() { nav_sim::report::json(&summary) } else { summary.text() };
+    let shown = if session.json() { crate::report::json(&summary) } else { summary.text() };
     session.printer.result(shown.trim_end());
     session.printer.say(&format!("wrote {}", args.out.display()));
     believed(&assessment, &args.out, outcome.nis_per_component)

@@ -1,9 +1,9 @@
 //! The directory of a fusion.
 
 use crate::cli::{Failure, Session};
-use nav_sim::formats::atomic::{AtomicDir, Found, claim_directory};
-use nav_sim::fusion::Solution;
-use nav_sim::report::{FUSION_FILES, FusionKind, FusionManifest, FusionSummary, Input, fusion_directory};
+use crate::formats::atomic::{AtomicDir, Found, claim_directory};
+use crate::fusion::Solution;
+use crate::report::{FUSION_FILES, FusionKind, FusionManifest, FusionSummary, Input, fusion_directory};
 use std::path::Path;
 
 /// Whether the directory can be made, found out before the work.

@@ -2,13 +2,13 @@
 
 use super::Args;
 use crate::cli::{Failure, Session, read, turn_on};
-use nav_sim::formats::draws_file::{self, Draws};
-use nav_sim::formats::model_file::ModelFile;
-use nav_sim::imu::{Recording, Sensor};
-use nav_sim::jobs::{NavigateInputs, TrueImu};
-use nav_sim::noise::Model;
-use nav_sim::report::{Input, ModelNote};
-use nav_sim::scenario::{Method, Scenario};
+use crate::formats::draws_file::{self, Draws};
+use crate::formats::model_file::ModelFile;
+use crate::imu::{Recording, Sensor};
+use crate::jobs::{NavigateInputs, TrueImu};
+use crate::noise::Model;
+use crate::report::{Input, ModelNote};
+use crate::scenario::{Method, Scenario};
 use std::path::{Path, PathBuf};
 
 /// What was read, ready to use.

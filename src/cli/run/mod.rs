@@ -8,15 +8,15 @@ use super::filter::FilterArgs;
 use super::parse::one_of;
 use super::pictures::PlotArgs;
 use super::{Failure, Session};
+use crate::formats::scenario_file;
+use crate::jobs::{self, NavigateError};
+use crate::metrics::{Requirement, Summary};
+use crate::report::{Manifest, TrajectorySeries, run_words, window};
+use crate::scenario::{Method, Scenario};
+use crate::sensors::imu::TruthError;
+use crate::sensors::outage::{NotAnOutage, Outage, PlacedOutages};
+use crate::simulation::ExperimentError;
 use inputs::Inputs;
-use nav_sim::formats::scenario_file;
-use nav_sim::jobs::{self, NavigateError};
-use nav_sim::metrics::{Requirement, Summary};
-use nav_sim::report::{Manifest, TrajectorySeries, run_words, window};
-use nav_sim::scenario::{Method, Scenario};
-use nav_sim::sensors::imu::TruthError;
-use nav_sim::sensors::outage::{NotAnOutage, Outage, PlacedOutages};
-use nav_sim::simulation::ExperimentError;
 use std::path::{Path, PathBuf};
 
 use output::{manifest, write};
@@ -136,10 +136,10 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let throughput_epochs_per_s = if wall_s > 0.0 { epochs / wall_s } else { 0.0 };
     let manifest = Manifest { independent_windows, wall_s, throughput_epochs_per_s, ..manifest };
     write(&found, &manifest, &TrajectorySeries::of(&inputs.job.trajectory), &args.out)?;
-    args.plot.write(|| nav_sim::report::run_svg(&found.epochs, &found.summary), session)?;
+    args.plot.write(|| crate::report::run_svg(&found.epochs, &found.summary), session)?;
     let summary = &found.summary;
     let shown = match session.json() {
-        true => nav_sim::report::summary_json(summary, throughput_epochs_per_s),
+        true => crate::report::summary_json(summary, throughput_epochs_per_s),
         false => run_words::text(summary),
     };
     session.printer.result(shown.trim_end());
@@ -147,7 +147,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         session.printer.say(&format!("{:.2} million IMU epochs/s", throughput_epochs_per_s / 1e6));
     }
     if args.chart && !session.json() {
-        session.printer.result(&nav_sim::report::run_text(&found.epochs, &found.summary));
+        session.printer.result(&crate::report::run_text(&found.epochs, &found.summary));
     }
     if session.verbose() && !session.json() {
         session.printer.result(run_words::sensitivity_table(&found.summary).trim_end());

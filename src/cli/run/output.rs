@@ -1,12 +1,12 @@
 //! The run directory and what is printed of it.
 
 use crate::cli::{Failure, Session};
-use nav_sim::formats::atomic::{AtomicDir, Found, claim_directory};
-use nav_sim::jobs::Navigation;
-use nav_sim::metrics::{Summary, VerdictKind};
-use nav_sim::report::{self, Input, Manifest, ModelNote, TrajectorySeries, run_words};
-use nav_sim::scenario::Scenario;
-use nav_sim::sensors::outage::Outage;
+use crate::formats::atomic::{AtomicDir, Found, claim_directory};
+use crate::jobs::Navigation;
+use crate::metrics::{Summary, VerdictKind};
+use crate::report::{self, Input, Manifest, ModelNote, TrajectorySeries, run_words};
+use crate::scenario::Scenario;
+use crate::sensors::outage::Outage;
 use std::path::Path;
 
 /// The manifest of a run: every key as it was used, outages one by one, the seed.

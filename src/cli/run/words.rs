@@ -1,9 +1,9 @@
 //! What a job tells, in words.
 
 use crate::cli::{Progress, Session};
-use nav_sim::jobs::Note;
-use nav_sim::observer::Observer;
-use nav_sim::report::run_words;
+use crate::jobs::Note;
+use crate::observer::Observer;
+use crate::report::run_words;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 

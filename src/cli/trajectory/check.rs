@@ -2,11 +2,11 @@
 
 use super::Source;
 use crate::cli::{Failure, Session, parse};
-use nav_sim::closure::{Bounds, Closure};
-use nav_sim::earth::GravityModel;
-use nav_sim::trajectory::Trajectory;
-use nav_sim::trajectory::plausibility::{Excess, Limits, Quantity, examine};
-use nav_sim::units::DEG;
+use crate::closure::{Bounds, Closure};
+use crate::earth::GravityModel;
+use crate::trajectory::Trajectory;
+use crate::trajectory::plausibility::{Excess, Limits, Quantity, examine};
+use crate::units::DEG;
 use serde::Serialize;
 
 /// Check a trajectory: could a vehicle move so, and does navigation close on it?

@@ -6,8 +6,8 @@ mod record;
 mod write;
 
 use super::{Failure, Session};
-use nav_sim::formats::trajectory_file::{Options, load, parse_origin};
-use nav_sim::trajectory::Trajectory;
+use crate::formats::trajectory_file::{Options, load, parse_origin};
+use crate::trajectory::Trajectory;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 

@@ -2,9 +2,9 @@
 
 use super::{Source, wrote};
 use crate::cli::{Failure, Session};
-use nav_sim::formats::atomic;
-use nav_sim::report::{TrajectorySeries, trajectory_svg};
-use nav_sim::sensors::outage::Outage;
+use crate::formats::atomic;
+use crate::report::{TrajectorySeries, trajectory_svg};
+use crate::sensors::outage::Outage;
 use std::path::PathBuf;
 
 /// Draw a trajectory: map, height, speed, attitude, outages marked

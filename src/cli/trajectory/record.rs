@@ -2,14 +2,14 @@
 
 use super::{Source, wrote};
 use crate::cli::{Failure, Session, read, turn_on};
-use nav_sim::formats::atomic::{AtomicDir, Found, claim_directory};
-use nav_sim::formats::scenario_file;
-use nav_sim::formats::trajectory_file::{Rows, write_rows};
-use nav_sim::noise::continuous;
-use nav_sim::report::{gnss_csv, imu_csv, initial_toml};
-use nav_sim::scenario::Scenario;
-use nav_sim::sensors::imu::Truth;
-use nav_sim::simulation::{Plan, record};
+use crate::formats::atomic::{AtomicDir, Found, claim_directory};
+use crate::formats::scenario_file;
+use crate::formats::trajectory_file::{Rows, write_rows};
+use crate::noise::continuous;
+use crate::report::{gnss_csv, imu_csv, initial_toml};
+use crate::scenario::Scenario;
+use crate::sensors::imu::Truth;
+use crate::simulation::{Plan, record};
 use std::path::PathBuf;
 
 /// Names of the files, in the order of writing.

@@ -2,8 +2,8 @@
 
 use super::{Source, wrote};
 use crate::cli::{Failure, Session, parse};
-use nav_sim::formats::atomic::guard_inputs;
-use nav_sim::formats::trajectory_file::{Rows, write_csv, write_rows};
+use crate::formats::atomic::guard_inputs;
+use crate::formats::trajectory_file::{Rows, write_csv, write_rows};
 use std::path::{Path, PathBuf};
 
 /// Write a motion profile as a table of evenly spaced rows

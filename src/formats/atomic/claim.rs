@@ -8,7 +8,7 @@ use std::path::Path;
 
 /// What a directory holds, told by its last file, which appears when the others are whole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Found {
+pub(crate) enum Found {
     /// The result of another command.
     Foreign,
     /// Another result of this command, or one that may be: how so.
@@ -20,7 +20,7 @@ pub enum Found {
 impl Found {
     /// A result of this command, by whether all that decides it is the same.
     #[must_use]
-    pub const fn result(is_same: bool) -> Self {
+    pub(crate) const fn result(is_same: bool) -> Self {
         match is_same {
             true => Self::Same,
             false => Self::Other("holds the result of another configuration, other inputs or another seed"),
@@ -36,7 +36,7 @@ impl Found {
 ///
 /// # Errors
 /// Why not.
-pub fn claim_directory<'a>(
+pub(crate) fn claim_directory<'a>(
     directory: &Path,
     files: &[impl AsRef<str>],
     inputs: impl Iterator<Item = &'a Path> + Clone,

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// replaced and others left alone. The file declared last (a manifest, say) vanishes first and appears last:
 /// where it is, the rest is whole. Killed on the way, everything is still there, and [`recover`] finishes.
 #[derive(Debug)]
-pub struct AtomicDir {
+pub(crate) struct AtomicDir {
     destination: PathBuf,
     staging: Temporary,
     names: Vec<String>,
@@ -28,7 +28,7 @@ impl AtomicDir {
     ///
     /// # Errors
     /// When the destination is a file, or a directory cannot be made.
-    pub fn create(destination: &Path) -> Result<Self, FileError> {
+    pub(crate) fn create(destination: &Path) -> Result<Self, FileError> {
         let error = |e| FileError::io(destination, e);
         let existing = fs::metadata(destination).ok();
         if existing.as_ref().is_some_and(|m| !m.is_dir()) {
@@ -44,7 +44,7 @@ impl AtomicDir {
     }
 
     /// Declares a file and returns the path to write it at for now.
-    pub fn path(&mut self, name: &str) -> PathBuf {
+    pub(crate) fn path(&mut self, name: &str) -> PathBuf {
         if !self.names.iter().any(|n| n == name) {
             self.names.push(name.to_owned());
         }
@@ -55,7 +55,7 @@ impl AtomicDir {
     ///
     /// # Errors
     /// When the system refuses.
-    pub fn write(&mut self, name: &str, contents: impl AsRef<[u8]>) -> Result<(), FileError> {
+    pub(crate) fn write(&mut self, name: &str, contents: impl AsRef<[u8]>) -> Result<(), FileError> {
         self.write_parts(name, [contents])
     }
 
@@ -63,7 +63,7 @@ impl AtomicDir {
     ///
     /// # Errors
     /// When the system refuses.
-    pub fn write_parts(
+    pub(crate) fn write_parts(
         &mut self,
         name: &str,
         parts: impl IntoIterator<Item = impl AsRef<[u8]>>,
@@ -77,17 +77,11 @@ impl AtomicDir {
         write().map_err(|e| FileError::io(&self.destination.join(name), e))
     }
 
-    /// Where the directory will appear.
-    #[must_use]
-    pub fn destination(&self) -> &Path {
-        &self.destination
-    }
-
     /// Flushes the declared files to the disk and gives them their names.
     ///
     /// # Errors
     /// When a declared file was not written, the disk is full, or a rename is refused.
-    pub fn commit(mut self) -> Result<(), FileError> {
+    pub(crate) fn commit(mut self) -> Result<(), FileError> {
         for name in &self.names {
             let sync = File::open(self.staging.path().join(name)).and_then(|f| f.sync_all());
             sync.map_err(|e| FileError::io(&self.destination.join(name), e))?;
@@ -117,7 +111,7 @@ fn inside(destination: &Path) -> PathBuf {
 
 /// Finishes what a writer of this directory had begun to put in place when it was killed. What cannot be
 /// finished (in a directory that may not be written to, say) stays as it is.
-pub fn recover(destination: &Path) {
+pub(crate) fn recover(destination: &Path) {
     for (moving, held) in temporary::abandoned(&inside(destination), temporary::MOVING) {
         let _ = move_files(&moving, destination);
         drop(held);

@@ -14,7 +14,7 @@ const BUFFER: usize = 1 << 16;
 /// A destination that exists and is no regular file (a pipe, `/dev/null`) is written directly; a symbolic
 /// link is followed. Missing parent directories are made.
 #[derive(Debug)]
-pub struct AtomicFile {
+pub(crate) struct AtomicFile {
     destination: PathBuf,
     temporary: Option<Temporary>,
     file: BufWriter<File>,
@@ -25,7 +25,7 @@ impl AtomicFile {
     ///
     /// # Errors
     /// When the directory cannot be made or written to.
-    pub fn create(destination: &Path) -> Result<Self, FileError> {
+    pub(crate) fn create(destination: &Path) -> Result<Self, FileError> {
         let error = |e| FileError::io(destination, e);
         let metadata = fs::metadata(destination).ok();
         if metadata.as_ref().is_some_and(fs::Metadata::is_dir) {
@@ -43,17 +43,11 @@ impl AtomicFile {
         Ok(Self { destination, temporary: Some(temporary), file: BufWriter::with_capacity(BUFFER, file) })
     }
 
-    /// Where the file will appear.
-    #[must_use]
-    pub fn destination(&self) -> &Path {
-        &self.destination
-    }
-
     /// Flushes to the disk and gives the file its name.
     ///
     /// # Errors
     /// When the disk is full or the rename is refused; nothing is left then.
-    pub fn commit(mut self) -> Result<(), FileError> {
+    pub(crate) fn commit(mut self) -> Result<(), FileError> {
         self.finish().map_err(|e| FileError::io(&self.destination, e))
     }
 
@@ -62,7 +56,7 @@ impl AtomicFile {
     ///
     /// # Errors
     /// When the destination holds something else and is to stay, too.
-    pub fn commit_result(mut self, shown: &Path, existing: Existing) -> Result<(), FileError> {
+    pub(crate) fn commit_result(mut self, shown: &Path, existing: Existing) -> Result<(), FileError> {
         self.file.flush().map_err(|e| FileError::io(shown, e))?;
         if let (Existing::Keep, Some(temporary)) = (existing, &self.temporary) {
             let digest = |path: &Path| hash::of_file(path).ok();

@@ -6,10 +6,10 @@ mod directory;
 mod file;
 mod temporary;
 
-pub use claim::{Found, claim_directory};
-pub use directory::{AtomicDir, recover};
-pub use file::AtomicFile;
-pub use temporary::remove_unfinished;
+pub(crate) use claim::{Found, claim_directory};
+pub(crate) use directory::{AtomicDir, recover};
+pub(crate) use file::AtomicFile;
+pub(crate) use temporary::remove_unfinished;
 
 use super::{FileError, Place, Setting};
 use std::io::{self, Write};
@@ -19,7 +19,10 @@ use std::path::Path;
 ///
 /// # Errors
 /// When it is one.
-pub fn guard_inputs<'a>(output: &Path, inputs: impl IntoIterator<Item = &'a Path>) -> Result<(), FileError> {
+pub(crate) fn guard_inputs<'a>(
+    output: &Path,
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> Result<(), FileError> {
     let Ok(target) = output.canonicalize() else { return Ok(()) };
     let hit = inputs.into_iter().any(|i| i.canonicalize().is_ok_and(|i| i == target));
     if !hit {
@@ -42,7 +45,7 @@ pub enum Existing {
 ///
 /// # Errors
 /// When the file holds something else and is to stay.
-pub fn guard_contents(path: &Path, contents: &[u8], existing: Existing) -> Result<(), FileError> {
+pub(crate) fn guard_contents(path: &Path, contents: &[u8], existing: Existing) -> Result<(), FileError> {
     let regular = std::fs::metadata(path).is_ok_and(|m| m.is_file());
     let same = || std::fs::read(path).is_ok_and(|there| there == contents);
     if existing == Existing::Replace || !regular || same() {
@@ -59,7 +62,7 @@ fn kept(path: &Path, why: &str) -> FileError {
 ///
 /// # Errors
 /// As [`guard_contents`] and [`write()`].
-pub fn write_result(
+pub(crate) fn write_result(
     destination: &Path,
     contents: impl AsRef<[u8]>,
     existing: Existing,
@@ -72,7 +75,7 @@ pub fn write_result(
 ///
 /// # Errors
 /// As [`AtomicFile::create`] and [`AtomicFile::commit`].
-pub fn write(destination: &Path, contents: impl AsRef<[u8]>) -> Result<(), FileError> {
+pub(crate) fn write(destination: &Path, contents: impl AsRef<[u8]>) -> Result<(), FileError> {
     let mut file = AtomicFile::create(destination)?;
     file.write_all(contents.as_ref()).map_err(|e| FileError::io(destination, e))?;
     file.commit()

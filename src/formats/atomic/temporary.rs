@@ -17,7 +17,7 @@ pub(super) fn unfinished() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 
 /// Removes everything this process is writing. From then on none of its outputs gets its name: for a process
 /// that is about to end.
-pub fn remove_unfinished() {
+pub(crate) fn remove_unfinished() {
     let unfinished = unfinished();
     for path in unfinished.iter() {
         // Other threads may still make files in a directory that is being removed.

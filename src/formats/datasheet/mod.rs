@@ -78,7 +78,7 @@ impl Datasheet {
 
     /// The figures that a noise model needs and the datasheet does not state: the model has no such noise.
     #[must_use]
-    pub fn not_stated(&self) -> Vec<String> {
+    pub(crate) fn not_stated(&self) -> Vec<String> {
         let figures = |sensor: Sensor| [Figure::Noise, Figure::Bias].map(|figure| (sensor, figure));
         let needed = Sensor::ALL.into_iter().flat_map(figures);
         let lacking = needed.filter(|(sensor, figure)| self.value(*sensor, *figure).is_none());

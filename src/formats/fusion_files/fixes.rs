@@ -53,7 +53,7 @@ pub(super) const COLUMNS: &str = "a GNSS file has the columns t_s, lat_deg, lon_
 
 /// Standard deviations of fixes whose file states none: north, east, down.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FixSigma {
+pub(crate) struct FixSigma {
     /// Of the position (m).
     pub pos_m: [f64; 3],
     /// Of the velocity (m/s).
@@ -223,7 +223,10 @@ fn of_another_kind(path: &str, text: &str) -> Option<Error> {
 ///
 /// # Errors
 /// Whatever is wrong with it, with its line.
-pub fn read_gnss(path: &Path, unsaid: Option<&FixSigma>) -> Result<(Vec<GnssFix>, Vec<String>), Error> {
+pub(crate) fn read_gnss(
+    path: &Path,
+    unsaid: Option<&FixSigma>,
+) -> Result<(Vec<GnssFix>, Vec<String>), Error> {
     let mut text = text(path)?;
     if let Some(error) = of_another_kind(&path.display().to_string(), &text) {
         return Err(error);

@@ -22,7 +22,7 @@ const FAST: f64 = 2.0;
 
 /// A recording, ready to be fused.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ImuFile {
+pub(crate) struct ImuFile {
     /// Samples whose intervals follow one another.
     pub samples: Vec<ImuIncrement>,
     /// Samples a second, by the median step.
@@ -49,7 +49,7 @@ struct Columns {
 ///
 /// # Errors
 /// Whatever is wrong with it, with its line.
-pub fn read_imu(path: &Path) -> Result<ImuFile, Error> {
+pub(crate) fn read_imu(path: &Path) -> Result<ImuFile, Error> {
     let packed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy"));
     let text = if packed { None } else { Some(text(path)?) };
     let columns = match text.as_ref().and_then(|text| Some((text, bare_columns(text)?))) {

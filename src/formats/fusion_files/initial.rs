@@ -35,7 +35,7 @@ const KEYS: [&str; 17] = [
 ///
 /// # Errors
 /// File, line, key and value of what is refused.
-pub fn read_initial(path: &Path) -> Result<Start, FileError> {
+pub(crate) fn read_initial(path: &Path) -> Result<Start, FileError> {
     parse(&Source::read(path)?)
 }
 

@@ -6,9 +6,9 @@ mod inertial;
 mod initial;
 mod rtklib;
 
-pub use fixes::{FixSigma, read_gnss};
-pub use inertial::{ImuFile, read_imu};
-pub use initial::read_initial;
+pub(crate) use fixes::{FixSigma, read_gnss};
+pub(crate) use inertial::{ImuFile, read_imu};
+pub(crate) use initial::read_initial;
 
 use crate::formats::trajectory_file::table::{self, Numbers, Table};
 use crate::formats::{FileError, Kind};

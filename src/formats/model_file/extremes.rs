@@ -25,7 +25,7 @@ impl ModelFile {
     /// theta) at one end, by name. The errors of a filter are linear in every amplitude: whatever holds at both
     /// ends holds between. None where no parameter has an interval.
     #[must_use]
-    pub fn extremes(&self) -> Option<Vec<(String, Model)>> {
+    pub(crate) fn extremes(&self) -> Option<Vec<(String, Model)>> {
         if self.intervals.is_empty() {
             return None;
         }

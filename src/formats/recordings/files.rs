@@ -46,7 +46,7 @@ pub(super) fn expand(paths: &[PathBuf]) -> Result<Vec<File>, FileError> {
 ///
 /// # Errors
 /// When a path cannot be read, or one is given twice.
-pub fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, FileError> {
+pub(crate) fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, FileError> {
     Ok(expand(paths)?.into_iter().map(|file| file.path).collect())
 }
 
@@ -69,7 +69,7 @@ fn name_of(path: &Path) -> String {
 
 /// Whether a name ends like a recording's.
 #[must_use]
-pub fn is_recording(name: &str) -> bool {
+pub(crate) fn is_recording(name: &str) -> bool {
     let lower = name.to_lowercase();
     let plain = lower.strip_suffix(".gz").unwrap_or(&lower);
     plain.rsplit_once('.').is_some_and(|(stem, ending)| !stem.is_empty() && ENDINGS.contains(&ending))

@@ -20,7 +20,7 @@ pub(in crate::formats) mod timing;
 mod values;
 mod write;
 
-pub use files::{is_recording, listed};
+pub(crate) use files::{is_recording, listed};
 pub use report::{FileReport, Report};
 pub use write::FileFormat;
 
@@ -114,7 +114,7 @@ const AT_ONCE: usize = 8;
 ///
 /// # Errors
 /// When a file cannot be read, or holds what no sound recording can: [`FileError`].
-pub fn visit<T: Send>(
+pub(crate) fn visit<T: Send>(
     paths: &[PathBuf],
     options: &ReadOptions,
     look: &(dyn Fn(Recording) -> T + Sync),

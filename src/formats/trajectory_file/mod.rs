@@ -10,8 +10,9 @@ mod samples;
 pub(in crate::formats) mod table;
 mod write;
 
-pub use samples::parse_origin;
-pub use write::{Rows, write_csv, write_rows};
+pub(crate) use samples::parse_origin;
+pub(crate) use write::write_rows;
+pub use write::{Rows, write_csv};
 
 use super::{FileError, Place};
 use crate::trajectory::Trajectory;

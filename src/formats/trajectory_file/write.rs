@@ -59,7 +59,7 @@ pub fn write_csv(
 ///
 /// # Errors
 /// What the system says.
-pub fn write_rows(out: &mut impl Write, trajectory: &Trajectory, rows: Rows) -> io::Result<()> {
+pub(crate) fn write_rows(out: &mut impl Write, trajectory: &Trajectory, rows: Rows) -> io::Result<()> {
     writeln!(out, "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg")?;
     for t_s in rows.times(trajectory) {
         let state = trajectory.state(t_s);

@@ -2,7 +2,7 @@
 
 /// How an axis runs.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Scale {
+pub(crate) enum Scale {
     /// Evenly.
     Linear,
     /// By powers of ten; what is not positive is not shown.
@@ -13,7 +13,7 @@ pub enum Scale {
 
 /// An axis.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Axis {
+pub(crate) struct Axis {
     /// Quantity and unit, such as `time (s)`.
     pub label: String,
     /// How it runs.
@@ -25,32 +25,32 @@ pub struct Axis {
 impl Axis {
     /// A linear axis.
     #[must_use]
-    pub fn linear(label: &str) -> Self {
+    pub(crate) fn linear(label: &str) -> Self {
         Self { label: label.to_owned(), scale: Scale::Linear, include: None }
     }
 
     /// A logarithmic axis.
     #[must_use]
-    pub fn log(label: &str) -> Self {
+    pub(crate) fn log(label: &str) -> Self {
         Self { scale: Scale::Log, ..Self::linear(label) }
     }
 
     /// An axis of names.
     #[must_use]
-    pub fn names(names: Vec<String>) -> Self {
+    pub(crate) fn names(names: Vec<String>) -> Self {
         Self { scale: Scale::Names(names), ..Self::linear("") }
     }
 
     /// The same, showing at least the values from `low` to `high`.
     #[must_use]
-    pub fn including(self, low: f64, high: f64) -> Self {
+    pub(crate) fn including(self, low: f64, high: f64) -> Self {
         Self { include: Some((low, high)), ..self }
     }
 }
 
 /// A colour of the palette, which the blind to red or green can tell apart too (Okabe and Ito).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Colour {
+pub(crate) enum Colour {
     /// That of the text: measurements.
     Ink,
     /// Grey: what stands in the background.
@@ -61,13 +61,13 @@ pub enum Colour {
 
 impl Colour {
     /// Hues of the palette.
-    pub const HUES: usize = 8;
+    pub(crate) const HUES: usize = 8;
     /// What a filter or a model believes.
-    pub const BELIEVED: Self = Self::Hue(0);
+    pub(crate) const BELIEVED: Self = Self::Hue(0);
     /// What is true.
-    pub const REAL: Self = Self::Hue(1);
+    pub(crate) const REAL: Self = Self::Hue(1);
     /// Where a right filter or model stays.
-    pub const RIGHT: Self = Self::Hue(2);
+    pub(crate) const RIGHT: Self = Self::Hue(2);
 
     /// Class of the style sheet.
     pub(super) fn class(self) -> String {
@@ -81,7 +81,7 @@ impl Colour {
 
 /// How a line is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stroke {
+pub(crate) enum Stroke {
     /// As most are.
     Plain,
     /// One of many.
@@ -106,7 +106,7 @@ impl Stroke {
 
 /// A point and its interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Interval {
+pub(crate) struct Interval {
     /// Where.
     pub x: f64,
     /// The value.
@@ -119,7 +119,7 @@ pub struct Interval {
 
 /// What is drawn of a series.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Mark {
+pub(crate) enum Mark {
     /// A line through points (x, y); a value that cannot be shown breaks it.
     Line(Vec<(f64, f64)>, Stroke),
     /// The area between two curves (x, low, high).
@@ -138,7 +138,7 @@ pub enum Mark {
 
 /// Something to see and its name in the legend. Series of one name, in all panels, are one entry there.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Series {
+pub(crate) struct Series {
     /// Name; of an empty one the legend says nothing.
     pub name: String,
     /// Colour.
@@ -150,39 +150,43 @@ pub struct Series {
 impl Series {
     /// A series.
     #[must_use]
-    pub fn new(name: &str, colour: Colour, mark: Mark) -> Self {
+    pub(crate) fn new(name: &str, colour: Colour, mark: Mark) -> Self {
         Self { name: name.to_owned(), colour, mark }
     }
 
     /// A line.
     #[must_use]
-    pub fn line(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
+    pub(crate) fn line(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
         Self::new(name, colour, Mark::Line(points, Stroke::Plain))
     }
 
     /// A thin line.
     #[must_use]
-    pub fn thin(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
+    pub(crate) fn thin(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
         Self::new(name, colour, Mark::Line(points, Stroke::Thin))
     }
 
     /// Points (x, y, half of the interval; NaN: none).
     #[must_use]
-    pub fn points(name: &str, colour: Colour, points: impl IntoIterator<Item = (f64, f64, f64)>) -> Self {
+    pub(crate) fn points(
+        name: &str,
+        colour: Colour,
+        points: impl IntoIterator<Item = (f64, f64, f64)>,
+    ) -> Self {
         let point = |(x, y, half): (f64, f64, f64)| Interval { x, y, low: y - half, high: y + half };
         Self::new(name, colour, Mark::Points(points.into_iter().map(point).collect()))
     }
 
     /// A dashed line.
     #[must_use]
-    pub fn dashed(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
+    pub(crate) fn dashed(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
         Self::new(name, colour, Mark::Line(points, Stroke::Dashed))
     }
 }
 
 /// One plot of a chart, all of which share their x axis.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Panel {
+pub(crate) struct Panel {
     /// Its own axis.
     pub y: Axis,
     /// What is in it, the first at the bottom.
@@ -194,14 +198,14 @@ pub struct Panel {
 impl Panel {
     /// A panel of the usual height.
     #[must_use]
-    pub fn new(y: Axis, series: Vec<Series>) -> Self {
+    pub(crate) fn new(y: Axis, series: Vec<Series>) -> Self {
         Self { y, series, height: 1.0 }
     }
 }
 
 /// How much room a chart takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Size {
+pub(crate) enum Size {
     /// The whole width: drawn twice, for a screen and for a phone.
     Full,
     /// One of several side by side ([`super::Page::charts`]).
@@ -210,7 +214,7 @@ pub enum Size {
 
 /// Panels above one another with one x axis.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Chart {
+pub(crate) struct Chart {
     /// What it shows, in words.
     pub title: String,
     /// The axis of all panels.
@@ -230,7 +234,7 @@ pub struct Chart {
 impl Chart {
     /// A chart of one or more panels, of the whole width.
     #[must_use]
-    pub fn new(title: &str, x: Axis, panels: Vec<Panel>) -> Self {
+    pub(crate) fn new(title: &str, x: Axis, panels: Vec<Panel>) -> Self {
         Self {
             title: title.to_owned(),
             x,
@@ -244,26 +248,26 @@ impl Chart {
 
     /// A map: east to the right, north up, in metres, one scale.
     #[must_use]
-    pub fn map(title: &str, series: Vec<Series>) -> Self {
+    pub(crate) fn map(title: &str, series: Vec<Series>) -> Self {
         let panel = Panel::new(Axis::linear("north (m)"), series);
         Self { is_map: true, ..Self::new(title, Axis::linear("east (m)"), vec![panel]) }
     }
 
     /// The same with outages (start, end) marked.
     #[must_use]
-    pub fn with_outages(self, outages: &[(f64, f64)]) -> Self {
+    pub(crate) fn with_outages(self, outages: &[(f64, f64)]) -> Self {
         Self { stripes: ("outage".to_owned(), outages.to_vec()), ..self }
     }
 
     /// The same in a group of charts that are zoomed together.
     #[must_use]
-    pub fn in_group(self, group: &str) -> Self {
+    pub(crate) fn in_group(self, group: &str) -> Self {
         Self { group: group.to_owned(), ..self }
     }
 
     /// The same, small.
     #[must_use]
-    pub fn small(self) -> Self {
+    pub(crate) fn small(self) -> Self {
         Self { size: Size::Small, ..self }
     }
 }

@@ -1,21 +1,5 @@
 //! Pages of results: one self-contained HTML file each (no network, complete without scripts, for a screen, a phone,
 //! paper, by day and by night), and charts as files. A page is a function of the results alone: same seed, same bytes.
-//!
-//! ```
-//! use nav_sim::report::page::{Axis, Chart, Colour, Page, Panel, Series, Table, Tone};
-//! let drift = Series::line("RMSE", Colour::REAL, vec![(0.0, 1.0), (30.0, 4.0), (60.0, 20.0)]);
-//! let belief = Series::line("ASEE", Colour::BELIEVED, vec![(0.0, 1.0), (30.0, 5.0), (60.0, 18.0)]);
-//! let panel = Panel::new(Axis::log("position error (m)"), vec![drift, belief]);
-//! let chart = Chart::new("Drift", Axis::linear("time (s)"), vec![panel]).with_outages(&[(10.0, 50.0)]);
-//! let mut page = Page::new("A drive", Tone::Good, "The filter is consistent.");
-//! page.section("Results");
-//! page.chart(&chart, "RMSE: how wrong the runs were. ASEE: how wrong the filter believed to be.");
-//! let mut table = Table::new(["state", "RMSE (m)"]);
-//! table.row(["north".into(), nav_sim::report::page::Cell::number(20.0, "/rmse_end/pos_n_m")]);
-//! page.table(&table);
-//! assert!(page.html().starts_with("<!DOCTYPE html>"));
-//! assert!(nav_sim::report::page::svg("Drift", &[chart]).starts_with("<svg xmlns="));
-//! ```
 
 mod axis;
 mod chart;
@@ -25,9 +9,9 @@ mod marks;
 mod table;
 mod terminal;
 
-pub use chart::{Axis, Chart, Colour, Interval, Mark, Panel, Scale, Series, Size, Stroke};
-pub use table::{Cell, Table};
-pub use terminal::{beside, terminal};
+pub(crate) use chart::{Axis, Chart, Colour, Interval, Mark, Panel, Series, Size, Stroke};
+pub(crate) use table::{Cell, Table};
+pub(crate) use terminal::{beside, terminal};
 
 use draw::{Canvas, NARROW, SMALL, WIDE, draw, text};
 use std::fmt::Write as _;
@@ -38,7 +22,7 @@ const SCRIPT: &str = include_str!("page.js");
 
 /// How a verdict is coloured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Tone {
+pub(crate) enum Tone {
     /// As it should be.
     Good,
     /// To be looked at.
@@ -49,7 +33,7 @@ pub enum Tone {
 
 /// A page: a title, a verdict, then sections of words, charts and tables.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Page {
+pub(crate) struct Page {
     title: String,
     body: String,
 }
@@ -57,7 +41,7 @@ pub struct Page {
 impl Page {
     /// A page that begins with its verdict, one or two sentences.
     #[must_use]
-    pub fn new(title: &str, tone: Tone, verdict: &str) -> Self {
+    pub(crate) fn new(title: &str, tone: Tone, verdict: &str) -> Self {
         let class = match tone {
             Tone::Good => "",
             Tone::Doubtful => " doubtful",
@@ -69,22 +53,22 @@ impl Page {
     }
 
     /// Begins a section.
-    pub fn section(&mut self, title: &str) {
+    pub(crate) fn section(&mut self, title: &str) {
         let _ = writeln!(self.body, "<h2>{}</h2>", escape(title));
     }
 
     /// A heading within a section.
-    pub fn heading(&mut self, title: &str) {
+    pub(crate) fn heading(&mut self, title: &str) {
         let _ = writeln!(self.body, "<h3>{}</h3>", escape(title));
     }
 
     /// A paragraph.
-    pub fn text(&mut self, words: &str) {
+    pub(crate) fn text(&mut self, words: &str) {
         let _ = writeln!(self.body, "<p>{}</p>", escape(words));
     }
 
     /// Names and what they are, line by line.
-    pub fn facts(&mut self, facts: &[(&str, String)]) {
+    pub(crate) fn facts(&mut self, facts: &[(&str, String)]) {
         self.body += "<dl>\n";
         for (name, value) in facts {
             let _ = writeln!(self.body, "<dt>{}</dt><dd>{}</dd>", escape(name), escape(value));
@@ -93,7 +77,7 @@ impl Page {
     }
 
     /// Links to files beside the page: relative path and what is there.
-    pub fn links(&mut self, links: &[(String, String)]) {
+    pub(crate) fn links(&mut self, links: &[(String, String)]) {
         self.body += "<ul>\n";
         for (path, name) in links {
             let _ = writeln!(self.body, "<li><a href=\"{}\">{}</a></li>", escape(path), escape(name));
@@ -102,34 +86,34 @@ impl Page {
     }
 
     /// A chart and what is to be seen in it.
-    pub fn chart(&mut self, chart: &Chart, caption: &str) {
+    pub(crate) fn chart(&mut self, chart: &Chart, caption: &str) {
         self.body += &figure(chart, caption);
     }
 
     /// Small charts side by side; one below the other on a phone.
-    pub fn charts(&mut self, charts: &[Chart], caption: &str) {
+    pub(crate) fn charts(&mut self, charts: &[Chart], caption: &str) {
         self.body += "<div class=\"charts\">\n";
         charts.iter().for_each(|chart| self.body += &figure(chart, ""));
         let _ = writeln!(self.body, "</div>\n<figcaption>{}</figcaption>", escape(caption));
     }
 
     /// The last line of a page: what its figures were checked against, to which tolerance, by which test.
-    pub fn checked(&mut self, words: &str) {
+    pub(crate) fn checked(&mut self, words: &str) {
         let _ = writeln!(self.body, "<p class=\"checked\">Checked: {}</p>", escape(words));
     }
 
     /// A table.
-    pub fn table(&mut self, table: &Table) {
+    pub(crate) fn table(&mut self, table: &Table) {
         self.body += &table.html();
     }
 
     /// A text as it stands in a file.
-    pub fn code(&mut self, text: &str) {
+    pub(crate) fn code(&mut self, text: &str) {
         let _ = writeln!(self.body, "<pre>{}</pre>", escape(text));
     }
 
     /// What few want to see, folded.
-    pub fn folded(&mut self, title: &str, inside: impl FnOnce(&mut Self)) {
+    pub(crate) fn folded(&mut self, title: &str, inside: impl FnOnce(&mut Self)) {
         let _ = writeln!(self.body, "<details><summary>{}</summary>", escape(title));
         inside(self);
         self.body += "</details>\n";
@@ -137,7 +121,7 @@ impl Page {
 
     /// The file.
     #[must_use]
-    pub fn html(&self) -> String {
+    pub(crate) fn html(&self) -> String {
         let Self { title, body } = self;
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -153,7 +137,7 @@ const GENERATOR: &str = "<meta name=\"generator\" content=\"nav-sim\">";
 
 /// Whether a text is a page of this module.
 #[must_use]
-pub fn is_own(html: &str) -> bool {
+pub(crate) fn is_own(html: &str) -> bool {
     html.contains(GENERATOR)
 }
 
@@ -191,7 +175,7 @@ fn element(chart: &Chart, canvas: &Canvas) -> Option<String> {
 
 /// Charts below one another as an SVG file; those without a value are left out.
 #[must_use]
-pub fn svg(title: &str, charts: &[Chart]) -> String {
+pub(crate) fn svg(title: &str, charts: &[Chart]) -> String {
     const MARGIN: f64 = 16.0;
     let line = 2.0 * WIDE.font;
     let (mut body, mut top) = (String::new(), MARGIN);

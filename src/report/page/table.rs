@@ -9,7 +9,7 @@ const LONG: usize = 40;
 
 /// A cell.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Cell {
+pub(crate) struct Cell {
     text: String,
     /// Where its number stands in the results as JSON, as a JSON pointer.
     source: String,
@@ -20,13 +20,13 @@ impl Cell {
     /// A number, shown with three digits; `source` says where it stands in the results as JSON, as a JSON pointer
     /// such as `/outages/0/nees_end`: tests hold the page against it.
     #[must_use]
-    pub fn number(value: f64, source: &str) -> Self {
+    pub(crate) fn number(value: f64, source: &str) -> Self {
         Self { text: readable(value), source: source.to_owned(), is_number: true }
     }
 
     /// A number, or several, as they are to be shown.
     #[must_use]
-    pub fn figures(text: impl Into<String>) -> Self {
+    pub(crate) fn figures(text: impl Into<String>) -> Self {
         Self { text: text.into(), source: String::new(), is_number: true }
     }
 }
@@ -39,7 +39,7 @@ impl<T: Into<String>> From<T> for Cell {
 
 /// A table: its head, and rows of as many cells. The first column stays where it is when a phone scrolls the rest.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Table {
+pub(crate) struct Table {
     head: Vec<String>,
     rows: Vec<Vec<Cell>>,
 }
@@ -47,27 +47,27 @@ pub struct Table {
 impl Table {
     /// An empty table.
     #[must_use]
-    pub fn new<const N: usize>(head: [&str; N]) -> Self {
+    pub(crate) fn new<const N: usize>(head: [&str; N]) -> Self {
         Self { head: head.map(str::to_owned).into(), rows: Vec::new() }
     }
 
     /// The same with further columns.
     #[must_use]
-    pub fn and(mut self, head: impl IntoIterator<Item = String>) -> Self {
+    pub(crate) fn and(mut self, head: impl IntoIterator<Item = String>) -> Self {
         self.head.extend(head);
         self
     }
 
     /// A table of texts, the first row its head.
     #[must_use]
-    pub fn of_rows(rows: &[Vec<String>]) -> Self {
+    pub(crate) fn of_rows(rows: &[Vec<String>]) -> Self {
         let Some((head, rows)) = rows.split_first() else { return Self::default() };
         let cells = |row: &Vec<String>| row.iter().map(|text| Cell::from(text.clone())).collect();
         Self { head: head.clone(), rows: rows.iter().map(cells).collect() }
     }
 
     /// Adds a row.
-    pub fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
+    pub(crate) fn row(&mut self, cells: impl IntoIterator<Item = Cell>) {
         self.rows.push(cells.into_iter().collect());
     }
 

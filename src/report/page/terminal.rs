@@ -6,7 +6,7 @@ use crate::report::comparison::in_order;
 
 /// The rows of a chart of so many characters by so many rows, axes and title among them; none without a value to show.
 #[must_use]
-pub fn terminal(chart: &Chart, columns: usize, rows: usize) -> Vec<String> {
+pub(crate) fn terminal(chart: &Chart, columns: usize, rows: usize) -> Vec<String> {
     let Some(panel) = chart.panels.first() else { return Vec::new() };
     let lines = lines(panel);
     let shown = |axis, values: &dyn Fn(&(f64, f64)) -> f64| {
@@ -105,7 +105,7 @@ fn below(places: &[(f64, String)], x: &Ruler, width: usize, label: &str) -> Stri
 
 /// Texts beside one another, the first of so many characters.
 #[must_use]
-pub fn beside(left: &[String], right: &[String], columns: usize) -> Vec<String> {
+pub(crate) fn beside(left: &[String], right: &[String], columns: usize) -> Vec<String> {
     let rows = left.len().max(right.len());
     let cell = |rows: &[String], k: usize| rows.get(k).cloned().unwrap_or_default();
     let row = |k: usize| format!("{:<columns$}  {}", cell(left, k), cell(right, k)).trim_end().to_owned();

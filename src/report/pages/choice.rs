@@ -11,7 +11,7 @@ use crate::simulation::NEES_DOF;
 
 /// The page.
 #[must_use]
-pub fn choice_page(report: &ChoiceReport<'_>) -> String {
+pub(crate) fn choice_page(report: &ChoiceReport<'_>) -> String {
     let placed = &report.ranking.candidates;
     let tone = if report.ranking.tells { Tone::Good } else { Tone::Doubtful };
     let mut verdict = report.verdict();

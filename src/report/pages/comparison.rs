@@ -34,7 +34,7 @@ impl RatioCurves {
 
 /// The page. `curves`: one a candidate; `outages` are (start, end) in seconds; `links`: pages beneath, path and name.
 #[must_use]
-pub fn comparison_page(
+pub(crate) fn comparison_page(
     file: &ComparisonFile,
     candidates: &[CandidateResult],
     curves: &[RatioCurves],
@@ -85,7 +85,7 @@ fn verdict(file: &ComparisonFile) -> String {
 
 /// The paper's Figure 7, beside its other ones.
 #[must_use]
-pub fn comparison_figure(
+pub(crate) fn comparison_figure(
     candidates: &[CandidateResult],
     curves: &[RatioCurves],
     outages: &[(f64, f64)],
@@ -99,7 +99,7 @@ const FIGURE: &str = "Departure of the ASEE of each filter from that of AWV in s
 
 /// The paper's Figure 7 as a picture.
 #[must_use]
-pub fn comparison_svg(
+pub(crate) fn comparison_svg(
     candidates: &[CandidateResult],
     curves: &[RatioCurves],
     outages: &[(f64, f64)],

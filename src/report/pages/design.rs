@@ -6,7 +6,7 @@ use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, 
 
 /// The page.
 #[must_use]
-pub fn design_page(designs: &[Design]) -> String {
+pub(crate) fn design_page(designs: &[Design]) -> String {
     let (tone, verdict) = verdict(designs);
     let mut page = Page::new("What recordings would tell", tone, &verdict);
     design_verdict(designs).lines().for_each(|line| page.text(&super::sentence(line)));

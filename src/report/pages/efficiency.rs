@@ -7,7 +7,7 @@ use crate::report::page::{Axis, Cell, Chart, Colour, Interval, Mark, Page, Panel
 
 /// The page.
 #[must_use]
-pub fn efficiency_page(file: &EfficiencyFile) -> String {
+pub(crate) fn efficiency_page(file: &EfficiencyFile) -> String {
     let mut page = Page::new("Study of the estimators", Tone::Good, &verdict(file));
     page.text(CAPTION);
     charts(file).iter().for_each(|chart| page.chart(chart, ""));
@@ -41,7 +41,7 @@ pub fn efficiency_page(file: &EfficiencyFile) -> String {
 
 /// The same as a picture.
 #[must_use]
-pub fn efficiency_svg(file: &EfficiencyFile) -> String {
+pub(crate) fn efficiency_svg(file: &EfficiencyFile) -> String {
     svg(&format!("Robust RMSE of {} sets", file.sets), &charts(file))
 }
 

@@ -9,7 +9,7 @@ use crate::report::trajectory::TrajectorySeries;
 
 /// A figure of the paper.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PaperFigure {
+pub(crate) struct PaperFigure {
     /// Its number.
     pub number: u32,
     /// What it shows.
@@ -20,13 +20,13 @@ pub struct PaperFigure {
 impl PaperFigure {
     /// `fig1.svg`
     #[must_use]
-    pub fn file_name(&self) -> String {
+    pub(crate) fn file_name(&self) -> String {
         format!("fig{}.svg", self.number)
     }
 
     /// As a picture.
     #[must_use]
-    pub fn svg(&self) -> String {
+    pub(crate) fn svg(&self) -> String {
         svg(&format!("Fig. {}: {}", self.number, self.caption), &self.charts)
     }
 
@@ -37,7 +37,7 @@ impl PaperFigure {
 
 /// The curves behind one model of the study.
 #[derive(Debug, Clone, PartialEq)]
-pub struct StudyCurves {
+pub(crate) struct StudyCurves {
     /// `I`, `II`, `III`.
     pub scenario: String,
     /// `awv`, `sr-awv`, `dr-awv`.
@@ -48,7 +48,7 @@ pub struct StudyCurves {
 
 /// Figures 1 and 3 to 6; 2 is of a study of the estimators, 7 of a comparison. `curves`: all models of the study.
 #[must_use]
-pub fn paper_figures(
+pub(crate) fn paper_figures(
     curves: &[StudyCurves],
     track: &TrajectorySeries,
     outages: &[(f64, f64)],
@@ -92,7 +92,7 @@ const AVERAGES: &str = "The wavelet variances that AWV, SR-AWV and DR-AWV are fi
 
 /// The page of all of them.
 #[must_use]
-pub fn paper_page(figures: &[PaperFigure]) -> String {
+pub(crate) fn paper_page(figures: &[PaperFigure]) -> String {
     let verdict = "The figures of Minaretzis et al. 2024 from this study, beside what the paper's show; Figure 2 is of a study of the \
                    estimators (nav-sim efficiency).";
     let mut page = Page::new("The paper's figures", Tone::Good, verdict);

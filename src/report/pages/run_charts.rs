@@ -6,13 +6,13 @@ use crate::report::page::{Axis, Chart, Colour, Interval, Mark, Panel, Series, sv
 
 /// What of it most people want as a picture.
 #[must_use]
-pub fn run_svg(epochs: &[EpochMetrics], summary: &Summary) -> String {
+pub(crate) fn run_svg(epochs: &[EpochMetrics], summary: &Summary) -> String {
     svg("Navigation errors", &[horizontal(epochs, summary), nees(epochs, summary)])
 }
 
 /// The horizontal error over time for a terminal.
 #[must_use]
-pub fn run_text(epochs: &[EpochMetrics], summary: &Summary) -> String {
+pub(crate) fn run_text(epochs: &[EpochMetrics], summary: &Summary) -> String {
     terminal(&horizontal(epochs, summary), 86, 15).join("\n")
 }
 

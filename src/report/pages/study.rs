@@ -11,7 +11,7 @@ use crate::report::verdict::verdict_word;
 /// The page of a merged study. `reference`: what ratios refer to; `more`: cells that are in outages.csv only; `rankings`:
 /// of candidates calibrated without the recordings that make the errors.
 #[must_use]
-pub fn study_page(
+pub(crate) fn study_page(
     cells: &[ShownCell],
     reference: &str,
     states: &[usize],

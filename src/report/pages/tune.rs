@@ -9,7 +9,7 @@ use crate::simulation::lincov::Honesty;
 
 /// The page.
 #[must_use]
-pub fn tune_page(result: &TuneResult) -> String {
+pub(crate) fn tune_page(result: &TuneResult) -> String {
     let tone = if result.is_honest() { Tone::Good } else { Tone::Doubtful };
     let mut page = Page::new("Honest inflation of a noise model", tone, &super::sentence(&result.verdict()));
     page.facts(&[("truths", result.truths.join(", "))]);

@@ -36,7 +36,7 @@ pub(super) fn band(tau_s: &[f64], low: &[f64], high: &[f64]) -> Mark {
 
 /// The page of the wavelet variances of some signals.
 #[must_use]
-pub fn wavelet_page(file: &SignalsFile) -> String {
+pub(crate) fn wavelet_page(file: &SignalsFile) -> String {
     let worst = file.signals.iter().filter_map(|s| Some((excess(s)?, s)));
     let worst = worst.max_by(|a, b| a.0.1.total_cmp(&b.0.1));
     let (tone, verdict) = match worst {
@@ -77,13 +77,13 @@ pub fn wavelet_page(file: &SignalsFile) -> String {
 
 /// The same as a picture.
 #[must_use]
-pub fn wavelet_svg(file: &SignalsFile) -> String {
+pub(crate) fn wavelet_svg(file: &SignalsFile) -> String {
     svg("Wavelet variance of static recordings", &charts(file))
 }
 
 /// The robust wavelet deviations for a terminal, a plot a sensor: each axis with its letter.
 #[must_use]
-pub fn wavelet_text(file: &SignalsFile) -> String {
+pub(crate) fn wavelet_text(file: &SignalsFile) -> String {
     let plot = |sensor: Sensor| {
         let own = file.signals.iter().filter(|s| s.sensor == sensor.name());
         let deviation = |s: &SignalCurves| -> Vec<(f64, f64)> {
