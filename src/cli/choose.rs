@@ -81,14 +81,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let trajectory = read::trajectory(&args.trajectory, session)?;
     let seed = session.seed(scenario.run.seed);
     let outages = outages(&scenario, (trajectory.start_s(), trajectory.end_s()), seed, session)?;
-    if args.recordings.skips_warm_up() {
-        // Windows of the recordings themselves make the errors, from the same beginning.
-        return Err(Failure::input("--skip-s auto is an option of calibrate and wv")
-            .hint("--skip-s with the longest that nav-sim calibrate advises"));
-    }
     let options = CalibrationOptions {
         reading: args.recordings.options(),
-        skip_warm_up: false,
+        skip_warm_up: args.recordings.skips_warm_up(),
         scales: args.tuning.scales,
         estimators: EstimatorChoice::default(),
         pool: args.pool,

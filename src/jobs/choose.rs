@@ -1,9 +1,10 @@
 //! Static recordings and a trajectory → the noise model that a filter is best made of.
 
+use super::calibrate::without_warm_up;
 use super::{Calibration, CalibrationOptions, EstimatorChoice, JobError, Measured, Note, Remarks, measure};
 use crate::calibration::{Estimator, model_of};
 use crate::choose::{Candidate, ChoiceError, Contender, Drive, Fold, Influence, Laboratory, Ranking, Unit};
-use crate::formats::recordings::{self, FileReport, ReadOptions};
+use crate::formats::recordings::{self, FileReport};
 use crate::imu::{Axis, Channel, Recording};
 use crate::noise::Model;
 use crate::observer::Observer;
@@ -77,7 +78,7 @@ pub fn choose(
     observer.begin(runs.iter().sum());
     let mut folds: Vec<(String, Fold)> = Vec::new();
     for (k, file) in files.iter().enumerate() {
-        let read = samples_of(file, &options.reading)?;
+        let read = samples_of(file, &options)?;
         let advance = |n| observer.advance(n);
         let fold = drive.leave_out(&laboratory, k, &read, candidates, runs[k], &advance)?;
         folds.push((file.file.clone(), fold));
@@ -120,6 +121,9 @@ fn runs_on(drive: &Drive, file: &FileReport) -> u64 {
     ((2.0 * windows / 8.0).ceil() as u64 * 8).clamp(16, 64)
 }
 
-fn samples_of(file: &FileReport, reading: &ReadOptions) -> Result<Vec<Recording>, JobError> {
-    Ok(recordings::read(std::slice::from_ref(&file.path), reading)?.0)
+/// The samples that were measured: a warm-up that was left out of the curves is no stretch to navigate on either.
+fn samples_of(file: &FileReport, options: &CalibrationOptions) -> Result<Vec<Recording>, JobError> {
+    let (read, _) = recordings::read(std::slice::from_ref(&file.path), &options.reading)?;
+    let measured = |recording| without_warm_up(recording, options.skip_warm_up).0;
+    Ok(read.into_iter().map(measured).collect())
 }

@@ -102,6 +102,36 @@ fn recordings_shorter_than_the_drive_are_judged_by_covariance_analysis() {
     assert!(shown.contains("judged by covariance analysis") && shown.lines().count() <= 20, "{shown}");
 }
 
+/// The first sixteenth of one recording is its warm-up: left out, it is as if it had never been recorded, for the curves and
+/// for the windows that are navigated on.
+#[test]
+fn a_warm_up_that_is_left_out_counts_for_nothing() {
+    const WARM_UP: usize = 1024;
+    let directory = recordings("16384", "3");
+    let first = directory.path().join("r/replicate_1.csv");
+    let text = std::fs::read_to_string(&first).unwrap();
+    let (header, rows) = text.split_once('\n').unwrap();
+    let warm = |row: &str| {
+        let (rest, last) = row.rsplit_once(',').unwrap();
+        format!("{rest},{}\n", last.parse::<f64>().unwrap() + 0.1)
+    };
+    let ranking = |rows: String, out: &str, more: &[&str]| {
+        std::fs::write(&first, format!("{header}\n{rows}")).unwrap();
+        let arguments = ["--estimator", "awv", "--model", "WN+RW", "-o", out];
+        choose(directory.path(), &[&arguments[..], more].concat()).success();
+        let file = std::fs::read_to_string(directory.path().join(out).join("ranking.json")).unwrap();
+        let fold = serde_json::from_str::<Value>(&file).unwrap()["candidates"][0]["folds"][0].clone();
+        [&fold["rmse_m"], &fold["nees"], &fold["believed_m"], &fold["expected"]["nees"]]
+            .map(|v| v.as_f64().unwrap())
+    };
+    let lines: Vec<&str> = rows.lines().collect();
+    let never: String = lines[WARM_UP..].iter().map(|row| format!("{row}\n")).collect();
+    let begun: String = lines[..WARM_UP].iter().map(|row| warm(row)).chain([never.clone()]).collect();
+    let (left_out, never) = (ranking(begun, "auto", &["--skip-s", "auto"]), ranking(never, "never", &[]));
+    // samples are kept from the first one of the file on: the same but for their rounding
+    assert!(left_out.iter().zip(never).all(|(a, b)| (a / b - 1.0).abs() < 1e-8), "{left_out:?} {never:?}");
+}
+
 #[test]
 fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
     let directory = recordings("8192", "3");

@@ -117,7 +117,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let outcome = fusion::outcome(&solution, &settings.outages);
     let constants = inputs.belief.groups.iter().flatten().filter(|g| g.is_constant()).count();
     let (rate_hz, states) = (inputs.imu.rate_hz, [inputs.belief.states, 3 * constants]);
-    let assessment = fusion::assess(&solution, &outcome, &doubts);
+    let assessment = fusion::assess(&solution, &outcome, &doubts).explained(&recorded);
     warn(&assessment, &outcome, session);
     doubt_heading(&solution, &settings.outages, session);
     let summary = FusionSummary::of(&solution, (&outcome, &assessment), &start, rate_hz, states);

@@ -1,6 +1,6 @@
 //! Whether a solution is to be believed: by its own innovations, and by a reference where there is one.
 
-use super::{FixRecord, Outcome, Solution, Use};
+use super::{FixRecord, Outcome, Recorded, Solution, Use, clocks_apart};
 
 /// NIS per component that is doubtful, and that is not to be believed: innovations 1.4 times and twice as large
 /// as stated. Receivers state their standard deviations to a factor like that; right solutions of real drives
@@ -57,6 +57,17 @@ impl Assessment {
         // caution is no comfort beside a doubt
         reasons.retain(|(v, _)| *v >= verdict.min(Verdict::Doubtful));
         Self { verdict, reasons }
+    }
+
+    /// The same, beginning with what the recorded data themselves show to be the cause.
+    #[must_use]
+    pub fn explained(mut self, recorded: &Recorded<'_>) -> Self {
+        if self.verdict >= Verdict::Doubtful
+            && let Some(apart) = clocks_apart(recorded)
+        {
+            self.reasons.insert(0, (Verdict::Doubtful, apart.to_string()));
+        }
+        self
     }
 }
 

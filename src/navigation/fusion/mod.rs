@@ -6,12 +6,14 @@
 
 pub mod alignment;
 mod assessment;
+mod clocks;
 mod filter;
 pub mod gap;
 mod outcome;
 
 use assessment::nis_bound;
 pub use assessment::{Assessment, Verdict, assess};
+pub use clocks::{ClocksApart, clocks_apart};
 pub use outcome::{Drift, OutageDrift, Outcome, outcome};
 
 use crate::earth::{GravityModel, MAX_LATITUDE, geodetic_to_ecef};

@@ -19,16 +19,16 @@ const ACCELERATION: f64 = 2.0;
 
 /// A fix with its velocity and the standard deviations of it (m/s).
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Moving {
-    pub(super) fix: GnssFix,
+pub(in crate::fusion) struct Moving {
+    pub(in crate::fusion) fix: GnssFix,
     pub(super) v_n: DVec3,
     pub(super) sigma_n: DVec3,
     /// Half the time between the two positions it comes from: it is as old as that (s); 0 as measured.
-    pub(super) lag_s: f64,
+    pub(in crate::fusion) lag_s: f64,
 }
 
 impl Moving {
-    pub(super) fn speed(&self) -> f64 {
+    pub(in crate::fusion) fn speed(&self) -> f64 {
         self.v_n.truncate().length()
     }
 
@@ -37,12 +37,12 @@ impl Moving {
     }
 
     /// The speed from which the course of this fix is a heading (m/s).
-    fn needed(&self) -> f64 {
+    pub(in crate::fusion) fn needed(&self) -> f64 {
         MIN_SPEED.max(5.0 * self.sigma())
     }
 
     /// The direction in which it moves (rad from north).
-    pub(super) fn course(&self) -> f64 {
+    pub(in crate::fusion) fn course(&self) -> f64 {
         self.v_n.y.atan2(self.v_n.x)
     }
 
@@ -61,7 +61,7 @@ impl Moving {
 }
 
 /// The velocities within the IMU recording.
-pub(super) fn courses(gnss: &[GnssFix], imu: &[ImuIncrement]) -> Vec<Moving> {
+pub(in crate::fusion) fn courses(gnss: &[GnssFix], imu: &[ImuIncrement]) -> Vec<Moving> {
     let first = imu.first().map_or(f64::INFINITY, |s| s.t_s - s.dt_s);
     let last = imu.last().map_or(f64::NEG_INFINITY, |s| s.t_s);
     let inside = |m: &Moving| m.fix.t_s >= first && m.fix.t_s < last;

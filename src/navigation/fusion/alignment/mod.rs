@@ -7,7 +7,7 @@
 //! change of the GNSS velocity, whichever is known better. A start that the fixes of the following minute
 //! contradict is given up for the next.
 
-mod course;
+pub(super) mod course;
 mod levelling;
 mod trial;
 

@@ -1,0 +1,195 @@
+//! Whether IMU and GNSS have one clock: the turns of the course against those of the gyroscopes.
+//!
+//! The norm of the mean angular rate between two fixes does not depend on how the IMU is mounted, and in a road vehicle it
+//! is the rate of the course. The lag at which the two agree best is the difference of the clocks.
+
+use super::Recorded;
+use super::alignment::course::{Moving, courses};
+use crate::frames::wrap_angle;
+use crate::imu::ImuIncrement;
+use glam::DVec3;
+use std::fmt;
+
+/// Lags that are tried (s), and the step from one to the next.
+const LONGEST_S: f64 = 60.0;
+const STEP_S: f64 = 0.1;
+/// Longest time from one fix to the next (s), and most pairs of them that are looked at.
+const APART_S: f64 = 3.0;
+const MOST: usize = 2000;
+/// Fewest turns of which anything is said.
+const FEWEST: usize = 30;
+/// Correlation from which the turns are the same ones.
+const SAME: f64 = 0.8;
+/// How much more of the turns must be left unexplained as the clocks are, and the least share that counts: between fixes
+/// the course of a vehicle is not quite its heading.
+const UNEXPLAINED: f64 = 2.0;
+const LEAST: f64 = 0.005;
+
+/// Clocks that are not the same.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ClocksApart {
+    /// What is to be added to the times of the fixes (s).
+    pub add_s: f64,
+    /// Correlation of the turns then.
+    pub correlation: f64,
+    /// Correlation as the clocks are.
+    pub as_they_are: f64,
+}
+
+impl fmt::Display for ClocksApart {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { add_s, correlation, as_they_are } = self;
+        write!(
+            f,
+            "the clocks of IMU and GNSS look {:.1} s apart: with {add_s:+.1} s added to the times of the fixes, their turns \
+             are those of the gyroscopes (correlation {correlation:.2}; {as_they_are:.2} as they are)",
+            add_s.abs()
+        )
+    }
+}
+
+/// A stretch between two fixes and the mean rate of the course in it (rad/s, without its sign).
+struct Turn {
+    from_s: f64,
+    to_s: f64,
+    rate: f64,
+}
+
+/// Finds the lag at which the turns agree; none where they agree as they are, or at no lag.
+#[must_use]
+pub fn clocks_apart(recorded: &Recorded<'_>) -> Option<ClocksApart> {
+    let turns = turns(recorded);
+    let turned = Turned::new(recorded.imu);
+    let steps = (LONGEST_S / STEP_S) as i32;
+    let lags = (-steps..=steps).map(|k| f64::from(k) * STEP_S);
+    let tried = lags.filter_map(|lag_s| Some((lag_s, correlation(&turns, &turned, lag_s)?)));
+    let (add_s, best) = tried.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let as_they_are = correlation(&turns, &turned, 0.0)?;
+    let unexplained = |r: f64| 1.0 - r * r.abs();
+    let is_other = best >= SAME && unexplained(as_they_are) > UNEXPLAINED * unexplained(best).max(LEAST);
+    is_other.then_some(ClocksApart { add_s, correlation: best, as_they_are })
+}
+
+/// The turns between fixes that move fast enough for a course.
+fn turns(recorded: &Recorded<'_>) -> Vec<Turn> {
+    let courses = courses(recorded.gnss, recorded.imu);
+    let between = |pair: &[Moving]| {
+        let [from, to] = pair else { return None };
+        let (from_s, to_s) = (from.fix.t_s - from.lag_s, to.fix.t_s - to.lag_s);
+        let is_course = |m: &Moving| m.speed() >= m.needed();
+        let turn = wrap_angle(to.course() - from.course()).abs();
+        let seconds = to_s - from_s;
+        (is_course(from) && is_course(to) && seconds > 0.0 && seconds <= APART_S).then_some(Turn {
+            from_s,
+            to_s,
+            rate: turn / seconds,
+        })
+    };
+    let all: Vec<Turn> = courses.windows(2).filter_map(between).collect();
+    let every = all.len().div_ceil(MOST).max(1);
+    all.into_iter().step_by(every).collect()
+}
+
+/// Pearson's correlation of the turns with those of the gyroscopes `lag_s` later; none where fewer than half of them
+/// lie in the recording, or hardly any.
+fn correlation(turns: &[Turn], turned: &Turned, lag_s: f64) -> Option<f64> {
+    let rate = |turn: &Turn| {
+        let angle = turned.until(turn.to_s + lag_s)? - turned.until(turn.from_s + lag_s)?;
+        Some((turn.rate, angle.length() / (turn.to_s - turn.from_s)))
+    };
+    let pairs: Vec<(f64, f64)> = turns.iter().filter_map(rate).collect();
+    if pairs.len() < FEWEST.max(turns.len() / 2) {
+        return None;
+    }
+    let count = pairs.len() as f64;
+    let mean_x = pairs.iter().map(|p| p.0).sum::<f64>() / count;
+    let mean_y = pairs.iter().map(|p| p.1).sum::<f64>() / count;
+    let product =
+        |f: &dyn Fn(f64, f64) -> f64| pairs.iter().map(|(x, y)| f(x - mean_x, y - mean_y)).sum::<f64>();
+    let (xx, yy, xy) = (product(&|x, _| x * x), product(&|_, y| y * y), product(&|x, y| x * y));
+    Some(xy / (xx * yy).sqrt()).filter(|r| r.is_finite())
+}
+
+/// The angle through which the IMU has turned, as the sum of its increments.
+struct Turned {
+    times: Vec<f64>,
+    angles: Vec<DVec3>,
+}
+
+impl Turned {
+    fn new(imu: &[ImuIncrement]) -> Self {
+        let mut angle = DVec3::ZERO;
+        let add = |sample: &ImuIncrement| {
+            angle += sample.dtheta;
+            angle
+        };
+        Self { times: imu.iter().map(|s| s.t_s).collect(), angles: imu.iter().map(add).collect() }
+    }
+
+    /// Up to a time, between samples in proportion; none outside the recording.
+    fn until(&self, t_s: f64) -> Option<DVec3> {
+        let next = self.times.partition_point(|t| *t < t_s);
+        let before = next.checked_sub(1)?;
+        let (from, to) = (self.times[before], *self.times.get(next)?);
+        Some(self.angles[before].lerp(self.angles[next], (t_s - from) / (to - from)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gnss::GnssFix;
+
+    /// A drive of ten minutes at 10 m/s whose course turns by `rate(t)`, an IMU at 50 Hz in any attitude, and fixes whose
+    /// clock is `late_s` ahead of the IMU's.
+    fn drive(late_s: f64, rate: impl Fn(f64) -> f64) -> (Vec<ImuIncrement>, Vec<GnssFix>) {
+        let axis = DVec3::new(0.6, 0.0, 0.8);
+        let (mut imu, mut gnss, mut course) = (Vec::new(), Vec::new(), 0.0_f64);
+        for k in 1..=30_000 {
+            let t_s = f64::from(k) * 0.02;
+            let turn = rate(t_s) * 0.02;
+            course += turn;
+            imu.push(ImuIncrement { t_s, dt_s: 0.02, dtheta: axis * turn, dv: DVec3::ZERO });
+            if k % 50 == 0 {
+                let v_n = 10.0 * DVec3::new(course.cos(), course.sin(), 0.0);
+                gnss.push(GnssFix {
+                    t_s: t_s + late_s,
+                    lat: 0.8,
+                    lon: 0.1,
+                    h: 0.0,
+                    pos_sigma_n: DVec3::ONE,
+                    velocity: Some((v_n, DVec3::splat(0.05))),
+                });
+            }
+        }
+        (imu, gnss)
+    }
+
+    /// Turns that never come again in the same order.
+    fn winding(t_s: f64) -> f64 {
+        0.2 * (t_s / 7.0).sin() * (t_s / 11.3).sin() + 0.1 * (t_s / 31.7).sin()
+    }
+
+    #[test]
+    fn the_difference_of_the_clocks_is_found_with_its_sign() {
+        for late_s in [18.0, -18.0, 2.0, -0.7] {
+            let (imu, gnss) = drive(late_s, winding);
+            let apart = clocks_apart(&Recorded { imu: &imu, gnss: &gnss }).unwrap();
+            assert!((apart.add_s + late_s).abs() < 0.5 * STEP_S, "{apart:?}");
+        }
+        let (imu, gnss) = drive(18.0, winding);
+        let said = clocks_apart(&Recorded { imu: &imu, gnss: &gnss }).unwrap().to_string();
+        assert!(said.contains("look 18.0 s apart: with -18.0 s added to the times of the fixes"), "{said}");
+    }
+
+    #[test]
+    fn nothing_is_said_of_one_clock_nor_of_straight_roads_nor_of_turns_that_repeat() {
+        let (imu, gnss) = drive(0.0, winding);
+        assert_eq!(clocks_apart(&Recorded { imu: &imu, gnss: &gnss }), None);
+        let (imu, gnss) = drive(18.0, |_| 0.0);
+        assert_eq!(clocks_apart(&Recorded { imu: &imu, gnss: &gnss }), None);
+        // a round of 20 s: as good as they are as 20 s later
+        let (imu, gnss) = drive(0.0, |t| 0.3 * (std::f64::consts::PI * t / 10.0).sin());
+        assert_eq!(clocks_apart(&Recorded { imu: &imu, gnss: &gnss }), None);
+    }
+}
