@@ -1,19 +1,7 @@
 //! `nav-sim fuse` of an IMU and a receiver whose clocks are apart.
 
-use crate::common::drive::{MODEL, done, nav_sim, place_with};
+use crate::common::drive::{DRIVE, MODEL, done, nav_sim, place_with};
 use std::fs;
-
-const DRIVE: &str = "
-start = { lat_deg = 46.5, lon_deg = 6.5, h_m = 400, heading_deg = 40 }
-segment = [
-  { kind = \"straight\", duration_s = 10 },
-  { kind = \"accelerate\", to_speed_m_s = 10, duration_s = 10 },
-  { kind = \"turn\", angle_deg = 90, duration_s = 10 },
-  { kind = \"straight\", duration_s = 30 },
-  { kind = \"turn\", angle_deg = -120, duration_s = 15 },
-  { kind = \"straight\", duration_s = 25 },
-]
-";
 
 /// GPS time is 18 s ahead of UTC: the commonest of differences.
 #[test]
