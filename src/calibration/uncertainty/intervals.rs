@@ -48,7 +48,7 @@ pub(crate) fn intervals(
             let [low, high] = match lost {
                 // The quantile is that of what has vanished.
                 lost if lost > TAIL => [f64::NAN; 2],
-                _ => holding(value, interval(parameter, value, drawn, stretch)),
+                _ => holding(value, either_way(parameter, value, drawn, stretch)),
             };
             // The intervals of a parameter that is bounded end there.
             let (from, to) = spec.range(of);
@@ -157,23 +157,70 @@ fn log_time(process: &Process) -> f64 {
 /// of MA1 likewise with differences. The distances of the quantiles from the median are multiplied by `stretch`. Where
 /// the estimate or a quantile is at the bound, 0, the ends are the quantiles themselves.
 fn interval(parameter: Parameter, estimate: f64, drawn: Vec<f64>, stretch: f64) -> [f64; 2] {
-    let scale = |value: f64| match parameter {
-        Parameter::Phi => (-value.ln()).ln(),
-        Parameter::Theta => value,
-        _ => value.ln(),
-    };
-    let back = |scaled: f64| match parameter {
-        Parameter::Phi => (-scaled.exp()).exp(),
-        Parameter::Theta => scaled.clamp(-1.0, 1.0),
-        _ => scaled.exp(),
-    };
-    let mut sorted = drawn;
-    sorted.sort_by(f64::total_cmp);
-    let quantiles = [TAIL, 1.0 - TAIL].map(|p| quantile(&sorted, p));
-    let middle = scale(quantile(&sorted, 0.5));
-    let mut ends = quantiles.map(|q| back(2.0 * scale(estimate) - middle - stretch * (scale(q) - middle)));
-    ends.sort_by(f64::total_cmp);
-    if ends.iter().all(|e| e.is_finite()) && scale(estimate).is_finite() { ends } else { quantiles }
+    let draws = Draws::new(parameter, drawn, stretch);
+    draws.mirrored(estimate).unwrap_or(draws.quantiles)
+}
+
+/// The interval of a parameter of a sum of processes: [`interval`] and the quantiles of the draws together. A process that is
+/// hardly told from the others is shown only where its estimate is large, and then the draws, which show it smaller
+/// than it was estimated, would be mirrored to what is larger still.
+fn either_way(parameter: Parameter, estimate: f64, drawn: Vec<f64>, stretch: f64) -> [f64; 2] {
+    let draws = Draws::new(parameter, drawn, stretch);
+    let [low, high] = draws.stretched();
+    let [from, to] = draws.mirrored(estimate).unwrap_or([low, high]);
+    [low.min(from), high.max(to)]
+}
+
+/// Sorted draws of a parameter.
+struct Draws {
+    parameter: Parameter,
+    quantiles: [f64; 2],
+    median: f64,
+    stretch: f64,
+}
+
+impl Draws {
+    fn new(parameter: Parameter, mut drawn: Vec<f64>, stretch: f64) -> Self {
+        drawn.sort_by(f64::total_cmp);
+        let [low, median, high] = [TAIL, 0.5, 1.0 - TAIL].map(|p| quantile(&drawn, p));
+        Self { parameter, quantiles: [low, high], median, stretch }
+    }
+
+    /// The parameter where its law does not depend on its value.
+    fn scale(&self, value: f64) -> f64 {
+        match self.parameter {
+            Parameter::Phi => (-value.ln()).ln(),
+            Parameter::Theta => value,
+            _ => value.ln(),
+        }
+    }
+
+    fn back(&self, scaled: f64) -> f64 {
+        match self.parameter {
+            Parameter::Phi => (-scaled.exp()).exp(),
+            Parameter::Theta => scaled.clamp(-1.0, 1.0),
+            _ => scaled.exp(),
+        }
+    }
+
+    /// How far the quantiles are from the median, there.
+    fn distances(&self) -> [f64; 2] {
+        self.quantiles.map(|q| self.stretch * (self.scale(q) - self.scale(self.median)))
+    }
+
+    /// The quantiles, their distances stretched; as they are where one is at a bound.
+    fn stretched(&self) -> [f64; 2] {
+        let ends = self.distances().map(|d| self.back(self.scale(self.median) + d));
+        if ends.iter().all(|e| e.is_finite()) { ends } else { self.quantiles }
+    }
+
+    /// The quantiles mirrored at the estimate; none where it or one of them is at a bound.
+    fn mirrored(&self, estimate: f64) -> Option<[f64; 2]> {
+        let centre = 2.0 * self.scale(estimate) - self.scale(self.median);
+        let mut ends = self.distances().map(|d| self.back(centre - d));
+        ends.sort_by(f64::total_cmp);
+        (ends.iter().all(|e| e.is_finite()) && self.scale(estimate).is_finite()).then_some(ends)
+    }
 }
 
 /// The 95 % interval of what is positive and follows from the parameters, from what follows from the models of draws:
@@ -289,5 +336,25 @@ mod tests {
         assert_eq!(interval(Parameter::Sigma2, 0.0, vec![0.0, 0.0, 1.0], 1.0), [0.0, 1.0]);
         let [low, high] = interval(Parameter::Phi, 0.9, vec![0.85, 0.9, 0.93], 1.0);
         assert!(0.0 < low && low < 0.9 && 0.9 < high && high < 1.0, "{low} {high}");
+    }
+
+    /// Draws that are on the whole a quarter of the estimate, 0.5 to 2 times their median: mirrored at the
+    /// estimate, 2 to 8 times it; as they are, 1/8 to 1/2 of it. All of that is in the interval.
+    #[test]
+    fn the_interval_of_a_parameter_holds_the_draws_and_their_mirror_image() {
+        let drawn: Vec<f64> = (-100..=100).map(|k| 0.25 * f64::from(k).mul_add(0.01, 0.0).exp2()).collect();
+        let [low, high] = either_way(Parameter::Sigma2, 1.0, drawn.clone(), 1.0);
+        // quantiles 0.025 and 0.975 of 201: the fifth from either end
+        let tail = 0.96_f64.exp2();
+        assert!(
+            (low * 4.0 * tail - 1.0).abs() < 0.01 && (high / (4.0 * tail) - 1.0).abs() < 0.01,
+            "{low} {high}"
+        );
+        let [low, high] = either_way(Parameter::Sigma2, 1.0, drawn, 1.5);
+        let tail = tail.powf(1.5);
+        assert!(
+            (low * 4.0 * tail - 1.0).abs() < 0.01 && (high / (4.0 * tail) - 1.0).abs() < 0.01,
+            "{low} {high}"
+        );
     }
 }
