@@ -16,6 +16,7 @@ use serde::Serialize;
 
 /// What decides the error.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Influence {
     /// Scale by scale, of each model (a sensor, or an axis of it).
     pub scales: Vec<ScaleInfluence>,

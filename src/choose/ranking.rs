@@ -39,6 +39,7 @@ pub struct Mean {
 
 /// A candidate beside the winner, on the same recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Difference {
     /// Its log score less the winner's (nats an outage end); negative is worse.
     pub log_score: Mean,
@@ -50,6 +51,7 @@ pub struct Difference {
 
 /// A candidate on one recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct FoldScore {
     /// The recording that was left out.
     pub recording: String,
@@ -65,6 +67,7 @@ pub struct FoldScore {
 
 /// A candidate with its place.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Placed {
     /// In words.
     pub candidate: String,
@@ -93,6 +96,7 @@ pub struct Placed {
 
 /// All candidates, the best first, those that may be chosen before the others.
 #[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Ranking {
     /// The candidates.
     pub candidates: Vec<Placed>,

@@ -8,6 +8,7 @@ use std::path::Path;
 
 /// A file that cannot be read or written, or whose contents are refused.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct FileError {
     /// The file or directory, as it was named.
     pub path: Box<str>,
@@ -48,6 +49,7 @@ impl From<usize> for Place {
 
 /// What is wrong with a file.
 #[derive(Debug)]
+#[non_exhaustive]
 pub enum Kind {
     /// The system refuses: no such file, no permission, a full disk, damaged compression.
     System(io::Error),
@@ -215,6 +217,7 @@ impl FileError {
 
 /// One way out.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Remedy {
     /// Something to do about the file.
     Advice(Cow<'static, str>),

@@ -107,6 +107,7 @@ impl Default for CalibrationOptions {
 
 /// Recordings that were measured and found to be replicates of one another.
 #[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Measured {
     /// What was found in the files.
     pub report: Report,
@@ -122,6 +123,7 @@ pub struct Measured {
 
 /// Models and what they were made of.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Calibration {
     /// The wavelet variances.
     pub groups: Vec<Group>,

@@ -35,6 +35,7 @@ pub struct CertifiedScale {
 
 /// The certificate of one sensor.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Certificate {
     /// The sensor.
     pub sensor: Sensor,
@@ -53,6 +54,7 @@ impl Certificate {
 
 /// Why there is no certificate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum CertifyError {
     /// The pair is no noise model.
     #[error("the exported pair is no noise model: {0}")]

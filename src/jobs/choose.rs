@@ -30,6 +30,7 @@ pub struct ChoiceDrive {
 
 /// What was found.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Chosen {
     /// The candidates, the winner first.
     pub ranking: Ranking,

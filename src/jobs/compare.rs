@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 /// What was found.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Comparison {
     /// All of it, as it is written to a file.
     pub file: ComparisonFile,
@@ -24,6 +25,7 @@ pub struct Comparison {
 
 /// Why runs cannot be compared.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum CompareError {
     /// A run directory that cannot be read.
     #[error(transparent)]

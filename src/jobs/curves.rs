@@ -9,6 +9,7 @@ use std::path::Path;
 
 /// Curves of a file, each with what it is for.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Curves {
     curves: Vec<(Scope, Estimator, Curve)>,
     /// How models are fitted: with the estimators and the rate of the curves.

@@ -38,6 +38,7 @@ pub struct Destination<'a> {
 
 /// Why nothing can be said.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum DesignError {
     /// No such calibration.
     #[error(transparent)]

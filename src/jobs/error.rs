@@ -7,6 +7,7 @@ use crate::wavelet::WaveletError;
 
 /// Why a job has no result.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum JobError {
     /// A file that cannot be read.
     #[error(transparent)]

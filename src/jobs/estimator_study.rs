@@ -21,6 +21,7 @@ pub struct EstimatorStudy {
 
 /// A study that does not go on.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum EstimatorStudyError {
     /// Its directory cannot be written to.
     #[error(transparent)]

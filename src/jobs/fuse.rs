@@ -12,6 +12,7 @@ use crate::simulation::lincov;
 
 /// What the filter of a fusion is made of.
 #[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
 pub struct FusionFilter<'a> {
     /// The model of the IMU.
     pub model: &'a Model,
@@ -23,6 +24,7 @@ pub struct FusionFilter<'a> {
 
 /// A filter that cannot be made.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum FusionFilterError {
     /// The model cannot be converted to the rate of the recording.
     #[error(transparent)]

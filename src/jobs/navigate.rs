@@ -51,6 +51,7 @@ pub enum TrueImu {
 
 /// What was found.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Navigation {
     /// The runs; none of a covariance analysis.
     pub runs: Option<RunResult>,
@@ -62,6 +63,7 @@ pub struct Navigation {
 
 /// What is worth telling while the job runs.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Note {
     /// The filter starts with a bias of this standard deviation (m/s² or rad/s), too large to be meant.
     LargeBias(Sensor, f64),
@@ -79,6 +81,7 @@ pub enum Note {
 
 /// Why a job cannot be done.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum NavigateError {
     /// The experiment does not fit together.
     #[error(transparent)]

@@ -9,6 +9,7 @@ use crate::simulation::lincov::{Track, assess};
 
 /// What a filter of 15 states was made for, and what it is assessed along.
 #[derive(Debug)]
+#[non_exhaustive]
 pub struct Reduced<'a> {
     /// The model that was reduced.
     pub model: &'a Model,

@@ -6,6 +6,7 @@ use crate::imu::Channel;
 
 /// What a user may want to know beside the result.
 #[derive(Debug, Clone, Copy)]
+#[non_exhaustive]
 pub enum Remark<'a> {
     /// What was found in the recordings, and what is doubtful about them.
     Read(&'a Report),

@@ -14,6 +14,7 @@ type Source = Box<dyn std::error::Error + Send + Sync>;
 
 /// A study that cannot be planned, run, merged or verified.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum StudyError {
     /// A file that cannot be read or written, or whose contents are refused.
     #[error(transparent)]

@@ -28,6 +28,7 @@ pub struct MergeOptions {
 
 /// What a merge made.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct MergeReport {
     /// The directory of the tables.
     pub results: PathBuf,

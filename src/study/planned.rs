@@ -146,6 +146,7 @@ impl Planned {
 
 /// What is there of a plan.
 #[derive(Debug, Clone, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Status {
     /// Units of the plan.
     pub units: usize,

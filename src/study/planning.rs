@@ -52,6 +52,7 @@ pub enum Writing {
 
 /// What planning found.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct PlanReport {
     /// The plan.
     pub planned: Planned,

@@ -53,6 +53,7 @@ pub struct RunOptions {
 
 /// What a run did.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct RunReport {
     /// Units computed and written.
     pub finished: usize,

@@ -23,6 +23,7 @@ pub struct VerifyOptions {
 
 /// What verifying found.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct VerifyReport {
     /// Units that are there and whole.
     pub whole: usize,

@@ -10,6 +10,7 @@ use std::path::PathBuf;
 
 /// What was found and assumed while reading.
 #[derive(Debug, Clone, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Report {
     /// One entry a file.
     pub files: Vec<FileReport>,
@@ -49,6 +50,7 @@ impl Report {
 
 /// What was found and assumed in one file. Displays as one line.
 #[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
 pub struct FileReport {
     /// The file, as shown.
     pub file: String,

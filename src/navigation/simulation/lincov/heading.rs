@@ -19,12 +19,15 @@ pub struct HeadingDoubt {
 
 impl fmt::Display for HeadingDoubt {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // beyond half a turn a linear deviation is only a large number
+        let sigma =
+            if self.sigma_deg < 180.0 { format!("{:.0}°", self.sigma_deg) } else { "over 180°".to_owned() };
         write!(
             f,
-            "the heading is hardly observable: its standard deviation is {:.0}° after {:.0} s although there are \
+            "the heading is hardly observable: its standard deviation is {sigma} after {:.0} s although there are \
              fixes (horizontal accelerations are too small to show it); there the filter's sigma of yaw may be \
              several times too small, with any number of states",
-            self.sigma_deg, self.after_s
+            self.after_s
         )
     }
 }
