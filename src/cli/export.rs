@@ -9,6 +9,7 @@ use crate::formats::model_file::{self, ModelFile};
 use crate::imu::Sensor;
 use crate::jobs::{self, Recorded};
 use crate::noise::practical::{Horizon, Policy};
+use crate::report;
 use std::path::PathBuf;
 
 /// Write a noise model as the parameters of another program
@@ -78,10 +79,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         certificate(&export, &file, session)?;
     }
     match &args.out {
-        _ if session.json() => {
-            let json = serde_json::to_string_pretty(&export.json(&shown)).map_err(Failure::could_not)?;
-            session.printer.result(&json);
-        }
+        _ if session.json() => session.printer.result(report::json(&export.json(&shown)).trim_end()),
         Some(out) => session.printer.result(&format!("{}: {}", out.display(), args.target.name())),
         None => session.printer.result(&text),
     }

@@ -40,7 +40,6 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         Kind::Model => crate::formats::model_file::schema(),
         Kind::Parameters => parameters_file::schema(),
     };
-    let text = serde_json::to_string_pretty(&schema).map_err(Failure::could_not)?;
-    session.printer.result(&text);
+    session.printer.result(crate::report::json(&schema).trim_end());
     Ok(())
 }

@@ -113,16 +113,12 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         factors,
         truths: names,
     };
-    let shown = if session.json() {
-        result.json()
-    } else {
-        format!("{}\n\n{}", result.verdict(), super::compare::table(&result.rows()))
-    };
-    session.printer.result(shown.trim_end());
+    let text = || format!("{}\n\n{}", result.verdict(), super::compare::table(&result.rows()));
+    session.show(|| result.json(), text);
     super::pictures::page(args.page.as_deref(), || tune_page(&result), session)?;
     if let Some(out) = &args.out {
         model_file::write(out, &tuned(&file, &result.factors, args, &files), session.existing())?;
-        session.printer.say(&format!("wrote {}", out.display()));
+        session.wrote(out);
     }
     Ok(())
 }
@@ -221,7 +217,7 @@ fn track(
 fn tuned(file: &ModelFile, factors: &[Factor], args: &Args, files: &[Input]) -> ModelFile {
     let mut provenance = toml::Table::new();
     let mut put = |key: &str, value: toml::Value| provenance.insert(key.to_owned(), value);
-    put("program", format!("nav-sim {}", env!("CARGO_PKG_VERSION")).into());
+    put("program", model_file::PROGRAM.into());
     put("made_by", "tune".into());
     let aim = if args.intervals { "intervals" } else { "truths" };
     put("honest_for", format!("{} {aim}", if args.aim == Aim::Mean { "mean of" } else { "worst of" }).into());

@@ -1,6 +1,6 @@
 //! The ranking of candidates, on one screen and as JSON.
 
-use super::number::{readable, seconds};
+use super::number::{readable, window};
 use crate::choose::{Influence, Mean, Placed, Ranking};
 use crate::sensors::outage::Outage;
 use crate::simulation::NEES_DOF;
@@ -180,8 +180,7 @@ impl ChoiceReport<'_> {
     #[must_use]
     pub(crate) fn legend(&self) -> String {
         let recordings = self.ranking.winner().folds.len();
-        let ends: Vec<String> =
-            self.outages.iter().map(|o| format!("{}–{} s", seconds(o.start_s), seconds(o.end_s))).collect();
+        let ends: Vec<String> = self.outages.iter().map(|o| window(o.start_s, o.end_s)).collect();
         format!(
             "{recordings} recordings, each left out once; outages {}; * the best by log score, = cannot be told from \
              it; [95 % over recordings]; log score: of the best, and of the others less the best",

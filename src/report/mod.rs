@@ -3,6 +3,7 @@
 
 mod brief;
 mod choose;
+mod closure;
 mod columns;
 mod comparison;
 mod curves;
@@ -34,6 +35,7 @@ mod verdict;
 
 pub(crate) use brief::brief;
 pub(crate) use choose::{ChoiceReport, RankedPlace};
+pub(crate) use closure::TrajectoryCheck;
 pub(crate) use columns::columns;
 pub(crate) use comparison::{
     CandidateResult, ComparisonFile, Label, consistency_rows, meaning_of_intervals, table_rows,

@@ -1,6 +1,6 @@
 //! The model file of a calibration.
 
-use super::{Interval, ModelFile, SCHEMA, TurnOn};
+use super::{Interval, ModelFile, PROGRAM, SCHEMA, TurnOn};
 use crate::calibration::{Estimator, Outcome, ParameterLimit, Settings, TurnOnSpread, undetermined};
 use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::Model;
@@ -10,8 +10,6 @@ use toml::{Table, Value};
 /// What a calibration leaves in the file beside the model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationNote {
-    /// Version of nav-sim.
-    pub version: String,
     /// How the tuning constant follows from the efficiency: `exact` or `wv`.
     pub efficiency_convention: String,
     /// Seed of the bootstrap, if there was one.
@@ -48,7 +46,7 @@ impl CalibrationNote {
         let mut table = Table::new();
         let mut put = |key: &str, value: Value| table.insert(key.to_owned(), value);
         let estimator = outcomes.first().map_or(Estimator::Given, |o| o.estimator);
-        put("program", format!("nav-sim {}", self.version).into());
+        put("program", PROGRAM.into());
         put("schema", (SCHEMA as i64).into());
         put("estimator", estimator.name().into());
         put("model", settings.model.to_string().into());
