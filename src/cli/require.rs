@@ -4,14 +4,13 @@ use super::{Failure, Session, parse, pictures, read, turn_on};
 use crate::formats::atomic::{AtomicFile, guard_inputs};
 use crate::formats::datasheet::{self, CATALOGUE, Datasheet};
 use crate::formats::file_kind::{self, FileKind};
-use crate::formats::model_file::{self, ModelFile};
+use crate::formats::model_file;
 use crate::formats::scenario_file;
 use crate::jobs::{Ask, CatalogueUnit, Misplaced, Requirements};
-use crate::noise::Model;
 use crate::report::require as words;
-use crate::report::require::{Question, RankedUnit};
+use crate::report::require::RankedUnit;
 use crate::report::{catalogue_page, model_page, needed_page};
-use crate::require::{ImuParameters, Limit, Quantity, RequireError};
+use crate::require::{Limit, Quantity, RequireError};
 use crate::sensors::outage::NotAnOutage;
 use std::path::{Path, PathBuf};
 
@@ -170,27 +169,10 @@ fn sought(args: &Args, asked: &Requirements, session: &Session) -> Result<(), Fa
     session.show(|| needed.json(&question), text);
     pictures::page(args.page.as_deref(), || needed_page(&needed, &question), session)?;
     if let Some(out) = &args.out {
-        model_file::write(
-            out,
-            &needed_file(&needed.imu, &question, asked.scenario.imu.rate_hz),
-            session.existing(),
-        )?;
+        model_file::write(out, &asked.model_file(&needed.imu, &question), session.existing())?;
         session.wrote(out);
     }
     Ok(())
-}
-
-fn needed_file(imu: &ImuParameters, question: &Question, rate_hz: f64) -> ModelFile {
-    let mut provenance = toml::Table::new();
-    let mut put = |key: &str, value: toml::Value| provenance.insert(key.to_owned(), value);
-    put("program", model_file::PROGRAM.into());
-    put("made_by", "require".into());
-    put("label", "what a limit needs: not a calibration".into());
-    put("question", question.in_words().into());
-    for (i, name) in ImuParameters::NAMES.iter().enumerate() {
-        put(name, ImuParameters::in_datasheets(i, imu.values[i]).into());
-    }
-    ModelFile { provenance: Some(provenance), ..ModelFile::new(imu.model(rate_hz)) }
 }
 
 /// What a given IMU makes of the limits.
@@ -278,7 +260,7 @@ fn units_of(
         let file = read::model(path, session)?;
         let model = read::at_rate(path, &file.model, asked.scenario.imu.rate_hz, session)?;
         let not_stated = file.missing.iter().map(ToString::to_string).collect();
-        Ok(of_model(name, &file, model, not_stated, asked))
+        Ok(asked.unit(name, &file, model, not_stated))
     };
     paths.iter().map(unit).collect()
 }
@@ -287,19 +269,5 @@ fn of_sheet(name: String, sheet: &Datasheet, asked: &Requirements) -> Result<Cat
     let made = sheet.model_file(asked.scenario.imu.rate_hz);
     let file = made.map_err(|e| Failure::input(format!("{name}: {e}")))?.file;
     let model = file.model.clone();
-    Ok(of_model(name, &file, model, sheet.not_stated(), asked))
-}
-
-/// A unit whose turn-on biases are there and expected.
-fn of_model(
-    name: String,
-    file: &ModelFile,
-    model: Model,
-    not_stated: Vec<String>,
-    asked: &Requirements,
-) -> CatalogueUnit {
-    let mut scenario = asked.scenario.clone();
-    turn_on::expected(&mut scenario.initial, file);
-    turn_on::made(&mut scenario.imu, file);
-    CatalogueUnit { name, model, scenario, not_stated }
+    Ok(asked.unit(name, &file, model, sheet.not_stated()))
 }

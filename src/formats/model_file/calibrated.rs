@@ -75,6 +75,20 @@ impl CalibrationNote {
 }
 
 impl ModelFile {
+    /// The largest whole number of that name that the provenance has of a fit.
+    #[must_use]
+    pub fn most_of_fits(&self, key: &str) -> Option<i64> {
+        let fits = self.provenance.as_ref()?.get("fits")?.as_array()?;
+        fits.iter().filter_map(|fit| fit.get(key)?.as_integer()).max()
+    }
+
+    /// The longest averaging time (s) that the calibration saw: half its longest scale.
+    #[must_use]
+    pub fn observed_s(&self) -> Option<f64> {
+        let scales = self.most_of_fits("scales").filter(|n| (1..63).contains(n))?;
+        Some((scales as f64 - 1.0).exp2() / self.model.rate_hz)
+    }
+
     /// The same with the turn-on biases that the recordings' means show; why or why not stands in the provenance.
     #[must_use]
     pub fn with_turn_on<'a>(mut self, means: impl Iterator<Item = &'a TurnOnSpread>) -> Self {
