@@ -36,7 +36,7 @@ pub mod efficiency;
 pub use anticipated::{Anticipated, AnticipationError};
 pub use curve::{
     AverageError, Change, Estimator, Group, Pool, Replicate, Scope, SignalError, Trim, TrimError, WarmUp,
-    average, grouped, implied, replicates, trend, warm_up,
+    average, grouped, implied, median, replicates, trend, warm_up,
 };
 pub use diagnosis::{
     Alarm, AxisScores, CommonOutliers, Diagnosis, Differing, DriftAlarm, LeftOut, Misfit, Movement, Verdict,
@@ -47,12 +47,12 @@ pub use model::{LimitError, Limits, ModelSpec, SpecError};
 pub use outcome::{
     Advance, AxesDiffer, Bootstrap, Candidate, Departure, FitRange, Goodness, Indistinct, Inference,
     LevelSpread, Miss, ModelChoice, Outcome, ParameterInterval, ParameterLimit, Practical,
-    PracticalIntervals, Ranking, Settings, TooSimple, Undetermined, model_of, put,
+    PracticalIntervals, Ranking, Settings, TooSimple, Undetermined, model_of, put, tau_s,
 };
 pub use pipeline::{CalibrationError, Cause, calibrate, calibrate_telling, fit_curve, infer, infer_telling};
 pub use turn_on::{MeansOfAxis, TURN_ON_LEVEL, TurnOnFinding, TurnOnSpread, turn_on};
 pub use uncertainty::{ALIKE_LEVEL, CurveInfluence, Scattering, derived_interval};
 pub use words::{
     Share, advice, axes_remark, correlation_time_s, duration, effects, percent, reasons, shares, signals,
-    tau_s, undetermined, worst_in_words,
+    undetermined, worst_in_words,
 };

@@ -26,7 +26,7 @@ const TURNING_RAD_S: f64 = 0.2;
 const REMOVED: f64 = 1e-3;
 
 /// What the means of one axis say.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct MeansOfAxis {
     /// The axis.
     pub axis: Axis,

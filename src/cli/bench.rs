@@ -1,6 +1,7 @@
 //! `nav-sim bench`: what a run-epoch costs on this machine (hidden).
 
 use super::{Failure, Session};
+use crate::calibration::median;
 use crate::ekf::FilterStates;
 use crate::lanes::Level;
 use crate::throughput::{Load, RUN_EPOCHS, model};
@@ -31,20 +32,19 @@ struct Costs {
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let costs = measure(args.rounds as usize)?;
-    if session.json() {
-        session.printer.result(&serde_json::to_string_pretty(&costs).map_err(Failure::could_not)?);
-        return Ok(());
-    }
-    let Costs { dispatch, noise_ns, filter_ns, fix_ns, run_epochs_per_s_and_core: rate } = costs;
-    session.printer.result(&format!(
-        "vector units  {dispatch}\n\
+    let Costs { dispatch, noise_ns, filter_ns, fix_ns, run_epochs_per_s_and_core: rate } = &costs;
+    let text = || {
+        format!(
+            "vector units  {dispatch}\n\
          noise         {noise_ns:6.1} ns a run-epoch (N2 on six axes: 30 numbers)\n\
          filter        {filter_ns:6.1} ns (15 states, strapdown and covariance at 100 Hz)\n\
          fixes         {fix_ns:6.1} ns (position and velocity at 1 Hz)\n\
          together      {:6.1} ns: {:.2} million run-epochs a second and core",
-        noise_ns + filter_ns + fix_ns,
-        rate / 1e6
-    ));
+            noise_ns + filter_ns + fix_ns,
+            rate / 1e6
+        )
+    };
+    session.show(|| crate::report::json(&costs), text);
     Ok(())
 }
 
@@ -62,7 +62,7 @@ fn measure(rounds: usize) -> Result<Costs, Failure> {
             times.push(start.elapsed().as_secs_f64() / RUN_EPOCHS as f64);
         }
     }
-    let [noise, filter, fix] = times.map(|mut t| median(&mut t));
+    let [noise, filter, fix] = times.map(|t| median(&t));
     Ok(Costs {
         dispatch: level.to_string(),
         noise_ns: noise * 1e9,
@@ -70,10 +70,4 @@ fn measure(rounds: usize) -> Result<Costs, Failure> {
         fix_ns: fix * 1e9,
         run_epochs_per_s_and_core: 1.0 / (noise + filter + fix),
     })
-}
-
-/// The median of at least one number.
-fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }

@@ -103,8 +103,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         seed,
     };
     write(args, &chosen, &report, seed)?;
-    let text = if session.json() { report.json() } else { text(&report, session) };
-    session.printer.result(text.trim_end());
+    session.show(|| report.json(), || text(&report, session));
     session.printer.say(&format!(
         "wrote {0}: report.html, ranking.json, model.toml (nav-sim export {0}/model.toml)",
         args.out.display()
@@ -200,7 +199,6 @@ fn write(args: &Args, chosen: &Chosen, report: &ChoiceReport<'_>, seed: u64) -> 
         inputs.push(read::input("recording", file)?);
     }
     let note = CalibrationNote {
-        version: env!("CARGO_PKG_VERSION").to_owned(),
         efficiency_convention: args.tuning.convention().to_owned(),
         reading: args.recordings.provenance(),
         seed: Some(seed),

@@ -2,6 +2,7 @@
 
 use super::{Failure, Printer, Progress};
 use crate::formats::atomic::Existing;
+use std::path::Path;
 use std::sync::OnceLock;
 
 /// Flags that mean the same in every command.
@@ -79,6 +80,17 @@ impl Session {
         let common = Common { seed: inner.seed, quiet, ..self.common.clone() };
         let printer = if muted { Printer::new(&common).without_results() } else { Printer::new(&common) };
         Self { printer, common, drawn: OnceLock::new() }
+    }
+
+    /// Puts a result to stdout: as JSON where that is asked for, else as text.
+    pub(crate) fn show(&self, json: impl FnOnce() -> String, text: impl FnOnce() -> String) {
+        let shown = if self.json() { json() } else { text() };
+        self.printer.result(shown.trim_end());
+    }
+
+    /// Says that a file or a directory was written.
+    pub(crate) fn wrote(&self, path: &Path) {
+        self.printer.say(&format!("wrote {}", path.display()));
     }
 
     /// Whether stdout gets JSON rather than text.

@@ -71,12 +71,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     atomic::write_result(out, &json, session.existing())?;
     atomic::write(&page, compared.page(&[]))?;
     args.plot.write(|| compared.picture(), session)?;
-    if session.json() {
-        session.printer.result(json.trim_end());
-    } else {
-        let shown = args.table.map_or_else(|| compared.text(), |form| compared.table(form));
-        session.printer.result(shown.trim_end());
-    }
+    session.show(|| json, || args.table.map_or_else(|| compared.text(), |form| compared.table(form)));
     session.printer.say(&format!("wrote {}, {}", out.display(), page.display()));
     Ok(())
 }

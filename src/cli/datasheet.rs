@@ -135,8 +135,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         (None, None) => Datasheet::default(),
     };
     args.figures.over(&mut sheet);
-    let program = format!("nav-sim {}", env!("CARGO_PKG_VERSION"));
-    let made = sheet.model_file(args.rate_hz, &program).map_err(Failure::input)?;
+    let made = sheet.model_file(args.rate_hz).map_err(Failure::input)?;
     if made.file.missing.len() == made.file.model.axes.len() {
         let failure = Failure::input("no figure is given that makes a noise model");
         return Err(failure.hint("give --vrw and --arw, or --unit NAME (nav-sim datasheet --list)"));

@@ -105,10 +105,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             designs.push(design.map_err(|e| Failure::input(e).hint("more, or longer recordings"))?);
         }
     }
-    let shown = match designs.as_slice() {
-        _ if session.json() => json!({ "schema_version": 1, "designs": designs }).to_string(),
-        designs => format!("{}\n{}", design_verdict(designs), super::compare::table(&design_rows(designs))),
-    };
-    session.printer.result(shown.trim_end());
+    session.show(
+        || json!({ "schema_version": 1, "designs": designs }).to_string(),
+        || format!("{}\n{}", design_verdict(&designs), super::compare::table(&design_rows(&designs))),
+    );
     super::pictures::page(args.page.as_deref(), || design_page(&designs), session)
 }

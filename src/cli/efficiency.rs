@@ -64,7 +64,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if args.sensitivity {
         atomic::write(&args.out.join("sensitivity.csv"), study.sensitivity().map_err(of_study)?)?;
     }
-    session.printer.say(&format!("wrote {}", args.out.display()));
+    session.wrote(&args.out);
     Ok(())
 }
 

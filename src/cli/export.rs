@@ -9,6 +9,7 @@ use crate::formats::model_file::{self, ModelFile};
 use crate::imu::Sensor;
 use crate::jobs::{self, Recorded};
 use crate::noise::practical::{Horizon, Policy};
+use crate::report;
 use std::path::PathBuf;
 
 /// Write a noise model as the parameters of another program
@@ -59,7 +60,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let settings = Settings {
         policy: args.policy,
         horizon: args.horizon,
-        range_s: observed_s(&file).unwrap_or(LONGEST_S).max(args.horizon.to_s),
+        range_s: file.observed_s().unwrap_or(LONGEST_S).max(args.horizon.to_s),
         turn_on: Sensor::ALL.map(|sensor| turn_on.sigma(sensor)),
     };
     let export = Export::new(args.target, &file.model, &file.missing, settings)
@@ -78,10 +79,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         certificate(&export, &file, session)?;
     }
     match &args.out {
-        _ if session.json() => {
-            let json = serde_json::to_string_pretty(&export.json(&shown)).map_err(Failure::could_not)?;
-            session.printer.result(&json);
-        }
+        _ if session.json() => session.printer.result(report::json(&export.json(&shown)).trim_end()),
         Some(out) => session.printer.result(&format!("{}: {}", out.display(), args.target.name())),
         None => session.printer.result(&text),
     }
@@ -90,7 +88,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 /// Says where the model lies outside the band of recordings of the exported pair.
 fn certificate(export: &Export, file: &ModelFile, session: &Session) -> Result<(), Failure> {
-    let recorded = recorded(file, session.seed(None), export.settings.horizon.to_s);
+    let recorded = Recorded::like(file, session.seed(None), export.settings.horizon.to_s);
     let certificates =
         jobs::certify(export, &file.model, &file.missing, recorded).map_err(Failure::could_not)?;
     let made = format!(
@@ -118,32 +116,8 @@ fn certificate(export: &Export, file: &ModelFile, session: &Session) -> Result<(
     Ok(())
 }
 
-/// As many recordings, and as long, as a calibration had; else four of 16 times the horizon.
-fn recorded(file: &ModelFile, seed: u64, horizon_s: f64) -> Recorded {
-    const MOST: usize = 1 << 22;
-    let rate_hz = file.model.rate_hz;
-    let fit = |key: &str| {
-        let fits = file.provenance.as_ref()?.get("fits")?.as_array()?;
-        fits.iter().filter_map(|fit| fit.get(key)?.as_integer()).max()
-    };
-    let recordings = fit("recordings").filter(|n| *n > 0).map_or(4, |n| n.unsigned_abs());
-    // A recording has one scale more than is used.
-    let samples = fit("scales").filter(|n| (1..40).contains(n)).map_or_else(
-        || ((16.0 * horizon_s * rate_hz) as usize).next_power_of_two(),
-        |scales| 1_usize << (scales + 1),
-    );
-    Recorded { recordings, samples: samples.min(MOST), seed }
-}
-
 /// Longest averaging time at which a minimum is believed of a model that no calibration made (s).
 const LONGEST_S: f64 = 10_000.0;
-
-/// The longest averaging time that the calibration saw: half its longest scale.
-fn observed_s(file: &ModelFile) -> Option<f64> {
-    let fits = file.provenance.as_ref()?.get("fits")?.as_array()?;
-    let scales = fits.iter().filter_map(|fit| fit.get("scales")?.as_integer()).max()?;
-    (1..63).contains(&scales).then(|| (scales as f64 - 1.0).exp2() / file.model.rate_hz)
-}
 
 fn advice(e: &ExportError) -> Option<String> {
     match e {

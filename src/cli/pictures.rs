@@ -30,7 +30,7 @@ impl PlotArgs {
     pub(super) fn write(&self, picture: impl FnOnce() -> String, session: &Session) -> Result<(), Failure> {
         let Some(path) = &self.plot else { return Ok(()) };
         atomic::write_result(path, picture(), session.existing())?;
-        session.printer.say(&format!("wrote {}", path.display()));
+        session.wrote(path);
         Ok(())
     }
 }
@@ -43,7 +43,7 @@ pub(super) fn page(
 ) -> Result<(), Failure> {
     let Some(path) = path else { return Ok(()) };
     atomic::write_result(path, html(), session.existing())?;
-    session.printer.say(&format!("wrote {}", path.display()));
+    session.wrote(path);
     Ok(())
 }
 

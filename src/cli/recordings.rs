@@ -3,10 +3,9 @@
 use super::axes::ChannelSet;
 use super::parse::words;
 use super::{Progress, Session};
-use crate::calibration::{Change, WarmUp, duration, tau_s};
 use crate::formats::recordings::{Gaps, ReadOptions, Report};
-use crate::imu::Channel;
-use crate::jobs::{BeginsOtherwise, Remark, Remarks};
+use crate::jobs::{Remark, Remarks};
+use crate::report::{warm_up_in_short, warm_up_lines};
 
 /// How recordings are read.
 #[derive(clap::Args, Debug)]
@@ -121,7 +120,7 @@ impl<'a> Said<'a> {
     fn report(&self, report: &Report) {
         let printer = &self.session.printer;
         if report.files.len() > FEW {
-            printer.say(&summary(report));
+            printer.say(&format!("{} (--verbose: each of them)", report.summary()));
         }
         for file in &report.files {
             if report.files.len() > FEW {
@@ -165,62 +164,5 @@ impl Remarks for Said<'_> {
     }
 }
 
-/// A line for each recording that does not begin as it goes on.
-fn warm_up_lines(found: &[BeginsOtherwise], rate_hz: f64) -> Vec<String> {
-    let signal = |(channel, w): &(Channel, WarmUp)| {
-        let what = if w.mean { "its mean moves" } else { "its noise is another" };
-        let change = w.change.map_or(String::new(), |c| format!(", {}", changes(&c, rate_hz)));
-        format!("{channel} ({what}, {:+.0} deviations{change})", w.deviations)
-    };
-    let line = |of_one: &BeginsOtherwise| {
-        let signals = of_one.signals.iter().map(signal).collect::<Vec<_>>().join(", ");
-        format!("{}: not stationary at its beginning: {signals}", of_one.recording)
-    };
-    found.iter().map(line).collect()
-}
-
-/// `wavelet variance -35 % at 164 s without it`
-fn changes(change: &Change, rate_hz: f64) -> String {
-    format!(
-        "wavelet variance {:+.0} % at {} without it",
-        100.0 * (change.ratio - 1.0),
-        duration(tau_s(change.level, rate_hz))
-    )
-}
-
-/// One line: what to leave out of each recording, and what that changes.
-fn warm_up_in_short(found: &[BeginsOtherwise], recordings: usize, left_out: bool, rate_hz: f64) -> String {
-    let advice = |of_one: &BeginsOtherwise| {
-        let surest =
-            of_one.signals.iter().max_by(|a, b| a.1.deviations.abs().total_cmp(&b.1.deviations.abs()));
-        let change =
-            surest.and_then(|(channel, w)| Some(format!("{channel}: {}", changes(&w.change?, rate_hz))));
-        match (of_one.skip_s, change) {
-            (Some(s), Some(change)) if left_out => format!("{} {s} s ({change})", of_one.recording),
-            (Some(s), Some(change)) => format!("{} --skip-s {s} ({change})", of_one.recording),
-            _ => format!("{} (not even its later half settles: left whole)", of_one.recording),
-        }
-    };
-    let all = found.iter().map(advice).collect::<Vec<_>>().join("; ");
-    let head = match (found.len(), recordings) {
-        (1, 1) => "not stationary at its beginning".to_owned(),
-        (some, all) => format!("{some} of {all} recordings not stationary at the beginning"),
-    };
-    let end = if left_out { ", left out" } else { "; --skip-s auto leaves out each one's own" };
-    format!("{head}: {all}{end}")
-}
-
 /// Files of more than this number are told in one line, unless all is to be said.
 const FEW: usize = 2;
-
-/// `8 recordings at 100 Hz, 655 s each`
-fn summary(report: &Report) -> String {
-    let seconds = report.files.iter().map(|f| f.samples.iter().sum::<usize>() as f64 / f.rate_hz);
-    let (low, high) = seconds.fold((f64::INFINITY, 0.0_f64), |(low, high), s| (low.min(s), high.max(s)));
-    let rate_hz = report.files.first().map_or(f64::NAN, |f| f.rate_hz);
-    let length =
-        if high - low < 0.5 { format!("{high:.0} s each") } else { format!("{low:.0} to {high:.0} s") };
-    let assumed = report.files.iter().any(|f| !f.assumptions.is_empty());
-    let assumed = if assumed { ", with assumptions" } else { "" };
-    format!("{} recordings at {rate_hz} Hz, {length}{assumed} (--verbose: each of them)", report.files.len())
-}

@@ -4,14 +4,13 @@ use super::{Failure, Session, parse, pictures, read, turn_on};
 use crate::formats::atomic::{AtomicFile, guard_inputs};
 use crate::formats::datasheet::{self, CATALOGUE, Datasheet};
 use crate::formats::file_kind::{self, FileKind};
-use crate::formats::model_file::{self, ModelFile};
+use crate::formats::model_file;
 use crate::formats::scenario_file;
 use crate::jobs::{Ask, CatalogueUnit, Misplaced, Requirements};
-use crate::noise::Model;
 use crate::report::require as words;
-use crate::report::require::{Question, RankedUnit};
+use crate::report::require::RankedUnit;
 use crate::report::{catalogue_page, model_page, needed_page};
-use crate::require::{ImuParameters, Limit, Quantity, RequireError};
+use crate::require::{Limit, Quantity, RequireError};
 use crate::sensors::outage::NotAnOutage;
 use std::path::{Path, PathBuf};
 
@@ -163,40 +162,17 @@ fn sought(args: &Args, asked: &Requirements, session: &Session) -> Result<(), Fa
         Failure::input(e)
             .hint("a larger limit, a shorter outage, or a better receiver ([gnss] of --scenario)")
     })?;
-    let shown = if session.json() {
-        needed.json(&question)
-    } else {
+    let text = || {
         let tables: Vec<String> = needed.tables().iter().map(|t| super::compare::table(t)).collect();
         format!("{}\n\n{}", needed.verdict(&question), tables.join("\n\n"))
     };
-    session.printer.result(shown.trim_end());
+    session.show(|| needed.json(&question), text);
     pictures::page(args.page.as_deref(), || needed_page(&needed, &question), session)?;
     if let Some(out) = &args.out {
-        model_file::write(
-            out,
-            &needed_file(&needed.imu, &question, asked.scenario.imu.rate_hz),
-            session.existing(),
-        )?;
-        session.printer.say(&format!("wrote {}", out.display()));
+        model_file::write(out, &asked.model_file(&needed.imu, &question), session.existing())?;
+        session.wrote(out);
     }
     Ok(())
-}
-
-fn needed_file(imu: &ImuParameters, question: &Question, rate_hz: f64) -> ModelFile {
-    let mut provenance = toml::Table::new();
-    let mut put = |key: &str, value: toml::Value| provenance.insert(key.to_owned(), value);
-    put("program", program().into());
-    put("made_by", "require".into());
-    put("label", "what a limit needs: not a calibration".into());
-    put("question", question.in_words().into());
-    for (i, name) in ImuParameters::NAMES.iter().enumerate() {
-        put(name, ImuParameters::in_datasheets(i, imu.values[i]).into());
-    }
-    ModelFile { provenance: Some(provenance), ..ModelFile::new(imu.model(rate_hz)) }
-}
-
-fn program() -> String {
-    format!("nav-sim {}", env!("CARGO_PKG_VERSION"))
 }
 
 /// What a given IMU makes of the limits.
@@ -209,22 +185,16 @@ fn given(path: &Path, args: &Args, asked: &Requirements, session: &Session) -> R
     let model = read::at_rate(path, &file.model, scenario.imu.rate_hz, session)?;
     let (bridged, places) = asked.longest(&scenario, &model).map_err(unusable)?;
     if args.outage == Ask::Longest {
-        let shown = if session.json() {
-            words::longest_json(&bridged, &places)
-        } else {
-            words::longest_verdict(bridged.longest, &places)
-        };
-        session.printer.result(shown.trim_end());
+        let text = || words::longest_verdict(bridged.longest, &places);
+        session.show(|| words::longest_json(&bridged, &places), text);
         return pictures::page(args.page.as_deref(), || model_page(None, &places, &bridged), session);
     }
     let (margins, question) = asked.margins(&scenario, &model).map_err(unusable)?;
-    let verdict = words::margins_verdict(&margins, &question, bridged.longest);
-    let shown = if session.json() {
-        words::margins_json(&margins, &question, &bridged)
-    } else {
+    let text = || {
+        let verdict = words::margins_verdict(&margins, &question, bridged.longest);
         format!("{verdict}\n\n{}", super::compare::table(&words::margins_rows(&margins)))
     };
-    session.printer.result(shown.trim_end());
+    session.show(|| words::margins_json(&margins, &question, &bridged), text);
     pictures::page(args.page.as_deref(), || model_page(Some(&margins), &question, &bridged), session)?;
     if margins.met() {
         return Ok(());
@@ -246,12 +216,9 @@ fn ranked(
         None => catalogue(asked)?,
     };
     let (units, question) = asked.ranked(&units).map_err(Failure::input)?;
-    let shown = if session.json() {
-        words::catalogue_json(&units, &question)
-    } else {
-        format!("{}:\n\n{}", question.in_words(), super::compare::table(&words::catalogue_rows(&units)))
-    };
-    session.printer.result(shown.trim_end());
+    let text =
+        || format!("{}:\n\n{}", question.in_words(), super::compare::table(&words::catalogue_rows(&units)));
+    session.show(|| words::catalogue_json(&units, &question), text);
     pictures::page(args.page.as_deref(), || catalogue_page(&units, &question), session)?;
     if units.iter().any(|unit| !unit.not_stated.is_empty()) {
         session
@@ -293,28 +260,14 @@ fn units_of(
         let file = read::model(path, session)?;
         let model = read::at_rate(path, &file.model, asked.scenario.imu.rate_hz, session)?;
         let not_stated = file.missing.iter().map(ToString::to_string).collect();
-        Ok(of_model(name, &file, model, not_stated, asked))
+        Ok(asked.unit(name, &file, model, not_stated))
     };
     paths.iter().map(unit).collect()
 }
 
 fn of_sheet(name: String, sheet: &Datasheet, asked: &Requirements) -> Result<CatalogueUnit, Failure> {
-    let made = sheet.model_file(asked.scenario.imu.rate_hz, &program());
+    let made = sheet.model_file(asked.scenario.imu.rate_hz);
     let file = made.map_err(|e| Failure::input(format!("{name}: {e}")))?.file;
     let model = file.model.clone();
-    Ok(of_model(name, &file, model, sheet.not_stated(), asked))
-}
-
-/// A unit whose turn-on biases are there and expected.
-fn of_model(
-    name: String,
-    file: &ModelFile,
-    model: Model,
-    not_stated: Vec<String>,
-    asked: &Requirements,
-) -> CatalogueUnit {
-    let mut scenario = asked.scenario.clone();
-    turn_on::expected(&mut scenario.initial, file);
-    turn_on::made(&mut scenario.imu, file);
-    CatalogueUnit { name, model, scenario, not_stated }
+    Ok(asked.unit(name, &file, model, sheet.not_stated()))
 }

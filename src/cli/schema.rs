@@ -1,7 +1,7 @@
 //! `nav-sim schema`: JSON schemas of the files people write.
 
 use super::{Failure, Session};
-use crate::formats::{efficiency_file, parameters_file};
+use crate::formats::{efficiency_file, fusion_files, parameters_file};
 use crate::scenario::Scenario;
 use crate::study::Study;
 
@@ -30,6 +30,8 @@ enum Kind {
     Model,
     /// What is known of parameters before a fit (`nav-sim calibrate --parameters`)
     Parameters,
+    /// Where and how a drive begins (`nav-sim fuse --initial`)
+    Initial,
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
@@ -39,8 +41,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         Kind::Efficiency => efficiency_file::schema(),
         Kind::Model => crate::formats::model_file::schema(),
         Kind::Parameters => parameters_file::schema(),
+        Kind::Initial => fusion_files::initial_schema(),
     };
-    let text = serde_json::to_string_pretty(&schema).map_err(Failure::could_not)?;
-    session.printer.result(&text);
+    session.printer.result(crate::report::json(&schema).trim_end());
     Ok(())
 }

@@ -6,11 +6,12 @@ use super::{Failure, Session, read, turn_on};
 use crate::ekf::FilterStates;
 use crate::formats::atomic::{AtomicFile, guard_inputs};
 use crate::formats::model_file::{self, ModelFile};
+use crate::jobs::{self, TuneInputs};
 use crate::noise::Model;
-use crate::report::{FactorEntry, Input, TuneResult, tune_page};
+use crate::report::{Input, tune_page};
 use crate::scenario::Scenario;
 use crate::sensors::outage::Outage;
-use crate::simulation::lincov::{Aim, Factor, Honesty, Per, Task, Track, drive, scaled};
+use crate::simulation::lincov::{Aim, Per, Track, drive};
 use std::path::{Path, PathBuf};
 
 /// Find the smallest factors on MODEL that make its filter honest for another truth
@@ -80,62 +81,31 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let file = read::model(&args.model, session)?;
     let model = read::at_rate(&args.model, &file.model, scenario.imu.rate_hz, session)?;
     turn_on::expect(&mut scenario.initial, &file, &args.model, session);
-    let (names, truths) = truths(args, &file, scenario.imu.rate_hz, session)?;
+    let truths = truths(args, &file, scenario.imu.rate_hz, session)?;
     let (track, outages) = track(args, &scenario, &model, session)?;
-    let full = scenario.with_full_noise();
-    let mut reduced = scenario.clone();
-    if !reduced.filter.states.is_reduced() {
-        reduced.filter.states = FilterStates::default();
-    }
-    let filter_of_run = reduced.filter.states;
-    let full = |model: &Model| full.belief(model, &outages, &track);
-    let reduced = |model: &Model| reduced.belief(model, &outages, &track);
-    let task = Task {
+    let result = jobs::tune(&TuneInputs {
+        scenario: &scenario,
         model: &model,
-        truths: &truths,
+        truths,
         track: &track,
-        full: &full,
-        filter: if args.filter.is_reduced() { &reduced } else { &full },
+        outages: &outages,
+        states: args.filter,
         per: args.per,
         aim: args.aim,
         allow_smaller: args.allow_smaller,
-    };
-    let factors = task.factors().map_err(|e| Failure::input(format!("{}: {e}", args.model.display())))?;
-    let ones: Vec<Factor> = factors.iter().map(|f| Factor { on_variance: 1.0, ..f.clone() }).collect();
-    let result = TuneResult {
-        filter: if args.filter.is_reduced() { filter_of_run } else { args.filter },
-        filter_of_run,
-        before: task.honesty(task.filter, &ones).map_err(Failure::input)?,
-        after: task.honesty(task.filter, &factors).map_err(Failure::input)?,
-        reduced: task.honesty(&reduced, &factors).map_err(Failure::input)?,
-        informed: task.informed().map_err(Failure::input)?,
-        sweep: sweep(&task, &factors)?,
-        factors,
-        truths: names,
-    };
-    let shown = if session.json() {
-        result.json()
-    } else {
-        format!("{}\n\n{}", result.verdict(), super::compare::table(&result.rows()))
-    };
-    session.printer.result(shown.trim_end());
+    });
+    let result = result.map_err(|e| Failure::input(format!("{}: {e}", args.model.display())))?;
+    let text = || format!("{}\n\n{}", result.verdict(), super::compare::table(&result.rows()));
+    session.show(|| result.json(), text);
     super::pictures::page(args.page.as_deref(), || tune_page(&result), session)?;
     if let Some(out) = &args.out {
-        model_file::write(out, &tuned(&file, &result.factors, args, &files), session.existing())?;
-        session.printer.say(&format!("wrote {}", out.display()));
+        let aim = if args.aim == Aim::Mean { "mean of" } else { "worst of" };
+        let honest_for = format!("{aim} {}", if args.intervals { "intervals" } else { "truths" });
+        let tuned = jobs::tuned(&file, &result.factors, &honest_for, &files);
+        model_file::write(out, &tuned, session.existing())?;
+        session.wrote(out);
     }
     Ok(())
-}
-
-/// The tuned filter with all its variances times 1/16, 1/8, … 16.
-fn sweep(task: &Task<'_>, factors: &[Factor]) -> Result<Vec<(f64, Honesty)>, Failure> {
-    let times = |power: i32| {
-        let on_variances = f64::from(power).exp2();
-        let scaled = |f: &Factor| Factor { on_variance: f.on_variance * on_variances, ..f.clone() };
-        let factors: Vec<Factor> = factors.iter().map(scaled).collect();
-        Ok((on_variances, task.honesty(task.filter, &factors).map_err(Failure::input)?))
-    };
-    (-4..=4).map(times).collect()
 }
 
 /// A directory or a table holds samples: a truth is a model.
@@ -215,22 +185,4 @@ fn track(
     let outages = placed.windows;
     let track = scenario.track(&trajectory, model, &outages).map_err(Failure::input)?;
     Ok((track, outages))
-}
-
-/// The tuned model, and where it came from.
-fn tuned(file: &ModelFile, factors: &[Factor], args: &Args, files: &[Input]) -> ModelFile {
-    let mut provenance = toml::Table::new();
-    let mut put = |key: &str, value: toml::Value| provenance.insert(key.to_owned(), value);
-    put("program", format!("nav-sim {}", env!("CARGO_PKG_VERSION")).into());
-    put("made_by", "tune".into());
-    let aim = if args.intervals { "intervals" } else { "truths" };
-    put("honest_for", format!("{} {aim}", if args.aim == Aim::Mean { "mean of" } else { "worst of" }).into());
-    let table = |t: Result<toml::Table, toml::ser::Error>| toml::Value::from(t.unwrap_or_default());
-    let factors_written: Vec<toml::Value> =
-        factors.iter().map(|f| table(toml::Table::try_from(FactorEntry::of(f)))).collect();
-    put("factors", factors_written.into());
-    put("inputs", files.iter().map(|i| table(toml::Table::try_from(i))).collect::<Vec<_>>().into());
-    let model = scaled(&file.model, factors);
-    let (missing, turn_on) = (file.missing.clone(), file.turn_on);
-    ModelFile { missing, turn_on, provenance: Some(provenance), ..ModelFile::new(model) }
 }

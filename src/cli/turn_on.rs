@@ -4,46 +4,19 @@ use super::Session;
 use crate::ekf::InitialSettings;
 use crate::formats::model_file::ModelFile;
 use crate::imu::Sensor;
+use crate::jobs;
 use crate::report::readable;
 use crate::sensors::defects::ImuSettings;
 use std::path::Path;
 
 /// Lets the filter expect the turn-on bias of its model; `--turn-on-bias` and `[initial]` win.
 pub(super) fn expect(initial: &mut InitialSettings, file: &ModelFile, path: &Path, session: &Session) {
-    say("the filter expects", &expected(initial, file), path, session);
+    say("the filter expects", &jobs::turn_on::expect(initial, file), path, session);
 }
 
 /// Gives the true IMU the turn-on bias of the model that makes its errors; `[imu]` wins, a 0 too.
 pub(super) fn make(imu: &mut ImuSettings, file: &ModelFile, path: &Path, session: &Session) {
-    say("the true IMU has", &made(imu, file), path, session);
-}
-
-/// As [`expect`], silently: what was set.
-pub(super) fn expected(initial: &mut InitialSettings, file: &ModelFile) -> Vec<(Sensor, f64)> {
-    set([&mut initial.accel_bias_sigma_m_s2, &mut initial.gyro_bias_sigma_rad_s], file)
-}
-
-/// As [`make`], silently: what was set.
-pub(super) fn made(imu: &mut ImuSettings, file: &ModelFile) -> Vec<(Sensor, f64)> {
-    set([&mut imu.turn_on_bias_accel_m_s2, &mut imu.turn_on_bias_gyro_rad_s], file)
-}
-
-/// Fills in the settings of both sensors that are not given.
-fn set(settings: [&mut Option<f64>; 2], file: &ModelFile) -> Vec<(Sensor, f64)> {
-    let mut set = stated(file);
-    let [accel, gyro] = settings;
-    set.retain(|(sensor, sigma)| {
-        let setting = if *sensor == Sensor::Accel { &mut *accel } else { &mut *gyro };
-        let is_open = setting.is_none();
-        setting.get_or_insert(*sigma);
-        is_open
-    });
-    set
-}
-
-fn stated(file: &ModelFile) -> Vec<(Sensor, f64)> {
-    let turn_on = file.turn_on.unwrap_or_default();
-    Sensor::ALL.into_iter().filter_map(|sensor| Some((sensor, turn_on.sigma(sensor)?))).collect()
+    say("the true IMU has", &jobs::turn_on::make(imu, file), path, session);
 }
 
 fn say(who: &str, set: &[(Sensor, f64)], path: &Path, session: &Session) {

@@ -68,7 +68,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let json = report::json(&file);
     if let Some(out) = &args.out {
         atomic::write_result(out, &json, session.existing())?;
-        session.printer.say(&format!("wrote {}", out.display()));
+        session.wrote(out);
     }
     pictures::page(args.page.as_deref(), || report::wavelet_page(&file), session)?;
     args.plot.write(|| report::wavelet_svg(&file), session)?;

@@ -1,6 +1,7 @@
 //! Wavelet-variance curves to fit: CSV with columns `tau_samples,wv,edof`, or the JSON that `calibrate` or `wv`
 //! writes (the classical curve of a signal is GMWM's, the robust one RGMWM's).
 
+use super::trajectory_file::table::{Numbers, Table};
 use super::{FileError, Kind, Place, source};
 use crate::imu::{Axis, Sensor};
 use crate::report::{CurvesFile, FittedCurve, SignalsFile};
@@ -43,6 +44,7 @@ pub(crate) fn read(path: &Path) -> Result<Vec<NamedCurve>, FileError> {
     curves.map_err(|e| match &e.kind {
         Kind::System(source) if source.kind() == ErrorKind::NotFound => e.advice("check the path"),
         _ if e.is_system() => e,
+        Kind::Header(_) => e.advice_instead(LAYOUT),
         _ => e.advice(LAYOUT),
     })
 }
@@ -57,28 +59,16 @@ fn parse(path: &str, text: &str) -> Result<Vec<NamedCurve>, FileError> {
 }
 
 fn csv(path: &str, text: &str) -> Result<NamedCurve, FileError> {
-    let mut reader =
-        csv::ReaderBuilder::new().trim(csv::Trim::All).comment(Some(b'#')).from_reader(text.as_bytes());
-    let syntax =
-        |e: csv::Error| FileError::contents(path, e.position().map_or(1, csv::Position::line), e.to_string());
-    let head = reader.headers().map_err(syntax)?.clone();
+    let table = Table::read(path, text.as_bytes(), None, Numbers::Finite)?;
     let column = |name: &'static str| {
         let missing = || Kind::Columns(format!("no column is named \"{name}\"").into());
-        let at = head.iter().position(|c| c == name);
-        at.map(|at| (name, at)).ok_or_else(|| FileError::new(path, 1_u64, missing()))
+        let at = table.columns.iter().position(|c| c == name);
+        at.ok_or_else(|| FileError::new(path, table.header_line, missing()))
     };
     let columns = [column("tau_samples")?, column("wv")?, column("edof")?];
     let mut curve = Curve::default();
-    for record in reader.records() {
-        let record = record.map_err(syntax)?;
-        let place = Place::Line(record.position().map_or(0, csv::Position::line));
-        let mut point = [0.0; 3];
-        for (number, (column, at)) in point.iter_mut().zip(columns) {
-            let value = record.get(at).unwrap_or_default();
-            let not_a_number = |_| refused(path, &place, column, format!("\"{value}\""), "a number");
-            *number = value.parse().map_err(not_a_number)?;
-        }
-        push(&mut curve, path, &place, point)?;
+    for (line, row) in &table.rows {
+        push(&mut curve, path, &Place::Line(*line), columns.map(|at| row[at]))?;
     }
     Ok(NamedCurve { sensor: None, axis: None, rate_hz: None, estimator: None, curve })
 }
@@ -230,7 +220,7 @@ mod tests {
         let message = |text: &str| csv("c.csv", text).unwrap_err().to_string();
         let head = "tau_samples,wv,edof\n";
         assert_eq!(message("tau,wv,edof\n2,1,1\n"), "c.csv, line 1: no column is named \"tau_samples\"");
-        assert_eq!(message(&format!("{head}2,x,1\n")), "c.csv, line 2: wv = \"x\" is not a number");
+        assert_eq!(message(&format!("{head}2,x,1\n")), "c.csv, line 2: column \"wv\": \"x\" is not a number");
         assert_eq!(
             message(&format!("{head}3,1,1\n")),
             "c.csv, line 2: tau_samples = 3 is not a power of two ≥ 2"
@@ -239,10 +229,7 @@ mod tests {
             message(&format!("{head}4,1,1\n2,1,1\n")),
             "c.csv, line 3: tau_samples = 2 is not greater than the one before"
         );
-        assert_eq!(
-            message(&format!("{head}2,NaN,1\n")),
-            "c.csv, line 2: wv = NaN is not a number from 1e-100 to 1e100"
-        );
+        assert_eq!(message(&format!("{head}2,NaN,1\n")), "c.csv, line 2: column \"wv\": NaN is not finite");
         assert_eq!(
             message(&format!("{head}2,1,0\n")),
             "c.csv, line 2: edof = 0 is not a number from 1e-15 to 1e15"

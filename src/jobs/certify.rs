@@ -2,6 +2,7 @@
 //! model's own curve.
 
 use crate::export::Export;
+use crate::formats::model_file::ModelFile;
 use crate::imu::{Channel, Sensor};
 use crate::noise::practical::Pair;
 use crate::noise::{
@@ -20,6 +21,21 @@ pub struct Recorded {
     pub samples: usize,
     /// Seed of their noise.
     pub seed: u64,
+}
+
+impl Recorded {
+    /// As many recordings, and as long, as the calibration of a model had; else four of 16 times the horizon (s).
+    #[must_use]
+    pub fn like(file: &ModelFile, seed: u64, horizon_s: f64) -> Self {
+        const MOST: usize = 1 << 22;
+        let recordings = file.most_of_fits("recordings").filter(|n| *n > 0).map_or(4, i64::unsigned_abs);
+        // A recording has one scale more than is used.
+        let samples = file.most_of_fits("scales").filter(|n| (1..40).contains(n)).map_or_else(
+            || ((16.0 * horizon_s * file.model.rate_hz) as usize).next_power_of_two(),
+            |scales| 1_usize << (scales + 1),
+        );
+        Self { recordings, samples: samples.min(MOST), seed }
+    }
 }
 
 /// What recordings of the exported pair say at one scale.

@@ -138,14 +138,17 @@ fn rows(design: &Design, aim: &Target, sets: &[Vec<Estimate>]) -> Vec<Efficiency
         for ((e, p), own) in cells.into_iter().zip(&judged) {
             let roots: usize = sets.iter().map(|set| set[s * width + e].without_root).sum();
             let variances = sets.len() as f64 * design.replicates as f64 * f64::from(design.levels);
+            let (ratio, ratio_se) = own.ratio_to(&judged[p]);
             rows.push(EfficiencyRow {
                 scenario: scenario.name.clone(),
                 estimator: design.estimators[e].name().to_owned(),
                 parameter: names[p].clone(),
                 target: targets[p],
+                accuracy: own.clone(),
+                ratio,
+                ratio_se,
                 zeros: of(e, p).iter().filter(|v| **v <= 0.0).count(),
                 without_root: roots as f64 / variances,
-                ..EfficiencyRow::new(own, &judged[p])
             });
         }
     }

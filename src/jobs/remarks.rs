@@ -1,8 +1,7 @@
 //! What is found on the way to a result.
 
-use crate::calibration::WarmUp;
 use crate::formats::recordings::Report;
-use crate::imu::Channel;
+use crate::report::BeginsOtherwise;
 
 /// What a user may want to know beside the result.
 #[derive(Debug, Clone, Copy)]
@@ -32,17 +31,6 @@ pub enum Remark<'a> {
         /// The scales that half of them would have.
         usual: u32,
     },
-}
-
-/// A recording that does not begin as it goes on.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BeginsOtherwise {
-    /// The recording.
-    pub recording: String,
-    /// Its signals of which that is so.
-    pub signals: Vec<(Channel, WarmUp)>,
-    /// Seconds to leave out at its beginning, with those that are left out already; none where that does not help.
-    pub skip_s: Option<f64>,
 }
 
 /// Listens to remarks.

@@ -1,10 +1,12 @@
 //! Which IMU a limit on the errors after an outage needs, what a given one makes of it, and a ranking.
 
+use super::turn_on;
+use crate::formats::model_file::{ModelFile, PROGRAM};
 use crate::noise::Model;
 use crate::report::require::{Bridged, CURVE_S, Longest, NeededImu, Question, RankedUnit};
 use crate::require::{
-    Answer, Course, Detail, Drift, IMU_PARAMETERS, Limit, Margins, Need, Quantity, RequireError, Worst,
-    evenly,
+    Answer, Course, Detail, Drift, IMU_PARAMETERS, ImuParameters, Limit, Margins, Need, Quantity,
+    RequireError, Worst, evenly,
 };
 use crate::scenario::Scenario;
 use crate::sensors::outage::Outage;
@@ -185,6 +187,36 @@ impl Requirements {
             curve: CURVE_S.map(|s| worst_after(&curves, s, worst.limit.quantity)),
             longest: longest(&curves, &self.limits),
         })
+    }
+
+    /// A unit whose turn-on biases are there and expected; `model` is at the rate of the IMU.
+    #[must_use]
+    pub fn unit(
+        &self,
+        name: String,
+        file: &ModelFile,
+        model: Model,
+        not_stated: Vec<String>,
+    ) -> CatalogueUnit {
+        let mut scenario = self.scenario.clone();
+        turn_on::expect(&mut scenario.initial, file);
+        turn_on::make(&mut scenario.imu, file);
+        CatalogueUnit { name, model, scenario, not_stated }
+    }
+
+    /// The model file of an IMU that is needed.
+    #[must_use]
+    pub fn model_file(&self, imu: &ImuParameters, question: &Question) -> ModelFile {
+        let mut provenance = toml::Table::new();
+        let mut put = |key: &str, value: toml::Value| provenance.insert(key.to_owned(), value);
+        put("program", PROGRAM.into());
+        put("made_by", "require".into());
+        put("label", "what a limit needs: not a calibration".into());
+        put("question", question.in_words().into());
+        for (i, name) in ImuParameters::NAMES.iter().enumerate() {
+            put(name, ImuParameters::in_datasheets(i, imu.values[i]).into());
+        }
+        ModelFile { provenance: Some(provenance), ..ModelFile::new(imu.model(self.scenario.imu.rate_hz)) }
     }
 
     /// The places of the outage; those of one second where the longest is sought.

@@ -32,7 +32,7 @@ pub enum Error {
 }
 
 /// How far the mechanised samples come away from the trajectory.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Closure {
     /// IMU rate (Hz).
     pub rate_hz: f64,

@@ -30,7 +30,7 @@ pub(crate) fn brief(
         let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.scope.sensor == sensor).collect();
         let mut parts: Vec<String> = if own.len() == 1 { vec![verdict(own[0], rate_hz)] } else { Vec::new() };
         parts.extend(own.iter().find_map(|o| axes_remark(o, rate_hz)));
-        let mut advice = advice(diagnoses, sensor, rate_hz).into_iter();
+        let mut advice = advice(diagnoses, sensor).into_iter();
         parts.extend(advice.next());
         let first = (!parts.is_empty()).then(|| format!("{}: {}", sensor.name(), parts.join("; ")));
         let notes = own.iter().filter(|_| outcomes.len() <= MOST).flat_map(|o| notes(o));

@@ -1,6 +1,6 @@
 //! The ranking of candidates, on one screen and as JSON.
 
-use super::number::{readable, seconds};
+use super::number::{readable, window};
 use crate::choose::{Influence, Mean, Placed, Ranking};
 use crate::sensors::outage::Outage;
 use crate::simulation::NEES_DOF;
@@ -63,45 +63,12 @@ impl ChoiceReport<'_> {
     #[must_use]
     pub(crate) fn verdict(&self) -> Vec<String> {
         let ranking = self.ranking;
-        let winner = ranking.winner();
-        let recordings = winner.folds.len();
-        let figures = format!(
-            "{} m of horizontal RMSE at the end of an outage where its filter believes {} m, NEES {} (9 if right)",
-            readable(winner.rmse_m),
-            readable(winner.believed_m),
-            readable(winner.nees.value)
-        );
-        let eligible = ranking.candidates.iter().filter(|p| p.eligible).count();
-        let mut lines = vec![match (ranking.tells, eligible) {
-            (_, 1) => format!("{}: {figures}; there is no other candidate", winner.candidate),
-            (true, _) => format!("{} is the best: {figures}", winner.candidate),
-            (false, _) if recordings < 4 => format!(
-                "{recordings} recordings cannot tell the candidates apart; {} has the highest score: {figures}",
-                winner.candidate
-            ),
-            (false, _) => format!(
-                "the recordings differ more than the candidates do: the data cannot tell; {} has the highest score: \
-                 {figures}",
-                winner.candidate
-            ),
-        }];
+        let mut lines = vec![self.best()];
         let tied: Vec<&str> = self.tied().collect();
         if ranking.tells && !tied.is_empty() {
             lines.push(format!("cannot be told from it: {}", tied.join("; ")));
         }
-        let right = NEES_DOF as f64;
-        let named = |of: &dyn Fn(&Placed) -> bool| {
-            let all = ranking.candidates.iter().filter(|p| p.eligible && of(p));
-            all.map(|p| p.candidate.as_str()).collect::<Vec<_>>().join("; ")
-        };
-        for (word, of) in [
-            ("overconfident", named(&|p| p.nees.ci95.0 > right)),
-            ("underconfident", named(&|p| p.nees.ci95.1 < right)),
-        ] {
-            if !of.is_empty() {
-                lines.push(format!("{word} (NEES over the recordings): {of}"));
-            }
-        }
+        lines.extend(self.dishonest());
         if !ranking.undescribed.is_empty() {
             lines.push(format!(
                 "no candidate describes {}: its errors are far larger than every filter believes; look at it with \
@@ -115,13 +82,52 @@ impl ChoiceReport<'_> {
                 ranking.decisive.join(", or without ")
             ));
         }
-        if winner.folds.iter().any(|fold| fold.windows == 0) {
+        if ranking.winner().folds.iter().any(|fold| fold.windows == 0) {
             lines.push(
                 "recordings shorter than the trajectory are judged by covariance analysis with their own N2 as truth"
                     .to_owned(),
             );
         }
         lines
+    }
+
+    /// The winner, and whether the data can tell that it is.
+    fn best(&self) -> String {
+        let winner = self.ranking.winner();
+        let recordings = winner.folds.len();
+        let figures = format!(
+            "{} m of horizontal RMSE at the end of an outage where its filter believes {} m, NEES {} (9 if right)",
+            readable(winner.rmse_m),
+            readable(winner.believed_m),
+            readable(winner.nees.value)
+        );
+        let eligible = self.ranking.candidates.iter().filter(|p| p.eligible).count();
+        match (self.ranking.tells, eligible) {
+            (_, 1) => format!("{}: {figures}; there is no other candidate", winner.candidate),
+            (true, _) => format!("{} is the best: {figures}", winner.candidate),
+            (false, _) if recordings < 4 => format!(
+                "{recordings} recordings cannot tell the candidates apart; {} has the highest score: {figures}",
+                winner.candidate
+            ),
+            (false, _) => format!(
+                "the recordings differ more than the candidates do: the data cannot tell; {} has the highest score: \
+                 {figures}",
+                winner.candidate
+            ),
+        }
+    }
+
+    /// The candidates whose filters believe too little or too much.
+    fn dishonest(&self) -> Vec<String> {
+        let right = NEES_DOF as f64;
+        let line = |word: &str, is_so: &dyn Fn(&Placed) -> bool| {
+            let all = self.ranking.candidates.iter().filter(|p| p.eligible && is_so(p));
+            let names = all.map(|p| p.candidate.as_str()).collect::<Vec<_>>().join("; ");
+            (!names.is_empty()).then(|| format!("{word} (NEES over the recordings): {names}"))
+        };
+        let over = line("overconfident", &|p| p.nees.ci95.0 > right);
+        let under = line("underconfident", &|p| p.nees.ci95.1 < right);
+        over.into_iter().chain(under).collect()
     }
 
     /// A row for each candidate under a head.
@@ -180,8 +186,7 @@ impl ChoiceReport<'_> {
     #[must_use]
     pub(crate) fn legend(&self) -> String {
         let recordings = self.ranking.winner().folds.len();
-        let ends: Vec<String> =
-            self.outages.iter().map(|o| format!("{}–{} s", seconds(o.start_s), seconds(o.end_s))).collect();
+        let ends: Vec<String> = self.outages.iter().map(|o| window(o.start_s, o.end_s)).collect();
         format!(
             "{recordings} recordings, each left out once; outages {}; * the best by log score, = cannot be told from \
              it; [95 % over recordings]; log score: of the best, and of the others less the best",

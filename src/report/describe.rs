@@ -23,12 +23,12 @@ pub(crate) fn describe(outcome: &Outcome, settings: &Settings) -> String {
     ));
     lines.extend(practical_line(outcome, settings.rate_hz));
     lines.push(optimum(outcome));
-    lines.extend(outcome.inference.iter().flat_map(|i| inference_lines(i, outcome, settings.rate_hz)));
+    lines.extend(outcome.inference.iter().flat_map(|i| inference_lines(i, outcome)));
     lines.extend(outcome.notes.iter().map(|note| format!("  note: {note}")));
     lines.join("\n")
 }
 
-fn inference_lines(inference: &Inference, outcome: &Outcome, rate_hz: f64) -> Vec<String> {
+fn inference_lines(inference: &Inference, outcome: &Outcome) -> Vec<String> {
     if inference.fitted < 2 {
         return vec![format!(
             "  {} of {} draws of the bootstrap had a fit: no intervals",
@@ -55,7 +55,7 @@ fn inference_lines(inference: &Inference, outcome: &Outcome, rate_hz: f64) -> Ve
         ));
     }
     if outcome.replicates > 1 {
-        lines.extend(spread_line(inference, outcome, rate_hz));
+        lines.extend(spread_line(inference, outcome));
     }
     lines
 }
@@ -76,7 +76,7 @@ fn j_test(goodness: &Goodness, outcome: &Outcome) -> String {
 }
 
 /// Where the signals that are averaged differ most beyond what noise alone makes.
-fn spread_line(inference: &Inference, outcome: &Outcome, rate_hz: f64) -> Option<String> {
+fn spread_line(inference: &Inference, outcome: &Outcome) -> Option<String> {
     let p = inference.alike?;
     let signals = match (outcome.recordings, outcome.replicates) {
         (1, _) => "the axes",
@@ -87,12 +87,11 @@ fn spread_line(inference: &Inference, outcome: &Outcome, rate_hz: f64) -> Option
         return Some(format!("  no evidence that {signals} differ beyond their noise (p = {p:.3})"));
     }
     let most = |s: &&LevelSpread| s.between / s.within;
-    let LevelSpread { level, within, between } =
+    let LevelSpread { tau_s, within, between } =
         *inference.spread.iter().max_by(|a, b| most(a).total_cmp(&most(b)))?;
     Some(format!(
-        "  {signals} differ beyond their noise (p = {p:.3}), most at {} s: by {} of the wavelet variance, noise alone \
+        "  {signals} differ beyond their noise (p = {p:.3}), most at {tau_s} s: by {} of the wavelet variance, noise alone \
          makes {}",
-        tau_s(level, rate_hz),
         percent(between),
         percent(within)
     ))

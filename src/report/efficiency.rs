@@ -30,16 +30,9 @@ pub struct EfficiencyRow {
     pub parameter: String,
     /// theta_0.
     pub target: f64,
-    /// Median relative error.
-    pub bias: f64,
-    /// Its Monte-Carlo standard error.
-    pub bias_se: f64,
-    /// 1.4826·MAD of the relative errors.
-    pub spread: f64,
-    /// Robust RMSE, eq. 15 of the paper.
-    pub rmse: f64,
-    /// Its Monte-Carlo standard error.
-    pub rmse_se: f64,
+    /// Its errors relative to the target.
+    #[serde(flatten)]
+    pub accuracy: Accuracy,
     /// RMSE over that of the study's first estimator in the same scenario, on the same sets.
     pub ratio: f64,
     /// Its Monte-Carlo standard error.
@@ -50,36 +43,14 @@ pub struct EfficiencyRow {
     pub without_root: f64,
 }
 
-impl EfficiencyRow {
-    /// With the names to be filled in.
-    #[must_use]
-    pub fn new(accuracy: &Accuracy, reference: &Accuracy) -> Self {
-        let (ratio, ratio_se) = accuracy.ratio_to(reference);
-        Self {
-            scenario: String::new(),
-            estimator: String::new(),
-            parameter: String::new(),
-            target: f64::NAN,
-            bias: accuracy.bias,
-            bias_se: accuracy.bias_se,
-            spread: accuracy.spread,
-            rmse: accuracy.rmse,
-            rmse_se: accuracy.rmse_se,
-            ratio,
-            ratio_se,
-            zeros: 0,
-            without_root: 0.0,
-        }
-    }
-}
-
 /// All numbers, one line for each scenario, estimator and parameter (also the data of a plot).
 #[must_use]
 pub(crate) fn efficiency_csv(file: &EfficiencyFile) -> String {
     let mut text = "scenario,estimator,parameter,target,bias,bias_se,spread,rmse,rmse_se,ratio,ratio_se,zeros,without_root\n".to_owned();
     for r in &file.results {
+        let a = &r.accuracy;
         let numbers =
-            [r.target, r.bias, r.bias_se, r.spread, r.rmse, r.rmse_se, r.ratio, r.ratio_se].map(shortest);
+            [r.target, a.bias, a.bias_se, a.spread, a.rmse, a.rmse_se, r.ratio, r.ratio_se].map(shortest);
         let names =
             [&r.scenario, &r.estimator, &r.parameter].map(|n| format!("\"{}\"", n.replace('"', "\"\"")));
         let last = shortest(r.without_root);
@@ -103,7 +74,7 @@ pub(crate) fn efficiency_table(file: &EfficiencyFile) -> String {
     table.set_header(["scenario".to_owned(), "estimator".to_owned()].into_iter().chain(heads));
     for row in file.results.chunks(parameters.len().max(1)) {
         let cell = |r: &EfficiencyRow| {
-            let [rmse, se, bias] = [r.rmse, r.rmse_se, r.bias].map(|v| 100.0 * v);
+            let [rmse, se, bias] = [r.accuracy.rmse, r.accuracy.rmse_se, r.accuracy.bias].map(|v| 100.0 * v);
             let se = if se.is_finite() { percent(se) } else { "n/a".to_owned() };
             format!("{} ± {se} ({})", percent(rmse), signed(bias))
         };
@@ -143,7 +114,11 @@ mod tests {
             estimator: estimator.into(),
             parameter: parameter.into(),
             target: 2.0,
-            ..EfficiencyRow::new(&a, &a)
+            accuracy: a.clone(),
+            ratio: 1.0,
+            ratio_se: 0.0,
+            zeros: 0,
+            without_root: 0.0,
         };
         let results = vec![
             named("awv", "WN sigma2"),
@@ -170,7 +145,7 @@ mod tests {
         let mut reader = csv::Reader::from_reader(text.as_bytes());
         let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
         assert_eq!((rows.len(), &rows[0][0], &rows[3][1], &rows[3][2]), (4, "a, b", "dr-awv", "RW gamma2"));
-        assert_eq!(&rows[0][7], shortest(file().results[0].rmse));
+        assert_eq!(&rows[0][7], shortest(file().results[0].accuracy.rmse));
         assert_eq!(&rows[0][9], "1", "the first estimator's ratio to itself");
     }
 }

@@ -1,6 +1,5 @@
 //! Fitted models as JSON.
 
-use super::replicates::ReplicateEntry;
 use super::turn_on::TurnOnEntry;
 use crate::calibration::{
     Candidate, Diagnosis, Goodness, Indistinct, LevelSpread, Miss, Outcome, ParameterInterval, Practical,
@@ -13,7 +12,7 @@ use serde_json::{Map, Value};
 
 /// What `calibrate --format json` prints.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct FitsFile {
+pub(crate) struct FitsFile<'a> {
     /// Layout version.
     pub schema_version: u32,
     /// Sample rate (Hz).
@@ -23,7 +22,7 @@ pub(crate) struct FitsFile {
     /// One entry a fit.
     pub fits: Vec<FitEntry>,
     /// One entry a recording and sensor: whether it is abnormal.
-    pub replicates: Vec<ReplicateEntry>,
+    pub replicates: &'a [Diagnosis],
     /// One entry a sensor and estimator: what the recordings' means say of a turn-on bias.
     pub turn_on: Vec<TurnOnEntry>,
     /// Files written.
@@ -54,7 +53,7 @@ pub(crate) struct FitEntry {
     /// J-test; none without bootstrap.
     pub goodness: Option<Goodness>,
     /// Standard deviation of ln wv of a replicate at each scale: within by theory, between beyond that.
-    pub spread: Vec<SpreadEntry>,
+    pub spread: Vec<LevelSpread>,
     /// Probability that replicates of one noise differ as much at some scale; none of a single signal.
     pub spread_p_value: Option<f64>,
     /// Alike processes that cannot be told apart.
@@ -158,17 +157,6 @@ pub(crate) struct MissEntry {
     pub deviations: f64,
 }
 
-/// How replicates differ at one scale.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct SpreadEntry {
-    /// Scale (s).
-    pub tau_s: f64,
-    /// Standard deviation of ln wv that noise alone makes.
-    pub within: f64,
-    /// Standard deviation beyond that.
-    pub between: f64,
-}
-
 impl FitEntry {
     /// The entry of an outcome.
     #[must_use]
@@ -179,7 +167,6 @@ impl FitEntry {
         let labelled = |processes: &[usize]| processes.iter().map(|i| labels[*i].clone()).collect();
         let intervals = inference.into_iter().flat_map(|i| &i.intervals);
         let open = intervals.filter_map(|i| undetermined(i, &labels));
-        let spread = inference.map_or(&[][..], |i| &i.spread).iter();
         let miss =
             |m: &Miss| MissEntry { tau_s: tau_s(m.level, rate_hz), ratio: m.ratio, deviations: m.deviations };
         Self {
@@ -193,13 +180,7 @@ impl FitEntry {
             scales: outcome.curve.levels.len(),
             processes: processes_json(&outcome.fit.composite, inference.map_or(&[][..], |i| &i.intervals)),
             goodness: inference.and_then(|i| i.goodness),
-            spread: spread
-                .map(|&LevelSpread { level, within, between }| SpreadEntry {
-                    tau_s: tau_s(level, rate_hz),
-                    within,
-                    between,
-                })
-                .collect(),
+            spread: inference.map_or(Vec::new(), |i| i.spread.clone()),
             spread_p_value: inference.and_then(|i| i.alike),
             indistinct: inference
                 .and_then(|i| i.indistinct.as_ref())
@@ -236,12 +217,12 @@ fn parameters(outcome: &Outcome, rate_hz: f64) -> Value {
     value
 }
 
-impl FitsFile {
+impl<'a> FitsFile<'a> {
     /// The file of some outcomes.
     #[must_use]
     pub(crate) fn new(
         outcomes: &[Outcome],
-        diagnoses: &[Diagnosis],
+        diagnoses: &'a [Diagnosis],
         turn_on: &[TurnOnSpread],
         settings: &Settings,
         files: Vec<String>,
@@ -252,7 +233,7 @@ impl FitsFile {
             rate_hz,
             model: settings.model.to_string(),
             fits: outcomes.iter().map(|o| FitEntry::new(o, rate_hz)).collect(),
-            replicates: diagnoses.iter().map(|d| ReplicateEntry::new(d, rate_hz)).collect(),
+            replicates: diagnoses,
             turn_on: turn_on.iter().map(TurnOnEntry::new).collect(),
             files,
         }

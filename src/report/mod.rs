@@ -3,6 +3,7 @@
 
 mod brief;
 mod choose;
+mod closure;
 mod columns;
 mod comparison;
 mod curves;
@@ -31,9 +32,11 @@ mod trajectory;
 mod tune;
 mod turn_on;
 mod verdict;
+mod warm_up;
 
 pub(crate) use brief::brief;
 pub(crate) use choose::{ChoiceReport, RankedPlace};
+pub(crate) use closure::TrajectoryCheck;
 pub(crate) use columns::columns;
 pub(crate) use comparison::{
     CandidateResult, ComparisonFile, Label, consistency_rows, meaning_of_intervals, table_rows,
@@ -69,3 +72,5 @@ pub use trajectory::TrajectorySeries;
 pub(crate) use trajectory::trajectory_svg;
 pub(crate) use tune::{FactorEntry, TuneResult};
 pub(crate) use turn_on::{turn_on_lines, turn_on_remark};
+pub use warm_up::BeginsOtherwise;
+pub(crate) use warm_up::{warm_up_in_short, warm_up_lines};

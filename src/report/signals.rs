@@ -2,7 +2,7 @@
 
 use super::curves::{Band, SignalCurves, SignalsFile};
 use super::number::shortest;
-use crate::calibration::duration;
+use crate::calibration::{duration, median};
 use crate::wavelet::Tuning;
 
 /// Degrees of freedom from which on robust over classical tells of outliers rather than of chance.
@@ -20,7 +20,9 @@ pub(crate) fn signals_digest(file: &SignalsFile) -> Vec<Vec<String>> {
     let row = |(sensor, axis): (&str, &str)| {
         let own = of(file, sensor, axis);
         let median_at = |i: usize| {
-            median(own.iter().filter_map(|s| Some(allan_deviation(*s.classical.wv.get(i)?))).collect())
+            let of_files = own.iter().filter_map(|s| Some(allan_deviation(*s.classical.wv.get(i)?)));
+            let all: Vec<f64> = of_files.collect();
+            (!all.is_empty()).then(|| median(&all))
         };
         let cells = decades.iter().map(|i| median_at(*i).map_or(String::new(), |x| format!("{x:.3e}")));
         let name = [format!("{sensor}.{axis}"), unit(sensor).to_owned()];
@@ -207,16 +209,6 @@ fn least_ratio(ratios: &[Ratio]) -> Option<(f64, &'static str)> {
     let is_marked = ratios.iter().any(|r| r.ratio.ln() < -z * r.deviation);
     let least = ratios.iter().map(|r| r.ratio).min_by(f64::total_cmp)?;
     Some((least, if is_marked { " *" } else { "" }))
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let middle = values.len() / 2;
-    match values.len() {
-        0 => None,
-        n if n % 2 == 1 => Some(values[middle]),
-        _ => Some(0.5 * (values[middle - 1] + values[middle])),
-    }
 }
 
 fn short_name(file: &str) -> String {

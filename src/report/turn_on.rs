@@ -28,37 +28,15 @@ pub(crate) struct TurnOnEntry {
     /// Below it both have to be for a bias to be seen.
     pub level: f64,
     /// Axis by axis.
-    pub axes: Vec<MeansEntry>,
+    pub axes: Vec<MeansOfAxis>,
     /// The same in words.
     pub remark: String,
-}
-
-/// The means of one axis.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct MeansEntry {
-    /// `x`, `y` or `z`.
-    pub axis: &'static str,
-    /// Recordings.
-    pub recordings: usize,
-    /// Standard deviation of their means (m/s² or rad/s).
-    pub spread: f64,
-    /// What the fitted noise alone would make it.
-    pub noise: f64,
-    /// Largest less smallest mean.
-    pub range: f64,
 }
 
 impl TurnOnEntry {
     /// The entry of a sensor.
     #[must_use]
     pub(crate) fn new(found: &TurnOnSpread) -> Self {
-        let of_axis = |&MeansOfAxis { axis, recordings, spread, noise, range }: &MeansOfAxis| MeansEntry {
-            axis: axis.name(),
-            recordings,
-            spread,
-            noise,
-            range,
-        };
         Self {
             sensor: found.sensor.name(),
             estimator: found.estimator.name(),
@@ -70,7 +48,7 @@ impl TurnOnEntry {
             p_noise: found.p_noise,
             p_drift: found.p_drift,
             level: TURN_ON_LEVEL,
-            axes: found.axes.iter().map(of_axis).collect(),
+            axes: found.axes.clone(),
             remark: turn_on_remark(found),
         }
     }

@@ -59,6 +59,8 @@ impl Axis {
     }
 }
 
+crate::named!(Axis, in files);
+
 /// One of the six signals of an IMU.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Channel {

@@ -243,7 +243,6 @@ fn calibration(
     let (outcomes, settings) = calibrated(&recordings, step)?;
     let inputs = files.iter().map(|file| input::input("recording", file));
     let note = CalibrationNote {
-        version: env!("CARGO_PKG_VERSION").to_owned(),
         efficiency_convention: step.efficiency_convention.unwrap_or_default().to_string(),
         seed: None,
         reading: toml::Table::new(),

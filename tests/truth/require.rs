@@ -179,7 +179,7 @@ fn a_datasheet_is_not_read_optimistically() {
         let figures = |s| [Figure::Noise, Figure::Bias].map(|figure| sheet.value(s, figure).unwrap());
         let [[n_a, b_a], [n_g, b_g]] = Sensor::ALL.map(figures);
         let truth = Model::pooled(100.0, &flicker_noise(n_a, b_a), &flicker_noise(n_g, b_g));
-        let model = sheet.model_file(100.0, "test").unwrap().file.model;
+        let model = sheet.model_file(100.0).unwrap().file.model;
         let above = [(n_a, b_a), (n_g, b_g)].map(|(n, b)| (1.0 + n * n / (567.8 * b * b)).sqrt());
         let ratio = p95(&model) / p95(&truth);
         assert!(ratio > 1.0 / 1.04 && ratio < 1.075 * above[0].max(above[1]), "{name}: {ratio} {above:?}");

@@ -10,4 +10,5 @@ mod stationarity;
 pub use average::{AverageError, Estimator, Replicate, Trim, TrimError, average};
 pub use implied::implied;
 pub use replicates::{Group, Pool, Scope, SignalError, grouped, replicates, trend};
+pub use robust_scale::median;
 pub use stationarity::{Change, WarmUp, warm_up};

@@ -4,7 +4,8 @@
 pub(crate) const MAD_TO_DEVIATION: f64 = 1.482_602_218_505_602;
 
 /// The median; NaN of nothing.
-pub(crate) fn median(values: &[f64]) -> f64 {
+#[must_use]
+pub fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
     match sorted.len() {

@@ -4,7 +4,7 @@
 //! (1/e − 1)·2/eta (see [`super`]); quantization noise, which the robust variance reads high, is allowed for. Looked at is the median over the signals, so that a minority makes no alarm.
 
 use super::piece::{Piece, Test};
-use crate::wavelet::Tuning;
+use crate::outcome::{Settings, tau_s};
 
 /// Standard deviations of the median: 1 in 10⁶ by chance, at each of some ten scales.
 const ALARM: f64 = 5.0;
@@ -14,12 +14,12 @@ const LEAST: f64 = 0.02;
 const MEDIAN: f64 = 1.2533;
 
 /// Outliers in most of the signals of a sensor.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct CommonOutliers {
-    /// The levels at which there are.
-    pub levels: Vec<u32>,
+    /// The scales (s) at which there are.
+    pub tau_s: Vec<f64>,
     /// The one where they weigh most.
-    pub most: u32,
+    pub most_tau_s: f64,
     /// Median of classical over robust wavelet variance, less one, there.
     pub excess: f64,
     /// The same (in the logarithm) in standard deviations.
@@ -27,8 +27,8 @@ pub struct CommonOutliers {
 }
 
 /// Looks at all signals of a sensor together.
-pub(super) fn common(pieces: &[Piece<'_>], tuning: &Tuning) -> Option<CommonOutliers> {
-    let test = Test::Outliers;
+pub(super) fn common(pieces: &[Piece<'_>], settings: &Settings) -> Option<CommonOutliers> {
+    let (test, tuning) = (Test::Outliers, &settings.tuning);
     let mut found: Option<CommonOutliers> = None;
     for level in 0..test.levels(pieces) {
         let (mut logs, mut variance) = (Vec::new(), 0.0);
@@ -47,11 +47,12 @@ pub(super) fn common(pieces: &[Piece<'_>], tuning: &Tuning) -> Option<CommonOutl
         if !(excess.is_finite() && deviations > ALARM && excess > LEAST) {
             continue;
         }
-        let level = level as u32 + 1;
-        let all = found.get_or_insert(CommonOutliers { levels: Vec::new(), most: level, excess, deviations });
-        all.levels.push(level);
+        let scale_s = tau_s(level as u32 + 1, settings.rate_hz);
+        let first = CommonOutliers { tau_s: Vec::new(), most_tau_s: scale_s, excess, deviations };
+        let all = found.get_or_insert(first);
+        all.tau_s.push(scale_s);
         if excess > all.excess {
-            (all.most, all.excess, all.deviations) = (level, excess, deviations);
+            (all.most_tau_s, all.excess, all.deviations) = (scale_s, excess, deviations);
         }
     }
     found

@@ -7,6 +7,7 @@ use super::result::{Alarm, DriftAlarm};
 use crate::curve::Replicate;
 use crate::imu::{Axis, Sensor};
 use crate::noise::Composite;
+use crate::outcome::tau_s;
 
 /// All recordings against one another by one test.
 pub(super) struct Comparison {
@@ -67,13 +68,13 @@ impl Comparison {
         Some(DriftAlarm { p_value: found.p_value, change, deviations })
     }
 
-    pub(super) fn alarm(&self, file: usize) -> Option<Alarm> {
+    pub(super) fn alarm(&self, file: usize, rate_hz: f64) -> Option<Alarm> {
         let found = self.found.iter().find(|f| f.file == file)?;
         let first = found.window.first as u32 + 1;
         let named = found.distance.deviations.iter().map(|(axis, z)| (self.axes[*axis], *z));
         Some(Alarm {
             p_value: found.p_value,
-            levels: (first, first + found.window.width as u32 - 1),
+            tau_s: [first, first + found.window.width as u32 - 1].map(|level| tau_s(level, rate_hz)),
             deviations: named.collect(),
         })
     }

@@ -30,7 +30,7 @@ fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &
         return Vec::new();
     }
     let pieces = axes(&own, &names, outcomes);
-    let common = common(&pieces, &settings.tuning);
+    let common = common(&pieces, settings);
     let pieces = if names.len() < FEWEST { Vec::new() } else { pieces };
     let dropped = dropped(&own, settings);
     let [noise, outliers] = [Test::Noise, Test::Outliers]
@@ -45,7 +45,7 @@ fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &
     };
     let (misfits, differing) = (misfits(sensor, outcomes), differing(sensor, outcomes));
     let one = |(index, name): (usize, &&str)| {
-        let (of_noise, of_outliers) = (noise.alarm(index), outliers.alarm(index));
+        let [of_noise, of_outliers] = [&noise, &outliers].map(|test| test.alarm(index, settings.rate_hz));
         let of_drift = drift.drift_alarm(index, &pieces);
         let verdict = match (&of_noise, &of_outliers, &of_drift) {
             (Some(_), _, _) => Verdict::Noise,

@@ -1,18 +1,19 @@
 //! What leaving a recording out does to each estimator: its curve, and every parameter.
 
 use crate::curve::{Estimator, Group, Replicate, average};
-use crate::outcome::{Outcome, Settings};
+use crate::outcome::{Outcome, Settings, tau_s};
 use crate::uncertainty::spread::variance_of_log;
 
 /// How far an estimator moves when one recording is left out.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct LeftOut {
     /// The group, `accel` or `accel.x`.
+    #[serde(rename = "signals")]
     pub group: String,
     /// The estimator.
     pub estimator: Estimator,
-    /// Level at which the curve moves most, in standard deviations of its own.
-    pub level: u32,
+    /// Scale (s) at which the curve moves most, in standard deviations of its own.
+    pub tau_s: f64,
     /// nu without it over nu with it, less one, there.
     pub change: f64,
     /// The same in standard deviations of ln nu of the curve.
@@ -57,7 +58,7 @@ pub(super) fn left_out(group: &Group, name: &str, outcome: &Outcome, settings: &
     Some(LeftOut {
         group: group.scope.name(),
         estimator: outcome.estimator,
-        level,
+        tau_s: tau_s(level, settings.rate_hz),
         change,
         deviations,
         parameters,

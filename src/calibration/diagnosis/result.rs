@@ -5,6 +5,7 @@ use super::leave_out::LeftOut;
 use crate::curve::{Estimator, Pool};
 use crate::imu::{Axis, Sensor};
 use crate::outcome::LevelSpread;
+use serde::{Serialize, Serializer};
 
 /// What is abnormal about a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,33 +33,51 @@ impl Verdict {
     }
 }
 
+impl Serialize for Verdict {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.serialize_str(self.name())
+    }
+}
+
+fn by_axis<S: Serializer>(values: &[(Axis, f64)], to: S) -> Result<S::Ok, S::Error> {
+    to.collect_map(values.iter().copied())
+}
+
+fn scores_by_axis<S: Serializer>(scores: &[AxisScores], to: S) -> Result<S::Ok, S::Error> {
+    to.collect_map(scores.iter().map(|of_axis| (of_axis.axis, of_axis)))
+}
+
 /// A drift that no other recording has.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DriftAlarm {
     /// Probability that the most unusual of recordings that are alike is as unusual.
     pub p_value: f64,
     /// Mean of the later half less that of the earlier one, of each axis (units).
+    #[serde(serialize_with = "by_axis")]
     pub change: Vec<(Axis, f64)>,
     /// The same against the others, in standard deviations.
+    #[serde(serialize_with = "by_axis")]
     pub deviations: Vec<(Axis, f64)>,
 }
 
 /// Why a recording is abnormal.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Alarm {
     /// Probability that the most unusual of recordings that are alike is as unusual.
     pub p_value: f64,
-    /// First and last level of the neighbouring scales at which it is most unusual.
-    pub levels: (u32, u32),
+    /// First and last of the neighbouring scales (s) at which it is most unusual.
+    pub tau_s: [f64; 2],
     /// What was looked at there, on all axes, against the others, in standard deviations.
+    #[serde(serialize_with = "by_axis")]
     pub deviations: Vec<(Axis, f64)>,
 }
 
 /// The scores of a recording at every scale, on one axis: against the mean of the others that are not abnormal, in
 /// standard deviations (those of the others, pooled over the axes, but no less than noise alone makes).
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AxisScores {
     /// Axis.
+    #[serde(skip)]
     pub axis: Axis,
     /// Of ln robust wavelet variance, level 1 first.
     pub noise: Vec<f64>,
@@ -72,13 +91,15 @@ pub struct AxisScores {
 /// often one of outliers, and one of drift, however much alike recordings differ, if ln nu does so by Gaussian numbers
 /// independent from axis to axis. Two recordings that are abnormal alike hide behind each
 /// other unless there are six or more; three do in any case.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Diagnosis {
     /// Recording.
+    #[serde(rename = "file")]
     pub name: String,
     /// Sensor.
     pub sensor: Sensor,
     /// Axes of the sensor that it has.
+    #[serde(skip)]
     pub axes: usize,
     /// What is said of it.
     pub verdict: Verdict,
@@ -88,17 +109,22 @@ pub struct Diagnosis {
     pub outliers: Option<Alarm>,
     /// Why its level is said to drift.
     pub drift: Option<DriftAlarm>,
-    /// Scores; empty when there are fewer than four recordings.
-    pub scores: Vec<AxisScores>,
     /// Outliers that most signals of this sensor hold, in all recordings alike.
+    #[serde(rename = "common_outliers")]
     pub common: Option<CommonOutliers>,
+    /// Scores; empty when there are fewer than four recordings.
+    #[serde(serialize_with = "scores_by_axis")]
+    pub scores: Vec<AxisScores>,
     /// Whether the axes of the sensor were pooled, and what DR-AWV dropped at each end of each scale, if it ran.
+    #[serde(skip)]
     pub dropped: Option<(Pool, usize)>,
     /// What leaving it out does to each fit.
     pub left_out: Vec<LeftOut>,
     /// The fits to this sensor whose model does not describe the curve, by the J-test.
+    #[serde(skip)]
     pub misfits: Vec<Misfit>,
     /// How the recordings of this sensor differ beyond their noise, if a fit's test says that they do.
+    #[serde(skip)]
     pub differing: Option<Differing>,
 }
 

@@ -142,16 +142,14 @@ fn outliers_and_another_noise_are_told_apart() {
     assert_eq!(verdicts(&all), [Normal, Normal, Outliers, Normal, Normal, Noise, Normal]);
     let alarm = all[2].outliers.as_ref().unwrap();
     assert!(alarm.deviations[0].1 > 5.0 && alarm.deviations[2].1 < 5.0, "{alarm:?}");
-    let words = advice(&all, Sensor::Accel, 1.0);
+    let words = advice(&all, Sensor::Accel);
     assert!(words[1].starts_with("run2 is abnormal: outliers within it"), "{words:?}");
     assert!(
         words[0].contains("dr-awv with a trim of at least 1 (axes apart) or 3 (axes pooled) does without"),
         "{words:?}"
     );
-    assert!(
-        effects(&all, Sensor::Accel, 1.0).iter().any(|l| l.starts_with("without run2 accel awv moves by"))
-    );
-    assert!(advice(&all, Sensor::Gyro, 1.0).is_empty());
+    assert!(effects(&all, Sensor::Accel).iter().any(|l| l.starts_with("without run2 accel awv moves by")));
+    assert!(advice(&all, Sensor::Gyro).is_empty());
 }
 
 /// What spikes do to the parameters: 3 of 60² on two of three axes of 2048 samples make the sigma2 of AWV 1 +
@@ -194,8 +192,8 @@ fn outliers_in_all_recordings_are_told() {
     let all = set(9, 6, NONE, |_, _, signal| (0..20).for_each(|i| signal[50 + 100 * i] += 8.0));
     assert!(all.iter().all(|d| d.verdict == Verdict::Normal));
     let common = all[0].common.as_ref().unwrap();
-    assert!((common.excess / 0.64 - 1.0).abs() < 0.3 && common.levels.contains(&1), "{common:?}");
-    let words = advice(&all, Sensor::Accel, 1.0);
+    assert!((common.excess / 0.64 - 1.0).abs() < 0.3 && common.tau_s.contains(&2.0), "{common:?}");
+    let words = advice(&all, Sensor::Accel);
     assert_eq!(words[0], "the 6 recordings agree: use them all");
     assert!(words[1].starts_with("outliers within all 6 recordings"), "{words:?}");
     for seed in 0..6 {
@@ -211,18 +209,18 @@ fn a_trim_that_suffices_is_not_asked_for() {
             signal.iter_mut().for_each(|x| *x *= 2.0_f64.sqrt());
         }
     });
-    assert!(advice(&one, Sensor::Accel, 1.0)[0].contains("trim of at least 1"));
+    assert!(advice(&one, Sensor::Accel)[0].contains("trim of at least 1"));
     one[0].dropped = Some((Pool::Sensor, 3));
-    assert!(advice(&one, Sensor::Accel, 1.0)[0].contains("with the trim it ran with, 3, already"));
+    assert!(advice(&one, Sensor::Accel)[0].contains("with the trim it ran with, 3, already"));
 }
 
 /// That none stands out is not that they agree.
 #[test]
 fn recordings_that_differ_are_not_said_to_agree() {
     let mut all = set(7, 6, NONE, |_, _, _| ());
-    let most = LevelSpread { level: 3, within: 0.01, between: 0.36 };
+    let most = LevelSpread { tau_s: 8.0, within: 0.01, between: 0.36 };
     all.iter_mut().for_each(|d| d.differing = Some(Differing { p_value: 0.002, most }));
-    let words = advice(&all, Sensor::Accel, 1.0);
+    let words = advice(&all, Sensor::Accel);
     let expected = "none of the 6 recordings stands out, but they differ among themselves beyond their noise, by 36 % of the \
                     wavelet variance at 8 s (p = 0.002)";
     assert!(words[0].starts_with(expected), "{words:?}");
@@ -232,10 +230,10 @@ fn recordings_that_differ_are_not_said_to_agree() {
 #[test]
 fn advice_is_conditioned_on_the_j_test() {
     let mut all = set(7, 6, NONE, |_, _, _| ());
-    assert_eq!(advice(&all, Sensor::Accel, 1.0), ["the 6 recordings agree: use them all"]);
+    assert_eq!(advice(&all, Sensor::Accel), ["the 6 recordings agree: use them all"]);
     let misfit = Misfit { group: "accel".to_owned(), estimator: Estimator::DrAwv, p_value: 0.005 };
     all.iter_mut().for_each(|d| d.misfits = vec![misfit.clone()]);
-    let words = advice(&all, Sensor::Accel, 1.0);
+    let words = advice(&all, Sensor::Accel);
     assert!(words[1].starts_with("the J-test rejects the model (accel dr-awv, p = 0.005)"), "{words:?}");
 }
 
@@ -260,6 +258,6 @@ fn a_slow_drift_is_found() {
 fn three_recordings_cannot_say_which() {
     let all = set(7, 3, NONE, |_, _, _| ());
     assert!(all.iter().all(|d| d.scores.is_empty() && d.verdict == Verdict::Normal));
-    assert!(advice(&all, Sensor::Accel, 1.0)[0].starts_with("too few recordings"));
+    assert!(advice(&all, Sensor::Accel)[0].starts_with("too few recordings"));
     assert!(set(7, 1, NONE, |_, _, _| ()).is_empty());
 }

@@ -1,27 +1,27 @@
 //! How far from the target the estimates of many sets are.
 
+use crate::curve::robust_scale::{MAD_TO_DEVIATION, median};
 use crate::rng::StreamKey;
 use rand::RngExt;
 
-/// 1.4826·MAD is consistent for a normal law's standard deviation.
-const MAD_SCALE: f64 = 1.482_602_218_505_602;
 /// Resamples of the bootstrap: a standard error is then known to 1/√(2·1000) = 2 %.
 const RESAMPLES: usize = 1000;
 
 /// Errors of one estimator in one parameter, relative to the target.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Accuracy {
     /// Median of the relative errors.
     pub bias: f64,
+    /// Standard error of the bias over draws of the sets.
+    pub bias_se: f64,
     /// 1.4826·MAD of the relative errors.
     pub spread: f64,
     /// √(bias² + spread²) ([Minaretzis](crate::bibliography::Minaretzis24), eq. 15).
     pub rmse: f64,
-    /// Standard error of the bias over draws of the sets.
-    pub bias_se: f64,
     /// Standard error of the RMSE.
     pub rmse_se: f64,
     /// The RMSE of each resample of the sets; the n-th of every estimator is of the same sets.
+    #[serde(skip)]
     pub resampled: Vec<f64>,
 }
 
@@ -69,18 +69,7 @@ pub fn accuracy(estimates: &[f64], target: f64, seed: u64) -> Accuracy {
 fn centre_and_spread(x: &mut [f64]) -> (f64, f64) {
     let centre = median(x);
     x.iter_mut().for_each(|v| *v = (*v - centre).abs());
-    (centre, MAD_SCALE * median(x))
-}
-
-/// The median; the order of the numbers is lost. NaN of none.
-fn median(x: &mut [f64]) -> f64 {
-    if x.is_empty() {
-        return f64::NAN;
-    }
-    let middle = x.len() / 2;
-    let odd = x.len() % 2 == 1;
-    let (below, &mut upper, _) = x.select_nth_unstable_by(middle, f64::total_cmp);
-    if odd { upper } else { 0.5 * (upper + below.iter().copied().fold(f64::NEG_INFINITY, f64::max)) }
+    (centre, MAD_TO_DEVIATION * median(x))
 }
 
 fn standard_deviation(x: &[f64]) -> f64 {
@@ -104,8 +93,8 @@ mod tests {
     #[test]
     fn equation_15_by_hand() {
         let a = accuracy(&[1.8, 2.0, 2.2, 2.4, 20.0], 2.0, 1);
-        assert!((a.bias - 0.1).abs() < 1e-15 && (a.spread - 0.1 * MAD_SCALE).abs() < 1e-15);
-        assert!((a.rmse - 0.1 * (1.0 + MAD_SCALE * MAD_SCALE).sqrt()).abs() < 1e-15);
+        assert!((a.bias - 0.1).abs() < 1e-15 && (a.spread - 0.1 * MAD_TO_DEVIATION).abs() < 1e-15);
+        assert!((a.rmse - 0.1 * (1.0 + MAD_TO_DEVIATION * MAD_TO_DEVIATION).sqrt()).abs() < 1e-15);
         let even = accuracy(&[1.0, 2.0, 3.0, 6.0], 1.0, 1);
         assert!((even.bias - 1.5).abs() < 1e-15, "{}", even.bias);
     }

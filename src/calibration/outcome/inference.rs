@@ -98,11 +98,11 @@ pub struct AxesDiffer {
     pub ratio: f64,
 }
 
-/// How replicates differ at one level: standard deviations of ln nu of a replicate.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// How replicates differ at one scale: standard deviations of ln nu of a replicate.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct LevelSpread {
-    /// Level.
-    pub level: u32,
+    /// Scale (s).
+    pub tau_s: f64,
     /// By the law of the noise alone.
     pub within: f64,
     /// Beyond that.

@@ -26,6 +26,12 @@ pub fn model_of<'a>(outcomes: impl IntoIterator<Item = &'a Outcome>, rate_hz: f6
     model
 }
 
+/// Scale of a level (s).
+#[must_use]
+pub fn tau_s(level: u32, rate_hz: f64) -> f64 {
+    f64::from(level).exp2() / rate_hz
+}
+
 /// Gives noise to the axes of a model.
 pub fn put(composite: &Composite, scope: Scope, model: &mut Model) {
     for channel in scope.channels() {

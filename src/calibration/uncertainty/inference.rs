@@ -15,7 +15,7 @@ use super::sandwich::standard_errors;
 use super::spread::Spread;
 use crate::curve::{Estimator, Group};
 use crate::fit::Fit;
-use crate::outcome::{Advance, Bootstrap, Indistinct, Inference, LevelSpread, Outcome, Settings};
+use crate::outcome::{Advance, Bootstrap, Indistinct, Inference, LevelSpread, Outcome, Settings, tau_s};
 use crate::rng::StreamKey;
 use rayon::prelude::*;
 
@@ -71,7 +71,11 @@ fn by_bootstrap(
         let deviations = s.within.iter().zip(&s.between);
         levels
             .zip(deviations)
-            .map(|(level, (within, between))| LevelSpread { level, within: *within, between: *between })
+            .map(|(level, (&within, &between))| LevelSpread {
+                tau_s: tau_s(level, settings.rate_hz),
+                within,
+                between,
+            })
             .collect()
     };
     let stretch = spread.map_or(1.0, Spread::student);

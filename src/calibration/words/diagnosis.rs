@@ -1,6 +1,6 @@
 //! The diagnosis in words.
 
-use super::format::{signed_percent, tau_s};
+use super::format::signed_percent;
 use crate::curve::Pool;
 use crate::diagnosis::{
     Alarm, CommonOutliers, Diagnosis, Differing, DriftAlarm, LeftOut, Misfit, Movement, Verdict,
@@ -10,12 +10,12 @@ use crate::outcome::LevelSpread;
 use std::fmt::Write;
 
 /// The answer for one sensor: what the recordings are used for, then a line for each that is abnormal, and each fit that the
-/// J-test rejects. `rate_hz` turns levels into seconds.
+/// J-test rejects.
 ///
 /// It says what each estimator describes; which of them suits a filter is a question about navigation, not about
 /// wavelet variances.
 #[must_use]
-pub fn advice(diagnoses: &[Diagnosis], sensor: Sensor, rate_hz: f64) -> Vec<String> {
+pub fn advice(diagnoses: &[Diagnosis], sensor: Sensor) -> Vec<String> {
     let own: Vec<&Diagnosis> = diagnoses.iter().filter(|d| d.sensor == sensor).collect();
     let Some(first) = own.first() else { return Vec::new() };
     let mut lines = Vec::new();
@@ -24,19 +24,19 @@ pub fn advice(diagnoses: &[Diagnosis], sensor: Sensor, rate_hz: f64) -> Vec<Stri
     } else {
         let abnormal: Vec<&Diagnosis> =
             own.iter().copied().filter(|d| d.verdict != Verdict::Normal).collect();
-        lines.push(answer(&own, &abnormal, rate_hz));
-        lines.extend(abnormal.iter().flat_map(|d| describe(d, rate_hz)));
+        lines.push(answer(&own, &abnormal));
+        lines.extend(abnormal.iter().flat_map(|d| describe(d)));
     }
-    lines.extend(first.common.iter().map(|c| outliers(c, own.len(), rate_hz)));
+    lines.extend(first.common.iter().map(|c| outliers(c, own.len())));
     lines.extend(misfits(&first.misfits));
     lines
 }
 
 /// What leaving each abnormal recording of a sensor out does to the fits, a line each.
 #[must_use]
-pub fn effects(diagnoses: &[Diagnosis], sensor: Sensor, rate_hz: f64) -> Vec<String> {
+pub fn effects(diagnoses: &[Diagnosis], sensor: Sensor) -> Vec<String> {
     let abnormal = diagnoses.iter().filter(|d| d.sensor == sensor && d.verdict != Verdict::Normal);
-    abnormal.flat_map(|d| d.left_out.iter().map(|l| effect(&d.name, l, rate_hz))).collect()
+    abnormal.flat_map(|d| d.left_out.iter().map(|l| effect(&d.name, l))).collect()
 }
 
 /// What is said where the model does not describe the curve: everything else is of the wrong model.
@@ -54,15 +54,13 @@ fn misfits(misfits: &[Misfit]) -> Option<String> {
 }
 
 /// What is said of outliers that all recordings hold.
-fn outliers(common: &CommonOutliers, count: usize, rate_hz: f64) -> String {
-    let (first, last) = (common.levels[0], common.levels[common.levels.len() - 1]);
+fn outliers(common: &CommonOutliers, count: usize) -> String {
+    let (first, last) = (common.tau_s[0], common.tau_s[common.tau_s.len() - 1]);
     format!(
         "outliers within all {count} recordings, or most: the classical wavelet variance is above the robust one \
-         from {} s to {} s, most at {} s: by {} in the median ({:.0} standard deviations): awv describes the noise with \
+         from {first} s to {last} s, most at {} s: by {} in the median ({:.0} standard deviations): awv describes the noise with \
          them, sr-awv and dr-awv without most of them (small ones pass for noise)",
-        tau_s(first, rate_hz),
-        tau_s(last, rate_hz),
-        tau_s(common.most, rate_hz),
+        common.most_tau_s,
         signed_percent(common.excess).trim_start_matches('+'),
         common.deviations
     )
@@ -75,9 +73,9 @@ fn suffices(own: &[&Diagnosis], recordings: usize, signals: usize) -> Option<usi
     (trim >= needed).then_some(trim)
 }
 
-fn describe(diagnosis: &Diagnosis, rate_hz: f64) -> Vec<String> {
+fn describe(diagnosis: &Diagnosis) -> Vec<String> {
     let of = |alarm: &Option<Alarm>, what: &str| {
-        let line = |a: &Alarm| format!("{} is abnormal: {what}, {}", diagnosis.name, extent(a, rate_hz));
+        let line = |a: &Alarm| format!("{} is abnormal: {what}, {}", diagnosis.name, extent(a));
         alarm.as_ref().map(line)
     };
     let noise = of(&diagnosis.noise, "its noise is not that of the others (robust wavelet variance)");
@@ -99,13 +97,13 @@ fn drift(name: &str, sensor: Sensor, alarm: &DriftAlarm) -> String {
     )
 }
 
-fn effect(name: &str, left: &LeftOut, rate_hz: f64) -> String {
+fn effect(name: &str, left: &LeftOut) -> String {
     let mut line = format!(
         "without {name} {} {} moves by {} at {} s",
         left.group,
         left.estimator.name(),
         signed_percent(left.change),
-        tau_s(left.level, rate_hz)
+        left.tau_s
     );
     let moved = |m: &Movement| match m.without / m.with - 1.0 {
         change if change.is_finite() => signed_percent(change),
@@ -120,29 +118,24 @@ fn effect(name: &str, left: &LeftOut, rate_hz: f64) -> String {
 }
 
 /// `most from 20.48 s to 327.68 s (x +4.9, y +6.3, z +2.1 deviations), p = 0.004`
-fn extent(alarm: &Alarm, rate_hz: f64) -> String {
-    let (first, last) = alarm.levels;
-    let range = if first == last {
-        format!("at {} s", tau_s(first, rate_hz))
-    } else {
-        format!("from {} s to {} s", tau_s(first, rate_hz), tau_s(last, rate_hz))
-    };
+fn extent(alarm: &Alarm) -> String {
+    let [first, last] = alarm.tau_s;
+    let range = if first < last { format!("from {first} s to {last} s") } else { format!("at {first} s") };
     let axes: Vec<String> = alarm.deviations.iter().map(|(a, z)| format!("{} {z:+.1}", a.name())).collect();
     format!("most {range} ({} deviations), p = {:.4}", axes.join(", "), alarm.p_value)
 }
 
-fn answer(own: &[&Diagnosis], abnormal: &[&Diagnosis], rate_hz: f64) -> String {
+fn answer(own: &[&Diagnosis], abnormal: &[&Diagnosis]) -> String {
     let of_noise = || abnormal.iter().filter(|d| d.verdict == Verdict::Noise);
     let signals: usize = of_noise().map(|d| d.axes).sum();
     let all = own.len();
     match (abnormal.len(), of_noise().count()) {
         (0, _) => match own[0].differing {
             None => format!("the {all} recordings agree: use them all"),
-            Some(Differing { p_value, most: LevelSpread { level, between, .. } }) => format!(
+            Some(Differing { p_value, most: LevelSpread { tau_s, between, .. } }) => format!(
                 "none of the {all} recordings stands out, but they differ among themselves beyond their noise, by {} of the \
-                 wavelet variance at {} s (p = {p_value:.3}): the model is their average, and each of them is another",
-                signed_percent(between).trim_start_matches('+'),
-                tau_s(level, rate_hz)
+                 wavelet variance at {tau_s} s (p = {p_value:.3}): the model is their average, and each of them is another",
+                signed_percent(between).trim_start_matches('+')
             ),
         },
         (some, 0) if abnormal.iter().all(|d| d.verdict == Verdict::Drift) => format!(

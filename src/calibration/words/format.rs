@@ -39,9 +39,3 @@ pub(super) fn three_digits(x: f64) -> String {
     let text = format!("{x:.decimals$}");
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
-
-/// Scale of a level (s).
-#[must_use]
-pub fn tau_s(level: u32, rate_hz: f64) -> f64 {
-    f64::from(level).exp2() / rate_hz
-}

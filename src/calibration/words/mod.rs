@@ -7,7 +7,7 @@ mod notes;
 mod ranking;
 
 pub use diagnosis::{advice, effects};
-pub use format::{duration, percent, tau_s};
+pub use format::{duration, percent};
 pub(crate) use inference::notes_of_inference;
 pub use inference::undetermined;
 pub(crate) use notes::notes;

@@ -1,9 +1,9 @@
 //! What a fit says, and what it cannot say, in words.
 
-use super::format::{duration, percent, tau_s, three_digits};
+use super::format::{duration, percent, three_digits};
 use crate::curve::{Estimator, Replicate};
 use crate::noise::{Composite, Process};
-use crate::outcome::{AxesDiffer, Miss, Outcome};
+use crate::outcome::{AxesDiffer, Miss, Outcome, tau_s};
 use crate::wavelet::{Curve, Status};
 
 /// What a process contributes to a model's wavelet variance.

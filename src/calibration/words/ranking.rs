@@ -1,7 +1,6 @@
 //! Why a model was chosen, in words.
 
-use super::format::tau_s;
-use crate::outcome::{Candidate, Ranking};
+use crate::outcome::{Candidate, Ranking, tau_s};
 
 /// The reasons of a choice. `rate_hz` turns levels into seconds.
 #[must_use]

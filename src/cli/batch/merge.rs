@@ -40,13 +40,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         }
         e => e.into(),
     })?;
-    let shown = match () {
-        () if session.json() => merged.summary.to_string(),
-        () if session.verbose() => merged.text,
-        () => beginning(merged.text.trim_end()),
-    };
-    session.printer.result(shown.trim_end());
-    session.printer.say(&format!("wrote {}", merged.results.display()));
+    let text = || if session.verbose() { merged.text.clone() } else { beginning(merged.text.trim_end()) };
+    session.show(|| merged.summary.to_string(), text);
+    session.wrote(&merged.results);
     if merged.diverged == 0 {
         return Ok(());
     }

@@ -40,7 +40,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if made.was_there {
         session.printer.say(&format!("{} was planned already", directory.display()));
     } else if !args.dry_run {
-        session.printer.say(&format!("wrote {}", directory.join("plan.json").display()));
+        session.wrote(&directory.join("plan.json"));
     }
     Ok(())
 }

@@ -81,7 +81,6 @@ pub(super) fn note(
         inputs.push(read::input("parameters", path)?);
     }
     Ok(CalibrationNote {
-        version: env!("CARGO_PKG_VERSION").to_owned(),
         efficiency_convention: args.tuning.convention().to_owned(),
         reading: reading(args, settings),
         seed: (args.bootstrap > 0).then(|| session.seed(None)),
@@ -117,7 +116,7 @@ pub(super) fn finish(
         session.printer.result(json.trim_end());
     } else {
         let text = if session.verbose() {
-            let replicates = report::describe_replicates(&diagnoses, settings.rate_hz);
+            let replicates = report::describe_replicates(&diagnoses);
             let fits = outcomes.iter().map(|o| report::describe(o, settings));
             let means = report::turn_on_lines(turn_on);
             replicates.into_iter().chain(fits).chain(means).collect::<Vec<_>>().join("\n\n")

@@ -123,9 +123,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let summary = FusionSummary::of(&solution, (&outcome, &assessment), &start, rate_hz, states);
     let wall_s = begin.elapsed().as_secs_f64();
     output::write(&solution, &summary, inputs.files, wall_s, &args.out)?;
-    let shown = if session.json() { crate::report::json(&summary) } else { summary.text() };
-    session.printer.result(shown.trim_end());
-    session.printer.say(&format!("wrote {}", args.out.display()));
+    session.show(|| crate::report::json(&summary), || summary.text());
+    session.wrote(&args.out);
     believed(&assessment, &args.out, outcome.nis_per_component)
 }
 

@@ -153,7 +153,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         session.printer.result(run_words::sensitivity_table(&found.summary).trim_end());
     }
     output::doubt_filter(&found.summary, session);
-    session.printer.say(&format!("wrote {}", args.out.display()));
+    session.wrote(&args.out);
     all_finite(&found.summary)?;
     not_lost(&found.summary)?;
     required(&found.summary)

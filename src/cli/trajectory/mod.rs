@@ -84,5 +84,5 @@ fn wrote(path: &Path, session: &Session) {
         let json = json!({ "schema_version": 1, "written": [path.display().to_string()] });
         session.printer.result(&json.to_string());
     }
-    session.printer.say(&format!("wrote {}", path.display()));
+    session.wrote(path);
 }

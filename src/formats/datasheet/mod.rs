@@ -23,7 +23,7 @@ mod figure;
 pub use catalogue::{CATALOGUE, catalogued, read};
 pub use figure::{Figure, Quantity, QuantityError};
 
-use crate::formats::model_file::{ModelFile, SCHEMA, TurnOn};
+use crate::formats::model_file::{ModelFile, PROGRAM, SCHEMA, TurnOn};
 use crate::imu::{Channel, Sensor};
 use crate::noise::{Composite, Flicker, Model, ParameterError, Process, RandomWalk, White, continuous};
 use toml::Table;
@@ -91,11 +91,11 @@ impl Datasheet {
         self.entries.push(entry);
     }
 
-    /// The model at a rate; `program` names what made it.
+    /// The model at a rate (Hz).
     ///
     /// # Errors
     /// When a figure is beyond what a process can have.
-    pub fn model_file(&self, rate_hz: f64, program: &str) -> Result<Made, ParameterError> {
+    pub fn model_file(&self, rate_hz: f64) -> Result<Made, ParameterError> {
         let mut doubts = Vec::new();
         let mut noise = |sensor| self.noise(sensor, rate_hz, &mut doubts);
         let (accel, gyro) = (noise(Sensor::Accel)?, noise(Sensor::Gyro)?);
@@ -105,7 +105,7 @@ impl Datasheet {
         let turn_on = |sensor| self.value(sensor, Figure::TurnOn).map(|sigma| [sigma; 3]);
         let turn_on = TurnOn { accel_m_s2: turn_on(Sensor::Accel), gyro_rad_s: turn_on(Sensor::Gyro) };
         file.turn_on = (turn_on != TurnOn::default()).then_some(turn_on);
-        file.provenance = Some(self.provenance(program, &doubts));
+        file.provenance = Some(self.provenance(&doubts));
         Ok(Made { file, doubts })
     }
 
@@ -135,9 +135,9 @@ impl Datasheet {
         Ok(Composite::new(processes))
     }
 
-    fn provenance(&self, program: &str, doubts: &[String]) -> Table {
+    fn provenance(&self, doubts: &[String]) -> Table {
         let mut table = Table::new();
-        table.insert("program".into(), program.into());
+        table.insert("program".into(), PROGRAM.into());
         table.insert("schema".into(), (SCHEMA as i64).into());
         table.insert("estimator".into(), "datasheet".into());
         table.insert("label".into(), "an assumption: figures of a datasheet, not a calibration".into());

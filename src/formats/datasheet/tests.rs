@@ -28,7 +28,7 @@ fn densities_are_where_the_allan_deviation_is_read() {
         (Sensor::Accel, Figure::Walk, "60 ug/sqrt(h)"),
     ]);
     // 128 samples a second: 1 s is 2^7 samples, level 8
-    let made = sheet.model_file(128.0, "test").unwrap().file.model;
+    let made = sheet.model_file(128.0).unwrap().file.model;
     let density = 0.15 / 60.0 * std::f64::consts::PI / 180.0;
     assert!((allan_deviation(&made.axes[3], 8) / density - 1.0).abs() < 1e-12);
     // K² τ/3 in continuous time; sampled, a share 1/(2·128²) more
@@ -45,7 +45,7 @@ fn densities_are_where_the_allan_deviation_is_read() {
 fn no_model_of_a_datasheet_is_below_its_bias_instability() {
     for (name, _) in CATALOGUE {
         let sheet = catalogued(name).unwrap().unwrap();
-        let model = sheet.model_file(100.0, "test").unwrap().file.model;
+        let model = sheet.model_file(100.0).unwrap().file.model;
         for sensor in Sensor::ALL {
             let [floor, density] = [Figure::Bias, Figure::Noise].map(|figure| sheet.value(sensor, figure));
             let (Some(floor), Some(density)) = (floor, density) else { continue };
@@ -65,7 +65,7 @@ fn what_is_assumed_is_said() {
     let doubts_with = |extra: &[(Sensor, Figure, &str)]| {
         let mut sheet = sheet(&bias);
         self::sheet(extra).entries.into_iter().for_each(|entry| sheet.set(entry));
-        sheet.model_file(100.0, "test").unwrap().doubts
+        sheet.model_file(100.0).unwrap().doubts
     };
     let assumed = "gyro: no correlation time is given; 300 s is assumed for the bias instability";
     assert_eq!(doubts_with(&[]), [assumed]);
@@ -88,7 +88,7 @@ fn provenance_holds_every_figure_as_given() {
         (Sensor::Gyro, Figure::TurnOn, "0.1 deg/s"),
         (Sensor::Gyro, Figure::Scale, "300 ppm"),
     ]);
-    let file = made.model_file(100.0, "nav-sim 1").unwrap().file;
+    let file = made.model_file(100.0).unwrap().file;
     let provenance = file.provenance.as_ref().unwrap();
     let figures = provenance["figures"].as_array().unwrap();
     let given: Vec<&str> = figures.iter().map(|f| f["given"].as_str().unwrap()).collect();
@@ -127,7 +127,7 @@ fn the_catalogue_is_sound() {
         for sensor in Sensor::ALL {
             assert!(sheet.value(sensor, Figure::Noise).is_some(), "{name}");
         }
-        let file = sheet.model_file(100.0, "test").unwrap().file;
+        let file = sheet.model_file(100.0).unwrap().file;
         assert!(file.missing.is_empty());
         let text = model_file::to_toml(&file);
         let place = tempfile::tempdir().unwrap();

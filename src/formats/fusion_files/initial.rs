@@ -3,32 +3,70 @@
 use crate::earth::MAX_LATITUDE;
 use crate::ekf::InitialSettings;
 use crate::formats::FileError;
-use crate::formats::toml_file::{Section, Source};
+use crate::formats::toml_described::Document;
+use crate::formats::toml_file::Source;
 use crate::frames::{NavState, RollPitchYaw};
 use crate::fusion::Start;
 use crate::units::DEG;
 use glam::DVec3;
+use schemars::JsonSchema;
+use serde::Deserialize;
 use std::path::Path;
 
-const KEYS: [&str; 17] = [
-    "t_s",
-    "lat_deg",
-    "lon_deg",
-    "h_m",
-    "v_n_m_s",
-    "v_e_m_s",
-    "v_d_m_s",
-    "roll_deg",
-    "pitch_deg",
-    "yaw_deg",
-    "pos_sigma_m",
-    "vel_sigma_m_s",
-    "att_sigma_deg",
-    "accel_bias_sigma_m_s2",
-    "gyro_bias_sigma_rad_s",
-    "accel_scale_sigma_ppm",
-    "gyro_scale_sigma_ppm",
-];
+/// Where and how a drive begins: nav-sim fuse --initial
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "Initial state")]
+struct Description {
+    /// Time (s)
+    t_s: f64,
+    /// Latitude of the IMU (degrees)
+    #[schemars(range(min = -90.0, max = 90.0))]
+    lat_deg: f64,
+    /// Longitude of the IMU (degrees)
+    #[schemars(range(min = -360.0, max = 360.0))]
+    lon_deg: f64,
+    /// Height of the IMU above the ellipsoid (m)
+    h_m: f64,
+    /// Velocity north (m/s; default: 0)
+    #[serde(default)]
+    v_n_m_s: f64,
+    /// Velocity east (m/s; default: 0)
+    #[serde(default)]
+    v_e_m_s: f64,
+    /// Velocity down (m/s; default: 0)
+    #[serde(default)]
+    v_d_m_s: f64,
+    /// Roll of the vehicle (degrees)
+    #[schemars(range(min = -180.0, max = 180.0))]
+    roll_deg: f64,
+    /// Pitch (degrees)
+    #[schemars(range(min = -90.0, max = 90.0))]
+    pitch_deg: f64,
+    /// Yaw (degrees)
+    #[schemars(range(min = -360.0, max = 360.0))]
+    yaw_deg: f64,
+    /// Standard deviations of the position north, east, down (m; default: as in scenarios)
+    pos_sigma_m: Option<[f64; 3]>,
+    /// Of the velocity (m/s)
+    vel_sigma_m_s: Option<[f64; 3]>,
+    /// Of roll, pitch, yaw (degrees)
+    att_sigma_deg: Option<[f64; 3]>,
+    /// Of a turn-on bias of the accelerometers that the filter expects (m/s²)
+    accel_bias_sigma_m_s2: Option<f64>,
+    /// Of a turn-on bias of the gyroscopes (rad/s)
+    gyro_bias_sigma_rad_s: Option<f64>,
+    /// Of a scale-factor error of the accelerometers (parts per million)
+    accel_scale_sigma_ppm: Option<f64>,
+    /// Of a scale-factor error of the gyroscopes (parts per million)
+    gyro_scale_sigma_ppm: Option<f64>,
+}
+
+/// The JSON schema of such a file.
+#[must_use]
+pub(crate) fn initial_schema() -> serde_json::Value {
+    schemars::schema_for!(Description).to_value()
+}
 
 /// Reads an initial state: time, position of the IMU, velocity (0 where it is not said), attitude of the
 /// vehicle, and standard deviations as in the `[initial]` section of a scenario.
@@ -40,55 +78,96 @@ pub(crate) fn read_initial(path: &Path) -> Result<Start, FileError> {
 }
 
 fn parse(source: &Source) -> Result<Start, FileError> {
-    let table = source.parse()?;
-    let root = source.root(&table);
-    root.only(&KEYS)?;
-    let angle = |key: &str, limit: f64| {
-        let degrees = root.require_f64(key)?;
-        if degrees.abs() > limit {
-            return Err(root.refuse(key, format!("is not within ±{limit}"), None));
-        }
-        Ok(degrees * DEG)
-    };
-    let speed = |key| Ok::<f64, FileError>(root.f64(key)?.unwrap_or(0.0));
-    let lat = angle("lat_deg", 90.0)?;
-    if lat.abs() > MAX_LATITUDE {
-        return Err(root.refuse("lat_deg", "is too near a pole to navigate in latitude and longitude", None));
+    let document = Document::parse(source)?;
+    let d: Description = document.read()?;
+    let refuse = |key: &str, reason: String| Err(document.root().refuse(key, reason, None));
+    let limits = [
+        ("lat_deg", d.lat_deg, 90.0),
+        ("lon_deg", d.lon_deg, 360.0),
+        ("roll_deg", d.roll_deg, 180.0),
+        ("pitch_deg", d.pitch_deg, 90.0),
+        ("yaw_deg", d.yaw_deg, 360.0),
+    ];
+    if let Some((key, _, limit)) =
+        limits.iter().find(|(_, value, limit)| value.is_nan() || value.abs() > *limit)
+    {
+        return refuse(key, format!("is not within ±{limit}"));
     }
-    let attitude = RollPitchYaw {
-        roll: angle("roll_deg", 180.0)?,
-        pitch: angle("pitch_deg", 90.0)?,
-        yaw: angle("yaw_deg", 360.0)?,
-    };
+    let unlimited = [
+        ("t_s", d.t_s),
+        ("h_m", d.h_m),
+        ("v_n_m_s", d.v_n_m_s),
+        ("v_e_m_s", d.v_e_m_s),
+        ("v_d_m_s", d.v_d_m_s),
+    ];
+    if let Some((key, _)) = unlimited.iter().find(|(_, value)| !value.is_finite()) {
+        return refuse(key, "is not a finite number".to_owned());
+    }
+    if (d.lat_deg * DEG).abs() > MAX_LATITUDE {
+        return refuse("lat_deg", "is too near a pole to navigate in latitude and longitude".to_owned());
+    }
+    let [roll, pitch, yaw] = [d.roll_deg, d.pitch_deg, d.yaw_deg].map(|degrees| degrees * DEG);
     let state = NavState {
-        lat,
-        lon: angle("lon_deg", 360.0)?,
-        h: root.require_f64("h_m")?,
-        v_n: DVec3::new(speed("v_n_m_s")?, speed("v_e_m_s")?, speed("v_d_m_s")?),
-        q_b_n: attitude.to_quat(),
+        lat: d.lat_deg * DEG,
+        lon: d.lon_deg * DEG,
+        h: d.h_m,
+        v_n: DVec3::new(d.v_n_m_s, d.v_e_m_s, d.v_d_m_s),
+        q_b_n: RollPitchYaw { roll, pitch, yaw }.to_quat(),
     };
-    let how = vec![format!("as {} says", source.path())];
-    Ok(Start { t_s: root.require_f64("t_s")?, state, sigma: sigma(&root)?, how })
-}
-
-fn sigma(root: &Section<'_>) -> Result<InitialSettings, FileError> {
-    let d = InitialSettings::default();
-    let three = |key: &str, default: [f64; 3]| match root.f64s(key)? {
-        None => Ok(default),
-        Some(v) => <[f64; 3]>::try_from(v).map_err(|_| root.refuse(key, "is not three numbers", None)),
-    };
+    let default = InitialSettings::default();
     let sigma = InitialSettings {
-        pos_sigma_m: three("pos_sigma_m", d.pos_sigma_m)?,
-        vel_sigma_m_s: three("vel_sigma_m_s", d.vel_sigma_m_s)?,
-        att_sigma_deg: three("att_sigma_deg", d.att_sigma_deg)?,
-        accel_bias_sigma_m_s2: root.f64("accel_bias_sigma_m_s2")?,
-        gyro_bias_sigma_rad_s: root.f64("gyro_bias_sigma_rad_s")?,
-        accel_scale_sigma_ppm: root.f64("accel_scale_sigma_ppm")?,
-        gyro_scale_sigma_ppm: root.f64("gyro_scale_sigma_ppm")?,
+        pos_sigma_m: d.pos_sigma_m.unwrap_or(default.pos_sigma_m),
+        vel_sigma_m_s: d.vel_sigma_m_s.unwrap_or(default.vel_sigma_m_s),
+        att_sigma_deg: d.att_sigma_deg.unwrap_or(default.att_sigma_deg),
+        accel_bias_sigma_m_s2: d.accel_bias_sigma_m_s2,
+        gyro_bias_sigma_rad_s: d.gyro_bias_sigma_rad_s,
+        accel_scale_sigma_ppm: d.accel_scale_sigma_ppm,
+        gyro_scale_sigma_ppm: d.gyro_scale_sigma_ppm,
         perfect: false,
     };
-    sigma
-        .validate()
-        .map_err(|e| root.refuse(&e.key.clone(), format!("is refused: {}", e.requirement), None))?;
-    Ok(sigma)
+    sigma.validate().map_err(|e| document.refused(&e))?;
+    Ok(Start { t_s: d.t_s, state, sigma, how: vec![format!("as {} says", source.path())] })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn refusals_name_line_key_and_value() {
+        let sound =
+            "t_s = 0\nlat_deg = 46\nlon_deg = 6\nh_m = 400\nroll_deg = 0\npitch_deg = 0\nyaw_deg = 40\n";
+        let refused = |text: &str| {
+            let e = parse(&Source::new("i.toml", text)).unwrap_err();
+            format!("{e} | {}", e.hint().unwrap_or_default())
+        };
+        assert_eq!(parse(&Source::new("i.toml", sound)).unwrap().sigma, InitialSettings::default());
+        for (old, new, expected) in [
+            ("= 46", "= 91", "i.toml, line 2: \"lat_deg\" = 91 is not within ±90 | "),
+            (
+                "= 46",
+                "= 89.95",
+                "i.toml, line 2: \"lat_deg\" = 89.95 is too near a pole to navigate in latitude and longitude | ",
+            ),
+            ("= 400", "= inf", "i.toml, line 4: \"h_m\" = inf is not a finite number | "),
+            ("h_m = 400\n", "", "i.toml, line 1: \"h_m\" is missing | add the key \"h_m\""),
+            (
+                "yaw_deg",
+                "heading_deg",
+                "i.toml, line 7: unknown key \"heading_deg\" | did you mean \"yaw_deg\"?",
+            ),
+            (
+                "t_s = 0",
+                "pos_sigma_m = [1, 1, -1]",
+                "i.toml, line 1: \"t_s\" is missing | add the key \"t_s\"",
+            ),
+            (
+                "t_s = 0",
+                "t_s = 0\npos_sigma_m = [1, 1, -1]",
+                "i.toml, line 2: \"pos_sigma_m\" = [1, 1, -1] is refused: it must be a finite number > 0 | ",
+            ),
+        ] {
+            assert_eq!(refused(&sound.replacen(old, new, 1)), expected);
+        }
+    }
 }

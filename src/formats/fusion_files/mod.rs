@@ -8,7 +8,7 @@ mod rtklib;
 
 pub(crate) use fixes::{FixSigma, read_gnss};
 pub(crate) use inertial::{ImuFile, read_imu};
-pub(crate) use initial::read_initial;
+pub(crate) use initial::{initial_schema, read_initial};
 
 use crate::formats::trajectory_file::table::{self, Numbers, Table};
 use crate::formats::{FileError, Kind};

@@ -1,6 +1,6 @@
 //! The model file of a calibration.
 
-use super::{Interval, ModelFile, SCHEMA, TurnOn};
+use super::{Interval, ModelFile, PROGRAM, SCHEMA, TurnOn};
 use crate::calibration::{Estimator, Outcome, ParameterLimit, Settings, TurnOnSpread, undetermined};
 use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::Model;
@@ -10,8 +10,6 @@ use toml::{Table, Value};
 /// What a calibration leaves in the file beside the model.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CalibrationNote {
-    /// Version of nav-sim.
-    pub version: String,
     /// How the tuning constant follows from the efficiency: `exact` or `wv`.
     pub efficiency_convention: String,
     /// Seed of the bootstrap, if there was one.
@@ -48,7 +46,7 @@ impl CalibrationNote {
         let mut table = Table::new();
         let mut put = |key: &str, value: Value| table.insert(key.to_owned(), value);
         let estimator = outcomes.first().map_or(Estimator::Given, |o| o.estimator);
-        put("program", format!("nav-sim {}", self.version).into());
+        put("program", PROGRAM.into());
         put("schema", (SCHEMA as i64).into());
         put("estimator", estimator.name().into());
         put("model", settings.model.to_string().into());
@@ -77,6 +75,20 @@ impl CalibrationNote {
 }
 
 impl ModelFile {
+    /// The largest whole number of that name that the provenance has of a fit.
+    #[must_use]
+    pub fn most_of_fits(&self, key: &str) -> Option<i64> {
+        let fits = self.provenance.as_ref()?.get("fits")?.as_array()?;
+        fits.iter().filter_map(|fit| fit.get(key)?.as_integer()).max()
+    }
+
+    /// The longest averaging time (s) that the calibration saw: half its longest scale.
+    #[must_use]
+    pub fn observed_s(&self) -> Option<f64> {
+        let scales = self.most_of_fits("scales").filter(|n| (1..63).contains(n))?;
+        Some((scales as f64 - 1.0).exp2() / self.model.rate_hz)
+    }
+
     /// The same with the turn-on biases that the recordings' means show; why or why not stands in the provenance.
     #[must_use]
     pub fn with_turn_on<'a>(mut self, means: impl Iterator<Item = &'a TurnOnSpread>) -> Self {

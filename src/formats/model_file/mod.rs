@@ -31,6 +31,9 @@ pub use write::{to_toml, write};
 use crate::imu::{Channel, Sensor};
 use crate::noise::{Model, Spread};
 
+/// What wrote a file, in its provenance.
+pub(crate) const PROGRAM: &str = concat!("nav-sim ", env!("CARGO_PKG_VERSION"));
+
 /// The version of the layout that is written; the only one that is read.
 pub const SCHEMA: u64 = 1;
 

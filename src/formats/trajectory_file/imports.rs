@@ -100,40 +100,17 @@ pub(super) fn motion_definition(path: &str, text: &str) -> Result<Rows, Error> {
         .map(|(i, l)| (i as u64 + 1, l.trim()))
         .filter(|(_, l)| !l.is_empty())
         .collect();
-    let row = |(line, text): (u64, &str), least: usize| numbers(path, line, text, least);
     let Some((&start, rest)) = lines.get(1).zip(lines.get(3..)) else {
         return Err(no_rows(path));
     };
-    let ini = row(start, 9)?;
+    let ini = numbers(path, start.0, start.1, 9)?;
     let mut motion = BodyMotion {
         start: [ini[0] * DEG, ini[1] * DEG, ini[2]],
         v_b: DVec3::new(ini[3], ini[4], ini[5]),
         rpy: DVec3::new(ini[8], ini[7], ini[6]) * DEG,
         commands: Vec::new(),
     };
-    let (mut rpy, mut v_b, mut timed, mut total_s) = (motion.rpy, motion.v_b, true, 0.0);
-    for &line in rest {
-        let cells = row(line, 8)?;
-        let duration_s = cells[7];
-        let (angles, speeds) =
-            (DVec3::new(cells[3], cells[2], cells[1]) * DEG, DVec3::from_slice(&cells[4..7]));
-        let change = match cells[0] as i64 {
-            1 => (angles * duration_s, speeds * duration_s),
-            2 => (angles - rpy, speeds - v_b),
-            3 => (angles, speeds),
-            4 => (angles - rpy, speeds),
-            5 => (angles, speeds - v_b),
-            _ => return Err(bad_line(path, line.0, format!("command type {} is none of 1 to 5", cells[0]))),
-        };
-        total_s += duration_s;
-        if duration_s <= 0.0 || total_s > DAY_S {
-            let message = format!("command duration {duration_s} s is not > 0, or makes more than a day");
-            return Err(bad_line(path, line.0, message));
-        }
-        timed &= cells[0] as i64 == 1;
-        (rpy, v_b) = (rpy + change.0, v_b + change.1);
-        motion.commands.push(Command { duration_s, rpy: change.0, v_b: change.1 });
-    }
+    let timed = command_all(&mut motion, path, rest)?;
     let samples = motion.samples();
     let mut rows = Rows {
         path: path.to_owned(),
@@ -151,6 +128,34 @@ pub(super) fn motion_definition(path: &str, text: &str) -> Result<Rows, Error> {
         );
     }
     Ok(rows)
+}
+
+/// Reads the commands of a motion; whether all of them are rates of change, which take the time they say.
+fn command_all(motion: &mut BodyMotion, path: &str, lines: &[(u64, &str)]) -> Result<bool, Error> {
+    let (mut rpy, mut v_b, mut timed, mut total_s) = (motion.rpy, motion.v_b, true, 0.0);
+    for &(line, text) in lines {
+        let cells = numbers(path, line, text, 8)?;
+        let duration_s = cells[7];
+        let (angles, speeds) =
+            (DVec3::new(cells[3], cells[2], cells[1]) * DEG, DVec3::from_slice(&cells[4..7]));
+        let change = match cells[0] as i64 {
+            1 => (angles * duration_s, speeds * duration_s),
+            2 => (angles - rpy, speeds - v_b),
+            3 => (angles, speeds),
+            4 => (angles - rpy, speeds),
+            5 => (angles, speeds - v_b),
+            _ => return Err(bad_line(path, line, format!("command type {} is none of 1 to 5", cells[0]))),
+        };
+        total_s += duration_s;
+        if duration_s <= 0.0 || total_s > DAY_S {
+            let message = format!("command duration {duration_s} s is not > 0, or makes more than a day");
+            return Err(bad_line(path, line, message));
+        }
+        timed &= cells[0] as i64 == 1;
+        (rpy, v_b) = (rpy + change.0, v_b + change.1);
+        motion.commands.push(Command { duration_s, rpy: change.0, v_b: change.1 });
+    }
+    Ok(timed)
 }
 
 /// The line of the command that leads to each sample; that of the start for the first.

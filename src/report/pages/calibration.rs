@@ -43,7 +43,7 @@ pub(crate) fn calibration_page(
         page.section("The recordings beside one another");
     }
     for sensor in Sensor::ALL {
-        let lines = advice(diagnoses, sensor, settings.rate_hz);
+        let lines = advice(diagnoses, sensor);
         lines.iter().for_each(|line| page.text(&format!("{}: {line}", sensor_name(sensor.name()))));
     }
     means(&mut page, turn_on, outcomes);

@@ -28,9 +28,9 @@ pub(crate) fn efficiency_page(file: &EfficiencyFile) -> String {
             r.scenario.clone().into(),
             r.estimator.clone().into(),
             r.parameter.clone().into(),
-            number(r.rmse, "rmse"),
-            number(r.rmse_se, "rmse_se"),
-            number(r.bias, "bias"),
+            number(r.accuracy.rmse, "rmse"),
+            number(r.accuracy.rmse_se, "rmse_se"),
+            number(r.accuracy.bias, "bias"),
             number(r.ratio, "ratio"),
             number(r.ratio_se, "ratio_se"),
         ]);
@@ -53,9 +53,10 @@ const HALF: f64 = 1.96;
 /// Which estimator is the most accurate one in each scenario: the least geometric mean of its RMSE over the parameters.
 fn verdict(file: &EfficiencyFile) -> String {
     let best = |scenario: &&str| {
-        let own = || file.results.iter().filter(|r| r.scenario == **scenario && r.rmse > 0.0);
+        let own = || file.results.iter().filter(|r| r.scenario == **scenario && r.accuracy.rmse > 0.0);
         let score = |estimator: &str| {
-            let logs: Vec<f64> = own().filter(|r| r.estimator == estimator).map(|r| r.rmse.ln()).collect();
+            let logs: Vec<f64> =
+                own().filter(|r| r.estimator == estimator).map(|r| r.accuracy.rmse.ln()).collect();
             logs.iter().sum::<f64>() / logs.len() as f64
         };
         let estimators = in_order(own().map(|r| r.estimator.as_str()));
@@ -81,14 +82,14 @@ fn charts(file: &EfficiencyFile) -> Vec<Chart> {
             let beside = 0.6 * ((k as f64 + 0.5) / estimators.len() as f64 - 0.5);
             let point = |r: &&EfficiencyRow| {
                 let x = scenarios.iter().position(|s| *s == r.scenario)? as f64 + beside;
-                let y = 100.0 * r.rmse;
-                let half = 100.0 * HALF * r.rmse_se;
+                let y = 100.0 * r.accuracy.rmse;
+                let half = 100.0 * HALF * r.accuracy.rmse_se;
                 Some(Interval { x, y, low: (y - half).max(0.1 * y), high: y + half })
             };
             let points = own.iter().filter(|r| r.estimator == **estimator).filter_map(point);
             Series::new(estimator, Colour::Hue(k), Mark::Points(points.collect()))
         });
-        let axis = axis(&own.iter().map(|r| r.rmse).collect::<Vec<_>>());
+        let axis = axis(&own.iter().map(|r| r.accuracy.rmse).collect::<Vec<_>>());
         let panel = Panel::new(axis, series.collect());
         let names = scenarios.iter().map(|s| (*s).to_owned()).collect();
         Chart::new(&format!("Accuracy of {}", symbol(parameter)), Axis::names(names), vec![panel])
@@ -123,7 +124,12 @@ mod tests {
             scenario: scenario.into(),
             estimator: estimator.into(),
             parameter: "WN sigma2".into(),
-            ..EfficiencyRow::new(&a, &a)
+            target: 2.0,
+            accuracy: a.clone(),
+            ratio: 1.0,
+            ratio_se: 0.0,
+            zeros: 0,
+            without_root: 0.0,
         };
         let results = vec![row("I", "awv"), row("I", "dr-awv"), row("<II>", "awv"), row("<II>", "dr-awv")];
         let file = EfficiencyFile { schema_version: 1, sets: 4, study: serde_json::Value::Null, results };

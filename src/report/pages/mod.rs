@@ -28,7 +28,7 @@ pub(crate) use study::study_page;
 pub(crate) use tune::tune_page;
 pub(crate) use wavelet::{wavelet_page, wavelet_svg, wavelet_text};
 
-use super::number::seconds;
+use super::number;
 use super::page::Tone;
 use crate::metrics::VerdictKind;
 use crate::simulation::REPORTED;
@@ -67,5 +67,5 @@ fn sentence(line: &str) -> String {
 
 /// `300–390 s`
 fn window((start_s, end_s): (f64, f64)) -> String {
-    format!("{}–{} s", seconds(start_s), seconds(end_s))
+    number::window(start_s, end_s)
 }

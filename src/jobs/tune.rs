@@ -1,0 +1,101 @@
+//! The smallest factors on a model that make its filter honest for another truth.
+
+use crate::ekf::{BeliefError, FilterStates};
+use crate::formats::model_file::{ModelFile, PROGRAM};
+use crate::noise::Model;
+use crate::report::{FactorEntry, Input, TuneResult};
+use crate::scenario::Scenario;
+use crate::sensors::outage::Outage;
+use crate::simulation::lincov::{Aim, Factor, Honesty, Per, Task, Track, scaled};
+
+/// What is tuned, for what, and where. Models are at the rate of the IMU.
+pub(crate) struct TuneInputs<'a> {
+    /// Receiver, start, and the filter that `run` would have.
+    pub scenario: &'a Scenario,
+    /// The model to be tuned.
+    pub model: &'a Model,
+    /// What may be true, by name.
+    pub truths: (Vec<String>, Vec<Model>),
+    /// The way of the analysis.
+    pub track: &'a Track,
+    /// Its outages.
+    pub outages: &'a [Outage],
+    /// The filter that is made honest.
+    pub states: FilterStates,
+    /// What has a factor of its own.
+    pub per: Per,
+    /// When the filter is honest.
+    pub aim: Aim,
+    /// Whether factors may be below 1.
+    pub allow_smaller: bool,
+}
+
+/// The factors, and the filter before and after them.
+///
+/// # Errors
+/// When a model has no filter.
+pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
+    let TuneInputs { model, truths: (names, truths), track, outages, states, per, aim, .. } = inputs;
+    let full = inputs.scenario.with_full_noise();
+    let mut reduced = inputs.scenario.clone();
+    if !reduced.filter.states.is_reduced() {
+        reduced.filter.states = FilterStates::default();
+    }
+    let filter_of_run = reduced.filter.states;
+    let full = |model: &Model| full.belief(model, outages, track);
+    let reduced = |model: &Model| reduced.belief(model, outages, track);
+    let task = Task {
+        model,
+        truths,
+        track,
+        full: &full,
+        filter: if states.is_reduced() { &reduced } else { &full },
+        per: *per,
+        aim: *aim,
+        allow_smaller: inputs.allow_smaller,
+    };
+    let factors = task.factors()?;
+    let ones: Vec<Factor> = factors.iter().map(|f| Factor { on_variance: 1.0, ..f.clone() }).collect();
+    Ok(TuneResult {
+        filter: if states.is_reduced() { filter_of_run } else { *states },
+        filter_of_run,
+        before: task.honesty(task.filter, &ones)?,
+        after: task.honesty(task.filter, &factors)?,
+        reduced: task.honesty(&reduced, &factors)?,
+        informed: task.informed()?,
+        sweep: sweep(&task, &factors)?,
+        factors,
+        truths: names.clone(),
+    })
+}
+
+/// The tuned filter with all its variances times 1/16, 1/8, … 16.
+fn sweep(task: &Task<'_>, factors: &[Factor]) -> Result<Vec<(f64, Honesty)>, BeliefError> {
+    let times = |power: i32| {
+        let on_variances = f64::from(power).exp2();
+        let scaled = |f: &Factor| Factor { on_variance: f.on_variance * on_variances, ..f.clone() };
+        let factors: Vec<Factor> = factors.iter().map(scaled).collect();
+        Ok((on_variances, task.honesty(task.filter, &factors)?))
+    };
+    (-4..=4).map(times).collect()
+}
+
+/// The tuned model, and where it came from; `honest_for`: the aim and what was taken for true.
+pub(crate) fn tuned(file: &ModelFile, factors: &[Factor], honest_for: &str, inputs: &[Input]) -> ModelFile {
+    let mut provenance = toml::Table::new();
+    let mut put = |key: &str, value: toml::Value| provenance.insert(key.to_owned(), value);
+    put("program", PROGRAM.into());
+    put("made_by", "tune".into());
+    put("honest_for", honest_for.into());
+    let table = |t: Result<toml::Table, toml::ser::Error>| toml::Value::from(t.unwrap_or_default());
+    let entries = factors.iter().map(|f| table(toml::Table::try_from(FactorEntry::of(f))));
+    put("factors", entries.collect::<Vec<_>>().into());
+    put("inputs", inputs.iter().map(|i| table(toml::Table::try_from(i))).collect::<Vec<_>>().into());
+    let (missing, turn_on) = (file.missing.clone(), file.turn_on);
+    ModelFile {
+        missing,
+        turn_on,
+        provenance: Some(provenance),
+        ..ModelFile::new(scaled(&file.model, factors))
+    }
+}

@@ -1,0 +1,102 @@
+//! Rows of measurements, sums of biases, and the noise of one sample.
+
+use super::*;
+
+/// H of position and velocity on a lever arm against central differences of the antenna itself.
+#[test]
+fn lever_arm_rows_agree_with_central_differences() {
+    let mut g = generator("h");
+    let arm = DVec3::new(1.3, -0.7, -2.1);
+    for _ in 0..RANDOM_STATES {
+        let (state, omega, _) = random_case(&mut g);
+        let mut ekf = ekf(&gauss_markov_model(), FilterStates::Reduced15);
+        for lane in 0..8 {
+            ekf.nominal.set_lane(lane, &state);
+        }
+        ekf.omega_ib_b = Vec3::splat(omega);
+        // antenna position (relative, m) and velocity for a state and a gyroscope bias error
+        let antenna = |s: &NavState, bias: DVec3| {
+            let r = earth::ned_difference(&state, s.lat, s.lon, s.h) + s.q_b_n * arm;
+            let omega_eb_b = omega - bias - s.q_b_n.inverse() * earth::omega_ie_n(state.lat);
+            (r, s.v_n + s.q_b_n * omega_eb_b.cross(arm))
+        };
+        let rows = ekf.measurement_rows(arm);
+        for column in 0..15 {
+            let (block, axis) = (column / 3, column % 3);
+            let size = [1.0, 1.0, 1e-5, 1.0, 1e-4][block];
+            let bias = |sign: f64| if block == 4 { DVec3::AXES[axis] * (sign * size) } else { DVec3::ZERO };
+            let plus = antenna(&perturbed(&state, block, axis, size), bias(1.0));
+            let minus = antenna(&perturbed(&state, block, axis, -size), bias(-1.0));
+            let numeric = ((plus.0 - minus.0) / (2.0 * size), (plus.1 - minus.1) / (2.0 * size));
+            for (component, row) in rows.iter().enumerate() {
+                let expected = if component < 3 { numeric.0[component] } else { numeric.1[component - 3] };
+                let got = row[column];
+                // position in metres is exact to 1e-3 of its curvature; velocity differences round at 1e-9
+                assert!((got - expected).abs() < 2e-6, "row {component}, column {column}: {got} {expected}");
+            }
+        }
+    }
+}
+
+/// The estimated bias of each sensor is the sum of its groups.
+#[test]
+fn biases_add_up() {
+    let mut filter = ekf(&gauss_markov_model(), FilterStates::Full);
+    filter.estimates = vec![Vec3::splat(DVec3::X), Vec3::splat(DVec3::Y)];
+    assert_eq!(filter.bias_of::<Lanes>(Sensor::Accel).lane(0), DVec3::X);
+    assert_eq!(filter.bias_of::<Lanes>(Sensor::Gyro).lane(0), DVec3::Y);
+}
+
+/// A filter that is certain of everything but for white noise of a sample of these variances at 100 Hz.
+fn certain(accel: f64, gyro: f64) -> Ekf {
+    let axis = |sigma2: f64| Composite::new(vec![Process::White(White::new(sigma2).unwrap())]);
+    let model = Model::pooled(100.0, &axis(accel), &axis(gyro));
+    let belief = Belief::new(&model, FilterStates::Full, 1.0, 800.0).unwrap();
+    let start =
+        NavState { lat: 0.8, lon: 0.1, h: 400.0, v_n: DVec3::ZERO, q_b_n: DQuat::from_rotation_z(0.7) };
+    let settings = InitialSettings {
+        pos_sigma_m: [0.0; 3],
+        vel_sigma_m_s: [0.0; 3],
+        att_sigma_deg: [0.0; 3],
+        ..InitialSettings::default()
+    };
+    Ekf::new(Strapdown::new(&start, GravityModel::Wgs84), &belief, &start, &settings)
+}
+
+/// One sample of white rates tilts and, while it lasts, lets the specific force drive the velocity:
+/// Q of velocity and attitude is −\[f_n ×\] S dt²/2, S the power of the rates (van Loan to first order).
+#[test]
+fn noise_of_one_sample_correlates_velocity_and_attitude() {
+    let mut filter = certain(4e-5, 1e-6);
+    let f_b = DVec3::new(1.0, -2.0, -9.8);
+    predict(&mut filter, DVec3::ZERO, f_b);
+    let f = DQuat::from_rotation_z(0.7) * f_b;
+    let skew = [[0.0, -f.z, f.y], [f.z, 0.0, -f.x], [-f.y, f.x, 0.0]];
+    let half = 0.5 * 1e-6 * 0.01 * 0.01 * 0.01;
+    for i in 0..3 {
+        for j in 0..3 {
+            let (found, expected) = (filter.p.get::<Lanes>(3 + i, 6 + j)[0], -skew[i][j] * half);
+            assert!((found - expected).abs() < 1e-3 * 9.8 * half, "({i}, {j}): {found:e} {expected:e}");
+        }
+    }
+}
+
+/// White noise keeps its density whatever the interval: velocity and attitude variance after a second are
+/// sigma² dt·1 s, at 100 Hz and in steps of 2 to 40 ms.
+#[test]
+fn white_noise_does_not_depend_on_how_time_is_cut() {
+    for steps in [vec![0.01; 100], [0.002, 0.04, 0.008].repeat(20)] {
+        let mut filter = certain(4e-5, 1e-6);
+        for dt in steps {
+            filter.set_interval(dt);
+            predict(&mut filter, DVec3::ZERO, DVec3::ZERO);
+        }
+        settle(&mut filter);
+        for i in 0..3 {
+            let (velocity, attitude) =
+                (filter.p.get::<Lanes>(3 + i, 3 + i)[0], filter.p.get::<Lanes>(6 + i, 6 + i)[0]);
+            assert!((velocity / (4e-5 * 0.01) - 1.0).abs() < 1e-3, "{velocity:e}");
+            assert!((attitude / (1e-6 * 0.01) - 1.0).abs() < 1e-3, "{attitude:e}");
+        }
+    }
+}

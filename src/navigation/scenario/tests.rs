@@ -1,0 +1,126 @@
+//! Scenarios as files have them.
+
+use super::*;
+use crate::noise::{Ar1, Composite, Process, RandomWalk};
+use crate::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start};
+
+#[test]
+fn an_empty_file_is_the_papers_setting() {
+    let scenario: Scenario = toml::from_str("").unwrap();
+    assert_eq!(scenario.validate(), Ok(()));
+    assert_eq!((scenario.run.runs, scenario.imu.rate_hz, scenario.gnss.rate_hz), (100, 100.0, 1.0));
+    let variance = |sigma: [f64; 3]| sigma.map(|s| (s * s * 1e6).round() / 1e6);
+    assert_eq!(variance(scenario.gnss.pos_sigma_m), [4.0, 4.0, 16.0]);
+    assert_eq!(variance(scenario.gnss.vel_sigma_m_s.unwrap()), [0.0016, 0.0016, 0.0036]);
+    assert_eq!(scenario.outages_on((0.0, 900.0), 1).unwrap().windows, Outage::PAPER);
+}
+
+#[test]
+fn every_key_of_the_interface_is_understood() {
+    let text = r#"
+        outage = []
+        run = { runs = 7, seed = 3, method = "monte-carlo" }
+        filter = { states = "full", gravity = "first-order" }
+        [imu]
+        rate_hz = 200.0
+        turn_on_bias_accel_m_s2 = 0.0
+        [gnss]
+        rate_hz = 5
+        pos_sigma_m = [1, 1, 2]
+        vel_sigma_m_s = "none"
+        lever_arm_m = [0.5, 0, -1]
+        [initial]
+        att_sigma_deg = [1, 1, 5]
+        accel_bias_sigma_m_s2 = 0.01
+        perfect = true
+        [outage_periodic]
+        first_s = 10
+        every_s = 100
+        duration_s = 20
+        [outage_random]
+        rate_per_hour = 3
+        duration_s = 10
+    "#;
+    let scenario: Scenario = toml::from_str(text).unwrap();
+    assert_eq!(scenario.validate(), Ok(()));
+    assert_eq!(scenario.filter.states, FilterStates::Full);
+    assert!(scenario.outages().fixed.is_empty());
+    let again: Scenario = toml::from_str(&toml::to_string(&scenario).unwrap()).unwrap();
+    assert_eq!(again, scenario);
+}
+
+#[test]
+fn what_the_filter_does_not_expect_is_said_of_each_sensor() {
+    let doubts = |text: &str| toml::from_str::<Scenario>(text).unwrap().doubts();
+    assert!(doubts("").is_empty());
+    let bias = doubts("imu = { turn_on_bias_gyro_rad_s = 1e-4, turn_on_bias_accel_m_s2 = 0.02 }");
+    assert!(bias.len() == 2 && bias[0].contains("initial.accel_bias_sigma_m_s2"), "{bias:?}");
+    let expected = "imu.turn_on_bias_gyro_rad_s = 1e-4\ninitial.gyro_bias_sigma_rad_s = ";
+    assert_eq!((doubts(&format!("{expected}1e-4")).len(), doubts(&format!("{expected}4e-5")).len()), (0, 1));
+    let scale = doubts("imu.scale_ppm_accel = 300");
+    assert!(scale.len() == 1 && scale[0].contains("initial.accel_scale_sigma_ppm"), "{scale:?}");
+    assert!(doubts("imu.scale_ppm_accel = 300\nfilter.states = 21").is_empty());
+}
+
+/// Ten seconds at rest.
+fn standing() -> Trajectory {
+    let start = Start { t_s: 0.0, lat: 0.8, lon: 0.1, h: 0.0, heading: 0.0, speed: 0.0 };
+    let kind = Kind::Straight(Length::Duration(10.0));
+    let segments = vec![Segment { kind, climb_m: 0.0, ramp_s: None }];
+    Profile { start, bank: Bank::None, ramp_s: 1.0, segments }.build().unwrap()
+}
+
+/// With N1 an axis has two bias states: 9 + 12, scale factors 6, turn-on biases of the gyroscope 3.
+#[test]
+fn what_is_expected_beside_the_model_adds_states_to_any_filter() {
+    let axis = Composite::new(vec![
+        Process::Ar1(Ar1::new(0.99, 1e-8).unwrap()),
+        Process::RandomWalk(RandomWalk::new(1e-12).unwrap()),
+    ]);
+    let model = Model::pooled(100.0, &axis, &axis);
+    let states = |text: &str| {
+        let scenario: Scenario = toml::from_str(text).unwrap();
+        assert_eq!(scenario.validate(), Ok(()));
+        let track = scenario.track(&standing(), &model, &[]).unwrap();
+        let full = scenario.with_full_noise().belief(&model, &[], &track).unwrap().states;
+        (scenario.belief(&model, &[], &track).unwrap().states, full)
+    };
+    assert_eq!(states(""), (15, 21));
+    assert_eq!(states("filter.states = 21"), (21, 27));
+    assert_eq!(states("initial.gyro_bias_sigma_rad_s = 1e-4\nfilter.states = 21"), (24, 30));
+    assert_eq!(states("initial.gyro_scale_sigma_ppm = 0\nfilter.states = 21"), (18, 24));
+    assert_eq!(states("initial.accel_scale_sigma_ppm = 100"), (18, 24));
+}
+
+#[test]
+fn no_outage_may_be_asked_for() {
+    let scenario: Scenario = toml::from_str("outage = []").unwrap();
+    assert!(scenario.outages_on((0.0, 900.0), 1).unwrap().windows.is_empty());
+}
+
+#[test]
+fn refusals_name_section_and_key() {
+    let refused = |text: &str| toml::from_str::<Scenario>(text).unwrap().validate().unwrap_err().key;
+    assert_eq!(refused("run.runs = 0"), "run.runs");
+    assert_eq!(refused("run.runs = 99999999999"), "run.runs");
+    assert_eq!(refused("imu.rate_hz = 1e9"), "imu.rate_hz");
+    assert_eq!(refused("run.coverage_level = 95"), "run.coverage_level");
+    assert_eq!(refused("gnss.rate_hz = 3"), "gnss.rate_hz");
+    assert_eq!(refused("gnss.rate_hz = 200"), "gnss.rate_hz");
+    assert_eq!(refused("gnss.pos_sigma_m = [0, 1, 1]"), "gnss.pos_sigma_m");
+    assert_eq!(refused("gnss.lever_arm_m = [0, 120, 0]"), "gnss.lever_arm_m");
+    assert_eq!(refused("imu.turn_on_bias_gyro_rad_s = 100"), "imu.turn_on_bias_gyro_rad_s");
+    assert_eq!(refused("imu.turn_on_bias_accel_m_s2 = 100"), "imu.turn_on_bias_accel_m_s2");
+    assert_eq!(refused("initial.gyro_bias_sigma_rad_s = 5"), "initial.gyro_bias_sigma_rad_s");
+    assert_eq!(refused("initial.accel_bias_sigma_m_s2 = 50"), "initial.accel_bias_sigma_m_s2");
+    assert_eq!(refused("initial.pos_sigma_m = [1e7, 1, 1]"), "initial.pos_sigma_m");
+    assert_eq!(refused("initial.vel_sigma_m_s = [1, 1, 5000]"), "initial.vel_sigma_m_s");
+    assert_eq!(refused("imu.rate_hz = -1"), "imu.rate_hz");
+    assert_eq!(refused("imu.misalignment_rad = 0.5"), "imu.misalignment_rad");
+    assert_eq!(refused("filter.nis_gate = 1"), "filter.nis_gate");
+    assert_eq!(refused("gnss.correlation_time_s = 0"), "gnss.correlation_time_s");
+    assert_eq!(refused("baro = { rate_hz = 1, sigma_m = 0 }"), "baro.sigma_m");
+    assert_eq!(refused("initial.att_sigma_deg = [1, 1, 180]"), "initial.att_sigma_deg");
+    assert_eq!(refused("baro = { rate_hz = 3, sigma_m = 1 }"), "baro.rate_hz");
+    assert_eq!(refused("outage = [{ start_s = 9, end_s = 3 }]"), "outage[1].end_s");
+}

@@ -1,0 +1,163 @@
+//! Covariance analysis, requirements, and where errors come from.
+
+use super::*;
+
+/// Covariance analysis makes the same directory, but for the table of runs; it needs no seed, and `compare` reads it.
+#[test]
+fn covariance_analysis_is_a_method_of_run() {
+    let place = place();
+    let ran = done(place.path(), "run drive.toml imu.toml --method lincov --outage 30:45 -o expected");
+    assert!(ran.stdout.starts_with("verdict: consistent: NEES 9.0"), "{}", ran.stdout);
+    assert!(ran.stdout.contains("covariance analysis without runs, 15 states"), "{}", ran.stdout);
+    assert!(!ran.stderr.contains("seed"), "{}", ran.stderr);
+    let out = place.path().join("expected");
+    let summary = json(&out.join("summary.json"));
+    assert_eq!((&summary["method"], &summary["runs"]), (&"lincov".into(), &0.into()));
+    let outage = &summary["outages"][0];
+    for key in ["asee_mean", "asee_end", "rmse_mean", "rmse_end"] {
+        assert!(outage[key]["pos_e_m"].as_f64().unwrap() > 0.1, "{key}");
+    }
+    let horizontal = &outage["horizontal_error_end_m"];
+    let quantile = |name: &str| horizontal[name].as_f64().unwrap();
+    assert!(quantile("p50") < quantile("p95") && quantile("p95") < quantile("p999"));
+    assert!(horizontal["max"].is_null() && !out.join("runs.csv").exists());
+    assert!((summary["coverage"]["mean"].as_f64().unwrap() - 0.95).abs() < 0.01);
+    assert!(fs::read_to_string(out.join("report.html")).unwrap().contains("INS/GNSS covariance analysis"));
+
+    done(place.path(), "run drive.toml imu.toml --runs 16 --outage 30:45 --seed 2 -o sampled");
+    let ran = done(place.path(), "compare sampled --reference expected");
+    assert!(ran.stderr.contains("the method is not that of the reference"), "{}", ran.stderr);
+    let row = json(&place.path().join("comparison.json"))["rows"][0].clone();
+    assert!(row["ratio_error_pct"].as_f64().unwrap().abs() < 1.0, "{row}");
+    done(place.path(), "run drive.toml imu.toml --method lincov --filter full --outage 30:45 -o full");
+    done(place.path(), "compare full --reference expected -o exact.json");
+    let row = json(&place.path().join("exact.json"))["rows"][0].clone();
+    assert_eq!(row["ci95_pct"][0], row["ci95_pct"][1], "{row}");
+}
+
+#[test]
+fn runs_stand_beside_what_is_expected_of_them() {
+    let place = place();
+    let command = "run drive.toml imu.toml --method both --runs 40 --outage 30:45 --seed 2 -o out";
+    let ran = done(place.path(), command);
+    assert!(ran.stdout.contains("runs against the covariance analysis: largest z "), "{}", ran.stdout);
+    assert!(!ran.stderr.contains("contradict"), "{}", ran.stderr);
+    let summary = json(&place.path().join("out/summary.json"));
+    assert_eq!((&summary["method"], &summary["lincov"]["method"]), (&"both".into(), &"lincov".into()));
+    assert_eq!(summary["verdict"], summary["lincov"]["verdict"]);
+    let agreement = &summary["agreement"];
+    assert_eq!(agreement["figures"], 12);
+    assert!(agreement["largest_z"].as_f64().unwrap().abs() < agreement["bound_z"].as_f64().unwrap());
+    assert!(place.path().join("out/runs.csv").exists());
+}
+
+/// Two runs tell nothing of a filter whose accelerometer is twice as bad as it believes: covariance analysis does.
+#[test]
+fn few_runs_do_not_hide_a_filter_that_is_wrong() {
+    let place = place();
+    fs::write(place.path().join("rough.toml"), MODEL.replace("1e-9", "4e-9")).unwrap();
+    let command = "run drive.toml imu.toml --truth rough.toml --outage 20:50 --seed 2";
+    let sampled = done(place.path(), &format!("{command} --runs 2 -o out"));
+    assert!(sampled.stdout.starts_with("verdict: overconfident: errors are 1."), "{}", sampled.stdout);
+    assert!(
+        sampled.stdout.lines().next().unwrap().ends_with(", by covariance analysis"),
+        "{}",
+        sampled.stdout
+    );
+    done(place.path(), &format!("{command} --method lincov -o expected"));
+    let summary = |run: &str| json(&place.path().join(run).join("summary.json"));
+    let (sampled, expected) = (summary("out"), summary("expected"));
+    assert_eq!(sampled["verdict"], expected["verdict"]);
+    assert_eq!(sampled["outages"][0]["verdict"], expected["outages"][0]["verdict"]);
+    assert_eq!((&sampled["method"], &sampled["lincov"]), (&"monte-carlo".into(), &Value::Null));
+}
+
+#[test]
+fn what_covariance_analysis_cannot_do_is_refused() {
+    let place = place();
+    fs::write(place.path().join("gate.toml"), "filter.nis_gate = 0.99\n").unwrap();
+    let command = "run drive.toml imu.toml --method lincov --outage none --scenario gate.toml -o out";
+    let ran = nav_sim(place.path(), command);
+    assert!(ran.code == 2 && ran.stderr.contains("covariance analysis has no gate"), "{}", ran.stderr);
+    done(place.path(), "synthesize imu.toml --replicates 1 --samples 7000 --seed 1 -o made");
+    let command = "run drive.toml imu.toml --method both --outage none --static made/replicate_1.csv -o out";
+    let ran = nav_sim(place.path(), command);
+    assert!(ran.code == 2 && ran.stderr.contains("covariance analysis needs a model"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("hint: calibrate the recordings"), "{}", ran.stderr);
+}
+
+/// Three requirements: one that is met, two that are not; told after the verdict, kept, and exit code 3.
+#[test]
+fn requirements_decide_the_exit_code() {
+    let place = place();
+    let command = "run drive.toml imu.toml --method lincov --outage 30:45 -o out";
+    let ran = nav_sim(place.path(), &format!("{command} --require p95_m<=1000 --require rmse_yaw_deg<=90"));
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(ran.stdout.lines().nth(1).unwrap().starts_with("required p95_m<=1000: met, "), "{}", ran.stdout);
+    let ran = nav_sim(place.path(), &format!("{command} --require p95_m<=0.1 --require yaw_deg<=90"));
+    assert_eq!(ran.code, 3, "{}", ran.stderr);
+    assert!(ran.stderr.contains("error: required p95_m<=0.1: NOT MET, "), "{}", ran.stderr);
+    let kept = &json(&place.path().join("out/summary.json"))["require"];
+    assert_eq!((&kept[0]["met"], &kept[1]["met"]), (&false.into(), &true.into()));
+    refused(
+        "run drive.toml imu.toml --outage none --seed 1 --require p95_m<=5 -o out",
+        2,
+        "--require p95_m<=5: p95_m is of",
+    );
+    refused("run drive.toml imu.toml --require p95<=5 -o out", 2, "invalid value 'p95<=5'");
+}
+
+/// What errors are made of is in the summary, in the page and, the largest sources, on the screen, with runs and
+/// without; of recordings nobody knows it.
+#[test]
+fn the_sources_of_errors_are_told() {
+    let place = place();
+    for method in ["lincov", "monte-carlo"] {
+        let command =
+            format!("run drive.toml imu.toml --method {method} --runs 2 --seed 1 --outage 30:45 -o out");
+        let ran = done(place.path(), &command);
+        assert!(ran.stdout.contains("| sources of errors | horizontal position"), "{}", ran.stdout);
+        assert!(ran.stdout.lines().count() <= 20, "{}", ran.stdout);
+        let outage = json(&place.path().join("out/summary.json"))["outages"][0].clone();
+        let sum = |budget: &Value| -> f64 {
+            budget.as_object().unwrap().values().map(|shares| shares["yaw_deg"].as_f64().unwrap()).sum()
+        };
+        assert!((sum(&outage["budget"]) - 1.0).abs() < 1e-9);
+        assert!((sum(&outage["believed_budget"]) - 1.0).abs() < 1e-9);
+        let page = fs::read_to_string(place.path().join("out/report.html")).unwrap();
+        assert!(page.contains("Sources of errors at the end of 30–45 s: true errors"));
+    }
+    done(place.path(), "synthesize imu.toml --replicates 1 --samples 7000 --seed 1 -o made");
+    let command =
+        "run drive.toml imu.toml --runs 2 --seed 1 --outage 30:45 --static made/replicate_1.csv -o out";
+    let ran = done(place.path(), command);
+    assert!(!ran.stdout.contains("sources of errors"), "{}", ran.stdout);
+    let outage = json(&place.path().join("out/summary.json"))["outages"][0].clone();
+    assert!(outage["budget"].is_null() && outage["believed_budget"].is_object());
+}
+
+/// A table of positions with a metre of noise now and then is no motion of a vehicle: said before the run, once, with the command
+/// that tells more.
+#[test]
+fn a_motion_that_nothing_makes_is_doubted() {
+    let place = place();
+    let dir = place.path();
+    done(dir, "trajectory convert drive.toml --rate-hz 10 -o rough.csv");
+    let text = fs::read_to_string(dir.join("rough.csv")).unwrap();
+    let column = text.lines().next().unwrap().split(',').position(|name| name == "h_m").unwrap();
+    let rough = |(i, line): (usize, &str)| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if i > 0 && i % 20 == 0 {
+            cells[column] = (cells[column].parse::<f64>().unwrap() + 1.0).to_string();
+        }
+        cells.join(",") + "\n"
+    };
+    fs::write(dir.join("rough.csv"), text.lines().enumerate().map(rough).collect::<String>()).unwrap();
+    let run = |drive: &str| {
+        done(dir, &format!("run {drive} imu.toml --runs 1 --outage none --seed 1 -o out")).stderr
+    };
+    let said = run("rough.csv");
+    assert_eq!(said.matches("nav-sim trajectory check rough.csv lists them").count(), 1, "{said}");
+    assert!(said.contains(", beyond ") && said.contains("more such stretches"), "{said}");
+    assert!(!run("drive.toml").contains("trajectory check"));
+}
