@@ -1,6 +1,7 @@
 //! `nav-sim require`: which IMU a limit needs, and what a given one makes of it.
 
-use super::{Failure, Session, parse, pictures, read, turn_on};
+use super::pictures::PageArgs;
+use super::{Failure, Session, parse, read, turn_on};
 use crate::formats::atomic::{AtomicFile, guard_inputs};
 use crate::formats::datasheet::{self, CATALOGUE, Datasheet};
 use crate::formats::file_kind::{self, FileKind};
@@ -10,7 +11,7 @@ use crate::jobs::{Ask, CatalogueUnit, Misplaced, Requirements};
 use crate::noise::Model;
 use crate::report::require as words;
 use crate::report::require::{Question, RankedUnit};
-use crate::report::{catalogue_page, model_page, needed_page};
+use crate::report::{catalogue_page, markdown_table, model_page, needed_page};
 use crate::require::{ImuParameters, Limit, Quantity, RequireError};
 use crate::sensors::outage::NotAnOutage;
 use std::path::{Path, PathBuf};
@@ -56,9 +57,8 @@ pub(crate) struct Args {
     /// Rank the catalogued IMUs (`nav-sim datasheet --list`), or those of a directory of entries and model files
     #[arg(long, value_name = "DIR", num_args = 0..=1, conflicts_with_all = ["model", "iso_drift", "out"])]
     catalogue: Option<Option<PathBuf>>,
-    /// Write a page with figures
-    #[arg(long, value_name = "FILE.html")]
-    page: Option<PathBuf>,
+    #[command(flatten)]
+    pictures: PageArgs,
     /// Model file of the IMU that is sought
     #[arg(long, short, value_name = "FILE", conflicts_with = "model")]
     out: Option<PathBuf>,
@@ -142,9 +142,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             Failure::input("--outage longest needs a MODEL").hint("without one, give a length in seconds")
         );
     }
-    if let Some(page) = &args.page {
-        guard_inputs(page, std::iter::once(&args.trajectory).chain(&args.model).map(PathBuf::as_path))?;
-    }
+    args.pictures
+        .guard(&std::iter::once(&args.trajectory).chain(&args.model).cloned().collect::<Vec<_>>())?;
     let asked = requirements(args, session)?;
     match (&args.model, &args.catalogue) {
         (Some(path), _) => given(path, args, &asked, session),
@@ -166,11 +165,11 @@ fn sought(args: &Args, asked: &Requirements, session: &Session) -> Result<(), Fa
     let shown = if session.json() {
         needed.json(&question)
     } else {
-        let tables: Vec<String> = needed.tables().iter().map(|t| super::compare::table(t)).collect();
+        let tables: Vec<String> = needed.tables().iter().map(|t| markdown_table(t)).collect();
         format!("{}\n\n{}", needed.verdict(&question), tables.join("\n\n"))
     };
     session.printer.result(shown.trim_end());
-    pictures::page(args.page.as_deref(), || needed_page(&needed, &question), session)?;
+    args.pictures.write(|| needed_page(&needed, &question), session)?;
     if let Some(out) = &args.out {
         model_file::write(
             out,
@@ -215,17 +214,17 @@ fn given(path: &Path, args: &Args, asked: &Requirements, session: &Session) -> R
             words::longest_verdict(bridged.longest, &places)
         };
         session.printer.result(shown.trim_end());
-        return pictures::page(args.page.as_deref(), || model_page(None, &places, &bridged), session);
+        return args.pictures.write(|| model_page(None, &places, &bridged), session);
     }
     let (margins, question) = asked.margins(&scenario, &model).map_err(unusable)?;
     let verdict = words::margins_verdict(&margins, &question, bridged.longest);
     let shown = if session.json() {
         words::margins_json(&margins, &question, &bridged)
     } else {
-        format!("{verdict}\n\n{}", super::compare::table(&words::margins_rows(&margins)))
+        format!("{verdict}\n\n{}", markdown_table(&words::margins_rows(&margins)))
     };
     session.printer.result(shown.trim_end());
-    pictures::page(args.page.as_deref(), || model_page(Some(&margins), &question, &bridged), session)?;
+    args.pictures.write(|| model_page(Some(&margins), &question, &bridged), session)?;
     if margins.met() {
         return Ok(());
     }
@@ -249,10 +248,10 @@ fn ranked(
     let shown = if session.json() {
         words::catalogue_json(&units, &question)
     } else {
-        format!("{}:\n\n{}", question.in_words(), super::compare::table(&words::catalogue_rows(&units)))
+        format!("{}:\n\n{}", question.in_words(), markdown_table(&words::catalogue_rows(&units)))
     };
     session.printer.result(shown.trim_end());
-    pictures::page(args.page.as_deref(), || catalogue_page(&units, &question), session)?;
+    args.pictures.write(|| catalogue_page(&units, &question), session)?;
     if units.iter().any(|unit| !unit.not_stated.is_empty()) {
         session
             .printer

@@ -1,13 +1,14 @@
 //! `nav-sim tune`: honest inflation of a noise model.
 
 use super::parse::one_of;
+use super::pictures::PageArgs;
 use super::run::{OutageArg, parse_outage, scenario_with};
 use super::{Failure, Session, read, turn_on};
 use crate::ekf::FilterStates;
 use crate::formats::atomic::{AtomicFile, guard_inputs};
 use crate::formats::model_file::{self, ModelFile};
 use crate::noise::Model;
-use crate::report::{FactorEntry, Input, TuneResult, tune_page};
+use crate::report::{FactorEntry, Input, TuneResult, markdown_table, tune_page};
 use crate::scenario::Scenario;
 use crate::sensors::outage::Outage;
 use crate::simulation::lincov::{Aim, Factor, Honesty, Per, Task, Track, drive, scaled};
@@ -58,9 +59,8 @@ pub(crate) struct Args {
     /// Scenario file: receiver, start, IMU rate (see `nav-sim schema scenario`)
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
-    /// Write a page with figures
-    #[arg(long, value_name = "FILE.html")]
-    page: Option<PathBuf>,
+    #[command(flatten)]
+    pictures: PageArgs,
     /// Model file to write
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -73,7 +73,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     refuse_recordings(args)?;
     let mut scenario = scenario(args)?;
     let files = files(args)?;
-    for out in args.out.iter().chain(&args.page) {
+    args.pictures.guard(&files.iter().map(|f| PathBuf::from(&f.path)).collect::<Vec<_>>())?;
+    if let Some(out) = &args.out {
         guard_inputs(out, files.iter().map(|f| Path::new(&f.path)))?;
         drop(AtomicFile::create(out)?);
     }
@@ -116,10 +117,10 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let shown = if session.json() {
         result.json()
     } else {
-        format!("{}\n\n{}", result.verdict(), super::compare::table(&result.rows()))
+        format!("{}\n\n{}", result.verdict(), markdown_table(&result.rows()))
     };
     session.printer.result(shown.trim_end());
-    super::pictures::page(args.page.as_deref(), || tune_page(&result), session)?;
+    args.pictures.write(|| tune_page(&result), session)?;
     if let Some(out) = &args.out {
         model_file::write(out, &tuned(&file, &result.factors, args, &files), session.existing())?;
         session.printer.say(&format!("wrote {}", out.display()));

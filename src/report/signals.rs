@@ -2,6 +2,7 @@
 
 use super::curves::{Band, SignalCurves, SignalsFile};
 use super::number::shortest;
+use super::short::short_names;
 use crate::calibration::duration;
 use crate::wavelet::Tuning;
 
@@ -42,7 +43,7 @@ pub(crate) fn signals_per_file(file: &SignalsFile) -> Vec<(String, Vec<Vec<Strin
     let decades = decades(file);
     let table = |(sensor, axis): (&str, &str)| {
         let own = of(file, sensor, axis);
-        let names = own.iter().map(|s| short_name(&s.file));
+        let names = short_names(&own.iter().map(|s| s.file.as_str()).collect::<Vec<_>>());
         let head = std::iter::once("averages of".to_owned()).chain(names).collect::<Vec<_>>();
         let row = |i: &usize| {
             let cell = |s: &&SignalCurves| {
@@ -217,12 +218,6 @@ fn median(mut values: Vec<f64>) -> Option<f64> {
         n if n % 2 == 1 => Some(values[middle]),
         _ => Some(0.5 * (values[middle - 1] + values[middle])),
     }
-}
-
-fn short_name(file: &str) -> String {
-    std::path::Path::new(file)
-        .file_name()
-        .map_or_else(|| file.to_owned(), |n| n.to_string_lossy().into_owned())
 }
 
 #[cfg(test)]

@@ -38,11 +38,12 @@ fn a_fusion_directory_holds_what_the_interface_says() {
     let place = recorded();
     let ran = done(
         place.path(),
-        "fuse rec/imu.csv rec/gnss.csv imu.toml --reference rec/reference.csv --outage 60:75 -o out",
+        "fuse rec/imu.csv rec/gnss.csv imu.toml --reference rec/reference.csv --outage 60:75 -o out --plot fused.svg",
     );
     assert!(ran.stderr.contains("from levelling at rest until"), "{}", ran.stderr);
     assert!(ran.stderr.contains("from the course of the fix at"), "{}", ran.stderr);
     assert!(ran.stdout.contains("15 fixes withheld"), "{}", ran.stdout);
+    assert!(fs::read_to_string(place.path().join("fused.svg")).unwrap().contains("Way"));
     let out = place.path().join("out");
     let header = fs::read_to_string(out.join("solution.csv")).unwrap().lines().next().unwrap().to_owned();
     assert!(header.starts_with(
@@ -400,7 +401,7 @@ fn what_is_not_to_be_believed_ends_with_3() {
     ] {
         let ran = nav_sim(place.path(), &format!("fuse rec/imu.csv rec/gnss.csv imu.toml {flags} -o out"));
         assert_eq!(ran.code, 3, "{flags}\n{}", ran.stderr);
-        assert!(ran.stdout.starts_with("verdict: not to be believed: "), "{}", ran.stdout);
+        assert!(ran.stdout.starts_with("verdict: overconfident and not to be believed: "), "{}", ran.stdout);
         assert!(ran.stdout.lines().next().unwrap().contains(why), "{flags}\n{}", ran.stdout);
         assert!(ran.stderr.contains("hint: "), "{}", ran.stderr);
         let summary: serde_json::Value =
@@ -409,7 +410,7 @@ fn what_is_not_to_be_believed_ends_with_3() {
         assert!(at("out/solution.csv").exists() && at("out/manifest.json").exists());
     }
     let ran = done(place.path(), "fuse rec/imu.csv rec/gnss.csv imu.toml -o out");
-    assert!(ran.stdout.starts_with("verdict: consistent with its fixes\n"), "{}", ran.stdout);
+    assert!(ran.stdout.starts_with("verdict: consistent with its fixes: NIS "), "{}", ran.stdout);
 }
 
 /// The reference with its yaw 20° off.
