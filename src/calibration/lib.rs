@@ -54,5 +54,5 @@ pub use turn_on::{MeansOfAxis, TURN_ON_LEVEL, TurnOnFinding, TurnOnSpread, turn_
 pub use uncertainty::{ALIKE_LEVEL, CurveInfluence, Scattering, derived_interval};
 pub use words::{
     Share, advice, axes_remark, correlation_time_s, duration, effects, percent, reasons, shares, signals,
-    undetermined, worst_in_words,
+    undetermined,
 };

@@ -1,6 +1,7 @@
 //! `nav-sim choose`: which noise model, on the user's own recordings.
 
 use super::jobs::unknown_model;
+use super::pictures::PlotArgs;
 use super::recordings::{RecordingArgs, Said};
 use super::run::{OutageArg, Words, parse_outage, scenario_with};
 use super::tuning::TuningArgs;
@@ -11,7 +12,7 @@ use crate::ekf::FilterStates;
 use crate::formats::atomic::{AtomicDir, Found, claim_directory};
 use crate::formats::model_file::CalibrationNote;
 use crate::jobs::{self, Calibration, CalibrationOptions, ChoiceDrive, Chosen, EstimatorChoice, ModelFiles};
-use crate::report::{ChoiceReport, choice_page};
+use crate::report::{ChoiceReport, choice_page, columns, terminal_table};
 use crate::scenario::Scenario;
 use crate::sensors::outage::Outage;
 use std::path::PathBuf;
@@ -65,6 +66,8 @@ pub(crate) struct Args {
     /// Scenario file: receiver, start, what filters expect (see `nav-sim schema scenario`)
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
+    #[command(flatten)]
+    plot: PlotArgs,
     /// Directory to make
     #[arg(long, short, value_name = "DIR", default_value = "out/choice")]
     out: PathBuf,
@@ -77,6 +80,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let candidates = candidates(args)?;
     claim(args, session)?;
+    args.plot.guard(&args.inputs.iter().chain([&args.trajectory]).cloned().collect::<Vec<_>>())?;
     let scenario = scenario(args)?;
     let trajectory = read::trajectory(&args.trajectory, session)?;
     let seed = session.seed(scenario.run.seed);
@@ -103,6 +107,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         seed,
     };
     write(args, &chosen, &report, seed)?;
+    args.plot.write(|| choice_page(&report).svg(), session)?;
     session.show(|| report.json(), || text(&report, session));
     session.printer.say(&format!(
         "wrote {0}: report.html, ranking.json, model.toml (nav-sim export {0}/model.toml)",
@@ -114,11 +119,11 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 fn text(report: &ChoiceReport<'_>, session: &Session) -> String {
     let mut parts = vec![
         report.verdict().into_iter().chain(report.decisive_scales()).collect::<Vec<_>>().join("\n"),
-        format!("{}\n{}", super::compare::table(&report.rows()), report.legend()),
+        format!("{}\n{}", columns(&report.rows()), report.legend()),
     ];
     if session.verbose() {
         let more = [report.fold_rows(), report.recording_rows(), report.scale_rows()];
-        parts.extend(more.iter().map(|rows| super::compare::table(rows)));
+        parts.extend(more.iter().map(|rows| terminal_table(rows, 1)));
     }
     parts.join("\n\n")
 }
@@ -214,7 +219,7 @@ fn write(args: &Args, chosen: &Chosen, report: &ChoiceReport<'_>, seed: u64) -> 
     }
     let Calibration { groups, outcomes, settings, .. } = calibration;
     files[0].write_page(calibration, &diagnose(groups, outcomes, settings))?;
-    directory.write("report.html", choice_page(report))?;
+    directory.write("report.html", choice_page(report).html())?;
     directory.write("ranking.json", report.json())?;
     Ok(directory.commit()?)
 }

@@ -5,7 +5,6 @@ use super::{Failure, Session};
 use crate::formats::atomic;
 use crate::jobs::{self, CompareError, Comparison};
 use crate::metrics::ComparisonError;
-pub(super) use crate::report::markdown_table as table;
 use crate::report::{self, PaperFigure};
 use crate::simulation::REPORTED_NAMES;
 use std::path::PathBuf;
@@ -76,6 +75,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Columns that say what a row is of: scenario and outage.
+const LEAD: usize = 2;
+
 /// What was found, and how it is shown.
 pub(super) struct Compared {
     found: Comparison,
@@ -139,13 +141,14 @@ impl Compared {
                 file.reference,
                 report::meaning_of_intervals(candidates)
             ));
-            lines.push(table(&self.rows()));
-            lines.push(
-                "NEES (9 if right) and coverage over the outage, RMSE at its end against the reference, %:"
-                    .to_owned(),
-            );
+            lines.push(report::terminal_table(&self.rows(), LEAD));
+            let names: Vec<&str> = self.states.iter().map(|s| REPORTED_NAMES[*s]).collect();
+            lines.push(format!(
+                "NEES (9 if right) and coverage over the outage, RMSE at its end ({}) against the reference, %:",
+                names.join(", ")
+            ));
             let rows = report::consistency_rows(candidates, &self.states);
-            lines.push(table(&report::with_times(rows, outages)));
+            lines.push(report::terminal_table(&report::with_times(rows, outages), LEAD));
         }
         lines.join("\n")
     }

@@ -3,9 +3,11 @@
 use super::batch::shell_words;
 use super::compare::Compared;
 use super::{Cli, Command, Failure, Session, read};
+use crate::formats::atomic::Existing;
 use crate::formats::{FileError, atomic};
-use crate::report::{StudyCurves, TrajectorySeries, paper_figures, paper_page};
+use crate::report::{self, StudyCurves, TrajectorySeries, paper_figures, paper_page};
 use clap::Parser;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// The case study of Minaretzis et al. 2024, Section V, on a virtual IMU: calibrate with three estimators
@@ -16,7 +18,7 @@ use std::path::{Path, PathBuf};
 /// vibrations and steps (II), and with two abnormal recordings of each sensor (III); AWV, SR-AWV and DR-AWV
 /// on each; Monte-Carlo navigation with errors from windows of one more clean recording and two outages of
 /// 90 s, the filter with a state for each AR1 and random walk as in the paper; the ASEE of each filter relative to AWV in
-/// scenario I.
+/// scenario I. Interrupted, the same command goes on where it was: demo.json in the directory says how far it is.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -43,15 +45,72 @@ const TRAJECTORY: &str = "trajectories/land_vehicle.toml";
 const SCENARIOS: [&str; 3] = ["I", "II", "III"];
 const ESTIMATORS: [&str; 3] = ["awv", "sr-awv", "dr-awv"];
 
+/// How far a demo is: demo.json of its directory.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+struct Progress {
+    version: String,
+    seed: u64,
+    samples: u64,
+    runs: u64,
+    commands_done: usize,
+    commands: usize,
+}
+
+impl Progress {
+    /// What is there to go on with, or a beginning.
+    fn of(args: &Args, session: &Session) -> Result<Self, Failure> {
+        let path = Self::path(&args.out);
+        let begun: Option<Self> =
+            std::fs::read_to_string(&path).ok().and_then(|text| serde_json::from_str(&text).ok());
+        let seed = begun.as_ref().map(|own| own.seed);
+        let seed = session.asked_seed().or(seed).unwrap_or_else(|| session.seed(None));
+        let new = Self {
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            seed,
+            samples: args.samples,
+            runs: args.runs,
+            commands_done: 0,
+            commands: commands(args, seed).len(),
+        };
+        match begun {
+            Some(begun) if begun == (Self { commands_done: begun.commands_done, ..new.clone() }) => Ok(begun),
+            Some(_) if session.existing() == Existing::Keep => {
+                let message = format!("{} is of a demo of another seed, size or version", path.display());
+                Err(Failure::input(message)
+                    .hint("name another directory with --out, or replace it with --force"))
+            }
+            _ => Ok(new),
+        }
+    }
+
+    fn path(out: &str) -> PathBuf {
+        Path::new(out).join("demo.json")
+    }
+
+    fn write(&self, out: &str) -> Result<(), Failure> {
+        Ok(atomic::write(&Self::path(out), report::json(self))?)
+    }
+}
+
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let commands = commands(args, session.seed(None));
     if args.print {
+        let commands = commands(args, session.seed(None));
         let lines: Vec<String> = commands.iter().map(|c| typed(c)).collect();
         session.printer.result(&lines.join("\n"));
         return Ok(());
     }
+    let mut progress = Progress::of(args, session)?;
+    let commands = commands(args, progress.seed);
     let last = commands.len() - 1;
-    for (i, command) in commands.iter().enumerate() {
+    // what is compared is shown again
+    let done = progress.commands_done.min(last);
+    if done > 0 {
+        let told =
+            format!("{}: {done} of {} commands are done, seed {}", args.out, commands.len(), progress.seed);
+        session.printer.say(&told);
+    }
+    progress.write(&args.out)?;
+    for (i, command) in commands.iter().enumerate().skip(done) {
         session.printer.say(&format!("$ {}", typed(command)));
         let words = std::iter::once("nav-sim").chain(command.iter().map(String::as_str));
         let cli = Cli::try_parse_from(words).map_err(Failure::input)?;
@@ -62,6 +121,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             figures(&compared, &args.out, session)?;
         }
         cli.command.run(&inner)?;
+        progress.commands_done = i + 1;
+        progress.write(&args.out)?;
     }
     session.printer.say(&format!("all results on one page: {}", page(&args.out).display()));
     Ok(())

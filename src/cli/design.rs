@@ -1,13 +1,13 @@
 //! `nav-sim design`: how many recordings, and how long.
 
 use super::parse;
+use super::pictures::PageArgs;
 use super::run::{OutageArg, parse_outage, windows_of};
 use super::{Failure, Session, read};
 use crate::calibration::{Bootstrap, Estimator, Settings};
 use crate::ekf::FilterStates;
-use crate::formats::atomic::guard_inputs;
 use crate::jobs::{self, DesignInputs, Destination, NavigateInputs, TrueImu};
-use crate::report::{design_page, design_rows, design_verdict};
+use crate::report::{design_page, design_rows, design_verdict, markdown_table};
 use crate::scenario::{Method, Scenario};
 use serde_json::json;
 use std::path::PathBuf;
@@ -46,9 +46,8 @@ pub(crate) struct Args {
     /// Window without fixes, in seconds (repeatable; default: 300:390 and 700:790)
     #[arg(long = "outage", value_name = "START:END", value_parser = parse_outage, requires = "trajectory")]
     outages: Vec<OutageArg>,
-    /// Write a page with figures
-    #[arg(long, value_name = "FILE.html")]
-    page: Option<PathBuf>,
+    #[command(flatten)]
+    pictures: PageArgs,
 }
 
 /// Longest recording that is planned (h): a year.
@@ -62,10 +61,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if args.hours.is_some_and(|hours| hours > LONGEST_H) {
         return Err(Failure::input("--hours: longer than a year"));
     }
-    if let Some(page) = &args.page {
-        let inputs = std::iter::once(&args.model).chain(&args.trajectory);
-        guard_inputs(page, inputs.map(PathBuf::as_path))?;
-    }
+    args.pictures
+        .guard(&std::iter::once(&args.model).chain(&args.trajectory).cloned().collect::<Vec<_>>())?;
     let file = read::model(&args.model, session)?;
     let mut scenario = Scenario::default();
     scenario.run.method = Method::Lincov;
@@ -107,7 +104,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     session.show(
         || json!({ "schema_version": 1, "designs": designs }).to_string(),
-        || format!("{}\n{}", design_verdict(&designs), super::compare::table(&design_rows(&designs))),
+        || format!("{}\n{}", design_verdict(&designs), markdown_table(&design_rows(&designs))),
     );
-    super::pictures::page(args.page.as_deref(), || design_page(&designs), session)
+    args.pictures.write(|| design_page(&designs), session)
 }

@@ -9,8 +9,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
 /// From now on a signal removes what is being written and ends the process: exit code 128 + signal, 130 for
-/// Ctrl-C. A signal that this process was started to ignore (by `nohup`, say) is still ignored.
-pub(super) fn watch(printer: Printer) {
+/// Ctrl-C, with advice. A signal that this process was started to ignore (by `nohup`, say) is still ignored.
+pub(super) fn watch(printer: Printer, advice: Option<String>) {
     let ignored = ignored();
     let wanted = [SIGINT, SIGTERM, SIGHUP].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
     let Ok(mut signals) = Signals::new(wanted) else { return };
@@ -18,7 +18,8 @@ pub(super) fn watch(printer: Printer) {
         let Some(signal) = signals.forever().next() else { return };
         INTERRUPTED.store(true, Ordering::SeqCst);
         atomic::remove_unfinished();
-        printer.failure(&Failure::interrupted("interrupted; what was being written is removed"));
+        let failure = Failure::interrupted("interrupted; what was being written is removed");
+        printer.failure(&failure.maybe_hint(advice));
         std::process::exit(128 + signal);
     });
 }

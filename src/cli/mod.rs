@@ -90,6 +90,11 @@ impl Command {
         matches!(self, Self::Batch(args) if args.heeds_signals())
     }
 
+    /// What to do after a signal.
+    fn advice_at_signals(&self) -> Option<String> {
+        matches!(self, Self::Demo(_)).then(|| "the same command goes on where it was".to_owned())
+    }
+
     fn run(self, session: &Session) -> Result<(), Failure> {
         if session.csv() && !matches!(self, Self::Wv(_)) {
             let failure = Failure::input("--format csv is a format of wv alone");
@@ -173,7 +178,7 @@ pub fn main() -> ExitCode {
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
     let printer = Printer::new(&cli.common);
     if !cli.command.heeds_signals() {
-        interrupt::watch(Printer::new(&cli.common));
+        interrupt::watch(Printer::new(&cli.common), cli.command.advice_at_signals());
     }
     let outcome = Session::new(cli.common).and_then(|session| cli.command.run(&session));
     interrupt::settle();

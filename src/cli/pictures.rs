@@ -2,47 +2,78 @@
 
 use super::{Failure, Session};
 use crate::formats::atomic;
-use crate::report::page;
+use crate::report::page::{self, Page};
 use std::path::{Path, PathBuf};
 
-/// The main figure as a file.
+/// The figures as a file.
 #[derive(clap::Args, Debug)]
 pub(super) struct PlotArgs {
-    /// Also write the main figure as a picture (.svg; a page saves its figures as PNG too)
-    #[arg(long, value_name = "FILE.svg", value_parser = svg_path)]
+    /// Also write the figures as a picture (.svg; a page saves each as PNG too)
+    #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
 }
 
-fn svg_path(text: &str) -> Result<PathBuf, String> {
-    let path = PathBuf::from(text);
-    let is_svg = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("svg"));
-    if is_svg { Ok(path) } else { Err("pictures are SVG: name a file that ends in .svg".to_owned()) }
-}
-
 impl PlotArgs {
-    /// Refuses a picture that is an input.
+    /// Refuses a picture that is an input, or of another form.
     pub(super) fn guard(&self, inputs: &[PathBuf]) -> Result<(), Failure> {
-        let guarded = |path: &PathBuf| atomic::guard_inputs(path, inputs.iter().map(PathBuf::as_path));
-        Ok(self.plot.iter().try_for_each(guarded)?)
+        let Some(path) = &self.plot else { return Ok(()) };
+        let svg = path.with_extension("svg");
+        let form = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+        if form != "svg" {
+            let message = format!("--plot {}: pictures are written as SVG", path.display());
+            let (name, svg) = (path.display(), svg.display());
+            return Err(Failure::input(message).hint(match form.as_str() {
+                "png" | "pdf" => {
+                    format!("--plot {svg}, then: rsvg-convert --format {form} --output {name} {svg}")
+                }
+                _ => "name a file that ends in .svg".to_owned(),
+            }));
+        }
+        Ok(atomic::guard_inputs(path, inputs.iter().map(PathBuf::as_path))?)
     }
 
     /// Writes the picture, if one is asked for.
     pub(super) fn write(&self, picture: impl FnOnce() -> String, session: &Session) -> Result<(), Failure> {
-        let Some(path) = &self.plot else { return Ok(()) };
-        atomic::write_result(path, picture(), session.existing())?;
-        session.wrote(path);
-        Ok(())
+        write_asked(self.plot.as_deref(), picture, session)
     }
 }
 
-/// Writes a page, if one is asked for.
-pub(super) fn page(
+/// A page, and its figures as a file.
+#[derive(clap::Args, Debug)]
+pub(super) struct PageArgs {
+    /// Write a page with figures
+    #[arg(long, value_name = "FILE.html")]
+    page: Option<PathBuf>,
+    #[command(flatten)]
+    plot: PlotArgs,
+}
+
+impl PageArgs {
+    /// Refuses a page or a picture that is an input, and a picture of another form.
+    pub(super) fn guard(&self, inputs: &[PathBuf]) -> Result<(), Failure> {
+        let mut pages = self.page.iter();
+        pages.try_for_each(|page| atomic::guard_inputs(page, inputs.iter().map(PathBuf::as_path)))?;
+        self.plot.guard(inputs)
+    }
+
+    /// Writes what is asked for.
+    pub(super) fn write(&self, page: impl FnOnce() -> Page, session: &Session) -> Result<(), Failure> {
+        if self.page.is_none() && self.plot.plot.is_none() {
+            return Ok(());
+        }
+        let page = page();
+        write_asked(self.page.as_deref(), || page.html(), session)?;
+        self.plot.write(|| page.svg(), session)
+    }
+}
+
+fn write_asked(
     path: Option<&Path>,
-    html: impl FnOnce() -> String,
+    contents: impl FnOnce() -> String,
     session: &Session,
 ) -> Result<(), Failure> {
     let Some(path) = path else { return Ok(()) };
-    atomic::write_result(path, html(), session.existing())?;
+    atomic::write_result(path, contents(), session.existing())?;
     session.wrote(path);
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! `nav-sim require`: which IMU a limit needs, and what a given one makes of it.
 
-use super::{Failure, Session, parse, pictures, read, turn_on};
+use super::pictures::PageArgs;
+use super::{Failure, Session, parse, read, turn_on};
 use crate::formats::atomic::{AtomicFile, guard_inputs};
 use crate::formats::datasheet::{self, CATALOGUE, Datasheet};
 use crate::formats::file_kind::{self, FileKind};
@@ -9,7 +10,7 @@ use crate::formats::scenario_file;
 use crate::jobs::{Ask, CatalogueUnit, Misplaced, Requirements};
 use crate::report::require as words;
 use crate::report::require::RankedUnit;
-use crate::report::{catalogue_page, model_page, needed_page};
+use crate::report::{catalogue_page, markdown_table, model_page, needed_page};
 use crate::require::{Limit, Quantity, RequireError};
 use crate::sensors::outage::NotAnOutage;
 use std::path::{Path, PathBuf};
@@ -55,9 +56,8 @@ pub(crate) struct Args {
     /// Rank the catalogued IMUs (`nav-sim datasheet --list`), or those of a directory of entries and model files
     #[arg(long, value_name = "DIR", num_args = 0..=1, conflicts_with_all = ["model", "iso_drift", "out"])]
     catalogue: Option<Option<PathBuf>>,
-    /// Write a page with figures
-    #[arg(long, value_name = "FILE.html")]
-    page: Option<PathBuf>,
+    #[command(flatten)]
+    pictures: PageArgs,
     /// Model file of the IMU that is sought
     #[arg(long, short, value_name = "FILE", conflicts_with = "model")]
     out: Option<PathBuf>,
@@ -141,9 +141,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             Failure::input("--outage longest needs a MODEL").hint("without one, give a length in seconds")
         );
     }
-    if let Some(page) = &args.page {
-        guard_inputs(page, std::iter::once(&args.trajectory).chain(&args.model).map(PathBuf::as_path))?;
-    }
+    args.pictures
+        .guard(&std::iter::once(&args.trajectory).chain(&args.model).cloned().collect::<Vec<_>>())?;
     let asked = requirements(args, session)?;
     match (&args.model, &args.catalogue) {
         (Some(path), _) => given(path, args, &asked, session),
@@ -163,11 +162,11 @@ fn sought(args: &Args, asked: &Requirements, session: &Session) -> Result<(), Fa
             .hint("a larger limit, a shorter outage, or a better receiver ([gnss] of --scenario)")
     })?;
     let text = || {
-        let tables: Vec<String> = needed.tables().iter().map(|t| super::compare::table(t)).collect();
+        let tables: Vec<String> = needed.tables().iter().map(|t| markdown_table(t)).collect();
         format!("{}\n\n{}", needed.verdict(&question), tables.join("\n\n"))
     };
     session.show(|| needed.json(&question), text);
-    pictures::page(args.page.as_deref(), || needed_page(&needed, &question), session)?;
+    args.pictures.write(|| needed_page(&needed, &question), session)?;
     if let Some(out) = &args.out {
         model_file::write(out, &asked.model_file(&needed.imu, &question), session.existing())?;
         session.wrote(out);
@@ -187,15 +186,15 @@ fn given(path: &Path, args: &Args, asked: &Requirements, session: &Session) -> R
     if args.outage == Ask::Longest {
         let text = || words::longest_verdict(bridged.longest, &places);
         session.show(|| words::longest_json(&bridged, &places), text);
-        return pictures::page(args.page.as_deref(), || model_page(None, &places, &bridged), session);
+        return args.pictures.write(|| model_page(None, &places, &bridged), session);
     }
     let (margins, question) = asked.margins(&scenario, &model).map_err(unusable)?;
     let text = || {
         let verdict = words::margins_verdict(&margins, &question, bridged.longest);
-        format!("{verdict}\n\n{}", super::compare::table(&words::margins_rows(&margins)))
+        format!("{verdict}\n\n{}", markdown_table(&words::margins_rows(&margins)))
     };
     session.show(|| words::margins_json(&margins, &question, &bridged), text);
-    pictures::page(args.page.as_deref(), || model_page(Some(&margins), &question, &bridged), session)?;
+    args.pictures.write(|| model_page(Some(&margins), &question, &bridged), session)?;
     if margins.met() {
         return Ok(());
     }
@@ -216,10 +215,9 @@ fn ranked(
         None => catalogue(asked)?,
     };
     let (units, question) = asked.ranked(&units).map_err(Failure::input)?;
-    let text =
-        || format!("{}:\n\n{}", question.in_words(), super::compare::table(&words::catalogue_rows(&units)));
+    let text = || format!("{}:\n\n{}", question.in_words(), markdown_table(&words::catalogue_rows(&units)));
     session.show(|| words::catalogue_json(&units, &question), text);
-    pictures::page(args.page.as_deref(), || catalogue_page(&units, &question), session)?;
+    args.pictures.write(|| catalogue_page(&units, &question), session)?;
     if units.iter().any(|unit| !unit.not_stated.is_empty()) {
         session
             .printer

@@ -1,6 +1,7 @@
 //! `nav-sim tune`: honest inflation of a noise model.
 
 use super::parse::one_of;
+use super::pictures::PageArgs;
 use super::run::{OutageArg, parse_outage, scenario_with};
 use super::{Failure, Session, read, turn_on};
 use crate::ekf::FilterStates;
@@ -8,7 +9,7 @@ use crate::formats::atomic::{AtomicFile, guard_inputs};
 use crate::formats::model_file::{self, ModelFile};
 use crate::jobs::{self, TuneInputs};
 use crate::noise::Model;
-use crate::report::{Input, tune_page};
+use crate::report::{Input, markdown_table, tune_page};
 use crate::scenario::Scenario;
 use crate::sensors::outage::Outage;
 use crate::simulation::lincov::{Aim, Per, Track, drive};
@@ -59,9 +60,8 @@ pub(crate) struct Args {
     /// Scenario file: receiver, start, IMU rate (see `nav-sim schema scenario`)
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
-    /// Write a page with figures
-    #[arg(long, value_name = "FILE.html")]
-    page: Option<PathBuf>,
+    #[command(flatten)]
+    pictures: PageArgs,
     /// Model file to write
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -74,7 +74,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     refuse_recordings(args)?;
     let mut scenario = scenario(args)?;
     let files = files(args)?;
-    for out in args.out.iter().chain(&args.page) {
+    args.pictures.guard(&files.iter().map(|f| PathBuf::from(&f.path)).collect::<Vec<_>>())?;
+    if let Some(out) = &args.out {
         guard_inputs(out, files.iter().map(|f| Path::new(&f.path)))?;
         drop(AtomicFile::create(out)?);
     }
@@ -95,9 +96,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         allow_smaller: args.allow_smaller,
     });
     let result = result.map_err(|e| Failure::input(format!("{}: {e}", args.model.display())))?;
-    let text = || format!("{}\n\n{}", result.verdict(), super::compare::table(&result.rows()));
+    let text = || format!("{}\n\n{}", result.verdict(), markdown_table(&result.rows()));
     session.show(|| result.json(), text);
-    super::pictures::page(args.page.as_deref(), || tune_page(&result), session)?;
+    args.pictures.write(|| tune_page(&result), session)?;
     if let Some(out) = &args.out {
         let aim = if args.aim == Aim::Mean { "mean of" } else { "worst of" };
         let honest_for = format!("{aim} {}", if args.intervals { "intervals" } else { "truths" });

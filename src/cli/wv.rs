@@ -1,7 +1,7 @@
 //! `nav-sim wv`: wavelet variance of static recordings.
 
 use super::parse::words;
-use super::pictures::{self, PlotArgs};
+use super::pictures::PageArgs;
 use super::recordings::{RecordingArgs, Said};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
@@ -34,14 +34,11 @@ pub(crate) struct Args {
     /// Write the curves as JSON
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Write a page with figures
-    #[arg(long, value_name = "FILE.html")]
-    page: Option<PathBuf>,
     /// Also draw the wavelet deviations in the terminal
     #[arg(long)]
     chart: bool,
     #[command(flatten)]
-    plot: PlotArgs,
+    pictures: PageArgs,
 }
 
 const INTERVALS: [(&str, &str); 2] = [
@@ -52,10 +49,10 @@ const INTERVALS: [(&str, &str); 2] = [
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let tuning = args.tuning.tuning()?;
     let inputs = read::listed(&args.files)?;
-    for out in args.out.iter().chain(&args.page) {
+    if let Some(out) = &args.out {
         atomic::guard_inputs(out, inputs.iter().map(PathBuf::as_path))?;
     }
-    args.plot.guard(&inputs)?;
+    args.pictures.guard(&inputs)?;
     let intervals = args.intervals;
     let options = WaveletOptions {
         reading: args.recordings.options(),
@@ -70,8 +67,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         atomic::write_result(out, &json, session.existing())?;
         session.wrote(out);
     }
-    pictures::page(args.page.as_deref(), || report::wavelet_page(&file), session)?;
-    args.plot.write(|| report::wavelet_svg(&file), session)?;
+    args.pictures.write(|| report::wavelet_page(&file), session)?;
     if session.json() {
         session.printer.result(json.trim_end());
         return Ok(());
@@ -106,7 +102,10 @@ fn digest(file: &SignalsFile) -> String {
 }
 
 fn side_by_side(file: &SignalsFile) -> String {
-    let table = |(title, rows): (String, Vec<Vec<String>>)| format!("{title}\n{}", report::columns(&rows));
+    let table = |(title, rows): (String, Vec<Vec<String>>)| {
+        let parts: Vec<String> = report::cut(&rows, 1).iter().map(|part| report::columns(part)).collect();
+        format!("{title}\n{}", parts.join("\n"))
+    };
     report::signals_per_file(file).into_iter().map(table).collect::<Vec<_>>().join("\n")
 }
 

@@ -66,6 +66,7 @@ pub(super) fn parse_runs(path: &str, text: &str) -> Result<Vec<RunRecord>, FileE
                 nees_mean: table.number(row, nees)?,
                 covered: table.number(row, coverage)?,
                 normalised_sq: table.numbers(row, normalised)?,
+                horizontal_m: Vec::new(), // its quantiles are in fan.csv
             });
         }
         if table.rows[row][outage].is_empty() {

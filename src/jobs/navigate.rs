@@ -7,8 +7,8 @@ use crate::ekf::{Belief, BeliefError};
 use crate::formats::draws_file::Draws;
 use crate::imu::{Recording, Sensor};
 use crate::metrics::{
-    Agreement, Budget, EpochMetrics, Expected, ReductionQuality, ReductionSummary, Sensitivities, Summary,
-    epochs,
+    Agreement, Budget, EpochMetrics, Expected, FanEpoch, ReductionQuality, ReductionSummary, Sensitivities,
+    Summary, epochs, expected_fan, fan,
 };
 use crate::monte_carlo;
 use crate::noise::reduction::window_s;
@@ -20,7 +20,7 @@ use crate::sensors::outage::Outage;
 use crate::simulation::lincov::{
     Assessment, FilterPass, HeadingDoubt, NamedSource, Track, TruthSide, assess, weak_heading,
 };
-use crate::simulation::{Experiment, ExperimentError, RunResult};
+use crate::simulation::{Experiment, ExperimentError, Plan, RunResult};
 use crate::trajectory::Trajectory;
 
 /// What is navigated, with what.
@@ -57,6 +57,8 @@ pub struct Navigation {
     pub runs: Option<RunResult>,
     /// Statistics of every reporting epoch: of the runs, if there are any.
     pub epochs: Vec<EpochMetrics>,
+    /// Quantiles of the horizontal error over time: of the runs, if there are any.
+    pub fan: Vec<FanEpoch>,
     /// The summary.
     pub summary: Summary,
 }
@@ -133,11 +135,15 @@ pub fn navigate(
         Method::Lincov | Method::Both => Some(analysis.expected(&belief).ok_or(NavigateError::NotFinite)?),
     };
     let mut navigation = match (method, expected) {
-        (Method::Lincov, Some((epochs, summary))) => Navigation { runs: None, epochs, summary },
+        (Method::Lincov, Some((epochs, summary))) => {
+            Navigation { runs: None, epochs, fan: analysis.fan(&belief), summary }
+        }
         (_, expected) => {
             let mut sampled = sampled(&experiment, scenario.run.runs, seed, observer)?;
             match (method, expected) {
-                (Method::Both, Some((_, expected))) => sampled.beside(expected, observer),
+                (Method::Both, Some((_, expected))) => {
+                    sampled.beside(expected, &analysis.fan(&belief), observer)
+                }
                 (_, Some((_, expected))) => {
                     sampled.summary.doubt_by(&expected);
                     sampled
@@ -210,12 +216,14 @@ fn sampled(
     observer: &dyn Observer<Note>,
 ) -> Result<Navigation, NavigateError> {
     observer.begin(runs);
-    let mut results = monte_carlo::run(experiment, runs, &|n| observer.advance(n))?;
+    let plan = Plan::new(experiment)?.with_fan();
+    let mut results = monte_carlo::run_plan(&plan, runs, &|n| observer.advance(n));
     observer.end();
     let result = results.swap_remove(0);
     let epochs = epochs(&result);
     let summary = Summary::of(&result, &epochs, seed);
-    Ok(Navigation { runs: Some(result), epochs, summary })
+    let fan = fan(&result);
+    Ok(Navigation { runs: Some(result), epochs, fan, summary })
 }
 
 /// What a covariance analysis is made of.
@@ -236,6 +244,13 @@ impl<'a> Analysis<'a> {
         let expected = Expected::along(self.track, self.experiment, belief, self.model?)?;
         let summary = expected.summary();
         Some((expected.epochs, summary))
+    }
+
+    /// Quantiles of the horizontal error over time; none where nothing models what makes the errors.
+    fn fan(&self, belief: &Belief) -> Vec<FanEpoch> {
+        let Some(model) = self.model else { return Vec::new() };
+        let truth = TruthSide::together(&TruthSide::sources(self.experiment, model));
+        expected_fan(&FilterPass::new(self.track, belief), &truth, self.experiment.outages)
     }
 
     /// How the errors at the ends of outages follow from the parameters of what makes them.
@@ -283,10 +298,13 @@ impl<'a> Analysis<'a> {
 
 impl Navigation {
     /// Runs beside what was expected of them: the verdict is that of the expected figures.
-    fn beside(mut self, expected: Summary, observer: &dyn Observer<Note>) -> Self {
+    fn beside(mut self, expected: Summary, fan: &[FanEpoch], observer: &dyn Observer<Note>) -> Self {
         let agreement = Agreement::of(&self.summary, &expected);
         observer.remark(&Note::Agreement(agreement.clone()));
         self.summary.expect(expected, agreement);
+        for (own, expected) in self.fan.iter_mut().zip(fan) {
+            own.lincov_m = Some(expected.quantiles_m);
+        }
         self
     }
 }

@@ -5,8 +5,8 @@ use super::number::readable;
 use super::practical::{PracticalRow, interval, policy, practical_rows};
 use super::turn_on::turn_on_lines;
 use crate::calibration::{
-    Diagnosis, Outcome, Settings, TurnOnSpread, advice, axes_remark, duration, percent, shares, signals,
-    tau_s, worst_in_words,
+    Diagnosis, Miss, Outcome, Settings, TurnOnSpread, Verdict, advice, axes_remark, duration, percent,
+    shares, signals, tau_s,
 };
 use crate::export::Quantity;
 use crate::imu::Sensor;
@@ -28,14 +28,15 @@ pub(crate) fn brief(
     let rate_hz = settings.rate_hz;
     let of_sensor = |sensor: Sensor| {
         let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.scope.sensor == sensor).collect();
-        let mut parts: Vec<String> = if own.len() == 1 { vec![verdict(own[0], rate_hz)] } else { Vec::new() };
-        parts.extend(own.iter().find_map(|o| axes_remark(o, rate_hz)));
-        let mut advice = advice(diagnoses, sensor).into_iter();
-        parts.extend(advice.next());
-        let first = (!parts.is_empty()).then(|| format!("{}: {}", sensor.name(), parts.join("; ")));
-        let notes = own.iter().filter(|_| outcomes.len() <= MOST).flat_map(|o| notes(o));
-        let others = advice.chain(notes).map(move |line| format!("{}: {line}", sensor.name()));
-        (first, others.collect::<Vec<_>>())
+        let parts = [verdict(&own, rate_hz), recordings(&own, diagnoses)];
+        let first: Vec<String> = parts.into_iter().flatten().collect();
+        let first = (!first.is_empty()).then(|| format!("{}: {}", sensor.name(), first.join(" ")));
+        let notes = own.iter().flat_map(|o| match outcomes.len() <= MOST {
+            true => notes(o),
+            false => axes_remark(o, rate_hz).into_iter().collect(),
+        });
+        let others = advice(diagnoses, sensor).into_iter().chain(notes);
+        (first, others.map(|line| format!("{}: {line}", sensor.name())).collect::<Vec<_>>())
     };
     let (mut lines, mut remarks) = (Vec::new(), Vec::new());
     for (first, others) in Sensor::ALL.map(of_sensor) {
@@ -57,39 +58,66 @@ pub(crate) fn brief(
     lines.join("\n")
 }
 
-/// Remarks that the verdict does not hold already.
-fn notes(outcome: &Outcome) -> Vec<String> {
-    let told = |note: &&String| note.starts_with("the data disagree") || note.starts_with("the axes differ");
-    outcome.notes.iter().filter(|note| !told(note)).cloned().collect()
+/// Whether the models of a sensor describe its data; none without a model.
+fn verdict(own: &[&Outcome], rate_hz: f64) -> Option<String> {
+    match own {
+        [] => None,
+        [outcome] => Some(format!("{}.", fit_verdict(outcome, rate_hz))),
+        several => {
+            let fitting = several.iter().filter(|o| in_short(o, rate_hz) == FITS).count();
+            Some(format!("{fitting} of {} models fit.", several.len()))
+        }
+    }
 }
 
-/// Whether the model fits, and where it does not.
-fn verdict(outcome: &Outcome, rate_hz: f64) -> String {
-    let departure = outcome.departure();
+/// What the models are of: `6 recordings × 3 axes: 1 abnormal, axes differ.`; none of a curve.
+fn recordings(own: &[&Outcome], diagnoses: &[Diagnosis]) -> Option<String> {
+    let first = own.iter().find(|o| o.recordings > 0)?;
+    let of_sensor = || diagnoses.iter().filter(|d| d.sensor == first.scope.sensor);
+    let abnormal = of_sensor().any(|d| !d.scores.is_empty()).then(|| {
+        match of_sensor().filter(|d| d.verdict != Verdict::Normal).count() {
+            0 => "none abnormal".to_owned(),
+            count => format!("{count} abnormal"),
+        }
+    });
+    let axes = own.iter().any(|o| o.axes_differ.is_some()).then(|| "axes differ".to_owned());
+    let found: Vec<String> = abnormal.into_iter().chain(axes).collect();
+    let colon = if found.is_empty() { "" } else { ": " };
+    Some(format!("{}{colon}{}.", signals(first), found.join(", ")))
+}
+
+/// The remarks on a fit, and why its two tests may disagree.
+fn notes(outcome: &Outcome) -> Vec<String> {
     let goodness = outcome.inference.as_ref().and_then(|i| i.goodness);
-    let test = goodness.map_or(String::new(), |g| format!(", J-test p = {:.3}", g.p_value));
-    let rejected = goodness.is_some_and(|g| g.is_rejected());
-    let (spec, signals) = (&outcome.spec, signals(outcome));
+    let is_allowed = goodness.is_some_and(|g| !g.is_rejected()) && outcome.departure().worst().is_some();
+    let allowed = is_allowed.then(|| {
+        "the J-test allows for how much recordings differ among themselves, the count of scales does not"
+            .to_owned()
+    });
+    outcome.notes.iter().cloned().chain(allowed).collect()
+}
+
+/// Whether the model fits, and the scale at which it is worst: the same on the terminal and on the page. Where scales are
+/// missed, of those the one with the largest factor between data and model; else of the scales that are well known.
+pub(super) fn fit_verdict(outcome: &Outcome, rate_hz: f64) -> String {
+    let (spec, departure) = (&outcome.spec, outcome.departure());
+    let goodness = outcome.inference.as_ref().and_then(|i| i.goodness);
+    let test = goodness.map_or(String::new(), |g| format!(" (J-test p = {:.3})", g.p_value));
+    let at = |miss: Miss| duration(tau_s(miss.level, rate_hz));
     if let Some(worst) = departure.worst() {
-        let allowed = if goodness.is_some() && !rejected {
-            ", which allows for how much they differ among themselves"
-        } else {
-            ""
-        };
         return format!(
-            "{spec} does not fit {signals} at {} of {} scales: the data have {}{test}{allowed}",
+            "{spec} does not fit: data/model is {} at {}, {} of {} scales are off{test}",
+            readable(worst.ratio),
+            at(worst),
             departure.missed.len(),
-            departure.scales,
-            worst_in_words(outcome, worst, rate_hz)
+            departure.scales
         );
     }
-    let furthest = departure.furthest.map_or(String::new(), |m| {
-        format!(", at most {} off, at {}", percent((m.ratio - 1.0).abs()), duration(tau_s(m.level, rate_hz)))
-    });
-    if rejected {
-        return format!("{spec} does not fit {signals} as a whole{furthest}{test}");
-    }
-    format!("{spec} fits {signals}{furthest}{test}")
+    let off = departure
+        .furthest
+        .map_or(String::new(), |m| format!(": at most {} off, at {}", percent((m.ratio - 1.0).abs()), at(m)));
+    let word = if goodness.is_some_and(|g| g.is_rejected()) { "does not fit as a whole" } else { "fits" };
+    format!("{spec} {word}{test}{off}")
 }
 
 /// Rows for a parameter each.
@@ -225,11 +253,14 @@ fn joint(outcomes: &[Outcome], rate_hz: f64) -> Vec<Vec<String>> {
     std::iter::once(head.map(str::to_owned).to_vec()).chain(outcomes.iter().map(row)).collect()
 }
 
+/// Of a fit that describes its data.
+const FITS: &str = "yes";
+
 fn in_short(outcome: &Outcome, rate_hz: f64) -> String {
     let rejected = outcome.inference.as_ref().and_then(|i| i.goodness).is_some_and(|g| g.is_rejected());
     match outcome.departure().worst() {
         Some(m) => format!("no: data/model {} at {}", readable(m.ratio), duration(tau_s(m.level, rate_hz))),
         None if rejected => "no (J-test)".to_owned(),
-        None => "yes".to_owned(),
+        None => FITS.to_owned(),
     }
 }

@@ -135,11 +135,11 @@ impl ChoiceReport<'_> {
     pub(crate) fn rows(&self) -> Vec<Vec<String>> {
         let head = [
             "candidate",
-            "RMSE at outage end (m)",
+            "RMSE (m)",
             "against the best (%)",
             "believed (m)",
             "NEES (9)",
-            "coverage (0.95)",
+            "coverage",
             "log score (nats)",
         ];
         let mut rows = vec![head.map(str::to_owned).to_vec()];
@@ -151,7 +151,7 @@ impl ChoiceReport<'_> {
         let is_winner = placed.index == self.ranking.winner().index;
         let mark = match (is_winner, placed.eligible, placed.tied) {
             (true, ..) => " *",
-            (_, false, _) => " (one recording)",
+            (_, false, _) => " †",
             (_, _, true) => " =",
             _ => "",
         };
@@ -159,7 +159,8 @@ impl ChoiceReport<'_> {
             if is_winner {
                 "–".to_owned()
             } else {
-                format!("{} [{}, {}]", signed(mean.value), signed(mean.ci95.0), signed(mean.ci95.1))
+                let [value, low, high] = [mean.value, mean.ci95.0, mean.ci95.1].map(signed_few);
+                format!("{value} [{low}, {high}]")
             }
         };
         vec![
@@ -167,12 +168,7 @@ impl ChoiceReport<'_> {
             readable(placed.rmse_m),
             against(&placed.difference.rmse_pct),
             readable(placed.believed_m),
-            format!(
-                "{} [{}, {}]",
-                readable(placed.nees.value),
-                readable(placed.nees.ci95.0),
-                readable(placed.nees.ci95.1)
-            ),
+            format!("{} [{}, {}]", few(placed.nees.value), few(placed.nees.ci95.0), few(placed.nees.ci95.1)),
             placed.coverage.map_or("–".to_owned(), |c| format!("{c:.2}")),
             if is_winner {
                 format!("{:.2}", placed.log_score.value)
@@ -189,7 +185,8 @@ impl ChoiceReport<'_> {
         let ends: Vec<String> = self.outages.iter().map(|o| window(o.start_s, o.end_s)).collect();
         format!(
             "{recordings} recordings, each left out once; outages {}; * the best by log score, = cannot be told from \
-             it; [95 % over recordings]; log score: of the best, and of the others less the best",
+             it, † of one recording; [95 % over recordings]; RMSE: horizontal, at the ends of the outages; NEES 9 and \
+             coverage 0.95 if the filter is right; log score: of the best, and of the others less the best",
             ends.join(", ")
         )
     }
@@ -297,6 +294,22 @@ impl ChoiceReport<'_> {
             influence: self.influence,
         }
     }
+}
+
+/// A number in a table that is wide enough already: two decimals at most.
+fn few(x: f64) -> String {
+    let decimals = match x.abs() {
+        size if size < 10.0 => 2,
+        size if size < 100.0 => 1,
+        _ => 0,
+    };
+    format!("{x:.decimals$}")
+}
+
+/// The same with its sign.
+fn signed_few(x: f64) -> String {
+    let shown = few(x);
+    if x > 0.0 { format!("+{shown}") } else { shown }
 }
 
 /// A number with its sign.

@@ -1,6 +1,7 @@
 //! `comparison.json` and the layout of the paper's Table I.
 
 use super::number::{readable, window};
+use super::short::short_names;
 use super::verdict::{verdict_in_short, verdict_word};
 use crate::metrics::{OutageComparison, RatioError, Verdict, VerdictKind};
 use crate::simulation::REPORTED_NAMES;
@@ -176,10 +177,11 @@ fn rows<'a>(run: &'a str, outage: usize, comparison: &'a OutageComparison) -> im
 pub(crate) fn verdict_lines(verdicts: &[VerdictRow]) -> Vec<String> {
     let kinds =
         [VerdictKind::Diverged, VerdictKind::Overconfident, VerdictKind::Underconfident, VerdictKind::Ok];
+    let names = short_names(&verdicts.iter().map(|row| row.run.as_str()).collect::<Vec<_>>());
     let line = |kind: VerdictKind| {
-        let of_kind = verdicts.iter().filter(|row| row.verdict.kind == kind);
+        let of_kind = verdicts.iter().zip(&names).filter(|(row, _)| row.verdict.kind == kind);
         let runs: Vec<String> =
-            of_kind.map(|row| format!("{} ({})", row.run, verdict_in_short(&row.verdict))).collect();
+            of_kind.map(|(row, name)| format!("{name} ({})", verdict_in_short(&row.verdict))).collect();
         (!runs.is_empty()).then(|| format!("{}: {}", verdict_word(kind), runs.join(", ")))
     };
     kinds.into_iter().filter_map(line).collect()
@@ -219,8 +221,6 @@ pub(crate) fn with_times(mut rows: Vec<Vec<String>>, outages: &[(f64, f64)]) -> 
 /// its end with half its 95 % interval, for each of the `states`.
 #[must_use]
 pub(crate) fn consistency_rows(candidates: &[CandidateResult], states: &[usize]) -> Vec<Vec<String>> {
-    let names: Vec<&str> = states.iter().map(|s| REPORTED_NAMES[*s]).collect();
-    let head = format!("NEES, coverage, RMSE {}", names.join(", RMSE "));
     let consistency = |candidate: &CandidateResult, outage: usize, _: usize| {
         let found = &candidate.outages[outage];
         let mut parts = vec![readable(found.nees[0]), format!("{:.3}", found.coverage[0])];
@@ -230,7 +230,7 @@ pub(crate) fn consistency_rows(candidates: &[CandidateResult], states: &[usize])
         }));
         parts.join(", ")
     };
-    laid_out(candidates, &[head], &consistency)
+    laid_out(candidates, &["NEES, coverage, RMSE".to_owned()], &consistency)
 }
 
 /// Rows scenario × outage, columns `heads` × estimator.
@@ -263,15 +263,16 @@ fn laid_out(
     rows
 }
 
-/// The places of candidates, each its own: those that would share one have rows of their full names, and a
+/// The places of candidates, each its own: those that would share one have rows of their names, and a
 /// number if even these are the same.
 fn distinct_labels(candidates: &[CandidateResult]) -> Vec<Label> {
     let shared = |c: &CandidateResult| candidates.iter().filter(|o| o.label == c.label).count() > 1;
+    let names = short_names(&candidates.iter().map(|c| c.run.as_str()).collect::<Vec<_>>());
     let mut labels: Vec<Label> = Vec::new();
-    for candidate in candidates {
+    for (candidate, name) in candidates.iter().zip(names) {
         let mut label = candidate.label.clone();
         if shared(candidate) {
-            label.scenario.clone_from(&candidate.run);
+            label.scenario = name;
         }
         let name = label.scenario.clone();
         let taken = |label: &Label, labels: &[Label]| {
@@ -374,7 +375,7 @@ mod tests {
         assert_eq!(rows[1], ["I", "1", "–", "+0.96 ± 0.50 (1.96)", "–", "+0.96 ± 0.50 (1.96)"]);
         assert_eq!(rows[4][..4], ["II", "2", "-75.00 ± 0.50 (76.00)", ""]);
         let rows = consistency_rows(&all, &[1, 6]);
-        assert_eq!(rows[0][2], "NEES, coverage, RMSE pos_e_m, RMSE roll_deg AWV");
+        assert_eq!(rows[0][2], "NEES, coverage, RMSE AWV");
         assert_eq!(rows[1][2..], ["9.50, 0.900, –, –", "9.50, 0.900, +0.96 ± 0.50, +0.96 ± 0.50"]);
     }
 

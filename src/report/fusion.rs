@@ -225,13 +225,27 @@ impl FusionSummary {
     pub(super) fn verdict_line(&self) -> String {
         let words = match self.verdict {
             word if word == Verdict::Ok.name() => "consistent with its fixes",
-            word if word == Verdict::Underconfident.name() => "consistent with its fixes, and cautious",
+            word if word == Verdict::Underconfident.name() => "underconfident",
             word if word == Verdict::Doubtful.name() => "doubtful",
-            _ => "not to be believed",
+            _ => "overconfident and not to be believed",
         };
-        let reasons =
-            if self.reasons.is_empty() { String::new() } else { format!(": {}", self.reasons.join("; ")) };
-        format!("verdict: {words}{reasons}")
+        let why = if self.reasons.is_empty() { self.figures() } else { self.reasons.join("; ") };
+        format!("verdict: {words}: {why}")
+    }
+
+    /// What a verdict rests on.
+    fn figures(&self) -> String {
+        let nis = format!(
+            "NIS {:.2} per component (1 if right) over {} fixes",
+            self.nis_per_component, self.fixes.used
+        );
+        let nees = self.reference.as_ref().map(|reference| {
+            format!(
+                ", NEES {:.2} against the reference ({} if right)",
+                reference.nees_mean, reference.nees_dof
+            )
+        });
+        nis + &nees.unwrap_or_default()
     }
 
     /// The summary for people, the verdict first.
@@ -248,7 +262,9 @@ impl FusionSummary {
             "{} IMU samples at {:.2} Hz, {} to {} s, {states}{turn_on} states; {used} fixes used, {withheld} withheld, {rejected} rejected",
             self.imu_samples, self.imu_rate_hz, seconds(self.start_s), seconds(self.end_s)
         ));
-        lines.push(format!("NIS {:.2} per component (1 if all is as believed)", self.nis_per_component));
+        if !self.reasons.is_empty() {
+            lines.push(self.figures());
+        }
         for o in &self.outages {
             let of = |name: &str, d: Option<DriftRow>| {
                 d.map(|d| {
@@ -296,7 +312,8 @@ pub(crate) fn fusion_directory(
             solution,
             summary,
             &manifest.inputs.iter().map(|i| (i.role.clone(), i.path.clone())).collect::<Vec<_>>(),
-        ),
+        )
+        .html(),
         json(manifest),
     ];
     FUSION_FILES.into_iter().zip(contents).map(|(name, text)| OutputFile::whole(name, text)).collect()

@@ -25,6 +25,7 @@ mod run_directory;
 pub(crate) mod run_words;
 #[cfg(test)]
 pub(crate) mod sample;
+mod short;
 mod signals;
 mod study;
 pub(crate) mod tables;
@@ -37,7 +38,7 @@ mod warm_up;
 pub(crate) use brief::brief;
 pub(crate) use choose::{ChoiceReport, RankedPlace};
 pub(crate) use closure::TrajectoryCheck;
-pub(crate) use columns::columns;
+pub(crate) use columns::{columns, cut, terminal_table};
 pub(crate) use comparison::{
     CandidateResult, ComparisonFile, Label, consistency_rows, meaning_of_intervals, table_rows,
     verdict_lines, with_times,
@@ -55,13 +56,14 @@ pub(crate) use number::{seconds, window};
 pub(crate) use pages::{
     PaperFigure, RatioCurves, StudyCurves, calibration_page, calibration_svg, catalogue_page, choice_page,
     comparison_figure, comparison_page, comparison_svg, design_page, efficiency_page, efficiency_svg,
-    model_page, needed_page, paper_figures, paper_page, run_svg, run_text, study_page, tune_page,
-    wavelet_page, wavelet_svg, wavelet_text,
+    fusion_page, model_page, needed_page, paper_figures, paper_page, run_svg, run_text, study_page,
+    tune_page, wavelet_page, wavelet_text,
 };
 pub(crate) use recording::{gnss_csv, imu_csv, initial_toml};
 pub(crate) use replicates::describe_replicates;
 pub use run_directory::run_directory;
 pub(crate) use run_directory::{RUN_FILES, json, summary_json};
+pub(crate) use short::short_names;
 pub(crate) use signals::{intervals_note, signal_rows, signals_csv, signals_digest, signals_per_file};
 pub(crate) use study::{
     ColumnResult, ShownCell, ShownColumn, TableColumn, TableRow, Value, ValueKind, drift_table,

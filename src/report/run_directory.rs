@@ -2,9 +2,9 @@
 
 use super::manifest::Manifest;
 use super::pages::run_page;
-use super::tables::{epochs_csv, runs_csv};
+use super::tables::{epochs_csv, fan_csv, runs_csv};
 use super::trajectory::TrajectorySeries;
-use crate::metrics::{EpochMetrics, Summary};
+use crate::metrics::{EpochMetrics, FanEpoch, Summary};
 use crate::simulation::RunResult;
 
 /// A file to be written.
@@ -24,8 +24,8 @@ impl OutputFile<'_> {
 }
 
 /// Names of the files of a run directory.
-pub(crate) const RUN_FILES: [&str; 5] =
-    ["epochs.csv", "runs.csv", "summary.json", "report.html", "manifest.json"];
+pub(crate) const RUN_FILES: [&str; 6] =
+    ["epochs.csv", "fan.csv", "runs.csv", "summary.json", "report.html", "manifest.json"];
 
 /// The files of a run directory, the manifest last: where it is, the rest is whole. Without runs (covariance
 /// analysis) there is no table of them. `track`: the reference trajectory.
@@ -33,23 +33,26 @@ pub(crate) const RUN_FILES: [&str; 5] =
 pub fn run_directory<'a>(
     runs: Option<&'a RunResult>,
     epochs: &[EpochMetrics],
+    fan: &[FanEpoch],
     summary: &Summary,
     manifest: &Manifest,
     track: &TrajectorySeries,
 ) -> Vec<OutputFile<'a>> {
-    let [epochs_name, runs_name, summary_name, page_name, manifest_name] = RUN_FILES;
+    let [epochs_name, fan_name, runs_name, summary_name, page_name, manifest_name] = RUN_FILES;
     let summary_text = summary_json(summary, manifest.throughput_epochs_per_s);
     let epochs_text = epochs_csv(epochs);
-    let tables = [(epochs_name, digest([&epochs_text])), (summary_name, digest([&summary_text]))];
+    let fan_text = fan_csv(fan);
+    let texts = [(epochs_name, &epochs_text), (fan_name, &fan_text), (summary_name, &summary_text)];
+    let tables = texts.map(|(name, text)| (name, digest([text])));
     let runs_digest = runs.map(|result| (runs_name, digest(runs_csv(result))));
     let outputs = tables.into_iter().chain(runs_digest).map(|(name, hash)| (name.to_owned(), hash)).collect();
     let with_outputs = Manifest { outputs, ..manifest.clone() };
     let runs = runs.map(|result| OutputFile { name: runs_name, parts: Box::new(runs_csv(result)) });
-    let mut files = vec![OutputFile::whole(epochs_name, epochs_text)];
+    let mut files = vec![OutputFile::whole(epochs_name, epochs_text), OutputFile::whole(fan_name, fan_text)];
     files.extend(runs);
     files.extend([
         OutputFile::whole(summary_name, summary_text),
-        OutputFile::whole(page_name, run_page(epochs, summary, manifest, track)),
+        OutputFile::whole(page_name, run_page(epochs, fan, summary, manifest, track)),
         OutputFile::whole(manifest_name, json(&with_outputs)),
     ]);
     files
@@ -109,7 +112,10 @@ mod tests {
             wall_s: 2.0,
             throughput_epochs_per_s: 2400.0,
         };
-        let files = run_directory(Some(&result), &epochs, &summary, &manifest, &TrajectorySeries::default());
+        let quantiles_m = [0.1, 0.2, 0.4, 0.8, 1.6];
+        let fan = [4.0, 8.0].map(|t_s| FanEpoch { t_s, quantiles_m, lincov_m: None });
+        let track = TrajectorySeries::default();
+        let files = run_directory(Some(&result), &epochs, &fan, &summary, &manifest, &track);
         files.into_iter().map(|file| (file.name, file.parts.collect())).collect()
     }
 
@@ -117,7 +123,7 @@ mod tests {
     fn the_manifest_comes_last_and_reads_back() {
         let files = files();
         assert_eq!(files.iter().map(|f| f.0).collect::<Vec<_>>(), RUN_FILES);
-        let manifest: Manifest = serde_json::from_str(&files[4].1).unwrap();
+        let manifest: Manifest = serde_json::from_str(&files[5].1).unwrap();
         assert_eq!(manifest.hashes("trajectory"), ["ab"]);
         assert_eq!(manifest.configuration, Scenario::default());
         for (name, text) in files.iter().filter(|(name, _)| !["report.html", "manifest.json"].contains(name))
@@ -130,7 +136,7 @@ mod tests {
     #[test]
     fn the_page_has_the_numbers_of_the_summary() {
         let files = files();
-        let (summary, page) = (&files[2].1, &files[3].1);
+        let (summary, page) = (&files[3].1, &files[4].1);
         let summary: serde_json::Value = serde_json::from_str(summary).unwrap();
         assert!(page.contains("a&lt;b.toml") && page.contains("<svg") && !page.contains("a<b"));
         let cells: Vec<(&str, &str)> = page

@@ -2,6 +2,7 @@
 
 use super::curves::{Band, SignalCurves, SignalsFile};
 use super::number::shortest;
+use super::short::short_names;
 use crate::calibration::{duration, median};
 use crate::wavelet::Tuning;
 
@@ -44,7 +45,7 @@ pub(crate) fn signals_per_file(file: &SignalsFile) -> Vec<(String, Vec<Vec<Strin
     let decades = decades(file);
     let table = |(sensor, axis): (&str, &str)| {
         let own = of(file, sensor, axis);
-        let names = own.iter().map(|s| short_name(&s.file));
+        let names = short_names(&own.iter().map(|s| s.file.as_str()).collect::<Vec<_>>());
         let head = std::iter::once("averages of".to_owned()).chain(names).collect::<Vec<_>>();
         let row = |i: &usize| {
             let cell = |s: &&SignalCurves| {
@@ -209,12 +210,6 @@ fn least_ratio(ratios: &[Ratio]) -> Option<(f64, &'static str)> {
     let is_marked = ratios.iter().any(|r| r.ratio.ln() < -z * r.deviation);
     let least = ratios.iter().map(|r| r.ratio).min_by(f64::total_cmp)?;
     Some((least, if is_marked { " *" } else { "" }))
-}
-
-fn short_name(file: &str) -> String {
-    std::path::Path::new(file)
-        .file_name()
-        .map_or_else(|| file.to_owned(), |n| n.to_string_lossy().into_owned())
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
-//! `epochs.csv` and `runs.csv` of a run directory.
+//! `epochs.csv`, `fan.csv` and `runs.csv` of a run directory.
 
 use super::number::shortest;
-use crate::metrics::{EpochMetrics, PerState};
+use crate::metrics::{EpochMetrics, FAN_LEVELS, FanEpoch, PerState};
 use crate::simulation::{BIAS_NAMES, OutageRecord, REPORTED, REPORTED_NAMES, RunResult};
 
 const EPOCH_ENDS: [&str; 4] = ["mean_pos_err_m", "mean_att_err_deg", "nees", "coverage"];
@@ -30,6 +30,22 @@ pub(crate) fn epochs_csv(epochs: &[EpochMetrics]) -> String {
         row.join(",")
     };
     lines(epoch_columns().join(","), epochs.iter().map(row))
+}
+
+/// `fan.csv`: quantiles of the horizontal error over time; with what covariance analysis expects of them where that stands
+/// beside runs.
+#[must_use]
+pub(crate) fn fan_csv(fan: &[FanEpoch]) -> String {
+    let has_lincov = fan.iter().any(|e| e.lincov_m.is_some());
+    let prefixes: &[&str] = if has_lincov { &["", "lincov_"] } else { &[""] };
+    let column = |prefix: &str, p: f64| format!("{prefix}p{:02.0}_m", 100.0 * p);
+    let quantiles = prefixes.iter().flat_map(|prefix| FAN_LEVELS.map(|p| column(prefix, p)));
+    let header: Vec<String> = std::iter::once("t_s".to_owned()).chain(quantiles).collect();
+    let row = |e: &FanEpoch| {
+        let quantiles = e.quantiles_m.into_iter().chain(e.lincov_m.into_iter().flatten());
+        std::iter::once(e.t_s).chain(quantiles).map(shortest).collect::<Vec<_>>().join(",")
+    };
+    lines(header.join(","), fan.iter().map(row))
 }
 
 /// Columns of `runs.csv`.

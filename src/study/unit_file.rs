@@ -245,6 +245,7 @@ fn sampled(head: ColumnHead, runs: u64, words: &mut Words<'_>) -> RunResult {
     let epochs = (0..head.epochs).map(|_| epoch(words)).collect();
     RunResult {
         epochs,
+        fan_t_s: Vec::new(),
         runs,
         outages: head.outages,
         filter_states: head.filter_states,
@@ -294,6 +295,7 @@ mod tests {
             nees_mean: value(k + 7),
             covered: value(k + 8),
             normalised_sq: std::array::from_fn(|i| value(i + k + 9)),
+            horizontal_m: Vec::new(),
         };
         let epoch = |k: usize| EpochSums {
             t_s: k as f64,
@@ -309,6 +311,7 @@ mod tests {
             Finding::Sampled(RunResult {
                 epochs: (0..3).map(epoch).collect(),
                 runs: (0..2).map(run).collect(),
+                fan_t_s: Vec::new(),
                 outages: vec![(0.1, 0.3), (1.0 / 3.0, 5.0)],
                 filter_states: states,
                 fix_components: 6,

@@ -110,7 +110,17 @@ pub(super) fn run(outages: usize, words: &mut Words<'_>) -> RunRecord {
         reconvergence_s: words.float(),
     };
     let outages = (0..outages).map(outage).collect();
-    RunRecord { run, diverged, outages, nis, rejected, nees_mean, covered, normalised_sq }
+    RunRecord {
+        run,
+        diverged,
+        outages,
+        nis,
+        rejected,
+        nees_mean,
+        covered,
+        normalised_sq,
+        horizontal_m: Vec::new(),
+    }
 }
 
 pub(super) fn epoch(words: &mut Words<'_>) -> EpochSums {

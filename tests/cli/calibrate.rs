@@ -300,6 +300,7 @@ fn wv_prints_the_curves_of_every_signal() {
         "{all}"
     );
     assert!(text(&["--per-file"]).contains("run0.csv  run1.csv"));
+    assert!(text(&["--per-file"]).lines().all(|line| line.chars().count() <= 120));
     assert_eq!(text(&["--format", "csv"]).lines().count(), 1 + 4 * 13);
     let stderr = refusal(dir.path(), &["check", "runs/run0.csv", "--format", "csv"], 2);
     assert!(stderr.contains("--format csv is a format of wv alone"), "{stderr}");

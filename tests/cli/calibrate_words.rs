@@ -19,6 +19,7 @@ fn what_is_printed_fits_a_screen() {
     assert!(count <= 20, "{count} lines: {text}");
     let first = text.lines().next().unwrap();
     assert!(first.contains(" fit") && first.contains("4 recordings × 2 axes"), "{text}");
+    assert!(first.chars().count() <= 160, "{first}");
     assert!(text.contains("angle random walk N") && text.contains("deg/sqrt(h)"), "{text}");
     assert!(text.contains("J-test p = "), "{text}");
     assert!(lines(&["--verbose"]).0 > count);
@@ -53,6 +54,88 @@ fn practitioners_parameters_are_those_of_export() {
         assert!(ends[0] < density && density < ends[1] && ends[1] / ends[0] < 1.05, "{ends:?}");
         assert!(fit["missed"].as_array().unwrap().is_empty());
     }
+}
+
+/// Four recordings of a model that is too small, whose axes differ and one of which has four times the noise: the first line
+/// says all of that shortly, the notes and the page have the rest.
+#[test]
+fn bad_data_are_told_in_a_line() {
+    let dir = tempfile::tempdir().unwrap();
+    let runs = recordings(dir.path(), 4);
+    for run in 0..4 {
+        let path = runs.join(format!("run{run}.csv"));
+        let text = std::fs::read_to_string(&path).unwrap();
+        let doctored = text.lines().enumerate().map(|(i, line)| {
+            let cells: Vec<&str> = line.split(',').collect();
+            let [x, y] = [1, 2].map(|c| cells[c].parse::<f64>().unwrap_or_default());
+            let factor = if run == 3 { 2.0 } else { 1.0 };
+            if i == 0 {
+                format!("{line}\n")
+            } else {
+                format!("{},{:e},{:e}\n", cells[0], factor * x, 3.0 * factor * y)
+            }
+        });
+        std::fs::write(&path, doctored.collect::<String>()).unwrap();
+    }
+    let fit = [
+        "calibrate",
+        "runs",
+        "--model",
+        "WN",
+        "--bootstrap",
+        "39",
+        "--seed",
+        "1",
+        "-o",
+        "m.toml",
+        "--no-progress",
+    ];
+    let output = nav_sim(dir.path()).args(fit).assert().success();
+    let text = String::from_utf8(output.get_output().stdout.clone()).unwrap();
+    let first = text.lines().next().unwrap();
+    assert!(first.starts_with("gyro: WN does not fit: data/model is "), "{first}");
+    assert!(first.ends_with(" 4 recordings × 2 axes: 1 abnormal, axes differ."), "{first}");
+    assert!(first.chars().count() <= 160, "{first}");
+    assert!(text.contains("note: gyro: runs/run3.csv is abnormal"), "{text}");
+}
+
+/// A curve of white noise with two blemishes: at 0.16 s half as much again, known to 1.4 %, and at 10 s four times as much, known
+/// by eight degrees of freedom. The 95 % band is farther from the model at 10 s, ln(4·8/17.5) = 0.60 against ln 1.5 = 0.41; but the
+/// normal score there is (1.587 − 1 + 0.028)/0.167 = 3.7, which is no scale that is missed. Terminal and page name the other one.
+#[test]
+fn terminal_and_page_name_the_same_scale() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut text = "tau_samples,wv,edof\n".to_owned();
+    for level in 1..=10_u32 {
+        let white = 1e-4 / f64::from(level).exp2();
+        let (factor, edof) = match level {
+            4 => (1.5, 1e4),
+            10 => (4.0, 8.0),
+            _ => (1.0, 1e6),
+        };
+        text += &format!("{},{:e},{edof}\n", 1_u64 << level, factor * white);
+    }
+    std::fs::write(dir.path().join("curve.csv"), text).unwrap();
+    let fit = [
+        "calibrate",
+        "--curve",
+        "curve.csv",
+        "--sensor",
+        "gyro",
+        "--model",
+        "WN",
+        "--rate-hz",
+        "100",
+        "-o",
+        "m.toml",
+    ];
+    let output = nav_sim(dir.path()).args(fit).assert().success();
+    let text = String::from_utf8(output.get_output().stdout.clone()).unwrap();
+    let verdict = text.lines().next().unwrap().split_once(": ").unwrap().1;
+    let told = verdict.split(" scales are off").next().unwrap();
+    assert_eq!(told, "WN does not fit: data/model is 1.50 at 0.16 s, 1 of 10", "{text}");
+    let page = std::fs::read_to_string(dir.path().join("m.html")).unwrap();
+    assert!(page.contains(told), "{told}");
 }
 
 /// N is one number wherever it is shown: of white noise, a fast AR1 and a random walk that of all three together, not that of WN

@@ -95,11 +95,17 @@ fn the_model_that_made_the_recordings_is_chosen_and_written() {
 #[test]
 fn recordings_shorter_than_the_drive_are_judged_by_covariance_analysis() {
     let directory = recordings("4096", "3");
-    let arguments = ["--estimator", "awv", "--model", "WN,WN+RW", "-j", "1"];
+    let arguments = ["--estimator", "awv", "--model", "WN,WN+RW", "-j", "1", "--plot", "choice.svg"];
     let output = choose(directory.path(), &arguments).success();
     let shown = String::from_utf8(output.get_output().stdout.clone()).unwrap();
     assert!(shown.starts_with("3 recordings cannot tell the candidates apart; awv WN+RW, 15"), "{shown}");
     assert!(shown.contains("judged by covariance analysis") && shown.lines().count() <= 20, "{shown}");
+    assert!(
+        shown.lines().filter(|line| line.starts_with("  ")).all(|line| line.chars().count() <= 120),
+        "{shown}"
+    );
+    let svg = std::fs::read_to_string(directory.path().join("choice.svg")).unwrap();
+    assert!(svg.contains("Log score against the best"), "{svg}");
 }
 
 /// The first sixteenth of one recording is its warm-up: left out, it is as if it had never been recorded, for the curves and

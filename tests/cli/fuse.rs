@@ -41,11 +41,12 @@ fn a_fusion_directory_holds_what_the_interface_says() {
     let place = recorded();
     let ran = done(
         place.path(),
-        "fuse rec/imu.csv rec/gnss.csv imu.toml --reference rec/reference.csv --outage 60:75 -o out",
+        "fuse rec/imu.csv rec/gnss.csv imu.toml --reference rec/reference.csv --outage 60:75 -o out --plot fused.svg",
     );
     assert!(ran.stderr.contains("from levelling at rest until"), "{}", ran.stderr);
     assert!(ran.stderr.contains("from the course of the fix at"), "{}", ran.stderr);
     assert!(ran.stdout.contains("15 fixes withheld"), "{}", ran.stdout);
+    assert!(fs::read_to_string(place.path().join("fused.svg")).unwrap().contains("Way"));
     let out = place.path().join("out");
     let header = fs::read_to_string(out.join("solution.csv")).unwrap().lines().next().unwrap().to_owned();
     assert!(header.starts_with(

@@ -21,6 +21,7 @@ mod choose;
 mod command_line;
 mod compare;
 mod datasheet;
+mod demo;
 mod design;
 mod efficiency;
 mod examples;

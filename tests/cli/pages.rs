@@ -92,8 +92,15 @@ fn wv_writes_a_page_and_a_picture_where_it_is_told() {
     done(dir, "wv static --page curves.html --plot curves.svg");
     is_whole(&text(&dir.join("curves.html")));
     assert!(text(&dir.join("curves.svg")).contains("Gyroscope"));
-    let ran = nav_sim(dir, "wv static --plot curves.png");
-    assert!(ran.code == 2 && ran.stderr.contains("name a file that ends in .svg"), "{}", ran.stderr);
+    for (name, hint) in [
+        ("curves.png", "--plot curves.svg, then: rsvg-convert --format png --output curves.png curves.svg"),
+        ("curves.PDF", "--plot curves.svg, then: rsvg-convert --format pdf --output curves.PDF curves.svg"),
+        ("curves", "name a file that ends in .svg"),
+    ] {
+        let ran = nav_sim(dir, &format!("wv static --plot {name}"));
+        let said = format!("error: --plot {name}: pictures are written as SVG\n\nhint: {hint}\n");
+        assert!(ran.code == 2 && ran.stderr.ends_with(&said), "{}", ran.stderr);
+    }
     let ran = nav_sim(dir, "wv static --page static/replicate_1.csv");
     assert!(ran.code == 2 && ran.stderr.contains("would be overwritten"), "{}", ran.stderr);
 }
@@ -109,10 +116,18 @@ fn runs_and_their_comparison_have_pages_with_the_numbers_of_their_results() {
     is_whole(&page);
     let summary: Value = serde_json::from_str(&text(&dir.join("I_awv/summary.json"))).unwrap();
     assert!(numbers_as_in(&page, &summary) > 40);
-    for word in ["GNSS", "start (1 σ)", "Reference trajectory", "NEES (9 if right)", "30–40 s"] {
+    for word in [
+        "GNSS",
+        "start (1 σ)",
+        "Reference trajectory",
+        "Percentiles of the horizontal",
+        "NEES (9 if right)",
+        "30–40 s",
+    ] {
         assert!(page.contains(word), "{word}");
     }
-    assert!(text(&dir.join("run.svg")).contains("Horizontal position error"));
+    let svg = text(&dir.join("run.svg"));
+    assert!(svg.contains("Horizontal position error") && svg.contains("Percentiles of the horizontal"));
     let ran = done(dir, "compare I_dr-awv --reference I_awv -o out/c.json --plot c.svg");
     assert!(ran.stderr.contains("wrote out/c.json, out/c.html"), "{}", ran.stderr);
     let page = text(&dir.join("out/c.html"));
@@ -136,11 +151,14 @@ fn tune_require_and_design_write_a_page_with_the_numbers_they_print() {
         ("design imu.toml --recordings 3 --hours 0.2 --draws 40", 2),
     ];
     for (k, (command, least)) in commands.into_iter().enumerate() {
-        let ran = nav_sim(dir, &format!("{command} --format json --page {k}.html"));
+        let ran = nav_sim(dir, &format!("{command} --format json --page {k}.html --plot {k}.svg"));
         assert!(ran.code == 0 || ran.code == 3, "{command}: {}", ran.stderr);
         assert!(ran.stderr.contains(&format!("wrote {k}.html")), "{}", ran.stderr);
         let page = text(&dir.join(format!("{k}.html")));
         is_whole(&page);
+        // what has no figure is an empty picture
+        let svg = text(&dir.join(format!("{k}.svg")));
+        assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n"), "{svg}");
         let numbers = numbers_as_in(&page, &serde_json::from_str(&ran.stdout).unwrap());
         assert!(numbers >= least, "{command}: {numbers}");
     }

@@ -11,5 +11,5 @@ pub use format::{duration, percent};
 pub(crate) use inference::notes_of_inference;
 pub use inference::undetermined;
 pub(crate) use notes::notes;
-pub use notes::{Share, axes_remark, correlation_time_s, shares, signals, worst_in_words};
+pub use notes::{Share, axes_remark, correlation_time_s, shares, signals};
 pub use ranking::reasons;

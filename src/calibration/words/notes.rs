@@ -163,8 +163,7 @@ fn misfit(outcome: &Outcome, rate_hz: f64) -> Option<String> {
 }
 
 /// `2.5 times the model's wavelet variance at 164 s (to the same side from 41 s to 330 s)`
-#[must_use]
-pub fn worst_in_words(outcome: &Outcome, worst: Miss, rate_hz: f64) -> String {
+fn worst_in_words(outcome: &Outcome, worst: Miss, rate_hz: f64) -> String {
     let (first, last) = outcome.stretch(worst);
     let range = if first == last {
         String::new()

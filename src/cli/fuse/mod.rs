@@ -5,13 +5,14 @@ mod output;
 
 use super::filter::FilterArgs;
 use super::parse::one_of;
+use super::pictures::PlotArgs;
 use super::run::{parse_outage, windows_of};
 use super::{Failure, Session, parse};
 use crate::earth::GravityModel;
 use crate::formats::fusion_files::FixSigma;
 use crate::fusion::alignment::Alignment;
 use crate::fusion::{self, Assessment, Recorded, Settings, Verdict};
-use crate::report::{FusionSummary, seconds};
+use crate::report::{FusionSummary, fusion_page, seconds};
 use crate::sensors::gnss::MAX_LEVER_ARM_M;
 use crate::sensors::outage::Outage;
 use crate::simulation::lincov::weak_heading;
@@ -91,6 +92,8 @@ pub(crate) struct Args {
     /// Rows of the solution a second
     #[arg(long, value_name = "HZ", default_value_t = 10.0, value_parser = parse::rate_hz)]
     rate_hz: f64,
+    #[command(flatten)]
+    plot: PlotArgs,
     /// Directory to make
     #[arg(long, short, value_name = "DIR", default_value = "out/fuse")]
     out: PathBuf,
@@ -101,6 +104,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let settings = settings(args)?;
     let inputs = Inputs::read(args, &settings, session)?;
     output::claim(&args.out, &inputs.files, session)?;
+    args.plot.guard(&inputs.files.iter().map(|i| PathBuf::from(&i.path)).collect::<Vec<_>>())?;
     let recorded = Recorded { imu: &inputs.imu.samples, gnss: &inputs.gnss };
     let settings = inputs::with_outages(settings, &recorded, session)?;
     let Alignment { start, doubts } = inputs.start(args, &recorded, &settings)?;
@@ -123,6 +127,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let summary = FusionSummary::of(&solution, (&outcome, &assessment), &start, rate_hz, states);
     let wall_s = begin.elapsed().as_secs_f64();
     output::write(&solution, &summary, inputs.files, wall_s, &args.out)?;
+    args.plot.write(|| fusion_page(&solution, &summary, &[]).svg(), session)?;
     session.show(|| crate::report::json(&summary), || summary.text());
     session.wrote(&args.out);
     believed(&assessment, &args.out, outcome.nis_per_component)

@@ -24,8 +24,8 @@ pub(super) use words::Words;
 
 /// Monte-Carlo INS/GNSS navigation along TRAJECTORY with MODEL in the filter
 ///
-/// Writes a run directory: epochs.csv (ASEE, RMSE, bias, NEES, coverage at 1 Hz), runs.csv, summary.json,
-/// report.html, manifest.json. The same seed gives the same noise to every model, so that runs can be
+/// Writes a run directory: epochs.csv (ASEE, RMSE, bias, NEES, coverage at 1 Hz), fan.csv (quantiles of the
+/// horizontal error), runs.csv, summary.json, report.html, manifest.json. The same seed gives the same noise to every model, so that runs can be
 /// compared pair by pair (see `nav-sim compare`).
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
@@ -136,7 +136,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let throughput_epochs_per_s = if wall_s > 0.0 { epochs / wall_s } else { 0.0 };
     let manifest = Manifest { independent_windows, wall_s, throughput_epochs_per_s, ..manifest };
     write(&found, &manifest, &TrajectorySeries::of(&inputs.job.trajectory), &args.out)?;
-    args.plot.write(|| crate::report::run_svg(&found.epochs, &found.summary), session)?;
+    args.plot.write(|| crate::report::run_svg(&found.epochs, &found.fan, &found.summary), session)?;
     let summary = &found.summary;
     let shown = match session.json() {
         true => crate::report::summary_json(summary, throughput_epochs_per_s),

@@ -55,7 +55,8 @@ pub(super) fn write(
     path: &Path,
 ) -> Result<(), Failure> {
     let mut directory = AtomicDir::create(path)?;
-    for file in report::run_directory(found.runs.as_ref(), &found.epochs, &found.summary, manifest, track) {
+    let Navigation { runs, epochs, fan, summary } = found;
+    for file in report::run_directory(runs.as_ref(), epochs, fan, summary, manifest, track) {
         directory.write_parts(file.name, file.parts)?;
     }
     Ok(directory.commit()?)

@@ -131,14 +131,16 @@ pub struct Quantile {
 /// values are independent, it runs between the order statistics at the same shares of the sample.
 #[must_use]
 pub fn quantile(sorted: &[f64], p: f64, windows: Option<f64>) -> Quantile {
-    let Some(last) = sorted.len().checked_sub(1) else {
-        return Quantile { value: f64::NAN, ci95: (None, None) };
-    };
+    Quantile { value: sample_quantile(sorted, p), ci95: order_statistic_interval(sorted, p, windows) }
+}
+
+/// The quantile alone; NaN of no value.
+pub(super) fn sample_quantile(sorted: &[f64], p: f64) -> f64 {
+    let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
     let position = p * last as f64;
     let below = position.floor() as usize;
     let above = (below + 1).min(last);
-    let value = sorted[below] + (position - below as f64) * (sorted[above] - sorted[below]);
-    Quantile { value, ci95: order_statistic_interval(sorted, p, windows) }
+    sorted[below] + (position - below as f64) * (sorted[above] - sorted[below])
 }
 
 /// x_(l) and x_(u), counted from 1, with P(B < l) ≤ 2.5 % and P(B ≥ u) ≤ 2.5 %, B binomial.

@@ -209,5 +209,6 @@ fn record(epochs: &[EpochMetrics], law: &ErrorLaw, outages: &[OutageMetrics]) ->
         nees_mean: mean(&|e| e.nees.value),
         covered: mean(&|e| e.coverage),
         normalised_sq: std::array::from_fn(|i| mean(&|e| (e.rmse.0[i].value / e.asee.0[i].value).powi(2))),
+        horizontal_m: Vec::new(),
     }
 }

@@ -10,6 +10,7 @@ mod consistency;
 mod epoch;
 mod estimate;
 mod expected;
+mod fan;
 mod outage;
 mod quadratic_form;
 mod ratio;
@@ -25,6 +26,7 @@ pub use consistency::{Band, chi_square_band, chi_square_interval, coverage_band}
 pub use epoch::{Accuracy, EpochMetrics, epochs};
 pub use estimate::{Estimate, PerState, Quantile, SampleSize, quantile};
 pub use expected::{Expected, horizontal_quantiles};
+pub use fan::{FAN_LEVELS, FanEpoch, expected_fan, fan};
 pub use outage::{OutageMetrics, Reconvergence, outages};
 pub use quadratic_form::QuadraticForm;
 pub use ratio::{ComparisonError, EpochRow, Measured, OutageComparison, RatioError, StateRatio, compare};

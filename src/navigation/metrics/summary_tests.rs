@@ -42,7 +42,7 @@ fn matched(runs: u64, epochs: usize) -> RunResult {
         fix_components: 6,
         coverage_level: 0.95,
         run_epochs: runs * 1000,
-        independent_windows: None,
+        ..RunResult::default()
     }
 }
 

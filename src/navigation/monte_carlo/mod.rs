@@ -22,9 +22,13 @@ pub fn run(
     runs: u64,
     progress: &(dyn Fn(u64) + Sync),
 ) -> Result<Vec<RunResult>, ExperimentError> {
-    let plan = Plan::new(experiment)?;
-    let results = run_range(&plan, 0, runs, &|| true, progress);
-    Ok(results.expect("nothing stops it"))
+    Ok(run_plan(&Plan::new(experiment)?, runs, progress))
+}
+
+/// The same of a planned experiment.
+#[must_use]
+pub fn run_plan(plan: &Plan<'_>, runs: u64, progress: &(dyn Fn(u64) + Sync)) -> Vec<RunResult> {
+    run_range(plan, 0, runs, &|| true, progress).expect("nothing stops it")
 }
 
 /// Runs `first..first + runs` of a planned experiment; `None` if `go_on`, asked before each batch of eight,
@@ -79,6 +83,7 @@ fn empty(plan: &Plan<'_>, filter_states: usize) -> RunResult {
     let experiment = plan.experiment();
     RunResult {
         outages: experiment.outages.iter().map(|o| (o.start_s, o.end_s)).collect(),
+        fan_t_s: plan.fan_t_s(),
         filter_states,
         fix_components: experiment.gnss.components(),
         coverage_level: experiment.coverage_level,

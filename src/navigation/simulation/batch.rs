@@ -50,7 +50,7 @@ pub fn run_batch(plan: &Plan<'_>, first: u64, live: usize) -> Vec<Batch> {
         }
         done = event.sample;
     }
-    candidates.into_iter().map(|c| c.finish(first)).collect()
+    candidates.into_iter().map(|c| c.finish(first, &plan.fan)).collect()
 }
 
 /// Everything random of eight runs.
@@ -168,6 +168,10 @@ pub(super) fn nominal_start(plan: &Plan<'_>, key: StreamKey<'_>) -> NavState {
     }
 }
 
+/// Runs whose horizontal error is kept over time: those after them would no longer move a quantile to be seen, and memory
+/// is bounded.
+const FAN_RUNS: u64 = 100_000;
+
 /// One filter on eight runs, and what is kept of it.
 struct Candidate {
     ekf: Ekf,
@@ -280,7 +284,8 @@ impl Candidate {
         }
     }
 
-    fn finish(self, first: u64) -> Batch {
+    /// `fan`: reports at which the horizontal error is kept.
+    fn finish(self, first: u64, fan: &[usize]) -> Batch {
         let diverged: [bool; LANES] = std::array::from_fn(|lane| {
             let finite = |e: &EpochLanes| {
                 e.nees[lane].is_finite() && e.see.iter().chain(&e.error).all(|value| value[lane].is_finite())
@@ -291,6 +296,11 @@ impl Candidate {
         let epochs = self.trace.iter().map(|e| e.sum(&kept)).collect();
         let reports = self.trace.len() as f64;
         let mean = |value: &dyn Fn(&EpochLanes) -> f64| self.trace.iter().map(value).sum::<f64>() / reports;
+        let horizontal = |lane: usize| {
+            let fan = if first + (lane as u64) < FAN_RUNS { fan } else { &[] };
+            let errors = fan.iter().map(|report| &self.trace[*report].error);
+            errors.map(|error| error[0][lane].hypot(error[1][lane]) as f32).collect()
+        };
         let record = |lane: usize| RunRecord {
             run: first + lane as u64,
             diverged: diverged[lane],
@@ -300,6 +310,7 @@ impl Candidate {
             nees_mean: mean(&|e| e.nees[lane]),
             covered: mean(&|e| f64::from(u8::from(e.covered[lane]))),
             normalised_sq: std::array::from_fn(|i| mean(&|e| (e.error[i][lane] / e.see[i][lane]).powi(2))),
+            horizontal_m: horizontal(lane),
         };
         Batch { epochs, runs: (0..self.live).map(record).collect() }
     }

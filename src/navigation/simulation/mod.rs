@@ -7,7 +7,7 @@ mod plan;
 mod recording;
 
 pub use batch::{Batch, run_batch};
-pub use plan::{Experiment, ExperimentError, Plan};
+pub use plan::{Experiment, ExperimentError, Plan, fan_epochs};
 pub use recording::{Recording, record};
 
 /// Number of reported navigation states: position, velocity (n, e, d), roll, pitch, yaw.
@@ -110,6 +110,9 @@ pub struct RunRecord {
     pub covered: f64,
     /// Mean over its reporting epochs of (error/SEE)² of each reported state.
     pub normalised_sq: [f64; REPORTED],
+    /// Its horizontal position error (m) at each of [`RunResult::fan_t_s`]; empty where it was not asked for, and of runs
+    /// after the first hundred thousand, which take 160 MB.
+    pub horizontal_m: Vec<f32>,
 }
 
 /// All runs of one experiment, reduced in run order.
@@ -117,6 +120,8 @@ pub struct RunRecord {
 pub struct RunResult {
     /// Reporting epochs in time order.
     pub epochs: Vec<EpochSums>,
+    /// Times (s) of the horizontal errors that are kept run by run; empty where they were not asked for.
+    pub fan_t_s: Vec<f64>,
     /// Runs in run order.
     pub runs: Vec<RunRecord>,
     /// Outages (start, end) in seconds on the trajectory.

@@ -138,6 +138,8 @@ pub struct Plan<'a> {
     pub(super) outages: Vec<(f64, usize)>,
     /// Quantile of the coverage statistic.
     pub(super) coverage_quantile: f64,
+    /// Reports at which the horizontal error is kept run by run.
+    pub(super) fan: Vec<usize>,
 }
 
 impl<'a> Plan<'a> {
@@ -180,7 +182,26 @@ impl<'a> Plan<'a> {
         let coverage_quantile = chi2.inverse_cdf(experiment.coverage_level);
         let start = trajectory.state(trajectory.start_s());
         let outages = experiment.outages.iter().map(|o| effects(o, &events)).collect();
-        Ok(Self { experiment, ideal, errors, start, events, outages, coverage_quantile })
+        Ok(Self { experiment, ideal, errors, start, events, outages, coverage_quantile, fan: Vec::new() })
+    }
+
+    /// The same with the horizontal error of every run kept over time, at [`fan_epochs`].
+    #[must_use]
+    pub fn with_fan(mut self) -> Self {
+        let times: Vec<f64> = self.reports().map(|e| e.t_s).collect();
+        self.fan = fan_epochs(&times, self.experiment.outages);
+        self
+    }
+
+    fn reports(&self) -> impl Iterator<Item = &Event> {
+        self.events.iter().filter(|e| e.report)
+    }
+
+    /// Times at which the horizontal error is kept run by run (s).
+    #[must_use]
+    pub fn fan_t_s(&self) -> Vec<f64> {
+        let times: Vec<f64> = self.reports().map(|e| e.t_s).collect();
+        self.fan.iter().map(|i| times[*i]).collect()
     }
 
     /// What was planned.
@@ -194,6 +215,21 @@ impl<'a> Plan<'a> {
     pub fn samples(&self) -> usize {
         self.ideal.len()
     }
+}
+
+/// Most reports of a fan, beside those around the ends of outages.
+const FAN_EPOCHS: usize = 400;
+
+/// Of reports at these times, those at which the horizontal error of every run is kept: every one, or every second,
+/// third …, so that they are few on a long drive, and those on both sides of the beginning and the end of each outage,
+/// between which errors are largest.
+#[must_use]
+pub fn fan_epochs(t_s: &[f64], outages: &[Outage]) -> Vec<usize> {
+    let step = t_s.len().div_ceil(FAN_EPOCHS).max(1);
+    let withheld: Vec<bool> = t_s.iter().map(|t| outages.iter().any(|o| o.withholds(*t))).collect();
+    let changes = |i: usize| withheld.get(i).zip(withheld.get(i + 1)).is_some_and(|(a, b)| a != b);
+    let is_kept = |i: &usize| i.is_multiple_of(step) || changes(*i) || i.checked_sub(1).is_some_and(changes);
+    (0..t_s.len()).filter(is_kept).collect()
 }
 
 fn effects(outage: &Outage, events: &[Event]) -> (f64, usize) {

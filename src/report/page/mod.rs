@@ -36,6 +36,8 @@ pub(crate) enum Tone {
 pub(crate) struct Page {
     title: String,
     body: String,
+    /// Its charts, in their order.
+    charts: Vec<Chart>,
 }
 
 impl Page {
@@ -47,9 +49,9 @@ impl Page {
             Tone::Doubtful => " doubtful",
             Tone::Bad => " bad",
         };
-        let (title, verdict) = (escape(title), escape(verdict));
-        let body = format!("<h1>{title}</h1>\n<p class=\"verdict{class}\">{verdict}</p>\n");
-        Self { title, body }
+        let (heading, verdict) = (escape(title), escape(verdict));
+        let body = format!("<h1>{heading}</h1>\n<p class=\"verdict{class}\">{verdict}</p>\n");
+        Self { title: title.to_owned(), body, charts: Vec::new() }
     }
 
     /// Begins a section.
@@ -88,6 +90,13 @@ impl Page {
     /// A chart and what is to be seen in it.
     pub(crate) fn chart(&mut self, chart: &Chart, caption: &str) {
         self.body += &figure(chart, caption);
+        self.charts.push(chart.clone());
+    }
+
+    /// Its figures, below one another, as an SVG file.
+    #[must_use]
+    pub(crate) fn svg(&self) -> String {
+        svg(&self.title, &self.charts)
     }
 
     /// Small charts side by side; one below the other on a phone.
@@ -95,6 +104,7 @@ impl Page {
         self.body += "<div class=\"charts\">\n";
         charts.iter().for_each(|chart| self.body += &figure(chart, ""));
         let _ = writeln!(self.body, "</div>\n<figcaption>{}</figcaption>", escape(caption));
+        self.charts.extend_from_slice(charts);
     }
 
     /// The last line of a page: what its figures were checked against, to which tolerance, by which test.
@@ -122,7 +132,7 @@ impl Page {
     /// The file.
     #[must_use]
     pub(crate) fn html(&self) -> String {
-        let Self { title, body } = self;
+        let (title, body) = (escape(&self.title), &self.body);
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              {GENERATOR}\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{title}</title>\n\

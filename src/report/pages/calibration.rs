@@ -2,9 +2,10 @@
 
 use super::wavelet::{band, curve, scale_axis, sensor_name, unit, variance_axis};
 use crate::calibration::{
-    Diagnosis, Goodness, Outcome, Practical, Settings, TurnOnSpread, Verdict, advice, shares, tau_s,
+    Diagnosis, Outcome, Practical, Settings, TurnOnSpread, Verdict, advice, shares, tau_s,
 };
 use crate::imu::Sensor;
+use crate::report::brief::fit_verdict;
 use crate::report::comparison::in_order;
 use crate::report::curves::{CurvesFile, FittedCurve};
 use crate::report::describe::meaning;
@@ -12,6 +13,7 @@ use crate::report::fits::interval_of;
 use crate::report::number::readable;
 use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, Table, Tone, svg};
 use crate::report::practical::{policy, practical_rows};
+use crate::report::short_names;
 use crate::report::turn_on::turn_on_remark;
 
 /// The page of the models of one estimator. `outcomes`: each with its place among all fits of the command; `curves`: of the
@@ -105,7 +107,7 @@ fn verdict(curves: &CurvesFile, outcomes: &[(usize, &Outcome)], diagnoses: &[Dia
         if goodness.is_some_and(|g| g.is_rejected()) {
             tone = Tone::Bad;
         }
-        let told = statement(fitted, goodness);
+        let told = fit_verdict(outcome, curves.rate_hz);
         match found.iter_mut().find(|(own, _)| *own == told) {
             Some((_, groups)) => groups.push(group_name(fitted)),
             None => found.push((told, vec![group_name(fitted)])),
@@ -121,42 +123,6 @@ fn verdict(curves: &CurvesFile, outcomes: &[(usize, &Outcome)], diagnoses: &[Dia
         parts.push(format!("Not like the other recordings: {}.", abnormal.join(", ")));
     }
     (tone, parts.join(" "))
-}
-
-/// What is said of one fit.
-fn statement(fitted: &FittedCurve, goodness: Option<Goodness>) -> String {
-    let test = goodness.map(|g| {
-        let word = if g.is_rejected() {
-            "the model does not describe the data"
-        } else {
-            "no evidence against the model"
-        };
-        format!("{word} (J-test p = {:.3})", g.p_value)
-    });
-    let far = match farthest(fitted) {
-        Some((tau, ratio)) => {
-            format!(
-                "data and model are farthest apart at {} s, where the data are {} times the model",
-                readable(tau),
-                readable(ratio)
-            )
-        }
-        None => "the 95 % band of the data holds the model at every scale".to_owned(),
-    };
-    test.into_iter().chain([far]).collect::<Vec<_>>().join("; ")
-}
-
-/// The scale at which the band of the data is farthest from the model, and data over model there; none where the band holds
-/// the model everywhere.
-fn farthest(fitted: &FittedCurve) -> Option<(f64, f64)> {
-    let distance = |i: usize| {
-        let model = fitted.implied.get(i)?;
-        let (low, high) = (fitted.ci_low.get(i)? / model, fitted.ci_high.get(i)? / model);
-        let distance = low.ln().max(-high.ln());
-        (distance > 0.0).then_some((distance, fitted.tau_s[i], fitted.wv[i] / model))
-    };
-    let all = (0..fitted.tau_s.len()).filter_map(distance);
-    all.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, tau, ratio)| (tau, ratio))
 }
 
 pub(super) fn chart(fitted: &FittedCurve, diagnoses: &[Diagnosis]) -> Chart {
@@ -195,7 +161,8 @@ fn recordings(fitted: &FittedCurve, diagnoses: &[Diagnosis]) -> Vec<Series> {
     if fitted.replicates.len() < 2 {
         return all;
     }
-    for replicate in &fitted.replicates {
+    let names = short_names(&fitted.replicates.iter().map(|r| r.file.as_str()).collect::<Vec<_>>());
+    for (replicate, name) in fitted.replicates.iter().zip(names) {
         let points = curve(&fitted.tau_s, &replicate.wv);
         if !is_abnormal(&replicate.file) {
             all.push(Series::thin("recordings", Colour::Soft, points));
@@ -204,8 +171,8 @@ fn recordings(fitted: &FittedCurve, diagnoses: &[Diagnosis]) -> Vec<Series> {
         if !abnormal.contains(&replicate.file.as_str()) {
             abnormal.push(&replicate.file);
         }
-        let hue = 3 + abnormal.iter().position(|name| *name == replicate.file).unwrap_or(0);
-        all.push(Series::thin(&format!("{} (abnormal)", replicate.file), Colour::Hue(hue), points));
+        let hue = 3 + abnormal.iter().position(|file| *file == replicate.file).unwrap_or(0);
+        all.push(Series::thin(&format!("{name} (abnormal)"), Colour::Hue(hue), points));
     }
     all
 }

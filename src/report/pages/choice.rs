@@ -11,7 +11,7 @@ use crate::simulation::NEES_DOF;
 
 /// The page.
 #[must_use]
-pub(crate) fn choice_page(report: &ChoiceReport<'_>) -> String {
+pub(crate) fn choice_page(report: &ChoiceReport<'_>) -> Page {
     let placed = &report.ranking.candidates;
     let tone = if report.ranking.tells { Tone::Good } else { Tone::Doubtful };
     let mut verdict = report.verdict();
@@ -36,7 +36,7 @@ pub(crate) fn choice_page(report: &ChoiceReport<'_>) -> String {
     if let Some(influence) = report.influence {
         decides(&mut page, report, influence);
     }
-    page.html()
+    page
 }
 
 /// Which scales and recordings decide.

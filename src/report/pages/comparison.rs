@@ -8,6 +8,7 @@ use crate::report::comparison::{
     with_times,
 };
 use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, Table, svg};
+use crate::report::short_names;
 use crate::simulation::{REPORTED, REPORTED_NAMES};
 
 /// How the ASEE of a run departs from that of the reference over time.
@@ -127,8 +128,14 @@ fn charts(
     let estimators = in_order(candidates.iter().map(|c| c.label.estimator.as_str()));
     let is_laid_out = estimators.len() > 1 && scenarios.len() <= SCENARIOS && !estimators.contains(&"");
     if !is_laid_out {
-        let own: Vec<Curve<'_>> =
-            all.iter().enumerate().map(|(hue, (c, curves))| Curve { name: &c.run, hue, curves }).collect();
+        let names = short_names(&all.iter().map(|(c, _)| c.run.as_str()).collect::<Vec<_>>());
+        let curves = all.iter().map(|(_, curves)| *curves);
+        let own: Vec<Curve<'_>> = names
+            .iter()
+            .zip(curves)
+            .enumerate()
+            .map(|(hue, (name, curves))| Curve { name, hue, curves })
+            .collect();
         return vec![chart("ASEE against the reference", &own, outages, states)];
     }
     let hue = |estimator: &str| estimators.iter().position(|e| *e == estimator).unwrap_or(0);

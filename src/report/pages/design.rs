@@ -6,7 +6,7 @@ use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, 
 
 /// The page.
 #[must_use]
-pub(crate) fn design_page(designs: &[Design]) -> String {
+pub(crate) fn design_page(designs: &[Design]) -> Page {
     let (tone, verdict) = verdict(designs);
     let mut page = Page::new("What recordings would tell", tone, &verdict);
     design_verdict(designs).lines().for_each(|line| page.text(&super::sentence(line)));
@@ -29,7 +29,7 @@ pub(crate) fn design_page(designs: &[Design]) -> String {
         "against recordings that were made and calibrated, 150 times, within four deviations of the scatter (27 %; \
          src/calibration/anticipated.rs).",
     );
-    page.html()
+    page
 }
 
 const BESIDE: &str =

@@ -8,11 +8,7 @@ use crate::report::fusion::FusionSummary;
 use crate::report::page::{Axis, Chart, Colour, Interval, Mark, Page, Panel, Series, Stroke};
 
 /// The page of a fusion directory.
-pub(crate) fn fusion_page(
-    solution: &Solution,
-    summary: &FusionSummary,
-    inputs: &[(String, String)],
-) -> String {
+pub(crate) fn fusion_page(solution: &Solution, summary: &FusionSummary, inputs: &[(String, String)]) -> Page {
     let outages = summary.windows();
     let mut page = Page::new(
         "INS/GNSS fusion of recorded data",
@@ -44,7 +40,7 @@ pub(crate) fn fusion_page(
         "fusions of simulated recordings are consistent with their own covariance, however the samples are split and the IMU is \
          mounted (tests/truth/fusion.rs).",
     );
-    page.html()
+    page
 }
 
 const POSITION: &str = "Standard deviation of the horizontal position that the filter states; with a reference, the distance from it.";

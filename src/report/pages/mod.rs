@@ -19,14 +19,14 @@ pub(crate) use choice::choice_page;
 pub(crate) use comparison::{RatioCurves, comparison_figure, comparison_page, comparison_svg};
 pub(crate) use design::design_page;
 pub(crate) use efficiency::{efficiency_page, efficiency_svg};
-pub(super) use fusion::fusion_page;
+pub(crate) use fusion::fusion_page;
 pub(crate) use paper::{PaperFigure, StudyCurves, paper_figures, paper_page};
 pub(crate) use require::{catalogue_page, model_page, needed_page};
 pub(super) use run::run_page;
 pub(crate) use run_charts::{run_svg, run_text};
 pub(crate) use study::study_page;
 pub(crate) use tune::tune_page;
-pub(crate) use wavelet::{wavelet_page, wavelet_svg, wavelet_text};
+pub(crate) use wavelet::{wavelet_page, wavelet_text};
 
 use super::number;
 use super::page::Tone;

@@ -14,7 +14,7 @@ const DRIFT: &str = "The error at the end of an outage against its length, at th
 
 /// The page of the IMU that is needed.
 #[must_use]
-pub(crate) fn needed_page(needed: &NeededImu, question: &Question) -> String {
+pub(crate) fn needed_page(needed: &NeededImu, question: &Question) -> Page {
     let mut page = Page::new("The IMU that a limit needs", Tone::Good, &sentence(&needed.verdict(question)));
     page.section("Figures, at most");
     page.text(
@@ -29,7 +29,7 @@ pub(crate) fn needed_page(needed: &NeededImu, question: &Question) -> String {
         page.table(&iso_table(&curve.points));
     }
     page.checked(CHECKED);
-    page.html()
+    page
 }
 
 const ISO_DRIFT: &str =
@@ -104,7 +104,7 @@ fn iso_table(points: &[(f64, Answer)]) -> Table {
 
 /// The page of what a given IMU makes of the limits; without margins, of the longest outage that it bridges.
 #[must_use]
-pub(crate) fn model_page(margins: Option<&Margins>, question: &Question, bridged: &Bridged) -> String {
+pub(crate) fn model_page(margins: Option<&Margins>, question: &Question, bridged: &Bridged) -> Page {
     let (tone, verdict) = match margins {
         Some(margins) => (Tone::from(margins.met()), margins_verdict(margins, question, bridged.longest)),
         None => {
@@ -133,7 +133,7 @@ pub(crate) fn model_page(margins: Option<&Margins>, question: &Question, bridged
         page.table(&parts(margins));
     }
     page.checked(CHECKED);
-    page.html()
+    page
 }
 
 fn drift_table(question: &Question, bridged: &Bridged) -> Table {
@@ -172,7 +172,7 @@ fn parts(margins: &Margins) -> Table {
 
 /// The page of a ranking.
 #[must_use]
-pub(crate) fn catalogue_page(units: &[RankedUnit], question: &Question) -> String {
+pub(crate) fn catalogue_page(units: &[RankedUnit], question: &Question) -> Page {
     let met: Vec<&str> = units.iter().filter(|u| u.is_met()).map(|u| u.name.as_str()).collect();
     let verdict = match met.as_slice() {
         [] => format!("No unit keeps the limits by figures that are all stated: {}.", question.in_words()),
@@ -206,7 +206,7 @@ pub(crate) fn catalogue_page(units: &[RankedUnit], question: &Question) -> Strin
     }
     page.table(&table);
     page.checked(CHECKED);
-    page.html()
+    page
 }
 
 /// Units beyond so many are drawn grey: more hues cannot be told apart.

@@ -1,9 +1,9 @@
 //! The page of a run directory.
 
-use super::run_charts::{budget_chart, horizontal, nees, states, windows};
+use super::run_charts::{budget_chart, fan_chart, horizontal, nees, states, windows};
 use super::{RMSE_AND_ASEE, STATES, tone, window};
 use crate::imu::Sensor;
-use crate::metrics::{Budget, EpochMetrics, OutageSummary, PerState, Summary};
+use crate::metrics::{Budget, EpochMetrics, FanEpoch, OutageSummary, PerState, Summary};
 use crate::report::manifest::Manifest;
 use crate::report::number::readable;
 use crate::report::page::{Cell, Page, Table};
@@ -17,6 +17,7 @@ const OUTAGES: usize = 3;
 /// The page of a run directory.
 pub(crate) fn run_page(
     epochs: &[EpochMetrics],
+    fan: &[FanEpoch],
     summary: &Summary,
     manifest: &Manifest,
     track: &TrajectorySeries,
@@ -29,6 +30,7 @@ pub(crate) fn run_page(
     page.facts(&assumptions(summary, manifest));
     page.chart(&track.map("Reference trajectory", &windows), "");
     page.chart(&horizontal(epochs, summary), HORIZONTAL);
+    page.chart(&fan_chart(fan, summary), &fan_caption(fan, summary));
     outages(summary, &mut page);
     page.section("Errors over time");
     page.charts(&states(epochs, &windows), RMSE_AND_ASEE);
@@ -46,6 +48,21 @@ pub(crate) fn run_page(
 const HORIZONTAL: &str = "Horizontal RMSE of the runs, and what the filter believes: its own standard deviation (ASEE, north and \
                           east together) and the range up to three times that. Dots: median of the runs at the end of an \
                           outage, the bar up to their 95 % quantile.";
+
+fn fan_caption(fan: &[FanEpoch], summary: &Summary) -> String {
+    let whose = if summary.runs > 0 {
+        "the runs' horizontal position errors"
+    } else {
+        "the horizontal position error by covariance analysis"
+    };
+    let beside = match fan.iter().any(|e| e.lincov_m.is_some()) {
+        true => " Dashed: 5, 50 and 95 % by covariance analysis.",
+        false => "",
+    };
+    format!(
+        "Quantiles of {whose} over time: half of all errors in the dark band, nine in ten in both.{beside} The numbers are in fan.csv."
+    )
+}
 
 fn requirements(summary: &Summary, page: &mut Page) {
     for met in &summary.require {

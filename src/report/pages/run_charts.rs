@@ -1,13 +1,13 @@
 //! The figures of a run.
 
 use super::STATES;
-use crate::metrics::{Budget, EpochMetrics, OutageSummary, Summary};
+use crate::metrics::{Budget, EpochMetrics, FanEpoch, OutageSummary, Summary};
 use crate::report::page::{Axis, Chart, Colour, Interval, Mark, Panel, Series, svg, terminal};
 
 /// What of it most people want as a picture.
 #[must_use]
-pub(crate) fn run_svg(epochs: &[EpochMetrics], summary: &Summary) -> String {
-    svg("Navigation errors", &[horizontal(epochs, summary), nees(epochs, summary)])
+pub(crate) fn run_svg(epochs: &[EpochMetrics], fan: &[FanEpoch], summary: &Summary) -> String {
+    svg("Navigation errors", &[horizontal(epochs, summary), fan_chart(fan, summary), nees(epochs, summary)])
 }
 
 /// The horizontal error over time for a terminal.
@@ -45,6 +45,27 @@ pub(super) fn horizontal(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
     ];
     let panel = Panel { height: 1.2, ..Panel::new(Axis::log("horizontal error (m)"), series) };
     timed("Horizontal position error", panel, &windows(summary))
+}
+
+/// Quantiles of the horizontal error over time, those of a covariance analysis beside the runs dashed.
+pub(super) fn fan_chart(fan: &[FanEpoch], summary: &Summary) -> Chart {
+    let between = |low: usize, high: usize| {
+        Mark::Band(fan.iter().map(|e| (e.t_s, e.quantiles_m[low], e.quantiles_m[high])).collect())
+    };
+    let median = fan.iter().map(|e| (e.t_s, e.quantiles_m[2])).collect();
+    let mut series = vec![
+        Series::new("5 to 95 %", Colour::REAL, between(0, 4)),
+        Series::new("25 to 75 %", Colour::REAL, between(1, 3)),
+        Series::line("median", Colour::REAL, median),
+    ];
+    if fan.iter().any(|e| e.lincov_m.is_some()) {
+        let expected = |i: usize| fan.iter().filter_map(|e| Some((e.t_s, e.lincov_m?[i]))).collect();
+        // the outermost and the median: five more lines would hide the bands
+        series
+            .extend([0, 2, 4].map(|i| Series::dashed("covariance analysis", Colour::BELIEVED, expected(i))));
+    }
+    let panel = Panel::new(Axis::log("horizontal error (m)"), series);
+    timed("Percentiles of the horizontal position error", panel, &windows(summary))
 }
 
 fn timed(title: &str, panel: Panel, outages: &[(f64, f64)]) -> Chart {

@@ -9,7 +9,7 @@ use crate::simulation::lincov::Honesty;
 
 /// The page.
 #[must_use]
-pub(crate) fn tune_page(result: &TuneResult) -> String {
+pub(crate) fn tune_page(result: &TuneResult) -> Page {
     let tone = if result.is_honest() { Tone::Good } else { Tone::Doubtful };
     let mut page = Page::new("Honest inflation of a noise model", tone, &super::sentence(&result.verdict()));
     page.facts(&[("truths", result.truths.join(", "))]);
@@ -27,7 +27,7 @@ pub(crate) fn tune_page(result: &TuneResult) -> String {
         "covariance analysis against 2000 Monte-Carlo runs (examples/README.md); sampled runs agree with the tuned filter's honesty \
          (tests/truth/tune.rs).",
     );
-    page.html()
+    page
 }
 
 const SWEEP: &str = "The tuned filter with all its variances times a factor (1: as tuned). NEES: the squared error in units of the \

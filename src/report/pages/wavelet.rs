@@ -2,9 +2,8 @@
 
 use crate::imu::Sensor;
 use crate::report::curves::{SignalCurves, SignalsFile};
-use crate::report::page::{
-    Axis, Chart, Colour, Mark, Page, Panel, Series, Table, Tone, beside, svg, terminal,
-};
+use crate::report::page::{Axis, Chart, Colour, Mark, Page, Panel, Series, Table, Tone, beside, terminal};
+use crate::report::short_names;
 
 /// The axis of scales.
 pub(super) fn scale_axis() -> Axis {
@@ -36,7 +35,7 @@ pub(super) fn band(tau_s: &[f64], low: &[f64], high: &[f64]) -> Mark {
 
 /// The page of the wavelet variances of some signals.
 #[must_use]
-pub(crate) fn wavelet_page(file: &SignalsFile) -> String {
+pub(crate) fn wavelet_page(file: &SignalsFile) -> Page {
     let worst = file.signals.iter().filter_map(|s| Some((excess(s)?, s)));
     let worst = worst.max_by(|a, b| a.0.1.total_cmp(&b.0.1));
     let (tone, verdict) = match worst {
@@ -72,13 +71,7 @@ pub(crate) fn wavelet_page(file: &SignalsFile) -> String {
         "wavelet variances to 1e-12, ends of intervals to 1e-9 of an independent implementation, relative \
          (tests/truth/calibration_truth.rs).",
     );
-    page.html()
-}
-
-/// The same as a picture.
-#[must_use]
-pub(crate) fn wavelet_svg(file: &SignalsFile) -> String {
-    svg("Wavelet variance of static recordings", &charts(file))
+    page
 }
 
 /// The robust wavelet deviations for a terminal, a plot a sensor: each axis with its letter.
@@ -125,14 +118,20 @@ const MOST: usize = 8;
 fn charts(file: &SignalsFile) -> Vec<Chart> {
     let mut charts: Vec<Chart> = Vec::new();
     let is_only_file = file.signals.windows(2).all(|pair| pair[0].file == pair[1].file);
+    let files = short_names(&file.signals.iter().map(|s| s.file.as_str()).collect::<Vec<_>>());
+    let name = |(s, file): (&SignalCurves, &String)| match is_only_file {
+        true => s.axis.clone(),
+        false => format!("{file} {}", s.axis),
+    };
     for sensor in Sensor::ALL {
-        let own: Vec<&SignalCurves> = file.signals.iter().filter(|s| s.sensor == sensor.name()).collect();
+        let own = file.signals.iter().zip(&files).filter(|(s, _)| s.sensor == sensor.name());
+        let own: Vec<(&SignalCurves, String)> = own.map(|(s, file)| (s, name((s, file)))).collect();
         let title = sensor_name(sensor.name());
         for (k, signals) in own.chunks(MOST).enumerate() {
             let series = signals
                 .iter()
                 .enumerate()
-                .flat_map(|(hue, s)| of_signal(s, is_only_file, Colour::Hue(hue)))
+                .flat_map(|(hue, (s, name))| of_signal(s, name, Colour::Hue(hue)))
                 .collect();
             let title = if k == 0 { title.to_owned() } else { format!("{title}, continued") };
             let panel = Panel { height: 1.4, ..Panel::new(variance_axis(sensor.name()), series) };
@@ -143,11 +142,10 @@ fn charts(file: &SignalsFile) -> Vec<Chart> {
 }
 
 /// Robust as a line in its band, classical dashed.
-fn of_signal(s: &SignalCurves, is_only_file: bool, colour: Colour) -> Vec<Series> {
-    let name = if is_only_file { s.axis.clone() } else { format!("{} {}", s.file, s.axis) };
+fn of_signal(s: &SignalCurves, name: &str, colour: Colour) -> Vec<Series> {
     vec![
-        Series::new(&name, colour, band(&s.tau_s, &s.robust.ci_low, &s.robust.ci_high)),
-        Series::line(&name, colour, curve(&s.tau_s, &s.robust.wv)),
+        Series::new(name, colour, band(&s.tau_s, &s.robust.ci_low, &s.robust.ci_high)),
+        Series::line(name, colour, curve(&s.tau_s, &s.robust.wv)),
         Series::dashed(&format!("{name}, classical"), colour, curve(&s.tau_s, &s.classical.wv)),
     ]
 }

@@ -42,7 +42,7 @@ fn what_is_not_to_be_believed_ends_with_3() {
     ] {
         let ran = nav_sim(place.path(), &format!("fuse rec/imu.csv rec/gnss.csv imu.toml {flags} -o out"));
         assert_eq!(ran.code, 3, "{flags}\n{}", ran.stderr);
-        assert!(ran.stdout.starts_with("verdict: not to be believed: "), "{}", ran.stdout);
+        assert!(ran.stdout.starts_with("verdict: overconfident and not to be believed: "), "{}", ran.stdout);
         assert!(ran.stdout.lines().next().unwrap().contains(why), "{flags}\n{}", ran.stdout);
         assert!(ran.stderr.contains("hint: "), "{}", ran.stderr);
         let summary: serde_json::Value =
@@ -51,7 +51,7 @@ fn what_is_not_to_be_believed_ends_with_3() {
         assert!(at("out/solution.csv").exists() && at("out/manifest.json").exists());
     }
     let ran = done(place.path(), "fuse rec/imu.csv rec/gnss.csv imu.toml -o out");
-    assert!(ran.stdout.starts_with("verdict: consistent with its fixes\n"), "{}", ran.stdout);
+    assert!(ran.stdout.starts_with("verdict: consistent with its fixes: NIS "), "{}", ran.stdout);
 }
 
 /// The reference with its yaw 20° off.

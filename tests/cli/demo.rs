@@ -1,0 +1,64 @@
+//! The demo, interrupted and gone on with.
+
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+/// A short demo into `out`, from the top of the repository.
+fn demo(out: &Path, more: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_nav-sim"));
+    command.current_dir(env!("CARGO_MANIFEST_DIR")).args([
+        "demo",
+        "--samples",
+        "100000",
+        "--runs",
+        "1",
+        "-o",
+    ]);
+    command.arg(out).args(more).arg("--no-progress").stdout(Stdio::null()).stderr(Stdio::piped());
+    command
+}
+
+/// Commands that are done, and the seed.
+fn progress(out: &Path) -> (u64, u64) {
+    let text = std::fs::read_to_string(out.join("demo.json")).unwrap_or_default();
+    let progress: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
+    ["commands_done", "seed"].map(|key| progress[key].as_u64().unwrap_or(0)).into()
+}
+
+/// Ended as soon as so many commands are done (by SIGTERM: tests may be started to ignore Ctrl-C); what was said.
+fn interrupted(mut child: Child, out: &Path, done: u64) -> String {
+    while progress(out).0 < done {
+        assert!(child.try_wait().unwrap().is_none(), "it ended before it was interrupted");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap();
+    let ended = child.wait_with_output().unwrap();
+    let said = String::from_utf8(ended.stderr).unwrap();
+    assert_eq!(ended.status.code(), Some(128 + 15), "{said}");
+    assert!(said.ends_with("hint: the same command goes on where it was\n"), "{said}");
+    said
+}
+
+/// Interrupted twice, it goes on with the seed that was drawn, and does nothing twice; a demo of another seed is refused.
+#[test]
+fn an_interrupted_demo_goes_on() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("out");
+    interrupted(demo(&out, &[]).spawn().unwrap(), &out, 2);
+    let (done, seed) = progress(&out);
+    assert!((2..17).contains(&done), "{done}");
+
+    let refused = demo(&out, &["--seed", "1"]).output().unwrap();
+    let said = String::from_utf8(refused.stderr).unwrap();
+    assert!(refused.status.code() == Some(2) && said.contains("is of a demo of another seed"), "{said}");
+
+    let said = interrupted(demo(&out, &[]).spawn().unwrap(), &out, done + 1);
+    assert!(said.contains(&format!("{done} of 17 commands are done, seed {seed}\n")), "{said}");
+    assert_eq!(progress(&out).1, seed);
+    let commands: Vec<&str> = said.lines().filter(|line| line.starts_with("$ ")).collect();
+    assert!(
+        !commands.is_empty() && !commands.iter().any(|c| c.ends_with("/I") || c.ends_with("/II")),
+        "{said}"
+    );
+}
