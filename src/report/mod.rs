@@ -1,4 +1,4 @@
-//! Results as files: tables, JSON, self-contained pages ([`page`]). It computes no statistic and touches no file:
+//! Results as files: tables, JSON, self-contained pages (`page`). It computes no statistic and touches no file:
 //! every function makes a text, the command line writes it.
 
 mod brief;

@@ -4,7 +4,7 @@
 //! A [`Study`] is the product of trajectories, truths, scenarios, receivers and outage sets: its *cells*.
 //! Candidates (noise models) and filter variants are the *columns* of a cell: all of them run on one draw
 //! of the noise, so that ratios between them are paired. The runs of a cell are cut into *units*; a unit is
-//! named by the hash of everything that decides its bytes ([`Plan::unit_id`]), so that finished work is
+//! named by the hash of everything that decides its bytes (`Plan::unit_id`), so that finished work is
 //! recognised wherever it was done, and work of another study never passes for it.
 //!
 //! ```text
