@@ -58,4 +58,9 @@ pub mod jobs;
 // All that most programs need.
 pub mod prelude;
 // Arguments, words and exit codes.
+#[allow(
+    rustdoc::broken_intra_doc_links,
+    rustdoc::invalid_html_tags,
+    reason = "help texts have sections of files and names to be filled in"
+)]
 pub mod cli;

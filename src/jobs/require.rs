@@ -156,7 +156,7 @@ impl Requirements {
         Ok((bridged, self.question(outages)))
     }
 
-    /// How units do after the outage and after those of 1 to 300 s, the best first: those that keep the limits, those
+    /// How units do after the outage and after those of `CURVE_S`, the best first: those that keep the limits, those
     /// that would if figures that are not stated were zero, those that do not.
     ///
     /// # Errors

@@ -38,6 +38,7 @@ pub struct Synthesis {
 
 /// Why there are no recordings.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SynthesisError {
     /// Parameters or a contamination that a recording cannot have.
     #[error(transparent)]
