@@ -35,8 +35,8 @@ pub(crate) fn brief(
             true => notes(o),
             false => axes_remark(o, rate_hz).into_iter().collect(),
         });
-        // that no recording is abnormal is said already
-        let told = usize::from(abnormal(diagnoses, sensor) == Some(0));
+        // that the recordings agree is said already
+        let told = usize::from(abnormal(diagnoses, sensor) == Some(0) && !differ(diagnoses, sensor));
         let others = advice(diagnoses, sensor).into_iter().skip(told).chain(notes);
         (first, others.map(|line| format!("{}: {line}", sensor.name())).collect::<Vec<_>>())
     };
@@ -79,10 +79,17 @@ fn abnormal(diagnoses: &[Diagnosis], sensor: Sensor) -> Option<usize> {
     can_tell.then(|| own().filter(|d| d.verdict != Verdict::Normal).count())
 }
 
+/// Whether the recordings of a sensor differ beyond their noise without one that stands out.
+fn differ(diagnoses: &[Diagnosis], sensor: Sensor) -> bool {
+    diagnoses.iter().any(|d| d.sensor == sensor && d.differing.is_some())
+}
+
 /// What the models are of: `6 recordings × 3 axes: 1 abnormal, axes differ.`; none of a curve.
 fn recordings(own: &[&Outcome], diagnoses: &[Diagnosis]) -> Option<String> {
     let first = own.iter().find(|o| o.recordings > 0)?;
-    let abnormal = abnormal(diagnoses, first.scope.sensor).map(|count| match count {
+    let sensor = first.scope.sensor;
+    let abnormal = abnormal(diagnoses, sensor).map(|count| match count {
+        0 if differ(diagnoses, sensor) => "none abnormal, but they differ".to_owned(),
         0 => "none abnormal".to_owned(),
         count => format!("{count} abnormal"),
     });
