@@ -12,7 +12,7 @@ use crate::ekf::FilterStates;
 use crate::formats::atomic::{AtomicDir, Found, claim_directory};
 use crate::formats::model_file::CalibrationNote;
 use crate::jobs::{self, Calibration, CalibrationOptions, ChoiceDrive, Chosen, EstimatorChoice, ModelFiles};
-use crate::report::{ChoiceReport, choice_page, columns, terminal_table};
+use crate::report::{ChoiceReport, choice_page, terminal_columns, terminal_table};
 use crate::scenario::Scenario;
 use crate::sensors::outage::Outage;
 use std::path::PathBuf;
@@ -119,7 +119,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 fn text(report: &ChoiceReport<'_>, session: &Session) -> String {
     let mut parts = vec![
         report.verdict().into_iter().chain(report.decisive_scales()).collect::<Vec<_>>().join("\n"),
-        format!("{}\n{}", columns(&report.rows()), report.legend()),
+        format!("{}\n{}", terminal_columns(&report.rows()), report.legend()),
     ];
     if session.verbose() {
         let more = [report.fold_rows(), report.recording_rows(), report.scale_rows()];

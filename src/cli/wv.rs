@@ -102,10 +102,8 @@ fn digest(file: &SignalsFile) -> String {
 }
 
 fn side_by_side(file: &SignalsFile) -> String {
-    let table = |(title, rows): (String, Vec<Vec<String>>)| {
-        let parts: Vec<String> = report::cut(&rows, 1).iter().map(|part| report::columns(part)).collect();
-        format!("{title}\n{}", parts.join("\n"))
-    };
+    let table =
+        |(title, rows): (String, Vec<Vec<String>>)| format!("{title}\n{}", report::terminal_columns(&rows));
     report::signals_per_file(file).into_iter().map(table).collect::<Vec<_>>().join("\n")
 }
 

@@ -35,7 +35,9 @@ pub(crate) fn brief(
             true => notes(o),
             false => axes_remark(o, rate_hz).into_iter().collect(),
         });
-        let others = advice(diagnoses, sensor).into_iter().chain(notes);
+        // that the recordings agree is said already
+        let told = usize::from(abnormal(diagnoses, sensor) == Some(0) && !differ(diagnoses, sensor));
+        let others = advice(diagnoses, sensor).into_iter().skip(told).chain(notes);
         (first, others.map(|line| format!("{}: {line}", sensor.name())).collect::<Vec<_>>())
     };
     let (mut lines, mut remarks) = (Vec::new(), Vec::new());
@@ -70,15 +72,26 @@ fn verdict(own: &[&Outcome], rate_hz: f64) -> Option<String> {
     }
 }
 
+/// Abnormal recordings of a sensor; none where they are too few to tell.
+fn abnormal(diagnoses: &[Diagnosis], sensor: Sensor) -> Option<usize> {
+    let own = || diagnoses.iter().filter(|d| d.sensor == sensor);
+    let can_tell = own().any(|d| !d.scores.is_empty());
+    can_tell.then(|| own().filter(|d| d.verdict != Verdict::Normal).count())
+}
+
+/// Whether the recordings of a sensor differ beyond their noise without one that stands out.
+fn differ(diagnoses: &[Diagnosis], sensor: Sensor) -> bool {
+    diagnoses.iter().any(|d| d.sensor == sensor && d.differing.is_some())
+}
+
 /// What the models are of: `6 recordings × 3 axes: 1 abnormal, axes differ.`; none of a curve.
 fn recordings(own: &[&Outcome], diagnoses: &[Diagnosis]) -> Option<String> {
     let first = own.iter().find(|o| o.recordings > 0)?;
-    let of_sensor = || diagnoses.iter().filter(|d| d.sensor == first.scope.sensor);
-    let abnormal = of_sensor().any(|d| !d.scores.is_empty()).then(|| {
-        match of_sensor().filter(|d| d.verdict != Verdict::Normal).count() {
-            0 => "none abnormal".to_owned(),
-            count => format!("{count} abnormal"),
-        }
+    let sensor = first.scope.sensor;
+    let abnormal = abnormal(diagnoses, sensor).map(|count| match count {
+        0 if differ(diagnoses, sensor) => "none abnormal, but they differ".to_owned(),
+        0 => "none abnormal".to_owned(),
+        count => format!("{count} abnormal"),
     });
     let axes = own.iter().any(|o| o.axes_differ.is_some()).then(|| "axes differ".to_owned());
     let found: Vec<String> = abnormal.into_iter().chain(axes).collect();

@@ -4,8 +4,6 @@ use super::markdown::markdown_table;
 
 /// Characters of a line that a table takes at most, where it can be cut.
 const WIDTH: usize = 120;
-/// Characters between two columns of a table in Markdown.
-const GAP: usize = 3;
 
 /// A table without lines, whose first row is its head.
 #[must_use]
@@ -18,21 +16,26 @@ pub(crate) fn columns(rows: &[Vec<String>]) -> String {
     rows.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
-/// A table in Markdown, cut as [`cut`] does.
+/// The same, cut where a line would be too long, each part with the first column.
 #[must_use]
-pub(crate) fn terminal_table(rows: &[Vec<String>], lead: usize) -> String {
-    cut(rows, lead).iter().map(|part| markdown_table(part)).collect::<Vec<_>>().join("\n\n")
+pub(crate) fn terminal_columns(rows: &[Vec<String>]) -> String {
+    cut(rows, 1, 2).iter().map(|part| columns(part)).collect::<Vec<_>>().join("\n\n")
 }
 
-/// A table as several that a terminal has room for, each with the first `lead` columns and at least one more.
+/// A table in Markdown, cut where a line would be too long, each part with the first `lead` columns.
 #[must_use]
-pub(crate) fn cut(rows: &[Vec<String>], lead: usize) -> Vec<Vec<Vec<String>>> {
+pub(crate) fn terminal_table(rows: &[Vec<String>], lead: usize) -> String {
+    cut(rows, lead, 3).iter().map(|part| markdown_table(part)).collect::<Vec<_>>().join("\n\n")
+}
+
+/// A table as several that a terminal has room for, with `gap` characters between two columns.
+fn cut(rows: &[Vec<String>], lead: usize, gap: usize) -> Vec<Vec<Vec<String>>> {
     let widths = widths(rows);
     let (leading, others): (Vec<usize>, Vec<usize>) = (0..widths.len()).partition(|column| *column < lead);
     if others.is_empty() {
         return vec![rows.to_vec()];
     }
-    let width = |columns: &[usize]| columns.iter().map(|c| widths[*c] + GAP).sum::<usize>() + 1;
+    let width = |columns: &[usize]| columns.iter().map(|c| widths[*c] + gap).sum::<usize>() + 1;
     let fits = |size: &usize| others.chunks(*size).all(|part| width(&leading) + width(part) - 1 <= WIDTH);
     let most = (1..=others.len()).rev().find(fits).unwrap_or(1);
     // as many columns in each as in the others, about: those of one state stay together
@@ -64,14 +67,15 @@ mod tests {
             std::iter::once(format!("{k:>10}")).chain(cells).collect::<Vec<String>>()
         };
         let rows: Vec<Vec<String>> = (0..3).map(row).collect();
-        let parts = cut(&rows, 1);
+        let parts = cut(&rows, 1, 3);
         assert_eq!(parts.iter().map(|part| part[0].len()).collect::<Vec<_>>(), [4, 4, 4]);
         assert!(parts.iter().all(|part| part.iter().zip(&rows).all(|(own, row)| own[0] == row[0])));
         let put_together: Vec<&String> = parts.iter().flat_map(|part| &part[2][1..]).collect();
         assert_eq!(put_together, rows[2][1..].iter().collect::<Vec<_>>());
-        assert!(terminal_table(&rows, 1).lines().all(|line| line.chars().count() <= WIDTH));
+        let is_narrow = |text: &str| text.lines().all(|line| line.chars().count() <= WIDTH);
+        assert!(is_narrow(&terminal_table(&rows, 1)) && is_narrow(&terminal_columns(&rows)));
         assert_eq!(terminal_table(&parts[0], 1), markdown_table(&parts[0]), "what has room is one table");
         // nothing can be done about a column that is wider than a terminal
-        assert_eq!(cut(&[vec!["a".repeat(100), "b".repeat(100)]], 1).len(), 1);
+        assert_eq!(cut(&[vec!["a".repeat(100), "b".repeat(100)]], 1, 3).len(), 1);
     }
 }

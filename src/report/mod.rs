@@ -38,7 +38,7 @@ mod warm_up;
 pub(crate) use brief::brief;
 pub(crate) use choose::{ChoiceReport, RankedPlace};
 pub(crate) use closure::TrajectoryCheck;
-pub(crate) use columns::{columns, cut, terminal_table};
+pub(crate) use columns::{columns, terminal_columns, terminal_table};
 pub(crate) use comparison::{
     CandidateResult, ComparisonFile, Label, consistency_rows, meaning_of_intervals, table_rows,
     verdict_lines, with_times,
