@@ -165,9 +165,6 @@ fn place(c: usize, candidate: &Contender, winner: usize, rivals: usize, folds: &
     };
     let density = paired(&|s| s.log_score);
     let (log_score, joint95) = (interval(&density, 0.05), interval(&density, 0.05 / rivals as f64).ci95);
-    let ratio = interval(&paired(&|s| s.rmse_m.ln()), 0.05);
-    let percent = |ln: f64| 100.0 * ln.exp_m1();
-    let rmse_pct = Mean { value: percent(ratio.value), ci95: (percent(ratio.ci95.0), percent(ratio.ci95.1)) };
     let root_mean_square =
         |values: Vec<f64>| (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt();
     let fold = |(recording, fold): &(String, Fold)| FoldScore {
@@ -187,11 +184,29 @@ fn place(c: usize, candidate: &Contender, winner: usize, rivals: usize, folds: &
         log_score: interval(&per_recording(&|s| s.log_score), 0.05),
         rmse_m: root_mean_square(per_recording(&|s| s.rmse_m)),
         believed_m: root_mean_square(per_recording(&|s| s.believed_m)),
-        nees: interval(&per_recording(&|s| s.nees), 0.05),
+        nees: positive(interval(&per_recording(&|s| s.nees), 0.05)),
         coverage: coverage.map(|all| all.iter().sum::<f64>() / all.len() as f64),
-        difference: Difference { log_score, joint95, rmse_pct },
+        difference: Difference { log_score, joint95, rmse_pct: rmse_ratio_pct(c, winner, folds) },
         folds: folds.iter().map(fold).collect(),
     }
+}
+
+/// The RMSE over all recordings against that of the winner (%). The interval is that of the mean of what each recording adds to the
+/// logarithm of the ratio (its derivative with respect to the recording's weight).
+fn rmse_ratio_pct(c: usize, winner: usize, folds: &[(String, Fold)]) -> Mean {
+    let square = |of: usize, fold: &Fold| fold.scores[of].rmse_m.powi(2);
+    let mean = |of: usize| folds.iter().map(|(_, f)| square(of, f)).sum::<f64>() / folds.len() as f64;
+    let (own, best) = (mean(c), mean(winner));
+    let added = |(_, f): &(String, Fold)| 0.5 * (square(c, f) / own - square(winner, f) / best);
+    let spread = interval(&folds.iter().map(added).collect::<Vec<_>>(), 0.05);
+    let percent = |more: f64| 100.0 * (0.5 * (own / best).ln() + more).exp_m1();
+    Mean { value: percent(0.0), ci95: (percent(spread.ci95.0), percent(spread.ci95.1)) }
+}
+
+/// The interval of what cannot be negative: that of its logarithm.
+fn positive(Mean { value, ci95 }: Mean) -> Mean {
+    let factor = ((ci95.1 - value) / value).exp();
+    Mean { value, ci95: (value / factor, value * factor) }
 }
 
 /// Mean of values, one a recording, and its interval at level 1 − `alpha`. Models of different folds share all but two

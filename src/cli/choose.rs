@@ -107,8 +107,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         seed,
     };
     write(args, &chosen, &report, seed)?;
-    args.plot.write(|| choice_page(&report).svg(), session)?;
     session.show(|| report.json(), || text(&report, session));
+    args.plot.write(|| choice_page(&report).svg(), session)?;
     session.printer.say(&format!(
         "wrote {0}: report.html, ranking.json, model.toml (nav-sim export {0}/model.toml)",
         args.out.display()

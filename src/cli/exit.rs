@@ -99,7 +99,7 @@ pub(crate) const fn option_for(setting: Setting) -> &'static str {
         Setting::Skip => "a smaller --skip-s",
         Setting::Origin => "give --origin LAT_DEG,LON_DEG,H_M",
         Setting::Output => "choose another output with --out",
-        Setting::Force => "choose another place with --out, or replace it with --force",
+        Setting::Force => "name another place for it, or replace it with --force",
         Setting::OutputDirectory => "choose another directory with --out",
         Setting::RemoveLine => {
             "remove the line, and give --gaps ignore or --gaps split for the gap that it leaves"

@@ -14,7 +14,7 @@ pub(super) struct PlotArgs {
 }
 
 impl PlotArgs {
-    /// Refuses a picture that is an input, or of another form.
+    /// Refuses a picture that is an input or cannot be made, or of another form.
     pub(super) fn guard(&self, inputs: &[PathBuf]) -> Result<(), Failure> {
         let Some(path) = &self.plot else { return Ok(()) };
         let svg = path.with_extension("svg");
@@ -29,7 +29,7 @@ impl PlotArgs {
                 _ => "name a file that ends in .svg".to_owned(),
             }));
         }
-        Ok(atomic::guard_inputs(path, inputs.iter().map(PathBuf::as_path))?)
+        writable(path, inputs)
     }
 
     /// Writes the picture, if one is asked for.
@@ -49,10 +49,9 @@ pub(super) struct PageArgs {
 }
 
 impl PageArgs {
-    /// Refuses a page or a picture that is an input, and a picture of another form.
+    /// Refuses a page or a picture that is an input or cannot be made, and a picture of another form.
     pub(super) fn guard(&self, inputs: &[PathBuf]) -> Result<(), Failure> {
-        let mut pages = self.page.iter();
-        pages.try_for_each(|page| atomic::guard_inputs(page, inputs.iter().map(PathBuf::as_path)))?;
+        self.page.iter().try_for_each(|page| writable(page, inputs))?;
         self.plot.guard(inputs)
     }
 
@@ -65,6 +64,13 @@ impl PageArgs {
         write_asked(self.page.as_deref(), || page.html(), session)?;
         self.plot.write(|| page.svg(), session)
     }
+}
+
+/// Whether a file can be made, found out before the work.
+fn writable(path: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
+    atomic::guard_inputs(path, inputs.iter().map(PathBuf::as_path))?;
+    drop(atomic::AtomicFile::create(path)?);
+    Ok(())
 }
 
 fn write_asked(

@@ -166,12 +166,11 @@ fn sought(args: &Args, asked: &Requirements, session: &Session) -> Result<(), Fa
         format!("{}\n\n{}", needed.verdict(&question), tables.join("\n\n"))
     };
     session.show(|| needed.json(&question), text);
-    args.pictures.write(|| needed_page(&needed, &question), session)?;
     if let Some(out) = &args.out {
         model_file::write(out, &asked.model_file(&needed.imu, &question), session.existing())?;
         session.wrote(out);
     }
-    Ok(())
+    args.pictures.write(|| needed_page(&needed, &question), session)
 }
 
 /// What a given IMU makes of the limits.

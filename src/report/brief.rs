@@ -126,12 +126,23 @@ pub(super) fn fit_verdict(outcome: &Outcome, rate_hz: f64) -> String {
             departure.scales
         );
     }
-    let off = departure
-        .furthest
-        .map_or(String::new(), |m| format!(": at most {} off, at {}", percent((m.ratio - 1.0).abs()), at(m)));
+    if let (None, Some(least)) = (goodness, departure.least_likely.filter(|_| departure.chance < IMPOSSIBLE))
+    {
+        let (ratio, at) = (readable(least.ratio), at(least));
+        return format!("{spec} does not fit as a whole: data/model is {ratio} at {at}");
+    }
+    let known = departure.known_to.map_or(String::new(), |level| {
+        format!(", of the scales known to 10 % (up to {})", duration(tau_s(level, rate_hz)))
+    });
+    let off = departure.furthest.map_or(String::new(), |m| {
+        format!(": at most {} off, at {}{known}", percent((m.ratio - 1.0).abs()), at(m))
+    });
     let word = if goodness.is_some_and(|g| g.is_rejected()) { "does not fit as a whole" } else { "fits" };
     format!("{spec} {word}{test}{off}")
 }
+
+/// Probability of the scores of all scales together below which a model is not said to fit, where no J-test was made.
+const IMPOSSIBLE: f64 = 1e-4;
 
 /// Rows for a parameter each.
 fn full(outcomes: &[Outcome], rate_hz: f64) -> Vec<Vec<String>> {

@@ -39,20 +39,23 @@ pub(crate) fn intervals(
         let is_zero = outcome.fit.zero.contains(&i);
         let lost = if is_zero { 1.0 } else { 1.0 - there.len() as f64 / fits.len() as f64 };
         let first = intervals.len();
+        let mut quantiles = Vec::new();
         for (p, (&parameter, value)) in process.kind().parameters().iter().zip(process.values()).enumerate() {
             let of = ParameterRef { process: i, parameter };
             if spec.is_fixed(of) {
                 continue;
             }
             let drawn = there.iter().map(|process| process.values()[p]).collect();
+            let draws = Draws::new(parameter, drawn, stretch);
             let [low, high] = match lost {
                 // The quantile is that of what has vanished.
                 lost if lost > TAIL => [f64::NAN; 2],
-                _ => holding(value, either_way(parameter, value, drawn, stretch)),
+                _ => holding(value, draws.around(value)),
             };
             // The intervals of a parameter that is bounded end there.
             let (from, to) = spec.range(of);
             let [low, high] = [low, high].map(|end: f64| end.clamp(from, to));
+            quantiles.push(draws.stretched().map(|end| end.clamp(from, to)));
             let absent = match lost {
                 1.0.. => Some(Undetermined::Zero),
                 lost if lost > TAIL => Some(Undetermined::Vanishes),
@@ -71,6 +74,9 @@ pub(crate) fn intervals(
         };
         if own.iter().any(open) {
             own.iter_mut().for_each(|i| i.refuse(Undetermined::Open));
+        }
+        for (interval, quantiles) in own.iter_mut().zip(quantiles).filter(|(i, _)| i.absent.is_none()) {
+            [interval.low, interval.high] = hull([interval.low, interval.high], quantiles);
         }
     }
     intervals
@@ -149,29 +155,19 @@ fn log_time(process: &Process) -> f64 {
     }
 }
 
-/// The 95 % interval of a parameter from draws around its estimate.
+/// Both together. A process that is hardly told from the others is shown only where its estimate is large, and then the
+/// draws, which show it smaller than it was estimated, are mirrored to what is larger still: its interval holds them too.
+const fn hull(mirrored: [f64; 2], quantiles: [f64; 2]) -> [f64; 2] {
+    [mirrored[0].min(quantiles[0]), mirrored[1].max(quantiles[1])]
+}
+
+/// What draws around an estimate say of its parameter.
 ///
 /// Amplitudes and correlation times are scale parameters: estimate over truth is distributed as draw over estimate, whatever
-/// the truth. So the ends are estimate²/draw at the quantiles of the draws (exact for a variance whose estimate
+/// the truth. So the ends of an interval are estimate²/draw at the quantiles of the draws (exact for a variance whose estimate
 /// is a chi-square; the same as the quantiles themselves where the draws are symmetric in the logarithm); theta
 /// of MA1 likewise with differences. The distances of the quantiles from the median are multiplied by `stretch`. Where
 /// the estimate or a quantile is at the bound, 0, the ends are the quantiles themselves.
-fn interval(parameter: Parameter, estimate: f64, drawn: Vec<f64>, stretch: f64) -> [f64; 2] {
-    let draws = Draws::new(parameter, drawn, stretch);
-    draws.mirrored(estimate).unwrap_or(draws.quantiles)
-}
-
-/// The interval of a parameter of a sum of processes: [`interval`] and the quantiles of the draws together. A process that is
-/// hardly told from the others is shown only where its estimate is large, and then the draws, which show it smaller
-/// than it was estimated, would be mirrored to what is larger still.
-fn either_way(parameter: Parameter, estimate: f64, drawn: Vec<f64>, stretch: f64) -> [f64; 2] {
-    let draws = Draws::new(parameter, drawn, stretch);
-    let [low, high] = draws.stretched();
-    let [from, to] = draws.mirrored(estimate).unwrap_or([low, high]);
-    [low.min(from), high.max(to)]
-}
-
-/// Sorted draws of a parameter.
 struct Draws {
     parameter: Parameter,
     quantiles: [f64; 2],
@@ -214,6 +210,11 @@ impl Draws {
         if ends.iter().all(|e| e.is_finite()) { ends } else { self.quantiles }
     }
 
+    /// The 95 % interval.
+    fn around(&self, estimate: f64) -> [f64; 2] {
+        self.mirrored(estimate).unwrap_or(self.quantiles)
+    }
+
     /// The quantiles mirrored at the estimate; none where it or one of them is at a bound.
     fn mirrored(&self, estimate: f64) -> Option<[f64; 2]> {
         let centre = 2.0 * self.scale(estimate) - self.scale(self.median);
@@ -223,11 +224,11 @@ impl Draws {
     }
 }
 
-/// The 95 % interval of what is positive and follows from the parameters, from what follows from the models of draws:
-/// as that of an amplitude.
+/// The 95 % interval of what is positive and follows from a whole model, from what follows from the models of draws:
+/// as that of an amplitude. Such a figure is there whatever the model, not shown because it came out large.
 #[must_use]
 pub fn derived_interval(estimate: f64, drawn: Vec<f64>, stretch: f64) -> [f64; 2] {
-    interval(Parameter::Sigma2, estimate, drawn, stretch)
+    Draws::new(Parameter::Sigma2, drawn, stretch).around(estimate)
 }
 
 /// The 95 % interval of a positive quantity that some of `draws` draws have; none where more of them lack it than the
@@ -236,8 +237,9 @@ pub(crate) fn scale_interval(estimate: f64, drawn: Vec<f64>, draws: usize, stret
     if (drawn.len() as f64) < (1.0 - TAIL) * draws as f64 || drawn.is_empty() {
         return None;
     }
-    let ends = holding(estimate, interval(Parameter::Sigma2, estimate, drawn, stretch));
-    ends.iter().all(|end| end.is_finite()).then_some(ends)
+    let draws = Draws::new(Parameter::Sigma2, drawn, stretch);
+    let ends = holding(estimate, draws.around(estimate));
+    ends.iter().all(|end| end.is_finite()).then(|| hull(ends, draws.stretched()))
 }
 
 /// Probability beyond either end of a 95 % interval.
@@ -328,13 +330,13 @@ mod tests {
         let mut generator = StreamKey { seed: 1, scenario: "", run: 0, source: "", process: "" }.generator();
         let law = ChiSquared::new(8.0).unwrap();
         let drawn = (0..4000).map(|_| 3.0 * generator.sample(law) / 8.0).collect();
-        let [low, high] = interval(Parameter::Sigma2, 3.0, drawn, 1.0);
+        let [low, high] = Draws::new(Parameter::Sigma2, drawn, 1.0).around(3.0);
         assert!(
             (low / (24.0 / 17.53) - 1.0).abs() < 0.064 && (high / (24.0 / 2.18) - 1.0).abs() < 0.125,
             "{low} {high}"
         );
-        assert_eq!(interval(Parameter::Sigma2, 0.0, vec![0.0, 0.0, 1.0], 1.0), [0.0, 1.0]);
-        let [low, high] = interval(Parameter::Phi, 0.9, vec![0.85, 0.9, 0.93], 1.0);
+        assert_eq!(Draws::new(Parameter::Sigma2, vec![0.0, 0.0, 1.0], 1.0).around(0.0), [0.0, 1.0]);
+        let [low, high] = Draws::new(Parameter::Phi, vec![0.85, 0.9, 0.93], 1.0).around(0.9);
         assert!(0.0 < low && low < 0.9 && 0.9 < high && high < 1.0, "{low} {high}");
     }
 
@@ -343,14 +345,18 @@ mod tests {
     #[test]
     fn the_interval_of_a_parameter_holds_the_draws_and_their_mirror_image() {
         let drawn: Vec<f64> = (-100..=100).map(|k| 0.25 * f64::from(k).mul_add(0.01, 0.0).exp2()).collect();
-        let [low, high] = either_way(Parameter::Sigma2, 1.0, drawn.clone(), 1.0);
+        let both = |stretch| {
+            let draws = Draws::new(Parameter::Sigma2, drawn.clone(), stretch);
+            hull(draws.around(1.0), draws.stretched())
+        };
+        let [low, high] = both(1.0);
         // quantiles 0.025 and 0.975 of 201: the fifth from either end
         let tail = 0.96_f64.exp2();
         assert!(
             (low * 4.0 * tail - 1.0).abs() < 0.01 && (high / (4.0 * tail) - 1.0).abs() < 0.01,
             "{low} {high}"
         );
-        let [low, high] = either_way(Parameter::Sigma2, 1.0, drawn, 1.5);
+        let [low, high] = both(1.5);
         let tail = tail.powf(1.5);
         assert!(
             (low * 4.0 * tail - 1.0).abs() < 0.01 && (high / (4.0 * tail) - 1.0).abs() < 0.01,

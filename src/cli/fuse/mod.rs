@@ -127,9 +127,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let summary = FusionSummary::of(&solution, (&outcome, &assessment), &start, rate_hz, states);
     let wall_s = begin.elapsed().as_secs_f64();
     output::write(&solution, &summary, inputs.files, wall_s, &args.out)?;
-    args.plot.write(|| fusion_page(&solution, &summary, &[]).svg(), session)?;
     session.show(|| crate::report::json(&summary), || summary.text());
     session.wrote(&args.out);
+    args.plot.write(|| fusion_page(&solution, &summary, &[]).svg(), session)?;
     believed(&assessment, &args.out, outcome.nis_per_component)
 }
 

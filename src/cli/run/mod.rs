@@ -136,13 +136,13 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let throughput_epochs_per_s = if wall_s > 0.0 { epochs / wall_s } else { 0.0 };
     let manifest = Manifest { independent_windows, wall_s, throughput_epochs_per_s, ..manifest };
     write(&found, &manifest, &TrajectorySeries::of(&inputs.job.trajectory), &args.out)?;
-    args.plot.write(|| crate::report::run_svg(&found.epochs, &found.fan, &found.summary), session)?;
     let summary = &found.summary;
     let shown = match session.json() {
         true => crate::report::summary_json(summary, throughput_epochs_per_s),
         false => run_words::text(summary),
     };
     session.printer.result(shown.trim_end());
+    args.plot.write(|| crate::report::run_svg(&found.epochs, &found.fan, &found.summary), session)?;
     if throughput_epochs_per_s > 0.0 {
         session.printer.say(&format!("{:.2} million IMU epochs/s", throughput_epochs_per_s / 1e6));
     }

@@ -111,7 +111,7 @@ pub struct RunRecord {
     /// Mean over its reporting epochs of (error/SEE)² of each reported state.
     pub normalised_sq: [f64; REPORTED],
     /// Its horizontal position error (m) at each of [`RunResult::fan_t_s`]; empty where it was not asked for, and of runs
-    /// after the first hundred thousand, which take 160 MB.
+    /// after the first hundred thousand, which take 160 MB where outages are few.
     pub horizontal_m: Vec<f32>,
 }
 

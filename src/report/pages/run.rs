@@ -59,8 +59,12 @@ fn fan_caption(fan: &[FanEpoch], summary: &Summary) -> String {
         true => " Dashed: 5, 50 and 95 % by covariance analysis.",
         false => "",
     };
+    let left_out = match summary.diverged {
+        0 => String::new(),
+        n => format!(" The {n} runs that diverged are left out."),
+    };
     format!(
-        "Quantiles of {whose} over time: half of all errors in the dark band, nine in ten in both.{beside} The numbers are in fan.csv."
+        "Quantiles of {whose} over time: half of all errors in the dark band, nine in ten in both.{beside}{left_out} The numbers are in fan.csv."
     )
 }
 
