@@ -126,10 +126,13 @@ pub(super) fn fit_verdict(outcome: &Outcome, rate_hz: f64) -> String {
             departure.scales
         );
     }
-    if let (None, Some(least)) = (goodness, departure.least_likely.filter(|_| departure.chance < IMPOSSIBLE))
-    {
-        let (ratio, at) = (readable(least.ratio), at(least));
-        return format!("{spec} does not fit as a whole: data/model is {ratio} at {at}");
+    let impossible = departure.doubtful.filter(|_| goodness.is_none() && departure.chance < IMPOSSIBLE);
+    if let Some(worst) = impossible {
+        return format!(
+            "{spec} does not fit as a whole: data/model is {} at {}",
+            readable(worst.ratio),
+            at(worst)
+        );
     }
     let known = departure.known_to.map_or(String::new(), |level| {
         format!(", of the scales known to 10 % (up to {})", duration(tau_s(level, rate_hz)))

@@ -40,8 +40,8 @@ pub struct Departure {
     pub furthest: Option<Miss>,
     /// The longest of these scales, where there are longer ones.
     pub known_to: Option<u32>,
-    /// The scale that noise explains least.
-    pub least_likely: Option<Miss>,
+    /// Of the scales that are off by more than two deviations, the one with the ratio furthest from 1.
+    pub doubtful: Option<Miss>,
     /// Probability of scores at least as far off together, where the model holds: their squares as a chi-square of as many
     /// degrees of freedom as scales. That parameters were fitted makes it larger, that neighbours hang together smaller.
     pub chance: f64,
@@ -79,11 +79,11 @@ impl Outcome {
         let furthest = furthest(if known.is_empty() { &all } else { &known });
         let longest =
             known.last().map(|m| m.level).filter(|level| all.last().is_some_and(|m| m.level > *level));
-        let least_likely =
-            all.iter().copied().max_by(|a, b| a.deviations.abs().total_cmp(&b.deviations.abs()));
+        let off: Vec<Miss> = all.iter().copied().filter(|m| m.deviations.abs() > DOUBTFUL).collect();
+        let doubtful = self::furthest(&off);
         let squares: f64 = all.iter().map(|m| m.deviations * m.deviations).sum();
         let chance = ChiSquared::new(all.len().max(1) as f64).map_or(1.0, |law| law.sf(squares));
-        Departure { scales: all.len(), missed, furthest, known_to: longest, least_likely, chance }
+        Departure { scales: all.len(), missed, furthest, known_to: longest, doubtful, chance }
     }
 
     /// First and last level of the stretch around a miss that is off to the same side.
