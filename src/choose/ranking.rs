@@ -241,6 +241,27 @@ mod tests {
         Fold { expected: None, scores, windows: 16 }
     }
 
+    /// What stands beside one another agrees: the ratio is that of the RMSE shown, though the mean of the recordings' own
+    /// ratios is on the other side (RMSE 10 and 1 against 9 and 2: √(101/85) = 1.09, the geometric mean 0.745). Of two recordings the
+    /// interval by hand: each adds ½(100/50.5 − 81/42.5) = ±0.0372 to the logarithm, so that a half width is
+    /// t √(2 · 0.0372² (1/2 + 1)) with t = 12.706 of one degree of freedom. What is positive has positive intervals.
+    #[test]
+    fn the_ratio_of_the_rmse_is_that_of_the_rmse_shown() {
+        let with = |rmse_m: [f64; 2]| {
+            let scores = rmse_m.map(|rmse_m| Score { rmse_m, ..fold(&[0.0]).scores[0].clone() }).to_vec();
+            Fold { scores, ..fold(&[]) }
+        };
+        let folds = [("a".to_owned(), with([10.0, 9.0])), ("b".to_owned(), with([1.0, 2.0]))];
+        let Mean { value, ci95 } = rmse_ratio_pct(0, 1, &folds);
+        assert!((value - 100.0 * ((101.0_f64 / 85.0).sqrt() - 1.0)).abs() < 1e-9, "{value}");
+        let added = 0.5 * (100.0 / 50.5 - 81.0 / 42.5);
+        let half = 12.706_204_7 * (2.0 * f64::powi(added, 2) * 1.5).sqrt();
+        let high = 100.0 * ((101.0_f64 / 85.0).sqrt() * half.exp() - 1.0);
+        assert!((ci95.1 / high - 1.0).abs() < 1e-6 && ci95.0 > -100.0, "{ci95:?} {high}");
+        let nees = positive(Mean { value: 30.0, ci95: (-20.0, 80.0) });
+        assert!(nees.ci95.0 > 0.0 && (nees.ci95.0 * nees.ci95.1 / 900.0 - 1.0).abs() < 1e-12, "{nees:?}");
+    }
+
     fn ranked(estimators: &[Estimator], folds: &[&[f64]]) -> Ranking {
         let candidates: Vec<Contender> =
             estimators.iter().map(|e| Contender::from(&Candidate::new(*e, "WN".parse().unwrap()))).collect();

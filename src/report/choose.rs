@@ -158,6 +158,9 @@ impl ChoiceReport<'_> {
         let against = |mean: &Mean| {
             if is_winner {
                 "–".to_owned()
+            } else if mean.value.is_infinite() {
+                // an error that the filter held for impossible
+                "−∞".to_owned()
             } else {
                 let [value, low, high] = [mean.value, mean.ci95.0, mean.ci95.1].map(signed_few);
                 format!("{value} [{low}, {high}]")

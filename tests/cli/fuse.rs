@@ -1,5 +1,6 @@
 //! `nav-sim fuse` as a user runs it.
 
+mod clocks;
 mod doubts;
 mod loggers;
 

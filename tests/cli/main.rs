@@ -28,7 +28,6 @@ mod examples;
 mod existing;
 mod export;
 mod fuse;
-mod fuse_clocks;
 mod help_examples;
 mod pages;
 mod readme;

@@ -48,6 +48,23 @@ pub struct Departure {
 }
 
 impl Departure {
+    fn of(all: &[Miss], is_known: impl Fn(&&Miss) -> bool) -> Self {
+        let beyond = |deviations: f64| -> Vec<Miss> {
+            all.iter().copied().filter(|m| m.deviations.abs() > deviations).collect()
+        };
+        let known: Vec<Miss> = all.iter().filter(is_known).copied().collect();
+        let longest = all.last().map(|m| m.level);
+        let squares: f64 = all.iter().map(|m| m.deviations * m.deviations).sum();
+        Self {
+            scales: all.len(),
+            missed: beyond(MISSED),
+            furthest: furthest(if known.is_empty() { all } else { &known }),
+            known_to: known.last().map(|m| m.level).filter(|level| Some(*level) != longest),
+            doubtful: furthest(&beyond(DOUBTFUL)),
+            chance: ChiSquared::new(all.len().max(1) as f64).map_or(1.0, |law| law.sf(squares)),
+        }
+    }
+
     /// Of the scales that are missed, the one with the ratio furthest from 1: where the model is worst for whoever uses it.
     #[must_use]
     pub fn worst(&self) -> Option<Miss> {
@@ -69,21 +86,11 @@ impl Outcome {
     /// The curve against the model at the scales that count.
     #[must_use]
     pub fn departure(&self) -> Departure {
-        let all = self.misses();
-        let missed = all.iter().copied().filter(|m| m.deviations.abs() > MISSED).collect();
         let is_known = |m: &&Miss| {
             let place = self.curve.levels.iter().position(|level| *level == m.level);
             place.is_some_and(|i| (2.0 / self.curve.edof[i]).sqrt() <= KNOWN)
         };
-        let known: Vec<Miss> = all.iter().filter(is_known).copied().collect();
-        let furthest = furthest(if known.is_empty() { &all } else { &known });
-        let longest =
-            known.last().map(|m| m.level).filter(|level| all.last().is_some_and(|m| m.level > *level));
-        let off: Vec<Miss> = all.iter().copied().filter(|m| m.deviations.abs() > DOUBTFUL).collect();
-        let doubtful = self::furthest(&off);
-        let squares: f64 = all.iter().map(|m| m.deviations * m.deviations).sum();
-        let chance = ChiSquared::new(all.len().max(1) as f64).map_or(1.0, |law| law.sf(squares));
-        Departure { scales: all.len(), missed, furthest, known_to: longest, doubtful, chance }
+        Departure::of(&self.misses(), is_known)
     }
 
     /// First and last level of the stretch around a miss that is off to the same side.
@@ -121,8 +128,26 @@ impl Outcome {
 
 #[cfg(test)]
 mod tests {
-    use super::score;
+    use super::{Departure, Miss, score};
     use statrs::distribution::{ChiSquared, ContinuousCDF, Normal};
+
+    /// Twelve scales that are off by one deviation each are what chance brings: P(chi-square of 12 > 12) = 0.4457 (tables). Off by
+    /// three each, none is missed by itself, and together they are impossible. What is told is of the scales that are known;
+    /// what speaks against the model is the scale where it is worst.
+    #[test]
+    fn scales_are_judged_together_and_told_as_far_as_they_are_known() {
+        let off = |deviations: f64| -> Vec<Miss> {
+            (1..=12).map(|level| Miss { level, ratio: 1.0 - 0.05 * f64::from(level), deviations }).collect()
+        };
+        let departure = |deviations| Departure::of(&off(deviations), |m| m.level <= 8);
+        let allowed = departure(-1.0);
+        assert!((allowed.chance - 0.4457).abs() < 5e-5 && allowed.doubtful.is_none(), "{allowed:?}");
+        assert_eq!((allowed.furthest.unwrap().level, allowed.known_to), (8, Some(8)));
+        let impossible = departure(-3.0);
+        assert!(impossible.missed.is_empty() && impossible.chance < 1e-15, "{impossible:?}");
+        assert_eq!(impossible.doubtful.unwrap().level, 12);
+        assert_eq!(Departure::of(&off(1.0), |_| true).known_to, None);
+    }
 
     /// Against the exact law: the cube is good to a tenth of a deviation out to five of them, from ten degrees on.
     #[test]

@@ -1,4 +1,4 @@
-//! The spread of simulated replicates is that which they were given.
+//! How replicates scatter, and how often intervals that rest on it hold the truth.
 
 use super::*;
 use approx::assert_relative_eq;
