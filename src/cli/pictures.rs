@@ -2,39 +2,30 @@
 
 use super::{Failure, Session};
 use crate::formats::atomic;
-use crate::report::page::{self, Page};
+use crate::report::page::{self, Form, Page};
 use std::path::{Path, PathBuf};
 
 /// The figures as a file.
 #[derive(clap::Args, Debug)]
 pub(super) struct PlotArgs {
-    /// Also write the figures as a picture (.svg; a page saves each as PNG too)
-    #[arg(long, value_name = "FILE.svg")]
+    /// Also write the figures as a picture: .svg, .png (300 dots an inch) or .pdf
+    #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 }
 
 impl PlotArgs {
     /// Refuses a picture that is an input or cannot be made, or of another form.
     pub(super) fn guard(&self, inputs: &[PathBuf]) -> Result<(), Failure> {
-        let Some(path) = &self.plot else { return Ok(()) };
-        let svg = path.with_extension("svg");
-        let form = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
-        if form != "svg" {
-            let message = format!("--plot {}: pictures are written as SVG", path.display());
-            let (name, svg) = (path.display(), svg.display());
-            return Err(Failure::input(message).hint(match form.as_str() {
-                "png" | "pdf" => {
-                    format!("--plot {svg}, then: rsvg-convert --format {form} --output {name} {svg}")
-                }
-                _ => "name a file that ends in .svg".to_owned(),
-            }));
-        }
-        writable(path, inputs)
+        self.plot.as_deref().map_or(Ok(()), |path| guard_picture(path, inputs))
     }
 
     /// Writes the picture, if one is asked for.
     pub(super) fn write(&self, picture: impl FnOnce() -> String, session: &Session) -> Result<(), Failure> {
-        write_asked(self.plot.as_deref(), picture, session)
+        if let Some(path) = &self.plot {
+            write_picture(path, picture(), session)?;
+            session.wrote(path);
+        }
+        Ok(())
     }
 }
 
@@ -61,9 +52,18 @@ impl PageArgs {
             return Ok(());
         }
         let page = page();
-        write_asked(self.page.as_deref(), || page.html(), session)?;
+        if let Some(path) = &self.page {
+            atomic::write_result(path, page.html(), session.existing())?;
+            session.wrote(path);
+        }
         self.plot.write(|| page.svg(), session)
     }
+}
+
+/// Refuses a picture of another form, before the work.
+pub(super) fn guard_picture(path: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
+    form(path)?;
+    writable(path, inputs)
 }
 
 /// Whether a file can be made, found out before the work.
@@ -73,14 +73,18 @@ fn writable(path: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
     Ok(())
 }
 
-fn write_asked(
-    path: Option<&Path>,
-    contents: impl FnOnce() -> String,
-    session: &Session,
-) -> Result<(), Failure> {
-    let Some(path) = path else { return Ok(()) };
-    atomic::write_result(path, contents(), session.existing())?;
-    session.wrote(path);
+/// The form of a picture, by its name.
+fn form(path: &Path) -> Result<Form, Failure> {
+    Form::of(path).ok_or_else(|| {
+        Failure::input(format!("{}: a picture is written as SVG, PNG or PDF", path.display()))
+            .hint("name a file that ends in .svg, .png or .pdf")
+    })
+}
+
+/// Writes a picture in the form that its name says.
+pub(super) fn write_picture(path: &Path, svg: String, session: &Session) -> Result<(), Failure> {
+    let picture = page::encode(svg, form(path)?).map_err(Failure::could_not)?;
+    atomic::write_result(path, picture, session.existing())?;
     Ok(())
 }
 

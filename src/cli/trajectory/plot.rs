@@ -1,8 +1,8 @@
 //! `nav-sim trajectory plot`.
 
 use super::{Source, wrote};
+use crate::cli::pictures::{guard_picture, write_picture};
 use crate::cli::{Failure, Session};
-use crate::formats::atomic;
 use crate::report::{TrajectorySeries, trajectory_svg};
 use crate::sensors::outage::Outage;
 use std::path::PathBuf;
@@ -13,25 +13,25 @@ use std::path::PathBuf;
 Examples:
   nav-sim trajectory plot trajectories/land_vehicle.toml -o drive.svg
   nav-sim trajectory plot trajectories/land_vehicle.toml --outage 300:390 -o outage.svg
-  nav-sim trajectory plot trajectories/fixed_wing.toml -o flight.svg")]
+  nav-sim trajectory plot trajectories/fixed_wing.toml -o flight.pdf")]
 pub(super) struct Args {
     #[command(flatten)]
     source: Source,
     /// A stretch without GNSS to mark, in seconds (repeatable)
     #[arg(long = "outage", value_name = "START:END")]
     outages: Vec<Outage>,
-    /// SVG to write
+    /// Picture to write: .svg, .png (300 dots an inch) or .pdf
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
 }
 
 pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    atomic::guard_inputs(&args.out, [args.source.path.as_path()])?;
+    guard_picture(&args.out, std::slice::from_ref(&args.source.path))?;
     let (trajectory, _) = args.source.read(session)?;
     let outages: Vec<_> = args.outages.iter().map(|o| (o.start_s, o.end_s)).collect();
     let name = args.source.path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
     let picture = trajectory_svg(&name, &TrajectorySeries::of(&trajectory), &outages);
-    atomic::write_result(&args.out, picture, session.existing())?;
+    write_picture(&args.out, picture, session)?;
     wrote(&args.out, session);
     Ok(())
 }

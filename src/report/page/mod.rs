@@ -6,16 +6,20 @@ mod chart;
 mod draw;
 mod legend;
 mod marks;
+mod picture;
 mod table;
 mod terminal;
 
 pub(crate) use chart::{Axis, Chart, Colour, Interval, Mark, Panel, Series, Size, Stroke};
+pub(crate) use picture::{Form, encode, svg};
 pub(crate) use table::{Cell, Table};
 pub(crate) use terminal::{beside, terminal};
 
-use draw::{Canvas, NARROW, SMALL, WIDE, draw, text};
+use draw::{Canvas, NARROW, SMALL, WIDE, draw};
 use std::fmt::Write as _;
 
+/// Colours by name, by day and by night.
+const COLOURS: &str = include_str!("colours.css");
 const CHART_STYLE: &str = include_str!("chart.css");
 const PAGE_STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
@@ -136,7 +140,7 @@ impl Page {
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              {GENERATOR}\n<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n<title>{title}</title>\n\
-             <style>\n{CHART_STYLE}{PAGE_STYLE}</style>\n</head>\n<body>\n<main>\n{body}</main>\n\
+             <style>\n{COLOURS}{CHART_STYLE}{PAGE_STYLE}</style>\n</head>\n<body>\n<main>\n{body}</main>\n\
              <script>\n{SCRIPT}</script>\n</body>\n</html>\n"
         )
     }
@@ -181,27 +185,6 @@ fn element(chart: &Chart, canvas: &Canvas) -> Option<String> {
         escape(&chart.title),
         escape(group)
     ))
-}
-
-/// Charts below one another as an SVG file; those without a value are left out.
-#[must_use]
-pub(crate) fn svg(title: &str, charts: &[Chart]) -> String {
-    const MARGIN: f64 = 16.0;
-    let line = 2.0 * WIDE.font;
-    let (mut body, mut top) = (String::new(), MARGIN);
-    for chart in charts {
-        let Some((inside, height)) = draw(chart, &WIDE) else { continue };
-        let _ = writeln!(body, "<g transform=\"translate({MARGIN} {top})\">");
-        text(&mut body, "title", (0.0, WIDE.font), "start", &chart.title);
-        let _ = writeln!(body, "<g transform=\"translate(0 {line})\">\n{inside}</g></g>");
-        top += line + height + MARGIN;
-    }
-    let (width, title) = (WIDE.width + 2.0 * MARGIN, escape(title));
-    format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" class=\"chart wide\" viewBox=\"0 0 {width} {top}\" width=\"{width}\" \
-         height=\"{top}\" role=\"img\">\n<title>{title}</title>\n<style>\n{CHART_STYLE}</style>\n\
-         <rect class=\"paper\" width=\"{width}\" height=\"{top}\"/>\n{body}</svg>\n"
-    )
 }
 
 /// Text made safe inside HTML and SVG.

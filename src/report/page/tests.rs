@@ -82,3 +82,30 @@ fn tables_say_where_their_numbers_are_from() {
         "{html}"
     );
 }
+
+/// White paper, ink where the title is, and a line in its own colour, at 300 dots an inch of 96 pixels; and a page of its size.
+#[test]
+fn a_picture_can_be_dots_or_a_page_of_a_document() {
+    let picture = svg("title", &[chart()]);
+    for word in ["var(", "@media", ":root"] {
+        assert!(!picture.contains(word), "{word}");
+    }
+    let dots = resvg::tiny_skia::Pixmap::decode_png(&encode(picture.clone(), Form::Png).unwrap()).unwrap();
+    assert_eq!(dots.width(), 3100); // of 992 pixels
+    let colour = |x, y| dots.pixel(x, y).map(|p| (p.red(), p.green(), p.blue())).unwrap();
+    assert_eq!(colour(2, 2), (255, 255, 255));
+    let in_title = (50..200).flat_map(|x| (50..100).map(move |y| (x, y)));
+    assert!(in_title.clone().any(|(x, y)| colour(x, y) == (0x1b, 0x1f, 0x24)));
+    let everywhere = (0..dots.width()).flat_map(|x| (0..dots.height()).map(move |y| (x, y)));
+    assert!(everywhere.clone().filter(|&(x, y)| colour(x, y) == (0xcc, 0x4e, 0x00)).count() > 1000);
+    let document = encode(picture, Form::Pdf).unwrap();
+    assert!(document.starts_with(b"%PDF-"));
+    let size = b"/MediaBox [0 0 744 "; // points, 1/72 inch
+    assert!(document.windows(size.len()).any(|bytes| bytes == size));
+}
+
+#[test]
+fn a_character_that_no_picture_can_hold_is_an_error() {
+    let refused = encode(svg("a\u{1}b", &[chart()]), Form::Png).unwrap_err().to_string();
+    assert!(refused.starts_with("the picture cannot be drawn as Png: "), "{refused}");
+}
