@@ -2,7 +2,7 @@
 
 use super::run_tables::{REPEAT, parse_epochs, parse_runs};
 use super::{FileError, Place, atomic, hash, source};
-use crate::metrics::{EpochRow, Measured, PerState};
+use crate::metrics::{EpochRow, Measured, PerState, Verdict};
 use crate::report::Manifest;
 use crate::scenario::Method;
 use crate::simulation::{OutageRecord, RunRecord};
@@ -18,6 +18,8 @@ pub(crate) struct RunDirectory {
     pub manifest: Manifest,
     /// What was found.
     pub experiment: Measured,
+    /// Whether the filter is as good as it believes: as its own command found it, covariance analysis included.
+    pub verdict: Verdict,
     /// 95 % interval of the ASEE at the end of each outage by what the calibration leaves open, where it is known.
     pub asee_end_ci95: Vec<OpenEnds>,
 }
@@ -44,17 +46,18 @@ pub(crate) fn read(directory: &Path) -> Result<RunDirectory, FileError> {
         as_written(directory, &manifest, "runs.csv", &runs_text)?;
         runs
     };
-    let asee_end_ci95 = open_by_calibration(directory)?;
+    let (verdict, asee_end_ci95) = found(directory)?;
     let outages = manifest.configuration.outage.iter().flatten().map(|o| (o.start_s, o.end_s)).collect();
     let independent_windows = manifest.independent_windows;
     let experiment = Measured { epochs, runs, outages, independent_windows, is_expected };
-    Ok(RunDirectory { manifest, experiment, asee_end_ci95 })
+    Ok(RunDirectory { manifest, experiment, verdict, asee_end_ci95 })
 }
 
-/// What the calibration leaves open, outage by outage, from the summary.
-fn open_by_calibration(directory: &Path) -> Result<Vec<OpenEnds>, FileError> {
+/// The verdict, and what the calibration leaves open, outage by outage, from the summary.
+fn found(directory: &Path) -> Result<(Verdict, Vec<OpenEnds>), FileError> {
     #[derive(serde::Deserialize)]
-    struct Open {
+    struct Found {
+        verdict: Verdict,
         outages: Vec<OpenOutage>,
     }
     #[derive(serde::Deserialize)]
@@ -62,8 +65,8 @@ fn open_by_calibration(directory: &Path) -> Result<Vec<OpenEnds>, FileError> {
         asee_end_ci95: Option<PerState<(f64, f64)>>,
     }
     let (path, summary) = text(directory, "summary.json")?;
-    let open: Open = serde_json::from_str(&summary).map_err(|e| not_json(&path, &e))?;
-    Ok(open.outages.into_iter().map(|outage| outage.asee_end_ci95).collect())
+    let found: Found = serde_json::from_str(&summary).map_err(|e| not_json(&path, &e))?;
+    Ok((found.verdict, found.outages.into_iter().map(|outage| outage.asee_end_ci95).collect()))
 }
 
 /// Refuses a file that is not the one the manifest tells of; what can be read of it was, for a more exact message.
@@ -122,7 +125,7 @@ fn manifest(directory: &Path) -> Result<Manifest, FileError> {
 
 fn not_json(path: &str, e: &serde_json::Error) -> FileError {
     let message = e.to_string().split(" at line ").next().unwrap_or_default().to_owned();
-    FileError::contents(path, e.line(), message)
+    FileError::contents(path, e.line(), message).advice(REPEAT)
 }
 
 fn text(directory: &Path, name: &str) -> Result<(String, String), FileError> {

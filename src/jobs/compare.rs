@@ -68,8 +68,7 @@ pub fn compare(runs: &[PathBuf], reference: &Path) -> Result<Comparison, Compare
         candidates.push(compared(run, &candidate, &directory, is_paired, is_reference)?);
         curves.push(RatioCurves::of(&candidate.experiment, &directory.experiment));
     }
-    let verdict = directory.experiment.verdict();
-    let file = ComparisonFile::new((&name, &verdict), doubts.is_empty(), &candidates);
+    let file = ComparisonFile::new((&name, &directory.verdict), doubts.is_empty(), &candidates);
     Ok(Comparison { file, candidates, curves, outages: directory.experiment.outages, doubts })
 }
 
@@ -96,8 +95,7 @@ fn compared(
         }
     }
     let label = Label::of(&run, candidate.manifest.model.estimator.as_deref());
-    let verdict = candidate.experiment.verdict();
-    Ok(CandidateResult { run, label, is_reference, verdict, outages })
+    Ok(CandidateResult { run, label, is_reference, verdict: candidate.verdict, outages })
 }
 
 /// What makes two runs differ beside the model in the filter; then run k did not see the same noise.

@@ -215,8 +215,13 @@ fn process_rows(outcome: &Outcome, rate_hz: f64) -> Vec<Vec<String>> {
                 )
             }
             Process::Quantization(p) => {
-                let ends = mapped("q2", &f64::sqrt);
-                ("quantization Q", p.q2().sqrt(), ends, sensor.unit(), String::new())
+                // of the increments over a sample, as IEEE 952 has it
+                let increment = |q2: f64| q2.sqrt() / rate_hz;
+                let unit = match sensor {
+                    Sensor::Accel => "m/s",
+                    Sensor::Gyro => "rad",
+                };
+                ("quantization Q", increment(p.q2()), mapped("q2", &increment), unit, String::new())
             }
             Process::Drift(p) => {
                 let ends = mapped("slope", &|x| x * rate_hz);

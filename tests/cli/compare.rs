@@ -144,6 +144,22 @@ fn ratios_are_those_that_were_made() {
     assert!(row["rmse_end_ratio_error_pct"].as_f64().unwrap().abs() < 1e-9, "{row}");
 }
 
+/// The verdict is that of the run's own directory: covariance analysis may know more than these runs show.
+#[test]
+fn verdicts_are_those_of_the_directories() {
+    let directory = tempfile::tempdir().unwrap();
+    write(&directory.path().join("a"), 1.0, |_| {});
+    write(&directory.path().join("b"), 1.0, |_| {});
+    let summary = directory.path().join("b/summary.json");
+    let text = std::fs::read_to_string(&summary).unwrap();
+    let doubted = text.replacen("\"kind\": \"ok\"", "\"kind\": \"overconfident\"", 1);
+    assert_ne!(doubted, text);
+    std::fs::write(&summary, doubted).unwrap();
+    let ran = compare(directory.path(), &["a", "b", "--reference", "a"]);
+    assert!(ran.stdout.starts_with("overconfident: b (NEES 9.00, "), "{}\n{}", ran.stdout, ran.stderr);
+    assert!(ran.stdout.contains("\nconsistent: a ("), "{}", ran.stdout);
+}
+
 /// Without `--out` a file of the default's name is replaced only if it is a comparison.
 #[test]
 fn a_file_that_is_no_comparison_is_left_alone() {

@@ -1,7 +1,12 @@
 //! Outliers that all recordings hold: comparing one with the others does not show those.
 //!
 //! ln (classical / robust) of every signal has, when the noise is Gaussian, the mean (1/e − 1)/eta and the variance
-//! (1/e − 1)·2/eta (see [`super`]); quantization noise, which the robust variance reads high, is allowed for. Looked at is the median over the signals, so that a minority makes no alarm.
+//! (1/e − 1)·2/eta (see [`super`]); quantization noise, which the robust variance reads high, is allowed for. Looked at is
+//! the median over the signals, so that a minority makes no alarm.
+//!
+//! What is allowed for is the noise of a quantizer, of uniform numbers. Where the same spectrum is of Gaussian numbers (a
+//! dithered output of velocity or angle increments, the difference of white noise), the robust variance reads it as it is, and
+//! the classical one seems too high by what was allowed. That is told apart: the two variances then agree.
 
 use super::piece::{Piece, Test};
 use crate::outcome::{Settings, tau_s};
@@ -26,34 +31,77 @@ pub struct CommonOutliers {
     pub deviations: f64,
 }
 
+/// Quantization noise whose numbers are Gaussian, not a quantizer's.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct GaussianQuantization {
+    /// The scales (s) at which classical and robust wavelet variance agree where a quantizer's would not.
+    pub tau_s: Vec<f64>,
+    /// By how much the robust wavelet variance of a quantizer's noise, which robust fits expect, would be above the classical
+    /// one at most: they read the noise there as much too low.
+    pub read_low: f64,
+}
+
+/// What most of the signals of a sensor have in common.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Common {
+    pub(super) outliers: Option<CommonOutliers>,
+    pub(super) gaussian: Option<GaussianQuantization>,
+}
+
+/// The median over the signals of ln (classical / robust) at a scale, less what is expected.
+struct Excess {
+    tau_s: f64,
+    /// Of a quantizer's noise, and as if all were Gaussian.
+    quantizer: f64,
+    gaussian: f64,
+    /// Its standard deviation.
+    sigma: f64,
+}
+
+impl Excess {
+    fn alarms(&self, excess: f64) -> bool {
+        excess.is_finite() && excess > ALARM * self.sigma && excess.exp_m1() > LEAST
+    }
+}
+
 /// Looks at all signals of a sensor together.
-pub(super) fn common(pieces: &[Piece<'_>], settings: &Settings) -> Option<CommonOutliers> {
+pub(super) fn common(pieces: &[Piece<'_>], settings: &Settings) -> Common {
+    let test = Test::Outliers;
+    let all = (0..test.levels(pieces)).map(|level| excess(pieces, level, settings));
+    let found: Vec<Excess> = all.filter(|e| e.alarms(e.quantizer)).collect();
+    let tau_s: Vec<f64> = found.iter().map(|e| e.tau_s).collect();
+    // Outliers that by chance make up for the allowance at one scale do not at the next.
+    if !found.is_empty() && found.iter().all(|e| !e.alarms(e.gaussian)) {
+        let read_low = found.iter().map(|e| (e.quantizer - e.gaussian).exp_m1()).fold(0.0, f64::max);
+        return Common { outliers: None, gaussian: Some(GaussianQuantization { tau_s, read_low }) };
+    }
+    let most = found.iter().max_by(|a, b| a.quantizer.total_cmp(&b.quantizer));
+    let outliers = most.map(|most| CommonOutliers {
+        tau_s,
+        most_tau_s: most.tau_s,
+        excess: most.quantizer.exp_m1(),
+        deviations: most.quantizer / most.sigma,
+    });
+    Common { outliers, gaussian: None }
+}
+
+fn excess(pieces: &[Piece<'_>], level: usize, settings: &Settings) -> Excess {
     let (test, tuning) = (Test::Outliers, &settings.tuning);
-    let mut found: Option<CommonOutliers> = None;
-    for level in 0..test.levels(pieces) {
-        let (mut logs, mut variance) = (Vec::new(), 0.0);
-        for piece in pieces {
-            for replicate in piece.replicates.iter().flatten() {
-                let eta = test.edof(piece.law.edof(replicate.samples)[level], tuning.efficiency());
-                let (read_high, _) = tuning.quantization().factor(piece.law.quantization[level]);
-                logs.push(test.value(replicate, level) + read_high.ln() - 1.0 / eta);
-                variance += 2.0 / eta;
-            }
-        }
-        let count = logs.len() as f64;
-        let centre = crate::curve::robust_scale::median(&logs);
-        let deviations = centre / (MEDIAN * variance.sqrt() / count);
-        let excess = centre.exp_m1();
-        if !(excess.is_finite() && deviations > ALARM && excess > LEAST) {
-            continue;
-        }
-        let scale_s = tau_s(level as u32 + 1, settings.rate_hz);
-        let first = CommonOutliers { tau_s: Vec::new(), most_tau_s: scale_s, excess, deviations };
-        let all = found.get_or_insert(first);
-        all.tau_s.push(scale_s);
-        if excess > all.excess {
-            (all.most_tau_s, all.excess, all.deviations) = (scale_s, excess, deviations);
+    let (mut of_quantizer, mut of_gaussian, mut variance) = (Vec::new(), Vec::new(), 0.0);
+    for piece in pieces {
+        for replicate in piece.replicates.iter().flatten() {
+            let eta = test.edof(piece.law.edof(replicate.samples)[level], tuning.efficiency());
+            let (read_high, _) = tuning.quantization().factor(piece.law.quantization[level]);
+            let gaussian = test.value(replicate, level) - 1.0 / eta;
+            of_gaussian.push(gaussian);
+            of_quantizer.push(gaussian + read_high.ln());
+            variance += 2.0 / eta;
         }
     }
-    found
+    Excess {
+        tau_s: tau_s(level as u32 + 1, settings.rate_hz),
+        quantizer: crate::curve::robust_scale::median(&of_quantizer),
+        gaussian: crate::curve::robust_scale::median(&of_gaussian),
+        sigma: MEDIAN * variance.sqrt() / of_gaussian.len() as f64,
+    }
 }

@@ -1,6 +1,6 @@
 //! What is said of each recording.
 
-use super::common::CommonOutliers;
+use super::common::{CommonOutliers, GaussianQuantization};
 use super::leave_out::LeftOut;
 use crate::curve::{Estimator, Pool};
 use crate::imu::{Axis, Sensor};
@@ -112,6 +112,9 @@ pub struct Diagnosis {
     /// Outliers that most signals of this sensor hold, in all recordings alike.
     #[serde(rename = "common_outliers")]
     pub common: Option<CommonOutliers>,
+    /// Quantization noise of this sensor that robust fits read low, in most signals.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gaussian_quantization: Option<GaussianQuantization>,
     /// Scores; empty when there are fewer than four recordings.
     #[serde(serialize_with = "scores_by_axis")]
     pub scores: Vec<AxisScores>,

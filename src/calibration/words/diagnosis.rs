@@ -1,9 +1,10 @@
 //! The diagnosis in words.
 
-use super::format::signed_percent;
+use super::format::{duration, signed_percent};
 use crate::curve::Pool;
 use crate::diagnosis::{
-    Alarm, CommonOutliers, Diagnosis, Differing, DriftAlarm, LeftOut, Misfit, Movement, Verdict,
+    Alarm, CommonOutliers, Diagnosis, Differing, DriftAlarm, GaussianQuantization, LeftOut, Misfit, Movement,
+    Verdict,
 };
 use crate::imu::{Axis, Sensor};
 use crate::outcome::LevelSpread;
@@ -28,6 +29,7 @@ pub fn advice(diagnoses: &[Diagnosis], sensor: Sensor) -> Vec<String> {
         lines.extend(abnormal.iter().flat_map(|d| describe(d)));
     }
     lines.extend(first.common.iter().map(|c| outliers(c, own.len())));
+    lines.extend(first.gaussian_quantization.iter().map(gaussian_quantization));
     lines.extend(misfits(&first.misfits));
     lines
 }
@@ -58,11 +60,24 @@ fn outliers(common: &CommonOutliers, count: usize) -> String {
     let (first, last) = (common.tau_s[0], common.tau_s[common.tau_s.len() - 1]);
     format!(
         "outliers within all {count} recordings, or most: the classical wavelet variance is above the robust one \
-         from {first} s to {last} s, most at {} s: by {} in the median ({:.0} standard deviations): awv describes the noise with \
+         from {} to {}, most at {}: by {} in the median ({:.0} standard deviations): awv describes the noise with \
          them, sr-awv and dr-awv without most of them (small ones pass for noise)",
-        common.most_tau_s,
+        duration(first),
+        duration(last),
+        duration(common.most_tau_s),
         signed_percent(common.excess).trim_start_matches('+'),
         common.deviations
+    )
+}
+
+/// What is said of quantization noise that is not a quantizer's.
+fn gaussian_quantization(found: &GaussianQuantization) -> String {
+    format!(
+        "the noise that the model calls quantization is Gaussian, not a quantizer's (classical and robust wavelet variance agree \
+         from {} to {}): sr-awv and dr-awv allow for a quantizer's and read it there by up to {:.0} % too low: use awv",
+        duration(found.tau_s[0]),
+        duration(found.tau_s[found.tau_s.len() - 1]),
+        100.0 * found.read_low
     )
 }
 

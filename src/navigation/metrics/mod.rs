@@ -34,4 +34,4 @@ pub use reduction::{AxisReduction, ReductionQuality, ReductionSummary, TOLERANCE
 pub use requirement::{Met, Requirement, UnknownRequirement};
 pub use sensitivity::Sensitivities;
 pub use summary::{AccuracySummary, Consistency, Coverage, Nis, OutageSummary, Recovery, Spread, Summary};
-pub use verdict::{OutageVerdict, Verdict, VerdictKind};
+pub use verdict::{OutageVerdict, StateName, Verdict, VerdictKind};

@@ -10,7 +10,7 @@
 use super::consistency::chi_square_interval;
 use super::estimate::Estimate;
 use crate::simulation::{NEES_DOF, OutageRecord, REPORTED, REPORTED_NAMES, RunRecord};
-use serde::Serialize;
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// Probability at which a right filter is called wrong, all statistics together.
 const LEVEL: f64 = 0.01;
@@ -20,7 +20,7 @@ const TOLERANCE: f64 = 0.1;
 const LOST: f64 = 100.0;
 
 /// What the verdict is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum VerdictKind {
     /// Nothing speaks against the filter.
@@ -33,37 +33,66 @@ pub enum VerdictKind {
     Diverged,
 }
 
+/// One of [`REPORTED_NAMES`]; `serde` would borrow what it saw as a reference.
+pub type StateName = &'static str;
+
 /// The verdict on the filter of an experiment.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Verdict {
     /// In one word.
     pub kind: VerdictKind,
     /// Mean NEES over epochs and runs; 9 if the filter is right.
+    #[serde(deserialize_with = "number")]
     pub nees: f64,
     /// Its Monte-Carlo standard error, from the scatter of the runs.
+    #[serde(deserialize_with = "number")]
     pub nees_std_error: f64,
     /// Mean share of epochs inside the filter's ellipsoid.
+    #[serde(deserialize_with = "number")]
     pub coverage: f64,
     /// Its Monte-Carlo standard error, from the scatter of the runs.
+    #[serde(deserialize_with = "number")]
     pub coverage_std_error: f64,
     /// The state that is farthest off in the direction of the verdict.
-    pub worst_state: &'static str,
+    #[serde(deserialize_with = "state")]
+    pub worst_state: StateName,
     /// The outage at whose end it is (from 0); none: over the whole run.
     pub worst_outage: Option<usize>,
     /// Root mean square there of error over standard deviation: 1 if the filter is right.
+    #[serde(deserialize_with = "number")]
     pub ratio: f64,
     /// Its Monte-Carlo standard error.
+    #[serde(deserialize_with = "number")]
     pub ratio_std_error: f64,
     /// Runs that count as independent; infinitely many (null) of a covariance analysis.
+    #[serde(deserialize_with = "count")]
     pub independent_runs: f64,
     /// The error over standard deviation, common to all states, from which on these runs would tell it.
+    #[serde(deserialize_with = "number")]
     pub detectable_ratio: f64,
     /// The same of one state alone.
+    #[serde(deserialize_with = "number")]
     pub detectable_state_ratio: f64,
     /// Probability at which a right filter is called wrong, all statistics together.
     pub level: f64,
     /// Errors that differ by less than this share from the filter's standard deviations are let pass.
     pub tolerance: f64,
+}
+
+/// A number as JSON has it: null if it is none.
+fn number<'de, D: Deserializer<'de>>(value: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(value)?.unwrap_or(f64::NAN))
+}
+
+/// A count as JSON has it: null if it has no end.
+fn count<'de, D: Deserializer<'de>>(value: D) -> Result<f64, D::Error> {
+    Ok(Option::deserialize(value)?.unwrap_or(f64::INFINITY))
+}
+
+fn state<'de, D: Deserializer<'de>>(value: D) -> Result<&'static str, D::Error> {
+    let name = String::deserialize(value)?;
+    let known = REPORTED_NAMES.into_iter().find(|known| *known == name);
+    known.ok_or_else(|| serde::de::Error::custom(format!("{name:?} is no state")))
 }
 
 /// The verdict on the filter at the end of one outage.
