@@ -62,9 +62,14 @@ pub(super) fn write(
     Ok(directory.commit()?)
 }
 
-/// Says aloud that a filter believes too much of itself.
+/// Says aloud that a filter believes too much of itself, and what helps.
 pub(crate) fn doubt_filter(summary: &Summary, session: &Session) {
-    if summary.verdict.kind == VerdictKind::Overconfident {
-        session.printer.warn(&format!("the filter is {}", run_words::verdict(summary)));
+    if summary.verdict.kind != VerdictKind::Overconfident {
+        return;
     }
+    let remedy = match summary.reduction {
+        Some(_) => "--filter full has a state for each process of the model",
+        None => "nav-sim tune finds variances that cover its errors",
+    };
+    session.printer.warn(&format!("the filter is {}; {remedy}", run_words::verdict(summary)));
 }

@@ -16,6 +16,7 @@ use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::Outage;
+use crate::simulation::REPORTED;
 use crate::simulation::plan::Experiment;
 use crate::trajectory::Trajectory;
 use crate::trajectory::profile::{Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning};
@@ -92,7 +93,7 @@ impl Search<'_> {
 const START: Factors = [0.3, -0.3, 1.0, 0.3, 0.0, 0.4];
 /// Cost of a factor e: what the fixes do not tell stays near the wavelet reduction.
 const RIDGE: f64 = 5e-4;
-const ITERATIONS: usize = 12;
+const ITERATIONS: usize = 40;
 /// Largest logarithm of a factor.
 const MAX_LN: f64 = 6.0;
 /// A step that gains less is the last: 2e-4 of divergence is 1 % in one standard deviation.
@@ -102,12 +103,21 @@ const ENDS: f64 = 0.3;
 /// A ratio whose logarithm is this far from 0 begins to count for itself, with this weight.
 const OFF: f64 = 0.08;
 const OFF_WEIGHT: f64 = 0.3;
+/// Share of such states over the whole way in the cost.
+const WAY: f64 = 0.3;
 
-/// The divergence at the outage ends and on the average; a single state whose ratio is a tenth off counts beside
-/// it, steeply: the divergence alone gives one state away for eight.
+/// The divergence at the outage ends and on the average; a single state whose ratio is a tenth off, at an outage's end or
+/// over the whole way, counts beside it, steeply: the divergence alone gives one state away for eight.
 fn cost(assessment: &Assessment) -> f64 {
-    let off = |c: &Consistency| c.ratio().iter().map(|r| (r.ln() / OFF).powi(4)).sum::<f64>();
-    divergence(assessment, |end| OFF_WEIGHT * off(end))
+    let steep = |r: f64| OFF_WEIGHT * (r.ln() / OFF).powi(4);
+    let over_the_way = match assessment.reports.get(1..) {
+        Some(reports) if !reports.is_empty() => {
+            let squares = |i: usize| reports.iter().map(|c| c.ratio()[i].powi(2)).sum::<f64>();
+            (0..REPORTED).map(|i| steep((squares(i) / reports.len() as f64).sqrt())).sum()
+        }
+        _ => 0.0,
+    };
+    divergence(assessment, |end| end.ratio().into_iter().map(steep).sum()) + WAY * over_the_way
 }
 
 /// The divergence on the average and at the outage ends, where `beside` is added to it.
