@@ -19,26 +19,31 @@
 //! With `of_samples` the burst's lengths are meant for a record of so many samples and are scaled to the
 //! record's length. What the operations do, and in which order: [`crate::noise::contamination`].
 
+mod description;
+
 use super::FileError;
 use super::suggest::nearest;
-use super::toml_described::{Document, Finite};
+use super::toml_described::Document;
 use super::toml_file::{Section, Source};
 use crate::imu::Sensor;
 use crate::noise::Ar1;
 use crate::noise::contamination::{Contamination, Extent, Operation, Rule};
-use schemars::JsonSchema;
-use serde::Deserialize;
-use serde::de::{DeserializeOwned, IgnoredAny};
+use description::{
+    Autoregression, Bursts, Described, Description, HeavyTails, Mean, Numbers, Of, Replace, Scale, Signal,
+    Step, describe,
+};
 use std::path::Path;
+
+pub(crate) use description::schema;
 
 /// Names and texts of the contaminations that come with the program.
 const PRESETS: [(&str, &str); 6] = [
     ("section4-I", "schema = 1\n"),
-    ("section4-II", include_str!("../../calib_data/contamination/section4-II.toml")),
-    ("section4-III", include_str!("../../calib_data/contamination/section4-III.toml")),
+    ("section4-II", include_str!("../../../calib_data/contamination/section4-II.toml")),
+    ("section4-III", include_str!("../../../calib_data/contamination/section4-III.toml")),
     ("section5-I", "schema = 1\n"),
-    ("section5-II", include_str!("../../calib_data/contamination/section5-II.toml")),
-    ("section5-III", include_str!("../../calib_data/contamination/section5-III.toml")),
+    ("section5-II", include_str!("../../../calib_data/contamination/section5-II.toml")),
+    ("section5-III", include_str!("../../../calib_data/contamination/section5-III.toml")),
 ];
 
 /// Names of the contaminations that come with the program: the scenarios of
@@ -79,181 +84,6 @@ fn parse(source: &Source, rate_hz: f64) -> Result<Contamination, FileError> {
         }
     }
     Ok(Contamination { name: source.path().to_owned(), rules })
-}
-
-/// Errors and disturbances put into recordings: nav-sim synthesize --contaminate
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(title = "Contamination")]
-struct Description {
-    /// Version of the layout
-    #[schemars(range(min = 1, max = 1))]
-    schema: Option<u64>,
-    /// Of all axes of the accelerometers
-    #[serde(default, rename = "accel")]
-    #[schemars(with = "Vec<RuleDescription>")]
-    _accel: IgnoredAny,
-    /// Of all axes of the gyroscopes
-    #[serde(default, rename = "gyro")]
-    #[schemars(with = "Vec<RuleDescription>")]
-    _gyro: IgnoredAny,
-}
-
-/// What is done to the signals of a sensor
-#[derive(JsonSchema)]
-#[schemars(deny_unknown_fields)]
-#[expect(dead_code, reason = "what describes files, for editors")]
-struct RuleDescription {
-    #[schemars(flatten)]
-    of: Of,
-    #[schemars(flatten)]
-    operation: Described,
-}
-
-#[derive(Deserialize, JsonSchema)]
-struct Of {
-    /// Replicates, counted from 1 (default: every one)
-    replicates: Option<Vec<u64>>,
-}
-
-/// The operations of files, each with its keys.
-#[derive(JsonSchema)]
-#[schemars(tag = "operation", rename_all = "kebab-case")]
-enum Described {
-    /// A jump of the mean
-    Step(Step),
-    /// A drift over the whole record
-    Drift(Drift),
-    /// Samples replaced by outliers
-    Replace(Replace),
-    /// Bursts of vibration
-    Bursts(Bursts),
-    /// A first-order autoregression on top
-    Ar1(Autoregression),
-    /// Noise with heavy tails on top
-    HeavyTails(HeavyTails),
-    /// A parameter of the model, scaled
-    Scale(Scale),
-}
-
-#[derive(Deserialize, JsonSchema)]
-struct Step {
-    /// Height of the step (units of the signal)
-    amplitude: Numbers,
-    /// Where in the record, as a share of it (default: 0.5)
-    at_share: Option<Numbers>,
-    /// Where in the record (samples)
-    at_samples: Option<u64>,
-    /// Where in the record (s)
-    at_s: Option<Numbers>,
-}
-
-#[derive(Deserialize, JsonSchema)]
-struct Drift {
-    /// Value at the end of the record (units of the signal)
-    amplitude: Numbers,
-}
-
-#[derive(Deserialize, JsonSchema)]
-struct Replace {
-    /// Share of the samples
-    share: Option<Numbers>,
-    /// Number of samples
-    points: Option<u64>,
-    /// Samples replaced together (default: 1)
-    length_samples: Option<u64>,
-    /// Standard deviation of what replaces them
-    sigma: Numbers,
-    /// Mean of what replaces them (default: the signal's)
-    mean: Option<Mean>,
-}
-
-#[derive(Deserialize, JsonSchema)]
-struct Bursts {
-    /// Number of bursts (default: 5)
-    count: Option<u64>,
-    /// Length of a burst (samples; default: 500)
-    length_samples: Option<u64>,
-    /// From one burst to the next (samples; default: 90000)
-    spacing_samples: Option<u64>,
-    /// Length of the record that these are meant for (samples; default: as it is)
-    of_samples: Option<Numbers>,
-    /// Amplitude (units of the signal)
-    amplitude: Numbers,
-    /// Frequency (Hz; default: 5)
-    frequency_hz: Option<Numbers>,
-}
-
-#[derive(Deserialize, JsonSchema)]
-struct Autoregression {
-    /// Coefficient
-    phi: Numbers,
-    /// Innovation variance per sample
-    sigma2: Numbers,
-}
-
-#[derive(Deserialize, JsonSchema)]
-struct HeavyTails {
-    /// Degrees of freedom, more than 2
-    freedom: Numbers,
-    /// Scale of Student's t (units of the signal)
-    sigma: Numbers,
-}
-
-#[derive(Deserialize, JsonSchema)]
-struct Scale {
-    /// Process of the model, such as RW
-    process: String,
-    /// Its parameter, such as gamma2
-    parameter: String,
-    /// What it is multiplied by
-    factor: Numbers,
-}
-
-/// One number for all, or one for each replicate listed
-#[derive(Deserialize, JsonSchema)]
-#[serde(untagged, expecting = "is neither a finite number nor a list of finite numbers")]
-enum Numbers {
-    One(Finite),
-    Each(Vec<Finite>),
-}
-
-#[derive(Deserialize, JsonSchema)]
-#[serde(untagged, expecting = "is neither a number nor \"signal\"")]
-enum Mean {
-    Own(Numbers),
-    Kept(Signal),
-}
-
-#[derive(Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-enum Signal {
-    Signal,
-}
-
-/// The JSON schema of such a file.
-#[must_use]
-pub(crate) fn schema() -> serde_json::Value {
-    schemars::schema_for!(Description).to_value()
-}
-
-fn describe(section: &Section<'_>) -> Result<Described, FileError> {
-    fn own<T: DeserializeOwned + JsonSchema>(section: &Section<'_>) -> Result<T, FileError> {
-        section.read_own(&["operation", "replicates"])
-    }
-    match section.require_str("operation")? {
-        "step" => own(section).map(Described::Step),
-        "drift" => own(section).map(Described::Drift),
-        "replace" => own(section).map(Described::Replace),
-        "bursts" => own(section).map(Described::Bursts),
-        "ar1" => own(section).map(Described::Ar1),
-        "heavy-tails" => own(section).map(Described::HeavyTails),
-        "scale" => own(section).map(Described::Scale),
-        _ => {
-            let hint = "operations: step, drift, replace, bursts, ar1, heavy-tails, scale".to_owned();
-            Err(section.refuse("operation", "is not an operation", Some(hint)))
-        }
-    }
 }
 
 fn read_rules(
