@@ -6,12 +6,11 @@ use super::recordings::{RecordingArgs, Said};
 use super::run::{OutageArg, Words, parse_outage, scenario_with};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
-use crate::calibration::{Bootstrap, Estimator, ModelChoice, Pool, Settings, Trim, diagnose};
+use crate::calibration::{Bootstrap, Estimator, ModelChoice, Pool, Settings, Trim};
 use crate::choose::{Candidate, Inflation};
 use crate::ekf::FilterStates;
-use crate::formats::atomic::{AtomicDir, Found, claim_directory};
 use crate::formats::model_file::CalibrationNote;
-use crate::jobs::{self, Calibration, CalibrationOptions, ChoiceDrive, Chosen, EstimatorChoice, ModelFiles};
+use crate::jobs::{self, CalibrationOptions, ChoiceDrive, EstimatorChoice};
 use crate::report::{ChoiceReport, choice_page, terminal_columns, terminal_table};
 use crate::scenario::Scenario;
 use crate::sensors::outage::Outage;
@@ -79,7 +78,8 @@ pub(crate) struct Args {
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let candidates = candidates(args)?;
-    claim(args, session)?;
+    let inputs = args.inputs.iter().chain([&args.trajectory]).chain(&args.scenario).map(PathBuf::as_path);
+    jobs::claim_choice(&args.out, inputs, session.existing())?;
     args.plot.guard(&args.inputs.iter().chain([&args.trajectory]).cloned().collect::<Vec<_>>())?;
     let scenario = scenario(args)?;
     let trajectory = read::trajectory(&args.trajectory, session)?;
@@ -106,7 +106,13 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         trajectory: &shown,
         seed,
     };
-    write(args, &chosen, &report, seed)?;
+    let note = CalibrationNote {
+        efficiency_convention: args.tuning.convention().to_owned(),
+        reading: args.recordings.provenance(),
+        seed: Some(seed),
+        inputs: Vec::new(),
+    };
+    chosen.write(&args.out, &args.trajectory, note, &report)?;
     session.show(|| report.json(), || text(&report, session));
     args.plot.write(|| choice_page(&report).svg(), session)?;
     session.printer.say(&format!(
@@ -177,49 +183,4 @@ fn outages(
             .hint("give one with --outage START:END"));
     }
     Ok(placed.windows)
-}
-
-/// The files of a choice, in the order of writing.
-const FILES: [&str; 6] =
-    ["model.toml", "model.wv.json", "model.html", "model.draws.json", "report.html", "ranking.json"];
-
-/// Whether the directory can be made, found out before the work. A ranking does not tell what it was made of.
-fn claim(args: &Args, session: &Session) -> Result<(), Failure> {
-    let inputs = args.inputs.iter().chain([&args.trajectory]).chain(&args.scenario).map(PathBuf::as_path);
-    let recognise = |text: &str| {
-        let there = serde_json::from_str::<serde_json::Value>(text).unwrap_or_default();
-        let is_ours = there["candidates"].is_array() && there["influence"].is_object();
-        Ok(if is_ours { Found::Other("holds the result of an earlier choose") } else { Found::Foreign })
-    };
-    Ok(claim_directory(&args.out, &FILES, inputs, session.existing(), recognise)?)
-}
-
-fn write(args: &Args, chosen: &Chosen, report: &ChoiceReport<'_>, seed: u64) -> Result<(), Failure> {
-    let mut directory = AtomicDir::create(&args.out)?;
-    let model = directory.path("model.toml");
-    directory.path("model.wv.json");
-    directory.path("model.html");
-    let mut inputs = vec![read::input("trajectory", &args.trajectory)?];
-    for file in &chosen.files {
-        inputs.push(read::input("recording", file)?);
-    }
-    let note = CalibrationNote {
-        efficiency_convention: args.tuning.convention().to_owned(),
-        reading: args.recordings.provenance(),
-        seed: Some(seed),
-        inputs,
-    };
-    let files = ModelFiles::of(&model, &[chosen.winner.estimator]);
-    let Chosen { calibration, model, winner, .. } = chosen;
-    if winner.inflation == Inflation::None {
-        files[0].write(calibration, &note)?;
-        directory.path("model.draws.json");
-    } else {
-        files[0].write_inflated(calibration, &note, model, winner.inflation.name())?;
-    }
-    let Calibration { groups, outcomes, settings, .. } = calibration;
-    files[0].write_page(calibration, &diagnose(groups, outcomes, settings))?;
-    directory.write("report.html", choice_page(report).html())?;
-    directory.write("ranking.json", report.json())?;
-    Ok(directory.commit()?)
 }

@@ -5,8 +5,7 @@ use crate::formats::datasheet::{self, CATALOGUE, Datasheet, Entry, Figure, Quant
 use crate::formats::suggest::nearest;
 use crate::formats::{atomic, model_file};
 use crate::imu::Sensor;
-use crate::report;
-use serde_json::json;
+use crate::jobs;
 use std::path::{Path, PathBuf};
 
 /// Noise model from the figures of a datasheet, in the datasheet's units: an assumption, not a calibration
@@ -124,7 +123,9 @@ impl Figures {
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if args.list {
-        return list(session);
+        let listed = if session.json() { jobs::catalogue_json()? } else { jobs::catalogue_text()? };
+        session.printer.result(listed.trim_end());
+        return Ok(());
     }
     if let (Some(out), Some(entry)) = (&args.out, &args.entry) {
         atomic::guard_inputs(out, std::iter::once(Path::new(entry)))?;
@@ -189,36 +190,4 @@ fn named(name: &str) -> Result<Datasheet, Failure> {
         Some(meant) => format!("did you mean {meant}?"),
         None => "nav-sim datasheet --list shows what there is".to_owned(),
     }))
-}
-
-/// The catalogue: name, class, and the figures of both sensors as given.
-fn list(session: &Session) -> Result<(), Failure> {
-    if session.json() {
-        let units = CATALOGUE.iter().map(|(name, _)| Ok(listed(name, &named(name)?)));
-        let units = units.collect::<Result<Vec<_>, Failure>>()?;
-        let json = json!({ "schema_version": 1, "units": units });
-        session.printer.result(report::json(&json).trim_end());
-        return Ok(());
-    }
-    for (name, _) in CATALOGUE {
-        let sheet = named(name)?;
-        let class = sheet.class.as_deref().unwrap_or_default();
-        session
-            .printer
-            .result(&format!("{name:<12} {class:<12} {}", sheet.name.as_deref().unwrap_or_default()));
-        for sensor in Sensor::ALL {
-            let of_sensor = sheet.entries.iter().filter(|e| e.sensor == sensor);
-            let shown: Vec<String> =
-                of_sensor.map(|e| format!("{} {}", e.figure.key(), e.quantity.given)).collect();
-            session.printer.result(&format!("  {:<5} {}", sensor.name(), shown.join(", ")));
-        }
-    }
-    Ok(())
-}
-
-/// A unit of the catalogue in JSON.
-fn listed(name: &str, sheet: &Datasheet) -> serde_json::Value {
-    let figure = |e: &Entry| json!({ "sensor": e.sensor.name(), "figure": e.figure.key(), "given": e.quantity.given, "source": e.source });
-    let figures: Vec<serde_json::Value> = sheet.entries.iter().map(figure).collect();
-    json!({ "unit": name, "name": sheet.name, "class": sheet.class, "figures": figures })
 }

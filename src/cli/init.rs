@@ -1,10 +1,9 @@
 //! `nav-sim init`: a directory to start from.
 
 use super::{Failure, Session};
-use crate::formats::atomic;
+use crate::jobs::{self, StartFiles};
 use serde_json::json;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Make a directory with everything to start from: a commented file of every kind, trajectories, virtual IMUs
 ///
@@ -24,52 +23,12 @@ pub(crate) struct Args {
     directory: PathBuf,
 }
 
-macro_rules! repository_files {
-    ($($path:literal => $name:literal),* $(,)?) => {
-        &[$(($name, include_bytes!(concat!("../../", $path)).as_slice())),*]
-    };
-}
-
-const FILES: &[(&str, &[u8])] = repository_files![
-    "examples/scenario.toml" => "scenario.toml",
-    "examples/model.toml" => "imu.toml",
-    "examples/parameters.toml" => "parameters.toml",
-    "examples/contamination.toml" => "contamination.toml",
-    "examples/initial.toml" => "initial.toml",
-    "examples/motion.toml" => "motion.toml",
-    "trajectories/land_vehicle.toml" => "trajectories/land_vehicle.toml",
-    "trajectories/figure_eight.toml" => "trajectories/figure_eight.toml",
-    "trajectories/fixed_wing.toml" => "trajectories/fixed_wing.toml",
-    "calib_data/consumer_mems.toml" => "calib_data/consumer_mems.toml",
-    "calib_data/tactical.toml" => "calib_data/tactical.toml",
-    "calib_data/formats/own.csv" => "calib_data/formats/own.csv",
-    "calib_data/formats/euroc.csv" => "calib_data/formats/euroc.csv",
-    "calib_data/formats/compressed.csv.gz" => "calib_data/formats/compressed.csv.gz",
-    "examples/scenario.toml" => "examples/scenario.toml",
-    "examples/paper_fig2.toml" => "examples/paper_fig2.toml",
-    "examples/accelerometer_n1.toml" => "examples/accelerometer_n1.toml",
-    "examples/phone.toml" => "examples/phone.toml",
-    "examples/paper_table1.toml" => "examples/paper_table1.toml",
-    "examples/quick_study.toml" => "examples/quick_study.toml",
-    "examples/quick_drive.toml" => "examples/quick_drive.toml",
-];
-
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let mut made = Made::default();
-    let mut kept = Vec::new();
-    for (name, contents) in FILES {
-        let path = args.directory.join(name);
-        if path.exists() {
-            session.printer.say(&format!("kept {}", path.display()));
-            kept.push(path.display().to_string());
-            continue;
-        }
-        made.directories.extend(path.ancestors().skip(1).filter(|p| !p.exists()).map(Path::to_owned));
-        made.write(path, contents)?;
-    }
-    made.directories.clear();
-    let written: Vec<String> =
-        std::mem::take(&mut made.files).iter().map(|path| path.display().to_string()).collect();
+    let StartFiles { written, kept } = jobs::write_start_files(&args.directory)?;
+    let [written, kept] =
+        [written, kept].map(|paths| paths.iter().map(|p| p.display().to_string()).collect());
+    let (written, kept): (Vec<String>, Vec<String>) = (written, kept);
+    kept.iter().for_each(|path| session.printer.say(&format!("kept {path}")));
     if session.json() {
         let json = json!({ "schema_version": 1, "written": written, "kept": kept });
         session.printer.result(&json.to_string());
@@ -77,32 +36,4 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         written.iter().for_each(|path| session.printer.result(path));
     }
     Ok(())
-}
-
-/// What was made so far; removed again if not all can be.
-#[derive(Default)]
-struct Made {
-    files: Vec<PathBuf>,
-    /// Those that were not there before.
-    directories: Vec<PathBuf>,
-}
-
-impl Made {
-    fn write(&mut self, path: PathBuf, contents: &[u8]) -> Result<(), Failure> {
-        atomic::write(&path, contents)?;
-        self.files.push(path);
-        Ok(())
-    }
-}
-
-impl Drop for Made {
-    fn drop(&mut self) {
-        for file in &self.files {
-            let _ = fs::remove_file(file);
-        }
-        self.directories.sort_by_key(|path| std::cmp::Reverse(path.components().count()));
-        for directory in &self.directories {
-            let _ = fs::remove_dir(directory); // if nothing else is in it
-        }
-    }
 }

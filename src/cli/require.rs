@@ -2,7 +2,7 @@
 
 use super::pictures::PageArgs;
 use super::{Failure, Session, parse, read, turn_on};
-use crate::formats::atomic::{AtomicFile, guard_inputs};
+use crate::formats::atomic::claim_file;
 use crate::formats::datasheet::{self, CATALOGUE, Datasheet};
 use crate::formats::file_kind::{self, FileKind};
 use crate::formats::model_file;
@@ -154,8 +154,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 /// The IMU that is needed.
 fn sought(args: &Args, asked: &Requirements, session: &Session) -> Result<(), Failure> {
     if let Some(out) = &args.out {
-        guard_inputs(out, [args.trajectory.as_path()])?;
-        drop(AtomicFile::create(out)?);
+        claim_file(out, [args.trajectory.as_path()])?;
     }
     let (needed, question) = asked.needed(args.corr_time_s, args.iso_drift).map_err(|e| {
         Failure::input(e)

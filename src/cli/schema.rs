@@ -1,7 +1,9 @@
 //! `nav-sim schema`: JSON schemas of the files people write.
 
 use super::{Failure, Session};
-use crate::formats::{efficiency_file, fusion_files, parameters_file};
+use crate::formats::{
+    contamination_file, efficiency_file, fusion_files, model_file, parameters_file, trajectory_file,
+};
 use crate::scenario::Scenario;
 use crate::study::Study;
 
@@ -32,6 +34,10 @@ enum Kind {
     Parameters,
     /// Where and how a drive begins (`nav-sim fuse --initial`)
     Initial,
+    /// A drive by what the vehicle does (`nav-sim run`)
+    Profile,
+    /// Errors put into recordings (`nav-sim synthesize --contaminate`)
+    Contamination,
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
@@ -39,9 +45,11 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         Kind::Scenario => schemars::schema_for!(Scenario).to_value(),
         Kind::Study => schemars::schema_for!(Study).to_value(),
         Kind::Efficiency => efficiency_file::schema(),
-        Kind::Model => crate::formats::model_file::schema(),
+        Kind::Model => model_file::schema(),
         Kind::Parameters => parameters_file::schema(),
         Kind::Initial => fusion_files::initial_schema(),
+        Kind::Profile => trajectory_file::profile_schema(),
+        Kind::Contamination => contamination_file::schema(),
     };
     session.printer.result(crate::report::json(&schema).trim_end());
     Ok(())

@@ -5,7 +5,7 @@ use super::pictures::PageArgs;
 use super::run::{OutageArg, parse_outage, scenario_with};
 use super::{Failure, Session, read, turn_on};
 use crate::ekf::FilterStates;
-use crate::formats::atomic::{AtomicFile, guard_inputs};
+use crate::formats::atomic::claim_file;
 use crate::formats::model_file::{self, ModelFile};
 use crate::jobs::{self, TuneInputs};
 use crate::noise::Model;
@@ -76,8 +76,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let files = files(args)?;
     args.pictures.guard(&files.iter().map(|f| PathBuf::from(&f.path)).collect::<Vec<_>>())?;
     if let Some(out) = &args.out {
-        guard_inputs(out, files.iter().map(|f| Path::new(&f.path)))?;
-        drop(AtomicFile::create(out)?);
+        claim_file(out, files.iter().map(|f| Path::new(&f.path)))?;
     }
     let file = read::model(&args.model, session)?;
     let model = read::at_rate(&args.model, &file.model, scenario.imu.rate_hz, session)?;

@@ -60,12 +60,7 @@ fn parse(path: &str, text: &str) -> Result<Vec<NamedCurve>, FileError> {
 
 fn csv(path: &str, text: &str) -> Result<NamedCurve, FileError> {
     let table = Table::read(path, text.as_bytes(), None, Numbers::Finite)?;
-    let column = |name: &'static str| {
-        let missing = || Kind::Columns(format!("no column is named \"{name}\"").into());
-        let at = table.columns.iter().position(|c| c == name);
-        at.ok_or_else(|| FileError::new(path, table.header_line, missing()))
-    };
-    let columns = [column("tau_samples")?, column("wv")?, column("edof")?];
+    let columns = table.named(["tau_samples", "wv", "edof"])?;
     let mut curve = Curve::default();
     for (line, row) in &table.rows {
         push(&mut curve, path, &Place::Line(*line), columns.map(|at| row[at]))?;

@@ -56,6 +56,16 @@ pub fn beside(model: &Path) -> PathBuf {
     model.with_extension("draws.json")
 }
 
+/// The draws beside a model file, at the rate of an IMU, if there are any.
+///
+/// # Errors
+/// Why those that are there cannot be used, in words.
+pub(crate) fn usable(path: &Path, model: &Model, rate_hz: f64) -> Result<Option<Draws>, String> {
+    let Some(file) = read(path).map_err(|e| e.to_string())? else { return Ok(None) };
+    let draws = file.draws(model).and_then(|draws| draws.at_rate(rate_hz).ok());
+    draws.map(Some).ok_or_else(|| format!("{} is not of {}", beside(path).display(), path.display()))
+}
+
 /// The draws beside a model file; none where there is no such file.
 ///
 /// # Errors

@@ -14,10 +14,14 @@
 //! sensor, and that over what is said of all.
 
 use super::FileError;
+use super::toml_described::Finite;
 use super::toml_file::{Section, Source};
 use crate::calibration::{ModelSpec, ParameterLimit};
 use crate::imu::{Axis, Sensor};
 use crate::noise::Kind;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde_json::{Map, Value, json};
 use std::path::Path;
 use toml::de::DeTable;
 
@@ -120,7 +124,7 @@ fn of_processes(
         table.only(&spec.parameter_names(process))?;
         for parameter in table.keys() {
             let Some(range) = table.section(parameter)? else { continue };
-            let (low, high) = bounds(&table, parameter, &range)?;
+            let (low, high) = bounds(&table, parameter, &range.read()?)?;
             let refuse = |e: crate::calibration::LimitError| {
                 table.refuse(parameter, format!("is not possible: {e}"), Some(e.hint()))
             };
@@ -132,14 +136,22 @@ fn of_processes(
     Ok(())
 }
 
-/// `{ fix = v }`, or `{ lower = v, upper = v }`, one of the two.
+/// Where a parameter may be, in the units of model files: fixed, or bounded on one side or both
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(inline, extend("oneOf" = [{ "required": ["fix"], "maxProperties": 1 }, { "minProperties": 1, "not": { "required": ["fix"] } }]))]
+struct Range {
+    fix: Option<Finite>,
+    lower: Option<Finite>,
+    upper: Option<Finite>,
+}
+
 fn bounds(
     table: &Section<'_>,
     parameter: &str,
-    range: &Section<'_>,
+    range: &Range,
 ) -> Result<(Option<f64>, Option<f64>), FileError> {
-    range.only(&["fix", "lower", "upper"])?;
-    let (fix, lower, upper) = (range.f64("fix")?, range.f64("lower")?, range.f64("upper")?);
+    let [fix, lower, upper] = [range.fix, range.lower, range.upper].map(|value| value.map(|v| v.0));
     let hint = || Some("{ fix = 0.98 }, or { lower = 0.9, upper = 0.99 }, or one of these two".to_owned());
     match (fix, lower, upper) {
         (Some(value), None, None) => Ok((Some(value), Some(value))),
@@ -149,49 +161,33 @@ fn bounds(
     }
 }
 
-/// The JSON schema of such a file.
+/// The JSON schema of such a file: [`Range`] under the names of the table of processes.
 #[must_use]
 pub(crate) fn schema() -> serde_json::Value {
-    use serde_json::json;
-    let number = json!({ "type": "number" });
-    let range = json!({
-        "description": "Where a parameter may be, in the units of model files",
-        "oneOf": [
-            { "type": "object", "properties": { "fix": number }, "required": ["fix"], "additionalProperties": false },
-            { "type": "object", "properties": { "lower": number, "upper": number }, "minProperties": 1,
-              "additionalProperties": false }
-        ]
-    });
-    let of = |names: &[&str]| {
-        let properties: serde_json::Map<String, serde_json::Value> =
-            names.iter().map(|n| ((*n).to_owned(), range.clone())).collect();
-        json!({ "type": "object", "properties": properties, "additionalProperties": false })
+    let mut range = schemars::schema_for!(Range);
+    range.remove("$schema");
+    range.remove("title");
+    let of_kind = |kind: Kind| {
+        let ranges: Map<String, Value> =
+            kind.parameters().iter().map(|p| (p.name().to_owned(), range.clone().to_value())).collect();
+        let repeats = if matches!(kind, Kind::Ar1 | Kind::GaussMarkov) { "(_[1-9])?" } else { "" };
+        let table = json!({ "type": "object", "properties": ranges, "additionalProperties": false });
+        (format!("^{}{repeats}$", kind.code()), table)
     };
-    let processes = json!({
-        "^WN$": of(&["sigma2"]),
-        "^QN$": of(&["q2"]),
-        "^AR1(_[1-9])?$": of(&["phi", "sigma2"]),
-        "^GM(_[1-9])?$": of(&["beta", "s2"]),
-        "^MA1$": of(&["theta", "sigma2"]),
-        "^RW$": of(&["gamma2"]),
-        "^DR$": of(&["slope"]),
-    });
-    let axis = json!({ "type": "object", "patternProperties": processes, "additionalProperties": false });
-    let sensor = json!({
-        "type": "object",
-        "patternProperties": processes,
-        "properties": { "x": axis, "y": axis, "z": axis },
-        "additionalProperties": false
-    });
-    json!({
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "Parameters",
-        "description": "What is known of a model's parameters before it is fitted: nav-sim calibrate --parameters",
-        "type": "object",
-        "patternProperties": processes,
-        "properties": { "schema": { "const": 1 }, "accel": sensor, "gyro": sensor },
-        "additionalProperties": false
-    })
+    let processes: Map<String, Value> = Kind::ALL.into_iter().map(of_kind).collect();
+    let table = |inner: Value| {
+        json!({
+            "type": "object", "patternProperties": processes, "properties": inner, "additionalProperties": false
+        })
+    };
+    let axis = table(json!({}));
+    let sensor = table(json!({ "x": axis, "y": axis, "z": axis }));
+    let mut file = table(json!({ "schema": { "const": 1 }, "accel": sensor, "gyro": sensor }));
+    file["$schema"] = "https://json-schema.org/draft/2020-12/schema".into();
+    file["title"] = "Parameters".into();
+    file["description"] =
+        "What is known of a model's parameters before it is fitted: nav-sim calibrate --parameters".into();
+    file
 }
 
 #[cfg(test)]

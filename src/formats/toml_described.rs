@@ -6,6 +6,8 @@ use super::suggest::nearest;
 use super::toml_file::{Section, Source, missing_key, shown, unknown_key};
 use super::toml_path::{dotted, path_at, span_of};
 use crate::units::SettingError;
+use schemars::JsonSchema;
+use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use toml::Spanned;
 use toml::de::{DeTable, Deserializer};
@@ -36,7 +38,7 @@ impl<'a> Document<'a> {
     /// # Errors
     /// File, line, key and value of what is refused; a mistyped key with the nearest legal one.
     pub(crate) fn read<T: DeserializeOwned>(&self) -> Result<T, FileError> {
-        T::deserialize(Deserializer::from(self.table.clone())).map_err(|e| self.explained(&e))
+        self.root().read()
     }
 
     /// The line of a dotted key, or of the innermost table around it that the file has.
@@ -56,12 +58,39 @@ impl<'a> Document<'a> {
         let error = error.advice_if(advice.map(str::to_owned));
         if is_set { error } else { error.advice("the file does not set it: this is the default") }
     }
+}
+
+impl Section<'_> {
+    /// The table as its description has it.
+    ///
+    /// # Errors
+    /// File, line, key and value of what is refused; a mistyped key with the nearest legal one.
+    pub(crate) fn read<T: DeserializeOwned>(&self) -> Result<T, FileError> {
+        let table = Spanned::new(self.span.clone(), self.table.clone());
+        T::deserialize(Deserializer::from(table)).map_err(|e| self.explained(&e))
+    }
+
+    /// The table as one of several descriptions that a word in it tells apart: beside keys that all of them
+    /// have, those of this one.
+    ///
+    /// # Errors
+    /// As [`Section::read`].
+    pub(crate) fn read_own<T: DeserializeOwned + JsonSchema>(&self, beside: &[&str]) -> Result<T, FileError> {
+        let schema = schemars::schema_for!(T);
+        let own = schema.get("properties").and_then(|properties| properties.as_object());
+        let own = own.into_iter().flat_map(|keys| keys.keys().map(String::as_str));
+        self.only(&beside.iter().copied().chain(own).collect::<Vec<_>>())?;
+        self.read()
+    }
 
     /// A refusal by serde as one by key.
     fn explained(&self, error: &toml::de::Error) -> FileError {
         let (source, span) = (self.source, error.span().unwrap_or_default());
         let line = source.line(span.start);
-        let path = path_at(self.table.get_ref(), &span);
+        let path = match path_at(self.table, &span) {
+            path if path.is_empty() || span == self.span => self.name.clone(),
+            path => self.key(&path),
+        };
         let message = error.message();
         let quoted: Vec<&str> = message.split('`').skip(1).step_by(2).collect();
         if message.starts_with("unknown field") && !quoted.is_empty() {
@@ -74,8 +103,31 @@ impl<'a> Document<'a> {
         let reason = reason(message, &quoted).into();
         let meant = quoted.split_first().filter(|_| message.starts_with("unknown variant"));
         let meant = meant.and_then(|(word, legal)| nearest(word, legal.iter().copied()));
-        let kind = Kind::Value { key: path.into(), value, reason };
-        source.error(line, kind).advice_if(meant.map(|meant| format!("did you mean \"{meant}\"?")))
+        let advice = match meant {
+            Some(meant) => Some(format!("did you mean \"{meant}\"?")),
+            None if message == Finite::REFUSAL => Some(Finite::ADVICE.to_owned()),
+            None => None,
+        };
+        source.error(line, Kind::Value { key: path.into(), value, reason }).advice_if(advice)
+    }
+}
+
+/// A number that is neither nan nor inf.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, JsonSchema)]
+#[serde(try_from = "f64")]
+#[schemars(inline)]
+pub(crate) struct Finite(pub(crate) f64);
+
+impl Finite {
+    pub(super) const REFUSAL: &str = "is not a finite number";
+    pub(super) const ADVICE: &str = "a number such as 1.5e-4; neither nan nor inf";
+}
+
+impl TryFrom<f64> for Finite {
+    type Error = &'static str;
+
+    fn try_from(value: f64) -> Result<Self, Self::Error> {
+        if value.is_finite() { Ok(Self(value)) } else { Err(Self::REFUSAL) }
     }
 }
 
@@ -94,6 +146,8 @@ fn reason(message: &str, quoted: &[&str]) -> String {
         Some("a boolean") => "is not true or false".to_owned(),
         Some(other) if !other.contains(' ') => format!("is refused: {message}"),
         Some(other) => format!("is not {}", other.strip_prefix("struct").map_or(other, |_| "a table")),
+        // a type of ours says it in words that follow the value
+        None if message.starts_with("is ") => message.to_owned(),
         None => format!("is refused: {message}"),
     }
 }
@@ -101,7 +155,6 @@ fn reason(message: &str, quoted: &[&str]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use serde::Deserialize;
 
     #[derive(Debug, Deserialize)]
     #[serde(deny_unknown_fields)]

@@ -4,7 +4,10 @@
 use super::error::{FileError, Kind, Place, Setting};
 use super::source;
 use super::suggest::nearest;
+use super::toml_described::Finite;
+use super::toml_path::dotted;
 use std::io::{self, ErrorKind};
+use std::ops::Range;
 use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -101,7 +104,7 @@ impl Source {
     }
 
     pub(crate) fn root<'a>(&'a self, table: &'a Spanned<DeTable<'a>>) -> Section<'a> {
-        Section { source: self, name: String::new(), at: 0, table: table.get_ref() }
+        Section { source: self, name: String::new(), span: table.span(), table: table.get_ref() }
     }
 
     pub(crate) fn text(&self) -> &str {
@@ -128,16 +131,16 @@ type Value<'a> = &'a Spanned<DeValue<'a>>;
 /// One table of a file, with its name for messages.
 #[derive(Debug, Clone)]
 pub(crate) struct Section<'a> {
-    source: &'a Source,
-    name: String,
-    at: usize,
-    table: &'a DeTable<'a>,
+    pub(super) source: &'a Source,
+    pub(super) name: String,
+    pub(super) span: Range<usize>,
+    pub(super) table: &'a DeTable<'a>,
 }
 
 impl<'a> Section<'a> {
     /// Dotted name of a key of this table.
     pub(crate) fn key(&self, key: &str) -> String {
-        if self.name.is_empty() { key.to_owned() } else { format!("{}.{key}", self.name) }
+        dotted(&self.name, key)
     }
 
     /// Keys in the order of the file.
@@ -150,14 +153,14 @@ impl<'a> Section<'a> {
     /// Refuses every key that is not listed.
     pub(crate) fn only(&self, legal: &[&str]) -> Result<(), FileError> {
         let Some(key) = self.keys().into_iter().find(|k| !legal.contains(k)) else { return Ok(()) };
-        let at = self.table.keys().find(|k| k.get_ref() == key).map_or(self.at, |k| k.span().start);
+        let at = self.table.keys().find(|k| k.get_ref() == key).map_or(self.span.start, |k| k.span().start);
         let line = self.source.line(at);
         Err(unknown_key(self.source, line, self.key(key), key, legal.iter().copied()))
     }
 
     /// The line it begins in.
     fn line(&self) -> usize {
-        self.source.line(self.at)
+        self.source.line(self.span.start)
     }
 
     pub(crate) fn has(&self, key: &str) -> bool {
@@ -179,17 +182,11 @@ impl<'a> Section<'a> {
 
     /// A refusal of the value of a key that is there.
     pub(crate) fn refuse(&self, key: &str, reason: impl Into<String>, hint: Option<String>) -> FileError {
-        let span = self.get(key).map_or(self.at..self.at, Spanned::span);
+        let span = self.get(key).map_or(self.span.start..self.span.start, Spanned::span);
         self.refuse_at(span, self.key(key), reason.into(), hint)
     }
 
-    fn refuse_at(
-        &self,
-        span: std::ops::Range<usize>,
-        key: String,
-        reason: String,
-        hint: Option<String>,
-    ) -> FileError {
+    fn refuse_at(&self, span: Range<usize>, key: String, reason: String, hint: Option<String>) -> FileError {
         let value = shown(self.source.text.get(span.clone()).unwrap_or_default());
         let kind = Kind::Value { key: key.into(), value: value.into(), reason: reason.into() };
         self.source.error(self.source.line(span.start), kind).advice_if(hint)
@@ -202,10 +199,10 @@ impl<'a> Section<'a> {
     /// A finite number.
     pub(crate) fn f64(&self, key: &str) -> Result<Option<f64>, FileError> {
         let Some(value) = self.get(key) else { return Ok(None) };
-        number(value).filter(|x| x.is_finite()).map(Some).ok_or_else(|| {
-            let hint = "a number such as 1.5e-4; neither nan nor inf".to_owned();
-            self.refuse(key, "is not a finite number", Some(hint))
-        })
+        number(value)
+            .filter(|x| x.is_finite())
+            .map(Some)
+            .ok_or_else(|| self.refuse(key, Finite::REFUSAL, Some(Finite::ADVICE.to_owned())))
     }
 
     pub(crate) fn require_f64(&self, key: &str) -> Result<f64, FileError> {
@@ -237,14 +234,6 @@ impl<'a> Section<'a> {
         integer(value).map(Some).ok_or_else(|| self.wrong_type(key, "a whole number ≥ 0"))
     }
 
-    /// A list of whole numbers ≥ 0.
-    pub(crate) fn u64s(&self, key: &str) -> Result<Option<Vec<u64>>, FileError> {
-        let Some(value) = self.get(key) else { return Ok(None) };
-        let error = || self.wrong_type(key, "a list of whole numbers ≥ 0");
-        let items = value.get_ref().as_array().ok_or_else(error)?;
-        items.iter().map(integer).collect::<Option<Vec<u64>>>().map(Some).ok_or_else(error)
-    }
-
     pub(crate) fn str(&self, key: &str) -> Result<Option<&'a str>, FileError> {
         let Some(value) = self.get(key) else { return Ok(None) };
         value.get_ref().as_str().map(Some).ok_or_else(|| self.wrong_type(key, "a text in quotes"))
@@ -264,7 +253,7 @@ impl<'a> Section<'a> {
     pub(crate) fn section(&self, key: &str) -> Result<Option<Section<'a>>, FileError> {
         let Some(value) = self.get(key) else { return Ok(None) };
         let table = value.get_ref().as_table().ok_or_else(|| self.wrong_type(key, "a table"))?;
-        Ok(Some(Section { source: self.source, name: self.key(key), at: value.span().start, table }))
+        Ok(Some(Section { source: self.source, name: self.key(key), span: value.span(), table }))
     }
 
     pub(crate) fn is_list(&self, key: &str) -> bool {
@@ -282,7 +271,7 @@ impl<'a> Section<'a> {
         let section = |(i, v): (usize, Value<'a>)| {
             let name = self.key(&format!("{key}[{}]", i + 1));
             match v.get_ref().as_table() {
-                Some(table) => Ok(Section { source: self.source, name, at: v.span().start, table }),
+                Some(table) => Ok(Section { source: self.source, name, span: v.span(), table }),
                 None => Err(self.refuse_at(v.span(), name, "is not a table".into(), None)),
             }
         };

@@ -5,7 +5,7 @@ use crate::calibration::{Diagnosis, Estimator, Outcome};
 use crate::formats::atomic::{self, AtomicFile, Existing};
 use crate::formats::draws_file::{self, DrawsFile};
 use crate::formats::model_file::{self, CalibrationNote, ModelFile};
-use crate::formats::{FileError, hash};
+use crate::formats::{FileError, Place, Setting, hash};
 use crate::noise::Model;
 use crate::report::{self, CurvesFile};
 use std::io::Write;
@@ -39,11 +39,51 @@ impl ModelFiles {
         estimators.iter().map(files).collect()
     }
 
+    /// The files of each estimator, found out before the work to be writable and none of them an input.
+    ///
+    /// # Errors
+    /// When one cannot be made, or is an input.
+    pub(crate) fn claim(
+        out: &Path,
+        estimators: &[Estimator],
+        inputs: &[PathBuf],
+    ) -> Result<Vec<Self>, FileError> {
+        let all = Self::of(out, estimators);
+        for path in all.iter().flat_map(|f| [&f.model, &f.curves, &f.draws, &f.page]) {
+            writable(path)?;
+            atomic::guard_inputs(path, inputs.iter().map(PathBuf::as_path))?;
+        }
+        Ok(all)
+    }
+
+    /// Writes the files of all estimators, the pages among them; their names.
+    ///
+    /// # Errors
+    /// When other models are there and are to stay, or the system refuses.
+    pub(crate) fn write_all<'a>(
+        all: &'a [Self],
+        calibration: &Calibration,
+        note: &CalibrationNote,
+        diagnoses: &[Diagnosis],
+        existing: Existing,
+    ) -> Result<Vec<&'a Path>, FileError> {
+        all.iter().try_for_each(|files| files.guard(calibration, note, existing))?;
+        let has_draws = calibration.outcomes.iter().any(|o| o.inference.is_some());
+        let mut written = Vec::new();
+        for files in all {
+            files.write(calibration, note)?;
+            files.write_page(calibration, diagnoses)?;
+            let draws = has_draws.then_some(&files.draws);
+            written.extend([&files.model, &files.curves].into_iter().chain(draws).chain([&files.page]));
+        }
+        Ok(written.into_iter().map(PathBuf::as_path).collect())
+    }
+
     /// Refuses to put other models in the place of those that are there.
     ///
     /// # Errors
     /// When there are others, and they are to stay.
-    pub fn guard(
+    fn guard(
         &self,
         calibration: &Calibration,
         note: &CalibrationNote,
@@ -114,13 +154,68 @@ impl ModelFiles {
     ///
     /// # Errors
     /// When the system refuses.
-    pub fn write_page(&self, calibration: &Calibration, diagnoses: &[Diagnosis]) -> Result<(), FileError> {
+    pub(super) fn write_page(
+        &self,
+        calibration: &Calibration,
+        diagnoses: &[Diagnosis],
+    ) -> Result<(), FileError> {
         let Calibration { groups, outcomes, settings, turn_on } = calibration;
         let own = outcomes.iter().enumerate().filter(|(_, o)| o.estimator == self.estimator);
         let own: Vec<(usize, &Outcome)> = own.collect();
         let curves = CurvesFile::new(groups, &own.iter().map(|(_, o)| *o).collect::<Vec<_>>(), settings);
         atomic::write(&self.page, report::calibration_page(&curves, &own, diagnoses, turn_on, settings))
     }
+}
+
+/// Fails before the work is done, not after, if nothing can be written there: several files are made of it, by its name.
+///
+/// # Errors
+/// When it cannot be replaced by a file.
+pub(crate) fn writable(out: &Path) -> Result<(), FileError> {
+    let what = match std::fs::metadata(out) {
+        Ok(m) if m.is_dir() => "is a directory",
+        Ok(m) if !m.is_file() => "is a device, and a model is a file with its curves beside it",
+        _ if out.file_name().is_none() || out.as_os_str().to_string_lossy().ends_with('/') => {
+            "is a directory"
+        }
+        _ => return AtomicFile::create(out).map(drop),
+    };
+    let error = FileError::contents(out.display().to_string(), Place::Itself, what);
+    Err(error.advice("name a file, such as model.toml"))
+}
+
+/// Refuses at once what would be refused after the work: a file that is no calibration is another result, and where the
+/// bootstrap, and so the file, is another each time (`drawn`), so is a calibration.
+///
+/// # Errors
+/// When the file is to stay.
+pub(crate) fn not_anew(out: &Path, drawn: bool, existing: Existing) -> Result<(), FileError> {
+    if drawn || !is_calibrated(out) {
+        atomic::guard_contents(out, &[], existing)?;
+    }
+    Ok(())
+}
+
+/// Refuses to replace a file of the default name that no calibration wrote: nobody asked for it by name.
+///
+/// # Errors
+/// When there is one.
+pub(crate) fn not_of_others(out: &Path) -> Result<(), FileError> {
+    if !out.exists() || is_calibrated(out) {
+        return Ok(());
+    }
+    let message = "is not a model that nav-sim calibrate wrote: it is not replaced";
+    let error = FileError::contents(out.display().to_string(), Place::Itself, message);
+    Err(error.setting(Setting::Output).advice("move that file away"))
+}
+
+/// Whether a file is a model that a calibration wrote.
+fn is_calibrated(path: &Path) -> bool {
+    let provenance = model_file::read(path).ok().and_then(|file| file.provenance);
+    provenance.is_some_and(|p| {
+        let program = p.get("program").and_then(toml::Value::as_str);
+        program.is_some_and(|name| name.starts_with("nav-sim")) && p.contains_key("estimator")
+    })
 }
 
 /// A file that is written but does not have its name yet.

@@ -43,7 +43,7 @@ impl FusionFilter<'_> {
     ///
     /// # Errors
     /// When the model cannot be converted to the rate, or has no such filter.
-    pub fn belief(
+    pub(super) fn belief(
         &self,
         rate_hz: f64,
         gnss: &[GnssFix],

@@ -23,7 +23,9 @@
 //! ```
 
 mod calibrate;
+mod catalogue;
 mod certify;
+mod choice_files;
 mod choose;
 mod compare;
 mod curves;
@@ -32,10 +34,12 @@ mod error;
 mod estimator_study;
 mod files;
 mod fuse;
+mod fusion;
 mod navigate;
 mod reduction;
 mod remarks;
 mod require;
+mod start_files;
 mod synthesize;
 mod tune;
 pub(crate) mod turn_on;
@@ -44,7 +48,9 @@ mod wavelet;
 
 pub use crate::report::BeginsOtherwise;
 pub use calibrate::{Calibration, CalibrationOptions, EstimatorChoice, Measured, calibrate, measure};
+pub(crate) use catalogue::{catalogue_json, catalogue_text};
 pub use certify::{Certificate, CertifiedScale, CertifyError, Recorded, certify};
+pub(crate) use choice_files::claim_choice;
 pub use choose::{ChoiceDrive, Chosen, choose};
 pub use compare::{CompareError, Comparison, compare};
 pub use curves::{Curves, read_curves};
@@ -52,11 +58,14 @@ pub use design::{DesignError, DesignInputs, Destination, design};
 pub use error::JobError;
 pub use estimator_study::{EstimatorStudy, EstimatorStudyError};
 pub use files::ModelFiles;
+pub(crate) use files::{not_anew, not_of_others, writable};
 pub use fuse::{FusionFilter, FusionFilterError};
+pub use fusion::{FuseError, Fused, RecordedDrive};
 pub use navigate::{NavigateError, NavigateInputs, Navigation, Note, TrueImu, navigate};
 pub use reduction::Reduced;
 pub use remarks::{Remark, Remarks, Silence};
 pub use require::{Ask, CatalogueUnit, Misplaced, Requirements};
+pub(crate) use start_files::{StartFiles, write_start_files};
 pub use synthesize::{Synthesis, SynthesisError};
 pub(crate) use tune::{TuneInputs, tune, tuned};
 pub use wavelet::{Intervals, WaveletOptions, wavelet_variances};

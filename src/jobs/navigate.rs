@@ -5,6 +5,7 @@ use super::reduction::Reduced;
 use super::uncertainty::Analysed;
 use crate::ekf::{Belief, BeliefError};
 use crate::formats::draws_file::Draws;
+use crate::fusion::{Assessment as Trust, Start};
 use crate::imu::{Recording, Sensor};
 use crate::metrics::{
     Agreement, Budget, EpochMetrics, Expected, FanEpoch, ReductionQuality, ReductionSummary, Sensitivities,
@@ -16,7 +17,7 @@ use crate::noise::{Model, ParameterError};
 use crate::observer::Observer;
 use crate::scenario::{Method, Scenario};
 use crate::sensors::imu::Truth;
-use crate::sensors::outage::Outage;
+use crate::sensors::outage::{Outage, OutageRemark};
 use crate::simulation::lincov::{
     Assessment, FilterPass, HeadingDoubt, NamedSource, Track, TruthSide, assess, weak_heading,
 };
@@ -79,6 +80,14 @@ pub enum Note {
     Heading(HeadingDoubt),
     /// What the runs say beside what the covariance analysis expects.
     Agreement(Agreement),
+    /// A window without fixes is not as it was asked for.
+    Outage(OutageRemark),
+    /// Where the filter starts on a recorded drive.
+    Start(Start),
+    /// A window that ends before the start of the solution (s): it is not an outage.
+    EarlyOutage(Outage, f64),
+    /// Whether the solution of a recorded drive is to be believed, and how far it is from the reference at most (m).
+    Fused(Trust, Option<f64>),
 }
 
 /// Why a job cannot be done.
@@ -122,6 +131,9 @@ pub fn navigate(
     }
     let track = scenario.track(&inputs.trajectory, &inputs.model, outages)?;
     let belief = scenario.belief(&inputs.model, outages, &track)?;
+    if let TrueImu::Recordings(recordings) = &inputs.truth {
+        recordings.iter().filter_map(motion).for_each(|doubt| observer.remark(&Note::Unexpected(doubt)));
+    }
     doubt(&belief, scenario, observer);
     let reduction = reduction(inputs, scenario, outages, &belief, &track, observer)?;
     let assessment = assess(&track, &belief, &inputs.model);
@@ -181,6 +193,29 @@ fn doubt(belief: &Belief, scenario: &Scenario, observer: &dyn Observer<Note>) {
         }
     }
     scenario.doubts().into_iter().for_each(|doubt| observer.remark(&Note::Unexpected(doubt)));
+}
+
+/// Means over a second that differ so much are motion, not noise: m/s², rad/s.
+const MOTION: (f64, f64) = (0.5, 0.05);
+
+/// Where a recording is not static.
+fn motion(recording: &Recording) -> Option<String> {
+    let second = (recording.rate_hz.round() as usize).max(1);
+    recording.signals.iter().find_map(|signal| {
+        let limit = if signal.channel.sensor == Sensor::Accel { MOTION.0 } else { MOTION.1 };
+        let means = signal.samples.chunks_exact(second).map(|c| c.iter().sum::<f64>() / second as f64);
+        let (low, high) = means.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), m| (l.min(m), h.max(m)));
+        let message = format!(
+            "{}: not static? The mean over a second of {} goes from {:.3} to {:.3} {}: motion becomes errors of the \
+             IMU",
+            recording.name,
+            signal.channel,
+            low + signal.mean,
+            high + signal.mean,
+            signal.channel.sensor.unit()
+        );
+        (high - low > limit).then_some(message)
+    })
 }
 
 /// The reduction of the model for these outages; none where nothing is reduced.

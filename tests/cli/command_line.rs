@@ -144,6 +144,40 @@ fn the_files_of_init_are_what_they_should_be() {
     }
 }
 
+/// Tables that a word tells apart: the schema has that word, and every key under it.
+#[test]
+fn schemas_describe_the_tables_of_profiles_and_contaminations() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    for (kind, file, word, lists) in [
+        ("profile", "examples/motion.toml", "kind", &["segment"][..]),
+        ("profile", "trajectories/figure_eight.toml", "kind", &["segment"]),
+        ("contamination", "examples/contamination.toml", "operation", &["accel", "gyro"]),
+        ("contamination", "calib_data/contamination/section5-III.toml", "operation", &["accel", "gyro"]),
+    ] {
+        let output = nav_sim().args(["schema", kind]).output().unwrap();
+        let schema: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+        let definition = |of: &serde_json::Value| {
+            schema["$defs"][of["$ref"].as_str().unwrap().rsplit('/').next().unwrap()].clone()
+        };
+        let table: toml::Table = std::fs::read_to_string(root.join(file)).unwrap().parse().unwrap();
+        assert!(table.keys().all(|key| schema["properties"][key].is_object()), "{file}");
+        for (list, entry) in lists
+            .iter()
+            .filter_map(|l| Some((l, table.get(*l)?.as_array()?)))
+            .flat_map(|(l, e)| e.iter().map(move |e| (l, e)))
+        {
+            let items = definition(&schema["properties"][list]["items"]);
+            let name = entry[word].as_str().unwrap();
+            let mut kinds = items["oneOf"].as_array().unwrap().iter();
+            let own = kinds.find(|of| of["properties"][word]["const"] == name).unwrap();
+            let keys = &definition(own)["properties"];
+            let is_known =
+                |key: &String| key == word || keys[key].is_object() || items["properties"][key].is_object();
+            assert!(entry.as_table().unwrap().keys().all(is_known), "{file}: {entry}");
+        }
+    }
+}
+
 /// What `init` makes is all that the examples of the help texts name.
 #[test]
 fn init_makes_every_file_that_the_help_names() {

@@ -294,7 +294,7 @@ fn a_table_that_was_changed_is_refused() {
         assert!(!directory.path().join("comparison.json").exists());
     };
     std::fs::write(&epochs, changed("nan")).unwrap();
-    refused("error: a/epochs.csv, line 7: column \"asee_pos_e_m\": \"nan\" is not a number");
+    refused("error: a/epochs.csv, line 7: column \"asee_pos_e_m\": NaN is not finite");
     std::fs::write(&epochs, changed("2.5")).unwrap();
     refused("error: a/epochs.csv: is not what its manifest.json says");
     let mut old: serde_json::Value =

@@ -156,9 +156,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 fn recordings(args: &Args, settings: Settings, session: &Session) -> Result<(), Failure> {
     let out = args.out.as_deref().unwrap_or(Path::new("model.toml"));
-    output::writable(out)?;
+    jobs::writable(out)?;
     if args.out.is_none() {
-        output::not_of_others(out)?;
+        jobs::not_of_others(out)?;
     }
     let options = CalibrationOptions {
         reading: args.recordings.options(),
@@ -171,7 +171,8 @@ fn recordings(args: &Args, settings: Settings, session: &Session) -> Result<(), 
         turn_on: !args.no_turn_on,
     };
     if args.estimator != EstimatorChoice::All {
-        output::not_anew(out, args.bootstrap > 0, session)?;
+        let drawn = args.bootstrap > 0 && session.asked_seed().is_none();
+        jobs::not_anew(out, drawn, session.existing())?;
     }
     let measured = jobs::measure(&args.inputs, &options, &mut Said::new(session))?;
     let files: Vec<PathBuf> = measured.report.files.iter().map(|f| f.path.clone()).collect();

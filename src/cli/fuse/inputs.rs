@@ -1,35 +1,30 @@
 //! The files of a fusion.
 
 use super::Args;
-use crate::cli::run::Words;
 use crate::cli::{Failure, Session, parse, read, turn_on};
-use crate::ekf::{Belief, FilterStates, InitialSettings};
-use crate::formats::fusion_files::{FixSigma, ImuFile, read_gnss, read_imu, read_initial};
+use crate::ekf::{FilterStates, InitialSettings};
+use crate::formats::fusion_files::{FixSigma, read_gnss, read_imu, read_initial};
+use crate::formats::model_file::ModelFile;
 use crate::frames::RollPitchYaw;
-use crate::fusion::alignment::{self, Alignment};
-use crate::fusion::{FusionError, Recorded, Settings, Start, check_clocks};
-use crate::gnss::GnssFix;
-use crate::jobs::{FusionFilter, FusionFilterError};
+use crate::jobs::RecordedDrive;
 use crate::report::Input;
-use crate::sensors::outage::{FixedData, OutagePlan, PlacedOutages};
-use crate::trajectory::reference::Reference;
 use crate::units::DEG;
 use glam::{DMat3, DQuat, DVec3};
 use std::path::PathBuf;
 
 /// What was read, ready to use.
 pub(super) struct Inputs {
-    pub(super) imu: ImuFile,
-    pub(super) gnss: Vec<GnssFix>,
-    pub(super) belief: Belief,
-    pub(super) reference: Option<Reference>,
-    initial: Option<Start>,
+    pub(super) drive: RecordedDrive,
+    pub(super) model: ModelFile,
+    pub(super) states: FilterStates,
+    /// What the filter expects at the start, and of the IMU beside the model.
+    pub(super) expected: InitialSettings,
     /// Every file with its hash.
     pub(super) files: Vec<Input>,
 }
 
 impl Inputs {
-    pub(super) fn read(args: &Args, settings: &Settings, session: &Session) -> Result<Self, Failure> {
+    pub(super) fn read(args: &Args, session: &Session) -> Result<Self, Failure> {
         let given = (args.initial.as_os_str() != "auto").then_some(&args.initial);
         let mut named: Vec<(&str, &PathBuf)> =
             vec![("imu", &args.imu), ("gnss", &args.gnss), ("model", &args.model)];
@@ -37,42 +32,28 @@ impl Inputs {
         named.extend(args.reference.iter().map(|p| ("reference", p)));
         let files = named.iter().map(|(role, path)| read::input(role, path)).collect::<Result<_, _>>()?;
         let imu = read_imu(&args.imu).map_err(read::refused_for_fusion)?;
-        let (mut gnss, remarks) =
+        let (gnss, remarks) =
             read_gnss(&args.gnss, args.gnss_sigma.as_ref()).map_err(read::refused_for_fusion)?;
         imu.remarks.iter().chain(&remarks).for_each(|r| session.printer.warn(r));
-        if let Some(parse::Pair([position, velocity])) = args.gnss_sigma_factor {
-            scale(&mut gnss, position, velocity);
-        }
-        check_clocks(&Recorded { imu: &imu.samples, gnss: &gnss }).map_err(impossible)?;
         let initial = given.map(|path| read_initial(path)).transpose()?;
-        let start = initial.as_ref().map(|start| start.sigma.clone()).unwrap_or_default();
-        let belief = belief(args, start, settings, &imu, &gnss, session)?;
-        let reference = args.reference.as_deref().map(|path| read::reference(path, session)).transpose()?;
-        Ok(Self { imu, gnss, belief, reference, initial, files })
-    }
-
-    /// Where the filter starts.
-    pub(super) fn start(
-        &self,
-        args: &Args,
-        recorded: &Recorded<'_>,
-        settings: &Settings,
-    ) -> Result<Alignment, Failure> {
-        if let Some(start) = &self.initial {
-            return Ok(Alignment { start: start.clone(), doubts: Vec::new() });
+        let model = read::model(&args.model, session)?;
+        let (from, to) = (model.model.rate_hz, imu.rate_hz);
+        if (to / from - 1.0).abs() > 0.01 {
+            let shown = args.model.display();
+            session.printer.say(&format!("{shown}: converted from {from} Hz to {to:.3} Hz"));
         }
-        alignment::coarse(recorded, settings, &self.belief).map_err(|e| {
-            let failure = Failure::input(format!("{}: {e}", args.gnss.display()));
-            failure.hint("give the start with --initial FILE (t_s, lat_deg, lon_deg, h_m, roll_deg, pitch_deg, yaw_deg)")
-        })
+        let mut expected = initial.as_ref().map(|start| start.sigma.clone()).unwrap_or_default();
+        let mut states = FilterStates::default();
+        args.filter.over(&mut states, &mut expected);
+        turn_on::expect(&mut expected, &model, &args.model, session);
+        expected.validate().map_err(Failure::input)?;
+        let reference = args.reference.as_deref().map(|path| read::reference(path, session)).transpose()?;
+        let mut drive = RecordedDrive { imu: imu.samples, rate_hz: imu.rate_hz, gnss, initial, reference };
+        if let Some(parse::Pair([position, velocity])) = args.gnss_sigma_factor {
+            drive.scale_sigma(position, velocity);
+        }
+        Ok(Self { drive, model, states, expected, files })
     }
-}
-
-/// What does not fit together.
-pub(super) fn impossible(e: FusionError) -> Failure {
-    let failure =
-        if matches!(e, FusionError::Diverged { .. }) { Failure::could_not(&e) } else { Failure::input(&e) };
-    failure.maybe_hint(e.hint())
 }
 
 /// What a logger calls x, y and z.
@@ -126,54 +107,6 @@ pub(super) fn mounting(axes: LoggerAxes, angles_deg: Option<parse::Triple>) -> D
         RollPitchYaw { roll: roll * DEG, pitch: pitch * DEG, yaw: yaw * DEG }.to_quat()
     });
     frd * axes.to_frd()
-}
-
-/// The settings with their outages placed on the fixes.
-pub(super) fn with_outages(
-    settings: Settings,
-    recorded: &Recorded<'_>,
-    session: &Session,
-) -> Result<Settings, Failure> {
-    let times_s: Vec<f64> = recorded.gnss.iter().map(|fix| fix.t_s).collect();
-    let plan = OutagePlan { fixed: settings.outages.clone(), ..OutagePlan::default() };
-    let PlacedOutages { windows, remarks } = plan.on(&FixedData::recorded(&times_s), 0)?;
-    remarks.iter().for_each(|remark| session.printer.warn(&remark.to_string()));
-    Ok(Settings { outages: windows, ..settings })
-}
-
-fn scale(gnss: &mut [GnssFix], position: f64, velocity: f64) {
-    for fix in gnss {
-        fix.pos_sigma_n *= position;
-        if let Some((_, sigma)) = &mut fix.velocity {
-            *sigma *= velocity;
-        }
-    }
-}
-
-/// The filter for the model, with what it expects at the start.
-fn belief(
-    args: &Args,
-    mut initial: InitialSettings,
-    settings: &Settings,
-    imu: &ImuFile,
-    gnss: &[GnssFix],
-    session: &Session,
-) -> Result<Belief, Failure> {
-    let shown = args.model.display();
-    let file = read::model(&args.model, session)?;
-    let (from, to) = (file.model.rate_hz, imu.rate_hz);
-    if (to / from - 1.0).abs() > 0.01 {
-        session.printer.say(&format!("{shown}: converted from {from} Hz to {to:.3} Hz"));
-    }
-    let mut states = FilterStates::default();
-    args.filter.over(&mut states, &mut initial);
-    turn_on::expect(&mut initial, &file, &args.model, session);
-    initial.validate().map_err(Failure::input)?;
-    let filter = FusionFilter { model: &file.model, states, initial: &initial };
-    filter.belief(to, gnss, &settings.outages, &Words::new(session)).map_err(|e| match e {
-        FusionFilterError::Reduction(e) => Failure::could_not(e),
-        e => Failure::input(format!("{shown}: {e}")),
-    })
 }
 
 #[cfg(test)]

@@ -6,16 +6,14 @@ mod output;
 use super::filter::FilterArgs;
 use super::parse::one_of;
 use super::pictures::PlotArgs;
-use super::run::{parse_outage, windows_of};
-use super::{Failure, Session, parse};
+use super::run::{Words, parse_outage, windows_of};
+use super::{Failure, Printer, Session, parse};
 use crate::earth::GravityModel;
 use crate::formats::fusion_files::FixSigma;
-use crate::fusion::alignment::Alignment;
-use crate::fusion::{self, Assessment, Recorded, Settings, Verdict};
-use crate::report::{FusionSummary, fusion_page, seconds};
+use crate::fusion::{Assessment, FusionError, Settings, Verdict};
+use crate::jobs::{FuseError, Fused, FusionFilter, FusionFilterError};
+use crate::report::fusion_page;
 use crate::sensors::gnss::MAX_LEVER_ARM_M;
-use crate::sensors::outage::Outage;
-use crate::simulation::lincov::weak_heading;
 use inputs::Inputs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -102,58 +100,32 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let begin = Instant::now();
     let settings = settings(args)?;
-    let inputs = Inputs::read(args, &settings, session)?;
+    let inputs = Inputs::read(args, session)?;
     output::claim(&args.out, &inputs.files, session)?;
     args.plot.guard(&inputs.files.iter().map(|i| PathBuf::from(&i.path)).collect::<Vec<_>>())?;
-    let recorded = Recorded { imu: &inputs.imu.samples, gnss: &inputs.gnss };
-    let settings = inputs::with_outages(settings, &recorded, session)?;
-    let Alignment { start, doubts } = inputs.start(args, &recorded, &settings)?;
-    for line in &start.how {
-        session.printer.say(&format!("initial state at {} s: {line}", seconds(start.t_s)));
-    }
-    let settings = without_early_outages(settings, start.t_s, session);
-    let solution = fusion::fuse(&recorded, &inputs.belief, &start, &settings, inputs.reference.as_ref())
-        .map_err(inputs::impossible)?;
-    if inputs.reference.is_some() && solution.rows.iter().all(|row| row.error.is_none()) {
-        let message = "the reference and the solution have no time in common";
-        return Err(Failure::input(message).hint("both need one clock"));
-    }
-    let outcome = fusion::outcome(&solution, &settings.outages);
-    let constants = inputs.belief.groups.iter().flatten().filter(|g| g.is_constant()).count();
-    let (rate_hz, states) = (inputs.imu.rate_hz, [inputs.belief.states, 3 * constants]);
-    let assessment = fusion::assess(&solution, &outcome, &doubts).explained(&recorded);
-    warn(&assessment, &outcome, session);
-    doubt_heading(&solution, &settings.outages, session);
-    let summary = FusionSummary::of(&solution, (&outcome, &assessment), &start, rate_hz, states);
-    let wall_s = begin.elapsed().as_secs_f64();
-    output::write(&solution, &summary, inputs.files, wall_s, &args.out)?;
+    let Inputs { drive, model, states, expected, files } = inputs;
+    let filter = FusionFilter { model: &model.model, states, initial: &expected };
+    let fused = drive.fuse(&filter, settings, &Words::new(session)).map_err(|e| impossible(e, args))?;
+    let Fused { solution, outcome, assessment, summary, .. } = fused;
+    output::write(&solution, &summary, files, begin.elapsed().as_secs_f64(), &args.out)?;
     session.show(|| crate::report::json(&summary), || summary.text());
     session.wrote(&args.out);
     args.plot.write(|| fusion_page(&solution, &summary, &[]).svg(), session)?;
     believed(&assessment, &args.out, outcome.nis_per_component)
 }
 
-/// Windows that end before the filter starts withhold nothing: no outages.
-fn without_early_outages(mut settings: Settings, start_s: f64, session: &Session) -> Settings {
-    let is_early = |o: &Outage| o.end_s <= start_s;
-    for o in settings.outages.iter().filter(|o| is_early(o)) {
-        session.printer.warn(&format!(
-            "outage {}:{} lies before the start of the solution at {} s: it is not an outage",
-            seconds(o.start_s),
-            seconds(o.end_s),
-            seconds(start_s)
-        ));
-    }
-    settings.outages.retain(|o| !is_early(o));
-    settings
-}
-
-/// Where the motion hardly shows the heading, no filter of this kind is to be believed.
-fn doubt_heading(solution: &fusion::Solution, outages: &[Outage], session: &Session) {
-    let start_s = solution.rows.first().map_or(0.0, |row| row.t_s);
-    let fixed = solution.rows.iter().filter(|row| !outages.iter().any(|o| o.withholds(row.t_s)));
-    if let Some(doubt) = weak_heading(fixed.map(|row| (row.t_s - start_s, row.sigma[8]))) {
-        session.printer.warn(&doubt.to_string());
+/// Why there is no solution, and what helps.
+fn impossible(e: FuseError, args: &Args) -> Failure {
+    match e {
+        FuseError::Fusion(e @ FusionError::Diverged { .. }) => Failure::could_not(&e).maybe_hint(e.hint()),
+        FuseError::Fusion(e) => Failure::input(&e).maybe_hint(e.hint()),
+        FuseError::Filter(FusionFilterError::Reduction(e)) => Failure::could_not(e),
+        FuseError::Filter(e) => Failure::input(format!("{}: {e}", args.model.display())),
+        FuseError::Outage(e) => e.into(),
+        FuseError::Alignment(e) => Failure::input(format!("{}: {e}", args.gnss.display())).hint(
+            "give the start with --initial FILE (t_s, lat_deg, lon_deg, h_m, roll_deg, pitch_deg, yaw_deg)",
+        ),
+        FuseError::NothingInCommon => Failure::input(e).hint("both need one clock"),
     }
 }
 
@@ -187,19 +159,19 @@ fn settings(args: &Args) -> Result<Settings, Failure> {
 }
 
 /// Says what makes the solution, or the comparison with the reference, doubtful.
-fn warn(assessment: &Assessment, outcome: &fusion::Outcome, session: &Session) {
+pub(super) fn judge(assessment: &Assessment, farthest_m: Option<f64>, printer: &Printer) {
     let told = |(verdict, text): &(Verdict, String)| match verdict {
-        Verdict::Ok | Verdict::Underconfident => session.printer.say(&format!("note: {text}")),
-        Verdict::Doubtful | Verdict::Overconfident => session.printer.warn(text),
+        Verdict::Ok | Verdict::Underconfident => printer.say(&format!("note: {text}")),
+        Verdict::Doubtful | Verdict::Overconfident => printer.warn(text),
     };
     assessment.reasons.iter().for_each(told);
     if assessment.verdict == Verdict::Doubtful {
-        session.printer.say(&format!("hint: {ADVICE}"));
+        printer.say(&format!("hint: {ADVICE}"));
     }
-    if let Some(far) = outcome.horizontal_max_m.filter(|m| *m > ELSEWHERE_M) {
+    if let Some(far) = farthest_m.filter(|m| *m > ELSEWHERE_M) {
         let message = format!(
             "the solution is up to {far:.0} m from the reference: is that of this drive, on this clock?"
         );
-        session.printer.warn(&message);
+        printer.warn(&message);
     }
 }

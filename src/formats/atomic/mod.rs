@@ -32,6 +32,18 @@ pub(crate) fn guard_inputs<'a>(
     Err(FileError::contents(output.display().to_string(), Place::Itself, message).setting(Setting::Output))
 }
 
+/// Whether a file can be made and is none of the inputs, found out before the work.
+///
+/// # Errors
+/// When it is one, or cannot be made.
+pub(crate) fn claim_file<'a>(
+    output: &Path,
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> Result<(), FileError> {
+    guard_inputs(output, inputs)?;
+    AtomicFile::create(output).map(drop)
+}
+
 /// What may become of a result that is there already.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Existing {

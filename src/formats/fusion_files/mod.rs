@@ -7,7 +7,7 @@ mod initial;
 mod rtklib;
 
 pub(crate) use fixes::{FixSigma, read_gnss};
-pub(crate) use inertial::{ImuFile, read_imu};
+pub(crate) use inertial::read_imu;
 pub(crate) use initial::{initial_schema, read_initial};
 
 use crate::formats::trajectory_file::table::{self, Numbers, Table};

@@ -75,6 +75,13 @@ impl CalibrationNote {
 }
 
 impl ModelFile {
+    /// The estimator that made the model, if known.
+    #[must_use]
+    pub(crate) fn estimator(&self) -> Option<String> {
+        let estimator = self.provenance.as_ref()?.get("estimator")?;
+        estimator.as_str().map(str::to_owned)
+    }
+
     /// The largest whole number of that name that the provenance has of a fit.
     #[must_use]
     pub fn most_of_fits(&self, key: &str) -> Option<i64> {

@@ -10,6 +10,7 @@ mod samples;
 pub(in crate::formats) mod table;
 mod write;
 
+pub(crate) use profile::schema as profile_schema;
 pub(crate) use samples::parse_origin;
 pub(crate) use write::write_rows;
 pub use write::{Rows, write_csv};

@@ -2,12 +2,16 @@
 
 use super::samples::HEIGHT;
 use crate::formats::FileError;
+use crate::formats::toml_described::{Document, Finite};
 use crate::formats::toml_file::{Section, Source};
 use crate::trajectory::Trajectory;
 use crate::trajectory::profile::{
     self, Acceleration, Bank, Kind, Length, Place, Profile, Segment, Start, Turning, Waypoint,
 };
 use crate::units::DEG;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde::de::{DeserializeOwned, IgnoredAny};
 use std::path::Path;
 
 /// Ramps of accelerations and rates unless said otherwise (s).
@@ -15,31 +19,230 @@ const RAMP_S: f64 = 2.0;
 /// Braking of a stop unless said otherwise (m/s²).
 const DECEL: f64 = 1.5;
 
+/// A drive by what the vehicle does: the trajectory of nav-sim run
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "Motion profile")]
+struct Description {
+    start: Origin,
+    #[serde(default)]
+    vehicle: Vehicle,
+    /// What the vehicle does, in order
+    #[schemars(with = "Vec<SegmentDescription>", length(min = 1))]
+    #[serde(rename = "segment")]
+    _segment: IgnoredAny,
+}
+
+/// Where and how it starts
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Origin {
+    /// Time (s; default: 0)
+    #[serde(default)]
+    t_s: Finite,
+    /// Geodetic latitude (degrees)
+    lat_deg: Finite,
+    /// Longitude (degrees)
+    lon_deg: Finite,
+    /// Height above the ellipsoid (m)
+    h_m: Finite,
+    /// Heading from north (degrees)
+    heading_deg: Finite,
+    /// Speed (m/s; default: 0)
+    #[serde(default)]
+    speed_m_s: Finite,
+}
+
+/// How the vehicle moves
+#[derive(Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Vehicle {
+    /// Roll in turns: level as a land vehicle (default), or as an aircraft
+    #[serde(default)]
+    bank: Roll,
+    /// Time over which accelerations and rates build up and fade (s; default: 2)
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    ramp_s: Option<Finite>,
+}
+
+#[derive(Clone, Copy, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+enum Roll {
+    #[default]
+    None,
+    Coordinated,
+}
+
+/// One segment
+#[derive(JsonSchema)]
+#[schemars(deny_unknown_fields)]
+#[expect(dead_code, reason = "what describes files, for editors")]
+struct SegmentDescription {
+    #[schemars(flatten)]
+    of: Of,
+    #[schemars(flatten)]
+    kind: Described,
+}
+
+/// What every segment may have.
+#[derive(Deserialize, JsonSchema)]
+struct Of {
+    /// Overrides that of the vehicle (s)
+    ramp_s: Option<Finite>,
+}
+
+/// The kinds of segment, each with its keys.
+#[derive(JsonSchema)]
+#[schemars(tag = "kind", rename_all = "lowercase")]
+#[expect(dead_code, reason = "what describes files, for editors")]
+enum Described {
+    /// Constant speed and heading; at speed zero, standing
+    Straight(Straight),
+    /// Speed changes
+    Accelerate(Accelerate),
+    /// Heading changes
+    Turn(Turn),
+    /// Height changes
+    Climb(Climb),
+    /// Brakes if moving, then stands
+    Stop(Stop),
+    /// From point to point on straight legs, cutting the corners with turns
+    Waypoints(Waypoints),
+}
+
+#[derive(Deserialize, JsonSchema)]
+struct Straight {
+    /// Duration (s), or …
+    duration_s: Option<Finite>,
+    /// … distance along the path (m)
+    distance_m: Option<Finite>,
+    /// Height gained (m; default: 0)
+    #[serde(default)]
+    climb_m: Finite,
+}
+
+#[derive(Deserialize, JsonSchema)]
+struct Climb {
+    /// Height gained (m)
+    height_m: Finite,
+    /// Duration (s), or …
+    duration_s: Option<Finite>,
+    /// … distance along the path (m)
+    distance_m: Option<Finite>,
+}
+
+#[derive(Deserialize, JsonSchema)]
+struct Accelerate {
+    /// Final speed (m/s)
+    to_speed_m_s: Finite,
+    /// Duration (s), or …
+    duration_s: Option<Finite>,
+    /// … largest acceleration (m/s²)
+    accel_m_s2: Option<Finite>,
+    /// Height gained (m; default: 0)
+    #[serde(default)]
+    climb_m: Finite,
+}
+
+#[derive(Deserialize, JsonSchema)]
+struct Turn {
+    /// Change of heading, positive to the right (degrees)
+    angle_deg: Finite,
+    /// Duration (s), or …
+    duration_s: Option<Finite>,
+    /// … largest rate (degrees/s), or …
+    rate_deg_s: Option<Finite>,
+    /// … smallest radius (m), or …
+    radius_m: Option<Finite>,
+    /// … largest lateral acceleration (m/s²)
+    lateral_accel_m_s2: Option<Finite>,
+    /// Height gained (m; default: 0)
+    #[serde(default)]
+    climb_m: Finite,
+}
+
+#[derive(Deserialize, JsonSchema)]
+struct Stop {
+    /// Time at rest (s)
+    duration_s: Finite,
+    /// Largest deceleration while braking (m/s²; default: 1.5)
+    decel_m_s2: Option<Finite>,
+    /// Height gained (m; default: 0)
+    #[serde(default)]
+    climb_m: Finite,
+}
+
+#[derive(Deserialize, JsonSchema)]
+struct Waypoints {
+    /// The points; the path ends at the last and passes inside the others
+    #[schemars(with = "Vec<Point>", length(min = 1))]
+    #[serde(rename = "points")]
+    _points: IgnoredAny,
+    /// Largest rate of turns (degrees/s), or …
+    rate_deg_s: Option<Finite>,
+    /// … smallest radius (m), or …
+    radius_m: Option<Finite>,
+    /// … largest lateral acceleration (m/s²)
+    lateral_accel_m_s2: Option<Finite>,
+    /// Height gained (m; default: 0)
+    #[serde(default)]
+    climb_m: Finite,
+}
+
+/// A point, by latitude and longitude or by metres from the start
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+struct Point {
+    /// Geodetic latitude (degrees)
+    lat_deg: Option<Finite>,
+    /// Longitude (degrees)
+    lon_deg: Option<Finite>,
+    /// North of the start (m)
+    n_m: Option<Finite>,
+    /// East of the start (m)
+    e_m: Option<Finite>,
+    /// Height above the ellipsoid (m; default: that before it)
+    h_m: Option<Finite>,
+}
+
+/// The JSON schema of such a file.
+#[must_use]
+pub(crate) fn schema() -> serde_json::Value {
+    schemars::schema_for!(Description).to_value()
+}
+
 pub(super) fn load(path: &Path) -> Result<Trajectory, FileError> {
     build(&Source::read(path)?)
 }
 
 pub(super) fn build(source: &Source) -> Result<Trajectory, FileError> {
-    let table = source.parse()?;
-    let root = source.root(&table);
-    root.only(&["start", "vehicle", "segment"])?;
-    let start = root.section("start")?.ok_or_else(|| root.missing("start"))?;
-    let segments = if root.has("segment") {
-        root.sections("segment")?
-    } else {
-        return Err(root.missing("segment"));
-    };
-    let (bank, ramp_s) = match root.section("vehicle")? {
-        Some(vehicle) => read_vehicle(&vehicle)?,
-        None => (Bank::None, RAMP_S),
-    };
+    let document = Document::parse(source)?;
+    let Description { start, vehicle, .. } = document.read()?;
+    let root = document.root();
+    let segments = root.sections("segment")?;
+    let origin = root.section("start")?.unwrap_or_else(|| root.clone());
+    let ramp_s = vehicle.ramp_s.map_or(RAMP_S, |ramp| ramp.0);
+    if ramp_s <= 0.0 {
+        let section = root.section("vehicle")?.unwrap_or_else(|| root.clone());
+        return Err(section.refuse("ramp_s", "is not a number > 0", None));
+    }
     let profile = Profile {
-        start: read_start(&start)?,
-        bank,
+        start: Start {
+            t_s: start.t_s.0,
+            lat: start.lat_deg.0 * DEG,
+            lon: start.lon_deg.0 * DEG,
+            h: height(&origin, start.h_m)?,
+            heading: start.heading_deg.0 * DEG,
+            speed: start.speed_m_s.0,
+        },
+        bank: match vehicle.bank {
+            Roll::None => Bank::None,
+            Roll::Coordinated => Bank::Coordinated,
+        },
         ramp_s,
         segments: segments.iter().map(read_segment).collect::<Result<_, _>>()?,
     };
-    profile.build().map_err(|e| blame(&root, &start, &segments, &e))
+    profile.build().map_err(|e| blame(&root, &origin, &segments, &e))
 }
 
 /// The refusal of a profile at the line of the key at fault.
@@ -56,37 +259,10 @@ fn blame(root: &Section<'_>, start: &Section<'_>, segments: &[Section<'_>], e: &
     }
 }
 
-fn read_vehicle(vehicle: &Section<'_>) -> Result<(Bank, f64), FileError> {
-    vehicle.only(&["bank", "ramp_s"])?;
-    let bank = match vehicle.str("bank")? {
-        None | Some("none") => Bank::None,
-        Some("coordinated") => Bank::Coordinated,
-        Some(_) => return Err(vehicle.refuse("bank", "is not \"none\" or \"coordinated\"", None)),
-    };
-    let ramp_s = vehicle.f64("ramp_s")?.unwrap_or(RAMP_S);
-    if ramp_s <= 0.0 {
-        return Err(vehicle.refuse("ramp_s", "is not a number > 0", None));
-    }
-    Ok((bank, ramp_s))
-}
-
-fn read_start(start: &Section<'_>) -> Result<Start, FileError> {
-    start.only(&["t_s", "lat_deg", "lon_deg", "h_m", "heading_deg", "speed_m_s"])?;
-    Ok(Start {
-        t_s: start.f64("t_s")?.unwrap_or(0.0),
-        lat: start.require_f64("lat_deg")? * DEG,
-        lon: start.require_f64("lon_deg")? * DEG,
-        h: height(start)?,
-        heading: start.require_f64("heading_deg")? * DEG,
-        speed: start.f64("speed_m_s")?.unwrap_or(0.0),
-    })
-}
-
 /// A height at which the gravity model means something.
-fn height(section: &Section<'_>) -> Result<f64, FileError> {
-    let h = section.require_f64("h_m")?;
-    if HEIGHT.contains(&h) {
-        return Ok(h);
+fn height(section: &Section<'_>, h_m: Finite) -> Result<f64, FileError> {
+    if HEIGHT.contains(&h_m.0) {
+        return Ok(h_m.0);
     }
     Err(section.refuse("h_m", "is no height within −12 to 1000 km", None))
 }
@@ -94,80 +270,105 @@ fn height(section: &Section<'_>) -> Result<f64, FileError> {
 const KINDS: &str = "straight, accelerate, turn, climb, stop, waypoints";
 
 fn read_segment(segment: &Section<'_>) -> Result<Segment, FileError> {
-    let word = segment.require_str("kind")?;
-    let Some((own, read)) = reader(word) else {
-        return Err(segment.refuse("kind", "is no kind of segment", Some(format!("kinds are {KINDS}"))));
+    fn own<T: DeserializeOwned + JsonSchema>(segment: &Section<'_>) -> Result<T, FileError> {
+        segment.read_own(&["kind", "ramp_s"])
+    }
+    let (kind, climb) = match segment.require_str("kind")? {
+        "straight" => own(segment).and_then(|own| straight(segment, &own))?,
+        "accelerate" => own(segment).and_then(|own| accelerate(segment, &own))?,
+        "turn" => own(segment).and_then(|own| turn(segment, &own))?,
+        "climb" => own(segment).and_then(|own| climb(segment, &own))?,
+        "stop" => own(segment).map(|own| stop(&own))?,
+        "waypoints" => own(segment).and_then(|own| waypoints(segment, &own))?,
+        _ => return Err(segment.refuse("kind", "is no kind of segment", Some(format!("kinds are {KINDS}")))),
     };
-    let mut legal = vec!["kind", "ramp_s", if word == "climb" { "height_m" } else { "climb_m" }];
-    legal.extend(own);
-    segment.only(&legal)?;
-    let climb_m = match word {
-        "climb" => segment.require_f64("height_m")?,
-        _ => segment.f64("climb_m")?.unwrap_or(0.0),
-    };
-    Ok(Segment { kind: read(segment)?, climb_m, ramp_s: segment.f64("ramp_s")? })
+    let Of { ramp_s } = segment.read()?;
+    Ok(Segment { kind, climb_m: climb.0, ramp_s: ramp_s.map(|ramp| ramp.0) })
 }
 
-type Read = fn(&Section<'_>) -> Result<Kind, FileError>;
-
-/// The keys of a kind of segment beside the common ones, and how it is read.
-fn reader(kind: &str) -> Option<(&'static [&'static str], Read)> {
-    Some(match kind {
-        "straight" | "climb" => (&["duration_s", "distance_m"], straight),
-        "accelerate" => (&["to_speed_m_s", "duration_s", "accel_m_s2"], accelerate),
-        "turn" => (&["angle_deg", "duration_s", "rate_deg_s", "radius_m", "lateral_accel_m_s2"], turn),
-        "stop" => (&["duration_s", "decel_m_s2"], stop),
-        "waypoints" => (&["points", "rate_deg_s", "radius_m", "lateral_accel_m_s2"], waypoints),
-        _ => return None,
-    })
-}
-
-fn straight(segment: &Section<'_>) -> Result<Kind, FileError> {
-    Ok(Kind::Straight(match one_of(segment, &["duration_s", "distance_m"])? {
+fn length(
+    segment: &Section<'_>,
+    duration: Option<Finite>,
+    distance: Option<Finite>,
+) -> Result<Kind, FileError> {
+    Ok(Kind::Straight(match one_of(segment, [("duration_s", duration), ("distance_m", distance)])? {
         ("duration_s", s) => Length::Duration(s),
         (_, m) => Length::Distance(m),
     }))
 }
 
-fn accelerate(segment: &Section<'_>) -> Result<Kind, FileError> {
-    let by = match one_of(segment, &["duration_s", "accel_m_s2"])? {
+fn straight(segment: &Section<'_>, own: &Straight) -> Result<(Kind, Finite), FileError> {
+    Ok((length(segment, own.duration_s, own.distance_m)?, own.climb_m))
+}
+
+fn climb(segment: &Section<'_>, own: &Climb) -> Result<(Kind, Finite), FileError> {
+    Ok((length(segment, own.duration_s, own.distance_m)?, own.height_m))
+}
+
+fn accelerate(segment: &Section<'_>, own: &Accelerate) -> Result<(Kind, Finite), FileError> {
+    let by = match one_of(segment, [("duration_s", own.duration_s), ("accel_m_s2", own.accel_m_s2)])? {
         ("duration_s", s) => Acceleration::Duration(s),
         (_, a) => Acceleration::Peak(a),
     };
-    Ok(Kind::Accelerate { to_speed: segment.require_f64("to_speed_m_s")?, by })
+    Ok((Kind::Accelerate { to_speed: own.to_speed_m_s.0, by }, own.climb_m))
 }
 
-fn turn(segment: &Section<'_>) -> Result<Kind, FileError> {
-    let by = turning(segment, &["duration_s", "rate_deg_s", "radius_m", "lateral_accel_m_s2"])?;
-    Ok(Kind::Turn { angle: segment.require_f64("angle_deg")? * DEG, by })
+fn turn(segment: &Section<'_>, own: &Turn) -> Result<(Kind, Finite), FileError> {
+    let given = [
+        ("duration_s", own.duration_s),
+        ("rate_deg_s", own.rate_deg_s),
+        ("radius_m", own.radius_m),
+        ("lateral_accel_m_s2", own.lateral_accel_m_s2),
+    ];
+    Ok((Kind::Turn { angle: own.angle_deg.0 * DEG, by: turning(segment, given)? }, own.climb_m))
 }
 
-fn stop(segment: &Section<'_>) -> Result<Kind, FileError> {
-    let decel = segment.f64("decel_m_s2")?.unwrap_or(DECEL);
-    Ok(Kind::Stop { duration: segment.require_f64("duration_s")?, decel })
+fn stop(own: &Stop) -> (Kind, Finite) {
+    let decel = own.decel_m_s2.map_or(DECEL, |decel| decel.0);
+    (Kind::Stop { duration: own.duration_s.0, decel }, own.climb_m)
 }
 
-fn waypoints(segment: &Section<'_>) -> Result<Kind, FileError> {
-    let by = turning(segment, &["rate_deg_s", "radius_m", "lateral_accel_m_s2"])?;
-    let points = segment.sections("points")?.iter().map(read_point).collect::<Result<_, _>>()?;
-    Ok(Kind::Waypoints { points, by })
+fn waypoints(segment: &Section<'_>, own: &Waypoints) -> Result<(Kind, Finite), FileError> {
+    let given = [
+        ("rate_deg_s", own.rate_deg_s),
+        ("radius_m", own.radius_m),
+        ("lateral_accel_m_s2", own.lateral_accel_m_s2),
+    ];
+    let by = turning(segment, given)?;
+    let points = segment.sections("points")?.iter().map(waypoint).collect::<Result<_, _>>()?;
+    Ok((Kind::Waypoints { points, by }, own.climb_m))
 }
 
-fn read_point(point: &Section<'_>) -> Result<Waypoint, FileError> {
-    point.only(&["lat_deg", "lon_deg", "n_m", "e_m", "h_m"])?;
-    let place = if point.has("n_m") || point.has("e_m") {
-        if let Some(extra) = ["lat_deg", "lon_deg"].into_iter().find(|k| point.has(k)) {
-            return Err(point.refuse(extra, "stands beside n_m, e_m", Some("give one pair of them".into())));
-        }
-        Place::Local { north: point.require_f64("n_m")?, east: point.require_f64("e_m")? }
-    } else {
-        Place::Geodetic { lat: point.require_f64("lat_deg")? * DEG, lon: point.require_f64("lon_deg")? * DEG }
+fn waypoint(section: &Section<'_>) -> Result<Waypoint, FileError> {
+    let point: Point = section.read()?;
+    let pair = |keys: [&str; 2], values: [Option<Finite>; 2]| match values {
+        [Some(first), Some(second)] => Ok((first.0, second.0)),
+        [None, _] => Err(section.missing(keys[0])),
+        [_, None] => Err(section.missing(keys[1])),
     };
-    Ok(Waypoint { place, h: if point.has("h_m") { Some(height(point)?) } else { None } })
+    let is_local = point.n_m.or(point.e_m).is_some();
+    let place = if is_local {
+        if let Some(extra) = ["lat_deg", "lon_deg"].into_iter().find(|k| section.has(k)) {
+            return Err(section.refuse(
+                extra,
+                "stands beside n_m, e_m",
+                Some("give one pair of them".into()),
+            ));
+        }
+        let (north, east) = pair(["n_m", "e_m"], [point.n_m, point.e_m])?;
+        Place::Local { north, east }
+    } else {
+        let (lat, lon) = pair(["lat_deg", "lon_deg"], [point.lat_deg, point.lon_deg])?;
+        Place::Geodetic { lat: lat * DEG, lon: lon * DEG }
+    };
+    Ok(Waypoint { place, h: point.h_m.map(|h| height(section, h)).transpose()? })
 }
 
-fn turning(segment: &Section<'_>, keys: &[&'static str]) -> Result<Turning, FileError> {
-    Ok(match one_of(segment, keys)? {
+fn turning<const N: usize>(
+    segment: &Section<'_>,
+    given: [(&'static str, Option<Finite>); N],
+) -> Result<Turning, FileError> {
+    Ok(match one_of(segment, given)? {
         ("duration_s", s) => Turning::Duration(s),
         ("rate_deg_s", rate) => Turning::Rate(rate * DEG),
         ("radius_m", m) => Turning::Radius(m),
@@ -176,12 +377,15 @@ fn turning(segment: &Section<'_>, keys: &[&'static str]) -> Result<Turning, File
 }
 
 /// The one key of several that is given, and its value.
-fn one_of(segment: &Section<'_>, keys: &[&'static str]) -> Result<(&'static str, f64), FileError> {
-    let given: Vec<&'static str> = keys.iter().copied().filter(|k| segment.has(k)).collect();
-    match given[..] {
-        [] => Err(segment.missing_one_of(keys)),
-        [key] => Ok((key, segment.require_f64(key)?)),
-        [first, second, ..] => {
+fn one_of<const N: usize>(
+    segment: &Section<'_>,
+    keys: [(&'static str, Option<Finite>); N],
+) -> Result<(&'static str, f64), FileError> {
+    let mut given = keys.iter().filter_map(|(key, value)| value.map(|value| (*key, value.0)));
+    match (given.next(), given.next()) {
+        (None, _) => Err(segment.missing_one_of(&keys.map(|(key, _)| key))),
+        (Some(only), None) => Ok(only),
+        (Some((first, _)), Some((second, _))) => {
             Err(segment.refuse(second, format!("stands beside {first}"), Some("give one of them".into())))
         }
     }

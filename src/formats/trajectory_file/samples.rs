@@ -152,7 +152,7 @@ pub(super) fn rows(mut table: Table, options: &Options, numbers: Numbers) -> Res
     let all = table.rows.len();
     match numbers {
         Numbers::Finite => check_ranges(&table, &columns)?,
-        Numbers::Any => table
+        Numbers::Any | Numbers::UpTo(_) => table
             .rows
             .retain(|row| row.1.iter().all(|x| x.is_finite()) && out_of_range(row, &columns).is_none()),
     }

@@ -41,6 +41,8 @@ pub(in crate::formats) enum Numbers {
     Finite,
     /// Any: who reads it leaves those rows out.
     Any,
+    /// Any, and a row may end where this column begins: the cells from there on are then empty, and read as NaN.
+    UpTo(&'static str),
 }
 
 /// Longest line of a table (bytes).
@@ -115,13 +117,37 @@ impl Table {
             return Err(Error::row_length(&self.path, line, found, expected));
         }
         let number = |(i, cell): (usize, &&str)| match cell.parse::<f64>() {
-            Ok(value) if value.is_finite() || numbers == Numbers::Any => Ok(value),
+            Ok(value) if value.is_finite() || numbers != Numbers::Finite => Ok(value),
             Ok(_) => Err(self.cell(line, i, cell, "is not finite")),
             Err(_) => Err(self.cell(line, i, &format!("\"{cell}\""), "is not a number")),
         };
-        let values = cells.iter().enumerate().map(number).collect::<Result<_, _>>()?;
+        let end = match numbers {
+            Numbers::UpTo(name) => self.columns.iter().position(|c| c == name),
+            _ => None,
+        };
+        let end = end.filter(|end| cells[*end..].iter().all(|cell| cell.is_empty())).unwrap_or(expected);
+        let mut values = cells[..end].iter().enumerate().map(number).collect::<Result<Vec<f64>, _>>()?;
+        values.resize(expected, f64::NAN);
         self.rows.push((line, values));
         Ok(())
+    }
+
+    /// Where the columns of those names are.
+    ///
+    /// # Errors
+    /// A name that is missing, or that two columns have.
+    pub(in crate::formats) fn named<const N: usize>(&self, names: [&str; N]) -> Result<[usize; N], Error> {
+        let refused =
+            |message: String| Error::new(self.path.as_str(), self.header_line, Kind::Columns(message.into()));
+        let mut found = [0; N];
+        for (at, name) in found.iter_mut().zip(names) {
+            let mut places = (0..self.columns.len()).filter(|i| self.columns[*i] == name);
+            *at = places.next().ok_or_else(|| refused(format!("no column is named \"{name}\"")))?;
+            if places.next().is_some() {
+                return Err(refused(format!("two columns are named \"{name}\"")));
+            }
+        }
+        Ok(found)
     }
 
     /// The refusal of a cell.

@@ -19,22 +19,31 @@
 //! With `of_samples` the burst's lengths are meant for a record of so many samples and are scaled to the
 //! record's length. What the operations do, and in which order: [`crate::noise::contamination`].
 
+mod description;
+
 use super::FileError;
 use super::suggest::nearest;
+use super::toml_described::Document;
 use super::toml_file::{Section, Source};
 use crate::imu::Sensor;
 use crate::noise::Ar1;
 use crate::noise::contamination::{Contamination, Extent, Operation, Rule};
+use description::{
+    Autoregression, Bursts, Described, Description, HeavyTails, Mean, Numbers, Of, Replace, Scale, Signal,
+    Step, describe,
+};
 use std::path::Path;
+
+pub(crate) use description::schema;
 
 /// Names and texts of the contaminations that come with the program.
 const PRESETS: [(&str, &str); 6] = [
     ("section4-I", "schema = 1\n"),
-    ("section4-II", include_str!("../../calib_data/contamination/section4-II.toml")),
-    ("section4-III", include_str!("../../calib_data/contamination/section4-III.toml")),
+    ("section4-II", include_str!("../../../calib_data/contamination/section4-II.toml")),
+    ("section4-III", include_str!("../../../calib_data/contamination/section4-III.toml")),
     ("section5-I", "schema = 1\n"),
-    ("section5-II", include_str!("../../calib_data/contamination/section5-II.toml")),
-    ("section5-III", include_str!("../../calib_data/contamination/section5-III.toml")),
+    ("section5-II", include_str!("../../../calib_data/contamination/section5-II.toml")),
+    ("section5-III", include_str!("../../../calib_data/contamination/section5-III.toml")),
 ];
 
 /// Names of the contaminations that come with the program: the scenarios of
@@ -62,10 +71,10 @@ pub(crate) fn meant(name: &str) -> Option<&'static str> {
 }
 
 fn parse(source: &Source, rate_hz: f64) -> Result<Contamination, FileError> {
-    let table = source.parse()?;
-    let root = source.root(&table);
-    root.only(&["schema", "accel", "gyro"])?;
-    if root.u64("schema")?.is_some_and(|s| s != 1) {
+    let document = Document::parse(source)?;
+    let Description { schema, .. } = document.read()?;
+    let root = document.root();
+    if schema.is_some_and(|s| s != 1) {
         return Err(root.refuse("schema", "is not a schema this version reads: it reads 1", None));
     }
     let mut rules = Vec::new();
@@ -77,35 +86,14 @@ fn parse(source: &Source, rate_hz: f64) -> Result<Contamination, FileError> {
     Ok(Contamination { name: source.path().to_owned(), rules })
 }
 
-/// Keys legal beside `operation` and `replicates`.
-fn legal(operation: &str) -> Option<&'static [&'static str]> {
-    Some(match operation {
-        "step" => &["amplitude", "at_share", "at_samples", "at_s"],
-        "replace" => &["share", "points", "length_samples", "sigma", "mean"],
-        "drift" => &["amplitude"],
-        "heavy-tails" => &["freedom", "sigma"],
-        "bursts" => {
-            &["count", "length_samples", "spacing_samples", "of_samples", "amplitude", "frequency_hz"]
-        }
-        "ar1" => &["phi", "sigma2"],
-        "scale" => &["process", "parameter", "factor"],
-        _ => return None,
-    })
-}
-
 fn read_rules(
     section: &Section<'_>,
     sensor: Sensor,
     rate_hz: f64,
     into: &mut Vec<Rule>,
 ) -> Result<(), FileError> {
-    let name = section.require_str("operation")?;
-    let Some(keys) = legal(name) else {
-        let hint = "operations: step, drift, replace, bursts, ar1, heavy-tails, scale".to_owned();
-        return Err(section.refuse("operation", "is not an operation", Some(hint)));
-    };
-    section.only(&[&["operation", "replicates"], keys].concat())?;
-    let replicates = section.u64s("replicates")?;
+    let described = describe(section)?;
+    let Of { replicates } = section.read()?;
     if replicates.as_ref().is_some_and(|r| r.is_empty() || r.contains(&0)) {
         return Err(section.refuse(
             "replicates",
@@ -116,14 +104,16 @@ fn read_rules(
     let listed = replicates.as_ref().map_or(1, Vec::len);
     for i in 0..listed {
         let entry = Entry { section, i, listed };
-        let operation = match name {
-            "step" => entry.step(rate_hz)?,
-            "replace" => entry.replace()?,
-            "bursts" => entry.bursts()?,
-            "ar1" => entry.ar1()?,
-            "drift" => Operation::Drift { amplitude: entry.any("amplitude")? },
-            "heavy-tails" => entry.heavy_tails()?,
-            _ => entry.scale()?,
+        let operation = match &described {
+            Described::Step(step) => entry.step(step, rate_hz)?,
+            Described::Drift(drift) => {
+                Operation::Drift { amplitude: entry.any("amplitude", &drift.amplitude)? }
+            }
+            Described::Replace(replace) => entry.replace(replace)?,
+            Described::Bursts(bursts) => entry.bursts(bursts)?,
+            Described::Ar1(process) => entry.ar1(process)?,
+            Described::HeavyTails(tails) => entry.heavy_tails(tails)?,
+            Described::Scale(scale) => entry.scale(scale)?,
         };
         into.push(Rule { sensor, replicate: replicates.as_ref().map(|r| r[i]), operation });
     }
@@ -142,35 +132,35 @@ impl Entry<'_> {
     fn number(
         &self,
         key: &str,
+        given: &Numbers,
         domain: &str,
         inside: impl Fn(f64) -> bool,
-    ) -> Result<Option<f64>, FileError> {
-        let value = if self.section.is_list(key) {
-            let values = self.section.f64s(key)?.unwrap_or_default();
-            if values.len() != self.listed {
+    ) -> Result<f64, FileError> {
+        let value = match given {
+            Numbers::One(value) => value.0,
+            Numbers::Each(values) if values.len() == self.listed => values[self.i].0,
+            Numbers::Each(values) => {
                 let reason = format!("has {} values for {} replicates", values.len(), self.listed);
                 return Err(self.section.refuse(key, reason, None));
             }
-            Some(values[self.i])
-        } else {
-            self.section.f64(key)?
         };
-        match value {
-            Some(v) if !inside(v) => Err(self.section.refuse(key, format!("is not {domain}"), None)),
-            value => Ok(value),
+        if inside(value) {
+            Ok(value)
+        } else {
+            Err(self.section.refuse(key, format!("is not {domain}"), None))
         }
     }
 
-    fn require(&self, key: &str, domain: &str, inside: impl Fn(f64) -> bool) -> Result<f64, FileError> {
-        self.number(key, domain, inside)?.ok_or_else(|| self.section.missing(key))
+    fn any(&self, key: &str, given: &Numbers) -> Result<f64, FileError> {
+        self.number(key, given, "a number", |_| true)
     }
 
-    fn any(&self, key: &str) -> Result<f64, FileError> {
-        self.require(key, "a number", |_| true)
+    fn at_least_0(&self, key: &str, given: &Numbers) -> Result<f64, FileError> {
+        self.number(key, given, "a number ≥ 0", |v| v >= 0.0)
     }
 
-    fn share(&self, key: &str) -> Result<Option<f64>, FileError> {
-        self.number(key, "between 0 and 1", |v| (0.0..=1.0).contains(&v))
+    fn share(&self, key: &str, given: &Numbers) -> Result<Extent, FileError> {
+        self.number(key, given, "between 0 and 1", |v| (0.0..=1.0).contains(&v)).map(Extent::Share)
     }
 
     /// Refuses more than one of several ways to say the same.
@@ -184,77 +174,76 @@ impl Entry<'_> {
         }
     }
 
-    fn step(&self, rate_hz: f64) -> Result<Operation, FileError> {
+    fn step(&self, step: &Step, rate_hz: f64) -> Result<Operation, FileError> {
         self.at_most_one(&["at_share", "at_samples", "at_s"])?;
-        let seconds = self.number("at_s", "a time ≥ 0", |v| v >= 0.0)?;
-        let at = match (self.section.u64("at_samples")?, seconds) {
-            (Some(samples), _) => Extent::Samples(samples),
-            (None, Some(s)) => Extent::Samples((s * rate_hz).round() as u64),
-            (None, None) => Extent::Share(self.share("at_share")?.unwrap_or(0.5)),
+        let at = match (step.at_samples, &step.at_s, &step.at_share) {
+            (Some(samples), ..) => Extent::Samples(samples),
+            (_, Some(seconds), _) => {
+                let seconds = self.number("at_s", seconds, "a time ≥ 0", |v| v >= 0.0)?;
+                Extent::Samples((seconds * rate_hz).round() as u64)
+            }
+            (_, _, Some(share)) => self.share("at_share", share)?,
+            _ => Extent::Share(0.5),
         };
-        Ok(Operation::Step { at, amplitude: self.any("amplitude")? })
+        Ok(Operation::Step { at, amplitude: self.any("amplitude", &step.amplitude)? })
     }
 
-    fn replace(&self) -> Result<Operation, FileError> {
+    fn replace(&self, replace: &Replace) -> Result<Operation, FileError> {
         self.at_most_one(&["share", "points"])?;
-        let points = match (self.section.u64("points")?, self.share("share")?) {
+        let points = match (replace.points, &replace.share) {
             (Some(points), _) => Extent::Samples(points),
-            (None, Some(share)) => Extent::Share(share),
+            (None, Some(share)) => self.share("share", share)?,
             (None, None) => return Err(self.section.missing_one_of(&["share", "points"])),
         };
-        let mean = match self.section.str("mean") {
-            Ok(None | Some("signal")) => None,
-            Ok(Some(_)) => {
-                return Err(self.section.refuse("mean", "is neither a number nor \"signal\"", None));
-            }
-            Err(_) => Some(self.any("mean")?),
+        let mean = match &replace.mean {
+            None | Some(Mean::Kept(Signal::Signal)) => None,
+            Some(Mean::Own(mean)) => Some(self.any("mean", mean)?),
         };
-        let sigma = self.require("sigma", "a number ≥ 0", |v| v >= 0.0)?;
-        let block = Extent::Samples(self.section.u64("length_samples")?.unwrap_or(1));
+        let sigma = self.at_least_0("sigma", &replace.sigma)?;
+        let block = Extent::Samples(replace.length_samples.unwrap_or(1));
         if block == Extent::Samples(0) {
             return Err(self.section.refuse("length_samples", "is not a number of samples > 0", None));
         }
         Ok(Operation::Replace { points, block, mean, sigma })
     }
 
-    fn bursts(&self) -> Result<Operation, FileError> {
-        let whole = |key, default| Ok::<u64, FileError>(self.section.u64(key)?.unwrap_or(default));
-        let (count, length) = (whole("count", 5)?, whole("length_samples", 500)?);
-        let spacing = whole("spacing_samples", 90_000)?;
-        let of = self.number("of_samples", "a number of samples > 0", |v| v >= 1.0)?;
+    fn bursts(&self, bursts: &Bursts) -> Result<Operation, FileError> {
+        let positive = |key, given: &Option<Numbers>, domain, least: f64| match given {
+            Some(given) => self.number(key, given, domain, |v| v > 0.0 && v >= least).map(Some),
+            None => Ok(None),
+        };
+        let of = positive("of_samples", &bursts.of_samples, "a number of samples > 0", 1.0)?;
+        let frequency = positive("frequency_hz", &bursts.frequency_hz, "a frequency > 0", 0.0)?;
         let extent = |samples: u64| match of {
             Some(of) => Extent::Share(samples as f64 / of),
             None => Extent::Samples(samples),
         };
-        let frequency = self.number("frequency_hz", "a frequency > 0", |v| v > 0.0)?;
         Ok(Operation::Bursts {
-            count,
-            length: extent(length),
-            spacing: extent(spacing),
-            amplitude: self.any("amplitude")?,
+            count: bursts.count.unwrap_or(5),
+            length: extent(bursts.length_samples.unwrap_or(500)),
+            spacing: extent(bursts.spacing_samples.unwrap_or(90_000)),
+            amplitude: self.any("amplitude", &bursts.amplitude)?,
             frequency_hz: frequency.unwrap_or(5.0),
         })
     }
 
-    fn ar1(&self) -> Result<Operation, FileError> {
-        let (phi, sigma2) = (self.any("phi")?, self.any("sigma2")?);
+    fn ar1(&self, process: &Autoregression) -> Result<Operation, FileError> {
+        let (phi, sigma2) = (self.any("phi", &process.phi)?, self.any("sigma2", &process.sigma2)?);
         let refuse = |e: crate::noise::ParameterError| {
             self.section.refuse(e.parameter, format!("is not {}", e.domain), None)
         };
         Ok(Operation::Ar1(Ar1::new(phi, sigma2).map_err(refuse)?))
     }
 
-    fn heavy_tails(&self) -> Result<Operation, FileError> {
-        let freedom = self.require("freedom", "a number > 2: fewer degrees have no variance", |v| v > 2.0)?;
-        let sigma = self.require("sigma", "a number ≥ 0", |v| v >= 0.0)?;
-        Ok(Operation::HeavyTails { freedom, sigma })
+    fn heavy_tails(&self, tails: &HeavyTails) -> Result<Operation, FileError> {
+        let domain = "a number > 2: fewer degrees have no variance";
+        let freedom = self.number("freedom", &tails.freedom, domain, |v| v > 2.0)?;
+        Ok(Operation::HeavyTails { freedom, sigma: self.at_least_0("sigma", &tails.sigma)? })
     }
 
-    fn scale(&self) -> Result<Operation, FileError> {
-        let process = self.section.require_str("process")?.to_owned();
-        let parameter = self.section.require_str("parameter")?.to_owned();
-        let factor = self.require("factor", "a number ≥ 0", |v| v >= 0.0)?;
-        Ok(Operation::Scale { process, parameter, factor })
+    fn scale(&self, scale: &Scale) -> Result<Operation, FileError> {
+        let (process, parameter) = (scale.process.clone(), scale.parameter.clone());
+        Ok(Operation::Scale { process, parameter, factor: self.at_least_0("factor", &scale.factor)? })
     }
 }
 

@@ -1,0 +1,184 @@
+//! What contamination files hold: one description an operation, for readers and for editors.
+
+use crate::formats::FileError;
+use crate::formats::toml_described::Finite;
+use crate::formats::toml_file::Section;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde::de::{DeserializeOwned, IgnoredAny};
+
+/// Errors and disturbances put into recordings: nav-sim synthesize --contaminate
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(title = "Contamination")]
+pub(super) struct Description {
+    /// Version of the layout
+    #[schemars(range(min = 1, max = 1))]
+    pub(super) schema: Option<u64>,
+    /// Of all axes of the accelerometers
+    #[serde(default, rename = "accel")]
+    #[schemars(with = "Vec<RuleDescription>")]
+    _accel: IgnoredAny,
+    /// Of all axes of the gyroscopes
+    #[serde(default, rename = "gyro")]
+    #[schemars(with = "Vec<RuleDescription>")]
+    _gyro: IgnoredAny,
+}
+
+/// What is done to the signals of a sensor
+#[derive(JsonSchema)]
+#[schemars(deny_unknown_fields)]
+#[expect(dead_code, reason = "what describes files, for editors")]
+struct RuleDescription {
+    #[schemars(flatten)]
+    of: Of,
+    #[schemars(flatten)]
+    operation: Described,
+}
+
+#[derive(Deserialize, JsonSchema)]
+pub(super) struct Of {
+    /// Replicates, counted from 1 (default: every one)
+    pub(super) replicates: Option<Vec<u64>>,
+}
+
+/// The operations of files, each with its keys.
+#[derive(JsonSchema)]
+#[schemars(tag = "operation", rename_all = "kebab-case")]
+pub(super) enum Described {
+    /// A jump of the mean
+    Step(Step),
+    /// A drift over the whole record
+    Drift(Drift),
+    /// Samples replaced by outliers
+    Replace(Replace),
+    /// Bursts of vibration
+    Bursts(Bursts),
+    /// A first-order autoregression on top
+    Ar1(Autoregression),
+    /// Noise with heavy tails on top
+    HeavyTails(HeavyTails),
+    /// A parameter of the model, scaled
+    Scale(Scale),
+}
+
+#[derive(Deserialize, JsonSchema)]
+pub(super) struct Step {
+    /// Height of the step (units of the signal)
+    pub(super) amplitude: Numbers,
+    /// Where in the record, as a share of it (default: 0.5)
+    pub(super) at_share: Option<Numbers>,
+    /// Where in the record (samples)
+    pub(super) at_samples: Option<u64>,
+    /// Where in the record (s)
+    pub(super) at_s: Option<Numbers>,
+}
+
+#[derive(Deserialize, JsonSchema)]
+pub(super) struct Drift {
+    /// Value at the end of the record (units of the signal)
+    pub(super) amplitude: Numbers,
+}
+
+#[derive(Deserialize, JsonSchema)]
+pub(super) struct Replace {
+    /// Share of the samples
+    pub(super) share: Option<Numbers>,
+    /// Number of samples
+    pub(super) points: Option<u64>,
+    /// Samples replaced together (default: 1)
+    pub(super) length_samples: Option<u64>,
+    /// Standard deviation of what replaces them
+    pub(super) sigma: Numbers,
+    /// Mean of what replaces them (default: the signal's)
+    pub(super) mean: Option<Mean>,
+}
+
+#[derive(Deserialize, JsonSchema)]
+pub(super) struct Bursts {
+    /// Number of bursts (default: 5)
+    pub(super) count: Option<u64>,
+    /// Length of a burst (samples; default: 500)
+    pub(super) length_samples: Option<u64>,
+    /// From one burst to the next (samples; default: 90000)
+    pub(super) spacing_samples: Option<u64>,
+    /// Length of the record that these are meant for (samples; default: as it is)
+    pub(super) of_samples: Option<Numbers>,
+    /// Amplitude (units of the signal)
+    pub(super) amplitude: Numbers,
+    /// Frequency (Hz; default: 5)
+    pub(super) frequency_hz: Option<Numbers>,
+}
+
+#[derive(Deserialize, JsonSchema)]
+pub(super) struct Autoregression {
+    /// Coefficient
+    pub(super) phi: Numbers,
+    /// Innovation variance per sample
+    pub(super) sigma2: Numbers,
+}
+
+#[derive(Deserialize, JsonSchema)]
+pub(super) struct HeavyTails {
+    /// Degrees of freedom, more than 2
+    pub(super) freedom: Numbers,
+    /// Scale of Student's t (units of the signal)
+    pub(super) sigma: Numbers,
+}
+
+#[derive(Deserialize, JsonSchema)]
+pub(super) struct Scale {
+    /// Process of the model, such as RW
+    pub(super) process: String,
+    /// Its parameter, such as gamma2
+    pub(super) parameter: String,
+    /// What it is multiplied by
+    pub(super) factor: Numbers,
+}
+
+/// One number for all, or one for each replicate listed
+#[derive(Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "is neither a finite number nor a list of finite numbers")]
+pub(super) enum Numbers {
+    One(Finite),
+    Each(Vec<Finite>),
+}
+
+#[derive(Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "is neither a number nor \"signal\"")]
+pub(super) enum Mean {
+    Own(Numbers),
+    Kept(Signal),
+}
+
+#[derive(Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Signal {
+    Signal,
+}
+
+/// The JSON schema of such a file.
+#[must_use]
+pub(crate) fn schema() -> serde_json::Value {
+    schemars::schema_for!(Description).to_value()
+}
+
+/// What a table of a file describes.
+pub(super) fn describe(section: &Section<'_>) -> Result<Described, FileError> {
+    fn own<T: DeserializeOwned + JsonSchema>(section: &Section<'_>) -> Result<T, FileError> {
+        section.read_own(&["operation", "replicates"])
+    }
+    match section.require_str("operation")? {
+        "step" => own(section).map(Described::Step),
+        "drift" => own(section).map(Described::Drift),
+        "replace" => own(section).map(Described::Replace),
+        "bursts" => own(section).map(Described::Bursts),
+        "ar1" => own(section).map(Described::Ar1),
+        "heavy-tails" => own(section).map(Described::HeavyTails),
+        "scale" => own(section).map(Described::Scale),
+        _ => {
+            let hint = "operations: step, drift, replace, bursts, ar1, heavy-tails, scale".to_owned();
+            Err(section.refuse("operation", "is not an operation", Some(hint)))
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! A recorded drive → its solution, and whether it is to be believed.
+
+use super::{FusionFilter, FusionFilterError, Note};
+use crate::fusion::alignment::{self, Alignment, AlignmentError};
+use crate::fusion::{
+    self, Assessment, FusionError, Outcome, Recorded, Settings, Solution, Start, check_clocks,
+};
+use crate::gnss::GnssFix;
+use crate::imu::ImuIncrement;
+use crate::observer::Observer;
+use crate::report::FusionSummary;
+use crate::sensors::outage::{FixedData, Outage, OutageError, OutagePlan, PlacedOutages};
+use crate::simulation::lincov::weak_heading;
+use crate::trajectory::reference::Reference;
+
+/// A recorded drive.
+#[derive(Debug)]
+pub struct RecordedDrive {
+    /// The IMU's samples.
+    pub imu: Vec<ImuIncrement>,
+    /// Their rate (Hz).
+    pub rate_hz: f64,
+    /// The receiver's fixes.
+    pub gnss: Vec<GnssFix>,
+    /// Where the filter starts; none: by levelling and the course.
+    pub initial: Option<Start>,
+    /// What the solution is compared with.
+    pub reference: Option<Reference>,
+}
+
+/// What was found.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct Fused {
+    /// The solution.
+    pub solution: Solution,
+    /// Its figures.
+    pub outcome: Outcome,
+    /// Whether it is to be believed.
+    pub assessment: Assessment,
+    /// The summary.
+    pub(crate) summary: FusionSummary,
+}
+
+/// Why there is no solution.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum FuseError {
+    /// Data and settings that do not fit together, or a filter that diverged.
+    #[error(transparent)]
+    Fusion(#[from] FusionError),
+    /// The filter cannot be made.
+    #[error(transparent)]
+    Filter(#[from] FusionFilterError),
+    /// Windows that are not on the data.
+    #[error(transparent)]
+    Outage(#[from] OutageError),
+    /// The data do not show where the drive starts.
+    #[error(transparent)]
+    Alignment(#[from] AlignmentError),
+    /// The reference is of another time.
+    #[error("the reference and the solution have no time in common")]
+    NothingInCommon,
+}
+
+impl RecordedDrive {
+    /// Multiplies the receiver's standard deviations, of position and of velocity.
+    pub fn scale_sigma(&mut self, position: f64, velocity: f64) {
+        for fix in &mut self.gnss {
+            fix.pos_sigma_n *= position;
+            if let Some((_, sigma)) = &mut fix.velocity {
+                *sigma *= velocity;
+            }
+        }
+    }
+
+    /// Fuses it. The outages of the settings are placed on the fixes, those before the start are left out.
+    ///
+    /// # Errors
+    /// Why there is no solution.
+    pub fn fuse(
+        &self,
+        filter: &FusionFilter<'_>,
+        settings: Settings,
+        observer: &dyn Observer<Note>,
+    ) -> Result<Fused, FuseError> {
+        let recorded = Recorded { imu: &self.imu, gnss: &self.gnss };
+        check_clocks(&recorded)?;
+        let belief = filter.belief(self.rate_hz, &self.gnss, &settings.outages, observer)?;
+        let settings = self.with_outages(settings, observer)?;
+        let Alignment { start, doubts } = match &self.initial {
+            Some(start) => Alignment { start: start.clone(), doubts: Vec::new() },
+            None => alignment::coarse(&recorded, &settings, &belief)?,
+        };
+        observer.remark(&Note::Start(start.clone()));
+        let settings = without_early_outages(settings, start.t_s, observer);
+        let solution = fusion::fuse(&recorded, &belief, &start, &settings, self.reference.as_ref())?;
+        if self.reference.is_some() && solution.rows.iter().all(|row| row.error.is_none()) {
+            return Err(FuseError::NothingInCommon);
+        }
+        let outcome = fusion::outcome(&solution, &settings.outages);
+        let assessment = fusion::assess(&solution, &outcome, &doubts).explained(&recorded);
+        observer.remark(&Note::Fused(assessment.clone(), outcome.horizontal_max_m));
+        doubt_heading(&solution, &settings.outages, observer);
+        let constants = belief.groups.iter().flatten().filter(|g| g.is_constant()).count();
+        let states = [belief.states, 3 * constants];
+        let summary = FusionSummary::of(&solution, (&outcome, &assessment), &start, self.rate_hz, states);
+        Ok(Fused { solution, outcome, assessment, summary })
+    }
+
+    /// The settings with their outages placed on the fixes.
+    fn with_outages(
+        &self,
+        settings: Settings,
+        observer: &dyn Observer<Note>,
+    ) -> Result<Settings, OutageError> {
+        let times_s: Vec<f64> = self.gnss.iter().map(|fix| fix.t_s).collect();
+        let plan = OutagePlan { fixed: settings.outages.clone(), ..OutagePlan::default() };
+        let PlacedOutages { windows, remarks } = plan.on(&FixedData::recorded(&times_s), 0)?;
+        remarks.into_iter().for_each(|remark| observer.remark(&Note::Outage(remark)));
+        Ok(Settings { outages: windows, ..settings })
+    }
+}
+
+/// Windows that end before the filter starts withhold nothing: no outages.
+fn without_early_outages(mut settings: Settings, start_s: f64, observer: &dyn Observer<Note>) -> Settings {
+    settings.outages.retain(|outage| {
+        let is_early = outage.end_s <= start_s;
+        if is_early {
+            observer.remark(&Note::EarlyOutage(*outage, start_s));
+        }
+        !is_early
+    });
+    settings
+}
+
+/// Where the motion hardly shows the heading, no filter of this kind is to be believed.
+fn doubt_heading(solution: &Solution, outages: &[Outage], observer: &dyn Observer<Note>) {
+    let start_s = solution.rows.first().map_or(0.0, |row| row.t_s);
+    let fixed = solution.rows.iter().filter(|row| !outages.iter().any(|o| o.withholds(row.t_s)));
+    if let Some(doubt) = weak_heading(fixed.map(|row| (row.t_s - start_s, row.sigma[8]))) {
+        observer.remark(&Note::Heading(doubt));
+    }
+}
