@@ -125,10 +125,10 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 fn text(report: &ChoiceReport<'_>, session: &Session) -> String {
     let mut parts = vec![
         report.verdict().into_iter().chain(report.decisive_scales()).collect::<Vec<_>>().join("\n"),
-        format!("{}\n{}", terminal_columns(&report.rows()), report.legend()),
+        format!("{}\n{}", terminal_columns(&report.brief_rows()), report.legend()),
     ];
     if session.verbose() {
-        let more = [report.fold_rows(), report.recording_rows(), report.scale_rows()];
+        let more = [report.rows(), report.fold_rows(), report.recording_rows(), report.scale_rows()];
         parts.extend(more.iter().map(|rows| terminal_table(rows, 1)));
     }
     parts.join("\n\n")

@@ -22,10 +22,10 @@ use std::path::PathBuf;
 #[command(before_help = "\
 Examples:
   nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml \\
-      --filter full --runs 8 --seed 1 -o out/full
+      --filter full --runs 8 --seed 1 -o out/with_all
   nav-sim run trajectories/land_vehicle.toml calib_data/consumer_mems.toml \\
-      --runs 8 --seed 1 -o out/reduced
-  nav-sim compare out/reduced --reference out/full --state all")]
+      --runs 8 --seed 1 -o out/with_15
+  nav-sim compare out/with_15 --reference out/with_all --state all")]
 pub(crate) struct Args {
     /// Run directories
     #[arg(required = true, value_name = "DIR")]

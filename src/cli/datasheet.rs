@@ -151,6 +151,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return Ok(());
     };
     model_file::write(out, &made.file, session.existing())?;
+    if session.json() {
+        session.printer.result(&as_json(&model_file::to_toml(&made.file))?);
+    }
     session.printer.say(&format!("wrote {}: an assumption, not a calibration", out.display()));
     Ok(())
 }

@@ -4,7 +4,7 @@ use super::batch::shell_words;
 use super::compare::Compared;
 use super::{Cli, Command, Failure, Session, read};
 use crate::formats::atomic::Existing;
-use crate::formats::{FileError, atomic};
+use crate::formats::{FileError, atomic, model_file};
 use crate::report::{self, StudyCurves, TrajectorySeries, paper_figures, paper_page};
 use clap::Parser;
 use serde::{Deserialize, Serialize};
@@ -99,11 +99,13 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         session.printer.result(&lines.join("\n"));
         return Ok(());
     }
+    long_enough(args, session)?;
     let mut progress = Progress::of(args, session)?;
     let commands = commands(args, progress.seed);
     let last = commands.len() - 1;
-    // what is compared is shown again
-    let done = progress.commands_done.min(last);
+    // what is compared is shown again, and what was removed is made again
+    let is_there = |command: &Vec<String>| command.last().is_some_and(|output| Path::new(output).exists());
+    let done = commands.iter().take(progress.commands_done.min(last)).take_while(|c| is_there(c)).count();
     if done > 0 {
         let told =
             format!("{}: {done} of {} commands are done, seed {}", args.out, commands.len(), progress.seed);
@@ -126,6 +128,24 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     session.printer.say(&format!("all results on one page: {}", page(&args.out).display()));
     Ok(())
+}
+
+/// Refuses recordings in which no window is as long as the trajectory, before anything is made.
+fn long_enough(args: &Args, session: &Session) -> Result<(), Failure> {
+    let of_repository = |e: Failure| {
+        e.hint("the demo takes its IMU and its trajectory from the top of the repository: run it there")
+    };
+    let trajectory = read::trajectory(Path::new(TRAJECTORY), session).map_err(of_repository)?;
+    let rate_hz = model_file::read(Path::new(IMU)).map_err(|e| of_repository(e.into()))?.model.rate_hz;
+    let needed = ((trajectory.end_s() - trajectory.start_s()) * rate_hz).ceil();
+    if args.samples as f64 >= needed {
+        return Ok(());
+    }
+    let message = format!(
+        "--samples {}: the INS errors are windows of a recording, as long as the trajectory",
+        args.samples
+    );
+    Err(Failure::input(message).hint(format!("at least --samples {needed}")))
 }
 
 /// The page that leads to all others.

@@ -15,8 +15,8 @@ use std::path::PathBuf;
 /// Say how well recordings of an IMU like MODEL would determine it: so many, so long each
 ///
 /// The wavelet variances of recordings are drawn by their law, with the [spread] of MODEL between them, and calibrated as
-/// `nav-sim calibrate` would: the scatter of the fits is the interval to expect. With --trajectory also that of the
-/// horizontal error (95 % quantile) at the end of each outage, in a filter that knows the IMU. Without --recordings or
+/// `nav-sim calibrate` would: the interval to expect is the one that it would state, wider than the scatter of estimates
+/// where they are poorly known. With --trajectory also that of the horizontal error (95 % quantile) at the end of each outage, in a filter that knows the IMU. Without --recordings or
 /// --hours: a table of several.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\

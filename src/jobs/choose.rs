@@ -71,11 +71,13 @@ pub fn choose(
     if files.len() < FEWEST {
         return Err(JobError::TooFew { recordings: files.len(), needed: FEWEST });
     }
-    let laboratory = Laboratory::new(units(&measured), measured.settings, asked_pool);
+    let units = units(&measured);
+    let samples: Vec<usize> = units.iter().map(samples_in).collect();
+    let laboratory = Laboratory::new(units, measured.settings, asked_pool);
     let rate_hz = laboratory.rate_hz();
     let ChoiceDrive { trajectory, scenario, outages, seed, runs } = drive;
     let drive = Drive::new(&trajectory, scenario, outages, rate_hz, seed).map_err(ChoiceError::from)?;
-    let runs: Vec<u64> = files.iter().map(|file| runs.unwrap_or_else(|| runs_on(&drive, file))).collect();
+    let runs: Vec<u64> = samples.iter().map(|own| runs.unwrap_or_else(|| runs_on(&drive, *own))).collect();
     observer.begin(runs.iter().sum());
     let mut folds: Vec<(String, Fold)> = Vec::new();
     for (k, file) in files.iter().enumerate() {
@@ -116,9 +118,17 @@ fn units(measured: &Measured) -> Vec<Unit> {
     measured.report.files.iter().map(unit).collect()
 }
 
-/// Two runs on each window that lies in a file side by side; whole batches.
-fn runs_on(drive: &Drive, file: &FileReport) -> u64 {
-    let windows = drive.independent_windows(file.samples.iter().sum());
+/// Samples of a recording that were measured: a warm-up that is left out is not among them.
+fn samples_in(unit: &Unit) -> usize {
+    let of_channel = |channel: Channel| {
+        unit.replicates.iter().filter(|(own, _)| *own == channel).map(|(_, r)| r.samples).sum::<usize>()
+    };
+    Channel::ALL.into_iter().map(of_channel).max().unwrap_or(0)
+}
+
+/// Two runs on each window that lies in a recording of so many samples side by side; whole batches.
+fn runs_on(drive: &Drive, samples: usize) -> u64 {
+    let windows = drive.independent_windows(samples);
     ((2.0 * windows / 8.0).ceil() as u64 * 8).clamp(16, 64)
 }
 

@@ -160,7 +160,9 @@ fn rows_of(outcome: &Outcome, rate_hz: f64) -> Vec<Vec<String>> {
     let practical = outcome.practical(rate_hz);
     let cells = |row: PracticalRow| {
         let value = row.shown();
-        vec![row.name.to_owned(), value, row.interval, row.unit.to_owned(), row.si, row.governs]
+        // without draws there are no intervals to be determined
+        let interval = if outcome.inference.is_some() { row.interval } else { String::new() };
+        vec![row.name.to_owned(), value, interval, row.unit.to_owned(), row.si, row.governs]
     };
     let rows = practical.iter().flat_map(|p| practical_rows(p, sensor)).map(cells);
     let mut rows: Vec<Vec<String>> = rows.collect();

@@ -70,9 +70,14 @@ impl ChoiceReport<'_> {
         }
         lines.extend(self.dishonest());
         if !ranking.undescribed.is_empty() {
+            // what most of the recordings have is not one recording's fault
+            let cure = if 2 * ranking.undescribed.len() > ranking.winner().folds.len() {
+                "something moves in most of them: where it is a warm-up at their beginning, --skip-s auto leaves it out"
+            } else {
+                "look at it with nav-sim calibrate --verbose, and run again with --skip-s auto (a warm-up) or without it"
+            };
             lines.push(format!(
-                "no candidate describes {}: its errors are far larger than every filter believes; look at it with \
-                 nav-sim calibrate --verbose, and run again without it",
+                "no candidate describes {}: errors are far larger than every filter believes; {cure}",
                 ranking.undescribed.join(", ")
             ));
         }
@@ -147,6 +152,22 @@ impl ChoiceReport<'_> {
         rows
     }
 
+    /// The table as a terminal of 120 columns and a few lines shows it: the best, and what decides.
+    #[must_use]
+    pub(crate) fn brief_rows(&self) -> Vec<Vec<String>> {
+        const SHOWN: usize = 9;
+        let brief = |row: Vec<String>| {
+            let kept = |(column, cell)| (![BELIEVED, COVERAGE].contains(&column)).then_some(cell);
+            row.into_iter().enumerate().filter_map(kept).collect::<Vec<String>>()
+        };
+        let mut rows: Vec<Vec<String>> = self.rows().into_iter().take(1 + SHOWN).map(brief).collect();
+        let more = self.ranking.candidates.len().saturating_sub(SHOWN);
+        if more > 0 {
+            rows.push(vec![format!("… and {more} more")]);
+        }
+        rows
+    }
+
     fn row(&self, placed: &Placed) -> Vec<String> {
         let is_winner = placed.index == self.ranking.winner().index;
         let mark = match (is_winner, placed.eligible, placed.tied) {
@@ -187,9 +208,9 @@ impl ChoiceReport<'_> {
         let recordings = self.ranking.winner().folds.len();
         let ends: Vec<String> = self.outages.iter().map(|o| window(o.start_s, o.end_s)).collect();
         format!(
-            "{recordings} recordings, each left out once; outages {}; * the best by log score, = cannot be told from \
-             it, † of one recording; [95 % over recordings]; RMSE: horizontal, at the ends of the outages; NEES 9 and \
-             coverage 0.95 if the filter is right; log score: of the best, and of the others less the best",
+            "{recordings} recordings, each left out once; [95 % over recordings]; horizontal RMSE at the ends of the outages \
+             {}\n* best log score, others less it; = cannot be told from it; † of one recording; NEES 9, coverage 0.95 if \
+             the filter is right",
             ends.join(", ")
         )
     }
@@ -298,6 +319,10 @@ impl ChoiceReport<'_> {
         }
     }
 }
+
+/// Columns of [`ChoiceReport::rows`] that a terminal does not show unless asked.
+const BELIEVED: usize = 3;
+const COVERAGE: usize = 5;
 
 /// A number in a table that is wide enough already: two decimals at most.
 fn few(x: f64) -> String {

@@ -29,6 +29,9 @@ pub struct WarmUp {
     pub mean: bool,
     /// The first part against the last eight, in their standard deviations.
     pub deviations: f64,
+    /// Whether that is more than a quarter of the record: what fades so slowly may not be over in the rest, which is then too
+    /// short to tell.
+    pub late: bool,
     /// What leaving them out changes; none where not even the later half begins as it goes on, and nothing is to be left out.
     pub change: Option<Change>,
 }
@@ -51,7 +54,10 @@ pub fn warm_up(samples: &[f64]) -> Option<WarmUp> {
     while left <= samples.len() / 2 {
         match look(&samples[left..]) {
             Some(more) => left += more.samples,
-            None => return Some(WarmUp { samples: left, change: change(samples, left), ..first }),
+            None => {
+                let late = 4 * left > samples.len();
+                return Some(WarmUp { samples: left, late, change: change(samples, left), ..first });
+            }
         }
     }
     Some(WarmUp { samples: left, ..first })
@@ -91,7 +97,7 @@ fn look(samples: &[f64]) -> Option<WarmUp> {
             break;
         };
         let (mean, deviations) = found.map_or((mean, deviations), |f: WarmUp| (f.mean, f.deviations));
-        found = Some(WarmUp { samples: (first + 1) * length, mean, deviations, change: None });
+        found = Some(WarmUp { samples: (first + 1) * length, mean, deviations, late: false, change: None });
     }
     found
 }
@@ -150,6 +156,17 @@ mod tests {
         let found = warm_up(&signal).unwrap();
         assert!(found.mean, "{found:?}");
         assert!((2 * SAMPLES / 16..=6 * SAMPLES / 16).contains(&found.samples), "{found:?}");
+    }
+
+    /// A tail of e^-4 of a mean that settles with a time constant of an eighth hides in the noise: it is said that it may.
+    #[test]
+    fn what_settles_late_is_said_to_be_doubtful() {
+        let mut generator = Generator::seed_from_u64(6);
+        let settles = |t: usize| 200.0 * (-8.0 * t as f64 / SAMPLES as f64).exp();
+        let signal: Vec<f64> =
+            signal(&mut generator).iter().enumerate().map(|(t, x)| x + settles(t)).collect();
+        let found = warm_up(&signal).unwrap();
+        assert!(found.late && found.samples > SAMPLES / 4, "{found:?}");
     }
 
     #[test]

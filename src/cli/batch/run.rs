@@ -5,6 +5,7 @@ use super::shard;
 use super::watch::Watch;
 use crate::cli::{Failure, Session};
 use crate::study::{self, RunOptions, Shard};
+use serde_json::json;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -111,7 +112,13 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     match (ran.left, stop.failure(ran.left, ran.finished)) {
         (1.., Some(failure)) => Err(failure),
         _ => {
-            session.printer.say(&format!("{} units done, none left in this shard", ran.finished + ran.left));
+            let done = ran.finished + ran.left;
+            if session.json() {
+                session
+                    .printer
+                    .result(&json!({ "schema_version": 1, "units_done": done, "units_left": 0 }).to_string());
+            }
+            session.printer.say(&format!("{done} units done, none left in this shard"));
             Ok(())
         }
     }

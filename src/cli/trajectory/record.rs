@@ -23,7 +23,7 @@ const FILES: [&str; 4] = ["imu.csv", "gnss.csv", "reference.csv", "initial.toml"
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
-  nav-sim trajectory record trajectories/land_vehicle.toml calib_data/tactical.toml -o drive
+  nav-sim trajectory record trajectories/land_vehicle.toml calib_data/tactical.toml -o recorded
   nav-sim trajectory record trajectories/figure_eight.toml calib_data/tactical.toml --seed 1
   nav-sim trajectory record trajectories/fixed_wing.toml calib_data/consumer_mems.toml \\
       --scenario examples/scenario.toml -o flight")]

@@ -35,8 +35,8 @@ pub(super) struct GenerateArgs {
 #[command(before_help = "\
 Examples:
   nav-sim trajectory convert trajectories/figure_eight.toml -o eight.csv
-  nav-sim trajectory convert trajectories/fixed_wing.toml --rate-hz 20 -o flight.csv.gz
-  nav-sim trajectory convert trajectories/land_vehicle.toml --rate-hz 1 -o drive.csv")]
+  nav-sim trajectory convert trajectories/fixed_wing.toml --rate-hz 20 -o denser.csv.gz
+  nav-sim trajectory convert trajectories/land_vehicle.toml --rate-hz 1 -o thinned.csv")]
 pub(super) struct ConvertArgs {
     #[command(flatten)]
     source: Source,
