@@ -6,8 +6,9 @@ use super::run::{OutageArg, parse_outage, windows_of};
 use super::{Failure, Session, read};
 use crate::calibration::{Bootstrap, Estimator, Settings};
 use crate::ekf::FilterStates;
+use crate::formats::model_file::ModelFile;
 use crate::jobs::{self, DesignInputs, Destination, NavigateInputs, TrueImu};
-use crate::report::{design_page, design_rows, design_verdict, markdown_table};
+use crate::report::{Design, design_page, design_rows, design_verdict, markdown_table};
 use crate::scenario::{Method, Scenario};
 use serde_json::json;
 use std::path::PathBuf;
@@ -64,12 +65,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     args.pictures
         .guard(&std::iter::once(&args.model).chain(&args.trajectory).cloned().collect::<Vec<_>>())?;
     let file = read::model(&args.model, session)?;
-    let mut scenario = Scenario::default();
-    scenario.run.method = Method::Lincov;
-    scenario.filter.states = FilterStates::Full;
-    if !args.outages.is_empty() {
-        scenario.outage = Some(windows_of(&args.outages)?);
-    }
+    let mut scenario = scenario(args)?;
     let mut navigation = None;
     if let Some(path) = &args.trajectory {
         let trajectory = read::trajectory(path, session)?;
@@ -80,19 +76,38 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         let inputs = NavigateInputs::new(trajectory, file.model.clone(), TrueImu::AsBelieved);
         navigation = Some((inputs, outages));
     }
-    let bootstrap = Bootstrap { draws: args.draws as usize, seed: session.asked_seed().unwrap_or(1) };
+    let destination =
+        navigation.as_mut().map(|(inputs, outages)| Destination { inputs, scenario: &scenario, outages });
+    let designs = designs(args, &file, destination, session)?;
+    session.show(
+        || json!({ "schema_version": 1, "designs": designs }).to_string(),
+        || format!("{}\n{}", design_verdict(&designs), markdown_table(&design_rows(&designs))),
+    );
+    args.pictures.write(|| design_page(&designs), session)
+}
+
+/// Drives are analysed, with a state for every process.
+fn scenario(args: &Args) -> Result<Scenario, Failure> {
+    let mut scenario = Scenario::default();
+    scenario.run.method = Method::Lincov;
+    scenario.filter.states = FilterStates::Full;
+    if !args.outages.is_empty() {
+        scenario.outage = Some(windows_of(&args.outages)?);
+    }
+    Ok(scenario)
+}
+
+/// One design for each number of recordings and length.
+fn designs(
+    args: &Args,
+    file: &ModelFile,
+    navigation: Option<Destination<'_>>,
+    session: &Session,
+) -> Result<Vec<Design>, Failure> {
     let settings = Settings::default();
-    let mut inputs = DesignInputs {
-        file: &file,
-        estimator: args.estimator,
-        settings: &settings,
-        bootstrap,
-        navigation: navigation.as_mut().map(|(inputs, outages)| Destination {
-            inputs,
-            scenario: &scenario,
-            outages,
-        }),
-    };
+    let bootstrap = Bootstrap { draws: args.draws as usize, seed: session.asked_seed().unwrap_or(1) };
+    let mut inputs =
+        DesignInputs { file, estimator: args.estimator, settings: &settings, bootstrap, navigation };
     let recordings = args.recordings.map_or(vec![3, 6, 12], |k| vec![k as usize]);
     let hours = args.hours.map_or(vec![1.0, 3.0, 10.0], |h| vec![h]);
     let mut designs = Vec::new();
@@ -102,9 +117,5 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             designs.push(design.map_err(|e| Failure::input(e).hint("more, or longer recordings"))?);
         }
     }
-    session.show(
-        || json!({ "schema_version": 1, "designs": designs }).to_string(),
-        || format!("{}\n{}", design_verdict(&designs), markdown_table(&design_rows(&designs))),
-    );
-    args.pictures.write(|| design_page(&designs), session)
+    Ok(designs)
 }

@@ -205,7 +205,7 @@ impl FileError {
 
     /// What helps, where `words` says how a setting is made. What cannot be set there is left out.
     #[must_use]
-    pub fn hint_with(&self, words: impl Fn(Setting) -> Option<&'static str>) -> Option<String> {
+    pub(crate) fn hint_with(&self, words: impl Fn(Setting) -> Option<&'static str>) -> Option<String> {
         let known = self.remedies.iter().filter_map(|remedy| match remedy {
             Remedy::Advice(advice) => Some(advice.as_ref()),
             Remedy::Setting(setting) => words(*setting),

@@ -20,7 +20,7 @@ pub struct Curves {
 ///
 /// # Errors
 /// When the file cannot be read, says nothing of rate or sensor where nothing is given, or has two curves for one model.
-pub fn read_curves(
+pub(crate) fn read_curves(
     path: &Path,
     rate_hz: Option<f64>,
     sensor: Option<Sensor>,

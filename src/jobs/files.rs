@@ -130,7 +130,7 @@ impl ModelFiles {
     ///
     /// # Errors
     /// When the system refuses.
-    pub fn write_inflated(
+    pub(crate) fn write_inflated(
         &self,
         calibration: &Calibration,
         note: &CalibrationNote,

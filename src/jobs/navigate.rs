@@ -131,10 +131,7 @@ pub fn navigate(
     }
     let track = scenario.track(&inputs.trajectory, &inputs.model, outages)?;
     let belief = scenario.belief(&inputs.model, outages, &track)?;
-    if let TrueImu::Recordings(recordings) = &inputs.truth {
-        recordings.iter().filter_map(motion).for_each(|doubt| observer.remark(&Note::Unexpected(doubt)));
-    }
-    doubt(&belief, scenario, observer);
+    doubt(inputs, &belief, scenario, observer);
     let reduction = reduction(inputs, scenario, outages, &belief, &track, observer)?;
     let assessment = assess(&track, &belief, &inputs.model);
     heading(&assessment).iter().for_each(|doubt| observer.remark(&Note::Heading(*doubt)));
@@ -150,18 +147,16 @@ pub fn navigate(
         (Method::Lincov, Some((epochs, summary))) => {
             Navigation { runs: None, epochs, fan: analysis.fan(&belief), summary }
         }
-        (_, expected) => {
+        (method, expected) => {
             let mut sampled = sampled(&experiment, scenario.run.runs, seed, observer)?;
-            match (method, expected) {
-                (Method::Both, Some((_, expected))) => {
-                    sampled.beside(expected, &analysis.fan(&belief), observer)
+            match expected {
+                Some((_, expected)) if method == Method::Both => {
+                    sampled = sampled.beside(expected, &analysis.fan(&belief), observer);
                 }
-                (_, Some((_, expected))) => {
-                    sampled.summary.doubt_by(&expected);
-                    sampled
-                }
-                (_, None) => sampled,
+                Some((_, expected)) => sampled.summary.doubt_by(&expected),
+                None => {}
             }
+            sampled
         }
     };
     navigation.summary.reduction = reduction;
@@ -183,7 +178,10 @@ fn possible(inputs: &NavigateInputs, scenario: &Scenario) -> Result<(), Navigate
 }
 
 /// What speaks against the filter before anything was computed.
-fn doubt(belief: &Belief, scenario: &Scenario, observer: &dyn Observer<Note>) {
+fn doubt(inputs: &NavigateInputs, belief: &Belief, scenario: &Scenario, observer: &dyn Observer<Note>) {
+    if let TrueImu::Recordings(recordings) = &inputs.truth {
+        recordings.iter().filter_map(motion).for_each(|doubt| observer.remark(&Note::Unexpected(doubt)));
+    }
     // A Gauss-Markov process of phi ≈ 1 may have any stationary variance: a filter that starts with it believes
     // nothing of its first sensor readings.
     for (sensor, limit) in [(Sensor::Accel, 1.0), (Sensor::Gyro, 0.1)] {

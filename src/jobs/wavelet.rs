@@ -55,7 +55,7 @@ pub struct WaveletOptions {
 ///
 /// # Errors
 /// When a recording cannot be read, or is too short for the scales.
-pub fn wavelet_variances(
+pub(crate) fn wavelet_variances(
     paths: &[PathBuf],
     options: &WaveletOptions,
     remarks: &mut dyn Remarks,

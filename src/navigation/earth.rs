@@ -13,21 +13,21 @@ pub const A: f64 = 6_378_137.0;
 /// Flattening.
 pub const F: f64 = 1.0 / 298.257_223_563;
 /// First eccentricity squared.
-pub const E2: f64 = F * (2.0 - F);
+pub(crate) const E2: f64 = F * (2.0 - F);
 /// Rotation rate of the Earth (rad/s).
-pub const OMEGA_IE: f64 = 7.292_115e-5;
+pub(crate) const OMEGA_IE: f64 = 7.292_115e-5;
 /// Gravitational constant times the mass of the Earth (m³/s²).
-pub const MU: f64 = 3.986_004_418e14;
+pub(crate) const MU: f64 = 3.986_004_418e14;
 /// Normal gravity at the equator (m/s²).
-pub const GRAVITY_EQUATOR: f64 = 9.780_325_335_9;
+pub(crate) const GRAVITY_EQUATOR: f64 = 9.780_325_335_9;
 /// Somigliana's constant.
-pub const SOMIGLIANA_K: f64 = 0.001_931_852_652_41;
+pub(crate) const SOMIGLIANA_K: f64 = 0.001_931_852_652_41;
 /// Navigation in latitude and longitude is refused beyond this latitude (rad): 89.9°.
 pub const MAX_LATITUDE: f64 = 89.9 * crate::units::DEG;
 
 /// What the ellipsoid and gravity take from a latitude: one square root and one division for all.
 #[derive(Debug, Clone, Copy)]
-pub struct Parallel<R> {
+pub(crate) struct Parallel<R> {
     sin_lat: R,
     /// 1/√(1 − e² sin² lat).
     per_w: R,
@@ -46,7 +46,7 @@ impl<R: Real> Parallel<R> {
     /// The parallel at the latitude whose sine is given.
     #[inline(always)]
     #[must_use]
-    pub fn at(sin_lat: R) -> Self {
+    pub(crate) fn at(sin_lat: R) -> Self {
         let w2 = sin_lat * sin_lat * -E2 + 1.0;
         Self { sin_lat, per_w: R::from(1.0) / w2.sqrt() }
     }
@@ -55,7 +55,7 @@ impl<R: Real> Parallel<R> {
     /// rounding there (its error is 3/8 of the square of e² · 1e-6).
     #[inline(always)]
     #[must_use]
-    pub fn nearby(&self, sin_lat: R) -> Self {
+    pub(crate) fn nearby(&self, sin_lat: R) -> Self {
         let w2 = sin_lat * sin_lat * -E2 + 1.0;
         Self { sin_lat, per_w: self.per_w * (w2 * self.per_w * self.per_w * -0.5 + 1.5) }
     }
@@ -63,7 +63,7 @@ impl<R: Real> Parallel<R> {
     /// Radii of curvature.
     #[inline(always)]
     #[must_use]
-    pub fn radii(&self) -> Radii<R> {
+    pub(crate) fn radii(&self) -> Radii<R> {
         let transverse = self.per_w * A;
         Radii { meridian: transverse * (self.per_w * self.per_w) * (1.0 - E2), transverse }
     }
@@ -73,7 +73,7 @@ impl<R: Real> Parallel<R> {
     /// peers do).
     #[inline(always)]
     #[must_use]
-    pub fn gravity_down(&self, model: GravityModel, h: R) -> R {
+    pub(crate) fn gravity_down(&self, model: GravityModel, h: R) -> R {
         let s2 = self.sin_lat * self.sin_lat;
         let surface = (s2 * SOMIGLIANA_K + 1.0) * GRAVITY_EQUATOR * self.per_w;
         match model {
@@ -124,7 +124,7 @@ impl GravityModel {
 
 nav_sim_signal::named!(GravityModel);
 
-/// [`Parallel::gravity_down`] at the latitude whose sine is given.
+/// `Parallel::gravity_down` at the latitude whose sine is given.
 #[inline(always)]
 #[must_use]
 pub fn gravity_down<R: Real>(model: GravityModel, sin_lat: R, h: R) -> R {

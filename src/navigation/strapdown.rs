@@ -77,7 +77,7 @@ impl Strapdown {
     }
 
     /// Sets the state of one lane.
-    pub fn set_lane(&mut self, i: usize, state: &NavState) {
+    pub(crate) fn set_lane(&mut self, i: usize, state: &NavState) {
         (self.lat[i], self.lon[i], self.h[i]) = (state.lat, state.lon, state.h);
         self.v_n.set_lane(i, state.v_n);
         self.q_b_n.set_lane(i, state.q_b_n);

@@ -10,7 +10,7 @@ use crate::calibration::{
 };
 use crate::export::Quantity;
 use crate::imu::Sensor;
-use crate::noise::Process;
+use crate::noise::{Parameter, Process};
 
 /// With more fits than this each has one line.
 const MOST: usize = 2;
@@ -180,61 +180,57 @@ fn process_rows(outcome: &Outcome, rate_hz: f64) -> Vec<Vec<String>> {
     let shares = shares(model, &outcome.counted_levels());
     let intervals = outcome.inference.as_ref().map_or(&[][..], |i| &i.intervals);
     let row = |(index, (process, label)): (usize, (&Process, String))| {
-        let ends = |name: &str| {
-            let own = intervals.iter().find(|i| i.of.process == index && i.of.parameter.name() == name);
-            own.map(|i| i.absent.is_none().then_some([i.low, i.high]))
-        };
-        let mapped = |name: &str, f: &dyn Fn(f64) -> f64| match ends(name) {
+        let figure = figure(process, sensor).filter(|_| !outcome.fit.zero.contains(&index))?;
+        let own = intervals.iter().find(|i| i.of.process == index && i.of.parameter == figure.parameter);
+        let ends = match own.map(|i| i.absent.is_none().then_some([i.low, i.high])) {
             None => String::new(),
             Some(None) => "not determined".to_owned(),
             Some(Some(ends)) => {
-                let mut ends = ends.map(f);
+                let mut ends = ends.map(|end| (figure.of)(end, rate_hz));
                 ends.sort_by(f64::total_cmp);
                 interval(Some(ends), 1.0)
             }
         };
-        let (name, value, ends, unit, si) = match process {
-            _ if outcome.fit.zero.contains(&index) => return None,
-            Process::Ar1(p) if p.phi() > 0.0 => {
-                let time = |phi: f64| -1.0 / (phi.ln() * rate_hz);
-                let ends = mapped("phi", &time);
-                (
-                    "correlation time T",
-                    time(p.phi()),
-                    ends,
-                    "s",
-                    format!("sigma {:.2e} {}", p.variance().sqrt(), sensor.unit()),
-                )
-            }
-            Process::GaussMarkov(p) => {
-                let ends = mapped("beta", &f64::recip);
-                (
-                    "correlation time T",
-                    1.0 / p.beta(),
-                    ends,
-                    "s",
-                    format!("sigma {:.2e} {}", p.s2().sqrt(), sensor.unit()),
-                )
-            }
-            Process::Quantization(p) => {
-                // of the increments over a sample, as IEEE 952 has it
-                let increment = |q2: f64| q2.sqrt() / rate_hz;
-                let unit = match sensor {
-                    Sensor::Accel => "m/s",
-                    Sensor::Gyro => "rad",
-                };
-                ("quantization Q", increment(p.q2()), mapped("q2", &increment), unit, String::new())
-            }
-            Process::Drift(p) => {
-                let ends = mapped("slope", &|x| x * rate_hz);
-                ("ramp", p.slope() * rate_hz, ends, "per s", sensor.unit().to_owned())
-            }
-            _ => return None,
-        };
-        let governs = governs(&shares[index], rate_hz);
-        Some(vec![format!("{label} {name}"), readable(value), ends, unit.to_owned(), si, governs])
+        let name = format!("{label} {}", figure.name);
+        let value = readable((figure.of)(figure.value, rate_hz));
+        Some(vec![name, value, ends, figure.unit.to_owned(), figure.si, governs(&shares[index], rate_hz)])
     };
     model.processes.iter().zip(model.labels()).enumerate().filter_map(row).collect()
+}
+
+/// What a process is known by beside N and K.
+struct Figure {
+    name: &'static str,
+    /// The parameter that it follows from, and its value.
+    parameter: Parameter,
+    value: f64,
+    /// How it follows from the parameter and the rate (Hz).
+    of: fn(f64, f64) -> f64,
+    unit: &'static str,
+    /// What stands beside it in SI units.
+    si: String,
+}
+
+fn figure(process: &Process, sensor: Sensor) -> Option<Figure> {
+    let sigma = |variance: f64| format!("sigma {:.2e} {}", variance.sqrt(), sensor.unit());
+    let of = |name, parameter, value, of, unit, si| Some(Figure { name, parameter, value, of, unit, si });
+    match process {
+        Process::Ar1(p) if p.phi() > 0.0 => {
+            let time = |phi: f64, rate_hz: f64| -1.0 / (phi.ln() * rate_hz);
+            of("correlation time T", Parameter::Phi, p.phi(), time, "s", sigma(p.variance()))
+        }
+        Process::GaussMarkov(p) => {
+            of("correlation time T", Parameter::Beta, p.beta(), |beta, _| 1.0 / beta, "s", sigma(p.s2()))
+        }
+        Process::Quantization(p) => {
+            of("quantization Q", Parameter::Q2, p.q2(), |q2, _| q2.sqrt(), sensor.unit(), String::new())
+        }
+        Process::Drift(p) => {
+            let ramp = |slope, rate_hz| slope * rate_hz;
+            of("ramp", Parameter::Slope, p.slope(), ramp, "per s", sensor.unit().to_owned())
+        }
+        _ => None,
+    }
 }
 
 /// Scales at which a process is the largest part of the wavelet variance.

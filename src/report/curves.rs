@@ -13,7 +13,7 @@ pub(crate) const CONFIDENCE: f64 = 0.95;
 
 /// A wavelet variance with its intervals.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Band {
+pub(crate) struct Band {
     /// Wavelet variance (units²).
     pub wv: Vec<f64>,
     /// Lower ends of its 95 % intervals.
@@ -35,7 +35,7 @@ impl Band {
 
 /// The wavelet variances of one signal.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SignalCurves {
+pub(crate) struct SignalCurves {
     /// Recording.
     pub file: String,
     /// `accel` or `gyro`.
@@ -57,7 +57,7 @@ pub struct SignalCurves {
 impl SignalCurves {
     /// The curves of a signal at a rate (Hz); `edof` are the degrees of freedom of its classical variance.
     #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         channel: Channel,
         replicate: &Replicate,
         rate_hz: f64,
@@ -81,7 +81,7 @@ impl SignalCurves {
 
 /// What `wv` prints.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SignalsFile {
+pub(crate) struct SignalsFile {
     /// Layout version.
     pub schema_version: u32,
     /// Sample rate (Hz).
@@ -99,7 +99,7 @@ pub struct SignalsFile {
 impl SignalsFile {
     /// The file of some signals.
     #[must_use]
-    pub fn new(rate_hz: f64, efficiency: f64, edof_method: &str, signals: Vec<SignalCurves>) -> Self {
+    pub(crate) fn new(rate_hz: f64, efficiency: f64, edof_method: &str, signals: Vec<SignalCurves>) -> Self {
         Self {
             schema_version: SCHEMA_VERSION,
             rate_hz,

@@ -61,7 +61,7 @@ const NEARLY_ALL: f64 = 0.8;
 
 impl Design {
     /// The parameters whose intervals are nearly all due to what recordings differ by: longer ones tell no more.
-    pub fn lengths_do_not_help(&self) -> impl Iterator<Item = &DesignedParameter> {
+    pub(crate) fn lengths_do_not_help(&self) -> impl Iterator<Item = &DesignedParameter> {
         let is_floor = |p: &&DesignedParameter| {
             p.endless_half_width_pct
                 .zip(p.half_width_pct)
@@ -74,7 +74,7 @@ impl Design {
 impl Design {
     /// The parameter that would be known least: its name, and how well.
     #[must_use]
-    pub fn least_known(&self) -> String {
+    pub(crate) fn least_known(&self) -> String {
         let open = self.parameters.iter().filter(|p| p.half_width_pct.is_none()).count();
         let widest = self.parameters.iter().filter(|p| p.half_width_pct.is_some());
         let widest = widest.max_by(|a, b| a.half_width_pct.partial_cmp(&b.half_width_pct).expect("numbers"));

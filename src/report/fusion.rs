@@ -1,35 +1,17 @@
 //! The files of a fusion: `solution.csv`, `innovations.csv`, `errors.csv`, `summary.json`, `solution.kml`.
 
-use super::json;
 use super::manifest::Input;
-use super::number::{seconds, shortest, window};
+use super::number::{seconds, window};
 use super::page::{Cell, Table, Tone};
-use super::pages::fusion_page;
-use super::run_directory::OutputFile;
-use crate::earth::radii;
 use crate::ekf::InitialSettings;
 use crate::frames::{NavState, RollPitchYaw, wrap_angle};
-use crate::fusion::{Assessment, Drift, Outcome, Row, Solution, Start, Use, Verdict};
+use crate::fusion::{Assessment, Drift, Outcome, Solution, Start, Verdict};
 use crate::metrics::PerState;
-use crate::simulation::{BIAS_NAMES, REPORTED_NAMES};
 use crate::units::DEG;
 use serde::{Deserialize, Serialize};
-use std::fmt::Write as _;
 
-/// Names of the files of a fusion directory, the manifest last.
-pub(crate) const FUSION_FILES: [&str; 7] = [
-    "solution.csv",
-    "innovations.csv",
-    "errors.csv",
-    "solution.kml",
-    "summary.json",
-    "report.html",
-    "manifest.json",
-];
-
-const STATE: [&str; 9] =
+pub(super) const STATE: [&str; 9] =
     ["lat_deg", "lon_deg", "h_m", "v_n_m_s", "v_e_m_s", "v_d_m_s", "roll_deg", "pitch_deg", "yaw_deg"];
-const COMPONENTS: [&str; 6] = ["pos_n_m", "pos_e_m", "pos_d_m", "vel_n_m_s", "vel_e_m_s", "vel_d_m_s"];
 const SCHEMA_VERSION: u32 = 1;
 
 /// Where a fusion came from: `manifest.json`.
@@ -293,126 +275,9 @@ impl FusionSummary {
     }
 }
 
-/// The files of a fusion directory, the manifest last; `errors.csv` is empty but for its header without a
-/// reference.
-#[must_use]
-pub(crate) fn fusion_directory(
-    solution: &Solution,
-    summary: &FusionSummary,
-    manifest: &FusionManifest,
-    title: &str,
-) -> Vec<OutputFile<'static>> {
-    let contents = [
-        solution_csv(&solution.rows),
-        innovations_csv(solution),
-        errors_csv(&solution.rows),
-        kml(solution, title),
-        json(summary),
-        fusion_page(
-            solution,
-            summary,
-            &manifest.inputs.iter().map(|i| (i.role.clone(), i.path.clone())).collect::<Vec<_>>(),
-        )
-        .html(),
-        json(manifest),
-    ];
-    FUSION_FILES.into_iter().zip(contents).map(|(name, text)| OutputFile::whole(name, text)).collect()
-}
-
 /// Position (degrees, m), velocity, roll, pitch, yaw (degrees).
-fn values(s: &NavState) -> [f64; 9] {
+pub(super) fn values(s: &NavState) -> [f64; 9] {
     let rpy = RollPitchYaw::from_quat(s.q_b_n);
     let [roll, pitch, yaw] = [rpy.roll, rpy.pitch, rpy.yaw].map(|a| a / DEG);
     [s.lat / DEG, wrap_angle(s.lon) / DEG, s.h, s.v_n.x, s.v_n.y, s.v_n.z, roll, pitch, yaw]
-}
-
-fn header(groups: &[(&str, &[&str])]) -> String {
-    let names = groups.iter().flat_map(|(prefix, names)| names.iter().map(move |n| format!("{prefix}{n}")));
-    std::iter::once("t_s".to_owned()).chain(names).collect::<Vec<_>>().join(",") + "\n"
-}
-
-/// A number with as many digits as its size deserves: 1e-10 degrees are 0.01 mm.
-fn fixed(x: f64, digits: usize) -> String {
-    if x.is_finite() && x.abs() < 1e15 { format!("{x:.digits$}") } else { shortest(x) }
-}
-
-/// `solution.csv`: states, their standard deviations (those of latitude and longitude in degrees), bias
-/// estimates, the horizontal standard deviations in metres, and those of the biases.
-#[must_use]
-pub(crate) fn solution_csv(rows: &[Row]) -> String {
-    let mut text = header(&[
-        ("", &STATE),
-        ("sd_", &STATE),
-        ("", &BIAS_NAMES),
-        ("sd_", &["n_m", "e_m"]),
-        ("sd_", &BIAS_NAMES),
-    ]);
-    for row in rows {
-        let (state, sd) = (values(&row.state), &row.sigma);
-        let r = radii(row.state.lat.sin());
-        let sd_lat = sd[0] / (r.meridian + row.state.h) / DEG;
-        let sd_lon = sd[1] / ((r.transverse + row.state.h) * row.state.lat.cos()) / DEG;
-        let digits = [10, 10, 5, 6, 6, 6, 7, 7, 7];
-        let mut cells = vec![fixed(row.t_s, 6)];
-        cells.extend(state.iter().zip(digits).map(|(x, d)| fixed(*x, d)));
-        cells.extend([sd_lat, sd_lon].map(|x| format!("{x:.4e}")));
-        cells.extend(sd[2..].iter().map(|x| fixed(*x, 6)));
-        cells.extend(row.bias.iter().flat_map(|b| b.to_array()).map(|x| fixed(x, 9)));
-        cells.extend(sd[..2].iter().map(|x| fixed(*x, 6)));
-        cells.extend(row.bias_sigma.iter().flat_map(|b| b.to_array()).map(|x| fixed(x, 9)));
-        text += &(cells.join(",") + "\n");
-    }
-    text
-}
-
-/// `innovations.csv`: every fix; 1 where it was used, and why not where it was not.
-fn innovations_csv(solution: &Solution) -> String {
-    let mut text =
-        header(&[("", &["used", "status"]), ("", &COMPONENTS), ("sd_", &COMPONENTS), ("", &["nis", "dof"])]);
-    for fix in &solution.fixes {
-        let status = match fix.used {
-            Use::Used => "used",
-            Use::Withheld => "withheld",
-            Use::Rejected => "rejected",
-        };
-        let mut cells =
-            vec![fixed(fix.t_s, 6), u8::from(fix.used == Use::Used).to_string(), status.to_owned()];
-        for list in [&fix.innovation, &fix.sigma] {
-            cells.extend((0..6).map(|i| list.get(i).map_or_else(String::new, |x| fixed(*x, 6))));
-        }
-        cells.extend([fixed(fix.nis, 4), fix.innovation.len().to_string()]);
-        text += &(cells.join(",") + "\n");
-    }
-    text
-}
-
-fn errors_csv(rows: &[Row]) -> String {
-    let mut text = header(&[("err_", &REPORTED_NAMES), ("", &["nees"])]);
-    for (row, error) in rows.iter().filter_map(|row| Some((row, row.error?))) {
-        let cells: Vec<String> = error.values.iter().map(|x| fixed(*x, 6)).collect();
-        let _ = writeln!(text, "{},{},{}", fixed(row.t_s, 6), cells.join(","), fixed(error.nees, 4));
-    }
-    text
-}
-
-/// The way as a line on the map, a point a second at most.
-fn kml(solution: &Solution, title: &str) -> String {
-    let mut line = String::new();
-    let mut last = f64::NEG_INFINITY;
-    for row in &solution.rows {
-        if row.t_s - last >= 1.0 - 1e-6 || std::ptr::eq(row, &solution.rows[solution.rows.len() - 1]) {
-            let (lon, lat, h) = (wrap_angle(row.state.lon) / DEG, row.state.lat / DEG, row.state.h);
-            let _ = write!(line, "{lon:.8},{lat:.8},{h:.2} ");
-            last = row.t_s;
-        }
-    }
-    let title = super::page::escape(title);
-    format!(
-        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<kml xmlns=\"http://www.opengis.net/kml/2.2\">\n<Document>\n\
-         <name>{title}</name>\n<Placemark>\n<name>solution</name>\n<Style><LineStyle><color>ff0050ff</color>\
-         <width>3</width></LineStyle></Style>\n<LineString><tessellate>1</tessellate>\
-         <altitudeMode>clampToGround</altitudeMode>\n<coordinates>{}</coordinates>\n</LineString>\n</Placemark>\n\
-         </Document>\n</kml>\n",
-        line.trim_end()
-    )
 }

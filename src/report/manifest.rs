@@ -60,7 +60,7 @@ impl Manifest {
 
     /// Whether a run of the one is a run of the other: all that decides the results is the same.
     #[must_use]
-    pub fn is_same_run(&self, other: &Self) -> bool {
+    pub(crate) fn is_same_run(&self, other: &Self) -> bool {
         let inputs = |m: &Self| -> Vec<(String, String)> {
             m.inputs.iter().map(|i| (i.role.clone(), i.blake3.clone())).collect()
         };
@@ -71,7 +71,7 @@ impl Manifest {
 
     /// The hashes of the inputs of a role, in the order given.
     #[must_use]
-    pub fn hashes(&self, role: &str) -> Vec<&str> {
+    pub(crate) fn hashes(&self, role: &str) -> Vec<&str> {
         self.inputs.iter().filter(|i| i.role == role).map(|i| i.blake3.as_str()).collect()
     }
 }

@@ -6,12 +6,14 @@ mod choose;
 mod closure;
 mod columns;
 mod comparison;
+mod comparison_table;
 mod curves;
 mod describe;
 mod design;
 mod efficiency;
 mod fits;
 mod fusion;
+mod fusion_files;
 mod manifest;
 mod markdown;
 mod number;
@@ -39,16 +41,15 @@ pub(crate) use brief::brief;
 pub(crate) use choose::{ChoiceReport, RankedPlace};
 pub(crate) use closure::TrajectoryCheck;
 pub(crate) use columns::{columns, terminal_columns, terminal_table};
-pub(crate) use comparison::{
-    CandidateResult, ComparisonFile, Label, consistency_rows, meaning_of_intervals, table_rows,
-    verdict_lines, with_times,
-};
+pub(crate) use comparison::{CandidateResult, ComparisonFile, Label, meaning_of_intervals, verdict_lines};
+pub(crate) use comparison_table::{consistency_rows, table_rows, with_times};
 pub(crate) use curves::{CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile};
 pub(crate) use describe::describe;
 pub(crate) use design::{Design, DesignedParameter, DesignedQuantile, design_rows, design_verdict};
 pub(crate) use efficiency::{EfficiencyFile, EfficiencyRow, efficiency_csv, efficiency_table};
 pub(crate) use fits::FitsFile;
-pub(crate) use fusion::{FUSION_FILES, FusionKind, FusionManifest, FusionSummary, fusion_directory};
+pub(crate) use fusion::{FusionKind, FusionManifest, FusionSummary};
+pub(crate) use fusion_files::{FUSION_FILES, fusion_directory};
 pub use manifest::{Input, Manifest, ModelNote};
 pub(crate) use markdown::{csv_table, latex_table, markdown, markdown_table};
 pub use number::readable;

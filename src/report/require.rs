@@ -70,13 +70,13 @@ pub struct RankedUnit {
 impl RankedUnit {
     /// Whether its errors are within the limits, as far as its figures are stated.
     #[must_use]
-    pub fn is_within(&self) -> bool {
+    pub(crate) fn is_within(&self) -> bool {
         self.worst.margin() >= 0.0
     }
 
     /// Whether it keeps the limits, by figures that are all stated.
     #[must_use]
-    pub fn is_met(&self) -> bool {
+    pub(crate) fn is_met(&self) -> bool {
         self.is_within() && self.not_stated.is_empty()
     }
 }
@@ -93,7 +93,7 @@ pub struct Question {
 impl Question {
     /// `p95_m ≤ 5 after 60 s without fixes (from 300 s on)`
     #[must_use]
-    pub fn in_words(&self) -> String {
+    pub(crate) fn in_words(&self) -> String {
         let first = self.outages[0];
         let places = match self.outages.as_slice() {
             [_] => format!("from {} s on", seconds(first.start_s)),

@@ -1,7 +1,8 @@
 //! Tables of studies: one row a cell, column and outage (and epoch, and run). Every column has its unit in
 //! its name; numbers that do not exist are NaN (null in JSON).
 
-use super::comparison::{CandidateResult, Label, table_rows};
+use super::comparison::{CandidateResult, Label};
+use super::comparison_table::table_rows;
 use super::number::{readable, window};
 use super::verdict::verdict_word;
 use crate::metrics::{self, EpochMetrics, Measured, OutageComparison, OutageMetrics, Verdict};

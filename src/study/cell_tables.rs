@@ -9,7 +9,7 @@ use super::planned::Planned;
 use super::sums::CellSums;
 use super::unit::{Finding, UnitResult};
 use super::unit_file::{self, UnitFileError};
-use crate::metrics::{self, Measured, OutageComparison};
+use crate::metrics::{self, EpochMetrics, Measured, OutageComparison};
 use crate::report::{self, ColumnResult, Label, ShownCell, ShownColumn, TableRow};
 use crate::simulation::RunRecord;
 
@@ -71,32 +71,29 @@ impl CellTables {
         };
         let columns = grid.columns.iter().zip(&sums.columns).zip(&measured).zip(comparisons);
         for (((column, finding), measured), (comparison, is_reference)) in columns {
-            let filter = grid.filter(cell, column).name();
             let reference = if comparison.is_some() { reference.1.as_str() } else { "" };
+            let filter = grid.filter(cell, column).name();
             let (cell, candidate) = (grid.names(cell), column.name.as_str());
-            let shown = ColumnResult { cell, candidate, filter, reference, measured };
-            let outages = finding.outages();
-            tables.outages.extend(report::outage_rows(&shown, &outages, comparison.as_deref()));
-            tables.runs.extend(report::run_rows(&shown));
-            if planned.keeps_epochs() {
-                tables.epochs.extend(report::epoch_rows(&shown, &finding.epochs()));
-            }
-            tables.diverged += measured.sampled().iter().filter(|r| r.diverged).count() as u64;
+            let result = ColumnResult { cell, candidate, filter, reference, measured };
             let (name, label) = shown_names(&planned.plan.study, column, filter);
-            let verdict = measured.verdict();
-            tables.shown.columns.push(ShownColumn {
-                name,
-                label,
-                outages,
-                comparison,
-                is_reference,
-                verdict,
-            });
+            let (outages, verdict) = (finding.outages(), measured.verdict());
+            let shown = ShownColumn { name, label, outages, comparison, is_reference, verdict };
+            let epochs = planned.keeps_epochs().then(|| finding.epochs());
+            tables.add(&result, shown, epochs.as_deref());
         }
         if planned.plan.study.leaves_out() {
             tables.runs_of_columns = measured.into_iter().map(|m| m.runs).collect();
         }
         Ok(Ok(tables))
+    }
+
+    /// The rows of a column.
+    fn add(&mut self, result: &ColumnResult<'_>, shown: ShownColumn, epochs: Option<&[EpochMetrics]>) {
+        self.outages.extend(report::outage_rows(result, &shown.outages, shown.comparison.as_deref()));
+        self.runs.extend(report::run_rows(result));
+        self.epochs.extend(epochs.into_iter().flat_map(|epochs| report::epoch_rows(result, epochs)));
+        self.diverged += result.measured.sampled().iter().filter(|r| r.diverged).count() as u64;
+        self.shown.columns.push(shown);
     }
 }
 

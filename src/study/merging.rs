@@ -63,10 +63,40 @@ pub fn merge(
     let mut texts = Texts::new(planned)?;
     let mut folds = Folds::default();
     let units: Vec<(Unit, String)> = planned.plan.named_units(&planned.grid).collect();
+    let diverged = match gather(planned, &units, options.threads, &mut tables, &mut texts, &mut folds)? {
+        Ok(diverged) => diverged,
+        Err(damaged) => return Err(incomplete(planned, units.len(), damaged)),
+    };
+    tables.finish()?;
+    texts.rankings = folds.ranked(planned);
+    let text = texts.render(&options.states);
+    out.write("tables.md", format!("{text}\n"))?;
+    out.write("report.html", texts.page(&options.states))?;
+    if !texts.rankings.is_empty() {
+        let rankings: Vec<&serde_json::Value> = texts.rankings.iter().map(|place| &place.json).collect();
+        out.write("ranking.json", report::json(&json!({ "schema_version": 1, "rankings": rankings })))?;
+    }
+    let summary = summary(planned, units.len(), diverged);
+    out.write("study.json", report::json(&summary))?;
+    remove_stale(planned)?;
+    out.commit()?;
+    Ok(MergeReport { results, text, summary, diverged })
+}
+
+/// Takes cell by cell into the tables, in their order, as long as no unit is damaged; how many runs diverged, or all units
+/// that are damaged.
+fn gather(
+    planned: &Planned,
+    units: &[(Unit, String)],
+    threads: usize,
+    tables: &mut Tables,
+    texts: &mut Texts,
+    folds: &mut Folds,
+) -> Result<Result<u64, Vec<(Unit, String)>>, StudyError> {
     let cells: Vec<&[(Unit, String)]> = units.chunk_by(|a, b| a.0.cell == b.0.cell).collect();
     let mut damaged = Vec::new();
     let mut diverged = 0;
-    for wave in cells.chunks(cells_at_once(planned, options.threads)) {
+    for wave in cells.chunks(cells_at_once(planned, threads)) {
         let found: Vec<Result<Result<CellTables, DamagedUnits>, StudyError>> =
             wave.par_iter().map(|units| CellTables::make(planned, units)).collect();
         for cell in found {
@@ -82,23 +112,7 @@ pub fn merge(
             }
         }
     }
-    if !damaged.is_empty() {
-        return Err(incomplete(planned, units.len(), damaged));
-    }
-    tables.finish()?;
-    texts.rankings = folds.ranked(planned);
-    let text = texts.render(&options.states);
-    out.write("tables.md", format!("{text}\n"))?;
-    out.write("report.html", texts.page(&options.states))?;
-    if !texts.rankings.is_empty() {
-        let rankings: Vec<&serde_json::Value> = texts.rankings.iter().map(|place| &place.json).collect();
-        out.write("ranking.json", report::json(&json!({ "schema_version": 1, "rankings": rankings })))?;
-    }
-    let summary = summary(planned, units.len(), diverged);
-    out.write("study.json", report::json(&summary))?;
-    remove_stale(planned)?;
-    out.commit()?;
-    Ok(MergeReport { results, text, summary, diverged })
+    Ok(if damaged.is_empty() { Ok(diverged) } else { Err(damaged) })
 }
 
 fn incomplete(planned: &Planned, units: usize, missing: Vec<(Unit, String)>) -> StudyError {

@@ -207,7 +207,7 @@ pub fn encode(unit: &UnitResult) -> Vec<u8> {
 ///
 /// # Errors
 /// What is wrong with them.
-pub fn decode(bytes: &[u8]) -> Result<UnitResult, &'static str> {
+pub(crate) fn decode(bytes: &[u8]) -> Result<UnitResult, &'static str> {
     let content = bytes.len().checked_sub(CHECKSUM).ok_or("it is cut off")?;
     let (content, checksum) = bytes.split_at(content);
     if blake3::hash(content).as_bytes() != checksum {

@@ -14,4 +14,4 @@ mod target;
 pub use accuracy::{Accuracy, accuracy};
 pub use design::{Design, Estimate, StudyError};
 pub use sensitivity::{Movement, abnormal_curve, outlier_curve};
-pub use target::{Target, expected_wv, target};
+pub use target::{Target, target};

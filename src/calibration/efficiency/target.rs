@@ -45,7 +45,7 @@ pub fn target(design: &Design) -> Result<Target, StudyError> {
 ///
 /// # Errors
 /// When a law does not belong to this noise.
-pub fn expected_wv(
+pub(crate) fn expected_wv(
     noise: &Composite,
     laws: &[Variation],
     rate_hz: f64,

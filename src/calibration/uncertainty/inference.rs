@@ -66,18 +66,6 @@ fn by_bootstrap(
     let fits: Vec<Fit> = (0..bootstrap.draws).into_par_iter().filter_map(draw).collect();
     let errors = standard_errors(outcome, settings, &sampler.covariance_as_recorded(CURVES, &name, settings));
     let spread = sampler.spread.as_ref();
-    let rows = |s: &Spread| {
-        let levels = outcome.curve.levels.iter().copied();
-        let deviations = s.within.iter().zip(&s.between);
-        levels
-            .zip(deviations)
-            .map(|(level, (&within, &between))| LevelSpread {
-                tau_s: tau_s(level, settings.rate_hz),
-                within,
-                between,
-            })
-            .collect()
-    };
     let stretch = spread.map_or(1.0, Spread::student);
     Inference {
         draws: bootstrap.draws,
@@ -86,12 +74,23 @@ fn by_bootstrap(
         stretch,
         intervals: intervals(outcome, &fits, stretch, &errors),
         goodness: (outcome.estimator != Estimator::Avlr).then(|| goodness(outcome, &fits)),
-        spread: spread.map_or(Vec::new(), rows),
+        spread: spread.map_or(Vec::new(), |s| level_spreads(s, &outcome.curve.levels, settings.rate_hz)),
         alike: spread
             .and_then(|s| alike::p_value(&group.replicates, outcome.estimator, s, &sampler.law, &name)),
         indistinct: None,
         practical: practical::intervals(outcome, &fits, stretch, settings.rate_hz),
     }
+}
+
+/// Deviations within recordings and between them, scale by scale.
+fn level_spreads(spread: &Spread, levels: &[u32], rate_hz: f64) -> Vec<LevelSpread> {
+    let deviations = spread.within.iter().zip(&spread.between);
+    let of_level = |(&level, (&within, &between)): (&u32, (&f64, &f64))| LevelSpread {
+        tau_s: tau_s(level, rate_hz),
+        within,
+        between,
+    };
+    levels.iter().zip(deviations).map(of_level).collect()
 }
 
 #[cfg(test)]

@@ -38,33 +38,8 @@ pub(crate) fn intervals(
         let there: Vec<&Process> = matched.iter().filter_map(|m| m[i]).collect();
         let is_zero = outcome.fit.zero.contains(&i);
         let lost = if is_zero { 1.0 } else { 1.0 - there.len() as f64 / fits.len() as f64 };
-        let first = intervals.len();
-        let mut quantiles = Vec::new();
-        for (p, (&parameter, value)) in process.kind().parameters().iter().zip(process.values()).enumerate() {
-            let of = ParameterRef { process: i, parameter };
-            if spec.is_fixed(of) {
-                continue;
-            }
-            let drawn = there.iter().map(|process| process.values()[p]).collect();
-            let draws = Draws::new(parameter, drawn, stretch);
-            let [low, high] = match lost {
-                // The quantile is that of what has vanished.
-                lost if lost > TAIL => [f64::NAN; 2],
-                _ => holding(value, draws.around(value)),
-            };
-            // The intervals of a parameter that is bounded end there.
-            let (from, to) = spec.range(of);
-            let [low, high] = [low, high].map(|end: f64| end.clamp(from, to));
-            quantiles.push(draws.stretched().map(|end| end.clamp(from, to)));
-            let absent = match lost {
-                1.0.. => Some(Undetermined::Zero),
-                lost if lost > TAIL => Some(Undetermined::Vanishes),
-                _ => low.is_nan().then_some(Undetermined::OneSided),
-            };
-            let standard_error = standard_errors[intervals.len()];
-            intervals.push(ParameterInterval { of, low, high, lost, absent, standard_error });
-        }
-        let own = &mut intervals[first..];
+        let drawn = DrawnProcess { spec, index: i, process, drawn: there, lost, stretch };
+        let (mut own, quantiles) = drawn.intervals(&standard_errors[intervals.len()..]);
         if spec.limits()[i].shape.is_none() && own.iter().any(|i| leaves_search(searched, process, i)) {
             own.iter_mut().for_each(|i| i.refuse(Undetermined::BeyondSearch));
         }
@@ -78,8 +53,55 @@ pub(crate) fn intervals(
         for (interval, quantiles) in own.iter_mut().zip(quantiles).filter(|(i, _)| i.absent.is_none()) {
             [interval.low, interval.high] = hull([interval.low, interval.high], quantiles);
         }
+        intervals.extend(own);
     }
     intervals
+}
+
+/// A process of a model, and what it is in the draws that have it.
+struct DrawnProcess<'a> {
+    spec: &'a ModelSpec,
+    /// Its position in the model.
+    index: usize,
+    process: &'a Process,
+    drawn: Vec<&'a Process>,
+    /// Share of the draws that do not have it.
+    lost: f64,
+    stretch: f64,
+}
+
+impl DrawnProcess<'_> {
+    /// The intervals of its parameters that are not fixed, by draws mirrored at the estimates, and the quantiles of the
+    /// draws themselves. `standard_errors`: of the same parameters.
+    fn intervals(&self, standard_errors: &[f64]) -> (Vec<ParameterInterval>, Vec<[f64; 2]>) {
+        let (mut intervals, mut quantiles) = (Vec::new(), Vec::new());
+        let parameters = self.process.kind().parameters().iter().zip(self.process.values());
+        for (p, (&parameter, value)) in parameters.enumerate() {
+            let of = ParameterRef { process: self.index, parameter };
+            if self.spec.is_fixed(of) {
+                continue;
+            }
+            let drawn = self.drawn.iter().map(|process| process.values()[p]).collect();
+            let draws = Draws::new(parameter, drawn, self.stretch);
+            let [low, high] = match self.lost {
+                // The quantile is that of what has vanished.
+                lost if lost > TAIL => [f64::NAN; 2],
+                _ => holding(value, draws.around(value)),
+            };
+            // The intervals of a parameter that is bounded end there.
+            let (from, to) = self.spec.range(of);
+            let [low, high] = [low, high].map(|end: f64| end.clamp(from, to));
+            quantiles.push(draws.stretched().map(|end| end.clamp(from, to)));
+            let absent = match self.lost {
+                1.0.. => Some(Undetermined::Zero),
+                lost if lost > TAIL => Some(Undetermined::Vanishes),
+                _ => low.is_nan().then_some(Undetermined::OneSided),
+            };
+            let standard_error = standard_errors[intervals.len()];
+            intervals.push(ParameterInterval { of, low, high, lost: self.lost, absent, standard_error });
+        }
+        (intervals, quantiles)
+    }
 }
 
 /// Upper over lower quantile of the draws of an amplitude that say nothing any more; of its interval, which Student's quantile

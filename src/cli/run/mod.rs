@@ -9,7 +9,7 @@ use super::parse::one_of;
 use super::pictures::PlotArgs;
 use super::{Failure, Session};
 use crate::formats::scenario_file;
-use crate::jobs::{self, NavigateError};
+use crate::jobs::{self, NavigateError, Navigation};
 use crate::metrics::{Requirement, Summary};
 use crate::report::{Manifest, TrajectorySeries, run_words, window};
 use crate::scenario::{Method, Scenario};
@@ -136,6 +136,21 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let throughput_epochs_per_s = if wall_s > 0.0 { epochs / wall_s } else { 0.0 };
     let manifest = Manifest { independent_windows, wall_s, throughput_epochs_per_s, ..manifest };
     write(&found, &manifest, &TrajectorySeries::of(&inputs.job.trajectory), &args.out)?;
+    show(args, &found, throughput_epochs_per_s, session)?;
+    output::doubt_filter(&found.summary, session);
+    session.wrote(&args.out);
+    all_finite(&found.summary)?;
+    not_lost(&found.summary)?;
+    required(&found.summary)
+}
+
+/// What is printed of the run, and its picture.
+fn show(
+    args: &Args,
+    found: &Navigation,
+    throughput_epochs_per_s: f64,
+    session: &Session,
+) -> Result<(), Failure> {
     let summary = &found.summary;
     let shown = match session.json() {
         true => crate::report::summary_json(summary, throughput_epochs_per_s),
@@ -152,11 +167,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if session.verbose() && !session.json() {
         session.printer.result(run_words::sensitivity_table(&found.summary).trim_end());
     }
-    output::doubt_filter(&found.summary, session);
-    session.wrote(&args.out);
-    all_finite(&found.summary)?;
-    not_lost(&found.summary)?;
-    required(&found.summary)
+    Ok(())
 }
 
 /// Refuses requirements of the ends of outages without an outage.

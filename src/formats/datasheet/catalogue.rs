@@ -26,7 +26,7 @@ macro_rules! catalogue {
 }
 
 /// The entries that are known by name, and their texts.
-pub const CATALOGUE: &[(&str, &str)] = catalogue![
+pub(crate) const CATALOGUE: &[(&str, &str)] = catalogue![
     "adis16405",
     "adis16448",
     "adis16470",

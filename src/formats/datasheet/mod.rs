@@ -20,7 +20,8 @@
 mod catalogue;
 mod figure;
 
-pub use catalogue::{CATALOGUE, catalogued, read};
+pub(crate) use catalogue::CATALOGUE;
+pub use catalogue::{catalogued, read};
 pub use figure::{Figure, Quantity, QuantityError};
 
 use crate::formats::model_file::{ModelFile, PROGRAM, SCHEMA, TurnOn};
@@ -29,7 +30,7 @@ use crate::noise::{Composite, Flicker, Model, ParameterError, Process, RandomWal
 use toml::Table;
 
 /// The correlation time that is assumed where none is given (s).
-pub const ASSUMED_CORRELATION_TIME_S: f64 = 300.0;
+pub(crate) const ASSUMED_CORRELATION_TIME_S: f64 = 300.0;
 
 /// One figure of one sensor, and where it was read.
 #[derive(Debug, Clone, PartialEq)]

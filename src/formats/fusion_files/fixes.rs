@@ -142,6 +142,19 @@ fn classify(name: &str) -> Option<(usize, f64)> {
 struct Columns([Option<(usize, f64)>; NAMES.len()]);
 
 impl Columns {
+    /// Standard deviations that are not of the file, and columns that are not used.
+    fn remarks(&self, ignored: &[String]) -> Vec<String> {
+        let unstated = |at: usize| self.0[at].is_none();
+        let mut remarks = Vec::new();
+        if unstated(4) || self.0[VELOCITY.start].is_some() && unstated(10) {
+            remarks.push("standard deviations as given for all fixes".to_owned());
+        }
+        if !ignored.is_empty() {
+            remarks.push(format!("columns not used: {}", ignored.join(", ")));
+        }
+        remarks
+    }
+
     fn of(table: &Table, unsaid: Option<&FixSigma>) -> Result<(Self, Vec<String>), Error> {
         let mut columns = Self([None; NAMES.len()]);
         let mut ignored = Vec::new();
@@ -238,28 +251,14 @@ pub(crate) fn read_gnss(
         (text, remarks) = (table, vec![remark]);
     }
     let bare = bare_columns(&text);
-    let names: Option<Vec<&str>> = match bare {
-        None => None,
-        Some(POSITION) => Some(NAMES[..POSITION].to_vec()),
-        Some(13) => Some(KF_GINS_VELOCITY.map(|i| NAMES[i]).to_vec()),
-        Some(columns) => {
-            let message = format!("{columns} columns without a header");
-            return Err(Error::contents(path.display().to_string(), Place::Within, message).advice(KF_GINS));
-        }
-    };
+    let names = bare.map(|columns| bare_names(path, columns)).transpose()?;
     let table = table(path, &text, names.as_deref())?;
     let (columns, ignored) = Columns::of(&table, unsaid)?;
     if bare.is_some() && !is_rtklib {
         let velocity = if columns.0[VELOCITY.start].is_some() { ", velocity" } else { "" };
         remarks.push(format!("no header: read as KF-GINS text, position{velocity} and standard deviations"));
     }
-    let unstated = |at: usize| columns.0[at].is_none();
-    if unstated(4) || columns.0[VELOCITY.start].is_some() && unstated(10) {
-        remarks.push("standard deviations as given for all fixes".to_owned());
-    }
-    if !ignored.is_empty() {
-        remarks.push(format!("columns not used: {}", ignored.join(", ")));
-    }
+    remarks.extend(columns.remarks(&ignored));
     let mut fixes: Vec<GnssFix> = Vec::with_capacity(table.rows.len());
     for (line, row) in &table.rows {
         check_values(&table, &columns, *line, row)?;
@@ -276,6 +275,18 @@ pub(crate) fn read_gnss(
         );
     }
     Ok((fixes, remarks.into_iter().map(|r| format!("{}: {r}", table.path)).collect()))
+}
+
+/// The columns of a KF-GINS text, which has no header.
+fn bare_names(path: &Path, columns: usize) -> Result<Vec<&'static str>, Error> {
+    match columns {
+        POSITION => Ok(NAMES[..POSITION].to_vec()),
+        13 => Ok(KF_GINS_VELOCITY.map(|i| NAMES[i]).to_vec()),
+        _ => {
+            let message = format!("{columns} columns without a header");
+            Err(Error::contents(path.display().to_string(), Place::Within, message).advice(KF_GINS))
+        }
+    }
 }
 
 fn fix(columns: &Columns, row: &[f64], unsaid: Option<&FixSigma>) -> GnssFix {

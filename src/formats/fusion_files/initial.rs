@@ -80,32 +80,7 @@ pub(crate) fn read_initial(path: &Path) -> Result<Start, FileError> {
 fn parse(source: &Source) -> Result<Start, FileError> {
     let document = Document::parse(source)?;
     let d: Description = document.read()?;
-    let refuse = |key: &str, reason: String| Err(document.root().refuse(key, reason, None));
-    let limits = [
-        ("lat_deg", d.lat_deg, 90.0),
-        ("lon_deg", d.lon_deg, 360.0),
-        ("roll_deg", d.roll_deg, 180.0),
-        ("pitch_deg", d.pitch_deg, 90.0),
-        ("yaw_deg", d.yaw_deg, 360.0),
-    ];
-    if let Some((key, _, limit)) =
-        limits.iter().find(|(_, value, limit)| value.is_nan() || value.abs() > *limit)
-    {
-        return refuse(key, format!("is not within ±{limit}"));
-    }
-    let unlimited = [
-        ("t_s", d.t_s),
-        ("h_m", d.h_m),
-        ("v_n_m_s", d.v_n_m_s),
-        ("v_e_m_s", d.v_e_m_s),
-        ("v_d_m_s", d.v_d_m_s),
-    ];
-    if let Some((key, _)) = unlimited.iter().find(|(_, value)| !value.is_finite()) {
-        return refuse(key, "is not a finite number".to_owned());
-    }
-    if (d.lat_deg * DEG).abs() > MAX_LATITUDE {
-        return refuse("lat_deg", "is too near a pole to navigate in latitude and longitude".to_owned());
-    }
+    check(&d).map_err(|(key, reason)| document.root().refuse(key, reason, None))?;
     let [roll, pitch, yaw] = [d.roll_deg, d.pitch_deg, d.yaw_deg].map(|degrees| degrees * DEG);
     let state = NavState {
         lat: d.lat_deg * DEG,
@@ -127,6 +102,36 @@ fn parse(source: &Source) -> Result<Start, FileError> {
     };
     sigma.validate().map_err(|e| document.refused(&e))?;
     Ok(Start { t_s: d.t_s, state, sigma, how: vec![format!("as {} says", source.path())] })
+}
+
+/// The key whose value means no state, and why.
+fn check(d: &Description) -> Result<(), (&'static str, String)> {
+    let limits = [
+        ("lat_deg", d.lat_deg, 90.0),
+        ("lon_deg", d.lon_deg, 360.0),
+        ("roll_deg", d.roll_deg, 180.0),
+        ("pitch_deg", d.pitch_deg, 90.0),
+        ("yaw_deg", d.yaw_deg, 360.0),
+    ];
+    if let Some((key, _, limit)) =
+        limits.iter().find(|(_, value, limit)| value.is_nan() || value.abs() > *limit)
+    {
+        return Err((key, format!("is not within ±{limit}")));
+    }
+    let unlimited = [
+        ("t_s", d.t_s),
+        ("h_m", d.h_m),
+        ("v_n_m_s", d.v_n_m_s),
+        ("v_e_m_s", d.v_e_m_s),
+        ("v_d_m_s", d.v_d_m_s),
+    ];
+    if let Some((key, _)) = unlimited.iter().find(|(_, value)| !value.is_finite()) {
+        return Err((key, "is not a finite number".to_owned()));
+    }
+    if (d.lat_deg * DEG).abs() > MAX_LATITUDE {
+        return Err(("lat_deg", "is too near a pole to navigate in latitude and longitude".to_owned()));
+    }
+    Ok(())
 }
 
 #[cfg(test)]

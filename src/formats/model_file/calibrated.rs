@@ -84,7 +84,7 @@ impl ModelFile {
 
     /// The largest whole number of that name that the provenance has of a fit.
     #[must_use]
-    pub fn most_of_fits(&self, key: &str) -> Option<i64> {
+    pub(crate) fn most_of_fits(&self, key: &str) -> Option<i64> {
         let fits = self.provenance.as_ref()?.get("fits")?.as_array()?;
         fits.iter().filter_map(|fit| fit.get(key)?.as_integer()).max()
     }
@@ -98,7 +98,7 @@ impl ModelFile {
 
     /// The same with the turn-on biases that the recordings' means show; why or why not stands in the provenance.
     #[must_use]
-    pub fn with_turn_on<'a>(mut self, means: impl Iterator<Item = &'a TurnOnSpread>) -> Self {
+    pub(crate) fn with_turn_on<'a>(mut self, means: impl Iterator<Item = &'a TurnOnSpread>) -> Self {
         let mut turn_on = TurnOn::default();
         let mut remarks = Table::new();
         for found in means {

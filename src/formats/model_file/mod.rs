@@ -24,9 +24,11 @@ mod schema;
 mod write;
 
 pub use calibrated::CalibrationNote;
-pub use read::{from_text, read};
+pub(crate) use read::from_text;
+pub use read::read;
 pub use schema::schema;
-pub use write::{to_toml, write};
+pub(crate) use write::to_toml;
+pub use write::write;
 
 use crate::imu::{Channel, Sensor};
 use crate::noise::{Model, Spread};
@@ -35,7 +37,7 @@ use crate::noise::{Model, Spread};
 pub(crate) const PROGRAM: &str = concat!("nav-sim ", env!("CARGO_PKG_VERSION"));
 
 /// The version of the layout that is written; the only one that is read.
-pub const SCHEMA: u64 = 1;
+pub(crate) const SCHEMA: u64 = 1;
 
 /// A model and what is known about it.
 #[derive(Debug, Clone, PartialEq)]

@@ -29,7 +29,7 @@ const NOT_A_MODEL: &str =
 ///
 /// # Errors
 /// As [`read`].
-pub fn from_text(path: &Path, text: &str) -> Result<ModelFile, FileError> {
+pub(crate) fn from_text(path: &Path, text: &str) -> Result<ModelFile, FileError> {
     parse(&Source::new(&path.display().to_string(), text))
 }
 

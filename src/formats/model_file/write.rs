@@ -18,7 +18,7 @@ pub fn write(path: &Path, file: &ModelFile, existing: Existing) -> Result<(), Fi
 
 /// The text of a model file. A sensor whose three axes are alike is written once.
 #[must_use]
-pub fn to_toml(file: &ModelFile) -> String {
+pub(crate) fn to_toml(file: &ModelFile) -> String {
     let mut out = format!("schema = {SCHEMA}\nrate_hz = {:?}\n", file.model.rate_hz);
     for sensor in Sensor::ALL {
         let tables = Axis::ALL.map(|axis| processes(file, Channel { sensor, axis }));

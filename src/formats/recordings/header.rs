@@ -19,7 +19,7 @@ use crate::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
 
 /// What a column is.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Role {
+pub(crate) enum Role {
     /// Time, with its unit in seconds if that is known.
     Time {
         /// Seconds in one unit.

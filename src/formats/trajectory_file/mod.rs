@@ -12,8 +12,9 @@ mod write;
 
 pub(crate) use profile::schema as profile_schema;
 pub(crate) use samples::parse_origin;
+pub use write::Rows;
+pub(crate) use write::write_csv;
 pub(crate) use write::write_rows;
-pub use write::{Rows, write_csv};
 
 use super::{FileError, Place};
 use crate::trajectory::Trajectory;

@@ -37,7 +37,7 @@ impl Rows {
 ///
 /// # Errors
 /// The file cannot be written, or holds another result that is to stay.
-pub fn write_csv(
+pub(crate) fn write_csv(
     path: &Path,
     trajectory: &Trajectory,
     rows: Rows,

@@ -8,7 +8,7 @@ use crate::noise::{Composite, Model, Process, reduction};
 use glam::DVec3;
 
 /// Most bias states an axis.
-pub const MAX_GROUPS: usize = 8;
+pub(crate) const MAX_GROUPS: usize = 8;
 /// Most blocks of a sensor: bias groups of the model, an unknown constant, and what is multiplied.
 pub(super) const MAX_BLOCKS: usize = MAX_GROUPS + 1 + KINDS;
 
@@ -167,7 +167,7 @@ impl Belief {
 
     /// The unknown constants of a sensor that are multiplied.
     #[must_use]
-    pub fn unknowns(&self, sensor: Sensor) -> &[Unknown] {
+    pub(crate) fn unknowns(&self, sensor: Sensor) -> &[Unknown] {
         &self.unknowns[sensor as usize]
     }
 
@@ -197,7 +197,7 @@ impl Belief {
     }
 
     /// Sets the deviations of an unknown on the three axes; without any, it has no states.
-    pub fn set_unknown(&mut self, sensor: Sensor, kind: UnknownKind, sigma: DVec3) {
+    pub(crate) fn set_unknown(&mut self, sensor: Sensor, kind: UnknownKind, sigma: DVec3) {
         let unknowns = &mut self.unknowns[sensor as usize];
         let axes = |sigma: DVec3| sigma.to_array().iter().filter(|s| **s > 0.0).count();
         self.states -= unknowns.iter().filter(|u| u.kind == kind).map(|u| axes(u.sigma)).sum::<usize>();

@@ -87,7 +87,7 @@ impl Covariance {
 
     /// States: rows of the matrix.
     #[must_use]
-    pub const fn dim(&self) -> usize {
+    pub(crate) const fn dim(&self) -> usize {
         self.dim
     }
 
@@ -281,7 +281,7 @@ impl Covariance {
     /// xᵀ P⁻¹ x over the states listed, by Cholesky; NaN where the covariance is not positive definite.
     #[inline(always)]
     #[must_use]
-    pub fn normalised_square<const N: usize>(&self, states: [usize; N], x: [Lanes; N]) -> Lanes {
+    pub(crate) fn normalised_square<const N: usize>(&self, states: [usize; N], x: [Lanes; N]) -> Lanes {
         self.whitened(states, x).0
     }
 

@@ -1,9 +1,9 @@
 //! First-order dynamics of the error state, in blocks.
 //!
 //! Two maps compose one step. [`Sample`] holds what changes with every IMU sample: the rotation of the
-//! biases into n and the specific force. [`EarthTerms`] holds what the Earth contributes: transport and
+//! biases into n and the specific force. `EarthTerms` holds what the Earth contributes: transport and
 //! Earth rate, Coriolis, gravity gradient, the errors of the transport rate. The latter change slowly and
-//! are below 1e-4 /s, so they are applied in steps of up to [`EARTH_STEP_S`] (the splitting is of second
+//! are below 1e-4 /s, so they are applied in steps of up to `EARTH_STEP_S` (the splitting is of second
 //! order: 1e-5 relative in a standard deviation over an outage, tested against the matrix exponential).
 //!
 //! [Groves](crate::bibliography::Groves13), sec. 14.2.4, with position in metres: delta r_n =
@@ -16,13 +16,13 @@ use crate::strapdown::{StepTrace, Strapdown};
 use glam::DVec3;
 
 /// Longest step of the Earth terms (s).
-pub const EARTH_STEP_S: f64 = 0.2;
+pub(crate) const EARTH_STEP_S: f64 = 0.2;
 
 /// A navigation error: triples [`R`], [`V`] and [`PSI`].
-pub type NavError<L> = [Vec3<L>; 3];
+pub(crate) type NavError<L> = [Vec3<L>; 3];
 
 /// A linear map of the navigation error, given the errors of the accelerometer and gyroscope biases.
-pub trait ErrorMap<L> {
+pub(crate) trait ErrorMap<L> {
     /// The error after the map.
     #[must_use]
     fn apply(&self, x: NavError<L>, accel: Vec3<L>, gyro: Vec3<L>) -> NavError<L>;
@@ -54,7 +54,7 @@ impl<L: Real> Sample<L> {
     /// C diag(variances) Cᵀ dt²: the noise of one sample of a sensor, in n.
     #[inline(always)]
     #[must_use]
-    pub fn rotated_noise(&self, variances: DVec3) -> Mat3<L> {
+    pub(crate) fn rotated_noise(&self, variances: DVec3) -> Mat3<L> {
         let z = L::from(0.0);
         let mut noise = Mat3([[z; 3]; 3]);
         if variances.x == variances.y && variances.x == variances.z {
@@ -77,7 +77,7 @@ impl<L: Real> Sample<L> {
     /// covariance of V and PSI it adds, −½ \[f_n dt ×\] q_psi.
     #[inline(always)]
     #[must_use]
-    pub fn tilted_noise(&self, q_psi: &Mat3<L>, j: usize) -> Vec3<L> {
+    pub(crate) fn tilted_noise(&self, q_psi: &Mat3<L>, j: usize) -> Vec3<L> {
         Vec3([q_psi.0[0][j], q_psi.0[1][j], q_psi.0[2][j]]).cross(self.half_f_dt)
     }
 }
@@ -96,7 +96,7 @@ impl<L: Real> ErrorMap<L> for Sample<L> {
 
 /// The blocks of F that the rotating, curved, heavy Earth contributes.
 #[derive(Debug, Clone, Copy)]
-pub struct EarthTerms<L> {
+pub(crate) struct EarthTerms<L> {
     /// ∂(dr/dt)/∂r (1/s).
     pub rr: Mat3<L>,
     /// ∂(dv/dt)/∂r (1/s²).
@@ -115,7 +115,7 @@ impl<L: Real> EarthTerms<L> {
     /// At the nominal state.
     #[inline(always)]
     #[must_use]
-    pub fn at(ins: &Strapdown<L>) -> Self {
+    pub(crate) fn at(ins: &Strapdown<L>) -> Self {
         let (z, one) = (L::from(0.0), L::from(1.0));
         let (s, c) = ins.lat.sin_cos();
         let radii = radii(s);
@@ -161,7 +161,7 @@ impl<L: Real> EarthTerms<L> {
 
 /// The Earth terms over a time step.
 #[derive(Debug, Clone, Copy)]
-pub struct EarthStep<L> {
+pub(crate) struct EarthStep<L> {
     /// The terms.
     pub terms: EarthTerms<L>,
     /// How long they act (s).

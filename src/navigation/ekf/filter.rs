@@ -103,7 +103,7 @@ impl Ekf {
     /// The next samples last `dt` seconds, whatever the belief's own rate: white noise keeps its density,
     /// biases their correlation time and variance. For recorded data, whose clock is not even and whose
     /// samples are split where a fix falls between them.
-    pub fn set_interval(&mut self, dt: f64) {
+    pub(crate) fn set_interval(&mut self, dt: f64) {
         let ratio = dt * self.belief.rate_hz;
         for (step, believed) in self.steps.iter_mut().zip(self.belief.groups.iter().flatten()) {
             *step = believed.over(ratio);
@@ -114,7 +114,7 @@ impl Ekf {
 
     /// Adds to the white variances of a sample, accelerometer ((m/s²)²) and gyroscope ((rad/s)²), until the next
     /// [`set_interval`](Self::set_interval): for samples that were not measured.
-    pub fn add_white(&mut self, variances: [DVec3; 2]) {
+    pub(crate) fn add_white(&mut self, variances: [DVec3; 2]) {
         for (white, more) in self.white.iter_mut().zip(variances) {
             *white += more;
         }
@@ -238,7 +238,7 @@ fn attitude_covariance(state: &NavState, sigma_deg: [f64; 3]) -> Matrix3<f64> {
 }
 
 /// Brings the covariance up to the time of the last sample (the Earth terms lag by up to
-/// [`EARTH_STEP_S`]): to be called before it is looked at.
+/// `EARTH_STEP_S`): to be called before it is looked at.
 pub fn settle(ekf: &mut Ekf) {
     dispatch(ekf.level, Settle(ekf));
 }

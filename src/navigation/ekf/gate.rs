@@ -8,13 +8,13 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 /// The NIS above which a fix of `components` is refused: the chi-square quantile of a probability
 /// ([Bar-Shalom](crate::bibliography::BarShalom01), sec. 5.4).
 #[must_use]
-pub fn nis_limit(probability: f64, components: usize) -> f64 {
+pub(crate) fn nis_limit(probability: f64, components: usize) -> f64 {
     ChiSquared::new(components as f64).map_or(f64::INFINITY, |chi2| chi2.inverse_cdf(probability))
 }
 
 /// Uses a fix in the runs where its NIS is at most `limit`; the others stay as they were. Returns the NIS
 /// and which runs refused it. (A NIS that is not a number is not refused: such a run has diverged.)
-pub fn update_within(ekf: &mut Ekf, fix: &Fix, limit: f64) -> (Lanes, [bool; LANES]) {
+pub(crate) fn update_within(ekf: &mut Ekf, fix: &Fix, limit: f64) -> (Lanes, [bool; LANES]) {
     super::settle(ekf);
     let before = ekf.clone();
     let nis = update(ekf, fix);

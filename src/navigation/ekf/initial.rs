@@ -135,7 +135,7 @@ fn at_most(key: &str, sigmas: &[f64], limit: f64, unit: &str) -> Result<(), Sett
 /// [`RollPitchYaw::jacobian_of_psi_n`]. At pitch ±90° roll and yaw are not separate: the errors are then
 /// taken about the axes of n.
 #[must_use]
-pub fn psi_of_angles(q_b_n: DQuat) -> Matrix3<f64> {
+pub(crate) fn psi_of_angles(q_b_n: DQuat) -> Matrix3<f64> {
     let j = RollPitchYaw::from_quat(q_b_n).jacobian_of_psi_n();
     Matrix3::from_fn(|row, column| j[row][column]).try_inverse().unwrap_or_else(Matrix3::identity)
 }

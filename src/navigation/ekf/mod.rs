@@ -18,11 +18,14 @@ pub mod update;
 pub use belief::{Belief, BeliefError};
 pub use covariance::Covariance;
 pub use filter::{Ekf, advance, settle};
-pub use gate::{nis_limit, update_within};
+pub(crate) use gate::nis_limit;
+pub(crate) use gate::update_within;
 pub use initial::InitialSettings;
 pub use states::FilterStates;
 pub use unknowns::{Unknown, UnknownKind};
-pub use update::{Fix, fix_rows, update, update_height};
+pub(crate) use update::fix_rows;
+pub(crate) use update::update_height;
+pub use update::{Fix, update};
 
 #[cfg(test)]
 mod tests;

@@ -128,7 +128,7 @@ impl Kernel for Update<'_> {
 }
 
 /// Uses a height above the ellipsoid (m), measured at the IMU with a standard deviation. Returns its NIS.
-pub fn update_height(ekf: &mut Ekf, h: &Lanes, sigma_m: f64) -> Lanes {
+pub(crate) fn update_height(ekf: &mut Ekf, h: &Lanes, sigma_m: f64) -> Lanes {
     dispatch(ekf.level, UpdateHeight { ekf, h, sigma_m })
 }
 
@@ -229,7 +229,7 @@ impl<W: Wide> Antenna<W> {
 /// The measurement rows of a fix about a nominal state: position north, east, down, then velocity. Twelve
 /// coefficients each: R, V, PSI, and the error of the gyroscope's bias.
 #[must_use]
-pub fn fix_rows(ins: &Strapdown<f64>, omega_ib_b: DVec3, lever_arm_b: DVec3) -> [[f64; 12]; 6] {
+pub(crate) fn fix_rows(ins: &Strapdown<f64>, omega_ib_b: DVec3, lever_arm_b: DVec3) -> [[f64; 12]; 6] {
     let antenna = Antenna::new(ins, Vec3::splat(omega_ib_b), lever_arm_b);
     std::array::from_fn(|i| {
         let mut row = if i < 3 { antenna.position_row(i) } else { Row::new(3 * V + i - 3) };
@@ -274,7 +274,7 @@ impl<L: Real> Row<L> {
 impl Ekf {
     /// The six measurement rows (position, velocity) of the first lane, dense.
     #[must_use]
-    pub fn measurement_rows(&self, lever_arm_b: DVec3) -> Vec<Vec<f64>> {
+    pub(crate) fn measurement_rows(&self, lever_arm_b: DVec3) -> Vec<Vec<f64>> {
         let antenna = Antenna::new(&self.nominal, self.omega_ib_b, lever_arm_b);
         let position = (0..3).map(|axis| antenna.position_row(axis));
         let velocity = (0..3).map(|axis| antenna.velocity_row(axis, &self.sources()));

@@ -64,7 +64,7 @@ struct Turn {
 
 /// Finds the lag at which the turns agree; none where they agree as they are, or at no lag.
 #[must_use]
-pub fn clocks_apart(recorded: &Recorded<'_>) -> Option<ClocksApart> {
+pub(crate) fn clocks_apart(recorded: &Recorded<'_>) -> Option<ClocksApart> {
     let turns = turns(recorded);
     let turned = Turned::new(recorded.imu);
     let steps = (LONGEST_S / STEP_S) as i32;

@@ -13,7 +13,8 @@ mod outcome;
 
 use assessment::nis_bound;
 pub use assessment::{Assessment, Verdict, assess};
-pub use clocks::{ClocksApart, clocks_apart};
+pub use clocks::ClocksApart;
+pub(crate) use clocks::clocks_apart;
 pub use outcome::{Drift, OutageDrift, Outcome, outcome};
 
 use crate::earth::{GravityModel, MAX_LATITUDE, geodetic_to_ecef};

@@ -19,7 +19,7 @@ impl Vec3 {
     }
 
     /// Sets the vector of one lane.
-    pub fn set_lane(&mut self, i: usize, v: glam::DVec3) {
+    pub(crate) fn set_lane(&mut self, i: usize, v: glam::DVec3) {
         for k in 0..3 {
             self.0[k][i] = v[k];
         }
@@ -142,7 +142,7 @@ impl<L: Real> Mat3<L> {
     /// The cross-product matrix \[v×\].
     #[inline(always)]
     #[must_use]
-    pub fn skew(v: Vec3<L>) -> Self {
+    pub(crate) fn skew(v: Vec3<L>) -> Self {
         let z = L::from(0.0);
         Self([[z, -v[2], v[1]], [v[2], z, -v[0]], [-v[1], v[0], z]])
     }
@@ -209,7 +209,7 @@ impl Quat {
     }
 
     /// Sets the rotation of one lane.
-    pub fn set_lane(&mut self, i: usize, q: glam::DQuat) {
+    pub(crate) fn set_lane(&mut self, i: usize, q: glam::DQuat) {
         self.w[i] = q.w;
         self.v.set_lane(i, q.xyz());
     }
@@ -240,7 +240,7 @@ impl<L: Real> Quat<L> {
     /// The rotation by a rotation vector of at most π/2 radians.
     #[inline(always)]
     #[must_use]
-    pub fn from_rotation_vector(phi: Vec3<L>) -> Self {
+    pub(crate) fn from_rotation_vector(phi: Vec3<L>) -> Self {
         let half = phi * L::from(0.5);
         let (sinc, cos) = sinc_cos_of_square(half.dot(half));
         Self { w: cos, v: half * sinc }

@@ -32,7 +32,7 @@ pub fn chi_square_band(dof: usize, count: f64) -> Band {
 /// The same with probability `tail` on each side. `count` need not be whole: so many independent values the
 /// mean is worth.
 #[must_use]
-pub fn chi_square_interval(dof: usize, count: f64, tail: f64) -> Band {
+pub(crate) fn chi_square_interval(dof: usize, count: f64, tail: f64) -> Band {
     if dof == 0 || count.is_nan() || count <= 0.0 {
         return Band::NONE;
     }
@@ -54,7 +54,7 @@ fn chi_square_quantile(dof: f64, p: f64) -> f64 {
 
 /// The band of the share of `count` independent runs that a region of probability `level` covers.
 #[must_use]
-pub fn coverage_band(level: f64, count: f64) -> Band {
+pub(crate) fn coverage_band(level: f64, count: f64) -> Band {
     let whole = count as u64;
     match Binomial::new(level, whole) {
         Ok(binomial) if whole > 0 => {

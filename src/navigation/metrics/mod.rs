@@ -22,7 +22,7 @@ mod verdict;
 
 pub use agreement::Agreement;
 pub use budget::Budget;
-pub use consistency::{Band, chi_square_band, chi_square_interval, coverage_band};
+pub use consistency::{Band, chi_square_band};
 pub use epoch::{Accuracy, EpochMetrics, epochs};
 pub use estimate::{Estimate, PerState, Quantile, SampleSize, quantile};
 pub use expected::{Expected, horizontal_quantiles};

@@ -40,7 +40,7 @@ impl QuadraticForm {
 
     /// eᵀ e for an error e of this covariance and mean.
     #[must_use]
-    pub fn of_square(covariance: &DMatrix<f64>, mean: &[f64]) -> Self {
+    pub(crate) fn of_square(covariance: &DMatrix<f64>, mean: &[f64]) -> Self {
         let eigen = covariance.clone().symmetric_eigen();
         let largest = eigen.eigenvalues.iter().copied().fold(0.0, f64::max);
         let (mut certain, mut terms) = (0.0, Vec::new());
@@ -57,7 +57,7 @@ impl QuadraticForm {
 
     /// eᵀ P⁻¹ e for an error e of this covariance and mean; none where `p` is not positive definite.
     #[must_use]
-    pub fn of_normalised(p: &DMatrix<f64>, covariance: &DMatrix<f64>, mean: &[f64]) -> Option<Self> {
+    pub(crate) fn of_normalised(p: &DMatrix<f64>, covariance: &DMatrix<f64>, mean: &[f64]) -> Option<Self> {
         let factor = p.clone().cholesky()?.l();
         let whiten = |m: &DMatrix<f64>| factor.solve_lower_triangular(m);
         let half = whiten(covariance)?;
@@ -171,7 +171,7 @@ impl QuadraticForm {
     /// E √Q = π^(−1/2) ∫ (1 − φ(u²)) du/u², with u = e^y by the trapezoidal rule, whose error is e^(−2π²), 3e-9, at most:
     /// that of a certain Q, whose transform grows beyond an imaginary part of π/4.
     #[must_use]
-    pub fn mean_root(&self) -> f64 {
+    pub(crate) fn mean_root(&self) -> f64 {
         let scale = self.mean();
         if scale.is_nan() || scale <= 0.0 {
             return scale;

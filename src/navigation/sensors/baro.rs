@@ -29,7 +29,7 @@ impl BaroSettings {
 
 /// The noise of the altimeter in one run.
 #[derive(Debug, Clone)]
-pub struct BaroNoise {
+pub(crate) struct BaroNoise {
     stream: Generator,
     sigma_m: f64,
 }
@@ -37,13 +37,13 @@ pub struct BaroNoise {
 impl BaroNoise {
     /// The noise of run `key.run`.
     #[must_use]
-    pub fn new(settings: &BaroSettings, key: StreamKey<'_>) -> Self {
+    pub(crate) fn new(settings: &BaroSettings, key: StreamKey<'_>) -> Self {
         let stream = StreamKey { source: "baro", process: "height", ..key }.generator();
         Self { stream, sigma_m: settings.sigma_m }
     }
 
     /// The error of the next height (m).
-    pub fn draw(&mut self) -> f64 {
+    pub(crate) fn draw(&mut self) -> f64 {
         let normal: f64 = StandardNormal.sample(&mut self.stream);
         self.sigma_m * normal
     }

@@ -96,7 +96,7 @@ impl ImuSettings {
 
     /// Whether the true IMU has none of them.
     #[must_use]
-    pub fn is_ideal(&self) -> bool {
+    pub(crate) fn is_ideal(&self) -> bool {
         let [accel, gyro] = Sensor::ALL.map(|sensor| self.deviations(sensor));
         [accel.0, accel.1, gyro.0, gyro.1, self.misalignment_rad].iter().all(|x| *x == 0.0)
     }
@@ -104,7 +104,7 @@ impl ImuSettings {
 
 /// The defects of one run.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Defects {
+pub(crate) struct Defects {
     /// Turn-on bias of accelerometer and gyroscope (m/s², rad/s).
     pub bias: [DVec3; 2],
     /// What is added to the true values, times these: scale factors on the diagonal, misalignment beside it.
@@ -114,7 +114,7 @@ pub struct Defects {
 impl Defects {
     /// Those of run `key.run`.
     #[must_use]
-    pub fn draw(settings: &ImuSettings, key: StreamKey<'_>) -> Self {
+    pub(crate) fn draw(settings: &ImuSettings, key: StreamKey<'_>) -> Self {
         let of = |sensor: Sensor| {
             let source = format!("{}.defects", sensor.name());
             let normals = |process: &'static str, n: usize| -> Vec<f64> {
@@ -138,7 +138,7 @@ impl Defects {
 
     /// What they add to a true sample: accelerometer, gyroscope.
     #[must_use]
-    pub fn error(&self, truth: &ImuSample) -> [DVec3; 2] {
+    pub(crate) fn error(&self, truth: &ImuSample) -> [DVec3; 2] {
         let [accel, gyro] = self.matrix;
         [self.bias[0] + accel * truth.f_ib_b, self.bias[1] + gyro * truth.omega_ib_b]
     }

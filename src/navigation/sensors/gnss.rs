@@ -75,7 +75,7 @@ impl GnssSettings {
 /// The noise of the receiver in one run: one stream a component, drawn at every epoch whether the fix is
 /// used or not, so that outages change no number.
 #[derive(Debug, Clone)]
-pub struct GnssNoise {
+pub(crate) struct GnssNoise {
     streams: [Generator; 6],
     sigma: [f64; 6],
     correlated: [Correlated; 3],
@@ -107,7 +107,7 @@ impl Correlated {
 impl GnssNoise {
     /// The noise of run `key.run`.
     #[must_use]
-    pub fn new(settings: &GnssSettings, key: StreamKey<'_>) -> Self {
+    pub(crate) fn new(settings: &GnssSettings, key: StreamKey<'_>) -> Self {
         const COMPONENTS: [&str; 6] = ["pos_n", "pos_e", "pos_d", "vel_n", "vel_e", "vel_d"];
         let streams = COMPONENTS.map(|process| StreamKey { source: "gnss", process, ..key }.generator());
         let velocity = settings.vel_sigma_m_s.unwrap_or([0.0; 3]);
@@ -122,7 +122,7 @@ impl GnssNoise {
     }
 
     /// Position error (m) and velocity error (m/s) of the next fix, n.
-    pub fn draw(&mut self) -> (DVec3, DVec3) {
+    pub(crate) fn draw(&mut self) -> (DVec3, DVec3) {
         let e: [f64; 6] = std::array::from_fn(|i| self.sigma[i] * normal(&mut self.streams[i]));
         let slow = DVec3::from_array(std::array::from_fn(|i| self.correlated[i].next()));
         (DVec3::new(e[0], e[1], e[2]) + slow, DVec3::new(e[3], e[4], e[5]))

@@ -133,7 +133,7 @@ fn check_recording(recording: &Recording, imu_hz: f64, needs: usize) -> Result<(
 
 /// The errors of the six channels of one run, as streams of samples.
 #[derive(Debug, Clone)]
-pub struct ImuErrors<'a> {
+pub(crate) struct ImuErrors<'a> {
     channels: Vec<ChannelErrors<'a>>,
 }
 
@@ -147,7 +147,7 @@ enum ChannelErrors<'a> {
 impl<'a> ImuErrors<'a> {
     /// The errors of run `key.run` over `samples` samples, as many as the source was made for.
     #[must_use]
-    pub fn new(errors: &ErrorSource<'a>, key: StreamKey<'_>, samples: usize) -> Self {
+    pub(crate) fn new(errors: &ErrorSource<'a>, key: StreamKey<'_>, samples: usize) -> Self {
         let channels = match errors {
             ErrorSource::Model(model) => Channel::ALL.map(|channel| {
                 let source = channel.to_string();
@@ -162,7 +162,7 @@ impl<'a> ImuErrors<'a> {
     }
 
     /// Overwrites `out` with the next samples of a channel (m/s² or rad/s).
-    pub fn fill(&mut self, channel: Channel, out: &mut [f64]) {
+    pub(crate) fn fill(&mut self, channel: Channel, out: &mut [f64]) {
         match &mut self.channels[channel.index()] {
             ChannelErrors::Synthesised(synthesizer) => synthesizer.fill(out),
             ChannelErrors::Recorded(left, level) => {
@@ -176,7 +176,7 @@ impl<'a> ImuErrors<'a> {
 
 /// The errors of up to eight runs, side by side.
 #[derive(Debug, Clone)]
-pub struct LaneErrors<'a> {
+pub(crate) struct LaneErrors<'a> {
     runs: Vec<ImuErrors<'a>>,
     /// For each sample, accelerometer (m/s²) and gyroscope (rad/s).
     block: Vec<[Vec3; 2]>,
@@ -186,12 +186,12 @@ pub struct LaneErrors<'a> {
 impl<'a> LaneErrors<'a> {
     /// Of at most eight runs; the lanes beyond them are without error.
     #[must_use]
-    pub const fn new(runs: Vec<ImuErrors<'a>>) -> Self {
+    pub(crate) const fn new(runs: Vec<ImuErrors<'a>>) -> Self {
         Self { runs, block: Vec::new(), channel: Vec::new() }
     }
 
     /// Draws the errors of the next `n` samples: accelerometer (m/s²) and gyroscope (rad/s).
-    pub fn next(&mut self, n: usize) -> &mut [[Vec3; 2]] {
+    pub(crate) fn next(&mut self, n: usize) -> &mut [[Vec3; 2]] {
         self.block.resize(n, [Vec3::ZERO; 2]);
         self.channel.resize(n, 0.0);
         for (lane, errors) in self.runs.iter_mut().enumerate() {
@@ -208,7 +208,7 @@ impl<'a> LaneErrors<'a> {
 
     /// What was drawn last.
     #[must_use]
-    pub fn drawn(&self) -> &[[Vec3; 2]] {
+    pub(crate) fn drawn(&self) -> &[[Vec3; 2]] {
         &self.block
     }
 }

@@ -7,7 +7,8 @@ mod plan;
 mod recording;
 
 pub use batch::{Batch, run_batch};
-pub use plan::{Experiment, ExperimentError, Plan, fan_epochs};
+pub(crate) use plan::fan_epochs;
+pub use plan::{Experiment, ExperimentError, Plan};
 pub use recording::{Recording, record};
 
 /// Number of reported navigation states: position, velocity (n, e, d), roll, pitch, yaw.
@@ -37,7 +38,7 @@ pub const BIAS_NAMES: [&str; BIASES] =
 pub const NEES_DOF: usize = 9;
 /// Degrees of freedom of the coverage statistic: position, attitude
 /// ([Cucci et al.](crate::bibliography::Cucci23)).
-pub const COVERAGE_DOF: usize = 6;
+pub(crate) const COVERAGE_DOF: usize = 6;
 
 /// Sums over runs at one reporting epoch (1 Hz), from which `metrics` makes means and their errors.
 #[derive(Debug, Clone, Default, PartialEq)]

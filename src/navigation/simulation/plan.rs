@@ -185,7 +185,7 @@ impl<'a> Plan<'a> {
         Ok(Self { experiment, ideal, errors, start, events, outages, coverage_quantile, fan: Vec::new() })
     }
 
-    /// The same with the horizontal error of every run kept over time, at [`fan_epochs`].
+    /// The same with the horizontal error of every run kept over time, at `fan_epochs`.
     #[must_use]
     pub fn with_fan(mut self) -> Self {
         let times: Vec<f64> = self.reports().map(|e| e.t_s).collect();
@@ -224,7 +224,7 @@ const FAN_EPOCHS: usize = 400;
 /// third …, so that they are few on a long drive, and those on both sides of the beginning and the end of each outage,
 /// between which errors are largest.
 #[must_use]
-pub fn fan_epochs(t_s: &[f64], outages: &[Outage]) -> Vec<usize> {
+pub(crate) fn fan_epochs(t_s: &[f64], outages: &[Outage]) -> Vec<usize> {
     let step = t_s.len().div_ceil(FAN_EPOCHS).max(1);
     let withheld: Vec<bool> = t_s.iter().map(|t| outages.iter().any(|o| o.withholds(*t))).collect();
     let changes = |i: usize| withheld.get(i).zip(withheld.get(i + 1)).is_some_and(|(a, b)| a != b);

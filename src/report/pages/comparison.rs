@@ -4,9 +4,9 @@ use super::paper::PaperFigure;
 use super::{STATES, tone, window};
 use crate::metrics::{Measured, VerdictKind};
 use crate::report::comparison::{
-    CandidateResult, ComparisonFile, Row, in_order, meaning_of_intervals, table_rows, verdict_lines,
-    with_times,
+    CandidateResult, ComparisonFile, Row, in_order, meaning_of_intervals, verdict_lines,
 };
+use crate::report::comparison_table::{table_rows, with_times};
 use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, Table, svg};
 use crate::report::short_names;
 use crate::simulation::{REPORTED, REPORTED_NAMES};

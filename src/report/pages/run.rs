@@ -2,6 +2,7 @@
 
 use super::run_charts::{budget_chart, fan_chart, horizontal, nees, states, windows};
 use super::{RMSE_AND_ASEE, STATES, tone, window};
+use crate::ekf::InitialSettings;
 use crate::imu::Sensor;
 use crate::metrics::{Budget, EpochMetrics, FanEpoch, OutageSummary, PerState, Summary};
 use crate::report::manifest::Manifest;
@@ -9,6 +10,8 @@ use crate::report::number::readable;
 use crate::report::page::{Cell, Page, Table};
 use crate::report::trajectory::TrajectorySeries;
 use crate::report::verdict::verdict_line;
+use crate::sensors::defects::ImuSettings;
+use crate::sensors::gnss::GnssSettings;
 use crate::simulation::REPORTED_NAMES;
 
 /// Outages whose tables are shown: of more, those with the largest errors.
@@ -84,46 +87,13 @@ fn assumptions(summary: &Summary, manifest: &Manifest) -> Vec<(&'static str, Str
         (recording, _) => format!("windows of {recording}"),
     };
     let scenario = &manifest.configuration;
-    let (imu, gnss, initial) = (&scenario.imu, &scenario.gnss, &scenario.initial);
-    let three = |sigma: &[f64; 3]| sigma.map(readable).join(", ");
-    let velocity =
-        gnss.vel_sigma_m_s.map_or("no velocity".to_owned(), |v| format!("velocity {} m/s", three(&v)));
-    let [bias_a, bias_g] = Sensor::ALL.map(|sensor| readable(imu.deviations(sensor).0));
     let mut facts = vec![
         ("trajectory", input("trajectory").to_owned()),
         ("model of the filter", format!("{}, {} states", input("model"), summary.filter_states)),
         ("what makes the errors", truth),
-        (
-            "IMU",
-            format!(
-                "{} Hz; turn-on bias {bias_a} m/s², {bias_g} rad/s (1 σ); scale factors {}, {} ppm; misalignment {} rad",
-                imu.rate_hz,
-                readable(imu.scale_ppm_accel),
-                readable(imu.scale_ppm_gyro),
-                readable(imu.misalignment_rad)
-            ),
-        ),
-        (
-            "GNSS",
-            format!(
-                "{} Hz; 1 σ north, east, down: position {} m, {velocity}",
-                gnss.rate_hz,
-                three(&gnss.pos_sigma_m)
-            ),
-        ),
-        (
-            "start (1 σ)",
-            if initial.perfect {
-                "the true state".to_owned()
-            } else {
-                format!(
-                    "position {} m, velocity {} m/s, attitude {} °",
-                    three(&initial.pos_sigma_m),
-                    three(&initial.vel_sigma_m_s),
-                    three(&initial.att_sigma_deg)
-                )
-            },
-        ),
+        ("IMU", defects(&scenario.imu)),
+        ("GNSS", receiver(&scenario.gnss)),
+        ("start (1 σ)", start(&scenario.initial)),
     ];
     if summary.runs > 0 {
         let worth = readable(summary.independent_runs);
@@ -134,6 +104,42 @@ fn assumptions(summary: &Summary, manifest: &Manifest) -> Vec<(&'static str, Str
     }
     facts.push(("seed", summary.seed.to_string()));
     facts
+}
+
+fn three(sigma: &[f64; 3]) -> String {
+    sigma.map(readable).join(", ")
+}
+
+/// What the true IMU has beside its noise.
+fn defects(imu: &ImuSettings) -> String {
+    let [bias_a, bias_g] = Sensor::ALL.map(|sensor| readable(imu.deviations(sensor).0));
+    format!(
+        "{} Hz; turn-on bias {bias_a} m/s², {bias_g} rad/s (1 σ); scale factors {}, {} ppm; misalignment {} rad",
+        imu.rate_hz,
+        readable(imu.scale_ppm_accel),
+        readable(imu.scale_ppm_gyro),
+        readable(imu.misalignment_rad)
+    )
+}
+
+fn receiver(gnss: &GnssSettings) -> String {
+    let velocity =
+        gnss.vel_sigma_m_s.map_or("no velocity".to_owned(), |v| format!("velocity {} m/s", three(&v)));
+    let position = three(&gnss.pos_sigma_m);
+    format!("{} Hz; 1 σ north, east, down: position {position} m, {velocity}", gnss.rate_hz)
+}
+
+/// What the filter knows at the start.
+fn start(initial: &InitialSettings) -> String {
+    if initial.perfect {
+        return "the true state".to_owned();
+    }
+    format!(
+        "position {} m, velocity {} m/s, attitude {} °",
+        three(&initial.pos_sigma_m),
+        three(&initial.vel_sigma_m_s),
+        three(&initial.att_sigma_deg)
+    )
 }
 
 /// Positions of the outages with the largest errors, in time order.
@@ -155,6 +161,12 @@ fn outages(summary: &Summary, page: &mut Page) {
     }
     page.section("At the ends of outages");
     page.text("Just before the first fix after the outage; brackets are 95 % intervals.");
+    page.table(&ends(summary));
+    by_state(summary, page);
+}
+
+/// Horizontal errors at the ends of outages, and how soon fixes mend them.
+fn ends(summary: &Summary) -> Table {
     let is_expected = summary.outages.iter().any(|o| o.horizontal_error_end_m.p999.is_some());
     let (last, key) = if is_expected { ("99.9 % (m)", "p999") } else { ("largest (m)", "max") };
     let mut table = Table::new([
@@ -183,7 +195,11 @@ fn outages(summary: &Summary, page: &mut Page) {
             Cell::number(o.reconvergence_s.p50, &at("reconvergence_s/p50")),
         ]);
     }
-    page.table(&table);
+    table
+}
+
+/// State by state, the outages with the largest errors.
+fn by_state(summary: &Summary, page: &mut Page) {
     let shown = largest(summary);
     let names: Vec<String> = shown.iter().map(|i| window(windows(summary)[*i])).collect();
     let table = |suffix: &str| {

@@ -3,7 +3,7 @@
 use super::sentence;
 use crate::metrics::{OutageMetrics, VerdictKind};
 use crate::report::choose::RankedPlace;
-use crate::report::comparison::with_times;
+use crate::report::comparison_table::with_times;
 use crate::report::page::{Axis, Chart, Colour, Interval, Mark, Page, Panel, Series, Table};
 use crate::report::study::{ShownCell, drift_table, ratio_table, verdict_table};
 use crate::report::verdict::verdict_word;

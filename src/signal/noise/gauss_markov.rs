@@ -19,9 +19,9 @@ impl GaussMarkov {
     pub const CODE: &'static str = "GM";
     /// Its largest Allan deviation over its standard deviation, where averages last [`Self::ALLAN_PEAK_AT`] correlation
     /// times: with x of them the Allan variance is s2·(2/x)·[1 − (3 − 4e^(−x) + e^(−2x))/(2x)].
-    pub const ALLAN_PEAK: f64 = 0.617_364_283_144_441_3;
+    pub(crate) const ALLAN_PEAK: f64 = 0.617_364_283_144_441_3;
     /// Where that is, in correlation times.
-    pub const ALLAN_PEAK_AT: f64 = 1.892_617_8;
+    pub(crate) const ALLAN_PEAK_AT: f64 = 1.892_617_8;
 
     /// From the inverse correlation time beta (1/s), the stationary variance s2 (units²) and the rate (Hz).
     ///

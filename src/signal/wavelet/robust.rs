@@ -69,7 +69,7 @@ pub fn both(
 
 /// The M-estimate of the mean of the given squares of zero-mean Gaussian numbers.
 #[must_use]
-pub fn m_scale(squares: &[f64], tuning: &Tuning) -> RobustVariance {
+pub(crate) fn m_scale(squares: &[f64], tuning: &Tuning) -> RobustVariance {
     let equation = Equation { squares, tuning };
     let start = squared_mad(&sample(squares));
     if start > 0.0

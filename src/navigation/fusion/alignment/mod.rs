@@ -23,7 +23,7 @@ use levelling::{Level, Scene};
 use std::f64::consts::PI;
 
 /// Slowest course that is taken as a heading (m/s).
-pub const MIN_SPEED: f64 = 3.0;
+pub(crate) const MIN_SPEED: f64 = 3.0;
 /// How much later other starts are tried (s), where none at the first moving fix agrees with what follows.
 const LATER_S: [f64; 5] = [15.0, 30.0, 60.0, 120.0, 240.0];
 /// Tilt beyond which the axes of an IMU are hardly those of a vehicle (rad).

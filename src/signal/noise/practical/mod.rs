@@ -33,7 +33,7 @@ use super::continuous::{correlation_time_s, walk_density, white_density};
 use super::{Composite, Process};
 
 /// Allan deviation over B of pure flicker noise: √(2 ln 2/π) = 0.664.
-pub const FLICKER_FLOOR: f64 = 0.664_282_8;
+pub(crate) const FLICKER_FLOOR: f64 = 0.664_282_8;
 
 /// Averaging times per octave at which curves are compared.
 const PER_OCTAVE: f64 = 16.0;
