@@ -103,16 +103,17 @@ fn signed(x: f64) -> String {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::efficiency::accuracy;
 
-    fn file() -> EfficiencyFile {
-        let a = accuracy(&[1.8, 2.0, 2.2, 2.4, 20.0], 2.0, 1);
-        let named = |estimator: &str, parameter: &str| EfficiencyRow {
-            scenario: "a, b".into(),
-            estimator: estimator.into(),
-            parameter: parameter.into(),
+    /// A file of estimates of one parameter whose truth is 2: scenario, estimator, parameter of each row.
+    pub(in crate::report) fn file(estimates: &[f64], rows: &[[&str; 3]]) -> EfficiencyFile {
+        let a = accuracy(estimates, 2.0, 1);
+        let row = |[scenario, estimator, parameter]: &[&str; 3]| EfficiencyRow {
+            scenario: (*scenario).into(),
+            estimator: (*estimator).into(),
+            parameter: (*parameter).into(),
             target: 2.0,
             accuracy: a.clone(),
             ratio: 1.0,
@@ -120,18 +121,23 @@ mod tests {
             zeros: 0,
             without_root: 0.0,
         };
-        let results = vec![
-            named("awv", "WN sigma2"),
-            named("awv", "RW gamma2"),
-            named("dr-awv", "WN sigma2"),
-            named("dr-awv", "RW gamma2"),
+        let (sets, results) = (estimates.len() as u64, rows.iter().map(row).collect());
+        EfficiencyFile { schema_version: 1, sets, study: serde_json::Value::Null, results }
+    }
+
+    fn five_sets() -> EfficiencyFile {
+        let rows = [
+            ["a, b", "awv", "WN sigma2"],
+            ["a, b", "awv", "RW gamma2"],
+            ["a, b", "dr-awv", "WN sigma2"],
+            ["a, b", "dr-awv", "RW gamma2"],
         ];
-        EfficiencyFile { schema_version: 1, sets: 5, study: serde_json::Value::Null, results }
+        file(&[1.8, 2.0, 2.2, 2.4, 20.0], &rows)
     }
 
     #[test]
     fn the_table_has_a_row_an_estimator_and_a_column_a_parameter() {
-        let text = efficiency_table(&file());
+        let text = efficiency_table(&five_sets());
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), 5, "{text}");
         assert!(lines[1].contains("WN sigma2 = 2.000000e0") && lines[1].contains("RW gamma2"), "{text}");
@@ -141,11 +147,11 @@ mod tests {
 
     #[test]
     fn the_csv_reads_back() {
-        let text = efficiency_csv(&file());
+        let text = efficiency_csv(&five_sets());
         let mut reader = csv::Reader::from_reader(text.as_bytes());
         let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
         assert_eq!((rows.len(), &rows[0][0], &rows[3][1], &rows[3][2]), (4, "a, b", "dr-awv", "RW gamma2"));
-        assert_eq!(&rows[0][7], shortest(file().results[0].accuracy.rmse));
+        assert_eq!(&rows[0][7], shortest(five_sets().results[0].accuracy.rmse));
         assert_eq!(&rows[0][9], "1", "the first estimator's ratio to itself");
     }
 }

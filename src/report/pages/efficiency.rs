@@ -115,24 +115,13 @@ fn axis(values: &[f64]) -> Axis {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::efficiency::accuracy;
+    use crate::report::efficiency::tests::file;
 
     #[test]
     fn a_point_for_every_number() {
-        let a = accuracy(&[1.8, 2.0, 2.2, 2.4], 2.0, 1);
-        let row = |scenario: &str, estimator: &str| EfficiencyRow {
-            scenario: scenario.into(),
-            estimator: estimator.into(),
-            parameter: "WN sigma2".into(),
-            target: 2.0,
-            accuracy: a.clone(),
-            ratio: 1.0,
-            ratio_se: 0.0,
-            zeros: 0,
-            without_root: 0.0,
-        };
-        let results = vec![row("I", "awv"), row("I", "dr-awv"), row("<II>", "awv"), row("<II>", "dr-awv")];
-        let file = EfficiencyFile { schema_version: 1, sets: 4, study: serde_json::Value::Null, results };
+        let places = [["I", "awv"], ["I", "dr-awv"], ["<II>", "awv"], ["<II>", "dr-awv"]];
+        let rows = places.map(|[scenario, estimator]| [scenario, estimator, "WN sigma2"]);
+        let file = file(&[1.8, 2.0, 2.2, 2.4], &rows);
         let svg = efficiency_svg(&file);
         assert_eq!(svg.matches("h0M").count() + svg.matches("class=\"dot\" d=\"M").count(), 4 + 2); // two in the legend
         assert!(svg.contains(">&lt;II&gt;</text>") && svg.ends_with("</svg>\n") && !svg.contains("NaN"));
