@@ -1,7 +1,7 @@
 //! `epochs.csv` and `runs.csv` of a run directory, read back.
 
+use super::FileError;
 use super::trajectory_file::table::{Numbers, Table};
-use super::{FileError, Kind};
 use crate::metrics::EpochRow;
 use crate::simulation::{OutageRecord, REPORTED, REPORTED_NAMES, RunRecord};
 
@@ -89,10 +89,7 @@ fn finite_or_lost(table: &Table, line: u64, row: &[f64], columns: &[usize]) -> R
 
 /// A table of a run is written by the program: what is wrong with it is damage.
 fn damaged(error: FileError) -> FileError {
-    match error.kind {
-        Kind::Contents(_) => error.advice(REPEAT),
-        _ => error.advice_instead(REPEAT),
-    }
+    error.advice_instead(REPEAT)
 }
 
 #[cfg(test)]
