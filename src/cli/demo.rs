@@ -132,6 +132,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 /// Refuses recordings in which no window is as long as the trajectory, before anything is made.
 fn long_enough(args: &Args, session: &Session) -> Result<(), Failure> {
+    if args.runs == 0 {
+        return Err(Failure::input("--runs 0: there is nothing to compare").hint("at least --runs 1"));
+    }
     let of_repository = |e: Failure| {
         e.hint("the demo takes its IMU and its trajectory from the top of the repository: run it there")
     };

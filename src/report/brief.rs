@@ -223,7 +223,13 @@ fn figure(process: &Process, sensor: Sensor) -> Option<Figure> {
             of("correlation time T", Parameter::Beta, p.beta(), |beta, _| 1.0 / beta, "s", sigma(p.s2()))
         }
         Process::Quantization(p) => {
-            of("quantization Q", Parameter::Q2, p.q2(), |q2, _| q2.sqrt(), sensor.unit(), String::new())
+            // of the increments over a sample, as IEEE 952 has it
+            let increment = |q2: f64, rate_hz: f64| q2.sqrt() / rate_hz;
+            let unit = match sensor {
+                Sensor::Accel => "m/s",
+                Sensor::Gyro => "rad",
+            };
+            of("quantization Q", Parameter::Q2, p.q2(), increment, unit, String::new())
         }
         Process::Drift(p) => {
             let ramp = |slope, rate_hz| slope * rate_hz;

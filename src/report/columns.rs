@@ -1,6 +1,6 @@
 //! Tables for a terminal.
 
-use super::markdown::markdown_table;
+use super::markdown::plain_table;
 
 /// Characters of a line that a table takes at most, where it can be cut.
 const WIDTH: usize = 120;
@@ -25,7 +25,7 @@ pub(crate) fn terminal_columns(rows: &[Vec<String>]) -> String {
 /// A table in Markdown, cut where a line would be too long, each part with the first `lead` columns.
 #[must_use]
 pub(crate) fn terminal_table(rows: &[Vec<String>], lead: usize) -> String {
-    cut(rows, lead, 3).iter().map(|part| markdown_table(part)).collect::<Vec<_>>().join("\n\n")
+    cut(rows, lead, 3).iter().map(|part| plain_table(part)).collect::<Vec<_>>().join("\n\n")
 }
 
 /// A table as several that a terminal has room for, with `gap` characters between two columns.
@@ -74,7 +74,7 @@ mod tests {
         assert_eq!(put_together, rows[2][1..].iter().collect::<Vec<_>>());
         let is_narrow = |text: &str| text.lines().all(|line| line.chars().count() <= WIDTH);
         assert!(is_narrow(&terminal_table(&rows, 1)) && is_narrow(&terminal_columns(&rows)));
-        assert_eq!(terminal_table(&parts[0], 1), markdown_table(&parts[0]), "what has room is one table");
+        assert_eq!(terminal_table(&parts[0], 1), plain_table(&parts[0]), "what has room is one table");
         // nothing can be done about a column that is wider than a terminal
         assert_eq!(cut(&[vec!["a".repeat(100), "b".repeat(100)]], 1, 3).len(), 1);
     }

@@ -5,9 +5,19 @@ use comfy_table::{ContentArrangement, Table, presets};
 /// A table of rows, of which the first is the head.
 #[must_use]
 pub(crate) fn markdown_table(rows: &[Vec<String>]) -> String {
+    table(rows, markdown)
+}
+
+/// The same for eyes: names as they are.
+#[must_use]
+pub(crate) fn plain_table(rows: &[Vec<String>]) -> String {
+    table(rows, |text| text.replace(['\n', '\r'], " "))
+}
+
+fn table(rows: &[Vec<String>], shown: impl Fn(&str) -> String) -> String {
     let mut table = Table::new();
     table.load_style(presets::ASCII_MARKDOWN).set_content_arrangement(ContentArrangement::Disabled);
-    let escaped = |row: &Vec<String>| row.iter().map(|cell| markdown(cell)).collect::<Vec<_>>();
+    let escaped = |row: &Vec<String>| row.iter().map(|cell| shown(cell)).collect::<Vec<_>>();
     if let Some((head, rows)) = rows.split_first() {
         table.set_header(escaped(head)).add_rows(rows.iter().map(escaped));
     }

@@ -26,6 +26,28 @@ fn what_is_printed_fits_a_screen() {
     assert!(lines(&["--estimator", "all"]).0 <= 20);
 }
 
+/// Quantization as IEEE 952 has it, of the increments: q2 = 4e-4 at 50 Hz is 0.02/50 = 4e-4 m/s, and rad. Of four signals of 16384 samples
+/// it is known to 1 % or so; 8 % are allowed. A rate would be fifty times as large.
+#[test]
+fn quantization_is_that_of_increments() {
+    let dir = tempfile::tempdir().unwrap();
+    let processes = "processes = [{ type = \"WN\", sigma2 = 4e-5 }, { type = \"QN\", q2 = 4e-4 }]";
+    let model = format!("schema = 1\nrate_hz = 50.0\n[accel]\n{processes}\n[gyro]\n{processes}\n");
+    std::fs::write(dir.path().join("imu.toml"), model).unwrap();
+    let synthesize = "synthesize imu.toml --replicates 4 --samples 16384 --axes x --seed 1 -o made";
+    nav_sim(dir.path()).args(synthesize.split(' ')).assert().success();
+    let calibrate = "calibrate made --model WN+QN --bootstrap 0 --seed 1 -o m.toml";
+    let output = nav_sim(dir.path()).args(calibrate.split(' ')).assert().success();
+    let text = String::from_utf8(output.get_output().stdout.clone()).unwrap();
+    let rows: Vec<&str> = text.lines().filter(|line| line.contains("quantization Q")).collect();
+    for (row, unit) in rows.iter().zip(["m/s", "rad"]) {
+        let words: Vec<&str> = row.split("quantization Q").nth(1).unwrap().split_whitespace().collect();
+        let value: f64 = words[0].parse().unwrap();
+        assert!((value / 4e-4 - 1.0).abs() < 0.08 && words[1..].contains(&unit), "{row}");
+    }
+    assert_eq!(rows.len(), 2, "{text}");
+}
+
 /// N, K and B of the JSON are those that `export` has of the model file, to the last bit; N is that of the noise: sigma2 of nine
 /// signals of 16384 samples is known to √(2/(9·16384·0.6)) = 0.5 % or so, N to half of that, eight of which are allowed.
 #[test]

@@ -70,8 +70,9 @@ pub(super) fn common(pieces: &[Piece<'_>], settings: &Settings) -> Common {
     let all = (0..test.levels(pieces)).map(|level| excess(pieces, level, settings));
     let found: Vec<Excess> = all.filter(|e| e.alarms(e.quantizer)).collect();
     let tau_s: Vec<f64> = found.iter().map(|e| e.tau_s).collect();
-    // Outliers that by chance make up for the allowance at one scale do not at the next.
-    if !found.is_empty() && found.iter().all(|e| !e.alarms(e.gaussian)) {
+    // Outliers raise the classical variance by anything; that they make up for the allowance, no more and no less, at every
+    // scale is not to be expected.
+    if !found.is_empty() && found.iter().all(|e| !e.alarms(e.gaussian.abs())) {
         let read_low = found.iter().map(|e| (e.quantizer - e.gaussian).exp_m1()).fold(0.0, f64::max);
         return Common { outliers: None, gaussian: Some(GaussianQuantization { tau_s, read_low }) };
     }

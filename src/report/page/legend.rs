@@ -3,6 +3,7 @@
 use super::chart::{Chart, Mark, Series};
 use super::draw::{Canvas, text};
 use super::marks::short;
+use std::borrow::Cow;
 use std::fmt::Write as _;
 
 /// Width of a text (pixels), rather too much: that of a wide typeface.
@@ -74,10 +75,11 @@ impl<'a> Legend<'a> {
         let x = left + text_width(title, canvas.font) + SPACE;
         let mut pen = Pen { left, x, y: top, line, canvas };
         for (k, entry) in self.entries.iter().enumerate().filter(|(_, e)| e.panel == panel) {
-            let (x, y) = pen.place(entry.name);
+            let name = fitting(entry.name, canvas);
+            let (x, y) = pen.place(&name);
             let _ = write!(svg, "<g class=\"key {}\" data-k=\"{k}\">", entry.series[0].colour.class());
             entry.series.iter().for_each(|s| swatch(&s.mark, (x, y + 0.5 * line - 1.0), svg));
-            text(svg, "", (x + SWATCH + 6.0, y + canvas.font), "start", entry.name);
+            text(svg, "", (x + SWATCH + 6.0, y + canvas.font), "start", &name);
             *svg += "</g>\n";
         }
         if let Some(name) = stripes {
@@ -91,6 +93,26 @@ impl<'a> Legend<'a> {
         }
         pen.y + line
     }
+}
+
+/// A name, without its middle if it is wider than the picture: ends tell names apart that begin alike.
+fn fitting<'a>(name: &'a str, canvas: &Canvas) -> Cow<'a, str> {
+    let room = canvas.width - 2.0 * (SWATCH + SPACE);
+    let mut letters: Vec<char> = name.chars().collect();
+    if text_width(name, canvas.font) <= room {
+        return Cow::Borrowed(name);
+    }
+    let mut shown = String::new();
+    while letters.len() > 2 {
+        let middle = letters.len() / 2;
+        letters.remove(middle);
+        let (before, after) = letters.split_at(middle);
+        shown = before.iter().chain(&['…']).chain(after).collect();
+        if text_width(&shown, canvas.font) <= room {
+            break;
+        }
+    }
+    Cow::Owned(shown)
 }
 
 /// Where the next entry begins.

@@ -112,10 +112,26 @@ fn png(svg: &str) -> Result<Vec<u8>, String> {
 }
 
 fn pdf(svg: &str) -> Result<Vec<u8>, String> {
-    // Text becomes outlines, so that no reader of the file needs the font. `svg2pdf` lists the objects of a page in an
-    // order of chance: the drawing is the same each time, the bytes are not.
+    // Text becomes outlines, so that no reader of the file needs the font.
     let outlines = usvg::WriteOptions { preserve_text: false, ..usvg::WriteOptions::default() };
     let picture = parsed(&parsed(svg)?.to_string(&outlines))?;
     let page = svg2pdf::PageOptions { dpi: PIXELS_AN_INCH };
-    svg2pdf::to_pdf(&picture, svg2pdf::ConversionOptions::default(), page).map_err(|e| e.to_string())
+    let document = svg2pdf::to_pdf(&picture, svg2pdf::ConversionOptions::default(), page);
+    document.map(|bytes| ordered(&bytes)).map_err(|e| e.to_string())
+}
+
+/// `svg2pdf` lists the resources of a page in an order of chance, which means nothing; by name, the same drawing has the same
+/// bytes. What moves stays within its list, so that all offsets hold.
+fn ordered(document: &[u8]) -> Vec<u8> {
+    let is_resource = |line: &&[u8]| {
+        let words: Vec<&[u8]> = line.split(|b| *b == b' ').filter(|word| !word.is_empty()).collect();
+        matches!(words[..], [[b'/', ..], _, b"0", b"R"])
+    };
+    let mut lines: Vec<&[u8]> = document.split(|b| *b == b'\n').collect();
+    for list in lines.chunk_by_mut(|a, b| is_resource(a) && is_resource(b)) {
+        if is_resource(&list[0]) {
+            list.sort_unstable();
+        }
+    }
+    lines.join(&b'\n')
 }

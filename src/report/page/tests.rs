@@ -98,10 +98,29 @@ fn a_picture_can_be_dots_or_a_page_of_a_document() {
     assert!(in_title.clone().any(|(x, y)| colour(x, y) == (0x1b, 0x1f, 0x24)));
     let everywhere = (0..dots.width()).flat_map(|x| (0..dots.height()).map(move |y| (x, y)));
     assert!(everywhere.clone().filter(|&(x, y)| colour(x, y) == (0xcc, 0x4e, 0x00)).count() > 1000);
-    let document = encode(picture, Form::Pdf).unwrap();
+    let document = encode(picture.clone(), Form::Pdf).unwrap();
     assert!(document.starts_with(b"%PDF-"));
+    for _ in 0..4 {
+        assert!(
+            document == encode(picture.clone(), Form::Pdf).unwrap(),
+            "the same picture has the same bytes"
+        );
+    }
     let size = b"/MediaBox [0 0 744 "; // points, 1/72 inch
     assert!(document.windows(size.len()).any(|bytes| bytes == size));
+}
+
+/// A name that is wider than the picture loses its middle, not its end: beginnings are alike.
+#[test]
+fn a_legend_stays_within_its_picture() {
+    let name = format!("{}_x, classical", "recording_of_the_unit_on_the_rate_table_".repeat(4));
+    let lines = vec![
+        Series::line(&name, Colour::BELIEVED, vec![(0.0, 1.0), (1.0, 2.0)]),
+        Series::line("model", Colour::REAL, vec![(0.0, 1.0), (1.0, 2.0)]),
+    ];
+    let html = page(&Chart::new("t", Axis::linear("x"), vec![Panel::new(Axis::linear("y"), lines)]));
+    assert!(!html.contains(&format!(">{name}</text>")) && html.matches("…").count() >= 2, "{html}");
+    assert!(html.contains("_x, classical</text>"), "{html}");
 }
 
 #[test]

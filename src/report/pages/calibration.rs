@@ -146,7 +146,7 @@ pub(super) fn chart(fitted: &FittedCurve, diagnoses: &[Diagnosis]) -> Chart {
         Panel { height: 1.4, ..Panel::new(variance_axis(&fitted.sensor), variance) },
         Panel { height: 0.5, ..Panel::new(Axis::log("data / model").including(0.8, 1.25), left) },
     ];
-    let title = format!("Wavelet variance: {}", group_name(fitted));
+    let title = format!("Wavelet variance: {}, {}", group_name(fitted), fitted.estimator.to_uppercase());
     Chart::new(&title, scale_axis(), panels).in_group("scales")
 }
 
