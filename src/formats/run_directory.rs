@@ -46,7 +46,7 @@ pub(crate) fn read(directory: &Path) -> Result<RunDirectory, FileError> {
         as_written(directory, &manifest, "runs.csv", &runs_text)?;
         runs
     };
-    let (verdict, asee_end_ci95) = found(directory)?;
+    let (verdict, asee_end_ci95) = found(directory, &manifest)?;
     let outages = manifest.configuration.outage.iter().flatten().map(|o| (o.start_s, o.end_s)).collect();
     let independent_windows = manifest.independent_windows;
     let experiment = Measured { epochs, runs, outages, independent_windows, is_expected };
@@ -54,7 +54,7 @@ pub(crate) fn read(directory: &Path) -> Result<RunDirectory, FileError> {
 }
 
 /// The verdict, and what the calibration leaves open, outage by outage, from the summary.
-fn found(directory: &Path) -> Result<(Verdict, Vec<OpenEnds>), FileError> {
+fn found(directory: &Path, manifest: &Manifest) -> Result<(Verdict, Vec<OpenEnds>), FileError> {
     #[derive(serde::Deserialize)]
     struct Found {
         verdict: Verdict,
@@ -66,6 +66,7 @@ fn found(directory: &Path) -> Result<(Verdict, Vec<OpenEnds>), FileError> {
     }
     let (path, summary) = text(directory, "summary.json")?;
     let found: Found = serde_json::from_str(&summary).map_err(|e| not_json(&path, &e))?;
+    as_written(directory, manifest, "summary.json", &summary)?;
     Ok((found.verdict, found.outages.into_iter().map(|outage| outage.asee_end_ci95).collect()))
 }
 

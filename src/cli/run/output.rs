@@ -67,9 +67,14 @@ pub(crate) fn doubt_filter(summary: &Summary, session: &Session) {
     if summary.verdict.kind != VerdictKind::Overconfident {
         return;
     }
-    let remedy = match summary.reduction {
-        Some(_) => "--filter full has a state for each process of the model",
-        None => "nav-sim tune finds variances that cover its errors",
+    let quality = summary.reduction.as_ref().and_then(|reduction| reduction.quality.as_ref());
+    let ratios =
+        quality.into_iter().flat_map(|q| q.outage_end.iter().chain([&q.mean]).flat_map(|state| state.0));
+    // where the reduced filter is right about the errors of its own model, the errors are of something else
+    let remedy = if ratios.fold(0.0, f64::max) > 1.0 + summary.verdict.tolerance {
+        "--filter full has a state for each process of the model"
+    } else {
+        "the errors are not those that MODEL expects: nav-sim tune finds variances that cover them"
     };
     session.printer.warn(&format!("the filter is {}; {remedy}", run_words::verdict(summary)));
 }
