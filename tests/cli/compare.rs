@@ -155,6 +155,11 @@ fn verdicts_are_those_of_the_directories() {
     let doubted = text.replacen("\"kind\": \"ok\"", "\"kind\": \"overconfident\"", 1);
     assert_ne!(doubted, text);
     std::fs::write(&summary, doubted).unwrap();
+    let manifest = directory.path().join("b/manifest.json");
+    let mut json: serde_json::Value =
+        serde_json::from_str(&std::fs::read_to_string(&manifest).unwrap()).unwrap();
+    json["outputs"].as_object_mut().unwrap().remove("summary.json"); // which would not be what was written
+    std::fs::write(manifest, json.to_string()).unwrap();
     let ran = compare(directory.path(), &["a", "b", "--reference", "a"]);
     assert!(ran.stdout.starts_with("overconfident: b (NEES 9.00, "), "{}\n{}", ran.stdout, ran.stderr);
     assert!(ran.stdout.contains("\nconsistent: a ("), "{}", ran.stdout);
