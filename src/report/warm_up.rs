@@ -68,7 +68,7 @@ pub(crate) fn warm_up_in_short(
     let unsettled = match late.is_empty() {
         true => String::new(),
         false => {
-            format!("; {}: more than a quarter of it, what remains may still be settling", late.join(", "))
+            format!("; {}: an eighth of it or more, what remains may still be settling", late.join(", "))
         }
     };
     format!("{head}: {all}{end}{unsettled}")

@@ -29,7 +29,7 @@ pub struct WarmUp {
     pub mean: bool,
     /// The first part against the last eight, in their standard deviations.
     pub deviations: f64,
-    /// Whether that is more than a quarter of the record: what fades so slowly may not be over in the rest, which is then too
+    /// Whether that is an eighth of the record or more: what fades so slowly may not be over in the rest, which is then too
     /// short to tell.
     pub late: bool,
     /// What leaving them out changes; none where not even the later half begins as it goes on, and nothing is to be left out.
@@ -55,7 +55,7 @@ pub fn warm_up(samples: &[f64]) -> Option<WarmUp> {
         match look(&samples[left..]) {
             Some(more) => left += more.samples,
             None => {
-                let late = 4 * left > samples.len();
+                let late = 8 * left >= samples.len();
                 return Some(WarmUp { samples: left, late, change: change(samples, left), ..first });
             }
         }
