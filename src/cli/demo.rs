@@ -104,7 +104,6 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let commands = commands(args, progress.seed);
     let last = commands.len() - 1;
     // what is compared is shown again, and what was removed is made again
-    let is_there = |command: &Vec<String>| command.last().is_some_and(|output| Path::new(output).exists());
     let done = commands.iter().take(progress.commands_done.min(last)).take_while(|c| is_there(c)).count();
     if done > 0 {
         let told =
@@ -149,6 +148,16 @@ fn long_enough(args: &Args, session: &Session) -> Result<(), Failure> {
         args.samples
     );
     Err(Failure::input(message).hint(format!("at least --samples {needed}")))
+}
+
+/// Whether what a command makes is there: what follows its `-o`, or a model of each estimator beside it.
+fn is_there(command: &[String]) -> bool {
+    let Some(output) = command.last().map(Path::new) else { return false };
+    if command[0] != "calibrate" {
+        return output.exists();
+    }
+    let scenario = output.file_stem().unwrap_or_default().to_string_lossy();
+    ESTIMATORS.iter().all(|estimator| output.with_file_name(format!("{scenario}_{estimator}.toml")).exists())
 }
 
 /// The page that leads to all others.

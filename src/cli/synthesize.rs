@@ -95,7 +95,7 @@ fn synthesis(args: &Args, session: &Session) -> Result<Synthesis, Failure> {
     let contamination = args.contaminate.as_deref().map(|c| contamination(c, file.model.rate_hz));
     let contamination = contamination.transpose()?;
     let channels = wanted(args, &file, session)?;
-    reaches(contamination.as_ref(), &channels, session)?;
+    reaches(contamination.as_ref(), args.replicates, &channels, session)?;
     let samples = match args.duration {
         Some(s) => (s * file.model.rate_hz).round(),
         None => args.samples.unwrap_or(524_284) as f64,
@@ -142,10 +142,18 @@ fn wanted(args: &Args, file: &ModelFile, session: &Session) -> Result<Vec<Channe
 /// which of its rules do not.
 fn reaches(
     contamination: Option<&Contamination>,
+    replicates: u64,
     channels: &[Channel],
     session: &Session,
 ) -> Result<(), Failure> {
-    let Some(Contamination { name, rules }) = contamination else { return Ok(()) };
+    let Some(contamination) = contamination else { return Ok(()) };
+    let Contamination { name, rules } = contamination;
+    if !(1..=replicates).any(|replicate| contamination.touches(replicate)) {
+        let message = format!("--contaminate {name}: it touches none of the replicates 1 to {replicates}");
+        return Err(
+            Failure::input(message).hint("replicates are counted from 1; more of them with --replicates")
+        );
+    }
     let made = |rule: &Rule| channels.iter().any(|c| c.sensor == rule.sensor);
     let Some(Rule { sensor, .. }) = rules.iter().find(|rule| !made(rule)) else { return Ok(()) };
     let message = format!("--contaminate {name}: it corrupts the {}, which is not made", sensor.name());

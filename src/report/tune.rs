@@ -216,7 +216,7 @@ fn judged_after(h: &Honesty) -> String {
         return format!("no error{place} is larger than stated, but the NEES is {nees} where 9 is right");
     }
     let (ratio, state) = (readable(h.ratio), REPORTED_NAMES[h.state]);
-    format!("the NEES is {nees}, {state} still overconfident by {ratio} (--for worst covers every state)")
+    format!("the NEES is {nees}, {state} still overconfident by {ratio}")
 }
 
 /// `gyro RW × 4.02 (variance; the rest × 1)`
