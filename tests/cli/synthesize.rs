@@ -145,6 +145,7 @@ fn mistakes_are_refused_and_leave_nothing() {
         "--contaminate ninth.toml: it touches none of the replicates 1 to 8",
         "replicates are counted from 1",
     );
+    fs::remove_file(place.path("ninth.toml")).unwrap();
     fs::write(
         place.path("plain.toml"),
         "rate_hz = 100\n[gyro]\nprocesses = [{ type = \"WN\", sigma2 = 1 }]\n",
