@@ -136,16 +136,15 @@ fn mistakes_are_refused_and_leave_nothing() {
         assert_eq!(entries(place.0.path()), ["model.toml", "plain.toml"]);
     };
     fs::write(
-        place.path("ninth.toml"),
+        place.path("plain.toml"),
         "schema = 1\n[[accel]]\noperation = \"step\"\namplitude = 1.0\nreplicates = [9]\n",
     )
     .unwrap();
     refused(
-        &["model.toml", "--replicates", "8", "--contaminate", "ninth.toml"],
-        "--contaminate ninth.toml: it touches none of the replicates 1 to 8",
+        &["model.toml", "--replicates", "8", "--contaminate", "plain.toml"],
+        "--contaminate plain.toml: it touches none of the replicates 1 to 8",
         "replicates are counted from 1",
     );
-    fs::remove_file(place.path("ninth.toml")).unwrap();
     fs::write(
         place.path("plain.toml"),
         "rate_hz = 100\n[gyro]\nprocesses = [{ type = \"WN\", sigma2 = 1 }]\n",
