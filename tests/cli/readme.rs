@@ -72,6 +72,32 @@ fn shell_blocks_run() {
 }
 
 /// Every relative link of README and book leads to a file.
+/// Numbers of a picture, and what stands between them.
+fn numbers(picture: &str) -> (Vec<f64>, String) {
+    let is_number = |c: char| c.is_ascii_digit() || c == '.';
+    let words = picture.split(|c| !is_number(c)).filter_map(|word| word.parse().ok());
+    (words.collect(), picture.replace(is_number, ""))
+}
+
+/// The script makes the pictures of the README as they are there, to a fifth of a pixel: another processor may round
+/// otherwise.
+#[test]
+fn pictures_are_current() {
+    let made = tempfile::tempdir().unwrap();
+    let script = ["scripts/pictures.sh", env!("CARGO_BIN_EXE_nav-sim")];
+    let ran = Command::new("sh").current_dir(ROOT).args(script).arg(made.path()).output().unwrap();
+    assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
+    for name in ["calibration.svg", "run.svg"] {
+        assert!(README.contains(&format!("(docs/figures/{name})")), "{name}");
+        let read = |directory: &Path| std::fs::read_to_string(directory.join(name)).unwrap();
+        let (there, words) = numbers(&read(&Path::new(ROOT).join("docs/figures")));
+        let (new, new_words) = numbers(&read(made.path()));
+        assert!(words == new_words && there.len() == new.len(), "{name}: scripts/pictures.sh");
+        let farthest = there.iter().zip(&new).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(there.len() > 500 && farthest <= 0.2, "{name}: {farthest}; scripts/pictures.sh");
+    }
+}
+
 #[test]
 fn links_lead_somewhere() {
     for page in pages() {
