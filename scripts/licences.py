@@ -28,9 +28,10 @@ names = ("LICENSE", "LICENCE", "COPYING", "NOTICE", "UNLICENSE")
 owners = {}
 for package in foreign:
     folder = pathlib.Path(package["manifest_path"]).parent
-    for path in sorted(folder.iterdir()):
+    # also of what a crate carries with it: fonts
+    for path in sorted(folder.rglob("*")):
         if path.is_file() and path.name.upper().startswith(names):
             text = path.read_text(encoding="utf-8", errors="replace").strip()
-            owners.setdefault(text, []).append(f"{package['name']} {package['version']} ({path.name})")
+            owners.setdefault(text, []).append(f"{package['name']} {package['version']} ({path.relative_to(folder)})")
 for text, files in owners.items():
     print(f"\n{'=' * 78}\n{', '.join(files)}\n{'=' * 78}\n{text}")
