@@ -16,8 +16,8 @@ use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::Outage;
-use crate::simulation::REPORTED;
 use crate::simulation::plan::Experiment;
+use crate::simulation::{NEES_DOF, REPORTED};
 use crate::trajectory::Trajectory;
 use crate::trajectory::profile::{Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning};
 use crate::units::DEG;
@@ -105,19 +105,27 @@ const OFF: f64 = 0.08;
 const OFF_WEIGHT: f64 = 0.3;
 /// Share of such states over the whole way in the cost.
 const WAY: f64 = 0.3;
+/// The same two of the mean NEES.
+const NEES_OFF: f64 = 0.04;
+const NEES_WEIGHT: f64 = 0.1;
 
 /// The divergence at the outage ends and on the average; a single state whose ratio is a tenth off, at an outage's end or
-/// over the whole way, counts beside it, steeply: the divergence alone gives one state away for eight.
+/// over the whole way, counts beside it, steeply: the divergence alone gives one state away for eight. So does the mean
+/// NEES: the divergence is that of a filter that is rather too timid.
 fn cost(assessment: &Assessment) -> f64 {
-    let steep = |r: f64| OFF_WEIGHT * (r.ln() / OFF).powi(4);
-    let over_the_way = match assessment.reports.get(1..) {
-        Some(reports) if !reports.is_empty() => {
-            let squares = |i: usize| reports.iter().map(|c| c.ratio()[i].powi(2)).sum::<f64>();
-            (0..REPORTED).map(|i| steep((squares(i) / reports.len() as f64).sqrt())).sum()
-        }
-        _ => 0.0,
-    };
-    divergence(assessment, |end| end.ratio().into_iter().map(steep).sum()) + WAY * over_the_way
+    let ends = divergence(assessment, |end| end.ratio().into_iter().map(steep).sum());
+    let reports = assessment.reports.get(1..).unwrap_or_default();
+    if reports.is_empty() {
+        return ends;
+    }
+    let mean = |of: &dyn Fn(&Consistency) -> f64| reports.iter().map(of).sum::<f64>() / reports.len() as f64;
+    let ratios: f64 = (0..REPORTED).map(|i| steep(mean(&|c| c.ratio()[i].powi(2)).sqrt())).sum();
+    let nees = (mean(&|c| c.nees) / NEES_DOF as f64).ln() / NEES_OFF;
+    ends + WAY * (ratios + NEES_WEIGHT * nees.powi(4))
+}
+
+fn steep(ratio: f64) -> f64 {
+    OFF_WEIGHT * (ratio.ln() / OFF).powi(4)
 }
 
 /// The divergence on the average and at the outage ends, where `beside` is added to it.
