@@ -99,7 +99,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         session.printer.result(&lines.join("\n"));
         return Ok(());
     }
-    long_enough(args, session)?;
+    refuse_the_impossible(args, session)?;
     let mut progress = Progress::of(args, session)?;
     let commands = commands(args, progress.seed);
     let last = commands.len() - 1;
@@ -129,8 +129,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Refuses recordings in which no window is as long as the trajectory, before anything is made.
-fn long_enough(args: &Args, session: &Session) -> Result<(), Failure> {
+/// Refuses no runs, and recordings in which no window is as long as the trajectory, before anything is made.
+fn refuse_the_impossible(args: &Args, session: &Session) -> Result<(), Failure> {
     if args.runs == 0 {
         return Err(Failure::input("--runs 0: there is nothing to compare").hint("at least --runs 1"));
     }

@@ -163,7 +163,9 @@ impl ChoiceReport<'_> {
         let mut rows: Vec<Vec<String>> = self.rows().into_iter().take(1 + SHOWN).map(brief).collect();
         let more = self.ranking.candidates.len().saturating_sub(SHOWN);
         if more > 0 {
-            rows.push(vec![format!("… and {more} more")]);
+            let mut rest = vec![String::new(); rows[0].len()];
+            rest[0] = format!("… and {more} more");
+            rows.push(rest);
         }
         rows
     }

@@ -92,6 +92,22 @@ fn the_model_that_made_the_recordings_is_chosen_and_written() {
     assert_eq!(serde_json::from_str::<Value>(&replaced).unwrap()["candidates"].as_array().unwrap().len(), 1);
 }
 
+/// Twelve candidates on one screen, the best of them; with `--verbose` all, with what is believed and covered.
+#[test]
+fn what_is_printed_fits_a_screen() {
+    let directory = recordings("8192", "4");
+    let text = |more: &[&str]| {
+        let arguments = ["--model", "WN,WN+RW", "--inflate", "none,x10", "--force"];
+        let output = choose(directory.path(), &[&arguments[..], more].concat()).success();
+        String::from_utf8(output.get_output().stdout.clone()).unwrap()
+    };
+    let brief = text(&[]);
+    assert!(brief.lines().count() <= 20 && brief.contains("… and 3 more"), "{brief}");
+    assert!(brief.contains("log score (nats)") && !brief.contains("believed (m)"), "{brief}");
+    let whole = text(&["--verbose"]);
+    assert!(whole.contains("believed (m)") && whole.contains("coverage"), "{whole}");
+}
+
 #[test]
 fn recordings_shorter_than_the_drive_are_judged_by_covariance_analysis() {
     let directory = recordings("4096", "3");

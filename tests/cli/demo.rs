@@ -63,3 +63,20 @@ fn an_interrupted_demo_goes_on() {
         "{said}"
     );
 }
+
+/// What cannot end well does not begin: 900 s of drive need 90 000 samples at 100 Hz.
+#[test]
+fn a_demo_that_cannot_work_makes_nothing() {
+    let dir = tempfile::tempdir().unwrap();
+    let refused = |more: &[&str], said: &str| {
+        let out = dir.path().join("out");
+        let mut command = Command::new(env!("CARGO_BIN_EXE_nav-sim"));
+        command.current_dir(env!("CARGO_MANIFEST_DIR")).arg("demo").args(more).arg("-o").arg(&out);
+        let ended = command.output().unwrap();
+        let stderr = String::from_utf8(ended.stderr).unwrap();
+        assert!(ended.status.code() == Some(2) && stderr.contains(said), "{stderr}");
+        assert!(!out.exists());
+    };
+    refused(&["--samples", "89999"], "at least --samples 90000");
+    refused(&["--runs", "0"], "at least --runs 1");
+}
