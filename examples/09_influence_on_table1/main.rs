@@ -2,7 +2,7 @@
 //! of the clean curve's scales predicts of it: first order, d ln(error) = Σ influence · d ln(wavelet variance), and in
 //! steps, the influence taken anew at the middle of each.
 //!
-//! `cargo run --release --example 09_influence_on_table1 -- SAMPLES STEPS` (default 524284 4)
+//! `cargo run --release --example 09_influence_on_table1 -- SAMPLES STEPS DISTURBANCE` (default 524284 4, every disturbance)
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
 use nav_sim::calibration::{
@@ -18,6 +18,8 @@ use nav_sim::wavelet::Curve;
 use std::error::Error;
 
 const REPLICATES: u64 = 8;
+/// A step of the way that the influence misses by more than this (percent) is one where the fit jumps.
+const JUMP: f64 = 1.0;
 
 /// The disturbances, each alone.
 fn disturbances(rate_hz: f64) -> Result<Vec<(&'static str, Contamination)>, Box<dyn Error>> {
@@ -66,31 +68,43 @@ impl Study<'_> {
         Settings { estimators: vec![estimator], ..self.settings.clone() }
     }
 
-    /// ln of the error that the influence predicts, in so many steps from one set of curves to another.
-    fn predicted(
+    /// The way from one set of curves to another in so many steps: of each, ln of the error's growth that the
+    /// influence predicts, and that of the models fitted at its ends.
+    fn way(
         &self,
         estimator: Estimator,
         groups: &[Group],
         (from, to): (&[Outcome], &[Outcome]),
         steps: u32,
-    ) -> Result<f64, Box<dyn Error>> {
+    ) -> Result<Vec<[f64; 2]>, Box<dyn Error>> {
         let settings = self.settings(estimator);
-        let mut sum = 0.0;
+        let fitted = |part: f64| {
+            let fit = |((group, from), to): ((&Group, &Outcome), &Outcome)| {
+                fit_curve(group, estimator, between(&from.curve, &to.curve, part), &settings)
+            };
+            groups.iter().zip(from).zip(to).map(fit).collect::<Result<Vec<_>, _>>()
+        };
+        let ratios = from.iter().zip(to).flat_map(|(from, to)| {
+            from.curve.wv.iter().zip(&to.curve.wv).map(|(a, b)| (b / a).ln()).collect::<Vec<_>>()
+        });
+        let ratios: Vec<f64> = ratios.collect();
+        let mut before = self.ln_error(&fitted(0.0)?)?;
+        let mut way = Vec::new();
         for step in 0..steps {
             // one step is of first order, from the beginning; of several each is taken from its middle
             let part = if steps == 1 { 0.0 } else { (f64::from(step) + 0.5) / f64::from(steps) };
-            let fitted = |((group, from), to): ((&Group, &Outcome), &Outcome)| {
-                fit_curve(group, estimator, between(&from.curve, &to.curve, part), &settings)
-            };
-            let outcomes = groups.iter().zip(from).zip(to).map(fitted).collect::<Result<Vec<_>, _>>()?;
-            let influence = self.drive.influence(&self.laboratory, groups, &outcomes, &settings)?;
-            let ratios = from.iter().zip(to).flat_map(|(from, to)| {
-                from.curve.wv.iter().zip(&to.curve.wv).map(|(a, b)| (b / a).ln()).collect::<Vec<_>>()
-            });
-            sum += influence.scales.iter().zip(ratios).map(|(s, ln)| s.on_error * ln).sum::<f64>()
-                / f64::from(steps);
+            let influence = self.drive.influence(&self.laboratory, groups, &fitted(part)?, &settings)?;
+            let predicted = influence.scales.iter().zip(&ratios).map(|(s, ln)| s.on_error * ln).sum::<f64>();
+            let after = self.ln_error(&fitted(f64::from(step + 1) / f64::from(steps))?)?;
+            way.push([predicted / f64::from(steps), after - before]);
+            before = after;
         }
-        Ok(sum)
+        Ok(way)
+    }
+
+    /// ln of the horizontal error after the outage, of the filter that believes what was fitted.
+    fn ln_error(&self, outcomes: &[Outcome]) -> Result<f64, Box<dyn Error>> {
+        Ok(self.drive.horizontal_rmse(&model_of(outcomes, self.settings.rate_hz)).map(f64::ln)?)
     }
 }
 
@@ -112,23 +126,31 @@ fn main() -> Result<(), Box<dyn Error>> {
         settings,
     };
     let clean = study.groups(None)?;
-    println!("disturbance, estimator: error after {steps} steps, first order, refitted (%)");
+    println!(
+        "disturbance, estimator: error after {steps} steps, first order, refitted (%); steps that are not foreseen"
+    );
+    let percent = |ln: f64| 100.0 * ln.exp_m1();
     for (name, contamination) in disturbances(rate_hz)? {
+        if arguments.get(2).is_some_and(|only| only != name) {
+            continue;
+        }
         let disturbed = study.groups(Some(&contamination))?;
         for estimator in [Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv] {
             let settings = study.settings(estimator);
             let (from, to) = (calibrate(&clean, &settings)?, calibrate(&disturbed, &settings)?);
-            let ln_error =
-                |outcomes: &[Outcome]| study.drive.horizontal_rmse(&model_of(outcomes, rate_hz)).map(f64::ln);
-            let found = ln_error(&to)? - ln_error(&from)?;
-            let percent = |ln: f64| 100.0 * ln.exp_m1();
-            let first = study.predicted(estimator, &clean, (&from, &to), 1)?;
-            let in_steps = study.predicted(estimator, &clean, (&from, &to), steps)?;
+            let first = study.way(estimator, &clean, (&from, &to), 1)?;
+            let way = study.way(estimator, &clean, (&from, &to), steps)?;
+            let sum = |way: &[[f64; 2]], which: usize| percent(way.iter().map(|step| step[which]).sum());
+            let unforeseen = way.iter().enumerate().map(|(at, step)| (at, step.map(percent)));
+            let unforeseen = unforeseen.filter(|(_, [predicted, found])| (predicted - found).abs() > JUMP);
+            let jumps = unforeseen.map(|(at, [predicted, found])| {
+                format!("; step {} is {predicted:.1} predicted, {found:.1} refitted", at + 1)
+            });
+            let [in_steps, first, found] =
+                [sum(&way, 0), sum(&first, 0), percent(study.ln_error(&to)? - study.ln_error(&from)?)];
             println!(
-                "{name}, {estimator}: {:.1}, {:.1}, {:.1}",
-                percent(in_steps),
-                percent(first),
-                percent(found)
+                "{name}, {estimator}: {in_steps:.1}, {first:.1}, {found:.1}{}",
+                jumps.collect::<String>()
             );
         }
     }

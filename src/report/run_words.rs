@@ -18,6 +18,7 @@ pub(crate) fn verdict(summary: &Summary) -> String {
 #[must_use]
 pub(crate) fn text(summary: &Summary) -> String {
     let mut text = format!("verdict: {}\n", verdict(summary));
+    text += &beyond_linear(summary).map_or_else(String::new, |words| format!("{words}\n"));
     summary.require.iter().for_each(|met| text += &format!("{}\n", met_line(met)));
     text += &format!("{}\n", how(summary));
     if summary.runs > 0 && summary.diverged == summary.runs {
@@ -52,6 +53,25 @@ pub(crate) fn text(summary: &Summary) -> String {
         text += &format!("\nruns against the covariance analysis: {}", agreement_line(agreement));
     }
     text
+}
+
+/// Where errors are too large for a linear filter, and for covariance analysis: the outage where it is worst.
+#[must_use]
+pub(crate) fn beyond_linear(summary: &Summary) -> Option<String> {
+    let beyond = summary.outages.iter().filter_map(|o| Some((o, o.beyond_linear()?)));
+    let (outage, share) = beyond.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let advice = match summary.runs {
+        0 => "; --method both sets runs beside the analysis",
+        _ => "",
+    };
+    Some(format!(
+        "beyond linear: attitude errors of the outage {} shift the velocity down by {} m/s to second order, {:.0} % of the \
+         filter's standard deviation; neither the filter nor covariance analysis knows that, and the vertical position, \
+         velocity and accelerometer bias are worse than believed from its end on{advice}",
+        window(outage.start_s, outage.end_s),
+        readable(outage.second_order_vel_d_m_s),
+        100.0 * share
+    ))
 }
 
 /// `required p95_m<=5: NOT MET, 7.41 at the end of outage 1`

@@ -144,3 +144,32 @@ fn the_full_filter_of_a_larger_model_is_inside() {
         assert!(p > 1e-3, "{name}: {p}");
     }
 }
+
+/// After five minutes without fixes the mean velocity down of a filter whose model is right is off by what the tilts make
+/// to second order, ∫ g (ψ_roll² + ψ_pitch²)/2 dt, and by nothing to first order: the mean over runs, within 3.5 of its own
+/// standard errors and a tenth (tilts are not Gaussian in a finite sample: the mean squares of 256 runs are known to
+/// √(2/256) = 9 %).
+#[test]
+fn long_outages_shift_the_velocity_down_by_the_square_of_the_tilts() {
+    let outages = [Outage { start_s: 100.0, end_s: 400.0 }];
+    let mut file = nav_sim::formats::model_file::read(
+        &Path::new(env!("CARGO_MANIFEST_DIR")).join("calib_data/consumer_mems.toml"),
+    )
+    .unwrap();
+    file.spread = None;
+    let scenario = Scenario::default();
+    let trajectory = trajectory("land_vehicle.toml");
+    let track = scenario.track(&trajectory, &file.model, &outages).unwrap();
+    let full = scenario.with_full_noise().belief(&file.model, &outages, &track).unwrap();
+    let beliefs = [full];
+    let experiment = scenario.experiment(&trajectory, Truth::Model(&file.model), &beliefs, &outages, 5);
+    let result = monte_carlo::run(&experiment, 256, &|_| {}).unwrap().remove(0);
+    let epochs = nav_sim::metrics::epochs(&result);
+    let summary = nav_sim::metrics::Summary::of(&result, &epochs, 5);
+    let shift = summary.outages[0].second_order_vel_d_m_s;
+    let end = epochs.iter().rev().find(|e| e.t_s < 399.5).unwrap();
+    let (mean, error) = (end.bias.0[5].value, end.bias.0[5].std_error);
+    assert!((mean - shift).abs() < 3.5 * error + 0.1 * shift, "{mean} ± {error} against {shift}");
+    assert!(mean > 3.0 * error, "{mean} ± {error} could be chance");
+    assert!(summary.outages[0].beyond_linear().is_some());
+}

@@ -82,7 +82,7 @@ impl Expected {
             filter_states: self.filter_states,
             seed: self.seed,
             accuracy: AccuracySummary::from(&Accuracy::over(self.epochs.iter())),
-            outages: OutageSummary::all(&self.outages, OutageVerdict::expected(&self.record)),
+            outages: OutageSummary::all(&self.outages, OutageVerdict::expected(&self.record), &self.epochs),
             nees: Consistency {
                 dof: NEES_DOF,
                 mean: self.record.nees_mean,

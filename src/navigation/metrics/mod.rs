@@ -16,6 +16,7 @@ mod quadratic_form;
 mod ratio;
 mod reduction;
 mod requirement;
+mod second_order;
 mod sensitivity;
 mod summary;
 mod verdict;

@@ -8,6 +8,7 @@ use super::estimate::{Estimate, PerState, Quantile, SampleSize};
 use super::outage::{self, OutageMetrics};
 use super::reduction::ReductionSummary;
 use super::requirement::Met;
+use super::second_order::velocity_down_m_s;
 use super::sensitivity::Sensitivities;
 use super::verdict::{OutageVerdict, Verdict, VerdictKind};
 use crate::simulation::{NEES_DOF, RunResult};
@@ -15,6 +16,9 @@ use serde::Serialize;
 
 /// Version of the layout of `summary.json`.
 pub(super) const SCHEMA_VERSION: u32 = 1;
+
+/// Among the reported states.
+const VELOCITY_DOWN: usize = 5;
 
 /// What the user reads first.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -116,6 +120,9 @@ pub struct OutageSummary {
     pub log_density_end_std_error: f64,
     /// Horizontal error at the same instant.
     pub horizontal_error_end_m: Spread,
+    /// Mean shift of the velocity down at the same instant that attitude errors make to second order, which neither
+    /// filter nor covariance analysis contains (null where the epochs were not kept).
+    pub second_order_vel_d_m_s: f64,
     /// Time until the error is back to what it was before.
     pub reconvergence_s: Recovery,
     /// Shares of the sources of the true errors in their mean squares just before the first fix after the outage,
@@ -227,7 +234,7 @@ impl Summary {
             filter_states: result.filter_states,
             seed,
             accuracy: AccuracySummary::from(&Accuracy::over(epochs.iter())),
-            outages: OutageSummary::all(&outage::outages(result), verdicts),
+            outages: OutageSummary::all(&outage::outages(result), verdicts, epochs),
             nees: nees(epochs, windows),
             nis: nis(result),
             coverage: coverage(epochs, result.coverage_level, windows),
@@ -291,11 +298,27 @@ impl From<&Accuracy> for AccuracySummary {
 
 impl OutageSummary {
     /// All outages with their verdicts.
-    pub(super) fn all(outages: &[OutageMetrics], verdicts: Vec<OutageVerdict>) -> Vec<Self> {
-        outages.iter().zip(verdicts).map(|(outage, verdict)| Self::new(outage, verdict)).collect()
+    pub(super) fn all(
+        outages: &[OutageMetrics],
+        verdicts: Vec<OutageVerdict>,
+        epochs: &[EpochMetrics],
+    ) -> Vec<Self> {
+        let outages = outages.iter().zip(verdicts);
+        outages.map(|(o, verdict)| Self::new(o, verdict, velocity_down_m_s(o, epochs))).collect()
     }
 
-    fn new(o: &OutageMetrics, verdict: OutageVerdict) -> Self {
+    /// The share of the filter's own standard deviation that the second order shifts the velocity down by at the end,
+    /// where the filter's linear model ends: where it is above [`Self::SECOND_ORDER_LIMIT`].
+    #[must_use]
+    pub fn beyond_linear(&self) -> Option<f64> {
+        let share = self.second_order_vel_d_m_s / self.asee_end.0[VELOCITY_DOWN];
+        (share > Self::SECOND_ORDER_LIMIT).then_some(share)
+    }
+
+    /// See [`Self::beyond_linear`].
+    pub const SECOND_ORDER_LIMIT: f64 = 0.3;
+
+    fn new(o: &OutageMetrics, verdict: OutageVerdict, second_order_vel_d_m_s: f64) -> Self {
         Self {
             start_s: o.start_s,
             end_s: o.end_s,
@@ -318,6 +341,7 @@ impl OutageSummary {
                 p999: o.horizontal_p999_m,
                 ..Spread::new(o.horizontal_p50_m, o.horizontal_p95_m, o.horizontal_max_m)
             },
+            second_order_vel_d_m_s,
             reconvergence_s: Recovery {
                 p50: o.reconvergence.p50_s.value,
                 p95: o.reconvergence.p95_s.value,

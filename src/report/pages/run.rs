@@ -1,13 +1,14 @@
 //! The page of a run directory.
 
 use super::run_charts::{budget_chart, fan_chart, horizontal, nees, states, windows};
-use super::{RMSE_AND_ASEE, STATES, tone, window};
+use super::{RMSE_AND_ASEE, STATES, sentence, tone, window};
 use crate::ekf::InitialSettings;
 use crate::imu::Sensor;
 use crate::metrics::{Budget, EpochMetrics, FanEpoch, OutageSummary, PerState, Summary};
 use crate::report::manifest::Manifest;
 use crate::report::number::readable;
 use crate::report::page::{Cell, Page, Table};
+use crate::report::run_words::beyond_linear;
 use crate::report::trajectory::TrajectorySeries;
 use crate::report::verdict::verdict_line;
 use crate::sensors::defects::ImuSettings;
@@ -29,6 +30,9 @@ pub(crate) fn run_page(
     let verdict = verdict_line(&summary.verdict, &windows, summary.runs, summary.diverged);
     let title = if summary.runs > 0 { "INS/GNSS Monte-Carlo run" } else { "INS/GNSS covariance analysis" };
     let mut page = Page::new(title, tone(summary.verdict.kind), &format!("The filter is {verdict}"));
+    if let Some(words) = beyond_linear(summary) {
+        page.text(&sentence(&words));
+    }
     requirements(summary, &mut page);
     page.facts(&assumptions(summary, manifest));
     page.chart(&track.map("Reference trajectory", &windows), "");

@@ -1,0 +1,67 @@
+//! What a linear filter, and a covariance analysis, leave out: errors of attitude to second order.
+//!
+//! A tilt ψ turns the specific force −g of level motion into a horizontal acceleration gψ, which the filter knows, and
+//! shortens what is left upright to g cos ψ: the vehicle seems to accelerate downwards with g(ψ_n² + ψ_e²)/2, whatever the
+//! sign of the tilt. The mean of this grows with the square of the attitude's standard deviation and is in no linear
+//! error model ([Groves](crate::bibliography::Groves13), Section 3.4.1, on the limits of the extended Kalman filter). After an
+//! outage of minutes it is taken for a bias of the vertical accelerometer.
+
+use super::epoch::EpochMetrics;
+use super::outage::OutageMetrics;
+use crate::units::{DEG, STANDARD_GRAVITY};
+
+/// Roll, pitch among the reported states.
+const TILT: [usize; 2] = [6, 7];
+
+/// Mean shift of the velocity down (m/s) that the tilt makes to second order over an outage: ∫ g (ψ_roll² + ψ_pitch²)/2 dt
+/// with the mean squares of the errors, by the trapezoidal rule over the reporting epochs. NaN where no epochs were kept.
+pub(super) fn velocity_down_m_s(outage: &OutageMetrics, epochs: &[EpochMetrics]) -> f64 {
+    let acceleration = |epoch: &EpochMetrics| {
+        STANDARD_GRAVITY / 2.0 * TILT.map(|i| (epoch.rmse.0[i].value * DEG).powi(2)).iter().sum::<f64>()
+    };
+    // a nanosecond of slack: sample times are multiples of 1/rate, outage times are typed
+    let inside = |e: &&EpochMetrics| outage.start_s <= e.t_s + 1e-9 && e.t_s + 1e-9 < outage.end_s;
+    let points: Vec<(f64, f64)> = epochs.iter().filter(inside).map(|e| (e.t_s, acceleration(e))).collect();
+    let Some(&(_, last)) = points.last() else { return f64::NAN };
+    // from the last epoch on as there: the fix that ends the outage is not inside
+    let end = (outage.end_s, last);
+    let ends = points.iter().zip(points.iter().skip(1).chain([&end]));
+    ends.map(|(a, b)| (b.0 - a.0) * (a.1 + b.1) / 2.0).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metrics::{Estimate, PerState};
+    use crate::simulation::{EpochSums, REPORTED, RunResult};
+
+    /// A tilt that grows as t in roll, 1° after 100 s: ∫ g (ct)²/2 dt = g c² T³/6, which the trapezoidal rule overstates by
+    /// g c² T h²/12, of epochs h apart; up to the last epoch, from where on the tilt stands still.
+    #[test]
+    fn a_growing_tilt_in_closed_form() {
+        let rate = 0.01;
+        let sums = |t: u32| EpochSums { t_s: f64::from(t), count: 1, ..EpochSums::default() };
+        let result = RunResult { epochs: (0..=300).map(sums).collect(), ..RunResult::default() };
+        let mut epochs = crate::metrics::epochs(&result);
+        for epoch in &mut epochs {
+            let mut tilt = [Estimate { value: 0.0, std_error: 0.0 }; REPORTED];
+            tilt[TILT[0]].value = rate * (epoch.t_s - 100.0).max(0.0);
+            epoch.rmse = PerState(tilt);
+        }
+        let result = RunResult {
+            runs: vec![crate::simulation::RunRecord {
+                outages: vec![crate::simulation::OutageRecord::default()],
+                ..Default::default()
+            }],
+            outages: vec![(100.0, 200.0)],
+            ..result
+        };
+        let outage = &crate::metrics::outages(&result)[0];
+        let c = rate * DEG;
+        // 100 to 199 s, and a second at the tilt of 99 s
+        let to_last = STANDARD_GRAVITY * c * c * (99.0_f64.powi(3) / 6.0 + 99.0 / 12.0);
+        let closed = to_last + STANDARD_GRAVITY / 2.0 * (99.0 * c).powi(2);
+        assert!((velocity_down_m_s(outage, &epochs) / closed - 1.0).abs() < 1e-12);
+        assert!(velocity_down_m_s(outage, &[]).is_nan());
+    }
+}
