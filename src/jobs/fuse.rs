@@ -61,7 +61,7 @@ impl FusionFilter<'_> {
         let Some(track) = states.is_reduced().then(drive).flatten() else {
             return Ok(belief.with_initial(initial));
         };
-        let belief = lincov::reduced_belief(&model, belief, &track).with_initial(initial);
+        let belief = lincov::reduced_belief(&model, belief, &track, lincov::Alike::All).with_initial(initial);
         let full = Belief::new(&model, FilterStates::Full, interval_s, window_s);
         let full = full.ok().map(|full| full.with_initial(&beside(states, initial)));
         let reduced = Reduced { model: &model, belief: &belief, full, track: &track, interval_s, window_s };

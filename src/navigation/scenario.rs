@@ -12,7 +12,7 @@ use crate::sensors::imu::Truth;
 use crate::sensors::outage::{
     FixedData, Fixes, Outage, OutageError, OutagePlan, PeriodicOutages, PlacedOutages, RandomOutages,
 };
-use crate::simulation::lincov::{Track, reduced_belief};
+use crate::simulation::lincov::{Alike, Track, reduced_belief};
 use crate::simulation::{Experiment, ExperimentError};
 use crate::trajectory::Trajectory;
 use crate::units::SettingError;
@@ -220,7 +220,7 @@ impl Scenario {
         let (interval_s, window_s) = (1.0 / self.gnss.rate_hz, reduction::window_s(longest));
         let mut belief = Belief::new(model, self.filter.states, interval_s, window_s)?;
         if self.filter.states.is_reduced() && self.filter.reduction == Reduction::Covariance {
-            belief = reduced_belief(model, belief, track);
+            belief = reduced_belief(model, belief, track, Alike::Level);
         }
         Ok(belief.with_initial(&self.initial))
     }

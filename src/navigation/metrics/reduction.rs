@@ -95,7 +95,7 @@ impl ReductionSummary {
         self.axes.iter().all(|a| a.misfit == 0.0)
     }
 
-    /// A line a sensor, or a line an axis where they differ.
+    /// A line for the axes of a sensor that are reduced alike.
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
         let describe = |name: &str, unit: &str, a: &AxisReduction| {
@@ -110,13 +110,15 @@ impl ReductionSummary {
             )
         };
         let mut lines = Vec::new();
-        for sensor in Sensor::ALL {
-            let axes = &self.axes[3 * sensor as usize..3 * sensor as usize + 3];
-            let same =
-                axes.iter().all(|a| (a.white_sigma2, a.bias_phi) == (axes[0].white_sigma2, axes[0].bias_phi));
-            let shown = if same { &axes[..1] } else { axes };
-            let name = |a: &AxisReduction| if same { sensor.name().to_owned() } else { a.axis.clone() };
-            lines.extend(shown.iter().map(|a| describe(&name(a), sensor.unit(), a)));
+        for (sensor, axes) in Sensor::ALL.into_iter().zip(self.axes.chunks(3)) {
+            let alike = |a: &AxisReduction, b: &AxisReduction| {
+                (a.white_sigma2, a.bias_phi, a.bias_sigma2) == (b.white_sigma2, b.bias_phi, b.bias_sigma2)
+            };
+            for shown in axes.chunk_by(alike) {
+                let names: Vec<&str> = shown.iter().map(|a| a.axis.as_str()).collect();
+                let name = if names.len() == 3 { sensor.name().to_owned() } else { names.join(", ") };
+                lines.push(describe(&name, sensor.unit(), &shown[0]));
+            }
         }
         lines
     }

@@ -24,7 +24,7 @@ mod tune;
 
 pub use heading::{HeadingDoubt, weak_heading};
 pub use pass::{Assessment, Consistency, ErrorLaw, FilterPass, Instant, assess};
-pub use reduce::{drive, reduced_belief};
+pub use reduce::{Alike, drive, reduced_belief};
 pub(crate) use root::Crossing;
 pub use track::Track;
 pub use truth::{DRIFT, NamedSource, TruthSide};

@@ -2,15 +2,16 @@
 //!
 //! A filter with one Gauss-Markov bias an axis cannot follow the processes of a larger model; the pair
 //! closest in wavelet variance leaves it overconfident. Here white noise, drive and correlation time of each
-//! sensor are chosen so that the filter's own covariance is closest to that of the errors it truly makes, in
-//! the sense of the Kullback-Leibler divergence, along a trajectory with its fixes and outages.
+//! sensor's level axes and of its axis down are chosen so that the filter's own covariance is closest to that of
+//! the errors it truly makes, in the sense of the Kullback-Leibler divergence, along a trajectory with its fixes and
+//! outages.
 
 use super::descent::Descent;
 use super::pass::{Assessment, Consistency, assess};
 use super::track::Track;
 use crate::earth::GravityModel;
 use crate::ekf::{Belief, InitialSettings};
-use crate::imu::Channel;
+use crate::imu::{Axis, Channel};
 use crate::noise::{Model, Process, reduction};
 use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
@@ -22,33 +23,53 @@ use crate::trajectory::Trajectory;
 use crate::trajectory::profile::{Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning};
 use crate::units::DEG;
 
-/// White noise, drive, correlation time of the accelerometer, then of the gyroscope.
-const FACTORS: usize = 6;
+/// White noise, drive, correlation time: of the accelerometers front and right, down, of the gyroscopes front and right,
+/// down.
+const FACTORS: usize = 12;
 /// Logarithms of factors on the wavelet reduction.
 type Factors = [f64; FACTORS];
 
 /// The belief of 15 states whose covariance is closest to that of the errors it makes along a track, where the
-/// errors are those of `model`; `wavelet` is the belief by wavelet variance, from which the search starts. Axes
-/// that are white noise and one bias already stay as they are.
+/// errors are those of `model`; `wavelet` is the belief by wavelet variance, from which the search starts; axes of a
+/// sensor are reduced as `alike` says. Axes that are white noise and one bias already stay as they are.
 #[must_use]
-pub fn reduced_belief(model: &Model, wavelet: Belief, track: &Track) -> Belief {
+pub fn reduced_belief(model: &Model, wavelet: Belief, track: &Track, alike: Alike) -> Belief {
     let exact = Channel::ALL.map(|c| reduction::is_exact(model.axis(c)));
-    let is_free = |i: &usize| exact[i / 3 * 3..i / 3 * 3 + 3].contains(&false);
+    let is_free =
+        |i: &usize| Channel::ALL.into_iter().any(|c| !exact[c.index()] && alike.first_factor(c) == i / 3 * 3);
     let free: Vec<usize> = (0..FACTORS).filter(is_free).collect();
     if free.is_empty() {
         return wavelet;
     }
-    let search = Search { model, base: wavelet, track: track.coarse(), exact, free };
+    let search = Search { model, base: wavelet, track: track.coarse(), exact, alike, free };
     search.belief(&search.minimise())
 }
 
-/// The choice of six factors.
+/// Which axes of a sensor are reduced alike.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Alike {
+    /// Front and right; down apart, whose gyroscope shows in the heading alone.
+    Level,
+    /// All: nobody knows how the IMU is mounted.
+    All,
+}
+
+impl Alike {
+    /// Of an axis.
+    fn first_factor(self, channel: Channel) -> usize {
+        let apart = self == Self::Level && channel.axis == Axis::Z;
+        6 * channel.sensor as usize + if apart { 3 } else { 0 }
+    }
+}
+
+/// The choice of the factors.
 struct Search<'a> {
     model: &'a Model,
     base: Belief,
     track: Track,
     /// Axes that are left as they are.
     exact: [bool; 6],
+    alike: Alike,
     /// Factors that act on an axis.
     free: Vec<usize>,
 }
@@ -59,11 +80,12 @@ impl Search<'_> {
         for channel in Channel::ALL.into_iter().filter(|c| !self.exact[c.index()]) {
             let (s, i) = (channel.sensor as usize, channel.axis as usize);
             // a factor needs something to act on: the wavelet fit may have put all white noise into the bias
+            let first = self.alike.first_factor(channel);
             let white = belief.white[s][i].max(white_of(self.model, channel));
-            belief.white[s][i] = white * ln[3 * s].exp();
+            belief.white[s][i] = white * ln[first].exp();
             let group = &mut belief.groups[s][0];
-            group.innovation[i] *= ln[3 * s + 1].exp();
-            let kappa = -(group.phi[i] - 1.0).ln_1p() * (-ln[3 * s + 2]).exp();
+            group.innovation[i] *= ln[first + 1].exp();
+            let kappa = -(group.phi[i] - 1.0).ln_1p() * (-ln[first + 2]).exp();
             group.phi[i] = (-kappa).exp();
         }
         belief
@@ -89,8 +111,8 @@ impl Search<'_> {
     }
 }
 
-/// Where the search starts: about the mean of the optima of two IMUs on three trajectories.
-const START: Factors = [0.3, -0.3, 1.0, 0.3, 0.0, 0.4];
+/// Where the search starts: about the mean of the optima of two IMUs on three trajectories, all axes of a sensor alike.
+const START: Factors = [0.3, -0.3, 1.0, 0.3, -0.3, 1.0, 0.3, 0.0, 0.4, 0.3, 0.0, 0.4];
 /// Cost of a factor e: what the fixes do not tell stays near the wavelet reduction.
 const RIDGE: f64 = 5e-4;
 const ITERATIONS: usize = 40;
