@@ -2,6 +2,7 @@
 
 use super::{FusionFilter, FusionFilterError, Note};
 use crate::fusion::alignment::{self, Alignment, AlignmentError};
+use crate::fusion::mounting::{self, MountingError};
 use crate::fusion::{
     self, Assessment, FusionError, Outcome, Recorded, Settings, Solution, Start, check_clocks,
 };
@@ -12,6 +13,17 @@ use crate::report::FusionSummary;
 use crate::sensors::outage::{FixedData, Outage, OutageError, OutagePlan, PlacedOutages};
 use crate::simulation::lincov::weak_heading;
 use crate::trajectory::reference::Reference;
+use crate::units::DEG;
+
+/// Where it is known from how the IMU sits in the vehicle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Mounted {
+    /// From the settings.
+    #[default]
+    AsGiven,
+    /// From the drive.
+    AsFound,
+}
 
 /// A recorded drive.
 #[derive(Debug)]
@@ -22,6 +34,8 @@ pub struct RecordedDrive {
     pub rate_hz: f64,
     /// The receiver's fixes.
     pub gnss: Vec<GnssFix>,
+    /// How the IMU sits in the vehicle.
+    pub mounted: Mounted,
     /// Where the filter starts; none: by levelling and the course.
     pub initial: Option<Start>,
     /// What the solution is compared with.
@@ -58,6 +72,9 @@ pub enum FuseError {
     /// The data do not show where the drive starts.
     #[error(transparent)]
     Alignment(#[from] AlignmentError),
+    /// The drive does not show how the IMU is mounted.
+    #[error(transparent)]
+    Mounting(#[from] MountingError),
     /// The reference is of another time.
     #[error("the reference and the solution have no time in common")]
     NothingInCommon,
@@ -87,9 +104,16 @@ impl RecordedDrive {
         let recorded = Recorded { imu: &self.imu, gnss: &self.gnss };
         check_clocks(&recorded)?;
         let belief = filter.belief(self.rate_hz, &self.gnss, &settings.outages, observer)?;
-        let settings = self.with_outages(settings, observer)?;
+        let mut settings = self.with_outages(settings, observer)?;
+        let mounting = match self.mounted {
+            Mounted::AsGiven => None,
+            Mounted::AsFound => Some(mounting::find(&recorded, &settings, &belief)?),
+        };
+        if let Some(found) = &mounting {
+            (settings.q_s_b, settings.mounting_sigma_b) = (found.q_s_b, found.sigma_b);
+        }
         let Alignment { start, doubts } = match &self.initial {
-            Some(start) => Alignment { start: start.clone(), doubts: Vec::new() },
+            Some(start) => Alignment { start: beside_mounting(start.clone(), &settings), doubts: Vec::new() },
             None => alignment::coarse(&recorded, &settings, &belief)?,
         };
         observer.remark(&Note::Start(start.clone()));
@@ -104,7 +128,8 @@ impl RecordedDrive {
         doubt_heading(&solution, &settings.outages, observer);
         let constants = belief.groups.iter().flatten().filter(|g| g.is_constant()).count();
         let states = [belief.states, 3 * constants];
-        let summary = FusionSummary::of(&solution, (&outcome, &assessment), &start, self.rate_hz, states);
+        let summary = FusionSummary::of(&solution, (&outcome, &assessment), &start, self.rate_hz, states)
+            .mounted(mounting.as_ref());
         Ok(Fused { solution, outcome, assessment, summary })
     }
 
@@ -120,6 +145,15 @@ impl RecordedDrive {
         remarks.into_iter().for_each(|remark| observer.remark(&Note::Outage(remark)));
         Ok(Settings { outages: windows, ..settings })
     }
+}
+
+/// A start that states the attitude of the vehicle: that of the IMU is known no better than the mounting.
+fn beside_mounting(mut start: Start, settings: &Settings) -> Start {
+    let mounting_deg = (settings.mounting_sigma_b / DEG).to_array();
+    for (sigma, mounting) in start.sigma.att_sigma_deg.iter_mut().zip(mounting_deg) {
+        *sigma = sigma.hypot(mounting).min(30.0).max(*sigma);
+    }
+    start
 }
 
 /// Windows that end before the filter starts withhold nothing: no outages.

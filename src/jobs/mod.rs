@@ -61,7 +61,7 @@ pub use estimator_study::{EstimatorStudy, EstimatorStudyError};
 pub use files::ModelFiles;
 pub(crate) use files::{not_anew, not_of_others, writable};
 pub use fuse::{FusionFilter, FusionFilterError};
-pub use fusion::{FuseError, Fused, RecordedDrive};
+pub use fusion::{FuseError, Fused, Mounted, RecordedDrive};
 pub use navigate::{NavigateError, NavigateInputs, Navigation, Note, TrueImu, navigate};
 pub use reduction::Reduced;
 pub use remarks::{Remark, Remarks, Silence};

@@ -5,6 +5,7 @@ use super::number::{seconds, window};
 use super::page::{Cell, Table, Tone};
 use crate::ekf::InitialSettings;
 use crate::frames::{NavState, RollPitchYaw, wrap_angle};
+use crate::fusion::mounting::Mounting;
 use crate::fusion::{Assessment, Drift, Outcome, Solution, Start, Verdict};
 use crate::metrics::PerState;
 use crate::units::DEG;
@@ -55,6 +56,8 @@ pub(crate) struct FusionSummary {
     filter_states: usize,
     turn_on_states: usize,
     initial: Initial,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mounting: Option<MountingRow>,
     fixes: Fixes,
     nis_per_component: f64,
     outages: Vec<OutageRow>,
@@ -68,6 +71,16 @@ struct Initial {
     state: PerName,
     sigma: InitialSettings,
     how: Vec<String>,
+}
+
+/// A mounting that was found: angles as `--mounting` takes them, standard deviations about front, right, down.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+struct MountingRow {
+    roll_deg: f64,
+    pitch_deg: f64,
+    yaw_deg: f64,
+    sigma_deg: [f64; 3],
+    how: String,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -114,6 +127,17 @@ struct Reference {
     nees_dof: usize,
 }
 
+impl MountingRow {
+    /// As it is given for the next drive.
+    fn line(&self) -> String {
+        let Self { roll_deg, pitch_deg, yaw_deg, sigma_deg: [front, right, down], how } = self;
+        format!(
+            "mounting found: --mounting={roll_deg:.2},{pitch_deg:.2},{yaw_deg:.2} (± {front:.1}°, {right:.1}°, {down:.1}° about \
+             the vehicle's front, right, down), {how}"
+        )
+    }
+}
+
 impl FusionSummary {
     /// The summary of a fusion.
     #[must_use]
@@ -157,11 +181,22 @@ impl FusionSummary {
                 sigma: start.sigma.clone(),
                 how: start.how.clone(),
             },
+            mounting: None,
             fixes: Fixes { used, withheld, rejected },
             nis_per_component: outcome.nis_per_component,
             outages: outcome.outages.iter().map(outage).collect(),
             reference,
         }
+    }
+
+    /// The same with the mounting that was found.
+    #[must_use]
+    pub(crate) fn mounted(self, found: Option<&Mounting>) -> Self {
+        let row = |m: &Mounting| {
+            let [roll_deg, pitch_deg, yaw_deg] = m.angles_deg();
+            MountingRow { roll_deg, pitch_deg, yaw_deg, sigma_deg: m.sigma_deg(), how: m.how.clone() }
+        };
+        Self { mounting: found.map(row), ..self }
     }
 
     /// How the page colours the verdict.
@@ -247,6 +282,7 @@ impl FusionSummary {
         if !self.reasons.is_empty() {
             lines.push(self.figures());
         }
+        lines.extend(self.mounting.iter().map(MountingRow::line));
         for o in &self.outages {
             let of = |name: &str, d: Option<DriftRow>| {
                 d.map(|d| {

@@ -3,6 +3,7 @@
 mod clocks;
 mod doubts;
 mod loggers;
+mod mounting;
 
 use crate::common::drive::{MODEL, done, nav_sim, place_with};
 use std::fs;

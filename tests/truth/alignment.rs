@@ -21,12 +21,12 @@ use std::path::Path;
 
 const DEG: f64 = std::f64::consts::PI / 180.0;
 /// Turn-on biases of a phone: m/s², rad/s.
-const TURN_ON: (f64, f64) = (0.3, 0.01);
+pub(crate) const TURN_ON: (f64, f64) = (0.3, 0.01);
 /// How far the IMU is in front of the axle that does not steer (m).
 const AXLE_M: f64 = 1.3;
 
 /// Seconds, acceleration along the vehicle (m/s², negative brakes or gathers way backwards), curvature (1/m).
-type Step = (f64, f64, f64);
+pub(crate) type Step = (f64, f64, f64);
 
 const DRIVES: [(&str, &[Step]); 8] = [
     (
@@ -113,7 +113,7 @@ const DRIVES: [(&str, &[Step]); 8] = [
 ];
 
 /// A vehicle that follows steps of acceleration and curvature, each reached within half a second.
-fn trajectory(steps: &[Step]) -> Trajectory {
+pub(crate) fn trajectory(steps: &[Step]) -> Trajectory {
     const DT_S: f64 = 0.01;
     let (lat, lon, h) = (46.5 * DEG, 6.5 * DEG, 400.0);
     let r = radii(lat.sin());
@@ -146,21 +146,22 @@ fn trajectory(steps: &[Step]) -> Trajectory {
 }
 
 /// `examples/phone.toml`.
-fn phone() -> Model {
+pub(crate) fn phone() -> Model {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/phone.toml");
     model_file::read(&path).unwrap().model
 }
 
-fn belief() -> Belief {
+pub(crate) fn belief() -> Belief {
     let mut belief = Belief::new(&phone(), FilterStates::Reduced15, 1.0, 800.0).unwrap();
     belief.add_constant(Sensor::Accel, TURN_ON.0);
     belief.add_constant(Sensor::Gyro, TURN_ON.1);
     belief
 }
 
-fn settings() -> Settings {
+pub(crate) fn settings() -> Settings {
     Settings {
         q_s_b: DQuat::IDENTITY,
+        mounting_sigma_b: DVec3::ZERO,
         lever_arm_b: DVec3::ZERO,
         gravity: GravityModel::default(),
         outages: Vec::new(),
@@ -170,7 +171,7 @@ fn settings() -> Settings {
 }
 
 /// Records a drive with a receiver of this velocity sigma (m/s), or of positions alone, and hands each run on.
-fn recorded(
+pub(crate) fn recorded(
     trajectory: &Trajectory,
     velocity: Option<f64>,
     runs: u64,

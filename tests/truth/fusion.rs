@@ -34,6 +34,7 @@ fn shipped(name: &str) -> Trajectory {
 fn settings() -> Settings {
     Settings {
         q_s_b: DQuat::IDENTITY,
+        mounting_sigma_b: DVec3::ZERO,
         lever_arm_b: DVec3::ZERO,
         gravity: GravityModel::default(),
         outages: Vec::new(),

@@ -28,6 +28,7 @@ mod imu_unknowns;
 mod lincov;
 mod lincov_sampled;
 mod long_records;
+mod mounting;
 mod reduction;
 mod require;
 mod trajectories;

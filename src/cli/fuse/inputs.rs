@@ -6,7 +6,7 @@ use crate::ekf::{FilterStates, InitialSettings};
 use crate::formats::fusion_files::{FixSigma, read_gnss, read_imu, read_initial};
 use crate::formats::model_file::ModelFile;
 use crate::frames::RollPitchYaw;
-use crate::jobs::RecordedDrive;
+use crate::jobs::{Mounted, RecordedDrive};
 use crate::report::Input;
 use crate::units::DEG;
 use glam::{DMat3, DQuat, DVec3};
@@ -48,7 +48,14 @@ impl Inputs {
         turn_on::expect(&mut expected, &model, &args.model, session);
         expected.validate().map_err(Failure::input)?;
         let reference = args.reference.as_deref().map(|path| read::reference(path, session)).transpose()?;
-        let mut drive = RecordedDrive { imu: imu.samples, rate_hz: imu.rate_hz, gnss, initial, reference };
+        let mut drive = RecordedDrive {
+            imu: imu.samples,
+            rate_hz: imu.rate_hz,
+            gnss,
+            mounted: args.mounting.map_or_else(Mounted::default, MountingArg::mounted),
+            initial,
+            reference,
+        };
         if let Some(parse::Pair([position, velocity])) = args.gnss_sigma_factor {
             drive.scale_sigma(position, velocity);
         }
@@ -101,11 +108,41 @@ pub(super) fn parse_sigma(text: &str) -> Result<FixSigma, String> {
     Ok(FixSigma { pos_m, vel_m_s })
 }
 
+/// How the IMU sits in the vehicle, as the user says.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum MountingArg {
+    /// Found from the drive.
+    Auto,
+    /// Roll, pitch, yaw (degrees).
+    Angles(parse::Triple),
+}
+
+impl MountingArg {
+    fn mounted(self) -> Mounted {
+        match self {
+            Self::Auto => Mounted::AsFound,
+            Self::Angles(_) => Mounted::AsGiven,
+        }
+    }
+}
+
+/// `auto` or `ROLL,PITCH,YAW` in degrees.
+pub(super) fn parse_mounting(text: &str) -> Result<MountingArg, String> {
+    if text == "auto" {
+        return Ok(MountingArg::Auto);
+    }
+    let angles = parse::triple(text).map(MountingArg::Angles);
+    angles.map_err(|_| "expected roll, pitch, yaw in degrees, such as -9.5,-60.8,-166.8, or auto".into())
+}
+
 /// The IMU in the vehicle: its axes named as the logger names them, turned by the mounting.
-pub(super) fn mounting(axes: LoggerAxes, angles_deg: Option<parse::Triple>) -> DQuat {
-    let frd = angles_deg.map_or(DQuat::IDENTITY, |parse::Triple([roll, pitch, yaw])| {
-        RollPitchYaw { roll: roll * DEG, pitch: pitch * DEG, yaw: yaw * DEG }.to_quat()
-    });
+pub(super) fn mounting(axes: LoggerAxes, angles: Option<MountingArg>) -> DQuat {
+    let frd = match angles {
+        Some(MountingArg::Angles(parse::Triple([roll, pitch, yaw]))) => {
+            RollPitchYaw { roll: roll * DEG, pitch: pitch * DEG, yaw: yaw * DEG }.to_quat()
+        }
+        Some(MountingArg::Auto) | None => DQuat::IDENTITY,
+    };
     frd * axes.to_frd()
 }
 

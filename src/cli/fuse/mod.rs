@@ -25,6 +25,9 @@ const ADVICE: &str = "are the IMU's axes front, right, down (if not: --axes, --m
 /// The same where the fixes agree with the solution and the reference does not.
 const LASTING: &str = "the filter takes the errors of the fixes as white: where they last, give larger standard deviations \
                        (--gnss-sigma-factor); is the reference's attitude that of the vehicle (if not: --mounting)?";
+/// What helps where a drive does not show the mounting.
+const UNMOUNTED: &str = "give --mounting ROLL,PITCH,YAW; or record some minutes of driving forwards with braking, \
+                         accelerating and turns on both sides, with velocities in the GNSS file; an IMU that was never calibrated needs --turn-on-bias";
 /// A distance from the reference that no filter makes: another place, or another time (m).
 const ELSEWHERE_M: f64 = 10_000.0;
 
@@ -60,9 +63,10 @@ pub(crate) struct Args {
     /// GNSS antenna from the IMU: front, right, down (m)
     #[arg(long, value_name = "X,Y,Z", value_parser = parse::triple, allow_hyphen_values = true)]
     lever_arm: Option<parse::Triple>,
-    /// Attitude of the IMU in the vehicle, where its axes are not front, right, down (degrees)
-    #[arg(long, value_name = "ROLL,PITCH,YAW", value_parser = parse::triple, allow_hyphen_values = true)]
-    mounting: Option<parse::Triple>,
+    /// Attitude of the IMU in the vehicle, where its axes are not front, right, down (degrees); auto: found from the drive
+    /// of a road vehicle
+    #[arg(long, value_name = "ROLL,PITCH,YAW|auto", value_parser = inputs::parse_mounting, allow_hyphen_values = true)]
+    mounting: Option<inputs::MountingArg>,
     /// What the logger calls x, y, z; the mounting turns what is front, right, down then
     #[arg(long, value_name = "AXES", value_enum, default_value = "frd")]
     axes: inputs::LoggerAxes,
@@ -125,6 +129,7 @@ fn impossible(e: FuseError, args: &Args) -> Failure {
         FuseError::Alignment(e) => Failure::input(format!("{}: {e}", args.gnss.display())).hint(
             "give the start with --initial FILE (t_s, lat_deg, lon_deg, h_m, roll_deg, pitch_deg, yaw_deg)",
         ),
+        FuseError::Mounting(e) => Failure::input(&e).hint(UNMOUNTED),
         FuseError::NothingInCommon => Failure::input(e).hint("both need one clock"),
     }
 }
@@ -150,6 +155,7 @@ fn settings(args: &Args) -> Result<Settings, Failure> {
     }
     Ok(Settings {
         q_s_b: inputs::mounting(args.axes, args.mounting),
+        mounting_sigma_b: glam::DVec3::ZERO,
         lever_arm_b,
         gravity: args.gravity,
         outages: windows_of(&args.outages)?,

@@ -4,7 +4,7 @@
 //! is the rate of the course. The lag at which the two agree best is the difference of the clocks.
 
 use super::Recorded;
-use super::alignment::course::{Moving, courses};
+use super::alignment::course::{Moving, courses, steps};
 use crate::frames::wrap_angle;
 use crate::imu::ImuIncrement;
 use glam::DVec3;
@@ -86,17 +86,8 @@ pub(crate) fn clocks_apart(recorded: &Recorded<'_>) -> Option<ClocksApart> {
 /// The turns between fixes that move fast enough for a course, one after the other.
 fn turns(recorded: &Recorded<'_>) -> Vec<Turn> {
     let courses = courses(recorded.gnss, recorded.imu);
-    let when = |m: &Moving| m.fix.t_s - m.lag_s;
-    let mut all = Vec::new();
-    let mut first = 0;
-    while let Some(from) = courses.get(first) {
-        let later = courses[first..].partition_point(|m| when(m) < when(from) + APART_S.0);
-        // twice at the same time, by files that a clock sets back
-        let next = first + later.max(1);
-        let Some(to) = courses.get(next) else { break };
-        all.extend(turn((from, when(from)), (to, when(to))));
-        first = next;
-    }
+    let all: Vec<Turn> =
+        steps(&courses, APART_S.0).into_iter().filter_map(|[from, to]| turn(from, to)).collect();
     let every = all.len().div_ceil(MOST).max(1);
     all.into_iter().step_by(every).collect()
 }

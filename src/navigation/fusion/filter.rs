@@ -13,7 +13,7 @@ use crate::linalg::to_nalgebra;
 use crate::strapdown::Strapdown;
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, Matrix3, SVector};
 
 /// Longest step through a gap (s): the filter is linear within one.
 const BRIDGE_STEP_S: f64 = 0.1;
@@ -22,6 +22,7 @@ const BRIDGE_STEP_S: f64 = 0.1;
 pub(super) struct Filter {
     ekf: Ekf,
     q_s_b: DQuat,
+    mounting_sigma_b: DVec3,
     lever_arm_s: DVec3,
 }
 
@@ -34,6 +35,7 @@ impl Filter {
             // roll, pitch and yaw are those of the vehicle: their deviations go to n at its attitude
             ekf: Ekf::new(nominal, belief, &start.state, &start.sigma),
             q_s_b,
+            mounting_sigma_b: settings.mounting_sigma_b,
             lever_arm_s: q_s_b.inverse() * settings.lever_arm_b,
         }
     }
@@ -110,12 +112,18 @@ impl Filter {
         NavState { q_b_n: (of_imu.q_b_n * self.q_s_b.inverse()).normalize(), ..of_imu }
     }
 
+    /// What the mounting adds to the covariance of the vehicle's attitude error in n (rad²).
+    fn of_mounting(&self, q_b_n: DQuat) -> Matrix3<f64> {
+        let axes = DVec3::AXES.map(|axis| to_nalgebra(q_b_n * (axis * self.mounting_sigma_b)));
+        axes.iter().map(|axis| axis * axis.transpose()).sum()
+    }
+
     pub(super) fn row(&mut self, t_s: f64) -> Row {
         settle(&mut self.ekf);
         let (state, p) = (self.state(), &self.ekf.p);
         let (r, v) = (p.variances(R).lane(0), p.variances(V).lane(0));
         let full = p.lane(0);
-        let psi = full.fixed_view::<3, 3>(3 * PSI, 3 * PSI);
+        let psi = full.fixed_view::<3, 3>(3 * PSI, 3 * PSI) + self.of_mounting(state.q_b_n);
         let jacobian = RollPitchYaw::from_quat(state.q_b_n).jacobian_of_psi_n().map(to_nalgebra);
         let angle = |i: usize| (jacobian[i].transpose() * psi * jacobian[i])[0].sqrt() / DEG;
         let sigma = [r.x.sqrt(), r.y.sqrt(), r.z.sqrt(), v.x.sqrt(), v.y.sqrt(), v.z.sqrt()];
@@ -134,9 +142,11 @@ impl Filter {
         let q = estimate.q_b_n * truth.q_b_n.inverse();
         let psi_n = (if q.w < 0.0 { -q } else { q }).to_scaled_axis();
         let angles = RollPitchYaw::from_quat(truth.q_b_n).jacobian_of_psi_n().map(|row| row.dot(psi_n) / DEG);
-        let states = std::array::from_fn(|i| i);
-        let x: Vec<f64> = [r, v, psi_n].iter().flat_map(|part| part.to_array()).collect();
-        let nees = self.ekf.p.normalised_square::<9>(states, std::array::from_fn(|i| Lanes::splat(x[i])))[0];
+        let x = SVector::<f64, 9>::from_iterator([r, v, psi_n].iter().flat_map(DVec3::to_array));
+        let mut p = self.ekf.p.lane(0).fixed_view::<9, 9>(0, 0).into_owned();
+        let mut psi = p.fixed_view_mut::<3, 3>(3 * PSI, 3 * PSI);
+        psi += self.of_mounting(truth.q_b_n);
+        let nees = p.cholesky().map_or(f64::NAN, |c| x.dot(&c.solve(&x)));
         let all = [r.to_array(), v.to_array(), angles].concat();
         RowError { values: std::array::from_fn(|i| all[i]), nees }
     }

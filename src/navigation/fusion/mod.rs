@@ -9,6 +9,7 @@ mod assessment;
 mod clocks;
 mod filter;
 pub mod gap;
+pub mod mounting;
 mod outcome;
 
 use assessment::nis_bound;
@@ -46,6 +47,8 @@ pub struct Recorded<'a> {
 pub struct Settings {
     /// The IMU in the vehicle: takes the IMU's axes, returns front, right, down.
     pub q_s_b: DQuat,
+    /// How well that is known about the vehicle's front, right and down axes (rad): 0 as given.
+    pub mounting_sigma_b: DVec3,
     /// Antenna from IMU: front, right, down (m).
     pub lever_arm_b: DVec3,
     /// Gravity.

@@ -21,8 +21,8 @@ const ACCELERATION: f64 = 2.0;
 #[derive(Debug, Clone, Copy)]
 pub(in crate::fusion) struct Moving {
     pub(in crate::fusion) fix: GnssFix,
-    pub(super) v_n: DVec3,
-    pub(super) sigma_n: DVec3,
+    pub(in crate::fusion) v_n: DVec3,
+    pub(in crate::fusion) sigma_n: DVec3,
     /// Half the time between the two positions it comes from: it is as old as that (s); 0 as measured.
     pub(in crate::fusion) lag_s: f64,
 }
@@ -32,7 +32,7 @@ impl Moving {
         self.v_n.truncate().length()
     }
 
-    pub(super) fn sigma(&self) -> f64 {
+    pub(in crate::fusion) fn sigma(&self) -> f64 {
         self.sigma_n.truncate().max_element()
     }
 
@@ -73,6 +73,22 @@ pub(in crate::fusion) fn courses(gnss: &[GnssFix], imu: &[ImuIncrement]) -> Vec<
         }
     };
     gnss.iter().enumerate().filter_map(velocity).filter(inside).collect()
+}
+
+/// Fixes one after the other that are at least `apart_s` apart, with when their velocities were (s).
+pub(in crate::fusion) fn steps(courses: &[Moving], apart_s: f64) -> Vec<[(&Moving, f64); 2]> {
+    let when = |m: &Moving| m.fix.t_s - m.lag_s;
+    let mut all = Vec::new();
+    let mut first = 0;
+    while let Some(from) = courses.get(first) {
+        let later = courses[first..].partition_point(|m| when(m) < when(from) + apart_s);
+        // twice at the same time, by files that a clock sets back
+        let next = first + later.max(1);
+        let Some(to) = courses.get(next) else { break };
+        all.push([(from, when(from)), (to, when(to))]);
+        first = next;
+    }
+    all
 }
 
 /// The first fix from `from_s` on whose course is a heading. One fix alone may be an outlier, and among

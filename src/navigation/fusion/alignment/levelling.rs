@@ -2,7 +2,7 @@
 //! and the change of the GNSS velocity.
 
 use super::course::Moving;
-use super::{BiasSigma, between};
+use super::{BiasSigma, between, carried};
 use crate::earth::radii;
 use crate::frames::{RollPitchYaw, wrap_angle};
 use crate::fusion::{Recorded, Settings};
@@ -148,12 +148,7 @@ impl Scene<'_> {
         if samples.is_empty() || seconds > MAX_AGE_S / 2.0 {
             return None;
         }
-        let (mut q, mut dv) = (DQuat::IDENTITY, DVec3::ZERO); // from the body now to the body at the start
-        for s in samples {
-            let half = DQuat::from_scaled_axis(self.settings.q_s_b * s.dtheta * 0.5);
-            dv += q * half * (self.settings.q_s_b * s.dv);
-            q = (q * half * half).normalize();
-        }
+        let dv = self.settings.q_s_b * carried(samples).1;
         let a_n = (to.v_n - from.v_n) / seconds;
         let (roll, pitch) = level(dv / seconds, DQuat::from_rotation_z(-heading) * (a_n - DVec3::Z * self.g));
         let velocities = from.sigma().hypot(to.sigma()) / (seconds * self.g);

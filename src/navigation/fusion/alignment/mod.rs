@@ -19,6 +19,7 @@ use crate::gnss::GnssFix;
 use crate::imu::{ImuIncrement, Sensor};
 use crate::units::DEG;
 use course::{Moving, courses, first_fast, nearest_to_fast};
+use glam::{DQuat, DVec3};
 use levelling::{Level, Scene};
 use std::f64::consts::PI;
 
@@ -176,7 +177,8 @@ fn candidates(
     let bias = BiasSigma { accel: sigma(Sensor::Accel), gyro: sigma(Sensor::Gyro) };
     let g = gravity_down(settings.gravity, moving.fix.lat.sin(), moving.fix.h);
     let scene = Scene { recorded: *recorded, settings, bias, g };
-    let heading_sigma = moving.heading_sigma(recorded.imu);
+    // the course is the heading of the vehicle; how the IMU sits in it is not better known than the mounting
+    let heading_sigma = moving.heading_sigma(recorded.imu).hypot(settings.mounting_sigma_b.z);
     let in_motion = |heading| scene.in_motion(&courses[at..], heading, heading_sigma);
     let forwards = moving.course();
     let backwards = wrap_angle(forwards + PI);
@@ -233,8 +235,20 @@ fn start(
 }
 
 /// Samples whose interval ends in (from, to].
-fn between(imu: &[ImuIncrement], from: f64, to: f64) -> &[ImuIncrement] {
+pub(in crate::fusion) fn between(imu: &[ImuIncrement], from: f64, to: f64) -> &[ImuIncrement] {
     let first = imu.partition_point(|s| s.t_s <= from + 1e-9);
     let end = imu.partition_point(|s| s.t_s <= to + 1e-9);
     &imu[first..end.max(first)]
+}
+
+/// How far the IMU turns through the samples, from its axes then to those at the start, and the velocity that the
+/// specific force makes, in the axes at the start (m/s).
+pub(in crate::fusion) fn carried(samples: &[ImuIncrement]) -> (DQuat, DVec3) {
+    let (mut q, mut dv) = (DQuat::IDENTITY, DVec3::ZERO);
+    for s in samples {
+        let half = DQuat::from_scaled_axis(s.dtheta * 0.5);
+        dv += q * half * s.dv;
+        q = (q * half * half).normalize();
+    }
+    (q, dv)
 }

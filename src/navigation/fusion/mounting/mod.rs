@@ -1,0 +1,130 @@
+//! How the IMU sits in a road vehicle, found from the drive itself.
+//!
+//! The vehicle is taken to move along its x axis, forwards for the most part, without slip and without bank on
+//! average. First the specific force is compared with what the change of the GNSS velocity says it is along the track
+//! ([`track`]): gravity gives roll and pitch, accelerations and turns the yaw. Then the filter of the fusion
+//! carries the attitude of the IMU through the whole drive, its biases estimated, and the mounting is the mean
+//! rotation from it to the track ([`refined`]).
+
+mod blocks;
+mod refined;
+mod track;
+
+use super::alignment::AlignmentError;
+use super::{FusionError, Recorded, Settings};
+use crate::ekf::Belief;
+use crate::frames::RollPitchYaw;
+use crate::gnss::GnssFix;
+use crate::units::DEG;
+use glam::{DQuat, DVec3};
+
+/// Largest standard deviation of an angle that is still an answer (rad).
+const DETERMINED: f64 = 5.0 * DEG;
+
+/// A mounting that was found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mounting {
+    /// Takes the IMU's axes, returns front, right, down.
+    pub q_s_b: DQuat,
+    /// The same angles beside the axes that the search began with: what a user gives for the next drive.
+    pub angles: RollPitchYaw,
+    /// Standard deviations about the vehicle's front, right and down axes (rad).
+    pub sigma_b: DVec3,
+    /// What it rests on.
+    pub how: String,
+}
+
+impl Mounting {
+    /// Roll, pitch and yaw in degrees.
+    #[must_use]
+    pub fn angles_deg(&self) -> [f64; 3] {
+        [self.angles.roll, self.angles.pitch, self.angles.yaw].map(|a| a / DEG)
+    }
+
+    /// Standard deviations about front, right and down in degrees.
+    #[must_use]
+    pub fn sigma_deg(&self) -> [f64; 3] {
+        (self.sigma_b / DEG).to_array()
+    }
+}
+
+/// Why a drive does not show the mounting.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MountingError {
+    /// Hardly any of it is fast enough to have a course.
+    #[error(
+        "the mounting is not found: {seconds:.0} s of the drive have a course (3 m/s or more and five standard deviations of \
+         the velocity), fewer than {needed:.0} s"
+    )]
+    TooSlow {
+        /// Time with a course (s).
+        seconds: f64,
+        /// How much is needed (s).
+        needed: f64,
+    },
+    /// It neither accelerates nor turns enough.
+    #[error(
+        "the mounting is not found: accelerations and turns of the GNSS velocity show the IMU's yaw in the vehicle to \
+         ±{sigma_deg:.0}° only (±{limit_deg:.0}° are needed)"
+    )]
+    NoAccelerations {
+        /// Standard deviation of the yaw (degrees).
+        sigma_deg: f64,
+        /// Largest that is still used (degrees).
+        limit_deg: f64,
+    },
+    /// It goes as much backwards as forwards.
+    #[error(
+        "the mounting is not found: {:.0} % of the way goes against the direction of the rest: forwards and backwards are not \
+         told apart", 100.0 * .share
+    )]
+    Directions {
+        /// Share of the lesser direction.
+        share: f64,
+    },
+    /// The angles scatter too much.
+    #[error(
+        "the mounting is not found: the drive shows the IMU's {axis} in the vehicle to ±{sigma_deg:.1}° only (±{:.0}° is the \
+         most that is taken)", DETERMINED / DEG
+    )]
+    NotDetermined {
+        /// `roll`, `pitch` or `yaw`.
+        axis: &'static str,
+        /// Its standard deviation (degrees).
+        sigma_deg: f64,
+    },
+    /// The fixes contradict the filter that carries the attitude.
+    #[error("the mounting is not found: the filter that carries the attitude is not to be believed: {0}")]
+    Contradicted(String),
+    /// The filter found no start with what was found so far.
+    #[error("the mounting is not found: {0}")]
+    Alignment(#[from] AlignmentError),
+    /// The filter failed with what was found so far.
+    #[error("the mounting is not found: {0}")]
+    Fusion(#[from] FusionError),
+}
+
+/// Finds the mounting. The rotation of the settings is where the axes' names come from; fixes that are withheld are
+/// not looked at.
+///
+/// # Errors
+/// When the drive does not show it.
+pub fn find(
+    recorded: &Recorded<'_>,
+    settings: &Settings,
+    belief: &Belief,
+) -> Result<Mounting, MountingError> {
+    let withheld = |f: &GnssFix| settings.outages.iter().any(|o| o.withholds(f.t_s));
+    let gnss: Vec<GnssFix> = recorded.gnss.iter().filter(|f| !withheld(f)).copied().collect();
+    let recorded = Recorded { gnss: &gnss, ..*recorded };
+    let rough = track::along(&recorded, settings)?;
+    let fine = refined::through(&recorded, settings, belief, &rough)?;
+    let named = ["roll", "pitch", "yaw"].into_iter().zip(fine.sigma_b.to_array());
+    // NaN is not determined either
+    let worst = named.into_iter().find(|(_, sigma)| sigma.is_nan() || *sigma > DETERMINED);
+    if let Some((axis, sigma)) = worst {
+        return Err(MountingError::NotDetermined { axis, sigma_deg: sigma / DEG });
+    }
+    let angles = RollPitchYaw::from_quat(fine.q_s_b * settings.q_s_b.inverse());
+    Ok(Mounting { q_s_b: fine.q_s_b, angles, sigma_b: fine.sigma_b, how: fine.how })
+}
