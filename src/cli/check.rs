@@ -150,7 +150,7 @@ fn model(path: &Path, session: &Session) -> Result<String, Failure> {
 }
 
 fn gnss(path: &Path, session: &Session) -> Result<String, Failure> {
-    let (fixes, remarks) = read_gnss(path, None).map_err(read::refused_for_fusion)?;
+    let (fixes, remarks) = read_gnss(path, None, None).map_err(read::refused_for_fusion)?;
     remarks.iter().for_each(|remark| session.printer.warn(remark));
     let span = fixes.first().zip(fixes.last()).map_or(0.0, |(a, b)| b.t_s - a.t_s);
     let velocity = if fixes.iter().any(|f| f.velocity.is_some()) { " with velocity" } else { "" };

@@ -1,6 +1,6 @@
 //! What kind of file a path holds, by its ending and its contents.
 
-use super::fusion_files::bare_row;
+use super::fusion_files::{bare_row, is_nmea};
 use super::{FileError, source};
 use flate2::read::GzDecoder;
 use std::io::Read;
@@ -129,6 +129,8 @@ fn table_kind(text: &str) -> FileKind {
     };
     if let Some(kind) = bare_kind(text) {
         kind
+    } else if is_nmea(text) {
+        FileKind::Gnss
     } else if text.trim_start_matches('\u{feff}').trim_start().starts_with("ini lat") {
         FileKind::Trajectory
     } else if text.lines().take(20).any(|line| line.contains("tau_samples")) {
@@ -161,6 +163,7 @@ mod tests {
         assert_eq!(of_toml("[gyro.AR1_1]\nphi = { fix = 0.98 }"), FileKind::Parameters);
         assert_eq!(of_toml("[WN]\nsigma2 = { lower = 0.1 }"), FileKind::Parameters);
         assert_eq!(of_toml("[[accel]]\noperation = 'ar1'"), FileKind::Contamination);
+        assert_eq!(table_kind("$GPGGA,123519,4807.038,N,01131.000,E,1"), FileKind::Gnss);
         assert_eq!(table_kind("tau_samples,wv,edof"), FileKind::Curve);
         assert_eq!(of_toml("t_s = 0\nlat_deg = 46\nyaw_deg = 3"), FileKind::Initial);
         assert_eq!(table_kind("t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m"), FileKind::Gnss);

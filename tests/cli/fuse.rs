@@ -4,6 +4,7 @@ mod clocks;
 mod doubts;
 mod loggers;
 mod mounting;
+mod nmea;
 
 use crate::common::drive::{MODEL, done, nav_sim, place_with};
 use std::fs;

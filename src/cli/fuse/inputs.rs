@@ -32,8 +32,9 @@ impl Inputs {
         named.extend(args.reference.iter().map(|p| ("reference", p)));
         let files = named.iter().map(|(role, path)| read::input(role, path)).collect::<Result<_, _>>()?;
         let imu = read_imu(&args.imu).map_err(read::refused_for_fusion)?;
+        let ends_s = imu.samples.first().zip(imu.samples.last()).map(|(first, last)| (first.t_s, last.t_s));
         let (gnss, remarks) =
-            read_gnss(&args.gnss, args.gnss_sigma.as_ref()).map_err(read::refused_for_fusion)?;
+            read_gnss(&args.gnss, args.gnss_sigma.as_ref(), ends_s).map_err(read::refused_for_fusion)?;
         imu.remarks.iter().chain(&remarks).for_each(|r| session.printer.warn(r));
         let initial = given.map(|path| read_initial(path)).transpose()?;
         let model = read::model(&args.model, session)?;

@@ -36,7 +36,7 @@ const ELSEWHERE_M: f64 = 10_000.0;
 /// IMU: rates (t_s, gyro_x_rad_s … accel_z_m_s2; other units and loggers' names as for `wv`) or increments
 /// (dtheta_x_rad … dv_z_m_s, time = end of the interval). GNSS: t_s, lat_deg, lon_deg, h_m, sd_n_m, sd_e_m,
 /// sd_d_m, and v_n_m_s … sd_vd_m_s where velocity is measured. Or both as the text files of KF-GINS: 7 or 8
-/// columns of increments; 7 of position, 13 with velocity; GNSS also as a solution of RTKLIB (.pos, GPST). Up to 5 s without samples are bridged, as uncertain
+/// columns of increments; 7 of position, 13 with velocity; GNSS also as a solution of RTKLIB (.pos, GPST) or as NMEA sentences (GGA; RMC or VTG, GST), in seconds of the day or Unix time as the IMU. Up to 5 s without samples are bridged, as uncertain
 /// as the recording is over such times elsewhere. Writes solution.csv, innovations.csv, errors.csv (with a
 /// reference), solution.kml, summary.json, report.html, manifest.json.
 #[derive(clap::Args, Debug)]
@@ -51,7 +51,7 @@ pub(crate) struct Args {
     /// IMU recording (.csv, .tsv, .txt, .npy, also .gz)
     #[arg(value_name = "IMU")]
     imu: PathBuf,
-    /// GNSS fixes (.csv, .txt, .pos, also .gz)
+    /// GNSS fixes (.csv, .txt, .pos, .nmea, also .gz)
     #[arg(value_name = "GNSS")]
     gnss: PathBuf,
     /// Noise model that the filter believes

@@ -1,5 +1,6 @@
 //! Recorded GNSS fixes.
 
+use super::nmea::{self, is_nmea};
 use super::rtklib::{self, is_rtklib};
 use super::{bare_columns, table, time_back};
 use crate::earth::{MAX_LATITUDE, geodetic_to_ecef};
@@ -49,7 +50,7 @@ const KF_GINS: &str = "a KF-GINS text has 7 columns (t_s, latitude, longitude, h
 /// What the columns are called.
 pub(super) const COLUMNS: &str = "a GNSS file has the columns t_s, lat_deg, lon_deg, h_m, sd_n_m, sd_e_m, sd_d_m and may \
                                   have v_n_m_s, v_e_m_s, v_d_m_s, sd_vn_m_s, sd_ve_m_s, sd_vd_m_s; or it is a KF-GINS \
-                                  text of 7 columns, or of 13 with velocity, or a solution of RTKLIB";
+                                  text of 7 columns, or of 13 with velocity, or a solution of RTKLIB, or NMEA sentences";
 
 /// Standard deviations of fixes whose file states none: north, east, down.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -212,38 +213,49 @@ impl Columns {
 /// A file of fixes that is not read, told by its first characters.
 fn of_another_kind(path: &str, text: &str) -> Option<Error> {
     let text = text.trim_start_matches('\u{feff}').trim_start();
-    let (message, advice) = if text.starts_with("$G") || text.starts_with("$B") {
-        (
-            "NMEA sentences, which state no standard deviations of the position north, east and down",
-            "convert the receiver's raw log to an RTKLIB solution (.pos), which is read; or write the GGA sentences as a table t_s, \
-             lat_deg, lon_deg, h_m in degrees, and give the standard deviations with --gnss-sigma",
-        )
-    } else if text.starts_with('<') {
-        (
-            "XML, as GPX and KML are, not a table of fixes",
+    let error = || {
+        Error::contents(path, 1_u64, "XML, as GPX and KML are, not a table of fixes").advice(
             "write its points as a table t_s, lat_deg, lon_deg, h_m on the clock of the IMU, and give their standard deviations \
              with --gnss-sigma",
         )
-    } else {
-        return None;
     };
-    Some(Error::contents(path, 1_u64, message).advice(advice))
+    text.starts_with('<').then(error)
 }
 
 /// Reads fixes: a table with a header, or the text of KF-GINS (time, latitude, longitude (deg), height (m),
 /// standard deviations north, east, down (m); or with velocity behind the height and its deviations behind
-/// those). `unsaid` are the standard deviations where the file states none. Also what is doubtful about it.
+/// those), a solution of RTKLIB, NMEA sentences. `unsaid` are the standard deviations where the file states none, `clock_s` when
+/// the IMU begins and ends, where there is one. Also what is doubtful about it.
 ///
 /// # Errors
 /// Whatever is wrong with it, with its line.
 pub(crate) fn read_gnss(
     path: &Path,
     unsaid: Option<&FixSigma>,
+    clock_s: Option<(f64, f64)>,
 ) -> Result<(Vec<GnssFix>, Vec<String>), Error> {
-    let mut text = text(path)?;
-    if let Some(error) = of_another_kind(&path.display().to_string(), &text) {
+    let shown = path.display().to_string();
+    let text = text(path)?;
+    if let Some(error) = of_another_kind(&shown, &text) {
         return Err(error);
     }
+    let (fixes, remarks) = if is_nmea(&text) {
+        nmea::fixes(&shown, &text, unsaid, clock_s)?
+    } else {
+        of_table(path, text, unsaid)?
+    };
+    for pair in fixes.windows(2) {
+        check_step(&shown, pair[1].0, &pair[0].1, &pair[1].1)?;
+    }
+    let fixes = fixes.into_iter().map(|(_, fix)| fix).collect();
+    Ok((fixes, remarks.into_iter().map(|r| format!("{shown}: {r}")).collect()))
+}
+
+/// Fixes with their lines, and remarks.
+pub(super) type Fixes = (Vec<(u64, GnssFix)>, Vec<String>);
+
+/// The fixes of a table, of KF-GINS or of RTKLIB.
+fn of_table(path: &Path, mut text: String, unsaid: Option<&FixSigma>) -> Result<Fixes, Error> {
     let mut remarks = Vec::new();
     let is_rtklib = is_rtklib(&text);
     if is_rtklib {
@@ -259,22 +271,18 @@ pub(crate) fn read_gnss(
         remarks.push(format!("no header: read as KF-GINS text, position{velocity} and standard deviations"));
     }
     remarks.extend(columns.remarks(&ignored));
-    let mut fixes: Vec<GnssFix> = Vec::with_capacity(table.rows.len());
+    let mut fixes = Vec::with_capacity(table.rows.len());
     for (line, row) in &table.rows {
         check_values(&table, &columns, *line, row)?;
-        let fix = fix(&columns, row, unsaid);
-        if let Some(before) = fixes.last() {
-            check_step(&table.path, *line, before, &fix)?;
-        }
-        fixes.push(fix);
+        fixes.push((*line, fix(&columns, row, unsaid)));
     }
-    let small = |f: &GnssFix| f.lat.abs() <= 0.5 * PI * DEG && f.lon.abs() <= 2.0 * PI * DEG;
+    let small = |(_, f): &(u64, GnssFix)| f.lat.abs() <= 0.5 * PI * DEG && f.lon.abs() <= 2.0 * PI * DEG;
     if fixes.iter().all(small) {
         remarks.push(
             "latitude and longitude never exceed π: radians? Then name the columns lat_rad, lon_rad".into(),
         );
     }
-    Ok((fixes, remarks.into_iter().map(|r| format!("{}: {r}", table.path)).collect()))
+    Ok((fixes, remarks))
 }
 
 /// The columns of a KF-GINS text, which has no header.
@@ -361,7 +369,7 @@ mod tests {
         let path = dir.path().join("gnss.csv");
         let text = "t_s,lat_deg,lon_deg,h_m,sd_n_m,sd_e_m,sd_d_m,altitude\n0,46,7,400,1,1,2,450\n";
         std::fs::write(&path, text).unwrap();
-        let e = read_gnss(&path, None).unwrap_err();
+        let e = read_gnss(&path, None, None).unwrap_err();
         assert!(e.to_string().ends_with("line 1: columns \"h_m\" and \"altitude\" both give h_m"), "{e}");
         assert_eq!(e.hint().unwrap(), "remove one of them");
     }

@@ -1,14 +1,16 @@
 //! What `fuse` reads: recorded IMU data, GNSS fixes, an initial state. Our own tables, the headers that
-//! recordings may have, the text files of KF-GINS, the solutions of RTKLIB.
+//! recordings may have, the text files of KF-GINS, the solutions of RTKLIB, the sentences of NMEA 0183.
 
 mod fixes;
 mod inertial;
 mod initial;
+mod nmea;
 mod rtklib;
 
 pub(crate) use fixes::{FixSigma, read_gnss};
 pub(crate) use inertial::read_imu;
 pub(crate) use initial::{initial_schema, read_initial};
+pub(in crate::formats) use nmea::is_nmea;
 
 use crate::formats::trajectory_file::table::{self, Numbers, Table};
 use crate::formats::{FileError, Kind};

@@ -88,7 +88,14 @@ fn files_of_other_kinds_are_named() {
     };
     refused("rec/gnss.csv", four, "", &["sd_n_m, sd_e_m, sd_d_m are missing", "hint: ", "--gnss-sigma"]);
     let nmea = |_: &str| "$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\n".repeat(3);
-    refused("rec/gnss.csv", nmea, "", &["gnss.csv, line 1: NMEA sentences", "--gnss-sigma", "RTKLIB"]);
+    refused(
+        "rec/gnss.csv",
+        nmea,
+        "",
+        &["gnss.csv, line 1: a fix without standard deviations", "--gnss-sigma"],
+    );
+    let nmea = |_: &str| "$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*48\n".repeat(3);
+    refused("rec/gnss.csv", nmea, "", &["gnss.csv, line 2: a sentence whose checksum is wrong"]);
     let gpx = |_: &str| "<?xml version=\"1.0\"?>\n<gpx><trk/></gpx>\n".to_owned();
     refused("rec/gnss.csv", gpx, "", &["gnss.csv, line 1: XML, as GPX", "--gnss-sigma"]);
     let increments = |text: &str| text.replacen("accel_x_m_s2", "dv_x_ft_s", 1);

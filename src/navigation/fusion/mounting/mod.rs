@@ -2,9 +2,9 @@
 //!
 //! The vehicle is taken to move along its x axis, forwards for the most part, without slip and without bank on
 //! average. First the specific force is compared with what the change of the GNSS velocity says it is along the track
-//! ([`track`]): gravity gives roll and pitch, accelerations and turns the yaw. Then the filter of the fusion
+//! (`track`): gravity gives roll and pitch, accelerations and turns the yaw. Then the filter of the fusion
 //! carries the attitude of the IMU through the whole drive, its biases estimated, and the mounting is the mean
-//! rotation from it to the track ([`refined`]).
+//! rotation from it to the track (`refined`).
 
 mod blocks;
 mod refined;

@@ -1,0 +1,96 @@
+//! Sentences of the manuals, and damaged ones.
+
+use super::sentence::{KNOT, fields};
+use super::*;
+use crate::units::DEG;
+
+const SIGMA: FixSigma = FixSigma { pos_m: [2.0, 2.0, 4.0], vel_m_s: Some([0.1, 0.1, 0.2]) };
+
+/// A sentence with its checksum.
+fn sentence(body: &str) -> String {
+    format!("${body}*{:02X}\n", body.bytes().fold(0, |all, byte| all ^ byte))
+}
+
+fn read(text: &str) -> Vec<GnssFix> {
+    fixes("a.nmea", text, Some(&SIGMA), None).unwrap().0.into_iter().map(|(_, fix)| fix).collect()
+}
+
+/// The sentences that the manuals print, with their own checksums: 48° 07.038' N, 11° 31.000' E, 545.4 m above the
+/// geoid, which is 46.9 m above the ellipsoid; 22.4 knots towards 84.4°; 1994-03-23 12:35:19 UTC.
+#[test]
+fn sentences_of_the_manuals() {
+    let text = "$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\r\n\
+                $GPRMC,123519,A,4807.038,N,01131.000,E,022.4,084.4,230394,003.1,W*6A\r\n";
+    let [fix] = read(text)[..] else { panic!() };
+    assert!((fix.lat / DEG - 48.1173).abs() < 1e-9 && (fix.lon / DEG - 11.0 - 31.0 / 60.0).abs() < 1e-9);
+    assert!((fix.h - 592.3).abs() < 1e-9 && fix.t_s == 45_319.0, "{fix:?}");
+    let (v, sigma) = fix.velocity.unwrap();
+    assert!((v.length() - 22.4 * 0.514_444_444).abs() < 1e-6 && (v.y.atan2(v.x) / DEG - 84.4).abs() < 1e-9);
+    assert_eq!((sigma, fix.pos_sigma_n), (DVec3::new(0.1, 0.1, OPEN), DVec3::new(2.0, 2.0, 4.0)));
+    // Trimble's, and u-blox's
+    assert!(fields("$GPGST,172814.0,0.006,0.023,0.020,273.6,0.023,0.020,0.031*6A").is_ok());
+    assert!(fields("$GPGST,082356.00,1.8,,,,1.7,1.3,2.2*7E").is_ok());
+    assert!(fields("$GPVTG,,T,,M,0.00,N,0.00,K*4E").is_ok());
+}
+
+#[test]
+fn what_has_one_time_is_one_fix_from_any_talker() {
+    let gst = sentence("GNGST,235959.50,1.8,,,,1.7,1.3,2.2");
+    let gga = "GGA,235959.50,4630.0,S,00630.0,W,4,12,0.7,400.0,M,-30.5,M,,";
+    let text = [
+        gst,
+        sentence(&format!("GN{gga}")),
+        sentence(&format!("GP{}", gga.replace("400.0", "444.4"))),
+        sentence("GNVTG,90.0,T,,M,,N,36.0,K,A"),
+        sentence("GAGGA,000000.00,4630.0,S,00630.0,W,1,12,1.4,400.0,M,-30.5,M,,"),
+        sentence("GNRMC,000000.00,A,4630.0,S,00630.0,W,0.02,,010224,,,A"),
+        sentence("GLGGA,000000.50,,,,,0,00,99.9,,,,,,"),
+    ]
+    .concat();
+    let all = read(&text);
+    assert_eq!(all.iter().map(|f| f.t_s).collect::<Vec<_>>(), [86_399.5, 86_400.0]);
+    assert_eq!((all[0].pos_sigma_n, all[0].h), (DVec3::new(1.7, 1.3, 2.2), 369.5));
+    assert!((all[0].lat / DEG + 46.5).abs() < 1e-9 && (all[0].lon / DEG + 6.5).abs() < 1e-9);
+    assert!(all[0].velocity.unwrap().0.distance(DVec3::new(0.0, 10.0, 0.0)) < 1e-9);
+    // at rest there is no course
+    let (v, sigma) = all[1].velocity.unwrap();
+    assert!(v == DVec3::ZERO && (sigma.x - 0.1_f64.hypot(0.02 * KNOT)).abs() < 1e-12, "{sigma}");
+    // HDOP 1.4 where 0.7 and 1.4 have the middle 1.4
+    assert_eq!(all[1].pos_sigma_n, DVec3::new(2.0, 2.0, 4.0));
+    // 2024-02-01 00:00 UTC is 1 706 745 600 s: the IMU's clock tells which of the two is meant
+    let unix = (1_706_745_599.0, 1_706_745_700.0);
+    let (unix, said) = fixes("a", &text, Some(&SIGMA), Some(unix)).unwrap();
+    assert!(unix[1].1.t_s == 1_706_745_600.0 && said[0].ends_with("Unix time, as the IMU's"), "{said:?}");
+    let zda = text.replace(&text[text.find("$GNRMC").unwrap()..text.find("$GLGGA").unwrap()], "")
+        + &sentence("GNZDA,000000.50,01,02,2024,00,00");
+    let (dated, _) = fixes("a", &zda, Some(&SIGMA), Some((1_706_745_599.0, 1_706_745_700.0))).unwrap();
+    assert_eq!(dated[1].1.t_s, 1_706_745_600.0);
+    assert!(said[1].starts_with("1 positions left out"), "{said:?}");
+}
+
+#[test]
+fn damaged_sentences_are_refused_with_their_line() {
+    let gga = sentence("GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,");
+    let later = sentence("GPGGA,123520,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,");
+    // cut at its ends by whatever logged it
+    let cut = format!("07.038,N,01131.000,E*1\n{gga}{}", &later[..30]);
+    assert_eq!(read(&cut).len(), 1);
+    let refused = |bad: &str| {
+        let text = format!("{gga}{bad}\n{later}");
+        fixes("a.nmea", &text, Some(&SIGMA), None).unwrap_err().to_string()
+    };
+    assert!(
+        refused(&gga.trim().replace("48", "49"))
+            .starts_with("a.nmea, line 2: a sentence whose checksum is wrong: $GPGGA")
+    );
+    assert!(refused(&gga[..40]).starts_with("a.nmea, line 2: a sentence without its checksum"));
+    assert!(refused("hello").starts_with("a.nmea, line 2: not a sentence"));
+    let bad = sentence("GPGGA,123519.5,9107.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,");
+    assert!(refused(bad.trim()).contains("line 2: not a latitude"));
+    let bad = sentence("GPGGA,253519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,");
+    assert!(refused(bad.trim()).contains("line 2: not a time of day"));
+    let unstated = fixes("a.nmea", &gga, None, None).unwrap_err().to_string();
+    assert!(unstated.starts_with("a.nmea, line 1: a fix without standard deviations"), "{unstated}");
+    let none = fixes("a.nmea", &sentence("GPRMC,1,V,,,,,,,,,"), Some(&SIGMA), None);
+    assert!(none.unwrap_err().to_string().contains("without a position"));
+}
