@@ -193,7 +193,8 @@ impl FusionSummary {
     #[must_use]
     pub(crate) fn mounted(self, found: Option<&Mounting>) -> Self {
         let row = |m: &Mounting| {
-            let [roll_deg, pitch_deg, yaw_deg] = m.angles_deg();
+            // hundredths are what is printed; + 0 takes the sign from -0
+            let [roll_deg, pitch_deg, yaw_deg] = m.angles_deg().map(|a| (a * 100.0).round() / 100.0 + 0.0);
             MountingRow { roll_deg, pitch_deg, yaw_deg, sigma_deg: m.sigma_deg(), how: m.how.clone() }
         };
         Self { mounting: found.map(row), ..self }
