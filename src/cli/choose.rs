@@ -79,8 +79,9 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let candidates = candidates(args)?;
     let inputs = args.inputs.iter().chain([&args.trajectory]).chain(&args.scenario).map(PathBuf::as_path);
-    jobs::claim_choice(&args.out, inputs, session.existing())?;
-    args.plot.guard(&args.inputs.iter().chain([&args.trajectory]).cloned().collect::<Vec<_>>())?;
+    let _own = jobs::claim_choice(&args.out, inputs, session.existing())?;
+    let _picture =
+        args.plot.claim(&args.inputs.iter().chain([&args.trajectory]).cloned().collect::<Vec<_>>())?;
     let scenario = scenario(args)?;
     let trajectory = read::trajectory(&args.trajectory, session)?;
     let seed = session.seed(scenario.run.seed);

@@ -61,9 +61,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let read_from = args.runs.iter().chain([&args.reference]);
     let inputs: Vec<PathBuf> =
         read_from.flat_map(|run| report::RUN_FILES.map(|name| run.join(name))).collect();
-    atomic::guard_inputs(out, inputs.iter().map(PathBuf::as_path))?;
-    atomic::guard_inputs(&page, inputs.iter().map(PathBuf::as_path))?;
-    args.plot.guard(&inputs)?;
+    let _own = atomic::claim_file(out, inputs.iter().map(PathBuf::as_path))?;
+    let _page = atomic::claim_file(&page, inputs.iter().map(PathBuf::as_path))?;
+    let _picture = args.plot.claim(&inputs)?;
     replaceable(&page)?;
     let compared = Compared::new(args, session)?;
     let json = report::json(&compared.found.file);

@@ -6,7 +6,7 @@ use crate::formats::suggest::nearest;
 use crate::formats::{atomic, model_file};
 use crate::imu::Sensor;
 use crate::jobs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Noise model from the figures of a datasheet, in the datasheet's units: an assumption, not a calibration
 ///
@@ -127,9 +127,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         session.printer.result(listed.trim_end());
         return Ok(());
     }
-    if let (Some(out), Some(entry)) = (&args.out, &args.entry) {
-        atomic::guard_inputs(out, std::iter::once(Path::new(entry)))?;
-    }
+    let claim = |out: &PathBuf| atomic::claim_file(out, args.entry.as_deref());
+    let _own = args.out.as_ref().map(claim).transpose()?;
     let mut sheet = match (&args.entry, &args.unit) {
         (Some(path), _) => datasheet::read(path)?,
         (None, Some(name)) => named(name)?,

@@ -100,6 +100,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return Ok(());
     }
     refuse_the_impossible(args, session)?;
+    let _own = atomic::claim_file(&Progress::path(&args.out), [])?;
     let mut progress = Progress::of(args, session)?;
     let commands = commands(args, progress.seed);
     let last = commands.len() - 1;

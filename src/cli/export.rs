@@ -4,7 +4,7 @@ use super::parse::one_of;
 use super::{Failure, Session};
 use crate::calibration::duration;
 use crate::export::{Export, ExportError, Settings, Target};
-use crate::formats::atomic::{self, guard_inputs};
+use crate::formats::atomic;
 use crate::formats::model_file::{self, ModelFile};
 use crate::imu::Sensor;
 use crate::jobs::{self, Recorded};
@@ -53,9 +53,8 @@ fn horizon(text: &str) -> Result<Horizon, String> {
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let file = model_file::read(&args.model)?;
     let shown = args.model.display().to_string();
-    if let Some(out) = &args.out {
-        guard_inputs(out, [args.model.as_path()])?;
-    }
+    let claim = |out: &PathBuf| atomic::claim_file(out, [args.model.as_path()]);
+    let _own = args.out.as_ref().map(claim).transpose()?;
     let turn_on = file.turn_on.unwrap_or_default();
     let settings = Settings {
         policy: args.policy,

@@ -1,7 +1,7 @@
 //! Pictures and pages that commands write beside their results.
 
 use super::{Failure, Session};
-use crate::formats::atomic;
+use crate::formats::atomic::{self, Claim};
 use crate::report::page::{self, Form, Page};
 use std::path::{Path, PathBuf};
 
@@ -14,9 +14,9 @@ pub(super) struct PlotArgs {
 }
 
 impl PlotArgs {
-    /// Refuses a picture that is an input or cannot be made, or of another form.
-    pub(super) fn guard(&self, inputs: &[PathBuf]) -> Result<(), Failure> {
-        self.plot.as_deref().map_or(Ok(()), |path| guard_picture(path, inputs))
+    /// Claims the picture; refuses one that is an input or cannot be made, or of another form.
+    pub(super) fn claim(&self, inputs: &[PathBuf]) -> Result<Option<Claim>, Failure> {
+        self.plot.as_deref().map(|path| claim_picture(path, inputs)).transpose()
     }
 
     /// Writes the picture, if one is asked for.
@@ -40,10 +40,10 @@ pub(super) struct PageArgs {
 }
 
 impl PageArgs {
-    /// Refuses a page or a picture that is an input or cannot be made, and a picture of another form.
-    pub(super) fn guard(&self, inputs: &[PathBuf]) -> Result<(), Failure> {
-        self.page.iter().try_for_each(|page| writable(page, inputs))?;
-        self.plot.guard(inputs)
+    /// Claims page and picture; refuses what is an input or cannot be made, and a picture of another form.
+    pub(super) fn claim(&self, inputs: &[PathBuf]) -> Result<[Option<Claim>; 2], Failure> {
+        let page = self.page.as_deref().map(|page| claim_own(page, inputs)).transpose()?;
+        Ok([page, self.plot.claim(inputs)?])
     }
 
     /// Writes what is asked for.
@@ -60,17 +60,14 @@ impl PageArgs {
     }
 }
 
-/// Refuses a picture of another form, before the work.
-pub(super) fn guard_picture(path: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
+/// Claims a picture before the work; refuses one of another form.
+pub(super) fn claim_picture(path: &Path, inputs: &[PathBuf]) -> Result<Claim, Failure> {
     form(path)?;
-    writable(path, inputs)
+    claim_own(path, inputs)
 }
 
-/// Whether a file can be made, found out before the work.
-fn writable(path: &Path, inputs: &[PathBuf]) -> Result<(), Failure> {
-    atomic::guard_inputs(path, inputs.iter().map(PathBuf::as_path))?;
-    drop(atomic::AtomicFile::create(path)?);
-    Ok(())
+fn claim_own(path: &Path, inputs: &[PathBuf]) -> Result<Claim, Failure> {
+    Ok(atomic::claim_file(path, inputs.iter().map(PathBuf::as_path))?)
 }
 
 /// The form of a picture, by its name.

@@ -141,8 +141,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             Failure::input("--outage longest needs a MODEL").hint("without one, give a length in seconds")
         );
     }
-    args.pictures
-        .guard(&std::iter::once(&args.trajectory).chain(&args.model).cloned().collect::<Vec<_>>())?;
+    let inputs: Vec<PathBuf> = std::iter::once(&args.trajectory).chain(&args.model).cloned().collect();
+    let _pictures = args.pictures.claim(&inputs)?;
     let asked = requirements(args, session)?;
     match (&args.model, &args.catalogue) {
         (Some(path), _) => given(path, args, &asked, session),
@@ -153,9 +153,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 /// The IMU that is needed.
 fn sought(args: &Args, asked: &Requirements, session: &Session) -> Result<(), Failure> {
-    if let Some(out) = &args.out {
-        claim_file(out, [args.trajectory.as_path()])?;
-    }
+    let claim = |out: &PathBuf| claim_file(out, [args.trajectory.as_path()]);
+    let _own = args.out.as_ref().map(claim).transpose()?;
     let (needed, question) = asked.needed(args.corr_time_s, args.iso_drift).map_err(|e| {
         Failure::input(e)
             .hint("a larger limit, a shorter outage, or a better receiver ([gnss] of --scenario)")

@@ -57,7 +57,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let job = synthesis(args, session)?;
     let contamination = args.contaminate.as_deref().map(Path::new);
     let inputs = contamination.into_iter().chain([args.model.as_path()]);
-    job.claim(&args.out, inputs, session.existing())?;
+    let _own = job.claim(&args.out, inputs, session.existing())?;
     let progress = session.progress("replicates", args.replicates);
     let manifest = job.write(&args.out, || progress.add(1)).map_err(|e| match e {
         SynthesisError::File(e) => e.into(),

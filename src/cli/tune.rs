@@ -74,10 +74,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     refuse_recordings(args)?;
     let mut scenario = scenario(args)?;
     let files = files(args)?;
-    args.pictures.guard(&files.iter().map(|f| PathBuf::from(&f.path)).collect::<Vec<_>>())?;
-    if let Some(out) = &args.out {
-        claim_file(out, files.iter().map(|f| Path::new(&f.path)))?;
-    }
+    let _pictures = args.pictures.claim(&files.iter().map(|f| PathBuf::from(&f.path)).collect::<Vec<_>>())?;
+    let claim = |out: &PathBuf| claim_file(out, files.iter().map(|f| Path::new(&f.path)));
+    let _own = args.out.as_ref().map(claim).transpose()?;
     let file = read::model(&args.model, session)?;
     let model = read::at_rate(&args.model, &file.model, scenario.imu.rate_hz, session)?;
     turn_on::expect(&mut scenario.initial, &file, &args.model, session);

@@ -49,10 +49,9 @@ const INTERVALS: [(&str, &str); 2] = [
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let tuning = args.tuning.tuning()?;
     let inputs = read::listed(&args.files)?;
-    if let Some(out) = &args.out {
-        atomic::guard_inputs(out, inputs.iter().map(PathBuf::as_path))?;
-    }
-    args.pictures.guard(&inputs)?;
+    let claim = |out: &PathBuf| atomic::claim_file(out, inputs.iter().map(PathBuf::as_path));
+    let _own = args.out.as_ref().map(claim).transpose()?;
+    let _pictures = args.pictures.claim(&inputs)?;
     let intervals = args.intervals;
     let options = WaveletOptions {
         reading: args.recordings.options(),

@@ -1,8 +1,9 @@
 //! The directory of an estimator study: what it is (`study.json`), and the estimates from each set as they
 //! are finished (`sets.csv`), from which a study that was stopped goes on.
 
+use super::atomic::{self, Claim};
 use super::difference::{self, Difference};
-use super::{FileError, Place, Setting, atomic};
+use super::{FileError, Place, Setting};
 use crate::efficiency::Estimate;
 use serde_json::Value;
 use std::fs::{self, File};
@@ -30,6 +31,7 @@ pub struct StudyDirectory {
     path: PathBuf,
     layout: Layout,
     sets: File,
+    _own: Claim,
     /// The sets already estimated from, in order.
     pub done: Vec<Vec<Estimate>>,
 }
@@ -43,6 +45,7 @@ impl StudyDirectory {
     /// cannot be written to.
     pub fn open(path: &Path, identity: &Value, layout: Layout) -> Result<Self> {
         let (study, sets) = (path.join("study.json"), path.join("sets.csv"));
+        let own = atomic::claim_file(&study, [])?;
         match fs::read_to_string(&study) {
             Ok(text) => same(path, &text, identity)?,
             Err(_) => {
@@ -59,7 +62,7 @@ impl StudyDirectory {
         let mut file = File::options().create(true).write(true).truncate(false).open(&sets).map_err(io)?;
         file.set_len(whole).map_err(io)?;
         std::io::Seek::seek(&mut file, std::io::SeekFrom::End(0)).map_err(io)?;
-        let mut directory = Self { path: sets.clone(), layout, sets: file, done };
+        let mut directory = Self { path: sets.clone(), layout, sets: file, _own: own, done };
         if whole == 0 {
             directory.write(directory.header().as_bytes())?;
         }
@@ -191,6 +194,9 @@ mod tests {
         let mut first = open(&path);
         first.append(vec![set(1.0), set(1e-300)]).unwrap();
         first.append(vec![set(0.1)]).unwrap();
+        let busy = StudyDirectory::open(&path, &json!({ "seed": 1 }), layout()).unwrap_err();
+        assert!(busy.to_string().ends_with("study.json is another output of the same command"), "{busy}");
+        drop(first);
         let sets = [set(1.0), set(1e-300), set(0.1)];
         assert_eq!(open(&path).done, sets);
         let file = path.join("sets.csv");

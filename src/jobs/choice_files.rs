@@ -4,7 +4,7 @@ use super::{Calibration, Chosen, ModelFiles};
 use crate::calibration::diagnose;
 use crate::choose::Inflation;
 use crate::formats::FileError;
-use crate::formats::atomic::{AtomicDir, Existing, Found, claim_directory};
+use crate::formats::atomic::{AtomicDir, Claim, Existing, Found, claim_directory};
 use crate::formats::input::input;
 use crate::formats::model_file::CalibrationNote;
 use crate::report::{ChoiceReport, choice_page};
@@ -22,7 +22,7 @@ pub(crate) fn claim_choice<'a>(
     out: &Path,
     inputs: impl Iterator<Item = &'a Path> + Clone,
     existing: Existing,
-) -> Result<(), FileError> {
+) -> Result<Claim, FileError> {
     let recognise = |text: &str| {
         let there = serde_json::from_str::<serde_json::Value>(text).unwrap_or_default();
         let is_ours = there["candidates"].is_array() && there["influence"].is_object();

@@ -2,7 +2,7 @@
 
 use super::Calibration;
 use crate::calibration::{Diagnosis, Estimator, Outcome};
-use crate::formats::atomic::{self, AtomicFile, Existing};
+use crate::formats::atomic::{self, AtomicFile, Claim, Existing};
 use crate::formats::draws_file::{self, DrawsFile};
 use crate::formats::model_file::{self, CalibrationNote, ModelFile};
 use crate::formats::{FileError, Place, Setting, hash};
@@ -39,21 +39,21 @@ impl ModelFiles {
         estimators.iter().map(files).collect()
     }
 
-    /// The files of each estimator, found out before the work to be writable and none of them an input.
+    /// The files of each estimator, claimed before the work but for `out` itself, and none of them an input.
     ///
     /// # Errors
-    /// When one cannot be made, or is an input.
+    /// When one cannot be made, is an input, or another command writes it.
     pub(crate) fn claim(
         out: &Path,
         estimators: &[Estimator],
         inputs: &[PathBuf],
-    ) -> Result<Vec<Self>, FileError> {
+    ) -> Result<(Vec<Self>, Vec<Claim>), FileError> {
         let all = Self::of(out, estimators);
-        for path in all.iter().flat_map(|f| [&f.model, &f.curves, &f.draws, &f.page]) {
-            writable(path)?;
-            atomic::guard_inputs(path, inputs.iter().map(PathBuf::as_path))?;
-        }
-        Ok(all)
+        let inputs = || inputs.iter().map(PathBuf::as_path);
+        atomic::guard_inputs(out, inputs())?;
+        let others = all.iter().flat_map(|f| [&f.model, &f.curves, &f.draws, &f.page]).filter(|p| *p != out);
+        let claims = others.map(|path| atomic::claim_file(path, inputs())).collect::<Result<_, _>>()?;
+        Ok((all, claims))
     }
 
     /// Writes the files of all estimators, the pages among them; their names.
@@ -167,18 +167,18 @@ impl ModelFiles {
     }
 }
 
-/// Fails before the work is done, not after, if nothing can be written there: several files are made of it, by its name.
+/// Claims a model file before the work: several files are made of it, by its name.
 ///
 /// # Errors
-/// When it cannot be replaced by a file.
-pub(crate) fn writable(out: &Path) -> Result<(), FileError> {
+/// When it cannot be replaced by a file, or another command writes it.
+pub(crate) fn claim_model(out: &Path) -> Result<Claim, FileError> {
     let what = match std::fs::metadata(out) {
         Ok(m) if m.is_dir() => "is a directory",
         Ok(m) if !m.is_file() => "is a device, and a model is a file with its curves beside it",
         _ if out.file_name().is_none() || out.as_os_str().to_string_lossy().ends_with('/') => {
             "is a directory"
         }
-        _ => return AtomicFile::create(out).map(drop),
+        _ => return atomic::claim_file(out, []),
     };
     let error = FileError::contents(out.display().to_string(), Place::Itself, what);
     Err(error.advice("name a file, such as model.toml"))

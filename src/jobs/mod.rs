@@ -59,7 +59,7 @@ pub use design::{DesignError, DesignInputs, Destination, design};
 pub use error::JobError;
 pub use estimator_study::{EstimatorStudy, EstimatorStudyError};
 pub use files::ModelFiles;
-pub(crate) use files::{not_anew, not_of_others, writable};
+pub(crate) use files::{claim_model, not_anew, not_of_others};
 pub use fuse::{FusionFilter, FusionFilterError};
 pub use fusion::{FuseError, Fused, Mounted, RecordedDrive};
 pub use navigate::{NavigateError, NavigateInputs, Navigation, Note, TrueImu, navigate};

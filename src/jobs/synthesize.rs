@@ -1,6 +1,6 @@
 //! Replicate recordings of a noise model, as the files of one directory.
 
-use crate::formats::atomic::{AtomicDir, Existing, Found, claim_directory};
+use crate::formats::atomic::{AtomicDir, Claim, Existing, Found, claim_directory};
 use crate::formats::model_file::ModelFile;
 use crate::formats::recordings::{FileFormat, is_recording};
 use crate::formats::{FileError, Place, Setting};
@@ -54,12 +54,12 @@ impl Synthesis {
     ///
     /// # Errors
     /// Why the directory cannot be written to.
-    pub fn claim<'a>(
+    pub(crate) fn claim<'a>(
         &self,
         out: &Path,
         inputs: impl Iterator<Item = &'a Path> + Clone,
         existing: Existing,
-    ) -> Result<(), FileError> {
+    ) -> Result<Claim, FileError> {
         let (names, own) = (self.names(), self.identity());
         let files: Vec<&str> = names.iter().map(String::as_str).chain(["manifest.json"]).collect();
         let recognise = |text: &str| {

@@ -63,6 +63,61 @@ fn another_result_is_refused() {
     assert!(!ran.stderr.contains("recordings at"), "{}", ran.stderr);
 }
 
+/// Another that writes there now is met before the work, even with `--force`; what a killed one left is not in the way
+/// and is removed. The two writers' lock is the operating system's, taken here as another process takes it.
+#[test]
+fn what_another_command_writes_is_refused_at_once() {
+    let place = place_with(DRIVE, MODEL);
+    let at = |name: &str| place.path().join(name);
+    done(place.path(), "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec");
+    fs::create_dir(at("there")).unwrap();
+    let run = "run drive.toml imu.toml --runs 2 --outage none --seed 1 --force";
+    for (command, marker, output) in [
+        (format!("{run} -o new"), ".new.claim", "new"),
+        (format!("{run} -o there"), "there/.claim", "there"),
+        (format!("{run} -o new --plot a.svg"), ".a.svg.claim", "a.svg"),
+        ("calibrate rec --model WN --bootstrap 0 -o m.toml --force".to_owned(), ".m.toml.claim", "m.toml"),
+        (
+            "tune imu.toml --truth imu.toml --trajectory drive.toml --outage 5:10 -o t.toml".to_owned(),
+            ".t.toml.claim",
+            "t.toml",
+        ),
+        ("wv rec -o wv.json".to_owned(), ".wv.json.claim", "wv.json"),
+    ] {
+        let held = fs::File::create(at(marker)).unwrap();
+        held.lock().unwrap();
+        let ran = plain(place.path(), &command);
+        assert_eq!(ran.code, 2, "{command}: {}", ran.stderr);
+        let told = format!(
+            "error: {output} is being written by another nav-sim\n\nhint: choose another output with --out"
+        );
+        assert!(ran.stderr.contains(&told), "{}", ran.stderr);
+        // not by closing it: a process that another test is starting may share it for a moment
+        held.unlock().unwrap();
+        let ran = plain(place.path(), &command);
+        assert_eq!(ran.code, 0, "{command}: {}", ran.stderr);
+        assert!(!at(marker).exists(), "{command}");
+    }
+}
+
+/// Two outputs of one name, whatever either is.
+#[test]
+fn two_outputs_of_one_name_are_refused_at_once() {
+    let place = place_with(DRIVE, MODEL);
+    done(place.path(), "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec");
+    for (command, output) in [
+        ("run drive.toml imu.toml --runs 2 --outage none -o a.svg --plot a.svg", "a.svg"),
+        ("calibrate rec --model WN --bootstrap 0 -o a.svg --plot ./a.svg", "./a.svg"),
+        ("wv rec -o a.html --page a.html", "a.html"),
+        ("compare log --reference log -o a.html", "a.html"),
+    ] {
+        let ran = plain(place.path(), command);
+        let told = format!("error: {output} is another output of the same command\n");
+        assert!(ran.code == 2 && ran.stderr.contains(&told), "{}", ran.stderr);
+        assert!(!place.path().join(output).exists(), "{command}");
+    }
+}
+
 /// What `init` makes is not in the way of `calibrate`; a file that is no calibration is told before the work.
 #[test]
 fn calibrate_begins_where_init_ended_and_replaces_no_other_model() {

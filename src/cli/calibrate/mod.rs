@@ -156,7 +156,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 fn recordings(args: &Args, settings: Settings, session: &Session) -> Result<(), Failure> {
     let out = args.out.as_deref().unwrap_or(Path::new("model.toml"));
-    jobs::writable(out)?;
+    let _own = jobs::claim_model(out)?;
+    let _picture = args.plot.claim(&read::listed(&args.inputs)?)?;
     if args.out.is_none() {
         jobs::not_of_others(out)?;
     }
@@ -177,8 +178,7 @@ fn recordings(args: &Args, settings: Settings, session: &Session) -> Result<(), 
     let measured = jobs::measure(&args.inputs, &options, &mut Said::new(session))?;
     let files: Vec<PathBuf> = measured.report.files.iter().map(|f| f.path.clone()).collect();
     let guarded: Vec<PathBuf> = files.iter().chain(&args.parameters).cloned().collect();
-    args.plot.guard(&guarded)?;
-    let outputs = outputs(out, &measured.settings.estimators, &guarded)?;
+    let (outputs, _claims) = outputs(out, &measured.settings.estimators, &guarded)?;
     let inputs = files.iter().map(|f| read::input("recording", f)).collect::<Result<Vec<_>, _>>()?;
     let calibration = {
         let progress = session.progress("steps of the fits", measured.steps());
@@ -193,13 +193,13 @@ fn curves(args: &Args, path: &Path, settings: &Settings, session: &Session) -> R
     // What is only printed needs no sensor.
     let sensor = args.sensor.or(args.out.is_none().then_some(Sensor::Accel));
     let curves = jobs::read_curves(path, args.recordings.rate_hz(), sensor, settings)?;
-    let outputs = match &args.out {
-        Some(out) => {
-            let inputs: Vec<PathBuf> =
-                [path].into_iter().map(Path::to_owned).chain(args.parameters.clone()).collect();
-            outputs(out, &curves.settings.estimators, &inputs)?
-        }
-        None => Vec::new(),
+    let inputs: Vec<PathBuf> =
+        [path].into_iter().map(Path::to_owned).chain(args.parameters.clone()).collect();
+    let _own = args.out.as_deref().map(jobs::claim_model).transpose()?;
+    let _picture = args.plot.claim(&inputs)?;
+    let (outputs, _claims) = match &args.out {
+        Some(out) => outputs(out, &curves.settings.estimators, &inputs)?,
+        None => Default::default(),
     };
     let calibration = curves.calibrate(bootstrap(args, session))?;
     let input = read::input("curve", path)?;

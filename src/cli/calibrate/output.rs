@@ -4,20 +4,21 @@ use super::Args;
 use crate::calibration::{Estimator, Outcome, Settings, diagnose};
 use crate::cli::pictures::{PlotArgs, replaceable};
 use crate::cli::{Failure, Session, read};
+use crate::formats::atomic::Claim;
 use crate::formats::model_file::CalibrationNote;
 use crate::jobs::{Calibration, ModelFiles};
 use crate::report::{self, CurvesFile, FitsFile, Input};
 use std::path::{Path, PathBuf};
 
-/// The files of each estimator, none of them an input or a page of somebody else.
+/// The files of each estimator, none of them an input or a page of somebody else, and the claims to them.
 pub(super) fn outputs(
     out: &Path,
     estimators: &[Estimator],
     inputs: &[PathBuf],
-) -> Result<Vec<ModelFiles>, Failure> {
-    let outputs = ModelFiles::claim(out, estimators, inputs)?;
+) -> Result<(Vec<ModelFiles>, Vec<Claim>), Failure> {
+    let (outputs, claims) = ModelFiles::claim(out, estimators, inputs)?;
     outputs.iter().try_for_each(|files| replaceable(&files.page))?;
-    Ok(outputs)
+    Ok((outputs, claims))
 }
 
 /// How the recordings were read and grouped; of a curve nothing is known.

@@ -105,8 +105,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let begin = Instant::now();
     let settings = settings(args)?;
     let inputs = Inputs::read(args, session)?;
-    output::claim(&args.out, &inputs.files, session)?;
-    args.plot.guard(&inputs.files.iter().map(|i| PathBuf::from(&i.path)).collect::<Vec<_>>())?;
+    let _own = output::claim(&args.out, &inputs.files, session)?;
+    let _picture =
+        args.plot.claim(&inputs.files.iter().map(|i| PathBuf::from(&i.path)).collect::<Vec<_>>())?;
     let Inputs { drive, model, states, expected, files } = inputs;
     let filter = FusionFilter { model: &model.model, states, initial: &expected };
     let fused = drive.fuse(&filter, settings, &Words::new(session)).map_err(|e| impossible(e, args))?;

@@ -1,13 +1,13 @@
 //! The directory of a fusion.
 
 use crate::cli::{Failure, Session};
-use crate::formats::atomic::{AtomicDir, Found, claim_directory};
+use crate::formats::atomic::{AtomicDir, Claim, Found, claim_directory};
 use crate::fusion::Solution;
 use crate::report::{FUSION_FILES, FusionKind, FusionManifest, FusionSummary, Input, fusion_directory};
 use std::path::Path;
 
 /// Whether the directory can be made, found out before the work.
-pub(super) fn claim(out: &Path, inputs: &[Input], session: &Session) -> Result<(), Failure> {
+pub(super) fn claim(out: &Path, inputs: &[Input], session: &Session) -> Result<Claim, Failure> {
     // Options are kept in the command alone.
     let is_same = |there: FusionManifest| {
         (there.command, there.version) == (command(), version()) && there.inputs == inputs

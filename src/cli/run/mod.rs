@@ -124,8 +124,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     let manifest =
         manifest(scenario.clone(), &outages, seed, inputs.files.clone(), inputs.note.clone(), session);
-    output::claim(&args.out, &manifest, session)?;
-    args.plot.guard(&inputs.files.iter().map(|i| PathBuf::from(&i.path)).collect::<Vec<_>>())?;
+    let _own = output::claim(&args.out, &manifest, session)?;
+    let _picture =
+        args.plot.claim(&inputs.files.iter().map(|i| PathBuf::from(&i.path)).collect::<Vec<_>>())?;
     let words = Words::new(session);
     let found = jobs::navigate(&inputs.job, &scenario, &outages, seed, &words);
     let mut found = found.map_err(|e| impossible(e, &args.model))?;

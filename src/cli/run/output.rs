@@ -1,7 +1,7 @@
 //! The run directory and what is printed of it.
 
 use crate::cli::{Failure, Session};
-use crate::formats::atomic::{AtomicDir, Found, claim_directory};
+use crate::formats::atomic::{AtomicDir, Claim, Found, claim_directory};
 use crate::jobs::Navigation;
 use crate::metrics::{Summary, VerdictKind};
 use crate::report::{self, Input, Manifest, ModelNote, TrajectorySeries, run_words};
@@ -38,7 +38,7 @@ pub(crate) fn manifest(
 }
 
 /// Whether a run directory can be made, found out before the long computation.
-pub(crate) fn claim(path: &Path, manifest: &Manifest, session: &Session) -> Result<(), Failure> {
+pub(crate) fn claim(path: &Path, manifest: &Manifest, session: &Session) -> Result<Claim, Failure> {
     let inputs = manifest.inputs.iter().map(|i| Path::new(&i.path));
     let recognise = |text: &str| {
         let there = serde_json::from_str::<Manifest>(text);

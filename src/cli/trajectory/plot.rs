@@ -1,7 +1,7 @@
 //! `nav-sim trajectory plot`.
 
 use super::{Source, wrote};
-use crate::cli::pictures::{guard_picture, write_picture};
+use crate::cli::pictures::{claim_picture, write_picture};
 use crate::cli::{Failure, Session};
 use crate::report::{TrajectorySeries, trajectory_svg};
 use crate::sensors::outage::Outage;
@@ -26,7 +26,7 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    guard_picture(&args.out, std::slice::from_ref(&args.source.path))?;
+    let _own = claim_picture(&args.out, std::slice::from_ref(&args.source.path))?;
     let (trajectory, _) = args.source.read(session)?;
     let outages: Vec<_> = args.outages.iter().map(|o| (o.start_s, o.end_s)).collect();
     let name = args.source.path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());

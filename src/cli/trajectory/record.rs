@@ -2,7 +2,7 @@
 
 use super::{Source, wrote};
 use crate::cli::{Failure, Session, read, turn_on};
-use crate::formats::atomic::{AtomicDir, Found, claim_directory};
+use crate::formats::atomic::{AtomicDir, Claim, Found, claim_directory};
 use crate::formats::scenario_file;
 use crate::formats::trajectory_file::{Rows, write_rows};
 use crate::noise::continuous;
@@ -64,7 +64,7 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         reference,
         initial.into_bytes(),
     ];
-    claim(args, &contents, session)?;
+    let _own = claim(args, &contents, session)?;
     let mut directory = AtomicDir::create(&args.out)?;
     for (name, contents) in FILES.iter().zip(contents) {
         directory.write(name, contents)?;
@@ -75,7 +75,7 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 }
 
 /// Refuses to overwrite an input, what this command did not make, or a recording that is not this one.
-fn claim(args: &Args, contents: &[Vec<u8>; 4], session: &Session) -> Result<(), Failure> {
+fn claim(args: &Args, contents: &[Vec<u8>; 4], session: &Session) -> Result<Claim, Failure> {
     let inputs = [Some(&args.source.path), Some(&args.model), args.scenario.as_ref()];
     let inputs = inputs.into_iter().flatten().map(|path| path.as_path());
     let recognise = |_: &str| {

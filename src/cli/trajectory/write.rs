@@ -2,7 +2,7 @@
 
 use super::{Source, wrote};
 use crate::cli::{Failure, Session, parse};
-use crate::formats::atomic::guard_inputs;
+use crate::formats::atomic::claim_file;
 use crate::formats::trajectory_file::{Rows, write_csv, write_rows};
 use std::path::{Path, PathBuf};
 
@@ -65,7 +65,7 @@ pub(super) fn convert(args: &ConvertArgs, session: &Session) -> Result<(), Failu
 }
 
 fn write(source: &Source, out: &Path, rows: Rows, session: &Session) -> Result<(), Failure> {
-    guard_inputs(out, [source.path.as_path()])?;
+    let _own = claim_file(out, [source.path.as_path()])?;
     let (trajectory, _) = source.read(session)?;
     write_csv(out, &trajectory, rows, session.existing())?;
     wrote(out, session);

@@ -1,10 +1,96 @@
-//! Whether a command may write its results into a directory.
+//! Whether a command may write its results to a file or into a directory, and that no other does meanwhile.
 
-use super::{AtomicDir, Existing, guard_inputs, kept, recover};
+use super::temporary::Temporary;
+use super::{AtomicDir, AtomicFile, Existing, guard_inputs, kept, make_parent, recover};
 use crate::formats::{FileError, Place, Setting};
+use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+/// Outputs that are this command's own until this is dropped: the marker of their place is locked by the operating
+/// system, and a process that is killed holds none.
+#[derive(Debug)]
+#[must_use = "another command may write there as soon as this is dropped"]
+pub(crate) struct Claim {
+    outputs: Vec<PathBuf>,
+    _marker: Option<Temporary>,
+}
+
+/// What this process has claimed.
+static CLAIMED: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+impl Claim {
+    /// Claims outputs in the place that `shown` names.
+    fn new(shown: &Path, marker: &Path, outputs: Vec<PathBuf>) -> Result<Self, FileError> {
+        let refused =
+            |path: &Path, why: &str| FileError::contents(path.display().to_string(), Place::Itself, why);
+        let mut claimed = CLAIMED.lock().unwrap_or_else(PoisonError::into_inner);
+        if outputs.iter().any(|output| claimed.contains(output)) {
+            return Err(refused(shown, "is another output of the same command").setting(Setting::Output));
+        }
+        let marked = make_parent(marker).and_then(|()| Temporary::marker(marker));
+        let Some(marked) = marked.map_err(|e| FileError::io(shown, e))? else {
+            let busy = refused(shown, "is being written by another nav-sim");
+            return Err(busy.setting(Setting::Output).advice("wait until that is done"));
+        };
+        claimed.extend(outputs.iter().cloned());
+        Ok(Self { outputs, _marker: Some(marked) })
+    }
+
+    fn of_directory(directory: &Path, files: &[impl AsRef<str>]) -> Result<Self, FileError> {
+        loop {
+            let marker = if directory.is_dir() { directory.join(MARKER) } else { marker_beside(directory) };
+            let inside = |name: &str| resolved(directory).join(name);
+            let outputs = files.iter().map(|name| inside(name.as_ref())).chain([inside("")]).collect();
+            let claim = Self::new(directory, &marker, outputs)?;
+            // where the directory was made meanwhile, its writers hold the marker in it
+            if directory.is_dir() == (marker.file_name() == Some(MARKER.as_ref())) {
+                return Ok(claim);
+            }
+        }
+    }
+}
+
+impl Drop for Claim {
+    fn drop(&mut self) {
+        let mut claimed = CLAIMED.lock().unwrap_or_else(PoisonError::into_inner);
+        self.outputs.iter().for_each(|output| _ = claimed.remove(output));
+    }
+}
+
+/// Name of the marker in a directory of outputs; ending of the one beside an output.
+const MARKER: &str = ".claim";
+
+fn marker_beside(path: &Path) -> PathBuf {
+    let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    path.with_file_name(format!(".{name}{MARKER}"))
+}
+
+/// A path by one name, whether anything is there or not.
+fn resolved(path: &Path) -> PathBuf {
+    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
+    let by_parent = || Some(parent.canonicalize().ok()?.join(path.file_name()?));
+    path.canonicalize().ok().or_else(by_parent).unwrap_or_else(|| path.to_owned())
+}
+
+/// Claims a file that can be made and is none of the inputs, before the work. A device is everybody's.
+///
+/// # Errors
+/// When it is an input, cannot be made, or another command writes it.
+pub(crate) fn claim_file<'a>(
+    output: &Path,
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> Result<Claim, FileError> {
+    guard_inputs(output, inputs)?;
+    AtomicFile::create(output)?; // dropped at once
+    if fs::metadata(output).is_ok_and(|m| !m.is_file()) {
+        return Ok(Claim { outputs: Vec::new(), _marker: None });
+    }
+    let output_at = resolved(output);
+    Claim::new(output, &marker_beside(&output_at), vec![output_at])
+}
 
 /// What a directory holds, told by its last file, which appears when the others are whole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,7 +114,7 @@ impl Found {
     }
 }
 
-/// Finds out before the work whether its results can be written to a directory: none of `files` is an input, the
+/// Claims a directory before the work whose results are to be written there: none of `files` is an input, the
 /// directory is new, empty, or of this command, and what it holds is the same or to be replaced. Finishes what a
 /// killed command had begun to put in place. Nothing is left: a command that is interrupted leaves no trace.
 ///
@@ -42,10 +128,12 @@ pub(crate) fn claim_directory<'a>(
     inputs: impl Iterator<Item = &'a Path> + Clone,
     existing: Existing,
     recognise: impl FnOnce(&str) -> Result<Found, FileError>,
-) -> Result<(), FileError> {
+) -> Result<Claim, FileError> {
     for name in files {
         guard_inputs(&directory.join(name.as_ref()), inputs.clone())?;
     }
+    AtomicDir::create(directory)?; // dropped at once
+    let claim = Claim::of_directory(directory, files)?;
     recover(directory);
     let last = directory.join(files.last().map_or("", AsRef::as_ref));
     match fs::read_to_string(&last) {
@@ -56,7 +144,7 @@ pub(crate) fn claim_directory<'a>(
             Found::Other(_) | Found::Same => {}
         },
     }
-    AtomicDir::create(directory).map(drop)
+    Ok(claim)
 }
 
 /// Refuses a directory that holds anything: files of the same names would be lost.

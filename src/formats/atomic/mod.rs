@@ -6,7 +6,7 @@ mod directory;
 mod file;
 mod temporary;
 
-pub(crate) use claim::{Found, claim_directory};
+pub(crate) use claim::{Claim, Found, claim_directory, claim_file};
 pub(crate) use directory::{AtomicDir, recover};
 pub(crate) use file::AtomicFile;
 pub(crate) use temporary::remove_unfinished;
@@ -30,18 +30,6 @@ pub(crate) fn guard_inputs<'a>(
     }
     let message = "is an input of this command and would be overwritten";
     Err(FileError::contents(output.display().to_string(), Place::Itself, message).setting(Setting::Output))
-}
-
-/// Whether a file can be made and is none of the inputs, found out before the work.
-///
-/// # Errors
-/// When it is one, or cannot be made.
-pub(crate) fn claim_file<'a>(
-    output: &Path,
-    inputs: impl IntoIterator<Item = &'a Path>,
-) -> Result<(), FileError> {
-    guard_inputs(output, inputs)?;
-    AtomicFile::create(output).map(drop)
 }
 
 /// What may become of a result that is there already.

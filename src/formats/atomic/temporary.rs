@@ -58,6 +58,21 @@ impl Temporary {
         claim(destination, make).map(|(path, hold)| Self { path, _hold: hold })
     }
 
+    /// The marker of an output, of one name for all its writers; `None` while another holds it.
+    pub(super) fn marker(path: &Path) -> io::Result<Option<Self>> {
+        loop {
+            let file = File::options().create(true).truncate(false).write(true).open(path)?;
+            let hold = match hold_open(file, path) {
+                Hold::Taken(file) => Some(file),
+                Hold::Unknown => None,
+                Hold::Busy => return Ok(None),
+                Hold::Stale => continue,
+            };
+            unfinished().insert(path.to_owned());
+            return Ok(Some(Self { path: path.to_owned(), _hold: hold }));
+        }
+    }
+
     pub(super) fn path(&self) -> &Path {
         &self.path
     }
@@ -86,6 +101,8 @@ pub(super) enum Hold {
     Taken(File),
     /// Another holds it.
     Busy,
+    /// What was held has lost the name meanwhile, which says nothing about what has the name now.
+    Stale,
     /// There are no locks here, or no such file.
     Unknown,
 }
@@ -96,9 +113,9 @@ pub(super) fn hold(path: &Path) -> Hold {
 
 fn hold_open(file: File, path: &Path) -> Hold {
     match file.try_lock() {
-        // A lock on what has lost the name meanwhile says nothing about what has the name now.
         Ok(()) if is_at(&file, path) => Hold::Taken(file),
-        Ok(()) | Err(TryLockError::WouldBlock) => Hold::Busy,
+        Ok(()) => Hold::Stale,
+        Err(TryLockError::WouldBlock) => Hold::Busy,
         Err(TryLockError::Error(_)) => Hold::Unknown,
     }
 }
@@ -139,7 +156,7 @@ fn claim(
         };
         let is_ours = match locked {
             Hold::Taken(_) => true, // the clone shares its lock with `made`
-            Hold::Busy => false,
+            Hold::Busy | Hold::Stale => false,
             Hold::Unknown => path.exists(),
         };
         if is_ours {
@@ -176,7 +193,7 @@ pub(super) fn abandoned(path: &Path, ending: &str) -> Vec<(PathBuf, File)> {
     let left = entries.filter(|e| is_temporary(&e.file_name().to_string_lossy())).map(|e| e.path());
     left.filter_map(|path| match hold(&path) {
         Hold::Taken(file) => Some((path, file)),
-        Hold::Busy | Hold::Unknown => None,
+        Hold::Busy | Hold::Stale | Hold::Unknown => None,
     })
     .collect()
 }

@@ -213,3 +213,17 @@ fn a_manifest_stands_beside_its_own_files_only() {
         assert!(manifest.is_none() || manifest == contents("a.csv"), "{steps}: {manifest:?}");
     }
 }
+
+/// A process that ended without a word left its marker: the next one takes it, and it goes with that one's claim.
+#[test]
+fn a_claim_ends_with_its_holder() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("model.toml");
+    fs::write(dir.path().join(".model.toml.claim"), "").unwrap();
+    let own = claim_file(&path, []).unwrap();
+    let again = claim_file(&path, []).unwrap_err();
+    assert!(again.to_string().ends_with("model.toml is another output of the same command"), "{again}");
+    drop(own);
+    assert!(listing(dir.path()).is_empty());
+    drop(claim_file(&path, []).unwrap());
+}
