@@ -1,7 +1,7 @@
 //! Flags that mean the same in every command, and what follows from them.
 
 use super::{Failure, Printer, Progress};
-use crate::formats::atomic::Existing;
+use crate::formats::atomic::{self, Existing};
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -86,6 +86,13 @@ impl Session {
     pub(crate) fn show(&self, json: impl FnOnce() -> String, text: impl FnOnce() -> String) {
         let shown = if self.json() { json() } else { text() };
         self.printer.result(shown.trim_end());
+    }
+
+    /// Writes a result as a file, and says so.
+    pub(crate) fn write(&self, path: &Path, contents: impl AsRef<[u8]>) -> Result<(), Failure> {
+        atomic::write_result(path, contents, self.existing())?;
+        self.wrote(path);
+        Ok(())
     }
 
     /// Says that a file or a directory was written.

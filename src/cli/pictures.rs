@@ -52,11 +52,8 @@ impl PageArgs {
             return Ok(());
         }
         let page = page();
-        if let Some(path) = &self.page {
-            atomic::write_result(path, page.html(), session.existing())?;
-            session.wrote(path);
-        }
-        self.plot.write(|| page.svg(), session)
+        let written = self.page.iter().try_for_each(|path| session.write(path, page.html()));
+        self.plot.write(|| page.svg(), session).and(written)
     }
 }
 
@@ -81,8 +78,7 @@ fn form(path: &Path) -> Result<Form, Failure> {
 /// Writes a picture in the form that its name says.
 pub(super) fn write_picture(path: &Path, svg: String, session: &Session) -> Result<(), Failure> {
     let picture = page::encode(svg, form(path)?).map_err(Failure::could_not)?;
-    atomic::write_result(path, picture, session.existing())?;
-    Ok(())
+    Ok(atomic::write_result(path, picture, session.existing())?)
 }
 
 /// Refuses to replace a page of somebody else by one that nobody named.

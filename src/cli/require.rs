@@ -164,11 +164,12 @@ fn sought(args: &Args, asked: &Requirements, session: &Session) -> Result<(), Fa
         format!("{}\n\n{}", needed.verdict(&question), tables.join("\n\n"))
     };
     session.show(|| needed.json(&question), text);
+    let drawn = args.pictures.write(|| needed_page(&needed, &question), session);
     if let Some(out) = &args.out {
         model_file::write(out, &asked.model_file(&needed.imu, &question), session.existing())?;
         session.wrote(out);
     }
-    args.pictures.write(|| needed_page(&needed, &question), session)
+    drawn
 }
 
 /// What a given IMU makes of the limits.

@@ -96,6 +96,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let result = result.map_err(|e| Failure::input(format!("{}: {e}", args.model.display())))?;
     let text = || format!("{}\n\n{}", result.verdict(), markdown_table(&result.rows()));
     session.show(|| result.json(), text);
+    let drawn = args.pictures.write(|| tune_page(&result), session);
     if let Some(out) = &args.out {
         let aim = if args.aim == Aim::Mean { "mean of" } else { "worst of" };
         let honest_for = format!("{aim} {}", if args.intervals { "intervals" } else { "truths" });
@@ -103,7 +104,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         model_file::write(out, &tuned, session.existing())?;
         session.wrote(out);
     }
-    args.pictures.write(|| tune_page(&result), session)
+    drawn
 }
 
 /// A directory or a table holds samples: a truth is a model.

@@ -62,26 +62,20 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     };
     let file = jobs::wavelet_variances(&args.files, &options, &mut Said::new(session))?;
     let json = report::json(&file);
-    if let Some(out) = &args.out {
-        atomic::write_result(out, &json, session.existing())?;
-        session.wrote(out);
-    }
-    args.pictures.write(|| report::wavelet_page(&file), session)?;
-    if session.json() {
-        session.printer.result(json.trim_end());
-        return Ok(());
-    }
+    let written = args.out.iter().try_for_each(|out| session.write(out, &json));
+    let drawn = args.pictures.write(|| report::wavelet_page(&file), session);
     let text = match () {
+        () if session.json() => json.trim_end().to_owned(),
         () if session.csv() => report::signals_csv(&file).trim_end().to_owned(),
         () if args.per_file => side_by_side(&file),
         () if session.verbose() => all_scales(&file, &report::intervals_note(intervals.name(), &tuning)),
         () => digest(&file),
     };
     session.printer.result(&text);
-    if args.chart {
+    if args.chart && !session.json() {
         session.printer.result(&report::wavelet_text(&file));
     }
-    Ok(())
+    written.and(drawn)
 }
 
 /// A row for each sensor and axis.

@@ -8,7 +8,6 @@ use crate::formats::model_file::{self, CalibrationNote, ModelFile};
 use crate::formats::{FileError, Place, Setting, hash};
 use crate::noise::Model;
 use crate::report::{self, CurvesFile};
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// The files of one estimator.
@@ -56,18 +55,42 @@ impl ModelFiles {
         Ok((all, claims))
     }
 
+    /// Where the files go: beside other models that are there and are to stay.
+    pub(crate) fn placed(
+        &self,
+        calibration: &Calibration,
+        note: &CalibrationNote,
+        existing: Existing,
+    ) -> Self {
+        let (curves, model) = self.contents(calibration, note);
+        let model = model_file::to_toml(&model);
+        let at = |path: &Path| Self::of(path, &[self.estimator]).remove(0);
+        let is_usable = |path: &Path| {
+            atomic::guard_contents(path, model.as_bytes(), existing)
+                .and_then(|()| atomic::guard_contents(&at(path).curves, curves.as_bytes(), existing))
+                .is_ok()
+        };
+        if is_usable(&self.model) { self.clone() } else { at(&atomic::name_beside(&self.model, is_usable)) }
+    }
+
+    /// Refuses what had to be written beside.
+    ///
+    /// # Errors
+    /// When it was.
+    pub(crate) fn refuse_beside(&self, placed: &Self) -> Result<(), FileError> {
+        if placed == self { Ok(()) } else { Err(atomic::kept_beside(&self.model, &placed.model)) }
+    }
+
     /// Writes the files of all estimators, the pages among them; their names.
     ///
     /// # Errors
-    /// When other models are there and are to stay, or the system refuses.
+    /// When the system refuses.
     pub(crate) fn write_all<'a>(
         all: &'a [Self],
         calibration: &Calibration,
         note: &CalibrationNote,
         diagnoses: &[Diagnosis],
-        existing: Existing,
     ) -> Result<Vec<&'a Path>, FileError> {
-        all.iter().try_for_each(|files| files.guard(calibration, note, existing))?;
         let has_draws = calibration.outcomes.iter().any(|o| o.inference.is_some());
         let mut written = Vec::new();
         for files in all {
@@ -77,21 +100,6 @@ impl ModelFiles {
             written.extend([&files.model, &files.curves].into_iter().chain(draws).chain([&files.page]));
         }
         Ok(written.into_iter().map(PathBuf::as_path).collect())
-    }
-
-    /// Refuses to put other models in the place of those that are there.
-    ///
-    /// # Errors
-    /// When there are others, and they are to stay.
-    fn guard(
-        &self,
-        calibration: &Calibration,
-        note: &CalibrationNote,
-        existing: Existing,
-    ) -> Result<(), FileError> {
-        let (curves, model) = self.contents(calibration, note);
-        atomic::guard_contents(&self.model, model_file::to_toml(&model).as_bytes(), existing)?;
-        atomic::guard_contents(&self.curves, curves.as_bytes(), existing)
     }
 
     fn contents(&self, calibration: &Calibration, note: &CalibrationNote) -> (String, ModelFile) {
@@ -117,9 +125,9 @@ impl ModelFiles {
             draws.map(|draws| serde_json::to_string(&draws).expect("plain structs are always JSON") + "\n");
         // All are on the disk before any has its name. Should the model not get its name, the hash in it tells that the
         // curves are not of it, and its parameters that the draws are not.
-        let draws = draws.map(|text| staged(&self.draws, &text)).transpose()?;
-        let (curves, model) =
-            (staged(&self.curves, &curves)?, staged(&self.model, &model_file::to_toml(&model))?);
+        let draws = draws.map(|text| atomic::filled(&self.draws, text.as_bytes())).transpose()?;
+        let curves = atomic::filled(&self.curves, curves.as_bytes())?;
+        let model = atomic::filled(&self.model, model_file::to_toml(&model).as_bytes())?;
         draws.map_or(Ok(()), AtomicFile::commit)?;
         curves.commit()?;
         model.commit()
@@ -142,8 +150,8 @@ impl ModelFiles {
         provenance.insert("inflation".to_owned(), inflation.into());
         let provenance = Some(provenance);
         let model = ModelFile { missing: own.missing, provenance, ..ModelFile::new(inflated.clone()) };
-        let (curves, model) =
-            (staged(&self.curves, &curves)?, staged(&self.model, &model_file::to_toml(&model))?);
+        let curves = atomic::filled(&self.curves, curves.as_bytes())?;
+        let model = atomic::filled(&self.model, model_file::to_toml(&model).as_bytes())?;
         curves.commit()?;
         model.commit()
     }
@@ -216,14 +224,6 @@ fn is_calibrated(path: &Path) -> bool {
         let program = p.get("program").and_then(toml::Value::as_str);
         program.is_some_and(|name| name.starts_with("nav-sim")) && p.contains_key("estimator")
     })
-}
-
-/// A file that is written but does not have its name yet.
-fn staged(path: &Path, text: &str) -> Result<AtomicFile, FileError> {
-    let mut file = AtomicFile::create(path)?;
-    let written = file.write_all(text.as_bytes()).and_then(|()| file.flush());
-    written.map_err(|e| FileError::io(path, e))?;
-    Ok(file)
 }
 
 fn with_suffix(path: &Path, suffix: &str) -> PathBuf {

@@ -69,6 +69,14 @@ impl Manifest {
             && inputs(self) == inputs(other)
     }
 
+    /// Whether another run would be a run of this one, had this one its seed.
+    #[must_use]
+    pub(crate) fn differs_in_seed(&self, other: &Self) -> bool {
+        let mut seeded = Self { seed: other.seed, ..self.clone() };
+        seeded.configuration.run.seed = other.configuration.run.seed;
+        self.seed != other.seed && seeded.is_same_run(other)
+    }
+
     /// The hashes of the inputs of a role, in the order given.
     #[must_use]
     pub(crate) fn hashes(&self, role: &str) -> Vec<&str> {

@@ -100,6 +100,53 @@ fn what_another_command_writes_is_refused_at_once() {
     }
 }
 
+/// What the work has made is kept beside what is not replaced, under the first name that is free or holds the same.
+#[test]
+fn a_result_that_is_refused_after_the_work_is_not_lost() {
+    let place = place_with(DRIVE, MODEL);
+    let at = |name: &str| place.path().join(name);
+    let text = |name: &str| fs::read_to_string(at(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+    done(place.path(), "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec");
+    let calibrate = "calibrate rec --model WN+RW --bootstrap 0 --seed 1 --quiet";
+    done(place.path(), &format!("{calibrate} --weighting edof -o wanted.toml --plot wanted.svg"));
+    done(place.path(), &format!("{calibrate} -o m.toml --plot m.svg"));
+    let before = text("m.toml");
+    for _ in 0..2 {
+        let ran = plain(place.path(), &format!("{calibrate} --weighting edof -o m.toml --plot m.svg"));
+        refused(&ran, "error: m.toml holds another result, this one is in m-2.toml");
+        assert!(!ran.stdout.is_empty(), "the fits are shown");
+    }
+    assert_eq!(text("m.toml"), before);
+    // the curves beside it are its own: the hash in the model says so
+    for (beside, wanted) in
+        [("m-2.toml", "wanted.toml"), ("m-2.wv.json", "wanted.wv.json"), ("m-2.svg", "wanted.svg")]
+    {
+        assert_eq!(text(beside), text(wanted), "{beside}");
+    }
+    assert!(at("m-2.html").exists() && !at("m-3.toml").exists());
+
+    done(place.path(), "wv rec --scales 5 -o wanted.json --page wanted.html");
+    fs::write(at("a.json"), "{}").unwrap();
+    fs::write(at("a.page.html"), "mine").unwrap();
+    let ran = plain(place.path(), "wv rec --scales 5 -o a.json --page a.page.html");
+    refused(&ran, "a.json holds another result, this one is in a-2.json");
+    assert_eq!((text("a-2.json"), text("a-2.page.html")), (text("wanted.json"), text("wanted.html")));
+    assert_eq!((text("a.json"), text("a.page.html")), ("{}".to_owned(), "mine".to_owned()));
+}
+
+/// A run whose seed is drawn is another one the next time: the hint says how to make the first one again.
+#[test]
+fn a_run_of_another_seed_is_told_the_first_ones() {
+    let place = place_with(DRIVE, MODEL);
+    let run = "run drive.toml imu.toml --outage none";
+    done(place.path(), &format!("{run} --runs 2 --seed 77"));
+    for (runs, is_same) in [("--runs 2", true), ("--runs 3", false)] {
+        let ran = plain(place.path(), &format!("{run} {runs}"));
+        refused(&ran, "holds the result of another");
+        assert_eq!(ran.stderr.contains("with --seed 77,"), is_same, "{}", ran.stderr);
+    }
+}
+
 /// Two outputs of one name, whatever either is.
 #[test]
 fn two_outputs_of_one_name_are_refused_at_once() {

@@ -62,10 +62,13 @@ pub(super) fn finish(
 ) -> Result<(), Failure> {
     let Calibration { groups, outcomes, settings, turn_on } = calibration;
     let diagnoses = diagnose(groups, outcomes, settings);
-    let files = ModelFiles::write_all(outputs, calibration, note, &diagnoses, session.existing())?;
+    let placed: Vec<ModelFiles> =
+        outputs.iter().map(|files| files.placed(calibration, note, session.existing())).collect();
+    let files = ModelFiles::write_all(&placed, calibration, note, &diagnoses)?;
     let files: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
     let all: Vec<&Outcome> = outcomes.iter().collect();
-    plot.write(|| report::calibration_svg(&CurvesFile::new(groups, &all, settings), &diagnoses), session)?;
+    let drawn =
+        plot.write(|| report::calibration_svg(&CurvesFile::new(groups, &all, settings), &diagnoses), session);
     if session.json() {
         let json = report::json(&FitsFile::new(outcomes, &diagnoses, turn_on, settings, files.clone()));
         session.printer.result(json.trim_end());
@@ -86,7 +89,8 @@ pub(super) fn finish(
     if outcomes.iter().any(|o| o.recordings > 1) {
         session.printer.detail(WHICH);
     }
-    Ok(())
+    outputs.iter().zip(&placed).try_for_each(|(asked, placed)| asked.refuse_beside(placed))?;
+    drawn
 }
 
 /// Where the choice between estimators is made.

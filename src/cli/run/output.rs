@@ -7,6 +7,7 @@ use crate::metrics::{Summary, VerdictKind};
 use crate::report::{self, Input, Manifest, ModelNote, TrajectorySeries, run_words};
 use crate::scenario::Scenario;
 use crate::sensors::outage::Outage;
+use std::cell::Cell;
 use std::path::Path;
 
 /// The manifest of a run: every key as it was used, outages one by one, the seed.
@@ -40,11 +41,22 @@ pub(crate) fn manifest(
 /// Whether a run directory can be made, found out before the long computation.
 pub(crate) fn claim(path: &Path, manifest: &Manifest, session: &Session) -> Result<Claim, Failure> {
     let inputs = manifest.inputs.iter().map(|i| Path::new(&i.path));
+    let first_seed = Cell::new(None);
     let recognise = |text: &str| {
-        let there = serde_json::from_str::<Manifest>(text);
-        Ok(there.map_or(Found::Foreign, |there| Found::result(manifest.is_same_run(&there))))
+        let Ok(there) = serde_json::from_str::<Manifest>(text) else { return Ok(Found::Foreign) };
+        first_seed.set(manifest.differs_in_seed(&there).then_some(there.seed));
+        Ok(Found::result(manifest.is_same_run(&there)))
     };
-    Ok(claim_directory(path, &report::RUN_FILES, inputs, session.existing(), recognise)?)
+    let claimed = claim_directory(path, &report::RUN_FILES, inputs, session.existing(), recognise);
+    claimed.map_err(|e| match first_seed.get() {
+        Some(seed) => {
+            let hint = format!(
+                "make that run again with --seed {seed}, name another directory with -o, or replace it with --force"
+            );
+            Failure::from(e).hint(hint)
+        }
+        None => e.into(),
+    })
 }
 
 /// Writes a run directory.

@@ -1,7 +1,7 @@
 //! A single output file.
 
 use super::temporary::{self, Temporary};
-use super::{Existing, kept, make_parent};
+use super::{Existing, kept_beside, make_parent, name_beside};
 use crate::formats::{FileError, hash};
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -51,17 +51,20 @@ impl AtomicFile {
         self.finish().map_err(|e| FileError::io(&self.destination, e))
     }
 
-    /// As [`AtomicFile::commit`], but not in the place of another result; `shown` is the destination as the user
-    /// named it.
+    /// As [`AtomicFile::commit`], but not in the place of another result: then it gets a name beside, so that the work
+    /// is not lost. `shown` is the destination as the user named it.
     ///
     /// # Errors
-    /// When the destination holds something else and is to stay, too.
+    /// When the destination holds something else and is to stay, too; which name it has then.
     pub(crate) fn commit_result(mut self, shown: &Path, existing: Existing) -> Result<(), FileError> {
         self.file.flush().map_err(|e| FileError::io(shown, e))?;
         if let (Existing::Keep, Some(temporary)) = (existing, &self.temporary) {
-            let digest = |path: &Path| hash::of_file(path).ok();
-            if self.destination.is_file() && digest(temporary.path()) != digest(&self.destination) {
-                return Err(kept(shown, "holds another result"));
+            let own = hash::of_file(temporary.path()).ok();
+            let is_usable = |path: &Path| !path.is_file() || hash::of_file(path).ok() == own;
+            if !is_usable(&self.destination) {
+                self.destination = name_beside(&self.destination, is_usable);
+                let refusal = kept_beside(shown, &self.destination);
+                return self.commit().and(Err(refusal));
             }
         }
         self.commit()

@@ -13,7 +13,7 @@ pub(crate) use temporary::remove_unfinished;
 
 use super::{FileError, Place, Setting};
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Refuses an output that is one of the inputs, under whatever name.
 ///
@@ -58,17 +58,32 @@ fn kept(path: &Path, why: &str) -> FileError {
     FileError::contents(path.display().to_string(), Place::Itself, why).setting(Setting::Force)
 }
 
+/// Refuses to put a result in the place of another, where it was written beside that.
+pub(crate) fn kept_beside(path: &Path, beside: &Path) -> FileError {
+    let name = beside.file_name().unwrap_or_default();
+    let beside = if path.is_symlink() { beside.to_owned() } else { path.with_file_name(name) };
+    kept(path, &format!("holds another result, this one is in {}", beside.display()))
+}
+
+/// The first of `model-2.toml`, `model-3.toml` … beside `model.toml` that is usable.
+pub(crate) fn name_beside(path: &Path, is_usable: impl Fn(&Path) -> bool) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let dot = name.get(1..).and_then(|rest| rest.find('.')).map_or(name.len(), |at| at + 1);
+    let (stem, ending) = name.split_at(dot);
+    let mut names = (2_u64..).map(|n| path.with_file_name(format!("{stem}-{n}{ending}")));
+    names.find(|path| is_usable(path)).expect("no directory holds so many files")
+}
+
 /// Writes a result as a file, but not in the place of another one.
 ///
 /// # Errors
-/// As [`guard_contents`] and [`write()`].
+/// As [`AtomicFile::create`] and [`AtomicFile::commit_result`].
 pub(crate) fn write_result(
     destination: &Path,
     contents: impl AsRef<[u8]>,
     existing: Existing,
 ) -> Result<(), FileError> {
-    guard_contents(destination, contents.as_ref(), existing)?;
-    write(destination, contents)
+    filled(destination, contents.as_ref())?.commit_result(destination, existing)
 }
 
 /// Writes a whole file.
@@ -76,9 +91,14 @@ pub(crate) fn write_result(
 /// # Errors
 /// As [`AtomicFile::create`] and [`AtomicFile::commit`].
 pub(crate) fn write(destination: &Path, contents: impl AsRef<[u8]>) -> Result<(), FileError> {
+    filled(destination, contents.as_ref())?.commit()
+}
+
+/// A file that is written but does not have its name yet.
+pub(crate) fn filled(destination: &Path, contents: &[u8]) -> Result<AtomicFile, FileError> {
     let mut file = AtomicFile::create(destination)?;
-    file.write_all(contents.as_ref()).map_err(|e| FileError::io(destination, e))?;
-    file.commit()
+    file.write_all(contents).and_then(|()| file.flush()).map_err(|e| FileError::io(destination, e))?;
+    Ok(file)
 }
 
 /// Makes the directory that `path` is to stand in.
