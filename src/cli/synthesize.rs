@@ -155,8 +155,8 @@ fn reaches(
         );
     }
     let made = |rule: &Rule| channels.iter().any(|c| c.sensor == rule.sensor);
-    let Some(Rule { sensor, .. }) = rules.iter().find(|rule| !made(rule)) else { return Ok(()) };
-    let message = format!("--contaminate {name}: it corrupts the {}, which is not made", sensor.name());
+    let Some(Rule { sensor, place, .. }) = rules.iter().find(|rule| !made(rule)) else { return Ok(()) };
+    let message = format!("{place}: corrupts the {}, which is not made", sensor.name());
     if rules.iter().any(made) {
         session.printer.detail(&message);
         return Ok(());

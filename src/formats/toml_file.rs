@@ -159,7 +159,8 @@ impl<'a> Section<'a> {
     }
 
     /// The line it begins in.
-    fn line(&self) -> usize {
+    /// Line of the file where the table begins.
+    pub(crate) fn line(&self) -> usize {
         self.source.line(self.span.start)
     }
 

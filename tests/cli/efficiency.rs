@@ -93,7 +93,8 @@ fn a_contamination_that_does_not_fit_is_told_before_anything_is_written() {
     fs::write(dir.path().join("s.toml"), study).unwrap();
     let mut command = Command::cargo_bin("nav-sim").unwrap();
     command.current_dir(dir.path()).args(["efficiency", "s.toml", "-o", "out"]);
-    let message = "error: s.toml: a train of bursts needs 450500 samples, the record has 4096";
+    let message =
+        "error: s.toml: bursts.toml, line 1: a train of bursts needs 450500 samples, the record has 4096";
     let assert = command.assert().code(2);
     assert!(said(&assert).starts_with(message), "{}", said(&assert));
     assert!(!dir.path().join("out").exists());

@@ -163,7 +163,17 @@ fn mistakes_are_refused_and_leave_nothing() {
         .unwrap();
     refused(
         &["model.toml", "--samples", "100", "--contaminate", "plain.toml"],
-        "replicate 1: the replacement of points needs 500 samples, the record has 100",
+        "plain.toml, line 1: the replacement of points needs 500 samples, the record has 100 (replicate 1)",
+        "",
+    );
+    fs::write(
+        place.path("plain.toml"),
+        "schema = 1\n\n[[gyro]]\noperation = \"scale\"\nprocess = \"DR\"\nparameter = \"slope\"\nfactor = 2\n",
+    )
+    .unwrap();
+    refused(
+        &["model.toml", "--contaminate", "plain.toml"],
+        "plain.toml, line 3: gyro.x has no DR slope to scale, only",
         "",
     );
     fs::write(
@@ -173,7 +183,7 @@ fn mistakes_are_refused_and_leave_nothing() {
     .unwrap();
     refused(
         &["plain.toml", "--axes", "gyro", "--contaminate", "section4-III"],
-        "--contaminate section4-III: it corrupts the accel, which is not made",
+        "section4-III, line 5: corrupts the accel, which is not made",
         "another contamination",
     );
     fs::write(place.path("plain.toml"), "[[accel]]\noperation = \"replace\"\npoints = 500\nsigma = 1\n")

@@ -1,7 +1,7 @@
 //! One set of replicates: drawn, contaminated in several ways, estimated from.
 
 use crate::imu::Channel;
-use crate::noise::contamination::{Contamination, ContaminationError, Operation};
+use crate::noise::contamination::{Contamination, Operation, RefusedRule};
 use crate::noise::{Model, Spread, SpreadError, Synthesizer};
 use crate::rng::StreamKey;
 use crate::wavelet::{Status, Tuning, WaveletError, both, default_levels};
@@ -47,7 +47,7 @@ pub enum StudyError {
     Spread(#[from] SpreadError),
     /// A contamination cannot be applied.
     #[error(transparent)]
-    Contamination(#[from] ContaminationError),
+    Contamination(#[from] RefusedRule),
     /// The replicates are too short for the levels.
     #[error(transparent)]
     Wavelet(#[from] WaveletError),
@@ -142,7 +142,7 @@ impl Design {
     /// The wavelet variances of one replicate (counted from 1) in every scenario.
     fn replicate(&self, set: u64, replicate: u64) -> Result<Vec<Replicate>, StudyError> {
         let operations: Vec<Vec<&Operation>> =
-            self.scenarios.iter().map(|s| s.rules_for(self.channel, replicate)).collect();
+            self.scenarios.iter().map(|s| s.operations_for(self.channel, replicate)).collect();
         let mut measured: Vec<Replicate> = Vec::with_capacity(operations.len());
         for (i, own) in operations.iter().enumerate() {
             let same = operations[..i].iter().position(|earlier| earlier == own);
@@ -250,7 +250,7 @@ pub(super) mod tests {
     }
 
     fn rule(replicate: Option<u64>, operation: Operation) -> Rule {
-        Rule { sensor: Sensor::Accel, replicate, operation }
+        Rule { sensor: Sensor::Accel, replicate, operation, place: String::new() }
     }
 
     fn scenario(rules: Vec<Rule>) -> Contamination {

@@ -115,7 +115,9 @@ fn read_rules(
             Described::HeavyTails(tails) => entry.heavy_tails(tails)?,
             Described::Scale(scale) => entry.scale(scale)?,
         };
-        into.push(Rule { sensor, replicate: replicates.as_ref().map(|r| r[i]), operation });
+        let replicate = replicates.as_ref().map(|r| r[i]);
+        let place = format!("{}, line {}", section.source.path(), section.line());
+        into.push(Rule { sensor, replicate, operation, place });
     }
     Ok(())
 }

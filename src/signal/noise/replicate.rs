@@ -1,6 +1,6 @@
 //! Virtual replicates: what a laboratory would record, switched on again and again.
 
-use super::contamination::{Contamination, ContaminationError};
+use super::contamination::{Contamination, RefusedRule};
 use super::{Model, Spread, SpreadError, Synthesizer};
 use crate::imu::{Channel, Recording, Signal};
 use crate::rng::StreamKey;
@@ -25,12 +25,12 @@ pub enum ReplicateError {
     #[error(transparent)]
     Spread(#[from] SpreadError),
     /// The contamination does not fit the model or the record.
-    #[error("replicate {replicate}: {source}")]
+    #[error("{source} (replicate {replicate})")]
     Contamination {
         /// Which replicate, counted from 1.
         replicate: u64,
         /// Why.
-        source: ContaminationError,
+        source: RefusedRule,
     },
 }
 
@@ -126,7 +126,7 @@ mod tests {
 
         let operation =
             Operation::Step { at: crate::noise::contamination::Extent::Share(0.5), amplitude: 1000.0 };
-        let rule = Rule { sensor: Sensor::Accel, replicate: Some(1), operation };
+        let rule = Rule { sensor: Sensor::Accel, replicate: Some(1), operation, place: String::new() };
         let contamination = Contamination { name: "step".into(), rules: vec![rule] };
         let dirty = VirtualImu { contamination: Some(&contamination), ..clean };
         let stepped = dirty.signal(&model, 1, X, 100).unwrap();
@@ -142,7 +142,7 @@ mod tests {
         let mut spread = Spread::default();
         spread.axes[0].push(variation);
         let operation = Operation::Scale { process: "RW".into(), parameter: "gamma2".into(), factor: 4.0 };
-        let rule = Rule { sensor: Sensor::Accel, replicate: Some(1), operation };
+        let rule = Rule { sensor: Sensor::Accel, replicate: Some(1), operation, place: String::new() };
         let contamination = Contamination { name: "scale".into(), rules: vec![rule] };
         let drawn = VirtualImu { model: &model, spread: Some(&spread), contamination: None, seed: 3 };
         let scaled = VirtualImu { contamination: Some(&contamination), ..drawn };

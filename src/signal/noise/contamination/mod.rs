@@ -100,9 +100,22 @@ pub struct Rule {
     pub replicate: Option<u64>,
     /// What is done.
     pub operation: Operation,
+    /// Where it is written, such as "shocks.toml, line 3"; empty: nowhere.
+    #[serde(skip)]
+    pub place: String,
 }
 
-/// A rule that cannot be applied.
+/// A rule that cannot be applied, and where it is written.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error("{place}{}{source}", if place.is_empty() { "" } else { ": " })]
+pub struct RefusedRule {
+    /// Of the rule.
+    pub place: String,
+    /// Why.
+    pub source: ContaminationError,
+}
+
+/// Why a rule cannot be applied.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ContaminationError {
     /// The record is too short for it.
@@ -147,13 +160,16 @@ pub struct Contamination {
 impl Contamination {
     /// What is done to a signal of a replicate (counted from 1), in the order of application.
     #[must_use]
-    pub fn rules_for(&self, channel: Channel, replicate: u64) -> Vec<&Operation> {
+    pub fn operations_for(&self, channel: Channel, replicate: u64) -> Vec<&Operation> {
+        self.rules_for(channel, replicate).into_iter().map(|r| &r.operation).collect()
+    }
+
+    fn rules_for(&self, channel: Channel, replicate: u64) -> Vec<&Rule> {
         let applies =
             |r: &&Rule| r.sensor == channel.sensor && r.replicate.is_none_or(|only| only == replicate);
-        let mut operations: Vec<&Operation> =
-            self.rules.iter().filter(applies).map(|r| &r.operation).collect();
-        operations.sort_by_key(|o| o.stage());
-        operations
+        let mut rules: Vec<&Rule> = self.rules.iter().filter(applies).collect();
+        rules.sort_by_key(|r| r.operation.stage());
+        rules
     }
 
     /// Whether anything is done to a replicate (counted from 1).
@@ -172,10 +188,10 @@ impl Contamination {
         channel: Channel,
         replicate: u64,
         rate_hz: f64,
-    ) -> Result<(), ContaminationError> {
-        for operation in self.rules_for(channel, replicate) {
-            if let Operation::Scale { process, parameter, factor } = operation {
-                scale(noise, channel, (process, parameter), *factor, rate_hz)?;
+    ) -> Result<(), RefusedRule> {
+        for rule in self.rules_for(channel, replicate) {
+            if let Operation::Scale { process, parameter, factor } = &rule.operation {
+                scale(noise, channel, (process, parameter), *factor, rate_hz).map_err(|e| rule.refused(e))?;
             }
         }
         Ok(())
@@ -193,18 +209,25 @@ impl Contamination {
         replicate: u64,
         rate_hz: f64,
         seed: u64,
-    ) -> Result<(), ContaminationError> {
+    ) -> Result<(), RefusedRule> {
         let source = channel.to_string();
-        let operations = self.rules_for(channel, replicate);
-        for (i, operation) in operations.iter().enumerate() {
+        let rules = self.rules_for(channel, replicate);
+        for (i, rule) in rules.iter().enumerate() {
+            let operation = &rule.operation;
             // A second operation of a kind draws from another stream.
-            let same = operations[..i].iter().filter(|o| o.stage() == operation.stage()).count();
+            let same = rules[..i].iter().filter(|r| r.operation.stage() == operation.stage()).count();
             let process = format!("{}_{}", operation.name(), same + 1);
             let run = replicate.wrapping_sub(1);
             let key = StreamKey { seed, scenario: "contamination", run, source: &source, process: &process };
-            operation.apply(samples, rate_hz, key)?;
+            operation.apply(samples, rate_hz, key).map_err(|e| rule.refused(e))?;
         }
         Ok(())
+    }
+}
+
+impl Rule {
+    fn refused(&self, source: ContaminationError) -> RefusedRule {
+        RefusedRule { place: self.place.clone(), source }
     }
 }
 

@@ -5,7 +5,7 @@ use crate::noise::{RandomWalk, White};
 const X: Channel = Channel { sensor: Sensor::Accel, axis: Axis::X };
 
 fn one(operation: Operation) -> Contamination {
-    let rules = vec![Rule { sensor: Sensor::Accel, replicate: Some(2), operation }];
+    let rules = vec![Rule { sensor: Sensor::Accel, replicate: Some(2), operation, place: String::new() }];
     Contamination { name: "test".into(), rules }
 }
 
@@ -86,6 +86,8 @@ fn bursts_are_sines_at_multiples_of_the_spacing() {
     let mut short = vec![0.0; 239];
     let e = one(bursts).apply(&mut short, X, 2, 100.0, 1).unwrap_err();
     assert_eq!(e.to_string(), "a train of bursts needs 240 samples, the record has 239");
+    let e = RefusedRule { place: "a.toml, line 3".into(), ..e };
+    assert_eq!(e.to_string(), "a.toml, line 3: a train of bursts needs 240 samples, the record has 239");
 }
 
 #[test]
@@ -107,7 +109,8 @@ fn the_order_is_fixed_and_other_signals_are_untouched() {
         sigma: 0.0,
     };
     let step = Operation::Step { at: Extent::Samples(0), amplitude: 1.0 };
-    let rule = |operation| Rule { sensor: Sensor::Accel, replicate: Some(2), operation };
+    let rule =
+        |operation| Rule { sensor: Sensor::Accel, replicate: Some(2), operation, place: String::new() };
     let both = Contamination { name: String::new(), rules: vec![rule(replace), rule(step)] };
     let mut x = vec![5.0; 4];
     both.apply(&mut x, X, 2, 100.0, 1).unwrap();
@@ -152,7 +155,9 @@ fn the_same_points_are_replaced_whatever_else_is_done() {
     let mut with_bursts = one(replace);
     let (length, spacing) = (Extent::Samples(1), Extent::Samples(999));
     let bursts = Operation::Bursts { count: 1, length, spacing, amplitude: 0.0, frequency_hz: 1.0 };
-    with_bursts.rules.insert(0, Rule { sensor: Sensor::Accel, replicate: None, operation: bursts });
+    with_bursts
+        .rules
+        .insert(0, Rule { sensor: Sensor::Accel, replicate: None, operation: bursts, place: String::new() });
     let mut x = vec![0.0; 1000];
     with_bursts.apply(&mut x, X, 2, 100.0, 1).unwrap();
     assert_eq!(x, alone);
