@@ -15,7 +15,7 @@ use crate::sensors::outage::{
 use crate::simulation::lincov::{Alike, Track, reduced_belief};
 use crate::simulation::{Experiment, ExperimentError};
 use crate::trajectory::Trajectory;
-use crate::units::SettingError;
+use crate::units::{Probability, SettingError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -55,6 +55,7 @@ pub const MAX_RUNS: u64 = 10_000_000;
 #[serde(deny_unknown_fields, default)]
 pub struct RunSettings {
     /// Monte-Carlo runs.
+    #[schemars(range(min = 1, max = MAX_RUNS))]
     pub runs: u64,
     /// Seed of all random numbers; without it one is drawn and recorded.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -62,6 +63,7 @@ pub struct RunSettings {
     /// How the statistics are found.
     pub method: Method,
     /// Level of the coverage statistic.
+    #[schemars(with = "Probability")]
     pub coverage_level: f64,
 }
 
@@ -113,6 +115,7 @@ pub struct FilterSettings {
     pub gravity: GravityModel,
     /// A fix is not used when its NIS is above the chi-square quantile of this probability; without it, every
     /// fix is used.
+    #[schemars(with = "Option<Probability>")]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub nis_gate: Option<f64>,
 }

@@ -1,6 +1,8 @@
 //! The border: units that headers, keys and flags name, and the values they may take. Inside, everything
 //! is SI and radians.
 
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+
 /// One degree in radians.
 pub const DEG: f64 = std::f64::consts::PI / 180.0;
 /// Standard gravity, exact (m/s²).
@@ -43,6 +45,40 @@ impl SettingError {
         self
     }
 }
+
+/// A number as schemas of files have it.
+macro_rules! number_in_schemas {
+    ($(#[$meta:meta])* $name:ident, $bounds:tt) => {
+        $(#[$meta])*
+        #[derive(Debug)]
+        pub struct $name;
+
+        impl JsonSchema for $name {
+            fn inline_schema() -> bool {
+                true
+            }
+            fn schema_name() -> std::borrow::Cow<'static, str> {
+                stringify!($name).into()
+            }
+            fn json_schema(_: &mut SchemaGenerator) -> Schema {
+                json_schema!($bounds)
+            }
+        }
+    };
+}
+
+number_in_schemas!(
+    /// In schemas, what [`require_positive`] accepts.
+    Positive, { "type": "number", "exclusiveMinimum": 0 }
+);
+number_in_schemas!(
+    /// In schemas, what [`require_non_negative`] accepts.
+    NonNegative, { "type": "number", "minimum": 0 }
+);
+number_in_schemas!(
+    /// In schemas, a number between 0 and 1, neither of them.
+    Probability, { "type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1 }
+);
 
 /// Accepts finite numbers > 0.
 ///

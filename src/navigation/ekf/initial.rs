@@ -2,7 +2,7 @@
 
 use crate::frames::RollPitchYaw;
 use crate::imu::Sensor;
-use crate::units::{SettingError, require_non_negative, require_positive};
+use crate::units::{NonNegative, Positive, SettingError, require_non_negative, require_positive};
 use glam::DQuat;
 use nalgebra::Matrix3;
 use schemars::JsonSchema;
@@ -17,25 +17,32 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 pub struct InitialSettings {
     /// Position north, east, down (m).
+    #[schemars(with = "[Positive; 3]", inner(range(max = 1e5)))]
     pub pos_sigma_m: [f64; 3],
     /// Velocity north, east, down (m/s).
+    #[schemars(with = "[Positive; 3]", inner(range(max = 1000.0)))]
     pub vel_sigma_m_s: [f64; 3],
     /// Roll, pitch, yaw (degrees).
+    #[schemars(with = "[Positive; 3]", inner(range(max = 30.0)))]
     pub att_sigma_deg: [f64; 3],
     /// Turn-on bias of the accelerometers that the filter expects beside the model's processes (m/s²): an
     /// unknown constant, one state an axis; without it, none.
+    #[schemars(with = "Option<NonNegative>", range(max = 10.0))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accel_bias_sigma_m_s2: Option<f64>,
     /// Turn-on bias of the gyroscopes that the filter expects beside the model's processes (rad/s): an unknown
     /// constant, one state an axis; without it, none.
+    #[schemars(with = "Option<NonNegative>", range(max = 1.0))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gyro_bias_sigma_rad_s: Option<f64>,
     /// Scale-factor error of the accelerometers that the filter expects (parts per million): an unknown
     /// constant, one state an axis; without it, 300 in the filter of 21 states and none in the others.
+    #[schemars(with = "Option<NonNegative>", range(max = 1e5))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub accel_scale_sigma_ppm: Option<f64>,
     /// Scale-factor error of the gyroscopes that the filter expects (parts per million), as that of the
     /// accelerometers.
+    #[schemars(with = "Option<NonNegative>", range(max = 1e5))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gyro_scale_sigma_ppm: Option<f64>,
     /// Start exactly at the truth; the filter's covariance stays as given above.

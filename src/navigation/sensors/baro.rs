@@ -1,7 +1,7 @@
 //! A barometric altimeter: height with white noise, as the R package `navigation` has it.
 
 use crate::rng::{Generator, StreamKey};
-use crate::units::{SettingError, require_positive};
+use crate::units::{Positive, SettingError, require_positive};
 use rand_distr::{Distribution, StandardNormal};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -11,8 +11,10 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct BaroSettings {
     /// Heights per second.
+    #[schemars(with = "Positive")]
     pub rate_hz: f64,
     /// Standard deviation of a height (m).
+    #[schemars(with = "Positive")]
     pub sigma_m: f64,
 }
 

@@ -3,7 +3,7 @@
 
 use crate::imu::{ImuSample, MAX_RATE_HZ, Sensor};
 use crate::rng::StreamKey;
-use crate::units::{SettingError, require_non_negative, require_positive};
+use crate::units::{NonNegative, Positive, SettingError, require_non_negative, require_positive};
 use glam::{DMat3, DVec3};
 use rand_distr::{Distribution, StandardNormal};
 use schemars::JsonSchema;
@@ -20,18 +20,24 @@ pub const MAX_BIAS_RAD_S: f64 = 1.0;
 #[serde(deny_unknown_fields, default)]
 pub struct ImuSettings {
     /// Samples per second.
+    #[schemars(with = "Positive", range(max = MAX_RATE_HZ))]
     pub rate_hz: f64,
     /// Turn-on bias of the accelerometers (m/s²); without it that of the model's `[turn_on]`, or none.
+    #[schemars(with = "Option<NonNegative>", range(max = MAX_BIAS_M_S2))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub turn_on_bias_accel_m_s2: Option<f64>,
     /// Turn-on bias of the gyroscopes (rad/s); without it that of the model's `[turn_on]`, or none.
+    #[schemars(with = "Option<NonNegative>", range(max = MAX_BIAS_RAD_S))]
     #[serde(skip_serializing_if = "Option::is_none")]
     pub turn_on_bias_gyro_rad_s: Option<f64>,
     /// Scale-factor error of the accelerometers (parts per million).
+    #[schemars(with = "NonNegative", range(max = 1e5))]
     pub scale_ppm_accel: f64,
     /// Scale-factor error of the gyroscopes (parts per million).
+    #[schemars(with = "NonNegative", range(max = 1e5))]
     pub scale_ppm_gyro: f64,
     /// Misalignment: what each axis of both sensors takes of each other axis (rad).
+    #[schemars(with = "NonNegative", range(max = 0.1))]
     pub misalignment_rad: f64,
 }
 

@@ -1,7 +1,9 @@
 //! The GNSS receiver: what it measures, how often and how well.
 
 use crate::rng::{Generator, StreamKey};
-use crate::units::{SettingError, require_finite, require_non_negative, require_positive};
+use crate::units::{
+    NonNegative, Positive, SettingError, require_finite, require_non_negative, require_positive,
+};
 use glam::DVec3;
 use rand_distr::{Distribution, StandardNormal};
 use schemars::JsonSchema;
@@ -18,19 +20,24 @@ pub const MAX_LEVER_ARM_M: f64 = 100.0;
 #[serde(deny_unknown_fields, default)]
 pub struct GnssSettings {
     /// Fixes per second.
+    #[schemars(with = "Positive")]
     pub rate_hz: f64,
     /// Position standard deviations north, east, down (m).
+    #[schemars(with = "[Positive; 3]")]
     pub pos_sigma_m: [f64; 3],
     /// Velocity standard deviations north, east, down (m/s); `None` ("none" in files): no velocity.
     #[serde(serialize_with = "sigmas_or_none", deserialize_with = "parse_sigmas_or_none")]
     #[schemars(with = "SigmasOrNoneText")]
     pub vel_sigma_m_s: Option<[f64; 3]>,
     /// Antenna position with respect to the IMU, in b: front, right, down (m).
+    #[schemars(inner(range(min = -MAX_LEVER_ARM_M, max = MAX_LEVER_ARM_M)))]
     pub lever_arm_m: [f64; 3],
     /// Standard deviations of a correlated position error north, east, down (m): a Gauss-Markov process beside
     /// the white noise, in the true receiver only. The filter believes `pos_sigma_m`, white.
+    #[schemars(with = "[NonNegative; 3]")]
     pub correlated_pos_sigma_m: [f64; 3],
     /// Correlation time of that error (s).
+    #[schemars(with = "Positive")]
     pub correlation_time_s: f64,
 }
 
@@ -149,7 +156,7 @@ fn parse_sigmas_or_none<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Op
 #[serde(untagged)]
 #[expect(dead_code, reason = "a description of the text, never a value")]
 enum SigmasOrNoneText {
-    Sigmas([f64; 3]),
+    Sigmas(#[schemars(with = "[Positive; 3]")] [f64; 3]),
     None(NoneText),
 }
 

@@ -2,7 +2,7 @@
 
 use super::Outage;
 use crate::rng::StreamKey;
-use crate::units::{SettingError, require_finite, require_positive};
+use crate::units::{Positive, SettingError, require_finite, require_positive};
 use rand_distr::{Distribution, Exp};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -11,11 +11,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PeriodicOutages {
-    /// Start of the first (s).
+    /// Start of the first (s), on the clock of the trajectory: its `t_s`, which need not begin at 0.
     pub first_s: f64,
     /// From one start to the next (s).
+    #[schemars(range(min = 0.1))]
     pub every_s: f64,
-    /// Length of each (s).
+    /// Length of each (s), less than `every_s`.
+    #[schemars(with = "Positive")]
     pub duration_s: f64,
 }
 
@@ -54,8 +56,10 @@ impl PeriodicOutages {
 #[serde(deny_unknown_fields)]
 pub struct RandomOutages {
     /// Outages per hour of time with fixes.
+    #[schemars(with = "Positive", range(max = 3600.0))]
     pub rate_per_hour: f64,
     /// Length of each (s).
+    #[schemars(with = "Positive")]
     pub duration_s: f64,
 }
 
