@@ -2,6 +2,7 @@
 
 use super::common::{Color, Common};
 use super::exit::Failure;
+use crate::formats::system_words;
 use std::borrow::Cow;
 use std::io::{ErrorKind, IsTerminal, Write};
 
@@ -40,7 +41,7 @@ impl Printer {
             Ok(()) => {}
             Err(e) if e.kind() == ErrorKind::BrokenPipe => std::process::exit(0),
             Err(e) => {
-                let failure = Failure::could_not(format!("standard output: {e}"));
+                let failure = Failure::could_not(format!("standard output: {}", system_words(&e)));
                 self.failure(&failure);
                 std::process::exit(failure.code().into());
             }

@@ -5,7 +5,7 @@ use super::parse::words;
 use super::{Progress, Session};
 use crate::formats::recordings::{Gaps, ReadOptions, Report};
 use crate::jobs::{Remark, Remarks};
-use crate::report::{warm_up_in_short, warm_up_lines};
+use crate::report::{BeginsOtherwise, warm_up_in_short, warm_up_lines};
 
 /// How recordings are read.
 #[derive(clap::Args, Debug)]
@@ -110,14 +110,16 @@ impl RecordingArgs {
 pub(crate) struct Said<'a> {
     session: &'a Session,
     progress: Option<Progress>,
+    /// The recordings, and how long each is (s).
+    lengths: Vec<(String, f64)>,
 }
 
 impl<'a> Said<'a> {
     pub(crate) const fn new(session: &'a Session) -> Self {
-        Self { session, progress: None }
+        Self { session, progress: None, lengths: Vec::new() }
     }
 
-    fn report(&self, report: &Report) {
+    fn report(&mut self, report: &Report) {
         let printer = &self.session.printer;
         if report.files.len() > FEW {
             printer.say(&format!("{} (--verbose: each of them)", report.summary()));
@@ -134,6 +136,22 @@ impl<'a> Said<'a> {
         }
         for warning in report.all_warnings() {
             printer.warn(&warning);
+        }
+        for file in &report.files {
+            let seconds = |(name, samples)| (name, samples as f64 / file.rate_hz);
+            self.lengths.extend(file.recordings().map(seconds));
+        }
+    }
+
+    /// `; 262 s of them are used`, of recordings whose beginning is left out.
+    fn used(&self, found: &[BeginsOtherwise]) -> String {
+        let length = |name: &str| self.lengths.iter().find(|(own, _)| own == name).map(|(_, s)| *s);
+        let used = found.iter().filter_map(|own| Some(length(&own.recording)? - own.skip_s?));
+        let (low, high) = used.fold((f64::INFINITY, 0.0_f64), |(low, high), s| (low.min(s), high.max(s)));
+        match high - low {
+            _ if high == 0.0 => String::new(),
+            ..0.5 => format!("; {high:.0} s of it are used"),
+            _ => format!("; {low:.0} to {high:.0} s of them are used"),
         }
     }
 }
@@ -154,7 +172,9 @@ impl Remarks for Said<'_> {
                 for line in warm_up_lines(found, rate_hz) {
                     self.session.printer.detail(&line);
                 }
-                self.session.printer.warn(&warm_up_in_short(found, recordings, left_out, rate_hz));
+                let used = if left_out { self.used(found) } else { String::new() };
+                let short = warm_up_in_short(found, recordings, left_out, rate_hz);
+                self.session.printer.warn(&format!("{short}{used}"));
             }
             Remark::Shortest { recording, samples, scales, usual } => self.session.printer.warn(&format!(
                 "{recording}: its {samples} samples limit all recordings to {scales} scales; without it there would be \

@@ -88,7 +88,7 @@ pub enum Kind {
 impl fmt::Display for Kind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::System(source) => source.fmt(f),
+            Self::System(source) => f.write_str(&system_words(source)),
             Self::Empty(message) => f.write_str(message),
             Self::Header(message) | Self::Columns(message) | Self::Contents(message) => f.write_str(message),
             Self::UnknownKey(key) => write!(f, "unknown key \"{key}\""),
@@ -97,6 +97,26 @@ impl fmt::Display for Kind {
             Self::Cell { column, value, reason } => write!(f, "column \"{column}\": {value} {reason}"),
         }
     }
+}
+
+/// What the system said, in our words where it comes often, without its numbers.
+pub(crate) fn system_words(error: &io::Error) -> Cow<'static, str> {
+    use io::ErrorKind as K;
+    let words = match error.kind() {
+        // an error of our own says more than its kind
+        _ if error.get_ref().is_some() => return error.to_string().into(),
+        K::PermissionDenied => "the system does not permit it",
+        K::ReadOnlyFilesystem => "the disk is read-only",
+        K::IsADirectory => "it is a directory, not a file",
+        K::NotADirectory | K::AlreadyExists => "a file is where a directory is needed",
+        K::StorageFull => "no space is left on the disk",
+        K::QuotaExceeded => "no space is left within the quota",
+        _ => {
+            let text = error.to_string();
+            return text.split(" (os error").next().unwrap_or_default().to_owned().into();
+        }
+    };
+    words.into()
 }
 
 impl fmt::Display for FileError {
@@ -127,11 +147,21 @@ impl FileError {
         Self { path: path.into(), place: place.into(), kind, remedies: Vec::new() }
     }
 
-    /// What the system said of a file.
+    /// What the system said of a file, and what helps.
     pub fn io(path: &Path, source: io::Error) -> Self {
-        let cut_off = matches!(source.kind(), io::ErrorKind::UnexpectedEof);
+        use io::ErrorKind as K;
+        let advice = match source.kind() {
+            K::UnexpectedEof => Some("the file is cut off: copy or pack it again"),
+            K::PermissionDenied | K::ReadOnlyFilesystem => {
+                Some("change the permissions of the file or its directory, or name another path")
+            }
+            K::IsADirectory => Some("name a file"),
+            K::NotADirectory | K::AlreadyExists => Some("name another path, or move that file away"),
+            K::StorageFull | K::QuotaExceeded => Some("make room, or name a path on another disk"),
+            _ => None,
+        };
         let error = Self::new(path.display().to_string(), Place::Within, Kind::System(source));
-        if cut_off { error.advice("the file is cut off: copy or pack it again") } else { error }
+        error.advice_if(advice.map(str::to_owned))
     }
 
     /// Contents that are refused, in words.
@@ -294,5 +324,25 @@ mod tests {
         assert!(e(io::ErrorKind::NotFound).is_system() && !e(io::ErrorKind::UnexpectedEof).is_system());
         assert!(!FileError::contents("a", Place::Itself, "is cut off").is_system());
         assert!(e(io::ErrorKind::UnexpectedEof).hint().is_some());
+    }
+
+    /// The numbers are those of POSIX (errno.h).
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn the_system_is_told_in_our_words() {
+        for (number, told, hint) in [
+            (2, "a: No such file or directory", None),
+            (13, "a: the system does not permit it", Some("change the permissions")),
+            (17, "a: a file is where a directory is needed", Some("name another path")),
+            (20, "a: a file is where a directory is needed", Some("name another path")),
+            (21, "a: it is a directory, not a file", Some("name a file")),
+            (28, "a: no space is left on the disk", Some("make room")),
+            (5, "a: Input/output error", None),
+        ] {
+            let e = FileError::io(Path::new("a"), io::Error::from_raw_os_error(number));
+            assert_eq!(e.to_string(), told);
+            let is_hinted = |start: &str| e.hint().is_some_and(|given| given.starts_with(start));
+            assert!(hint.map_or(e.hint().is_none(), is_hinted), "{number}: {:?}", e.hint());
+        }
     }
 }

@@ -28,4 +28,5 @@ pub(crate) mod toml_file;
 mod toml_path;
 pub mod trajectory_file;
 
+pub(crate) use error::system_words;
 pub use error::{FileError, Kind, Place, Remedy, Setting};

@@ -99,7 +99,12 @@ impl Source {
             let line_start = self.text[..at].rfind('\n').map_or(0, |i| i + 1);
             let column = self.text[line_start..at].chars().count() + 1;
             let place = Place::Character(self.line(at) as u64, column as u64);
-            FileError::contents(self.path.as_str(), place, e.message())
+            let key = e.span().and_then(|span| self.text.get(span)).map(str::trim).unwrap_or_default();
+            let message = match e.message() {
+                "duplicate key" => format!("the key \"{key}\" is there already"),
+                other => other.to_owned(),
+            };
+            FileError::contents(self.path.as_str(), place, message)
         })
     }
 
@@ -360,7 +365,7 @@ mod tests {
     #[test]
     fn a_missing_file_is_named() {
         let e = Source::read(Path::new("/no/such.toml")).unwrap_err();
-        assert_eq!(e.to_string(), "/no/such.toml: No such file or directory (os error 2)");
+        assert_eq!(e.to_string(), "/no/such.toml: No such file or directory");
         assert!(e.is_system());
     }
 }

@@ -4,7 +4,7 @@ use super::fits::CandidateEntry;
 use super::practical::{policy, practical_rows};
 use crate::calibration::{
     ALIKE_LEVEL, Estimator, Goodness, Inference, LevelSpread, Outcome, Ranking, Settings, Share,
-    correlation_time_s, percent, reasons, shares, signals, tau_s, undetermined,
+    correlation_time_s, duration, percent, reasons, shares, signals, tau_s, undetermined,
 };
 use crate::imu::Sensor;
 use crate::noise::{Composite, Process};
@@ -90,8 +90,9 @@ fn spread_line(inference: &Inference, outcome: &Outcome) -> Option<String> {
     let LevelSpread { tau_s, within, between } =
         *inference.spread.iter().max_by(|a, b| most(a).total_cmp(&most(b)))?;
     Some(format!(
-        "  {signals} differ beyond their noise (p = {p:.3}), most at {tau_s} s: by {} of the wavelet variance, noise alone \
+        "  {signals} differ beyond their noise (p = {p:.3}), most at {}: by {} of the wavelet variance, noise alone \
          makes {}",
+        duration(tau_s),
         percent(between),
         percent(within)
     ))
@@ -126,15 +127,16 @@ fn process_lines(model: &Composite, sensor: Sensor, levels: &[u32], rate_hz: f64
         let meaning = meaning(process, sensor, rate_hz);
         let governs = match (share.leads.first(), share.leads.last()) {
             (Some(first), Some(last)) if first == last => {
-                format!("dominates at {} s", tau_s(*first, rate_hz))
+                format!("dominates at {}", duration(tau_s(*first, rate_hz)))
             }
             (Some(first), Some(last)) => {
-                format!("dominates from {} s to {} s", tau_s(*first, rate_hz), tau_s(*last, rate_hz))
+                let ends = [first, last].map(|level| duration(tau_s(*level, rate_hz)));
+                format!("dominates from {} to {}", ends[0], ends[1])
             }
             _ => format!(
-                "dominates at no scale ({} of the variance at most, at {} s)",
+                "dominates at no scale ({} of the variance at most, at {})",
                 percent(share.largest.0),
-                tau_s(share.largest.1, rate_hz)
+                duration(tau_s(share.largest.1, rate_hz))
             ),
         };
         format!("  {label:<6} {parameters:<42} {meaning}; {governs}")

@@ -41,7 +41,38 @@ fn a_full_disk_exits_with_1() {
         .output()
         .unwrap();
     assert_eq!(output.status.code(), Some(1));
-    assert!(String::from_utf8_lossy(&output.stderr).starts_with("error: standard output: No space left"));
+    assert!(
+        String::from_utf8_lossy(&output.stderr)
+            .starts_with("error: standard output: no space is left on the disk")
+    );
+}
+
+/// What the system refuses is said in words with advice, once; the numbers of the system are nobody's business.
+#[test]
+fn what_the_system_refuses_is_said_in_words() {
+    let place = tempfile::tempdir().unwrap();
+    let at = |name: &str| place.path().join(name);
+    let rows: String = (0..100).map(|k| format!("{:.2},{}\n", 0.01 * f64::from(k), k % 7)).collect();
+    std::fs::write(at("a.csv"), format!("t_s,gyro_x_rad_s\n{rows}")).unwrap();
+    std::fs::write(at("cut.csv.gz"), [0x1f, 0x8b, 8, 0, 0, 0, 0, 0, 0, 3, 0x8d]).unwrap();
+    std::fs::create_dir(at("there")).unwrap();
+    for (command, told, hint) in [
+        (
+            "wv a.csv -o a.csv/x.json",
+            "a.csv/x.json: a file is where a directory is needed",
+            "name another path",
+        ),
+        ("wv a.csv -o there", "there: it is a directory, not a file", "name a file"),
+        ("run there there", "there: it is a directory, not a file", "name a file"),
+        ("wv cut.csv.gz", "cut.csv.gz: ", "the file is cut off, or not gzipped"),
+    ] {
+        let mut program = nav_sim();
+        let output = program.current_dir(place.path()).args(command.split(' ')).output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(said.contains(&format!("error: {told}")), "{said}");
+        assert!(said.contains(&format!("hint: {hint}")) && !said.contains("os error"), "{said}");
+        assert_eq!(said.matches("is cut off").count(), usize::from(hint.contains("cut")), "{said}");
+    }
 }
 
 #[test]

@@ -114,11 +114,11 @@ fn drift(name: &str, sensor: Sensor, alarm: &DriftAlarm) -> String {
 
 fn effect(name: &str, left: &LeftOut) -> String {
     let mut line = format!(
-        "without {name} {} {} moves by {} at {} s",
+        "without {name} {} {} moves by {} at {}",
         left.group,
         left.estimator.name(),
         signed_percent(left.change),
-        left.tau_s
+        duration(left.tau_s)
     );
     let moved = |m: &Movement| match m.without / m.with - 1.0 {
         change if change.is_finite() => signed_percent(change),
@@ -132,10 +132,10 @@ fn effect(name: &str, left: &LeftOut) -> String {
     line
 }
 
-/// `most from 20.48 s to 327.68 s (x +4.9, y +6.3, z +2.1 deviations), p = 0.004`
+/// `most from 20.5 s to 5.46 min (x +4.9, y +6.3, z +2.1 deviations), p = 0.004`
 fn extent(alarm: &Alarm) -> String {
-    let [first, last] = alarm.tau_s;
-    let range = if first < last { format!("from {first} s to {last} s") } else { format!("at {first} s") };
+    let [first, last] = alarm.tau_s.map(duration);
+    let range = if first == last { format!("at {first}") } else { format!("from {first} to {last}") };
     let axes: Vec<String> = alarm.deviations.iter().map(|(a, z)| format!("{} {z:+.1}", a.name())).collect();
     format!("most {range} ({} deviations), p = {:.4}", axes.join(", "), alarm.p_value)
 }

@@ -82,7 +82,7 @@ fn links_are_followed_and_devices_written_directly() {
 #[test]
 fn a_full_disk_is_an_error_that_names_the_output() {
     let e = write(Path::new("/dev/full"), vec![0; 1 << 20]).unwrap_err();
-    assert!(e.to_string().starts_with("/dev/full: No space left"), "{e}");
+    assert!(e.to_string().starts_with("/dev/full: no space is left"), "{e}");
     assert!(e.is_system());
 }
 

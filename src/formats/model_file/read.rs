@@ -4,7 +4,7 @@ use super::{CI, Interval, ModelFile, SCHEMA, TurnOn};
 use crate::formats::FileError;
 use crate::formats::suggest::nearest;
 use crate::formats::toml_file::{Section, Source};
-use crate::imu::{Axis, Channel, Sensor};
+use crate::imu::{Axis, Channel, MAX_RATE_HZ, Sensor};
 use crate::noise::{Composite, Kind, Law, Model, ParameterError, Process, Spread, SpreadError, Variation};
 use crate::sensors::defects::{MAX_BIAS_M_S2, MAX_BIAS_RAD_S};
 use std::path::Path;
@@ -39,8 +39,9 @@ pub(super) fn parse(source: &Source) -> Result<ModelFile, FileError> {
     root.only(&["schema", "rate_hz", "accel", "gyro", "turn_on", "spread", "provenance"])?;
     check_schema(&root)?;
     let rate_hz = root.require_f64("rate_hz")?;
-    if rate_hz <= 0.0 {
-        return Err(root.refuse("rate_hz", "is not a rate: it must be > 0", None));
+    if !(rate_hz > 0.0 && rate_hz <= MAX_RATE_HZ) {
+        let reason = format!("is not a rate: it must be > 0 and at most {MAX_RATE_HZ}");
+        return Err(root.refuse("rate_hz", reason, None));
     }
     let mut file = ModelFile::new(Model { rate_hz, axes: Default::default() });
     for sensor in Sensor::ALL {

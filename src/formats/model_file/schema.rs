@@ -43,7 +43,7 @@ pub fn schema() -> Value {
         "required": ["rate_hz"],
         "properties": {
             "schema": { "const": super::SCHEMA },
-            "rate_hz": { "type": "number", "exclusiveMinimum": 0, "description": "Sample rate that the variances are of (Hz)" },
+            "rate_hz": { "type": "number", "exclusiveMinimum": 0, "maximum": crate::imu::MAX_RATE_HZ, "description": "Sample rate that the variances are of (Hz)" },
             "accel": sensor,
             "gyro": sensor,
             "turn_on": {

@@ -141,7 +141,13 @@ fn wrong_values_are_refused_with_line_key_and_value() {
         process_refusal("type = \"WN\", sigma2 = 1, sigma2_ci95 = [1]"),
         "m.toml, line 4: \"accel.processes[1].sigma2_ci95\" = [1] is not a pair [low, high] | "
     );
-    assert_eq!(refusal("rate_hz = 0\n"), "m.toml, line 1: \"rate_hz\" = 0 is not a rate: it must be > 0 | ");
+    assert_eq!(
+        refusal("rate_hz = 0\n"),
+        "m.toml, line 1: \"rate_hz\" = 0 is not a rate: it must be > 0 and at most 100000 | "
+    );
+    assert!(refusal("rate_hz = 1e300\n").contains("\"rate_hz\" = 1e300 is not a rate"));
+    let twice = refusal("rate_hz = 1\nrate_hz = 2\n");
+    assert_eq!(twice, "m.toml, line 2, column 1: the key \"rate_hz\" is there already | ");
     assert_eq!(
         refusal("schema = 2\n"),
         "m.toml, line 1: \"schema\" = 2 is not a schema this version reads: it reads 1 | \

@@ -15,8 +15,9 @@ pub(super) fn unreadable(path: &Path, source: io::Error) -> FileError {
     let error = FileError::io(path, source);
     match kind {
         ErrorKind::FileTooLarge => error.advice("write what comes through a pipe to a file first"),
-        kind if is_damage(kind) => error
-            .advice("the file is cut off, or not gzipped though it ends in .gz: copy it again, or rename it"),
+        kind if is_damage(kind) => error.advice_instead(
+            "the file is cut off, or not gzipped though it ends in .gz: copy it again, or rename it",
+        ),
         ErrorKind::NotFound => error.advice("check the path; a directory stands for all its recordings"),
         _ => error,
     }

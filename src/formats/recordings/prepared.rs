@@ -120,7 +120,7 @@ fn pieces(
     let longest = all().map(|p| p.len()).max().unwrap_or(0);
     let needed = options.min_samples.max(2);
     if longest < needed && options.skip_s > 0.0 {
-        let (skip_s, seconds) = (options.skip_s, samples as f64 / timing.rate_hz);
+        let (skip_s, seconds) = (options.skip_s, crate::report::seconds(samples as f64 / timing.rate_hz));
         let message = format!(
             "leaving out the first {skip_s} s leaves {longest} samples of {seconds} s, but {needed} are needed"
         );

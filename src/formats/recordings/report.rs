@@ -140,7 +140,8 @@ impl fmt::Display for FileReport {
     /// `a.csv: 524284 samples at 100 Hz (time column), 5242.84 s; means removed: accel x 0.02, …`
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let total: usize = self.samples.iter().sum();
-        let (rate, from, seconds) = (self.rate_hz, &self.rate_from, total as f64 / self.rate_hz);
+        let (rate, from, seconds) =
+            (self.rate_hz, &self.rate_from, crate::report::seconds(total as f64 / self.rate_hz));
         write!(f, "{}: {total} samples at {rate} Hz ({from}), {seconds} s", self.file)?;
         if self.samples.len() > 1 {
             write!(f, ", in {} stretches", self.samples.len())?;

@@ -1,5 +1,6 @@
 //! The page of `wv`, and what pages of wavelet variances share.
 
+use crate::calibration::duration;
 use crate::imu::Sensor;
 use crate::report::curves::{SignalCurves, SignalsFile};
 use crate::report::page::{Axis, Chart, Colour, Mark, Page, Panel, Series, Table, Tone, beside, terminal};
@@ -42,8 +43,11 @@ pub(crate) fn wavelet_page(file: &SignalsFile) -> Page {
         Some(((tau_s, ratio), s)) if ratio > OUTLIERS => (
             Tone::Doubtful,
             format!(
-                "Outliers? The classical wavelet variance of {} {}.{} is {ratio:.2} times the robust one at {tau_s} s.",
-                s.file, s.sensor, s.axis
+                "Outliers? The classical wavelet variance of {} {}.{} is {ratio:.2} times the robust one at {}.",
+                s.file,
+                s.sensor,
+                s.axis,
+                duration(tau_s)
             ),
         ),
         _ => (

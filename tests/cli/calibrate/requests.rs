@@ -148,11 +148,14 @@ fn what_is_skipped_counts_in_the_advice() {
         writeln!(text, "{:.2},{:e}", 0.02 * t as f64, x + level).unwrap();
     }
     std::fs::write(dir.path().join("warm.csv"), text).unwrap();
-    let advised = |skip: &str| {
+    let said_with = |skip: &str| {
         let arguments =
             ["calibrate", "warm.csv", "--estimator", "gmwm", "--model", "WN+RW", "--bootstrap", "0"];
         let output = nav_sim(dir.path()).args(arguments).args(["--skip-s", skip]).assert().success();
-        let said = String::from_utf8(output.get_output().stderr.clone()).unwrap();
+        String::from_utf8(output.get_output().stderr.clone()).unwrap()
+    };
+    let advised = |skip: &str| {
+        let said = said_with(skip);
         let seconds = said.split("--skip-s ").nth(1).unwrap_or_else(|| panic!("{said}"));
         seconds.split(' ').next().unwrap().parse::<f64>().unwrap()
     };
@@ -160,6 +163,11 @@ fn what_is_skipped_counts_in_the_advice() {
         let seconds = advised(skip);
         assert!((50.0..=85.0).contains(&seconds), "after {skip}: {seconds}");
     }
+    // left out by itself, it is said what is left of the 328 s
+    let said = said_with("auto");
+    let used = said.split(" s of it are used").next().and_then(|rest| rest.rsplit(' ').next());
+    let used = used.and_then(|s| s.parse::<f64>().ok()).unwrap_or_else(|| panic!("{said}"));
+    assert!((327.0 - 85.0..=328.0 - 50.0).contains(&used), "{said}");
 }
 
 /// The parameters file with its hash and every limit, how the recordings were read, and the curves' hash are in the
