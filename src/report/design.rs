@@ -150,7 +150,7 @@ pub(crate) fn design_rows(designs: &[Design]) -> Vec<Vec<String>> {
 fn parameter_rows(design: &Design) -> Vec<Vec<String>> {
     let varies = design.parameters.iter().any(|p| p.endless_half_width_pct.is_some());
     let mut titles = vec!["parameter", "value", "95 % interval to expect", ""];
-    titles.extend(varies.then_some("of endless recordings"));
+    titles.extend(varies.then_some("however long they are"));
     let mut rows: Vec<Vec<String>> = vec![titles.into_iter().map(str::to_owned).collect()];
     for p in &design.parameters {
         let ends =

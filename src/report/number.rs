@@ -19,6 +19,16 @@ pub(crate) fn window(start_s: f64, end_s: f64) -> String {
     format!("{}–{} s", seconds(start_s), seconds(end_s))
 }
 
+/// The square of a sensor's unit.
+#[must_use]
+pub(super) fn squared(unit: &str) -> String {
+    match unit {
+        "m/s²" => "m²/s⁴".to_owned(),
+        "rad/s" => "rad²/s²".to_owned(),
+        other => format!("({other})²"),
+    }
+}
+
 /// A number for people: three significant digits, or four figures before the point.
 #[must_use]
 pub fn readable(x: f64) -> String {

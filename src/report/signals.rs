@@ -1,7 +1,7 @@
 //! Wavelet variances of recordings for people: a digest, recordings side by side, all scales.
 
 use super::curves::{Band, SignalCurves, SignalsFile};
-use super::number::shortest;
+use super::number::{shortest, squared};
 use super::short::short_names;
 use crate::calibration::{duration, median};
 use crate::wavelet::Tuning;
@@ -97,9 +97,9 @@ pub(crate) fn signal_rows(curves: &SignalCurves) -> Vec<Vec<String>> {
     let unit = unit(&curves.sensor);
     let head = [
         "scale tau (s)".to_owned(),
-        format!("classical (({unit})²)"),
+        format!("classical ({})", squared(unit)),
         "95 % interval".to_owned(),
-        format!("robust (({unit})²)"),
+        format!("robust ({})", squared(unit)),
         "95 % interval".to_owned(),
         String::new(),
         "averages of (s)".to_owned(),

@@ -43,7 +43,9 @@ pub(crate) fn fan_csv(fan: &[FanEpoch]) -> String {
     let header: Vec<String> = std::iter::once("t_s".to_owned()).chain(quantiles).collect();
     let row = |e: &FanEpoch| {
         let quantiles = e.quantiles_m.into_iter().chain(e.lincov_m.into_iter().flatten());
-        std::iter::once(e.t_s).chain(quantiles).map(shortest).collect::<Vec<_>>().join(",")
+        // errors are kept in single precision: more digits would say what nobody knows
+        let quantiles = quantiles.map(|q| (q as f32).to_string());
+        std::iter::once(shortest(e.t_s)).chain(quantiles).collect::<Vec<_>>().join(",")
     };
     lines(header.join(","), fan.iter().map(row))
 }

@@ -124,6 +124,8 @@ pub(crate) enum Mark {
     Line(Vec<(f64, f64)>, Stroke),
     /// The area between two curves (x, low, high).
     Band(Vec<(f64, f64, f64)>),
+    /// The same, darker, within another.
+    InnerBand(Vec<(f64, f64, f64)>),
     /// Points with error bars.
     Points(Vec<Interval>),
     /// Bars from one value to another (x, from, to), on a linear axis.

@@ -272,7 +272,7 @@ fn slanted_names(chart: &Chart, canvas: &Canvas, width: f64) -> Option<(f64, f64
 fn xs(mark: &Mark) -> Vec<f64> {
     match mark {
         Mark::Line(points, _) => points.iter().map(|p| p.0).collect(),
-        Mark::Band(points) => points.iter().map(|p| p.0).collect(),
+        Mark::Band(points) | Mark::InnerBand(points) => points.iter().map(|p| p.0).collect(),
         Mark::Points(points) => points.iter().map(|p| p.x).collect(),
         Mark::Bars(bars) => bars.iter().map(|b| b.0).collect(),
         Mark::Level(_) | Mark::Zone(..) => Vec::new(),
@@ -283,7 +283,7 @@ fn xs(mark: &Mark) -> Vec<f64> {
 fn ys(mark: &Mark) -> Vec<f64> {
     match mark {
         Mark::Line(points, _) => points.iter().map(|p| p.1).collect(),
-        Mark::Band(points) => points.iter().flat_map(|p| [p.1, p.2]).collect(),
+        Mark::Band(points) | Mark::InnerBand(points) => points.iter().flat_map(|p| [p.1, p.2]).collect(),
         Mark::Points(points) => points.iter().flat_map(|p| [p.y, p.low, p.high]).collect(),
         Mark::Bars(bars) => bars.iter().flat_map(|b| [b.1, b.2]).collect(),
         Mark::Level(y) => vec![*y],

@@ -138,13 +138,13 @@ impl Pen<'_> {
 
 /// What a mark looks like, in small.
 fn swatch(mark: &Mark, (x, y): (f64, f64), svg: &mut String) {
+    let square = || format!("M{} {}h{SWATCH}v12h-{SWATCH}Z", short(x), short(y - 6.0));
     let (class, d) = match mark {
         Mark::Line(_, stroke) => (stroke.class(), format!("M{} {}h{SWATCH}", short(x), short(y))),
         Mark::Level(_) => ("line level", format!("M{} {}h{SWATCH}", short(x), short(y))),
-        Mark::Band(_) | Mark::Zone(..) => {
-            ("area", format!("M{} {}h{SWATCH}v12h-{SWATCH}Z", short(x), short(y - 6.0)))
-        }
-        Mark::Bars(_) => ("bar", format!("M{} {}h{SWATCH}v12h-{SWATCH}Z", short(x), short(y - 6.0))),
+        Mark::Band(_) | Mark::Zone(..) => ("area", square()),
+        Mark::InnerBand(_) => ("area inner", square()),
+        Mark::Bars(_) => ("bar", square()),
         Mark::Points(_) | Mark::Place(..) => ("dot", format!("M{} {}h0", short(x + 0.5 * SWATCH), short(y))),
     };
     let _ = write!(svg, "<path class=\"{class}\" d=\"{d}\"/>");

@@ -39,6 +39,7 @@ impl Frame<'_> {
                 path(svg, stroke.class(), &self.line(points));
             }
             Mark::Band(points) => path(svg, "area", &self.band(points)),
+            Mark::InnerBand(points) => path(svg, "area inner", &self.band(points)),
             Mark::Points(points) => self.points(points, svg),
             Mark::Bars(bars) => path(svg, "bar", &self.bars(bars)),
             Mark::Level(y) => path(svg, "line level", &self.span(*y)),

@@ -83,10 +83,17 @@ fn plain_style() -> String {
 pub(crate) fn encode(svg: String, form: Form) -> Result<Vec<u8>, PictureError> {
     let drawn = match form {
         Form::Svg => return Ok(svg.into_bytes()),
-        Form::Png => png(&svg),
-        Form::Pdf => pdf(&svg),
+        Form::Png => png(&drawable(&svg)),
+        Form::Pdf => pdf(&drawable(&svg)),
     };
     drawn.map_err(|cause| PictureError { form, cause })
+}
+
+/// With a question mark for each character of the scripts that the font lacks (those of East Asia, pictographs): it would
+/// be drawn as an empty box.
+fn drawable(svg: &str) -> String {
+    let is_lacking = |c: char| matches!(c, '\u{1100}'..='\u{11ff}' | '\u{2e80}'..='\u{a4cf}' | '\u{ac00}'..='\u{d7ff}' | '\u{f900}'..='\u{faff}' | '\u{ff00}'..='\u{ffef}' | '\u{1f000}'..);
+    svg.replace(is_lacking, "?")
 }
 
 /// With the font that is compiled in: the same drawing on every machine, also where no font is installed.

@@ -128,3 +128,30 @@ fn a_character_that_no_picture_can_hold_is_an_error() {
     let refused = encode(svg("a\u{1}b", &[chart()]), Form::Png).unwrap_err().to_string();
     assert!(refused.starts_with("the picture cannot be drawn as Png: "), "{refused}");
 }
+
+/// The name of a file in a script that the font lacks is drawn with question marks, not with boxes.
+#[test]
+fn what_the_font_lacks_is_drawn_as_question_marks() {
+    let dots = |title: &str| {
+        let named = Chart { title: title.to_owned(), ..chart() };
+        encode(svg("t", &[named]), Form::Png).unwrap()
+    };
+    assert!(dots("\u{6d4b}\u{8bd5} \u{d55c} \u{1f697} \u{3c3}") == dots("?? ? ? \u{3c3}"));
+    assert!(dots("\u{3c3}") != dots("?"), "Greek letters are drawn");
+}
+
+/// Bands within bands are told apart, in the legend too.
+#[test]
+fn an_inner_band_has_a_swatch_of_its_own() {
+    let band = |half: f64| vec![(0.0, 1.0 - half, 1.0 + half), (1.0, 1.0 - half, 1.0 + half)];
+    let series = vec![
+        Series::new("5 to 95 %", Colour::REAL, Mark::Band(band(0.5))),
+        Series::new("25 to 75 %", Colour::REAL, Mark::InnerBand(band(0.2))),
+    ];
+    let picture =
+        svg("t", &[Chart::new("t", Axis::linear("x"), vec![Panel::new(Axis::linear("y"), series)])]);
+    // each in its panel and in the legend
+    for class in ["class=\"area\"", "class=\"area inner\""] {
+        assert_eq!(picture.matches(class).count(), 2, "{class}: {picture}");
+    }
+}

@@ -106,7 +106,7 @@ pub(crate) fn comparison_svg(
     outages: &[(f64, f64)],
     states: &[usize],
 ) -> String {
-    svg("ASEE against the reference", &charts(candidates, curves, outages, states))
+    svg(&against(candidates), &charts(candidates, curves, outages, states))
 }
 
 const CAPTION: &str = "ASEE (averaged standard estimation error): the filter's own standard deviation. 0 % is as the reference believes; \
@@ -136,7 +136,7 @@ fn charts(
             .enumerate()
             .map(|(hue, (name, curves))| Curve { name, hue, curves })
             .collect();
-        return vec![chart("ASEE against the reference", &own, outages, states)];
+        return vec![chart(&against(candidates), &own, outages, states)];
     }
     let hue = |estimator: &str| estimators.iter().position(|e| *e == estimator).unwrap_or(0);
     let of_scenario = |scenario: &&str| {
@@ -144,10 +144,16 @@ fn charts(
         let curves: Vec<Curve<'_>> = own
             .map(|(c, curves)| Curve { name: &c.label.estimator, hue: hue(&c.label.estimator), curves })
             .collect();
-        let title = format!("ASEE against the reference, scenario {scenario}");
+        let title = format!("{}, scenario {scenario}", against(candidates));
         (!curves.is_empty()).then(|| chart(&title, &curves, outages, states))
     };
     scenarios.iter().filter_map(of_scenario).collect()
+}
+
+/// What a chart shows, with the name of the reference.
+fn against(candidates: &[CandidateResult]) -> String {
+    let reference = candidates.iter().find(|c| c.is_reference).map_or("the reference", |c| c.run.as_str());
+    format!("ASEE against {reference}")
 }
 
 /// One run in a chart.

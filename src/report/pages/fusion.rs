@@ -1,6 +1,6 @@
 //! The page of a fusion: the way, errors against a reference, innovations.
 
-use super::STATES;
+use super::{STATES, error_of};
 use crate::earth::ned_difference;
 use crate::fusion::{FixRecord, Row, Solution, Use};
 use crate::metrics::chi_square_band;
@@ -98,7 +98,7 @@ fn errors(rows: &[Row], outages: &[(f64, f64)]) -> Vec<Chart> {
             Series::new("±3 σ", Colour::BELIEVED, Mark::Band(believed)),
             Series::line("error", Colour::REAL, error),
         ];
-        timed(state, vec![Panel::new(Axis::linear(""), series)], outages).small()
+        timed(&error_of(state), vec![Panel::new(Axis::linear(""), series)], outages).small()
     };
     STATES.iter().enumerate().map(chart).collect()
 }

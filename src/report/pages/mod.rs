@@ -46,6 +46,11 @@ const STATES: [&str; REPORTED] = [
     "yaw (°)",
 ];
 
+/// A state as the title of a chart of its errors: `roll error (°)`.
+fn error_of(state: &str) -> String {
+    state.replacen(" (", " error (", 1)
+}
+
 /// What ASEE and RMSE are, where they are shown.
 const RMSE_AND_ASEE: &str = "RMSE: how wrong the runs were. ASEE (averaged standard estimation error): the filter's own standard \
                              deviation, averaged over the runs. Their ratio is 1 if the filter is right.";

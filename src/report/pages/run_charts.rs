@@ -1,6 +1,6 @@
 //! The figures of a run.
 
-use super::STATES;
+use super::{STATES, error_of};
 use crate::metrics::{Budget, EpochMetrics, FanEpoch, OutageSummary, Summary};
 use crate::report::page::{Axis, Chart, Colour, Interval, Mark, Panel, Series, svg, terminal};
 
@@ -49,13 +49,13 @@ pub(super) fn horizontal(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
 
 /// Quantiles of the horizontal error over time, those of a covariance analysis beside the runs dashed.
 pub(super) fn fan_chart(fan: &[FanEpoch], summary: &Summary) -> Chart {
-    let between = |low: usize, high: usize| {
-        Mark::Band(fan.iter().map(|e| (e.t_s, e.quantiles_m[low], e.quantiles_m[high])).collect())
+    let between = |low: usize, high: usize| -> Vec<(f64, f64, f64)> {
+        fan.iter().map(|e| (e.t_s, e.quantiles_m[low], e.quantiles_m[high])).collect()
     };
     let median = fan.iter().map(|e| (e.t_s, e.quantiles_m[2])).collect();
     let mut series = vec![
-        Series::new("5 to 95 %", Colour::REAL, between(0, 4)),
-        Series::new("25 to 75 %", Colour::REAL, between(1, 3)),
+        Series::new("5 to 95 %", Colour::REAL, Mark::Band(between(0, 4))),
+        Series::new("25 to 75 %", Colour::REAL, Mark::InnerBand(between(1, 3))),
         Series::line("median", Colour::REAL, median),
     ];
     if fan.iter().any(|e| e.lincov_m.is_some()) {
@@ -79,7 +79,7 @@ pub(super) fn states(epochs: &[EpochMetrics], outages: &[(f64, f64)]) -> Vec<Cha
             Series::line("RMSE", Colour::REAL, over_time(epochs, |e| e.rmse.0[i].value)),
             Series::line("ASEE", Colour::BELIEVED, over_time(epochs, |e| e.asee.0[i].value)),
         ];
-        timed(state, Panel::new(Axis::log(""), series), outages).small()
+        timed(&error_of(state), Panel::new(Axis::log(""), series), outages).small()
     };
     STATES.iter().enumerate().map(chart).collect()
 }

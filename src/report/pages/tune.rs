@@ -1,6 +1,6 @@
 //! The page of a tuning: how honest the filter is against the factor on its variances, before and after.
 
-use super::STATES;
+use super::{STATES, error_of};
 use crate::report::number::seconds;
 use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, Table, Tone};
 use crate::report::tune::TuneResult;
@@ -100,7 +100,7 @@ fn ends(result: &TuneResult) -> Vec<Chart> {
             Series::points(filter, Colour::Hue(hue), h.rmse_end.iter().enumerate().map(point))
         });
         let panel = Panel::new(Axis::linear("").including(0.0, 0.0), series.collect());
-        Chart::new(name, Axis::names(names.clone()), vec![panel]).small()
+        Chart::new(&error_of(name), Axis::names(names.clone()), vec![panel]).small()
     };
     STATES.iter().enumerate().map(chart).collect()
 }

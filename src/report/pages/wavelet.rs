@@ -3,6 +3,7 @@
 use crate::calibration::duration;
 use crate::imu::Sensor;
 use crate::report::curves::{SignalCurves, SignalsFile};
+use crate::report::number::squared;
 use crate::report::page::{Axis, Chart, Colour, Mark, Page, Panel, Series, Table, Tone, beside, terminal};
 use crate::report::short_names;
 
@@ -13,7 +14,7 @@ pub(super) fn scale_axis() -> Axis {
 
 /// The axis of wavelet variances of a sensor.
 pub(super) fn variance_axis(sensor: &str) -> Axis {
-    Axis::log(&format!("wavelet variance (({})²)", unit(sensor)))
+    Axis::log(&format!("wavelet variance ({})", squared(unit(sensor))))
 }
 
 /// Unit of a sensor, by its name in files.
