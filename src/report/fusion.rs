@@ -240,15 +240,31 @@ impl FusionSummary {
         table
     }
 
+    /// The verdict with all its reasons.
     pub(super) fn verdict_line(&self) -> String {
+        self.verdict_for(&self.reasons.join("; "))
+    }
+
+    /// The verdict with what weighs most.
+    fn short_verdict(&self) -> String {
+        match self.reasons.as_slice() {
+            [first, _, ..] => self.verdict_for(&format!(
+                "{first} (and {} more: warnings, summary.json)",
+                self.reasons.len() - 1
+            )),
+            _ => self.verdict_line(),
+        }
+    }
+
+    fn verdict_for(&self, reasons: &str) -> String {
         let words = match self.verdict {
             word if word == Verdict::Ok.name() => "consistent with its fixes",
             word if word == Verdict::Underconfident.name() => "underconfident",
             word if word == Verdict::Doubtful.name() => "doubtful",
             _ => "overconfident and not to be believed",
         };
-        let why = if self.reasons.is_empty() { self.figures() } else { self.reasons.join("; ") };
-        format!("verdict: {words}: {why}")
+        let figures = self.figures();
+        format!("verdict: {words}: {}", if reasons.is_empty() { &figures } else { reasons })
     }
 
     /// What a verdict rests on.
@@ -270,7 +286,7 @@ impl FusionSummary {
     #[must_use]
     pub(crate) fn text(&self) -> String {
         let Fixes { used, withheld, rejected } = self.fixes;
-        let mut lines = vec![self.verdict_line()];
+        let mut lines = vec![self.short_verdict()];
         let turn_on = match self.turn_on_states {
             0 => String::new(),
             n => format!(" + {n} turn-on"),

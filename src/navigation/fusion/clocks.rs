@@ -44,12 +44,11 @@ pub struct ClocksApart {
 impl fmt::Display for ClocksApart {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { add_s, correlation, as_they_are, or_add_s } = self;
-        let or =
-            or_add_s.map_or(String::new(), |s| format!("; so they are with {s:+.1} s: the course repeats"));
+        let or = or_add_s.map_or(String::new(), |s| format!(", as with {s:+.1} s: the course repeats"));
         write!(
             f,
             "the clocks of IMU and GNSS look {:.1} s apart: with {add_s:+.1} s added to the times of the fixes, their turns \
-             are those of the gyroscopes (correlation {correlation:.2}; {as_they_are:.2} as they are){or}",
+             match the gyroscopes' (correlation {correlation:.2}, now {as_they_are:.2}){or}",
             add_s.abs()
         )
     }
@@ -215,5 +214,6 @@ mod tests {
         let (imu, gnss) = drive(5.0, round);
         let said = clocks_apart(&Recorded { imu: &imu, gnss: &gnss }).unwrap().to_string();
         assert!(said.ends_with("s: the course repeats"), "{said}");
+        assert!(said.len() <= 200, "{said}");
     }
 }

@@ -20,6 +20,8 @@ fn clocks_that_are_apart_are_named_with_what_to_add() {
     assert_eq!(ran.code, 3, "{}", ran.stderr);
     let cause = "the clocks of IMU and GNSS look 18.0 s apart: with -18.0 s added to the times of the fixes";
     assert!(ran.stderr.contains(cause), "{}", ran.stderr);
+    let verdict = ran.stdout.lines().next().unwrap();
+    assert!(verdict.contains(cause) && verdict.len() <= 300, "{verdict}");
     let summary = fs::read_to_string(place.path().join("out/summary.json")).unwrap();
     assert!(summary.contains(cause), "{summary}");
 }
