@@ -10,7 +10,7 @@ use crate::formats::scenario_file;
 use crate::jobs::{Ask, CatalogueUnit, Misplaced, Requirements};
 use crate::report::require as words;
 use crate::report::require::RankedUnit;
-use crate::report::{catalogue_page, markdown_table, model_page, needed_page};
+use crate::report::{catalogue_page, columns, markdown_table, model_page, needed_page};
 use crate::require::{Limit, Quantity, RequireError};
 use crate::sensors::outage::NotAnOutage;
 use std::path::{Path, PathBuf};
@@ -213,7 +213,7 @@ fn ranked(
         None => catalogue(asked)?,
     };
     let (units, question) = asked.ranked(&units).map_err(Failure::input)?;
-    let text = || format!("{}:\n\n{}", question.in_words(), markdown_table(&words::catalogue_rows(&units)));
+    let text = || format!("{}:\n\n{}", question.in_words(), columns(&words::catalogue_rows(&units)));
     session.show(|| words::catalogue_json(&units, &question), text);
     args.pictures.write(|| catalogue_page(&units, &question), session)?;
     if units.iter().any(|unit| !unit.not_stated.is_empty()) {

@@ -150,7 +150,7 @@ const IMPOSSIBLE: f64 = 1e-4;
 /// Rows for a parameter each.
 fn full(outcomes: &[Outcome], rate_hz: f64) -> Vec<Vec<String>> {
     let matched = format!("N, K {}", policy());
-    let head = ["", &matched, "value", "95 % interval", "unit", "in SI", "governs"];
+    let head = ["", &matched, "value", "95 % interval", "unit", "governs averages"];
     let rows = outcomes.iter().flat_map(|o| rows_of(o, rate_hz));
     std::iter::once(head.map(str::to_owned).to_vec()).chain(rows).collect()
 }
@@ -159,10 +159,15 @@ fn rows_of(outcome: &Outcome, rate_hz: f64) -> Vec<Vec<String>> {
     let sensor = outcome.scope.sensor;
     let practical = outcome.practical(rate_hz);
     let cells = |row: PracticalRow| {
-        let value = row.shown();
-        // without draws there are no intervals to be determined
-        let interval = if outcome.inference.is_some() { row.interval } else { String::new() };
-        vec![row.name.to_owned(), value, interval, row.unit.to_owned(), row.si, row.governs]
+        let (value, interval) = match row.value {
+            Err(why) => ("–".to_owned(), why.to_owned()),
+            // without draws there are no intervals to be determined
+            Ok(_) if outcome.inference.is_none() => (row.shown(), String::new()),
+            Ok(_) => (row.shown(), row.interval),
+        };
+        // the sensor stands before it; no line is longer than a terminal
+        let name = row.name.replace("acceleration", "accel.");
+        vec![name, value, interval, row.unit.to_owned(), row.governs]
     };
     let rows = practical.iter().flat_map(|p| practical_rows(p, sensor)).map(cells);
     let mut rows: Vec<Vec<String>> = rows.collect();
@@ -193,7 +198,7 @@ fn process_rows(outcome: &Outcome, rate_hz: f64) -> Vec<Vec<String>> {
         };
         let name = format!("{label} {}", figure.name);
         let value = readable((figure.of)(figure.value, rate_hz));
-        Some(vec![name, value, ends, figure.unit.to_owned(), figure.si, governs(&shares[index], rate_hz)])
+        Some(vec![name, value, ends, figure.unit.to_owned(), governs(&shares[index], rate_hz)])
     };
     model.processes.iter().zip(model.labels()).enumerate().filter_map(row).collect()
 }
@@ -207,33 +212,30 @@ struct Figure {
     /// How it follows from the parameter and the rate (Hz).
     of: fn(f64, f64) -> f64,
     unit: &'static str,
-    /// What stands beside it in SI units.
-    si: String,
 }
 
 fn figure(process: &Process, sensor: Sensor) -> Option<Figure> {
-    let sigma = |variance: f64| format!("sigma {:.2e} {}", variance.sqrt(), sensor.unit());
-    let of = |name, parameter, value, of, unit, si| Some(Figure { name, parameter, value, of, unit, si });
+    let of = |name, parameter, value, of, unit| Some(Figure { name, parameter, value, of, unit });
+    let [increment_unit, ramp_unit] = match sensor {
+        Sensor::Accel => ["m/s", "m/s² per s"],
+        Sensor::Gyro => ["rad", "rad/s per s"],
+    };
     match process {
         Process::Ar1(p) if p.phi() > 0.0 => {
             let time = |phi: f64, rate_hz: f64| -1.0 / (phi.ln() * rate_hz);
-            of("correlation time T", Parameter::Phi, p.phi(), time, "s", sigma(p.variance()))
+            of("correlation time T", Parameter::Phi, p.phi(), time, "s")
         }
         Process::GaussMarkov(p) => {
-            of("correlation time T", Parameter::Beta, p.beta(), |beta, _| 1.0 / beta, "s", sigma(p.s2()))
+            of("correlation time T", Parameter::Beta, p.beta(), |beta, _| 1.0 / beta, "s")
         }
         Process::Quantization(p) => {
             // of the increments over a sample, as IEEE 952 has it
             let increment = |q2: f64, rate_hz: f64| q2.sqrt() / rate_hz;
-            let unit = match sensor {
-                Sensor::Accel => "m/s",
-                Sensor::Gyro => "rad",
-            };
-            of("quantization Q", Parameter::Q2, p.q2(), increment, unit, String::new())
+            of("quantization Q", Parameter::Q2, p.q2(), increment, increment_unit)
         }
         Process::Drift(p) => {
             let ramp = |slope, rate_hz| slope * rate_hz;
-            of("ramp", Parameter::Slope, p.slope(), ramp, "per s", sensor.unit().to_owned())
+            of("ramp", Parameter::Slope, p.slope(), ramp, ramp_unit)
         }
         _ => None,
     }
@@ -243,9 +245,9 @@ fn figure(process: &Process, sensor: Sensor) -> Option<Figure> {
 fn governs(share: &crate::calibration::Share, rate_hz: f64) -> String {
     let at = |level: u32| duration(tau_s(level, rate_hz));
     match (share.leads.first(), share.leads.last()) {
-        (Some(first), Some(last)) if first == last => format!("scale {}", at(*first)),
-        (Some(first), Some(last)) => format!("scales {} to {}", at(*first), at(*last)),
-        _ => format!("none ({} at most, at {})", percent(share.largest.0), at(share.largest.1)),
+        (Some(first), Some(last)) if first == last => at(*first),
+        (Some(first), Some(last)) => format!("{} – {}", at(*first), at(*last)),
+        _ => format!("none ({} at most)", percent(share.largest.0)),
     }
 }
 

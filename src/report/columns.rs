@@ -3,7 +3,7 @@
 use super::markdown::plain_table;
 
 /// Characters of a line that a table takes at most, where it can be cut.
-const WIDTH: usize = 120;
+const WIDTH: usize = 100;
 
 /// A table without lines, whose first row is its head.
 #[must_use]

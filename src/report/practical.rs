@@ -18,7 +18,7 @@ pub(super) struct PracticalRow {
     pub unit: &'static str,
     /// The value in SI, with its unit.
     pub si: String,
-    /// The averaging times that it governs.
+    /// The averages that it governs, by their length.
     pub governs: String,
     /// Where the value stands in the parameters of a fit as JSON.
     pub source: &'static str,
@@ -68,8 +68,8 @@ pub(super) fn practical_rows(practical: &Practical, sensor: Sensor) -> [Practica
         source,
     };
     let (seen, crossover) = (duration(*range_s), pair.crossover_s().map(duration));
-    let to = crossover.as_ref().map_or(String::new(), |t| format!("averages up to {t}"));
-    let from = crossover.map(|t| format!("averages from {t}"));
+    let to = crossover.as_ref().map_or(String::new(), |t| format!("up to {t}"));
+    let from = crossover.map(|t| format!("from {t}"));
     let n = (white, "white_and_walk/n/data_sheet/value");
     let b = ("bias instability B", "minimum/bias_instability/data_sheet/value");
     let k = (walk, "white_and_walk/k/data_sheet/value");
@@ -77,7 +77,7 @@ pub(super) fn practical_rows(practical: &Practical, sensor: Sensor) -> [Practica
         row(n, Quantity::Density, pair.density, intervals.density, to),
         match parameters.minimum {
             Some(m) => {
-                let floor = format!("the floor, at {}", duration(m.tau_s));
+                let floor = format!("floor at {}", duration(m.tau_s));
                 row(b, Quantity::Bias, m.bias_instability(), intervals.instability, floor)
             }
             None => absent(b, "not reached", format!("no floor up to {seen}")),
@@ -85,8 +85,7 @@ pub(super) fn practical_rows(practical: &Practical, sensor: Sensor) -> [Practica
         if practical.walk_is_observed() {
             row(k, Quantity::Walk, pair.walk, intervals.walk, from.unwrap_or_default())
         } else {
-            let beyond = from.map(|from| format!("{from}; these data show them up to {seen}"));
-            absent(k, "not observed", beyond.unwrap_or_else(|| format!("no average up to {seen}")))
+            absent(k, "not observed", from.unwrap_or_else(|| format!("none up to {seen}")))
         },
     ]
 }

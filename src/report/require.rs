@@ -312,8 +312,12 @@ pub(crate) fn margins_json(margins: &Margins, question: &Question, bridged: &Bri
 #[must_use]
 pub(crate) fn catalogue_rows(units: &[RankedUnit]) -> Vec<Vec<String>> {
     let name = units.first().map_or("", |u| u.worst.limit.quantity.name());
-    let mut head = vec!["unit".to_owned(), "limit".to_owned(), "longest outage".to_owned()];
-    head.extend(CURVE_S.iter().map(|s| format!("{name} at {s} s")));
+    // a line of a terminal has room for short heads only
+    let mut head = vec!["unit".to_owned(), "limit".to_owned(), "bridges".to_owned()];
+    head.extend(CURVE_S.iter().enumerate().map(|(k, s)| match k {
+        0 => format!("{name} {s} s"),
+        _ => format!("{s} s"),
+    }));
     head.push("not stated".to_owned());
     let row = |unit: &RankedUnit| {
         let met = match (unit.is_met(), unit.is_within()) {
@@ -321,9 +325,10 @@ pub(crate) fn catalogue_rows(units: &[RankedUnit]) -> Vec<Vec<String>> {
             (false, true) => "open",
             (false, false) => "not met",
         };
-        let mut row = vec![unit.name.clone(), met.to_owned(), unit.longest.in_words()];
+        let longest = unit.longest.in_words().replace("at least", "≥");
+        let mut row = vec![unit.name.clone(), met.to_owned(), longest];
         row.extend(unit.curve.iter().map(|x| x.map_or_else(|| "–".to_owned(), readable)));
-        row.push(unit.not_stated.join(", "));
+        row.push(unit.not_stated.join(", ").replace("accel bias, gyro bias", "both biases"));
         row
     };
     std::iter::once(head).chain(units.iter().map(row)).collect()

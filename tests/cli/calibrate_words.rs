@@ -22,6 +22,8 @@ fn what_is_printed_fits_a_screen() {
     assert!(first.chars().count() <= 160, "{first}");
     assert!(text.contains("angle random walk N") && text.contains("deg/sqrt(h)"), "{text}");
     assert!(text.contains("J-test p = "), "{text}");
+    let table: Vec<&str> = text.lines().filter(|line| line.starts_with("  ")).collect();
+    assert!(table.len() > 6 && table.iter().all(|row| row.chars().count() <= 100), "{text}");
     assert!(lines(&["--verbose"]).0 > count);
     assert!(lines(&["--estimator", "all"]).0 <= 20);
 }

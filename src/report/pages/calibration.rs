@@ -214,7 +214,7 @@ fn allan(fitted: &FittedCurve) -> Chart {
 
 /// N, B and K as the terminal prints them.
 fn practical_table(practical: &Practical, sensor: Sensor, index: usize) -> Table {
-    let mut table = Table::new(["parameter", "value", "95 % interval", "unit", "in SI", "governs"]);
+    let mut table = Table::new(["parameter", "value", "95 % interval", "unit", "in SI", "governs averages"]);
     for row in practical_rows(practical, sensor) {
         let value = match row.value {
             Ok(value) => Cell::number(value, &format!("/fits/{index}/parameters/{}", row.source)),
