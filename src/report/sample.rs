@@ -48,6 +48,7 @@ pub(crate) fn result() -> RunResult {
         epochs: (0..12).map(epoch).collect(),
         runs: (0..runs).map(run).collect(),
         fan_t_s: Vec::new(),
+        outage_fix_t_s: Vec::new(),
         outages: vec![(4.0, 8.0)],
         filter_states: 15,
         fix_components: 6,

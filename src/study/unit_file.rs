@@ -246,6 +246,7 @@ fn sampled(head: ColumnHead, runs: u64, words: &mut Words<'_>) -> RunResult {
     RunResult {
         epochs,
         fan_t_s: Vec::new(),
+        outage_fix_t_s: Vec::new(),
         runs,
         outages: head.outages,
         filter_states: head.filter_states,
@@ -312,6 +313,7 @@ mod tests {
                 epochs: (0..3).map(epoch).collect(),
                 runs: (0..2).map(run).collect(),
                 fan_t_s: Vec::new(),
+                outage_fix_t_s: Vec::new(),
                 outages: vec![(0.1, 0.3), (1.0 / 3.0, 5.0)],
                 filter_states: states,
                 fix_components: 6,

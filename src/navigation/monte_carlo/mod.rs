@@ -83,6 +83,7 @@ fn empty(plan: &Plan<'_>, filter_states: usize) -> RunResult {
     let experiment = plan.experiment();
     RunResult {
         outages: experiment.outages.iter().map(|o| (o.start_s, o.end_s)).collect(),
+        outage_fix_t_s: plan.outage_fix_t_s(),
         fan_t_s: plan.fan_t_s(),
         filter_states,
         fix_components: experiment.gnss.components(),

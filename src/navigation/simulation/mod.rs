@@ -127,6 +127,8 @@ pub struct RunResult {
     pub runs: Vec<RunRecord>,
     /// Outages (start, end) in seconds on the trajectory.
     pub outages: Vec<(f64, f64)>,
+    /// Times (s) of the first fix after each, or of the end of the trajectory.
+    pub outage_fix_t_s: Vec<f64>,
     /// States of the filter.
     pub filter_states: usize,
     /// Components of one fix: 3 (position) or 6 (and velocity): degrees of freedom of the NIS.

@@ -204,6 +204,12 @@ impl<'a> Plan<'a> {
         self.fan.iter().map(|i| times[*i]).collect()
     }
 
+    /// Times of the first fix after each outage, or of the end of the trajectory (s).
+    #[must_use]
+    pub fn outage_fix_t_s(&self) -> Vec<f64> {
+        self.outages.iter().map(|(_, end)| self.events[*end].t_s).collect()
+    }
+
     /// What was planned.
     #[must_use]
     pub const fn experiment(&self) -> &'a Experiment<'a> {

@@ -31,6 +31,11 @@ fn covariance_analysis_is_a_method_of_run() {
         "{fan}"
     );
     assert!(0.8 * quantile("p95") < at_44_s[4] && at_44_s[4] < quantile("p95"), "{fan}");
+    // just before the fix at 45 s what the summary has, to single precision; after it less
+    let at_45_s: Vec<&str> = fan.lines().filter_map(|line| line.strip_prefix("45,")).collect();
+    let p95 = |line: &str| line.rsplit(',').next().unwrap().parse::<f64>().unwrap();
+    assert!(at_45_s.len() == 2 && p95(at_45_s[1]) < 0.9 * p95(at_45_s[0]), "{fan}");
+    assert!((p95(at_45_s[0]) / quantile("p95") - 1.0).abs() < 1e-6, "{fan}");
     assert!((summary["coverage"]["mean"].as_f64().unwrap() - 0.95).abs() < 0.01);
     assert!(fs::read_to_string(out.join("report.html")).unwrap().contains("INS/GNSS covariance analysis"));
 
@@ -60,7 +65,7 @@ fn runs_stand_beside_what_is_expected_of_them() {
     let fan = fs::read_to_string(place.path().join("out/fan.csv")).unwrap();
     let names = "p05_m,p25_m,p50_m,p75_m,p95_m";
     assert!(fan.starts_with(&format!("t_s,{names},lincov_{}\n", names.replace(',', ",lincov_"))), "{fan}");
-    assert_eq!(fan.lines().count(), 1 + 61);
+    assert_eq!(fan.lines().count(), 1 + 61 + 1);
     assert!(fan.lines().all(|line| line.split(',').count() == 11), "{fan}");
     let page = fs::read_to_string(place.path().join("out/report.html")).unwrap();
     assert!(page.contains("Dashed: 5, 50 and 95 % by covariance analysis."), "{page}");
