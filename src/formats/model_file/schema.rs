@@ -12,11 +12,10 @@ pub fn schema() -> Value {
         let interval =
             json!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 });
         let mut required = vec!["type"];
-        for parameter in kind.parameters() {
-            properties.insert(
-                parameter.name().to_owned(),
-                json!({ "type": "number", "description": meaning(parameter.name()) }),
-            );
+        for (at, parameter) in kind.parameters().iter().enumerate() {
+            let mut number = json!({ "type": "number", "description": meaning(parameter.name()) });
+            bound(&mut number, *kind, at);
+            properties.insert(parameter.name().to_owned(), number);
             properties.insert(format!("{}_ci95", parameter.name()), interval.clone());
             required.push(parameter.name());
         }
@@ -56,6 +55,21 @@ pub fn schema() -> Value {
         },
         "additionalProperties": false
     })
+}
+
+/// Adds the bounds of a parameter; whether a bound itself is in the domain, the process says.
+fn bound(number: &mut Value, kind: Kind, at: usize) {
+    let holds = |end: f64| {
+        let mut values = vec![0.5; kind.parameters().len()];
+        values[at] = end;
+        kind.process(&values, 1.0).is_some_and(|process| process.is_ok())
+    };
+    let (low, high) = kind.parameters()[at].domain();
+    for (end, closed, open) in [(low, "minimum", "exclusiveMinimum"), (high, "maximum", "exclusiveMaximum")] {
+        if end.is_finite() {
+            number[if holds(end) { closed } else { open }] = end.into();
+        }
+    }
 }
 
 fn meaning(parameter: &str) -> &'static str {
