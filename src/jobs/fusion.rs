@@ -124,7 +124,7 @@ impl RecordedDrive {
         }
         let outcome = fusion::outcome(&solution, &settings.outages);
         let assessment = fusion::assess(&solution, &outcome, &doubts).explained(&recorded);
-        observer.remark(&Note::Fused(assessment.clone(), outcome.horizontal_max_m));
+        observer.remark(&Note::Fused(assessment.clone(), outcome.reference.map(|r| r.horizontal_max_m)));
         doubt_heading(&solution, &settings.outages, observer);
         let constants = belief.groups.iter().flatten().filter(|g| g.is_constant()).count();
         let states = [belief.states, 3 * constants];

@@ -12,12 +12,15 @@ use crate::simulation::{BIAS_NAMES, REPORTED_NAMES};
 use crate::units::DEG;
 use std::fmt::Write as _;
 
-/// Names of the files of a fusion directory, the manifest last.
-pub(crate) const FUSION_FILES: [&str; 7] = [
+/// Names of the files of a fusion directory, the manifest last. The smoothed ones are there where that was asked for.
+pub(crate) const FUSION_FILES: [&str; 10] = [
     "solution.csv",
     "innovations.csv",
     "errors.csv",
     "solution.kml",
+    "smoothed.csv",
+    "errors_smoothed.csv",
+    "smoothed.kml",
     "summary.json",
     "report.html",
     "manifest.json",
@@ -34,21 +37,22 @@ pub(crate) fn fusion_directory(
     manifest: &FusionManifest,
     title: &str,
 ) -> Vec<OutputFile<'static>> {
+    let inputs: Vec<_> = manifest.inputs.iter().map(|i| (i.role.clone(), i.path.clone())).collect();
+    let smoothed = solution.smoothed.as_deref();
     let contents = [
-        solution_csv(&solution.rows),
-        innovations_csv(solution),
-        errors_csv(&solution.rows),
-        kml(solution, title),
-        json(summary),
-        fusion_page(
-            solution,
-            summary,
-            &manifest.inputs.iter().map(|i| (i.role.clone(), i.path.clone())).collect::<Vec<_>>(),
-        )
-        .html(),
-        json(manifest),
+        Some(solution_csv(&solution.rows)),
+        Some(innovations_csv(solution)),
+        Some(errors_csv(&solution.rows)),
+        Some(kml(&solution.rows, "solution", title)),
+        smoothed.map(solution_csv),
+        smoothed.map(errors_csv),
+        smoothed.map(|rows| kml(rows, "smoothed solution", title)),
+        Some(json(summary)),
+        Some(fusion_page(solution, summary, &inputs).html()),
+        Some(json(manifest)),
     ];
-    FUSION_FILES.into_iter().zip(contents).map(|(name, text)| OutputFile::whole(name, text)).collect()
+    let files = FUSION_FILES.into_iter().zip(contents);
+    files.filter_map(|(name, text)| Some(OutputFile::whole(name, text?))).collect()
 }
 
 fn header(groups: &[(&str, &[&str])]) -> String {
@@ -61,7 +65,7 @@ fn fixed(x: f64, digits: usize) -> String {
     if x.is_finite() && x.abs() < 1e15 { format!("{x:.digits$}") } else { shortest(x) }
 }
 
-/// `solution.csv`: states, their standard deviations (those of latitude and longitude in degrees), bias
+/// `solution.csv` and `smoothed.csv`: states, their standard deviations (those of latitude and longitude in degrees), bias
 /// estimates, the horizontal standard deviations in metres, and those of the biases.
 #[must_use]
 pub(crate) fn solution_csv(rows: &[Row]) -> String {
@@ -121,11 +125,11 @@ fn errors_csv(rows: &[Row]) -> String {
 }
 
 /// The way as a line on the map, a point a second at most.
-fn kml(solution: &Solution, title: &str) -> String {
+fn kml(rows: &[Row], name: &str, title: &str) -> String {
     let mut line = String::new();
     let mut last = f64::NEG_INFINITY;
-    for row in &solution.rows {
-        if row.t_s - last >= 1.0 - 1e-6 || std::ptr::eq(row, &solution.rows[solution.rows.len() - 1]) {
+    for (k, row) in rows.iter().enumerate() {
+        if row.t_s - last >= 1.0 - 1e-6 || k + 1 == rows.len() {
             let (lon, lat, h) = (wrap_angle(row.state.lon) / DEG, row.state.lat / DEG, row.state.h);
             let _ = write!(line, "{lon:.8},{lat:.8},{h:.2} ");
             last = row.t_s;
@@ -134,7 +138,7 @@ fn kml(solution: &Solution, title: &str) -> String {
     let title = super::page::escape(title);
     format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<kml xmlns=\"http://www.opengis.net/kml/2.2\">\n<Document>\n\
-         <name>{title}</name>\n<Placemark>\n<name>solution</name>\n<Style><LineStyle><color>ff0050ff</color>\
+         <name>{title}</name>\n<Placemark>\n<name>{name}</name>\n<Style><LineStyle><color>ff0050ff</color>\
          <width>3</width></LineStyle></Style>\n<LineString><tessellate>1</tessellate>\
          <altitudeMode>clampToGround</altitudeMode>\n<coordinates>{}</coordinates>\n</LineString>\n</Placemark>\n\
          </Document>\n</kml>\n",

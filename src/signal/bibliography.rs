@@ -34,6 +34,11 @@ sources! {
     /// P. G. Savage: *Strapdown inertial navigation integration algorithm design*, J. Guidance, Control
     /// and Dynamics 21, 1998 (parts 1 and 2).
     Savage98;
+    /// H. E. Rauch, F. Tung, C. T. Striebel: *Maximum likelihood estimates of linear dynamic systems*, AIAA Journal 3,
+    /// 1965 (the smoother).
+    Rauch65;
+    /// S. Särkkä: *Bayesian Filtering and Smoothing*, Cambridge University Press, 2013.
+    Sarkka13;
     /// NIMA TR8350.2: *Department of Defense World Geodetic System 1984*, 3rd ed., 2000.
     Wgs84;
     /// P. S. Maybeck: *Stochastic Models, Estimation, and Control*, vol. 1, Academic Press, 1979.

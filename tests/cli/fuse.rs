@@ -5,6 +5,7 @@ mod doubts;
 mod loggers;
 mod mounting;
 mod nmea;
+mod smooth;
 
 use crate::common::drive::{MODEL, done, nav_sim, place_with};
 use std::fs;

@@ -167,6 +167,7 @@ pub(crate) fn settings() -> Settings {
         outages: Vec::new(),
         nis_gate: None,
         rows_hz: 10.0,
+        smooth: false,
     }
 }
 

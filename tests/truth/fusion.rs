@@ -21,17 +21,17 @@ use nav_sim::trajectory::Trajectory;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::path::Path;
 
-fn model() -> Model {
+pub(crate) fn model() -> Model {
     let place = place_with(DRIVE, MODEL);
     model_file::read(&place.path().join("imu.toml")).unwrap().model
 }
 
-fn shipped(name: &str) -> Trajectory {
+pub(crate) fn shipped(name: &str) -> Trajectory {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("trajectories").join(name);
     trajectory_file::load(&path, &trajectory_file::Options::default()).unwrap().0
 }
 
-fn settings() -> Settings {
+pub(crate) fn settings() -> Settings {
     Settings {
         q_s_b: DQuat::IDENTITY,
         mounting_sigma_b: DVec3::ZERO,
@@ -40,15 +40,16 @@ fn settings() -> Settings {
         outages: Vec::new(),
         nis_gate: None,
         rows_hz: 1.0,
+        smooth: false,
     }
 }
 
-fn belief(model: &Model) -> Belief {
+pub(crate) fn belief(model: &Model) -> Belief {
     Belief::new(model, FilterStates::Reduced15, 1.0, 800.0).unwrap()
 }
 
 /// Records runs of an experiment on a trajectory and hands each to `then`.
-fn recorded(
+pub(crate) fn recorded(
     trajectory: &Trajectory,
     model: &Model,
     gnss: &GnssSettings,
@@ -71,7 +72,7 @@ fn recorded(
     }
 }
 
-fn run(
+pub(crate) fn run(
     imu: &[ImuIncrement],
     gnss: &[GnssFix],
     start: &Start,

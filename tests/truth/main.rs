@@ -31,5 +31,6 @@ mod long_records;
 mod mounting;
 mod reduction;
 mod require;
+mod smoothing;
 mod trajectories;
 mod tune;

@@ -38,13 +38,14 @@ const ELSEWHERE_M: f64 = 10_000.0;
 /// sd_d_m, and v_n_m_s … sd_vd_m_s where velocity is measured. Or both as the text files of KF-GINS: 7 or 8
 /// columns of increments; 7 of position, 13 with velocity; GNSS also as a solution of RTKLIB (.pos, GPST) or as NMEA sentences (GGA; RMC or VTG, GST), in seconds of the day or Unix time as the IMU. Up to 5 s without samples are bridged, as uncertain
 /// as the recording is over such times elsewhere. Writes solution.csv, innovations.csv, errors.csv (with a
-/// reference), solution.kml, summary.json, report.html, manifest.json.
+/// reference), solution.kml, summary.json, report.html, manifest.json; with --smooth also smoothed.csv,
+/// errors_smoothed.csv, smoothed.kml.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
   nav-sim trajectory record trajectories/land_vehicle.toml calib_data/tactical.toml -o drive
   nav-sim fuse drive/imu.csv drive/gnss.csv calib_data/tactical.toml \\
-      --reference drive/reference.csv --outage 300:360 -o out/fused
+      --reference drive/reference.csv --outage 300:360 --smooth -o out/fused
   nav-sim fuse drive/imu.csv drive/gnss.csv calib_data/tactical.toml \\
       --initial drive/initial.toml --nis-gate 0.999 -o out/given")]
 pub(crate) struct Args {
@@ -94,6 +95,9 @@ pub(crate) struct Args {
     /// Rows of the solution a second
     #[arg(long, value_name = "HZ", default_value_t = 10.0, value_parser = parse::rate_hz)]
     rate_hz: f64,
+    /// Smooth the solution as well: every row estimated from all fixes, those after it included
+    #[arg(long)]
+    smooth: bool,
     #[command(flatten)]
     plot: PlotArgs,
     /// Directory to make
@@ -162,6 +166,7 @@ fn settings(args: &Args) -> Result<Settings, Failure> {
         outages: windows_of(&args.outages)?,
         nis_gate: args.nis_gate,
         rows_hz: args.rate_hz,
+        smooth: args.smooth,
     })
 }
 

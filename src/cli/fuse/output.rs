@@ -46,9 +46,14 @@ pub(super) fn write(
         wall_s,
     };
     let mut directory = AtomicDir::create(out)?;
-    for file in fusion_directory(solution, summary, &manifest, &title) {
+    let files = fusion_directory(solution, summary, &manifest, &title);
+    let is_old = |name: &&str| files.iter().all(|file| file.name != *name);
+    let old: Vec<&str> = FUSION_FILES.into_iter().filter(is_old).collect();
+    for file in files {
         directory.write_parts(file.name, file.parts)?;
     }
     directory.commit()?;
+    // what an earlier fusion smoothed is not of this one; where there is none, there is nothing to remove
+    old.iter().for_each(|name| drop(std::fs::remove_file(out.join(name))));
     Ok(())
 }

@@ -24,7 +24,7 @@ pub const PSI: usize = 2;
 /// First bias block.
 pub const BIAS: usize = 3;
 /// Navigation states.
-const NAV: usize = 3 * BIAS;
+pub(super) const NAV: usize = 3 * BIAS;
 
 /// Symmetric covariance of eight runs.
 #[derive(Debug, Clone)]
@@ -125,6 +125,11 @@ impl Covariance {
         for (to, from) in self.p.iter_mut().zip(&other.p) {
             to[lane] = from[lane];
         }
+    }
+
+    /// Sets the matrix of one lane to a symmetric one.
+    pub(super) fn set_lane(&mut self, lane: usize, matrix: &nalgebra::DMatrix<f64>) {
+        self.p.iter_mut().zip(matrix.iter()).for_each(|(to, from)| to[lane] = *from);
     }
 
     /// P⁺ = A P Aᵀ + Q for a map A of the navigation error and the transition of the biases; the biases
@@ -331,13 +336,13 @@ impl Covariance {
 
 /// The first nine lanes of a row as a navigation error.
 #[inline(always)]
-fn load_error<W: Wide>(row: &[Lanes]) -> NavError<W> {
+pub(super) fn load_error<W: Wide>(row: &[Lanes]) -> NavError<W> {
     let row = &row[..NAV];
     [load_triple(&row[..3]), load_triple(&row[3..6]), load_triple(&row[6..])]
 }
 
 #[inline(always)]
-fn store_error<W: Wide>(row: &mut [Lanes], x: &NavError<W>) {
+pub(super) fn store_error<W: Wide>(row: &mut [Lanes], x: &NavError<W>) {
     let row = &mut row[..NAV];
     for k in 0..NAV {
         x[k / 3][k % 3].store(&mut row[k]);
@@ -361,7 +366,7 @@ fn sum_triples<W: Wide>(row: &[Lanes]) -> Vec3<W> {
 
 /// The errors of the sample of each sensor in the row of a state behind the navigation's.
 #[inline(always)]
-fn row_errors<W: Wide>(row: &[Lanes], sources: &Sources<'_>) -> [Vec3<W>; 2] {
+pub(super) fn row_errors<W: Wide>(row: &[Lanes], sources: &Sources<'_>) -> [Vec3<W>; 2] {
     let (accel, rest) = row.split_at(3 * sources.biases[0]);
     let (gyro, rest) = rest.split_at(3 * sources.biases[1]);
     let [of_accel, of_gyro] = sources.regressors;

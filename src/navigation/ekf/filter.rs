@@ -4,6 +4,7 @@ use super::belief::{Belief, BiasGroup};
 use super::covariance::{BIAS, Covariance, PSI, R, Sources, V};
 use super::dynamics::{EARTH_STEP_S, EarthStep, EarthTerms, Sample};
 use super::initial::{InitialSettings, psi_of_angles};
+use super::transition::Transition;
 use super::unknowns::{Regressor, UnknownKind};
 use crate::frames::NavState;
 use crate::imu::{ImuSample, Sensor};
@@ -29,14 +30,16 @@ pub struct Ekf {
     pub(super) steps: Vec<BiasGroup>,
     white: [DVec3; 2],
     /// What the unknowns of each sensor are multiplied by in the last sample.
-    regressors: [Vec<Regressor>; 2],
+    pub(super) regressors: [Vec<Regressor>; 2],
     dt: f64,
     /// Samples of the belief's rate since the start.
     age: f64,
     /// Time since the Earth terms were last applied (s).
-    earth_age: f64,
+    pub(super) earth_age: f64,
     /// Angular rate of the last sample less its bias (rad/s), for the lever arm's velocity.
     pub(super) omega_ib_b: Vec3,
+    /// The transition since it was last looked at, where a smoother needs it.
+    pub(super) transition: Option<Transition>,
     pub(super) scratch: Scratch,
     pub(super) level: Level,
 }
@@ -89,6 +92,7 @@ impl Ekf {
             belief: belief.clone(),
             earth_age: 0.0,
             omega_ib_b: Vec3::ZERO,
+            transition: None,
             scratch: Scratch { ph: zeros(), gain: zeros(), error: zeros() },
             level: Level::best(),
         }
@@ -180,7 +184,11 @@ impl Ekf {
         self.omega_ib_b.store(omega_ib_b);
         let seconds = W::from(dt);
         let sample = Sample::new(&ins.step(omega_ib_b * seconds, f_ib_b * seconds, dt), dt);
-        self.p.step(&sample, &Sources::new(&self.belief, &self.steps, &self.regressors));
+        let sources = Sources::new(&self.belief, &self.steps, &self.regressors);
+        self.p.step(&sample, &sources);
+        if let Some(transition) = &mut self.transition {
+            transition.step(&sample, &sources);
+        }
         self.add_white_noise(&sample);
         self.earth_age += dt;
         if self.earth_age + 0.5 * dt > EARTH_STEP_S {
@@ -194,8 +202,11 @@ impl Ekf {
         if self.earth_age > 0.0 {
             let step = EarthStep { terms: EarthTerms::at(ins), dt: self.earth_age };
             self.earth_age = 0.0;
-            let sources = Sources::new(&self.belief, &self.steps, &self.regressors);
-            self.p.step(&step, &sources.still());
+            let sources = Sources::new(&self.belief, &self.steps, &self.regressors).still();
+            self.p.step(&step, &sources);
+            if let Some(transition) = &mut self.transition {
+                transition.step(&step, &sources);
+            }
         }
     }
 

@@ -11,7 +11,9 @@ pub mod dynamics;
 pub mod filter;
 pub mod gate;
 pub mod initial;
+mod snapshot;
 pub mod states;
+mod transition;
 pub mod unknowns;
 pub mod update;
 
@@ -21,6 +23,7 @@ pub use filter::{Ekf, advance, settle};
 pub(crate) use gate::nis_limit;
 pub(crate) use gate::update_within;
 pub use initial::InitialSettings;
+pub(crate) use snapshot::Snapshot;
 pub use states::FilterStates;
 pub use unknowns::{Unknown, UnknownKind};
 pub(crate) use update::fix_rows;

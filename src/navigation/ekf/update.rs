@@ -90,7 +90,7 @@ impl Ekf {
 
     /// Takes the estimated error out of the nominal state and the biases.
     #[inline(always)]
-    fn correct<W: Wide>(&mut self, mut ins: Strapdown<W>) {
+    pub(super) fn correct<W: Wide>(&mut self, mut ins: Strapdown<W>) {
         let (dr, dv, psi) = (self.scratch.of::<W>(R), self.scratch.of(V), self.scratch.of(PSI));
         let (s, c) = ins.lat.sin_cos();
         let radii = radii(s);

@@ -173,7 +173,7 @@ fn rejected(outcome: &Outcome) -> Option<(Verdict, String)> {
 }
 
 fn nees(outcome: &Outcome) -> Option<(Verdict, String)> {
-    let nees = outcome.nees_mean.filter(|nees| *nees > NEES_LIMIT)?;
+    let nees = outcome.reference.map(|r| r.nees_mean).filter(|nees| *nees > NEES_LIMIT)?;
     let coloured = if outcome.nis_per_component < 1.0 {
         "; the innovations do not show it, as when the errors of the fixes hardly change from one to the next"
     } else {
@@ -189,7 +189,7 @@ fn nees(outcome: &Outcome) -> Option<(Verdict, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fusion::outcome;
+    use crate::fusion::{FromReference, outcome};
     use statrs::distribution::{ChiSquared, ContinuousCDF};
 
     /// A fix a second of three components with this NIS per component.
@@ -243,7 +243,8 @@ mod tests {
     fn a_reference_that_is_three_sigma_off_in_every_state_is_not_believed() {
         let all = solution(|_| 1.0, 600);
         let verdict = |nees| {
-            let outcome = Outcome { nees_mean: Some(nees), ..outcome(&all, &[]) };
+            let reference = FromReference { rmse: [0.0; 9], horizontal_max_m: 0.0, nees_mean: nees };
+            let outcome = Outcome { reference: Some(reference), ..outcome(&all, &[]) };
             assess(&all, &outcome, &[]).verdict
         };
         assert_eq!([9.0, 20.0, 81.0].map(verdict), [Verdict::Ok, Verdict::Ok, Verdict::Overconfident]);

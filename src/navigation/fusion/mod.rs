@@ -7,16 +7,21 @@
 pub mod alignment;
 mod assessment;
 mod clocks;
+mod error;
 mod filter;
 pub mod gap;
 pub mod mounting;
 mod outcome;
+mod smoother;
 
 use assessment::nis_bound;
 pub use assessment::{Assessment, Verdict, assess};
 pub use clocks::ClocksApart;
 pub(crate) use clocks::clocks_apart;
-pub use outcome::{Drift, OutageDrift, Outcome, outcome};
+pub use error::{DOUBTFUL, FusionError};
+pub use outcome::{
+    Drift, Farthest, FromReference, OutageDrift, Outcome, SmoothedOutage, SmoothedOutcome, outcome,
+};
 
 use crate::earth::{GravityModel, MAX_LATITUDE, geodetic_to_ecef};
 use crate::ekf::{Belief, InitialSettings, nis_limit};
@@ -29,6 +34,7 @@ use crate::units::DEG;
 use filter::Filter;
 use gap::{Bridges, Spread};
 use glam::{DQuat, DVec3};
+use smoother::Tape;
 
 /// Position (m, north, east, down), velocity (m/s), roll, pitch, yaw (degrees).
 pub type Nine = [f64; 9];
@@ -59,6 +65,8 @@ pub struct Settings {
     pub nis_gate: Option<f64>,
     /// Rows of the solution a second.
     pub rows_hz: f64,
+    /// Whether every row is estimated a second time, from what was recorded before and after it.
+    pub smooth: bool,
 }
 
 /// Where the filter starts.
@@ -135,90 +143,12 @@ pub struct FixRecord {
 pub struct Solution {
     /// States at `rows_hz`.
     pub rows: Vec<Row>,
+    /// The same rows smoothed, where that was asked for.
+    pub smoothed: Option<Vec<Row>>,
     /// Every fix from start to end of the IMU.
     pub fixes: Vec<FixRecord>,
     /// IMU samples used.
     pub samples: usize,
-}
-
-/// Why recorded data cannot be fused.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum FusionError {
-    /// The clocks have nothing in common.
-    #[error(
-        "the clocks do not overlap: the IMU runs from {} to {} s, GNSS from {} to {} s", .imu.0, .imu.1, .gnss.0, .gnss.1
-    )]
-    Clocks {
-        /// First and last sample (s).
-        imu: (f64, f64),
-        /// First and last fix (s).
-        gnss: (f64, f64),
-    },
-    /// It begins after the data end, or before they begin.
-    #[error("the start at {t_s} s is not within the IMU's {} to {} s", .imu.0, .imu.1)]
-    Start {
-        /// The start (s).
-        t_s: f64,
-        /// First and last sample (s).
-        imu: (f64, f64),
-    },
-    /// The initial position is not where the fixes are.
-    #[error(
-        "the initial position is {metres:.0} m from the fix at {t_s} s (both together are good to {sigma_m:.1} m)"
-    )]
-    Place {
-        /// The first fix after the start (s).
-        t_s: f64,
-        /// How far (m).
-        metres: f64,
-        /// Horizontal standard deviation of both (m).
-        sigma_m: f64,
-    },
-    /// Latitude and longitude lose their meaning.
-    #[error(
-        "latitude {lat_deg:.3}° at {t_s} s: beyond ±89.9° there is no navigation in latitude and longitude"
-    )]
-    Pole {
-        /// When (s).
-        t_s: f64,
-        /// Where (degrees).
-        lat_deg: f64,
-    },
-    /// State or covariance stopped being finite.
-    #[error("the filter diverged at {t_s} s")]
-    Diverged {
-        /// When (s).
-        t_s: f64,
-    },
-}
-
-/// What to look at where a solution is not to be believed.
-pub const DOUBTFUL: &str =
-    "are the IMU's axes front, right, down (--mounting), its units right, the initial state true?";
-
-impl FusionError {
-    /// What to do about it.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
-        const WEEK_S: f64 = 604_800.0;
-        match self {
-            Self::Clocks { imu, gnss } => {
-                let weeks = ((imu.0 - gnss.0) / WEEK_S).round();
-                let rest = (imu.0 - gnss.0 - weeks * WEEK_S).abs();
-                Some(if weeks != 0.0 && rest < 86_400.0 {
-                    format!("they are {weeks} GPS weeks apart: give both in seconds of the week, without a week column")
-                } else {
-                    "both files need one clock: is one in milliseconds, or counted from its own start?".into()
-                })
-            }
-            Self::Start { .. } => Some("give t_s of the initial state on the clock of the IMU".into()),
-            Self::Diverged { .. } => Some(DOUBTFUL.to_owned()),
-            Self::Place { .. } => Some(
-                "are t_s, lat_deg and lon_deg of the initial state those of this recording, its pos_sigma_m honest?".into(),
-            ),
-            Self::Pole { .. } => None,
-        }
-    }
 }
 
 /// Checks that IMU and GNSS have time in common.
@@ -260,8 +190,14 @@ pub fn fuse(
         return Err(FusionError::Start { t_s: start.t_s, imu });
     }
     check_place(recorded, start, settings)?;
+    let mut filter = Filter::new(belief, start, settings);
+    let tape = match settings.smooth {
+        true => Some(Tape::new(&mut filter, start.t_s, most_marks(recorded, start, settings))?),
+        false => None,
+    };
     let mut run = Run {
-        filter: Filter::new(belief, start, settings),
+        filter,
+        tape,
         settings,
         reference,
         now: start.t_s,
@@ -285,7 +221,14 @@ pub fn fuse(
             run.row()?;
         }
     }
-    Ok(run.solution)
+    Ok(run.end())
+}
+
+/// Rows and fixes that there will be at most.
+fn most_marks(recorded: &Recorded<'_>, start: &Start, settings: &Settings) -> f64 {
+    let samples = recorded.imu.iter().filter(|s| s.t_s > start.t_s).count() as f64;
+    let rows = (spans(recorded).0.1 - start.t_s) * settings.rows_hz;
+    1.0 + rows.min(samples).ceil() + recorded.gnss.len() as f64
 }
 
 /// Refuses a start that its own and the receiver's deviations cannot explain: 10 km or 50 of both, beside
@@ -307,6 +250,7 @@ fn check_place(recorded: &Recorded<'_>, start: &Start, settings: &Settings) -> R
 /// The state of a run through the data.
 struct Run<'a> {
     filter: Filter,
+    tape: Option<Tape>,
     settings: &'a Settings,
     reference: Option<&'a Reference>,
     now: f64,
@@ -338,8 +282,10 @@ impl Run<'_> {
             Some(limit) if record.nis > limit => Use::Rejected,
             _ => Use::Used,
         };
-        if record.used == Use::Used {
-            self.filter.update(fix);
+        match &mut self.tape {
+            _ if record.used != Use::Used => {}
+            Some(tape) => tape.fix(&mut self.filter, self.now, |filter| filter.update(fix)),
+            None => self.filter.update(fix),
         }
         let finite = record.nis.is_finite();
         self.solution.fixes.push(record);
@@ -357,7 +303,17 @@ impl Run<'_> {
         }
         row.error = self.error();
         self.solution.rows.push(row);
+        if let Some(tape) = &mut self.tape {
+            tape.row(&mut self.filter, self.now);
+        }
         Ok(())
+    }
+
+    /// What came out; smoothed where a tape ran along.
+    fn end(self) -> Solution {
+        let Self { mut filter, tape, mut solution, reference, .. } = self;
+        solution.smoothed = tape.map(|tape| tape.smoothed(&mut filter, &solution.rows, reference));
+        solution
     }
 
     /// Difference from the reference now, if it reaches here.

@@ -1,6 +1,6 @@
 //! What a fusion says of itself: how many fixes, how consistent, how far off at the end of outages.
 
-use super::{Nine, Solution, Use};
+use super::{Nine, Row, Solution, Use};
 use crate::sensors::outage::Outage;
 
 /// A distance at the end of an outage, and what the filter believed of it.
@@ -38,12 +38,52 @@ pub struct Outcome {
     pub nis_per_component: f64,
     /// What each outage did.
     pub outages: Vec<OutageDrift>,
-    /// Root mean square difference from the reference in each state, over all rows that have one.
-    pub rmse: Option<Nine>,
-    /// Largest horizontal distance from the reference (m).
-    pub horizontal_max_m: Option<f64>,
-    /// Mean NEES against the reference (9 if both are right).
-    pub nees_mean: Option<f64>,
+    /// How far the rows are from the reference, where one reaches them.
+    pub reference: Option<FromReference>,
+    /// What smoothing does, where it was done.
+    pub smoothed: Option<SmoothedOutcome>,
+}
+
+/// Differences of rows from a reference.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FromReference {
+    /// Root mean square in each state.
+    pub rmse: Nine,
+    /// Largest horizontal distance (m).
+    pub horizontal_max_m: f64,
+    /// Mean NEES (9 if both are right).
+    pub nees_mean: f64,
+}
+
+/// What smoothing does to a solution.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct SmoothedOutcome {
+    /// Root mean square of the horizontal standard deviations, of the filter and smoothed (m).
+    pub sigma_rms_m: [f64; 2],
+    /// How far the smoothed rows are from the reference.
+    pub reference: Option<FromReference>,
+    /// The outages in which there are rows.
+    pub outages: Vec<SmoothedOutage>,
+}
+
+/// The rows in an outage.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SmoothedOutage {
+    /// The outage.
+    pub outage: Outage,
+    /// Of the filter.
+    pub filtered: Farthest,
+    /// Smoothed.
+    pub smoothed: Farthest,
+}
+
+/// The largest of some rows.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Farthest {
+    /// Horizontal standard deviation (m).
+    pub sigma_m: f64,
+    /// Horizontal distance from the reference (m).
+    pub from_reference_m: Option<f64>,
 }
 
 /// The figures of a solution with these outages.
@@ -52,19 +92,51 @@ pub fn outcome(solution: &Solution, outages: &[Outage]) -> Outcome {
     let count = |kind: Use| solution.fixes.iter().filter(|f| f.used == kind).count();
     let used = || solution.fixes.iter().filter(|f| f.used == Use::Used);
     let components: usize = used().map(|f| f.innovation.len()).sum();
-    let errors: Vec<_> = solution.rows.iter().filter_map(|row| row.error).collect();
-    let n = errors.len() as f64;
-    let any = (!errors.is_empty()).then_some(());
-    let rms = |i: usize| (errors.iter().map(|e| e.values[i].powi(2)).sum::<f64>() / n).sqrt();
     Outcome {
         fixes: [count(Use::Used), count(Use::Withheld), count(Use::Rejected)],
         nis_per_component: used().map(|f| f.nis).sum::<f64>() / components as f64,
         outages: outages.iter().map(|o| drift(solution, *o)).collect(),
-        rmse: any.map(|()| std::array::from_fn(rms)),
-        horizontal_max_m: any
-            .map(|()| errors.iter().map(|e| e.values[0].hypot(e.values[1])).fold(0.0, f64::max)),
-        nees_mean: any.map(|()| errors.iter().map(|e| e.nees).sum::<f64>() / n),
+        reference: from_reference(&solution.rows),
+        smoothed: solution.smoothed.as_ref().map(|rows| smoothed(&solution.rows, rows, outages)),
     }
+}
+
+fn from_reference(rows: &[Row]) -> Option<FromReference> {
+    let errors: Vec<_> = rows.iter().filter_map(|row| row.error).collect();
+    let n = errors.len() as f64;
+    let rms = |i: usize| (errors.iter().map(|e| e.values[i].powi(2)).sum::<f64>() / n).sqrt();
+    (!errors.is_empty()).then(|| FromReference {
+        rmse: std::array::from_fn(rms),
+        horizontal_max_m: errors.iter().map(|e| horizontal(&e.values)).fold(0.0, f64::max),
+        nees_mean: errors.iter().map(|e| e.nees).sum::<f64>() / n,
+    })
+}
+
+fn horizontal(values: &Nine) -> f64 {
+    values[0].hypot(values[1])
+}
+
+fn smoothed(filtered: &[Row], smoothed: &[Row], outages: &[Outage]) -> SmoothedOutcome {
+    let mean_square =
+        |rows: &[Row]| rows.iter().map(|row| horizontal(&row.sigma).powi(2)).sum::<f64>() / rows.len() as f64;
+    let of_outage = |outage: &Outage| {
+        let [filtered, smoothed] = [filtered, smoothed].map(|rows| farthest(rows, outage));
+        Some(SmoothedOutage { outage: *outage, filtered: filtered?, smoothed: smoothed? })
+    };
+    SmoothedOutcome {
+        sigma_rms_m: [filtered, smoothed].map(|rows| mean_square(rows).sqrt()),
+        reference: from_reference(smoothed),
+        outages: outages.iter().filter_map(of_outage).collect(),
+    }
+}
+
+/// The largest of the rows in an outage; none without rows.
+fn farthest(rows: &[Row], outage: &Outage) -> Option<Farthest> {
+    let within = || rows.iter().filter(|row| outage.withholds(row.t_s));
+    Some(Farthest {
+        sigma_m: within().map(|row| horizontal(&row.sigma)).reduce(f64::max)?,
+        from_reference_m: within().filter_map(|row| Some(horizontal(&row.error?.values))).reduce(f64::max),
+    })
 }
 
 fn drift(solution: &Solution, outage: Outage) -> OutageDrift {
@@ -78,8 +150,7 @@ fn drift(solution: &Solution, outage: Outage) -> OutageDrift {
     });
     let from_reference = last.and_then(|f| {
         let error = f.error?;
-        let horizontal_m = error[0].hypot(error[1]);
-        Some(Drift { horizontal_m, down_m: error[2], sigma_m: f.horizontal_sigma_m })
+        Some(Drift { horizontal_m: horizontal(&error), down_m: error[2], sigma_m: f.horizontal_sigma_m })
     });
     OutageDrift {
         outage,

@@ -28,25 +28,30 @@ pub(crate) fn fusion_page(solution: &Solution, summary: &FusionSummary, inputs: 
         page.table(&summary.outage_table());
     }
     page.section("Position");
-    page.chart(&position(&solution.rows, &outages), POSITION);
+    page.chart(&position(solution, &outages), POSITION);
     if solution.rows.iter().any(|row| row.error.is_some()) {
         page.section("Errors against the reference");
-        page.charts(&errors(&solution.rows, &outages), "Estimate less reference, and ±3 σ of the filter.");
+        page.charts(&errors(solution, &outages), ERRORS);
     }
     page.section("Fixes");
     page.chart(&innovations(solution, &outages), INNOVATIONS);
     page.chart(&nis(&solution.fixes, &outages), NIS);
     page.checked(
         "fusions of simulated recordings are consistent with their own covariance, however the samples are split and the IMU is \
-         mounted (tests/truth/fusion.rs).",
+         mounted (tests/truth/fusion.rs), smoothed ones too (tests/truth/smoothing.rs).",
     );
     page
 }
 
 const POSITION: &str = "Standard deviation of the horizontal position that the filter states; with a reference, the distance from it.";
+const ERRORS: &str =
+    "Estimate less reference, and ±3 σ of the filter; the same smoothed, where that was asked for.";
 const INNOVATIONS: &str =
     "Estimated less measured position over its standard deviation; 95 % of used fixes belong into the band.";
 const NIS: &str = "Normalised innovation squared of each fix; 95 % belong into the band of a right filter.";
+
+/// What is smoothed.
+const SMOOTHED: Colour = Colour::Hue(3);
 
 fn timed(title: &str, panels: Vec<Panel>, outages: &[(f64, f64)]) -> Chart {
     Chart::new(title, Axis::linear("time (s)"), panels).with_outages(outages).in_group("time")
@@ -71,6 +76,8 @@ fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
         series.push(Series::line("reference", Colour::Ink, way));
     }
     series.push(Series::line("solution", Colour::REAL, solution.rows.iter().map(place).collect()));
+    let smoothed = solution.smoothed.iter();
+    series.extend(smoothed.map(|rows| Series::line("smoothed", SMOOTHED, rows.iter().map(place).collect())));
     let ends = [("start", Some(first)), ("end", solution.rows.last())];
     series.extend(ends.into_iter().filter_map(|(name, row)| {
         let (east, north) = place(row?);
@@ -79,25 +86,38 @@ fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
     Chart::map("Way", series)
 }
 
-fn position(rows: &[Row], outages: &[(f64, f64)]) -> Chart {
-    let sigma = rows.iter().map(|row| (row.t_s, row.sigma[0].hypot(row.sigma[1]))).collect();
+fn position(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
+    let horizontal = |rows: &[Row], of: fn(&Row) -> f64| rows.iter().map(|row| (row.t_s, of(row))).collect();
+    let sigma = |row: &Row| row.sigma[0].hypot(row.sigma[1]);
     let error = |row: &Row| row.error.map_or(f64::NAN, |e| e.values[0].hypot(e.values[1]));
-    let mut series = vec![Series::line("σ of the filter", Colour::BELIEVED, sigma)];
-    if rows.iter().any(|row| row.error.is_some()) {
-        let errors = rows.iter().map(|row| (row.t_s, error(row))).collect();
-        series.push(Series::line("error against the reference", Colour::REAL, errors));
+    let rows = &solution.rows;
+    let has_reference = rows.iter().any(|row| row.error.is_some());
+    let mut series = vec![Series::line("σ of the filter", Colour::BELIEVED, horizontal(rows, sigma))];
+    if has_reference {
+        series.push(Series::line("error against the reference", Colour::REAL, horizontal(rows, error)));
+    }
+    if let Some(rows) = &solution.smoothed {
+        let dashed = Mark::Line(horizontal(rows, sigma), Stroke::Dashed);
+        series.push(Series::new("σ smoothed", SMOOTHED, dashed));
+        if has_reference {
+            series.push(Series::line("error smoothed", SMOOTHED, horizontal(rows, error)));
+        }
     }
     timed("Horizontal position", vec![Panel::new(Axis::log("horizontal (m)"), series)], outages)
 }
 
-fn errors(rows: &[Row], outages: &[(f64, f64)]) -> Vec<Chart> {
+fn errors(solution: &Solution, outages: &[(f64, f64)]) -> Vec<Chart> {
+    let filtered = (&solution.rows, ["±3 σ", "error"], [Colour::BELIEVED, Colour::REAL]);
+    let smoothed = solution.smoothed.as_ref();
+    let smoothed = smoothed.map(|rows| (rows, ["±3 σ smoothed", "error smoothed"], [SMOOTHED; 2]));
     let chart = |(i, state): (usize, &&str)| {
-        let error = rows.iter().map(|row| (row.t_s, row.error.map_or(f64::NAN, |e| e.values[i]))).collect();
-        let believed = rows.iter().map(|row| (row.t_s, -3.0 * row.sigma[i], 3.0 * row.sigma[i])).collect();
-        let series = vec![
-            Series::new("±3 σ", Colour::BELIEVED, Mark::Band(believed)),
-            Series::line("error", Colour::REAL, error),
-        ];
+        let mut series = Vec::new();
+        for (rows, [band, line], [believed, real]) in std::iter::once(filtered).chain(smoothed) {
+            let sigma = rows.iter().map(|row| (row.t_s, -3.0 * row.sigma[i], 3.0 * row.sigma[i])).collect();
+            let error = |row: &Row| (row.t_s, row.error.map_or(f64::NAN, |e| e.values[i]));
+            series.push(Series::new(band, believed, Mark::Band(sigma)));
+            series.push(Series::line(line, real, rows.iter().map(error).collect()));
+        }
         timed(&error_of(state), vec![Panel::new(Axis::linear(""), series)], outages).small()
     };
     STATES.iter().enumerate().map(chart).collect()

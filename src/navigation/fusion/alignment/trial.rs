@@ -43,7 +43,7 @@ fn agreement(
 ) -> Agreement {
     let imu = &recorded.imu[..recorded.imu.partition_point(|s| s.t_s <= to_s)];
     let gnss = &recorded.gnss[..recorded.gnss.partition_point(|f| f.t_s <= to_s)];
-    let settings = Settings { nis_gate: None, rows_hz: 1e-3, ..settings.clone() };
+    let settings = Settings { nis_gate: None, rows_hz: 1e-3, smooth: false, ..settings.clone() };
     let failed = Agreement { cost: f64::INFINITY, nis: f64::INFINITY, components: 0 };
     let Ok(solution) = fuse(&Recorded { imu, gnss }, belief, start, &settings, None) else { return failed };
     let mut sum = Agreement { cost: 0.0, nis: 0.0, components: 0 };
