@@ -230,7 +230,8 @@ fn smoothed_errors_are_as_large_as_stated_and_smaller_than_the_filter_s() {
 }
 
 /// Identities: the filter is the same, to the bit, whether a tape runs along or not; at the last mark smoothed is
-/// filtered, to the bit; no deviation grows; and more rows are more marks, which change nothing.
+/// filtered, to the bit; no deviation grows; more rows are more marks, which change nothing; and without fixes there is
+/// nothing to smooth, to rounding.
 #[test]
 fn smoothing_changes_nothing_that_it_should_not() {
     let trajectory = shipped("figure_eight.toml");
@@ -273,6 +274,18 @@ fn smoothing_changes_nothing_that_it_should_not() {
                 assert!(apart.abs() < 1e-6, "{i} at {} s: {apart:e}", row.t_s);
                 assert!((same.sigma[i] / row.sigma[i] - 1.0).abs() < 1e-6);
             }
+        }
+        // without a fix there is nothing to smooth
+        let all = vec![Outage { start_s: 0.0, end_s: 1e4 }];
+        let free =
+            run(imu, &fixes, start, &Settings { smooth: true, outages: all, ..plain.clone() }, &trajectory);
+        for (filtered, smoothed) in free.rows.iter().zip(rows(&free)) {
+            let apart = |of: fn(&Row) -> [f64; 9]| {
+                (0..9)
+                    .map(|i| (of(filtered)[i] - of(smoothed)[i]).abs() / filtered.sigma[i])
+                    .fold(0.0, f64::max)
+            };
+            assert!(apart(|row| row.error.unwrap().values) < 1e-9 && apart(|row| row.sigma) < 1e-6);
         }
     });
 }
