@@ -3,11 +3,11 @@
 use super::manifest::Input;
 use super::number::{seconds, window};
 use super::page::{Cell, Table, Tone};
+use super::smoothed::{Reference, Smoothed};
 use crate::ekf::InitialSettings;
 use crate::frames::{NavState, RollPitchYaw, wrap_angle};
 use crate::fusion::mounting::Mounting;
-use crate::fusion::{Assessment, Drift, FromReference, Outcome, SmoothedOutcome, Solution, Start, Verdict};
-use crate::metrics::PerState;
+use crate::fusion::{Assessment, Drift, Outcome, Solution, Start, Verdict};
 use crate::units::DEG;
 use serde::{Deserialize, Serialize};
 
@@ -120,15 +120,6 @@ impl From<Drift> for DriftRow {
     }
 }
 
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct Reference {
-    rmse: PerState<f64>,
-    horizontal_rmse_m: f64,
-    horizontal_max_m: f64,
-    nees_mean: f64,
-    nees_dof: usize,
-}
-
 impl MountingRow {
     /// As it is given for the next drive.
     fn line(&self) -> String {
@@ -137,100 +128,6 @@ impl MountingRow {
             "mounting found: --mounting={roll_deg:.2},{pitch_deg:.2},{yaw_deg:.2} (± {front:.1}°, {right:.1}°, {down:.1}° about \
              the vehicle's front, right, down), {how}"
         )
-    }
-}
-
-impl From<FromReference> for Reference {
-    fn from(r: FromReference) -> Self {
-        Self {
-            rmse: PerState(r.rmse),
-            horizontal_rmse_m: r.rmse[0].hypot(r.rmse[1]),
-            horizontal_max_m: r.horizontal_max_m,
-            nees_mean: r.nees_mean,
-            nees_dof: 9,
-        }
-    }
-}
-
-/// What smoothing does, beside the filter's own.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-struct Smoothed {
-    /// Root mean square of the horizontal standard deviation.
-    horizontal_sigma_rms_m: f64,
-    horizontal_sigma_rms_filter_m: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    reference: Option<Reference>,
-    outages: Vec<SmoothedOutageRow>,
-}
-
-/// The largest of the rows in an outage.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-struct SmoothedOutageRow {
-    start_s: f64,
-    end_s: f64,
-    sigma_max_m: f64,
-    sigma_max_filter_m: f64,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    horizontal_max_m: Option<f64>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    horizontal_max_filter_m: Option<f64>,
-}
-
-impl From<&SmoothedOutcome> for Smoothed {
-    fn from(outcome: &SmoothedOutcome) -> Self {
-        let [filter, smoothed] = outcome.sigma_rms_m;
-        let outages = outcome.outages.iter().map(|o| SmoothedOutageRow {
-            start_s: o.outage.start_s,
-            end_s: o.outage.end_s,
-            sigma_max_m: o.smoothed.sigma_m,
-            sigma_max_filter_m: o.filtered.sigma_m,
-            horizontal_max_m: o.smoothed.from_reference_m,
-            horizontal_max_filter_m: o.filtered.from_reference_m,
-        });
-        Self {
-            horizontal_sigma_rms_m: smoothed,
-            horizontal_sigma_rms_filter_m: filter,
-            reference: outcome.reference.map(Into::into),
-            outages: outages.collect(),
-        }
-    }
-}
-
-impl Smoothed {
-    /// What is said of it, filter → smoothed.
-    fn lines(&self, filter: Option<&Reference>) -> Vec<String> {
-        let mut lines = vec![format!(
-            "smoothed, filter → smoothed: horizontal 1 sigma {:.3} → {:.3} m (RMS)",
-            self.horizontal_sigma_rms_filter_m, self.horizontal_sigma_rms_m
-        )];
-        if let (Some(before), Some(after)) = (filter, &self.reference) {
-            lines[0] += &format!(
-                "; RMSE against the reference: horizontal {:.3} → {:.3} m, down {:.3} → {:.3} m, yaw {:.3} → {:.3}°; NEES {:.2} → {:.2}",
-                before.horizontal_rmse_m,
-                after.horizontal_rmse_m,
-                before.rmse.0[2],
-                after.rmse.0[2],
-                before.rmse.0[8],
-                after.rmse.0[8],
-                before.nees_mean,
-                after.nees_mean
-            );
-        }
-        let largest =
-            |of: fn(&SmoothedOutageRow) -> Option<f64>| self.outages.iter().filter_map(of).reduce(f64::max);
-        if let (Some(before), Some(after)) =
-            (largest(|o| Some(o.sigma_max_filter_m)), largest(|o| Some(o.sigma_max_m)))
-        {
-            let mut line =
-                format!("smoothed, in outages, largest: horizontal 1 sigma {before:.2} → {after:.2} m");
-            if let (Some(before), Some(after)) =
-                (largest(|o| o.horizontal_max_filter_m), largest(|o| o.horizontal_max_m))
-            {
-                line += &format!(", from the reference {before:.2} → {after:.2} m");
-            }
-            lines.push(line);
-        }
-        lines
     }
 }
 

@@ -29,6 +29,7 @@ pub(crate) mod run_words;
 pub(crate) mod sample;
 mod short;
 mod signals;
+mod smoothed;
 mod study;
 pub(crate) mod tables;
 mod trajectory;

@@ -8,10 +8,13 @@
 
 use super::epoch::EpochMetrics;
 use super::outage::OutageMetrics;
+use super::summary::OutageSummary;
 use crate::units::{DEG, STANDARD_GRAVITY};
 
 /// Roll, pitch among the reported states.
 const TILT: [usize; 2] = [6, 7];
+/// Among them too.
+const VELOCITY_DOWN: usize = 5;
 
 /// Mean shift of the velocity down (m/s) that the tilt makes to second order over an outage: ∫ g (ψ_roll² + ψ_pitch²)/2 dt
 /// with the mean squares of the errors, by the trapezoidal rule over the reporting epochs. NaN where no epochs were kept.
@@ -27,6 +30,19 @@ pub(super) fn velocity_down_m_s(outage: &OutageMetrics, epochs: &[EpochMetrics])
     let end = (outage.end_s, last);
     let ends = points.iter().zip(points.iter().skip(1).chain([&end]));
     ends.map(|(a, b)| (b.0 - a.0) * (a.1 + b.1) / 2.0).sum()
+}
+
+impl OutageSummary {
+    /// The share of the filter's own standard deviation that the second order shifts the velocity down by at the end,
+    /// where the filter's linear model ends: where it is above [`Self::SECOND_ORDER_LIMIT`].
+    #[must_use]
+    pub fn beyond_linear(&self) -> Option<f64> {
+        let share = self.second_order_vel_d_m_s / self.asee_end.0[VELOCITY_DOWN];
+        (share > Self::SECOND_ORDER_LIMIT).then_some(share)
+    }
+
+    /// See [`Self::beyond_linear`].
+    pub const SECOND_ORDER_LIMIT: f64 = 0.3;
 }
 
 #[cfg(test)]

@@ -17,9 +17,6 @@ use serde::Serialize;
 /// Version of the layout of `summary.json`.
 pub(super) const SCHEMA_VERSION: u32 = 1;
 
-/// Among the reported states.
-const VELOCITY_DOWN: usize = 5;
-
 /// What the user reads first.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Summary {
@@ -306,17 +303,6 @@ impl OutageSummary {
         let outages = outages.iter().zip(verdicts);
         outages.map(|(o, verdict)| Self::new(o, verdict, velocity_down_m_s(o, epochs))).collect()
     }
-
-    /// The share of the filter's own standard deviation that the second order shifts the velocity down by at the end,
-    /// where the filter's linear model ends: where it is above [`Self::SECOND_ORDER_LIMIT`].
-    #[must_use]
-    pub fn beyond_linear(&self) -> Option<f64> {
-        let share = self.second_order_vel_d_m_s / self.asee_end.0[VELOCITY_DOWN];
-        (share > Self::SECOND_ORDER_LIMIT).then_some(share)
-    }
-
-    /// See [`Self::beyond_linear`].
-    pub const SECOND_ORDER_LIMIT: f64 = 0.3;
 
     fn new(o: &OutageMetrics, verdict: OutageVerdict, second_order_vel_d_m_s: f64) -> Self {
         Self {
