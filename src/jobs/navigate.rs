@@ -160,6 +160,9 @@ pub fn navigate(
         }
     };
     navigation.summary.reduction = reduction;
+    if scenario.baro.is_some() {
+        navigation.summary.see_height();
+    }
     analysis.add_budgets(&mut navigation.summary, &belief);
     if method == Method::Lincov {
         analysis.add_sensitivities(&mut navigation.summary, &belief);

@@ -60,14 +60,15 @@ pub(crate) fn text(summary: &Summary) -> String {
 pub(crate) fn beyond_linear(summary: &Summary) -> Option<String> {
     let beyond = summary.outages.iter().filter_map(|o| Some((o, o.beyond_linear()?)));
     let (outage, share) = beyond.max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let advice = match summary.runs {
-        0 => "; --method both sets runs beside the analysis",
+    let how_far = match summary.runs {
+        0 => "; --method both shows how far",
         _ => "",
     };
     Some(format!(
         "beyond linear: attitude errors of the outage {} shift the velocity down by {} m/s to second order, {:.0} % of the \
-         filter's standard deviation; neither the filter nor covariance analysis knows that, and the vertical position, \
-         velocity and accelerometer bias are worse than believed from its end on{advice}",
+         filter's standard deviation, which neither filter nor covariance analysis contains; for some minutes from its end on the velocity \
+         down and the vertical accelerometer bias can be twice as wrong as believed{how_far}. A barometer, a shorter outage \
+         or a better gyroscope removes it",
         window(outage.start_s, outage.end_s),
         readable(outage.second_order_vel_d_m_s),
         100.0 * share

@@ -69,6 +69,9 @@ impl From<&SmoothedOutcome> for Smoothed {
     }
 }
 
+/// Errors over standard deviations, of all states together, that are said.
+const TOO_SURE: f64 = 1.5;
+
 impl Smoothed {
     /// What is said of it, filter → smoothed.
     pub(super) fn lines(&self, filter: Option<&Reference>) -> Vec<String> {
@@ -88,6 +91,10 @@ impl Smoothed {
                 before.nees_mean,
                 after.nees_mean
             );
+            let times = (after.nees_mean / after.nees_dof as f64).sqrt();
+            if times > TOO_SURE {
+                lines[0] += &format!("; smoothed errors are {times:.1} times their standard deviations");
+            }
         }
         let largest =
             |of: fn(&SmoothedOutageRow) -> Option<f64>| self.outages.iter().filter_map(of).reduce(f64::max);

@@ -1,7 +1,7 @@
 //! Verdicts in words.
 
 use super::number::{readable, window};
-use crate::metrics::{Verdict, VerdictKind};
+use crate::metrics::{ALL_STATES, Verdict, VerdictKind};
 
 /// One line: the verdict, by how much and where, the figures it rests on. `outages` are those of the
 /// experiment (start, end) in seconds; `runs` and `diverged` count its runs.
@@ -56,11 +56,15 @@ fn departure(verdict: &Verdict, outages: &[(f64, f64)]) -> String {
         }
         None => "over the run".to_owned(),
     };
-    format!(
-        "errors are {} times the filter's standard deviation in {} {place}",
-        with_error(verdict.ratio, verdict.ratio_std_error),
-        verdict.worst_state
-    )
+    let times = with_error(verdict.ratio, verdict.ratio_std_error);
+    match verdict.worst_state {
+        ALL_STATES => format!(
+            "errors are {times} times what the filter believes of all states together, and of no single one, {place} (NEES \
+             {} there)",
+            readable(9.0 * verdict.ratio.powi(2))
+        ),
+        state => format!("errors are {times} times the filter's standard deviation in {state} {place}"),
+    }
 }
 
 fn with_error(value: f64, error: f64) -> String {

@@ -165,11 +165,13 @@ fn long_outages_shift_the_velocity_down_by_the_square_of_the_tilts() {
     let experiment = scenario.experiment(&trajectory, Truth::Model(&file.model), &beliefs, &outages, 5);
     let result = monte_carlo::run(&experiment, 256, &|_| {}).unwrap().remove(0);
     let epochs = nav_sim::metrics::epochs(&result);
-    let summary = nav_sim::metrics::Summary::of(&result, &epochs, 5);
+    let mut summary = nav_sim::metrics::Summary::of(&result, &epochs, 5);
     let shift = summary.outages[0].second_order_vel_d_m_s;
     let end = epochs.iter().rev().find(|e| e.t_s < 399.5).unwrap();
     let (mean, error) = (end.bias.0[5].value, end.bias.0[5].std_error);
     assert!((mean - shift).abs() < 3.5 * error + 0.1 * shift, "{mean} ± {error} against {shift}");
     assert!(mean > 3.0 * error, "{mean} ± {error} could be chance");
     assert!(summary.outages[0].beyond_linear().is_some());
+    summary.see_height();
+    assert!(summary.outages[0].beyond_linear().is_none());
 }

@@ -27,7 +27,8 @@ const LASTING: &str = "the filter takes the errors of the fixes as white: where 
                        (--gnss-sigma-factor); is the reference's attitude that of the vehicle (if not: --mounting)?";
 /// What helps where a drive does not show the mounting.
 const UNMOUNTED: &str = "give --mounting ROLL,PITCH,YAW; or record some minutes of driving forwards with braking, \
-                         accelerating and turns on both sides, with velocities in the GNSS file; an IMU that was never calibrated needs --turn-on-bias";
+                         accelerating and turns on both sides, with velocities in the GNSS file; an IMU that was never \
+                         calibrated needs --turn-on-bias, an antenna apart from it --lever-arm, and fixes that lag behind (clocks) contradict every mounting";
 /// A distance from the reference that no filter makes: another place, or another time (m).
 const ELSEWHERE_M: f64 = 10_000.0;
 

@@ -35,4 +35,4 @@ pub use reduction::{AxisReduction, ReductionQuality, ReductionSummary, TOLERANCE
 pub use requirement::{Met, Requirement, UnknownRequirement};
 pub use sensitivity::Sensitivities;
 pub use summary::{AccuracySummary, Consistency, Coverage, Nis, OutageSummary, Recovery, Spread, Summary};
-pub use verdict::{OutageVerdict, StateName, Verdict, VerdictKind};
+pub use verdict::{ALL_STATES, OutageVerdict, StateName, Verdict, VerdictKind};

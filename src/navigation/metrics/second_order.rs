@@ -8,7 +8,7 @@
 
 use super::epoch::EpochMetrics;
 use super::outage::OutageMetrics;
-use super::summary::OutageSummary;
+use super::summary::{OutageSummary, Summary};
 use crate::units::{DEG, STANDARD_GRAVITY};
 
 /// Roll, pitch among the reported states.
@@ -30,6 +30,18 @@ pub(super) fn velocity_down_m_s(outage: &OutageMetrics, epochs: &[EpochMetrics])
     let end = (outage.end_s, last);
     let ends = points.iter().zip(points.iter().skip(1).chain([&end]));
     ends.map(|(a, b)| (b.0 - a.0) * (a.1 + b.1) / 2.0).sum()
+}
+
+impl Summary {
+    /// A barometer sees the vertical channel: no shift grows there without being corrected, and none is stated.
+    pub fn see_height(&mut self) {
+        for outage in &mut self.outages {
+            outage.second_order_vel_d_m_s = f64::NAN;
+        }
+        if let Some(expected) = &mut self.lincov {
+            expected.see_height();
+        }
+    }
 }
 
 impl OutageSummary {

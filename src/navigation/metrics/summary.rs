@@ -118,7 +118,7 @@ pub struct OutageSummary {
     /// Horizontal error at the same instant.
     pub horizontal_error_end_m: Spread,
     /// Mean shift of the velocity down at the same instant that attitude errors make to second order, which neither
-    /// filter nor covariance analysis contains (null where the epochs were not kept).
+    /// filter nor covariance analysis contains (null where the epochs were not kept, or a barometer sees the height).
     pub second_order_vel_d_m_s: f64,
     /// Time until the error is back to what it was before.
     pub reconvergence_s: Recovery,

@@ -33,8 +33,11 @@ pub enum VerdictKind {
     Diverged,
 }
 
-/// One of [`REPORTED_NAMES`]; `serde` would borrow what it saw as a reference.
+/// One of [`REPORTED_NAMES`], or [`ALL_STATES`]; `serde` would borrow what it saw as a reference.
 pub type StateName = &'static str;
+
+/// Stands for all states together, by their NEES, where they are off and no single one is.
+pub const ALL_STATES: StateName = "all";
 
 /// The verdict on the filter of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -53,7 +56,7 @@ pub struct Verdict {
     /// Its Monte-Carlo standard error, from the scatter of the runs.
     #[serde(deserialize_with = "number")]
     pub coverage_std_error: f64,
-    /// The state that is farthest off in the direction of the verdict.
+    /// The state that is farthest off in the direction of the verdict, or [`ALL_STATES`].
     #[serde(deserialize_with = "state")]
     pub worst_state: StateName,
     /// The outage at whose end it is (from 0); none: over the whole run.
@@ -91,7 +94,7 @@ fn count<'de, D: Deserializer<'de>>(value: D) -> Result<f64, D::Error> {
 
 fn state<'de, D: Deserializer<'de>>(value: D) -> Result<&'static str, D::Error> {
     let name = String::deserialize(value)?;
-    let known = REPORTED_NAMES.into_iter().find(|known| *known == name);
+    let known = REPORTED_NAMES.into_iter().chain([ALL_STATES]).find(|known| *known == name);
     known.ok_or_else(|| serde::de::Error::custom(format!("{name:?} is no state")))
 }
 
@@ -100,8 +103,8 @@ fn state<'de, D: Deserializer<'de>>(value: D) -> Result<&'static str, D::Error> 
 pub struct OutageVerdict {
     /// In one word.
     pub kind: VerdictKind,
-    /// The state that is farthest off there in the direction of the verdict.
-    pub worst_state: &'static str,
+    /// The state that is farthest off there in the direction of the verdict, or [`ALL_STATES`].
+    pub worst_state: StateName,
     /// Root mean square there of error over standard deviation: 1 if the filter is right.
     pub ratio: f64,
     /// Its Monte-Carlo standard error.
@@ -168,7 +171,7 @@ impl Verdict {
             nees_std_error: nees.std_error,
             coverage: coverage.value,
             coverage_std_error: coverage.std_error,
-            worst_state: REPORTED_NAMES[worst.state.unwrap_or(0)],
+            worst_state: worst.name(),
             worst_outage: worst.outage,
             ratio: worst.ratio.value,
             ratio_std_error: worst.ratio.std_error,
@@ -196,6 +199,12 @@ struct Statistic {
     outage: Option<usize>,
     /// √(mean/degrees of freedom).
     ratio: Estimate,
+}
+
+impl Statistic {
+    fn name(&self) -> StateName {
+        self.state.map_or(ALL_STATES, |state| REPORTED_NAMES[state])
+    }
 }
 
 /// The runs that count.
@@ -277,7 +286,7 @@ impl Judge {
             let worst = self.worst(&own, kind);
             OutageVerdict {
                 kind,
-                worst_state: REPORTED_NAMES[worst.state.unwrap_or(0)],
+                worst_state: worst.name(),
                 ratio: worst.ratio.value,
                 ratio_std_error: worst.ratio.std_error,
             }
@@ -285,7 +294,8 @@ impl Judge {
         (0..outages).map(of).collect()
     }
 
-    /// The state that is farthest off in the direction of the verdict; of those that alarm, if any does.
+    /// The state that is farthest off in the direction of the verdict; of those that alarm, if any does. Where all
+    /// states together alarm and none by itself does, it is they.
     fn worst(&self, all: &[Statistic], kind: VerdictKind) -> Statistic {
         let distance = |s: &Statistic| match kind {
             VerdictKind::Underconfident => -s.ratio.value.ln(),
@@ -293,7 +303,10 @@ impl Judge {
             VerdictKind::Ok | VerdictKind::Diverged => s.ratio.value.ln().abs(),
         };
         let key = |s: &&Statistic| (self.of(s) == kind, distance(s));
-        let states = all.iter().filter(|s| s.state.is_some());
+        let alarms = |s: &&Statistic| kind != VerdictKind::Ok && self.of(s) == kind;
+        let alone = all.iter().filter(alarms).any(|s| s.state.is_some());
+        let together = !alone && all.iter().filter(alarms).any(|s| s.state.is_none());
+        let states = all.iter().filter(|s| s.state.is_none() == together);
         let farther = |a: &&Statistic, b: &&Statistic| {
             let (a, b) = (key(a), key(b));
             a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))

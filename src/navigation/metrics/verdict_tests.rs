@@ -56,6 +56,23 @@ fn an_overconfident_state_is_named() {
     assert!((verdict.ratio - 1.5).abs() < 5.0 * 1.5 / 20.0, "{verdict:?}");
 }
 
+/// Errors that hang together as the filter does not believe: each state is as far off as it should be, all together are
+/// not. They are named, with √(NEES/9), known to half of √(2/(9·200)), within five standard errors.
+#[test]
+fn states_that_are_wrong_together_only_are_named_together() {
+    let mut all = runs(200, 20, 3, [1.0; 9]);
+    all.iter_mut().for_each(|run| run.outages[0].nees_end *= 1.7);
+    let verdict = Verdict::of(&all, 1, None);
+    assert_eq!((verdict.kind, verdict.worst_state), (VerdictKind::Overconfident, ALL_STATES));
+    assert_eq!(verdict.worst_outage, Some(0));
+    assert!(
+        (verdict.ratio / 1.7_f64.sqrt() - 1.0).abs() < 5.0 * 0.5 * (2.0_f64 / 1800.0).sqrt(),
+        "{verdict:?}"
+    );
+    let text = serde_json::to_string(&verdict).unwrap();
+    assert_eq!(serde_json::from_str::<Verdict>(&text).unwrap().worst_state, ALL_STATES);
+}
+
 #[test]
 fn too_little_confidence_is_told_and_too_much_comes_first() {
     let timid = Verdict::of(&runs(200, 20, 3, [0.7; 9]), 1, None);
