@@ -4,7 +4,7 @@
 use super::comparison::{CandidateResult, Label};
 use super::comparison_table::table_rows;
 use super::number::{readable, window};
-use super::verdict::verdict_word;
+use super::verdict::{state_in_words, verdict_word};
 use crate::metrics::{self, EpochMetrics, Measured, OutageComparison, OutageMetrics, Verdict};
 use crate::simulation::{BIAS_NAMES, REPORTED, REPORTED_NAMES};
 
@@ -290,7 +290,7 @@ pub(crate) fn verdict_table(cells: &[ShownCell]) -> Vec<Vec<String>> {
             verdict_word(v.kind),
             readable(v.nees),
             readable(v.ratio),
-            v.worst_state
+            state_in_words(v.worst_state)
         )
     };
     rows.extend(

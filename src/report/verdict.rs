@@ -1,7 +1,7 @@
 //! Verdicts in words.
 
 use super::number::{readable, window};
-use crate::metrics::{ALL_STATES, Verdict, VerdictKind};
+use crate::metrics::{ALL_STATES, StateName, Verdict, VerdictKind};
 
 /// One line: the verdict, by how much and where, the figures it rests on. `outages` are those of the
 /// experiment (start, end) in seconds; `runs` and `diverged` count its runs.
@@ -71,10 +71,20 @@ fn with_error(value: f64, error: f64) -> String {
     if error.is_finite() { format!("{} ± {}", readable(value), readable(error)) } else { readable(value) }
 }
 
+/// A state, or all of them, in words.
+pub(crate) fn state_in_words(name: StateName) -> &'static str {
+    if name == ALL_STATES { "all states together" } else { name }
+}
+
 /// For a line that names several runs: "NEES 1189, 34.6 × in yaw_deg".
 #[must_use]
 pub(crate) fn verdict_in_short(verdict: &Verdict) -> String {
-    format!("NEES {}, {} × in {}", readable(verdict.nees), readable(verdict.ratio), verdict.worst_state)
+    format!(
+        "NEES {}, {} × in {}",
+        readable(verdict.nees),
+        readable(verdict.ratio),
+        state_in_words(verdict.worst_state)
+    )
 }
 
 /// The verdict in one word.
