@@ -125,8 +125,8 @@ impl MountingRow {
     fn line(&self) -> String {
         let Self { roll_deg, pitch_deg, yaw_deg, sigma_deg: [front, right, down], how } = self;
         format!(
-            "mounting found: --mounting={roll_deg:.2},{pitch_deg:.2},{yaw_deg:.2} (± {front:.1}°, {right:.1}°, {down:.1}° about \
-             the vehicle's front, right, down), {how}"
+            "mounting found: --mounting={roll_deg:.2},{pitch_deg:.2},{yaw_deg:.2}:{front:.2},{right:.2},{down:.2} (after the \
+             colon ± about the vehicle's front, right, down, degrees), {how}"
         )
     }
 }

@@ -114,32 +114,50 @@ pub(super) fn parse_sigma(text: &str) -> Result<FixSigma, String> {
 pub(super) enum MountingArg {
     /// Found from the drive.
     Auto,
-    /// Roll, pitch, yaw (degrees).
-    Angles(parse::Triple),
+    /// Roll, pitch, yaw, and their standard deviations about the vehicle's front, right, down (degrees).
+    Angles(parse::Triple, parse::Triple),
 }
 
 impl MountingArg {
     fn mounted(self) -> Mounted {
         match self {
             Self::Auto => Mounted::AsFound,
-            Self::Angles(_) => Mounted::AsGiven,
+            Self::Angles(..) => Mounted::AsGiven,
+        }
+    }
+
+    /// Standard deviations about front, right, down (rad).
+    pub(super) fn sigma_b(self) -> DVec3 {
+        match self {
+            Self::Auto => DVec3::ZERO,
+            Self::Angles(_, sigma_deg) => DVec3::from(sigma_deg.0) * DEG,
         }
     }
 }
 
-/// `auto` or `ROLL,PITCH,YAW` in degrees.
+/// Largest standard deviation of a mounting that small angles describe (degrees).
+const MAX_MOUNTING_SIGMA_DEG: f64 = 30.0;
+
+/// `auto` or `ROLL,PITCH,YAW[:SD,SD,SD]` in degrees.
 pub(super) fn parse_mounting(text: &str) -> Result<MountingArg, String> {
     if text == "auto" {
         return Ok(MountingArg::Auto);
     }
-    let angles = parse::triple(text).map(MountingArg::Angles);
-    angles.map_err(|_| "expected roll, pitch, yaw in degrees, such as -9.5,-60.8,-166.8, or auto".into())
+    let (angles, sigma) = text.split_once(':').unwrap_or((text, "0,0,0"));
+    let known = |sigma: &parse::Triple| sigma.0.iter().all(|s| (0.0..=MAX_MOUNTING_SIGMA_DEG).contains(s));
+    let both = parse::triple(angles).ok().zip(parse::triple(sigma).ok().filter(known));
+    both.map(|(angles, sigma)| MountingArg::Angles(angles, sigma)).ok_or_else(|| {
+        format!(
+            "expected roll, pitch, yaw in degrees, such as -9.5,-60.8,-166.8, or with standard deviations of 0 to \
+             {MAX_MOUNTING_SIGMA_DEG}° about the vehicle's front, right, down, -9.5,-60.8,-166.8:1.5,0.5,0.8, or auto"
+        )
+    })
 }
 
 /// The IMU in the vehicle: its axes named as the logger names them, turned by the mounting.
 pub(super) fn mounting(axes: LoggerAxes, angles: Option<MountingArg>) -> DQuat {
     let frd = match angles {
-        Some(MountingArg::Angles(parse::Triple([roll, pitch, yaw]))) => {
+        Some(MountingArg::Angles(parse::Triple([roll, pitch, yaw]), _)) => {
             RollPitchYaw { roll: roll * DEG, pitch: pitch * DEG, yaw: yaw * DEG }.to_quat()
         }
         Some(MountingArg::Auto) | None => DQuat::IDENTITY,

@@ -65,9 +65,9 @@ pub(crate) struct Args {
     /// GNSS antenna from the IMU: front, right, down (m)
     #[arg(long, value_name = "X,Y,Z", value_parser = parse::triple, allow_hyphen_values = true)]
     lever_arm: Option<parse::Triple>,
-    /// Attitude of the IMU in the vehicle, where its axes are not front, right, down (degrees); auto: found from the drive
-    /// of a road vehicle
-    #[arg(long, value_name = "ROLL,PITCH,YAW|auto", value_parser = inputs::parse_mounting, allow_hyphen_values = true)]
+    /// Attitude of the IMU in the vehicle, where its axes are not front, right, down (degrees), after a colon how well it is
+    /// known about the vehicle's front, right, down; auto: found from the drive of a road vehicle
+    #[arg(long, value_name = "ROLL,PITCH,YAW[:SD,SD,SD]|auto", value_parser = inputs::parse_mounting, allow_hyphen_values = true)]
     mounting: Option<inputs::MountingArg>,
     /// What the logger calls x, y, z; the mounting turns what is front, right, down then
     #[arg(long, value_name = "AXES", value_enum, default_value = "frd")]
@@ -161,7 +161,7 @@ fn settings(args: &Args) -> Result<Settings, Failure> {
     }
     Ok(Settings {
         q_s_b: inputs::mounting(args.axes, args.mounting),
-        mounting_sigma_b: glam::DVec3::ZERO,
+        mounting_sigma_b: args.mounting.map_or(glam::DVec3::ZERO, inputs::MountingArg::sigma_b),
         lever_arm_b,
         gravity: args.gravity,
         outages: windows_of(&args.outages)?,

@@ -10,7 +10,8 @@ use std::path::Path;
 pub(super) fn claim(out: &Path, inputs: &[Input], session: &Session) -> Result<Claim, Failure> {
     // Options are kept in the command alone.
     let is_same = |there: FusionManifest| {
-        (there.command, there.version) == (command(), version()) && there.inputs == inputs
+        (deciding(&there.command), there.version) == (deciding(&command()), version())
+            && there.inputs == inputs
     };
     let recognise = |text: &str| {
         let there = serde_json::from_str(text);
@@ -26,6 +27,23 @@ fn version() -> String {
 
 fn command() -> Vec<String> {
     std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect()
+}
+
+/// The words of a command that decide its results: neither the program nor where and how they are told.
+fn deciding(command: &[String]) -> Vec<&str> {
+    const ALONE: [&str; 6] = ["-q", "--quiet", "-v", "--verbose", "--no-progress", "--force"];
+    const WITH_VALUE: [&str; 7] = ["-j", "--threads", "--format", "--seed", "-o", "--out", "--plot"];
+    let mut words = command.iter().skip(1).map(String::as_str);
+    let mut kept = Vec::new();
+    while let Some(word) = words.next() {
+        let name = word.split_once('=').map_or(word, |(name, _)| name);
+        if WITH_VALUE.contains(&word) {
+            words.next();
+        } else if !ALONE.contains(&word) && !WITH_VALUE.contains(&name) {
+            kept.push(word);
+        }
+    }
+    kept
 }
 
 /// Writes all files, the manifest last.

@@ -13,6 +13,8 @@ use std::fmt;
 /// Lags that are tried (s), and the step from one to the next.
 const LONGEST_S: f64 = 60.0;
 const STEP_S: f64 = 0.1;
+/// Shortest lag that is told: turns between fixes a second apart, of receivers that filter them, lie off by less (s).
+const SHORTEST_S: f64 = 0.5;
 /// Times from the beginning of a turn to its end (s): of fixes nearer to one another the course is mostly noise.
 const APART_S: (f64, f64) = (0.9, 5.0);
 /// Most turns that are looked at.
@@ -79,7 +81,12 @@ pub(crate) fn clocks_apart(recorded: &Recorded<'_>) -> Option<ClocksApart> {
     let far = |lag_s: f64| (lag_s - add_s).abs() > PEAK_S;
     let second = best_of(&mut tried.iter().copied().filter(|(lag_s, _)| far(*lag_s)));
     let or_add_s = second.filter(|(_, r)| unexplained(*r) <= enough).map(|(lag_s, _)| lag_s);
-    is_other.then_some(ClocksApart { add_s, correlation: best, as_they_are, or_add_s })
+    (is_other && add_s.abs() >= SHORTEST_S).then_some(ClocksApart {
+        add_s,
+        correlation: best,
+        as_they_are,
+        or_add_s,
+    })
 }
 
 /// The turns between fixes that move fast enough for a course, one after the other.

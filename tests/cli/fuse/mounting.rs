@@ -31,11 +31,21 @@ fn a_mounting_is_found_and_can_be_pasted() {
     let page = fs::read_to_string(place.path().join("out/report.html")).unwrap();
     assert!(page.contains("mounting found: "), "the page");
 
-    // the same solution but for what is known of the mounting: the heading's sigma at the start
+    // the same solution, as sure of itself
     let (_, given) = fuse(&format!("--axes flu {paste}"));
     let rmse = |summary: &serde_json::Value| number(&summary["reference"]["horizontal_rmse_m"]);
     assert!((rmse(&given) / rmse(&summary) - 1.0).abs() < 0.05, "{} {}", rmse(&given), rmse(&summary));
+    let nees = |summary: &serde_json::Value| number(&summary["reference"]["nees_mean"]);
+    assert!((nees(&given) / nees(&summary) - 1.0).abs() < 0.05, "{} {}", nees(&given), nees(&summary));
     assert!(given.get("mounting").is_none());
+
+    // told otherwise, it is the same result
+    done(
+        place.path(),
+        &format!(
+            "fuse rec/imu.csv rec/gnss.csv imu.toml --reference rec/reference.csv --axes flu {paste} -j 1 -q --out=out"
+        ),
+    );
 }
 
 /// Too short, and a word that is none.
