@@ -2,7 +2,7 @@
 
 use super::epoch::{Accuracy, EpochMetrics};
 use super::estimate::{Estimate, PerState, Quantile};
-use super::outage::{OutageMetrics, Reconvergence};
+use super::outage::{OutageMetrics, Reconvergence, within};
 use super::quadratic_form::QuadraticForm;
 use super::summary::{AccuracySummary, Consistency, Coverage, Nis, OutageSummary, SCHEMA_VERSION, Summary};
 use super::verdict::{OutageVerdict, Verdict};
@@ -164,9 +164,7 @@ fn epoch(instant: &Instant, bias_asee: [f64; BIASES], limit: f64) -> Option<Epoc
 }
 
 fn outage((start_s, end_s): (f64, f64), end: &Instant, epochs: &[EpochMetrics]) -> OutageMetrics {
-    // a nanosecond of slack: sample times are multiples of 1/rate, outage times are typed
-    let inside = epochs.iter().filter(|e| start_s <= e.t_s + 1e-9 && e.t_s + 1e-9 < end_s);
-    let mean = Accuracy::over(inside);
+    let mean = Accuracy::over(within((start_s, end_s), epochs));
     let without_error = |all: &PerState<Estimate>| PerState(all.0.map(|e| exact(e.value)));
     let [p50, p95, p999] = horizontal_quantiles(end, [0.5, 0.95, NEARLY_ALL]);
     let quantile = |value: f64| Quantile { value, ci95: (None, None) };

@@ -1,6 +1,6 @@
 //! Statistics of one outage.
 
-use super::epoch::{Accuracy, epochs};
+use super::epoch::{Accuracy, EpochMetrics, epochs};
 use super::estimate::{Estimate, PerState, Quantile, quantile};
 use crate::simulation::{OutageRecord, REPORTED, RunResult};
 
@@ -54,14 +54,21 @@ pub fn outages(result: &RunResult) -> Vec<OutageMetrics> {
     let epochs = epochs(result);
     let of = |(i, window): (usize, &(f64, f64))| {
         let records: Vec<&OutageRecord> = kept().filter_map(|r| r.outages.get(i)).collect();
-        // a nanosecond of slack: sample times are multiples of 1/rate, outage times are typed
-        let inside = epochs.iter().filter(|e| window.0 <= e.t_s + 1e-9 && e.t_s + 1e-9 < window.1);
         OutageMetrics {
-            rmse_mean: Accuracy::over(inside).rmse_mean,
+            rmse_mean: Accuracy::over(within(*window, &epochs)).rmse_mean,
             ..outage(*window, &records, result.independent_windows)
         }
     };
     result.outages.iter().enumerate().map(of).collect()
+}
+
+/// The epochs without a fix of an outage.
+pub(super) fn within(
+    (start_s, end_s): (f64, f64),
+    epochs: &[EpochMetrics],
+) -> impl Iterator<Item = &EpochMetrics> + Clone {
+    // a nanosecond of slack: sample times are multiples of 1/rate, outage times are typed
+    epochs.iter().filter(move |e| start_s <= e.t_s + 1e-9 && e.t_s + 1e-9 < end_s)
 }
 
 /// All that the records of the runs tell.
