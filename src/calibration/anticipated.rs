@@ -147,14 +147,14 @@ impl Anticipated<'_> {
             mean: f64::NAN,
         };
         let group = |values: &[f64]| {
-            let one = |k: usize, channel: &Channel| Replicate {
+            let expected_replicate = |k: usize, channel: &Channel| Replicate {
                 name: (k + 1).to_string(),
                 axis: Some(channel.axis),
                 ..like(&template, values.to_vec())
             };
             let channels = scope.channels();
             let replicates = channels.iter().flat_map(|c| (0..self.recordings).map(move |k| (k, c)));
-            Group { scope, replicates: replicates.map(|(k, c)| one(k, c)).collect() }
+            Group { scope, replicates: replicates.map(|(k, c)| expected_replicate(k, c)).collect() }
         };
         let first = group(&classical);
         // what a robust variance reads of quantization noise is known once there is a curve

@@ -88,8 +88,9 @@ impl TurnOnSpread {
     #[must_use]
     pub fn sigmas(&self) -> Option<[f64; 3]> {
         let seen = self.finding == TurnOnFinding::Seen;
-        let own = |axis: Axis| self.axes.iter().find(|a| a.axis == axis).map_or(self.spread(), |a| a.spread);
-        seen.then(|| Axis::ALL.map(own))
+        let spread_of_axis =
+            |axis: Axis| self.axes.iter().find(|a| a.axis == axis).map_or(self.spread(), |a| a.spread);
+        seen.then(|| Axis::ALL.map(spread_of_axis))
     }
 
     /// Root mean square over the axes of the spread of the means (m/s² or rad/s).

@@ -99,7 +99,7 @@ pub fn replicates(
     levels: Option<u32>,
     tuning: &Tuning,
 ) -> Result<Vec<(Channel, Replicate)>, SignalError> {
-    let one = |signal: &Signal| {
+    let replicate = |signal: &Signal| {
         let (channel, samples) = (signal.channel, signal.samples.len());
         let levels = levels.unwrap_or_else(|| default_levels(samples));
         let error = |source| SignalError { recording: recording.name.clone(), channel, source };
@@ -110,7 +110,7 @@ pub fn replicates(
         let mean = signal.mean + signal.samples.iter().sum::<f64>() / samples as f64;
         Ok((channel, Replicate { name, axis, samples, classical, robust, trend, mean }))
     };
-    recording.signals.par_iter().map(one).collect()
+    recording.signals.par_iter().map(replicate).collect()
 }
 
 /// Mean of the later half of a signal less that of its earlier half; the middle one of an odd number is left out.

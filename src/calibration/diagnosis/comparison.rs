@@ -41,8 +41,8 @@ impl Comparison {
     /// those of the noise at the longest scales do.
     pub(super) fn drift(pieces: &[Piece<'_>], sensor: Sensor, noise: &Self) -> Self {
         let deviations = |p: &Piece<'_>| {
-            let of = |r: &Replicate| vec![0.5 * r.trend / wv_of_length(p.model, r.samples).sqrt()];
-            p.replicates.iter().map(|r| r.map(of)).collect()
+            let deviation = |r: &Replicate| vec![0.5 * r.trend / wv_of_length(p.model, r.samples).sqrt()];
+            p.replicates.iter().map(|r| r.map(deviation)).collect()
         };
         let table = Table { logs: pieces.iter().map(deviations).collect::<Vec<Vec<_>>>(), above_only: false };
         let files = pieces.first().map_or(0, |p| p.replicates.len());

@@ -44,7 +44,7 @@ fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &
         fits.into_par_iter().filter_map(|(g, o)| left_out(g, name, o, settings)).collect()
     };
     let (misfits, differing) = (misfits(sensor, outcomes), differing(sensor, outcomes));
-    let one = |(index, name): (usize, &&str)| {
+    let diagnosis = |(index, name): (usize, &&str)| {
         let [of_noise, of_outliers] = [&noise, &outliers].map(|test| test.alarm(index, settings.rate_hz));
         let of_drift = drift.drift_alarm(index, &pieces);
         let verdict = match (&of_noise, &of_outliers, &of_drift) {
@@ -53,11 +53,11 @@ fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &
             (None, None, Some(_)) => Verdict::Drift,
             (None, None, None) => Verdict::Normal,
         };
-        let has = |r: &&Replicate| r.name == **name;
+        let is_of_recording = |r: &&Replicate| r.name == **name;
         Diagnosis {
             name: (*name).to_owned(),
             sensor,
-            axes: own.iter().flat_map(|g| &g.replicates).filter(has).count(),
+            axes: own.iter().flat_map(|g| &g.replicates).filter(is_of_recording).count(),
             verdict,
             noise: of_noise,
             outliers: of_outliers,
@@ -71,7 +71,7 @@ fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &
             differing,
         }
     };
-    names.iter().enumerate().map(one).collect()
+    names.iter().enumerate().map(diagnosis).collect()
 }
 
 /// The fits of a sensor that the J-test rejects.

@@ -47,11 +47,11 @@ pub(super) fn left_out(group: &Group, name: &str, outcome: &Outcome, settings: &
     let with = &outcome.curve;
     without.ignored.clone_from(&with.ignored);
     let moves = with.levels.iter().zip(&with.wv).zip(&with.edof).zip(&without.wv);
-    let one = |(((level, with), edof), without): (((&u32, &f64), &f64), &f64)| {
+    let movement = |(((level, with), edof), without): (((&u32, &f64), &f64), &f64)| {
         let ratio = without / with;
         (*level, ratio - 1.0, ratio.ln() / variance_of_log(*edof).sqrt())
     };
-    let (level, change, deviations) = moves.map(one).max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))?;
+    let (level, change, deviations) = moves.map(movement).max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))?;
     let parameters = outcome
         .estimate_again(&without, settings)
         .map_or(Vec::new(), |fit| movements(outcome, &fit.composite));

@@ -25,9 +25,10 @@ pub(super) fn axes<'a>(own: &[&'a Group], names: &[&str], outcomes: &'a [Outcome
         let group = own.iter().find(|g| g.replicates.iter().any(|r| r.axis == Some(axis)))?;
         // The last estimator is the most robust.
         let model = &outcomes.iter().rfind(|o| o.scope == group.scope)?.fit.composite;
-        let of = |name: &&str| group.replicates.iter().find(|r| r.name == **name && r.axis == Some(axis));
+        let replicate_of =
+            |name: &&str| group.replicates.iter().find(|r| r.name == **name && r.axis == Some(axis));
         let law = SamplingLaw::new(model, levels);
-        Some(Piece { axis, model, law, replicates: names.iter().map(of).collect() })
+        Some(Piece { axis, model, law, replicates: names.iter().map(replicate_of).collect() })
     };
     Axis::ALL.into_iter().filter_map(piece).collect()
 }

@@ -171,14 +171,16 @@ fn leaving_out_moves_what_it_should() {
             (0..3).for_each(|i| signal[100 + 600 * i] += 60.0);
         }
     });
-    let of = |file: usize, estimator: Estimator| {
+    let change_without = |file: usize, estimator: Estimator| {
         let left = all[file].left_out.iter().find(|l| l.estimator == estimator).unwrap();
         let sigma2 = left.parameters.iter().find(|m| m.parameter == "sigma2").unwrap();
         sigma2.without / sigma2.with - 1.0
     };
-    assert!((of(2, Estimator::Awv) + 0.33).abs() < 0.1, "{}", of(2, Estimator::Awv));
-    assert!(of(2, Estimator::SrAwv).abs() < 0.03 && of(2, Estimator::DrAwv).abs() < 0.03);
-    assert!(of(3, Estimator::SrAwv).abs() < 0.03);
+    assert!((change_without(2, Estimator::Awv) + 0.33).abs() < 0.1, "{}", change_without(2, Estimator::Awv));
+    assert!(
+        change_without(2, Estimator::SrAwv).abs() < 0.03 && change_without(2, Estimator::DrAwv).abs() < 0.03
+    );
+    assert!(change_without(3, Estimator::SrAwv).abs() < 0.03);
 }
 
 /// Two of eight with twice the variance at all scales.

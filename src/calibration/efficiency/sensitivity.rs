@@ -71,7 +71,7 @@ fn curve(
     let clean = |r| design.measure(&design.synthesized(0, r, &design.drawn(0, r)?));
     let mut replicates = (1..=design.replicates).map(clean).collect::<Result<Vec<_>, _>>()?;
     let reference = design.estimate_all(&replicates)?;
-    let mut one = |size: &f64| {
+    let mut changes_at = |size: &f64| {
         for replicate in touched {
             replicates[*replicate as usize - 1] = disturbed(*replicate, *size)?;
         }
@@ -79,7 +79,7 @@ fn curve(
         let changes = moved.iter().zip(&reference).map(|(m, r)| relative(m, r)).collect();
         Ok(Movement { size: *size, changes })
     };
-    sizes.iter().map(&mut one).collect()
+    sizes.iter().map(&mut changes_at).collect()
 }
 
 fn relative(moved: &Estimate, reference: &Estimate) -> Vec<f64> {

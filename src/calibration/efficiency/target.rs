@@ -183,14 +183,14 @@ mod tests {
         let model = Model::pooled(RATE, &Example1::noise(), &Composite::default());
         let spread = Spread { axes: [example.laws(), vec![], vec![], vec![], vec![], vec![]] };
         let n = 8000_u32;
-        let one = |run: u32| {
+        let first_scale = |run: u32| {
             let drawn = spread.draw(&model, 1, run.into()).unwrap();
             let key = StreamKey { seed: 1, scenario: "", run: run.into(), source: "accel.x", process: "" };
             let mut x = [0.0; 128];
             Synthesizer::new(&drawn.axes[0], key).fill(&mut x);
             crate::wavelet::classical(&x, 1).unwrap()[0]
         };
-        let nu: Vec<f64> = (0..n).map(one).collect();
+        let nu: Vec<f64> = (0..n).map(first_scale).collect();
         let mean = nu.iter().sum::<f64>() / f64::from(n);
         let variance = nu.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / f64::from(n);
         let sd = (variance / f64::from(n)).sqrt() / (0.5 - example.theta_0());

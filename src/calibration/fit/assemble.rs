@@ -120,19 +120,19 @@ impl Term {
     /// The parameters that lie on a bound given; those that are fixed have nowhere else to be.
     fn bounded(&self, process: usize, rate_hz: f64) -> Vec<ParameterRef> {
         let (amplitude, shape) = self.values(rate_hz);
-        let on = |value: f64, (low, high): (f64, f64)| {
+        let is_at_end = |value: f64, (low, high): (f64, f64)| {
             low < high
                 && value.abs() > 0.0
                 && (value.to_bits() == low.to_bits() || value.to_bits() == high.to_bits())
         };
         let mut bounded = Vec::new();
-        if on(amplitude, self.limits.amplitude) {
+        if is_at_end(amplitude, self.limits.amplitude) {
             bounded.push(ParameterRef { process, parameter: self.kind.amplitude() });
         }
         // What is not there has its shape anywhere.
         if let (Some(parameter), Some(limits)) = (self.kind.shape(), self.limits.shape)
             && amplitude > 0.0
-            && on(shape, limits)
+            && is_at_end(shape, limits)
         {
             bounded.push(ParameterRef { process, parameter });
         }

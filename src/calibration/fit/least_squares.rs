@@ -72,10 +72,10 @@ fn reweighted(
 fn covariance(curve: &Curve, fit: &Fit) -> DMatrix<f64> {
     let levels = curve.levels.iter().copied().max().unwrap_or(1) as usize;
     let law = SamplingLaw::new(&fit.composite, levels);
-    let at = |i: usize| curve.levels[i] as usize - 1;
+    let index = |i: usize| curve.levels[i] as usize - 1;
     let deviation = |i: usize| (2.0 / curve.edof[i]).sqrt();
     let n = curve.levels.len();
-    DMatrix::from_fn(n, n, |i, j| law.correlation[(at(i), at(j))] * deviation(i) * deviation(j))
+    DMatrix::from_fn(n, n, |i, j| law.correlation[(index(i), index(j))] * deviation(i) * deviation(j))
 }
 
 /// The fit weighted by the inverse of a covariance of the curve relative to `nu`.

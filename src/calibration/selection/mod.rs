@@ -70,11 +70,11 @@ pub(crate) fn choose(
         other => other,
     };
     let settings = &Settings { weighting, ..settings.clone() };
-    let one = |spec: &ModelSpec| {
+    let fitted = |spec: &ModelSpec| {
         fit(curve, spec, settings.rate_hz, settings.weighting).map(|fit| (spec.clone(), fit))
     };
     let all = sums(curve.levels.len());
-    let fits = all.par_iter().map(one).collect::<Result<Vec<_>, _>>()?;
+    let fits = all.par_iter().map(fitted).collect::<Result<Vec<_>, _>>()?;
     let tried = fits.len();
     let fits: Vec<(ModelSpec, Fit)> =
         fits.into_iter().filter(|(_, f)| f.zero.is_empty() && f.at_end.is_empty()).collect();
@@ -240,11 +240,11 @@ impl Field<'_> {
         let count = pairs.len() as f64;
         let roots = self.settings.weighting.roots(self.curve, &self.curve.wv);
         let term = |(j, root): (usize, &f64)| {
-            let of = |(c, implied): &(&Curve, Vec<f64>)| (root * c.wv[j], root * implied[j]);
+            let rooted = |(c, implied): &(&Curve, Vec<f64>)| (root * c.wv[j], root * implied[j]);
             let (mut a, mut b, mut ab) = (0.0, 0.0, 0.0);
             // About the first, so that no digits are lost.
-            let first = of(&pairs[0]);
-            for (x, y) in pairs.iter().map(of) {
+            let first = rooted(&pairs[0]);
+            for (x, y) in pairs.iter().map(rooted) {
                 let (x, y) = (x - first.0, y - first.1);
                 (a, b, ab) = (a + x, b + y, ab + x * y);
             }

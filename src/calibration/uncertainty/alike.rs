@@ -68,7 +68,7 @@ mod tests {
     /// Signals of white noise and random walk, their white noise of standard deviation e^(spread/2 · N(0, 1)).
     fn set(seed: u64, count: usize, spread: f64) -> Vec<Replicate> {
         let tuning = tuning();
-        let one = |run: usize| {
+        let recording = |run: usize| {
             let key = StreamKey { seed, scenario: "", run: run as u64, source: "", process: "" };
             let mut generator = key.generator();
             let mut normal = || generator.sample::<f64, _>(StandardNormal);
@@ -91,7 +91,7 @@ mod tests {
                 mean: f64::NAN,
             }
         };
-        (0..count).map(one).collect()
+        (0..count).map(recording).collect()
     }
 
     /// Sets, of so many, that are said to differ.

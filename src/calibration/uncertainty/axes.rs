@@ -43,8 +43,8 @@ pub(crate) fn axes_differ(
         let noise = replicates.iter().map(|r| variance_of_log(degrees(r, level))).fold(0.0, f64::max);
         let (p_value, means) = between_axes(&table.iter().map(logs).collect::<Vec<_>>(), noise)?;
         let by_mean = |a: &(f64, Axis), b: &(f64, Axis)| a.0.total_cmp(&b.0);
-        let all = || means.iter().copied().zip(axes.iter().copied());
-        let (smallest, largest) = (all().min_by(by_mean)?, all().max_by(by_mean)?);
+        let means_of_axes = || means.iter().copied().zip(axes.iter().copied());
+        let (smallest, largest) = (means_of_axes().min_by(by_mean)?, means_of_axes().max_by(by_mean)?);
         Some(AxesDiffer {
             level,
             p_value: (p_value * count).min(1.0),
@@ -100,7 +100,7 @@ mod tests {
 
     /// White noise of three axes, the second with so many times the variance of the others.
     fn set(seed: u64, recordings: usize, factor: f64) -> Vec<Replicate> {
-        let one = |k: usize| {
+        let recording = |k: usize| {
             let (run, axis) = (k as u64, Axis::ALL[k % 3]);
             let key = StreamKey { seed, scenario: "", run, source: "", process: "" };
             let mut generator = key.generator();
@@ -111,7 +111,7 @@ mod tests {
             let (name, trend) = (format!("run{}", k / 3), f64::NAN);
             Replicate { name, axis: Some(axis), samples: 2048, classical, robust, trend, mean: f64::NAN }
         };
-        (0..3 * recordings).map(one).collect()
+        (0..3 * recordings).map(recording).collect()
     }
 
     /// By Bonferroni at most 2.5 % of sets of alike axes: of 200 at most 13 (5 and four standard deviations of 2.2), whatever the

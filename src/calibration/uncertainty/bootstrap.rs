@@ -135,35 +135,36 @@ impl<'a> CurveSampler<'a> {
         settings: &Settings,
     ) -> Option<Curve> {
         let mut generator = key.generator();
-        let with = |(edof, between): (&Vec<f64>, &Vec<f64>)| match scattering {
+        let ratios_of_recording = |(edof, between): (&Vec<f64>, &Vec<f64>)| match scattering {
             Scattering::All => {
                 let within = self.law.draw(edof, &mut generator);
                 within.into_iter().zip(between).map(|(ratio, b)| ratio * b).collect()
             }
             Scattering::BetweenRecordings => between.clone(),
         };
-        let ratios = self.spread.as_ref()?.edof.iter().zip(between).map(with).collect();
+        let ratios = self.spread.as_ref()?.edof.iter().zip(between).map(ratios_of_recording).collect();
         self.curve(ratios, settings)
     }
 
     /// nu*/nu of new replicates: what they differ by, and the scatter of each.
     fn random_effects(&self, spread: &Spread, generator: &mut Generator) -> Vec<Vec<f64>> {
         let between = spread.draw_between(generator);
-        let with = |(edof, between): (&Vec<f64>, Vec<f64>)| {
+        let ratios_of_recording = |(edof, between): (&Vec<f64>, Vec<f64>)| {
             let within = self.law.draw(edof, generator);
             within.into_iter().zip(between).map(|(ratio, b)| ratio * b.exp()).collect()
         };
-        spread.edof.iter().zip(between).map(with).collect()
+        spread.edof.iter().zip(between).map(ratios_of_recording).collect()
     }
 
     /// The estimator's curve of replicates of which nu*/nu is given.
     fn curve(&self, ratios: Vec<Vec<f64>>, settings: &Settings) -> Option<Curve> {
         let edof = self.spread.iter().flat_map(|s| &s.edof);
-        let of = |((replicate, ratios), edof): ((&Replicate, Vec<f64>), &Vec<f64>)| {
+        let drawn_replicate = |((replicate, ratios), edof): ((&Replicate, Vec<f64>), &Vec<f64>)| {
             let levels = self.centre.iter().zip(ratios).zip(edof);
             like(replicate, levels.map(|((nu, ratio), edof)| nu * ratio * (1.0 + self.bias(*edof))).collect())
         };
-        let replicates: Vec<Replicate> = self.replicates.iter().zip(ratios).zip(edof).map(of).collect();
+        let replicates: Vec<Replicate> =
+            self.replicates.iter().zip(ratios).zip(edof).map(drawn_replicate).collect();
         let curve = average(&replicates, self.estimator, settings.trim, &settings.tuning).ok()?;
         Some(Curve { ignored: self.curve.ignored.clone(), ..curve })
     }

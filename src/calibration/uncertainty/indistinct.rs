@@ -69,8 +69,9 @@ fn probability(group: &Group, outcome: &Outcome, simple: &Outcome, settings: &Se
     let gain = |run: usize| {
         let key = StreamKey { seed: SEED, scenario: "indistinct", run: run as u64, source: &name, process };
         let curve = sampler.draw(&key, settings)?;
-        let of = |o: &Outcome| again(outcome, &o.spec, &curve, settings, Some(&o.fit)).map(|f| f.objective);
-        Some(of(simple)? - of(outcome)?)
+        let objective =
+            |o: &Outcome| again(outcome, &o.spec, &curve, settings, Some(&o.fit)).map(|f| f.objective);
+        Some(objective(simple)? - objective(outcome)?)
     };
     let mut gains: Vec<f64> = Vec::new();
     let mut done = 0;
@@ -147,7 +148,7 @@ mod tests {
     fn fitted(seed: u64, count: u64, ratio: f64) -> Outcome {
         let phis = phis(ratio);
         let channel = Channel { sensor: Sensor::Gyro, axis: Axis::X };
-        let one = |run: u64| {
+        let recording = |run: u64| {
             let key = StreamKey { seed, scenario: "", run, source: "", process: "" };
             let mut generator = key.generator();
             let mut normal = || generator.sample::<f64, _>(StandardNormal);
@@ -171,7 +172,7 @@ mod tests {
             };
             (channel, crate::uncertainty::bootstrap::like(&template, nu))
         };
-        let groups = [grouped((0..count).map(one).collect(), Pool::Axes).remove(0)];
+        let groups = [grouped((0..count).map(recording).collect(), Pool::Axes).remove(0)];
         let mut outcomes = calibrate(&groups, &settings("WN+2*AR1")).unwrap();
         infer(&groups, &mut outcomes, &settings("WN+2*AR1"), Bootstrap { draws: 99, seed: 3 });
         outcomes.remove(0)
@@ -192,8 +193,9 @@ mod tests {
             );
             for (process, phi) in [1, 2].into_iter().zip(phis) {
                 for (parameter, value) in [(Parameter::Phi, phi), (Parameter::Sigma2, 1.0 - phi * phi)] {
-                    let own = |i: &&ParameterInterval| i.of == ParameterRef { process, parameter };
-                    let interval = inference.intervals.iter().find(own).unwrap();
+                    let is_of_parameter =
+                        |i: &&ParameterInterval| i.of == ParameterRef { process, parameter };
+                    let interval = inference.intervals.iter().find(is_of_parameter).unwrap();
                     if interval.absent.is_some() {
                         continue;
                     }

@@ -122,7 +122,7 @@ mod tests {
 
     /// Replicates of white noise and random walk, each with its own variances.
     fn group(set: u64, replicates: &[(f64, f64)]) -> Group {
-        let one = |(run, (sigma2, gamma2)): (usize, &(f64, f64))| {
+        let recording = |(run, (sigma2, gamma2)): (usize, &(f64, f64))| {
             let run = run as u64;
             let key = StreamKey { seed: set, scenario: "", run, source: "", process: "" };
             let mut generator = key.generator();
@@ -144,7 +144,7 @@ mod tests {
             };
             (CHANNEL, like(&template, nu))
         };
-        grouped(replicates.iter().enumerate().map(one).collect(), Pool::Axes).remove(0)
+        grouped(replicates.iter().enumerate().map(recording).collect(), Pool::Axes).remove(0)
     }
 
     fn inferred(group: Group, settings: &Settings, draws: usize) -> Outcome {

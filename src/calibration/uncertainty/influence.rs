@@ -146,12 +146,12 @@ mod tests {
             let influence = CurveInfluence::of(&outcome, &settings).unwrap();
             assert_eq!(influence.parameters.len(), 4);
             for j in 0..curve.wv.len() {
-                let at = |by: f64| {
+                let refitted = |by: f64| {
                     let mut moved = curve.clone();
                     moved.wv[j] *= 1.0 + by;
                     fitted(moved).fit.composite.parameters().map(|(_, v)| v).collect::<Vec<f64>>()
                 };
-                let (up, down) = (at(1e-3), at(-1e-3));
+                let (up, down) = (refitted(1e-3), refitted(-1e-3));
                 for m in 0..4 {
                     let brute = (up[m] - down[m]) / 2e-3 / influence.units[m];
                     let exact = influence.passed_on[(m, j)];

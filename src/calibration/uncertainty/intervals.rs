@@ -131,14 +131,14 @@ fn holding(value: f64, [low, high]: [f64; 2]) -> [f64; 2] {
 /// them are paired as can be, the nearest.
 fn matched<'a>(estimate: &Fit, spec: &ModelSpec, fit: &'a Fit) -> Vec<Option<&'a Process>> {
     let (drawn, model) = (&fit.composite.processes, &estimate.composite.processes);
-    let there = |fit: &Fit, i: usize| !fit.zero.contains(&i) && !fit.at_end.contains(&i);
+    let is_present = |fit: &Fit, i: usize| !fit.zero.contains(&i) && !fit.at_end.contains(&i);
     let kinds = spec.kinds();
     let cost = |i: usize, d: usize| (log_time(&model[i]) - log_time(&drawn[d])).powi(2);
     let mut matched = vec![None; drawn.len()];
     for (first, kind) in kinds.iter().enumerate().filter(|(i, kind)| !kinds[..*i].contains(kind)) {
         let own: Vec<usize> = (first..kinds.len()).filter(|i| kinds[*i] == *kind).collect();
-        let items: Vec<usize> = own.iter().copied().filter(|i| there(fit, *i)).collect();
-        let places: Vec<usize> = own.iter().copied().filter(|i| there(estimate, *i)).collect();
+        let items: Vec<usize> = own.iter().copied().filter(|i| is_present(fit, *i)).collect();
+        let places: Vec<usize> = own.iter().copied().filter(|i| is_present(estimate, *i)).collect();
         let pairs: Vec<(usize, usize)> = if own.iter().any(|i| spec.limits()[*i] != Limits::NONE) {
             items.iter().map(|i| (*i, *i)).collect()
         } else if items.len() <= places.len() {
@@ -294,7 +294,7 @@ mod tests {
     #[test]
     fn a_component_that_vanishes_in_draws_takes_nothing_of_the_other() {
         let ar1 = |time: f64, sigma2: f64| Process::Ar1(Ar1::new((-1.0 / time).exp(), sigma2).unwrap());
-        let of = |processes: Vec<Process>| {
+        let fit_of = |processes: Vec<Process>| {
             let composite = Composite::new(processes);
             let levels: Vec<u32> = (1..=12).collect();
             let wv = levels.iter().map(|l| composite.haar_wv(*l) + 1e-12).collect();
@@ -316,10 +316,10 @@ mod tests {
                 inference: None,
             }
         };
-        let outcome = of(vec![ar1(10.0, 1.0), ar1(1000.0, 1.0)]);
-        let whole = |factor: f64| of(vec![ar1(10.0, factor), ar1(1000.0, factor)]).fit;
+        let outcome = fit_of(vec![ar1(10.0, 1.0), ar1(1000.0, 1.0)]);
+        let whole = |factor: f64| fit_of(vec![ar1(10.0, factor), ar1(1000.0, factor)]).fit;
         // The one that is not there has a time beyond the other's: by order it is the second.
-        let mut lost = of(vec![ar1(700.0, 1.1), ar1(5000.0, 0.0)]).fit;
+        let mut lost = fit_of(vec![ar1(700.0, 1.1), ar1(5000.0, 0.0)]).fit;
         lost.zero = vec![1];
         let matched = matched(&outcome.fit, &outcome.spec, &lost);
         assert!(matched[0].is_none() && matched[1].unwrap() == &lost.composite.processes[0]);
@@ -367,18 +367,18 @@ mod tests {
     #[test]
     fn the_interval_of_a_parameter_holds_the_draws_and_their_mirror_image() {
         let drawn: Vec<f64> = (-100..=100).map(|k| 0.25 * f64::from(k).mul_add(0.01, 0.0).exp2()).collect();
-        let both = |stretch| {
+        let hull_of = |stretch| {
             let draws = Draws::new(Parameter::Sigma2, drawn.clone(), stretch);
             hull(draws.around(1.0), draws.stretched())
         };
-        let [low, high] = both(1.0);
+        let [low, high] = hull_of(1.0);
         // quantiles 0.025 and 0.975 of 201: the fifth from either end
         let tail = 0.96_f64.exp2();
         assert!(
             (low * 4.0 * tail - 1.0).abs() < 0.01 && (high / (4.0 * tail) - 1.0).abs() < 0.01,
             "{low} {high}"
         );
-        let [low, high] = both(1.5);
+        let [low, high] = hull_of(1.5);
         let tail = tail.powf(1.5);
         assert!(
             (low * 4.0 * tail - 1.0).abs() < 0.01 && (high / (4.0 * tail) - 1.0).abs() < 0.01,

@@ -32,14 +32,14 @@ pub(crate) fn intervals(outcome: &Outcome, fits: &[Fit], stretch: f64, rate_hz: 
     let reading = |model: &Composite| Reading::of(model, rate_hz, range_s);
     let Some(own) = reading(&outcome.fit.composite) else { return none };
     let drawn: Vec<Reading> = fits.iter().filter_map(|fit| reading(&fit.composite)).collect();
-    let of = |value: &dyn Fn(&Reading) -> Option<f64>| {
+    let interval = |value: &dyn Fn(&Reading) -> Option<f64>| {
         let there: Vec<f64> = drawn.iter().filter_map(value).filter(|x| *x > 0.0).collect();
         scale_interval(value(&own)?, there, fits.len(), stretch)
     };
     PracticalIntervals {
-        density: of(&|r| Some(r.density)),
-        walk: of(&|r| Some(r.walk)),
-        instability: of(&|r| r.instability),
+        density: interval(&|r| Some(r.density)),
+        walk: interval(&|r| Some(r.walk)),
+        instability: interval(&|r| r.instability),
     }
 }
 

@@ -261,21 +261,21 @@ impl Scatter {
         }
         let clipped = estimator == Estimator::DrAwv;
         let correction = if clipped { small_sample(logs.len()) } else { 1.0 };
-        let of = |between: f64| {
+        let weighted = |between: f64| {
             let weights: Vec<f64> = noise.iter().map(|n| 1.0 / (n + between * between)).collect();
             let residuals = residuals(logs, &weights, clipped);
             let length = (residuals.iter().map(|z| z * z).sum::<f64>() / freedom).sqrt();
             (residuals, length)
         };
         let (mut low, mut high) = (0.0, 2.0 * range);
-        if of(low).1 * correction.sqrt() > 1.0 {
+        if weighted(low).1 * correction.sqrt() > 1.0 {
             // Halved to rounding.
             for _ in 0..60 {
                 let middle = 0.5 * (low + high);
-                if of(middle).1 * correction.sqrt() > 1.0 { low = middle } else { high = middle }
+                if weighted(middle).1 * correction.sqrt() > 1.0 { low = middle } else { high = middle }
             }
         }
-        let (mut units, length) = of(low);
+        let (mut units, length) = weighted(low);
         if length > 0.0 {
             units.iter_mut().for_each(|z| *z /= length);
         }

@@ -46,8 +46,8 @@ fn misfits(misfits: &[Misfit]) -> Option<String> {
     if misfits.is_empty() {
         return None;
     }
-    let one = |m: &Misfit| format!("{} {}, p = {:.3}", m.group, m.estimator.name(), m.p_value);
-    let fits: Vec<String> = misfits.iter().map(one).collect();
+    let rejection = |m: &Misfit| format!("{} {}, p = {:.3}", m.group, m.estimator.name(), m.p_value);
+    let fits: Vec<String> = misfits.iter().map(rejection).collect();
     Some(format!(
         "the J-test rejects the model ({}): its parameters are not those of the noise, whichever recordings are used; \
          another model, or recordings without disturbances, come first",
@@ -89,22 +89,22 @@ fn suffices(own: &[&Diagnosis], recordings: usize, signals: usize) -> Option<usi
 }
 
 fn describe(diagnosis: &Diagnosis) -> Vec<String> {
-    let of = |alarm: &Option<Alarm>, what: &str| {
+    let sentence = |alarm: &Option<Alarm>, what: &str| {
         let line = |a: &Alarm| format!("{} is abnormal: {what}, {}", diagnosis.name, extent(a));
         alarm.as_ref().map(line)
     };
-    let noise = of(&diagnosis.noise, "its noise is not that of the others (robust wavelet variance)");
+    let noise = sentence(&diagnosis.noise, "its noise is not that of the others (robust wavelet variance)");
     let outliers =
-        of(&diagnosis.outliers, "outliers within it (classical wavelet variance above the robust one)");
+        sentence(&diagnosis.outliers, "outliers within it (classical wavelet variance above the robust one)");
     let drift = diagnosis.drift.as_ref().map(|d| drift(&diagnosis.name, diagnosis.sensor, d));
     noise.into_iter().chain(outliers).chain(drift).collect()
 }
 
 fn drift(name: &str, sensor: Sensor, alarm: &DriftAlarm) -> String {
-    let of = |((axis, change), (_, z)): (&(Axis, f64), &(Axis, f64))| {
+    let change_of_axis = |((axis, change), (_, z)): (&(Axis, f64), &(Axis, f64))| {
         format!("{} {change:+.2e} {} ({z:+.1} deviations)", axis.name(), sensor.unit())
     };
-    let axes: Vec<String> = alarm.change.iter().zip(&alarm.deviations).map(of).collect();
+    let axes: Vec<String> = alarm.change.iter().zip(&alarm.deviations).map(change_of_axis).collect();
     format!(
         "{name} is abnormal: its level drifts as that of no other does: later half less earlier half {}, p = {:.4}",
         axes.join(", "),

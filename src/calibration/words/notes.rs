@@ -210,11 +210,13 @@ pub fn signals(outcome: &Outcome) -> String {
 }
 
 fn robust_remarks(curve: &Curve, replicates: &[Replicate], notes: &mut Vec<String>) {
-    let with = |status: Status| {
-        let has = |r: &&Replicate| r.robust[..curve.levels.len()].iter().any(|v| v.status == status);
-        replicates.iter().filter(has).count()
+    let replicates_with = |status: Status| {
+        let has_such_a_scale =
+            |r: &&Replicate| r.robust[..curve.levels.len()].iter().any(|v| v.status == status);
+        replicates.iter().filter(has_such_a_scale).count()
     };
-    let (count, no_root, coarse) = (replicates.len(), with(Status::NoRoot), with(Status::Coarse));
+    let (count, no_root, coarse) =
+        (replicates.len(), replicates_with(Status::NoRoot), replicates_with(Status::Coarse));
     if no_root > 0 {
         notes.push(format!(
             "{} scales without an admissible robust variance (too many outliers, or \

@@ -210,9 +210,9 @@ fn van_loan(f: &Matrix15, q: &Matrix15, dt: f64) -> (Matrix15, Matrix15) {
 fn bias_step(p: &Matrix15) -> Matrix15 {
     let phi: [f64; 2] = [(-0.01_f64 / 200.0).exp(), (-0.01_f64 / 500.0).exp()];
     let variance = [9e-4, 1e-8];
-    let of = |i: usize| if i < 9 { 1.0 } else { phi[i / 3 - 3] };
+    let decay = |i: usize| if i < 9 { 1.0 } else { phi[i / 3 - 3] };
     let q = |i: usize| if i < 9 { 0.0 } else { variance[i / 3 - 3] * (1.0 - phi[i / 3 - 3].powi(2)) };
-    Matrix15::from_fn(|i, j| of(i) * p[(i, j)] * of(j) + if i == j { q(i) } else { 0.0 })
+    Matrix15::from_fn(|i, j| decay(i) * p[(i, j)] * decay(j) + if i == j { q(i) } else { 0.0 })
 }
 
 /// The standard deviations of a whole run with an outage against the exact discretisation: 1e-4.

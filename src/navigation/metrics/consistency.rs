@@ -58,8 +58,8 @@ pub(crate) fn coverage_band(level: f64, count: f64) -> Band {
     let whole = count as u64;
     match Binomial::new(level, whole) {
         Ok(binomial) if whole > 0 => {
-            let at = |p: f64| binomial.inverse_cdf(p) as f64 / whole as f64;
-            Band { lower: at(0.025), upper: at(0.975) }
+            let quantile = |p: f64| binomial.inverse_cdf(p) as f64 / whole as f64;
+            Band { lower: quantile(0.025), upper: quantile(0.975) }
         }
         _ => Band::NONE,
     }

@@ -52,14 +52,14 @@ pub struct Reconvergence {
 pub fn outages(result: &RunResult) -> Vec<OutageMetrics> {
     let kept = || result.runs.iter().filter(|r| !r.diverged);
     let epochs = epochs(result);
-    let of = |(i, window): (usize, &(f64, f64))| {
+    let metrics_of_outage = |(i, window): (usize, &(f64, f64))| {
         let records: Vec<&OutageRecord> = kept().filter_map(|r| r.outages.get(i)).collect();
         OutageMetrics {
             rmse_mean: Accuracy::over(within(*window, &epochs)).rmse_mean,
             ..outage(*window, &records, result.independent_windows)
         }
     };
-    result.outages.iter().enumerate().map(of).collect()
+    result.outages.iter().enumerate().map(metrics_of_outage).collect()
 }
 
 /// The epochs without a fix of an outage.

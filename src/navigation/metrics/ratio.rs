@@ -174,8 +174,9 @@ pub fn compare(
             reference: reference.runs.len(),
         });
     }
-    let of = |(i, window): (usize, &(f64, f64))| outage(candidate, reference, i, *window, paired);
-    Ok(reference.outages.iter().enumerate().map(of).collect())
+    let ratio_of_outage =
+        |(i, window): (usize, &(f64, f64))| outage(candidate, reference, i, *window, paired);
+    Ok(reference.outages.iter().enumerate().map(ratio_of_outage).collect())
 }
 
 fn comparable(candidate: &Measured, reference: &Measured) -> Result<(), ComparisonError> {
@@ -206,8 +207,8 @@ fn outage(
     (start_s, end_s): (f64, f64),
     paired: bool,
 ) -> OutageComparison {
-    let inside = |row: &&EpochRow| start_s <= row.t_s && row.t_s < end_s;
-    let pick = |e: &Measured| e.epochs.iter().filter(inside).cloned().collect::<Vec<_>>();
+    let is_within = |row: &&EpochRow| start_s <= row.t_s && row.t_s < end_s;
+    let pick = |e: &Measured| e.epochs.iter().filter(is_within).cloned().collect::<Vec<_>>();
     let (c, r) = (pick(candidate), pick(reference));
     let records = records(candidate, reference, index, paired);
     let windows = [candidate.independent_windows, reference.independent_windows].into_iter().flatten();

@@ -191,8 +191,8 @@ impl ReductionQuality {
     /// One line: how sure the filter is of itself, and what it loses.
     #[must_use]
     pub fn line(&self) -> String {
-        let all = || self.outage_end.iter().flat_map(|e| e.0);
-        let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max));
+        let ratios = || self.outage_end.iter().flat_map(|e| e.0);
+        let (low, high) = (ratios().fold(f64::INFINITY, f64::min), ratios().fold(0.0, f64::max));
         let ends = if self.outage_end.is_empty() {
             String::new()
         } else {

@@ -280,7 +280,7 @@ impl Judge {
 
     /// The verdicts on outages, from the statistics at their ends.
     fn outages(&self, all: &[Statistic], outages: usize, diverged: bool) -> Vec<OutageVerdict> {
-        let of = |outage: usize| {
+        let verdict_of_outage = |outage: usize| {
             let own: Vec<Statistic> = all.iter().filter(|s| s.outage == Some(outage)).copied().collect();
             let kind = if diverged { VerdictKind::Diverged } else { self.kind(&own) };
             let worst = self.worst(&own, kind);
@@ -291,7 +291,7 @@ impl Judge {
                 ratio_std_error: worst.ratio.std_error,
             }
         };
-        (0..outages).map(of).collect()
+        (0..outages).map(verdict_of_outage).collect()
     }
 
     /// The state that is farthest off in the direction of the verdict; of those that alarm, if any does. Where all

@@ -106,12 +106,12 @@ fn bits<T: std::fmt::Debug + ?Sized>(value: &T) -> String {
 #[test]
 fn the_same_seed_gives_the_same_bits_on_any_number_of_threads() {
     let setting = Setting::new(30.0, &[1.0]);
-    let on = |threads| {
+    let result_on = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| setting.run(20))
     };
-    let one = on(1);
-    assert!(bits(&one) == bits(&on(2)) && bits(&one) == bits(&on(3)));
+    let one = result_on(1);
+    assert!(bits(&one) == bits(&result_on(2)) && bits(&one) == bits(&result_on(3)));
     assert_eq!(one[0].runs.len(), 20);
 }
 
@@ -257,11 +257,11 @@ fn sums_of_batches_are_sums_of_runs() {
     let setting = Setting::new(30.0, &[1.0]);
     let experiment = setting.experiment();
     let plan = Plan::new(&experiment).unwrap();
-    let of = |first, runs| run_range(&plan, first, runs, &|| true, &|_| {}).unwrap().swap_remove(0);
-    let together = of(0, 11);
-    let mut appended = of(0, 5);
-    appended.append(of(5, 6));
-    let single: Vec<RunResult> = (0..11).map(|k| of(k, 1)).collect();
+    let runs_from = |first, runs| run_range(&plan, first, runs, &|| true, &|_| {}).unwrap().swap_remove(0);
+    let together = runs_from(0, 11);
+    let mut appended = runs_from(0, 5);
+    appended.append(runs_from(5, 6));
+    let single: Vec<RunResult> = (0..11).map(|k| runs_from(k, 1)).collect();
     let agree = |sum: f64, parts: &dyn Fn(&EpochSums) -> f64, epoch: usize| {
         let expected: f64 = single.iter().map(|r| parts(&r.epochs[epoch])).sum();
         assert!((sum - expected).abs() <= 1e-9 * expected.abs() + 1e-12, "epoch {epoch}: {sum}, {expected}");

@@ -203,10 +203,11 @@ impl Need<'_> {
         imu: &ImuParameters,
         weights: [f64; IMU_PARAMETERS],
     ) -> Result<(f64, ImuParameters), BeliefError> {
-        let at = |ln: f64| imu.times(weights.map(|w| (w * ln).exp()));
+        let scaled = |ln: f64| imu.times(weights.map(|w| (w * ln).exp()));
         let crossing = Crossing { bounds: (-RANGE, RANGE), step: 0.7, exact: EXACT };
-        let (ln, margin) = crossing.from(0.0, |ln| Ok::<_, BeliefError>(self.worst(&at(ln))?.margin()))?;
-        Ok((margin, at(ln)))
+        let (ln, margin) =
+            crossing.from(0.0, |ln| Ok::<_, BeliefError>(self.worst(&scaled(ln))?.margin()))?;
+        Ok((margin, scaled(ln)))
     }
 
     /// Mean squares of the four sources and of everything else in what is limited the hardest.

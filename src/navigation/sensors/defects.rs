@@ -121,7 +121,7 @@ impl Defects {
     /// Those of run `key.run`.
     #[must_use]
     pub(crate) fn draw(settings: &ImuSettings, key: StreamKey<'_>) -> Self {
-        let of = |sensor: Sensor| {
+        let defects_of = |sensor: Sensor| {
             let source = format!("{}.defects", sensor.name());
             let normals = |process: &'static str, n: usize| -> Vec<f64> {
                 let mut generator = StreamKey { source: &source, process, ..key }.generator();
@@ -138,7 +138,7 @@ impl Defects {
             }
             (bias, matrix)
         };
-        let [accel, gyro] = Sensor::ALL.map(of);
+        let [accel, gyro] = Sensor::ALL.map(defects_of);
         Self { bias: [accel.0, gyro.0], matrix: [accel.1, gyro.1] }
     }
 

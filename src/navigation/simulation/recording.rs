@@ -50,12 +50,12 @@ pub fn record(plan: &Plan<'_>, run: u64) -> Recording {
 fn inertial(plan: &Plan<'_>, key: StreamKey<'_>) -> Vec<ImuIncrement> {
     let (rate_hz, start_s) = (plan.experiment.rate_hz, plan.experiment.trajectory.start_s());
     let mut errors = ImuErrors::new(&plan.errors, key, plan.samples());
-    let of = |channel: Channel, errors: &mut ImuErrors<'_>| {
+    let errors_of = |channel: Channel, errors: &mut ImuErrors<'_>| {
         let mut signal = vec![0.0; plan.samples()];
         errors.fill(channel, &mut signal);
         signal
     };
-    let signals = Channel::ALL.map(|channel| of(channel, &mut errors));
+    let signals = Channel::ALL.map(|channel| errors_of(channel, &mut errors));
     let defects = Defects::draw(plan.experiment.defects, key);
     let triad = |sensor: Sensor, k: usize| {
         let first = 3 * sensor as usize;

@@ -143,9 +143,9 @@ fn extend(event: &mut Excess, by: &Excess) {
 
 fn magnitudes(trajectory: &Trajectory, t_s: f64) -> [f64; 4] {
     let half = 0.5 * JERK_WINDOW_S;
-    let inside = |t: f64| t.clamp(trajectory.start_s(), trajectory.end_s());
+    let clamped = |t: f64| t.clamp(trajectory.start_s(), trajectory.end_s());
     let (before, after) =
-        (trajectory.kinematics(inside(t_s - half)), trajectory.kinematics(inside(t_s + half)));
+        (trajectory.kinematics(clamped(t_s - half)), trajectory.kinematics(clamped(t_s + half)));
     let now = trajectory.kinematics(t_s);
     let jerk = (after.a_e - before.a_e).length() / JERK_WINDOW_S;
     [now.v_e.length(), now.a_e.length(), jerk, now.omega_eb_b.length()]

@@ -94,8 +94,8 @@ impl Reference {
 #[must_use]
 pub fn breaks(samples: &[TrajectorySample]) -> Vec<Break> {
     let steps = Steps::new(samples);
-    let at = |index| steps.fault(index).map(|fault| Break { index, fault });
-    (1..samples.len()).filter_map(at).collect()
+    let break_before = |index| steps.fault(index).map(|fault| Break { index, fault });
+    (1..samples.len()).filter_map(break_before).collect()
 }
 
 /// Samples that can be compared with: those between breaks, without what is near a jump.

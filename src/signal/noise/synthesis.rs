@@ -224,8 +224,8 @@ mod tests {
     /// Variance over many runs of the sample at a given time; its standard deviation is σ²√(2/R).
     fn assert_variance_at(process: Process, t: usize, expected: f64) {
         const RUNS: u64 = 20_000;
-        let at = |run| draw(vec![process], StreamKey { run, ..KEY }, t)[t - 1];
-        let variance = (0..RUNS).map(|run| at(run).powi(2)).sum::<f64>() / RUNS as f64;
+        let last_value = |run| draw(vec![process], StreamKey { run, ..KEY }, t)[t - 1];
+        let variance = (0..RUNS).map(|run| last_value(run).powi(2)).sum::<f64>() / RUNS as f64;
         let bound = SIGMAS * expected * (2.0 / RUNS as f64).sqrt();
         assert!((variance - expected).abs() < bound, "{process:?} at {t}: {variance}, expected {expected}");
     }

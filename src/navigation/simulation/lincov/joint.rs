@@ -38,8 +38,9 @@ pub(super) struct Inputs {
 impl Inputs {
     /// `b` in the filter's hands, `t` in the world's; `white` of the side that makes the errors.
     pub(super) fn new(b: &Sources, t: &Sources, samples: u32) -> Self {
-        let over = |s: &Sources| -> Vec<StepOfSource> { s.states.iter().map(|x| x.over(samples)).collect() };
-        let (bs, ts) = (over(b), over(t));
+        let steps_of =
+            |s: &Sources| -> Vec<StepOfSource> { s.states.iter().map(|x| x.over(samples)).collect() };
+        let (bs, ts) = (steps_of(b), steps_of(t));
         let mut q_mean: [f64; SIGNALS] =
             std::array::from_fn(|i| (b.white[i] + t.white[i]) / f64::from(samples));
         for source in bs.iter().chain(&ts) {
@@ -149,9 +150,9 @@ impl Joint {
         for (column, h) in self.xx.iter().zip(&row.h) {
             add_scaled(&mut x, *h, column);
         }
-        let along = |x: &Nav| -> f64 { x.iter().zip(&row.h).map(|(a, h)| a * h).sum() };
-        let mut b: Vec<f64> = self.xb.iter().map(along).collect();
-        let mut t: Vec<f64> = self.xt.iter().map(along).collect();
+        let product = |x: &Nav| -> f64 { x.iter().zip(&row.h).map(|(a, h)| a * h).sum() };
+        let mut b: Vec<f64> = self.xb.iter().map(product).collect();
+        let mut t: Vec<f64> = self.xt.iter().map(product).collect();
         let mut s = r;
         let coefficients = |s: &[Source]| -> Vec<f64> { s.iter().map(|x| row.coefficient(x)).collect() };
         let (hb, ht) = (coefficients(&self.sources_b), coefficients(&self.sources_t));
@@ -170,7 +171,7 @@ impl Joint {
             let dot = |h: &[f64], c: &[f64]| -> f64 { h.iter().zip(c).map(|(h, c)| h * c).sum() };
             s += dot(&hb, &b) + dot(&ht, &t);
         }
-        s += along(&x);
+        s += product(&x);
         Innovation { x, b, t, s }
     }
 

@@ -50,10 +50,10 @@ impl Mean {
     /// Mean of what a row measures less what is expected.
     pub(super) fn innovation(&self, row: &Row) -> f64 {
         let of_x: f64 = self.x.iter().zip(&row.h).map(|(x, h)| x * h).sum();
-        let beside = |states: &[f64], sources: &[Source]| -> f64 {
+        let measured = |states: &[f64], sources: &[Source]| -> f64 {
             states.iter().zip(sources).map(|(x, s)| x * row.coefficient(s)).sum()
         };
-        of_x + beside(&self.b, &self.sources_b) + beside(&self.t, &self.sources_t)
+        of_x + measured(&self.b, &self.sources_b) + measured(&self.t, &self.sources_t)
     }
 
     /// z ← z − k y.

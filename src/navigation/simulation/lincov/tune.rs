@@ -189,8 +189,9 @@ impl Task<'_> {
     /// # Errors
     /// When a truth has no such filter.
     pub fn informed(&self) -> Result<Honesty, BeliefError> {
-        let own = |truth: &Model| Ok(assess(self.track, &(self.full)(truth)?, truth));
-        let assessments: Result<Vec<Assessment>, BeliefError> = self.truths.par_iter().map(own).collect();
+        let assessed = |truth: &Model| Ok(assess(self.track, &(self.full)(truth)?, truth));
+        let assessments: Result<Vec<Assessment>, BeliefError> =
+            self.truths.par_iter().map(assessed).collect();
         Ok(Honesty::of(&assessments?))
     }
 
@@ -201,11 +202,12 @@ impl Task<'_> {
     /// Mean divergence over the truths, and what no error may be.
     fn cost(&self, factors: &[Factor], track: &Track) -> f64 {
         let Ok(belief) = (self.full)(&scaled(self.model, factors)) else { return f64::INFINITY };
-        let over = |end: &Consistency| match self.aim {
+        let overconfidence = |end: &Consistency| match self.aim {
             Aim::Mean => 0.0,
             Aim::Worst => end.ratio().iter().map(|r| OVERCONFIDENT * r.ln().max(0.0).powi(2)).sum(),
         };
-        let costs: Vec<f64> = self.assessments(&belief, track).iter().map(|a| divergence(a, over)).collect();
+        let costs: Vec<f64> =
+            self.assessments(&belief, track).iter().map(|a| divergence(a, overconfidence)).collect();
         costs.iter().sum::<f64>() / costs.len() as f64
     }
 

@@ -125,9 +125,12 @@ fn acceleration_and_rate_are_continuous_over_a_stop_and_go_drive() {
     ];
     let t = profile(0.0, segments).build().unwrap();
     let n = ((t.end_s() - t.start_s()) / 0.005) as usize;
-    let at = |k: usize| t.kinematics(t.start_s() + 0.005 * k as f64);
-    let jump = (1..=n).map(|k| (at(k).a_e - at(k - 1).a_e).length()).fold(0.0, f64::max);
-    let rate = (1..=n).map(|k| (at(k).omega_eb_b - at(k - 1).omega_eb_b).length()).fold(0.0, f64::max);
+    let kinematics_after = |k: usize| t.kinematics(t.start_s() + 0.005 * k as f64);
+    let jump =
+        (1..=n).map(|k| (kinematics_after(k).a_e - kinematics_after(k - 1).a_e).length()).fold(0.0, f64::max);
+    let rate = (1..=n)
+        .map(|k| (kinematics_after(k).omega_eb_b - kinematics_after(k - 1).omega_eb_b).length())
+        .fold(0.0, f64::max);
     assert!(jump < 1.875 * 3.0 * 0.005 * 1.05, "{jump}");
     assert!(rate < 1.875 * 3.0 / 15.0 * 0.005 * 1.05, "{rate}");
     // It stands still while it stands still.
@@ -195,23 +198,26 @@ fn what_cannot_be_followed_is_refused() {
         refused(5.0, turn(10_000.0, Turning::Duration(1.0))),
         "start: \"segment\" gives no trajectory: attitude turns 65.4° between 10.14 s and 10.16 s: more than 60°"
     );
-    let to = |north, east| {
+    let waypoints = |north, east| {
         let points = vec![
             Waypoint { place: Place::Local { north, east }, h: None },
             Waypoint { place: Place::Local { north: 2.0 * north, east: 0.0 }, h: None },
         ];
         Segment { kind: Kind::Waypoints { points, by: Turning::Radius(30.0) }, climb_m: 0.0, ramp_s: None }
     };
-    assert_eq!(refused(10.0, to(2.0, 5.0)), "segment 1: \"points\" has waypoint 1 inside the turning circle");
     assert_eq!(
-        refused(10.0, to(0.0, 200.0)),
+        refused(10.0, waypoints(2.0, 5.0)),
+        "segment 1: \"points\" has waypoint 1 inside the turning circle"
+    );
+    assert_eq!(
+        refused(10.0, waypoints(0.0, 200.0)),
         "segment 1: \"points\" turns back by 173° at waypoint 1: more than 150°"
     );
     assert_eq!(
-        refused(10.0, to(40.0, 60.0)),
+        refused(10.0, waypoints(40.0, 60.0)),
         "segment 1: \"points\" has waypoint 1 too near: 46.5 m away, the turns take 55.4 m"
     );
-    assert!(refused(0.0, to(100.0, 0.0)).contains("\"points\" needs a moving vehicle"));
+    assert!(refused(0.0, waypoints(100.0, 0.0)).contains("\"points\" needs a moving vehicle"));
     let mut p = profile(5.0, Vec::new());
     assert_eq!(
         p.build().unwrap_err().to_string(),

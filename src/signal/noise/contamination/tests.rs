@@ -17,9 +17,9 @@ fn applied(operation: Operation, n: usize) -> Vec<f64> {
 
 #[test]
 fn shares_of_the_papers_records() {
-    let of = |share: f64| Extent::Share(share).of(524_284);
-    assert_eq!((of(0.00025), of(0.01), of(0.5)), (131, 5242, 262_142));
-    assert_eq!((of(90_000.0 / 524_284.0), of(500.0 / 524_284.0)), (90_000, 500));
+    let samples = |share: f64| Extent::Share(share).of(524_284);
+    assert_eq!((samples(0.00025), samples(0.01), samples(0.5)), (131, 5242, 262_142));
+    assert_eq!((samples(90_000.0 / 524_284.0), samples(500.0 / 524_284.0)), (90_000, 500));
     assert_eq!(Extent::Samples(7).of(3), 7);
 }
 

@@ -147,11 +147,11 @@ impl Pair {
             tau_s: f64::from(p.samples) / curve.rate_hz,
         };
         let ratios: Vec<Ratio> = curve.points.iter().map(ratio).collect();
-        let by = |a: &&Ratio, b: &&Ratio| a.ratio.total_cmp(&b.ratio);
+        let by_ratio = |a: &&Ratio, b: &&Ratio| a.ratio.total_cmp(&b.ratio);
         let first = ratios[0];
         Closure {
-            lowest: *ratios.iter().min_by(by).unwrap_or(&first),
-            highest: *ratios.iter().max_by(by).unwrap_or(&first),
+            lowest: *ratios.iter().min_by(by_ratio).unwrap_or(&first),
+            highest: *ratios.iter().max_by(by_ratio).unwrap_or(&first),
         }
     }
 }
@@ -314,8 +314,8 @@ fn point(axes: &[&Composite], samples: u32) -> Point {
 /// Whole numbers of samples from one to another, evenly in the logarithm.
 fn averages(from: f64, to: f64) -> Vec<u32> {
     let steps = ((to / from).log2() * PER_OCTAVE).ceil();
-    let at = |i: u32| (from * (to / from).powf(f64::from(i) / steps)).round().max(1.0) as u32;
-    let mut all: Vec<u32> = (0..=steps as u32).map(at).collect();
+    let factor = |i: u32| (from * (to / from).powf(f64::from(i) / steps)).round().max(1.0) as u32;
+    let mut all: Vec<u32> = (0..=steps as u32).map(factor).collect();
     all.dedup();
     all
 }
