@@ -67,7 +67,10 @@ impl BiasGroup {
         let axis = |i: usize| match self.phi[i] {
             phi if phi >= 1.0 => (phi, self.innovation[i] * ratio),
             phi if phi > 0.0 => {
+                // κ = dt/T of one sample. exp_m1 below, since at κ = 1e-8 the difference 1 − exp(−2κ) keeps
+                // half of its digits only.
                 let kappa = -(phi - 1.0).ln_1p();
+                // Variance σ²/(1 − phi²) is kept, hence innovation ∝ 1 − phi^(2·ratio).
                 let share = (-2.0 * kappa * ratio).exp_m1() / (-2.0 * kappa).exp_m1();
                 ((-kappa * ratio).exp(), self.innovation[i] * share)
             }
@@ -129,10 +132,14 @@ impl Belief {
         }
         for groups in &mut belief.groups {
             if groups.is_empty() {
+                // The step of the covariance expects a bias block for each sensor: one that is zero for all
+                // time costs nothing else.
                 groups.push(BiasGroup::default());
             }
         }
         for sensor in Sensor::ALL {
+            // A drift is deterministic in the truth. Believed as an unknown slope, its sign need not be known
+            // to the filter.
             belief.set_unknown(sensor, UnknownKind::Drift, drift(model, sensor));
             belief.set_unknown(sensor, UnknownKind::ScaleFactor, DVec3::splat(states.scale_sigma()));
         }
@@ -188,9 +195,13 @@ impl Belief {
         }
         let groups = &mut self.groups[sensor as usize];
         if let Some(before) = groups.iter_mut().find(|g| g.is_constant()) {
+            // The sum of two independent unknown constants cannot be separated by any measurement: one state
+            // for both.
             before.initial += DVec3::splat(sigma * sigma);
             return;
         }
+        // The placeholder of a model without biases makes room for the constant: a block without variance is
+        // only cost.
         groups.retain(|g| !g.is_empty());
         groups.push(BiasGroup::constant(sigma));
         self.states += 3;
@@ -257,6 +268,8 @@ impl AxisBelief {
                 Process::Quantization(_) | Process::Drift(_) => {}
                 Process::Ar1(p) => axis.push(p.phi(), p.sigma2(), p.variance()),
                 Process::GaussMarkov(p) => axis.push(p.ar1().phi(), p.ar1().sigma2(), p.s2()),
+                // A random walk has no stationary variance. It is taken to start at zero; the turn-on bias is
+                // an unknown apart.
                 Process::RandomWalk(p) => axis.push(1.0, p.gamma2(), 0.0),
             }
         }

@@ -36,7 +36,7 @@ pub struct Covariance {
     columns: [[Lanes; NAV]; NAV],
 }
 
-/// Biases that stay as they are.
+/// Steps of biases that stay as they are: phi = 1, no innovation.
 const CONSTANT_BIASES: [BiasGroup; 2 * MAX_BLOCKS] = [BiasGroup::constant(0.0); 2 * MAX_BLOCKS];
 
 /// The blocks behind the navigation's: what makes the errors of a sample.
@@ -64,7 +64,7 @@ impl<'a> Sources<'a> {
         self.biases[0] + self.biases[1] + before
     }
 
-    /// The same, all constant.
+    /// The same blocks with transition 1 and no noise: for a map between samples, which moves no bias.
     pub(super) fn still(self) -> Self {
         Self { steps: &CONSTANT_BIASES[..self.steps.len()], ..self }
     }
@@ -144,6 +144,7 @@ impl Covariance {
             let after = map.apply(load_error(&self.p[j * n..]), accel, gyro);
             store_error(&mut self.columns[j], &after);
         }
+        // Columns of the biases: among themselves they have taken their step, with the navigation not yet.
         for j in NAV..n {
             let phi = W::from(sources.steps[j / 3 - BIAS].phi[j % 3]);
             let (nav, rest) = self.p[j * n..(j + 1) * n].split_at_mut(NAV);
@@ -152,13 +153,15 @@ impl Covariance {
             let x = [x[R] * phi, x[V] * phi, x[PSI] * phi];
             store_error(nav, &map.apply(x, accel, gyro));
         }
-        // (A P) Aᵀ: the same map on the rows of A P.
+        // (A P) Aᵀ: the same map on the rows of A P. Cross terms have taken their step by now: no second phi.
         let still = sources.still();
         for i in 0..NAV {
             let mut row = [Lanes::ZERO; NAV];
             for (element, column) in row.iter_mut().zip(&self.columns) {
+                // Transposed while copying: row i of A P is column i of P Aᵀ, to which the same map applies.
                 *element = column[i];
             }
+            // Row i of A P in the columns of the biases, read from below the diagonal.
             let [accel, gyro] = self.column_errors(i, &still);
             let after = map.apply(load_error(&row), accel, gyro);
             store_error(&mut self.p[i * n..], &after);
@@ -274,8 +277,11 @@ impl Covariance {
         // With M = (I − k hᵀ) P:  P⁺ = M (I − k hᵀ)ᵀ + r k kᵀ = M + (r k − M h) kᵀ.
         for i in 0..n {
             let (ph_i, gain_i) = (W::load(&ph[i]), W::load(&gain[i]));
+            // r k − M h vanishes for the optimal gain but for rounding. With it the error of P⁺ is of second
+            // order in that of k, without it of first, and P may become indefinite.
             let residual = gain_i * r - (ph_i - gain_i * h_ph);
             for j in 0..=i {
+                // Each element is read once, before it is written: in place, without a copy of P.
                 let m = (-gain_i).mul_add(W::load(&ph[j]), self.get(i, j));
                 self.set(i, j, residual.mul_add(W::load(&gain[j]), m));
             }
@@ -310,6 +316,7 @@ impl Covariance {
         let (mut sum, mut det) = (Lanes::ZERO, Lanes::splat(1.0));
         for i in 0..N {
             for j in 0..=i {
+                // A negative pivot gives a NaN on purpose: such a run has diverged and is to be seen.
                 let mut a: Lanes = self.get(states[i], states[j]);
                 for k in 0..j {
                     a -= l[i][k] * l[j][k];

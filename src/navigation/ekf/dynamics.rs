@@ -57,6 +57,8 @@ impl<L: Real> Sample<L> {
     pub(crate) fn rotated_noise(&self, variances: DVec3) -> Mat3<L> {
         let z = L::from(0.0);
         let mut noise = Mat3([[z; 3]; 3]);
+        // C Cᵀ = I: equal axes need no rotation, and the mean attitude's missing cos(θ/2) does not enter
+        // either.
         if variances.x == variances.y && variances.x == variances.z {
             for i in 0..3 {
                 noise.0[i][i] = self.half_dt * self.half_dt * (4.0 * variances.x);
@@ -73,8 +75,8 @@ impl<L: Real> Sample<L> {
         noise
     }
 
-    /// What the sample's own gyroscope noise does to the velocity of the same sample: column j of the
-    /// covariance of V and PSI it adds, −½ \[f_n dt ×\] q_psi.
+    /// The gyroscope noise of a sample tilts the specific force of the same sample: column j of what that adds to
+    /// the covariance of V and PSI, −½ \[f_n dt ×\] q_psi.
     #[inline(always)]
     #[must_use]
     pub(crate) fn tilted_noise(&self, q_psi: &Mat3<L>, j: usize) -> Vec3<L> {
@@ -87,7 +89,11 @@ impl<L: Real> ErrorMap<L> for Sample<L> {
     /// the matrix exponential come with it.
     #[inline(always)]
     fn apply(&self, x: NavError<L>, accel: Vec3<L>, gyro: Vec3<L>) -> NavError<L> {
+        // psi_n turns C_true into C_est; a bias estimated too large is taken off too much, hence the minus
+        // signs.
         let psi = x[PSI] - self.c_dt * gyro;
+        // ½ (psi before + psi after) × f dt: a gyroscope bias reaches v with dt²/2, exactly; r below with
+        // dt³/4 instead of dt³/6.
         let v = x[V] + (x[PSI] + psi).cross(self.half_f_dt) - self.c_dt * accel;
         let r = (x[V] + v).mul_add(self.half_dt, x[R]);
         [r, v, psi]
@@ -128,20 +134,26 @@ impl<L: Real> EarthTerms<L> {
         let drn = radii.meridian * s * c * (3.0 * E2) / w2;
         let dre = radii.transverse * s * c * E2 / w2;
 
+        // d/dt of (R_N + h) δlat: the slope of R_N cancels between the factor and δlat. East, the slope of
+        // (R_E + h) cos lat by latitude is −(R_N + h) sin lat: hence no derivative of a radius in this block.
         let rr = Mat3([[-(vd / rn), z, wn], [we * tan, -(wn * tan * rn / re) - vd / re, we], [z, z, z]]);
         // For r in metres: ∂/∂lat · 1/rn per metre north, −∂/∂h per metre down.
         let omega_ie = Vec3([c * OMEGA_IE, z, s * -OMEGA_IE]);
         let omega_en = Vec3([we, -wn, -(we * tan)]);
+        // omega_ie_n is (cos, 0, −sin)·omega_ie; its derivative by latitude, per metre north.
         let d_ie_north = Vec3([s * -OMEGA_IE, z, c * -OMEGA_IE]) * (one / rn);
         let east = -(we * dre / re);
         let d_en_north = Vec3([east, wn * drn / rn, -(east * tan) - we * (tan * tan + 1.0)]) * (one / rn);
         let d_en_down = Vec3([we / re, -(wn / rn), -(we * tan / re)]);
+        // omega_en_n is linear in the velocity: this is the matrix itself.
         let d_en_v = Mat3([[z, one / re, z], [-(one / rn), z, z], [z, -(tan / re), z]]);
 
         let coriolis = omega_ie + omega_ie + omega_en;
         let mut v_north = -(d_ie_north + d_ie_north + d_en_north).cross(ins.v_n);
         let mut v_down = -d_en_down.cross(ins.v_n);
         let (g_north, g_down) = gravity_gradient(ins, s, c);
+        // Gravity by latitude is 8e-9 m/s² a metre; by height 3.1e-6 /s², what makes the vertical channel
+        // unstable (570 s).
         v_north[2] += g_north / rn;
         v_down[2] += g_down;
         // ∂(−(2 w_ie + w_en) × v)/∂v = −[w×] + [v×] ∂w_en/∂v
@@ -173,6 +185,7 @@ impl<L: Real> ErrorMap<L> for EarthStep<L> {
     fn apply(&self, x: NavError<L>, _accel: Vec3<L>, _gyro: Vec3<L>) -> NavError<L> {
         let (t, dt) = (&self.terms, L::from(self.dt));
         [
+            // I + F dt: the next term, F² dt²/2, is (1e-4 · 0.2)²/2 = 2e-10.
             (t.rr * x[R]).mul_add(dt, x[R]),
             (t.vr * x[R] + t.vv * x[V]).mul_add(dt, x[V]),
             (t.psi_r * x[R] + t.psi_v * x[V] + t.psi_psi * x[PSI]).mul_add(dt, x[PSI]),
@@ -191,6 +204,8 @@ fn columns<L: Real>(north: Vec3<L>, down: Vec3<L>) -> Mat3<L> {
 /// enough (second order, 1e-9 relative) and follows whatever gravity model is in use.
 #[inline(always)]
 fn gravity_gradient<L: Real>(ins: &Strapdown<L>, s: L, c: L) -> (L, L) {
+    // The rounding of g over this step, 1e-15/1e-5, is 1e-9 of the derivative, its truncation less. In height
+    // the series is quadratic, and a central difference exact for any step.
     const STEP_RAD: f64 = 1e-5;
     const STEP_M: f64 = 100.0;
     let (model, h) = (ins.gravity(), ins.h);

@@ -56,8 +56,8 @@ impl Scratch {
     /// The estimated errors of a block.
     #[inline(always)]
     pub(super) fn of<W: Wide>(&self, block: usize) -> Vec3<W> {
-        let of = &self.error[3 * block..];
-        Vec3([W::load(&of[0]), W::load(&of[1]), W::load(&of[2])])
+        let triple = &self.error[3 * block..];
+        Vec3([W::load(&triple[0]), W::load(&triple[1]), W::load(&triple[2])])
     }
 }
 
@@ -74,6 +74,8 @@ impl Ekf {
         let square = |sigma: [f64; 3]| Matrix3::from_diagonal(&sigma.map(|s| s * s).into());
         add_block(&mut p, R, &square(initial.pos_sigma_m));
         add_block(&mut p, V, &square(initial.vel_sigma_m_s));
+        // Rows and columns of psi_n are correlated where pitch or roll are not zero: a full block, not a
+        // diagonal.
         add_block(&mut p, PSI, &attitude_covariance(about, initial.att_sigma_deg));
         for (g, step) in steps.iter().enumerate() {
             add_block(&mut p, BIAS + g, &Matrix3::from_diagonal(&step.initial.to_array().into()));
@@ -109,9 +111,13 @@ impl Ekf {
     /// samples are split where a fix falls between them.
     pub(crate) fn set_interval(&mut self, dt: f64) {
         let ratio = dt * self.belief.rate_hz;
+        // The zip ends with the bias groups: the unknown constants behind them have no step that depends on
+        // dt.
         for (step, believed) in self.steps.iter_mut().zip(self.belief.groups.iter().flatten()) {
             *step = believed.over(ratio);
         }
+        // A mean over `ratio` samples: the variance of white noise falls as the interval grows, its density
+        // stays.
         self.white = self.belief.white.map(|w| w / ratio);
         self.dt = dt;
     }
@@ -148,6 +154,8 @@ impl Ekf {
                 for axis in 0..3 {
                     sample[axis] = sample[axis] / (estimate[axis] + 1.0);
                 }
+                // ∂/∂s of (y − b)/(1 + s) is −sample/(1 + s); the factor 1/(1 + s) is left out: 300 ppm of a
+                // coefficient.
                 regressor.value.store(sample);
             }
         }
@@ -170,6 +178,7 @@ impl Ekf {
     #[inline(always)]
     fn predict<W: Wide>(&mut self, ins: &mut Strapdown<W>, omega_ib_b: Vec3<W>, f_ib_b: Vec3<W>) {
         let dt = self.dt;
+        // The estimates obey the model between fixes: those of a Gauss-Markov bias decay towards zero.
         for (estimate, step) in self.estimates.iter_mut().zip(&self.steps) {
             for axis in 0..3 {
                 (W::load(&estimate[axis]) * step.phi[axis]).store(&mut estimate[axis]);
@@ -183,14 +192,19 @@ impl Ekf {
         let f_ib_b = self.corrected(Sensor::Accel, f_ib_b, age);
         self.omega_ib_b.store(omega_ib_b);
         let seconds = W::from(dt);
+        // The nominal state first: the map is linearised about the interval it has just passed through.
         let sample = Sample::new(&ins.step(omega_ib_b * seconds, f_ib_b * seconds, dt), dt);
         let sources = Sources::new(&self.belief, &self.steps, &self.regressors);
         self.p.step(&sample, &sources);
         if let Some(transition) = &mut self.transition {
             transition.step(&sample, &sources);
         }
+        // After the map: this noise belongs to the sample itself and is not propagated by it, except within
+        // it.
         self.add_white_noise(&sample);
         self.earth_age += dt;
+        // At the sample nearest to the step: a comparison without slack would hang on the last bit of a sum
+        // of 0.01 s.
         if self.earth_age + 0.5 * dt > EARTH_STEP_S {
             self.apply_earth_terms(ins);
         }
@@ -214,6 +228,8 @@ impl Ekf {
     /// sample itself carries on to R and V.
     #[inline(always)]
     fn add_white_noise<W: Wide>(&mut self, sample: &Sample<W>) {
+        // The gyroscope's own part in V × V, (g dt/2)² sigma_g² dt², is left out: 2.5e-3 sigma_g² at 100 Hz,
+        // far below sigma_a² of any IMU (both in SI).
         let (accel, gyro) = (sample.rotated_noise(self.white[0]), sample.rotated_noise(self.white[1]));
         let half = W::from(0.5 * self.dt);
         let to_position = accel.scaled(half);
@@ -287,6 +303,7 @@ impl Kernel for Advance<'_> {
     fn run<W: Wide>(self) {
         let mut ins = self.ekf.nominal.load::<W>();
         for (sample, [accel, gyro]) in self.samples.iter().zip(self.errors) {
+            // Runs differ by their errors only; the ideal samples are read once for eight.
             let omega_ib_b = Vec3::splat(sample.omega_ib_b) + gyro.load();
             let f_ib_b = Vec3::splat(sample.f_ib_b) + accel.load();
             self.ekf.predict(&mut ins, omega_ib_b, f_ib_b);

@@ -15,8 +15,11 @@ pub(crate) fn nis_limit(probability: f64, components: usize) -> f64 {
 /// Uses a fix in the runs where its NIS is at most `limit`; the others stay as they were. Returns the NIS
 /// and which runs refused it. (A NIS that is not a number is not refused: such a run has diverged.)
 pub(crate) fn update_within(ekf: &mut Ekf, fix: &Fix, limit: f64) -> (Lanes, [bool; LANES]) {
+    // Before the copy: the age of the Earth terms is common to all lanes, and the update sets it to zero. A
+    // run put back to a copy made before would never get them.
     super::settle(ekf);
     let before = ekf.clone();
+    // The NIS comes out of the update itself; refusals are rare, and one lane cannot stop while seven go on.
     let nis = update(ekf, fix);
     let refused: [bool; LANES] = std::array::from_fn(|lane| nis[lane] > limit);
     for lane in (0..LANES).filter(|lane| refused[*lane]) {

@@ -17,6 +17,8 @@ pub(crate) struct Snapshot {
 impl Ekf {
     /// The first lane as it is.
     pub(crate) fn snapshot(&self) -> Snapshot {
+        // The regressors too: the bias of a drift is slope times the age of the sample, and that is of the
+        // past here.
         let regressors = self.regressors.iter().flatten().map(|r| &r.value);
         let triples = self.estimates.iter().chain(regressors).map(|triple| triple.lane(0)).collect();
         Snapshot { nominal: self.nominal.lane(0), triples }
@@ -30,9 +32,12 @@ impl Ekf {
         let triples = self.estimates.iter_mut().chain(regressors);
         triples.zip(&snapshot.triples).for_each(|(to, from)| to.set_lane(0, *from));
         self.p.set_lane(0, p);
+        // `p` is that of the snapshot's instant: an age left over would add the Earth terms of another
+        // interval.
         self.earth_age = 0.0;
         for (to, from) in self.scratch.error.iter_mut().zip(error.iter()) {
             *to = Lanes::ZERO;
+            // The other lanes get no correction: zero moves them nowhere.
             to[0] = *from;
         }
         dispatch(self.level, Correct(self));

@@ -31,6 +31,7 @@ impl Transition {
         for column in self.columns.chunks_exact_mut(self.dim) {
             let (nav, rest) = column.split_at_mut(NAV);
             for (i, state) in rest.iter_mut().enumerate() {
+                // In the order of the filter: biases take their step, then the map uses them.
                 (W::load(state) * sources.steps[i / 3].phi[i % 3]).store(state);
             }
             let [accel, gyro] = row_errors(rest, sources);

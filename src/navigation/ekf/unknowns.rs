@@ -20,7 +20,7 @@ pub enum UnknownKind {
 /// An unknown constant on each axis of a sensor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Unknown {
-    /// What it is.
+    /// Its kind.
     pub kind: UnknownKind,
     /// Its standard deviations on the three axes (units per sample, or 1).
     pub sigma: DVec3,
@@ -34,7 +34,7 @@ pub(super) struct Regressor {
 }
 
 impl Regressor {
-    /// That of an unknown, before the first sample.
+    /// The regressor of an unknown before the first sample: zero.
     pub(super) const fn of(unknown: &Unknown) -> Self {
         Self { kind: unknown.kind, value: Vec3::ZERO }
     }
@@ -102,6 +102,9 @@ impl Ekf {
     /// Standard deviations of the sum of the terms on the three axes.
     fn deviation(&self, terms: impl Iterator<Item = Term> + Clone) -> Vec3 {
         let variance = |axis: usize| {
+            // Var(Σ c_a x_a) with all covariances: after some fixes the groups of an axis are strongly
+            // anti-correlated (the sum is observed, not its parts), and a sum of variances would be too large
+            // many times over.
             let pairs = terms.clone().flat_map(|a| terms.clone().map(move |b| (a, b)));
             pairs.fold(Lanes::ZERO, |sum, ((a, of_a), (b, of_b))| {
                 sum + self.p.get::<Lanes>(3 * a + axis, 3 * b + axis) * of_a[axis] * of_b[axis]

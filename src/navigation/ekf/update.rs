@@ -43,6 +43,8 @@ impl Ekf {
         let mut nis = W::from(0.0);
         for axis in 0..3 {
             let row = antenna.position_row(axis);
+            // The density of six innovations is a product of conditional ones: the squares of the sequence
+            // sum to zᵀ S⁻¹ z.
             nis += self.scalar(row.entries(), position[axis], fix.pos_sigma_m[axis].powi(2));
         }
         if fix.v_n.is_some() {
@@ -78,6 +80,8 @@ impl Ekf {
     fn scalar<W: Wide>(&mut self, h: &[(usize, W)], z: W, r: f64) -> W {
         let scratch = &mut self.scratch;
         let s = self.p.update(h, r, &mut scratch.ph, &mut scratch.gain);
+        // What the scalars before have already explained. The nominal state moves only after the last one, so
+        // all six are linearised at the same state, and their order changes nothing but rounding.
         let mut innovation = z;
         for (i, c) in h {
             innovation -= *c * W::load(&scratch.error[*i]);
@@ -94,10 +98,14 @@ impl Ekf {
         let (dr, dv, psi) = (self.scratch.of::<W>(R), self.scratch.of(V), self.scratch.of(PSI));
         let (s, c) = ins.lat.sin_cos();
         let radii = radii(s);
+        // The order matters: longitude and latitude take the metres back with the radii, height and latitude
+        // at which they were made.
         ins.lon -= dr[1] / ((radii.transverse + ins.h) * c);
         ins.lat -= dr[0] / (radii.meridian + ins.h);
         ins.h += dr[2];
         ins.v_n = ins.v_n - dv;
+        // C_est = (I + [psi×]) C_true: the correction is the inverse rotation, on the side of n. As an exact
+        // rotation, not I − [psi×], it stays valid for the large first corrections of an alignment.
         ins.q_b_n = (Quat::from_rotation_vector(-psi) * ins.q_b_n).renormalised();
         self.nominal.store(&ins);
         for (g, estimate) in self.estimates.iter_mut().enumerate() {
@@ -155,9 +163,10 @@ struct Antenna<L> {
     arm_n: Vec3<L>,
     /// Velocity of the antenna about the IMU, C (omega_eb_b × l), in n (m/s).
     swing_n: Vec3<L>,
-    /// What an attitude error does to it: −\[C (omega_ib_b × l) ×\] + \[omega_ie_n ×\] \[C l ×\].
+    /// Change of that velocity per attitude error psi_n (m/s per rad):
+    /// −\[C (omega_ib_b × l) ×\] + \[omega_ie_n ×\] \[C l ×\].
     of_psi: Mat3<L>,
-    /// What a gyroscope bias error does to it: C \[l ×\].
+    /// Change of that velocity per error of the gyroscope's bias (m): C \[l ×\].
     of_bias: Mat3<L>,
 }
 
@@ -174,6 +183,7 @@ impl<W: Real> Antenna<W> {
             has_arm: lever_arm_b != DVec3::ZERO,
             arm_n,
             swing_n: inertial_n - omega_ie_n.cross(arm_n),
+            // The error of omega_ie_n by latitude is left out: 7e-5 rad/s × 1e-6 rad × metres.
             of_psi: Mat3::skew(omega_ie_n) * Mat3::skew(arm_n) - Mat3::skew(inertial_n),
             of_bias: c_b_n * Mat3::skew(arm_b),
         }
@@ -200,6 +210,8 @@ impl<W: Wide> Antenna<W> {
             row.push3(3 * PSI, self.of_psi.0[axis]);
             let of_bias = self.of_bias.0[axis];
             let [_, gyro, unknown, gyro_unknown] = sources.starts();
+            // The rate is that of the last sample: its biases count all alike. Its white noise times the arm
+            // is left out: at 1 m it is mm/s beside the cm/s of a receiver.
             for first in (gyro..unknown).step_by(3) {
                 row.push3(first, of_bias);
             }
