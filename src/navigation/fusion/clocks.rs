@@ -75,6 +75,7 @@ pub(crate) fn clocks_apart(recorded: &Recorded<'_>) -> Option<ClocksApart> {
     let best_of = |tried: &mut dyn Iterator<Item = (f64, f64)>| tried.max_by(|a, b| a.1.total_cmp(&b.1));
     let (add_s, best) = best_of(&mut tried.iter().copied())?;
     let as_they_are = correlation(&turns, &turned, 0.0)?;
+    // 1 − r², for r < 0 more than 1: turns that go against each other explain less than nothing.
     let unexplained = |r: f64| 1.0 - r * r.abs();
     let enough = UNEXPLAINED * unexplained(best).max(LEAST);
     let is_other = best >= SAME && unexplained(as_they_are) > enough;
@@ -103,6 +104,7 @@ fn turn((from, from_s): (&Moving, f64), (to, to_s): (&Moving, f64)) -> Option<Tu
     let is_course = |m: &Moving| m.speed() >= m.needed();
     let seconds = to_s - from_s;
     let is_one = is_course(from) && is_course(to) && (APART_S.0..=APART_S.1).contains(&seconds);
+    // Without its sign: the norm of the angular rate has none.
     let rate = wrap_angle(to.course() - from.course()).abs() / seconds;
     is_one.then_some(Turn { from_s, to_s, rate })
 }
@@ -111,10 +113,13 @@ fn turn((from, from_s): (&Moving, f64), (to, to_s): (&Moving, f64)) -> Option<Tu
 /// lie in the recording, or hardly any.
 fn correlation(turns: &[Turn], turned: &Turned, lag_s: f64) -> Option<f64> {
     let rate = |turn: &Turn| {
+        // The sum of increments is a rotation only to first order; over seconds of a road turn that is
+        // enough.
         let angle = turned.until(turn.to_s + lag_s)? - turned.until(turn.from_s + lag_s)?;
         Some((turn.rate, angle.length() / (turn.to_s - turn.from_s)))
     };
     let pairs: Vec<(f64, f64)> = turns.iter().filter_map(rate).collect();
+    // At a long lag only the overlap is left: a correlation of few turns is high by chance.
     if pairs.len() < FEWEST.max(turns.len() / 2) {
         return None;
     }

@@ -38,6 +38,7 @@ pub fn bridged(samples: &[ImuIncrement], step_s: f64) -> Vec<ImuIncrement> {
         filled.extend_from_slice(&samples[done..k]);
         // not beyond the next hole
         let end = holes.get(i + 1).copied().unwrap_or(samples.len());
+        // A few samples only: further away the motion is no longer that at the edges of the gap.
         let before = rates(&samples[k.saturating_sub(BESIDE).max(done)..k]);
         let after = rates(&samples[k..(k + BESIDE).min(end)]);
         let dt_s = hole(k);
@@ -92,8 +93,11 @@ impl<'a> Bridges<'a> {
     fn of_windows(&self, steps: usize) -> Spread {
         let mut off: [Vec<f64>; 6] = Default::default();
         let whole = steps + 2 * BESIDE;
+        // Windows overlap by half: nearly all that the recording tells, at twice the cost of windows side by
+        // side.
         for first in (0..self.imu.len().saturating_sub(whole)).step_by((steps / 2).max(1)) {
             let part = &self.imu[first..first + whole];
+            // A bridge says nothing about the quality of bridges.
             if part.iter().any(|s| s.dt_s > LONG * self.step_s) {
                 continue;
             }
@@ -111,7 +115,7 @@ impl<'a> Bridges<'a> {
             return UNKNOWN.map(DVec3::splat);
         }
         let at = ((off[0].len() - 1) as f64 * SHARE) as usize;
-        let sigma = off.map(|mut of| *of.select_nth_unstable_by(at, f64::total_cmp).1);
+        let sigma = off.map(|mut errors| *errors.select_nth_unstable_by(at, f64::total_cmp).1);
         [DVec3::new(sigma[0], sigma[1], sigma[2]), DVec3::new(sigma[3], sigma[4], sigma[5])]
     }
 }

@@ -40,6 +40,8 @@ impl Blocks {
         let own: f64 = self.sums.iter().map(|(_, sum)| sum * sum).sum();
         let neighbours = self.sums.windows(2).filter(|w| w[1].0 == w[0].0 + 1);
         let shared: f64 = neighbours.map(|w| w[0].1 * w[1].1).sum();
+        // Newey and West's weight at lag one is 1/2, and each pair counts twice: factor 1. A negative
+        // correlation is not used: it would narrow the interval on the evidence of few blocks.
         let variance = (own + shared.max(0.0)) * count / (count - 1.0);
         // 1 + 1/(4ν) of the normal quantile is t's near one sigma; 2.5/ν covers three
         variance.sqrt() / self.weight * (1.0 + 2.5 / (count - 1.0))

@@ -89,6 +89,8 @@ pub(super) fn through(
         let seconds = moments.len() as f64 / ROWS_HZ;
         return Err(MountingError::TooSlow { seconds, needed: FEWEST as f64 * BLOCK_S });
     }
+    // Three parts: what scatters over the drive, what the filter itself is wrong by all along, and what no
+    // drive shows.
     let scatter = DVec3::from_array(blocks.each_ref().map(Blocks::sigma));
     let sigma_b = (scatter.powf(2.0) + of_filter(&moments).powf(2.0) + UNSEEN.powf(2.0)).powf(0.5);
     agreeing(mean, rough.yaw_sigma.hypot(sigma_b.z))?;
@@ -112,8 +114,11 @@ fn moment(before: &Row, row: &Row, after: &Row) -> Option<Moment> {
     let turned = before.state.q_b_n.inverse() * after.state.q_b_n;
     let rate = turned.to_scaled_axis().length() / seconds;
     let lean = LEAN * acceleration.length();
+    // ω · lever/speed is the angle between the course at the IMU and the axis of the body in a turn.
     let slip = (rate * AXLE_M / speed).hypot(of_velocity / speed);
     let of_filter = DVec3::new(row.sigma[6], row.sigma[7], row.sigma[8]) * DEG;
+    // About the front axis lean in turns; about the right axis nod, and the error of the slope by that of the
+    // vertical velocity; about down slip.
     let others = DVec3::new(lean, lean.hypot(row.sigma[5] / speed), slip);
     let q = track_attitude(v_n, row.sigma[5]).inverse() * row.state.q_b_n;
     let sigma = (of_filter.powf(2.0) + AT_A_TIME.powf(2.0) + others.powf(2.0)).powf(0.5);
@@ -166,5 +171,7 @@ fn deviations(moments: &[Moment], mean: DQuat) -> [Blocks; 3] {
 fn of_filter(moments: &[Moment]) -> DVec3 {
     let weights: DVec3 = moments.iter().map(|m| m.sigma.powf(-2.0)).sum();
     let sums: DVec3 = moments.iter().map(|m| m.of_filter.powf(2.0) * m.sigma.powf(-2.0)).sum();
+    // Not divided by the number of moments: an attitude error lasts for minutes, so that averaging does not
+    // reduce it.
     (sums / weights).powf(0.5)
 }

@@ -66,6 +66,7 @@ pub(super) fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<Roug
     let (mut sine, mut cosine) = (0.0, 0.0);
     for s in &stretches {
         let (u, w) = pair(s);
+        // Wahba's problem about one axis: both vectors projected across `up`, sums of their sine and cosine.
         sine += s.weight * up.dot(u.cross(w));
         cosine += s.weight * (u.dot(w) - up.dot(u) * up.dot(w));
     }
@@ -98,6 +99,8 @@ fn turn_sigma(stretches: &[Stretch], turned: impl Fn(&Stretch) -> (DVec3, DVec3)
         stiffness += s.weight * held;
     }
     let weights: f64 = stretches.iter().map(|s| s.weight).sum();
+    // A sandwich: the deviation of the sum of the torques (σ of the weighted mean times the weights) over the
+    // slope of that sum with the turn.
     torques.sigma() * weights / stiffness.max(0.0)
 }
 
@@ -122,8 +125,11 @@ fn stretch(
     }
     let (q, dv) = carried(samples);
     let covered: f64 = samples.iter().map(|s| s.dt_s).sum();
+    // The sum is in the axes at the beginning; half of the rotation brings it to those of the middle, where
+    // the mean velocity is taken.
     let to_middle = DQuat::from_scaled_axis(q.to_scaled_axis() * -0.5);
     let g = gravity_down(settings.gravity, from.fix.lat.sin(), from.fix.h);
+    // f = v̇ − g; Coriolis at driving speeds is 4e-3 m/s², far below the sway.
     let f_n = (to.v_n - from.v_n) / seconds - DVec3::Z * g;
     let sigma_down = from.sigma_n.z.hypot(to.sigma_n.z) / 2.0;
     let to_track = track_attitude((from.v_n + to.v_n) / 2.0, sigma_down).inverse();
