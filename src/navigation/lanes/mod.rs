@@ -61,6 +61,8 @@ impl Real for f64 {
         self * factor + term
     }
     #[inline(always)]
+    // The library's for a scalar: it is correct for angles of any size, and branches cost a single number
+    // nothing.
     fn sin_cos(self) -> (Self, Self) {
         self.sin_cos()
     }
@@ -177,6 +179,7 @@ impl Real for Lanes {
         result
     }
     #[inline(always)]
+    // Not f64::mul_add: without a fused instruction that would be a call into a library for every product.
     fn mul_add(self, factor: Self, term: Self) -> Self {
         self * factor + term
     }

@@ -242,6 +242,7 @@ impl<L: Real> Quat<L> {
     #[must_use]
     pub(crate) fn from_rotation_vector(phi: Vec3<L>) -> Self {
         let half = phi * L::from(0.5);
+        // sin(θ/2)/(θ/2) as a series in θ²: no division by θ, and so no branch for a rotation of zero.
         let (sinc, cos) = sinc_cos_of_square(half.dot(half));
         Self { w: cos, v: half * sinc }
     }
@@ -250,6 +251,7 @@ impl<L: Real> Quat<L> {
     #[inline(always)]
     #[must_use]
     pub fn renormalised(self) -> Self {
+        // 1/√x ≈ (3 − x)/2 near 1: an error ε of the norm becomes 3ε²/2.
         let scale = (self.w * self.w + self.v.dot(self.v)) * -0.5 + 1.5;
         Self { w: self.w * scale, v: self.v * scale }
     }
@@ -259,6 +261,7 @@ impl<L: Real> Quat<L> {
     #[must_use]
     pub fn to_matrix(&self) -> Mat3<L> {
         let (w, [x, y, z]) = (self.w, self.v.0);
+        // Doubling by addition is exact, and leaves nine products.
         let (x2, y2, z2) = (x + x, y + y, z + z);
         let (xx, yy, zz) = (x * x2, y * y2, z * z2);
         let (xy, xz, yz) = (x * y2, x * z2, y * z2);
@@ -276,6 +279,7 @@ impl<L: Real> Mul for Quat<L> {
     type Output = Self;
     #[inline(always)]
     fn mul(self, b: Self) -> Self {
+        // w_a v_b + w_b v_a + v_a × v_b.
         let v = b.v.mul_add(self.w, self.v.mul_add(b.w, self.v.cross(b.v)));
         Self { w: self.w.mul_add(b.w, -self.v.dot(b.v)), v }
     }

@@ -40,6 +40,8 @@ impl Level {
     pub fn best() -> Self {
         #[cfg(target_arch = "x86_64")]
         {
+            // AVX-512VL beside F: the compiler may then use narrower registers of that set in the same
+            // kernel.
             if is_x86_feature_detected!("avx512f") && is_x86_feature_detected!("avx512vl") {
                 return Self::Avx512;
             }
@@ -144,6 +146,7 @@ mod x86 {
                 type Output = Self;
                 #[inline(always)]
                 fn neg(self) -> Self {
+                    // −0 − x is −x for x = ±0 as well; 0 − x would lose the sign of a zero.
                     Self::from(-0.0) - self
                 }
             }
