@@ -16,18 +16,18 @@ pub struct Agreement {
     pub figures: usize,
     /// The largest distance, with its sign.
     pub largest_z: f64,
-    /// Of which figure.
+    /// The figure that has it.
     pub largest: String,
     /// What chance alone reaches with probability 1e-3 (Student's t, Bonferroni).
     pub bound_z: f64,
-    /// Of the NEES over the run.
+    /// Distance of the mean NEES over the run.
     pub nees_z: f64,
-    /// Of the coverage over the run.
+    /// Distance of the mean coverage over the run.
     pub coverage_z: f64,
 }
 
 impl Agreement {
-    /// Of the summary of runs and the expected one, of the same experiment.
+    /// The agreement of the summary of runs with the expected one of the same experiment.
     #[must_use]
     pub fn of(runs: &Summary, expected: &Summary) -> Self {
         let distance = |value: f64, error: f64, expected: f64| (value - expected) / error;
@@ -47,7 +47,10 @@ impl Agreement {
         all.retain(|(z, _)| z.is_finite());
         let largest = all.iter().max_by(|a, b| a.0.abs().total_cmp(&b.0.abs())).cloned();
         let (largest_z, largest) = largest.unwrap_or((f64::NAN, String::new()));
+        // Two sides, and Bonferroni over all figures: they are correlated, so that the true level is below
+        // LEVEL.
         let tail = LEVEL / (2.0 * all.len().max(1) as f64);
+        // The standard errors are estimated from the same runs: Student's t, not the normal law.
         let t = StudentsT::new(0.0, 1.0, runs.independent_runs - 1.0);
         let bound_z = t.map_or(f64::NAN, |t| t.inverse_cdf(1.0 - tail));
         Self { figures: all.len(), largest_z, largest, bound_z, nees_z, coverage_z }

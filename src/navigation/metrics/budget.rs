@@ -21,6 +21,7 @@ impl Budget {
     #[must_use]
     pub fn at_outage_ends(filter: &FilterPass<'_>, sources: &[NamedSource]) -> Vec<Self> {
         let squares = |source: &NamedSource| -> Vec<[f64; REPORTED]> {
+            // Mean squares, not variances: a deterministic source (drift) has a mean and no variance.
             filter.errors_at_ends(&source.side).iter().map(|end| end.variances(&end.moments())).collect()
         };
         let of_source: Vec<Vec<[f64; REPORTED]>> = sources.par_iter().map(squares).collect();

@@ -36,6 +36,7 @@ pub(crate) fn chi_square_interval(dof: usize, count: f64, tail: f64) -> Band {
     if dof == 0 || count.is_nan() || count <= 0.0 {
         return Band::NONE;
     }
+    // The sum of independent chi-square variables is one of the sum of their degrees of freedom.
     let total = dof as f64 * count;
     let mean_at = |p: f64| chi_square_quantile(total, p) / count;
     Band { lower: mean_at(tail), upper: mean_at(1.0 - tail) }
@@ -47,6 +48,7 @@ fn chi_square_quantile(dof: f64, p: f64) -> f64 {
     if dof > 1e5 {
         let c = 2.0 / (9.0 * dof);
         let z = Normal::new(0.0, 1.0).map_or(f64::NAN, |normal| normal.inverse_cdf(p));
+        // (χ²/dof)^(1/3) is nearly normal with mean 1 − 2/(9 dof) and variance 2/(9 dof).
         return dof * (1.0 - c + z * c.sqrt()).powi(3);
     }
     ChiSquared::new(dof).map_or(f64::NAN, |chi_square| chi_square.inverse_cdf(p))
@@ -58,6 +60,8 @@ pub(crate) fn coverage_band(level: f64, count: f64) -> Band {
     let whole = count as u64;
     match Binomial::new(level, whole) {
         Ok(binomial) if whole > 0 => {
+            // The binomial law is discrete: the smallest count that reaches p, so that the band holds 95 % or
+            // more.
             let quantile = |p: f64| binomial.inverse_cdf(p) as f64 / whole as f64;
             Band { lower: quantile(0.025), upper: quantile(0.975) }
         }

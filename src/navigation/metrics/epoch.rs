@@ -75,6 +75,8 @@ impl Accuracy {
         let n = epochs.clone().count() as f64;
         let mean = |of: &dyn Fn(&EpochMetrics) -> Estimate| Estimate {
             value: epochs.clone().map(|e| of(e).value).sum::<f64>() / n,
+            // The mean of the errors, not the root of the sum of their squares: epochs of a run are strongly
+            // correlated.
             std_error: epochs.clone().map(|e| of(e).std_error).sum::<f64>() / n,
         };
         Self {

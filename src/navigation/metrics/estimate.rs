@@ -24,11 +24,14 @@ impl Estimate {
     pub fn mean(size: SampleSize, sum: f64, sum_sq: f64) -> Self {
         let n = size.values as f64;
         let value = sum / n;
+        // Cancellation may leave a scatter of −1e-16; the root of it would be NaN.
         Self::scattered(size, value, (sum_sq / n - value * value).max(0.0))
     }
 
     /// A mean and the mean square of the values about it.
     fn scattered(size: SampleSize, value: f64, scatter: f64) -> Self {
+        // scatter is the sum of squares over n; over m independent values its expectation is σ²(1 − 1/m), and
+        // the variance of the mean σ²/m: hence scatter/(m − 1).
         let freedom = size.independent - 1.0;
         Self { value, std_error: if freedom > 0.0 { (scatter / freedom).sqrt() } else { f64::NAN } }
     }
@@ -74,7 +77,8 @@ pub struct SampleSize {
 }
 
 impl SampleSize {
-    /// Of `values` runs, no more than `windows` of which have noise of their own (none: all have).
+    /// The size of a sample of `values` runs, no more than `windows` of which have noise of their own (none: all
+    /// have).
     #[must_use]
     pub fn of(values: u64, windows: Option<f64>) -> Self {
         Self { values, independent: windows.unwrap_or(f64::INFINITY).min(values as f64) }
@@ -137,6 +141,7 @@ pub fn quantile(sorted: &[f64], p: f64, windows: Option<f64>) -> Quantile {
 /// The quantile alone; NaN of no value.
 pub(super) fn sample_quantile(sorted: &[f64], p: f64) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
+    // From the first value (p = 0) to the last (p = 1): Hyndman and Fan's type 7, the default of R and NumPy.
     let position = p * last as f64;
     let below = position.floor() as usize;
     let above = (below + 1).min(last);
@@ -145,6 +150,7 @@ pub(super) fn sample_quantile(sorted: &[f64], p: f64) -> f64 {
 
 /// x_(l) and x_(u), counted from 1, with P(B < l) ≤ 2.5 % and P(B ≥ u) ≤ 2.5 %, B binomial.
 fn order_statistic_interval(sorted: &[f64], p: f64, windows: Option<f64>) -> (Option<f64>, Option<f64>) {
+    // Rounded down: fewer independent values make a wider interval.
     let n = SampleSize::of(sorted.len() as u64, windows).independent.floor() as u64;
     let Ok(binomial) = Binomial::new(p, n) else { return (None, None) };
     let l = (0..n).take_while(|l| binomial.cdf(*l) <= 0.025).count(); // B ≤ l − 1 has at most 2.5 %

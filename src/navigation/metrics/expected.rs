@@ -39,14 +39,15 @@ pub struct Expected {
 }
 
 impl Expected {
-    /// Of a filter in an experiment whose inertial errors `truth` makes, along the experiment's track; none where a
-    /// covariance did not stay finite and positive.
+    /// The figures of a filter in an experiment whose inertial errors `truth` makes, along the experiment's track; none
+    /// where a covariance did not stay finite and positive.
     #[must_use]
     pub fn along(track: &Track, experiment: &Experiment<'_>, belief: &Belief, truth: &Model) -> Option<Self> {
         let truth = TruthSide::together(&TruthSide::sources(experiment, truth));
         let filter = FilterPass::new(track, belief);
         let law = filter.errors(&truth);
         let chi2 = ChiSquared::new(COVERAGE_DOF as f64).expect("degrees of freedom are positive");
+        // The limit that the filter itself would take for this level: it believes in a chi-square law.
         let limit = chi2.inverse_cdf(experiment.coverage_level);
         let reports = law.reports.iter().zip(filter.bias_sigmas());
         let epochs: Vec<EpochMetrics> =
@@ -55,6 +56,8 @@ impl Expected {
         let outages: Vec<OutageMetrics> =
             ends.map(|(window, end)| outage((window.start_s, window.end_s), end, &epochs)).collect();
         let record = record(&epochs, &law, &outages);
+        // NaN comes from a believed covariance without a Cholesky factor: at any report it makes the mean
+        // NaN.
         record.nees_mean.is_finite().then_some(Self {
             epochs,
             record,
@@ -126,7 +129,7 @@ fn block(p: &[[f64; NEES_DOF]; NEES_DOF], states: &[usize]) -> DMatrix<f64> {
     DMatrix::from_fn(states.len(), states.len(), |i, j| p[states[j]][states[i]])
 }
 
-/// Mean size of the part of the error that these states have.
+/// Mean norm of the error in these states: E ‖e‖ (m, m/s, rad).
 fn mean_size(instant: &Instant, states: &[usize]) -> f64 {
     square(instant, states).mean_root()
 }
@@ -138,7 +141,7 @@ pub fn horizontal_quantiles<const N: usize>(instant: &Instant, probabilities: [f
     probabilities.map(|p| horizontal.quantile(p).sqrt())
 }
 
-/// The square of that part.
+/// The law of ‖e‖² over these states.
 fn square(instant: &Instant, states: &[usize]) -> QuadraticForm {
     let mean: Vec<f64> = states.iter().map(|s| instant.mean[*s]).collect();
     QuadraticForm::of_square(&block(&instant.covariance, states), &mean)
@@ -147,6 +150,8 @@ fn square(instant: &Instant, states: &[usize]) -> QuadraticForm {
 fn epoch(instant: &Instant, bias_asee: [f64; BIASES], limit: f64) -> Option<EpochMetrics> {
     let believed = block(&instant.believed, &COVERED);
     let mean = COVERED.map(|s| instant.mean[s]);
+    // eᵀ P_f⁻¹ e is not chi-square where P_f is not the covariance of e: a weighted sum of such, whose law is
+    // exact.
     let inside = QuadraticForm::of_normalised(&believed, &block(&instant.covariance, &COVERED), &mean)?;
     Some(EpochMetrics {
         t_s: instant.t_s,
@@ -195,6 +200,7 @@ fn record(epochs: &[EpochMetrics], law: &ErrorLaw, outages: &[OutageMetrics]) ->
         error_end: o.rmse_end.0.map(|e| e.value),
         nees_end: o.nees_end.value,
         log_density_end: o.log_density_end.value,
+        // The horizontal error is not normal, and a run with its mean square is not a run of its median.
         horizontal_error_end_m: f64::NAN,
         reconvergence_s: f64::NAN,
     };
@@ -206,6 +212,7 @@ fn record(epochs: &[EpochMetrics], law: &ErrorLaw, outages: &[OutageMetrics]) ->
         rejected: 0,
         nees_mean: mean(&|e| e.nees.value),
         covered: mean(&|e| e.coverage),
+        // The mean of squares over the epochs, as runs have it; the root is taken by the verdict.
         normalised_sq: std::array::from_fn(|i| mean(&|e| (e.rmse.0[i].value / e.asee.0[i].value).powi(2))),
         horizontal_m: Vec::new(),
     }

@@ -25,6 +25,8 @@ pub struct FanEpoch {
 /// each outage, where errors are largest: that row stands before the one after the fix, at the same time.
 #[must_use]
 pub fn fan(result: &RunResult) -> Vec<FanEpoch> {
+    // Runs after the hundred thousandth have no errors over time: they are left out at the ends as well, so
+    // that the band is of one set of runs.
     let kept: Vec<&RunRecord> =
         result.runs.iter().filter(|run| !run.diverged && !run.horizontal_m.is_empty()).collect();
     let epoch = |t_s: f64, error: &dyn Fn(&RunRecord) -> f64| {
@@ -39,7 +41,7 @@ pub fn fan(result: &RunResult) -> Vec<FanEpoch> {
     with_ends(over_time, ends.map(|(k, t_s)| epoch(*t_s, &|run| run.outages[k].horizontal_error_end_m)))
 }
 
-/// Of a filter's errors by covariance analysis, at the same times.
+/// The quantiles of a filter's errors by covariance analysis, at the same times.
 #[must_use]
 pub fn expected_fan(filter: &FilterPass<'_>, truth: &TruthSide, outages: &[Outage]) -> Vec<FanEpoch> {
     let law = filter.errors(truth);
@@ -55,6 +57,7 @@ pub fn expected_fan(filter: &FilterPass<'_>, truth: &TruthSide, outages: &[Outag
 /// Puts the ends of outages into their places in time, before what comes after the fix.
 fn with_ends(mut epochs: Vec<FanEpoch>, ends: impl Iterator<Item = FanEpoch>) -> Vec<FanEpoch> {
     for end in ends {
+        // Strictly before: the end of an outage comes ahead of the report after the fix at the same time.
         epochs.insert(epochs.partition_point(|epoch| epoch.t_s < end.t_s), end);
     }
     epochs

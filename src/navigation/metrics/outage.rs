@@ -71,9 +71,10 @@ pub(super) fn within(
     epochs.iter().filter(move |e| start_s <= e.t_s + 1e-9 && e.t_s + 1e-9 < end_s)
 }
 
-/// All that the records of the runs tell.
+/// Statistics of an outage from the records of the runs; the mean RMSE, which needs the epochs, is NaN.
 fn outage((start_s, end_s): (f64, f64), records: &[&OutageRecord], windows: Option<f64>) -> OutageMetrics {
     let horizontal = sorted(records.iter().map(|r| r.horizontal_error_end_m));
+    // Runs that never recover have NaN here. They are counted apart: no finite time stands for them.
     let recovery = sorted(records.iter().map(|r| r.reconvergence_s).filter(|s| s.is_finite()));
     let mean =
         |value: &dyn Fn(&OutageRecord) -> f64| Estimate::mean_of(records.iter().map(|r| value(r)), windows);
@@ -86,6 +87,7 @@ fn outage((start_s, end_s): (f64, f64), records: &[&OutageRecord], windows: Opti
         asee_end: per_state(&|i| mean(&|r| r.see_end[i])),
         nees_end: mean(&|r| r.nees_end),
         log_density_end: mean(&|r| r.log_density_end),
+        // Mean square first, then the root: the standard error is linearised once, at the root.
         rmse_end: per_state(&|i| mean(&|r| r.error_end[i].powi(2)).root()),
         horizontal_p50_m: quantile(&horizontal, 0.5, windows),
         horizontal_p95_m: quantile(&horizontal, 0.95, windows),

@@ -19,7 +19,7 @@ const MEAN_STEP: f64 = 0.25;
 /// Q = c + Σ w (z + d)², z independent standard normal variables.
 #[derive(Debug, Clone, PartialEq)]
 pub struct QuadraticForm {
-    /// c ≥ 0.
+    /// The part without scatter, c ≥ 0.
     certain: f64,
     /// Weights w > 0 and shifts d.
     terms: Vec<(f64, f64)>,
@@ -45,10 +45,12 @@ impl QuadraticForm {
         let largest = eigen.eigenvalues.iter().copied().fold(0.0, f64::max);
         let (mut certain, mut terms) = (0.0, Vec::new());
         for (w, axis) in eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter()) {
+            // In the axes of the covariance the components are independent: w (z + d)² with d = mean/√w.
             let along: f64 = axis.iter().zip(mean).map(|(a, m)| a * m).sum();
             if *w > ROUNDING * largest {
                 terms.push((*w, along / w.sqrt()));
             } else {
+                // A direction without variance: what mean there is in it belongs to every error.
                 certain += along * along;
             }
         }
@@ -60,13 +62,14 @@ impl QuadraticForm {
     pub(crate) fn of_normalised(p: &DMatrix<f64>, covariance: &DMatrix<f64>, mean: &[f64]) -> Option<Self> {
         let factor = p.clone().cholesky()?.l();
         let whiten = |m: &DMatrix<f64>| factor.solve_lower_triangular(m);
+        // L⁻¹ C L⁻ᵀ with P = L Lᵀ has the eigenvalues of P⁻¹ C and is symmetric.
         let half = whiten(covariance)?;
         let whole = whiten(&half.transpose())?;
         let mean = whiten(&DMatrix::from_column_slice(mean.len(), 1, mean))?;
         Some(Self::of_square(&whole, mean.as_slice()))
     }
 
-    /// Its expectation.
+    /// Expectation, c + Σ w (1 + d²).
     #[must_use]
     pub fn mean(&self) -> f64 {
         self.certain + self.terms.iter().map(|(w, d)| w * (1.0 + d * d)).sum::<f64>()
@@ -90,6 +93,9 @@ impl QuadraticForm {
     fn along_parabola(&self, x: f64) -> f64 {
         let n = f64::from(NODES);
         let node = |k: u32| {
+            // Midpoints: the rule is symmetric about the real axis and no node lies on it. The constants of
+            // the parabola below are the optimal ones for the plain transform; scaled by the number of nodes
+            // it follows x through p/x.
             let theta = (2.0 * f64::from(k) + 1.0) * PI / n;
             let p = Complex(0.1309 - 0.1194 * theta * theta, 0.25 * theta).scaled(n);
             let slope = Complex(-0.2388 * theta, 0.25).scaled(n);
@@ -103,6 +109,8 @@ impl QuadraticForm {
     /// density: by the trapezoidal rule, until nothing is added.
     fn along_line(&self, x: f64) -> f64 {
         let (saddle, width) = self.saddle(x);
+        // On a line through the saddle the integrand is like exp(−y²/2) in widths: the trapezoidal rule
+        // converges geometrically, and a quarter of a width is exact to rounding.
         let step = LINE_STEP * width;
         let value = |k: u32| {
             let p = Complex(saddle, f64::from(k) * step);
@@ -115,6 +123,7 @@ impl QuadraticForm {
         for k in 1..LINE_STEPS {
             let next = value(k);
             sum += next;
+            // The second condition: the integrand oscillates and may pass through zero before it has fallen.
             if next.abs() < 1e-17 * first && f64::from(k) * LINE_STEP > 8.0 {
                 break;
             }
@@ -131,10 +140,12 @@ impl QuadraticForm {
             };
             x - self.terms.iter().map(term).sum::<f64>() - 1.0 / p
         };
+        // At p = 1/x the slope is −Σ … < 0: the least lies above.
         let (mut low, mut high) = (0.0, 1.0 / x);
         while slope(high) < 0.0 {
             (low, high) = (high, 2.0 * high);
         }
+        // Bisection of a monotone slope; the place of the line need not be exact, only its neighbourhood.
         for _ in 0..100 {
             let middle = 0.5 * (low + high);
             if slope(middle) < 0.0 { low = middle } else { high = middle }
@@ -154,10 +165,12 @@ impl QuadraticForm {
         if mean.is_nan() || self.terms.is_empty() {
             return mean;
         }
+        // Markov: P(Q ≤ k · mean) ≥ 1 − 1/k, so that doubling finds a bracket.
         let (mut low, mut high) = (0.0, mean);
         while self.cdf(high) < probability && high < 1e6 * mean {
             (low, high) = (high, 2.0 * high);
         }
+        // Bisection, since near 0 and 1 the distribution function has only its rounding to give to a secant.
         while high - low > 1e-12 * high {
             let middle = 0.5 * (low + high);
             if middle <= low || middle >= high {
@@ -172,6 +185,7 @@ impl QuadraticForm {
     /// that of a certain Q, whose transform grows beyond an imaginary part of π/4.
     #[must_use]
     pub(crate) fn mean_root(&self) -> f64 {
+        // In units of its mean Q is about 1, and the fixed range of y holds the integrand of any Q.
         let scale = self.mean();
         if scale.is_nan() || scale <= 0.0 {
             return scale;
@@ -213,6 +227,8 @@ impl QuadraticForm {
         for (w, d) in &self.terms {
             let q = p.scaled(2.0 * w);
             let base = Complex(1.0 + q.0, q.1);
+            // Root by root: each factor 1 + 2wp keeps to the plane cut along its negative axis, their product
+            // does not.
             product = product.over(base.root());
             let shift = q.over(base).scaled(-0.5 * d * d);
             exponent = Complex(exponent.0 + shift.0, exponent.1 + shift.1);

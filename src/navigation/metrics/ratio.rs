@@ -35,7 +35,7 @@ impl From<&EpochMetrics> for EpochRow {
     }
 }
 
-/// What was measured in an experiment, as far as ratios need it.
+/// The results of an experiment, as far as ratios need them.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Measured {
     /// Epochs in time order.
@@ -188,6 +188,8 @@ fn comparable(candidate: &Measured, reference: &Measured) -> Result<(), Comparis
         let (candidate, reference) = (words(candidate), words(reference));
         return Err(ComparisonError::Outages { candidate, reference });
     }
+    // To the last bit: epochs of the same schedule are equal, and ratios of unequal epochs would mean
+    // nothing.
     let times = |e: &Measured| e.epochs.iter().map(|row| row.t_s.to_bits()).collect::<Vec<_>>();
     if times(candidate) != times(reference) {
         let words = |e: &Measured| match (e.epochs.first(), e.epochs.last()) {
@@ -242,6 +244,8 @@ impl OutageComparison {
         let half_of_log = |(low, high): (f64, f64)| 0.5 * (high / low).ln();
         for (state, (c, r)) in self.states.iter_mut().zip(candidate.0.iter().zip(&reference.0)) {
             let RatioError { pct, ci95_pct: [low, high] } = state.asee;
+            // In logarithms, where the intervals of scale parameters are nearly symmetric; independent, so
+            // squares add.
             let calibration = (100.0 + pct) * half_of_log(*c).hypot(half_of_log(*r));
             let half = (0.5 * (high - low)).hypot(calibration);
             state.asee.ci95_pct = [pct - half, pct + half];
@@ -279,6 +283,7 @@ impl MeanRatio {
     /// none is below zero.
     fn root(&self) -> RatioError {
         let root = self.ratio.sqrt();
+        // d ln √R = dR/(2R).
         let half = self.half_width_pct / 100.0 / (2.0 * self.ratio);
         let pct = |root: f64| (root - 1.0) * 100.0;
         RatioError { pct: pct(root), ci95_pct: [-half, half].map(|x| pct(root * x.exp())) }
@@ -308,14 +313,18 @@ impl Pairing {
             return MeanRatio { ratio, half_width_pct: 0.0 };
         };
         let variance = if sampled.len() == 1 {
+            // Var(a/b̄) is Var(ā)/b̄² with b certain, and ρ² Var(b̄)/b̄² with a certain.
             let scale = if self.is_expected[0] { ratio * ratio } else { 1.0 };
             scale * self.variance_of_mean(sampled[0])
         } else if self.paired {
+            // What both runs of a pair have in common cancels here: the reason for drawing the same noise
+            // twice.
             let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - ratio * b).collect();
             self.variance_of_mean(&differences)
         } else {
             self.variance_of_mean(a) + ratio * ratio * self.variance_of_mean(b)
         };
+        // The smaller sample decides: fewer degrees of freedom make a wider interval, never a narrower one.
         let freedom = SampleSize::of(fewest as u64, self.windows).independent - 1.0;
         let t = StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |t| t.inverse_cdf(0.975));
         MeanRatio { ratio, half_width_pct: t * variance.sqrt() / mean_b * 100.0 }

@@ -139,8 +139,10 @@ impl AxisReduction {
         let (white, bias) =
             (White::new(belief.white[sensor][i])?, Ar1::new(group.phi[i], group.innovation[i])?);
         let is_quantization = |p: &&Process| matches!(p, Process::Quantization(_));
+        // Compared with the model as a filter can carry it: quantization noise is left out on both sides.
         let kept = reduction::carried(noise);
         let pair = Composite::new(vec![Process::White(white), Process::Ar1(bias)]);
+        // Haar scales are 2, 4, 8 … samples: the nearest in the logarithm. 2^40 samples is beyond any record.
         let level = |seconds: f64| (seconds * model.rate_hz).max(2.0).log2().round().min(40.0) as u32;
         let [first, last] = scales_s.map(level);
         let distance = |l: u32| (pair.haar_wv(l) / kept.haar_wv(l)).ln().abs();
@@ -185,6 +187,7 @@ impl ReductionQuality {
     fn worst(&self) -> Option<(usize, usize, f64)> {
         let ends = self.outage_end.iter().enumerate();
         let all = ends.flat_map(|(o, end)| end.0.iter().enumerate().map(move |(s, r)| (s, o + 1, *r)));
+        // By the logarithm: half and twice are equally far off.
         all.max_by(|a, b| a.2.ln().abs().total_cmp(&b.2.ln().abs()))
     }
 

@@ -6,7 +6,7 @@ use serde::Serialize;
 use std::fmt;
 use std::str::FromStr;
 
-/// What a limit is of.
+/// The figure that a limit is set on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Figure {
     /// Median of the horizontal error at the end of an outage.
@@ -82,9 +82,10 @@ impl Requirement {
         }
     }
 
-    /// Against what was found: what covariance analysis expects, where there is such, else what the runs say.
+    /// Compares the limit with the expectation of the covariance analysis where there is one, else with the runs.
     #[must_use]
     pub fn check(&self, summary: &Summary) -> Met {
+        // Free of chance: a limit is then not kept or missed by the luck of the runs.
         let summary = summary.lincov.as_deref().unwrap_or(summary);
         let of_outage = |o: &super::OutageSummary| match self.figure {
             Figure::P50 => o.horizontal_error_end_m.p50,

@@ -13,13 +13,14 @@ use crate::units::{DEG, STANDARD_GRAVITY};
 
 /// Roll, pitch among the reported states.
 const TILT: [usize; 2] = [6, 7];
-/// Among them too.
+/// Velocity down among the reported states.
 const VELOCITY_DOWN: usize = 5;
 
 /// Mean shift of the velocity down (m/s) that the tilt makes to second order over an outage: ∫ g (ψ_roll² + ψ_pitch²)/2 dt
 /// with the mean squares of the errors, by the trapezoidal rule over the reporting epochs. NaN where no epochs were kept.
 pub(super) fn velocity_down_m_s(outage: &OutageMetrics, epochs: &[EpochMetrics]) -> f64 {
     let acceleration = |epoch: &EpochMetrics| {
+        // 1 − cos ψ ≈ ψ²/2 for each of the two tilts; in mean squares, so that no draw is needed.
         STANDARD_GRAVITY / 2.0 * TILT.map(|i| (epoch.rmse.0[i].value * DEG).powi(2)).iter().sum::<f64>()
     };
     let inside = within((outage.start_s, outage.end_s), epochs);

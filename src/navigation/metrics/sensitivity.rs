@@ -37,6 +37,7 @@ impl Sensitivities {
         let slopes: Vec<Vec<[f64; REPORTED]>> = varied
             .par_iter()
             .map(|varied| {
+                // Only the truth moves; the gains stay those of the filter, which does not know of it.
                 let (more, less) = (ln_rmse(&varied.by(truth, STEP)), ln_rmse(&varied.by(truth, -STEP)));
                 let slope = |(more, less): (&[f64; REPORTED], &[f64; REPORTED])| {
                     std::array::from_fn(|i| (more[i] - less[i]) / (2.0 * STEP))
@@ -62,6 +63,7 @@ impl Varied {
             for (process, label) in axis.processes.iter().zip(axis.labels()) {
                 for (&parameter, value) in process.kind().parameters().iter().zip(process.values()) {
                     let known = |v: &Self| v.sensor == sensor && v.label == label && v.parameter == parameter;
+                    // Zero has no logarithm to move along.
                     if value != 0.0 && !all.iter().any(known) {
                         all.push(Self { sensor, label: label.clone(), parameter });
                     }

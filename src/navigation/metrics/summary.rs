@@ -249,6 +249,7 @@ impl Summary {
         let diverged = self.verdict.kind == VerdictKind::Diverged;
         if !agreement.is_broken() {
             self.take_verdicts(&expected);
+            // Divergence is a fact of the runs that no linear analysis can take back.
             if diverged {
                 self.verdict.kind = VerdictKind::Diverged;
                 self.outages.iter_mut().for_each(|o| o.verdict.kind = VerdictKind::Diverged);
@@ -261,6 +262,7 @@ impl Summary {
     /// A filter that runs do not find wrong, being too few, is wrong where covariance analysis finds it so and the runs
     /// do not contradict that.
     pub fn doubt_by(&mut self, expected: &Self) {
+        // The runs' own alarm stands, and an expectation without fault adds nothing to it.
         let is_told = self.verdict.kind != VerdictKind::Ok || expected.verdict.kind == VerdictKind::Ok;
         if !is_told && !Agreement::of(self, expected).is_broken() {
             self.take_verdicts(expected);
@@ -374,10 +376,12 @@ fn nis(result: &RunResult) -> Nis {
     let fixes: u64 = kept().map(|(_, fixes)| fixes).sum();
     let sum: f64 = kept().map(|(mean, fixes)| mean * fixes as f64).sum();
     let runs = SampleSize::of(kept().count() as u64, result.independent_windows);
+    // NIS are independent within a run and between runs; of runs that share windows only this share is new.
     let share = runs.independent / runs.values as f64;
     let band = chi_square_band(result.fix_components, fixes as f64 * share);
     Nis {
         dof: result.fix_components,
+        // Weighted by fixes: a run of which the gate refused most must not count as one that used them all.
         mean: sum / fixes as f64,
         lower95: band.lower,
         upper95: band.upper,

@@ -127,6 +127,7 @@ impl OutageVerdict {
     #[must_use]
     pub fn expected(record: &RunRecord) -> Vec<Self> {
         let statistics = Evidence { runs: &[record], windows: None }.statistics(record.outages.len());
+        // Nothing is left to chance: the limits of significance close on 1, and the tolerance alone decides.
         Judge { limits: [(1.0, 1.0); 2] }.outages(&statistics, record.outages.len(), false)
     }
 }
@@ -228,11 +229,14 @@ impl Evidence<'_> {
         }
         for k in 0..outages {
             let end = |value: &dyn Fn(&OutageRecord) -> f64| {
+                // A record that is missing makes the statistic NaN, and NaN alarms in neither direction.
                 ratio(&|r: &RunRecord| r.outages.get(k).map_or(f64::NAN, value))
             };
             let nees = end(&|o| o.nees_end / NEES_DOF as f64);
             all.push(Statistic { state: None, outage: Some(k), ratio: nees });
             for i in 0..REPORTED {
+                // Normalised run by run with the run's own deviation: to first order it is the same in all of
+                // them.
                 let one = end(&|o| (o.error_end[i] / o.see_end[i]).powi(2));
                 all.push(Statistic { state: Some(i), outage: Some(k), ratio: one });
             }
@@ -241,7 +245,7 @@ impl Evidence<'_> {
     }
 }
 
-/// What the ratios of a right filter do not leave.
+/// The limits between which the ratios of a right filter lie.
 struct Judge {
     /// Lower and upper limit of all states together, and of one state.
     limits: [(f64, f64); 2],
@@ -251,6 +255,7 @@ impl Judge {
     /// With probability `tail` beyond each limit.
     fn new(independent_runs: f64, tail: f64) -> Self {
         let limits = [NEES_DOF, 1].map(|dof| {
+            // Of a right filter the square is χ² over its degrees of freedom; the ratio is its root.
             let band = chi_square_interval(dof, independent_runs, tail);
             let ratio = |mean: f64| (mean / dof as f64).sqrt();
             (ratio(band.lower), ratio(band.upper))
@@ -262,6 +267,8 @@ impl Judge {
     fn of(&self, statistic: &Statistic) -> VerdictKind {
         let (lower, upper) = self.limits[usize::from(statistic.state.is_some())];
         let ratio = statistic.ratio.value;
+        // Both: significant, since chance must not alarm; material, since with enough runs any linear filter
+        // is wrong. Below, 1/1.1 is the same distance in the logarithm.
         if ratio > upper && ratio > 1.0 + TOLERANCE {
             VerdictKind::Overconfident
         } else if ratio < lower && ratio < 1.0 / (1.0 + TOLERANCE) {
