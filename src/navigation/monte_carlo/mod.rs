@@ -45,6 +45,8 @@ pub fn run_range(
     let results = experiment.beliefs.iter().map(|b| empty(plan, b.states)).collect();
     let sums = Mutex::new(InOrder { results, next: 0, waiting: BTreeMap::new() });
     let batches = runs.div_ceil(LANES as u64);
+    // A bridge hands batches out one by one and in order, where splitting the range would have one thread
+    // begin in the middle: few results wait for their turn.
     (0..batches).par_bridge().for_each(|batch| {
         if !go_on() {
             return;
@@ -56,6 +58,7 @@ pub fn run_range(
         sums.lock().unwrap_or_else(PoisonError::into_inner).take(batch, computed, plan.samples());
     });
     let sums = sums.into_inner().unwrap_or_else(PoisonError::into_inner);
+    // A batch that was not run leaves all later ones waiting: the result is whole or none.
     (sums.next == batches).then_some(sums.results)
 }
 
@@ -69,6 +72,8 @@ struct InOrder {
 impl InOrder {
     fn take(&mut self, batch: u64, computed: Vec<Batch>, samples: usize) {
         self.waiting.insert(batch, computed);
+        // Floating-point sums depend on their order: they are made in the order of the runs, whoever finishes
+        // first.
         while let Some(parts) = self.waiting.remove(&self.next) {
             self.next += 1;
             for (result, part) in self.results.iter_mut().zip(parts) {
