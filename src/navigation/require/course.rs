@@ -38,7 +38,7 @@ impl Drift {
         }
     }
 
-    /// A quantity of it (its unit).
+    /// The value of a quantity (m or degrees).
     #[must_use]
     pub fn value(&self, quantity: Quantity) -> f64 {
         match quantity {
@@ -49,16 +49,20 @@ impl Drift {
         }
     }
 
-    /// The mean square behind a quantity: sources add in it.
+    /// The mean square behind a quantity (m² or degrees²), in which the parts of independent sources add.
     pub(super) fn square(&self, quantity: Quantity) -> f64 {
         match quantity {
             Quantity::Angle(i) => self.angles_deg[i].powi(2),
+            // The quantiles have no sum over sources: shares are of the mean square whatever quantile is
+            // limited.
             _ => (0..2).map(|i| self.covariance_m2[i][i] + self.mean_m[i].powi(2)).sum(),
         }
     }
 
     fn quantile(&self, probability: f64) -> f64 {
         let covariance = DMatrix::from_fn(2, 2, |i, j| self.covariance_m2[j][i]);
+        // North and east have unequal variances and are correlated: the horizontal error is neither Rayleigh
+        // nor normal.
         QuadraticForm::of_square(&covariance, &self.mean_m).quantile(probability).sqrt()
     }
 }
@@ -96,6 +100,8 @@ impl<'a> Course<'a> {
         outages: &[Outage],
         detail: Detail,
     ) -> Result<Self, ExperimentError> {
+        // The track is of the reference alone; the noise that is sought comes later, a hundred times over the
+        // same track.
         let silent = Model { rate_hz: scenario.imu.rate_hz, axes: Default::default() };
         let place = |outage: &Outage| {
             let track = scenario.track(trajectory, &silent, &[*outage])?.until_outage_end();
@@ -179,6 +185,8 @@ impl<'a> Course<'a> {
 
 impl Place {
     fn filter(&self, scenario: &Scenario, model: &Model) -> Result<FilterPass<'_>, BeliefError> {
+        // The filter that knows every process: the best that this IMU allows, whatever reduction is chosen
+        // later.
         let belief = scenario.with_full_noise().belief(model, &self.outage, &self.track)?;
         Ok(FilterPass::new(&self.track, &belief))
     }
@@ -195,6 +203,8 @@ pub fn evenly(first_s: f64, end_s: f64, length_s: f64, places: u32) -> Vec<Outag
     let last_s = end_s - length_s;
     let step = if places > 1 { (last_s - first_s).max(0.0) / f64::from(places - 1) } else { 0.0 };
     let mut outages: Vec<Outage> = (0..places)
+        // Reports come at whole seconds: only from such a start are the errors within the outage those after
+        // 1, 2, 3 … s.
         .map(|k| (first_s + f64::from(k) * step).floor())
         .map(|start_s| Outage { start_s, end_s: start_s + length_s })
         .collect();

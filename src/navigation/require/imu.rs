@@ -29,7 +29,7 @@ const START: [f64; IMU_PARAMETERS] = [1e-3, 3e-4, 5e-5, 1e-5];
 const NONE: f64 = 1e-5;
 /// How far from the start an intensity is sought, as a logarithm: beyond, any will do.
 const RANGE: f64 = 9.0;
-/// Where the logarithm of limit over error is zero.
+/// A logarithm of limit over error this close to zero counts as zero.
 const EXACT: f64 = 1e-4;
 /// Rounds of the allocation, the share of a correction that is applied, and when it is done.
 const ROUNDS: usize = 25;
@@ -102,7 +102,7 @@ pub enum Answer {
 
 /// What is asked of an IMU.
 pub struct Need<'a> {
-    /// Where.
+    /// The trajectory and the places of the outage.
     pub course: &'a Course<'a>,
     /// Receiver, start and IMU rate.
     pub scenario: &'a Scenario,
@@ -127,6 +127,7 @@ impl Need<'_> {
     /// When not even a perfect IMU meets them.
     pub fn allocated(&self) -> Result<(ImuParameters, [f64; IMU_PARAMETERS + 1]), RequireError> {
         let start = ImuParameters { values: START, t_corr_s: self.t_corr_s };
+        // 1e-5 of a consumer IMU, not zero: intensities are sought as logarithms.
         let perfect = self.worst(&start.times([NONE; IMU_PARAMETERS]))?;
         if perfect.margin() <= 0.0 {
             return Err(RequireError::Floor { limit: perfect.limit, value: perfect.value });
@@ -136,14 +137,21 @@ impl Need<'_> {
             let (worst, squares) = self.squares(&imu)?;
             let total: f64 = squares.iter().sum();
             // what the limit leaves when GNSS and start have taken their part
+            // The margin is ln(limit/error): squared, exp(2 margin) is what the mean square may grow by.
             let allowed = total * (2.0 * worst.margin()).exp() - squares[IMU_PARAMETERS];
+            // Where GNSS and start alone exceed the limit at this iterate the rest is negative: five per cent
+            // keep the logarithm finite until it is not.
             let quarter = allowed.max(0.05 * total) / IMU_PARAMETERS as f64;
             let off: [f64; IMU_PARAMETERS] = std::array::from_fn(|i| (quarter / squares[i]).ln());
             if off.iter().all(|x| x.abs() < EVEN) {
                 break;
             }
+            // Half of the logarithm of the squares would be the exact step of a source alone; less, since the
+            // filter's gains, and with them all four parts, change with every intensity.
             imu = imu.times(off.map(|x| (DAMPING * x).clamp(-1.0, 1.0).exp()));
         }
+        // The rounds end near the limit; one factor common to all then meets it exactly and leaves the shares
+        // as they are.
         imu = self.at_limit(&imu, [1.0; IMU_PARAMETERS])?.1;
         let (_, squares) = self.squares(&imu)?;
         let total: f64 = squares.iter().sum();
@@ -160,6 +168,8 @@ impl Need<'_> {
         varied[which] = 1.0;
         let (margin, found) = self.at_limit(&base, varied)?;
         Ok(match margin {
+            // Regula falsi may end at a bracket without the last digit: ten times the tolerance is still a
+            // crossing.
             m if m.abs() <= 10.0 * EXACT => Answer::AtMost(found.values[which]),
             m if m > 0.0 => Answer::Any,
             _ => Answer::Never,
@@ -180,6 +190,8 @@ impl Need<'_> {
     /// When the model has no filter.
     pub fn iso_drift(&self, imu: &ImuParameters, count: u32) -> Result<IsoDrift, BeliefError> {
         let largest = match self.alone(&imu.times([NONE, 1.0, 1.0, 1.0]), 3, 1.0)? {
+            // At the largest itself nothing is left for the other intensity: the end of the curve would be
+            // zero.
             Answer::AtMost(bias) => 0.99 * bias,
             Answer::Any | Answer::Never => imu.values[3],
         };

@@ -10,9 +10,9 @@ use crate::simulation::lincov::{Crossing, DRIFT, NamedSource, times};
 /// A part of an IMU's noise.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Group {
-    /// Whose.
+    /// The sensor.
     pub sensor: Sensor,
-    /// Whether it is what is correlated, or what is new in every sample.
+    /// Whether it is the correlated noise, or the noise that is new in every sample.
     pub correlated: bool,
 }
 
@@ -47,6 +47,7 @@ impl Group {
         for channel in Channel::ALL.into_iter().filter(|c| c.sensor == self.sensor) {
             for process in &mut changed.axes[channel.index()].processes {
                 if self.includes(self.sensor, process.kind()) {
+                    // The factor is on standard deviations, the parameter a variance.
                     *process = times(process, factor * factor, model.rate_hz);
                 }
             }
@@ -55,10 +56,10 @@ impl Group {
     }
 }
 
-/// What a part of an IMU's noise does to a limit.
+/// The effect of a part of an IMU's noise on a limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GroupMargin {
-    /// Which part.
+    /// The part.
     pub group: Group,
     /// Its share in the mean square of what is limited.
     pub share: f64,
@@ -84,7 +85,7 @@ pub struct Margins {
 const RANGE: f64 = 9.0;
 
 impl Margins {
-    /// Of the filter that knows the model.
+    /// The margins of the filter that knows the model.
     ///
     /// # Errors
     /// When the model has no such filter.
@@ -112,6 +113,8 @@ impl Margins {
             };
             let (ln, left) =
                 Crossing { bounds: (-RANGE, RANGE), step: 0.7, exact: 1e-3 }.from(0.0, margin)?;
+            // A value left at a bound is no crossing: with this part without noise, or with any, the limit
+            // stays where it is.
             let factor = (left.abs() <= 1e-2).then(|| ln.exp());
             groups.push(GroupMargin { group, share: square / total, factor });
         }

@@ -45,16 +45,16 @@ impl Quantity {
 /// A quantity and the most it may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limit {
-    /// Which.
+    /// The quantity.
     pub quantity: Quantity,
-    /// How much (its unit).
+    /// Its largest value allowed (m or degrees).
     pub most: f64,
 }
 
 /// The limit that is the hardest to keep, and where.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Worst {
-    /// Which limit.
+    /// The limit.
     pub limit: Limit,
     /// The error there.
     pub value: f64,
@@ -66,6 +66,8 @@ impl Worst {
     /// Logarithm of limit over error: above 0 there is a reserve.
     #[must_use]
     pub fn margin(&self) -> f64 {
+        // In logarithms limits of different units compare, and the margin is nearly linear in the logarithm
+        // of an intensity.
         (self.limit.most / self.value).ln()
     }
 
