@@ -113,16 +113,18 @@ impl ImuSettings {
 pub(crate) struct Defects {
     /// Turn-on bias of accelerometer and gyroscope (m/s², rad/s).
     pub bias: [DVec3; 2],
-    /// What is added to the true values, times these: scale factors on the diagonal, misalignment beside it.
+    /// Error per unit of the true sample (1, rad): scale factors on the diagonal, misalignments beside it.
     pub matrix: [DMat3; 2],
 }
 
 impl Defects {
-    /// Those of run `key.run`.
+    /// The defects of run `key.run`, drawn from their standard deviations.
     #[must_use]
     pub(crate) fn draw(settings: &ImuSettings, key: StreamKey<'_>) -> Self {
         let defects_of = |sensor: Sensor| {
             let source = format!("{}.defects", sensor.name());
+            // A stream for each defect, drawn whether its deviation is zero or not: one setting changes no
+            // other number.
             let normals = |process: &'static str, n: usize| -> Vec<f64> {
                 let mut generator = StreamKey { source: &source, process, ..key }.generator();
                 (0..n).map(|_| StandardNormal.sample(&mut generator)).collect()
@@ -130,6 +132,7 @@ impl Defects {
             let (bias_sigma, ppm) = settings.deviations(sensor);
             let bias = DVec3::from_slice(&normals("turn_on_bias", 3)) * bias_sigma;
             let mut matrix = DMat3::from_diagonal(DVec3::from_slice(&normals("scale", 3)) * (ppm * 1e-6));
+            // Six numbers, not three: the axes of a triad need not be orthogonal to each other.
             let angles = normals("misalignment", 6);
             for (k, angle) in angles.iter().enumerate() {
                 // row k/2 takes of the other two columns
@@ -142,7 +145,7 @@ impl Defects {
         Self { bias: [accel.0, gyro.0], matrix: [accel.1, gyro.1] }
     }
 
-    /// What they add to a true sample: accelerometer, gyroscope.
+    /// The error of a true sample, bias + matrix · sample: accelerometer (m/s²), gyroscope (rad/s).
     #[must_use]
     pub(crate) fn error(&self, truth: &ImuSample) -> [DVec3; 2] {
         let [accel, gyro] = self.matrix;

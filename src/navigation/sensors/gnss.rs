@@ -94,7 +94,7 @@ struct Correlated {
     stream: Generator,
     phi: f64,
     sigma: f64,
-    /// None before the first epoch.
+    /// The error at the last epoch (m); none before the first.
     value: Option<f64>,
 }
 
@@ -103,6 +103,7 @@ impl Correlated {
         if self.sigma == 0.0 {
             return 0.0;
         }
+        // The first value has the stationary deviation; later ones phi e + √(1 − phi²) σ w, which keeps it.
         let fresh = self.sigma * normal(&mut self.stream);
         let innovation = (1.0 - self.phi * self.phi).sqrt();
         let value = self.value.map_or(fresh, |before| self.phi * before + innovation * fresh);
@@ -119,6 +120,7 @@ impl GnssNoise {
         let streams = COMPONENTS.map(|process| StreamKey { source: "gnss", process, ..key }.generator());
         let velocity = settings.vel_sigma_m_s.unwrap_or([0.0; 3]);
         let sigma = std::array::from_fn(|i| if i < 3 { settings.pos_sigma_m[i] } else { velocity[i - 3] });
+        // From one epoch of the receiver to the next, whatever the rate of the IMU.
         let phi = (-1.0 / (settings.rate_hz * settings.correlation_time_s)).exp();
         let correlated = std::array::from_fn(|i| {
             let process = ["correlated_n", "correlated_e", "correlated_d"][i];
@@ -130,6 +132,7 @@ impl GnssNoise {
 
     /// Position error (m) and velocity error (m/s) of the next fix, n.
     pub(crate) fn draw(&mut self) -> (DVec3, DVec3) {
+        // All six, also without a velocity: each has a stream of its own, and its deviation is then zero.
         let e: [f64; 6] = std::array::from_fn(|i| self.sigma[i] * normal(&mut self.streams[i]));
         let slow = DVec3::from_array(std::array::from_fn(|i| self.correlated[i].next()));
         (DVec3::new(e[0], e[1], e[2]) + slow, DVec3::new(e[3], e[4], e[5]))

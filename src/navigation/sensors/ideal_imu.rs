@@ -31,11 +31,14 @@ pub(crate) fn ideal_imu_at(trajectory: &Trajectory, t_s: f64, gravity: GravityMo
     let omega_ie_e = DVec3::new(0.0, 0.0, OMEGA_IE);
     let (lat, lon, h) = ecef_to_geodetic(k.r_e);
     let ((sin_lat, cos_lat), (sin_lon, cos_lon)) = (lat.sin_cos(), lon.sin_cos());
+    // Gravity along the normal of the ellipsoid, as the filter has it: its north component is left out on
+    // both sides.
     let down_e = -DVec3::new(cos_lat * cos_lon, cos_lat * sin_lon, sin_lat);
     let g_e = down_e * gravity_down(gravity, sin_lat, h);
     let q_e_b = k.q_b_e.conjugate();
     ImuSample {
         omega_ib_b: k.omega_eb_b + q_e_b * omega_ie_e,
+        // In e the centrifugal acceleration is part of g_e, hence no omega_ie × (omega_ie × r) here.
         f_ib_b: q_e_b * (k.a_e + 2.0 * omega_ie_e.cross(k.v_e) - g_e),
     }
 }
@@ -72,6 +75,7 @@ pub fn ideal_imu(
 fn mean(trajectory: &Trajectory, from: f64, to: f64, knots: &mut &[f64], gravity: GravityModel) -> ImuSample {
     let mut sum = ImuSample::default();
     let mut left = from;
+    // A cubic spline has a jump of its third derivative at a knot: quadrature across it would lose its order.
     while let Some((&knot, rest)) = knots.split_first().filter(|(knot, _)| **knot < to) {
         if knot > left {
             add_integral(&mut sum, trajectory, left, knot, gravity);
@@ -86,6 +90,7 @@ fn mean(trajectory: &Trajectory, from: f64, to: f64, knots: &mut &[f64], gravity
 
 fn add_integral(sum: &mut ImuSample, trajectory: &Trajectory, from: f64, to: f64, gravity: GravityModel) {
     let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+    // Three points are exact for polynomials of degree five within the piece.
     let node = 0.6_f64.sqrt();
     for (x, weight) in [(-node, 5.0 / 9.0), (0.0, 8.0 / 9.0), (node, 5.0 / 9.0)] {
         let sample = ideal_imu_at(trajectory, middle + half * x, gravity);

@@ -109,6 +109,8 @@ impl Truth<'_> {
         match self {
             Self::Model(_) => None,
             Self::Static(recordings) => {
+                // By length, not by count: windows that overlap share samples, and a fraction of a window is
+                // worth its fraction.
                 Some(recordings.iter().map(|r| r.len() as f64).sum::<f64>() / samples.max(1) as f64)
             }
         }
@@ -140,7 +142,7 @@ pub(crate) struct ImuErrors<'a> {
 #[derive(Debug, Clone)]
 enum ChannelErrors<'a> {
     Synthesised(Box<Synthesizer>),
-    /// What is left of the window, and the level it started from.
+    /// The rest of the window, and the level from which the window started (m/s² or rad/s).
     Recorded(&'a [f64], f64),
 }
 
@@ -167,6 +169,8 @@ impl<'a> ImuErrors<'a> {
             ChannelErrors::Synthesised(synthesizer) => synthesizer.fill(out),
             ChannelErrors::Recorded(left, level) => {
                 let (now, later) = left.split_at(out.len());
+                // The level of the window's start, not its mean: a mean over the window would know the
+                // future, and hold the random walk down at both ends.
                 out.iter_mut().zip(now).for_each(|(error, sample)| *error = sample - *level);
                 *left = later;
             }
@@ -184,7 +188,7 @@ pub(crate) struct LaneErrors<'a> {
 }
 
 impl<'a> LaneErrors<'a> {
-    /// Of at most eight runs; the lanes beyond them are without error.
+    /// The errors of at most eight runs; lanes beyond them are without error.
     #[must_use]
     pub(crate) const fn new(runs: Vec<ImuErrors<'a>>) -> Self {
         Self { runs, block: Vec::new(), channel: Vec::new() }
@@ -196,6 +200,8 @@ impl<'a> LaneErrors<'a> {
         self.channel.resize(n, 0.0);
         for (lane, errors) in self.runs.iter_mut().enumerate() {
             for channel in Channel::ALL {
+                // A stretch of one channel at a time: a process is cheapest to synthesise along time; the
+                // lanes come afterwards.
                 errors.fill(channel, &mut self.channel);
                 let (sensor, axis) = (channel.sensor as usize, channel.axis as usize);
                 for (sample, value) in self.block.iter_mut().zip(&self.channel) {

@@ -10,7 +10,7 @@ use crate::rng::StreamKey;
 use crate::wavelet::haar;
 use rand::RngExt;
 
-/// Recordings and how long their levels are best averaged.
+/// Recordings, and the averaging times that tell their levels best.
 #[derive(Debug, Clone)]
 pub struct Windows<'a> {
     recordings: &'a [Recording],
@@ -20,7 +20,7 @@ pub struct Windows<'a> {
 }
 
 impl<'a> Windows<'a> {
-    /// Of recordings that have all six channels.
+    /// The windows of recordings that have all six channels.
     pub(super) fn new(recordings: &'a [Recording]) -> Self {
         let spans_of = |recording: &Recording| {
             Channel::ALL.map(|channel| recording.signal(channel).map_or(0, |s| best_span(&s.samples)))
@@ -45,12 +45,16 @@ impl<'a> Windows<'a> {
     fn place(&self, key: StreamKey<'_>, samples: usize) -> (usize, usize) {
         const GOLDEN: u64 = 0x9E37_79B9_7F4A_7C15; // (√5 − 1)/2 in units of 2⁻⁶⁴
         let shift: u64 = StreamKey { run: 0, source: "imu", process: "window", ..key }.generator().random();
+        // Integers wrap as fractions do modulo 1, without the rounding that k·(√5 − 1)/2 has for large k.
         let point = shift.wrapping_add(key.run.wrapping_mul(GOLDEN));
         let total: f64 = self.recordings.iter().map(|r| r.len() as f64).sum();
+        // The upper 53 bits: as many as a double holds, so that the fraction stays below 1.
         let mut at = (point >> 11) as f64 / (1_u64 << 53) as f64 * total;
         for (index, recording) in self.recordings.iter().enumerate() {
             let length = recording.len() as f64;
             if at < length || index + 1 == self.recordings.len() {
+                // Scaled to the possible starts rather than refused: a window never runs over the end of its
+                // recording.
                 let starts = recording.len() - samples + 1;
                 return (index, ((at / length * starts as f64) as usize).min(starts - 1));
             }
@@ -76,6 +80,8 @@ fn level_at(signal: &[f64], start: usize, span: usize) -> f64 {
     if span == 0 {
         return 0.0;
     }
+    // Centred on the start: a random walk gives this mean a quarter of the error variance of a one-sided one,
+    // and a drift no error at all.
     let first = start.saturating_sub(span / 2).min(signal.len() - span);
     signal[first..first + span].iter().sum::<f64>() / span as f64
 }

@@ -38,6 +38,8 @@ impl<'a> FixedData<'a> {
         match self.fixes {
             Fixes::Every { interval_s } => {
                 let since_start = (outage.start_s - self.span_s.0) / interval_s;
+                // The first fix not before the outage, at the earliest one interval after the start: there is
+                // no fix at the start itself.
                 let next = (since_start - 1e-6).ceil().max(1.0);
                 self.span_s.0 + next * interval_s < outage.end_s
             }

@@ -89,6 +89,8 @@ impl RandomOutages {
         let mut t = start_s + waiting.sample(&mut generator);
         while t < end_s {
             windows.push(Outage { start_s: t, end_s: t + self.duration_s });
+            // Waiting begins when fixes are back: the rate is that of outages per hour with fixes, and none
+            // overlap.
             t += self.duration_s + waiting.sample(&mut generator);
         }
         Ok(windows)

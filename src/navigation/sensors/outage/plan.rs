@@ -71,6 +71,8 @@ impl OutagePlan {
             }
         }
         let windows = self.windows(data.span_s, seed)?;
+        // Every fixed window lies on the data by now: fewer windows than were asked for can only come of a
+        // union.
         if self.fixed.len() > windows.len() {
             remarks.push(OutageRemark::United);
         }
@@ -106,6 +108,8 @@ fn united(mut windows: Vec<Outage>, (start_s, end_s): (f64, f64)) -> Vec<Outage>
         let cut = Outage { start_s: window.start_s.max(start_s), end_s: window.end_s.min(end_s) };
         match united.last_mut() {
             _ if cut.start_s >= cut.end_s => {}
+            // Touching counts as overlapping: the first fix after the one is the first that the other
+            // withholds.
             Some(last) if cut.start_s <= last.end_s => last.end_s = last.end_s.max(cut.end_s),
             _ => united.push(cut),
         }
