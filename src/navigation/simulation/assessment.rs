@@ -32,7 +32,7 @@ impl Assessment {
         ekf.p.log_density(std::array::from_fn(|i| i), self.navigation)
     }
 
-    /// Of the first `live` lanes; the others are zero.
+    /// The assessment of the first `live` lanes against the reference; the other lanes are zero.
     pub(super) fn of(ekf: &Ekf, live: usize, reference: &NavState) -> Self {
         let jacobian = RollPitchYaw::from_quat(reference.q_b_n).jacobian_of_psi_n();
         let mut found = Self {
@@ -55,6 +55,8 @@ impl Assessment {
             }
             found.att_error_deg[lane] = error.psi_n.length() / DEG;
         }
+        // With psi_n (rad), not with roll, pitch, yaw: NEES is invariant under the Jacobian, which is
+        // singular at pitch ±90°.
         found.nees = ekf.p.normalised_square(std::array::from_fn(|i| i), found.navigation);
         found
     }
@@ -90,6 +92,8 @@ impl EpochLanes {
             error: found.error,
             att_error_deg: found.att_error_deg,
             nees: found.nees,
+            // The filter's own ellipsoid at the level: eᵀ P⁻¹ e below the χ² quantile of six degrees of
+            // freedom.
             covered: std::array::from_fn(|lane| coverage[lane] <= plan.coverage_quantile),
         }
     }
@@ -133,15 +137,21 @@ struct ReportedError {
 fn reported_error(estimate: &NavState, truth: &NavState) -> ReportedError {
     let r = ned_difference(truth, estimate.lat, estimate.lon, estimate.h);
     let v = estimate.v_n - truth.v_n;
+    // C_est = (I + [psi×]) C_true, hence the estimate on the left: the same error vector as the filter's PSI
+    // block.
     let psi_n = rotation_vector(estimate.q_b_n * truth.q_b_n.inverse());
     let jacobian = RollPitchYaw::from_quat(truth.q_b_n).jacobian_of_psi_n();
+    // Through the Jacobian, not as a difference of Euler angles: linear as the filter's own deviation is, and
+    // no angle wraps at ±180°.
     let angles = jacobian.map(|row| row.dot(psi_n) / DEG);
     ReportedError { values: [r.x, r.y, r.z, v.x, v.y, v.z, angles[0], angles[1], angles[2]], psi_n }
 }
 
-/// The logarithm of a rotation, exact for small ones too.
+/// The rotation vector of a rotation (rad), the logarithm, exact for small ones too.
 fn rotation_vector(q: DQuat) -> DVec3 {
+    // q and −q are the same rotation: the one with w ≥ 0 is the shorter way.
     let (v, w) = if q.w < 0.0 { (-q.xyz(), -q.w) } else { (q.xyz(), q.w) };
     let sine = v.length();
+    // Below it atan2(s, w)/s is 1 to rounding, and 0/0 is avoided.
     if sine < 1e-12 { v * 2.0 } else { v * (2.0 * sine.atan2(w) / sine) }
 }

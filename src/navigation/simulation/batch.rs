@@ -41,8 +41,12 @@ pub fn run_batch(plan: &Plan<'_>, first: u64, live: usize) -> Vec<Batch> {
     let mut done = 0;
     for (index, event) in plan.events.iter().enumerate() {
         let samples = &plan.ideal[done..event.sample];
+        // At every epoch of the receiver, also within outages, so that an outage changes no random number
+        // after it.
         let fix = event.gnss_epoch.then(|| source.fix(plan, event));
         let height = source.height(event);
+        // Drawn once for all candidates: their errors are paired, and ratios between them scatter far less
+        // than each.
         let errors = source.errors(samples);
         for candidate in &mut candidates {
             advance(&mut candidate.ekf, samples, errors);
@@ -118,8 +122,10 @@ impl<'a> Source<'a> {
         let mut fix = exact_fix(plan, event);
         for (lane, noise) in self.gnss.iter_mut().enumerate() {
             let (position, speed) = noise.draw();
+            // Metres to angles at the antenna: the white error is small enough for one set of radii.
             fix.lat[lane] += position.x / (r.meridian + antenna.z);
             fix.lon[lane] += position.y / ((r.transverse + antenna.z) * antenna.x.cos());
+            // The error is down, the height up.
             fix.h[lane] -= position.z;
             if let Some(v_n) = &mut fix.v_n {
                 v_n.set_lane(lane, velocity + speed);
@@ -157,6 +163,8 @@ pub(super) fn nominal_start(plan: &Plan<'_>, key: StreamKey<'_>) -> NavState {
     let dr = draw("position", initial.pos_sigma_m);
     let dv = draw("velocity", initial.vel_sigma_m_s);
     let angles = draw("attitude", initial.att_sigma_deg.map(|s| s * DEG));
+    // Drawn as roll, pitch, yaw and brought to psi_n by the map that makes the filter's covariance: the NEES
+    // at the start is a χ² of nine degrees of freedom, to first order.
     let psi = linalg::to_glam(&(psi_of_angles(truth.q_b_n) * linalg::to_nalgebra(angles)));
     let r = radii(truth.lat.sin());
     NavState {
@@ -177,7 +185,7 @@ struct Candidate {
     ekf: Ekf,
     live: usize,
     trace: Vec<EpochLanes>,
-    /// For each outage and run.
+    /// A record for each outage and run.
     outages: Vec<[OutageRecord; LANES]>,
     /// For each run: sum of the NIS of the fixes used, their number, fixes refused.
     nis: [(f64, u64, u64); LANES],
@@ -212,6 +220,7 @@ impl Candidate {
         fix: Option<&Fix>,
         height: Option<&Lanes>,
     ) {
+        // Before the fix of the same instant: the end of an outage is where the error is largest.
         self.end_outages(plan, index, event);
         if let Some(fix) = fix {
             self.use_fix(fix);
@@ -264,10 +273,12 @@ impl Candidate {
     /// Means over outages, and when the horizontal error is back within the receiver's own.
     fn follow_outages(&mut self, plan: &Plan<'_>, event: &Event, epoch: &EpochLanes) {
         let [n, e, _] = plan.experiment.gnss.pos_sigma_m;
+        // The deviation of a single fix: an error below it can no longer be told from the receiver's.
         let receiver = n.hypot(e);
         let outages = plan.experiment.outages.iter().zip(&plan.outages);
         for ((outage, (reports, _)), records) in outages.zip(&mut self.outages) {
             let inside = outage.withholds(event.t_s);
+            // The slack of `Outage::withholds`, so that the fix at the end itself is after the outage.
             let after = event.t_s + 1e-9 - outage.end_s;
             for lane in 0..self.live {
                 let record = &mut records[lane];
@@ -284,8 +295,11 @@ impl Candidate {
         }
     }
 
-    /// `fan`: reports at which the horizontal error is kept.
+    /// Sums over the runs that did not diverge, and a record of each run; `fan` lists the reports at which its
+    /// horizontal error is kept.
     fn finish(self, first: u64, fan: &[usize]) -> Batch {
+        // Looked for at the reports alone: what has become NaN stays NaN, so that a divergence between two
+        // reports is seen at the next.
         let diverged: [bool; LANES] = std::array::from_fn(|lane| {
             let finite = |e: &EpochLanes| {
                 e.nees[lane].is_finite() && e.see.iter().chain(&e.error).all(|value| value[lane].is_finite())
@@ -299,6 +313,7 @@ impl Candidate {
         let horizontal = |lane: usize| {
             let fan = if first + (lane as u64) < FAN_RUNS { fan } else { &[] };
             let errors = fan.iter().map(|report| &self.trace[*report].error);
+            // f32: seven digits for a quantile plot, at half of the memory of 100 000 runs.
             errors.map(|error| error[0][lane].hypot(error[1][lane]) as f32).collect()
         };
         let record = |lane: usize| RunRecord {

@@ -98,7 +98,7 @@ pub enum ExperimentError {
         imu_hz: f64,
         /// Rate of the fixes (Hz).
         fix_hz: f64,
-        /// Whose.
+        /// The sensor: GNSS or the barometer.
         what: &'static str,
     },
 }
@@ -261,11 +261,13 @@ fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, E
     let Experiment { trajectory, rate_hz, gnss, .. } = *experiment;
     let per_fix = samples_per(rate_hz, gnss.rate_hz, "GNSS")?;
     let baro = experiment.baro.map(|b| samples_per(rate_hz, b.rate_hz, "the barometer")).transpose()?;
+    // Rounded for each second anew: a rate that is no whole number would drift against the seconds.
     let reports = (0_u32..).map(|s| (f64::from(s) * rate_hz).round() as usize);
     let reports: Vec<usize> = reports.take_while(|k| *k <= samples).collect();
     let mut all = reports.clone();
     all.extend((per_fix..=samples).step_by(per_fix));
     all.extend(baro.iter().flat_map(|step| (*step..=samples).step_by(*step)));
+    // The last sample is an event, so that an outage that lasts to the end has an end.
     all.push(samples);
     all.sort_unstable();
     all.dedup();
@@ -275,6 +277,8 @@ fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, E
         if reference.lat.abs() > MAX_LATITUDE {
             return Err(ExperimentError::Pole { t_s, lat_deg: reference.lat / DEG });
         }
+        // None at the very start: the initial deviations are those of a vehicle that GNSS has helped to align
+        // already.
         let gnss_epoch = sample > 0 && sample.is_multiple_of(per_fix);
         let withheld = experiment.outages.iter().any(|o| o.withholds(t_s));
         Ok(Event {
@@ -294,6 +298,8 @@ fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, E
 /// IMU samples from one measurement to the next.
 fn samples_per(imu_hz: f64, fix_hz: f64, what: &'static str) -> Result<usize, ExperimentError> {
     let samples = imu_hz / fix_hz;
+    // Relative to the count: a rate that was written with seven digits or more still counts as a whole
+    // divisor.
     if samples < 0.5 || (samples - samples.round()).abs() > 1e-6 * samples {
         return Err(ExperimentError::FixBetweenSamples { imu_hz, fix_hz, what });
     }
@@ -309,6 +315,8 @@ fn antenna(experiment: &Experiment<'_>, t_s: f64, reference: &NavState) -> (DVec
     }
     let k = experiment.trajectory.kinematics(t_s);
     let arm_e = k.q_b_e * arm_b;
+    // Exact, through e, where the filter linearises: what it neglects shows as an error of the filter, not of
+    // the truth.
     let (lat, lon, h) = crate::earth::ecef_to_geodetic(k.r_e + arm_e);
     let swing_n = reference.q_b_n * k.omega_eb_b.cross(arm_b);
     (DVec3::new(lat, lon, h), reference.v_n + swing_n)

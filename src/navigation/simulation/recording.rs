@@ -55,6 +55,7 @@ fn inertial(plan: &Plan<'_>, key: StreamKey<'_>) -> Vec<ImuIncrement> {
         errors.fill(channel, &mut signal);
         signal
     };
+    // One stream a channel: drawn channel by channel or sample by sample, the numbers are those of the run.
     let signals = Channel::ALL.map(|channel| errors_of(channel, &mut errors));
     let defects = Defects::draw(plan.experiment.defects, key);
     let triad = |sensor: Sensor, k: usize| {

@@ -54,12 +54,16 @@ impl Descent<'_> {
             beside[i] += DIFFERENCE;
             ((self.cost)(&beside) - cost) / DIFFERENCE
         };
+        // One-sided: half the evaluations of central differences, each of which is a pass along the whole
+        // track.
         (0..x.len()).into_par_iter().map(slope).collect()
     }
 
     /// The quasi-Newton step among the variables that no bound holds.
     fn direction(&self, x: &[f64], gradient: &[f64], inverse: &Square) -> Vec<f64> {
         let (low, high) = self.bounds;
+        // At a bound with the descent pointing outwards: such a variable would only shorten the step of the
+        // others.
         let held: Vec<bool> = x
             .iter()
             .zip(gradient)
@@ -73,6 +77,7 @@ impl Descent<'_> {
         let mut step = free(&downhill);
         let largest = step.iter().fold(0.0, |m: f64, s| m.max(s.abs()));
         if largest > MAX_STEP {
+            // All shortened alike, which keeps the direction: no factor changes by more than e in one step.
             step.iter_mut().for_each(|s| *s *= MAX_STEP / largest);
         }
         step
@@ -85,6 +90,7 @@ impl Descent<'_> {
             let moved = |(x, s): (&f64, &f64)| (x + share * s).clamp(self.bounds.0, self.bounds.1);
             let next: Vec<f64> = x.iter().zip(step).map(moved).collect();
             let next_cost = (self.cost)(&next);
+            // Armijo's condition with the customary 1e-4: any decrease in proportion to the step will do.
             if next_cost < cost + 1e-4 * share * slope {
                 return Some((next, next_cost));
             }
@@ -98,9 +104,11 @@ impl Descent<'_> {
 /// along the step it stays.
 fn update(inverse: &mut Square, s: &[f64], y: &[f64]) {
     let sy = dot(s, y);
+    // sᵀ y > 0 is what keeps the inverse Hessian positive definite, and so the next direction downhill.
     if sy <= 1e-12 {
         return;
     }
+    // BFGS: H⁺ = (I − ρ s yᵀ) H (I − ρ y sᵀ) + ρ s sᵀ.
     let rho = 1.0 / sy;
     let mut left = diagonal(s.len(), 1.0);
     for (row, s) in left.iter_mut().zip(s) {

@@ -50,7 +50,7 @@ pub(super) struct Source {
     pub(super) position: Option<usize>,
 }
 
-/// Nothing at all.
+/// A source that makes no error.
 const NONE: Source = Source {
     signal: 0,
     before: 0.0,
@@ -93,6 +93,7 @@ impl Source {
     /// A state that is nothing but the last innovation of standard deviation `sigma`: the error of a sample
     /// is `fresh`·w + `before`·(the w of the sample before).
     fn memory(signal: usize, sigma: f64, fresh: f64, before: f64) -> Self {
+        // `before` multiplies the state, which carries sigma itself; `fresh` multiplies w of variance 1.
         let (before, fresh) = (before, fresh * sigma);
         Self { signal, before, fresh, decay: 0.0, drive: sigma, initial: sigma * sigma, ..NONE }
     }
@@ -104,6 +105,7 @@ impl Source {
 
     /// A slope that is the same in every run. The states of the truth are negated, and so is its mean.
     pub(super) fn drift(signal: usize, slope: f64) -> Self {
+        // No variance: a deterministic slope enters the mean alone.
         Self { initial: 0.0, level: -slope, ..Self::ramp(signal, slope) }
     }
 
@@ -114,12 +116,12 @@ impl Source {
         Self { decay: phi, drive, initial: sigma * sigma, position: Some(component), ..NONE }
     }
 
-    /// What a unit of it is in the error of the last of so many samples.
+    /// Error of the last of `samples` samples per unit of the state.
     pub(super) fn share(&self, samples: f64) -> f64 {
         self.after + self.ramp * samples
     }
 
-    /// Over `samples` samples, exactly.
+    /// What the source does over a step of `samples` samples, exactly.
     pub(super) fn over(&self, samples: u32) -> StepOfSource {
         let n = f64::from(samples);
         let mut step = StepOfSource {
@@ -133,6 +135,8 @@ impl Source {
         };
         // backwards: what a unit of s before the remaining samples adds to their sum, and leaves of itself
         for _ in 0..samples {
+            // The w of this sample: in its own error by `fresh` and `after`·`drive`, in all later ones
+            // through the state.
             let in_sum = self.fresh + self.drive * (self.after + step.mean);
             let in_state = self.drive * step.decay;
             step.q_mean += in_sum * in_sum;
@@ -141,6 +145,7 @@ impl Source {
             step.mean = self.before + self.decay * (self.after + step.mean);
             step.decay *= self.decay;
         }
+        // The ramp counts samples 1 … n of the step, whose mean is (n + 1)/2.
         step.mean = step.mean / n + self.ramp * 0.5 * (n + 1.0);
         step.q_mean /= n * n;
         step.q_cross /= n;
@@ -234,7 +239,7 @@ impl Sources {
         states
     }
 
-    /// Those of a noise model, each process exactly.
+    /// The sources of a noise model, each process exactly.
     pub(super) fn of_model(model: &Model) -> Self {
         let mut sources = Self::default();
         for channel in Channel::ALL {
@@ -251,6 +256,8 @@ impl Sources {
                 self.white[signal] += p.sigma2();
                 return;
             }
+            // U_k − U_{k−1}: the last U is a state, because the sum over a step telescopes. As white noise it
+            // would grow.
             Process::Quantization(p) => Source::memory(signal, p.q2().sqrt(), 1.0, -1.0),
             Process::Ma1(p) => Source::memory(signal, p.sigma2().sqrt(), 1.0, p.theta()),
             Process::Ar1(p) => Source::bias(signal, p.phi(), p.sigma2(), p.variance()),

@@ -31,12 +31,13 @@ pub(super) struct Joint {
 pub(super) struct Inputs {
     pub(super) b: Vec<StepOfSource>,
     pub(super) t: Vec<StepOfSource>,
-    /// Variance of the mean over the step, all that is new in it.
+    /// Variance of the part of a signal's mean over the step that is new in it (units²).
     q_mean: [f64; SIGNALS],
 }
 
 impl Inputs {
-    /// `b` in the filter's hands, `t` in the world's; `white` of the side that makes the errors.
+    /// The steps of the filter's states `b` and of the states `t` of the truth; white noise belongs to the side that
+    /// makes the errors.
     pub(super) fn new(b: &Sources, t: &Sources, samples: u32) -> Self {
         let steps_of =
             |s: &Sources| -> Vec<StepOfSource> { s.states.iter().map(|x| x.over(samples)).collect() };
@@ -93,6 +94,7 @@ impl Joint {
             let mut u = [0.0; SIGNALS];
             inputs.b.iter().zip(&self.xb).for_each(|(s, x)| u[s.signal] += mean(s) * x[j]);
             inputs.t.iter().zip(&self.xt).for_each(|(s, x)| u[s.signal] += mean(s) * x[j]);
+            // Into a copy: the cross terms below still need P before the step.
             gx[j] = step.map(&self.xx[j], &u);
         }
         for j in 0..nb {
@@ -104,6 +106,7 @@ impl Joint {
         for j in 0..nt {
             let mut u = [0.0; SIGNALS];
             inputs.b.iter().enumerate().for_each(|(i, s)| u[s.signal] += mean(s) * self.bt[i * nt + j]);
+            // The states t are independent: of column j only its own variance feeds its signal.
             u[inputs.t[j].signal] += mean(&inputs.t[j]) * self.tt[j];
             self.xt[j] = step.map(&self.xt[j], &u);
         }
@@ -115,8 +118,10 @@ impl Joint {
             inputs.t.iter().zip(&self.xt).for_each(|(s, x)| u[s.signal] += mean(s) * x[i]);
             self.xx[i] = step.map(&row, &u);
         }
+        // The states themselves last: the maps above are of their values at the beginning of the step.
         self.step_biases(step, inputs);
         self.elapsed += f64::from(step.samples);
+        // What is new in the mean input of a signal acts through one column of B: Q = Σ q b bᵀ.
         for (q, column) in inputs.q_mean.iter().zip(&step.b).filter(|(q, _)| **q != 0.0) {
             for j in 0..NAV {
                 add_scaled(&mut self.xx[j], q * column[j], column);
@@ -128,6 +133,7 @@ impl Joint {
         let (nb, nt) = (inputs.b.len(), inputs.t.len());
         let decay = |x: &mut Nav, s: &StepOfSource| {
             x.iter_mut().for_each(|v| *v *= s.decay);
+            // The w of the step moves the mean input and the state together: cov(x, s) = b q_cross.
             add_scaled(x, s.q_cross, &step.b[s.signal]);
         };
         self.xb.iter_mut().zip(&inputs.b).for_each(|(x, s)| decay(x, s));
@@ -171,6 +177,7 @@ impl Joint {
             let dot = |h: &[f64], c: &[f64]| -> f64 { h.iter().zip(c).map(|(h, c)| h * c).sum() };
             s += dot(&hb, &b) + dot(&ht, &t);
         }
+        // hᵀ P h + r; x has by now its part from b and t.
         s += product(&x);
         Innovation { x, b, t, s }
     }
@@ -179,6 +186,8 @@ impl Joint {
     pub(super) fn correct(&mut self, y: &Innovation, gain: &Gain) {
         let (nb, nt) = (self.xb.len(), self.xt.len());
         // P − k cᵀ − c kᵀ + k s kᵀ, by (s k − c) kᵀ − k cᵀ
+        // With the optimal gain s k = c and the first term is zero. Here c is of the truth and k of the
+        // filter.
         let rest_x: Nav = std::array::from_fn(|i| y.s * gain.x[i] - y.x[i]);
         for j in 0..NAV {
             add_scaled(&mut self.xx[j], gain.x[j], &rest_x);
@@ -192,6 +201,8 @@ impl Joint {
                 self.bb[j * nb + i] += rest * gain.b[i] - gain.b[j] * y.b[i];
             }
             for i in 0..nt {
+                // t has no gain: a measurement does not change what truly makes the errors, only the
+                // estimate's relation to it.
                 self.bt[j * nt + i] -= gain.b[j] * y.t[i];
             }
         }

@@ -21,6 +21,7 @@ impl Mean {
     /// Errors that are zero at the start, with the estimates of `b` and the truth's states `t`; none where all of
     /// them have mean zero and so has everything else.
     pub(super) fn new(b: &Sources, t: &Sources) -> Option<Self> {
+        // A mean is rare (drifts of the truth): without one the whole propagation is spared.
         t.states.iter().any(|s| s.level != 0.0).then(|| Self {
             x: [0.0; NAV],
             b: vec![0.0; b.states.len()],
@@ -37,6 +38,7 @@ impl Mean {
         let mut error = [0.0; SIGNALS];
         let mut add = |states: &mut [f64], steps: &[StepOfSource]| {
             for (state, s) in states.iter_mut().zip(steps) {
+                // With the state at the beginning of the step, as in the covariance; it decays afterwards.
                 error[s.signal] += (s.mean + s.ramp * elapsed) * *state;
                 *state *= s.decay;
             }

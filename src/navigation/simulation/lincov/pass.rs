@@ -26,8 +26,8 @@ pub struct Consistency {
     pub rmse: [f64; REPORTED],
     /// Expected NEES: tr(P⁻¹ P_true) over position, velocity and attitude; 9 for a filter that is right.
     pub nees: f64,
-    /// tr(P⁻¹ P_true) − ln det(P⁻¹ P_true) − 9: twice the Kullback-Leibler divergence of the believed law of
-    /// the errors from the true one. 0 for a filter that is right.
+    /// tr(P⁻¹ P_true) − ln det(P⁻¹ P_true) − 9: twice the Kullback-Leibler divergence KL(true ‖ believed) of
+    /// normal laws with these second moments. 0 for a filter that is right.
     pub divergence: f64,
     /// Expected logarithm of the density of the true error under the filter's belief (nats, of m, m/s, rad).
     pub log_density: f64,
@@ -100,12 +100,12 @@ pub struct ErrorLaw {
 pub struct FilterPass<'a> {
     track: &'a Track,
     believed: Sources,
-    /// Of every scalar measurement in sequence, with the variance that the filter states of its innovation.
+    /// The gain of every scalar measurement, in sequence, and the variance that the filter states for its innovation.
     gains: Vec<(Gain, f64)>,
     reports: Vec<[Nav; NAV]>,
     /// Standard deviations that the filter states of the biases, at every report.
     biases: Vec<[f64; BIASES]>,
-    /// Of each outage.
+    /// The covariance that the filter states at the end of each outage.
     ends: Vec<[Nav; NAV]>,
 }
 
@@ -123,6 +123,7 @@ impl<'a> FilterPass<'a> {
                 filter.step(step, inputs.over(step.samples));
             }
             done = mark.steps;
+            // Before the measurements of the same instant, as the runs have it.
             mark.outages.iter().for_each(|outage| ends[*outage] = filter.xx);
             for row in &mark.rows {
                 let y = filter.innovation(row, row.r);
@@ -149,6 +150,8 @@ impl<'a> FilterPass<'a> {
     #[must_use]
     pub fn sigma_at_ends(&self) -> Vec<[f64; REPORTED]> {
         let mut sigmas = vec![[0.0; REPORTED]; self.track.outages];
+        // What the filter states needs no true errors: these are a stand-in for the conversion to the
+        // reported states.
         let none = Errors {
             joint: Joint::new([[0.0; NAV]; NAV], &Sources::default(), &Sources::default()),
             mean: None,
@@ -218,9 +221,12 @@ impl<'a> FilterPass<'a> {
             }
             fixes += u64::from(mark.fix);
             for (row, (gain, believed)) in mark.rows.iter().zip(&mut gains) {
+                // Without its noise where the source under study is another one: covariances of independent
+                // sources add.
                 let y = errors.joint.innovation(row, if truth.has_noise(row.what) { row.r } else { 0.0 });
                 let mean = errors.mean.as_ref().map_or(0.0, |mean| mean.innovation(row));
                 if row.what != Measured::Height {
+                    // The gate and the NIS of runs are of fixes; a height of the barometer is none.
                     nis += (y.s + mean * mean) / believed;
                 }
                 errors.joint.correct(&y, gain);
@@ -338,6 +344,8 @@ impl Instant {
         let p = SMatrix::<f64, NAV, NAV>::from_fn(|i, j| self.believed[j][i]);
         let t = SMatrix::<f64, NAV, NAV>::from_fn(|i, j| moments[j][i]);
         let log_det = |l: SMatrix<f64, NAV, NAV>| 2.0 * l.diagonal().map(f64::ln).sum();
+        // One source alone need not move all nine states: P_true is then singular, its NEES finite, the
+        // divergence infinite.
         let (nees, believed, real) = match (p.cholesky(), t.cholesky()) {
             (Some(p), Some(t_factor)) => (p.solve(&t).trace(), log_det(p.l()), log_det(t_factor.l())),
             (Some(p), None) => (p.solve(&t).trace(), log_det(p.l()), f64::NEG_INFINITY),
@@ -351,6 +359,8 @@ impl Instant {
             rmse: self.rmse(),
             nees,
             divergence: nees - (real - believed) - dof,
+            // E ln N(x; 0, P) = −½ (E xᵀ P⁻¹ x + ln det P + n ln 2π), and the first term is the expected
+            // NEES.
             log_density: -0.5 * (nees + believed + dof * std::f64::consts::TAU.ln()),
         }
     }

@@ -55,7 +55,7 @@ pub enum Alike {
 }
 
 impl Alike {
-    /// Of an axis.
+    /// The first of the three factors that act on an axis.
     fn first_factor(self, channel: Channel) -> usize {
         let apart = self == Self::Level && channel.axis == Axis::Z;
         6 * channel.sensor as usize + if apart { 3 } else { 0 }
@@ -85,6 +85,8 @@ impl Search<'_> {
             belief.white[s][i] = white * ln[first].exp();
             let group = &mut belief.groups[s][0];
             group.innovation[i] *= ln[first + 1].exp();
+            // A factor on the correlation time T is 1/factor on κ = dt/T; in phi itself 0.9999 and 0.99999
+            // would hardly differ.
             let kappa = -(group.phi[i] - 1.0).ln_1p() * (-ln[first + 2]).exp();
             group.phi[i] = (-kappa).exp();
         }
@@ -125,9 +127,9 @@ const ENDS: f64 = 0.3;
 /// A ratio whose logarithm is this far from 0 begins to count for itself, with this weight.
 const OFF: f64 = 0.08;
 const OFF_WEIGHT: f64 = 0.3;
-/// Share of such states over the whole way in the cost.
+/// Weight in the cost of the states whose ratio is off over the whole drive.
 const WAY: f64 = 0.3;
-/// The same two of the mean NEES.
+/// The same for the mean NEES: the logarithm at which it begins to count, and its weight.
 const NEES_OFF: f64 = 0.04;
 const NEES_WEIGHT: f64 = 0.1;
 
@@ -141,12 +143,15 @@ fn cost(assessment: &Assessment) -> f64 {
         return ends;
     }
     let mean = |of: &dyn Fn(&Consistency) -> f64| reports.iter().map(of).sum::<f64>() / reports.len() as f64;
+    // Root mean square over the way, so that one bad minute is not hidden by an hour that is good.
     let ratios: f64 = (0..REPORTED).map(|i| steep(mean(&|c| c.ratio()[i].powi(2)).sqrt())).sum();
     let nees = (mean(&|c| c.nees) / NEES_DOF as f64).ln() / NEES_OFF;
     ends + WAY * (ratios + NEES_WEIGHT * nees.powi(4))
 }
 
 fn steep(ratio: f64) -> f64 {
+    // The fourth power: 8 % off cost 0.3, 4 % a sixteenth of that, 16 % sixteen times as much; in the
+    // logarithm, so that both directions count alike.
     OFF_WEIGHT * (ratio.ln() / OFF).powi(4)
 }
 
@@ -164,7 +169,7 @@ pub(super) fn divergence(assessment: &Assessment, beside: impl Fn(&Consistency) 
     ENDS * ends + (1.0 - ENDS) * all
 }
 
-/// White noise that the model has for certain.
+/// Long-run variance of the white and moving-average noise of the model (units² a sample).
 fn white_of(model: &Model, channel: Channel) -> f64 {
     let white = |p: &Process| match p {
         Process::White(p) => p.sigma2(),
@@ -204,6 +209,7 @@ pub fn drive(model: &Model, gnss: &GnssSettings, outages_s: &[f64]) -> Option<Tr
         vel_sigma_m_s: gnss.vel_sigma_m_s.map(|v| v.map(|s| s / often.sqrt())),
         ..gnss.clone()
     };
+    // The next multiple of the receiver's rate: every fix must meet a sample.
     let rate_hz = gnss.rate_hz * (DRIVE_HZ / gnss.rate_hz).ceil();
     let experiment = Experiment {
         trajectory: &trajectory,
@@ -244,6 +250,7 @@ fn path(duration_s: f64) -> Option<Trajectory> {
         accelerate(0.0, 14.0),
         straight(12.0),
     ];
+    // The sum of the durations above.
     let cycle_s = 158.0;
     let segment = |kind: &Kind| Segment { kind: kind.clone(), climb_m: 0.0, ramp_s: None };
     let cycles = (duration_s / cycle_s).ceil() as usize;

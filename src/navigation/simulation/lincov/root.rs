@@ -26,6 +26,7 @@ impl Crossing {
         if near.1.abs() <= self.exact {
             return Ok(near);
         }
+        // The function falls: a value above zero means that the crossing lies above.
         let mut step = self.step.copysign(near.1);
         let mut far = near;
         while far.1 * near.1 > 0.0 {
@@ -43,6 +44,8 @@ impl Crossing {
             }
             let middle = (near.0 * far.1 - far.0 * near.1) / (far.1 - near.1);
             let found = (middle, value(middle)?);
+            // Illinois: the end that stays is given half of its value, since plain regula falsi keeps one end
+            // for ever where the function is convex.
             near = if found.1 * far.1 < 0.0 { far } else { (near.0, 0.5 * near.1) };
             far = found;
         }

@@ -53,13 +53,15 @@ pub(super) struct Row {
 }
 
 impl Row {
-    /// How the measurement feels the state of a source beside what the navigation error has of it.
+    /// The coefficient of a source's state in the measurement, beside its part through the navigation error.
     pub(super) fn coefficient(&self, source: &Source) -> f64 {
         if let Some(component) = source.position {
             return f64::from(u8::from(self.what == Measured::Position(component)));
         }
         match place(source.signal) {
             (0, ..) => 0.0,
+            // The coefficient of the lever arm's velocity is per unit of the rate's error, and this is the
+            // error that the source has at the instant.
             (_, axis, None) => source.present() * self.h[NAV + axis],
             (_, axis, Some(by)) => source.present() * (self.h[NAV + axis] * self.omega_ib_b[by]),
         }
@@ -116,6 +118,8 @@ impl Track {
         let (mut steps, mut marks, mut done) = (Vec::new(), Vec::with_capacity(plan.events.len()), 0);
         for (index, event) in plan.events.iter().enumerate() {
             let samples = &plan.ideal[done..event.sample];
+            // Parts of equal length: what the noise processes do over a step is computed once for each length
+            // that occurs.
             let parts = samples.len().div_ceil(longest).max(1);
             for part in samples.chunks(samples.len().div_ceil(parts).max(1)) {
                 steps.push(line.step(part));
@@ -144,9 +148,11 @@ impl Track {
         let (mut steps, mut marks, mut done) = (Vec::new(), self.marks.clone(), 0);
         let mut reports = 0;
         for mark in &mut marks {
+            // Between marks alone: no step may reach over a measurement.
             steps.extend(self.steps[done..mark.steps].iter().cloned().reduce(|a, b| a.then(&b)));
             (done, mark.steps) = (mark.steps, steps.len());
             reports += usize::from(mark.report);
+            // One report in ten: reports enter the cost of a search as an average, and errors change slowly.
             mark.report &= reports % 10 == 0;
         }
         Self { steps, marks, ..self.clone() }
@@ -175,6 +181,7 @@ impl Linearisation {
     fn step(&mut self, samples: &[ImuSample]) -> Step {
         let unit = |i: usize| std::array::from_fn(|k| if i == k { 1.0 } else { 0.0 });
         let mut step = Step {
+            // Samples of the noise model's rate, which need not be the rate at which the motion is sampled.
             samples: (samples.len() as f64 * self.dt * self.noise_hz).round().max(1.0) as u32,
             m: std::array::from_fn(unit),
             b: [[0.0; NAV]; SIGNALS],
@@ -191,6 +198,8 @@ impl Linearisation {
                 age = 0.0;
             }
         }
+        // A measurement meets a covariance that has all of the Earth's terms, as `settle` gives it in the
+        // filter.
         if let Some(sample) = samples.last().filter(|_| age > 0.0) {
             step.apply(&EarthStep { terms: EarthTerms::at(&self.ins), dt: age }, sample, self.signals);
         }
@@ -225,6 +234,8 @@ impl Step {
         let none = [0.0; SIGNALS];
         let mut b = self.b.map(|column| next.map(&column, &none));
         for (sum, column) in b.iter_mut().flatten().zip(next.b.iter().flatten()) {
+            // The response to a constant input: that of the first part, carried through the second, and that
+            // of the second.
             *sum += column;
         }
         Self { samples: self.samples + next.samples, m: self.m.map(|column| next.map(&column, &none)), b }
@@ -240,6 +251,8 @@ impl Step {
             let (sensor, axis, by) = place(signal);
             let measured = [sample.f_ib_b, sample.omega_ib_b][sensor];
             let mut input = [zero, zero];
+            // Unit error of the signal: 1 for a bias, the true sample for a scale factor, that of another
+            // axis for a misalignment.
             input[sensor].0[axis] = by.map_or(1.0, |by| measured[by]);
             *column = flat(&map.apply(triples(column), input[0], input[1]));
         }
@@ -263,6 +276,7 @@ fn start(plan: &Plan<'_>) -> [Nav; NAV] {
         p[3 * R + i][3 * R + i] = initial.pos_sigma_m[i].powi(2);
         p[3 * V + i][3 * V + i] = initial.vel_sigma_m_s[i].powi(2);
         for j in 0..3 {
+            // J diag(σ²) Jᵀ with J from roll, pitch, yaw to psi_n.
             let angle = |k: usize| psi[(i, k)] * psi[(j, k)] * (initial.att_sigma_deg[k] * DEG).powi(2);
             p[3 * PSI + i][3 * PSI + j] = (0..3).map(angle).sum();
         }

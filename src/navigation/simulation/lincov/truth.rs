@@ -72,6 +72,7 @@ impl TruthSide {
     /// The sources that a filter believes in: its bias states instead of a model's processes.
     #[must_use]
     pub fn believed(experiment: &Experiment<'_>, belief: &Belief) -> Vec<NamedSource> {
+        // The filter believes in an uncertain start, also where the true one is perfect.
         let mut parts = beside_the_imu(experiment, true);
         for sensor in Sensor::ALL {
             parts.extend(believed_of(belief, sensor));
@@ -99,6 +100,7 @@ impl TruthSide {
 
 /// Start, receiver and barometer.
 fn beside_the_imu(experiment: &Experiment<'_>, starts_off: bool) -> Vec<NamedSource> {
+    // One kind of white noise at a time: a budget asks for the share of each.
     let noise = |at: usize| TruthSide { noise: std::array::from_fn(|i| i == at), ..TruthSide::default() };
     let start = TruthSide { starts_off: true, ..TruthSide::default() };
     let all = [
@@ -136,6 +138,7 @@ fn processes(model: &Model, sensor: Sensor, drifts: &mut Vec<Source>) -> Vec<Nam
                 found.push(NamedSource { process, ..NamedSource::new(name, TruthSide::default()) });
                 found.len() - 1
             });
+            // The axes are independent: one source with three states has the sum of their covariances.
             found[at].side.inertial.add(channel.index(), process);
         }
     }

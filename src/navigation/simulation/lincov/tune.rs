@@ -73,11 +73,11 @@ nav_sim_signal::named!(Aim);
 
 /// A model, and the truths that its filter is to be honest for.
 pub struct Task<'a> {
-    /// What the filter is made of.
+    /// The noise model that the filter is made of.
     pub model: &'a Model,
     /// What may make the inertial errors; at least one.
     pub truths: &'a [Model],
-    /// Where.
+    /// The trajectory with its fixes and outages.
     pub track: &'a Track,
     /// The filter with a state for each process, for which the factors are found.
     pub full: &'a Filter<'a>,
@@ -98,7 +98,7 @@ pub struct Factor {
     pub sensor: Sensor,
     /// Label of the process, as [`crate::noise::Composite::labels`]; none: all of the sensor's.
     pub process: Option<String>,
-    /// On its variance.
+    /// The factor on its variance.
     pub on_variance: f64,
 }
 
@@ -117,11 +117,11 @@ pub struct Honesty {
     pub nees: f64,
     /// Largest true RMSE over stated standard deviation at an outage's end (without outages: at any time).
     pub ratio: f64,
-    /// In which reported state.
+    /// The reported state with that ratio.
     pub state: usize,
-    /// In which outage, counted from 0.
+    /// The outage at whose end it is, counted from 0.
     pub outage: usize,
-    /// In which truth.
+    /// The truth in which it is, counted from 0.
     pub truth: usize,
     /// When the outages end (s from the start).
     pub end_s: Vec<f64>,
@@ -152,6 +152,7 @@ impl Task<'_> {
     /// When the model has no such filter.
     pub fn factors(&self) -> Result<Vec<Factor>, BeliefError> {
         let mut factors = multiplied(self.model, self.per);
+        // Asked for its error alone: inside the search a model without a filter is only an infinite cost.
         (self.full)(self.model)?;
         if self.dishonesty(&factors)?.abs() <= TOLERANCE {
             return Ok(factors);
@@ -204,6 +205,8 @@ impl Task<'_> {
         let Ok(belief) = (self.full)(&scaled(self.model, factors)) else { return f64::INFINITY };
         let overconfidence = |end: &Consistency| match self.aim {
             Aim::Mean => 0.0,
+            // One-sided: an error smaller than stated costs nothing here, the divergence alone speaks of
+            // timidity.
             Aim::Worst => end.ratio().iter().map(|r| OVERCONFIDENT * r.ln().max(0.0).powi(2)).sum(),
         };
         let costs: Vec<f64> =
@@ -226,6 +229,7 @@ impl Task<'_> {
             let ln: Vec<f64> = ln.iter().map(|x| (x + by).clamp(low, MAX_LN)).collect();
             set(factors, &ln)
         };
+        // Down to where the largest factor meets the lowest bound: below that nothing changes any more.
         let highest = ln.iter().copied().fold(low, f64::max);
         let crossing = Crossing { bounds: (low - highest, MAX_LN), step: 0.1, exact: EXACT };
         let (by, _) = crossing.from(0.0, |by| self.dishonesty(&moved(by)))?;
@@ -234,7 +238,7 @@ impl Task<'_> {
 }
 
 impl Honesty {
-    /// Of the same filter under several truths.
+    /// The honesty of one filter under several truths.
     fn of(assessments: &[Assessment]) -> Self {
         let count = assessments.len() as f64;
         let mean = |a: &Assessment| a.reports.iter().map(|r| r.nees).sum::<f64>() / a.reports.len() as f64;
@@ -247,6 +251,7 @@ impl Honesty {
             for (sum, end) in honesty.rmse_end.iter_mut().zip(ends) {
                 sum.iter_mut().zip(&end.rmse).for_each(|(sum, rmse)| *sum += rmse * rmse / count);
             }
+            // Without outages the filter is judged wherever it reports.
             let judged = if ends.is_empty() { &assessment.reports } else { ends };
             for (outage, instant) in judged.iter().enumerate() {
                 for (state, ratio) in instant.ratio().into_iter().enumerate() {
@@ -266,7 +271,8 @@ impl Honesty {
     }
 }
 
-/// What of a model can be multiplied: what is zero stays so, and quantization noise is in no filter.
+/// The factors of a model, all 1. Processes without amplitude have none, nor has quantization noise, which no
+/// filter contains.
 fn multiplied(model: &Model, per: Per) -> Vec<Factor> {
     let mut factors: Vec<Factor> = Vec::new();
     for channel in Channel::ALL {
@@ -281,7 +287,7 @@ fn multiplied(model: &Model, per: Per) -> Vec<Factor> {
     factors
 }
 
-/// Whether a filter has it, and there is something to multiply.
+/// Whether a filter models the process and its amplitude is not zero.
 fn is_felt(process: &Process) -> bool {
     let (_, amplitude) = amplitude(process);
     amplitude != 0.0 && !matches!(process, Process::Quantization(_))
