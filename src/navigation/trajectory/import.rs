@@ -14,7 +14,7 @@ const RAMP_S: f64 = 1.0;
 /// Changes of Euler angles and body velocity within a time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Command {
-    /// (s)
+    /// Duration (s).
     pub duration_s: f64,
     /// Changes of roll, pitch, yaw (rad).
     pub rpy: DVec3,
@@ -44,6 +44,8 @@ impl BodyMotion {
         let mut samples = vec![sample(t_s, place, rpy)];
         for command in &self.commands {
             let shape = Shape::new(RAMP_S / command.duration_s);
+            // A whole number of steps in every command, so that its end is a sample; the slack keeps 1 s at
+            // fifty steps.
             let n = (command.duration_s / STEP_S - 1e-9).ceil().max(1.0);
             let dt = command.duration_s / n;
             let rates = |place: [f64; 3], x: f64| {
@@ -62,6 +64,8 @@ impl BodyMotion {
                 let share = shape.value(x(1.0));
                 samples.push(sample(t_s + command.duration_s * x(1.0), place, rpy + command.rpy * share));
             }
+            // Rounded to a nanosecond: the sum of many decimal durations stays the decimal that a user would
+            // type.
             t_s = (1e9 * (t_s + command.duration_s)).round() / 1e9;
             rpy += command.rpy;
             v_b += command.v_b;

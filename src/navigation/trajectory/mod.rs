@@ -137,7 +137,11 @@ impl Trajectory {
         let mut q_last = DQuat::IDENTITY;
         let mut values = Vec::with_capacity(samples.len());
         for (index, s) in samples.iter().enumerate() {
+            // Small numbers for the spline, whose second derivatives would else lose digits to 6.4e6 m. The
+            // rounding of the samples themselves, 1e-9 m, becomes part of the motion, for reference and IMU
+            // alike.
             let r = geodetic_to_ecef(s.lat, s.lon, s.h) - origin_e;
+            // With respect to e, not n: the axes of n turn as the vehicle moves, ever faster towards a pole.
             let mut q = q_e_n(s.lat, s.lon).inverse() * s.q_b_n.normalize();
             if q.dot(q_last) < 0.0 {
                 q = -q; // q and −q are the same attitude: stay on the side of the last sample
@@ -184,6 +188,7 @@ impl Trajectory {
         let p_dot = DQuat::from_xyzw(first[3], first[4], first[5], first[6]);
         let norm2 = p.length_squared();
         // q = p/|p|: the derivative of |p| is along q and has no vector part in q* q̇.
+        // q̇ = ½ q ω (ω in b), hence ω = 2 vec(q* q̇).
         let rate = p.conjugate() * p_dot;
         Kinematics {
             r_e: self.origin_e + DVec3::new(x, y, z),
@@ -215,6 +220,7 @@ fn check(samples: &[TrajectorySample]) -> Result<(), Error> {
             return Err(Error::NotFinite { index, what, value });
         }
         let norm = s.q_b_n.length();
+        // Zero, NaN and infinity alike: none can be made a unit quaternion.
         if !norm.is_normal() {
             return Err(Error::NotFinite { index, what: "attitude", value: norm });
         }

@@ -33,7 +33,7 @@ impl Default for Limits {
     }
 }
 
-/// What a limit is on.
+/// The quantities that have a limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Quantity {
     /// Speed (m/s).
@@ -76,7 +76,7 @@ impl Quantity {
 /// A stretch beyond a limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Excess {
-    /// Of what.
+    /// The quantity.
     pub quantity: Quantity,
     /// The limit (SI).
     pub limit: f64,
@@ -113,6 +113,7 @@ pub fn examine(trajectory: &Trajectory, limits: &Limits) -> ([f64; 4], Vec<Exces
         for (i, value) in magnitudes(trajectory, t_s).into_iter().enumerate() {
             largest[i] = larger(largest[i], value);
             let limit = Quantity::ALL[i].limit(limits);
+            // NaN lies beyond every limit: it is to be reported, not passed over.
             if value.is_nan() || value > limit {
                 let event = Excess {
                     quantity: Quantity::ALL[i],
@@ -144,6 +145,8 @@ fn extend(event: &mut Excess, by: &Excess) {
 fn magnitudes(trajectory: &Trajectory, t_s: f64) -> [f64; 4] {
     let half = 0.5 * JERK_WINDOW_S;
     let clamped = |t: f64| t.clamp(trajectory.start_s(), trajectory.end_s());
+    // A window rather than the third derivative: that of a cubic spline is a constant between samples, and
+    // mostly the noise of them. At the ends the window is cut, and a steady jerk counts half there.
     let (before, after) =
         (trajectory.kinematics(clamped(t_s - half)), trajectory.kinematics(clamped(t_s + half)));
     let now = trajectory.kinematics(t_s);

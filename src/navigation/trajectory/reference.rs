@@ -120,6 +120,7 @@ pub fn usable(samples: &[TrajectorySample], breaks: &[Break]) -> Vec<Range<usize
         // a clock that was set back: what is behind is not gone through twice
         let later =
             found.last().is_none_or(|r| samples[r.end - 1].t_s < samples[range.start.min(edge[1] - 1)].t_s);
+        // Four samples are what a spline needs.
         if range.len() >= 4 && later {
             found.push(range);
         }
@@ -143,6 +144,7 @@ impl<'a> Steps<'a> {
         Self {
             samples,
             moved_e: samples.windows(2).map(|w| place(&w[1]) - place(&w[0])).collect(),
+            // The median is not moved by gaps, however long.
             median_s: seconds.get(seconds.len() / 2).copied().unwrap_or(0.0),
         }
     }
@@ -154,6 +156,7 @@ impl<'a> Steps<'a> {
     /// What is wrong with the step to sample `index`.
     fn fault(&self, index: usize) -> Option<Fault> {
         let seconds = self.seconds(index);
+        // Time first: everything below divides by the seconds.
         if seconds <= 0.0 {
             return Some(Fault::Back(-seconds));
         }
@@ -161,11 +164,14 @@ impl<'a> Steps<'a> {
             return Some(Fault::Gap(seconds));
         }
         let turn = self.samples[index - 1].q_b_n.conjugate() * self.samples[index].q_b_n;
+        // |w|: q and −q are one attitude, and the shorter way round is meant.
         let angle = 2.0 * turn.xyz().length().atan2(turn.w.abs());
         if angle > MAX_ROTATION.min(ATTITUDE_JUMP.0 + ATTITUDE_JUMP.1 * seconds) {
             return Some(Fault::Attitude(angle));
         }
         let (expected, reach_s) = self.expected(index);
+        // The velocity of the neighbours may differ by acceleration × their distance in time, and so the step
+        // by that times its own length.
         let metres = (self.moved_e[index - 1] - expected * seconds).length();
         (metres > POSITION_JUMP.0 + POSITION_JUMP.1 * seconds * reach_s).then_some(Fault::Position(metres))
     }
@@ -173,13 +179,14 @@ impl<'a> Steps<'a> {
     /// The median velocity of the steps about one (m/s, in e), each axis by itself, and how far in time they
     /// reach (s). The median is not moved by a jump to another place and back.
     fn expected(&self, index: usize) -> (DVec3, f64) {
+        // The step itself is among its neighbours: of eleven values one does not move a median.
         let first = index.saturating_sub(NEIGHBOURS).max(1);
         let last = (index + NEIGHBOURS).min(self.samples.len() - 1);
         let near = || (first..=last).filter(|i| self.seconds(*i) > 0.0);
         let axis = |a: usize| {
-            let mut of: Vec<f64> = near().map(|i| self.moved_e[i - 1][a] / self.seconds(i)).collect();
-            of.sort_by(f64::total_cmp);
-            of[of.len() / 2]
+            let mut velocities: Vec<f64> = near().map(|i| self.moved_e[i - 1][a] / self.seconds(i)).collect();
+            velocities.sort_by(f64::total_cmp);
+            velocities[velocities.len() / 2]
         };
         let now = self.samples[index].t_s;
         let reach = (now - self.samples[first - 1].t_s).max(self.samples[last].t_s - now);

@@ -22,6 +22,8 @@ impl<const N: usize> Spline<N> {
         let mut m = vec![[0.0; N]; last + 1];
         for i in 1..last {
             let (mut a, mut b, mut c) = (h[i - 1], 2.0 * (h[i - 1] + h[i]), h[i]);
+            // m₀ = m₁ + (m₁ − m₂) h₀/h₁, the third derivative continued to the end, put into the first
+            // equation.
             if i == 1 {
                 b += h[0] + h[0] * h[0] / h[1];
                 c -= h[0] * h[0] / h[1];
@@ -32,6 +34,8 @@ impl<const N: usize> Spline<N> {
                 a -= h[i] * h[i] / h[i - 1];
                 c = 0.0;
             }
+            // The diagonal dominates for any spacing, the changed rows included: (h₀ + 2h₁) > |h₁ − h₀|. No
+            // pivoting.
             let pivot = b - a * upper[i - 1];
             upper[i] = c / pivot;
             for k in 0..N {
@@ -56,6 +60,8 @@ impl<const N: usize> Spline<N> {
 
     /// The same curve as far as the first knot at or after `t`.
     pub(super) fn until(&self, t: f64) -> Self {
+        // The second derivatives are kept, not solved for anew: the curve before the cut is the same to the
+        // last bit.
         let kept = (self.t.partition_point(|&knot| knot < t) + 1).clamp(2, self.t.len());
         Self { t: self.t[..kept].to_vec(), y: self.y[..kept].to_vec(), m: self.m[..kept].to_vec() }
     }
@@ -69,6 +75,7 @@ impl<const N: usize> Spline<N> {
         for k in 0..N {
             let (m0, m1) = (self.m[i][k], self.m[i + 1][k]);
             let third = (m1 - m0) / h;
+            // First derivative at the left knot of the cubic with these values and second derivatives.
             let slope = (self.y[i + 1][k] - self.y[i][k]) / h - h * (2.0 * m0 + m1) / 6.0;
             value[k] = self.y[i][k] + dt * (slope + dt * (m0 / 2.0 + dt * third / 6.0));
             first[k] = slope + dt * (m0 + dt * third / 2.0);

@@ -159,10 +159,14 @@ impl<'a> Path<'a> {
     }
 
     fn integrate(&mut self, piece: &Piece) {
+        // A whole number of steps, so that the end of the piece, where the fourth derivative of the speed may
+        // jump, is a sample.
         let n = (piece.duration / STEP_S - 1e-9).ceil().max(1.0);
         let dt = piece.duration / n;
         for k in 0..n as usize {
             let x = |part: f64| (k as f64 + part) / n;
+            // Speed, heading and height are known in closed form: of the Runge-Kutta stages only the latitude
+            // is a guess, and nothing depends on the longitude.
             let [from, middle, to] = [piece.at(x(0.0)), piece.at(x(0.5)), piece.at(x(1.0))];
             let k1 = rates(self.lat, &from);
             let k2 = rates(self.lat + 0.5 * dt * k1[0], &middle);
@@ -174,6 +178,7 @@ impl<'a> Path<'a> {
         }
         let end = piece.at(1.0);
         self.t_s = (1e9 * (self.t_s + piece.duration)).round() / 1e9; // sums of decimals stay decimals
+        // From the closed form, not from the sums of steps: no error builds up over the segments.
         (self.h, self.heading) = (end.h, end.heading);
         self.speed += piece.speed[1];
     }
@@ -181,6 +186,8 @@ impl<'a> Path<'a> {
     fn sample(&mut self, t_s: f64, motion: &Motion) {
         let roll = match self.profile.bank {
             Bank::None => 0.0,
+            // Level turn: the lateral specific force v·ψ̇ and gravity combine along the down axis of the
+            // body.
             Bank::Coordinated => (motion.horizontal * motion.heading_rate / STANDARD_GRAVITY).atan(),
         };
         let q_b_n = RollPitchYaw { roll, pitch: motion.slope, yaw: motion.heading }.to_quat();
@@ -191,6 +198,8 @@ impl<'a> Path<'a> {
 /// Duration of a change with a given peak rate: change/rate plus one ramp, or two ramps when it is short.
 fn duration_of(change: f64, rate: f64, ramp_s: f64) -> f64 {
     let plateau = (change / rate).abs();
+    // peak = change/(duration − ramp) where ramp ≤ duration/2; a shorter change is all ramp, peak
+    // 2·change/duration.
     plateau + ramp_s.min(plateau)
 }
 

@@ -23,12 +23,14 @@ impl Shape {
     /// Rate of change at x.
     pub(super) fn rate(self, x: f64) -> f64 {
         let y = (x.min(1.0 - x) / self.ramp).clamp(0.0, 1.0);
+        // 10y³ − 15y⁴ + 6y⁵: first and second derivative are zero at both ends.
         self.peak() * y * y * y * (10.0 + y * (6.0 * y - 15.0))
     }
 
     /// The change so far: the integral of the rate.
     pub(in crate::trajectory) fn value(self, x: f64) -> f64 {
         if x > 0.5 {
+            // The rate is symmetric about the middle: one formula for both ramps, and exactly 1 at the end.
             return 1.0 - self.value(1.0 - x);
         }
         let y = (x / self.ramp).clamp(0.0, 1.0);
@@ -39,7 +41,7 @@ impl Shape {
     /// The integral of the change so far.
     pub(super) fn integral(self, x: f64) -> f64 {
         if x > 0.5 {
-            return x - 0.5 + self.integral(1.0 - x); // U(x) = 1 − U(1 − x)
+            return x - 0.5 + self.integral(1.0 - x); // from value(x) = 1 − value(1 − x)
         }
         let y = (x / self.ramp).clamp(0.0, 1.0);
         let ramped = self.ramp * self.ramp * y.powi(5) * (0.5 + y * (y / 7.0 - 0.5));
@@ -51,7 +53,7 @@ impl Shape {
 /// A stretch of motion: everything as a function of the share x of its duration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Piece {
-    /// (s)
+    /// Duration (s).
     pub(super) duration: f64,
     pub(super) shape: Shape,
     /// Speed along the path at the start, and its change (m/s).
@@ -98,6 +100,7 @@ impl Piece {
             h += self.height[1] * self.shape.value(share);
         }
         Motion {
+            // Speed is along the path; what climbs does not go forwards.
             horizontal: speed * (1.0 - sin_slope * sin_slope).sqrt(),
             heading: self.heading[0] + self.heading[1] * self.shape.value(x),
             heading_rate: self.heading[1] * self.shape.rate(x) / self.duration,

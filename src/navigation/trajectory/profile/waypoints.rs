@@ -37,7 +37,7 @@ pub enum Place {
     },
 }
 
-/// How far a turn carries.
+/// The geometry of a turn that cuts a corner.
 struct Corner {
     /// Length of the straight line from its begin to its end (m), in the direction of half the turn.
     chord: f64,
@@ -114,6 +114,8 @@ impl Path<'_> {
             if piece.steepest() > MAX_SLOPE.sin() {
                 break; // refused when the path is to take it
             }
+            // The horizontal distance grows almost as the path does: the iteration contracts unless the slope
+            // nears its limit.
             let correction = distance - duration * mean(|x| piece.at(x).horizontal);
             length += correction;
             if correction.abs() < 1e-9 * distance {
@@ -127,7 +129,10 @@ impl Path<'_> {
         let duration = self.turn_duration(angle, by, ramp_s)?;
         let piece = self.piece([duration, ramp_s], 0.0, angle, 0.0);
         let half = self.heading + 0.5 * angle;
+        // By symmetry the path of a turn ends in the direction of half its angle; only the part of the
+        // velocity along it counts.
         let chord = self.speed * duration * mean(|x| (piece.at(x).heading - half).cos());
+        // Chord and both leads are an isosceles triangle with the angle of the turn outside at the corner.
         Ok(Corner { chord, lead: 0.5 * chord / (0.5 * angle).cos() })
     }
 
@@ -166,8 +171,11 @@ impl Path<'_> {
                 let duration = self.turn_duration(angle, by, ramp_s)?;
                 return self.push([duration, ramp_s], 0.0, angle, 0.0);
             }
+            // Turning by more leaves as much less to turn, but for the displacement during the turn.
             let slope = before.map_or(-1.0, |(a, m)| (miss - m) / (angle - a));
             before = Some((angle, miss));
+            // At most a radian at once: near the turning circle the slope nearly vanishes, and a secant would
+            // leap.
             angle -= (miss / slope).clamp(-1.0, 1.0);
         }
         Err(Problem::Unreachable { number })
@@ -178,6 +186,8 @@ impl Path<'_> {
         let corner = self.corner(angle, by, ramp_s)?;
         let r = radii(self.lat.sin());
         let (sin_psi, cos_psi) = (self.heading + 0.5 * angle).sin_cos();
+        // Flat over the chord of a turn: hundreds of metres over the radius of the Earth, second order 1e-8
+        // of it.
         let after = [
             self.lat + corner.chord * cos_psi / (r.meridian + self.h),
             self.lon + corner.chord * sin_psi / ((r.transverse + self.h) * self.lat.cos()),
