@@ -85,6 +85,7 @@ impl Closure {
             velocity_m_s: 0.0,
             attitude_rad: 0.0,
         };
+        // The mean over an interval leads to its end: sample k is compared at t_{k+1}.
         for (k, sample) in samples.iter().enumerate() {
             let t_s = trajectory.start_s() + (k + 1) as f64 / rate_hz;
             let dtheta = sample.omega_ib_b * dt;
@@ -103,6 +104,8 @@ impl Closure {
 
     fn widen(&mut self, truth: &NavState, found: &NavState) {
         let apart = ned_difference(truth, found.lat, found.lon, found.h);
+        // 2 sin(θ/2) for θ: the bound is 1 µrad, and the vector part keeps digits there that 2 acos(w) would
+        // lose.
         let turned = 2.0 * (truth.q_b_n.conjugate() * found.q_b_n).xyz().length();
         self.position_m = larger(self.position_m, apart.length());
         self.horizontal_m = larger(self.horizontal_m, apart.truncate().length());

@@ -25,7 +25,7 @@ pub(crate) const SOMIGLIANA_K: f64 = 0.001_931_852_652_41;
 /// Navigation in latitude and longitude is refused beyond this latitude (rad): 89.9°.
 pub const MAX_LATITUDE: f64 = 89.9 * crate::units::DEG;
 
-/// What the ellipsoid and gravity take from a latitude: one square root and one division for all.
+/// The functions of latitude that radii and gravity share: one square root and one division for all.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Parallel<R> {
     sin_lat: R,
@@ -64,6 +64,7 @@ impl<R: Real> Parallel<R> {
     #[inline(always)]
     #[must_use]
     pub(crate) fn radii(&self) -> Radii<R> {
+        // R_E = a/w and R_N = a (1 − e²)/w³ with w² = 1 − e² sin² lat.
         let transverse = self.per_w * A;
         Radii { meridian: transverse * (self.per_w * self.per_w) * (1.0 - E2), transverse }
     }
@@ -78,7 +79,11 @@ impl<R: Real> Parallel<R> {
         let surface = (s2 * SOMIGLIANA_K + 1.0) * GRAVITY_EQUATOR * self.per_w;
         match model {
             GravityModel::Wgs84 => {
+                // m = ω² a² b/μ, the ratio of centrifugal to gravitational acceleration at the equator
+                // (3.45e-3).
                 const M: f64 = OMEGA_IE * OMEGA_IE * A * A * (A * (1.0 - F)) / MU;
+                // g(h)/g(0) = 1 − (2/a)(1 + f + m − 2f sin²φ) h + 3 h²/a²: at 3 km the bracket alone is worth
+                // 2e-5 m/s², and an error of 1e-5 m/s² is 4 m of height after 900 s.
                 let first = (s2 * (-2.0 * F) + (1.0 + F + M)) * (-2.0 / A);
                 surface * (h * (first + h * (3.0 / (A * A))) + 1.0)
             }
@@ -140,13 +145,16 @@ pub fn geodetic_to_ecef(lat: f64, lon: f64, h: f64) -> DVec3 {
     DVec3::new((n + h) * cos_lat * cos_lon, (n + h) * cos_lat * sin_lon, (n * (1.0 - E2) + h) * sin_lat)
 }
 
-/// Latitude, longitude (rad) and height (m) of a position in e: Bowring's start and Newton-like
-/// iteration to rounding; for |h| up to 1000 km.
+/// Latitude, longitude (rad) and height (m) of a position in e: fixed-point iteration of
+/// tan lat = (z + e² N sin lat)/p from the latitude that is exact at h = 0, to rounding; for |h| up to 1000 km.
 #[must_use]
 pub fn ecef_to_geodetic(r_e: DVec3) -> (f64, f64, f64) {
     let p = r_e.x.hypot(r_e.y);
     let lon = r_e.y.atan2(r_e.x);
+    // Exact on the ellipsoid; at height h it is off by at most e² h/2a, 5e-6 rad at 10 km.
     let mut lat = r_e.z.atan2(p * (1.0 - E2));
+    // Each pass contracts the error by e² cos²φ N/(N + h) < 0.008, so that six leave less than rounding, and
+    // a fixed number of them keeps the result independent of a tolerance.
     for _ in 0..6 {
         let n = radii(lat.sin()).transverse;
         lat = (r_e.z + E2 * n * lat.sin()).atan2(p);
@@ -168,6 +176,7 @@ pub fn omega_ie_n(lat: f64) -> DVec3 {
 pub fn omega_en_n(lat: f64, h: f64, v_n: DVec3) -> DVec3 {
     let r = radii(lat.sin());
     let east = v_n.y / (r.transverse + h);
+    // The down component grows as tan(lat): here the mechanisation in n fails at the poles.
     DVec3::new(east, -v_n.x / (r.meridian + h), -east * lat.tan())
 }
 
@@ -178,6 +187,7 @@ pub fn ned_difference(a: &NavState, lat: f64, lon: f64, h: f64) -> DVec3 {
     let r = radii(a.lat.sin());
     DVec3::new(
         (lat - a.lat) * (r.meridian + a.h),
+        // Two points either side of ±180° are neighbours, not a turn apart.
         crate::frames::wrap_angle(lon - a.lon) * (r.transverse + a.h) * a.lat.cos(),
         a.h - h,
     )

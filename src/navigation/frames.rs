@@ -50,6 +50,8 @@ impl RollPitchYaw {
     /// Grows as 1/cos(pitch).
     #[must_use]
     pub fn jacobian_of_psi_n(&self) -> [DVec3; 3] {
+        // psi_n = roll · x_b + pitch · (−sin yaw, cos yaw, 0) + yaw · (0, 0, 1), the axes of the three turns
+        // in n, solved for the angles.
         let (sy, cy) = self.yaw.sin_cos();
         let (tp, cp) = (self.pitch.tan(), self.pitch.cos());
         [DVec3::new(cy / cp, sy / cp, 0.0), DVec3::new(-sy, cy, 0.0), DVec3::new(cy * tp, sy * tp, 1.0)]
@@ -59,6 +61,8 @@ impl RollPitchYaw {
 /// The rotation from e to n at a latitude and longitude (rad): takes e, returns n.
 #[must_use]
 pub fn q_e_n(lat: f64, lon: f64) -> DQuat {
+    // From n to e: a turn by the longitude about the axis of the Earth, then by −lat − 90° about the new y
+    // axis, east. Asked for is its inverse.
     (DQuat::from_rotation_z(lon) * DQuat::from_rotation_y(-lat - std::f64::consts::FRAC_PI_2)).inverse()
 }
 

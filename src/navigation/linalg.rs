@@ -21,7 +21,7 @@ pub(crate) fn to_glam(v: &Vector3<f64>) -> DVec3 {
     DVec3::new(v.x, v.y, v.z)
 }
 
-/// What an instant has to do with the next one, for a smoother that comes back.
+/// The regression of the error at an instant on that at the next one, for a backward smoother.
 ///
 /// The error there is Φ times the error here plus noise. Given it, the error here is normal: its mean is
 /// C = P Φᵀ (P⁻)⁻¹ times the error there, its covariance D = P − C P⁻ Cᵀ, where P is the covariance here and P⁻ that
@@ -40,6 +40,7 @@ impl Link {
         let root = root(predicted);
         // P⁻ = L Lᵀ, W = L⁻¹ Φ P: C = (L⁻ᵀ W)ᵀ, D = P − Wᵀ W
         let mut w = transition * p;
+        // The solver reports failure only for a zero on the diagonal, which `root` never leaves there.
         let _ = root.solve_lower_triangular_mut(&mut w);
         let n = p.nrows();
         let mut rest = Vec::with_capacity(n * (n + 1) / 2);
@@ -51,6 +52,8 @@ impl Link {
     /// Mean and covariance of the error there become those of the error here.
     pub(crate) fn back(&self, error: &mut DVector<f64>, p: &mut DMatrix<f64>) {
         *error = &self.gain * &*error;
+        // The upper triangle is copied from the lower below: the product is symmetric only to rounding, and
+        // what is asymmetric would grow over the thousands of links of a backward pass.
         *p = &self.gain * &*p * self.gain.transpose();
         for ((i, j), rest) in lower(p.nrows()).zip(&self.rest) {
             p[(i, j)] += rest;
@@ -73,6 +76,8 @@ fn root(p: &DMatrix<f64>) -> DMatrix<f64> {
         let rest =
             |l: &DMatrix<f64>, i: usize| p[(i, j)] - (0..j).map(|k| l[(i, k)] * l[(j, k)]).sum::<f64>();
         let pivot = rest(&l, j);
+        // The pivot is what the states before leave of this variance: the rounding of n products cannot be
+        // told from it.
         let is_free = pivot > n as f64 * f64::EPSILON * p[(j, j)];
         l[(j, j)] = if is_free { pivot.sqrt() } else { f64::INFINITY };
         for i in j + 1..n {

@@ -220,9 +220,12 @@ impl Scenario {
     /// When the model has no such filter.
     pub fn belief(&self, model: &Model, outages: &[Outage], track: &Track) -> Result<Belief, BeliefError> {
         let longest = outages.iter().map(|o| o.end_s - o.start_s).fold(0.0, f64::max);
+        // The scales over which the reduction has to agree: from one fix, below which the filter sees none of
+        // them, to several times the longest outage.
         let (interval_s, window_s) = (1.0 / self.gnss.rate_hz, reduction::window_s(longest));
         let mut belief = Belief::new(model, self.filter.states, interval_s, window_s)?;
         if self.filter.states.is_reduced() && self.filter.reduction == Reduction::Covariance {
+            // The wavelet reduction is where this search starts, hence made in either case.
             belief = reduced_belief(model, belief, track, Alike::Level);
         }
         Ok(belief.with_initial(&self.initial))
@@ -236,6 +239,8 @@ impl Scenario {
         full.filter.states = FilterStates::Full;
         let ppm = self.filter.states.scale_sigma() * 1e6;
         if ppm > 0.0 {
+            // The default scale factors of the filter of 21 states go with its name: kept here, since they
+            // are no part of the model.
             full.initial.accel_scale_sigma_ppm.get_or_insert(ppm);
             full.initial.gyro_scale_sigma_ppm.get_or_insert(ppm);
         }

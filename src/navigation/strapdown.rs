@@ -57,6 +57,9 @@ impl Strapdown {
             h: Lanes::splat(start.h),
             v_n: Vec3::splat(start.v_n),
             q_b_n: Quat::splat(start.q_b_n),
+            // No sample before the first: its coning and sculling are those of a vehicle that has just begun
+            // to turn. A vehicle in steady rotation has no such correction (parallel increments), so nothing
+            // is lost at rest.
             dtheta_before: Vec3::ZERO,
             dv_before: Vec3::ZERO,
             coriolis_before: Vec3::ZERO,
@@ -149,9 +152,13 @@ impl<L: Real> Strapdown<L> {
         let (half, sixth, twelfth) = (L::from(0.5), L::from(1.0 / 6.0), L::from(1.0 / 12.0));
         let seconds = L::from(dt);
         // Coning and sculling from this sample and the one before (Savage 1998, two-sample form).
+        // 1/12 is exact where the rate is linear in time over both intervals; what is left is of order dt⁴ a
+        // step.
         let phi_b = self.dtheta_before.cross(dtheta).mul_add(twelfth, dtheta);
         // Without the triple product, θ²/6 of the specific force is lost in every turn: dt² overall.
         let sculling = self.dtheta_before.cross(dv) + self.dv_before.cross(dtheta);
+        // (1 − cos θ)/θ² → 1/2 and (1 − sin θ/θ)/θ² → 1/6: rotation of the body while the specific force is
+        // summed.
         let turned = dtheta.cross(dv * half + dtheta.cross(dv) * sixth);
         let dv_sf_b = sculling.mul_add(twelfth, dv + turned);
         self.dtheta_before = dtheta;
@@ -160,16 +167,22 @@ impl<L: Real> Strapdown<L> {
         let c_before = self.q_b_n.to_matrix();
         let dv_sf_n = c_before * dv_sf_b;
         let mid = self.at_middle(dv_sf_n, dt);
+        // Rotation of n against inertial space over the interval; positive as n turns, so it is taken off the
+        // attitude.
         let zeta = (mid.omega_ie_n + mid.omega_en_n) * seconds;
 
         // Velocity: specific force with the rotation of n, gravity, Coriolis.
+        // On the average over the interval n has turned by half of zeta away from the axes of its beginning.
         let dv_n = dv_sf_n - zeta.cross(dv_sf_n) * half;
+        // 2 ω_ie is the Coriolis term of the turning Earth, ω_en comes with writing v in n, which turns
+        // against e.
         let coriolis = (mid.omega_ie_n + mid.omega_ie_n + mid.omega_en_n).cross(mid.v_n);
         self.coriolis_before = coriolis;
         let mut v_new = self.v_n + dv_n - coriolis * seconds;
         v_new[2] += mid.gravity * dt;
 
         // Position by the trapezoidal rule.
+        // Radii and cos(lat) are those of the middle, hence the rule is of second order in position as well.
         let v_mean = (self.v_n + v_new) * half;
         self.lat += v_mean[0] * dt * mid.per_meridian;
         self.lon += v_mean[1] * dt * mid.per_transverse * mid.per_cos_lat;
@@ -179,10 +192,14 @@ impl<L: Real> Strapdown<L> {
         // Attitude: b turns by phi_b, n by zeta (≤ 3e-4 rad, second order suffices to rounding).
         let half_zeta = zeta * half;
         let q_n = Quat { w: half_zeta.dot(half_zeta) * -0.5 + 1.0, v: -half_zeta };
+        // Renormalised at every step: products of unit quaternions lose their norm by a random walk of
+        // rounding, and a norm off by 1e-10 would scale the specific force.
         self.q_b_n = (q_n * self.q_b_n * Quat::from_rotation_vector(phi_b)).renormalised();
         let mut c_b_n = self.q_b_n.to_matrix();
         for i in 0..3 {
             for j in 0..3 {
+                // The mean of both ends is that of the middle times cos(θ/2) in the plane of rotation: second
+                // order in θ, as the error map is; it only weighs noise and biases, never the nominal state.
                 c_b_n.0[i][j] = (c_before.0[i][j] + c_b_n.0[i][j]) * 0.5;
             }
         }
@@ -196,6 +213,8 @@ impl<L: Real> Strapdown<L> {
         let parallel = Parallel::at(s);
         let r = parallel.radii();
         let half = L::from(0.5 * dt);
+        // A velocity that is wrong by O(dt²) is enough: it enters through Coriolis (1e-4 /s), the radii and
+        // gravity alone.
         let mut v_n = self.v_n + dv_sf_n * L::from(0.5) - self.coriolis_before * half;
         v_n[2] += parallel.gravity_down(self.gravity, self.h) * half;
         let h = self.h - (self.v_n[2] + v_n[2]) * (0.25 * dt);
@@ -204,6 +223,8 @@ impl<L: Real> Strapdown<L> {
         let inverse = L::from(1.0) / (meridian * transverse);
         let (per_meridian, per_transverse) = (inverse * transverse, inverse * meridian);
         let half_dlat = v_n[0] * half * per_meridian;
+        // First-order rotation of (sin, cos): half_dlat²/2 is 3e-15 at 100 m/s and 100 Hz, and no second
+        // sin_cos is paid.
         let (sin_lat, cos_lat) = (s + c * half_dlat, c - s * half_dlat);
         let per_cos_lat = L::from(1.0) / cos_lat;
         let east = v_n[1] * per_transverse;

@@ -51,9 +51,11 @@ impl<'a> Load<'a> {
     /// # Errors
     /// When the model cannot be made into filter states.
     pub fn new(model: &'a Model, states: FilterStates, level: Level) -> Result<Self, BeliefError> {
+        // Fixes at 1 Hz and the shortest window of the reduction, as in a default run.
         let belief = Belief::new(model, states, 1.0, 800.0)?;
         let start = NavState { lat: 0.8, lon: 0.1, h: 400.0, v_n: DVec3::ZERO, q_b_n: DQuat::IDENTITY };
         let gravity = GravityModel::Wgs84;
+        // At rest the accelerometers measure the reaction of the ground, −g.
         let f_ib_b = DVec3::NEG_Z * gravity_down(gravity, start.lat.sin(), start.h);
         let key = |run| StreamKey { seed: 1, scenario: "", run, source: "", process: "" };
         let imu = (0..LANES as u64).map(|run| ImuErrors::new(&ErrorSource::Model(model), key(run), SAMPLES));
