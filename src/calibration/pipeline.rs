@@ -213,21 +213,29 @@ mod tests {
             ..Curve::default()
         };
         let group = Group { scope: Scope { sensor: Sensor::Accel, axis: None }, replicates: Vec::new() };
-        let settings = |fit_range| Settings {
-            model: ModelChoice::Given("WN+AR1+RW".parse().unwrap()),
-            rate_hz: 100.0,
-            fit_range,
-            ..Settings::default()
-        };
         let range = FitRange { from_s: 0.04, to_s: 81.92 };
-        let fit = |curve, range| fit_curve(&group, Estimator::Given, curve, &settings(range)).unwrap();
-        let (ranged, shortened, all) = (fit(whole.clone(), Some(range)), fit(short, None), fit(whole, None));
-        assert_eq!((ranged.counted_levels().len(), ranged.departure().scales), (12, 12));
-        assert_relative_eq!(ranged.fit.objective, shortened.fit.objective, max_relative = 1e-9);
-        let values = |o: &Outcome| o.fit.composite.parameters().map(|(_, x)| x).collect::<Vec<_>>();
-        for (a, b) in values(&ranged).into_iter().zip(values(&shortened)) {
-            assert_relative_eq!(a, b, max_relative = 1e-6);
+        for weighting in [Weighting::Model, Weighting::Full] {
+            let settings = |fit_range| Settings {
+                model: ModelChoice::Given("WN+AR1+RW".parse().unwrap()),
+                rate_hz: 100.0,
+                weighting,
+                fit_range,
+                ..Settings::default()
+            };
+            let fit = |curve: &Curve, range| {
+                fit_curve(&group, Estimator::Given, curve.clone(), &settings(range)).unwrap()
+            };
+            let (ranged, shortened, all) = (fit(&whole, Some(range)), fit(&short, None), fit(&whole, None));
+            assert_eq!((ranged.counted_levels().len(), ranged.departure().scales), (12, 12));
+            // The covariance of the second is that of a first fit, known to 1e-8 or so; at a minimum parameters are known to the
+            // square root of what the objective is known to.
+            let (known, near) = if weighting == Weighting::Full { (1e-7, 3e-4) } else { (1e-9, 1e-6) };
+            assert_relative_eq!(ranged.fit.objective, shortened.fit.objective, max_relative = known);
+            let values = |o: &Outcome| o.fit.composite.parameters().map(|(_, x)| x).collect::<Vec<_>>();
+            for (a, b) in values(&ranged).into_iter().zip(values(&shortened)) {
+                assert_relative_eq!(a, b, max_relative = near);
+            }
+            assert!(all.fit.objective > 10.0 * ranged.fit.objective);
         }
-        assert!(all.fit.objective > 10.0 * ranged.fit.objective);
     }
 }

@@ -123,7 +123,7 @@ fn advice(e: &ExportError) -> Option<String> {
         ExportError::NoSensor { .. } => {
             Some("calibrate recordings of both sensors, or write the other one's section by hand".into())
         }
-        ExportError::NoWalk { .. } | ExportError::TwoTimes { .. } => {
+        ExportError::NoSuchBias { .. } | ExportError::TwoTimes { .. } => {
             Some("--policy matched fits the bias that the target has, over --horizon".to_owned())
         }
         ExportError::Curve { .. } => None,

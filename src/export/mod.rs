@@ -47,9 +47,11 @@ pub enum ExportError {
         /// The target.
         target: &'static str,
     },
-    /// A random walk is to be taken as it is, and the target has none.
-    #[error("{target} has no random walk, and the model's {} has one", .sensor.name())]
-    NoWalk {
+    /// A bias is to be taken as it is, and the target has none of that kind.
+    #[error("{target} has no {bias}, and the model's {} has one", .sensor.name())]
+    NoSuchBias {
+        /// What it has not.
+        bias: &'static str,
         /// The sensor.
         sensor: Sensor,
         /// The target.
@@ -160,12 +162,10 @@ impl Export {
                 return Err(ExportError::NoSensor { sensor, target: target.name() });
             }
             let axes: Vec<&Composite> = channels.iter().map(|c| model.axis(*c)).collect();
-            let walks = |p: &Process| matches!(p, Process::RandomWalk(_));
-            if settings.policy == Policy::Strict
-                && target.bias() != Bias::Walk
-                && axes.iter().any(|a| a.processes.iter().any(walks))
-            {
-                return Err(ExportError::NoWalk { sensor, target: target.name() });
+            let lacking =
+                (settings.policy == Policy::Strict).then(|| lacking(target.bias(), &axes)).flatten();
+            if let Some(bias) = lacking {
+                return Err(ExportError::NoSuchBias { bias, sensor, target: target.name() });
             }
             let curve = Curve::largest(&axes, model.rate_hz, settings.horizon)
                 .map_err(|source| ExportError::Curve { sensor, source })?;
@@ -185,6 +185,19 @@ impl Export {
         }
         let entries = target.entries(&Values::new(model.rate_hz, &sensors));
         Ok(Self { target, rate_hz: model.rate_hz, settings, sensors, entries })
+    }
+}
+
+/// The kind of bias that the model has and the target has not. The AR1 beside a random walk are what a strict pair leaves out,
+/// as its doubts say; a Gauss-Markov process that is the model's only bias is not left out.
+fn lacking(known: Bias, axes: &[&Composite]) -> Option<&'static str> {
+    let has = |is: fn(&Process) -> bool| axes.iter().any(|a| a.processes.iter().any(is));
+    let walks = has(|p| matches!(p, Process::RandomWalk(_)));
+    match known {
+        Bias::Walk => {
+            (!walks && has(|p| matches!(p, Process::GaussMarkov(_)))).then_some("Gauss-Markov bias")
+        }
+        _ => walks.then_some("random walk"),
     }
 }
 

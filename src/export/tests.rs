@@ -76,12 +76,15 @@ fn kalibr_reads_back_the_densities() {
     }
 }
 
-/// Standard deviations of a sample at 200 Hz: N √200.
+/// Standard deviations of a sample at 200 Hz. In one second a velocity or angle must grow by N²: 200 intervals with two ends of
+/// weight dt/2 each. The bias is K √200.
 #[test]
 fn vins_has_noise_of_a_sample() {
+    let dt = 1.0_f64 / 200.0;
+    let of_end = (1.0 / (200.0 * 2.0 * (dt / 2.0).powi(2))).sqrt();
     let root = 200.0_f64.sqrt();
     let expected =
-        [("acc_n", N_A * root), ("gyr_n", N_G * root), ("acc_w", K_A * root), ("gyr_w", K_G * root)];
+        [("acc_n", N_A * of_end), ("gyr_n", N_G * of_end), ("acc_w", K_A * root), ("gyr_w", K_G * root)];
     assert_values(&walks(Target::Vins), &expected);
 }
 
@@ -301,4 +304,21 @@ fn axes_that_differ_are_told() {
 fn numbers_are_numbers_in_yaml() {
     let shown = [2e-5, 1.25e-7, 100.0, 0.02, 0.0, 1e7].map(number);
     assert_eq!(shown, ["2.0e-5", "1.25e-7", "100.0", "0.02", "0.0", "1.0e7"]);
+}
+
+/// A strict pair takes the model's bias as it is, of either kind, or is refused.
+#[test]
+fn a_strict_pair_does_not_drop_the_bias() {
+    let refused = |target, bias: fn() -> Process| {
+        let model = Model::pooled(
+            RATE,
+            &Composite::new(vec![white(N_A), bias()]),
+            &Composite::new(vec![white(N_G), bias()]),
+        );
+        Export::new(target, &model, &[], settings(Policy::Strict)).unwrap_err().to_string()
+    };
+    let said = refused(Target::Kalibr, || markov(1e-3, 100.0));
+    assert_eq!(said, "kalibr has no Gauss-Markov bias, and the model's accel has one");
+    let said = refused(Target::KfGins, || walk(K_A));
+    assert_eq!(said, "kf-gins has no random walk, and the model's accel has one");
 }

@@ -69,16 +69,19 @@ pub(super) const VINS: Layout = Layout {
     source: "VINS-Mono and VINS-Fusion, config/*.yaml; paste in the place of the same keys",
 };
 
-/// VINS-Mono and VINS-Fusion: standard deviations of a sample, N√f, and of the bias's slope over one sample interval, K√f:
+/// VINS-Mono and VINS-Fusion: standard deviations of a sample, N√(2f), and of the bias's slope over one sample interval, K√f:
 /// the integration multiplies both by dt (<https://github.com/HKUST-Aerial-Robotics/VINS-Mono>,
-/// `vins_estimator/src/factor/integration_base.h`). Its midpoint rule takes the noise of the two ends of an interval as
-/// independent from interval to interval, which counts half the variance; nothing is added for that here.
+/// `vins_estimator/src/factor/integration_base.h`). Its midpoint rule gives each end of an interval half the weight and
+/// takes the ends as independent from interval to interval: a velocity grows by f·2·(dt/2)²·acc_n² a second, half of what
+/// noise of that deviation in every sample makes. Hence the 2.
 pub(super) fn vins(v: &Values) -> Vec<Entry> {
     let root = v.rate_hz.sqrt();
+    let midpoint = (2.0 * v.rate_hz).sqrt();
     let per = |what: &str| format!("{what}, at {} Hz", v.rate_hz);
+    let noise = per("N sqrt(2f), noise of a sample in the midpoint rule");
     vec![
-        Entry::new("acc_n", v.accel.density * root, "m/s^2", per("N sqrt(f), noise of a sample")),
-        Entry::new("gyr_n", v.gyro.density * root, "rad/s", per("N sqrt(f), noise of a sample")),
+        Entry::new("acc_n", v.accel.density * midpoint, "m/s^2", noise.clone()),
+        Entry::new("gyr_n", v.gyro.density * midpoint, "rad/s", noise),
         Entry::new("acc_w", v.accel.walk * root, "m/s^3", per("K sqrt(f), bias random walk of a sample")),
         Entry::new("gyr_w", v.gyro.walk * root, "rad/s^2", per("K sqrt(f), bias random walk of a sample")),
     ]

@@ -89,7 +89,13 @@ pub(crate) fn fit_with_covariance(
     covariance: &DMatrix<f64>,
     nu: Vec<f64>,
 ) -> Result<Fit, FitError> {
-    let mixing = Some(Arc::new(whitening(covariance)));
+    // A scale that counts nothing must not come in through the errors it shares with others.
+    let counts = |i: usize| !curve.ignored.contains(&curve.levels[i]);
+    let own = DMatrix::from_fn(covariance.nrows(), covariance.ncols(), |i, j| match i == j {
+        _ if counts(i) && counts(j) => covariance[(i, j)],
+        diagonal => f64::from(u8::from(diagonal)),
+    });
+    let mixing = Some(Arc::new(whitening(&own)));
     fit_near(curve, spec, rate_hz, Weights { weighting: Weighting::Full, nu, mixing }, COMBINATIONS, &[])
 }
 

@@ -139,7 +139,13 @@ impl Objective {
         components: Vec<Component>,
     ) -> Self {
         let roots = match mixing {
-            Some(_) => nu.iter().map(|nu| 1.0 / nu).collect(),
+            Some(_) => {
+                let relative = |(nu, level): (&f64, &u32)| match curve.ignored.contains(level) {
+                    true => 0.0,
+                    false => 1.0 / nu,
+                };
+                nu.iter().zip(&curve.levels).map(relative).collect()
+            }
             None => weighting.roots(curve, nu),
         };
         let target: Vec<f64> = roots.iter().zip(&curve.wv).map(|(w, nu)| w * nu).collect();

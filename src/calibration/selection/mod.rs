@@ -69,22 +69,24 @@ pub(crate) fn choose(
         Weighting::Full | Weighting::Model => Weighting::Edof,
         other => other,
     };
+    let reported = settings;
     let settings = &Settings { weighting, ..settings.clone() };
     let fitted = |spec: &ModelSpec| {
         fit(curve, spec, settings.rate_hz, settings.weighting).map(|fit| (spec.clone(), fit))
     };
-    let all = sums(curve.levels.len());
+    let scales = curve.levels.len() - curve.ignored.len();
+    let all = sums(scales);
     let fits = all.par_iter().map(fitted).collect::<Result<Vec<_>, _>>()?;
     let tried = fits.len();
     let fits: Vec<(ModelSpec, Fit)> =
         fits.into_iter().filter(|(_, f)| f.zero.is_empty() && f.at_end.is_empty()).collect();
     let not_identifiable = tried - fits.len();
     advance(stage);
-    let field = Field { group, estimator, curve, settings, fits };
+    let field = Field { group, estimator, curve, settings, reported, fits };
     field.rank(not_identifiable, &|| advance(stage)).ok_or_else(|| FitError::TooFewScales {
         spec: "auto".to_owned(),
         parameters: 2,
-        scales: curve.levels.len(),
+        scales,
     })
 }
 
@@ -117,7 +119,10 @@ struct Field<'a> {
     group: &'a Group,
     estimator: Estimator,
     curve: &'a Curve,
+    /// With the weighting that is the same for all candidates.
     settings: &'a Settings,
+    /// With the weighting of the fit that is reported.
+    reported: &'a Settings,
     fits: Vec<(ModelSpec, Fit)>,
 }
 
@@ -197,22 +202,28 @@ impl Field<'_> {
         p >= J_LEVEL
     }
 
-    /// Probability of so large an objective if the candidate is true.
+    /// Probability of so large an objective if the candidate is true, of its fit as it would be reported.
     fn j_p_value(&self, i: usize) -> f64 {
-        let curves =
-            self.curves(i, "auto J-test", |sampler, key, settings| sampler.draw_as_recorded(key, settings));
-        let drawn: Vec<f64> = curves.par_iter().filter_map(|c| Some(self.again(i, c)?.objective)).collect();
-        let larger = drawn.iter().filter(|objective| **objective >= self.objective(i)).count();
+        let Self { curve, reported, .. } = *self;
+        let spec = &self.fits[i].0;
+        // Weights of the observed variances cannot reject a model that is far below them: a scale costs edof/2 at most.
+        let Ok(own) = fit(curve, spec, reported.rate_hz, reported.weighting) else { return 0.0 };
+        let curves = self
+            .curves(&own, "auto J-test", |sampler, key, settings| sampler.draw_as_recorded(key, settings));
+        let objective = |c: &Curve| {
+            refit(c, spec, reported.rate_hz, reported.weighting, &own).ok().map(|fit| fit.objective)
+        };
+        let drawn: Vec<f64> = curves.par_iter().filter_map(objective).collect();
+        let larger = drawn.iter().filter(|objective| **objective >= own.objective).count();
         (1 + larger) as f64 / (1 + drawn.len()) as f64
     }
 
     /// New curves of a candidate.
     fn draws(&self, i: usize) -> Vec<Curve> {
-        self.curves(i, "auto", |sampler, key, settings| sampler.draw(key, settings))
+        self.curves(&self.fits[i].1, "auto", |sampler, key, settings| sampler.draw(key, settings))
     }
 
-    fn curves(&self, i: usize, scenario: &str, draw: Draw) -> Vec<Curve> {
-        let (_, fit) = &self.fits[i];
+    fn curves(&self, fit: &Fit, scenario: &str, draw: Draw) -> Vec<Curve> {
         let sampler = CurveSampler::new(
             &self.group.replicates,
             self.estimator,
