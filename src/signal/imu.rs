@@ -64,9 +64,9 @@ crate::named!(Axis, in files);
 /// One of the six signals of an IMU.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Channel {
-    /// Which sensor.
+    /// The sensor.
     pub sensor: Sensor,
-    /// Which axis of it.
+    /// The axis of the sensor.
     pub axis: Axis,
 }
 
@@ -87,8 +87,8 @@ impl Channel {
         self.sensor as usize * 3 + self.axis as usize
     }
 
-    /// The channels a word stands for: `all`, a sensor (`accel`), an axis of both sensors (`x`) or one channel
-    /// (`accel.x`); none for any other.
+    /// Channels that a word stands for: `all`, a sensor (`accel`), an axis of both sensors (`x`) or one
+    /// channel (`accel.x`); none for any other.
     #[must_use]
     pub fn named(word: &str) -> Vec<Self> {
         let meant = |c: &Self| {
@@ -119,7 +119,7 @@ pub struct ImuSample {
 pub struct ImuIncrement {
     /// End of the interval (s).
     pub t_s: f64,
-    /// Its length (s).
+    /// Length of the interval (s).
     pub dt_s: f64,
     /// ∫ omega_ib dt in the axes of the sensor (rad).
     pub dtheta: DVec3,
@@ -130,7 +130,7 @@ pub struct ImuIncrement {
 /// One signal of a static recording, its mean removed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Signal {
-    /// Which channel.
+    /// The channel.
     pub channel: Channel,
     /// The mean that was removed: gravity, Earth rate, turn-on bias (m/s² or rad/s).
     pub mean: f64,

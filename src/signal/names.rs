@@ -1,12 +1,12 @@
 //! Words for the members of closed sets, as files and command lines write them.
 
-/// A word that names none of those there are.
+/// A word that names no member of the set.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("\"{word}\" is not one of {}", legal.join(", "))]
 pub struct UnknownName {
     /// The word.
     pub word: String,
-    /// What there is.
+    /// The legal words.
     pub legal: &'static [&'static str],
 }
 

@@ -7,7 +7,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 /// The generator of the project: xoshiro256++ (fast, 256 bits of state, equidistributed).
 pub type Generator = Xoshiro256PlusPlus;
 
-/// What a stream is for. Two keys that differ in any part give independent streams: the generator's
+/// Key of a random stream. Two keys that differ in any part give independent streams: the generator's
 /// state is the BLAKE3 hash of the parts, each preceded by its length.
 #[derive(Debug, Clone, Copy)]
 pub struct StreamKey<'a> {
@@ -17,9 +17,9 @@ pub struct StreamKey<'a> {
     pub scenario: &'a str,
     /// Monte-Carlo run, or replicate, counted from 0.
     pub run: u64,
-    /// What is noisy: "accel.x", "gyro.z", "gnss.pos_n", "initial.att", …
+    /// Noisy quantity: "accel.x", "gyro.z", "gnss.pos_n", "initial.att", …
     pub source: &'a str,
-    /// Which part of it: "WN", "AR1_2", "window", …
+    /// Part of the noise: "WN", "AR1_2", "window", …
     pub process: &'a str,
 }
 

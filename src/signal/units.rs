@@ -20,7 +20,7 @@ pub struct SettingError {
     pub value: String,
     /// What would be accepted, in words.
     pub requirement: String,
-    /// What to do about it, where the requirement does not say that.
+    /// Advice, where the requirement alone does not say what to do.
     pub advice: Option<&'static str>,
 }
 

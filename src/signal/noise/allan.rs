@@ -37,7 +37,7 @@ impl Composite {
     }
 }
 
-/// Of a Gauss-Markov process of variance 1 whose correlation time is 1/kappa samples.
+/// Allan variance of a Gauss-Markov process of variance 1 and correlation time 1/kappa samples.
 pub(super) fn unit_markov(kappa: f64, samples: u32) -> f64 {
     // The textbook form loses every digit as kappa → 0; this one is a sum of positive terms.
     if kappa < LN_2 && samples > 1 {
@@ -45,6 +45,7 @@ pub(super) fn unit_markov(kappa: f64, samples: u32) -> f64 {
     }
     let phi = (-kappa).exp();
     match samples {
+        // Half the variance of the difference of neighbours, 1 − phi.
         1 => -(-kappa).exp_m1(),
         m => 2.0 * (1.0 - phi) * (1.0 + phi) * fast_shape(phi, f64::from(m)).0,
     }
@@ -58,6 +59,8 @@ fn of_ar1(p: &Ar1, samples: u32) -> f64 {
     if phi > 0.0 {
         return p.variance() * unit_markov(-(phi - 1.0).ln_1p(), samples);
     }
+    // Between the octaves m may be odd: phi^m keeps its sign, and the product form of the wavelet variance
+    // does not apply.
     let u = phi.powi(samples.min(i32::MAX as u32) as i32);
     let bump = (1.0 - u) * (3.0 - u);
     p.sigma2() * (m * (1.0 - phi) * (1.0 + phi) - phi * bump) / (m * m * (1.0 - phi).powi(3) * (1.0 + phi))

@@ -46,6 +46,7 @@ impl Ar1 {
     /// Stationary variance sigma2/(1 − phi²) (units²).
     #[must_use]
     pub fn variance(&self) -> f64 {
+        // Factorised: 1 − phi is exact for phi ≥ ½, whereas phi² would be rounded before the subtraction.
         self.sigma2 / ((1.0 - self.phi) * (1.0 + self.phi))
     }
 
@@ -61,11 +62,14 @@ impl Ar1 {
     pub fn haar_shape(phi: f64, level: u32) -> (f64, f64) {
         let m = half_scale(level);
         if level <= 1 {
+            // m = 1: W is half the difference of neighbours, nu = γ₀(1 − phi)/2, and 1 − phi cancels against
+            // that of γ₀.
             let sum = 1.0 + phi;
             (0.5 / sum, -0.5 / (sum * sum))
         } else if phi > 0.5 {
             // phi − 1 is exact here, so kappa keeps all its digits.
             let (value, derivative) = slow_shape(-(phi - 1.0).ln_1p(), m);
+            // dκ/dphi = −1/phi.
             (value, -derivative / phi)
         } else if phi >= 0.0 {
             fast_shape(phi, m)
@@ -92,6 +96,7 @@ impl Ar1 {
 /// ½ < phi < 1, in kappa = −ln phi, where nothing cancels.
 fn slow_shape(kappa: f64, m: f64) -> (f64, f64) {
     let bracket = Slow::new(kappa).bracket(m);
+    // nu = s2·2κB for the stationary variance s2, and sigma2 = s2 (1 − e^(−2κ)) = s2·2κ e^(−κ) s(κ).
     let (s, s_log_derivative) = sinhc(kappa);
     let value = bracket.value * kappa.exp() / s;
     (value, value * (1.0 + bracket.log_derivative - s_log_derivative))
@@ -103,6 +108,8 @@ pub(super) fn fast_shape(phi: f64, m: f64) -> (f64, f64) {
     let (minus, plus) = (1.0 - phi, 1.0 + phi);
     let bump = (1.0 - u) * (3.0 - u);
     let numerator = m * minus * plus - phi * bump;
+    // d(phi·bump)/dphi = bump + phi (2u − 4) du/dphi with phi·du/dphi = m·u: no division by phi, which may be
+    // 0.
     let derivative = -2.0 * m * phi - bump + (4.0 - 2.0 * u) * m * u;
     let value = numerator / (2.0 * m * m * minus * minus * minus * plus);
     (value, value * (derivative / numerator + 3.0 / minus - 1.0 / plus))
@@ -112,6 +119,8 @@ pub(super) fn fast_shape(phi: f64, m: f64) -> (f64, f64) {
 /// product of 1 + r^(2^i); the derivative is with respect to r.
 fn alternating_shape(r: f64, level: u32) -> (f64, f64) {
     let m = half_scale(level);
+    // From level 2 on m is even, phi^m = r^m, and the factor 1 − r of 1 − u = (1 − r) G cancels against 1 +
+    // phi.
     // p = r^(2^i), q = 1 − p without cancellation; slant = Σ 2^i q/(1 + p) = m − 1 − 2rG'/G.
     let (mut p, mut q, mut sum, mut slant, mut weight) = (r, 1.0 - r, 1.0, 0.0, 1.0);
     for _ in 1..level {
@@ -124,6 +133,8 @@ fn alternating_shape(r: f64, level: u32) -> (f64, f64) {
     let plus = 1.0 + r;
     let numerator = m * plus + r * sum * (3.0 - p);
     let moment = 0.5 * sum * (m - 1.0 - slant);
+    // d/dr = m + (G + rG')(3 − u) − m·u·G. As r → 1 its terms of order m² cancel: with 2rG' = G(m − 1 −
+    // slant) they do so on paper, and q = 1 − u has all its digits.
     let derivative = m + sum * (2.0 - p - slant) + q * (moment + m * sum);
     let value = numerator / (2.0 * m * m * plus * plus * plus);
     (value, value * (derivative / numerator - 3.0 / plus))

@@ -33,6 +33,7 @@ pub fn walk_gamma2(density: f64, rate_hz: f64) -> f64 {
 /// Correlation time T = −dt/ln phi (s) of an AR1 with 0 < phi < 1.
 #[must_use]
 pub fn correlation_time_s(phi: f64, rate_hz: f64) -> f64 {
+    // phi − 1 is exact for phi ≥ ½: T keeps its digits where phi is next to 1.
     -1.0 / (rate_hz * (phi - 1.0).ln_1p())
 }
 
@@ -83,11 +84,14 @@ fn process_at_rate(process: &Process, from_hz: f64, to_hz: f64) -> Result<Proces
     let ratio = to_hz / from_hz;
     let tied = |why| RateError::Tied { code: process.code(), from_hz, to_hz, why };
     Ok(match process {
+        // What is kept: N² = sigma2/f, K² = gamma2·f, and the slope per second.
         Process::White(p) => Process::White(White::new(p.sigma2() * ratio)?),
         Process::RandomWalk(p) => Process::RandomWalk(RandomWalk::new(p.gamma2() / ratio)?),
         Process::Drift(p) => Process::Drift(Drift::new(p.slope() / ratio)?),
         Process::GaussMarkov(p) => Process::GaussMarkov(GaussMarkov::new(p.beta(), p.s2(), to_hz)?),
         Process::Ar1(p) if p.phi() > 0.0 => {
+            // T and the stationary variance are kept: kappa = dt/T goes with dt, and sigma2 = variance·(1 −
+            // phi²).
             let kappa = -(p.phi() - 1.0).ln_1p() / ratio;
             Process::Ar1(Ar1::new((-kappa).exp(), p.variance() * -(-2.0 * kappa).exp_m1())?)
         }

@@ -12,7 +12,7 @@
 
 use super::{GaussMarkov, ParameterError};
 
-/// From one correlation time to the next.
+/// Ratio of neighbouring correlation times.
 const APART: f64 = 16.0;
 /// The shortest correlation time, unless the longest is shorter (s): what is faster is hidden by white noise.
 const SHORTEST_S: f64 = 1.0;
@@ -38,11 +38,13 @@ impl Flicker {
         (GaussMarkov::ALLAN_PEAK_AT * shortest_s, GaussMarkov::ALLAN_PEAK_AT * self.t_corr_s)
     }
 
-    /// The processes that have it, the slowest first.
+    /// The Gauss-Markov processes whose sum has this floor, the slowest first.
     ///
     /// # Errors
     /// When a number is not positive.
     pub fn processes(&self, rate_hz: f64) -> Result<Vec<GaussMarkov>, ParameterError> {
+        // One variance for all, such that the lowest Allan variance between the peaks is the square of the
+        // floor.
         let s2 = self.floor * self.floor / LOWEST[(self.count() as usize).min(LOWEST.len()) - 1];
         let process = |k: i32| GaussMarkov::new(APART.powi(k) / self.t_corr_s, s2, rate_hz);
         (0..self.count()).map(process).collect()

@@ -17,10 +17,11 @@ pub struct GaussMarkov {
 impl GaussMarkov {
     /// Code in model files.
     pub const CODE: &'static str = "GM";
-    /// Its largest Allan deviation over its standard deviation, where averages last [`Self::ALLAN_PEAK_AT`] correlation
-    /// times: with x of them the Allan variance is s2·(2/x)·[1 − (3 − 4e^(−x) + e^(−2x))/(2x)].
+    /// Largest Allan deviation over standard deviation, reached with averages of [`Self::ALLAN_PEAK_AT`]
+    /// correlation times: with averages of x correlation times the Allan variance is
+    /// s2·(2/x)·[1 − (3 − 4e^(−x) + e^(−2x))/(2x)].
     pub(crate) const ALLAN_PEAK: f64 = 0.617_364_283_144_441_3;
-    /// Where that is, in correlation times.
+    /// Averaging time of the largest Allan deviation (correlation times).
     pub(crate) const ALLAN_PEAK_AT: f64 = 1.892_617_8;
 
     /// From the inverse correlation time beta (1/s), the stationary variance s2 (units²) and the rate (Hz).
@@ -37,6 +38,8 @@ impl GaussMarkov {
         };
         let x = positive("beta", beta)? / positive("rate_hz", rate_hz)?;
         let s2 = non_negative(Self::CODE, "s2", s2)?;
+        // sigma2 = s2 (1 − phi²) by expm1: of a slow process phi² is next to 1 and the difference would lose
+        // its digits.
         let ar1 = Ar1::new((-x).exp(), s2 * -(-2.0 * x).exp_m1())?;
         Ok(Self { beta, s2, rate_hz, ar1 })
     }
@@ -59,7 +62,7 @@ impl GaussMarkov {
         self.s2
     }
 
-    /// The AR1 it is when sampled.
+    /// The same process sampled: an AR1 with phi = e^(−beta/f) and sigma2 = s2 (1 − phi²).
     #[must_use]
     pub const fn ar1(&self) -> Ar1 {
         self.ar1
@@ -82,6 +85,7 @@ impl GaussMarkov {
             (value, 2.0 * bracket.value + value * bracket.log_derivative)
         } else {
             let phi = (-kappa).exp();
+            // phi ≤ ½: nothing cancels in the form of phi. d/dκ = −phi d/dphi, and 1 − phi² is sigma2/s2.
             let variance = (1.0 - phi) * (1.0 + phi);
             let (value, derivative) = fast_shape(phi, m);
             (value * variance, -phi * (derivative * variance - 2.0 * phi * value))

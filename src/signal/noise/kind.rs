@@ -47,11 +47,11 @@ pub enum Parameter {
 pub struct ParameterRef {
     /// Position of the process in the sum.
     pub process: usize,
-    /// Which of its parameters.
+    /// The parameter.
     pub parameter: Parameter,
 }
 
-/// What is to be said of a kind.
+/// Row of the table of kinds.
 struct Row {
     code: &'static str,
     /// In the order of files: the shape, if it has one, before the amplitude.
@@ -181,7 +181,7 @@ impl Parameter {
         matches!(self, Self::Phi | Self::Beta | Self::Theta)
     }
 
-    /// Where it lives.
+    /// Ends of its domain, (low, high).
     #[must_use]
     pub const fn domain(self) -> (f64, f64) {
         match self {

@@ -1,4 +1,4 @@
-//! How far the mean of a recording is from the level it was switched on at.
+//! Variance of the mean of a recording about the level at which it was switched on.
 
 use super::{Ar1, Composite, Process};
 
@@ -22,17 +22,20 @@ fn mean_variance(process: &Process, n: f64) -> f64 {
         Process::RandomWalk(p) => p.gamma2() * (n + 1.0) * (2.0 * n + 1.0) / (6.0 * n),
         Process::Drift(_) => 0.0,
         Process::Ma1(p) => {
+            // W_1 … W_(n−1) occur in two samples, with 1 and theta; W_n in one with 1, W_0 in one with theta.
             let inner = (1.0 + p.theta()) * (1.0 + p.theta());
             p.sigma2() * ((n - 1.0) * inner + 1.0 + p.theta() * p.theta()) / (n * n)
         }
     }
 }
 
+/// Variance of the mean of n samples of an AR1 (units²):
 /// γ₀/n² [n (1 + φ)/(1 − φ) − 2 φ (1 − φⁿ)/(1 − φ)²]
 fn of_ar1(p: &Ar1, n: f64) -> f64 {
     let (phi, left) = (p.phi(), 1.0 - p.phi());
     if n * left < 1e-2 {
         // The difference would lose its digits: e^(−κd) in powers of the distances d, what is left out is below 2e-8.
+        // Over the n² pairs the mean of |i − k| is (n² − 1)/(3n) and that of its square (n² − 1)/6.
         let (kappa, squares) = (-phi.ln(), n * n - 1.0);
         return p.variance() * (1.0 - kappa * squares / (3.0 * n) + kappa * kappa * squares / 12.0);
     }

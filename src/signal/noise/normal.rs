@@ -8,7 +8,7 @@ use rand::{Rng, RngExt};
 use std::sync::LazyLock;
 
 const LAYERS: usize = 256;
-/// Where the tail begins; with it, 256 layers of equal area close at the top (tested).
+/// Beginning of the tail. With this value 256 layers of equal area close at the top (tested).
 const R: f64 = 3.654_152_885_361_009;
 /// Area of each layer, R·f(R) + ∫_R^∞ f, of the unnormalised density f.
 const AREA: f64 = 0.004_928_673_233_974_655;
@@ -38,6 +38,8 @@ impl Ziggurat {
         // The bottom layer is as wide as a rectangle of its area, which includes the tail.
         x[0] = AREA / density(R);
         x[1] = R;
+        // Layers of one area: x[i−1] (f(x[i]) − f(x[i−1])) = AREA. x[LAYERS] stays 0, so the top layer has no
+        // part that is accepted unseen.
         for i in 2..LAYERS {
             x[i] = (-2.0 * (AREA / x[i - 1] + density(x[i - 1])).ln()).sqrt();
         }
@@ -48,6 +50,7 @@ impl Ziggurat {
     #[inline(always)]
     pub(super) fn draw(&self, g: &mut Generator) -> f64 {
         let (layer, u, x) = self.candidate(g);
+        // Within the next narrower layer the whole height of this one lies below the density.
         if x.abs() < self.x[layer + 1] {
             return x;
         }
@@ -62,6 +65,8 @@ impl Ziggurat {
     fn candidate(&self, g: &mut Generator) -> (usize, f64, f64) {
         let bits = g.next_u64();
         let layer = (bits & 0xff) as usize;
+        // Mantissa bits under the exponent of 2: uniform on [2, 4), and the subtraction is exact. The layer's
+        // 8 bits are not among them.
         let u = f64::from_bits((bits >> 12) | 2.0_f64.to_bits()) - 3.0;
         (layer, u, u * self.x[layer])
     }
@@ -74,6 +79,8 @@ impl Ziggurat {
             if layer == 0 {
                 return (tail(&mut g).copysign(u), g);
             }
+            // A uniform height within the layer, accepted below the density: von Neumann's rejection on the
+            // edge.
             let (low, high) = (self.f[layer], self.f[layer + 1]);
             if high + (low - high) * g.random::<f64>() < density(x) {
                 return (x, g);
@@ -92,6 +99,8 @@ fn tail(g: &mut Generator) -> f64 {
     let mut exponential = || -(1.0 - g.random::<f64>()).ln();
     loop {
         let (x, y) = (exponential() / R, exponential());
+        // f(R + x) is e^(−Rx)·e^(−x²/2) but for a constant: the first factor is drawn, the second accepts
+        // with P(y > x²/2).
         if 2.0 * y > x * x {
             return R + x;
         }

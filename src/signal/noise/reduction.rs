@@ -61,14 +61,18 @@ pub fn reduce(
     if let Some(exact) = exact(&kept) {
         return exact;
     }
+    // Level 1 (two samples) is the first there is; level 40 is three and a half centuries at 100 Hz.
     let level = |seconds: f64| (seconds * rate_hz).max(2.0).log2().round();
     let levels: Vec<u32> = (level(interval_s) as u32..=level(window_s).min(40.0) as u32).collect();
+    // Three unknowns: white noise, variance and correlation time of the bias.
     if levels.len() < 3 {
         return Err(ReductionError::TooFewScales { interval_s, window_s, rate_hz });
     }
     let target: Vec<f64> = levels.iter().map(|l| kept.haar_wv(*l)).collect();
     let fit = Fit { levels, target };
     let [ln_white, ln_variance, ln_kappa] = fit.solve();
+    // The Gauss-Markov bias as the AR1 that it is when sampled; expm1 keeps the digits of 1 − phi² for a slow
+    // one.
     let (kappa, variance) = (ln_kappa.exp(), ln_variance.exp());
     Ok(Reduced {
         white: White::new(ln_white.exp())?,
@@ -131,6 +135,8 @@ impl Fit {
     fn solve(&self) -> [f64; 3] {
         let (first, last) = (f64::from(self.levels[0]), f64::from(self.levels[self.levels.len() - 1]));
         let starts = (0..60).map(|i| {
+            // From a quarter of the shortest scale, where the bias looks white, to sixteen times the longest,
+            // where it looks like a random walk.
             let log2_tau = first - 2.0 + (last - first + 6.0) * f64::from(i) / 59.0;
             self.start(-log2_tau * std::f64::consts::LN_2)
         });
@@ -149,8 +155,12 @@ impl Fit {
             (aa, ab, bb, a1, b1) = (aa + a * a, ab + a * b, bb + b * b, a1 + a, b1 + b);
             (a_max, b_max) = (a_max.max(a), b_max.max(b));
         }
+        // a·x + b·y ≈ 1 at every scale, in the mean square: to first order that is the logarithm of the
+        // ratio.
         let determinant = aa * bb - ab * ab;
         let (mut x, mut y) = ((a1 * bb - b1 * ab) / determinant, (b1 * aa - a1 * ab) / determinant);
+        // Where one amplitude would be negative it is 0, and the other is fitted alone; NaN comes from
+        // parallel columns.
         if x.is_nan() || x <= 0.0 {
             (x, y) = (0.0, b1 / bb);
         } else if y.is_nan() || y <= 0.0 {
@@ -174,6 +184,8 @@ impl Fit {
         let (mut cost, mut damping) = (self.cost(&x), 1e-3);
         for _ in 0..200 {
             let (normal, gradient) = self.normal_equations(&x);
+            // Marquardt's scaling by the diagonal; the 1e-12 keeps the matrix regular where an amplitude has
+            // vanished and its row with it.
             let damped = normal + Matrix3::from_diagonal(&normal.diagonal().add_scalar(1e-12)) * damping;
             let Some(step) = damped.lu().solve(&-gradient) else { break };
             // a parameter that the fit does not feel may wander: at most e² a step
@@ -201,6 +213,7 @@ impl Fit {
         for (level, target) in self.levels.iter().zip(&self.target) {
             let (shape, slope) = GaussMarkov::haar_shape(kappa, *level);
             let (a, b) = (white * White::haar_shape(*level), variance * shape);
+            // d ln(a + b) with respect to ln sigma2, ln variance and ln kappa.
             let row = Vector3::new(a, b, variance * slope * kappa) / (a + b);
             normal += row * row.transpose();
             gradient += row * ((a + b) / target).ln();

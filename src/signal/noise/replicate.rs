@@ -5,14 +5,14 @@ use super::{Model, Spread, SpreadError, Synthesizer};
 use crate::imu::{Channel, Recording, Signal};
 use crate::rng::StreamKey;
 
-/// What the replicates are drawn from.
+/// Source of virtual replicates: an IMU with known noise.
 #[derive(Debug, Clone, Copy)]
 pub struct VirtualImu<'a> {
     /// The noise.
     pub model: &'a Model,
-    /// How its parameters vary between replicates; none: they do not.
+    /// Variation of its parameters between replicates; none: they do not vary.
     pub spread: Option<&'a Spread>,
-    /// What goes wrong; none: nothing.
+    /// Contamination of the signals; none: they are clean.
     pub contamination: Option<&'a Contamination>,
     /// Seed of everything.
     pub seed: u64,

@@ -17,7 +17,7 @@ pub(super) struct Bracket {
     pub(super) log_derivative: f64,
 }
 
-/// What of B depends on κ alone, for 0 ≤ κ ≤ ln 2 (phi ≥ ½).
+/// The parts of B that depend on κ alone, for 0 ≤ κ ≤ ln 2 (phi ≥ ½).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Slow {
     kappa: f64,
@@ -43,7 +43,7 @@ impl Slow {
     }
 }
 
-/// d ln s(κ)/dκ and s(κ), s = sinh κ/κ.
+/// s(κ) = sinh κ/κ and d ln s/dκ.
 pub(super) fn sinhc(kappa: f64) -> (f64, f64) {
     let (s, ds) = sinh_series::<1>(kappa);
     (s, ds / s)
@@ -54,6 +54,7 @@ fn sinh_series<const N: usize>(x: f64) -> (f64, f64) {
     let x2 = x * x;
     let mut term = if N == 1 { 1.0 } else { 1.0 / 6.0 };
     let (mut sum, mut derivative) = (term, 0.0);
+    // At x = ln 2 the first term left out, x^20/21!, is below 1e-22 of the sum.
     for k in 1..10_usize {
         let n = 2 * k + N;
         term /= ((n - 1) * n) as f64;
@@ -69,6 +70,7 @@ fn ramp(x: f64) -> (f64, f64) {
     if x < 1.0 {
         return ramp_series(x);
     }
+    // At x = 1 the numerator is 0.34, of terms up to 3: at most one digit is lost here, and fewer as x grows.
     let e = (-x).exp();
     let f = (2.0 * x - 3.0 + e * (4.0 - e)) / (x * x * x);
     (f, (2.0 * (1.0 - e) * (1.0 - e) / (x * x) - 3.0 * f) / x)
@@ -78,6 +80,7 @@ fn ramp(x: f64) -> (f64, f64) {
 fn ramp_series(x: f64) -> (f64, f64) {
     let (mut f, mut df) = (0.0, 0.0);
     for &c in RAMP.iter().rev() {
+        // Horner's rule for the derivative needs f from before this coefficient.
         df = df * x + f;
         f = f * x + c;
     }

@@ -1,5 +1,5 @@
-//! How parameters vary between replicates: each time an IMU is switched on, its noise is drawn from a model
-//! that is itself drawn (θ_i ~ G, [Minaretzis](crate::bibliography::Minaretzis24), eq. 1).
+//! Variation of the parameters between replicates: each time an IMU is switched on, its noise is drawn from a
+//! model that is itself drawn (θ_i ~ G, [Minaretzis](crate::bibliography::Minaretzis24), eq. 1).
 //!
 //! In a model file:
 //! ```toml
@@ -27,15 +27,15 @@ use crate::rng::{Generator, StreamKey};
 use rand::RngExt;
 use rand_distr::{Beta, StandardNormal};
 
-/// A law that cannot be.
+/// Why a law is refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum SpreadError {
     /// The model has no process of that label.
     #[error("the model has no process \"{label}\" there, only {}", known.join(", "))]
     NoProcess {
-        /// What was asked for.
+        /// Label asked for.
         label: String,
-        /// What there is.
+        /// Labels of the processes of the model.
         known: Vec<String>,
     },
     /// The process has no parameter of that name.
@@ -43,9 +43,9 @@ pub enum SpreadError {
     NoParameter {
         /// Code of the process.
         process: &'static str,
-        /// What was asked for.
+        /// Name asked for.
         parameter: String,
-        /// What there is.
+        /// Names of the parameters of the process.
         known: Vec<&'static str>,
     },
     /// A constant of the law is outside its domain.
@@ -110,6 +110,8 @@ impl Variation {
         };
         let variation = Self { process: process.to_owned(), parameter: parameter.to_owned(), law };
         variation.check_constants()?;
+        // The domains are intervals: a beta law stays inside if its two ends do. A normal law is drawn again
+        // until inside, so only its centre must be there.
         let (low, high) = match law {
             Law::Beta { low, width, .. } => (low, low + width),
             Law::Normal { .. } => {
@@ -221,6 +223,7 @@ impl Spread {
                     return Err(SpreadError::NoProcess { label: variation.process.clone(), known: labels });
                 };
                 let process = format!("spread.{}.{}", variation.process, variation.parameter);
+                // A stream for each law: to let one more parameter vary changes no other's draws.
                 let key =
                     StreamKey { seed, scenario: "", run: replicate, source: &source, process: &process };
                 noise.processes[at] =

@@ -20,7 +20,8 @@ pub struct Synthesizer {
 
 /// Samples made at a time: every process fills a block, then the blocks are summed.
 const BLOCK: usize = 64;
-/// Recursions that advance together: each waits for its own last sample, three keep the processor busy.
+/// Recursions that advance together: each step waits for the last one of its own chain, and three chains side
+/// by side keep the processor busy meanwhile.
 const TOGETHER: usize = 3;
 
 impl Synthesizer {
@@ -40,6 +41,8 @@ impl Synthesizer {
         let draw = |g: &mut Generator| Ziggurat::get().draw(g);
         let (kind, last) = match process {
             Process::White(p) if p.sigma2() > 0.0 => (Kind::White { sigma: p.sigma2().sqrt() }, 0.0),
+            // The value before the first one is drawn too, so that the first sample has the variance 2 Q² of
+            // all others.
             Process::Quantization(p) if p.q2() > 0.0 => {
                 (Kind::Quantization { scale: (12.0 * p.q2()).sqrt() }, g.random())
             }
@@ -92,6 +95,8 @@ enum Kind {
 impl Direct {
     /// Adds the next samples to `out`.
     fn add_to(&mut self, out: &mut [f64]) {
+        // A local copy of the generator stays in registers; the one behind `self` would be stored at every
+        // draw.
         let (z, mut g, mut last) = (Ziggurat::get(), self.generator.clone(), self.last);
         match self.kind {
             Kind::White { sigma } => out.iter_mut().for_each(|x| *x += sigma * z.draw(&mut g)),
@@ -140,6 +145,8 @@ impl Recursive {
 /// Adds the next samples of N recursions to `out`.
 fn add_recursive<const N: usize>(group: &mut [Recursive; N], out: &mut [f64]) {
     let n = out.len().min(BLOCK);
+    // All numbers first, then all recursions: the draws branch, and would break up the chains that run side
+    // by side.
     for r in group.iter_mut() {
         let (z, mut g) = (Ziggurat::get(), r.generator.clone());
         r.block[..n].iter_mut().for_each(|w| *w = z.draw(&mut g));
@@ -150,6 +157,8 @@ fn add_recursive<const N: usize>(group: &mut [Recursive; N], out: &mut [f64]) {
     for (k, x) in out.iter_mut().enumerate().take(n) {
         for i in 0..N {
             last[i] = phi[i] * last[i] + sigma[i] * group[i].block[k];
+            // In the order of the list, however it is grouped: the rounding of the sum does not depend on
+            // TOGETHER.
             *x += last[i];
         }
     }

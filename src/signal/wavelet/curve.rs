@@ -2,7 +2,7 @@
 
 use super::QuantizationResponse;
 
-/// Wavelet variance over scales, and how well it is known.
+/// Wavelet variance over scales, with its degrees of freedom.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Curve {
     /// Levels, ascending; level j has scale 2^j samples.
@@ -11,15 +11,15 @@ pub struct Curve {
     pub wv: Vec<f64>,
     /// Equivalent degrees of freedom.
     pub edof: Vec<f64>,
-    /// How its variances read quantization noise, where they are robust; classical ones read it as it is.
+    /// Response of robust variances to quantization noise; none for classical ones, which read it as it is.
     pub quantization: Option<QuantizationResponse>,
-    /// Levels that count nothing in a fit: robust variances without an admissible root.
+    /// Levels without weight in a fit: robust variances without an admissible root.
     pub ignored: Vec<u32>,
 }
 
 impl Curve {
     /// Variances that can be fitted (units²): their squares and quotients are numbers.
     pub const WV_RANGE: (f64, f64) = (1e-100, 1e100);
-    /// Degrees of freedom that mean something.
+    /// Degrees of freedom that are accepted.
     pub const EDOF_RANGE: (f64, f64) = (1e-15, 1e15);
 }

@@ -13,7 +13,7 @@ pub fn edof_eta3(samples: usize, level: u32) -> f64 {
     (coefficient_count(samples, level) as f64 / f64::from(level).exp2()).max(1.0)
 }
 
-/// What an estimator of the given efficiency leaves of the degrees of freedom, at least 1.
+/// Degrees of freedom of a robust variance: those of the classical one times the efficiency, at least 1.
 #[must_use]
 pub fn edof_robust(edof: f64, efficiency: f64) -> f64 {
     (edof * efficiency).max(1.0)
@@ -30,6 +30,8 @@ pub fn edof_large_sample(coefficients: &[f64], level: u32) -> f64 {
     let samples = coefficients.len() + (1 << level) - 1;
     let count = coefficients.len();
     let eta3 = edof_eta3(samples, level);
+    // The autocovariance is as smooth as the scale is long: every sixteenth of a scale resolves it, and
+    // spares the rest.
     let step = (1_usize << level).div_ceil(16);
     let lags = (2_usize << level) / step;
     if eta3 < 8.0 {
@@ -41,7 +43,10 @@ pub fn edof_large_sample(coefficients: &[f64], level: u32) -> f64 {
     };
     let s0 = autocovariance(0);
     let tail: f64 = (1..=lags).map(|lag| autocovariance(lag).powi(2)).sum();
+    // Σ over all lags of both signs; each lag kept stands for `step` of them.
     let sum = step as f64 * (s0 * s0 + 2.0 * tail);
+    // Each estimated s_k² is too large by its sampling variance, Σ s²/M in the mean: 2·lags·step of them
+    // raise the sum by this factor.
     let noise = 1.0 + 2.0 * (lags * step) as f64 / count as f64;
     (count as f64 * s0 * s0 * noise / sum).max(1.0)
 }
@@ -50,6 +55,7 @@ pub fn edof_large_sample(coefficients: &[f64], level: u32) -> f64 {
 #[must_use]
 pub fn interval(nu: f64, edof: f64, confidence: f64) -> (f64, f64) {
     let tail = 0.5 * (1.0 - confidence);
+    // nu = eta·nu_hat/chi²: the upper quantile of chi² gives the lower end.
     let (high, low) = (quantile(edof, 1.0 - tail), quantile(edof, tail));
     (nu * edof / high, nu * edof / low)
 }

@@ -18,7 +18,7 @@ pub use tuning::{Convention, Tuning};
 /// Why there is no wavelet variance.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum WaveletError {
-    /// Not even one coefficient at the last level.
+    /// The last level has no coefficient.
     #[error(
         "{samples} samples are too few for {levels} scales: scale 2^{levels} needs {} samples (at most {} scales here)",
         1_u64.checked_shl(*levels).unwrap_or(u64::MAX), max_levels(*samples)
@@ -40,7 +40,7 @@ pub enum WaveletError {
         /// The value.
         value: f64,
     },
-    /// A tuning that does not exist.
+    /// An efficiency without a tuning.
     #[error("efficiency {0} is out of range: between {low} and {high}", low = tuning::EFFICIENCY_RANGE.0, high = tuning::EFFICIENCY_RANGE.1)]
     Efficiency(f64),
 }
@@ -54,6 +54,7 @@ pub fn max_levels(samples: usize) -> u32 {
 /// The usual number of levels: floor(log2 T) − 1, at least 1.
 #[must_use]
 pub fn default_levels(samples: usize) -> u32 {
+    // At the last level of all the record holds less than two lengths of the scale.
     max_levels(samples).saturating_sub(1).max(1)
 }
 

@@ -1,4 +1,4 @@
-//! What quantization noise does to the robust wavelet variance.
+//! Response of the robust wavelet variance to quantization noise.
 //!
 //! The Haar coefficients of quantization noise are (U_t − 2 U_{t−m} + U_{t−2m})·√(12 Q²)/(2m) at every scale, U uniform:
 //! their law has no tails, and the M-estimate that is consistent for Gaussian coefficients reads it high. Of a sum of
@@ -19,7 +19,7 @@ const NODES: usize = 10;
 pub struct QuantizationResponse {
     /// Chebyshev coefficients of (b − 1)/share².
     factor: [f64; NODES],
-    /// Of (efficiency/Gaussian efficiency − 1)/share².
+    /// Chebyshev coefficients of (efficiency/Gaussian efficiency − 1)/share².
     efficiency: [f64; NODES],
 }
 
@@ -31,6 +31,7 @@ impl QuantizationResponse {
         let mut response = Self { factor: [0.0; NODES], efficiency: [0.0; NODES] };
         for node in 0..NODES {
             let angle = PI * (node as f64 + 0.5) / NODES as f64;
+            // Chebyshev's nodes leave out share = 0, where the quotient by share² would be 0/0.
             let share = 0.5 * (1.0 + angle.cos());
             let (factor, efficiency) = law.solve(share, c, a);
             for k in 0..NODES {
@@ -71,7 +72,7 @@ fn departure(series: &[f64; NODES], share: f64) -> (f64, f64) {
     (1.0 + share * share * p, 2.0 * share * p + 2.0 * share * share * dp)
 }
 
-/// Nodes and weights for Z and Y.
+/// Law of √(1 − share)·Z + √share·Y: nodes and weights of the quadratures over Z and Y.
 struct Law {
     normal: Vec<(f64, f64)>,
     second_difference: Vec<(f64, f64)>,
@@ -95,6 +96,7 @@ impl Law {
             for (z, wz) in &self.normal {
                 let r = gaussian * z + uniform * y;
                 let q = (r / c).powi(2);
+                // chi and its derivatives vanish beyond the rejection point.
                 if q >= 1.0 {
                     continue;
                 }
@@ -102,6 +104,7 @@ impl Law {
                 let chi = cube * (1.0 - q);
                 let weight = wy * wz;
                 sums.0 += weight * chi;
+                // dchi/dln b = −r² (1 − q)³ (1 − 5q), since r² and q fall as 1/b.
                 sums.1 -= weight * cube * (1.0 - 5.0 * q);
                 sums.2 += weight * chi * chi;
             }
@@ -114,6 +117,7 @@ impl Law {
         let mut log_b = 0.0_f64;
         for _ in 0..20 {
             let (chi, slope, _) = self.means(share, c, log_b.exp());
+            // The same constant a as for Gaussian coefficients: that it does not fit here is what b measures.
             let step = (a - chi) / slope;
             log_b += step;
             if step.abs() < 1e-14 {
@@ -121,6 +125,8 @@ impl Law {
             }
         }
         let (chi, slope, squares) = self.means(share, c, log_b.exp());
+        // An M-estimate has var ln b = var chi/(n (E dchi/dln b)²); the mean square of n Gaussian numbers has
+        // 2/n.
         (log_b.exp(), 2.0 * slope * slope / (squares - chi * chi))
     }
 }
@@ -130,6 +136,8 @@ impl Law {
 fn second_difference() -> Vec<(f64, f64)> {
     const INTERVALS: usize = 64;
     let mut nodes = Vec::new();
+    // The second derivative of the density jumps at v = 1: one rule over both pieces would lose Simpson's
+    // order.
     for from in [0.0, 1.0] {
         for i in 0..=INTERVALS {
             let v = from + i as f64 / INTERVALS as f64;

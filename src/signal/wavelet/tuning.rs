@@ -7,7 +7,7 @@ use super::{QuantizationResponse, WaveletError};
 use statrs::function::erf::erf;
 use std::f64::consts::{PI, SQRT_2};
 
-/// How the constant follows from the efficiency.
+/// Rule by which the constant follows from the efficiency.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Convention {
     /// From the definition.
@@ -67,6 +67,7 @@ impl Tuning {
         if !(EFFICIENCY_RANGE.0..=EFFICIENCY_RANGE.1).contains(&efficiency) {
             return Err(WaveletError::Efficiency(efficiency));
         }
+        // The efficiency is 0.014 at c = 2.6 and 0.9999 at c = 40: the range asked for lies between.
         let (mut low, mut high) = (BRANCH, 40.0);
         // Halved until no number lies between.
         while let middle = 0.5 * (low + high)
@@ -80,6 +81,8 @@ impl Tuning {
             }
         }
         let moments = Moments::new(high);
+        // The true efficiency, also under the convention of R: the degrees of freedom follow from it, not
+        // from the label.
         let (efficiency, a) = (moments.efficiency(Convention::Exact), moments.chi());
         Ok(Self { efficiency, c: high, a, quantization: QuantizationResponse::new(high, a) })
     }
@@ -107,18 +110,21 @@ impl Tuning {
             let (left, right) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
             if mean_chi(left) < mean_chi(right) { low = left } else { high = right }
         }
+        // Rejected coefficients have chi = 0, so with a share ε of them the equation reads (1 − ε) E
+        // chi(Z/√s) = a.
         1.0 - self.a / mean_chi(low)
     }
 
-    /// How far the variance of few Gaussian coefficients reads high in the mean, relative, times its degrees of
-    /// freedom: 0.295 at efficiency 0.6, 0 for the classical variance. To second order in the estimating equation it is
-    /// 1 + 2 cov(chi, chi')/var chi − E chi''/E chi', derivatives with respect to ln s of chi(W/√s).
+    /// Relative bias of the variance of few Gaussian coefficients times its degrees of freedom (it reads
+    /// high): 0.295 at efficiency 0.6, 0 for the classical variance. To second order in the estimating
+    /// equation it is 1 + 2 cov(chi, chi')/var chi − E chi''/E chi', derivatives with respect to ln s of
+    /// chi(W/√s).
     #[must_use]
     pub fn bias(&self) -> f64 {
         Moments::new(self.c).bias()
     }
 
-    /// How the robust wavelet variance reads quantization noise.
+    /// Response of the robust wavelet variance to quantization noise.
     #[must_use]
     pub const fn quantization(&self) -> &QuantizationResponse {
         &self.quantization
@@ -140,6 +146,7 @@ struct Moments {
 impl Moments {
     fn new(c: f64) -> Self {
         let mut even = [erf(c / SQRT_2); 11];
+        // By parts: E[Z^2k; |Z| ≤ c] = (2k − 1) E[Z^(2k−2); |Z| ≤ c] − 2 c^(2k−1) φ(c).
         let mut boundary = 2.0 * c * (-0.5 * c * c).exp() / (2.0 * PI).sqrt();
         for k in 1..=10 {
             even[k] = f64::from(2 * k as u8 - 1) * even[k - 1] - boundary;
@@ -150,6 +157,7 @@ impl Moments {
 
     /// E\[Z^2p (1 − Z²/c²)^n\].
     fn bump(&self, p: usize, n: usize) -> f64 {
+        // Binomial theorem: the sum of (n choose i)(−1)^i c^(−2i) E[Z^(2p+2i)].
         let (mut binomial, mut power, mut sum) = (1.0, 1.0, 0.0);
         for i in 0..=n {
             sum += binomial * power * self.even[p + i];
@@ -169,7 +177,10 @@ impl Moments {
         let first = 4.0 * self.bump(2, 3) / c2 - self.chi();
         let second = self.chi() - 12.0 * self.bump(2, 3) / c2 + 12.0 * self.bump(3, 2) / (c2 * c2);
         let variance = self.bump(2, 8) - self.chi() * self.chi();
+        // chi·chi' = 4 r⁶ y⁷/c² − r⁴ y⁸.
         let covariance = 4.0 * self.bump(3, 7) / c2 - self.bump(2, 8) - self.chi() * first;
+        // E δ of δ = ln(nu_hat/nu), times eta, is the rest; the 1 is that of E(e^δ − 1) = E δ + var(δ)/2 with
+        // var δ = 2/eta.
         1.0 + 2.0 * covariance / variance - second / first
     }
 
@@ -178,6 +189,7 @@ impl Moments {
         let m = self.bump(2, 4) - a;
         let slip = match convention {
             Convention::Exact => 0.0,
+            // The term of Q in Z^18 is −8 E[Z^18]/c^14; theirs has a plus, 16 of it too much.
             Convention::Wv => 16.0 * self.even[9] / self.c.powi(14),
         };
         let q = self.bump(2, 8) - a * a + slip;

@@ -32,7 +32,7 @@ impl Extent {
     }
 }
 
-/// What is done to a signal.
+/// Operation on a signal.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum Operation {
     /// Multiplies a parameter of the model, before synthesis.
@@ -67,9 +67,9 @@ pub enum Operation {
     },
     /// Replaces samples, chosen at random, by white noise.
     Replace {
-        /// How many.
+        /// Number of samples replaced.
         points: Extent,
-        /// How many stand together; the last block may be shorter.
+        /// Length of the blocks in which they stand; the last block may be shorter.
         block: Extent,
         /// Mean of the noise; none: the signal's mean.
         mean: Option<f64>,
@@ -78,11 +78,12 @@ pub enum Operation {
     },
     /// Adds vibrations: sines that begin with phase 0 at multiples of the spacing.
     Bursts {
-        /// How many.
+        /// Number of bursts.
         count: u64,
         /// Length of each.
         length: Extent,
-        /// From one's beginning to the next's, and from the record's beginning to the first's.
+        /// Distance between the beginnings of two bursts, and between those of the record and of the first
+        /// burst.
         spacing: Extent,
         /// Amplitude (m/s² or rad/s).
         amplitude: f64,
@@ -98,9 +99,9 @@ pub struct Rule {
     pub sensor: Sensor,
     /// Replicate, counted from 1 as in file names; none: every one.
     pub replicate: Option<u64>,
-    /// What is done.
+    /// The operation.
     pub operation: Operation,
-    /// Where it is written, such as "shocks.toml, line 3"; empty: nowhere.
+    /// Place in a file, such as "shocks.toml, line 3"; empty for a rule that is in none.
     #[serde(skip)]
     pub place: String,
 }
@@ -109,7 +110,7 @@ pub struct Rule {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("{place}{}{source}", if place.is_empty() { "" } else { ": " })]
 pub struct RefusedRule {
-    /// Of the rule.
+    /// Place of the rule.
     pub place: String,
     /// Why.
     pub source: ContaminationError,
@@ -121,7 +122,7 @@ pub enum ContaminationError {
     /// The record is too short for it.
     #[error("{what} needs {needed} samples, the record has {samples}")]
     TooShort {
-        /// Which operation.
+        /// The operation.
         what: &'static str,
         /// Samples it reaches to.
         needed: usize,
@@ -137,7 +138,7 @@ pub enum ContaminationError {
         process: String,
         /// Parameter asked for.
         parameter: String,
-        /// What there is.
+        /// Processes and parameters that the axis has.
         known: Vec<String>,
     },
     /// A law that does not exist.
@@ -158,7 +159,7 @@ pub struct Contamination {
 }
 
 impl Contamination {
-    /// What is done to a signal of a replicate (counted from 1), in the order of application.
+    /// Operations on a signal of a replicate (counted from 1), in the order of application.
     #[must_use]
     pub fn operations_for(&self, channel: Channel, replicate: u64) -> Vec<&Operation> {
         self.rules_for(channel, replicate).into_iter().map(|r| &r.operation).collect()
@@ -271,6 +272,8 @@ impl Operation {
                 let mut g = key.generator();
                 x.iter_mut().for_each(|v| *v += sigma * law.sample(&mut g));
             }
+            // A ramp of given end value, whatever the length: 0 at the first sample, the amplitude at the
+            // last.
             Self::Drift { amplitude } => {
                 let last = x.len().saturating_sub(1).max(1) as f64;
                 x.iter_mut().enumerate().for_each(|(k, v)| *v += amplitude * k as f64 / last);
@@ -283,12 +286,14 @@ impl Operation {
             Self::Replace { points, block, mean, sigma } => {
                 let (points, block) = (points.of(x.len()), block.of(x.len()).max(1));
                 fits("the replacement of points", points)?;
+                // Before anything is replaced, so that the mean is of the signal.
                 let mean = mean.unwrap_or_else(|| x.iter().sum::<f64>() / x.len().max(1) as f64);
                 replace(x, (points, block), mean, *sigma, key);
             }
             Self::Bursts { count, length, spacing, amplitude, frequency_hz } => {
                 let (length, spacing) = (length.of(x.len()), spacing.of(x.len()));
                 let count = usize::try_from(*count).unwrap_or(usize::MAX);
+                // The first burst begins after one spacing, so the last one ends at count·spacing + length.
                 fits("a train of bursts", count.saturating_mul(spacing).saturating_add(length))?;
                 let step = std::f64::consts::TAU * frequency_hz / rate_hz;
                 for start in (1..=count).map(|i| i * spacing) {
@@ -332,6 +337,8 @@ fn scale(
 }
 
 fn add_ar1(x: &mut [f64], ar1: Ar1, key: StreamKey<'_>) {
+    // In blocks, so that a long record needs no second one for the noise; the numbers do not depend on the
+    // block.
     let mut source = Synthesizer::new(&Composite::new(vec![Process::Ar1(ar1)]), key);
     let mut block = [0.0; 1024];
     for part in x.chunks_mut(block.len()) {
@@ -347,12 +354,14 @@ fn add_ar1(x: &mut [f64], ar1: Ar1, key: StreamKey<'_>) {
 fn replace(x: &mut [f64], (points, block): (usize, usize), mean: f64, sigma: f64, key: StreamKey<'_>) {
     let mut g = key.generator();
     let (mut wanted, mut left) = (points.div_ceil(block), points);
+    // Each sample that stays is a place, and each block is one.
     let places = x.len() - points + wanted;
     let mut at = 0;
     for place in 0..places {
         if wanted == 0 {
             break;
         }
+        // Taken with probability (still wanted)/(places left): every choice of places is equally likely.
         if g.random::<f64>() * ((places - place) as f64) < wanted as f64 {
             let length = block.min(left);
             for v in &mut x[at..at + length] {

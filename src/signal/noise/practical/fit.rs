@@ -13,6 +13,7 @@ pub(super) fn white(samples: u32, rate_hz: f64) -> f64 {
 /// Allan variance of a random walk of density 1, or of a Gauss-Markov process of variance 1 and correlation time T.
 pub(super) fn bias(t_corr_s: Option<f64>, samples: u32, rate_hz: f64) -> f64 {
     let m = f64::from(samples);
+    // K²τ/3 with the term of the sampling: twice the wavelet variance gamma2 (4m² + 2)/(24m), gamma2 = K²/f.
     let Some(t_corr_s) = t_corr_s else { return (2.0 * m * m + 1.0) / (6.0 * m * rate_hz) };
     let kappa = 1.0 / (t_corr_s * rate_hz);
     super::super::allan::unit_markov(kappa, samples)
@@ -74,10 +75,14 @@ impl Problem {
         let [w, _, target] = self.reference;
         let most = match self.policy {
             Policy::Envelope => self.rows.iter().map(|[w, _, target]| target / w).fold(0.0, f64::max),
+            // White noise alone may not exceed the Allan variance at the reference, through which the pair
+            // goes.
             _ => target / w,
         };
         // Neither end is in reach of a search in the logarithm: no white noise, no bias.
         let ends = [self.with_white(0.0), self.with_white(most)];
+        // The best may lie close to either end: one search is logarithmic in what white noise leaves to the
+        // bias, the other in the white noise.
         let (ln_rest, _) =
             least(LEAST_SHARE.ln(), -LEAST_SHARE, 80, |x| self.with_white(most * -x.exp_m1()).misfit);
         let (ln_white, _) = least(LEAST_SHARE.ln(), 0.0, 80, |x| self.with_white(most * x.exp()).misfit);
@@ -94,14 +99,15 @@ impl Problem {
             Policy::Envelope => self.rows.iter().map(rest).fold(0.0, f64::max),
             _ => rest(&self.reference),
         };
+        // Half: the logarithm is of the deviation, the rows are variances.
         let log_ratio = |[w, b, target]: &[f64; 3]| 0.5 * ((white * w + bias * b) / target).ln();
         let misfit = self.rows.iter().map(log_ratio).map(|r| r * r).sum();
         Solution { white, bias, misfit }
     }
 }
 
-/// Where a function of one variable is least on an interval, and its value: the best of a grid, then golden sections
-/// between its neighbours.
+/// Least point of a function of one variable on an interval, and the value there: the best of a grid, then
+/// golden sections between its neighbours.
 fn least(low: f64, high: f64, steps: u32, f: impl Fn(f64) -> f64) -> (f64, f64) {
     let grid = |i: u32| low + (high - low) * f64::from(i) / f64::from(steps);
     let best = (0..=steps).map(|i| (i, f(grid(i)))).min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(i, _)| i);

@@ -54,7 +54,7 @@ impl Default for Horizon {
     }
 }
 
-/// Which pair stands for a model.
+/// Rule by which a pair stands for a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Policy {
     /// Only what the model has under that name: WN is N, RW is K, the slowest AR1 or GM is the Gauss-Markov bias.
@@ -84,7 +84,7 @@ impl Policy {
 
 crate::named!(Policy);
 
-/// What the other program takes a bias for.
+/// Model of the bias in the other program.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Bias {
     /// A random walk.
@@ -133,13 +133,14 @@ impl Pair {
         n2 + k2 + self.markov.map_or(0.0, gm)
     }
 
-    /// Where the random walk takes over from the white noise, τ = √3 N/K (s); none without a random walk.
+    /// Averaging time from which on the random walk exceeds the white noise, τ = √3 N/K (s); none without a
+    /// random walk.
     #[must_use]
     pub fn crossover_s(&self) -> Option<f64> {
         (self.walk > 0.0).then(|| 3.0_f64.sqrt() * self.density / self.walk)
     }
 
-    /// How far its Allan deviation is from that of the model.
+    /// Smallest and largest ratio of its Allan deviation to that of the model.
     #[must_use]
     pub fn closure(&self, curve: &Curve) -> Closure {
         let ratio = |p: &Point| Ratio {
@@ -156,7 +157,7 @@ impl Pair {
     }
 }
 
-/// Exported over model: Allan deviations at one averaging time.
+/// Ratio of Allan deviations, exported pair to model, at one averaging time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ratio {
     /// Allan deviation of the pair over that of the model.
@@ -168,9 +169,9 @@ pub struct Ratio {
 /// The closure certificate: how an exported pair compares with the model over the horizon.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Closure {
-    /// Where the pair is most below the model, or least above.
+    /// Smallest ratio over the horizon.
     pub lowest: Ratio,
-    /// Where it is most above.
+    /// Largest ratio over the horizon.
     pub highest: Ratio,
 }
 
@@ -212,7 +213,7 @@ pub enum CurveError {
         rate_hz: f64,
         /// One sample (s).
         shortest_s: f64,
-        /// What a count of samples holds (s).
+        /// Longest averaging time that a count of samples holds (s).
         longest_s: f64,
     },
     /// The Allan variance vanishes.
@@ -240,6 +241,7 @@ impl Curve {
         if let Some(p) = points.iter().find(|p| p.whole <= 0.0) {
             return Err(CurveError::NoNoise { tau_s: f64::from(p.samples) / rate_hz });
         }
+        // N is read at 1 s, where N²/τ is N².
         let reference = point((rate_hz.round() as u32).max(1));
         let axes = axes.iter().map(|a| (*a).clone()).collect();
         Ok(Self { axes, rate_hz, points, reference, horizon })
@@ -270,6 +272,7 @@ impl Curve {
     }
 
     fn strict(&self, walk: bool) -> Pair {
+        // Each figure is the largest of any axis, so the pair need not be that of one of them.
         let largest = |f: &dyn Fn(&Composite) -> f64| self.axes.iter().map(f).fold(0.0, f64::max);
         let density = largest(&|axis| white_density(white_sigma2(axis), self.rate_hz));
         let k = largest(&|axis| walk_density(walk_gamma2(axis), self.rate_hz));
@@ -277,6 +280,8 @@ impl Curve {
             let of_axis = reading::correlated(axis, self.rate_hz);
             of_axis.into_iter().map(|c| c.markov).max_by(|a, b| a.t_corr_s.total_cmp(&b.t_corr_s))
         });
+        // Of each axis the slowest, of these the largest: a filter has one bias state an axis, and one figure
+        // for all three.
         let markov = slowest.max_by(|a, b| a.sigma.total_cmp(&b.sigma));
         Pair { density, walk: if walk { k } else { 0.0 }, markov: markov.filter(|_| !walk) }
     }
@@ -316,6 +321,7 @@ fn averages(from: f64, to: f64) -> Vec<u32> {
     let steps = ((to / from).log2() * PER_OCTAVE).ceil();
     let factor = |i: u32| (from * (to / from).powf(f64::from(i) / steps)).round().max(1.0) as u32;
     let mut all: Vec<u32> = (0..=steps as u32).map(factor).collect();
+    // Of few samples neighbouring times round to the same number, which would count twice.
     all.dedup();
     all
 }

@@ -17,9 +17,12 @@ impl Minimum {
     /// still falls, or rises from the start.
     #[must_use]
     pub fn of(axes: &[&Composite], rate_hz: f64, range_s: f64) -> Option<Self> {
+        // The grid of 1/16 octave is fine enough: around its minimum N²/τ + K²τ/3 is proportional to cosh x with
+        // x = ln(τ/τ₀), and √cosh(ln 2/32) exceeds 1 by 1e-4.
         let samples = averages(1.0, (range_s * rate_hz).clamp(2.0, f64::from(1_u32 << 30)));
         let variance = |m: &u32| axes.iter().map(|a| a.allan_variance(*m)).fold(0.0, f64::max);
         let variances: Vec<f64> = samples.iter().map(variance).collect();
+        // An end of the range is no minimum: the deviation may go on falling beyond it.
         let inner = (1..samples.len().saturating_sub(1))
             .filter(|i| variances[*i] < variances[i - 1] && variances[*i] <= variances[i + 1]);
         let lowest = inner.min_by(|a, b| variances[*a].total_cmp(&variances[*b]))?;
@@ -42,7 +45,7 @@ pub struct CorrelatedProcess {
     pub markov: Markov,
 }
 
-/// What a practitioner asks of an axis.
+/// Practitioners' parameters of an axis.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AxisParameters {
     /// N and K of the policy: white noise and random walk.
@@ -56,7 +59,7 @@ pub struct AxisParameters {
 }
 
 impl AxisParameters {
-    /// Of some axes, the largest at each averaging time; minima are sought up to `range_s`.
+    /// Parameters of the largest of some axes at each averaging time. Minima are sought up to `range_s`.
     ///
     /// # Errors
     /// As [`Curve::largest`].
