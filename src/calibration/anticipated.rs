@@ -1,4 +1,5 @@
-//! A calibration that is not made yet: what recordings of a known IMU would tell, so many of such a length.
+//! Anticipated calibration: the intervals that recordings of a known IMU would give, of a given number and
+//! length.
 //!
 //! The wavelet variances of each recording are drawn by the law of those of the model (as behind the intervals of a
 //! calibration that was made, `uncertainty::bootstrap`); where parameters vary between recordings, those of each are drawn
@@ -18,14 +19,14 @@ use crate::uncertainty::practical;
 use crate::wavelet::default_levels;
 use rayon::prelude::*;
 
-/// Recordings of an IMU, not made yet.
+/// Recordings of an IMU that are planned.
 #[derive(Debug, Clone, Copy)]
 pub struct Anticipated<'a> {
     /// The noise.
     pub model: &'a Model,
-    /// How its parameters vary between recordings; none: they do not.
+    /// Variation of its parameters between recordings; none: they do not vary.
     pub spread: Option<&'a Spread>,
-    /// How many recordings.
+    /// Number of recordings.
     pub recordings: usize,
     /// Samples of each.
     pub samples: usize,
@@ -91,6 +92,8 @@ impl Anticipated<'_> {
         let failed = |source| CalibrationError::of(&group, estimator, source);
         let curve = average(&group.replicates, estimator, settings.trim, &settings.tuning).map_err(failed)?;
         let mut outcome = fit_curve(&group, estimator, curve, settings)?;
+        // The fit is kept for its minima, from which the draws are fitted; the centre of the draws is the
+        // model itself.
         outcome.fit.composite = composite;
         let sampler = CurveSampler::of_outcome(&group, &outcome, settings);
         let name = scope.name();
@@ -170,17 +173,20 @@ impl Anticipated<'_> {
         outcome: &Outcome,
         bootstrap: Bootstrap,
     ) -> Result<Vec<f64>, AnticipationError> {
+        // 50 sets of K signals give each deviation to 1/√(100 K), at most 10 %: enough for the degrees of
+        // freedom.
         const DRAWS: usize = 50;
         let drawn = (0..DRAWS).map(|run| self.between(scope, run, outcome, bootstrap));
         let signals: Vec<Vec<f64>> = drawn.collect::<Result<Vec<_>, _>>()?.concat();
         let deviation = |j: usize| {
+            // About the model and not about their own mean, so that a departure common to all counts as well.
             let squares: f64 = signals.iter().map(|ratios| ratios[j].ln().powi(2)).sum();
             (squares / signals.len() as f64).sqrt()
         };
         Ok((0..outcome.curve.levels.len()).map(deviation).collect())
     }
 
-    /// What each signal has more or less of than the model, `[signal][level]`, in a draw.
+    /// Wavelet variance of each signal of a draw over that of the model, `[signal][level]`.
     fn between(
         &self,
         scope: Scope,
@@ -210,6 +216,7 @@ fn in_order(composite: &Composite) -> Composite {
     let mut processes = composite.processes.clone();
     processes.sort_by(|a, b| {
         let time = |p: &Process| match p {
+            // phi rises with the correlation time, beta falls.
             Process::GaussMarkov(p) => -p.beta(),
             other => other.kind().shape().map_or(0.0, |_| other.values()[0]),
         };

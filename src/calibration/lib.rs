@@ -10,25 +10,25 @@ pub(crate) use nav_sim_signal::{imu, noise, rng, wavelet};
 
 // Wavelet variances: of replicates, averaged, as a model implies them, and how they scatter.
 mod curve;
-// What is fitted.
+// The model that is fitted.
 mod model;
-// A model to a curve.
+// The fit of a model to a curve.
 mod fit;
-// What is asked of a calibration, and what comes of it.
+// Settings and results of a calibration.
 mod outcome;
-// How sure a fit is.
+// Uncertainty of a fit.
 mod uncertainty;
-// Which model.
+// Choice of the model.
 mod selection;
-// Which recordings.
+// Diagnosis: recordings that are unlike the others.
 mod diagnosis;
-// The same for people.
+// All of these in words.
 mod words;
-// All of it.
+// The whole calibration.
 mod pipeline;
-// What the means of recordings say.
+// Turn-on bias, from the means of recordings.
 mod turn_on;
-// What a calibration that is not made yet would tell.
+// Intervals to be expected of a calibration that is planned.
 mod anticipated;
 // Studies of estimators.
 pub mod efficiency;

@@ -1,4 +1,4 @@
-//! Turn-on bias: how the means of recordings scatter about their own mean.
+//! Turn-on bias: the scatter of the means of recordings about their own mean.
 //!
 //! Between recordings of one fixed mounting gravity and Earth rate are the same; what differs is the bias of the switching-on
 //! and what the noise adds. A turn-on bias is seen where both of two tests refuse that the noise alone made the scatter:
@@ -22,10 +22,10 @@ const SLOWEST: f64 = 1.58;
 const OTHER_TILT_M_S2: f64 = 0.85;
 /// The same of the gyroscopes (rad/s, 11 °/s): the sensor turned.
 const TURNING_RAD_S: f64 = 0.2;
-/// Means so far below what the noise alone makes are no means: they were removed before.
+/// Share of the standard deviation by the noise below which all means are taken to have been removed before.
 const REMOVED: f64 = 1e-3;
 
-/// What the means of one axis say.
+/// Scatter of the means of one axis.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct MeansOfAxis {
     /// The axis.
@@ -34,13 +34,13 @@ pub struct MeansOfAxis {
     pub recordings: usize,
     /// Standard deviation of their means about their own mean (m/s² or rad/s), which holds what the noise adds.
     pub spread: f64,
-    /// What the fitted noise alone would make it.
+    /// The standard deviation that the fitted noise alone gives (m/s² or rad/s).
     pub noise: f64,
-    /// Largest less smallest mean.
+    /// Largest less smallest mean (m/s² or rad/s).
     pub range: f64,
 }
 
-/// What follows.
+/// Finding about the means of a sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TurnOnFinding {
     /// The means scatter by more than noise explains.
@@ -66,12 +66,12 @@ impl TurnOnFinding {
     }
 }
 
-/// What the means of a sensor say.
+/// Scatter of the means of a sensor, and the finding.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TurnOnSpread {
     /// The sensor.
     pub sensor: Sensor,
-    /// Whose model says what the noise makes.
+    /// Estimator whose model gives the contribution of the noise.
     pub estimator: Estimator,
     /// Axis by axis.
     pub axes: Vec<MeansOfAxis>,
@@ -79,7 +79,7 @@ pub struct TurnOnSpread {
     pub p_noise: f64,
     /// Probability that noise which moves the recordings themselves as much as they move makes means scatter as much.
     pub p_drift: f64,
-    /// What follows.
+    /// The finding.
     pub finding: TurnOnFinding,
 }
 
@@ -99,7 +99,7 @@ impl TurnOnSpread {
         self.root_mean_square(|a| a.spread)
     }
 
-    /// The same of what the noise makes of it.
+    /// Root mean square over the axes of the part that the noise makes (m/s² or rad/s).
     #[must_use]
     pub fn noise(&self) -> f64 {
         self.root_mean_square(|a| a.noise)
@@ -146,10 +146,15 @@ fn of_sensor(groups: &[Group], outcomes: &[&Outcome], sensor: Sensor) -> Option<
         return None;
     }
     let trends = axes.iter().map(|m| m.replicates.len() as f64).sum::<f64>();
+    // One mean is estimated on each axis; a trend is about 0 and costs none.
     let dof = trends - axes.len() as f64;
     let scatter = axes.iter().map(Means::chi_square).sum::<f64>();
+    // Both sums are over the variance of a mean by the fit: an error common to all of these cancels in the
+    // quotient.
     let f = (scatter / dof) / (axes.iter().map(Means::trends).sum::<f64>() / trends);
     let p_noise = ChiSquared::new(dof).map_or(f64::NAN, |law| law.sf(scatter));
+    // Scaled as for the slowest process that counts as noise: for a faster one the probability is too large,
+    // never too small.
     let p_drift = FisherSnedecor::new(dof, trends).map_or(f64::NAN, |law| law.sf(f / SLOWEST));
     let limit = if sensor == Sensor::Accel { OTHER_TILT_M_S2 } else { TURNING_RAD_S };
     let finding = if axes.iter().any(|m| m.of_axis().range > limit) {

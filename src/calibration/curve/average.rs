@@ -6,7 +6,7 @@ use crate::wavelet::{Curve, RobustVariance, Status, Tuning, interval};
 use std::fmt;
 use std::str::FromStr;
 
-/// Which curve a model is fitted to.
+/// Estimator: the curve to which a model is fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Estimator {
     /// Average of the classical wavelet variances.
@@ -60,12 +60,12 @@ impl Estimator {
 
 nav_sim_signal::named!(Estimator, in files);
 
-/// How many replicates DR-AWV drops at each end, scale by scale.
+/// Number of replicates that DR-AWV drops at each end, scale by scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Trim {
-    /// So many.
+    /// A number.
     Count(usize),
-    /// floor(fraction·K).
+    /// A fraction of the K replicates, rounded down: floor(fraction·K).
     Fraction(f64),
 }
 
@@ -98,7 +98,7 @@ impl fmt::Display for Trim {
     }
 }
 
-/// A trim that means nothing.
+/// A text that is no trim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("not a number of replicates such as 2, or a percentage under 50 such as 30%")]
 pub struct TrimError;
@@ -124,7 +124,7 @@ pub struct Replicate {
     pub name: String,
     /// The axis it is of, if known.
     pub axis: Option<Axis>,
-    /// Its length T.
+    /// Its length T (samples).
     pub samples: usize,
     /// Classical wavelet variance at levels 1, 2, … (units²).
     pub classical: Vec<f64>,
@@ -202,6 +202,7 @@ pub fn average(
             .iter()
             .map(|r| Term::new(r, level, estimator, tuning.efficiency()))
             .collect::<Vec<_>>();
+        // Scale by scale: a recording that is abnormal at long scales still serves at short ones.
         kept.sort_by(|a, b| a.nu.total_cmp(&b.nu));
         let kept = &kept[trim..count - trim];
         let total: f64 = kept.iter().map(|t| t.samples).sum();
@@ -209,6 +210,7 @@ pub fn average(
         // var(Σ w nu) = Σ w²·2 nu²/eta, the replicates' true nu taken equal.
         let inverse: f64 = kept.iter().map(|t| (t.samples / total).powi(2) / t.edof).sum();
         curve.edof.push(1.0 / inverse);
+        // A value without a root is the nearest there is, not an estimate: a majority of these is no curve.
         if 2 * kept.iter().filter(|t| !t.has_root).count() >= kept.len() {
             curve.ignored.push(level);
         }
@@ -216,7 +218,7 @@ pub fn average(
     Ok(curve)
 }
 
-/// What one replicate contributes at one level.
+/// Contribution of one replicate at one level.
 struct Term {
     samples: f64,
     nu: f64,

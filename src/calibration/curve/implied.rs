@@ -1,6 +1,6 @@
-//! The curve a model implies: what the wavelet variances that are fitted would be on average.
+//! The curve that a model implies: the expected values of the wavelet variances to which it is fitted.
 //!
-//! Of classical variances that is nu_j(theta). Robust ones read quantization noise high
+//! For classical variances these are nu_j(theta). Robust ones read quantization noise high
 //! ([`QuantizationResponse`]): nu_j(theta)·b(s_j), s_j the part of nu_j that is quantization noise.
 
 use crate::noise::{Composite, Process};
@@ -52,10 +52,12 @@ pub(crate) struct Response {
 }
 
 impl Response {
-    /// Of a curve that reads everything as it is.
+    /// Response of a curve that reads quantization noise as it is.
     pub(crate) const PLAIN: Self = Self { quantization: 1.0, others: 1.0 };
 
     pub(crate) fn new(response: &QuantizationResponse, share: f64) -> Self {
+        // With s = q/nu: d(nu·b)/dq = b + (1 − s)·db/ds for quantization noise, which is in q and in nu;
+        // b − s·db/ds for a process that is in nu only.
         let (b, slope) = response.factor(share);
         Self { quantization: b + (1.0 - share) * slope, others: b - share * slope }
     }

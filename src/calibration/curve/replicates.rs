@@ -5,7 +5,7 @@ use crate::imu::{Axis, Channel, Recording, Sensor, Signal};
 use crate::wavelet::{Tuning, WaveletError, both, default_levels};
 use rayon::prelude::*;
 
-/// What one model is for.
+/// Sensor, and axis if not all, that one model is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Scope {
     /// The sensor.
@@ -32,10 +32,10 @@ impl Scope {
     }
 }
 
-/// What one model is fitted to: replicates of one axis, or of all axes of a sensor.
+/// Signals to which one model is fitted: replicates of one axis, or of all axes of a sensor.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Group {
-    /// What the model is for.
+    /// Scope of the model.
     pub scope: Scope,
     /// The replicates, each with the axis it is of.
     pub replicates: Vec<Replicate>,
@@ -52,7 +52,7 @@ impl Group {
     }
 }
 
-/// Which signals are replicates of one another.
+/// Rule by which signals are replicates of one another.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Pool {
     /// Those of one axis: a model an axis.
@@ -128,6 +128,7 @@ pub fn trend(samples: &[f64]) -> f64 {
 pub fn grouped(replicates: Vec<(Channel, Replicate)>, pool: Pool) -> Vec<Group> {
     let mut groups: Vec<Group> = Vec::new();
     let mut replicates = replicates;
+    // A stable sort: within a channel the recordings keep the order in which they were given.
     replicates.sort_by_key(|(channel, _)| channel.index());
     for (channel, replicate) in replicates {
         let axis = (pool == Pool::Axes).then_some(channel.axis);

@@ -1,4 +1,4 @@
-//! The median, and what makes a median absolute deviation a standard deviation.
+//! The median, and the factor from a median absolute deviation to a standard deviation.
 
 /// 1 / normal quantile of ¾: the median absolute deviation of Gaussian numbers times this is their standard deviation.
 pub(crate) const MAD_TO_DEVIATION: f64 = 1.482_602_218_505_602;

@@ -1,4 +1,4 @@
-//! How a wavelet variance scatters from recording to recording of the same noise: its large-sample law.
+//! Large-sample law of the wavelet variance: its scatter from recording to recording of the same noise.
 //!
 //! For Gaussian coefficients cov(nu_j, nu_k) ≈ 2/√(M_j M_k) ∫ |H_j|² |H_k|² S² df, H the Haar filters, S the
 //! spectrum of the model ([Percival](crate::bibliography::Percival95)). Each nu_j is taken as chi-square with
@@ -41,6 +41,8 @@ impl SamplingLaw {
             .map(|i| {
                 let nu = model.haar_wv(i as u32 + 1);
                 let plain = 0.5_f64.powi(i as i32 + 1);
+                // var nu_hat = 2/M ∫(|H|² S)² df, so 2 nu²/var over M is this quotient. A drift alone does
+                // not scatter and gets those of eta3, 1/tau.
                 if products[(i, i)] > 0.0 { nu * nu / products[(i, i)] } else { plain }
             })
             .collect();
@@ -48,6 +50,7 @@ impl SamplingLaw {
             let scale = (products[(i, i)] * products[(j, j)]).sqrt();
             if scale > 0.0 { products[(i, j)] / scale } else { 0.0 }
         });
+        // Also for a level without noise, whose row is zero: the matrix must stay positive definite.
         correlation.fill_diagonal(1.0);
         let factor = factor(&correlation);
         let quantization = (1..=levels as u32).map(|level| quantization_share(model, level)).collect();
@@ -96,12 +99,13 @@ impl SamplingLaw {
 const LAST: usize = 4;
 /// Lengths of the scale from which on the large-sample law is used.
 const MANY: f64 = 8.0;
-/// Lags to the scale.
+/// Number of lags into which the scale is divided.
 const LAGS: usize = 16;
 
 /// Squares of the autocorrelations of a level's coefficients at [`LAGS`] lags up to the scale, beyond which they are
 /// uncorrelated or nearly so; none for a level that is not among the last.
 fn squared_autocorrelations(model: &Composite, level: usize, levels: usize) -> Vec<f64> {
+    // Below level 4 a sixteenth of the scale is less than a sample.
     if level + LAST <= levels || level < 4 {
         return Vec::new();
     }
@@ -114,6 +118,7 @@ fn squared_autocorrelations(model: &Composite, level: usize, levels: usize) -> V
         let f = 0.5 * (k as f64 + 0.5) / half as f64;
         let sin2 = (PI * f).sin().powi(2);
         let density = model.processes.iter().map(|p| spectrum(p, sin2)).sum::<f64>();
+        // |H|² S with the Haar gain |H|² = sin⁴(πfm)/(m² sin²(πf)).
         let gain = density * (PI * f * m).sin().powi(4) / (m * m * sin2);
         for (lag, sum) in sums.iter_mut().enumerate() {
             *sum += gain * (2.0 * PI * f * 2.0 * m * lag as f64 / LAGS as f64).cos();
@@ -125,6 +130,7 @@ fn squared_autocorrelations(model: &Composite, level: usize, levels: usize) -> V
 /// Degrees of freedom of a mean of `count` squares with these squared autocorrelations; 0 where the large-sample law holds.
 fn of_few(squared: &[f64], count: f64, level: u32) -> f64 {
     let step = f64::from(level).exp2() / LAGS as f64;
+    // Counted in steps of the lag, so that each lag kept stands for a step of them.
     let n = count / step;
     if squared.is_empty() || n > MANY * LAGS as f64 {
         return 0.0;
@@ -143,6 +149,7 @@ pub(crate) fn chi_square_ratio(z: f64, edof: f64) -> f64 {
     const MOST: f64 = 30.0;
     if edof < MOST && z < 1.0 {
         let probability = 0.5 * erfc(-z * FRAC_1_SQRT_2);
+        // The condition of Best and Roberts for their series: there the cube is too far off, or negative.
         if edof < -1.24 * probability.ln() {
             let half = 0.5 * edof;
             let known = probability.ln() + ln_gamma(half + 1.0);
@@ -152,6 +159,7 @@ pub(crate) fn chi_square_ratio(z: f64, edof: f64) -> f64 {
             return ((known + 0.5 * x - more) / half).exp() / half;
         }
     }
+    // (chi²/eta)^(1/3) is nearly normal with mean 1 − 2/(9 eta) and variance 2/(9 eta).
     let variance = 2.0 / (9.0 * edof);
     (1.0 - variance + z * variance.sqrt()).powi(3)
 }
@@ -177,6 +185,8 @@ fn products(model: &Composite, levels: usize) -> DMatrix<f64> {
         let mut sin2 = base;
         for (i, gain) in gains.iter_mut().enumerate() {
             let m = f64::from(i as u32).exp2();
+            // sin2 is sin²(πfm) here, base sin²(πf). Midpoints leave out f = 0, where a random walk has no
+            // density.
             *gain = density * sin2 * sin2 / (m * m * base);
             sin2 = 4.0 * sin2 * (1.0 - sin2);
         }
@@ -186,6 +196,7 @@ fn products(model: &Composite, levels: usize) -> DMatrix<f64> {
             }
         }
     }
+    // The midpoint rule with step ½/half over 0 … ½, doubled for the negative frequencies.
     sums /= half as f64;
     sums.fill_upper_triangle_with_lower_triangle();
     sums

@@ -20,7 +20,7 @@ const LAST: usize = 8;
 /// Probability of a false alarm of each of the two questions.
 const LEVEL: f64 = 1e-4;
 
-/// What is unlike at the beginning of a record.
+/// The beginning of a record that is unlike the rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WarmUp {
     /// Samples to leave out: what remains begins as it goes on.
@@ -32,11 +32,12 @@ pub struct WarmUp {
     /// Whether that is an eighth of the record or more: what fades so slowly may not be over in the rest, which is then too
     /// short to tell.
     pub late: bool,
-    /// What leaving them out changes; none where not even the later half begins as it goes on, and nothing is to be left out.
+    /// Change by leaving them out; none where not even the later half begins as it goes on, and nothing is to
+    /// be left out.
     pub change: Option<Change>,
 }
 
-/// What a warm-up does to the classical wavelet variance, at the scale where that is surest.
+/// Effect of a warm-up on the classical wavelet variance, at the scale where it is most certain.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Change {
     /// Level.
@@ -71,6 +72,8 @@ fn change(samples: &[f64], left: usize) -> Option<Change> {
     let (with, without) = (classical(samples, levels).ok()?, classical(part, levels).ok()?);
     let of_level = |level: u32| {
         let ratio = without[level as usize - 1] / with[level as usize - 1];
+        // The whole contains the part, so the variance of their difference is the difference of the
+        // variances.
         let noise = 2.0 / edof_eta3(part.len(), level) - 2.0 / edof_eta3(samples.len(), level);
         (ratio.ln().abs() / noise.max(f64::MIN_POSITIVE).sqrt(), Change { level, ratio })
     };
@@ -87,15 +90,18 @@ fn look(samples: &[f64]) -> Option<WarmUp> {
     let parts: Vec<&[f64]> = samples.chunks_exact(length).take(PARTS).collect();
     let means: Vec<f64> = parts.iter().map(|p| p.iter().sum::<f64>() / length as f64).collect();
     let steps: Vec<f64> = means.windows(2).map(|m| m[1] - m[0]).collect();
+    // ln: a factor in the noise is then a shift, and the scatter of a variance does not depend on its size.
     let squares = |p: &&[f64]| p.windows(2).map(|x| (x[1] - x[0]).powi(2)).sum::<f64>().ln();
     let noise: Vec<f64> = parts.iter().map(squares).collect();
     let mut found = None;
+    // The parts that are compared with the last eight must not be among them; a step needs two parts.
     for first in 0..PARTS - LAST - 1 {
         let [mean, variance] =
             [&steps, &noise].map(|values| out_of_place(values[first], &values[values.len() - LAST..]));
         let Some((deviations, mean)) = mean.map(|d| (d, true)).or(variance.map(|d| (d, false))) else {
             break;
         };
+        // The first alarm is the one that is told; later ones only lengthen what is left out.
         let (mean, deviations) = found.map_or((mean, deviations), |f: WarmUp| (f.mean, f.deviations));
         found = Some(WarmUp { samples: (first + 1) * length, mean, deviations, late: false, change: None });
     }
@@ -107,6 +113,7 @@ fn out_of_place(first: f64, others: &[f64]) -> Option<f64> {
     let count = others.len() as f64;
     let mean = others.iter().sum::<f64>() / count;
     let variance = others.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0);
+    // The value is new: its own variance adds to that of the mean of the others.
     let t = (first - mean) / (variance * (1.0 + 1.0 / count)).sqrt();
     let law = StudentsT::new(0.0, 1.0, count - 1.0).ok()?;
     (t.is_finite() && 2.0 * law.sf(t.abs()) < LEVEL).then_some(t)

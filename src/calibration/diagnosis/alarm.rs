@@ -1,4 +1,4 @@
-//! Which recordings are further from the others than chance would have it.
+//! Alarms: the recordings that are further from the others than chance explains.
 //!
 //! The largest F over all windows and files is compared with what it is in sets of alike recordings, drawn by
 //! the sampling law, that differ as much as these do (their excess variance at each scale, of which the axes share as
@@ -19,7 +19,7 @@ const FEWEST_TO_SHARE: usize = 4;
 /// Seed of the draws: a diagnosis is an answer, the same each time.
 const SEED: u64 = 1;
 
-/// What is unusual about a file.
+/// An abnormal file, and where it is so.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Found {
     pub(super) file: usize,
@@ -39,6 +39,8 @@ pub(super) fn alarms(table: &Table, noise: &[Noise], source: &str, process: &str
         if next.p_value > FALSE_ALARM {
             break;
         }
+        // An abnormal file widens the spread that the others are measured by: without it a second one may
+        // show.
         active[next.file] = false;
         found.push(next);
     }
@@ -67,6 +69,7 @@ fn most_abnormal(
     let draw = |run: usize| {
         let key = StreamKey { seed: SEED, scenario: "diagnosis", run: run as u64, source, process };
         let drawn = table.drawn(noise, &between, shared, &mut key.generator());
+        // The whole search is repeated for each draw, so that looking at many windows and files is paid for.
         let all = furthest(&drawn, noise, active);
         [0, 1].map(|kind| all.iter().map(|f| f.f[kind]).fold(0.0, f64::max))
     };
@@ -83,9 +86,10 @@ fn most_abnormal(
     Some(Found { file, p_value: (1 + larger) as f64 / (1 + DRAWS) as f64, window, distance })
 }
 
-/// What a share [`FALSE_ALARM`] of the values exceeds; 1 where all are 0.
+/// Value that a share [`FALSE_ALARM`] of the values exceeds; 1 where all are 0.
 fn limit(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
+    // Of 799 values 19 lie above this one: 20/800 = 2.5 % with the observed one counted among them.
     let index = ((1.0 - FALSE_ALARM) * values.len() as f64) as usize;
     values.get(index).copied().filter(|v| *v > 0.0).unwrap_or(1.0)
 }

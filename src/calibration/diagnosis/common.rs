@@ -41,7 +41,7 @@ pub struct GaussianQuantization {
     pub read_low: f64,
 }
 
-/// What most of the signals of a sensor have in common.
+/// Findings that most signals of a sensor have in common.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Common {
     pub(super) outliers: Option<CommonOutliers>,
@@ -51,10 +51,11 @@ pub(super) struct Common {
 /// The median over the signals of ln (classical / robust) at a scale, less what is expected.
 struct Excess {
     tau_s: f64,
-    /// Of a quantizer's noise, and as if all were Gaussian.
+    /// Excess with the allowance for the noise of a quantizer.
     quantizer: f64,
+    /// Excess as if all noise were Gaussian.
     gaussian: f64,
-    /// Its standard deviation.
+    /// Standard deviation of either.
     sigma: f64,
 }
 
@@ -93,9 +94,12 @@ fn excess(pieces: &[Piece<'_>], level: usize, settings: &Settings) -> Excess {
         for replicate in piece.replicates.iter().flatten() {
             let eta = test.edof(piece.law.edof(replicate.samples)[level], tuning.efficiency());
             let (read_high, _) = tuning.quantization().factor(piece.law.quantization[level]);
+            // E ln(chi²/eta) ≈ −1/eta: lower for the robust variance, by (1/e − 1)/eta of the classical one,
+            // which is 1/eta here. The bias of robust variances of few coefficients is left out.
             let gaussian = test.value(replicate, level) - 1.0 / eta;
             of_gaussian.push(gaussian);
             of_quantizer.push(gaussian + read_high.ln());
+            // The standard deviation of a mean of n is √(Σ variances)/n, that of the median √(π/2) times it.
             variance += 2.0 / eta;
         }
     }

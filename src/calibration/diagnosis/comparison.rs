@@ -41,6 +41,8 @@ impl Comparison {
     /// those of the noise at the longest scales do.
     pub(super) fn drift(pieces: &[Piece<'_>], sensor: Sensor, noise: &Self) -> Self {
         let deviations = |p: &Piece<'_>| {
+            // The Haar coefficient of a scale as long as the record is half the trend, and its variance is nu
+            // there.
             let deviation = |r: &Replicate| vec![0.5 * r.trend / wv_of_length(p.model, r.samples).sqrt()];
             p.replicates.iter().map(|r| r.map(deviation)).collect()
         };
@@ -94,6 +96,7 @@ const LONGEST_SCALES: usize = 5;
 fn wv_of_length(model: &Composite, samples: usize) -> f64 {
     let level = samples.max(2).ilog2();
     let (below, above) = (model.haar_wv(level), model.haar_wv(level + 1));
+    // A record is rarely a power of two long; between two levels ln nu is nearly linear in ln tau.
     let part = (samples as f64).log2() - f64::from(level);
     below * (above / below).powf(part)
 }

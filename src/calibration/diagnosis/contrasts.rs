@@ -1,4 +1,4 @@
-//! How far each recording is from the others, over neighbouring scales and all axes of a sensor.
+//! Distance of each recording from the others, over neighbouring scales and all axes of a sensor.
 //!
 //! A contrast is the mean of ln nu over a window of neighbouring scales, of one axis. The distance of a
 //! recording is F = Σ_axes d²/(1 + 1/n) / (A·max(s², v)): d from the mean of the n others, s² their variance,
@@ -25,7 +25,7 @@ const FEWEST_TO_PASS_OVER: usize = 6;
 pub(super) struct Window {
     /// Index of the first.
     pub(super) first: usize,
-    /// How many.
+    /// Number of scales.
     pub(super) width: usize,
 }
 
@@ -42,7 +42,7 @@ impl Window {
     }
 }
 
-/// What noise alone does to one axis.
+/// Scatter of one axis by noise alone.
 #[derive(Debug, Clone)]
 pub(super) struct Noise {
     kind: NoiseKind,
@@ -52,7 +52,7 @@ pub(super) struct Noise {
     variances: Vec<Vec<f64>>,
 }
 
-/// What the values of a file scatter like.
+/// Law of the values of a file.
 #[derive(Debug, Clone)]
 enum NoiseKind {
     /// Logarithms of wavelet variances.
@@ -63,24 +63,27 @@ enum NoiseKind {
 }
 
 impl Noise {
-    /// Of files of one Gaussian number each, of unit variance but for what ln of its standard deviation differs by.
+    /// Noise of files of one Gaussian number each, whose standard deviation is log-normal about 1 with
+    /// `log_deviation`.
     pub(super) fn normal(files: usize, log_deviation: f64) -> Self {
         let kind = NoiseKind::Normal(log_deviation);
         Self { kind, edof: vec![vec![1.0]; files], variances: vec![vec![1.0; files]] }
     }
 
-    /// What noise alone makes of a file, level by level.
+    /// Draws the values of a file by noise alone, level by level.
     fn draw(&self, file: usize, generator: &mut Generator) -> Vec<f64> {
         match &self.kind {
             NoiseKind::Law(law) => law.draw(&self.edof[file], generator).into_iter().map(f64::ln).collect(),
             NoiseKind::Normal(log_deviation) => {
                 let mut normal = || generator.sample::<f64, _>(StandardNormal);
+                // A normal number whose standard deviation is itself log-normal: recordings differ in how far
+                // they move.
                 vec![(log_deviation * normal()).exp() * normal()]
             }
         }
     }
 
-    /// Of files with so many degrees of freedom at each level.
+    /// Noise of files with these degrees of freedom, `[file][level]`.
     pub(super) fn new(law: SamplingLaw, edof: Vec<Vec<f64>>) -> Self {
         let levels = edof.first().map_or(0, Vec::len);
         let deviations: Vec<Vec<f64>> =
@@ -98,7 +101,7 @@ impl Noise {
     }
 }
 
-/// What every file has at each level on one axis, if it has that axis.
+/// Values of every file on one axis, level by level; none of a file without that axis.
 type Files = Vec<Option<Vec<f64>>>;
 
 /// ln nu of every file on the axes of a sensor, `[axis][file][level]`; not every file has every axis.
@@ -140,8 +143,9 @@ impl Table {
         Self { logs, above_only: self.above_only }
     }
 
-    /// What the axes of a file share of the variance by which the active files differ beyond their noise: the
-    /// covariance between axes over the excess variance, over all levels, each weighted by its certainty.
+    /// Share that the axes of a file have in common of the variance by which the active files differ beyond
+    /// their noise: the covariance between axes over the excess variance, over all levels, each weighted by
+    /// its certainty.
     pub(super) fn shared(&self, noise: &[Noise], between: &[f64], active: &[bool]) -> f64 {
         let (mut covariance, mut variance) = (0.0, 0.0);
         for (j, between) in between.iter().enumerate() {
@@ -151,7 +155,11 @@ impl Table {
                     let pairs = one.values.iter().zip(&other.values);
                     let products: Vec<f64> = pairs.filter_map(|(x, y)| Some((*x)? * (*y)?)).collect();
                     let excess = between * between;
+                    // Inverse variance of a product of two independent values about 0, both of the mean noise
+                    // plus the excess.
                     let weight = (0.5 * (one.noise + other.noise) + excess).powi(-2);
+                    // Signals have independent noise: what two axes have in common is what recordings differ
+                    // by.
                     covariance += weight * products.iter().sum::<f64>() / (products.len() as f64 - 1.0);
                     variance += weight * excess;
                 }
@@ -170,6 +178,8 @@ impl Table {
             for axis in &contrasts {
                 squares += axis.squares;
                 freedom += axis.count - 1.0;
+                // Moments: E Σ(x − mean)² = (n − 1)(noise + between²), summed over the axes before the
+                // quotient.
                 own += axis.noise * (axis.count - 1.0);
             }
             let excess = (squares - own) / freedom;
@@ -200,12 +210,12 @@ struct Contrast {
     sum: f64,
     squares: f64,
     count: f64,
-    /// What noise makes: mean variance, and what each file has above it.
+    /// Variance by noise alone: the mean over the files, and the excess of each over it.
     noise: f64,
     excess: Vec<f64>,
 }
 
-/// Values without some.
+/// Statistics of the values without one or two of them.
 struct Rest {
     mean: f64,
     /// Σ of the squares about the mean.
@@ -223,6 +233,8 @@ impl Contrast {
         if count < FEWEST as f64 || !mean.is_finite() {
             return None;
         }
+        // About the mean before squares are summed, so that `without` may subtract from them and keep its
+        // digits.
         values.iter_mut().flatten().for_each(|v| *v -= mean);
         let (sum, squares) = (values.iter().flatten().sum(), values.iter().flatten().map(|v| v * v).sum());
         let excess = variances.iter().map(|s| (s - noise).max(0.0)).collect();
@@ -240,12 +252,12 @@ impl Contrast {
     }
 }
 
-/// How far a file is from the others at one window.
+/// Distance of a file from the others at one window.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Distance {
     /// F, with one of the others passed over or none.
     pub(super) f: f64,
-    /// Of each axis (index): d in standard deviations.
+    /// For each axis (index), d in standard deviations.
     pub(super) deviations: Vec<(usize, f64)>,
 }
 
@@ -258,6 +270,8 @@ fn distance(contrasts: &[Contrast], file: usize, pass_over: bool) -> Option<Dist
         rests().map(|r| r.squares).sum::<f64>() / rests().map(|r| r.count - 1.0).sum::<f64>()
     };
     let files = own.first()?.values.len();
+    // Two that are abnormal alike widen each other's reference; without the one that widens it most, the
+    // first stands out.
     let other = if pass_over {
         let candidates = (0..files).filter(|h| *h != file && own[0].values[*h].is_some());
         candidates.map(|h| (spread(h), h)).min_by(|a, b| a.0.total_cmp(&b.0))?.1
@@ -265,6 +279,7 @@ fn distance(contrasts: &[Contrast], file: usize, pass_over: bool) -> Option<Dist
         usize::MAX
     };
     let noise = own.iter().map(|c| c.noise).sum::<f64>() / own.len() as f64;
+    // A spread below the noise is chance; divided by it any recording would look far off.
     let scale2 = spread(other).max(noise);
     let of_axis = |c: &&Contrast| {
         let rest = c.without(file, other);
@@ -281,7 +296,7 @@ fn distance(contrasts: &[Contrast], file: usize, pass_over: bool) -> Option<Dist
 pub(super) struct Furthest {
     /// The two F.
     pub(super) f: [f64; 2],
-    /// Where, with the deviations there.
+    /// The window of each, with the deviations there.
     pub(super) at: [Option<(Window, Distance)>; 2],
 }
 

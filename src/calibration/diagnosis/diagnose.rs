@@ -83,11 +83,14 @@ fn misfits(sensor: Sensor, outcomes: &[Outcome]) -> Vec<Misfit> {
     outcomes.iter().filter(|o| o.scope.sensor == sensor).filter_map(rejected).collect()
 }
 
-/// By the fit whose test is the surest.
+/// Difference of the recordings of a sensor, by the fit with the smallest p-value; none where no test sees
+/// one.
 fn differing(sensor: Sensor, outcomes: &[Outcome]) -> Option<Differing> {
     let of_fit = |o: &Outcome| {
         let inference = o.inference.as_ref()?;
         let p_value = inference.alike.filter(|p| *p <= ALIKE_LEVEL)?;
+        // Relative to the noise: at the last scales recordings scatter most for lack of coefficients, which
+        // is no difference.
         let ratio = |s: &LevelSpread| s.between / s.within;
         let most = *inference.spread.iter().max_by(|a, b| ratio(a).total_cmp(&ratio(b)))?;
         Some(Differing { p_value, most })
@@ -96,7 +99,7 @@ fn differing(sensor: Sensor, outcomes: &[Outcome]) -> Option<Differing> {
     own.filter_map(of_fit).min_by(|a, b| a.p_value.total_cmp(&b.p_value))
 }
 
-/// What DR-AWV drops of the smallest group of a sensor.
+/// Number of replicates that DR-AWV drops at each end in the smallest group of a sensor, with the pooling.
 fn dropped(own: &[&Group], settings: &Settings) -> Option<(Pool, usize)> {
     let trim = own.iter().map(|g| settings.trim.count(g.replicates.len())).min()?;
     let pool = if own.iter().any(|g| g.scope.axis.is_none()) { Pool::Sensor } else { Pool::Axes };

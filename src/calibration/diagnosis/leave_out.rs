@@ -1,10 +1,10 @@
-//! What leaving a recording out does to each estimator: its curve, and every parameter.
+//! Effect of leaving a recording out on each estimator: its curve, and every parameter.
 
 use crate::curve::{Estimator, Group, Replicate, average};
 use crate::outcome::{Outcome, Settings, tau_s};
 use crate::uncertainty::spread::variance_of_log;
 
-/// How far an estimator moves when one recording is left out.
+/// Movement of an estimator when one recording is left out.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct LeftOut {
     /// The group, `accel` or `accel.x`.
@@ -18,11 +18,11 @@ pub struct LeftOut {
     pub change: f64,
     /// The same in standard deviations of ln nu of the curve.
     pub deviations: f64,
-    /// How every parameter moves; empty where there is no fit without it.
+    /// Movement of every parameter; empty where there is no fit without it.
     pub parameters: Vec<Movement>,
 }
 
-/// How one parameter moves.
+/// Movement of one parameter.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Movement {
     /// Label of the process.
@@ -31,11 +31,11 @@ pub struct Movement {
     pub parameter: &'static str,
     /// With all recordings (units of the parameter).
     pub with: f64,
-    /// Without this one.
+    /// Without this recording (units of the parameter).
     pub without: f64,
 }
 
-/// Without the recording of that name. None if no curve is left.
+/// Movement of an outcome without the recording of that name; none if no curve is left.
 pub(super) fn left_out(group: &Group, name: &str, outcome: &Outcome, settings: &Settings) -> Option<LeftOut> {
     let mut rest: Vec<Replicate> = group.replicates.iter().filter(|r| r.name != name).cloned().collect();
     // Without the shortest there would be more scales: another fit than this one.
@@ -45,6 +45,7 @@ pub(super) fn left_out(group: &Group, name: &str, outcome: &Outcome, settings: &
     }
     let mut without = average(&rest, outcome.estimator, settings.trim, &settings.tuning).ok()?;
     let with = &outcome.curve;
+    // The same scales in both fits: else the change of a parameter would be one of scales.
     without.ignored.clone_from(&with.ignored);
     let moves = with.levels.iter().zip(&with.wv).zip(&with.edof).zip(&without.wv);
     let movement = |(((level, with), edof), without): (((&u32, &f64), &f64), &f64)| {

@@ -1,4 +1,4 @@
-//! The replicates of one axis, and what is looked at in them.
+//! The replicates of one axis, and the two tests of them.
 
 use crate::curve::sampling::SamplingLaw;
 use crate::curve::{Estimator, Group, Replicate};
@@ -33,7 +33,7 @@ pub(super) fn axes<'a>(own: &[&'a Group], names: &[&str], outcomes: &'a [Outcome
     Axis::ALL.into_iter().filter_map(piece).collect()
 }
 
-/// What is looked at.
+/// Quantity in which recordings are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Test {
     /// ln robust wavelet variance.
@@ -55,11 +55,12 @@ impl Test {
     pub(super) fn edof(self, classical: f64, efficiency: f64) -> f64 {
         match self {
             Self::Noise => edof_robust(classical, efficiency),
+            // (1/e − 1)·2/eta = 2/(eta e/(1 − e)).
             Self::Outliers => classical * efficiency / (1.0 - efficiency),
         }
     }
 
-    /// How many levels can be looked at.
+    /// Number of levels at which recordings can be compared.
     pub(super) fn levels(self, pieces: &[Piece<'_>]) -> usize {
         let enough = |p: &Piece<'_>| {
             let edof = p.law.edof(p.replicates.iter().flatten().map(|r| r.samples).min().unwrap_or(0));

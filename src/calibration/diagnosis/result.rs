@@ -1,4 +1,4 @@
-//! What is said of each recording.
+//! Results of the diagnosis of each recording.
 
 use super::common::{CommonOutliers, GaussianQuantization};
 use super::leave_out::LeftOut;
@@ -7,7 +7,7 @@ use crate::imu::{Axis, Sensor};
 use crate::outcome::LevelSpread;
 use serde::{Serialize, Serializer};
 
-/// What is abnormal about a recording.
+/// Verdict on a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// Nothing.
@@ -16,7 +16,7 @@ pub enum Verdict {
     Outliers,
     /// Its level drifts as that of no other does.
     Drift,
-    /// Its robust wavelet variance is: its noise is another.
+    /// Its robust wavelet variance is not that of the others: its noise is another.
     Noise,
 }
 
@@ -67,7 +67,7 @@ pub struct Alarm {
     pub p_value: f64,
     /// First and last of the neighbouring scales (s) at which it is most unusual.
     pub tau_s: [f64; 2],
-    /// What was looked at there, on all axes, against the others, in standard deviations.
+    /// Deviations from the others there, axis by axis, in standard deviations.
     #[serde(serialize_with = "by_axis")]
     pub deviations: Vec<(Axis, f64)>,
 }
@@ -101,7 +101,7 @@ pub struct Diagnosis {
     /// Axes of the sensor that it has.
     #[serde(skip)]
     pub axes: usize,
-    /// What is said of it.
+    /// The verdict.
     pub verdict: Verdict,
     /// Why its noise is not that of the others.
     pub noise: Option<Alarm>,
@@ -121,12 +121,12 @@ pub struct Diagnosis {
     /// Whether the axes of the sensor were pooled, and what DR-AWV dropped at each end of each scale, if it ran.
     #[serde(skip)]
     pub dropped: Option<(Pool, usize)>,
-    /// What leaving it out does to each fit.
+    /// Effect of leaving it out on each fit.
     pub left_out: Vec<LeftOut>,
     /// The fits to this sensor whose model does not describe the curve, by the J-test.
     #[serde(skip)]
     pub misfits: Vec<Misfit>,
-    /// How the recordings of this sensor differ beyond their noise, if a fit's test says that they do.
+    /// Difference of the recordings of this sensor beyond their noise, if a fit's test says that they do.
     #[serde(skip)]
     pub differing: Option<Differing>,
 }
@@ -136,7 +136,7 @@ pub struct Diagnosis {
 pub struct Differing {
     /// Probability that recordings of one noise differ so at some scale.
     pub p_value: f64,
-    /// Where they do most.
+    /// Spread at the scale where they differ most.
     pub most: LevelSpread,
 }
 

@@ -1,4 +1,4 @@
-//! How far from the target the estimates of many sets are.
+//! Accuracy of estimates: bias, spread and RMSE about the target over many sets.
 
 use crate::curve::robust_scale::{MAD_TO_DEVIATION, median};
 use crate::rng::StreamKey;
@@ -30,6 +30,8 @@ impl Accuracy {
     #[must_use]
     pub fn ratio_to(&self, other: &Self) -> (f64, f64) {
         let ratios: Vec<f64> = self.resampled.iter().zip(&other.resampled).map(|(a, b)| a / b).collect();
+        // The deviation of the ratios themselves: the errors of two estimators on one set are correlated, and
+        // most of that cancels.
         let error = if self.rmse_se.is_nan() { f64::NAN } else { standard_deviation(&ratios) };
         (self.rmse / other.rmse, error)
     }
@@ -47,6 +49,8 @@ pub fn accuracy(estimates: &[f64], target: f64, seed: u64) -> Accuracy {
     let mut generator = key.generator();
     let mut resample = vec![0.0; errors.len()];
     let mut draw = || {
+        // The key has no estimator in it: the n-th resample is of the same sets for all of them, and their
+        // ratio is paired.
         resample.fill_with(|| errors[generator.random_range(0..errors.len())]);
         centre_and_spread(&mut resample)
     };

@@ -15,7 +15,7 @@ pub struct Design {
     pub seed: u64,
     /// The model whose axis is studied.
     pub model: Model,
-    /// How its parameters vary between replicates.
+    /// Variation of its parameters between replicates.
     pub spread: Spread,
     /// The axis.
     pub channel: Channel,
@@ -25,17 +25,17 @@ pub struct Design {
     pub samples: usize,
     /// Levels of the wavelet variance, J.
     pub levels: u32,
-    /// What is done to the replicates, one scenario each.
+    /// Contaminations of the replicates, one for each scenario.
     pub scenarios: Vec<Contamination>,
     /// The estimators compared: averages over replicates, and AVLR of the classical average.
     pub estimators: Vec<Estimator>,
     /// The model that is fitted.
     pub spec: ModelSpec,
-    /// What DR-AWV drops.
+    /// Replicates that DR-AWV drops.
     pub trim: Trim,
     /// Tuning of the robust wavelet variance.
     pub tuning: Tuning,
-    /// What a scale counts in the fit.
+    /// Weights of the scales in the fit.
     pub weighting: Weighting,
 }
 
@@ -65,7 +65,7 @@ pub enum StudyError {
     },
 }
 
-/// What one estimator made of one set in one scenario.
+/// Estimate by one estimator from one set in one scenario.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimate {
     /// The parameters of the fitted model, in its order.
@@ -112,6 +112,8 @@ impl Design {
         for scenario in &self.scenarios {
             for replicate in 1..=self.replicates {
                 let (channel, rate_hz) = (self.channel, self.model.rate_hz);
+                // The model's own values stand for those drawn: a scaled parameter that leaves its domain
+                // only for some draw is found when it is drawn.
                 scenario.scale(&mut self.model.axis(channel).clone(), channel, replicate, rate_hz)?;
                 scenario.apply(&mut nothing, channel, replicate, rate_hz, 0)?;
             }
@@ -136,6 +138,7 @@ impl Design {
     fn seed_of(&self, set: u64) -> u64 {
         let key =
             StreamKey { seed: self.seed, scenario: "efficiency", run: set, source: "set", process: "seed" };
+        // A seed of its own: the streams within a set are then keyed as those of any other experiment.
         key.generator().next_u64()
     }
 
@@ -192,7 +195,7 @@ impl Design {
         })
     }
 
-    /// What the estimators make of replicates.
+    /// Estimates from replicates, one for each estimator.
     pub(super) fn estimate_all(&self, replicates: &[Replicate]) -> Result<Vec<Estimate>, StudyError> {
         self.estimators.iter().map(|e| self.estimate(replicates, *e)).collect()
     }

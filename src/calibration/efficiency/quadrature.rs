@@ -3,7 +3,7 @@
 use crate::noise::Law;
 use nalgebra::{DMatrix, SymmetricEigen};
 
-/// Nodes a law is replaced by: exact for polynomials of degree 95 under a beta law.
+/// Number of nodes by which a law is replaced: exact for polynomials of degree 95 under a beta law.
 const NODES: usize = 48;
 /// A normal law is cut off so many standard deviations from its centre: 1e-19 of it lies beyond.
 const CUT: f64 = 9.0;
@@ -21,20 +21,26 @@ pub(super) fn nodes(law: Law, centre: f64, domain: (f64, f64)) -> Vec<(f64, f64)
 fn normal(centre: f64, sd: f64, (low, high): (f64, f64)) -> Vec<(f64, f64)> {
     let (low, high) = (low.max(centre - CUT * sd), high.min(centre + CUT * sd));
     let density = |x: f64| (-0.5 * ((x - centre) / sd).powi(2)).exp();
+    // Legendre's weight is Jacobi's with alpha = beta = 0.
     let raw = beta(1.0, 1.0).map(|(u, w)| (low + (high - low) * u, w));
     let raw: Vec<_> = raw.map(|(x, w)| (x, w * density(x))).collect();
     let total: f64 = raw.iter().map(|(_, w)| w).sum();
+    // Truncation takes some of the law away: what is left is made a law again.
     raw.into_iter().map(|(x, w)| (x, w / total)).collect()
 }
 
 /// Gauss-Jacobi quadrature for B ~ Beta(a, b): the eigenvalues of the Jacobi matrix, and the squares of the
 /// first components of its eigenvectors (Golub and Welsch).
 fn beta(a: f64, b: f64) -> impl Iterator<Item = (f64, f64)> {
+    // Jacobi's weight on (−1, 1) is (1 − x)^alpha (1 + x)^beta, and u = (1 + x)/2 has the density
+    // u^(a−1) (1 − u)^(b−1): alpha goes with b.
     let (alpha, beta) = (b - 1.0, a - 1.0);
     let sum = alpha + beta;
     let diagonal = |k: usize| {
         let s = 2.0 * k as f64 + sum;
         match k {
+            // The general forms are 0/0 here for alpha + beta = 0 and, below, −1: the common factor is
+            // cancelled.
             0 => (beta - alpha) / (sum + 2.0),
             _ => (beta * beta - alpha * alpha) / (s * (s + 2.0)),
         }
@@ -52,6 +58,7 @@ fn beta(a: f64, b: f64) -> impl Iterator<Item = (f64, f64)> {
         _ => 0.0,
     });
     let eigen = SymmetricEigen::new(matrix);
+    // The law has mass 1, so the squared components are the weights as they are.
     (0..NODES).map(move |i| (0.5 * (1.0 + eigen.eigenvalues[i]), eigen.eigenvectors[(0, i)].powi(2)))
 }
 

@@ -12,7 +12,7 @@ use super::design::{Design, Estimate, StudyError};
 use crate::Replicate;
 use crate::noise::Process;
 
-/// What one size of a disturbance does.
+/// Effect of a disturbance of one size.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Movement {
     /// The size: of an outlier in standard deviations of the signal's white part, or the factor of an
@@ -28,6 +28,7 @@ pub struct Movement {
 /// # Errors
 /// As [`StudyError`].
 pub fn outlier_curve(design: &Design, unit: f64, sizes: &[f64]) -> Result<Vec<Movement>, StudyError> {
+    // Set 0 is one realisation: a sensitivity curve is of a sample, the influence function of its limit.
     let mut samples = design.synthesized(0, 1, &design.drawn(0, 1)?);
     let middle = samples.len() / 2;
     let clean = samples[middle];
@@ -72,6 +73,7 @@ fn curve(
     let mut replicates = (1..=design.replicates).map(clean).collect::<Result<Vec<_>, _>>()?;
     let reference = design.estimate_all(&replicates)?;
     let mut changes_at = |size: &f64| {
+        // Overwritten at every size, so each starts from the clean ones and not from the size before.
         for replicate in touched {
             replicates[*replicate as usize - 1] = disturbed(*replicate, *size)?;
         }

@@ -1,4 +1,4 @@
-//! What the estimators aim at when parameters vary between replicates
+//! The target of the estimators when parameters vary between replicates
 //! ([Minaretzis](crate::bibliography::Minaretzis24), eqs. 2 and 3): the model nearest to the *expected*
 //! wavelet variance, which is not the model of the expected parameters.
 
@@ -29,6 +29,7 @@ pub fn target(design: &Design) -> Result<Target, StudyError> {
     let axis = design.channel.index();
     let (noise, laws) = (&design.model.axes[axis], &design.spread.axes[axis]);
     let rate_hz = design.model.rate_hz;
+    // The degrees of freedom of the average of K independent curves of one length.
     let edof = |j| design.replicates as f64 * interval::edof_eta3(design.samples, j);
     let levels: Vec<u32> = (1..=design.levels).collect();
     let curve = Curve {
@@ -56,6 +57,8 @@ pub(crate) fn expected_wv(
         let own = laws.iter().filter(|l| l.process() == label);
         for (process, weight) in weighted(process, own, rate_hz)? {
             for (nu, level) in expected.iter_mut().zip(1..) {
+                // nu is a sum over the processes, and so is its expectation: laws of different processes need
+                // no common quadrature.
                 *nu += weight * process.haar_wv(level);
             }
         }

@@ -33,6 +33,8 @@ pub(super) fn assemble(
     let processes = terms.iter().map(|t| t.process(rate_hz)).collect::<Result<_, _>>()?;
     let composite = Composite::new(processes);
     let those = |test: fn(&Term) -> bool| (0..terms.len()).filter(|i| test(&terms[*i])).collect();
+    // Local minima differ by far more than 1e-6 of the objective; the ε² is for a curve that the model meets
+    // exactly.
     let agreeing = |cost: f64| cost <= best.cost * (1.0 + 1e-6) + f64::EPSILON * f64::EPSILON;
     Ok(Fit {
         objective: best.cost * unit,
@@ -59,6 +61,7 @@ const KEPT: usize = 4;
 fn minima(found: &Found) -> Vec<Vec<f64>> {
     let mut minima: Vec<Vec<f64>> = Vec::new();
     for end in &found.ends {
+        // A descent from a start 0.1 % off ends in the same minimum.
         let same = |m: &Vec<f64>| m.iter().zip(&end.coordinates).all(|(a, b)| (a - b).abs() < 1e-3);
         if minima.len() < KEPT && !minima.iter().any(same) {
             minima.push(end.coordinates.clone());
@@ -89,6 +92,7 @@ fn terms(objective: &Objective, coordinates: &[f64], amplitudes: &[f64]) -> Vec<
             None => (0.0, false),
             Some(Range { low, high }) => {
                 let u = next.next().copied().unwrap_or(low);
+                // 1e-6 of ln κ, or of theta: the bounded step puts a coordinate on its end but for rounding.
                 (u, high > low && (u - low < 1e-6 || high - u < 1e-6))
             }
         };
@@ -109,6 +113,7 @@ impl Term {
         let kappa = self.coordinate.exp();
         let amplitude = if self.kind == Kind::Drift { self.amplitude.sqrt() } else { self.amplitude };
         let (shape, scale) = match self.kind {
+            // Near phi = 1 what counts is 1 − phi ≈ κ: a bound of 0.99999 is met to 1e-9 of that, not of 1.
             Kind::Ar1 => ((-kappa).exp(), kappa.min(1.0)),
             Kind::GaussMarkov => (kappa * rate_hz, kappa * rate_hz),
             _ => (self.coordinate, 1.0),

@@ -35,6 +35,7 @@ pub(crate) fn avlr(curve: &Curve, spec: &ModelSpec) -> Result<Fit, FitError> {
         .levels
         .iter()
         .zip(&curve.wv)
+        // ln m with m = 2^(level − 1), and ln adev with adev² = 2 nu.
         .map(|(level, nu)| ((f64::from(*level) - 1.0) * std::f64::consts::LN_2, 0.5 * (2.0 * nu).ln()))
         .collect();
     if points.len() < 2 {
@@ -46,6 +47,7 @@ pub(crate) fn avlr(curve: &Curve, spec: &ModelSpec) -> Result<Fit, FitError> {
     let not_found = |i: &usize| composite.processes[*i].values().iter().all(|value| *value <= 0.0);
     let zero = (0..composite.processes.len()).filter(not_found).collect();
     let residual = |((level, nu), edof): ((&u32, &f64), &f64)| {
+        // The distance with the weights `edof`, for comparison with other estimators; nothing minimised it.
         (0.5 * edof).sqrt() * (1.0 - composite.haar_wv(*level) / nu)
     };
     let residuals: Vec<f64> = curve.levels.iter().zip(&curve.wv).zip(&curve.edof).map(residual).collect();
@@ -71,6 +73,7 @@ fn term(kind: Kind, points: &[(f64, f64)]) -> Result<Process, FitError> {
     // adev at m = 1 on the line of a slope.
     let at_one = |slope: f64| {
         let stretch = &points[stretch(points, slope)];
+        // The least-squares intercept of a line of given slope is the mean of y − slope·x.
         (stretch.iter().map(|(x, y)| y - slope * x).sum::<f64>() / stretch.len() as f64).exp()
     };
     Ok(match kind {

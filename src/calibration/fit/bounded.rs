@@ -4,7 +4,7 @@
 //! with upper bounds treated like lower ones. Columns are expected at unit length, so that G has a unit
 //! diagonal and tolerances mean the same for every parameter.
 
-/// Parameters at most.
+/// Largest number of parameters.
 pub(crate) const MOST: usize = 12;
 
 /// A small symmetric matrix; rows and columns beyond the problem's size are not read.
@@ -22,7 +22,7 @@ pub(crate) struct Bounded {
     pub(crate) upper: Vector,
 }
 
-/// Where a parameter is.
+/// Place of a parameter: between its bounds, or on one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Place {
     Free,
@@ -30,9 +30,9 @@ enum Place {
     Upper,
 }
 
-/// A gradient below this part of the data is rounding.
+/// A gradient component below this is rounding (target and columns have unit length).
 const FLAT: f64 = 1e-15;
-/// A pivot below this part of the diagonal: the column depends on the others.
+/// A pivot below this share of the diagonal element means that the column depends on those before it.
 const DEPENDENT: f64 = 1e-13;
 
 impl Bounded {
@@ -56,6 +56,8 @@ impl Bounded {
             if self.descend(&mut x, &mut places, entering) {
                 refused = [false; MOST];
             } else {
+                // The column depends on the free ones or cannot leave its bound: it is tried again only after
+                // another step.
                 places[entering] = before;
                 refused[entering] = true;
             }
@@ -90,11 +92,15 @@ impl Bounded {
     fn descend(&self, x: &mut Vector, places: &mut [Place; MOST], entering: usize) -> bool {
         let start = x[entering];
         loop {
+            // Only the first solution can fail: afterwards the free columns get fewer, and those left are
+            // independent.
             let Some(goal) = self.solve_free(x, places) else { return false };
             let mut blocking = (1.0, None);
             for i in (0..self.n).filter(|i| places[*i] == Place::Free) {
                 let step = goal[i] - x[i];
                 let room = if step < 0.0 { self.lower[i] - x[i] } else { self.upper[i] - x[i] };
+                // The part of the way to the minimum at which this parameter meets its bound; the nearest of
+                // all stops the step.
                 if step.abs() > room.abs() && room / step < blocking.0 {
                     let place = if step < 0.0 { Place::Lower } else { Place::Upper };
                     blocking = ((room / step).max(0.0), Some((i, place)));
@@ -104,6 +110,7 @@ impl Bounded {
                 x[i] += blocking.0 * (goal[i] - x[i]);
             }
             let Some((i, place)) = blocking.1 else { return true };
+            // The bound itself: the sum above meets it to rounding only.
             x[i] = if place == Place::Lower { self.lower[i] } else { self.upper[i] };
             places[i] = place;
             if i == entering && (x[i] - start).abs() <= 0.0 {
@@ -142,6 +149,8 @@ pub(crate) fn cholesky_solve(a: impl Fn(usize, usize) -> f64, mut b: Vector, n: 
         for j in 0..=i {
             let dot: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
             if i == j {
+                // The squared part of the column that is independent of those before it. Its rounding error
+                // is 1e-16 of the whole.
                 let pivot = a(i, i) - dot;
                 if pivot <= DEPENDENT * a(i, i) {
                     return None;

@@ -22,6 +22,8 @@ use std::sync::Arc;
 /// When the curve has fewer scales than the model parameters, or numbers that are no wavelet variances.
 pub fn fit(curve: &Curve, spec: &ModelSpec, rate_hz: f64, weighting: Weighting) -> Result<Fit, FitError> {
     let observed = Weights { weighting, nu: curve.wv.clone(), mixing: None };
+    // The observed variances are the only ones there are before a model; what is low by chance weighs too
+    // much in this round.
     let first = fit_near(curve, spec, rate_hz, observed, COMBINATIONS, &[])?;
     match weighting {
         Weighting::Model => reweighted(curve, spec, rate_hz, first, MOST_ROUNDS, COMBINATIONS),
@@ -32,11 +34,11 @@ pub fn fit(curve: &Curve, spec: &ModelSpec, rate_hz: f64, weighting: Weighting) 
     }
 }
 
-/// Fits again at most, until the weights are those of the model itself.
+/// Largest number of repeated fits until the weights are those of the model itself.
 const MOST_ROUNDS: usize = 20;
 /// The same of a curve that resembles one already fitted, whose model is where the weights begin.
 const FEW_ROUNDS: usize = 3;
-/// Changes of the implied curve, relative, that are not worth another fit.
+/// Relative change of the implied curve below which no further fit is made.
 const SETTLED: f64 = 1e-6;
 
 /// The curve that a fit implies, where it may be divided by.
@@ -110,6 +112,8 @@ pub(crate) fn refit(
     weighting: Weighting,
     like: &Fit,
 ) -> Result<Fit, FitError> {
+    // Model and Full begin with the model of the curve that this one resembles, which is known better than
+    // one draw knows itself.
     let nu = match weighting {
         Weighting::Model | Weighting::Full => expected(curve, like),
         Weighting::Edof | Weighting::Interval | Weighting::None => curve.wv.clone(),
@@ -125,10 +129,10 @@ pub(crate) fn refit(
 /// Descents from the known minima only.
 const NO_GRID: usize = 0;
 
-/// What the scales of a curve count.
+/// Weights of the scales of a curve.
 struct Weights {
     weighting: Weighting,
-    /// The variances it is made for.
+    /// Wavelet variances at which the weights are evaluated (units²).
     nu: Vec<f64>,
     mixing: Option<Arc<DMatrix<f64>>>,
 }
@@ -179,6 +183,7 @@ pub(crate) fn correlated(curve: &Curve) -> Range {
 
 /// The widest ranges in which a curve can say anything, less what the limits leave out.
 fn component(kind: Kind, limits: Limits, curve: &Curve, rate_hz: f64) -> Component {
+    // Correlation times in logarithms: equal steps of ln κ change the curve about equally.
     let correlated = correlated(curve);
     // Coordinates of the limits: ln κ, which falls as phi rises.
     let coordinate = match (kind, limits.shape) {
@@ -199,6 +204,7 @@ fn component(kind: Kind, limits: Limits, curve: &Curve, rate_hz: f64) -> Compone
     };
     let (low, high) = limits.amplitude;
     let amplitude = match kind {
+        // The amplitude in which a drift is linear is the square of its slope.
         Kind::Drift => Range { low: low * low, high: high * high },
         _ => Range { low, high },
     };

@@ -94,9 +94,9 @@ pub(crate) const NEARLY_SETTLED: usize = 3;
 pub(crate) struct Objective {
     levels: Vec<u32>,
     roots: Vec<f64>,
-    /// What mixes the scales so that their errors are uncorrelated, once they are relative to the curve.
+    /// Matrix that mixes the scales so that their relative errors are uncorrelated ([`whitening`]).
     mixing: Option<Arc<DMatrix<f64>>>,
-    /// How the curve reads quantization noise, where that is not as it is and the model has some.
+    /// Response of a robust curve to quantization noise, where the model has some.
     quantization: Option<QuantizationResponse>,
     pub(crate) target: Vec<f64>,
     pub(crate) length: f64,
@@ -139,6 +139,7 @@ impl Objective {
         components: Vec<Component>,
     ) -> Self {
         let roots = match mixing {
+            // The covariance behind the mixing is relative to nu, so the curve must be too.
             Some(_) => {
                 let relative = |(nu, level): (&f64, &u32)| match curve.ignored.contains(level) {
                     true => 0.0,
@@ -150,6 +151,7 @@ impl Objective {
         };
         let target: Vec<f64> = roots.iter().zip(&curve.wv).map(|(w, nu)| w * nu).collect();
         let target = mixed(mixing.as_deref(), target);
+        // The unit of the objective depends on the weighting; at unit length every tolerance is relative.
         let length = dot(&target, &target).sqrt();
         let target = target.iter().map(|b| b / length).collect();
         let has_quantization = components.iter().any(|c| c.kind == Kind::Quantization);
@@ -184,17 +186,20 @@ impl Objective {
             shape.values.iter().zip(&shape.slopes).zip(weights).map(weighted).unzip();
         let mut values = mixed(self.mixing.as_deref(), values);
         let mut slopes = mixed(self.mixing.as_deref(), slopes);
+        // Unit columns: the Gram matrix has a unit diagonal, and its condition is that of the shapes, not of
+        // the units.
         let length = dot(&values, &values).sqrt();
         values.iter_mut().chain(&mut slopes).for_each(|v| *v /= length);
         Column { values, slopes, length }
     }
 
-    /// Of a curve that reads everything as it is.
+    /// Responses of a curve that reads quantization noise as it is: 1 at every level.
     pub(crate) fn plain_responses(&self) -> Vec<Response> {
         vec![Response::PLAIN; self.levels.len()]
     }
 
-    /// How the curve responds to small changes of the amplitudes, level by level.
+    /// Derivatives of the implied curve with respect to the wavelet variances of the components, level by
+    /// level.
     fn responses(&self, shapes: &[&Shape], amplitudes: &[f64]) -> Vec<Response> {
         let Some(quantization) = &self.quantization else { return self.plain_responses() };
         let at_level = |level: usize| {
@@ -215,6 +220,7 @@ impl Objective {
     /// The bounds of an amplitude in units in which its column has unit length.
     pub(crate) fn scaled_bounds(&self, component: usize, length: f64) -> (f64, f64) {
         let Range { low, high } = self.components[component].amplitude;
+        // x = amplitude·(length of its column)/(length of the target).
         (low * length / self.length, high * length / self.length)
     }
 
@@ -259,6 +265,8 @@ impl Objective {
     fn linear_best(&self, columns: &[Column]) -> LinearBest {
         let problem = self.linear_problem(columns);
         let mut x = problem.minimise();
+        // An amplitude on a bound does not follow the coordinates, so its column is left out of the
+        // projection.
         let free = |x: &Vector, i: usize| x[i] > problem.lower[i] && x[i] < problem.upper[i];
         let active: Vec<usize> = (0..columns.len()).filter(|i| free(&x, *i)).collect();
         // One refinement with the residuals themselves: the normal equations know only half the digits.
@@ -301,7 +309,7 @@ impl Objective {
     }
 }
 
-/// Coefficients of the projection of `vector` on the active columns.
+/// Coefficients of the projection of `vector` on the active columns; none if these depend on one another.
 fn project(columns: &[Column], active: &[usize], gram: &Matrix, vector: &[f64]) -> Option<Vec<f64>> {
     let mut right = [0.0; MOST];
     for (r, &i) in right.iter_mut().zip(active) {
@@ -315,6 +323,8 @@ fn project(columns: &[Column], active: &[usize], gram: &Matrix, vector: &[f64]) 
 /// −amplitude × the part of a column's slope that the active columns cannot follow.
 fn tangent(columns: &[Column], active: &[usize], gram: &Matrix, i: usize, amplitude: f64) -> Vec<f64> {
     let slopes = &columns[i].slopes;
+    // d(residual)/du with the amplitudes fixed, less its part within the columns, which the amplitudes take
+    // up.
     let mut tangent: Vec<f64> = slopes.iter().map(|s| -amplitude * s).collect();
     if let Some(part) = project(columns, active, gram, &tangent) {
         for (&a, p) in active.iter().zip(part) {
@@ -329,8 +339,8 @@ fn mixed(mixing: Option<&DMatrix<f64>>, values: Vec<f64>) -> Vec<f64> {
     (0..values.len()).map(|i| (0..values.len()).map(|j| mixing[(i, j)] * values[j]).sum()).collect()
 }
 
-/// What makes errors of this covariance uncorrelated and of unit variance: the inverse of its Cholesky factor; where
-/// rounding leaves no positive definite matrix, of its diagonal alone.
+/// Matrix that makes errors of this covariance uncorrelated and of unit variance: the inverse of its Cholesky
+/// factor; where rounding leaves no positive definite matrix, of its diagonal alone.
 pub(crate) fn whitening(covariance: &DMatrix<f64>) -> DMatrix<f64> {
     let inverse = covariance.clone().cholesky().and_then(|c| c.l().try_inverse());
     inverse.unwrap_or_else(|| {

@@ -11,7 +11,7 @@ use argmin::core::{
     TerminationStatus,
 };
 
-/// How the iterations ended.
+/// End of the iterations.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Termination {
     /// The model is linear in its parameters: no iteration needed.
@@ -37,7 +37,7 @@ impl Termination {
     }
 }
 
-/// Where a start led.
+/// Local minimum to which a start led.
 #[derive(Debug, Clone)]
 pub(crate) struct End {
     pub(crate) coordinates: Vec<f64>,
@@ -111,7 +111,8 @@ struct DampedNewton {
     growth: f64,
 }
 
-/// Step of the differences (natural logarithms of a correlation time, or theta).
+/// Step h of the central differences (natural logarithms of a correlation time, or theta): their error h² and
+/// the rounding of the gradients over h are both of the order 1e-10.
 const DIFFERENCE: f64 = 1e-5;
 
 /// Half the second derivatives of the cost.
@@ -127,11 +128,14 @@ fn curvature(objective: &Objective, u: &[f64], at: &Solution) -> Matrix {
         };
         let (up, down) = (gradients(1.0), gradients(-1.0));
         for i in 0..n {
+            // `gradient` is half a derivative, so (up − down)/2h is half a second one; half of it in either
+            // place makes the matrix symmetric.
             let half = 0.25 * (up[i] - down[i]) / DIFFERENCE;
             hessian[i][j] += half;
             hessian[j][i] += half;
         }
     }
+    // Away from a minimum the curvature may be indefinite and point uphill; Gauss and Newton's is never.
     if cholesky_solve(|i, j| hessian[i][j], [0.0; MOST], n).is_some() {
         return hessian;
     }
@@ -152,6 +156,8 @@ impl DampedNewton {
         let mut problem = Bounded::new(n);
         problem.gram = *curvature;
         let largest = (0..n).map(|i| curvature[i][i]).fold(f64::MIN_POSITIVE, f64::max);
+        // Damped along the diagonal (Marquardt), so that the step does not depend on the units of the
+        // coordinates.
         for i in 0..n {
             // A component without amplitude has no slope: it stays where it is.
             problem.gram[i][i] += self.damping * (curvature[i][i] + 1e-12 * largest);
@@ -166,8 +172,12 @@ impl DampedNewton {
             problem.lower[i] = (self.ranges[i].low - u[i]).max(-LARGE_STEP) * scale[i];
             problem.upper[i] = (self.ranges[i].high - u[i]).min(LARGE_STEP) * scale[i];
         }
+        // The bounds are part of the quadratic problem: cut off afterwards, the step of the other coordinates
+        // would be wrong.
         let scaled = problem.minimise();
         let step: Vec<f64> = (0..n).map(|i| scaled[i] / scale[i]).collect();
+        // Gradient and curvature are halves: the cost falls by 2g·s − s·Hs, which is g·s where Hs = g, g
+        // downhill.
         (step, (0..n).map(|i| scaled[i] * problem.right[i]).sum())
     }
 }
@@ -205,10 +215,13 @@ impl Solver<Reduced<'_>, Iterate> for DampedNewton {
             self.growth = 2.0;
             state = state.param(there).cost(after).jacobian(next);
         } else {
+            // Doubling the factor with each refusal: a start far off needs few tries to become cautious
+            // enough.
             self.damping *= self.growth;
             self.growth *= 2.0;
             state = state.param(u).cost(before).jacobian(at);
         }
+        // No decrease that the cost could show.
         let flat = expected <= 1e-16 * before;
         if small || flat || self.damping > HOPELESS {
             state = state.terminate_with(TerminationReason::SolverConverged);

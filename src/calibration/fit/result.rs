@@ -13,7 +13,7 @@ pub struct Fit {
     pub composite: Composite,
     /// Σ Omega_j (nu_j − nu_j(theta))² at theta.
     pub objective: f64,
-    /// How the iterations of the best start ended.
+    /// End of the iterations of the best start.
     pub termination: Termination,
     /// Combinations of shapes (correlation times) that were tried, each with its best amplitudes.
     pub combinations: usize,
@@ -36,7 +36,7 @@ pub struct Fit {
     pub(crate) minima: Vec<Vec<f64>>,
     /// The variances that the weights were made for.
     pub(crate) weighted_for: Vec<f64>,
-    /// What the scales were mixed with, with the full covariance.
+    /// Matrix by which the scales were mixed, with weights by the full covariance.
     pub(crate) mixing: Option<Arc<DMatrix<f64>>>,
 }
 

@@ -9,14 +9,14 @@ use super::objective::{Column, NEARLY_SETTLED, Objective, Range, Shape, dot};
 use super::optimise::{End, Termination, descend};
 use rayon::prelude::*;
 
-/// Combinations of the grid at most, about.
+/// Approximate limit of the number of combinations of the grid.
 pub(crate) const COMBINATIONS: usize = 6000;
-/// Points of one dimension at most.
+/// Largest number of points in one dimension.
 const POINTS: usize = 160;
-/// Local minima of the grid to descend from, at most.
+/// Largest number of local minima of the grid from which a descent starts.
 const STARTS: usize = 16;
 
-/// What the search found.
+/// Result of the search.
 #[derive(Debug)]
 pub(crate) struct Found {
     /// The best end.
@@ -42,6 +42,7 @@ pub(crate) fn search(objective: &Objective, combinations: usize, known: &[Vec<f6
         let grid = Grid::new(objective, &dimensions, combinations);
         let choices = grid.choices();
         tried = choices.len();
+        // The grid first: of ends with the same cost the sort keeps that order, whatever is known.
         starts.splice(0..0, grid.starts(&choices));
     }
     let mut ends: Vec<End> = starts.par_iter().map(|start| descend(objective, start)).collect();
@@ -103,6 +104,7 @@ impl<'a> Grid<'a> {
         }
         if !self.objective.is_linear() {
             let mut shapes: Vec<&Shape> = selected[..n].iter().map(|i| &self.shapes[*i]).collect();
+            // The amplitudes and their bounds are in the order of the components.
             shapes.sort_unstable_by_key(|shape| shape.component);
             return self.objective.best_amplitudes(&shapes, NEARLY_SETTLED).cost();
         }
@@ -120,6 +122,7 @@ impl<'a> Grid<'a> {
         let linear: f64 = (0..n).map(|i| problem.right[i] * x[i]).sum();
         let quadratic: f64 =
             (0..n).map(|i| x[i] * (0..n).map(|j| problem.gram[i][j] * x[j]).sum::<f64>()).sum();
+        // |b − Ax|² with |b| = 1, from inner products that are shared by all combinations.
         1.0 - 2.0 * linear + quadratic
     }
 
@@ -151,6 +154,8 @@ impl<'a> Grid<'a> {
             choices = choices
                 .into_iter()
                 .flat_map(|choice: Vec<usize>| {
+                    // Alike processes may be exchanged, and two at one point are one: strictly ascending
+                    // choices are all there are.
                     let first = if *repeats { choice.last().map_or(0, |i| i + 1) } else { 0 };
                     (first..points.len()).map(move |i| [choice.as_slice(), &[i]].concat())
                 })

@@ -1,8 +1,8 @@
-//! What a scale counts in a fit.
+//! Weights of the scales in a fit.
 
 use crate::wavelet::{Curve, interval};
 
-/// Omega: what a scale counts.
+/// Omega: the weights of the scales.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Weighting {
     /// edof/(2 nu(theta)²), the inverse variance of nu_hat where the model holds. The fit is repeated until the weights
@@ -40,6 +40,7 @@ impl Weighting {
     pub(crate) fn roots(self, curve: &Curve, nu: &[f64]) -> Vec<f64> {
         let root = |((nu, edof), level): ((&f64, &f64), &u32)| match self {
             _ if curve.ignored.contains(level) => 0.0,
+            // var nu_hat = 2 nu²/eta.
             Self::Model | Self::Edof | Self::Full => (0.5 * edof).sqrt() / nu,
             Self::Interval => {
                 let (low, high) = interval::interval(*nu, *edof, 0.95);

@@ -1,6 +1,6 @@
-//! Where the parameters of a model may be: fixed, or within bounds.
+//! Limits of the parameters of a model: fixed values or bounds.
 
-/// Where the parameters of one process may be, in the units of the parameters.
+/// Bounds of the parameters of one process, in the units of the parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// sigma2, q2, gamma2, s2 or slope.
@@ -10,7 +10,7 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Wherever the process exists.
+    /// No limits: wherever the process exists.
     pub(crate) const NONE: Self = Self { amplitude: (0.0, f64::INFINITY), shape: None };
 }
 
@@ -58,13 +58,13 @@ pub enum LimitError {
         parameter: String,
         /// The bound.
         value: f64,
-        /// Where it can be.
+        /// The domain, in words.
         domain: &'static str,
     },
 }
 
 impl LimitError {
-    /// What to do about it.
+    /// Advice to the user.
     #[must_use]
     pub fn hint(&self) -> String {
         match self {

@@ -1,4 +1,4 @@
-//! What is fitted: a sum of processes, and where their parameters may be.
+//! The model that is fitted: a sum of processes, and the limits of their parameters.
 
 mod limits;
 mod spec;

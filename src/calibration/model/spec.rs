@@ -1,4 +1,4 @@
-//! What a model is made of: "2*AR1+RW+WN+QN".
+//! Specification of a model, the kinds of its processes: "2*AR1+RW+WN+QN".
 
 use super::limits::{LimitError, Limits};
 use crate::noise::{Kind, ParameterRef, labels};
@@ -6,7 +6,7 @@ use crate::wavelet::Curve;
 use std::fmt;
 use std::str::FromStr;
 
-/// How many of a kind a model may have.
+/// Largest number of processes of a kind in one model.
 const fn most(kind: Kind) -> usize {
     match kind {
         Kind::Ar1 | Kind::GaussMarkov => MOST_SHAPES,
@@ -43,7 +43,7 @@ pub enum SpecError {
     Count {
         /// The specification.
         spec: String,
-        /// What stands before the asterisk.
+        /// Text before the asterisk.
         count: String,
     },
     /// Several of a kind that adds up to one of itself.
@@ -53,7 +53,7 @@ pub enum SpecError {
         spec: String,
         /// Code of the kind.
         code: &'static str,
-        /// How many.
+        /// Number given.
         count: usize,
     },
     /// More AR1, GM and MA1 than can be searched.
@@ -137,6 +137,8 @@ impl ModelSpec {
         if named.is_shape() {
             limits.shape = Some((from, to));
         } else {
+            // Amplitudes are not negative: variances, and the slope of a drift, whose sign a wavelet variance
+            // does not show.
             limits.amplitude = (from.max(0.0), to);
         }
         Ok(())
@@ -162,7 +164,7 @@ impl ModelSpec {
         }
     }
 
-    /// Where a parameter may be, by what was given.
+    /// Range of a parameter by the limits given.
     pub(crate) fn range(&self, of: ParameterRef) -> (f64, f64) {
         let limits = self.limits[of.process];
         if of.parameter.is_shape() {
@@ -187,6 +189,8 @@ impl ModelSpec {
     pub(crate) fn is_special_case_of(&self, other: &Self) -> bool {
         let count = |spec: &Self, kind: Kind| spec.kinds.iter().filter(|k| **k == kind).count();
         let more = |kind: Kind| count(self, kind).saturating_sub(count(other, kind));
+        // A white noise or random walk that the other model lacks must be one of its AR1 at the end of its
+        // range, and that AR1 is then free for nothing else.
         let (white, walk) = (more(Kind::White), more(Kind::RandomWalk));
         let others: usize = Kind::ALL.into_iter().map(more).sum::<usize>() - white - walk;
         others == 0 && count(self, Kind::Ar1) + white + walk <= count(other, Kind::Ar1)
@@ -209,6 +213,7 @@ impl ModelSpec {
     /// Number of parameters that are not fixed.
     #[must_use]
     pub fn parameters(&self) -> usize {
+        // Equal bounds leave nothing to estimate: such a parameter costs no degree of freedom.
         let fixed = |(low, high): (f64, f64)| usize::from(low >= high);
         let free = |(kind, limits): (&Kind, &Limits)| {
             kind.parameters().len() - fixed(limits.amplitude) - limits.shape.map_or(0, fixed)
@@ -216,7 +221,7 @@ impl ModelSpec {
         self.kinds.iter().zip(&self.limits).map(free).sum()
     }
 
-    /// What may stand between plus signs.
+    /// Words that may stand between plus signs.
     pub fn legal() -> impl Iterator<Item = &'static str> {
         Kind::ALL.iter().map(|k| k.code()).chain(["N1", "N2"])
     }

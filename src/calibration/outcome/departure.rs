@@ -1,4 +1,4 @@
-//! How far a curve is from the model that was fitted to it: where it matters, and where it is most certain.
+//! Departure of a curve from the model that was fitted to it: where it matters, and where it is most certain.
 
 use super::Outcome;
 use crate::curve::implied;
@@ -25,6 +25,7 @@ pub struct Miss {
 /// The normal score of a chi-square over its degrees of freedom (Wilson and Hilferty): of few degrees the ratio less one over
 /// its deviation would never be far below zero, however improbable it is.
 fn score(ratio: f64, edof: f64) -> f64 {
+    // (chi²/eta)^(1/3) is nearly normal with mean 1 − 2/(9 eta) and variance 2/(9 eta).
     let variance = 2.0 / (9.0 * edof);
     (ratio.cbrt() - 1.0 + variance) / variance.sqrt()
 }
@@ -79,6 +80,7 @@ impl Departure {
 }
 
 fn furthest(all: &[Miss]) -> Option<Miss> {
+    // In the logarithm half is as far from 1 as twice.
     all.iter().copied().max_by(|a, b| a.ratio.ln().abs().total_cmp(&b.ratio.ln().abs()))
 }
 
@@ -100,6 +102,7 @@ impl Outcome {
         let Some(place) = all.iter().position(|m| m.level == around.level) else {
             return (around.level, around.level);
         };
+        // The same side: a curve that crosses the model misses it for another reason on the other side.
         let belongs = |m: &&Miss| m.deviations * around.deviations.signum() > DOUBTFUL;
         let before = all[..place].iter().rev().take_while(belongs).last();
         let after = all[place + 1..].iter().take_while(belongs).last();

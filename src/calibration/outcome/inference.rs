@@ -1,11 +1,11 @@
-//! How sure a fit is: the results.
+//! Uncertainty of a fit: the results.
 
 use crate::imu::Axis;
 use crate::model::ModelSpec;
 use crate::noise::practical::AxisParameters;
 use crate::noise::{Composite, ParameterRef};
 
-/// How to draw.
+/// Settings of the bootstrap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Bootstrap {
     /// Number of draws.
@@ -25,7 +25,7 @@ impl Default for Bootstrap {
     }
 }
 
-/// What the bootstrap says about a fit.
+/// Uncertainty of a fit by the bootstrap.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Inference {
     /// Draws made.
@@ -34,14 +34,14 @@ pub struct Inference {
     pub fitted: usize,
     /// The models of these draws: what other recordings of the same IMU would have given.
     pub drawn: Vec<Composite>,
-    /// What the distances of quantiles of the draws from their median are multiplied by, where few replicates leave their
-    /// own scatter unknown: Student's quantile over the normal one.
+    /// Factor of the distances of the quantiles of the draws from their median, for the few replicates from
+    /// which their scatter is known: Student's quantile over the normal one.
     pub stretch: f64,
     /// One interval a parameter that is not fixed, in the order of the model.
     pub intervals: Vec<ParameterInterval>,
     /// Whether the model describes the curve; of slopes (AVLR), which are not fitted to it, nothing is known.
     pub goodness: Option<Goodness>,
-    /// How replicates differ at each level of the curve. Empty for a curve from elsewhere.
+    /// Spread of the replicates at each level of the curve. Empty for a curve from elsewhere.
     pub spread: Vec<LevelSpread>,
     /// Probability that replicates of one noise differ as much at some scale (see [`ALIKE_LEVEL`](crate::ALIKE_LEVEL)); none of a
     /// single signal.
@@ -52,7 +52,7 @@ pub struct Inference {
     pub practical: PracticalIntervals,
 }
 
-/// What practitioners ask of a fit.
+/// Practitioners' parameters of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Practical {
     /// N, K, B and T, of the policy "matched" over the default horizon.
@@ -75,11 +75,11 @@ impl Practical {
 /// 95 % intervals (units of the parameter); none where the draws do not determine it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PracticalIntervals {
-    /// Of the white noise density N.
+    /// White noise density N (units/√Hz).
     pub density: Option<[f64; 2]>,
-    /// Of the random-walk density K.
+    /// Random-walk density K (units/s/√Hz).
     pub walk: Option<[f64; 2]>,
-    /// Of the bias instability B.
+    /// Bias instability B (units).
     pub instability: Option<[f64; 2]>,
 }
 
@@ -98,14 +98,14 @@ pub struct AxesDiffer {
     pub ratio: f64,
 }
 
-/// How replicates differ at one scale: standard deviations of ln nu of a replicate.
+/// Spread of replicates at one scale: standard deviations of ln nu of a replicate.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct LevelSpread {
     /// Scale (s).
     pub tau_s: f64,
-    /// By the law of the noise alone.
+    /// Standard deviation by the law of the noise alone.
     pub within: f64,
-    /// Beyond that.
+    /// Standard deviation of the differences beyond that.
     pub between: f64,
 }
 

@@ -1,4 +1,4 @@
-//! What is asked of a calibration, and what comes of it: data that estimation, tests and words share.
+//! Settings and results of a calibration: data that estimation, tests and words share.
 
 mod departure;
 mod inference;
@@ -42,7 +42,7 @@ pub fn put(composite: &Composite, scope: Scope, model: &mut Model) {
 /// One fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Outcome {
-    /// What it is for: an axis of a sensor, or all its axes.
+    /// Scope of the model: an axis of a sensor, or all its axes.
     pub scope: Scope,
     /// Replicates averaged; 0 for a curve from elsewhere.
     pub replicates: usize,
@@ -50,15 +50,15 @@ pub struct Outcome {
     pub recordings: usize,
     /// The estimator.
     pub estimator: Estimator,
-    /// What the model is made of.
+    /// Specification of the model.
     pub spec: ModelSpec,
-    /// How that was chosen, if it was.
+    /// Ranking by which the specification was chosen, if it was.
     pub ranking: Option<Ranking>,
     /// The curve that was fitted.
     pub curve: Curve,
     /// The model.
     pub fit: Fit,
-    /// How the axes that are pooled differ, where they do.
+    /// Difference of the pooled axes, where there is one.
     pub axes_differ: Option<AxesDiffer>,
     /// Remarks, in words.
     pub notes: Vec<String>,

@@ -1,4 +1,4 @@
-//! How a model was chosen: the results.
+//! Choice of a model: the results.
 
 use super::inference::LEVEL;
 use crate::model::ModelSpec;
@@ -39,12 +39,12 @@ pub struct Ranking {
     /// The candidates all of whose processes can be identified, by WVIC; those whose distance alone exceeds the
     /// WVIC of the nearest are left out.
     pub candidates: Vec<Candidate>,
-    /// Which was chosen.
+    /// Position of the chosen candidate.
     pub chosen: usize,
-    /// How many were left out because a process of theirs is zero or at the end of its range: the same without it
-    /// is among the others.
+    /// Number of candidates left out because a process of theirs is zero or at the end of its range: the same
+    /// without it is among the others.
     pub not_identifiable: usize,
-    /// How many were left out because their distance alone is too large.
+    /// Number of candidates left out because their distance alone is too large.
     pub far: usize,
     /// The last simpler candidate that was given up, if any was.
     pub too_simple: Option<TooSimple>,
@@ -59,6 +59,6 @@ pub struct TooSimple {
     pub p_value: f64,
     /// The level that speaks loudest against it.
     pub level: u32,
-    /// Its part of all that does.
+    /// Share of that level in all that speaks against it.
     pub share: f64,
 }

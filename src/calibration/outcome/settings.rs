@@ -1,4 +1,4 @@
-//! What is asked of a calibration.
+//! Settings of a calibration.
 
 use crate::curve::{Estimator, Pool, Scope, Trim};
 use crate::fit::Weighting;
@@ -7,20 +7,20 @@ use crate::model::{LimitError, ModelSpec, SpecError};
 use crate::wavelet::Tuning;
 use std::str::FromStr;
 
-/// How to calibrate.
+/// Settings of a calibration.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
-    /// Which curves to fit.
+    /// The curves to fit.
     pub estimators: Vec<Estimator>,
-    /// What the model is made of.
+    /// Choice of the model.
     pub model: ModelChoice,
-    /// Where its parameters may be, the more special after the more general.
+    /// Limits of its parameters, the more special after the more general.
     pub limits: Vec<ParameterLimit>,
-    /// What DR-AWV drops.
+    /// Replicates that DR-AWV drops.
     pub trim: Trim,
     /// The tuning the robust wavelet variances were made with.
     pub tuning: Tuning,
-    /// What a scale counts.
+    /// Weights of the scales.
     pub weighting: Weighting,
     /// The scales that count (s); none: all.
     pub fit_range: Option<FitRange>,
@@ -77,7 +77,7 @@ impl ModelChoice {
     /// Stages of a choice.
     pub(crate) const STAGES: u64 = 3;
 
-    /// How many steps a fit is, where a draw of the bootstrap is one.
+    /// Number of steps of a fit, in which a draw of the bootstrap is one.
     #[must_use]
     pub const fn steps(&self) -> u64 {
         match self {
@@ -106,7 +106,7 @@ impl std::fmt::Display for ModelChoice {
     }
 }
 
-/// Where one parameter may be.
+/// Bounds of one parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterLimit {
     /// The sensor, or both.
@@ -124,7 +124,7 @@ pub struct ParameterLimit {
 }
 
 impl Default for Settings {
-    /// What suits most recordings: DR-AWV, N2. At 1 Hz, until a rate is known.
+    /// Settings that suit most recordings: DR-AWV, N2. At 1 Hz, until a rate is known.
     fn default() -> Self {
         Self {
             estimators: vec![Estimator::default()],
@@ -140,8 +140,8 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Which signals the estimators take as replicates of one another, unless told otherwise: those of single recordings
-    /// pool nothing.
+    /// Signals that the estimators take as replicates of one another, unless told otherwise: those of single
+    /// recordings pool nothing.
     #[must_use]
     pub fn pool(&self) -> Pool {
         if self.estimators.iter().any(|e| e.is_single()) { Pool::Axes } else { Pool::Sensor }

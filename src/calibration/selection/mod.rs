@@ -43,6 +43,8 @@ fn sums(scales: usize) -> Vec<ModelSpec> {
         for correlated in 0..=2 {
             let chosen = single.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, k)| *k);
             let spec = ModelSpec::of(chosen.chain(std::iter::repeat_n(Kind::Ar1, correlated)));
+            // At least one scale more than parameters, or the model meets the curve exactly and its distance
+            // tells nothing.
             if (1..scales).contains(&spec.parameters()) {
                 all.push(spec);
             }
@@ -90,7 +92,7 @@ pub(crate) fn choose(
     })
 }
 
-/// How a curve is drawn.
+/// Function that draws a curve.
 type Draw = fn(&CurveSampler<'_>, &StreamKey<'_>, &Settings) -> Option<Curve>;
 
 /// The probabilities of the candidates that were tested.
@@ -103,7 +105,8 @@ struct Trials {
 }
 
 impl Trials {
-    /// What the ranking tells of, however far it is: the chosen one, and those that would have been but for the J-test.
+    /// Candidates that the ranking lists, however far they are: the chosen one, and those that only the
+    /// J-test refused.
     fn told(&self, chosen: usize) -> Vec<usize> {
         let rejected = self.whole.iter().map(|(i, _)| *i);
         rejected.chain([chosen]).collect()
@@ -114,7 +117,7 @@ fn found(tested: &[(usize, f64)], i: usize) -> Option<f64> {
     tested.iter().find(|(t, _)| *t == i).map(|(_, p)| *p)
 }
 
-/// What is compared.
+/// The candidates, with all that their comparison needs.
 struct Field<'a> {
     group: &'a Group,
     estimator: Estimator,
@@ -130,6 +133,7 @@ impl Field<'_> {
     fn rank(&self, not_identifiable: usize, stage_done: &dyn Fn()) -> Option<(ModelSpec, Ranking)> {
         let nearest =
             (0..self.fits.len()).min_by(|a, b| self.objective(*a).total_cmp(&self.objective(*b)))?;
+        // One set of curves for all candidates: their optimisms are then compared on the same noise.
         let curves = self.draws(nearest);
         // An optimism is not negative: whose distance alone exceeds the sum of the nearest is not the best.
         let bound = self.objective(nearest) + self.optimism(nearest, &curves);
@@ -272,6 +276,7 @@ impl Field<'_> {
         let difference = |c: &Curve| Some(self.again(simple, c)?.objective - self.again(best, c)?.objective);
         let (some, rest) = curves.split_at(FIRST.min(curves.len()));
         let mut drawn: Vec<f64> = some.par_iter().filter_map(difference).collect();
+        // With the 99 drawn and none as far off, p ≤ 1/100: the other hundred would only confirm it.
         if observed <= 2.0 * drawn.iter().copied().fold(0.0, f64::max) {
             drawn.extend(rest.par_iter().filter_map(difference).collect::<Vec<_>>());
         }
@@ -288,6 +293,8 @@ impl Field<'_> {
     /// The scale that speaks loudest for one candidate against another, and its part of all that does.
     fn deciding(&self, against: usize, chosen: usize) -> (u32, f64) {
         let (a, b) = (&self.fits[against].1.residuals, &self.fits[chosen].1.residuals);
+        // Contribution of each scale to the difference of the objectives; the share is of those in favour of
+        // the chosen model.
         let gains: Vec<f64> = a.iter().zip(b).map(|(a, b)| a * a - b * b).collect();
         let total: f64 = gains.iter().filter(|g| **g > 0.0).sum();
         let loudest = gains.iter().zip(&self.curve.levels).max_by(|x, y| x.0.total_cmp(y.0));

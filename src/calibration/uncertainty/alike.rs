@@ -52,6 +52,8 @@ pub(crate) fn p_value(
         largest(&|j| without_axes(&axes, ratios.iter().map(|r| r[j].ln())))
     };
     let larger = (0..DRAWS).into_par_iter().filter(|run| draw(*run) >= own).count();
+    // The observed set counts as one of the draws, all exchangeable if the fitted law holds: p is never 0,
+    // and the level is kept (Davison and Hinkley 1997, chapter 4).
     Some((1 + larger) as f64 / (1 + DRAWS) as f64)
 }
 

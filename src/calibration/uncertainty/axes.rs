@@ -19,7 +19,7 @@ const LEAST: f64 = 30.0;
 /// Largest over smallest axis, in wavelet variance, from which on a model an axis is worth while.
 const NOTABLE: f64 = 1.1;
 
-/// How the axes of pooled replicates differ; none where they do not, or where every recording has not all of them.
+/// Difference of the axes of pooled replicates; none where they agree, or where a recording lacks an axis.
 pub(crate) fn axes_differ(
     replicates: &[Replicate],
     estimator: Estimator,
@@ -40,6 +40,8 @@ pub(crate) fn axes_differ(
         let logs = |row: &Vec<&Replicate>| -> Vec<f64> {
             row.iter().map(|r| r.value(estimator, level as usize - 1).ln()).collect()
         };
+        // The largest, that of the shortest recording: too much noise makes the test cautious, too little
+        // bold.
         let noise = replicates.iter().map(|r| variance_of_log(degrees(r, level))).fold(0.0, f64::max);
         let (p_value, means) = between_axes(&table.iter().map(logs).collect::<Vec<_>>(), noise)?;
         let by_mean = |a: &(f64, Axis), b: &(f64, Axis)| a.0.total_cmp(&b.0);
@@ -76,7 +78,11 @@ fn between_axes(rows: &[Vec<f64>], noise: f64) -> Option<(f64, Vec<f64>)> {
     let columns: Vec<f64> =
         (0..rows[0].len()).map(|axis| mean(&rows.iter().map(|row| row[axis]).collect::<Vec<_>>())).collect();
     let all = mean(&columns);
+    // Recordings differ as a whole too, but that is in every column alike and drops out of the means'
+    // differences.
     let between = count * columns.iter().map(|m| (m - all).powi(2)).sum::<f64>();
+    // One recording leaves no remainder to compare with: the noise is taken as known, and F becomes a
+    // chi-square.
     if rows.len() == 1 {
         return Some((ChiSquared::new(axes - 1.0).ok()?.sf(between / noise), columns));
     }
@@ -85,6 +91,8 @@ fn between_axes(rows: &[Vec<f64>], noise: f64) -> Option<(f64, Vec<f64>)> {
         row.iter().zip(&columns).map(|(value, column)| (value - own - column + all).powi(2)).sum()
     };
     let degrees = (count - 1.0) * (axes - 1.0);
+    // By few recordings the remainder may come out small by chance, and F large; it cannot truly be less than
+    // the noise.
     let remaining = (rows.iter().map(remains).sum::<f64>() / degrees).max(noise);
     let law = FisherSnedecor::new(axes - 1.0, degrees).ok()?;
     Some((law.sf(between / (axes - 1.0) / remaining), columns))

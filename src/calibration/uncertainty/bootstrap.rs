@@ -19,7 +19,7 @@ use crate::rng::{Generator, StreamKey};
 use crate::wavelet::{Curve, RobustVariance, Status};
 use nalgebra::DMatrix;
 
-/// What scatters in the draws.
+/// Sources of scatter in the draws.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scattering {
     /// Recordings differ, and each scatters for its length.
@@ -28,8 +28,8 @@ pub enum Scattering {
     BetweenRecordings,
 }
 
-/// Beyond this the expansion of the bias of a robust variance ends: the most that was measured (docs/limits.md: 21 % with
-/// two lengths of the scale in the record).
+/// Largest relative bias of a robust variance, beyond which its expansion fails: the most that was measured
+/// (docs/limits.md: 21 % with two lengths of the scale in the record).
 const LARGEST_BIAS: f64 = 0.2;
 
 /// Draws curves as a fitted model and the spread of the replicates would give them.
@@ -39,11 +39,12 @@ pub(crate) struct CurveSampler<'a> {
     /// The curve that was fitted.
     curve: &'a Curve,
     pub(crate) law: SamplingLaw,
-    /// Of replicates; none for a curve from elsewhere.
+    /// Spread of the replicates; none for a curve from elsewhere.
     pub(crate) spread: Option<Spread>,
     /// The curve that the model implies.
     centre: Vec<f64>,
-    /// Of a robust variance ([`Tuning::bias`](crate::wavelet::Tuning::bias)).
+    /// Relative bias of a robust variance times its degrees of freedom
+    /// ([`Tuning::bias`](crate::wavelet::Tuning::bias)).
     bias_times_edof: f64,
 }
 
@@ -63,7 +64,7 @@ impl<'a> CurveSampler<'a> {
         Self { replicates, estimator, curve, law, spread, centre, bias_times_edof: settings.tuning.bias() }
     }
 
-    /// Of curves as the fit of an outcome would give them.
+    /// A sampler of the curves that the fit of an outcome would give.
     pub(crate) fn of_outcome(group: &'a Group, outcome: &'a Outcome, settings: &Settings) -> Self {
         let Outcome { estimator, curve, fit, .. } = outcome;
         Self::new(&group.replicates, *estimator, curve, &fit.composite, settings)
@@ -91,6 +92,7 @@ impl<'a> CurveSampler<'a> {
         draw: impl Fn(&StreamKey<'_>) -> Option<Curve>,
     ) -> DMatrix<f64> {
         let process = self.estimator.name();
+        // Relative to the model: absolute values differ by powers of ten from level to level.
         let error = |run: usize| {
             let key = StreamKey { seed: 1, scenario: "covariance", run: run as u64, source: group, process };
             let curve = draw(&key)?;
@@ -161,15 +163,18 @@ impl<'a> CurveSampler<'a> {
         let edof = self.spread.iter().flat_map(|s| &s.edof);
         let drawn_replicate = |((replicate, ratios), edof): ((&Replicate, Vec<f64>), &Vec<f64>)| {
             let levels = self.centre.iter().zip(ratios).zip(edof);
+            // The law gives ratios whose mean is 1; robust variances of few coefficients read high, and so
+            // must those drawn.
             like(replicate, levels.map(|((nu, ratio), edof)| nu * ratio * (1.0 + self.bias(*edof))).collect())
         };
         let replicates: Vec<Replicate> =
             self.replicates.iter().zip(ratios).zip(edof).map(drawn_replicate).collect();
         let curve = average(&replicates, self.estimator, settings.trim, &settings.tuning).ok()?;
+        // The draws have a root everywhere; what the fit left out, it leaves out of every draw.
         Some(Curve { ignored: self.curve.ignored.clone(), ..curve })
     }
 
-    /// By how much a robust variance of so many degrees of freedom reads high.
+    /// Relative bias of a robust variance with so many degrees of freedom; 0 for a classical one.
     fn bias(&self, edof: f64) -> f64 {
         if self.estimator.is_robust() { (self.bias_times_edof / edof).min(LARGEST_BIAS) } else { 0.0 }
     }

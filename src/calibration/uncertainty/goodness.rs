@@ -10,6 +10,7 @@ pub(crate) fn goodness(outcome: &Outcome, draws: &[Fit]) -> Goodness {
     let Outcome { fit, spec, .. } = outcome;
     let objectives: Vec<f64> = draws.iter().map(|d| d.objective).collect();
     let larger = objectives.iter().filter(|o| **o >= fit.objective).count();
+    // A parameter of a process without amplitude took nothing from the curve.
     let free = |of: &ParameterRef| !fit.zero.contains(&of.process) && !spec.is_fixed(*of);
     let parameters = fit.composite.parameters().filter(|(of, _)| free(of)).count();
     Goodness {

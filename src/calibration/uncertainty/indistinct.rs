@@ -80,6 +80,8 @@ fn probability(group: &Group, outcome: &Outcome, simple: &Outcome, settings: &Se
         done = stage;
         let larger = gains.iter().filter(|g| **g >= observed).count();
         let largest = gains.iter().copied().fold(0.0, f64::max);
+        // Three larger gains make the probability at least 4/200 = 2 % at the end: more draws cannot bring it
+        // to 1 %.
         let hopeless = larger > 2;
         let clear = stage > STAGES[0] && observed > 2.0 * largest;
         if hopeless || clear {

@@ -1,4 +1,4 @@
-//! How sure a fit is: intervals of its parameters, and whether the model describes the curve at all.
+//! Uncertainty of a fit: intervals of its parameters, and whether the model describes the curve at all.
 //!
 //! A parametric bootstrap ([`super::bootstrap`]): the model is fitted to each curve drawn.
 //!
@@ -32,6 +32,7 @@ pub(crate) fn inference(
 ) -> Inference {
     let mut own = by_bootstrap(group, outcome, settings, bootstrap, advance);
     if let Some((simple, processes, p_value)) = simpler(group, outcome, settings) {
+        // By recursion: the simpler model may itself have processes that are not told apart.
         let intervals = inference(group, &simple, settings, bootstrap, &|_| {}).intervals;
         let Outcome { spec, fit: Fit { composite, .. }, .. } = simple;
         let indistinct = Indistinct { processes, spec, composite, p_value, intervals };

@@ -1,4 +1,4 @@
-//! How a fit follows its curve: the derivatives of the parameters with respect to the wavelet variances.
+//! Influence of a curve on its fit: the derivatives of the parameters with respect to the wavelet variances.
 //!
 //! A fit solves g(theta, nu) = Jᵀ(theta) Omega (nu − nu(theta)) = 0, J the derivatives of the model's wavelet variance and
 //! Omega the weights, which depend on theta or on nu as [`Weighting`] says. By the implicit function theorem d theta /
@@ -17,7 +17,7 @@ use nalgebra::{DMatrix, DVector};
 /// The parameters of a fit that follow the curve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CurveInfluence {
-    /// Which.
+    /// The parameters.
     pub parameters: Vec<ParameterRef>,
     /// A natural step of each, in its units: 1 − |phi| of a coefficient, the parameter itself of any other.
     pub units: Vec<f64>,
@@ -29,8 +29,8 @@ pub struct CurveInfluence {
 const STEP: f64 = 1e-4;
 
 impl CurveInfluence {
-    /// Of a least-squares fit; none of slopes (AVLR), of the full covariance, which is drawn, and of a fit without a
-    /// parameter that moves.
+    /// Influence on a least-squares fit; none for slopes (AVLR), for weights by the full covariance, which is
+    /// drawn, and for a fit without a parameter that moves.
     #[must_use]
     pub fn of(outcome: &Outcome, settings: &Settings) -> Option<Self> {
         let fit = &outcome.fit;
@@ -44,6 +44,7 @@ impl CurveInfluence {
             return None;
         }
         let unit = |(_, (of, value)): &(usize, (ParameterRef, f64))| match of.parameter {
+            // A step relative to phi itself would leave the stationary range where 1 − phi is below it.
             Parameter::Phi | Parameter::Theta => 1.0 - value.abs(),
             _ => *value,
         };
@@ -65,11 +66,13 @@ impl CurveInfluence {
         for j in 0..curve.wv.len() {
             let scaled = |by: f64| {
                 let mut moved = curve.clone();
+                // A relative step, so that the derivative is with respect to ln nu_j.
                 moved.wv[j] *= 1.0 + by;
                 equation.value(&fit.composite, &moved)
             };
             by_curve.set_column(j, &((scaled(STEP) - scaled(-STEP)) / (2.0 * STEP)));
         }
+        // Implicit function theorem: (∂g/∂theta) dtheta = −(∂g/∂nu) dnu.
         let passed_on = by_parameter.lu().solve(&-by_curve)?;
         Some(Self { passed_on, ..steps })
     }
@@ -86,7 +89,7 @@ impl CurveInfluence {
     }
 }
 
-/// What a fit makes zero.
+/// The estimating equation g(theta, nu) = 0 of a fit.
 struct Equation {
     /// The parameters that move, among all of the model.
     columns: Vec<usize>,

@@ -6,7 +6,7 @@ use crate::noise::{Parameter, ParameterRef, Process};
 use crate::outcome::{Outcome, ParameterInterval, Undetermined};
 
 impl ParameterInterval {
-    /// Takes the interval away.
+    /// Removes the interval and records why.
     pub(crate) fn refuse(&mut self, why: Undetermined) {
         (self.low, self.high) = (f64::NAN, f64::NAN);
         self.absent = Some(why);
@@ -40,6 +40,8 @@ pub(crate) fn intervals(
         let lost = if is_zero { 1.0 } else { 1.0 - there.len() as f64 / fits.len() as f64 };
         let drawn = DrawnProcess { spec, index: i, process, drawn: there, lost, stretch };
         let (mut own, quantiles) = drawn.intervals(&standard_errors[intervals.len()..]);
+        // Only a correlation time that is free can leave the search; limits that are given are an answer of
+        // their own.
         if spec.limits()[i].shape.is_none() && own.iter().any(|i| leaves_search(searched, process, i)) {
             own.iter_mut().for_each(|i| i.refuse(Undetermined::BeyondSearch));
         }
@@ -139,6 +141,8 @@ fn matched<'a>(estimate: &Fit, spec: &ModelSpec, fit: &'a Fit) -> Vec<Option<&'a
         let own: Vec<usize> = (first..kinds.len()).filter(|i| kinds[*i] == *kind).collect();
         let items: Vec<usize> = own.iter().copied().filter(|i| is_present(fit, *i)).collect();
         let places: Vec<usize> = own.iter().copied().filter(|i| is_present(estimate, *i)).collect();
+        // With limits the labels tell which is which; without, fits list alike processes by correlation time,
+        // and only their number may differ.
         let pairs: Vec<(usize, usize)> = if own.iter().any(|i| spec.limits()[*i] != Limits::NONE) {
             items.iter().map(|i| (*i, *i)).collect()
         } else if items.len() <= places.len() {
@@ -177,13 +181,14 @@ fn log_time(process: &Process) -> f64 {
     }
 }
 
-/// Both together. A process that is hardly told from the others is shown only where its estimate is large, and then the
-/// draws, which show it smaller than it was estimated, are mirrored to what is larger still: its interval holds them too.
+/// The smallest interval that holds both. A process that is hardly told from the others is shown only where
+/// its estimate is large, and then the draws, which show it smaller than it was estimated, are mirrored to
+/// what is larger still: its interval holds them too.
 const fn hull(mirrored: [f64; 2], quantiles: [f64; 2]) -> [f64; 2] {
     [mirrored[0].min(quantiles[0]), mirrored[1].max(quantiles[1])]
 }
 
-/// What draws around an estimate say of its parameter.
+/// Quantiles of the draws of one parameter, and the intervals that follow.
 ///
 /// Amplitudes and correlation times are scale parameters: estimate over truth is distributed as draw over estimate, whatever
 /// the truth. So the ends of an interval are estimate²/draw at the quantiles of the draws (exact for a variance whose estimate
@@ -204,9 +209,11 @@ impl Draws {
         Self { parameter, quantiles: [low, high], median, stretch }
     }
 
-    /// The parameter where its law does not depend on its value.
+    /// The parameter on the scale on which its law does not depend on its value: ln κ, theta, or the
+    /// logarithm.
     fn scale(&self, value: f64) -> f64 {
         match self.parameter {
+            // ln κ = −ln T but for the rate: phi as the correlation time that it stands for.
             Parameter::Phi => (-value.ln()).ln(),
             Parameter::Theta => value,
             _ => value.ln(),
@@ -221,7 +228,7 @@ impl Draws {
         }
     }
 
-    /// How far the quantiles are from the median, there.
+    /// Distances of the quantiles from the median on that scale, stretched.
     fn distances(&self) -> [f64; 2] {
         self.quantiles.map(|q| self.stretch * (self.scale(q) - self.scale(self.median)))
     }
@@ -239,6 +246,8 @@ impl Draws {
 
     /// The quantiles mirrored at the estimate; none where it or one of them is at a bound.
     fn mirrored(&self, estimate: f64) -> Option<[f64; 2]> {
+        // 2·estimate − quantile is the mirror image; written with the median, whose distance from the
+        // quantiles is what is stretched.
         let centre = 2.0 * self.scale(estimate) - self.scale(self.median);
         let mut ends = self.distances().map(|d| self.back(centre - d));
         ends.sort_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! How sure a fit is: curves drawn anew, intervals, tests.
+//! Uncertainty of a fit: curves drawn anew, intervals, tests.
 
 pub(crate) mod alike;
 pub(crate) mod axes;

@@ -13,7 +13,8 @@ fn observed_s(outcome: &Outcome, rate_hz: f64) -> Option<f64> {
 }
 
 impl Outcome {
-    /// What practitioners call N, K, B and T, as exports have them; none at a rate without averages of 1 s, and of no noise.
+    /// N, K, B and T of practitioners, as exports have them; none at a rate without averages of 1 s, nor
+    /// without noise.
     #[must_use]
     pub fn practical(&self, rate_hz: f64) -> Option<Practical> {
         let (horizon, policy) = (Horizon::default(), Policy::Matched);
@@ -43,7 +44,7 @@ pub(crate) fn intervals(outcome: &Outcome, fits: &[Fit], stretch: f64, rate_hz: 
     }
 }
 
-/// What is read off one model.
+/// N, K and B read off one model.
 struct Reading {
     density: f64,
     walk: f64,

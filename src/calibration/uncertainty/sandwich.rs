@@ -37,6 +37,7 @@ pub(crate) fn standard_errors(outcome: &Outcome, settings: &Settings, covariance
     // Relative to the parameters, which are of very different sizes.
     let jacobian = DMatrix::from_fn(levels, moving.len(), |j, m| gradients[j][moving[m]] * all[moving[m]].2);
     let scatter = DMatrix::from_fn(levels, levels, |i, j| covariance[(i, j)] * centre[i] * centre[j]);
+    // (W J)⁺ W with WᵀW = Omega is (Jᵀ Omega J)⁻¹ Jᵀ Omega, without squaring the condition of J.
     let relative = (&weights * jacobian)
         .pseudo_inverse(f64::EPSILON)
         .map(|inverse| inverse * weights)

@@ -1,4 +1,4 @@
-//! How replicates of one noise differ: between them, beyond what each of them scatters.
+//! Spread of replicates: their own scatter, and their differences beyond it.
 //!
 //! Their ln nu scatter as their variance from replicate to replicate shows. Of that the part `within` follows from the
 //! model and the length ([`SamplingLaw`]); `between` is what is there in excess, if anything (moments of a
@@ -41,7 +41,7 @@ pub(crate) struct Spread {
     units: Vec<Vec<f64>>,
     /// The recording that each replicate is of, and its position among those of it, from 0.
     origin: Vec<Origin>,
-    /// Part of a variance's degrees of freedom that the estimator leaves.
+    /// Share of the K − 1 degrees of freedom of a variance that the estimator leaves.
     share_of_freedom: f64,
 }
 
@@ -101,9 +101,12 @@ impl Spread {
     /// replicates show, and their correlations between levels.
     pub(crate) fn draw(&self, generator: &mut Generator) -> Vec<Vec<f64>> {
         let of_replicate = |(scores, total): (Vec<f64>, &Vec<f64>)| {
+            // The chi-square whose logarithm has the observed variance: the skew of few degrees of freedom
+            // comes with it.
             let ratio = |(score, total): (f64, &f64)| chi_square_ratio(score, edof_of_log(total * total));
             scores.into_iter().zip(total).map(ratio).collect()
         };
+        // The part of the variance of ln nu by which recordings differ, which the axes of a recording share.
         let part = |j: usize| {
             let (within, between) = (self.within[j].powi(2), self.between[j].powi(2));
             if between > 0.0 { between / (within + between) } else { 0.0 }
@@ -112,8 +115,9 @@ impl Spread {
         self.scores(&between, generator).into_iter().zip(&self.total).map(of_replicate).collect()
     }
 
-    /// What makes an interval of normal quantiles one of Student's, for the few replicates that the variances are
-    /// known from: the ratio of the quantiles 0.975. Nothing is known from a single one: its variances are the law's.
+    /// Ratio of the quantiles 0.975 of Student's law and the normal one, by which intervals are stretched
+    /// because the variances are known from few replicates. 1 for a single replicate, whose variances are
+    /// those of the law.
     pub(crate) fn student(&self) -> f64 {
         self.student_where(&self.between)
     }
@@ -137,6 +141,8 @@ impl Spread {
             return signals - 1.0;
         }
         let at_level = |(within, between): (&f64, &f64)| {
+            // Variance of the mean of all signals: their own noise falls with the number of signals, shared
+            // differences with that of recordings.
             let (own, common) = (within * within / signals, between * between / recordings);
             let scatter = own * own / (signals - 1.0) + common * common / (recordings - 1.0);
             (own + common).powi(2) / scatter
@@ -160,9 +166,12 @@ impl Spread {
     fn scores(&self, between: &[f64], generator: &mut Generator) -> Vec<Vec<f64>> {
         let (signals, recordings) = (self.units.len(), self.recordings());
         let mut normals = |count: usize| -> Vec<f64> {
+            // Σ unit² is K − 1 over the replicates: weights of variance 1/(K − 1) make a sum of variance 1.
             let freedom = (count as f64 - 1.0).max(1.0);
             (0..count).map(|_| generator.sample::<f64, _>(StandardNormal) / freedom.sqrt()).collect()
         };
+        // One signal to a recording: what is the recording's and what is the signal's cannot be told apart,
+        // and need not.
         let is_whole = recordings == signals || recordings < 2;
         let of_recordings: Vec<Vec<f64>> =
             (0..if is_whole { 0 } else { recordings }).map(|_| normals(recordings)).collect();
@@ -175,12 +184,13 @@ impl Spread {
             };
             let common: Vec<f64> = self.origin.iter().map(weight).collect();
             let parts = self.combined(&weights).into_iter().zip(self.combined(&common)).zip(between);
+            // Variances add up: the parts (1 − part) and part of a variance of 1.
             parts.map(|((own, common), part)| (1.0 - part).sqrt() * own + part.sqrt() * common).collect()
         };
         self.origin.iter().map(of_replicate).collect()
     }
 
-    /// The residuals with weights, added up.
+    /// Weighted sum of the residuals, level by level.
     fn combined(&self, weights: &[f64]) -> Vec<f64> {
         let mut sum = vec![0.0; self.between.len()];
         for (weight, unit) in weights.iter().zip(&self.units) {
@@ -192,6 +202,7 @@ impl Spread {
 
 /// The degrees of freedom of a chi-square whose logarithm has this variance: psi1(x) ≈ 1/x + 1/2x² at x = eta/2.
 fn edof_of_log(variance: f64) -> f64 {
+    // The positive root of variance·x² − x − ½ = 0, doubled.
     (1.0 + (1.0 + 2.0 * variance).sqrt()) / variance
 }
 
@@ -222,7 +233,7 @@ const fn share_of_freedom(estimator: Estimator) -> f64 {
     if matches!(estimator, Estimator::DrAwv) { 0.87 } else { 1.0 }
 }
 
-/// What makes the mean of the clipped variance of K Gaussian numbers their variance: 1.075 for K = 8.
+/// Factor that makes the clipped variance of K Gaussian numbers unbiased: 1.075 for K = 8.
 fn small_sample(count: usize) -> f64 {
     1.0 + 0.6 / count as f64
 }
@@ -237,7 +248,7 @@ pub(crate) fn mean_square(logs: &[f64], noise: &[f64], estimator: Estimator) -> 
     correction * squares / (logs.len() as f64 - 1.0)
 }
 
-/// How the ln nu of replicates scatter at one level.
+/// Scatter of the ln nu of replicates at one level.
 struct Scatter {
     /// Standard deviation of what they differ by beyond their noise.
     between: f64,
@@ -267,6 +278,8 @@ impl Scatter {
             let length = (residuals.iter().map(|z| z * z).sum::<f64>() / freedom).sqrt();
             (residuals, length)
         };
+        // At twice the range each residual is below ½, so their mean square is below 1: the root lies before
+        // it.
         let (mut low, mut high) = (0.0, 2.0 * range);
         if weighted(low).1 * correction.sqrt() > 1.0 {
             // Halved to rounding.
@@ -295,6 +308,8 @@ fn residuals(values: &[f64], weights: &[f64], clipped: bool) -> Vec<f64> {
         let centre = weighted_median(values, weights);
         let distances: Vec<f64> =
             values.iter().zip(weights).map(|(x, w)| (x - centre).abs() * w.sqrt()).collect();
+        // Distances are in the standard deviations of each replicate: a short recording scatters more and is
+        // not clipped for that.
         let most = CLIP * MAD_TO_DEVIATION * median(&distances);
         for (x, w) in kept.iter_mut().zip(weights) {
             let most = most / w.sqrt();

@@ -34,14 +34,15 @@ pub fn advice(diagnoses: &[Diagnosis], sensor: Sensor) -> Vec<String> {
     lines
 }
 
-/// What leaving each abnormal recording of a sensor out does to the fits, a line each.
+/// Effect on the fits of leaving out each abnormal recording of a sensor, a line each.
 #[must_use]
 pub fn effects(diagnoses: &[Diagnosis], sensor: Sensor) -> Vec<String> {
     let abnormal = diagnoses.iter().filter(|d| d.sensor == sensor && d.verdict != Verdict::Normal);
     abnormal.flat_map(|d| d.left_out.iter().map(|l| effect(&d.name, l))).collect()
 }
 
-/// What is said where the model does not describe the curve: everything else is of the wrong model.
+/// Sentence for a model that does not describe the curve: all other statements are then about the wrong
+/// model.
 fn misfits(misfits: &[Misfit]) -> Option<String> {
     if misfits.is_empty() {
         return None;
@@ -55,7 +56,7 @@ fn misfits(misfits: &[Misfit]) -> Option<String> {
     ))
 }
 
-/// What is said of outliers that all recordings hold.
+/// Sentence on outliers that all recordings hold.
 fn outliers(common: &CommonOutliers, count: usize) -> String {
     let (first, last) = (common.tau_s[0], common.tau_s[common.tau_s.len() - 1]);
     format!(
@@ -70,7 +71,7 @@ fn outliers(common: &CommonOutliers, count: usize) -> String {
     )
 }
 
-/// What is said of quantization noise that is not a quantizer's.
+/// Sentence on quantization noise that is not that of a quantizer.
 fn gaussian_quantization(found: &GaussianQuantization) -> String {
     format!(
         "the noise that the model calls quantization is Gaussian, not a quantizer's (classical and robust wavelet variance agree \

@@ -1,4 +1,4 @@
-//! How sure a fit is, in words.
+//! Uncertainty of a fit, in words.
 
 use super::format::{percent, three_digits};
 use crate::outcome::{Indistinct, Outcome, ParameterInterval, Undetermined};
@@ -59,7 +59,7 @@ fn joined(processes: &[usize], labels: &[String]) -> String {
     processes.iter().map(|i| labels[*i].as_str()).collect::<Vec<_>>().join(" and ")
 }
 
-/// What of a model with processes of these labels cannot be told apart, and what is known instead.
+/// Sentence on the processes (with these labels) that cannot be told apart, and on what is known instead.
 fn note_of_indistinct(indistinct: &Indistinct, labels: &[String]) -> String {
     let Indistinct { processes, spec, composite, p_value, intervals } = indistinct;
     let kind = spec.kinds()[processes[0]];

@@ -1,4 +1,4 @@
-//! What a fit says, and what it cannot say, in words.
+//! Remarks on a fit, and on what it cannot determine, in words.
 
 use super::format::{duration, percent, three_digits};
 use crate::curve::{Estimator, Replicate};
@@ -6,7 +6,7 @@ use crate::noise::{Composite, Process};
 use crate::outcome::{AxesDiffer, Miss, Outcome, tau_s};
 use crate::wavelet::{Curve, Status};
 
-/// What a process contributes to a model's wavelet variance.
+/// Contribution of a process to a model's wavelet variance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Share {
     /// Levels at which it is the largest part, ascending.
@@ -62,7 +62,7 @@ pub(crate) fn notes(outcome: &Outcome, replicates: &[Replicate], rate_hz: f64) -
     notes
 }
 
-/// What stands at the end of where it may be.
+/// Remarks on parameters at the ends of their ranges.
 fn at_ends(outcome: &Outcome, rate_hz: f64, notes: &mut Vec<String>) {
     let fit = &outcome.fit;
     let labels = fit.composite.labels();
@@ -95,7 +95,7 @@ fn at_ends(outcome: &Outcome, rate_hz: f64, notes: &mut Vec<String>) {
     }
 }
 
-/// What the scales there are tell little of.
+/// Remarks on processes of which the observed scales tell little.
 fn beyond_the_scales(outcome: &Outcome, record_s: f64, rate_hz: f64, notes: &mut Vec<String>) {
     let (fit, levels) = (&outcome.fit, &outcome.counted_levels());
     let last = levels.last().copied().unwrap_or(0);
@@ -120,6 +120,8 @@ fn beyond_the_scales(outcome: &Outcome, record_s: f64, rate_hz: f64, notes: &mut
                  name"
             ));
         }
+        // Before its peak the curve of an AR1 rises as that of a random walk does: without the peak only
+        // sigma2 is known.
         if PEAK * t_corr_s > longest_s {
             let record = if record_s > 0.0 {
                 format!("the record is {}: ", duration(record_s))
@@ -181,7 +183,7 @@ fn worst_in_words(outcome: &Outcome, worst: Miss, rate_hz: f64) -> String {
     )
 }
 
-/// That the axes differ, and where most; none where they do not.
+/// Remark that the axes differ, and where most; none where they agree.
 #[must_use]
 pub fn axes_remark(outcome: &Outcome, rate_hz: f64) -> Option<String> {
     let AxesDiffer { level, largest, smallest, ratio, .. } = outcome.axes_differ?;
@@ -194,7 +196,7 @@ pub fn axes_remark(outcome: &Outcome, rate_hz: f64) -> Option<String> {
     ))
 }
 
-/// What was averaged: "6 recordings × 3 axes", "1 recording".
+/// Description of the signals averaged: "6 recordings × 3 axes", "1 recording".
 #[must_use]
 pub fn signals(outcome: &Outcome) -> String {
     let recordings = match outcome.recordings {
