@@ -10,12 +10,13 @@ use std::path::{Path, PathBuf};
 
 /// Check scenario, study, model, trajectory and recording files without running anything
 ///
-/// What a file is follows from its contents: a TOML with [accel] or [gyro] is a noise model, one with
-/// segments or waypoints a motion profile, one with candidates a study of `batch`, one with sets of
-/// replicates a study of `efficiency`, one with bounds of parameters (lower, upper, fix) or operations that of
-/// `calibrate --parameters` or `synthesize --contaminate`, one with lat_deg and yaw_deg an initial
-/// state of `fuse`, one with [unit] an entry of the catalogue of IMUs, any other a scenario; a table with lat_deg or n_m is a trajectory, as are .nav, .tum and .gpx, or with standard
-/// deviations GNSS fixes, with tau_samples (or a .wv.json) a curve, any other table or .npy a static recording.
+/// What a file is follows from its contents. A TOML file with [accel] or [gyro] is a noise model; with segments or
+/// waypoints a motion profile; with candidates a study of `batch`; with sets of replicates a study of
+/// `efficiency`; with bounds of parameters (lower, upper, fix) a file for `calibrate --parameters`; with operations
+/// one for `synthesize --contaminate`; with lat_deg and yaw_deg an initial state of `fuse`; with [unit] an entry of
+/// the catalogue of IMUs; any other is a scenario. A table with lat_deg or n_m is a trajectory, as are .nav, .tum
+/// and .gpx; with standard deviations it is GNSS fixes; with tau_samples (or a .wv.json) a curve; any other table or
+/// .npy is a static recording.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -29,7 +30,7 @@ pub(crate) struct Args {
     /// Sample rate of recordings without a time column
     #[arg(long, value_name = "HZ", value_parser = parse::rate_hz)]
     rate_hz: Option<f64>,
-    /// Also print what a file comes to: scenarios and studies with every key, defaults included; models axis by axis
+    /// Also print the contents: scenarios and studies with every key, defaults included; models axis by axis
     #[arg(long)]
     dry_run: bool,
 }

@@ -16,12 +16,13 @@ use crate::scenario::Scenario;
 use crate::sensors::outage::Outage;
 use std::path::PathBuf;
 
-/// Choose the noise model for a filter by what it does on recordings that it has not seen
+/// Choose the noise model for a filter by navigating on recordings left out of its calibration
 ///
-/// Leaves out one recording after the other, calibrates every candidate on the others and takes it along TRAJECTORY on
-/// windows of the one left out. Ranks candidates by the mean log density of their true errors at the ends of outages,
-/// which rewards accuracy and honesty together; beside it RMSE, NEES and coverage, with intervals over recordings.
-/// Writes report.html, ranking.json and model.toml, the winner calibrated on all recordings.
+/// Leaves out one recording at a time, calibrates every candidate on the others and navigates along TRAJECTORY with
+/// windows of the one left out. Ranks the candidates by the mean log density of the true errors at the ends of outages
+/// under the filter's covariance, which rewards accuracy and consistency together. Also prints RMSE, NEES and coverage,
+/// with intervals over recordings. Writes report.html, ranking.json and model.toml, the winner calibrated on all
+/// recordings.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -49,11 +50,11 @@ pub(crate) struct Args {
     /// Filters to compare: 15, 21, full [default: 15, and full with awv]
     #[arg(long, value_name = "STATES", value_delimiter = ',')]
     filter: Vec<FilterStates>,
-    /// What is done to models: none, tuned (honest in the mean for the models of the single recordings), x10 (ten times
-    /// the standard deviations) [default: none, and all three with awv]
+    /// How models are inflated: none, tuned (consistent in the mean for the models of the single recordings), x10 (ten
+    /// times the standard deviations) [default: none, and all three with awv]
     #[arg(long, value_name = "HOW", value_delimiter = ',')]
     inflate: Vec<Inflation>,
-    /// Runs on each recording (default: two on each window that lies in it side by side, 16 to 64)
+    /// Runs on each recording (default: two for each window that fits side by side, 16 to 64)
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     runs: Option<u64>,
     /// What DR-AWV drops at each end of each scale: a number, or a share such as 30%

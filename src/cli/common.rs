@@ -15,19 +15,19 @@ pub(crate) struct Common {
     /// Worker threads, at most 1024 (default: one per core)
     #[arg(long, short = 'j', global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(crate) threads: Option<u16>,
-    /// Say only errors
+    /// Print errors only
     #[arg(long, short, global = true)]
     pub(crate) quiet: bool,
-    /// Say more
+    /// Print more
     #[arg(long, short, global = true, conflicts_with = "quiet")]
     pub(crate) verbose: bool,
-    /// No progress, neither bars nor lines
+    /// Show no progress, neither bars nor lines
     #[arg(long, global = true)]
     pub(crate) no_progress: bool,
-    /// Replace results that are there already and differ
+    /// Replace existing results that differ
     #[arg(long, global = true)]
     pub(crate) force: bool,
-    /// Colour
+    /// When to use colour
     #[arg(long, global = true, value_name = "WHEN", value_enum, default_value_t)]
     pub(crate) color: Color,
     /// Format of what goes to stdout
@@ -52,7 +52,7 @@ pub(crate) enum Format {
     #[default]
     Text,
     Json,
-    /// Of wv: all scales of all signals
+    /// For wv only: all scales of all signals
     Csv,
 }
 

@@ -9,15 +9,15 @@ use crate::report::{self, PaperFigure};
 use crate::simulation::REPORTED_NAMES;
 use std::path::PathBuf;
 
-/// Ratios of ASEE (and RMSE, NEES, coverage) between runs, per outage and state
+/// Compare runs: verdicts, and ratios of ASEE and RMSE per outage and state
 ///
 /// The table has the layout of the paper's Table I: rows scenario × outage, columns state × estimator, both
-/// from the names of the directories (II_sr-awv, or II/sr-awv). Each cell: the mean over the outage of
-/// (ASEE ratio − 1)·100, ± half its 95 % interval (Monte Carlo, and what the calibrations leave open where both runs are
-/// of --method lincov or both, with models of calibrate), and in brackets the mean of its absolute
-/// value. ASEE is the averaged standard estimation error: what the filter believes, not how wrong it is. So the
-/// verdict on every filter comes first, and a second table has NEES, coverage and the ratios of the RMSE at the
-/// end of the outage. All states are in the JSON file; a page with figures is written beside it.
+/// from the names of the directories (II_sr-awv, or II/sr-awv). Each cell holds the mean over the outage of
+/// (ASEE ratio − 1)·100, ± half its 95 % interval, and in parentheses the mean of its absolute value. The interval
+/// covers the Monte-Carlo error, and the uncertainty of the calibrations if both runs used --method lincov or both
+/// with models of calibrate. ASEE, the averaged standard estimation error, is what the filter believes, not how
+/// wrong it is. So the verdict on every filter comes first, and a second table has NEES, coverage and the ratios of
+/// the RMSE at the end of the outage. All states are in the JSON file; a page with figures is written beside it.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -36,7 +36,7 @@ pub(crate) struct Args {
     /// States in the table (repeatable), or "all"
     #[arg(long = "state", value_name = "STATE", default_values = ["pos_e_m", "roll_deg"])]
     states: Vec<String>,
-    /// Where to write the comparison [default: comparison.json, unless that is something else]
+    /// Where to write the comparison [default: comparison.json, unless that name is taken by something else]
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print the table of ASEE ratios alone, in this form

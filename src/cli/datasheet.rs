@@ -8,11 +8,11 @@ use crate::imu::Sensor;
 use crate::jobs;
 use std::path::PathBuf;
 
-/// Noise model from the figures of a datasheet, in the datasheet's units: an assumption, not a calibration
+/// Make a noise model from the figures of a data sheet, in their own units: an assumption, not a calibration
 ///
-/// White noise of the density given; Gauss-Markov processes whose Allan deviation has the bias instability as its
-/// floor; a random walk. [provenance] of the model file holds every figure as given and what it became.
-/// Flags win over the entry of the catalogue.
+/// The model has white noise of the given density, Gauss-Markov processes whose Allan deviation has the bias
+/// instability as its minimum, and a random walk. [provenance] of the model file holds every figure as given and the
+/// parameters that follow from it. Flags override the entry of the catalogue.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -55,7 +55,7 @@ struct Figures {
     /// Bias instability of the gyroscopes: deg/h, deg/s, rad/s
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::Bias))]
     gyro_bias: Option<Quantity>,
-    /// Longest correlation time of both biases: s, min, h [default: 300 s, which is said]
+    /// Longest correlation time of both biases: s, min, h [default: 300 s, with a warning]
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::CorrelationTime))]
     corr_time: Option<Quantity>,
     /// Correlation time of the accelerometers' bias

@@ -10,7 +10,7 @@ use clap::Parser;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
-/// The case study of Minaretzis et al. 2024, Section V, on a virtual IMU: calibrate with three estimators
+/// Run the case study of Minaretzis et al. 2024, Section V, on a virtual IMU: calibrate with three estimators
 /// on clean and corrupted recordings, navigate with each model, compare (their Table I)
 ///
 /// Runs other commands of nav-sim one after the other and shows each, so that it can be pasted, changed and
@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 /// vibrations and steps (II), and with two abnormal recordings of each sensor (III); AWV, SR-AWV and DR-AWV
 /// on each; Monte-Carlo navigation with errors from windows of one more clean recording and two outages of
 /// 90 s, the filter with a state for each AR1 and random walk as in the paper; the ASEE of each filter relative to AWV in
-/// scenario I. Interrupted, the same command goes on where it was: demo.json in the directory says how far it is.
+/// scenario I. If interrupted, the same command continues: demo.json in the directory says how far it is.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:

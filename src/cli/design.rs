@@ -13,12 +13,13 @@ use crate::scenario::{Method, Scenario};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Say how well recordings of an IMU like MODEL would determine it: so many, so long each
+/// Predict how well a number of recordings of given length would determine an IMU like MODEL
 ///
-/// The wavelet variances of recordings are drawn by their law, with the [spread] of MODEL between them, and calibrated as
-/// `nav-sim calibrate` would: the interval to expect is the one that it would state, wider than the scatter of estimates
-/// where they are poorly known. With --trajectory also that of the horizontal error (95 % quantile) at the end of each outage, in a filter that knows the IMU. Without --recordings or
-/// --hours: a table of several.
+/// Draws the wavelet variances of recordings from their sampling distribution, with the [spread] of MODEL between
+/// recordings, and calibrates them as `nav-sim calibrate` would. The expected interval is the one that it would state;
+/// it is wider than the scatter of the estimates where they are poorly known. With --trajectory there is also the
+/// interval on the horizontal error (95 % quantile) at the end of each outage, for a filter that knows the IMU.
+/// Without --recordings or --hours a table of several is printed.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -27,9 +28,9 @@ Examples:
   nav-sim design calib_data/tactical.toml --recordings 4 --hours 1 --draws 50 \\
       --trajectory trajectories/figure_eight.toml --outage 300:360")]
 pub(crate) struct Args {
-    /// Noise model of the IMU, as it is believed to be
+    /// Noise model of the IMU, as far as it is known
     model: PathBuf,
-    /// Recordings [default: a table of 3, 6 and 12]
+    /// Number of recordings [default: a table of 3, 6 and 12]
     #[arg(long, value_name = "K", value_parser = clap::value_parser!(u32).range(2..=1000))]
     recordings: Option<u32>,
     /// Length of each in hours [default: a table of 1, 3 and 10]

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 /// Draws H sets of K replicates from a model with [spread], contaminates each set in several ways, estimates
 /// from it, and says how far from theta_0 the estimates are: robust RMSE (eq. 15 of the paper), its
 /// Monte-Carlo error, and the median relative error. What is finished is kept in the output directory
-/// (sets.csv): a study that was stopped goes on where it was, to the same results; more --sets extend it.
+/// (sets.csv): a study that was stopped continues where it was, to the same results; more --sets extend it.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:

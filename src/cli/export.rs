@@ -14,8 +14,9 @@ use std::path::PathBuf;
 
 /// Write a noise model as the parameters of another program
 ///
-/// Filters elsewhere know white noise (N) and one bias, a random walk (K) or a Gauss-Markov process. --policy says which
-/// such pair stands for the model's largest axis over --horizon; head and stderr say by how much the two differ.
+/// Other filters know white noise (N) and one bias process, a random walk (K) or a Gauss-Markov process. --policy says
+/// which such pair stands for the model's noisiest axis over --horizon. The head of the file and stderr say by how much
+/// the two differ.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -26,7 +27,7 @@ pub(crate) struct Args {
     /// Noise model (TOML)
     #[arg(value_name = "MODEL")]
     model: PathBuf,
-    /// The program
+    /// Program to export to
     #[arg(long, value_name = "PROGRAM", value_parser = one_of::<Target>(&Target::NAMES))]
     target: Target,
     /// strict: WN and RW as they are; matched: the model's Allan deviation at 1 s and the closest bias; envelope: the

@@ -6,11 +6,11 @@ use crate::ekf::{FilterStates, InitialSettings};
 /// States of the filter.
 #[derive(clap::Args, Debug)]
 pub(super) struct FilterArgs {
-    /// States of the filter: 15 (one bias an axis, the reduction of the model), 21 (and a scale factor an axis)
-    /// or full (a state for each process) [default: 15]
+    /// States of the filter: 15 (one bias per axis, to which the model is reduced), 21 (and a scale factor per axis)
+    /// or full (a bias state for each process) [default: 15]
     #[arg(long, value_name = "STATES")]
     filter: Option<FilterStates>,
-    /// Constant biases that the filter expects beside the model (a calibration removes them): standard
+    /// Constant biases that the filter expects in addition to the model (a calibration would remove them): standard
     /// deviations, accelerometer in m/s², gyroscope in rad/s; 3 states each
     #[arg(long, value_name = "ACCEL,GYRO", value_parser = parse::pair)]
     turn_on_bias: Option<parse::Pair>,

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 ///
 /// scenario.toml, imu.toml, motion.toml, parameters.toml, contamination.toml, initial.toml and examples/quick_study.toml say
 /// what each key means. The others are those of the repository; the examples of every --help work inside the directory. Files
-/// that are there already are left alone.
+/// that exist already are left alone.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:

@@ -14,7 +14,7 @@ pub(crate) struct RecordingArgs {
     /// Sample rate (Hz) of files without a time column
     #[arg(long, value_name = "HZ", value_parser = super::parse::rate_hz)]
     rate_hz: Option<f64>,
-    /// Seconds to leave out at the beginning of each file (warm-up); auto: of each what does not begin as it goes on
+    /// Seconds to leave out at the beginning of each file (warm-up); auto: what differs from the rest of each file
     #[arg(long, value_name = "S|auto", default_value = "0", value_parser = skip)]
     skip_s: Skip,
     /// What to do where the time jumps or stands still
@@ -23,8 +23,8 @@ pub(crate) struct RecordingArgs {
     /// Signals to use: all, accel, gyro, x, accel.x, … (repeatable or comma-separated; default: all)
     #[arg(long, value_name = "AXES", value_delimiter = ',', value_parser = ChannelSet::named)]
     axes: Vec<ChannelSet>,
-    /// Names of the columns, comma-separated, instead of the header (and for files without one: an .npy has, if nothing is
-    /// said, the accelerometers' x, y, z first and then the gyroscopes')
+    /// Names of the columns, comma-separated, instead of the header (and for files without one; default for .npy: the
+    /// accelerometers' x, y, z, then the gyroscopes')
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     columns: Option<Vec<String>>,
 }

@@ -15,11 +15,11 @@ use crate::require::{Limit, Quantity, RequireError};
 use crate::sensors::outage::NotAnOutage;
 use std::path::{Path, PathBuf};
 
-/// Say which IMU keeps the errors at the end of an outage within limits, or what MODEL makes of them
+/// Find the IMU that keeps the errors at the end of an outage within limits, or judge MODEL by them
 ///
-/// By linear covariance analysis of the filter that knows its IMU, along TRAJECTORY with its fixes. Without MODEL: the
-/// white noise and bias instability that each sensor may have. With MODEL: whether it keeps the limits (exit code 3:
-/// it does not), what decides, and the longest outage that it bridges.
+/// Uses linear covariance analysis, along TRAJECTORY with its fixes, of a filter that knows its IMU. Without MODEL it
+/// finds the white noise and bias instability that each sensor may have. With MODEL it says whether the limits are
+/// kept (exit code 3: they are not), which part of the IMU decides, and the longest outage that it bridges.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -33,10 +33,10 @@ pub(crate) struct Args {
     trajectory: PathBuf,
     /// Noise model of an IMU
     model: Option<PathBuf>,
-    /// Outage: its length in seconds at several places, START:END, or "longest" (needs MODEL)
+    /// Outage: a length in seconds (tried at several places), START:END, or "longest" (needs MODEL)
     #[arg(long, value_name = "SECONDS", value_parser = parse_ask)]
     outage: Ask,
-    /// Earliest start of the outage in seconds [default: 300, less where the trajectory is short]
+    /// Earliest start of the outage in seconds [default: 300, less if the trajectory is short]
     #[arg(long, value_name = "SECONDS", value_parser = parse::non_negative)]
     start: Option<f64>,
     #[command(flatten)]
@@ -47,10 +47,10 @@ pub(crate) struct Args {
     /// Scenario file: receiver, start, IMU rate (see `nav-sim schema scenario`)
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
-    /// Longest correlation time of the biases of the IMU that is sought
+    /// Longest correlation time of the biases of the required IMU (s)
     #[arg(long, value_name = "SECONDS", value_parser = parse::positive, default_value = "300", conflicts_with = "model")]
     corr_time_s: f64,
-    /// Also a curve of equal drift: eight gyroscope biases, and the velocity random walk that each leaves
+    /// Also print a curve of equal drift: eight gyroscope biases, and the velocity random walk that each allows
     #[arg(long, conflicts_with = "model")]
     iso_drift: bool,
     /// Rank the catalogued IMUs (`nav-sim datasheet --list`), or those of a directory of entries and model files
@@ -58,7 +58,7 @@ pub(crate) struct Args {
     catalogue: Option<Option<PathBuf>>,
     #[command(flatten)]
     pictures: PageArgs,
-    /// Model file of the IMU that is sought
+    /// Model file to write, of the required IMU
     #[arg(long, short, value_name = "FILE", conflicts_with = "model")]
     out: Option<PathBuf>,
 }

@@ -22,7 +22,7 @@ pub(crate) struct Args {
 
 #[derive(clap::ValueEnum, Clone, Copy, Debug)]
 enum Kind {
-    /// Everything of a run (`nav-sim run --scenario`)
+    /// All settings of a run (`nav-sim run --scenario`)
     Scenario,
     /// A grid of experiments (`nav-sim batch`)
     Study,
@@ -30,11 +30,11 @@ enum Kind {
     Efficiency,
     /// A noise model (what `nav-sim calibrate` writes)
     Model,
-    /// What is known of parameters before a fit (`nav-sim calibrate --parameters`)
+    /// Bounds and fixed values of parameters (`nav-sim calibrate --parameters`)
     Parameters,
     /// Where and how a drive begins (`nav-sim fuse --initial`)
     Initial,
-    /// A drive by what the vehicle does (`nav-sim run`)
+    /// A trajectory by what the vehicle does (`nav-sim run`)
     Profile,
     /// Errors put into recordings (`nav-sim synthesize --contaminate`)
     Contamination,

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 /// Synthesise static recordings from a noise model
 ///
-/// Writes replicate_1, replicate_2, … and a manifest.json that says what was drawn. The same seed gives the
+/// Writes replicate_1, replicate_2, … and a manifest.json with the parameters that were drawn. The same seed gives the
 /// same noise with and without contamination, and at any number of threads.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\

@@ -15,11 +15,11 @@ use crate::sensors::outage::Outage;
 use crate::simulation::lincov::{Aim, Per, Track, drive};
 use std::path::{Path, PathBuf};
 
-/// Find the smallest factors on MODEL that make its filter honest for another truth
+/// Find the smallest factors on MODEL that make its filter consistent for another truth
 ///
-/// Factors multiply variances; quantization noise, which is in no filter, is left as it is. They come from linear
-/// covariance analysis along the trajectory, not from random numbers: the least divergence between what the filter
-/// states and what its errors are, then one factor on all that makes it exactly honest.
+/// Factors multiply variances; quantization noise, which is in no filter, stays as it is. They are found by linear
+/// covariance analysis along the trajectory, without random numbers: first the smallest divergence between the
+/// filter's covariance and that of its true errors, then one common factor that makes the filter consistent.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -35,23 +35,23 @@ pub(crate) struct Args {
     /// Noise models that may make the errors, such as those of single recordings
     #[arg(long = "truth", value_name = "MODEL2", num_args = 1..)]
     truths: Vec<PathBuf>,
-    /// The truth may be MODEL itself with its parameters at the ends of their 95 % intervals
+    /// Take as truths MODEL itself, with its parameters at the ends of their 95 % intervals
     #[arg(long, conflicts_with = "truths")]
     intervals: bool,
-    /// Trajectory: motion profile (.toml) or table (.csv) [default: a built-in drive, of outages as long]
+    /// Trajectory: motion profile (.toml) or table (.csv) [default: a built-in drive with outages of that length]
     #[arg(long, value_name = "FILE")]
     trajectory: Option<PathBuf>,
     /// Window without fixes, in seconds (repeatable), or "none" (default: 300:390 and 700:790)
     #[arg(long = "outage", value_name = "START:END", value_parser = parse_outage)]
     outages: Vec<OutageArg>,
-    /// When the filter is honest: worst, when in no truth an error at the end of an outage is larger than stated, in
-    /// any state; mean, when the expected NEES, averaged over truths and time, is right
+    /// What consistent means: worst, for no truth is the error of any state at the end of an outage larger than the
+    /// filter states; mean, the expected NEES, averaged over truths and time, is right
     #[arg(long = "for", value_name = "AIM", value_parser = one_of::<Aim>(&Aim::NAMES), default_value_t)]
     aim: Aim,
-    /// What has a factor of its own
+    /// Whether each sensor or each process has a factor of its own
     #[arg(long, value_name = "WHAT", value_parser = one_of::<Per>(&Per::NAMES), default_value_t)]
     per: Per,
-    /// The filter that is made honest: full, or that of the scenario (15 states; takes longer); the verdict judges both
+    /// The filter to tune: full, or that of the scenario (15 states; takes longer); the verdict judges both
     #[arg(long, value_name = "STATES", default_value = "full")]
     filter: FilterStates,
     /// Factors may be below 1

@@ -10,7 +10,7 @@ use crate::jobs::{self, Intervals, WaveletOptions};
 use crate::report::{self, SignalCurves, SignalsFile};
 use std::path::PathBuf;
 
-/// Wavelet variance of static recordings: classical, robust, Allan, with confidence intervals
+/// Compute wavelet variances (classical, robust) and Allan deviations of static recordings
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -25,10 +25,10 @@ pub(crate) struct Args {
     recordings: RecordingArgs,
     #[command(flatten)]
     tuning: TuningArgs,
-    /// Where the intervals' degrees of freedom are from
+    /// Where the degrees of freedom of the intervals come from
     #[arg(long, value_parser = words::<Intervals>(&INTERVALS), default_value_t, help_heading = "Wavelet variance")]
     intervals: Intervals,
-    /// One table for each sensor and axis, the recordings side by side
+    /// Print one table for each sensor and axis, with the recordings side by side
     #[arg(long, conflicts_with = "verbose")]
     per_file: bool,
     /// Write the curves as JSON
@@ -43,7 +43,7 @@ pub(crate) struct Args {
 
 const INTERVALS: [(&str, &str); 2] = [
     (Intervals::Eta3.name(), "The field's usual ones, conservative beyond the first scale"),
-    (Intervals::LargeSample.name(), "From the autocovariance of the coefficients: cover at their level"),
+    (Intervals::LargeSample.name(), "From the autocovariance of the coefficients: with the stated coverage"),
 ];
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {

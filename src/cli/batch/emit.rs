@@ -8,7 +8,7 @@ use std::path::Path;
 /// Print a script that runs a planned study on a cluster or here
 ///
 /// Paths are as seen from the directory in which the script is submitted; it must be shared by all machines.
-/// Every script may be submitted again and again: what is done is skipped. If the study is planned already, a
+/// A script may be submitted any number of times: what is done is skipped. If the study is planned already, a
 /// --time too short for a unit is refused.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
@@ -17,15 +17,15 @@ Examples:
   nav-sim batch emit hyperqueue examples/quick_study.toml --shards 64 > study.py
   nav-sim batch emit local examples/quick_study.toml --shards 2 > study.sh && bash -n study.sh")]
 pub(crate) struct Args {
-    /// For what
+    /// Scheduler
     #[arg(value_enum)]
     target: Target,
     #[command(flatten)]
     place: Place,
-    /// Tasks
+    /// Number of tasks
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u64).range(1..=1_000_000))]
     shards: u64,
-    /// Processors of a task
+    /// Processors per task
     #[arg(long, value_name = "C", default_value_t = 2, value_parser = clap::value_parser!(u16).range(1..))]
     cpus: u16,
     /// Longest time of a task: seconds, or with s, m, h

@@ -7,10 +7,10 @@ use crate::study::{self, MergeOptions, Planned, StudyError, Unit};
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Tables of a finished study: outages, ratios to the reference, epochs, runs
+/// Write the tables of a finished study: outages, ratios to the reference, epochs, runs
 ///
-/// Writes results/ in the directory of the study: outages.csv, .json and .parquet (a row an outage of each
-/// candidate in each cell), runs.parquet, epochs.csv and .parquet if the study asks for them, tables.md, report.html. The
+/// Writes results/ in the directory of the study: outages.csv, .json and .parquet (one row for each outage
+/// of each candidate in each cell), runs.parquet, epochs.csv and .parquet if the study asks for them, tables.md, report.html. The
 /// bytes depend on the plan alone, not on how it was run. Ratios are taken within a filter: column `reference`
 /// names the candidate they refer to, in the row's own filter. Nothing is written while units are missing: they
 /// are listed (all of them with --verbose or --format json), and the exit code is 75.

@@ -15,12 +15,12 @@ use super::{Failure, Session, read};
 use crate::study::{Planned, Remedy, StudyError};
 use std::path::{Path, PathBuf};
 
-/// Studies: grids of Monte-Carlo experiments, planned, run in pieces anywhere, merged
+/// Run studies: plan a grid of experiments, run it in pieces on any machines, merge the results
 ///
 /// A study (TOML, see `nav-sim schema study`) is the product of trajectories, truths, scenarios, receivers and
 /// outage sets, with several candidate models and filters on the same noise in each cell. `plan` cuts it into
-/// units of work, `run` does those that are not done yet (any number of processes, on any machines that share
-/// the directory; kill and repeat at will), `merge` makes the tables, the same bytes however it was run.
+/// units of work. `run` does those that are not done yet (any number of processes, on any machines that share
+/// the directory; kill and repeat at will). `merge` makes the tables, the same bytes however the units were run.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:

@@ -9,9 +9,10 @@ use std::time::Instant;
 
 /// Check a study and everything it names, calibrate its candidates, and cut it into units of work
 ///
-/// A probe (eight runs of the first cell) says how long it will take; units are made to last about two
-/// minutes, unless the study says `unit_runs`. The directory then holds plan.json, which names every input by
-/// its hash, and models/ calibrated here (planning again restores those that are lost). Nothing is computed yet: see `nav-sim batch run`.
+/// A probe (eight runs of the first cell) predicts how long the study will take. Units are made to last about two
+/// minutes, unless the study states `unit_runs`. The directory then holds plan.json, which names every input by
+/// its hash, and models/ calibrated here (planning again restores those that are lost). No unit is computed yet:
+/// see `nav-sim batch run`.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -21,7 +22,7 @@ Examples:
 pub(crate) struct Args {
     #[command(flatten)]
     place: Place,
-    /// Say what it will take, write nothing
+    /// Say how long the study will take; write nothing
     #[arg(long)]
     dry_run: bool,
 }

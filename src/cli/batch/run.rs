@@ -11,11 +11,12 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// Do the units of work that are not done yet, all or those of one shard
+/// Compute the units of work that are not done yet, all or those of one shard
 ///
-/// Each unit appears whole, by rename, with a checksum; what is there and whole is skipped, what is damaged is
-/// done again. On SIGTERM, or at the time limit, the unit at work is dropped and the exit code is 75: run
-/// again to go on (1 if the time limit was too short for a single unit). Any number of processes may work at once; two on the same shard waste time and harm nothing.
+/// Each unit file appears whole, by rename, with a checksum. Intact units are skipped, damaged ones are computed
+/// again. On SIGTERM, or at the time limit, the current unit is dropped and the exit code is 75: run again to
+/// continue (exit code 1 if the time limit was too short for a single unit). Any number of processes may work at
+/// once; two on the same shard waste time but do no harm.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -30,7 +31,7 @@ pub(crate) struct Args {
     /// PBS_ARRAY_INDEX or JOB_COMPLETION_INDEX, else everything)
     #[arg(long, value_name = "I/N", value_parser = shard::parse)]
     shard: Option<Shard>,
-    /// How many shards there are, where only their index comes from the scheduler
+    /// Number of shards, if only the index comes from the scheduler
     #[arg(long, value_name = "N", conflicts_with = "shard", value_parser = clap::value_parser!(u64).range(1..))]
     shards: Option<u64>,
     /// Stop after this time (exit code 75; 1 if no unit was finished): seconds, or with s, m, h

@@ -6,9 +6,9 @@ use crate::cli::{Failure, Session};
 use crate::observer::Observer;
 use serde_json::json;
 
-/// What is done of a study and what is left
+/// Say what is done of a study and what is left
 ///
-/// Every unit file is read: one that is damaged is not done, and `run` computes it again.
+/// Every unit file is read. A damaged one counts as not done, and `run` computes it again.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:

@@ -8,8 +8,8 @@ use serde_json::json;
 
 /// Compute some finished units again and compare them bit by bit
 ///
-/// Which ones is drawn with --seed. All finished units are read first, and damaged ones listed. Exit code 3 if
-/// any is damaged or differs.
+/// The units are drawn with --seed. All finished units are read first, and damaged ones are listed. Exit code 3
+/// means that a unit is damaged or differs.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -20,7 +20,7 @@ Examples:
 pub(crate) struct Args {
     #[command(flatten)]
     place: Place,
-    /// How many
+    /// Number of units
     #[arg(long, value_name = "K", default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..))]
     units: u64,
 }

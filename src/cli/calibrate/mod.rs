@@ -18,12 +18,12 @@ use crate::jobs::{self, CalibrationOptions, EstimatorChoice};
 use output::outputs;
 use std::path::{Path, PathBuf};
 
-/// Replicate static recordings -> noise model
+/// Fit a noise model to static recordings
 ///
-/// Each recording is one replicate. By default the three axes of a sensor are pooled: one model a sensor,
-/// their signals replicates of one another. The model goes to a TOML file, the curves behind it to
-/// <model>.wv.json beside it, the draws behind its intervals to <model>.draws.json, a page with figures to
-/// <model>.html; with `--estimator all` there is such a set for each estimator, <model>_<estimator>.toml and so on.
+/// Each recording is one replicate. By default the three axes of a sensor are pooled: there is one model per
+/// sensor, and the signals of its axes are replicates of one another. The model goes to a TOML file. Beside it,
+/// <model>.wv.json holds the curves, <model>.draws.json the draws behind the intervals, <model>.html a page with
+/// figures. With `--estimator all` there is such a set for each estimator, <model>_<estimator>.toml and so on.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -35,30 +35,30 @@ pub(crate) struct Args {
     /// Recordings, or directories of recordings
     #[arg(value_name = "INPUT", required_unless_present = "curve", conflicts_with = "curve")]
     inputs: Vec<PathBuf>,
-    /// Fit a curve instead of recordings: CSV tau_samples,wv,edof or a .wv.json (also of wv)
+    /// Fit a curve instead of recordings: CSV tau_samples,wv,edof, or a .wv.json of calibrate or wv
     #[arg(long, value_name = "FILE", conflicts_with_all = OF_RECORDINGS)]
     curve: Option<PathBuf>,
     /// Sensor of a CSV curve, for the model file
     #[arg(long, value_name = "SENSOR", value_parser = one_of::<Sensor>(&Sensor::NAMES), requires = "curve")]
     sensor: Option<Sensor>,
-    /// Which curve is fitted: averages over the replicates (awv; sr-awv robust to outliers; dr-awv robust to
-    /// abnormal replicates too), or that of a single recording (gmwm, rgmwm; avlr: slopes of its Allan deviation)
+    /// Which curve is fitted: an average over the replicates (awv; sr-awv, robust to outliers; dr-awv, robust to
+    /// abnormal replicates too), or the curve of a single recording (gmwm, rgmwm; avlr: slopes of its Allan deviation)
     #[arg(long, value_parser = words::<EstimatorChoice>(&ESTIMATORS), default_value_t)]
     estimator: EstimatorChoice,
     /// Sum of WN QN AR1 GM MA1 RW DR such as 2*AR1+RW+WN+QN, N1 = AR1+RW+WN, N2 = 2*AR1+RW+WN+QN, or auto: the
-    /// simplest sum of WN QN RW DR and up to two AR1 that does as well as the best, with its reasons
+    /// simplest sum of WN QN RW DR and up to two AR1 that fits as well as the best one, with the reasons
     #[arg(long, value_name = "SUM", default_value = ModelSpec::USUAL)]
     model: String,
-    /// What is known of the parameters: a TOML file that fixes or bounds them (nav-sim schema parameters)
+    /// TOML file that fixes or bounds parameters known beforehand (nav-sim schema parameters)
     #[arg(long, value_name = "FILE")]
     parameters: Option<PathBuf>,
     /// Replicates that dr-awv drops at each end of each scale: a number, or a percentage of all
     #[arg(long, value_name = "A", default_value_t)]
     trim: Trim,
-    /// What a scale counts in the fit
+    /// Weight of a scale in the fit
     #[arg(long, value_parser = words::<Weighting>(&WEIGHTINGS), default_value_t)]
     weighting: Weighting,
-    /// Scales that count in the fit, such as 1s:1000s; the others are shown and count nothing
+    /// Scales that enter the fit, such as 1s:1000s; the others are only shown
     #[arg(long, value_name = "FROM:TO", value_parser = fit_range)]
     fit_range: Option<FitRange>,
     /// Which signals are replicates of one another (default: sensor; axes for gmwm, rgmwm and avlr)
@@ -67,8 +67,8 @@ pub(crate) struct Args {
     /// Draws of the parametric bootstrap behind intervals and goodness of fit (0: neither)
     #[arg(long, value_name = "B", default_value_t = Bootstrap::DRAWS as u32, value_parser = clap::value_parser!(u32).range(0..=100_000))]
     bootstrap: u32,
-    /// Ask the recordings' means for no turn-on bias (that of recordings of one fixed mounting, switched off in between, is
-    /// stored as [turn_on] where it shows)
+    /// Do not test the recordings' means for a turn-on bias (for recordings in one fixed mounting, each a power-on of
+    /// its own, it is stored as [turn_on] if it is significant)
     #[arg(long)]
     no_turn_on: bool,
     /// The model file (default: model.toml; none for --curve)
@@ -125,8 +125,8 @@ const WEIGHTINGS: [(&str, &str); 5] = [
 ];
 
 const POOLS: [(&str, &str); 2] = [
-    (Pool::Axes.name(), "Those of one axis: a model an axis"),
-    (Pool::Sensor.name(), "Those of all axes of a sensor: a model a sensor"),
+    (Pool::Axes.name(), "Those of one axis: one model per axis"),
+    (Pool::Sensor.name(), "Those of all axes of a sensor: one model per sensor"),
 ];
 
 fn fit_range(text: &str) -> Result<FitRange, String> {

@@ -32,15 +32,16 @@ const UNMOUNTED: &str = "give --mounting ROLL,PITCH,YAW; or record some minutes 
 /// A distance from the reference that no filter makes: another place, or another time (m).
 const ELSEWHERE_M: f64 = 10_000.0;
 
-/// Fuse recorded IMU and GNSS data with the filter of `run`, MODEL telling it the noise of the IMU
+/// Fuse recorded IMU and GNSS data with the filter of `run` and the noise model MODEL
 ///
 /// IMU: rates (t_s, gyro_x_rad_s … accel_z_m_s2; other units and loggers' names as for `wv`) or increments
 /// (dtheta_x_rad … dv_z_m_s, time = end of the interval). GNSS: t_s, lat_deg, lon_deg, h_m, sd_n_m, sd_e_m,
-/// sd_d_m, and v_n_m_s … sd_vd_m_s where velocity is measured. Or both as the text files of KF-GINS: 7 or 8
-/// columns of increments; 7 of position, 13 with velocity; GNSS also as a solution of RTKLIB (.pos, GPST) or as NMEA sentences (GGA; RMC or VTG, GST), in seconds of the day or Unix time as the IMU. Up to 5 s without samples are bridged, as uncertain
-/// as the recording is over such times elsewhere. Writes solution.csv, innovations.csv, errors.csv (with a
-/// reference), solution.kml, summary.json, report.html, manifest.json; with --smooth also smoothed.csv,
-/// errors_smoothed.csv, smoothed.kml.
+/// sd_d_m, and v_n_m_s … sd_vd_m_s where velocity is measured. Either may be a text file of KF-GINS (7 or 8
+/// columns of increments; 7 of position, 13 with velocity). GNSS may also be a solution of RTKLIB (.pos, GPST)
+/// or NMEA sentences (GGA; RMC or VTG, GST), in seconds of the day or in Unix time, as the IMU is. Gaps of up to
+/// 5 s are bridged, with the uncertainty that the recording shows over such times elsewhere. Writes solution.csv,
+/// innovations.csv, errors.csv (with a reference), solution.kml, summary.json, report.html, manifest.json; with
+/// --smooth also smoothed.csv, errors_smoothed.csv, smoothed.kml.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -65,17 +66,17 @@ pub(crate) struct Args {
     /// GNSS antenna from the IMU: front, right, down (m)
     #[arg(long, value_name = "X,Y,Z", value_parser = parse::triple, allow_hyphen_values = true)]
     lever_arm: Option<parse::Triple>,
-    /// Attitude of the IMU in the vehicle, where its axes are not front, right, down (degrees), after a colon how well it is
-    /// known about the vehicle's front, right, down; auto: found from the drive of a road vehicle
+    /// Attitude of the IMU in the vehicle (degrees) if its axes are not front, right, down; after a colon the standard
+    /// deviations about the vehicle's front, right, down; auto: estimated from the drive of a road vehicle
     #[arg(long, value_name = "ROLL,PITCH,YAW[:SD,SD,SD]|auto", value_parser = inputs::parse_mounting, allow_hyphen_values = true)]
     mounting: Option<inputs::MountingArg>,
-    /// What the logger calls x, y, z; the mounting turns what is front, right, down then
+    /// What the logger calls x, y, z; --mounting applies after this
     #[arg(long, value_name = "AXES", value_enum, default_value = "frd")]
     axes: inputs::LoggerAxes,
-    /// How gravity falls with height: wgs84 (second order) or first-order
+    /// How gravity decreases with height: wgs84 (second order) or first-order
     #[arg(long, value_name = "MODEL", value_parser = one_of::<GravityModel>(&GravityModel::NAMES), default_value = "wgs84")]
     gravity: GravityModel,
-    /// Trajectory to compare with; stretches where it jumps are left out
+    /// Reference trajectory to compare with; stretches where it jumps are left out
     #[arg(long, value_name = "TRAJECTORY")]
     reference: Option<PathBuf>,
     /// Window in which fixes are withheld, on the clock of the data in seconds (repeatable)
@@ -93,10 +94,10 @@ pub(crate) struct Args {
     /// Refuse fixes whose NIS is above the chi-square quantile of this probability
     #[arg(long, value_name = "P", value_parser = parse::probability)]
     nis_gate: Option<f64>,
-    /// Rows of the solution a second
+    /// Rows of the solution per second
     #[arg(long, value_name = "HZ", default_value_t = 10.0, value_parser = parse::rate_hz)]
     rate_hz: f64,
-    /// Smooth the solution as well: every row estimated from all fixes, those after it included
+    /// Also smooth the solution: every row is then estimated from all fixes, later ones included
     #[arg(long)]
     smooth: bool,
     #[command(flatten)]

@@ -22,11 +22,11 @@ use std::path::{Path, PathBuf};
 use output::{manifest, write};
 pub(super) use words::Words;
 
-/// Monte-Carlo INS/GNSS navigation along TRAJECTORY with MODEL in the filter
+/// Navigate by INS/GNSS along TRAJECTORY with MODEL in the filter: Monte Carlo or covariance analysis
 ///
 /// Writes a run directory: epochs.csv (ASEE, RMSE, bias, NEES, coverage at 1 Hz), fan.csv (quantiles of the
-/// horizontal error), runs.csv, summary.json, report.html, manifest.json. The same seed gives the same noise to every model, so that runs can be
-/// compared pair by pair (see `nav-sim compare`).
+/// horizontal error), runs.csv, summary.json, report.html, manifest.json. The same seed gives every model the same
+/// noise, so that runs can be compared pair by pair (see `nav-sim compare`).
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -57,18 +57,18 @@ pub(crate) struct Args {
     runs: Option<u64>,
     #[command(flatten)]
     filter: FilterArgs,
-    /// How statistics are found: monte-carlo (sampled runs), lincov (linear covariance analysis, no sampling) or
-    /// both, the runs beside what is expected of them
+    /// How statistics are computed: monte-carlo (sampled runs), lincov (linear covariance analysis, no sampling) or
+    /// both (runs, compared with their expected values)
     #[arg(long, value_name = "METHOD", value_parser = one_of::<Method>(&Method::NAMES))]
     method: Option<Method>,
-    /// Most that an error may be, as NAME<=LIMIT (repeatable), at the end of every outage: p50_m, p95_m (horizontal),
-    /// rmse_pos_e_m, yaw_deg and the other states; else exit code 3
+    /// Limit on an error at the end of every outage, as NAME<=LIMIT (repeatable): p50_m, p95_m (horizontal),
+    /// rmse_pos_e_m, yaw_deg and the other states; exit code 3 if it is not met
     #[arg(long, value_name = "NAME<=LIMIT")]
     require: Vec<Requirement>,
     /// Scenario file whose [gnss] section is used
     #[arg(long, value_name = "FILE")]
     gnss: Option<PathBuf>,
-    /// Everything of the run in one TOML file; flags win over it (see `nav-sim schema scenario`)
+    /// All settings of the run in one TOML file; flags override it (see `nav-sim schema scenario`)
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
     /// Also draw the horizontal error over time in the terminal

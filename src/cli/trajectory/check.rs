@@ -10,8 +10,8 @@ use crate::units::DEG;
 
 /// Check a trajectory: could a vehicle move so, and does navigation close on it?
 ///
-/// Closure: the noise-free IMU samples of the trajectory, mechanised from its exact start, are compared with
-/// it; what is left is the error of the strapdown algorithm at this rate. Beyond a bound the exit code is 3.
+/// Closure: the noise-free IMU samples of the trajectory are mechanised from its exact start and compared with
+/// it. The difference is the error of the strapdown algorithm at this rate; beyond a bound the exit code is 3.
 /// Motion beyond a limit, and velocity columns that contradict the positions, are warnings.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
@@ -25,13 +25,13 @@ pub(super) struct Args {
     /// IMU rate at which the closure is computed
     #[arg(long, value_name = "HZ", default_value_t = 100.0, value_parser = parse::rate_hz)]
     rate_hz: f64,
-    /// Bound on the closure's distance
+    /// Bound on the position error of the closure (m)
     #[arg(long, value_name = "M", default_value_t = Bounds::default().position_m, value_parser = parse::positive)]
     max_position_m: f64,
-    /// Bound on the closure's velocity
+    /// Bound on the velocity error of the closure (m/s)
     #[arg(long, value_name = "M_S", default_value_t = Bounds::default().velocity_m_s, value_parser = parse::positive)]
     max_velocity_m_s: f64,
-    /// Bound on the closure's angle
+    /// Bound on the attitude error of the closure (rad)
     #[arg(long, value_name = "RAD", default_value_t = Bounds::default().attitude_rad, value_parser = parse::positive)]
     max_attitude_rad: f64,
     /// Largest plausible speed (m/s)

@@ -38,7 +38,7 @@ struct Source {
     /// Motion profile (.toml) or table (.csv, .tsv, .txt, also .gz)
     #[arg(value_name = "TRAJECTORY")]
     path: PathBuf,
-    /// Origin of local coordinates, where the file does not say it: latitude, longitude, height
+    /// Origin of local coordinates, if the file does not state it: latitude, longitude, height
     #[arg(long, value_name = "LAT_DEG,LON_DEG,H_M", value_parser = origin, allow_hyphen_values = true)]
     origin: Option<Origin>,
 }

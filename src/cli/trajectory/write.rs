@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// Write a motion profile as a table of evenly spaced rows
 ///
 /// Columns: time, latitude, longitude, height, velocity north, east, down, roll, pitch, yaw. Numbers have
-/// the digits that read back to them.
+/// enough digits to be read back exactly.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -19,7 +19,7 @@ Examples:
 pub(super) struct GenerateArgs {
     #[command(flatten)]
     source: Source,
-    /// Rows a second
+    /// Rows per second
     #[arg(long, value_name = "HZ", default_value_t = 100.0, value_parser = parse::rate_hz)]
     rate_hz: f64,
     /// Table to write (.csv or .csv.gz); without it, standard output
@@ -27,10 +27,10 @@ pub(super) struct GenerateArgs {
     out: Option<PathBuf>,
 }
 
-/// Write a trajectory file of any kind as our table
+/// Convert a trajectory file of any kind to a nav-sim table
 ///
-/// The rows are those of the input, or evenly spaced ones with --rate-hz. Of local coordinates come
-/// latitude, longitude and height; of a path without attitude, heading and pitch along it.
+/// The rows are those of the input, or evenly spaced ones with --rate-hz. Local coordinates become latitude,
+/// longitude and height. A path without attitude gets the heading and pitch along it.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -40,7 +40,7 @@ Examples:
 pub(super) struct ConvertArgs {
     #[command(flatten)]
     source: Source,
-    /// Rows a second (default: the rows of the input)
+    /// Rows per second (default: the rows of the input)
     #[arg(long, value_name = "HZ", value_parser = parse::rate_hz)]
     rate_hz: Option<f64>,
     /// Table to write (.csv or .csv.gz)
