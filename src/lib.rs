@@ -1,17 +1,17 @@
 //! **nav-sim**: an INS/GNSS navigation simulator with a robust stochastic-calibration front end.
 //!
-//! Replicate static recordings → robust wavelet variance → one noise model → Monte-Carlo INS/GNSS
-//! navigation → comparison of estimators by what they do to the navigation solution.
+//! Static recordings (replicates) → robust wavelet variance → one noise model → Monte-Carlo INS/GNSS navigation →
+//! comparison of estimators by their effect on the navigation solution.
 //!
 //! # Notation
-//! SI units and radians inside; units stand in the names of everything at the border (`lat_deg`,
+//! Units are SI and radians inside; in files, flags and reports the unit is in the name (`lat_deg`,
 //! `pos_sigma_m`). Frames are in the name: `f_ib_b` is the specific force of b with respect to i, written
 //! in b; `q_b_n` and `C_b_n` take b and return n. n = North-East-Down, b = front-right-down,
 //! e = Earth-centred Earth-fixed (WGS-84).
 //!
 //! | name | meaning |
 //! |---|---|
-//! | `phi` | AR(1) coefficient, only |
+//! | `phi` | AR(1) coefficient, nothing else |
 //! | `Phi` | transition matrix |
 //! | `lat`, `lon`, `h` | geodetic latitude, longitude (rad), ellipsoidal height (m) |
 //! | `roll`, `pitch`, `yaw` | attitude (ZYX); `psi_n` is the attitude *error* rotation vector in n |
@@ -22,16 +22,16 @@
 //!
 //! # Architecture
 //! Three crates hold the mathematics, this one the files, words and commands. `nav-sim-signal` (noise, wavelet
-//! variance) is below; `nav-sim-calibration` (recordings → model) and `nav-sim-navigation` (trajectory → errors)
-//! stand on it side by side and cannot import each other: they meet in [`noise::Model`]. Their modules are
-//! re-exported here, so that `nav_sim::ekf` is the only path a user needs. Within a crate a module names only
-//! what stands above it in the list of its `lib.rs`, held by `tests/layering.rs`. Nothing below the command line
+//! variance) is the lowest. `nav-sim-calibration` (recordings → model) and `nav-sim-navigation` (trajectory → errors)
+//! both depend on it and cannot import each other: they meet in [`noise::Model`]. Their modules are re-exported
+//! here, so that `nav_sim::ekf`, for example, is the only path a user needs. Within a crate a module names only
+//! modules above it in the list of its `lib.rs`, as `tests/layering.rs` checks. Nothing below the command line
 //! reads a clock, the environment, a terminal or a source of randomness: generators and seeds are arguments.
 //!
-//! What a command does is one call of [`jobs`]: files in, results out, remarks on the way as values.
+//! What a command does is one call in [`jobs`]: it takes files and returns results, and reports remarks as values.
 //!
-//! The crates are for the compiler too: a changed line in the filter recompiles `nav-sim-navigation` and what is
-//! above it, and its unit tests are `cargo test -p nav-sim-navigation`.
+//! The division into crates also shortens compilation: a changed line in the filter recompiles `nav-sim-navigation`
+//! and the crates that depend on it. Its unit tests are `cargo test -p nav-sim-navigation`.
 
 pub use nav_sim_calibration as calibration;
 pub use nav_sim_calibration::efficiency;

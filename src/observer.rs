@@ -1,21 +1,21 @@
-//! Who follows a long job.
+//! The observer of a long job: progress, and a request to stop.
 
-/// Is told remarks of type `R` and progress, and asked whether to go on. Every method has a default that does nothing,
-/// and `()` is the observer that says nothing and never stops.
+/// Receives remarks of type `R` and the progress of a job, and may stop it. Every method has a default that does
+/// nothing; `()` is the observer that ignores everything and never stops.
 pub trait Observer<R>: Sync {
-    /// Something to know.
+    /// A remark.
     fn remark(&self, _remark: &R) {}
 
-    /// So many runs begin.
+    /// A number of runs begins.
     fn begin(&self, _runs: u64) {}
 
-    /// So many more of them are done; called from any thread.
+    /// Some more of the runs are done; called from any thread.
     fn advance(&self, _runs: u64) {}
 
     /// The runs have ended.
     fn end(&self) {}
 
-    /// Whether to go on; asked from any thread, several times a second, by jobs that can be continued.
+    /// Whether to continue; called from any thread, several times a second, by jobs that can be continued.
     fn go_on(&self) -> bool {
         true
     }

@@ -1,4 +1,4 @@
-//! What a program needs that calibrates recordings and navigates with the model: `use nav_sim::prelude::*;`.
+//! The types and functions to calibrate recordings and to navigate with the model: `use nav_sim::prelude::*;`.
 //!
 //! ```
 //! use nav_sim::prelude::*;
@@ -10,7 +10,7 @@
 //! scenario.run.method = Method::Lincov;
 //! let outage = Outage { start_s: 60.0, end_s: 90.0 };
 //! let found = navigate(&inputs, &scenario, &[outage], 1, &())?;
-//! // the filter believes what is true: nine states, NEES 9
+//! // the filter's model is the truth: nine states, NEES 9
 //! assert!((found.summary.nees.mean - 9.0).abs() < 0.1);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

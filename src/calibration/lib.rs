@@ -1,8 +1,8 @@
 //! From replicate recordings to one noise model: AWV, SR-AWV, DR-AWV, GMWM.
 //!
-//! [`replicates()`] takes the wavelet variances of all signals, [`average()`] makes one curve of those of a
-//! group, [`fit()`] finds the model whose theoretical wavelet variance is nearest to it; [`calibrate`] is
-//! all of it but the first.
+//! [`replicates()`] computes the wavelet variances of all signals, [`average()`] averages those of a group to one
+//! curve, and [`fit()`] finds the model whose theoretical wavelet variance is closest to the curve. [`calibrate`]
+//! does the last two.
 
 #[allow(unused_imports, reason = "sources are named in the documentation")]
 pub(crate) use nav_sim_signal::bibliography;

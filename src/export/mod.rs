@@ -1,7 +1,7 @@
 //! A noise model as the parameters of other programs: each value with its key, unit, rate and meaning.
 //!
 //! [`Export::new`] fits the pair that the target knows ([`noise::practical`](crate::noise::practical)) to the model's
-//! largest axis, states by how much the two differ, and [`Export::text`] writes it in the target's own syntax.
+//! noisiest axis, states by how much the two differ, and [`Export::text`] writes it in the target's own syntax.
 
 mod autopilots;
 mod filters;

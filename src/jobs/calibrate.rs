@@ -1,4 +1,4 @@
-//! Static recordings, or directories of them → a noise model for each sensor or axis.
+//! Calibration: from static recordings, or directories of them, to a noise model for each sensor or axis.
 
 use super::{BeginsOtherwise, JobError, Remark, Remarks};
 use crate::calibration::{
@@ -72,19 +72,19 @@ impl EstimatorChoice {
 /// How to calibrate recordings.
 #[derive(Debug, Clone)]
 pub struct CalibrationOptions {
-    /// How they are read.
+    /// How recordings are read.
     pub reading: ReadOptions,
-    /// Whether each recording's warm-up, as it is found, is left out.
+    /// Whether the warm-up found in each recording is left out.
     pub skip_warm_up: bool,
-    /// Number of scales; none: one less than the shortest signal allows.
+    /// Number of scales; `None`: one less than the shortest signal allows.
     pub scales: Option<u32>,
     /// Which estimators.
     pub estimators: EstimatorChoice,
-    /// Which signals are replicates of one another; none: as the estimators need it ([`Settings::pool`]).
+    /// Which signals are replicates of one another; `None`: as the estimators need it ([`Settings::pool`]).
     pub pool: Option<Pool>,
-    /// How models are fitted; its estimators and its rate follow from the recordings.
+    /// How models are fitted; the estimators and the rate in it follow from the recordings.
     pub settings: Settings,
-    /// The draws behind intervals and goodness of fit; none: neither.
+    /// The bootstrap behind intervals and goodness of fit; `None`: neither is computed.
     pub bootstrap: Option<Bootstrap>,
     /// Whether the recordings' means are asked for a turn-on bias.
     pub turn_on: bool,
@@ -121,22 +121,21 @@ pub struct Measured {
     pub turn_on: bool,
 }
 
-/// Models and what they were made of.
+/// A calibration: the fitted models and the wavelet variances behind them.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Calibration {
     /// The wavelet variances.
     pub groups: Vec<Group>,
-    /// The models, group by group, in each estimator by estimator.
+    /// The fitted models: for each group, one per estimator.
     pub outcomes: Vec<Outcome>,
     /// How they were fitted.
     pub settings: Settings,
-    /// What the recordings' means say of a turn-on bias, estimator by estimator and sensor by sensor; empty where they were not
-    /// asked.
+    /// Turn-on bias from the recordings' means, for each estimator and sensor; empty if it was not tested.
     pub turn_on: Vec<TurnOnSpread>,
 }
 
-/// From recordings, or directories of them, to models.
+/// Calibrates recordings, or directories of them.
 ///
 /// # Errors
 /// As [`measure`] and [`Measured::calibrate`].
@@ -148,7 +147,7 @@ pub fn calibrate(
     measure(paths, options, remarks)?.calibrate(&|_| {})
 }
 
-/// The first half, which reads: what is wrong with the files is known before the long half begins.
+/// The first half of [`calibrate()`], which reads the files: errors in them are known before the long half begins.
 ///
 /// # Errors
 /// When a recording cannot be read, is too short, or is no replicate of its own; when the estimator takes one recording only.

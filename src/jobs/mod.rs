@@ -1,7 +1,7 @@
 //! What a command does, as one library call: files in, results out.
 //!
-//! What is found on the way is told to [`Remarks`] as values; words, flags and terminals are the command line's. From
-//! a directory of recordings to models is [`calibrate()`]; from signals that are in memory:
+//! Remarks on the way are reported to [`Remarks`] as values; words, flags and terminals belong to the command line.
+//! [`calibrate()`] goes from a directory of recordings to models. From signals in memory:
 //! ```
 //! use nav_sim::calibration::{ModelChoice, Pool, Settings, calibrate, grouped, replicates};
 //! use nav_sim::imu::Channel;

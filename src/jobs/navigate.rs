@@ -1,5 +1,5 @@
-//! The main job: a trajectory, what the filter believes and what makes the errors → navigation errors, by runs, by
-//! covariance analysis, or by both.
+//! The main job: from a trajectory, the filter's noise model and the model of the true errors to navigation errors, by
+//! Monte-Carlo runs, by covariance analysis, or by both.
 
 use super::reduction::Reduced;
 use super::uncertainty::Analysed;
@@ -24,22 +24,22 @@ use crate::simulation::lincov::{
 use crate::simulation::{Experiment, ExperimentError, Plan, RunResult};
 use crate::trajectory::Trajectory;
 
-/// What is navigated, with what.
+/// Inputs of [`navigate()`].
 #[derive(Debug)]
 pub struct NavigateInputs {
-    /// The reference.
+    /// The reference trajectory.
     pub trajectory: Trajectory,
     /// The noise model that the filter believes, at the rate of the IMU.
     pub model: Model,
     /// What makes the errors of the true IMU.
     pub truth: TrueImu,
-    /// What the calibration of the model left open, at the rate of the IMU.
+    /// Bootstrap draws of the calibration of the model, at the rate of the IMU.
     pub model_draws: Option<Draws>,
-    /// What the calibration of the truth left open, where it is another model.
+    /// Bootstrap draws of the calibration of the truth, if it is another model.
     pub truth_draws: Option<Draws>,
 }
 
-/// What makes the errors of the true IMU, beside the defects of the scenario.
+/// The source of the errors of the true IMU, in addition to the defects in the scenario.
 #[derive(Debug)]
 pub enum TrueImu {
     /// The model that the filter believes.
@@ -50,13 +50,13 @@ pub enum TrueImu {
     Recordings(Vec<Recording>),
 }
 
-/// What was found.
+/// Results of [`navigate()`].
 #[derive(Debug)]
 #[non_exhaustive]
 pub struct Navigation {
-    /// The runs; none of a covariance analysis.
+    /// The runs; `None` for a covariance analysis.
     pub runs: Option<RunResult>,
-    /// Statistics of every reporting epoch: of the runs, if there are any.
+    /// Statistics at every reporting epoch: of the runs, if there are any.
     pub epochs: Vec<EpochMetrics>,
     /// Quantiles of the horizontal error over time: of the runs, if there are any.
     pub fan: Vec<FanEpoch>,
@@ -64,21 +64,21 @@ pub struct Navigation {
     pub summary: Summary,
 }
 
-/// What is worth telling while the job runs.
+/// A remark while the job runs.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Note {
     /// The filter starts with a bias of this standard deviation (m/s² or rad/s), too large to be meant.
     LargeBias(Sensor, f64),
-    /// What the true IMU has and the filter does not expect.
+    /// The true IMU has a defect that the filter does not expect.
     Unexpected(String),
     /// How the model was reduced to 15 states.
     Reduction(ReductionSummary),
-    /// How sure the reduced filter is of itself; whether the model has a full filter.
+    /// How consistent the reduced filter is; whether the model has a full filter.
     ReductionQuality(ReductionQuality, bool),
-    /// The motion hardly shows the heading.
+    /// The motion hardly makes the heading observable.
     Heading(HeadingDoubt),
-    /// What the runs say beside what the covariance analysis expects.
+    /// How far the runs are from what the covariance analysis expects.
     Agreement(Agreement),
     /// A window without fixes is not as it was asked for.
     Outage(OutageRemark),
@@ -90,7 +90,7 @@ pub enum Note {
     Fused(Trust, Option<f64>),
 }
 
-/// Why a job cannot be done.
+/// Error of [`navigate()`].
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum NavigateError {

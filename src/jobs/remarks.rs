@@ -33,15 +33,15 @@ pub enum Remark<'a> {
     },
 }
 
-/// Listens to remarks.
+/// Receives the remarks of a job.
 pub trait Remarks {
-    /// So many of all recordings are read, 0 at the beginning.
+    /// Number of recordings read so far, of all; 0 at the beginning.
     fn progress(&mut self, done: usize, all: usize);
     /// Something was found.
     fn remark(&mut self, remark: Remark<'_>);
 }
 
-/// Listens to nothing.
+/// Ignores all remarks.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Silence;
 

@@ -1,5 +1,5 @@
 //! Proof that truth and navigation agree: the noise-free samples of a trajectory, mechanised from its exact
-//! start, return to the trajectory. What is left is the error of the strapdown algorithm at the rate.
+//! start, return to the trajectory. The difference is the error of the strapdown algorithm at that rate.
 
 use crate::earth::{GravityModel, MAX_LATITUDE, ned_difference};
 use crate::frames::NavState;

@@ -1,4 +1,4 @@
-//! The scenario file: everything of a run in one TOML. Every key is optional; the defaults are those of
+//! The scenario file: all settings of a run in one TOML file. Every key is optional; the defaults are those of
 //! [Minaretzis et al.](crate::bibliography::Minaretzis24), Section V.
 
 use crate::earth::GravityModel;
@@ -19,7 +19,7 @@ use crate::units::{Probability, SettingError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Everything of a run but the trajectory and the models.
+/// All settings of a run except the trajectory and the models.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Scenario {
@@ -36,7 +36,7 @@ pub struct Scenario {
     pub baro: Option<BaroSettings>,
     /// The start.
     pub initial: InitialSettings,
-    /// Windows without fixes. Without this key and the two below: the paper's two; an empty list: none.
+    /// Windows without fixes. Without this key and the two below: the two of the paper. An empty list: none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub outage: Option<Vec<Outage>>,
     /// Regular outages.
@@ -111,7 +111,7 @@ pub struct FilterSettings {
     pub states: FilterStates,
     /// How the filter of 15 states is made of a larger model.
     pub reduction: Reduction,
-    /// How gravity falls with height, for truth and filter alike.
+    /// How gravity decreases with height, for truth and filter alike.
     pub gravity: GravityModel,
     /// A fix is not used when its NIS is above the chi-square quantile of this probability; without it, every
     /// fix is used.
@@ -120,7 +120,7 @@ pub struct FilterSettings {
     pub nis_gate: Option<f64>,
 }
 
-/// How a noise model is reduced to white noise and one Gauss-Markov bias an axis.
+/// How a noise model is reduced to white noise and one Gauss-Markov bias per axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Reduction {

@@ -1,5 +1,5 @@
-//! Results as files: tables, JSON, self-contained pages (`page`). It computes no statistic and touches no file:
-//! every function makes a text, the command line writes it.
+//! Results as files: tables, JSON, self-contained pages (`page`). The module computes no statistic and touches
+//! no file: every function returns a text, and the command line writes it.
 
 mod brief;
 mod choose;

@@ -6,14 +6,14 @@ use crate::wavelet::{Curve, RobustVariance, Status, Tuning, interval};
 use std::fmt;
 use std::str::FromStr;
 
-/// Estimator: the curve to which a model is fitted.
+/// The curve to which a model is fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Estimator {
     /// Average of the classical wavelet variances.
     Awv,
-    /// Average of the robust ones: safe from outliers within replicates.
+    /// Average of the robust wavelet variances: robust to outliers within replicates.
     SrAwv,
-    /// Trimmed average, scale by scale, of the robust ones: safe from abnormal replicates too.
+    /// Trimmed average, scale by scale, of the robust wavelet variances: robust to abnormal replicates too.
     #[default]
     DrAwv,
     /// Classical wavelet variance of one replicate.

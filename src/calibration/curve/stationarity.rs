@@ -1,4 +1,4 @@
-//! Whether a recording begins as it goes on: warm-up, and a suggestion of what to leave out.
+//! Warm-up: whether the beginning of a recording differs from the rest, and how much of it to leave out.
 //!
 //! The record is cut into sixteen parts. Looked at are the steps of their means, and the logarithms of
 //! their mean squared differences (the wavelet variance at the first scale). The first of each is compared with the

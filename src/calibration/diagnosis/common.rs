@@ -1,4 +1,4 @@
-//! Outliers that all recordings hold: comparing one with the others does not show those.
+//! Outliers in all recordings, which comparing one recording with the others does not show.
 //!
 //! ln (classical / robust) of every signal has, when the noise is Gaussian, the mean (1/e − 1)/eta and the variance
 //! (1/e − 1)·2/eta (see [`super`]); quantization noise, which the robust variance reads high, is allowed for. Looked at is

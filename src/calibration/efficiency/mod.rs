@@ -1,4 +1,4 @@
-//! Studies of the estimators themselves: signals with known laws in, errors of the estimates out.
+//! Studies of the estimators themselves: from signals of known distribution to the errors of the estimates.
 //!
 //! [`target()`] is what an estimator aims at when parameters vary between replicates, [`Design::set`] draws
 //! one set of replicates and estimates from it, [`accuracy()`] says how far from the target the estimates

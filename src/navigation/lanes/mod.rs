@@ -5,8 +5,8 @@
 //! so a plain `cargo build --release` reaches the vector units. The formulas are written once, over
 //! [`Real`]: the Earth model for a scalar (trajectories), strapdown and covariance for any width.
 //!
-//! `[f64; 8]` alone is not enough: LLVM takes it apart into eight scalars and finds its way back to vector
-//! instructions only in part, with shuffles between (seen in the profile).
+//! `[f64; 8]` alone is not enough: LLVM splits it into eight scalars and restores vector instructions only in part,
+//! with shuffles between (seen in the profile).
 
 mod elementary;
 mod space;

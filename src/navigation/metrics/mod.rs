@@ -1,4 +1,4 @@
-//! What the runs say: ASEE, RMSE, bias, consistency (NEES, NIS, coverage), errors at the end of outages,
+//! Statistics of the runs: ASEE, RMSE, bias, consistency (NEES, NIS, coverage), errors at the end of outages,
 //! ratios between experiments; each with its Monte-Carlo standard error or interval.
 //!
 //! Everything here is a pure function of a [`RunResult`](crate::simulation::RunResult) or of what a run

@@ -1,8 +1,8 @@
-//! All runs: lane batches over threads, reduced in run order.
+//! Monte Carlo: lane batches distributed over threads, reduced in run order.
 //!
 //! Batches of eight runs are handed out in order to any number of threads and added up in order as they
-//! come back, so that the result is the same to the last bit. One batch a thread is in flight and few
-//! wait for their turn: memory does not grow with the number of runs (but for one small record a run).
+//! come back, so that the result is the same to the last bit. One batch per thread is in flight and few
+//! wait for their turn: memory does not grow with the number of runs, except for one small record per run.
 
 use crate::lanes::LANES;
 use crate::simulation::{

@@ -1,7 +1,7 @@
-//! Which IMU a limit on the errors at an outage's end needs, and by how much a given one keeps it.
+//! The IMU that keeps the errors at the end of an outage within a limit, and the margin of a given IMU.
 //!
-//! Everything here is linear covariance analysis of the filter that knows its IMU: a state for every process, gains
-//! to match. Errors grow with every intensity, so that each answer is where a monotone function crosses zero.
+//! Everything here is linear covariance analysis of a filter that knows its IMU: a state for every process, with the
+//! gains that follow. Errors grow with every noise intensity, so each answer is the zero of a monotone function.
 
 mod course;
 mod imu;

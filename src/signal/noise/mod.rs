@@ -1,4 +1,4 @@
-//! Noise models: the noun in which calibration and navigation meet.
+//! Noise models: the type that calibration hands to navigation.
 //!
 //! A [`Process`] is one latent stochastic process; a [`Composite`] is the sum of processes that one axis
 //! carries; a [`Model`] is the six axes of an IMU at a sample rate. Parameters are per sample at that rate.

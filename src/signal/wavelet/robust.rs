@@ -2,11 +2,11 @@
 //!
 //! nu solves mean chi(W/√nu) = a ([Mondal and Percival](crate::bibliography::MondalPercival12),
 //! [Guerrier](crate::bibliography::Guerrier21)). The left side falls to zero on both ends, so roots come in
-//! pairs; the admissible one is where it *falls* through a. Consistent for Gaussian coefficients: pure
-//! quantization noise reads 15 % high at efficiency 0.6, by a factor that is known ([`super::QuantizationResponse`]) and
-//! that fits to robust curves allow for. Nor is it unbiased for few coefficients ([`Tuning::bias`]): of white noise it
+//! pairs; the admissible one is where it *falls* through a. The estimate is consistent for Gaussian coefficients. Pure
+//! quantization noise reads 15 % high at efficiency 0.6, by a known factor ([`super::QuantizationResponse`]) for which
+//! fits to robust curves correct. The estimate is biased for few coefficients ([`Tuning::bias`]): for white noise it
 //! reads 2 ± 0.8 % high where the record has 16 lengths of the scale, 3 ± 1.1 % with 8, 8 ± 1.7 % with 4, 21 ± 3 % with 2
-//! (means of 1000 records; the command is in README, Limits).
+//! (means of 1000 records; the command is in docs/limits.md).
 
 use super::haar::{Compensated, Pyramid, array, pairwise};
 use super::{Tuning, WaveletError};

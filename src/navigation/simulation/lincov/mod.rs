@@ -1,8 +1,7 @@
-//! Linear covariance analysis: what a filter believes of its errors, and what they are, without a random
-//! number.
+//! Linear covariance analysis: what a filter believes of its errors, and what they are, without random numbers.
 //!
-//! A filter's gains do not depend on what is drawn, but for the small part in which it is linearised about
-//! its estimate. One pass along the reference therefore gives its own covariance, and beside it the covariance
+//! A filter's gains do not depend on the random numbers, except for the small effect of linearising about its own
+//! estimate. One pass along the reference therefore gives its own covariance, and beside it the covariance
 //! of the *true* error under the same gains: that of \[navigation error; the filter's bias estimates\] jointly
 //! with the states of whatever makes the inertial errors ([Maybeck](crate::bibliography::Maybeck79), sec. 6.8).
 //!
