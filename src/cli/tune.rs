@@ -110,7 +110,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 /// A directory or a table holds samples: a truth is a model.
 fn refuse_recordings(args: &Args) -> Result<(), Failure> {
     if args.truths.is_empty() && !args.intervals {
-        return Err(Failure::input("nothing to be honest for: neither --truth nor --intervals").hint(
+        return Err(Failure::input("no truth to be consistent with: neither --truth nor --intervals is given").hint(
             "give models of what may be true (--truth OTHER.toml, one for each recording or day), or --intervals \
              for a MODEL that `nav-sim calibrate` wrote with intervals",
         ));

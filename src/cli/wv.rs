@@ -88,8 +88,8 @@ fn digest(file: &SignalsFile) -> String {
         String::new()
     };
     format!(
-        "Allan deviation over averages of{of}:\n{}\nrobust/classical: least ratio of the wavelet variances, marked * where it \
-         is lower than chance makes it, as with outliers; all scales with intervals: --verbose, --format csv; recordings side by side: --per-file",
+        "Allan deviation over averages of{of}:\n{}\nrobust/classical: smallest ratio of the wavelet variances, marked * where it \
+         is lower than chance explains, as with outliers; all scales with intervals: --verbose, --format csv; recordings side by side: --per-file",
         report::columns(&report::signals_digest(file))
     )
 }

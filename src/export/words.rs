@@ -49,8 +49,8 @@ impl Export {
         }
         if self.target.is_autopilot() {
             doubts.push(
-                "a recording at rest holds no vibration, for which the autopilot's defaults allow: these values are a lower \
-                 bound"
+                "a recording at rest contains no vibration, and the autopilot's defaults allow for it: these values are a \
+                 lower bound"
                     .to_owned(),
             );
         }
@@ -156,7 +156,7 @@ fn parameters(s: &SensorExport) -> String {
         |m| format!("B {} (minimum at {})", bias(m.bias_instability()), seconds(m.tau_s)),
     ));
     if let Some(crossover) = s.exported.crossover_s() {
-        parts.push(format!("N rules below {}, K above", seconds(crossover)));
+        parts.push(format!("N dominates below {}, K above", seconds(crossover)));
     }
     parts.join(", ")
 }

@@ -211,7 +211,7 @@ impl ChoiceReport<'_> {
         let ends: Vec<String> = self.outages.iter().map(|o| window(o.start_s, o.end_s)).collect();
         format!(
             "{recordings} recordings, each left out once; [95 % over recordings]; horizontal RMSE at the ends of the outages \
-             {}\n* best log score, others less it; = cannot be told from it, given so many candidates; † of one recording; NEES 9, coverage 0.95 if \
+             {}\n* best log score, the others relative to it; = not distinguishable from it, given the number of candidates; † of one recording; NEES 9, coverage 0.95 if \
              the filter is right",
             ends.join(", ")
         )

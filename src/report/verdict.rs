@@ -33,7 +33,7 @@ pub(crate) fn verdict_line(verdict: &Verdict, outages: &[(f64, f64)], runs: u64,
         VerdictKind::Ok => {
             let percent = |ratio: f64| readable(100.0 * (ratio - 1.0));
             format!(
-                "consistent: {figures}; {} would tell errors {} % above the filter's standard deviations, {} % in one \
+                "consistent: {figures}; {} can detect errors {} % above the filter's standard deviations, {} % in one \
                  state alone",
                 independent(verdict.independent_runs),
                 percent(verdict.detectable_ratio),

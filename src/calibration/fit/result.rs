@@ -72,7 +72,7 @@ pub enum FitError {
         value: f64,
     },
     /// Nothing to be read off.
-    #[error("{process} has no slope of its own in the Allan deviation: avlr cannot tell it")]
+    #[error("{process} has no slope of its own in the Allan deviation: avlr cannot estimate it")]
     NoSlope {
         /// Code of the process.
         process: &'static str,

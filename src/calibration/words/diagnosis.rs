@@ -51,7 +51,7 @@ fn misfits(misfits: &[Misfit]) -> Option<String> {
     let fits: Vec<String> = misfits.iter().map(rejection).collect();
     Some(format!(
         "the J-test rejects the model ({}): its parameters are not those of the noise, whichever recordings are used; \
-         another model, or recordings without disturbances, come first",
+         first find another model, or recordings without disturbances",
         fits.join("; ")
     ))
 }
@@ -60,9 +60,9 @@ fn misfits(misfits: &[Misfit]) -> Option<String> {
 fn outliers(common: &CommonOutliers, count: usize) -> String {
     let (first, last) = (common.tau_s[0], common.tau_s[common.tau_s.len() - 1]);
     format!(
-        "outliers within all {count} recordings, or most: the classical wavelet variance is above the robust one \
+        "outliers in all or most of the {count} recordings: the classical wavelet variance is above the robust one \
          from {} to {}, most at {}: by {} in the median ({:.0} standard deviations): awv describes the noise with \
-         them, sr-awv and dr-awv without most of them (small ones pass for noise)",
+         them, sr-awv and dr-awv without most of them (small outliers pass for noise)",
         duration(first),
         duration(last),
         duration(common.most_tau_s),
@@ -107,7 +107,7 @@ fn drift(name: &str, sensor: Sensor, alarm: &DriftAlarm) -> String {
     };
     let axes: Vec<String> = alarm.change.iter().zip(&alarm.deviations).map(change_of_axis).collect();
     format!(
-        "{name} is abnormal: its level drifts as that of no other does: later half less earlier half {}, p = {:.4}",
+        "{name} is abnormal: its level drifts as no other does: mean of the later half minus that of the earlier half {}, p = {:.4}",
         axes.join(", "),
         alarm.p_value
     )
@@ -150,16 +150,16 @@ fn answer(own: &[&Diagnosis], abnormal: &[&Diagnosis]) -> String {
             None => format!("the {all} recordings agree: use them all"),
             Some(Differing { p_value, most: LevelSpread { tau_s, between, .. } }) => format!(
                 "none of the {all} recordings stands out, but they differ among themselves beyond their noise, by {} of the \
-                 wavelet variance at {tau_s} s (p = {p_value:.3}): the model is their average, and each of them is another",
+                 wavelet variance at {tau_s} s (p = {p_value:.3}): the model is their average and describes none of them exactly",
                 signed_percent(between).trim_start_matches('+')
             ),
         },
         (some, 0) if abnormal.iter().all(|d| d.verdict == Verdict::Drift) => format!(
-            "{some} of {all} recordings drift as no other does, and every estimator's random walk holds that: leave them \
+            "{some} of {all} recordings drift as no other does, which enters the random walk of every estimator: leave them \
              out once you know why"
         ),
         (some, 0) => format!(
-            "{some} of {all} recordings hold outliers (or drift): awv describes the noise with them, sr-awv and dr-awv without most \
+            "{some} of {all} recordings have outliers (or drift): awv describes the noise with them, sr-awv and dr-awv without most \
              of them{}",
             robust_moves(abnormal)
         ),
@@ -169,14 +169,14 @@ fn answer(own: &[&Diagnosis], abnormal: &[&Diagnosis]) -> String {
         }
         (_, n) => {
             let drops = match suffices(own, n, signals) {
-                Some(trim) => format!("dr-awv, with the trim it ran with, {trim}, already does without"),
-                None if n == signals => format!("dr-awv with a trim of at least {n} does without"),
+                Some(trim) => format!("dr-awv, with its trim of {trim}, already leaves it out"),
+                None if n == signals => format!("dr-awv with a trim of at least {n} leaves it out"),
                 None => format!(
-                    "dr-awv with a trim of at least {n} (axes apart) or {signals} (axes pooled) does without"
+                    "dr-awv with a trim of at least {n} (axes apart) or {signals} (axes pooled) leaves it out"
                 ),
             };
             format!(
-                "the noise of {n} of {all} recordings is not that of the others: awv and sr-awv hold it, {drops}; leave \
+                "the noise of {n} of {all} recordings is not that of the others: awv and sr-awv include it, {drops}; leave \
                  the abnormal recordings out once you know what happened to them"
             )
         }

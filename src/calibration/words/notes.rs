@@ -84,12 +84,12 @@ fn at_ends(outcome: &Outcome, rate_hz: f64, notes: &mut Vec<String>) {
         notes.push(if is_short {
             format!(
                 "{label}: its correlation time is the shortest that is sought, a sixth of a sample (phi = e^-6): it is \
-                 white noise by another name, and not identifiable from these data"
+                 indistinguishable from white noise, and not identifiable from these data"
             )
         } else {
             format!(
-                "{label}: its correlation time is the longest that is sought, 20 times the longest scale: it is a random \
-                 walk by another name, and not identifiable from these data"
+                "{label}: its correlation time is the longest that is sought, 20 times the longest scale: it is \
+                 indistinguishable from a random walk, and not identifiable from these data"
             )
         });
     }
@@ -109,15 +109,15 @@ fn beyond_the_scales(outcome: &Outcome, record_s: f64, rate_hz: f64, notes: &mut
         if matches!(process, Process::RandomWalk(_) | Process::Drift(_)) && share.leads == [last] {
             notes.push(format!(
                 "{label} dominates at the last scale only ({}), of which there are few independent values: a longer \
-                 record would tell it better",
+                 record would determine it better",
                 duration(longest_s)
             ));
         }
         let Some(t_corr_s) = correlation_time_s(process, rate_hz) else { continue };
         if t_corr_s * rate_hz < 1.0 {
             notes.push(format!(
-                "{label}: its correlation time of {t_corr_s:.4} s is shorter than a sample: white noise by another \
-                 name"
+                "{label}: its correlation time of {t_corr_s:.4} s is shorter than a sample: indistinguishable from \
+                 white noise"
             ));
         }
         // Before its peak the curve of an AR1 rises as that of a random walk does: without the peak only

@@ -167,8 +167,7 @@ fn rejected(outcome: &Outcome) -> Option<(Verdict, String)> {
         share if share > REJECTED.0 && rejected > 3 => Verdict::Doubtful,
         _ => return None,
     };
-    let text =
-        format!("{rejected} of {} fixes were rejected: the solution went its own way", used + rejected);
+    let text = format!("{rejected} of {} fixes were rejected: the solution left the fixes", used + rejected);
     Some((verdict, text))
 }
 

@@ -101,8 +101,8 @@ impl ReductionSummary {
         let describe = |name: &str, unit: &str, a: &AxisReduction| {
             let left_out = if a.quantization_left_out { "; quantization noise left out" } else { "" };
             format!(
-                "{name} reduced to white noise {:.3e} {unit} a sample and one bias of {:.3e} {unit}, correlation time {:.0} s \
-                 (wavelet variance within {:.0} %{left_out})",
+                "{name} reduced to white noise of {:.3e} {unit} per sample and one bias of {:.3e} {unit}, correlation time {:.0} s \
+                 (wavelet variance reproduced within {:.0} %{left_out})",
                 a.white_sigma2.sqrt(),
                 a.bias_sigma,
                 a.bias_t_corr_s,
@@ -203,7 +203,7 @@ impl ReductionQuality {
         };
         let lost = self.rmse_over_full.iter().flatten().flat_map(|e| e.0).reduce(f64::max);
         let lost = lost.map_or(String::new(), |lost| {
-            format!("; errors there at most {:.0} % above those of the full filter", 100.0 * (lost - 1.0))
+            format!("; errors at most {:.0} % above those of the full filter", 100.0 * (lost - 1.0))
         });
         format!("the reduced filter by covariance analysis: {ends}NEES {:.2} of 9{lost}", self.nees)
     }
