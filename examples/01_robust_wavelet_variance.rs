@@ -1,4 +1,4 @@
-//! What one shock does to the classical wavelet variance, and not to the robust one.
+//! The effect of one shock on the classical wavelet variance, and its absence in the robust one.
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
 use nav_sim::noise::{Ar1, Composite, Process, RandomWalk, Synthesizer, White};

@@ -1,5 +1,5 @@
-//! Two filters on the same noise: one believes the model that made it, the other that the gyroscopes' bias
-//! is ten times as steady. What they claim, and what is true.
+//! Two filters on the same noise: one has the model that made it, the other takes the gyroscopes' bias for ten
+//! times as steady. Prints the errors that they claim and the true ones.
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
 use nav_sim::ekf::{Belief, FilterStates};

@@ -1,4 +1,4 @@
-//! How often the 95 % intervals of a calibration hold the truth, and how far the estimates are off in the mean: sets of
+//! How often the 95 % intervals of a calibration contain the truth, and the mean error of the estimates: sets of
 //! eight replicates of the paper's Section IV (clean, parameters drawn for each), theta_0 by quadrature.
 //!
 //! `cargo run --release --example 05_interval_coverage -- SETS SAMPLES DRAWS CASE` (default 200 65536 199 paper). Other

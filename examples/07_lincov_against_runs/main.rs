@@ -1,5 +1,5 @@
-//! Covariance analysis held against Monte-Carlo runs: three trajectories, three filters, a truth as believed, one process
-//! of it four times as strong, and what the true IMU and the receiver can have beside noise.
+//! Covariance analysis compared with Monte-Carlo runs: three trajectories, three filters, a truth as believed, one process
+//! of it four times as strong, and the other errors that the true IMU and the receiver can have.
 //!
 //! `cargo run --release --example 07_lincov_against_runs -- RUNS TRAJECTORY…` (default 2000, the three shipped ones). Every ten
 //! seconds: the largest departure of the ASEE in per cent; the largest departures of RMSE (nine states), NEES and

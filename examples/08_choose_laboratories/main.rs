@@ -1,6 +1,6 @@
 //! How often `nav-sim choose` finds what is truly best: simulated laboratories of K recordings of the virtual consumer
 //! IMU, whose parameters differ from recording to recording, clean or contaminated as in the paper's scenarios II and
-//! III, and what is true of each candidate on fresh recordings, of the same kind and clean.
+//! III. The true value of each candidate is measured on fresh recordings, of the same kind and clean.
 //!
 //! `cargo run --release --example 08_choose_laboratories -- LABORATORIES RECORDINGS CASE` (default 100 6 clean). Cases:
 //! `clean`; `II`, `III`: the recordings are contaminated, operation too; `II-clean`, `III-clean`: operation is clean.

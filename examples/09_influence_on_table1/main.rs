@@ -1,6 +1,6 @@
-//! What each disturbance of the paper's scenarios II and III does to the error after an outage, and what the influence
-//! of the clean curve's scales predicts of it: first order, d ln(error) = Σ influence · d ln(wavelet variance), and in
-//! steps, the influence taken anew at the middle of each.
+//! The effect of each disturbance of the paper's scenarios II and III on the error after an outage, and its prediction
+//! from the influence of the clean curve's scales: first order, d ln(error) = Σ influence · d ln(wavelet variance), and in
+//! steps, with the influence computed anew at the middle of each.
 //!
 //! `cargo run --release --example 09_influence_on_table1 -- SAMPLES STEPS DISTURBANCE` (default 524284 4, every disturbance)
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
