@@ -3,8 +3,7 @@
 use super::pictures::{PlotArgs, replaceable};
 use super::{Failure, Session};
 use crate::formats::atomic;
-use crate::jobs::{self, CompareError, Comparison};
-use crate::metrics::ComparisonError;
+use crate::jobs::{self, Comparison};
 use crate::report::{self, PaperFigure};
 use crate::simulation::REPORTED_NAMES;
 use std::path::PathBuf;
@@ -166,21 +165,6 @@ fn unasked_output() -> Result<PathBuf, Failure> {
     }
     let failure = Failure::input(format!("{} is there and is no comparison", path.display()));
     Err(failure.hint("name the output with --out"))
-}
-
-impl From<CompareError> for Failure {
-    fn from(e: CompareError) -> Self {
-        match e {
-            CompareError::File(e) => e.into(),
-            CompareError::Trajectory { .. } => {
-                Self::input(e).hint("compare runs along one and the same trajectory file")
-            }
-            CompareError::Ratio { source: ComparisonError::Runs { .. }, .. } => {
-                Self::input(e).hint("make both with one number of --runs")
-            }
-            CompareError::Ratio { .. } => Self::input(e),
-        }
-    }
 }
 
 pub(super) fn states(names: &[String]) -> Result<Vec<usize>, Failure> {

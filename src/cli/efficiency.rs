@@ -3,7 +3,7 @@
 use super::{Failure, Session};
 use crate::efficiency::StudyError;
 use crate::formats::{atomic, efficiency_file};
-use crate::jobs::{EstimatorStudy, EstimatorStudyError};
+use crate::jobs::EstimatorStudy;
 use crate::report::{self, EfficiencyFile};
 use std::path::{Path, PathBuf};
 
@@ -56,10 +56,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let progress = session.progress("sets", sets.saturating_sub(done));
     // Long enough that no thread waits for the last set of a block for a large part of it.
     let block = 8 * session.threads() as u64;
-    study.estimate(sets, block, &mut directory, &|sets| progress.add(sets)).map_err(|e| match e {
-        EstimatorStudyError::File(e) => e.into(),
-        EstimatorStudyError::Study(e) => Failure::input(e),
-    })?;
+    study.estimate(sets, block, &mut directory, &|sets| progress.add(sets))?;
     write(&args.out, &study.results(sets, &directory), session)?;
     if args.sensitivity {
         atomic::write(&args.out.join("sensitivity.csv"), study.sensitivity().map_err(of_study)?)?;

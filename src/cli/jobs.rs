@@ -5,6 +5,7 @@ use crate::calibration::{AverageError, CalibrationError, Cause, FitError, ModelS
 use crate::choose::ChoiceError;
 use crate::formats::suggest::nearest;
 use crate::jobs::JobError;
+use crate::metrics::ComparisonError;
 use crate::simulation::ExperimentError;
 
 impl From<JobError> for Failure {
@@ -26,6 +27,18 @@ impl From<JobError> for Failure {
                  another truth",
             ),
             JobError::Choice(e) => of_choice(&e),
+            JobError::OtherTrajectory { .. } => {
+                Self::input(e).hint("compare runs along one and the same trajectory file")
+            }
+            JobError::Ratio { source: ComparisonError::Runs { .. }, .. } => {
+                Self::input(e).hint("make both with one number of --runs")
+            }
+            JobError::Replicate(_)
+            | JobError::Anticipation(_)
+            | JobError::Navigate(_)
+            | JobError::EstimatorStudy(_)
+            | JobError::Pair(_)
+            | JobError::Ratio { .. } => Self::input(e),
             JobError::Pooled => Self::input(format!("--pool sensor: {e}")).hint("--pool axes"),
             JobError::TwoRates { path, own, given } => {
                 let message =

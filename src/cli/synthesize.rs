@@ -7,7 +7,7 @@ use crate::formats::contamination_file;
 use crate::formats::model_file::{self, ModelFile};
 use crate::formats::recordings::FileFormat;
 use crate::imu::Channel;
-use crate::jobs::{Synthesis, SynthesisError};
+use crate::jobs::Synthesis;
 use crate::noise::contamination::{Contamination, Rule};
 use std::path::{Path, PathBuf};
 
@@ -59,10 +59,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let inputs = contamination.into_iter().chain([args.model.as_path()]);
     let _own = job.claim(&args.out, inputs, session.existing())?;
     let progress = session.progress("replicates", args.replicates);
-    let manifest = job.write(&args.out, || progress.add(1)).map_err(|e| match e {
-        SynthesisError::File(e) => e.into(),
-        SynthesisError::Replicate(e) => Failure::input(e),
-    })?;
+    let manifest = job.write(&args.out, || progress.add(1))?;
     let text = || {
         let axes: Vec<String> = job.channels.iter().map(Channel::to_string).collect();
         format!(

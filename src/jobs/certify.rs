@@ -1,6 +1,7 @@
 //! The closure certificate of an export: recordings of the exported pair, as long as those that were calibrated, against the
 //! model's own curve.
 
+use super::JobError;
 use crate::export::Export;
 use crate::formats::model_file::ModelFile;
 use crate::imu::{Channel, Sensor};
@@ -9,7 +10,7 @@ use crate::noise::{
     Composite, GaussMarkov, Model, ParameterError, Process, RandomWalk, Synthesizer, White, continuous,
 };
 use crate::rng::StreamKey;
-use crate::wavelet::{WaveletError, classical, default_levels, interval};
+use crate::wavelet::{classical, default_levels, interval};
 use rayon::prelude::*;
 
 /// The recordings that are made.
@@ -68,18 +69,6 @@ impl Certificate {
     }
 }
 
-/// Why there is no certificate.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum CertifyError {
-    /// The pair is no noise model.
-    #[error("the exported pair is no noise model: {0}")]
-    Pair(#[from] ParameterError),
-    /// The recordings have too few scales.
-    #[error(transparent)]
-    Wavelet(#[from] WaveletError),
-}
-
 /// Synthesises recordings of the exported pairs, takes the average of their classical wavelet variances with its band, and sees
 /// whether the model lies within. The band holds 95 % of all scales together (Bonferroni).
 ///
@@ -90,11 +79,11 @@ pub fn certify(
     model: &Model,
     missing: &[Channel],
     recorded: Recorded,
-) -> Result<Vec<Certificate>, CertifyError> {
+) -> Result<Vec<Certificate>, JobError> {
     let of_sensor = |s: &crate::export::SensorExport| {
         let own = |c: &Channel| c.sensor == s.sensor && !missing.contains(c);
         let axes: Vec<&Composite> = Channel::ALL.iter().filter(|c| own(c)).map(|c| model.axis(*c)).collect();
-        let pair = composite(&s.exported, model.rate_hz)?;
+        let pair = composite(&s.exported, model.rate_hz).map_err(JobError::Pair)?;
         let levels = default_levels(recorded.samples);
         let horizon = export.settings.horizon;
         let average_s = |level: u32| f64::from(level - 1).exp2() / model.rate_hz;
@@ -126,7 +115,7 @@ fn variances(
     sensor: Sensor,
     levels: u32,
     recorded: Recorded,
-) -> Result<Vec<Vec<f64>>, CertifyError> {
+) -> Result<Vec<Vec<f64>>, JobError> {
     let one = |run: u64| {
         let (seed, source) = (recorded.seed, sensor.name());
         let key = StreamKey { seed, scenario: "certify", run, source, process: "" };

@@ -1,8 +1,8 @@
 //! Run directories → ratios between runs.
 
-use crate::formats::FileError;
+use super::JobError;
 use crate::formats::run_directory::{self, RunDirectory};
-use crate::metrics::{self, ComparisonError};
+use crate::metrics;
 use crate::report::{CandidateResult, ComparisonFile, Label, Manifest, RatioCurves};
 use crate::scenario::Method;
 use std::path::{Path, PathBuf};
@@ -23,34 +23,11 @@ pub struct Comparison {
     pub doubts: Vec<String>,
 }
 
-/// Why runs cannot be compared.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum CompareError {
-    /// A run directory that cannot be read.
-    #[error(transparent)]
-    File(#[from] FileError),
-    /// Without the same trajectory a ratio means nothing.
-    #[error("{run}: not the trajectory of the reference")]
-    Trajectory {
-        /// The run.
-        run: String,
-    },
-    /// Runs that have no ratio.
-    #[error("{run}: {source}")]
-    Ratio {
-        /// The run.
-        run: String,
-        /// Why.
-        source: ComparisonError,
-    },
-}
-
 /// Compares runs with a reference.
 ///
 /// # Errors
 /// When a directory cannot be read, or is of something else.
-pub fn compare(runs: &[PathBuf], reference: &Path) -> Result<Comparison, CompareError> {
+pub fn compare(runs: &[PathBuf], reference: &Path) -> Result<Comparison, JobError> {
     let name = reference.display().to_string();
     let directory = run_directory::read(reference)?;
     let (mut candidates, mut curves, mut doubts) = (Vec::new(), Vec::new(), Vec::new());
@@ -79,12 +56,12 @@ fn compared(
     reference: &RunDirectory,
     is_paired: bool,
     is_reference: bool,
-) -> Result<CandidateResult, CompareError> {
+) -> Result<CandidateResult, JobError> {
     if candidate.manifest.hashes("trajectory") != reference.manifest.hashes("trajectory") {
-        return Err(CompareError::Trajectory { run });
+        return Err(JobError::OtherTrajectory { run });
     }
     let outages = metrics::compare(&candidate.experiment, &reference.experiment, is_paired);
-    let mut outages = outages.map_err(|source| CompareError::Ratio { run: run.clone(), source })?;
+    let mut outages = outages.map_err(|source| JobError::Ratio { run: run.clone(), source })?;
     // the reference is itself, whatever its calibration leaves open
     if !is_reference {
         let open = candidate.asee_end_ci95.iter().zip(&reference.asee_end_ci95);

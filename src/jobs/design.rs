@@ -1,8 +1,9 @@
 //! What a calibration that is not made yet would tell: so many recordings of an IMU, so long each.
 
-use super::navigate::{NavigateError, NavigateInputs, navigate};
+use super::JobError;
+use super::navigate::{NavigateInputs, navigate};
 use crate::calibration::{
-    Anticipated, AnticipationError, Bootstrap, Estimator, Outcome, ParameterInterval, Scattering, Settings,
+    Anticipated, Bootstrap, Estimator, Outcome, ParameterInterval, Scattering, Settings,
 };
 use crate::formats::draws_file::DrawsFile;
 use crate::formats::model_file::ModelFile;
@@ -36,23 +37,11 @@ pub struct Destination<'a> {
     pub outages: &'a [Outage],
 }
 
-/// Why nothing can be said.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum DesignError {
-    /// No such calibration.
-    #[error(transparent)]
-    Anticipation(#[from] AnticipationError),
-    /// No such navigation.
-    #[error(transparent)]
-    Navigate(#[from] NavigateError),
-}
-
 /// What `recordings` of `hours` each would tell.
 ///
 /// # Errors
 /// When the recordings are too few or too short, or the navigation cannot be analysed.
-pub fn design(inputs: &mut DesignInputs<'_>, recordings: usize, hours: f64) -> Result<Design, DesignError> {
+pub fn design(inputs: &mut DesignInputs<'_>, recordings: usize, hours: f64) -> Result<Design, JobError> {
     let model = &inputs.file.model;
     let samples = (hours * 3600.0 * model.rate_hz).round() as usize;
     let anticipated = Anticipated { model, spread: inputs.file.spread.as_ref(), recordings, samples };
@@ -114,7 +103,7 @@ fn quantiles(
     destination: &mut Destination<'_>,
     outcomes: &[Outcome],
     rate_hz: f64,
-) -> Result<Vec<DesignedQuantile>, DesignError> {
+) -> Result<Vec<DesignedQuantile>, JobError> {
     let mut model = destination.inputs.model.clone();
     outcomes.iter().for_each(|outcome| outcome.put_into(&mut model));
     let draws = DrawsFile::of(&outcomes.iter().collect::<Vec<_>>(), rate_hz);

@@ -1,8 +1,12 @@
 //! Why a job has no result.
 
-use crate::calibration::{CalibrationError, Estimator, SignalError};
+use super::NavigateError;
+use crate::calibration::{AnticipationError, CalibrationError, Estimator, SignalError};
 use crate::choose::ChoiceError;
+use crate::efficiency::StudyError;
 use crate::formats::FileError;
+use crate::metrics::ComparisonError;
+use crate::noise::{ParameterError, ReplicateError};
 use crate::wavelet::WaveletError;
 
 /// Why a job has no result.
@@ -53,6 +57,35 @@ pub enum JobError {
     /// Candidates that cannot be compared.
     #[error(transparent)]
     Choice(#[from] ChoiceError),
+    /// Parameters or a contamination that a recording cannot have.
+    #[error(transparent)]
+    Replicate(#[from] ReplicateError),
+    /// No calibration of such recordings to anticipate.
+    #[error(transparent)]
+    Anticipation(#[from] AnticipationError),
+    /// No such navigation.
+    #[error(transparent)]
+    Navigate(#[from] NavigateError),
+    /// A set of an estimator study without estimates.
+    #[error(transparent)]
+    EstimatorStudy(#[from] StudyError),
+    /// An exported pair that is no noise model.
+    #[error("the exported pair is no noise model: {0}")]
+    Pair(ParameterError),
+    /// Runs along another trajectory than that of the reference: a ratio means nothing.
+    #[error("{run}: not the trajectory of the reference")]
+    OtherTrajectory {
+        /// The run.
+        run: String,
+    },
+    /// Runs that have no ratio.
+    #[error("{run}: {source}")]
+    Ratio {
+        /// The run.
+        run: String,
+        /// Why.
+        source: ComparisonError,
+    },
     /// An estimator of one recording was given several.
     #[error("{estimator} takes one recording at a time; there are {recordings}")]
     Single {

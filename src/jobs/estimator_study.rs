@@ -1,5 +1,6 @@
 //! A Monte-Carlo study of the estimators themselves, set by set, from which it goes on when it was stopped.
 
+use super::JobError;
 use crate::efficiency::{
     Accuracy, Design, Estimate, Movement, StudyError, Target, abnormal_curve, accuracy, outlier_curve, target,
 };
@@ -17,18 +18,6 @@ pub struct EstimatorStudy {
     /// The design. Its seed may be set before the first estimate.
     pub design: Design,
     aim: Target,
-}
-
-/// A study that does not go on.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum EstimatorStudyError {
-    /// Its directory cannot be written to.
-    #[error(transparent)]
-    File(#[from] FileError),
-    /// A set without estimates.
-    #[error(transparent)]
-    Study(#[from] StudyError),
 }
 
 impl EstimatorStudy {
@@ -59,7 +48,7 @@ impl EstimatorStudy {
         block: u64,
         directory: &mut StudyDirectory,
         progress: &(dyn Fn(u64) + Sync),
-    ) -> Result<(), EstimatorStudyError> {
+    ) -> Result<(), JobError> {
         let mut next = directory.done.len() as u64;
         while next < sets {
             let end = sets.min(next + block);

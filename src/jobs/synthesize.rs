@@ -1,5 +1,6 @@
 //! Replicate recordings of a noise model, as the files of one directory.
 
+use super::JobError;
 use crate::formats::atomic::{AtomicDir, Claim, Existing, Found, claim_directory};
 use crate::formats::model_file::ModelFile;
 use crate::formats::recordings::{FileFormat, is_recording};
@@ -36,18 +37,6 @@ pub struct Synthesis {
     pub seed: u64,
 }
 
-/// Why there are no recordings.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SynthesisError {
-    /// Parameters or a contamination that a recording cannot have.
-    #[error(transparent)]
-    Replicate(#[from] ReplicateError),
-    /// A file that cannot be written.
-    #[error(transparent)]
-    File(#[from] FileError),
-}
-
 impl Synthesis {
     /// Refuses to overwrite an input or what a synthesis did not make, and to leave recordings of another one beside
     /// those of this one. `inputs`: what is read.
@@ -78,7 +67,7 @@ impl Synthesis {
     ///
     /// # Errors
     /// Of the first recording that cannot be made or written; then none is.
-    pub fn write(&self, out: &Path, made: impl Fn() + Sync) -> Result<String, SynthesisError> {
+    pub fn write(&self, out: &Path, made: impl Fn() + Sync) -> Result<String, JobError> {
         let mut directory = AtomicDir::create(out)?;
         let names = self.names();
         let paths: Vec<PathBuf> = names.iter().map(|n| directory.path(n)).collect();
@@ -88,9 +77,8 @@ impl Synthesis {
             Ok(model)
         };
         // Collected before the first failure is looked for, so that it is the same at any number of threads.
-        let outcomes: Vec<Result<Model, SynthesisError>> =
-            (0..names.len()).into_par_iter().map(write).collect();
-        let models = outcomes.into_iter().collect::<Result<Vec<Model>, SynthesisError>>()?;
+        let outcomes: Vec<Result<Model, JobError>> = (0..names.len()).into_par_iter().map(write).collect();
+        let models = outcomes.into_iter().collect::<Result<Vec<Model>, JobError>>()?;
         let text = report::json(&self.manifest(&names, &models));
         directory.write("manifest.json", &text)?;
         directory.commit()?;
@@ -102,7 +90,7 @@ impl Synthesis {
     }
 
     /// Writes a replicate and returns the model it was made from; `shown`: where the file will be.
-    fn write_replicate(&self, replicate: u64, path: &Path, shown: &Path) -> Result<Model, SynthesisError> {
+    fn write_replicate(&self, replicate: u64, path: &Path, shown: &Path) -> Result<Model, JobError> {
         let spread = self.file.spread.as_ref().filter(|_| self.spread);
         let contamination = self.contamination.as_ref();
         let imu = VirtualImu { model: &self.file.model, spread, contamination, seed: self.seed };
