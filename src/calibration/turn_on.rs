@@ -53,18 +53,14 @@ pub enum TurnOnFinding {
     Removed,
 }
 
-impl TurnOnFinding {
-    /// Name in files.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Seen => "seen",
-            Self::WithinNoise => "within_noise",
-            Self::Moved => "moved",
-            Self::Removed => "removed",
-        }
+nav_sim_signal::named!(
+    TurnOnFinding {
+        Seen = "seen",
+        WithinNoise = "within_noise",
+        Moved = "moved",
+        Removed = "removed",
     }
-}
+);
 
 /// Scatter of the means of a sensor, and the finding.
 #[derive(Debug, Clone, PartialEq)]

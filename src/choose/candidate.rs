@@ -31,22 +31,7 @@ pub enum Inflation {
     Tenfold,
 }
 
-impl Inflation {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::None, Self::Tuned, Self::Tenfold];
-
-    /// As it is written.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Tuned => "tuned",
-            Self::Tenfold => "x10",
-        }
-    }
-}
-
-nav_sim_signal::named!(Inflation);
+nav_sim_signal::named!(Inflation { None = "none", Tuned = "tuned", Tenfold = "x10" });
 
 impl Candidate {
     /// The estimator's model as it is, in the default filter of 15 states.

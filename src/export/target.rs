@@ -33,42 +33,24 @@ pub enum Target {
     Matlab,
 }
 
-impl Target {
-    /// All of them.
-    pub const ALL: [Self; 12] = [
-        Self::Kalibr,
-        Self::OpenVins,
-        Self::Vins,
-        Self::Gtsam,
-        Self::Px4,
-        Self::ArduPilot,
-        Self::KfGins,
-        Self::NaveGo,
-        Self::Psins,
-        Self::GnssInsSim,
-        Self::Pyins,
-        Self::Matlab,
-    ];
-
-    /// Name on the command line.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Kalibr => "kalibr",
-            Self::OpenVins => "openvins",
-            Self::Vins => "vins",
-            Self::Gtsam => "gtsam",
-            Self::Px4 => "px4",
-            Self::ArduPilot => "ardupilot",
-            Self::KfGins => "kf-gins",
-            Self::NaveGo => "navego",
-            Self::Psins => "psins",
-            Self::GnssInsSim => "gnss-ins-sim",
-            Self::Pyins => "pyins",
-            Self::Matlab => "matlab",
-        }
+nav_sim_signal::named!(
+    Target {
+        Kalibr = "kalibr",
+        OpenVins = "openvins",
+        Vins = "vins",
+        Gtsam = "gtsam",
+        Px4 = "px4",
+        ArduPilot = "ardupilot",
+        KfGins = "kf-gins",
+        NaveGo = "navego",
+        Psins = "psins",
+        GnssInsSim = "gnss-ins-sim",
+        Pyins = "pyins",
+        Matlab = "matlab",
     }
+);
 
+impl Target {
     /// What it takes a bias for.
     pub(super) const fn bias(self) -> Bias {
         match self {
@@ -116,5 +98,3 @@ impl Target {
         }
     }
 }
-
-nav_sim_signal::named!(Target);

@@ -20,21 +20,7 @@ pub enum Intervals {
     LargeSample,
 }
 
-impl Intervals {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Eta3, Self::LargeSample];
-
-    /// Name in files and on the command line.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Eta3 => "eta3",
-            Self::LargeSample => "large-sample",
-        }
-    }
-}
-
-nav_sim_signal::named!(Intervals);
+nav_sim_signal::named!(Intervals { Eta3 = "eta3", LargeSample = "large-sample" });
 
 /// How wavelet variances are taken.
 #[derive(Debug, Clone, Default)]

@@ -113,21 +113,7 @@ pub enum GravityModel {
     FirstOrder,
 }
 
-impl GravityModel {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Wgs84, Self::FirstOrder];
-
-    /// As it is written.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Wgs84 => "wgs84",
-            Self::FirstOrder => "first-order",
-        }
-    }
-}
-
-nav_sim_signal::named!(GravityModel);
+nav_sim_signal::named!(GravityModel { Wgs84 = "wgs84", FirstOrder = "first-order" });
 
 /// `Parallel::gravity_down` at the latitude whose sine is given.
 #[inline(always)]

@@ -86,22 +86,7 @@ pub enum Method {
     Both,
 }
 
-impl Method {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::MonteCarlo, Self::Lincov, Self::Both];
-
-    /// As it is written.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::MonteCarlo => "monte-carlo",
-            Self::Lincov => "lincov",
-            Self::Both => "both",
-        }
-    }
-}
-
-nav_sim_signal::named!(Method);
+nav_sim_signal::named!(Method { MonteCarlo = "monte-carlo", Lincov = "lincov", Both = "both" });
 
 /// `[filter]`.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]

@@ -15,17 +15,9 @@ pub enum Sensor {
     Gyro,
 }
 
+crate::named!(Sensor { Accel = "accel", Gyro = "gyro" }, in files);
+
 impl Sensor {
-    /// Both sensors, accelerometer first.
-    pub const ALL: [Self; 2] = [Self::Accel, Self::Gyro];
-    /// Name in files: `accel` or `gyro`.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Accel => "accel",
-            Self::Gyro => "gyro",
-        }
-    }
     /// Unit of a sample.
     #[must_use]
     pub const fn unit(self) -> &'static str {
@@ -35,8 +27,6 @@ impl Sensor {
         }
     }
 }
-
-crate::named!(Sensor, in files);
 
 /// Axis of the sensor triad (body frame: front, right, down).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -49,17 +39,7 @@ pub enum Axis {
     Z,
 }
 
-impl Axis {
-    /// The three axes.
-    pub const ALL: [Self; 3] = [Self::X, Self::Y, Self::Z];
-    /// Name in files.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        ["x", "y", "z"][self as usize]
-    }
-}
-
-crate::named!(Axis, in files);
+crate::named!(Axis { X = "x", Y = "y", Z = "z" }, in files);
 
 /// One of the six signals of an IMU.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -13,22 +13,24 @@ pub struct UnknownName {
 #[doc(hidden)]
 pub use {schemars, serde};
 
-/// Display and reading of a type with `ALL` and a constant `name`; with `in files`, also as a word in files, and in
-/// their schema.
+/// The members of a closed set in their order (`ALL`) and the word for each (`NAMES`, `name`), which is shown and read;
+/// with `in files`, also as a word in files, and in their schema.
 #[macro_export]
 macro_rules! named {
-    ($type:ty) => {
+    ($type:ident { $($member:ident = $word:literal),+ $(,)? }) => {
         impl $type {
-            /// The names of all of them.
-            pub const NAMES: [&'static str; Self::ALL.len()] = {
-                let mut names = [""; Self::ALL.len()];
-                let mut i = 0;
-                while i < names.len() {
-                    names[i] = Self::ALL[i].name();
-                    i += 1;
+            /// All of them.
+            pub const ALL: [Self; [$($word),+].len()] = [$(Self::$member),+];
+            /// Their names, in the same order.
+            pub const NAMES: [&'static str; Self::ALL.len()] = [$($word),+];
+
+            /// Name in files and on the command line.
+            #[must_use]
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$member => $word),+
                 }
-                names
-            };
+            }
         }
 
         impl std::fmt::Display for $type {
@@ -46,8 +48,8 @@ macro_rules! named {
             }
         }
     };
-    ($type:ty, in files) => {
-        $crate::named!($type);
+    ($type:ident { $($members:tt)+ }, in files) => {
+        $crate::named!($type { $($members)+ });
 
         impl $crate::names::serde::Serialize for $type {
             fn serialize<S: $crate::names::serde::Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {

@@ -26,25 +26,19 @@ pub enum Estimator {
     Given,
 }
 
+nav_sim_signal::named!(
+    Estimator {
+        Awv = "awv",
+        SrAwv = "sr-awv",
+        DrAwv = "dr-awv",
+        Gmwm = "gmwm",
+        Rgmwm = "rgmwm",
+        Avlr = "avlr",
+        Given = "given",
+    }, in files
+);
+
 impl Estimator {
-    /// All estimators.
-    pub const ALL: [Self; 7] =
-        [Self::Awv, Self::SrAwv, Self::DrAwv, Self::Gmwm, Self::Rgmwm, Self::Avlr, Self::Given];
-
-    /// Name in files and on the command line.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Awv => "awv",
-            Self::SrAwv => "sr-awv",
-            Self::DrAwv => "dr-awv",
-            Self::Gmwm => "gmwm",
-            Self::Rgmwm => "rgmwm",
-            Self::Avlr => "avlr",
-            Self::Given => "given",
-        }
-    }
-
     /// Whether it uses the robust wavelet variance.
     #[must_use]
     pub const fn is_robust(self) -> bool {
@@ -57,8 +51,6 @@ impl Estimator {
         matches!(self, Self::Gmwm | Self::Rgmwm | Self::Avlr | Self::Given)
     }
 }
-
-nav_sim_signal::named!(Estimator, in files);
 
 /// Number of replicates that DR-AWV drops at each end, scale by scale.
 #[derive(Debug, Clone, Copy, PartialEq)]

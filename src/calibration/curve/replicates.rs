@@ -61,21 +61,7 @@ pub enum Pool {
     Sensor,
 }
 
-impl Pool {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Axes, Self::Sensor];
-
-    /// Name in files and on the command line.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Axes => "axes",
-            Self::Sensor => "sensor",
-        }
-    }
-}
-
-nav_sim_signal::named!(Pool, in files);
+nav_sim_signal::named!(Pool { Axes = "axes", Sensor = "sensor" }, in files);
 
 /// A signal without a wavelet variance.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -20,24 +20,14 @@ pub enum Verdict {
     Noise,
 }
 
-impl Verdict {
-    /// Name in files.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Normal => "normal",
-            Self::Outliers => "outliers",
-            Self::Drift => "drift",
-            Self::Noise => "abnormal",
-        }
-    }
-}
-
-impl Serialize for Verdict {
-    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        to.serialize_str(self.name())
-    }
-}
+nav_sim_signal::named!(
+    Verdict {
+        Normal = "normal",
+        Outliers = "outliers",
+        Drift = "drift",
+        Noise = "abnormal",
+    }, in files
+);
 
 fn by_axis<S: Serializer>(values: &[(Axis, f64)], to: S) -> Result<S::Ok, S::Error> {
     to.collect_map(values.iter().copied())

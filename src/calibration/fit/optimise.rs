@@ -24,18 +24,14 @@ pub enum Termination {
     Regression,
 }
 
-impl Termination {
-    /// Name in files.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Linear => "linear",
-            Self::Converged => "converged",
-            Self::IterationLimit => "iteration_limit",
-            Self::Regression => "regression",
-        }
+nav_sim_signal::named!(
+    Termination {
+        Linear = "linear",
+        Converged = "converged",
+        IterationLimit = "iteration_limit",
+        Regression = "regression",
     }
-}
+);
 
 /// Local minimum to which a start led.
 #[derive(Debug, Clone)]

@@ -20,22 +20,17 @@ pub enum Weighting {
     Full,
 }
 
+nav_sim_signal::named!(
+    Weighting {
+        Model = "model",
+        Edof = "edof",
+        Interval = "ci",
+        None = "none",
+        Full = "full",
+    }, in files
+);
+
 impl Weighting {
-    /// All of them.
-    pub const ALL: [Self; 5] = [Self::Model, Self::Edof, Self::Interval, Self::None, Self::Full];
-
-    /// Name in files and on the command line.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Model => "model",
-            Self::Edof => "edof",
-            Self::Interval => "ci",
-            Self::None => "none",
-            Self::Full => "full",
-        }
-    }
-
     /// √Omega_j of each scale (1/units²), where its variance is taken to be `nu`.
     pub(crate) fn roots(self, curve: &Curve, nu: &[f64]) -> Vec<f64> {
         let root = |((nu, edof), level): ((&f64, &f64), &u32)| match self {
@@ -51,5 +46,3 @@ impl Weighting {
         nu.iter().zip(&curve.edof).zip(&curve.levels).map(root).collect()
     }
 }
-
-nav_sim_signal::named!(Weighting, in files);

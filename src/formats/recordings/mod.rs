@@ -78,22 +78,7 @@ pub enum Gaps {
     Ignore,
 }
 
-impl Gaps {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Refuse, Self::Split, Self::Ignore];
-
-    /// Name in files and on the command line.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Refuse => "refuse",
-            Self::Split => "split",
-            Self::Ignore => "ignore",
-        }
-    }
-}
-
-nav_sim_signal::named!(Gaps);
+nav_sim_signal::named!(Gaps { Refuse = "refuse", Split = "split", Ignore = "ignore" });
 
 /// Reads recordings; those of a directory in name order (numbers in names by value). All are held.
 ///

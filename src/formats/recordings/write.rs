@@ -18,22 +18,9 @@ pub enum FileFormat {
     Npy,
 }
 
-nav_sim_signal::named!(FileFormat);
+nav_sim_signal::named!(FileFormat { Csv = "csv", CsvGz = "csv.gz", Npy = "npy" });
 
 impl FileFormat {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Csv, Self::CsvGz, Self::Npy];
-
-    /// Ending of file names.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Csv => "csv",
-            Self::CsvGz => "csv.gz",
-            Self::Npy => "npy",
-        }
-    }
-
     /// Writes signals of the same length (m/s² or rad/s), sampled at `rate_hz` from time 0 on.
     ///
     /// # Errors

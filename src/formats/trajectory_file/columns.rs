@@ -23,70 +23,44 @@ pub(super) enum Quantity {
     Vd,
 }
 
-use Quantity::{D, E, H, Lat, Lon, N, Pitch, Roll, Time, Vd, Ve, Vn, Yaw};
-
-impl Quantity {
-    /// Our own name of the column.
-    pub(super) const fn name(self) -> &'static str {
-        match self {
-            Time => "t_s",
-            Lat => "lat_deg",
-            Lon => "lon_deg",
-            H => "h_m",
-            N => "n_m",
-            E => "e_m",
-            D => "d_m",
-            Roll => "roll_deg",
-            Pitch => "pitch_deg",
-            Yaw => "yaw_deg",
-            Vn => "v_n_m_s",
-            Ve => "v_e_m_s",
-            Vd => "v_d_m_s",
-        }
+nav_sim_signal::named!(
+    Quantity {
+        Time = "t_s",
+        Lat = "lat_deg",
+        Lon = "lon_deg",
+        H = "h_m",
+        N = "n_m",
+        E = "e_m",
+        D = "d_m",
+        Roll = "roll_deg",
+        Pitch = "pitch_deg",
+        Yaw = "yaw_deg",
+        Vn = "v_n_m_s",
+        Ve = "v_e_m_s",
+        Vd = "v_d_m_s",
     }
-}
+);
 
-const ALL: [Quantity; 13] = [Time, Lat, Lon, H, N, E, D, Roll, Pitch, Yaw, Vn, Ve, Vd];
+use Quantity::{D, E, H, Lat, Lon, N, Pitch, Roll, Time, Vd, Ve, Vn, Yaw};
 
 /// Names of a quantity without their unit. Angles end in `_deg` or `_rad` (nothing: degrees), times in
 /// `_s`, `_ms`, `_us`, `_ns`, lengths in `_m`, velocities in `_m_s` or `_mps`.
-const STEMS: [(&str, Quantity, f64); 36] = [
-    ("t", Time, 1.0),
-    ("time", Time, 1.0),
-    ("timestamp", Time, 1.0),
-    ("lat", Lat, 1.0),
-    ("latitude", Lat, 1.0),
-    ("lon", Lon, 1.0),
-    ("lng", Lon, 1.0),
-    ("longitude", Lon, 1.0),
-    ("h", H, 1.0),
-    ("alt", H, 1.0),
-    ("height", H, 1.0),
-    ("altitude", H, 1.0),
-    ("n", N, 1.0),
-    ("north", N, 1.0),
-    ("e", E, 1.0),
-    ("east", E, 1.0),
-    ("d", D, 1.0),
-    ("down", D, 1.0),
-    ("u", D, -1.0),
-    ("up", D, -1.0),
-    ("roll", Roll, 1.0),
-    ("pitch", Pitch, 1.0),
-    ("yaw", Yaw, 1.0),
-    ("heading", Yaw, 1.0),
-    ("azimuth", Yaw, 1.0),
-    ("v_n", Vn, 1.0),
-    ("vn", Vn, 1.0),
-    ("v_north", Vn, 1.0),
-    ("v_e", Ve, 1.0),
-    ("ve", Ve, 1.0),
-    ("v_east", Ve, 1.0),
-    ("v_d", Vd, 1.0),
-    ("vd", Vd, 1.0),
-    ("v_down", Vd, 1.0),
-    ("v_u", Vd, -1.0),
-    ("v_up", Vd, -1.0),
+const STEMS: [(&[&str], Quantity, f64); 15] = [
+    (&["t", "time", "timestamp"], Time, 1.0),
+    (&["lat", "latitude"], Lat, 1.0),
+    (&["lon", "lng", "longitude"], Lon, 1.0),
+    (&["h", "alt", "height", "altitude"], H, 1.0),
+    (&["n", "north"], N, 1.0),
+    (&["e", "east"], E, 1.0),
+    (&["d", "down"], D, 1.0),
+    (&["u", "up"], D, -1.0),
+    (&["roll"], Roll, 1.0),
+    (&["pitch"], Pitch, 1.0),
+    (&["yaw", "heading", "azimuth"], Yaw, 1.0),
+    (&["v_n", "vn", "v_north"], Vn, 1.0),
+    (&["v_e", "ve", "v_east"], Ve, 1.0),
+    (&["v_d", "vd", "v_down"], Vd, 1.0),
+    (&["v_u", "v_up"], Vd, -1.0),
 ];
 
 /// The quantity a name stands for and the factor to SI.
@@ -104,7 +78,8 @@ fn classify(name: &str) -> Option<(Quantity, f64)> {
         ("_m", 1.0, &[H, N, E, D]),
         ("", 1.0, &[Time, H]),
     ];
-    let of_stem = |stem: &str| STEMS.iter().find(|(s, ..)| *s == stem).map(|&(_, q, sign)| (q, sign));
+    let of_stem =
+        |stem: &str| STEMS.iter().find(|(names, ..)| names.contains(&stem)).map(|&(_, q, sign)| (q, sign));
     for (suffix, factor, quantities) in units {
         let found = name.strip_suffix(suffix).and_then(of_stem);
         if let Some((q, sign)) = found.filter(|(q, _)| quantities.contains(q)) {
@@ -161,7 +136,8 @@ impl Columns {
 
     /// A column that nearly has the name of one that is missing is a slip, not an extra.
     fn refuse_slips(&self, table: &Table) -> Result<(), Error> {
-        let missing: Vec<_> = ALL.into_iter().filter(|q| !self.has(*q)).map(Quantity::name).collect();
+        let missing: Vec<_> =
+            Quantity::ALL.into_iter().filter(|q| !self.has(*q)).map(Quantity::name).collect();
         for column in &self.ignored {
             if let Some(meant) = nearest(column, missing.iter().copied()) {
                 let message = format!("unknown column \"{column}\"");
@@ -222,6 +198,6 @@ mod tests {
         for name in ["sd_roll_deg", "gnss", "e", "n", "roll_m", "lat_m", "t_deg", "v_n_deg"] {
             assert_eq!(classify(name), None, "{name}");
         }
-        assert!(ALL.into_iter().all(|q| classify(q.name()).is_some_and(|(found, _)| found == q)));
+        assert!(Quantity::ALL.into_iter().all(|q| classify(q.name()).is_some_and(|(found, _)| found == q)));
     }
 }

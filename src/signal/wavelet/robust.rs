@@ -25,18 +25,7 @@ pub enum Status {
     Zero,
 }
 
-impl Status {
-    /// Name in files.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Ok => "ok",
-            Self::Coarse => "coarse",
-            Self::NoRoot => "no_root",
-            Self::Zero => "zero",
-        }
-    }
-}
+crate::named!(Status { Ok = "ok", Coarse = "coarse", NoRoot = "no_root", Zero = "zero" });
 
 /// Robust variance of one level.
 #[derive(Debug, Clone, Copy, PartialEq)]

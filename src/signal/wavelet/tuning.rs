@@ -18,21 +18,7 @@ pub enum Convention {
     Wv,
 }
 
-impl Convention {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Exact, Self::Wv];
-
-    /// Name in files and on the command line.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Exact => "exact",
-            Self::Wv => "wv",
-        }
-    }
-}
-
-crate::named!(Convention, in files);
+crate::named!(Convention { Exact = "exact", Wv = "wv" }, in files);
 
 /// Efficiencies that have a constant: from the branch point of the efficiency upwards.
 pub(super) const EFFICIENCY_RANGE: (f64, f64) = (0.3, 0.99);

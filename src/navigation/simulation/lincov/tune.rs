@@ -29,21 +29,7 @@ pub enum Per {
     Process,
 }
 
-impl Per {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Sensor, Self::Process];
-
-    /// As it is written.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Sensor => "sensor",
-            Self::Process => "process",
-        }
-    }
-}
-
-nav_sim_signal::named!(Per);
+nav_sim_signal::named!(Per { Sensor = "sensor", Process = "process" });
 
 /// When a filter counts as honest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -55,21 +41,7 @@ pub enum Aim {
     Worst,
 }
 
-impl Aim {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Worst, Self::Mean];
-
-    /// As it is written.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Mean => "mean",
-            Self::Worst => "worst",
-        }
-    }
-}
-
-nav_sim_signal::named!(Aim);
+nav_sim_signal::named!(Aim { Worst = "worst", Mean = "mean" });
 
 /// A model, and the truths that its filter is to be honest for.
 pub struct Task<'a> {

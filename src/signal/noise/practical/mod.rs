@@ -67,22 +67,7 @@ pub enum Policy {
     Envelope,
 }
 
-impl Policy {
-    /// All of them.
-    pub const ALL: [Self; 3] = [Self::Strict, Self::Matched, Self::Envelope];
-
-    /// Name in files.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Strict => "strict",
-            Self::Matched => "matched",
-            Self::Envelope => "envelope",
-        }
-    }
-}
-
-crate::named!(Policy);
+crate::named!(Policy { Strict = "strict", Matched = "matched", Envelope = "envelope" });
 
 /// Model of the bias in the other program.
 #[derive(Debug, Clone, Copy, PartialEq)]
