@@ -4,7 +4,7 @@ use super::pictures::{PlotArgs, replaceable};
 use super::{Failure, Session};
 use crate::formats::atomic;
 use crate::jobs::{self, Comparison};
-use crate::report::{self, PaperFigure};
+use crate::report::{self, PaperFigure, ShownComparison};
 use crate::simulation::REPORTED_NAMES;
 use std::path::PathBuf;
 
@@ -68,7 +68,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let json = report::json(&compared.found.file);
     atomic::write_result(out, &json, session.existing())?;
     atomic::write(&page, compared.page(&[]))?;
-    args.plot.write(|| compared.picture(), session)?;
+    args.plot.write(|| compared.shown().svg(), session)?;
     session.show(|| json, || args.table.map_or_else(|| compared.text(), |form| compared.table(form)));
     session.printer.say(&format!("wrote {}, {}", out.display(), page.display()));
     Ok(())
@@ -95,14 +95,12 @@ impl Compared {
 
     /// The page, with links to those beneath it.
     pub(super) fn page(&self, links: &[(String, String)]) -> String {
-        let Comparison { file, candidates, curves, outages, .. } = &self.found;
-        report::comparison_page(file, candidates, curves, outages, &self.states, links)
+        self.shown().page(&self.found.file, links)
     }
 
     /// The paper's Figure 7.
     pub(super) fn figure(&self) -> PaperFigure {
-        let Comparison { candidates, curves, outages, .. } = &self.found;
-        report::comparison_figure(candidates, curves, outages, &self.states)
+        self.shown().figure()
     }
 
     /// The outages (start, end) (s).
@@ -110,9 +108,9 @@ impl Compared {
         &self.found.outages
     }
 
-    fn picture(&self) -> String {
+    fn shown(&self) -> ShownComparison<'_> {
         let Comparison { candidates, curves, outages, .. } = &self.found;
-        report::comparison_svg(candidates, curves, outages, &self.states)
+        ShownComparison { candidates, curves, outages, states: &self.states }
     }
 
     /// The table of ASEE ratios.

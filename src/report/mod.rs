@@ -56,10 +56,10 @@ pub(crate) use markdown::{csv_table, latex_table, markdown, markdown_table};
 pub use number::readable;
 pub(crate) use number::{seconds, window};
 pub(crate) use pages::{
-    PaperFigure, RatioCurves, StudyCurves, calibration_page, calibration_svg, catalogue_page, choice_page,
-    comparison_figure, comparison_page, comparison_svg, design_page, efficiency_page, efficiency_svg,
-    fusion_page, model_page, needed_page, paper_figures, paper_page, run_svg, run_text, study_page,
-    tune_page, wavelet_page, wavelet_text,
+    PaperFigure, RatioCurves, ShownComparison, StudyCurves, calibration_page, calibration_svg,
+    catalogue_page, choice_page, design_page, efficiency_page, efficiency_svg, fusion_page, model_page,
+    needed_page, paper_figures, paper_page, run_svg, run_text, study_page, tune_page, wavelet_page,
+    wavelet_text,
 };
 pub(crate) use recording::{gnss_csv, imu_csv, initial_toml};
 pub(crate) use replicates::describe_replicates;

@@ -95,36 +95,27 @@ pub(super) fn expand(entry: &OutagesEntry, index: usize) -> Result<Vec<OutageSet
         [entry.windows.is_some(), entry.sweep.is_some(), entry.periodic.is_some(), entry.random.is_some()];
     let key = format!("outages[{}]", index + 1);
     exactly_one(key.clone(), &said, "windows, sweep, periodic, random")?;
-    let sets = combinations(entry);
+    let swept = swept(entry);
+    let axes = swept.iter().flat_map(|(axes, _)| axes);
+    let sets = axes.fold(1_usize, |n, axis| n.saturating_mul(axis.values().len()));
     if sets > MAX_CELLS {
         let reason = format!("makes more than {MAX_CELLS} outage sets");
         return Err(DescriptionError::refused(&key, sets, reason));
     }
-    let sets = if let Some(windows) = &entry.windows {
-        vec![(Vec::new(), OutagePlan { fixed: windows.clone(), ..OutagePlan::default() })]
-    } else if let Some(sweep) = &entry.sweep {
-        product(&[&sweep.start_s, &sweep.duration_s], |v| OutagePlan {
-            fixed: vec![Outage { start_s: v[0], end_s: v[0] + v[1] }],
-            ..OutagePlan::default()
-        })
-    } else if let Some(p) = &entry.periodic {
-        product(&[&p.first_s, &p.every_s, &p.duration_s], |v| OutagePlan {
-            periodic: Some(PeriodicOutages { first_s: v[0], every_s: v[1], duration_s: v[2] }),
-            ..OutagePlan::default()
-        })
-    } else if let Some(r) = &entry.random {
-        product(&[&r.rate_per_hour, &r.duration_s], |v| OutagePlan {
-            random: Some(RandomOutages { rate_per_hour: v[0], duration_s: v[1] }),
-            ..OutagePlan::default()
-        })
-    } else {
-        Vec::new()
+    let sets = match (&entry.windows, swept) {
+        (Some(windows), _) => {
+            vec![(OutagePlan { fixed: windows.clone(), ..OutagePlan::default() }, Vec::new())]
+        }
+        (None, Some((axes, plan))) => {
+            product(&axes).into_iter().map(|values| (plan(&values), values)).collect()
+        }
+        (None, None) => Vec::new(),
     };
     if sets.is_empty() {
         return Err(DescriptionError::Empty { axis: key });
     }
     let several = sets.len() > 1;
-    let named = |(values, plan): (Vec<f64>, OutagePlan)| {
+    let named = |(plan, values): (OutagePlan, Vec<f64>)| {
         let refused = |e: SettingError| {
             DescriptionError::refused(&key, e.value, format!("is refused: {}", e.requirement))
         };
@@ -136,19 +127,29 @@ pub(super) fn expand(entry: &OutagesEntry, index: usize) -> Result<Vec<OutageSet
     sets.into_iter().map(named).collect()
 }
 
-/// How many sets an entry stands for, before any is made.
-fn combinations(entry: &OutagesEntry) -> usize {
-    let axes = match (&entry.sweep, &entry.periodic, &entry.random) {
-        (Some(s), ..) => vec![&s.start_s, &s.duration_s],
-        (_, Some(p), _) => vec![&p.first_s, &p.every_s, &p.duration_s],
-        (.., Some(r)) => vec![&r.rate_per_hour, &r.duration_s],
-        _ => Vec::new(),
-    };
-    axes.iter().fold(1, |n, axis| n.saturating_mul(axis.values().len()))
+/// What an entry is swept over, and the outages of one combination.
+type Swept<'a> = (Vec<&'a OneOrMany>, fn(&[f64]) -> OutagePlan);
+
+fn swept(entry: &OutagesEntry) -> Option<Swept<'_>> {
+    match (&entry.sweep, &entry.periodic, &entry.random) {
+        (Some(s), ..) => Some((vec![&s.start_s, &s.duration_s], |v| OutagePlan {
+            fixed: vec![Outage { start_s: v[0], end_s: v[0] + v[1] }],
+            ..OutagePlan::default()
+        })),
+        (_, Some(p), _) => Some((vec![&p.first_s, &p.every_s, &p.duration_s], |v| OutagePlan {
+            periodic: Some(PeriodicOutages { first_s: v[0], every_s: v[1], duration_s: v[2] }),
+            ..OutagePlan::default()
+        })),
+        (.., Some(r)) => Some((vec![&r.rate_per_hour, &r.duration_s], |v| OutagePlan {
+            random: Some(RandomOutages { rate_per_hour: v[0], duration_s: v[1] }),
+            ..OutagePlan::default()
+        })),
+        _ => None,
+    }
 }
 
 /// Every combination of values, the last axis fastest.
-fn product(axes: &[&OneOrMany], make: impl Fn(&[f64]) -> OutagePlan) -> Vec<(Vec<f64>, OutagePlan)> {
+fn product(axes: &[&OneOrMany]) -> Vec<Vec<f64>> {
     let mut combinations: Vec<Vec<f64>> = vec![Vec::new()];
     for axis in axes {
         let longer =
@@ -156,12 +157,6 @@ fn product(axes: &[&OneOrMany], make: impl Fn(&[f64]) -> OutagePlan) -> Vec<(Vec
         combinations = combinations.iter().flat_map(longer).collect();
     }
     combinations
-        .into_iter()
-        .map(|c| {
-            let plan = make(&c);
-            (c, plan)
-        })
-        .collect()
 }
 
 #[cfg(test)]

@@ -22,8 +22,7 @@ pub struct RatioCurves {
 
 impl RatioCurves {
     /// Of two experiments with the same epochs.
-    #[must_use]
-    pub fn of(candidate: &Measured, reference: &Measured) -> Self {
+    pub(crate) fn of(candidate: &Measured, reference: &Measured) -> Self {
         let both = candidate.epochs.iter().zip(&reference.epochs);
         let pct = |i: usize, a: &[f64; REPORTED], b: &[f64; REPORTED]| 100.0 * (a[i] / b[i] - 1.0);
         Self {
@@ -33,43 +32,115 @@ impl RatioCurves {
     }
 }
 
-/// The page. `curves`: one a candidate; `outages` are (start, end) in seconds; `links`: pages beneath, path and name.
-#[must_use]
-pub(crate) fn comparison_page(
-    file: &ComparisonFile,
-    candidates: &[CandidateResult],
-    curves: &[RatioCurves],
-    outages: &[(f64, f64)],
-    states: &[usize],
-    links: &[(String, String)],
-) -> String {
-    let gravest = [VerdictKind::Diverged, VerdictKind::Overconfident, VerdictKind::Underconfident];
-    let has = |kind: &VerdictKind| file.verdicts.iter().any(|row| row.verdict.kind == *kind);
-    let kind = gravest.into_iter().find(has).unwrap_or(VerdictKind::Ok);
-    let mut page = Page::new("What the filters believe, compared", tone(kind), &verdict(file));
-    let paired = if file.paired {
-        "; the runs saw the same noise, intervals are those of paired differences"
-    } else {
-        ""
-    };
-    page.text(&format!("Reference: {}{paired}.", file.reference));
-    if !links.is_empty() {
-        page.folded("Pages of the single results", |page| page.links(links));
+/// Runs beside a reference, as they are shown.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct ShownComparison<'a> {
+    /// The runs.
+    pub candidates: &'a [CandidateResult],
+    /// How their ratios go with time, one a run.
+    pub curves: &'a [RatioCurves],
+    /// Start and end of each outage (s).
+    pub outages: &'a [(f64, f64)],
+    /// The states that are shown.
+    pub states: &'a [usize],
+}
+
+impl ShownComparison<'_> {
+    /// The page of a comparison file. `links`: pages beneath, path and name.
+    pub(crate) fn page(&self, file: &ComparisonFile, links: &[(String, String)]) -> String {
+        let Self { candidates, outages, states, .. } = *self;
+        let gravest = [VerdictKind::Diverged, VerdictKind::Overconfident, VerdictKind::Underconfident];
+        let has = |kind: &VerdictKind| file.verdicts.iter().any(|row| row.verdict.kind == *kind);
+        let kind = gravest.into_iter().find(has).unwrap_or(VerdictKind::Ok);
+        let mut page = Page::new("What the filters believe, compared", tone(kind), &verdict(file));
+        let paired = if file.paired {
+            "; the runs saw the same noise, intervals are those of paired differences"
+        } else {
+            ""
+        };
+        page.text(&format!("Reference: {}{paired}.", file.reference));
+        if !links.is_empty() {
+            page.folded("Pages of the single results", |page| page.links(links));
+        }
+        page.text(CAPTION);
+        self.charts().iter().for_each(|chart| page.chart(chart, ""));
+        if !outages.is_empty() {
+            page.section("ASEE against the reference, mean over the outage (%)");
+            page.text(&format!(
+                "The layout of the paper's Table I: mean of (ASEE ratio − 1)·100, in brackets the mean of its absolute value; {}.",
+                meaning_of_intervals(candidates)
+            ));
+            page.table(&Table::of_rows(&with_times(table_rows(candidates, states), outages)));
+            page.section("Consistency and errors");
+            page.text("NEES (9 if right) and coverage over the outage; RMSE at its end against the reference, (ratio − 1)·100.");
+            page.table(&consistency(file, outages, states));
+        }
+        page.html()
     }
-    page.text(CAPTION);
-    charts(candidates, curves, outages, states).iter().for_each(|chart| page.chart(chart, ""));
-    if !outages.is_empty() {
-        page.section("ASEE against the reference, mean over the outage (%)");
-        page.text(&format!(
-            "The layout of the paper's Table I: mean of (ASEE ratio − 1)·100, in brackets the mean of its absolute value; {}.",
-            meaning_of_intervals(candidates)
-        ));
-        page.table(&Table::of_rows(&with_times(table_rows(candidates, states), outages)));
-        page.section("Consistency and errors");
-        page.text("NEES (9 if right) and coverage over the outage; RMSE at its end against the reference, (ratio − 1)·100.");
-        page.table(&consistency(file, outages, states));
+
+    /// The paper's Figure 7, beside its other ones.
+    pub(crate) fn figure(&self) -> PaperFigure {
+        PaperFigure::new(7, FIGURE, self.charts())
     }
-    page.html()
+
+    /// The paper's Figure 7 as a picture.
+    pub(crate) fn svg(&self) -> String {
+        svg(&self.title(), &self.charts())
+    }
+
+    /// A chart a scenario, with a curve an estimator; where the names of the runs tell neither, one with all runs.
+    fn charts(&self) -> Vec<Chart> {
+        let Self { candidates, curves, .. } = *self;
+        let all: Vec<(&CandidateResult, &RatioCurves)> =
+            candidates.iter().zip(curves).filter(|(c, _)| !c.is_reference).collect();
+        let scenarios = in_order(candidates.iter().map(|c| c.label.scenario.as_str()));
+        let estimators = in_order(candidates.iter().map(|c| c.label.estimator.as_str()));
+        let is_laid_out = estimators.len() > 1 && scenarios.len() <= SCENARIOS && !estimators.contains(&"");
+        if !is_laid_out {
+            let names = short_names(&all.iter().map(|(c, _)| c.run.as_str()).collect::<Vec<_>>());
+            let curves = all.iter().map(|(_, curves)| *curves);
+            let own: Vec<Curve<'_>> = names
+                .iter()
+                .zip(curves)
+                .enumerate()
+                .map(|(hue, (name, curves))| Curve { name, hue, curves })
+                .collect();
+            return vec![self.chart(&self.title(), &own)];
+        }
+        let hue = |estimator: &str| estimators.iter().position(|e| *e == estimator).unwrap_or(0);
+        let of_scenario = |scenario: &&str| {
+            let own = all.iter().filter(|(c, _)| c.label.scenario == *scenario);
+            let curves: Vec<Curve<'_>> = own
+                .map(|(c, curves)| Curve { name: &c.label.estimator, hue: hue(&c.label.estimator), curves })
+                .collect();
+            let title = format!("{}, scenario {scenario}", self.title());
+            (!curves.is_empty()).then(|| self.chart(&title, &curves))
+        };
+        scenarios.iter().filter_map(of_scenario).collect()
+    }
+
+    /// What a chart shows, with the name of the reference.
+    fn title(&self) -> String {
+        let reference =
+            self.candidates.iter().find(|c| c.is_reference).map_or("the reference", |c| c.run.as_str());
+        format!("ASEE against {reference}")
+    }
+
+    fn chart(&self, title: &str, own: &[Curve<'_>]) -> Chart {
+        let panel = |state: &usize| {
+            let line = |c: &Curve<'_>| {
+                let points = c.curves.t_s.iter().zip(&c.curves.asee_pct).map(|(t, pct)| (*t, pct[*state]));
+                Series::line(c.name, Colour::Hue(c.hue), points.collect())
+            };
+            let zero = Series::new("", Colour::Ink, Mark::Level(0.0));
+            let name = STATES[*state].split(" (").next().unwrap_or_default();
+            let axis = Axis::linear(&format!("{name}: (ratio − 1)·100 (%)")).including(-1.0, 1.0);
+            let series = std::iter::once(zero).chain(own.iter().map(line)).collect();
+            Panel { height: 0.8, ..Panel::new(axis, series) }
+        };
+        let panels = self.states.iter().map(panel).collect();
+        Chart::new(title, Axis::linear("time (s)"), panels).with_outages(self.outages).in_group("time")
+    }
 }
 
 /// Which filters are not as good as they believe, or better.
@@ -84,30 +155,8 @@ fn verdict(file: &ComparisonFile) -> String {
     }
 }
 
-/// The paper's Figure 7, beside its other ones.
-#[must_use]
-pub(crate) fn comparison_figure(
-    candidates: &[CandidateResult],
-    curves: &[RatioCurves],
-    outages: &[(f64, f64)],
-    states: &[usize],
-) -> PaperFigure {
-    PaperFigure::new(7, FIGURE, charts(candidates, curves, outages, states))
-}
-
 const FIGURE: &str = "Departure of the ASEE of each filter from that of AWV in scenario I, (ratio − 1)·100, scenario by scenario; \
                       outages shaded.";
-
-/// The paper's Figure 7 as a picture.
-#[must_use]
-pub(crate) fn comparison_svg(
-    candidates: &[CandidateResult],
-    curves: &[RatioCurves],
-    outages: &[(f64, f64)],
-    states: &[usize],
-) -> String {
-    svg(&against(candidates), &charts(candidates, curves, outages, states))
-}
 
 const CAPTION: &str = "ASEE (averaged standard estimation error): the filter's own standard deviation. 0 % is as the reference believes; \
                        below it a filter is surer of itself.";
@@ -115,68 +164,11 @@ const CAPTION: &str = "ASEE (averaged standard estimation error): the filter's o
 /// Scenarios that have a chart each; of more, one chart has all runs.
 const SCENARIOS: usize = 6;
 
-/// A chart a scenario, with a curve an estimator; where the names of the runs tell neither, one with all runs.
-fn charts(
-    candidates: &[CandidateResult],
-    curves: &[RatioCurves],
-    outages: &[(f64, f64)],
-    states: &[usize],
-) -> Vec<Chart> {
-    let all: Vec<(&CandidateResult, &RatioCurves)> =
-        candidates.iter().zip(curves).filter(|(c, _)| !c.is_reference).collect();
-    let scenarios = in_order(candidates.iter().map(|c| c.label.scenario.as_str()));
-    let estimators = in_order(candidates.iter().map(|c| c.label.estimator.as_str()));
-    let is_laid_out = estimators.len() > 1 && scenarios.len() <= SCENARIOS && !estimators.contains(&"");
-    if !is_laid_out {
-        let names = short_names(&all.iter().map(|(c, _)| c.run.as_str()).collect::<Vec<_>>());
-        let curves = all.iter().map(|(_, curves)| *curves);
-        let own: Vec<Curve<'_>> = names
-            .iter()
-            .zip(curves)
-            .enumerate()
-            .map(|(hue, (name, curves))| Curve { name, hue, curves })
-            .collect();
-        return vec![chart(&against(candidates), &own, outages, states)];
-    }
-    let hue = |estimator: &str| estimators.iter().position(|e| *e == estimator).unwrap_or(0);
-    let of_scenario = |scenario: &&str| {
-        let own = all.iter().filter(|(c, _)| c.label.scenario == *scenario);
-        let curves: Vec<Curve<'_>> = own
-            .map(|(c, curves)| Curve { name: &c.label.estimator, hue: hue(&c.label.estimator), curves })
-            .collect();
-        let title = format!("{}, scenario {scenario}", against(candidates));
-        (!curves.is_empty()).then(|| chart(&title, &curves, outages, states))
-    };
-    scenarios.iter().filter_map(of_scenario).collect()
-}
-
-/// What a chart shows, with the name of the reference.
-fn against(candidates: &[CandidateResult]) -> String {
-    let reference = candidates.iter().find(|c| c.is_reference).map_or("the reference", |c| c.run.as_str());
-    format!("ASEE against {reference}")
-}
-
 /// One run in a chart.
 struct Curve<'a> {
     name: &'a str,
     hue: usize,
     curves: &'a RatioCurves,
-}
-
-fn chart(title: &str, own: &[Curve<'_>], outages: &[(f64, f64)], states: &[usize]) -> Chart {
-    let panel = |state: &usize| {
-        let line = |c: &Curve<'_>| {
-            let points = c.curves.t_s.iter().zip(&c.curves.asee_pct).map(|(t, pct)| (*t, pct[*state]));
-            Series::line(c.name, Colour::Hue(c.hue), points.collect())
-        };
-        let zero = Series::new("", Colour::Ink, Mark::Level(0.0));
-        let name = STATES[*state].split(" (").next().unwrap_or_default();
-        let axis = Axis::linear(&format!("{name}: (ratio − 1)·100 (%)")).including(-1.0, 1.0);
-        let series = std::iter::once(zero).chain(own.iter().map(line)).collect();
-        Panel { height: 0.8, ..Panel::new(axis, series) }
-    };
-    let panels = states.iter().map(panel).collect();
-    Chart::new(title, Axis::linear("time (s)"), panels).with_outages(outages).in_group("time")
 }
 
 /// A row a run and outage, as they stand in comparison.json.

@@ -16,7 +16,7 @@ mod wavelet;
 
 pub(crate) use calibration::{calibration_page, calibration_svg};
 pub(crate) use choice::choice_page;
-pub(crate) use comparison::{RatioCurves, comparison_figure, comparison_page, comparison_svg};
+pub(crate) use comparison::{RatioCurves, ShownComparison};
 pub(crate) use design::design_page;
 pub(crate) use efficiency::{efficiency_page, efficiency_svg};
 pub(crate) use fusion::fusion_page;
