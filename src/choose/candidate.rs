@@ -43,7 +43,6 @@ impl Candidate {
 
     /// What is compared where nothing else is said: the three averages of N2, and beside AWV what else is done in
     /// practice, from all states to the rule of thumb, and single recordings.
-    #[must_use]
     pub(crate) fn usual() -> Vec<Self> {
         let n2 = |estimator| Self::new(estimator, ModelSpec::n2());
         let two_slopes = |estimator| Self::new(estimator, white_and_walk());
@@ -61,7 +60,6 @@ impl Candidate {
     }
 
     /// All combinations; AVLR, which reads slopes, with the models that have nothing else, or WN+RW.
-    #[must_use]
     pub(crate) fn product(
         estimators: &[Estimator],
         models: &[ModelChoice],
@@ -90,7 +88,6 @@ impl Candidate {
     }
 
     /// Whether another one has the same model, before any inflation.
-    #[must_use]
     pub(crate) fn is_calibrated_as(&self, other: &Self) -> bool {
         self.estimator == other.estimator && self.model == other.model
     }

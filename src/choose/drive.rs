@@ -107,15 +107,8 @@ impl Drive {
             .map_err(|source| ChoiceError::Belief { candidate: "all states".to_owned(), source })
     }
 
-    /// The outages.
-    #[must_use]
-    pub fn outages(&self) -> &[Outage] {
-        &self.outages
-    }
-
     /// How many windows as long as the trajectory lie side by side in so many samples.
-    #[must_use]
-    pub fn independent_windows(&self, samples: usize) -> f64 {
+    pub(crate) fn independent_windows(&self, samples: usize) -> f64 {
         let lasts_s = self.trajectory.end_s() - self.trajectory.start_s();
         samples as f64 / (lasts_s * self.scenario.imu.rate_hz)
     }

@@ -41,14 +41,12 @@ impl Laboratory {
     }
 
     /// The recordings.
-    #[must_use]
-    pub fn units(&self) -> &[Unit] {
+    pub(crate) fn units(&self) -> &[Unit] {
         &self.units
     }
 
     /// Sample rate (Hz).
-    #[must_use]
-    pub const fn rate_hz(&self) -> f64 {
+    pub(crate) const fn rate_hz(&self) -> f64 {
         self.settings.rate_hz
     }
 
@@ -57,7 +55,7 @@ impl Laboratory {
     ///
     /// # Errors
     /// When a trim leaves no replicate, or a curve is too short for the model.
-    pub fn calibrate(
+    pub(crate) fn calibrate(
         &self,
         candidate: &Candidate,
         without: Option<usize>,

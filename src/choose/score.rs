@@ -41,7 +41,6 @@ pub struct EndScore {
 
 impl Score {
     /// Of runs with so many outages.
-    #[must_use]
     pub(crate) fn of_runs(runs: &[RunRecord], outages: usize) -> Self {
         let kept: Vec<&[OutageRecord]> =
             runs.iter().filter(|r| !r.diverged).map(|r| r.outages.as_slice()).collect();
@@ -64,8 +63,7 @@ impl Score {
     }
 
     /// As covariance analysis expects it.
-    #[must_use]
-    pub fn expected(ends: &[Instant]) -> Self {
+    pub(crate) fn expected(ends: &[Instant]) -> Self {
         let end = |instant: &Instant| {
             let found = instant.consistency();
             EndScore {

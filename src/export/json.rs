@@ -7,8 +7,7 @@ use serde_json::{Map, Value, json};
 
 impl Export {
     /// As a JSON document.
-    #[must_use]
-    pub fn json(&self, model: &str) -> Value {
+    pub(crate) fn json(&self, model: &str) -> Value {
         let horizon = self.settings.horizon;
         let sensors: Map<String, Value> =
             self.sensors.iter().map(|s| (s.sensor.name().to_owned(), sensor(s))).collect();
@@ -48,7 +47,6 @@ fn sensor(s: &SensorExport) -> Value {
 }
 
 /// The parameters of an axis, each in SI and in the unit of data sheets.
-#[must_use]
 pub(crate) fn parameters(p: &AxisParameters, sensor: Sensor) -> Value {
     let minimum = p.minimum.map(|m| {
         let b = m.bias_instability();

@@ -22,8 +22,7 @@ pub(super) struct Layout {
 impl Export {
     /// The file: a head of comments that says what it is and how good it is, then the parameters. `model` is the name of
     /// the model file.
-    #[must_use]
-    pub fn text(&self, model: &str) -> String {
+    pub(crate) fn text(&self, model: &str) -> String {
         let layout = self.target.layout();
         let mut lines: Vec<String> = layout.first.iter().map(|l| (*l).to_owned()).collect();
         let head = self.head(model);
@@ -37,7 +36,6 @@ impl Export {
 }
 
 /// A number that reads back to the same, with a point: YAML 1.1 takes `2e-5` for a text.
-#[must_use]
 pub(crate) fn number(value: f64) -> String {
     if value == 0.0 {
         return "0.0".to_owned();

@@ -38,7 +38,7 @@ pub struct Settings {
 
 /// Why a model cannot be exported.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ExportError {
+pub(crate) enum ExportError {
     /// A sensor is not in the model.
     #[error("the model has no {}, and {target} needs both sensors", .sensor.name())]
     NoSensor {
@@ -148,7 +148,7 @@ impl Export {
     ///
     /// # Errors
     /// When a sensor is missing or has no noise over the horizon, or the horizon does not suit the rate.
-    pub fn new(
+    pub(crate) fn new(
         target: Target,
         model: &Model,
         missing: &[Channel],

@@ -16,7 +16,6 @@ pub(crate) enum Quantity {
 
 impl Quantity {
     /// Its SI unit.
-    #[must_use]
     pub(crate) const fn si_unit(self, sensor: Sensor) -> &'static str {
         match (self, sensor) {
             (Self::Density, Sensor::Accel) => "m/s^2/sqrt(Hz)",
@@ -28,7 +27,6 @@ impl Quantity {
     }
 
     /// Its unit on data sheets, and how many of them one SI unit is.
-    #[must_use]
     pub(crate) const fn sheet(self, sensor: Sensor) -> (&'static str, f64) {
         const ROOT_HOUR: f64 = 60.0;
         match (self, sensor) {

@@ -27,8 +27,7 @@ impl Export {
     }
 
     /// A line for each sensor: its parameters in the units of data sheets, and how well the pair stands for the model.
-    #[must_use]
-    pub fn summary(&self) -> Vec<String> {
+    pub(crate) fn summary(&self) -> Vec<String> {
         self.sensors
             .iter()
             .map(|s| format!("{}: {}; {}", s.sensor.name(), parameters(s), closure_in_words(s.closure)))
@@ -36,8 +35,7 @@ impl Export {
     }
 
     /// What a user should know before pasting.
-    #[must_use]
-    pub fn doubts(&self) -> Vec<String> {
+    pub(crate) fn doubts(&self) -> Vec<String> {
         let mut doubts: Vec<String> = self.sensors.iter().flat_map(|s| self.doubts_of(s)).collect();
         for entry in self.entries.iter().filter(|e| e.wanted.is_some()) {
             doubts.push(format!(
@@ -122,7 +120,6 @@ fn axes_differ(s: &SensorExport) -> Option<String> {
 }
 
 /// "0.97 (at 3.2 s) to 1.04 (at 80 s) times the model's Allan deviation".
-#[must_use]
 pub(crate) fn closure_in_words(closure: Closure) -> String {
     let Closure { lowest, highest } = closure;
     format!(

@@ -18,7 +18,7 @@ const FILES: [&str; 7] =
 
 /// The names of what is estimated in each set.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Layout {
+pub(crate) struct Layout {
     /// (scenario, estimator) of each row of a set.
     pub rows: Vec<(String, String)>,
     /// Names of the parameters.
@@ -43,7 +43,7 @@ impl StudyDirectory {
     /// # Errors
     /// When the directory is of another study, holds somebody else's file of a name that the study writes, is damaged, or
     /// cannot be written to.
-    pub fn open(path: &Path, identity: &Value, layout: Layout) -> Result<Self> {
+    pub(crate) fn open(path: &Path, identity: &Value, layout: Layout) -> Result<Self> {
         let (study, sets) = (path.join("study.json"), path.join("sets.csv"));
         let own = atomic::claim_file(&study, [])?;
         match fs::read_to_string(&study) {

@@ -143,12 +143,12 @@ impl std::error::Error for FileError {
 
 impl FileError {
     /// Something wrong, without a remedy.
-    pub fn new(path: impl Into<Box<str>>, place: impl Into<Place>, kind: Kind) -> Self {
+    pub(crate) fn new(path: impl Into<Box<str>>, place: impl Into<Place>, kind: Kind) -> Self {
         Self { path: path.into(), place: place.into(), kind, remedies: Vec::new() }
     }
 
     /// What the system said of a file, and what helps.
-    pub fn io(path: &Path, source: io::Error) -> Self {
+    pub(crate) fn io(path: &Path, source: io::Error) -> Self {
         use io::ErrorKind as K;
         let advice = match source.kind() {
             K::UnexpectedEof => Some("the file is cut off: copy or pack it again"),
@@ -165,7 +165,7 @@ impl FileError {
     }
 
     /// Contents that are refused, in words.
-    pub fn contents(
+    pub(crate) fn contents(
         path: impl Into<Box<str>>,
         place: impl Into<Place>,
         message: impl Into<Box<str>>,
@@ -174,7 +174,7 @@ impl FileError {
     }
 
     /// A value in a column that is refused.
-    pub fn cell(
+    pub(crate) fn cell(
         path: &str,
         line: u64,
         column: &str,
@@ -192,14 +192,12 @@ impl FileError {
     }
 
     /// With advice, beside what it has.
-    #[must_use]
     pub(crate) fn advice(mut self, advice: impl Into<Cow<'static, str>>) -> Self {
         self.remedies.push(Remedy::Advice(advice.into()));
         self
     }
 
     /// With advice, if there is any.
-    #[must_use]
     pub(crate) fn advice_if(self, advice: Option<String>) -> Self {
         match advice {
             Some(advice) => self.advice(advice),
@@ -208,21 +206,18 @@ impl FileError {
     }
 
     /// With other advice than it has.
-    #[must_use]
     pub(crate) fn advice_instead(mut self, advice: &'static str) -> Self {
         self.remedies.clear();
         self.advice(advice)
     }
 
     /// With a setting that helps, beside what it has.
-    #[must_use]
     pub(crate) fn setting(mut self, setting: Setting) -> Self {
         self.remedies.push(Remedy::Setting(setting));
         self
     }
 
     /// Whether the system, not the contents or the request, is at fault.
-    #[must_use]
     pub(crate) fn is_system(&self) -> bool {
         matches!(&self.kind, Kind::System(source) if !is_damage(source.kind()))
     }
@@ -234,7 +229,6 @@ impl FileError {
     }
 
     /// What helps, where `words` says how a setting is made. What cannot be set there is left out.
-    #[must_use]
     pub(crate) fn hint_with(&self, words: impl Fn(Setting) -> Option<&'static str>) -> Option<String> {
         let known = self.remedies.iter().filter_map(|remedy| match remedy {
             Remedy::Advice(advice) => Some(advice.as_ref()),

@@ -38,13 +38,11 @@ pub(crate) fn of_file(path: &Path) -> io::Result<String> {
 }
 
 /// BLAKE3 of bytes, in hexadecimal.
-#[must_use]
 pub(crate) fn of_bytes(bytes: &[u8]) -> String {
     blake3::hash(bytes).to_hex().to_string()
 }
 
 /// BLAKE3 of samples, in hexadecimal.
-#[must_use]
 pub(crate) fn samples(samples: &[f64]) -> String {
     let mut hasher = blake3::Hasher::new();
     for block in samples.chunks(4096) {

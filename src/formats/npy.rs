@@ -140,7 +140,6 @@ fn element_type(code: &str) -> Option<(bool, u8, usize)> {
 
 impl<R: Read> Array<R> {
     /// Its columns.
-    #[must_use]
     pub(crate) const fn columns(&self) -> usize {
         self.header.columns
     }

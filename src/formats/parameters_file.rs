@@ -162,7 +162,6 @@ fn bounds(
 }
 
 /// The JSON schema of such a file: [`Range`] under the names of the table of processes.
-#[must_use]
 pub(crate) fn schema() -> serde_json::Value {
     let mut range = schemars::schema_for!(Range);
     range.remove("$schema");

@@ -2,7 +2,6 @@
 
 /// The candidate nearest to `word`, if near enough to be what was meant: at most one edit in three
 /// letters, or one begins with the other ("rate", "rate_hz"). Case is ignored; ties go to the first.
-#[must_use]
 pub(crate) fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let lower = word.to_lowercase();
     let near = |candidate: &&str| {

@@ -45,7 +45,6 @@ pub struct Radii<R> {
 impl<R: Real> Parallel<R> {
     /// The parallel at the latitude whose sine is given.
     #[inline(always)]
-    #[must_use]
     pub(crate) fn at(sin_lat: R) -> Self {
         let w2 = sin_lat * sin_lat * -E2 + 1.0;
         Self { sin_lat, per_w: R::from(1.0) / w2.sqrt() }
@@ -54,7 +53,6 @@ impl<R: Real> Parallel<R> {
     /// The parallel at a sine that differs by less than 1e-6: one Newton step of the inverse root, exact to
     /// rounding there (its error is 3/8 of the square of e² · 1e-6).
     #[inline(always)]
-    #[must_use]
     pub(crate) fn nearby(&self, sin_lat: R) -> Self {
         let w2 = sin_lat * sin_lat * -E2 + 1.0;
         Self { sin_lat, per_w: self.per_w * (w2 * self.per_w * self.per_w * -0.5 + 1.5) }
@@ -62,7 +60,6 @@ impl<R: Real> Parallel<R> {
 
     /// Radii of curvature.
     #[inline(always)]
-    #[must_use]
     pub(crate) fn radii(&self) -> Radii<R> {
         // R_E = a/w and R_N = a (1 − e²)/w³ with w² = 1 − e² sin² lat.
         let transverse = self.per_w * A;
@@ -73,7 +70,6 @@ impl<R: Real> Parallel<R> {
     /// east are zero: the north component is below 1e-5 m/s² under 1.2 km of height and left out (as all
     /// peers do).
     #[inline(always)]
-    #[must_use]
     pub(crate) fn gravity_down(&self, model: GravityModel, h: R) -> R {
         let s2 = self.sin_lat * self.sin_lat;
         let surface = (s2 * SOMIGLIANA_K + 1.0) * GRAVITY_EQUATOR * self.per_w;

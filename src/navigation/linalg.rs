@@ -10,13 +10,11 @@ pub const fn larger(a: f64, b: f64) -> f64 {
 }
 
 /// glam vector to nalgebra.
-#[must_use]
 pub(crate) fn to_nalgebra(v: DVec3) -> Vector3<f64> {
     Vector3::new(v.x, v.y, v.z)
 }
 
 /// nalgebra vector to glam.
-#[must_use]
 pub(crate) fn to_glam(v: &Vector3<f64>) -> DVec3 {
     DVec3::new(v.x, v.y, v.z)
 }

@@ -271,8 +271,7 @@ impl Scenario {
     }
 
     /// The outages asked for: the paper's two when nothing is said.
-    #[must_use]
-    pub fn outages(&self) -> OutagePlan {
+    pub(crate) fn outages(&self) -> OutagePlan {
         let said = self.outage.is_some() || self.outage_periodic.is_some() || self.outage_random.is_some();
         OutagePlan {
             fixed: self.outage.clone().unwrap_or_default(),

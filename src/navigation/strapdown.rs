@@ -88,8 +88,7 @@ impl Strapdown {
 
     /// Into registers.
     #[inline(always)]
-    #[must_use]
-    pub fn load<W: Wide>(&self) -> Strapdown<W> {
+    pub(crate) fn load<W: Wide>(&self) -> Strapdown<W> {
         Strapdown {
             lat: W::load(&self.lat),
             lon: W::load(&self.lon),
@@ -105,7 +104,7 @@ impl Strapdown {
 
     /// From registers.
     #[inline(always)]
-    pub fn store<W: Wide>(&mut self, ins: &Strapdown<W>) {
+    pub(crate) fn store<W: Wide>(&mut self, ins: &Strapdown<W>) {
         ins.lat.store(&mut self.lat);
         ins.lon.store(&mut self.lon);
         ins.h.store(&mut self.h);
@@ -119,8 +118,7 @@ impl Strapdown {
 
 impl Strapdown<f64> {
     /// One run alone, from a state.
-    #[must_use]
-    pub fn single(start: &NavState, gravity: GravityModel) -> Self {
+    pub(crate) fn single(start: &NavState, gravity: GravityModel) -> Self {
         let zero = Vec3::splat(DVec3::ZERO);
         Self {
             lat: start.lat,
@@ -138,8 +136,7 @@ impl Strapdown<f64> {
 
 impl<L: Real> Strapdown<L> {
     /// The gravity model in use.
-    #[must_use]
-    pub const fn gravity(&self) -> GravityModel {
+    pub(crate) const fn gravity(&self) -> GravityModel {
         self.gravity
     }
 

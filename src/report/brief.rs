@@ -18,7 +18,6 @@ const MOST: usize = 2;
 const LINES: usize = 17;
 
 /// What the recordings of each sensor say of one another, and every fit, shortly: two of five processes in twenty lines.
-#[must_use]
 pub(crate) fn brief(
     outcomes: &[Outcome],
     diagnoses: &[Diagnosis],

@@ -60,7 +60,6 @@ struct RankingFile<'a> {
 
 impl ChoiceReport<'_> {
     /// The verdict, a sentence or two a line: the winner, what cannot be told from it, which recordings decide.
-    #[must_use]
     pub(crate) fn verdict(&self) -> Vec<String> {
         let ranking = self.ranking;
         let mut lines = vec![self.best()];
@@ -136,7 +135,6 @@ impl ChoiceReport<'_> {
     }
 
     /// A row for each candidate under a head.
-    #[must_use]
     pub(crate) fn rows(&self) -> Vec<Vec<String>> {
         let head = [
             "candidate",
@@ -153,7 +151,6 @@ impl ChoiceReport<'_> {
     }
 
     /// The table as a terminal of 120 columns and a few lines shows it: the best, and what decides.
-    #[must_use]
     pub(crate) fn brief_rows(&self) -> Vec<Vec<String>> {
         const SHOWN: usize = 9;
         let brief = |row: Vec<String>| {
@@ -205,7 +202,6 @@ impl ChoiceReport<'_> {
     }
 
     /// What the marks of the table mean.
-    #[must_use]
     pub(crate) fn legend(&self) -> String {
         let recordings = self.ranking.winner().folds.len();
         let ends: Vec<String> = self.outages.iter().map(|o| window(o.start_s, o.end_s)).collect();
@@ -218,7 +214,6 @@ impl ChoiceReport<'_> {
     }
 
     /// Recording by recording: NEES and log score of every candidate.
-    #[must_use]
     pub(crate) fn fold_rows(&self) -> Vec<Vec<String>> {
         let winner = self.ranking.winner();
         let mut head = vec!["NEES (log score, nats)".to_owned()];
@@ -233,7 +228,6 @@ impl ChoiceReport<'_> {
     }
 
     /// Which scales of which sensors decide: a line each, those of a quarter of the largest influence or more.
-    #[must_use]
     pub(crate) fn decisive_scales(&self) -> Vec<String> {
         let scales = self.influence.map_or(&[][..], |influence| &influence.scales);
         let largest = scales.iter().map(|s| s.on_error.abs()).fold(0.0, f64::max);
@@ -266,7 +260,6 @@ impl ChoiceReport<'_> {
     }
 
     /// Scale by scale under a head.
-    #[must_use]
     pub(crate) fn scale_rows(&self) -> Vec<Vec<String>> {
         let head = ["signals", "scale (s)", "% of horizontal error for 1 % of wavelet variance"];
         let row = |s: &crate::choose::ScaleInfluence| {
@@ -277,7 +270,6 @@ impl ChoiceReport<'_> {
     }
 
     /// Recording by recording under a head.
-    #[must_use]
     pub(crate) fn recording_rows(&self) -> Vec<Vec<String>> {
         let head = ["adds to the expected horizontal error (%)", "awv", "sr-awv", "dr-awv"];
         let row = |r: &crate::choose::RecordingInfluence| {
@@ -294,13 +286,11 @@ impl ChoiceReport<'_> {
     }
 
     /// `ranking.json`.
-    #[must_use]
     pub(crate) fn json(&self) -> String {
         super::json(&self.file())
     }
 
     /// The same as one of several rankings.
-    #[must_use]
     pub(crate) fn of_place(&self, name: String) -> RankedPlace {
         let mut json = serde_json::to_value(self.file()).expect("plain structs are always JSON");
         json["place"] = name.as_str().into();

@@ -6,7 +6,6 @@ use super::markdown::plain_table;
 const WIDTH: usize = 100;
 
 /// A table without lines, whose first row is its head.
-#[must_use]
 pub(crate) fn columns(rows: &[Vec<String>]) -> String {
     let widths = widths(rows);
     let line = |row: &Vec<String>| {
@@ -17,13 +16,11 @@ pub(crate) fn columns(rows: &[Vec<String>]) -> String {
 }
 
 /// The same, cut where a line would be too long, each part with the first column.
-#[must_use]
 pub(crate) fn terminal_columns(rows: &[Vec<String>]) -> String {
     cut(rows, 1, 2).iter().map(|part| columns(part)).collect::<Vec<_>>().join("\n\n")
 }
 
 /// A table in Markdown, cut where a line would be too long, each part with the first `lead` columns.
-#[must_use]
 pub(crate) fn terminal_table(rows: &[Vec<String>], lead: usize) -> String {
     cut(rows, lead, 3).iter().map(|part| plain_table(part)).collect::<Vec<_>>().join("\n\n")
 }

@@ -22,8 +22,7 @@ impl Label {
     /// From a run directory's name: `II_sr-awv` or `II/sr-awv` is scenario II, estimator SR-AWV. A name
     /// that ends in no estimator is a scenario of its own; the estimator is then the one the model was
     /// made with, if known.
-    #[must_use]
-    pub fn of(directory: &str, model_estimator: Option<&str>) -> Self {
+    pub(crate) fn of(directory: &str, model_estimator: Option<&str>) -> Self {
         let parts: Vec<&str> = directory.split('/').filter(|p| !p.is_empty() && *p != ".").collect();
         let name = parts.last().copied().unwrap_or(directory);
         let lower = name.to_lowercase();
@@ -127,8 +126,7 @@ pub struct ConsistencyRow {
 
 impl ComparisonFile {
     /// All candidates against one reference.
-    #[must_use]
-    pub fn new(reference: (&str, &Verdict), paired: bool, candidates: &[CandidateResult]) -> Self {
+    pub(crate) fn new(reference: (&str, &Verdict), paired: bool, candidates: &[CandidateResult]) -> Self {
         let own = VerdictRow { run: reference.0.to_owned(), verdict: *reference.1 };
         let others = candidates.iter().filter(|c| !c.is_reference);
         let verdicts = others.map(|c| VerdictRow { run: c.run.clone(), verdict: c.verdict });
@@ -172,7 +170,6 @@ fn rows<'a>(run: &'a str, outage: usize, comparison: &'a OutageComparison) -> im
 }
 
 /// Which filters are as good as they believe: a line a kind of verdict, the gravest first.
-#[must_use]
 pub(crate) fn verdict_lines(verdicts: &[VerdictRow]) -> Vec<String> {
     let kinds =
         [VerdictKind::Diverged, VerdictKind::Overconfident, VerdictKind::Underconfident, VerdictKind::Ok];
@@ -187,7 +184,6 @@ pub(crate) fn verdict_lines(verdicts: &[VerdictRow]) -> Vec<String> {
 }
 
 /// What the ± of the table are.
-#[must_use]
 pub(crate) fn meaning_of_intervals(candidates: &[CandidateResult]) -> &'static str {
     let mut states = candidates.iter().flat_map(|c| &c.outages).flat_map(|outage| &outage.states);
     if states.any(|state| state.calibration_half_pct.is_some()) {

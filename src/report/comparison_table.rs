@@ -9,14 +9,12 @@ use crate::simulation::REPORTED_NAMES;
 /// The paper's Table I: rows scenario × outage, columns state × estimator; each cell the signed mean ratio
 /// error with half its 95 % interval, and in brackets the mean of the absolute ratio error (%). The first
 /// row is the head; an interval below half a hundredth has one digit; `states` are indices of reported states.
-#[must_use]
 pub(crate) fn table_rows(candidates: &[CandidateResult], states: &[usize]) -> Vec<Vec<String>> {
     let heads: Vec<String> = states.iter().map(|s| REPORTED_NAMES[*s].to_owned()).collect();
     laid_out(candidates, &heads, &|candidate, outage, column| cell(candidate, outage, states[column]))
 }
 
 /// Outages by their times in the place of their numbers.
-#[must_use]
 pub(crate) fn with_times(mut rows: Vec<Vec<String>>, outages: &[(f64, f64)]) -> Vec<Vec<String>> {
     for row in rows.iter_mut().skip(1) {
         let time = row[1].parse::<usize>().ok().and_then(|k| outages.get(k - 1));
@@ -27,7 +25,6 @@ pub(crate) fn with_times(mut rows: Vec<Vec<String>>, outages: &[(f64, f64)]) -> 
 
 /// Beside Table I, in its layout: mean NEES and coverage over the outage, and (ratio − 1)·100 of the RMSE at
 /// its end with half its 95 % interval, for each of the `states`.
-#[must_use]
 pub(crate) fn consistency_rows(candidates: &[CandidateResult], states: &[usize]) -> Vec<Vec<String>> {
     let consistency = |candidate: &CandidateResult, outage: usize, _: usize| {
         let found = &candidate.outages[outage];

@@ -56,7 +56,6 @@ pub(crate) struct SignalCurves {
 
 impl SignalCurves {
     /// The curves of a signal at a rate (Hz); `edof` are the degrees of freedom of its classical variance.
-    #[must_use]
     pub(crate) fn new(
         channel: Channel,
         replicate: &Replicate,
@@ -98,7 +97,6 @@ pub(crate) struct SignalsFile {
 
 impl SignalsFile {
     /// The file of some signals.
-    #[must_use]
     pub(crate) fn new(rate_hz: f64, efficiency: f64, edof_method: &str, signals: Vec<SignalCurves>) -> Self {
         Self {
             schema_version: SCHEMA_VERSION,
@@ -200,7 +198,6 @@ pub(crate) struct ReplicateCurve {
 
 impl CurvesFile {
     /// The file of some outcomes and the groups they are of.
-    #[must_use]
     pub(crate) fn new(groups: &[Group], outcomes: &[&Outcome], settings: &Settings) -> Self {
         let replicates =
             |o: &Outcome| groups.iter().find(|g| g.scope == o.scope).map_or(&[][..], |g| &g.replicates);

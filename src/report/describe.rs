@@ -11,7 +11,6 @@ use crate::noise::{Composite, Process};
 use crate::units::DEG;
 
 /// A fit in words: a head line, a line for each process, how sure the optimum is, the remarks.
-#[must_use]
 pub(crate) fn describe(outcome: &Outcome, settings: &Settings) -> String {
     let mut lines = vec![head(outcome, settings)];
     lines.extend(outcome.ranking.iter().flat_map(|r| ranking_lines(r, settings.rate_hz)));

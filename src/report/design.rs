@@ -73,7 +73,6 @@ impl Design {
 
 impl Design {
     /// The parameter that would be known least: its name, and how well.
-    #[must_use]
     pub(crate) fn least_known(&self) -> String {
         let open = self.parameters.iter().filter(|p| p.half_width_pct.is_none()).count();
         let widest = self.parameters.iter().filter(|p| p.half_width_pct.is_some());
@@ -114,8 +113,7 @@ impl Design {
     }
 
     /// The verdict: the parameter known least, and the horizontal error.
-    #[must_use]
-    pub fn verdict(&self) -> Vec<String> {
+    pub(crate) fn verdict(&self) -> Vec<String> {
         let head = format!(
             "{} recordings of {} h; the parameter known least: {}",
             self.recordings,
@@ -131,7 +129,6 @@ fn percent(half_width: Option<f64>) -> String {
 }
 
 /// The verdict on one design, or on several.
-#[must_use]
 pub(crate) fn design_verdict(designs: &[Design]) -> String {
     if let [design] = designs {
         return design.verdict().join("\n");
@@ -142,7 +139,6 @@ pub(crate) fn design_verdict(designs: &[Design]) -> String {
 }
 
 /// Every parameter of one design, or a row for each of several; the first row is the head.
-#[must_use]
 pub(crate) fn design_rows(designs: &[Design]) -> Vec<Vec<String>> {
     if let [design] = designs { parameter_rows(design) } else { grid_rows(designs) }
 }

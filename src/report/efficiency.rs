@@ -44,7 +44,6 @@ pub struct EfficiencyRow {
 }
 
 /// All numbers, one line for each scenario, estimator and parameter (also the data of a plot).
-#[must_use]
 pub(crate) fn efficiency_csv(file: &EfficiencyFile) -> String {
     let mut text = "scenario,estimator,parameter,target,bias,bias_se,spread,rmse,rmse_se,ratio,ratio_se,zeros,without_root\n".to_owned();
     for r in &file.results {
@@ -60,7 +59,6 @@ pub(crate) fn efficiency_csv(file: &EfficiencyFile) -> String {
 }
 
 /// The table for people: rows scenario × estimator, columns the parameters.
-#[must_use]
 pub(crate) fn efficiency_table(file: &EfficiencyFile) -> String {
     let mut parameters: Vec<(&str, f64)> = Vec::new();
     for r in &file.results {

@@ -159,7 +159,6 @@ pub(crate) struct MissEntry {
 
 impl FitEntry {
     /// The entry of an outcome.
-    #[must_use]
     pub(crate) fn new(outcome: &Outcome, rate_hz: f64) -> Self {
         let fit = &outcome.fit;
         let inference = outcome.inference.as_ref();
@@ -219,7 +218,6 @@ fn parameters(outcome: &Outcome, rate_hz: f64) -> Value {
 
 impl<'a> FitsFile<'a> {
     /// The file of some outcomes.
-    #[must_use]
     pub(crate) fn new(
         outcomes: &[Outcome],
         diagnoses: &'a [Diagnosis],

@@ -59,7 +59,6 @@ impl Manifest {
     pub const SCHEMA_VERSION: u32 = 2;
 
     /// Whether a run of the one is a run of the other: all that decides the results is the same.
-    #[must_use]
     pub(crate) fn is_same_run(&self, other: &Self) -> bool {
         let inputs = |m: &Self| -> Vec<(String, String)> {
             m.inputs.iter().map(|i| (i.role.clone(), i.blake3.clone())).collect()
@@ -70,7 +69,6 @@ impl Manifest {
     }
 
     /// Whether another run would be a run of this one, had this one its seed.
-    #[must_use]
     pub(crate) fn differs_in_seed(&self, other: &Self) -> bool {
         let mut seeded = Self { seed: other.seed, ..self.clone() };
         seeded.configuration.run.seed = other.configuration.run.seed;
@@ -78,7 +76,6 @@ impl Manifest {
     }
 
     /// The hashes of the inputs of a role, in the order given.
-    #[must_use]
     pub(crate) fn hashes(&self, role: &str) -> Vec<&str> {
         self.inputs.iter().filter(|i| i.role == role).map(|i| i.blake3.as_str()).collect()
     }

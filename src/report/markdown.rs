@@ -3,13 +3,11 @@
 use comfy_table::{ContentArrangement, Table, presets};
 
 /// A table of rows, of which the first is the head.
-#[must_use]
 pub(crate) fn markdown_table(rows: &[Vec<String>]) -> String {
     table(rows, markdown)
 }
 
 /// The same for eyes: names as they are.
-#[must_use]
 pub(crate) fn plain_table(rows: &[Vec<String>]) -> String {
     table(rows, |text| text.replace(['\n', '\r'], " "))
 }
@@ -25,13 +23,11 @@ fn table(rows: &[Vec<String>], shown: impl Fn(&str) -> String) -> String {
 }
 
 /// A text in Markdown, of which no part is taken for a cell's end, a line's end or HTML.
-#[must_use]
 pub(crate) fn markdown(text: &str) -> String {
     text.replace('|', "\\|").replace('<', "&lt;").replace(['\n', '\r'], " ")
 }
 
 /// A table of rows, of which the first is the head, as CSV.
-#[must_use]
 pub(crate) fn csv_table(rows: &[Vec<String>]) -> String {
     let mut writer = csv::WriterBuilder::new().flexible(true).from_writer(Vec::new());
     let written = rows.iter().try_for_each(|row| writer.write_record(row)).and_then(|()| Ok(writer.flush()?));
@@ -40,7 +36,6 @@ pub(crate) fn csv_table(rows: &[Vec<String>]) -> String {
 }
 
 /// A table of rows, of which the first is the head, as a `tabular` of LaTeX (package booktabs), the first column to the left.
-#[must_use]
 pub(crate) fn latex_table(rows: &[Vec<String>]) -> String {
     let columns = rows.first().map_or(0, Vec::len);
     let line = |row: &Vec<String>| {

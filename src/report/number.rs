@@ -8,19 +8,16 @@ pub(super) fn shortest(x: f64) -> String {
 }
 
 /// A time of a schedule, to a hundredth of a second.
-#[must_use]
 pub(crate) fn seconds(t_s: f64) -> String {
     format!("{}", (t_s * 100.0).round() / 100.0)
 }
 
 /// A window of a schedule: `300–390 s`.
-#[must_use]
 pub(crate) fn window(start_s: f64, end_s: f64) -> String {
     format!("{}–{} s", seconds(start_s), seconds(end_s))
 }
 
 /// The square of a sensor's unit.
-#[must_use]
 pub(super) fn squared(unit: &str) -> String {
     match unit {
         "m/s²" => "m²/s⁴".to_owned(),

@@ -8,7 +8,6 @@ use crate::units::DEG;
 use std::fmt::Write as _;
 
 /// `imu.csv`: mean rates over the interval that ends at the time given.
-#[must_use]
 pub(crate) fn imu_csv(samples: &[ImuIncrement]) -> String {
     let mut text =
         "t_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2\n".to_owned();
@@ -25,7 +24,6 @@ pub(crate) fn imu_csv(samples: &[ImuIncrement]) -> String {
 }
 
 /// `gnss.csv`: fixes with their standard deviations.
-#[must_use]
 pub(crate) fn gnss_csv(fixes: &[GnssFix]) -> String {
     let has_velocity = fixes.iter().any(|f| f.velocity.is_some());
     let velocity = ",v_n_m_s,v_e_m_s,v_d_m_s,sd_vn_m_s,sd_ve_m_s,sd_vd_m_s";
@@ -53,7 +51,6 @@ pub(crate) fn gnss_csv(fixes: &[GnssFix]) -> String {
 }
 
 /// `initial.toml`: a start and how well it is known.
-#[must_use]
 pub(crate) fn initial_toml(t_s: f64, state: &NavState, sigma: &InitialSettings) -> String {
     let rpy = RollPitchYaw::from_quat(state.q_b_n);
     let v = state.v_n;

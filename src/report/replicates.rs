@@ -4,7 +4,6 @@ use crate::calibration::{Diagnosis, advice, effects};
 use crate::imu::Sensor;
 
 /// What the recordings of each sensor say of one another, in words; nothing of a single one.
-#[must_use]
 pub(crate) fn describe_replicates(diagnoses: &[Diagnosis]) -> Vec<String> {
     let of_sensor = |sensor: Sensor| {
         let mut lines = advice(diagnoses, sensor);

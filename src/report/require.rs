@@ -69,13 +69,11 @@ pub struct RankedUnit {
 
 impl RankedUnit {
     /// Whether its errors are within the limits, as far as its figures are stated.
-    #[must_use]
     pub(crate) fn is_within(&self) -> bool {
         self.worst.margin() >= 0.0
     }
 
     /// Whether it keeps the limits, by figures that are all stated.
-    #[must_use]
     pub(crate) fn is_met(&self) -> bool {
         self.is_within() && self.not_stated.is_empty()
     }
@@ -92,7 +90,6 @@ pub struct Question {
 
 impl Question {
     /// `p95_m ≤ 5 after 60 s without fixes (from 300 s on)`
-    #[must_use]
     pub(crate) fn in_words(&self) -> String {
         let first = self.outages[0];
         let places = match self.outages.as_slice() {
@@ -153,8 +150,7 @@ fn share(x: f64) -> String {
 
 impl NeededImu {
     /// What is needed, in a sentence.
-    #[must_use]
-    pub fn verdict(&self, question: &Question) -> String {
+    pub(crate) fn verdict(&self, question: &Question) -> String {
         let (from_s, to_s) = self.imu.floor_s();
         format!(
             "needed for {}: an IMU as allocated below (bias instability: the floor of the Allan deviation, here from {} s \
@@ -167,8 +163,7 @@ impl NeededImu {
     }
 
     /// The figures, and the curve of equal drift if it was asked for.
-    #[must_use]
-    pub fn tables(&self) -> Vec<Vec<Vec<String>>> {
+    pub(crate) fn tables(&self) -> Vec<Vec<Vec<String>>> {
         let head = ["figure, at most", "allocated", "share", "if alone", "others 10 × better"];
         let mut rows = vec![head.map(str::to_owned).to_vec()];
         for i in 0..IMU_PARAMETERS {
@@ -191,8 +186,7 @@ impl NeededImu {
     }
 
     /// All of it.
-    #[must_use]
-    pub fn json(&self, question: &Question) -> String {
+    pub(crate) fn json(&self, question: &Question) -> String {
         let figure = |i: usize| {
             json!({
                 "figure": ImuParameters::NAMES[i],
@@ -233,13 +227,11 @@ impl Longest {
 }
 
 /// The longest outage, in a sentence.
-#[must_use]
 pub(crate) fn longest_verdict(longest: Longest, question: &Question) -> String {
     format!("longest outage within the limits: {} ({})", longest.in_words(), question.limits_in_words())
 }
 
 /// The longest outage.
-#[must_use]
 pub(crate) fn longest_json(bridged: &Bridged, question: &Question) -> String {
     super::json(&json!({
         "schema_version": 1,
@@ -250,7 +242,6 @@ pub(crate) fn longest_json(bridged: &Bridged, question: &Question) -> String {
 }
 
 /// Whether a model keeps its limits, in a sentence.
-#[must_use]
 pub(crate) fn margins_verdict(margins: &Margins, question: &Question, longest: Longest) -> String {
     let times = readable(margins.worst.value / margins.worst.limit.most);
     let word = if margins.met() { "met" } else { "NOT met" };
@@ -263,7 +254,6 @@ pub(crate) fn margins_verdict(margins: &Margins, question: &Question, longest: L
 }
 
 /// A row for each part of the IMU.
-#[must_use]
 pub(crate) fn margins_rows(margins: &Margins) -> Vec<Vec<String>> {
     let mut rows = vec![
         ["part of the error", "share", "factor on its sigma that alone meets the limit"]
@@ -289,7 +279,6 @@ pub(crate) fn margins_rows(margins: &Margins) -> Vec<Vec<String>> {
 }
 
 /// All of it.
-#[must_use]
 pub(crate) fn margins_json(margins: &Margins, question: &Question, bridged: &Bridged) -> String {
     let group = |g: &GroupMargin| json!({ "part": g.group.name(), "share": g.share, "factor": g.factor });
     super::json(&json!({
@@ -309,7 +298,6 @@ pub(crate) fn margins_json(margins: &Margins, question: &Question, bridged: &Bri
 }
 
 /// The units of a catalogue, the best first.
-#[must_use]
 pub(crate) fn catalogue_rows(units: &[RankedUnit]) -> Vec<Vec<String>> {
     let name = units.first().map_or("", |u| u.worst.limit.quantity.name());
     // a line of a terminal has room for short heads only
@@ -335,7 +323,6 @@ pub(crate) fn catalogue_rows(units: &[RankedUnit]) -> Vec<Vec<String>> {
 }
 
 /// All of it.
-#[must_use]
 pub(crate) fn catalogue_json(units: &[RankedUnit], question: &Question) -> String {
     let unit = |u: &RankedUnit| {
         json!({

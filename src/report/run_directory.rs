@@ -17,7 +17,6 @@ pub struct OutputFile<'a> {
 
 impl OutputFile<'_> {
     /// A small file.
-    #[must_use]
     pub(crate) fn whole(name: &'static str, text: String) -> Self {
         Self { name, parts: Box::new(std::iter::once(text)) }
     }
@@ -69,7 +68,6 @@ fn digest(parts: impl IntoIterator<Item = impl AsRef<str>>) -> String {
 
 /// `summary.json`, with how fast it was found (IMU epochs a second, all runs together): its only number that the
 /// seed does not determine.
-#[must_use]
 pub(crate) fn summary_json(summary: &Summary, throughput_epochs_per_s: f64) -> String {
     #[derive(serde::Serialize)]
     struct WithThroughput<'a> {
@@ -81,7 +79,6 @@ pub(crate) fn summary_json(summary: &Summary, throughput_epochs_per_s: f64) -> S
 }
 
 /// Indented JSON with a final newline; NaN is null.
-#[must_use]
 pub(crate) fn json(value: &impl serde::Serialize) -> String {
     serde_json::to_string_pretty(value).expect("plain structs with text keys are always JSON") + "\n"
 }

@@ -8,14 +8,12 @@ use crate::scenario::Method;
 use crate::simulation::REPORTED_NAMES;
 
 /// The verdict in words.
-#[must_use]
 pub(crate) fn verdict(summary: &Summary) -> String {
     let windows: Vec<(f64, f64)> = summary.outages.iter().map(|o| (o.start_s, o.end_s)).collect();
     verdict_line(&summary.verdict, &windows, summary.runs, summary.diverged)
 }
 
 /// The summary for people, the verdict first.
-#[must_use]
 pub(crate) fn text(summary: &Summary) -> String {
     let mut text = format!("verdict: {}\n", verdict(summary));
     text += &beyond_linear(summary).map_or_else(String::new, |words| format!("{words}\n"));
@@ -56,7 +54,6 @@ pub(crate) fn text(summary: &Summary) -> String {
 }
 
 /// Where errors are too large for a linear filter, and for covariance analysis: the outage where it is worst.
-#[must_use]
 pub(crate) fn beyond_linear(summary: &Summary) -> Option<String> {
     let beyond = summary.outages.iter().filter_map(|o| Some((o, o.beyond_linear()?)));
     let (outage, share) = beyond.max_by(|a, b| a.1.total_cmp(&b.1))?;
@@ -76,7 +73,6 @@ pub(crate) fn beyond_linear(summary: &Summary) -> Option<String> {
 }
 
 /// `required p95_m<=5: NOT MET, 7.41 at the end of outage 1`
-#[must_use]
 pub(crate) fn met_line(met: &Met) -> String {
     let verdict = if met.met { "met" } else { "NOT MET" };
     let place = met.outage.map_or("over the run".to_owned(), |k| format!("at the end of outage {}", k + 1));
@@ -139,7 +135,6 @@ fn budget_table(summary: &Summary) -> String {
 }
 
 /// How horizontal position (east) and yaw at the end of the outage with the largest errors follow from each parameter.
-#[must_use]
 pub(crate) fn sensitivity_table(summary: &Summary) -> String {
     let known = summary.outages.iter().filter_map(|o| Some((o, o.sensitivity.as_ref()?)));
     let east = |o: &OutageSummary| o.rmse_end.0[1];
@@ -218,7 +213,6 @@ fn whole_run_table(summary: &Summary) -> String {
 }
 
 /// `largest z -2.31 (RMSE of yaw_deg at the end of outage 1) of 22 figures, up to 4.4 by chance; NEES z +0.52, …`
-#[must_use]
 pub(crate) fn agreement_line(a: &Agreement) -> String {
     if a.figures == 0 {
         return "too few to compare: a scatter takes two runs".to_owned();

@@ -12,7 +12,6 @@ const LEAST: f64 = 100.0;
 /// One table for all recordings: a row for each sensor and axis, its Allan deviation at one averaging time a decade (the
 /// median over the recordings), the lowest of all averaging times, and how far the robust wavelet variance is below the
 /// classical one.
-#[must_use]
 pub(crate) fn signals_digest(file: &SignalsFile) -> Vec<Vec<String>> {
     let decades = decades(file);
     let times = decades.iter().map(|i| duration(allan_time_s(&longest(file).tau_s, *i)));
@@ -40,7 +39,6 @@ pub(crate) fn signals_digest(file: &SignalsFile) -> Vec<Vec<String>> {
 }
 
 /// For each sensor and axis a title and a table: a row an averaging time, one a decade, a column a recording.
-#[must_use]
 pub(crate) fn signals_per_file(file: &SignalsFile) -> Vec<(String, Vec<Vec<String>>)> {
     let decades = decades(file);
     let table = |(sensor, axis): (&str, &str)| {
@@ -61,7 +59,6 @@ pub(crate) fn signals_per_file(file: &SignalsFile) -> Vec<(String, Vec<Vec<Strin
 }
 
 /// All scales of all signals as CSV.
-#[must_use]
 pub(crate) fn signals_csv(file: &SignalsFile) -> String {
     let mut text = "file,sensor,axis,tau_s,edof,classical_wv,classical_ci_low,classical_ci_high,robust_wv,robust_ci_low,\
                     robust_ci_high,robust_status,allan_tau_s,allan_deviation\n"
@@ -92,7 +89,6 @@ pub(crate) fn signals_csv(file: &SignalsFile) -> String {
 }
 
 /// A signal's curves as a table: rows of text, the first its head.
-#[must_use]
 pub(crate) fn signal_rows(curves: &SignalCurves) -> Vec<Vec<String>> {
     let unit = unit(&curves.sensor);
     let head = [
@@ -126,7 +122,6 @@ pub(crate) fn signal_rows(curves: &SignalCurves) -> Vec<Vec<String>> {
 }
 
 /// What a file of signals says about its intervals.
-#[must_use]
 pub(crate) fn intervals_note(edof_method: &str, tuning: &Tuning) -> String {
     let kind = match edof_method {
         "large-sample" => "large-sample degrees of freedom (eta1)",

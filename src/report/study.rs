@@ -96,7 +96,6 @@ const HORIZONTAL: [&str; 10] = [
 ];
 
 /// Columns of the table of outages.
-#[must_use]
 pub(crate) fn outage_columns() -> Vec<TableColumn> {
     let mut names: Vec<String> = ["start_s", "end_s", "duration_s"].map(str::to_owned).into();
     for prefix in ["asee_mean", "rmse_mean", "asee_end", "rmse_end"] {
@@ -123,7 +122,6 @@ pub(crate) fn outage_columns() -> Vec<TableColumn> {
 }
 
 /// One row an outage; a set without outages has no row.
-#[must_use]
 pub(crate) fn outage_rows(
     of: &ColumnResult<'_>,
     outages: &[OutageMetrics],
@@ -177,7 +175,6 @@ fn ratio_values(comparison: Option<&OutageComparison>) -> Vec<f64> {
 }
 
 /// Columns of the table of epochs.
-#[must_use]
 pub(crate) fn epoch_columns() -> Vec<TableColumn> {
     let mut names = vec!["t_s".to_owned()];
     for prefix in ["asee", "asee_std_error", "rmse", "rmse_std_error", "bias"] {
@@ -189,7 +186,6 @@ pub(crate) fn epoch_columns() -> Vec<TableColumn> {
 }
 
 /// One row an epoch.
-#[must_use]
 pub(crate) fn epoch_rows(of: &ColumnResult<'_>, epochs: &[EpochMetrics]) -> Vec<TableRow> {
     let row = |e: &EpochMetrics| {
         let mut row = keys(of);
@@ -209,7 +205,6 @@ pub(crate) fn epoch_rows(of: &ColumnResult<'_>, epochs: &[EpochMetrics]) -> Vec<
 }
 
 /// Columns of the table of runs.
-#[must_use]
 pub(crate) fn run_columns() -> Vec<TableColumn> {
     let mut names: Vec<String> = ["nis_mean", "nees_mean", "coverage"].map(str::to_owned).into();
     names.extend(["see_mean", "see_end", "error_end"].into_iter().flat_map(prefixed));
@@ -219,7 +214,6 @@ pub(crate) fn run_columns() -> Vec<TableColumn> {
 }
 
 /// One row a run and outage; a covariance analysis has none.
-#[must_use]
 pub(crate) fn run_rows(of: &ColumnResult<'_>) -> Vec<TableRow> {
     let mut rows = Vec::new();
     for run in of.measured.sampled() {
@@ -263,7 +257,6 @@ pub(crate) struct ShownCell {
 }
 
 /// The layout of the paper's Table I for one cell; `states` are indices of reported states.
-#[must_use]
 pub(crate) fn ratio_table(cell: &ShownCell, states: &[usize]) -> Vec<Vec<String>> {
     let candidate = |column: &ShownColumn| CandidateResult {
         run: column.name.clone(),
@@ -277,7 +270,6 @@ pub(crate) fn ratio_table(cell: &ShownCell, states: &[usize]) -> Vec<Vec<String>
 
 /// Whether the filters are as good as they believe: a row a cell, a column a candidate; the ratio is that of
 /// error to standard deviation in the state that is farthest off.
-#[must_use]
 pub(crate) fn verdict_table(cells: &[ShownCell]) -> Vec<Vec<String>> {
     let mut rows = vec![vec!["cell".to_owned()]];
     if let Some(cell) = cells.first() {
@@ -303,7 +295,6 @@ pub(crate) fn verdict_table(cells: &[ShownCell]) -> Vec<Vec<String>> {
 
 /// Horizontal error just before the first fix after each outage, median and (95 %) in metres: a row an
 /// outage, a column a candidate.
-#[must_use]
 pub(crate) fn drift_table(cells: &[ShownCell]) -> Vec<Vec<String>> {
     let mut rows = vec![["cell", "outage"].map(str::to_owned).to_vec()];
     if let Some(cell) = cells.first() {

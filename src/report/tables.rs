@@ -19,7 +19,6 @@ fn epoch_columns() -> Vec<String> {
 }
 
 /// `epochs.csv`: one row a reporting epoch (1 Hz), means over runs.
-#[must_use]
 pub(crate) fn epochs_csv(epochs: &[EpochMetrics]) -> String {
     let values = |all: &PerState<crate::metrics::Estimate>| all.0.map(|e| shortest(e.value));
     let row = |e: &EpochMetrics| {
@@ -34,7 +33,6 @@ pub(crate) fn epochs_csv(epochs: &[EpochMetrics]) -> String {
 
 /// `fan.csv`: quantiles of the horizontal error over time; with what covariance analysis expects of them where that stands
 /// beside runs.
-#[must_use]
 pub(crate) fn fan_csv(fan: &[FanEpoch]) -> String {
     let has_lincov = fan.iter().any(|e| e.lincov_m.is_some());
     let prefixes: &[&str] = if has_lincov { &["", "lincov_"] } else { &[""] };

@@ -26,7 +26,6 @@ const INSTANTS: u32 = 4000;
 
 impl TrajectorySeries {
     /// A trajectory at evenly spaced instants.
-    #[must_use]
     pub(crate) fn of(trajectory: &Trajectory) -> Self {
         let start = trajectory.state(trajectory.start_s());
         let step = (trajectory.end_s() - trajectory.start_s()) / f64::from(INSTANTS);
@@ -90,7 +89,6 @@ impl TrajectorySeries {
 }
 
 /// The picture; `outages` are (start, end) in seconds.
-#[must_use]
 pub(crate) fn trajectory_svg(title: &str, series: &TrajectorySeries, outages: &[(f64, f64)]) -> String {
     svg(title, &[series.map(title, outages), series.over_time(outages)])
 }

@@ -35,7 +35,6 @@ pub(crate) struct TuneResult {
 
 impl TuneResult {
     /// The verdict: how honest the filter was, with which factors it is, and what that costs.
-    #[must_use]
     pub(crate) fn verdict(&self) -> String {
         let before = format!("the {} is {}", filter_name(self.filter), judged(&self.before));
         if self.factors.iter().all(|f| (f.on_variance - 1.0).abs() < RIGHT) {
@@ -93,7 +92,6 @@ impl TuneResult {
     }
 
     /// A row for each filter under a head.
-    #[must_use]
     pub(crate) fn rows(&self) -> Vec<Vec<String>> {
         let mut head = vec!["filter".to_owned(), "NEES (9)".to_owned(), "largest RMSE/sigma".to_owned()];
         head.extend(self.before.end_s.iter().map(|t| format!("horizontal RMSE at {} s (m)", seconds(*t))));
@@ -124,7 +122,6 @@ impl TuneResult {
     }
 
     /// All of it as JSON.
-    #[must_use]
     pub(crate) fn json(&self) -> String {
         let filter = |(name, h): (&'static str, &Honesty)| FilterEntry {
             filter: name,
@@ -269,7 +266,6 @@ pub(crate) struct FactorEntry {
 
 impl FactorEntry {
     /// Of a factor.
-    #[must_use]
     pub(crate) fn of(factor: &Factor) -> Self {
         Self {
             sensor: factor.sensor.name(),

@@ -35,7 +35,6 @@ pub(crate) struct TurnOnEntry {
 
 impl TurnOnEntry {
     /// The entry of a sensor.
-    #[must_use]
     pub(crate) fn new(found: &TurnOnSpread) -> Self {
         Self {
             sensor: found.sensor.name(),
@@ -55,7 +54,6 @@ impl TurnOnEntry {
 }
 
 /// What follows from the means of one sensor, without its name.
-#[must_use]
 pub(crate) fn turn_on_remark(found: &TurnOnSpread) -> String {
     let unit = found.sensor.unit();
     let (spread, noise) = (readable(found.spread()), readable(found.noise()));
@@ -87,7 +85,6 @@ pub(crate) fn turn_on_remark(found: &TurnOnSpread) -> String {
 }
 
 /// A line a sensor; with the name of the estimator where the models of several disagree.
-#[must_use]
 pub(crate) fn turn_on_lines(found: &[TurnOnSpread]) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for one in found {

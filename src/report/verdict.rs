@@ -5,7 +5,6 @@ use crate::metrics::{ALL_STATES, StateName, Verdict, VerdictKind};
 
 /// One line: the verdict, by how much and where, the figures it rests on. `outages` are those of the
 /// experiment (start, end) in seconds; `runs` and `diverged` count its runs.
-#[must_use]
 pub(crate) fn verdict_line(verdict: &Verdict, outages: &[(f64, f64)], runs: u64, diverged: u64) -> String {
     let is_expected = verdict.independent_runs.is_infinite();
     let figures = format!(
@@ -77,7 +76,6 @@ pub(crate) fn state_in_words(name: StateName) -> &'static str {
 }
 
 /// For a line that names several runs: "NEES 1189, 34.6 × in yaw_deg".
-#[must_use]
 pub(crate) fn verdict_in_short(verdict: &Verdict) -> String {
     format!(
         "NEES {}, {} × in {}",
@@ -88,7 +86,6 @@ pub(crate) fn verdict_in_short(verdict: &Verdict) -> String {
 }
 
 /// The verdict in one word.
-#[must_use]
 pub(crate) const fn verdict_word(kind: VerdictKind) -> &'static str {
     match kind {
         VerdictKind::Ok => "consistent",

@@ -15,7 +15,6 @@ pub struct BeginsOtherwise {
 }
 
 /// A line for each recording that does not begin as it goes on.
-#[must_use]
 pub(crate) fn warm_up_lines(found: &[BeginsOtherwise], rate_hz: f64) -> Vec<String> {
     let signal = |(channel, w): &(Channel, WarmUp)| {
         let what = if w.mean { "its mean moves" } else { "its noise is another" };
@@ -39,7 +38,6 @@ fn changes(change: &Change, rate_hz: f64) -> String {
 }
 
 /// One line: what to leave out of each recording, and what that changes.
-#[must_use]
 pub(crate) fn warm_up_in_short(
     found: &[BeginsOtherwise],
     recordings: usize,

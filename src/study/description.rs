@@ -297,8 +297,7 @@ impl Study {
     }
 
     /// The candidates, one a column: its entry and, for calibrations, its estimator.
-    #[must_use]
-    pub fn candidates(&self) -> Vec<(String, usize, Option<Estimator>)> {
+    pub(crate) fn candidates(&self) -> Vec<(String, usize, Option<Estimator>)> {
         let of = |(i, e): (usize, &CandidateEntry)| match &e.calibrate {
             None => vec![(e.name.clone(), i, None)],
             Some(step) if step.estimators.len() == 1 => {
@@ -313,7 +312,6 @@ impl Study {
     }
 
     /// Whether a candidate is calibrated without the recordings that make the errors.
-    #[must_use]
     pub(crate) fn leaves_out(&self) -> bool {
         self.candidate.iter().any(CandidateEntry::leaves_out)
     }
@@ -322,7 +320,7 @@ impl Study {
     ///
     /// # Errors
     /// When no candidate has that name.
-    pub fn reference(&self) -> Result<usize, DescriptionError> {
+    pub(crate) fn reference(&self) -> Result<usize, DescriptionError> {
         let candidates = self.candidates();
         let names: Vec<(usize, &str)> = candidates.iter().map(|(name, i, _)| (*i, name.as_str())).collect();
         unique("candidate", &names)?;
@@ -335,8 +333,7 @@ impl Study {
     }
 
     /// Files that the study names: what for, and where.
-    #[must_use]
-    pub fn files(&self) -> Vec<(&'static str, &Path)> {
+    pub(crate) fn files(&self) -> Vec<(&'static str, &Path)> {
         let mut files: Vec<(&'static str, &Path)> = Vec::new();
         files.extend(self.trajectory.iter().map(|e| ("trajectory", e.file.as_path())));
         for e in &self.truth {
@@ -355,20 +352,17 @@ impl Study {
     }
 
     /// Whether runs are made.
-    #[must_use]
     pub(crate) const fn is_sampled(&self) -> bool {
         !matches!(self.method, Method::Lincov)
     }
 
     /// Runs of each cell; a covariance analysis counts as one.
-    #[must_use]
     pub(crate) const fn runs_of_cell(&self) -> u64 {
         if self.is_sampled() { self.runs } else { 1 }
     }
 
     /// Whether sums are kept at epochs outside outages too.
-    #[must_use]
-    pub fn keeps(&self, metric: Metric) -> bool {
+    pub(crate) fn keeps(&self, metric: Metric) -> bool {
         self.metrics.contains(&metric)
     }
 }

@@ -67,14 +67,12 @@ pub enum DescriptionError {
 
 impl DescriptionError {
     /// The refusal of a value.
-    #[must_use]
-    pub fn refused(key: &str, value: impl ToString, reason: impl Into<String>) -> Self {
+    pub(crate) fn refused(key: &str, value: impl ToString, reason: impl Into<String>) -> Self {
         Self::Refused { key: key.to_owned(), value: value.to_string(), reason: reason.into() }
     }
 
     /// The key to look for in the file, dotted.
-    #[must_use]
-    pub fn key(&self) -> String {
+    pub(crate) fn key(&self) -> String {
         match self {
             Self::Refused { key, .. } | Self::NotOne { key, .. } => key.clone(),
             Self::Empty { axis } => axis.clone(),
@@ -87,8 +85,7 @@ impl DescriptionError {
     }
 
     /// What to do about it.
-    #[must_use]
-    pub fn hint(&self) -> Option<String> {
+    pub(crate) fn hint(&self) -> Option<String> {
         match self {
             Self::Empty { axis } if axis.contains('[') => Some("a list without values makes no cell".into()),
             Self::Empty { axis } => Some(format!("add a [[{axis}]] to the study")),

@@ -155,7 +155,6 @@ impl From<FileError> for StudyError {
 
 impl StudyError {
     /// Whether contents or the request are at fault (rather than the machine).
-    #[must_use]
     pub(crate) fn is_usage(&self) -> bool {
         match self {
             Self::File(e) => !e.is_system(),
@@ -166,7 +165,6 @@ impl StudyError {
     }
 
     /// What to do about it.
-    #[must_use]
     pub(crate) fn remedy(&self) -> Option<Remedy> {
         match self {
             Self::File(e) => e.hint().map(Remedy::Advice),

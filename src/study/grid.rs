@@ -59,7 +59,7 @@ impl Grid {
     ///
     /// # Errors
     /// When its outage sets are refused.
-    pub fn new(
+    pub(crate) fn new(
         study: &Study,
         scenarios: &[Scenario],
         gnss: &[GnssSettings],
@@ -91,19 +91,11 @@ impl Grid {
     }
 
     /// Number of cells.
-    #[must_use]
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.per_trajectory().saturating_mul(self.trajectories.len())
     }
 
-    /// Whether there is no cell.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
     /// Cells of each trajectory.
-    #[must_use]
     pub(crate) fn per_trajectory(&self) -> usize {
         [self.truths.len(), self.scenarios.len(), self.gnss.len(), self.outages.len()]
             .into_iter()
@@ -111,8 +103,7 @@ impl Grid {
     }
 
     /// A cell by its position; the last axis (outages) is the fastest.
-    #[must_use]
-    pub fn cell(&self, index: usize) -> Cell {
+    pub(crate) fn cell(&self, index: usize) -> Cell {
         let mut rest = index;
         let mut digit = |base: usize| {
             let digit = rest % base;
@@ -127,8 +118,7 @@ impl Grid {
     }
 
     /// The names of a cell, in the order trajectory, truth, scenario, gnss, outages.
-    #[must_use]
-    pub fn names(&self, cell: Cell) -> [&str; 5] {
+    pub(crate) fn names(&self, cell: Cell) -> [&str; 5] {
         [
             &self.trajectories[cell.trajectory],
             &self.truths[cell.truth],
@@ -139,7 +129,6 @@ impl Grid {
     }
 
     /// The names of a cell on those axes that have more than one, in words.
-    #[must_use]
     pub(crate) fn short_name(&self, cell: Cell) -> String {
         let sizes = [
             self.trajectories.len(),
@@ -154,8 +143,7 @@ impl Grid {
     }
 
     /// The resolved scenario of a cell, without runs.
-    #[must_use]
-    pub fn scenario(&self, cell: Cell, seed: u64) -> Scenario {
+    pub(crate) fn scenario(&self, cell: Cell, seed: u64) -> Scenario {
         let mut scenario = self.scenarios[cell.scenario].1.clone();
         if let Some(gnss) = &self.gnss[cell.gnss].1 {
             scenario.gnss = gnss.clone();
@@ -171,8 +159,7 @@ impl Grid {
     }
 
     /// What the true IMU of a scenario has and a filter does not expect ([`Scenario::doubts`]), each once.
-    #[must_use]
-    pub fn doubts(&self) -> Vec<String> {
+    pub(crate) fn doubts(&self) -> Vec<String> {
         let mut found: Vec<String> = Vec::new();
         for (name, scenario) in &self.scenarios {
             for column in &self.columns {
@@ -190,8 +177,7 @@ impl Grid {
     }
 
     /// The filter of a column in a cell.
-    #[must_use]
-    pub fn filter(&self, cell: Cell, column: &Column) -> FilterStates {
+    pub(crate) fn filter(&self, cell: Cell, column: &Column) -> FilterStates {
         column.filter.unwrap_or(self.scenarios[cell.scenario].1.filter.states)
     }
 }

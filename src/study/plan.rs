@@ -65,8 +65,7 @@ pub enum Kept {
 
 impl Kept {
     /// What the metrics of a study need.
-    #[must_use]
-    pub fn of(study: &Study) -> Self {
+    pub(crate) fn of(study: &Study) -> Self {
         if study.keeps(Metric::Epochs) {
             Self::AllEpochs
         } else if study.keeps(Metric::Ratios) {
@@ -105,13 +104,13 @@ struct CellKey<'a> {
 
 impl Plan {
     /// Version of the layout.
-    pub const SCHEMA_VERSION: u32 = 2;
+    pub(crate) const SCHEMA_VERSION: u32 = 2;
 
     /// The grid of the plan.
     ///
     /// # Errors
     /// When the study's outage sets are refused.
-    pub fn grid(&self) -> Result<Grid, DescriptionError> {
+    pub(crate) fn grid(&self) -> Result<Grid, DescriptionError> {
         Grid::new(&self.study, &self.scenarios, &self.gnss)
     }
 
@@ -122,14 +121,12 @@ impl Plan {
     }
 
     /// What units keep of the runs.
-    #[must_use]
-    pub fn kept(&self) -> Kept {
+    pub(crate) fn kept(&self) -> Kept {
         Kept::of(&self.study)
     }
 
     /// Runs of each cell; a covariance analysis counts as one.
-    #[must_use]
-    pub const fn runs(&self) -> u64 {
+    pub(crate) const fn runs(&self) -> u64 {
         self.study.runs_of_cell()
     }
 
@@ -140,7 +137,7 @@ impl Plan {
     }
 
     /// All units, in cell and run order.
-    pub fn units<'a>(&'a self, grid: &'a Grid) -> impl Iterator<Item = Unit> + 'a {
+    pub(crate) fn units<'a>(&'a self, grid: &'a Grid) -> impl Iterator<Item = Unit> + 'a {
         let of_cell = move |cell: usize| {
             let trajectory = grid.cell(cell).trajectory;
             let size = self.unit_runs[trajectory].max(1);
@@ -162,20 +159,17 @@ impl Plan {
 
     /// Processor time of a unit by the estimate (s). Runs are computed as many at a time as there are lanes: a unit of
     /// one run lasts as long as one of eight.
-    #[must_use]
     pub(crate) fn unit_s(&self, grid: &Grid, unit: Unit) -> f64 {
         let run_s = self.estimate.run_s.get(grid.cell(unit.cell).trajectory).copied().unwrap_or(0.0);
         run_s * unit.runs.next_multiple_of(self.lanes()) as f64
     }
 
     /// Runs that are computed together.
-    #[must_use]
-    pub const fn lanes(&self) -> u64 {
+    pub(crate) const fn lanes(&self) -> u64 {
         if self.study.is_sampled() { LANES as u64 } else { 1 }
     }
 
     /// Hash of everything that decides the bytes of a cell's units.
-    #[must_use]
     pub(crate) fn cell_hash(&self, grid: &Grid, cell: Cell) -> blake3::Hash {
         let scenario = grid.scenario(cell, self.seed);
         let key = CellKey {
@@ -197,7 +191,6 @@ impl Plan {
     }
 
     /// The name of a unit: hash of its cell's hash and its run range, 32 hexadecimal digits.
-    #[must_use]
     pub(crate) fn unit_id(cell_hash: &blake3::Hash, unit: Unit) -> String {
         let mut hasher = blake3::Hasher::new();
         hasher.update(cell_hash.as_bytes());
@@ -219,8 +212,7 @@ impl Plan {
     }
 
     /// The plan's own name: hash of everything but the estimate.
-    #[must_use]
-    pub fn id(&self) -> String {
+    pub(crate) fn id(&self) -> String {
         let bare = Self { estimate: Estimate::default(), ..self.clone() };
         let json = serde_json::to_vec(&bare).expect("plain structs are always JSON");
         blake3::hash(&json).to_hex()[..16].to_owned()

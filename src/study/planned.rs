@@ -60,13 +60,11 @@ impl Planned {
     }
 
     /// Processor time of all units by the plan's probe (s).
-    #[must_use]
     pub(crate) fn processor_s(&self) -> f64 {
         self.plan.units(&self.grid).map(|unit| self.plan.unit_s(&self.grid, unit)).sum()
     }
 
     /// What the longest unit takes by the plan's probe (s) on so many threads.
-    #[must_use]
     pub(crate) fn longest_unit_s(&self, threads: u64) -> f64 {
         let wall_s = |unit: Unit| {
             let batches = unit.runs.div_ceil(self.plan.lanes());
@@ -117,7 +115,6 @@ impl Planned {
     }
 
     /// How many unit files are not of this plan, and where.
-    #[must_use]
     pub(crate) fn foreign_units(&self, status: &Status) -> Option<Remark> {
         let first = status.foreign.first()?;
         let example = unit_file::path(&self.directory, first);

@@ -29,7 +29,7 @@ impl Material<'_> {
     ///
     /// # Errors
     /// When spread or contamination do not belong to the model.
-    pub fn recordings(&self) -> Result<Vec<Recording>, PrepareError> {
+    pub(crate) fn recordings(&self) -> Result<Vec<Recording>, PrepareError> {
         let channels = channels(&self.step.axes)?;
         let imu = VirtualImu {
             model: self.model,

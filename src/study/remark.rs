@@ -92,7 +92,6 @@ pub enum Remark {
 
 impl Remark {
     /// How much it matters.
-    #[must_use]
     pub(crate) const fn importance(&self) -> Importance {
         match self {
             Self::InputRead(_) => Importance::Detail,

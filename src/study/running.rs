@@ -21,7 +21,7 @@ pub struct Shard {
 
 impl Shard {
     /// All units.
-    pub const ALL: Self = Self { index: 0, count: 1 };
+    pub(crate) const ALL: Self = Self { index: 0, count: 1 };
 
     /// One of `count`, from 0.
     #[must_use]
@@ -30,14 +30,12 @@ impl Shard {
     }
 
     /// Which of them, and how many there are.
-    #[must_use]
-    pub const fn parts(self) -> (u64, u64) {
+    pub(crate) const fn parts(self) -> (u64, u64) {
         (self.index, self.count)
     }
 
     /// Whether a unit belongs to it.
-    #[must_use]
-    pub const fn has(self, unit: usize) -> bool {
+    pub(crate) const fn has(self, unit: usize) -> bool {
         unit as u64 % self.count == self.index
     }
 }

@@ -14,8 +14,7 @@ pub struct CellSums {
 
 impl CellSums {
     /// Adds the next unit; `false` (and nothing done) if it is not the next one or has another form.
-    #[must_use]
-    pub fn add(&mut self, unit: UnitResult) -> bool {
+    pub(crate) fn add(&mut self, unit: UnitResult) -> bool {
         if unit.first != self.runs {
             return false;
         }

@@ -32,8 +32,7 @@ pub struct UnitResult {
 impl UnitResult {
     /// Whether it holds the runs of this unit of a plan, all of them, in so many columns with these outages (start and
     /// end, s).
-    #[must_use]
-    pub fn fits(&self, unit: Unit, columns: usize, outages: &[(f64, f64)]) -> bool {
+    pub(crate) fn fits(&self, unit: Unit, columns: usize, outages: &[(f64, f64)]) -> bool {
         let numbers = || unit.first..unit.first + unit.runs;
         let column_fits =
             |c: &Finding| c.windows() == outages && c.records().iter().map(|r| r.run).eq(numbers());
@@ -53,8 +52,7 @@ impl Finding {
     }
 
     /// One record a run; that which stands for all runs in a covariance analysis.
-    #[must_use]
-    pub fn records(&self) -> &[RunRecord] {
+    pub(crate) fn records(&self) -> &[RunRecord] {
         match self {
             Self::Sampled(result) => &result.runs,
             Self::Expected(expected) => std::slice::from_ref(&expected.record),
@@ -62,8 +60,7 @@ impl Finding {
     }
 
     /// Statistics of the outages.
-    #[must_use]
-    pub fn outages(&self) -> Vec<OutageMetrics> {
+    pub(crate) fn outages(&self) -> Vec<OutageMetrics> {
         match self {
             Self::Sampled(result) => metrics::outages(result),
             Self::Expected(expected) => expected.outages.clone(),
@@ -71,8 +68,7 @@ impl Finding {
     }
 
     /// Statistics of the epochs that were kept.
-    #[must_use]
-    pub fn epochs(&self) -> Vec<EpochMetrics> {
+    pub(crate) fn epochs(&self) -> Vec<EpochMetrics> {
         match self {
             Self::Sampled(result) => metrics::epochs(result),
             Self::Expected(expected) => expected.epochs.clone(),
@@ -80,8 +76,7 @@ impl Finding {
     }
 
     /// What ratios and the verdict are made of.
-    #[must_use]
-    pub fn measured(&self) -> Measured {
+    pub(crate) fn measured(&self) -> Measured {
         match self {
             Self::Sampled(result) => result.into(),
             Self::Expected(expected) => expected.into(),
@@ -101,7 +96,6 @@ impl Finding {
 
 /// Computes runs `first..first + runs`; `None` if `go_on` said no on the way. `progress` is told of runs
 /// completed.
-#[must_use]
 pub(crate) fn run_unit(
     plan: &simulation::Plan<'_>,
     (first, runs): (u64, u64),

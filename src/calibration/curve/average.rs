@@ -130,8 +130,7 @@ pub struct Replicate {
 
 impl Replicate {
     /// The wavelet variance that an estimator uses, at index level − 1.
-    #[must_use]
-    pub fn value(&self, estimator: Estimator, index: usize) -> f64 {
+    pub(crate) fn value(&self, estimator: Estimator, index: usize) -> f64 {
         if estimator.is_robust() { self.robust[index].value } else { self.classical[index] }
     }
 }

@@ -43,8 +43,7 @@ pub struct Group {
 
 impl Group {
     /// Recordings that the replicates are of.
-    #[must_use]
-    pub fn recordings(&self) -> usize {
+    pub(crate) fn recordings(&self) -> usize {
         let mut names: Vec<&str> = self.replicates.iter().map(|r| r.name.as_str()).collect();
         names.sort_unstable();
         names.dedup();

@@ -148,7 +148,7 @@ impl ModelSpec {
     ///
     /// # Errors
     /// When there is no such process or parameter.
-    pub fn parameter(&self, process: &str, parameter: &str) -> Result<ParameterRef, LimitError> {
+    pub(crate) fn parameter(&self, process: &str, parameter: &str) -> Result<ParameterRef, LimitError> {
         let labels = self.labels();
         let Some(index) = labels.iter().position(|l| l == process) else {
             let (spec, process) = (self.to_string(), process.to_owned());

@@ -73,8 +73,7 @@ impl Departure {
     }
 
     /// Of the scales that are missed, the one that noise explains least.
-    #[must_use]
-    pub fn surest(&self) -> Option<Miss> {
+    pub(crate) fn surest(&self) -> Option<Miss> {
         self.missed.iter().copied().max_by(|a, b| a.deviations.abs().total_cmp(&b.deviations.abs()))
     }
 }
@@ -96,8 +95,7 @@ impl Outcome {
     }
 
     /// First and last level of the stretch around a miss that is off to the same side.
-    #[must_use]
-    pub fn stretch(&self, around: Miss) -> (u32, u32) {
+    pub(crate) fn stretch(&self, around: Miss) -> (u32, u32) {
         let all = self.misses();
         let Some(place) = all.iter().position(|m| m.level == around.level) else {
             return (around.level, around.level);

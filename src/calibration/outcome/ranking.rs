@@ -21,8 +21,7 @@ pub struct Candidate {
 
 impl Candidate {
     /// Whether it was tested and does not describe the curve.
-    #[must_use]
-    pub fn is_rejected(&self) -> bool {
+    pub(crate) fn is_rejected(&self) -> bool {
         self.j_p_value.is_some_and(|p| p < LEVEL)
     }
 

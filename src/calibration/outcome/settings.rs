@@ -39,8 +39,7 @@ pub struct FitRange {
 
 impl FitRange {
     /// Whether a level counts at a rate (Hz); ends may be off by rounding.
-    #[must_use]
-    pub fn holds(&self, level: u32, rate_hz: f64) -> bool {
+    pub(crate) fn holds(&self, level: u32, rate_hz: f64) -> bool {
         let scale_s = f64::from(level).exp2() / rate_hz;
         scale_s >= self.from_s * (1.0 - 1e-9) && scale_s <= self.to_s * (1.0 + 1e-9)
     }

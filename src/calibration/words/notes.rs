@@ -41,7 +41,6 @@ pub fn shares(model: &Composite, levels: &[u32]) -> Vec<Share> {
 const PEAK: f64 = 3.78;
 
 /// Remarks on a fit to the average of some replicates at a rate (Hz).
-#[must_use]
 pub(crate) fn notes(outcome: &Outcome, replicates: &[Replicate], rate_hz: f64) -> Vec<String> {
     let Outcome { curve, estimator, .. } = outcome;
     let mut notes = Vec::new();

@@ -105,7 +105,6 @@ pub(crate) enum Found {
 
 impl Found {
     /// A result of this command, by whether all that decides it is the same.
-    #[must_use]
     pub(crate) const fn result(is_same: bool) -> Self {
         match is_same {
             true => Self::Same,

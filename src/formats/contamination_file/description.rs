@@ -158,7 +158,6 @@ pub(super) enum Signal {
 }
 
 /// The JSON schema of such a file.
-#[must_use]
 pub(crate) fn schema() -> serde_json::Value {
     schemars::schema_for!(Description).to_value()
 }

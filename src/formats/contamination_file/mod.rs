@@ -65,7 +65,6 @@ pub fn find(name_or_path: &str, rate_hz: f64) -> Result<Contamination, FileError
 }
 
 /// The name of a preset that was meant by what is neither a preset nor a file.
-#[must_use]
 pub(crate) fn meant(name: &str) -> Option<&'static str> {
     nearest(name, names())
 }

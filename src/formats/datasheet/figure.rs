@@ -61,12 +61,11 @@ const RATIO: Units = &[("ppm", 1.0), ("%", 1e4)];
 
 impl Figure {
     /// All of them.
-    pub const ALL: [Self; 6] =
+    pub(crate) const ALL: [Self; 6] =
         [Self::Noise, Self::Bias, Self::CorrelationTime, Self::Walk, Self::TurnOn, Self::Scale];
 
     /// The key in a catalogue entry.
-    #[must_use]
-    pub const fn key(self) -> &'static str {
+    pub(crate) const fn key(self) -> &'static str {
         match self {
             Self::Noise => "noise",
             Self::Bias => "bias",
@@ -78,8 +77,7 @@ impl Figure {
     }
 
     /// The units it may be given in.
-    #[must_use]
-    pub const fn units(self, sensor: Sensor) -> Units {
+    pub(crate) const fn units(self, sensor: Sensor) -> Units {
         match (self, sensor) {
             (Self::Noise, Sensor::Accel) => ACCEL_NOISE,
             (Self::Noise, Sensor::Gyro) => GYRO_NOISE,
@@ -132,7 +130,7 @@ impl Quantity {
     ///
     /// # Errors
     /// When there is no positive number, no unit, or one that does not fit.
-    pub fn parse(text: &str, units: Units) -> Result<Self, QuantityError> {
+    pub(crate) fn parse(text: &str, units: Units) -> Result<Self, QuantityError> {
         let given = text.trim();
         // of "0.5e-3 deg/h" the longest beginning that is a number; 'e' may begin no unit here
         let end = given.find(|c: char| !(c.is_ascii_digit() || ".+-eE".contains(c))).unwrap_or(given.len());

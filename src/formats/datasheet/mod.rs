@@ -78,7 +78,6 @@ impl Datasheet {
     }
 
     /// The figures that a noise model needs and the datasheet does not state: the model has no such noise.
-    #[must_use]
     pub(crate) fn not_stated(&self) -> Vec<String> {
         let figures = |sensor: Sensor| [Figure::Noise, Figure::Bias].map(|figure| (sensor, figure));
         let needed = Sensor::ALL.into_iter().flat_map(figures);
@@ -87,7 +86,7 @@ impl Datasheet {
     }
 
     /// Puts a figure in the place of what was known of it.
-    pub fn set(&mut self, entry: Entry) {
+    pub(crate) fn set(&mut self, entry: Entry) {
         self.entries.retain(|e| (e.sensor, e.figure) != (entry.sensor, entry.figure));
         self.entries.push(entry);
     }

@@ -23,8 +23,12 @@ pub struct CalibrationNote {
 impl CalibrationNote {
     /// The model file of the outcomes of one estimator. Channels of no group are missing in it. `curves`: BLAKE3, in
     /// hexadecimal, of the file of curves that goes beside it.
-    #[must_use]
-    pub fn model_file(&self, outcomes: &[&Outcome], settings: &Settings, curves: Option<&str>) -> ModelFile {
+    pub(crate) fn model_file(
+        &self,
+        outcomes: &[&Outcome],
+        settings: &Settings,
+        curves: Option<&str>,
+    ) -> ModelFile {
         let mut file = ModelFile::new(Model { rate_hz: settings.rate_hz, axes: Default::default() });
         file.missing = Channel::ALL.to_vec();
         for outcome in outcomes {
@@ -76,28 +80,24 @@ impl CalibrationNote {
 
 impl ModelFile {
     /// The estimator that made the model, if known.
-    #[must_use]
     pub(crate) fn estimator(&self) -> Option<String> {
         let estimator = self.provenance.as_ref()?.get("estimator")?;
         estimator.as_str().map(str::to_owned)
     }
 
     /// The largest whole number of that name that the provenance has of a fit.
-    #[must_use]
     pub(crate) fn most_of_fits(&self, key: &str) -> Option<i64> {
         let fits = self.provenance.as_ref()?.get("fits")?.as_array()?;
         fits.iter().filter_map(|fit| fit.get(key)?.as_integer()).max()
     }
 
     /// The longest averaging time (s) that the calibration saw: half its longest scale.
-    #[must_use]
-    pub fn observed_s(&self) -> Option<f64> {
+    pub(crate) fn observed_s(&self) -> Option<f64> {
         let scales = self.most_of_fits("scales").filter(|n| (1..63).contains(n))?;
         Some((scales as f64 - 1.0).exp2() / self.model.rate_hz)
     }
 
     /// The same with the turn-on biases that the recordings' means show; why or why not stands in the provenance.
-    #[must_use]
     pub(crate) fn with_turn_on<'a>(mut self, means: impl Iterator<Item = &'a TurnOnSpread>) -> Self {
         let mut turn_on = TurnOn::default();
         let mut remarks = Table::new();

@@ -24,7 +24,6 @@ impl ModelFile {
     /// The model itself, and the four with all amplitudes at one end of their intervals and all shapes (phi, beta,
     /// theta) at one end, by name. The errors of a filter are linear in every amplitude: whatever holds at both
     /// ends holds between. None where no parameter has an interval.
-    #[must_use]
     pub(crate) fn extremes(&self) -> Option<Vec<(String, Model)>> {
         if self.intervals.is_empty() {
             return None;

@@ -58,8 +58,7 @@ pub struct ModelFile {
 
 impl ModelFile {
     /// What the file at this path leaves open, in words.
-    #[must_use]
-    pub fn doubts(&self, path: &std::path::Path) -> Vec<String> {
+    pub(crate) fn doubts(&self, path: &std::path::Path) -> Vec<String> {
         let shown = path.display();
         let unsaid = |channel: &Channel| {
             format!("{shown} has no noise model for {channel}; it is taken as free of noise")
@@ -68,8 +67,7 @@ impl ModelFile {
     }
 
     /// A model of all six axes and nothing beside.
-    #[must_use]
-    pub const fn new(model: Model) -> Self {
+    pub(crate) const fn new(model: Model) -> Self {
         Self {
             model,
             missing: Vec::new(),
@@ -101,8 +99,7 @@ impl TurnOn {
     }
 
     /// One for the three axes of a sensor, with the sum of their variances (m/s² or rad/s).
-    #[must_use]
-    pub fn sigma(&self, sensor: Sensor) -> Option<f64> {
+    pub(crate) fn sigma(&self, sensor: Sensor) -> Option<f64> {
         let [x, y, z] = self.axes(sensor)?;
         // like axes keep every bit
         let alike = x.to_bits() == y.to_bits() && y.to_bits() == z.to_bits();
@@ -110,8 +107,7 @@ impl TurnOn {
     }
 
     /// The key of a sensor.
-    #[must_use]
-    pub const fn key(sensor: Sensor) -> &'static str {
+    pub(crate) const fn key(sensor: Sensor) -> &'static str {
         match sensor {
             Sensor::Accel => "accel_m_s2",
             Sensor::Gyro => "gyro_rad_s",

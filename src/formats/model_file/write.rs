@@ -17,7 +17,6 @@ pub fn write(path: &Path, file: &ModelFile, existing: Existing) -> Result<(), Fi
 }
 
 /// The text of a model file. A sensor whose three axes are alike is written once.
-#[must_use]
 pub(crate) fn to_toml(file: &ModelFile) -> String {
     let mut out = format!("schema = {SCHEMA}\nrate_hz = {:?}\n", file.model.rate_hz);
     for sensor in Sensor::ALL {

@@ -68,7 +68,6 @@ fn name_of(path: &Path) -> String {
 }
 
 /// Whether a name ends like a recording's.
-#[must_use]
 pub(crate) fn is_recording(name: &str) -> bool {
     let lower = name.to_lowercase();
     let plain = lower.strip_suffix(".gz").unwrap_or(&lower);

@@ -337,7 +337,6 @@ pub(super) fn npy_order(columns: usize) -> Option<Vec<String>> {
 }
 
 /// The name of a channel's column in files of this program.
-#[must_use]
 pub(crate) fn column_name(channel: Channel) -> String {
     let unit = match channel.sensor {
         Sensor::Accel => "m_s2",

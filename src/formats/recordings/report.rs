@@ -20,8 +20,7 @@ pub struct Report {
 
 impl Report {
     /// `8 recordings at 100 Hz, 655 s each`
-    #[must_use]
-    pub fn summary(&self) -> String {
+    pub(crate) fn summary(&self) -> String {
         let seconds = self.files.iter().map(|f| f.samples.iter().sum::<usize>() as f64 / f.rate_hz);
         let (low, high) = seconds.fold((f64::INFINITY, 0.0_f64), |(low, high), s| (low.min(s), high.max(s)));
         let rate_hz = self.files.first().map_or(f64::NAN, |f| f.rate_hz);
@@ -34,8 +33,7 @@ impl Report {
 
     /// The first two files that have samples in common, wherever these stand in them, and about which share of one is
     /// in the other (of both, where they are equally long).
-    #[must_use]
-    pub fn overlap(&self) -> Option<(&str, &str, f64)> {
+    pub(crate) fn overlap(&self) -> Option<(&str, &str, f64)> {
         let pairs =
             self.files.iter().enumerate().flat_map(|(i, b)| self.files[..i].iter().map(move |a| (a, b)));
         pairs.into_iter().find_map(|(a, b)| {
@@ -45,8 +43,7 @@ impl Report {
     }
 
     /// Every doubt, and which files have samples in common.
-    #[must_use]
-    pub fn doubts(&self) -> Vec<String> {
+    pub(crate) fn doubts(&self) -> Vec<String> {
         let common =
             self.overlap().map(|(one, other, _)| format!("{other} and {one} have samples in common"));
         self.all_warnings().into_iter().chain(common).collect()
@@ -120,7 +117,7 @@ impl FileReport {
     }
 
     /// The names of its recordings, with their samples: of several, such as stretches between gaps, `a.csv[1]`, …
-    pub fn recordings(&self) -> impl Iterator<Item = (String, usize)> + Clone {
+    pub(crate) fn recordings(&self) -> impl Iterator<Item = (String, usize)> + Clone {
         let count = self.samples.len();
         self.samples.iter().enumerate().map(move |(i, samples)| (name_of(&self.file, i, count), *samples))
     }

@@ -25,7 +25,12 @@ impl FileFormat {
     ///
     /// # Errors
     /// When the system refuses.
-    pub fn write(self, to: impl Write, rate_hz: f64, signals: &[(Channel, Vec<f64>)]) -> io::Result<()> {
+    pub(crate) fn write(
+        self,
+        to: impl Write,
+        rate_hz: f64,
+        signals: &[(Channel, Vec<f64>)],
+    ) -> io::Result<()> {
         let mut to = BufWriter::with_capacity(1 << 17, to);
         match self {
             Self::Csv => write_csv(&mut to, rate_hz, signals)?,

@@ -76,7 +76,7 @@ pub fn load(path: &Path, options: &Options) -> Result<(Trajectory, Vec<Warning>)
 ///
 /// # Errors
 /// What cannot be read at all, with its line; rows of which no stretch is usable.
-pub fn load_reference(path: &Path, options: &Options) -> Result<(Reference, Vec<Warning>), FileError> {
+pub(crate) fn load_reference(path: &Path, options: &Options) -> Result<(Reference, Vec<Warning>), FileError> {
     match parse(path, options, Numbers::Any)? {
         Parsed::Profile(trajectory) => Ok((trajectory.into(), Vec::new())),
         Parsed::Rows(rows) => rows.reference(),

@@ -206,7 +206,6 @@ struct Point {
 }
 
 /// The JSON schema of such a file.
-#[must_use]
 pub(crate) fn schema() -> serde_json::Value {
     schemars::schema_for!(Description).to_value()
 }

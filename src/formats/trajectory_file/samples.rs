@@ -229,7 +229,6 @@ pub(super) fn origin(table: &Table, options: &Options) -> Result<[f64; 3], Error
 }
 
 /// An origin as it is written, `LAT_DEG,LON_DEG,H_M`: latitude, longitude (rad), height (m).
-#[must_use]
 pub(crate) fn parse_origin(text: &str) -> Option<[f64; 3]> {
     let numbers: Option<Vec<f64>> = text.split(',').map(|x| x.trim().parse().ok()).collect();
     match numbers?[..] {

@@ -45,7 +45,7 @@ pub struct BiasGroup {
 impl BiasGroup {
     /// A constant that is not known: the same for all time, with this standard deviation on each axis.
     #[must_use]
-    pub const fn constant(sigma: f64) -> Self {
+    pub(crate) const fn constant(sigma: f64) -> Self {
         Self { phi: DVec3::ONE, innovation: DVec3::ZERO, initial: DVec3::splat(sigma * sigma) }
     }
 
@@ -63,7 +63,7 @@ impl BiasGroup {
     /// correlation time and variance, a random walk its growth. A coefficient ≤ 0 belongs to no process in
     /// continuous time and is left as it is.
     #[must_use]
-    pub fn over(&self, ratio: f64) -> Self {
+    pub(crate) fn over(&self, ratio: f64) -> Self {
         let axis = |i: usize| match self.phi[i] {
             phi if phi >= 1.0 => (phi, self.innovation[i] * ratio),
             phi if phi > 0.0 => {
@@ -180,7 +180,7 @@ impl Belief {
 
     /// Blocks of the covariance: R, V, PSI, the bias groups and the unknowns.
     #[must_use]
-    pub fn blocks(&self) -> usize {
+    pub(crate) fn blocks(&self) -> usize {
         3 + Sensor::ALL
             .map(|s| self.groups[s as usize].len() + self.unknowns[s as usize].len())
             .iter()

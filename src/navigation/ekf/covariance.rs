@@ -20,9 +20,9 @@ pub const R: usize = 0;
 /// Velocity error block (m/s, n).
 pub const V: usize = 1;
 /// Attitude error block (rad, n).
-pub const PSI: usize = 2;
+pub(crate) const PSI: usize = 2;
 /// First bias block.
-pub const BIAS: usize = 3;
+pub(crate) const BIAS: usize = 3;
 /// Navigation states.
 pub(super) const NAV: usize = 3 * BIAS;
 
@@ -81,7 +81,7 @@ impl<'a> Sources<'a> {
 impl Covariance {
     /// Zero covariance of `dim` states.
     #[must_use]
-    pub fn zeros(dim: usize) -> Self {
+    pub(crate) fn zeros(dim: usize) -> Self {
         Self { dim, p: vec![Lanes::ZERO; dim * dim], columns: [[Lanes::ZERO; NAV]; NAV] }
     }
 
@@ -94,7 +94,7 @@ impl Covariance {
     /// Element (i, j) of the matrix.
     #[inline(always)]
     #[must_use]
-    pub fn get<W: Wide>(&self, i: usize, j: usize) -> W {
+    pub(crate) fn get<W: Wide>(&self, i: usize, j: usize) -> W {
         W::load(&self.p[i.max(j) * self.dim + i.min(j)])
     }
 
@@ -241,7 +241,7 @@ impl Covariance {
 
     /// The variances of a block's three states.
     #[must_use]
-    pub fn variances(&self, block: usize) -> Vec3 {
+    pub(crate) fn variances(&self, block: usize) -> Vec3 {
         Vec3([0, 1, 2].map(|i| self.get(3 * block + i, 3 * block + i)))
     }
 
@@ -299,7 +299,7 @@ impl Covariance {
     /// Logarithm of the normal density of mean zero and this covariance at `x` (nats; the units of the density are
     /// those of the states, inverse).
     #[must_use]
-    pub fn log_density<const N: usize>(&self, states: [usize; N], x: [Lanes; N]) -> Lanes {
+    pub(crate) fn log_density<const N: usize>(&self, states: [usize; N], x: [Lanes; N]) -> Lanes {
         let (square, root_of_det) = self.whitened(states, x);
         let constant = N as f64 * std::f64::consts::TAU.ln();
         let mut density = Lanes::ZERO;

@@ -43,7 +43,7 @@ impl<L: Real> Sample<L> {
     /// From what the strapdown passed through.
     #[inline(always)]
     #[must_use]
-    pub fn new(trace: &StepTrace<L>, dt: f64) -> Self {
+    pub(crate) fn new(trace: &StepTrace<L>, dt: f64) -> Self {
         Self {
             c_dt: trace.c_b_n.scaled(L::from(dt)),
             half_f_dt: trace.dv_n * L::from(0.5),

@@ -102,7 +102,7 @@ impl Ekf {
 
     /// The same filter with other vector units, for comparison; portable where the machine lacks them.
     #[must_use]
-    pub fn at_level(self, level: Level) -> Self {
+    pub(crate) fn at_level(self, level: Level) -> Self {
         Self { level, ..self }
     }
 

@@ -50,7 +50,7 @@ impl Ekf {
     /// The bias estimate of a sensor (m/s² or rad/s): the sum of its groups and its drift.
     #[inline(always)]
     #[must_use]
-    pub fn bias_of<W: Wide>(&self, sensor: Sensor) -> Vec3<W> {
+    pub(crate) fn bias_of<W: Wide>(&self, sensor: Sensor) -> Vec3<W> {
         let mut sum = self.bias_sum::<W>(sensor);
         if let Some((block, factor)) = self.drift_term(sensor) {
             let (slope, age) = (self.estimates[block - BIAS].load::<W>(), factor.load::<W>());
@@ -63,7 +63,7 @@ impl Ekf {
 
     /// Standard deviations of that estimate on the three axes (m/s² or rad/s).
     #[must_use]
-    pub fn bias_sigma(&self, sensor: Sensor) -> Vec3 {
+    pub(crate) fn bias_sigma(&self, sensor: Sensor) -> Vec3 {
         let sources = self.sources();
         let [accel, gyro] = sources.biases;
         let blocks = if sensor == Sensor::Accel { 0..accel } else { accel..accel + gyro };

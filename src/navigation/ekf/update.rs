@@ -71,7 +71,7 @@ impl Ekf {
     /// Estimated less measured position and velocity of the antenna: metres and m/s north, east, down; the
     /// velocity zero where none is measured.
     #[must_use]
-    pub fn innovation(&self, fix: &Fix) -> [Vec3; 2] {
+    pub(crate) fn innovation(&self, fix: &Fix) -> [Vec3; 2] {
         Antenna::new(&self.nominal, self.omega_ib_b, fix.lever_arm_b).innovation(&self.nominal, fix)
     }
 

@@ -37,7 +37,7 @@ use glam::{DQuat, DVec3};
 use smoother::Tape;
 
 /// Position (m, north, east, down), velocity (m/s), roll, pitch, yaw (degrees).
-pub type Nine = [f64; 9];
+pub(crate) type Nine = [f64; 9];
 
 /// What was recorded, both in order of time.
 #[derive(Debug, Clone, Copy)]

@@ -44,7 +44,6 @@ fn sin_cos_kernel<L: Real>(x: L) -> (L, L) {
 
 /// (sin x / x, cos x) as functions of x², exact to rounding for |x| ≤ π/4.
 #[inline(always)]
-#[must_use]
 pub(super) fn sinc_cos_of_square<L: Real>(x2: L) -> (L, L) {
     // (−1)^k/(2k + 1)! and below (−1)^k/(2k)!: at π/4 the first terms left out are 1e-19 and 3e-21.
     const SINC: [f64; 9] = [

@@ -37,14 +37,11 @@ pub trait Real:
     + SubAssign
 {
     /// Square root.
-    #[must_use]
     fn sqrt(self) -> Self;
     /// self · factor + term: fused where the machine has it, so results differ by rounding between
     /// machines, never between runs on one.
-    #[must_use]
     fn mul_add(self, factor: Self, term: Self) -> Self;
     /// Sine and cosine of an angle in radians, |x| ≤ 2^20.
-    #[must_use]
     #[inline(always)]
     fn sin_cos(self) -> (Self, Self) {
         elementary::sin_cos(self)
@@ -75,7 +72,7 @@ pub struct Lanes(pub [f64; LANES]);
 
 impl Lanes {
     /// All lanes zero.
-    pub const ZERO: Self = Self([0.0; LANES]);
+    pub(crate) const ZERO: Self = Self([0.0; LANES]);
 
     /// The same value in every lane.
     #[inline(always)]

@@ -13,8 +13,7 @@ impl Vec3 {
     pub const ZERO: Self = Self([Lanes::ZERO; 3]);
 
     /// The vector of one lane.
-    #[must_use]
-    pub fn lane(&self, i: usize) -> glam::DVec3 {
+    pub(crate) fn lane(&self, i: usize) -> glam::DVec3 {
         glam::DVec3::new(self.0[0][i], self.0[1][i], self.0[2][i])
     }
 
@@ -27,14 +26,13 @@ impl Vec3 {
 
     /// Into registers.
     #[inline(always)]
-    #[must_use]
-    pub fn load<W: Wide>(&self) -> Vec3<W> {
+    pub(crate) fn load<W: Wide>(&self) -> Vec3<W> {
         Vec3([W::load(&self.0[0]), W::load(&self.0[1]), W::load(&self.0[2])])
     }
 
     /// From registers.
     #[inline(always)]
-    pub fn store<W: Wide>(&mut self, v: Vec3<W>) {
+    pub(crate) fn store<W: Wide>(&mut self, v: Vec3<W>) {
         for i in 0..3 {
             v.0[i].store(&mut self.0[i]);
         }
@@ -51,8 +49,7 @@ impl<L: Real> Vec3<L> {
 
     /// Cross product.
     #[inline(always)]
-    #[must_use]
-    pub fn cross(self, b: Self) -> Self {
+    pub(crate) fn cross(self, b: Self) -> Self {
         let (a, b) = (self.0, b.0);
         let minor = |i: usize, j: usize| a[i].mul_add(b[j], -(a[j] * b[i]));
         Self([minor(1, 2), minor(2, 0), minor(0, 1)])
@@ -60,15 +57,13 @@ impl<L: Real> Vec3<L> {
 
     /// Scalar product.
     #[inline(always)]
-    #[must_use]
-    pub fn dot(self, b: Self) -> L {
+    pub(crate) fn dot(self, b: Self) -> L {
         dot3(&self.0, &b)
     }
 
     /// self · s + term.
     #[inline(always)]
-    #[must_use]
-    pub fn mul_add(self, s: L, term: Self) -> Self {
+    pub(crate) fn mul_add(self, s: L, term: Self) -> Self {
         let (a, t) = (self.0, term.0);
         Self([a[0].mul_add(s, t[0]), a[1].mul_add(s, t[1]), a[2].mul_add(s, t[2])])
     }
@@ -141,7 +136,6 @@ impl Mat3 {
 impl<L: Real> Mat3<L> {
     /// The cross-product matrix \[v×\].
     #[inline(always)]
-    #[must_use]
     pub(crate) fn skew(v: Vec3<L>) -> Self {
         let z = L::from(0.0);
         Self([[z, -v[2], v[1]], [v[2], z, -v[0]], [-v[1], v[0], z]])
@@ -149,8 +143,7 @@ impl<L: Real> Mat3<L> {
 
     /// Every element times s.
     #[inline(always)]
-    #[must_use]
-    pub fn scaled(mut self, s: L) -> Self {
+    pub(crate) fn scaled(mut self, s: L) -> Self {
         for row in &mut self.0 {
             for value in row {
                 *value = *value * s;
@@ -202,8 +195,7 @@ pub struct Quat<L = Lanes> {
 
 impl Quat {
     /// The rotation of one lane.
-    #[must_use]
-    pub fn lane(&self, i: usize) -> glam::DQuat {
+    pub(crate) fn lane(&self, i: usize) -> glam::DQuat {
         let v = self.v.lane(i);
         glam::DQuat::from_xyzw(v.x, v.y, v.z, self.w[i])
     }
@@ -216,14 +208,13 @@ impl Quat {
 
     /// Into registers.
     #[inline(always)]
-    #[must_use]
-    pub fn load<W: Wide>(&self) -> Quat<W> {
+    pub(crate) fn load<W: Wide>(&self) -> Quat<W> {
         Quat { w: W::load(&self.w), v: self.v.load() }
     }
 
     /// From registers.
     #[inline(always)]
-    pub fn store<W: Wide>(&mut self, q: Quat<W>) {
+    pub(crate) fn store<W: Wide>(&mut self, q: Quat<W>) {
         q.w.store(&mut self.w);
         self.v.store(q.v);
     }
@@ -231,15 +222,13 @@ impl Quat {
 
 impl<L: Real> Quat<L> {
     /// The same rotation in every lane.
-    #[must_use]
     #[inline(always)]
-    pub fn splat(q: glam::DQuat) -> Self {
+    pub(crate) fn splat(q: glam::DQuat) -> Self {
         Self { w: L::from(q.w), v: Vec3::splat(q.xyz()) }
     }
 
     /// The rotation by a rotation vector of at most π/2 radians.
     #[inline(always)]
-    #[must_use]
     pub(crate) fn from_rotation_vector(phi: Vec3<L>) -> Self {
         let half = phi * L::from(0.5);
         // sin(θ/2)/(θ/2) as a series in θ²: no division by θ, and so no branch for a rotation of zero.
@@ -249,8 +238,7 @@ impl<L: Real> Quat<L> {
 
     /// One Newton step towards unit length: enough after each product of unit quaternions.
     #[inline(always)]
-    #[must_use]
-    pub fn renormalised(self) -> Self {
+    pub(crate) fn renormalised(self) -> Self {
         // 1/√x ≈ (3 − x)/2 near 1: an error ε of the norm becomes 3ε²/2.
         let scale = (self.w * self.w + self.v.dot(self.v)) * -0.5 + 1.5;
         Self { w: self.w * scale, v: self.v * scale }

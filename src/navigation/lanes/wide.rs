@@ -6,7 +6,6 @@ use super::{Lanes, Real};
 /// Eight lanes as a kernel computes with them.
 pub trait Wide: Real {
     /// From memory.
-    #[must_use]
     fn load(lanes: &Lanes) -> Self;
     /// To memory.
     fn store(self, lanes: &mut Lanes);

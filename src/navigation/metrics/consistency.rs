@@ -16,8 +16,7 @@ impl Band {
     const NONE: Self = Self { lower: f64::NAN, upper: f64::NAN };
 
     /// Whether a value lies in the band, its ends included.
-    #[must_use]
-    pub fn contains(&self, value: f64) -> bool {
+    pub(crate) fn contains(&self, value: f64) -> bool {
         self.lower <= value && value <= self.upper
     }
 }
@@ -31,7 +30,6 @@ pub fn chi_square_band(dof: usize, count: f64) -> Band {
 
 /// The same with probability `tail` on each side. `count` need not be whole: so many independent values the
 /// mean is worth.
-#[must_use]
 pub(crate) fn chi_square_interval(dof: usize, count: f64, tail: f64) -> Band {
     if dof == 0 || count.is_nan() || count <= 0.0 {
         return Band::NONE;
@@ -55,7 +53,6 @@ fn chi_square_quantile(dof: f64, p: f64) -> f64 {
 }
 
 /// The band of the share of `count` independent runs that a region of probability `level` covers.
-#[must_use]
 pub(crate) fn coverage_band(level: f64, count: f64) -> Band {
     let whole = count as u64;
     match Binomial::new(level, whole) {

@@ -70,8 +70,7 @@ pub struct Accuracy {
 
 impl Accuracy {
     /// Over some epochs. The standard errors are upper bounds: as if all epochs erred together.
-    #[must_use]
-    pub fn over<'a>(epochs: impl Iterator<Item = &'a EpochMetrics> + Clone) -> Self {
+    pub(crate) fn over<'a>(epochs: impl Iterator<Item = &'a EpochMetrics> + Clone) -> Self {
         let n = epochs.clone().count() as f64;
         let mean = |of: &dyn Fn(&EpochMetrics) -> Estimate| Estimate {
             value: epochs.clone().map(|e| of(e).value).sum::<f64>() / n,

@@ -43,8 +43,7 @@ impl Estimate {
     }
 
     /// The square root, its standard error by linearisation: that of the square over twice the root.
-    #[must_use]
-    pub fn root(self) -> Self {
+    pub(crate) fn root(self) -> Self {
         let value = self.value.sqrt();
         let std_error = if value > 0.0 { self.std_error / (2.0 * value) } else { self.std_error };
         Self { value, std_error }

@@ -39,7 +39,6 @@ impl QuadraticForm {
     }
 
     /// eᵀ e for an error e of this covariance and mean.
-    #[must_use]
     pub(crate) fn of_square(covariance: &DMatrix<f64>, mean: &[f64]) -> Self {
         let eigen = covariance.clone().symmetric_eigen();
         let largest = eigen.eigenvalues.iter().copied().fold(0.0, f64::max);
@@ -58,7 +57,6 @@ impl QuadraticForm {
     }
 
     /// eᵀ P⁻¹ e for an error e of this covariance and mean; none where `p` is not positive definite.
-    #[must_use]
     pub(crate) fn of_normalised(p: &DMatrix<f64>, covariance: &DMatrix<f64>, mean: &[f64]) -> Option<Self> {
         let factor = p.clone().cholesky()?.l();
         let whiten = |m: &DMatrix<f64>| factor.solve_lower_triangular(m);
@@ -70,14 +68,12 @@ impl QuadraticForm {
     }
 
     /// Expectation, c + Σ w (1 + d²).
-    #[must_use]
-    pub fn mean(&self) -> f64 {
+    pub(crate) fn mean(&self) -> f64 {
         self.certain + self.terms.iter().map(|(w, d)| w * (1.0 + d * d)).sum::<f64>()
     }
 
     /// P(Q ≤ x): the inversion of [Imhof](crate::bibliography::Imhof61).
-    #[must_use]
-    pub fn cdf(&self, x: f64) -> f64 {
+    pub(crate) fn cdf(&self, x: f64) -> f64 {
         let x = x - self.certain;
         if x <= 0.0 || self.terms.is_empty() {
             return f64::from(u8::from(x >= 0.0 && self.terms.is_empty()));
@@ -159,8 +155,7 @@ impl QuadraticForm {
     }
 
     /// The x with P(Q ≤ x) = `probability`, to 1e-12 of itself.
-    #[must_use]
-    pub fn quantile(&self, probability: f64) -> f64 {
+    pub(crate) fn quantile(&self, probability: f64) -> f64 {
         let mean = self.mean();
         if mean.is_nan() || self.terms.is_empty() {
             return mean;
@@ -183,7 +178,6 @@ impl QuadraticForm {
 
     /// E √Q = π^(−1/2) ∫ (1 − φ(u²)) du/u², with u = e^y by the trapezoidal rule, whose error is e^(−2π²), 3e-9, at most:
     /// that of a certain Q, whose transform grows beyond an imaginary part of π/4.
-    #[must_use]
     pub(crate) fn mean_root(&self) -> f64 {
         // In units of its mean Q is about 1, and the fixed range of y holds the integrand of any Q.
         let scale = self.mean();

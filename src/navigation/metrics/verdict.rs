@@ -114,8 +114,7 @@ pub struct OutageVerdict {
 impl OutageVerdict {
     /// From the records of the runs, as [`Verdict::of`]: with the same limits, so that no outage is called wrong
     /// where the filter is not. A run that diverged did so in every outage, since nobody knows when.
-    #[must_use]
-    pub fn of(runs: &[RunRecord], outages: usize, independent_windows: Option<f64>) -> Vec<Self> {
+    pub(crate) fn of(runs: &[RunRecord], outages: usize, independent_windows: Option<f64>) -> Vec<Self> {
         let kept: Vec<&RunRecord> = runs.iter().filter(|r| !r.diverged).collect();
         let statistics = Evidence { runs: &kept, windows: independent_windows }.statistics(outages);
         let independent_runs = independent_windows.unwrap_or(f64::INFINITY).min(kept.len() as f64);
@@ -124,8 +123,7 @@ impl OutageVerdict {
     }
 
     /// From the run whose squares are the expected ones, as [`Verdict::expected`].
-    #[must_use]
-    pub fn expected(record: &RunRecord) -> Vec<Self> {
+    pub(crate) fn expected(record: &RunRecord) -> Vec<Self> {
         let statistics = Evidence { runs: &[record], windows: None }.statistics(record.outages.len());
         // Nothing is left to chance: the limits of significance close on 1, and the tolerance alone decides.
         Judge { limits: [(1.0, 1.0); 2] }.outages(&statistics, record.outages.len(), false)
@@ -148,8 +146,7 @@ impl Verdict {
 
     /// From the run whose squares are the expected ones: nothing is left to chance, and what is off by more than
     /// the tolerance is wrong.
-    #[must_use]
-    pub fn expected(record: &RunRecord) -> Self {
+    pub(crate) fn expected(record: &RunRecord) -> Self {
         let evidence = Evidence { runs: &[record], windows: None };
         let statistics = evidence.statistics(record.outages.len());
         let judge = Judge { limits: [(1.0, 1.0); 2] };

@@ -112,11 +112,6 @@ impl<'a> Course<'a> {
         Ok(Self { trajectory, places })
     }
 
-    /// The outages.
-    pub fn outages(&self) -> impl Iterator<Item = Outage> {
-        self.places.iter().map(|p| p.outage[0])
-    }
-
     /// Errors at the outage's end, at each place, of the filter that knows the model.
     ///
     /// # Errors

@@ -18,7 +18,7 @@ pub struct Group {
 
 impl Group {
     /// All four.
-    pub const ALL: [Self; 4] = [
+    pub(crate) const ALL: [Self; 4] = [
         Self { sensor: Sensor::Accel, correlated: false },
         Self { sensor: Sensor::Accel, correlated: true },
         Self { sensor: Sensor::Gyro, correlated: false },

@@ -23,7 +23,7 @@ impl BaroSettings {
     ///
     /// # Errors
     /// The first key whose value is refused.
-    pub fn validate(&self) -> Result<(), SettingError> {
+    pub(crate) fn validate(&self) -> Result<(), SettingError> {
         require_positive("rate_hz", &[self.rate_hz])?;
         require_positive("sigma_m", &[self.sigma_m])
     }
@@ -38,7 +38,6 @@ pub(crate) struct BaroNoise {
 
 impl BaroNoise {
     /// The noise of run `key.run`.
-    #[must_use]
     pub(crate) fn new(settings: &BaroSettings, key: StreamKey<'_>) -> Self {
         let stream = StreamKey { source: "baro", process: "height", ..key }.generator();
         Self { stream, sigma_m: settings.sigma_m }

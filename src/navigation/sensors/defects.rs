@@ -59,7 +59,7 @@ impl ImuSettings {
     ///
     /// # Errors
     /// The first key whose value is refused.
-    pub fn validate(&self) -> Result<(), SettingError> {
+    pub(crate) fn validate(&self) -> Result<(), SettingError> {
         require_positive("rate_hz", &[self.rate_hz])?;
         if self.rate_hz > MAX_RATE_HZ {
             let requirement = format!("at most {MAX_RATE_HZ} samples a second");
@@ -101,7 +101,6 @@ impl ImuSettings {
     }
 
     /// Whether the true IMU has none of them.
-    #[must_use]
     pub(crate) fn is_ideal(&self) -> bool {
         let [accel, gyro] = Sensor::ALL.map(|sensor| self.deviations(sensor));
         [accel.0, accel.1, gyro.0, gyro.1, self.misalignment_rad].iter().all(|x| *x == 0.0)
@@ -119,7 +118,6 @@ pub(crate) struct Defects {
 
 impl Defects {
     /// The defects of run `key.run`, drawn from their standard deviations.
-    #[must_use]
     pub(crate) fn draw(settings: &ImuSettings, key: StreamKey<'_>) -> Self {
         let defects_of = |sensor: Sensor| {
             let source = format!("{}.defects", sensor.name());
@@ -146,7 +144,6 @@ impl Defects {
     }
 
     /// The error of a true sample, bias + matrix · sample: accelerometer (m/s²), gyroscope (rad/s).
-    #[must_use]
     pub(crate) fn error(&self, truth: &ImuSample) -> [DVec3; 2] {
         let [accel, gyro] = self.matrix;
         [self.bias[0] + accel * truth.f_ib_b, self.bias[1] + gyro * truth.omega_ib_b]

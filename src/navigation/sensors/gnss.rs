@@ -73,8 +73,7 @@ impl GnssSettings {
     }
 
     /// Components of one fix: 3 (position) or 6 (and velocity).
-    #[must_use]
-    pub const fn components(&self) -> usize {
+    pub(crate) const fn components(&self) -> usize {
         if self.vel_sigma_m_s.is_some() { 6 } else { 3 }
     }
 }
@@ -114,7 +113,6 @@ impl Correlated {
 
 impl GnssNoise {
     /// The noise of run `key.run`.
-    #[must_use]
     pub(crate) fn new(settings: &GnssSettings, key: StreamKey<'_>) -> Self {
         const COMPONENTS: [&str; 6] = ["pos_n", "pos_e", "pos_d", "vel_n", "vel_e", "vel_d"];
         let streams = COMPONENTS.map(|process| StreamKey { source: "gnss", process, ..key }.generator());

@@ -63,7 +63,7 @@ pub enum TruthError {
 
 /// What makes the errors, ready to be drawn from.
 #[derive(Debug, Clone)]
-pub enum ErrorSource<'a> {
+pub(crate) enum ErrorSource<'a> {
     /// Synthesised from a model.
     Model(&'a Model),
     /// Windows of recordings.
@@ -75,7 +75,7 @@ impl<'a> Truth<'a> {
     ///
     /// # Errors
     /// As [`check`](Self::check).
-    pub fn source(&self, imu_hz: f64, samples: usize) -> Result<ErrorSource<'a>, TruthError> {
+    pub(crate) fn source(&self, imu_hz: f64, samples: usize) -> Result<ErrorSource<'a>, TruthError> {
         self.check(imu_hz, samples)?;
         Ok(match self {
             Self::Model(model) => ErrorSource::Model(model),
@@ -89,7 +89,7 @@ impl Truth<'_> {
     ///
     /// # Errors
     /// What is missing, and by how much.
-    pub fn check(&self, imu_hz: f64, samples: usize) -> Result<(), TruthError> {
+    pub(crate) fn check(&self, imu_hz: f64, samples: usize) -> Result<(), TruthError> {
         match self {
             Self::Model(model) if same_rate(model.rate_hz, imu_hz) => Ok(()),
             Self::Model(model) => Err(TruthError::ModelRate { model_hz: model.rate_hz, imu_hz }),
@@ -104,8 +104,7 @@ impl Truth<'_> {
 impl Truth<'_> {
     /// How many windows of `samples` samples the recordings hold side by side: runs beyond these share noise
     /// with others. None for a model, which gives every run noise of its own.
-    #[must_use]
-    pub fn independent_windows(&self, samples: usize) -> Option<f64> {
+    pub(crate) fn independent_windows(&self, samples: usize) -> Option<f64> {
         match self {
             Self::Model(_) => None,
             Self::Static(recordings) => {
@@ -148,7 +147,6 @@ enum ChannelErrors<'a> {
 
 impl<'a> ImuErrors<'a> {
     /// The errors of run `key.run` over `samples` samples, as many as the source was made for.
-    #[must_use]
     pub(crate) fn new(errors: &ErrorSource<'a>, key: StreamKey<'_>, samples: usize) -> Self {
         let channels = match errors {
             ErrorSource::Model(model) => Channel::ALL.map(|channel| {
@@ -189,7 +187,6 @@ pub(crate) struct LaneErrors<'a> {
 
 impl<'a> LaneErrors<'a> {
     /// The errors of at most eight runs; lanes beyond them are without error.
-    #[must_use]
     pub(crate) const fn new(runs: Vec<ImuErrors<'a>>) -> Self {
         Self { runs, block: Vec::new(), channel: Vec::new() }
     }
@@ -213,7 +210,6 @@ impl<'a> LaneErrors<'a> {
     }
 
     /// What was drawn last.
-    #[must_use]
     pub(crate) fn drawn(&self) -> &[[Vec3; 2]] {
         &self.block
     }

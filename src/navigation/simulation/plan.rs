@@ -199,26 +199,26 @@ impl<'a> Plan<'a> {
 
     /// Times at which the horizontal error is kept run by run (s).
     #[must_use]
-    pub fn fan_t_s(&self) -> Vec<f64> {
+    pub(crate) fn fan_t_s(&self) -> Vec<f64> {
         let times: Vec<f64> = self.reports().map(|e| e.t_s).collect();
         self.fan.iter().map(|i| times[*i]).collect()
     }
 
     /// Times of the first fix after each outage, or of the end of the trajectory (s).
     #[must_use]
-    pub fn outage_fix_t_s(&self) -> Vec<f64> {
+    pub(crate) fn outage_fix_t_s(&self) -> Vec<f64> {
         self.outages.iter().map(|(_, end)| self.events[*end].t_s).collect()
     }
 
     /// What was planned.
     #[must_use]
-    pub const fn experiment(&self) -> &'a Experiment<'a> {
+    pub(crate) const fn experiment(&self) -> &'a Experiment<'a> {
         self.experiment
     }
 
     /// IMU samples of one run.
     #[must_use]
-    pub fn samples(&self) -> usize {
+    pub(crate) fn samples(&self) -> usize {
         self.ideal.len()
     }
 }

@@ -48,7 +48,7 @@ pub enum Quantity {
 
 impl Quantity {
     /// All of them.
-    pub const ALL: [Self; 4] = [Self::Speed, Self::Acceleration, Self::Jerk, Self::Rate];
+    pub(crate) const ALL: [Self; 4] = [Self::Speed, Self::Acceleration, Self::Jerk, Self::Rate];
 
     /// Name, unit of display, and its factor from SI.
     #[must_use]
@@ -62,8 +62,7 @@ impl Quantity {
     }
 
     /// The limit on it.
-    #[must_use]
-    pub const fn limit(self, limits: &Limits) -> f64 {
+    pub(crate) const fn limit(self, limits: &Limits) -> f64 {
         match self {
             Self::Speed => limits.speed,
             Self::Acceleration => limits.acceleration,

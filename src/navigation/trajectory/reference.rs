@@ -82,12 +82,6 @@ impl Reference {
         let stretch = self.stretches.get(next).filter(|s| s.start_s() <= t_s)?;
         Some(stretch.state(t_s))
     }
-
-    /// The stretches.
-    #[must_use]
-    pub fn stretches(&self) -> &[Trajectory] {
-        &self.stretches
-    }
 }
 
 /// Where samples do not follow one another as a vehicle moves.

@@ -24,25 +24,21 @@ pub(crate) struct Axis {
 
 impl Axis {
     /// A linear axis.
-    #[must_use]
     pub(crate) fn linear(label: &str) -> Self {
         Self { label: label.to_owned(), scale: Scale::Linear, include: None }
     }
 
     /// A logarithmic axis.
-    #[must_use]
     pub(crate) fn log(label: &str) -> Self {
         Self { scale: Scale::Log, ..Self::linear(label) }
     }
 
     /// An axis of names.
-    #[must_use]
     pub(crate) fn names(names: Vec<String>) -> Self {
         Self { scale: Scale::Names(names), ..Self::linear("") }
     }
 
     /// The same, showing at least the values from `low` to `high`.
-    #[must_use]
     pub(crate) fn including(self, low: f64, high: f64) -> Self {
         Self { include: Some((low, high)), ..self }
     }
@@ -151,25 +147,21 @@ pub(crate) struct Series {
 
 impl Series {
     /// A series.
-    #[must_use]
     pub(crate) fn new(name: &str, colour: Colour, mark: Mark) -> Self {
         Self { name: name.to_owned(), colour, mark }
     }
 
     /// A line.
-    #[must_use]
     pub(crate) fn line(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
         Self::new(name, colour, Mark::Line(points, Stroke::Plain))
     }
 
     /// A thin line.
-    #[must_use]
     pub(crate) fn thin(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
         Self::new(name, colour, Mark::Line(points, Stroke::Thin))
     }
 
     /// Points (x, y, half of the interval; NaN: none).
-    #[must_use]
     pub(crate) fn points(
         name: &str,
         colour: Colour,
@@ -180,7 +172,6 @@ impl Series {
     }
 
     /// A dashed line.
-    #[must_use]
     pub(crate) fn dashed(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
         Self::new(name, colour, Mark::Line(points, Stroke::Dashed))
     }
@@ -199,7 +190,6 @@ pub(crate) struct Panel {
 
 impl Panel {
     /// A panel of the usual height.
-    #[must_use]
     pub(crate) fn new(y: Axis, series: Vec<Series>) -> Self {
         Self { y, series, height: 1.0 }
     }
@@ -235,7 +225,6 @@ pub(crate) struct Chart {
 
 impl Chart {
     /// A chart of one or more panels, of the whole width.
-    #[must_use]
     pub(crate) fn new(title: &str, x: Axis, panels: Vec<Panel>) -> Self {
         Self {
             title: title.to_owned(),
@@ -249,26 +238,22 @@ impl Chart {
     }
 
     /// A map: east to the right, north up, in metres, one scale.
-    #[must_use]
     pub(crate) fn map(title: &str, series: Vec<Series>) -> Self {
         let panel = Panel::new(Axis::linear("north (m)"), series);
         Self { is_map: true, ..Self::new(title, Axis::linear("east (m)"), vec![panel]) }
     }
 
     /// The same with outages (start, end) marked.
-    #[must_use]
     pub(crate) fn with_outages(self, outages: &[(f64, f64)]) -> Self {
         Self { stripes: ("outage".to_owned(), outages.to_vec()), ..self }
     }
 
     /// The same in a group of charts that are zoomed together.
-    #[must_use]
     pub(crate) fn in_group(self, group: &str) -> Self {
         Self { group: group.to_owned(), ..self }
     }
 
     /// The same, small.
-    #[must_use]
     pub(crate) fn small(self) -> Self {
         Self { size: Size::Small, ..self }
     }

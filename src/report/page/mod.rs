@@ -46,7 +46,6 @@ pub(crate) struct Page {
 
 impl Page {
     /// A page that begins with its verdict, one or two sentences.
-    #[must_use]
     pub(crate) fn new(title: &str, tone: Tone, verdict: &str) -> Self {
         let class = match tone {
             Tone::Good => "",
@@ -98,7 +97,6 @@ impl Page {
     }
 
     /// Its figures, below one another, as an SVG file.
-    #[must_use]
     pub(crate) fn svg(&self) -> String {
         svg(&self.title, &self.charts)
     }
@@ -134,7 +132,6 @@ impl Page {
     }
 
     /// The file.
-    #[must_use]
     pub(crate) fn html(&self) -> String {
         let (title, body) = (escape(&self.title), &self.body);
         format!(
@@ -150,7 +147,6 @@ impl Page {
 const GENERATOR: &str = "<meta name=\"generator\" content=\"nav-sim\">";
 
 /// Whether a text is a page of this module.
-#[must_use]
 pub(crate) fn is_own(html: &str) -> bool {
     html.contains(GENERATOR)
 }

@@ -26,7 +26,6 @@ pub(crate) enum Form {
 
 impl Form {
     /// By the ending of a file's name, in capitals or not.
-    #[must_use]
     pub(crate) fn of(path: &Path) -> Option<Self> {
         match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
             "svg" => Some(Self::Svg),
@@ -46,7 +45,6 @@ pub(crate) struct PictureError {
 }
 
 /// Charts below one another as an SVG file; those without a value are left out.
-#[must_use]
 pub(crate) fn svg(title: &str, charts: &[Chart]) -> String {
     const MARGIN: f64 = 16.0;
     let line = 2.0 * WIDE.font;

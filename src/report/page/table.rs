@@ -19,13 +19,11 @@ pub(crate) struct Cell {
 impl Cell {
     /// A number, shown with three digits; `source` says where it stands in the results as JSON, as a JSON pointer
     /// such as `/outages/0/nees_end`: tests hold the page against it.
-    #[must_use]
     pub(crate) fn number(value: f64, source: &str) -> Self {
         Self { text: readable(value), source: source.to_owned(), is_number: true }
     }
 
     /// A number, or several, as they are to be shown.
-    #[must_use]
     pub(crate) fn figures(text: impl Into<String>) -> Self {
         Self { text: text.into(), source: String::new(), is_number: true }
     }
@@ -46,20 +44,17 @@ pub(crate) struct Table {
 
 impl Table {
     /// An empty table.
-    #[must_use]
     pub(crate) fn new<const N: usize>(head: [&str; N]) -> Self {
         Self { head: head.map(str::to_owned).into(), rows: Vec::new() }
     }
 
     /// The same with further columns.
-    #[must_use]
     pub(crate) fn and(mut self, head: impl IntoIterator<Item = String>) -> Self {
         self.head.extend(head);
         self
     }
 
     /// A table of texts, the first row its head.
-    #[must_use]
     pub(crate) fn of_rows(rows: &[Vec<String>]) -> Self {
         let Some((head, rows)) = rows.split_first() else { return Self::default() };
         let cells = |row: &Vec<String>| row.iter().map(|text| Cell::from(text.clone())).collect();

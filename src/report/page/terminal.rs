@@ -5,7 +5,6 @@ use super::chart::{Chart, Mark, Panel, Scale};
 use crate::report::comparison::in_order;
 
 /// The rows of a chart of so many characters by so many rows, axes and title among them; none without a value to show.
-#[must_use]
 pub(crate) fn terminal(chart: &Chart, columns: usize, rows: usize) -> Vec<String> {
     let Some(panel) = chart.panels.first() else { return Vec::new() };
     let lines = lines(panel);
@@ -104,7 +103,6 @@ fn below(places: &[(f64, String)], x: &Ruler, width: usize, label: &str) -> Stri
 }
 
 /// Texts beside one another, the first of so many characters.
-#[must_use]
 pub(crate) fn beside(left: &[String], right: &[String], columns: usize) -> Vec<String> {
     let rows = left.len().max(right.len());
     let cell = |rows: &[String], k: usize| rows.get(k).cloned().unwrap_or_default();

@@ -18,7 +18,6 @@ use crate::report::turn_on::turn_on_remark;
 
 /// The page of the models of one estimator. `outcomes`: each with its place among all fits of the command; `curves`: of the
 /// same outcomes.
-#[must_use]
 pub(crate) fn calibration_page(
     curves: &CurvesFile,
     outcomes: &[(usize, &Outcome)],
@@ -81,7 +80,6 @@ fn means(page: &mut Page, turn_on: &[TurnOnSpread], outcomes: &[(usize, &Outcome
 }
 
 /// The same as a picture.
-#[must_use]
 pub(crate) fn calibration_svg(curves: &CurvesFile, diagnoses: &[Diagnosis]) -> String {
     let charts: Vec<Chart> = curves.curves.iter().map(|fitted| chart(fitted, diagnoses)).collect();
     svg("Stochastic calibration", &charts)

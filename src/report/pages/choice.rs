@@ -10,7 +10,6 @@ use crate::report::page::{
 use crate::simulation::NEES_DOF;
 
 /// The page.
-#[must_use]
 pub(crate) fn choice_page(report: &ChoiceReport<'_>) -> Page {
     let placed = &report.ranking.candidates;
     let tone = if report.ranking.tells { Tone::Good } else { Tone::Doubtful };

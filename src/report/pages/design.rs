@@ -5,7 +5,6 @@ use crate::report::design::{Design, design_verdict};
 use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, Table, Tone};
 
 /// The page.
-#[must_use]
 pub(crate) fn design_page(designs: &[Design]) -> Page {
     let (tone, verdict) = verdict(designs);
     let mut page = Page::new("What recordings would tell", tone, &verdict);

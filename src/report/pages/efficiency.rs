@@ -6,7 +6,6 @@ use crate::report::number::readable;
 use crate::report::page::{Axis, Cell, Chart, Colour, Interval, Mark, Page, Panel, Series, Table, Tone, svg};
 
 /// The page.
-#[must_use]
 pub(crate) fn efficiency_page(file: &EfficiencyFile) -> String {
     let mut page = Page::new("Study of the estimators", Tone::Good, &verdict(file));
     page.text(CAPTION);
@@ -40,7 +39,6 @@ pub(crate) fn efficiency_page(file: &EfficiencyFile) -> String {
 }
 
 /// The same as a picture.
-#[must_use]
 pub(crate) fn efficiency_svg(file: &EfficiencyFile) -> String {
     svg(&format!("Robust RMSE of {} sets", file.sets), &charts(file))
 }

@@ -19,13 +19,11 @@ pub(crate) struct PaperFigure {
 
 impl PaperFigure {
     /// `fig1.svg`
-    #[must_use]
     pub(crate) fn file_name(&self) -> String {
         format!("fig{}.svg", self.number)
     }
 
     /// As a picture.
-    #[must_use]
     pub(crate) fn svg(&self) -> String {
         svg(&format!("Fig. {}: {}", self.number, self.caption), &self.charts)
     }
@@ -47,7 +45,6 @@ pub(crate) struct StudyCurves {
 }
 
 /// Figures 1 and 3 to 6; 2 is of a study of the estimators, 7 of a comparison. `curves`: all models of the study.
-#[must_use]
 pub(crate) fn paper_figures(
     curves: &[StudyCurves],
     track: &TrajectorySeries,
@@ -91,7 +88,6 @@ const CLEAN: &str =
 const AVERAGES: &str = "The wavelet variances that AWV, SR-AWV and DR-AWV are fitted to, in scenarios II and III; dashed: AWV of scenario I.";
 
 /// The page of all of them.
-#[must_use]
 pub(crate) fn paper_page(figures: &[PaperFigure]) -> String {
     let verdict = "The figures of Minaretzis et al. 2024 from this study, beside what the paper's show; Figure 2 is of a study of the \
                    estimators (nav-sim efficiency).";

@@ -13,7 +13,6 @@ const CHECKED: &str = "the IMU that a limit needs meets it in sampled runs, and 
 const DRIFT: &str = "The error at the end of an outage against its length, at the worst of the places; the limit is the level line.";
 
 /// The page of the IMU that is needed.
-#[must_use]
 pub(crate) fn needed_page(needed: &NeededImu, question: &Question) -> Page {
     let mut page = Page::new("The IMU that a limit needs", Tone::Good, &sentence(&needed.verdict(question)));
     page.section("Figures, at most");
@@ -103,7 +102,6 @@ fn iso_table(points: &[(f64, Answer)]) -> Table {
 }
 
 /// The page of what a given IMU makes of the limits; without margins, of the longest outage that it bridges.
-#[must_use]
 pub(crate) fn model_page(margins: Option<&Margins>, question: &Question, bridged: &Bridged) -> Page {
     let (tone, verdict) = match margins {
         Some(margins) => (Tone::from(margins.met()), margins_verdict(margins, question, bridged.longest)),
@@ -171,7 +169,6 @@ fn parts(margins: &Margins) -> Table {
 }
 
 /// The page of a ranking.
-#[must_use]
 pub(crate) fn catalogue_page(units: &[RankedUnit], question: &Question) -> Page {
     let met: Vec<&str> = units.iter().filter(|u| u.is_met()).map(|u| u.name.as_str()).collect();
     let verdict = match met.as_slice() {

@@ -5,13 +5,11 @@ use crate::metrics::{Budget, EpochMetrics, FanEpoch, OutageSummary, Summary};
 use crate::report::page::{Axis, Chart, Colour, Interval, Mark, Panel, Series, svg, terminal};
 
 /// What of it most people want as a picture.
-#[must_use]
 pub(crate) fn run_svg(epochs: &[EpochMetrics], fan: &[FanEpoch], summary: &Summary) -> String {
     svg("Navigation errors", &[horizontal(epochs, summary), fan_chart(fan, summary), nees(epochs, summary)])
 }
 
 /// The horizontal error over time for a terminal.
-#[must_use]
 pub(crate) fn run_text(epochs: &[EpochMetrics], summary: &Summary) -> String {
     terminal(&horizontal(epochs, summary), 86, 15).join("\n")
 }

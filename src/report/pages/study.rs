@@ -10,7 +10,6 @@ use crate::report::verdict::verdict_word;
 
 /// The page of a merged study. `reference`: what ratios refer to; `more`: cells that are in outages.csv only; `rankings`:
 /// of candidates calibrated without the recordings that make the errors.
-#[must_use]
 pub(crate) fn study_page(
     cells: &[ShownCell],
     reference: &str,

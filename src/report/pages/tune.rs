@@ -8,7 +8,6 @@ use crate::simulation::NEES_DOF;
 use crate::simulation::lincov::Honesty;
 
 /// The page.
-#[must_use]
 pub(crate) fn tune_page(result: &TuneResult) -> Page {
     let tone = if result.is_honest() { Tone::Good } else { Tone::Doubtful };
     let mut page = Page::new("Honest inflation of a noise model", tone, &super::sentence(&result.verdict()));

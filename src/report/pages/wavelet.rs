@@ -36,7 +36,6 @@ pub(super) fn band(tau_s: &[f64], low: &[f64], high: &[f64]) -> Mark {
 }
 
 /// The page of the wavelet variances of some signals.
-#[must_use]
 pub(crate) fn wavelet_page(file: &SignalsFile) -> Page {
     let worst = file.signals.iter().filter_map(|s| Some((excess(s)?, s)));
     let worst = worst.max_by(|a, b| a.0.1.total_cmp(&b.0.1));
@@ -80,7 +79,6 @@ pub(crate) fn wavelet_page(file: &SignalsFile) -> Page {
 }
 
 /// The robust wavelet deviations for a terminal, a plot a sensor: each axis with its letter.
-#[must_use]
 pub(crate) fn wavelet_text(file: &SignalsFile) -> String {
     let plot = |sensor: Sensor| {
         let own = file.signals.iter().filter(|s| s.sensor == sensor.name());

@@ -11,8 +11,7 @@ use std::f64::consts::LN_2;
 impl Process {
     /// Theoretical Allan variance (units²) of averages over m ≥ 1 samples; for a drift the square of its deterministic
     /// contribution ([IEEE 952](crate::bibliography::Ieee952), annex C).
-    #[must_use]
-    pub fn allan_variance(&self, samples: u32) -> f64 {
+    pub(crate) fn allan_variance(&self, samples: u32) -> f64 {
         let m = f64::from(samples.max(1));
         match self {
             Self::White(p) => p.sigma2() / m,

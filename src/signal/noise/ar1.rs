@@ -13,7 +13,7 @@ pub struct Ar1 {
 
 impl Ar1 {
     /// Code in model files.
-    pub const CODE: &'static str = "AR1";
+    pub(crate) const CODE: &'static str = "AR1";
 
     /// From the coefficient (dimensionless) and the innovation variance (units²).
     ///
@@ -51,15 +51,13 @@ impl Ar1 {
     }
 
     /// Haar wavelet variance at a level (units²), scale tau = 2^level samples.
-    #[must_use]
-    pub fn haar_wv(&self, level: u32) -> f64 {
+    pub(crate) fn haar_wv(&self, level: u32) -> f64 {
         self.sigma2 * Self::haar_shape(self.phi, level).0
     }
 
     /// Haar wavelet variance per unit of sigma2, and its derivative with respect to phi. Relative error a
     /// few 1e-15 for every |phi| < 1, up to |phi| = 1 − 1e-16.
-    #[must_use]
-    pub fn haar_shape(phi: f64, level: u32) -> (f64, f64) {
+    pub(crate) fn haar_shape(phi: f64, level: u32) -> (f64, f64) {
         let m = half_scale(level);
         if level <= 1 {
             // m = 1: W is half the difference of neighbours, nu = γ₀(1 − phi)/2, and 1 − phi cancels against

@@ -7,7 +7,6 @@
 use super::{Ar1, Composite, Drift, GaussMarkov, Model, ParameterError, Process, RandomWalk, White};
 
 /// White noise density N = sigma √dt (units/√Hz).
-#[must_use]
 pub(crate) fn white_density(sigma2: f64, rate_hz: f64) -> f64 {
     (sigma2 / rate_hz).sqrt()
 }
@@ -19,7 +18,6 @@ pub fn white_sigma2(density: f64, rate_hz: f64) -> f64 {
 }
 
 /// Random-walk density K = gamma √f (units/s/√Hz).
-#[must_use]
 pub(crate) fn walk_density(gamma2: f64, rate_hz: f64) -> f64 {
     (gamma2 * rate_hz).sqrt()
 }

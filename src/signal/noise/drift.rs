@@ -11,7 +11,7 @@ pub struct Drift {
 
 impl Drift {
     /// Code in model files.
-    pub const CODE: &'static str = "DR";
+    pub(crate) const CODE: &'static str = "DR";
 
     /// Slope (units per sample).
     ///
@@ -37,8 +37,7 @@ impl Drift {
     }
 
     /// Haar wavelet variance at a level (units²), not centred: slope² tau²/16, tau = 2^level.
-    #[must_use]
-    pub fn haar_wv(&self, level: u32) -> f64 {
+    pub(crate) fn haar_wv(&self, level: u32) -> f64 {
         self.slope * self.slope * Self::haar_shape(level)
     }
 

@@ -16,7 +16,7 @@ pub struct GaussMarkov {
 
 impl GaussMarkov {
     /// Code in model files.
-    pub const CODE: &'static str = "GM";
+    pub(crate) const CODE: &'static str = "GM";
     /// Largest Allan deviation over standard deviation, reached with averages of [`Self::ALLAN_PEAK_AT`]
     /// correlation times: with averages of x correlation times the Allan variance is
     /// s2·(2/x)·[1 − (3 − 4e^(−x) + e^(−2x))/(2x)].
@@ -69,8 +69,7 @@ impl GaussMarkov {
     }
 
     /// Haar wavelet variance at a level (units²), scale tau = 2^level samples.
-    #[must_use]
-    pub fn haar_wv(&self, level: u32) -> f64 {
+    pub(crate) fn haar_wv(&self, level: u32) -> f64 {
         self.s2 * Self::haar_shape(self.beta / self.rate_hz, level).0
     }
 

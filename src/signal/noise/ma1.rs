@@ -12,7 +12,7 @@ pub struct Ma1 {
 
 impl Ma1 {
     /// Code in model files.
-    pub const CODE: &'static str = "MA1";
+    pub(crate) const CODE: &'static str = "MA1";
 
     /// From the coefficient (dimensionless) and the innovation variance (units²).
     ///

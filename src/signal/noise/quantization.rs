@@ -11,7 +11,7 @@ pub struct Quantization {
 
 impl Quantization {
     /// Code in model files.
-    pub const CODE: &'static str = "QN";
+    pub(crate) const CODE: &'static str = "QN";
 
     /// Q² (units²).
     ///
@@ -28,8 +28,7 @@ impl Quantization {
     }
 
     /// Haar wavelet variance at a level (units²): 6 Q²/tau², tau = 2^level.
-    #[must_use]
-    pub fn haar_wv(&self, level: u32) -> f64 {
+    pub(crate) fn haar_wv(&self, level: u32) -> f64 {
         self.q2 * Self::haar_shape(level)
     }
 

@@ -11,7 +11,7 @@ pub struct RandomWalk {
 
 impl RandomWalk {
     /// Code in model files.
-    pub const CODE: &'static str = "RW";
+    pub(crate) const CODE: &'static str = "RW";
 
     /// Variance of an increment (units²).
     ///
@@ -28,8 +28,7 @@ impl RandomWalk {
     }
 
     /// Haar wavelet variance at a level (units²): gamma2 (tau² + 2)/(12 tau), tau = 2^level.
-    #[must_use]
-    pub fn haar_wv(&self, level: u32) -> f64 {
+    pub(crate) fn haar_wv(&self, level: u32) -> f64 {
         self.gamma2 * Self::haar_shape(level)
     }
 

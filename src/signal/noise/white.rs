@@ -11,7 +11,7 @@ pub struct White {
 
 impl White {
     /// Code in model files.
-    pub const CODE: &'static str = "WN";
+    pub(crate) const CODE: &'static str = "WN";
 
     /// Variance of a sample (units²).
     ///
@@ -28,8 +28,7 @@ impl White {
     }
 
     /// Haar wavelet variance at a level (units²): sigma2/tau, tau = 2^level.
-    #[must_use]
-    pub fn haar_wv(&self, level: u32) -> f64 {
+    pub(crate) fn haar_wv(&self, level: u32) -> f64 {
         self.sigma2 * Self::haar_shape(level)
     }
 

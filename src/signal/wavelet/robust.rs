@@ -59,7 +59,6 @@ pub fn both(
 }
 
 /// The M-estimate of the mean of the given squares of zero-mean Gaussian numbers.
-#[must_use]
 pub(crate) fn m_scale(squares: &[f64], tuning: &Tuning) -> RobustVariance {
     let equation = Equation { squares, tuning };
     // The start must only be within 25 % of the root: of 4096 independent coefficients the squared MAD is

@@ -26,7 +26,7 @@ impl PeriodicOutages {
     ///
     /// # Errors
     /// The key whose value is refused.
-    pub fn validate(&self) -> Result<(), SettingError> {
+    pub(crate) fn validate(&self) -> Result<(), SettingError> {
         require_finite("first_s", &[self.first_s])?;
         require_positive("duration_s", &[self.duration_s])?;
         if !(self.every_s.is_finite() && self.every_s >= 0.1) {
@@ -68,7 +68,7 @@ impl RandomOutages {
     ///
     /// # Errors
     /// The key whose value is refused.
-    pub fn validate(&self) -> Result<(), SettingError> {
+    pub(crate) fn validate(&self) -> Result<(), SettingError> {
         require_positive("rate_per_hour", &[self.rate_per_hour])?;
         if self.rate_per_hour > 3600.0 {
             return Err(SettingError::new("rate_per_hour", self.rate_per_hour, "it must be at most 3600"));

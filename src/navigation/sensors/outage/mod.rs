@@ -43,7 +43,7 @@ impl Outage {
     ///
     /// # Errors
     /// The key whose value is refused.
-    pub fn validate(&self) -> Result<(), SettingError> {
+    pub(crate) fn validate(&self) -> Result<(), SettingError> {
         require_finite("start_s", &[self.start_s])?;
         require_finite("end_s", &[self.end_s])?;
         if self.end_s > self.start_s {

@@ -289,14 +289,14 @@ impl StepInputs<'_> {
 impl Instant {
     /// Mean squares and products of the true errors.
     #[must_use]
-    pub fn moments(&self) -> [Nav; NAV] {
+    pub(crate) fn moments(&self) -> [Nav; NAV] {
         let m = &self.mean;
         std::array::from_fn(|j| std::array::from_fn(|i| self.covariance[j][i] + m[i] * m[j]))
     }
 
     /// The reported states (m, m/s, degrees) of a vector of the filter's states.
     #[must_use]
-    pub fn reported(&self, x: &Nav) -> [f64; REPORTED] {
+    pub(crate) fn reported(&self, x: &Nav) -> [f64; REPORTED] {
         let psi = DVec3::new(x[3 * PSI], x[3 * PSI + 1], x[3 * PSI + 2]);
         std::array::from_fn(|i| if i < 6 { x[i] } else { self.jacobian[i - 6].dot(psi) / DEG })
     }
@@ -315,7 +315,7 @@ impl Instant {
 
     /// Variances of the reported states (m², (m/s)², degrees²) of a covariance of the filter's states.
     #[must_use]
-    pub fn variances(&self, p: &[Nav; NAV]) -> [f64; REPORTED] {
+    pub(crate) fn variances(&self, p: &[Nav; NAV]) -> [f64; REPORTED] {
         let squares = self.squares(p);
         std::array::from_fn(|i| if i < 6 { squares[i] } else { squares[i] / (DEG * DEG) })
     }

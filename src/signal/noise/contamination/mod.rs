@@ -22,8 +22,7 @@ pub enum Extent {
 
 impl Extent {
     /// In samples of a record of `length` samples.
-    #[must_use]
-    pub fn of(self, length: usize) -> usize {
+    pub(crate) fn of(self, length: usize) -> usize {
         match self {
             Self::Samples(n) => usize::try_from(n).unwrap_or(usize::MAX),
             // A share written as a ratio of whole numbers must not lose one to rounding.
@@ -234,8 +233,7 @@ impl Rule {
 
 impl Operation {
     /// Name in files.
-    #[must_use]
-    pub const fn name(&self) -> &'static str {
+    pub(crate) const fn name(&self) -> &'static str {
         match self {
             Self::Scale { .. } => "scale",
             Self::Ar1(_) => "ar1",

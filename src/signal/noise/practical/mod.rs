@@ -282,12 +282,6 @@ impl Curve {
         let none = Ratio { ratio: 0.0, tau_s: self.horizon.from_s };
         self.points.iter().map(share).fold(none, |a, b| if b.ratio > a.ratio { b } else { a })
     }
-
-    /// The horizon.
-    #[must_use]
-    pub const fn horizon(&self) -> Horizon {
-        self.horizon
-    }
 }
 
 fn point(axes: &[&Composite], samples: u32) -> Point {
