@@ -13,16 +13,16 @@ pub struct FileError {
     /// The file or directory, as it was named.
     pub path: Box<str>,
     /// Where in it.
-    pub place: Place,
+    pub(crate) place: Place,
     /// What is wrong.
-    pub kind: Kind,
+    pub(crate) kind: Kind,
     /// What helps: any one of these.
-    pub remedies: Vec<Remedy>,
+    pub(crate) remedies: Vec<Remedy>,
 }
 
 /// Where in a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Place {
+pub(crate) enum Place {
     /// Anywhere in it.
     Within,
     /// The file as a whole: its name is the subject of the sentence.
@@ -50,7 +50,7 @@ impl From<usize> for Place {
 /// What is wrong with a file.
 #[derive(Debug)]
 #[non_exhaustive]
-pub enum Kind {
+pub(crate) enum Kind {
     /// The system refuses: no such file, no permission, a full disk, damaged compression.
     System(io::Error),
     /// There is nothing in it.
@@ -242,7 +242,7 @@ impl FileError {
 /// One way out.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
-pub enum Remedy {
+pub(crate) enum Remedy {
     /// Something to do about the file.
     Advice(Cow<'static, str>),
     /// A setting of what reads or writes it.
@@ -251,8 +251,7 @@ pub enum Remedy {
 
 /// A setting that may help. The program says it as an option of the command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[expect(missing_docs, reason = "said by `words`")]
-pub enum Setting {
+pub(crate) enum Setting {
     ColumnNames,
     Channels,
     FewerChannels,

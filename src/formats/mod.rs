@@ -28,5 +28,6 @@ pub(crate) mod toml_file;
 mod toml_path;
 pub mod trajectory_file;
 
+pub use error::FileError;
 pub(crate) use error::system_words;
-pub use error::{FileError, Kind, Place, Remedy, Setting};
+pub(crate) use error::{Kind, Place, Setting};

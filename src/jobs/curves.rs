@@ -10,7 +10,7 @@ use std::path::Path;
 /// Curves of a file, each with what it is for.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub struct Curves {
+pub(crate) struct Curves {
     curves: Vec<(Scope, Estimator, Curve)>,
     /// How models are fitted: with the estimators and the rate of the curves.
     pub settings: Settings,
@@ -53,7 +53,7 @@ impl Curves {
     ///
     /// # Errors
     /// When a curve is too short for the model.
-    pub fn calibrate(self, bootstrap: Option<Bootstrap>) -> Result<Calibration, JobError> {
+    pub(crate) fn calibrate(self, bootstrap: Option<Bootstrap>) -> Result<Calibration, JobError> {
         let Self { curves, settings } = self;
         let mut groups: Vec<Group> = Vec::new();
         let mut outcomes: Vec<Outcome> = Vec::new();

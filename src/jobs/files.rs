@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// The files of one estimator.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct ModelFiles {
+pub(crate) struct ModelFiles {
     /// The estimator.
     pub estimator: Estimator,
     /// The model file.
@@ -27,8 +27,7 @@ pub struct ModelFiles {
 
 impl ModelFiles {
     /// The files of each estimator: of several `<out>_<estimator>.toml`.
-    #[must_use]
-    pub fn of(out: &Path, estimators: &[Estimator]) -> Vec<Self> {
+    pub(crate) fn of(out: &Path, estimators: &[Estimator]) -> Vec<Self> {
         let files = |estimator: &Estimator| {
             let suffix = if estimators.len() > 1 { format!("_{estimator}") } else { String::new() };
             let model = with_suffix(out, &suffix);
@@ -116,7 +115,7 @@ impl ModelFiles {
     ///
     /// # Errors
     /// When the system refuses.
-    pub fn write(&self, calibration: &Calibration, note: &CalibrationNote) -> Result<(), FileError> {
+    pub(crate) fn write(&self, calibration: &Calibration, note: &CalibrationNote) -> Result<(), FileError> {
         let (curves, model) = self.contents(calibration, note);
         let own: Vec<&Outcome> =
             calibration.outcomes.iter().filter(|o| o.estimator == self.estimator).collect();

@@ -10,7 +10,7 @@ use crate::simulation::lincov::{Track, assess};
 /// What a filter of 15 states was made for, and what it is assessed along.
 #[derive(Debug)]
 #[non_exhaustive]
-pub struct Reduced<'a> {
+pub(crate) struct Reduced<'a> {
     /// The model that was reduced.
     pub model: &'a Model,
     /// The filter.
@@ -31,7 +31,7 @@ impl Reduced<'_> {
     ///
     /// # Errors
     /// When a parameter of the belief is outside its domain.
-    pub fn summary(&self, observer: &dyn Observer<Note>) -> Result<ReductionSummary, ParameterError> {
+    pub(crate) fn summary(&self, observer: &dyn Observer<Note>) -> Result<ReductionSummary, ParameterError> {
         let Self { model, belief, track, interval_s, window_s, .. } = *self;
         let mut summary = ReductionSummary::of(model, belief, interval_s, window_s)?;
         if summary.is_exact() {

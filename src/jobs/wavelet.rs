@@ -12,7 +12,7 @@ use std::path::PathBuf;
 
 /// Where the degrees of freedom of intervals are from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Intervals {
+pub(crate) enum Intervals {
     /// The field's usual ones, conservative beyond the first scale.
     #[default]
     Eta3,
@@ -24,7 +24,7 @@ nav_sim_signal::named!(Intervals { Eta3 = "eta3", LargeSample = "large-sample" }
 
 /// How wavelet variances are taken.
 #[derive(Debug, Clone, Default)]
-pub struct WaveletOptions {
+pub(crate) struct WaveletOptions {
     /// How the recordings are read.
     pub reading: ReadOptions,
     /// Whether each recording's warm-up, as it is found, is left out.

@@ -19,7 +19,7 @@ fn file(directory: &Path) -> PathBuf {
 ///
 /// # Errors
 /// When it cannot be read or is not a plan.
-pub fn plan(directory: &Path) -> Result<Option<Plan>, FileError> {
+pub(crate) fn plan(directory: &Path) -> Result<Option<Plan>, FileError> {
     let path = file(directory);
     let shown = path.display().to_string();
     let text = match source::text(&path) {
@@ -58,7 +58,12 @@ pub(crate) fn plan_of(directory: &Path, study: &Study, seed: Option<u64>) -> Res
 ///
 /// # Errors
 /// The key that differs.
-pub fn same(directory: &Path, plan: &Plan, study: &Study, seed: Option<u64>) -> Result<(), StudyError> {
+pub(crate) fn same(
+    directory: &Path,
+    plan: &Plan,
+    study: &Study,
+    seed: Option<u64>,
+) -> Result<(), StudyError> {
     let refused = |key: &str, found: String, wanted: String| {
         Err(StudyError::OtherStudy { plan: file(directory), key: key.to_owned(), found, wanted })
     };
@@ -88,7 +93,7 @@ pub(crate) fn write_plan(directory: &Path, plan: &Plan) -> Result<(), FileError>
 ///
 /// # Errors
 /// When the directory cannot be read.
-pub fn units(directory: &Path) -> Result<BTreeSet<String>, FileError> {
+pub(crate) fn units(directory: &Path) -> Result<BTreeSet<String>, FileError> {
     let top = directory.join("units");
     let mut names = BTreeSet::new();
     for inner in entries(&top)? {
@@ -115,7 +120,7 @@ fn entries(path: &Path) -> Result<Vec<PathBuf>, FileError> {
 ///
 /// # Errors
 /// When the system refuses.
-pub fn finished(
+pub(crate) fn finished(
     directory: &Path,
     (unit, id): (Unit, &str),
     columns: usize,

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 /// A study, read, with the scenario and receiver files it names.
 #[derive(Debug, Clone, PartialEq)]
-pub struct StudyFile {
+pub(crate) struct StudyFile {
     /// The study, names and defaults filled in.
     pub study: Study,
     /// Its scenarios, in order (empty: the default).
@@ -23,8 +23,7 @@ pub struct StudyFile {
 }
 
 /// What a path of a study file means: it is relative to the file.
-#[must_use]
-pub fn beside(study: &Path, path: &Path) -> PathBuf {
+pub(crate) fn beside(study: &Path, path: &Path) -> PathBuf {
     study.parent().unwrap_or(Path::new("")).join(path)
 }
 
@@ -32,7 +31,7 @@ pub fn beside(study: &Path, path: &Path) -> PathBuf {
 ///
 /// # Errors
 /// File, line, key and value of what is refused; a mistyped key with the nearest legal one.
-pub fn read(path: &Path) -> Result<StudyFile, FileError> {
+pub(crate) fn read(path: &Path) -> Result<StudyFile, FileError> {
     let source = Source::read(path)?;
     let document = Document::parse(&source)?;
     let mut study: Study = document.read()?;

@@ -17,8 +17,7 @@ const RUNS: u64 = 3;
 /// Hash of the bits that a small experiment makes here: 4 s of a climbing turn, synthesised errors, both
 /// filters, a fix, an outage. Another processor, system library or compiler may round the last digit of a
 /// sine otherwise; units of the two would make a table that neither of them makes.
-#[must_use]
-pub fn fingerprint() -> String {
+pub(crate) fn fingerprint() -> String {
     let bits = results().map_or_else(|| b"this build runs no experiment".to_vec(), |found| encode(&found));
     blake3::hash(&bits).to_hex()[..16].to_owned()
 }

@@ -9,7 +9,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// Those of reading, or the first key that names such a file.
-pub fn read(study: &Path) -> Result<StudyFile, FileError> {
+pub(crate) fn read(study: &Path) -> Result<StudyFile, FileError> {
     match file::read(study) {
         Err(e) if !e.is_system() => Err(e),
         read => exist(study).and(read), // a scenario that is not there is told by its key, too

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 /// What virtual recordings are made of.
 #[derive(Debug, Clone, Copy)]
-pub struct Material<'a> {
+pub(crate) struct Material<'a> {
     /// How many, how long, of what.
     pub step: &'a Synthesis,
     /// The model.
@@ -46,7 +46,7 @@ impl Material<'_> {
 ///
 /// # Errors
 /// When it stands for none.
-pub fn channels(word: &str) -> Result<Vec<Channel>, PrepareError> {
+pub(crate) fn channels(word: &str) -> Result<Vec<Channel>, PrepareError> {
     let found = Channel::named(word);
     if found.is_empty() {
         let reason = "is not all, accel, gyro, x, y, z, or one channel such as accel.x";
@@ -82,7 +82,7 @@ pub(super) fn settings(step: &CalibrateStep, rate_hz: f64) -> Result<Settings, P
 ///
 /// # Errors
 /// A word that means nothing, recordings too short or too few.
-pub fn calibrated(
+pub(crate) fn calibrated(
     recordings: &[Recording],
     step: &CalibrateStep,
 ) -> Result<(Vec<Outcome>, Settings), PrepareError> {

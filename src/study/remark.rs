@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 /// How much a remark matters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Importance {
+pub(crate) enum Importance {
     /// For who wants to know all.
     Detail,
     /// What is done.

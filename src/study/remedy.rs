@@ -2,7 +2,7 @@
 
 /// What to do about a failure.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Remedy {
+pub(crate) enum Remedy {
     /// Advice of the reader of a file.
     Advice(String),
     /// Plan the study first.

@@ -5,7 +5,7 @@ use crate::simulation::RunResult;
 
 /// The sums of a cell as its units come in, in run order.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct CellSums {
+pub(crate) struct CellSums {
     /// One finding a column.
     pub columns: Vec<Finding>,
     /// Runs so far.

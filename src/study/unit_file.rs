@@ -130,15 +130,13 @@ impl ColumnHead {
 }
 
 /// Where a unit's file stands in a study directory: `units/ab/abcd….unit`.
-#[must_use]
-pub fn path(directory: &Path, id: &str) -> PathBuf {
+pub(crate) fn path(directory: &Path, id: &str) -> PathBuf {
     directory.join("units").join(id.get(..2).unwrap_or("00")).join(format!("{id}.unit"))
 }
 
 /// Size (bytes, without the head) of the file of a unit like this one, with so many runs, and so many epochs in each
 /// column.
-#[must_use]
-pub fn size(like: &UnitResult, runs: u64, epochs: usize) -> f64 {
+pub(crate) fn size(like: &UnitResult, runs: u64, epochs: usize) -> f64 {
     let words = |finding: &Finding| ColumnHead { epochs, ..finding.into() }.words(runs as usize).unwrap_or(0);
     400.0 + like.columns.iter().map(|column| 100.0 + 8.0 * words(column) as f64).sum::<f64>()
 }
@@ -149,7 +147,7 @@ pub fn size(like: &UnitResult, runs: u64, epochs: usize) -> f64 {
 ///
 /// # Errors
 /// When the disk is full or the directory cannot be written to; nothing is left then.
-pub fn write(directory: &Path, unit: &UnitResult) -> Result<(), FileError> {
+pub(crate) fn write(directory: &Path, unit: &UnitResult) -> Result<(), FileError> {
     let file = path(directory, &unit.id);
     if file.is_dir() {
         let aside = file.with_extension("unit.damaged");

@@ -9,7 +9,7 @@ use toml::{Table, Value};
 
 /// What a calibration leaves in the file beside the model.
 #[derive(Debug, Clone, PartialEq)]
-pub struct CalibrationNote {
+pub(crate) struct CalibrationNote {
     /// How the tuning constant follows from the efficiency: `exact` or `wv`.
     pub efficiency_convention: String,
     /// Seed of the bootstrap, if there was one.

@@ -23,7 +23,7 @@ mod read;
 mod schema;
 mod write;
 
-pub use calibrated::CalibrationNote;
+pub(crate) use calibrated::CalibrationNote;
 pub(crate) use read::from_text;
 pub use read::read;
 pub use schema::schema;
