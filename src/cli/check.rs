@@ -152,7 +152,7 @@ fn model(path: &Path, session: &Session) -> Result<String, Failure> {
 
 fn gnss(path: &Path, session: &Session) -> Result<String, Failure> {
     let (fixes, remarks) = read_gnss(path, None, None).map_err(read::refused_for_fusion)?;
-    remarks.iter().for_each(|remark| session.printer.warn(remark));
+    remarks.iter().for_each(|remark| session.printer.remark(remark));
     let span = fixes.first().zip(fixes.last()).map_or(0.0, |(a, b)| b.t_s - a.t_s);
     let velocity = if fixes.iter().any(|f| f.velocity.is_some()) { " with velocity" } else { "" };
     Ok(format!("{} GNSS fixes{velocity} over {span} s", fixes.len()))
@@ -160,7 +160,7 @@ fn gnss(path: &Path, session: &Session) -> Result<String, Failure> {
 
 fn imu(path: &Path, session: &Session) -> Result<String, Failure> {
     let imu = read_imu(path).map_err(read::refused_for_fusion)?;
-    imu.remarks.iter().for_each(|remark| session.printer.warn(remark));
+    imu.remarks.iter().for_each(|remark| session.printer.remark(remark));
     Ok(format!("an IMU recording of {} samples at {:.2} Hz, for fuse", imu.samples.len(), imu.rate_hz))
 }
 

@@ -2,6 +2,7 @@
 
 use super::common::{Color, Common};
 use super::exit::Failure;
+use crate::formats::fusion_files::Remark;
 use crate::formats::system_words;
 use std::borrow::Cow;
 use std::io::{ErrorKind, IsTerminal, Write};
@@ -62,6 +63,14 @@ impl Printer {
     /// A doubt about the input or the result, to stderr.
     pub(crate) fn warn(&self, text: &str) {
         self.line(&format!("{} {}", self.painted("warning:", "\x1b[1;33m"), safe(text)));
+    }
+
+    /// What is said of a file that was read, to stderr.
+    pub(crate) fn remark(&self, remark: &Remark) {
+        match remark {
+            Remark::Note(text) => self.say(&format!("note: {text}")),
+            Remark::Doubt(text) => self.warn(text),
+        }
     }
 
     /// A detail, to stderr, with `--verbose`.

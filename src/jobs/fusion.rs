@@ -2,7 +2,7 @@
 
 use super::{FusionFilter, FusionFilterError, Note};
 use crate::fusion::alignment::{self, Alignment, AlignmentError};
-use crate::fusion::mounting::{self, MountingError};
+use crate::fusion::mounting::{self, Mounted, MountingError};
 use crate::fusion::{
     self, Assessment, FusionError, Outcome, Recorded, Settings, Solution, Start, check_clocks,
 };
@@ -14,16 +14,6 @@ use crate::sensors::outage::{FixedData, Outage, OutageError, OutagePlan, PlacedO
 use crate::simulation::lincov::weak_heading;
 use crate::trajectory::reference::Reference;
 use crate::units::DEG;
-
-/// Where it is known from how the IMU sits in the vehicle.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Mounted {
-    /// From the settings.
-    #[default]
-    AsGiven,
-    /// From the drive.
-    AsFound,
-}
 
 /// A recorded drive.
 #[derive(Debug)]

@@ -59,7 +59,7 @@ pub use error::JobError;
 pub use estimator_study::EstimatorStudy;
 pub(crate) use files::{ModelFiles, claim_model, not_anew, not_of_others};
 pub use fuse::{FusionFilter, FusionFilterError};
-pub use fusion::{FuseError, Fused, Mounted, RecordedDrive};
+pub use fusion::{FuseError, Fused, RecordedDrive};
 pub use navigate::{NavigateError, NavigateInputs, Navigation, Note, TrueImu, navigate};
 pub use remarks::{Remark, Remarks, Silence};
 pub use require::{Ask, CatalogueUnit, Misplaced, Requirements};

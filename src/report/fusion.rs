@@ -1,6 +1,5 @@
 //! What is said of a fusion: `summary.json` and the lines on the terminal.
 
-use super::manifest::Input;
 use super::number::{seconds, window};
 use super::page::{Cell, Table, Tone};
 use super::smoothed::{Reference, Smoothed};
@@ -9,36 +8,11 @@ use crate::frames::{NavState, RollPitchYaw, wrap_angle};
 use crate::fusion::mounting::Mounting;
 use crate::fusion::{Assessment, Drift, Outcome, Solution, Start, Verdict};
 use crate::units::DEG;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 pub(super) const STATE: [&str; 9] =
     ["lat_deg", "lon_deg", "h_m", "v_n_m_s", "v_e_m_s", "v_d_m_s", "roll_deg", "pitch_deg", "yaw_deg"];
 const SCHEMA_VERSION: u32 = 1;
-
-/// Where a fusion came from: `manifest.json`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct FusionManifest {
-    /// Layout version.
-    pub schema_version: u32,
-    /// What made the directory.
-    pub kind: FusionKind,
-    /// Version of nav-sim.
-    pub version: String,
-    /// The command as given.
-    pub command: Vec<String>,
-    /// Every file that was read.
-    pub inputs: Vec<Input>,
-    /// Time from start to results (s).
-    pub wall_s: f64,
-}
-
-/// Tells the directory of a fusion from that of a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(crate) enum FusionKind {
-    /// `nav-sim fuse`.
-    Fusion,
-}
 
 /// `summary.json` of a fusion.
 #[derive(Debug, Clone, PartialEq, Serialize)]

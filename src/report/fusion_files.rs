@@ -1,7 +1,8 @@
 //! The files of a fusion directory: tables, the path for maps, the summary, the page.
 
-use super::fusion::{FusionManifest, FusionSummary, STATE, values};
+use super::fusion::{FusionSummary, STATE, values};
 use super::json;
+use super::manifest::FusionManifest;
 use super::number::shortest;
 use super::pages::fusion_page;
 use super::run_directory::OutputFile;

@@ -1,5 +1,9 @@
-//! `manifest.json`: all it takes to know where a run directory came from, and to make it again.
+//! `manifest.json`: all it takes to know where the directory of a run or a fusion came from, and to make it again.
 
+use crate::ekf::{FilterStates, InitialSettings};
+use crate::fusion::Settings;
+use crate::fusion::mounting::Mounted;
+use crate::gnss::FixSigma;
 use crate::scenario::Scenario;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -60,12 +64,9 @@ impl Manifest {
 
     /// Whether a run of the one is a run of the other: all that decides the results is the same.
     pub(crate) fn is_same_run(&self, other: &Self) -> bool {
-        let inputs = |m: &Self| -> Vec<(String, String)> {
-            m.inputs.iter().map(|i| (i.role.clone(), i.blake3.clone())).collect()
-        };
         (&self.version, self.seed) == (&other.version, other.seed)
             && (&self.configuration, &self.model) == (&other.configuration, &other.model)
-            && inputs(self) == inputs(other)
+            && contents(&self.inputs) == contents(&other.inputs)
     }
 
     /// Whether another run would be a run of this one, had this one its seed.
@@ -78,5 +79,66 @@ impl Manifest {
     /// The hashes of the inputs of a role, in the order given.
     pub(crate) fn hashes(&self, role: &str) -> Vec<&str> {
         self.inputs.iter().filter(|i| i.role == role).map(|i| i.blake3.as_str()).collect()
+    }
+}
+
+/// What files hold and what for, wherever they are.
+fn contents(inputs: &[Input]) -> Vec<(&str, &str)> {
+    inputs.iter().map(|i| (i.role.as_str(), i.blake3.as_str())).collect()
+}
+
+/// Where a fusion came from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct FusionManifest {
+    /// Layout version.
+    pub schema_version: u32,
+    /// What made the directory.
+    pub kind: FusionKind,
+    /// Version of nav-sim.
+    pub version: String,
+    /// The command as given.
+    pub command: Vec<String>,
+    /// All that decides the result beside the files.
+    pub configuration: FusionConfiguration,
+    /// Every file that was read.
+    pub inputs: Vec<Input>,
+    /// Time from start to results (s).
+    pub wall_s: f64,
+}
+
+/// Tells the directory of a fusion from that of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum FusionKind {
+    /// `nav-sim fuse`.
+    Fusion,
+}
+
+/// What decides a fusion beside its files.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct FusionConfiguration {
+    /// How it is fused; where the mounting is found, about which axes it is looked for.
+    pub settings: Settings,
+    /// Whether the mounting is found.
+    pub mounted: Mounted,
+    /// States of the filter.
+    pub filter: FilterStates,
+    /// What it expects at the start, and of the IMU beside the model.
+    pub initial: InitialSettings,
+    /// Standard deviations of fixes that state none.
+    pub gnss_sigma: Option<FixSigma>,
+    /// What the standard deviations of position and velocity are multiplied by.
+    pub gnss_sigma_factor: [f64; 2],
+}
+
+impl FusionManifest {
+    /// Version of the layout.
+    pub(crate) const SCHEMA_VERSION: u32 = 2;
+
+    /// Whether a fusion of the one is a fusion of the other: all that decides the results is the same.
+    #[must_use]
+    pub(crate) fn is_same_fusion(&self, other: &Self) -> bool {
+        (&self.version, &self.configuration) == (&other.version, &other.configuration)
+            && contents(&self.inputs) == contents(&other.inputs)
     }
 }

@@ -63,6 +63,42 @@ fn another_result_is_refused() {
     assert!(!ran.stderr.contains("recordings at"), "{}", ran.stderr);
 }
 
+/// A fusion is known by what decides it: not by the words of its command, its order, or where its files are.
+#[test]
+fn a_fusion_is_known_by_its_configuration_and_the_contents_of_its_files() {
+    let place = place_with(DRIVE, MODEL);
+    done(place.path(), "trajectory record drive.toml imu.toml --seed 3 -o log");
+    fs::copy(place.path().join("log/imu.csv"), place.path().join("copy.csv")).unwrap();
+    let start = "--initial log/initial.toml";
+    let given = "--outage 8:11 --gnss-sigma-factor 2,1 --mounting 0,0,1:1,1,1 --nis-gate 0.999";
+    let fuse = format!("fuse log/imu.csv log/gnss.csv imu.toml {start}");
+    let first = plain(place.path(), &format!("{fuse} {given} -o out"));
+    assert_eq!(first.code, 0, "{}", first.stderr);
+    let manifest: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(place.path().join("out/manifest.json")).unwrap()).unwrap();
+    let configuration = &manifest["configuration"];
+    assert_eq!(configuration["settings"]["outages"][0]["end_s"], 11.0);
+    assert_eq!(configuration["gnss_sigma_factor"], serde_json::json!([2.0, 1.0]));
+    let same = [
+        "fuse copy.csv log/gnss.csv imu.toml --nis-gate .999 --mounting=0,0,1.0:1,1,1 --gnss-sigma-factor 2.0,1.0",
+        " --outage 8.0:11 --lever-arm 0,0,0 --axes frd --gravity wgs84 --filter 15 --rate-hz 10 -j 1 -q --out=out ",
+        start,
+    ]
+    .concat();
+    let again = plain(place.path(), &same);
+    assert_eq!(again.code, 0, "{}", again.stderr);
+    for other in ["--smooth", "--lever-arm 0,0,1", "--gnss-sigma 5", "--turn-on-bias 0.02,1e-4", "--axes flu"]
+    {
+        refused(
+            &plain(place.path(), &format!("{fuse} {given} {other} -o out")),
+            "holds the result of another",
+        );
+    }
+    let text = fs::read_to_string(place.path().join("copy.csv")).unwrap();
+    fs::write(place.path().join("copy.csv"), text.trim_end()).unwrap();
+    refused(&plain(place.path(), &same), "holds the result of another");
+}
+
 /// Another that writes there now is met before the work, even with `--force`; what a killed one left is not in the way
 /// and is removed. The two writers' lock is the operating system's, taken here as another process takes it.
 #[test]

@@ -9,7 +9,7 @@ use nav_sim::formats::{model_file, trajectory_file};
 use nav_sim::frames::RollPitchYaw;
 use nav_sim::fusion::gap::bridged;
 use nav_sim::fusion::{Recorded, Row, Settings, Solution, Start, Use, fuse, outcome};
-use nav_sim::gnss::GnssFix;
+use nav_sim::gnss::{GnssFix, OPEN_M_S};
 use nav_sim::imu::{ImuIncrement, Sensor};
 use nav_sim::noise::Model;
 use nav_sim::scenario::Scenario;
@@ -104,12 +104,35 @@ fn errors_are_as_large_as_the_filter_says() {
             runs += 1.0;
         });
     }
-    let inside = |sum: f64, dof: f64| {
-        let p = ChiSquared::new(dof).unwrap().cdf(sum);
-        assert!((1e-4..=1.0 - 1e-4).contains(&p), "{sum} of {dof} degrees: p = {p}");
-    };
     nees.iter().for_each(|sum| inside(*sum, 9.0 * runs));
     inside(nis, components);
+}
+
+/// A sum of squares is chi-square of so many degrees (two-sided 1e-4).
+fn inside(sum: f64, dof: f64) {
+    let p = ChiSquared::new(dof).unwrap().cdf(sum);
+    assert!((1e-4..=1.0 - 1e-4).contains(&p), "{sum} of {dof} degrees: p = {p}");
+}
+
+/// Fixes whose vertical velocity is not measured, as those of NMEA sentences: the sum of the NIS is chi-square of 5 a fix.
+#[test]
+fn what_is_not_measured_is_no_component_of_the_nis() {
+    let trajectory = shipped("figure_eight.toml");
+    let (mut nis, mut fixes) = (0.0, 0);
+    recorded(&trajectory, &model(), &GnssSettings::default(), 4, |recording, start| {
+        let open = |fix: &GnssFix| {
+            let horizontal =
+                |(v, sigma): (DVec3, DVec3)| (v.truncate().extend(0.0), sigma.truncate().extend(OPEN_M_S));
+            GnssFix { velocity: fix.velocity.map(horizontal), ..*fix }
+        };
+        let gnss: Vec<GnssFix> = recording.gnss.iter().map(open).collect();
+        let solution = run(&recording.imu, &gnss, start, &settings(), &trajectory);
+        assert!(solution.fixes.iter().all(|f| f.innovation.len() == 5 && f.sigma.len() == 5));
+        let per_component = outcome(&solution, &[]).nis_per_component;
+        nis += per_component * 5.0 * solution.fixes.len() as f64;
+        fixes += solution.fixes.len();
+    });
+    inside(nis, 5.0 * fixes as f64);
 }
 
 /// Without noise, fixes between the samples agree to millimetres only when they are used at their own time:

@@ -3,11 +3,14 @@
 use super::Args;
 use crate::cli::{Failure, Session, parse, read, turn_on};
 use crate::ekf::{FilterStates, InitialSettings};
-use crate::formats::fusion_files::{FixSigma, read_gnss, read_imu, read_initial};
+use crate::formats::fusion_files::{read_gnss, read_imu, read_initial};
 use crate::formats::model_file::ModelFile;
 use crate::frames::RollPitchYaw;
-use crate::jobs::{Mounted, RecordedDrive};
-use crate::report::Input;
+use crate::fusion::Settings;
+use crate::fusion::mounting::Mounted;
+use crate::gnss::FixSigma;
+use crate::jobs::RecordedDrive;
+use crate::report::{FusionConfiguration, Input};
 use crate::units::DEG;
 use glam::{DMat3, DQuat, DVec3};
 use std::path::PathBuf;
@@ -19,12 +22,11 @@ pub(super) struct Inputs {
     pub(super) states: FilterStates,
     /// What the filter expects at the start, and of the IMU beside the model.
     pub(super) expected: InitialSettings,
-    /// Every file with its hash.
-    pub(super) files: Vec<Input>,
 }
 
 impl Inputs {
-    pub(super) fn read(args: &Args, session: &Session) -> Result<Self, Failure> {
+    /// Reads them; also every file with its hash.
+    pub(super) fn read(args: &Args, session: &Session) -> Result<(Self, Vec<Input>), Failure> {
         let given = (args.initial.as_os_str() != "auto").then_some(&args.initial);
         let mut named: Vec<(&str, &PathBuf)> =
             vec![("imu", &args.imu), ("gnss", &args.gnss), ("model", &args.model)];
@@ -35,7 +37,7 @@ impl Inputs {
         let ends_s = imu.samples.first().zip(imu.samples.last()).map(|(first, last)| (first.t_s, last.t_s));
         let (gnss, remarks) =
             read_gnss(&args.gnss, args.gnss_sigma.as_ref(), ends_s).map_err(read::refused_for_fusion)?;
-        imu.remarks.iter().chain(&remarks).for_each(|r| session.printer.warn(r));
+        imu.remarks.iter().chain(&remarks).for_each(|remark| session.printer.remark(remark));
         let initial = given.map(|path| read_initial(path)).transpose()?;
         let model = read::model(&args.model, session)?;
         let (from, to) = (model.model.rate_hz, imu.rate_hz);
@@ -60,7 +62,19 @@ impl Inputs {
         if let Some(parse::Pair([position, velocity])) = args.gnss_sigma_factor {
             drive.scale_sigma(position, velocity);
         }
-        Ok(Self { drive, model, states, expected, files })
+        Ok((Self { drive, model, states, expected }, files))
+    }
+
+    /// What decides the fusion beside the files.
+    pub(super) fn configuration(&self, args: &Args, settings: &Settings) -> FusionConfiguration {
+        FusionConfiguration {
+            settings: settings.clone(),
+            mounted: self.drive.mounted,
+            filter: self.states,
+            initial: self.expected.clone(),
+            gnss_sigma: args.gnss_sigma,
+            gnss_sigma_factor: args.gnss_sigma_factor.map_or([1.0; 2], |factor| factor.0),
+        }
     }
 }
 

@@ -9,10 +9,10 @@ use super::pictures::PlotArgs;
 use super::run::{Words, parse_outage, windows_of};
 use super::{Failure, Printer, Session, parse};
 use crate::earth::GravityModel;
-use crate::formats::fusion_files::FixSigma;
 use crate::fusion::{Assessment, FusionError, Settings, Verdict};
+use crate::gnss::FixSigma;
 use crate::jobs::{FuseError, Fused, FusionFilter, FusionFilterError};
-use crate::report::fusion_page;
+use crate::report::{FusionManifest, fusion_page};
 use crate::sensors::gnss::MAX_LEVER_ARM_M;
 use inputs::Inputs;
 use std::path::{Path, PathBuf};
@@ -110,15 +110,17 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let begin = Instant::now();
     let settings = settings(args)?;
-    let inputs = Inputs::read(args, session)?;
-    let _own = output::claim(&args.out, &inputs.files, session)?;
+    let (inputs, files) = Inputs::read(args, session)?;
+    let manifest = output::manifest(inputs.configuration(args, &settings), files);
+    let _own = output::claim(&args.out, &manifest, session)?;
     let _picture =
-        args.plot.claim(&inputs.files.iter().map(|i| PathBuf::from(&i.path)).collect::<Vec<_>>())?;
-    let Inputs { drive, model, states, expected, files } = inputs;
+        args.plot.claim(&manifest.inputs.iter().map(|i| PathBuf::from(&i.path)).collect::<Vec<_>>())?;
+    let Inputs { drive, model, states, expected } = inputs;
     let filter = FusionFilter { model: &model.model, states, initial: &expected };
     let fused = drive.fuse(&filter, settings, &Words::new(session)).map_err(|e| impossible(e, args))?;
     let Fused { solution, outcome, assessment, summary, .. } = fused;
-    output::write(&solution, &summary, files, begin.elapsed().as_secs_f64(), &args.out)?;
+    let manifest = FusionManifest { wall_s: begin.elapsed().as_secs_f64(), ..manifest };
+    output::write(&solution, &summary, &manifest, &args.out)?;
     session.show(|| crate::report::json(&summary), || summary.text());
     session.wrote(&args.out);
     args.plot.write(|| fusion_page(&solution, &summary, &[]).svg(), session)?;

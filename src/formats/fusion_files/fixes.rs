@@ -2,12 +2,12 @@
 
 use super::nmea::{self, is_nmea};
 use super::rtklib::{self, is_rtklib};
-use super::{bare_columns, table, time_back};
+use super::{Remark, bare_columns, table, time_back};
 use crate::earth::{MAX_LATITUDE, geodetic_to_ecef};
 use crate::formats::suggest::nearest;
 use crate::formats::trajectory_file::table::{Table, text};
 use crate::formats::{FileError as Error, Kind, Place, Setting};
-use crate::gnss::GnssFix;
+use crate::gnss::{FixSigma, GnssFix};
 use crate::units::DEG;
 use glam::DVec3;
 use std::f64::consts::PI;
@@ -52,14 +52,6 @@ pub(super) const COLUMNS: &str = "a GNSS file has the columns t_s, lat_deg, lon_
                                   have v_n_m_s, v_e_m_s, v_d_m_s, sd_vn_m_s, sd_ve_m_s, sd_vd_m_s; or it is a KF-GINS \
                                   text of 7 columns, or of 13 with velocity, or a solution of RTKLIB, or NMEA sentences";
 
-/// Standard deviations of fixes whose file states none: north, east, down.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct FixSigma {
-    /// Of the position (m).
-    pub pos_m: [f64; 3],
-    /// Of the velocity (m/s).
-    pub vel_m_s: Option<[f64; 3]>,
-}
 /// Other names of them: stem, index of the quantity.
 const STEMS: [(&str, usize); 49] = [
     ("t", 0),
@@ -144,14 +136,14 @@ struct Columns([Option<(usize, f64)>; NAMES.len()]);
 
 impl Columns {
     /// Standard deviations that are not of the file, and columns that are not used.
-    fn remarks(&self, ignored: &[String]) -> Vec<String> {
+    fn remarks(&self, ignored: &[String]) -> Vec<Remark> {
         let unstated = |at: usize| self.0[at].is_none();
         let mut remarks = Vec::new();
         if unstated(4) || self.0[VELOCITY.start].is_some() && unstated(10) {
-            remarks.push("standard deviations as given for all fixes".to_owned());
+            remarks.push(Remark::note("standard deviations as given for all fixes"));
         }
         if !ignored.is_empty() {
-            remarks.push(format!("columns not used: {}", ignored.join(", ")));
+            remarks.push(Remark::note(format!("columns not used: {}", ignored.join(", "))));
         }
         remarks
     }
@@ -233,7 +225,7 @@ pub(crate) fn read_gnss(
     path: &Path,
     unsaid: Option<&FixSigma>,
     clock_s: Option<(f64, f64)>,
-) -> Result<(Vec<GnssFix>, Vec<String>), Error> {
+) -> Result<(Vec<GnssFix>, Vec<Remark>), Error> {
     let shown = path.display().to_string();
     let text = text(path)?;
     if let Some(error) = of_another_kind(&shown, &text) {
@@ -248,11 +240,11 @@ pub(crate) fn read_gnss(
         check_step(&shown, pair[1].0, &pair[0].1, &pair[1].1)?;
     }
     let fixes = fixes.into_iter().map(|(_, fix)| fix).collect();
-    Ok((fixes, remarks.into_iter().map(|r| format!("{shown}: {r}")).collect()))
+    Ok((fixes, remarks.into_iter().map(|r| r.of_file(&shown)).collect()))
 }
 
 /// Fixes with their lines, and remarks.
-pub(super) type Fixes = (Vec<(u64, GnssFix)>, Vec<String>);
+pub(super) type Fixes = (Vec<(u64, GnssFix)>, Vec<Remark>);
 
 /// The fixes of a table, of KF-GINS or of RTKLIB.
 fn of_table(path: &Path, mut text: String, unsaid: Option<&FixSigma>) -> Result<Fixes, Error> {
@@ -260,7 +252,7 @@ fn of_table(path: &Path, mut text: String, unsaid: Option<&FixSigma>) -> Result<
     let is_rtklib = is_rtklib(&text);
     if is_rtklib {
         let (table, remark) = rtklib::rows(&path.display().to_string(), &text)?;
-        (text, remarks) = (table, vec![remark]);
+        (text, remarks) = (table, vec![Remark::note(remark)]);
     }
     let bare = bare_columns(&text);
     let names = bare.map(|columns| bare_names(path, columns)).transpose()?;
@@ -268,7 +260,8 @@ fn of_table(path: &Path, mut text: String, unsaid: Option<&FixSigma>) -> Result<
     let (columns, ignored) = Columns::of(&table, unsaid)?;
     if bare.is_some() && !is_rtklib {
         let velocity = if columns.0[VELOCITY.start].is_some() { ", velocity" } else { "" };
-        remarks.push(format!("no header: read as KF-GINS text, position{velocity} and standard deviations"));
+        let text = format!("no header: read as KF-GINS text, position{velocity} and standard deviations");
+        remarks.push(Remark::note(text));
     }
     remarks.extend(columns.remarks(&ignored));
     let mut fixes = Vec::with_capacity(table.rows.len());
@@ -278,9 +271,8 @@ fn of_table(path: &Path, mut text: String, unsaid: Option<&FixSigma>) -> Result<
     }
     let small = |(_, f): &(u64, GnssFix)| f.lat.abs() <= 0.5 * PI * DEG && f.lon.abs() <= 2.0 * PI * DEG;
     if fixes.iter().all(small) {
-        remarks.push(
-            "latitude and longitude never exceed π: radians? Then name the columns lat_rad, lon_rad".into(),
-        );
+        let text = "latitude and longitude never exceed π: radians? Then name the columns lat_rad, lon_rad";
+        remarks.push(Remark::doubt(text));
     }
     Ok((fixes, remarks))
 }

@@ -1,6 +1,6 @@
 //! Recorded IMU data.
 
-use super::{bare_columns, table, time_back};
+use super::{Remark, bare_columns, table, time_back};
 use crate::formats::recordings::checks::{check_gravity, gravity_factor};
 use crate::formats::recordings::error::storage;
 use crate::formats::recordings::header::{Role, Unit};
@@ -28,7 +28,7 @@ pub(crate) struct ImuFile {
     /// Samples a second, by the median step.
     pub rate_hz: f64,
     /// What is doubtful, and how the file was read.
-    pub remarks: Vec<String>,
+    pub remarks: Vec<Remark>,
 }
 
 /// Six values a sample, and the time it ends.
@@ -40,7 +40,7 @@ struct Columns {
     /// Which of the two each sensor gives.
     increments: [bool; 2],
     lines: Vec<u64>,
-    remarks: Vec<String>,
+    remarks: Vec<Remark>,
 }
 
 /// Reads a recording: a table whose headers are those of static recordings (rates, or increments over the
@@ -87,7 +87,9 @@ fn kf_gins(path: &Path, text: &str) -> Result<Columns, Error> {
         values: table.rows.iter().map(|(_, r)| [r[4], r[5], r[6], r[1], r[2], r[3]]).collect(),
         increments: [true; 2],
         lines: table.rows.iter().map(|(line, _)| *line).collect(),
-        remarks: vec![format!("no header: read as KF-GINS text, angle then velocity increments{odometer}")],
+        remarks: vec![Remark::note(format!(
+            "no header: read as KF-GINS text, angle then velocity increments{odometer}"
+        ))],
     })
 }
 
@@ -193,8 +195,7 @@ impl Columns {
             samples.push(sample);
         }
         self.tell_of_holes(&holes);
-        let path = &self.path;
-        let remarks = self.remarks.iter().map(|r| format!("{path}: {r}")).collect();
+        let remarks = self.remarks.into_iter().map(|r| r.of_file(&self.path)).collect();
         Ok(ImuFile { samples: bridged(&samples, step), rate_hz: 1.0 / step, remarks })
     }
 
@@ -208,10 +209,10 @@ impl Columns {
             list.push(format!("and {} more", holes.len() - SHOWN));
         }
         if !list.is_empty() {
-            self.remarks.push(format!(
+            self.remarks.push(Remark::doubt(format!(
                 "samples missing: {}; bridged with those beside them, as uncertain as this recording is over such times",
                 list.join(", ")
-            ));
+            )));
         }
     }
 
@@ -242,8 +243,8 @@ impl Columns {
         }
         if rate > FAST {
             let degrees = rate / DEG;
-            self.remarks
-                .push(format!("mean angular rate {degrees:.0} deg/s: are these degrees named radians?"));
+            let text = format!("mean angular rate {degrees:.0} deg/s: are these degrees named radians?");
+            self.remarks.push(Remark::doubt(text));
         }
         Ok(())
     }

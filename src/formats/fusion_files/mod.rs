@@ -7,7 +7,7 @@ mod initial;
 mod nmea;
 mod rtklib;
 
-pub(crate) use fixes::{FixSigma, read_gnss};
+pub(crate) use fixes::read_gnss;
 pub(crate) use inertial::read_imu;
 pub(crate) use initial::{initial_schema, read_initial};
 pub(in crate::formats) use nmea::is_nmea;
@@ -15,6 +15,33 @@ pub(in crate::formats) use nmea::is_nmea;
 use crate::formats::trajectory_file::table::{self, Numbers, Table};
 use crate::formats::{FileError, Kind};
 use std::path::Path;
+
+/// What is said of a file that was read.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Remark {
+    /// How it was read.
+    Note(String),
+    /// What is doubtful about it.
+    Doubt(String),
+}
+
+impl Remark {
+    fn note(text: impl Into<String>) -> Self {
+        Self::Note(text.into())
+    }
+
+    fn doubt(text: impl Into<String>) -> Self {
+        Self::Doubt(text.into())
+    }
+
+    /// The same with the name of the file before it.
+    fn of_file(self, path: &str) -> Self {
+        match self {
+            Self::Note(text) => Self::Note(format!("{path}: {text}")),
+            Self::Doubt(text) => Self::Doubt(format!("{path}: {text}")),
+        }
+    }
+}
 
 /// The first row of a table of numbers between blanks without a header; none of any other text.
 pub(super) fn bare_row(text: &str) -> Option<Vec<f64>> {

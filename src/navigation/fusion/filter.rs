@@ -73,11 +73,11 @@ impl Filter {
         }
     }
 
-    /// Innovation, its standard deviations and NIS, all components together.
+    /// Innovation, its standard deviations and NIS, all measured components together.
     pub(super) fn look_at(&mut self, fix: &GnssFix) -> FixRecord {
         settle(&mut self.ekf);
         let measured = self.fix(fix);
-        let components = if measured.v_n.is_some() { 6 } else { 3 };
+        let components = fix.components();
         let [position, velocity] = self.ekf.innovation(&measured);
         let both = [position.lane(0).to_array(), velocity.lane(0).to_array()].concat();
         let z = DVector::from_fn(components, |i, _| both[i]);

@@ -34,6 +34,7 @@ use crate::units::DEG;
 use filter::Filter;
 use gap::{Bridges, Spread};
 use glam::{DQuat, DVec3};
+use serde::{Deserialize, Serialize};
 use smoother::Tape;
 
 /// Position (m, north, east, down), velocity (m/s), roll, pitch, yaw (degrees).
@@ -49,13 +50,16 @@ pub struct Recorded<'a> {
 }
 
 /// How it is fused.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
     /// The IMU in the vehicle: takes the IMU's axes, returns front, right, down.
+    #[serde(rename = "imu_to_vehicle_xyzw")]
     pub q_s_b: DQuat,
     /// How well that is known about the vehicle's front, right and down axes (rad): 0 as given.
+    #[serde(rename = "mounting_sigma_rad")]
     pub mounting_sigma_b: DVec3,
     /// Antenna from IMU: front, right, down (m).
+    #[serde(rename = "lever_arm_m")]
     pub lever_arm_b: DVec3,
     /// Gravity.
     pub gravity: GravityModel,

@@ -4,18 +4,19 @@
 //! The layout of the sentences is that of the receivers' manuals (Trimble R6/R7/R8, appendix A; u-blox protocol
 //! specifications).
 
+mod clock;
 mod sentence;
 
-use super::fixes::{FixSigma, Fixes};
+use super::Remark;
+use super::fixes::Fixes;
 use crate::formats::{FileError as Error, Setting};
-use crate::gnss::GnssFix;
+use crate::gnss::{FixSigma, GnssFix, OPEN_M_S};
+use clock::{Clock, Dates};
 use glam::{DVec2, DVec3};
-use sentence::{angle, date_of_rmc, fields, horizontal, midnight, time_of_day};
+use sentence::{address, angle, date_of_rmc, fields, horizontal, midnight, time_of_day, unchecked_fields};
 
 /// Seconds of a day.
 const DAY_S: f64 = 86_400.0;
-/// Standard deviation of a vertical velocity that no sentence states (m/s): it tells the filter nothing.
-const OPEN: f64 = 1000.0;
 
 /// What the sentences of one time say.
 #[derive(Debug, Clone, Default)]
@@ -37,31 +38,34 @@ struct Epoch {
 #[derive(Debug, Default)]
 pub(super) struct Log {
     epochs: Vec<Epoch>,
-    /// Midnight before the first sentence (Unix s), where there is a date.
-    midnight_s: Option<f64>,
+    /// Midnights before the first sentence, by the dates that are stated.
+    dates: Dates,
     /// Positions that are none: no fix, dead reckoning, typed in by hand.
     left_out: usize,
     has_separation: bool,
+    has_checksums: bool,
 }
 
-/// Whether a text is such a log: one of its first lines is a sentence of a receiver.
+/// Whether a text is such a log: one of its first lines has a sentence of a receiver in it.
 pub(in crate::formats) fn is_nmea(text: &str) -> bool {
-    let is_sentence = |line: &str| {
-        let address = line.strip_prefix('$').and_then(|rest| rest.split(',').next());
-        address.is_some_and(|a| a.len() == 5 && a.bytes().all(|b| b.is_ascii_uppercase()))
-    };
-    text.trim_start_matches('\u{feff}').lines().take(20).any(is_sentence)
+    text.lines().take(20).any(|line| address(line.trim_end()).is_some())
 }
 
 impl Log {
-    /// Reads all sentences. A first or last line that is cut is left out.
+    /// Reads all sentences, whatever a logger wrote before them in their lines. A first or last line that is cut is left
+    /// out. Where no sentence has a checksum, their numbers of fields tell those that are whole; a last line without an
+    /// end may be cut within a number.
     pub(super) fn read(path: &str, text: &str) -> Result<Self, Error> {
-        let lines = text.trim_start_matches('\u{feff}').lines().map(str::trim).enumerate();
+        let has_checksums = text.contains('*');
+        let ended = || text.rsplit_once('\n').map_or(text, |(whole, _)| whole);
+        let kept = if has_checksums { text } else { ended() };
+        let split = |line| if has_checksums { fields(line) } else { unchecked_fields(line) };
+        let lines = kept.lines().map(str::trim).enumerate();
         let lines: Vec<(usize, &str)> = lines.filter(|(_, line)| !line.is_empty()).collect();
         let ends = [lines.first().map(|l| l.0), lines.last().map(|l| l.0)];
-        let mut log = Self::default();
+        let mut log = Self { has_checksums, ..Self::default() };
         for (i, line) in lines {
-            let said = fields(line).and_then(|fields| log.sentence(i + 1, &fields));
+            let said = split(line).and_then(|fields| log.sentence(i + 1, &fields));
             match said {
                 Err(message) if !ends.contains(&Some(i)) => {
                     let found: String = line.chars().take(60).collect();
@@ -105,13 +109,12 @@ impl Log {
                 if field(2) == "A" {
                     at.velocity = number(7).map(|knots| horizontal(knots, number(8)));
                 }
-                let date = date_of_rmc(field(9)).map(|s| s - day_s);
-                self.midnight_s = self.midnight_s.or(date);
+                self.dates.add(date_of_rmc(field(9)).map(|s| s - day_s));
             }
             "ZDA" => {
                 let date = number(4).zip(number(3)).zip(number(2));
                 let date = date.and_then(|((y, m), d)| midnight(y as i32, m as u32, d as u32));
-                self.midnight_s = self.midnight_s.or(date.map(|s| s - day_s));
+                self.dates.add(date.map(|s| s - day_s));
             }
             _ => {}
         }
@@ -162,7 +165,7 @@ pub(super) fn fixes(
     clock_s: Option<(f64, f64)>,
 ) -> Result<Fixes, Error> {
     let log = Log::read(path, text)?;
-    let (origin_s, clock) = log.clock(clock_s);
+    let clock = log.clock(clock_s);
     let hdop = log.middle_hdop();
     let mut fixes = Vec::new();
     for epoch in &log.epochs {
@@ -175,11 +178,10 @@ pub(super) fn fixes(
             let message = "a fix without standard deviations: no GST sentence of its time states them";
             return Err(Error::contents(path, epoch.line, message).setting(Setting::FixSigma));
         };
-        let velocity = epoch
-            .velocity
-            .zip(unsaid.and_then(|s| s.vel_m_s))
-            .map(|((v, open), [n, e, _])| (v.extend(0.0), DVec3::new(n.hypot(open), e.hypot(open), OPEN)));
-        let t_s = origin_s + DAY_S * epoch.day + epoch.time_s;
+        let velocity = epoch.velocity.zip(unsaid.and_then(|s| s.vel_m_s)).map(|((v, open), [n, e, _])| {
+            (v.extend(0.0), DVec3::new(n.hypot(open), e.hypot(open), OPEN_M_S))
+        });
+        let t_s = clock.origin_s + DAY_S * epoch.day + epoch.time_s;
         fixes.push((epoch.line as u64, GnssFix { t_s, lat, lon, h, pos_sigma_n, velocity }));
     }
     if fixes.is_empty() {
@@ -191,56 +193,49 @@ pub(super) fn fixes(
 }
 
 impl Log {
-    /// What is added to seconds of the first day, and what the times are then: Unix time where the IMU runs in it.
-    fn clock(&self, imu_s: Option<(f64, f64)>) -> (f64, &'static str) {
-        let span = |origin_s: f64| {
-            let at = |e: &Epoch| origin_s + DAY_S * e.day + e.time_s;
-            self.epochs.first().map(at).zip(self.epochs.last().map(at))
-        };
-        let overlaps = |origin_s: f64| {
-            let both = imu_s.zip(span(origin_s));
-            both.is_some_and(|(imu, gnss)| imu.0 <= gnss.1 && gnss.0 <= imu.1)
-        };
-        match self.midnight_s {
-            Some(midnight_s) if overlaps(midnight_s) => (midnight_s, "Unix time, as the IMU's"),
-            Some(_) => (0.0, "seconds of the day (UTC; the IMU's clock is not Unix time of the log's date)"),
-            None => (0.0, "seconds of the day (UTC; the log has no date)"),
-        }
-    }
-
     fn middle_hdop(&self) -> Option<f64> {
         let mut all: Vec<f64> = self.epochs.iter().filter_map(|e| e.hdop).collect();
         all.sort_by(f64::total_cmp);
         all.get(all.len() / 2).copied()
     }
 
-    fn remarks(&self, fixes: &[(u64, GnssFix)], unsaid: Option<&FixSigma>, clock: &str) -> Vec<String> {
+    fn remarks(&self, fixes: &[(u64, GnssFix)], unsaid: Option<&FixSigma>, clock: Clock) -> Vec<Remark> {
         let moving = fixes.iter().filter(|(_, fix)| fix.velocity.is_some()).count();
         let count = fixes.len();
-        let mut remarks = vec![format!(
-            "NMEA sentences: {count} fixes, {moving} with a horizontal velocity, times are {clock}"
-        )];
+        let mut remarks = vec![Remark::note(format!(
+            "NMEA sentences: {count} fixes, {moving} with a horizontal velocity, times are {}",
+            clock.words
+        ))];
+        remarks.extend(clock.doubts.into_iter().map(Remark::doubt));
+        if !self.has_checksums {
+            remarks.push(Remark::doubt(
+                "no sentence has a checksum, so that damaged digits go unseen: let the receiver write checksums",
+            ));
+        }
         if self.left_out > 0 {
-            remarks.push(format!("{} positions left out: no fix, dead reckoning or typed in", self.left_out));
+            remarks.push(Remark::note(format!(
+                "{} positions left out: no fix, dead reckoning or typed in",
+                self.left_out
+            )));
         }
         if self.epochs.iter().any(|e| e.position.is_some() && e.sigma.is_none()) {
-            remarks.push(
-                "standard deviations of positions without GST as given, in proportion to HDOP".to_owned(),
-            );
+            remarks.push(Remark::note(
+                "standard deviations of positions without GST as given, in proportion to HDOP",
+            ));
         }
         if moving == 0
             && self.epochs.iter().any(|e| e.velocity.is_some())
             && unsaid.is_none_or(|s| s.vel_m_s.is_none())
         {
-            remarks.push(
+            remarks.push(Remark::doubt(
                 "speed and course are not used: NMEA states no standard deviations of them; give them behind a colon \
-                 (--gnss-sigma 2,2,4:0.1)".to_owned(),
-            );
+                 (--gnss-sigma 2,2,4:0.1)",
+            ));
         }
         if !self.has_separation {
-            remarks.push(
-                "GGA states no geoid separation: heights are above the sea, up to 100 m off".to_owned(),
-            );
+            remarks.push(Remark::doubt(
+                "GGA states no geoid separation: heights are above the sea, up to 100 m off",
+            ));
         }
         remarks
     }

@@ -1,15 +1,40 @@
 //! What stands in a sentence.
 
 use crate::units::DEG;
-use chrono::NaiveDate;
+use chrono::{DateTime, NaiveDate};
 use glam::DVec2;
 
 /// A knot (m/s).
 pub(super) const KNOT: f64 = 1852.0 / 3600.0;
 
+/// Fields of a sentence with its address, at the least (NMEA 0183, version 2).
+const LEAST_FIELDS: [(&str, usize); 5] = [("GGA", 15), ("RMC", 12), ("VTG", 9), ("GST", 9), ("ZDA", 7)];
+
+/// What stands between `$` and the end of a line; before it, a logger may have written when it came.
+fn body(line: &str) -> Result<&str, &'static str> {
+    line.find(['$', '!']).map(|at| &line[at + 1..]).ok_or("not a sentence: it has no $")
+}
+
+/// The address of the sentence in a line, such as `GPGGA`.
+pub(super) fn address(line: &str) -> Option<&str> {
+    let address = body(line).ok()?.split(',').next()?;
+    (address.len() == 5 && address.bytes().all(|b| b.is_ascii_uppercase())).then_some(address)
+}
+
+/// The fields of a sentence in a log without checksums: whole by its number of fields.
+pub(super) fn unchecked_fields(line: &str) -> Result<Vec<&str>, &'static str> {
+    let body = body(line)?;
+    if body.contains(['$', '!']) {
+        return Err("a sentence within a sentence");
+    }
+    let fields: Vec<&str> = body.split(',').collect();
+    let is_cut = |(kind, least): &(&str, usize)| fields[0].ends_with(kind) && fields.len() < *least;
+    if LEAST_FIELDS.iter().any(is_cut) { Err("a sentence that is cut") } else { Ok(fields) }
+}
+
 /// The fields of a sentence whose checksum is right: what is between `$` and `*`, a XOR of its bytes.
 pub(super) fn fields(line: &str) -> Result<Vec<&str>, &'static str> {
-    let body = line.strip_prefix(['$', '!']).ok_or("not a sentence: it does not begin with $")?;
+    let body = body(line)?;
     let (body, sum) = body.rsplit_once('*').ok_or("a sentence without its checksum")?;
     let sum = u8::from_str_radix(sum, 16).map_err(|_| "a sentence without its checksum")?;
     let right = sum == body.bytes().fold(0, |all, byte| all ^ byte);
@@ -43,6 +68,12 @@ pub(super) fn angle(text: &str, hemisphere: &str, limit_deg: f64) -> Option<f64>
 pub(super) fn midnight(year: i32, month: u32, day: u32) -> Option<f64> {
     let date = NaiveDate::from_ymd_opt(year, month, day)?;
     Some(date.and_hms_opt(0, 0, 0)?.and_utc().timestamp() as f64)
+}
+
+/// The date of a time (Unix s).
+pub(super) fn date_of(unix_s: f64) -> String {
+    let time = DateTime::from_timestamp(unix_s as i64, 0);
+    time.map_or_else(|| format!("{unix_s} s"), |time| time.date_naive().to_string())
 }
 
 /// `ddmmyy`; years from 80 on are of the last century, as receivers count GPS.

@@ -15,6 +15,27 @@ fn read(text: &str) -> Vec<GnssFix> {
     fixes("a.nmea", text, Some(&SIGMA), None).unwrap().0.into_iter().map(|(_, fix)| fix).collect()
 }
 
+/// The fixes of a log, and what is said of it.
+fn said(text: &str, imu_s: Option<(f64, f64)>) -> (Vec<GnssFix>, Vec<String>) {
+    let (all, remarks) = fixes("a.nmea", text, Some(&SIGMA), imu_s).unwrap();
+    let words = |remark| match remark {
+        Remark::Note(text) => format!("note: {text}"),
+        Remark::Doubt(text) => format!("doubt: {text}"),
+    };
+    (all.into_iter().map(|(_, fix)| fix).collect(), remarks.into_iter().map(words).collect())
+}
+
+/// A second of a receiver that knows date, position and its deviations.
+fn second(time: &str, date: &str) -> String {
+    [
+        format!("GPRMC,{time},A,4807.038,N,01131.000,E,022.4,084.4,{date},003.1,W"),
+        format!("GPGGA,{time},4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,"),
+        format!("GPGST,{time},1.8,,,,1.7,1.3,2.2"),
+    ]
+    .map(|body| sentence(&body))
+    .concat()
+}
+
 /// The sentences that the manuals print, with their own checksums: 48° 07.038' N, 11° 31.000' E, 545.4 m above the
 /// geoid, which is 46.9 m above the ellipsoid; 22.4 knots towards 84.4°; 1994-03-23 12:35:19 UTC.
 #[test]
@@ -26,7 +47,7 @@ fn sentences_of_the_manuals() {
     assert!((fix.h - 592.3).abs() < 1e-9 && fix.t_s == 45_319.0, "{fix:?}");
     let (v, sigma) = fix.velocity.unwrap();
     assert!((v.length() - 22.4 * 0.514_444_444).abs() < 1e-6 && (v.y.atan2(v.x) / DEG - 84.4).abs() < 1e-9);
-    assert_eq!((sigma, fix.pos_sigma_n), (DVec3::new(0.1, 0.1, OPEN), DVec3::new(2.0, 2.0, 4.0)));
+    assert_eq!((sigma, fix.pos_sigma_n), (DVec3::new(0.1, 0.1, OPEN_M_S), DVec3::new(2.0, 2.0, 4.0)));
     // Trimble's, and u-blox's
     assert!(fields("$GPGST,172814.0,0.006,0.023,0.020,273.6,0.023,0.020,0.031*6A").is_ok());
     assert!(fields("$GPGST,082356.00,1.8,,,,1.7,1.3,2.2*7E").is_ok());
@@ -59,13 +80,13 @@ fn what_has_one_time_is_one_fix_from_any_talker() {
     assert_eq!(all[1].pos_sigma_n, DVec3::new(2.0, 2.0, 4.0));
     // 2024-02-01 00:00 UTC is 1 706 745 600 s: the IMU's clock tells which of the two is meant
     let unix = (1_706_745_599.0, 1_706_745_700.0);
-    let (unix, said) = fixes("a", &text, Some(&SIGMA), Some(unix)).unwrap();
-    assert!(unix[1].1.t_s == 1_706_745_600.0 && said[0].ends_with("Unix time, as the IMU's"), "{said:?}");
+    let (unix, said) = said(&text, Some(unix));
+    assert!(unix[1].t_s == 1_706_745_600.0 && said[0].ends_with("Unix time, as the IMU's"), "{said:?}");
     let zda = text.replace(&text[text.find("$GNRMC").unwrap()..text.find("$GLGGA").unwrap()], "")
         + &sentence("GNZDA,000000.50,01,02,2024,00,00");
-    let (dated, _) = fixes("a", &zda, Some(&SIGMA), Some((1_706_745_599.0, 1_706_745_700.0))).unwrap();
-    assert_eq!(dated[1].1.t_s, 1_706_745_600.0);
-    assert!(said[1].starts_with("1 positions left out"), "{said:?}");
+    let (dated, _) = self::said(&zda, Some((1_706_745_599.0, 1_706_745_700.0)));
+    assert_eq!(dated[1].t_s, 1_706_745_600.0);
+    assert!(said[1].starts_with("note: 1 positions left out"), "{said:?}");
 }
 
 #[test]
@@ -93,4 +114,70 @@ fn damaged_sentences_are_refused_with_their_line() {
     assert!(unstated.starts_with("a.nmea, line 1: a fix without standard deviations"), "{unstated}");
     let none = fixes("a.nmea", &sentence("GPRMC,1,V,,,,,,,,,"), Some(&SIGMA), None);
     assert!(none.unwrap_err().to_string().contains("without a position"));
+}
+
+/// Whatever a logger writes before the sentence of a line, a text of its own or a column.
+#[test]
+fn what_a_logger_writes_before_a_sentence_is_ignored() {
+    let log = second("123519", "230394") + &second("123520", "230394");
+    let plain = said(&log, None);
+    for stamp in ["2026-11-23T10:00:00.123 ", "1699999999.123,", "[  12.5] RX: "] {
+        let stamped: String = log.lines().map(|line| format!("{stamp}{line}\n")).collect();
+        assert!(is_nmea(&stamped), "{stamp}");
+        assert_eq!(said(&stamped, None), plain, "{stamp}");
+    }
+    assert!(!is_nmea("t_s,price\n0,$12\n") && !is_nmea("t_s,lat_deg\n0,46\n"));
+}
+
+/// The checksum is optional for most sentences: a log that has none is read, with a doubt, where its sentences are whole
+/// by their numbers of fields; one that has some is damaged where there is none.
+#[test]
+fn a_log_without_any_checksum_is_read_with_a_doubt() {
+    let log = second("123519", "230394") + &second("123520", "230394");
+    let bare: String = log.lines().map(|line| line.split('*').next().unwrap().to_owned() + "\n").collect();
+    let (with, without) = (said(&log, None), said(&bare, None));
+    assert_eq!(with.0, without.0);
+    assert!(without.1[1].starts_with("doubt: no sentence has a checksum"), "{without:?}");
+    assert!(
+        without.1.iter().filter(|r| r.starts_with("doubt")).count() == 1
+            && with.1.len() + 1 == without.1.len()
+    );
+    let refused = |text: &str| fixes("a.nmea", text, Some(&SIGMA), None).unwrap_err().to_string();
+    let lines: Vec<&str> = bare.lines().collect();
+    let cut = bare.replacen(lines[1], &lines[1][..50], 1);
+    assert!(refused(&cut).starts_with("a.nmea, line 2: a sentence that is cut: $GPGGA"), "{}", refused(&cut));
+    let run_together = bare.replacen(&format!("{}\n", lines[1]), &lines[1][..50], 1);
+    assert!(refused(&run_together).starts_with("a.nmea, line 2: a sentence within a sentence"));
+    let some = bare.replacen(lines[0], log.lines().next().unwrap(), 1);
+    assert!(refused(&some).starts_with("a.nmea, line 2: a sentence without its checksum"));
+    // a last line without an end, cut within the last of its numbers
+    let unfinished =
+        format!("{bare}{}", &second("123521", "230394").lines().nth(1).unwrap().replace(",,*", ",1"));
+    assert_eq!(said(&unfinished, None).0.len(), 2);
+}
+
+/// 2026-11-23 was 2007-04-09 1024 weeks before: an IMU that runs in Unix time tells which of the two a receiver means.
+#[test]
+fn dates_of_a_week_counter_that_has_rolled_over_are_told() {
+    let log = second("100000", "090407") + &second("100001", "090407");
+    let day_s = 1_795_392_000.0;
+    let imu = Some((day_s + 35_990.0, day_s + 36_100.0));
+    let (rolled, words) = said(&log, imu);
+    assert_eq!(rolled[0].t_s, day_s + 36_000.0);
+    let doubt = "doubt: the log is of 2007-04-09, the IMU of 2026-11-23, 1024 weeks later: the week counter of the \
+                 receiver has rolled over; read as 2026-11-23";
+    assert!(words[0].ends_with("times are Unix time, as the IMU's") && words[1] == doubt, "{words:?}");
+    // another day than the IMU's, by a rollover or not
+    let other = |date: &str| said(&(second("100000", date) + &second("100001", date)), imu).1[1].clone();
+    let apart = "the IMU, if its clock is Unix time, of 2026-11-23";
+    let rolled = ", more than 1024 weeks later, as when the week counter of a receiver has rolled over";
+    assert_eq!(other("080407"), format!("doubt: the log is of 2007-04-08, {apart}{rolled}"));
+    assert_eq!(other("221126"), format!("doubt: the log is of 2026-11-22, {apart}"));
+    // seconds since the IMU was switched on are no date
+    assert_eq!(said(&log, Some((0.0, 100.0))).1.len(), 1);
+    // before it has found the time, a receiver states any date
+    let (found, words) =
+        said(&(second("095959", "060180") + &second("100000", "231126") + &second("100001", "231126")), imu);
+    assert_eq!(found[1].t_s, day_s + 36_000.0);
+    assert!(words[1].starts_with("doubt: 1 dates do not agree with 2026-11-23"), "{words:?}");
 }
