@@ -201,6 +201,12 @@ impl FusionSummary {
         table
     }
 
+    /// What smoothing does in the outages, as the page shows it.
+    pub(super) fn smoothed_table(&self) -> Option<Table> {
+        let smoothed = self.smoothed.as_ref().filter(|_| !self.outages.is_empty());
+        smoothed.map(Smoothed::outage_table)
+    }
+
     /// The verdict with all its reasons.
     pub(super) fn verdict_line(&self) -> String {
         self.verdict_for(&self.reasons.join("; "))

@@ -1,7 +1,10 @@
 //! What a fusion says of its errors against a reference, and of what smoothing does to them.
 
-use crate::fusion::{FromReference, SmoothedOutcome};
+use super::number::window;
+use super::page::{Cell, Table};
+use crate::fusion::{Confidence, FromReference, SmoothedOutcome, Verdict};
 use crate::metrics::PerState;
+use crate::simulation::REPORTED_NAMES;
 use serde::Serialize;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -9,6 +12,8 @@ pub(super) struct Reference {
     pub(super) rmse: PerState<f64>,
     pub(super) horizontal_rmse_m: f64,
     pub(super) horizontal_max_m: f64,
+    /// Root mean square of error over standard deviation.
+    error_over_sigma: PerState<f64>,
     pub(super) nees_mean: f64,
     pub(super) nees_dof: usize,
 }
@@ -19,6 +24,7 @@ impl From<FromReference> for Reference {
             rmse: PerState(r.rmse),
             horizontal_rmse_m: r.rmse[0].hypot(r.rmse[1]),
             horizontal_max_m: r.horizontal_max_m,
+            error_over_sigma: PerState(r.over_sigma),
             nees_mean: r.nees_mean,
             nees_dof: 9,
         }
@@ -33,7 +39,18 @@ pub(super) struct Smoothed {
     horizontal_sigma_rms_filter_m: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     reference: Option<Reference>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    confidence: Option<ConfidenceRow>,
     outages: Vec<SmoothedOutageRow>,
+}
+
+/// Whether smoothed errors against the reference are as large as stated.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+struct ConfidenceRow {
+    verdict: &'static str,
+    error_over_sigma: f64,
+    worst_state: &'static str,
+    worst_error_over_sigma: f64,
 }
 
 /// The largest of the rows in an outage.
@@ -64,23 +81,44 @@ impl From<&SmoothedOutcome> for Smoothed {
             horizontal_sigma_rms_m: smoothed,
             horizontal_sigma_rms_filter_m: filter,
             reference: outcome.reference.map(Into::into),
+            confidence: outcome.reference.map(|r| r.confidence().into()),
             outages: outages.collect(),
         }
     }
 }
 
-/// Errors over standard deviations, of all states together, that are said.
-const TOO_SURE: f64 = 1.5;
+impl From<Confidence> for ConfidenceRow {
+    fn from(c: Confidence) -> Self {
+        Self {
+            verdict: c.verdict.name(),
+            error_over_sigma: c.over_sigma,
+            worst_state: REPORTED_NAMES[c.state],
+            worst_error_over_sigma: c.over_sigma_of_state,
+        }
+    }
+}
+
+impl ConfidenceRow {
+    /// The verdict, by how much and where.
+    fn line(&self) -> String {
+        let word =
+            if self.verdict == Verdict::Ok.name() { "consistent with the reference" } else { self.verdict };
+        format!(
+            "smoothed solution {word}: errors {:.1} times their standard deviations in all states together, {:.1} times in {}",
+            self.error_over_sigma, self.worst_error_over_sigma, self.worst_state
+        )
+    }
+}
 
 impl Smoothed {
     /// What is said of it, filter → smoothed.
     pub(super) fn lines(&self, filter: Option<&Reference>) -> Vec<String> {
-        let mut lines = vec![format!(
+        let mut line = format!(
             "smoothed, filter → smoothed: horizontal 1 sigma {:.3} → {:.3} m (RMS)",
             self.horizontal_sigma_rms_filter_m, self.horizontal_sigma_rms_m
-        )];
+        );
         if let (Some(before), Some(after)) = (filter, &self.reference) {
-            lines[0] += &format!(
+            line += &format!(
                 "; RMSE against the reference: horizontal {:.3} → {:.3} m, down {:.3} → {:.3} m, yaw {:.3} → {:.3}°; NEES {:.2} → {:.2}",
                 before.horizontal_rmse_m,
                 after.horizontal_rmse_m,
@@ -91,11 +129,9 @@ impl Smoothed {
                 before.nees_mean,
                 after.nees_mean
             );
-            let times = (after.nees_mean / after.nees_dof as f64).sqrt();
-            if times > TOO_SURE {
-                lines[0] += &format!("; smoothed errors are {times:.1} times their standard deviations");
-            }
         }
+        let mut lines: Vec<String> = self.confidence.iter().map(ConfidenceRow::line).collect();
+        lines.push(line);
         let largest =
             |of: fn(&SmoothedOutageRow) -> Option<f64>| self.outages.iter().filter_map(of).reduce(f64::max);
         if let (Some(before), Some(after)) =
@@ -111,5 +147,34 @@ impl Smoothed {
             lines.push(line);
         }
         lines
+    }
+
+    /// The outages as the page shows them.
+    pub(super) fn outage_table(&self) -> Table {
+        let has_reference = self.outages.iter().any(|o| o.horizontal_max_m.is_some());
+        let of_both = |what: &str| [format!("{what}, filter (m)"), format!("{what}, smoothed (m)")];
+        let mut table = Table::new(["outage"]).and(of_both("largest horizontal 1 σ"));
+        if has_reference {
+            table = table.and(of_both("largest horizontal error"));
+        }
+        for (i, o) in self.outages.iter().enumerate() {
+            let cell = |value: f64, key: &str| Cell::number(value, &format!("/smoothed/outages/{i}/{key}"));
+            let mut cells = vec![
+                Cell::from(window(o.start_s, o.end_s)),
+                cell(o.sigma_max_filter_m, "sigma_max_filter_m"),
+                cell(o.sigma_max_m, "sigma_max_m"),
+            ];
+            if has_reference {
+                let errors = [
+                    (o.horizontal_max_filter_m, "horizontal_max_filter_m"),
+                    (o.horizontal_max_m, "horizontal_max_m"),
+                ];
+                cells.extend(
+                    errors.map(|(value, key)| value.map_or_else(|| Cell::figures("–"), |v| cell(v, key))),
+                );
+            }
+            table.row(cells);
+        }
+        table
     }
 }

@@ -242,7 +242,7 @@ mod tests {
     fn a_reference_that_is_three_sigma_off_in_every_state_is_not_believed() {
         let all = solution(|_| 1.0, 600);
         let verdict = |nees| {
-            let reference = FromReference { rmse: [0.0; 9], horizontal_max_m: 0.0, nees_mean: nees };
+            let reference = FromReference { nees_mean: nees, ..FromReference::default() };
             let outcome = Outcome { reference: Some(reference), ..outcome(&all, &[]) };
             assess(&all, &outcome, &[]).verdict
         };

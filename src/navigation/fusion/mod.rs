@@ -7,6 +7,7 @@
 pub mod alignment;
 mod assessment;
 mod clocks;
+mod confidence;
 mod error;
 mod filter;
 pub mod gap;
@@ -18,6 +19,7 @@ use assessment::nis_bound;
 pub use assessment::{Assessment, Verdict, assess};
 pub use clocks::ClocksApart;
 pub(crate) use clocks::clocks_apart;
+pub use confidence::Confidence;
 pub use error::{DOUBTFUL, FusionError};
 pub use outcome::{
     Drift, Farthest, FromReference, OutageDrift, Outcome, SmoothedOutage, SmoothedOutcome, outcome,

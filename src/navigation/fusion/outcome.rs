@@ -45,10 +45,12 @@ pub struct Outcome {
 }
 
 /// Differences of rows from a reference.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct FromReference {
     /// Root mean square in each state.
     pub rmse: Nine,
+    /// Root mean square of the difference over its standard deviation in each state: 1 if both are right.
+    pub over_sigma: Nine,
     /// Largest horizontal distance (m).
     pub horizontal_max_m: f64,
     /// Mean NEES (9 if both are right).
@@ -102,13 +104,16 @@ pub fn outcome(solution: &Solution, outages: &[Outage]) -> Outcome {
 }
 
 fn from_reference(rows: &[Row]) -> Option<FromReference> {
-    let errors: Vec<_> = rows.iter().filter_map(|row| row.error).collect();
+    let errors: Vec<_> = rows.iter().filter_map(|row| Some((row.error?, &row.sigma))).collect();
     let n = errors.len() as f64;
-    let rms = |i: usize| (errors.iter().map(|e| e.values[i].powi(2)).sum::<f64>() / n).sqrt();
+    let rms = |of: &dyn Fn(&Nine, &Nine) -> f64| {
+        (errors.iter().map(|(e, sigma)| of(&e.values, sigma).powi(2)).sum::<f64>() / n).sqrt()
+    };
     (!errors.is_empty()).then(|| FromReference {
-        rmse: std::array::from_fn(rms),
-        horizontal_max_m: errors.iter().map(|e| horizontal(&e.values)).fold(0.0, f64::max),
-        nees_mean: errors.iter().map(|e| e.nees).sum::<f64>() / n,
+        rmse: std::array::from_fn(|i| rms(&|e, _| e[i])),
+        over_sigma: std::array::from_fn(|i| rms(&|e, sigma| e[i] / sigma[i])),
+        horizontal_max_m: errors.iter().map(|(e, _)| horizontal(&e.values)).fold(0.0, f64::max),
+        nees_mean: errors.iter().map(|(e, _)| e.nees).sum::<f64>() / n,
     })
 }
 

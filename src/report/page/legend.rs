@@ -72,7 +72,7 @@ impl<'a> Legend<'a> {
         if self.entries.len() + usize::from(self.stripes.is_some()) < 2 {
             return top + line;
         }
-        let x = left + text_width(title, canvas.font) + SPACE;
+        let x = if title.is_empty() { left } else { left + text_width(title, canvas.font) + SPACE };
         let mut pen = Pen { left, x, y: top, line, canvas };
         for (k, entry) in self.entries.iter().enumerate().filter(|(_, e)| e.panel == panel) {
             let name = fitting(entry.name, canvas);

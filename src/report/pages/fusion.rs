@@ -20,13 +20,14 @@ pub(crate) fn fusion_page(solution: &Solution, summary: &FusionSummary, inputs: 
     page.facts(&facts);
     page.chart(
         &map(solution, &outages),
-        "Solution, and reference where there is one; north and east of the start.",
+        "Solution, smoothed where that was asked for, and reference where there is one; north and east of the start.",
     );
     page.section("Figures");
     summary.text().lines().skip(1).for_each(|line| page.text(line));
     if !outages.is_empty() {
         page.table(&summary.outage_table());
     }
+    summary.smoothed_table().iter().for_each(|table| page.table(table));
     page.section("Position");
     page.chart(&position(solution, &outages), POSITION);
     if solution.rows.iter().any(|row| row.error.is_some()) {
@@ -44,14 +45,13 @@ pub(crate) fn fusion_page(solution: &Solution, summary: &FusionSummary, inputs: 
 }
 
 const POSITION: &str = "Standard deviation of the horizontal position that the filter states; with a reference, the distance from it.";
-const ERRORS: &str =
-    "Estimate less reference, and ±3 σ of the filter; the same smoothed, where that was asked for.";
+const ERRORS: &str = "Lines: estimate less reference. Bands: ±3 σ. Of the filter, and of the smoothed solution where that was asked for.";
 const INNOVATIONS: &str =
     "Estimated less measured position over its standard deviation; 95 % of used fixes belong into the band.";
 const NIS: &str = "Normalised innovation squared of each fix; 95 % belong into the band of a right filter.";
 
 /// What is smoothed.
-const SMOOTHED: Colour = Colour::Hue(3);
+const SMOOTHED: Colour = Colour::Hue(2);
 
 fn timed(title: &str, panels: Vec<Panel>, outages: &[(f64, f64)]) -> Chart {
     Chart::new(title, Axis::linear("time (s)"), panels).with_outages(outages).in_group("time")
@@ -66,18 +66,20 @@ fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
     let reference = |row: &Row| row.error.map(|e| (place(row).0 - e.values[1], place(row).1 - e.values[0]));
     let missing = (f64::NAN, f64::NAN);
     let mut series = Vec::new();
+    // the three lie on one another but for metres: wide beneath narrow beneath dashed, all are seen
+    if solution.rows.iter().any(|row| row.error.is_some()) {
+        let way = solution.rows.iter().map(|row| reference(row).unwrap_or(missing)).collect();
+        series.push(Series::new("reference", Colour::Ink, Mark::Line(way, Stroke::Bold)));
+    }
     for (start_s, end_s) in outages {
         let within =
             solution.rows.iter().filter(|row| (start_s..end_s).contains(&&row.t_s)).map(place).collect();
         series.push(Series::new("outage", Colour::Hue(4), Mark::Line(within, Stroke::Bold)));
     }
-    if solution.rows.iter().any(|row| row.error.is_some()) {
-        let way = solution.rows.iter().map(|row| reference(row).unwrap_or(missing)).collect();
-        series.push(Series::line("reference", Colour::Ink, way));
-    }
     series.push(Series::line("solution", Colour::REAL, solution.rows.iter().map(place).collect()));
-    let smoothed = solution.smoothed.iter();
-    series.extend(smoothed.map(|rows| Series::line("smoothed", SMOOTHED, rows.iter().map(place).collect())));
+    series.extend(solution.smoothed.iter().map(|rows| {
+        Series::new("smoothed", SMOOTHED, Mark::Line(rows.iter().map(place).collect(), Stroke::Dashed))
+    }));
     let ends = [("start", Some(first)), ("end", solution.rows.last())];
     series.extend(ends.into_iter().filter_map(|(name, row)| {
         let (east, north) = place(row?);
@@ -107,9 +109,13 @@ fn position(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
 }
 
 fn errors(solution: &Solution, outages: &[(f64, f64)]) -> Vec<Chart> {
-    let filtered = (&solution.rows, ["±3 σ", "error"], [Colour::BELIEVED, Colour::REAL]);
-    let smoothed = solution.smoothed.as_ref();
-    let smoothed = smoothed.map(|rows| (rows, ["±3 σ smoothed", "error smoothed"], [SMOOTHED; 2]));
+    // a panel has room for three names in its legend
+    let (names, colours) = match solution.smoothed {
+        Some(_) => (["filter"; 2], [Colour::REAL; 2]),
+        None => (["±3 σ", "error"], [Colour::BELIEVED, Colour::REAL]),
+    };
+    let filtered = (&solution.rows, names, colours);
+    let smoothed = solution.smoothed.as_ref().map(|rows| (rows, ["smoothed"; 2], [SMOOTHED; 2]));
     let chart = |(i, state): (usize, &&str)| {
         let mut series = Vec::new();
         for (rows, [band, line], [believed, real]) in std::iter::once(filtered).chain(smoothed) {

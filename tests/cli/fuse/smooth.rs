@@ -1,7 +1,8 @@
 //! `fuse --smooth` as a user runs it.
 
 use super::{recorded, table};
-use crate::common::drive::{done, nav_sim};
+use crate::common::drive::{done, nav_sim, place_with};
+use std::collections::HashSet;
 use std::fs;
 
 #[test]
@@ -40,6 +41,52 @@ fn a_smoothed_fusion_lies_beside_the_filter_s_and_is_the_same_on_any_number_of_t
     done(place.path(), &format!("{fuse} -o one"));
     assert!(
         !place.path().join("one/smoothed.csv").exists() && !place.path().join("one/smoothed.kml").exists()
+    );
+}
+
+/// Fixes believed better than they are make smoothed standard deviations too small, fixes and an IMU believed worse too
+/// large: said, in which state and by how much.
+#[test]
+fn a_smoothed_solution_has_a_verdict_by_the_reference() {
+    let shipped = |name: &str| fs::read_to_string(format!("{}/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap();
+    let place = place_with(&shipped("trajectories/land_vehicle.toml"), &shipped("calib_data/tactical.toml"));
+    done(place.path(), "trajectory record drive.toml imu.toml --seed 3 -o rec");
+    let start = "--initial rec/initial.toml --reference rec/reference.csv --rate-hz 1";
+    let worse = concat!(env!("CARGO_MANIFEST_DIR"), "/calib_data/consumer_mems.toml");
+    for (model, factor, verdict, said) in [
+        ("imu.toml", 1.0, "ok", "smoothed solution consistent with the reference: errors "),
+        ("imu.toml", 0.3, "overconfident", "smoothed solution overconfident: errors "),
+        (worse, 10.0, "underconfident", "smoothed solution underconfident: errors "),
+    ] {
+        let fuse = format!("fuse rec/imu.csv rec/gnss.csv {model} {start} --outage 300:360 --smooth -o out");
+        let ran = nav_sim(place.path(), &format!("{fuse} --gnss-sigma-factor {factor},{factor}"));
+        let summary = fs::read_to_string(place.path().join("out/summary.json")).unwrap();
+        let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+        let confidence = &summary["smoothed"]["confidence"];
+        assert_eq!(confidence["verdict"], verdict, "{factor}: {summary}");
+        let state = confidence["worst_state"].as_str().unwrap();
+        let of_state = &summary["smoothed"]["reference"]["error_over_sigma"][state];
+        assert_eq!(*of_state, confidence["worst_error_over_sigma"]);
+        let line = ran
+            .stdout
+            .lines()
+            .find(|line| line.starts_with(said))
+            .unwrap_or_else(|| panic!("{}", ran.stdout));
+        assert!(line.ends_with(&format!(" times in {state}")), "{line}");
+    }
+    let page = fs::read_to_string(place.path().join("out/report.html")).unwrap();
+    // legends of nine panels of errors, each on one line
+    let panels: Vec<&str> = page.split("<svg class=\"chart small\"").skip(1).collect();
+    assert_eq!(panels.len(), 9);
+    for panel in panels {
+        let legend = panel.split("<g class=\"ticks\">").next().unwrap();
+        let texts = legend.split(" y=\"").skip(1).filter(|y| y.contains("text-anchor"));
+        let lines: HashSet<&str> = texts.filter_map(|y| y.split('"').next()).collect();
+        assert!(legend.contains("smoothed") && legend.contains("outage") && lines.len() == 1, "{legend}");
+    }
+    assert!(
+        page.contains("largest horizontal 1 σ, smoothed (m)")
+            && page.contains("/smoothed/outages/0/sigma_max_m")
     );
 }
 
