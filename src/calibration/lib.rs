@@ -43,7 +43,7 @@ pub use diagnosis::{
     Misfit, Movement, Verdict, diagnose,
 };
 pub use fit::{Fit, FitError, Termination, Weighting, estimate, fit};
-pub use model::{LimitError, Limits, ModelSpec, SpecError};
+pub use model::{BoundDomain, LimitError, Limits, ModelSpec, SpecError};
 pub use outcome::{
     Advance, AxesDiffer, Bootstrap, Candidate, Departure, FitRange, Goodness, Indistinct, Inference,
     LevelSpread, Miss, ModelChoice, Outcome, ParameterInterval, ParameterLimit, Practical,

@@ -41,7 +41,12 @@ enum Kind {
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let schema = match args.of {
+    session.printer.result(crate::report::json(&schema(args.of)).trim_end());
+    Ok(())
+}
+
+fn schema(of: Kind) -> serde_json::Value {
+    match of {
         Kind::Scenario => schemars::schema_for!(Scenario).to_value(),
         Kind::Study => schemars::schema_for!(Study).to_value(),
         Kind::Efficiency => efficiency_file::schema(),
@@ -50,7 +55,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         Kind::Initial => fusion_files::initial_schema(),
         Kind::Profile => trajectory_file::profile_schema(),
         Kind::Contamination => contamination_file::schema(),
-    };
-    session.printer.result(crate::report::json(&schema).trim_end());
-    Ok(())
+    }
 }
+
+#[cfg(test)]
+mod tests;

@@ -59,16 +59,16 @@ struct Description {
     /// What is fitted, such as N1
     fit: String,
     /// Replicates of a set, K
-    #[schemars(range(min = 1))]
+    #[schemars(range(min = 1, max = MOST))]
     replicates: u64,
     /// Samples of a replicate, T
-    #[schemars(range(min = 4))]
+    #[schemars(range(min = 4, max = MOST))]
     samples: u64,
     /// Scales, J (default: floor(log2 T) - 1)
     #[schemars(range(min = 1))]
     levels: Option<u64>,
     /// Sets of replicates, H
-    #[schemars(range(min = 1))]
+    #[schemars(range(min = 1, max = MOST))]
     sets: u64,
     /// Seed (default: --seed, or drawn)
     seed: Option<u64>,
@@ -83,7 +83,7 @@ struct Description {
     trim: Option<u64>,
     /// Efficiency of the robust wavelet variance
     #[serde(default = "efficiency")]
-    #[schemars(range(min = 0.3, max = 0.99))]
+    #[schemars(range(min = Tuning::EFFICIENCIES.0, max = Tuning::EFFICIENCIES.1))]
     efficiency: f64,
 }
 
@@ -167,9 +167,12 @@ pub fn read(path: &Path) -> Result<StudyFile, FileError> {
     Ok(StudyFile { design, seed: d.seed, sets: d.sets, model })
 }
 
-/// Refuses a whole number that is too small, or more than fits memory and file formats.
+/// More than fits memory and file formats.
+const MOST: u64 = 1 << 40;
+
+/// Refuses a whole number that is too small, or too large.
 fn at_least(root: &Section<'_>, key: &str, value: u64, least: u64) -> Result<(), FileError> {
-    if (least..=1 << 40).contains(&value) {
+    if (least..=MOST).contains(&value) {
         return Ok(());
     }
     Err(root.refuse(key, format!("is not a whole number ≥ {least}"), None))

@@ -164,6 +164,19 @@ impl FileError {
         error.advice_if(advice.map(str::to_owned))
     }
 
+    /// What the system said of a file that was to be written, and what helps: another place if nothing else.
+    pub(super) fn unwritable(path: &Path, source: io::Error) -> Self {
+        let source = match source.kind() {
+            // its directory is there or was made: where files are the system's own, it makes none
+            io::ErrorKind::NotFound => {
+                io::Error::new(source.kind(), "the system makes no file or directory there")
+            }
+            _ => source,
+        };
+        let error = Self::io(path, source);
+        if error.remedies.is_empty() { error.advice("name another path") } else { error }
+    }
+
     /// Contents that are refused, in words.
     pub(crate) fn contents(
         path: impl Into<Box<str>>,

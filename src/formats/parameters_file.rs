@@ -16,7 +16,7 @@
 use super::FileError;
 use super::toml_described::Finite;
 use super::toml_file::{Section, Source};
-use crate::calibration::{ModelSpec, ParameterLimit};
+use crate::calibration::{BoundDomain, ModelSpec, ParameterLimit};
 use crate::imu::{Axis, Sensor};
 use crate::noise::Kind;
 use schemars::JsonSchema;
@@ -166,9 +166,11 @@ pub(crate) fn schema() -> serde_json::Value {
     let mut range = schemars::schema_for!(Range);
     range.remove("$schema");
     range.remove("title");
+    let range = range.to_value();
     let of_kind = |kind: Kind| {
+        let bounded = |is_shape| bounded(range.clone(), &BoundDomain::of(kind, is_shape));
         let ranges: Map<String, Value> =
-            kind.parameters().iter().map(|p| (p.name().to_owned(), range.clone().to_value())).collect();
+            kind.parameters().iter().map(|p| (p.name().to_owned(), bounded(p.is_shape()))).collect();
         let repeats = if matches!(kind, Kind::Ar1 | Kind::GaussMarkov) { "(_[1-9])?" } else { "" };
         let table = json!({ "type": "object", "properties": ranges, "additionalProperties": false });
         (format!("^{}{repeats}$", kind.code()), table)
@@ -187,6 +189,18 @@ pub(crate) fn schema() -> serde_json::Value {
     file["description"] =
         "What is known of a model's parameters before it is fitted: nav-sim calibrate --parameters".into();
     file
+}
+
+/// The schema of [`Range`] of a parameter whose bounds lie there.
+fn bounded(mut range: Value, domain: &BoundDomain) -> Value {
+    let (least, most) = match domain.is_open {
+        true => ("exclusiveMinimum", "exclusiveMaximum"),
+        false => ("minimum", "maximum"),
+    };
+    for (_, end) in range["properties"].as_object_mut().into_iter().flatten() {
+        (end[least], end[most]) = (domain.low.into(), domain.high.into());
+    }
+    range
 }
 
 #[cfg(test)]

@@ -131,6 +131,15 @@ impl TryFrom<f64> for Finite {
     }
 }
 
+/// In schemas, one number for all or one for each of several.
+#[derive(JsonSchema)]
+#[schemars(untagged, inline)]
+#[expect(dead_code, reason = "what describes files, for editors")]
+pub(crate) enum OneOrEach<T> {
+    One(T),
+    Each(Vec<T>),
+}
+
 /// Why a value is refused, in words that follow it: serde's types in ours.
 fn reason(message: &str, quoted: &[&str]) -> String {
     if message.starts_with("unknown variant") {

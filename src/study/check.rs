@@ -1,10 +1,12 @@
 //! Whether a study means a grid.
 
-use super::description::{CalibrateStep, Study};
+use super::description::{CalibrateStep, Study, Synthesis};
 use super::error::DescriptionError;
 use super::rules::{exactly_one, unique};
 use crate::calibration::Estimator;
+use crate::imu::MAX_RATE_HZ;
 use crate::scenario::{MAX_RUNS, Method};
+use crate::wavelet::Tuning;
 use std::path::PathBuf;
 
 impl Study {
@@ -87,6 +89,7 @@ impl Study {
             let said = [e.model.is_some(), !e.recordings.is_empty(), e.synthesize.is_some()];
             let key = format!("truth[{}]", i + 1);
             exactly_one(key.clone(), &said, "model, recordings, synthesize")?;
+            check_rate(&key, e.rate_hz)?;
             if e.each && e.recordings.is_empty() {
                 return Err(DescriptionError::refused(&format!("{key}.each"), true, "is of recordings"));
             }
@@ -99,6 +102,13 @@ impl Study {
             let said = [!step.recordings.is_empty(), step.synthesize.is_some()];
             exactly_one(format!("{key}.calibrate"), &said, "recordings, synthesize")?;
             self.check_leave_out(&format!("{key}.calibrate.leave_out"), step)?;
+            check_rate(&format!("{key}.calibrate"), step.rate_hz)?;
+            let (least, most) = Tuning::EFFICIENCIES;
+            if !(least..=most).contains(&step.efficiency) {
+                let reason = format!("is not between {least} and {most}");
+                let key = format!("{key}.calibrate.efficiency");
+                return Err(DescriptionError::refused(&key, step.efficiency, reason));
+            }
             let key = format!("{key}.calibrate.estimators");
             empty(&key, !step.estimators.is_empty())?;
             if step.estimators.contains(&Estimator::Given) {
@@ -115,7 +125,7 @@ impl Study {
             exactly_one(format!("gnss[{}]", i + 1), &said, "file, settings")?;
         }
         let syntheses = self.syntheses();
-        match syntheses.iter().find(|(_, s)| s.replicates == 0 || s.samples < 2) {
+        match syntheses.iter().find(|(_, s)| s.replicates == 0 || s.samples < Synthesis::LEAST_SAMPLES) {
             Some((key, s)) => {
                 let value = format!("{} of {} samples", s.replicates, s.samples);
                 Err(DescriptionError::refused(key, value, "cannot be made: at least 1 of 2 samples"))
@@ -178,5 +188,16 @@ fn name_after(name: &mut String, file: Option<&PathBuf>) {
         && let Some(stem) = file.and_then(|f| f.file_stem())
     {
         *name = stem.to_string_lossy().into_owned();
+    }
+}
+
+/// Refuses what is no rate of recordings.
+fn check_rate(entry: &str, rate_hz: Option<f64>) -> Result<(), DescriptionError> {
+    match rate_hz {
+        Some(rate_hz) if !(rate_hz > 0.0 && rate_hz <= MAX_RATE_HZ) => {
+            let reason = format!("is not a rate: it must be > 0 and at most {MAX_RATE_HZ}");
+            Err(DescriptionError::refused(&format!("{entry}.rate_hz"), rate_hz, reason))
+        }
+        _ => Ok(()),
     }
 }

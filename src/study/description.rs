@@ -5,8 +5,10 @@ use super::rules::unique;
 use super::sweep::{OutageSet, OutagesEntry, expand};
 use crate::calibration::{Estimator, ModelSpec, Pool, Weighting};
 use crate::ekf::FilterStates;
-use crate::scenario::{Method, Scenario};
+use crate::imu::MAX_RATE_HZ;
+use crate::scenario::{MAX_RUNS, Method, Scenario};
 use crate::sensors::gnss::GnssSettings;
+use crate::units::Positive;
 use crate::wavelet::{Convention, Tuning};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -18,9 +20,11 @@ use std::path::{Path, PathBuf};
 pub struct Study {
     /// Layout version: 1.
     #[serde(default = "one")]
+    #[schemars(range(min = 1, max = 1))]
     pub schema: u64,
     /// Monte-Carlo runs of each cell; a covariance analysis needs none.
     #[serde(default = "hundred")]
+    #[schemars(range(min = 1, max = MAX_RUNS))]
     pub runs: u64,
     /// Seed of all random numbers; without it --seed, or one is drawn and kept in the plan.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -37,6 +41,7 @@ pub struct Study {
     pub reference: Option<String>,
     /// Runs of one unit of work; without it `batch plan` measures and aims at two minutes.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1))]
     pub unit_runs: Option<u64>,
     /// Filter variants, each once; by default the scenario's.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -119,6 +124,7 @@ pub struct TruthEntry {
     pub each: bool,
     /// Sample rate of recordings without a time column (Hz).
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Positive>", range(max = MAX_RATE_HZ))]
     pub rate_hz: Option<f64>,
     /// Recordings of a virtual IMU: each run takes a window of one.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -149,9 +155,11 @@ pub struct Synthesis {
     pub model: PathBuf,
     /// How many recordings.
     #[serde(default = "one")]
+    #[schemars(range(min = 1))]
     pub replicates: u64,
     /// Samples of each.
     #[serde(default = "paper_samples")]
+    #[schemars(range(min = Synthesis::LEAST_SAMPLES))]
     pub samples: usize,
     /// Whether each recording has parameters of its own.
     #[serde(default)]
@@ -166,6 +174,11 @@ pub struct Synthesis {
     /// meets the numbers its filter was calibrated with).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
+}
+
+impl Synthesis {
+    /// Fewer samples have no variance.
+    pub(super) const LEAST_SAMPLES: usize = 2;
 }
 
 const fn paper_samples() -> usize {
@@ -188,6 +201,7 @@ pub struct CalibrateStep {
     pub leave_out: bool,
     /// Sample rate of recordings without a time column (Hz).
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Option<Positive>", range(max = MAX_RATE_HZ))]
     pub rate_hz: Option<f64>,
     /// Recordings of a virtual IMU instead.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -203,6 +217,7 @@ pub struct CalibrateStep {
     pub trim: Option<usize>,
     /// Efficiency of the robust wavelet variance.
     #[serde(default = "efficiency")]
+    #[schemars(range(min = Tuning::EFFICIENCIES.0, max = Tuning::EFFICIENCIES.1))]
     pub efficiency: f64,
     /// How the tuning constant follows from it: exact, or wv as the R packages have it (default: exact).
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -2,8 +2,9 @@
 
 use super::error::DescriptionError;
 use super::rules::{MAX_CELLS, exactly_one};
+use crate::formats::toml_described::OneOrEach;
 use crate::sensors::outage::{Outage, OutagePlan, PeriodicOutages, RandomOutages};
-use crate::units::SettingError;
+use crate::units::{Positive, SettingError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -33,6 +34,7 @@ pub struct Sweep {
     /// First instants without a fix (s).
     pub start_s: OneOrMany,
     /// Durations (s).
+    #[schemars(with = "OneOrEach<Positive>")]
     pub duration_s: OneOrMany,
 }
 
@@ -43,8 +45,10 @@ pub struct Periodic {
     /// Start of the first (s).
     pub first_s: OneOrMany,
     /// From one start to the next (s).
+    #[schemars(with = "OneOrEach<Interval>")]
     pub every_s: OneOrMany,
     /// Length of each (s).
+    #[schemars(with = "OneOrEach<Positive>")]
     pub duration_s: OneOrMany,
 }
 
@@ -53,10 +57,24 @@ pub struct Periodic {
 #[serde(deny_unknown_fields)]
 pub struct Random {
     /// Outages per hour of time with fixes.
+    #[schemars(with = "OneOrEach<PerHour>")]
     pub rate_per_hour: OneOrMany,
     /// Length of each (s).
+    #[schemars(with = "OneOrEach<Positive>")]
     pub duration_s: OneOrMany,
 }
+
+/// In schemas, what [`PeriodicOutages`] accepts.
+#[derive(JsonSchema)]
+#[schemars(inline)]
+#[expect(dead_code, reason = "what describes files, for editors")]
+struct Interval(#[schemars(range(min = PeriodicOutages::LEAST_INTERVAL_S))] f64);
+
+/// In schemas, what [`RandomOutages`] accepts.
+#[derive(JsonSchema)]
+#[schemars(inline)]
+#[expect(dead_code, reason = "what describes files, for editors")]
+struct PerHour(#[schemars(with = "Positive", range(max = RandomOutages::MOST_PER_HOUR))] f64);
 
 /// `[[outages]]`: one of `windows`, `sweep`, `periodic`, `random`. The latter three take numbers or lists
 /// of numbers and make one set for each combination.

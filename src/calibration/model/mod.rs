@@ -4,4 +4,4 @@ mod limits;
 mod spec;
 
 pub use limits::{LimitError, Limits};
-pub use spec::{ModelSpec, SpecError};
+pub use spec::{BoundDomain, ModelSpec, SpecError};

@@ -121,10 +121,9 @@ impl ModelSpec {
         let ParameterRef { process: index, parameter: named } = self.parameter(process, parameter)?;
         let kind = self.kinds[index];
         for value in [low, high].into_iter().flatten() {
-            let amplitude = ((0.0..=Curve::WV_RANGE.1).contains(&value), "a number from 0 to 1e100");
-            let (inside, domain) = if named.is_shape() { shape_domain(kind, value) } else { amplitude };
-            if !inside {
-                let (process, parameter) = (process.to_owned(), parameter.to_owned());
+            let domain = BoundDomain::of(kind, named.is_shape());
+            if !domain.contains(value) {
+                let (process, parameter, domain) = (process.to_owned(), parameter.to_owned(), domain.words);
                 return Err(LimitError::Domain { process, parameter, value, domain });
             }
         }
@@ -251,13 +250,36 @@ fn names(kind: Kind) -> Vec<&'static str> {
     kind.parameters().iter().map(|p| p.name()).collect()
 }
 
-/// Whether a shape can be there, and where it can be in words.
-fn shape_domain(kind: Kind, value: f64) -> (bool, &'static str) {
-    match kind {
-        // The search is over positive correlations.
-        Kind::Ar1 => (value > 0.0 && value < 1.0, "between 0 and 1"),
-        Kind::GaussMarkov => ((1e-100..=1e100).contains(&value), "a number from 1e-100 to 1e100 (1/s)"),
-        _ => ((-1.0..=1.0).contains(&value), "between -1 and 1"),
+/// Where bounds of a parameter may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct BoundDomain {
+    /// From.
+    pub low: f64,
+    /// To.
+    pub high: f64,
+    /// Whether these two are left out.
+    pub is_open: bool,
+    /// The same in words.
+    pub words: &'static str,
+}
+
+impl BoundDomain {
+    /// That of the shape of a process (phi, beta or theta), or of another parameter.
+    #[must_use]
+    pub fn of(kind: Kind, is_shape: bool) -> Self {
+        let closed = |low: f64, high: f64, words| Self { low, high, is_open: false, words };
+        match kind {
+            _ if !is_shape => closed(0.0, Curve::WV_RANGE.1, "a number from 0 to 1e100"),
+            // The search is over positive correlations.
+            Kind::Ar1 => Self { low: 0.0, high: 1.0, is_open: true, words: "between 0 and 1" },
+            Kind::GaussMarkov => closed(1e-100, 1e100, "a number from 1e-100 to 1e100 (1/s)"),
+            _ => closed(-1.0, 1.0, "between -1 and 1"),
+        }
+    }
+
+    fn contains(&self, value: f64) -> bool {
+        let is_end = value == self.low || value == self.high;
+        (self.low..=self.high).contains(&value) && !(self.is_open && is_end)
     }
 }
 

@@ -31,7 +31,7 @@ impl Claim {
             return Err(refused(shown, "is another output of the same command").setting(Setting::Output));
         }
         let marked = make_parent(marker).and_then(|()| Temporary::marker(marker));
-        let Some(marked) = marked.map_err(|e| FileError::io(shown, e))? else {
+        let Some(marked) = marked.map_err(|e| FileError::unwritable(shown, e))? else {
             let busy = refused(shown, "is being written by another nav-sim");
             return Err(busy.setting(Setting::Output).advice("wait until that is done"));
         };

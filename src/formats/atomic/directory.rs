@@ -29,7 +29,7 @@ impl AtomicDir {
     /// # Errors
     /// When the destination is a file, or a directory cannot be made.
     pub(crate) fn create(destination: &Path) -> Result<Self, FileError> {
-        let error = |e| FileError::io(destination, e);
+        let error = |e| FileError::unwritable(destination, e);
         let existing = fs::metadata(destination).ok();
         if existing.as_ref().is_some_and(|m| !m.is_dir()) {
             return Err(error(io::ErrorKind::NotADirectory.into()));

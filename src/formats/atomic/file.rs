@@ -26,7 +26,7 @@ impl AtomicFile {
     /// # Errors
     /// When the directory cannot be made or written to.
     pub(crate) fn create(destination: &Path) -> Result<Self, FileError> {
-        let error = |e| FileError::io(destination, e);
+        let error = |e| FileError::unwritable(destination, e);
         let metadata = fs::metadata(destination).ok();
         if metadata.as_ref().is_some_and(fs::Metadata::is_dir) {
             return Err(error(io::ErrorKind::IsADirectory.into()));

@@ -227,3 +227,17 @@ fn a_claim_ends_with_its_holder() {
     assert!(listing(dir.path()).is_empty());
     drop(claim_file(&path, []).unwrap());
 }
+
+/// Where the system makes no file (of its own file systems, /proc): told so, with a remedy.
+#[cfg(target_os = "linux")]
+#[test]
+fn where_nothing_can_be_made_another_path_is_the_remedy() {
+    for path in ["/proc/no_such_place", "/proc/no_such_place/inside"].map(Path::new) {
+        for e in [AtomicFile::create(path).unwrap_err(), AtomicDir::create(path).unwrap_err()] {
+            let shown = path.display();
+            assert_eq!(e.to_string(), format!("{shown}: the system makes no file or directory there"));
+            assert_eq!(e.hint().unwrap(), "name another path");
+            assert!(e.is_system());
+        }
+    }
+}

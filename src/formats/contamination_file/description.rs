@@ -1,11 +1,12 @@
 //! What contamination files hold: one description an operation, for readers and for editors.
 
 use crate::formats::FileError;
-use crate::formats::toml_described::Finite;
+use crate::formats::toml_described::{Finite, OneOrEach};
 use crate::formats::toml_file::Section;
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::Deserialize;
 use serde::de::{DeserializeOwned, IgnoredAny};
+use std::borrow::Cow;
 
 /// Errors and disturbances put into recordings: nav-sim synthesize --contaminate
 #[derive(Deserialize, JsonSchema)]
@@ -39,6 +40,7 @@ struct RuleDescription {
 #[derive(Deserialize, JsonSchema)]
 pub(super) struct Of {
     /// Replicates, counted from 1 (default: every one)
+    #[schemars(length(min = 1), inner(range(min = 1)))]
     pub(super) replicates: Option<Vec<u64>>,
 }
 
@@ -67,10 +69,12 @@ pub(super) struct Step {
     /// Height of the step (units of the signal)
     pub(super) amplitude: Numbers,
     /// Where in the record, as a share of it (default: 0.5)
+    #[schemars(with = "Option<OneOrEach<Share>>")]
     pub(super) at_share: Option<Numbers>,
     /// Where in the record (samples)
     pub(super) at_samples: Option<u64>,
     /// Where in the record (s)
+    #[schemars(with = "Option<OneOrEach<NonNegative>>")]
     pub(super) at_s: Option<Numbers>,
 }
 
@@ -83,12 +87,15 @@ pub(super) struct Drift {
 #[derive(Deserialize, JsonSchema)]
 pub(super) struct Replace {
     /// Share of the samples
+    #[schemars(with = "Option<OneOrEach<Share>>")]
     pub(super) share: Option<Numbers>,
     /// Number of samples
     pub(super) points: Option<u64>,
     /// Samples replaced together (default: 1)
+    #[schemars(range(min = 1))]
     pub(super) length_samples: Option<u64>,
     /// Standard deviation of what replaces them
+    #[schemars(with = "OneOrEach<NonNegative>")]
     pub(super) sigma: Numbers,
     /// Mean of what replaces them (default: the signal's)
     pub(super) mean: Option<Mean>,
@@ -103,26 +110,32 @@ pub(super) struct Bursts {
     /// From one burst to the next (samples; default: 90000)
     pub(super) spacing_samples: Option<u64>,
     /// Length of the record that these are meant for (samples; default: as it is)
+    #[schemars(with = "Option<OneOrEach<AtLeastOne>>")]
     pub(super) of_samples: Option<Numbers>,
     /// Amplitude (units of the signal)
     pub(super) amplitude: Numbers,
     /// Frequency (Hz; default: 5)
+    #[schemars(with = "Option<OneOrEach<Positive>>")]
     pub(super) frequency_hz: Option<Numbers>,
 }
 
 #[derive(Deserialize, JsonSchema)]
 pub(super) struct Autoregression {
     /// Coefficient
+    #[schemars(with = "OneOrEach<Stationary>")]
     pub(super) phi: Numbers,
     /// Innovation variance per sample
+    #[schemars(with = "OneOrEach<NonNegative>")]
     pub(super) sigma2: Numbers,
 }
 
 #[derive(Deserialize, JsonSchema)]
 pub(super) struct HeavyTails {
     /// Degrees of freedom, more than 2
+    #[schemars(with = "OneOrEach<AboveTwo>")]
     pub(super) freedom: Numbers,
     /// Scale of Student's t (units of the signal)
+    #[schemars(with = "OneOrEach<NonNegative>")]
     pub(super) sigma: Numbers,
 }
 
@@ -133,7 +146,49 @@ pub(super) struct Scale {
     /// Its parameter, such as gamma2
     pub(super) parameter: String,
     /// What it is multiplied by
+    #[schemars(with = "OneOrEach<NonNegative>")]
     pub(super) factor: Numbers,
+}
+
+/// Numbers between two whole ones, for schemas and for the reader: open without them; `i64::MAX` is no end.
+pub(super) struct Between<const LOW: i64, const HIGH: i64, const OPEN: bool>;
+
+/// A part of a whole.
+pub(super) type Share = Between<0, 1, false>;
+pub(super) type NonNegative = Between<0, { i64::MAX }, false>;
+pub(super) type Positive = Between<0, { i64::MAX }, true>;
+pub(super) type AtLeastOne = Between<1, { i64::MAX }, false>;
+/// Degrees of freedom with a variance.
+pub(super) type AboveTwo = Between<2, { i64::MAX }, true>;
+/// Coefficients of a stationary AR(1), as [`Ar1::new`](crate::noise::Ar1::new) takes them.
+type Stationary = Between<-1, 1, true>;
+
+impl<const LOW: i64, const HIGH: i64, const OPEN: bool> Between<LOW, HIGH, OPEN> {
+    pub(super) fn contains(value: f64) -> bool {
+        let (low, high) = (LOW as f64, if HIGH == i64::MAX { f64::INFINITY } else { HIGH as f64 });
+        if OPEN { low < value && value < high } else { (low..=high).contains(&value) }
+    }
+}
+
+impl<const LOW: i64, const HIGH: i64, const OPEN: bool> JsonSchema for Between<LOW, HIGH, OPEN> {
+    fn inline_schema() -> bool {
+        true
+    }
+
+    fn schema_name() -> Cow<'static, str> {
+        format!("Between_{LOW}_{HIGH}_{OPEN}").into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let (least, most) =
+            if OPEN { ("exclusiveMinimum", "exclusiveMaximum") } else { ("minimum", "maximum") };
+        let mut schema = json_schema!({ "type": "number" });
+        schema.insert(least.to_owned(), LOW.into());
+        if HIGH < i64::MAX {
+            schema.insert(most.to_owned(), HIGH.into());
+        }
+        schema
+    }
 }
 
 /// One number for all, or one for each replicate listed

@@ -29,8 +29,8 @@ use crate::imu::Sensor;
 use crate::noise::Ar1;
 use crate::noise::contamination::{Contamination, Extent, Operation, Rule};
 use description::{
-    Autoregression, Bursts, Described, Description, HeavyTails, Mean, Numbers, Of, Replace, Scale, Signal,
-    Step, describe,
+    AboveTwo, AtLeastOne, Autoregression, Bursts, Described, Description, HeavyTails, Mean, NonNegative,
+    Numbers, Of, Positive, Replace, Scale, Share, Signal, Step, describe,
 };
 use std::path::Path;
 
@@ -157,11 +157,11 @@ impl Entry<'_> {
     }
 
     fn at_least_0(&self, key: &str, given: &Numbers) -> Result<f64, FileError> {
-        self.number(key, given, "a number ≥ 0", |v| v >= 0.0)
+        self.number(key, given, "a number ≥ 0", NonNegative::contains)
     }
 
     fn share(&self, key: &str, given: &Numbers) -> Result<Extent, FileError> {
-        self.number(key, given, "between 0 and 1", |v| (0.0..=1.0).contains(&v)).map(Extent::Share)
+        self.number(key, given, "between 0 and 1", Share::contains).map(Extent::Share)
     }
 
     /// Refuses more than one of several ways to say the same.
@@ -180,7 +180,7 @@ impl Entry<'_> {
         let at = match (step.at_samples, &step.at_s, &step.at_share) {
             (Some(samples), ..) => Extent::Samples(samples),
             (_, Some(seconds), _) => {
-                let seconds = self.number("at_s", seconds, "a time ≥ 0", |v| v >= 0.0)?;
+                let seconds = self.number("at_s", seconds, "a time ≥ 0", NonNegative::contains)?;
                 Extent::Samples((seconds * rate_hz).round() as u64)
             }
             (_, _, Some(share)) => self.share("at_share", share)?,
@@ -209,12 +209,12 @@ impl Entry<'_> {
     }
 
     fn bursts(&self, bursts: &Bursts) -> Result<Operation, FileError> {
-        let positive = |key, given: &Option<Numbers>, domain, least: f64| match given {
-            Some(given) => self.number(key, given, domain, |v| v > 0.0 && v >= least).map(Some),
+        let given = |key, given: &Option<Numbers>, domain, inside: fn(f64) -> bool| match given {
+            Some(given) => self.number(key, given, domain, inside).map(Some),
             None => Ok(None),
         };
-        let of = positive("of_samples", &bursts.of_samples, "a number of samples > 0", 1.0)?;
-        let frequency = positive("frequency_hz", &bursts.frequency_hz, "a frequency > 0", 0.0)?;
+        let of = given("of_samples", &bursts.of_samples, "a number of samples > 0", AtLeastOne::contains)?;
+        let frequency = given("frequency_hz", &bursts.frequency_hz, "a frequency > 0", Positive::contains)?;
         let extent = |samples: u64| match of {
             Some(of) => Extent::Share(samples as f64 / of),
             None => Extent::Samples(samples),
@@ -238,7 +238,7 @@ impl Entry<'_> {
 
     fn heavy_tails(&self, tails: &HeavyTails) -> Result<Operation, FileError> {
         let domain = "a number > 2: fewer degrees have no variance";
-        let freedom = self.number("freedom", &tails.freedom, domain, |v| v > 2.0)?;
+        let freedom = self.number("freedom", &tails.freedom, domain, AboveTwo::contains)?;
         Ok(Operation::HeavyTails { freedom, sigma: self.at_least_0("sigma", &tails.sigma)? })
     }
 

@@ -1,6 +1,6 @@
 //! An initial state (TOML).
 
-use crate::earth::MAX_LATITUDE;
+use crate::earth::MAX_LATITUDE_DEG;
 use crate::ekf::InitialSettings;
 use crate::formats::FileError;
 use crate::formats::toml_described::Document;
@@ -13,6 +13,12 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use std::path::Path;
 
+/// Largest angles.
+const LON_DEG: f64 = 360.0;
+const ROLL_DEG: f64 = 180.0;
+const PITCH_DEG: f64 = 90.0;
+const YAW_DEG: f64 = 360.0;
+
 /// Where and how a drive begins: nav-sim fuse --initial
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -21,10 +27,10 @@ struct Description {
     /// Time (s)
     t_s: f64,
     /// Latitude of the IMU (degrees)
-    #[schemars(range(min = -90.0, max = 90.0))]
+    #[schemars(range(min = -MAX_LATITUDE_DEG, max = MAX_LATITUDE_DEG))]
     lat_deg: f64,
     /// Longitude of the IMU (degrees)
-    #[schemars(range(min = -360.0, max = 360.0))]
+    #[schemars(range(min = -LON_DEG, max = LON_DEG))]
     lon_deg: f64,
     /// Height of the IMU above the ellipsoid (m)
     h_m: f64,
@@ -38,13 +44,13 @@ struct Description {
     #[serde(default)]
     v_d_m_s: f64,
     /// Roll of the vehicle (degrees)
-    #[schemars(range(min = -180.0, max = 180.0))]
+    #[schemars(range(min = -ROLL_DEG, max = ROLL_DEG))]
     roll_deg: f64,
     /// Pitch (degrees)
-    #[schemars(range(min = -90.0, max = 90.0))]
+    #[schemars(range(min = -PITCH_DEG, max = PITCH_DEG))]
     pitch_deg: f64,
     /// Yaw (degrees)
-    #[schemars(range(min = -360.0, max = 360.0))]
+    #[schemars(range(min = -YAW_DEG, max = YAW_DEG))]
     yaw_deg: f64,
     /// Standard deviations of the position north, east, down (m; default: as in scenarios)
     pos_sigma_m: Option<[f64; 3]>,
@@ -62,10 +68,19 @@ struct Description {
     gyro_scale_sigma_ppm: Option<f64>,
 }
 
-/// The JSON schema of such a file.
+/// The JSON schema of such a file; the ranges of standard deviations are those of scenarios.
 #[must_use]
 pub(crate) fn initial_schema() -> serde_json::Value {
-    schemars::schema_for!(Description).to_value()
+    let mut schema = schemars::schema_for!(Description).to_value();
+    let of_scenarios = schemars::schema_for!(InitialSettings).to_value();
+    for (key, own) in schema["properties"].as_object_mut().into_iter().flatten() {
+        if let Some(said) = of_scenarios["properties"].get(key) {
+            let description = own["description"].take();
+            *own = said.clone();
+            own["description"] = description;
+        }
+    }
+    schema
 }
 
 /// Reads an initial state: time, position of the IMU, velocity (0 where it is not said), attitude of the
@@ -108,10 +123,10 @@ fn parse(source: &Source) -> Result<Start, FileError> {
 fn check(d: &Description) -> Result<(), (&'static str, String)> {
     let limits = [
         ("lat_deg", d.lat_deg, 90.0),
-        ("lon_deg", d.lon_deg, 360.0),
-        ("roll_deg", d.roll_deg, 180.0),
-        ("pitch_deg", d.pitch_deg, 90.0),
-        ("yaw_deg", d.yaw_deg, 360.0),
+        ("lon_deg", d.lon_deg, LON_DEG),
+        ("roll_deg", d.roll_deg, ROLL_DEG),
+        ("pitch_deg", d.pitch_deg, PITCH_DEG),
+        ("yaw_deg", d.yaw_deg, YAW_DEG),
     ];
     if let Some((key, _, limit)) =
         limits.iter().find(|(_, value, limit)| value.is_nan() || value.abs() > *limit)
@@ -128,7 +143,7 @@ fn check(d: &Description) -> Result<(), (&'static str, String)> {
     if let Some((key, _)) = unlimited.iter().find(|(_, value)| !value.is_finite()) {
         return Err((key, "is not a finite number".to_owned()));
     }
-    if (d.lat_deg * DEG).abs() > MAX_LATITUDE {
+    if d.lat_deg.abs() > MAX_LATITUDE_DEG {
         return Err(("lat_deg", "is too near a pole to navigate in latitude and longitude".to_owned()));
     }
     Ok(())

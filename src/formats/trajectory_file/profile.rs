@@ -1,6 +1,7 @@
 //! Motion profiles in TOML.
 
 use super::samples::HEIGHT;
+use crate::earth::MAX_LATITUDE_DEG;
 use crate::formats::FileError;
 use crate::formats::toml_described::{Document, Finite};
 use crate::formats::toml_file::{Section, Source};
@@ -8,7 +9,7 @@ use crate::trajectory::Trajectory;
 use crate::trajectory::profile::{
     self, Acceleration, Bank, Kind, Length, Place, Profile, Segment, Start, Turning, Waypoint,
 };
-use crate::units::DEG;
+use crate::units::{DEG, NonNegative, Positive};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::{DeserializeOwned, IgnoredAny};
@@ -41,15 +42,18 @@ struct Origin {
     #[serde(default)]
     t_s: Finite,
     /// Geodetic latitude (degrees)
+    #[schemars(range(min = -MAX_LATITUDE_DEG, max = MAX_LATITUDE_DEG))]
     lat_deg: Finite,
     /// Longitude (degrees)
     lon_deg: Finite,
     /// Height above the ellipsoid (m)
+    #[schemars(range(min = *HEIGHT.start(), max = *HEIGHT.end()))]
     h_m: Finite,
     /// Heading from north (degrees)
     heading_deg: Finite,
     /// Speed (m/s; default: 0)
     #[serde(default)]
+    #[schemars(with = "NonNegative")]
     speed_m_s: Finite,
 }
 
@@ -61,7 +65,7 @@ struct Vehicle {
     #[serde(default)]
     bank: Roll,
     /// Time over which accelerations and rates build up and fade (s; default: 2)
-    #[schemars(extend("exclusiveMinimum" = 0))]
+    #[schemars(with = "Option<Positive>")]
     ramp_s: Option<Finite>,
 }
 
@@ -88,6 +92,7 @@ struct SegmentDescription {
 #[derive(Deserialize, JsonSchema)]
 struct Of {
     /// Overrides that of the vehicle (s)
+    #[schemars(with = "Option<Positive>")]
     ramp_s: Option<Finite>,
 }
 
@@ -113,8 +118,10 @@ enum Described {
 #[derive(Deserialize, JsonSchema)]
 struct Straight {
     /// Duration (s), or …
+    #[schemars(with = "Option<Positive>")]
     duration_s: Option<Finite>,
     /// … distance along the path (m)
+    #[schemars(with = "Option<Positive>")]
     distance_m: Option<Finite>,
     /// Height gained (m; default: 0)
     #[serde(default)]
@@ -126,18 +133,23 @@ struct Climb {
     /// Height gained (m)
     height_m: Finite,
     /// Duration (s), or …
+    #[schemars(with = "Option<Positive>")]
     duration_s: Option<Finite>,
     /// … distance along the path (m)
+    #[schemars(with = "Option<Positive>")]
     distance_m: Option<Finite>,
 }
 
 #[derive(Deserialize, JsonSchema)]
 struct Accelerate {
     /// Final speed (m/s)
+    #[schemars(with = "NonNegative")]
     to_speed_m_s: Finite,
     /// Duration (s), or …
+    #[schemars(with = "Option<Positive>")]
     duration_s: Option<Finite>,
     /// … largest acceleration (m/s²)
+    #[schemars(with = "Option<Positive>")]
     accel_m_s2: Option<Finite>,
     /// Height gained (m; default: 0)
     #[serde(default)]
@@ -149,12 +161,16 @@ struct Turn {
     /// Change of heading, positive to the right (degrees)
     angle_deg: Finite,
     /// Duration (s), or …
+    #[schemars(with = "Option<Positive>")]
     duration_s: Option<Finite>,
     /// … largest rate (degrees/s), or …
+    #[schemars(with = "Option<Positive>")]
     rate_deg_s: Option<Finite>,
     /// … smallest radius (m), or …
+    #[schemars(with = "Option<Positive>")]
     radius_m: Option<Finite>,
     /// … largest lateral acceleration (m/s²)
+    #[schemars(with = "Option<Positive>")]
     lateral_accel_m_s2: Option<Finite>,
     /// Height gained (m; default: 0)
     #[serde(default)]
@@ -164,8 +180,10 @@ struct Turn {
 #[derive(Deserialize, JsonSchema)]
 struct Stop {
     /// Time at rest (s)
+    #[schemars(with = "Positive")]
     duration_s: Finite,
     /// Largest deceleration while braking (m/s²; default: 1.5)
+    #[schemars(with = "Option<Positive>")]
     decel_m_s2: Option<Finite>,
     /// Height gained (m; default: 0)
     #[serde(default)]
@@ -179,10 +197,13 @@ struct Waypoints {
     #[serde(rename = "points")]
     _points: IgnoredAny,
     /// Largest rate of turns (degrees/s), or …
+    #[schemars(with = "Option<Positive>")]
     rate_deg_s: Option<Finite>,
     /// … smallest radius (m), or …
+    #[schemars(with = "Option<Positive>")]
     radius_m: Option<Finite>,
     /// … largest lateral acceleration (m/s²)
+    #[schemars(with = "Option<Positive>")]
     lateral_accel_m_s2: Option<Finite>,
     /// Height gained (m; default: 0)
     #[serde(default)]
@@ -194,6 +215,7 @@ struct Waypoints {
 #[serde(deny_unknown_fields)]
 struct Point {
     /// Geodetic latitude (degrees)
+    #[schemars(range(min = -MAX_LATITUDE_DEG, max = MAX_LATITUDE_DEG))]
     lat_deg: Option<Finite>,
     /// Longitude (degrees)
     lon_deg: Option<Finite>,
@@ -202,6 +224,7 @@ struct Point {
     /// East of the start (m)
     e_m: Option<Finite>,
     /// Height above the ellipsoid (m; default: that before it)
+    #[schemars(range(min = *HEIGHT.start(), max = *HEIGHT.end()))]
     h_m: Option<Finite>,
 }
 

@@ -41,7 +41,7 @@ pub enum WaveletError {
         value: f64,
     },
     /// An efficiency without a tuning.
-    #[error("efficiency {0} is out of range: between {low} and {high}", low = tuning::EFFICIENCY_RANGE.0, high = tuning::EFFICIENCY_RANGE.1)]
+    #[error("efficiency {0} is out of range: between {low} and {high}", low = Tuning::EFFICIENCIES.0, high = Tuning::EFFICIENCIES.1)]
     Efficiency(f64),
 }
 

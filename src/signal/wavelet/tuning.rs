@@ -20,8 +20,6 @@ pub enum Convention {
 
 crate::named!(Convention { Exact = "exact", Wv = "wv" }, in files);
 
-/// Efficiencies that have a constant: from the branch point of the efficiency upwards.
-pub(super) const EFFICIENCY_RANGE: (f64, f64) = (0.3, 0.99);
 /// On this side of c the efficiency grows with c.
 const BRANCH: f64 = 2.6;
 
@@ -44,13 +42,15 @@ impl Tuning {
     /// The usual efficiency: for the same scatter a record must be 1/0.6 times as long as with the classical variance, and
     /// up to 26 % of gross outliers leave the equation a root ([`Self::breakdown`]).
     pub const DEFAULT_EFFICIENCY: f64 = 0.6;
+    /// Efficiencies that have a constant: from the branch point of the efficiency upwards.
+    pub const EFFICIENCIES: (f64, f64) = (0.3, 0.99);
 
     /// For a wanted efficiency at the Gaussian model, 0.3 to 0.99.
     ///
     /// # Errors
     /// When the efficiency is out of this range.
     pub fn new(efficiency: f64, convention: Convention) -> Result<Self, WaveletError> {
-        if !(EFFICIENCY_RANGE.0..=EFFICIENCY_RANGE.1).contains(&efficiency) {
+        if !(Self::EFFICIENCIES.0..=Self::EFFICIENCIES.1).contains(&efficiency) {
             return Err(WaveletError::Efficiency(efficiency));
         }
         // The efficiency is 0.014 at c = 2.6 and 0.9999 at c = 40: the range asked for lies between.

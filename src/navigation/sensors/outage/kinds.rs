@@ -14,7 +14,7 @@ pub struct PeriodicOutages {
     /// Start of the first (s), on the clock of the trajectory: its `t_s`, which need not begin at 0.
     pub first_s: f64,
     /// From one start to the next (s).
-    #[schemars(range(min = 0.1))]
+    #[schemars(range(min = Self::LEAST_INTERVAL_S))]
     pub every_s: f64,
     /// Length of each (s), less than `every_s`.
     #[schemars(with = "Positive")]
@@ -22,6 +22,9 @@ pub struct PeriodicOutages {
 }
 
 impl PeriodicOutages {
+    /// Shortest time from one start to the next (s).
+    pub const LEAST_INTERVAL_S: f64 = 0.1;
+
     /// Checks every value.
     ///
     /// # Errors
@@ -29,8 +32,9 @@ impl PeriodicOutages {
     pub(crate) fn validate(&self) -> Result<(), SettingError> {
         require_finite("first_s", &[self.first_s])?;
         require_positive("duration_s", &[self.duration_s])?;
-        if !(self.every_s.is_finite() && self.every_s >= 0.1) {
-            return Err(SettingError::new("every_s", self.every_s, "it must be a finite number ≥ 0.1"));
+        if !(self.every_s.is_finite() && self.every_s >= Self::LEAST_INTERVAL_S) {
+            let requirement = format!("it must be a finite number ≥ {}", Self::LEAST_INTERVAL_S);
+            return Err(SettingError::new("every_s", self.every_s, requirement));
         }
         if self.duration_s < self.every_s {
             return Ok(());
@@ -56,7 +60,7 @@ impl PeriodicOutages {
 #[serde(deny_unknown_fields)]
 pub struct RandomOutages {
     /// Outages per hour of time with fixes.
-    #[schemars(with = "Positive", range(max = 3600.0))]
+    #[schemars(with = "Positive", range(max = Self::MOST_PER_HOUR))]
     pub rate_per_hour: f64,
     /// Length of each (s).
     #[schemars(with = "Positive")]
@@ -64,14 +68,18 @@ pub struct RandomOutages {
 }
 
 impl RandomOutages {
+    /// One a second.
+    pub const MOST_PER_HOUR: f64 = 3600.0;
+
     /// Checks every value.
     ///
     /// # Errors
     /// The key whose value is refused.
     pub(crate) fn validate(&self) -> Result<(), SettingError> {
         require_positive("rate_per_hour", &[self.rate_per_hour])?;
-        if self.rate_per_hour > 3600.0 {
-            return Err(SettingError::new("rate_per_hour", self.rate_per_hour, "it must be at most 3600"));
+        if self.rate_per_hour > Self::MOST_PER_HOUR {
+            let requirement = format!("it must be at most {}", Self::MOST_PER_HOUR);
+            return Err(SettingError::new("rate_per_hour", self.rate_per_hour, requirement));
         }
         require_positive("duration_s", &[self.duration_s])
     }
