@@ -164,8 +164,30 @@ fn imu(path: &Path, session: &Session) -> Result<String, Failure> {
     Ok(format!("an IMU recording of {} samples at {:.2} Hz, for fuse", imu.samples.len(), imu.rate_hz))
 }
 
+/// What is no static recording may be one of a drive or a flight, which `fuse` reads.
+fn moving(path: &Path, session: &Session) -> Option<String> {
+    /// Specific force about its mean from which it moves (m/s²): vibrations at rest are less.
+    const MOVES: f64 = 0.5;
+    let imu = read_imu(path).ok()?;
+    let force = || imu.samples.iter().map(|s| s.dv / s.dt_s);
+    let count = imu.samples.len() as f64;
+    let mean = force().sum::<glam::DVec3>() / count;
+    let spread = (force().map(|f| f.distance_squared(mean)).sum::<f64>() / count).sqrt();
+    if spread < MOVES {
+        return None;
+    }
+    imu.remarks.iter().for_each(|remark| session.printer.remark(remark));
+    let (samples, rate_hz) = (imu.samples.len(), imu.rate_hz);
+    Some(format!(
+        "an IMU recording of {samples} samples at {rate_hz:.2} Hz that moves, for fuse; not a static one"
+    ))
+}
+
 fn recording(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String, Failure> {
-    let recordings = read::recordings_at(&[path.to_owned()], rate_hz, session)?;
+    let recordings = match read::recordings_at(&[path.to_owned()], rate_hz, session) {
+        Ok(recordings) => recordings,
+        Err(refusal) => return moving(path, session).ok_or(refusal),
+    };
     let described = recordings
         .iter()
         .map(|r| format!("{} channels of {} samples at {} Hz", r.signals.len(), r.len(), r.rate_hz));

@@ -15,6 +15,11 @@ where
     PossibleValuesParser::new(values).map(|word| word.parse().expect("a word of the list"))
 }
 
+/// A finite number.
+pub(super) fn finite(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| "not a finite number".into())
+}
+
 /// A finite number ≥ 0.
 pub(super) fn non_negative(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {

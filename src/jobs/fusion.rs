@@ -24,6 +24,8 @@ pub struct RecordedDrive {
     pub rate_hz: f64,
     /// The receiver's fixes.
     pub gnss: Vec<GnssFix>,
+    /// How much earlier than their files say they were made to be ([`Self::earlier`], s).
+    pub delay_s: f64,
     /// How the IMU sits in the vehicle.
     pub mounted: Mounted,
     /// Where the filter starts; none: by levelling and the course.
@@ -81,6 +83,12 @@ impl RecordedDrive {
         }
     }
 
+    /// Takes the fixes for those of so long before their times (s).
+    pub fn earlier(&mut self, delay_s: f64) {
+        self.gnss.iter_mut().for_each(|fix| fix.t_s -= delay_s);
+        self.delay_s += delay_s;
+    }
+
     /// Fuses it. The outages of the settings are placed on the fixes, those before the start are left out.
     ///
     /// # Errors
@@ -113,7 +121,12 @@ impl RecordedDrive {
             return Err(FuseError::NothingInCommon);
         }
         let outcome = fusion::outcome(&solution, &settings.outages);
-        let assessment = fusion::assess(&solution, &outcome, &doubts).explained(&recorded);
+        let cause = || {
+            let mut found = fusion::displaced(&recorded, &belief, &start, &settings)?;
+            found.delay_s = found.delay_s.map(|[more_s, sigma_s]| [self.delay_s + more_s, sigma_s]);
+            Some(found)
+        };
+        let assessment = fusion::assess(&solution, &outcome, &doubts).explained(&recorded, cause);
         observer.remark(&Note::Fused(assessment.clone(), outcome.reference.map(|r| r.horizontal_max_m)));
         doubt_heading(&solution, &settings.outages, observer);
         let constants = belief.groups.iter().flatten().filter(|g| g.is_constant()).count();

@@ -286,9 +286,9 @@ impl FusionSummary {
         if let Some(r) = &self.reference {
             let e = &r.rmse.0;
             lines.push(format!(
-                "against the reference, RMSE: horizontal {:.3} m (largest {:.3} m), down {:.3} m, velocity {:.3} {:.3} {:.3} m/s, \
+                "against the reference, RMSE: horizontal {:.3} m (largest {:.3} m), down {:.3} m, velocity {:.3} {:.3} {:.3} m/s{}, \
                  roll {:.3}°, pitch {:.3}°, yaw {:.3}°; NEES {:.2} (9 if both are right)",
-                r.horizontal_rmse_m, r.horizontal_max_m, e[2], e[3], e[4], e[5], e[6], e[7], e[8], r.nees_mean
+                r.horizontal_rmse_m, r.horizontal_max_m, e[2], e[3], e[4], e[5], r.velocity_words(), e[6], e[7], e[8], r.nees_mean
             ));
         }
         if let Some(smoothed) = &self.smoothed {

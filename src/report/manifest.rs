@@ -129,6 +129,8 @@ pub(crate) struct FusionConfiguration {
     pub gnss_sigma: Option<FixSigma>,
     /// What the standard deviations of position and velocity are multiplied by.
     pub gnss_sigma_factor: [f64; 2],
+    /// How much earlier than its time a fix is taken to be (s).
+    pub gnss_delay_s: f64,
 }
 
 impl FusionManifest {

@@ -16,6 +16,7 @@ pub(super) struct Reference {
     error_over_sigma: PerState<f64>,
     pub(super) nees_mean: f64,
     pub(super) nees_dof: usize,
+    pub(super) velocity_sigma_m_s: f64,
 }
 
 impl From<FromReference> for Reference {
@@ -27,6 +28,22 @@ impl From<FromReference> for Reference {
             error_over_sigma: PerState(r.over_sigma),
             nees_mean: r.nees_mean,
             nees_dof: 9,
+            velocity_sigma_m_s: r.velocity_sigma,
+        }
+    }
+}
+
+/// Unevenness of a reference's velocity that is said (m/s).
+const UNEVEN: f64 = 0.1;
+
+impl Reference {
+    /// What its velocity is worth, where that is little.
+    pub(super) fn velocity_words(&self) -> String {
+        let sigma = self.velocity_sigma_m_s;
+        if sigma < UNEVEN {
+            String::new()
+        } else {
+            format!(" (the reference's own ± {sigma:.2}: its positions step)")
         }
     }
 }

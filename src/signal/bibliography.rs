@@ -39,6 +39,8 @@ sources! {
     Rauch65;
     /// S. Särkkä: *Bayesian Filtering and Smoothing*, Cambridge University Press, 2013.
     Sarkka13;
+    /// L. Ljung: *System Identification: Theory for the User*, 2nd ed., Prentice Hall, 1999 (prediction-error method).
+    Ljung99;
     /// NIMA TR8350.2: *Department of Defense World Geodetic System 1984*, 3rd ed., 2000.
     Wgs84;
     /// P. S. Maybeck: *Stochastic Models, Estimation, and Control*, vol. 1, Academic Press, 1979.

@@ -1,6 +1,7 @@
 //! `nav-sim fuse` as a user runs it.
 
 mod clocks;
+mod delays;
 mod doubts;
 mod loggers;
 mod mounting;

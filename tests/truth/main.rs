@@ -19,6 +19,7 @@ mod case_study;
 mod choose;
 mod consistency;
 mod covariance_truth;
+mod displaced;
 mod estimator_bias;
 mod formats;
 mod full_weighting;

@@ -1,9 +1,9 @@
 //! The mounting of an IMU found from the drive: as good as it says, whatever it is, or refused.
 
 use crate::alignment::{Step, belief, phone, recorded, settings, trajectory};
+use crate::fusion::shipped;
 use glam::{DQuat, DVec3};
 use nav_sim::ekf::{Belief, FilterStates};
-use nav_sim::formats::trajectory_file;
 use nav_sim::frames::RollPitchYaw;
 use nav_sim::fusion::alignment::coarse;
 use nav_sim::fusion::mounting::{Mounting, MountingError, find};
@@ -13,7 +13,6 @@ use nav_sim::simulation::Recording;
 use nav_sim::trajectory::Trajectory;
 use nav_sim::trajectory::reference::Reference;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
-use std::path::Path;
 
 const DEG: f64 = std::f64::consts::PI / 180.0;
 
@@ -50,8 +49,7 @@ fn found(recording: &Recording, q_s_b: DQuat) -> Result<Mounting, MountingError>
 }
 
 fn land_vehicle() -> Trajectory {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("trajectories/land_vehicle.toml");
-    trajectory_file::load(&path, &trajectory_file::Options::default()).unwrap().0
+    shipped("land_vehicle.toml")
 }
 
 /// Found less true, about the vehicle's axes (rad).
@@ -134,6 +132,15 @@ fn a_drive_that_does_not_show_it_is_refused() {
     let both = refusal(&[forwards, backwards, forwards, backwards].concat(), Some(0.1));
     let is_told = matches!(both, MountingError::Directions { .. } | MountingError::NoAccelerations { .. });
     assert!(is_told, "{both}");
+}
+
+/// An aircraft banks into its turns: its way is not that of its axes, and what is found would be wrong.
+#[test]
+fn an_aircraft_is_refused() {
+    recorded(&shipped("fixed_wing.toml"), Some(0.1), 1, |_, recording| {
+        let refusal = found(recording, rotation(MOUNTINGS[0])).unwrap_err();
+        assert!(matches!(refusal, MountingError::Banks { bank_deg } if bank_deg < 35.0), "{refusal}");
+    });
 }
 
 /// Out of lots backwards, then forwards for the most part: still the right way round.

@@ -55,6 +55,7 @@ impl Inputs {
             imu: imu.samples,
             rate_hz: imu.rate_hz,
             gnss,
+            delay_s: 0.0,
             mounted: args.mounting.map_or_else(Mounted::default, MountingArg::mounted),
             initial,
             reference,
@@ -62,6 +63,7 @@ impl Inputs {
         if let Some(parse::Pair([position, velocity])) = args.gnss_sigma_factor {
             drive.scale_sigma(position, velocity);
         }
+        drive.earlier(args.gnss_delay);
         Ok((Self { drive, model, states, expected }, files))
     }
 
@@ -74,6 +76,7 @@ impl Inputs {
             initial: self.expected.clone(),
             gnss_sigma: args.gnss_sigma,
             gnss_sigma_factor: args.gnss_sigma_factor.map_or([1.0; 2], |factor| factor.0),
+            gnss_delay_s: args.gnss_delay,
         }
     }
 }

@@ -21,7 +21,7 @@ use std::time::Instant;
 /// What to look at where a solution is not to be believed.
 const ADVICE: &str = "are the IMU's axes front, right, down (if not: --axes, --mounting), its units right, the start true \
                       (if not: --initial FILE), the receiver's standard deviations honest (if not: --gnss-sigma-factor), the clocks of \
-                      the two files one, to milliseconds, and the antenna where the IMU is (if not: --lever-arm)?";
+                      the two files one, to milliseconds (if not: --gnss-delay), and the antenna where the IMU is (if not: --lever-arm)?";
 /// The same where the fixes agree with the solution and the reference does not.
 const LASTING: &str = "the filter takes the errors of the fixes as white: where they last, give larger standard deviations \
                        (--gnss-sigma-factor); is the reference's attitude that of the vehicle (if not: --mounting)?";
@@ -88,6 +88,9 @@ pub(crate) struct Args {
     /// m/s; each one number or north,east,down
     #[arg(long, value_name = "POS[:VEL]", value_parser = inputs::parse_sigma)]
     gnss_sigma: Option<FixSigma>,
+    /// Take the fixes for those of so many seconds before their times: how late the receiver or the logger stamps them
+    #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = parse::finite, allow_hyphen_values = true)]
+    gnss_delay: f64,
     /// Multiply the receiver's standard deviations, of position and of velocity
     #[arg(long, value_name = "POS,VEL", value_parser = parse::positive_pair)]
     gnss_sigma_factor: Option<parse::Pair>,

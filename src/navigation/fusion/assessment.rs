@@ -1,6 +1,6 @@
 //! Whether a solution is to be believed: by its own innovations, and by a reference where there is one.
 
-use super::{FixRecord, Outcome, Recorded, Solution, Use, clocks_apart};
+use super::{Displaced, FixRecord, IN_WORDS, Outcome, Recorded, Solution, Use, clocks_apart};
 
 /// NIS per component that is doubtful, and that is not to be believed: innovations 1.4 times and twice as large
 /// as stated. Receivers state their standard deviations to a factor like that; right solutions of real drives
@@ -56,16 +56,23 @@ impl Assessment {
         let verdict = reasons.iter().map(|(v, _)| *v).max().unwrap_or(Verdict::Ok);
         // caution is no comfort beside a doubt
         reasons.retain(|(v, _)| *v >= verdict.min(Verdict::Doubtful));
+        // what weighs most first
+        reasons.sort_by_key(|(v, _)| std::cmp::Reverse(*v));
         Self { verdict, reasons }
     }
 
-    /// The same, beginning with what the recorded data themselves show to be the cause.
+    /// The same, beginning with what the recorded data themselves show to be the cause: clocks that are apart, or
+    /// what `displaced` finds.
     #[must_use]
-    pub fn explained(mut self, recorded: &Recorded<'_>) -> Self {
-        if self.verdict >= Verdict::Doubtful
-            && let Some(apart) = clocks_apart(recorded)
-        {
-            self.reasons.insert(0, (Verdict::Doubtful, apart.to_string()));
+    pub fn explained(
+        mut self,
+        recorded: &Recorded<'_>,
+        displaced: impl FnOnce() -> Option<Displaced>,
+    ) -> Self {
+        if self.verdict >= Verdict::Doubtful {
+            let clocks = clocks_apart(recorded).map(|apart| apart.to_string());
+            let cause = clocks.or_else(|| displaced().map(|found| found.to_string()));
+            self.reasons.splice(0..0, cause.map(|text| (Verdict::Doubtful, text)));
         }
         self
     }
@@ -172,14 +179,17 @@ fn rejected(outcome: &Outcome) -> Option<(Verdict, String)> {
 }
 
 fn nees(outcome: &Outcome) -> Option<(Verdict, String)> {
-    let nees = outcome.reference.map(|r| r.nees_mean).filter(|nees| *nees > NEES_LIMIT)?;
+    let reference = outcome.reference.filter(|r| r.nees_mean > NEES_LIMIT)?;
+    let nees = reference.nees_mean;
+    let worst = reference.over_sigma.iter().zip(IN_WORDS).max_by(|a, b| a.0.total_cmp(b.0));
+    let most = worst.map_or(String::new(), |(ratio, name)| format!(", most in {name} ({ratio:.1} times)"));
     let coloured = if outcome.nis_per_component < 1.0 {
         "; the innovations do not show it, as when the errors of the fixes hardly change from one to the next"
     } else {
         ""
     };
     let text = format!(
-        "NEES {nees:.0} against the reference, where 9 is right: the errors are {:.1} times as large as stated{coloured}",
+        "NEES {nees:.0} against the reference, where 9 is right: the errors are {:.1} times as large as stated{most}{coloured}",
         (nees / 9.0).sqrt()
     );
     Some((Verdict::Overconfident, text))
@@ -242,7 +252,8 @@ mod tests {
     fn a_reference_that_is_three_sigma_off_in_every_state_is_not_believed() {
         let all = solution(|_| 1.0, 600);
         let verdict = |nees| {
-            let reference = FromReference { nees_mean: nees, ..FromReference::default() };
+            let reference =
+                FromReference { nees_mean: nees, over_sigma: [3.0; 9], ..FromReference::default() };
             let outcome = Outcome { reference: Some(reference), ..outcome(&all, &[]) };
             assess(&all, &outcome, &[]).verdict
         };

@@ -11,6 +11,7 @@ use crate::imu::{ImuIncrement, ImuSample, Sensor};
 use crate::lanes::{Lanes, Vec3};
 use crate::linalg::to_nalgebra;
 use crate::strapdown::Strapdown;
+use crate::trajectory::reference::Reference;
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
 use nalgebra::{DMatrix, DVector, Matrix3, SVector};
@@ -124,17 +125,19 @@ impl Filter {
         let (r, v) = (p.variances(R).lane(0), p.variances(V).lane(0));
         let full = p.lane(0);
         let psi = full.fixed_view::<3, 3>(3 * PSI, 3 * PSI) + self.of_mounting(state.q_b_n);
-        let jacobian = RollPitchYaw::from_quat(state.q_b_n).jacobian_of_psi_n().map(to_nalgebra);
-        let angle = |i: usize| (jacobian[i].transpose() * psi * jacobian[i])[0].sqrt() / DEG;
-        let sigma = [r.x.sqrt(), r.y.sqrt(), r.z.sqrt(), v.x.sqrt(), v.y.sqrt(), v.z.sqrt()];
-        let sigma: Nine = std::array::from_fn(|i| if i < 6 { sigma[i] } else { angle(i - 6) });
+        let sigma = nine(&[r.powf(0.5), v.powf(0.5), angle_sigmas(state.q_b_n, &psi)]);
         let bias = Sensor::ALL.map(|sensor| self.ekf.bias_of(sensor).lane(0));
         let bias_sigma = Sensor::ALL.map(|sensor| self.ekf.bias_sigma(sensor).lane(0));
         Row { t_s, state, sigma, bias, bias_sigma, error: None }
     }
 
-    /// Difference from a reference.
-    pub(super) fn error(&mut self, truth: &NavState) -> RowError {
+    /// Difference from a reference, where it is known at this instant.
+    pub(super) fn error_from(&mut self, reference: &Reference, t_s: f64) -> Option<RowError> {
+        Some(self.error(&reference.state(t_s)?, reference.velocity_sigma(t_s)?))
+    }
+
+    /// Difference from a state whose velocity is known as well as `velocity_sigma` (m/s).
+    fn error(&mut self, truth: &NavState, velocity_sigma: f64) -> RowError {
         settle(&mut self.ekf);
         let estimate = self.state();
         let r = ned_difference(truth, estimate.lat, estimate.lon, estimate.h);
@@ -146,8 +149,23 @@ impl Filter {
         let mut p = self.ekf.p.lane(0).fixed_view::<9, 9>(0, 0).into_owned();
         let mut psi = p.fixed_view_mut::<3, 3>(3 * PSI, 3 * PSI);
         psi += self.of_mounting(truth.q_b_n);
+        let angle_sigma = angle_sigmas(truth.q_b_n, &psi.into_owned());
+        let mut of_velocity = p.fixed_view_mut::<3, 3>(3 * V, 3 * V);
+        of_velocity += Matrix3::from_diagonal_element(velocity_sigma * velocity_sigma);
+        let sigma =
+            |block: usize| DVec3::from_array([0, 1, 2].map(|i| p[(3 * block + i, 3 * block + i)].sqrt()));
+        let sigma = nine(&[sigma(R), sigma(V), angle_sigma]);
         let nees = p.cholesky().map_or(f64::NAN, |c| x.dot(&c.solve(&x)));
-        let all = [r.to_array(), v.to_array(), angles].concat();
-        RowError { values: std::array::from_fn(|i| all[i]), nees }
+        RowError { values: nine(&[r, v, angles.into()]), sigma, velocity_sigma, nees }
     }
+}
+
+/// Standard deviations of roll, pitch and yaw (degrees) where the attitude error in n has this covariance.
+fn angle_sigmas(q_b_n: DQuat, psi: &Matrix3<f64>) -> DVec3 {
+    let jacobian = RollPitchYaw::from_quat(q_b_n).jacobian_of_psi_n().map(to_nalgebra);
+    DVec3::from_array(jacobian.map(|row| (row.transpose() * psi * row)[0].sqrt() / DEG))
+}
+
+fn nine(of: &[DVec3; 3]) -> Nine {
+    std::array::from_fn(|i| of[i / 3][i % 3])
 }

@@ -8,6 +8,7 @@ pub mod alignment;
 mod assessment;
 mod clocks;
 mod confidence;
+mod displaced;
 mod error;
 mod filter;
 pub mod gap;
@@ -20,6 +21,7 @@ pub use assessment::{Assessment, Verdict, assess};
 pub use clocks::ClocksApart;
 pub(crate) use clocks::clocks_apart;
 pub use confidence::Confidence;
+pub use displaced::{Displaced, displaced};
 pub use error::{DOUBTFUL, FusionError};
 pub use outcome::{
     Drift, Farthest, FromReference, OutageDrift, Outcome, SmoothedOutage, SmoothedOutcome, outcome,
@@ -41,6 +43,19 @@ use smoother::Tape;
 
 /// Position (m, north, east, down), velocity (m/s), roll, pitch, yaw (degrees).
 pub(crate) type Nine = [f64; 9];
+
+/// The nine in words.
+pub(crate) const IN_WORDS: [&str; 9] = [
+    "position north",
+    "position east",
+    "position down",
+    "velocity north",
+    "velocity east",
+    "velocity down",
+    "roll",
+    "pitch",
+    "yaw",
+];
 
 /// What was recorded, both in order of time.
 #[derive(Debug, Clone, Copy)]
@@ -110,7 +125,12 @@ pub struct Row {
 pub struct RowError {
     /// In each state.
     pub values: Nine,
-    /// Normalised by the filter's own covariance of the nine: its mean is 9 if both are right.
+    /// Standard deviations of these, by the filter and the reference's velocity together.
+    pub sigma: Nine,
+    /// How well the velocity of the reference is known ([`Reference::velocity_sigma`], m/s).
+    pub velocity_sigma: f64,
+    /// Normalised by the covariance of the nine, of which these are the roots of the diagonal: its mean is 9 if both
+    /// are right.
     pub nees: f64,
 }
 
@@ -324,7 +344,6 @@ impl Run<'_> {
 
     /// Difference from the reference now, if it reaches here.
     fn error(&mut self) -> Option<RowError> {
-        let truth = self.reference?.state(self.now)?;
-        Some(self.filter.error(&truth))
+        self.filter.error_from(self.reference?, self.now)
     }
 }

@@ -1,6 +1,6 @@
 //! What a fusion says of itself: how many fixes, how consistent, how far off at the end of outages.
 
-use super::{Nine, Row, Solution, Use};
+use super::{Nine, Row, RowError, Solution, Use};
 use crate::sensors::outage::Outage;
 
 /// A distance at the end of an outage, and what the filter believed of it.
@@ -55,6 +55,8 @@ pub struct FromReference {
     pub horizontal_max_m: f64,
     /// Mean NEES (9 if both are right).
     pub nees_mean: f64,
+    /// How well the velocity of the reference is known, which the NEES allows for: root mean square (m/s).
+    pub velocity_sigma: f64,
 }
 
 /// What smoothing does to a solution.
@@ -104,16 +106,15 @@ pub fn outcome(solution: &Solution, outages: &[Outage]) -> Outcome {
 }
 
 fn from_reference(rows: &[Row]) -> Option<FromReference> {
-    let errors: Vec<_> = rows.iter().filter_map(|row| Some((row.error?, &row.sigma))).collect();
+    let errors: Vec<RowError> = rows.iter().filter_map(|row| row.error).collect();
     let n = errors.len() as f64;
-    let rms = |of: &dyn Fn(&Nine, &Nine) -> f64| {
-        (errors.iter().map(|(e, sigma)| of(&e.values, sigma).powi(2)).sum::<f64>() / n).sqrt()
-    };
+    let rms = |of: &dyn Fn(&RowError) -> f64| (errors.iter().map(|e| of(e).powi(2)).sum::<f64>() / n).sqrt();
     (!errors.is_empty()).then(|| FromReference {
-        rmse: std::array::from_fn(|i| rms(&|e, _| e[i])),
-        over_sigma: std::array::from_fn(|i| rms(&|e, sigma| e[i] / sigma[i])),
-        horizontal_max_m: errors.iter().map(|(e, _)| horizontal(&e.values)).fold(0.0, f64::max),
-        nees_mean: errors.iter().map(|(e, _)| e.nees).sum::<f64>() / n,
+        rmse: std::array::from_fn(|i| rms(&|e| e.values[i])),
+        over_sigma: std::array::from_fn(|i| rms(&|e| e.values[i] / e.sigma[i].max(f64::MIN_POSITIVE))),
+        velocity_sigma: rms(&|e| e.velocity_sigma),
+        horizontal_max_m: errors.iter().map(|e| horizontal(&e.values)).fold(0.0, f64::max),
+        nees_mean: errors.iter().map(|e| e.nees).sum::<f64>() / n,
     })
 }
 

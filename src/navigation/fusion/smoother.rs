@@ -114,7 +114,7 @@ impl Tape {
                 if mark.link.is_some() {
                     filter.ekf.show(&mark.after, &error, &p);
                     *row = filter.row(mark.t_s);
-                    row.error = reference.and_then(|r| Some(filter.error(&r.state(mark.t_s)?)));
+                    row.error = reference.and_then(|r| filter.error_from(r, mark.t_s));
                 }
             }
         }

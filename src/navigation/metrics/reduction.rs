@@ -3,6 +3,7 @@
 use super::estimate::PerState;
 use crate::ekf::Belief;
 use crate::ekf::belief::BiasGroup;
+use crate::fusion::IN_WORDS;
 use crate::imu::{Channel, Sensor};
 use crate::noise::{Ar1, Composite, Model, ParameterError, Process, White, continuous, reduction};
 use crate::simulation::REPORTED;
@@ -218,23 +219,10 @@ impl ReductionQuality {
         Some(format!(
             "the sigma of {} at the end of outage {outage} is {off:.0} % too {size}: the filter reduced to 15 states \
              is {meaning}",
-            STATE_WORDS[state]
+            IN_WORDS[state]
         ))
     }
 }
-
-/// The reported states in words.
-const STATE_WORDS: [&str; REPORTED] = [
-    "position north",
-    "position east",
-    "position down",
-    "velocity north",
-    "velocity east",
-    "velocity down",
-    "roll",
-    "pitch",
-    "yaw",
-];
 
 #[cfg(test)]
 mod tests {

@@ -23,15 +23,36 @@ const AROUND_JUMP_S: f64 = 1.0;
 /// A stretch with a jump at an end lasts at least so long (s), or is part of what jumps.
 const SHORTEST_S: f64 = 5.0;
 
+/// Longest step of positions whose unevenness is that of the positions (s): over longer ones it may be the motion's.
+const FINE_S: f64 = 0.1;
+/// A change of velocity from step to step so many times the median one is a correction.
+const CORRECTION: f64 = 5.0;
+/// Samples on either side over which the spline spreads a correction.
+const SPREAD: usize = 6;
+
 /// Stretches of a recorded trajectory, in order of time.
 #[derive(Debug, Clone)]
 pub struct Reference {
-    stretches: Vec<Trajectory>,
+    stretches: Vec<Stretch>,
+}
+
+/// A trajectory, and how well its velocity is known at each of its knots (m/s).
+#[derive(Debug, Clone)]
+struct Stretch {
+    curve: Trajectory,
+    velocity_sigma: Vec<f64>,
 }
 
 impl From<Trajectory> for Reference {
     fn from(whole: Trajectory) -> Self {
-        Self { stretches: vec![whole] }
+        Self { stretches: vec![whole.into()] }
+    }
+}
+
+impl From<Trajectory> for Stretch {
+    fn from(curve: Trajectory) -> Self {
+        let velocity_sigma = velocity_sigma(&curve);
+        Self { curve, velocity_sigma }
     }
 }
 
@@ -72,16 +93,59 @@ impl Reference {
     /// The reference of stretches in order of time; none without any.
     #[must_use]
     pub fn of_stretches(stretches: Vec<Trajectory>) -> Option<Self> {
+        let stretches: Vec<Stretch> = stretches.into_iter().map(Into::into).collect();
         (!stretches.is_empty()).then_some(Self { stretches })
     }
 
     /// Position, velocity and attitude at an instant; none where nothing is known.
     #[must_use]
     pub fn state(&self, t_s: f64) -> Option<NavState> {
-        let next = self.stretches.partition_point(|s| s.end_s() < t_s);
-        let stretch = self.stretches.get(next).filter(|s| s.start_s() <= t_s)?;
-        Some(stretch.state(t_s))
+        Some(self.stretch(t_s)?.curve.state(t_s))
     }
+
+    /// How well the velocity is known at an instant (m/s, each axis): it follows from the positions, and is as uneven
+    /// as they are. A filter that corrects its position by half a metre from one sample to the next, 20 ms later, does
+    /// not move at 25 m/s.
+    #[must_use]
+    pub fn velocity_sigma(&self, t_s: f64) -> Option<f64> {
+        let stretch = self.stretch(t_s)?;
+        let knot = stretch.curve.knots().partition_point(|knot| *knot < t_s);
+        stretch.velocity_sigma.get(knot).copied()
+    }
+
+    fn stretch(&self, t_s: f64) -> Option<&Stretch> {
+        let next = self.stretches.partition_point(|s| s.curve.end_s() < t_s);
+        self.stretches.get(next).filter(|s| s.curve.start_s() <= t_s)
+    }
+}
+
+/// How uneven the velocities of a spline through these positions are at its knots (m/s, each axis): everywhere as for
+/// positions with white errors, near a correction as that.
+fn velocity_sigma(curve: &Trajectory) -> Vec<f64> {
+    let knots = curve.knots();
+    let places: Vec<DVec3> = knots.iter().map(|t_s| curve.kinematics(*t_s).r_e).collect();
+    let seconds: Vec<f64> = knots.windows(2).map(|w| w[1] - w[0]).collect();
+    let v: Vec<DVec3> = places.windows(2).zip(&seconds).map(|(w, s)| (w[1] - w[0]) / *s).collect();
+    // the second difference of the velocities of steps: of a smooth motion the jerk times a step squared
+    let uneven: Vec<f64> = v
+        .windows(3)
+        .zip(seconds.windows(3))
+        .map(|(v, s)| if s.iter().all(|s| *s <= FINE_S) { (v[2] - 2.0 * v[1] + v[0]).length() } else { 0.0 })
+        .collect();
+    let mut sorted = uneven.clone();
+    sorted.sort_by(f64::total_cmp);
+    let median = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+    // White errors σ of a position have 20 σ² in an axis of that difference times the step, and 1.39 σ² in the slope of
+    // the spline, whose weights are 3 (√3 − 2)^k; the median of three axes is at 1.54.
+    let white = (1.39_f64 / 20.0).sqrt() / 1.54 * median;
+    let near = |knot: usize| {
+        // `uneven[i]` is about the knots i + 1 and i + 2
+        let from = knot.saturating_sub(SPREAD + 2).min(uneven.len());
+        let to = (knot + SPREAD).min(uneven.len());
+        uneven[from..to].iter().copied().filter(|u| *u > CORRECTION * median).fold(0.0, f64::max)
+    };
+    // a correction by s makes 1, −2, 1 times s over the step
+    (0..knots.len()).map(|knot| white.hypot(0.5 * near(knot))).collect()
 }
 
 /// Where samples do not follow one another as a vehicle moves.
@@ -234,6 +298,33 @@ mod tests {
         assert_eq!(spans(&started), [(4.05, 60.0)]);
         let shifted = drive(|t, s| s.h += if t > 20.02 { 20.0 } else { 0.0 });
         assert_eq!(spans(&shifted), [(0.0, 19.0), (21.05, 60.0)]);
+    }
+
+    /// The velocity of a reference that is corrected by 1 m, or rounded to millimetres, is off by what is said of it; that
+    /// of a smooth one is known.
+    #[test]
+    fn velocities_are_known_as_well_as_positions_are_even() {
+        let known = |samples: &[TrajectorySample]| {
+            let reference = Reference::from(Trajectory::from_samples(samples).unwrap());
+            let at = |k: u32| {
+                let t_s = 0.013 * f64::from(k);
+                // the drive goes north at a constant speed, to a curvature of 1e-5 m/s
+                let v = reference.state(t_s).unwrap().v_n;
+                (v.y.hypot(v.z), reference.velocity_sigma(t_s).unwrap())
+            };
+            (80..4500).map(at).collect::<Vec<_>>()
+        };
+        let rms = |of: &dyn Fn(&(f64, f64)) -> f64, all: &[(f64, f64)]| {
+            (all.iter().map(|x| of(x).powi(2)).sum::<f64>() / all.len() as f64).sqrt()
+        };
+        assert!(known(&drive(|_, _| {})).iter().all(|(_, sigma)| *sigma < 1e-3));
+        let corrected = known(&drive(|t, s| s.h += if (t + 0.02).rem_euclid(2.0) < 1.0 { 1.0 } else { 0.0 }));
+        assert!(corrected.iter().all(|(off, sigma)| *off < 2.0 * sigma + 0.01), "{corrected:?}");
+        assert!(corrected.iter().filter(|(_, sigma)| *sigma < 0.01).count() > corrected.len() / 8);
+        let rounded = known(&drive(|_, s| s.h = ((s.h + 1e3 * s.lat) * 1e3).round() / 1e3));
+        // the rounding is white where the slope is that of 1e3 rad⁻¹: 0.29 mm each
+        let (off, sigma) = (rms(&|x| x.0, &rounded), rms(&|x| x.1, &rounded));
+        assert!(off < 2.0 * sigma && sigma < 0.1, "{off} {sigma}");
     }
 
     #[test]

@@ -5,7 +5,7 @@
 //! Roll and pitch come from levelling ([Groves](crate::bibliography::Groves13), sec. 5.6.1) in a static
 //! window before it, carried on with the gyroscopes, or from the mean specific force while it moves and the
 //! change of the GNSS velocity, whichever is known better. A start that the fixes of the following minute
-//! contradict is given up for the next.
+//! contradict is given up for the next, and a heading that they move is not believed as well as it says.
 
 pub(super) mod course;
 mod levelling;
@@ -87,6 +87,10 @@ pub fn coarse(
     };
     let first_s = courses[first].fix.t_s;
     let later = LATER_S.iter().filter_map(|s| first_fast(&courses, first_s + s));
+    let finished = |mut candidate: Candidate| {
+        trial::widen(&recorded, belief, settings, &mut candidate.start);
+        candidate.alignment(first_s)
+    };
     let mut best: Option<Candidate> = None;
     let mut tried_s = f64::NEG_INFINITY;
     for at in std::iter::once(first).chain(later) {
@@ -97,12 +101,12 @@ pub fn coarse(
         for candidate in candidates(&recorded, settings, belief, &courses, at) {
             // on a straight road anything agrees: a later start must also tell forwards from backwards
             if candidate.agrees() && (at == first || candidate.trial.decided) {
-                return Ok(candidate.alignment(first_s));
+                return Ok(finished(candidate));
             }
             best.get_or_insert(candidate);
         }
     }
-    best.map(|b| b.alignment(first_s)).ok_or(AlignmentError::NoSamples { t_s: first_s })
+    best.map(finished).ok_or(AlignmentError::NoSamples { t_s: first_s })
 }
 
 /// Which way the vehicle goes along its course.

@@ -2,10 +2,16 @@
 
 use super::Recorded;
 use crate::ekf::Belief;
-use crate::fusion::{Settings, Start, Use, fuse, nis_bound};
+use crate::frames::{RollPitchYaw, wrap_angle};
+use crate::fusion::{Settings, Solution, Start, Use, fuse, nis_bound};
+use crate::units::DEG;
 
 /// How much of the recording is tried at first (s). Doubled while the two starts are not told apart.
 const TRIAL_S: f64 = 60.0;
+/// A heading that the smoother moves by more than so many of its standard deviations is not known as well as it says.
+const MOVED: f64 = 3.0;
+/// Largest standard deviation of a start (degrees).
+const WIDEST_DEG: f64 = 30.0;
 /// Difference of −2 ln(likelihood) between forwards and backwards from which one is refuted: odds of e^10.
 const DECIDED: f64 = 20.0;
 
@@ -34,6 +40,20 @@ pub(super) struct Trial {
     pub(super) agreements: [Agreement; 2],
 }
 
+/// The solution from a start as far as `to_s`, its rows those of the start and the end.
+fn until(
+    recorded: &Recorded<'_>,
+    belief: &Belief,
+    settings: &Settings,
+    start: &Start,
+    to_s: f64,
+) -> Option<Solution> {
+    let imu = &recorded.imu[..recorded.imu.partition_point(|s| s.t_s <= to_s)];
+    let gnss = &recorded.gnss[..recorded.gnss.partition_point(|f| f.t_s <= to_s)];
+    let settings = Settings { nis_gate: None, rows_hz: 1e-3, ..settings.clone() };
+    fuse(&Recorded { imu, gnss }, belief, start, &settings, None).ok()
+}
+
 fn agreement(
     recorded: &Recorded<'_>,
     belief: &Belief,
@@ -41,11 +61,9 @@ fn agreement(
     start: &Start,
     to_s: f64,
 ) -> Agreement {
-    let imu = &recorded.imu[..recorded.imu.partition_point(|s| s.t_s <= to_s)];
-    let gnss = &recorded.gnss[..recorded.gnss.partition_point(|f| f.t_s <= to_s)];
-    let settings = Settings { nis_gate: None, rows_hz: 1e-3, smooth: false, ..settings.clone() };
     let failed = Agreement { cost: f64::INFINITY, nis: f64::INFINITY, components: 0 };
-    let Ok(solution) = fuse(&Recorded { imu, gnss }, belief, start, &settings, None) else { return failed };
+    let settings = Settings { smooth: false, ..settings.clone() };
+    let Some(solution) = until(recorded, belief, &settings, start, to_s) else { return failed };
     let mut sum = Agreement { cost: 0.0, nis: 0.0, components: 0 };
     for fix in solution.fixes.iter().filter(|f| f.used == Use::Used) {
         // the sum of the logarithms stands for the determinant: the correlations of both starts are alike
@@ -82,5 +100,23 @@ pub(super) fn opposite(
             return Trial { better, decided, agreements: [first[better], both[better]] };
         }
         window_s *= 2.0;
+    }
+}
+
+/// Widens the standard deviation of a heading that is not the course: wind sets an aircraft off, currents a boat. The
+/// smoother, from all fixes of the first minute, says how far.
+pub(super) fn widen(recorded: &Recorded<'_>, belief: &Belief, settings: &Settings, start: &mut Start) {
+    let settings = Settings { smooth: true, ..settings.clone() };
+    let solution = until(recorded, belief, &settings, start, start.t_s + TRIAL_S);
+    let Some([first, ..]) = solution.as_ref().and_then(|s| s.smoothed.as_deref()) else { return };
+    let [course, heading] = [start.state.q_b_n, first.state.q_b_n].map(|q| RollPitchYaw::from_quat(q).yaw);
+    let moved_deg = wrap_angle(heading - course) / DEG;
+    let sigma_deg = &mut start.sigma.att_sigma_deg[2];
+    if moved_deg.abs() > MOVED * *sigma_deg {
+        *sigma_deg = sigma_deg.hypot(moved_deg).min(WIDEST_DEG);
+        let text = format!(
+            "heading ± {sigma_deg:.1}°: by the fixes of the minute after it, it is {moved_deg:+.0}° from the course (wind, slip)"
+        );
+        start.how.push(text);
     }
 }

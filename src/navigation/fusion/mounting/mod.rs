@@ -94,6 +94,14 @@ pub enum MountingError {
         /// Share of the lesser direction.
         share: f64,
     },
+    /// It is no road vehicle.
+    #[error(
+        "the mounting is not found: the vehicle banks by {bank_deg:.0}° (root mean square) beside its way, as an aircraft does: the          angles are found of road vehicles"
+    )]
+    Banks {
+        /// Root mean square of the angles about the way (degrees).
+        bank_deg: f64,
+    },
     /// The angles scatter too much.
     #[error(
         "the mounting is not found: the drive shows the IMU's {axis} in the vehicle to ±{sigma_deg:.1}° only (±{:.0}° is the \

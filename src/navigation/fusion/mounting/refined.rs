@@ -25,6 +25,8 @@ const UNSEEN: DVec3 = DVec3::new(1.5 * DEG, 0.5 * DEG, 0.3 * DEG);
 const LOOSE: f64 = 3.0;
 /// How many standard deviations the yaw of the filter may be from the rough one.
 const APART: f64 = 4.0;
+/// Banks of roads and leaning bodies are less than this, root mean square (rad).
+const BANKED: f64 = 8.0 * DEG;
 /// Share of the way in the lesser direction from which nobody knows which one is forwards.
 const UNDECIDED: f64 = 0.25;
 
@@ -84,6 +86,7 @@ pub(super) fn through(
         solution.rows.windows(3).filter_map(|w| moment(&w[0], &w[1], &w[2])).collect();
     turn_to_front(&mut moments)?;
     let mean = mean(&moments);
+    upright(&moments, mean)?;
     let blocks = deviations(&moments, mean);
     if blocks[0].count() < FEWEST {
         let seconds = moments.len() as f64 / ROWS_HZ;
@@ -154,12 +157,25 @@ fn mean(moments: &[Moment]) -> DQuat {
     mean
 }
 
-/// The deviations from a rotation about the track's axes (rad), in blocks.
+/// What banks into its turns is an aircraft, whose way says little of its attitude.
+fn upright(moments: &[Moment], mean: DQuat) -> Result<(), MountingError> {
+    let square =
+        moments.iter().map(|m| deviation(m, mean).x.powi(2)).sum::<f64>() / moments.len().max(1) as f64;
+    let bank = square.sqrt();
+    if bank > BANKED { Err(MountingError::Banks { bank_deg: bank / DEG }) } else { Ok(()) }
+}
+
+/// The deviation of a moment from a rotation, about the track's axes (rad).
+fn deviation(moment: &Moment, mean: DQuat) -> DVec3 {
+    let q = moment.q * mean.inverse();
+    (if q.w < 0.0 { -q } else { q }).to_scaled_axis()
+}
+
+/// The deviations of all, in blocks.
 fn deviations(moments: &[Moment], mean: DQuat) -> [Blocks; 3] {
     let mut blocks: [Blocks; 3] = std::array::from_fn(|_| Blocks::default());
     for m in moments {
-        let q = m.q * mean.inverse();
-        let deviation = (if q.w < 0.0 { -q } else { q }).to_scaled_axis().to_array();
+        let deviation = deviation(m, mean).to_array();
         for (i, sum) in blocks.iter_mut().enumerate() {
             sum.add(m.t_s, deviation[i], m.sigma[i].powi(-2));
         }

@@ -1,0 +1,234 @@
+//! Whether the fixes are those of an antenna elsewhere, or of an earlier time, than the filter was told.
+//!
+//! The innovations change almost linearly with the place of the antenna and with the delay of the fixes. The filter is
+//! run with each a little off; least squares over the innovations of all fixes give the values at which they are
+//! smallest ([Ljung](crate::bibliography::Ljung99), ch. 7: the prediction-error method, which is maximum likelihood
+//! here). What was found is a cause only if the filter, run with it, makes a solution to be believed: an explanation is
+//! tested by taking the cause away.
+
+use super::{Recorded, Settings, Start, Use, fuse};
+use crate::ekf::Belief;
+use crate::gnss::GnssFix;
+use glam::DVec3;
+use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
+use std::fmt;
+use std::ops::Range;
+
+/// How far off the filter is run (m; s).
+const OFF: [f64; 4] = [0.3, 0.3, 0.3, 0.03];
+/// The antenna's and the delay's among the four.
+const ANTENNA: Range<usize> = 0..3;
+const DELAY: Range<usize> = 3..4;
+/// How much of a recording is looked at (s).
+const MOST_S: f64 = 1200.0;
+/// Steps of Gauss and Newton: the second one corrects what a solution that was far off made of the first.
+const STEPS: usize = 2;
+/// A part whose absence costs less than this in −2 ln(likelihood) is no part of the cause: odds of e^10.
+const COSTLY: f64 = 20.0;
+/// Mean NIS per component with which the solution is to be believed, and the share of it now that is a gain.
+const BELIEVED: (f64, f64) = (2.0, 0.9);
+/// An antenna farther off (m) and a delay longer (s) are none: what is wrong is something else.
+const FARTHEST: (f64, f64) = (10.0, 1.0);
+
+/// What makes the fixes agree with the IMU.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Displaced {
+    /// Antenna from IMU: front, right, down (m), and standard deviations; none where it is as given.
+    pub lever_arm_b: Option<[DVec3; 2]>,
+    /// How long the fixes are late (s), and its standard deviation; none where they are not.
+    pub delay_s: Option<[f64; 2]>,
+    /// Mean NIS per component as it is, and with these.
+    pub nis: [f64; 2],
+}
+
+impl fmt::Display for Displaced {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let three = |v: DVec3| format!("{:.2},{:.2},{:.2}", v.x, v.y, v.z);
+        let antenna = self.lever_arm_b.map(|[arm, sigma]| {
+            let given = three(arm);
+            (
+                format!(
+                    "those of an antenna at {given} ± {} m (front, right, down of the IMU)",
+                    three(sigma)
+                ),
+                format!("--lever-arm={given}"),
+            )
+        });
+        let delay = self.delay_s.map(|[delay, sigma]| {
+            (format!("{delay:.3} ± {sigma:.3} s late"), format!("--gnss-delay={delay:.3}"))
+        });
+        let (what, options): (Vec<String>, Vec<String>) = antenna.into_iter().chain(delay).unzip();
+        let [now, then] = self.nis;
+        write!(
+            f,
+            "the fixes seem to be {}: with {} the NIS is {then:.2} per component, now {now:.2}",
+            what.join(" and "),
+            options.join(" ")
+        )
+    }
+}
+
+/// Finds where the antenna is and how late the fixes are, where that makes a solution to be believed of one that is
+/// less so.
+#[must_use]
+pub fn displaced(
+    recorded: &Recorded<'_>,
+    belief: &Belief,
+    start: &Start,
+    settings: &Settings,
+) -> Option<Displaced> {
+    let to_s = start.t_s + MOST_S;
+    let imu = &recorded.imu[..recorded.imu.partition_point(|s| s.t_s <= to_s)];
+    let gnss = &recorded.gnss[..recorded.gnss.partition_point(|f| f.t_s <= to_s)];
+    let scene = Scene { recorded: Recorded { imu, gnss }, belief, start, settings };
+    let now = scene.innovations(&Vector4::zeros())?;
+    // innovations as small as stated need no explanation
+    if now.nis() < 1.0 {
+        return None;
+    }
+    let (mut x, mut normal) = (Vector4::zeros(), scene.normal(&Vector4::zeros(), &now)?);
+    for step in 1.. {
+        x += normal.inverse * normal.gradient;
+        let there = scene.innovations(&x)?;
+        if step == STEPS {
+            break;
+        }
+        normal = scene.normal(&x, &there)?;
+    }
+    let best = scene.innovations(&x)?;
+    // fixes whose errors last make any gain as much larger as their NIS
+    let scale = best.nis().max(1.0);
+    let kept = normal.needed(&x, scale)?;
+    let (x, covariance) = normal.without_the_rest(&x, &kept)?;
+    let nis = [now.nis(), scene.innovations(&x)?.nis()];
+    let antenna_b = DVec3::new(x[0], x[1], x[2]);
+    let is_believed = nis[1] < BELIEVED.0 && nis[1] < BELIEVED.1 * nis[0];
+    if !is_believed || antenna_b.length() > FARTHEST.0 || x[3].abs() > FARTHEST.1 {
+        return None;
+    }
+    let sigma = covariance.diagonal().map(|v| (v * scale).sqrt());
+    Some(Displaced {
+        lever_arm_b: kept
+            .contains(&ANTENNA)
+            .then(|| [settings.lever_arm_b + antenna_b, DVec3::new(sigma[0], sigma[1], sigma[2])]),
+        delay_s: kept.contains(&DELAY).then(|| [x[3], sigma[3]]),
+        nis,
+    })
+}
+
+/// What is run again.
+struct Scene<'a> {
+    recorded: Recorded<'a>,
+    belief: &'a Belief,
+    start: &'a Start,
+    settings: &'a Settings,
+}
+
+impl Scene<'_> {
+    /// The innovations with the antenna and the delay off by `x`.
+    fn innovations(&self, x: &Vector4<f64>) -> Option<Innovations> {
+        let earlier = |fix: &GnssFix| GnssFix { t_s: fix.t_s - x[3], ..*fix };
+        let gnss: Vec<GnssFix> = self.recorded.gnss.iter().map(earlier).collect();
+        let settings = Settings {
+            lever_arm_b: self.settings.lever_arm_b + DVec3::new(x[0], x[1], x[2]),
+            nis_gate: None,
+            rows_hz: 1e-3,
+            smooth: false,
+            ..self.settings.clone()
+        };
+        let recorded = Recorded { gnss: &gnss, ..self.recorded };
+        let solution = fuse(&recorded, self.belief, self.start, &settings, None).ok()?;
+        let first = gnss.partition_point(|f| f.t_s <= self.start.t_s);
+        let mut all = vec![None; gnss.len()];
+        for (k, fix) in solution.fixes.into_iter().enumerate().filter(|(_, f)| f.used == Use::Used) {
+            all[first + k] = Some(OneFix { z: fix.innovation, sigma: fix.sigma, nis: fix.nis });
+        }
+        Some(Innovations { of_fix: all })
+    }
+
+    /// The normal equations about `x`, where the innovations are `there`.
+    fn normal(&self, x: &Vector4<f64>, there: &Innovations) -> Option<Normal> {
+        let mut aside = Vec::new();
+        for (k, off) in OFF.into_iter().enumerate() {
+            let mut y = *x;
+            y[k] += off;
+            aside.push(self.innovations(&y)?);
+        }
+        let (mut information, mut gradient) = (Matrix4::zeros(), Vector4::zeros());
+        for (i, fix) in there.of_fix.iter().enumerate() {
+            let Some(fix) = fix else { continue };
+            let moved: Option<Vec<&OneFix>> = aside.iter().map(|a| a.of_fix[i].as_ref()).collect();
+            let Some(moved) = moved else { continue };
+            for (c, (z, sigma)) in fix.z.iter().zip(&fix.sigma).enumerate() {
+                let slope = Vector4::from_fn(|k, _| (moved[k].z[c] - z) / (OFF[k] * sigma));
+                information += slope * slope.transpose();
+                gradient -= slope * (z / sigma);
+            }
+        }
+        Some(Normal { inverse: information.try_inverse()?, gradient })
+    }
+}
+
+/// A fix as the filter saw it: innovation, its standard deviations, NIS.
+#[derive(Debug, Clone)]
+struct OneFix {
+    z: Vec<f64>,
+    sigma: Vec<f64>,
+    nis: f64,
+}
+
+/// What the filter made of each fix of the recording that it used.
+struct Innovations {
+    of_fix: Vec<Option<OneFix>>,
+}
+
+impl Innovations {
+    /// Mean NIS per component.
+    fn nis(&self) -> f64 {
+        let used = || self.of_fix.iter().flatten();
+        used().map(|f| f.nis).sum::<f64>() / used().map(|f| f.z.len()).sum::<usize>().max(1) as f64
+    }
+}
+
+/// Least squares: the inverse of the information about the four, and the gradient.
+struct Normal {
+    inverse: Matrix4<f64>,
+    gradient: Vector4<f64>,
+}
+
+impl Normal {
+    /// The parts that `x` owes its gain to. Costs count `scale` times less.
+    fn needed(&self, x: &Vector4<f64>, scale: f64) -> Option<Vec<Range<usize>>> {
+        let cost = |part: &Range<usize>| {
+            let n = part.len();
+            let block = self.inverse.view((part.start, part.start), (n, n)).into_owned();
+            let of: DVector<f64> = x.rows(part.start, n).into_owned();
+            Some(of.dot(&(DMatrix::try_inverse(block)? * &of)))
+        };
+        let [antenna, delay] = [cost(&ANTENNA)?, cost(&DELAY)?];
+        let limit = COSTLY * scale;
+        Some(match (antenna > limit, delay > limit) {
+            (true, true) => vec![ANTENNA, DELAY],
+            (true, false) => vec![ANTENNA],
+            // on a straight way at one speed either would do: one number instead of three
+            _ => vec![DELAY],
+        })
+    }
+
+    /// The best values of the parts that are kept where the others are zero, and their covariance.
+    fn without_the_rest(
+        &self,
+        x: &Vector4<f64>,
+        kept: &[Range<usize>],
+    ) -> Option<(Vector4<f64>, Matrix4<f64>)> {
+        let dropped: Vec<usize> = (0..4).filter(|k| !kept.iter().any(|part| part.contains(k))).collect();
+        let (mut x, mut p) = (*x, self.inverse);
+        // as if each of them had been measured to be zero
+        for k in dropped {
+            let gain = p.column(k) / p[(k, k)];
+            x -= gain * x[k];
+            p -= gain * p.row(k);
+        }
+        x.iter().chain(p.iter()).all(|v| v.is_finite()).then_some((x, p))
+    }
+}
