@@ -109,8 +109,10 @@ impl Reference {
     #[must_use]
     pub fn velocity_sigma(&self, t_s: f64) -> Option<f64> {
         let stretch = self.stretch(t_s)?;
+        // the worse one of the knots on either side
         let knot = stretch.curve.knots().partition_point(|knot| *knot < t_s);
-        stretch.velocity_sigma.get(knot).copied()
+        let sigmas = stretch.velocity_sigma.get(knot.saturating_sub(1)..=knot)?;
+        Some(sigmas.iter().copied().fold(0.0, f64::max))
     }
 
     fn stretch(&self, t_s: f64) -> Option<&Stretch> {
@@ -138,14 +140,19 @@ fn velocity_sigma(curve: &Trajectory) -> Vec<f64> {
     // White errors σ of a position have 20 σ² in an axis of that difference times the step, and 1.39 σ² in the slope of
     // the spline, whose weights are 3 (√3 − 2)^k; the median of three axes is at 1.54.
     let white = (1.39_f64 / 20.0).sqrt() / 1.54 * median;
+    // a correction by s makes 1, −2, 1 times s over the step; the slopes of the spline fall by √3 − 2 a knot beside it
     let near = |knot: usize| {
         // `uneven[i]` is about the knots i + 1 and i + 2
         let from = knot.saturating_sub(SPREAD + 2).min(uneven.len());
         let to = (knot + SPREAD).min(uneven.len());
-        uneven[from..to].iter().copied().filter(|u| *u > CORRECTION * median).fold(0.0, f64::max)
+        let corrections = (from..to).filter(|i| uneven[*i] > CORRECTION * median);
+        let faded = corrections.map(|i| {
+            let beside = (i + 1).saturating_sub(knot).max(knot.saturating_sub(i + 2));
+            0.5 * uneven[i] * (2.0 - 3.0_f64.sqrt()).powi(beside as i32)
+        });
+        faded.fold(0.0, f64::max)
     };
-    // a correction by s makes 1, −2, 1 times s over the step
-    (0..knots.len()).map(|knot| white.hypot(0.5 * near(knot))).collect()
+    (0..knots.len()).map(|knot| white.hypot(near(knot))).collect()
 }
 
 /// Where samples do not follow one another as a vehicle moves.
