@@ -16,7 +16,7 @@ pub struct Plan {
     pub schema_version: u32,
     /// Version of nav-sim.
     pub version: String,
-    /// Fingerprint of the numbers this build makes ([`super::fingerprint::fingerprint()`]).
+    /// Fingerprint of the numbers this build makes (`fingerprint()`).
     pub numerics: String,
     /// Seed of all random numbers.
     pub seed: u64,

@@ -1,7 +1,8 @@
 //! Motion profiles in TOML.
 
+mod description;
+
 use super::samples::HEIGHT;
-use crate::earth::MAX_LATITUDE_DEG;
 use crate::formats::FileError;
 use crate::formats::toml_described::{Document, Finite};
 use crate::formats::toml_file::{Section, Source};
@@ -9,224 +10,16 @@ use crate::trajectory::Trajectory;
 use crate::trajectory::profile::{
     self, Acceleration, Bank, Kind, Length, Place, Profile, Segment, Start, Turning, Waypoint,
 };
-use crate::units::{DEG, NonNegative, Positive};
+use crate::units::DEG;
+use description::{Accelerate, Climb, Description, Of, Point, Roll, Stop, Straight, Turn, Waypoints};
 use schemars::JsonSchema;
-use serde::Deserialize;
-use serde::de::{DeserializeOwned, IgnoredAny};
+use serde::de::DeserializeOwned;
 use std::path::Path;
 
 /// Ramps of accelerations and rates unless said otherwise (s).
 const RAMP_S: f64 = 2.0;
 /// Braking of a stop unless said otherwise (m/s²).
 const DECEL: f64 = 1.5;
-
-/// A drive by what the vehicle does: the trajectory of nav-sim run
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(title = "Motion profile")]
-struct Description {
-    start: Origin,
-    #[serde(default)]
-    vehicle: Vehicle,
-    /// What the vehicle does, in order
-    #[schemars(with = "Vec<SegmentDescription>", length(min = 1))]
-    #[serde(rename = "segment")]
-    _segment: IgnoredAny,
-}
-
-/// Where and how it starts
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct Origin {
-    /// Time (s; default: 0)
-    #[serde(default)]
-    t_s: Finite,
-    /// Geodetic latitude (degrees)
-    #[schemars(range(min = -MAX_LATITUDE_DEG, max = MAX_LATITUDE_DEG))]
-    lat_deg: Finite,
-    /// Longitude (degrees)
-    lon_deg: Finite,
-    /// Height above the ellipsoid (m)
-    #[schemars(range(min = *HEIGHT.start(), max = *HEIGHT.end()))]
-    h_m: Finite,
-    /// Heading from north (degrees)
-    heading_deg: Finite,
-    /// Speed (m/s; default: 0)
-    #[serde(default)]
-    #[schemars(with = "NonNegative")]
-    speed_m_s: Finite,
-}
-
-/// How the vehicle moves
-#[derive(Default, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct Vehicle {
-    /// Roll in turns: level as a land vehicle (default), or as an aircraft
-    #[serde(default)]
-    bank: Roll,
-    /// Time over which accelerations and rates build up and fade (s; default: 2)
-    #[schemars(with = "Option<Positive>")]
-    ramp_s: Option<Finite>,
-}
-
-#[derive(Clone, Copy, Default, Deserialize, JsonSchema)]
-#[serde(rename_all = "lowercase")]
-enum Roll {
-    #[default]
-    None,
-    Coordinated,
-}
-
-/// One segment
-#[derive(JsonSchema)]
-#[schemars(deny_unknown_fields)]
-#[expect(dead_code, reason = "what describes files, for editors")]
-struct SegmentDescription {
-    #[schemars(flatten)]
-    of: Of,
-    #[schemars(flatten)]
-    kind: Described,
-}
-
-/// What every segment may have.
-#[derive(Deserialize, JsonSchema)]
-struct Of {
-    /// Overrides that of the vehicle (s)
-    #[schemars(with = "Option<Positive>")]
-    ramp_s: Option<Finite>,
-}
-
-/// The kinds of segment, each with its keys.
-#[derive(JsonSchema)]
-#[schemars(tag = "kind", rename_all = "lowercase")]
-#[expect(dead_code, reason = "what describes files, for editors")]
-enum Described {
-    /// Constant speed and heading; at speed zero, standing
-    Straight(Straight),
-    /// Speed changes
-    Accelerate(Accelerate),
-    /// Heading changes
-    Turn(Turn),
-    /// Height changes
-    Climb(Climb),
-    /// Brakes if moving, then stands
-    Stop(Stop),
-    /// From point to point on straight legs, cutting the corners with turns
-    Waypoints(Waypoints),
-}
-
-#[derive(Deserialize, JsonSchema)]
-struct Straight {
-    /// Duration (s), or …
-    #[schemars(with = "Option<Positive>")]
-    duration_s: Option<Finite>,
-    /// … distance along the path (m)
-    #[schemars(with = "Option<Positive>")]
-    distance_m: Option<Finite>,
-    /// Height gained (m; default: 0)
-    #[serde(default)]
-    climb_m: Finite,
-}
-
-#[derive(Deserialize, JsonSchema)]
-struct Climb {
-    /// Height gained (m)
-    height_m: Finite,
-    /// Duration (s), or …
-    #[schemars(with = "Option<Positive>")]
-    duration_s: Option<Finite>,
-    /// … distance along the path (m)
-    #[schemars(with = "Option<Positive>")]
-    distance_m: Option<Finite>,
-}
-
-#[derive(Deserialize, JsonSchema)]
-struct Accelerate {
-    /// Final speed (m/s)
-    #[schemars(with = "NonNegative")]
-    to_speed_m_s: Finite,
-    /// Duration (s), or …
-    #[schemars(with = "Option<Positive>")]
-    duration_s: Option<Finite>,
-    /// … largest acceleration (m/s²)
-    #[schemars(with = "Option<Positive>")]
-    accel_m_s2: Option<Finite>,
-    /// Height gained (m; default: 0)
-    #[serde(default)]
-    climb_m: Finite,
-}
-
-#[derive(Deserialize, JsonSchema)]
-struct Turn {
-    /// Change of heading, positive to the right (degrees)
-    angle_deg: Finite,
-    /// Duration (s), or …
-    #[schemars(with = "Option<Positive>")]
-    duration_s: Option<Finite>,
-    /// … largest rate (degrees/s), or …
-    #[schemars(with = "Option<Positive>")]
-    rate_deg_s: Option<Finite>,
-    /// … smallest radius (m), or …
-    #[schemars(with = "Option<Positive>")]
-    radius_m: Option<Finite>,
-    /// … largest lateral acceleration (m/s²)
-    #[schemars(with = "Option<Positive>")]
-    lateral_accel_m_s2: Option<Finite>,
-    /// Height gained (m; default: 0)
-    #[serde(default)]
-    climb_m: Finite,
-}
-
-#[derive(Deserialize, JsonSchema)]
-struct Stop {
-    /// Time at rest (s)
-    #[schemars(with = "Positive")]
-    duration_s: Finite,
-    /// Largest deceleration while braking (m/s²; default: 1.5)
-    #[schemars(with = "Option<Positive>")]
-    decel_m_s2: Option<Finite>,
-    /// Height gained (m; default: 0)
-    #[serde(default)]
-    climb_m: Finite,
-}
-
-#[derive(Deserialize, JsonSchema)]
-struct Waypoints {
-    /// The points; the path ends at the last and passes inside the others
-    #[schemars(with = "Vec<Point>", length(min = 1))]
-    #[serde(rename = "points")]
-    _points: IgnoredAny,
-    /// Largest rate of turns (degrees/s), or …
-    #[schemars(with = "Option<Positive>")]
-    rate_deg_s: Option<Finite>,
-    /// … smallest radius (m), or …
-    #[schemars(with = "Option<Positive>")]
-    radius_m: Option<Finite>,
-    /// … largest lateral acceleration (m/s²)
-    #[schemars(with = "Option<Positive>")]
-    lateral_accel_m_s2: Option<Finite>,
-    /// Height gained (m; default: 0)
-    #[serde(default)]
-    climb_m: Finite,
-}
-
-/// A point, by latitude and longitude or by metres from the start
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-struct Point {
-    /// Geodetic latitude (degrees)
-    #[schemars(range(min = -MAX_LATITUDE_DEG, max = MAX_LATITUDE_DEG))]
-    lat_deg: Option<Finite>,
-    /// Longitude (degrees)
-    lon_deg: Option<Finite>,
-    /// North of the start (m)
-    n_m: Option<Finite>,
-    /// East of the start (m)
-    e_m: Option<Finite>,
-    /// Height above the ellipsoid (m; default: that before it)
-    #[schemars(range(min = *HEIGHT.start(), max = *HEIGHT.end()))]
-    h_m: Option<Finite>,
-}
 
 /// The JSON schema of such a file.
 pub(crate) fn schema() -> serde_json::Value {

@@ -1,7 +1,7 @@
 //! The covariance of eight runs.
 //!
-//! States by threes: [`R`] position error (m, n), [`V`] velocity error (m/s, n), [`PSI`] attitude error
-//! (rad, n), then one triple of axes for each bias group, accelerometer groups first ([`BIAS`]), and for each
+//! States by threes: [`R`] position error (m, n), [`V`] velocity error (m/s, n), `PSI` attitude error
+//! (rad, n), then one triple of axes for each bias group, accelerometer groups first (`BIAS`), and for each
 //! unknown constant that acts multiplied, in the same order.
 //!
 //! The lower triangle is the matrix. Inside the square of the navigation states and inside that of the

@@ -46,7 +46,7 @@ impl Summary {
 
 impl OutageSummary {
     /// The share of the filter's own standard deviation that the second order shifts the velocity down by at the end,
-    /// where the filter's linear model ends: where it is above [`Self::SECOND_ORDER_LIMIT`].
+    /// where the filter's linear model ends: where it is above `SECOND_ORDER_LIMIT`.
     #[must_use]
     pub fn beyond_linear(&self) -> Option<f64> {
         let share = self.second_order_vel_d_m_s / self.asee_end.0[VELOCITY_DOWN];

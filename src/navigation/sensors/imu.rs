@@ -13,7 +13,7 @@ pub enum Truth<'a> {
     /// Synthesised from a model, per run and axis.
     Model(&'a Model),
     /// A window of a static recording for each run, all axes together, so that correlation between axes
-    /// survives; windows are spread evenly, and each starts from the level best known there ([`Windows`]).
+    /// survives; windows are spread evenly, and each starts from the level best known there (`Windows`).
     Static(&'a [Recording]),
 }
 

@@ -101,7 +101,7 @@ impl fmt::Display for Excess {
     }
 }
 
-/// The largest speed, acceleration, jerk and rate of a trajectory (SI), in the order of [`Quantity::ALL`],
+/// The largest speed, acceleration, jerk and rate of a trajectory (SI), in the order of `Quantity::ALL`,
 /// and every stretch beyond the limits, in order of time.
 #[must_use]
 pub fn examine(trajectory: &Trajectory, limits: &Limits) -> ([f64; 4], Vec<Excess>) {
