@@ -267,10 +267,17 @@ fn recordings_that_differ_are_not_said_to_agree() {
     let mut all = set(7, 6, NONE, |_, _, _| ());
     let most = LevelSpread { tau_s: 8.0, within: 0.01, between: 0.36 };
     all.iter_mut().for_each(|d| d.differing = Some(Differing { p_value: 0.002, most }));
+    all[3].scores[0].noise[2] = -9.9;
     let words = advice(&all, Sensor::Accel);
     let expected = "none of the 6 recordings stands out, but they differ among themselves beyond their noise, by 36 % of the \
                     wavelet variance at 8 s (p = 0.002)";
     assert!(words[0].starts_with(expected), "{words:?}");
+    let farthest = format!(
+        "farthest from the others is {} ({} -9.9 deviations)",
+        all[3].name,
+        all[3].scores[0].axis.name()
+    );
+    assert!(words[0].ends_with(&farthest), "{words:?}");
 }
 
 /// A model that the J-test rejects is told whatever the recordings say of one another; no estimator is advised for a filter.

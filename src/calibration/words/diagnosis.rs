@@ -141,6 +141,16 @@ fn extent(alarm: &Alarm) -> String {
     format!("most {range} ({} deviations), p = {:.4}", axes.join(", "), alarm.p_value)
 }
 
+/// `; farthest from the others is r2 (y +4.6 deviations)`, of recordings that have scores.
+fn farthest(own: &[&Diagnosis]) -> String {
+    let scores = own.iter().flat_map(|d| d.scores.iter().map(move |s| (d, s)));
+    let all = scores.flat_map(|(d, s)| s.noise.iter().map(move |z| (&d.name, s.axis, *z)));
+    let largest = all.filter(|(_, _, z)| z.is_finite()).max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()));
+    largest.map_or(String::new(), |(name, axis, z)| {
+        format!("; farthest from the others is {name} ({} {z:+.1} deviations)", axis.name())
+    })
+}
+
 fn answer(own: &[&Diagnosis], abnormal: &[&Diagnosis]) -> String {
     let of_noise = || abnormal.iter().filter(|d| d.verdict == Verdict::Noise);
     let signals: usize = of_noise().map(|d| d.axes).sum();
@@ -150,8 +160,9 @@ fn answer(own: &[&Diagnosis], abnormal: &[&Diagnosis]) -> String {
             None => format!("the {all} recordings agree: use them all"),
             Some(Differing { p_value, most: LevelSpread { tau_s, between, .. } }) => format!(
                 "none of the {all} recordings stands out, but they differ among themselves beyond their noise, by {} of the \
-                 wavelet variance at {tau_s} s (p = {p_value:.3}): the model is their average and describes none of them exactly",
-                signed_percent(between).trim_start_matches('+')
+                 wavelet variance at {tau_s} s (p = {p_value:.3}): the model is their average and describes none of them exactly{}",
+                signed_percent(between).trim_start_matches('+'),
+                farthest(own)
             ),
         },
         (some, 0) if abnormal.iter().all(|d| d.verdict == Verdict::Drift) => format!(

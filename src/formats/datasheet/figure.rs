@@ -37,6 +37,7 @@ const GYRO_NOISE: Units = &[
     ("deg/s/sqrt(Hz)", DEG),
     ("mdeg/s/sqrt(Hz)", 1e-3 * DEG),
     ("deg/h/sqrt(Hz)", DEG_PER_HOUR),
+    ("rad/sqrt(s)", 1.0),
     ("rad/s/sqrt(Hz)", 1.0),
 ];
 const ACCELERATION: Units =
