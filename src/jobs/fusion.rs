@@ -9,7 +9,7 @@ use crate::fusion::{
 use crate::gnss::GnssFix;
 use crate::imu::ImuIncrement;
 use crate::observer::Observer;
-use crate::report::FusionSummary;
+use crate::report::{FusionSummary, displaced_words};
 use crate::sensors::outage::{FixedData, Outage, OutageError, OutagePlan, PlacedOutages};
 use crate::simulation::lincov::weak_heading;
 use crate::trajectory::reference::Reference;
@@ -124,7 +124,7 @@ impl RecordedDrive {
         let cause = || {
             let mut found = fusion::displaced(&recorded, &belief, &start, &settings)?;
             found.delay_s = found.delay_s.map(|[more_s, sigma_s]| [self.delay_s + more_s, sigma_s]);
-            Some(found)
+            Some(displaced_words(&found))
         };
         let assessment = fusion::assess(&solution, &outcome, &doubts).explained(&recorded, cause);
         observer.remark(&Note::Fused(assessment.clone(), outcome.reference.map(|r| r.horizontal_max_m)));

@@ -33,18 +33,18 @@ fn an_antenna_elsewhere_and_late_fixes_are_found() {
     for (arm_b, late_s) in [(ARM, LATE_S), (ARM, 0.0), (DVec3::ZERO, LATE_S)] {
         for found in found(arm_b, late_s, &settings()) {
             let found = found.unwrap();
-            assert!(found.nis[0] > 1.5 && (0.9..1.1).contains(&found.nis[1]), "{found}");
+            assert!(found.nis[0] > 1.5 && (0.9..1.1).contains(&found.nis[1]), "{found:?}");
             assert_eq!(
                 (found.lever_arm_b.is_some(), found.delay_s.is_some()),
                 (arm_b != DVec3::ZERO, late_s > 0.0)
             );
             if let Some([arm, sigma]) = found.lever_arm_b {
-                assert!(((arm - arm_b) / sigma).abs().max_element() < 4.0, "{found}");
+                assert!(((arm - arm_b) / sigma).abs().max_element() < 4.0, "{found:?}");
                 // how high it is shows in tilts alone
-                assert!(sigma.truncate().max_element() < 0.3, "{found}");
+                assert!(sigma.truncate().max_element() < 0.3, "{found:?}");
             }
             if let Some([delay_s, sigma_s]) = found.delay_s {
-                assert!((delay_s - late_s).abs() < 4.0 * sigma_s && sigma_s < 0.02, "{found}");
+                assert!((delay_s - late_s).abs() < 4.0 * sigma_s && sigma_s < 0.02, "{found:?}");
             }
         }
     }

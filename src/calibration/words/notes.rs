@@ -187,7 +187,7 @@ fn worst_in_words(outcome: &Outcome, worst: Miss, rate_hz: f64) -> String {
 pub fn axes_remark(outcome: &Outcome, rate_hz: f64) -> Option<String> {
     let AxesDiffer { level, largest, smallest, ratio, .. } = outcome.axes_differ?;
     Some(format!(
-        "the axes differ: at {} {} has {} times the wavelet variance of {}; --pool axes gives each its own model",
+        "the axes differ: at {} {} has {} times the wavelet variance of {}; pooled by axes, each has its own model",
         duration(tau_s(level, rate_hz)),
         largest.name(),
         three_digits(ratio),

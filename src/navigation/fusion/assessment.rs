@@ -1,6 +1,6 @@
 //! Whether a solution is to be believed: by its own innovations, and by a reference where there is one.
 
-use super::{Displaced, FixRecord, IN_WORDS, Outcome, Recorded, Solution, Use, clocks_apart};
+use super::{FixRecord, IN_WORDS, Outcome, Recorded, Solution, Use, clocks_apart};
 
 /// NIS per component that is doubtful, and that is not to be believed: innovations 1.4 times and twice as large
 /// as stated. Receivers state their standard deviations to a factor like that; right solutions of real drives
@@ -62,16 +62,12 @@ impl Assessment {
     }
 
     /// The same, beginning with what the recorded data themselves show to be the cause: clocks that are apart, or
-    /// what `displaced` finds.
+    /// what else is found, in words.
     #[must_use]
-    pub fn explained(
-        mut self,
-        recorded: &Recorded<'_>,
-        displaced: impl FnOnce() -> Option<Displaced>,
-    ) -> Self {
+    pub fn explained(mut self, recorded: &Recorded<'_>, found: impl FnOnce() -> Option<String>) -> Self {
         if self.verdict >= Verdict::Doubtful {
             let clocks = clocks_apart(recorded).map(|apart| apart.to_string());
-            let cause = clocks.or_else(|| displaced().map(|found| found.to_string()));
+            let cause = clocks.or_else(found);
             self.reasons.splice(0..0, cause.map(|text| (Verdict::Doubtful, text)));
         }
         self

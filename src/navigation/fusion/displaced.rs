@@ -11,7 +11,6 @@ use crate::ekf::Belief;
 use crate::gnss::GnssFix;
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
-use std::fmt;
 use std::ops::Range;
 
 /// How far off the filter is run (m; s).
@@ -41,33 +40,6 @@ pub struct Displaced {
     pub nis: [f64; 2],
 }
 
-impl fmt::Display for Displaced {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let three = |v: DVec3| format!("{:.2},{:.2},{:.2}", v.x, v.y, v.z);
-        let antenna = self.lever_arm_b.map(|[arm, sigma]| {
-            let given = three(arm);
-            (
-                format!(
-                    "those of an antenna at {given} ± {} m (front, right, down of the IMU)",
-                    three(sigma)
-                ),
-                format!("--lever-arm={given}"),
-            )
-        });
-        let delay = self.delay_s.map(|[delay, sigma]| {
-            (format!("{delay:.3} ± {sigma:.3} s late"), format!("--gnss-delay={delay:.3}"))
-        });
-        let (what, options): (Vec<String>, Vec<String>) = antenna.into_iter().chain(delay).unzip();
-        let [now, then] = self.nis;
-        write!(
-            f,
-            "the fixes seem to be {}: with {} the NIS is {then:.2} per component, now {now:.2}",
-            what.join(" and "),
-            options.join(" ")
-        )
-    }
-}
-
 /// Finds where the antenna is and how late the fixes are, where that makes a solution to be believed of one that is
 /// less so.
 #[must_use]
@@ -87,15 +59,11 @@ pub fn displaced(
         return None;
     }
     let (mut x, mut normal) = (Vector4::zeros(), scene.normal(&Vector4::zeros(), &now)?);
-    for step in 1.. {
-        x += normal.inverse * normal.gradient;
-        let there = scene.innovations(&x)?;
-        if step == STEPS {
-            break;
-        }
-        normal = scene.normal(&x, &there)?;
+    let mut best = scene.step(&mut x, &normal)?;
+    for _ in 1..STEPS {
+        normal = scene.normal(&x, &best)?;
+        best = scene.step(&mut x, &normal)?;
     }
-    let best = scene.innovations(&x)?;
     // fixes whose errors last make any gain as much larger as their NIS
     let scale = best.nis().max(1.0);
     let kept = normal.needed(&x, scale)?;
@@ -144,6 +112,12 @@ impl Scene<'_> {
             all[first + k] = Some(OneFix { z: fix.innovation, sigma: fix.sigma, nis: fix.nis });
         }
         Some(Innovations { of_fix: all })
+    }
+
+    /// Takes a step of Gauss and Newton; the innovations where it leads.
+    fn step(&self, x: &mut Vector4<f64>, normal: &Normal) -> Option<Innovations> {
+        *x += normal.inverse * normal.gradient;
+        self.innovations(x)
     }
 
     /// The normal equations about `x`, where the innovations are `there`.

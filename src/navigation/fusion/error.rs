@@ -65,8 +65,7 @@ pub enum FusionError {
 }
 
 /// What to look at where a solution is not to be believed.
-pub const DOUBTFUL: &str =
-    "are the IMU's axes front, right, down (--mounting), its units right, the initial state true?";
+pub const DOUBTFUL: &str = "are the IMU's axes front, right, down, its units right, the initial state true?";
 
 impl FusionError {
     /// What to do about it.
@@ -89,7 +88,7 @@ impl FusionError {
                 "are t_s, lat_deg and lon_deg of the initial state those of this recording, its pos_sigma_m honest?".into(),
             ),
             Self::Memory { .. } => {
-                Some("fewer rows (a lower --rate-hz), or fewer states (--filter 15), take less".into())
+                Some("fewer rows a second, or a filter of fewer states, take less".into())
             }
             Self::Pole { .. } => None,
         }
