@@ -306,6 +306,6 @@ fn a_tape_that_is_too_long_is_refused() {
         let refused = fuse(&recorded, &belief(&model()), start, &long, None).unwrap_err();
         let FusionError::Memory { bytes, states: 15, .. } = refused else { panic!("{refused}") };
         assert!((2.8e9..3.5e9).contains(&bytes), "{bytes}");
-        assert!(refused.hint().unwrap().contains("--rate-hz"), "{refused}");
+        assert!(refused.hint().unwrap().contains("fewer rows a second"), "{refused}");
     });
 }
