@@ -76,10 +76,7 @@ impl RecordedDrive {
     /// Multiplies the receiver's standard deviations, of position and of velocity.
     pub fn scale_sigma(&mut self, position: f64, velocity: f64) {
         for fix in &mut self.gnss {
-            fix.pos_sigma_n *= position;
-            if let Some((_, sigma)) = &mut fix.velocity {
-                *sigma *= velocity;
-            }
+            *fix = fix.with_sigmas_times(position, velocity);
         }
     }
 

@@ -170,7 +170,10 @@ fn rejected(outcome: &Outcome) -> Option<(Verdict, String)> {
         share if share > REJECTED.0 && rejected > 3 => Verdict::Doubtful,
         _ => return None,
     };
-    let text = format!("{rejected} of {} fixes were rejected: the solution left the fixes", used + rejected);
+    let text = format!(
+        "{rejected} of {} fixes were rejected: the solution departed from the fixes",
+        used + rejected
+    );
     Some((verdict, text))
 }
 

@@ -20,7 +20,7 @@ const ANTENNA: Range<usize> = 0..3;
 const DELAY: Range<usize> = 3..4;
 /// How much of a recording is looked at (s).
 const MOST_S: f64 = 1200.0;
-/// Steps of Gauss and Newton: the second one corrects what a solution that was far off made of the first.
+/// Gauss-Newton steps: the second one corrects what a solution that was far off made of the first.
 const STEPS: usize = 2;
 /// A part whose absence costs less than this in −2 ln(likelihood) is no part of the cause: odds of e^10.
 const COSTLY: f64 = 20.0;
@@ -114,7 +114,7 @@ impl Scene<'_> {
         Some(Innovations { of_fix: all })
     }
 
-    /// Takes a step of Gauss and Newton; the innovations where it leads.
+    /// Takes a Gauss-Newton step; returns the innovations where it leads.
     fn step(&self, x: &mut Vector4<f64>, normal: &Normal) -> Option<Innovations> {
         *x += normal.inverse * normal.gradient;
         self.innovations(x)

@@ -125,7 +125,7 @@ impl Filter {
         let (r, v) = (p.variances(R).lane(0), p.variances(V).lane(0));
         let full = p.lane(0);
         let psi = full.fixed_view::<3, 3>(3 * PSI, 3 * PSI) + self.of_mounting(state.q_b_n);
-        let sigma = nine(&[r.powf(0.5), v.powf(0.5), angle_sigmas(state.q_b_n, &psi)]);
+        let sigma = nine(&[r.map(f64::sqrt), v.map(f64::sqrt), angle_sigmas(state.q_b_n, &psi)]);
         let bias = Sensor::ALL.map(|sensor| self.ekf.bias_of(sensor).lane(0));
         let bias_sigma = Sensor::ALL.map(|sensor| self.ekf.bias_sigma(sensor).lane(0));
         Row { t_s, state, sigma, bias, bias_sigma, error: None }

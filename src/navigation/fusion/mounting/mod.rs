@@ -96,7 +96,7 @@ pub enum MountingError {
     },
     /// It is no road vehicle.
     #[error(
-        "the mounting is not found: the vehicle banks by {bank_deg:.0}° (root mean square) beside its way, as an aircraft does: the          angles are found of road vehicles"
+        "the mounting is not found: the vehicle banks by {bank_deg:.0}° (root mean square) along its track, as an aircraft does; the angles can be found for road vehicles only"
     )]
     Banks {
         /// Root mean square of the angles about the way (degrees).
