@@ -176,10 +176,20 @@ impl Remarks for Said<'_> {
                 let short = warm_up_in_short(found, recordings, left_out, rate_hz);
                 self.session.printer.warn(&format!("{short}{used}"));
             }
-            Remark::Shortest { recording, samples, scales, usual } => self.session.printer.warn(&format!(
+            Remark::Shortest { recording, samples, scales, short: 0, usual, .. } => self.session.printer.warn(&format!(
                 "{recording}: its {samples} samples limit all recordings to {scales} scales; without it there would be \
                  more (half of them have {usual}): leave it out for those"
             )),
+            Remark::Shortest { recording, samples, scales, short, used, .. } => {
+                let others = match short {
+                    1 => String::new(),
+                    _ => format!(" ({} more are short)", short - 1),
+                };
+                self.session.printer.warn(&format!(
+                    "{recording}: its {samples} samples have {scales} scales{others}; the longer ones, up to {used} scales, are \
+                     averaged over the longer recordings alone"
+                ));
+            }
         }
     }
 }

@@ -14,7 +14,7 @@ pub(crate) struct TuningArgs {
     /// How the tuning constant follows from the efficiency
     #[arg(long, value_parser = words::<Convention>(CONVENTIONS), default_value_t)]
     efficiency_convention: Convention,
-    /// Number of scales, 2, 4, 8, … samples (default: one less than the shortest signal allows)
+    /// Number of scales, 2, 4, 8, … samples (default: of each signal one less than its length allows)
     #[arg(long, value_name = "J", value_parser = clap::value_parser!(u32).range(1..=62))]
     pub(crate) scales: Option<u32>,
 }

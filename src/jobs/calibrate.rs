@@ -76,7 +76,7 @@ pub struct CalibrationOptions {
     pub reading: ReadOptions,
     /// Whether the warm-up found in each recording is left out.
     pub skip_warm_up: bool,
-    /// Number of scales; `None`: one less than the shortest signal allows.
+    /// Number of scales; `None`: of each recording one less than its length allows.
     pub scales: Option<u32>,
     /// Which estimators.
     pub estimators: EstimatorChoice,
@@ -342,7 +342,7 @@ pub(super) fn without_warm_up(
     (recording, found)
 }
 
-/// Remarks which recording is so much shorter than the others that it costs all of them scales.
+/// Remarks which recording is so much shorter than the others that it lacks scales, or costs all of them scales.
 fn shortest(report: &Report, scales: Option<u32>, remarks: &mut dyn Remarks) {
     let levels = |samples: usize| scales.unwrap_or(u32::MAX).min(default_levels(samples));
     let recordings = report.files.iter().flat_map(FileReport::recordings);
@@ -351,8 +351,10 @@ fn shortest(report: &Report, scales: Option<u32>, remarks: &mut dyn Remarks) {
     };
     let mut found: Vec<u32> = recordings.map(|(_, samples)| levels(samples)).collect();
     found.sort_unstable();
-    let (scales, usual) = (found[0], found[found.len() / 2]);
+    // Scales are averaged up to the last that more than half of the recordings have ([`calibration::average`]).
+    let (scales, used, usual) = (found[0], found[(found.len() - 1) / 2], found[found.len() / 2]);
+    let short = found.iter().filter(|own| **own < used).count();
     if scales < usual {
-        remarks.remark(Remark::Shortest { recording: &recording, samples, scales, usual });
+        remarks.remark(Remark::Shortest { recording: &recording, samples, scales, short, used, usual });
     }
 }

@@ -20,15 +20,19 @@ pub enum Remark<'a> {
         /// Sample rate (Hz).
         rate_hz: f64,
     },
-    /// A recording is so much shorter than the others that it costs all of them scales.
+    /// A recording is so much shorter than the others that it lacks scales, or costs all of them scales.
     Shortest {
         /// The recording.
         recording: &'a str,
         /// Its samples.
         samples: usize,
-        /// The scales that all have for it.
+        /// Its scales.
         scales: u32,
-        /// The scales that half of them would have.
+        /// Recordings with fewer scales than are used.
+        short: usize,
+        /// The scales that more than half of the recordings have, which are used.
+        used: u32,
+        /// The scales that half of them have.
         usual: u32,
     },
 }

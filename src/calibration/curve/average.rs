@@ -133,6 +133,11 @@ impl Replicate {
     pub(crate) fn value(&self, estimator: Estimator, index: usize) -> f64 {
         if estimator.is_robust() { self.robust[index].value } else { self.classical[index] }
     }
+
+    /// Number of levels at which it has wavelet variances.
+    pub(crate) fn levels(&self) -> usize {
+        self.classical.len()
+    }
 }
 
 /// Why replicates have no average.
@@ -159,7 +164,16 @@ pub enum AverageError {
     },
 }
 
-/// The curve an estimator fits: averages with weights T_i/Σ T, over the levels that all replicates have.
+/// Number of levels that more than half of the replicates have: a few short ones cost the others nothing,
+/// and no scale rests on a few long ones, or on one without a second to say how recordings differ.
+fn majority(replicates: &[Replicate]) -> usize {
+    let mut levels: Vec<usize> = replicates.iter().map(Replicate::levels).collect();
+    levels.sort_unstable_by(|a, b| b.cmp(a));
+    levels.get(levels.len() / 2).copied().unwrap_or(0)
+}
+
+/// The curve an estimator fits: averages with weights T_i/Σ T, level by level over the replicates that have it, up to the
+/// last level that more than half of them have.
 ///
 /// The paper's slips are resolved: SR-AWV's weights sum to one (its 1/J must be 1/K), DR-AWV keeps the
 /// order statistics a + 1 … K − a (2a are dropped), weights of the kept ones renormalised. `tuning` is
@@ -178,24 +192,30 @@ pub fn average(
     if estimator.is_single() && count > 1 {
         return Err(AverageError::Single { estimator: estimator.name(), replicates: count });
     }
-    let levels = replicates.iter().map(|r| r.classical.len()).min().unwrap_or(0);
+    let levels = majority(replicates);
     if levels == 0 {
         return Err(AverageError::None);
     }
-    let trim = if estimator == Estimator::DrAwv { trim.count(count) } else { 0 };
-    if count < 2 * trim + 1 {
-        return Err(AverageError::Trim { trim, replicates: count });
+    let dropped = |count: usize| if estimator == Estimator::DrAwv { trim.count(count) } else { 0 };
+    let is_enough = |count: usize| count > 2 * dropped(count);
+    if !is_enough(count) {
+        return Err(AverageError::Trim { trim: dropped(count), replicates: count });
     }
-    let mut curve = Curve { levels: (1..=levels as u32).collect(), ..Curve::default() };
+    let mut curve = Curve::default();
     curve.quantization = estimator.is_robust().then(|| *tuning.quantization());
-    for &level in &curve.levels {
-        let mut kept = replicates
-            .iter()
-            .map(|r| Term::new(r, level, estimator, tuning.efficiency()))
-            .collect::<Vec<_>>();
+    for level in 1..=levels as u32 {
+        let long_enough = replicates.iter().filter(|r| r.levels() >= level as usize);
+        let mut kept: Vec<Term> =
+            long_enough.map(|r| Term::new(r, level, estimator, tuning.efficiency())).collect();
+        // A trim by a number, of which too few are left at the longest scales.
+        if !is_enough(kept.len()) {
+            break;
+        }
+        curve.levels.push(level);
         // Scale by scale: a recording that is abnormal at long scales still serves at short ones.
         kept.sort_by(|a, b| a.nu.total_cmp(&b.nu));
-        let kept = &kept[trim..count - trim];
+        let trim = dropped(kept.len());
+        let kept = &kept[trim..kept.len() - trim];
         let total: f64 = kept.iter().map(|t| t.samples).sum();
         curve.wv.push(kept.iter().map(|t| t.samples / total * t.nu).sum());
         // var(Σ w nu) = Σ w²·2 nu²/eta, the replicates' true nu taken equal.
@@ -274,6 +294,31 @@ mod tests {
         let eta = |samples: f64| (samples - 1.0) / 2.0;
         assert_relative_eq!(curve.edof[0], 1.0 / (0.0625 / eta(1000.0) + 0.5625 / eta(3000.0)));
         assert_relative_eq!(curve.wv[0], 4.0);
+    }
+
+    /// Four of 1000 samples with two levels, and one of 10 with one: the second level is the average of the four, with the
+    /// trim of four. Of two replicates one alone is no majority.
+    #[test]
+    fn a_level_is_averaged_over_the_replicates_that_have_it() {
+        let mut replicates = eight()[..4].to_vec();
+        replicates.push(replicate(10, 500.0, 500.0));
+        replicates[4].classical.pop();
+        replicates[4].robust.pop();
+        let curve = |estimator, trim| average(&replicates, estimator, trim, &tuning()).unwrap();
+        let awv = curve(Estimator::Awv, Trim::Count(0));
+        assert_eq!(awv.levels, [1, 2]);
+        assert_relative_eq!(awv.wv[0], (10.0 * 1000.0 + 10.0 * 500.0) / 4010.0, max_relative = 1e-14);
+        assert_relative_eq!(awv.wv[1], 2.5);
+        // floor(0.3·5) = floor(0.3·4) = 1: of 10, 20, 30, 40, 500 and of 10, 20, 30, 40.
+        let trimmed = curve(Estimator::DrAwv, Trim::Fraction(0.3));
+        assert_relative_eq!(trimmed.wv[0], 30.0);
+        assert_relative_eq!(trimmed.wv[1], 25.0);
+        // Two at each end leave one of five and none of four.
+        assert_eq!(curve(Estimator::DrAwv, Trim::Count(2)).levels, [1]);
+        let levels = |kept: &[Replicate]| {
+            average(kept, Estimator::Awv, Trim::Count(0), &tuning()).unwrap().levels.len()
+        };
+        assert_eq!((levels(&replicates[3..]), levels(&replicates[2..])), (1, 2));
     }
 
     #[test]

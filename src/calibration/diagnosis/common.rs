@@ -9,6 +9,7 @@
 //! the classical one seems too high by what was allowed. That is told apart: the two variances then agree.
 
 use super::piece::{Piece, Test};
+use crate::curve::Replicate;
 use crate::outcome::{Settings, tau_s};
 
 /// Standard deviations of the median: 1 in 10⁶ by chance, at each of some ten scales.
@@ -68,7 +69,7 @@ impl Excess {
 /// Looks at all signals of a sensor together.
 pub(super) fn common(pieces: &[Piece<'_>], settings: &Settings) -> Common {
     let test = Test::Outliers;
-    let all = (0..test.levels(pieces)).map(|level| excess(pieces, level, settings));
+    let all = (0..test.most_levels(pieces)).map(|level| excess(pieces, level, settings));
     let found: Vec<Excess> = all.filter(|e| e.alarms(e.quantizer)).collect();
     let tau_s: Vec<f64> = found.iter().map(|e| e.tau_s).collect();
     // Outliers raise the classical variance by anything; that they make up for the allowance, no more and no less, at every
@@ -91,7 +92,8 @@ fn excess(pieces: &[Piece<'_>], level: usize, settings: &Settings) -> Excess {
     let (test, tuning) = (Test::Outliers, &settings.tuning);
     let (mut of_quantizer, mut of_gaussian, mut variance) = (Vec::new(), Vec::new(), 0.0);
     for piece in pieces {
-        for replicate in piece.replicates.iter().flatten() {
+        let long_enough = |r: &&&Replicate| test.levels(piece, r) > level;
+        for replicate in piece.replicates.iter().flatten().filter(long_enough) {
             let eta = test.edof(piece.law.edof(replicate.samples)[level], tuning.efficiency());
             let (read_high, _) = tuning.quantization().factor(piece.law.quantization[level]);
             // E ln(chi²/eta) ≈ −1/eta: lower for the robust variance, by (1/e − 1)/eta of the classical one,

@@ -19,9 +19,11 @@ pub(super) struct Comparison {
 
 impl Comparison {
     pub(super) fn new(pieces: &[Piece<'_>], sensor: Sensor, test: Test, efficiency: f64) -> Self {
-        let levels = test.levels(pieces);
-        let logs = |r: &Replicate| (0..levels).map(|j| test.value(r, j)).collect();
-        let of_piece = |p: &Piece<'_>| p.replicates.iter().map(|r| r.map(logs)).collect();
+        let levels = test.most_levels(pieces);
+        let of_piece = |p: &Piece<'_>| {
+            let logs = |r: &Replicate| (0..test.levels(p, r)).map(|j| test.value(r, j)).collect();
+            p.replicates.iter().map(|r| r.map(logs)).collect()
+        };
         let noise = |p: &Piece<'_>| {
             let longest = p.replicates.iter().flatten().map(|r| r.samples).max().unwrap_or(1);
             let edof = |r: &Option<&Replicate>| {

@@ -101,7 +101,7 @@ impl Noise {
     }
 }
 
-/// Values of every file on one axis, level by level; none of a file without that axis.
+/// Values of every file on one axis, level by level as far as it has them; none of a file without that axis.
 type Files = Vec<Option<Vec<f64>>>;
 
 /// ln nu of every file on the axes of a sensor, `[axis][file][level]`; not every file has every axis.
@@ -127,13 +127,13 @@ impl Table {
             || -> Vec<f64> { between.iter().map(|_| generator.sample(StandardNormal)).collect() };
         let common: Vec<Vec<f64>> = (0..files).map(|_| normals()).collect();
         let mut file = |noise: &Noise, k: usize, own: &Option<Vec<f64>>| {
-            own.as_ref().map(|_| {
+            own.as_ref().map(|own| {
                 let values = noise.draw(k, generator);
                 let difference = |((value, b), common): ((f64, &f64), &f64)| {
                     let own: f64 = generator.sample(StandardNormal);
                     value + b * (shared.sqrt() * common + (1.0 - shared).sqrt() * own)
                 };
-                values.into_iter().zip(between).zip(&common[k]).map(difference).collect()
+                values.into_iter().zip(between).zip(&common[k]).map(difference).take(own.len()).collect()
             })
         };
         let axis = |(files, noise): (&Files, &Noise)| {
@@ -192,9 +192,11 @@ impl Table {
     fn contrasts(&self, noise: &[Noise], window: Window, index: usize, active: &[bool]) -> Vec<Contrast> {
         let axis = |a: usize| {
             let (files, noise) = (self.logs.get(a)?, noise.get(a)?);
-            let mean = |logs: &Vec<f64>| logs[window.range()].iter().sum::<f64>() / window.width as f64;
+            // A short recording has no value at the longest scales.
+            let mean =
+                |logs: &Vec<f64>| Some(logs.get(window.range())?.iter().sum::<f64>() / window.width as f64);
             let values: Vec<Option<f64>> =
-                files.iter().zip(active).map(|(f, on)| f.as_ref().filter(|_| *on).map(mean)).collect();
+                files.iter().zip(active).map(|(f, on)| f.as_ref().filter(|_| *on).and_then(mean)).collect();
             Contrast::new(a, values, &noise.variances[index])
         };
         (0..self.logs.len()).filter_map(axis).collect()
@@ -378,10 +380,10 @@ mod tests {
     #[test]
     fn distances_follow_fishers_law() {
         let mut generator = Generator::seed_from_u64(5);
-        let empty = Table { logs: vec![vec![Some(vec![]); 8]; 3], above_only: false };
+        let alike = Table { logs: vec![vec![Some(vec![0.0]); 8]; 3], above_only: false };
         let noise = [noise(8, 1, 1e9), noise(8, 1, 1e9), noise(8, 1, 1e9)];
         let mut f = || {
-            let table = empty.drawn(&noise, &[0.3], 0.0, &mut generator);
+            let table = alike.drawn(&noise, &[0.3], 0.0, &mut generator);
             furthest(&table, &noise, &[true; 8])[0].f[0]
         };
         let mean = (0..600).map(|_| f()).sum::<f64>() / 600.0;

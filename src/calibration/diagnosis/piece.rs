@@ -20,7 +20,7 @@ pub(super) struct Piece<'a> {
 
 /// The pieces of a sensor's groups.
 pub(super) fn axes<'a>(own: &[&'a Group], names: &[&str], outcomes: &'a [Outcome]) -> Vec<Piece<'a>> {
-    let levels = own.iter().flat_map(|g| &g.replicates).map(|r| r.classical.len()).min().unwrap_or(0);
+    let levels = own.iter().flat_map(|g| &g.replicates).map(Replicate::levels).max().unwrap_or(0);
     let piece = |axis: Axis| {
         let group = own.iter().find(|g| g.replicates.iter().any(|r| r.axis == Some(axis)))?;
         // The last estimator is the most robust.
@@ -60,13 +60,16 @@ impl Test {
         }
     }
 
-    /// Number of levels at which recordings can be compared.
-    pub(super) fn levels(self, pieces: &[Piece<'_>]) -> usize {
-        let enough = |p: &Piece<'_>| {
-            let edof = p.law.edof(p.replicates.iter().flatten().map(|r| r.samples).min().unwrap_or(0));
-            edof.iter().take_while(|e| self == Self::Noise || **e >= LARGE_SAMPLE).count()
-        };
-        pieces.iter().map(enough).min().unwrap_or(0)
+    /// Number of levels at which a replicate can be compared with others.
+    pub(super) fn levels(self, piece: &Piece<'_>, replicate: &Replicate) -> usize {
+        let edof = piece.law.edof(replicate.samples).into_iter().take(replicate.levels());
+        edof.take_while(|e| self == Self::Noise || *e >= LARGE_SAMPLE).count()
+    }
+
+    /// The most levels at which any can be.
+    pub(super) fn most_levels(self, pieces: &[Piece<'_>]) -> usize {
+        let of_piece = |p: &Piece<'_>| p.replicates.iter().flatten().map(|r| self.levels(p, r)).max();
+        pieces.iter().filter_map(of_piece).max().unwrap_or(0)
     }
 
     pub(super) const fn name(self) -> &'static str {

@@ -30,42 +30,62 @@ pub(crate) fn p_value(
     law: &SamplingLaw,
     group: &str,
 ) -> Option<f64> {
-    let levels = (0..spread.within.len()).take_while(|j| spread.edof.iter().all(|e| e[*j] >= LEAST)).count();
-    let noise: Vec<Vec<f64>> =
-        (0..levels).map(|j| spread.edof.iter().map(|e| variance_of_log(e[j])).collect()).collect();
-    let largest = |logs: &dyn Fn(usize) -> Vec<f64>| {
-        let squares = noise.iter().enumerate().map(|(j, noise)| mean_square(&logs(j), noise, estimator));
-        squares.filter(|square| square.is_finite()).fold(0.0, f64::max)
-    };
-    let axes: Vec<Option<Axis>> = replicates.iter().map(|r| r.axis).collect();
-    // Each axis alone in its recording is compared with nothing.
-    let is_repeated = axes.iter().enumerate().any(|(i, axis)| axes[..i].contains(axis));
-    if !is_repeated || levels == 0 {
+    let scales: Vec<Scale> =
+        (0..spread.within.len()).map_while(|j| Scale::new(j, replicates, spread)).collect();
+    if scales.is_empty() {
         return None;
     }
-    let own = largest(&|j| without_axes(&axes, replicates.iter().map(|r| r.value(estimator, j).ln())));
+    let largest = |nu: &dyn Fn(usize, usize) -> f64| {
+        let squares = scales.iter().enumerate().map(|(j, scale)| scale.mean_square(&|i| nu(i, j), estimator));
+        squares.filter(|square| square.is_finite()).fold(0.0, f64::max)
+    };
+    let observed = largest(&|i, j| replicates[i].value(estimator, j));
     let draw = |run: usize| {
         let process = estimator.name();
         let key = StreamKey { seed: SEED, scenario: "alike", run: run as u64, source: group, process };
         let mut generator = key.generator();
         let ratios: Vec<Vec<f64>> = spread.edof.iter().map(|e| law.draw(e, &mut generator)).collect();
-        largest(&|j| without_axes(&axes, ratios.iter().map(|r| r[j].ln())))
+        largest(&|i, j| ratios[i][j])
     };
-    let larger = (0..DRAWS).into_par_iter().filter(|run| draw(*run) >= own).count();
+    let larger = (0..DRAWS).into_par_iter().filter(|run| draw(*run) >= observed).count();
     // The observed set counts as one of the draws, all exchangeable if the fitted law holds: p is never 0,
     // and the level is kept (Davison and Hinkley 1997, chapter 4).
     Some((1 + larger) as f64 / (1 + DRAWS) as f64)
 }
 
-/// Logarithms less the mean of their axis: drawn ones in the same way, so that the degrees of freedom of the means are allowed
-/// for.
-fn without_axes(axes: &[Option<Axis>], logs: impl Iterator<Item = f64>) -> Vec<f64> {
-    let logs: Vec<f64> = logs.collect();
-    let mean = |axis: &Option<Axis>| {
-        let of_axis = || axes.iter().zip(&logs).filter(|(other, _)| *other == axis);
-        of_axis().map(|(_, log)| log).sum::<f64>() / of_axis().count() as f64
-    };
-    axes.iter().zip(&logs).map(|(axis, log)| log - mean(axis)).collect()
+/// The replicates that are compared at one scale.
+struct Scale {
+    /// Which replicates, and the axis of each.
+    members: Vec<(usize, Option<Axis>)>,
+    /// Variance of ln nu of each by its noise.
+    noise: Vec<f64>,
+}
+
+impl Scale {
+    /// Those that are long enough for the level of index `j`; none where no axis is there twice: each axis alone in its
+    /// recording is compared with nothing.
+    fn new(j: usize, replicates: &[Replicate], spread: &Spread) -> Option<Self> {
+        let is_long_enough = |i: &usize| replicates[*i].levels() > j && spread.edof[*i][j] >= LEAST;
+        let members: Vec<(usize, Option<Axis>)> =
+            (0..replicates.len()).filter(is_long_enough).map(|i| (i, replicates[i].axis)).collect();
+        let is_repeated =
+            |(k, (_, axis)): (usize, &(usize, Option<Axis>))| members[..k].iter().any(|(_, a)| a == axis);
+        let noise = members.iter().map(|(i, _)| variance_of_log(spread.edof[*i][j])).collect();
+        members.iter().enumerate().any(is_repeated).then(|| Self { members, noise })
+    }
+
+    /// Mean square of the residuals of ln nu less the mean of its axis: of drawn values in the same way as of observed ones,
+    /// so that the degrees of freedom of the means are allowed for.
+    fn mean_square(&self, nu: &dyn Fn(usize) -> f64, estimator: Estimator) -> f64 {
+        let logs: Vec<f64> = self.members.iter().map(|(i, _)| nu(*i).ln()).collect();
+        let mean = |axis: &Option<Axis>| {
+            let of_axis = || self.members.iter().zip(&logs).filter(|((_, other), _)| other == axis);
+            of_axis().map(|(_, log)| log).sum::<f64>() / of_axis().count() as f64
+        };
+        let residuals: Vec<f64> =
+            self.members.iter().zip(&logs).map(|((_, axis), log)| log - mean(axis)).collect();
+        mean_square(&residuals, &self.noise, estimator)
+    }
 }
 
 #[cfg(test)]

@@ -32,18 +32,26 @@ pub(crate) fn axes_differ(
         edof if estimator.is_robust() => edof_robust(edof, tuning.efficiency()),
         edof => edof,
     };
-    let levels = replicates.iter().map(|r| r.classical.len()).min()? as u32;
-    let usable: Vec<u32> =
-        (1..=levels).filter(|level| replicates.iter().all(|r| degrees(r, *level) >= LEAST)).collect();
+    let is_usable = |r: &Replicate, level: u32| r.levels() >= level as usize && degrees(r, level) >= LEAST;
+    let long_enough = |level: u32| -> Vec<&Vec<&Replicate>> {
+        table.iter().filter(|row| row.iter().all(|r| is_usable(r, level))).collect()
+    };
+    // Up to the scale that more than half of the recordings have, as the average of them.
+    let usable: Vec<(u32, Vec<&Vec<&Replicate>>)> = (1..)
+        .map(|level| (level, long_enough(level)))
+        .take_while(|(_, rows)| 2 * rows.len() > table.len())
+        .collect();
     let count = usable.len() as f64;
-    let of_level = |level: u32| {
-        let logs = |row: &Vec<&Replicate>| -> Vec<f64> {
+    let of_level = |(level, rows): &(u32, Vec<&Vec<&Replicate>>)| {
+        let level = *level;
+        let logs = |row: &&Vec<&Replicate>| -> Vec<f64> {
             row.iter().map(|r| r.value(estimator, level as usize - 1).ln()).collect()
         };
         // The largest, that of the shortest recording: too much noise makes the test cautious, too little
         // bold.
-        let noise = replicates.iter().map(|r| variance_of_log(degrees(r, level))).fold(0.0, f64::max);
-        let (p_value, means) = between_axes(&table.iter().map(logs).collect::<Vec<_>>(), noise)?;
+        let variances = rows.iter().copied().flatten().map(|r| variance_of_log(degrees(r, level)));
+        let noise = variances.fold(0.0, f64::max);
+        let (p_value, means) = between_axes(&rows.iter().map(logs).collect::<Vec<_>>(), noise)?;
         let by_mean = |a: &(f64, Axis), b: &(f64, Axis)| a.0.total_cmp(&b.0);
         let means_of_axes = || means.iter().copied().zip(axes.iter().copied());
         let (smallest, largest) = (means_of_axes().min_by(by_mean)?, means_of_axes().max_by(by_mean)?);
@@ -55,7 +63,7 @@ pub(crate) fn axes_differ(
             ratio: (largest.0 - smallest.0).exp(),
         })
     };
-    let all = usable.iter().filter_map(|level| of_level(*level));
+    let all = usable.iter().filter_map(of_level);
     let told: Vec<AxesDiffer> = all.filter(|d| d.p_value <= LEVEL && d.ratio >= NOTABLE).collect();
     told.into_iter().max_by(|a, b| a.ratio.total_cmp(&b.ratio))
 }

@@ -162,7 +162,7 @@ impl<'a> CurveSampler<'a> {
     fn curve(&self, ratios: Vec<Vec<f64>>, settings: &Settings) -> Option<Curve> {
         let edof = self.spread.iter().flat_map(|s| &s.edof);
         let drawn_replicate = |((replicate, ratios), edof): ((&Replicate, Vec<f64>), &Vec<f64>)| {
-            let levels = self.centre.iter().zip(ratios).zip(edof);
+            let levels = self.centre.iter().zip(ratios).zip(edof).take(replicate.levels());
             // The law gives ratios whose mean is 1; robust variances of few coefficients read high, and so
             // must those drawn.
             like(replicate, levels.map(|((nu, ratio), edof)| nu * ratio * (1.0 + self.bias(*edof))).collect())

@@ -35,8 +35,8 @@ pub(crate) struct Spread {
     /// Standard deviation of ln nu of each replicate at each level, as the replicates show it: that of the replicates,
     /// more for the shorter and less for the longer of them.
     total: Vec<Vec<f64>>,
-    /// Residuals of each replicate over their standard deviation, so that Σ over replicates of their squares
-    /// is K − 1: their combinations with normal weights over √(K − 1) have unit variance and the replicates'
+    /// Residuals of each replicate over their standard deviation, 0 where it has none, so that Σ over replicates of their
+    /// squares is K − 1: their combinations with normal weights over √(K − 1) have unit variance and the replicates'
     /// correlations between levels.
     units: Vec<Vec<f64>>,
     /// The recording that each replicate is of, and its position among those of it, from 0.
@@ -77,20 +77,24 @@ impl Spread {
         let levels = law.correlation.nrows();
         let edof: Vec<Vec<f64>> = replicates.iter().map(|r| edof(r, estimator, law, tuning)).collect();
         let count = replicates.len() as f64;
-        let within: Vec<f64> = (0..levels)
-            .map(|j| (edof.iter().map(|e| variance_of_log(e[j])).sum::<f64>() / count).sqrt())
-            .collect();
+        let mut within = vec![0.0; levels];
         let mut units = vec![vec![0.0; levels]; replicates.len()];
         let mut total = vec![vec![0.0; levels]; replicates.len()];
         let mut between = vec![0.0; levels];
         for j in 0..levels {
-            let logs: Vec<f64> = replicates.iter().map(|r| r.value(estimator, j).ln()).collect();
-            let noise: Vec<f64> = edof.iter().map(|e| variance_of_log(e[j])).collect();
+            // Short recordings lack the longest scales, and say nothing of them.
+            let present: Vec<usize> = (0..replicates.len()).filter(|i| replicates[*i].levels() > j).collect();
+            let logs: Vec<f64> = present.iter().map(|i| replicates[*i].value(estimator, j).ln()).collect();
+            let noise: Vec<f64> = present.iter().map(|i| variance_of_log(edof[*i][j])).collect();
+            within[j] = (noise.iter().sum::<f64>() / present.len() as f64).sqrt();
             let scatter = Scatter::new(&logs, &noise, estimator);
             between[j] = scatter.between;
-            for (i, unit) in scatter.units.into_iter().enumerate() {
-                units[i][j] = unit;
-                total[i][j] = scatter.factor * noise[i].sqrt().hypot(between[j]);
+            // The weights of a draw are for the K − 1 degrees of freedom of all.
+            let freedom = (present.len() as f64 - 1.0).max(1.0);
+            let fewer = ((count - 1.0).max(1.0) / freedom).sqrt();
+            for ((i, unit), noise) in present.into_iter().zip(scatter.units).zip(&noise) {
+                units[i][j] = unit * fewer;
+                total[i][j] = scatter.factor * noise.sqrt().hypot(between[j]);
             }
         }
         let (origin, share_of_freedom) = (origins(replicates), share_of_freedom(estimator));

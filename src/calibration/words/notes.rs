@@ -213,7 +213,7 @@ pub fn signals(outcome: &Outcome) -> String {
 fn robust_remarks(curve: &Curve, replicates: &[Replicate], notes: &mut Vec<String>) {
     let replicates_with = |status: Status| {
         let has_such_a_scale =
-            |r: &&Replicate| r.robust[..curve.levels.len()].iter().any(|v| v.status == status);
+            |r: &&Replicate| r.robust.iter().take(curve.levels.len()).any(|v| v.status == status);
         replicates.iter().filter(has_such_a_scale).count()
     };
     let (count, no_root, coarse) =

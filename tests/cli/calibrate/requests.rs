@@ -127,14 +127,25 @@ fn what_was_drawn_is_recorded_and_copies_are_refused() {
     std::fs::write(&copy, text.replace('\n', "\r\n")).unwrap();
     let stderr = refusal(dir.path(), &calibrate, 2);
     assert!(stderr.contains("run2.csv is a copy of runs/run0.csv"), "{stderr}");
-    // A recording that costs the others scales is told.
+    // Of three recordings a short one lacks the longest scales, of two it limits both.
     let rows = std::fs::read_to_string(&copy).unwrap();
     let first: Vec<&str> = rows.lines().take(600).collect();
     std::fs::write(&copy, first.join("\n") + "\n").unwrap();
     let short = ["calibrate", "runs", "--model", "WN+RW", "--bootstrap", "0", "-o", "short.toml"];
-    let output = nav_sim(dir.path()).args(short).assert().success();
-    let said = String::from_utf8(output.get_output().stderr.clone()).unwrap();
+    let said_and_scales = || {
+        let output = nav_sim(dir.path()).args(short).assert().success();
+        let curves = std::fs::read_to_string(dir.path().join("short.wv.json")).unwrap();
+        let curves: serde_json::Value = serde_json::from_str(&curves).unwrap();
+        let said = String::from_utf8(output.get_output().stderr.clone()).unwrap();
+        (said, curves["curves"][0]["tau_s"].as_array().unwrap().len())
+    };
+    let (said, scales) = said_and_scales();
+    assert!(said.contains("run2.csv: its 599 samples have 8 scales; the longer ones, up to 13"), "{said}");
+    assert_eq!(scales, 13);
+    std::fs::remove_file(dir.path().join("runs/run1.csv")).unwrap();
+    let (said, scales) = said_and_scales();
     assert!(said.contains("run2.csv: its 599 samples limit all recordings to 8 scales"), "{said}");
+    assert_eq!(scales, 8);
 }
 
 /// Twenty seconds of another level at the beginning; half of them already left out: what is advised counts from the

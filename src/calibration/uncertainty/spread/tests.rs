@@ -120,3 +120,31 @@ fn intervals_hold_the_truth_whatever_axes_share() {
     let alike = coverage(0.0, true);
     assert!(alike > 0.95 - 0.038, "{alike}");
 }
+
+/// Four recordings, of which the last has one level: at the second the others' ln nu are −0.3, 0, 0.3 (variance 0.09, beside
+/// which the noise of 2^40 samples is nothing), and so must the draws scatter. 4000 know a variance to √(2/4000) = 2.2 %, of
+/// which four are allowed, and 2 % for the chi-square in place of the normal law.
+#[test]
+fn a_level_that_a_short_recording_lacks_scatters_as_the_others_show() {
+    use crate::noise::{Composite, Process, White};
+    use rand::SeedableRng;
+    let law = SamplingLaw::new(&Composite::new(vec![Process::White(White::new(1.0).unwrap())]), 2);
+    let replicate = |(name, logs): (usize, &[f64])| Replicate {
+        name: name.to_string(),
+        axis: None,
+        samples: 1 << 40,
+        classical: logs.iter().map(|log| log.exp()).collect(),
+        robust: Vec::new(),
+        trend: f64::NAN,
+        mean: f64::NAN,
+    };
+    let logs: [&[f64]; 4] = [&[0.1, -0.3], &[-0.1, 0.0], &[0.0, 0.3], &[0.0]];
+    let replicates: Vec<Replicate> = logs.into_iter().enumerate().map(replicate).collect();
+    let spread = Spread::new(&replicates, Estimator::Awv, &law, &Tuning::default());
+    assert_relative_eq!(spread.between[1], 0.3, max_relative = 1e-4);
+    let mut generator = Generator::seed_from_u64(3);
+    let drawn: Vec<f64> = (0..4000).map(|_| spread.draw(&mut generator)[0][1].ln()).collect();
+    let mean = drawn.iter().sum::<f64>() / 4000.0;
+    let variance = drawn.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 3999.0;
+    assert!((variance / 0.09 - 1.0).abs() < 4.0 * 0.022 + 0.02, "{variance}");
+}
