@@ -228,7 +228,7 @@ pub struct CalibrateStep {
     /// Which signals are replicates of one another: sensor or axes (default: sensor; of a single recording axes).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pool: Option<Pool>,
-    /// Number of scales (default: one less than the shortest signal allows).
+    /// Number of scales (default: of each signal one less than its length allows).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scales: Option<u32>,
 }
