@@ -14,13 +14,13 @@ use kinavis_kernel::{
 use nalgebra::SMatrix;
 use nav_sim::ekf::{Belief, FilterStates};
 use nav_sim::formats::trajectory_file;
-use nav_sim::lanes::Level;
-use nav_sim::metrics::Budget;
 use nav_sim::scenario::Scenario;
 use nav_sim::sensors::imu::Truth;
 use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::lincov::{FilterPass, TruthSide};
-use nav_sim::throughput::{Load, RUN_EPOCHS, SAMPLES, model};
+use nav_sim_navigation::lanes::Level;
+use nav_sim_navigation::metrics::Budget;
+use nav_sim_navigation::simulation::lincov::{FilterPass, TruthSide};
+use nav_sim_navigation::throughput::{Load, RUN_EPOCHS, SAMPLES, model};
 use std::hint::black_box;
 use std::path::Path;
 use std::time::Duration;

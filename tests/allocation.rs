@@ -8,8 +8,9 @@ use nav_sim::formats::trajectory_file::{Options, load};
 use nav_sim::scenario::Scenario;
 use nav_sim::sensors::imu::Truth;
 use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::{Plan, run_batch};
-use nav_sim::throughput;
+use nav_sim::simulation::Plan;
+use nav_sim_navigation::simulation::run_batch;
+use nav_sim_navigation::throughput;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicU64, Ordering};
 

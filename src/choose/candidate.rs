@@ -1,8 +1,8 @@
 //! What is chosen among.
 
-use crate::calibration::{Estimator, ModelChoice, ModelSpec};
-use crate::ekf::FilterStates;
-use crate::noise::Kind;
+use nav_sim_calibration::{Estimator, ModelChoice, ModelSpec};
+use nav_sim_navigation::ekf::FilterStates;
+use nav_sim_signal::noise::Kind;
 use std::fmt;
 
 /// A way from recordings to a filter.

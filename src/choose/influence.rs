@@ -6,11 +6,11 @@
 
 use super::drive::{ChoiceError, Drive};
 use super::laboratory::Laboratory;
-use crate::calibration::{
+use nav_sim_calibration::{
     CurveInfluence, Estimator, Group, Outcome, Settings, average, model_of, put, tau_s,
 };
-use crate::noise::Model;
-use crate::simulation::lincov::assess;
+use nav_sim_navigation::simulation::lincov::assess;
+use nav_sim_signal::noise::Model;
 use rayon::prelude::*;
 use serde::Serialize;
 

@@ -1,12 +1,12 @@
 //! The recordings of a laboratory, measured, and the models that are made of all but one of them.
 
 use super::candidate::Candidate;
-use crate::calibration::{
+use nav_sim_calibration::{
     CalibrationError, Estimator, Group, ModelChoice, ModelSpec, Outcome, Pool, Replicate, Settings,
     calibrate, grouped, model_of,
 };
-use crate::imu::Channel;
-use crate::noise::Model;
+use nav_sim_signal::imu::Channel;
+use nav_sim_signal::noise::Model;
 use std::sync::OnceLock;
 
 /// One recording: what is kept of it. The stretches of a file that has gaps are one.
@@ -29,7 +29,7 @@ pub struct Laboratory {
 }
 
 /// The groups of recordings that were calibrated, their fits, and how these were made.
-pub type Calibrated = (Vec<Group>, Vec<Outcome>, Settings);
+pub(crate) type Calibrated = (Vec<Group>, Vec<Outcome>, Settings);
 
 impl Laboratory {
     /// Estimators and model of the settings count nothing: those of the candidates do. `pool`: which signals are

@@ -44,6 +44,6 @@ mod score;
 pub use candidate::{Candidate, Inflation};
 pub use drive::{ChoiceError, Drive, Fold};
 pub use influence::{Influence, RecordingInfluence, ScaleInfluence};
-pub use laboratory::{Calibrated, Laboratory, Unit};
+pub use laboratory::{Laboratory, Unit};
 pub use ranking::{Contender, Difference, FoldScore, Mean, Placed, Ranking};
 pub use score::{EndScore, Score};

@@ -225,7 +225,7 @@ fn interval(values: &[f64], alpha: f64) -> Mean {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::Estimator;
+    use nav_sim_calibration::Estimator;
 
     fn fold(scores: &[f64]) -> Fold {
         let score = |&log_score: &f64| Score {

@@ -1,7 +1,7 @@
 //! How good a filter was at the ends of outages.
 
-use crate::simulation::lincov::Instant;
-use crate::simulation::{NEES_DOF, OutageRecord, RunRecord};
+use nav_sim_navigation::simulation::lincov::Instant;
+use nav_sim_navigation::simulation::{NEES_DOF, OutageRecord, RunRecord};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 

@@ -1,6 +1,6 @@
 //! Signals by name, as `--axes` takes them.
 
-use crate::imu::Channel;
+use nav_sim_signal::imu::Channel;
 
 /// What one word of `--axes` stands for.
 #[derive(Debug, Clone)]

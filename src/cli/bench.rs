@@ -1,10 +1,10 @@
 //! `nav-sim bench`: what a run-epoch costs on this machine (hidden).
 
 use super::{Failure, Session};
-use crate::calibration::median;
-use crate::ekf::FilterStates;
-use crate::lanes::Level;
-use crate::throughput::{Load, RUN_EPOCHS, model};
+use nav_sim_calibration::median;
+use nav_sim_navigation::ekf::FilterStates;
+use nav_sim_navigation::lanes::Level;
+use nav_sim_navigation::throughput::{Load, RUN_EPOCHS, model};
 use std::time::Instant;
 
 /// Print what a run-epoch costs on this machine, and which vector units are used

@@ -6,14 +6,14 @@ use super::recordings::{RecordingArgs, Said};
 use super::run::{OutageArg, Words, parse_outage, scenario_with};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
-use crate::calibration::{Bootstrap, Estimator, ModelChoice, Pool, Settings, Trim};
 use crate::choose::{Candidate, Inflation};
-use crate::ekf::FilterStates;
 use crate::formats::model_file::CalibrationNote;
 use crate::jobs::{self, CalibrationOptions, ChoiceDrive, EstimatorChoice};
 use crate::report::{ChoiceReport, choice_page, terminal_columns, terminal_table};
-use crate::scenario::Scenario;
-use crate::sensors::outage::Outage;
+use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Pool, Settings, Trim};
+use nav_sim_navigation::ekf::FilterStates;
+use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::sensors::outage::Outage;
 use std::path::PathBuf;
 
 /// Choose the noise model for a filter by navigating on recordings left out of its calibration

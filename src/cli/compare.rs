@@ -5,7 +5,7 @@ use super::{Failure, Session};
 use crate::formats::atomic;
 use crate::jobs::{self, Comparison};
 use crate::report::{self, PaperFigure, ShownComparison};
-use crate::simulation::REPORTED_NAMES;
+use nav_sim_navigation::simulation::REPORTED_NAMES;
 use std::path::PathBuf;
 
 /// Compare runs: verdicts, and ratios of ASEE and RMSE per outage and state

@@ -4,8 +4,8 @@ use super::{Failure, Session, parse};
 use crate::formats::datasheet::{self, CATALOGUE, Datasheet, Entry, Figure, Quantity};
 use crate::formats::suggest::nearest;
 use crate::formats::{atomic, model_file};
-use crate::imu::Sensor;
 use crate::jobs;
+use nav_sim_signal::imu::Sensor;
 use std::path::PathBuf;
 
 /// Make a noise model from the figures of a data sheet, in their own units: an assumption, not a calibration

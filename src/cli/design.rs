@@ -4,12 +4,12 @@ use super::parse;
 use super::pictures::PageArgs;
 use super::run::{OutageArg, parse_outage, windows_of};
 use super::{Failure, Session, read};
-use crate::calibration::{Bootstrap, Estimator, Settings};
-use crate::ekf::FilterStates;
 use crate::formats::model_file::ModelFile;
 use crate::jobs::{self, DesignInputs, Destination, NavigateInputs, TrueImu};
 use crate::report::{Design, design_page, design_rows, design_verdict, markdown_table};
-use crate::scenario::{Method, Scenario};
+use nav_sim_calibration::{Bootstrap, Estimator, Settings};
+use nav_sim_navigation::ekf::FilterStates;
+use nav_sim_navigation::scenario::{Method, Scenario};
 use serde_json::json;
 use std::path::PathBuf;
 

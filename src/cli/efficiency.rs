@@ -1,10 +1,10 @@
 //! `nav-sim efficiency`: Monte-Carlo study of the estimators themselves.
 
 use super::{Failure, Session};
-use crate::efficiency::StudyError;
 use crate::formats::{atomic, efficiency_file};
 use crate::jobs::EstimatorStudy;
 use crate::report::{self, EfficiencyFile};
+use nav_sim_calibration::efficiency::StudyError;
 use std::path::{Path, PathBuf};
 
 /// Study the estimators themselves by Monte Carlo

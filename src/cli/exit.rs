@@ -1,8 +1,8 @@
 //! What went wrong, as the user reads it, and the exit code it means.
 
-use crate::calibration::SignalError;
 use crate::formats::{FileError, Setting};
-use crate::sensors::outage::OutageError;
+use nav_sim_calibration::SignalError;
+use nav_sim_navigation::sensors::outage::OutageError;
 use std::fmt;
 
 /// A failure: exit code, message and hint. 1 could not (I/O, numerics); 2 usage or configuration;

@@ -2,14 +2,14 @@
 
 use super::parse::one_of;
 use super::{Failure, Session};
-use crate::calibration::duration;
 use crate::export::{Export, ExportError, Settings, Target};
 use crate::formats::atomic;
 use crate::formats::model_file::{self, ModelFile};
-use crate::imu::Sensor;
 use crate::jobs::{self, Recorded};
-use crate::noise::practical::{Horizon, Policy};
 use crate::report;
+use nav_sim_calibration::duration;
+use nav_sim_signal::imu::Sensor;
+use nav_sim_signal::noise::practical::{Horizon, Policy};
 use std::path::PathBuf;
 
 /// Write a noise model as the parameters of another program

@@ -1,7 +1,7 @@
 //! The flags that say which states the filter has: the same for `run` and `fuse`.
 
 use super::parse;
-use crate::ekf::{FilterStates, InitialSettings};
+use nav_sim_navigation::ekf::{FilterStates, InitialSettings};
 
 /// States of the filter.
 #[derive(clap::Args, Debug)]

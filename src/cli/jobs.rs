@@ -1,12 +1,12 @@
 //! Why a job has no result, in the words of the command line: which flag helps.
 
 use super::Failure;
-use crate::calibration::{AverageError, CalibrationError, Cause, FitError, ModelSpec, SpecError};
 use crate::choose::ChoiceError;
 use crate::formats::suggest::nearest;
 use crate::jobs::JobError;
-use crate::metrics::ComparisonError;
-use crate::simulation::ExperimentError;
+use nav_sim_calibration::{AverageError, CalibrationError, Cause, FitError, ModelSpec, SpecError};
+use nav_sim_navigation::metrics::ComparisonError;
+use nav_sim_navigation::simulation::ExperimentError;
 
 impl From<JobError> for Failure {
     fn from(e: JobError) -> Self {

@@ -1,8 +1,8 @@
 //! Values of flags.
 
-use crate::imu::MAX_RATE_HZ;
-use crate::names::UnknownName;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use nav_sim_signal::imu::MAX_RATE_HZ;
+use nav_sim_signal::names::UnknownName;
 use std::fmt::Debug;
 use std::str::FromStr;
 

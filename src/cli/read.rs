@@ -7,12 +7,12 @@ use crate::formats::model_file::{self, ModelFile};
 use crate::formats::recordings::{self, ReadOptions};
 use crate::formats::trajectory_file;
 use crate::formats::{FileError, Setting};
-use crate::imu::Recording;
-use crate::noise::{Model, continuous};
 use crate::report::Input;
-use crate::trajectory::Trajectory;
-use crate::trajectory::plausibility::{Excess, Limits, examine};
-use crate::trajectory::reference::Reference;
+use nav_sim_navigation::trajectory::Trajectory;
+use nav_sim_navigation::trajectory::plausibility::{Excess, Limits, examine};
+use nav_sim_navigation::trajectory::reference::Reference;
+use nav_sim_signal::imu::Recording;
+use nav_sim_signal::noise::{Model, continuous};
 use std::path::{Path, PathBuf};
 
 /// For commands without the option `--origin`: `trajectory convert` has it.

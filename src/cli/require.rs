@@ -11,8 +11,8 @@ use crate::jobs::{Ask, CatalogueUnit, Misplaced, Requirements};
 use crate::report::require as words;
 use crate::report::require::RankedUnit;
 use crate::report::{catalogue_page, columns, markdown_table, model_page, needed_page};
-use crate::require::{Limit, Quantity, RequireError};
-use crate::sensors::outage::NotAnOutage;
+use nav_sim_navigation::require::{Limit, Quantity, RequireError};
+use nav_sim_navigation::sensors::outage::NotAnOutage;
 use std::path::{Path, PathBuf};
 
 /// Find the IMU that keeps the errors at the end of an outage within limits, or judge MODEL by them

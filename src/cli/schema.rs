@@ -4,8 +4,8 @@ use super::{Failure, Session};
 use crate::formats::{
     contamination_file, efficiency_file, fusion_files, model_file, parameters_file, trajectory_file,
 };
-use crate::scenario::Scenario;
 use crate::study::Study;
+use nav_sim_navigation::scenario::Scenario;
 
 /// Print the JSON schema of a file that people write, for editors and checkers
 #[derive(clap::Args, Debug)]

@@ -6,9 +6,9 @@ use super::{Failure, Session, read};
 use crate::formats::contamination_file;
 use crate::formats::model_file::{self, ModelFile};
 use crate::formats::recordings::FileFormat;
-use crate::imu::Channel;
 use crate::jobs::Synthesis;
-use crate::noise::contamination::{Contamination, Rule};
+use nav_sim_signal::imu::Channel;
+use nav_sim_signal::noise::contamination::{Contamination, Rule};
 use std::path::{Path, PathBuf};
 
 /// Synthesise static recordings from a noise model

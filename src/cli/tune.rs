@@ -4,15 +4,15 @@ use super::parse::one_of;
 use super::pictures::PageArgs;
 use super::run::{OutageArg, parse_outage, scenario_with};
 use super::{Failure, Session, read, turn_on};
-use crate::ekf::FilterStates;
 use crate::formats::atomic::claim_file;
 use crate::formats::model_file::{self, ModelFile};
 use crate::jobs::{self, TuneInputs};
-use crate::noise::Model;
 use crate::report::{Input, markdown_table, tune_page};
-use crate::scenario::Scenario;
-use crate::sensors::outage::Outage;
-use crate::simulation::lincov::{Aim, Per, Track, drive};
+use nav_sim_navigation::ekf::FilterStates;
+use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::sensors::outage::Outage;
+use nav_sim_navigation::simulation::lincov::{Aim, Per, Track, drive};
+use nav_sim_signal::noise::Model;
 use std::path::{Path, PathBuf};
 
 /// Find the smallest factors on MODEL that make its filter consistent for another truth

@@ -2,7 +2,7 @@
 
 use super::Failure;
 use super::parse::words;
-use crate::wavelet::{Convention, Tuning};
+use nav_sim_signal::wavelet::{Convention, Tuning};
 
 /// How the robust wavelet variance is tuned.
 #[derive(clap::Args, Debug)]

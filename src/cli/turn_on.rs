@@ -1,12 +1,12 @@
 //! The constant bias of a switching-on that a model file states, used where flags and scenario are silent.
 
 use super::Session;
-use crate::ekf::InitialSettings;
 use crate::formats::model_file::ModelFile;
-use crate::imu::Sensor;
 use crate::jobs;
 use crate::report::readable;
-use crate::sensors::defects::ImuSettings;
+use nav_sim_navigation::ekf::InitialSettings;
+use nav_sim_navigation::sensors::defects::ImuSettings;
+use nav_sim_signal::imu::Sensor;
 use std::path::Path;
 
 /// Lets the filter expect the turn-on bias of its model; `--turn-on-bias` and `[initial]` win.

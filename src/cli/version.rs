@@ -1,6 +1,6 @@
 //! `nav-sim --version`, and with `--verbose` what this program was built for and what it uses here.
 
-use crate::lanes::Level;
+use nav_sim_navigation::lanes::Level;
 use std::env::consts::{ARCH, OS};
 
 /// The version; more where the words of the command line ask for it.

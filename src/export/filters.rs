@@ -2,8 +2,8 @@
 
 use super::layout::{Layout, number, remark, triple};
 use super::{Entry, Values};
-use crate::ekf::FilterStates;
-use crate::units::{DEG, DEG_PER_HOUR};
+use nav_sim_navigation::ekf::FilterStates;
+use nav_sim_signal::units::{DEG, DEG_PER_HOUR};
 
 /// One milligal (m/s²).
 const MILLIGAL: f64 = 1e-5;

@@ -1,8 +1,8 @@
 //! All the numbers of an export, with units.
 
 use super::{Entry, Export, Quantity, SensorExport};
-use crate::imu::Sensor;
-use crate::noise::practical::{AxisParameters, CorrelatedProcess, Markov, Pair, Ratio};
+use nav_sim_signal::imu::Sensor;
+use nav_sim_signal::noise::practical::{AxisParameters, CorrelatedProcess, Markov, Pair, Ratio};
 use serde_json::{Map, Value, json};
 
 impl Export {
@@ -30,7 +30,7 @@ fn entry(e: &Entry) -> Value {
 }
 
 fn sensor(s: &SensorExport) -> Value {
-    let axis = |((channel, p), deviation): (&(crate::imu::Channel, AxisParameters), &f64)| {
+    let axis = |((channel, p), deviation): (&(nav_sim_signal::imu::Channel, AxisParameters), &f64)| {
         let mut value = parameters(p, s.sensor);
         value["allan_deviation_at_1_s"] = json!({ "value": deviation, "unit": s.sensor.unit() });
         (channel.axis.name().to_owned(), value)

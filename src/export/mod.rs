@@ -1,6 +1,6 @@
 //! A noise model as the parameters of other programs: each value with its key, unit, rate and meaning.
 //!
-//! [`Export::new`] fits the pair that the target knows ([`noise::practical`](crate::noise::practical)) to the model's
+//! [`Export::new`] fits the pair that the target knows ([`noise::practical`](nav_sim_signal::noise::practical)) to the model's
 //! noisiest axis, states by how much the two differ, and [`Export::text`] writes it in the target's own syntax.
 
 mod autopilots;
@@ -17,15 +17,15 @@ pub(crate) use json::parameters as parameters_json;
 pub(crate) use sheet::Quantity;
 pub(crate) use target::Target;
 
-use crate::imu::{Channel, Sensor};
-use crate::noise::practical::{
+use nav_sim_signal::imu::{Channel, Sensor};
+use nav_sim_signal::noise::practical::{
     AxisParameters, Bias, Closure, Curve, CurveError, Horizon, Markov, Pair, Policy,
 };
-use crate::noise::{Composite, Model, Process};
+use nav_sim_signal::noise::{Composite, Model, Process};
 
 /// How a model is turned into parameters.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
+pub(crate) struct Settings {
     /// Which pair stands for the model.
     pub policy: Policy,
     /// Over which averaging times.
@@ -77,7 +77,7 @@ pub(crate) enum ExportError {
 
 /// One line of the exported file.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Entry {
+pub(crate) struct Entry {
     /// Key, as the target writes it.
     pub key: &'static str,
     /// The value, in the target's unit.
@@ -107,7 +107,7 @@ impl Entry {
 
 /// What is known of one sensor.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SensorExport {
+pub(crate) struct SensorExport {
     /// Which sensor.
     pub sensor: Sensor,
     /// Parameters of each axis that the model has.
@@ -125,12 +125,12 @@ pub struct SensorExport {
     pub bias_sd: f64,
     /// Standard deviation of the turn-on bias, where the model states one (units).
     pub turn_on: Option<f64>,
-    left_out: crate::noise::practical::Ratio,
+    left_out: nav_sim_signal::noise::practical::Ratio,
 }
 
 /// A model in the terms of a target.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Export {
+pub(crate) struct Export {
     /// Which program.
     pub target: Target,
     /// Sample rate of the model, for values per sample (Hz).

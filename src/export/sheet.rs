@@ -1,7 +1,7 @@
 //! Quantities in the units of data sheets, in ASCII as `nav-sim datasheet` reads them.
 
-use crate::imu::Sensor;
-use crate::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
+use nav_sim_signal::imu::Sensor;
+use nav_sim_signal::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
 
 /// A quantity of a sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -2,7 +2,7 @@
 
 use super::layout::{Layout, number, remark, triple};
 use super::{Entry, SensorValues, Values};
-use crate::units::{DEG, DEG_PER_HOUR};
+use nav_sim_signal::units::{DEG, DEG_PER_HOUR};
 
 /// √3600: from per √s to per √h.
 const ROOT_HOUR: f64 = 60.0;
@@ -75,7 +75,7 @@ pub(super) fn matlab(v: &Values) -> Vec<Entry> {
     let phi = |t: f64| (-1.0 / (t * v.rate_hz)).exp();
     // 1 − phi² without cancellation
     let drive = |sigma: f64, t: f64| sigma * (-(-2.0 / (t * v.rate_hz)).exp_m1()).sqrt();
-    let pole = |m: crate::noise::practical::Markov| {
+    let pole = |m: nav_sim_signal::noise::practical::Markov| {
         format!(
             "phi of the bias, standard deviation {}, correlation time {} s",
             number(m.sigma),

@@ -2,11 +2,11 @@
 
 use super::layout::Layout;
 use super::{Entry, Values, autopilots, filters, simulators, vision};
-use crate::noise::practical::Bias;
+use nav_sim_signal::noise::practical::Bias;
 
 /// A program that parameters are written for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Target {
+pub(crate) enum Target {
     /// Kalibr, imu.yaml.
     Kalibr,
     /// `OpenVINS`, `kalibr_imu_chain.yaml`.

@@ -1,7 +1,7 @@
 use super::layout::number;
 use super::*;
-use crate::noise::{Ar1, GaussMarkov, Process, RandomWalk, White};
-use crate::units::{DEG, STANDARD_GRAVITY};
+use nav_sim_signal::noise::{Ar1, GaussMarkov, Process, RandomWalk, White};
+use nav_sim_signal::units::{DEG, STANDARD_GRAVITY};
 
 const RATE: f64 = 200.0;
 /// Data sheet: 0.02 m/s/√h and 0.15 °/√h.

@@ -1,9 +1,9 @@
 //! What people are told: the head of the file, and doubts.
 
 use super::{Export, SensorExport};
-use crate::imu::Sensor;
-use crate::noise::practical::{Closure, Pair, Policy};
-use crate::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
+use nav_sim_signal::imu::Sensor;
+use nav_sim_signal::noise::practical::{Closure, Pair, Policy};
+use nav_sim_signal::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
 
 /// A pair is in doubt when its Allan deviation is off by more than this.
 const TOLERANCE: f64 = 1.5;

@@ -3,9 +3,9 @@
 
 use super::trajectory_file::table::{Numbers, Table};
 use super::{FileError, Kind, Place, source};
-use crate::imu::{Axis, Sensor};
 use crate::report::{CurvesFile, FittedCurve, SignalsFile};
-use crate::wavelet::{Convention, Curve, QuantizationResponse, Tuning};
+use nav_sim_signal::imu::{Axis, Sensor};
+use nav_sim_signal::wavelet::{Convention, Curve, QuantizationResponse, Tuning};
 use std::fmt::Display;
 use std::io::ErrorKind;
 use std::path::Path;

@@ -4,10 +4,10 @@
 //! They carry the uncertainty of a calibration on into what is computed from its model.
 
 use super::{FileError, source};
-use crate::calibration::Outcome;
-use crate::imu::Channel;
-use crate::noise::continuous::{self, RateError};
-use crate::noise::{Composite, Model};
+use nav_sim_calibration::Outcome;
+use nav_sim_signal::imu::Channel;
+use nav_sim_signal::noise::continuous::{self, RateError};
+use nav_sim_signal::noise::{Composite, Model};
 use serde::{Deserialize, Serialize};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -52,7 +52,7 @@ pub struct Draws {
 
 /// Where the draws of a model file stand.
 #[must_use]
-pub fn beside(model: &Path) -> PathBuf {
+pub(crate) fn beside(model: &Path) -> PathBuf {
     model.with_extension("draws.json")
 }
 
@@ -166,7 +166,7 @@ fn with_values(axis: &Composite, values: &[f64], rate_hz: f64) -> Option<Composi
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::noise::{Ar1, Process, White};
+    use nav_sim_signal::noise::{Ar1, Process, White};
 
     fn axis(scale: f64) -> Composite {
         let ar1 = Ar1::new(1.0 - 1e-4 * scale, 1e-9 * scale).unwrap();

@@ -4,7 +4,7 @@
 use super::atomic::{self, Claim};
 use super::difference::{self, Difference};
 use super::{FileError, Place, Setting};
-use crate::efficiency::Estimate;
+use nav_sim_calibration::efficiency::Estimate;
 use serde_json::Value;
 use std::fs::{self, File};
 use std::io::Write;
@@ -27,7 +27,7 @@ pub(crate) struct Layout {
 
 /// An open study directory.
 #[derive(Debug)]
-pub struct StudyDirectory {
+pub(crate) struct StudyDirectory {
     path: PathBuf,
     layout: Layout,
     sets: File,

@@ -21,11 +21,11 @@ use super::contamination_file;
 use super::model_file;
 use super::toml_described::Document;
 use super::toml_file::{Section, Source};
-use crate::calibration::{AverageError, Estimator, Trim, Weighting};
-use crate::efficiency::Design;
-use crate::imu::Channel;
-use crate::noise::contamination::Contamination;
-use crate::wavelet::{Convention, Tuning, default_levels, max_levels};
+use nav_sim_calibration::efficiency::Design;
+use nav_sim_calibration::{AverageError, Estimator, Trim, Weighting};
+use nav_sim_signal::imu::Channel;
+use nav_sim_signal::noise::contamination::Contamination;
+use nav_sim_signal::wavelet::{Convention, Tuning, default_levels, max_levels};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -123,7 +123,7 @@ const fn efficiency() -> f64 {
 
 /// The JSON schema of a study file.
 #[must_use]
-pub fn schema() -> serde_json::Value {
+pub(crate) fn schema() -> serde_json::Value {
     schemars::schema_for!(Description).to_value()
 }
 

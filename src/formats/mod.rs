@@ -28,6 +28,7 @@ pub(crate) mod toml_file;
 mod toml_path;
 pub mod trajectory_file;
 
+pub use atomic::Existing;
 pub use error::FileError;
 pub(crate) use error::system_words;
 pub(crate) use error::{Kind, Place, Setting};

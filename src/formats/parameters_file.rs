@@ -16,9 +16,9 @@
 use super::FileError;
 use super::toml_described::Finite;
 use super::toml_file::{Section, Source};
-use crate::calibration::{BoundDomain, ModelSpec, ParameterLimit};
-use crate::imu::{Axis, Sensor};
-use crate::noise::Kind;
+use nav_sim_calibration::{BoundDomain, ModelSpec, ParameterLimit};
+use nav_sim_signal::imu::{Axis, Sensor};
+use nav_sim_signal::noise::Kind;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
@@ -125,7 +125,7 @@ fn of_processes(
         for parameter in table.keys() {
             let Some(range) = table.section(parameter)? else { continue };
             let (low, high) = bounds(&table, parameter, &range.read()?)?;
-            let refuse = |e: crate::calibration::LimitError| {
+            let refuse = |e: nav_sim_calibration::LimitError| {
                 table.refuse(parameter, format!("is not possible: {e}"), Some(e.hint()))
             };
             spec.clone().limit(process, parameter, low, high).map_err(refuse)?;

@@ -2,10 +2,10 @@
 
 use super::run_tables::{REPEAT, parse_epochs, parse_runs};
 use super::{FileError, Place, atomic, hash, source};
-use crate::metrics::{EpochRow, Measured, PerState, Verdict};
 use crate::report::Manifest;
-use crate::scenario::Method;
-use crate::simulation::{OutageRecord, RunRecord};
+use nav_sim_navigation::metrics::{EpochRow, Measured, PerState, Verdict};
+use nav_sim_navigation::scenario::Method;
+use nav_sim_navigation::simulation::{OutageRecord, RunRecord};
 use std::path::Path;
 
 /// Lower and upper end of each state's interval, where it is known.

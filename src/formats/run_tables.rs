@@ -2,8 +2,8 @@
 
 use super::FileError;
 use super::trajectory_file::table::{Numbers, Table};
-use crate::metrics::EpochRow;
-use crate::simulation::{OutageRecord, REPORTED, REPORTED_NAMES, RunRecord};
+use nav_sim_navigation::metrics::EpochRow;
+use nav_sim_navigation::simulation::{OutageRecord, REPORTED, REPORTED_NAMES, RunRecord};
 
 /// What to do about a damaged table.
 pub(super) const REPEAT: &str = "repeat the run, or put back its files";
@@ -95,12 +95,12 @@ fn damaged(error: FileError) -> FileError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::metrics;
     use crate::report::{
         sample,
         tables::{epochs_csv, runs_csv},
     };
-    use crate::simulation::EpochSums;
+    use nav_sim_navigation::metrics;
+    use nav_sim_navigation::simulation::EpochSums;
 
     #[test]
     fn epochs_read_back_exactly() {

@@ -3,8 +3,8 @@
 use super::FileError;
 use super::toml_described::Document;
 use super::toml_file::Source;
-use crate::scenario::Scenario;
-use crate::units::SettingError;
+use nav_sim_navigation::scenario::Scenario;
+use nav_sim_signal::units::SettingError;
 use std::path::Path;
 
 /// Reads and checks a scenario.

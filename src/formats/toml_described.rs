@@ -5,7 +5,7 @@ use super::error::{FileError, Kind};
 use super::suggest::nearest;
 use super::toml_file::{Section, Source, missing_key, shown, unknown_key};
 use super::toml_path::{dotted, path_at, span_of};
-use crate::units::SettingError;
+use nav_sim_signal::units::SettingError;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;

@@ -1,16 +1,16 @@
 //! Calibration: from static recordings, or directories of them, to a noise model for each sensor or axis.
 
 use super::{BeginsOtherwise, JobError, Remark, Remarks};
-use crate::calibration::{
+use crate::formats::hash;
+use crate::formats::recordings::{self, FileReport, ReadOptions, Report};
+use nav_sim_calibration::{
     self, Advance, Bootstrap, Estimator, Group, Outcome, Pool, Replicate, Settings, SignalError,
     TurnOnSpread, WarmUp, grouped, infer_telling, replicates, turn_on, warm_up,
 };
-use crate::formats::hash;
-use crate::formats::recordings::{self, FileReport, ReadOptions, Report};
-use crate::imu::{Channel, Recording, Signal};
-use crate::names::UnknownName;
-use crate::noise::Model;
-use crate::wavelet::{Tuning, default_levels};
+use nav_sim_signal::imu::{Channel, Recording, Signal};
+use nav_sim_signal::names::UnknownName;
+use nav_sim_signal::noise::Model;
+use nav_sim_signal::wavelet::{Tuning, default_levels};
 use rayon::prelude::*;
 use std::cell::RefCell;
 use std::fmt;
@@ -197,7 +197,7 @@ impl Measured {
     /// When a trim leaves no replicate, or a curve is too short for the model.
     pub fn calibrate(self, advance: Advance<'_>) -> Result<Calibration, JobError> {
         let Self { groups, settings, bootstrap, turn_on, .. } = self;
-        let outcomes = calibration::calibrate_telling(&groups, &settings, advance)?;
+        let outcomes = nav_sim_calibration::calibrate_telling(&groups, &settings, advance)?;
         let calibration = Calibration { groups, outcomes, settings, turn_on: Vec::new() };
         let calibration = if turn_on { calibration.with_turn_on() } else { calibration };
         Ok(calibration.with_inference(bootstrap, advance))
@@ -209,7 +209,7 @@ impl Calibration {
     #[must_use]
     pub fn model(&self, estimator: Estimator) -> Model {
         let own = self.outcomes.iter().filter(|o| o.estimator == estimator);
-        calibration::model_of(own, self.settings.rate_hz)
+        nav_sim_calibration::model_of(own, self.settings.rate_hz)
     }
 
     /// The same with what the recordings' means say.

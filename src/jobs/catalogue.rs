@@ -2,8 +2,8 @@
 
 use crate::formats::FileError;
 use crate::formats::datasheet::{CATALOGUE, Datasheet, Entry, catalogued};
-use crate::imu::Sensor;
 use crate::report;
+use nav_sim_signal::imu::Sensor;
 use serde_json::{Value, json};
 
 fn units() -> Result<Vec<(&'static str, Datasheet)>, FileError> {

@@ -4,18 +4,18 @@
 use super::JobError;
 use crate::export::Export;
 use crate::formats::model_file::ModelFile;
-use crate::imu::{Channel, Sensor};
-use crate::noise::practical::Pair;
-use crate::noise::{
+use nav_sim_signal::imu::{Channel, Sensor};
+use nav_sim_signal::noise::practical::Pair;
+use nav_sim_signal::noise::{
     Composite, GaussMarkov, Model, ParameterError, Process, RandomWalk, Synthesizer, White, continuous,
 };
-use crate::rng::StreamKey;
-use crate::wavelet::{classical, default_levels, interval};
+use nav_sim_signal::rng::StreamKey;
+use nav_sim_signal::wavelet::{classical, default_levels, interval};
 use rayon::prelude::*;
 
 /// The recordings that are made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Recorded {
+pub(crate) struct Recorded {
     /// How many.
     pub recordings: u64,
     /// Samples of each.
@@ -27,7 +27,7 @@ pub struct Recorded {
 impl Recorded {
     /// As many recordings, and as long, as the calibration of a model had; else four of 16 times the horizon (s).
     #[must_use]
-    pub fn like(file: &ModelFile, seed: u64, horizon_s: f64) -> Self {
+    pub(crate) fn like(file: &ModelFile, seed: u64, horizon_s: f64) -> Self {
         const MOST: usize = 1 << 22;
         let recordings = file.most_of_fits("recordings").filter(|n| *n > 0).map_or(4, i64::unsigned_abs);
         // A recording has one scale more than is used.
@@ -41,7 +41,7 @@ impl Recorded {
 
 /// What recordings of the exported pair say at one scale.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CertifiedScale {
+pub(crate) struct CertifiedScale {
     /// Averaging time (s), half the scale.
     pub average_s: f64,
     /// Allan deviation of the model (its largest axis) over that of the recordings.
@@ -53,7 +53,7 @@ pub struct CertifiedScale {
 /// The certificate of one sensor.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub struct Certificate {
+pub(crate) struct Certificate {
     /// The sensor.
     pub sensor: Sensor,
     /// The scales whose averaging times the horizon holds.
@@ -63,7 +63,7 @@ pub struct Certificate {
 impl Certificate {
     /// Of the scales at which the model lies outside the band, the one with the ratio furthest from 1.
     #[must_use]
-    pub fn worst(&self) -> Option<CertifiedScale> {
+    pub(crate) fn worst(&self) -> Option<CertifiedScale> {
         let outside = self.scales.iter().copied().filter(|s| !s.inside);
         outside.max_by(|a, b| a.ratio.ln().abs().total_cmp(&b.ratio.ln().abs()))
     }
@@ -74,7 +74,7 @@ impl Certificate {
 ///
 /// # Errors
 /// When a pair is no noise model, or the recordings are too short.
-pub fn certify(
+pub(crate) fn certify(
     export: &Export,
     model: &Model,
     missing: &[Channel],
@@ -143,8 +143,8 @@ fn composite(pair: &Pair, rate_hz: f64) -> Result<Composite, ParameterError> {
 mod tests {
     use super::*;
     use crate::export::{Settings, Target};
-    use crate::noise::Ar1;
-    use crate::noise::practical::{Horizon, Policy};
+    use nav_sim_signal::noise::Ar1;
+    use nav_sim_signal::noise::practical::{Horizon, Policy};
 
     /// White noise and random walk are the pair: within its band. With an AR1 of ten times the white noise's variance at 10 s left
     /// out (strict) the model is above it there: Allan deviation ratio by the closed forms.

@@ -1,13 +1,13 @@
 //! The directory of a choice: the winner's model with its curves and draws, the page and the ranking.
 
 use super::{Calibration, Chosen, ModelFiles};
-use crate::calibration::diagnose;
 use crate::choose::Inflation;
 use crate::formats::FileError;
 use crate::formats::atomic::{AtomicDir, Claim, Existing, Found, claim_directory};
 use crate::formats::input::input;
 use crate::formats::model_file::CalibrationNote;
 use crate::report::{ChoiceReport, choice_page};
+use nav_sim_calibration::diagnose;
 use std::path::Path;
 
 /// The files of a choice, in the order of writing.

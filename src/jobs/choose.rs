@@ -2,15 +2,15 @@
 
 use super::calibrate::without_warm_up;
 use super::{Calibration, CalibrationOptions, EstimatorChoice, JobError, Measured, Note, Remarks, measure};
-use crate::calibration::{Estimator, model_of};
 use crate::choose::{Candidate, ChoiceError, Contender, Drive, Fold, Influence, Laboratory, Ranking, Unit};
 use crate::formats::recordings::{self, FileReport};
-use crate::imu::{Axis, Channel, Recording};
-use crate::noise::Model;
 use crate::observer::Observer;
-use crate::scenario::Scenario;
-use crate::sensors::outage::Outage;
-use crate::trajectory::Trajectory;
+use nav_sim_calibration::{Estimator, model_of};
+use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::sensors::outage::Outage;
+use nav_sim_navigation::trajectory::Trajectory;
+use nav_sim_signal::imu::{Axis, Channel, Recording};
+use nav_sim_signal::noise::Model;
 use std::path::PathBuf;
 
 /// Where candidates navigate.

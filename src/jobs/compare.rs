@@ -2,15 +2,15 @@
 
 use super::JobError;
 use crate::formats::run_directory::{self, RunDirectory};
-use crate::metrics;
 use crate::report::{CandidateResult, ComparisonFile, Label, Manifest, RatioCurves};
-use crate::scenario::Method;
+use nav_sim_navigation::metrics;
+use nav_sim_navigation::scenario::Method;
 use std::path::{Path, PathBuf};
 
 /// What was found.
 #[derive(Debug)]
 #[non_exhaustive]
-pub struct Comparison {
+pub(crate) struct Comparison {
     /// All of it, as it is written to a file.
     pub file: ComparisonFile,
     /// The runs.
@@ -27,7 +27,7 @@ pub struct Comparison {
 ///
 /// # Errors
 /// When a directory cannot be read, or is of something else.
-pub fn compare(runs: &[PathBuf], reference: &Path) -> Result<Comparison, JobError> {
+pub(crate) fn compare(runs: &[PathBuf], reference: &Path) -> Result<Comparison, JobError> {
     let name = reference.display().to_string();
     let directory = run_directory::read(reference)?;
     let (mut candidates, mut curves, mut doubts) = (Vec::new(), Vec::new(), Vec::new());

@@ -1,10 +1,10 @@
 //! Wavelet-variance curves that come from elsewhere → models.
 
 use super::{Calibration, JobError};
-use crate::calibration::{Bootstrap, Estimator, Group, Outcome, Scope, Settings, fit_curve};
 use crate::formats::curve_file;
-use crate::imu::Sensor;
-use crate::wavelet::Curve;
+use nav_sim_calibration::{Bootstrap, Estimator, Group, Outcome, Scope, Settings, fit_curve};
+use nav_sim_signal::imu::Sensor;
+use nav_sim_signal::wavelet::Curve;
 use std::path::Path;
 
 /// Curves of a file, each with what it is for.

@@ -2,19 +2,19 @@
 
 use super::JobError;
 use super::navigate::{NavigateInputs, navigate};
-use crate::calibration::{
-    Anticipated, Bootstrap, Estimator, Outcome, ParameterInterval, Scattering, Settings,
-};
 use crate::formats::draws_file::DrawsFile;
 use crate::formats::model_file::ModelFile;
-use crate::metrics::OutageSummary;
-use crate::noise::Parameter;
 use crate::report::{Design, DesignedParameter, DesignedQuantile};
-use crate::scenario::Scenario;
-use crate::sensors::outage::Outage;
+use nav_sim_calibration::{
+    Anticipated, Bootstrap, Estimator, Outcome, ParameterInterval, Scattering, Settings,
+};
+use nav_sim_navigation::metrics::OutageSummary;
+use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::sensors::outage::Outage;
+use nav_sim_signal::noise::Parameter;
 
 /// What is planned with.
-pub struct DesignInputs<'a> {
+pub(crate) struct DesignInputs<'a> {
     /// The IMU as it is believed to be, with its spread where recordings differ.
     pub file: &'a ModelFile,
     /// How it will be calibrated.
@@ -28,7 +28,7 @@ pub struct DesignInputs<'a> {
 }
 
 /// A navigation with the model that will be calibrated.
-pub struct Destination<'a> {
+pub(crate) struct Destination<'a> {
     /// Trajectory and model.
     pub inputs: &'a mut NavigateInputs,
     /// Filter and receiver; the method is covariance analysis.
@@ -41,7 +41,11 @@ pub struct Destination<'a> {
 ///
 /// # Errors
 /// When the recordings are too few or too short, or the navigation cannot be analysed.
-pub fn design(inputs: &mut DesignInputs<'_>, recordings: usize, hours: f64) -> Result<Design, JobError> {
+pub(crate) fn design(
+    inputs: &mut DesignInputs<'_>,
+    recordings: usize,
+    hours: f64,
+) -> Result<Design, JobError> {
     let model = &inputs.file.model;
     let samples = (hours * 3600.0 * model.rate_hz).round() as usize;
     let anticipated = Anticipated { model, spread: inputs.file.spread.as_ref(), recordings, samples };

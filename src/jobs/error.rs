@@ -1,13 +1,13 @@
 //! Why a job has no result.
 
 use super::NavigateError;
-use crate::calibration::{AnticipationError, CalibrationError, Estimator, SignalError};
 use crate::choose::ChoiceError;
-use crate::efficiency::StudyError;
 use crate::formats::FileError;
-use crate::metrics::ComparisonError;
-use crate::noise::{ParameterError, ReplicateError};
-use crate::wavelet::WaveletError;
+use nav_sim_calibration::efficiency::StudyError;
+use nav_sim_calibration::{AnticipationError, CalibrationError, Estimator, SignalError};
+use nav_sim_navigation::metrics::ComparisonError;
+use nav_sim_signal::noise::{ParameterError, ReplicateError};
+use nav_sim_signal::wavelet::WaveletError;
 
 /// Why a job has no result.
 #[derive(Debug, thiserror::Error)]

@@ -1,20 +1,20 @@
 //! A Monte-Carlo study of the estimators themselves, set by set, from which it goes on when it was stopped.
 
 use super::JobError;
-use crate::efficiency::{
-    Accuracy, Design, Estimate, Movement, StudyError, Target, abnormal_curve, accuracy, outlier_curve, target,
-};
 use crate::formats::FileError;
 use crate::formats::efficiency_directory::{Layout, StudyDirectory};
-use crate::noise::{Process, contamination::Contamination};
 use crate::report::{EfficiencyFile, EfficiencyRow};
+use nav_sim_calibration::efficiency::{
+    Accuracy, Design, Estimate, Movement, StudyError, Target, abnormal_curve, accuracy, outlier_curve, target,
+};
+use nav_sim_signal::noise::{Process, contamination::Contamination};
 use rayon::prelude::*;
 use serde_json::{Value, json};
 use std::path::Path;
 
 /// A study, and what its estimators aim at.
 #[derive(Debug)]
-pub struct EstimatorStudy {
+pub(crate) struct EstimatorStudy {
     /// The design. Its seed may be set before the first estimate.
     pub design: Design,
     aim: Target,
@@ -25,7 +25,7 @@ impl EstimatorStudy {
     ///
     /// # Errors
     /// When the design means no study.
-    pub fn new(design: Design) -> Result<Self, StudyError> {
+    pub(crate) fn new(design: Design) -> Result<Self, StudyError> {
         design.check()?;
         Ok(Self { aim: target(&design)?, design })
     }
@@ -34,7 +34,7 @@ impl EstimatorStudy {
     ///
     /// # Errors
     /// When it is of another study, damaged, or cannot be written to.
-    pub fn open(&self, path: &Path) -> Result<StudyDirectory, FileError> {
+    pub(crate) fn open(&self, path: &Path) -> Result<StudyDirectory, FileError> {
         StudyDirectory::open(path, &identity(&self.design), layout(&self.design, &self.aim))
     }
 
@@ -42,7 +42,7 @@ impl EstimatorStudy {
     ///
     /// # Errors
     /// When a set has no estimates, or the disk is full.
-    pub fn estimate(
+    pub(crate) fn estimate(
         &self,
         sets: u64,
         block: u64,
@@ -67,7 +67,7 @@ impl EstimatorStudy {
 
     /// What so many sets tell.
     #[must_use]
-    pub fn results(&self, sets: u64, directory: &StudyDirectory) -> EfficiencyFile {
+    pub(crate) fn results(&self, sets: u64, directory: &StudyDirectory) -> EfficiencyFile {
         let results = rows(&self.design, &self.aim, &directory.done[..sets as usize]);
         EfficiencyFile { schema_version: 1, sets, study: identity(&self.design), results }
     }
@@ -77,7 +77,7 @@ impl EstimatorStudy {
     ///
     /// # Errors
     /// When a disturbed set has no estimates.
-    pub fn sensitivity(&self) -> Result<String, StudyError> {
+    pub(crate) fn sensitivity(&self) -> Result<String, StudyError> {
         sensitivity(&self.design, &self.aim)
     }
 }

@@ -1,13 +1,13 @@
 //! The files of a calibration: for each estimator a model, the curves behind it and the draws behind its intervals.
 
 use super::Calibration;
-use crate::calibration::{Diagnosis, Estimator, Outcome};
 use crate::formats::atomic::{self, AtomicFile, Claim, Existing};
 use crate::formats::draws_file::{self, DrawsFile};
 use crate::formats::model_file::{self, CalibrationNote, ModelFile};
 use crate::formats::{FileError, Place, Setting, hash};
-use crate::noise::Model;
 use crate::report::{self, CurvesFile};
+use nav_sim_calibration::{Diagnosis, Estimator, Outcome};
+use nav_sim_signal::noise::Model;
 use std::path::{Path, PathBuf};
 
 /// The files of one estimator.

@@ -2,13 +2,13 @@
 
 use super::navigate::Note;
 use super::reduction::Reduced;
-use crate::ekf::{Belief, BeliefError, FilterStates, InitialSettings};
-use crate::gnss::GnssFix;
-use crate::noise::{Composite, Model, ParameterError, Process, continuous, reduction};
 use crate::observer::Observer;
-use crate::sensors::gnss::GnssSettings;
-use crate::sensors::outage::Outage;
-use crate::simulation::lincov;
+use nav_sim_navigation::ekf::{Belief, BeliefError, FilterStates, InitialSettings};
+use nav_sim_navigation::gnss::GnssFix;
+use nav_sim_navigation::sensors::gnss::GnssSettings;
+use nav_sim_navigation::sensors::outage::Outage;
+use nav_sim_navigation::simulation::lincov;
+use nav_sim_signal::noise::{Composite, Model, ParameterError, Process, continuous, reduction};
 
 /// What the filter of a fusion is made of.
 #[derive(Debug, Clone, Copy)]

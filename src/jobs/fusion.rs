@@ -1,19 +1,19 @@
 //! A recorded drive → its solution, and whether it is to be believed.
 
 use super::{FusionFilter, FusionFilterError, Note};
-use crate::fusion::alignment::{self, Alignment, AlignmentError};
-use crate::fusion::mounting::{self, Mounted, MountingError};
-use crate::fusion::{
-    self, Assessment, FusionError, Outcome, Recorded, Settings, Solution, Start, check_clocks,
-};
-use crate::gnss::GnssFix;
-use crate::imu::ImuIncrement;
 use crate::observer::Observer;
 use crate::report::{FusionSummary, displaced_words};
-use crate::sensors::outage::{FixedData, Outage, OutageError, OutagePlan, PlacedOutages};
-use crate::simulation::lincov::weak_heading;
-use crate::trajectory::reference::Reference;
-use crate::units::DEG;
+use nav_sim_navigation::fusion::alignment::{self, Alignment, AlignmentError};
+use nav_sim_navigation::fusion::mounting::{self, Mounted, MountingError};
+use nav_sim_navigation::fusion::{
+    self, Assessment, FusionError, Outcome, Recorded, Settings, Solution, Start, check_clocks,
+};
+use nav_sim_navigation::gnss::GnssFix;
+use nav_sim_navigation::sensors::outage::{FixedData, Outage, OutageError, OutagePlan, PlacedOutages};
+use nav_sim_navigation::simulation::lincov::weak_heading;
+use nav_sim_navigation::trajectory::reference::Reference;
+use nav_sim_signal::imu::ImuIncrement;
+use nav_sim_signal::units::DEG;
 
 /// A recorded drive.
 #[derive(Debug)]

@@ -3,26 +3,26 @@
 
 use super::reduction::Reduced;
 use super::uncertainty::Analysed;
-use crate::ekf::{Belief, BeliefError};
 use crate::formats::draws_file::Draws;
-use crate::fusion::{Assessment as Trust, Start};
-use crate::imu::{Recording, Sensor};
-use crate::metrics::{
+use crate::observer::Observer;
+use nav_sim_navigation::ekf::{Belief, BeliefError};
+use nav_sim_navigation::fusion::{Assessment as Trust, Start};
+use nav_sim_navigation::metrics::{
     Agreement, Budget, EpochMetrics, Expected, FanEpoch, ReductionQuality, ReductionSummary, Sensitivities,
     Summary, epochs, expected_fan, fan,
 };
-use crate::monte_carlo;
-use crate::noise::reduction::window_s;
-use crate::noise::{Model, ParameterError};
-use crate::observer::Observer;
-use crate::scenario::{Method, Scenario};
-use crate::sensors::imu::Truth;
-use crate::sensors::outage::{Outage, OutageRemark};
-use crate::simulation::lincov::{
+use nav_sim_navigation::monte_carlo;
+use nav_sim_navigation::scenario::{Method, Scenario};
+use nav_sim_navigation::sensors::imu::Truth;
+use nav_sim_navigation::sensors::outage::{Outage, OutageRemark};
+use nav_sim_navigation::simulation::lincov::{
     Assessment, FilterPass, HeadingDoubt, NamedSource, Track, TruthSide, assess, weak_heading,
 };
-use crate::simulation::{Experiment, ExperimentError, Plan, RunResult};
-use crate::trajectory::Trajectory;
+use nav_sim_navigation::simulation::{Experiment, ExperimentError, Plan, RunResult};
+use nav_sim_navigation::trajectory::Trajectory;
+use nav_sim_signal::imu::{Recording, Sensor};
+use nav_sim_signal::noise::reduction::window_s;
+use nav_sim_signal::noise::{Model, ParameterError};
 
 /// Inputs of [`navigate()`].
 #[derive(Debug)]

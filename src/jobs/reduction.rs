@@ -1,11 +1,11 @@
 //! What the reduction of a model to 15 states does.
 
 use super::navigate::Note;
-use crate::ekf::Belief;
-use crate::metrics::{ReductionQuality, ReductionSummary};
-use crate::noise::{Model, ParameterError};
 use crate::observer::Observer;
-use crate::simulation::lincov::{Track, assess};
+use nav_sim_navigation::ekf::Belief;
+use nav_sim_navigation::metrics::{ReductionQuality, ReductionSummary};
+use nav_sim_navigation::simulation::lincov::{Track, assess};
+use nav_sim_signal::noise::{Model, ParameterError};
 
 /// What a filter of 15 states was made for, and what it is assessed along.
 #[derive(Debug)]

@@ -2,20 +2,20 @@
 
 use super::turn_on;
 use crate::formats::model_file::{ModelFile, PROGRAM};
-use crate::noise::Model;
 use crate::report::require::{Bridged, CURVE_S, Longest, NeededImu, Question, RankedUnit};
-use crate::require::{
+use nav_sim_navigation::require::{
     Answer, Course, Detail, Drift, IMU_PARAMETERS, ImuParameters, Limit, Margins, Need, Quantity,
     RequireError, Worst, evenly,
 };
-use crate::scenario::Scenario;
-use crate::sensors::outage::Outage;
-use crate::simulation::ExperimentError;
-use crate::trajectory::Trajectory;
+use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::sensors::outage::Outage;
+use nav_sim_navigation::simulation::ExperimentError;
+use nav_sim_navigation::trajectory::Trajectory;
+use nav_sim_signal::noise::Model;
 
 /// The outage that is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Ask {
+pub(crate) enum Ask {
     /// One of this length (s), at several places.
     Length(f64),
     /// This one.
@@ -49,7 +49,7 @@ const MISSED: f64 = -2e-3;
 /// An outage that does not lie on the trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 #[error("an outage of {length_s} s from {begins_s} s on is not on the trajectory, which lasts from {} to {} s", .span_s.0, .span_s.1)]
-pub struct Misplaced {
+pub(crate) struct Misplaced {
     /// How long it lasts (s).
     pub length_s: f64,
     /// When it begins (s).
@@ -60,7 +60,7 @@ pub struct Misplaced {
 
 /// What is asked of an IMU, and where.
 #[derive(Debug)]
-pub struct Requirements {
+pub(crate) struct Requirements {
     /// Receiver, start and rate.
     pub scenario: Scenario,
     /// The reference.
@@ -77,7 +77,7 @@ impl Requirements {
     ///
     /// # Errors
     /// When the outage does not lie on the trajectory.
-    pub fn new(
+    pub(crate) fn new(
         scenario: Scenario,
         trajectory: Trajectory,
         limits: Vec<Limit>,
@@ -99,7 +99,11 @@ impl Requirements {
     ///
     /// # Errors
     /// When no IMU keeps the limits, or trajectory and rates do not fit together.
-    pub fn needed(&self, t_corr_s: f64, iso_drift: bool) -> Result<(NeededImu, Question), RequireError> {
+    pub(crate) fn needed(
+        &self,
+        t_corr_s: f64,
+        iso_drift: bool,
+    ) -> Result<(NeededImu, Question), RequireError> {
         let outages = self.outages();
         let course = self.course(&outages, Detail::End)?;
         let need = Need { course: &course, scenario: &self.scenario, limits: &self.limits, t_corr_s };
@@ -125,7 +129,11 @@ impl Requirements {
     ///
     /// # Errors
     /// When the model has no filter.
-    pub fn margins(&self, scenario: &Scenario, model: &Model) -> Result<(Margins, Question), RequireError> {
+    pub(crate) fn margins(
+        &self,
+        scenario: &Scenario,
+        model: &Model,
+    ) -> Result<(Margins, Question), RequireError> {
         let outages = self.outages();
         let course = self.course(&outages, Detail::End)?;
         Ok((Margins::of(&course, scenario, model, &self.limits)?, self.question(outages)))
@@ -136,7 +144,11 @@ impl Requirements {
     ///
     /// # Errors
     /// When the model has no filter.
-    pub fn longest(&self, scenario: &Scenario, model: &Model) -> Result<(Bridged, Question), RequireError> {
+    pub(crate) fn longest(
+        &self,
+        scenario: &Scenario,
+        model: &Model,
+    ) -> Result<(Bridged, Question), RequireError> {
         let outages = match self.ask {
             Ask::Longest => self.long_outages(),
             Ask::Length(_) | Ask::Window(_) => {
@@ -161,7 +173,10 @@ impl Requirements {
     ///
     /// # Errors
     /// When a model has no filter, with its name, or the length is not a whole number of seconds.
-    pub fn ranked(&self, units: &[CatalogueUnit]) -> Result<(Vec<RankedUnit>, Question), RequireError> {
+    pub(crate) fn ranked(
+        &self,
+        units: &[CatalogueUnit],
+    ) -> Result<(Vec<RankedUnit>, Question), RequireError> {
         let outages = self.long_outages();
         let course = self.course(&outages, Detail::Seconds)?;
         let named =
@@ -191,7 +206,7 @@ impl Requirements {
 
     /// A unit whose turn-on biases are there and expected; `model` is at the rate of the IMU.
     #[must_use]
-    pub fn unit(
+    pub(crate) fn unit(
         &self,
         name: String,
         file: &ModelFile,
@@ -206,7 +221,7 @@ impl Requirements {
 
     /// The model file of an IMU that is needed.
     #[must_use]
-    pub fn model_file(&self, imu: &ImuParameters, question: &Question) -> ModelFile {
+    pub(crate) fn model_file(&self, imu: &ImuParameters, question: &Question) -> ModelFile {
         let mut provenance = toml::Table::new();
         let mut put = |key: &str, value: toml::Value| provenance.insert(key.to_owned(), value);
         put("program", PROGRAM.into());
@@ -249,7 +264,7 @@ impl Requirements {
 
 /// A unit to be ranked.
 #[derive(Debug, Clone)]
-pub struct CatalogueUnit {
+pub(crate) struct CatalogueUnit {
     /// Its name.
     pub name: String,
     /// At the rate of the IMU.

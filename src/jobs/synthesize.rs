@@ -5,10 +5,10 @@ use crate::formats::atomic::{AtomicDir, Claim, Existing, Found, claim_directory}
 use crate::formats::model_file::ModelFile;
 use crate::formats::recordings::{FileFormat, is_recording};
 use crate::formats::{FileError, Place, Setting};
-use crate::imu::Channel;
-use crate::noise::contamination::Contamination;
-use crate::noise::{Model, ReplicateError, VirtualImu};
 use crate::report::{self, Input};
+use nav_sim_signal::imu::Channel;
+use nav_sim_signal::noise::contamination::Contamination;
+use nav_sim_signal::noise::{Model, ReplicateError, VirtualImu};
 use rayon::prelude::*;
 use serde_json::{Map, Value, json};
 use std::fs::File;

@@ -1,12 +1,12 @@
 //! The smallest factors on a model that make its filter honest for another truth.
 
-use crate::ekf::{BeliefError, FilterStates};
 use crate::formats::model_file::{ModelFile, PROGRAM};
-use crate::noise::Model;
 use crate::report::{FactorEntry, Input, TuneResult};
-use crate::scenario::Scenario;
-use crate::sensors::outage::Outage;
-use crate::simulation::lincov::{Aim, Factor, Honesty, Per, Task, Track, scaled};
+use nav_sim_navigation::ekf::{BeliefError, FilterStates};
+use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::sensors::outage::Outage;
+use nav_sim_navigation::simulation::lincov::{Aim, Factor, Honesty, Per, Task, Track, scaled};
+use nav_sim_signal::noise::Model;
 
 /// What is tuned, for what, and where. Models are at the rate of the IMU.
 pub(crate) struct TuneInputs<'a> {

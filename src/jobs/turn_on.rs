@@ -1,9 +1,9 @@
 //! The constant bias of a switching-on that a model file states, used where settings are silent.
 
-use crate::ekf::InitialSettings;
 use crate::formats::model_file::ModelFile;
-use crate::imu::Sensor;
-use crate::sensors::defects::ImuSettings;
+use nav_sim_navigation::ekf::InitialSettings;
+use nav_sim_navigation::sensors::defects::ImuSettings;
+use nav_sim_signal::imu::Sensor;
 
 /// Lets the filter expect the turn-on bias of its model; settings win. What was set.
 pub(crate) fn expect(initial: &mut InitialSettings, file: &ModelFile) -> Vec<(Sensor, f64)> {

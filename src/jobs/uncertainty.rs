@@ -8,13 +8,13 @@
 //! it *believes*: each draw has the filter that knows it, with a state for each process, since the reduction to 15 states
 //! would have to be found anew for each; the interval is carried over as a ratio.
 
-use crate::calibration::derived_interval;
-use crate::ekf::Belief;
 use crate::formats::draws_file::Draws;
-use crate::metrics::{OutageSummary, PerState, horizontal_quantiles};
-use crate::noise::Model;
-use crate::simulation::Experiment;
-use crate::simulation::lincov::{FilterPass, Track, TruthSide};
+use nav_sim_calibration::derived_interval;
+use nav_sim_navigation::ekf::Belief;
+use nav_sim_navigation::metrics::{OutageSummary, PerState, horizontal_quantiles};
+use nav_sim_navigation::simulation::Experiment;
+use nav_sim_navigation::simulation::lincov::{FilterPass, Track, TruthSide};
+use nav_sim_signal::noise::Model;
 use rayon::prelude::*;
 
 /// A covariance analysis that was made.

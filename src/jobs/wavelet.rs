@@ -2,11 +2,11 @@
 
 use super::calibrate::{visit, without_warm_up};
 use super::{JobError, Remarks};
-use crate::calibration::{Replicate, replicates};
 use crate::formats::recordings::ReadOptions;
-use crate::imu::{Channel, Recording};
 use crate::report::{SignalCurves, SignalsFile};
-use crate::wavelet::{Tuning, WaveletError, haar, interval};
+use nav_sim_calibration::{Replicate, replicates};
+use nav_sim_signal::imu::{Channel, Recording};
+use nav_sim_signal::wavelet::{Tuning, WaveletError, haar, interval};
 use rayon::prelude::*;
 use std::path::PathBuf;
 

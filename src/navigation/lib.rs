@@ -1,7 +1,7 @@
 //! From a noise model to navigation errors: trajectories, sensors, strapdown, error-state filter, Monte
 //! Carlo, covariance analysis, metrics.
 //!
-//! Part of [nav-sim](https://docs.rs/nav-sim), which re-exports its modules. The modules are listed in layer
+//! Part of [nav-sim](https://docs.rs/nav-sim), which lists what its users need of it. The modules are listed in layer
 //! order: one names only what stands above it.
 
 #[allow(unused_imports, reason = "sources are named in the documentation")]

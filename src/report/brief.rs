@@ -4,13 +4,13 @@ use super::columns::columns;
 use super::number::readable;
 use super::practical::{PracticalRow, interval, policy, practical_rows};
 use super::turn_on::turn_on_lines;
-use crate::calibration::{
+use crate::export::Quantity;
+use nav_sim_calibration::{
     Diagnosis, Miss, Outcome, Settings, TurnOnSpread, Verdict, advice, axes_remark, duration, percent,
     shares, signals, tau_s,
 };
-use crate::export::Quantity;
-use crate::imu::Sensor;
-use crate::noise::{Parameter, Process};
+use nav_sim_signal::imu::Sensor;
+use nav_sim_signal::noise::{Parameter, Process};
 
 /// With more fits than this each has one line.
 const MOST: usize = 2;
@@ -241,7 +241,7 @@ fn figure(process: &Process, sensor: Sensor) -> Option<Figure> {
 }
 
 /// Scales at which a process is the largest part of the wavelet variance.
-fn governs(share: &crate::calibration::Share, rate_hz: f64) -> String {
+fn governs(share: &nav_sim_calibration::Share, rate_hz: f64) -> String {
     let at = |level: u32| duration(tau_s(level, rate_hz));
     match (share.leads.first(), share.leads.last()) {
         (Some(first), Some(last)) if first == last => at(*first),

@@ -2,8 +2,8 @@
 
 use super::number::{readable, window};
 use crate::choose::{Influence, Mean, Placed, Ranking};
-use crate::sensors::outage::Outage;
-use crate::simulation::NEES_DOF;
+use nav_sim_navigation::sensors::outage::Outage;
+use nav_sim_navigation::simulation::NEES_DOF;
 use serde::Serialize;
 
 /// Share of the largest influence from which on a scale decides.

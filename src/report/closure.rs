@@ -1,8 +1,8 @@
 //! Whether a vehicle could move along a trajectory and navigation closes on it, in words and as JSON.
 
-use crate::closure::{Bounds, Closure};
-use crate::trajectory::Trajectory;
-use crate::trajectory::plausibility::{Excess, Quantity};
+use nav_sim_navigation::closure::{Bounds, Closure};
+use nav_sim_navigation::trajectory::Trajectory;
+use nav_sim_navigation::trajectory::plausibility::{Excess, Quantity};
 use serde::Serialize;
 
 /// What was found.
@@ -38,7 +38,7 @@ struct Closed {
 }
 
 impl TrajectoryCheck {
-    /// `largest` and `beyond` are of [`examine`](crate::trajectory::plausibility::examine).
+    /// `largest` and `beyond` are of [`examine`](nav_sim_navigation::trajectory::plausibility::examine).
     pub(crate) fn new(
         (file, warnings): (String, Vec<String>),
         trajectory: &Trajectory,

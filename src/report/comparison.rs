@@ -2,8 +2,8 @@
 
 use super::short::short_names;
 use super::verdict::{verdict_in_short, verdict_word};
-use crate::metrics::{OutageComparison, Verdict, VerdictKind};
-use crate::simulation::REPORTED_NAMES;
+use nav_sim_navigation::metrics::{OutageComparison, Verdict, VerdictKind};
+use nav_sim_navigation::simulation::REPORTED_NAMES;
 use serde::Serialize;
 
 /// Estimators by the names their run directories end in.
@@ -11,7 +11,7 @@ const ESTIMATORS: [&str; 6] = ["sr-awv", "dr-awv", "awv", "rgmwm", "gmwm", "avlr
 
 /// Where a run stands in Table I: its row (scenario) and column (estimator, may be empty).
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Label {
+pub(crate) struct Label {
     /// Row.
     pub scenario: String,
     /// Column.
@@ -44,7 +44,7 @@ impl Label {
 
 /// A candidate and what the comparison with the reference found.
 #[derive(Debug, Clone, PartialEq)]
-pub struct CandidateResult {
+pub(crate) struct CandidateResult {
     /// Run directory.
     pub run: String,
     /// Its place in the table.
@@ -59,7 +59,7 @@ pub struct CandidateResult {
 
 /// What `comparison.json` holds.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ComparisonFile {
+pub(crate) struct ComparisonFile {
     /// Layout version.
     pub schema_version: u32,
     /// Run directory of the reference.
@@ -76,7 +76,7 @@ pub struct ComparisonFile {
 
 /// Whether the filter of a run is as good as it believes.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct VerdictRow {
+pub(crate) struct VerdictRow {
     /// Run directory.
     pub run: String,
     /// The verdict.
@@ -86,7 +86,7 @@ pub struct VerdictRow {
 
 /// One state of one run in one outage, against the reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Row {
+pub(crate) struct Row {
     /// Run directory.
     pub run: String,
     /// Outage, from 0.
@@ -109,7 +109,7 @@ pub struct Row {
 
 /// Consistency of one run in one outage, beside the reference's.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ConsistencyRow {
+pub(crate) struct ConsistencyRow {
     /// Run directory.
     pub run: String,
     /// Outage, from 0.

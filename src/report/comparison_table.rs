@@ -3,8 +3,8 @@
 use super::comparison::{CandidateResult, Label, in_order};
 use super::number::{readable, window};
 use super::short::short_names;
-use crate::metrics::RatioError;
-use crate::simulation::REPORTED_NAMES;
+use nav_sim_navigation::metrics::RatioError;
+use nav_sim_navigation::simulation::REPORTED_NAMES;
 
 /// The paper's Table I: rows scenario × outage, columns state × estimator; each cell the signed mean ratio
 /// error with half its 95 % interval, and in brackets the mean of the absolute ratio error (%). The first
@@ -117,7 +117,7 @@ fn signed(error: &RatioError) -> String {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::metrics::{OutageComparison, StateRatio, Verdict};
+    use nav_sim_navigation::metrics::{OutageComparison, StateRatio, Verdict};
 
     pub(in crate::report) fn candidate(run: &str, pct: f64, is_reference: bool) -> CandidateResult {
         let error = RatioError { pct, ci95_pct: [pct - 0.5, pct + 0.5] };

@@ -1,8 +1,8 @@
 //! Wavelet-variance curves as JSON: of signals (`wv`), and of fits (`<model>.wv.json`).
 
-use crate::calibration::{Estimator, Group, Outcome, Replicate, Settings, implied, tau_s};
-use crate::imu::Channel;
-use crate::wavelet::interval;
+use nav_sim_calibration::{Estimator, Group, Outcome, Replicate, Settings, implied, tau_s};
+use nav_sim_signal::imu::Channel;
+use nav_sim_signal::wavelet::interval;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

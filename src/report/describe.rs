@@ -2,13 +2,13 @@
 
 use super::fits::CandidateEntry;
 use super::practical::{policy, practical_rows};
-use crate::calibration::{
+use nav_sim_calibration::{
     ALIKE_LEVEL, Estimator, Goodness, Inference, LevelSpread, Outcome, Ranking, Settings, Share,
     correlation_time_s, duration, percent, reasons, shares, signals, tau_s, undetermined,
 };
-use crate::imu::Sensor;
-use crate::noise::{Composite, Process};
-use crate::units::DEG;
+use nav_sim_signal::imu::Sensor;
+use nav_sim_signal::noise::{Composite, Process};
+use nav_sim_signal::units::DEG;
 
 /// A fit in words: a head line, a line for each process, how sure the optimum is, the remarks.
 pub(crate) fn describe(outcome: &Outcome, settings: &Settings) -> String {

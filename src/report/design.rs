@@ -5,7 +5,7 @@ use serde::Serialize;
 
 /// What so many recordings, so long each, would tell.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Design {
+pub(crate) struct Design {
     /// Recordings.
     pub recordings: usize,
     /// Length of each (h).
@@ -18,7 +18,7 @@ pub struct Design {
 
 /// The interval that a parameter would have.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct DesignedParameter {
+pub(crate) struct DesignedParameter {
     /// `accel`, or `accel.x` alone.
     pub signals: String,
     /// `WN sigma2`, `AR1_1 correlation_time_s`.
@@ -43,7 +43,7 @@ impl DesignedParameter {
 
 /// The interval that the horizontal p95 at an outage's end would have.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct DesignedQuantile {
+pub(crate) struct DesignedQuantile {
     /// First instant without a fix (s).
     pub start_s: f64,
     /// First instant with a fix again (s).

@@ -1,7 +1,7 @@
 //! Fixes of an antenna elsewhere, or of an earlier time, in words.
 
-use crate::fusion::Displaced;
 use glam::DVec3;
+use nav_sim_navigation::fusion::Displaced;
 
 /// `the fixes seem to be 0.107 ± 0.002 s late: with --gnss-delay=0.107 the NIS is 1.01 per component, now 1.95`
 #[must_use]

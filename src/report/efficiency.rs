@@ -2,13 +2,13 @@
 //! the paper's Figure 2.
 
 use super::number::shortest;
-use crate::efficiency::Accuracy;
 use comfy_table::{ContentArrangement, Table, presets};
+use nav_sim_calibration::efficiency::Accuracy;
 use serde::Serialize;
 
 /// What a study found.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct EfficiencyFile {
+pub(crate) struct EfficiencyFile {
     /// Version of this layout.
     pub schema_version: u32,
     /// Sets of replicates, H.
@@ -21,7 +21,7 @@ pub struct EfficiencyFile {
 
 /// One estimator's accuracy in one parameter and scenario.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct EfficiencyRow {
+pub(crate) struct EfficiencyRow {
     /// Name of the contamination.
     pub scenario: String,
     /// The estimator.
@@ -103,7 +103,7 @@ fn signed(x: f64) -> String {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::efficiency::accuracy;
+    use nav_sim_calibration::efficiency::accuracy;
 
     /// A file of estimates of one parameter whose truth is 2: scenario, estimator, parameter of each row.
     pub(in crate::report) fn file(estimates: &[f64], rows: &[[&str; 3]]) -> EfficiencyFile {

@@ -1,12 +1,12 @@
 //! Fitted models as JSON.
 
 use super::turn_on::TurnOnEntry;
-use crate::calibration::{
+use crate::export::parameters_json;
+use nav_sim_calibration::{
     Candidate, Diagnosis, Goodness, Indistinct, LevelSpread, Miss, Outcome, ParameterInterval, Practical,
     Ranking, Settings, TurnOnSpread, reasons, tau_s, undetermined,
 };
-use crate::export::parameters_json;
-use crate::noise::{Composite, ParameterRef, Process};
+use nav_sim_signal::noise::{Composite, ParameterRef, Process};
 use serde::Serialize;
 use serde_json::{Map, Value};
 

@@ -3,11 +3,11 @@
 use super::number::{seconds, window};
 use super::page::{Cell, Table, Tone};
 use super::smoothed::{Reference, Smoothed};
-use crate::ekf::InitialSettings;
-use crate::frames::{NavState, RollPitchYaw, wrap_angle};
-use crate::fusion::mounting::Mounting;
-use crate::fusion::{Assessment, Drift, Outcome, Solution, Start, Verdict};
-use crate::units::DEG;
+use nav_sim_navigation::ekf::InitialSettings;
+use nav_sim_navigation::frames::{NavState, RollPitchYaw, wrap_angle};
+use nav_sim_navigation::fusion::mounting::Mounting;
+use nav_sim_navigation::fusion::{Assessment, Drift, Outcome, Solution, Start, Verdict};
+use nav_sim_signal::units::DEG;
 use serde::Serialize;
 
 pub(super) const STATE: [&str; 9] =
@@ -115,7 +115,7 @@ impl FusionSummary {
         imu_rate_hz: f64,
         [filter_states, turn_on_states]: [usize; 2],
     ) -> Self {
-        let outage = |o: &crate::fusion::OutageDrift| OutageRow {
+        let outage = |o: &nav_sim_navigation::fusion::OutageDrift| OutageRow {
             start_s: o.outage.start_s,
             end_s: o.outage.end_s,
             fixes_withheld: o.withheld,

@@ -6,11 +6,11 @@ use super::manifest::FusionManifest;
 use super::number::shortest;
 use super::pages::fusion_page;
 use super::run_directory::OutputFile;
-use crate::earth::radii;
-use crate::frames::wrap_angle;
-use crate::fusion::{Row, Solution, Use};
-use crate::simulation::{BIAS_NAMES, REPORTED_NAMES};
-use crate::units::DEG;
+use nav_sim_navigation::earth::radii;
+use nav_sim_navigation::frames::wrap_angle;
+use nav_sim_navigation::fusion::{Row, Solution, Use};
+use nav_sim_navigation::simulation::{BIAS_NAMES, REPORTED_NAMES};
+use nav_sim_signal::units::DEG;
 use std::fmt::Write as _;
 
 /// Names of the files of a fusion directory, the manifest last. The smoothed ones are there where that was asked for.

@@ -1,10 +1,10 @@
 //! `manifest.json`: all it takes to know where the directory of a run or a fusion came from, and to make it again.
 
-use crate::ekf::{FilterStates, InitialSettings};
-use crate::fusion::Settings;
-use crate::fusion::mounting::Mounted;
-use crate::gnss::FixSigma;
-use crate::scenario::Scenario;
+use nav_sim_navigation::ekf::{FilterStates, InitialSettings};
+use nav_sim_navigation::fusion::Settings;
+use nav_sim_navigation::fusion::mounting::Mounted;
+use nav_sim_navigation::gnss::FixSigma;
+use nav_sim_navigation::scenario::Scenario;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -66,7 +66,7 @@ pub(crate) use pages::{
 };
 pub(crate) use recording::{gnss_csv, imu_csv, initial_toml};
 pub(crate) use replicates::describe_replicates;
-pub use run_directory::run_directory;
+pub use run_directory::{OutputFile, run_directory};
 pub(crate) use run_directory::{RUN_FILES, json, summary_json};
 pub(crate) use short::short_names;
 pub(crate) use signals::{intervals_note, signal_rows, signals_csv, signals_digest, signals_per_file};

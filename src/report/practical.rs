@@ -1,10 +1,10 @@
 //! N, B and K of a fit, as the terminal and the page show them.
 
 use super::number::readable;
-use crate::calibration::{Practical, duration};
 use crate::export::Quantity;
-use crate::imu::Sensor;
-use crate::noise::practical::Horizon;
+use nav_sim_calibration::{Practical, duration};
+use nav_sim_signal::imu::Sensor;
+use nav_sim_signal::noise::practical::Horizon;
 
 /// A parameter in the unit of data sheets.
 pub(super) struct PracticalRow {

@@ -1,10 +1,10 @@
 //! A simulated recording as the files that `fuse` reads.
 
-use crate::ekf::InitialSettings;
-use crate::frames::{NavState, RollPitchYaw, wrap_angle};
-use crate::gnss::GnssFix;
-use crate::imu::{ImuIncrement, Sensor};
-use crate::units::DEG;
+use nav_sim_navigation::ekf::InitialSettings;
+use nav_sim_navigation::frames::{NavState, RollPitchYaw, wrap_angle};
+use nav_sim_navigation::gnss::GnssFix;
+use nav_sim_signal::imu::{ImuIncrement, Sensor};
+use nav_sim_signal::units::DEG;
 use std::fmt::Write as _;
 
 /// `imu.csv`: mean rates over the interval that ends at the time given.

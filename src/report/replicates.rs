@@ -1,7 +1,7 @@
 //! Which recordings are abnormal, as words.
 
-use crate::calibration::{Diagnosis, advice, effects};
-use crate::imu::Sensor;
+use nav_sim_calibration::{Diagnosis, advice, effects};
+use nav_sim_signal::imu::Sensor;
 
 /// What the recordings of each sensor say of one another, in words; nothing of a single one.
 pub(crate) fn describe_replicates(diagnoses: &[Diagnosis]) -> Vec<String> {

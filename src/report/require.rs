@@ -1,8 +1,10 @@
 //! What a limit needs of an IMU, and what a given one makes of it, on one screen and as JSON.
 
 use super::number::{readable, seconds, window};
-use crate::require::{Answer, GroupMargin, IMU_PARAMETERS, ImuParameters, IsoDrift, Limit, Margins, Worst};
-use crate::sensors::outage::Outage;
+use nav_sim_navigation::require::{
+    Answer, GroupMargin, IMU_PARAMETERS, ImuParameters, IsoDrift, Limit, Margins, Worst,
+};
+use nav_sim_navigation::sensors::outage::Outage;
 use serde_json::{Value, json};
 
 /// Lengths of an outage in the table of units (s).
@@ -10,7 +12,7 @@ pub(crate) const CURVE_S: [u32; 7] = [1, 3, 10, 30, 60, 120, 300];
 
 /// The IMU that a limit needs.
 #[derive(Debug, Clone)]
-pub struct NeededImu {
+pub(crate) struct NeededImu {
     /// With equal shares.
     pub imu: ImuParameters,
     /// The shares at the limit, and that of GNSS and start.
@@ -25,7 +27,7 @@ pub struct NeededImu {
 
 /// The longest outage that keeps the limits.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Longest {
+pub(crate) enum Longest {
     /// So long (s).
     Seconds(f64),
     /// All that was looked at (s).
@@ -34,7 +36,7 @@ pub enum Longest {
 
 /// What a model bridges.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Bridged {
+pub(crate) struct Bridged {
     /// The longest outage within the limits.
     pub longest: Longest,
     /// The quantity of each limit, at its worst place, after [`CURVE_S`]; none where the trajectory is too short.
@@ -54,7 +56,7 @@ fn points_json(curve: &[Option<f64>; CURVE_S.len()]) -> Vec<Value> {
 
 /// A unit of a catalogue.
 #[derive(Debug, Clone)]
-pub struct RankedUnit {
+pub(crate) struct RankedUnit {
     /// Its name.
     pub name: String,
     /// Figures that its datasheet does not state: they count as zero.
@@ -81,7 +83,7 @@ impl RankedUnit {
 
 /// What was asked, and where.
 #[derive(Debug, Clone)]
-pub struct Question {
+pub(crate) struct Question {
     /// The limits.
     pub limits: Vec<Limit>,
     /// The places of the outage.

@@ -4,8 +4,8 @@ use super::manifest::Manifest;
 use super::pages::run_page;
 use super::tables::{epochs_csv, fan_csv, runs_csv};
 use super::trajectory::TrajectorySeries;
-use crate::metrics::{EpochMetrics, FanEpoch, Summary};
-use crate::simulation::RunResult;
+use nav_sim_navigation::metrics::{EpochMetrics, FanEpoch, Summary};
+use nav_sim_navigation::simulation::RunResult;
 
 /// A file to be written.
 pub struct OutputFile<'a> {
@@ -87,8 +87,8 @@ pub(crate) fn json(value: &impl serde::Serialize) -> String {
 mod tests {
     use super::super::{Input, ModelNote, sample};
     use super::*;
-    use crate::metrics;
-    use crate::scenario::Scenario;
+    use nav_sim_navigation::metrics;
+    use nav_sim_navigation::scenario::Scenario;
 
     /// Names and texts.
     fn files() -> Vec<(&'static str, String)> {

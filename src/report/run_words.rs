@@ -3,9 +3,9 @@
 use super::markdown::markdown_table as table;
 use super::number::{readable, window};
 use super::verdict::verdict_line;
-use crate::metrics::{Agreement, Budget, Met, OutageSummary, PerState, Summary};
-use crate::scenario::Method;
-use crate::simulation::REPORTED_NAMES;
+use nav_sim_navigation::metrics::{Agreement, Budget, Met, OutageSummary, PerState, Summary};
+use nav_sim_navigation::scenario::Method;
+use nav_sim_navigation::simulation::REPORTED_NAMES;
 
 /// The verdict in words.
 pub(crate) fn verdict(summary: &Summary) -> String {

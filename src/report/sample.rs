@@ -1,6 +1,6 @@
 //! A small made-up result for the tests of this room.
 
-use crate::simulation::{EpochSums, OutageRecord, RunRecord, RunResult};
+use nav_sim_navigation::simulation::{EpochSums, OutageRecord, RunRecord, RunResult};
 
 /// Four runs of 12 epochs, one outage from 4 to 8 s, errors as large as the filter believes.
 pub(crate) fn result() -> RunResult {

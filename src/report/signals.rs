@@ -3,8 +3,8 @@
 use super::curves::{Band, SignalCurves, SignalsFile};
 use super::number::{shortest, squared};
 use super::short::short_names;
-use crate::calibration::{duration, median};
-use crate::wavelet::Tuning;
+use nav_sim_calibration::{duration, median};
+use nav_sim_signal::wavelet::Tuning;
 
 /// Degrees of freedom from which on robust over classical tells of outliers rather than of chance.
 const LEAST: f64 = 100.0;
@@ -210,8 +210,8 @@ fn least_ratio(ratios: &[Ratio]) -> Option<(f64, &'static str)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rng::Generator;
-    use crate::wavelet::{Convention, interval};
+    use nav_sim_signal::rng::Generator;
+    use nav_sim_signal::wavelet::{Convention, interval};
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
 
@@ -259,7 +259,7 @@ mod tests {
             let mut generator = Generator::seed_from_u64(seed);
             let mut signal: Vec<f64> = (0..4096).map(|_| generator.sample(StandardNormal)).collect();
             signal.iter_mut().step_by(50).take(outliers).for_each(|x| *x *= 10.0);
-            let (classical, robust) = crate::wavelet::both(&signal, 8, &tuning).unwrap();
+            let (classical, robust) = nav_sim_signal::wavelet::both(&signal, 8, &tuning).unwrap();
             let ratios: Vec<Ratio> = (1..=8_u32)
                 .map(|level| (level, interval::edof_eta3(4096, level)))
                 .filter(|(_, edof)| *edof >= LEAST)

@@ -2,9 +2,9 @@
 
 use super::number::window;
 use super::page::{Cell, Table};
-use crate::fusion::{Confidence, FromReference, SmoothedOutcome, Verdict};
-use crate::metrics::PerState;
-use crate::simulation::REPORTED_NAMES;
+use nav_sim_navigation::fusion::{Confidence, FromReference, SmoothedOutcome, Verdict};
+use nav_sim_navigation::metrics::PerState;
+use nav_sim_navigation::simulation::REPORTED_NAMES;
 use serde::Serialize;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]

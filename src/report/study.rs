@@ -5,8 +5,8 @@ use super::comparison::{CandidateResult, Label};
 use super::comparison_table::table_rows;
 use super::number::{readable, window};
 use super::verdict::{state_in_words, verdict_word};
-use crate::metrics::{self, EpochMetrics, Measured, OutageComparison, OutageMetrics, Verdict};
-use crate::simulation::{BIAS_NAMES, REPORTED, REPORTED_NAMES};
+use nav_sim_navigation::metrics::{self, EpochMetrics, Measured, OutageComparison, OutageMetrics, Verdict};
+use nav_sim_navigation::simulation::{BIAS_NAMES, REPORTED, REPORTED_NAMES};
 
 /// A value of a table.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,8 +1,8 @@
 //! `epochs.csv`, `fan.csv` and `runs.csv` of a run directory.
 
 use super::number::shortest;
-use crate::metrics::{EpochMetrics, FAN_LEVELS, FanEpoch, PerState};
-use crate::simulation::{BIAS_NAMES, OutageRecord, REPORTED, REPORTED_NAMES, RunResult};
+use nav_sim_navigation::metrics::{EpochMetrics, FAN_LEVELS, FanEpoch, PerState};
+use nav_sim_navigation::simulation::{BIAS_NAMES, OutageRecord, REPORTED, REPORTED_NAMES, RunResult};
 
 const EPOCH_ENDS: [&str; 4] = ["mean_pos_err_m", "mean_att_err_deg", "nees", "coverage"];
 
@@ -20,7 +20,7 @@ fn epoch_columns() -> Vec<String> {
 
 /// `epochs.csv`: one row a reporting epoch (1 Hz), means over runs.
 pub(crate) fn epochs_csv(epochs: &[EpochMetrics]) -> String {
-    let values = |all: &PerState<crate::metrics::Estimate>| all.0.map(|e| shortest(e.value));
+    let values = |all: &PerState<nav_sim_navigation::metrics::Estimate>| all.0.map(|e| shortest(e.value));
     let row = |e: &EpochMetrics| {
         let mut row = vec![shortest(e.t_s), u8::from(e.gnss).to_string()];
         row.extend([&e.asee, &e.rmse, &e.bias].into_iter().flat_map(values));

@@ -1,10 +1,10 @@
 //! A trajectory in pictures: map, height, speed, attitude, outages marked.
 
 use super::page::{Axis, Chart, Colour, Mark, Panel, Series, svg};
-use crate::earth::ned_difference;
-use crate::frames::RollPitchYaw;
-use crate::trajectory::Trajectory;
-use crate::units::DEG;
+use nav_sim_navigation::earth::ned_difference;
+use nav_sim_navigation::frames::RollPitchYaw;
+use nav_sim_navigation::trajectory::Trajectory;
+use nav_sim_signal::units::DEG;
 
 /// A trajectory in samples: one value an instant in every list.
 #[derive(Debug, Clone, Default, PartialEq)]

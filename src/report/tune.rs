@@ -1,10 +1,10 @@
 //! The tuning of a model, on one screen and as JSON.
 
 use super::number::{readable, seconds};
-use crate::ekf::FilterStates;
-use crate::metrics::PerState;
-use crate::simulation::REPORTED_NAMES;
-use crate::simulation::lincov::{Factor, Honesty};
+use nav_sim_navigation::ekf::FilterStates;
+use nav_sim_navigation::metrics::PerState;
+use nav_sim_navigation::simulation::REPORTED_NAMES;
+use nav_sim_navigation::simulation::lincov::{Factor, Honesty};
 use serde::Serialize;
 
 /// A deviation of the NEES or of a ratio from what is right that is not worth a word.
@@ -295,7 +295,7 @@ struct EndEntry {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::imu::Sensor;
+    use nav_sim_signal::imu::Sensor;
 
     fn honesty(ratio: f64, nees: f64) -> Honesty {
         let (end_s, rmse_end) = (vec![90.0], vec![[1.0; 9]]);

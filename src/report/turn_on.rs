@@ -1,7 +1,7 @@
 //! What the means of recordings say of a turn-on bias, in words and as JSON.
 
 use super::number::readable;
-use crate::calibration::{MeansOfAxis, TURN_ON_LEVEL, TurnOnFinding, TurnOnSpread};
+use nav_sim_calibration::{MeansOfAxis, TURN_ON_LEVEL, TurnOnFinding, TurnOnSpread};
 use serde::Serialize;
 
 /// What the means of one sensor say, by the model of one estimator.

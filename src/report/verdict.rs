@@ -1,7 +1,7 @@
 //! Verdicts in words.
 
 use super::number::{readable, window};
-use crate::metrics::{ALL_STATES, StateName, Verdict, VerdictKind};
+use nav_sim_navigation::metrics::{ALL_STATES, StateName, Verdict, VerdictKind};
 
 /// One line: the verdict, by how much and where, the figures it rests on. `outages` are those of the
 /// experiment (start, end) in seconds; `runs` and `diverged` count its runs.
@@ -98,7 +98,7 @@ pub(crate) const fn verdict_word(kind: VerdictKind) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulation::{OutageRecord, RunRecord};
+    use nav_sim_navigation::simulation::{OutageRecord, RunRecord};
 
     /// Runs whose errors are `scale` times what the filter believes, in every state and at every time.
     fn verdict(runs: u64, scale: f64) -> Verdict {

@@ -1,7 +1,7 @@
 //! Recordings that do not begin as they go on, in words.
 
-use crate::calibration::{Change, WarmUp, duration, tau_s};
-use crate::imu::Channel;
+use nav_sim_calibration::{Change, WarmUp, duration, tau_s};
+use nav_sim_signal::imu::Channel;
 
 /// A recording that does not begin as it goes on.
 #[derive(Debug, Clone, PartialEq)]

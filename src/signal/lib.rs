@@ -1,6 +1,6 @@
 //! Signals of an inertial sensor: noise processes and models, their synthesis, and the wavelet variance.
 //!
-//! Part of [nav-sim](https://docs.rs/nav-sim), which re-exports its modules; calibration and navigation both
+//! Part of [nav-sim](https://docs.rs/nav-sim), which lists what its users need of it; calibration and navigation both
 //! stand on it and never import each other.
 //! The modules are listed in layer order: one names only what stands above it.
 

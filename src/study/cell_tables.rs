@@ -9,9 +9,9 @@ use super::planned::Planned;
 use super::sums::CellSums;
 use super::unit::{Finding, UnitResult};
 use super::unit_file::{self, UnitFileError};
-use crate::metrics::{self, EpochMetrics, Measured, OutageComparison};
 use crate::report::{self, ColumnResult, Label, ShownCell, ShownColumn, TableRow};
-use crate::simulation::RunRecord;
+use nav_sim_navigation::metrics::{self, EpochMetrics, Measured, OutageComparison};
+use nav_sim_navigation::simulation::RunRecord;
 
 /// What a cell contributes.
 pub(super) struct CellTables {

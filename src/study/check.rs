@@ -3,10 +3,10 @@
 use super::description::{CalibrateStep, Study, Synthesis};
 use super::error::DescriptionError;
 use super::rules::{exactly_one, unique};
-use crate::calibration::Estimator;
-use crate::imu::MAX_RATE_HZ;
-use crate::scenario::{MAX_RUNS, Method};
-use crate::wavelet::Tuning;
+use nav_sim_calibration::Estimator;
+use nav_sim_navigation::scenario::{MAX_RUNS, Method};
+use nav_sim_signal::imu::MAX_RATE_HZ;
+use nav_sim_signal::wavelet::Tuning;
 use std::path::PathBuf;
 
 impl Study {

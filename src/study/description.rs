@@ -3,13 +3,13 @@
 use super::error::DescriptionError;
 use super::rules::unique;
 use super::sweep::{OutageSet, OutagesEntry, expand};
-use crate::calibration::{Estimator, ModelSpec, Pool, Weighting};
-use crate::ekf::FilterStates;
-use crate::imu::MAX_RATE_HZ;
-use crate::scenario::{MAX_RUNS, Method, Scenario};
-use crate::sensors::gnss::GnssSettings;
-use crate::units::Positive;
-use crate::wavelet::{Convention, Tuning};
+use nav_sim_calibration::{Estimator, ModelSpec, Pool, Weighting};
+use nav_sim_navigation::ekf::FilterStates;
+use nav_sim_navigation::scenario::{MAX_RUNS, Method, Scenario};
+use nav_sim_navigation::sensors::gnss::GnssSettings;
+use nav_sim_signal::imu::MAX_RATE_HZ;
+use nav_sim_signal::units::Positive;
+use nav_sim_signal::wavelet::{Convention, Tuning};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 /// A study. Every list is an axis of the grid; the study is their product.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Study {
+pub(crate) struct Study {
     /// Layout version: 1.
     #[serde(default = "one")]
     #[schemars(range(min = 1, max = 1))]
@@ -86,7 +86,7 @@ fn default_metrics() -> Vec<Metric> {
 /// What is kept of the runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Metric {
+pub(crate) enum Metric {
     /// Errors and standard deviations in and after each outage (always there).
     Outages,
     /// Ratios to the reference, NEES and coverage during outages: sums at the epochs of outages.
@@ -98,7 +98,7 @@ pub enum Metric {
 /// `[[trajectory]]`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct TrajectoryEntry {
+pub(crate) struct TrajectoryEntry {
     /// Name in the results (default: the file's).
     #[serde(default)]
     pub name: String,
@@ -109,7 +109,7 @@ pub struct TrajectoryEntry {
 /// `[[truth]]`: one of `model`, `recordings`, `synthesize`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct TruthEntry {
+pub(crate) struct TruthEntry {
     /// Name in the results (default: that of the file).
     #[serde(default)]
     pub name: String,
@@ -134,7 +134,7 @@ pub struct TruthEntry {
 /// `[[candidate]]`: one of `model`, `calibrate`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct CandidateEntry {
+pub(crate) struct CandidateEntry {
     /// Name in the results (default: that of the file). A calibration with several estimators makes
     /// several candidates, `name/estimator`.
     #[serde(default)]
@@ -150,7 +150,7 @@ pub struct CandidateEntry {
 /// Recordings of a virtual IMU.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Synthesis {
+pub(crate) struct Synthesis {
     /// Model file, with `[spread]` if `spread` is wanted.
     pub model: PathBuf,
     /// How many recordings.
@@ -192,7 +192,7 @@ fn all_axes() -> String {
 /// `calibrate = { … }`: recordings or `synthesize`, and how to estimate from them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct CalibrateStep {
+pub(crate) struct CalibrateStep {
     /// Static recordings, or directories of them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub recordings: Vec<PathBuf>,
@@ -248,7 +248,7 @@ const fn efficiency() -> f64 {
 /// `[[scenario]]`: a scenario file or its keys. Of its `[run]` only `coverage_level` is used.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct ScenarioEntry {
+pub(crate) struct ScenarioEntry {
     /// Name in the results (default: that of the file).
     #[serde(default)]
     pub name: String,
@@ -263,7 +263,7 @@ pub struct ScenarioEntry {
 /// `[[gnss]]`: a scenario file whose `[gnss]` is used, or its keys.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct GnssEntry {
+pub(crate) struct GnssEntry {
     /// Name in the results (default: that of the file).
     #[serde(default)]
     pub name: String,

@@ -1,8 +1,8 @@
 //! What is wrong with a study.
 
-use crate::calibration::{CalibrationError, SignalError};
 use crate::formats::suggest::nearest;
-use crate::noise::ReplicateError;
+use nav_sim_calibration::{CalibrationError, SignalError};
+use nav_sim_signal::noise::ReplicateError;
 
 /// A study that means no grid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

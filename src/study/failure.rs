@@ -5,8 +5,8 @@ use super::plan::Unit;
 use super::remedy::Remedy;
 use super::unit_file::UnitFileError;
 use crate::formats::FileError;
-use crate::metrics::ComparisonError;
-use crate::sensors::outage::OutageError;
+use nav_sim_navigation::metrics::ComparisonError;
+use nav_sim_navigation::sensors::outage::OutageError;
 use std::path::PathBuf;
 
 /// Any error, where only its words matter.

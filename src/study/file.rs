@@ -6,9 +6,9 @@ use crate::formats::toml_described::Document;
 use crate::formats::toml_file::Source;
 use crate::formats::{FileError, Kind};
 use crate::formats::{recordings, scenario_file};
-use crate::scenario::Scenario;
-use crate::sensors::gnss::GnssSettings;
-use crate::units::SettingError;
+use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::sensors::gnss::GnssSettings;
+use nav_sim_signal::units::SettingError;
 use std::path::{Path, PathBuf};
 
 /// A study, read, with the scenario and receiver files it names.

@@ -2,14 +2,14 @@
 
 use super::unit::{Finding, UnitResult};
 use super::unit_file::encode;
-use crate::ekf::{Belief, FilterStates};
-use crate::frames::RollPitchYaw;
-use crate::monte_carlo;
-use crate::noise::{Ar1, Composite, Model, Process, Quantization, RandomWalk, White};
-use crate::scenario::Scenario;
-use crate::sensors::imu::Truth;
-use crate::sensors::outage::Outage;
-use crate::trajectory::{Trajectory, TrajectorySample};
+use nav_sim_navigation::ekf::{Belief, FilterStates};
+use nav_sim_navigation::frames::RollPitchYaw;
+use nav_sim_navigation::monte_carlo;
+use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::sensors::imu::Truth;
+use nav_sim_navigation::sensors::outage::Outage;
+use nav_sim_navigation::trajectory::{Trajectory, TrajectorySample};
+use nav_sim_signal::noise::{Ar1, Composite, Model, Process, Quantization, RandomWalk, White};
 
 /// Runs of the experiment.
 const RUNS: u64 = 3;

@@ -4,31 +4,31 @@ use super::description::Study;
 use super::error::DescriptionError;
 use super::rules::MAX_CELLS;
 use super::sweep::OutageSet;
-use crate::calibration::Estimator;
-use crate::ekf::FilterStates;
-use crate::scenario::Scenario;
-use crate::sensors::gnss::GnssSettings;
+use nav_sim_calibration::Estimator;
+use nav_sim_navigation::ekf::FilterStates;
+use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::sensors::gnss::GnssSettings;
 
 /// The axes of a study with what stands on them.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
     /// Names of the trajectories.
-    pub trajectories: Vec<String>,
+    pub(crate) trajectories: Vec<String>,
     /// Names of the truths.
-    pub truths: Vec<String>,
+    pub(crate) truths: Vec<String>,
     /// Scenarios.
-    pub scenarios: Vec<(String, Scenario)>,
+    pub(crate) scenarios: Vec<(String, Scenario)>,
     /// Receivers; none: the scenario's.
-    pub gnss: Vec<(String, Option<GnssSettings>)>,
+    pub(crate) gnss: Vec<(String, Option<GnssSettings>)>,
     /// Outage sets; none: the scenario's.
-    pub outages: Vec<(String, Option<OutageSet>)>,
+    pub(crate) outages: Vec<(String, Option<OutageSet>)>,
     /// What runs on the noise of each cell.
-    pub columns: Vec<Column>,
+    pub(crate) columns: Vec<Column>,
 }
 
 /// A candidate with a filter variant.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Column {
+pub(crate) struct Column {
     /// Position of the candidate.
     pub candidate: usize,
     /// Its name.
@@ -39,7 +39,7 @@ pub struct Column {
 
 /// One experiment of the grid: positions on the axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Cell {
+pub(crate) struct Cell {
     /// Position in the grid.
     pub index: usize,
     /// Trajectory.

@@ -5,7 +5,7 @@ use super::grid::{Cell, Grid};
 use super::planned::Planned;
 use crate::choose::{Contender, Fold, Ranking, Score};
 use crate::report::{ChoiceReport, RankedPlace};
-use crate::sensors::outage::Outage;
+use nav_sim_navigation::sensors::outage::Outage;
 
 /// What the recordings say, where all but the recording is the same.
 struct Place {

@@ -11,7 +11,7 @@ use crate::formats::FileError;
 use crate::formats::atomic::AtomicDir;
 use crate::observer::Observer;
 use crate::report;
-use crate::simulation::REPORTED_NAMES;
+use nav_sim_navigation::simulation::REPORTED_NAMES;
 use rayon::prelude::*;
 use serde_json::json;
 use std::io::ErrorKind;

@@ -1,7 +1,7 @@
 //! Studies: grids of Monte-Carlo experiments, cut into units of work that survive, resume and spread over
 //! machines.
 //!
-//! A [`Study`] is the product of trajectories, truths, scenarios, receivers and outage sets: its *cells*.
+//! A study is the product of trajectories, truths, scenarios, receivers and outage sets: its *cells*.
 //! Candidates (noise models) and filter variants are the *columns* of a cell: all of them run on one draw
 //! of the noise, so that ratios between them are paired. The runs of a cell are cut into *units*; a unit is
 //! named by the hash of everything that decides its bytes (`Plan::unit_id`), so that finished work is
@@ -65,21 +65,17 @@ pub mod unit_file;
 mod unit_words;
 mod verification;
 
-pub use description::{
-    CalibrateStep, CandidateEntry, GnssEntry, Metric, ScenarioEntry, Study, Synthesis, TrajectoryEntry,
-    TruthEntry,
-};
+pub(crate) use description::Study;
 pub use error::{DescriptionError, PrepareError};
 pub use failure::StudyError;
-pub use grid::{Cell, Column, Grid};
+pub use grid::Grid;
 pub use merging::{MergeOptions, MergeReport, merge};
-pub use plan::{Estimate, Kept, Plan, Unit};
+pub use plan::{Plan, Unit};
 pub use planned::{Planned, Status};
 pub use planning::{PlanOptions, PlanReport, Writing, plan};
 pub(crate) use remark::Importance;
 pub use remark::Remark;
 pub(crate) use remedy::Remedy;
 pub use running::{RunOptions, RunReport, Shard, run};
-pub use sweep::{OneOrMany, OutageSet, OutagesEntry, Periodic, Random, Sweep};
 pub use unit::{Finding, UnitResult};
 pub use verification::{VerifyOptions, VerifyReport, verify};

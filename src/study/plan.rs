@@ -3,10 +3,10 @@
 use super::description::{Metric, Study};
 use super::error::DescriptionError;
 use super::grid::{Cell, Grid};
-use crate::lanes::LANES;
 use crate::report::Input;
-use crate::scenario::{Method, Scenario};
-use crate::sensors::gnss::GnssSettings;
+use nav_sim_navigation::lanes::LANES;
+use nav_sim_navigation::scenario::{Method, Scenario};
+use nav_sim_navigation::sensors::gnss::GnssSettings;
 use serde::{Deserialize, Serialize};
 
 /// A plan. It does not hold the units: they follow from it.
@@ -21,7 +21,7 @@ pub struct Plan {
     /// Seed of all random numbers.
     pub seed: u64,
     /// The study, names and defaults filled in.
-    pub study: Study,
+    pub(crate) study: Study,
     /// Scenario files as read (empty: the default).
     pub scenarios: Vec<Scenario>,
     /// Receivers as read (empty: those of the scenarios).
@@ -37,12 +37,12 @@ pub struct Plan {
     /// Runs of a unit, for each trajectory.
     pub unit_runs: Vec<u64>,
     /// What it will take.
-    pub estimate: Estimate,
+    pub(crate) estimate: Estimate,
 }
 
 /// What a probe found.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-pub struct Estimate {
+pub(crate) struct Estimate {
     /// Processor time of one run of a cell, for each trajectory (s).
     pub run_s: Vec<f64>,
     /// Threads that were asked for.
@@ -54,7 +54,7 @@ pub struct Estimate {
 /// What is kept of the sums at epochs; records of runs are always kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Kept {
+pub(crate) enum Kept {
     /// None.
     Runs,
     /// Those of epochs inside outages.
@@ -99,7 +99,7 @@ struct CellKey<'a> {
     trajectory: &'a str,
     truth: &'a str,
     scenario: &'a Scenario,
-    columns: Vec<(&'a str, crate::ekf::FilterStates)>,
+    columns: Vec<(&'a str, nav_sim_navigation::ekf::FilterStates)>,
 }
 
 impl Plan {

@@ -15,12 +15,12 @@ use super::reader::{CANDIDATE_SEED, Reader};
 use super::remark::Remark;
 use super::unit::{UnitResult, compute};
 use super::unit_file;
-use crate::calibration::{Estimator, Outcome};
 use crate::formats::model_file::{self, CalibrationNote};
 use crate::formats::{atomic, hash, input};
-use crate::lanes::LANES;
 use crate::observer::Observer;
 use crate::report::Input;
+use nav_sim_calibration::{Estimator, Outcome};
+use nav_sim_navigation::lanes::LANES;
 use std::collections::HashSet;
 use std::path::Path;
 

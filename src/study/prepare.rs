@@ -2,11 +2,11 @@
 
 use super::description::{CalibrateStep, Synthesis};
 use super::error::PrepareError;
-use crate::calibration::{Outcome, Pool, Settings, Trim, calibrate, grouped, replicates};
-use crate::imu::{Channel, Recording};
-use crate::noise::contamination::Contamination;
-use crate::noise::{Model, Spread, VirtualImu};
-use crate::wavelet::Tuning;
+use nav_sim_calibration::{Outcome, Pool, Settings, Trim, calibrate, grouped, replicates};
+use nav_sim_signal::imu::{Channel, Recording};
+use nav_sim_signal::noise::contamination::Contamination;
+use nav_sim_signal::noise::{Model, Spread, VirtualImu};
+use nav_sim_signal::wavelet::Tuning;
 use rayon::prelude::*;
 
 /// What virtual recordings are made of.

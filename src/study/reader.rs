@@ -8,11 +8,11 @@ use super::remark::Remark;
 use crate::formats::model_file::{self, ModelFile};
 use crate::formats::recordings::{self, ReadOptions};
 use crate::formats::{contamination_file, hash, input, trajectory_file};
-use crate::imu::Recording;
-use crate::noise::Model;
-use crate::noise::contamination::Contamination;
 use crate::observer::Observer;
-use crate::trajectory::Trajectory;
+use nav_sim_navigation::trajectory::Trajectory;
+use nav_sim_signal::imu::Recording;
+use nav_sim_signal::noise::Model;
+use nav_sim_signal::noise::contamination::Contamination;
 use std::path::{Path, PathBuf};
 
 /// What is added to the study's seed for virtual recordings of truths, and of candidates.

@@ -1,6 +1,6 @@
 //! What a caller of the engine is told on the way.
 
-use crate::sensors::outage::OutageRemark;
+use nav_sim_navigation::sensors::outage::OutageRemark;
 use std::path::PathBuf;
 
 /// How much a remark matters.

@@ -8,8 +8,8 @@ use super::planned::Planned;
 use super::remark::Remark;
 use super::unit::compute;
 use super::unit_file;
-use crate::lanes::LANES;
 use crate::observer::Observer;
+use nav_sim_navigation::lanes::LANES;
 use rayon::prelude::*;
 
 /// Units whose position leaves `index` when divided by `count`.

@@ -1,7 +1,7 @@
 //! Units added up to cells.
 
 use super::unit::{Finding, UnitResult};
-use crate::simulation::RunResult;
+use nav_sim_navigation::simulation::RunResult;
 
 /// The sums of a cell as its units come in, in run order.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -47,7 +47,7 @@ fn alike(a: &Finding, b: &Finding) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulation::{EpochSums, RunRecord};
+    use nav_sim_navigation::simulation::{EpochSums, RunRecord};
 
     /// Two runs of one column, from `first`.
     fn unit(first: u64) -> UnitResult {

@@ -3,15 +3,15 @@
 use super::error::DescriptionError;
 use super::rules::{MAX_CELLS, exactly_one};
 use crate::formats::toml_described::OneOrEach;
-use crate::sensors::outage::{Outage, OutagePlan, PeriodicOutages, RandomOutages};
-use crate::units::{Positive, SettingError};
+use nav_sim_navigation::sensors::outage::{Outage, OutagePlan, PeriodicOutages, RandomOutages};
+use nav_sim_signal::units::{Positive, SettingError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A number or a list of numbers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "a number or a list of numbers")]
-pub enum OneOrMany {
+pub(crate) enum OneOrMany {
     /// One.
     One(f64),
     /// Several.
@@ -30,7 +30,7 @@ impl OneOrMany {
 /// A window of each start and duration.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Sweep {
+pub(crate) struct Sweep {
     /// First instants without a fix (s).
     pub start_s: OneOrMany,
     /// Durations (s).
@@ -41,7 +41,7 @@ pub struct Sweep {
 /// Regular outages of each combination.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Periodic {
+pub(crate) struct Periodic {
     /// Start of the first (s).
     pub first_s: OneOrMany,
     /// From one start to the next (s).
@@ -55,7 +55,7 @@ pub struct Periodic {
 /// Random outages of each combination.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Random {
+pub(crate) struct Random {
     /// Outages per hour of time with fixes.
     #[schemars(with = "OneOrEach<PerHour>")]
     pub rate_per_hour: OneOrMany,
@@ -80,7 +80,7 @@ struct PerHour(#[schemars(with = "Positive", range(max = RandomOutages::MOST_PER
 /// of numbers and make one set for each combination.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct OutagesEntry {
+pub(crate) struct OutagesEntry {
     /// Name in the results; a sweep adds its values: `name(300,60)`.
     #[serde(default)]
     pub name: String,
@@ -100,7 +100,7 @@ pub struct OutagesEntry {
 
 /// One outage set.
 #[derive(Debug, Clone, PartialEq)]
-pub struct OutageSet {
+pub(crate) struct OutageSet {
     /// Its name.
     pub name: String,
     /// Its windows.

@@ -3,9 +3,9 @@
 use super::failure::StudyError;
 use super::inputs::Work;
 use super::plan::{Kept, Plan, Unit};
-use crate::metrics::{self, EpochMetrics, Expected, Measured, OutageMetrics};
-use crate::monte_carlo;
-use crate::simulation::{self, RunRecord, RunResult};
+use nav_sim_navigation::metrics::{self, EpochMetrics, Expected, Measured, OutageMetrics};
+use nav_sim_navigation::monte_carlo;
+use nav_sim_navigation::simulation::{self, RunRecord, RunResult};
 
 /// What is found of one column.
 #[derive(Debug, Clone, PartialEq)]

@@ -10,8 +10,8 @@ use super::unit_words::{
     put_epoch, put_expected, put_run, run,
 };
 use crate::formats::{FileError, atomic};
-use crate::metrics::Expected;
-use crate::simulation::RunResult;
+use nav_sim_navigation::metrics::Expected;
+use nav_sim_navigation::simulation::RunResult;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::io;
@@ -272,7 +272,7 @@ fn expected(head: &ColumnHead, words: &mut Words<'_>) -> Expected {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulation::{EpochSums, OutageRecord, RunRecord};
+    use nav_sim_navigation::simulation::{EpochSums, OutageRecord, RunRecord};
 
     fn unit() -> UnitResult {
         let value = |k: usize| (k as f64 + 0.1).sqrt();

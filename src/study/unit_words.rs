@@ -1,7 +1,9 @@
 //! The numbers of a unit file, eight bytes each: integers and floating point, little-endian.
 
-use crate::metrics::{EpochMetrics, Estimate, Expected, OutageMetrics, PerState, Quantile, Reconvergence};
-use crate::simulation::{BIASES, EpochSums, OutageRecord, REPORTED, RunRecord};
+use nav_sim_navigation::metrics::{
+    EpochMetrics, Estimate, Expected, OutageMetrics, PerState, Quantile, Reconvergence,
+};
+use nav_sim_navigation::simulation::{BIASES, EpochSums, OutageRecord, REPORTED, RunRecord};
 
 /// Numbers of an outage record, an epoch, and a run without its outages.
 pub(super) const OUTAGE: usize = 3 * REPORTED + 4;

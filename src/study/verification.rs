@@ -9,7 +9,7 @@ use super::remark::Remark;
 use super::unit::compute;
 use super::unit_file;
 use crate::observer::Observer;
-use crate::rng::StreamKey;
+use nav_sim_signal::rng::StreamKey;
 use rand::seq::IndexedRandom;
 
 /// Which units to compute again.

@@ -2,10 +2,10 @@
 //! says, and never the wrong way round.
 
 use glam::{DQuat, DVec3};
-use nav_sim::earth::{GravityModel, radii};
+use nav_sim::earth::GravityModel;
 use nav_sim::ekf::{Belief, FilterStates};
 use nav_sim::formats::model_file;
-use nav_sim::frames::{RollPitchYaw, wrap_angle};
+use nav_sim::frames::RollPitchYaw;
 use nav_sim::fusion::alignment::{Alignment, coarse};
 use nav_sim::fusion::{Recorded, Settings, Verdict};
 use nav_sim::imu::Sensor;
@@ -17,6 +17,8 @@ use nav_sim::sensors::imu::Truth;
 use nav_sim::sensors::outage::Outage;
 use nav_sim::simulation::{Plan, Recording, record};
 use nav_sim::trajectory::{Trajectory, TrajectorySample};
+use nav_sim_navigation::earth::radii;
+use nav_sim_navigation::frames::wrap_angle;
 use std::path::Path;
 
 const DEG: f64 = std::f64::consts::PI / 180.0;

@@ -2,7 +2,9 @@
 
 use nav_sim::calibration::{Termination, Weighting, fit};
 use nav_sim::noise::{Ar1, Composite, Drift, GaussMarkov, Ma1, Process, Quantization, RandomWalk, White};
-use nav_sim::wavelet::{self, Convention, Curve, Tuning, interval};
+use nav_sim::wavelet;
+use nav_sim::wavelet::{Convention, Curve, Tuning};
+use nav_sim_signal::wavelet::{coefficient_count, interval};
 use serde_json::Value;
 
 fn truth(file: &str) -> Value {
@@ -89,7 +91,7 @@ fn wavelet_variance_of_a_signal() {
         let level = i as u32 + 1;
         let expected = |key: &str| truth[key][i].as_f64().unwrap();
         assert_relative(classical[i], expected("classical"), 1e-12, &format!("classical {level}"));
-        assert_eq!(wavelet::coefficient_count(4096, level) as u64, truth["M"][i].as_u64().unwrap());
+        assert_eq!(coefficient_count(4096, level) as u64, truth["M"][i].as_u64().unwrap());
         let edof = interval::edof_eta3(4096, level);
         assert_relative(edof, expected("edof"), 1e-15, "edof");
         let (low, high) = interval::interval(classical[i], edof, 0.95);

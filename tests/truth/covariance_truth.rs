@@ -1,15 +1,17 @@
 //! The filter's standard deviations against an independent implementation (provenance in tests/data).
 
 use glam::DVec3;
-use nav_sim::earth::{GravityModel, ned_difference};
-use nav_sim::ekf::{Belief, Ekf, FilterStates, Fix, InitialSettings, advance, settle, update};
+use nav_sim::earth::GravityModel;
+use nav_sim::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim::frames::{NavState, RollPitchYaw};
 use nav_sim::imu::ImuSample;
-use nav_sim::lanes::{Lanes, Vec3};
-use nav_sim::noise::continuous::white_sigma2;
 use nav_sim::noise::{Composite, GaussMarkov, Model, Process, White};
-use nav_sim::strapdown::Strapdown;
-use nav_sim::units::{DEG, DEG_PER_HOUR};
+use nav_sim_navigation::earth::ned_difference;
+use nav_sim_navigation::ekf::{Ekf, Fix, advance, settle, update};
+use nav_sim_navigation::lanes::{Lanes, Vec3};
+use nav_sim_navigation::strapdown::Strapdown;
+use nav_sim_signal::noise::continuous::white_sigma2;
+use nav_sim_signal::units::{DEG, DEG_PER_HOUR};
 use std::io::Read;
 use std::path::Path;
 

@@ -1,10 +1,11 @@
 //! What estimates are off by in the mean. Quantization noise in robust fits: its wavelet coefficients are not Gaussian, and
 //! the estimators know by how much their variance is read high. Last scales: what is low by chance does not rule the fit.
 
-use nav_sim::calibration::{Estimator, ModelSpec, Replicate, Trim, Weighting, average, fit, implied, trend};
+use nav_sim::calibration::{Estimator, ModelSpec, Replicate, Trim, Weighting, average, fit, implied};
 use nav_sim::noise::{Ar1, Composite, Process, Quantization, RandomWalk, Synthesizer, White};
 use nav_sim::rng::StreamKey;
 use nav_sim::wavelet::{Convention, Curve, Tuning, both};
+use nav_sim_calibration::trend;
 use rayon::prelude::*;
 
 fn tuning() -> Tuning {

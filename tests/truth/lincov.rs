@@ -8,9 +8,9 @@ use nav_sim::noise::{Ar1, Composite, Ma1, Model, Process, Quantization, RandomWa
 use nav_sim::scenario::Scenario;
 use nav_sim::sensors::imu::Truth;
 use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::lincov::{FilterPass, assess};
 use nav_sim::trajectory::Trajectory;
 use nav_sim::trajectory::profile::{Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning};
+use nav_sim_navigation::simulation::lincov::{FilterPass, assess};
 
 const RATE_HZ: f64 = 100.0;
 

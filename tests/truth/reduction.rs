@@ -5,7 +5,7 @@ use nav_sim::formats::model_file;
 use nav_sim::formats::trajectory_file::{Options, load};
 use nav_sim::scenario::{Reduction, Scenario};
 use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::lincov::{Assessment, assess};
+use nav_sim_navigation::simulation::lincov::{Assessment, assess};
 use std::path::Path;
 
 /// What the filter of a model does on a trajectory with outages.

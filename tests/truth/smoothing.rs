@@ -4,7 +4,6 @@ use crate::common::drive::{DRIVE, MODEL, place_with};
 use crate::fusion::{belief, model, recorded, run, settings, shipped};
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
-use nav_sim::earth::radii;
 use nav_sim::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim::formats::trajectory_file;
 use nav_sim::fusion::{FusionError, Row, Settings, Start, fuse, outcome};
@@ -17,6 +16,7 @@ use nav_sim::sensors::imu::Truth;
 use nav_sim::sensors::outage::Outage;
 use nav_sim::simulation::{Plan, Recording, record};
 use nav_sim::trajectory::Trajectory;
+use nav_sim_navigation::earth::radii;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 const OUTAGE: Outage = Outage { start_s: 300.0, end_s: 390.0 };

@@ -2,15 +2,16 @@
 //! them. And ideal samples and strapdown agree with independent truth.
 
 use glam::DVec3;
-use nav_sim::closure::{Bounds, Closure};
-use nav_sim::earth::{GravityModel, ned_difference};
+use nav_sim::earth::GravityModel;
 use nav_sim::formats::trajectory_file::{Options, load};
 use nav_sim::frames::NavState;
-use nav_sim::lanes::Vec3;
 use nav_sim::sensors::ideal_imu::ideal_imu;
-use nav_sim::strapdown::Strapdown;
 use nav_sim::trajectory::Trajectory;
-use nav_sim::trajectory::plausibility::{Limits, examine};
+use nav_sim_navigation::closure::{Bounds, Closure};
+use nav_sim_navigation::earth::ned_difference;
+use nav_sim_navigation::lanes::Vec3;
+use nav_sim_navigation::strapdown::Strapdown;
+use nav_sim_navigation::trajectory::plausibility::{Limits, examine};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 

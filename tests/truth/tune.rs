@@ -7,9 +7,9 @@ use nav_sim::noise::{Composite, Model, Process, RandomWalk, White};
 use nav_sim::scenario::Scenario;
 use nav_sim::sensors::imu::Truth;
 use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::lincov::{Aim, Factor, Filter, Per, Task, Track, scaled};
 use nav_sim::trajectory::Trajectory;
 use nav_sim::trajectory::profile::{Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning};
+use nav_sim_navigation::simulation::lincov::{Aim, Factor, Filter, Per, Task, Track, scaled};
 
 const OUTAGES: [Outage; 1] = [Outage { start_s: 200.0, end_s: 260.0 }];
 

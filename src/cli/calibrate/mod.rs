@@ -9,12 +9,12 @@ use super::pictures::PlotArgs;
 use super::recordings::{RecordingArgs, Said};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
-use crate::calibration::{
+use crate::formats::parameters_file;
+use crate::jobs::{self, CalibrationOptions, EstimatorChoice};
+use nav_sim_calibration::{
     Bootstrap, Estimator, FitRange, ModelChoice, ModelSpec, ParameterLimit, Pool, Settings, Trim, Weighting,
 };
-use crate::formats::parameters_file;
-use crate::imu::Sensor;
-use crate::jobs::{self, CalibrationOptions, EstimatorChoice};
+use nav_sim_signal::imu::Sensor;
 use output::outputs;
 use std::path::{Path, PathBuf};
 

@@ -1,13 +1,13 @@
 //! The files of a calibration: one model and its curves for each estimator.
 
 use super::Args;
-use crate::calibration::{Estimator, Outcome, Settings, diagnose};
 use crate::cli::pictures::{PlotArgs, replaceable};
 use crate::cli::{Failure, Session, read};
 use crate::formats::atomic::Claim;
 use crate::formats::model_file::CalibrationNote;
 use crate::jobs::{Calibration, ModelFiles};
 use crate::report::{self, CurvesFile, FitsFile, Input};
+use nav_sim_calibration::{Estimator, Outcome, Settings, diagnose};
 use std::path::{Path, PathBuf};
 
 /// The files of each estimator, none of them an input or a page of somebody else, and the claims to them.

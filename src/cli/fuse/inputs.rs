@@ -2,17 +2,17 @@
 
 use super::Args;
 use crate::cli::{Failure, Session, parse, read, turn_on};
-use crate::ekf::{FilterStates, InitialSettings};
 use crate::formats::fusion_files::{read_gnss, read_imu, read_initial};
 use crate::formats::model_file::ModelFile;
-use crate::frames::RollPitchYaw;
-use crate::fusion::Settings;
-use crate::fusion::mounting::Mounted;
-use crate::gnss::FixSigma;
 use crate::jobs::RecordedDrive;
 use crate::report::{FusionConfiguration, Input};
-use crate::units::DEG;
 use glam::{DMat3, DQuat, DVec3};
+use nav_sim_navigation::ekf::{FilterStates, InitialSettings};
+use nav_sim_navigation::frames::RollPitchYaw;
+use nav_sim_navigation::fusion::Settings;
+use nav_sim_navigation::fusion::mounting::Mounted;
+use nav_sim_navigation::gnss::FixSigma;
+use nav_sim_signal::units::DEG;
 use std::path::PathBuf;
 
 /// What was read, ready to use.

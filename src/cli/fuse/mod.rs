@@ -8,13 +8,13 @@ use super::parse::one_of;
 use super::pictures::PlotArgs;
 use super::run::{Words, parse_outage, windows_of};
 use super::{Failure, Printer, Session, parse};
-use crate::earth::GravityModel;
-use crate::fusion::{Assessment, FusionError, Settings, Verdict};
-use crate::gnss::FixSigma;
 use crate::jobs::{FuseError, Fused, FusionFilter, FusionFilterError};
 use crate::report::{FusionManifest, fusion_page};
-use crate::sensors::gnss::MAX_LEVER_ARM_M;
 use inputs::Inputs;
+use nav_sim_navigation::earth::GravityModel;
+use nav_sim_navigation::fusion::{Assessment, FusionError, Settings, Verdict};
+use nav_sim_navigation::gnss::FixSigma;
+use nav_sim_navigation::sensors::gnss::MAX_LEVER_ARM_M;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 

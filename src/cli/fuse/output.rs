@@ -2,10 +2,10 @@
 
 use crate::cli::{Failure, Session};
 use crate::formats::atomic::{AtomicDir, Claim, Found, claim_directory};
-use crate::fusion::Solution;
 use crate::report::{
     FUSION_FILES, FusionConfiguration, FusionKind, FusionManifest, FusionSummary, Input, fusion_directory,
 };
+use nav_sim_navigation::fusion::Solution;
 use std::path::Path;
 
 /// The manifest of a fusion that is yet to run.

@@ -5,9 +5,9 @@ use crate::cli::{Failure, Session, read, turn_on};
 use crate::formats::draws_file;
 use crate::formats::model_file::ModelFile;
 use crate::jobs::{NavigateInputs, TrueImu};
-use crate::noise::Model;
 use crate::report::{Input, ModelNote};
-use crate::scenario::{Method, Scenario};
+use nav_sim_navigation::scenario::{Method, Scenario};
+use nav_sim_signal::noise::Model;
 use std::path::{Path, PathBuf};
 
 /// What was read, ready to use.

@@ -10,13 +10,13 @@ use super::pictures::PlotArgs;
 use super::{Failure, Session};
 use crate::formats::scenario_file;
 use crate::jobs::{self, NavigateError, Navigation};
-use crate::metrics::{Requirement, Summary};
 use crate::report::{Manifest, TrajectorySeries, run_words, window};
-use crate::scenario::{Method, Scenario};
-use crate::sensors::imu::TruthError;
-use crate::sensors::outage::{NotAnOutage, Outage, PlacedOutages};
-use crate::simulation::ExperimentError;
 use inputs::Inputs;
+use nav_sim_navigation::metrics::{Requirement, Summary};
+use nav_sim_navigation::scenario::{Method, Scenario};
+use nav_sim_navigation::sensors::imu::TruthError;
+use nav_sim_navigation::sensors::outage::{NotAnOutage, Outage, PlacedOutages};
+use nav_sim_navigation::simulation::ExperimentError;
 use std::path::{Path, PathBuf};
 
 use output::{manifest, write};

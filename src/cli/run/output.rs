@@ -3,10 +3,10 @@
 use crate::cli::{Failure, Session};
 use crate::formats::atomic::{AtomicDir, Claim, Found, claim_directory};
 use crate::jobs::Navigation;
-use crate::metrics::{Summary, VerdictKind};
 use crate::report::{self, Input, Manifest, ModelNote, TrajectorySeries, run_words};
-use crate::scenario::Scenario;
-use crate::sensors::outage::Outage;
+use nav_sim_navigation::metrics::{Summary, VerdictKind};
+use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::sensors::outage::Outage;
 use std::cell::Cell;
 use std::path::Path;
 

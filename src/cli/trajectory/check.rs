@@ -2,11 +2,11 @@
 
 use super::Source;
 use crate::cli::{Failure, Session, parse};
-use crate::closure::{Bounds, Closure};
-use crate::earth::GravityModel;
 use crate::report::TrajectoryCheck;
-use crate::trajectory::plausibility::{Limits, examine};
-use crate::units::DEG;
+use nav_sim_navigation::closure::{Bounds, Closure};
+use nav_sim_navigation::earth::GravityModel;
+use nav_sim_navigation::trajectory::plausibility::{Limits, examine};
+use nav_sim_signal::units::DEG;
 
 /// Check a trajectory: could a vehicle move so, and does navigation close on it?
 ///

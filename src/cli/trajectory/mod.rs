@@ -7,7 +7,7 @@ mod write;
 
 use super::{Failure, Session};
 use crate::formats::trajectory_file::{Options, load, parse_origin};
-use crate::trajectory::Trajectory;
+use nav_sim_navigation::trajectory::Trajectory;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 

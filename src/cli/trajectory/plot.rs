@@ -4,7 +4,7 @@ use super::{Source, wrote};
 use crate::cli::pictures::{claim_picture, write_picture};
 use crate::cli::{Failure, Session};
 use crate::report::{TrajectorySeries, trajectory_svg};
-use crate::sensors::outage::Outage;
+use nav_sim_navigation::sensors::outage::Outage;
 use std::path::PathBuf;
 
 /// Draw a trajectory: map, height, speed, attitude, outages marked

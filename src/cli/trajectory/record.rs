@@ -5,11 +5,11 @@ use crate::cli::{Failure, Session, read, turn_on};
 use crate::formats::atomic::{AtomicDir, Claim, Found, claim_directory};
 use crate::formats::scenario_file;
 use crate::formats::trajectory_file::{Rows, write_rows};
-use crate::noise::continuous;
 use crate::report::{gnss_csv, imu_csv, initial_toml};
-use crate::scenario::Scenario;
-use crate::sensors::imu::Truth;
-use crate::simulation::{Plan, record};
+use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::sensors::imu::Truth;
+use nav_sim_navigation::simulation::{Plan, record};
+use nav_sim_signal::noise::continuous;
 use std::path::PathBuf;
 
 /// Names of the files, in the order of writing.

@@ -160,7 +160,7 @@ pub(super) type Positive = Between<0, { i64::MAX }, true>;
 pub(super) type AtLeastOne = Between<1, { i64::MAX }, false>;
 /// Degrees of freedom with a variance.
 pub(super) type AboveTwo = Between<2, { i64::MAX }, true>;
-/// Coefficients of a stationary AR(1), as [`Ar1::new`](crate::noise::Ar1::new) takes them.
+/// Coefficients of a stationary AR(1), as [`Ar1::new`](nav_sim_signal::noise::Ar1::new) takes them.
 type Stationary = Between<-1, 1, true>;
 
 impl<const LOW: i64, const HIGH: i64, const OPEN: bool> Between<LOW, HIGH, OPEN> {

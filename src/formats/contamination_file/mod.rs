@@ -17,7 +17,7 @@
 //! operation = "scale"              # process = "RW", parameter = "gamma2", factor
 //! ```
 //! With `of_samples` the burst's lengths are meant for a record of so many samples and are scaled to the
-//! record's length. What the operations do, and in which order: [`crate::noise::contamination`].
+//! record's length. What the operations do, and in which order: [`nav_sim_signal::noise::contamination`].
 
 mod description;
 
@@ -25,13 +25,13 @@ use super::FileError;
 use super::suggest::nearest;
 use super::toml_described::Document;
 use super::toml_file::{Section, Source};
-use crate::imu::Sensor;
-use crate::noise::Ar1;
-use crate::noise::contamination::{Contamination, Extent, Operation, Rule};
 use description::{
     AboveTwo, AtLeastOne, Autoregression, Bursts, Described, Description, HeavyTails, Mean, NonNegative,
     Numbers, Of, Positive, Replace, Scale, Share, Signal, Step, describe,
 };
+use nav_sim_signal::imu::Sensor;
+use nav_sim_signal::noise::Ar1;
+use nav_sim_signal::noise::contamination::{Contamination, Extent, Operation, Rule};
 use std::path::Path;
 
 pub(crate) use description::schema;
@@ -47,7 +47,7 @@ const PRESETS: [(&str, &str); 6] = [
 ];
 
 /// Names of the contaminations that come with the program: the scenarios of
-/// [Minaretzis](crate::bibliography::Minaretzis24), Sections IV and V.
+/// [Minaretzis](nav_sim_signal::bibliography::Minaretzis24), Sections IV and V.
 #[must_use]
 pub fn names() -> [&'static str; 6] {
     PRESETS.map(|(name, _)| name)
@@ -230,7 +230,7 @@ impl Entry<'_> {
 
     fn ar1(&self, process: &Autoregression) -> Result<Operation, FileError> {
         let (phi, sigma2) = (self.any("phi", &process.phi)?, self.any("sigma2", &process.sigma2)?);
-        let refuse = |e: crate::noise::ParameterError| {
+        let refuse = |e: nav_sim_signal::noise::ParameterError| {
             self.section.refuse(e.parameter, format!("is not {}", e.domain), None)
         };
         Ok(Operation::Ar1(Ar1::new(phi, sigma2).map_err(refuse)?))
@@ -251,7 +251,7 @@ impl Entry<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::imu::{Axis, Channel};
+    use nav_sim_signal::imu::{Axis, Channel};
 
     fn rules(name: &str, sensor: Sensor, replicate: u64) -> Vec<Operation> {
         let of = |r: &Rule| r.sensor == sensor && r.replicate.is_none_or(|only| only == replicate);

@@ -14,7 +14,7 @@ use super::{Datasheet, Entry, Figure, Quantity};
 use crate::formats::error::{FileError, Kind};
 use crate::formats::toml_described::Document;
 use crate::formats::toml_file::{Source, unknown_key};
-use crate::imu::Sensor;
+use nav_sim_signal::imu::Sensor;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::Path;

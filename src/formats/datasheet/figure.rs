@@ -1,7 +1,7 @@
 //! The figures of a datasheet and the units they are given in.
 
-use crate::imu::Sensor;
-use crate::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
+use nav_sim_signal::imu::Sensor;
+use nav_sim_signal::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
 
 /// A figure of one sensor.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -9,7 +9,7 @@
 //! | scale factor | said, not part of a noise model |
 //!
 //! **Bias instability.** Manufacturers read B off the lowest point of the Allan deviation (Sensonor's FAQ: "the
-//! minimum point of the Allan Variance curve"); [IEEE 952](crate::bibliography::Ieee952) calls that point 0.664
+//! minimum point of the Allan Variance curve"); [IEEE 952](nav_sim_signal::bibliography::Ieee952) calls that point 0.664
 //! times the coefficient of a flicker noise. B is read as that floor: [`Flicker`] has correlation times T, T/16, T/256, …
 //! down to 1 s, and its Allan deviation is at least B and at most 1.08 B from 1.9 times the shortest to 1.9 times T.
 //! White noise comes on top, so that the model is nowhere in that range below the datasheet; by how much its lowest point
@@ -25,8 +25,10 @@ pub use catalogue::{catalogued, read};
 pub use figure::{Figure, Quantity, QuantityError};
 
 use crate::formats::model_file::{ModelFile, PROGRAM, SCHEMA, TurnOn};
-use crate::imu::{Channel, Sensor};
-use crate::noise::{Composite, Flicker, Model, ParameterError, Process, RandomWalk, White, continuous};
+use nav_sim_signal::imu::{Channel, Sensor};
+use nav_sim_signal::noise::{
+    Composite, Flicker, Model, ParameterError, Process, RandomWalk, White, continuous,
+};
 use toml::Table;
 
 /// The correlation time that is assumed where none is given (s).

@@ -3,13 +3,13 @@
 use super::nmea::{self, is_nmea};
 use super::rtklib::{self, is_rtklib};
 use super::{Remark, bare_columns, table, time_back};
-use crate::earth::{MAX_LATITUDE, geodetic_to_ecef};
 use crate::formats::suggest::nearest;
 use crate::formats::trajectory_file::table::{Table, text};
 use crate::formats::{FileError as Error, Kind, Place, Setting};
-use crate::gnss::{FixSigma, GnssFix};
-use crate::units::DEG;
 use glam::DVec3;
+use nav_sim_navigation::earth::{MAX_LATITUDE, geodetic_to_ecef};
+use nav_sim_navigation::gnss::{FixSigma, GnssFix};
+use nav_sim_signal::units::DEG;
 use std::f64::consts::PI;
 use std::path::Path;
 

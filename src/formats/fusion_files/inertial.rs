@@ -8,11 +8,11 @@ use crate::formats::recordings::timing::{median_step, unit_of_step};
 use crate::formats::recordings::{self, Raw, ReadOptions};
 use crate::formats::trajectory_file::table::text;
 use crate::formats::{FileError as Error, Place};
-use crate::fusion::gap::{LONGEST_S, bridged};
-use crate::imu::{Axis, Channel, ImuIncrement, Sensor};
-use crate::strapdown::MAX_ROTATION;
-use crate::units::DEG;
 use glam::DVec3;
+use nav_sim_navigation::fusion::gap::{LONGEST_S, bridged};
+use nav_sim_navigation::strapdown::MAX_ROTATION;
+use nav_sim_signal::imu::{Axis, Channel, ImuIncrement, Sensor};
+use nav_sim_signal::units::DEG;
 use std::path::Path;
 
 /// A step this many times the median one is a gap.

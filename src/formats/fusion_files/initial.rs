@@ -1,14 +1,14 @@
 //! An initial state (TOML).
 
-use crate::earth::MAX_LATITUDE_DEG;
-use crate::ekf::InitialSettings;
 use crate::formats::FileError;
 use crate::formats::toml_described::Document;
 use crate::formats::toml_file::Source;
-use crate::frames::{NavState, RollPitchYaw};
-use crate::fusion::Start;
-use crate::units::DEG;
 use glam::DVec3;
+use nav_sim_navigation::earth::MAX_LATITUDE_DEG;
+use nav_sim_navigation::ekf::InitialSettings;
+use nav_sim_navigation::frames::{NavState, RollPitchYaw};
+use nav_sim_navigation::fusion::Start;
+use nav_sim_signal::units::DEG;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use std::path::Path;

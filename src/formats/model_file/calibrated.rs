@@ -1,10 +1,10 @@
 //! The model file of a calibration.
 
 use super::{Interval, ModelFile, PROGRAM, SCHEMA, TurnOn};
-use crate::calibration::{Estimator, Outcome, ParameterLimit, Settings, TurnOnSpread, undetermined};
-use crate::imu::{Axis, Channel, Sensor};
-use crate::noise::Model;
 use crate::report::{Input, turn_on_remark};
+use nav_sim_calibration::{Estimator, Outcome, ParameterLimit, Settings, TurnOnSpread, undetermined};
+use nav_sim_signal::imu::{Axis, Channel, Sensor};
+use nav_sim_signal::noise::Model;
 use toml::{Table, Value};
 
 /// What a calibration leaves in the file beside the model.

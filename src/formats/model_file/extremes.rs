@@ -1,8 +1,8 @@
 //! Models at the ends of the intervals of their parameters.
 
 use super::ModelFile;
-use crate::imu::Channel;
-use crate::noise::Model;
+use nav_sim_signal::imu::Channel;
+use nav_sim_signal::noise::Model;
 
 /// An end of an interval.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -63,7 +63,7 @@ impl ModelFile {
 mod tests {
     use super::super::Interval;
     use super::*;
-    use crate::noise::{Ar1, Composite, Process};
+    use nav_sim_signal::noise::{Ar1, Composite, Process};
 
     #[test]
     fn amplitudes_and_shapes_go_to_either_end_together() {

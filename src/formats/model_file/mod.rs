@@ -26,12 +26,12 @@ mod write;
 pub(crate) use calibrated::CalibrationNote;
 pub(crate) use read::from_text;
 pub use read::read;
-pub use schema::schema;
+pub(crate) use schema::schema;
 pub(crate) use write::to_toml;
 pub use write::write;
 
-use crate::imu::{Channel, Sensor};
-use crate::noise::{Model, Spread};
+use nav_sim_signal::imu::{Channel, Sensor};
+use nav_sim_signal::noise::{Model, Spread};
 
 /// What wrote a file, in its provenance.
 pub(crate) const PROGRAM: &str = concat!("nav-sim ", env!("CARGO_PKG_VERSION"));
@@ -120,9 +120,9 @@ impl TurnOn {
 pub struct Interval {
     /// The axis.
     pub channel: Channel,
-    /// Label of the process, as [`crate::noise::Composite::labels`].
+    /// Label of the process, as [`nav_sim_signal::noise::Composite::labels`].
     pub process: String,
-    /// Name of the parameter, as [`crate::noise::Process::parameters`].
+    /// Name of the parameter, as [`nav_sim_signal::noise::Process::parameters`].
     pub parameter: String,
     /// Lower end (units of the parameter; −∞ if unbounded).
     pub low: f64,

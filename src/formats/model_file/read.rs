@@ -4,9 +4,11 @@ use super::{CI, Interval, ModelFile, SCHEMA, TurnOn};
 use crate::formats::FileError;
 use crate::formats::suggest::nearest;
 use crate::formats::toml_file::{Section, Source};
-use crate::imu::{Axis, Channel, MAX_RATE_HZ, Sensor};
-use crate::noise::{Composite, Kind, Law, Model, ParameterError, Process, Spread, SpreadError, Variation};
-use crate::sensors::defects::{MAX_BIAS_M_S2, MAX_BIAS_RAD_S};
+use nav_sim_navigation::sensors::defects::{MAX_BIAS_M_S2, MAX_BIAS_RAD_S};
+use nav_sim_signal::imu::{Axis, Channel, MAX_RATE_HZ, Sensor};
+use nav_sim_signal::noise::{
+    Composite, Kind, Law, Model, ParameterError, Process, Spread, SpreadError, Variation,
+};
 use std::path::Path;
 
 /// Reads a model file.

@@ -1,11 +1,11 @@
 //! The JSON schema of model files.
 
-use crate::noise::Kind;
+use nav_sim_signal::noise::Kind;
 use serde_json::{Map, Value, json};
 
 /// The JSON schema of a model file, for editors and checkers.
 #[must_use]
-pub fn schema() -> Value {
+pub(crate) fn schema() -> Value {
     let process = |kind: &Kind| {
         let mut properties = Map::new();
         properties.insert("type".to_owned(), json!({ "const": kind.code() }));
@@ -42,7 +42,7 @@ pub fn schema() -> Value {
         "required": ["rate_hz"],
         "properties": {
             "schema": { "const": super::SCHEMA },
-            "rate_hz": { "type": "number", "exclusiveMinimum": 0, "maximum": crate::imu::MAX_RATE_HZ, "description": "Sample rate that the variances are of (Hz)" },
+            "rate_hz": { "type": "number", "exclusiveMinimum": 0, "maximum": nav_sim_signal::imu::MAX_RATE_HZ, "description": "Sample rate that the variances are of (Hz)" },
             "accel": sensor,
             "gyro": sensor,
             "turn_on": {

@@ -2,8 +2,8 @@ use super::read::parse;
 use super::*;
 use crate::formats::FileError;
 use crate::formats::toml_file::Source;
-use crate::imu::{Axis, Sensor};
-use crate::noise::{Composite, Law, Process, Variation};
+use nav_sim_signal::imu::{Axis, Sensor};
+use nav_sim_signal::noise::{Composite, Law, Process, Variation};
 
 const ACCEL_X: Channel = Channel { sensor: Sensor::Accel, axis: Axis::X };
 

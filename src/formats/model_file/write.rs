@@ -3,8 +3,8 @@
 use super::{CI, Interval, ModelFile, SCHEMA, TurnOn};
 use crate::formats::FileError;
 use crate::formats::atomic::{self, Existing};
-use crate::imu::{Axis, Channel, Sensor};
-use crate::noise::{Law, Process, Variation};
+use nav_sim_signal::imu::{Axis, Channel, Sensor};
+use nav_sim_signal::noise::{Law, Process, Variation};
 use std::fmt::Write;
 use std::path::Path;
 

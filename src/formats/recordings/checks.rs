@@ -6,8 +6,8 @@ use super::header::{Role, Unit};
 use super::table::{Column, Raw};
 use super::values::Values;
 use crate::formats::{FileError, Place, Setting};
-use crate::imu::{Channel, Sensor};
-use crate::units::STANDARD_GRAVITY;
+use nav_sim_signal::imu::{Channel, Sensor};
+use nav_sim_signal::units::STANDARD_GRAVITY;
 use std::io;
 use std::ops::Range;
 

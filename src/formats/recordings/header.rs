@@ -14,8 +14,8 @@ use super::error::{COLUMNS, no_unit, shown};
 use super::table::Column;
 use super::values::Values;
 use crate::formats::{FileError, Kind, Setting};
-use crate::imu::{Axis, Channel, Sensor};
-use crate::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
+use nav_sim_signal::imu::{Axis, Channel, Sensor};
+use nav_sim_signal::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
 
 /// What a column is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,7 +40,7 @@ pub(crate) enum Role {
 
 /// The unit of a signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Unit {
+pub(crate) enum Unit {
     /// That many SI units.
     Si(f64),
     /// That many SI units, per sample interval.

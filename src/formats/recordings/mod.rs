@@ -1,11 +1,11 @@
 //! Static recordings: text tables with a header (CSV, TSV, gzipped or not) and `.npy` arrays, one replicate
 //! a file, a directory being all its recordings in name order.
 //!
-//! Columns are found by their names ([`header`]), their units by the names' endings; what was found, and
+//! Columns are found by their names (`header`), their units by the names' endings; what was found, and
 //! what was assumed, is told in the [`Report`]. What cannot be right is refused with file and line
 //! ([`FileError`]).
 
-pub mod header;
+pub(crate) mod header;
 
 pub(in crate::formats) mod checks;
 pub(in crate::formats) mod error;
@@ -27,8 +27,8 @@ pub use write::FileFormat;
 pub(in crate::formats) use table::{Raw, load};
 
 use super::{FileError, Kind};
-use crate::imu::{Channel, Recording};
 use error::no_files;
+use nav_sim_signal::imu::{Channel, Recording};
 use prepared::Prepared;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};

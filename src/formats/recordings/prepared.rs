@@ -7,7 +7,7 @@ use super::table::{Column, Raw};
 use super::timing::{self, Timing};
 use super::{FileReport, ReadOptions, checks, repeats, texture};
 use crate::formats::{FileError, Place, Setting};
-use crate::imu::{Channel, Recording, Signal};
+use nav_sim_signal::imu::{Channel, Recording, Signal};
 use std::ops::Range;
 
 /// What recordings are made of.

@@ -4,7 +4,7 @@ use super::FileReport;
 use super::error::storage;
 use super::table::{Column, Raw};
 use crate::formats::FileError;
-use crate::imu::Channel;
+use nav_sim_signal::imu::Channel;
 use std::collections::HashMap;
 use std::io;
 

@@ -4,7 +4,7 @@ use super::header::{self, Role, Unit};
 use super::repeats::{self, Sketch};
 use super::table::{Column, Raw};
 use crate::formats::suggest::nearest;
-use crate::imu::{Channel, Sensor};
+use nav_sim_signal::imu::{Channel, Sensor};
 use std::fmt;
 use std::path::PathBuf;
 

@@ -5,7 +5,7 @@ use super::header::{self, HeaderPlace, Role};
 use super::values::Values;
 use super::{ReadOptions, text};
 use crate::formats::{FileError, Place, Setting, npy};
-use crate::imu::Channel;
+use nav_sim_signal::imu::Channel;
 use std::path::Path;
 
 /// A file's columns as found, before anything is decided about time and units.

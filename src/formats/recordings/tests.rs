@@ -4,8 +4,8 @@ mod gravity;
 
 use super::*;
 use crate::formats::npy;
-use crate::imu::Signal;
-use crate::units::{DEG, STANDARD_GRAVITY};
+use nav_sim_signal::imu::Signal;
+use nav_sim_signal::units::{DEG, STANDARD_GRAVITY};
 use std::fs;
 use tempfile::TempDir;
 

@@ -4,7 +4,7 @@ use super::FileReport;
 use super::error::storage;
 use super::table::{Column, Raw};
 use crate::formats::FileError;
-use crate::imu::{Channel, Sensor};
+use nav_sim_signal::imu::{Channel, Sensor};
 use std::io;
 
 /// Longest pattern of rows in which values are looked for that stand.

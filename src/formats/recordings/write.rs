@@ -2,8 +2,8 @@
 
 use super::header::column_name;
 use crate::formats::npy;
-use crate::imu::Channel;
 use flate2::{Compression, write::GzEncoder};
+use nav_sim_signal::imu::Channel;
 use std::io::{self, BufWriter, Write};
 
 /// A format of recordings.

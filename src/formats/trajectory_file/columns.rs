@@ -3,7 +3,7 @@
 use super::table::{COLUMNS, Table};
 use crate::formats::suggest::nearest;
 use crate::formats::{FileError as Error, Kind};
-use crate::units::DEG;
+use nav_sim_signal::units::DEG;
 
 /// What a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,10 +1,10 @@
 //! What is doubtful about a trajectory file that can be used all the same.
 
 use super::samples::{Attitude, MOVING, Rows};
-use crate::frames::{NavState, RollPitchYaw, wrap_angle};
-use crate::trajectory::Trajectory;
-use crate::trajectory::plausibility::VelocityMisfit;
-use crate::units::DEG;
+use nav_sim_navigation::frames::{NavState, RollPitchYaw, wrap_angle};
+use nav_sim_navigation::trajectory::Trajectory;
+use nav_sim_navigation::trajectory::plausibility::VelocityMisfit;
+use nav_sim_signal::units::DEG;
 use std::f64::consts::{FRAC_PI_2, PI};
 
 /// Longest step between rows that is not doubted (s).

@@ -6,10 +6,10 @@
 use super::samples::{Attitude, Rows};
 use super::table::{Table, no_rows};
 use crate::formats::FileError as Error;
-use crate::trajectory::TrajectorySample;
-use crate::units::DEG;
 use chrono::{DateTime, NaiveDateTime, Utc};
 use glam::DQuat;
+use nav_sim_navigation::trajectory::TrajectorySample;
+use nav_sim_signal::units::DEG;
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
@@ -128,9 +128,9 @@ fn seconds_between(start: DateTime<Utc>, end: DateTime<Utc>) -> f64 {
 mod tests {
     use super::*;
     use crate::formats::trajectory_file::Warning;
-    use crate::frames::RollPitchYaw;
-    use crate::trajectory::Trajectory;
     use glam::DVec3;
+    use nav_sim_navigation::frames::RollPitchYaw;
+    use nav_sim_navigation::trajectory::Trajectory;
 
     fn load(path: &str, text: &str) -> Result<(Trajectory, Vec<Warning>), Error> {
         gpx(path, text)?.trajectory()

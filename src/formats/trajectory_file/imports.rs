@@ -4,10 +4,10 @@ use super::Options;
 use super::samples::{Attitude, Rows, local};
 use super::table::{Numbers, Table, no_rows};
 use crate::formats::FileError as Error;
-use crate::trajectory::TrajectorySample;
-use crate::trajectory::import::{BodyMotion, Command};
-use crate::units::DEG;
 use glam::{DQuat, DVec3};
+use nav_sim_navigation::trajectory::TrajectorySample;
+use nav_sim_navigation::trajectory::import::{BodyMotion, Command};
+use nav_sim_signal::units::DEG;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 /// Seconds of a GNSS week.
@@ -195,8 +195,8 @@ fn bad_line(path: &str, line: u64, message: String) -> Error {
 mod tests {
     use super::*;
     use crate::formats::trajectory_file::Warning;
-    use crate::frames::RollPitchYaw;
-    use crate::trajectory::Trajectory;
+    use nav_sim_navigation::frames::RollPitchYaw;
+    use nav_sim_navigation::trajectory::Trajectory;
 
     type Loaded = Result<(Trajectory, Vec<Warning>), Error>;
 

@@ -12,13 +12,13 @@ mod write;
 
 pub(crate) use profile::schema as profile_schema;
 pub(crate) use samples::parse_origin;
-pub use write::Rows;
+pub(crate) use write::Rows;
 pub(crate) use write::write_csv;
 pub(crate) use write::write_rows;
 
 use super::{FileError, Place};
-use crate::trajectory::Trajectory;
-use crate::trajectory::reference::Reference;
+use nav_sim_navigation::trajectory::Trajectory;
+use nav_sim_navigation::trajectory::reference::Reference;
 use std::fmt;
 use std::path::Path;
 use table::{Numbers, Table};

@@ -6,12 +6,12 @@ use super::samples::HEIGHT;
 use crate::formats::FileError;
 use crate::formats::toml_described::{Document, Finite};
 use crate::formats::toml_file::{Section, Source};
-use crate::trajectory::Trajectory;
-use crate::trajectory::profile::{
+use description::{Accelerate, Climb, Description, Of, Point, Roll, Stop, Straight, Turn, Waypoints};
+use nav_sim_navigation::trajectory::Trajectory;
+use nav_sim_navigation::trajectory::profile::{
     self, Acceleration, Bank, Kind, Length, Place, Profile, Segment, Start, Turning, Waypoint,
 };
-use crate::units::DEG;
-use description::{Accelerate, Climb, Description, Of, Point, Roll, Stop, Straight, Turn, Waypoints};
+use nav_sim_signal::units::DEG;
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use std::path::Path;

@@ -3,8 +3,8 @@
 use super::Warning;
 use super::samples::{Attitude, Rows, follow_path, no_trajectory};
 use crate::formats::{FileError as Error, Place};
-use crate::trajectory::Trajectory;
-use crate::trajectory::reference::{Reference, breaks, usable};
+use nav_sim_navigation::trajectory::Trajectory;
+use nav_sim_navigation::trajectory::reference::{Reference, breaks, usable};
 use std::ops::Range;
 
 impl Rows {

@@ -4,12 +4,12 @@ use super::columns::{Columns, Quantity};
 use super::doubts;
 use super::table::{Numbers, Table};
 use super::{Options, Warning};
-use crate::earth::{e_to_n, ecef_to_geodetic, geodetic_to_ecef};
 use crate::formats::{FileError as Error, Place, Setting};
-use crate::frames::{RollPitchYaw, q_e_n, wrap_angle};
-use crate::trajectory::{self, Trajectory, TrajectorySample};
-use crate::units::DEG;
 use glam::{DQuat, DVec3};
+use nav_sim_navigation::earth::{e_to_n, ecef_to_geodetic, geodetic_to_ecef};
+use nav_sim_navigation::frames::{RollPitchYaw, q_e_n, wrap_angle};
+use nav_sim_navigation::trajectory::{self, Trajectory, TrajectorySample};
+use nav_sim_signal::units::DEG;
 
 use Quantity::{D, E, H, Lat, Lon, N, Pitch, Roll, Time, Vd, Ve, Vn, Yaw};
 

@@ -3,9 +3,9 @@ mod profiles;
 use super::*;
 use crate::formats::atomic::Existing;
 use crate::formats::toml_file::Source;
-use crate::frames::RollPitchYaw;
-use crate::units::DEG;
 use glam::DVec3;
+use nav_sim_navigation::frames::RollPitchYaw;
+use nav_sim_signal::units::DEG;
 
 const HEADER: &str = "t_s,lat_deg,lon_deg,h_m,roll_deg,pitch_deg,yaw_deg\n";
 

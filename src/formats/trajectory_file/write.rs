@@ -2,16 +2,16 @@
 
 use crate::formats::FileError;
 use crate::formats::atomic::{AtomicFile, Existing};
-use crate::frames::{RollPitchYaw, wrap_angle};
-use crate::trajectory::Trajectory;
-use crate::units::DEG;
 use flate2::{Compression, write::GzEncoder};
+use nav_sim_navigation::frames::{RollPitchYaw, wrap_angle};
+use nav_sim_navigation::trajectory::Trajectory;
+use nav_sim_signal::units::DEG;
 use std::io::{self, Write};
 use std::path::Path;
 
 /// Which instants become rows.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Rows {
+pub(crate) enum Rows {
     /// Evenly spaced ones, from the start (Hz).
     Rate(f64),
     /// Those the trajectory was made from.

@@ -1,10 +1,6 @@
 //! The page of a calibrated model: curves, model, what is left over, parameters, recordings.
 
 use super::wavelet::{band, curve, scale_axis, sensor_name, unit, variance_axis};
-use crate::calibration::{
-    Diagnosis, Outcome, Practical, Settings, TurnOnSpread, Verdict, advice, shares, tau_s,
-};
-use crate::imu::Sensor;
 use crate::report::brief::fit_verdict;
 use crate::report::comparison::in_order;
 use crate::report::curves::{CurvesFile, FittedCurve};
@@ -15,6 +11,10 @@ use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, 
 use crate::report::practical::{policy, practical_rows};
 use crate::report::short_names;
 use crate::report::turn_on::turn_on_remark;
+use nav_sim_calibration::{
+    Diagnosis, Outcome, Practical, Settings, TurnOnSpread, Verdict, advice, shares, tau_s,
+};
+use nav_sim_signal::imu::Sensor;
 
 /// The page of the models of one estimator. `outcomes`: each with its place among all fits of the command; `curves`: of the
 /// same outcomes.

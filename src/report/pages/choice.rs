@@ -7,7 +7,7 @@ use crate::report::comparison::in_order;
 use crate::report::page::{
     Axis, Cell, Chart, Colour, Interval, Mark, Page, Panel, Series, Stroke, Table, Tone,
 };
-use crate::simulation::NEES_DOF;
+use nav_sim_navigation::simulation::NEES_DOF;
 
 /// The page.
 pub(crate) fn choice_page(report: &ChoiceReport<'_>) -> Page {

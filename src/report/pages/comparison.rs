@@ -2,18 +2,18 @@
 
 use super::paper::PaperFigure;
 use super::{STATES, tone, window};
-use crate::metrics::{Measured, VerdictKind};
 use crate::report::comparison::{
     CandidateResult, ComparisonFile, Row, in_order, meaning_of_intervals, verdict_lines,
 };
 use crate::report::comparison_table::{table_rows, with_times};
 use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, Table, svg};
 use crate::report::short_names;
-use crate::simulation::{REPORTED, REPORTED_NAMES};
+use nav_sim_navigation::metrics::{Measured, VerdictKind};
+use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
 
 /// How the ASEE of a run departs from that of the reference over time.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RatioCurves {
+pub(crate) struct RatioCurves {
     /// Time (s).
     pub t_s: Vec<f64>,
     /// (ratio − 1)·100 of each reported state.

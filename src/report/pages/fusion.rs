@@ -1,11 +1,11 @@
 //! The page of a fusion: the way, errors against a reference, innovations.
 
 use super::{STATES, error_of};
-use crate::earth::ned_difference;
-use crate::fusion::{FixRecord, Row, Solution, Use};
-use crate::metrics::chi_square_band;
 use crate::report::fusion::FusionSummary;
 use crate::report::page::{Axis, Chart, Colour, Interval, Mark, Page, Panel, Series, Stroke};
+use nav_sim_navigation::earth::ned_difference;
+use nav_sim_navigation::fusion::{FixRecord, Row, Solution, Use};
+use nav_sim_navigation::metrics::chi_square_band;
 
 /// The page of a fusion directory.
 pub(crate) fn fusion_page(solution: &Solution, summary: &FusionSummary, inputs: &[(String, String)]) -> Page {

@@ -30,8 +30,8 @@ pub(crate) use wavelet::{wavelet_page, wavelet_text};
 
 use super::number;
 use super::page::Tone;
-use crate::metrics::VerdictKind;
-use crate::simulation::REPORTED;
+use nav_sim_navigation::metrics::VerdictKind;
+use nav_sim_navigation::simulation::REPORTED;
 
 /// The reported states and their units, in words.
 const STATES: [&str; REPORTED] = [

@@ -2,10 +2,10 @@
 
 use super::calibration::{CAPTION as FITTED, chart as fitted_chart};
 use super::wavelet::{curve, scale_axis, variance_axis};
-use crate::imu::Sensor;
 use crate::report::curves::{CurvesFile, FittedCurve};
 use crate::report::page::{Chart, Colour, Page, Panel, Series, Tone, svg};
 use crate::report::trajectory::TrajectorySeries;
+use nav_sim_signal::imu::Sensor;
 
 /// A figure of the paper.
 #[derive(Debug, Clone, PartialEq)]

@@ -6,7 +6,7 @@ use crate::report::require::{
     Bridged, CURVE_S, Longest, NeededImu, Question, RankedUnit, catalogue_rows, longest_verdict,
     margins_verdict,
 };
-use crate::require::{Answer, IMU_PARAMETERS, ImuParameters, Margins, Quantity};
+use nav_sim_navigation::require::{Answer, IMU_PARAMETERS, ImuParameters, Margins, Quantity};
 
 const CHECKED: &str = "the IMU that a limit needs meets it in sampled runs, and a larger error of the IMU never makes a smaller one of \
                        navigation (tests/truth/require.rs).";

@@ -2,18 +2,18 @@
 
 use super::run_charts::{budget_chart, fan_chart, horizontal, nees, states, windows};
 use super::{RMSE_AND_ASEE, STATES, sentence, tone, window};
-use crate::ekf::InitialSettings;
-use crate::imu::Sensor;
-use crate::metrics::{Budget, EpochMetrics, FanEpoch, OutageSummary, PerState, Summary};
 use crate::report::manifest::Manifest;
 use crate::report::number::readable;
 use crate::report::page::{Cell, Page, Table};
 use crate::report::run_words::beyond_linear;
 use crate::report::trajectory::TrajectorySeries;
 use crate::report::verdict::verdict_line;
-use crate::sensors::defects::ImuSettings;
-use crate::sensors::gnss::GnssSettings;
-use crate::simulation::REPORTED_NAMES;
+use nav_sim_navigation::ekf::InitialSettings;
+use nav_sim_navigation::metrics::{Budget, EpochMetrics, FanEpoch, OutageSummary, PerState, Summary};
+use nav_sim_navigation::sensors::defects::ImuSettings;
+use nav_sim_navigation::sensors::gnss::GnssSettings;
+use nav_sim_navigation::simulation::REPORTED_NAMES;
+use nav_sim_signal::imu::Sensor;
 
 /// Outages whose tables are shown: of more, those with the largest errors.
 const OUTAGES: usize = 3;

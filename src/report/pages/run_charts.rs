@@ -1,8 +1,8 @@
 //! The figures of a run.
 
 use super::{STATES, error_of};
-use crate::metrics::{Budget, EpochMetrics, FanEpoch, OutageSummary, Summary};
 use crate::report::page::{Axis, Chart, Colour, Interval, Mark, Panel, Series, svg, terminal};
+use nav_sim_navigation::metrics::{Budget, EpochMetrics, FanEpoch, OutageSummary, Summary};
 
 /// What of it most people want as a picture.
 pub(crate) fn run_svg(epochs: &[EpochMetrics], fan: &[FanEpoch], summary: &Summary) -> String {

@@ -1,12 +1,12 @@
 //! The page of a study: verdicts, drift against the length of outages.
 
 use super::sentence;
-use crate::metrics::{OutageMetrics, VerdictKind};
 use crate::report::choose::RankedPlace;
 use crate::report::comparison_table::with_times;
 use crate::report::page::{Axis, Chart, Colour, Interval, Mark, Page, Panel, Series, Table};
 use crate::report::study::{ShownCell, drift_table, ratio_table, verdict_table};
 use crate::report::verdict::verdict_word;
+use nav_sim_navigation::metrics::{OutageMetrics, VerdictKind};
 
 /// The page of a merged study. `reference`: what ratios refer to; `more`: cells that are in outages.csv only; `rankings`:
 /// of candidates calibrated without the recordings that make the errors.

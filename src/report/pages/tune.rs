@@ -4,8 +4,8 @@ use super::{STATES, error_of};
 use crate::report::number::seconds;
 use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, Table, Tone};
 use crate::report::tune::TuneResult;
-use crate::simulation::NEES_DOF;
-use crate::simulation::lincov::Honesty;
+use nav_sim_navigation::simulation::NEES_DOF;
+use nav_sim_navigation::simulation::lincov::Honesty;
 
 /// The page.
 pub(crate) fn tune_page(result: &TuneResult) -> Page {

@@ -1,11 +1,11 @@
 //! The page of `wv`, and what pages of wavelet variances share.
 
-use crate::calibration::duration;
-use crate::imu::Sensor;
 use crate::report::curves::{SignalCurves, SignalsFile};
 use crate::report::number::squared;
 use crate::report::page::{Axis, Chart, Colour, Mark, Page, Panel, Series, Table, Tone, beside, terminal};
 use crate::report::short_names;
+use nav_sim_calibration::duration;
+use nav_sim_signal::imu::Sensor;
 
 /// The axis of scales.
 pub(super) fn scale_axis() -> Axis {

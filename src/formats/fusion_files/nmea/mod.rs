@@ -10,9 +10,9 @@ mod sentence;
 use super::Remark;
 use super::fixes::Fixes;
 use crate::formats::{FileError as Error, Setting};
-use crate::gnss::{FixSigma, GnssFix, OPEN_M_S};
 use clock::{Clock, Dates};
 use glam::{DVec2, DVec3};
+use nav_sim_navigation::gnss::{FixSigma, GnssFix, OPEN_M_S};
 use sentence::{address, angle, date_of_rmc, fields, horizontal, midnight, time_of_day, unchecked_fields};
 
 /// Seconds of a day.

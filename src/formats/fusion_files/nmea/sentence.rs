@@ -1,8 +1,8 @@
 //! What stands in a sentence.
 
-use crate::units::DEG;
 use chrono::{DateTime, NaiveDate};
 use glam::DVec2;
+use nav_sim_signal::units::DEG;
 
 /// A knot (m/s).
 pub(super) const KNOT: f64 = 1852.0 / 3600.0;

@@ -2,7 +2,7 @@
 
 use super::sentence::{KNOT, fields};
 use super::*;
-use crate::units::DEG;
+use nav_sim_signal::units::DEG;
 
 const SIGMA: FixSigma = FixSigma { pos_m: [2.0, 2.0, 4.0], vel_m_s: Some([0.1, 0.1, 0.2]) };
 

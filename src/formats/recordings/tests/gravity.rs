@@ -70,7 +70,7 @@ fn dead_axes_and_short_recordings() {
     let (message, hint) = refusal_with("a.csv", dead, &at_100_hz());
     assert_eq!(message, "a.csv: gyro.y (column \"gyro_y_rad_s\") is dead: every sample is 0.5");
     assert!(hint.contains("leave the channel out"));
-    let x = Channel { sensor: crate::imu::Sensor::Gyro, axis: crate::imu::Axis::X };
+    let x = Channel { sensor: nav_sim_signal::imu::Sensor::Gyro, axis: nav_sim_signal::imu::Axis::X };
     let only_x = ReadOptions { channels: Some(vec![x]), ..at_100_hz() };
     assert_eq!(read_one("a.csv", dead, &only_x).unwrap().signals.len(), 1);
 

@@ -1,9 +1,9 @@
 //! Keys of a motion profile: their types, ranges and words, for the reader and for editors.
 
 use super::super::samples::HEIGHT;
-use crate::earth::MAX_LATITUDE_DEG;
 use crate::formats::toml_described::Finite;
-use crate::units::{NonNegative, Positive};
+use nav_sim_navigation::earth::MAX_LATITUDE_DEG;
+use nav_sim_signal::units::{NonNegative, Positive};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::IgnoredAny;

@@ -24,8 +24,8 @@ fn a_profile_of_every_kind_of_segment() {
     let end = t.state(t.end_s());
     // Braking from 15 m/s at 1.5 m/s² takes 11 s and 82.5 m past the last point, 410 m high.
     let (lat, lon) = (46.512 * DEG, 6.6 * DEG);
-    let last = crate::frames::NavState { lat, lon, h: 410.0, ..end };
-    let past = crate::earth::ned_difference(&last, end.lat, end.lon, end.h);
+    let last = nav_sim_navigation::frames::NavState { lat, lon, h: 410.0, ..end };
+    let past = nav_sim_navigation::earth::ned_difference(&last, end.lat, end.lon, end.h);
     assert!((past.length() - 82.5).abs() < 0.01 && past.z.abs() < 1e-6, "{past}");
     assert!(end.v_n.length() < 1e-6);
 }
