@@ -4,13 +4,13 @@ use glam::DVec3;
 use nav_sim::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim::metrics::{Estimate, SampleSize};
 use nav_sim::monte_carlo;
-use nav_sim::noise::{Ar1, Composite, Ma1, Model, Process, Quantization, RandomWalk, White};
+use nav_sim::noise::{Ar1, Composite, Drift, Ma1, Model, Process, Quantization, RandomWalk, White};
 use nav_sim::scenario::Scenario;
 use nav_sim::sensors::imu::Truth;
 use nav_sim::sensors::outage::Outage;
 use nav_sim::trajectory::Trajectory;
 use nav_sim::trajectory::profile::{Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning};
-use nav_sim_navigation::simulation::lincov::{FilterPass, assess};
+use nav_sim_navigation::simulation::lincov::{DRIFT, FilterPass, TruthSide, assess};
 
 const RATE_HZ: f64 = 100.0;
 
@@ -69,6 +69,38 @@ fn a_vehicle_that_stands_has_the_closed_forms_of_each_process() {
     let [v, _] = standing(Process::Ar1(Ar1::new(phi, 1e-8).unwrap()));
     let variance = 1e-8 / (1.0 - phi * phi);
     near(v, 2.0 * variance * time * time * (t / time - 1.0 + (-t / time).exp()));
+}
+
+/// A drift of the gyroscope moves the velocity that the filter works out for its antenna: one that knows nothing of its
+/// velocity takes it from the first fix, and is off by C (rate error × arm), whatever it did before. The three axes
+/// drift alike, by n samples of the slope: the error is 2 m times that across the arm and down. White noise of the
+/// gyroscope is none here, and believing 1e-6 of the velocity of a fix that is known to 1 mm/s is none either.
+#[test]
+fn a_drift_of_the_gyroscope_is_felt_at_the_end_of_a_lever_arm() {
+    let (slope, arm_m, n) = (1e-6, 2.0, 2000.0);
+    let gyro = Composite::new(vec![Process::Drift(Drift::new(slope).unwrap())]);
+    let truth = Model::pooled(RATE_HZ, &Composite::default(), &gyro);
+    let path = trajectory(vec![still(21.0)]);
+    let mut scenario = Scenario::default();
+    scenario.initial.vel_sigma_m_s = [100.0; 3];
+    scenario.gnss.lever_arm_m = [arm_m, 0.0, 0.0];
+    (scenario.gnss.pos_sigma_m, scenario.gnss.vel_sigma_m_s) = ([1e6; 3], Some([1e-3; 3]));
+    let outages = [Outage { start_s: 0.0, end_s: n / RATE_HZ }];
+    let track = scenario.track(&path, &truth, &outages).unwrap();
+    let white = |sigma2| Composite::new(vec![Process::White(White::new(sigma2).unwrap())]);
+    let believed = Model::pooled(RATE_HZ, &white(1e-4), &white(1e-8));
+    let beliefs = [Belief::new(&believed, FilterStates::Reduced15, 1.0, 800.0).unwrap()];
+    let experiment = scenario.experiment(&path, Truth::Model(&truth), &beliefs, &outages, 1);
+    let sources = TruthSide::sources(&experiment, &truth);
+    let drift = sources.iter().find(|source| source.name == DRIFT).unwrap();
+    let law = FilterPass::new(&track, &beliefs[0]).errors(&drift.side);
+    let fix = law.reports.iter().find(|report| report.fix).unwrap();
+    assert_eq!(fix.after_s, n / RATE_HZ);
+    let [north, east, down] = [3, 4, 5].map(|i| fix.rmse()[i]);
+    let expected = arm_m * slope * n;
+    for found in [north.hypot(east), down] {
+        assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
+    }
 }
 
 /// A model of every process but drift, and a filter that believes in a quarter of its bias and white noise.

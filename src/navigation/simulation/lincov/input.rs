@@ -116,7 +116,8 @@ impl Source {
         Self { decay: phi, drive, initial: sigma * sigma, position: Some(component), ..NONE }
     }
 
-    /// Error of the last of `samples` samples per unit of the state.
+    /// Error that is there after `samples` samples per unit of the state: biases count and drifts at their age, noise
+    /// of single samples does not.
     pub(super) fn share(&self, samples: f64) -> f64 {
         self.after + self.ramp * samples
     }
@@ -150,11 +151,6 @@ impl Source {
         step.q_mean /= n * n;
         step.q_cross /= n;
         step
-    }
-
-    /// Coefficient of the error that is there at an instant: biases count, noise of single samples does not.
-    pub(super) const fn present(&self) -> f64 {
-        self.after
     }
 
     /// Without what drives it: a filter's estimate of the state, which starts at zero.

@@ -160,7 +160,8 @@ impl Joint {
         let mut b: Vec<f64> = self.xb.iter().map(product).collect();
         let mut t: Vec<f64> = self.xt.iter().map(product).collect();
         let mut s = r;
-        let coefficients = |s: &[Source]| -> Vec<f64> { s.iter().map(|x| row.coefficient(x)).collect() };
+        let coefficients =
+            |s: &[Source]| -> Vec<f64> { s.iter().map(|x| row.coefficient(x, self.elapsed)).collect() };
         let (hb, ht) = (coefficients(&self.sources_b), coefficients(&self.sources_t));
         // only a velocity on a lever arm feels the gyroscope, only a position the receiver's correlated error
         if hb.iter().chain(&ht).any(|h| *h != 0.0) {

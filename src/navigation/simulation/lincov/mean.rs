@@ -53,7 +53,7 @@ impl Mean {
     pub(super) fn innovation(&self, row: &Row) -> f64 {
         let of_x: f64 = self.x.iter().zip(&row.h).map(|(x, h)| x * h).sum();
         let measured = |states: &[f64], sources: &[Source]| -> f64 {
-            states.iter().zip(sources).map(|(x, s)| x * row.coefficient(s)).sum()
+            states.iter().zip(sources).map(|(x, s)| x * row.coefficient(s, self.elapsed)).sum()
         };
         of_x + measured(&self.b, &self.sources_b) + measured(&self.t, &self.sources_t)
     }

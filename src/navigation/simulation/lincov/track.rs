@@ -53,17 +53,18 @@ pub(super) struct Row {
 }
 
 impl Row {
-    /// The coefficient of a source's state in the measurement, beside its part through the navigation error.
-    pub(super) fn coefficient(&self, source: &Source) -> f64 {
+    /// The coefficient of a source's state in the measurement after `elapsed` samples, beside its part through the
+    /// navigation error.
+    pub(super) fn coefficient(&self, source: &Source, elapsed: f64) -> f64 {
         if let Some(component) = source.position {
             return f64::from(u8::from(self.what == Measured::Position(component)));
         }
         match place(source.signal) {
             (0, ..) => 0.0,
             // The coefficient of the lever arm's velocity is per unit of the rate's error, and this is the
-            // error that the source has at the instant.
-            (_, axis, None) => source.present() * self.h[NAV + axis],
-            (_, axis, Some(by)) => source.present() * (self.h[NAV + axis] * self.omega_ib_b[by]),
+            // error that the source has at the instant: a bias its value, a drift its slope times its age.
+            (_, axis, None) => source.share(elapsed) * self.h[NAV + axis],
+            (_, axis, Some(by)) => source.share(elapsed) * (self.h[NAV + axis] * self.omega_ib_b[by]),
         }
     }
 }
