@@ -11,18 +11,21 @@ use serde::{Serialize, Serializer};
 /// d ln RMSE / d ln parameter of each reported state: by how many per cent an error grows where a parameter of the true
 /// noise is one per cent larger, on all axes of its sensor, and the filter stays as it is. Of a correlated process the
 /// parameters are its variance in the model file (of an AR1 that of its innovations) and its correlation time, in
-/// the place of phi or beta. In files an object with the names of the parameters as keys.
+/// the place of phi or beta; an AR1 whose phi is negative has none, and its phi is moved away from zero. In files an
+/// object with the names of the parameters as keys.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensitivities(pub Vec<(String, PerState<f64>)>);
 
 /// Half of a central difference, as a logarithm: its error is of the order of its square.
 const STEP: f64 = 0.01;
 
-/// A parameter of the processes of one label of a sensor.
+/// A quantity of the processes of one label of a sensor.
 struct Varied {
     sensor: Sensor,
     label: String,
-    parameter: Parameter,
+    quantity: &'static str,
+    /// How much larger it can be on all axes, as a logarithm.
+    room: f64,
 }
 
 impl Sensitivities {
@@ -38,11 +41,12 @@ impl Sensitivities {
             .par_iter()
             .map(|varied| {
                 // Only the truth moves; the gains stay those of the filter, which does not know of it.
-                let (more, less) = (ln_rmse(&varied.by(truth, STEP)), ln_rmse(&varied.by(truth, -STEP)));
-                let slope = |(more, less): (&[f64; REPORTED], &[f64; REPORTED])| {
-                    std::array::from_fn(|i| (more[i] - less[i]) / (2.0 * STEP))
+                let difference = varied.difference();
+                let terms = difference.map(|(step, weight)| (ln_rmse(&varied.by(truth, step)), weight));
+                let slope = |end: usize| {
+                    std::array::from_fn(|i| terms.iter().map(|(ends, weight)| weight * ends[end][i]).sum())
                 };
-                more.iter().zip(&less).map(slope).collect()
+                (0..terms[0].0.len()).map(slope).collect()
             })
             .collect();
         let outages = slopes.first().map_or(0, Vec::len);
@@ -54,18 +58,37 @@ impl Sensitivities {
     }
 }
 
+/// What is moved in the place of a parameter of this value: its name, and how much larger it can be, as a logarithm.
+fn quantity(parameter: Parameter, value: f64) -> (&'static str, f64) {
+    match parameter {
+        Parameter::Phi if value > 0.0 => (CORRELATION_TIME, f64::INFINITY),
+        Parameter::Beta => (CORRELATION_TIME, f64::INFINITY),
+        // An alternating process has no correlation time: what moves is phi, between −1 and 0.
+        Parameter::Phi | Parameter::Theta => (parameter.name(), -value.abs().ln()),
+        _ => (parameter.name(), f64::INFINITY),
+    }
+}
+
+const CORRELATION_TIME: &str = "correlation_time";
+
 impl Varied {
-    /// All parameters that are not zero.
+    /// All quantities that are not zero.
     fn all(model: &Model) -> Vec<Self> {
         let mut all: Vec<Self> = Vec::new();
         for channel in Channel::ALL {
             let (sensor, axis) = (channel.sensor, model.axis(channel));
             for (process, label) in axis.processes.iter().zip(axis.labels()) {
                 for (&parameter, value) in process.kind().parameters().iter().zip(process.values()) {
-                    let known = |v: &Self| v.sensor == sensor && v.label == label && v.parameter == parameter;
                     // Zero has no logarithm to move along.
-                    if value != 0.0 && !all.iter().any(known) {
-                        all.push(Self { sensor, label: label.clone(), parameter });
+                    if value == 0.0 {
+                        continue;
+                    }
+                    let (quantity, room) = quantity(parameter, value);
+                    let known =
+                        |v: &&mut Self| v.sensor == sensor && v.label == label && v.quantity == quantity;
+                    match all.iter_mut().find(known) {
+                        Some(varied) => varied.room = varied.room.min(room),
+                        None => all.push(Self { sensor, label: label.clone(), quantity, room }),
                     }
                 }
             }
@@ -75,14 +98,25 @@ impl Varied {
 
     /// `accel.WN.sigma2`, `gyro.AR1_2.correlation_time`.
     fn name(&self) -> String {
-        let parameter = match self.parameter {
-            Parameter::Phi | Parameter::Beta => "correlation_time",
-            other => other.name(),
-        };
-        format!("{}.{}.{parameter}", self.sensor.name(), self.label)
+        format!("{}.{}.{}", self.sensor.name(), self.label, self.quantity)
     }
 
-    /// The model with the parameter times e^`ln`; without change where the parameter cannot be so large.
+    /// Steps of the logarithm and their weights: the sum of weight × value is the derivative.
+    fn difference(&self) -> [(f64, f64); 3] {
+        if self.room > STEP * STEP {
+            // Central. Errors may vary as the reciprocal of what is left to the end of the domain (the variance of an
+            // AR1); with a fortieth of that their derivative is right to a thousandth (1/40²).
+            let step = STEP.min(self.room / 40.0);
+            let weight = 0.5 / step;
+            return [(step, weight), (0.0, 0.0), (-step, -weight)];
+        }
+        // At the end of the domain (theta = ±1): from one side, still of second order. Small, because over n samples the
+        // errors of theta near −1 change as n (1 + theta)².
+        let step = STEP * STEP;
+        [(0.0, 1.5 / step), (-step, -2.0 / step), (-2.0 * step, 0.5 / step)]
+    }
+
+    /// The model with the quantity times e^`ln`.
     fn by(&self, model: &Model, ln: f64) -> Model {
         let mut moved = model.clone();
         for channel in Channel::ALL.into_iter().filter(|c| c.sensor == self.sensor) {
@@ -97,15 +131,17 @@ impl Varied {
     }
 
     fn moved(&self, process: &Process, ln: f64, rate_hz: f64) -> Process {
-        let change = |value: f64| match self.parameter {
+        let change = |parameter: Parameter, value: f64| match parameter {
             // a correlation time is −1/ln phi, or 1/beta
-            Parameter::Phi => (value.ln() * (-ln).exp()).exp(),
+            Parameter::Phi if value > 0.0 => (value.ln() * (-ln).exp()).exp(),
             Parameter::Beta => value * (-ln).exp(),
             _ => value * ln.exp(),
         };
-        let values = process.kind().parameters().iter().zip(process.values());
-        let values: Vec<f64> =
-            values.map(|(p, value)| if *p == self.parameter { change(value) } else { value }).collect();
+        let moved = |(&parameter, value): (&Parameter, f64)| {
+            let moves = quantity(parameter, value).0 == self.quantity;
+            if moves { change(parameter, value) } else { value }
+        };
+        let values: Vec<f64> = process.kind().parameters().iter().zip(process.values()).map(moved).collect();
         process.kind().process(&values, rate_hz).and_then(Result::ok).unwrap_or(*process)
     }
 }
