@@ -61,9 +61,9 @@ pub struct ReductionQuality {
     /// True RMSE over the filter's own standard deviation at the end of each outage: above 1 it is
     /// overconfident, below 1 overcautious.
     pub outage_end: Vec<PerState<f64>>,
-    /// The same, mean over all epochs.
+    /// The same, mean over all epochs after the start.
     pub mean: PerState<f64>,
-    /// Expected NEES, mean over all epochs; 9 is right.
+    /// Expected NEES, mean over all epochs after the start; 9 is right.
     pub nees: f64,
     /// True RMSE over that of the full filter at the end of each outage; none where the model has no full filter.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -170,16 +170,17 @@ impl ReductionQuality {
     /// From a covariance analysis of the reduced filter and, where there is one, of the full filter.
     #[must_use]
     pub fn of(reduced: &Assessment, full: Option<&Assessment>) -> Self {
-        let n = reduced.reports.len() as f64;
-        let ratios: Vec<[f64; REPORTED]> = reduced.reports.iter().map(Consistency::ratio).collect();
-        // a perfect start has no deviation to be compared with
+        // At the start the errors are those that the filter believes in, or none: that says nothing of it.
+        let later: Vec<&Consistency> = reduced.reports.iter().filter(|r| r.after_s > 0.0).collect();
+        let n = later.len() as f64;
+        let ratios: Vec<[f64; REPORTED]> = later.iter().map(|r| r.ratio()).collect();
         let mean = |i: usize| ratios.iter().map(|r| r[i]).sum::<f64>() / n;
         let over =
             |(a, b): (&Consistency, &Consistency)| PerState(std::array::from_fn(|i| a.rmse[i] / b.rmse[i]));
         Self {
             outage_end: reduced.outage_ends.iter().map(|e| PerState(e.ratio())).collect(),
             mean: PerState(std::array::from_fn(mean)),
-            nees: reduced.reports.iter().map(|r| r.nees).sum::<f64>() / n,
+            nees: later.iter().map(|r| r.nees).sum::<f64>() / n,
             rmse_over_full: full.map(|f| reduced.outage_ends.iter().zip(&f.outage_ends).map(over).collect()),
         }
     }
@@ -284,6 +285,24 @@ mod tests {
         let fitted = a.tau_s.iter().zip(a.model_wv.iter().zip(&a.reduced_wv)).filter(|(tau, _)| **tau > 1.0);
         let worst = fitted.map(|(_, (m, r))| (r / m).ln().abs()).fold(0.0, f64::max);
         assert!((worst / a.misfit - 1.0).abs() < 1e-9, "{worst} {}", a.misfit);
+    }
+
+    /// At the start the errors are drawn from the filter's own belief (or are none): its ratio is 1 (or 0), whatever
+    /// the filter does afterwards.
+    #[test]
+    fn the_start_says_nothing_of_the_filter() {
+        let report = |after_s, rmse, nees| Consistency {
+            after_s,
+            measured: false,
+            sigma: [1.0; REPORTED],
+            rmse: [rmse; REPORTED],
+            nees,
+            divergence: 0.0,
+            log_density: 0.0,
+        };
+        let reports = vec![report(0.0, 1.0, 9.0), report(1.0, 2.0, 36.0), report(2.0, 4.0, 144.0)];
+        let quality = ReductionQuality::of(&Assessment { reports, outage_ends: vec![] }, None);
+        assert_eq!((quality.mean.0, quality.nees), ([3.0; REPORTED], 90.0));
     }
 
     #[test]
