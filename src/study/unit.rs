@@ -5,6 +5,7 @@ use super::inputs::Work;
 use super::plan::{Kept, Plan, Unit};
 use nav_sim_navigation::metrics::{self, EpochMetrics, Expected, Measured, OutageMetrics};
 use nav_sim_navigation::monte_carlo;
+use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::{self, RunRecord, RunResult};
 
 /// What is found of one column.
@@ -85,7 +86,8 @@ impl Finding {
 
     fn reduce(&mut self, kept: Kept) {
         let windows = self.windows();
-        let inside = |t_s: f64| windows.iter().any(|(start, end)| *start <= t_s && t_s < *end);
+        let inside =
+            |t_s: f64| windows.iter().any(|&(start_s, end_s)| Outage { start_s, end_s }.withholds(t_s));
         let keeps = |t_s: f64| kept == Kept::AllEpochs || (kept == Kept::OutageEpochs && inside(t_s));
         match self {
             Self::Sampled(result) => result.epochs.retain(|e| keeps(e.t_s)),

@@ -2,6 +2,7 @@
 
 use super::epoch::{Accuracy, EpochMetrics, epochs};
 use super::estimate::{Estimate, PerState, Quantile, quantile};
+use crate::sensors::outage::Outage;
 use crate::simulation::{OutageRecord, REPORTED, RunResult};
 
 /// What the runs say about one outage (m, m/s, degrees, s).
@@ -67,8 +68,8 @@ pub(super) fn within(
     (start_s, end_s): (f64, f64),
     epochs: &[EpochMetrics],
 ) -> impl Iterator<Item = &EpochMetrics> + Clone {
-    // a nanosecond of slack: sample times are multiples of 1/rate, outage times are typed
-    epochs.iter().filter(move |e| start_s <= e.t_s + 1e-9 && e.t_s + 1e-9 < end_s)
+    let outage = Outage { start_s, end_s };
+    epochs.iter().filter(move |e| outage.withholds(e.t_s))
 }
 
 /// Statistics of an outage from the records of the runs; the mean RMSE, which needs the epochs, is NaN.

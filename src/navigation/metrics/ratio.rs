@@ -5,6 +5,7 @@ use super::epoch::{EpochMetrics, epochs};
 use super::estimate::{Estimate, PerState, SampleSize};
 use super::expected::Expected;
 use super::verdict::Verdict;
+use crate::sensors::outage::Outage;
 use crate::simulation::{OutageRecord, REPORTED, RunRecord, RunResult};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
@@ -209,8 +210,10 @@ fn outage(
     (start_s, end_s): (f64, f64),
     paired: bool,
 ) -> OutageComparison {
-    let is_within = |row: &&EpochRow| start_s <= row.t_s && row.t_s < end_s;
-    let pick = |e: &Measured| e.epochs.iter().filter(is_within).cloned().collect::<Vec<_>>();
+    let outage = Outage { start_s, end_s };
+    let pick = |e: &Measured| {
+        e.epochs.iter().filter(|row| outage.withholds(row.t_s)).cloned().collect::<Vec<EpochRow>>()
+    };
     let (c, r) = (pick(candidate), pick(reference));
     let records = records(candidate, reference, index, paired);
     let windows = [candidate.independent_windows, reference.independent_windows].into_iter().flatten();

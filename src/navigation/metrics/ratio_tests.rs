@@ -31,6 +31,23 @@ fn ratio_errors_are_means_over_the_outage_signed_and_absolute() {
     assert!((state.rmse_end.pct - 100.0).abs() < 1e-12, "{state:?}");
 }
 
+/// Epochs are the trajectory's start plus whole seconds, outages are typed: 0.36 + 1 is below 1.36 in a double, and yet
+/// the fix at 1.36 s is the first that is missing, and the next epoch but one would be the first after an outage until 1.36 s.
+#[test]
+fn an_epoch_at_a_typed_time_is_on_the_side_of_its_fix() {
+    assert!(0.36 + 1.0 < 1.36);
+    for (outage, expected) in [((1.36, 3.36), 5.0), ((0.36, 1.36), 20.0)] {
+        let shifted = |asee: &[f64]| {
+            let mut made = experiment(asee, vec![run(0, 1.5, 1.0), run(1, 1.5, 1.0)]);
+            made.epochs.iter_mut().for_each(|epoch| epoch.t_s += 0.36);
+            Measured { outages: vec![outage], ..made }
+        };
+        let (candidate, reference) = (shifted(&[1.2, 1.2, 1.8, 9.0]), shifted(&[1.0, 1.0, 2.0, 1.0]));
+        let found = compare(&candidate, &reference, true).unwrap()[0].states[0].asee.pct;
+        assert!((found - expected).abs() < 1e-12, "{outage:?}: {found}");
+    }
+}
+
 #[test]
 fn proportional_runs_leave_no_doubt_when_paired_and_some_when_not() {
     let scaled = |factor: f64| (0..10).map(|k| run(k, factor * (1.0 + 0.1 * k as f64), 1.0)).collect();

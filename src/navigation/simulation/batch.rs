@@ -278,8 +278,7 @@ impl Candidate {
         let outages = plan.experiment.outages.iter().zip(&plan.outages);
         for ((outage, (reports, _)), records) in outages.zip(&mut self.outages) {
             let inside = outage.withholds(event.t_s);
-            // The slack of `Outage::withholds`, so that the fix at the end itself is after the outage.
-            let after = event.t_s + 1e-9 - outage.end_s;
+            let after = outage.is_over(event.t_s);
             for lane in 0..self.live {
                 let record = &mut records[lane];
                 if inside {
@@ -288,7 +287,7 @@ impl Candidate {
                     }
                 }
                 let horizontal = epoch.error[0][lane].hypot(epoch.error[1][lane]);
-                if after >= 0.0 && record.reconvergence_s.is_nan() && horizontal <= receiver {
+                if after && record.reconvergence_s.is_nan() && horizontal <= receiver {
                     record.reconvergence_s = event.t_s - outage.end_s;
                 }
             }

@@ -240,7 +240,7 @@ pub(crate) fn fan_epochs(t_s: &[f64], outages: &[Outage]) -> Vec<usize> {
 
 fn effects(outage: &Outage, events: &[Event]) -> (f64, usize) {
     let reports = events.iter().filter(|e| e.report && outage.withholds(e.t_s)).count();
-    let first_fix = events.iter().position(|e| e.fix && e.t_s + 1e-9 >= outage.end_s);
+    let first_fix = events.iter().position(|e| e.fix && outage.is_over(e.t_s));
     (reports as f64, first_fix.unwrap_or(events.len() - 1))
 }
 

@@ -25,6 +25,10 @@ pub struct Outage {
     pub end_s: f64,
 }
 
+/// What a time that is typed and the same time as a multiple of 1/rate differ by at most (s): times of days, 1e5 s, are
+/// rounded to 1.5e-11 s, so that some tens of roundings are less, and no two samples are as near.
+const SLACK_S: f64 = 1e-9;
+
 impl Outage {
     /// The two outages of [Minaretzis et al.](crate::bibliography::Minaretzis24), Section V: one on a
     /// straight stretch, one with turns.
@@ -34,9 +38,13 @@ impl Outage {
     /// Whether a fix at `t_s` is missing.
     #[must_use]
     pub fn withholds(&self, t_s: f64) -> bool {
-        // a nanosecond of slack: sample times are multiples of 1/rate, outage times are typed
-        let t_s = t_s + 1e-9;
-        self.start_s <= t_s && t_s < self.end_s
+        self.start_s <= t_s + SLACK_S && !self.is_over(t_s)
+    }
+
+    /// Whether a fix at `t_s` comes after it.
+    #[must_use]
+    pub(crate) fn is_over(&self, t_s: f64) -> bool {
+        self.end_s <= t_s + SLACK_S
     }
 
     /// Checks that it is finite and lasts.
