@@ -13,7 +13,7 @@ use crate::sensors::outage::{
     FixedData, Fixes, Outage, OutageError, OutagePlan, PeriodicOutages, PlacedOutages, RandomOutages,
 };
 use crate::simulation::lincov::{Alike, Track, reduced_belief};
-use crate::simulation::{Experiment, ExperimentError};
+use crate::simulation::{Experiment, ExperimentError, samples_per};
 use crate::trajectory::Trajectory;
 use crate::units::{Probability, SettingError};
 use schemars::JsonSchema;
@@ -178,8 +178,7 @@ impl Scenario {
 
     /// A measurement must fall on an IMU sample: one that does not would be used late or never.
     fn meets_imu_samples(&self, key: &str, rate_hz: f64) -> Result<(), SettingError> {
-        let samples = self.imu.rate_hz / rate_hz;
-        if samples >= 1.0 - 1e-9 && (samples - samples.round()).abs() <= 1e-9 * samples {
+        if samples_per(self.imu.rate_hz, rate_hz).is_some() {
             return Ok(());
         }
         let requirement = format!("imu.rate_hz = {} must be a whole multiple of it", self.imu.rate_hz);

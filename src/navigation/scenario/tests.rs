@@ -92,6 +92,19 @@ fn what_is_expected_beside_the_model_adds_states_to_any_filter() {
     assert_eq!(states("initial.accel_scale_sigma_ppm = 100"), (18, 24));
 }
 
+/// What is checked is what is simulated: a third of the IMU's rate with seven digits or more, which has every third sample.
+#[test]
+fn a_rate_is_accepted_where_it_is_simulated() {
+    let model = Model::pooled(100.0, &Composite::default(), &Composite::default());
+    for (rate, accepted) in [("33.33333", true), ("33.333333333", true), ("33.333", false), ("200", false)] {
+        for sensor in ["gnss", "baro.sigma_m = 1\nbaro"] {
+            let scenario: Scenario = toml::from_str(&format!("{sensor}.rate_hz = {rate}")).unwrap();
+            let simulated = scenario.track(&standing(), &model, &[]).is_ok();
+            assert_eq!((scenario.validate().is_ok(), simulated), (accepted, accepted), "{sensor} {rate}");
+        }
+    }
+}
+
 #[test]
 fn no_outage_may_be_asked_for() {
     let scenario: Scenario = toml::from_str("outage = []").unwrap();

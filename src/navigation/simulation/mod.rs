@@ -8,6 +8,7 @@ mod recording;
 
 pub use batch::{Batch, run_batch};
 pub(crate) use plan::fan_epochs;
+pub(crate) use plan::samples_per;
 pub use plan::{Experiment, ExperimentError, Plan};
 pub use recording::{Recording, record};
 

@@ -259,8 +259,15 @@ fn check_rotation(ideal: &[ImuSample], start_s: f64, rate_hz: f64) -> Result<(),
 /// Reports at every second from the start, fixes at every GNSS epoch after it, in time order.
 fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, ExperimentError> {
     let Experiment { trajectory, rate_hz, gnss, .. } = *experiment;
-    let per_fix = samples_per(rate_hz, gnss.rate_hz, "GNSS")?;
-    let baro = experiment.baro.map(|b| samples_per(rate_hz, b.rate_hz, "the barometer")).transpose()?;
+    let step = |fix_hz: f64, what| {
+        samples_per(rate_hz, fix_hz).ok_or(ExperimentError::FixBetweenSamples {
+            imu_hz: rate_hz,
+            fix_hz,
+            what,
+        })
+    };
+    let per_fix = step(gnss.rate_hz, "GNSS")?;
+    let baro = experiment.baro.map(|b| step(b.rate_hz, "the barometer")).transpose()?;
     // Rounded for each second anew: a rate that is no whole number would drift against the seconds.
     let reports = (0_u32..).map(|s| (f64::from(s) * rate_hz).round() as usize);
     let reports: Vec<usize> = reports.take_while(|k| *k <= samples).collect();
@@ -295,15 +302,14 @@ fn schedule(experiment: &Experiment<'_>, samples: usize) -> Result<Vec<Event>, E
     all.into_iter().map(event).collect()
 }
 
-/// IMU samples from one measurement to the next.
-fn samples_per(imu_hz: f64, fix_hz: f64, what: &'static str) -> Result<usize, ExperimentError> {
+/// IMU samples from one measurement to the next; none where measurements would fall between samples, to be used late or
+/// never.
+pub(crate) fn samples_per(imu_hz: f64, fix_hz: f64) -> Option<usize> {
     let samples = imu_hz / fix_hz;
     // Relative to the count: a rate that was written with seven digits or more still counts as a whole
     // divisor.
-    if samples < 0.5 || (samples - samples.round()).abs() > 1e-6 * samples {
-        return Err(ExperimentError::FixBetweenSamples { imu_hz, fix_hz, what });
-    }
-    Ok(samples.round() as usize)
+    let is_whole = samples >= 0.5 && (samples - samples.round()).abs() <= 1e-6 * samples;
+    is_whole.then(|| samples.round() as usize)
 }
 
 /// Position (lat, lon, h) and velocity in n of the antenna.

@@ -37,11 +37,10 @@ impl<'a> FixedData<'a> {
     fn has_fix_in(&self, outage: &Outage) -> bool {
         match self.fixes {
             Fixes::Every { interval_s } => {
-                let since_start = (outage.start_s - self.span_s.0) / interval_s;
-                // The first fix not before the outage, at the earliest one interval after the start: there is
-                // no fix at the start itself.
-                let next = (since_start - 1e-6).ceil().max(1.0);
-                self.span_s.0 + next * interval_s < outage.end_s
+                // The last fix before the outage and the first after its start, which rounding may exchange; at the
+                // earliest one interval after the start of the data: there is no fix at the start itself.
+                let last = ((outage.start_s - self.span_s.0) / interval_s).floor().max(1.0);
+                [last, last + 1.0].iter().any(|k| outage.withholds(self.span_s.0 + k * interval_s))
             }
             Fixes::At(times_s) => times_s.iter().any(|t_s| outage.withholds(*t_s)),
         }
