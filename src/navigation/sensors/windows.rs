@@ -50,17 +50,16 @@ impl<'a> Windows<'a> {
         let total: f64 = self.recordings.iter().map(|r| r.len() as f64).sum();
         // The upper 53 bits: as many as a double holds, so that the fraction stays below 1.
         let mut at = (point >> 11) as f64 / (1_u64 << 53) as f64 * total;
-        for (index, recording) in self.recordings.iter().enumerate() {
-            let length = recording.len() as f64;
-            if at < length || index + 1 == self.recordings.len() {
-                // Scaled to the possible starts rather than refused: a window never runs over the end of its
-                // recording.
-                let starts = recording.len() - samples + 1;
-                return (index, ((at / length * starts as f64) as usize).min(starts - 1));
-            }
-            at -= length;
+        let length = |index: usize| self.recordings[index].len();
+        let mut index = 0;
+        // The last recording has what rounding leaves over.
+        while index + 1 < self.recordings.len() && at >= length(index) as f64 {
+            at -= length(index) as f64;
+            index += 1;
         }
-        (0, 0)
+        // Scaled to the possible starts rather than refused: a window never runs over the end of its recording.
+        let starts = length(index) - samples + 1;
+        (index, ((at / length(index) as f64 * starts as f64) as usize).min(starts - 1))
     }
 }
 
