@@ -116,7 +116,7 @@ pub mod earth {
 /// GNSS fixes.
 pub mod gnss {
     #[doc(inline)]
-    pub use nav_sim_navigation::gnss::GnssFix;
+    pub use nav_sim_navigation::gnss::{GnssFix, GnssVelocity};
 }
 
 /// Reference trajectories, of samples or of a motion profile.

@@ -91,7 +91,8 @@ fn beside(states: FilterStates, initial: &InitialSettings) -> InitialSettings {
 fn receiver(gnss: &[GnssFix], interval_s: f64) -> GnssSettings {
     let defaults = GnssSettings::default();
     let position = |i: usize| middle(gnss.iter().map(|fix| fix.pos_sigma_n[i]).collect());
-    let velocity = |i: usize| middle(gnss.iter().filter_map(|fix| Some(fix.velocity?.1[i])).collect());
+    let velocity =
+        |i: usize| middle(gnss.iter().filter_map(|fix| Some(fix.velocity?.sigma_n()[i])).collect());
     let velocities = [0, 1, 2].map(velocity);
     let has_velocity = velocities.iter().all(Option::is_some);
     GnssSettings {

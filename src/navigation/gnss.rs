@@ -1,6 +1,6 @@
 //! GNSS fixes.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// One position (and velocity) fix with the standard deviations that belong to it.
@@ -16,9 +16,48 @@ pub struct GnssFix {
     pub h: f64,
     /// Position standard deviations north, east, down (m).
     pub pos_sigma_n: DVec3,
-    /// Velocity with respect to the Earth in NED (m/s) and its standard deviations, when measured; where the vertical one
-    /// is not, its deviation is [`OPEN_M_S`].
-    pub velocity: Option<(DVec3, DVec3)>,
+    /// Velocity of the antenna, when measured.
+    pub velocity: Option<GnssVelocity>,
+}
+
+/// A measured velocity with respect to the Earth, in NED.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GnssVelocity {
+    /// North, east (m/s).
+    pub horizontal: DVec2,
+    /// Standard deviations of these (m/s).
+    pub horizontal_sigma: DVec2,
+    /// Down and its standard deviation (m/s), where measured: NMEA sentences have none.
+    pub down: Option<(f64, f64)>,
+}
+
+/// Standard deviation (m/s) with which a filter of three components is told a vertical velocity of 0 that was not measured:
+/// nothing.
+const OPEN_M_S: f64 = 1000.0;
+
+impl GnssVelocity {
+    /// With all three components measured: velocity and standard deviations (m/s).
+    #[must_use]
+    pub fn new(v_n: DVec3, sigma_n: DVec3) -> Self {
+        Self {
+            horizontal: v_n.truncate(),
+            horizontal_sigma: sigma_n.truncate(),
+            down: Some((v_n.z, sigma_n.z)),
+        }
+    }
+
+    /// North, east, down (m/s), for who takes three components: where the last is not measured it is 0, and its
+    /// standard deviation too large to tell anything.
+    #[must_use]
+    pub fn v_n(&self) -> DVec3 {
+        self.horizontal.extend(self.down.map_or(0.0, |(v, _)| v))
+    }
+
+    /// Standard deviations of [`Self::v_n`] (m/s).
+    #[must_use]
+    pub fn sigma_n(&self) -> DVec3 {
+        self.horizontal_sigma.extend(self.down.map_or(OPEN_M_S, |(_, sigma)| sigma))
+    }
 }
 
 /// Standard deviations of fixes that state none: north, east, down.
@@ -30,17 +69,14 @@ pub struct FixSigma {
     pub vel_m_s: Option<[f64; 3]>,
 }
 
-/// Standard deviation of a vertical velocity that was not measured (m/s): it tells a filter nothing.
-pub const OPEN_M_S: f64 = 1000.0;
-
 impl GnssFix {
     /// With its standard deviations of position and velocity times these; what was not measured stays open.
     #[must_use]
     pub fn with_sigmas_times(mut self, position: f64, velocity: f64) -> Self {
         self.pos_sigma_n *= position;
-        if let Some((_, sigma)) = &mut self.velocity {
-            let scaled = *sigma * velocity;
-            *sigma = if sigma.z >= OPEN_M_S { scaled.truncate().extend(sigma.z) } else { scaled };
+        if let Some(measured) = &mut self.velocity {
+            measured.horizontal_sigma *= velocity;
+            measured.down = measured.down.map(|(v, sigma)| (v, sigma * velocity));
         }
         self
     }
@@ -49,11 +85,7 @@ impl GnssFix {
     /// in the order of north, east, down of the position and of the velocity.
     #[must_use]
     pub fn components(&self) -> usize {
-        match self.velocity {
-            None => 3,
-            Some((_, sigma)) if sigma.z >= OPEN_M_S => 5,
-            Some(_) => 6,
-        }
+        3 + self.velocity.map_or(0, |measured| 2 + usize::from(measured.down.is_some()))
     }
 }
 
@@ -61,21 +93,28 @@ impl GnssFix {
 mod tests {
     use super::*;
 
-    /// A receiver that is twice as good as it says has still not measured the vertical velocity.
+    /// A receiver that is twice as good as it says has still not measured the vertical velocity; one that measures it
+    /// badly has.
     #[test]
     fn what_was_not_measured_stays_open() {
-        let sigma = DVec3::new(0.1, 0.2, OPEN_M_S);
-        let fix = GnssFix {
+        let fix = |down| GnssFix {
             t_s: 0.0,
             lat: 0.0,
             lon: 0.0,
             h: 0.0,
             pos_sigma_n: DVec3::ONE,
-            velocity: Some((DVec3::ZERO, sigma)),
+            velocity: Some(GnssVelocity {
+                horizontal: DVec2::ZERO,
+                horizontal_sigma: DVec2::new(0.1, 0.2),
+                down,
+            }),
         };
-        let halved = fix.with_sigmas_times(0.5, 0.5);
-        assert_eq!((fix.components(), halved.components()), (5, 5));
+        let halved = fix(None).with_sigmas_times(0.5, 0.5);
+        assert_eq!((fix(None).components(), halved.components()), (5, 5));
         assert_eq!(halved.pos_sigma_n, DVec3::splat(0.5));
-        assert_eq!(halved.velocity.unwrap().1, DVec3::new(0.05, 0.1, OPEN_M_S));
+        let velocity = halved.velocity.unwrap();
+        assert_eq!((velocity.horizontal_sigma, velocity.down), (DVec2::new(0.05, 0.1), None));
+        let bad = fix(Some((3.0, 1500.0))).with_sigmas_times(0.5, 0.5);
+        assert_eq!((bad.components(), bad.velocity.unwrap().sigma_n().z), (6, 750.0));
     }
 }

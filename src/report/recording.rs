@@ -42,7 +42,8 @@ pub(crate) fn gnss_csv(fixes: &[GnssFix]) -> String {
             s.y,
             s.z
         );
-        if let Some((v, s)) = f.velocity {
+        if let Some(velocity) = f.velocity {
+            let (v, s) = (velocity.v_n(), velocity.sigma_n());
             let _ = write!(text, ",{:.5},{:.5},{:.5},{},{},{}", v.x, v.y, v.z, s.x, s.y, s.z);
         }
         text.push('\n');

@@ -276,8 +276,8 @@ fn aligned(recording: &Recording, settings: &Settings) -> Alignment {
 fn a_start_that_the_next_minute_contradicts_is_given_up_for_a_later_one() {
     let (trajectory, mut recording) = one(DRIVES[0].1);
     for fix in recording.gnss.iter_mut().filter(|f| (15.0..30.0).contains(&f.t_s)) {
-        let (v, sigma) = fix.velocity.unwrap();
-        fix.velocity = Some((DVec3::new(-v.y, v.x, v.z), sigma));
+        let velocity = fix.velocity.as_mut().unwrap();
+        velocity.horizontal = velocity.horizontal.perp();
     }
     let found = aligned(&recording, &settings());
     let z = normalised(&found, &trajectory);

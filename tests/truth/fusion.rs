@@ -8,7 +8,7 @@ use nav_sim::ekf::{Belief, FilterStates, InitialSettings};
 use nav_sim::formats::{model_file, trajectory_file};
 use nav_sim::frames::RollPitchYaw;
 use nav_sim::fusion::{Recorded, Row, Settings, Solution, Start, Use, fuse, outcome};
-use nav_sim::gnss::GnssFix;
+use nav_sim::gnss::{GnssFix, GnssVelocity};
 use nav_sim::imu::{ImuIncrement, Sensor};
 use nav_sim::noise::Model;
 use nav_sim::scenario::Scenario;
@@ -122,8 +122,7 @@ fn what_is_not_measured_is_no_component_of_the_nis() {
     let (mut nis, mut fixes) = (0.0, 0);
     recorded(&trajectory, &model(), &GnssSettings::default(), 4, |recording, start| {
         let open = |fix: &GnssFix| {
-            let horizontal =
-                |(v, sigma): (DVec3, DVec3)| (v.truncate().extend(0.0), sigma.truncate().extend(OPEN_M_S));
+            let horizontal = |velocity| GnssVelocity { down: None, ..velocity };
             GnssFix { velocity: fix.velocity.map(horizontal), ..*fix }
         };
         let gnss: Vec<GnssFix> = recording.gnss.iter().map(open).collect();
@@ -146,7 +145,7 @@ fn fixes_between_samples_are_used_at_their_own_time() {
         let fix = |k: u32, late: f64| {
             let t_s = f64::from(k) + 0.0037;
             let s = trajectory.state(t_s - late);
-            let velocity = Some((s.v_n, DVec3::splat(0.01)));
+            let velocity = Some(GnssVelocity::new(s.v_n, DVec3::splat(0.01)));
             GnssFix { t_s, lat: s.lat, lon: s.lon, h: s.h, pos_sigma_n: DVec3::splat(0.01), velocity }
         };
         let start = Start { state: trajectory.state(trajectory.start_s()), ..start.clone() };

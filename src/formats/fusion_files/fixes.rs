@@ -8,7 +8,7 @@ use crate::formats::trajectory_file::table::{Table, text};
 use crate::formats::{FileError as Error, Kind, Place, Setting};
 use glam::DVec3;
 use nav_sim_navigation::earth::{MAX_LATITUDE, geodetic_to_ecef};
-use nav_sim_navigation::gnss::{FixSigma, GnssFix};
+use nav_sim_navigation::gnss::{FixSigma, GnssFix, GnssVelocity};
 use nav_sim_signal::units::DEG;
 use std::f64::consts::PI;
 use std::path::Path;
@@ -302,7 +302,8 @@ fn fix(columns: &Columns, row: &[f64], unsaid: Option<&FixSigma>) -> GnssFix {
         lon: value(2),
         h: value(3),
         pos_sigma_n: sigma(4, unsaid.map(|s| s.pos_m)),
-        velocity: has_velocity.then(|| (columns.triad(7, row), sigma(10, unsaid.and_then(|s| s.vel_m_s)))),
+        velocity: has_velocity
+            .then(|| GnssVelocity::new(columns.triad(7, row), sigma(10, unsaid.and_then(|s| s.vel_m_s)))),
     }
 }
 

@@ -160,7 +160,7 @@ impl Turned {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::gnss::GnssFix;
+    use crate::gnss::{GnssFix, GnssVelocity};
 
     /// A drive of ten minutes at 10 m/s whose course turns by `rate(t)`, an IMU at 50 Hz in any attitude, and fixes whose
     /// clock is `late_s` ahead of the IMU's.
@@ -186,7 +186,7 @@ mod tests {
                     lon: 0.1,
                     h: 0.0,
                     pos_sigma_n: DVec3::ONE,
-                    velocity: Some((v_n, DVec3::splat(0.05))),
+                    velocity: Some(GnssVelocity::new(v_n, DVec3::splat(0.05))),
                 });
             }
         }

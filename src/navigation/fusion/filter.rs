@@ -62,14 +62,13 @@ impl Filter {
     }
 
     fn fix(&self, fix: &GnssFix) -> Fix {
-        let (velocity, vel_sigma) = fix.velocity.unzip();
         Fix {
             lat: Lanes::splat(fix.lat),
             lon: Lanes::splat(fix.lon),
             h: Lanes::splat(fix.h),
-            v_n: velocity.map(Vec3::splat),
+            v_n: fix.velocity.map(|velocity| Vec3::splat(velocity.v_n())),
             pos_sigma_m: fix.pos_sigma_n,
-            vel_sigma_m_s: vel_sigma.unwrap_or(DVec3::ONE),
+            vel_sigma_m_s: fix.velocity.map_or(DVec3::ONE, |velocity| velocity.sigma_n()),
             lever_arm_b: self.lever_arm_s,
         }
     }

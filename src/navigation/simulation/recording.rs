@@ -4,7 +4,7 @@ use super::Plan;
 use super::batch::nominal_start;
 use crate::earth::radii;
 use crate::frames::NavState;
-use crate::gnss::GnssFix;
+use crate::gnss::{GnssFix, GnssVelocity};
 use crate::imu::{Channel, ImuIncrement, Sensor};
 use crate::rng::StreamKey;
 use crate::sensors::defects::Defects;
@@ -41,7 +41,7 @@ pub fn record(plan: &Plan<'_>, run: u64) -> Recording {
             lon: antenna.y + dr.y / ((r.transverse + antenna.z) * antenna.x.cos()),
             h: antenna.z - dr.z,
             pos_sigma_n: experiment.gnss.pos_sigma_m.into(),
-            velocity: sigma.map(|sigma| (velocity + dv, sigma.into())),
+            velocity: sigma.map(|sigma| GnssVelocity::new(velocity + dv, sigma.into())),
         })
     });
     Recording { gnss: gnss.collect(), imu: inertial(plan, key), start: nominal_start(plan, key) }

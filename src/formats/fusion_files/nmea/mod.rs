@@ -12,7 +12,7 @@ use super::fixes::Fixes;
 use crate::formats::{FileError as Error, Setting};
 use clock::{Clock, Dates};
 use glam::{DVec2, DVec3};
-use nav_sim_navigation::gnss::{FixSigma, GnssFix, OPEN_M_S};
+use nav_sim_navigation::gnss::{FixSigma, GnssFix, GnssVelocity};
 use sentence::{address, angle, date_of_rmc, fields, horizontal, midnight, time_of_day, unchecked_fields};
 
 /// Seconds of a day.
@@ -178,8 +178,9 @@ pub(super) fn fixes(
             let message = "a fix without standard deviations: no GST sentence of its time states them";
             return Err(Error::contents(path, epoch.line, message).setting(Setting::FixSigma));
         };
-        let velocity = epoch.velocity.zip(unsaid.and_then(|s| s.vel_m_s)).map(|((v, open), [n, e, _])| {
-            (v.extend(0.0), DVec3::new(n.hypot(open), e.hypot(open), OPEN_M_S))
+        let velocity = epoch.velocity.zip(unsaid.and_then(|s| s.vel_m_s)).map(|((v, course), [n, e, _])| {
+            let horizontal_sigma = DVec2::new(n.hypot(course), e.hypot(course));
+            GnssVelocity { horizontal: v, horizontal_sigma, down: None }
         });
         let t_s = clock.origin_s + DAY_S * epoch.day + epoch.time_s;
         fixes.push((epoch.line as u64, GnssFix { t_s, lat, lon, h, pos_sigma_n, velocity }));

@@ -45,9 +45,9 @@ fn sentences_of_the_manuals() {
     let [fix] = read(text)[..] else { panic!() };
     assert!((fix.lat / DEG - 48.1173).abs() < 1e-9 && (fix.lon / DEG - 11.0 - 31.0 / 60.0).abs() < 1e-9);
     assert!((fix.h - 592.3).abs() < 1e-9 && fix.t_s == 45_319.0, "{fix:?}");
-    let (v, sigma) = fix.velocity.unwrap();
+    let GnssVelocity { horizontal: v, horizontal_sigma: sigma, down } = fix.velocity.unwrap();
     assert!((v.length() - 22.4 * 0.514_444_444).abs() < 1e-6 && (v.y.atan2(v.x) / DEG - 84.4).abs() < 1e-9);
-    assert_eq!((sigma, fix.pos_sigma_n), (DVec3::new(0.1, 0.1, OPEN_M_S), DVec3::new(2.0, 2.0, 4.0)));
+    assert_eq!((sigma, down, fix.pos_sigma_n), (DVec2::splat(0.1), None, DVec3::new(2.0, 2.0, 4.0)));
     // Trimble's, and u-blox's
     assert!(fields("$GPGST,172814.0,0.006,0.023,0.020,273.6,0.023,0.020,0.031*6A").is_ok());
     assert!(fields("$GPGST,082356.00,1.8,,,,1.7,1.3,2.2*7E").is_ok());
@@ -72,10 +72,10 @@ fn what_has_one_time_is_one_fix_from_any_talker() {
     assert_eq!(all.iter().map(|f| f.t_s).collect::<Vec<_>>(), [86_399.5, 86_400.0]);
     assert_eq!((all[0].pos_sigma_n, all[0].h), (DVec3::new(1.7, 1.3, 2.2), 369.5));
     assert!((all[0].lat / DEG + 46.5).abs() < 1e-9 && (all[0].lon / DEG + 6.5).abs() < 1e-9);
-    assert!(all[0].velocity.unwrap().0.distance(DVec3::new(0.0, 10.0, 0.0)) < 1e-9);
+    assert!(all[0].velocity.unwrap().horizontal.distance(DVec2::new(0.0, 10.0)) < 1e-9);
     // at rest there is no course
-    let (v, sigma) = all[1].velocity.unwrap();
-    assert!(v == DVec3::ZERO && (sigma.x - 0.1_f64.hypot(0.02 * KNOT)).abs() < 1e-12, "{sigma}");
+    let GnssVelocity { horizontal: v, horizontal_sigma: sigma, .. } = all[1].velocity.unwrap();
+    assert!(v == DVec2::ZERO && (sigma.x - 0.1_f64.hypot(0.02 * KNOT)).abs() < 1e-12, "{sigma}");
     // HDOP 1.4 where 0.7 and 1.4 have the middle 1.4
     assert_eq!(all[1].pos_sigma_n, DVec3::new(2.0, 2.0, 4.0));
     // 2024-02-01 00:00 UTC is 1 706 745 600 s: the IMU's clock tells which of the two is meant

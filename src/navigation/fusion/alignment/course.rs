@@ -66,7 +66,9 @@ pub(in crate::fusion) fn courses(gnss: &[GnssFix], imu: &[ImuIncrement]) -> Vec<
     let last = imu.last().map_or(f64::NEG_INFINITY, |s| s.t_s);
     let inside = |m: &Moving| m.fix.t_s >= first && m.fix.t_s < last;
     let velocity = |(i, fix): (usize, &GnssFix)| match fix.velocity {
-        Some((v_n, sigma_n)) => Some(Moving { fix: *fix, v_n, sigma_n, lag_s: 0.0 }),
+        Some(velocity) => {
+            Some(Moving { fix: *fix, v_n: velocity.v_n(), sigma_n: velocity.sigma_n(), lag_s: 0.0 })
+        }
         None => {
             let earlier = gnss[..i].partition_point(|f| f.t_s <= fix.t_s - BASELINE_S.0 + 1e-6);
             derived(&gnss[earlier.checked_sub(1)?], fix)
