@@ -6,6 +6,7 @@ use crate::formats::fusion_files::{read_gnss, read_imu, read_initial};
 use crate::formats::{
     contamination_file, curve_file, datasheet, efficiency_file, model_file, parameters_file, scenario_file,
 };
+use crate::fusion::alignment::moves;
 use std::path::{Path, PathBuf};
 
 /// Check scenario, study, model, trajectory and recording files without running anything
@@ -166,14 +167,8 @@ fn imu(path: &Path, session: &Session) -> Result<String, Failure> {
 
 /// What is no static recording may be one of a drive or a flight, which `fuse` reads.
 fn moving(path: &Path, session: &Session) -> Option<String> {
-    /// Specific force about its mean from which it moves (m/s²): vibrations at rest are less.
-    const MOVES: f64 = 0.5;
     let imu = read_imu(path).ok()?;
-    let force = || imu.samples.iter().map(|s| s.dv / s.dt_s);
-    let count = imu.samples.len() as f64;
-    let mean = force().sum::<glam::DVec3>() / count;
-    let spread = (force().map(|f| f.distance_squared(mean)).sum::<f64>() / count).sqrt();
-    if spread < MOVES {
+    if !moves(&imu.samples) {
         return None;
     }
     imu.remarks.iter().for_each(|remark| session.printer.remark(remark));

@@ -64,6 +64,12 @@ fn window(samples: &[ImuIncrement], q_s_b: DQuat) -> Window {
     Window { end_s, seconds, f: q_s_b * f, omega: q_s_b * omega, spread }
 }
 
+/// Whether the specific force is spread too much for anything that stands: vibrations at rest are less.
+#[must_use]
+pub fn moves(imu: &[ImuIncrement]) -> bool {
+    window(imu, DQuat::IDENTITY).spread.0 >= STILL.0
+}
+
 impl Scene<'_> {
     /// The tilt's standard deviation with the biases and a levelling of age `age_s` (rad).
     fn tilt_sigma(&self, age_s: f64, own: f64) -> f64 {

@@ -20,6 +20,7 @@ use crate::imu::{ImuIncrement, Sensor};
 use crate::units::DEG;
 use course::{Moving, courses, first_fast, nearest_to_fast};
 use glam::{DQuat, DVec3};
+pub use levelling::moves;
 use levelling::{Level, Scene};
 use std::f64::consts::PI;
 
