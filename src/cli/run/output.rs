@@ -83,8 +83,8 @@ pub(crate) fn doubt_filter(summary: &Summary, session: &Session) {
     let ratios =
         quality.into_iter().flat_map(|q| q.outage_end.iter().chain([&q.mean]).flat_map(|state| state.0));
     // where the reduced filter is right about the errors of its own model, the errors are of something else
-    let remedy = if run_words::beyond_linear(summary).is_some() {
-        "its errors are too large for a linear filter, and no other MODEL changes that"
+    let remedy = if run_words::beyond_linear(summary).is_some() || summary.is_second_order {
+        "its errors are too large for a linear filter, and neither another MODEL nor nav-sim tune changes that"
     } else if ratios.fold(0.0, f64::max) > 1.0 + summary.verdict.tolerance {
         "--filter full has a state for each process of the model"
     } else {

@@ -1,6 +1,7 @@
 //! Whether runs scatter about what covariance analysis expects of them.
 
 use super::summary::Summary;
+use super::verdict::VerdictKind;
 use crate::simulation::REPORTED_NAMES;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -60,5 +61,49 @@ impl Agreement {
     #[must_use]
     pub fn is_broken(&self) -> bool {
         self.largest_z.abs() > self.bound_z
+    }
+}
+
+impl Summary {
+    /// With what covariance analysis expects beside the runs. The verdict becomes that of the expected figures, of
+    /// which chance has no part, unless the runs contradict them: then errors are no longer small, and the runs are right.
+    pub fn expect(&mut self, expected: Self, agreement: Agreement) {
+        self.method = "both";
+        let diverged = self.verdict.kind == VerdictKind::Diverged;
+        self.is_second_order = self.surpasses(&expected) && agreement.is_broken();
+        if !agreement.is_broken() {
+            self.take_verdicts(&expected);
+            // Divergence is a fact of the runs that no linear analysis can take back.
+            if diverged {
+                self.verdict.kind = VerdictKind::Diverged;
+                self.outages.iter_mut().for_each(|o| o.verdict.kind = VerdictKind::Diverged);
+            }
+        }
+        self.lincov = Some(Box::new(expected));
+        self.agreement = Some(agreement);
+    }
+
+    /// A filter that runs do not find wrong, being too few, is wrong where covariance analysis finds it so and the runs
+    /// do not contradict that.
+    pub fn doubt_by(&mut self, expected: &Self) {
+        self.is_second_order = self.surpasses(expected) && Agreement::of(self, expected).is_broken();
+        // The runs' own alarm stands, and an expectation without fault adds nothing to it.
+        let is_told = self.verdict.kind != VerdictKind::Ok || expected.verdict.kind == VerdictKind::Ok;
+        if !is_told && !Agreement::of(self, expected).is_broken() {
+            self.take_verdicts(expected);
+        }
+    }
+
+    /// Whether the runs alone find errors larger than the filter believes.
+    fn surpasses(&self, expected: &Self) -> bool {
+        let kinds = [self, expected].map(|summary| summary.verdict.kind == VerdictKind::Overconfident);
+        kinds == [true, false]
+    }
+
+    fn take_verdicts(&mut self, expected: &Self) {
+        self.verdict = expected.verdict;
+        for (own, expected) in self.outages.iter_mut().zip(&expected.outages) {
+            own.verdict = expected.verdict;
+        }
     }
 }

@@ -111,6 +111,7 @@ impl Expected {
             reduction: None,
             lincov: None,
             agreement: None,
+            is_second_order: false,
             require: Vec::new(),
         }
     }

@@ -10,7 +10,7 @@ use super::reduction::ReductionSummary;
 use super::requirement::Met;
 use super::second_order::velocity_down_m_s;
 use super::sensitivity::Sensitivities;
-use super::verdict::{OutageVerdict, Verdict, VerdictKind};
+use super::verdict::{OutageVerdict, Verdict};
 use crate::simulation::{NEES_DOF, RunResult};
 use serde::Serialize;
 
@@ -58,6 +58,10 @@ pub struct Summary {
     /// How far the runs are from it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub agreement: Option<Agreement>,
+    /// Whether the errors are of second order: larger than the filter believes in the runs, and contradicting a covariance
+    /// analysis that finds no fault with it.
+    #[serde(skip)]
+    pub is_second_order: bool,
     /// What was required, and whether it is met.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub require: Vec<Met>,
@@ -238,41 +242,8 @@ impl Summary {
             reduction: None,
             lincov: None,
             agreement: None,
+            is_second_order: false,
             require: Vec::new(),
-        }
-    }
-
-    /// With what covariance analysis expects beside the runs. The verdict becomes that of the expected figures, of
-    /// which chance has no part, unless the runs contradict them: then errors are no longer small, and the runs are right.
-    pub fn expect(&mut self, expected: Self, agreement: Agreement) {
-        self.method = "both";
-        let diverged = self.verdict.kind == VerdictKind::Diverged;
-        if !agreement.is_broken() {
-            self.take_verdicts(&expected);
-            // Divergence is a fact of the runs that no linear analysis can take back.
-            if diverged {
-                self.verdict.kind = VerdictKind::Diverged;
-                self.outages.iter_mut().for_each(|o| o.verdict.kind = VerdictKind::Diverged);
-            }
-        }
-        self.lincov = Some(Box::new(expected));
-        self.agreement = Some(agreement);
-    }
-
-    /// A filter that runs do not find wrong, being too few, is wrong where covariance analysis finds it so and the runs
-    /// do not contradict that.
-    pub fn doubt_by(&mut self, expected: &Self) {
-        // The runs' own alarm stands, and an expectation without fault adds nothing to it.
-        let is_told = self.verdict.kind != VerdictKind::Ok || expected.verdict.kind == VerdictKind::Ok;
-        if !is_told && !Agreement::of(self, expected).is_broken() {
-            self.take_verdicts(expected);
-        }
-    }
-
-    fn take_verdicts(&mut self, expected: &Self) {
-        self.verdict = expected.verdict;
-        for (own, expected) in self.outages.iter_mut().zip(&expected.outages) {
-            own.verdict = expected.verdict;
         }
     }
 }

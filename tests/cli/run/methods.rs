@@ -73,6 +73,25 @@ fn runs_stand_beside_what_is_expected_of_them() {
     assert!(place.path().join("out/runs.csv").exists());
 }
 
+/// A vehicle that stands shows no heading: with 20° of it unknown the linear filter comes to know it from the turning of its
+/// horizontal frame, which is of second order. Covariance analysis finds no fault, and no variance that `tune` could find
+/// mends that.
+#[test]
+fn errors_of_second_order_are_not_to_be_tuned_away() {
+    let place = place();
+    let still = DRIVE.lines().nth(1).unwrap();
+    let still = format!("{still}\nsegment = [{{ kind = \"straight\", duration_s = 200 }}]\n");
+    fs::write(place.path().join("still.toml"), still).unwrap();
+    fs::write(place.path().join("wide.toml"), "initial.att_sigma_deg = [3, 3, 20]\n").unwrap();
+    let command = "run still.toml imu.toml --runs 60 --outage 60:150 --seed 3 --scenario wide.toml";
+    for method in ["both", "monte-carlo"] {
+        let ran = nav_sim(place.path(), &format!("{command} --method {method} -o {method}"));
+        assert!(ran.stdout.starts_with("verdict: overconfident: "), "{}", ran.stdout);
+        let warning = ran.stderr.lines().find(|line| line.contains("the filter is overconfident")).unwrap();
+        assert!(warning.contains("too large for a linear filter, and neither"), "{warning}");
+    }
+}
+
 /// Two runs tell nothing of a filter whose accelerometer is twice as bad as it believes: covariance analysis does.
 #[test]
 fn few_runs_do_not_hide_a_filter_that_is_wrong() {
