@@ -17,21 +17,25 @@ const MOVES: f64 = 0.8;
 
 /// Tells what no sensor gives though every number is one.
 pub(super) fn doubts(raw: &Raw, factors: &[f64], report: &mut FileReport) -> Result<(), FileError> {
-    let mut textures = Vec::new();
+    let (mut textures, mut clipped) = (Vec::new(), Vec::new());
     for (column, factor) in raw.columns.iter().zip(factors) {
         let Some(channel) = column.channel() else { continue };
         let texture = Texture::of(column).map_err(storage(&raw.path))?;
-        for (end, place) in texture.clipped() {
-            report.warn(format!(
-                "{channel} (column \"{}\") stands at its {end}, {}, in {:.0} % of the rows, first in line {}: clipped? \
-                 A larger range of the sensor, or leave the axis out",
-                column.name,
-                place.value,
-                100.0 * place.count as f64 / texture.rows as f64,
-                raw.lines.of(place.first)
-            ));
+        let ends = texture.clipped().into_iter().map(|(end, place)| {
+            let percent = 100.0 * place.count as f64 / texture.rows as f64;
+            let line = raw.lines.of(place.first);
+            format!("at its {end}, {}, in {percent:.0} % of the rows, first in line {line}", place.value)
+        });
+        let ends: Vec<String> = ends.collect();
+        if !ends.is_empty() {
+            clipped.push(format!("{channel} (column \"{}\") stands {}", column.name, ends.join(" and ")));
         }
         textures.push((channel, texture, factor.abs()));
+    }
+    if !clipped.is_empty() {
+        // One remark a file: a range too small for one axis is so for others, at both ends.
+        let clipped = clipped.join("; ");
+        report.warn(format!("{clipped}: clipped? A larger range of the sensor, or leave the axis out"));
     }
     held(&textures, report);
     for sensor in Sensor::ALL {
