@@ -56,6 +56,12 @@ pub(crate) struct DesignedQuantile {
     pub half_width_pct: f64,
 }
 
+/// What stands between the interval to expect and that of one calibration. Of 240 simulated intervals of a random walk (two
+/// models without and one with a spread; ± 64, ± 86 and ± 115 % to expect by thousands of draws) the median was 0.80 to 0.84 of
+/// that, the mean 0.83 to 0.87, and 24 to 31 % were wider; those of white noise were 0.9 to 1 of it.
+const STATED: &str = "what one calibration states scatters: for a parameter known to ± 100 % half the intervals are below 0.8 of this, one in four \
+     above";
+
 /// A part of an interval this large is nearly all of it.
 const NEARLY_ALL: f64 = 0.8;
 
@@ -120,7 +126,7 @@ impl Design {
             self.hours,
             self.least_known()
         );
-        std::iter::once(head).chain(self.p95()).chain(self.floor()).collect()
+        std::iter::once(head).chain(self.p95()).chain(self.floor()).chain([STATED.to_owned()]).collect()
     }
 }
 
@@ -135,7 +141,7 @@ pub(crate) fn design_verdict(designs: &[Design]) -> String {
     }
     let head = "half of the 95 % intervals to expect".to_owned();
     let floor = designs.last().and_then(Design::floor).map(|floor| format!("with the most hours, {floor}"));
-    std::iter::once(head).chain(floor).collect::<Vec<_>>().join("\n")
+    std::iter::once(head).chain(floor).chain([STATED.to_owned()]).collect::<Vec<_>>().join("\n")
 }
 
 /// Every parameter of one design, or a row for each of several; the first row is the head.
