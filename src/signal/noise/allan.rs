@@ -60,8 +60,10 @@ fn of_ar1(p: &Ar1, samples: u32) -> f64 {
     }
     // Between the octaves m may be odd: phi^m keeps its sign, and the product form of the wavelet variance
     // does not apply.
-    let u = phi.powi(samples.min(i32::MAX as u32) as i32);
-    let bump = (1.0 - u) * (3.0 - u);
+    // 1 − u by the logarithm of −phi = 1 − (1 + phi): as phi → −1 it vanishes for an even m as m (1 + phi) does.
+    let log_power = m * (-(1.0 + phi)).ln_1p();
+    let rest = if samples.is_multiple_of(2) { -log_power.exp_m1() } else { 1.0 + log_power.exp() };
+    let bump = rest * (2.0 + rest);
     p.sigma2() * (m * (1.0 - phi) * (1.0 + phi) - phi * bump) / (m * m * (1.0 - phi).powi(3) * (1.0 + phi))
 }
 
@@ -85,6 +87,7 @@ mod tests {
             ar1(0.3),
             ar1(0.0),
             ar1(-0.6),
+            ar1(-1.0 + 1e-12),
         ]
     }
 
