@@ -12,11 +12,12 @@ use super::piece::{Piece, Test};
 use crate::curve::Replicate;
 use crate::outcome::{Settings, tau_s};
 
-/// Standard deviations of the median: 1 in 10⁶ by chance, at each of some ten scales.
+/// Standard deviations of the median: by chance 3 in 10⁷, of a normal law, at each of some ten scales.
 const ALARM: f64 = 5.0;
 /// Classical over robust, less one, from which it is told: less than that hardly moves a fit.
 const LEAST: f64 = 0.02;
-/// Standard deviation of a median of Gaussian numbers, times the root of how many: √(π/2).
+/// Standard deviation of a median of many Gaussian numbers, times the root of how many: √(π/2). Of few it is less (1 of one,
+/// 1.16 of three), and the alarm the rarer.
 const MEDIAN: f64 = 1.2533;
 
 /// Outliers in most of the signals of a sensor.
@@ -101,7 +102,8 @@ fn excess(pieces: &[Piece<'_>], level: usize, settings: &Settings) -> Excess {
             let gaussian = test.value(replicate, level) - 1.0 / eta;
             of_gaussian.push(gaussian);
             of_quantizer.push(gaussian + read_high.ln());
-            // The standard deviation of a mean of n is √(Σ variances)/n, that of the median √(π/2) times it.
+            // The standard deviation of a mean of n is √(Σ variances)/n, that of the median √(π/2) times it where the
+            // variances are alike, as those of recordings of one length are.
             variance += 2.0 / eta;
         }
     }

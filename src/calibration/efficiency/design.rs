@@ -83,7 +83,8 @@ impl Design {
     /// alike its wavelet variances are taken once. A set depends on its number and the seed only.
     ///
     /// # Errors
-    /// As [`StudyError`]; whether there is one does not depend on the set.
+    /// As [`StudyError`]; whether there is one does not depend on the set, unless a parameter that varies is scaled: it may
+    /// leave its domain in some of them.
     pub fn set(&self, set: u64) -> Result<Vec<Estimate>, StudyError> {
         let mut scenarios = vec![Vec::new(); self.scenarios.len()];
         for replicate in 1..=self.replicates {

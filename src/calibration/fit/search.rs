@@ -2,14 +2,15 @@
 //! from every local minimum of the grid.
 //!
 //! With the shapes fixed the problem is linear with non-negative amplitudes, so nothing can be missed but
-//! between grid points, and the objective is smooth there: neighbouring shapes differ by a few per cent.
+//! between grid points, and the objective is smooth there: over the correlation times of 15 scales neighbours differ by 10 %
+//! with one of them in the model, by 15 % with two, by 60 % with three and by a factor of 2 with four.
 
 use super::bounded::{Bounded, MOST};
 use super::objective::{Column, NEARLY_SETTLED, Objective, Range, Shape, dot};
 use super::optimise::{End, Termination, descend};
 use rayon::prelude::*;
 
-/// Approximate limit of the number of combinations of the grid.
+/// Limit of the number of combinations of the grid, where its dimensions are alike.
 pub(crate) const COMBINATIONS: usize = 6000;
 /// Largest number of points in one dimension.
 const POINTS: usize = 160;
@@ -27,8 +28,8 @@ pub(crate) struct Found {
     pub(crate) combinations: usize,
 }
 
-/// Searches all coordinates, on a grid of about so many combinations at most (none for 0) and from the `known` minima of
-/// a similar curve.
+/// Searches all coordinates, on a grid of at most so many combinations of alike dimensions (none for 0) and from the `known`
+/// minima of a similar curve.
 pub(crate) fn search(objective: &Objective, combinations: usize, known: &[Vec<f64>]) -> Found {
     let dimensions: Vec<(usize, Range)> = objective.shaped().collect();
     if dimensions.is_empty() {
@@ -179,8 +180,10 @@ fn neighbours(choice: &[usize]) -> Vec<Vec<usize>> {
     all
 }
 
+/// As many points as leave the number of combinations of alike dimensions at `most`, at least one more than there are
+/// dimensions. Unlike dimensions (an AR1 and an MA1) have up to k! times as many combinations.
 fn points_per_dimension(dimensions: usize, most: usize) -> usize {
-    // n·(n − 1)···/k! combinations of k alike dimensions.
+    // n·(n − 1)···/k! of k alike dimensions, of which ascending choices are all there are.
     let combinations = |n: usize| (0..dimensions).fold(1, |c, k| c * (n - k) / (k + 1));
     (dimensions + 1..=POINTS).take_while(|n| combinations(*n) <= most).last().unwrap_or(dimensions + 1)
 }
