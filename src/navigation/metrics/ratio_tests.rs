@@ -35,7 +35,6 @@ fn ratio_errors_are_means_over_the_outage_signed_and_absolute() {
 /// the fix at 1.36 s is the first that is missing, and the next epoch but one would be the first after an outage until 1.36 s.
 #[test]
 fn an_epoch_at_a_typed_time_is_on_the_side_of_its_fix() {
-    assert!(0.36 + 1.0 < 1.36);
     for (outage, expected) in [((1.36, 3.36), 5.0), ((0.36, 1.36), 20.0)] {
         let shifted = |asee: &[f64]| {
             let mut made = experiment(asee, vec![run(0, 1.5, 1.0), run(1, 1.5, 1.0)]);
