@@ -6,7 +6,7 @@ use crate::formats::fusion_files::{read_gnss, read_imu, read_initial};
 use crate::formats::{
     contamination_file, curve_file, datasheet, efficiency_file, model_file, parameters_file, scenario_file,
 };
-use crate::fusion::alignment::moves;
+use nav_sim_navigation::fusion::alignment::moves;
 use std::path::{Path, PathBuf};
 
 /// Check scenario, study, model, trajectory and recording files without running anything
