@@ -203,12 +203,13 @@ impl FitEntry {
 /// N, K, B and T as exports have them, with their intervals (SI); null where there are none.
 fn parameters(outcome: &Outcome, rate_hz: f64) -> Value {
     let Some(practical) = outcome.practical(rate_hz) else { return Value::Null };
-    let Practical { parameters, intervals, range_s } = &practical;
+    let Practical { parameters, intervals, range_s, walk_until_s } = &practical;
     let mut value = parameters_json(parameters, outcome.scope.sensor);
     let ends = |interval: Option<[f64; 2]>| interval.map_or(Value::Null, |ends| ends.to_vec().into());
     value["white_and_walk"]["n"]["ci95"] = ends(intervals.density);
     value["white_and_walk"]["k"]["ci95"] = ends(intervals.walk);
     value["white_and_walk"]["k"]["observed"] = practical.walk_is_observed().into();
+    value["white_and_walk"]["k"]["until_s"] = (*walk_until_s).into();
     if value["minimum"].is_object() {
         value["minimum"]["bias_instability"]["ci95"] = ends(intervals.instability);
     }

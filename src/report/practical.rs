@@ -39,7 +39,7 @@ pub(super) fn policy() -> String {
 
 /// Velocity or angle random walk, bias instability, acceleration or rate random walk.
 pub(super) fn practical_rows(practical: &Practical, sensor: Sensor) -> [PracticalRow; 3] {
-    let Practical { parameters, intervals, range_s } = practical;
+    let Practical { parameters, intervals, range_s, walk_until_s } = practical;
     let pair = &parameters.walk;
     let [white, walk] = match sensor {
         Sensor::Accel => ["velocity random walk N", "acceleration random walk K"],
@@ -69,7 +69,8 @@ pub(super) fn practical_rows(practical: &Practical, sensor: Sensor) -> [Practica
     };
     let (seen, crossover) = (duration(*range_s), pair.crossover_s().map(duration));
     let to = crossover.as_ref().map_or(String::new(), |t| format!("up to {t}"));
-    let from = crossover.map(|t| format!("from {t}"));
+    let until = walk_until_s.map_or(String::new(), |t| format!(" to {}", duration(t)));
+    let from = crossover.map(|t| format!("from {t}{until}"));
     let n = (white, "white_and_walk/n/data_sheet/value");
     let b = ("bias instability B", "minimum/bias_instability/data_sheet/value");
     let k = (walk, "white_and_walk/k/data_sheet/value");

@@ -18,7 +18,6 @@ use nav_sim::sensors::outage::Outage;
 use nav_sim::simulation::{Plan, Recording, record};
 use nav_sim::trajectory::Trajectory;
 use nav_sim_navigation::fusion::gap::bridged;
-use nav_sim_navigation::gnss::OPEN_M_S;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::path::Path;
 

@@ -61,14 +61,22 @@ pub struct Practical {
     pub intervals: PracticalIntervals,
     /// Longest averaging time that was observed (s): how far a minimum was looked for.
     pub range_s: f64,
+    /// First of these averaging times (s) at which the pair of N and K has more than [`Practical::BESIDE`] times the Allan
+    /// deviation of the model, if there is one: K is no random walk beyond.
+    pub walk_until_s: Option<f64>,
 }
 
 impl Practical {
-    /// Whether the data hold averages so long that the random walk is the larger part of them: where they do not, K is what
-    /// the model says of times that nobody saw.
+    /// Ratio of Allan deviations from which on a random walk does not stand for a model: over an octave of averaging times a
+    /// random walk and a floor part by √2, over two by this.
+    pub const BESIDE: f64 = 2.0;
+
+    /// Whether the data hold averages so long that the random walk is the larger part of them, and the model has it over an
+    /// octave of these: where they do not, K is what the pair says of times that nobody saw, or that were seen to be otherwise.
     #[must_use]
     pub fn walk_is_observed(&self) -> bool {
-        self.parameters.walk.crossover_s().is_some_and(|t| t <= self.range_s)
+        let lasts = |from: f64| self.walk_until_s.is_none_or(|until| until >= 2.0 * from);
+        self.parameters.walk.crossover_s().is_some_and(|from| from <= self.range_s && lasts(from))
     }
 }
 

@@ -22,7 +22,8 @@ impl Outcome {
         let model = &self.fit.composite;
         let parameters = AxisParameters::of(&[model], rate_hz, horizon, policy, range_s).ok()?;
         let intervals = self.inference.as_ref().map_or(PracticalIntervals::default(), |i| i.practical);
-        Some(Practical { parameters, intervals, range_s })
+        let walk_until_s = parameters.walk.departs_s(model, rate_hz, range_s, Practical::BESIDE);
+        Some(Practical { parameters, intervals, range_s, walk_until_s })
     }
 }
 
@@ -61,5 +62,40 @@ impl Reading {
             walk: pair.walk,
             instability: minimum.map(|m| m.bias_instability()),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::noise::{GaussMarkov, Process, RandomWalk, White};
+
+    fn practical(processes: Vec<Process>) -> Practical {
+        let (model, rate_hz, range_s) = (Composite::new(processes), 100.0, 1e4);
+        let parameters =
+            AxisParameters::of(&[&model], rate_hz, Horizon::default(), Policy::Matched, range_s).unwrap();
+        let walk_until_s = parameters.walk.departs_s(&model, rate_hz, range_s, Practical::BESIDE);
+        let intervals = PracticalIntervals::default();
+        Practical { parameters, intervals, range_s, walk_until_s }
+    }
+
+    /// White noise of N = 1e-3 with a random walk that takes over at √3·1e-3/1e-5 = 173 s; with a Gauss-Markov process of 30 s,
+    /// which the pair over 1 s to 100 s follows on its rise and not on its fall (from 1.9·30 s on); with one that
+    /// adds 3 % to the Allan variance at 30 s: the random walk that follows it over 1 s to 100 s would take over beyond,
+    /// where nothing rises.
+    #[test]
+    fn a_random_walk_is_observed_where_the_model_rises_as_it_does() {
+        let white = Process::White(White::new(1e-4).unwrap());
+        let walk = Process::RandomWalk(RandomWalk::new(1e-12).unwrap());
+        let markov =
+            |sigma: f64| Process::GaussMarkov(GaussMarkov::new(1.0 / 30.0, sigma * sigma, 100.0).unwrap());
+        let with_walk = practical(vec![white, walk]);
+        assert!(with_walk.walk_is_observed() && with_walk.walk_until_s.is_none());
+        let hump = practical(vec![white, markov(3e-3)]);
+        let until = hump.walk_until_s.unwrap();
+        assert!(hump.walk_is_observed() && (60.0..600.0).contains(&until), "{until}");
+        let trace = practical(vec![white, markov(5e-5)]);
+        assert!(!trace.walk_is_observed(), "{trace:?}");
+        assert!(trace.parameters.walk.crossover_s().unwrap() < trace.range_s);
     }
 }

@@ -7,7 +7,7 @@ use crate::uncertainty::WIDEST;
 /// An amplitude known to no better than this factor, either way, is told.
 const FACTOR: f64 = 3.0;
 
-/// Remarks on what the bootstrap says: what cannot be told apart, and which amplitude is hardly known, by the width of its
+/// Remarks on what the bootstrap says: which processes the data do not need all of, and which amplitude is hardly known, by the width of its
 /// interval.
 pub(crate) fn notes_of_inference(outcome: &Outcome) -> Vec<String> {
     let Some(inference) = &outcome.inference else { return Vec::new() };
@@ -49,17 +49,20 @@ pub fn undetermined(interval: &ParameterInterval, labels: &[String]) -> Option<S
             format!("not determined: the data leave {process} open by more than a factor of {WIDEST}")
         }
         Undetermined::Indistinct(alike) => {
-            format!("not determined: {} cannot be told apart", joined(alike, labels))
+            format!("not determined: the data do not need {}", joined(alike, labels))
         }
     };
     Some(format!("{process} {parameter}: no interval, {why}"))
 }
 
+/// `both AR1_1 and AR1_2`
 fn joined(processes: &[usize], labels: &[String]) -> String {
-    processes.iter().map(|i| labels[*i].as_str()).collect::<Vec<_>>().join(" and ")
+    let together = if processes.len() == 2 { "both " } else { "all of " };
+    let named = processes.iter().map(|i| labels[*i].as_str()).collect::<Vec<_>>().join(" and ");
+    format!("{together}{named}")
 }
 
-/// Sentence on the processes (with these labels) that cannot be told apart, and on what is known instead.
+/// Sentence on the processes (with these labels) of which the data do not need all, and on what is known instead.
 fn note_of_indistinct(indistinct: &Indistinct, labels: &[String]) -> String {
     let Indistinct { processes, spec, composite, p_value, intervals } = indistinct;
     let kind = spec.kinds()[processes[0]];
@@ -70,7 +73,7 @@ fn note_of_indistinct(indistinct: &Indistinct, labels: &[String]) -> String {
         format!("{} = {value:.5e}{ends}", of.parameter.name())
     });
     format!(
-        "{} cannot be told apart: {spec} describes the curve as well (p = {p_value:.2}), with {}; the intervals of the \
+        "the data do not need {}: {spec} describes the curve as well (p = {p_value:.2}), with {}; the intervals of the \
          other parameters are those of that model",
         joined(processes, labels),
         known.collect::<Vec<_>>().join(", ")

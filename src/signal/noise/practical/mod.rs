@@ -125,6 +125,19 @@ impl Pair {
         (self.walk > 0.0).then(|| 3.0_f64.sqrt() * self.density / self.walk)
     }
 
+    /// First averaging time (s), from its crossover on and up to `to_s`, at which its Allan deviation is more than `factor`
+    /// times that of a model: from there on the model's deviation does not rise as the random walk's does. None where it is
+    /// nowhere, or without a random walk.
+    #[must_use]
+    pub fn departs_s(&self, model: &Composite, rate_hz: f64, to_s: f64, factor: f64) -> Option<f64> {
+        let longest = (to_s * rate_hz).min(f64::from(1_u32 << 30));
+        let from = (self.crossover_s()? * rate_hz).max(1.0);
+        let is_above =
+            |m: &u32| self.allan_variance(*m, rate_hz) > factor * factor * model.allan_variance(*m);
+        let departs = averages(from, longest.max(from)).into_iter().find(is_above)?;
+        Some(f64::from(departs) / rate_hz)
+    }
+
     /// Smallest and largest ratio of its Allan deviation to that of the model.
     #[must_use]
     pub fn closure(&self, curve: &Curve) -> Closure {

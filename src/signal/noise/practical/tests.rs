@@ -179,3 +179,18 @@ fn horizons_that_cannot_be_are_refused() {
     let silent = Curve::largest(&[&Composite::default()], RATE, Horizon::default()).unwrap_err();
     assert_eq!(silent.to_string(), "the model has no noise at an averaging time of 1 s");
 }
+
+/// Beside white noise of the same N the pair has 1 + (Kτ/N)²/3 times the Allan variance: 4 at τ = 3 N/K, found on a grid of
+/// 1/16 octave (4.4 %); beside itself it departs nowhere.
+#[test]
+fn a_pair_departs_from_a_model_without_its_random_walk() {
+    let (n, k) = (1e-3, 1e-5);
+    let pair = Pair { density: n, walk: k, markov: None };
+    let departs = |processes, to_s| pair.departs_s(&Composite::new(processes), RATE, to_s, 2.0);
+    let found = departs(vec![wn(n)], 1e4).unwrap() / (3.0 * n / k);
+    assert!((1.0..1.045).contains(&found), "{found}");
+    assert_eq!(departs(vec![wn(n)], 250.0), None);
+    assert_eq!(departs(vec![wn(n), rw(k)], 1e4), None);
+    let white = Pair { walk: 0.0, ..pair };
+    assert_eq!(white.departs_s(&Composite::new(vec![wn(0.1 * n)]), RATE, 1e4, 2.0), None);
+}
