@@ -41,12 +41,16 @@ impl Sensitivities {
             .par_iter()
             .map(|varied| {
                 // Only the truth moves; the gains stay those of the filter, which does not know of it.
-                let difference = varied.difference();
-                let terms = difference.map(|(step, weight)| (ln_rmse(&varied.by(truth, step)), weight));
+                let (terms, step) = varied.difference();
+                let moved = |(steps, _): &(f64, f64)| ln_rmse(&varied.by(truth, steps * step));
+                let ends: Vec<_> = terms.iter().map(moved).collect();
                 let slope = |end: usize| {
-                    std::array::from_fn(|i| terms.iter().map(|(ends, weight)| weight * ends[end][i]).sum())
+                    let sum = |i: usize| {
+                        terms.iter().zip(&ends).map(|((_, c), ends)| c * ends[end][i]).sum::<f64>()
+                    };
+                    std::array::from_fn(|i| sum(i) / (2.0 * step))
                 };
-                (0..terms[0].0.len()).map(slope).collect()
+                (0..ends[0].len()).map(slope).collect()
             })
             .collect();
         let outages = slopes.first().map_or(0, Vec::len);
@@ -70,6 +74,10 @@ fn quantity(parameter: Parameter, value: f64) -> (&'static str, f64) {
 }
 
 const CORRELATION_TIME: &str = "correlation_time";
+
+const CENTRAL: [(f64, f64); 2] = [(1.0, 1.0), (-1.0, -1.0)];
+/// Of second order, as the central one.
+const ONE_SIDED: [(f64, f64); 3] = [(0.0, 3.0), (-1.0, -4.0), (-2.0, 1.0)];
 
 impl Varied {
     /// All quantities that are not zero.
@@ -101,19 +109,17 @@ impl Varied {
         format!("{}.{}.{}", self.sensor.name(), self.label, self.quantity)
     }
 
-    /// Steps of the logarithm and their weights: the sum of weight × value is the derivative.
-    fn difference(&self) -> [(f64, f64); 3] {
+    /// The difference that is the derivative, from (steps of the logarithm, coefficient) and the step: the sum of coefficient
+    /// times value over twice the step.
+    fn difference(&self) -> (&'static [(f64, f64)], f64) {
         if self.room > STEP * STEP {
-            // Central. Errors may vary as the reciprocal of what is left to the end of the domain (the variance of an
-            // AR1); with a fortieth of that their derivative is right to a thousandth (1/40²).
-            let step = STEP.min(self.room / 40.0);
-            let weight = 0.5 / step;
-            return [(step, weight), (0.0, 0.0), (-step, -weight)];
+            // Errors may vary as the reciprocal of what is left to the end of the domain (the variance of an AR1);
+            // with a fortieth of that their derivative is right to a thousandth (1/40²).
+            return (&CENTRAL, STEP.min(self.room / 40.0));
         }
-        // At the end of the domain (theta = ±1): from one side, still of second order. Small, because over n samples the
-        // errors of theta near −1 change as n (1 + theta)².
-        let step = STEP * STEP;
-        [(0.0, 1.5 / step), (-step, -2.0 / step), (-2.0 * step, 0.5 / step)]
+        // At the end of the domain (theta = ±1). Small, because over n samples the errors of theta near −1 change as
+        // n (1 + theta)².
+        (&ONE_SIDED, STEP * STEP)
     }
 
     /// The model with the quantity times e^`ln`.
