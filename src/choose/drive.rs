@@ -129,8 +129,8 @@ impl Drive {
     ) -> Result<Fold, ChoiceError> {
         let models = self.models(laboratory, Some(k), candidates)?;
         let beliefs = self.beliefs(candidates, &models)?;
-        let own = own_model(laboratory, k)?;
-        let expected = self.expected(&beliefs, own);
+        let left_out_model = own_model(laboratory, k)?;
+        let expected = self.expected(&beliefs, left_out_model);
         let is_long = |r: &Recording| self.independent_windows(r.len()) >= 1.0;
         let usable: Cow<'_, [Recording]> = if recordings.iter().all(is_long) {
             recordings.into()
@@ -186,8 +186,8 @@ impl Drive {
             Inflation::Tenfold => Ok(tenfold(model)),
             Inflation::Tuned => {
                 let others: Vec<usize> = laboratory.others(without).collect();
-                let own = |k: &usize| own_model(laboratory, *k).cloned();
-                let truths: Vec<Model> = others.par_iter().map(own).collect::<Result<_, _>>()?;
+                let model_of = |k: &usize| own_model(laboratory, *k).cloned();
+                let truths: Vec<Model> = others.par_iter().map(model_of).collect::<Result<_, _>>()?;
                 self.tuned(candidate, model, &truths)
             }
         }

@@ -105,14 +105,14 @@ impl Drive {
         settings: &Settings,
     ) -> Result<Vec<f64>, ChoiceError> {
         let slope = |m: usize| {
-            let at = |by: f64| {
+            let log_rmse = |by: f64| {
                 let moved = influence.moved(&outcome.fit.composite, m, by, settings.rate_hz);
                 let composite = moved.expect("a thousandth of the way to the end of its domain is within it");
                 let mut changed = model.clone();
                 put(&composite, outcome.scope, &mut changed);
                 self.horizontal_rmse(&changed).map(f64::ln)
             };
-            Ok::<f64, ChoiceError>((at(STEP)? - at(-STEP)?) / (2.0 * STEP))
+            Ok::<f64, ChoiceError>((log_rmse(STEP)? - log_rmse(-STEP)?) / (2.0 * STEP))
         };
         let slopes: Vec<f64> =
             (0..influence.parameters.len()).into_par_iter().map(slope).collect::<Result<_, _>>()?;
@@ -141,9 +141,9 @@ fn added(
     estimator: Estimator,
     settings: &Settings,
 ) -> f64 {
-    let own: Vec<&str> = laboratory.units()[k].replicates.iter().map(|(_, r)| r.name.as_str()).collect();
+    let names: Vec<&str> = laboratory.units()[k].replicates.iter().map(|(_, r)| r.name.as_str()).collect();
     let others: Vec<_> =
-        group.replicates.iter().filter(|r| !own.contains(&r.name.as_str())).cloned().collect();
+        group.replicates.iter().filter(|r| !names.contains(&r.name.as_str())).cloned().collect();
     let curve = |replicates: &[_]| average(replicates, estimator, settings.trim, &settings.tuning).ok();
     let (Some(all), Some(without)) = (curve(&group.replicates), curve(&others)) else { return f64::NAN };
     let ratios = all.wv.iter().zip(&without.wv).map(|(with, without)| (with / without).ln());

@@ -25,7 +25,7 @@ pub struct Laboratory {
     settings: Settings,
     pool: Option<Pool>,
     /// The noise of each recording alone, once it was asked for.
-    own: Vec<OnceLock<Model>>,
+    models: Vec<OnceLock<Model>>,
 }
 
 /// The groups of recordings that were calibrated, their fits, and how these were made.
@@ -36,8 +36,8 @@ impl Laboratory {
     /// replicates of one another; none: the axes of a sensor, but for single recordings.
     #[must_use]
     pub fn new(units: Vec<Unit>, settings: Settings, pool: Option<Pool>) -> Self {
-        let own = units.iter().map(|_| OnceLock::new()).collect();
-        Self { units, settings, pool, own }
+        let models = units.iter().map(|_| OnceLock::new()).collect();
+        Self { units, settings, pool, models }
     }
 
     /// The recordings.
@@ -78,14 +78,14 @@ impl Laboratory {
     /// # Errors
     /// When a curve is too short for the model.
     pub(crate) fn own_model(&self, k: usize) -> Result<&Model, CalibrationError> {
-        if self.own[k].get().is_none() {
+        if self.models[k].get().is_none() {
             let n2 = ModelChoice::Given(ModelSpec::n2());
             let (_, outcomes, settings) =
                 self.fit(&[&self.units[k]], Estimator::Awv, &n2, Some(Pool::Axes))?;
             // another thread may have been as quick, with the same model
-            let _ = self.own[k].set(model_of(&outcomes, settings.rate_hz));
+            let _ = self.models[k].set(model_of(&outcomes, settings.rate_hz));
         }
-        Ok(self.own[k].get().expect("set above"))
+        Ok(self.models[k].get().expect("set above"))
     }
 
     fn fit(

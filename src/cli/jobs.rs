@@ -40,9 +40,9 @@ impl From<JobError> for Failure {
             | JobError::Pair(_)
             | JobError::Ratio { .. } => Self::input(e),
             JobError::Pooled => Self::input(format!("--pool sensor: {e}")).hint("--pool axes"),
-            JobError::TwoRates { path, own, given } => {
+            JobError::TwoRates { path, stated, given } => {
                 let message =
-                    format!("{path}: the curve says its rate, {own} Hz; --rate-hz {given} is another");
+                    format!("{path}: the curve says its rate, {stated} Hz; --rate-hz {given} is another");
                 Self::input(message).hint("leave --rate-hz out: it is for a CSV curve")
             }
             JobError::NoRate { .. } => Self::input(e)

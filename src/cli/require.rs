@@ -152,10 +152,10 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 }
 
 /// The IMU that is needed.
-fn sought(args: &Args, asked: &Requirements, session: &Session) -> Result<(), Failure> {
+fn sought(args: &Args, requirements: &Requirements, session: &Session) -> Result<(), Failure> {
     let claim = |out: &PathBuf| claim_file(out, [args.trajectory.as_path()]);
     let _own = args.out.as_ref().map(claim).transpose()?;
-    let (needed, question) = asked.needed(args.corr_time_s, args.iso_drift).map_err(|e| {
+    let (needed, question) = requirements.needed(args.corr_time_s, args.iso_drift).map_err(|e| {
         Failure::input(e)
             .hint("a larger limit, a shorter outage, or a better receiver ([gnss] of --scenario)")
     })?;
@@ -166,27 +166,27 @@ fn sought(args: &Args, asked: &Requirements, session: &Session) -> Result<(), Fa
     session.show(|| needed.json(&question), text);
     let drawn = args.pictures.write(|| needed_page(&needed, &question), session);
     if let Some(out) = &args.out {
-        model_file::write(out, &asked.model_file(&needed.imu, &question), session.existing())?;
+        model_file::write(out, &requirements.model_file(&needed.imu, &question), session.existing())?;
         session.wrote(out);
     }
     drawn
 }
 
 /// What a given IMU makes of the limits.
-fn given(path: &Path, args: &Args, asked: &Requirements, session: &Session) -> Result<(), Failure> {
+fn given(path: &Path, args: &Args, requirements: &Requirements, session: &Session) -> Result<(), Failure> {
     let unusable = |e: RequireError| Failure::input(format!("{}: {e}", path.display()));
     let file = read::model(path, session)?;
-    let mut scenario = asked.scenario.clone();
+    let mut scenario = requirements.scenario.clone();
     turn_on::expect(&mut scenario.initial, &file, path, session);
     turn_on::make(&mut scenario.imu, &file, path, session);
     let model = read::at_rate(path, &file.model, scenario.imu.rate_hz, session)?;
-    let (bridged, places) = asked.longest(&scenario, &model).map_err(unusable)?;
+    let (bridged, places) = requirements.longest(&scenario, &model).map_err(unusable)?;
     if args.outage == Ask::Longest {
         let text = || words::longest_verdict(bridged.longest, &places);
         session.show(|| words::longest_json(&bridged, &places), text);
         return args.pictures.write(|| model_page(None, &places, &bridged), session);
     }
-    let (margins, question) = asked.margins(&scenario, &model).map_err(unusable)?;
+    let (margins, question) = requirements.margins(&scenario, &model).map_err(unusable)?;
     let text = || {
         let verdict = words::margins_verdict(&margins, &question, bridged.longest);
         format!("{verdict}\n\n{}", markdown_table(&words::margins_rows(&margins)))
@@ -205,14 +205,14 @@ fn given(path: &Path, args: &Args, asked: &Requirements, session: &Session) -> R
 fn ranked(
     directory: Option<&Path>,
     args: &Args,
-    asked: &Requirements,
+    requirements: &Requirements,
     session: &Session,
 ) -> Result<(), Failure> {
     let units = match directory {
-        Some(directory) => units_of(directory, asked, session)?,
-        None => catalogue(asked)?,
+        Some(directory) => units_of(directory, requirements, session)?,
+        None => catalogue(requirements)?,
     };
-    let (units, question) = asked.ranked(&units).map_err(Failure::input)?;
+    let (units, question) = requirements.ranked(&units).map_err(Failure::input)?;
     let text = || format!("{}:\n\n{}", question.in_words(), columns(&words::catalogue_rows(&units)));
     session.show(|| words::catalogue_json(&units, &question), text);
     args.pictures.write(|| catalogue_page(&units, &question), session)?;
@@ -228,10 +228,10 @@ fn ranked(
 }
 
 /// The units that are known by name.
-fn catalogue(asked: &Requirements) -> Result<Vec<CatalogueUnit>, Failure> {
+fn catalogue(requirements: &Requirements) -> Result<Vec<CatalogueUnit>, Failure> {
     let unit = |(name, _): &(&str, &str)| {
         let sheet = datasheet::catalogued(name).expect("a name of the catalogue")?;
-        of_sheet((*name).to_owned(), &sheet, asked)
+        of_sheet((*name).to_owned(), &sheet, requirements)
     };
     CATALOGUE.iter().map(unit).collect()
 }
@@ -261,9 +261,9 @@ fn units_of(
     paths.iter().map(unit).collect()
 }
 
-fn of_sheet(name: String, sheet: &Datasheet, asked: &Requirements) -> Result<CatalogueUnit, Failure> {
-    let made = sheet.model_file(asked.scenario.imu.rate_hz);
+fn of_sheet(name: String, sheet: &Datasheet, requirements: &Requirements) -> Result<CatalogueUnit, Failure> {
+    let made = sheet.model_file(requirements.scenario.imu.rate_hz);
     let file = made.map_err(|e| Failure::input(format!("{name}: {e}")))?.file;
     let model = file.model.clone();
-    Ok(asked.unit(name, &file, model, sheet.not_stated()))
+    Ok(requirements.unit(name, &file, model, sheet.not_stated()))
 }

@@ -163,12 +163,12 @@ fn reaches(
 
 fn contamination(name: &str, rate_hz: f64) -> Result<Contamination, Failure> {
     contamination_file::find(name, rate_hz).map_err(|e| {
-        let there = contamination_file::names().join(", ");
+        let known = contamination_file::names().join(", ");
         let meant = contamination_file::meant(name);
         let hint = match (e.is_system(), meant) {
             (false, _) => None,
             (true, Some(meant)) => Some(format!("did you mean \"{meant}\"?")),
-            (true, None) => Some(format!("give a file or one of {there}")),
+            (true, None) => Some(format!("give a file or one of {known}")),
         };
         Failure::from(e).maybe_hint(hint)
     })

@@ -5,17 +5,17 @@ use std::env::consts::{ARCH, OS};
 
 /// The version; more where the words of the command line ask for it.
 pub(super) fn version(words: &[String]) -> String {
-    let own = env!("CARGO_PKG_VERSION").to_owned();
+    let number = env!("CARGO_PKG_VERSION").to_owned();
     let is_version = |w: &String| w == "--version" || w == "-V";
     let is_verbose = |w: &String| w == "--verbose" || w == "-v";
     let short = words.iter().any(|w| matches!(w.as_str(), "-vV" | "-Vv"));
     let asked = short || (words.iter().any(is_version) && words.iter().any(is_verbose));
     if !asked {
-        return own;
+        return number;
     }
     let library = if cfg!(target_env = "musl") { "musl" } else { "gnu" };
     let linked = if cfg!(target_feature = "crt-static") { "static" } else { "dynamic" };
     let profile = if cfg!(debug_assertions) { "debug" } else { "release" };
     let level = Level::best();
-    format!("{own}\nbuild         {profile}, {ARCH}-{OS}-{library}, {linked}\nvector units  {level}")
+    format!("{number}\nbuild         {profile}, {ARCH}-{OS}-{library}, {linked}\nvector units  {level}")
 }

@@ -82,13 +82,13 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 fn digest(file: &SignalsFile) -> String {
     let mut recordings: Vec<&str> = file.signals.iter().map(|s| s.file.as_str()).collect();
     recordings.dedup();
-    let of = if recordings.len() > 1 {
+    let median_note = if recordings.len() > 1 {
         format!(", median of {} recordings", recordings.len())
     } else {
         String::new()
     };
     format!(
-        "Allan deviation over averages of{of}:\n{}\nrobust/classical: smallest ratio of the wavelet variances, marked * where it \
+        "Allan deviation over averages of{median_note}:\n{}\nrobust/classical: smallest ratio of the wavelet variances, marked * where it \
          is lower than chance explains, as with outliers; all scales with intervals: --verbose, --format csv; recordings side by side: --per-file",
         report::columns(&report::signals_digest(file))
     )

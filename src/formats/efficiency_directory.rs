@@ -31,7 +31,7 @@ pub(crate) struct StudyDirectory {
     path: PathBuf,
     layout: Layout,
     sets: File,
-    _own: Claim,
+    _claim: Claim,
     /// The sets already estimated from, in order.
     pub done: Vec<Vec<Estimate>>,
 }
@@ -45,7 +45,7 @@ impl StudyDirectory {
     /// cannot be written to.
     pub(crate) fn open(path: &Path, identity: &Value, layout: Layout) -> Result<Self> {
         let (study, sets) = (path.join("study.json"), path.join("sets.csv"));
-        let own = atomic::claim_file(&study, [])?;
+        let claim = atomic::claim_file(&study, [])?;
         match fs::read_to_string(&study) {
             Ok(text) => same(path, &text, identity)?,
             Err(_) => {
@@ -62,7 +62,7 @@ impl StudyDirectory {
         let mut file = File::options().create(true).write(true).truncate(false).open(&sets).map_err(io)?;
         file.set_len(whole).map_err(io)?;
         std::io::Seek::seek(&mut file, std::io::SeekFrom::End(0)).map_err(io)?;
-        let mut directory = Self { path: sets.clone(), layout, sets: file, _own: own, done };
+        let mut directory = Self { path: sets.clone(), layout, sets: file, _claim: claim, done };
         if whole == 0 {
             directory.write(directory.header().as_bytes())?;
         }
@@ -179,8 +179,8 @@ mod tests {
     }
 
     fn set(seed: f64) -> Vec<Estimate> {
-        let one = |x: f64| Estimate { theta: vec![x / 3.0], objective: x, without_root: 2 };
-        vec![one(seed), one(-seed)]
+        let estimate = |x: f64| Estimate { theta: vec![x / 3.0], objective: x, without_root: 2 };
+        vec![estimate(seed), estimate(-seed)]
     }
 
     fn open(path: &Path) -> StudyDirectory {

@@ -73,8 +73,8 @@ fn parse<R: Read>(path: &str, mut reader: R, size: u64) -> Result<Array<R>, File
     Ok(Array { path: path.to_owned(), header, elements: reader })
 }
 
-fn malformed(path: &str, what: &str) -> FileError {
-    FileError::contents(path, Place::Within, format!("not a NumPy array: {what}"))
+fn malformed(path: &str, defect: &str) -> FileError {
+    FileError::contents(path, Place::Within, format!("not a NumPy array: {defect}"))
 }
 
 impl Header {

@@ -47,11 +47,11 @@ pub(crate) fn check(path: &Path) -> Result<(), FileError> {
 }
 
 /// Labels of processes that a table names, at any depth.
-fn named(table: &DeTable<'_>, into: &mut Vec<String>) {
+fn named(table: &DeTable<'_>, names: &mut Vec<String>) {
     for (key, value) in table {
         let (key, Some(inner)) = (key.get_ref(), value.get_ref().as_table()) else { continue };
         let outer = Sensor::ALL.iter().any(|s| s.name() == key) || Axis::ALL.iter().any(|a| a.name() == key);
-        if outer { named(inner, into) } else { into.push(key.to_string()) }
+        if outer { named(inner, names) } else { names.push(key.to_string()) }
     }
 }
 
@@ -75,12 +75,12 @@ fn limits(source: &Source, spec: &ModelSpec) -> Result<Vec<ParameterLimit>, File
         return Err(root.refuse("schema", "is not a schema this version reads: it reads 1", None));
     }
     let labels = spec.labels();
-    let mut own: Vec<&str> = labels.iter().map(String::as_str).collect();
-    let processes = own.clone();
-    own.extend(Sensor::ALL.map(Sensor::name));
+    let mut known: Vec<&str> = labels.iter().map(String::as_str).collect();
+    let processes = known.clone();
+    known.extend(Sensor::ALL.map(Sensor::name));
     let mut limits = Vec::new();
     not_of_the_model(&root, &processes, spec)?;
-    root.only(&[own.as_slice(), &["schema"]].concat())?;
+    root.only(&[known.as_slice(), &["schema"]].concat())?;
     of_processes(&root, &processes, None, None, spec, &mut limits)?;
     for sensor in Sensor::ALL {
         let Some(section) = root.section(sensor.name())? else { continue };

@@ -98,13 +98,13 @@ mod tests {
         for part in schema["anyOf"].as_array().into_iter().flatten() {
             numbers(part, root, key, into);
         }
-        let is = |schema: &Value, name: &str| schema["type"].to_string().contains(name);
+        let has_type = |schema: &Value, name: &str| schema["type"].to_string().contains(name);
         if schema["items"].is_object() {
-            match is(&schema["items"], "number") {
+            match has_type(&schema["items"], "number") {
                 true => into.push((key.to_owned(), schema["items"].clone(), 3)),
                 false => numbers(&schema["items"], root, &format!("{key}[1]"), into),
             }
-        } else if is(schema, "number") || is(schema, "integer") {
+        } else if has_type(schema, "number") || has_type(schema, "integer") {
             into.push((key.to_owned(), schema.clone(), 1));
         }
     }

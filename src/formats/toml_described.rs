@@ -77,9 +77,9 @@ impl Section<'_> {
     /// As [`Section::read`].
     pub(crate) fn read_own<T: DeserializeOwned + JsonSchema>(&self, beside: &[&str]) -> Result<T, FileError> {
         let schema = schemars::schema_for!(T);
-        let own = schema.get("properties").and_then(|properties| properties.as_object());
-        let own = own.into_iter().flat_map(|keys| keys.keys().map(String::as_str));
-        self.only(&beside.iter().copied().chain(own).collect::<Vec<_>>())?;
+        let keys_of_schema = schema.get("properties").and_then(|properties| properties.as_object());
+        let keys_of_schema = keys_of_schema.into_iter().flat_map(|keys| keys.keys().map(String::as_str));
+        self.only(&beside.iter().copied().chain(keys_of_schema).collect::<Vec<_>>())?;
         self.read()
     }
 

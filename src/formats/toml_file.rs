@@ -95,10 +95,10 @@ impl Source {
     /// The table of the whole file.
     pub(crate) fn parse(&self) -> Result<Spanned<DeTable<'_>>, FileError> {
         DeTable::parse(&self.text).map_err(|e| {
-            let at = e.span().map_or(0, |s| s.start);
-            let line_start = self.text[..at].rfind('\n').map_or(0, |i| i + 1);
-            let column = self.text[line_start..at].chars().count() + 1;
-            let place = Place::Character(self.line(at) as u64, column as u64);
+            let offset = e.span().map_or(0, |s| s.start);
+            let line_start = self.text[..offset].rfind('\n').map_or(0, |i| i + 1);
+            let column = self.text[line_start..offset].chars().count() + 1;
+            let place = Place::Character(self.line(offset) as u64, column as u64);
             let key = e.span().and_then(|span| self.text.get(span)).map(str::trim).unwrap_or_default();
             let message = match e.message() {
                 "duplicate key" => format!("the key \"{key}\" is there already"),
@@ -126,8 +126,8 @@ impl Source {
     }
 
     /// The line (from 1) a byte stands in.
-    pub(crate) fn line(&self, at: usize) -> usize {
-        1 + self.text.as_bytes()[..at.min(self.text.len())].iter().filter(|b| **b == b'\n').count()
+    pub(crate) fn line(&self, offset: usize) -> usize {
+        1 + self.text.as_bytes()[..offset.min(self.text.len())].iter().filter(|b| **b == b'\n').count()
     }
 }
 
@@ -158,8 +158,9 @@ impl<'a> Section<'a> {
     /// Refuses every key that is not listed.
     pub(crate) fn only(&self, legal: &[&str]) -> Result<(), FileError> {
         let Some(key) = self.keys().into_iter().find(|k| !legal.contains(k)) else { return Ok(()) };
-        let at = self.table.keys().find(|k| k.get_ref() == key).map_or(self.span.start, |k| k.span().start);
-        let line = self.source.line(at);
+        let offset =
+            self.table.keys().find(|k| k.get_ref() == key).map_or(self.span.start, |k| k.span().start);
+        let line = self.source.line(offset);
         Err(unknown_key(self.source, line, self.key(key), key, legal.iter().copied()))
     }
 

@@ -32,8 +32,8 @@ fn within_value(value: &Value<'_>, path: String, span: &Range<usize>) -> Option<
         }),
         _ => None,
     };
-    let own = value.span();
-    inner.or_else(|| (own.start <= span.start && span.end <= own.end).then_some(path))
+    let extent = value.span();
+    inner.or_else(|| (extent.start <= span.start && span.end <= extent.end).then_some(path))
 }
 
 /// Where the value of a path is written, and whether it is: if not, the span of the innermost table around it.

@@ -81,8 +81,9 @@ pub(crate) fn certify(
     recorded: Recorded,
 ) -> Result<Vec<Certificate>, JobError> {
     let of_sensor = |s: &crate::export::SensorExport| {
-        let own = |c: &Channel| c.sensor == s.sensor && !missing.contains(c);
-        let axes: Vec<&Composite> = Channel::ALL.iter().filter(|c| own(c)).map(|c| model.axis(*c)).collect();
+        let is_of_sensor = |c: &Channel| c.sensor == s.sensor && !missing.contains(c);
+        let axes: Vec<&Composite> =
+            Channel::ALL.iter().filter(|c| is_of_sensor(c)).map(|c| model.axis(*c)).collect();
         let pair = composite(&s.exported, model.rate_hz).map_err(JobError::Pair)?;
         let levels = default_levels(recorded.samples);
         let horizon = export.settings.horizon;
@@ -97,11 +98,11 @@ pub(crate) fn certify(
                 variances.iter().map(|nu| nu[level as usize - 1]).sum::<f64>() / variances.len() as f64;
             let edof = recorded.recordings as f64 * interval::edof_eta3(recorded.samples, level);
             let (low, high) = interval::interval(mean, edof, confidence);
-            let own = axes.iter().map(|axis| axis.haar_wv(level)).fold(0.0, f64::max);
+            let largest = axes.iter().map(|axis| axis.haar_wv(level)).fold(0.0, f64::max);
             CertifiedScale {
                 average_s: average_s(level),
-                ratio: (own / mean).sqrt(),
-                inside: (low..=high).contains(&own),
+                ratio: (largest / mean).sqrt(),
+                inside: (low..=high).contains(&largest),
             }
         };
         Ok(Certificate { sensor: s.sensor, scales: usable.into_iter().map(scale).collect() })
@@ -116,14 +117,14 @@ fn variances(
     levels: u32,
     recorded: Recorded,
 ) -> Result<Vec<Vec<f64>>, JobError> {
-    let one = |run: u64| {
+    let recording_variances = |run: u64| {
         let (seed, source) = (recorded.seed, sensor.name());
         let key = StreamKey { seed, scenario: "certify", run, source, process: "" };
         let mut signal = vec![0.0; recorded.samples];
         Synthesizer::new(pair, key).fill(&mut signal);
         Ok(classical(&signal, levels)?)
     };
-    (0..recorded.recordings).into_par_iter().map(one).collect()
+    (0..recorded.recordings).into_par_iter().map(recording_variances).collect()
 }
 
 /// The pair as a noise model.

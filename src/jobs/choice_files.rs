@@ -24,8 +24,8 @@ pub(crate) fn claim_choice<'a>(
     existing: Existing,
 ) -> Result<Claim, FileError> {
     let recognise = |text: &str| {
-        let there = serde_json::from_str::<serde_json::Value>(text).unwrap_or_default();
-        let is_ours = there["candidates"].is_array() && there["influence"].is_object();
+        let present = serde_json::from_str::<serde_json::Value>(text).unwrap_or_default();
+        let is_ours = present["candidates"].is_array() && present["influence"].is_object();
         Ok(if is_ours { Found::Other("holds the result of an earlier choose") } else { Found::Foreign })
     };
     claim_directory(out, &FILES, inputs, existing, recognise)

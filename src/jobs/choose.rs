@@ -111,8 +111,8 @@ fn units(measured: &Measured) -> Vec<Unit> {
         })
     };
     let unit = |file: &FileReport| {
-        let own: Vec<String> = file.recordings().map(|(name, _)| name).collect();
-        let replicates = signals().filter(|(_, r)| own.contains(&r.name)).map(|(c, r)| (c, r.clone()));
+        let names: Vec<String> = file.recordings().map(|(name, _)| name).collect();
+        let replicates = signals().filter(|(_, r)| names.contains(&r.name)).map(|(c, r)| (c, r.clone()));
         Unit { name: file.file.clone(), replicates: replicates.collect() }
     };
     measured.report.files.iter().map(unit).collect()

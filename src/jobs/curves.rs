@@ -29,13 +29,13 @@ pub(crate) fn read_curves(
     let named = curve_file::read(path)?;
     let path = || path.display().to_string();
     let rate_hz = match (named[0].rate_hz, rate_hz) {
-        (Some(own), Some(given)) => return Err(JobError::TwoRates { path: path(), own, given }),
-        (own, given) => own.or(given).ok_or_else(|| JobError::NoRate { path: path() })?,
+        (Some(stated), Some(given)) => return Err(JobError::TwoRates { path: path(), stated, given }),
+        (stated, given) => stated.or(given).ok_or_else(|| JobError::NoRate { path: path() })?,
     };
     let mut curves: Vec<(Scope, Estimator, Curve)> = Vec::new();
     for named in named {
-        let own = named.estimator.and_then(|name| name.parse().ok());
-        let estimator = own.unwrap_or(Estimator::Given);
+        let estimator = named.estimator.and_then(|name| name.parse().ok());
+        let estimator = estimator.unwrap_or(Estimator::Given);
         let sensor = named.sensor.or(sensor).ok_or_else(|| JobError::NoSensor { path: path() })?;
         let scope = Scope { sensor, axis: named.axis };
         if curves.iter().any(|(s, e, _)| (*s, *e) == (scope, estimator)) {

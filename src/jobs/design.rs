@@ -73,7 +73,7 @@ pub(crate) fn design(
 fn designed(outcome: &Outcome, rate_hz: f64) -> Vec<DesignedParameter> {
     let composite = &outcome.fit.composite;
     let values: Vec<_> = composite.parameters().collect();
-    let one = |interval: &ParameterInterval| {
+    let parameter_of_interval = |interval: &ParameterInterval| {
         let (_, value) = *values.iter().find(|(of, _)| *of == interval.of)?;
         let (name, label) = (composite.name_of(interval.of), &composite.labels()[interval.of.process]);
         let (parameter, shown): (String, &dyn Fn(f64) -> f64) = match interval.of.parameter {
@@ -95,7 +95,7 @@ fn designed(outcome: &Outcome, rate_hz: f64) -> Vec<DesignedParameter> {
             endless_half_width_pct: None,
         })
     };
-    outcome.inference.iter().flat_map(|i| &i.intervals).filter_map(one).collect()
+    outcome.inference.iter().flat_map(|i| &i.intervals).filter_map(parameter_of_interval).collect()
 }
 
 fn half_width_pct(value: f64, [low, high]: [f64; 2]) -> f64 {

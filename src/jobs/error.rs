@@ -98,12 +98,12 @@ pub enum JobError {
     #[error("gmwm, rgmwm and avlr take one signal at a time")]
     Pooled,
     /// A curve that says its rate, and another one given.
-    #[error("{path}: the curve says its rate, {own} Hz; {given} Hz is another")]
+    #[error("{path}: the curve says its rate, {stated} Hz; {given} Hz is another")]
     TwoRates {
         /// File.
         path: String,
         /// Its rate.
-        own: f64,
+        stated: f64,
         /// The rate given.
         given: f64,
     },

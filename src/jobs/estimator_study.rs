@@ -107,8 +107,8 @@ fn identity(design: &Design) -> Value {
 
 fn layout(design: &Design, aim: &Target) -> Layout {
     let row = |(s, e): (&Contamination, &str)| (s.name.clone(), e.to_owned());
-    let of = |s| design.estimators.iter().map(move |e| row((s, e.name())));
-    let rows = design.scenarios.iter().flat_map(of).collect();
+    let rows_of_scenario = |s| design.estimators.iter().map(move |e| row((s, e.name())));
+    let rows = design.scenarios.iter().flat_map(rows_of_scenario).collect();
     Layout { rows, parameters: Design::parameters(&aim.fit.composite) }
 }
 
@@ -119,8 +119,9 @@ fn rows(design: &Design, aim: &Target, sets: &[Vec<Estimate>]) -> Vec<Efficiency
     let width = design.estimators.len();
     let mut rows = Vec::new();
     for (s, scenario) in design.scenarios.iter().enumerate() {
-        let of = |e: usize, p: usize| sets.iter().map(|set| set[s * width + e].theta[p]).collect::<Vec<_>>();
-        let judge = |e: usize, p: usize| accuracy(&of(e, p), targets[p], design.seed);
+        let estimates =
+            |e: usize, p: usize| sets.iter().map(|set| set[s * width + e].theta[p]).collect::<Vec<_>>();
+        let judge = |e: usize, p: usize| accuracy(&estimates(e, p), targets[p], design.seed);
         let cells: Vec<(usize, usize)> =
             (0..width).flat_map(|e| (0..names.len()).map(move |p| (e, p))).collect();
         let judged: Vec<Accuracy> = cells.par_iter().map(|(e, p)| judge(*e, *p)).collect();
@@ -136,7 +137,7 @@ fn rows(design: &Design, aim: &Target, sets: &[Vec<Estimate>]) -> Vec<Efficiency
                 accuracy: own.clone(),
                 ratio,
                 ratio_se,
-                zeros: of(e, p).iter().filter(|v| **v <= 0.0).count(),
+                zeros: estimates(e, p).iter().filter(|v| **v <= 0.0).count(),
                 without_root: roots as f64 / variances,
             });
         }

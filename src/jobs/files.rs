@@ -63,13 +63,19 @@ impl ModelFiles {
     ) -> Self {
         let (curves, model) = self.contents(calibration, note);
         let model = model_file::to_toml(&model);
-        let at = |path: &Path| Self::of(path, &[self.estimator]).remove(0);
+        let files_of_path = |path: &Path| Self::of(path, &[self.estimator]).remove(0);
         let is_usable = |path: &Path| {
             atomic::guard_contents(path, model.as_bytes(), existing)
-                .and_then(|()| atomic::guard_contents(&at(path).curves, curves.as_bytes(), existing))
+                .and_then(|()| {
+                    atomic::guard_contents(&files_of_path(path).curves, curves.as_bytes(), existing)
+                })
                 .is_ok()
         };
-        if is_usable(&self.model) { self.clone() } else { at(&atomic::name_beside(&self.model, is_usable)) }
+        if is_usable(&self.model) {
+            self.clone()
+        } else {
+            files_of_path(&atomic::name_beside(&self.model, is_usable))
+        }
     }
 
     /// Refuses what had to be written beside.
@@ -103,11 +109,11 @@ impl ModelFiles {
 
     fn contents(&self, calibration: &Calibration, note: &CalibrationNote) -> (String, ModelFile) {
         let Calibration { groups, outcomes, settings, turn_on } = calibration;
-        let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == self.estimator).collect();
-        let curves = report::json(&CurvesFile::new(groups, &own, settings));
+        let chosen: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == self.estimator).collect();
+        let curves = report::json(&CurvesFile::new(groups, &chosen, settings));
         let blake3 = hash::of_bytes(curves.as_bytes());
         let means = turn_on.iter().filter(|t| t.estimator == self.estimator);
-        let model = note.model_file(&own, settings, Some(&blake3)).with_turn_on(means);
+        let model = note.model_file(&chosen, settings, Some(&blake3)).with_turn_on(means);
         (curves, model)
     }
 
@@ -117,9 +123,9 @@ impl ModelFiles {
     /// When the system refuses.
     pub(crate) fn write(&self, calibration: &Calibration, note: &CalibrationNote) -> Result<(), FileError> {
         let (curves, model) = self.contents(calibration, note);
-        let own: Vec<&Outcome> =
+        let chosen: Vec<&Outcome> =
             calibration.outcomes.iter().filter(|o| o.estimator == self.estimator).collect();
-        let draws = DrawsFile::of(&own, calibration.settings.rate_hz);
+        let draws = DrawsFile::of(&chosen, calibration.settings.rate_hz);
         let draws =
             draws.map(|draws| serde_json::to_string(&draws).expect("plain structs are always JSON") + "\n");
         // All are on the disk before any has its name. Should the model not get its name, the hash in it tells that the
@@ -167,10 +173,10 @@ impl ModelFiles {
         diagnoses: &[Diagnosis],
     ) -> Result<(), FileError> {
         let Calibration { groups, outcomes, settings, turn_on } = calibration;
-        let own = outcomes.iter().enumerate().filter(|(_, o)| o.estimator == self.estimator);
-        let own: Vec<(usize, &Outcome)> = own.collect();
-        let curves = CurvesFile::new(groups, &own.iter().map(|(_, o)| *o).collect::<Vec<_>>(), settings);
-        atomic::write(&self.page, report::calibration_page(&curves, &own, diagnoses, turn_on, settings))
+        let chosen = outcomes.iter().enumerate().filter(|(_, o)| o.estimator == self.estimator);
+        let chosen: Vec<(usize, &Outcome)> = chosen.collect();
+        let curves = CurvesFile::new(groups, &chosen.iter().map(|(_, o)| *o).collect::<Vec<_>>(), settings);
+        atomic::write(&self.page, report::calibration_page(&curves, &chosen, diagnoses, turn_on, settings))
     }
 }
 

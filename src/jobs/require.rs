@@ -277,8 +277,9 @@ pub(crate) struct CatalogueUnit {
 
 /// The errors after a time without fixes at every place where the outage lasts so long.
 fn after(curves: &[Vec<Drift>], length_s: f64) -> Vec<Drift> {
-    let there = |curve: &Vec<Drift>| curve.iter().find(|d| (d.after_s - length_s).abs() < 1e-3).copied();
-    curves.iter().filter_map(there).collect()
+    let drift_of_curve =
+        |curve: &Vec<Drift>| curve.iter().find(|d| (d.after_s - length_s).abs() < 1e-3).copied();
+    curves.iter().filter_map(drift_of_curve).collect()
 }
 
 /// The largest value of a quantity after a time without fixes.

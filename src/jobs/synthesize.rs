@@ -54,9 +54,9 @@ impl Synthesis {
         let recognise = |text: &str| {
             let Some(made) = made(text) else { return Ok(Found::Foreign) };
             no_others(out, &names, &made)?;
-            let there: Value = serde_json::from_str(text).unwrap_or_default();
+            let present: Value = serde_json::from_str(text).unwrap_or_default();
             let is_same =
-                own.as_object().is_some_and(|own| own.iter().all(|(key, value)| there[key] == *value));
+                own.as_object().is_some_and(|own| own.iter().all(|(key, value)| present[key] == *value));
             Ok(Found::result(is_same && made == names))
         };
         claim_directory(out, &files, inputs, existing, recognise)

@@ -26,11 +26,11 @@ pub(crate) fn brief(
 ) -> String {
     let rate_hz = settings.rate_hz;
     let of_sensor = |sensor: Sensor| {
-        let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.scope.sensor == sensor).collect();
-        let parts = [verdict(&own, rate_hz), recordings(&own, diagnoses)];
+        let of_sensor: Vec<&Outcome> = outcomes.iter().filter(|o| o.scope.sensor == sensor).collect();
+        let parts = [verdict(&of_sensor, rate_hz), recordings(&of_sensor, diagnoses)];
         let first: Vec<String> = parts.into_iter().flatten().collect();
         let first = (!first.is_empty()).then(|| format!("{}: {}", sensor.name(), first.join(" ")));
-        let notes = own.iter().flat_map(|o| match outcomes.len() <= MOST {
+        let notes = of_sensor.iter().flat_map(|o| match outcomes.len() <= MOST {
             true => notes(o),
             false => axes_remark(o, rate_hz).into_iter().collect(),
         });
@@ -60,8 +60,8 @@ pub(crate) fn brief(
 }
 
 /// Whether the models of a sensor describe its data; none without a model.
-fn verdict(own: &[&Outcome], rate_hz: f64) -> Option<String> {
-    match own {
+fn verdict(outcomes: &[&Outcome], rate_hz: f64) -> Option<String> {
+    match outcomes {
         [] => None,
         [outcome] => Some(format!("{}.", fit_verdict(outcome, rate_hz))),
         several => {
@@ -73,9 +73,9 @@ fn verdict(own: &[&Outcome], rate_hz: f64) -> Option<String> {
 
 /// Abnormal recordings of a sensor; none where they are too few to tell.
 fn abnormal(diagnoses: &[Diagnosis], sensor: Sensor) -> Option<usize> {
-    let own = || diagnoses.iter().filter(|d| d.sensor == sensor);
-    let can_tell = own().any(|d| !d.scores.is_empty());
-    can_tell.then(|| own().filter(|d| d.verdict != Verdict::Normal).count())
+    let of_sensor = || diagnoses.iter().filter(|d| d.sensor == sensor);
+    let can_tell = of_sensor().any(|d| !d.scores.is_empty());
+    can_tell.then(|| of_sensor().filter(|d| d.verdict != Verdict::Normal).count())
 }
 
 /// Whether the recordings of a sensor differ beyond their noise without one that stands out.
@@ -84,15 +84,15 @@ fn differ(diagnoses: &[Diagnosis], sensor: Sensor) -> bool {
 }
 
 /// What the models are of: `6 recordings × 3 axes: 1 abnormal, axes differ.`; none of a curve.
-fn recordings(own: &[&Outcome], diagnoses: &[Diagnosis]) -> Option<String> {
-    let first = own.iter().find(|o| o.recordings > 0)?;
+fn recordings(outcomes: &[&Outcome], diagnoses: &[Diagnosis]) -> Option<String> {
+    let first = outcomes.iter().find(|o| o.recordings > 0)?;
     let sensor = first.scope.sensor;
     let abnormal = abnormal(diagnoses, sensor).map(|count| match count {
         0 if differ(diagnoses, sensor) => "none abnormal, but they differ".to_owned(),
         0 => "none abnormal".to_owned(),
         count => format!("{count} abnormal"),
     });
-    let axes = own.iter().any(|o| o.axes_differ.is_some()).then(|| "axes differ".to_owned());
+    let axes = outcomes.iter().any(|o| o.axes_differ.is_some()).then(|| "axes differ".to_owned());
     let found: Vec<String> = abnormal.into_iter().chain(axes).collect();
     let colon = if found.is_empty() { "" } else { ": " };
     Some(format!("{}{colon}{}.", signals(first), found.join(", ")))
@@ -115,12 +115,12 @@ pub(super) fn fit_verdict(outcome: &Outcome, rate_hz: f64) -> String {
     let (spec, departure) = (&outcome.spec, outcome.departure());
     let goodness = outcome.inference.as_ref().and_then(|i| i.goodness);
     let test = goodness.map_or(String::new(), |g| format!(" (J-test p = {:.3})", g.p_value));
-    let at = |miss: Miss| duration(tau_s(miss.level, rate_hz));
+    let scale_words = |miss: Miss| duration(tau_s(miss.level, rate_hz));
     if let Some(worst) = departure.worst() {
         return format!(
             "{spec} does not fit: data/model is {} at {}, {} of {} scales are off{test}",
             readable(worst.ratio),
-            at(worst),
+            scale_words(worst),
             departure.missed.len(),
             departure.scales
         );
@@ -130,14 +130,14 @@ pub(super) fn fit_verdict(outcome: &Outcome, rate_hz: f64) -> String {
         return format!(
             "{spec} does not fit as a whole: data/model is {} at {}",
             readable(worst.ratio),
-            at(worst)
+            scale_words(worst)
         );
     }
     let known = departure.known_to.map_or(String::new(), |level| {
         format!(", of the scales known to 10 % (up to {})", duration(tau_s(level, rate_hz)))
     });
     let off = departure.furthest.map_or(String::new(), |m| {
-        format!(": at most {} off, at {}{known}", percent((m.ratio - 1.0).abs()), at(m))
+        format!(": at most {} off, at {}{known}", percent((m.ratio - 1.0).abs()), scale_words(m))
     });
     let word = if goodness.is_some_and(|g| g.is_rejected()) { "does not fit as a whole" } else { "fits" };
     format!("{spec} {word}{test}{off}")
@@ -185,18 +185,19 @@ fn process_rows(outcome: &Outcome, rate_hz: f64) -> Vec<Vec<String>> {
     let intervals = outcome.inference.as_ref().map_or(&[][..], |i| &i.intervals);
     let row = |(index, (process, label)): (usize, (&Process, String))| {
         let figure = figure(process, sensor).filter(|_| !outcome.fit.zero.contains(&index))?;
-        let own = intervals.iter().find(|i| i.of.process == index && i.of.parameter == figure.parameter);
-        let ends = match own.map(|i| i.absent.is_none().then_some([i.low, i.high])) {
+        let estimated =
+            intervals.iter().find(|i| i.of.process == index && i.of.parameter == figure.parameter);
+        let ends = match estimated.map(|i| i.absent.is_none().then_some([i.low, i.high])) {
             None => String::new(),
             Some(None) => "not determined".to_owned(),
             Some(Some(ends)) => {
-                let mut ends = ends.map(|end| (figure.of)(end, rate_hz));
+                let mut ends = ends.map(|end| (figure.convert)(end, rate_hz));
                 ends.sort_by(f64::total_cmp);
                 interval(Some(ends), 1.0)
             }
         };
         let name = format!("{label} {}", figure.name);
-        let value = readable((figure.of)(figure.value, rate_hz));
+        let value = readable((figure.convert)(figure.value, rate_hz));
         Some(vec![name, value, ends, figure.unit.to_owned(), governs(&shares[index], rate_hz)])
     };
     model.processes.iter().zip(model.labels()).enumerate().filter_map(row).collect()
@@ -209,12 +210,13 @@ struct Figure {
     parameter: Parameter,
     value: f64,
     /// How it follows from the parameter and the rate (Hz).
-    of: fn(f64, f64) -> f64,
+    convert: fn(f64, f64) -> f64,
     unit: &'static str,
 }
 
 fn figure(process: &Process, sensor: Sensor) -> Option<Figure> {
-    let of = |name, parameter, value, of, unit| Some(Figure { name, parameter, value, of, unit });
+    let figure_of =
+        |name, parameter, value, convert, unit| Some(Figure { name, parameter, value, convert, unit });
     let [increment_unit, ramp_unit] = match sensor {
         Sensor::Accel => ["m/s", "m/s² per s"],
         Sensor::Gyro => ["rad", "rad/s per s"],
@@ -222,19 +224,19 @@ fn figure(process: &Process, sensor: Sensor) -> Option<Figure> {
     match process {
         Process::Ar1(p) if p.phi() > 0.0 => {
             let time = |phi: f64, rate_hz: f64| -1.0 / (phi.ln() * rate_hz);
-            of("correlation time T", Parameter::Phi, p.phi(), time, "s")
+            figure_of("correlation time T", Parameter::Phi, p.phi(), time, "s")
         }
         Process::GaussMarkov(p) => {
-            of("correlation time T", Parameter::Beta, p.beta(), |beta, _| 1.0 / beta, "s")
+            figure_of("correlation time T", Parameter::Beta, p.beta(), |beta, _| 1.0 / beta, "s")
         }
         Process::Quantization(p) => {
             // of the increments over a sample, as IEEE 952 has it
             let increment = |q2: f64, rate_hz: f64| q2.sqrt() / rate_hz;
-            of("quantization Q", Parameter::Q2, p.q2(), increment, increment_unit)
+            figure_of("quantization Q", Parameter::Q2, p.q2(), increment, increment_unit)
         }
         Process::Drift(p) => {
             let ramp = |slope, rate_hz| slope * rate_hz;
-            of("ramp", Parameter::Slope, p.slope(), ramp, ramp_unit)
+            figure_of("ramp", Parameter::Slope, p.slope(), ramp, ramp_unit)
         }
         _ => None,
     }
@@ -242,10 +244,10 @@ fn figure(process: &Process, sensor: Sensor) -> Option<Figure> {
 
 /// Scales at which a process is the largest part of the wavelet variance.
 fn governs(share: &nav_sim_calibration::Share, rate_hz: f64) -> String {
-    let at = |level: u32| duration(tau_s(level, rate_hz));
+    let scale_words = |level: u32| duration(tau_s(level, rate_hz));
     match (share.leads.first(), share.leads.last()) {
-        (Some(first), Some(last)) if first == last => at(*first),
-        (Some(first), Some(last)) => format!("{} – {}", at(*first), at(*last)),
+        (Some(first), Some(last)) if first == last => scale_words(*first),
+        (Some(first), Some(last)) => format!("{} – {}", scale_words(*first), scale_words(*last)),
         _ => format!("none ({} at most)", percent(share.largest.0)),
     }
 }

@@ -236,14 +236,15 @@ impl ChoiceReport<'_> {
             if scales[..i].iter().any(|s| s.signals == first.signals) {
                 continue;
             }
-            let own: Vec<_> = scales.iter().filter(|s| s.signals == first.signals).collect();
+            let of_signals: Vec<_> = scales.iter().filter(|s| s.signals == first.signals).collect();
             // the scales around the one that counts most
             let decides = |s: &&crate::choose::ScaleInfluence| s.on_error >= DECISIVE * largest;
-            let peak =
-                (0..own.len()).max_by(|a, b| own[*a].on_error.total_cmp(&own[*b].on_error)).unwrap_or(0);
-            let before = own[..peak].iter().rev().take_while(|s| decides(s)).count();
-            let felt: Vec<_> = own[peak - before..].iter().take_while(|s| decides(s)).collect();
-            let sum: f64 = own.iter().map(|s| s.on_error).sum();
+            let peak = (0..of_signals.len())
+                .max_by(|a, b| of_signals[*a].on_error.total_cmp(&of_signals[*b].on_error))
+                .unwrap_or(0);
+            let before = of_signals[..peak].iter().rev().take_while(|s| decides(s)).count();
+            let felt: Vec<_> = of_signals[peak - before..].iter().take_while(|s| decides(s)).collect();
+            let sum: f64 = of_signals.iter().map(|s| s.on_error).sum();
             let range = match (felt.first(), felt.last()) {
                 (Some(from), Some(to)) => {
                     format!("mostly from {} to {} s", readable(from.tau_s), readable(to.tau_s))

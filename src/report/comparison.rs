@@ -127,14 +127,14 @@ pub(crate) struct ConsistencyRow {
 impl ComparisonFile {
     /// All candidates against one reference.
     pub(crate) fn new(reference: (&str, &Verdict), paired: bool, candidates: &[CandidateResult]) -> Self {
-        let own = VerdictRow { run: reference.0.to_owned(), verdict: *reference.1 };
+        let reference_row = VerdictRow { run: reference.0.to_owned(), verdict: *reference.1 };
         let others = candidates.iter().filter(|c| !c.is_reference);
         let verdicts = others.map(|c| VerdictRow { run: c.run.clone(), verdict: c.verdict });
         let mut file = Self {
             schema_version: 1,
             reference: reference.0.to_owned(),
             paired,
-            verdicts: std::iter::once(own).chain(verdicts).collect(),
+            verdicts: std::iter::once(reference_row).chain(verdicts).collect(),
             rows: Vec::new(),
             consistency: Vec::new(),
         };

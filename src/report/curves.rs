@@ -115,7 +115,7 @@ impl From<SignalsFile> for CurvesFile {
         let efficiency = file.efficiency;
         let curves = file.signals.into_iter().flat_map(|s| {
             let robust_edof = s.edof.iter().map(|e| interval::edof_robust(*e, efficiency)).collect();
-            let of = |estimator: Estimator, wv: Vec<f64>, edof: Vec<f64>| FittedCurve {
+            let curve_of_estimator = |estimator: Estimator, wv: Vec<f64>, edof: Vec<f64>| FittedCurve {
                 efficiency: estimator.is_robust().then_some(efficiency),
                 sensor: s.sensor.clone(),
                 axis: s.axis.clone(),
@@ -126,8 +126,8 @@ impl From<SignalsFile> for CurvesFile {
                 ..FittedCurve::default()
             };
             [
-                of(Estimator::Gmwm, s.classical.wv.clone(), s.edof.clone()),
-                of(Estimator::Rgmwm, s.robust.wv.clone(), robust_edof),
+                curve_of_estimator(Estimator::Gmwm, s.classical.wv.clone(), s.edof.clone()),
+                curve_of_estimator(Estimator::Rgmwm, s.robust.wv.clone(), robust_edof),
             ]
         });
         Self { schema_version: file.schema_version, rate_hz: file.rate_hz, curves: curves.collect() }

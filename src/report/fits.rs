@@ -259,6 +259,9 @@ fn process_json(process: &Process, index: usize, intervals: &[ParameterInterval]
     map
 }
 
-pub(super) fn interval_of(intervals: &[ParameterInterval], of: ParameterRef) -> Option<&ParameterInterval> {
-    intervals.iter().find(|i| i.of == of)
+pub(super) fn interval_of(
+    intervals: &[ParameterInterval],
+    parameter: ParameterRef,
+) -> Option<&ParameterInterval> {
+    intervals.iter().find(|i| i.of == parameter)
 }

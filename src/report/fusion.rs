@@ -268,13 +268,13 @@ impl FusionSummary {
         }
         lines.extend(self.mounting.iter().map(MountingRow::line));
         for o in &self.outages {
-            let of = |name: &str, d: Option<DriftRow>| {
+            let drift_words = |name: &str, d: Option<DriftRow>| {
                 d.map(|d| {
                     format!("{:.2} m from the {name} (1 sigma {:.2} m)", d.horizontal_m, d.expected_sigma_m)
                 })
             };
             let fix = if o.followed_by_fix { "next fix" } else { "last fix withheld" };
-            let ends = [of(fix, o.end_from_fix), of("reference", o.end_from_reference)];
+            let ends = [drift_words(fix, o.end_from_fix), drift_words("reference", o.end_from_reference)];
             let ends: Vec<String> = ends.into_iter().flatten().collect();
             lines.push(format!(
                 "outage {}, {} fixes withheld: at its end {}",

@@ -89,11 +89,11 @@ fn calibration_lines(outages: &[OutageSummary]) -> String {
         let h = &o.horizontal_error_end_m;
         let p95 =
             (h.p95_ci95.0.zip(h.p95_ci95.1)).map(|ends| format!("horizontal p95 {} m", shown(h.p95, ends)));
-        let of = |name: &str, value: &PerState<f64>, interval: &Option<PerState<(f64, f64)>>| {
+        let interval_words = |name: &str, value: &PerState<f64>, interval: &Option<PerState<(f64, f64)>>| {
             interval.map(|interval| format!("{name} pos_e_m {}", shown(value.0[1], interval.0[1])))
         };
-        let rmse = of("RMSE", &o.rmse_end, &o.rmse_end_ci95);
-        let asee = of("ASEE", &o.asee_end, &o.asee_end_ci95);
+        let rmse = interval_words("RMSE", &o.rmse_end, &o.rmse_end_ci95);
+        let asee = interval_words("ASEE", &o.asee_end, &o.asee_end_ci95);
         let all: Vec<String> = [p95, rmse, asee].into_iter().flatten().collect();
         let window = window(o.start_s, o.end_s);
         (!all.is_empty()).then(|| format!("\nby the calibration, 95 %, {window}: {}", all.join(", ")))

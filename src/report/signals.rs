@@ -18,20 +18,20 @@ pub(crate) fn signals_digest(file: &SignalsFile) -> Vec<Vec<String>> {
     let head = ["", "unit"].map(str::to_owned).into_iter().chain(times);
     let head = head.chain(["lowest", "robust/classical"].map(str::to_owned)).collect();
     let row = |(sensor, axis): (&str, &str)| {
-        let own = of(file, sensor, axis);
+        let signals = signals_of(file, sensor, axis);
         let median_at = |i: usize| {
-            let of_files = own.iter().filter_map(|s| Some(allan_deviation(*s.classical.wv.get(i)?)));
+            let of_files = signals.iter().filter_map(|s| Some(allan_deviation(*s.classical.wv.get(i)?)));
             let all: Vec<f64> = of_files.collect();
             (!all.is_empty()).then(|| median(&all))
         };
         let cells = decades.iter().map(|i| median_at(*i).map_or(String::new(), |x| format!("{x:.3e}")));
         let name = [format!("{sensor}.{axis}"), unit(sensor).to_owned()];
-        let scales = own.iter().map(|s| s.tau_s.len()).max().unwrap_or(0);
+        let scales = signals.iter().map(|s| s.tau_s.len()).max().unwrap_or(0);
         let lowest = (0..scales).filter_map(|i| Some((i, median_at(i)?))).min_by(|a, b| a.1.total_cmp(&b.1));
         let lowest = lowest.map_or(String::new(), |(i, deviation)| {
             format!("{deviation:.3e} at {}", duration(allan_time_s(&longest(file).tau_s, i)))
         });
-        let ratios: Vec<Ratio> = own.iter().flat_map(|s| ratios(s, file.efficiency)).collect();
+        let ratios: Vec<Ratio> = signals.iter().flat_map(|s| ratios(s, file.efficiency)).collect();
         let ratio = least_ratio(&ratios).map_or(String::new(), |(r, mark)| format!("{r:.2}{mark}"));
         name.into_iter().chain(cells).chain([lowest, ratio]).collect()
     };
@@ -42,15 +42,15 @@ pub(crate) fn signals_digest(file: &SignalsFile) -> Vec<Vec<String>> {
 pub(crate) fn signals_per_file(file: &SignalsFile) -> Vec<(String, Vec<Vec<String>>)> {
     let decades = decades(file);
     let table = |(sensor, axis): (&str, &str)| {
-        let own = of(file, sensor, axis);
-        let names = short_names(&own.iter().map(|s| s.file.as_str()).collect::<Vec<_>>());
+        let signals = signals_of(file, sensor, axis);
+        let names = short_names(&signals.iter().map(|s| s.file.as_str()).collect::<Vec<_>>());
         let head = std::iter::once("averages of".to_owned()).chain(names).collect::<Vec<_>>();
         let row = |i: &usize| {
             let cell = |s: &&SignalCurves| {
                 s.classical.wv.get(*i).map_or(String::new(), |wv| format!("{:.3e}", allan_deviation(*wv)))
             };
             let time = duration(allan_time_s(&longest(file).tau_s, *i));
-            std::iter::once(time).chain(own.iter().map(cell)).collect::<Vec<_>>()
+            std::iter::once(time).chain(signals.iter().map(cell)).collect::<Vec<_>>()
         };
         let title = format!("{sensor}.{axis}: Allan deviation ({})", unit(sensor));
         (title, std::iter::once(head).chain(decades.iter().map(row)).collect())
@@ -144,7 +144,7 @@ fn unit(sensor: &str) -> &'static str {
     if sensor == "accel" { "m/s²" } else { "rad/s" }
 }
 
-fn of<'a>(file: &'a SignalsFile, sensor: &str, axis: &str) -> Vec<&'a SignalCurves> {
+fn signals_of<'a>(file: &'a SignalsFile, sensor: &str, axis: &str) -> Vec<&'a SignalCurves> {
     file.signals.iter().filter(|s| s.sensor == sensor && s.axis == axis).collect()
 }
 

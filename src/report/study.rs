@@ -73,8 +73,8 @@ fn ints<const N: usize>(names: [&str; N]) -> impl Iterator<Item = (String, Value
     names.map(|name| (name.to_owned(), ValueKind::Int)).into_iter()
 }
 
-fn keys(of: &ColumnResult<'_>) -> TableRow {
-    let names = of.cell.into_iter().chain([of.candidate, of.filter]);
+fn keys(result: &ColumnResult<'_>) -> TableRow {
+    let names = result.cell.into_iter().chain([result.candidate, result.filter]);
     names.map(|name| Value::Text(name.to_owned())).collect()
 }
 
@@ -123,16 +123,16 @@ pub(crate) fn outage_columns() -> Vec<TableColumn> {
 
 /// One row an outage; a set without outages has no row.
 pub(crate) fn outage_rows(
-    of: &ColumnResult<'_>,
+    result: &ColumnResult<'_>,
     outages: &[OutageMetrics],
     comparison: Option<&[OutageComparison]>,
 ) -> Vec<TableRow> {
-    let runs = of.measured.sampled().len() as u64;
-    let diverged = of.measured.sampled().iter().filter(|r| r.diverged).count() as u64;
-    let verdict = of.measured.verdict();
-    let words = [of.reference, verdict_word(verdict.kind), verdict.worst_state];
+    let runs = result.measured.sampled().len() as u64;
+    let diverged = result.measured.sampled().iter().filter(|r| r.diverged).count() as u64;
+    let verdict = result.measured.verdict();
+    let words = [result.reference, verdict_word(verdict.kind), verdict.worst_state];
     let row = |(i, outage): (usize, &OutageMetrics)| {
-        let mut row = keys(of);
+        let mut row = keys(result);
         row.extend(words.map(|word| Value::Text(word.to_owned())));
         row.extend([i as u64, runs, diverged].map(Value::Int));
         let ratios = comparison.and_then(|c| c.get(i));
@@ -186,9 +186,9 @@ pub(crate) fn epoch_columns() -> Vec<TableColumn> {
 }
 
 /// One row an epoch.
-pub(crate) fn epoch_rows(of: &ColumnResult<'_>, epochs: &[EpochMetrics]) -> Vec<TableRow> {
+pub(crate) fn epoch_rows(result: &ColumnResult<'_>, epochs: &[EpochMetrics]) -> Vec<TableRow> {
     let row = |e: &EpochMetrics| {
-        let mut row = keys(of);
+        let mut row = keys(result);
         row.extend([u64::from(e.gnss), e.count].map(Value::Int));
         let mut values = vec![e.t_s];
         for estimates in [&e.asee, &e.rmse] {
@@ -214,11 +214,11 @@ pub(crate) fn run_columns() -> Vec<TableColumn> {
 }
 
 /// One row a run and outage; a covariance analysis has none.
-pub(crate) fn run_rows(of: &ColumnResult<'_>) -> Vec<TableRow> {
+pub(crate) fn run_rows(result: &ColumnResult<'_>) -> Vec<TableRow> {
     let mut rows = Vec::new();
-    for run in of.measured.sampled() {
+    for run in result.measured.sampled() {
         for (i, o) in run.outages.iter().enumerate() {
-            let mut row = keys(of);
+            let mut row = keys(result);
             row.extend([run.run, i as u64, u64::from(run.diverged), run.nis.1].map(Value::Int));
             let whole = [run.nis.0, run.nees_mean, run.covered].into_iter();
             let states = whole.chain(o.see_mean).chain(o.see_end).chain(o.error_end);

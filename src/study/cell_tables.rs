@@ -150,8 +150,12 @@ fn comparisons(
     }
     let compared = |i: usize| {
         let filter = columns[i].filter;
-        let own = columns.iter().position(|c| c.candidate == reference && c.filter == filter).unwrap_or(0);
-        Ok((Some(metrics::compare(&experiments[i], &experiments[own], true)?), own == i))
+        let reference_column =
+            columns.iter().position(|c| c.candidate == reference && c.filter == filter).unwrap_or(0);
+        Ok((
+            Some(metrics::compare(&experiments[i], &experiments[reference_column], true)?),
+            reference_column == i,
+        ))
     };
     (0..columns.len()).map(compared).collect()
 }

@@ -78,7 +78,7 @@ impl Study {
 
     /// Every axis has something, and every entry says one thing.
     fn check_axes(&self) -> Result<(), DescriptionError> {
-        let empty = |key: &str, there: bool| match there {
+        let empty = |key: &str, is_given: bool| match is_given {
             true => Ok(()),
             false => Err(DescriptionError::Empty { axis: key.to_owned() }),
         };

@@ -313,17 +313,17 @@ impl Study {
 
     /// The candidates, one a column: its entry and, for calibrations, its estimator.
     pub(crate) fn candidates(&self) -> Vec<(String, usize, Option<Estimator>)> {
-        let of = |(i, e): (usize, &CandidateEntry)| match &e.calibrate {
+        let labels_of_entry = |(i, e): (usize, &CandidateEntry)| match &e.calibrate {
             None => vec![(e.name.clone(), i, None)],
             Some(step) if step.estimators.len() == 1 => {
                 vec![(e.name.clone(), i, Some(step.estimators[0]))]
             }
             Some(step) => {
-                let one = |estimator: &Estimator| (format!("{}/{estimator}", e.name), i, Some(*estimator));
-                step.estimators.iter().map(one).collect()
+                let label = |estimator: &Estimator| (format!("{}/{estimator}", e.name), i, Some(*estimator));
+                step.estimators.iter().map(label).collect()
             }
         };
-        self.candidate.iter().enumerate().flat_map(of).collect()
+        self.candidate.iter().enumerate().flat_map(labels_of_entry).collect()
     }
 
     /// Whether a candidate is calibrated without the recordings that make the errors.

@@ -50,7 +50,7 @@ fn samples() -> Vec<TrajectorySample> {
 }
 
 fn model() -> Option<Model> {
-    let of = |unit: f64| {
+    let composite = |unit: f64| {
         Some(Composite::new(vec![
             Process::White(White::new(1e-5 * unit).ok()?),
             Process::Quantization(Quantization::new(1e-7 * unit).ok()?),
@@ -58,7 +58,7 @@ fn model() -> Option<Model> {
             Process::RandomWalk(RandomWalk::new(1e-11 * unit).ok()?),
         ]))
     };
-    Some(Model::pooled(100.0, &of(1.0)?, &of(1e-2)?))
+    Some(Model::pooled(100.0, &composite(1.0)?, &composite(1e-2)?))
 }
 
 #[cfg(test)]

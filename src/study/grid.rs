@@ -163,11 +163,11 @@ impl Grid {
         let mut found: Vec<String> = Vec::new();
         for (name, scenario) in &self.scenarios {
             for column in &self.columns {
-                let mut own = scenario.clone();
-                own.filter.states = column.filter.unwrap_or(own.filter.states);
-                let states = own.filter.states;
+                let mut variant = scenario.clone();
+                variant.filter.states = column.filter.unwrap_or(variant.filter.states);
+                let states = variant.filter.states;
                 found.extend(
-                    own.doubts().iter().map(|doubt| format!("scenario {name}, filter {states}: {doubt}")),
+                    variant.doubts().iter().map(|doubt| format!("scenario {name}, filter {states}: {doubt}")),
                 );
             }
         }
@@ -188,8 +188,8 @@ fn columns(study: &Study) -> Vec<Column> {
         all => all.iter().copied().map(Some).collect(),
     };
     let candidates = study.candidates().into_iter().enumerate();
-    let of = |(candidate, (name, ..)): (usize, (String, usize, Option<Estimator>))| {
+    let columns_of = |(candidate, (name, ..)): (usize, (String, usize, Option<Estimator>))| {
         filters.iter().map(move |f| Column { candidate, name: name.clone(), filter: *f }).collect::<Vec<_>>()
     };
-    candidates.flat_map(of).collect()
+    candidates.flat_map(columns_of).collect()
 }

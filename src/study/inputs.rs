@@ -207,12 +207,12 @@ impl<'a> Inputs<'a> {
         }
         let models = &self.models;
         let belief = |column: &Column| {
-            let mut own = scenario.clone();
-            own.filter.states = grid.filter(cell, column);
+            let mut variant = scenario.clone();
+            variant.filter.states = grid.filter(cell, column);
             let part = || format!("candidate {}", column.name);
             let model = &models[plan.model(column.candidate, cell.truth).path.as_str()];
             let model = continuous::at_rate(model, scenario.imu.rate_hz).map_err(|e| unfit(part(), e))?;
-            own.belief(&model, outages, track).map_err(|e| unfit(part(), e))
+            variant.belief(&model, outages, track).map_err(|e| unfit(part(), e))
         };
         grid.columns.par_iter().map(belief).collect()
     }

@@ -90,12 +90,12 @@ impl Planned {
     }
 
     fn status_by(&self, is_whole: &dyn Fn(&str) -> bool) -> Result<Status, StudyError> {
-        let mut there = directory::units(&self.directory)?;
+        let mut present = directory::units(&self.directory)?;
         let (plan, grid) = (&self.plan, &self.grid);
         let mut status = Status::default();
         let mut cell_whole = true;
         for (unit, id) in plan.named_units(grid) {
-            let is_there = there.remove(&id);
+            let is_there = present.remove(&id);
             let done = is_there && is_whole(&id);
             status.units += 1;
             status.damaged += usize::from(is_there && !done);
@@ -110,7 +110,7 @@ impl Planned {
                 cell_whole = true;
             }
         }
-        status.foreign = there;
+        status.foreign = present;
         Ok(status)
     }
 

@@ -249,8 +249,8 @@ fn calibration(
         inputs: inputs.collect::<Result<Vec<Input>, _>>()?,
     };
     let text = |estimator: &Estimator| {
-        let own: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == *estimator).collect();
-        model_file::to_toml(&note.model_file(&own, &settings, None))
+        let chosen: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == *estimator).collect();
+        model_file::to_toml(&note.model_file(&chosen, &settings, None))
     };
     Ok(settings.estimators.iter().map(text).collect())
 }

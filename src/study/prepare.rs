@@ -37,8 +37,8 @@ impl Material<'_> {
             contamination: self.contamination,
             seed: self.step.seed.unwrap_or(self.seed),
         };
-        let one = |replicate: u64| Ok(imu.recording(replicate, &channels, self.step.samples)?);
-        (1..=self.step.replicates).into_par_iter().map(one).collect()
+        let recording = |replicate: u64| Ok(imu.recording(replicate, &channels, self.step.samples)?);
+        (1..=self.step.replicates).into_par_iter().map(recording).collect()
     }
 }
 
@@ -97,8 +97,8 @@ pub(crate) fn calibrated(
     if let Some(estimator) = single.filter(|_| pool != Pool::Axes) {
         return refused("pool", pool.to_string(), format!("is not axes, as {estimator} needs"));
     }
-    let of = |recording| replicates(recording, step.scales, &settings.tuning);
-    let measured: Vec<_> = recordings.par_iter().map(of).collect::<Result<_, _>>()?;
+    let curves_of = |recording| replicates(recording, step.scales, &settings.tuning);
+    let measured: Vec<_> = recordings.par_iter().map(curves_of).collect::<Result<_, _>>()?;
     let groups = grouped(measured.concat(), pool);
     let outcomes = calibrate(&groups, &settings)?;
     Ok((outcomes, settings))

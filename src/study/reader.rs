@@ -84,12 +84,12 @@ impl Reader<'_> {
         recordings: &[PathBuf],
         truth: &TruthEntry,
     ) -> Result<Vec<PathBuf>, StudyError> {
-        let own: Vec<String> = hashes(&recordings::listed(&self.beside_all(&truth.recordings))?)?;
+        let of_truth: Vec<String> = hashes(&recordings::listed(&self.beside_all(&truth.recordings))?)?;
         let mut files = recordings::listed(&self.beside_all(recordings))?;
         let all = files.len();
         // by their contents: the same file may be named in two ways
         let same = hashes(&files)?;
-        let mut is_other = same.iter().map(|hash| !own.contains(hash));
+        let mut is_other = same.iter().map(|hash| !of_truth.contains(hash));
         files.retain(|_| is_other.next().unwrap_or(true));
         if files.is_empty() || files.len() == all {
             return Err(StudyError::NothingLeftOut { truth: truth.name.clone(), left: files.len() });

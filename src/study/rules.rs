@@ -23,8 +23,8 @@ pub(super) fn unique(axis: &str, names: &[(usize, &str)]) -> Result<(), Descript
 }
 
 /// An entry says one of several things.
-pub(super) fn exactly_one(key: String, said: &[bool], keys: &'static str) -> Result<(), DescriptionError> {
-    match said.iter().filter(|s| **s).count() {
+pub(super) fn exactly_one(key: String, given: &[bool], keys: &'static str) -> Result<(), DescriptionError> {
+    match given.iter().filter(|s| **s).count() {
         1 => Ok(()),
         _ => Err(DescriptionError::NotOne { key, keys }),
     }

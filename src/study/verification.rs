@@ -72,8 +72,8 @@ type Named = (Unit, String);
 
 /// The units that are there and whole, and what is wrong with the others.
 fn whole(planned: &Planned, inputs: &mut Inputs<'_>) -> Result<(Vec<Named>, Vec<String>), StudyError> {
-    let there = directory::units(&planned.directory)?;
-    let units = planned.plan.named_units(&planned.grid).filter(|(_, id)| there.contains(id));
+    let present = directory::units(&planned.directory)?;
+    let units = planned.plan.named_units(&planned.grid).filter(|(_, id)| present.contains(id));
     let (mut whole, mut damaged) = (Vec::new(), Vec::new());
     for (unit, id) in units {
         match inputs.finished((unit, &id))? {

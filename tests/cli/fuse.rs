@@ -51,7 +51,7 @@ fn a_fusion_directory_holds_what_the_interface_says() {
     assert!(ran.stderr.contains("from levelling at rest until"), "{}", ran.stderr);
     assert!(ran.stderr.contains("from the course of the fix at"), "{}", ran.stderr);
     assert!(ran.stdout.contains("15 fixes withheld"), "{}", ran.stdout);
-    assert!(fs::read_to_string(place.path().join("fused.svg")).unwrap().contains("Way"));
+    assert!(fs::read_to_string(place.path().join("fused.svg")).unwrap().contains("Track"));
     let out = place.path().join("out");
     let header = fs::read_to_string(out.join("solution.csv")).unwrap().lines().next().unwrap().to_owned();
     assert!(header.starts_with(

@@ -45,10 +45,10 @@ pub(super) fn find(
     let number = |name: &str, text: &str| {
         text.trim().parse::<u64>().map_err(|_| Failure::input(format!("{name}={text} is not a number")))
     };
-    let of = |name: &str| variable(name).map(|text| number(name, &text)).transpose();
+    let number_of = |name: &str| variable(name).map(|text| number(name, &text)).transpose();
     // With --shards, tasks count from 0 whatever part of an array was submitted; without, the array says.
     let [first, step, count] = match more.filter(|_| shards.is_none()) {
-        Some([min, step, count]) => [of(min)?, of(step)?, of(count)?],
+        Some([min, step, count]) => [number_of(min)?, number_of(step)?, number_of(count)?],
         None => [None; 3],
     };
     let id = number(name, &text)?;

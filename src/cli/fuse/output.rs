@@ -24,8 +24,8 @@ pub(super) fn manifest(configuration: FusionConfiguration, inputs: Vec<Input>) -
 /// Whether the directory can be made, found out before the work.
 pub(super) fn claim(out: &Path, manifest: &FusionManifest, session: &Session) -> Result<Claim, Failure> {
     let recognise = |text: &str| {
-        let there = serde_json::from_str(text);
-        Ok(there.map_or(Found::Foreign, |there| Found::result(manifest.is_same_fusion(&there))))
+        let present = serde_json::from_str(text);
+        Ok(present.map_or(Found::Foreign, |present| Found::result(manifest.is_same_fusion(&present))))
     };
     let paths = manifest.inputs.iter().map(|i| Path::new(&i.path));
     Ok(claim_directory(out, &FUSION_FILES, paths, session.existing(), recognise)?)

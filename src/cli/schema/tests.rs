@@ -256,11 +256,11 @@ fn read(kind: Kind, path: &Path) -> Result<(), FileError> {
 
 /// What a schema may mean for a value: itself, what it refers to, the alternatives whose words the value has.
 fn meant<'a>(schema: &'a Value, root: &'a Value, value: &toml::Value) -> Vec<&'a Value> {
-    let own = schema["properties"].as_object().into_iter().flatten();
+    let properties = schema["properties"].as_object().into_iter().flatten();
     let is_other = |(key, said): (&String, &Value)| {
         said["const"].as_str().is_some_and(|word| value.get(key).and_then(toml::Value::as_str) != Some(word))
     };
-    if own.into_iter().any(is_other) {
+    if properties.into_iter().any(is_other) {
         return Vec::new();
     }
     let referred = schema["$ref"].as_str().and_then(|name| root.pointer(&name[1..]));
@@ -296,8 +296,9 @@ fn numbers<'a>(
     match value {
         toml::Value::Table(table) => {
             for (key, inner) in table {
-                let own: Vec<&Value> = schemas.iter().filter_map(|schema| of_key(schema, key)).collect();
-                numbers(inner, &own, root, &format!("{at}.{key}"), into);
+                let described: Vec<&Value> =
+                    schemas.iter().filter_map(|schema| of_key(schema, key)).collect();
+                numbers(inner, &described, root, &format!("{at}.{key}"), into);
             }
         }
         toml::Value::Array(list) => {
@@ -319,9 +320,9 @@ fn numbers<'a>(
 }
 
 /// The sample with another number in this place.
-fn with(sample: &toml::Value, at: &str, number: f64) -> String {
+fn with(sample: &toml::Value, path: &str, number: f64) -> String {
     let mut changed = sample.clone();
-    let place = at.split('.').skip(1).fold(&mut changed, |value, step| match value {
+    let place = path.split('.').skip(1).fold(&mut changed, |value, step| match value {
         toml::Value::Array(list) => &mut list[step.parse::<usize>().unwrap()],
         table => &mut table[step],
     });

@@ -79,9 +79,9 @@ fn claim(args: &Args, contents: &[Vec<u8>; 4], session: &Session) -> Result<Clai
     let inputs = [Some(&args.source.path), Some(&args.model), args.scenario.as_ref()];
     let inputs = inputs.into_iter().flatten().map(|path| path.as_path());
     let recognise = |_: &str| {
-        let there = FILES.map(|name| std::fs::read(args.out.join(name)).ok());
-        let is_whole = there.iter().all(Option::is_some);
-        let is_same = there.iter().zip(contents).all(|(there, own)| there.as_ref() == Some(own));
+        let present = FILES.map(|name| std::fs::read(args.out.join(name)).ok());
+        let is_whole = present.iter().all(Option::is_some);
+        let is_same = present.iter().zip(contents).all(|(present, own)| present.as_ref() == Some(own));
         Ok(if is_whole { Found::result(is_same) } else { Found::Foreign })
     };
     Ok(claim_directory(&args.out, &FILES, inputs, session.existing(), recognise)?)

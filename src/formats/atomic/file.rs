@@ -59,8 +59,8 @@ impl AtomicFile {
     pub(crate) fn commit_result(mut self, shown: &Path, existing: Existing) -> Result<(), FileError> {
         self.file.flush().map_err(|e| FileError::io(shown, e))?;
         if let (Existing::Keep, Some(temporary)) = (existing, &self.temporary) {
-            let own = hash::of_file(temporary.path()).ok();
-            let is_usable = |path: &Path| !path.is_file() || hash::of_file(path).ok() == own;
+            let contents_hash = hash::of_file(temporary.path()).ok();
+            let is_usable = |path: &Path| !path.is_file() || hash::of_file(path).ok() == contents_hash;
             if !is_usable(&self.destination) {
                 self.destination = name_beside(&self.destination, is_usable);
                 let refusal = kept_beside(shown, &self.destination);

@@ -220,10 +220,10 @@ fn a_claim_ends_with_its_holder() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("model.toml");
     fs::write(dir.path().join(".model.toml.claim"), "").unwrap();
-    let own = claim_file(&path, []).unwrap();
+    let claim = claim_file(&path, []).unwrap();
     let again = claim_file(&path, []).unwrap_err();
     assert!(again.to_string().ends_with("model.toml is another output of the same command"), "{again}");
-    drop(own);
+    drop(claim);
     assert!(listing(dir.path()).is_empty());
     drop(claim_file(&path, []).unwrap());
 }

@@ -219,17 +219,17 @@ pub(crate) fn schema() -> serde_json::Value {
 
 /// What a table of a file describes.
 pub(super) fn describe(section: &Section<'_>) -> Result<Described, FileError> {
-    fn own<T: DeserializeOwned + JsonSchema>(section: &Section<'_>) -> Result<T, FileError> {
+    fn keys_of<T: DeserializeOwned + JsonSchema>(section: &Section<'_>) -> Result<T, FileError> {
         section.read_own(&["operation", "replicates"])
     }
     match section.require_str("operation")? {
-        "step" => own(section).map(Described::Step),
-        "drift" => own(section).map(Described::Drift),
-        "replace" => own(section).map(Described::Replace),
-        "bursts" => own(section).map(Described::Bursts),
-        "ar1" => own(section).map(Described::Ar1),
-        "heavy-tails" => own(section).map(Described::HeavyTails),
-        "scale" => own(section).map(Described::Scale),
+        "step" => keys_of(section).map(Described::Step),
+        "drift" => keys_of(section).map(Described::Drift),
+        "replace" => keys_of(section).map(Described::Replace),
+        "bursts" => keys_of(section).map(Described::Bursts),
+        "ar1" => keys_of(section).map(Described::Ar1),
+        "heavy-tails" => keys_of(section).map(Described::HeavyTails),
+        "scale" => keys_of(section).map(Described::Scale),
         _ => {
             let hint = "operations: step, drift, replace, bursts, ar1, heavy-tails, scale".to_owned();
             Err(section.refuse("operation", "is not an operation", Some(hint)))

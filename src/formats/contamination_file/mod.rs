@@ -177,7 +177,7 @@ impl Entry<'_> {
 
     fn step(&self, step: &Step, rate_hz: f64) -> Result<Operation, FileError> {
         self.at_most_one(&["at_share", "at_samples", "at_s"])?;
-        let at = match (step.at_samples, &step.at_s, &step.at_share) {
+        let extent = match (step.at_samples, &step.at_s, &step.at_share) {
             (Some(samples), ..) => Extent::Samples(samples),
             (_, Some(seconds), _) => {
                 let seconds = self.number("at_s", seconds, "a time ≥ 0", NonNegative::contains)?;
@@ -186,7 +186,7 @@ impl Entry<'_> {
             (_, _, Some(share)) => self.share("at_share", share)?,
             _ => Extent::Share(0.5),
         };
-        Ok(Operation::Step { at, amplitude: self.any("amplitude", &step.amplitude)? })
+        Ok(Operation::Step { at: extent, amplitude: self.any("amplitude", &step.amplitude)? })
     }
 
     fn replace(&self, replace: &Replace) -> Result<Operation, FileError> {
@@ -213,10 +213,11 @@ impl Entry<'_> {
             Some(given) => self.number(key, given, domain, inside).map(Some),
             None => Ok(None),
         };
-        let of = given("of_samples", &bursts.of_samples, "a number of samples > 0", AtLeastOne::contains)?;
+        let period =
+            given("of_samples", &bursts.of_samples, "a number of samples > 0", AtLeastOne::contains)?;
         let frequency = given("frequency_hz", &bursts.frequency_hz, "a frequency > 0", Positive::contains)?;
-        let extent = |samples: u64| match of {
-            Some(of) => Extent::Share(samples as f64 / of),
+        let extent = |samples: u64| match period {
+            Some(period) => Extent::Share(samples as f64 / period),
             None => Extent::Samples(samples),
         };
         Ok(Operation::Bursts {
@@ -254,8 +255,8 @@ mod tests {
     use nav_sim_signal::imu::{Axis, Channel};
 
     fn rules(name: &str, sensor: Sensor, replicate: u64) -> Vec<Operation> {
-        let of = |r: &Rule| r.sensor == sensor && r.replicate.is_none_or(|only| only == replicate);
-        find(name, 100.0).unwrap().rules.into_iter().filter(of).map(|r| r.operation).collect()
+        let applies = |r: &Rule| r.sensor == sensor && r.replicate.is_none_or(|only| only == replicate);
+        find(name, 100.0).unwrap().rules.into_iter().filter(applies).map(|r| r.operation).collect()
     }
 
     fn refusal(text: &str) -> String {
@@ -289,8 +290,8 @@ mod tests {
         assert_eq!(abnormal[3], Operation::Ar1(Ar1::new(0.976_658_0, 5.313_189e-9).unwrap()));
         assert_eq!(rules("section5-III", Sensor::Gyro, 2)[1], replace(0.022));
         for replicate in [1, 2, 4, 5, 6, 7] {
-            let of = |name| rules(name, Sensor::Accel, replicate);
-            assert_eq!(of("section5-III"), of("section5-II"), "{replicate}");
+            let rules_of = |name| rules(name, Sensor::Accel, replicate);
+            assert_eq!(rules_of("section5-III"), rules_of("section5-II"), "{replicate}");
         }
 
         let bursts = |replicate| rules("section4-III", Sensor::Accel, replicate).len();

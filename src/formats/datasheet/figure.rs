@@ -228,8 +228,8 @@ mod tests {
                 let units = figure.units(sensor);
                 units.iter().flat_map(move |from| units.iter().map(move |to| (figure, from, to)))
             }) {
-                let there = parse(sensor, figure, &format!("0.3 {}", from.0)).unwrap() / to.1;
-                let back = parse(sensor, figure, &format!("{there:e} {}", to.0)).unwrap() / from.1;
+                let converted = parse(sensor, figure, &format!("0.3 {}", from.0)).unwrap() / to.1;
+                let back = parse(sensor, figure, &format!("{converted:e} {}", to.0)).unwrap() / from.1;
                 assert!((back / 0.3 - 1.0).abs() < 1e-14, "{} {}", from.0, to.0);
             }
         }

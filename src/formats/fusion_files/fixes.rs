@@ -309,15 +309,15 @@ fn fix(columns: &Columns, row: &[f64], unsaid: Option<&FixSigma>) -> GnssFix {
 
 fn check_values(table: &Table, columns: &Columns, line: u64, row: &[f64]) -> Result<(), Error> {
     let refuse = |quantity: usize, reason| {
-        let at = columns.0[quantity].map_or(0, |(at, _)| at);
-        let column = &table.columns[at];
+        let index = columns.0[quantity].map_or(0, |(index, _)| index);
+        let column = &table.columns[index];
         let advice = if column.starts_with("lat") || column.starts_with("lon") {
             "latitude within ±89.9, longitude in (−180, 180] or [0, 360), in degrees (or name the columns lat_rad, \
              lon_rad)"
         } else {
             "a fix needs the standard deviations its receiver believes; remove rows without"
         };
-        Err(Error::cell(&table.path, line, column, row[at].to_string(), reason).advice(advice))
+        Err(Error::cell(&table.path, line, column, row[index].to_string(), reason).advice(advice))
     };
     let (lat, lon) = (columns.value(1, row), columns.value(2, row));
     if lat.abs() > 90.0 * DEG {

@@ -44,8 +44,8 @@ impl ModelFile {
         for channel in Channel::ALL {
             let axis = &mut model.axes[channel.index()];
             for (process, label) in axis.processes.iter_mut().zip(self.model.axis(channel).labels()) {
-                let own = |i: &&super::Interval| i.channel == channel && i.process == label;
-                for interval in self.intervals.iter().filter(own) {
+                let is_of_process = |i: &&super::Interval| i.channel == channel && i.process == label;
+                for interval in self.intervals.iter().filter(is_of_process) {
                     let is_shape = matches!(interval.parameter.as_str(), "phi" | "beta" | "theta");
                     let end = if is_shape { shapes } else { amplitudes };
                     let value = if end == End::High { interval.high } else { interval.low };

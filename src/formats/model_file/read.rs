@@ -77,12 +77,12 @@ fn read_sensor(root: &Section<'_>, sensor: Sensor, file: &mut ModelFile) -> Resu
     let pooled = section.has("processes");
     for axis in Axis::ALL {
         let channel = Channel { sensor, axis };
-        let own = section.section(axis.name())?;
-        if let Some(own) = &own {
-            own.only(&["processes"])?;
+        let axis_section = section.section(axis.name())?;
+        if let Some(axis_section) = &axis_section {
+            axis_section.only(&["processes"])?;
         }
-        match own.as_ref().or(pooled.then_some(&section)) {
-            Some(_) if pooled && own.is_some() => {
+        match axis_section.as_ref().or(pooled.then_some(&section)) {
+            Some(_) if pooled && axis_section.is_some() => {
                 let hint = format!("write either [{sensor}] or one table an axis", sensor = sensor.name());
                 let reason = "is given both for all axes and for this one";
                 return Err(section.refuse(axis.name(), reason, Some(hint)));
@@ -177,15 +177,15 @@ fn read_spread(section: &Section<'_>, file: &ModelFile) -> Result<Spread, FileEr
     let mut spread = Spread::default();
     for sensor in Sensor::ALL {
         let pooled = section.is_list(sensor.name());
-        let own = if pooled { None } else { section.section(sensor.name())? };
-        if let Some(own) = &own {
-            own.only(&Axis::ALL.map(Axis::name))?;
+        let sensor_section = if pooled { None } else { section.section(sensor.name())? };
+        if let Some(sensor_section) = &sensor_section {
+            sensor_section.only(&Axis::ALL.map(Axis::name))?;
         }
         for axis in Axis::ALL {
             let channel = Channel { sensor, axis };
-            let laws = match &own {
+            let laws = match &sensor_section {
                 _ if pooled => section.sections(sensor.name())?,
-                Some(own) => own.sections(axis.name())?,
+                Some(sensor_section) => sensor_section.sections(axis.name())?,
                 None => Vec::new(),
             };
             let into = &mut spread.axes[channel.index()];

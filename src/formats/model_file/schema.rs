@@ -58,13 +58,13 @@ pub(crate) fn schema() -> Value {
 }
 
 /// Adds the bounds of a parameter; whether a bound itself is in the domain, the process says.
-fn bound(number: &mut Value, kind: Kind, at: usize) {
+fn bound(number: &mut Value, kind: Kind, place: usize) {
     let holds = |end: f64| {
         let mut values = vec![0.5; kind.parameters().len()];
-        values[at] = end;
+        values[place] = end;
         kind.process(&values, 1.0).is_some_and(|process| process.is_ok())
     };
-    let (low, high) = kind.parameters()[at].domain();
+    let (low, high) = kind.parameters()[place].domain();
     for (end, closed, open) in [(low, "minimum", "exclusiveMinimum"), (high, "maximum", "exclusiveMaximum")] {
         if end.is_finite() {
             number[if holds(end) { closed } else { open }] = end.into();

@@ -280,13 +280,14 @@ fn the_schema_has_the_bounds_of_the_reader() {
     let processes = schema.pointer("/properties/accel/properties/processes/items/oneOf").unwrap();
     let mut bounds = 0;
     for process in processes.as_array().unwrap() {
-        let own = process["properties"].as_object().unwrap();
-        let numbers: Vec<&String> = own.keys().filter(|key| own[*key]["type"] == "number").collect();
+        let properties = process["properties"].as_object().unwrap();
+        let numbers: Vec<&String> =
+            properties.keys().filter(|key| properties[*key]["type"] == "number").collect();
         let reads = |key: &str, value: f64| {
             let value_of = |name: &str| if name == key { value } else { 0.5 };
             let keys: Vec<String> =
                 numbers.iter().map(|name| format!("{name} = {:?}", value_of(name))).collect();
-            with_process(&format!("type = {}, {}", own["type"]["const"], keys.join(", "))).is_ok()
+            with_process(&format!("type = {}, {}", properties["type"]["const"], keys.join(", "))).is_ok()
         };
         for key in &numbers {
             for (name, outward, is_open) in [
@@ -295,7 +296,7 @@ fn the_schema_has_the_bounds_of_the_reader() {
                 ("maximum", 1e-9, false),
                 ("exclusiveMaximum", 1e-9, true),
             ] {
-                let Some(bound) = own[*key][name].as_f64() else { continue };
+                let Some(bound) = properties[*key][name].as_f64() else { continue };
                 bounds += 1;
                 assert!(reads(key, bound) != is_open && !reads(key, bound + outward), "{key} {name} {bound}");
                 assert!(reads(key, bound - outward), "{key} {name} {bound}");

@@ -77,8 +77,8 @@ fn processes(file: &ModelFile, channel: Channel) -> Option<String> {
     let noise = file.model.axis(channel);
     let mut out = String::from("processes = [\n");
     for (process, label) in noise.processes.iter().zip(noise.labels()) {
-        let own = |i: &&Interval| i.channel == channel && i.process == label;
-        let intervals: Vec<&Interval> = file.intervals.iter().filter(own).collect();
+        let is_of_process = |i: &&Interval| i.channel == channel && i.process == label;
+        let intervals: Vec<&Interval> = file.intervals.iter().filter(is_of_process).collect();
         let _ = writeln!(
             out,
             "  {{ {} }}, # {}",

@@ -116,10 +116,10 @@ pub(super) fn plausible(
 ) -> Result<(), FileError> {
     /// Room for local gravity, a scale error and a bias of 30 mg.
     const NEAR: f64 = 0.03;
-    let of = |sensor| -> Vec<f64> {
+    let means_of_sensor = |sensor| -> Vec<f64> {
         means.iter().filter(|(channel, _)| channel.sensor == sensor).map(|(_, mean)| *mean).collect()
     };
-    let (accel, gyro) = (of(Sensor::Accel), of(Sensor::Gyro));
+    let (accel, gyro) = (means_of_sensor(Sensor::Accel), means_of_sensor(Sensor::Gyro));
     let is_gravity = |mean: &[f64]| (norm(mean) / STANDARD_GRAVITY - 1.0).abs() < 0.1;
     if accel.len() == 3 && gyro.len() == 3 && norm(&accel) < NO_GRAVITY && is_gravity(&gyro) {
         let message = format!(

@@ -194,7 +194,7 @@ fn split_unit<'a>(name: &'a str, units: &[(&[&str], f64)]) -> Option<(&'a str, f
 
 /// The channel of a name such as `accel_x_ft_s2`: a sensor, an axis, and something else.
 fn in_unknown_unit(name: &str) -> Option<Channel> {
-    let of = |sensor: Sensor, stem: &str| {
+    let channel_of_stem = |sensor: Sensor, stem: &str| {
         let rest = name.strip_prefix(stem)?.trim_start_matches('_');
         let axis = Axis::ALL.into_iter().find(|a| rest.starts_with(a.name()))?;
         let unit = rest[1..].strip_prefix('_')?;
@@ -204,7 +204,7 @@ fn in_unknown_unit(name: &str) -> Option<Channel> {
     };
     let stems = [(Sensor::Accel, ACCEL), (Sensor::Gyro, GYRO)];
     let mut all = stems.into_iter().flat_map(|(sensor, names)| names.iter().map(move |n| (sensor, *n)));
-    all.find_map(|(sensor, stem)| of(sensor, stem))
+    all.find_map(|(sensor, stem)| channel_of_stem(sensor, stem))
 }
 
 /// The axis of a signal's name, and whether the name means SI by convention.
@@ -290,7 +290,8 @@ impl Layout {
                 .setting(Setting::ColumnNames)
                 .setting(Setting::Channels)
         };
-        let is = |f: &Found, channel| matches!(f.role, Role::Signal { channel: c, .. } if c == channel);
+        let has_channel =
+            |f: &Found, channel| matches!(f.role, Role::Signal { channel: c, .. } if c == channel);
         for name in &self.ignored {
             let plain = normalise(name);
             for (stem, endings) in [("dv_", "_m_s, _mps"), ("dtheta_", "_rad, _deg")] {
@@ -300,7 +301,7 @@ impl Layout {
             }
             let Some(channel) = in_unknown_unit(&plain) else { continue };
             let missed = wanted.is_none_or(|w| w.contains(&channel));
-            if missed && !self.found.iter().any(|f| is(f, channel)) {
+            if missed && !self.found.iter().any(|f| has_channel(f, channel)) {
                 let units = match channel.sensor {
                     Sensor::Accel => ACCEL_UNITS,
                     Sensor::Gyro => GYRO_UNITS,

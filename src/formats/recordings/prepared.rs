@@ -79,14 +79,14 @@ impl Prepared {
 
     /// One signal at a time, as recordings: those of the first stretch, those of the next.
     pub(super) fn signals(&self) -> impl Iterator<Item = Result<Recording, FileError>> {
-        let one = |(i, piece, signals): (usize, &Range<usize>, &Signals)| {
+        let recording_of_signal = |(i, piece, signals): (usize, &Range<usize>, &Signals)| {
             let samples = signals.column.values.stretch(piece.clone());
             let samples = samples.map_err(storage(&self.path))?;
             let signal = signal(signals.channel, samples, signals.factor, signals.means[i]);
             Ok(Recording { signals: vec![signal], ..self.recording(i) })
         };
         let pieces = self.pieces.iter().enumerate();
-        pieces.flat_map(|(i, piece)| self.columns.iter().map(move |c| (i, piece, c))).map(one)
+        pieces.flat_map(|(i, piece)| self.columns.iter().map(move |c| (i, piece, c))).map(recording_of_signal)
     }
 
     /// A recording without its signals.

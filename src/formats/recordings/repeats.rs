@@ -138,11 +138,11 @@ fn extended(raw: &Raw, column: &Column, first: usize, second: usize) -> io::Resu
     let apart = second - first;
     let (mut before, mut after) = (first.min(LONGEST), apart.min(rows - second).min(LONGEST));
     for column in raw.columns.iter().filter(|c| c.channel().is_some()) {
-        let of = |start: usize, count: usize| column.values.stretch(start..start + count);
+        let stretch = |start: usize, count: usize| column.values.stretch(start..start + count);
         let alike = |(a, b): &(&f64, &f64)| a.to_bits() == b.to_bits();
-        let (a, b) = (of(first, after)?, of(second, after)?);
+        let (a, b) = (stretch(first, after)?, stretch(second, after)?);
         after = a.iter().zip(&b).take_while(alike).count();
-        let (a, b) = (of(first - before, before)?, of(second - before, before)?);
+        let (a, b) = (stretch(first - before, before)?, stretch(second - before, before)?);
         before = a.iter().rev().zip(b.iter().rev()).take_while(alike).count();
     }
     let before = before.min(apart - after);

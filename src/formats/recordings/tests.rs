@@ -207,8 +207,8 @@ fn arrays() {
     let r = read_one("a.npy", array(4, 3), &named).unwrap();
     assert_close(&samples_with_mean(&r.signals[0]), &[0.0, 3e-3 * DEG, 6e-3 * DEG, 9e-3 * DEG]);
     let mut nan = array(4, 6);
-    let at = nan.len() - 8 * 7;
-    nan[at..at + 8].copy_from_slice(&f64::NAN.to_le_bytes());
+    let offset = nan.len() - 8 * 7;
+    nan[offset..offset + 8].copy_from_slice(&f64::NAN.to_le_bytes());
     assert_eq!(
         refusal_with("a.npy", nan, &at_100_hz()).0,
         "a.npy, line 3: column \"gyro_z_rad_s\": \"NaN\" is not finite"
@@ -375,8 +375,11 @@ fn what_is_not_held_reads_the_same() {
     };
     let head = "t_ms,acc_x,acc_y,acc_z,dtheta_x_rad,dtheta_y_rad,dtheta_z_rad".to_owned();
     let table = |gaps: bool| {
-        let at = |k: usize| k + if gaps && k > 9000 { 40 } else { 0 };
-        std::iter::once(head.clone()).chain((0..20_000).map(|k| row(k, at(k)))).collect::<Vec<_>>().join("\n")
+        let time_ms = |k: usize| k + if gaps && k > 9000 { 40 } else { 0 };
+        std::iter::once(head.clone())
+            .chain((0..20_000).map(|k| row(k, time_ms(k))))
+            .collect::<Vec<_>>()
+            .join("\n")
     };
     let mut array = Vec::new();
     npy::write_header(&mut array, 9000, 6).unwrap();

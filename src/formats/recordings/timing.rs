@@ -36,8 +36,8 @@ pub(super) fn timing(
         );
     }
     let take = |raw: &mut Raw, wanted: fn(&Role) -> bool| {
-        let at = raw.columns.iter().position(|c| wanted(&c.role))?;
-        Some(raw.columns.swap_remove(at))
+        let column = raw.columns.iter().position(|c| wanted(&c.role))?;
+        Some(raw.columns.swap_remove(column))
     };
     let time = take(raw, |r| matches!(r, Role::Time { .. }));
     let counter = take(raw, |r| *r == Role::Counter);
@@ -156,9 +156,9 @@ impl Clock {
 
     fn check(&self, raw: &Raw, options: &ReadOptions) -> Result<Checked, FileError> {
         let steps = || self.since.windows(2).map(|w| w[1] - w[0]);
-        let at = |i: usize| (raw.lines.of(i + 1), self.time_of(i), self.time_of(i + 1));
+        let step_at = |i: usize| (raw.lines.of(i + 1), self.time_of(i), self.time_of(i + 1));
         if let Some(i) = steps().position(|s| s < 0.0) {
-            let (line, from, to) = at(i);
+            let (line, from, to) = step_at(i);
             let message = format!("time goes back from {from} s to {to} s");
             return Err(FileError::contents(raw.path.as_str(), line, message)
                 .advice("sort the rows by time, or split the file where the clock was set back"));
@@ -174,7 +174,7 @@ impl Clock {
         let breaks: Vec<usize> =
             steps().enumerate().filter(|(_, s)| irregular(*s)).map(|(i, _)| i + 1).collect();
         if let (Gaps::Refuse, Some(first)) = (options.gaps, breaks.first()) {
-            let (line, from, to) = at(first - 1);
+            let (line, from, to) = step_at(first - 1);
             let step = rounded(median * self.unit_s);
             let what = if self.since[*first] - self.since[*first - 1] > median {
                 format!("gap in time from {from} s to {to} s")

@@ -85,16 +85,16 @@ fn height(section: &Section<'_>, h_m: Finite) -> Result<f64, FileError> {
 const KINDS: &str = "straight, accelerate, turn, climb, stop, waypoints";
 
 fn read_segment(segment: &Section<'_>) -> Result<Segment, FileError> {
-    fn own<T: DeserializeOwned + JsonSchema>(segment: &Section<'_>) -> Result<T, FileError> {
+    fn keys_of<T: DeserializeOwned + JsonSchema>(segment: &Section<'_>) -> Result<T, FileError> {
         segment.read_own(&["kind", "ramp_s"])
     }
     let (kind, climb) = match segment.require_str("kind")? {
-        "straight" => own(segment).and_then(|own| straight(segment, &own))?,
-        "accelerate" => own(segment).and_then(|own| accelerate(segment, &own))?,
-        "turn" => own(segment).and_then(|own| turn(segment, &own))?,
-        "climb" => own(segment).and_then(|own| climb(segment, &own))?,
-        "stop" => own(segment).map(|own| stop(&own))?,
-        "waypoints" => own(segment).and_then(|own| waypoints(segment, &own))?,
+        "straight" => keys_of(segment).and_then(|own| straight(segment, &own))?,
+        "accelerate" => keys_of(segment).and_then(|own| accelerate(segment, &own))?,
+        "turn" => keys_of(segment).and_then(|own| turn(segment, &own))?,
+        "climb" => keys_of(segment).and_then(|own| climb(segment, &own))?,
+        "stop" => keys_of(segment).map(|own| stop(&own))?,
+        "waypoints" => keys_of(segment).and_then(|own| waypoints(segment, &own))?,
         _ => return Err(segment.refuse("kind", "is no kind of segment", Some(format!("kinds are {KINDS}")))),
     };
     let Of { ramp_s } = segment.read()?;
@@ -112,46 +112,52 @@ fn length(
     }))
 }
 
-fn straight(segment: &Section<'_>, own: &Straight) -> Result<(Kind, Finite), FileError> {
-    Ok((length(segment, own.duration_s, own.distance_m)?, own.climb_m))
+fn straight(segment: &Section<'_>, description: &Straight) -> Result<(Kind, Finite), FileError> {
+    Ok((length(segment, description.duration_s, description.distance_m)?, description.climb_m))
 }
 
-fn climb(segment: &Section<'_>, own: &Climb) -> Result<(Kind, Finite), FileError> {
-    Ok((length(segment, own.duration_s, own.distance_m)?, own.height_m))
+fn climb(segment: &Section<'_>, description: &Climb) -> Result<(Kind, Finite), FileError> {
+    Ok((length(segment, description.duration_s, description.distance_m)?, description.height_m))
 }
 
-fn accelerate(segment: &Section<'_>, own: &Accelerate) -> Result<(Kind, Finite), FileError> {
-    let by = match one_of(segment, [("duration_s", own.duration_s), ("accel_m_s2", own.accel_m_s2)])? {
+fn accelerate(segment: &Section<'_>, description: &Accelerate) -> Result<(Kind, Finite), FileError> {
+    let by = match one_of(
+        segment,
+        [("duration_s", description.duration_s), ("accel_m_s2", description.accel_m_s2)],
+    )? {
         ("duration_s", s) => Acceleration::Duration(s),
         (_, a) => Acceleration::Peak(a),
     };
-    Ok((Kind::Accelerate { to_speed: own.to_speed_m_s.0, by }, own.climb_m))
+    Ok((Kind::Accelerate { to_speed: description.to_speed_m_s.0, by }, description.climb_m))
 }
 
-fn turn(segment: &Section<'_>, own: &Turn) -> Result<(Kind, Finite), FileError> {
+fn turn(segment: &Section<'_>, description: &Turn) -> Result<(Kind, Finite), FileError> {
     let given = [
-        ("duration_s", own.duration_s),
-        ("rate_deg_s", own.rate_deg_s),
-        ("radius_m", own.radius_m),
-        ("lateral_accel_m_s2", own.lateral_accel_m_s2),
+        ("duration_s", description.duration_s),
+        ("rate_deg_s", description.rate_deg_s),
+        ("radius_m", description.radius_m),
+        ("lateral_accel_m_s2", description.lateral_accel_m_s2),
     ];
-    Ok((Kind::Turn { angle: own.angle_deg.0 * DEG, by: turning(segment, given)? }, own.climb_m))
+    Ok((
+        Kind::Turn { angle: description.angle_deg.0 * DEG, by: turning(segment, given)? },
+        description.climb_m,
+    ))
 }
 
-fn stop(own: &Stop) -> (Kind, Finite) {
-    let decel = own.decel_m_s2.map_or(DECEL, |decel| decel.0);
-    (Kind::Stop { duration: own.duration_s.0, decel }, own.climb_m)
+fn stop(description: &Stop) -> (Kind, Finite) {
+    let decel = description.decel_m_s2.map_or(DECEL, |decel| decel.0);
+    (Kind::Stop { duration: description.duration_s.0, decel }, description.climb_m)
 }
 
-fn waypoints(segment: &Section<'_>, own: &Waypoints) -> Result<(Kind, Finite), FileError> {
+fn waypoints(segment: &Section<'_>, description: &Waypoints) -> Result<(Kind, Finite), FileError> {
     let given = [
-        ("rate_deg_s", own.rate_deg_s),
-        ("radius_m", own.radius_m),
-        ("lateral_accel_m_s2", own.lateral_accel_m_s2),
+        ("rate_deg_s", description.rate_deg_s),
+        ("radius_m", description.radius_m),
+        ("lateral_accel_m_s2", description.lateral_accel_m_s2),
     ];
     let by = turning(segment, given)?;
     let points = segment.sections("points")?.iter().map(waypoint).collect::<Result<_, _>>()?;
-    Ok((Kind::Waypoints { points, by }, own.climb_m))
+    Ok((Kind::Waypoints { points, by }, description.climb_m))
 }
 
 fn waypoint(section: &Section<'_>) -> Result<Waypoint, FileError> {

@@ -190,7 +190,7 @@ fn velocities(table: &Table, columns: &Columns) -> Vec<DVec3> {
 
 fn samples(table: &Table, columns: &Columns, options: &Options) -> Result<Vec<TrajectorySample>, Error> {
     let origin = if columns.has(Lat) { None } else { Some(origin(table, options)?) };
-    let at = |(_, row): &(u64, Vec<f64>)| {
+    let sample_of_row = |(_, row): &(u64, Vec<f64>)| {
         let value = |q| columns.value(q, row);
         let attitude = RollPitchYaw { roll: value(Roll), pitch: value(Pitch), yaw: value(Yaw) }.to_quat();
         match origin {
@@ -204,7 +204,7 @@ fn samples(table: &Table, columns: &Columns, options: &Options) -> Result<Vec<Tr
             Some(origin) => local(value(Time), origin, DVec3::new(value(N), value(E), value(D)), attitude),
         }
     };
-    Ok(table.rows.iter().map(at).collect())
+    Ok(table.rows.iter().map(sample_of_row).collect())
 }
 
 /// A sample given in the axes north, east, down of the origin.
@@ -278,9 +278,9 @@ pub(super) fn follow_path(samples: &mut [TrajectorySample]) {
             }
             _ => 0.0,
         };
-        let at = |k: Option<usize>| k.and_then(|k| directions[k]);
-        let from = at(before).or(at(after)).unwrap_or_default();
-        let to = at(after).unwrap_or(from);
+        let direction_of = |k: Option<usize>| k.and_then(|k| directions[k]);
+        let from = direction_of(before).or(direction_of(after)).unwrap_or_default();
+        let to = direction_of(after).unwrap_or(from);
         let yaw = from.0 + share * wrap_angle(to.0 - from.0);
         let pitch = from.1 + share * (to.1 - from.1);
         samples[i].q_b_n = RollPitchYaw { roll: 0.0, pitch, yaw }.to_quat();

@@ -214,9 +214,13 @@ fn without_attitude_heading_and_pitch_follow_the_path() {
     let (t, warnings) = read(&format!("# origin: 40, 3, 0\nt_s,n_m,e_m,d_m\n{rows}")).unwrap();
     assert_eq!(warnings.len(), 1);
     assert_eq!(warnings[0].message, "no attitude columns: heading and pitch follow the path, roll is 0");
-    let at = |t_s: f64| RollPitchYaw::from_quat(t.state(t_s).q_b_n);
-    assert!((at(20.0).yaw - 1.0).abs() < 0.01 && (at(20.0).pitch - 0.1_f64.atan()).abs() < 0.005);
-    assert!(at(2.0).yaw.abs() < 0.3 && (at(33.0).yaw - 1.5).abs() < 0.3 && at(20.0).roll.abs() < 1e-3);
+    let attitude = |t_s: f64| RollPitchYaw::from_quat(t.state(t_s).q_b_n);
+    assert!((attitude(20.0).yaw - 1.0).abs() < 0.01 && (attitude(20.0).pitch - 0.1_f64.atan()).abs() < 0.005);
+    assert!(
+        attitude(2.0).yaw.abs() < 0.3
+            && (attitude(33.0).yaw - 1.5).abs() < 0.3
+            && attitude(20.0).roll.abs() < 1e-3
+    );
 }
 
 #[test]

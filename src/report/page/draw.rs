@@ -112,10 +112,15 @@ impl Sketch<'_> {
         *svg += "<g class=\"ticks\">\n";
         self.minor(svg);
         for (value, label) in y_ticks {
-            let at = y.at(*value);
-            let _ =
-                writeln!(svg, "<path class=\"grid\" d=\"M{} {}H{}\"/>", short(left), short(at), short(right));
-            text(svg, "tick", (left - 6.0, at + 0.35 * canvas.font), "end", label);
+            let height = y.at(*value);
+            let _ = writeln!(
+                svg,
+                "<path class=\"grid\" d=\"M{} {}H{}\"/>",
+                short(left),
+                short(height),
+                short(right)
+            );
+            text(svg, "tick", (left - 6.0, height + 0.35 * canvas.font), "end", label);
         }
         let below = self.x_axis(canvas, is_last, svg);
         *svg += "</g>\n";
@@ -196,20 +201,20 @@ impl Sketch<'_> {
         let is_named = matches!(self.chart.x.scale, Scale::Names(_));
         let slanted_name = slanted_names(self.chart, canvas, x.pixels.1 - x.pixels.0);
         for (value, label) in &ticks {
-            let at = x.at(*value);
+            let place = x.at(*value);
             if !is_named {
                 let _ = writeln!(
                     svg,
                     "<path class=\"grid\" d=\"M{} {}V{}\"/>",
-                    short(at),
+                    short(place),
                     short(y.pixels.0),
                     short(y.pixels.1)
                 );
             }
             if is_last && slanted_name.is_some() {
-                slanted(svg, (at + 4.0, y.pixels.0 + 16.0), label);
+                slanted(svg, (place + 4.0, y.pixels.0 + 16.0), label);
             } else if is_last {
-                text(svg, "tick", (at, y.pixels.0 + canvas.font + 5.0), "middle", label);
+                text(svg, "tick", (place, y.pixels.0 + canvas.font + 5.0), "middle", label);
             }
         }
         let labels = slanted_name.map_or(canvas.font + 9.0, |(longest, _)| 0.62 * longest + 22.0);

@@ -75,10 +75,10 @@ impl Frame<'_> {
         };
         let pieces = points.split(|p| !is_drawn(p)).filter(|piece| !piece.is_empty());
         let closed = |piece: &[(f64, f64, f64)]| {
-            let at = |x: f64, y: f64| format!("{} {}", short(self.x.at(x)), short(self.y.within(y)));
-            let there = piece.iter().map(|p| at(p.0, p.2));
-            let back = piece.iter().rev().map(|p| at(p.0, p.1));
-            format!("M{}Z", there.chain(back).collect::<Vec<_>>().join("L"))
+            let corner = |x: f64, y: f64| format!("{} {}", short(self.x.at(x)), short(self.y.within(y)));
+            let forth = piece.iter().map(|p| corner(p.0, p.2));
+            let back = piece.iter().rev().map(|p| corner(p.0, p.1));
+            format!("M{}Z", forth.chain(back).collect::<Vec<_>>().join("L"))
         };
         pieces.map(closed).collect()
     }

@@ -57,13 +57,13 @@ pub(crate) fn calibration_page(
 
 /// What the recordings' means say of a turn-on bias. Sources of the numbers are places in the JSON of the command.
 fn means(page: &mut Page, turn_on: &[TurnOnSpread], outcomes: &[(usize, &Outcome)]) {
-    let own = |t: &&TurnOnSpread| outcomes.iter().any(|(_, o)| o.estimator == t.estimator);
-    if !turn_on.iter().any(|t| own(&t)) {
+    let is_of_these_fits = |t: &&TurnOnSpread| outcomes.iter().any(|(_, o)| o.estimator == t.estimator);
+    if !turn_on.iter().any(|t| is_of_these_fits(&t)) {
         return;
     }
     page.section("Turn-on bias");
     let mut table = Table::new(["axis", "recordings", "spread of the means", "by noise alone", "unit"]);
-    for (i, found) in turn_on.iter().enumerate().filter(|(_, t)| own(t)) {
+    for (i, found) in turn_on.iter().enumerate().filter(|(_, t)| is_of_these_fits(t)) {
         page.text(&format!("{}: {}.", sensor_name(found.sensor.name()), turn_on_remark(found)));
         for (k, axis) in found.axes.iter().enumerate() {
             let number = |value: f64, key: &str| Cell::number(value, &format!("/turn_on/{i}/axes/{k}/{key}"));
@@ -151,8 +151,8 @@ pub(super) fn chart(fitted: &FittedCurve, diagnoses: &[Diagnosis]) -> Chart {
 /// Thin lines, grey but for the abnormal ones.
 fn recordings(fitted: &FittedCurve, diagnoses: &[Diagnosis]) -> Vec<Series> {
     let is_abnormal = |file: &str| {
-        let own = |d: &&Diagnosis| d.name == file && d.sensor.name() == fitted.sensor;
-        diagnoses.iter().find(own).is_some_and(|d| d.verdict != Verdict::Normal)
+        let is_of_file = |d: &&Diagnosis| d.name == file && d.sensor.name() == fitted.sensor;
+        diagnoses.iter().find(is_of_file).is_some_and(|d| d.verdict != Verdict::Normal)
     };
     let mut abnormal: Vec<&str> = Vec::new();
     let mut all = Vec::new();

@@ -129,8 +129,8 @@ fn over_scales(scales: &[ScaleInfluence]) -> Chart {
     let signals = in_order(scales.iter().map(|s| s.signals.as_str()));
     let mut series = vec![Series::new("", Colour::Soft, Mark::Level(0.0))];
     series.extend(signals.iter().enumerate().map(|(hue, name)| {
-        let own = scales.iter().filter(|s| s.signals == **name);
-        let line = own.map(|s| (s.tau_s, s.on_error)).collect();
+        let of_signals = scales.iter().filter(|s| s.signals == **name);
+        let line = of_signals.map(|s| (s.tau_s, s.on_error)).collect();
         Series::new(name, Colour::Hue(hue), Mark::Line(line, Stroke::Plain))
     }));
     let panel = Panel::new(Axis::linear("% of error for 1 %"), series);

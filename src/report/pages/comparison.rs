@@ -99,18 +99,18 @@ impl ShownComparison<'_> {
         if !is_laid_out {
             let names = short_names(&all.iter().map(|(c, _)| c.run.as_str()).collect::<Vec<_>>());
             let curves = all.iter().map(|(_, curves)| *curves);
-            let own: Vec<Curve<'_>> = names
+            let curves_of_scenario: Vec<Curve<'_>> = names
                 .iter()
                 .zip(curves)
                 .enumerate()
                 .map(|(hue, (name, curves))| Curve { name, hue, curves })
                 .collect();
-            return vec![self.chart(&self.title(), &own)];
+            return vec![self.chart(&self.title(), &curves_of_scenario)];
         }
         let hue = |estimator: &str| estimators.iter().position(|e| *e == estimator).unwrap_or(0);
         let of_scenario = |scenario: &&str| {
-            let own = all.iter().filter(|(c, _)| c.label.scenario == *scenario);
-            let curves: Vec<Curve<'_>> = own
+            let of_scenario = all.iter().filter(|(c, _)| c.label.scenario == *scenario);
+            let curves: Vec<Curve<'_>> = of_scenario
                 .map(|(c, curves)| Curve { name: &c.label.estimator, hue: hue(&c.label.estimator), curves })
                 .collect();
             let title = format!("{}, scenario {scenario}", self.title());
@@ -126,7 +126,7 @@ impl ShownComparison<'_> {
         format!("ASEE against {reference}")
     }
 
-    fn chart(&self, title: &str, own: &[Curve<'_>]) -> Chart {
+    fn chart(&self, title: &str, curves: &[Curve<'_>]) -> Chart {
         let panel = |state: &usize| {
             let line = |c: &Curve<'_>| {
                 let points = c.curves.t_s.iter().zip(&c.curves.asee_pct).map(|(t, pct)| (*t, pct[*state]));
@@ -135,7 +135,7 @@ impl ShownComparison<'_> {
             let zero = Series::new("", Colour::Ink, Mark::Level(0.0));
             let name = STATES[*state].split(" (").next().unwrap_or_default();
             let axis = Axis::linear(&format!("{name}: (ratio − 1)·100 (%)")).including(-1.0, 1.0);
-            let series = std::iter::once(zero).chain(own.iter().map(line)).collect();
+            let series = std::iter::once(zero).chain(curves.iter().map(line)).collect();
             Panel { height: 0.8, ..Panel::new(axis, series) }
         };
         let panels = self.states.iter().map(panel).collect();
@@ -177,18 +177,18 @@ fn consistency(file: &ComparisonFile, outages: &[(f64, f64)], states: &[usize]) 
         states.iter().map(|s| format!("RMSE {} (%)", STATES[*s].split(" (").next().unwrap_or_default()));
     let mut table = Table::new(["run", "outage", "NEES", "NEES of the reference", "coverage"]).and(errors);
     for (i, row) in file.consistency.iter().enumerate() {
-        let at = |key: &str| format!("/consistency/{i}/{key}");
+        let source_of = |key: &str| format!("/consistency/{i}/{key}");
         let mut cells: Vec<Cell> = vec![
             row.run.clone().into(),
             outages.get(row.outage).map_or_else(String::new, |w| window(*w)).into(),
-            Cell::number(row.nees_mean, &at("nees_mean")),
-            Cell::number(row.nees_mean_reference, &at("nees_mean_reference")),
-            Cell::number(row.coverage_mean, &at("coverage_mean")),
+            Cell::number(row.nees_mean, &source_of("nees_mean")),
+            Cell::number(row.nees_mean_reference, &source_of("nees_mean_reference")),
+            Cell::number(row.coverage_mean, &source_of("coverage_mean")),
         ];
         for state in states {
-            let own =
+            let is_of_cell =
                 |r: &&Row| r.run == row.run && r.outage == row.outage && r.state == REPORTED_NAMES[*state];
-            let place = file.rows.iter().position(|r| own(&r));
+            let place = file.rows.iter().position(|r| is_of_cell(&r));
             cells.push(place.map_or_else(
                 || Cell::figures("–"),
                 |k| {

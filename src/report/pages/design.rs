@@ -61,10 +61,10 @@ fn beside(design: &Design) -> Chart {
         let all = (0..design.parameters.len()).filter_map(|k| Some((k as f64, value(k)?, f64::NAN)));
         all.collect()
     };
-    let own = points(&|k| design.parameters[k].half_width_pct);
+    let parameter_points = points(&|k| design.parameters[k].half_width_pct);
     let endless = points(&|k| design.parameters[k].endless_half_width_pct);
     let series = vec![
-        Series::points("this plan", Colour::REAL, own),
+        Series::points("this plan", Colour::REAL, parameter_points),
         Series::points("endless recordings", Colour::Soft, endless),
     ];
     let panel = Panel::new(Axis::log("half width (%)"), series);
@@ -97,8 +97,8 @@ fn counts(designs: &[Design]) -> Vec<usize> {
 /// A curve over hours for each number of recordings.
 fn curves(designs: &[Design], value: impl Fn(&Design) -> f64) -> Vec<Series> {
     let curve = |(hue, count): (usize, usize)| {
-        let own = || designs.iter().filter(|d| d.recordings == count);
-        let points: Vec<(f64, f64)> = own().map(|d| (d.hours, value(d))).collect();
+        let designs_of_count = || designs.iter().filter(|d| d.recordings == count);
+        let points: Vec<(f64, f64)> = designs_of_count().map(|d| (d.hours, value(d))).collect();
         let name = format!("{count} recordings");
         let dots = points.iter().map(|(x, y)| (*x, *y, f64::NAN)).collect::<Vec<_>>();
         [Series::line(&name, Colour::Hue(hue), points), Series::points(&name, Colour::Hue(hue), dots)]
@@ -124,15 +124,15 @@ fn quantiles(designs: &[Design]) -> Table {
     let mut table = Table::new(["recordings", "hours", "outage", "p95 (m)", "from", "to", "half width (%)"]);
     for (i, d) in designs.iter().enumerate() {
         for (k, q) in d.horizontal_p95.iter().enumerate() {
-            let at = |key: &str| format!("/designs/{i}/horizontal_p95/{k}/{key}");
+            let source_of = |key: &str| format!("/designs/{i}/horizontal_p95/{k}/{key}");
             table.row([
                 Cell::figures(d.recordings.to_string()),
                 Cell::number(d.hours, &format!("/designs/{i}/hours")),
                 window((q.start_s, q.end_s)).into(),
-                Cell::number(q.p95_m, &at("p95_m")),
-                Cell::number(q.ci95[0], &at("ci95/0")),
-                Cell::number(q.ci95[1], &at("ci95/1")),
-                Cell::number(q.half_width_pct, &at("half_width_pct")),
+                Cell::number(q.p95_m, &source_of("p95_m")),
+                Cell::number(q.ci95[0], &source_of("ci95/0")),
+                Cell::number(q.ci95[1], &source_of("ci95/1")),
+                Cell::number(q.half_width_pct, &source_of("half_width_pct")),
             ]);
         }
     }

@@ -51,13 +51,16 @@ const HALF: f64 = 1.96;
 /// Which estimator is the most accurate one in each scenario: the least geometric mean of its RMSE over the parameters.
 fn verdict(file: &EfficiencyFile) -> String {
     let best = |scenario: &&str| {
-        let own = || file.results.iter().filter(|r| r.scenario == **scenario && r.accuracy.rmse > 0.0);
+        let rows_of_scenario =
+            || file.results.iter().filter(|r| r.scenario == **scenario && r.accuracy.rmse > 0.0);
         let score = |estimator: &str| {
-            let logs: Vec<f64> =
-                own().filter(|r| r.estimator == estimator).map(|r| r.accuracy.rmse.ln()).collect();
+            let logs: Vec<f64> = rows_of_scenario()
+                .filter(|r| r.estimator == estimator)
+                .map(|r| r.accuracy.rmse.ln())
+                .collect();
             logs.iter().sum::<f64>() / logs.len() as f64
         };
-        let estimators = in_order(own().map(|r| r.estimator.as_str()));
+        let estimators = in_order(rows_of_scenario().map(|r| r.estimator.as_str()));
         let least = estimators.into_iter().min_by(|a, b| score(a).total_cmp(&score(b)))?;
         Some(format!("{scenario}: {least} ({} %)", readable(100.0 * score(least).exp())))
     };
@@ -75,7 +78,7 @@ fn charts(file: &EfficiencyFile) -> Vec<Chart> {
     let scenarios = in_order(file.results.iter().map(|r| r.scenario.as_str()));
     let estimators = in_order(file.results.iter().map(|r| r.estimator.as_str()));
     let chart = |parameter: &str| {
-        let own: Vec<&EfficiencyRow> = file.results.iter().filter(|r| r.parameter == parameter).collect();
+        let rows: Vec<&EfficiencyRow> = file.results.iter().filter(|r| r.parameter == parameter).collect();
         let series = estimators.iter().enumerate().map(|(k, estimator)| {
             let beside = 0.6 * ((k as f64 + 0.5) / estimators.len() as f64 - 0.5);
             let point = |r: &&EfficiencyRow| {
@@ -84,10 +87,10 @@ fn charts(file: &EfficiencyFile) -> Vec<Chart> {
                 let half = 100.0 * HALF * r.accuracy.rmse_se;
                 Some(Interval { x, y, low: (y - half).max(0.1 * y), high: y + half })
             };
-            let points = own.iter().filter(|r| r.estimator == **estimator).filter_map(point);
+            let points = rows.iter().filter(|r| r.estimator == **estimator).filter_map(point);
             Series::new(estimator, Colour::Hue(k), Mark::Points(points.collect()))
         });
-        let axis = axis(&own.iter().map(|r| r.accuracy.rmse).collect::<Vec<_>>());
+        let axis = axis(&rows.iter().map(|r| r.accuracy.rmse).collect::<Vec<_>>());
         let panel = Panel::new(axis, series.collect());
         let names = scenarios.iter().map(|s| (*s).to_owned()).collect();
         Chart::new(&format!("Accuracy of {}", symbol(parameter)), Axis::names(names), vec![panel])

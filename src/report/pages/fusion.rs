@@ -58,7 +58,7 @@ fn timed(title: &str, panels: Vec<Panel>, outages: &[(f64, f64)]) -> Chart {
 }
 
 fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
-    let Some(first) = solution.rows.first() else { return Chart::map("Way", Vec::new()) };
+    let Some(first) = solution.rows.first() else { return Chart::map("Track", Vec::new()) };
     let place = |row: &Row| {
         let moved = ned_difference(&first.state, row.state.lat, row.state.lon, row.state.h);
         (moved.y, moved.x)
@@ -85,11 +85,12 @@ fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
         let (east, north) = place(row?);
         Some(Series::new(name, Colour::RIGHT, Mark::Place(east, north)))
     }));
-    Chart::map("Way", series)
+    Chart::map("Track", series)
 }
 
 fn position(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
-    let horizontal = |rows: &[Row], of: fn(&Row) -> f64| rows.iter().map(|row| (row.t_s, of(row))).collect();
+    let horizontal =
+        |rows: &[Row], value: fn(&Row) -> f64| rows.iter().map(|row| (row.t_s, value(row))).collect();
     let sigma = |row: &Row| row.sigma[0].hypot(row.sigma[1]);
     let error = |row: &Row| row.error.map_or(f64::NAN, |e| e.values[0].hypot(e.values[1]));
     let rows = &solution.rows;

@@ -50,19 +50,19 @@ pub(crate) fn paper_figures(
     track: &TrajectorySeries,
     outages: &[(f64, f64)],
 ) -> Vec<PaperFigure> {
-    let of = |scenario: &str, estimator: &str, sensor: Sensor| {
-        let own = curves.iter().find(|c| c.scenario == scenario && c.estimator == estimator)?;
-        own.file.curves.iter().find(|c| c.sensor == sensor.name())
+    let fitted_curve = |scenario: &str, estimator: &str, sensor: Sensor| {
+        let result = curves.iter().find(|c| c.scenario == scenario && c.estimator == estimator)?;
+        result.file.curves.iter().find(|c| c.sensor == sensor.name())
     };
     let replicates = |scenario: &str| {
         let kinds = [
-            ("robust", of(scenario, "sr-awv", Sensor::Accel)),
-            ("classical", of(scenario, "awv", Sensor::Accel)),
+            ("robust", fitted_curve(scenario, "sr-awv", Sensor::Accel)),
+            ("classical", fitted_curve(scenario, "awv", Sensor::Accel)),
         ];
         let panels = kinds.into_iter().filter_map(|(kind, fitted)| Some(recordings(kind, fitted?)));
         vec![Chart::new("Accelerometer recordings", scale_axis(), panels.collect())]
     };
-    let fit = of("I", "awv", Sensor::Accel).map(|fitted| fitted_chart(fitted, &[]));
+    let fit = fitted_curve("I", "awv", Sensor::Accel).map(|fitted| fitted_chart(fitted, &[]));
     vec![
         PaperFigure::new(1, ABNORMAL, replicates("III")),
         PaperFigure::new(
@@ -76,7 +76,7 @@ pub(crate) fn paper_figures(
             &format!("Fit of N2 to the accelerometers of scenario I. {FITTED}"),
             fit.into_iter().collect(),
         ),
-        PaperFigure::new(6, AVERAGES, averages(&of)),
+        PaperFigure::new(6, AVERAGES, averages(&fitted_curve)),
     ]
 }
 
@@ -102,25 +102,25 @@ pub(crate) fn paper_page(figures: &[PaperFigure]) -> String {
 
 /// A curve a recording.
 fn recordings(kind: &str, fitted: &FittedCurve) -> Panel {
-    let one = |(k, replicate): (usize, &crate::report::ReplicateCurve)| {
+    let series_of_recording = |(k, replicate): (usize, &crate::report::ReplicateCurve)| {
         Series::line(&replicate.file, Colour::Hue(k), curve(&fitted.tau_s, &replicate.wv))
     };
     let mut axis = variance_axis(&fitted.sensor);
     axis.label = format!("{kind} {}", axis.label);
-    Panel::new(axis, fitted.replicates.iter().enumerate().map(one).collect())
+    Panel::new(axis, fitted.replicates.iter().enumerate().map(series_of_recording).collect())
 }
 
 /// A chart a sensor, a panel a scenario.
-fn averages<'a>(of: &dyn Fn(&str, &str, Sensor) -> Option<&'a FittedCurve>) -> Vec<Chart> {
+fn averages<'a>(fitted_curve: &dyn Fn(&str, &str, Sensor) -> Option<&'a FittedCurve>) -> Vec<Chart> {
     let chart = |sensor: Sensor| {
         let panel = |scenario: &&str| {
             let names = [("awv", "AWV"), ("sr-awv", "SR-AWV"), ("dr-awv", "DR-AWV")];
-            let mut series: Vec<Series> = of("I", "awv", sensor)
+            let mut series: Vec<Series> = fitted_curve("I", "awv", sensor)
                 .map(|clean| Series::dashed("AWV, scenario I", Colour::Ink, curve(&clean.tau_s, &clean.wv)))
                 .into_iter()
                 .collect();
             series.extend(names.into_iter().enumerate().filter_map(|(hue, (estimator, name))| {
-                let fitted = of(scenario, estimator, sensor)?;
+                let fitted = fitted_curve(scenario, estimator, sensor)?;
                 Some(Series::line(name, Colour::Hue(hue), curve(&fitted.tau_s, &fitted.wv)))
             }));
             let mut axis = variance_axis(sensor.name());

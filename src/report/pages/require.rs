@@ -37,13 +37,13 @@ const ISO_DRIFT: &str =
 fn figures(needed: &NeededImu) -> Table {
     let mut table = Table::new(["figure", "allocated", "share", "if alone", "others 10 × better"]);
     for i in 0..IMU_PARAMETERS {
-        let at = |key: &str| format!("/figures/{i}/{key}");
+        let source_of = |key: &str| format!("/figures/{i}/{key}");
         table.row([
             ImuParameters::NAMES[i].into(),
-            Cell::number(ImuParameters::in_datasheets(i, needed.imu.values[i]), &at("allocated")),
-            Cell::number(needed.shares[i], &at("share")),
-            answer(i, &needed.alone[i], &at("alone")),
-            answer(i, &needed.others_better[i], &at("others_10_times_better")),
+            Cell::number(ImuParameters::in_datasheets(i, needed.imu.values[i]), &source_of("allocated")),
+            Cell::number(needed.shares[i], &source_of("share")),
+            answer(i, &needed.alone[i], &source_of("alone")),
+            answer(i, &needed.others_better[i], &source_of("others_10_times_better")),
         ]);
     }
     table.row([

@@ -188,15 +188,15 @@ fn ends(summary: &Summary) -> Table {
     };
     for (i, o) in summary.outages.iter().enumerate() {
         let h = &o.horizontal_error_end_m;
-        let at = |key: &str| format!("/outages/{i}/{key}");
+        let source_of = |key: &str| format!("/outages/{i}/{key}");
         table.row([
             window((o.start_s, o.end_s)).into(),
-            Cell::number(h.p50, &at("horizontal_error_end_m/p50")),
+            Cell::number(h.p50, &source_of("horizontal_error_end_m/p50")),
             interval(h.p50_ci95),
-            Cell::number(h.p95, &at("horizontal_error_end_m/p95")),
+            Cell::number(h.p95, &source_of("horizontal_error_end_m/p95")),
             interval(h.p95_ci95),
-            Cell::number(h.p999.unwrap_or(h.max), &at(&format!("horizontal_error_end_m/{key}"))),
-            Cell::number(o.reconvergence_s.p50, &at("reconvergence_s/p50")),
+            Cell::number(h.p999.unwrap_or(h.max), &source_of(&format!("horizontal_error_end_m/{key}"))),
+            Cell::number(o.reconvergence_s.p50, &source_of("reconvergence_s/p50")),
         ]);
     }
     table
@@ -207,7 +207,7 @@ fn by_state(summary: &Summary, page: &mut Page) {
     let shown = largest(summary);
     let names: Vec<String> = shown.iter().map(|i| window(windows(summary)[*i])).collect();
     let table = |suffix: &str| {
-        let of = |i: &usize| {
+        let errors_of_outage = |i: &usize| {
             let o = &summary.outages[*i];
             let (rmse, asee) =
                 if suffix == "end" { (&o.rmse_end, &o.asee_end) } else { (&o.rmse_mean, &o.asee_mean) };
@@ -215,7 +215,7 @@ fn by_state(summary: &Summary, page: &mut Page) {
         };
         let columns: Vec<Pair<'_>> = names
             .iter()
-            .zip(shown.iter().map(of))
+            .zip(shown.iter().map(errors_of_outage))
             .map(|(name, (place, rmse, asee))| (name.as_str(), place, rmse, asee))
             .collect();
         pairs(&columns, suffix)

@@ -57,8 +57,8 @@ fn verdict(cells: &[ShownCell]) -> String {
     let kinds =
         [VerdictKind::Ok, VerdictKind::Overconfident, VerdictKind::Underconfident, VerdictKind::Diverged];
     let of_column = |(k, name): (usize, &str)| {
-        let own = || cells.iter().filter_map(|cell| cell.columns.get(k));
-        let count = |kind: VerdictKind| own().filter(|c| c.verdict.kind == kind).count();
+        let column_results = || cells.iter().filter_map(|cell| cell.columns.get(k));
+        let count = |kind: VerdictKind| column_results().filter(|c| c.verdict.kind == kind).count();
         let told = kinds.into_iter().filter(|kind| count(*kind) > 0);
         let words: Vec<String> =
             told.map(|kind| format!("{} in {}", verdict_word(kind), count(kind))).collect();

@@ -81,11 +81,11 @@ pub(crate) fn wavelet_page(file: &SignalsFile) -> Page {
 /// The robust wavelet deviations for a terminal, a plot a sensor: each axis with its letter.
 pub(crate) fn wavelet_text(file: &SignalsFile) -> String {
     let plot = |sensor: Sensor| {
-        let own = file.signals.iter().filter(|s| s.sensor == sensor.name());
+        let of_sensor = file.signals.iter().filter(|s| s.sensor == sensor.name());
         let deviation = |s: &SignalCurves| -> Vec<(f64, f64)> {
             s.tau_s.iter().zip(&s.robust.wv).map(|(tau, nu)| (*tau, nu.sqrt())).collect()
         };
-        let series = own.map(|s| Series::line(&s.axis, Colour::Ink, deviation(s))).collect();
+        let series = of_sensor.map(|s| Series::line(&s.axis, Colour::Ink, deviation(s))).collect();
         let panel = Panel::new(Axis::log(&format!("{} ({})", sensor.name(), sensor.unit())), series);
         terminal(&Chart::new("", scale_axis(), vec![panel]), TEXT.0, TEXT.1)
     };
@@ -127,10 +127,11 @@ fn charts(file: &SignalsFile) -> Vec<Chart> {
         false => format!("{file} {}", s.axis),
     };
     for sensor in Sensor::ALL {
-        let own = file.signals.iter().zip(&files).filter(|(s, _)| s.sensor == sensor.name());
-        let own: Vec<(&SignalCurves, String)> = own.map(|(s, file)| (s, name((s, file)))).collect();
+        let with_names = file.signals.iter().zip(&files).filter(|(s, _)| s.sensor == sensor.name());
+        let with_names: Vec<(&SignalCurves, String)> =
+            with_names.map(|(s, file)| (s, name((s, file)))).collect();
         let title = sensor_name(sensor.name());
-        for (k, signals) in own.chunks(MOST).enumerate() {
+        for (k, signals) in with_names.chunks(MOST).enumerate() {
             let series = signals
                 .iter()
                 .enumerate()

@@ -3,7 +3,7 @@
 use super::super::sample;
 use super::*;
 
-fn of(measured: &Measured) -> ColumnResult<'_> {
+fn column_result(measured: &Measured) -> ColumnResult<'_> {
     let cell = ["land", "m", "s", "g", "o"];
     ColumnResult { cell, candidate: "I/awv", filter: "15", reference: "I/awv", measured }
 }
@@ -15,10 +15,10 @@ fn rows_fit_their_columns_and_names_carry_units() {
     let experiment = Measured::from(&result);
     let comparison = metrics::compare(&experiment, &experiment, true).unwrap();
     let tables = [
-        (outage_columns(), outage_rows(&of(&experiment), &outages, Some(&comparison))),
-        (outage_columns(), outage_rows(&of(&experiment), &outages, None)),
-        (epoch_columns(), epoch_rows(&of(&experiment), &epochs)),
-        (run_columns(), run_rows(&of(&experiment))),
+        (outage_columns(), outage_rows(&column_result(&experiment), &outages, Some(&comparison))),
+        (outage_columns(), outage_rows(&column_result(&experiment), &outages, None)),
+        (epoch_columns(), epoch_rows(&column_result(&experiment), &epochs)),
+        (run_columns(), run_rows(&column_result(&experiment))),
     ];
     for (columns, rows) in tables {
         assert!(!rows.is_empty());
@@ -62,16 +62,16 @@ fn rows_fit_their_columns_and_names_carry_units() {
 fn values_stand_under_their_names() {
     let result = sample::result();
     let (outages, experiment) = (metrics::outages(&result), Measured::from(&result));
-    let rows = outage_rows(&of(&experiment), &outages, None);
-    let at = |name: &str| {
+    let rows = outage_rows(&column_result(&experiment), &outages, None);
+    let value_of = |name: &str| {
         let i = outage_columns().iter().position(|(n, _)| n == name).unwrap();
         rows[0][i].clone()
     };
     let o = &outages[0];
-    assert_eq!(at("candidate"), Value::Text("I/awv".into()));
-    assert_eq!(at("duration_s"), Value::Float(o.end_s - o.start_s));
-    assert_eq!(at("asee_mean_std_error_pos_n_m"), Value::Float(o.asee_mean.0[0].std_error));
-    assert_eq!(at("rmse_end_yaw_deg"), Value::Float(o.rmse_end.0[8].value));
-    assert_eq!(at("horizontal_error_end_max_m"), Value::Float(o.horizontal_max_m));
-    assert!(matches!(at("coverage_mean"), Value::Float(x) if x.is_nan()));
+    assert_eq!(value_of("candidate"), Value::Text("I/awv".into()));
+    assert_eq!(value_of("duration_s"), Value::Float(o.end_s - o.start_s));
+    assert_eq!(value_of("asee_mean_std_error_pos_n_m"), Value::Float(o.asee_mean.0[0].std_error));
+    assert_eq!(value_of("rmse_end_yaw_deg"), Value::Float(o.rmse_end.0[8].value));
+    assert_eq!(value_of("horizontal_error_end_max_m"), Value::Float(o.horizontal_max_m));
+    assert!(matches!(value_of("coverage_mean"), Value::Float(x) if x.is_nan()));
 }

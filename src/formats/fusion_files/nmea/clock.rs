@@ -41,8 +41,8 @@ impl Log {
     /// Unix time where the IMU runs in it from one time to the other, else seconds of the first day. A receiver whose week
     /// counter has rolled over is known by dates that are the IMU's after 1024 weeks, or twice that.
     pub(super) fn clock(&self, imu_s: Option<(f64, f64)>) -> Clock {
-        let at = |e: &super::Epoch| DAY_S * e.day + e.time_s;
-        let span = self.epochs.first().map(at).zip(self.epochs.last().map(at));
+        let time_of_epoch = |e: &super::Epoch| DAY_S * e.day + e.time_s;
+        let span = self.epochs.first().map(time_of_epoch).zip(self.epochs.last().map(time_of_epoch));
         let overlaps = |origin_s: f64| {
             let both = imu_s.zip(span);
             both.is_some_and(|(imu, gnss)| imu.0 <= origin_s + gnss.1 && origin_s + gnss.0 <= imu.1)

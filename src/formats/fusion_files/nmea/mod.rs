@@ -83,7 +83,7 @@ impl Log {
         let number = |i: usize| field(i).parse::<f64>().ok();
         let kind = field(0).get(2..).unwrap_or_default();
         // proprietary ones begin with P
-        let at = match kind {
+        let epoch = match kind {
             "ZDA" | "RMC" | "GGA" | "GST" if !field(1).is_empty() && !field(0).starts_with('P') => {
                 let time_s = time_of_day(field(1)).ok_or("not a time of day hhmmss.ss")?;
                 self.at(line, time_s)
@@ -95,19 +95,19 @@ impl Log {
             },
             _ => return Ok(()),
         };
-        let day_s = DAY_S * at.day;
+        let day_s = DAY_S * epoch.day;
         match kind {
-            "GGA" if at.position.is_none() => return self.position(line, fields),
+            "GGA" if epoch.position.is_none() => return self.position(line, fields),
             "GST" => {
-                at.sigma = number(6).zip(number(7)).zip(number(8)).map(|((n, e), d)| DVec3::new(n, e, d))
+                epoch.sigma = number(6).zip(number(7)).zip(number(8)).map(|((n, e), d)| DVec3::new(n, e, d))
             }
-            "VTG" if at.velocity.is_none() => {
+            "VTG" if epoch.velocity.is_none() => {
                 let knots = number(5).or(number(7).map(|km_h| km_h / 1.852));
-                at.velocity = knots.map(|knots| horizontal(knots, number(1)));
+                epoch.velocity = knots.map(|knots| horizontal(knots, number(1)));
             }
             "RMC" => {
                 if field(2) == "A" {
-                    at.velocity = number(7).map(|knots| horizontal(knots, number(8)));
+                    epoch.velocity = number(7).map(|knots| horizontal(knots, number(8)));
                 }
                 self.dates.add(date_of_rmc(field(9)).map(|s| s - day_s));
             }
