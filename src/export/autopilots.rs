@@ -1,15 +1,13 @@
 //! Autopilots: noise of a prediction step, within documented ranges.
 
-use super::layout::{Layout, number, remark};
+use super::layout::{Layout, PLAIN, number, remark};
 use super::{Entry, Values};
 
 pub(super) const PX4: Layout = Layout {
-    comment: "#",
-    first: None,
-    open: "",
-    close: "",
+    entries: px4,
     line: |entry| format!("param set {} {}  # {}", entry.key, number(entry.value), remark(entry)),
     source: "PX4 parameter reference, group EKF2",
+    ..PLAIN
 };
 
 /// Prediction interval of PX4's EKF2, its parameter `EKF2_PREDICT_US` (s).
@@ -18,7 +16,7 @@ const PX4_STEP_S: f64 = 0.01;
 /// PX4's EKF2 adds (dt·noise)² to the variance of velocity or angle in a step of dt, and (dt·bias noise)² to that of the
 /// bias: N/√dt and K/√dt (<https://docs.px4.io/main/en/advanced_config/parameter_reference.html>, covariance.cpp). The
 /// units follow: the bias noise is in units per second.
-pub(super) fn px4(v: &Values) -> Vec<Entry> {
+fn px4(v: &Values) -> Vec<Entry> {
     step_noise(
         v,
         ["EKF2_ACC_NOISE", "EKF2_GYR_NOISE", "EKF2_ACC_B_NOISE", "EKF2_GYR_B_NOISE"],
@@ -29,13 +27,11 @@ pub(super) fn px4(v: &Values) -> Vec<Entry> {
 }
 
 pub(super) const ARDUPILOT: Layout = Layout {
-    comment: "#",
-    first: None,
-    open: "",
-    close: "",
+    entries: ardupilot,
     // Ground stations refuse a line with more than a name and a value.
     line: |entry| format!("# {}\n{},{}", remark(entry), entry.key, number(entry.value)),
     source: "ArduPilot, complete parameter list, EK3_",
+    ..PLAIN
 };
 
 /// Target interval of ArduPilot's EKF3, `EKF_TARGET_DT` (s).
@@ -44,7 +40,7 @@ const ARDUPILOT_STEP_S: f64 = 0.012;
 /// ArduPilot's EKF3 adds (dt·noise)² to velocity and angle and (dt²·bias noise)² to biases of increments in a step of dt:
 /// N/√dt and K/√dt as in PX4, with dt of 12 ms (<https://ardupilot.org/copter/docs/parameters.html>,
 /// AP_NavEKF3_core.cpp).
-pub(super) fn ardupilot(v: &Values) -> Vec<Entry> {
+fn ardupilot(v: &Values) -> Vec<Entry> {
     step_noise(
         v,
         ["EK3_ACC_P_NSE", "EK3_GYRO_P_NSE", "EK3_ABIAS_P_NSE", "EK3_GBIAS_P_NSE"],

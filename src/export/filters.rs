@@ -1,8 +1,9 @@
 //! INS/GNSS filters.
 
-use super::layout::{Layout, number, remark, triple};
+use super::layout::{Layout, PLAIN, number, remark, triple};
 use super::{Entry, Values};
 use nav_sim_navigation::ekf::FilterStates;
+use nav_sim_signal::noise::practical::Bias;
 use nav_sim_signal::units::{DEG, DEG_PER_HOUR};
 
 /// One milligal (m/s²).
@@ -12,20 +13,20 @@ const ROOT_HOUR: f64 = 60.0;
 /// PSINS has a gravity of its own, `glv.g0` (m/s²).
 const PSINS_G0: f64 = 9.780_326_771_4;
 pub(super) const KF_GINS: Layout = Layout {
-    comment: "#",
-    first: None,
+    entries: kf_gins,
+    bias: Bias::Markov,
     open: "imunoise:",
-    close: "",
     line: |entry| match entry.key {
         "corrtime" => format!("  {}: {}  # {}", entry.key, number(entry.value), remark(entry)),
         _ => format!("  {}: [{}]  # {}", entry.key, triple(entry.value), remark(entry)),
     },
     source: "KF-GINS, dataset/kf-gins.yaml; paste in the place of the same section",
+    ..PLAIN
 };
 
 /// KF-GINS: white noise per √h and Gauss-Markov biases of one correlation time
 /// (<https://github.com/i2Nav-WHU/KF-GINS>, dataset/kf-gins.yaml and its unit conversions in kf_gins.cpp).
-pub(super) fn kf_gins(v: &Values) -> Vec<Entry> {
+fn kf_gins(v: &Values) -> Vec<Entry> {
     let rate = format!("IMU at {} Hz", v.rate_hz);
     let sigma = "Gauss-Markov bias, standard deviation";
     let hours = v.gyro.markov.t_corr_s.min(v.accel.markov.t_corr_s) / 3600.0;
@@ -49,15 +50,15 @@ pub(super) fn kf_gins(v: &Values) -> Vec<Entry> {
 }
 
 pub(super) const NAVEGO: Layout = Layout {
+    entries: navego,
+    bias: Bias::Markov,
     comment: "%",
-    first: None,
-    open: "",
-    close: "",
     line: |entry| match entry.key {
         "imu.freq" => format!("{} = {};  % {}", entry.key, number(entry.value), remark(entry)),
         _ => format!("{} = {} * [1 1 1];  % {}", entry.key, matlab_number(entry.value), remark(entry)),
     },
     source: "NaveGo, \"IMU data structure\" of its examples (SI units)",
+    ..PLAIN
 };
 
 /// Numbers of MATLAB: infinity has its own name.
@@ -67,7 +68,7 @@ fn matlab_number(value: f64) -> String {
 
 /// NaveGo's imu structure in SI units (<https://github.com/rodralez/NaveGo>). Its filter drives the biases by white noise of
 /// `gb_psd` and `ab_psd`: they are given as sigma √(2/T), so that the biases have the standard deviations given.
-pub(super) fn navego(v: &Values) -> Vec<Entry> {
+fn navego(v: &Values) -> Vec<Entry> {
     let root = v.rate_hz.sqrt();
     let rate = format!("IMU at {} Hz", v.rate_hz);
     let named = |what: &str| format!("{what}, {rate}");
@@ -92,16 +93,18 @@ pub(super) fn navego(v: &Values) -> Vec<Entry> {
 }
 
 pub(super) const PSINS: Layout = Layout {
+    entries: psins,
+    bias: Bias::Markov,
     comment: "%",
-    first: None,
     open: "glvs",
     close: "imuerr = imuerrset(eb, db, web, wdb, sqrtR0G, TauG, sqrtR0A, TauA);",
     line: |entry| format!("{} = {};  % {}", entry.key, matlab_number(entry.value), remark(entry)),
     source: "PSINS, imuerrset.m",
+    ..PLAIN
 };
 
 /// PSINS: the arguments of `imuerrset` (<http://www.psins.org.cn>, base/base1/imuerrset.m), with PSINS's own g0.
-pub(super) fn psins(v: &Values) -> Vec<Entry> {
+fn psins(v: &Values) -> Vec<Entry> {
     let ug = PSINS_G0 * 1e-6;
     let rate = format!("IMU at {} Hz", v.rate_hz);
     let (a, g) = (&v.accel, &v.gyro);
@@ -119,17 +122,17 @@ pub(super) fn psins(v: &Values) -> Vec<Entry> {
 }
 
 pub(super) const PYINS: Layout = Layout {
-    comment: "#",
-    first: None,
+    entries: pyins,
     open: "from pyins.inertial_sensor import EstimationModel\n",
     close: "\naccel_model = EstimationModel(bias_sd=accel_bias_sd, noise=accel_noise, bias_walk=accel_bias_walk)\n\
             gyro_model = EstimationModel(bias_sd=gyro_bias_sd, noise=gyro_noise, bias_walk=gyro_bias_walk)",
     line: |entry| format!("{} = {}  # {}", entry.key, number(entry.value), remark(entry)),
     source: "pyins.inertial_sensor.EstimationModel",
+    ..PLAIN
 };
 
 /// pyins: SI units, root densities (<https://github.com/nmayorov/pyins>, pyins/inertial_sensor.py).
-pub(super) fn pyins(v: &Values) -> Vec<Entry> {
+fn pyins(v: &Values) -> Vec<Entry> {
     let rate = format!("continuous-time, IMU at {} Hz", v.rate_hz);
     let (n, k) = (format!("white noise N, {rate}"), format!("bias random walk K, {rate}"));
     vec![

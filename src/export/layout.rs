@@ -1,10 +1,15 @@
 //! How a target's file is laid out.
 
-use super::{Entry, Export};
+use super::{Entry, Export, Values};
+use nav_sim_signal::noise::practical::Bias;
 
-/// The syntax of a target's file.
+/// A target's parameters and the syntax of its file.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Layout {
+    /// The parameters, in the target's units.
+    pub(super) entries: fn(&Values) -> Vec<Entry>,
+    /// What it takes a bias for.
+    pub(super) bias: Bias,
     /// What begins a comment.
     pub(super) comment: &'static str,
     /// A line that must be the very first.
@@ -18,6 +23,18 @@ pub(super) struct Layout {
     /// The document that keys and units are from.
     pub(super) source: &'static str,
 }
+
+/// Entries as in YAML below a head of `#` comments, with a bias that walks.
+pub(super) const PLAIN: Layout = Layout {
+    entries: |_| Vec::new(),
+    bias: Bias::Walk,
+    comment: "#",
+    first: None,
+    open: "",
+    close: "",
+    line: yaml,
+    source: "",
+};
 
 impl Export {
     /// The file: a head of comments that says what it is and how good it is, then the parameters. `model` is the name of

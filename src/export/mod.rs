@@ -183,7 +183,7 @@ impl Export {
         {
             return Err(ExportError::TwoTimes { accel_s: accel.t_corr_s, gyro_s: gyro.t_corr_s });
         }
-        let entries = target.entries(&Values::new(model.rate_hz, &sensors));
+        let entries = (target.layout().entries)(&Values::new(model.rate_hz, &sensors));
         Ok(Self { target, rate_hz: model.rate_hz, settings, sensors, entries })
     }
 }
@@ -191,7 +191,7 @@ impl Export {
 /// The kind of bias that the model has and the target has not. The AR1 beside a random walk are what a strict pair leaves out,
 /// as its doubts say; a Gauss-Markov process that is the model's only bias is not left out.
 fn lacking(known: Bias, axes: &[&Composite]) -> Option<&'static str> {
-    let has = |is: fn(&Process) -> bool| axes.iter().any(|a| a.processes.iter().any(is));
+    let has = |kind: fn(&Process) -> bool| axes.iter().any(|a| a.processes.iter().any(kind));
     let walks = has(|p| matches!(p, Process::RandomWalk(_)));
     match known {
         Bias::Walk => {

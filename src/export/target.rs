@@ -1,7 +1,7 @@
 //! The programs that are known.
 
 use super::layout::Layout;
-use super::{Entry, Values, autopilots, filters, simulators, vision};
+use super::{autopilots, filters, simulators, vision};
 use nav_sim_signal::noise::practical::Bias;
 
 /// A program that parameters are written for.
@@ -53,32 +53,12 @@ nav_sim_signal::named!(
 impl Target {
     /// What it takes a bias for.
     pub(super) const fn bias(self) -> Bias {
-        match self {
-            Self::KfGins | Self::NaveGo | Self::Psins | Self::GnssInsSim | Self::Matlab => Bias::Markov,
-            _ => Bias::Walk,
-        }
+        self.layout().bias
     }
 
     /// Whether it flies a vehicle, whose vibration no static recording holds.
     pub(super) const fn is_autopilot(self) -> bool {
         matches!(self, Self::Px4 | Self::ArduPilot)
-    }
-
-    pub(super) fn entries(self, values: &Values) -> Vec<Entry> {
-        match self {
-            Self::Kalibr => vision::kalibr(values),
-            Self::OpenVins => vision::openvins(values),
-            Self::Vins => vision::vins(values),
-            Self::Gtsam => vision::gtsam(values),
-            Self::Px4 => autopilots::px4(values),
-            Self::ArduPilot => autopilots::ardupilot(values),
-            Self::KfGins => filters::kf_gins(values),
-            Self::NaveGo => filters::navego(values),
-            Self::Psins => filters::psins(values),
-            Self::Pyins => filters::pyins(values),
-            Self::GnssInsSim => simulators::gnss_ins_sim(values),
-            Self::Matlab => simulators::matlab(values),
-        }
     }
 
     pub(super) const fn layout(self) -> Layout {
