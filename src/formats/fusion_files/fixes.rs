@@ -18,22 +18,22 @@ pub(super) const WEEK_S: f64 = 604_800.0;
 /// Faster than this from one fix to the next is no motion (m/s).
 const MAX_SPEED: f64 = 8000.0;
 
-/// Quantities, by our own names.
-const NAMES: [&str; 14] = [
-    "t_s",
-    "lat_deg",
-    "lon_deg",
-    "h_m",
-    "sd_n_m",
-    "sd_e_m",
-    "sd_d_m",
-    "v_n_m_s",
-    "v_e_m_s",
-    "v_d_m_s",
-    "sd_vn_m_s",
-    "sd_ve_m_s",
-    "sd_vd_m_s",
-    "week",
+/// Quantities: our own name, and the names without a unit that other programs have for it.
+const QUANTITIES: [(&str, &[&str]); 14] = [
+    ("t_s", &["t", "time", "timestamp", "tow", "sow"]),
+    ("lat_deg", &["lat", "latitude"]),
+    ("lon_deg", &["lon", "lng", "longitude"]),
+    ("h_m", &["h", "height", "alt", "altitude"]),
+    ("sd_n_m", &["sd_n", "std_n", "sigma_n", "pos_std_n", "sd_north", "sd_lat"]),
+    ("sd_e_m", &["sd_e", "std_e", "sigma_e", "pos_std_e", "sd_east", "sd_lon"]),
+    ("sd_d_m", &["sd_d", "std_d", "sigma_d", "pos_std_d", "sd_u", "std_u", "sd_h"]),
+    ("v_n_m_s", &["v_n", "vn"]),
+    ("v_e_m_s", &["v_e", "ve"]),
+    ("v_d_m_s", &["v_d", "vd"]),
+    ("sd_vn_m_s", &["sd_vn", "sd_v_n", "vel_std_n"]),
+    ("sd_ve_m_s", &["sd_ve", "sd_v_e", "vel_std_e"]),
+    ("sd_vd_m_s", &["sd_vd", "sd_v_d", "vel_std_d"]),
+    ("week", &["week"]),
 ];
 /// Time, position and its deviations: what every file has.
 pub(super) const POSITION: usize = 7;
@@ -52,59 +52,6 @@ pub(super) const COLUMNS: &str = "a GNSS file has the columns t_s, lat_deg, lon_
                                   have v_n_m_s, v_e_m_s, v_d_m_s, sd_vn_m_s, sd_ve_m_s, sd_vd_m_s; or it is a KF-GINS \
                                   text of 7 columns, or of 13 with velocity, or a solution of RTKLIB, or NMEA sentences";
 
-/// Other names of them: stem, index of the quantity.
-const STEMS: [(&str, usize); 49] = [
-    ("t", 0),
-    ("time", 0),
-    ("timestamp", 0),
-    ("tow", 0),
-    ("sow", 0),
-    ("lat", 1),
-    ("latitude", 1),
-    ("lon", 2),
-    ("lng", 2),
-    ("longitude", 2),
-    ("h", 3),
-    ("height", 3),
-    ("alt", 3),
-    ("altitude", 3),
-    ("sd_n", 4),
-    ("std_n", 4),
-    ("sigma_n", 4),
-    ("pos_std_n", 4),
-    ("sd_north", 4),
-    ("sd_lat", 4),
-    ("sd_e", 5),
-    ("std_e", 5),
-    ("sigma_e", 5),
-    ("pos_std_e", 5),
-    ("sd_east", 5),
-    ("sd_lon", 5),
-    ("sd_d", 6),
-    ("std_d", 6),
-    ("sigma_d", 6),
-    ("pos_std_d", 6),
-    ("sd_u", 6),
-    ("std_u", 6),
-    ("sd_h", 6),
-    ("v_n", 7),
-    ("vn", 7),
-    ("v_e", 8),
-    ("ve", 8),
-    ("v_d", 9),
-    ("vd", 9),
-    ("sd_vn", 10),
-    ("sd_v_n", 10),
-    ("vel_std_n", 10),
-    ("sd_ve", 11),
-    ("sd_v_e", 11),
-    ("vel_std_e", 11),
-    ("sd_vd", 12),
-    ("sd_v_d", 12),
-    ("vel_std_d", 12),
-    ("week", WEEK),
-];
-
 /// The quantity of a column and the factor to SI (angles: radians); none if it means nothing here.
 fn classify(name: &str) -> Option<(usize, f64)> {
     let name = name.to_lowercase().replace([' ', '-'], "_");
@@ -122,7 +69,7 @@ fn classify(name: &str) -> Option<(usize, f64)> {
         ("_rad", 1.0, 1..=2),
         ("_m", 1.0, 3..=6),
     ];
-    let of_stem = |stem: &str| STEMS.iter().find(|(s, _)| *s == stem).map(|(_, i)| *i);
+    let of_stem = |stem: &str| QUANTITIES.iter().position(|(_, stems)| stems.contains(&stem));
     let with = endings.into_iter().find_map(|(ending, factor, legal)| {
         let index = of_stem(name.strip_suffix(ending)?)?;
         legal.contains(&index).then_some((index, factor))
@@ -132,12 +79,12 @@ fn classify(name: &str) -> Option<(usize, f64)> {
 }
 
 /// Where each quantity stands: column and factor.
-struct Columns([Option<(usize, f64)>; NAMES.len()]);
+struct Columns([Option<(usize, f64)>; QUANTITIES.len()]);
 
 impl Columns {
     /// Standard deviations that are not of the file, and columns that are not used.
     fn remarks(&self, ignored: &[String]) -> Vec<Remark> {
-        let unstated = |at: usize| self.0[at].is_none();
+        let unstated = |quantity: usize| self.0[quantity].is_none();
         let mut remarks = Vec::new();
         if unstated(4) || self.0[VELOCITY.start].is_some() && unstated(10) {
             remarks.push(Remark::note("standard deviations as given for all fixes"));
@@ -149,7 +96,7 @@ impl Columns {
     }
 
     fn of(table: &Table, unsaid: Option<&FixSigma>) -> Result<(Self, Vec<String>), Error> {
-        let mut columns = Self([None; NAMES.len()]);
+        let mut columns = Self([None; QUANTITIES.len()]);
         let mut ignored = Vec::new();
         for (at, name) in table.columns.iter().enumerate() {
             let Some((quantity, factor)) = classify(name) else {
@@ -157,7 +104,7 @@ impl Columns {
                 continue;
             };
             if let Some((earlier, _)) = columns.0[quantity].replace((at, factor)) {
-                return Err(table.given_twice([earlier, at], NAMES[quantity]));
+                return Err(table.given_twice([earlier, at], QUANTITIES[quantity].0));
             }
         }
         columns.complete(table, &ignored, unsaid)?;
@@ -169,14 +116,15 @@ impl Columns {
     fn complete(&self, table: &Table, ignored: &[String], unsaid: Option<&FixSigma>) -> Result<(), Error> {
         let has_velocity = VELOCITY.into_iter().any(|i| self.0[i].is_some());
         let needed = if has_velocity { 0..VELOCITY.end } else { 0..POSITION };
-        let none_of = |of: std::ops::Range<usize>| of.into_iter().all(|i| self.0[i].is_none());
+        let none_of =
+            |quantities: std::ops::Range<usize>| quantities.into_iter().all(|i| self.0[i].is_none());
         let given = |i: usize| match i {
             4..7 => unsaid.is_some() && none_of(4..7),
             10..13 => unsaid.is_some_and(|s| s.vel_m_s.is_some()) && none_of(10..13),
             _ => false,
         };
         let missing: Vec<&str> =
-            needed.filter(|i| self.0[*i].is_none() && !given(*i)).map(|i| NAMES[i]).collect();
+            needed.filter(|i| self.0[*i].is_none() && !given(*i)).map(|i| QUANTITIES[i].0).collect();
         if missing.is_empty() {
             return Ok(());
         }
@@ -194,7 +142,7 @@ impl Columns {
     }
 
     fn value(&self, quantity: usize, row: &[f64]) -> f64 {
-        self.0[quantity].map_or(0.0, |(at, factor)| row[at] * factor)
+        self.0[quantity].map_or(0.0, |(column, factor)| row[column] * factor)
     }
 
     fn triad(&self, first: usize, row: &[f64]) -> DVec3 {
@@ -280,8 +228,8 @@ fn of_table(path: &Path, mut text: String, unsaid: Option<&FixSigma>) -> Result<
 /// The columns of a KF-GINS text, which has no header.
 fn bare_names(path: &Path, columns: usize) -> Result<Vec<&'static str>, Error> {
     match columns {
-        POSITION => Ok(NAMES[..POSITION].to_vec()),
-        13 => Ok(KF_GINS_VELOCITY.map(|i| NAMES[i]).to_vec()),
+        POSITION => Ok(QUANTITIES[..POSITION].iter().map(|(name, _)| *name).collect()),
+        13 => Ok(KF_GINS_VELOCITY.map(|i| QUANTITIES[i].0).to_vec()),
         _ => {
             let message = format!("{columns} columns without a header");
             Err(Error::contents(path.display().to_string(), Place::Within, message).advice(KF_GINS))
