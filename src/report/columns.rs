@@ -66,7 +66,7 @@ mod tests {
         let rows: Vec<Vec<String>> = (0..3).map(row).collect();
         let parts = cut(&rows, 1, 3);
         assert_eq!(parts.iter().map(|part| part[0].len()).collect::<Vec<_>>(), [4, 4, 4]);
-        assert!(parts.iter().all(|part| part.iter().zip(&rows).all(|(own, row)| own[0] == row[0])));
+        assert!(parts.iter().all(|part| part.iter().zip(&rows).all(|(cells, row)| cells[0] == row[0])));
         let put_together: Vec<&String> = parts.iter().flat_map(|part| &part[2][1..]).collect();
         assert_eq!(put_together, rows[2][1..].iter().collect::<Vec<_>>());
         let is_narrow = |text: &str| text.lines().all(|line| line.chars().count() <= WIDTH);

@@ -1,8 +1,8 @@
 //! Results of an estimator study: `results.csv`, `results.json`, the table on the terminal and the data of
 //! the paper's Figure 2.
 
+use super::markdown::plain_table;
 use super::number::shortest;
-use comfy_table::{ContentArrangement, Table, presets};
 use nav_sim_calibration::efficiency::Accuracy;
 use serde::Serialize;
 
@@ -66,10 +66,9 @@ pub(crate) fn efficiency_table(file: &EfficiencyFile) -> String {
             parameters.push((&r.parameter, r.target));
         }
     }
-    let mut table = Table::new();
-    table.load_style(presets::ASCII_MARKDOWN).set_content_arrangement(ContentArrangement::Disabled);
     let heads = parameters.iter().map(|(name, target)| format!("{name} = {target:.6e}"));
-    table.set_header(["scenario".to_owned(), "estimator".to_owned()].into_iter().chain(heads));
+    let mut rows: Vec<Vec<String>> =
+        vec![["scenario", "estimator"].map(str::to_owned).into_iter().chain(heads).collect()];
     for row in file.results.chunks(parameters.len().max(1)) {
         let cell = |r: &EfficiencyRow| {
             let [rmse, se, bias] = [r.accuracy.rmse, r.accuracy.rmse_se, r.accuracy.bias].map(|v| 100.0 * v);
@@ -77,11 +76,12 @@ pub(crate) fn efficiency_table(file: &EfficiencyFile) -> String {
             format!("{} ± {se} ({})", percent(rmse), signed(bias))
         };
         let names = [row[0].scenario.clone(), row[0].estimator.clone()];
-        table.add_row(names.into_iter().chain(row.iter().map(cell)));
+        rows.push(names.into_iter().chain(row.iter().map(cell)).collect());
     }
     format!(
-        "robust RMSE in % of theta_0 ± its Monte-Carlo standard error (median relative error), {} sets\n{table}",
-        file.sets
+        "robust RMSE in % of theta_0 ± its Monte-Carlo standard error (median relative error), {} sets\n{}",
+        file.sets,
+        plain_table(&rows)
     )
 }
 

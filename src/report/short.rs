@@ -3,17 +3,19 @@
 /// Each path by the shortest of its ends that no other one of them has: `run1.csv`, or `a/run1.csv` beside `b/run1.csv`.
 pub(crate) fn short_names(paths: &[&str]) -> Vec<String> {
     let parts: Vec<Vec<&str>> = paths.iter().map(|path| components(path)).collect();
-    let tail = |own: &[&str], length: usize| own[own.len().saturating_sub(length)..].join("/");
-    let shortest = |own: &Vec<&str>| {
+    let tail = |parts: &[&str], length: usize| parts[parts.len().saturating_sub(length)..].join("/");
+    let shortest = |components: &Vec<&str>| {
         let is_alone = |length: &usize| {
-            let name = tail(own, *length);
-            parts.iter().all(|other| other == own || tail(other, *length) != name)
+            let name = tail(components, *length);
+            parts.iter().all(|other| other == components || tail(other, *length) != name)
         };
-        (1..own.len()).find(is_alone)
+        (1..components.len()).find(is_alone)
     };
-    let named = parts.iter().zip(paths).map(|(own, path)| (own, path, shortest(own)));
+    let named = parts.iter().zip(paths).map(|(components, path)| (components, path, shortest(components)));
     named
-        .map(|(own, path, length)| length.map_or_else(|| (*path).to_owned(), |length| tail(own, length)))
+        .map(|(components, path, length)| {
+            length.map_or_else(|| (*path).to_owned(), |length| tail(components, length))
+        })
         .collect()
 }
 

@@ -149,8 +149,9 @@ impl Smoothed {
         }
         let mut lines: Vec<String> = self.confidence.iter().map(ConfidenceRow::line).collect();
         lines.push(line);
-        let largest =
-            |of: fn(&SmoothedOutageRow) -> Option<f64>| self.outages.iter().filter_map(of).reduce(f64::max);
+        let largest = |value: fn(&SmoothedOutageRow) -> Option<f64>| {
+            self.outages.iter().filter_map(value).reduce(f64::max)
+        };
         if let (Some(before), Some(after)) =
             (largest(|o| Some(o.sigma_max_filter_m)), largest(|o| Some(o.sigma_max_m)))
         {

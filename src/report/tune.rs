@@ -88,7 +88,7 @@ impl TuneResult {
 
     /// Whether the tuned filter is honest.
     pub(super) fn is_honest(&self) -> bool {
-        self.after.ratio <= 1.0 + RIGHT && self.after.nees <= 9.0 * (1.0 + RIGHT)
+        is_honest(&self.after)
     }
 
     /// A row for each filter under a head.

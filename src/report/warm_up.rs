@@ -61,8 +61,10 @@ pub(crate) fn warm_up_in_short(
         (some, all) => format!("{some} of {all} recordings not stationary at the beginning"),
     };
     let end = if left_out { ", left out" } else { "; --skip-s auto leaves out each one's own" };
-    let late = found.iter().filter(|own| own.skip_s.is_some() && own.signals.iter().any(|(_, w)| w.late));
-    let late: Vec<&str> = late.map(|own| own.recording.as_str()).collect();
+    let late = found
+        .iter()
+        .filter(|recording| recording.skip_s.is_some() && recording.signals.iter().any(|(_, w)| w.late));
+    let late: Vec<&str> = late.map(|recording| recording.recording.as_str()).collect();
     let unsettled = match late.is_empty() {
         true => String::new(),
         false => {

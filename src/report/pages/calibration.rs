@@ -106,7 +106,7 @@ fn verdict(curves: &CurvesFile, outcomes: &[(usize, &Outcome)], diagnoses: &[Dia
             tone = Tone::Bad;
         }
         let told = fit_verdict(outcome, curves.rate_hz);
-        match found.iter_mut().find(|(own, _)| *own == told) {
+        match found.iter_mut().find(|(verdict, _)| *verdict == told) {
             Some((_, groups)) => groups.push(group_name(fitted)),
             None => found.push((told, vec![group_name(fitted)])),
         }

@@ -100,8 +100,7 @@ fn curves(designs: &[Design], value: impl Fn(&Design) -> f64) -> Vec<Series> {
         let designs_of_count = || designs.iter().filter(|d| d.recordings == count);
         let points: Vec<(f64, f64)> = designs_of_count().map(|d| (d.hours, value(d))).collect();
         let name = format!("{count} recordings");
-        let dots = points.iter().map(|(x, y)| (*x, *y, f64::NAN)).collect::<Vec<_>>();
-        [Series::line(&name, Colour::Hue(hue), points), Series::points(&name, Colour::Hue(hue), dots)]
+        Series::dotted_line(&name, Colour::Hue(hue), points)
     };
     counts(designs).into_iter().enumerate().flat_map(curve).collect()
 }

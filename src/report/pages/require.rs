@@ -81,11 +81,7 @@ fn iso_drift(points: &[(f64, Answer)]) -> Chart {
         Answer::Any | Answer::Never => None,
     };
     let line: Vec<(f64, f64)> = points.iter().filter_map(point).collect();
-    let dots: Vec<_> = line.iter().map(|(x, y)| (*x, *y, f64::NAN)).collect();
-    let series = vec![
-        Series::line("limit kept exactly", Colour::REAL, line),
-        Series::points("limit kept exactly", Colour::REAL, dots),
-    ];
+    let series = Series::dotted_line("limit kept exactly", Colour::REAL, line).into();
     let panel = Panel::new(Axis::log(ImuParameters::NAMES[0]), series);
     Chart::new("IMUs of equal drift", Axis::log(ImuParameters::NAMES[3]), vec![panel])
 }
@@ -114,15 +110,8 @@ pub(crate) fn model_page(margins: Option<&Margins>, question: &Question, bridged
     page.section("Error against the length of an outage");
     for (i, limit) in question.limits.iter().enumerate() {
         let Some(curve) = bridged.curves.get(i) else { continue };
-        let series = vec![
-            Series::new("limit", Colour::RIGHT, Mark::Level(limit.most)),
-            Series::line("this IMU", Colour::REAL, points(curve)),
-            Series::points(
-                "this IMU",
-                Colour::REAL,
-                points(curve).into_iter().map(|(x, y)| (x, y, f64::NAN)),
-            ),
-        ];
+        let mut series = vec![Series::new("limit", Colour::RIGHT, Mark::Level(limit.most))];
+        series.extend(Series::dotted_line("this IMU", Colour::REAL, points(curve)));
         page.chart(&drift_chart(limit.quantity, series), DRIFT);
     }
     page.table(&drift_table(question, bridged));

@@ -123,7 +123,8 @@ pub(super) fn budget_chart(bars: &[(String, Budget)]) -> Chart {
         let mut series: Vec<Vec<(f64, f64, f64)>> = vec![Vec::new(); named.len() + 1];
         for (x, (_, budget)) in bars.iter().enumerate() {
             let ranked = budget.ranked(states);
-            let share = |name: &str| 100.0 * ranked.iter().find(|(own, _)| *own == name).map_or(0.0, |r| r.1);
+            let share =
+                |name: &str| 100.0 * ranked.iter().find(|(source, _)| *source == name).map_or(0.0, |r| r.1);
             let mut from = 0.0;
             for (k, name) in named.iter().enumerate() {
                 series[k].push((x as f64, from, from + share(name)));
