@@ -171,7 +171,7 @@ fn place(c: usize, candidate: &Contender, winner: usize, rivals: usize, folds: &
         recording: recording.clone(),
         windows: fold.windows,
         score: fold.scores[c].clone(),
-        expected: fold.expected.as_ref().map(|of| of[c].clone()),
+        expected: fold.expected.as_ref().map(|fields| fields[c].clone()),
     };
     let coverage: Option<Vec<f64>> = scores().map(|s| s.coverage).collect();
     // where nothing is known of the difference, nothing tells them apart
@@ -194,8 +194,9 @@ fn place(c: usize, candidate: &Contender, winner: usize, rivals: usize, folds: &
 /// The RMSE over all recordings against that of the winner (%). The interval is that of the mean of what each recording adds to the
 /// logarithm of the ratio (its derivative with respect to the recording's weight).
 fn rmse_ratio_pct(c: usize, winner: usize, folds: &[(String, Fold)]) -> Mean {
-    let square = |of: usize, fold: &Fold| fold.scores[of].rmse_m.powi(2);
-    let mean = |of: usize| folds.iter().map(|(_, f)| square(of, f)).sum::<f64>() / folds.len() as f64;
+    let square = |candidate: usize, fold: &Fold| fold.scores[candidate].rmse_m.powi(2);
+    let mean =
+        |candidate: usize| folds.iter().map(|(_, f)| square(candidate, f)).sum::<f64>() / folds.len() as f64;
     let (own, best) = (mean(c), mean(winner));
     let added = |(_, f): &(String, Fold)| 0.5 * (square(c, f) / own - square(winner, f) / best);
     let spread = interval(&folds.iter().map(added).collect::<Vec<_>>(), 0.05);

@@ -54,9 +54,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         match check(path, args.rate_hz, session) {
             Ok(found) if session.json() => checked.push(Checked { file, ok: true, found }),
             Ok(found) => {
-                session.printer.result(&format!("{file}: {found}"));
+                session.result(format!("{file}: {found}"));
                 if args.dry_run {
-                    resolved(path)?.into_iter().for_each(|text| session.printer.result(text.trim_end()));
+                    resolved(path)?.into_iter().for_each(|text| session.result(text.trim_end()));
                 }
             }
             Err(failure) => {
@@ -66,7 +66,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         }
     }
     if session.json() {
-        session.printer.result(crate::report::json(&checked).trim_end());
+        session.result(crate::report::json(&checked).trim_end());
     }
     let (Some(last), wrong, all) = (failures.pop(), failures.len() + 1, args.files.len()) else {
         return Ok(());

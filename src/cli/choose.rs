@@ -3,7 +3,7 @@
 use super::jobs::unknown_model;
 use super::pictures::PlotArgs;
 use super::recordings::{RecordingArgs, Said};
-use super::run::{OutageArg, Words, parse_outage, scenario_with};
+use super::run::{OutageArg, Words, checked_scenario, parse_outage, placed};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
 use crate::choose::{Candidate, Inflation};
@@ -81,9 +81,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let candidates = candidates(args)?;
     let inputs = args.inputs.iter().chain([&args.trajectory]).chain(&args.scenario).map(PathBuf::as_path);
     let _own = jobs::claim_choice(&args.out, inputs, session.existing())?;
-    let _picture =
-        args.plot.claim(&args.inputs.iter().chain([&args.trajectory]).cloned().collect::<Vec<_>>())?;
-    let scenario = scenario(args)?;
+    let _picture = args.plot.claim(args.inputs.iter().chain([&args.trajectory]))?;
+    let scenario = checked_scenario(args.scenario.as_deref(), &args.outages)?;
     let trajectory = read::trajectory(&args.trajectory, session)?;
     let seed = session.seed(scenario.run.seed);
     let outages = outages(&scenario, (trajectory.start_s(), trajectory.end_s()), seed, session)?;
@@ -117,7 +116,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     chosen.write(&args.out, &args.trajectory, note, &report)?;
     session.show(|| report.json(), || text(&report, session));
     args.plot.write(|| choice_page(&report).svg(), session)?;
-    session.printer.say(&format!(
+    session.say(format!(
         "wrote {0}: report.html, ranking.json, model.toml (nav-sim export {0}/model.toml)",
         args.out.display()
     ));
@@ -166,23 +165,16 @@ fn candidates(args: &Args) -> Result<Vec<Candidate>, Failure> {
         .hint("add awv, sr-awv or dr-awv to --estimator"))
 }
 
-fn scenario(args: &Args) -> Result<Scenario, Failure> {
-    let scenario = scenario_with(args.scenario.as_deref(), &args.outages)?;
-    scenario.validate().map_err(Failure::input)?;
-    Ok(scenario)
-}
-
 fn outages(
     scenario: &Scenario,
     span_s: (f64, f64),
     seed: u64,
     session: &Session,
 ) -> Result<Vec<Outage>, Failure> {
-    let placed = scenario.outages_on(span_s, seed)?;
-    placed.remarks.iter().for_each(|remark| session.printer.warn(&remark.to_string()));
-    if placed.windows.is_empty() {
+    let outages = placed(scenario, span_s, seed, session)?;
+    if outages.is_empty() {
         return Err(Failure::input("there is no outage, and candidates are judged at the ends of outages")
             .hint("give one with --outage START:END"));
     }
-    Ok(placed.windows)
+    Ok(outages)
 }

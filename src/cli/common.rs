@@ -2,6 +2,7 @@
 
 use super::{Failure, Printer, Progress};
 use crate::formats::atomic::{self, Existing};
+use std::fmt::Display;
 use std::path::Path;
 use std::sync::OnceLock;
 
@@ -88,6 +89,31 @@ impl Session {
         self.printer.result(shown.trim_end());
     }
 
+    /// Puts a result to stdout.
+    pub(crate) fn result(&self, text: impl Display) {
+        self.printer.result(&text.to_string());
+    }
+
+    /// Says what is done.
+    pub(crate) fn say(&self, text: impl Display) {
+        self.printer.say(&text.to_string());
+    }
+
+    /// Says what is worth knowing to those who ask for more.
+    pub(crate) fn detail(&self, text: impl Display) {
+        self.printer.detail(&text.to_string());
+    }
+
+    /// Warns.
+    pub(crate) fn warn(&self, text: impl Display) {
+        self.printer.warn(&text.to_string());
+    }
+
+    /// Warns of each.
+    pub(crate) fn warn_all<T: Display>(&self, texts: impl IntoIterator<Item = T>) {
+        texts.into_iter().for_each(|text| self.warn(text));
+    }
+
     /// Writes a result as a file, and says so.
     pub(crate) fn write(&self, path: &Path, contents: impl AsRef<[u8]>) -> Result<(), Failure> {
         atomic::write_result(path, contents, self.existing())?;
@@ -97,7 +123,7 @@ impl Session {
 
     /// Says that a file or a directory was written.
     pub(crate) fn wrote(&self, path: &Path) {
-        self.printer.say(&format!("wrote {}", path.display()));
+        self.say(format!("wrote {}", path.display()));
     }
 
     /// Whether stdout gets JSON rather than text.
@@ -130,7 +156,7 @@ impl Session {
         let draw = || {
             // 53 bits, so that it survives JSON readers that know doubles only
             let seed = rand::random::<u64>() >> 11;
-            self.printer.say(&format!("seed {seed} (drawn; repeat with --seed {seed})"));
+            self.say(format!("seed {seed} (drawn; repeat with --seed {seed})"));
             seed
         };
         self.common.seed.or(of_file).unwrap_or_else(|| *self.drawn.get_or_init(draw))

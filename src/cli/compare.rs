@@ -70,7 +70,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     atomic::write(&page, compared.page(&[]))?;
     args.plot.write(|| compared.shown().svg(), session)?;
     session.show(|| json, || args.table.map_or_else(|| compared.text(), |form| compared.table(form)));
-    session.printer.say(&format!("wrote {}, {}", out.display(), page.display()));
+    session.say(format!("wrote {}, {}", out.display(), page.display()));
     Ok(())
 }
 
@@ -89,7 +89,7 @@ impl Compared {
     pub(super) fn new(args: &Args, session: &Session) -> Result<Self, Failure> {
         let states = states(&args.states)?;
         let found = jobs::compare(&args.runs, &args.reference)?;
-        found.doubts.iter().for_each(|doubt| session.printer.warn(doubt));
+        session.warn_all(&found.doubts);
         Ok(Self { found, states })
     }
 

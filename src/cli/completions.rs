@@ -18,6 +18,6 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut super::command(), "nav-sim", &mut script);
-    session.printer.result(String::from_utf8_lossy(&script).trim_end());
+    session.result(String::from_utf8_lossy(&script).trim_end());
     Ok(())
 }

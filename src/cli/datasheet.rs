@@ -1,9 +1,10 @@
 //! `nav-sim datasheet`: a datasheet's figures → a model file.
 
+use super::pictures::claim_output;
 use super::{Failure, Session, parse};
 use crate::formats::datasheet::{self, CATALOGUE, Datasheet, Entry, Figure, Quantity};
+use crate::formats::model_file;
 use crate::formats::suggest::nearest;
-use crate::formats::{atomic, model_file};
 use crate::jobs;
 use nav_sim_signal::imu::Sensor;
 use std::path::PathBuf;
@@ -124,11 +125,10 @@ impl Figures {
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if args.list {
         let listed = if session.json() { jobs::catalogue_json()? } else { jobs::catalogue_text()? };
-        session.printer.result(listed.trim_end());
+        session.result(listed.trim_end());
         return Ok(());
     }
-    let claim = |out: &PathBuf| atomic::claim_file(out, args.entry.as_deref());
-    let _own = args.out.as_ref().map(claim).transpose()?;
+    let _own = claim_output(args.out.as_deref(), &args.entry)?;
     let mut sheet = match (&args.entry, &args.unit) {
         (Some(path), _) => datasheet::read(path)?,
         (None, Some(name)) => named(name)?,
@@ -143,17 +143,17 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     for sensor in Sensor::ALL {
         doubt(&sheet, sensor, session);
     }
-    made.doubts.iter().for_each(|doubt| session.printer.warn(doubt));
+    session.warn_all(&made.doubts);
     let Some(out) = &args.out else {
         let toml = model_file::to_toml(&made.file);
-        session.printer.result(&if session.json() { as_json(&toml)? } else { toml.trim_end().to_owned() });
+        session.result(&if session.json() { as_json(&toml)? } else { toml.trim_end().to_owned() });
         return Ok(());
     };
     model_file::write(out, &made.file, session.existing())?;
     if session.json() {
-        session.printer.result(&as_json(&model_file::to_toml(&made.file))?);
+        session.result(&as_json(&model_file::to_toml(&made.file))?);
     }
-    session.printer.say(&format!("wrote {}: an assumption, not a calibration", out.display()));
+    session.say(format!("wrote {}: an assumption, not a calibration", out.display()));
     Ok(())
 }
 
@@ -168,15 +168,14 @@ fn doubt(sheet: &Datasheet, sensor: Sensor, session: &Session) {
     let name = sensor.name();
     let flag = if sensor == Sensor::Accel { "--vrw" } else { "--arw" };
     if sheet.value(sensor, Figure::Noise).is_none() {
-        session.printer.warn(&format!("{name}: no white noise is given ({flag}): the model has none"));
+        session.warn(format!("{name}: no white noise is given ({flag}): the model has none"));
     }
     if sheet.value(sensor, Figure::Bias).is_none() {
         session
-            .printer
-            .warn(&format!("{name}: no bias instability is given (--{name}-bias): the bias does not wander"));
+            .warn(format!("{name}: no bias instability is given (--{name}-bias): the bias does not wander"));
     }
     if let Some(ppm) = sheet.value(sensor, Figure::Scale) {
-        session.printer.say(&format!(
+        session.say(format!(
             "{name}: a scale factor of {ppm} ppm is not noise; the filter expects it with `run --scale-ppm`, the true \
              IMU has it with [imu] scale_ppm_{name} of a scenario"
         ));

@@ -62,7 +62,7 @@ impl Progress {
         let path = Self::path(&args.out);
         let begun: Option<Self> =
             std::fs::read_to_string(&path).ok().and_then(|text| serde_json::from_str(&text).ok());
-        let seed = begun.as_ref().map(|own| own.seed);
+        let seed = begun.as_ref().map(|progress| progress.seed);
         let seed = session.asked_seed().or(seed).unwrap_or_else(|| session.seed(None));
         let new = Self {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -96,7 +96,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if args.print {
         let commands = commands(args, session.seed(None));
         let lines: Vec<String> = commands.iter().map(|c| typed(c)).collect();
-        session.printer.result(&lines.join("\n"));
+        session.result(lines.join("\n"));
         return Ok(());
     }
     refuse_the_impossible(args, session)?;
@@ -109,11 +109,11 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if done > 0 {
         let told =
             format!("{}: {done} of {} commands are done, seed {}", args.out, commands.len(), progress.seed);
-        session.printer.say(&told);
+        session.say(&told);
     }
     progress.write(&args.out)?;
     for (i, command) in commands.iter().enumerate().skip(done) {
-        session.printer.say(&format!("$ {}", typed(command)));
+        session.say(format!("$ {}", typed(command)));
         let words = std::iter::once("nav-sim").chain(command.iter().map(String::as_str));
         let cli = Cli::try_parse_from(words).map_err(Failure::input)?;
         let inner = session.within(&cli.common, i < last);
@@ -126,7 +126,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         progress.commands_done = i + 1;
         progress.write(&args.out)?;
     }
-    session.printer.say(&format!("all results on one page: {}", page(&args.out).display()));
+    session.say(format!("all results on one page: {}", page(&args.out).display()));
     Ok(())
 }
 
@@ -201,7 +201,7 @@ fn figures(compared: &Compared, out: &str, session: &Session) -> Result<(), Fail
         atomic::write(&directory.join(figure.file_name()), figure.svg())?;
     }
     atomic::write(&directory.join("index.html"), paper_page(&figures))?;
-    session.printer.say(&format!("the paper's figures: {}", directory.display()));
+    session.say(format!("the paper's figures: {}", directory.display()));
     Ok(())
 }
 

@@ -65,8 +65,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if args.hours.is_some_and(|hours| hours > LONGEST_H) {
         return Err(Failure::input("--hours: longer than a year"));
     }
-    let inputs: Vec<PathBuf> = std::iter::once(&args.model).chain(&args.trajectory).cloned().collect();
-    let _pictures = args.pictures.claim(&inputs)?;
+    let _pictures = args.pictures.claim(std::iter::once(&args.model).chain(&args.trajectory))?;
     let file = read::model(&args.model, session)?;
     let mut scenario = scenario(args)?;
     let mut navigation = None;

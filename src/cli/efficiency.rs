@@ -51,7 +51,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut directory = study.open(&args.out)?;
     let done = directory.done.len() as u64;
     if done > 0 {
-        session.printer.say(&format!("{done} sets are there already"));
+        session.say(format!("{done} sets are there already"));
     }
     let progress = session.progress("sets", sets.saturating_sub(done));
     // Long enough that no thread waits for the last set of a block for a large part of it.
@@ -72,6 +72,6 @@ fn write(out: &Path, results: &EfficiencyFile, session: &Session) -> Result<(), 
     atomic::write(&out.join("results.json"), &json)?;
     atomic::write(&out.join("rmse.svg"), report::efficiency_svg(results))?;
     atomic::write(&out.join("report.html"), report::efficiency_page(results))?;
-    session.printer.result(if session.json() { json.trim_end() } else { &table });
+    session.result(if session.json() { json.trim_end() } else { &table });
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! `nav-sim export`: a noise model as the parameters of other programs.
 
 use super::parse::one_of;
+use super::pictures::claim_output;
 use super::{Failure, Session};
 use crate::export::{Export, ExportError, Settings, Target};
 use crate::formats::atomic;
@@ -54,8 +55,7 @@ fn horizon(text: &str) -> Result<Horizon, String> {
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let file = model_file::read(&args.model)?;
     let shown = args.model.display().to_string();
-    let claim = |out: &PathBuf| atomic::claim_file(out, [args.model.as_path()]);
-    let _own = args.out.as_ref().map(claim).transpose()?;
+    let _own = claim_output(args.out.as_deref(), [&args.model])?;
     let turn_on = file.turn_on.unwrap_or_default();
     let settings = Settings {
         policy: args.policy,
@@ -70,18 +70,18 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         atomic::write_result(out, text.clone() + "\n", session.existing())?;
     }
     for line in export.summary() {
-        session.printer.say(&line);
+        session.say(&line);
     }
     for doubt in export.doubts() {
-        session.printer.warn(&doubt);
+        session.warn(&doubt);
     }
     if args.certify {
         certificate(&export, &file, session)?;
     }
     match &args.out {
-        _ if session.json() => session.printer.result(report::json(&export.json(&shown)).trim_end()),
-        Some(out) => session.printer.result(&format!("{}: {}", out.display(), args.target.name())),
-        None => session.printer.result(&text),
+        _ if session.json() => session.result(report::json(&export.json(&shown)).trim_end()),
+        Some(out) => session.result(format!("{}: {}", out.display(), args.target.name())),
+        None => session.result(&text),
     }
     Ok(())
 }
@@ -101,11 +101,11 @@ fn certificate(export: &Export, file: &ModelFile, session: &Session) -> Result<(
         let all = certificate.scales.len();
         let outside = certificate.scales.iter().filter(|s| !s.inside).count();
         match certificate.worst() {
-            None => session.printer.say(&format!(
+            None => session.say(format!(
                 "{name}: certified: the model lies within the 95 % band of {made} of the exported pair at all {all} \
                  scales of the horizon"
             )),
-            Some(worst) => session.printer.warn(&format!(
+            Some(worst) => session.warn(format!(
                 "{name}: not certified: the model lies outside the 95 % band of {made} of the exported pair at {outside} of \
                  {all} scales of the horizon, most over averages of {}: {:.2} times their Allan deviation",
                 duration(worst.average_s),

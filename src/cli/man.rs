@@ -22,7 +22,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         Some(name) => subcommand(root, name)?,
     };
     clap_mangen::Man::new(of_command).render(&mut page).map_err(Failure::could_not)?;
-    session.printer.result(String::from_utf8_lossy(&page).trim_end());
+    session.result(String::from_utf8_lossy(&page).trim_end());
     Ok(())
 }
 

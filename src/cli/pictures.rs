@@ -15,7 +15,10 @@ pub(super) struct PlotArgs {
 
 impl PlotArgs {
     /// Claims the picture; refuses one that is an input or cannot be made, or of another form.
-    pub(super) fn claim(&self, inputs: &[PathBuf]) -> Result<Option<Claim>, Failure> {
+    pub(super) fn claim(
+        &self,
+        inputs: impl IntoIterator<Item: AsRef<Path>>,
+    ) -> Result<Option<Claim>, Failure> {
         self.plot.as_deref().map(|path| claim_picture(path, inputs)).transpose()
     }
 
@@ -41,8 +44,11 @@ pub(super) struct PageArgs {
 
 impl PageArgs {
     /// Claims page and picture; refuses what is an input or cannot be made, and a picture of another form.
-    pub(super) fn claim(&self, inputs: &[PathBuf]) -> Result<[Option<Claim>; 2], Failure> {
-        let page = self.page.as_deref().map(|page| claim_own(page, inputs)).transpose()?;
+    pub(super) fn claim(
+        &self,
+        inputs: impl IntoIterator<Item: AsRef<Path>> + Clone,
+    ) -> Result<[Option<Claim>; 2], Failure> {
+        let page = claim_output(self.page.as_deref(), inputs.clone())?;
         Ok([page, self.plot.claim(inputs)?])
     }
 
@@ -58,13 +64,25 @@ impl PageArgs {
 }
 
 /// Claims a picture before the work; refuses one of another form.
-pub(super) fn claim_picture(path: &Path, inputs: &[PathBuf]) -> Result<Claim, Failure> {
+pub(super) fn claim_picture(
+    path: &Path,
+    inputs: impl IntoIterator<Item: AsRef<Path>>,
+) -> Result<Claim, Failure> {
     form(path)?;
     claim_own(path, inputs)
 }
 
-fn claim_own(path: &Path, inputs: &[PathBuf]) -> Result<Claim, Failure> {
-    Ok(atomic::claim_file(path, inputs.iter().map(PathBuf::as_path))?)
+fn claim_own(path: &Path, inputs: impl IntoIterator<Item: AsRef<Path>>) -> Result<Claim, Failure> {
+    let inputs: Vec<_> = inputs.into_iter().collect();
+    Ok(atomic::claim_file(path, inputs.iter().map(AsRef::as_ref))?)
+}
+
+/// Claims an output that is written where it is named; refuses one that is an input.
+pub(super) fn claim_output(
+    path: Option<&Path>,
+    inputs: impl IntoIterator<Item: AsRef<Path>>,
+) -> Result<Option<Claim>, Failure> {
+    path.map(|path| claim_own(path, inputs)).transpose()
 }
 
 /// The form of a picture, by its name.

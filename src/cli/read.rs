@@ -65,9 +65,7 @@ pub(super) fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
 pub(super) fn trajectory(path: &Path, session: &Session) -> Result<Trajectory, Failure> {
     let (trajectory, warnings) =
         trajectory_file::load(path, &trajectory_file::Options::default()).map_err(without_options)?;
-    for warning in warnings {
-        session.printer.warn(&warning.to_string());
-    }
+    session.warn_all(warnings);
     implausible(path, &trajectory, session);
     Ok(trajectory)
 }
@@ -82,9 +80,7 @@ fn implausible(path: &Path, trajectory: &Trajectory, session: &Session) {
             0 => String::new(),
             n => format!(", and {n} more such stretches"),
         };
-        session
-            .printer
-            .warn(&format!("{shown}: {worst}{more} (nav-sim trajectory check {shown} lists them)"));
+        session.warn(format!("{shown}: {worst}{more} (nav-sim trajectory check {shown} lists them)"));
     }
 }
 
@@ -92,16 +88,14 @@ fn implausible(path: &Path, trajectory: &Trajectory, session: &Session) {
 pub(super) fn reference(path: &Path, session: &Session) -> Result<Reference, Failure> {
     let (reference, warnings) = trajectory_file::load_reference(path, &trajectory_file::Options::default())
         .map_err(without_options)?;
-    for warning in warnings {
-        session.printer.warn(&warning.to_string());
-    }
+    session.warn_all(warnings);
     Ok(reference)
 }
 
 /// A model; axes that it does not name are said.
 pub(super) fn model(path: &Path, session: &Session) -> Result<ModelFile, Failure> {
     let file = model_file::read(path)?;
-    file.doubts(path).iter().for_each(|doubt| session.printer.warn(doubt));
+    session.warn_all(file.doubts(path));
     Ok(file)
 }
 
@@ -113,7 +107,7 @@ pub(super) fn at_rate(path: &Path, model: &Model, imu_hz: f64, session: &Session
         Failure::input(format!("{shown}: {e}")).hint(hint)
     })?;
     if !continuous::same_rate(from_hz, imu_hz) {
-        session.printer.say(&format!("{shown}: converted from {from_hz} Hz to {imu_hz} Hz"));
+        session.say(format!("{shown}: converted from {from_hz} Hz to {imu_hz} Hz"));
     }
     Ok(converted)
 }
@@ -134,9 +128,9 @@ pub(super) fn recordings_at(
     };
     let (recordings, report) = recordings::read(paths, &ReadOptions { rate_hz, ..ReadOptions::default() })
         .map_err(|e| Failure::of_file(&e, hint))?;
-    report.doubts().iter().for_each(|doubt| session.printer.warn(doubt));
+    session.warn_all(report.doubts());
     for file in &report.files {
-        session.printer.detail(&file.to_string());
+        session.detail(file);
     }
     Ok(recordings)
 }

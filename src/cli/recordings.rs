@@ -145,8 +145,10 @@ impl<'a> Said<'a> {
 
     /// `; 262 s of them are used`, of recordings whose beginning is left out.
     fn used(&self, found: &[BeginsOtherwise]) -> String {
-        let length = |name: &str| self.lengths.iter().find(|(own, _)| own == name).map(|(_, s)| *s);
-        let used = found.iter().filter_map(|own| Some(length(&own.recording)? - own.skip_s?));
+        let length =
+            |name: &str| self.lengths.iter().find(|(recording, _)| recording == name).map(|(_, s)| *s);
+        let used =
+            found.iter().filter_map(|recording| Some(length(&recording.recording)? - recording.skip_s?));
         let (low, high) = used.fold((f64::INFINITY, 0.0_f64), |(low, high), s| (low.min(s), high.max(s)));
         match high - low {
             _ if high == 0.0 => String::new(),
@@ -170,13 +172,13 @@ impl Remarks for Said<'_> {
             Remark::Read(report) => self.report(report),
             Remark::WarmUp { found, recordings, left_out, rate_hz } => {
                 for line in warm_up_lines(found, rate_hz) {
-                    self.session.printer.detail(&line);
+                    self.session.detail(&line);
                 }
                 let used = if left_out { self.used(found) } else { String::new() };
                 let short = warm_up_in_short(found, recordings, left_out, rate_hz);
-                self.session.printer.warn(&format!("{short}{used}"));
+                self.session.warn(format!("{short}{used}"));
             }
-            Remark::Shortest { recording, samples, scales, short: 0, usual, .. } => self.session.printer.warn(&format!(
+            Remark::Shortest { recording, samples, scales, short: 0, usual, .. } => self.session.warn(format!(
                 "{recording}: its {samples} samples limit all recordings to {scales} scales; without it there would be \
                  more (half of them have {usual}): leave it out for those"
             )),
@@ -185,7 +187,7 @@ impl Remarks for Said<'_> {
                     1 => String::new(),
                     _ => format!(" ({} more are short)", short - 1),
                 };
-                self.session.printer.warn(&format!(
+                self.session.warn(format!(
                     "{recording}: its {samples} samples have {scales} scales{others}; the longer ones, up to {used} scales, are \
                      averaged over the longer recordings alone"
                 ));

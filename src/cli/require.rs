@@ -1,8 +1,7 @@
 //! `nav-sim require`: which IMU a limit needs, and what a given one makes of it.
 
-use super::pictures::PageArgs;
+use super::pictures::{PageArgs, claim_output};
 use super::{Failure, Session, parse, read, turn_on};
-use crate::formats::atomic::claim_file;
 use crate::formats::datasheet::{self, CATALOGUE, Datasheet};
 use crate::formats::file_kind::{self, FileKind};
 use crate::formats::model_file;
@@ -141,8 +140,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             Failure::input("--outage longest needs a MODEL").hint("without one, give a length in seconds")
         );
     }
-    let inputs: Vec<PathBuf> = std::iter::once(&args.trajectory).chain(&args.model).cloned().collect();
-    let _pictures = args.pictures.claim(&inputs)?;
+    let _pictures = args.pictures.claim(std::iter::once(&args.trajectory).chain(&args.model))?;
     let asked = requirements(args, session)?;
     match (&args.model, &args.catalogue) {
         (Some(path), _) => given(path, args, &asked, session),
@@ -153,8 +151,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 /// The IMU that is needed.
 fn sought(args: &Args, requirements: &Requirements, session: &Session) -> Result<(), Failure> {
-    let claim = |out: &PathBuf| claim_file(out, [args.trajectory.as_path()]);
-    let _own = args.out.as_ref().map(claim).transpose()?;
+    let _own = claim_output(args.out.as_deref(), [&args.trajectory])?;
     let (needed, question) = requirements.needed(args.corr_time_s, args.iso_drift).map_err(|e| {
         Failure::input(e)
             .hint("a larger limit, a shorter outage, or a better receiver ([gnss] of --scenario)")
@@ -217,9 +214,7 @@ fn ranked(
     session.show(|| words::catalogue_json(&units, &question), text);
     args.pictures.write(|| catalogue_page(&units, &question), session)?;
     if units.iter().any(|unit| !unit.not_stated.is_empty()) {
-        session
-            .printer
-            .warn("figures that are not stated count as none: such a unit looks better than it is (open)");
+        session.warn("figures that are not stated count as none: such a unit looks better than it is (open)");
     }
     if units.iter().any(RankedUnit::is_met) {
         return Ok(());

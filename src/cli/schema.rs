@@ -41,7 +41,7 @@ enum Kind {
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    session.printer.result(crate::report::json(&schema(args.of)).trim_end());
+    session.result(crate::report::json(&schema(args.of)).trim_end());
     Ok(())
 }
 

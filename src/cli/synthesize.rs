@@ -85,7 +85,7 @@ fn synthesis(args: &Args, session: &Session) -> Result<Synthesis, Failure> {
         return Err(Failure::input(format!("{shown}: no [spread] to draw parameters from")).hint(hint));
     }
     if file.turn_on.is_some() {
-        session.printer.say(&format!(
+        session.say(format!(
             "{shown}: its turn-on biases are not drawn: recordings are of noise about their mean"
         ));
     }
@@ -121,18 +121,16 @@ fn synthesis(args: &Args, session: &Session) -> Result<Synthesis, Failure> {
 /// The channels to make: those asked for that the model has.
 fn wanted(args: &Args, file: &ModelFile, session: &Session) -> Result<Vec<Channel>, Failure> {
     let asked = |c: &Channel| args.axes.iter().any(|set| set.0.contains(c));
-    let (missing, there): (Vec<Channel>, Vec<Channel>) =
+    let (missing, present): (Vec<Channel>, Vec<Channel>) =
         Channel::ALL.into_iter().filter(asked).partition(|c| file.missing.contains(c));
     let shown = args.model.display();
-    if there.is_empty() {
+    if present.is_empty() {
         return Err(Failure::input(format!("{shown} has no noise model for the axes asked for")));
     }
     for channel in missing {
-        session
-            .printer
-            .warn(&format!("{shown} has no noise model for {channel}; no signal is written for that axis"));
+        session.warn(format!("{shown} has no noise model for {channel}; no signal is written for that axis"));
     }
-    Ok(there)
+    Ok(present)
 }
 
 /// Refuses a contamination that touches nothing of what is made: the replicates would be clean by another name. Says
@@ -155,7 +153,7 @@ fn reaches(
     let Some(Rule { sensor, place, .. }) = rules.iter().find(|rule| !made(rule)) else { return Ok(()) };
     let message = format!("{place}: corrupts the {}, which is not made", sensor.name());
     if rules.iter().any(made) {
-        session.printer.detail(&message);
+        session.detail(&message);
         return Ok(());
     }
     Err(Failure::input(message).hint("another contamination, or --axes with that sensor"))

@@ -1,10 +1,9 @@
 //! `nav-sim tune`: honest inflation of a noise model.
 
 use super::parse::one_of;
-use super::pictures::PageArgs;
-use super::run::{OutageArg, parse_outage, scenario_with};
+use super::pictures::{PageArgs, claim_output};
+use super::run::{OutageArg, checked_scenario, parse_outage, placed};
 use super::{Failure, Session, read, turn_on};
-use crate::formats::atomic::claim_file;
 use crate::formats::model_file::{self, ModelFile};
 use crate::jobs::{self, TuneInputs};
 use crate::report::{Input, markdown_table, tune_page};
@@ -72,11 +71,10 @@ const DAY_S: f64 = 86_400.0;
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     refuse_recordings(args)?;
-    let mut scenario = scenario(args)?;
+    let mut scenario = checked_scenario(args.scenario.as_deref(), &args.outages)?;
     let files = files(args)?;
-    let _pictures = args.pictures.claim(&files.iter().map(|f| PathBuf::from(&f.path)).collect::<Vec<_>>())?;
-    let claim = |out: &PathBuf| claim_file(out, files.iter().map(|f| Path::new(&f.path)));
-    let _own = args.out.as_ref().map(claim).transpose()?;
+    let _pictures = args.pictures.claim(files.iter().map(|f| &f.path))?;
+    let _own = claim_output(args.out.as_deref(), files.iter().map(|f| &f.path))?;
     let file = read::model(&args.model, session)?;
     let model = read::at_rate(&args.model, &file.model, scenario.imu.rate_hz, session)?;
     turn_on::expect(&mut scenario.initial, &file, &args.model, session);
@@ -124,12 +122,6 @@ fn refuse_recordings(args: &Args) -> Result<(), Failure> {
     }
 }
 
-fn scenario(args: &Args) -> Result<Scenario, Failure> {
-    let scenario = scenario_with(args.scenario.as_deref(), &args.outages)?;
-    scenario.validate().map_err(Failure::input)?;
-    Ok(scenario)
-}
-
 fn files(args: &Args) -> Result<Vec<Input>, Failure> {
     let mut named = vec![("model", &args.model)];
     named.extend(args.truths.iter().map(|p| ("truth", p)));
@@ -175,13 +167,11 @@ fn track(
         let track = drive(model, &scenario.gnss, &lengths).ok_or_else(|| {
             Failure::input("no built-in drive for this receiver").hint("give a trajectory with --trajectory")
         })?;
-        session.printer.say("along a built-in drive with outages as long; --trajectory takes another");
+        session.say("along a built-in drive with outages as long; --trajectory takes another");
         return Ok((track, outages));
     };
     let trajectory = read::trajectory(path, session)?;
-    let placed = scenario.outages_on((trajectory.start_s(), trajectory.end_s()), seed)?;
-    placed.remarks.iter().for_each(|remark| session.printer.warn(&remark.to_string()));
-    let outages = placed.windows;
+    let outages = placed(scenario, (trajectory.start_s(), trajectory.end_s()), seed, session)?;
     let track = scenario.track(&trajectory, model, &outages).map_err(Failure::input)?;
     Ok((track, outages))
 }

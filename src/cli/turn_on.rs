@@ -24,6 +24,6 @@ fn say(who: &str, set: &[(Sensor, f64)], path: &Path, session: &Session) {
         let (shown, sigma) = (path.display(), readable(*sigma));
         let (name, unit) = (sensor.name(), sensor.unit());
         let message = format!("{shown}: {who} a turn-on bias of {sigma} {unit} ({name}, standard deviation)");
-        session.printer.say(&message);
+        session.say(&message);
     }
 }

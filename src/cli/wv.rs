@@ -1,11 +1,10 @@
 //! `nav-sim wv`: wavelet variance of static recordings.
 
 use super::parse::words;
-use super::pictures::PageArgs;
+use super::pictures::{PageArgs, claim_output};
 use super::recordings::{RecordingArgs, Said};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
-use crate::formats::atomic;
 use crate::jobs::{self, Intervals, WaveletOptions};
 use crate::report::{self, SignalCurves, SignalsFile};
 use std::path::PathBuf;
@@ -49,8 +48,7 @@ const INTERVALS: [(&str, &str); 2] = [
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let tuning = args.tuning.tuning()?;
     let inputs = read::listed(&args.files)?;
-    let claim = |out: &PathBuf| atomic::claim_file(out, inputs.iter().map(PathBuf::as_path));
-    let _own = args.out.as_ref().map(claim).transpose()?;
+    let _own = claim_output(args.out.as_deref(), &inputs)?;
     let _pictures = args.pictures.claim(&inputs)?;
     let intervals = args.intervals;
     let options = WaveletOptions {
@@ -71,9 +69,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         () if session.verbose() => all_scales(&file, &report::intervals_note(intervals.name(), &tuning)),
         () => digest(&file),
     };
-    session.printer.result(&text);
+    session.result(&text);
     if args.chart && !session.json() {
-        session.printer.result(&report::wavelet_text(&file));
+        session.result(report::wavelet_text(&file));
     }
     written.and(drawn)
 }

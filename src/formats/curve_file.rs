@@ -63,7 +63,7 @@ fn csv(path: &str, text: &str) -> Result<NamedCurve, FileError> {
     let columns = table.named(["tau_samples", "wv", "edof"])?;
     let mut curve = Curve::default();
     for (line, row) in &table.rows {
-        push(&mut curve, path, &Place::Line(*line), columns.map(|at| row[at]))?;
+        push(&mut curve, path, &Place::Line(*line), columns.map(|column| row[column]))?;
     }
     Ok(NamedCurve { sensor: None, axis: None, rate_hz: None, estimator: None, curve })
 }

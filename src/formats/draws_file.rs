@@ -103,7 +103,10 @@ impl DrawsFile {
             Some(SignalDraws {
                 signals: outcome.scope.name(),
                 stretch: inference.stretch,
-                parameters: composite.parameters().map(|(of, _)| composite.name_of(of)).collect(),
+                parameters: composite
+                    .parameters()
+                    .map(|(parameter, _)| composite.name_of(parameter))
+                    .collect(),
                 estimate: values(composite),
                 draws: inference.drawn.iter().map(values).collect(),
             })

@@ -30,7 +30,7 @@ fn epochs(table: &Table) -> Result<Vec<EpochRow>, FileError> {
     let columns: Vec<usize> = asee.iter().chain(&rmse).copied().chain([nees, coverage]).collect();
     let epoch = |(line, row): &(u64, Vec<f64>)| {
         finite_or_lost(table, *line, row, &columns)?;
-        let [asee, rmse] = [asee, rmse].map(|columns| columns.map(|at| row[at]));
+        let [asee, rmse] = [asee, rmse].map(|columns| columns.map(|column| row[column]));
         Ok(EpochRow { t_s: row[t_s], asee, rmse, nees: row[nees], coverage: row[coverage] })
     };
     table.rows.iter().map(epoch).collect()
@@ -55,12 +55,12 @@ fn runs(table: &Table) -> Result<Vec<RunRecord>, FileError> {
                 rejected: 0, // known to the summary only
                 nees_mean: row[nees],
                 covered: row[coverage],
-                normalised_sq: normalised.map(|at| row[at]),
+                normalised_sq: normalised.map(|column| row[column]),
                 horizontal_m: Vec::new(), // its quantiles are in fan.csv
             });
         }
         let Some(last) = runs.last_mut().filter(|_| !row[outage].is_nan()) else { continue };
-        let [see_mean, see_end, error_end] = ends.map(|columns| columns.map(|at| row[at]));
+        let [see_mean, see_end, error_end] = ends.map(|columns| columns.map(|column| row[column]));
         last.outages.push(OutageRecord {
             see_mean,
             see_end,
@@ -80,9 +80,11 @@ fn states(table: &Table, prefix: &str) -> Result<[usize; REPORTED], FileError> {
 
 /// Refuses a row of an epoch in which some values are finite and others not. Where no run is left, all are NaN.
 fn finite_or_lost(table: &Table, line: u64, row: &[f64], columns: &[usize]) -> Result<(), FileError> {
-    let is_lost = columns.iter().all(|at| row[*at].is_nan());
-    match columns.iter().find(|at| !row[**at].is_finite()) {
-        Some(at) if !is_lost => Err(table.cell(line, *at, &row[*at].to_string(), "is not finite")),
+    let is_lost = columns.iter().all(|column| row[*column].is_nan());
+    match columns.iter().find(|column| !row[**column].is_finite()) {
+        Some(column) if !is_lost => {
+            Err(table.cell(line, *column, &row[*column].to_string(), "is not finite"))
+        }
         _ => Ok(()),
     }
 }

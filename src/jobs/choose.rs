@@ -77,7 +77,8 @@ pub fn choose(
     let rate_hz = laboratory.rate_hz();
     let ChoiceDrive { trajectory, scenario, outages, seed, runs } = drive;
     let drive = Drive::new(&trajectory, scenario, outages, rate_hz, seed).map_err(ChoiceError::from)?;
-    let runs: Vec<u64> = samples.iter().map(|own| runs.unwrap_or_else(|| runs_on(&drive, *own))).collect();
+    let runs: Vec<u64> =
+        samples.iter().map(|count| runs.unwrap_or_else(|| runs_on(&drive, *count))).collect();
     observer.begin(runs.iter().sum());
     let mut folds: Vec<(String, Fold)> = Vec::new();
     for (k, file) in files.iter().enumerate() {
@@ -121,7 +122,11 @@ fn units(measured: &Measured) -> Vec<Unit> {
 /// Samples of a recording that were measured: a warm-up that is left out is not among them.
 fn samples_in(unit: &Unit) -> usize {
     let of_channel = |channel: Channel| {
-        unit.replicates.iter().filter(|(own, _)| *own == channel).map(|(_, r)| r.samples).sum::<usize>()
+        unit.replicates
+            .iter()
+            .filter(|(of_channel, _)| *of_channel == channel)
+            .map(|(_, r)| r.samples)
+            .sum::<usize>()
     };
     Channel::ALL.into_iter().map(of_channel).max().unwrap_or(0)
 }

@@ -66,8 +66,8 @@ fn compared(
     if !is_reference {
         let open = candidate.asee_end_ci95.iter().zip(&reference.asee_end_ci95);
         for (outage, ends) in outages.iter_mut().zip(open) {
-            if let (Some(own), Some(others)) = ends {
-                outage.widen(own, others);
+            if let (Some(interval), Some(of_reference)) = ends {
+                outage.widen(interval, of_reference);
             }
         }
     }
@@ -78,7 +78,7 @@ fn compared(
 /// What makes two runs differ beside the model in the filter; then run k did not see the same noise.
 fn differences(candidate: &Manifest, reference: &Manifest) -> Vec<&'static str> {
     let (c, r) = (&candidate.configuration, &reference.configuration);
-    let is_expected = [c, r].map(|of| of.run.method == Method::Lincov);
+    let is_expected = [c, r].map(|manifest| manifest.run.method == Method::Lincov);
     let all = [
         ("the method is", is_expected[0] != is_expected[1]),
         // covariance analysis draws nothing, and so differs in nothing by its seed

@@ -43,7 +43,7 @@ pub(crate) fn read_curves(
         }
         curves.push((scope, estimator, named.curve));
     }
-    let has = |e: &Estimator| curves.iter().any(|(_, own, _)| own == e);
+    let has = |e: &Estimator| curves.iter().any(|(_, estimator, _)| estimator == e);
     let estimators = Estimator::ALL.into_iter().filter(has).collect();
     Ok(Curves { curves, settings: Settings { estimators, rate_hz, ..settings.clone() } })
 }

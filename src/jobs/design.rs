@@ -74,7 +74,7 @@ fn designed(outcome: &Outcome, rate_hz: f64) -> Vec<DesignedParameter> {
     let composite = &outcome.fit.composite;
     let values: Vec<_> = composite.parameters().collect();
     let parameter_of_interval = |interval: &ParameterInterval| {
-        let (_, value) = *values.iter().find(|(of, _)| *of == interval.of)?;
+        let (_, value) = *values.iter().find(|(parameter, _)| *parameter == interval.of)?;
         let (name, label) = (composite.name_of(interval.of), &composite.labels()[interval.of.process]);
         let (parameter, shown): (String, &dyn Fn(f64) -> f64) = match interval.of.parameter {
             Parameter::Phi => (format!("{label} correlation_time_s"), &|phi| -1.0 / (rate_hz * phi.ln())),

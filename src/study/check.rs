@@ -45,7 +45,8 @@ impl Study {
                 ("periodic", e.periodic.is_some()),
                 ("random", e.random.is_some()),
             ];
-            e.name = kinds.iter().find(|(_, there)| *there).map_or(String::new(), |(n, _)| (*n).to_owned());
+            e.name =
+                kinds.iter().find(|(_, is_given)| *is_given).map_or(String::new(), |(n, _)| (*n).to_owned());
         }
     }
 

@@ -154,7 +154,7 @@ pub(crate) fn write(directory: &Path, unit: &UnitResult) -> Result<(), FileError
         fs::rename(&file, &aside).map_err(|e| FileError::io(&file, e))?;
     }
     atomic::write(&file, encode(unit)).or_else(|e| match read(directory, &unit.id) {
-        Ok(there) if encode(&there) == encode(unit) => Ok(()),
+        Ok(present) if encode(&present) == encode(unit) => Ok(()),
         _ => Err(e),
     })
 }

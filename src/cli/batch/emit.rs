@@ -55,7 +55,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         let planned = args.place.planned(session.asked_seed())?;
         long_enough(script.limit_s() as f64, planned.longest_unit_s(u64::from(args.cpus)), session)?;
     }
-    session.printer.result(script.text(args.target).trim_end());
+    session.result(script.text(args.target).trim_end());
     Ok(())
 }
 
@@ -67,7 +67,7 @@ fn long_enough(limit_s: f64, unit_s: f64, session: &Session) -> Result<(), Failu
         return Err(Failure::input(message).hint("a longer --time, or a study with fewer unit_runs"));
     }
     if limit_s < 3.0 * unit_s {
-        session.printer.warn(&format!("a task works for {}, and {unit}", duration(limit_s)));
+        session.warn(format!("a task works for {}, and {unit}", duration(limit_s)));
     }
     Ok(())
 }

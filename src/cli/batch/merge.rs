@@ -75,11 +75,11 @@ fn list_missing(planned: &Planned, units: usize, missing: &[(Unit, String)], ses
         let json = json!({
             "schema_version": 1, "plan": planned.plan.id(), "units": units, "missing": missing,
         });
-        session.printer.result(&json.to_string());
+        session.result(json);
     }
     for (unit, id) in missing {
         let (name, last) = (cell(unit).join(", "), unit.first + unit.runs - 1);
-        session.printer.detail(&format!("{id}: {name}, runs {} to {last}", unit.first));
+        session.detail(format!("{id}: {name}, runs {} to {last}", unit.first));
     }
 }
 

@@ -39,7 +39,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let made = study::plan(&args.place.study, &directory, &options, &Watch::new(session, || true))?;
     report(&made.planned, session);
     if made.was_there {
-        session.printer.say(&format!("{} was planned already", directory.display()));
+        session.say(format!("{} was planned already", directory.display()));
     } else if !args.dry_run {
         session.wrote(&directory.join("plan.json"));
     }
@@ -59,7 +59,7 @@ fn report(planned: &Planned, session: &Session) {
             "processor_s": total_s, "wall_s": wall_s, "threads": plan.estimate.threads,
             "disk_bytes": plan.estimate.bytes,
         });
-        session.printer.result(&json.to_string());
+        session.result(json);
         return;
     }
     let seed = plan.seed;
@@ -67,7 +67,7 @@ fn report(planned: &Planned, session: &Session) {
         true => (format!("× {runs} runs"), format!(" of {} runs", range(&plan.unit_runs))),
         false => ("by covariance analysis".to_owned(), String::new()),
     };
-    session.printer.result(&format!(
+    session.result(format!(
         "{} cells × {} columns {work}, seed {seed}: {units} units{cut}\nabout {} on {} threads, {} on disk",
         grid.len(),
         grid.columns.len(),

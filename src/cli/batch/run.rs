@@ -104,10 +104,10 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let variable = |name: &str| std::env::var(name).ok();
     let (shard, from) = shard::find(args.shard, args.shards, &variable)?;
     if let Some(remark) = shard::mismatch(args.shard, args.shards, &variable) {
-        session.printer.warn(&remark);
+        session.warn(&remark);
     }
     let (index, count) = shard.parts();
-    session.printer.say(&format!("shard {index}/{count} ({from})"));
+    session.say(format!("shard {index}/{count} ({from})"));
     let options = RunOptions { shard, threads: session.threads() };
     let ran = study::run(&planned, &options, &Watch::new(session, || stop.go_on()))?;
     match (ran.left, stop.failure(ran.left, ran.finished)) {
@@ -115,11 +115,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         _ => {
             let done = ran.finished + ran.left;
             if session.json() {
-                session
-                    .printer
-                    .result(&json!({ "schema_version": 1, "units_done": done, "units_left": 0 }).to_string());
+                session.result(json!({ "schema_version": 1, "units_done": done, "units_left": 0 }));
             }
-            session.printer.say(&format!("{done} units done, none left in this shard"));
+            session.say(format!("{done} units done, none left in this shard"));
             Ok(())
         }
     }

@@ -33,16 +33,16 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             "units": status.units, "done": status.done, "damaged": status.damaged, "foreign": status.foreign.len(),
             "processor_s_left": status.left_s,
         });
-        session.printer.result(&json.to_string());
+        session.result(json);
         return Ok(());
     }
     if status.damaged > 0 {
-        session.printer.warn(&format!(
+        session.warn(format!(
             "{} unit files are damaged; `nav-sim batch run` computes them again",
             status.damaged
         ));
     }
-    session.printer.result(&format!(
+    session.result(format!(
         "{} of {} units done, {} of {} cells complete; about {} left on {} threads",
         status.done,
         status.units,

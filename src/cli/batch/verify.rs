@@ -36,11 +36,11 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             "schema_version": 1, "plan": planned.plan.id(), "whole": found.whole, "compared": found.compared,
             "damaged": found.damaged, "different": found.different,
         });
-        session.printer.result(&json.to_string());
+        session.result(json);
     }
     if found.different.is_empty() && found.damaged.is_empty() {
         if !session.json() {
-            session.printer.result(&format!(
+            session.result(format!(
                 "{} of {} finished units computed again: the same bits",
                 found.compared, found.whole
             ));

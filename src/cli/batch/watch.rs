@@ -23,9 +23,9 @@ impl<F: Fn() -> bool + Sync> Observer<Remark> for Watch<'_, F> {
     fn remark(&self, remark: &Remark) {
         let text = remark.to_string();
         match remark.importance() {
-            Importance::Detail => self.session.printer.detail(&text),
-            Importance::Note => self.session.printer.say(&text),
-            Importance::Warning => self.session.printer.warn(&text),
+            Importance::Detail => self.session.detail(&text),
+            Importance::Note => self.session.say(&text),
+            Importance::Warning => self.session.warn(&text),
         }
     }
 

@@ -71,7 +71,7 @@ pub(super) fn finish(
         plot.write(|| report::calibration_svg(&CurvesFile::new(groups, &all, settings), &diagnoses), session);
     if session.json() {
         let json = report::json(&FitsFile::new(outcomes, &diagnoses, turn_on, settings, files.clone()));
-        session.printer.result(json.trim_end());
+        session.result(json.trim_end());
     } else {
         let text = if session.verbose() {
             let replicates = report::describe_replicates(&diagnoses);
@@ -81,13 +81,13 @@ pub(super) fn finish(
         } else {
             report::brief(outcomes, &diagnoses, turn_on, settings)
         };
-        session.printer.result(&text);
+        session.result(&text);
     }
     if !files.is_empty() {
-        session.printer.say(&format!("wrote {}", files.join(", ")));
+        session.say(format!("wrote {}", files.join(", ")));
     }
     if outcomes.iter().any(|o| o.recordings > 1) {
-        session.printer.detail(WHICH);
+        session.detail(WHICH);
     }
     outputs.iter().zip(&placed).try_for_each(|(asked, placed)| asked.refuse_beside(placed))?;
     drawn

@@ -43,7 +43,7 @@ impl Inputs {
         let (from, to) = (model.model.rate_hz, imu.rate_hz);
         if (to / from - 1.0).abs() > 0.01 {
             let shown = args.model.display();
-            session.printer.say(&format!("{shown}: converted from {from} Hz to {to:.3} Hz"));
+            session.say(format!("{shown}: converted from {from} Hz to {to:.3} Hz"));
         }
         let mut expected = initial.as_ref().map(|start| start.sigma.clone()).unwrap_or_default();
         let mut states = FilterStates::default();

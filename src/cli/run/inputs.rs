@@ -45,7 +45,7 @@ impl Inputs {
         let draws = |path: &Path, file: &ModelFile| {
             let found = analysed.then(|| draws_file::usable(path, &file.model, imu_hz))?;
             found.unwrap_or_else(|doubt| {
-                session.printer.warn(&format!("{doubt}: no intervals from the calibration"));
+                session.warn(format!("{doubt}: no intervals from the calibration"));
                 None
             })
         };

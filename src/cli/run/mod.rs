@@ -118,15 +118,12 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     })?;
     requirable(&args.require, outages.is_empty())?;
     if scenario.run.method == Method::Lincov && args.runs.is_some() {
-        session
-            .printer
-            .warn("--runs counts nothing here: --method lincov makes none; both makes them beside it");
+        session.warn("--runs counts nothing here: --method lincov makes none; both makes them beside it");
     }
     let manifest =
         manifest(scenario.clone(), &outages, seed, inputs.files.clone(), inputs.note.clone(), session);
     let _own = output::claim(&args.out, &manifest, session)?;
-    let _picture =
-        args.plot.claim(&inputs.files.iter().map(|i| PathBuf::from(&i.path)).collect::<Vec<_>>())?;
+    let _picture = args.plot.claim(inputs.files.iter().map(|i| &i.path))?;
     let words = Words::new(session);
     let found = jobs::navigate(&inputs.job, &scenario, &outages, seed, &words);
     let mut found = found.map_err(|e| impossible(e, &args.model))?;
@@ -157,16 +154,16 @@ fn show(
         true => crate::report::summary_json(summary, throughput_epochs_per_s),
         false => run_words::text(summary),
     };
-    session.printer.result(shown.trim_end());
+    session.result(shown.trim_end());
     args.plot.write(|| crate::report::run_svg(&found.epochs, &found.fan, &found.summary), session)?;
     if throughput_epochs_per_s > 0.0 {
-        session.printer.say(&format!("{:.2} million IMU epochs/s", throughput_epochs_per_s / 1e6));
+        session.say(format!("{:.2} million IMU epochs/s", throughput_epochs_per_s / 1e6));
     }
     if args.chart && !session.json() {
-        session.printer.result(&crate::report::run_text(&found.epochs, &found.summary));
+        session.result(crate::report::run_text(&found.epochs, &found.summary));
     }
     if session.verbose() && !session.json() {
-        session.printer.result(run_words::sensitivity_table(&found.summary).trim_end());
+        session.result(run_words::sensitivity_table(&found.summary).trim_end());
     }
     Ok(())
 }
@@ -244,6 +241,25 @@ fn scenario(args: &Args) -> Result<Scenario, Failure> {
     Ok(scenario)
 }
 
+/// The scenario of [`scenario_with`], checked.
+pub(super) fn checked_scenario(path: Option<&Path>, outages: &[OutageArg]) -> Result<Scenario, Failure> {
+    let scenario = scenario_with(path, outages)?;
+    scenario.validate().map_err(Failure::input)?;
+    Ok(scenario)
+}
+
+/// The outages on a trajectory; what is doubtful about them is said.
+pub(super) fn placed(
+    scenario: &Scenario,
+    span_s: (f64, f64),
+    seed: u64,
+    session: &Session,
+) -> Result<Vec<Outage>, Failure> {
+    let PlacedOutages { windows, remarks } = scenario.outages_on(span_s, seed)?;
+    session.warn_all(&remarks);
+    Ok(windows)
+}
+
 /// The outages on this trajectory, said.
 fn outages(
     scenario: &Scenario,
@@ -251,10 +267,9 @@ fn outages(
     seed: u64,
     session: &Session,
 ) -> Result<Vec<Outage>, Failure> {
-    let PlacedOutages { windows, remarks } = scenario.outages_on(span, seed)?;
-    remarks.iter().for_each(|remark| session.printer.warn(&remark.to_string()));
+    let windows = placed(scenario, span, seed, session)?;
     let shown: Vec<String> = windows.iter().map(|o| window(o.start_s, o.end_s)).collect();
-    session.printer.say(&match shown.as_slice() {
+    session.say(&match shown.as_slice() {
         [] => "no outage".to_owned(),
         some => format!("outages {}", some.join(", ")),
     });

@@ -43,9 +43,9 @@ pub(crate) fn claim(path: &Path, manifest: &Manifest, session: &Session) -> Resu
     let inputs = manifest.inputs.iter().map(|i| Path::new(&i.path));
     let first_seed = Cell::new(None);
     let recognise = |text: &str| {
-        let Ok(there) = serde_json::from_str::<Manifest>(text) else { return Ok(Found::Foreign) };
-        first_seed.set(manifest.differs_in_seed(&there).then_some(there.seed));
-        Ok(Found::result(manifest.is_same_run(&there)))
+        let Ok(present) = serde_json::from_str::<Manifest>(text) else { return Ok(Found::Foreign) };
+        first_seed.set(manifest.differs_in_seed(&present).then_some(present.seed));
+        Ok(Found::result(manifest.is_same_run(&present)))
     };
     let claimed = claim_directory(path, &report::RUN_FILES, inputs, session.existing(), recognise);
     claimed.map_err(|e| match first_seed.get() {
@@ -90,5 +90,5 @@ pub(crate) fn doubt_filter(summary: &Summary, session: &Session) {
     } else {
         "the errors are not those that MODEL expects: nav-sim tune finds variances that cover them"
     };
-    session.printer.warn(&format!("the filter is {}; {remedy}", run_words::verdict(summary)));
+    session.warn(format!("the filter is {}; {remedy}", run_words::verdict(summary)));
 }

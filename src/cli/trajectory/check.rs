@@ -56,13 +56,11 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let (largest, beyond) = examine(&trajectory, &args.limits());
     let name = args.source.name();
     for excess in beyond.iter().take(SAID) {
-        session.printer.warn(&format!("{name}: {excess}"));
+        session.warn(format!("{name}: {excess}"));
     }
     if beyond.len() > SAID {
         let more = beyond.len() - SAID;
-        session
-            .printer
-            .warn(&format!("{name}: and {more} more stretches beyond limits (--format json lists all)"));
+        session.warn(format!("{name}: and {more} more stretches beyond limits (--format json lists all)"));
     }
     let closure = Closure::new(&trajectory, args.rate_hz, GravityModel::default())
         .map_err(|e| Failure::input(format!("{name}: {e}")).hint("give another --rate-hz"))?;

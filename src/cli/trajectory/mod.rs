@@ -49,7 +49,7 @@ impl Source {
         let options = Options { origin: self.origin.map(|o| o.0) };
         let (trajectory, warnings) = load(&self.path, &options)?;
         let warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
-        warnings.iter().for_each(|w| session.printer.warn(w));
+        session.warn_all(&warnings);
         Ok((trajectory, warnings))
     }
 
@@ -82,7 +82,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 fn wrote(path: &Path, session: &Session) {
     if session.json() {
         let json = json!({ "schema_version": 1, "written": [path.display().to_string()] });
-        session.printer.result(&json.to_string());
+        session.result(json);
     }
     session.wrote(path);
 }

@@ -81,7 +81,7 @@ fn claim(args: &Args, contents: &[Vec<u8>; 4], session: &Session) -> Result<Clai
     let recognise = |_: &str| {
         let present = FILES.map(|name| std::fs::read(args.out.join(name)).ok());
         let is_whole = present.iter().all(Option::is_some);
-        let is_same = present.iter().zip(contents).all(|(present, own)| present.as_ref() == Some(own));
+        let is_same = present.iter().zip(contents).all(|(file, made)| file.as_ref() == Some(made));
         Ok(if is_whole { Found::result(is_same) } else { Found::Foreign })
     };
     Ok(claim_directory(&args.out, &FILES, inputs, session.existing(), recognise)?)

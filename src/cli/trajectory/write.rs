@@ -56,7 +56,7 @@ pub(super) fn generate(args: &GenerateArgs, session: &Session) -> Result<(), Fai
     let (trajectory, _) = args.source.read(session)?;
     let mut text = Vec::new();
     write_rows(&mut text, &trajectory, rows).map_err(Failure::could_not)?;
-    session.printer.result(String::from_utf8_lossy(&text).trim_end());
+    session.result(String::from_utf8_lossy(&text).trim_end());
     Ok(())
 }
 

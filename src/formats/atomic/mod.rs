@@ -47,7 +47,7 @@ pub enum Existing {
 /// When the file holds something else and is to stay.
 pub(crate) fn guard_contents(path: &Path, contents: &[u8], existing: Existing) -> Result<(), FileError> {
     let regular = std::fs::metadata(path).is_ok_and(|m| m.is_file());
-    let same = || std::fs::read(path).is_ok_and(|there| there == contents);
+    let same = || std::fs::read(path).is_ok_and(|present| present == contents);
     if existing == Existing::Replace || !regular || same() {
         return Ok(());
     }

@@ -134,8 +134,8 @@ fn lacking(path: &str, message: &str) -> Error {
 
 /// The first column of such a role, with its numbers.
 fn take(raw: &mut Raw, is_wanted: impl Fn(&Role) -> bool) -> Result<Option<(Role, Vec<f64>)>, Error> {
-    let Some(at) = raw.columns.iter().position(|c| is_wanted(&c.role)) else { return Ok(None) };
-    let column = raw.columns.swap_remove(at);
+    let Some(index) = raw.columns.iter().position(|c| is_wanted(&c.role)) else { return Ok(None) };
+    let column = raw.columns.swap_remove(index);
     let values = column.values.into_vec();
     let values = values.map_err(storage(&raw.path))?;
     Ok(Some((column.role, values)))

@@ -197,9 +197,5 @@ fn limit(limit: &ParameterLimit) -> Table {
 }
 
 fn input(input: &Input) -> Table {
-    let mut table = Table::new();
-    table.insert("role".into(), input.role.as_str().into());
-    table.insert("path".into(), input.path.as_str().into());
-    table.insert("blake3".into(), input.blake3.as_str().into());
-    table
+    Table::try_from(input).expect("three words")
 }

@@ -95,15 +95,15 @@ fn load_npy(path: &Path, options: &ReadOptions) -> Result<Raw, FileError> {
     let stored = storage(&name);
     let mut count = 0;
     array.each(|row, index, value| {
-        let Some(at) = place[index] else { return Ok(()) };
+        let Some(target) = place[index] else { return Ok(()) };
         if !value.is_finite() || value.abs() > LARGEST {
-            return Err(not_a_measurement(&name, row as u64 + 1, &columns[at].name, value));
+            return Err(not_a_measurement(&name, row as u64 + 1, &columns[target].name, value));
         }
         if count % BETWEEN == 0 {
             relieve(&mut columns, options).map_err(&stored)?;
         }
         count += 1;
-        columns[at].values.push(value);
+        columns[target].values.push(value);
         Ok(())
     })?;
     settle(&mut columns, options).map_err(&stored)?;

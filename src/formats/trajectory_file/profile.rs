@@ -89,12 +89,12 @@ fn read_segment(segment: &Section<'_>) -> Result<Segment, FileError> {
         segment.read_own(&["kind", "ramp_s"])
     }
     let (kind, climb) = match segment.require_str("kind")? {
-        "straight" => keys_of(segment).and_then(|own| straight(segment, &own))?,
-        "accelerate" => keys_of(segment).and_then(|own| accelerate(segment, &own))?,
-        "turn" => keys_of(segment).and_then(|own| turn(segment, &own))?,
-        "climb" => keys_of(segment).and_then(|own| climb(segment, &own))?,
-        "stop" => keys_of(segment).map(|own| stop(&own))?,
-        "waypoints" => keys_of(segment).and_then(|own| waypoints(segment, &own))?,
+        "straight" => keys_of(segment).and_then(|keys| straight(segment, &keys))?,
+        "accelerate" => keys_of(segment).and_then(|keys| accelerate(segment, &keys))?,
+        "turn" => keys_of(segment).and_then(|keys| turn(segment, &keys))?,
+        "climb" => keys_of(segment).and_then(|keys| climb(segment, &keys))?,
+        "stop" => keys_of(segment).map(|keys| stop(&keys))?,
+        "waypoints" => keys_of(segment).and_then(|keys| waypoints(segment, &keys))?,
         _ => return Err(segment.refuse("kind", "is no kind of segment", Some(format!("kinds are {KINDS}")))),
     };
     let Of { ramp_s } = segment.read()?;

@@ -51,7 +51,7 @@ const LONGEST_LINE: u64 = 1 << 16;
 impl Table {
     /// Two columns of one quantity.
     pub(in crate::formats) fn given_twice(&self, columns: [usize; 2], quantity: &str) -> Error {
-        let [first, second] = columns.map(|at| &self.columns[at]);
+        let [first, second] = columns.map(|column| &self.columns[column]);
         let message = format!("columns \"{first}\" and \"{second}\" both give {quantity}");
         Error::contents(self.path.as_str(), self.header_line, message).advice("remove one of them")
     }

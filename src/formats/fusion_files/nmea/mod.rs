@@ -171,7 +171,7 @@ pub(super) fn fixes(
     for epoch in &log.epochs {
         let Some([lat, lon, h]) = epoch.position else { continue };
         // a receiver's deviations as given are those of its middle HDOP
-        let worse = epoch.hdop.zip(hdop).map_or(1.0, |(own, middle)| own / middle);
+        let worse = epoch.hdop.zip(hdop).map_or(1.0, |(epoch_hdop, middle)| epoch_hdop / middle);
         let given = unsaid.map(|s| DVec3::from(s.pos_m) * worse);
         let stated = epoch.sigma.filter(|sigma| sigma.min_element() > 0.0);
         let Some(pos_sigma_n) = stated.or(given) else {

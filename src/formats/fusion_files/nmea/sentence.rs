@@ -12,7 +12,7 @@ const LEAST_FIELDS: [(&str, usize); 5] = [("GGA", 15), ("RMC", 12), ("VTG", 9), 
 
 /// What stands between `$` and the end of a line; before it, a logger may have written when it came.
 fn body(line: &str) -> Result<&str, &'static str> {
-    line.find(['$', '!']).map(|at| &line[at + 1..]).ok_or("not a sentence: it has no $")
+    line.find(['$', '!']).map(|start| &line[start + 1..]).ok_or("not a sentence: it has no $")
 }
 
 /// The address of the sentence in a line, such as `GPGGA`.
@@ -43,7 +43,7 @@ pub(super) fn fields(line: &str) -> Result<Vec<&str>, &'static str> {
 
 /// `hhmmss.ss` (s of the day).
 pub(super) fn time_of_day(text: &str) -> Option<f64> {
-    let two = |at: usize| text.get(at..at + 2)?.parse::<u8>().ok().map(f64::from);
+    let two = |start: usize| text.get(start..start + 2)?.parse::<u8>().ok().map(f64::from);
     let seconds: f64 = text.get(4..)?.parse().ok()?;
     let (hours, minutes) = (two(0)?, two(2)?);
     (hours < 24.0 && minutes < 60.0 && (0.0..61.0).contains(&seconds))
@@ -78,7 +78,7 @@ pub(super) fn date_of(unix_s: f64) -> String {
 
 /// `ddmmyy`; years from 80 on are of the last century, as receivers count GPS.
 pub(super) fn date_of_rmc(text: &str) -> Option<f64> {
-    let two = |at: usize| text.get(at..at + 2)?.parse::<u8>().ok();
+    let two = |start: usize| text.get(start..start + 2)?.parse::<u8>().ok();
     let year = i32::from(two(4)?);
     midnight(year + if year < 80 { 2000 } else { 1900 }, two(2)?.into(), two(0)?.into())
 }
