@@ -375,11 +375,8 @@ fn what_is_not_held_reads_the_same() {
     };
     let head = "t_ms,acc_x,acc_y,acc_z,dtheta_x_rad,dtheta_y_rad,dtheta_z_rad".to_owned();
     let table = |gaps: bool| {
-        let time_ms = |k: usize| k + if gaps && k > 9000 { 40 } else { 0 };
-        std::iter::once(head.clone())
-            .chain((0..20_000).map(|k| row(k, time_ms(k))))
-            .collect::<Vec<_>>()
-            .join("\n")
+        let rows = (0..20_000).map(|k| row(k, if gaps && k > 9000 { k + 40 } else { k }));
+        std::iter::once(head.clone()).chain(rows).collect::<Vec<_>>().join("\n")
     };
     let mut array = Vec::new();
     npy::write_header(&mut array, 9000, 6).unwrap();
