@@ -201,8 +201,8 @@ pub fn average(
     if !is_enough(count) {
         return Err(AverageError::Trim { trim: dropped(count), replicates: count });
     }
-    let mut curve = Curve::default();
-    curve.quantization = estimator.is_robust().then(|| *tuning.quantization());
+    let quantization = estimator.is_robust().then(|| *tuning.quantization());
+    let mut curve = Curve { quantization, ..Curve::default() };
     for level in 1..=levels as u32 {
         let long_enough = replicates.iter().filter(|r| r.levels() >= level as usize);
         let mut kept: Vec<Term> =

@@ -71,7 +71,7 @@ impl Scale {
         let is_repeated =
             |(k, (_, axis)): (usize, &(usize, Option<Axis>))| members[..k].iter().any(|(_, a)| a == axis);
         let noise = members.iter().map(|(i, _)| variance_of_log(spread.edof[*i][j])).collect();
-        members.iter().enumerate().any(is_repeated).then(|| Self { members, noise })
+        members.iter().enumerate().any(is_repeated).then_some(Self { members, noise })
     }
 
     /// Mean square of the residuals of ln nu less the mean of its axis: of drawn values in the same way as of observed ones,
