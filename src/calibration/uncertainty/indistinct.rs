@@ -191,7 +191,7 @@ mod tests {
             indistinct += u32::from(inference.indistinct.is_some());
             assert_eq!(
                 inference.indistinct.is_some(),
-                outcome.notes.iter().any(|n| n.contains("cannot be told"))
+                outcome.notes.iter().any(|n| n.contains("do not need both"))
             );
             for (process, phi) in [1, 2].into_iter().zip(phis) {
                 for (parameter, value) in [(Parameter::Phi, phi), (Parameter::Sigma2, 1.0 - phi * phi)] {
