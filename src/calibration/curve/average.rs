@@ -138,7 +138,19 @@ impl Replicate {
     pub(crate) fn levels(&self) -> usize {
         self.classical.len()
     }
+
+    /// Whether the steps of a quantiser make the robust wavelet variance (index level − 1) another than the classical one. Of
+    /// finer steps, or where the two agree, it is as good as ever.
+    fn is_moved_by_steps(&self, index: usize, classical_edof: f64, efficiency: f64) -> bool {
+        let ratio = (self.classical[index] / self.robust[index].value).ln();
+        // (1/e − 1)·2/eta is the variance of the logarithm of the two of Gaussian coefficients (see `diagnosis`).
+        let sigma = ((1.0 / efficiency - 1.0) * 2.0 / classical_edof).sqrt();
+        self.robust[index].is_stepped() && ratio.abs() > LEAST_MOVE.max(3.0 * sigma)
+    }
 }
+
+/// Classical over robust, less one, from which the steps of a quantiser are said to move a variance: less hardly moves a fit.
+const LEAST_MOVE: f64 = 0.02;
 
 /// Why replicates have no average.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -178,7 +190,8 @@ fn majority(replicates: &[Replicate]) -> usize {
 /// The paper's slips are resolved: SR-AWV's weights sum to one (its 1/J must be 1/K), DR-AWV keeps the
 /// order statistics a + 1 … K − a (2a are dropped), weights of the kept ones renormalised. `tuning` is
 /// that of the robust wavelet variances; the degrees of freedom are those of the replicates' eta3 combined. A level
-/// at which half of the kept ones or more have no admissible robust variance is ignored in fits.
+/// at which half of the kept ones or more have no admissible robust variance, or one that a quantiser's steps move, is ignored in
+/// fits.
 ///
 /// # Errors
 /// When there is no replicate, more than one for a single-replicate estimator, or none left by the trim.
@@ -221,8 +234,9 @@ pub fn average(
         // var(Σ w nu) = Σ w²·2 nu²/eta, the replicates' true nu taken equal.
         let inverse: f64 = kept.iter().map(|t| (t.samples / total).powi(2) / t.edof).sum();
         curve.edof.push(1.0 / inverse);
-        // A value without a root is the nearest there is, not an estimate: a majority of these is no curve.
-        if 2 * kept.iter().filter(|t| !t.has_root).count() >= kept.len() {
+        // A value without a root is the nearest there is, not an estimate, and one on coarse steps is that of another law: a
+        // majority of these is no curve.
+        if 2 * kept.iter().filter(|t| !t.is_estimate).count() >= kept.len() {
             curve.ignored.push(level);
         }
     }
@@ -234,7 +248,7 @@ struct Term {
     samples: f64,
     nu: f64,
     edof: f64,
-    has_root: bool,
+    is_estimate: bool,
 }
 
 impl Term {
@@ -242,8 +256,10 @@ impl Term {
         let i = level as usize - 1;
         let eta3 = interval::edof_eta3(replicate.samples, level);
         let edof = if estimator.is_robust() { interval::edof_robust(eta3, efficiency) } else { eta3 };
-        let has_root = !(estimator.is_robust() && replicate.robust[i].status == Status::NoRoot);
-        Self { samples: replicate.samples as f64, nu: replicate.value(estimator, i), edof, has_root }
+        let is_estimate = !estimator.is_robust()
+            || replicate.robust[i].status != Status::NoRoot
+                && !replicate.is_moved_by_steps(i, eta3, efficiency);
+        Self { samples: replicate.samples as f64, nu: replicate.value(estimator, i), edof, is_estimate }
     }
 }
 
@@ -258,7 +274,7 @@ mod tests {
     }
 
     fn replicate(samples: usize, classical: f64, robust: f64) -> Replicate {
-        let robust = vec![RobustVariance { value: robust, status: Status::Ok }; 2];
+        let robust = vec![RobustVariance { value: robust, status: Status::Ok, zeros: 0.0 }; 2];
         let (name, classical) = (String::new(), vec![classical; 2]);
         Replicate { name, axis: None, samples, classical, robust, trend: f64::NAN, mean: f64::NAN }
     }
@@ -325,6 +341,30 @@ mod tests {
     fn equal_replicates_multiply_the_degrees_of_freedom() {
         let curve = average(&eight(), Estimator::DrAwv, Trim::Count(2), &tuning()).unwrap();
         assert_relative_eq!(curve.edof[0], 4.0 * 0.6 * 499.5, max_relative = 1e-12);
+    }
+
+    /// Gaussian numbers of 0.3 steps, rounded: nu of level j is their variance over 2^j, that of the law of three numbers −1, 0,
+    /// 1 (0.2 % beyond; P(1) = P(Z > 5/3) = 0.0478, variance 0.0956). The scales that a fit counts are right to four standard
+    /// deviations, √(2/(0.6 eta)), and the 1.3 % of fine steps; the first, which is off by more, is not counted.
+    #[test]
+    fn scales_that_coarse_steps_move_are_not_counted() {
+        use crate::wavelet::both;
+        use rand::{RngExt, SeedableRng};
+        let mut generator = crate::rng::Generator::seed_from_u64(5);
+        let mut number = || (0.3 * generator.sample::<f64, _>(rand_distr::StandardNormal)).round();
+        let signal: Vec<f64> = (0..1 << 17).map(|_| number()).collect();
+        let (classical, robust) = both(&signal, 9, &tuning()).unwrap();
+        let one = Replicate { samples: signal.len(), classical, robust, ..replicate(1, 0.0, 0.0) };
+        let curve =
+            |estimator| average(std::slice::from_ref(&one), estimator, Trim::Count(0), &tuning()).unwrap();
+        assert_eq!(curve(Estimator::Gmwm).ignored, [0; 0]);
+        let curve = curve(Estimator::Rgmwm);
+        assert!(curve.ignored.contains(&1) && curve.ignored.len() < 7, "{:?}", curve.ignored);
+        for ((level, nu), edof) in curve.levels.iter().zip(&curve.wv).zip(&curve.edof) {
+            let off = (nu / (0.0956 / f64::from(*level).exp2()) - 1.0).abs();
+            let allowed = 0.013 + 4.0 * (2.0 / edof).sqrt();
+            assert!(curve.ignored.contains(level) || off < allowed, "level {level}: {off}");
+        }
     }
 
     #[test]

@@ -7,8 +7,11 @@
 //! What is allowed for is the noise of a quantizer, of uniform numbers. Where the same spectrum is of Gaussian numbers (a
 //! dithered output of velocity or angle increments, the difference of white noise), the robust variance reads it as it is, and
 //! the classical one seems too high by what was allowed. That is told apart: the two variances then agree.
+//!
+//! Where the steps of a quantiser are comparable with the noise the two variances differ without an outlier: there nothing is said
+//! of outliers.
 
-use super::piece::{Piece, Test};
+use super::piece::{Piece, Test, excess_of_classical};
 use crate::curve::Replicate;
 use crate::outcome::{Settings, tau_s};
 
@@ -43,11 +46,21 @@ pub struct GaussianQuantization {
     pub read_low: f64,
 }
 
+/// Steps of a quantiser that are comparable with the noise, by which the classical and the robust wavelet variance differ.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct CoarseSteps {
+    /// The scales (s) at which they differ so.
+    pub tau_s: Vec<f64>,
+    /// Median of classical over robust wavelet variance, less one, where it is furthest from 0.
+    pub excess: f64,
+}
+
 /// Findings that most signals of a sensor have in common.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Common {
     pub(super) outliers: Option<CommonOutliers>,
     pub(super) gaussian: Option<GaussianQuantization>,
+    pub(super) steps: Option<CoarseSteps>,
 }
 
 /// The median over the signals of ln (classical / robust) at a scale, less what is expected.
@@ -59,6 +72,8 @@ struct Excess {
     gaussian: f64,
     /// Standard deviation of either.
     sigma: f64,
+    /// Whether half of the signals or more have coarse steps there.
+    is_stepped: bool,
 }
 
 impl Excess {
@@ -71,13 +86,14 @@ impl Excess {
 pub(super) fn common(pieces: &[Piece<'_>], settings: &Settings) -> Common {
     let test = Test::Outliers;
     let all = (0..test.most_levels(pieces)).map(|level| excess(pieces, level, settings));
-    let found: Vec<Excess> = all.filter(|e| e.alarms(e.quantizer)).collect();
+    let (stepped, fine): (Vec<Excess>, Vec<Excess>) = all.partition(|e| e.is_stepped);
+    let found: Vec<Excess> = fine.into_iter().filter(|e| e.alarms(e.quantizer)).collect();
     let tau_s: Vec<f64> = found.iter().map(|e| e.tau_s).collect();
     // Outliers raise the classical variance by anything; that they make up for the allowance, no more and no less, at every
     // scale is not to be expected.
     if !found.is_empty() && found.iter().all(|e| !e.alarms(e.gaussian.abs())) {
         let read_low = found.iter().map(|e| (e.quantizer - e.gaussian).exp_m1()).fold(0.0, f64::max);
-        return Common { outliers: None, gaussian: Some(GaussianQuantization { tau_s, read_low }) };
+        return Common { gaussian: Some(GaussianQuantization { tau_s, read_low }), ..Common::default() };
     }
     let most = found.iter().max_by(|a, b| a.quantizer.total_cmp(&b.quantizer));
     let outliers = most.map(|most| CommonOutliers {
@@ -86,12 +102,21 @@ pub(super) fn common(pieces: &[Piece<'_>], settings: &Settings) -> Common {
         excess: most.quantizer.exp_m1(),
         deviations: most.quantizer / most.sigma,
     });
-    Common { outliers, gaussian: None }
+    // Outliers of the finer scales explain what the coarser steps show.
+    let steps = if outliers.is_some() { None } else { coarse_steps(&stepped) };
+    Common { outliers, gaussian: None, steps }
+}
+
+fn coarse_steps(stepped: &[Excess]) -> Option<CoarseSteps> {
+    let differ = stepped.iter().filter(|e| e.alarms(e.gaussian.abs()));
+    let (tau_s, all): (Vec<f64>, Vec<f64>) = differ.map(|e| (e.tau_s, e.gaussian.exp_m1())).unzip();
+    let excess = all.into_iter().max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+    Some(CoarseSteps { tau_s, excess })
 }
 
 fn excess(pieces: &[Piece<'_>], level: usize, settings: &Settings) -> Excess {
     let (test, tuning) = (Test::Outliers, &settings.tuning);
-    let (mut of_quantizer, mut of_gaussian, mut variance) = (Vec::new(), Vec::new(), 0.0);
+    let (mut of_quantizer, mut of_gaussian, mut variance, mut stepped) = (Vec::new(), Vec::new(), 0.0, 0);
     for piece in pieces {
         let long_enough = |r: &&&Replicate| test.levels(piece, r) > level;
         for replicate in piece.replicates.iter().flatten().filter(long_enough) {
@@ -99,7 +124,8 @@ fn excess(pieces: &[Piece<'_>], level: usize, settings: &Settings) -> Excess {
             let (read_high, _) = tuning.quantization().factor(piece.law.quantization[level]);
             // E ln(chi²/eta) ≈ −1/eta: lower for the robust variance, by (1/e − 1)/eta of the classical one,
             // which is 1/eta here. The bias of robust variances of few coefficients is left out.
-            let gaussian = test.value(replicate, level) - 1.0 / eta;
+            let gaussian = excess_of_classical(replicate, level) - 1.0 / eta;
+            stepped += usize::from(replicate.robust[level].is_stepped());
             of_gaussian.push(gaussian);
             of_quantizer.push(gaussian + read_high.ln());
             // The standard deviation of a mean of n is √(Σ variances)/n, that of the median √(π/2) times it where the
@@ -112,5 +138,6 @@ fn excess(pieces: &[Piece<'_>], level: usize, settings: &Settings) -> Excess {
         quantizer: crate::curve::robust_scale::median(&of_quantizer),
         gaussian: crate::curve::robust_scale::median(&of_gaussian),
         sigma: MEDIAN * variance.sqrt() / of_gaussian.len() as f64,
+        is_stepped: 2 * stepped >= of_gaussian.len(),
     }
 }

@@ -129,11 +129,15 @@ impl Table {
         let mut file = |noise: &Noise, k: usize, own: &Option<Vec<f64>>| {
             own.as_ref().map(|own| {
                 let values = noise.draw(k, generator);
-                let difference = |((value, b), common): ((f64, &f64), &f64)| {
+                let difference = |(((value, b), common), seen): (((f64, &f64), &f64), &f64)| {
                     let own: f64 = generator.sample(StandardNormal);
+                    // What is no evidence here must be none there: it would be one more chance of a large F.
+                    if !seen.is_finite() {
+                        return f64::NAN;
+                    }
                     value + b * (shared.sqrt() * common + (1.0 - shared).sqrt() * own)
                 };
-                values.into_iter().zip(between).zip(&common[k]).map(difference).take(own.len()).collect()
+                values.into_iter().zip(between).zip(&common[k]).zip(own).map(difference).collect()
             })
         };
         let axis = |(files, noise): (&Files, &Noise)| {
@@ -231,7 +235,7 @@ impl Contrast {
         let mean = values.iter().flatten().sum::<f64>() / count;
         let present = || values.iter().zip(variances).filter(|(v, _)| v.is_some()).map(|(_, s)| s);
         let noise = present().sum::<f64>() / count;
-        // A silent scale (coarse quantisation) has no logarithm, and says nothing.
+        // A silent scale (coarse quantisation) has no logarithm, and says nothing, as one does that is no evidence.
         if count < FEWEST as f64 || !mean.is_finite() {
             return None;
         }

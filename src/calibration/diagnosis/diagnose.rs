@@ -65,6 +65,7 @@ fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &
             scores: joined(&pieces, noise.scores(index), outliers.scores(index)),
             common: common.outliers.clone(),
             gaussian_quantization: common.gaussian.clone(),
+            coarse_steps: common.steps.clone(),
             dropped,
             left_out: without(name),
             misfits: misfits.clone(),

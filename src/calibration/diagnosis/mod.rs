@@ -17,7 +17,7 @@ mod leave_out;
 mod piece;
 mod result;
 
-pub use common::{CommonOutliers, GaussianQuantization};
+pub use common::{CoarseSteps, CommonOutliers, GaussianQuantization};
 pub use diagnose::diagnose;
 pub use leave_out::{LeftOut, Movement};
 pub use result::{Alarm, AxisScores, Diagnosis, Differing, DriftAlarm, Misfit, Verdict};

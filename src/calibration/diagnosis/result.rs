@@ -1,6 +1,6 @@
 //! Results of the diagnosis of each recording.
 
-use super::common::{CommonOutliers, GaussianQuantization};
+use super::common::{CoarseSteps, CommonOutliers, GaussianQuantization};
 use super::leave_out::LeftOut;
 use crate::curve::{Estimator, Pool};
 use crate::imu::{Axis, Sensor};
@@ -105,6 +105,9 @@ pub struct Diagnosis {
     /// Quantization noise of this sensor that robust fits read low, in most signals.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gaussian_quantization: Option<GaussianQuantization>,
+    /// Steps of a quantiser in most signals of this sensor that are comparable with its noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coarse_steps: Option<CoarseSteps>,
     /// Scores; empty when there are fewer than four recordings.
     #[serde(serialize_with = "scores_by_axis")]
     pub scores: Vec<AxisScores>,

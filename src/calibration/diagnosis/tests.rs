@@ -11,6 +11,8 @@ use crate::{ModelChoice, Pool, Trim, Weighting, advice, calibrate, effects, grou
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
+mod causes;
+
 fn settings() -> Settings {
     Settings {
         estimators: vec![Estimator::Awv, Estimator::SrAwv, Estimator::DrAwv],

@@ -193,7 +193,8 @@ impl<'a> CurveSampler<'a> {
 
 /// A replicate of the same length with other variances.
 pub(crate) fn like(replicate: &Replicate, nu: Vec<f64>) -> Replicate {
-    let robust = nu.iter().map(|value| RobustVariance { value: *value, status: Status::Ok }).collect();
+    let robust =
+        nu.iter().map(|value| RobustVariance { value: *value, status: Status::Ok, zeros: 0.0 }).collect();
     Replicate {
         name: String::new(),
         axis: replicate.axis,

@@ -3,8 +3,8 @@
 use super::format::{duration, signed_percent};
 use crate::curve::Pool;
 use crate::diagnosis::{
-    Alarm, CommonOutliers, Diagnosis, Differing, DriftAlarm, GaussianQuantization, LeftOut, Misfit, Movement,
-    Verdict,
+    Alarm, CoarseSteps, CommonOutliers, Diagnosis, Differing, DriftAlarm, GaussianQuantization, LeftOut,
+    Misfit, Movement, Verdict,
 };
 use crate::imu::{Axis, Sensor};
 use crate::outcome::LevelSpread;
@@ -30,6 +30,7 @@ pub fn advice(diagnoses: &[Diagnosis], sensor: Sensor) -> Vec<String> {
     }
     lines.extend(first.common.iter().map(|c| outliers(c, own.len())));
     lines.extend(first.gaussian_quantization.iter().map(gaussian_quantization));
+    lines.extend(first.coarse_steps.iter().map(coarse_steps));
     lines.extend(misfits(&first.misfits));
     lines
 }
@@ -79,6 +80,18 @@ fn gaussian_quantization(found: &GaussianQuantization) -> String {
         duration(found.tau_s[0]),
         duration(found.tau_s[found.tau_s.len() - 1]),
         100.0 * found.read_low
+    )
+}
+
+/// Sentence on steps of a quantiser that are comparable with the noise.
+fn coarse_steps(found: &CoarseSteps) -> String {
+    format!(
+        "the quantisation step is comparable with the noise (more than a tenth of the wavelet coefficients are zero from {} to {}): \
+         there the classical wavelet variance differs from the robust one, by up to {}, even without outliers, and sr-awv and dr-awv \
+         leave these scales out: use awv if the recordings have no outliers",
+        duration(found.tau_s[0]),
+        duration(found.tau_s[found.tau_s.len() - 1]),
+        signed_percent(found.excess)
     )
 }
 

@@ -34,6 +34,24 @@ pub struct RobustVariance {
     pub value: f64,
     /// Kind of root.
     pub status: Status,
+    /// Share of the coefficients that are zero.
+    pub zeros: f64,
+}
+
+/// Share of zeros from which the steps of a quantiser count. By the exact law of rounded Gaussian numbers (0.15 to 1.5 steps, any
+/// offset, differences of up to 512 of them, efficiencies from 0.4) the variance is within 1.3 % of the truth where fewer are zero,
+/// and up to 50 % off where half are: a mean of numbers that rarely leave their step is no Gaussian number.
+const MOST_ZEROS: f64 = 0.1;
+/// A coefficient below so many standard deviations is zero but for rounding; of Gaussian ones 0.08 % are.
+const ZERO: f64 = 1e-3;
+
+impl RobustVariance {
+    /// Whether the coefficients lie on steps so coarse that the variance is not that of Gaussian ones: a tenth of them are zero,
+    /// the step (of the coefficients) a quarter of their standard deviation.
+    #[must_use]
+    pub fn is_stepped(&self) -> bool {
+        self.zeros > MOST_ZEROS
+    }
 }
 
 /// Classical and robust wavelet variance at levels 1 … `levels` in one walk.
@@ -63,13 +81,13 @@ pub(crate) fn m_scale(squares: &[f64], tuning: &Tuning) -> RobustVariance {
     let equation = Equation { squares, tuning };
     // The start must only be within 25 % of the root: of 4096 independent coefficients the squared MAD is
     // known to 4 %. Anything unusual goes to the search, which takes all of them.
-    let start = squared_mad(&sample(squares));
-    if start > 0.0
-        && let Some(value) = equation.newton_near(start)
-    {
-        return RobustVariance { value, status: Status::Ok };
-    }
-    equation.search()
+    let sample = sample(squares);
+    let start = squared_mad(&sample);
+    let near = if start > 0.0 { equation.newton_near(start) } else { None };
+    let (value, status) = near.map_or_else(|| equation.search(), |value| (value, Status::Ok));
+    // Of 4096 a share of a tenth is known to 0.5 %.
+    let zero = sample.iter().filter(|y| **y <= ZERO * ZERO * value).count();
+    RobustVariance { value, status, zeros: zero as f64 / sample.len() as f64 }
 }
 
 /// Normal quantile of ¾: the median of |Z|.
@@ -121,7 +139,7 @@ impl Equation<'_> {
     /// The march from the squared MAD: up while g > 0; else down until g > 0, then to that region's falling
     /// edge; if nothing is positive downward, up to a positive region and on to its falling edge (where nearly half of the
     /// coefficients are many times as large as the others).
-    fn search(&self) -> RobustVariance {
+    fn search(&self) -> (f64, Status) {
         let mad = squared_mad(self.squares);
         let status = if mad > 0.0 { Status::Ok } else { Status::Coarse };
         let mean = self.squares.iter().sum::<f64>() / self.squares.len() as f64;
@@ -129,7 +147,7 @@ impl Equation<'_> {
         // unless all are zero.
         let start = if mad > 0.0 { mad } else { mean };
         if mean <= 0.0 {
-            return RobustVariance { value: 0.0, status: Status::Zero };
+            return (0.0, Status::Zero);
         }
         let mut s = start;
         if self.at(s).0 > 0.0 {
@@ -137,14 +155,14 @@ impl Equation<'_> {
             while self.at(s * STEP).0 > 0.0 {
                 s *= STEP;
             }
-            return RobustVariance { value: self.falling_edge(s, s * STEP), status };
+            return (self.falling_edge(s, s * STEP), status);
         }
         let (mut best, mut best_g) = (s, f64::NEG_INFINITY);
         while s > start / DEPTH {
             s /= STEP;
             let g = self.at(s).0;
             if g > 0.0 {
-                return RobustVariance { value: self.falling_edge(s, s * STEP), status };
+                return (self.falling_edge(s, s * STEP), status);
             }
             if g > best_g {
                 (best, best_g) = (s, g);
@@ -154,11 +172,11 @@ impl Equation<'_> {
         // step may have been marched over.
         let (top, g) = self.summit(best);
         if g > 0.0 {
-            return RobustVariance { value: self.falling_edge(top, best * STEP), status };
+            return (self.falling_edge(top, best * STEP), status);
         }
         match self.root_above(start, mean) {
-            Some(value) => RobustVariance { value, status },
-            None => RobustVariance { value: top, status: Status::NoRoot },
+            Some(value) => (value, status),
+            None => (top, Status::NoRoot),
         }
     }
 
