@@ -8,8 +8,17 @@ use crate::wavelet::{Curve, QuantizationResponse};
 
 /// The part of a model's wavelet variance that is quantization noise, at a level.
 pub(crate) fn quantization_share(model: &Composite, level: u32) -> f64 {
-    let own: f64 = model.processes.iter().filter(|p| is_quantization(p)).map(|p| p.haar_wv(level)).sum();
-    if own > 0.0 { own / model.haar_wv(level) } else { 0.0 }
+    share(model, level, is_quantization)
+}
+
+/// The part of a model's wavelet variance that is drift, at a level.
+pub(crate) fn drift_share(model: &Composite, level: u32) -> f64 {
+    share(model, level, |p| matches!(p, Process::Drift(_)))
+}
+
+fn share(model: &Composite, level: u32, is_counted: impl Fn(&Process) -> bool) -> f64 {
+    let counted: f64 = model.processes.iter().filter(|p| is_counted(p)).map(|p| p.haar_wv(level)).sum();
+    if counted > 0.0 { counted / model.haar_wv(level) } else { 0.0 }
 }
 
 const fn is_quantization(process: &Process) -> bool {

@@ -4,7 +4,7 @@
 //! spectrum of the model ([Percival](crate::bibliography::Percival95)). Each nu_j is taken as chi-square with
 //! the degrees of freedom 2 nu²/var that follow, joined by the correlations that follow; where the record has few lengths of
 //! the scale, with those of var = 2/M² Σ (M − |k|) s_k² over the lags there are, s_k the autocovariance of the coefficients. Drift is not noise:
-//! it adds to nu and not to its scatter. Quantization noise is not Gaussian: what that leaves of the scatter of a robust
+//! it adds to nu and, but for its product with the mean of the coefficients, not to its scatter. Quantization noise is not Gaussian: what that leaves of the scatter of a robust
 //! variance is in [`SamplingLaw::robust_edof`].
 
 use super::implied::quantization_share;

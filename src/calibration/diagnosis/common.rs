@@ -117,7 +117,7 @@ fn coarse_steps(stepped: &[Excess]) -> Option<CoarseSteps> {
 fn excess(pieces: &[Piece<'_>], level: usize, settings: &Settings) -> Excess {
     let (test, tuning) = (Test::Outliers, &settings.tuning);
     let (mut of_quantizer, mut of_gaussian, mut variance, mut stepped) = (Vec::new(), Vec::new(), 0.0, 0);
-    for piece in pieces {
+    for piece in pieces.iter().filter(|p| !p.drifts(level)) {
         let long_enough = |r: &&&Replicate| test.levels(piece, r) > level;
         for replicate in piece.replicates.iter().flatten().filter(long_enough) {
             let eta = test.edof(piece.law.edof(replicate.samples)[level], tuning.efficiency());

@@ -21,7 +21,7 @@ impl Comparison {
     pub(super) fn new(pieces: &[Piece<'_>], sensor: Sensor, test: Test, efficiency: f64) -> Self {
         let levels = test.most_levels(pieces);
         let of_piece = |p: &Piece<'_>| {
-            let logs = |r: &Replicate| (0..test.levels(p, r)).map(|j| test.value(r, j)).collect();
+            let logs = |r: &Replicate| (0..test.levels(p, r)).map(|j| test.value(p, r, j)).collect();
             p.replicates.iter().map(|r| r.map(logs)).collect()
         };
         let noise = |p: &Piece<'_>| {

@@ -6,7 +6,7 @@
 //! later half, in standard deviations of the fitted model (does it drift as no other does?). In the second the real
 //! differences between recordings cancel, and what noise alone contributes is small: a classical variance of eta degrees of freedom being
 //! efficient, its covariance with a robust one of efficiency e is its variance, so that of the ratio is
-//! (1/e − 1) times it.
+//! (1/e − 1) times it. Scales of which a drift of the fitted model makes more than 2 % are no evidence: there these laws do not hold.
 
 mod alarm;
 mod common;

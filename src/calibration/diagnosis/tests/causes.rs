@@ -44,3 +44,30 @@ fn coarse_steps_are_not_taken_for_outliers() {
         assert!(glitched.common.is_some() && glitched.coarse_steps.is_none(), "{deviation}: {glitched:?}");
     }
 }
+
+/// Five alike recordings of white noise and one ramp, or ramps that differ by a twentieth, and another on each axis, under the
+/// model that has it: no more alarms of noise and of outliers than said (see `alike_recordings_raise_no_more_alarms_than_said`).
+#[test]
+fn a_drift_of_the_model_raises_no_alarms() {
+    let model = ModelChoice::Given("WN+DR".parse().unwrap());
+    let settings = Settings { model, ..settings() };
+    for differ in [0.0, 0.05] {
+        let mut alarms = [0; 2];
+        for seed in 0..24 {
+            let recording = |file: usize| {
+                let run = file as u64;
+                let mut generator =
+                    StreamKey { seed, scenario: "", run, source: "", process: "" }.generator();
+                let slope = 30.0 * (1.0 + differ * normals(&mut generator)[0]) / (4 * SAMPLES) as f64;
+                [1.0, -0.7, 0.4].map(|part| {
+                    let ramp = (0..4 * SAMPLES).map(|t| part * slope * t as f64);
+                    ramp.map(|level| level + generator.sample::<f64, _>(StandardNormal)).collect()
+                })
+            };
+            let all = diagnosed((0..5).map(recording), &settings);
+            alarms[0] += u32::from(all.iter().any(|d| d.noise.is_some()));
+            alarms[1] += u32::from(all.iter().any(|d| d.outliers.is_some()));
+        }
+        assert!(alarms.iter().all(|n| *n <= 3), "{differ}: {alarms:?} of 24");
+    }
+}
