@@ -39,8 +39,8 @@ pub use curve::{
     average, grouped, implied, median, replicates, trend, warm_up,
 };
 pub use diagnosis::{
-    Alarm, AxisScores, CoarseSteps, CommonOutliers, Diagnosis, Differing, DriftAlarm, GaussianQuantization,
-    LeftOut, Misfit, Movement, Verdict, diagnose,
+    Alarm, AxisScores, CoarseSteps, CommonDrift, CommonOutliers, Diagnosis, Differing, DriftAlarm,
+    GaussianQuantization, LeftOut, Misfit, Movement, Verdict, diagnose,
 };
 pub use fit::{Fit, FitError, Termination, Weighting, estimate, fit};
 pub use model::{BoundDomain, LimitError, Limits, ModelSpec, SpecError};

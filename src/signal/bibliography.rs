@@ -62,6 +62,9 @@ sources! {
     /// D. J. Best, D. E. Roberts: *Algorithm AS 91: The percentage points of the χ² distribution*, Applied Statistics 24,
     /// 1975.
     BestRoberts75;
+    /// R. Ibragimov, U. K. Müller: *t-Statistic based correlation and heterogeneity robust inference*, J. Business and Economic
+    /// Statistics 28, 2010.
+    IbragimovMuller10;
     /// A. C. Davison, D. V. Hinkley: *Bootstrap Methods and their Application*, Cambridge University Press, 1997.
     DavisonHinkley97;
     /// R. B. Davies: *Hypothesis testing when a nuisance parameter is present only under the alternative*, Biometrika 64,

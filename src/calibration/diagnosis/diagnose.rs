@@ -1,6 +1,7 @@
 //! Each recording against the others, sensor by sensor.
 
 use super::common::common;
+use super::common_drift::common_drift;
 use super::comparison::Comparison;
 use super::contrasts::FEWEST;
 use super::leave_out::left_out;
@@ -31,6 +32,7 @@ fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &
     }
     let pieces = axes(&own, &names, outcomes);
     let common = common(&pieces, settings);
+    let common_drift = common_drift(&pieces, settings.rate_hz);
     let pieces = if names.len() < FEWEST { Vec::new() } else { pieces };
     let dropped = dropped(&own, settings);
     let [noise, outliers] = [Test::Noise, Test::Outliers]
@@ -66,6 +68,7 @@ fn of_sensor(sensor: Sensor, groups: &[Group], outcomes: &[Outcome], settings: &
             common: common.outliers.clone(),
             gaussian_quantization: common.gaussian.clone(),
             coarse_steps: common.steps.clone(),
+            common_drift: common_drift.clone(),
             dropped,
             left_out: without(name),
             misfits: misfits.clone(),

@@ -10,6 +10,7 @@
 
 mod alarm;
 mod common;
+mod common_drift;
 mod comparison;
 mod contrasts;
 mod diagnose;
@@ -20,7 +21,7 @@ mod result;
 pub use common::{CoarseSteps, CommonOutliers, GaussianQuantization};
 pub use diagnose::diagnose;
 pub use leave_out::{LeftOut, Movement};
-pub use result::{Alarm, AxisScores, Diagnosis, Differing, DriftAlarm, Misfit, Verdict};
+pub use result::{Alarm, AxisScores, CommonDrift, Diagnosis, Differing, DriftAlarm, Misfit, Verdict};
 
 #[cfg(test)]
 mod tests;

@@ -50,6 +50,19 @@ pub struct DriftAlarm {
     pub deviations: Vec<(Axis, f64)>,
 }
 
+/// A drift that the recordings share, on the axes where it is seen.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct CommonDrift {
+    /// Probability that recordings which drift by chance seem to share as much on any axis.
+    pub p_value: f64,
+    /// Mean slope of the level (units per hour).
+    #[serde(serialize_with = "by_axis")]
+    pub per_hour: Vec<(Axis, f64)>,
+    /// The same over its standard deviation by the scatter among the recordings: Student's t.
+    #[serde(serialize_with = "by_axis")]
+    pub t: Vec<(Axis, f64)>,
+}
+
 /// Why a recording is abnormal.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Alarm {
@@ -108,6 +121,9 @@ pub struct Diagnosis {
     /// Steps of a quantiser in most signals of this sensor that are comparable with its noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coarse_steps: Option<CoarseSteps>,
+    /// Drift of this sensor that the recordings share and the model has not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub common_drift: Option<CommonDrift>,
     /// Scores; empty when there are fewer than four recordings.
     #[serde(serialize_with = "scores_by_axis")]
     pub scores: Vec<AxisScores>,

@@ -3,8 +3,8 @@
 use super::format::{duration, signed_percent};
 use crate::curve::Pool;
 use crate::diagnosis::{
-    Alarm, CoarseSteps, CommonOutliers, Diagnosis, Differing, DriftAlarm, GaussianQuantization, LeftOut,
-    Misfit, Movement, Verdict,
+    Alarm, CoarseSteps, CommonDrift, CommonOutliers, Diagnosis, Differing, DriftAlarm, GaussianQuantization,
+    LeftOut, Misfit, Movement, Verdict,
 };
 use crate::imu::{Axis, Sensor};
 use crate::outcome::LevelSpread;
@@ -31,6 +31,7 @@ pub fn advice(diagnoses: &[Diagnosis], sensor: Sensor) -> Vec<String> {
     lines.extend(first.common.iter().map(|c| outliers(c, own.len())));
     lines.extend(first.gaussian_quantization.iter().map(gaussian_quantization));
     lines.extend(first.coarse_steps.iter().map(coarse_steps));
+    lines.extend(first.common_drift.iter().map(|d| common_drift(d, sensor)));
     lines.extend(misfits(&first.misfits));
     lines
 }
@@ -92,6 +93,19 @@ fn coarse_steps(found: &CoarseSteps) -> String {
         duration(found.tau_s[0]),
         duration(found.tau_s[found.tau_s.len() - 1]),
         signed_percent(found.excess)
+    )
+}
+
+/// Sentence on a drift that the recordings share.
+fn common_drift(drift: &CommonDrift, sensor: Sensor) -> String {
+    let slope = |((axis, slope), (_, t)): (&(Axis, f64), &(Axis, f64))| {
+        format!("{} {slope:+.2e} {} per hour (Student's t {t:+.1})", axis.name(), sensor.unit())
+    };
+    let axes: Vec<String> = drift.per_hour.iter().zip(&drift.t).map(slope).collect();
+    format!(
+        "the recordings drift the same way: {}: that is deterministic (temperature after switching on?), no random walk: add DR to the \
+         model, or let the unit warm up",
+        axes.join(", ")
     )
 }
 
