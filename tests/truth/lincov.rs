@@ -42,6 +42,25 @@ fn standing(process: Process) -> [f64; 2] {
     [end.rmse[5], end.rmse[2]]
 }
 
+/// A filter that is right has the NEES 9 after four hours as at the beginning: 14 400 corrections of 16 digits, which do not grow
+/// along the unaided vertical channel (e^(14400/400) = 4e15 where they do), leave 1e-9.
+#[test]
+fn a_filter_that_is_right_is_so_after_hours() {
+    let noise = Composite::new(vec![
+        Process::White(White::new(1e-6).unwrap()),
+        Process::RandomWalk(RandomWalk::new(1e-12).unwrap()),
+    ]);
+    let gyro = Composite::new(vec![Process::White(White::new(1e-10).unwrap())]);
+    let model = Model::pooled(5.0, &noise, &gyro);
+    let path =
+        trajectory(vec![Kind::Accelerate { to_speed: 9.0, by: Acceleration::Peak(1.5) }, still(14_400.0)]);
+    let track = Scenario::default().track(&path, &model, &[]).unwrap();
+    let belief = Belief::new(&model, FilterStates::Full, 1.0, 800.0).unwrap();
+    let reports = assess(&track, &belief, &model).reports;
+    let farthest = reports.iter().map(|r| (r.nees - 9.0).abs()).fold(0.0, f64::max);
+    assert!(reports.len() > 14_400 && farthest < 1e-9, "{farthest:e} of {}", reports.len());
+}
+
 /// The vertical channel over n samples of dt, whose gravity gradient (time constant 570 s) adds (20/570)²/6,
 /// 2e-4. White noise: sums of n samples. Random walk: gamma2 f t³/3 and gamma2 f t⁵/20, to 1/n. Quantization
 /// noise: dt (U_n − U_0), whose variance does not grow. MA1: dt ((1 + theta) sum of the innovations but the
