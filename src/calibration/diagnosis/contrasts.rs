@@ -63,8 +63,7 @@ enum NoiseKind {
 }
 
 impl Noise {
-    /// Noise of files of one Gaussian number each, whose standard deviation is log-normal about 1 with
-    /// `log_deviation`.
+    /// Noise of files of one Gaussian number each, whose standard deviation is log-normal about 1 with `log_deviation`.
     pub(super) fn normal(files: usize, log_deviation: f64) -> Self {
         let kind = NoiseKind::Normal(log_deviation);
         Self { kind, edof: vec![vec![1.0]; files], variances: vec![vec![1.0; files]] }
@@ -76,8 +75,7 @@ impl Noise {
             NoiseKind::Law(law) => law.draw(&self.edof[file], generator).into_iter().map(f64::ln).collect(),
             NoiseKind::Normal(log_deviation) => {
                 let mut normal = || generator.sample::<f64, _>(StandardNormal);
-                // A normal number whose standard deviation is itself log-normal: recordings differ in how far
-                // they move.
+                // A normal number whose standard deviation is itself log-normal: recordings differ in how far they move.
                 vec![(log_deviation * normal()).exp() * normal()]
             }
         }
@@ -131,11 +129,9 @@ impl Table {
                 let values = noise.draw(k, generator);
                 let difference = |(((value, b), common), seen): (((f64, &f64), &f64), &f64)| {
                     let own: f64 = generator.sample(StandardNormal);
-                    // What is no evidence here must be none there: it would be one more chance of a large F.
-                    if !seen.is_finite() {
-                        return f64::NAN;
-                    }
-                    value + b * (shared.sqrt() * common + (1.0 - shared).sqrt() * own)
+                    // NaN for what is no evidence: drawn, it would be one more chance of a large F.
+                    let mask = if seen.is_finite() { 0.0 } else { f64::NAN };
+                    mask + value + b * (shared.sqrt() * common + (1.0 - shared).sqrt() * own)
                 };
                 values.into_iter().zip(between).zip(&common[k]).zip(own).map(difference).collect()
             })
