@@ -1,11 +1,12 @@
 //! Large-sample law of the wavelet variance: its scatter from recording to recording of the same noise.
 //!
-//! For Gaussian coefficients cov(nu_j, nu_k) ≈ 2/√(M_j M_k) ∫ |H_j|² |H_k|² S² df, H the Haar filters, S the
-//! spectrum of the model ([Percival](crate::bibliography::Percival95)). Each nu_j is taken as chi-square with
-//! the degrees of freedom 2 nu²/var that follow, joined by the correlations that follow; where the record has few lengths of
-//! the scale, with those of var = 2/M² Σ (M − |k|) s_k² over the lags there are, s_k the autocovariance of the coefficients. Drift is not noise:
-//! it adds to nu and, but for its product with the mean of the coefficients, not to its scatter. Quantization noise is not Gaussian: what that leaves of the scatter of a robust
-//! variance is in [`SamplingLaw::robust_edof`].
+//! For Gaussian coefficients cov(nu_j, nu_k) ≈ 2/√(M_j M_k) ∫ |H_j|² |H_k|² S² df, H the Haar filters, S the spectrum
+//! of the model ([Percival](crate::bibliography::Percival95)). Each nu_j is taken as chi-square with the degrees of
+//! freedom 2 nu²/var that follow, joined by the correlations that follow; where the record has few lengths of the
+//! scale, with those of var = 2/M² Σ (M − |k|) s_k² over the lags there are, s_k the autocovariance of the
+//! coefficients. Drift is not noise: it adds to nu and, but for its product with the mean of the coefficients, not to
+//! its scatter. Quantization noise is not Gaussian: what that leaves of the scatter of a robust variance is in
+//! [`SamplingLaw::robust_edof`].
 
 use super::implied::quantization_share;
 use crate::noise::{Composite, Process};
