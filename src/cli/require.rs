@@ -153,8 +153,11 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 fn sought(args: &Args, requirements: &Requirements, session: &Session) -> Result<(), Failure> {
     let _own = claim_output(args.out.as_deref(), [&args.trajectory])?;
     let (needed, question) = requirements.needed(args.corr_time_s, args.iso_drift).map_err(|e| {
-        Failure::input(e)
-            .hint("a larger limit, a shorter outage, or a better receiver ([gnss] of --scenario)")
+        let hint = match e {
+            RequireError::Loose { .. } => "a smaller limit, or a longer outage",
+            _ => "a larger limit, a shorter outage, or a better receiver ([gnss] of --scenario)",
+        };
+        Failure::input(e).hint(hint)
     })?;
     let text = || {
         let tables: Vec<String> = needed.tables().iter().map(|t| markdown_table(t)).collect();

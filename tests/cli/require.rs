@@ -83,6 +83,13 @@ fn requests_that_mean_nothing_are_refused() {
     refused(&["--outage", "longest", "--p95-m", "5"], ["needs a MODEL", "hint"]);
     refused(&["--outage", "1e5", "--p95-m", "5"], ["is not on the trajectory", "a shorter --outage"]);
     refused(&["--outage", "60:90", "--p95-m", "0.01"], ["no IMU keeps p95_m ≤ 0.01", "a larger limit"]);
+    // the poorest IMU keeps them: to look further made a noise without a finite variance, and a panic
+    for loose in ["1e6", "1e9", "1e300"] {
+        refused(
+            &["--outage", "60:90", "--p95-m", loose],
+            ["no IMU is too poor for p95_m ≤ 1", "a smaller limit"],
+        );
+    }
     let model = format!("{ROOT}/calib_data/tactical.toml");
     refused(&[&model, "--outage", "30", "--p95-m", "5", "-o", "x.toml"], ["cannot be used with", "--out"]);
 }

@@ -25,6 +25,9 @@ const HOUR_S: f64 = 3600.0;
 
 /// A consumer IMU, from which searches start.
 const START: [f64; IMU_PARAMETERS] = [1e-3, 3e-4, 5e-5, 1e-5];
+/// The poorest IMU that is sought has this times the intensities of the start (18 m/s/√h, 9.2 mg, 52 deg/√h, 620 deg/h):
+/// poorer than any that is sold. Beyond, errors are no longer small and the linear analysis means nothing.
+const POOREST: f64 = 300.0;
 /// An intensity times this is as good as none.
 const NONE: f64 = 1e-5;
 /// How far from the start an intensity is sought, as a logarithm: beyond, any will do.
@@ -84,6 +87,17 @@ impl ImuParameters {
         "gyroscope bias instability (deg/h)",
     ];
 
+    /// `velocity random walk (m/s/√h) 18.0, …`
+    pub(super) fn in_words(&self) -> String {
+        let figure = |i: usize| {
+            let value = Self::in_datasheets(i, self.values[i]);
+            // Three digits: the figures are bounds of a search, not measurements.
+            let decimals = (2.0 - value.log10().floor()).max(0.0) as usize;
+            format!("{} {value:.decimals$}", Self::NAMES[i])
+        };
+        (0..IMU_PARAMETERS).map(figure).collect::<Vec<_>>().join(", ")
+    }
+
     fn times(&self, factors: [f64; IMU_PARAMETERS]) -> Self {
         Self { values: std::array::from_fn(|i| self.values[i] * factors[i]), ..*self }
     }
@@ -124,13 +138,18 @@ impl Need<'_> {
     /// start leave, and these shares with that of GNSS and start at the end.
     ///
     /// # Errors
-    /// When not even a perfect IMU meets them.
+    /// When not even a perfect IMU meets them, or the poorest that is sought does.
     pub fn allocated(&self) -> Result<(ImuParameters, [f64; IMU_PARAMETERS + 1]), RequireError> {
         let start = ImuParameters { values: START, t_corr_s: self.t_corr_s };
         // 1e-5 of a consumer IMU, not zero: intensities are sought as logarithms.
         let perfect = self.worst(&start.times([NONE; IMU_PARAMETERS]))?;
         if perfect.margin() <= 0.0 {
             return Err(RequireError::Floor { limit: perfect.limit, value: perfect.value });
+        }
+        let poorest = start.times([POOREST; IMU_PARAMETERS]);
+        let worst = self.worst(&poorest)?;
+        if worst.margin() >= 0.0 {
+            return Err(RequireError::Loose { limit: worst.limit, value: worst.value, poorest });
         }
         let mut imu = self.at_limit(&start, [1.0; IMU_PARAMETERS])?.1;
         for _ in 0..ROUNDS {

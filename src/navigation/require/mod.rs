@@ -97,6 +97,16 @@ pub enum RequireError {
         /// The error with a perfect IMU.
         value: f64,
     },
+    /// The poorest IMU that is sought keeps every limit.
+    #[error("no IMU is too poor for {} ≤ {}: any that is sought keeps it; with the poorest of the search the error is {value:.3} ({})", .limit.quantity.name(), .limit.most, .poorest.in_words())]
+    Loose {
+        /// The hardest limit.
+        limit: Limit,
+        /// The error with the poorest IMU.
+        value: f64,
+        /// That IMU.
+        poorest: ImuParameters,
+    },
     /// Curves have a value each second.
     #[error("{length_s} s is not a whole number of seconds")]
     PartOfASecond {
