@@ -26,8 +26,8 @@ fn the_imu_that_is_named_meets_the_limit_and_a_tighter_one_not() {
     assert_eq!(found["figures"].as_array().unwrap().len(), 4);
     let given =
         |limit: &str| require(dir.path(), &[&["needed.toml"], &outage[..], &["--p95-m", limit]].concat());
-    let met = stdout(&given("10.1").success());
-    assert!(met.starts_with("met: p95_m ≤ 10.1 after 30 s") && met.contains("(binding)"), "{met}");
+    let met = stdout(&given("10").success());
+    assert!(met.starts_with("met: p95_m ≤ 10.0 after 30 s") && met.contains("(binding)"), "{met}");
     let missed = stdout(&given("9.9").code(3));
     assert!(missed.starts_with("NOT met") && missed.lines().count() <= 20, "{missed}");
     // the outage that it bridges is the one that it was made for, to the second
@@ -84,7 +84,7 @@ fn requests_that_mean_nothing_are_refused() {
     refused(&["--outage", "1e5", "--p95-m", "5"], ["is not on the trajectory", "a shorter --outage"]);
     refused(&["--outage", "60:90", "--p95-m", "0.01"], ["no IMU keeps p95_m ≤ 0.01", "a larger limit"]);
     // the poorest IMU keeps them: to look further made a noise without a finite variance, and a panic
-    for loose in ["1e6", "1e9", "1e300"] {
+    for loose in ["1e6", "1e9"] {
         refused(
             &["--outage", "60:90", "--p95-m", loose],
             ["no IMU is too poor for p95_m ≤ 1", "a smaller limit"],

@@ -32,7 +32,10 @@ const POOREST: f64 = 300.0;
 const NONE: f64 = 1e-5;
 /// How far from the start an intensity is sought, as a logarithm: beyond, any will do.
 const RANGE: f64 = 9.0;
-/// A logarithm of limit over error this close to zero counts as zero.
+/// A logarithm of limit over error that is left: the search ends on either side of what it aims at, and the IMU that is
+/// named is to keep the limit itself. More than [`EXACT`].
+const RESERVE: f64 = 5e-4;
+/// A logarithm of limit over error this close to the one sought counts as it.
 const EXACT: f64 = 1e-4;
 /// Rounds of the allocation, the share of a correction that is applied, and when it is done.
 const ROUNDS: usize = 25;
@@ -134,7 +137,7 @@ pub struct IsoDrift {
 }
 
 impl Need<'_> {
-    /// The IMU that meets the limits exactly, its four intensities with equal shares in the variance that GNSS and
+    /// The IMU that meets the limits with half a thousandth in reserve, its four intensities with equal shares in the variance that GNSS and
     /// start leave, and these shares with that of GNSS and start at the end.
     ///
     /// # Errors
@@ -143,12 +146,12 @@ impl Need<'_> {
         let start = ImuParameters { values: START, t_corr_s: self.t_corr_s };
         // 1e-5 of a consumer IMU, not zero: intensities are sought as logarithms.
         let perfect = self.worst(&start.times([NONE; IMU_PARAMETERS]))?;
-        if perfect.margin() <= 0.0 {
+        if perfect.margin() <= RESERVE {
             return Err(RequireError::Floor { limit: perfect.limit, value: perfect.value });
         }
         let poorest = start.times([POOREST; IMU_PARAMETERS]);
         let worst = self.worst(&poorest)?;
-        if worst.margin() >= 0.0 {
+        if worst.margin() >= RESERVE {
             return Err(RequireError::Loose { limit: worst.limit, value: worst.value, poorest });
         }
         let mut imu = self.at_limit(&start, [1.0; IMU_PARAMETERS])?.1;
@@ -157,7 +160,7 @@ impl Need<'_> {
             let total: f64 = squares.iter().sum();
             // what the limit leaves when GNSS and start have taken their part
             // The margin is ln(limit/error): squared, exp(2 margin) is what the mean square may grow by.
-            let allowed = total * (2.0 * worst.margin()).exp() - squares[IMU_PARAMETERS];
+            let allowed = total * (2.0 * (worst.margin() - RESERVE)).exp() - squares[IMU_PARAMETERS];
             // Where GNSS and start alone exceed the limit at this iterate the rest is negative: five per cent
             // keep the logarithm finite until it is not.
             let quarter = allowed.max(0.05 * total) / IMU_PARAMETERS as f64;
@@ -227,8 +230,8 @@ impl Need<'_> {
         self.course.worst(self.scenario, &imu.model(self.scenario.imu.rate_hz), self.limits)
     }
 
-    /// The IMU whose intensities with a weight are multiplied until the hardest limit is met, and the margin that is
-    /// left: not zero where no factor within the range meets it.
+    /// The IMU whose intensities with a weight are multiplied until the hardest limit is met with its reserve, and the
+    /// margin beyond that which is left: not zero where no factor within the range meets it.
     fn at_limit(
         &self,
         imu: &ImuParameters,
@@ -237,7 +240,7 @@ impl Need<'_> {
         let scaled = |ln: f64| imu.times(weights.map(|w| (w * ln).exp()));
         let crossing = Crossing { bounds: (-RANGE, RANGE), step: 0.7, exact: EXACT };
         let (ln, margin) =
-            crossing.from(0.0, |ln| Ok::<_, BeliefError>(self.worst(&scaled(ln))?.margin()))?;
+            crossing.from(0.0, |ln| Ok::<_, BeliefError>(self.worst(&scaled(ln))?.margin() - RESERVE))?;
         Ok((margin, scaled(ln)))
     }
 
