@@ -37,8 +37,8 @@ impl Ask {
 
 /// Earliest start of an outage where nothing else is said (s): by then a filter has aligned itself.
 const SETTLED_S: f64 = 300.0;
-/// Places of an outage of which only the length is given.
-const PLACES: u32 = 4;
+/// Places of an outage of which only the length is given: the time that the search takes is in proportion.
+const PLACES: u32 = 8;
 /// Longest outage that is looked at (s).
 const LONGEST_S: f64 = 600.0;
 /// Points of a curve of equal drift.
@@ -108,9 +108,12 @@ impl Requirements {
         let course = self.course(&outages, Detail::End)?;
         let need = Need { course: &course, scenario: &self.scenario, limits: &self.limits, t_corr_s };
         let (imu, shares) = need.allocated()?;
+        let ends = course.drifts(&self.scenario, &imu.model(self.scenario.imu.rate_hz))?;
+        let worst = Worst::of(&self.limits, &ends).expect("at least one limit and one place");
         let mut needed = NeededImu {
             imu,
             shares,
+            worst,
             alone: [Answer::Any; IMU_PARAMETERS],
             others_better: [Answer::Any; IMU_PARAMETERS],
             iso_drift: None,
@@ -149,15 +152,7 @@ impl Requirements {
         scenario: &Scenario,
         model: &Model,
     ) -> Result<(Bridged, Question), RequireError> {
-        let outages = match self.ask {
-            Ask::Longest => self.long_outages(),
-            Ask::Length(_) | Ask::Window(_) => {
-                let end_s = self.trajectory.end_s();
-                let lasting =
-                    |o: Outage| Outage { end_s: end_s.min(o.start_s + LONGEST_S).max(o.end_s), ..o };
-                self.outages().into_iter().map(lasting).collect()
-            }
-        };
+        let outages = self.long_outages();
         let course = self.course(&outages, Detail::Seconds)?;
         let curves = course.curves(scenario, model)?;
         let of_limit = |limit: &Limit| CURVE_S.map(|s| worst_after(&curves, s, limit.quantity));
@@ -185,9 +180,7 @@ impl Requirements {
         let mut ranked = units.iter().map(ranked).collect::<Result<Vec<_>, _>>()?;
         let class = |u: &RankedUnit| (!u.is_within(), !u.not_stated.is_empty());
         ranked.sort_by(|a, b| class(a).cmp(&class(b)).then(b.worst.margin().total_cmp(&a.worst.margin())));
-        let length_s = self.ask.length_s();
-        let asked = outages.iter().map(|o| Outage { end_s: o.start_s + length_s, ..*o }).collect();
-        Ok((ranked, self.question(asked)))
+        Ok((ranked, self.question(self.outages())))
     }
 
     fn rank(&self, course: &Course<'_>, unit: &CatalogueUnit) -> Result<RankedUnit, RequireError> {
@@ -242,15 +235,17 @@ impl Requirements {
         }
     }
 
-    /// Outages as long as the trajectory allows at several places.
+    /// The outage at the places that it is asked for, each as long as the trajectory allows. Where the longest is sought,
+    /// all of one length.
     fn long_outages(&self) -> Vec<Outage> {
         let end_s = self.trajectory.end_s();
-        if let Ask::Window(outage) = self.ask {
-            let end_s = end_s.min(outage.start_s + LONGEST_S).max(outage.end_s);
-            return vec![Outage { end_s, ..outage }];
+        if self.ask == Ask::Longest {
+            let length_s = (0.5 * (end_s - self.first_s)).floor().min(LONGEST_S).max(self.ask.length_s());
+            return evenly(self.first_s, end_s, length_s, PLACES);
         }
-        let length_s = (0.5 * (end_s - self.first_s)).floor().min(LONGEST_S).max(self.ask.length_s());
-        evenly(self.first_s, end_s, length_s, PLACES)
+        // The same places whatever is made of them: a unit is judged alike alone and in a ranking.
+        let lasting = |o: Outage| Outage { end_s: end_s.min(o.start_s + LONGEST_S).max(o.end_s), ..o };
+        self.outages().into_iter().map(lasting).collect()
     }
 
     fn course(&self, outages: &[Outage], detail: Detail) -> Result<Course<'_>, ExperimentError> {

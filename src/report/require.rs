@@ -17,6 +17,8 @@ pub(crate) struct NeededImu {
     pub imu: ImuParameters,
     /// The shares at the limit, and that of GNSS and start.
     pub shares: [f64; IMU_PARAMETERS + 1],
+    /// The hardest limit, and where.
+    pub worst: Worst,
     /// What each intensity may be if there were no other.
     pub alone: [Answer; IMU_PARAMETERS],
     /// What each may be if the others are ten times better.
@@ -91,15 +93,17 @@ pub(crate) struct Question {
 }
 
 impl Question {
-    /// `p95_m ≤ 5 after 60 s without fixes (from 300 s on)`
+    /// `p95_m ≤ 5 after 60 s without fixes (from 300 s on)`, `(the worst of 8 places, beginning from 300 to 840 s)`
     pub(crate) fn in_words(&self) -> String {
         let first = self.outages[0];
         let places = match self.outages.as_slice() {
-            [_] => format!("from {} s on", seconds(first.start_s)),
-            several => {
-                let starts: Vec<String> = several.iter().map(|o| seconds(o.start_s)).collect();
-                format!("from {} s on, the worst of which counts", starts.join(", "))
-            }
+            [.., last] if last.start_s > first.start_s => format!(
+                "the worst of {} places, beginning from {} to {} s",
+                self.outages.len(),
+                seconds(first.start_s),
+                seconds(last.start_s)
+            ),
+            _ => format!("from {} s on", seconds(first.start_s)),
         };
         let length = seconds(first.end_s - first.start_s);
         format!("{} after {length} s without fixes ({places})", self.limits_in_words())
@@ -156,10 +160,11 @@ impl NeededImu {
         let (from_s, to_s) = self.imu.floor_s();
         format!(
             "needed for {}: an IMU as allocated below (bias instability: the floor of the Allan deviation, here from {} s \
-             to {} s); GNSS and the start take {} of the variance",
+             to {} s); with it {}; GNSS and the start take {} of the variance there",
             question.in_words(),
             readable(from_s),
             readable(to_s),
+            question.worst(&self.worst),
             share(self.shares[IMU_PARAMETERS])
         )
     }
@@ -207,6 +212,7 @@ impl NeededImu {
             "t_corr_s": self.imu.t_corr_s,
             "figures": (0..IMU_PARAMETERS).map(figure).collect::<Vec<_>>(),
             "share_of_gnss_and_start": self.shares[IMU_PARAMETERS],
+            "place": self.worst.place,
             "iso_drift": self.iso_drift.as_ref().map(|c| c.points.iter().map(point).collect::<Vec<_>>()),
         }))
     }
@@ -333,6 +339,7 @@ pub(crate) fn catalogue_json(units: &[RankedUnit], question: &Question) -> Strin
             "not_stated": u.not_stated,
             "quantity": u.worst.limit.quantity.name(),
             "value": u.worst.value,
+            "place": u.worst.place,
             "outage": u.longest.json(),
             "curve": points_json(&u.curve),
         })
