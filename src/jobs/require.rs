@@ -43,8 +43,6 @@ const PLACES: u32 = 8;
 const LONGEST_S: f64 = 600.0;
 /// Points of a curve of equal drift.
 const POINTS: u32 = 8;
-/// Steps of a second and of a part of it differ in the error by a thousandth: a limit is missed beyond that.
-const MISSED: f64 = -2e-3;
 
 /// An outage that does not lie on the trajectory.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -286,7 +284,7 @@ fn worst_after(curves: &[Vec<Drift>], length_s: u32, quantity: Quantity) -> Opti
 fn longest(curves: &[Vec<Drift>], limits: &[Limit]) -> Longest {
     let lengths: Vec<f64> = curves.first().map_or_else(Vec::new, |c| c.iter().map(|d| d.after_s).collect());
     let is_missed = |length_s: &f64| {
-        Worst::of(limits, &after(curves, *length_s)).is_some_and(|worst| worst.margin() < MISSED)
+        Worst::of(limits, &after(curves, *length_s)).is_some_and(|worst| worst.margin() < 0.0)
     };
     match lengths.iter().position(is_missed) {
         Some(0) => Longest::Seconds(0.0),

@@ -36,6 +36,13 @@ fn the_imu_that_is_named_meets_the_limit_and_a_tighter_one_not() {
     let longest: Value = serde_json::from_str(&stdout(&longest.success())).unwrap();
     let seconds = longest["outage"]["longest_s"].as_f64().unwrap();
     assert!((29.0..=31.0).contains(&seconds), "{longest}");
+    // met: the longest is no shorter than what was asked for; not met: it is
+    for (limit, is_met) in [("10", true), ("9.98", false)] {
+        let asked = ["needed.toml", "--outage", "60:90", "--p95-m", limit, "--format", "json"];
+        let judged: Value = serde_json::from_str(&stdout(&require(dir.path(), &asked))).unwrap();
+        let seconds = judged["outage"]["longest_s"].as_f64().unwrap();
+        assert!(judged["met"] == is_met && (seconds >= 30.0) == is_met, "{limit}: {judged}");
+    }
 }
 
 #[test]

@@ -80,10 +80,10 @@ pub struct Course<'a> {
     places: Vec<Place>,
 }
 
-/// How finely a course is followed.
+/// What is seen of a course, which is followed in steps of a second.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Detail {
-    /// The outage's end alone, in steps of a second.
+    /// The outage's end alone.
     End,
     /// Every second of the outage.
     Seconds,
@@ -105,7 +105,8 @@ impl<'a> Course<'a> {
         let silent = Model { rate_hz: scenario.imu.rate_hz, axes: Default::default() };
         let place = |outage: &Outage| {
             let track = scenario.track(trajectory, &silent, &[*outage])?.until_outage_end();
-            let track = if detail == Detail::End { track.coarse() } else { track };
+            // The same steps for both: the error after 60 s of a long outage is that of an outage of 60 s.
+            let track = if detail == Detail::End { track.coarse() } else { track.merged() };
             Ok(Place { outage: [*outage], track })
         };
         let places = outages.par_iter().map(place).collect::<Result<_, ExperimentError>>()?;
