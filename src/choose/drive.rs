@@ -10,7 +10,9 @@ use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::imu::{Truth, TruthError};
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::ExperimentError;
-use nav_sim_navigation::simulation::lincov::{Aim, Factor, FilterPass, Per, Task, Track, TruthSide, scaled};
+use nav_sim_navigation::simulation::lincov::{
+    Aim, Factor, FilterPass, Per, Task, Track, TrueErrors, TruthSide, scaled,
+};
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_signal::imu::{Recording, Sensor};
 use nav_sim_signal::noise::Model;
@@ -196,9 +198,10 @@ impl Drive {
     fn tuned(&self, candidate: &Candidate, model: &Model, truths: &[Model]) -> Result<Model, ChoiceError> {
         let full = self.scenario.with_full_noise();
         let full = |model: &Model| full.belief(model, &self.outages, &self.track);
+        let truths: Vec<TrueErrors> = truths.iter().cloned().map(TrueErrors::from).collect();
         let task = Task {
             model,
-            truths,
+            truths: &truths,
             track: &self.track,
             full: &full,
             // a reduced filter is made so that it is as honest as the full one

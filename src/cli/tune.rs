@@ -10,7 +10,7 @@ use crate::report::{Input, markdown_table, tune_page};
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::outage::Outage;
-use nav_sim_navigation::simulation::lincov::{Aim, Per, Track, drive};
+use nav_sim_navigation::simulation::lincov::{Aim, Per, Track, TrueErrors, drive};
 use nav_sim_signal::noise::Model;
 use std::path::{Path, PathBuf};
 
@@ -78,7 +78,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let file = read::model(&args.model, session)?;
     let model = read::at_rate(&args.model, &file.model, scenario.imu.rate_hz, session)?;
     turn_on::expect(&mut scenario.initial, &file, &args.model, session);
-    let truths = truths(args, &file, scenario.imu.rate_hz, session)?;
+    let truths = truths(args, &file, &scenario, session)?;
     let (track, outages) = track(args, &scenario, &model, session)?;
     let result = jobs::tune(&TuneInputs {
         scenario: &scenario,
@@ -130,27 +130,44 @@ fn files(args: &Args) -> Result<Vec<Input>, Failure> {
     named.iter().map(|(role, path)| read::input(role, path)).collect()
 }
 
-/// What may be true, by name, at the rate of the IMU.
+/// What may be true, by name, at the rate of the IMU: noise, turn-on bias, and what the scenario states of the true
+/// IMU and receiver.
 fn truths(
     args: &Args,
     file: &ModelFile,
-    imu_hz: f64,
+    scenario: &Scenario,
     session: &Session,
-) -> Result<(Vec<String>, Vec<Model>), Failure> {
+) -> Result<(Vec<String>, Vec<TrueErrors>), Failure> {
+    let true_errors = |path: &Path, name: &str, model: &Model, turned_on: &ModelFile| {
+        let model = read::at_rate(Path::new(name), model, scenario.imu.rate_hz, session)?;
+        let (mut imu, gnss) = (scenario.imu.clone(), scenario.gnss.clone());
+        turn_on::make(&mut imu, turned_on, path, session);
+        Ok::<_, Failure>((name.to_owned(), TrueErrors { model, imu, gnss }))
+    };
     let named = if args.intervals {
-        file.extremes().ok_or_else(|| {
+        let extremes = file.extremes().ok_or_else(|| {
             Failure::input(format!("{}: no parameter has an interval", args.model.display()))
                 .hint("`nav-sim calibrate` writes them beside the parameters (unless --bootstrap 0)")
-        })?
+        })?;
+        let all = extremes.iter().map(|(name, model)| true_errors(&args.model, name, model, file));
+        all.collect::<Result<Vec<_>, _>>()?
     } else {
         let truth = |path: &PathBuf| {
-            Ok::<_, Failure>((path.display().to_string(), read::model(path, session)?.model))
+            let file = read::model(path, session)?;
+            true_errors(path, &path.display().to_string(), &file.model, &file)
         };
-        args.truths.iter().map(truth).collect::<Result<_, _>>()?
+        args.truths.iter().map(truth).collect::<Result<Vec<_>, _>>()?
     };
-    let models = named.iter().map(|(name, model)| read::at_rate(Path::new(name), model, imu_hz, session));
-    let models = models.collect::<Result<_, _>>()?;
-    Ok((named.into_iter().map(|(name, _)| name).collect(), models))
+    let mut doubts = Vec::new();
+    for (_, truth) in &named {
+        for doubt in (Scenario { imu: truth.imu.clone(), ..scenario.clone() }).doubts() {
+            if !doubts.contains(&doubt) {
+                doubts.push(doubt);
+            }
+        }
+    }
+    session.warn_all(&doubts);
+    Ok(named.into_iter().unzip())
 }
 
 /// The way of the analysis with its outages.

@@ -4,8 +4,10 @@ use crate::formats::model_file::{ModelFile, PROGRAM};
 use crate::report::{FactorEntry, Input, TuneResult};
 use nav_sim_navigation::ekf::{BeliefError, FilterStates};
 use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::sensors::defects::ImuSettings;
 use nav_sim_navigation::sensors::outage::Outage;
-use nav_sim_navigation::simulation::lincov::{Aim, Factor, Honesty, Per, Task, Track, scaled};
+use nav_sim_navigation::simulation::lincov::{Aim, Factor, Honesty, Per, Task, Track, TrueErrors, scaled};
+use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::Model;
 
 /// What is tuned, for what, and where. Models are at the rate of the IMU.
@@ -15,7 +17,7 @@ pub(crate) struct TuneInputs<'a> {
     /// The model to be tuned.
     pub model: &'a Model,
     /// What may be true, by name.
-    pub truths: (Vec<String>, Vec<Model>),
+    pub truths: (Vec<String>, Vec<TrueErrors>),
     /// The way of the analysis.
     pub track: &'a Track,
     /// Its outages.
@@ -62,11 +64,28 @@ pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
         before: task.honesty(task.filter, &ones)?,
         after: task.honesty(task.filter, &factors)?,
         reduced: task.honesty(&reduced, &factors)?,
-        informed: task.informed()?,
+        informed: task
+            .informed(|truth| knowing(inputs.scenario, &truth.imu).belief(&truth.model, outages, track))?,
         sweep: sweep(&task, &factors)?,
         factors,
         truths: names.clone(),
     })
+}
+
+/// The scenario with the filter that has states for what the true IMU is stated to have beside its noise.
+fn knowing(scenario: &Scenario, imu: &ImuSettings) -> Scenario {
+    let mut knowing = scenario.with_full_noise();
+    for sensor in Sensor::ALL {
+        let (_, ppm) = imu.deviations(sensor);
+        let known = (imu.turn_on_bias(sensor), Some(ppm).filter(|ppm| *ppm > 0.0));
+        let initial = &mut knowing.initial;
+        let (bias, scale) = match sensor {
+            Sensor::Accel => (&mut initial.accel_bias_sigma_m_s2, &mut initial.accel_scale_sigma_ppm),
+            Sensor::Gyro => (&mut initial.gyro_bias_sigma_rad_s, &mut initial.gyro_scale_sigma_ppm),
+        };
+        (*bias, *scale) = (known.0.or(*bias), known.1.or(*scale));
+    }
+    knowing
 }
 
 /// The tuned filter with all its variances times 1/16, 1/8, … 16.

@@ -57,3 +57,41 @@ fn intervals_are_covered_and_nothing_to_cover_is_an_error() {
     refused(&["model.toml"], ["neither --truth nor --intervals", "hint: give models"]);
     refused(&["truth.toml", "--truth", "."], ["recordings, not a model", "--estimator gmwm"]);
 }
+
+/// A filter is judged by the errors that `run` makes of the same files: what a truth's `[turn_on]` and a scenario state
+/// beside the noise counts, and a filter that does not expect it is not called honest.
+#[test]
+fn what_is_wrong_beside_the_noise_is_judged_as_run_judges_it() {
+    let (dir, silent) = (tempfile::tempdir().unwrap(), MODEL.replace("[turn_on]\ngyro_rad_s = 1e-4\n", ""));
+    let put = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
+    put("silent.toml", &silent);
+    put("turned_on.toml", &format!("{silent}[turn_on]\naccel_m_s2 = 0.02\ngyro_rad_s = 3e-4\n"));
+    put("drive.toml", crate::common::drive::DRIVE);
+    put("defects.toml", "[imu]\nscale_ppm_gyro = 3000.0\nmisalignment_rad = 0.002\n");
+    put("coloured.toml", "[gnss]\ncorrelated_pos_sigma_m = [5.0, 5.0, 9.0]\ncorrelation_time_s = 60.0\n");
+    let nees = |arguments: &str, of: fn(&Value) -> &Value| {
+        let all = format!("{arguments} --outage 30:40 --filter full --format json --seed 1");
+        let output = tune_or_run(dir.path(), &all);
+        let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+        (of(&found).as_f64().unwrap(), String::from_utf8(output.stderr).unwrap())
+    };
+    let cases = [
+        ("turned_on.toml", "", "turn-on bias of 0.02 m/s², the filter expects 0"),
+        ("silent.toml", " --scenario defects.toml", "scale-factor error of 3000 ppm, the filter expects 0"),
+        ("silent.toml", " --scenario coloured.toml", ""),
+    ];
+    for (truth, scenario, doubt) in cases {
+        let rest = format!("silent.toml --truth {truth}{scenario}");
+        let (tuned, told) =
+            nees(&format!("tune {rest} --trajectory drive.toml"), |f| &f["filters"][0]["nees"]);
+        let run = format!("run drive.toml {rest} --method lincov -o out --force");
+        let (ran, _) = nees(&run, |f| &f["nees"]["mean"]);
+        assert!(ran > 12.0 && (tuned / ran - 1.0).abs() < 1e-6, "{rest}: tune {tuned}, run {ran}");
+        assert!(told.contains(doubt), "{told}");
+    }
+}
+
+fn tune_or_run(dir: &Path, arguments: &str) -> std::process::Output {
+    let mut command = Command::cargo_bin("nav-sim").unwrap();
+    command.current_dir(dir).args(arguments.split_whitespace()).output().unwrap()
+}

@@ -9,7 +9,7 @@ use nav_sim::sensors::imu::Truth;
 use nav_sim::sensors::outage::Outage;
 use nav_sim::trajectory::Trajectory;
 use nav_sim::trajectory::profile::{Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning};
-use nav_sim_navigation::simulation::lincov::{Aim, Factor, Filter, Per, Task, Track, scaled};
+use nav_sim_navigation::simulation::lincov::{Aim, Factor, Filter, Per, Task, Track, TrueErrors, scaled};
 
 const OUTAGES: [Outage; 1] = [Outage { start_s: 200.0, end_s: 260.0 }];
 
@@ -55,6 +55,7 @@ impl Drive {
     fn factors(&self, truths: &[Model], per: Per, aim: Aim) -> Vec<Factor> {
         let filter: &Filter<'_> = &|model: &Model| self.scenario.belief(model, &OUTAGES, &self.track);
         let model = &model(1.0, 1.0);
+        let truths: &[TrueErrors] = &truths.iter().cloned().map(TrueErrors::from).collect::<Vec<_>>();
         let task =
             Task { model, truths, track: &self.track, full: filter, filter, per, aim, allow_smaller: false };
         let factors = task.factors().unwrap();

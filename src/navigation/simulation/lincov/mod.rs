@@ -26,6 +26,6 @@ pub use pass::{Assessment, Consistency, ErrorLaw, FilterPass, Instant, assess};
 pub use reduce::{Alike, drive, reduced_belief};
 pub(crate) use root::Crossing;
 pub use track::Track;
-pub use truth::{DRIFT, NamedSource, TruthSide};
+pub use truth::{DRIFT, NamedSource, TrueErrors, TruthSide};
 pub(crate) use tune::times;
 pub use tune::{Aim, Factor, Filter, Honesty, Per, Task, scaled};

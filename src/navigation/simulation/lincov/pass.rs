@@ -4,7 +4,7 @@ use super::input::Sources;
 use super::joint::{Gain, Inputs, Joint};
 use super::mean::Mean;
 use super::track::{Mark, Measured, NAV, Nav, Track};
-use super::truth::TruthSide;
+use super::truth::{TrueErrors, TruthSide};
 use crate::ekf::Belief;
 use crate::ekf::covariance::PSI;
 use crate::noise::Model;
@@ -56,8 +56,16 @@ pub struct Assessment {
 /// the same drift is in every run, [`super::TruthSide`] adds the errors instead of their variances.
 #[must_use]
 pub fn assess(track: &Track, belief: &Belief, truth: &Model) -> Assessment {
-    let truth = TruthSide::as_expected(belief, truth, !track.perfect);
-    let law = FilterPass::new(track, belief).errors(&truth);
+    assess_side(track, belief, &TruthSide::as_expected(belief, truth, !track.perfect))
+}
+
+/// The same where settings state more of the true errors than a noise model.
+pub(super) fn assess_stated(track: &Track, belief: &Belief, truth: &TrueErrors) -> Assessment {
+    assess_side(track, belief, &TruthSide::as_stated(belief, truth, !track.perfect))
+}
+
+fn assess_side(track: &Track, belief: &Belief, truth: &TruthSide) -> Assessment {
+    let law = FilterPass::new(track, belief).errors(truth);
     let consistency = |all: &[Instant]| all.iter().map(Instant::consistency).collect();
     Assessment { reports: consistency(&law.reports), outage_ends: consistency(&law.outage_ends) }
 }

@@ -6,6 +6,7 @@ use super::track::Measured;
 use crate::ekf::{Belief, UnknownKind};
 use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::{Kind, Model, Process};
+use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
 use crate::simulation::plan::Experiment;
 
@@ -17,6 +18,26 @@ pub struct TruthSide {
     pub(super) starts_off: bool,
     /// Whether the white noise of positions, velocities and heights is there.
     noise: [bool; 3],
+}
+
+/// What may be true of an IMU and its receiver: a noise model at the IMU's rate, and what is wrong beside it. Where
+/// these settings are silent, errors are as the filter expects them.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrueErrors {
+    /// What makes the inertial errors.
+    pub model: Model,
+    /// Turn-on bias, scale factors and misalignment of the true IMU.
+    pub imu: ImuSettings,
+    /// The true receiver, whose positions may have correlated errors.
+    pub gnss: GnssSettings,
+}
+
+impl From<Model> for TrueErrors {
+    /// Nothing beside the model but what the filter expects.
+    fn from(model: Model) -> Self {
+        let imu = ImuSettings { rate_hz: model.rate_hz, ..ImuSettings::default() };
+        Self { model, imu, gnss: GnssSettings::default() }
+    }
 }
 
 /// One source of errors.
@@ -62,7 +83,7 @@ impl TruthSide {
         let mut drifts = Vec::new();
         for sensor in Sensor::ALL {
             parts.extend(processes(model, sensor, &mut drifts));
-            parts.extend(defects(experiment, sensor));
+            parts.extend(defects(experiment.defects, sensor));
         }
         parts.extend(inertial(DRIFT.to_owned(), drifts));
         parts.extend(correlated(experiment.gnss, experiment.rate_hz));
@@ -86,6 +107,29 @@ impl TruthSide {
         let mut inertial = Sources::of_model(model);
         inertial.states.extend(Sources::beside_model(belief));
         Self { inertial, starts_off, noise: [true; 3] }
+    }
+
+    /// The same, with what the settings of the true IMU and of the receiver state in the place of what the filter
+    /// expects: turn-on biases (a 0 too), scale factors, misalignment, correlated errors of positions.
+    pub(super) fn as_stated(belief: &Belief, errors: &TrueErrors, starts_off: bool) -> Self {
+        let TrueErrors { model, imu, gnss } = errors;
+        let mut all = Self::as_expected(belief, model, starts_off);
+        let mut stated: Vec<NamedSource> = correlated(gnss, imu.rate_hz).into_iter().collect();
+        // the processes of the model come first and stay; an expectation has its place in the list after them
+        let own = Sources::of_model(model).states.len();
+        let mut expected = all.inertial.states.split_off(own);
+        for sensor in Sensor::ALL {
+            let first = 3 * sensor as usize;
+            let (bias, (_, ppm)) = (imu.turn_on_bias(sensor), imu.deviations(sensor));
+            expected.retain(|source| {
+                let is_of = |signal: usize| (signal..signal + 3).contains(&source.signal);
+                !(bias.is_some() && is_of(first) || ppm > 0.0 && is_of(SCALED + first))
+            });
+            stated.extend(defects(imu, sensor));
+        }
+        all.inertial.states.append(&mut expected);
+        all.inertial.extend(&Self::together(&stated).inertial);
+        all
     }
 
     /// Whether a measurement has its white noise.
@@ -146,14 +190,14 @@ fn processes(model: &Model, sensor: Sensor, drifts: &mut Vec<Source>) -> Vec<Nam
 }
 
 /// Turn-on bias, scale factors and misalignment of a sensor of the true IMU.
-fn defects(experiment: &Experiment<'_>, sensor: Sensor) -> Vec<NamedSource> {
-    let (bias, ppm) = experiment.defects.deviations(sensor);
+fn defects(imu: &ImuSettings, sensor: Sensor) -> Vec<NamedSource> {
+    let (bias, ppm) = imu.deviations(sensor);
     let first = 3 * sensor as usize;
     let of_sensor = |signal: &usize| *signal >= CROSSED && place(*signal).0 == sensor as usize;
     let all: [(&str, f64, Vec<usize>); 3] = [
         ("turn_on_bias", bias, (first..first + 3).collect()),
         ("scale", ppm * 1e-6, (SCALED + first..SCALED + first + 3).collect()),
-        ("misalignment", experiment.defects.misalignment_rad, (0..SIGNALS).filter(of_sensor).collect()),
+        ("misalignment", imu.misalignment_rad, (0..SIGNALS).filter(of_sensor).collect()),
     ];
     let source = |(name, sigma, signals): (&str, f64, Vec<usize>)| {
         let states = signals.into_iter().map(|signal| Source::constant(signal, sigma));

@@ -6,10 +6,11 @@
 //! on all of them makes the filter exactly honest.
 
 use super::descent::Descent;
-use super::pass::{Assessment, Consistency, assess};
+use super::pass::{Assessment, Consistency, assess_stated};
 use super::reduce::divergence;
 use super::root::Crossing;
 use super::track::Track;
+use super::truth::TrueErrors;
 use crate::ekf::{Belief, BeliefError};
 use crate::imu::{Channel, Sensor};
 use crate::noise::{Model, Process};
@@ -47,8 +48,8 @@ nav_sim_signal::named!(Aim { Worst = "worst", Mean = "mean" });
 pub struct Task<'a> {
     /// The noise model that the filter is made of.
     pub model: &'a Model,
-    /// What may make the inertial errors; at least one.
-    pub truths: &'a [Model],
+    /// What may make the errors; at least one.
+    pub truths: &'a [TrueErrors],
     /// The trajectory with its fixes and outages.
     pub track: &'a Track,
     /// The filter with a state for each process, for which the factors are found.
@@ -157,19 +158,22 @@ impl Task<'_> {
         Ok(Honesty::of(&self.assessments(&belief, self.track)))
     }
 
-    /// Every truth under the filter that is made of it.
+    /// Every truth under the filter that `knows` makes of it.
     ///
     /// # Errors
     /// When a truth has no such filter.
-    pub fn informed(&self) -> Result<Honesty, BeliefError> {
-        let assessed = |truth: &Model| Ok(assess(self.track, &(self.full)(truth)?, truth));
+    pub fn informed(
+        &self,
+        knows: impl Fn(&TrueErrors) -> Result<Belief, BeliefError> + Sync,
+    ) -> Result<Honesty, BeliefError> {
+        let assessed = |truth: &TrueErrors| Ok(assess_stated(self.track, &knows(truth)?, truth));
         let assessments: Result<Vec<Assessment>, BeliefError> =
             self.truths.par_iter().map(assessed).collect();
         Ok(Honesty::of(&assessments?))
     }
 
     fn assessments(&self, belief: &Belief, track: &Track) -> Vec<Assessment> {
-        self.truths.par_iter().map(|truth| assess(track, belief, truth)).collect()
+        self.truths.par_iter().map(|truth| assess_stated(track, belief, truth)).collect()
     }
 
     /// Mean divergence over the truths, and what no error may be.
