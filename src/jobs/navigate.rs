@@ -193,7 +193,7 @@ fn doubt(inputs: &NavigateInputs, belief: &Belief, scenario: &Scenario, observer
             observer.remark(&Note::LargeBias(sensor, sigma));
         }
     }
-    scenario.doubts().into_iter().for_each(|doubt| observer.remark(&Note::Unexpected(doubt)));
+    scenario.doubts().into_iter().for_each(|doubt| observer.remark(&Note::Unexpected(doubt.to_string())));
 }
 
 /// Means over a second that differ so much are motion, not noise: m/s², rad/s.

@@ -231,9 +231,9 @@ impl Scenario {
         full
     }
 
-    /// What the true IMU has and the filter does not expect: its errors will be larger than it says.
+    /// What the true IMU and receiver have and the filter does not expect: its errors will be larger than it says.
     #[must_use]
-    pub fn doubts(&self) -> Vec<String> {
+    pub fn doubts(&self) -> Vec<Unexpected> {
         let mut doubts = Vec::new();
         for sensor in Sensor::ALL {
             let (name, unit) = (sensor.name(), sensor.unit());
@@ -242,20 +242,42 @@ impl Scenario {
             let expected = self.initial.bias_sigma(sensor).unwrap_or(0.0);
             if expected < 0.5 * bias {
                 let key = InitialSettings::bias_key(sensor);
-                doubts.push(format!(
-                    "the true {name} has a turn-on bias of {bias} {unit}, the filter expects {expected}: \
-                     initial.{key} gives it states"
-                ));
+                doubts.push(Unexpected {
+                    source: format!("{name}.turn_on_bias"),
+                    what: format!(
+                        "the true {name} has a turn-on bias of {bias} {unit}, the filter expects {expected}"
+                    ),
+                    remedy: format!("initial.{key} gives it states"),
+                });
             }
             let by_default = self.filter.states.scale_sigma() * 1e6;
             let expected = self.initial.scale_sigma_ppm(sensor).unwrap_or(by_default);
             if expected < 0.5 * ppm {
                 let key = InitialSettings::scale_key(sensor);
-                doubts.push(format!(
-                    "the true {name} has a scale-factor error of {ppm} ppm, the filter expects {expected}: \
-                     initial.{key} gives it states"
-                ));
+                doubts.push(Unexpected {
+                    source: format!("{name}.scale"),
+                    what: format!(
+                        "the true {name} has a scale-factor error of {ppm} ppm, the filter expects {expected}"
+                    ),
+                    remedy: format!("initial.{key} gives it states"),
+                });
             }
+        }
+        let GnssSettings { rate_hz, pos_sigma_m, correlated_pos_sigma_m, correlation_time_s, .. } =
+            &self.gnss;
+        // A filter averages the white noise of so many fixes while the correlated error stays: that is felt when it is no
+        // longer small beside their mean.
+        let fixes = (rate_hz * correlation_time_s).max(1.0);
+        if (0..3).any(|i| correlated_pos_sigma_m[i] > 0.5 * pos_sigma_m[i] / fixes.sqrt()) {
+            let [north, east, down] = correlated_pos_sigma_m;
+            doubts.push(Unexpected {
+                source: "gnss.correlated".to_owned(),
+                what: format!(
+                    "the true receiver has correlated position errors of {north}, {east}, {down} m (north, east, down) over \
+                     {correlation_time_s} s, the filter expects white ones"
+                ),
+                remedy: "no filter has states for them; a larger gnss.pos_sigma_m makes it trust positions less".to_owned(),
+            });
         }
         doubts
     }
@@ -278,6 +300,23 @@ impl Scenario {
             periodic: self.outage_periodic,
             random: self.outage_random,
         }
+    }
+}
+
+/// What the true IMU or receiver has, and the filter does not expect.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Unexpected {
+    /// Its name among the sources of a [`Budget`](crate::metrics::Budget).
+    pub source: String,
+    /// What it is.
+    pub what: String,
+    /// What lets the filter expect it.
+    pub remedy: String,
+}
+
+impl std::fmt::Display for Unexpected {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}: {}", self.what, self.remedy)
     }
 }
 

@@ -135,7 +135,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let manifest = Manifest { independent_windows, wall_s, throughput_epochs_per_s, ..manifest };
     write(&found, &manifest, &TrajectorySeries::of(&inputs.job.trajectory), &args.out)?;
     show(args, &found, throughput_epochs_per_s, session)?;
-    output::doubt_filter(&found.summary, session);
+    output::doubt_filter(&found.summary, &scenario, &inputs.job.truth, session);
     session.wrote(&args.out);
     all_finite(&found.summary)?;
     not_lost(&found.summary)?;

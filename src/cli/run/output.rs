@@ -2,11 +2,12 @@
 
 use crate::cli::{Failure, Session};
 use crate::formats::atomic::{AtomicDir, Claim, Found, claim_directory};
-use crate::jobs::Navigation;
+use crate::jobs::{Navigation, TrueImu};
 use crate::report::{self, Input, Manifest, ModelNote, TrajectorySeries, run_words};
 use nav_sim_navigation::metrics::{Summary, VerdictKind};
-use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::scenario::{Method, Scenario, Unexpected};
 use nav_sim_navigation::sensors::outage::Outage;
+use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
 use std::cell::Cell;
 use std::path::Path;
 
@@ -75,20 +76,68 @@ pub(super) fn write(
 }
 
 /// Says aloud that a filter believes too much of itself, and what helps.
-pub(crate) fn doubt_filter(summary: &Summary, session: &Session) {
-    if summary.verdict.kind != VerdictKind::Overconfident {
-        return;
+pub(super) fn doubt_filter(summary: &Summary, scenario: &Scenario, truth: &TrueImu, session: &Session) {
+    if summary.verdict.kind == VerdictKind::Overconfident {
+        let remedy = remedy(summary, &scenario.doubts(), truth);
+        session.warn(format!("the filter is {}; {remedy}", run_words::verdict(summary)));
     }
+}
+
+const TOO_LARGE: &str =
+    "its errors are too large for a linear filter, and neither another MODEL nor nav-sim tune changes that";
+
+/// What helps: by what the belief lacks, where linear analysis finds the filter wrong already; errors that are large are then
+/// its consequence.
+fn remedy(summary: &Summary, unexpected: &[Unexpected], truth: &TrueImu) -> String {
     let quality = summary.reduction.as_ref().and_then(|reduction| reduction.quality.as_ref());
     let ratios =
         quality.into_iter().flat_map(|q| q.outage_end.iter().chain([&q.mean]).flat_map(|state| state.0));
-    // where the reduced filter is right about the errors of its own model, the errors are of something else
-    let remedy = if run_words::beyond_linear(summary).is_some() || summary.is_second_order {
-        "its errors are too large for a linear filter, and neither another MODEL nor nav-sim tune changes that"
-    } else if ratios.fold(0.0, f64::max) > 1.0 + summary.verdict.tolerance {
-        "--filter full has a state for each process of the model"
-    } else {
-        "the errors are not those that MODEL expects: nav-sim tune finds variances that cover them"
+    if summary.is_second_order {
+        return TOO_LARGE.to_owned();
+    }
+    if let Some(largest) = largest(summary, unexpected) {
+        return largest.to_string();
+    }
+    let is_too_large = run_words::beyond_linear(summary).is_some();
+    match truth {
+        // what recordings contain is unknown, and so is whether linear analysis would find the filter wrong
+        TrueImu::Recordings(_) if is_too_large => TOO_LARGE.to_owned(),
+        // where the reduced filter is right about the errors of its own model, the errors are of something else
+        _ if ratios.fold(0.0, f64::max) > 1.0 + summary.verdict.tolerance => {
+            "--filter full has a state for each process of the model".to_owned()
+        }
+        TrueImu::Model(_) | TrueImu::Recordings(_) => {
+            "the errors are not those that MODEL expects: nav-sim tune finds variances that cover them".to_owned()
+        }
+        // no draw is in a covariance analysis: what is larger there is noise that a filter has no state for
+        TrueImu::AsBelieved if summary.method == Method::Lincov.name() => {
+            "MODEL has noise that no filter contains: nav-sim tune with MODEL as its own --truth finds variances that cover it"
+                .to_owned()
+        }
+        TrueImu::AsBelieved => TOO_LARGE.to_owned(),
+    }
+}
+
+/// The source with the largest share of the worst error, of those that the filter does not expect, where it makes at least
+/// half of what is too much there; without an outage, which has the shares, the first.
+fn largest<'a>(summary: &Summary, unexpected: &'a [Unexpected]) -> Option<&'a Unexpected> {
+    let verdict = &summary.verdict;
+    let outage = verdict.worst_outage.or_else(|| summary.outages.len().checked_sub(1));
+    let Some(budget) = outage.and_then(|k| summary.outages[k].budget.as_ref()) else {
+        return unexpected.first();
     };
-    session.warn(format!("the filter is {}; {remedy}", run_words::verdict(summary)));
+    let state = REPORTED_NAMES.iter().position(|name| *name == verdict.worst_state);
+    let share = |source: &Unexpected| {
+        let shares =
+            budget.shares.iter().find(|(name, _)| *name == source.source).map(|(_, shares)| shares.0);
+        let of = |shares: [f64; REPORTED]| match state {
+            Some(state) => shares[state],
+            None => shares.into_iter().fold(0.0, f64::max),
+        };
+        shares.map_or(0.0, of)
+    };
+    // of a mean square that is ratio² times what is believed, this share is too much
+    let excess = 1.0 - verdict.ratio.powi(-2);
+    let largest = unexpected.iter().max_by(|a, b| share(a).total_cmp(&share(b)))?;
+    (share(largest) > 0.5 * excess).then_some(largest)
 }

@@ -99,6 +99,9 @@ fn assumptions(summary: &Summary, manifest: &Manifest) -> Vec<(&'static str, Str
         ("GNSS", receiver(&scenario.gnss)),
         ("start (1 σ)", start(&scenario.initial)),
     ];
+    if let Some(baro) = &scenario.baro {
+        facts.push(("barometer", format!("{} Hz; 1 σ {} m", baro.rate_hz, readable(baro.sigma_m))));
+    }
     if summary.runs > 0 {
         let worth = readable(summary.independent_runs);
         facts.push((
@@ -130,7 +133,15 @@ fn receiver(gnss: &GnssSettings) -> String {
     let velocity =
         gnss.vel_sigma_m_s.map_or("no velocity".to_owned(), |v| format!("velocity {} m/s", three(&v)));
     let position = three(&gnss.pos_sigma_m);
-    format!("{} Hz; 1 σ north, east, down: position {position} m, {velocity}", gnss.rate_hz)
+    let mut words = format!("{} Hz; 1 σ north, east, down: position {position} m, {velocity}", gnss.rate_hz);
+    if gnss.correlated_pos_sigma_m.iter().any(|sigma| *sigma > 0.0) {
+        let (sigma, time) = (three(&gnss.correlated_pos_sigma_m), readable(gnss.correlation_time_s));
+        words += &format!("; in truth a correlated position error of {sigma} m over {time} s beside it");
+    }
+    if gnss.lever_arm_m.iter().any(|x| *x != 0.0) {
+        words += &format!("; antenna {} m front, right, down of the IMU", three(&gnss.lever_arm_m));
+    }
+    words
 }
 
 /// What the filter knows at the start.

@@ -202,3 +202,48 @@ fn a_motion_that_nothing_makes_is_doubted() {
     assert!(said.contains(", beyond ") && said.contains("more such stretches"), "{said}");
     assert!(!run("drive.toml").contains("trajectory check"));
 }
+
+/// What is wrong with a filter is what it does not expect: the warning names the largest of it and what helps, and neither
+/// `tune` nor the size of the errors, which is its consequence.
+#[test]
+fn the_remedy_is_for_what_the_filter_does_not_expect() {
+    let place = place();
+    let put = |name: &str, text: &str| fs::write(place.path().join(name), text).unwrap();
+    put("turned_on.toml", &format!("{MODEL}[turn_on]\naccel_m_s2 = 0.5\ngyro_rad_s = 1e-6\n"));
+    put("coloured.toml", "gnss.correlated_pos_sigma_m = [9, 9, 9]\ngnss.correlation_time_s = 60\n");
+    put("scaled.toml", "imu.scale_ppm_gyro = 50000\n");
+    let cases = [
+        (
+            "--truth turned_on.toml",
+            "the true accel has a turn-on bias of 0.5 m/s²",
+            "initial.accel_bias_sigma_m_s2",
+        ),
+        ("--scenario coloured.toml", "correlated position errors of 9, 9, 9 m", "a larger gnss.pos_sigma_m"),
+        (
+            "--scenario scaled.toml",
+            "the true gyro has a scale-factor error of 50000 ppm",
+            "initial.gyro_scale_sigma_ppm",
+        ),
+    ];
+    for (arguments, cause, helps) in cases {
+        for method in ["lincov", "both --runs 8"] {
+            let command = format!(
+                "run drive.toml imu.toml {arguments} --outage 30:40 --seed 1 --method {method} -o out"
+            );
+            let ran = nav_sim(place.path(), &command);
+            let warning =
+                ran.stderr.lines().find(|line| line.contains("the filter is overconfident")).unwrap();
+            assert!(warning.contains(cause) && warning.contains(helps), "{warning}");
+            assert!(!warning.contains("nav-sim tune"), "{warning}");
+        }
+    }
+    done(
+        place.path(),
+        "run drive.toml imu.toml --scenario coloured.toml --method lincov --outage none -o page",
+    );
+    let page = fs::read_to_string(place.path().join("page/report.html")).unwrap();
+    assert!(
+        page.contains("in truth a correlated position error of 9.00, 9.00, 9.00 m over 60.0 s"),
+        "{page}"
+    );
+}
