@@ -53,23 +53,57 @@ pub(crate) fn text(summary: &Summary) -> String {
     text
 }
 
-/// Where errors are too large for a linear filter, and for covariance analysis: the outage where it is worst.
+/// Where errors are too large for a linear filter, and for covariance analysis: the outages where it is worst.
 pub(crate) fn beyond_linear(summary: &Summary) -> Option<String> {
+    let lines: Vec<String> =
+        [beyond_vertically(summary), beyond_horizontally(summary)].into_iter().flatten().collect();
+    (!lines.is_empty()).then(|| lines.join("\n"))
+}
+
+fn beyond_vertically(summary: &Summary) -> Option<String> {
     let beyond = summary.outages.iter().filter_map(|o| Some((o, o.beyond_linear()?)));
     let (outage, share) = beyond.max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let how_far = match summary.runs {
-        0 => "; --method both shows how far",
-        _ => "",
-    };
     Some(format!(
         "beyond linear: attitude errors of the outage {} shift the velocity down by {} m/s to second order, {:.0} % of the \
          filter's standard deviation, which neither filter nor covariance analysis contains; for some minutes from its end on the velocity \
-         down and the vertical accelerometer bias can be twice as wrong as believed{how_far}. A barometer, a shorter outage \
-         or a better gyroscope removes it",
+         down and the vertical accelerometer bias can be twice as wrong as believed{}. A barometer, a shorter outage \
+         or {} removes it",
         window(outage.start_s, outage.end_s),
         readable(outage.second_order_vel_d_m_s),
-        100.0 * share
+        100.0 * share,
+        how_far(summary),
+        smaller(outage, &TILT)
     ))
+}
+
+fn beyond_horizontally(summary: &Summary) -> Option<String> {
+    let beyond = summary.outages.iter().filter_map(|o| Some((o, o.beyond_linear_horizontally()?)));
+    let (outage, nees) = beyond.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    Some(format!(
+        "beyond linear: heading error times tilt in the outage {} shifts horizontal velocity and position to second order, by which the \
+         NEES at its end is larger by about {}, which neither filter nor covariance analysis contains{}. A shorter outage or {} removes it",
+        window(outage.start_s, outage.end_s),
+        readable(nees),
+        how_far(summary),
+        smaller(outage, &[YAW])
+    ))
+}
+
+const fn how_far(summary: &Summary) -> &'static str {
+    if summary.runs == 0 { "; --method both shows how far" } else { "" }
+}
+
+/// Roll and pitch, and yaw, among the reported states.
+const TILT: [usize; 2] = [6, 7];
+const YAW: usize = 8;
+
+/// What makes these attitude errors smaller: where most of them was there at the start, no gyroscope.
+fn smaller(outage: &OutageSummary, states: &[usize]) -> &'static str {
+    let largest = outage.budget.as_ref().and_then(|b| Some(b.ranked(states).first()?.0 == "initial"));
+    match largest {
+        Some(true) => "a better initial attitude (fixes before the outage, a smaller initial.att_sigma_deg)",
+        _ => "a better gyroscope",
+    }
 }
 
 /// `required p95_m<=5: NOT MET, 7.41 at the end of outage 1`

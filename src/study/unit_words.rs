@@ -160,6 +160,7 @@ pub(super) fn expected_outage((start_s, end_s): (f64, f64), words: &mut Words<'_
         horizontal_p95_m: words.quantile(),
         horizontal_p999_m: Some(words.float()),
         horizontal_max_m: f64::NAN,
+        second_order_nees: f64::NAN,
         reconvergence: Reconvergence { p50_s: unknown, p95_s: unknown, never: None },
     }
 }

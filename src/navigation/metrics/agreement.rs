@@ -69,6 +69,7 @@ impl Summary {
     /// which chance has no part, unless the runs contradict them: then errors are no longer small, and the runs are right.
     pub fn expect(&mut self, expected: Self, agreement: Agreement) {
         self.method = "both";
+        self.take_second_order(&expected);
         let diverged = self.verdict.kind == VerdictKind::Diverged;
         self.is_second_order = self.surpasses(&expected) && agreement.is_broken();
         if !agreement.is_broken() {
@@ -86,6 +87,7 @@ impl Summary {
     /// A filter that runs do not find wrong, being too few, is wrong where covariance analysis finds it so and the runs
     /// do not contradict that.
     pub fn doubt_by(&mut self, expected: &Self) {
+        self.take_second_order(expected);
         self.is_second_order = self.surpasses(expected) && Agreement::of(self, expected).is_broken();
         // The runs' own alarm stands, and an expectation without fault adds nothing to it.
         let is_told = self.verdict.kind != VerdictKind::Ok || expected.verdict.kind == VerdictKind::Ok;

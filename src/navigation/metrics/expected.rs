@@ -4,6 +4,7 @@ use super::epoch::{Accuracy, EpochMetrics};
 use super::estimate::{Estimate, PerState, Quantile};
 use super::outage::{OutageMetrics, Reconvergence, within};
 use super::quadratic_form::QuadraticForm;
+use super::second_order::horizontal_nees;
 use super::summary::{AccuracySummary, Consistency, Coverage, Nis, OutageSummary, SCHEMA_VERSION, Summary};
 use super::verdict::{OutageVerdict, Verdict};
 use crate::ekf::Belief;
@@ -187,6 +188,7 @@ fn outage((start_s, end_s): (f64, f64), end: &Instant, epochs: &[EpochMetrics]) 
         horizontal_p95_m: quantile(p95),
         horizontal_p999_m: Some(p999),
         horizontal_max_m: f64::NAN,
+        second_order_nees: horizontal_nees((start_s, end_s), &end.believed, epochs),
         reconvergence: Reconvergence { p50_s: quantile(f64::NAN), p95_s: quantile(f64::NAN), never: None },
     }
 }

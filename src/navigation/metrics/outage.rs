@@ -32,6 +32,8 @@ pub struct OutageMetrics {
     pub horizontal_p999_m: Option<f64>,
     /// Largest; NaN of a covariance analysis, whose law has no end.
     pub horizontal_max_m: f64,
+    /// What the horizontal errors of second order add to the expected NEES there; of a covariance analysis only.
+    pub second_order_nees: f64,
     /// How soon the runs recover.
     pub reconvergence: Reconvergence,
 }
@@ -94,6 +96,7 @@ fn outage((start_s, end_s): (f64, f64), records: &[&OutageRecord], windows: Opti
         horizontal_p95_m: quantile(&horizontal, 0.95, windows),
         horizontal_p999_m: None,
         horizontal_max_m: horizontal.last().copied().unwrap_or(f64::NAN),
+        second_order_nees: f64::NAN,
         reconvergence: Reconvergence {
             p50_s: quantile(&recovery, 0.5, windows),
             p95_s: quantile(&recovery, 0.95, windows),

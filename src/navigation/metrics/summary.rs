@@ -124,6 +124,10 @@ pub struct OutageSummary {
     /// Mean shift of the velocity down at the same instant that attitude errors make to second order, which neither
     /// filter nor covariance analysis contains (null where the epochs were not kept, or a barometer sees the height).
     pub second_order_vel_d_m_s: f64,
+    /// What heading error times tilt, which is of second order, adds to the expected NEES at the same instant; NaN where no
+    /// covariance analysis stands beside the runs.
+    #[serde(skip)]
+    pub second_order_nees: f64,
     /// Time until the error is back to what it was before.
     pub reconvergence_s: Recovery,
     /// Shares of the sources of the true errors in their mean squares just before the first fix after the outage,
@@ -301,6 +305,7 @@ impl OutageSummary {
                 ..Spread::new(o.horizontal_p50_m, o.horizontal_p95_m, o.horizontal_max_m)
             },
             second_order_vel_d_m_s,
+            second_order_nees: o.second_order_nees,
             reconvergence_s: Recovery {
                 p50: o.reconvergence.p50_s.value,
                 p95: o.reconvergence.p95_s.value,

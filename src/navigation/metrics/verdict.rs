@@ -15,7 +15,7 @@ use serde::{Deserialize, Deserializer, Serialize};
 /// Probability at which a right filter is called wrong, all statistics together.
 const LEVEL: f64 = 0.01;
 /// Errors that differ by less than this share from the filter's standard deviations are let pass.
-const TOLERANCE: f64 = 0.1;
+pub(super) const TOLERANCE: f64 = 0.1;
 /// A mean NEES above this is not a matter of tuning: the filter has lost its way.
 const LOST: f64 = 100.0;
 
