@@ -99,9 +99,12 @@ const YAW: usize = 8;
 
 /// What makes these attitude errors smaller: where most of them was there at the start, no gyroscope.
 fn smaller(outage: &OutageSummary, states: &[usize]) -> &'static str {
-    let largest = outage.budget.as_ref().and_then(|b| Some(b.ranked(states).first()?.0 == "initial"));
+    let largest = outage.budget.as_ref().and_then(|b| Some(b.ranked(states).first()?.0));
     match largest {
-        Some(true) => "a better initial attitude (fixes before the outage, a smaller initial.att_sigma_deg)",
+        Some(name) if name.starts_with("accel") => "a better accelerometer",
+        Some("initial") => {
+            "a better initial attitude (fixes before the outage, a smaller initial.att_sigma_deg)"
+        }
         _ => "a better gyroscope",
     }
 }

@@ -138,7 +138,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     output::doubt_filter(&found.summary, &scenario, &inputs.job.truth, session);
     session.wrote(&args.out);
     all_finite(&found.summary)?;
-    not_lost(&found.summary)?;
+    not_lost(&found.summary, &scenario)?;
     required(&found.summary)
 }
 
@@ -195,14 +195,17 @@ fn seed(scenario: &Scenario, session: &Session) -> u64 {
 }
 
 /// A filter whose errors are of another order than it believes did what was asked for, and is of no use.
-fn not_lost(summary: &Summary) -> Result<(), Failure> {
+fn not_lost(summary: &Summary, scenario: &Scenario) -> Result<(), Failure> {
     if !summary.verdict.is_lost() {
         return Ok(());
     }
     let message =
         format!("the filter is lost: NEES {:.0}, {} if it is right", summary.nees.mean, summary.nees.dof);
-    Err(Failure::bound(message)
-        .hint("the results are written; does MODEL describe the errors of --truth or --static?"))
+    let hint = match scenario.doubts().is_empty() {
+        true => "the results are written; does MODEL describe the errors of --truth or --static?",
+        false => "the results are written; the warnings name what the filter does not expect",
+    };
+    Err(Failure::bound(message).hint(hint))
 }
 
 /// A run that diverged is left out of every number; the exit code says that there was one.
