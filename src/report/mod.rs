@@ -57,7 +57,7 @@ pub(crate) use manifest::{FusionConfiguration, FusionKind, FusionManifest};
 pub use manifest::{Input, Manifest, ModelNote};
 pub(crate) use markdown::{csv_table, latex_table, markdown, markdown_table};
 pub use number::readable;
-pub(crate) use number::{seconds, window};
+pub(crate) use number::{seconds, six_digits, window};
 pub(crate) use pages::{
     PaperFigure, RatioCurves, ShownComparison, StudyCurves, calibration_page, calibration_svg,
     catalogue_page, choice_page, design_page, efficiency_page, efficiency_svg, fusion_page, model_page,

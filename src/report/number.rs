@@ -12,6 +12,11 @@ pub(crate) fn seconds(t_s: f64) -> String {
     format!("{}", (t_s * 100.0).round() / 100.0)
 }
 
+/// A value as the nearest of six significant digits: more of a rate or a time is no one's to read.
+pub(crate) fn six_digits(value: f64) -> f64 {
+    format!("{value:.5e}").parse().unwrap_or(value)
+}
+
 /// A window of a schedule: `300–390 s`.
 pub(crate) fn window(start_s: f64, end_s: f64) -> String {
     format!("{}–{} s", seconds(start_s), seconds(end_s))

@@ -16,6 +16,7 @@ mod report;
 mod table;
 mod text;
 mod texture;
+pub(in crate::formats) mod time_unit;
 pub(in crate::formats) mod timing;
 mod values;
 mod write;

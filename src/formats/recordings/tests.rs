@@ -1,3 +1,4 @@
+mod clocks;
 mod doubts;
 mod garbage;
 mod gravity;
@@ -260,58 +261,6 @@ fn headers_that_do_not_help() {
     for text in ["0,1\n0.01,2\n", "time,speed\n0,1\n0.01,2\n"] {
         assert_close(&samples_with_mean(&read_one("a.csv", text, &named).unwrap().signals[0]), &[1.0, 2.0]);
     }
-}
-
-#[test]
-fn time_is_checked() {
-    assert_eq!(refusal(changed(7, "0.03,1")), "a.csv, line 7: time goes back from 0.04 s to 0.03 s");
-    assert_eq!(
-        refusal(changed(7, "0.04,1")),
-        "a.csv, line 7: duplicate in time: 0.04 s to 0.04 s, the median step is 0.01 s (2 such steps in all)"
-    );
-    let gap: String =
-        sound(20).into_iter().enumerate().filter(|(i, _)| *i != 10).map(|(_, l)| l + "\n").collect();
-    assert_eq!(refusal(&gap), "a.csv, line 11: gap in time from 0.08 s to 0.1 s, the median step is 0.01 s");
-    assert_eq!(
-        refusal("t_s,gyro_x_rad_s\n1,1\n1,2\n1,3\n"),
-        "a.csv: column \"t_s\" does not advance: its median step is 0"
-    );
-
-    let with = |gaps| ReadOptions { gaps, ..ReadOptions::default() };
-    let (_files, path) = Files::with("a.csv", &gap);
-    let (split, report) = read(std::slice::from_ref(&path), &with(Gaps::Split)).unwrap();
-    assert_eq!(split.iter().map(Recording::len).collect::<Vec<_>>(), [9, 10]);
-    assert!(
-        report.files[0].warnings[0].contains("split at 1 gaps or duplicates in time, the first in line 11")
-    );
-    let (whole, _) = read(&[path], &with(Gaps::Ignore)).unwrap();
-    assert_eq!((whole.len(), whole[0].len()), (1, 19));
-    assert_close(&[whole[0].rate_hz], &[100.0]);
-}
-
-#[test]
-fn rates() {
-    let text = sound(20).join("\n");
-    let given = |rate_hz| ReadOptions { rate_hz: Some(rate_hz), ..ReadOptions::default() };
-    assert_eq!(
-        refusal_with("a.csv", &text, &given(200.0)).0,
-        "a.csv: the time column runs at 100 Hz, but 200 Hz is given"
-    );
-    assert_eq!(refusal_with("a.csv", &text, &given(-1.0)).0, "a.csv: -1 Hz is not a sample rate");
-    assert_eq!(refusal("gyro_x_rad_s\n1\n2\n"), "a.csv: no time column, and no rate is given");
-    // Stamps rounded to 1 ms at 128 Hz: the span knows the rate, no single step does.
-    let rounded: String = (0..1000).map(|k| format!("{:.3},{}\n", k as f64 / 128.0, k % 3)).collect();
-    let r = read_one("a.csv", format!("t_s,gyro_x_rad_s\n{rounded}"), &ReadOptions::default()).unwrap();
-    assert!((r.rate_hz - 128.0).abs() < 0.01, "{}", r.rate_hz);
-
-    let files = Files::new();
-    files.add("a.csv", &text);
-    files.add("b.csv", text.replace("t_s", "t_ms"));
-    let message = read(&[files.path()], &ReadOptions::default()).unwrap_err().to_string();
-    assert!(
-        message.ends_with(&format!("b.csv has 100000 Hz, but {}/a.csv has 100 Hz", files.path().display())),
-        "{message}"
-    );
 }
 
 #[test]

@@ -3,12 +3,14 @@
 use super::error::{storage, too_short};
 use super::header::Role;
 use super::table::{Column, Raw};
+use super::time_unit::Guess;
 use super::values::Values;
 use super::{FileReport, Gaps, ReadOptions};
 use crate::formats::{FileError, Place, Setting};
+use crate::report::six_digits;
 
 /// Rates beyond these are looked at twice (Hz).
-const USUAL_RATES_HZ: std::ops::RangeInclusive<f64> = 0.5..=20_000.0;
+pub(super) const USUAL_RATES_HZ: std::ops::RangeInclusive<f64> = 0.5..=20_000.0;
 
 /// All numbers of a column.
 fn of_file(raw: &Raw, values: Values) -> Result<Vec<f64>, FileError> {
@@ -44,7 +46,7 @@ pub(super) fn timing(
     let ticks = take(raw, |r| *r == Role::Ticks);
     let known = options.rate_hz.or(raw.head_rate_hz);
     let clock = match (time, counter, ticks, known) {
-        (Some(time), ..) => Clock::of_time(time, raw, report)?,
+        (Some(time), ..) => Clock::of_time(time, raw, options, report)?,
         (None, Some(counter), _, Some(rate_hz)) => {
             let source = if options.rate_hz.is_some() { "given" } else { "head of the file" };
             let mut clock = Clock::counting(counter, raw, 65536.0, 1.0)?;
@@ -84,7 +86,18 @@ fn doubt(timing: &Checked, column: &str, raw: &Raw, options: &ReadOptions, repor
         let first = raw.lines.of(timing.breaks[0]);
         let n = timing.breaks.len();
         report.warn(match options.gaps {
-            Gaps::Ignore => format!("{n} gaps or duplicates in time ignored, the first in line {first}"),
+            Gaps::Ignore => {
+                let mut text = format!("{n} gaps or duplicates in time ignored, the first in line {first}");
+                // Lost samples lengthen the span, late stamps do not.
+                if (timing.step_hz / timing.found_hz - 1.0).abs() > DISAGREEING {
+                    let (span, step) = (six_digits(timing.found_hz), six_digits(timing.step_hz));
+                    text += &format!(
+                        "; the rate over the whole is {span} Hz, that of the median step {step} Hz: were samples lost, give \
+                         the rate (--rate-hz), or split the recording (--gaps split)"
+                    );
+                }
+                text
+            }
             _ => format!("split at {n} gaps or duplicates in time, the first in line {first}"),
         });
     }
@@ -95,11 +108,16 @@ struct Checked {
     rate_hz: f64,
     /// The clock's own rate (Hz).
     found_hz: f64,
+    /// The rate of its median step (Hz).
+    step_hz: f64,
     breaks: Vec<usize>,
 }
 
 /// A rate that is given may differ from the clock's by so much without a word: it was rounded.
 const ROUNDED: f64 = 1e-3;
+
+/// A rate that differs by more than this is another.
+const DISAGREEING: f64 = 0.01;
 
 /// Time of each sample.
 #[derive(Debug)]
@@ -114,23 +132,27 @@ struct Clock {
 }
 
 impl Clock {
-    fn of_time(column: Column, raw: &Raw, report: &mut FileReport) -> Result<Self, FileError> {
+    fn of_time(
+        column: Column,
+        raw: &Raw,
+        options: &ReadOptions,
+        report: &mut FileReport,
+    ) -> Result<Self, FileError> {
         let (name, mut since) = (column.name, of_file(raw, column.values)?);
         let first = since.first().copied().unwrap_or(0.0);
         since.iter_mut().for_each(|t| *t -= first);
         let unit_s = match column.role {
             Role::Time { unit_s: Some(unit) } => unit,
             _ => {
-                let (unit, word) = unit_of_step(median_step(&since));
+                let step = step_of(&since, options.gaps);
+                let known = options.rate_hz.or(raw.head_rate_hz);
+                let guess = Guess::new(step, first, known);
                 if since.len() > 1 {
-                    report.assumptions.push(format!("column \"{name}\" taken as {word}, from its step"));
+                    guess.tell(&name, step, report);
                 }
-                unit
+                guess.unit_s
             }
         };
-        if since.len() > 2 && median_step(&since) == 0.0 {
-            return Err(still(&raw.path, &name));
-        }
         Ok(Self { name, start: first * unit_s, since, unit_s, source: "time column".into() })
     }
 
@@ -167,8 +189,9 @@ impl Clock {
         if self.since.len() < 2 {
             return Err(too_short(&raw.path, self.since.len(), 2));
         }
-        if median <= 0.0 {
-            return Err(still(&raw.path, &self.name));
+        let step = step_of(&self.since, options.gaps);
+        if step <= 0.0 {
+            return Err(self.still(&raw.path));
         }
         let irregular = |s: f64| s > 1.5 * median || s < 0.5 * median;
         let breaks: Vec<usize> =
@@ -188,34 +211,30 @@ impl Clock {
             let message = format!("{what}, the median step is {step} s{more}");
             return Err(FileError::contents(raw.path.as_str(), line, message).setting(Setting::Gaps));
         }
-        let found = self.rate(median, breaks.is_empty());
+        let rate = |step: f64| rounded(1.0 / (step * self.unit_s));
+        // The whole span averages the jitter.
+        let found = rate(if breaks.is_empty() { mean_step(&self.since) } else { step });
         let given = options.rate_hz.unwrap_or(found);
-        if (found / given - 1.0).abs() > 0.01 {
+        if options.gaps != Gaps::Ignore && (found / given - 1.0).abs() > DISAGREEING {
             let message = format!("the time column runs at {found} Hz, but {given} Hz is given");
             return Err(
                 FileError::contents(raw.path.as_str(), Place::Within, message).setting(Setting::WrongRate)
             );
         }
-        Ok(Checked { rate_hz: given, found_hz: found, breaks })
+        Ok(Checked { rate_hz: given, found_hz: found, step_hz: rate(median), breaks })
     }
 
-    /// From the whole span if it has no gaps (averages the jitter), else from the median step.
-    fn rate(&self, median: f64, regular: bool) -> f64 {
-        let n = self.since.len() - 1;
-        let step = if regular { self.since[n] / n as f64 } else { median };
-        rounded(1.0 / (step * self.unit_s))
+    /// A clock that does not advance, or by coarser steps than those of the samples.
+    fn still(&self, path: &str) -> FileError {
+        let message = format!("column \"{}\" does not advance: its median step is 0", self.name);
+        let error = FileError::contents(path, Place::Within, message);
+        if mean_step(&self.since) > 0.0 { error.setting(Setting::Gaps) } else { error }
     }
-}
-
-/// A clock that does not advance.
-fn still(path: &str, column: &str) -> FileError {
-    let message = format!("column \"{column}\" does not advance: its median step is 0");
-    FileError::contents(path, Place::Within, message)
 }
 
 /// Six significant digits where the value is that within 1e-7 (stamps are rounded), else as it is.
 fn rounded(value: f64) -> f64 {
-    let short: f64 = format!("{value:.5e}").parse().unwrap_or(value);
+    let short = six_digits(value);
     if (short / value - 1.0).abs() < 1e-7 { short } else { value }
 }
 
@@ -228,12 +247,16 @@ pub(in crate::formats) fn median_step(times: &[f64]) -> f64 {
     *steps.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
-/// The unit in which a step is that of 10 Hz … 10 kHz: the four ranges do not overlap.
-pub(in crate::formats) fn unit_of_step(step: f64) -> (f64, &'static str) {
-    match step {
-        s if s >= 1e5 => (1e-9, "ns"),
-        s if s >= 100.0 => (1e-6, "µs"),
-        s if s > 0.1 => (1e-3, "ms"),
-        _ => (1.0, "s"),
+/// The step over the whole span; 0 of fewer than two.
+fn mean_step(times: &[f64]) -> f64 {
+    match times {
+        [first, .., last] => (last - first) / (times.len() - 1) as f64,
+        _ => 0.0,
     }
+}
+
+/// The step of the samples: gaps do not change the median. Where the stamps are late (coarse, in bursts) and no sample is
+/// lost, no single step is that of the samples, but the span is theirs.
+fn step_of(times: &[f64], gaps: Gaps) -> f64 {
+    if gaps == Gaps::Ignore { mean_step(times) } else { median_step(times) }
 }

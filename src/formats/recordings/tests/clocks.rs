@@ -1,0 +1,116 @@
+//! The clock of a recording: gaps, rates, units.
+
+use super::*;
+
+#[test]
+fn time_is_checked() {
+    assert_eq!(refusal(changed(7, "0.03,1")), "a.csv, line 7: time goes back from 0.04 s to 0.03 s");
+    assert_eq!(
+        refusal(changed(7, "0.04,1")),
+        "a.csv, line 7: duplicate in time: 0.04 s to 0.04 s, the median step is 0.01 s (2 such steps in all)"
+    );
+    let gap: String =
+        sound(20).into_iter().enumerate().filter(|(i, _)| *i != 10).map(|(_, l)| l + "\n").collect();
+    assert_eq!(refusal(&gap), "a.csv, line 11: gap in time from 0.08 s to 0.1 s, the median step is 0.01 s");
+    assert_eq!(
+        refusal("t_s,gyro_x_rad_s\n1,1\n1,2\n1,3\n"),
+        "a.csv: column \"t_s\" does not advance: its median step is 0"
+    );
+
+    let with = |gaps| ReadOptions { gaps, ..ReadOptions::default() };
+    let (_files, path) = Files::with("a.csv", &gap);
+    let (split, report) = read(std::slice::from_ref(&path), &with(Gaps::Split)).unwrap();
+    assert_eq!(split.iter().map(Recording::len).collect::<Vec<_>>(), [9, 10]);
+    assert!(
+        report.files[0].warnings[0].contains("split at 1 gaps or duplicates in time, the first in line 11")
+    );
+    // Ignored, 19 samples are taken as evenly spaced over 0.19 s; that one may be lost is told.
+    let (whole, report) = read(&[path], &with(Gaps::Ignore)).unwrap();
+    assert_eq!((whole.len(), whole[0].len()), (1, 19));
+    assert_close(&[whole[0].rate_hz], &[18.0 / 0.19]);
+    let warning = &report.files[0].warnings[0];
+    assert!(warning.contains("over the whole is 94.7368 Hz, that of the median step 100 Hz"), "{warning}");
+}
+
+#[test]
+fn rates() {
+    let text = sound(20).join("\n");
+    let given = |rate_hz| ReadOptions { rate_hz: Some(rate_hz), ..ReadOptions::default() };
+    assert_eq!(
+        refusal_with("a.csv", &text, &given(200.0)).0,
+        "a.csv: the time column runs at 100 Hz, but 200 Hz is given"
+    );
+    assert_eq!(refusal_with("a.csv", &text, &given(-1.0)).0, "a.csv: -1 Hz is not a sample rate");
+    assert_eq!(refusal("gyro_x_rad_s\n1\n2\n"), "a.csv: no time column, and no rate is given");
+    // Stamps rounded to 1 ms at 128 Hz: the span knows the rate, no single step does.
+    let rounded: String = (0..1000).map(|k| format!("{:.3},{}\n", k as f64 / 128.0, k % 3)).collect();
+    let r = read_one("a.csv", format!("t_s,gyro_x_rad_s\n{rounded}"), &ReadOptions::default()).unwrap();
+    assert!((r.rate_hz - 128.0).abs() < 0.01, "{}", r.rate_hz);
+
+    let files = Files::new();
+    files.add("a.csv", &text);
+    files.add("b.csv", text.replace("t_s", "t_ms"));
+    let message = read(&[files.path()], &ReadOptions::default()).unwrap_err().to_string();
+    assert!(
+        message.ends_with(&format!("b.csv has 100000 Hz, but {}/a.csv has 100 Hz", files.path().display())),
+        "{message}"
+    );
+}
+
+/// A recording of `n` rows with such stamps.
+fn stamped(name: &str, n: usize, stamp: impl Fn(usize) -> String) -> String {
+    let rows = (0..n).map(|k| format!("{},{}\n", stamp(k), (k * k % 1009 % 7) as f64 * 1e-3));
+    format!("{name},gyro_x_rad_s\n{}", rows.collect::<String>())
+}
+
+/// Stamps that are late by less than `late` leave the span right to that: the rate, to `late/span`.
+#[test]
+fn coarse_and_bursting_stamps_keep_the_rate_of_the_whole() {
+    const N: usize = 3001;
+    let ignore = |rate_hz| ReadOptions { gaps: Gaps::Ignore, rate_hz, ..ReadOptions::default() };
+    let cases: [(f64, f64, String); 4] = [
+        (200.0, 0.01, stamped("t_s", N, |k| format!("{:.2}", k as f64 / 200.0))),
+        (1000.0 / 1.2, 1e-3, stamped("t_ms", N, |k| format!("{}", (1.2 * k as f64).floor()))),
+        (100.0, 0.03, stamped("t_s", N, |k| format!("{:.4}", 0.03 * (k / 3) as f64 + 1e-4 * (k % 3) as f64))),
+        (200.0, 1.0 / 64.0, stamped("t_s", N, |k| format!("{}", (k as f64 / 200.0 * 64.0).floor() / 64.0))),
+    ];
+    for (rate_hz, late_s, text) in cases {
+        let bound = late_s * rate_hz / (N - 1) as f64;
+        let r = read_one("a.csv", &text, &ignore(None)).unwrap();
+        assert!((r.rate_hz / rate_hz - 1.0).abs() <= bound, "{} Hz, expected {rate_hz} Hz", r.rate_hz);
+        let r = read_one("a.csv", &text, &ignore(Some(rate_hz))).unwrap();
+        assert_close(&[r.rate_hz], &[rate_hz]);
+        let (_, hint) = refusal_with("a.csv", &text, &ReadOptions::default());
+        assert!(hint.contains("ignore them"), "{hint}");
+    }
+}
+
+#[test]
+fn a_unit_that_is_not_said_is_told_by_the_rate_or_doubted() {
+    let outcome = |name: &str, step: f64, first: f64, rate_hz: Option<f64>| {
+        let text = stamped(name, 100, |k| format!("{}", first + step * k as f64));
+        let (_files, path) = Files::with("a.csv", text);
+        let options = ReadOptions { rate_hz, ..ReadOptions::default() };
+        let (recordings, report) = read(&[path], &options).unwrap();
+        (recordings[0].rate_hz, report.files[0].warnings.join("\n"))
+    };
+    // step, guess and what it may be as well, the rates
+    for (step, guessed, other) in [(1.0, 1000.0, 1.0), (50.0, 20.0, 20_000.0), (200.0, 5000.0, 5.0)] {
+        let (rate_hz, warning) = outcome("time", step, 0.0, None);
+        assert_close(&[rate_hz], &[guessed]);
+        assert!(warning.contains("--columns t_s,…") && warning.contains("--rate-hz"), "{warning}");
+        assert!(warning.contains(&format!("it would be {other} Hz in ")), "{warning}");
+        for given in [guessed, other] {
+            let (rate_hz, warning) = outcome("time", step, 0.0, Some(given));
+            assert_close(&[rate_hz], &[given]);
+            assert_eq!(warning, "");
+        }
+    }
+    let (rate_hz, warning) = outcome("time", 99.0, 0.0, None);
+    assert_close(&[rate_hz], &[1e3 / 99.0]);
+    assert!(warning.contains("taken as 10.101 Hz in ms, but it would be 10101 Hz in µs"), "{warning}");
+    // No doubt: a rate that only one unit makes plausible, a unit that is said, Unix time in µs.
+    assert_eq!(outcome("time", 10.0, 0.0, None), (100.0, String::new()));
+    assert_eq!(outcome("t_s", 1.0, 0.0, None), (1.0, String::new()));
+    assert_eq!(outcome("timestamp", 1000.0, 1.7e15, None), (1000.0, String::new()));
+}
