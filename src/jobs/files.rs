@@ -49,7 +49,9 @@ impl ModelFiles {
         let all = Self::of(out, estimators);
         let inputs = || inputs.iter().map(PathBuf::as_path);
         atomic::guard_inputs(out, inputs())?;
-        let others = all.iter().flat_map(|f| [&f.model, &f.curves, &f.draws, &f.page]).filter(|p| *p != out);
+        // What stands beside a model is claimed even where it is called like `out`: it would replace the model.
+        let models = all.iter().map(|f| &f.model).filter(|path| *path != out);
+        let others = models.chain(all.iter().flat_map(|f| [&f.curves, &f.draws, &f.page]));
         let claims = others.map(|path| atomic::claim_file(path, inputs())).collect::<Result<_, _>>()?;
         Ok((all, claims))
     }
@@ -186,6 +188,7 @@ impl ModelFiles {
 /// When it cannot be replaced by a file, or another command writes it.
 pub(crate) fn claim_model(out: &Path) -> Result<Claim, FileError> {
     let what = match std::fs::metadata(out) {
+        _ if out.as_os_str() == "-" => "is no file, and a model is a file with its curves beside it",
         Ok(m) if m.is_dir() => "is a directory",
         Ok(m) if !m.is_file() => "is a device, and a model is a file with its curves beside it",
         _ if out.file_name().is_none() || out.as_os_str().to_string_lossy().ends_with('/') => {

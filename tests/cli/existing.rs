@@ -193,6 +193,7 @@ fn two_outputs_of_one_name_are_refused_at_once() {
         ("calibrate rec --model WN --bootstrap 0 -o a.svg --plot ./a.svg", "./a.svg"),
         ("wv rec -o a.html --page a.html", "a.html"),
         ("compare log --reference log -o a.html", "a.html"),
+        ("calibrate rec --model WN --bootstrap 0 -o a.html", "a.html"),
     ] {
         let ran = plain(place.path(), command);
         let told = format!("error: {output} is another output of the same command\n");
