@@ -35,7 +35,7 @@ pub enum JobError {
     },
     /// Recordings that have samples in common, such as a copy less its first rows.
     #[error(
-        "{later} and {first} have samples in common, about {:.0} % of each: they are no two replicates",
+        "{later} and {first} have samples in common, about {:.0} % of the shorter: they are no two replicates",
         100.0 * share
     )]
     Overlap {
@@ -43,7 +43,7 @@ pub enum JobError {
         later: String,
         /// The one before.
         first: String,
-        /// Which part of one is in the other.
+        /// Which part of the shorter is in the other.
         share: f64,
     },
     /// Too few recordings to leave one out.

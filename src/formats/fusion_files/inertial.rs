@@ -114,12 +114,15 @@ fn headed(path: &Path) -> Result<Columns, Error> {
         signals.push((values, factor, increment));
     }
     let t_s = times(&mut raw)?;
+    let notes = std::mem::take(&mut raw.notes);
+    let assumed = notes.assumptions.into_iter().map(Remark::note);
+    let remarks = assumed.chain(notes.warnings.into_iter().map(Remark::doubt)).collect();
     let sample = |k: usize| std::array::from_fn(|i| signals[i].0[k] * signals[i].1);
     Ok(Columns {
         values: (0..t_s.len()).map(sample).collect(),
         increments: [signals[0].2, signals[3].2],
         lines: (0..t_s.len()).map(|k| raw.lines.of(k)).collect(),
-        remarks: Vec::new(),
+        remarks,
         path: shown,
         t_s,
     })

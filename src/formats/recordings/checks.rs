@@ -6,6 +6,7 @@ use super::header::{Role, Unit};
 use super::table::{Column, Raw};
 use super::values::Values;
 use crate::formats::{FileError, Place, Setting};
+use crate::report::six_digits;
 use nav_sim_signal::imu::{Channel, Sensor};
 use nav_sim_signal::units::STANDARD_GRAVITY;
 use std::io;
@@ -174,7 +175,12 @@ pub(super) fn same_rate(files: &[FileReport]) -> Result<(), FileError> {
     match files.iter().find(|f| (f.rate_hz / first.rate_hz - 1.0).abs() > 0.005) {
         None => Ok(()),
         Some(other) => {
-            let message = format!("has {} Hz, but {} has {} Hz", other.rate_hz, first.file, first.rate_hz);
+            let message = format!(
+                "has {} Hz, but {} has {} Hz",
+                six_digits(other.rate_hz),
+                first.file,
+                six_digits(first.rate_hz)
+            );
             Err(FileError::contents(other.file.as_str(), Place::Itself, message)
                 .advice("calibrate recordings of one rate at a time, or resample them"))
         }

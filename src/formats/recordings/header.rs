@@ -8,6 +8,8 @@
 //! | x-io | `Time (s)`, `Gyroscope X (deg/s)`, `Accelerometer X (g)` |
 //! | gnss-ins-sim | `accel_x (m/s^2)`, `gyro_x (deg/s)` |
 //! | Xsens MT Manager | `PacketCounter`, `SampleTimeFine`, `Acc_X`, `Gyr_X` below a `//` head: SI |
+//! | GNSS/INS units | `gps_week`, `tow_s`; `iTOW`; `gps_time` |
+//! | ArduPilot | `TimeUS` |
 //! | loggers | `ax_mps2`, `gx_radps`, `gyro_x_dps`, `acc_x [mg]`, … |
 
 use super::error::{COLUMNS, no_unit, shown};
@@ -107,6 +109,25 @@ const GYRO: &[&str] = &["gyro", "gyr", "gyroscope", "angular_rate", "ang_vel", "
 const ACCEL_SI: &[&str] = &["linear_acceleration", "field_linear_acceleration", "a_rs_s", "alpha"];
 const GYRO_SI: &[&str] = &["angular_velocity", "field_angular_velocity", "w_rs_s", "omega"];
 const TIME: &[&str] = &["t", "time", "timestamp", "time_stamp", "elapsed", "elapsed_time", "epoch"];
+/// Times whose names hold their unit, and the length of that (s).
+const TIME_IN: &[(&str, f64)] = &[("timeus", 1e-6), ("timems", 1e-3), ("itow", 1e-3)];
+/// Time of a receiver, of the week or not: the last to be taken, because it may be that of its last fix.
+const GPS_TIME: &[&str] = &[
+    "tow",
+    "gps_tow",
+    "gpstow",
+    "time_of_week",
+    "gps_time_of_week",
+    "sow",
+    "gps_sow",
+    "seconds_of_week",
+    "second_of_week",
+    "gps_seconds_of_week",
+    "gps_seconds",
+    "gps_time",
+    "gpstime",
+    "gps_timestamp",
+];
 /// Time of measurement, preferred to the time of arrival beside it.
 const STAMP: &[&str] = &["field_header_stamp", "header_stamp", "stamp"];
 
@@ -120,11 +141,15 @@ pub(super) fn classify(name: &str, si: bool) -> Option<Result<Role, ()>> {
         "sampletimefine" => return Some(Ok(Role::Ticks)),
         _ => {}
     }
-    if TIME.contains(&name.as_str()) || STAMP.contains(&name.as_str()) {
+    let is_time = |stem: &str| [TIME, STAMP, GPS_TIME].iter().any(|names| names.contains(&stem));
+    if is_time(&name) {
         return Some(Ok(Role::Time { unit_s: None }));
     }
+    if let Some((_, unit)) = TIME_IN.iter().find(|(own, _)| *own == name) {
+        return Some(Ok(Role::Time { unit_s: Some(*unit) }));
+    }
     if let Some((stem, unit)) = split_unit(&name, TIME_UNITS)
-        && (TIME.contains(&stem) || STAMP.contains(&stem))
+        && is_time(stem)
     {
         return Some(Ok(Role::Time { unit_s: Some(unit) }));
     }
@@ -268,6 +293,7 @@ impl Layout {
     fn one_time_column(&mut self) {
         let rank = |f: &Found| match f.role {
             Role::Time { .. } if STAMP.iter().any(|s| normalise(&f.name).starts_with(s)) => Some(0),
+            Role::Time { .. } if GPS_TIME.iter().any(|s| normalise(&f.name).starts_with(s)) => Some(3),
             Role::Time { unit_s: Some(_) } => Some(1),
             Role::Time { unit_s: None } => Some(2),
             _ => None,

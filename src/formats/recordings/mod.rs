@@ -10,6 +10,8 @@ pub(crate) mod header;
 pub(in crate::formats) mod checks;
 pub(in crate::formats) mod error;
 mod files;
+mod lines;
+mod manifest;
 mod prepared;
 mod repeats;
 mod report;
@@ -18,6 +20,7 @@ mod text;
 mod texture;
 pub(in crate::formats) mod time_unit;
 pub(in crate::formats) mod timing;
+mod unused;
 mod values;
 mod write;
 
@@ -37,7 +40,8 @@ use std::path::{Path, PathBuf};
 /// How recordings are read.
 #[derive(Debug, Clone)]
 pub struct ReadOptions {
-    /// Sample rate (Hz) for files without a time column; where there is one, it must agree within 1 %.
+    /// Sample rate (Hz) for files without a time column; where there is one, it must agree within 1 %, and wins where
+    /// gaps are ignored.
     pub rate_hz: Option<f64>,
     /// Seconds to leave out at the beginning (warm-up).
     pub skip_s: f64,
@@ -75,7 +79,7 @@ pub enum Gaps {
     Refuse,
     /// Make each stretch between such steps a recording of its own.
     Split,
-    /// Take the samples as evenly spaced all the same (late stamps, not lost samples).
+    /// Take the samples as evenly spaced over the whole time all the same (late stamps, not lost samples).
     Ignore,
 }
 

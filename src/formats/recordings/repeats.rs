@@ -153,8 +153,8 @@ fn extended(raw: &Raw, column: &Column, first: usize, second: usize) -> io::Resu
     Ok(is_repetition.then_some(Repetition { first: start, second: second - before, rows: count }))
 }
 
-/// The share of samples that two files have in common, from their sketches; `None` if it is none.
-pub(super) fn overlap(a: &[(Channel, Sketch)], b: &[(Channel, Sketch)]) -> Option<f64> {
+/// What two files have in common, as a part of their union (Jaccard), from their sketches; `None` if it is nothing.
+pub(super) fn jaccard(a: &[(Channel, Sketch)], b: &[(Channel, Sketch)]) -> Option<f64> {
     /// By chance not even one is shared.
     const FEWEST: usize = 4;
     let share = |(channel, a): &(Channel, Sketch)| {
@@ -165,9 +165,7 @@ pub(super) fn overlap(a: &[(Channel, Sketch)], b: &[(Channel, Sketch)]) -> Optio
         union.truncate(SKETCH);
         let is_shared = |hash: &&u64| a.binary_search(hash).is_ok() && b.binary_search(hash).is_ok();
         let shared = union.iter().filter(is_shared).count();
-        // Of the union (Jaccard); two records of equal length share 2 J/(1 + J) of each.
-        let jaccard = shared as f64 / union.len() as f64;
-        (shared >= FEWEST).then_some(2.0 * jaccard / (1.0 + jaccard))
+        (shared >= FEWEST).then_some(shared as f64 / union.len() as f64)
     };
     a.iter().filter_map(share).reduce(f64::max)
 }

@@ -4,6 +4,7 @@ use super::header::{self, Role, Unit};
 use super::repeats::{self, Sketch};
 use super::table::{Column, Raw};
 use crate::formats::suggest::nearest;
+use crate::report::six_digits;
 use nav_sim_signal::imu::{Channel, Sensor};
 use std::fmt;
 use std::path::PathBuf;
@@ -23,7 +24,7 @@ impl Report {
     pub(crate) fn summary(&self) -> String {
         let seconds = self.files.iter().map(|f| f.samples.iter().sum::<usize>() as f64 / f.rate_hz);
         let (low, high) = seconds.fold((f64::INFINITY, 0.0_f64), |(low, high), s| (low.min(s), high.max(s)));
-        let rate_hz = self.files.first().map_or(f64::NAN, |f| f.rate_hz);
+        let rate_hz = six_digits(self.files.first().map_or(f64::NAN, |f| f.rate_hz));
         let length =
             if high - low < 0.5 { format!("{high:.0} s each") } else { format!("{low:.0} to {high:.0} s") };
         let assumed = self.files.iter().any(|f| !f.assumptions.is_empty());
@@ -31,13 +32,17 @@ impl Report {
         format!("{} recordings at {rate_hz} Hz, {length}{assumed}", self.files.len())
     }
 
-    /// The first two files that have samples in common, wherever these stand in them, and about which share of one is
-    /// in the other (of both, where they are equally long).
+    /// The first two files that have samples in common, wherever these stand in them, and about which share of the
+    /// shorter is in the other.
     pub(crate) fn overlap(&self) -> Option<(&str, &str, f64)> {
         let pairs =
             self.files.iter().enumerate().flat_map(|(i, b)| self.files[..i].iter().map(move |a| (a, b)));
         pairs.into_iter().find_map(|(a, b)| {
-            let share = repeats::overlap(&a.sketches, &b.sketches)?;
+            let jaccard = repeats::jaccard(&a.sketches, &b.sketches)?;
+            let [shorter, longer] = if a.count() <= b.count() { [a, b] } else { [b, a] };
+            // What is common is J/(1 + J) of all samples of both.
+            let both = 1.0 + longer.count() as f64 / shorter.count().max(1) as f64;
+            let share = (both * jaccard / (1.0 + jaccard)).min(1.0);
             Some((a.file.as_str(), b.file.as_str(), share))
         })
     }
@@ -98,8 +103,14 @@ impl FileReport {
             _ => None,
         };
         let columns = raw.columns.iter().filter_map(signal).collect();
-        let mut report =
-            Self { file: raw.path.clone(), columns, ignored: raw.ignored.clone(), ..Self::default() };
+        let mut report = Self {
+            file: raw.path.clone(),
+            columns,
+            ignored: raw.ignored.clone(),
+            assumptions: raw.notes.assumptions.clone(),
+            warnings: raw.notes.warnings.clone(),
+            ..Self::default()
+        };
         let has = |channel: Channel| raw.columns.iter().any(|c| c.channel() == Some(channel));
         let missing: Vec<String> =
             Channel::ALL.into_iter().filter(|c| !has(*c)).map(header::column_name).collect();
@@ -122,6 +133,11 @@ impl FileReport {
         self.samples.iter().enumerate().map(move |(i, samples)| (name_of(&self.file, i, count), *samples))
     }
 
+    /// Samples of all its recordings.
+    fn count(&self) -> usize {
+        self.samples.iter().sum()
+    }
+
     pub(super) fn warn(&mut self, text: String) {
         self.warnings.push(text);
     }
@@ -136,9 +152,9 @@ impl FileReport {
 impl fmt::Display for FileReport {
     /// `a.csv: 524284 samples at 100 Hz (time column), 5242.84 s; means removed: accel x 0.02, …`
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let total: usize = self.samples.iter().sum();
+        let total = self.count();
         let (rate, from, seconds) =
-            (self.rate_hz, &self.rate_from, crate::report::seconds(total as f64 / self.rate_hz));
+            (six_digits(self.rate_hz), &self.rate_from, crate::report::seconds(total as f64 / self.rate_hz));
         write!(f, "{}: {total} samples at {rate} Hz ({from}), {seconds} s", self.file)?;
         if self.samples.len() > 1 {
             write!(f, ", in {} stretches", self.samples.len())?;

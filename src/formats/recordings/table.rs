@@ -2,6 +2,7 @@
 
 use super::error::{COLUMNS, sample, storage};
 use super::header::{self, HeaderPlace, Role};
+use super::manifest::{MANIFEST, Manifest};
 use super::values::Values;
 use super::{ReadOptions, text};
 use crate::formats::{FileError, Place, Setting, npy};
@@ -15,9 +16,19 @@ pub(crate) struct Raw {
     pub(crate) columns: Vec<Column>,
     /// Names of columns that mean nothing here.
     pub(crate) ignored: Vec<String>,
-    /// Rate said in the head of the file (Hz).
-    pub(crate) head_rate_hz: Option<f64>,
+    /// Rate said in the head of the file or beside it (Hz), and where.
+    pub(crate) head_rate: Option<(f64, &'static str)>,
     pub(crate) lines: Lines,
+    pub(crate) notes: Notes,
+}
+
+/// What is said of a file's text.
+#[derive(Debug, Default)]
+pub(crate) struct Notes {
+    /// What was passed over, or taken for granted.
+    pub(crate) assumptions: Vec<String>,
+    /// What is doubtful.
+    pub(crate) warnings: Vec<String>,
 }
 
 /// A column with a meaning.
@@ -80,9 +91,13 @@ fn load_npy(path: &Path, options: &ReadOptions) -> Result<Raw, FileError> {
     let name = path.display().to_string();
     let array = npy::open(path)?;
     let expected = array.columns();
+    let manifest = Manifest::beside(path);
     let names = match &options.columns {
         Some(names) => names.clone(),
-        None => header::npy_order(expected).ok_or_else(|| unnamed(&name, expected))?,
+        None => {
+            let said = manifest.as_ref().and_then(|manifest| manifest.columns(expected));
+            said.or_else(|| header::npy_order(expected)).ok_or_else(|| unnamed(&name, expected))?
+        }
     };
     if names.len() != expected {
         return Err(FileError::row_length(&name, 1, expected, names.len()));
@@ -111,8 +126,9 @@ fn load_npy(path: &Path, options: &ReadOptions) -> Result<Raw, FileError> {
         path: name.clone(),
         columns,
         ignored: layout.ignored,
-        head_rate_hz: None,
+        head_rate: manifest.map(|manifest| (manifest.rate_hz, MANIFEST)),
         lines: Lines::default(),
+        notes: Notes::default(),
     })
 }
 

@@ -2,6 +2,7 @@ mod clocks;
 mod doubts;
 mod garbage;
 mod gravity;
+mod texts;
 
 use super::*;
 use crate::formats::npy;
@@ -275,7 +276,7 @@ fn increments_become_rates() {
 fn a_directory_is_all_its_recordings_in_name_order() {
     let files = Files::new();
     for i in [10, 9, 1] {
-        files.add(&format!("replicate_{i}.csv"), sound(20 + i).join("\n"));
+        files.add(&format!("replicate_{i}.csv"), sound(20 + i).join("\n") + "\n");
     }
     files.add("manifest.json", "{}");
     files.add(".hidden.csv", "x");
@@ -325,7 +326,7 @@ fn what_is_not_held_reads_the_same() {
     let head = "t_ms,acc_x,acc_y,acc_z,dtheta_x_rad,dtheta_y_rad,dtheta_z_rad".to_owned();
     let table = |gaps: bool| {
         let rows = (0..20_000).map(|k| row(k, if gaps && k > 9000 { k + 40 } else { k }));
-        std::iter::once(head.clone()).chain(rows).collect::<Vec<_>>().join("\n")
+        std::iter::once(head.clone()).chain(rows).collect::<Vec<_>>().join("\n") + "\n"
     };
     let mut array = Vec::new();
     npy::write_header(&mut array, 9000, 6).unwrap();

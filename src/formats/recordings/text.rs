@@ -3,7 +3,9 @@
 use super::ReadOptions;
 use super::error::{COLUMNS, empty, sample, shown, storage, unreadable};
 use super::header::{HeaderPlace, Layout, Role, classify};
-use super::table::{BETWEEN, BEYOND, Column, LARGEST, Lines, Raw, relieve, settle};
+use super::lines::{Blanks, Ended};
+use super::table::{BETWEEN, BEYOND, Column, LARGEST, Lines, Notes, Raw, relieve, settle};
+use super::unused::Unused;
 use super::values::Values;
 use crate::formats::{FileError, Kind, Place, Setting, source};
 use flate2::read::MultiGzDecoder;
@@ -39,7 +41,11 @@ pub(super) fn parse(name: &str, mut reader: Reader, options: &ReadOptions) -> Re
     let place = HeaderPlace { path: name, line: head.line };
     let layout = Layout::new(place, &head.names, head.xsens, options.channels.as_deref())?;
     let (indices, mut columns) = layout.columns();
-    let lines = read_rows(name, reader, &head, &indices, &mut columns, options)?;
+    let mut notes = Notes::default();
+    if head.is_latin_1 && options.columns.is_none() {
+        notes.assumptions.push("header not in UTF-8, taken as ISO-8859-1".to_owned());
+    }
+    let lines = read_rows(name, reader, &head, &indices, &mut columns, options, &mut notes)?;
     if lines.is_empty() {
         return Err(empty(name));
     }
@@ -51,8 +57,9 @@ pub(super) fn parse(name: &str, mut reader: Reader, options: &ReadOptions) -> Re
             kept.push(column);
         }
     }
-    let head_rate_hz = head.rate_hz;
-    Ok(Raw { path: name.to_owned(), columns: kept, ignored: layout.ignored, head_rate_hz, lines })
+    let head_rate = head.rate_hz.map(|rate_hz| (rate_hz, "head of the file"));
+    let ignored = layout.ignored;
+    Ok(Raw { path: name.to_owned(), columns: kept, ignored, head_rate, lines, notes })
 }
 
 /// What stands before the rows.
@@ -69,6 +76,8 @@ struct Head {
     /// Whether the head is that of an Xsens MT Manager export.
     xsens: bool,
     rate_hz: Option<f64>,
+    /// Whether the header is no UTF-8: `²` and `°` are one byte each then.
+    is_latin_1: bool,
 }
 
 impl Head {
@@ -88,7 +97,9 @@ impl Head {
                 ));
             }
             line += 1;
-            let text = String::from_utf8_lossy(&bytes).into_owned();
+            let utf_8 = std::str::from_utf8(&bytes).ok().map(str::to_owned);
+            let is_latin_1 = utf_8.is_none();
+            let text = utf_8.unwrap_or_else(|| bytes.iter().map(|b| char::from(*b)).collect());
             let text = text.trim_start_matches('\u{feff}').trim();
             if let Some(comment) = text.strip_prefix("//") {
                 xsens = true;
@@ -100,7 +111,10 @@ impl Head {
             }
             let header = text.trim_start_matches(['#', '%']).trim_start();
             let delimiter = delimiter_of(header);
-            let cells = split(header, delimiter);
+            let cells = match delimiter {
+                b' ' => split(&header.split_ascii_whitespace().collect::<Vec<_>>().join(" "), delimiter),
+                _ => split(header, delimiter),
+            };
             if text.starts_with(['#', '%'])
                 && Layout::new(HeaderPlace { path: name, line }, &cells, xsens, None).is_err()
             {
@@ -116,7 +130,7 @@ impl Head {
             };
             let first_row = if numeric { bytes } else { Vec::new() };
             let lines_before = if numeric { line - 1 } else { line };
-            return Ok(Self { names, delimiter, line, lines_before, first_row, xsens, rate_hz });
+            return Ok(Self { names, delimiter, line, lines_before, first_row, xsens, rate_hz, is_latin_1 });
         }
     }
 }
@@ -167,7 +181,7 @@ fn all_finite(values: &Values) -> std::io::Result<bool> {
     Ok(finite)
 }
 
-/// Appends every row's values to their columns.
+/// Appends every row's values to their columns; what is passed over becomes a note.
 fn read_rows(
     name: &str,
     reader: Reader,
@@ -175,23 +189,46 @@ fn read_rows(
     indices: &[usize],
     columns: &mut [Column],
     options: &ReadOptions,
+    notes: &mut Notes,
 ) -> Result<Lines, FileError> {
+    let rows = Cursor::new(head.first_row.clone()).chain(reader);
+    let rows: Box<dyn Read> =
+        if head.delimiter == b' ' { Box::new(Blanks::new(rows)) } else { Box::new(rows) };
+    let (rows, open_at) = Ended::new(rows);
     let mut rows = csv::ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
         .delimiter(head.delimiter)
         .buffer_capacity(BUFFER)
-        .from_reader(Cursor::new(head.first_row.clone()).chain(reader).chain(&b"\n"[..]));
+        .from_reader(rows);
     let (mut lines, mut record, mut sample) = (Lines::default(), csv::ByteRecord::new(), 0);
+    let (mut longest, mut has_units) = (0, false);
     let expected = head.names.len();
+    let has_clock = columns.iter().any(|c| !matches!(c.role, Role::Signal { .. }));
+    let mut unused = Unused::new((0..expected).filter(|i| !has_clock && !indices.contains(i)));
     loop {
         match rows.read_byte_record(&mut record) {
             Ok(true) => {}
-            Ok(false) => return Ok(lines),
+            Ok(false) => break,
             Err(e) => return Err(unreadable(Path::new(name), of_csv(e))),
         }
         let line = head.lines_before + line_of(&record, rows.position().line());
         let found = record.len();
+        if sample == 0 && !has_units && found == expected && is_words(&record) {
+            has_units = true;
+            notes.assumptions.push(format!("line {line} has words and no numbers: passed over"));
+            continue;
+        }
+        let last_used = found == expected && indices.contains(&(expected - 1));
+        let length = if last_used { length_of(record.get(expected - 1).unwrap_or_default()) } else { 0 };
+        // A number that was cut off is another number: `5.1e-0` of `5.1e-04`. What is as long as any before is whole.
+        if open_at.get().is_some_and(|end| rows.position().byte() > end)
+            && (found < expected || length < longest)
+        {
+            notes.assumptions.push(format!("line {line}, the last, does not end and may be cut: left out"));
+            break;
+        }
+        longest = longest.max(length);
         let trailing =
             found == expected + 1 && record.get(expected).is_some_and(|c| c.trim_ascii().is_empty());
         if found != expected && !trailing {
@@ -212,9 +249,27 @@ fn read_rows(
                 parsed => return Err(bad_cell(name, line, &column.name, cell, parsed)),
             }
         }
+        unused.look(&record);
         lines.push(sample, line);
         sample += 1;
     }
+    unused.tell(&head.names, notes);
+    Ok(lines)
+}
+
+/// Whether a row has units, say, below the names: no cell begins as a number does.
+fn is_words(record: &csv::ByteRecord) -> bool {
+    let begins = |cell: &[u8]| cell.trim_ascii().first().copied();
+    let is_word = |cell: &[u8]| {
+        number(cell).is_none() && begins(cell).is_none_or(|b| !b.is_ascii_digit() && !b"+-.".contains(&b))
+    };
+    record.iter().all(is_word) && record.iter().any(|cell| begins(cell).is_some())
+}
+
+/// Characters of a number without its sign.
+fn length_of(cell: &[u8]) -> usize {
+    let cell = cell.trim_ascii();
+    cell.len() - usize::from(cell.starts_with(b"-") || cell.starts_with(b"+"))
 }
 
 /// What the system said, with its kind.
@@ -250,7 +305,7 @@ fn line_of(record: &csv::ByteRecord, next: u64) -> u64 {
 }
 
 #[inline]
-fn number(cell: &[u8]) -> Option<f64> {
+pub(super) fn number(cell: &[u8]) -> Option<f64> {
     std::str::from_utf8(cell.trim_ascii()).ok()?.parse().ok()
 }
 

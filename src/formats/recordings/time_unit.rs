@@ -5,7 +5,7 @@ use super::timing::USUAL_RATES_HZ;
 use crate::report::six_digits;
 
 /// The units of time and their length (s).
-const UNITS: [(f64, &str); 4] = [(1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns")];
+pub(super) const UNITS: [(f64, &str); 4] = [(1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns")];
 
 /// Unix time of the years 2000 to 2100 (s): in no two units of a thousand are the numbers of these the same.
 const UNIX_S: std::ops::Range<f64> = 9.4e8..4.2e9;

@@ -3,7 +3,7 @@
 use super::error::{storage, too_short};
 use super::header::Role;
 use super::table::{Column, Raw};
-use super::time_unit::Guess;
+use super::time_unit::{Guess, UNITS};
 use super::values::Values;
 use super::{FileReport, Gaps, ReadOptions};
 use crate::formats::{FileError, Place, Setting};
@@ -44,19 +44,18 @@ pub(super) fn timing(
     let time = take(raw, |r| matches!(r, Role::Time { .. }));
     let counter = take(raw, |r| *r == Role::Counter);
     let ticks = take(raw, |r| *r == Role::Ticks);
-    let known = options.rate_hz.or(raw.head_rate_hz);
+    let known = options.rate_hz.map(|rate_hz| (rate_hz, "given")).or(raw.head_rate);
     let clock = match (time, counter, ticks, known) {
         (Some(time), ..) => Clock::of_time(time, raw, options, report)?,
-        (None, Some(counter), _, Some(rate_hz)) => {
-            let source = if options.rate_hz.is_some() { "given" } else { "head of the file" };
+        (None, Some(counter), _, Some((rate_hz, source))) => {
             let mut clock = Clock::counting(counter, raw, 65536.0, 1.0)?;
             // The counter tells what was lost, not the rate: with a skip factor it counts by more than one.
             clock.unit_s = 1.0 / (rate_hz * median_step(&clock.since).max(1.0));
             Clock { source: format!("{source}, packet counter"), ..clock }
         }
         (None, _, Some(ticks), _) => Clock::counting(ticks, raw, 4_294_967_296.0, 1e-4)?,
-        (None, _, None, Some(rate_hz)) => {
-            report.rate_from = if options.rate_hz.is_some() { "given" } else { "head of the file" }.into();
+        (None, _, None, Some((rate_hz, source))) => {
+            report.rate_from = source.into();
             return Ok(Timing { rate_hz, breaks: Vec::new() });
         }
         (None, _, None, None) => {
@@ -74,12 +73,12 @@ pub(super) fn timing(
 /// Says what is doubtful about a clock.
 fn doubt(timing: &Checked, column: &str, raw: &Raw, options: &ReadOptions, report: &mut FileReport) {
     if let Some(given) = options.rate_hz.filter(|given| (timing.found_hz / given - 1.0).abs() > ROUNDED) {
-        let found = timing.found_hz;
+        let found = six_digits(timing.found_hz);
         report.rate_from = format!("given; the {} has {found} Hz", report.rate_from);
         report.warn(format!("{given} Hz is given, but the file runs at {found} Hz: the rate given is taken"));
     }
     if !USUAL_RATES_HZ.contains(&timing.rate_hz) {
-        let rate_hz = timing.rate_hz;
+        let rate_hz = six_digits(timing.rate_hz);
         report.warn(format!("{rate_hz} Hz is no usual rate of an IMU: is the unit of \"{column}\" right?"));
     }
     if !timing.breaks.is_empty() {
@@ -89,7 +88,8 @@ fn doubt(timing: &Checked, column: &str, raw: &Raw, options: &ReadOptions, repor
             Gaps::Ignore => {
                 let mut text = format!("{n} gaps or duplicates in time ignored, the first in line {first}");
                 // Lost samples lengthen the span, late stamps do not.
-                if (timing.step_hz / timing.found_hz - 1.0).abs() > DISAGREEING {
+                let is_other = (timing.step_hz / timing.found_hz - 1.0).abs() > DISAGREEING;
+                if is_other && options.rate_hz.is_none() {
                     let (span, step) = (six_digits(timing.found_hz), six_digits(timing.step_hz));
                     text += &format!(
                         "; the rate over the whole is {span} Hz, that of the median step {step} Hz: were samples lost, give \
@@ -140,12 +140,19 @@ impl Clock {
     ) -> Result<Self, FileError> {
         let (name, mut since) = (column.name, of_file(raw, column.values)?);
         let first = since.first().copied().unwrap_or(0.0);
-        since.iter_mut().for_each(|t| *t -= first);
+        if let Some(week) = week_of(&since, column.role) {
+            report
+                .assumptions
+                .push(format!("column \"{name}\" taken as time of the week, which starts again"));
+            unwrap(&mut since, week);
+        } else {
+            since.iter_mut().for_each(|t| *t -= first);
+        }
         let unit_s = match column.role {
             Role::Time { unit_s: Some(unit) } => unit,
             _ => {
                 let step = step_of(&since, options.gaps);
-                let known = options.rate_hz.or(raw.head_rate_hz);
+                let known = options.rate_hz.or(raw.head_rate.map(|(rate_hz, _)| rate_hz));
                 let guess = Guess::new(step, first, known);
                 if since.len() > 1 {
                     guess.tell(&name, step, report);
@@ -159,14 +166,7 @@ impl Clock {
     /// A counter that starts again at 0 when it reaches `modulus`.
     fn counting(column: Column, raw: &Raw, modulus: f64, unit_s: f64) -> Result<Self, FileError> {
         let mut since = of_file(raw, column.values)?;
-        let (mut last, mut total) = (since.first().copied().unwrap_or(0.0), 0.0);
-        for value in &mut since {
-            let step = *value - last;
-            last = *value;
-            // A fall of more than half the range is the counter starting again.
-            total += if step < -0.5 * modulus { step + modulus } else { step };
-            *value = total;
-        }
+        unwrap(&mut since, modulus);
         let source = format!("column \"{}\"", column.name);
         Ok(Self { source, name: column.name, start: 0.0, since, unit_s })
     }
@@ -216,7 +216,8 @@ impl Clock {
         let found = rate(if breaks.is_empty() { mean_step(&self.since) } else { step });
         let given = options.rate_hz.unwrap_or(found);
         if options.gaps != Gaps::Ignore && (found / given - 1.0).abs() > DISAGREEING {
-            let message = format!("the time column runs at {found} Hz, but {given} Hz is given");
+            let message =
+                format!("the time column runs at {} Hz, but {given} Hz is given", six_digits(found));
             return Err(
                 FileError::contents(raw.path.as_str(), Place::Within, message).setting(Setting::WrongRate)
             );
@@ -230,6 +231,34 @@ impl Clock {
         let error = FileError::contents(path, Place::Within, message);
         if mean_step(&self.since) > 0.0 { error.setting(Setting::Gaps) } else { error }
     }
+}
+
+/// From values that start again at 0 when they reach `modulus` to what they rose since the first.
+fn unwrap(values: &mut [f64], modulus: f64) {
+    let (mut last, mut total) = (values.first().copied().unwrap_or(0.0), 0.0);
+    for value in values {
+        let step = *value - last;
+        last = *value;
+        // A fall of more than half the range is the counter starting again.
+        total += if step < -0.5 * modulus { step + modulus } else { step };
+        *value = total;
+    }
+}
+
+/// The length of a week, if that is where times start again: they lie in one, and fall by more than half of it. No two
+/// units have both.
+fn week_of(times: &[f64], role: Role) -> Option<f64> {
+    const WEEK_S: f64 = 604_800.0;
+    let said = match role {
+        Role::Time { unit_s } => unit_s,
+        _ => None,
+    };
+    let units =
+        UNITS.iter().map(|(unit_s, _)| *unit_s).filter(|unit_s| said.is_none_or(|own| own == *unit_s));
+    let mut weeks = units.map(|unit_s| WEEK_S / unit_s);
+    weeks.find(|week| {
+        times.iter().all(|t| (0.0..=*week).contains(t)) && times.windows(2).any(|w| w[1] - w[0] < -0.5 * week)
+    })
 }
 
 /// Six significant digits where the value is that within 1e-7 (stamps are rounded), else as it is.

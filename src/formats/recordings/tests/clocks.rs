@@ -114,3 +114,62 @@ fn a_unit_that_is_not_said_is_told_by_the_rate_or_doubted() {
     assert_eq!(outcome("t_s", 1.0, 0.0, None), (1.0, String::new()));
     assert_eq!(outcome("timestamp", 1000.0, 1.7e15, None), (1000.0, String::new()));
 }
+
+/// A gap is seen in the time of a receiver, in a unit's own time, and over the end of a GPS week; a column that runs like
+/// a clock and is not used is told.
+#[test]
+fn clocks_of_receivers_and_loggers_are_known() {
+    for (name, unit) in [
+        ("tow_s", 1.0),
+        ("gps_tow", 1.0),
+        ("gps_time_s", 1.0),
+        ("sow", 1.0),
+        ("TimeUS", 1e-6),
+        ("iTOW", 1e-3),
+        ("GPS Time (ms)", 1e-3),
+    ] {
+        let decimals = if unit == 1.0 { 2 } else { 0 };
+        let at = |k: usize| format!("{:.decimals$}", (345_600.0 + 0.01 * k as f64) / unit);
+        let r = read_one("a.csv", stamped(name, 100, at), &ReadOptions::default()).unwrap();
+        // 345 600 s is held to 6e-11 s, a span of 0.99 s to 1e-10
+        assert!((r.rate_hz - 100.0).abs() < 1e-6, "{name}: {}", r.rate_hz);
+        let gap = stamped(name, 100, |k| at(if k < 50 { k } else { k + 6000 }));
+        assert!(refusal(&gap).contains("gap in time"), "{name}: {}", refusal(&gap));
+    }
+    // The time of the unit itself is preferred.
+    let both = stamped("gps_time,t_s", 100, |k| format!("{},{}", 5 * (k / 10), k as f64 / 50.0));
+    assert_close(&[read_one("a.csv", both, &ReadOptions::default()).unwrap().rate_hz], &[50.0]);
+}
+
+#[test]
+fn the_end_of_a_gps_week_is_no_step_back() {
+    let week = |lost: usize| {
+        let at = move |k: usize| 604_799.5 + 0.01 * (if k < 80 { k } else { k + lost }) as f64;
+        stamped("gps_week,tow_s", 100, |k| format!("{},{:.2}", 2300, at(k) % 604_800.0))
+    };
+    let r = read_one("a.csv", week(0), &ReadOptions::default()).unwrap();
+    assert!((r.rate_hz - 100.0).abs() < 1e-6, "{}", r.rate_hz);
+    assert!(
+        refusal(week(500)).contains("gap in time from 604800.29 s to 604805.3 s"),
+        "{}",
+        refusal(week(500))
+    );
+    // An hour back is one, in a week or not.
+    let back =
+        stamped("t_s", 100, |k| format!("{}", 7200.0 + 0.01 * k as f64 - if k < 50 { 0.0 } else { 3600.0 }));
+    assert!(refusal(back).contains("time goes back"));
+}
+
+#[test]
+fn a_column_that_runs_like_a_clock_and_is_not_used_is_told() {
+    let warnings = |name: &str, value: &dyn Fn(usize) -> f64| {
+        let (_files, path) = Files::with("a.csv", stamped(name, 100, |k| format!("{}", value(k))));
+        read(&[path], &at_100_hz()).unwrap().1.files.remove(0).warnings
+    };
+    let told = warnings("clk", &|k| 17.0 + 0.01 * k as f64);
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(told[0].starts_with("column \"clk\" rises evenly like a clock, but is not used"), "{told:?}");
+    // A temperature does not.
+    assert_eq!(warnings("temperature", &|k| 20.0 + 0.01 * (k / 3) as f64), [""; 0]);
+    assert_eq!(warnings("height", &|k| (k * k) as f64), [""; 0]);
+}

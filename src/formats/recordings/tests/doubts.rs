@@ -138,6 +138,10 @@ fn recordings_that_share_samples_are_known() {
     // a half: of 64 hashes 21 ± 4 are shared, a third of the union
     let half = overlap(&rows[..4000], &rows[2000..6000]).unwrap();
     assert!((0.2..0.8).contains(&half), "{half}");
+    // All of a file half as long: the union is shared by half ± 0.0625 (one standard deviation), J/(1 + J) of 6000
+    // samples; within three of these, 0.75 of the shorter at least.
+    let whole = overlap(&rows[..4000], &rows[1000..3000]).unwrap();
+    assert!((0.75..=1.0).contains(&whole), "{whole}");
 }
 
 #[test]

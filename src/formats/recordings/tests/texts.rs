@@ -1,0 +1,82 @@
+//! Texts that are not quite tables.
+
+use super::*;
+
+fn outcome(contents: impl AsRef<[u8]>) -> (Recording, FileReport) {
+    let (_files, path) = Files::with("a.csv", contents);
+    let (mut recordings, mut report) = read(&[path], &ReadOptions::default()).unwrap();
+    (recordings.remove(0), report.files.remove(0))
+}
+
+/// A copy that ends within its last number ends in another number.
+#[test]
+fn a_last_line_that_does_not_end_is_left_out_unless_it_is_as_long_as_any() {
+    const WHOLE: &str = "t_s,gyro_x_rad_s\n0.00,1.1e-04\n0.01,-2.2e-04\n0.02,-5.1e-04";
+    let cut = |characters: usize| outcome(&WHOLE[..WHOLE.len() - characters]);
+    assert_eq!((cut(0).0.len(), cut(0).1.assumptions.len()), (3, 0));
+    assert_eq!(outcome(format!("{WHOLE}\n")).0.len(), 3);
+    // one and two digits of the exponent, its sign, the whole number, its column
+    for characters in [1, 2, 3, 5, 8, 9, 10] {
+        let (recording, report) = cut(characters);
+        assert_close(&samples_with_mean(&recording.signals[0]), &[1.1e-4, -2.2e-4]);
+        assert_eq!(report.assumptions, ["line 4, the last, does not end and may be cut: left out"]);
+    }
+    // Cut in a column that is not read: no harm.
+    assert_eq!(outcome("t_s,gyro_x_rad_s,note\n0.00,1,well\n0.01,2,we").0.len(), 2);
+    // A line that ends is another matter.
+    assert_eq!(refusal(format!("{}\n", &WHOLE[..WHOLE.len() - 9])), "a.csv, line 4: 1 values, but 2 columns");
+}
+
+#[test]
+fn columns_that_blanks_align_are_read() {
+    let (recording, _) =
+        outcome("t_s   gyro_x_rad_s  gyro_y_rad_s\n 0.00   1e-3 -2e-3 \n 0.01  -4e-3  5e-3\n");
+    assert_close(&samples_with_mean(&recording.signals[0]), &[1e-3, -4e-3]);
+    assert_close(&samples_with_mean(&recording.signals[1]), &[-2e-3, 5e-3]);
+    assert_close(&[recording.rate_hz], &[100.0]);
+}
+
+#[test]
+fn units_below_the_names_are_passed_over_and_numbers_are_not() {
+    let (recording, report) = outcome("t_s,gx_dps\ns,deg/s\n0,1\n0.01,2\n");
+    assert_close(&samples_with_mean(&recording.signals[0]), &[DEG, 2.0 * DEG]);
+    assert_eq!(report.assumptions, ["line 2 has words and no numbers: passed over"]);
+    assert_eq!(
+        refusal("t_s,gx_dps\ns,deg/s\ns,deg/s\n0,1\n"),
+        "a.csv, line 3: column \"t_s\": \"s\" is not a number"
+    );
+    assert_eq!(refusal("t_s,gx_dps\n0,abc\n"), "a.csv, line 2: column \"gx_dps\": \"abc\" is not a number");
+    assert_eq!(refusal("t_s;gx_dps\n0,00;0,5\n"), "a.csv, line 2: column \"t_s\": \"0,00\" is not a number");
+}
+
+#[test]
+fn a_header_in_iso_8859_1_has_its_units() {
+    let header = b"time [s];Acc X [m/s\xb2];Gyr X [\xb0/s]\n".to_vec();
+    let (recording, report) = outcome([header, b"0;9.8;1\n0.01;9.7;2\n".to_vec()].concat());
+    assert_close(&samples_with_mean(&recording.signals[0]), &[9.8, 9.7]);
+    assert_close(&samples_with_mean(&recording.signals[1]), &[DEG, 2.0 * DEG]);
+    assert_eq!(report.assumptions, ["header not in UTF-8, taken as ISO-8859-1"]);
+}
+
+#[test]
+fn an_array_is_read_as_the_manifest_beside_it_says() {
+    let files = Files::new();
+    let signals: [(Channel, Vec<f64>); 2] =
+        [(Channel::ALL[3], vec![1.0, 2.0, 4.0]), (Channel::ALL[5], vec![3.0, 5.0, 8.0])];
+    let mut bytes = Vec::new();
+    FileFormat::Npy.write(&mut bytes, 50.0, &signals).unwrap();
+    let path = files.add("replicate_1.npy", &bytes);
+    let other = files.add("other.npy", &bytes);
+    files.add(
+        "manifest.json",
+        "{\"command\": \"synthesize\", \"axes\": [\"gyro.x\", \"gyro.z\"], \"rate_hz\": 50.0, \"replicates\": \
+         [{\"file\": \"replicate_1.npy\"}]}",
+    );
+    let (recordings, report) = read(&[path], &ReadOptions::default()).unwrap();
+    assert_eq!(channels(&recordings[0]), ["gyro.x", "gyro.z"]);
+    assert_close(&[recordings[0].rate_hz], &[50.0]);
+    assert_close(&samples_with_mean(&recordings[0].signals[1]), &[3.0, 5.0, 8.0]);
+    assert_eq!(report.files[0].rate_from, "manifest.json");
+    // It says nothing of a file that it does not name.
+    assert!(read(&[other], &at_100_hz()).is_err());
+}
