@@ -45,11 +45,6 @@ impl Laboratory {
         &self.units
     }
 
-    /// Sample rate (Hz).
-    pub(crate) const fn rate_hz(&self) -> f64 {
-        self.settings.rate_hz
-    }
-
     /// Calibrates a candidate on all recordings but one, before any inflation. An estimator of single recordings takes
     /// that after the one left out (the first, where none is), so that each is taken once.
     ///

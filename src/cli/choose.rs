@@ -14,6 +14,7 @@ use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Pool, Settings, Tri
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::outage::Outage;
+use nav_sim_signal::imu::Channel;
 use std::path::PathBuf;
 
 /// Choose the noise model for a filter by navigating on recordings left out of its calibration
@@ -96,6 +97,12 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         bootstrap: Some(Bootstrap { seed, ..Bootstrap::default() }),
         turn_on: false,
     };
+    if let Some(wanted) = &options.reading.channels
+        && let Some(missing) = Channel::ALL.into_iter().find(|c| !wanted.contains(c))
+    {
+        let message = format!("--axes leaves {missing} out, and candidates navigate with all six signals");
+        return Err(Failure::input(message).hint("leave --axes out"));
+    }
     let drive = ChoiceDrive { trajectory, scenario, outages: outages.clone(), seed, runs: args.runs };
     let words = Words::new(session);
     let chosen = jobs::choose(&args.inputs, &options, &candidates, drive, &mut Said::new(session), &words)?;

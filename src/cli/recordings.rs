@@ -5,7 +5,7 @@ use super::parse::words;
 use super::{Progress, Session};
 use crate::formats::recordings::{Gaps, ReadOptions, Report};
 use crate::jobs::{Remark, Remarks};
-use crate::report::{BeginsOtherwise, warm_up_in_short, warm_up_lines};
+use crate::report::{BeginsOtherwise, six_digits, warm_up_in_short, warm_up_lines};
 
 /// How recordings are read.
 #[derive(clap::Args, Debug)]
@@ -35,7 +35,7 @@ const GAPS: &[(&str, &str)] = &[
         "split",
         "Make each stretch between gaps a recording of its own (but not one 16 times shorter than the longest)",
     ),
-    ("ignore", "Take the samples as evenly spaced"),
+    ("ignore", "Take the samples as evenly spaced over the whole time: stamped late, none lost"),
 ];
 
 /// What is left out at the beginning.
@@ -178,6 +178,10 @@ impl Remarks for Said<'_> {
                 let short = warm_up_in_short(found, recordings, left_out, rate_hz);
                 self.session.warn(format!("{short}{used}"));
             }
+            Remark::Rate { found_hz, taken_hz } => self.session.say(format!(
+                "the recordings run at {} Hz: taken as {taken_hz} Hz, so that fixes meet samples",
+                six_digits(found_hz)
+            )),
             Remark::Shortest { recording, samples, scales, short: 0, usual, .. } => self.session.warn(format!(
                 "{recording}: its {samples} samples limit all recordings to {scales} scales; without it there would be \
                  more (half of them have {usual}): leave it out for those"

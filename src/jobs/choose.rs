@@ -1,9 +1,11 @@
 //! Static recordings and a trajectory → the noise model that a filter is best made of.
 
 use super::calibrate::without_warm_up;
-use super::{Calibration, CalibrationOptions, EstimatorChoice, JobError, Measured, Note, Remarks, measure};
+use super::{
+    Calibration, CalibrationOptions, EstimatorChoice, JobError, Measured, Note, Remark, Remarks, measure,
+};
 use crate::choose::{Candidate, ChoiceError, Contender, Drive, Fold, Influence, Laboratory, Ranking, Unit};
-use crate::formats::recordings::{self, FileReport};
+use crate::formats::recordings::{self, FileReport, ReadOptions};
 use crate::observer::Observer;
 use nav_sim_calibration::{Estimator, model_of};
 use nav_sim_navigation::scenario::Scenario;
@@ -66,7 +68,16 @@ pub fn choose(
 ) -> Result<Chosen, JobError> {
     let options = CalibrationOptions { estimators: EstimatorChoice::One(Estimator::Awv), ..options.clone() };
     let asked_pool = options.pool;
-    let measured = measure(paths, &CalibrationOptions { pool: None, ..options.clone() }, remarks)?;
+    let mut measured = measure(paths, &CalibrationOptions { pool: None, ..options.clone() }, remarks)?;
+    let found_hz = measured.settings.rate_hz;
+    let rate_hz = nominal_hz(found_hz, drive.scenario.gnss.rate_hz);
+    if rate_hz != found_hz {
+        remarks.remark(Remark::Rate { found_hz, taken_hz: rate_hz });
+        measured.settings.rate_hz = rate_hz;
+    }
+    // The clocks of the files are not quite alike: one rate is that of all.
+    let reading = ReadOptions { rate_hz: Some(rate_hz), ..options.reading.clone() };
+    let options = CalibrationOptions { reading, ..options };
     let files = measured.report.files.clone();
     if files.len() < FEWEST {
         return Err(JobError::TooFew { recordings: files.len(), needed: FEWEST });
@@ -74,7 +85,6 @@ pub fn choose(
     let units = units(&measured);
     let samples: Vec<usize> = units.iter().map(samples_in).collect();
     let laboratory = Laboratory::new(units, measured.settings, asked_pool);
-    let rate_hz = laboratory.rate_hz();
     let ChoiceDrive { trajectory, scenario, outages, seed, runs } = drive;
     let drive = Drive::new(&trajectory, scenario, outages, rate_hz, seed).map_err(ChoiceError::from)?;
     let runs: Vec<u64> =
@@ -100,6 +110,17 @@ pub fn choose(
         .with_inference(options.bootstrap, &|_| {});
     let files = files.into_iter().map(|file| file.path).collect();
     Ok(Chosen { ranking, winner, calibration, influence, model, files })
+}
+
+/// The rate of which that of the fixes is a whole divisor, if the clock of the recordings (Hz) shows it to within its own
+/// error: quartz is within 1e-4, and a stamp that was rounded at either end costs no more than the rest. Else that of the
+/// clock.
+fn nominal_hz(found_hz: f64, fix_hz: f64) -> f64 {
+    const CLOCK: f64 = 1e-3;
+    let nominal_hz = (found_hz / fix_hz).round() * fix_hz;
+    let apart = (nominal_hz / found_hz - 1.0).abs();
+    // To the precision of a rate that is written with seven digits it is one already.
+    if apart > 1e-6 && apart <= CLOCK { nominal_hz } else { found_hz }
 }
 
 /// The recordings, each with its signals' wavelet variances.

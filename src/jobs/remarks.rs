@@ -20,6 +20,13 @@ pub enum Remark<'a> {
         /// Sample rate (Hz).
         rate_hz: f64,
     },
+    /// The recordings run at a rate that is no whole multiple of the fixes' but for the error of a clock.
+    Rate {
+        /// Their rate (Hz).
+        found_hz: f64,
+        /// The rate that they are taken to have (Hz).
+        taken_hz: f64,
+    },
     /// A recording is so much shorter than the others that it lacks scales, or costs all of them scales.
     Shortest {
         /// The recording.

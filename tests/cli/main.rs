@@ -29,6 +29,7 @@ mod existing;
 mod export;
 mod fuse;
 mod help_examples;
+mod laboratory;
 mod pages;
 mod readme;
 mod require;
