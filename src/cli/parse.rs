@@ -46,10 +46,17 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
 
 /// Two times (s): `1s:100s`, also without the unit.
 pub(super) fn seconds_range(text: &str) -> Result<(f64, f64), String> {
-    let seconds = |t: &str| positive(t.trim().trim_end_matches('s')).ok();
+    let seconds = |text: &str| {
+        let text = text.trim();
+        // as results have it
+        let units = [("min", 60.0), ("s", 1.0), ("h", 3600.0)];
+        let said = units.iter().find_map(|(name, unit_s)| Some((text.strip_suffix(name)?, *unit_s)));
+        let (number, unit_s) = said.unwrap_or((text, 1.0));
+        positive(number.trim()).ok().map(|value| value * unit_s)
+    };
     match text.split_once(':').map(|(from, to)| (seconds(from), seconds(to))) {
         Some((Some(from_s), Some(to_s))) => Ok((from_s, to_s)),
-        _ => Err("expected two times in seconds, such as 1s:100s".into()),
+        _ => Err("expected two times, such as 1s:100s or 1min:2h".into()),
     }
 }
 

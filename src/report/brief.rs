@@ -150,11 +150,17 @@ const IMPOSSIBLE: f64 = 1e-4;
 fn full(outcomes: &[Outcome], rate_hz: f64) -> Vec<Vec<String>> {
     let matched = format!("N, K {}", policy());
     let head = ["", &matched, "value", "95 % interval", "unit", "governs averages"];
-    let rows = outcomes.iter().flat_map(|o| rows_of(o, rate_hz));
+    // Two estimators of one signal are told by their names.
+    let scopes = |outcome: &Outcome| outcomes.iter().filter(|o| o.scope == outcome.scope).count();
+    let name = |outcome: &Outcome| match scopes(outcome) {
+        1 => outcome.scope.name(),
+        _ => format!("{} {}", outcome.scope.name(), outcome.estimator.name()),
+    };
+    let rows = outcomes.iter().flat_map(|o| rows_of(o, &name(o), rate_hz));
     std::iter::once(head.map(str::to_owned).to_vec()).chain(rows).collect()
 }
 
-fn rows_of(outcome: &Outcome, rate_hz: f64) -> Vec<Vec<String>> {
+fn rows_of(outcome: &Outcome, name: &str, rate_hz: f64) -> Vec<Vec<String>> {
     let sensor = outcome.scope.sensor;
     let practical = outcome.practical(rate_hz);
     let cells = |row: PracticalRow| {
@@ -172,7 +178,7 @@ fn rows_of(outcome: &Outcome, rate_hz: f64) -> Vec<Vec<String>> {
     let mut rows: Vec<Vec<String>> = rows.collect();
     rows.extend(process_rows(outcome, rate_hz));
     for row in &mut rows {
-        row.insert(0, outcome.scope.name());
+        row.insert(0, name.to_owned());
     }
     rows
 }

@@ -10,7 +10,7 @@ use super::recordings::{RecordingArgs, Said};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
 use crate::formats::parameters_file;
-use crate::jobs::{self, CalibrationOptions, EstimatorChoice};
+use crate::jobs::{self, CalibrationOptions, EstimatorChoice, JobError};
 use nav_sim_calibration::{
     Bootstrap, Estimator, FitRange, ModelChoice, ModelSpec, ParameterLimit, Pool, Settings, Trim, Weighting,
 };
@@ -39,7 +39,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE", conflicts_with_all = OF_RECORDINGS)]
     curve: Option<PathBuf>,
     /// Sensor of a CSV curve, for the model file
-    #[arg(long, value_name = "SENSOR", value_parser = one_of::<Sensor>(&Sensor::NAMES), requires = "curve")]
+    #[arg(long, value_name = "SENSOR", value_parser = one_of::<Sensor>(&Sensor::NAMES), requires = "curve", conflicts_with = "inputs")]
     sensor: Option<Sensor>,
     /// Which curve is fitted: an average over the replicates (awv; sr-awv, robust to outliers; dr-awv, robust to
     /// abnormal replicates too), or the curve of a single recording (gmwm, rgmwm; avlr: slopes of its Allan deviation)
@@ -190,9 +190,18 @@ fn recordings(args: &Args, settings: Settings, session: &Session) -> Result<(), 
 
 /// Fitting curves that come from elsewhere.
 fn curves(args: &Args, path: &Path, settings: &Settings, session: &Session) -> Result<(), Failure> {
-    // What is only printed needs no sensor.
-    let sensor = args.sensor.or(args.out.is_none().then_some(Sensor::Accel));
-    let curves = jobs::read_curves(path, args.recordings.rate_hz(), sensor, settings)?;
+    let curves_of = |sensor| jobs::read_curves(path, args.recordings.rate_hz(), sensor, settings);
+    let curves = match curves_of(args.sensor) {
+        // What is only printed needs a sensor for its units alone.
+        Err(JobError::NoSensor { .. }) if args.out.is_none() => {
+            let shown = path.display();
+            session.say(format!(
+                "{shown}: does not say its sensor: taken as that of an accelerometer, in m/s² (--sensor gyro: rad/s)"
+            ));
+            curves_of(Some(Sensor::Accel))?
+        }
+        read => read?,
+    };
     let inputs: Vec<PathBuf> =
         [path].into_iter().map(Path::to_owned).chain(args.parameters.clone()).collect();
     let _own = args.out.as_deref().map(jobs::claim_model).transpose()?;
