@@ -6,6 +6,7 @@ use crate::formats::fusion_files::{read_gnss, read_imu, read_initial};
 use crate::formats::{
     contamination_file, curve_file, datasheet, efficiency_file, model_file, parameters_file, scenario_file,
 };
+use crate::report::six_digits;
 use nav_sim_navigation::fusion::alignment::moves;
 use std::path::{Path, PathBuf};
 
@@ -129,6 +130,9 @@ fn check(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<String,
             let scales: Vec<String> = curves.iter().map(|c| c.curve.levels.len().to_string()).collect();
             Ok(format!("wavelet-variance curves, of {} scales", scales.join(", ")))
         }
+        FileKind::Record => {
+            Ok("a record that nav-sim wrote beside a result: nothing in it to be checked".to_owned())
+        }
         FileKind::Trajectory => {
             let trajectory = read::trajectory(path, session)?;
             let seconds = trajectory.end_s() - trajectory.start_s();
@@ -183,8 +187,8 @@ fn recording(path: &Path, rate_hz: Option<f64>, session: &Session) -> Result<Str
         Ok(recordings) => recordings,
         Err(refusal) => return moving(path, session).ok_or(refusal),
     };
-    let described = recordings
-        .iter()
-        .map(|r| format!("{} channels of {} samples at {} Hz", r.signals.len(), r.len(), r.rate_hz));
+    let described = recordings.iter().map(|r| {
+        format!("{} channels of {} samples at {} Hz", r.signals.len(), r.len(), six_digits(r.rate_hz))
+    });
     Ok(format!("read as a static recording, {}", described.collect::<Vec<_>>().join("; ")))
 }

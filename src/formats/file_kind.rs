@@ -25,6 +25,8 @@ pub(crate) enum FileKind {
     Contamination,
     /// Wavelet-variance curves.
     Curve,
+    /// What this program noted of a result, which no command reads by itself: manifests, draws, summaries.
+    Record,
     /// A trajectory.
     Trajectory,
     /// The initial state of a fusion.
@@ -65,7 +67,9 @@ pub(crate) fn of(path: &Path) -> Result<FileKind, FileError> {
     };
     let text = String::from_utf8_lossy(&head);
     if name.ends_with(".json") || text.trim_start().starts_with('{') {
-        return Ok(FileKind::Curve);
+        // What this program says of its results has a version; of those only curves have wavelet variances to be read.
+        let is_record = text.contains("\"schema_version\"") && !text.contains("\"wv\"");
+        return Ok(if is_record { FileKind::Record } else { FileKind::Curve });
     }
     // No table of numbers is TOML, which needs no ending then: a pipe has none.
     let table = table_of(&text).filter(|table| !table.is_empty());

@@ -64,3 +64,16 @@ fn models_and_curves_say_what_they_are_of() {
     assert!(told("").contains("taken as that of an accelerometer"), "{}", told(""));
     assert!(!told(" --sensor gyro").contains("taken as"), "{}", told(" --sensor gyro"));
 }
+
+/// What the program wrote beside a result is no broken curve.
+#[test]
+fn check_knows_its_own_records() {
+    let place = place_with(DRIVE, MODEL);
+    done(place.path(), "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec");
+    done(place.path(), "calibrate rec --model WN --bootstrap 9 --seed 1 -o m.toml");
+    let ran = plain(place.path(), "check rec/manifest.json m.draws.json m.wv.json");
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let lines: Vec<&str> = ran.stdout.lines().collect();
+    assert!(lines[..2].iter().all(|line| line.contains("a record that nav-sim wrote")), "{lines:?}");
+    assert!(lines[2].contains("wavelet-variance curves"), "{lines:?}");
+}
