@@ -152,12 +152,12 @@ fn misfit(outcome: &Outcome, rate_hz: f64) -> Option<String> {
     let (worst, surest) = (departure.worst()?, departure.surest()?);
     let side = if surest.ratio > 1.0 { "above" } else { "below" };
     Some(format!(
-        "the data disagree with this model at {} of {} scales: they have {}; most certainly at {} s, {} {side} it, {:.0} standard \
+        "the data disagree with this model at {} of {} scales: they have {}; most certainly at {}, {} {side} it, {:.0} standard \
          deviations",
         departure.missed.len(),
         departure.scales,
         worst_in_words(outcome, worst, rate_hz),
-        tau_s(surest.level, rate_hz),
+        duration(tau_s(surest.level, rate_hz)),
         percent((surest.ratio - 1.0).abs()),
         surest.deviations.abs()
     ))
