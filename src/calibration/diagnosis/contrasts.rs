@@ -139,8 +139,7 @@ impl Table {
         let axis = |(files, noise): (&Files, &Noise)| {
             files.iter().enumerate().map(|(k, own)| file(noise, k, own)).collect()
         };
-        let logs = self.logs.iter().zip(noise).map(axis).collect();
-        Self { logs, above_only: self.above_only }
+        Self { logs: self.logs.iter().zip(noise).map(axis).collect(), above_only: self.above_only }
     }
 
     /// Share that the axes of a file have in common of the variance by which the active files differ beyond
