@@ -81,7 +81,7 @@ fn beyond_horizontally(summary: &Summary) -> Option<String> {
     let (outage, nees) = beyond.max_by(|a, b| a.1.total_cmp(&b.1))?;
     Some(format!(
         "beyond linear: heading error times tilt in the outage {} shifts horizontal velocity and position to second order, by which the \
-         NEES at its end is larger by about {}, which neither filter nor covariance analysis contains{}. A shorter outage or {} removes it",
+         NEES is larger by up to about {}, which neither filter nor covariance analysis contains{}. A shorter outage or {} removes it",
         window(outage.start_s, outage.end_s),
         readable(nees),
         how_far(summary),

@@ -54,8 +54,14 @@ impl Expected {
         let epochs: Vec<EpochMetrics> =
             reports.map(|(instant, bias)| epoch(instant, *bias, limit)).collect::<Option<_>>()?;
         let ends = experiment.outages.iter().zip(&law.outage_ends);
-        let outages: Vec<OutageMetrics> =
+        let mut outages: Vec<OutageMetrics> =
             ends.map(|(window, end)| outage((window.start_s, window.end_s), end, &epochs)).collect();
+        let believed = |epoch: &EpochMetrics| {
+            law.reports.iter().find(|report| report.t_s == epoch.t_s).map(|report| &report.believed)
+        };
+        for outage in &mut outages {
+            outage.second_order_nees = horizontal_nees((outage.start_s, outage.end_s), &epochs, believed);
+        }
         let record = record(&epochs, &law, &outages);
         // NaN comes from a believed covariance without a Cholesky factor: at any report it makes the mean
         // NaN.
@@ -188,7 +194,7 @@ fn outage((start_s, end_s): (f64, f64), end: &Instant, epochs: &[EpochMetrics]) 
         horizontal_p95_m: quantile(p95),
         horizontal_p999_m: Some(p999),
         horizontal_max_m: f64::NAN,
-        second_order_nees: horizontal_nees((start_s, end_s), &end.believed, epochs),
+        second_order_nees: f64::NAN,
         reconvergence: Reconvergence { p50_s: quantile(f64::NAN), p95_s: quantile(f64::NAN), never: None },
     }
 }

@@ -32,7 +32,7 @@ pub struct OutageMetrics {
     pub horizontal_p999_m: Option<f64>,
     /// Largest; NaN of a covariance analysis, whose law has no end.
     pub horizontal_max_m: f64,
-    /// What the horizontal errors of second order add to the expected NEES there; of a covariance analysis only.
+    /// What the horizontal errors of second order add to the expected NEES at most; of a covariance analysis only.
     pub second_order_nees: f64,
     /// How soon the runs recover.
     pub reconvergence: Reconvergence,

@@ -124,7 +124,7 @@ pub struct OutageSummary {
     /// Mean shift of the velocity down at the same instant that attitude errors make to second order, which neither
     /// filter nor covariance analysis contains (null where the epochs were not kept, or a barometer sees the height).
     pub second_order_vel_d_m_s: f64,
-    /// What heading error times tilt, which is of second order, adds to the expected NEES at the same instant; NaN where no
+    /// What heading error times tilt, which is of second order, adds to the expected NEES in the outage at most; NaN where no
     /// covariance analysis stands beside the runs.
     #[serde(skip)]
     pub second_order_nees: f64,

@@ -237,7 +237,7 @@ fn the_remedy_is_for_what_the_filter_does_not_expect() {
             assert!(!warning.contains("nav-sim tune"), "{warning}");
         }
     }
-    done(
+    nav_sim(
         place.path(),
         "run drive.toml imu.toml --scenario coloured.toml --method lincov --outage none -o page",
     );
