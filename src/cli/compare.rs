@@ -66,10 +66,11 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     replaceable(&page)?;
     let compared = Compared::new(args, session)?;
     let json = report::json(&compared.found.file);
+    // Before the files: what was found is seen also where a name is taken.
+    session.show(|| json.clone(), || args.table.map_or_else(|| compared.text(), |form| compared.table(form)));
     atomic::write_result(out, &json, session.existing())?;
     atomic::write(&page, compared.page(&[]))?;
     args.plot.write(|| compared.shown().svg(), session)?;
-    session.show(|| json, || args.table.map_or_else(|| compared.text(), |form| compared.table(form)));
     session.say(format!("wrote {}, {}", out.display(), page.display()));
     Ok(())
 }

@@ -198,7 +198,8 @@ fn given(path: &Path, args: &Args, requirements: &Requirements, session: &Sessio
     }
     let worst = margins.worst;
     let (name, most) = (worst.limit.quantity.name(), worst.limit.most);
-    Err(Failure::bound(format!("{name} is {:.3}, the limit is {most}", worst.value)))
+    let unit = worst.limit.quantity.unit();
+    Err(Failure::bound(format!("{name} is {:.3} {unit}, the limit is {most} {unit}", worst.value)))
 }
 
 /// The units of the catalogue or of a directory, the best first.

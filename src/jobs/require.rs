@@ -38,7 +38,7 @@ impl Ask {
 /// Earliest start of an outage where nothing else is said (s): by then a filter has aligned itself.
 const SETTLED_S: f64 = 300.0;
 /// Places of an outage of which only the length is given: the time that the search takes is in proportion.
-const PLACES: u32 = 8;
+const PLACES: u32 = 16;
 /// Longest outage that is looked at (s).
 const LONGEST_S: f64 = 600.0;
 /// Points of a curve of equal drift.

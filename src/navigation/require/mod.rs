@@ -40,6 +40,15 @@ impl Quantity {
             Self::Angle(_) => "yaw_deg",
         }
     }
+
+    /// Its unit.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::P50 | Self::P95 | Self::Rmse => "m",
+            Self::Angle(_) => "deg",
+        }
+    }
 }
 
 /// A quantity and the most it may be.
@@ -90,7 +99,7 @@ impl Worst {
 #[derive(Debug, thiserror::Error)]
 pub enum RequireError {
     /// Not even an IMU without errors keeps a limit.
-    #[error("no IMU keeps {} ≤ {}: without any noise of it, the error is {value:.3}, from GNSS, the start and what else the scenario has", .limit.quantity.name(), .limit.most)]
+    #[error("no IMU keeps {} ≤ {}: without any noise of it, the error is {value:.3} {}, from GNSS, the start and what else the scenario has", .limit.quantity.name(), .limit.most, .limit.quantity.unit())]
     Floor {
         /// The limit.
         limit: Limit,
@@ -98,7 +107,7 @@ pub enum RequireError {
         value: f64,
     },
     /// The poorest IMU that is sought keeps every limit.
-    #[error("no IMU is too poor for {} ≤ {}: any that is sought keeps it; with the poorest of the search the error is {value:.3} ({})", .limit.quantity.name(), .limit.most, .poorest.in_words())]
+    #[error("no IMU is too poor for {} ≤ {}: any that is sought keeps it; with the poorest of the search the error is {value:.3} {} ({})", .limit.quantity.name(), .limit.most, .limit.quantity.unit(), .poorest.in_words())]
     Loose {
         /// The hardest limit.
         limit: Limit,
