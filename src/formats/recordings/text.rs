@@ -202,7 +202,7 @@ fn read_rows(
         .buffer_capacity(BUFFER)
         .from_reader(rows);
     let (mut lines, mut record, mut sample) = (Lines::default(), csv::ByteRecord::new(), 0);
-    let (mut longest, mut has_units) = (0, false);
+    let (mut shortest, mut largest, mut has_units) = (0, f64::INFINITY, false);
     let expected = head.names.len();
     let has_clock = columns.iter().any(|c| !matches!(c.role, Role::Signal { .. }));
     let mut unused = Unused::new((0..expected).filter(|i| !has_clock && !indices.contains(i)));
@@ -220,15 +220,18 @@ fn read_rows(
             continue;
         }
         let last_used = found == expected && indices.contains(&(expected - 1));
-        let length = if last_used { length_of(record.get(expected - 1).unwrap_or_default()) } else { 0 };
-        // A number that was cut off is another number: `5.1e-0` of `5.1e-04`. What is as long as any before is whole.
-        if open_at.get().is_some_and(|end| rows.position().byte() > end)
-            && (found < expected || length < longest)
-        {
+        let last = record.get(expected - 1).filter(|_| last_used).unwrap_or(b"0");
+        let (length, size) = (length_of(last), number(last).map_or(f64::INFINITY, f64::abs));
+        // A number that was cut off is another number: `5.1e-0` of `5.1e-04`, `9` of `9.81`. It has fewer characters than all before,
+        // or, where these are of many lengths, another size without its exponent.
+        let is_cut = || found < expected || length < shortest || size > TEN_TIMES * largest;
+        if open_at.get().is_some_and(|end| rows.position().byte() > end) && is_cut() {
             notes.assumptions.push(format!("line {line}, the last, does not end and may be cut: left out"));
             break;
         }
-        longest = longest.max(length);
+        let is_first = sample == 0;
+        shortest = if is_first { length } else { shortest.min(length) };
+        largest = if is_first { size } else { largest.max(size) };
         let trailing =
             found == expected + 1 && record.get(expected).is_some_and(|c| c.trim_ascii().is_empty());
         if found != expected && !trailing {
@@ -265,6 +268,9 @@ fn is_words(record: &csv::ByteRecord) -> bool {
     };
     record.iter().all(is_word) && record.iter().any(|cell| begins(cell).is_some())
 }
+
+/// A number so many times as large as any before is not of its column.
+const TEN_TIMES: f64 = 10.0;
 
 /// Characters of a number without its sign.
 fn length_of(cell: &[u8]) -> usize {

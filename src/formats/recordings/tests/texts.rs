@@ -10,7 +10,7 @@ fn outcome(contents: impl AsRef<[u8]>) -> (Recording, FileReport) {
 
 /// A copy that ends within its last number ends in another number.
 #[test]
-fn a_last_line_that_does_not_end_is_left_out_unless_it_is_as_long_as_any() {
+fn a_last_line_that_does_not_end_is_left_out_where_its_number_is_not_of_the_column() {
     const WHOLE: &str = "t_s,gyro_x_rad_s\n0.00,1.1e-04\n0.01,-2.2e-04\n0.02,-5.1e-04";
     let cut = |characters: usize| outcome(&WHOLE[..WHOLE.len() - characters]);
     assert_eq!((cut(0).0.len(), cut(0).1.assumptions.len()), (3, 0));
@@ -21,6 +21,10 @@ fn a_last_line_that_does_not_end_is_left_out_unless_it_is_as_long_as_any() {
         assert_close(&samples_with_mean(&recording.signals[0]), &[1.1e-4, -2.2e-4]);
         assert_eq!(report.assumptions, ["line 4, the last, does not end and may be cut: left out"]);
     }
+    // Numbers of many lengths: a whole one is rarely the shortest of all; one without its exponent is another size.
+    const FREE: &str = "t_s,gyro_x_rad_s\n0.00,1.25e-04\n0.01,-2e-04\n0.02,0.00051\n0.03,-5.12e-05";
+    let free = |characters: usize| outcome(&FREE[..FREE.len() - characters]).0.len();
+    assert_eq!([0, 1, 2, 4, 5].map(free), [4, 3, 3, 3, 3]);
     // Cut in a column that is not read: no harm.
     assert_eq!(outcome("t_s,gyro_x_rad_s,note\n0.00,1,well\n0.01,2,we").0.len(), 2);
     // A line that ends is another matter.
