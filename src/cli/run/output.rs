@@ -130,11 +130,11 @@ fn largest<'a>(summary: &Summary, unexpected: &'a [Unexpected]) -> Option<&'a Un
     let share = |source: &Unexpected| {
         let shares =
             budget.shares.iter().find(|(name, _)| *name == source.source).map(|(_, shares)| shares.0);
-        let of = |shares: [f64; REPORTED]| match state {
+        let of_worst_state = |shares: [f64; REPORTED]| match state {
             Some(state) => shares[state],
             None => shares.into_iter().fold(0.0, f64::max),
         };
-        shares.map_or(0.0, of)
+        shares.map_or(0.0, of_worst_state)
     };
     // of a mean square that is ratio² times what is believed, this share is too much
     let excess = 1.0 - verdict.ratio.powi(-2);

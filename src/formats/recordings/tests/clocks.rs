@@ -169,6 +169,8 @@ fn a_column_that_runs_like_a_clock_and_is_not_used_is_told() {
     let told = warnings("clk", &|k| 17.0 + 0.01 * k as f64);
     assert_eq!(told.len(), 1, "{told:?}");
     assert!(told[0].starts_with("column \"clk\" rises evenly like a clock, but is not used"), "{told:?}");
+    // The gap itself must not hide it.
+    assert_eq!(warnings("clk", &|k| 0.01 * k as f64 + if k < 50 { 0.0 } else { 60.0 }), told);
     // A temperature does not.
     assert_eq!(warnings("temperature", &|k| 20.0 + 0.01 * (k / 3) as f64), [""; 0]);
     assert_eq!(warnings("height", &|k| (k * k) as f64), [""; 0]);
