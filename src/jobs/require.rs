@@ -4,8 +4,8 @@ use super::turn_on;
 use crate::formats::model_file::{ModelFile, PROGRAM};
 use crate::report::require::{Bridged, CURVE_S, Longest, NeededImu, Question, RankedUnit};
 use nav_sim_navigation::require::{
-    Answer, Course, Detail, Drift, IMU_PARAMETERS, ImuParameters, Limit, Margins, Need, Quantity,
-    RequireError, Worst, evenly,
+    Answer, Course, Drift, IMU_PARAMETERS, ImuParameters, Limit, Margins, Need, Quantity, RequireError,
+    Worst, evenly,
 };
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::outage::Outage;
@@ -37,8 +37,11 @@ impl Ask {
 
 /// Earliest start of an outage where nothing else is said (s): by then a filter has aligned itself.
 const SETTLED_S: f64 = 300.0;
-/// Places of an outage of which only the length is given: the time that the search takes is in proportion.
-const PLACES: u32 = 16;
+/// An outage of which only the length is given begins at every whole second, at fewer where all of them together would
+/// last longer than this (s): the time that an answer takes is in proportion.
+const TOGETHER_S: f64 = 60_000.0;
+/// Beginnings at least.
+const BEGINNINGS: f64 = 16.0;
 /// Longest outage that is looked at (s).
 const LONGEST_S: f64 = 600.0;
 /// Points of a curve of equal drift.
@@ -103,7 +106,7 @@ impl Requirements {
         iso_drift: bool,
     ) -> Result<(NeededImu, Question), RequireError> {
         let outages = self.outages();
-        let course = self.course(&outages, Detail::End)?;
+        let course = self.course(&outages)?;
         let need = Need { course: &course, scenario: &self.scenario, limits: &self.limits, t_corr_s };
         let (imu, shares) = need.allocated()?;
         let ends = course.drifts(&self.scenario, &imu.model(self.scenario.imu.rate_hz))?;
@@ -136,7 +139,7 @@ impl Requirements {
         model: &Model,
     ) -> Result<(Margins, Question), RequireError> {
         let outages = self.outages();
-        let course = self.course(&outages, Detail::End)?;
+        let course = self.course(&outages)?;
         Ok((Margins::of(&course, scenario, model, &self.limits)?, self.question(outages)))
     }
 
@@ -151,7 +154,7 @@ impl Requirements {
         model: &Model,
     ) -> Result<(Bridged, Question), RequireError> {
         let outages = self.long_outages();
-        let course = self.course(&outages, Detail::Seconds)?;
+        let course = self.course(&outages)?;
         let curves = course.curves(scenario, model)?;
         let of_limit = |limit: &Limit| CURVE_S.map(|s| worst_after(&curves, s, limit.quantity));
         let bridged = Bridged {
@@ -171,7 +174,7 @@ impl Requirements {
         units: &[CatalogueUnit],
     ) -> Result<(Vec<RankedUnit>, Question), RequireError> {
         let outages = self.long_outages();
-        let course = self.course(&outages, Detail::Seconds)?;
+        let course = self.course(&outages)?;
         let named =
             |unit: &CatalogueUnit, e| RequireError::Unit { name: unit.name.clone(), source: Box::new(e) };
         let ranked = |unit: &CatalogueUnit| self.rank(&course, unit).map_err(|e| named(unit, e));
@@ -229,8 +232,16 @@ impl Requirements {
     fn outages(&self) -> Vec<Outage> {
         match self.ask {
             Ask::Window(outage) => vec![outage],
-            ask => evenly(self.first_s, self.trajectory.end_s(), ask.length_s(), PLACES),
+            ask => self.beginnings(ask.length_s()),
         }
+    }
+
+    /// An outage of this length at all its beginnings.
+    fn beginnings(&self, length_s: f64) -> Vec<Outage> {
+        let end_s = self.trajectory.end_s();
+        let seconds = (end_s - length_s - self.first_s).floor().max(0.0) + 1.0;
+        let count = seconds.min((TOGETHER_S / length_s).max(BEGINNINGS));
+        evenly(self.first_s, end_s, length_s, count as u32)
     }
 
     /// The outage at the places that it is asked for, each as long as the trajectory allows. Where the longest is sought,
@@ -239,15 +250,15 @@ impl Requirements {
         let end_s = self.trajectory.end_s();
         if self.ask == Ask::Longest {
             let length_s = (0.5 * (end_s - self.first_s)).floor().min(LONGEST_S).max(self.ask.length_s());
-            return evenly(self.first_s, end_s, length_s, PLACES);
+            return self.beginnings(length_s);
         }
         // The same places whatever is made of them: a unit is judged alike alone and in a ranking.
         let lasting = |o: Outage| Outage { end_s: end_s.min(o.start_s + LONGEST_S).max(o.end_s), ..o };
         self.outages().into_iter().map(lasting).collect()
     }
 
-    fn course(&self, outages: &[Outage], detail: Detail) -> Result<Course<'_>, ExperimentError> {
-        Course::new(&self.scenario, &self.trajectory, outages, detail)
+    fn course(&self, outages: &[Outage]) -> Result<Course<'_>, ExperimentError> {
+        Course::new(&self.scenario, &self.trajectory, outages)
     }
 
     fn question(&self, outages: Vec<Outage>) -> Question {
@@ -270,22 +281,25 @@ pub(crate) struct CatalogueUnit {
 
 /// The errors after a time without fixes at every place where the outage lasts so long.
 fn after(curves: &[Vec<Drift>], length_s: f64) -> Vec<Drift> {
-    let drift_of_curve =
-        |curve: &Vec<Drift>| curve.iter().find(|d| (d.after_s - length_s).abs() < 1e-3).copied();
+    // Times come from samples: within a millisecond they are the same.
+    const SAME_S: f64 = 1e-3;
+    let drift_of_curve = |curve: &Vec<Drift>| {
+        let first = curve.partition_point(|d| d.after_s < length_s - SAME_S);
+        curve.get(first).filter(|d| d.after_s < length_s + SAME_S).copied()
+    };
     curves.iter().filter_map(drift_of_curve).collect()
 }
 
 /// The largest value of a quantity after a time without fixes.
 fn worst_after(curves: &[Vec<Drift>], length_s: u32, quantity: Quantity) -> Option<f64> {
-    after(curves, f64::from(length_s)).iter().map(|d| d.value(quantity)).reduce(f64::max)
+    Drift::largest(&after(curves, f64::from(length_s)), quantity).map(|(_, value)| value)
 }
 
 /// The longest outage within the limits, in whole seconds. The first place holds the longest.
 fn longest(curves: &[Vec<Drift>], limits: &[Limit]) -> Longest {
     let lengths: Vec<f64> = curves.first().map_or_else(Vec::new, |c| c.iter().map(|d| d.after_s).collect());
-    let is_missed = |length_s: &f64| {
-        Worst::of(limits, &after(curves, *length_s)).is_some_and(|worst| worst.margin() < 0.0)
-    };
+    let is_missed =
+        |length_s: &f64| after(curves, *length_s).iter().any(|drift| limits.iter().any(|l| drift.exceeds(l)));
     match lengths.iter().position(is_missed) {
         Some(0) => Longest::Seconds(0.0),
         Some(first) => Longest::Seconds(lengths[first - 1]),

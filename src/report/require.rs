@@ -93,7 +93,7 @@ pub(crate) struct Question {
 }
 
 impl Question {
-    /// `p95_m ≤ 5 after 60 s without fixes (from 300 s on)`, `(the worst of 16 places, beginning from 300 to 840 s)`
+    /// `p95_m ≤ 5 after 60 s without fixes (from 300 s on)`, `(the worst of 541 places, beginning from 300 to 840 s)`
     pub(crate) fn in_words(&self) -> String {
         let first = self.outages[0];
         let places = match self.outages.as_slice() {

@@ -1,14 +1,16 @@
 //! The places of an outage along a trajectory, and the errors at its end.
 
 use super::{Limit, Quantity, Worst};
-use crate::ekf::BeliefError;
+use crate::ekf::{Belief, BeliefError};
 use crate::metrics::QuadraticForm;
 use crate::noise::Model;
 use crate::scenario::Scenario;
 use crate::sensors::imu::Truth;
 use crate::sensors::outage::Outage;
 use crate::simulation::ExperimentError;
-use crate::simulation::lincov::{FilterPass, Instant, NamedSource, Track, TruthSide};
+use crate::simulation::lincov::{
+    Crossing, Instant, Moments, NamedSource, Track, TruthSide, errors_in_outages,
+};
 use crate::trajectory::Trajectory;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -59,6 +61,50 @@ impl Drift {
         }
     }
 
+    /// What a value is at most, at next to no cost.
+    fn bound(&self, quantity: Quantity) -> f64 {
+        match quantity {
+            Quantity::P50 => self.quantile_bound(0.5),
+            Quantity::P95 => self.quantile_bound(0.95),
+            Quantity::Rmse | Quantity::Angle(_) => self.value(quantity),
+        }
+    }
+
+    /// The mean, and the quantile of a circular error whose variance on every axis is the largest of this one's.
+    fn quantile_bound(&self, probability: f64) -> f64 {
+        let [[north, both], [_, east]] = self.covariance_m2;
+        let largest = 0.5 * (north + east + (north - east).hypot(2.0 * both));
+        self.mean_m[0].hypot(self.mean_m[1]) + (-2.0 * (1.0 - probability).ln() * largest).sqrt()
+    }
+
+    /// Whether a limit is exceeded, or the value is not a number.
+    #[must_use]
+    pub fn exceeds(&self, limit: &Limit) -> bool {
+        let is_within = |value: f64| value <= limit.most;
+        !is_within(self.bound(limit.quantity)) && !is_within(self.value(limit.quantity))
+    }
+
+    /// The largest value of a quantity and where it is; what is not a number is the largest.
+    #[must_use]
+    pub fn largest(drifts: &[Self], quantity: Quantity) -> Option<(usize, f64)> {
+        let bound =
+            |drift: &Self| Some(drift.bound(quantity)).filter(|b| !b.is_nan()).unwrap_or(f64::INFINITY);
+        let mut bounds: Vec<(usize, f64)> = drifts.iter().map(bound).enumerate().collect();
+        bounds.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let mut largest: Option<(usize, f64)> = None;
+        // A quantile is an integral: only those are computed that may be the largest.
+        for (place, bound) in bounds {
+            if largest.is_some_and(|(_, value)| bound <= value || value.is_nan()) {
+                break;
+            }
+            let value = drifts[place].value(quantity);
+            if largest.is_none_or(|(_, largest)| value > largest || value.is_nan()) {
+                largest = Some((place, value));
+            }
+        }
+        largest
+    }
+
     fn quantile(&self, probability: f64) -> f64 {
         let covariance = DMatrix::from_fn(2, 2, |i, j| self.covariance_m2[j][i]);
         // North and east have unequal variances and are correlated: the horizontal error is neither Rayleigh
@@ -67,30 +113,15 @@ impl Drift {
     }
 }
 
-/// One place of the outage.
-struct Place {
-    outage: [Outage; 1],
-    /// To the end of the outage.
-    track: Track,
-}
-
-/// A trajectory with an outage of one length at several places, each alone.
+/// A trajectory with an outage at several places, each alone.
 pub struct Course<'a> {
     trajectory: &'a Trajectory,
-    places: Vec<Place>,
-}
-
-/// What is seen of a course, which is followed in steps of a second.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Detail {
-    /// The outage's end alone.
-    End,
-    /// Every second of the outage.
-    Seconds,
+    track: Track,
+    outages: Vec<Outage>,
 }
 
 impl<'a> Course<'a> {
-    /// Linearises along the trajectory for each place; of the scenario, receiver, barometer and start count.
+    /// Linearises along the trajectory; of the scenario, receiver, barometer and start count. Outages may overlap.
     ///
     /// # Errors
     /// When trajectory, rates and fixes do not fit together.
@@ -98,19 +129,12 @@ impl<'a> Course<'a> {
         scenario: &Scenario,
         trajectory: &'a Trajectory,
         outages: &[Outage],
-        detail: Detail,
     ) -> Result<Self, ExperimentError> {
         // The track is of the reference alone; the noise that is sought comes later, a hundred times over the
         // same track.
         let silent = Model { rate_hz: scenario.imu.rate_hz, axes: Default::default() };
-        let place = |outage: &Outage| {
-            let track = scenario.track(trajectory, &silent, &[*outage])?.until_outage_end();
-            // The same steps for both: the error after 60 s of a long outage is that of an outage of 60 s.
-            let track = if detail == Detail::End { track.coarse() } else { track.merged() };
-            Ok(Place { outage: [*outage], track })
-        };
-        let places = outages.par_iter().map(place).collect::<Result<_, ExperimentError>>()?;
-        Ok(Self { trajectory, places })
+        let track = scenario.track(trajectory, &silent, &[])?.merged();
+        Ok(Self { trajectory, track, outages: outages.to_vec() })
     }
 
     /// Errors at the outage's end, at each place, of the filter that knows the model.
@@ -118,12 +142,7 @@ impl<'a> Course<'a> {
     /// # Errors
     /// When the model has no such filter.
     pub fn drifts(&self, scenario: &Scenario, model: &Model) -> Result<Vec<Drift>, BeliefError> {
-        let end = |place: &Place| {
-            let all = TruthSide::together(&self.sources(place, scenario, model));
-            let end = place.filter(scenario, model)?.errors_at_ends(&all);
-            Ok(place.drift(end.first().copied()))
-        };
-        self.places.par_iter().map(end).collect()
+        self.drifts_in(&self.outages, scenario, model)
     }
 
     /// Errors at every whole second of the outage, at each place.
@@ -131,16 +150,19 @@ impl<'a> Course<'a> {
     /// # Errors
     /// When the model has no such filter.
     pub fn curves(&self, scenario: &Scenario, model: &Model) -> Result<Vec<Vec<Drift>>, BeliefError> {
-        let curve = |place: &Place| {
-            let all = TruthSide::together(&self.sources(place, scenario, model));
-            let law = place.filter(scenario, model)?.errors(&all);
-            let outage = place.outage[0];
-            // a report within the outage is what an outage would leave that ended there
-            let within = law.reports.iter().filter(|r| r.t_s > outage.start_s && r.t_s < outage.end_s);
+        let belief = self.belief(scenario, model)?;
+        let all = TruthSide::together(&self.sources(scenario, model));
+        let laws = errors_in_outages(&self.track, &belief, &all, &self.outages, Moments::Reports);
+        let curve = |(instants, outage): (Vec<Instant>, &Outage)| {
+            // A report within the outage is what an outage would leave that ended there.
             let drift = |instant: &Instant| Drift::of(instant, instant.t_s - outage.start_s);
-            Ok(within.map(drift).chain([place.drift(law.outage_ends.first().copied())]).collect())
+            let mut curve: Vec<Drift> = instants.iter().map(drift).filter(|d| d.after_s > 0.0).collect();
+            if let Some(end) = curve.last_mut() {
+                end.after_s = outage.end_s - outage.start_s;
+            }
+            curve
         };
-        self.places.par_iter().map(curve).collect()
+        Ok(laws.into_iter().zip(&self.outages).map(curve).collect())
     }
 
     /// The errors of each group of sources alone, under the gains of the filter that knows them all.
@@ -152,12 +174,11 @@ impl<'a> Course<'a> {
         group: &(dyn Fn(&NamedSource) -> usize + Sync),
         groups: usize,
     ) -> Result<Vec<Drift>, BeliefError> {
-        let place = &self.places[place];
-        let filter = place.filter(scenario, model)?;
-        let sources = self.sources(place, scenario, model);
+        let belief = self.belief(scenario, model)?;
+        let sources = self.sources(scenario, model);
         let part = |g: usize| {
             let own: Vec<NamedSource> = sources.iter().filter(|source| group(source) == g).cloned().collect();
-            place.drift(filter.errors_at_ends(&TruthSide::together(&own)).first().copied())
+            self.ends(&self.outages[place..=place], &belief, &TruthSide::together(&own))[0]
         };
         Ok((0..groups).into_par_iter().map(part).collect())
     }
@@ -173,23 +194,63 @@ impl<'a> Course<'a> {
         Ok(worst.expect("at least one limit and one place"))
     }
 
-    fn sources(&self, place: &Place, scenario: &Scenario, model: &Model) -> Vec<NamedSource> {
+    /// Where the margin of the hardest limit falls to `reserve` along models of a rising logarithm, as
+    /// [`Crossing::from`] 0; the logarithm and what is left beyond the reserve.
+    ///
+    /// The search is at the places that were the worst so far; what it finds is held against all, and it goes on where
+    /// another is worse. The answer is that of all places, at the cost of a few.
+    pub(super) fn crossing(
+        &self,
+        scenario: &Scenario,
+        limits: &[Limit],
+        (crossing, reserve): (&Crossing, f64),
+        model_at: impl Fn(f64) -> Model,
+    ) -> Result<(f64, f64), BeliefError> {
+        let mut places = vec![self.worst(scenario, &model_at(0.0), limits)?.place];
+        let mut start = 0.0;
+        loop {
+            let outages: Vec<Outage> = places.iter().map(|place| self.outages[*place]).collect();
+            let margin_there = |ln: f64| {
+                let worst = Worst::of(limits, &self.drifts_in(&outages, scenario, &model_at(ln))?);
+                Ok::<_, BeliefError>(worst.expect("at least one limit and one place").margin() - reserve)
+            };
+            let (ln, there) = crossing.from(start, margin_there)?;
+            let worst = self.worst(scenario, &model_at(ln), limits)?;
+            let everywhere = worst.margin() - reserve;
+            if everywhere >= there - crossing.exact || places.contains(&worst.place) {
+                return Ok((ln, everywhere));
+            }
+            places.push(worst.place);
+            start = ln;
+        }
+    }
+
+    fn drifts_in(
+        &self,
+        outages: &[Outage],
+        scenario: &Scenario,
+        model: &Model,
+    ) -> Result<Vec<Drift>, BeliefError> {
+        let all = TruthSide::together(&self.sources(scenario, model));
+        Ok(self.ends(outages, &self.belief(scenario, model)?, &all))
+    }
+
+    fn ends(&self, outages: &[Outage], belief: &Belief, truth: &TruthSide) -> Vec<Drift> {
+        let ends = errors_in_outages(&self.track, belief, truth, outages, Moments::End);
+        let drift = |(instants, outage): (Vec<Instant>, &Outage)| {
+            Drift::of(instants.last().expect("every outage has an end"), outage.end_s - outage.start_s)
+        };
+        ends.into_iter().zip(outages).map(drift).collect()
+    }
+
+    /// The filter that knows every process: the best that this IMU allows, whatever reduction is chosen later.
+    fn belief(&self, scenario: &Scenario, model: &Model) -> Result<Belief, BeliefError> {
+        scenario.with_full_noise().belief(model, &self.outages, &self.track)
+    }
+
+    fn sources(&self, scenario: &Scenario, model: &Model) -> Vec<NamedSource> {
         let truth = Truth::Model(model);
-        TruthSide::sources(&scenario.experiment(self.trajectory, truth, &[], &place.outage, 0), model)
-    }
-}
-
-impl Place {
-    fn filter(&self, scenario: &Scenario, model: &Model) -> Result<FilterPass<'_>, BeliefError> {
-        // The filter that knows every process: the best that this IMU allows, whatever reduction is chosen
-        // later.
-        let belief = scenario.with_full_noise().belief(model, &self.outage, &self.track)?;
-        Ok(FilterPass::new(&self.track, &belief))
-    }
-
-    fn drift(&self, end: Option<Instant>) -> Drift {
-        let length_s = self.outage[0].end_s - self.outage[0].start_s;
-        Drift::of(&end.expect("every place has its outage"), length_s)
+        TruthSide::sources(&scenario.experiment(self.trajectory, truth, &[], &self.outages, 0), model)
     }
 }
 

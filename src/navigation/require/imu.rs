@@ -239,8 +239,9 @@ impl Need<'_> {
     ) -> Result<(f64, ImuParameters), BeliefError> {
         let scaled = |ln: f64| imu.times(weights.map(|w| (w * ln).exp()));
         let crossing = Crossing { bounds: (-RANGE, RANGE), step: 0.7, exact: EXACT };
+        let model_at = |ln: f64| scaled(ln).model(self.scenario.imu.rate_hz);
         let (ln, margin) =
-            crossing.from(0.0, |ln| Ok::<_, BeliefError>(self.worst(&scaled(ln))?.margin() - RESERVE))?;
+            self.course.crossing(self.scenario, self.limits, (&crossing, RESERVE), model_at)?;
         Ok((margin, scaled(ln)))
     }
 

@@ -107,12 +107,9 @@ impl Margins {
         let total: f64 = squares.iter().sum();
         let mut groups = Vec::new();
         for (group, square) in Group::ALL.into_iter().zip(&squares).filter(|(_, square)| **square > 0.0) {
-            let margin = |ln: f64| {
-                let changed = group.multiplied(model, ln.exp());
-                Ok::<_, BeliefError>(course.worst(scenario, &changed, limits)?.margin())
-            };
-            let (ln, left) =
-                Crossing { bounds: (-RANGE, RANGE), step: 0.7, exact: 1e-3 }.from(0.0, margin)?;
+            let crossing = Crossing { bounds: (-RANGE, RANGE), step: 0.7, exact: 1e-3 };
+            let model_at = |ln: f64| group.multiplied(model, ln.exp());
+            let (ln, left) = course.crossing(scenario, limits, (&crossing, 0.0), model_at)?;
             // A value left at a bound is no crossing: with this part without noise, or with any, the limit
             // stays where it is.
             let factor = (left.abs() <= 1e-2).then(|| ln.exp());

@@ -7,7 +7,7 @@ mod course;
 mod imu;
 mod margins;
 
-pub use course::{Course, Detail, Drift, evenly};
+pub use course::{Course, Drift, evenly};
 pub use imu::{Answer, IMU_PARAMETERS, ImuParameters, IsoDrift, Need};
 pub use margins::{Group, GroupMargin, Margins};
 
@@ -83,11 +83,12 @@ impl Worst {
     /// The hardest of some limits for the errors at several places; none without limits or places.
     #[must_use]
     pub fn of(limits: &[Limit], drifts: &[Drift]) -> Option<Self> {
-        let each = drifts.iter().enumerate().flat_map(|(place, drift)| {
-            limits.iter().map(move |limit| Self { limit: *limit, value: drift.value(limit.quantity), place })
-        });
+        let worst_of_limit = |limit: &Limit| {
+            let (place, value) = Drift::largest(drifts, limit.quantity)?;
+            Some(Self { limit: *limit, value, place })
+        };
         let margins = |worst: &Self| (worst.margin(), worst.margin().is_nan());
-        each.min_by(|a, b| {
+        limits.iter().filter_map(worst_of_limit).min_by(|a, b| {
             let ((a, a_is_nan), (b, b_is_nan)) = (margins(a), margins(b));
             // what is not a number is the hardest
             b_is_nan.cmp(&a_is_nan).then(a.total_cmp(&b))

@@ -8,7 +8,7 @@
 //! The trajectory is reduced once to a [`Track`]: exact maps of the navigation error over steps of a fraction
 //! of a second. Any number of beliefs and truths are then assessed along it, in milliseconds each.
 
-mod cut;
+mod branch;
 mod descent;
 mod heading;
 mod input;
@@ -21,6 +21,7 @@ mod track;
 mod truth;
 mod tune;
 
+pub(crate) use branch::{Moments, errors_in_outages};
 pub use heading::{HeadingDoubt, weak_heading};
 pub use pass::{Assessment, Consistency, ErrorLaw, FilterPass, Instant, assess};
 pub use reduce::{Alike, drive, reduced_belief};

@@ -3,7 +3,7 @@
 use super::input::Sources;
 use super::joint::{Gain, Inputs, Joint};
 use super::mean::Mean;
-use super::track::{Mark, Measured, NAV, Nav, Track};
+use super::track::{Mark, Measured, NAV, Nav, Row, Step, Track};
 use super::truth::{TrueErrors, TruthSide};
 use crate::ekf::Belief;
 use crate::ekf::covariance::PSI;
@@ -123,7 +123,7 @@ impl<'a> FilterPass<'a> {
     pub fn new(track: &'a Track, belief: &Belief) -> Self {
         let (believed, none) = (Sources::of_belief(belief), Sources::default());
         let mut filter = Joint::new(track.start, &believed, &none);
-        let mut inputs = StepInputs { b: &believed, t: &none, made: Vec::new() };
+        let mut inputs = StepInputs::new(&believed, &none);
         let (mut gains, mut reports, mut biases, mut done) = (Vec::new(), Vec::new(), Vec::new(), 0);
         let mut ends = vec![[[0.0; NAV]; NAV]; track.outages];
         for mark in &track.marks {
@@ -214,14 +214,12 @@ impl<'a> FilterPass<'a> {
         let begin = if truth.starts_off { self.track.start } else { [[0.0; NAV]; NAV] };
         let mut errors =
             Errors { joint: Joint::new(begin, &estimates, real), mean: Mean::new(&estimates, real) };
-        let mut inputs = StepInputs { b: &estimates, t: real, made: Vec::new() };
+        let mut inputs = StepInputs::new(&estimates, real);
         let mut gains = self.gains.iter();
         let (mut nis, mut fixes, mut done) = (0.0, 0, 0);
         for mark in &self.track.marks[..marks] {
             for step in &self.track.steps[done..mark.steps] {
-                let inputs = inputs.over(step.samples);
-                errors.joint.step(step, inputs);
-                errors.mean.iter_mut().for_each(|mean| mean.step(step, inputs));
+                errors.step(step, inputs.over(step.samples));
             }
             done = mark.steps;
             if !mark.outages.is_empty() {
@@ -229,16 +227,11 @@ impl<'a> FilterPass<'a> {
             }
             fixes += u64::from(mark.fix);
             for (row, (gain, believed)) in mark.rows.iter().zip(&mut gains) {
-                // Without its noise where the source under study is another one: covariances of independent
-                // sources add.
-                let y = errors.joint.innovation(row, if truth.has_noise(row.what) { row.r } else { 0.0 });
-                let mean = errors.mean.as_ref().map_or(0.0, |mean| mean.innovation(row));
+                let square = errors.measure(row, truth, gain);
                 if row.what != Measured::Height {
                     // The gate and the NIS of runs are of fixes; a height of the barometer is none.
-                    nis += (y.s + mean * mean) / believed;
+                    nis += square / believed;
                 }
-                errors.joint.correct(&y, gain);
-                errors.mean.iter_mut().for_each(|m| m.correct(mean, gain));
             }
             if mark.report {
                 show(mark, Moment::Report, &errors);
@@ -256,13 +249,30 @@ enum Moment {
 }
 
 /// The true errors at an instant.
-struct Errors {
-    joint: Joint,
-    mean: Option<Mean>,
+#[derive(Clone)]
+pub(super) struct Errors {
+    pub(super) joint: Joint,
+    pub(super) mean: Option<Mean>,
 }
 
 impl Errors {
-    fn instant(&self, mark: &Mark, believed: &[Nav; NAV]) -> Instant {
+    pub(super) fn step(&mut self, step: &Step, inputs: &Inputs) {
+        self.joint.step(step, inputs);
+        self.mean.iter_mut().for_each(|mean| mean.step(step, inputs));
+    }
+
+    /// Corrects by a measurement with the filter's gain; returns the expected square of the innovation.
+    pub(super) fn measure(&mut self, row: &Row, truth: &TruthSide, gain: &Gain) -> f64 {
+        // Without its noise where the source under study is another one: covariances of independent sources
+        // add.
+        let y = self.joint.innovation(row, if truth.has_noise(row.what) { row.r } else { 0.0 });
+        let mean = self.mean.as_ref().map_or(0.0, |mean| mean.innovation(row));
+        self.joint.correct(&y, gain);
+        self.mean.iter_mut().for_each(|m| m.correct(mean, gain));
+        y.s + mean * mean
+    }
+
+    pub(super) fn instant(&self, mark: &Mark, believed: &[Nav; NAV]) -> Instant {
         Instant {
             after_s: mark.after_s,
             t_s: mark.t_s,
@@ -277,14 +287,18 @@ impl Errors {
 }
 
 /// Inputs by the number of samples of a step; few numbers occur.
-struct StepInputs<'a> {
+pub(super) struct StepInputs<'a> {
     b: &'a Sources,
     t: &'a Sources,
     made: Vec<(u32, Inputs)>,
 }
 
-impl StepInputs<'_> {
-    fn over(&mut self, samples: u32) -> &Inputs {
+impl<'a> StepInputs<'a> {
+    pub(super) const fn new(b: &'a Sources, t: &'a Sources) -> Self {
+        Self { b, t, made: Vec::new() }
+    }
+
+    pub(super) fn over(&mut self, samples: u32) -> &Inputs {
         let found = self.made.iter().position(|(n, _)| *n == samples);
         let at = found.unwrap_or_else(|| {
             self.made.push((samples, Inputs::new(self.b, self.t, samples)));
