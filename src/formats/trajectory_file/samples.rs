@@ -287,10 +287,22 @@ pub(super) fn follow_path(samples: &mut [TrajectorySample]) {
     }
 }
 
-/// Heading and pitch of the chord from the sample before to the one after, if that is a motion.
+/// Heading and pitch of the parabola through a row and its neighbours (at the ends through the nearest three), if that is a
+/// motion. The chord from the row before to the one after has the direction of the path halfway between them, which is not
+/// that at the row where the steps are unequal.
 fn direction(samples: &[TrajectorySample], i: usize) -> Option<(f64, f64)> {
-    let (a, b) = (&samples[i.saturating_sub(1)], &samples[(i + 1).min(samples.len() - 1)]);
-    let chord = geodetic_to_ecef(b.lat, b.lon, b.h) - geodetic_to_ecef(a.lat, a.lon, a.h);
-    let v = e_to_n(samples[i].lat, samples[i].lon, chord) / (b.t_s - a.t_s);
+    let position = |k: usize| geodetic_to_ecef(samples[k].lat, samples[k].lon, samples[k].h);
+    let slope = |a: usize, b: usize| (position(b) - position(a)) / (samples[b].t_s - samples[a].t_s);
+    let velocity = if samples.len() < 3 {
+        slope(0, samples.len() - 1)
+    } else {
+        // Of the parabola through three rows the slope between two is that at their middle, and linear in time.
+        let middle = i.clamp(1, samples.len() - 2);
+        let [before, at, after] = [middle - 1, middle, middle + 1].map(|k| samples[k].t_s);
+        let (first, second) = (slope(middle - 1, middle), slope(middle, middle + 1));
+        let share = (2.0 * samples[i].t_s - before - at) / (after - before);
+        first.lerp(second, share)
+    };
+    let v = e_to_n(samples[i].lat, samples[i].lon, velocity);
     (v.length() > MOVING).then(|| (v.y.atan2(v.x), (-v.z).atan2(v.x.hypot(v.y))))
 }

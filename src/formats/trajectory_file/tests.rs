@@ -223,6 +223,21 @@ fn without_attitude_heading_and_pitch_follow_the_path() {
     );
 }
 
+/// A circle of 100 m at 10 m/s in steps of 0.2 and 0.8 s by turns: the chord over both is 0.03 rad off the heading at the
+/// row between them, that of the first step 0.01 rad off the heading at the start. What a parabola leaves is of the order
+/// 0.1³ · 0.2 · 0.8 · 0.6/24 rad at a row, and of 0.1³ at the ends.
+#[test]
+fn the_heading_is_that_of_the_path_where_rows_are_uneven() {
+    let time = |k: u32| f64::from(k / 2) + if k.is_multiple_of(2) { 0.0 } else { 0.2 };
+    let row = |t: f64| format!("{t},{},{},0\n", 100.0 * (0.1 * t).sin(), 100.0 * (1.0 - (0.1 * t).cos()));
+    let rows: String = (0..=40).map(|k| row(time(k))).collect();
+    let (t, _) = read(&format!("# origin: 40, 3, 0\nt_s,n_m,e_m,d_m\n{rows}")).unwrap();
+    for k in 0..=40 {
+        let off = RollPitchYaw::from_quat(t.state(time(k)).q_b_n).yaw - 0.1 * time(k);
+        assert!(off.abs() < 1e-3, "{off} rad at {} s", time(k));
+    }
+}
+
 #[test]
 fn what_is_written_reads_back_the_same() {
     let dir = tempfile::tempdir().unwrap();
