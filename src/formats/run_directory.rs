@@ -20,8 +20,8 @@ pub(crate) struct RunDirectory {
     pub experiment: Measured,
     /// Whether the filter is as good as it believes: as its own command found it, covariance analysis included.
     pub verdict: Verdict,
-    /// 95 % interval of the ASEE at the end of each outage by what the calibration leaves open, where it is known.
-    pub asee_end_ci95: Vec<OpenEnds>,
+    /// 95 % interval of the mean ASEE over each outage by what the calibration leaves open, where it is known.
+    pub asee_mean_ci95: Vec<OpenEnds>,
 }
 
 /// Reads a run directory; what a killed command had begun to replace in it is finished first.
@@ -46,11 +46,11 @@ pub(crate) fn read(directory: &Path) -> Result<RunDirectory, FileError> {
         as_written(directory, &manifest, "runs.csv", &runs_text)?;
         runs
     };
-    let (verdict, asee_end_ci95) = found(directory, &manifest)?;
+    let (verdict, asee_mean_ci95) = found(directory, &manifest)?;
     let outages = manifest.configuration.outage.iter().flatten().map(|o| (o.start_s, o.end_s)).collect();
     let independent_windows = manifest.independent_windows;
     let experiment = Measured { epochs, runs, outages, independent_windows, is_expected };
-    Ok(RunDirectory { manifest, experiment, verdict, asee_end_ci95 })
+    Ok(RunDirectory { manifest, experiment, verdict, asee_mean_ci95 })
 }
 
 /// The verdict, and what the calibration leaves open, outage by outage, from the summary.
@@ -62,12 +62,12 @@ fn found(directory: &Path, manifest: &Manifest) -> Result<(Verdict, Vec<OpenEnds
     }
     #[derive(serde::Deserialize)]
     struct OpenOutage {
-        asee_end_ci95: Option<PerState<(f64, f64)>>,
+        asee_mean_ci95: Option<PerState<(f64, f64)>>,
     }
     let (path, summary) = text(directory, "summary.json")?;
     let found: Found = serde_json::from_str(&summary).map_err(|e| not_json(&path, &e))?;
     as_written(directory, manifest, "summary.json", &summary)?;
-    Ok((found.verdict, found.outages.into_iter().map(|outage| outage.asee_end_ci95).collect()))
+    Ok((found.verdict, found.outages.into_iter().map(|outage| outage.asee_mean_ci95).collect()))
 }
 
 /// Refuses a file that is not the one the manifest tells of; what can be read of it was, for a more exact message.

@@ -64,7 +64,7 @@ fn compared(
     let mut outages = outages.map_err(|source| JobError::Ratio { run: run.clone(), source })?;
     // the reference is itself, whatever its calibration leaves open
     if !is_reference {
-        let open = candidate.asee_end_ci95.iter().zip(&reference.asee_end_ci95);
+        let open = candidate.asee_mean_ci95.iter().zip(&reference.asee_mean_ci95);
         for (outage, ends) in outages.iter_mut().zip(open) {
             if let (Some(interval), Some(of_reference)) = ends {
                 outage.widen(interval, of_reference);

@@ -59,14 +59,19 @@ impl Analysed<'_> {
         full: &(dyn Fn(&Model) -> Option<Belief> + Sync),
         outages: &mut [OutageSummary],
     ) {
-        let track = self.track.coarse();
+        let track = self.track.merged();
         let figures = |model: &Model| -> Vec<Figures> {
-            let sigmas = full(model).map(|belief| FilterPass::new(&track, &belief).sigma_at_ends());
-            sigmas.unwrap_or_default().into_iter().map(Vec::from).collect()
+            let Some(belief) = full(model) else { return Vec::new() };
+            let filter = FilterPass::new(&track, &belief);
+            let means = filter.sigma_means(self.experiment.outages);
+            filter.sigma_at_ends().iter().zip(means).map(|(end, mean)| [&end[..], &mean].concat()).collect()
         };
         for (outage, interval) in outages.iter_mut().zip(intervals(model, draws, &figures)) {
-            let asee = outage.asee_end.0;
-            outage.asee_end_ci95 = Some(PerState(std::array::from_fn(|i| interval.about(i, asee[i]))));
+            let (end, mean) = (outage.asee_end.0, outage.asee_mean.0);
+            outage.asee_end_ci95 = Some(PerState(std::array::from_fn(|i| interval.about(i, end[i]))));
+            let of_mean = PerState(std::array::from_fn(|i| interval.about(end.len() + i, mean[i])));
+            // An outage between two reports has no mean.
+            outage.asee_mean_ci95 = Some(of_mean).filter(|_| mean.iter().all(|x| x.is_finite()));
         }
     }
 }

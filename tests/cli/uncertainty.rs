@@ -30,10 +30,33 @@ fn intervals_go_from_recordings_to_navigation() {
         assert!(low < value && value < high, "{low} {value} {high}");
     };
     for state in nav_sim::simulation::REPORTED_NAMES {
-        for figure in ["asee_end", "rmse_end"] {
+        for figure in ["asee_end", "asee_mean", "rmse_end"] {
             holds(&outage[format!("{figure}_ci95")][state], &outage[figure][state]);
         }
     }
+    // Over the outage the position leans on the fixes before it, whose noise is no part of the calibration: the interval
+    // of its mean is narrower than that at the end, and it is this one that a ratio of means gets.
+    let half_of_log = |figure: &str| {
+        let ends = &outage[figure]["pos_e_m"];
+        0.5 * (ends[1].as_f64().unwrap() / ends[0].as_f64().unwrap()).ln()
+    };
+    let [mean, end] = ["asee_mean_ci95", "asee_end_ci95"].map(half_of_log);
+    assert!(0.0 < mean && mean < 0.8 * end, "{mean} {end}");
+    done(dir, "run drive.toml imu.toml --method lincov --outage 30:45 -o known");
+    done(dir, "compare out --reference known -o ratios.json");
+    let rows = json(&dir.join("ratios.json"))["rows"].as_array().unwrap().clone();
+    assert!(rows.iter().all(|row| row["calibration_half_pct"].is_null()), "one of them has no draws");
+    fs::copy(dir.join("m.toml"), dir.join("n.toml")).unwrap();
+    fs::copy(dir.join("m.draws.json"), dir.join("n.draws.json")).unwrap();
+    analysis("n.toml", "-o same");
+    done(dir, "compare out --reference same -o even.json");
+    let rows = json(&dir.join("even.json"))["rows"].as_array().unwrap().clone();
+    let east = rows.iter().find(|row| row["state"] == "pos_e_m").unwrap();
+    let expected = 100.0 * mean.hypot(mean);
+    assert!(
+        (east["calibration_half_pct"].as_f64().unwrap() / expected - 1.0).abs() < 1e-6,
+        "{east} {expected}"
+    );
     let horizontal = &outage["horizontal_error_end_m"];
     holds(&horizontal["p95_ci95"], &horizontal["p95"]);
     assert!(outage["sensitivity"]["gyro.RW.gamma2"]["yaw_deg"].as_f64().unwrap() > 0.0);

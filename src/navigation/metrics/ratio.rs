@@ -240,8 +240,8 @@ fn outage(
 }
 
 impl OutageComparison {
-    /// Adds to the intervals of the ASEE ratios what the calibrations leave open: the 95 % intervals of the ASEE at the end
-    /// of the outage, of candidate and reference. The two are taken as independent: of models of the same recordings,
+    /// Adds to the intervals of the ASEE ratios what the calibrations leave open: the 95 % intervals of the mean ASEE over
+    /// the outage, of candidate and reference. The two are taken as independent: of models of the same recordings,
     /// whose errors hang together, the interval is too wide rather than too narrow.
     pub fn widen(&mut self, candidate: &PerState<(f64, f64)>, reference: &PerState<(f64, f64)>) {
         let half_of_log = |(low, high): (f64, f64)| 0.5 * (high / low).ln();

@@ -107,6 +107,9 @@ pub struct OutageSummary {
     /// known for certain; of a covariance analysis whose model has its draws beside it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub asee_end_ci95: Option<PerState<(f64, f64)>>,
+    /// The same of the mean over the outage's epochs of the ASEE.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub asee_mean_ci95: Option<PerState<(f64, f64)>>,
     /// 95 % interval of the RMSE of this filter that the calibration of what makes the errors leaves; as above.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rmse_end_ci95: Option<PerState<(f64, f64)>>,
@@ -295,6 +298,7 @@ impl OutageSummary {
             rmse_end: values(&o.rmse_end),
             rmse_end_std_error: errors(&o.rmse_end),
             asee_end_ci95: None,
+            asee_mean_ci95: None,
             rmse_end_ci95: None,
             nees_end: o.nees_end.value,
             nees_end_std_error: o.nees_end.std_error,

@@ -8,6 +8,7 @@ use super::truth::{TrueErrors, TruthSide};
 use crate::ekf::Belief;
 use crate::ekf::covariance::PSI;
 use crate::noise::Model;
+use crate::sensors::outage::Outage;
 use crate::simulation::{BIASES, REPORTED};
 use crate::units::DEG;
 use glam::DVec3;
@@ -158,16 +159,26 @@ impl<'a> FilterPass<'a> {
     #[must_use]
     pub fn sigma_at_ends(&self) -> Vec<[f64; REPORTED]> {
         let mut sigmas = vec![[0.0; REPORTED]; self.track.outages];
-        // What the filter states needs no true errors: these are a stand-in for the conversion to the
-        // reported states.
-        let none = Errors {
-            joint: Joint::new([[0.0; NAV]; NAV], &Sources::default(), &Sources::default()),
-            mean: None,
-        };
+        let none = Errors::none();
         for mark in &self.track.marks {
             mark.outages.iter().for_each(|o| sigmas[*o] = none.instant(mark, &self.ends[*o]).sigma());
         }
         sigmas
+    }
+
+    /// Their means over the reports within each of some outages.
+    #[must_use]
+    pub fn sigma_means(&self, outages: &[Outage]) -> Vec<[f64; REPORTED]> {
+        let none = Errors::none();
+        let reports = self.track.marks.iter().filter(|mark| mark.report).zip(&self.reports);
+        let sigmas: Vec<(f64, [f64; REPORTED])> =
+            reports.map(|(mark, believed)| (mark.t_s, none.instant(mark, believed).sigma())).collect();
+        let mean = |outage: &Outage| {
+            let within = || sigmas.iter().filter(|(t_s, _)| outage.withholds(*t_s));
+            let count = within().count() as f64;
+            std::array::from_fn(|i| within().map(|(_, sigma)| sigma[i]).sum::<f64>() / count)
+        };
+        outages.iter().map(mean).collect()
     }
 
     /// The true errors of the filter.
@@ -256,6 +267,12 @@ pub(super) struct Errors {
 }
 
 impl Errors {
+    /// A stand-in where what the filter states is converted to the reported states, which needs no true errors.
+    fn none() -> Self {
+        let none = Sources::default();
+        Self { joint: Joint::new([[0.0; NAV]; NAV], &none, &none), mean: None }
+    }
+
     pub(super) fn step(&mut self, step: &Step, inputs: &Inputs) {
         self.joint.step(step, inputs);
         self.mean.iter_mut().for_each(|mean| mean.step(step, inputs));
