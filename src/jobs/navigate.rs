@@ -163,7 +163,10 @@ pub fn navigate(
     if scenario.baro.is_some() {
         navigation.summary.see_height();
     }
-    analysis.add_budgets(&mut navigation.summary, &belief);
+    // Which fixes a gate refuses is drawn with the errors: the gains of such a filter are not those of the analysis.
+    if scenario.filter.nis_gate.is_none() {
+        analysis.add_budgets(&mut navigation.summary, &belief);
+    }
     if method == Method::Lincov {
         analysis.add_sensitivities(&mut navigation.summary, &belief);
         let full = |model: &Model| scenario.with_full_noise().belief(model, outages, &track).ok();

@@ -120,6 +120,16 @@ fn what_covariance_analysis_cannot_do_is_refused() {
     let command = "run drive.toml imu.toml --method lincov --outage none --scenario gate.toml -o out";
     let ran = nav_sim(place.path(), command);
     assert!(ran.code == 2 && ran.stderr.contains("covariance analysis has no gate"), "{}", ran.stderr);
+    // nor is there a budget beside the runs of such a filter, whose gains are drawn with the errors
+    let command = "run drive.toml imu.toml --runs 2 --outage 30:45 --scenario gate.toml -o gated";
+    let told = done(place.path(), command);
+    let summary: Value =
+        serde_json::from_str(&fs::read_to_string(place.path().join("gated/summary.json")).unwrap()).unwrap();
+    assert!(
+        summary["outages"][0]["budget"].is_null() && !told.stdout.contains("sources of"),
+        "{}",
+        told.stdout
+    );
     done(place.path(), "synthesize imu.toml --replicates 1 --samples 7000 --seed 1 -o made");
     let command = "run drive.toml imu.toml --method both --outage none --static made/replicate_1.csv -o out";
     let ran = nav_sim(place.path(), command);
