@@ -93,7 +93,7 @@ pub(crate) struct Question {
 }
 
 impl Question {
-    /// `p95_m ≤ 5 after 60 s without fixes (from 300 s on)`, `(the worst of 541 places, beginning from 300 to 840 s)`
+    /// `p95_m ≤ 5 after an outage of 60 s (from 300 s on)`, `(the worst of 541 places, beginning from 300 to 840 s)`
     pub(crate) fn in_words(&self) -> String {
         let first = self.outages[0];
         let places = match self.outages.as_slice() {
@@ -106,7 +106,7 @@ impl Question {
             _ => format!("from {} s on", seconds(first.start_s)),
         };
         let length = seconds(first.end_s - first.start_s);
-        format!("{} after {length} s without fixes ({places})", self.limits_in_words())
+        format!("{} after an outage of {length} s ({places})", self.limits_in_words())
     }
 
     fn limits_in_words(&self) -> String {

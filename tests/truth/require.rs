@@ -50,7 +50,7 @@ fn the_imu_that_is_named_meets_the_limit_in_sampled_runs() {
     let within = result.runs.iter().filter(|r| r.outages[0].horizontal_error_end_m <= 12.0).count();
     assert!((within as f64 / 400.0 - 0.95).abs() < 0.044, "{within} of 400, {imu:?}");
     let margins = Margins::of(&course, &scenario, &model, &limits).unwrap();
-    assert!(margins.met() && margins.worst.value / 12.0 > 0.999 && margins.groups.len() == 4, "{margins:?}");
+    assert!(margins.met() && margins.worst.value / 12.0 > 0.9975 && margins.groups.len() == 4, "{margins:?}");
     assert!(margins.groups.iter().all(|g| g.factor.is_some_and(|f| (f - 1.0).abs() < 0.02)), "{margins:?}");
 }
 
@@ -104,7 +104,7 @@ fn the_imu_that_is_named_keeps_the_limit_at_every_beginning() {
         let model = need.allocated().unwrap().0.model(scenario.imu.rate_hz);
         let drifts = course.drifts(&scenario, &model).unwrap();
         let (place, worst) = Drift::largest(&drifts, Quantity::P95).unwrap();
-        assert!((0.998..=1.0).contains(&(worst / most)), "{worst} of {most} at {:?}", outages[place]);
+        assert!((0.9975..=1.0).contains(&(worst / most)), "{worst} of {most} at {:?}", outages[place]);
         let values: Vec<f64> = drifts.iter().map(|d| d.value(Quantity::P95)).collect();
         assert_eq!(worst, values.iter().copied().fold(0.0, f64::max));
         let least = values.iter().copied().fold(f64::MAX, f64::min);

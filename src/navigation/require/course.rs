@@ -18,7 +18,7 @@ use rayon::prelude::*;
 /// True errors at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drift {
-    /// How long there has been no fix (s).
+    /// How long the outage has lasted (s).
     pub after_s: f64,
     /// Mean of the position error, north and east (m).
     pub mean_m: [f64; 2],
