@@ -1,7 +1,8 @@
 //! The flags that say which states the filter has: the same for `run` and `fuse`.
 
-use super::parse;
-use nav_sim_navigation::ekf::{FilterStates, InitialSettings};
+use super::{Failure, parse};
+use nav_sim_navigation::ekf::{BeliefError, FilterStates, InitialSettings};
+use std::path::Path;
 
 /// States of the filter.
 #[derive(clap::Args, Debug)]
@@ -18,6 +19,18 @@ pub(super) struct FilterArgs {
     /// [default: 300,300 with --filter 21, else none]
     #[arg(long, value_name = "ACCEL,GYRO", value_parser = parse::pair)]
     scale_ppm: Option<parse::Pair>,
+}
+
+/// Why a model has no filter: by the file that is at fault, of the model and the one with the settings; `advice` is on settings.
+pub(super) fn no_filter(e: &BeliefError, model: &Path, settings: Option<&Path>, advice: &str) -> Failure {
+    let within = |failure: Failure, file: &Path| failure.within(&file.display().to_string());
+    match e {
+        BeliefError::Setting(_) => {
+            let failure = Failure::input(e).hint(advice);
+            settings.into_iter().fold(failure, within)
+        }
+        _ => within(Failure::input(e), model),
+    }
 }
 
 impl FilterArgs {

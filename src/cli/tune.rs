@@ -1,5 +1,6 @@
 //! `nav-sim tune`: honest inflation of a noise model.
 
+use super::filter::no_filter;
 use super::parse::one_of;
 use super::pictures::{PageArgs, claim_output};
 use super::run::{OutageArg, checked_scenario, parse_outage, placed};
@@ -66,6 +67,9 @@ pub(crate) struct Args {
     out: Option<PathBuf>,
 }
 
+/// What helps where fixes are too rare to reduce a model.
+const RARE_FIXES: &str = "raise it: the verdict is of the filter of 15 states too, whatever --filter tunes";
+
 /// Longest schedule of outages that is looked at where no trajectory says how long (s).
 const DAY_S: f64 = 86_400.0;
 
@@ -91,7 +95,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         aim: args.aim,
         allow_smaller: args.allow_smaller,
     });
-    let result = result.map_err(|e| Failure::input(format!("{}: {e}", args.model.display())))?;
+    let result = result.map_err(|e| no_filter(&e, &args.model, args.scenario.as_deref(), RARE_FIXES))?;
     let text = || format!("{}\n\n{}", result.verdict(), markdown_table(&result.rows()));
     session.show(|| result.json(), text);
     let drawn = args.pictures.write(|| tune_page(&result), session);

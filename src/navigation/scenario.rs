@@ -4,7 +4,8 @@
 use crate::earth::GravityModel;
 use crate::ekf::{Belief, BeliefError, FilterStates, InitialSettings};
 use crate::imu::Sensor;
-use crate::noise::{Model, reduction};
+use crate::noise::Model;
+use crate::noise::reduction::{self, ReductionError};
 use crate::sensors::baro::BaroSettings;
 use crate::sensors::defects::ImuSettings;
 use crate::sensors::gnss::GnssSettings;
@@ -207,12 +208,23 @@ impl Scenario {
         // The scales over which the reduction has to agree: from one fix, below which the filter sees none of
         // them, to several times the longest outage.
         let (interval_s, window_s) = (1.0 / self.gnss.rate_hz, reduction::window_s(longest));
-        let mut belief = Belief::new(model, self.filter.states, interval_s, window_s)?;
+        let mut belief =
+            Belief::new(model, self.filter.states, interval_s, window_s).map_err(|e| self.blame(e))?;
         if self.filter.states.is_reduced() && self.filter.reduction == Reduction::Covariance {
             // The wavelet reduction is where this search starts, hence made in either case.
             belief = reduced_belief(model, belief, track, Alike::Level);
         }
         Ok(belief.with_initial(&self.initial))
+    }
+
+    /// Where fixes are too rare for a reduction, the key that makes them so.
+    fn blame(&self, error: BeliefError) -> BeliefError {
+        match error {
+            BeliefError::Reduction { source: source @ ReductionError::TooFewScales { .. }, .. } => {
+                SettingError::new("gnss.rate_hz", self.gnss.rate_hz, source.to_string()).into()
+            }
+            other => other,
+        }
     }
 
     /// The same with a filter that has a state for every process of the model; what it expects beside the model

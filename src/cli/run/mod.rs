@@ -4,7 +4,7 @@ mod inputs;
 mod output;
 mod words;
 
-use super::filter::FilterArgs;
+use super::filter::{FilterArgs, no_filter};
 use super::parse::one_of;
 use super::pictures::PlotArgs;
 use super::{Failure, Session};
@@ -126,7 +126,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let _picture = args.plot.claim(inputs.files.iter().map(|i| &i.path))?;
     let words = Words::new(session);
     let found = jobs::navigate(&inputs.job, &scenario, &outages, seed, &words);
-    let mut found = found.map_err(|e| impossible(e, &args.model))?;
+    let mut found = found.map_err(|e| impossible(e, args))?;
     found.summary.require = args.require.iter().map(|r| r.check(&found.summary)).collect();
     let epochs = found.runs.as_ref().map_or(0, |runs| runs.run_epochs) as f64;
     let independent_windows = found.runs.as_ref().and_then(|runs| runs.independent_windows);
@@ -280,7 +280,7 @@ fn outages(
 }
 
 /// A job that cannot be done.
-fn impossible(e: NavigateError, model: &Path) -> Failure {
+fn impossible(e: NavigateError, args: &Args) -> Failure {
     let failure = Failure::input(&e);
     match e {
         NavigateError::Experiment(ExperimentError::Truth(TruthError::TooShort { .. })) => {
@@ -290,7 +290,12 @@ fn impossible(e: NavigateError, model: &Path) -> Failure {
             failure.hint(format!("set rate_hz = {rate_hz} in the [imu] section of a --scenario file"))
         }
         NavigateError::Experiment(_) => failure,
-        NavigateError::Belief(e) => Failure::input(format!("{}: {e}", model.display())),
+        NavigateError::Belief(e) => no_filter(
+            &e,
+            &args.model,
+            args.gnss.as_deref().or(args.scenario.as_deref()),
+            "raise it, or take the full filter (--filter full), which reduces nothing",
+        ),
         NavigateError::Reduction(e) => Failure::could_not(e),
         NavigateError::RecordedTruth => failure.hint(
             "calibrate the recordings and give the model with --truth in the place of --static, or use --method \

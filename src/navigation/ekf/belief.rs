@@ -5,6 +5,7 @@ use super::states::FilterStates;
 use super::unknowns::{KINDS, Unknown, UnknownKind};
 use crate::imu::{Axis, Channel, Sensor};
 use crate::noise::{Composite, Model, Process, reduction};
+use crate::units::SettingError;
 use glam::DVec3;
 
 /// Most bias states an axis.
@@ -29,6 +30,9 @@ pub enum BeliefError {
         /// Why.
         source: reduction::ReductionError,
     },
+    /// A setting that leaves the model no such filter: nothing is wrong with the model.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
 }
 
 /// One bias state an axis of one sensor: b_{k+1} = phi b_k + w.

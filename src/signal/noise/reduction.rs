@@ -35,14 +35,17 @@ pub enum ReductionError {
     #[error(transparent)]
     Parameter(#[from] ParameterError),
     /// Fewer than three scales between the GNSS interval and the window.
-    #[error("the scales from {interval_s} s to {window_s} s are fewer than three at {rate_hz} Hz")]
+    #[error(
+        "fixes {interval_s} s apart are too rare to reduce the model over the scales up to {window_s} s: at most \
+         {longest_interval_s:.1} s apart, they leave the three that it needs"
+    )]
     TooFewScales {
         /// GNSS interval (s).
         interval_s: f64,
         /// Longest scale (s).
         window_s: f64,
-        /// Sample rate (Hz).
-        rate_hz: f64,
+        /// Longest GNSS interval that leaves three scales (s).
+        longest_interval_s: f64,
     },
 }
 
@@ -66,7 +69,9 @@ pub fn reduce(
     let levels: Vec<u32> = (level(interval_s) as u32..=level(window_s).min(40.0) as u32).collect();
     // Three unknowns: white noise, variance and correlation time of the bias.
     if levels.len() < 3 {
-        return Err(ReductionError::TooFewScales { interval_s, window_s, rate_hz });
+        // the first of three levels is the last less two, to which half a level more is rounded
+        let longest_interval_s = (level(window_s).min(40.0) - 1.5).exp2() / rate_hz;
+        return Err(ReductionError::TooFewScales { interval_s, window_s, longest_interval_s });
     }
     let target: Vec<f64> = levels.iter().map(|l| kept.haar_wv(*l)).collect();
     let fit = Fit { levels, target };
@@ -284,6 +289,19 @@ mod tests {
         let reduced = reduce(&walk, 100.0, 1.0, 800.0).unwrap();
         // a random walk is a Gauss-Markov process of infinite correlation time
         assert!(reduced.misfit < 0.05, "misfit {}", reduced.misfit);
-        assert!(matches!(reduce(&walk, 100.0, 1.0, 2.0), Err(ReductionError::TooFewScales { .. })));
+    }
+
+    /// The interval that is said to be the longest is: a little below it a reduction exists, a little above none.
+    #[test]
+    fn the_longest_interval_is_where_reductions_end() {
+        let walk = Composite::new(vec![n2()[3]]);
+        for (rate_hz, window_s) in [(100.0, 2.0), (100.0, 800.0), (400.0, 1234.0), (1.0, 800.0)] {
+            let longest = match reduce(&walk, rate_hz, 1e4, window_s) {
+                Err(ReductionError::TooFewScales { longest_interval_s, .. }) => longest_interval_s,
+                other => panic!("{other:?}"),
+            };
+            assert!(reduce(&walk, rate_hz, 0.999 * longest, window_s).is_ok());
+            assert!(reduce(&walk, rate_hz, 1.001 * longest, window_s).is_err());
+        }
     }
 }

@@ -50,6 +50,29 @@ fn covariance_analysis_is_a_method_of_run() {
     assert_eq!(row["ci95_pct"][0], row["ci95_pct"][1], "{row}");
 }
 
+/// Fixes too rare for a reduction are the fault of the receiver's rate, not of the model: the full filter takes both.
+#[test]
+fn fixes_too_rare_for_the_reduction_are_blamed_on_their_rate() {
+    let place = place();
+    fs::write(place.path().join("rare.toml"), "[gnss]\nrate_hz = 0.001\n").unwrap();
+    let walk = MODEL.replace("\"AR1\", phi = 0.9999, sigma2", "\"RW\", gamma2");
+    fs::write(place.path().join("walk.toml"), walk).unwrap();
+    let full = "hint: raise it, or take the full filter (--filter full)";
+    for (command, hint) in [
+        ("run drive.toml walk.toml --runs 2 --scenario rare.toml -o out", full),
+        ("run drive.toml walk.toml --method lincov --gnss rare.toml -o out", full),
+        ("tune walk.toml --truth walk.toml --scenario rare.toml", "hint: raise it: the verdict is of"),
+    ] {
+        let ran = nav_sim(place.path(), command);
+        assert_eq!(ran.code, 2, "{}", ran.stderr);
+        for words in ["error: rare.toml: gnss.rate_hz = 0.001 is refused", "at most 231.7 s apart", hint] {
+            assert!(ran.stderr.contains(words), "{command}: {}", ran.stderr);
+        }
+        assert!(!ran.stderr.contains("walk.toml:"), "{}", ran.stderr);
+    }
+    done(place.path(), "run drive.toml walk.toml --method lincov --filter full --scenario rare.toml -o out");
+}
+
 #[test]
 fn runs_stand_beside_what_is_expected_of_them() {
     let place = place();
