@@ -144,7 +144,9 @@ pub fn navigate(
         Method::Lincov | Method::Both => Some(analysis.expected(&belief).ok_or(NavigateError::NotFinite)?),
     };
     let mut navigation = match (method, expected) {
-        (Method::Lincov, Some((epochs, summary))) => {
+        (Method::Lincov, Some((epochs, mut summary))) => {
+            // nothing is drawn but outages
+            summary.seed = scenario.outage_random.map(|_| seed);
             Navigation { runs: None, epochs, fan: analysis.fan(&belief), summary }
         }
         (method, expected) => {

@@ -17,8 +17,8 @@ pub struct Manifest {
     pub version: String,
     /// The command as given.
     pub command: Vec<String>,
-    /// Seed of all random numbers.
-    pub seed: u64,
+    /// Seed of all random numbers; none where there are none.
+    pub seed: Option<u64>,
     /// The resolved configuration: every key, outages one by one.
     pub configuration: Scenario,
     /// Every file that was read.

@@ -99,7 +99,7 @@ mod tests {
             schema_version: Manifest::SCHEMA_VERSION,
             version: "0.1.0".into(),
             command: ["nav-sim", "run", "a<b.toml"].map(str::to_owned).to_vec(),
-            seed: 7,
+            seed: Some(7),
             configuration: Scenario::default(),
             inputs: vec![Input { role: "trajectory".into(), path: "a<b.toml".into(), blake3: "ab".into() }],
             outputs: Default::default(),

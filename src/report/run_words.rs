@@ -198,9 +198,10 @@ fn how(summary: &Summary) -> String {
         true => format!(", worth {:.1} independent ones", summary.independent_runs),
         false => String::new(),
     };
+    let seed = summary.seed.map_or_else(String::new, |seed| format!(", seed {seed}"));
     format!(
-        "{} runs ({} diverged){shared}, {} states, seed {}",
-        summary.runs, summary.diverged, summary.filter_states, summary.seed
+        "{} runs ({} diverged){shared}, {} states{seed}",
+        summary.runs, summary.diverged, summary.filter_states
     )
 }
 

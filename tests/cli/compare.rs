@@ -68,7 +68,7 @@ fn write(directory: &Path, factor: f64, change: impl FnOnce(&mut Manifest)) {
         schema_version: Manifest::SCHEMA_VERSION,
         version: "0".into(),
         command: vec![],
-        seed: 7,
+        seed: Some(7),
         configuration: Scenario { outage, ..Scenario::default() },
         inputs: vec![input("trajectory", "t.csv", b"t"), input("truth", "m.toml", b"m")],
         outputs: Default::default(),
@@ -252,7 +252,7 @@ fn another_seed_or_truth_is_said_and_unpaired() {
     let directory = tempfile::tempdir().unwrap();
     write(&directory.path().join("a"), 1.0, |_| {});
     write(&directory.path().join("b"), 1.2, |m| {
-        m.seed = 8;
+        m.seed = Some(8);
         m.inputs.truncate(1);
     });
     let ran = compare(directory.path(), &["b", "--reference", "a", "--format", "json"]);

@@ -110,7 +110,8 @@ pub(super) fn windows_of(outages: &[OutageArg]) -> Result<Vec<Outage>, Failure> 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut scenario = scenario(args)?;
     let inputs = Inputs::read(args, &mut scenario, session)?;
-    let seed = seed(&scenario, session);
+    let recorded_seed = seed(&scenario, session);
+    let seed = recorded_seed.unwrap_or_default();
     let span = (inputs.job.trajectory.start_s(), inputs.job.trajectory.end_s());
     let outages = outages(&scenario, span, seed, session).map_err(|e| match &args.scenario {
         Some(path) if args.outages.is_empty() => e.within(&path.display().to_string()),
@@ -120,8 +121,14 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if scenario.run.method == Method::Lincov && args.runs.is_some() {
         session.warn("--runs counts nothing here: --method lincov makes none; both makes them beside it");
     }
-    let manifest =
-        manifest(scenario.clone(), &outages, seed, inputs.files.clone(), inputs.note.clone(), session);
+    let manifest = manifest(
+        scenario.clone(),
+        &outages,
+        recorded_seed,
+        inputs.files.clone(),
+        inputs.note.clone(),
+        session,
+    );
     let _own = output::claim(&args.out, &manifest, session)?;
     let _picture = args.plot.claim(inputs.files.iter().map(|i| &i.path))?;
     let words = Words::new(session);
@@ -185,13 +192,10 @@ fn required(summary: &Summary) -> Result<(), Failure> {
     if missed.is_empty() { Ok(()) } else { Err(Failure::bound(missed.join("; "))) }
 }
 
-/// The seed of all random numbers: drawn where nobody gives one and there are any.
-fn seed(scenario: &Scenario, session: &Session) -> u64 {
+/// The seed of all random numbers, where there are any: drawn where nobody gives one.
+fn seed(scenario: &Scenario, session: &Session) -> Option<u64> {
     let draws = scenario.run.method != Method::Lincov || scenario.outage_random.is_some();
-    if draws {
-        return session.seed(scenario.run.seed);
-    }
-    session.asked_seed().or(scenario.run.seed).unwrap_or(0)
+    draws.then(|| session.seed(scenario.run.seed))
 }
 
 /// A filter whose errors are of another order than it believes did what was asked for, and is of no use.

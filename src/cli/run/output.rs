@@ -15,14 +15,14 @@ use std::path::Path;
 pub(crate) fn manifest(
     mut configuration: Scenario,
     outages: &[Outage],
-    seed: u64,
+    seed: Option<u64>,
     inputs: Vec<Input>,
     model: ModelNote,
     session: &Session,
 ) -> Manifest {
     configuration.outage = Some(outages.to_vec());
     (configuration.outage_periodic, configuration.outage_random) = (None, None);
-    configuration.run.seed = Some(seed);
+    configuration.run.seed = seed;
     Manifest {
         schema_version: Manifest::SCHEMA_VERSION,
         version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -45,7 +45,7 @@ pub(crate) fn claim(path: &Path, manifest: &Manifest, session: &Session) -> Resu
     let first_seed = Cell::new(None);
     let recognise = |text: &str| {
         let Ok(present) = serde_json::from_str::<Manifest>(text) else { return Ok(Found::Foreign) };
-        first_seed.set(manifest.differs_in_seed(&present).then_some(present.seed));
+        first_seed.set(manifest.differs_in_seed(&present).then_some(present.seed).flatten());
         Ok(Found::result(manifest.is_same_run(&present)))
     };
     let claimed = claim_directory(path, &report::RUN_FILES, inputs, session.existing(), recognise);

@@ -90,7 +90,7 @@ impl Expected {
             diverged_runs: Vec::new(),
             independent_runs: verdict.independent_runs,
             filter_states: self.filter_states,
-            seed: self.seed,
+            seed: Some(self.seed),
             accuracy: AccuracySummary::from(&Accuracy::over(self.epochs.iter())),
             outages: OutageSummary::all(&self.outages, OutageVerdict::expected(&self.record), &self.epochs),
             nees: Consistency {

@@ -37,8 +37,8 @@ pub struct Summary {
     pub independent_runs: f64,
     /// States of the filter.
     pub filter_states: usize,
-    /// Seed of all random numbers.
-    pub seed: u64,
+    /// Seed of all random numbers; none for a covariance analysis that drew nothing.
+    pub seed: Option<u64>,
     /// Means over all epochs, with and without fixes.
     pub accuracy: AccuracySummary,
     /// Outages in time order.
@@ -240,7 +240,7 @@ impl Summary {
             diverged_runs,
             independent_runs: verdict.independent_runs,
             filter_states: result.filter_states,
-            seed,
+            seed: Some(seed),
             accuracy: AccuracySummary::from(&Accuracy::over(epochs.iter())),
             outages: OutageSummary::all(&outage::outages(result), verdicts, epochs),
             nees: nees(epochs, windows),

@@ -66,6 +66,18 @@ impl Table {
         self.rows.push(cells.into_iter().collect());
     }
 
+    /// The same without columns of which no row knows anything, for results that have no such figures.
+    pub(crate) fn without_unknown(self) -> Self {
+        let is_known = |cell: &Cell| cell.text.contains(|letter| !"[–, ]".contains(letter));
+        let kept: Vec<bool> =
+            (0..self.head.len()).map(|k| self.rows.iter().any(|row| is_known(&row[k]))).collect();
+        fn only<T>(row: Vec<T>, kept: &[bool]) -> Vec<T> {
+            row.into_iter().zip(kept).filter_map(|(cell, kept)| kept.then_some(cell)).collect()
+        }
+        let rows = self.rows.into_iter().map(|row| only(row, &kept)).collect();
+        Self { head: only(self.head, &kept), rows }
+    }
+
     pub(super) fn html(&self) -> String {
         let mut html = "<div class=\"scroll\" tabindex=\"0\"><table>\n<thead><tr>".to_owned();
         let is_number = |column: usize| {

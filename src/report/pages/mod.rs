@@ -51,10 +51,6 @@ fn error_of(state: &str) -> String {
     state.replacen(" (", " error (", 1)
 }
 
-/// What ASEE and RMSE are, where they are shown.
-const RMSE_AND_ASEE: &str = "RMSE: how wrong the runs were. ASEE (averaged standard estimation error): the filter's own standard \
-                             deviation, averaged over the runs. Their ratio is 1 if the filter is right.";
-
 fn tone(kind: VerdictKind) -> Tone {
     match kind {
         VerdictKind::Ok => Tone::Good,

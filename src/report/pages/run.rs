@@ -1,7 +1,9 @@
 //! The page of a run directory.
 
-use super::run_charts::{budget_chart, fan_chart, horizontal, nees, states, windows};
-use super::{RMSE_AND_ASEE, STATES, sentence, tone, window};
+use super::run_charts::{
+    budget_chart, fan_chart, horizontal, horizontal_caption, nees, rmse_and_asee, states, windows,
+};
+use super::{STATES, sentence, tone, window};
 use crate::report::manifest::Manifest;
 use crate::report::number::readable;
 use crate::report::page::{Cell, Page, Table};
@@ -36,11 +38,11 @@ pub(crate) fn run_page(
     requirements(summary, &mut page);
     page.facts(&assumptions(summary, manifest));
     page.chart(&track.map("Reference trajectory", &windows), "");
-    page.chart(&horizontal(epochs, summary), HORIZONTAL);
+    page.chart(&horizontal(epochs, summary), horizontal_caption(summary));
     page.chart(&fan_chart(fan, summary), &fan_caption(fan, summary));
     outages(summary, &mut page);
     page.section("Errors over time");
-    page.charts(&states(epochs, &windows), RMSE_AND_ASEE);
+    page.charts(&states(epochs, &windows), rmse_and_asee(summary));
     consistency(epochs, summary, &mut page);
     budgets(summary, &mut page);
     provenance(manifest, &mut page);
@@ -52,9 +54,10 @@ pub(crate) fn run_page(
     page.html()
 }
 
-const HORIZONTAL: &str = "Horizontal RMSE of the runs, and what the filter believes: its own standard deviation (ASEE, north and \
-                          east together) and the range up to three times that. Dots: median of the runs at the end of an \
-                          outage, the bar up to their 95 % quantile.";
+/// A table of figures, of which a covariance analysis does not have all: no draw, hence no interval.
+fn known(table: Table, summary: &Summary) -> Table {
+    if summary.runs > 0 { table } else { table.without_unknown() }
+}
 
 fn fan_caption(fan: &[FanEpoch], summary: &Summary) -> String {
     let whose = if summary.runs > 0 {
@@ -109,7 +112,7 @@ fn assumptions(summary: &Summary, manifest: &Manifest) -> Vec<(&'static str, Str
             format!("{} ({} diverged), worth {worth} independent ones", summary.runs, summary.diverged),
         ));
     }
-    facts.push(("seed", summary.seed.to_string()));
+    facts.extend(summary.seed.map(|seed| ("seed", seed.to_string())));
     facts
 }
 
@@ -175,8 +178,14 @@ fn outages(summary: &Summary, page: &mut Page) {
         return;
     }
     page.section("At the ends of outages");
-    page.text("Just before the first fix after the outage; brackets are 95 % intervals.");
-    page.table(&ends(summary));
+    let has_intervals = summary.runs > 0
+        || summary.outages.iter().any(|o| {
+            let h = &o.horizontal_error_end_m;
+            [h.p50_ci95, h.p95_ci95].iter().any(|ci| ci.0.is_some())
+        });
+    let brackets = if has_intervals { "; brackets are 95 % intervals" } else { "" };
+    page.text(&format!("Just before the first fix after the outage{brackets}."));
+    page.table(&known(ends(summary), summary));
     by_state(summary, page);
 }
 
@@ -233,7 +242,7 @@ fn by_state(summary: &Summary, page: &mut Page) {
     };
     page.heading("RMSE and ASEE at the end");
     page.table(&table("end"));
-    page.text(RMSE_AND_ASEE);
+    page.text(rmse_and_asee(summary));
     page.folded("Means over the outage", |page| page.table(&table("mean")));
     if summary.outages.len() > shown.len() {
         page.text(&format!(
@@ -268,10 +277,13 @@ fn pairs(columns: &[Pair<'_>], suffix: &str) -> Table {
 
 fn consistency(epochs: &[EpochMetrics], summary: &Summary, page: &mut Page) {
     page.section("Consistency");
+    let covered = if summary.runs > 0 { "share of runs" } else { "share of errors" };
     page.chart(
         &nees(epochs, summary),
-        "NEES: normalised estimation error squared of position, velocity and attitude. Coverage: share of runs inside the filter's \
-         ellipsoid of position and attitude.",
+        &format!(
+            "NEES: normalised estimation error squared of position, velocity and attitude. Coverage: {covered} inside the filter's \
+             ellipsoid of position and attitude."
+        ),
     );
     let (nees, nis, coverage) = (&summary.nees, &summary.nis, &summary.coverage);
     let share = |x: f64| if x.is_finite() { format!("{:.0} %", x * 100.0) } else { "–".to_owned() };
@@ -307,7 +319,7 @@ fn consistency(epochs: &[EpochMetrics], summary: &Summary, page: &mut Page) {
             Cell::figures(share(inside)),
         ]);
     }
-    page.table(&table);
+    page.table(&known(table, summary));
 }
 
 /// What the errors at the ends of outages are made of, beside what the filter believes.

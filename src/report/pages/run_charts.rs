@@ -36,13 +36,36 @@ pub(super) fn horizontal(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
         Series::line("believed (ASEE)", Colour::BELIEVED, believed),
         Series::line("true (RMSE)", Colour::REAL, rmse),
         Series::new(
-            "median and 95 % of runs",
+            if summary.runs > 0 { "median and 95 % of runs" } else { "median and 95 %" },
             Colour::Ink,
             Mark::Points(summary.outages.iter().map(end).collect()),
         ),
     ];
     let panel = Panel { height: 1.2, ..Panel::new(Axis::log("horizontal error (m)"), series) };
     timed("Horizontal position error", panel, &windows(summary))
+}
+
+/// What stands beneath the horizontal error.
+pub(super) const fn horizontal_caption(summary: &Summary) -> &'static str {
+    if summary.runs > 0 {
+        "Horizontal RMSE of the runs, and what the filter believes: its own standard deviation (ASEE, north and east together) \
+         and the range up to three times that. Dots: median of the runs at the end of an outage, the bar up to their 95 % \
+         quantile."
+    } else {
+        "Horizontal RMSE by covariance analysis, and what the filter believes: its own standard deviation (ASEE, north and east \
+         together) and the range up to three times that. Dots: median at the end of an outage, the bar up to the 95 % quantile."
+    }
+}
+
+/// What ASEE and RMSE are, where they are shown.
+pub(super) const fn rmse_and_asee(summary: &Summary) -> &'static str {
+    if summary.runs > 0 {
+        "RMSE: how wrong the runs were. ASEE (averaged standard estimation error): the filter's own standard deviation, averaged \
+         over the runs. Their ratio is 1 if the filter is right."
+    } else {
+        "RMSE: how wrong the filter is, by covariance analysis. ASEE (averaged standard estimation error): its own standard \
+         deviation. Their ratio is 1 if the filter is right."
+    }
 }
 
 /// Quantiles of the horizontal error over time, those of a covariance analysis beside the runs dashed.
@@ -83,17 +106,20 @@ pub(super) fn states(epochs: &[EpochMetrics], outages: &[(f64, f64)]) -> Vec<Cha
 }
 
 pub(super) fn nees(epochs: &[EpochMetrics], summary: &Summary) -> Chart {
+    // of expected values there is no scatter, and no band for it
     let zone = |low: f64, high: f64| {
-        Series::new("95 % band of a right filter", Colour::RIGHT, Mark::Zone(low, high))
+        let zone = Series::new("95 % band of a right filter", Colour::RIGHT, Mark::Zone(low, high));
+        (summary.runs > 0).then_some(zone)
     };
-    let nees = vec![
+    let beside = |zone: Option<Series>, line: Series| zone.into_iter().chain([line]).collect();
+    let nees = beside(
         zone(summary.nees.lower95, summary.nees.upper95),
         Series::line("NEES", Colour::Ink, over_time(epochs, |e| e.nees.value)),
-    ];
-    let coverage = vec![
+    );
+    let coverage = beside(
         zone(summary.coverage.lower95, summary.coverage.upper95),
         Series::line("coverage", Colour::Ink, over_time(epochs, |e| e.coverage)),
-    ];
+    );
     let title = format!("coverage at level {}", summary.coverage.level);
     let panels = vec![
         Panel::new(Axis::log(&format!("NEES ({} if right)", summary.nees.dof)), nees),

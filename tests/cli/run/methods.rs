@@ -37,7 +37,17 @@ fn covariance_analysis_is_a_method_of_run() {
     assert!(at_45_s.len() == 2 && p95(at_45_s[1]) < 0.9 * p95(at_45_s[0]), "{fan}");
     assert!((p95(at_45_s[0]) / quantile("p95") - 1.0).abs() < 1e-6, "{fan}");
     assert!((summary["coverage"]["mean"].as_f64().unwrap() - 0.95).abs() < 0.01);
-    assert!(fs::read_to_string(out.join("report.html")).unwrap().contains("INS/GNSS covariance analysis"));
+    // nothing is drawn: no seed, no runs, no interval, no band, and no column for any of them
+    let page = fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(page.contains("INS/GNSS covariance analysis"));
+    let page = page.split("<body>").nth(1).unwrap().split("Provenance").next().unwrap();
+    for words in ["seed", "runs", "interval", "95 % band", "re-convergence", "epochs inside", ">–<", "[–"]
+    {
+        assert!(!page.contains(words), "{words}: {page}");
+    }
+    let manifest = json(&out.join("manifest.json"));
+    let seeds = [&summary["seed"], &manifest["seed"], &manifest["configuration"]["run"]["seed"]];
+    assert!(seeds.iter().all(|seed| seed.is_null()), "{seeds:?}");
 
     done(place.path(), "run drive.toml imu.toml --runs 16 --outage 30:45 --seed 2 -o sampled");
     let ran = done(place.path(), "compare sampled --reference expected");
