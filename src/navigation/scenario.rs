@@ -255,7 +255,7 @@ impl Scenario {
             if expected < 0.5 * bias {
                 let key = InitialSettings::bias_key(sensor);
                 doubts.push(Unexpected {
-                    source: format!("{name}.turn_on_bias"),
+                    sources: vec![format!("{name}.turn_on_bias")],
                     what: format!(
                         "the true {name} has a turn-on bias of {bias} {unit}, the filter expects {expected}"
                     ),
@@ -267,13 +267,22 @@ impl Scenario {
             if expected < 0.5 * ppm {
                 let key = InitialSettings::scale_key(sensor);
                 doubts.push(Unexpected {
-                    source: format!("{name}.scale"),
+                    sources: vec![format!("{name}.scale")],
                     what: format!(
                         "the true {name} has a scale-factor error of {ppm} ppm, the filter expects {expected}"
                     ),
                     remedy: format!("initial.{key} gives it states"),
                 });
             }
+        }
+        let angle = self.imu.misalignment_rad;
+        if angle > 0.0 {
+            doubts.push(Unexpected {
+                sources: Sensor::ALL.map(|sensor| format!("{}.misalignment", sensor.name())).into(),
+                what: format!("the true IMU has a misalignment of {angle} rad, the filter expects none"),
+                remedy: "no filter has states for it; a calibration of the axes (a smaller imu.misalignment_rad) removes it"
+                    .to_owned(),
+            });
         }
         let GnssSettings { rate_hz, pos_sigma_m, correlated_pos_sigma_m, correlation_time_s, .. } =
             &self.gnss;
@@ -283,7 +292,7 @@ impl Scenario {
         if (0..3).any(|i| correlated_pos_sigma_m[i] > 0.5 * pos_sigma_m[i] / fixes.sqrt()) {
             let [north, east, down] = correlated_pos_sigma_m;
             doubts.push(Unexpected {
-                source: "gnss.correlated".to_owned(),
+                sources: vec!["gnss.correlated".to_owned()],
                 what: format!(
                     "the true receiver has correlated position errors of {north}, {east}, {down} m (north, east, down) over \
                      {correlation_time_s} s, the filter expects white ones"
@@ -318,8 +327,8 @@ impl Scenario {
 /// What the true IMU or receiver has, and the filter does not expect.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Unexpected {
-    /// Its name among the sources of a [`Budget`](crate::metrics::Budget).
-    pub source: String,
+    /// Its names among the sources of a [`Budget`](crate::metrics::Budget): their shares together are its own.
+    pub sources: Vec<String>,
     /// What it is.
     pub what: String,
     /// What lets the filter expect it.

@@ -3,7 +3,7 @@
 use crate::cli::{Failure, Session};
 use crate::formats::atomic::{AtomicDir, Claim, Found, claim_directory};
 use crate::jobs::{Navigation, TrueImu};
-use crate::report::{self, Input, Manifest, ModelNote, TrajectorySeries, run_words};
+use crate::report::{self, Input, Manifest, ModelNote, TrajectorySeries, run_words, window};
 use nav_sim_navigation::metrics::{Summary, VerdictKind};
 use nav_sim_navigation::scenario::{Method, Scenario, Unexpected};
 use nav_sim_navigation::sensors::outage::Outage;
@@ -96,7 +96,7 @@ fn remedy(summary: &Summary, unexpected: &[Unexpected], truth: &TrueImu) -> Stri
         return TOO_LARGE.to_owned();
     }
     if let Some(largest) = largest(summary, unexpected) {
-        return largest.to_string();
+        return largest;
     }
     let is_too_large = run_words::beyond_linear(summary).is_some();
     match truth {
@@ -120,24 +120,27 @@ fn remedy(summary: &Summary, unexpected: &[Unexpected], truth: &TrueImu) -> Stri
 
 /// The source with the largest share of the worst error, of those that the filter does not expect, where it makes at least
 /// half of what is too much there; without an outage, which has the shares, the first.
-fn largest<'a>(summary: &Summary, unexpected: &'a [Unexpected]) -> Option<&'a Unexpected> {
+fn largest(summary: &Summary, unexpected: &[Unexpected]) -> Option<String> {
     let verdict = &summary.verdict;
     let outage = verdict.worst_outage.or_else(|| summary.outages.len().checked_sub(1));
-    let Some(budget) = outage.and_then(|k| summary.outages[k].budget.as_ref()) else {
-        return unexpected.first();
+    let known = outage.and_then(|k| Some((&summary.outages[k], summary.outages[k].budget.as_ref()?)));
+    let Some((outage, budget)) = known else { return unexpected.first().map(Unexpected::to_string) };
+    let worst = REPORTED_NAMES.iter().position(|name| *name == verdict.worst_state);
+    // the state, and the share in its mean square
+    let share = |cause: &Unexpected| {
+        let of_cause = budget.shares.iter().filter(|(name, _)| cause.sources.contains(name));
+        let shares = of_cause.fold([0.0; REPORTED], |sum, (_, of)| std::array::from_fn(|i| sum[i] + of.0[i]));
+        let states = worst.map_or(0..REPORTED, |state| state..state + 1);
+        states.map(|state| (state, shares[state])).max_by(|a, b| a.1.total_cmp(&b.1))
     };
-    let state = REPORTED_NAMES.iter().position(|name| *name == verdict.worst_state);
-    let share = |source: &Unexpected| {
-        let shares =
-            budget.shares.iter().find(|(name, _)| *name == source.source).map(|(_, shares)| shares.0);
-        let of_worst_state = |shares: [f64; REPORTED]| match state {
-            Some(state) => shares[state],
-            None => shares.into_iter().fold(0.0, f64::max),
-        };
-        shares.map_or(0.0, of_worst_state)
-    };
+    let shares = unexpected.iter().filter_map(|cause| Some((cause, share(cause)?)));
+    let (largest, (state, share)) = shares.max_by(|a, b| a.1.1.total_cmp(&b.1.1))?;
     // of a mean square that is ratio² times what is believed, this share is too much
     let excess = 1.0 - verdict.ratio.powi(-2);
-    let largest = unexpected.iter().max_by(|a, b| share(a).total_cmp(&share(b)))?;
-    (share(largest) > 0.5 * excess).then_some(largest)
+    let place = format!("{} at the end of {}", REPORTED_NAMES[state], window(outage.start_s, outage.end_s));
+    let told = || {
+        let Unexpected { what, remedy, .. } = largest;
+        format!("{what} ({:.0} % of the mean square of {place}): {remedy}", 100.0 * share)
+    };
+    (share > 0.5 * excess).then(told)
 }

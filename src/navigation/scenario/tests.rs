@@ -60,9 +60,12 @@ fn what_the_filter_does_not_expect_is_said_of_each_sensor() {
     let scale = doubts("imu.scale_ppm_accel = 300");
     assert!(scale.len() == 1 && scale[0].remedy.contains("initial.accel_scale_sigma_ppm"), "{scale:?}");
     assert!(doubts("imu.scale_ppm_accel = 300\nfilter.states = 21").is_empty());
+    let crossed = doubts("imu.misalignment_rad = 1e-3");
+    assert!(crossed.len() == 1 && crossed[0].remedy.contains("imu.misalignment_rad"), "{crossed:?}");
+    assert_eq!(crossed[0].sources, ["accel.misalignment", "gyro.misalignment"]);
     // white noise of 2 m is known to 0.2 m from the hundred fixes of the default correlation time
     let coloured = |m: f64| doubts(&format!("gnss.correlated_pos_sigma_m = [{m}, 0.0, 0.0]"));
-    assert!(coloured(0.09).is_empty() && coloured(0.11)[0].source == "gnss.correlated");
+    assert!(coloured(0.09).is_empty() && coloured(0.11)[0].sources == ["gnss.correlated"]);
 }
 
 /// Ten seconds at rest.

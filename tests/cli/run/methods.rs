@@ -255,20 +255,34 @@ fn the_remedy_is_for_what_the_filter_does_not_expect() {
     put("turned_on.toml", &format!("{MODEL}[turn_on]\naccel_m_s2 = 0.5\ngyro_rad_s = 1e-6\n"));
     put("coloured.toml", "gnss.correlated_pos_sigma_m = [9, 9, 9]\ngnss.correlation_time_s = 60\n");
     put("scaled.toml", "imu.scale_ppm_gyro = 50000\n");
+    put("crossed.toml", "imu.misalignment_rad = 0.03\n");
     let cases = [
         (
             "--truth turned_on.toml",
+            "accel.turn_on_bias",
             "the true accel has a turn-on bias of 0.5 m/s²",
             "initial.accel_bias_sigma_m_s2",
         ),
-        ("--scenario coloured.toml", "correlated position errors of 9, 9, 9 m", "a larger gnss.pos_sigma_m"),
+        (
+            "--scenario coloured.toml",
+            "gnss.correlated",
+            "correlated position errors of 9, 9, 9 m",
+            "a larger gnss.pos_sigma_m",
+        ),
         (
             "--scenario scaled.toml",
+            "gyro.scale",
             "the true gyro has a scale-factor error of 50000 ppm",
             "initial.gyro_scale_sigma_ppm",
         ),
+        (
+            "--scenario crossed.toml",
+            "gyro.misalignment",
+            "the true IMU has a misalignment of 0.03 rad",
+            "a smaller imu.misalignment_rad",
+        ),
     ];
-    for (arguments, cause, helps) in cases {
+    for (arguments, source, cause, helps) in cases {
         for method in ["lincov", "both --runs 8"] {
             let command = format!(
                 "run drive.toml imu.toml {arguments} --outage 30:40 --seed 1 --method {method} -o out"
@@ -278,6 +292,15 @@ fn the_remedy_is_for_what_the_filter_does_not_expect() {
                 ran.stderr.lines().find(|line| line.starts_with("warning: the filter is ")).unwrap();
             assert!(warning.contains(cause) && warning.contains(helps), "{warning}");
             assert!(!warning.contains("nav-sim tune"), "{warning}");
+            // by its share of what the budget in summary.json has for the state that the warning names
+            let (said, rest) = warning.split_once(" % of the mean square of ").unwrap();
+            let state = rest.split(" at the end of 30–40 s): ").next().unwrap();
+            let budget = &json(&place.path().join("out/summary.json"))["outages"][0]["budget"];
+            let mut share = budget[source][state].as_f64().unwrap();
+            if source == "gyro.misalignment" {
+                share += budget["accel.misalignment"][state].as_f64().unwrap();
+            }
+            assert!(said.ends_with(&format!(" ({:.0}", 100.0 * share)), "{warning} {share}");
         }
     }
     nav_sim(
