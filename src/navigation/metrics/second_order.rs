@@ -10,6 +10,12 @@
 //! second order of the rotation by ψ, has the horizontal parts ½gψ_dψ_n and ½gψ_dψ_e. Its mean is 0, and it is small beside the
 //! velocity's standard deviation; but the filter knows the velocity's error much better than that once the tilt is given,
 //! since both have one cause. What it does is therefore measured by the NEES.
+//!
+//! The product explains what the heading adds, and that alone: an IMU so quiet that all follows from the attitude of the start has
+//! a NEES of 92 ± 6 after two minutes at rest with 0.5° of tilt and 2° of heading, of 9 that are expected; 77 of the 83 more are
+//! predicted here, 7 are there with a known heading too and come from the tilts' downward shift. It is an approximation: of small
+//! angles (with 20° of heading, and 0.05° of tilt, it has 167 of 308), of a product that stands still, so that its effects add
+//! (tilts that grow in the outage, and turns, make it less), and the largest over the epochs, which need not be the end.
 
 use super::epoch::EpochMetrics;
 use super::outage::{OutageMetrics, within};
