@@ -202,6 +202,10 @@ mod tests {
             "s.toml, line 9: the grid is empty: no outages[1] | a list without values makes no cell"
         );
         assert_eq!(
+            with("[10, 20]", "[0, 20]"),
+            "s.toml, line 10: \"outages[1].sweep.duration_s\" = 0 is refused: it must be a finite number > 0 | "
+        );
+        assert_eq!(
             with("runs = 8", "reference = \"II/avw\""),
             "s.toml, line 1: \"reference\" = \"II/avw\" is no candidate | did you mean \"II/awv\"?"
         );

@@ -134,15 +134,27 @@ pub(super) fn expand(entry: &OutagesEntry, index: usize) -> Result<Vec<OutageSet
     }
     let several = sets.len() > 1;
     let named = |(plan, values): (OutagePlan, Vec<f64>)| {
-        let refused = |e: SettingError| {
-            DescriptionError::refused(&key, e.value, format!("is refused: {}", e.requirement))
-        };
-        plan.validate().map_err(refused)?;
+        plan.validate().map_err(|e| refused(entry, &key, &values, e))?;
         let values: Vec<String> = values.iter().map(f64::to_string).collect();
         let name = if several { format!("{}({})", entry.name, values.join(",")) } else { entry.name.clone() };
         Ok(OutageSet { name, plan })
     };
     sets.into_iter().map(named).collect()
+}
+
+/// The refusal of a value by the key that the entry has it under, of which a plan knows other names.
+fn refused(entry: &OutagesEntry, key: &str, values: &[f64], e: SettingError) -> DescriptionError {
+    // a window that does not end after its start has no length
+    let e = match (&entry.sweep, values) {
+        (Some(_), [_, duration_s]) if e.key.ends_with("end_s") => {
+            SettingError::new("sweep.duration_s", duration_s, "it must be a finite number > 0")
+        }
+        _ => e,
+    };
+    let fixed = if entry.sweep.is_some() { ("outage[1]", "sweep") } else { ("outage[", "windows[") };
+    let names = [fixed, ("outage_periodic", "periodic"), ("outage_random", "random")];
+    let written = names.iter().fold(e.key, |name, (of_plan, of_entry)| name.replace(of_plan, of_entry));
+    DescriptionError::refused(&format!("{key}.{written}"), e.value, format!("is refused: {}", e.requirement))
 }
 
 /// What an entry is swept over, and the outages of one combination.
@@ -182,9 +194,36 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_refused_window_is_told_in_a_sentence() {
-        let entry: OutagesEntry = toml::from_str("windows = [{ start_s = 25, end_s = 24 }]").unwrap();
-        let refusal = expand(&entry, 0).unwrap_err().to_string();
-        assert_eq!(refusal, "\"outages[1]\" = 24 is refused: it must come after start_s = 25");
+    fn a_refused_value_is_told_by_its_key() {
+        let positive = "it must be a finite number > 0";
+        let cases = [
+            (
+                "windows = [{ start_s = 25, end_s = 24 }]",
+                "windows[1].end_s",
+                "24",
+                "it must come after start_s = 25",
+            ),
+            ("sweep = { start_s = [300, 400], duration_s = [10, 0] }", "sweep.duration_s", "0", positive),
+            ("sweep = { start_s = 300, duration_s = -4 }", "sweep.duration_s", "-4", positive),
+            ("sweep = { start_s = 300, duration_s = nan }", "sweep.duration_s", "NaN", positive),
+            (
+                "sweep = { start_s = inf, duration_s = 4 }",
+                "sweep.start_s",
+                "inf",
+                "it must be a finite number",
+            ),
+            (
+                "periodic = { first_s = 10, every_s = 100, duration_s = [5, 0] }",
+                "periodic.duration_s",
+                "0",
+                positive,
+            ),
+            ("random = { rate_per_hour = 4, duration_s = [0, 4] }", "random.duration_s", "0", positive),
+        ];
+        for (text, key, value, requirement) in cases {
+            let entry: OutagesEntry = toml::from_str(text).unwrap();
+            let refusal = expand(&entry, 0).unwrap_err().to_string();
+            assert_eq!(refusal, format!("\"outages[1].{key}\" = {value} is refused: {requirement}"));
+        }
     }
 }
