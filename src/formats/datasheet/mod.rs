@@ -25,6 +25,7 @@ pub use catalogue::{catalogued, read};
 pub use figure::{Figure, Quantity, QuantityError};
 
 use crate::formats::model_file::{ModelFile, PROGRAM, SCHEMA, TurnOn};
+use crate::report::readable;
 use nav_sim_signal::imu::{Channel, Sensor};
 use nav_sim_signal::noise::{
     Composite, Flicker, Model, ParameterError, Process, RandomWalk, White, continuous,
@@ -204,14 +205,16 @@ fn doubt_floor(sensor: Sensor, flicker: Flicker, density: f64, is_time_given: bo
     let lowest = white.hypot(1.0);
     if white > 1.0 {
         doubts.push(format!(
-            "{name}: at {tau_s:.0} s the white noise alone is above the bias instability, which the Allan deviation then \
-             does not show; a correlation time above {:.0} s would",
-            flicker.t_corr_s * white * white
+            "{name}: at {} s the white noise alone is above the bias instability, which the Allan deviation then \
+             does not show; a correlation time above {} s would",
+            readable(tau_s),
+            readable(flicker.t_corr_s * white * white)
         ));
     } else if lowest > NOTABLE {
         doubts.push(format!(
             "{name}: with the white noise the lowest Allan deviation of this model is {lowest:.2} times the bias instability, \
-             at {tau_s:.0} s: the model is cautious; a longer correlation time is less so"
+             at {} s: the model is cautious; a longer correlation time is less so",
+            readable(tau_s)
         ));
     }
     doubts

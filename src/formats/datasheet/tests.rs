@@ -72,13 +72,16 @@ fn what_is_assumed_is_said() {
     // 0.3 °/√h is above 10 °/h until (0.3·60/10)² = 3.24 s: a floor that ends at 1.89·1 s is below that
     let doubts = doubts_with(&[(Sensor::Gyro, Figure::CorrelationTime, "1 s")]);
     assert!(
-        doubts[0].starts_with("gyro: at 2 s the white noise alone is above the bias instability"),
+        doubts[0].starts_with("gyro: at 1.89 s the white noise alone is above the bias instability"),
         "{doubts:?}"
     );
-    assert!(doubts[0].ends_with("a correlation time above 2 s would"), "{doubts:?}");
+    // 3.24 s / 1.8926
+    assert!(doubts[0].ends_with("a correlation time above 1.71 s would"), "{doubts:?}");
+    let doubts = doubts_with(&[(Sensor::Gyro, Figure::CorrelationTime, "0.001 s")]);
+    assert!(doubts[0].starts_with("gyro: at 0.00189 s the white noise alone"), "{doubts:?}");
     // one that ends at 1.8926·3 s: √(1 + 3.24/5.678) = 1.25
     let doubts = doubts_with(&[(Sensor::Gyro, Figure::CorrelationTime, "3 s")]);
-    assert!(doubts[0].contains("is 1.25 times the bias instability, at 6 s"), "{doubts:?}");
+    assert!(doubts[0].contains("is 1.25 times the bias instability, at 5.68 s"), "{doubts:?}");
 }
 
 #[test]
