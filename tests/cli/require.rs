@@ -77,6 +77,55 @@ fn a_directory_of_models_is_ranked() {
     assert!(none.contains("  open ") && !none.contains("  met "), "{none}");
 }
 
+/// Sixteen places, and the same figures to the last digit, whether a unit is judged alone or among others: one meets the
+/// limit and one does not, both worst at a place in the middle.
+#[test]
+fn a_unit_alone_is_judged_as_in_a_catalogue() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("drive.toml"), TURNS).unwrap();
+    std::fs::create_dir(dir.path().join("units")).unwrap();
+    let names = ["consumer_mems", "tactical"];
+    for file in names.map(|name| format!("{name}.toml")) {
+        std::fs::copy(format!("{ROOT}/calib_data/{file}"), dir.path().join("units").join(file)).unwrap();
+    }
+    let judged = |arguments: &[&str]| -> Value {
+        let asked =
+            ["require", "drive.toml", "--outage", "20", "--start", "70", "--p95-m", "6", "--format", "json"];
+        let mut command = Command::cargo_bin("nav-sim").unwrap();
+        let ran = command.current_dir(dir.path()).args(asked).args(arguments).assert();
+        serde_json::from_str(&stdout(&ran)).unwrap()
+    };
+    let ranked = judged(&["--catalogue", "units"]);
+    assert_eq!(ranked["question"]["outages"].as_array().unwrap().len(), 16);
+    let verdicts = names.map(|name| {
+        let alone = judged(&[&format!("units/{name}.toml")]);
+        let among = ranked["units"].as_array().unwrap().iter().find(|unit| unit["unit"] == name).unwrap();
+        assert_eq!(alone["question"], ranked["question"]);
+        for key in ["met", "quantity", "value", "place", "outage"] {
+            assert_eq!(alone[key], among[key], "{name}: {key}");
+        }
+        assert!((1..15).contains(&alone["place"].as_u64().unwrap()), "{alone}");
+        alone["met"].as_bool().unwrap()
+    });
+    assert_eq!(verdicts, [false, true]);
+}
+
+/// A drive whose middle is the worst place of an outage.
+const TURNS: &str = r#"
+start = { lat_deg = 46.5, lon_deg = 6.5, h_m = 400, heading_deg = 40 }
+segment = [
+  { kind = "straight", duration_s = 20 },
+  { kind = "accelerate", to_speed_m_s = 10, duration_s = 10 },
+  { kind = "turn", angle_deg = 90, duration_s = 10 },
+  { kind = "straight", duration_s = 20 },
+  { kind = "turn", angle_deg = -90, duration_s = 10 },
+  { kind = "straight", duration_s = 45 },
+  { kind = "accelerate", to_speed_m_s = 20, duration_s = 5 },
+  { kind = "turn", angle_deg = 120, duration_s = 15 },
+  { kind = "straight", duration_s = 45 },
+]
+"#;
+
 #[test]
 fn the_catalogue_is_ranked_without_a_directory() {
     let dir = tempfile::tempdir().unwrap();
