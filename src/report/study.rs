@@ -4,7 +4,7 @@
 use super::comparison::{CandidateResult, Label};
 use super::comparison_table::table_rows;
 use super::number::{readable, window};
-use super::verdict::{state_in_words, verdict_word};
+use super::verdict::{verdict_in_short, verdict_word};
 use nav_sim_navigation::metrics::{self, EpochMetrics, Measured, OutageComparison, OutageMetrics, Verdict};
 use nav_sim_navigation::simulation::{BIAS_NAMES, REPORTED, REPORTED_NAMES};
 
@@ -276,14 +276,7 @@ pub(crate) fn verdict_table(cells: &[ShownCell]) -> Vec<Vec<String>> {
         rows[0].extend(cell.columns.iter().map(|c| c.name.clone()));
     }
     let shown = |column: &ShownColumn| {
-        let v = &column.verdict;
-        format!(
-            "{}, NEES {}, {} × in {}",
-            verdict_word(v.kind),
-            readable(v.nees),
-            readable(v.ratio),
-            state_in_words(v.worst_state)
-        )
+        format!("{}, {}", verdict_word(column.verdict.kind), verdict_in_short(&column.verdict))
     };
     rows.extend(
         cells

@@ -75,14 +75,22 @@ pub(crate) fn state_in_words(name: StateName) -> &'static str {
     if name == ALL_STATES { "all states together" } else { name }
 }
 
-/// For a line that names several runs: "NEES 1189, 34.6 × in yaw_deg".
+/// For a line or a cell among several: "NEES 1189, 34.6 × in yaw_deg"; of runs that found nothing, what they would have found:
+/// "NEES 8.7, 0.91 × in yaw_deg, 57 % detectable".
 pub(crate) fn verdict_in_short(verdict: &Verdict) -> String {
-    format!(
+    let figures = format!(
         "NEES {}, {} × in {}",
         readable(verdict.nees),
         readable(verdict.ratio),
         state_in_words(verdict.worst_state)
-    )
+    );
+    match verdict.kind {
+        VerdictKind::Ok if verdict.independent_runs.is_finite() => {
+            format!("{figures}, {} % detectable", readable(100.0 * (verdict.detectable_state_ratio - 1.0)))
+        }
+        VerdictKind::Overconfident if verdict.is_lost() => format!("the filter is lost, {figures}"),
+        _ => figures,
+    }
 }
 
 /// The verdict in one word.
@@ -135,6 +143,16 @@ mod tests {
             "{over}"
         );
         assert!(line(0.5).starts_with("underconfident: errors are 0.500"), "{}", line(0.5));
+        let short = |runs: u64, scale: f64| verdict_in_short(&verdict(runs, scale));
+        assert!(
+            short(100, 1.0).contains(" × in ") && short(100, 1.0).ends_with(" % detectable"),
+            "{}",
+            short(100, 1.0)
+        );
+        assert!(
+            !short(100, 1.5).contains("detectable")
+                && short(100, 12.0).starts_with("the filter is lost, NEES")
+        );
         assert!(line(12.0).starts_with("OVERCONFIDENT BY FAR, the filter is lost: "), "{}", line(12.0));
     }
 }

@@ -83,7 +83,7 @@ impl Texts {
             text += &format!("{}\n\n{said}\n\n{}\n{legend}\n\n", markdown(name), markdown_table(rows));
         }
         text += "Verdict on each filter: NEES over the run (9 if right), error over its standard deviation in the \
-                 state that is farthest off\n\n";
+                 state that is farthest off; detectable: what so many runs find in one state\n\n";
         text += &markdown_table(&report::verdict_table(&self.cells));
         text += "\n\nHorizontal error before the first fix after the outage, median (95 %), m\n\n";
         text += &markdown_table(&report::drift_table(&self.cells));

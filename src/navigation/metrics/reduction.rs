@@ -227,8 +227,8 @@ impl ReductionQuality {
         let (size, meaning) =
             if ratio > 1.0 { ("small", "overconfident") } else { ("large", "overcautious") };
         Some(format!(
-            "the sigma of {} at the end of outage {outage} is {off:.0} % too {size}: the filter reduced to 15 states \
-             is {meaning}",
+            "the sigma of {} at the end of outage {outage} is {off:.0} % too {size}: there the filter reduced to 15 \
+             states is {meaning}",
             IN_WORDS[state]
         ))
     }

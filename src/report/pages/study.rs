@@ -32,7 +32,7 @@ pub(crate) fn study_page(
         page.chart(&chart, "Horizontal error just before the first fix after an outage: median over the runs, the bar up to the 95 % quantile.");
     }
     page.section("Verdict on each filter");
-    page.text("NEES over the run (9 if right), error over its standard deviation in the state that is farthest off.");
+    page.text("NEES over the run (9 if right), error over its standard deviation in the state that is farthest off; of a filter that the runs do not find wrong, the smallest error in one state that so many runs find (detectable).");
     page.table(&Table::of_rows(&verdict_table(cells)));
     page.section("Horizontal error at the ends of outages: median (95 %), m");
     page.table(&Table::of_rows(&drift_table(cells)));
