@@ -98,8 +98,11 @@ impl TuneResult {
         let several = self.truths.len() > 1;
         let row = |(name, h): (&str, &Honesty)| {
             let mut largest = format!("{} in {}", readable(h.ratio), REPORTED_NAMES[h.state]);
-            if let Some(end_s) = h.end_s.get(h.outage).filter(|_| h.end_s.len() > 1) {
-                largest += &format!(" at {} s", seconds(*end_s));
+            match h.outage {
+                Some(outage) if h.end_s.len() > 1 => {
+                    largest += &format!(" at {} s", seconds(h.end_s[outage]))
+                }
+                _ => largest += over_run(h),
             }
             if several {
                 largest += &format!(", {}", self.truths[h.truth]);
@@ -182,14 +185,20 @@ fn judged(h: &Honesty) -> String {
         Excess::None => format!("honest (NEES {nees}, 9 is right)"),
         Excess::Overconfident if h.ratio > 1.0 + RIGHT => {
             format!(
-                "overconfident by {} in {} (NEES {nees}, 9 is right)",
+                "overconfident by {} in {}{} (NEES {nees}, 9 is right)",
                 readable(h.ratio),
-                REPORTED_NAMES[h.state]
+                REPORTED_NAMES[h.state],
+                over_run(h)
             )
         }
         Excess::Overconfident => format!("overconfident (NEES {nees}, 9 is right)"),
         Excess::Underconfident => format!("on the safe side (NEES {nees}, 9 is right)"),
     }
+}
+
+/// Where the largest ratio is, if not at the end of an outage.
+const fn over_run(h: &Honesty) -> &'static str {
+    if h.outage.is_none() && !h.end_s.is_empty() { " over the run" } else { "" }
 }
 
 /// `filter of 15 states`
@@ -205,7 +214,7 @@ fn is_honest(h: &Honesty) -> bool {
 /// The tuned filter: `it is honest (NEES 7.9)`
 fn judged_after(h: &Honesty) -> String {
     let nees = readable(h.nees);
-    let place = if h.end_s.is_empty() { "" } else { " at an outage's end" };
+    let place = if h.end_s.is_empty() { "" } else { " at an outage's end or over the run" };
     if is_honest(h) {
         return format!("it is honest: no error{place} larger than stated (NEES {nees})");
     }
@@ -213,7 +222,7 @@ fn judged_after(h: &Honesty) -> String {
         return format!("no error{place} is larger than stated, but the NEES is {nees} where 9 is right");
     }
     let (ratio, state) = (readable(h.ratio), REPORTED_NAMES[h.state]);
-    format!("the NEES is {nees}, {state} still overconfident by {ratio}")
+    format!("the NEES is {nees}, {state} still overconfident by {ratio}{}", over_run(h))
 }
 
 /// `gyro RW × 4.02 (variance; the rest × 1)`
@@ -299,7 +308,7 @@ mod tests {
 
     fn honesty(ratio: f64, nees: f64) -> Honesty {
         let (end_s, rmse_end) = (vec![90.0], vec![[1.0; 9]]);
-        Honesty { nees, ratio, state: 8, outage: 0, truth: 0, end_s, rmse_end }
+        Honesty { nees, ratio, state: 8, outage: Some(0), truth: 0, end_s, rmse_end }
     }
 
     fn result(filter: FilterStates, reduced: Honesty) -> TuneResult {

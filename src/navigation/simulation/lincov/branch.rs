@@ -1,10 +1,10 @@
 //! One outage at many places of a track, each alone: a pass with all fixes, from which each outage branches off.
 
+use super::errors::{Errors, StepInputs};
 use super::input::Sources;
 use super::joint::Joint;
-use super::mean::Mean;
-use super::pass::{Errors, Instant, StepInputs};
-use super::track::{Mark, Measured, NAV, Row, Track};
+use super::pass::Instant;
+use super::track::{Mark, Measured, Row, Track};
 use super::truth::TruthSide;
 use crate::ekf::Belief;
 use crate::sensors::outage::Outage;
@@ -104,12 +104,8 @@ struct Pass<'a> {
 
 impl<'a> Pass<'a> {
     fn new(track: &'a Track, truth: &'a TruthSide, filter: &Sources, estimates: &Sources) -> Self {
-        let begin = if truth.starts_off { track.start } else { [[0.0; NAV]; NAV] };
-        let errors = Errors {
-            joint: Joint::new(begin, estimates, &truth.inertial),
-            mean: Mean::new(estimates, &truth.inertial),
-        };
-        Self { track, truth, filter: Joint::new(track.start, filter, &Sources::default()), errors }
+        let filter = Joint::new(track.start, filter, &Sources::default());
+        Self { track, truth, filter, errors: Errors::at_start(track, estimates, truth) }
     }
 
     /// Over the steps that lead to a mark.

@@ -10,6 +10,7 @@
 
 mod branch;
 mod descent;
+mod errors;
 mod heading;
 mod input;
 mod joint;

@@ -1,9 +1,9 @@
 //! One filter along a track, and what makes its true errors.
 
+use super::errors::{Errors, StepInputs};
 use super::input::Sources;
-use super::joint::{Gain, Inputs, Joint};
-use super::mean::Mean;
-use super::track::{Mark, Measured, NAV, Nav, Row, Step, Track};
+use super::joint::{Gain, Joint};
+use super::track::{Mark, Measured, NAV, Nav, Track};
 use super::truth::{TrueErrors, TruthSide};
 use crate::ekf::Belief;
 use crate::ekf::covariance::PSI;
@@ -51,6 +51,17 @@ pub struct Assessment {
     pub outage_ends: Vec<Consistency>,
 }
 
+impl Assessment {
+    /// True RMSE over stated standard deviation over the whole run, as verdicts have it: the root mean square over the
+    /// reports.
+    #[must_use]
+    pub fn ratio_over_run(&self) -> [f64; REPORTED] {
+        let count = self.reports.len() as f64;
+        let ratios: Vec<[f64; REPORTED]> = self.reports.iter().map(Consistency::ratio).collect();
+        std::array::from_fn(|i| (ratios.iter().map(|r| r[i].powi(2)).sum::<f64>() / count).sqrt())
+    }
+}
+
 /// Takes a filter along a track with its own covariance and that of its true errors, where `truth` makes the
 /// inertial errors, turn-on biases and scale factors are as the filter expects them, and the receiver is as the filter
 /// believes. A drift (DR) is taken as the filter takes it: of that magnitude, either sign, each axis by itself; where
@@ -89,7 +100,7 @@ pub struct Instant {
     pub covariance: [Nav; NAV],
     /// Mean of its true errors.
     pub mean: Nav,
-    jacobian: [DVec3; 3],
+    pub(super) jacobian: [DVec3; 3],
 }
 
 /// The law of a filter's errors along a track.
@@ -222,9 +233,7 @@ impl<'a> FilterPass<'a> {
         show: &mut dyn FnMut(&Mark, Moment, &Errors),
     ) -> (f64, u64) {
         let (estimates, real) = (self.believed.estimates(), &truth.inertial);
-        let begin = if truth.starts_off { self.track.start } else { [[0.0; NAV]; NAV] };
-        let mut errors =
-            Errors { joint: Joint::new(begin, &estimates, real), mean: Mean::new(&estimates, real) };
+        let mut errors = Errors::at_start(self.track, &estimates, truth);
         let mut inputs = StepInputs::new(&estimates, real);
         let mut gains = self.gains.iter();
         let (mut nis, mut fixes, mut done) = (0.0, 0, 0);
@@ -257,72 +266,6 @@ impl<'a> FilterPass<'a> {
 enum Moment {
     Ends,
     Report,
-}
-
-/// The true errors at an instant.
-#[derive(Clone)]
-pub(super) struct Errors {
-    pub(super) joint: Joint,
-    pub(super) mean: Option<Mean>,
-}
-
-impl Errors {
-    /// A stand-in where what the filter states is converted to the reported states, which needs no true errors.
-    fn none() -> Self {
-        let none = Sources::default();
-        Self { joint: Joint::new([[0.0; NAV]; NAV], &none, &none), mean: None }
-    }
-
-    pub(super) fn step(&mut self, step: &Step, inputs: &Inputs) {
-        self.joint.step(step, inputs);
-        self.mean.iter_mut().for_each(|mean| mean.step(step, inputs));
-    }
-
-    /// Corrects by a measurement with the filter's gain; returns the expected square of the innovation.
-    pub(super) fn measure(&mut self, row: &Row, truth: &TruthSide, gain: &Gain) -> f64 {
-        // Without its noise where the source under study is another one: covariances of independent sources
-        // add.
-        let y = self.joint.innovation(row, if truth.has_noise(row.what) { row.r } else { 0.0 });
-        let mean = self.mean.as_ref().map_or(0.0, |mean| mean.innovation(row));
-        self.joint.correct(&y, gain);
-        self.mean.iter_mut().for_each(|m| m.correct(mean, gain));
-        y.s + mean * mean
-    }
-
-    pub(super) fn instant(&self, mark: &Mark, believed: &[Nav; NAV]) -> Instant {
-        Instant {
-            after_s: mark.after_s,
-            t_s: mark.t_s,
-            measured: !mark.rows.is_empty(),
-            fix: mark.fix,
-            believed: *believed,
-            covariance: self.joint.xx,
-            mean: self.mean.as_ref().map_or([0.0; NAV], |mean| mean.x),
-            jacobian: mark.jacobian,
-        }
-    }
-}
-
-/// Inputs by the number of samples of a step; few numbers occur.
-pub(super) struct StepInputs<'a> {
-    b: &'a Sources,
-    t: &'a Sources,
-    made: Vec<(u32, Inputs)>,
-}
-
-impl<'a> StepInputs<'a> {
-    pub(super) const fn new(b: &'a Sources, t: &'a Sources) -> Self {
-        Self { b, t, made: Vec::new() }
-    }
-
-    pub(super) fn over(&mut self, samples: u32) -> &Inputs {
-        let found = self.made.iter().position(|(n, _)| *n == samples);
-        let at = found.unwrap_or_else(|| {
-            self.made.push((samples, Inputs::new(self.b, self.t, samples)));
-            self.made.len() - 1
-        });
-        &self.made[at].1
-    }
 }
 
 impl Instant {

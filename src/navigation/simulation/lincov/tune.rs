@@ -6,7 +6,7 @@
 //! on all of them makes the filter exactly honest.
 
 use super::descent::Descent;
-use super::pass::{Assessment, Consistency, assess_stated};
+use super::pass::{Assessment, assess_stated};
 use super::reduce::divergence;
 use super::root::Crossing;
 use super::track::Track;
@@ -37,7 +37,7 @@ nav_sim_signal::named!(Per { Sensor = "sensor", Process = "process" });
 pub enum Aim {
     /// The expected NEES, averaged over time and truths, is what it should be.
     Mean,
-    /// In no truth is an error larger than stated, in any state at the end of any outage.
+    /// In no truth is an error larger than stated, in any state at the end of any outage or over the whole run.
     #[default]
     Worst,
 }
@@ -88,12 +88,13 @@ impl Factor {
 pub struct Honesty {
     /// Expected NEES, mean over time and truths; 9 is right.
     pub nees: f64,
-    /// Largest true RMSE over stated standard deviation at an outage's end (without outages: at any time).
+    /// Largest true RMSE over stated standard deviation at an outage's end and over the whole run (without outages: at any
+    /// time).
     pub ratio: f64,
     /// The reported state with that ratio.
     pub state: usize,
-    /// The outage at whose end it is, counted from 0.
-    pub outage: usize,
+    /// The outage at whose end it is, counted from 0; none: over the whole run.
+    pub outage: Option<usize>,
     /// The truth in which it is, counted from 0.
     pub truth: usize,
     /// When the outages end (s from the start).
@@ -179,14 +180,18 @@ impl Task<'_> {
     /// Mean divergence over the truths, and what no error may be.
     fn cost(&self, factors: &[Factor], track: &Track) -> f64 {
         let Ok(belief) = (self.full)(&scaled(self.model, factors)) else { return f64::INFINITY };
-        let overconfidence = |end: &Consistency| match self.aim {
-            Aim::Mean => 0.0,
-            // One-sided: an error smaller than stated costs nothing here, the divergence alone speaks of
-            // timidity.
-            Aim::Worst => end.ratio().iter().map(|r| OVERCONFIDENT * r.ln().max(0.0).powi(2)).sum(),
+        let overconfidence = |ratios: [f64; REPORTED]| -> f64 {
+            match self.aim {
+                Aim::Mean => 0.0,
+                // One-sided: an error smaller than stated costs nothing here, the divergence alone speaks of
+                // timidity.
+                Aim::Worst => ratios.iter().map(|r| OVERCONFIDENT * r.ln().max(0.0).powi(2)).sum(),
+            }
         };
-        let costs: Vec<f64> =
-            self.assessments(&belief, track).iter().map(|a| divergence(a, overconfidence)).collect();
+        let cost_of_truth = |a: &Assessment| {
+            divergence(a, |end| overconfidence(end.ratio())) + overconfidence(a.ratio_over_run())
+        };
+        let costs: Vec<f64> = self.assessments(&belief, track).iter().map(cost_of_truth).collect();
         costs.iter().sum::<f64>() / costs.len() as f64
     }
 
@@ -221,16 +226,21 @@ impl Honesty {
         let nees = assessments.iter().map(mean).sum::<f64>() / count;
         let end_s: Vec<f64> = assessments[0].outage_ends.iter().map(|end| end.after_s).collect();
         let rmse_end = vec![[0.0; REPORTED]; end_s.len()];
-        let mut honesty = Self { nees, ratio: 0.0, state: 0, outage: 0, truth: 0, end_s, rmse_end };
+        let mut honesty = Self { nees, ratio: 0.0, state: 0, outage: None, truth: 0, end_s, rmse_end };
         for (truth, assessment) in assessments.iter().enumerate() {
             let ends = &assessment.outage_ends;
             for (sum, end) in honesty.rmse_end.iter_mut().zip(ends) {
                 sum.iter_mut().zip(&end.rmse).for_each(|(sum, rmse)| *sum += rmse * rmse / count);
             }
             // Without outages the filter is judged wherever it reports.
-            let judged = if ends.is_empty() { &assessment.reports } else { ends };
-            for (outage, instant) in judged.iter().enumerate() {
-                for (state, ratio) in instant.ratio().into_iter().enumerate() {
+            let judged: Vec<(Option<usize>, [f64; REPORTED])> = if ends.is_empty() {
+                assessment.reports.iter().map(|report| (None, report.ratio())).collect()
+            } else {
+                let at_ends = ends.iter().enumerate().map(|(outage, end)| (Some(outage), end.ratio()));
+                at_ends.chain([(None, assessment.ratio_over_run())]).collect()
+            };
+            for (outage, ratios) in judged {
+                for (state, ratio) in ratios.into_iter().enumerate() {
                     if ratio > honesty.ratio {
                         honesty = Self { ratio, state, outage, truth, ..honesty };
                     }
