@@ -62,6 +62,8 @@ sources! {
     /// D. J. Best, D. E. Roberts: *Algorithm AS 91: The percentage points of the χ² distribution*, Applied Statistics 24,
     /// 1975.
     BestRoberts75;
+    /// H. E. Daniels: *Tail probability approximations*, International Statistical Review 55, 1987.
+    Daniels87;
     /// R. Ibragimov, U. K. Müller: *t-Statistic based correlation and heterogeneity robust inference*, J. Business and Economic
     /// Statistics 28, 2010.
     IbragimovMuller10;

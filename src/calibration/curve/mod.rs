@@ -5,6 +5,7 @@ pub(crate) mod implied;
 mod replicates;
 pub(crate) mod robust_scale;
 pub(crate) mod sampling;
+pub(crate) mod shape;
 mod stationarity;
 
 pub use average::{AverageError, Estimator, Replicate, Trim, TrimError, average};

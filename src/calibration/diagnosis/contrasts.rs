@@ -8,7 +8,6 @@
 
 use crate::curve::sampling::SamplingLaw;
 use crate::rng::Generator;
-use crate::uncertainty::spread::variance_of_log;
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
@@ -84,8 +83,10 @@ impl Noise {
     /// Noise of files with these degrees of freedom, `[file][level]`.
     pub(super) fn new(law: SamplingLaw, edof: Vec<Vec<f64>>) -> Self {
         let levels = edof.first().map_or(0, Vec::len);
-        let deviations: Vec<Vec<f64>> =
-            edof.iter().map(|e| e.iter().map(|e| variance_of_log(*e).sqrt()).collect()).collect();
+        let deviations: Vec<Vec<f64>> = edof
+            .iter()
+            .map(|e| e.iter().zip(&law.shapes).map(|(e, shape)| shape.variance_of_log(*e).sqrt()).collect())
+            .collect();
         let of_window = |window: Window| {
             let of_file = |s: &Vec<f64>| {
                 let pair =
@@ -345,6 +346,7 @@ pub(super) fn scores(table: &Table, noise: &[Noise], active: &[bool], file: usiz
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::curve::shape::variance_of_log;
     use crate::noise::{Composite, Process, White};
     use rand::SeedableRng;
 

@@ -1,8 +1,8 @@
 //! Effect of leaving a recording out on each estimator: its curve, and every parameter.
 
+use crate::curve::shape::variance_of_log;
 use crate::curve::{Estimator, Group, Replicate, average};
 use crate::outcome::{Outcome, Settings, tau_s};
-use crate::uncertainty::spread::variance_of_log;
 
 /// Movement of an estimator when one recording is left out.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]

@@ -5,8 +5,9 @@
 //! model ([`SamplingLaw`]), the correlations between scales included, so that looking at many scales costs nothing.
 //! Axes that are pooled may differ from one another in every recording alike: recordings are compared axis by axis.
 
-use super::spread::{Spread, mean_square, variance_of_log};
+use super::spread::{Spread, mean_square};
 use crate::curve::sampling::SamplingLaw;
+use crate::curve::shape::Shape;
 use crate::curve::{Estimator, Replicate};
 use crate::imu::Axis;
 use crate::rng::StreamKey;
@@ -30,8 +31,12 @@ pub(crate) fn p_value(
     law: &SamplingLaw,
     group: &str,
 ) -> Option<f64> {
-    let scales: Vec<Scale> =
-        (0..spread.within.len()).map_while(|j| Scale::new(j, replicates, spread)).collect();
+    let scales: Vec<Scale> = law
+        .shapes
+        .iter()
+        .enumerate()
+        .map_while(|(j, shape)| Scale::new(j, replicates, spread, shape))
+        .collect();
     if scales.is_empty() {
         return None;
     }
@@ -64,13 +69,13 @@ struct Scale {
 impl Scale {
     /// Those that are long enough for the level of index `j`; none where no axis is there twice: each axis alone in its
     /// recording is compared with nothing.
-    fn new(j: usize, replicates: &[Replicate], spread: &Spread) -> Option<Self> {
+    fn new(j: usize, replicates: &[Replicate], spread: &Spread, shape: &Shape) -> Option<Self> {
         let is_long_enough = |i: &usize| replicates[*i].levels() > j && spread.edof[*i][j] >= LEAST;
         let members: Vec<(usize, Option<Axis>)> =
             (0..replicates.len()).filter(is_long_enough).map(|i| (i, replicates[i].axis)).collect();
         let is_repeated =
             |(k, (_, axis)): (usize, &(usize, Option<Axis>))| members[..k].iter().any(|(_, a)| a == axis);
-        let noise = members.iter().map(|(i, _)| variance_of_log(spread.edof[*i][j])).collect();
+        let noise = members.iter().map(|(i, _)| shape.variance_of_log(spread.edof[*i][j])).collect();
         members.iter().enumerate().any(is_repeated).then_some(Self { members, noise })
     }
 

@@ -6,7 +6,7 @@
 //! axes is a chi-square. The least probability of all scales, times their number (Bonferroni), is the answer.
 
 use super::alike::LEVEL;
-use super::spread::variance_of_log;
+use crate::curve::shape::variance_of_log;
 use crate::curve::{Estimator, Replicate};
 use crate::imu::Axis;
 use crate::outcome::AxesDiffer;

@@ -10,7 +10,8 @@
 //! freedom as there are recordings, less one, where `between` rules, and as there are signals, less one, where it does not.
 
 use crate::curve::robust_scale::{MAD_TO_DEVIATION, median};
-use crate::curve::sampling::{SamplingLaw, chi_square_ratio};
+use crate::curve::sampling::SamplingLaw;
+use crate::curve::shape::Shape;
 use crate::curve::{Estimator, Replicate};
 use crate::rng::Generator;
 use crate::wavelet::Tuning;
@@ -32,9 +33,11 @@ pub(crate) struct Spread {
     pub(crate) between: Vec<f64>,
     /// Degrees of freedom of each replicate at each level.
     pub(crate) edof: Vec<Vec<f64>>,
-    /// Standard deviation of ln nu of each replicate at each level, as the replicates show it: that of the replicates,
+    /// Degrees of freedom with which ln nu of each replicate at each level scatters as the replicates show it: as they do,
     /// more for the shorter and less for the longer of them.
     total: Vec<Vec<f64>>,
+    /// Shape of the law at each level.
+    shapes: Vec<Shape>,
     /// Residuals of each replicate over their standard deviation, 0 where it has none, so that Σ over replicates of their
     /// squares is K − 1: their combinations with normal weights over √(K − 1) have unit variance and the replicates'
     /// correlations between levels.
@@ -79,13 +82,14 @@ impl Spread {
         let count = replicates.len() as f64;
         let mut within = vec![0.0; levels];
         let mut units = vec![vec![0.0; levels]; replicates.len()];
-        let mut total = vec![vec![0.0; levels]; replicates.len()];
+        let mut total = vec![vec![f64::INFINITY; levels]; replicates.len()];
         let mut between = vec![0.0; levels];
         for j in 0..levels {
             // Short recordings lack the longest scales, and say nothing of them.
             let present: Vec<usize> = (0..replicates.len()).filter(|i| replicates[*i].levels() > j).collect();
             let logs: Vec<f64> = present.iter().map(|i| replicates[*i].value(estimator, j).ln()).collect();
-            let noise: Vec<f64> = present.iter().map(|i| variance_of_log(edof[*i][j])).collect();
+            let shape = &law.shapes[j];
+            let noise: Vec<f64> = present.iter().map(|i| shape.variance_of_log(edof[*i][j])).collect();
             within[j] = (noise.iter().sum::<f64>() / present.len() as f64).sqrt();
             let scatter = Scatter::new(&logs, &noise, estimator);
             between[j] = scatter.between;
@@ -94,21 +98,20 @@ impl Spread {
             let fewer = ((count - 1.0).max(1.0) / freedom).sqrt();
             for ((i, unit), noise) in present.into_iter().zip(scatter.units).zip(&noise) {
                 units[i][j] = unit * fewer;
-                total[i][j] = scatter.factor * noise.sqrt().hypot(between[j]);
+                total[i][j] = shape.edof_of_log(scatter.factor.powi(2) * (noise + between[j].powi(2)));
             }
         }
         let (origin, share_of_freedom) = (origins(replicates), share_of_freedom(estimator));
-        Self { within, between, edof, total, units, origin, share_of_freedom }
+        Self { within, between, edof, total, shapes: law.shapes.clone(), units, origin, share_of_freedom }
     }
 
     /// Draws nu*/nu of as many new replicates as there are, `[replicate][level]`: with the variances of ln nu that the
     /// replicates show, and their correlations between levels.
     pub(crate) fn draw(&self, generator: &mut Generator) -> Vec<Vec<f64>> {
         let of_replicate = |(scores, total): (Vec<f64>, &Vec<f64>)| {
-            // The chi-square whose logarithm has the observed variance: the skew of few degrees of freedom
-            // comes with it.
-            let ratio = |(score, total): (f64, &f64)| chi_square_ratio(score, edof_of_log(total * total));
-            scores.into_iter().zip(total).map(ratio).collect()
+            // The law whose logarithm has the observed variance: the skew of few degrees of freedom comes with it.
+            let ratio = |((score, total), shape): ((f64, &f64), &Shape)| shape.ratio(score, *total);
+            scores.into_iter().zip(total).zip(&self.shapes).map(ratio).collect()
         };
         // The part of the variance of ln nu by which recordings differ, which the axes of a recording share.
         let part = |j: usize| {
@@ -204,30 +207,12 @@ impl Spread {
     }
 }
 
-/// The degrees of freedom of a chi-square whose logarithm has this variance: psi1(x) ≈ 1/x + 1/2x² at x = eta/2.
-fn edof_of_log(variance: f64) -> f64 {
-    // The positive root of variance·x² − x − ½ = 0, doubled.
-    (1.0 + (1.0 + 2.0 * variance).sqrt()) / variance
-}
-
 fn edof(replicate: &Replicate, estimator: Estimator, law: &SamplingLaw, tuning: &Tuning) -> Vec<f64> {
     if estimator.is_robust() {
         law.robust_edof(replicate.samples, tuning)
     } else {
         law.edof(replicate.samples)
     }
-}
-
-/// Variance of ln(chi²/eta): the trigamma function at eta/2, by its asymptotic series.
-pub(crate) fn variance_of_log(edof: f64) -> f64 {
-    // psi1(x) = 1/x² + psi1(x + 1), then the series, whose error is under 1e-6 from x = 4.
-    let (mut x, mut sum) = (0.5 * edof, 0.0);
-    while x < 4.0 {
-        sum += 1.0 / (x * x);
-        x += 1.0;
-    }
-    let y = 1.0 / (x * x);
-    sum + 1.0 / x + 0.5 * y + y / x * (1.0 / 6.0 - y * (1.0 / 30.0 - y / 42.0))
 }
 
 /// The degrees of freedom of a variance over those of the plain one, K − 1. That of K Gaussian numbers of which the

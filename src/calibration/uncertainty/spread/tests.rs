@@ -1,16 +1,8 @@
 //! How replicates scatter, and how often intervals that rest on it hold the truth.
 
 use super::*;
+use crate::curve::shape::variance_of_log;
 use approx::assert_relative_eq;
-
-/// psi1(½) = π²/2, psi1(1) = π²/6, psi1(2) = π²/6 − 1.
-#[test]
-fn variance_of_the_logarithm() {
-    let pi2 = std::f64::consts::PI.powi(2);
-    assert_relative_eq!(variance_of_log(1.0), pi2 / 2.0, max_relative = 1e-6);
-    assert_relative_eq!(variance_of_log(2.0), pi2 / 6.0, max_relative = 1e-6);
-    assert_relative_eq!(variance_of_log(4.0), pi2 / 6.0 - 1.0, max_relative = 1e-5);
-}
 
 /// Of replicates whose noise is nothing.
 fn noiseless(logs: &[f64], estimator: Estimator) -> Scatter {
