@@ -4,8 +4,8 @@
 //! The wavelet variances of each recording are drawn by the law of those of the model (as behind the intervals of a
 //! calibration that was made, `uncertainty::bootstrap`); where parameters vary between recordings, those of each are drawn
 //! first. The estimator and the fit are applied to the draws, whose scatter is that of estimates from such recordings. A
-//! calibration that was made draws with the scatter that its own few recordings show, which varies, and of the last scales is
-//! mostly less: where a parameter hangs on these its interval is narrower than the one anticipated, three times in four.
+//! calibration that was made draws with the scatter that its own few recordings show, which varies, and is more often less than
+//! more: where a parameter hangs on the last scales its interval is narrower than the one anticipated, two times in three.
 
 use crate::curve::{Estimator, Group, Replicate, Scope, average, implied};
 use crate::fit::Fit;

@@ -28,6 +28,9 @@ pub(crate) struct SamplingLaw {
     pub(crate) quantization: Vec<f64>,
     /// Squares of the autocorrelations of the coefficients of the last levels ([`squared_autocorrelations`]); none of others.
     autocorrelations: Vec<Vec<f64>>,
+    /// Of what a robust variance scatters more than the classical one, the part that is left in correlated coefficients, of each
+    /// level ([`fourth_powers`]).
+    fourth: Vec<f64>,
     /// Shape of the law of each level: a chi-square's but at the last levels.
     pub(crate) shapes: Vec<Shape>,
     /// Correlations between levels, and the lower Cholesky factor.
@@ -56,10 +59,15 @@ impl SamplingLaw {
         correlation.fill_diagonal(1.0);
         let factor = factor(&correlation);
         let quantization = (1..=levels as u32).map(|level| quantization_share(model, level)).collect();
-        let autocorrelations =
-            (1..=levels).map(|level| squared_autocorrelations(model, level, levels)).collect();
+        let autocorrelations = (1..=levels)
+            .map(|level| match is_last(level, levels) {
+                true => squared_autocorrelations(model, level, 1 << levels),
+                false => Vec::new(),
+            })
+            .collect();
+        let fourth = (1..=levels).map(|level| fourth_powers(model, level)).collect();
         let shapes = (1..=levels).map(|level| shape(model, level, levels)).collect();
-        Self { per_coefficient, quantization, autocorrelations, shapes, correlation, factor }
+        Self { per_coefficient, quantization, autocorrelations, fourth, shapes, correlation, factor }
     }
 
     /// The law of the first so many levels.
@@ -70,8 +78,9 @@ impl SamplingLaw {
         let per_coefficient = self.per_coefficient[..levels].to_vec();
         let quantization = self.quantization[..levels].to_vec();
         let autocorrelations = self.autocorrelations[..levels].to_vec();
+        let fourth = self.fourth[..levels].to_vec();
         let shapes = self.shapes[..levels].to_vec();
-        Self { per_coefficient, quantization, autocorrelations, shapes, correlation, factor }
+        Self { per_coefficient, quantization, autocorrelations, fourth, shapes, correlation, factor }
     }
 
     /// Degrees of freedom of the classical wavelet variance of a signal of so many samples.
@@ -85,10 +94,14 @@ impl SamplingLaw {
 
     /// The same of the robust one, at least 1.
     pub(crate) fn robust_edof(&self, samples: usize, tuning: &Tuning) -> Vec<f64> {
-        let robust = |(edof, share): (f64, &f64)| {
-            edof_robust(edof, tuning.efficiency() * tuning.quantization().degrees(*share))
+        let robust = |((edof, share), fourth): ((f64, &f64), &f64)| {
+            // The efficiency is that of independent coefficients. In Hermite polynomials of a coefficient the robust variance has the
+            // second, by which it scatters as the classical one does, and others from the fourth on, whose covariances fall
+            // as the fourth powers of the correlations or faster.
+            let efficiency = 1.0 / (1.0 + (1.0 / tuning.efficiency() - 1.0) * fourth);
+            edof_robust(edof, efficiency * tuning.quantization().degrees(*share))
         };
-        self.edof(samples).into_iter().zip(&self.quantization).map(robust).collect()
+        self.edof(samples).into_iter().zip(&self.quantization).zip(&self.fourth).map(robust).collect()
     }
 
     /// Draws nu*/nu of every level, given the degrees of freedom.
@@ -107,25 +120,31 @@ const MANY: f64 = 8.0;
 /// Number of lags into which the scale is divided.
 const LAGS: usize = 16;
 
-/// Squares of the autocorrelations of a level's coefficients at [`LAGS`] lags up to the scale, beyond which they are
-/// uncorrelated or nearly so; none for a level that is not among the last.
-fn squared_autocorrelations(model: &Composite, level: usize, levels: usize) -> Vec<f64> {
-    if !is_last(level, levels) {
-        return Vec::new();
-    }
-    let half = 1_usize << levels;
-    let m = f64::from(level as u32 - 1).exp2();
+/// Squares of the autocorrelations of a level's coefficients at up to [`LAGS`] lags up to the scale, beyond which they are
+/// uncorrelated or nearly so. `half`: number of frequencies up to half the rate, no fewer than the scale has samples.
+fn squared_autocorrelations(model: &Composite, level: usize, half: usize) -> Vec<f64> {
+    let tau = 1_usize << level;
+    let m = 0.5 * tau as f64;
+    let lags = LAGS.min(tau);
     // The gain falls as 1/f² or faster: beyond 32/tau there is a hundredth of it.
-    let frequencies = (64_usize << (levels - level)).min(half);
-    let mut sums = [0.0; LAGS + 1];
+    let frequencies = (64 * half / tau).min(half);
+    let mut sums = vec![0.0; lags + 1];
     for k in 0..frequencies {
         let f = 0.5 * (k as f64 + 0.5) / half as f64;
         let gain = gain(model, f, m);
         for (lag, sum) in sums.iter_mut().enumerate() {
-            *sum += gain * (2.0 * PI * f * 2.0 * m * lag as f64 / LAGS as f64).cos();
+            *sum += gain * (2.0 * PI * f * 2.0 * m * lag as f64 / lags as f64).cos();
         }
     }
     sums.iter().map(|s| (s / sums[0]).powi(2)).collect()
+}
+
+/// Sum of the fourth powers of a level's autocorrelations over that of their squares; 1 of a process without noise.
+fn fourth_powers(model: &Composite, level: usize) -> f64 {
+    let squared = squared_autocorrelations(model, level, 1 << level);
+    let over_lags = |power: i32| 1.0 + 2.0 * squared.iter().skip(1).map(|s| s.powi(power)).sum::<f64>();
+    let ratio = over_lags(2) / over_lags(1);
+    if ratio.is_finite() { ratio } else { 1.0 }
 }
 
 /// The shape of the law of a level's wavelet variance; a chi-square's for a level that is not among the last.
@@ -221,144 +240,4 @@ fn spectrum(process: &Process, sin2: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::noise::{Ar1, Quantization, RandomWalk, White};
-    use crate::wavelet::classical;
-    use approx::assert_relative_eq;
-    use rand::SeedableRng;
-
-    /// White noise, levels 1 and 2, by hand: W at level 1 is (x' − x)/2, with autocovariances ½, −¼ (σ² = 1),
-    /// so Σ s² = ¼ + 2/16 = 3/8; per coefficient nu²/Σ s² = (½)²/(3/8) = 2/3. Level 2 has ¼, 1/16·(…): the
-    /// autocovariances are (4, 1, −2, −1)/16, Σ s² = (16 + 2·6)/256, per coefficient (1/16)/(28/256) = 4/7.
-    #[test]
-    fn white_noise_by_hand() {
-        let model = Composite::new(vec![Process::White(White::new(1.0).unwrap())]);
-        let law = SamplingLaw::new(&model, 6);
-        assert_relative_eq!(law.per_coefficient[0], 2.0 / 3.0, max_relative = 1e-12);
-        assert_relative_eq!(law.per_coefficient[1], 4.0 / 7.0, max_relative = 1e-12);
-        assert_relative_eq!(law.edof(1000)[1], 997.0 * 4.0 / 7.0, max_relative = 1e-12);
-    }
-
-    /// The spectrum and the filters agree with the closed forms: ∫ |H_j|² S df = nu_j.
-    #[test]
-    fn spectra_integrate_to_the_wavelet_variance() {
-        let processes = [
-            Process::White(White::new(2.0).unwrap()),
-            Process::Quantization(Quantization::new(3.0).unwrap()),
-            Process::Ar1(Ar1::new(0.9, 0.5).unwrap()),
-            Process::RandomWalk(RandomWalk::new(0.1).unwrap()),
-            Process::Ma1(crate::noise::Ma1::new(0.5, 1.0).unwrap()),
-            Process::GaussMarkov(crate::noise::GaussMarkov::new(10.0, 0.3, 100.0).unwrap()),
-        ];
-        let half = 1 << 14;
-        for process in &processes {
-            for level in 1..=6 {
-                let m = f64::from(level - 1).exp2();
-                let term = |k: usize| {
-                    let x = 0.5 * PI * (k as f64 + 0.5) / half as f64;
-                    spectrum(process, x.sin().powi(2)) * (m * x).sin().powi(4) / (m * x.sin()).powi(2)
-                };
-                let integral = (0..half).map(term).sum::<f64>() / half as f64;
-                assert_relative_eq!(integral, process.haar_wv(level), max_relative = 1e-9);
-            }
-        }
-    }
-
-    /// 2000 records of twice the scale, and of four times: 2/var of nu/mean(nu), known to √(2·(2 + 12/eta)/2000)·… or so: a
-    /// variance of chi-squares of eta degrees, from n, is known to √((2 + 12/eta)/n) relative, 6.4 % at eta = 2; four of
-    /// which are allowed, and 5 % for the lags. That of ln nu, whose tails are lighter, is known to √((2 + 1)/n) = 3.9 %, of which
-    /// four are allowed, and 8 % for the spectrum in place of the eigenvalues; the chi-square's would be off by 40 %.
-    #[test]
-    fn few_coefficients_scatter_as_said() {
-        const RECORDS: usize = 2000;
-        let mut generator = Generator::seed_from_u64(4);
-        let processes =
-            [Process::White(White::new(1.0).unwrap()), Process::RandomWalk(RandomWalk::new(1.0).unwrap())];
-        for process in processes {
-            let law = SamplingLaw::new(&Composite::new(vec![process]), 8);
-            let mut nu = vec![Vec::new(); 2];
-            for _ in 0..RECORDS {
-                let mut walk = 0.0;
-                let walks = matches!(process, Process::RandomWalk(_));
-                let signal: Vec<f64> = (0..512)
-                    .map(|_| {
-                        let step = generator.sample::<f64, _>(StandardNormal);
-                        walk = if walks { walk + step } else { step };
-                        walk
-                    })
-                    .collect();
-                let all = classical(&signal, 8).unwrap();
-                nu.iter_mut().zip([all[7], all[6]]).for_each(|(list, value)| list.push(value));
-            }
-            for (list, level) in nu.iter().zip([8, 7]) {
-                let mean = list.iter().sum::<f64>() / RECORDS as f64;
-                let variance = list.iter().map(|v| (v / mean - 1.0).powi(2)).sum::<f64>() / RECORDS as f64;
-                let (found, said) = (2.0 / variance, law.edof(512)[level - 1]);
-                let allowed = 4.0 * ((2.0 + 12.0 / said) / RECORDS as f64).sqrt() + 0.05;
-                assert!(
-                    (found / said - 1.0).abs() < allowed,
-                    "{} level {level}: {found} {said}",
-                    process.code()
-                );
-                let logs: Vec<f64> = list.iter().map(|nu| nu.ln()).collect();
-                let centre = logs.iter().sum::<f64>() / RECORDS as f64;
-                let found = logs.iter().map(|ln| (ln - centre).powi(2)).sum::<f64>() / RECORDS as f64;
-                let of_law = law.shapes[level - 1].variance_of_log(said);
-                let allowed = 4.0 * (3.0 / RECORDS as f64).sqrt() + 0.08;
-                assert!(
-                    (of_law / found - 1.0).abs() < allowed,
-                    "ln, {} level {level}: {found} {of_law}",
-                    process.code()
-                );
-            }
-        }
-    }
-
-    /// 600 signals of white noise plus AR1: the scatter of log nu and its correlation from level to level.
-    /// A variance estimated from n draws is known to √(2/n) = 5.8 %, a correlation to 1/√n = 0.041; four
-    /// deviations are allowed, and log nu's variance is 2/edof·(1 + 1/edof + …), under 3 % off from edof 30.
-    #[test]
-    fn simulated_signals_scatter_so() {
-        const SIGNALS: usize = 600;
-        let model = Composite::new(vec![
-            Process::White(White::new(1.0).unwrap()),
-            Process::Ar1(Ar1::new(0.8, 0.5).unwrap()),
-        ]);
-        let law = SamplingLaw::new(&model, 5);
-        let edof = law.edof(2048);
-        let mut generator = Generator::seed_from_u64(11);
-        let mut logs = vec![Vec::new(); 5];
-        let mut drawn = vec![Vec::new(); 5];
-        for _ in 0..SIGNALS {
-            let mut normal = || generator.sample::<f64, _>(StandardNormal);
-            let mut ar1 = (0.5_f64 / 0.36).sqrt() * normal();
-            let signal: Vec<f64> = (0..2048)
-                .map(|_| {
-                    ar1 = 0.8 * ar1 + 0.5_f64.sqrt() * normal();
-                    ar1 + normal()
-                })
-                .collect();
-            let nu = classical(&signal, 5).unwrap();
-            nu.iter().zip(&mut logs).for_each(|(nu, l)| l.push(nu.ln()));
-            let ratios = law.draw(&edof, &mut generator);
-            ratios.iter().zip(&mut drawn).for_each(|(r, l)| l.push(r.ln()));
-        }
-        let covariance = |a: &[f64], b: &[f64]| {
-            let mean = |x: &[f64]| x.iter().sum::<f64>() / SIGNALS as f64;
-            let (ma, mb) = (mean(a), mean(b));
-            a.iter().zip(b).map(|(x, y)| (x - ma) * (y - mb)).sum::<f64>() / (SIGNALS - 1) as f64
-        };
-        for logs in [&logs, &drawn] {
-            for i in 0..5 {
-                let ratio = covariance(&logs[i], &logs[i]) * edof[i] / 2.0;
-                assert!((ratio - 1.0).abs() < 4.0 * 0.058 + 0.03, "level {}: {ratio}", i + 1);
-                for j in 0..i {
-                    let scale = (covariance(&logs[i], &logs[i]) * covariance(&logs[j], &logs[j])).sqrt();
-                    let r = covariance(&logs[i], &logs[j]) / scale;
-                    assert!((r - law.correlation[(i, j)]).abs() < 4.0 * 0.041, "{i} {j}: {r}");
-                }
-            }
-        }
-    }
-}
+mod tests;
