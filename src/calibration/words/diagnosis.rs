@@ -30,7 +30,7 @@ pub fn advice(diagnoses: &[Diagnosis], sensor: Sensor) -> Vec<String> {
     }
     lines.extend(first.common.iter().map(|c| outliers(c, own.len())));
     lines.extend(first.gaussian_quantization.iter().map(gaussian_quantization));
-    lines.extend(first.coarse_steps.iter().map(coarse_steps));
+    lines.extend(first.coarse_steps.iter().map(|s| coarse_steps(s, "sr-awv and dr-awv leave", "awv")));
     lines.extend(first.common_drift.iter().map(|d| common_drift(d, sensor)));
     lines.extend(misfits(&first.misfits));
     lines
@@ -84,12 +84,13 @@ fn gaussian_quantization(found: &GaussianQuantization) -> String {
     )
 }
 
-/// Sentence on steps of a quantiser that are comparable with the noise.
-fn coarse_steps(found: &CoarseSteps) -> String {
+/// Sentence on steps of a quantiser that are comparable with the noise. `leave`: the estimators that leave scales out; `instead`: the
+/// one that does not.
+pub(super) fn coarse_steps(found: &CoarseSteps, leave: &str, instead: &str) -> String {
     format!(
         "the quantisation step is comparable with the noise (more than a tenth of the wavelet coefficients are zero from {} to {}): \
-         there the classical wavelet variance differs from the robust one, by up to {}, even without outliers, and sr-awv and dr-awv \
-         leave these scales out: use awv if the recordings have no outliers",
+         there the classical wavelet variance differs from the robust one, by up to {}, even without outliers, and {leave} \
+         these scales out: use {instead} if the recordings have no outliers",
         duration(found.tau_s[0]),
         duration(found.tau_s[found.tau_s.len() - 1]),
         signed_percent(found.excess)

@@ -1,10 +1,12 @@
 //! Remarks on a fit, and on what it cannot determine, in words.
 
+use super::diagnosis::coarse_steps;
 use super::format::{duration, percent, three_digits};
-use crate::curve::{Estimator, Replicate};
+use crate::curve::{Estimator, Replicate, median};
+use crate::diagnosis::{CoarseSteps, excess_of_classical};
 use crate::noise::{Composite, Process};
 use crate::outcome::{AxesDiffer, Miss, Outcome, tau_s};
-use crate::wavelet::{Curve, Status};
+use crate::wavelet::{Curve, RobustVariance, Status};
 
 /// Contribution of a process to a model's wavelet variance.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,6 +59,10 @@ pub(crate) fn notes(outcome: &Outcome, replicates: &[Replicate], rate_hz: f64) -
     notes.extend(axes_remark(outcome, rate_hz));
     if estimator.is_robust() {
         robust_remarks(curve, replicates, &mut notes);
+        // Several recordings have a diagnosis, which says it.
+        if outcome.recordings == 1 {
+            notes.extend(steps_of_one(outcome, replicates, rate_hz));
+        }
     }
     notes
 }
@@ -231,6 +237,24 @@ fn robust_remarks(curve: &Curve, replicates: &[Replicate], notes: &mut Vec<Strin
             have(coarse, count)
         ));
     }
+}
+
+/// Remark on the scales that the robust estimators leave out of the fit to one recording, for the steps of its quantiser.
+fn steps_of_one(outcome: &Outcome, replicates: &[Replicate], rate_hz: f64) -> Option<String> {
+    let excess = |level: u32| {
+        let i = level as usize - 1;
+        let stepped = replicates.iter().filter(|r| r.robust.get(i).is_some_and(RobustVariance::is_stepped));
+        let ratios: Vec<f64> = stepped.map(|r| excess_of_classical(r, i).exp_m1()).collect();
+        (!ratios.is_empty()).then(|| (tau_s(level, rate_hz), median(&ratios)))
+    };
+    let left_out = outcome.curve.ignored.iter().filter_map(|level| excess(*level));
+    let (tau_s, all): (Vec<f64>, Vec<f64>) = left_out.unzip();
+    let excess = all.into_iter().max_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+    let [leave, instead] = match outcome.estimator {
+        Estimator::Rgmwm => ["rgmwm leaves", Estimator::Gmwm.name()],
+        _ => ["sr-awv and dr-awv leave", Estimator::Awv.name()],
+    };
+    Some(coarse_steps(&CoarseSteps { tau_s, excess }, leave, instead))
 }
 
 fn have(some: usize, all: usize) -> String {

@@ -1,6 +1,8 @@
 //! What classical and robust variances differ by, and recordings drift by, without an outlier or another noise.
 
 use super::*;
+use crate::outcome::Outcome;
+use rand::SeedableRng;
 
 /// Four recordings of Gaussian numbers, of a deviation in steps and a bias that differs, rounded to whole steps; `glitches` of
 /// 30 steps.
@@ -43,6 +45,32 @@ fn coarse_steps_are_not_taken_for_outliers() {
         let glitched = &rounded(deviation, 100)[0];
         assert!(glitched.common.is_some() && glitched.coarse_steps.is_none(), "{deviation}: {glitched:?}");
     }
+}
+
+/// One recording has no diagnosis: its fit says which scales were left out (see `scales_that_coarse_steps_move_are_not_counted`), and
+/// that of the classical variances leaves none out.
+#[test]
+fn one_recording_is_told_of_the_scales_that_steps_take() {
+    let mut generator = Generator::seed_from_u64(5);
+    let signal: Vec<f64> =
+        (0..32 * SAMPLES).map(|_| (0.3 * generator.sample::<f64, _>(StandardNormal)).round()).collect();
+    let (classical, robust) = both(&signal, LEVELS, &settings().tuning).unwrap();
+    let (name, axis, samples) = ("run".to_owned(), Some(Axis::X), signal.len());
+    let one = Replicate { name, axis, samples, classical, robust, trend: f64::NAN, mean: f64::NAN };
+    let groups = grouped(vec![(Channel { sensor: Sensor::Accel, axis: Axis::X }, one)], Pool::Axes);
+    let estimators = vec![Estimator::Gmwm, Estimator::Rgmwm, Estimator::SrAwv];
+    let model = ModelChoice::Given("WN".parse().unwrap());
+    let outcomes = calibrate(&groups, &Settings { model, estimators, ..settings() }).unwrap();
+    let told = |outcome: &Outcome, end: &str| {
+        let is_it = |n: &&String| {
+            n.starts_with("the quantisation step is comparable with the noise") && n.contains(end)
+        };
+        outcome.notes.iter().filter(is_it).count()
+    };
+    assert_eq!(told(&outcomes[0], ""), 0, "{:?}", outcomes[0].notes);
+    assert_eq!(told(&outcomes[1], "are zero from 2 s to"), 1, "{:?}", outcomes[1].notes);
+    assert_eq!(told(&outcomes[1], "rgmwm leaves these scales out: use gmwm"), 1, "{:?}", outcomes[1].notes);
+    assert_eq!(told(&outcomes[2], "sr-awv and dr-awv leave these scales out: use awv"), 1);
 }
 
 /// Sets, of so many, with an alarm of noise and of outliers: five alike recordings of white noise and a ramp, another on each axis,
