@@ -21,7 +21,10 @@ pub fn advice(diagnoses: &[Diagnosis], sensor: Sensor) -> Vec<String> {
     let Some(first) = own.first() else { return Vec::new() };
     let mut lines = Vec::new();
     if own.iter().all(|d| d.scores.is_empty()) {
-        lines.push("too few recordings to tell which of them is abnormal: four are needed".to_owned());
+        let line = "too few recordings to tell which of them is abnormal: four are needed";
+        // Of two, Student's t has one degree of freedom: see `diagnosis::common_drift`.
+        let drift = if own.len() == 2 { "; for a drift that they share, three" } else { "" };
+        lines.push(format!("{line}{drift}"));
     } else {
         let abnormal: Vec<&Diagnosis> =
             own.iter().copied().filter(|d| d.verdict != Verdict::Normal).collect();

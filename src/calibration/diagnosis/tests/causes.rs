@@ -133,6 +133,8 @@ fn a_drift_that_all_share_is_told() {
             .any(|l| l.starts_with("the recordings drift the same way: x +5.") && l.contains("add DR"));
         assert!(said, "{words:?}");
     }
+    let two = advice(&drifting(2, "WN+RW"), Sensor::Accel);
+    assert!(two[0].ends_with("four are needed; for a drift that they share, three"), "{two:?}");
     assert!(drifting(2, "WN+RW").iter().chain(&drifting(5, "WN+DR")).all(|d| d.common_drift.is_none()));
 }
 
