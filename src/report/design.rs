@@ -59,8 +59,8 @@ pub(crate) struct DesignedQuantile {
 /// What stands between the interval to expect and that of one calibration. Of 400 to 1000 simulated intervals of a random walk
 /// (white noise and random walk, four recordings of three axes; ± 57 to ± 102 % to expect by 2000 draws) the median was
 /// 0.83 to 0.88 of that, the mean 0.92 to 0.95, and 32 to 33 % were wider (AWV and DR-AWV); those of white noise were 0.93
-/// to 0.98 of it. All of them held the truth in 96 to 98.5 % of the cases: a scatter read off twelve signals is mostly less than it is, for which
-/// Student's quantile makes amends.
+/// to 0.98 of it. All of them held the truth in 96 to 98.5 % of the cases: a scatter read off twelve signals is more often
+/// less than more, for which Student's quantile makes amends.
 const STATED: &str = "what one calibration states scatters: for a parameter known to ± 100 % half the intervals are below 0.85 of this, one in \
      three above";
 

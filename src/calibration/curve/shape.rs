@@ -2,10 +2,10 @@
 //!
 //! With many lengths of the scale in the record it is as good as a chi-square. With few it is not: nu is Σ λ_i z_i² with
 //! weights of very different size, and its lower tail, the product of all of them, is far lighter than that of the one
-//! chi-square of as many degrees of freedom (white noise and random walk, two lengths: 2.4 degrees, the variance of ln nu is 0.86
-//! and that of the chi-square's logarithm 1.24). The weights go as the spectrum of the coefficients (Whittle), each with a chi-square of a
-//! common number of degrees, which is chosen so that nu has its degrees of freedom 2 nu²/var; the quantiles follow by the
-//! saddlepoint ([Daniels](crate::bibliography::Daniels87), r*).
+//! chi-square of as many degrees of freedom (white noise and random walk, two lengths: 2.4 degrees, the variance of ln nu is
+//! 0.86 and that of the chi-square's logarithm 1.24). The weights go as the spectrum of the coefficients (Whittle), each with
+//! a chi-square of a common number of degrees, which is chosen so that nu has its degrees of freedom 2 nu²/var; the
+//! quantiles follow by the saddlepoint ([Daniels](crate::bibliography::Daniels87), r*).
 
 use statrs::function::erf::erfc;
 use statrs::function::gamma::ln_gamma;
