@@ -32,7 +32,8 @@ impl Printer {
         Self { muted: true, ..self }
     }
 
-    /// A result, to stdout. A closed pipe ends the program quietly, as success; a full disk as a failure.
+    /// A result, to stdout. Where nobody reads any longer nothing is shown, and the command goes on: its files and its
+    /// exit code are for others. A full disk ends the program as a failure.
     pub(crate) fn result(&self, text: &str) {
         if self.muted {
             return;
@@ -40,7 +41,7 @@ impl Printer {
         let mut stdout = std::io::stdout().lock();
         match writeln!(stdout, "{}", safe(text)).and_then(|()| stdout.flush()) {
             Ok(()) => {}
-            Err(e) if e.kind() == ErrorKind::BrokenPipe => std::process::exit(0),
+            Err(e) if e.kind() == ErrorKind::BrokenPipe => {}
             Err(e) => {
                 let failure = Failure::could_not(format!("standard output: {}", system_words(&e)));
                 self.failure(&failure);

@@ -1,5 +1,6 @@
 //! What the program does as a program: exit codes, streams, messages.
 
+use crate::common::drive;
 use assert_cmd::Command;
 use std::process::Stdio;
 
@@ -28,6 +29,32 @@ fn a_closed_pipe_is_success() {
     drop(child.stdout.take());
     let output = child.wait_with_output().unwrap();
     assert_eq!((output.status.code(), output.stderr.as_slice()), (Some(0), &b""[..]));
+}
+
+/// Nobody reads what is shown: the files are written all the same, and the exit code is that of the verdict.
+#[test]
+fn a_closed_pipe_loses_neither_files_nor_the_verdict() {
+    let place = drive::place_with(drive::DRIVE, drive::MODEL);
+    std::fs::write(place.path().join("rough.toml"), drive::MODEL.replace("1e-9", "1e-4")).unwrap();
+    let code = |arguments: &str| {
+        let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_nav-sim"))
+            .current_dir(place.path())
+            .args(arguments.split(' '))
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        child.wait().unwrap().code().unwrap()
+    };
+    let run = "run drive.toml imu.toml --runs 8 --outage 20:50 --seed 3 -o";
+    assert_eq!(code(&format!("{run} bad --truth rough.toml")), 3);
+    assert_eq!(code(&format!("{run} good")), 0);
+    assert_eq!(code("compare good --reference bad -o comparison.json --plot ratios.svg"), 0);
+    assert_eq!(code("tune imu.toml --truth rough.toml -o tuned.toml --page tuned.html"), 0);
+    for file in ["comparison.json", "comparison.html", "ratios.svg", "tuned.toml", "tuned.html"] {
+        assert!(place.path().join(file).exists(), "{file}");
+    }
 }
 
 #[test]
