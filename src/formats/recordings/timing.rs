@@ -45,6 +45,9 @@ pub(super) fn timing(
     let counter = take(raw, |r| *r == Role::Counter);
     let ticks = take(raw, |r| *r == Role::Ticks);
     let known = options.rate_hz.map(|rate_hz| (rate_hz, "given")).or(raw.head_rate);
+    if time.is_none() && ticks.is_none() {
+        agree(raw, options, report)?;
+    }
     let clock = match (time, counter, ticks, known) {
         (Some(time), ..) => Clock::of_time(time, raw, options, report)?,
         (None, Some(counter), _, Some((rate_hz, source))) => {
@@ -68,6 +71,22 @@ pub(super) fn timing(
     doubt(&timing, &clock.name, raw, options, report);
     let breaks = if options.gaps == Gaps::Split { timing.breaks } else { Vec::new() };
     Ok(Timing { rate_hz: timing.rate_hz, breaks })
+}
+
+/// Refuses a rate that is given where the file, or the manifest beside it, states another.
+fn agree(raw: &Raw, options: &ReadOptions, report: &mut FileReport) -> Result<(), FileError> {
+    let Some((given, (stated, source))) = options.rate_hz.zip(raw.head_rate) else { return Ok(()) };
+    let difference = (stated / given - 1.0).abs();
+    let message = format!("the {source} says {} Hz, but {given} Hz is given", six_digits(stated));
+    if difference > DISAGREEING {
+        return Err(
+            FileError::contents(raw.path.as_str(), Place::Within, message).setting(Setting::WrongRate)
+        );
+    }
+    if difference > ROUNDED {
+        report.warn(format!("{message}: the rate given is taken"));
+    }
+    Ok(())
 }
 
 /// Says what is doubtful about a clock.

@@ -40,6 +40,16 @@ fn rates() {
         refusal_with("a.csv", &text, &given(200.0)).0,
         "a.csv: the time column runs at 100 Hz, but 200 Hz is given"
     );
+    let stated = "// Update Rate: 50.0Hz\ngyr_X\n0.1\n0.2\n0.4\n";
+    assert_eq!(
+        refusal_with("a.txt", stated, &given(25.0)).0,
+        "a.txt: the head of the file says 50 Hz, but 25 Hz is given"
+    );
+    let (_files, path) = Files::with("a.txt", stated);
+    let (rounded, report) = read(&[path], &given(50.2)).unwrap();
+    assert_close(&[rounded[0].rate_hz], &[50.2]);
+    let warning = &report.files[0].warnings[0];
+    assert_eq!(warning, "the head of the file says 50 Hz, but 50.2 Hz is given: the rate given is taken");
     assert_eq!(refusal_with("a.csv", &text, &given(-1.0)).0, "a.csv: -1 Hz is not a sample rate");
     assert_eq!(refusal("gyro_x_rad_s\n1\n2\n"), "a.csv: no time column, and no rate is given");
     // Stamps rounded to 1 ms at 128 Hz: the span knows the rate, no single step does.
