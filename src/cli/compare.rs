@@ -49,6 +49,7 @@ pub(crate) struct Args {
 #[derive(clap::ValueEnum, Clone, Copy, Debug)]
 enum TableForm {
     Markdown,
+    /// Numbers for other programs: one row a run, outage and state, percentages in columns of their own
     Csv,
     /// A `tabular` with the rules of booktabs
     Latex,
@@ -121,12 +122,15 @@ impl Compared {
     }
 
     fn table(&self, form: TableForm) -> String {
-        let write = match form {
-            TableForm::Markdown => report::markdown_table,
-            TableForm::Csv => report::csv_table,
-            TableForm::Latex => report::latex_table,
-        };
-        write(&self.rows())
+        let Comparison { file, candidates, outages, .. } = &self.found;
+        match form {
+            TableForm::Markdown => report::markdown_table(&self.rows()),
+            TableForm::Csv => {
+                let rows = report::ratio_rows(candidates, &self.states, outages, &file.reference);
+                report::csv_table(&rows).trim_end().to_owned()
+            }
+            TableForm::Latex => report::latex_table(&self.rows()),
+        }
     }
 
     /// The verdicts, the table of ASEE ratios, and what stands beside them.

@@ -1,7 +1,7 @@
 //! The layout of the paper's Table I: scenario by outage, state by estimator.
 
 use super::comparison::{CandidateResult, Label, in_order};
-use super::number::{readable, window};
+use super::number::{readable, shortest, window};
 use super::short::short_names;
 use nav_sim_navigation::metrics::RatioError;
 use nav_sim_navigation::simulation::REPORTED_NAMES;
@@ -12,6 +12,51 @@ use nav_sim_navigation::simulation::REPORTED_NAMES;
 pub(crate) fn table_rows(candidates: &[CandidateResult], states: &[usize]) -> Vec<Vec<String>> {
     let heads: Vec<String> = states.iter().map(|s| REPORTED_NAMES[*s].to_owned()).collect();
     laid_out(candidates, &heads, &|candidate, outage, column| cell(candidate, outage, states[column]))
+}
+
+/// The same for other programs, the first row the head: one row a run, outage and state, every number in a cell of its own,
+/// and no number for the reference itself.
+pub(crate) fn ratio_rows(
+    candidates: &[CandidateResult],
+    states: &[usize],
+    outages: &[(f64, f64)],
+    reference: &str,
+) -> Vec<Vec<String>> {
+    let head = [
+        "scenario",
+        "estimator",
+        "run",
+        "reference",
+        "outage_start_s",
+        "outage_end_s",
+        "state",
+        "ratio_error_pct",
+        "ci95_low_pct",
+        "ci95_high_pct",
+        "calibration_half_pct",
+        "abs_ratio_error_pct",
+    ];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    let number = |x: Option<f64>| x.filter(|x| x.is_finite()).map_or_else(String::new, shortest);
+    for (candidate, Label { scenario, estimator }) in candidates.iter().zip(distinct_labels(candidates)) {
+        for (outage, (start_s, end_s)) in candidate.outages.iter().zip(outages) {
+            rows.extend(states.iter().map(|state| {
+                let found = (!candidate.is_reference).then_some(outage.states[*state]);
+                let names = [scenario.as_str(), &estimator, &candidate.run, reference].map(str::to_owned);
+                let window = [*start_s, *end_s].map(shortest);
+                let numbers = [
+                    found.map(|ratio| ratio.asee.pct),
+                    found.map(|ratio| ratio.asee.ci95_pct[0]),
+                    found.map(|ratio| ratio.asee.ci95_pct[1]),
+                    found.and_then(|ratio| ratio.calibration_half_pct),
+                    found.map(|ratio| ratio.asee_abs_pct),
+                ];
+                let state = REPORTED_NAMES[*state].to_owned();
+                names.into_iter().chain(window).chain([state]).chain(numbers.map(number)).collect()
+            }));
+        }
+    }
+    rows
 }
 
 /// Outages by their times in the place of their numbers.
@@ -150,6 +195,32 @@ pub(super) mod tests {
         let rows = consistency_rows(&all, &[1, 6]);
         assert_eq!(rows[0][2], "NEES, coverage, RMSE AWV");
         assert_eq!(rows[1][2..], ["9.50, 0.900, –, –", "9.50, 0.900, +0.96 ± 0.50, +0.96 ± 0.50"]);
+    }
+
+    #[test]
+    fn every_number_of_the_table_for_other_programs_is_one() {
+        let all = [candidate("I/awv", 0.0, true), candidate("II/sr-awv", -75.0, false)];
+        let rows = ratio_rows(&all, &[1, 6], &[(4.0, 8.0), (20.0, 30.5)], "I/awv");
+        assert_eq!(rows.len(), 1 + 2 * 2 * 2);
+        assert!(rows.iter().all(|row| row.len() == rows[0].len()));
+        assert_eq!(rows[1], ["I", "AWV", "I/awv", "I/awv", "4", "8", "pos_e_m", "", "", "", "", ""]);
+        assert_eq!(
+            rows[8],
+            [
+                "II",
+                "SR-AWV",
+                "II/sr-awv",
+                "I/awv",
+                "20",
+                "30.5",
+                "roll_deg",
+                "-75",
+                "-75.5",
+                "-74.5",
+                "",
+                "76"
+            ]
+        );
     }
 
     #[test]

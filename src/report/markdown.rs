@@ -39,7 +39,7 @@ pub(crate) fn csv_table(rows: &[Vec<String>]) -> String {
 pub(crate) fn latex_table(rows: &[Vec<String>]) -> String {
     let columns = rows.first().map_or(0, Vec::len);
     let line = |row: &Vec<String>| {
-        let cells: Vec<String> = row.iter().map(|cell| latex(cell)).collect();
+        let cells: Vec<String> = row.iter().map(|cell| latex_cell(cell)).collect();
         format!("{} \\\\\n", cells.join(" & "))
     };
     let (head, body) = rows
@@ -49,6 +49,25 @@ pub(crate) fn latex_table(rows: &[Vec<String>]) -> String {
     format!(
         "\\begin{{tabular}}{{{layout}}}\n\\toprule\n{head}\\midrule\n{body}\\bottomrule\n\\end{{tabular}}\n"
     )
+}
+
+/// A cell in LaTeX: its numbers as numbers are set, the rest as text.
+fn latex_cell(text: &str) -> String {
+    let word = |word: &str| {
+        let number = word.trim_start_matches('(').trim_end_matches([')', ',']);
+        latex_number(number).map_or_else(|| latex(word), |set| word.replacen(number, &set, 1))
+    };
+    text.split(' ').map(word).collect::<Vec<_>>().join(" ")
+}
+
+/// A number with a sign or a power of ten in LaTeX: a hyphen is no minus.
+fn latex_number(text: &str) -> Option<String> {
+    text.parse::<f64>().ok().filter(|number| number.is_finite())?;
+    match (text.split_once('e'), text.strip_prefix('-')) {
+        (Some((factor, power)), _) => Some(format!("${factor}\\times10^{{{power}}}$")),
+        (None, Some(size)) => Some(format!("$-${size}")),
+        (None, None) => None,
+    }
 }
 
 /// A text in LaTeX.
@@ -87,5 +106,9 @@ mod tests {
             "{latex}"
         );
         assert!(latex.contains("x\\_1 \\& 5 \\% & 1 $\\pm$ 2 \\\\\n\\bottomrule"), "{latex}");
+        let set = ["-1.67 ± 5e-4 (1.67)", "9.50, -2e-3", "a-4 -b 1e400"].map(super::latex_cell);
+        let expected =
+            ["$-$1.67 $\\pm$ $5\\times10^{-4}$ (1.67)", "9.50, $-2\\times10^{-3}$", "a-4 -b 1e400"];
+        assert_eq!(set, expected);
     }
 }

@@ -44,7 +44,7 @@ pub(crate) use choose::{ChoiceReport, RankedPlace};
 pub(crate) use closure::TrajectoryCheck;
 pub(crate) use columns::{columns, terminal_columns, terminal_table};
 pub(crate) use comparison::{CandidateResult, ComparisonFile, Label, meaning_of_intervals, verdict_lines};
-pub(crate) use comparison_table::{consistency_rows, table_rows, with_times};
+pub(crate) use comparison_table::{consistency_rows, ratio_rows, table_rows, with_times};
 pub(crate) use curves::{CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile};
 pub(crate) use describe::describe;
 pub(crate) use design::{Design, DesignedParameter, DesignedQuantile, design_rows, design_verdict};

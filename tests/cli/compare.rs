@@ -126,10 +126,30 @@ fn ratios_are_those_that_were_made() {
         compare(directory.path(), &[&runs[..], &["--table", form]].concat()).stdout
     };
     let csv = table("csv");
-    assert!(csv.starts_with("scenario,outage,pos_e_m AWV,pos_e_m SR-AWV\nI,4–8 s,–,"), "{csv}");
-    assert!(csv.contains("\nII,4–8 s,+75.00 (75.00)") && csv.lines().count() == 3, "{csv}");
+    let rows: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
+    assert_eq!(
+        (rows.len(), rows[0].join(",")),
+        (
+            4,
+            "scenario,estimator,run,reference,outage_start_s,outage_end_s,state,\
+        ratio_error_pct,ci95_low_pct,ci95_high_pct,calibration_half_pct,abs_ratio_error_pct"
+                .to_owned()
+        )
+    );
+    assert_eq!(rows[1], ["I", "AWV", "I_awv", "I_awv", "4", "8", "pos_e_m", "", "", "", "", ""]);
+    assert_eq!(rows[2][..7], ["II", "AWV", "II_awv", "I_awv", "4", "8", "pos_e_m"]);
+    let number = |cell: &str| cell.parse::<f64>().unwrap();
+    for (row, pct) in [(&rows[2], 75.0), (&rows[3], -10.0)] {
+        assert!(
+            (number(row[7]) - pct).abs() < 1e-9 && (number(row[11]) - f64::abs(pct)).abs() < 1e-9,
+            "{csv}"
+        );
+        assert!(number(row[8]) <= number(row[7]) && number(row[7]) <= number(row[9]), "{csv}");
+        assert_eq!(row[10], "", "{csv}");
+    }
     let latex = table("latex");
     assert!(latex.starts_with("\\begin{tabular}{lrrr}") && latex.contains("II & 4--8 s & +75.00"), "{latex}");
+    assert!(latex.contains("& $-$10.00 (10.00) "), "{latex}");
     let text = std::fs::read_to_string(directory.path().join("comparison.json")).unwrap();
     let json: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!((&json["reference"], &json["paired"]), (&"I_awv".into(), &true.into()));
