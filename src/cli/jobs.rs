@@ -2,7 +2,7 @@
 
 use super::Failure;
 use crate::choose::ChoiceError;
-use crate::formats::suggest::nearest;
+use crate::formats::suggest;
 use crate::jobs::JobError;
 use nav_sim_calibration::{AverageError, CalibrationError, Cause, FitError, ModelSpec, SpecError};
 use nav_sim_navigation::metrics::ComparisonError;
@@ -86,14 +86,6 @@ fn of_calibration(e: &CalibrationError) -> Failure {
 
 /// Not a `--model`.
 pub(super) fn unknown_model(e: SpecError) -> Failure {
-    let hint = match &e {
-        SpecError::Unknown { term, .. } => match nearest(term, ModelSpec::legal()) {
-            Some(meant) => format!("did you mean \"{meant}\"?"),
-            None => {
-                format!("processes and models: {}, auto", ModelSpec::legal().collect::<Vec<_>>().join(", "))
-            }
-        },
-        _ => "a model is a sum such as 2*AR1+RW+WN+QN".into(),
-    };
+    let hint = suggest::model(&e, ModelSpec::legal().chain(["auto"]));
     Failure::input(format!("--model: {e}")).hint(hint)
 }

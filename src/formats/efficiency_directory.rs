@@ -5,7 +5,7 @@ use super::atomic::{self, Claim};
 use super::difference::{self, Difference};
 use super::{FileError, Place, Setting};
 use nav_sim_calibration::efficiency::Estimate;
-use serde_json::Value;
+use serde_json::{Map, Value};
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -15,6 +15,9 @@ type Result<T> = std::result::Result<T, FileError>;
 /// What a study writes beside `study.json`.
 const FILES: [&str; 7] =
     ["sets.csv", "results.csv", "results.txt", "results.json", "rmse.svg", "report.html", "sensitivity.csv"];
+
+/// What follows from other keys where it is not given: blamed last.
+const FOLLOWING: [&str; 2] = ["levels", "trim"];
 
 /// The names of what is estimated in each set.
 #[derive(Debug, Clone, PartialEq)]
@@ -118,7 +121,13 @@ fn same(path: &Path, text: &str, wanted: &Value) -> Result<()> {
         return Err(foreign(path, "study.json"));
     };
     let Some(wanted) = wanted.as_object() else { return Ok(()) };
-    match difference::first(&found, wanted) {
+    let given = |all: &Map<String, Value>| {
+        let mut given = all.clone();
+        given.retain(|key, _| !FOLLOWING.contains(&key.as_str()));
+        given
+    };
+    let difference = difference::first(&given(&found), &given(wanted));
+    match difference.or_else(|| difference::first(&found, wanted)) {
         None => Ok(()),
         Some(Difference { key, found, wanted }) => {
             let message = format!("holds another study: its \"{key}\" is {found}, not {wanted}");
@@ -218,6 +227,13 @@ mod tests {
         let e = StudyDirectory::open(dir.path(), &json!({ "seed": 2 }), layout()).unwrap_err();
         assert!(e.to_string().ends_with("holds another study: its \"seed\" is 1, not 2"), "{e}");
         assert!(!e.is_system() && e.hint().is_some());
+        let samples = tempfile::tempdir().unwrap();
+        let study = |levels: u32, samples: u32| json!({ "levels": levels, "samples": samples });
+        StudyDirectory::open(samples.path(), &study(12, 8192), layout()).unwrap();
+        let e = StudyDirectory::open(samples.path(), &study(11, 4096), layout()).unwrap_err().to_string();
+        assert!(e.ends_with("its \"samples\" is 8192, not 4096"), "{e}");
+        let e = StudyDirectory::open(samples.path(), &study(11, 8192), layout()).unwrap_err().to_string();
+        assert!(e.ends_with("its \"levels\" is 12, not 11"), "{e}");
         let file = dir.path().join("sets.csv");
         let text = fs::read_to_string(&file).unwrap().replace("dr-awv", "gmwm");
         fs::write(&file, text).unwrap();

@@ -3,7 +3,7 @@
 use super::description::{CalibrateStep, Study, Synthesis};
 use super::error::DescriptionError;
 use super::rules::{exactly_one, unique};
-use nav_sim_calibration::Estimator;
+use nav_sim_calibration::{Estimator, ModelSpec};
 use nav_sim_navigation::scenario::{MAX_RUNS, Method};
 use nav_sim_signal::imu::MAX_RATE_HZ;
 use nav_sim_signal::wavelet::Tuning;
@@ -109,6 +109,10 @@ impl Study {
                 let reason = format!("is not between {least} and {most}");
                 let key = format!("{key}.calibrate.efficiency");
                 return Err(DescriptionError::refused(&key, step.efficiency, reason));
+            }
+            if let Err(source) = step.fit.parse::<ModelSpec>() {
+                let (key, fit) = (format!("{key}.calibrate.fit"), step.fit.clone());
+                return Err(DescriptionError::NotModel { key, fit, source });
             }
             let key = format!("{key}.calibrate.estimators");
             empty(&key, !step.estimators.is_empty())?;

@@ -1,7 +1,7 @@
 //! What is wrong with a study.
 
-use crate::formats::suggest::nearest;
-use nav_sim_calibration::{CalibrationError, SignalError};
+use crate::formats::suggest::{self, nearest};
+use nav_sim_calibration::{CalibrationError, Estimator, ModelSpec, SignalError, SpecError};
 use nav_sim_signal::noise::ReplicateError;
 
 /// A study that means no grid.
@@ -16,6 +16,26 @@ pub enum DescriptionError {
         value: String,
         /// Why.
         reason: String,
+    },
+    /// What is to be fitted is no model.
+    #[error("\"{key}\" = \"{fit}\" is not a model: {source}")]
+    NotModel {
+        /// Key, dotted.
+        key: String,
+        /// What is to be fitted.
+        fit: String,
+        /// Why it is none.
+        source: SpecError,
+    },
+    /// An estimator of a single recording, and several recordings.
+    #[error("\"{key}\": {estimator} takes a single recording; there are {recordings}")]
+    NotSingle {
+        /// Key of the estimators, dotted.
+        key: String,
+        /// The estimator.
+        estimator: Estimator,
+        /// How many recordings there are.
+        recordings: u64,
     },
     /// An axis without a point: the grid would be empty.
     #[error("the grid is empty: no {axis}")]
@@ -74,7 +94,10 @@ impl DescriptionError {
     /// The key to look for in the file, dotted.
     pub(crate) fn key(&self) -> String {
         match self {
-            Self::Refused { key, .. } | Self::NotOne { key, .. } => key.clone(),
+            Self::Refused { key, .. }
+            | Self::NotModel { key, .. }
+            | Self::NotSingle { key, .. }
+            | Self::NotOne { key, .. } => key.clone(),
             Self::Empty { axis } => axis.clone(),
             Self::Duplicate { axis, entry, .. } | Self::Unnamed { axis, entry } => {
                 format!("{axis}[{entry}].name")
@@ -87,6 +110,10 @@ impl DescriptionError {
     /// What to do about it.
     pub(crate) fn hint(&self) -> Option<String> {
         match self {
+            Self::NotModel { source, .. } => Some(suggest::model(source, ModelSpec::legal())),
+            Self::NotSingle { .. } => {
+                Some("give it one recording, or take awv, sr-awv or dr-awv, which average several".into())
+            }
             Self::Empty { axis } if axis.contains('[') => Some("a list without values makes no cell".into()),
             Self::Empty { axis } => Some(format!("add a [[{axis}]] to the study")),
             Self::Duplicate { .. } | Self::Unnamed { .. } => Some("give each entry a \"name\"".into()),

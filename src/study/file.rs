@@ -3,7 +3,7 @@
 use super::description::{GnssEntry, ScenarioEntry, Study, TruthEntry};
 use super::error::DescriptionError;
 use crate::formats::toml_described::Document;
-use crate::formats::toml_file::Source;
+use crate::formats::toml_file::{Section, Source};
 use crate::formats::{FileError, Kind};
 use crate::formats::{recordings, scenario_file};
 use nav_sim_navigation::scenario::Scenario;
@@ -20,6 +20,8 @@ pub(crate) struct StudyFile {
     pub scenarios: Vec<Scenario>,
     /// Its receivers, in order (empty: those of the scenarios).
     pub gnss: Vec<GnssSettings>,
+    /// What its scenarios say that no study uses, a sentence each.
+    pub unused: Vec<String>,
 }
 
 /// What a path of a study file means: it is relative to the file.
@@ -42,11 +44,12 @@ pub(crate) fn read(path: &Path) -> Result<StudyFile, FileError> {
         }
     }
     let written = one_truth_each(&mut study, path)?;
-    let checked = study.resolve().and_then(|()| study.reference());
+    let checked = study.resolve().and_then(|()| study.reference()).and_then(|_| single(&study, path));
     checked.map_err(|e| located(&e, &written, &document, &source))?;
     let scenarios = scenarios(&study, path, &document)?;
     let gnss = receivers(&study, path, &document)?;
-    Ok(StudyFile { study, scenarios, gnss })
+    let unused = unused(&study, path, &root)?;
+    Ok(StudyFile { study, scenarios, gnss, unused })
 }
 
 /// Puts a truth for each recording in the place of one that says so.
@@ -77,6 +80,56 @@ fn one_truth_each(study: &mut Study, path: &Path) -> Result<Vec<usize>, FileErro
     }
     study.truth = truths;
     Ok(written)
+}
+
+/// Refuses several recordings for an estimator that takes one. How many a calibration without those of a truth has is
+/// known when it is made.
+fn single(study: &Study, path: &Path) -> Result<(), DescriptionError> {
+    for (i, entry) in (1..).zip(&study.candidate) {
+        let Some(step) = entry.calibrate.as_ref().filter(|step| !step.leave_out) else { continue };
+        let Some(estimator) = step.estimators.iter().find(|e| e.is_single()) else { continue };
+        let recordings = step.synthesize.as_ref().map_or_else(
+            || {
+                let places: Vec<PathBuf> = step.recordings.iter().map(|r| beside(path, r)).collect();
+                // what is not there is told later, by its key
+                recordings::listed(&places).map_or(places.len(), |files| files.len()) as u64
+            },
+            |synthesis| synthesis.replicates,
+        );
+        if recordings > 1 {
+            let key = format!("candidate[{i}].calibrate.estimators");
+            return Err(DescriptionError::NotSingle { key, estimator: *estimator, recordings });
+        }
+    }
+    Ok(())
+}
+
+/// What scenarios say of the runs beside the level of coverage: a study has its own.
+fn unused(study: &Study, path: &Path, root: &Section<'_>) -> Result<Vec<String>, FileError> {
+    let of_run = |scenario: &Section<'_>| -> Result<Vec<String>, FileError> {
+        let run = scenario.section("run")?;
+        let keys = run.iter().flat_map(Section::keys).filter(|key| *key != "coverage_level");
+        Ok(keys.map(str::to_owned).collect())
+    };
+    let mut said = Vec::new();
+    for (entry, section) in study.scenario.iter().zip(root.sections("scenario").unwrap_or_default()) {
+        let keys = match &entry.file {
+            Some(file) => {
+                let source = Source::read(&beside(path, file))?;
+                let table = source.parse()?;
+                of_run(&source.root(&table))?
+            }
+            None => section.section("settings")?.as_ref().map_or(Ok(Vec::new()), of_run)?,
+        };
+        if !keys.is_empty() {
+            said.push(format!(
+                "scenario \"{}\": of its [run] a study uses coverage_level alone, not {}; the study has its own",
+                entry.name,
+                keys.join(", ")
+            ));
+        }
+    }
+    Ok(said)
 }
 
 fn scenarios(study: &Study, path: &Path, document: &Document<'_>) -> Result<Vec<Scenario>, FileError> {
@@ -168,6 +221,27 @@ mod tests {
         assert!(file.scenarios.is_empty() && file.gnss.is_empty());
     }
 
+    /// Of `[run]` a study uses the level of coverage alone, of a file as of settings.
+    #[test]
+    fn runs_of_a_scenario_are_said_to_be_unused() {
+        let with = |scenario: &str| {
+            let dir = tempfile::tempdir().unwrap();
+            std::fs::write(dir.path().join("own.toml"), "[run]\nruns = 3\nseed = 4\ncoverage_level = 0.9\n")
+                .unwrap();
+            let path = dir.path().join("s.toml");
+            std::fs::write(&path, format!("{STUDY}[[scenario]]\n{scenario}\n")).unwrap();
+            read(&path).unwrap().unused
+        };
+        let told = |name: &str, keys: &str| {
+            vec![format!(
+                "scenario \"{name}\": of its [run] a study uses coverage_level alone, not {keys}; the study has its own"
+            )]
+        };
+        assert_eq!(with("file = \"own.toml\""), told("own", "runs, seed"));
+        assert_eq!(with("name = \"a\"\nsettings.run.runs = 3"), told("a", "runs"));
+        assert_eq!(with("name = \"a\"\nsettings.run.coverage_level = 0.9"), [""; 0]);
+    }
+
     #[test]
     fn mistakes_are_named() {
         let with = |from: &str, to: &str| study(&STUDY.replace(from, to)).unwrap_err();
@@ -217,6 +291,31 @@ mod tests {
             with("\"awv\", \"dr-awv\"", "\"dr_awv\""),
             "s.toml, line 8: \"candidate[2].calibrate.estimators\" = [\"dr_awv\"] is not one of \"awv\", \"sr-awv\", \
              \"dr-awv\", \"gmwm\", \"rgmwm\", \"avlr\", \"given\" | did you mean \"dr-awv\"?"
+        );
+        assert_eq!(
+            with("estimators", "fit = \"N7\", estimators"),
+            "s.toml, line 8: \"candidate[2].calibrate.fit\" = \"N7\" is not a model: model \"N7\": \"N7\" is no process | \
+             did you mean \"N1\"?"
+        );
+        let two = with(
+            "[\"r.csv\"], estimators = [\"awv\", \"dr-awv\"]",
+            "[\"r.csv\", \"q.csv\"], estimators = [\"gmwm\"]",
+        );
+        assert_eq!(
+            two,
+            "s.toml, line 8: \"candidate[2].calibrate.estimators\": gmwm takes a single recording; there are 2 | \
+             give it one recording, or take awv, sr-awv or dr-awv, which average several"
+        );
+        assert_eq!(
+            with(
+                "recordings = [\"r.csv\"], estimators = [\"awv\", \"dr-awv\"]",
+                "estimators = [\"avlr\"], synthesize = { model = \"m.toml\", replicates = 4 }"
+            )
+            .split(" | ")
+            .next(),
+            Some(
+                "s.toml, line 8: \"candidate[2].calibrate.estimators\": avlr takes a single recording; there are 4"
+            )
         );
         assert_eq!(
             with("\"awv\", \"dr-awv\"", "\"given\""),

@@ -1,8 +1,8 @@
 //! Whether the files that a study names are there.
 
 use super::file::{self, StudyFile, beside};
-use crate::formats::FileError;
 use crate::formats::toml_file::{Section, Source};
+use crate::formats::{FileError, contamination_file};
 use std::path::Path;
 
 /// Reads a study as [`file::read`] does, and refuses one that names a file which does not exist, by line and key.
@@ -37,6 +37,10 @@ fn of_entry(study: &Path, entry: &Section<'_>) -> Result<(), FileError> {
     for named in entry.texts("recordings") {
         exists(study, entry, "recordings", named)?;
     }
+    let contamination = entry.str("contaminate").ok().flatten();
+    if let Some(named) = contamination.filter(|named| !contamination_file::names().contains(named)) {
+        exists(study, entry, "contaminate", named)?;
+    }
     for step in ["calibrate", "synthesize"] {
         let step = entry.section(step).ok().flatten();
         step.map_or(Ok(()), |step| of_entry(study, &step))?;
@@ -50,5 +54,10 @@ fn exists(study: &Path, entry: &Section<'_>, key: &str, named: &str) -> Result<(
         return Ok(());
     }
     let reason = format!("names {}, which does not exist", path.display());
-    Err(entry.refuse(key, reason, Some("paths are relative to the study file".to_owned())))
+    let meant = contamination_file::meant(named).filter(|_| key == "contaminate");
+    let hint = meant.map_or_else(
+        || "paths are relative to the study file".to_owned(),
+        |meant| format!("did you mean \"{meant}\"?"),
+    );
+    Err(entry.refuse(key, reason, Some(hint)))
 }

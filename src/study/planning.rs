@@ -130,7 +130,8 @@ fn restore_models(planned: &Planned, reader: Reader<'_>) -> Result<(), StudyErro
 
 /// The plan without its units, and the texts of the models calibrated for it.
 fn prepared(file: StudyFile, seed: u64, reader: Reader<'_>) -> Result<(Plan, ModelTexts), StudyError> {
-    let StudyFile { study, scenarios, gnss } = file;
+    let StudyFile { study, scenarios, gnss, unused } = file;
+    reader.doubt(unused);
     let inputs = input_hashes(&study, reader)?;
     let trajectories = study.trajectory.iter().map(|e| hash_of(&inputs, &e.file)).collect();
     let truths = study.truth.iter().map(|e| reader.truth_hash(e, seed)).collect::<Result<_, _>>()?;

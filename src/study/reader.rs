@@ -114,21 +114,12 @@ impl Reader<'_> {
 
     fn contamination(&self, step: &Synthesis, rate_hz: f64) -> Result<Option<Contamination>, StudyError> {
         let Some(name) = &step.contaminate else { return Ok(None) };
-        let preset = contamination_file::names().contains(&name.as_str());
-        let place = beside(self.study, Path::new(name));
-        let found = if preset {
+        let found = if contamination_file::names().contains(&name.as_str()) {
             contamination_file::find(name, rate_hz)
         } else {
-            contamination_file::find(&place.to_string_lossy(), rate_hz)
+            contamination_file::find(&beside(self.study, Path::new(name)).to_string_lossy(), rate_hz)
         };
-        let meant = contamination_file::meant(name).filter(|_| !place.exists());
-        found.map(Some).map_err(|mut e| {
-            if let Some(name) = meant {
-                e.remedies.clear();
-                e = e.advice(format!("did you mean \"{name}\"?"));
-            }
-            e.into()
-        })
+        Ok(Some(found?))
     }
 
     /// What makes the errors of a truth.

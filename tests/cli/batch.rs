@@ -203,6 +203,19 @@ fn a_named_file_that_is_missing_is_told_by_its_key() {
     let output = output.unwrap();
     assert_eq!(output.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&output.stderr).starts_with(expected), "{output:?}");
+    let contaminated = |name: &str| {
+        let calibrated = format!(
+            "{{ name = \"II\", calibrate = {{ synthesize = {{ model = \"imu.toml\", contaminate = \"{name}\" }} }} }}"
+        );
+        let study = STUDY.replace("{ name = \"wrong\", model = \"wrong.toml\" }", &calibrated);
+        fs::write(dir.join("study.toml"), study).unwrap();
+        refused(dir, "plan study.toml -o out", 2)
+    };
+    let key = "error: study.toml, line 8: \"candidate[2].calibrate.synthesize.contaminate\" = ";
+    let said = contaminated("gone.toml");
+    assert!(said.starts_with(&format!("{key}\"gone.toml\" names gone.toml, which does not exist")), "{said}");
+    let said = contaminated("section5-2");
+    assert!(said.starts_with(key) && said.contains("hint: did you mean \"section5-I\"?"), "{said}");
     assert!(!dir.join("out").exists());
 }
 
