@@ -24,6 +24,7 @@ use super::toml_file::{Section, Source};
 use nav_sim_calibration::efficiency::Design;
 use nav_sim_calibration::{AverageError, Estimator, Trim, Weighting};
 use nav_sim_signal::imu::Channel;
+use nav_sim_signal::noise::Kind;
 use nav_sim_signal::noise::contamination::Contamination;
 use nav_sim_signal::wavelet::{Convention, Tuning, default_levels, max_levels};
 use schemars::JsonSchema;
@@ -164,6 +165,7 @@ pub fn read(path: &Path) -> Result<StudyFile, FileError> {
     };
     enough(&root, &design)?;
     has_slopes(&root, &design)?;
+    has_targets(&root, &design)?;
     Ok(StudyFile { design, seed: d.seed, sets: d.sets, model })
 }
 
@@ -258,6 +260,38 @@ fn has_slopes(root: &Section<'_>, design: &Design) -> Result<(), FileError> {
     }
 }
 
+/// Refuses a fit that holds the model and a process more: what is estimated has no true value, and no error relative to it.
+/// One of a kind that is there may have one where parameters vary: the expected variance is not that of a single one.
+fn has_targets(root: &Section<'_>, design: &Design) -> Result<(), FileError> {
+    let axis = design.channel.index();
+    // one process in two forms
+    let alike = |kind: Kind| if kind == Kind::GaussMarkov { Kind::Ar1 } else { kind };
+    let there: Vec<Kind> = design.model.axes[axis].processes.iter().map(|p| alike(p.kind())).collect();
+    let fitted: Vec<Kind> = design.spec.kinds().iter().copied().map(alike).collect();
+    let count = |kinds: &[Kind], kind: Kind| kinds.iter().filter(|k| **k == kind).count();
+    if there.iter().any(|kind| count(&there, *kind) > count(&fitted, *kind)) {
+        return Ok(()); // another model: its target is what comes nearest
+    }
+    let is_varied = !design.spread.axes[axis].is_empty();
+    let is_extra = |kind: &&Kind| match count(&there, alike(**kind)) {
+        0 => true,
+        of_kind => !is_varied && count(&fitted, alike(**kind)) > of_kind,
+    };
+    let Some(extra) = design.spec.kinds().iter().find(is_extra) else { return Ok(()) };
+    let has = match count(&there, alike(*extra)) {
+        0 => format!("no {}", extra.code()),
+        of_kind => format!("{of_kind} {} only", extra.code()),
+    };
+    let reason =
+        format!("is more than the model: {} has {has}, so that there is no true value", design.channel);
+    let codes: Vec<&str> = there.iter().map(|kind| kind.code()).collect();
+    Err(root.refuse(
+        "fit",
+        reason,
+        Some(format!("fit = \"{}\", or a model with such a process", codes.join("+"))),
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -294,6 +328,16 @@ mod tests {
             with("section4-I", "section4-2"),
             "s.toml, line 6: \"scenarios\" = [\"section4-2\"] names section4-2, which is not there | did you mean \"section4-I\"?"
         );
+        let more = |fit: &str, has: &str| {
+            format!(
+                "s.toml, line 2: \"fit\" = \"{fit}\" is more than the model: accel.x has {has}, so that there is no true value | \
+                 fit = \"WN\", or a model with such a process"
+            )
+        };
+        assert_eq!(with("fit = \"WN\"", "fit = \"WN+AR1\""), more("WN+AR1", "no AR1"));
+        assert_eq!(with("fit = \"WN\"", "fit = \"WN+GM\""), more("WN+GM", "no GM"));
+        // another model than that of the data has the nearest as its target
+        assert!(study(&STUDY.replace("fit = \"WN\"", "fit = \"QN\"")).is_ok());
         assert_eq!(with("fit = ", "fits = "), "s.toml, line 2: unknown key \"fits\" | did you mean \"fit\"?");
         assert_eq!(with("sets = 3\n", ""), "s.toml, line 1: \"sets\" is missing | add the key \"sets\"");
         assert_eq!(
