@@ -37,7 +37,8 @@ pub fn readable(x: f64) -> String {
     if !x.is_finite() {
         return "–".to_owned();
     }
-    let magnitude = x.abs();
+    // of the number as it is shown: 9.996 is 10.0, not 10.00
+    let magnitude = format!("{x:.2e}").parse::<f64>().unwrap_or(x).abs();
     match magnitude {
         0.0 => "0".to_owned(),
         m if !(1e-3..1e6).contains(&m) => format!("{x:.2e}"),
@@ -70,5 +71,7 @@ mod tests {
     fn readable_numbers_have_three_significant_digits() {
         let shown = [0.0, 1234.5, 123.4, 12.34, 1.234, 0.1234, 0.01, 0.000_123, f64::NAN].map(readable);
         assert_eq!(shown, ["0", "1234", "123", "12.3", "1.23", "0.123", "0.0100", "1.23e-4", "–"]);
+        let carried = [0.000_999_6, 0.099_96, 0.9996, -9.996, 99.96, 999_600.0].map(readable);
+        assert_eq!(carried, ["0.00100", "0.100", "1.00", "-10.0", "100", "1.00e6"]);
     }
 }

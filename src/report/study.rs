@@ -2,7 +2,7 @@
 //! its name; numbers that do not exist are NaN (null in JSON).
 
 use super::comparison::{CandidateResult, Label};
-use super::comparison_table::table_rows;
+use super::comparison_table::{table_rows, with_times};
 use super::number::{readable, window};
 use super::verdict::{verdict_in_short, verdict_word};
 use nav_sim_navigation::metrics::{self, EpochMetrics, Measured, OutageComparison, OutageMetrics, Verdict};
@@ -256,7 +256,8 @@ pub(crate) struct ShownCell {
     pub columns: Vec<ShownColumn>,
 }
 
-/// The layout of the paper's Table I for one cell; `states` are indices of reported states.
+/// The layout of the paper's Table I for one cell, a candidate (with its filter, where there are several) in the place of
+/// a scenario; `states` are indices of reported states.
 pub(crate) fn ratio_table(cell: &ShownCell, states: &[usize]) -> Vec<Vec<String>> {
     let candidate = |column: &ShownColumn| CandidateResult {
         run: column.name.clone(),
@@ -265,7 +266,12 @@ pub(crate) fn ratio_table(cell: &ShownCell, states: &[usize]) -> Vec<Vec<String>
         verdict: column.verdict,
         outages: column.comparison.clone().unwrap_or_default(),
     };
-    table_rows(&cell.columns.iter().map(candidate).collect::<Vec<_>>(), states)
+    let rows = table_rows(&cell.columns.iter().map(candidate).collect::<Vec<_>>(), states);
+    let outages = cell.columns.first().map_or(&[][..], |column| &column.outages);
+    let outages: Vec<(f64, f64)> = outages.iter().map(|o| (o.start_s, o.end_s)).collect();
+    let mut rows = with_times(rows, &outages);
+    rows[0][0] = "candidate".to_owned();
+    rows
 }
 
 /// Whether the filters are as good as they believe: a row a cell, a column a candidate; the ratio is that of

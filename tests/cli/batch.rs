@@ -284,7 +284,7 @@ fn every_candidate_and_filter_is_in_the_ratio_table() {
         // two states are shown, each by estimator: two for the calibrated ones, none for the others
         let filled = row[0].matches('(').count() + row[0].matches(" –").count();
         assert_eq!(filled, if name.starts_with("II ") { 4 } else { 2 }, "{ratios}");
-        assert_eq!(row[0].contains('–'), name.starts_with("III"), "{ratios}");
+        assert_eq!(row[0].contains(" –"), name.starts_with("III"), "{ratios}");
     }
     let text = fs::read_to_string(dir.join("out/results/outages.json")).unwrap();
     let rows: Vec<serde_json::Value> = serde_json::from_str(&text).unwrap();

@@ -2,7 +2,6 @@
 
 use super::sentence;
 use crate::report::choose::RankedPlace;
-use crate::report::comparison_table::with_times;
 use crate::report::page::{Axis, Chart, Colour, Interval, Mark, Page, Panel, Series, Table};
 use crate::report::study::{ShownCell, drift_table, ratio_table, verdict_table};
 use crate::report::verdict::verdict_word;
@@ -41,8 +40,7 @@ pub(crate) fn study_page(
         page.text(
             "Mean over the outage of (ratio − 1)·100 ± half the 95 % interval (mean of the absolute value).",
         );
-        let outages: Vec<(f64, f64)> = cell.columns[0].outages.iter().map(|o| (o.start_s, o.end_s)).collect();
-        page.table(&Table::of_rows(&with_times(ratio_table(cell, states), &outages)));
+        page.table(&Table::of_rows(&ratio_table(cell, states)));
     }
     if more > 0 {
         page.text(&format!("{more} more cells are in outages.csv."));
