@@ -1,7 +1,7 @@
 //! Tuned models are honest: the factor of a process that is larger in truth is found, and sampled runs agree.
 
 use nav_sim::ekf::Belief;
-use nav_sim::metrics::Estimate;
+use nav_sim::metrics::{Estimate, Expected, VerdictKind};
 use nav_sim::monte_carlo;
 use nav_sim::noise::{Composite, Model, Process, RandomWalk, White};
 use nav_sim::scenario::Scenario;
@@ -103,6 +103,26 @@ fn a_model_that_is_true_needs_no_factor() {
         let factors = drive.factors(&[model(1.0, 1.0)], Per::Process, aim);
         assert!(factors.iter().all(|f| f.on_variance == 1.0) && factors.len() == 4, "{factors:?}");
     }
+}
+
+/// White noise of the gyroscope that is a hundred times as large shows in the attitude while fixes come, more than at the end of
+/// an outage, where velocity and position have grown: the tuned filter is honest in both, as a verdict on a run has it.
+#[test]
+fn a_tuned_filter_is_honest_over_the_run_as_a_verdict_judges_it() {
+    let drive = drive();
+    let axis = |white: f64, walk: f64| {
+        Composite::new(vec![
+            Process::White(White::new(white).unwrap()),
+            Process::RandomWalk(RandomWalk::new(walk).unwrap()),
+        ])
+    };
+    let truth = Model::pooled(100.0, &axis(1e-4, 1e-10), &axis(1e-6, 1e-12));
+    let factors = drive.factors(std::slice::from_ref(&truth), Per::Sensor, Aim::Worst);
+    let belief = drive.belief(&scaled(&model(1.0, 1.0), &factors));
+    let experiment = drive.scenario.experiment(&drive.trajectory, Truth::Model(&truth), &[], &OUTAGES, 1);
+    let summary = Expected::along(&drive.track, &experiment, &belief, &truth).unwrap().summary();
+    assert!(summary.verdict.kind != VerdictKind::Overconfident, "{:?} {factors:?}", summary.verdict);
+    assert!(summary.verdict.ratio < 1.01, "{:?}", summary.verdict);
 }
 
 /// Of two truths, each larger in another sensor, neither is underrated; and the factors are those of the two.
