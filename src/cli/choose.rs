@@ -1,6 +1,8 @@
 //! `nav-sim choose`: which noise model, on the user's own recordings.
 
+use super::calibrate::ESTIMATORS;
 use super::jobs::unknown_model;
+use super::parse::words;
 use super::pictures::PlotArgs;
 use super::recordings::{RecordingArgs, Said};
 use super::run::{OutageArg, Words, checked_scenario, parse_outage, placed};
@@ -43,7 +45,7 @@ pub(crate) struct Args {
     #[arg(long = "outage", value_name = "START:END", value_parser = parse_outage)]
     outages: Vec<OutageArg>,
     /// Estimators to compare [default: awv, sr-awv, dr-awv and, for comparison, gmwm and avlr of single recordings]
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = words::<Estimator>(EACH))]
     estimator: Vec<Estimator>,
     /// Models to compare, such as N2,N1,WN+RW,auto [default: N2, and WN+RW with awv]
     #[arg(long, value_name = "MODELS", value_delimiter = ',')]
@@ -142,14 +144,14 @@ fn text(report: &ChoiceReport<'_>, session: &Session) -> String {
     parts.join("\n\n")
 }
 
+/// The estimators that are one.
+const EACH: &[(&str, &str)] = ESTIMATORS.split_at(6).0;
+
 /// Those that are usual, or all combinations of what is given.
 fn candidates(args: &Args) -> Result<Vec<Candidate>, Failure> {
     let Args { estimator, model, filter, inflate, .. } = args;
     if estimator.is_empty() && model.is_empty() && filter.is_empty() && inflate.is_empty() {
         return Ok(Candidate::usual());
-    }
-    if estimator.contains(&Estimator::Given) {
-        return Err(Failure::input("--estimator given: it is of curves that come from elsewhere"));
     }
     let mut models = model
         .iter()

@@ -1,5 +1,6 @@
 //! `nav-sim design`: how many recordings, and how long.
 
+use super::calibrate::ESTIMATORS;
 use super::parse;
 use super::pictures::PageArgs;
 use super::run::{OutageArg, parse_outage, windows_of};
@@ -38,8 +39,8 @@ pub(crate) struct Args {
     /// Length of each in hours [default: a table of 1, 3 and 10]
     #[arg(long, value_name = "HOURS", value_parser = parse::positive)]
     hours: Option<f64>,
-    /// How they will be calibrated: awv, sr-awv or dr-awv
-    #[arg(long, value_name = "ESTIMATOR", default_value_t)]
+    /// How they will be calibrated
+    #[arg(long, value_name = "ESTIMATOR", value_parser = parse::words::<Estimator>(AVERAGES), default_value_t)]
     estimator: Estimator,
     /// Draws of the bootstrap
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(40..=10_000))]
@@ -54,14 +55,13 @@ pub(crate) struct Args {
     pictures: PageArgs,
 }
 
+/// The estimators of several recordings.
+const AVERAGES: &[(&str, &str)] = ESTIMATORS.split_at(3).0;
+
 /// Longest recording that is planned (h): a year.
 const LONGEST_H: f64 = 8766.0;
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    if args.estimator.is_single() {
-        let message = format!("--estimator {}: takes one recording at a time", args.estimator);
-        return Err(Failure::input(message).hint("awv, sr-awv or dr-awv average several"));
-    }
     if args.hours.is_some_and(|hours| hours > LONGEST_H) {
         return Err(Failure::input("--hours: longer than a year"));
     }

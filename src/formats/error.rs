@@ -194,8 +194,10 @@ impl FileError {
         value: impl Into<Box<str>>,
         reason: impl Into<Box<str>>,
     ) -> Self {
-        let kind = Kind::Cell { column: column.into(), value: value.into(), reason: reason.into() };
-        Self::new(path, line, kind)
+        let (value, reason) = (value.into(), reason.into());
+        let is_decimal = &*reason == "is not a number" && decimal_comma(value.trim_matches('"'));
+        let error = Self::new(path, line, Kind::Cell { column: column.into(), value, reason });
+        if is_decimal { error.advice("write decimals with a point: 0.5, not 0,5") } else { error }
     }
 
     /// A row with too few or too many values.
@@ -219,7 +221,7 @@ impl FileError {
     }
 
     /// With other advice than it has.
-    pub(crate) fn advice_instead(mut self, advice: &'static str) -> Self {
+    pub(crate) fn advice_instead(mut self, advice: impl Into<Cow<'static, str>>) -> Self {
         self.remedies.clear();
         self.advice(advice)
     }
@@ -250,6 +252,11 @@ impl FileError {
         let known: Vec<&str> = known.collect();
         (!known.is_empty()).then(|| known.join(", or "))
     }
+}
+
+/// Whether a text is a number with a decimal comma.
+pub(super) fn decimal_comma(text: &str) -> bool {
+    text.contains(',') && text.replacen(',', ".", 1).trim().parse::<f64>().is_ok()
 }
 
 /// One way out.
@@ -307,6 +314,15 @@ impl Setting {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_decimal_comma_is_told_wherever_a_cell_is_no_number() {
+        let hint = |value: &str| FileError::cell("a.csv", 2, "t_s", value, "is not a number").hint();
+        for value in ["\"0,05\"", "-1,5e3"] {
+            assert_eq!(hint(value).unwrap(), "write decimals with a point: 0.5, not 0,5");
+        }
+        assert_eq!((hint("\"1,2,3\""), hint("\"abc\"")), (None, None));
+    }
 
     #[test]
     fn remedies_are_said_in_the_words_of_who_asks() {

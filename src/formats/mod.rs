@@ -26,6 +26,7 @@ pub(crate) mod table_files;
 pub(crate) mod toml_described;
 pub(crate) mod toml_file;
 mod toml_path;
+mod toml_places;
 pub mod trajectory_file;
 
 pub use atomic::Existing;

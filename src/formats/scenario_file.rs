@@ -31,7 +31,7 @@ fn from_source(
     rule: impl FnOnce(&Scenario) -> Result<(), SettingError>,
 ) -> Result<Scenario, FileError> {
     let document = Document::parse(source)?;
-    let scenario: Scenario = document.read()?;
+    let scenario: Scenario = document.read_placed()?;
     scenario.validate().and_then(|()| rule(&scenario)).map_err(|e| document.refused(&e))?;
     Ok(scenario)
 }
@@ -54,6 +54,18 @@ mod tests {
         let (message, hint) = refused("[gps]\nrate_hz = 1\n");
         assert_eq!(message, "s.toml, line 1: unknown key \"gps\"");
         assert!(hint.unwrap().contains("gnss"));
+    }
+
+    #[test]
+    fn a_key_in_the_wrong_table_is_told_where_it_belongs() {
+        let hint = |text: &str| refused(text).1.unwrap();
+        assert_eq!(hint("[gnss]\nnis_gate = 0.5\n"), "\"nis_gate\" belongs in [filter]");
+        assert_eq!(hint("rate_hz = 10\n"), "\"rate_hz\" belongs in [baro], [gnss] or [imu]");
+        assert_eq!(hint("[run]\nend_s = 10\n"), "\"end_s\" belongs in [[outage]]");
+        assert_eq!(
+            hint("[outage]\nstart_s = 1\nend_s = 2\n"),
+            "there may be several: write [[outage]], in double brackets"
+        );
     }
 
     #[test]

@@ -5,6 +5,7 @@ use super::error::{FileError, Kind};
 use super::suggest::nearest;
 use super::toml_file::{Section, Source, missing_key, shown, unknown_key};
 use super::toml_path::{dotted, path_at, span_of};
+use super::toml_places::places;
 use nav_sim_signal::units::SettingError;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -39,6 +40,26 @@ impl<'a> Document<'a> {
     /// File, line, key and value of what is refused; a mistyped key with the nearest legal one.
     pub(crate) fn read<T: DeserializeOwned>(&self) -> Result<T, FileError> {
         self.root().read()
+    }
+
+    /// The same, where a key that is unknown in its table may belong in another: the answer is then where.
+    ///
+    /// # Errors
+    /// As [`Document::read`].
+    pub(crate) fn read_placed<T: DeserializeOwned + JsonSchema>(&self) -> Result<T, FileError> {
+        self.read().map_err(|e| {
+            let Kind::UnknownKey(path) = &e.kind else { return e };
+            let key = path.rsplit('.').next().unwrap_or_default().to_owned();
+            let places = places(&schemars::schema_for!(T).to_value(), &key);
+            match places.split_last() {
+                // a key of many tables, such as a name, tells nothing
+                Some((last, others)) if others.len() < MOST_PLACES => {
+                    let or = if others.is_empty() { "" } else { " or " };
+                    e.advice_instead(format!("\"{key}\" belongs in {}{or}{last}", others.join(", ")))
+                }
+                _ => e,
+            }
+        })
     }
 
     /// The line of a dotted key, or of the innermost table around it that the file has.
@@ -106,11 +127,17 @@ impl Section<'_> {
         let advice = match meant {
             Some(meant) => Some(format!("did you mean \"{meant}\"?")),
             None if message == Finite::REFUSAL => Some(Finite::ADVICE.to_owned()),
+            None if message.starts_with("invalid type: map, expected a sequence") => {
+                Some(several(path.rsplit('.').next().unwrap_or_default()))
+            }
             None => None,
         };
         source.error(line, Kind::Value { key: path.into(), value, reason }).advice_if(advice)
     }
 }
+
+/// Most tables that are named as those a key belongs in.
+const MOST_PLACES: usize = 3;
 
 /// A number that is neither nan nor inf.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Deserialize, JsonSchema)]
@@ -138,6 +165,11 @@ impl TryFrom<f64> for Finite {
 pub(crate) enum OneOrEach<T> {
     One(T),
     Each(Vec<T>),
+}
+
+/// What to write for a table where a list of them is meant.
+pub(super) fn several(key: &str) -> String {
+    format!("there may be several: write [[{key}]], in double brackets")
 }
 
 /// Why a value is refused, in words that follow it: serde's types in ours.
@@ -199,6 +231,10 @@ mod tests {
             ("count = 1\n[part]\n", "line 2: \"part.x\" is missing | add the key \"part.x\""),
             ("count = 1\npart = {}\n", "line 2: \"part.x\" is missing | add the key \"part.x\""),
             ("count = 1\n[part]\nx = \"a\"\n", "line 3: \"part.x\" = \"a\" is not a number | "),
+            (
+                "count = 1\n[parts]\nx = 1\n",
+                "line 2: \"parts\" = [parts] is not a list | there may be several: write [[parts]], in double brackets",
+            ),
             ("count = 1\npart = 3\n", "line 2: \"part\" = 3 is not a table | "),
             (
                 "count = 1\n[part]\nx = 1\nxyz = [1, 2]\n",

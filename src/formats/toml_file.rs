@@ -4,7 +4,7 @@
 use super::error::{FileError, Kind, Place, Setting};
 use super::source;
 use super::suggest::nearest;
-use super::toml_described::Finite;
+use super::toml_described::{Finite, several};
 use super::toml_path::dotted;
 use std::io::{self, ErrorKind};
 use std::ops::Range;
@@ -274,7 +274,9 @@ impl<'a> Section<'a> {
     /// A list of tables, named `key[1]`, `key[2]`, … in messages.
     pub(crate) fn sections(&self, key: &str) -> Result<Vec<Section<'a>>, FileError> {
         let Some(value) = self.get(key) else { return Ok(Vec::new()) };
-        let items = value.get_ref().as_array().ok_or_else(|| self.wrong_type(key, "a list of tables"))?;
+        let hint = || value.get_ref().is_table().then(|| several(key));
+        let items = value.get_ref().as_array();
+        let items = items.ok_or_else(|| self.refuse(key, "is not a list of tables", hint()))?;
         let section = |(i, v): (usize, Value<'a>)| {
             let name = self.key(&format!("{key}[{}]", i + 1));
             match v.get_ref().as_table() {

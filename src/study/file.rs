@@ -36,7 +36,7 @@ pub(crate) fn beside(study: &Path, path: &Path) -> PathBuf {
 pub(crate) fn read(path: &Path) -> Result<StudyFile, FileError> {
     let source = Source::read(path)?;
     let document = Document::parse(&source)?;
-    let mut study: Study = document.read()?;
+    let mut study: Study = document.read_placed()?;
     let root = document.root();
     for key in ["filters", "scenario", "gnss", "outages"] {
         if root.is_empty_list(key) {
@@ -258,6 +258,10 @@ mod tests {
         assert_eq!(
             with("runs = 8", "rums = 8"),
             "s.toml, line 1: unknown key \"rums\" | did you mean \"runs\"?"
+        );
+        assert_eq!(
+            with("runs = 8", "sweep = {}"),
+            "s.toml, line 1: unknown key \"sweep\" | \"sweep\" belongs in [[outages]]"
         );
         assert_eq!(
             with("runs = 8", "runs = 0"),

@@ -43,7 +43,7 @@ fn one_design_is_a_screen_and_what_cannot_be_planned_is_refused() {
         let said = String::from_utf8(output.get_output().stderr.clone()).unwrap();
         assert!(said.contains(word), "{said}");
     };
-    refused("calib_data/tactical.toml --estimator gmwm", "awv, sr-awv or dr-awv average several");
+    refused("calib_data/tactical.toml --estimator gmwm", "[possible values: awv, sr-awv, dr-awv]");
     refused("calib_data/tactical.toml --hours 1e6", "longer than a year");
     refused("calib_data/tactical.toml --hours 1e-4 --recordings 3 --draws 40", "more, or longer recordings");
 }

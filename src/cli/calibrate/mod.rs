@@ -97,7 +97,8 @@ const OF_RECORDINGS: [&str; 11] = [
     "no_turn_on",
 ];
 
-const ESTIMATORS: [(&str, &str); 7] = [
+/// Those of several recordings first, then those of one.
+pub(super) const ESTIMATORS: [(&str, &str); 7] = [
     (Estimator::Awv.name(), "Average of the classical wavelet variances"),
     (Estimator::SrAwv.name(), "Average of the robust wavelet variances"),
     (Estimator::DrAwv.name(), "Trimmed average of the robust wavelet variances"),

@@ -7,6 +7,7 @@ use super::lines::{Blanks, Ended};
 use super::table::{BETWEEN, BEYOND, Column, LARGEST, Lines, Notes, Raw, relieve, settle};
 use super::unused::Unused;
 use super::values::Values;
+use crate::formats::error::decimal_comma;
 use crate::formats::{FileError, Kind, Place, Setting, source};
 use flate2::read::MultiGzDecoder;
 use std::io::{BufRead, BufReader, Cursor, Read};
@@ -319,14 +320,9 @@ fn bad_cell(path: &str, line: u64, column: &str, cell: &[u8], parsed: Option<f64
     let value = shown(&String::from_utf8_lossy(cell.trim_ascii()), 40);
     let quoted = format!("\"{value}\"");
     match parsed {
-        None if decimal_comma(&value) => FileError::cell(path, line, column, quoted, "is not a number")
-            .advice("write decimals with a point: 0.5, not 0,5"),
+        None if decimal_comma(&value) => FileError::cell(path, line, column, quoted, "is not a number"),
         None => sample(path, line, column, &quoted, "is not a number"),
         Some(number) if number.is_finite() => sample(path, line, column, &value, BEYOND),
         Some(_) => sample(path, line, column, &quoted, "is not finite"),
     }
-}
-
-fn decimal_comma(value: &str) -> bool {
-    value.contains(',') && value.replacen(',', ".", 1).trim().parse::<f64>().is_ok()
 }
