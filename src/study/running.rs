@@ -60,7 +60,8 @@ pub struct RunReport {
 }
 
 /// Computes the units of a shard that are not there, or damaged. Each appears whole, by rename; when the observer
-/// says stop, those at work are dropped, and the same call goes on later. Any number of processes may work at once.
+/// says stop, those at work are dropped (a covariance analysis, which is short, is finished), and the same call goes on
+/// later. Any number of processes may work at once.
 ///
 /// # Errors
 /// When the plan is of another build, an input has changed, or a unit cannot be written.

@@ -14,9 +14,9 @@ use std::time::{Duration, Instant};
 /// Compute the units of work that are not done yet, all or those of one shard
 ///
 /// Each unit file appears whole, by rename, with a checksum. Intact units are skipped, damaged ones are computed
-/// again. On SIGTERM, or at the time limit, the current unit is dropped and the exit code is 75: run again to
-/// continue (exit code 1 if the time limit was too short for a single unit). Any number of processes may work at
-/// once; two on the same shard waste time but do no harm.
+/// again. On SIGTERM, or at the time limit, the current unit is dropped (with method = "lincov" it is finished) and the
+/// exit code is 75: run again to continue (exit code 1 if the time limit was too short for a single unit). Any number
+/// of processes may work at once; two on the same shard waste time but do no harm.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
