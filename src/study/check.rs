@@ -112,7 +112,7 @@ impl Study {
             }
             if let Err(source) = step.fit.parse::<ModelSpec>() {
                 let (key, fit) = (format!("{key}.calibrate.fit"), step.fit.clone());
-                return Err(DescriptionError::NotModel { key, fit, source });
+                return Err(DescriptionError::NotModel { key, fit, source: Box::new(source) });
             }
             let key = format!("{key}.calibrate.estimators");
             empty(&key, !step.estimators.is_empty())?;

@@ -25,7 +25,7 @@ pub enum DescriptionError {
         /// What is to be fitted.
         fit: String,
         /// Why it is none.
-        source: SpecError,
+        source: Box<SpecError>,
     },
     /// An estimator of a single recording, and several recordings.
     #[error("\"{key}\": {estimator} takes a single recording; there are {recordings}")]
