@@ -72,7 +72,7 @@ fn compared(
         }
     }
     let label = Label::of(&run, candidate.manifest.model.estimator.as_deref());
-    Ok(CandidateResult { run, label, is_reference, verdict: candidate.verdict, outages })
+    Ok(CandidateResult { run, label, is_reference, is_paired, verdict: candidate.verdict, outages })
 }
 
 /// What makes two runs differ beside the model in the filter; then run k did not see the same noise.

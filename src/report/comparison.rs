@@ -51,6 +51,8 @@ pub(crate) struct CandidateResult {
     pub label: Label,
     /// Whether it is the reference itself.
     pub is_reference: bool,
+    /// Whether run k saw the same noise as that of the reference.
+    pub is_paired: bool,
     /// Whether its filter is as good as it believes.
     pub verdict: Verdict,
     /// Outage by outage.
@@ -89,6 +91,8 @@ pub(crate) struct VerdictRow {
 pub(crate) struct Row {
     /// Run directory.
     pub run: String,
+    /// Whether run k saw the same noise as that of the reference, so that the intervals are those of paired differences.
+    pub paired: bool,
     /// Outage, from 0.
     pub outage: usize,
     /// State.
@@ -140,7 +144,7 @@ impl ComparisonFile {
         };
         for candidate in candidates {
             for (outage, comparison) in candidate.outages.iter().enumerate() {
-                file.rows.extend(rows(&candidate.run, outage, comparison));
+                file.rows.extend(rows(candidate, outage, comparison));
                 file.consistency.push(ConsistencyRow {
                     run: candidate.run.clone(),
                     outage,
@@ -155,9 +159,14 @@ impl ComparisonFile {
     }
 }
 
-fn rows<'a>(run: &'a str, outage: usize, comparison: &'a OutageComparison) -> impl Iterator<Item = Row> + 'a {
+fn rows<'a>(
+    candidate: &'a CandidateResult,
+    outage: usize,
+    comparison: &'a OutageComparison,
+) -> impl Iterator<Item = Row> + 'a {
     REPORTED_NAMES.iter().zip(&comparison.states).map(move |(state, ratio)| Row {
-        run: run.to_owned(),
+        run: candidate.run.clone(),
+        paired: candidate.is_paired,
         outage,
         state,
         ratio_error_pct: ratio.asee.pct,

@@ -175,7 +175,8 @@ pub(super) mod tests {
         let outage = OutageComparison { states: [state; 9], nees: [9.5, 9.0], coverage: [0.9, 0.95] };
         let outages = vec![outage.clone(), outage];
         let verdict = Verdict::of(&[], 2, None);
-        CandidateResult { run: run.into(), label: Label::of(run, None), is_reference, verdict, outages }
+        let label = Label::of(run, None);
+        CandidateResult { run: run.into(), label, is_reference, is_paired: true, verdict, outages }
     }
 
     #[test]

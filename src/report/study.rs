@@ -263,6 +263,7 @@ pub(crate) fn ratio_table(cell: &ShownCell, states: &[usize]) -> Vec<Vec<String>
         run: column.name.clone(),
         label: column.label.clone(),
         is_reference: column.is_reference,
+        is_paired: true,
         verdict: column.verdict,
         outages: column.comparison.clone().unwrap_or_default(),
     };

@@ -304,7 +304,8 @@ fn another_seed_or_truth_is_said_and_unpaired() {
         m.seed = Some(8);
         m.inputs.truncate(1);
     });
-    let ran = compare(directory.path(), &["b", "--reference", "a", "--format", "json"]);
+    write(&directory.path().join("c"), 1.2, |_| {});
+    let ran = compare(directory.path(), &["b", "c", "--reference", "a", "--format", "json"]);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     assert!(ran.stderr.contains("warning: b: the seed is not that of the reference"), "{}", ran.stderr);
     assert!(ran.stderr.contains("warning: b: what makes the errors is not"), "{}", ran.stderr);
@@ -312,6 +313,10 @@ fn another_seed_or_truth_is_said_and_unpaired() {
     let ci = &json["rows"][0]["ci95_pct"];
     assert!(ci[1].as_f64().unwrap() - ci[0].as_f64().unwrap() > 5.0, "{ci}");
     assert_eq!(json["paired"], false);
+    // the other run is paired all the same
+    for row in json["rows"].as_array().unwrap() {
+        assert_eq!(row["paired"], row["run"] == "c", "{row}");
+    }
 }
 
 #[test]
