@@ -32,7 +32,7 @@ pub(crate) struct Args {
     trajectory: PathBuf,
     /// Noise model of an IMU
     model: Option<PathBuf>,
-    /// Outage: a length in seconds (tried at several places), START:END, or "longest" (needs MODEL)
+    /// Outage: a length in seconds (tried from every second on), START:END, or "longest" (needs MODEL)
     #[arg(long, value_name = "SECONDS", value_parser = parse_ask)]
     outage: Ask,
     /// Earliest start of the outage in seconds [default: 300, less if the trajectory is short]
@@ -135,6 +135,10 @@ fn requirements(args: &Args, session: &Session) -> Result<Requirements, Failure>
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    if let (Ask::Window(outage), Some(start_s)) = (args.outage, args.start) {
+        let message = format!("--start {start_s} beside --outage {}:{}", outage.start_s, outage.end_s);
+        return Err(Failure::input(message).hint("an outage of a length alone has an earliest start"));
+    }
     if args.model.is_none() && args.outage == Ask::Longest {
         return Err(
             Failure::input("--outage longest needs a MODEL").hint("without one, give a length in seconds")

@@ -145,6 +145,8 @@ fn requests_that_mean_nothing_are_refused() {
     };
     refused(&["--outage", "30"], ["no limit is given", "hint: give one, such as --p95-m 5"]);
     refused(&["--outage", "longest", "--p95-m", "5"], ["needs a MODEL", "hint"]);
+    let window = ["--outage", "60:90", "--start", "70", "--p95-m", "5"];
+    refused(&window, ["--start 70 beside --outage 60:90", "a length alone"]);
     refused(&["--outage", "1e5", "--p95-m", "5"], ["is not on the trajectory", "a shorter --outage"]);
     refused(&["--outage", "60:90", "--p95-m", "0.01"], ["no IMU keeps p95_m ≤ 0.01", "a larger limit"]);
     // the poorest IMU keeps them: to look further made a noise without a finite variance, and a panic
