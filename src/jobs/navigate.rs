@@ -145,8 +145,8 @@ pub fn navigate(
     };
     let mut navigation = match (method, expected) {
         (Method::Lincov, Some((epochs, mut summary))) => {
-            // nothing is drawn but outages
-            summary.seed = scenario.outage_random.map(|_| seed);
+            // Nothing is drawn but outages; a seed that is given stays on record.
+            summary.seed = scenario.outage_random.map(|_| seed).or(scenario.run.seed);
             Navigation { runs: None, epochs, fan: analysis.fan(&belief), summary }
         }
         (method, expected) => {

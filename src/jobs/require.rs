@@ -16,7 +16,7 @@ use nav_sim_signal::noise::Model;
 /// The outage that is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Ask {
-    /// One of this length (s), at several places.
+    /// One of this length (s), from every second on.
     Length(f64),
     /// This one.
     Window(Outage),

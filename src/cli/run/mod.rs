@@ -110,8 +110,8 @@ pub(super) fn windows_of(outages: &[OutageArg]) -> Result<Vec<Outage>, Failure> 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut scenario = scenario(args)?;
     let inputs = Inputs::read(args, &mut scenario, session)?;
-    let recorded_seed = seed(&scenario, session);
-    let seed = recorded_seed.unwrap_or_default();
+    scenario.run.seed = seed(&scenario, session);
+    let seed = scenario.run.seed.unwrap_or_default();
     let span = (inputs.job.trajectory.start_s(), inputs.job.trajectory.end_s());
     let outages = outages(&scenario, span, seed, session).map_err(|e| match &args.scenario {
         Some(path) if args.outages.is_empty() => e.within(&path.display().to_string()),
@@ -124,7 +124,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let manifest = manifest(
         scenario.clone(),
         &outages,
-        recorded_seed,
+        scenario.run.seed,
         inputs.files.clone(),
         inputs.note.clone(),
         session,
@@ -192,10 +192,13 @@ fn required(summary: &Summary) -> Result<(), Failure> {
     if missed.is_empty() { Ok(()) } else { Err(Failure::bound(missed.join("; "))) }
 }
 
-/// The seed of all random numbers, where there are any: drawn where nobody gives one.
+/// The seed of all random numbers: drawn where nobody gives one and there are any, and none where there are not.
 fn seed(scenario: &Scenario, session: &Session) -> Option<u64> {
     let draws = scenario.run.method != Method::Lincov || scenario.outage_random.is_some();
-    draws.then(|| session.seed(scenario.run.seed))
+    if draws {
+        return Some(session.seed(scenario.run.seed));
+    }
+    session.asked_seed().or(scenario.run.seed)
 }
 
 /// A filter whose errors are of another order than it believes did what was asked for, and is of no use.

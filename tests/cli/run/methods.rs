@@ -48,6 +48,10 @@ fn covariance_analysis_is_a_method_of_run() {
     let manifest = json(&out.join("manifest.json"));
     let seeds = [&summary["seed"], &manifest["seed"], &manifest["configuration"]["run"]["seed"]];
     assert!(seeds.iter().all(|seed| seed.is_null()), "{seeds:?}");
+    // one that is given is on record
+    done(place.path(), "run drive.toml imu.toml --method lincov --outage 30:45 --seed 7 -o given");
+    let given = fs::read_to_string(place.path().join("given/summary.json")).unwrap();
+    assert_eq!(serde_json::from_str::<Value>(&given).unwrap()["seed"], 7);
 
     done(place.path(), "run drive.toml imu.toml --runs 16 --outage 30:45 --seed 2 -o sampled");
     let ran = done(place.path(), "compare sampled --reference expected");
