@@ -1,10 +1,11 @@
 //! One outage at many places of a track, each alone: a pass with all fixes, from which each outage branches off.
 
-use super::errors::{Errors, StepInputs};
+use super::errors::Errors;
 use super::input::Sources;
 use super::joint::Joint;
 use super::pass::Instant;
-use super::track::{Mark, Measured, Row, Track};
+use super::sides::Sides;
+use super::track::{Mark, Measured, Row, Step, Track};
 use super::truth::TruthSide;
 use crate::ekf::Belief;
 use crate::sensors::outage::Outage;
@@ -38,34 +39,29 @@ pub(crate) fn errors_in_outages(
     let ways: Vec<Range<usize>> = outages.iter().map(|outage| track.without_fixes(outage)).collect();
     let mut order: Vec<usize> = (0..ways.len()).collect();
     order.sort_by_key(|place| ways[*place].start);
-    let (filter_sources, none) = (Sources::of_belief(belief), Sources::default());
-    let estimates = filter_sources.estimates();
-    let mut filter_inputs = StepInputs::new(&filter_sources, &none);
-    let mut true_inputs = StepInputs::new(&estimates, &truth.inertial);
-    let mut pass = Pass::new(track, truth, &filter_sources, &estimates);
+    let believed = Sources::of_belief(belief);
+    let sides = Sides::of_errors(&believed, &truth.inertial, track);
+    let own = Sides::of_filter(believed, track);
+    let mut pass = Pass::new(track, &own, &sides, truth);
     let mut found = vec![Vec::new(); ways.len()];
     let mut at = 0;
     for together in order.chunks(TOGETHER) {
         let mut begun = Vec::with_capacity(together.len());
         for place in together {
             let way = &ways[*place];
-            for mark in at..way.start {
-                pass.follow(mark, &mut filter_inputs, &mut true_inputs);
-                pass.measure(&track.marks[mark], |_| true);
+            for (steps, mark) in track.legs(at..way.start) {
+                pass.follow(steps);
+                pass.measure(mark, |_| true);
             }
             at = at.max(way.start);
             begun.push((*place, pass.clone()));
         }
         let branch = |(place, mut pass): (usize, Pass<'_>)| {
-            // Each branch for itself: the steps of a few lengths are made anew in a moment.
-            let mut filter_inputs = StepInputs::new(&filter_sources, &none);
-            let mut true_inputs = StepInputs::new(&estimates, &truth.inertial);
-            let mut instants = Vec::new();
-            for mark in ways[place].clone() {
-                pass.follow(mark, &mut filter_inputs, &mut true_inputs);
-                let (last, mark) = (mark + 1 == ways[place].end, &track.marks[mark]);
+            let (way, mut instants) = (&ways[place], Vec::new());
+            for (index, (steps, mark)) in way.clone().zip(track.legs(way.clone())) {
+                pass.follow(steps);
                 // The end is looked at before its measurements, a report after them, as in the runs.
-                if last {
+                if index + 1 == way.end {
                     instants.push(pass.instant(mark));
                 } else {
                     pass.measure(mark, |row| row.what == Measured::Height);
@@ -95,35 +91,29 @@ impl Track {
 
 /// A filter's own covariance and its true errors, side by side.
 #[derive(Clone)]
-struct Pass<'a> {
-    track: &'a Track,
-    truth: &'a TruthSide,
-    filter: Joint,
-    errors: Errors,
+pub(super) struct Pass<'a> {
+    pub(super) filter: Joint<'a>,
+    pub(super) errors: Errors<'a>,
 }
 
 impl<'a> Pass<'a> {
-    fn new(track: &'a Track, truth: &'a TruthSide, filter: &Sources, estimates: &Sources) -> Self {
-        let filter = Joint::new(track.start, filter, &Sources::default());
-        Self { track, truth, filter, errors: Errors::at_start(track, estimates, truth) }
+    /// At the start of a track, of a filter's own states and those of its true errors.
+    pub(super) fn new(track: &Track, own: &'a Sides, sides: &'a Sides, truth: &'a TruthSide) -> Self {
+        Self { filter: Joint::new(track.start, own), errors: Errors::at_start(track, sides, truth) }
     }
 
-    /// Over the steps that lead to a mark.
-    fn follow(&mut self, mark: usize, filter: &mut StepInputs<'_>, truth: &mut StepInputs<'_>) {
-        let begin = mark.checked_sub(1).map_or(0, |before| self.track.marks[before].steps);
-        for step in &self.track.steps[begin..self.track.marks[mark].steps] {
-            self.filter.step(step, filter.over(step.samples));
-            self.errors.step(step, truth.over(step.samples));
+    pub(super) fn follow(&mut self, steps: &[Step]) {
+        for step in steps {
+            self.filter.step(step);
+            self.errors.step(step);
         }
     }
 
     /// The measurements of a mark that are wanted.
-    fn measure(&mut self, mark: &Mark, is_used: impl Fn(&Row) -> bool) {
-        for row in mark.rows.iter().filter(|row| is_used(row)) {
-            let expected = self.filter.innovation(row, row.r);
-            let gain = expected.gain();
-            self.filter.correct(&expected, &gain);
-            self.errors.measure(row, self.truth, &gain);
+    pub(super) fn measure(&mut self, mark: &Mark, is_wanted: impl Fn(&Row) -> bool) {
+        for row in mark.rows.iter().filter(|row| is_wanted(row)) {
+            let (gain, _) = self.filter.measure(row);
+            self.errors.measure(row, &gain);
         }
     }
 

@@ -1,6 +1,7 @@
 //! The covariance of \[navigation error; bias estimates\] and its correlation with the states of the truth.
 
-use super::input::{SIGNALS, Source, Sources, StepOfSource};
+use super::input::{SIGNALS, Source, StepOfSource};
+use super::sides::{Inputs, Sides};
 use super::track::{NAV, Nav, Row, Step};
 use crate::simulation::BIASES;
 
@@ -11,7 +12,8 @@ use crate::simulation::BIASES;
 /// error of a bias is estimate less truth, so both enter the navigation error alike. States t are independent
 /// of one another and stay so.
 #[derive(Debug, Clone)]
-pub(super) struct Joint {
+pub(super) struct Joint<'a> {
+    sides: &'a Sides,
     pub(super) xx: [Nav; NAV],
     xb: Vec<Nav>,
     /// Row-major.
@@ -22,43 +24,18 @@ pub(super) struct Joint {
     tt: Vec<f64>,
     /// Samples so far.
     elapsed: f64,
-    sources_b: Vec<Source>,
-    sources_t: Vec<Source>,
 }
 
-/// What sources do over steps of one length.
-#[derive(Debug, Clone)]
-pub(super) struct Inputs {
-    pub(super) b: Vec<StepOfSource>,
-    pub(super) t: Vec<StepOfSource>,
-    /// Variance of the part of a signal's mean over the step that is new in it (units²).
-    q_mean: [f64; SIGNALS],
-}
-
-impl Inputs {
-    /// The steps of the filter's states `b` and of the states `t` of the truth; white noise belongs to the side that
-    /// makes the errors.
-    pub(super) fn new(b: &Sources, t: &Sources, samples: u32) -> Self {
-        let steps_of =
-            |s: &Sources| -> Vec<StepOfSource> { s.states.iter().map(|x| x.over(samples)).collect() };
-        let (bs, ts) = (steps_of(b), steps_of(t));
-        let mut q_mean: [f64; SIGNALS] =
-            std::array::from_fn(|i| (b.white[i] + t.white[i]) / f64::from(samples));
-        for source in bs.iter().chain(&ts) {
-            q_mean[source.signal] += source.q_mean;
-        }
-        Self { b: bs, t: ts, q_mean }
-    }
-}
-
-impl Joint {
-    pub(super) fn new(xx: [Nav; NAV], b: &Sources, t: &Sources) -> Self {
+impl<'a> Joint<'a> {
+    pub(super) fn new(xx: [Nav; NAV], sides: &'a Sides) -> Self {
+        let (b, t) = (&sides.b, &sides.t);
         let (nb, nt) = (b.states.len(), t.states.len());
         let mut bb = vec![0.0; nb * nb];
         for (i, source) in b.states.iter().enumerate() {
             bb[i * nb + i] = source.initial;
         }
         Self {
+            sides,
             xx,
             xb: vec![[0.0; NAV]; nb],
             bb,
@@ -66,17 +43,16 @@ impl Joint {
             bt: vec![0.0; nb * nt],
             tt: t.states.iter().map(|s| s.initial).collect(),
             elapsed: 0.0,
-            sources_b: b.states.clone(),
-            sources_t: t.states.clone(),
         }
     }
 
     /// Variances of the biases of the signals: of the sum of the states b of each, drifts at their age.
     pub(super) fn bias_variances(&self) -> [f64; BIASES] {
-        let factors: Vec<f64> = self.sources_b.iter().map(|s| s.share(self.elapsed)).collect();
+        let states = &self.sides.b.states;
+        let factors: Vec<f64> = states.iter().map(|s| s.share(self.elapsed)).collect();
         let (nb, mut variances) = (factors.len(), [0.0; BIASES]);
-        for (i, a) in self.sources_b.iter().enumerate().filter(|(_, a)| a.signal < BIASES) {
-            let of_signal = self.sources_b.iter().enumerate().filter(|(_, b)| b.signal == a.signal);
+        for (i, a) in states.iter().enumerate().filter(|(_, a)| a.signal < BIASES) {
+            let of_signal = states.iter().enumerate().filter(|(_, b)| b.signal == a.signal);
             variances[a.signal] +=
                 of_signal.map(|(j, _)| factors[i] * factors[j] * self.bb[i * nb + j]).sum::<f64>();
         }
@@ -84,7 +60,8 @@ impl Joint {
     }
 
     /// Over one step: A P Aᵀ + Q in blocks.
-    pub(super) fn step(&mut self, step: &Step, inputs: &Inputs) {
+    pub(super) fn step(&mut self, step: &Step) {
+        let inputs = self.sides.over(step);
         let (nb, nt) = (inputs.b.len(), inputs.t.len());
         let elapsed = self.elapsed;
         let mean = |s: &StepOfSource| s.mean + s.ramp * elapsed;
@@ -162,7 +139,7 @@ impl Joint {
         let mut s = r;
         let coefficients =
             |s: &[Source]| -> Vec<f64> { s.iter().map(|x| row.coefficient(x, self.elapsed)).collect() };
-        let (hb, ht) = (coefficients(&self.sources_b), coefficients(&self.sources_t));
+        let (hb, ht) = (coefficients(&self.sides.b.states), coefficients(&self.sides.t.states));
         // only a velocity on a lever arm feels the gyroscope, only a position the receiver's correlated error
         if hb.iter().chain(&ht).any(|h| *h != 0.0) {
             for (j, h) in hb.iter().enumerate() {
@@ -181,6 +158,15 @@ impl Joint {
         // hᵀ P h + r; x has by now its part from b and t.
         s += product(&x);
         Innovation { x, b, t, s }
+    }
+
+    /// Corrects by a measurement as the filter does whose own covariance this is; returns its gain, and the variance that it
+    /// states for the innovation.
+    pub(super) fn measure(&mut self, row: &Row) -> (Gain, f64) {
+        let y = self.innovation(row, row.r);
+        let gain = y.gain();
+        self.correct(&y, &gain);
+        (gain, y.s)
     }
 
     /// z ← z − k y for an innovation y; the gain belongs to a filter that need not be right.
@@ -245,7 +231,7 @@ pub(super) struct Innovation {
 
 impl Innovation {
     /// The gain that is best where the covariance is right.
-    pub(super) fn gain(&self) -> Gain {
+    fn gain(&self) -> Gain {
         Gain { x: self.x.map(|c| c / self.s), b: self.b.iter().map(|c| c / self.s).collect() }
     }
 }

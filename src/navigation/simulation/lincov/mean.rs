@@ -1,40 +1,39 @@
 //! The mean of the true errors: what is the same in every run.
 
-use super::input::{SIGNALS, Source, Sources, StepOfSource};
-use super::joint::{Gain, Inputs};
+use super::input::{SIGNALS, Source, StepOfSource};
+use super::joint::Gain;
+use super::sides::Sides;
 use super::track::{NAV, Nav, Row, Step};
 
 /// Mean of z = \[navigation error; bias estimates\] and of the truth's states, as [`Joint`](super::joint::Joint)
 /// has their covariance.
 #[derive(Debug, Clone)]
-pub(super) struct Mean {
+pub(super) struct Mean<'a> {
+    sides: &'a Sides,
     pub(super) x: Nav,
     b: Vec<f64>,
     t: Vec<f64>,
     /// Samples so far.
     elapsed: f64,
-    sources_b: Vec<Source>,
-    sources_t: Vec<Source>,
 }
 
-impl Mean {
-    /// Errors that are zero at the start, with the estimates of `b` and the truth's states `t`; none where all of
-    /// them have mean zero and so has everything else.
-    pub(super) fn new(b: &Sources, t: &Sources) -> Option<Self> {
+impl<'a> Mean<'a> {
+    /// Errors that are zero at the start; none where all states of the truth have mean zero and so has everything else.
+    pub(super) fn new(sides: &'a Sides) -> Option<Self> {
+        let (b, t) = (&sides.b, &sides.t);
         // A mean is rare (drifts of the truth): without one the whole propagation is spared.
         t.states.iter().any(|s| s.level != 0.0).then(|| Self {
+            sides,
             x: [0.0; NAV],
             b: vec![0.0; b.states.len()],
             t: t.states.iter().map(|s| s.level).collect(),
             elapsed: 0.0,
-            sources_b: b.states.clone(),
-            sources_t: t.states.clone(),
         })
     }
 
     /// Over one step.
-    pub(super) fn step(&mut self, step: &Step, inputs: &Inputs) {
-        let elapsed = self.elapsed;
+    pub(super) fn step(&mut self, step: &Step) {
+        let (inputs, elapsed) = (self.sides.over(step), self.elapsed);
         let mut error = [0.0; SIGNALS];
         let mut add = |states: &mut [f64], steps: &[StepOfSource]| {
             for (state, s) in states.iter_mut().zip(steps) {
@@ -55,7 +54,7 @@ impl Mean {
         let measured = |states: &[f64], sources: &[Source]| -> f64 {
             states.iter().zip(sources).map(|(x, s)| x * row.coefficient(s, self.elapsed)).sum()
         };
-        of_x + measured(&self.b, &self.sources_b) + measured(&self.t, &self.sources_t)
+        of_x + measured(&self.b, &self.sides.b.states) + measured(&self.t, &self.sides.t.states)
     }
 
     /// z ← z − k y.

@@ -18,6 +18,7 @@ mod mean;
 mod pass;
 mod reduce;
 mod root;
+mod sides;
 mod track;
 mod truth;
 mod tune;

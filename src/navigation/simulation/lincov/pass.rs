@@ -1,9 +1,10 @@
 //! One filter along a track, and what makes its true errors.
 
-use super::errors::{Errors, StepInputs};
+use super::errors::Errors;
 use super::input::Sources;
 use super::joint::{Gain, Joint};
-use super::track::{Mark, Measured, NAV, Nav, Track};
+use super::sides::Sides;
+use super::track::{Measured, NAV, Nav, Track};
 use super::truth::{TrueErrors, TruthSide};
 use crate::ekf::Belief;
 use crate::ekf::covariance::PSI;
@@ -133,30 +134,21 @@ impl<'a> FilterPass<'a> {
     /// Takes a filter along a track.
     #[must_use]
     pub fn new(track: &'a Track, belief: &Belief) -> Self {
-        let (believed, none) = (Sources::of_belief(belief), Sources::default());
-        let mut filter = Joint::new(track.start, &believed, &none);
-        let mut inputs = StepInputs::new(&believed, &none);
-        let (mut gains, mut reports, mut biases, mut done) = (Vec::new(), Vec::new(), Vec::new(), 0);
+        let own = Sides::of_filter(Sources::of_belief(belief), track);
+        let mut filter = Joint::new(track.start, &own);
+        let (mut gains, mut reports, mut biases) = (Vec::new(), Vec::new(), Vec::new());
         let mut ends = vec![[[0.0; NAV]; NAV]; track.outages];
-        for mark in &track.marks {
-            for step in &track.steps[done..mark.steps] {
-                filter.step(step, inputs.over(step.samples));
-            }
-            done = mark.steps;
+        for (steps, mark) in track.legs(0..track.marks.len()) {
+            steps.iter().for_each(|step| filter.step(step));
             // Before the measurements of the same instant, as the runs have it.
             mark.outages.iter().for_each(|outage| ends[*outage] = filter.xx);
-            for row in &mark.rows {
-                let y = filter.innovation(row, row.r);
-                let gain = y.gain();
-                filter.correct(&y, &gain);
-                gains.push((gain, y.s));
-            }
+            gains.extend(mark.rows.iter().map(|row| filter.measure(row)));
             if mark.report {
                 reports.push(filter.xx);
                 biases.push(filter.bias_variances().map(f64::sqrt));
             }
         }
-        Self { track, believed, gains, reports, biases, ends }
+        Self { track, gains, reports, biases, ends, believed: own.b }
     }
 
     /// Standard deviations that the filter states of the sensors' biases (m/s², rad/s), at every report.
@@ -170,9 +162,8 @@ impl<'a> FilterPass<'a> {
     #[must_use]
     pub fn sigma_at_ends(&self) -> Vec<[f64; REPORTED]> {
         let mut sigmas = vec![[0.0; REPORTED]; self.track.outages];
-        let none = Errors::none();
         for mark in &self.track.marks {
-            mark.outages.iter().for_each(|o| sigmas[*o] = none.instant(mark, &self.ends[*o]).sigma());
+            mark.outages.iter().for_each(|o| sigmas[*o] = deviations(&mark.jacobian, &self.ends[*o]));
         }
         sigmas
     }
@@ -180,10 +171,9 @@ impl<'a> FilterPass<'a> {
     /// Their means over the reports within each of some outages.
     #[must_use]
     pub fn sigma_means(&self, outages: &[Outage]) -> Vec<[f64; REPORTED]> {
-        let none = Errors::none();
         let reports = self.track.marks.iter().filter(|mark| mark.report).zip(&self.reports);
         let sigmas: Vec<(f64, [f64; REPORTED])> =
-            reports.map(|(mark, believed)| (mark.t_s, none.instant(mark, believed).sigma())).collect();
+            reports.map(|(mark, believed)| (mark.t_s, deviations(&mark.jacobian, believed))).collect();
         let mean = |outage: &Outage| {
             let within = || sigmas.iter().filter(|(t_s, _)| outage.withholds(*t_s));
             let count = within().count() as f64;
@@ -195,77 +185,40 @@ impl<'a> FilterPass<'a> {
     /// The true errors of the filter.
     #[must_use]
     pub fn errors(&self, truth: &TruthSide) -> ErrorLaw {
-        let mut law = ErrorLaw::default();
-        let mut ends = vec![None; self.track.outages];
-        let mut reports = self.reports.iter();
-        let marks = &self.track.marks;
-        law.nis = self.follow(truth, marks.len(), &mut |mark, moment, errors| {
-            let instant = |believed: &[Nav; NAV]| errors.instant(mark, believed);
-            match moment {
-                Moment::Ends => mark.outages.iter().for_each(|o| ends[*o] = Some(instant(&self.ends[*o]))),
-                Moment::Report => law.reports.extend(reports.next().map(instant)),
-            }
-        });
-        law.outage_ends = ends.into_iter().flatten().collect();
-        law
+        self.errors_until(self.track.marks.len(), truth)
     }
 
     /// The same at the ends of outages alone: what comes after the last is not computed.
     #[must_use]
     pub fn errors_at_ends(&self, truth: &TruthSide) -> Vec<Instant> {
-        let marks = &self.track.marks;
-        let last = marks.iter().rposition(|m| !m.outages.is_empty()).map_or(0, |at| at + 1);
-        let mut ends = vec![None; self.track.outages];
-        self.follow(truth, last, &mut |mark, moment, errors| {
-            if moment == Moment::Ends {
-                mark.outages.iter().for_each(|o| ends[*o] = Some(errors.instant(mark, &self.ends[*o])));
-            }
-        });
-        ends.into_iter().flatten().collect()
+        let last = self.track.marks.iter().rposition(|m| !m.outages.is_empty()).map_or(0, |at| at + 1);
+        self.errors_until(last, truth).outage_ends
     }
 
-    /// Takes the true errors along the first `marks` marks and shows them where outages end and where reports are
-    /// due; returns the sum of the expected NIS, and the fixes.
-    fn follow(
-        &self,
-        truth: &TruthSide,
-        marks: usize,
-        show: &mut dyn FnMut(&Mark, Moment, &Errors),
-    ) -> (f64, u64) {
-        let (estimates, real) = (self.believed.estimates(), &truth.inertial);
-        let mut errors = Errors::at_start(self.track, &estimates, truth);
-        let mut inputs = StepInputs::new(&estimates, real);
-        let mut gains = self.gains.iter();
-        let (mut nis, mut fixes, mut done) = (0.0, 0, 0);
-        for mark in &self.track.marks[..marks] {
-            for step in &self.track.steps[done..mark.steps] {
-                errors.step(step, inputs.over(step.samples));
-            }
-            done = mark.steps;
-            if !mark.outages.is_empty() {
-                show(mark, Moment::Ends, &errors);
-            }
-            fixes += u64::from(mark.fix);
+    /// Along the first `marks` marks.
+    fn errors_until(&self, marks: usize, truth: &TruthSide) -> ErrorLaw {
+        let sides = Sides::of_errors(&self.believed, &truth.inertial, self.track);
+        let mut errors = Errors::at_start(self.track, &sides, truth);
+        let (mut gains, mut reports) = (self.gains.iter(), self.reports.iter());
+        let (mut law, mut ends) = (ErrorLaw::default(), vec![None; self.track.outages]);
+        for (steps, mark) in self.track.legs(0..marks) {
+            steps.iter().for_each(|step| errors.step(step));
+            mark.outages.iter().for_each(|o| ends[*o] = Some(errors.instant(mark, &self.ends[*o])));
+            law.nis.1 += u64::from(mark.fix);
             for (row, (gain, believed)) in mark.rows.iter().zip(&mut gains) {
-                let square = errors.measure(row, truth, gain);
+                let square = errors.measure(row, gain);
                 if row.what != Measured::Height {
                     // The gate and the NIS of runs are of fixes; a height of the barometer is none.
-                    nis += square / believed;
+                    law.nis.0 += square / believed;
                 }
             }
             if mark.report {
-                show(mark, Moment::Report, &errors);
+                law.reports.extend(reports.next().map(|believed| errors.instant(mark, believed)));
             }
         }
-        (nis, fixes)
+        law.outage_ends = ends.into_iter().flatten().collect();
+        law
     }
-}
-
-/// When errors are looked at: before the measurements of a mark or after them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Moment {
-    Ends,
-    Report,
 }
 
 impl Instant {
@@ -283,40 +236,23 @@ impl Instant {
         std::array::from_fn(|i| if i < 6 { x[i] } else { self.jacobian[i - 6].dot(psi) / DEG })
     }
 
-    /// Variances of the reported states of a covariance of the filter's states, angles in radians.
-    fn squares(&self, p: &[Nav; NAV]) -> [f64; REPORTED] {
-        std::array::from_fn(|i| match i {
-            0..6 => p[i][i],
-            _ => {
-                let j = self.jacobian[i - 6];
-                let terms = (0..9).map(|k| p[3 * PSI + k / 3][3 * PSI + k % 3] * j[k / 3] * j[k % 3]);
-                terms.sum::<f64>()
-            }
-        })
-    }
-
     /// Variances of the reported states (m², (m/s)², degrees²) of a covariance of the filter's states.
     #[must_use]
     pub(crate) fn variances(&self, p: &[Nav; NAV]) -> [f64; REPORTED] {
-        let squares = self.squares(p);
+        let squares = squares(&self.jacobian, p);
         std::array::from_fn(|i| if i < 6 { squares[i] } else { squares[i] / (DEG * DEG) })
-    }
-
-    fn deviations(&self, p: &[Nav; NAV]) -> [f64; REPORTED] {
-        let roots = self.squares(p).map(f64::sqrt);
-        std::array::from_fn(|i| if i < 6 { roots[i] } else { roots[i] / DEG })
     }
 
     /// Standard deviations that the filter states of the reported states.
     #[must_use]
     pub fn sigma(&self) -> [f64; REPORTED] {
-        self.deviations(&self.believed)
+        deviations(&self.jacobian, &self.believed)
     }
 
     /// Root mean squares of the true errors of the reported states.
     #[must_use]
     pub fn rmse(&self) -> [f64; REPORTED] {
-        self.deviations(&self.moments())
+        deviations(&self.jacobian, &self.moments())
     }
 
     /// How the filter's covariance stands to that of its true errors.
@@ -346,4 +282,22 @@ impl Instant {
             log_density: -0.5 * (nees + believed + dof * std::f64::consts::TAU.ln()),
         }
     }
+}
+
+/// Variances of the reported states of a covariance of the filter's states, angles in radians.
+fn squares(jacobian: &[DVec3; 3], p: &[Nav; NAV]) -> [f64; REPORTED] {
+    std::array::from_fn(|i| match i {
+        0..6 => p[i][i],
+        _ => {
+            let j = jacobian[i - 6];
+            let terms = (0..9).map(|k| p[3 * PSI + k / 3][3 * PSI + k % 3] * j[k / 3] * j[k % 3]);
+            terms.sum::<f64>()
+        }
+    })
+}
+
+/// Standard deviations of the reported states (m, m/s, degrees).
+fn deviations(jacobian: &[DVec3; 3], p: &[Nav; NAV]) -> [f64; REPORTED] {
+    let roots = squares(jacobian, p).map(f64::sqrt);
+    std::array::from_fn(|i| if i < 6 { roots[i] } else { roots[i] / DEG })
 }

@@ -12,6 +12,7 @@ use crate::lanes::Vec3;
 use crate::strapdown::Strapdown;
 use crate::units::DEG;
 use glam::DVec3;
+use std::ops::Range;
 
 /// Navigation states: R, V, PSI.
 pub(super) const NAV: usize = 9;
@@ -140,6 +141,12 @@ impl Track {
         }
         let (outages, perfect) = (plan.outages.len(), experiment.initial.perfect);
         Ok(Self { steps, marks, outages, start: start(plan), perfect })
+    }
+
+    /// Some marks, each with the steps that lead to it.
+    pub(super) fn legs(&self, marks: Range<usize>) -> impl Iterator<Item = (&[Step], &Mark)> {
+        let begin = |mark: usize| mark.checked_sub(1).map_or(0, |before| self.marks[before].steps);
+        marks.map(move |mark| (&self.steps[begin(mark)..self.marks[mark].steps], &self.marks[mark]))
     }
 
     /// As [`Self::merged`], with a report every ten.

@@ -1,0 +1,66 @@
+//! The states beside the navigation error, and what they do over the steps of a track.
+
+use super::input::{SIGNALS, Sources, StepOfSource};
+use super::track::{Step, Track};
+
+/// The states `b` of a filter and `t` of the truth, as [`Joint`](super::joint::Joint) has them.
+#[derive(Debug)]
+pub(super) struct Sides {
+    pub(super) b: Sources,
+    pub(super) t: Sources,
+    /// By the number of samples of a step; few numbers occur.
+    inputs: Vec<(u32, Inputs)>,
+}
+
+impl Sides {
+    /// A filter as it sees itself along a track: its biases are what makes its errors.
+    pub(super) fn of_filter(believed: Sources, track: &Track) -> Self {
+        Self::new(believed, Sources::default(), track)
+    }
+
+    /// The estimates of a filter, and what truly makes its errors.
+    pub(super) fn of_errors(believed: &Sources, truth: &Sources, track: &Track) -> Self {
+        Self::new(believed.estimates(), truth.clone(), track)
+    }
+
+    fn new(b: Sources, t: Sources, track: &Track) -> Self {
+        let mut inputs: Vec<(u32, Inputs)> = Vec::new();
+        for step in &track.steps {
+            if inputs.iter().all(|(samples, _)| *samples != step.samples) {
+                inputs.push((step.samples, Inputs::new(&b, &t, step.samples)));
+            }
+        }
+        Self { b, t, inputs }
+    }
+
+    /// What they do over a step of the track.
+    pub(super) fn over(&self, step: &Step) -> &Inputs {
+        let found = self.inputs.iter().find(|(samples, _)| *samples == step.samples);
+        &found.expect("every length of the track is there").1
+    }
+}
+
+/// What sources do over steps of one length.
+#[derive(Debug, Clone)]
+pub(super) struct Inputs {
+    pub(super) b: Vec<StepOfSource>,
+    pub(super) t: Vec<StepOfSource>,
+    /// Variance of the part of a signal's mean over the step that is new in it (units²).
+    pub(super) q_mean: [f64; SIGNALS],
+}
+
+impl Inputs {
+    /// The steps of the filter's states `b` and of the states `t` of the truth; white noise belongs to the side that
+    /// makes the errors.
+    fn new(b: &Sources, t: &Sources, samples: u32) -> Self {
+        let steps_of =
+            |s: &Sources| -> Vec<StepOfSource> { s.states.iter().map(|x| x.over(samples)).collect() };
+        let (bs, ts) = (steps_of(b), steps_of(t));
+        let mut q_mean: [f64; SIGNALS] =
+            std::array::from_fn(|i| (b.white[i] + t.white[i]) / f64::from(samples));
+        for source in bs.iter().chain(&ts) {
+            q_mean[source.signal] += source.q_mean;
+        }
+        Self { b: bs, t: ts, q_mean }
+    }
+}
