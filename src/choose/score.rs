@@ -1,6 +1,6 @@
 //! How good a filter was at the ends of outages.
 
-use nav_sim_navigation::simulation::lincov::Instant;
+use nav_sim_navigation::simulation::lincov::Judged;
 use nav_sim_navigation::simulation::{NEES_DOF, OutageRecord, RunRecord};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -63,9 +63,9 @@ impl Score {
     }
 
     /// As covariance analysis expects it.
-    pub(crate) fn expected(ends: &[Instant]) -> Self {
-        let end = |instant: &Instant| {
-            let found = instant.consistency();
+    pub(crate) fn expected(ends: &[Judged]) -> Self {
+        let end = |end: &Judged| {
+            let found = end.consistency();
             EndScore {
                 rmse_m: found.rmse[0].hypot(found.rmse[1]),
                 believed_m: found.sigma[0].hypot(found.sigma[1]),

@@ -13,7 +13,7 @@ use nav_sim_calibration::derived_interval;
 use nav_sim_navigation::ekf::Belief;
 use nav_sim_navigation::metrics::{OutageSummary, PerState, horizontal_quantiles};
 use nav_sim_navigation::simulation::Experiment;
-use nav_sim_navigation::simulation::lincov::{FilterPass, Track, TruthSide};
+use nav_sim_navigation::simulation::lincov::{FilterPass, Instant, Track, TruthSide};
 use nav_sim_signal::noise::Model;
 use rayon::prelude::*;
 
@@ -38,7 +38,8 @@ impl Analysed<'_> {
         let figures = |model: &Model| -> Vec<Figures> {
             let truth = TruthSide::together(&TruthSide::sources(self.experiment, model));
             let ends = filter.errors_at_ends(&truth);
-            ends.iter().map(|end| [&end.rmse()[..], &horizontal_quantiles(end, QUANTILES)].concat()).collect()
+            let figures = |end: &Instant| [&end.rmse()[..], &horizontal_quantiles(end, QUANTILES)].concat();
+            ends.iter().map(|end| figures(&end.errors)).collect()
         };
         for (outage, interval) in outages.iter_mut().zip(intervals(truth, draws, &figures)) {
             let rmse = outage.rmse_end.0;

@@ -155,7 +155,7 @@ fn a_drift_of_the_gyroscope_is_felt_at_the_end_of_a_lever_arm() {
     let sources = TruthSide::sources(&experiment, &truth);
     let drift = sources.iter().find(|source| source.name == DRIFT).unwrap();
     let law = FilterPass::new(&track, &beliefs[0]).errors(&drift.side);
-    let fix = law.reports.iter().find(|report| report.fix).unwrap();
+    let fix = law.reports.iter().map(|report| &report.errors).find(|errors| errors.fix).unwrap();
     assert_eq!(fix.after_s, n / RATE_HZ);
     let [north, east, down] = [3, 4, 5].map(|i| fix.rmse()[i]);
     let expected = arm_m * slope * n;

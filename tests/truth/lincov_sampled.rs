@@ -282,7 +282,7 @@ fn constants_of_the_true_imu_have_their_closed_forms() {
         let experiment = scenario.experiment(&path, Truth::Model(truth), &beliefs, &outages, 1);
         let sources = TruthSide::together(&TruthSide::sources(&experiment, truth));
         let end = FilterPass::new(&track, &beliefs[0]).errors(&sources).outage_ends[0];
-        (end.rmse()[2], end.mean[2])
+        (end.errors.rmse()[2], end.errors.mean[2])
     };
     let none = Model { rate_hz: RATE_HZ, axes: Default::default() };
     let (bias, mean) = down("imu.turn_on_bias_accel_m_s2 = 0.01", &none);
@@ -351,7 +351,7 @@ fn budgets_add_up_to_the_true_errors_and_to_the_believed_ones() {
     let sources = TruthSide::sources(&experiment, &truth);
     let end = filter.errors(&TruthSide::together(&sources)).outage_ends[0];
     let believed = TruthSide::believed(&experiment, &beliefs[0]);
-    for (sources, deviations) in [(&sources, end.rmse()), (&believed, end.sigma())] {
+    for (sources, deviations) in [(&sources, end.errors.rmse()), (&believed, end.sigma())] {
         let budget = &Budget::at_outage_ends(&filter, sources)[0];
         for i in 0..9 {
             let sum: f64 = budget.shares.iter().map(|(_, shares)| shares.0[i]).sum();

@@ -134,7 +134,7 @@ fn outages_beside_one_another_are_as_each_alone() {
             let belief = scenario.with_full_noise().belief(&model, outage, &track).unwrap();
             let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &[], outage, 1);
             let truth = TruthSide::together(&TruthSide::sources(&experiment, &model));
-            let alone = FilterPass::new(&track, &belief).errors(&truth).outage_ends[0].rmse();
+            let alone = FilterPass::new(&track, &belief).errors(&truth).outage_ends[0].errors.rmse();
             let found = [drift.value(Quantity::Rmse), drift.angles_deg[0], drift.angles_deg[2]];
             let expected = [alone[0].hypot(alone[1]), alone[6], alone[8]];
             assert!(

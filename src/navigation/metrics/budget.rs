@@ -2,7 +2,7 @@
 
 use super::estimate::{PerState, serialize_named};
 use crate::simulation::REPORTED;
-use crate::simulation::lincov::{FilterPass, NamedSource};
+use crate::simulation::lincov::{FilterPass, Judged, NamedSource};
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
@@ -22,7 +22,8 @@ impl Budget {
     pub fn at_outage_ends(filter: &FilterPass<'_>, sources: &[NamedSource]) -> Vec<Self> {
         let squares = |source: &NamedSource| -> Vec<[f64; REPORTED]> {
             // Mean squares, not variances: a deterministic source (drift) has a mean and no variance.
-            filter.errors_at_ends(&source.side).iter().map(|end| end.variances(&end.moments())).collect()
+            let squares = |end: &Judged| end.errors.variances(&end.errors.moments());
+            filter.errors_at_ends(&source.side).iter().map(squares).collect()
         };
         let of_source: Vec<Vec<[f64; REPORTED]>> = sources.par_iter().map(squares).collect();
         let outages = of_source.first().map_or(0, Vec::len);

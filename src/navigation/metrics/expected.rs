@@ -9,7 +9,7 @@ use super::summary::{AccuracySummary, Consistency, Coverage, Nis, OutageSummary,
 use super::verdict::{OutageVerdict, Verdict};
 use crate::ekf::Belief;
 use crate::noise::Model;
-use crate::simulation::lincov::{ErrorLaw, FilterPass, Instant, Track, TruthSide};
+use crate::simulation::lincov::{ErrorLaw, FilterPass, Instant, Judged, Track, TruthSide};
 use crate::simulation::{BIASES, COVERAGE_DOF, Experiment, NEES_DOF, OutageRecord, REPORTED, RunRecord};
 use crate::units::DEG;
 use nalgebra::DMatrix;
@@ -57,7 +57,7 @@ impl Expected {
         let mut outages: Vec<OutageMetrics> =
             ends.map(|(window, end)| outage((window.start_s, window.end_s), end, &epochs)).collect();
         let believed = |epoch: &EpochMetrics| {
-            law.reports.iter().find(|report| report.t_s == epoch.t_s).map(|report| &report.believed)
+            law.reports.iter().find(|report| report.errors.t_s == epoch.t_s).map(|report| &report.believed)
         };
         for outage in &mut outages {
             outage.second_order_nees = horizontal_nees((outage.start_s, outage.end_s), &epochs, believed);
@@ -155,8 +155,8 @@ fn square(instant: &Instant, states: &[usize]) -> QuadraticForm {
     QuadraticForm::of_square(&block(&instant.covariance, states), &mean)
 }
 
-fn epoch(instant: &Instant, bias_asee: [f64; BIASES], limit: f64) -> Option<EpochMetrics> {
-    let believed = block(&instant.believed, &COVERED);
+fn epoch(judged: &Judged, bias_asee: [f64; BIASES], limit: f64) -> Option<EpochMetrics> {
+    let (instant, believed) = (&judged.errors, block(&judged.believed, &COVERED));
     let mean = COVERED.map(|s| instant.mean[s]);
     // eᵀ P_f⁻¹ e is not chi-square where P_f is not the covariance of e: a weighted sum of such, whose law is
     // exact.
@@ -165,21 +165,21 @@ fn epoch(instant: &Instant, bias_asee: [f64; BIASES], limit: f64) -> Option<Epoc
         t_s: instant.t_s,
         gnss: instant.fix,
         count: 0,
-        asee: exactly(instant.sigma()),
+        asee: exactly(judged.sigma()),
         bias_asee,
         rmse: exactly(instant.rmse()),
         bias: exactly(instant.reported(&instant.mean)),
         mean_pos_err_m: exact(mean_size(instant, &[0, 1, 2])),
         mean_att_err_deg: exact(mean_size(instant, &[6, 7, 8]) / DEG),
-        nees: exact(instant.consistency().nees),
+        nees: exact(judged.consistency().nees),
         coverage: inside.cdf(limit),
     })
 }
 
-fn outage((start_s, end_s): (f64, f64), end: &Instant, epochs: &[EpochMetrics]) -> OutageMetrics {
+fn outage((start_s, end_s): (f64, f64), end: &Judged, epochs: &[EpochMetrics]) -> OutageMetrics {
     let mean = Accuracy::over(within((start_s, end_s), epochs));
     let without_error = |all: &PerState<Estimate>| PerState(all.0.map(|e| exact(e.value)));
-    let [p50, p95, p999] = horizontal_quantiles(end, [0.5, 0.95, NEARLY_ALL]);
+    let [p50, p95, p999] = horizontal_quantiles(&end.errors, [0.5, 0.95, NEARLY_ALL]);
     let quantile = |value: f64| Quantile { value, ci95: (None, None) };
     OutageMetrics {
         start_s,
@@ -187,7 +187,7 @@ fn outage((start_s, end_s): (f64, f64), end: &Instant, epochs: &[EpochMetrics]) 
         asee_mean: without_error(&mean.asee_mean),
         rmse_mean: without_error(&mean.rmse_mean),
         asee_end: exactly(end.sigma()),
-        rmse_end: exactly(end.rmse()),
+        rmse_end: exactly(end.errors.rmse()),
         nees_end: exact(end.consistency().nees),
         log_density_end: exact(end.consistency().log_density),
         horizontal_p50_m: quantile(p50),

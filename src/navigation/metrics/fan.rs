@@ -45,13 +45,13 @@ pub fn fan(result: &RunResult) -> Vec<FanEpoch> {
 #[must_use]
 pub fn expected_fan(filter: &FilterPass<'_>, truth: &TruthSide, outages: &[Outage]) -> Vec<FanEpoch> {
     let law = filter.errors(truth);
-    let times: Vec<f64> = law.reports.iter().map(|instant| instant.t_s).collect();
+    let times: Vec<f64> = law.reports.iter().map(|report| report.errors.t_s).collect();
     let epoch = |instant: &Instant| {
         let quantiles_m = horizontal_quantiles(instant, FAN_LEVELS);
         FanEpoch { t_s: instant.t_s, quantiles_m, lincov_m: None }
     };
-    let over_time = fan_epochs(&times, outages).par_iter().map(|i| epoch(&law.reports[*i])).collect();
-    with_ends(over_time, law.outage_ends.iter().map(epoch))
+    let over_time = fan_epochs(&times, outages).par_iter().map(|i| epoch(&law.reports[*i].errors)).collect();
+    with_ends(over_time, law.outage_ends.iter().map(|end| epoch(&end.errors)))
 }
 
 /// Puts the ends of outages into their places in time, before what comes after the fix.

@@ -34,7 +34,7 @@ impl Sensitivities {
     pub fn at_outage_ends(filter: &FilterPass<'_>, experiment: &Experiment<'_>, truth: &Model) -> Vec<Self> {
         let ln_rmse = |model: &Model| -> Vec<[f64; REPORTED]> {
             let side = TruthSide::together(&TruthSide::sources(experiment, model));
-            filter.errors_at_ends(&side).iter().map(|end| end.rmse().map(f64::ln)).collect()
+            filter.errors_at_ends(&side).iter().map(|end| end.errors.rmse().map(f64::ln)).collect()
         };
         let varied = Varied::all(truth);
         let slopes: Vec<Vec<[f64; REPORTED]>> = varied

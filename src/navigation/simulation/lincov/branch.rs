@@ -24,7 +24,7 @@ pub(crate) enum Moments {
     Reports,
 }
 
-/// The errors of a filter in each of some outages along a track that has none: what a pass along a track with that
+/// The true errors of a filter in each of some outages along a track that has none: what a pass along a track with that
 /// outage alone finds, at the cost of the outage instead of the way from the start.
 ///
 /// The outages may overlap: no branch knows of another.
@@ -43,6 +43,7 @@ pub(crate) fn errors_in_outages(
     let sides = Sides::of_errors(&believed, &truth.inertial, track);
     let own = Sides::of_filter(believed, track);
     let mut pass = Pass::new(track, &own, &sides, truth);
+    let is_height = |row: &Row| row.what == Measured::Height;
     let mut found = vec![Vec::new(); ways.len()];
     let mut at = 0;
     for together in order.chunks(TOGETHER) {
@@ -58,14 +59,21 @@ pub(crate) fn errors_in_outages(
         }
         let branch = |(place, mut pass): (usize, Pass<'_>)| {
             let (way, mut instants) = (&ways[place], Vec::new());
+            // Without a measurement nobody asks for a gain: of the filter's own covariance nothing is needed then.
+            let is_blind = !track.marks[way.clone()].iter().flat_map(|mark| &mark.rows).any(is_height);
             for (index, (steps, mark)) in way.clone().zip(track.legs(way.clone())) {
-                pass.follow(steps);
+                if is_blind {
+                    steps.iter().for_each(|step| pass.errors.step(step))
+                } else {
+                    pass.follow(steps)
+                }
                 // The end is looked at before its measurements, a report after them, as in the runs.
                 if index + 1 == way.end {
-                    instants.push(pass.instant(mark));
+                    instants.push(pass.errors.instant(mark));
                 } else {
-                    pass.measure(mark, |row| row.what == Measured::Height);
-                    instants.extend((moments == Moments::Reports && mark.report).then(|| pass.instant(mark)));
+                    pass.measure(mark, is_height);
+                    let report = moments == Moments::Reports && mark.report;
+                    instants.extend(report.then(|| pass.errors.instant(mark)));
                 }
             }
             (place, instants)
@@ -115,9 +123,5 @@ impl<'a> Pass<'a> {
             let (gain, _) = self.filter.measure(row);
             self.errors.measure(row, &gain);
         }
-    }
-
-    fn instant(&self, mark: &Mark) -> Instant {
-        self.errors.instant(mark, &self.filter.xx)
     }
 }

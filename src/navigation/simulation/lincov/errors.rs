@@ -2,7 +2,7 @@
 
 use super::joint::{Gain, Joint};
 use super::mean::Mean;
-use super::pass::Instant;
+use super::pass::{Instant, Judged};
 use super::sides::Sides;
 use super::track::{Mark, NAV, Nav, Row, Step, Track};
 use super::truth::TruthSide;
@@ -38,13 +38,16 @@ impl<'a> Errors<'a> {
         y.s + mean * mean
     }
 
-    pub(super) fn instant(&self, mark: &Mark, believed: &[Nav; NAV]) -> Instant {
+    pub(super) fn judged(&self, mark: &Mark, believed: &[Nav; NAV]) -> Judged {
+        Judged { errors: self.instant(mark), believed: *believed }
+    }
+
+    pub(super) fn instant(&self, mark: &Mark) -> Instant {
         Instant {
             after_s: mark.after_s,
             t_s: mark.t_s,
             measured: !mark.rows.is_empty(),
             fix: mark.fix,
-            believed: *believed,
             covariance: self.joint.xx,
             mean: self.mean.as_ref().map_or([0.0; NAV], |mean| mean.x),
             jacobian: mark.jacobian,

@@ -25,7 +25,7 @@ mod tune;
 
 pub(crate) use branch::{Moments, errors_in_outages};
 pub use heading::{HeadingDoubt, weak_heading};
-pub use pass::{Assessment, Consistency, ErrorLaw, FilterPass, Instant, assess};
+pub use pass::{Assessment, Consistency, ErrorLaw, FilterPass, Instant, Judged, assess};
 pub use reduce::{Alike, drive, reduced_belief};
 pub(crate) use root::Crossing;
 pub use track::Track;

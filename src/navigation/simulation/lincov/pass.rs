@@ -79,11 +79,11 @@ pub(super) fn assess_stated(track: &Track, belief: &Belief, truth: &TrueErrors) 
 
 fn assess_side(track: &Track, belief: &Belief, truth: &TruthSide) -> Assessment {
     let law = FilterPass::new(track, belief).errors(truth);
-    let consistency = |all: &[Instant]| all.iter().map(Instant::consistency).collect();
+    let consistency = |all: &[Judged]| all.iter().map(Judged::consistency).collect();
     Assessment { reports: consistency(&law.reports), outage_ends: consistency(&law.outage_ends) }
 }
 
-/// The law of errors at one instant: normal, with this mean and covariance, in the filter's navigation states
+/// The law of a filter's true errors at one instant: normal, with this mean and covariance, in the filter's navigation states
 /// (position m, velocity m/s, attitude rad, in n).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Instant {
@@ -95,22 +95,29 @@ pub struct Instant {
     pub measured: bool,
     /// Whether a fix is used here.
     pub fix: bool,
-    /// The covariance that the filter states.
-    pub believed: [Nav; NAV],
-    /// That of its true errors.
+    /// Covariance of the errors.
     pub covariance: [Nav; NAV],
-    /// Mean of its true errors.
+    /// Their mean.
     pub mean: Nav,
     pub(super) jacobian: [DVec3; 3],
+}
+
+/// A filter's errors at one instant, and what it states of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Judged {
+    /// The law of the true errors.
+    pub errors: Instant,
+    /// The covariance that the filter states.
+    pub believed: [Nav; NAV],
 }
 
 /// The law of a filter's errors along a track.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ErrorLaw {
     /// At every report (1 Hz), after the measurements.
-    pub reports: Vec<Instant>,
+    pub reports: Vec<Judged>,
     /// Just before the first fix after each outage (or at the end).
-    pub outage_ends: Vec<Instant>,
+    pub outage_ends: Vec<Judged>,
     /// Sum of the expected squares of the innovations of fixes over the variances that the filter states, and how
     /// many fixes.
     pub nis: (f64, u64),
@@ -190,7 +197,7 @@ impl<'a> FilterPass<'a> {
 
     /// The same at the ends of outages alone: what comes after the last is not computed.
     #[must_use]
-    pub fn errors_at_ends(&self, truth: &TruthSide) -> Vec<Instant> {
+    pub fn errors_at_ends(&self, truth: &TruthSide) -> Vec<Judged> {
         let last = self.track.marks.iter().rposition(|m| !m.outages.is_empty()).map_or(0, |at| at + 1);
         self.errors_until(last, truth).outage_ends
     }
@@ -203,7 +210,7 @@ impl<'a> FilterPass<'a> {
         let (mut law, mut ends) = (ErrorLaw::default(), vec![None; self.track.outages]);
         for (steps, mark) in self.track.legs(0..marks) {
             steps.iter().for_each(|step| errors.step(step));
-            mark.outages.iter().for_each(|o| ends[*o] = Some(errors.instant(mark, &self.ends[*o])));
+            mark.outages.iter().for_each(|o| ends[*o] = Some(errors.judged(mark, &self.ends[*o])));
             law.nis.1 += u64::from(mark.fix);
             for (row, (gain, believed)) in mark.rows.iter().zip(&mut gains) {
                 let square = errors.measure(row, gain);
@@ -213,7 +220,7 @@ impl<'a> FilterPass<'a> {
                 }
             }
             if mark.report {
-                law.reports.extend(reports.next().map(|believed| errors.instant(mark, believed)));
+                law.reports.extend(reports.next().map(|believed| errors.judged(mark, believed)));
             }
         }
         law.outage_ends = ends.into_iter().flatten().collect();
@@ -243,22 +250,24 @@ impl Instant {
         std::array::from_fn(|i| if i < 6 { squares[i] } else { squares[i] / (DEG * DEG) })
     }
 
-    /// Standard deviations that the filter states of the reported states.
-    #[must_use]
-    pub fn sigma(&self) -> [f64; REPORTED] {
-        deviations(&self.jacobian, &self.believed)
-    }
-
     /// Root mean squares of the true errors of the reported states.
     #[must_use]
     pub fn rmse(&self) -> [f64; REPORTED] {
         deviations(&self.jacobian, &self.moments())
     }
+}
+
+impl Judged {
+    /// Standard deviations that the filter states of the reported states.
+    #[must_use]
+    pub fn sigma(&self) -> [f64; REPORTED] {
+        deviations(&self.errors.jacobian, &self.believed)
+    }
 
     /// How the filter's covariance stands to that of its true errors.
     #[must_use]
     pub fn consistency(&self) -> Consistency {
-        let moments = self.moments();
+        let moments = self.errors.moments();
         let p = SMatrix::<f64, NAV, NAV>::from_fn(|i, j| self.believed[j][i]);
         let t = SMatrix::<f64, NAV, NAV>::from_fn(|i, j| moments[j][i]);
         let log_det = |l: SMatrix<f64, NAV, NAV>| 2.0 * l.diagonal().map(f64::ln).sum();
@@ -271,10 +280,10 @@ impl Instant {
         };
         let dof = NAV as f64;
         Consistency {
-            after_s: self.after_s,
-            measured: self.measured,
+            after_s: self.errors.after_s,
+            measured: self.errors.measured,
             sigma: self.sigma(),
-            rmse: self.rmse(),
+            rmse: self.errors.rmse(),
             nees,
             divergence: nees - (real - believed) - dof,
             // E ln N(x; 0, P) = −½ (E xᵀ P⁻¹ x + ln det P + n ln 2π), and the first term is the expected
