@@ -65,9 +65,9 @@ fn beyond_vertically(summary: &Summary) -> Option<String> {
     let (outage, share) = beyond.max_by(|a, b| a.1.total_cmp(&b.1))?;
     Some(format!(
         "beyond linear: attitude errors of the outage {} shift the velocity down by {} m/s to second order, {:.0} % of the \
-         filter's standard deviation, which neither filter nor covariance analysis contains; for some minutes from its end on the velocity \
-         down and the vertical accelerometer bias can be twice as wrong as believed{}. A barometer, a shorter outage \
-         or {} removes it",
+         filter's standard deviation; the covariance analysis contains this up to the outage's end, and not what the first fixes make \
+         of it: for some minutes the velocity down and the vertical accelerometer bias can be twice as wrong as believed{}. A shorter \
+         outage or {} removes it, and so does a barometer, unless the accelerometer is so quiet that the filter takes no bias for its cause",
         window(outage.start_s, outage.end_s),
         readable(outage.second_order_vel_d_m_s),
         100.0 * share,
@@ -81,7 +81,7 @@ fn beyond_horizontally(summary: &Summary) -> Option<String> {
     let (outage, nees) = beyond.max_by(|a, b| a.1.total_cmp(&b.1))?;
     Some(format!(
         "beyond linear: heading error times tilt in the outage {} shifts horizontal velocity and position to second order, by which the \
-         NEES is larger by up to about {}, which neither filter nor covariance analysis contains{}. A shorter outage or {} removes it",
+         NEES is larger by up to about {}, which the covariance analysis does not contain{}. A shorter outage or {} removes it",
         window(outage.start_s, outage.end_s),
         readable(nees),
         how_far(summary),

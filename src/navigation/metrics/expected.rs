@@ -9,7 +9,9 @@ use super::summary::{AccuracySummary, Consistency, Coverage, Nis, OutageSummary,
 use super::verdict::{OutageVerdict, Verdict};
 use crate::ekf::Belief;
 use crate::noise::Model;
-use crate::simulation::lincov::{ErrorLaw, FilterPass, Instant, Judged, Track, TruthSide};
+use crate::simulation::lincov::{
+    ErrorLaw, FilterPass, Instant, Judged, SecondOrder, Track, TruthSide, vertical_second_order,
+};
 use crate::simulation::{BIASES, COVERAGE_DOF, Experiment, NEES_DOF, OutageRecord, REPORTED, RunRecord};
 use crate::units::DEG;
 use nalgebra::DMatrix;
@@ -51,11 +53,24 @@ impl Expected {
         // The limit that the filter itself would take for this level: it believes in a chi-square law.
         let limit = chi2.inverse_cdf(experiment.coverage_level);
         let reports = law.reports.iter().zip(filter.bias_sigmas());
-        let epochs: Vec<EpochMetrics> =
+        let mut epochs: Vec<EpochMetrics> =
             reports.map(|(instant, bias)| epoch(instant, *bias, limit)).collect::<Option<_>>()?;
+        let second_order = vertical_second_order(track, belief, &truth, experiment.outages);
+        for second in second_order.iter().flatten() {
+            // the fix that ends an outage is used at the epoch of that instant, but not at the outage's end
+            if let Some(epoch) = epochs.iter_mut().find(|epoch| epoch.t_s == second.t_s && !epoch.gnss) {
+                add_second_order(&mut epoch.asee, &mut epoch.rmse, second);
+                DOWN.into_iter().zip(second.mean).for_each(|(i, mean)| epoch.bias.0[i].value += mean);
+            }
+        }
         let ends = experiment.outages.iter().zip(&law.outage_ends);
         let mut outages: Vec<OutageMetrics> =
             ends.map(|(window, end)| outage((window.start_s, window.end_s), end, &epochs)).collect();
+        for (outage, second) in outages.iter_mut().zip(&second_order) {
+            if let Some(end) = second.last() {
+                add_second_order(&mut outage.asee_end, &mut outage.rmse_end, end);
+            }
+        }
         let believed = |epoch: &EpochMetrics| {
             law.reports.iter().find(|report| report.errors.t_s == epoch.t_s).map(|report| &report.believed)
         };
@@ -121,6 +136,19 @@ impl Expected {
             is_second_order: false,
             require: Vec::new(),
         }
+    }
+}
+
+/// Position and velocity down among the reported states.
+const DOWN: [usize; 2] = [2, 5];
+
+/// Adds what is of second order in position and velocity down to standard deviations that the filter states and to root mean
+/// squares of its errors. NEES, coverage and quantiles stay those of first order: they are of the whole covariance of one run, which
+/// its mean over the runs does not stand for.
+fn add_second_order(asee: &mut PerState<Estimate>, rmse: &mut PerState<Estimate>, second: &SecondOrder) {
+    for (k, i) in DOWN.into_iter().enumerate() {
+        asee.0[i].value = (asee.0[i].value.powi(2) + second.believed[k]).sqrt();
+        rmse.0[i].value = (rmse.0[i].value.powi(2) + second.variance[k] + second.mean[k].powi(2)).sqrt();
     }
 }
 

@@ -1,10 +1,10 @@
-//! What a linear filter, and a covariance analysis, leave out: errors of attitude to second order.
+//! What a linear filter leaves out, and a covariance analysis in part: errors of attitude to second order.
 //!
 //! A tilt ψ turns the specific force −g of level motion into a horizontal acceleration gψ, which the filter knows, and
 //! shortens what is left upright to g cos ψ: the vehicle seems to accelerate downwards with g(ψ_n² + ψ_e²)/2, whatever the
-//! sign of the tilt. The mean of this grows with the square of the attitude's standard deviation and is in no linear
-//! error model (that of [Groves](crate::bibliography::Groves13), chapter 14, is its first order). After an
-//! outage of minutes it is taken for a bias of the vertical accelerometer.
+//! sign of the tilt. A covariance analysis contains this up to the end of the outage (`lincov/vertical.rs`), where the filters of
+//! runs state as much more themselves. The first fixes then take the shift for a bias of the vertical accelerometer, and that is
+//! in neither.
 //!
 //! A heading error ψ_d turns the horizontal acceleration gψ out of the direction in which the filter expects it: ½ψ×(ψ×f), the
 //! second order of the rotation by ψ, has the horizontal parts ½gψ_dψ_n and ½gψ_dψ_e. Its mean is 0, and it is small beside the

@@ -1,6 +1,7 @@
 //! The covariance of \[navigation error; bias estimates\] and its correlation with the states of the truth.
 
 use super::input::{SIGNALS, Source, StepOfSource};
+use super::mean::Mean;
 use super::sides::{Inputs, Sides};
 use super::track::{NAV, Nav, Row, Step};
 use crate::simulation::BIASES;
@@ -57,6 +58,13 @@ impl<'a> Joint<'a> {
                 of_signal.map(|(j, _)| factors[i] * factors[j] * self.bb[i * nb + j]).sum::<f64>();
         }
         variances
+    }
+
+    /// Covariance of everything with a state of the navigation error as it is now: as time goes on, that of the present with the past.
+    pub(super) fn covariance_with(&self, state: usize) -> Mean<'a> {
+        let with_states = |columns: &[Nav]| columns.iter().map(|x| x[state]).collect();
+        let (b, t) = (with_states(&self.xb), with_states(&self.xt));
+        Mean { sides: self.sides, x: self.xx[state], b, t, elapsed: self.elapsed }
     }
 
     /// Over one step: A P Aᵀ + Q in blocks.

@@ -1,4 +1,4 @@
-//! The mean of the true errors: what is the same in every run.
+//! The mean of the true errors, which is the same in every run, and what else moves as a mean does.
 
 use super::input::{SIGNALS, Source, StepOfSource};
 use super::joint::Gain;
@@ -6,15 +6,15 @@ use super::sides::Sides;
 use super::track::{NAV, Nav, Row, Step};
 
 /// Mean of z = \[navigation error; bias estimates\] and of the truth's states, as [`Joint`](super::joint::Joint)
-/// has their covariance.
+/// has their covariance; or their covariance with a variable of the past, of which later noise knows nothing.
 #[derive(Debug, Clone)]
 pub(super) struct Mean<'a> {
-    sides: &'a Sides,
+    pub(super) sides: &'a Sides,
     pub(super) x: Nav,
-    b: Vec<f64>,
-    t: Vec<f64>,
+    pub(super) b: Vec<f64>,
+    pub(super) t: Vec<f64>,
     /// Samples so far.
-    elapsed: f64,
+    pub(super) elapsed: f64,
 }
 
 impl<'a> Mean<'a> {

@@ -22,6 +22,7 @@ mod sides;
 mod track;
 mod truth;
 mod tune;
+mod vertical;
 
 pub(crate) use branch::{Moments, errors_in_outages};
 pub use heading::{HeadingDoubt, weak_heading};
@@ -32,3 +33,4 @@ pub use track::Track;
 pub use truth::{DRIFT, NamedSource, TrueErrors, TruthSide};
 pub(crate) use tune::times;
 pub use tune::{Aim, Factor, Filter, Honesty, Per, Task, scaled};
+pub(crate) use vertical::{SecondOrder, vertical_second_order};
