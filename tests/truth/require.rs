@@ -10,7 +10,8 @@ use nav_sim::sensors::imu::Truth;
 use nav_sim::sensors::outage::Outage;
 use nav_sim::trajectory::Trajectory;
 use nav_sim::trajectory::profile::{Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning};
-use nav_sim_navigation::simulation::lincov::{FilterPass, TruthSide};
+use nav_sim_navigation::simulation::REPORTED;
+use nav_sim_navigation::simulation::lincov::{FilterPass, Track, TruthSide};
 
 const OUTAGE: Outage = Outage { start_s: 150.0, end_s: 190.0 };
 
@@ -112,6 +113,51 @@ fn the_imu_that_is_named_keeps_the_limit_at_every_beginning() {
     }
 }
 
+/// The search takes steps of up to a second, `run` of a fifth: what the steps leave is less than the reserve.
+#[test]
+fn the_imu_that_is_named_keeps_the_limit_in_the_steps_of_a_run() {
+    let (scenario, trajectory) = (Scenario::default(), trajectory());
+    for (start_s, length_s) in [(133.0, 5.0), (120.0, 10.0), (100.0, 20.0), (150.0, 40.0)] {
+        let outages = [Outage { start_s, end_s: start_s + length_s }];
+        let course = Course::new(&scenario, &trajectory, &outages).unwrap();
+        let limits = limit(Quantity::Rmse, 1.0 + 0.005 * length_s * length_s);
+        let need = Need { course: &course, scenario: &scenario, limits: &limits, t_corr_s: 300.0 };
+        let model = need.allocated().unwrap().0.model(scenario.imu.rate_hz);
+        let track = scenario.track(&trajectory, &model, &outages).unwrap();
+        let end = end_of_outage(&scenario, &trajectory, &model, &outages, &track);
+        let share = end[0].hypot(end[1]) / limits[0].most;
+        assert!((0.9975..=1.0).contains(&share), "{length_s} s: {share}");
+    }
+}
+
+/// White noise in a step of a second is the sum of that in its parts, to rounding.
+#[test]
+fn white_noise_does_not_know_the_length_of_steps() {
+    let (scenario, trajectory) = (Scenario::default(), trajectory());
+    let white = |sigma2| Composite::new(vec![Process::White(White::new(sigma2).unwrap())]);
+    let model = Model::pooled(scenario.imu.rate_hz, &white(1e-3), &white(1e-7));
+    let outages = [Outage { start_s: 133.0, end_s: 138.0 }];
+    let track = scenario.track(&trajectory, &model, &outages).unwrap();
+    let at_end = |track: &Track| end_of_outage(&scenario, &trajectory, &model, &outages, track);
+    for (fine, merged) in at_end(&track).into_iter().zip(at_end(&track.merged())) {
+        assert!((merged / fine - 1.0).abs() < 1e-9, "{fine} {merged}");
+    }
+}
+
+/// RMSE at the end of an outage of the filter that knows the model.
+fn end_of_outage(
+    scenario: &Scenario,
+    trajectory: &Trajectory,
+    model: &Model,
+    outage: &[Outage],
+    track: &Track,
+) -> [f64; REPORTED] {
+    let belief = scenario.with_full_noise().belief(model, outage, track).unwrap();
+    let experiment = scenario.experiment(trajectory, Truth::Model(model), &[], outage, 1);
+    let truth = TruthSide::together(&TruthSide::sources(&experiment, model));
+    FilterPass::new(track, &belief).errors_at_ends(&truth)[0].errors.rmse()
+}
+
 /// What a pass along the trajectory with one outage alone finds: outages that overlap, that begin between fixes or within
 /// the first second, that last to the end; fixes at 5 Hz, and heights within the outage.
 #[test]
@@ -131,10 +177,7 @@ fn outages_beside_one_another_are_as_each_alone() {
             Course::new(&scenario, &trajectory, &outages).unwrap().drifts(&scenario, &model).unwrap();
         for (outage, drift) in outages.iter().map(std::slice::from_ref).zip(drifts) {
             let track = scenario.track(&trajectory, &model, outage).unwrap().merged();
-            let belief = scenario.with_full_noise().belief(&model, outage, &track).unwrap();
-            let experiment = scenario.experiment(&trajectory, Truth::Model(&model), &[], outage, 1);
-            let truth = TruthSide::together(&TruthSide::sources(&experiment, &model));
-            let alone = FilterPass::new(&track, &belief).errors(&truth).outage_ends[0].errors.rmse();
+            let alone = end_of_outage(&scenario, &trajectory, &model, outage, &track);
             let found = [drift.value(Quantity::Rmse), drift.angles_deg[0], drift.angles_deg[2]];
             let expected = [alone[0].hypot(alone[1]), alone[6], alone[8]];
             assert!(

@@ -106,8 +106,12 @@ impl<'a> Joint<'a> {
         // The states themselves last: the maps above are of their values at the beginning of the step.
         self.step_biases(step, inputs);
         self.elapsed += f64::from(step.samples);
+        for (white, unit) in inputs.white.iter().zip(&step.white) {
+            self.xx.iter_mut().zip(unit).for_each(|(column, unit)| add_scaled(column, *white, unit));
+        }
+        let q_mean = &inputs.q_mean[usize::from(!step.white.is_empty())];
         // What is new in the mean input of a signal acts through one column of B: Q = Σ q b bᵀ.
-        for (q, column) in inputs.q_mean.iter().zip(&step.b).filter(|(q, _)| **q != 0.0) {
+        for (q, column) in q_mean.iter().zip(&step.b).filter(|(q, _)| **q != 0.0) {
             for j in 0..NAV {
                 add_scaled(&mut self.xx[j], q * column[j], column);
             }

@@ -45,8 +45,11 @@ impl Sides {
 pub(super) struct Inputs {
     pub(super) b: Vec<StepOfSource>,
     pub(super) t: Vec<StepOfSource>,
-    /// Variance of the part of a signal's mean over the step that is new in it (units²).
-    pub(super) q_mean: [f64; SIGNALS],
+    /// Variance of the white noise of a sample (units²).
+    pub(super) white: [f64; SIGNALS],
+    /// Variance of the part of a signal's mean over the step that is new in it: of white noise and states, of states
+    /// alone (units²).
+    pub(super) q_mean: [[f64; SIGNALS]; 2],
 }
 
 impl Inputs {
@@ -56,11 +59,11 @@ impl Inputs {
         let steps_of =
             |s: &Sources| -> Vec<StepOfSource> { s.states.iter().map(|x| x.over(samples)).collect() };
         let (bs, ts) = (steps_of(b), steps_of(t));
-        let mut q_mean: [f64; SIGNALS] =
-            std::array::from_fn(|i| (b.white[i] + t.white[i]) / f64::from(samples));
+        let white: [f64; SIGNALS] = std::array::from_fn(|i| b.white[i] + t.white[i]);
+        let mut q_mean = [white.map(|white| white / f64::from(samples)), [0.0; SIGNALS]];
         for source in bs.iter().chain(&ts) {
-            q_mean[source.signal] += source.q_mean;
+            q_mean.iter_mut().for_each(|q| q[source.signal] += source.q_mean);
         }
-        Self { b: bs, t: ts, q_mean }
+        Self { b: bs, t: ts, white, q_mean }
     }
 }
