@@ -93,8 +93,19 @@ impl TrajectoryCheck {
         rows.join("\n")
     }
 
-    /// Which bounds are not met.
-    pub(crate) fn beyond_bounds(&self) -> String {
+    /// Which bounds are not met, and how often limits are exceeded; none where all is well.
+    pub(crate) fn missed(&self) -> Option<String> {
+        let closure = (!self.is_closed()).then(|| self.beyond_bounds());
+        let motion = match self.beyond_limits.len() {
+            0 => None,
+            1 => Some("the motion is beyond a limit in 1 stretch".to_owned()),
+            n => Some(format!("the motion is beyond a limit in {n} stretches")),
+        };
+        let missed: Vec<String> = closure.into_iter().chain(motion).collect();
+        (!missed.is_empty()).then(|| format!("{}: {}", self.file, missed.join("; ")))
+    }
+
+    fn beyond_bounds(&self) -> String {
         let (c, b) = (&self.closure.closure, &self.bounds);
         let all = [
             (c.position_m, b.position_m, "m"),
@@ -103,8 +114,7 @@ impl TrajectoryCheck {
         ];
         let beyond = all.into_iter().filter(|(found, bound, _)| found.is_nan() || found > bound);
         let text = beyond.map(|(found, bound, unit)| format!("{found:.3e} {unit}, beyond {bound:e} {unit}"));
-        let text = text.collect::<Vec<_>>().join("; ");
-        format!("{}: closure at {} Hz is {text}", self.file, c.rate_hz)
+        format!("closure at {} Hz is {}", c.rate_hz, text.collect::<Vec<_>>().join("; "))
     }
 }
 

@@ -33,15 +33,21 @@ fn check_prints_the_closure_and_exits_with_3_beyond_a_bound() {
 }
 
 #[test]
-fn check_speaks_json_and_warns_beyond_limits() {
+fn check_speaks_json_and_exits_with_3_beyond_a_limit() {
     let (code, out, err) = trajectory(&["check", DRIVE, "--limit-speed", "24", "--format", "json"]);
     let report: serde_json::Value = serde_json::from_str(&out).unwrap();
-    assert_eq!((code, report["closure"]["within_bounds"].as_bool()), (0, Some(true)));
+    assert_eq!((code, report["closure"]["within_bounds"].as_bool()), (3, Some(true)));
     assert!(report["closure"]["horizontal_m"].as_f64().unwrap() < 0.01);
     assert!((report["largest"]["speed_m_s"].as_f64().unwrap() - 25.0).abs() < 1e-3);
     let said = report["beyond_limits"][0].as_str().unwrap();
     assert!(said.starts_with("speed 25.0 m/s at ") && said.contains("beyond 24.0 m/s (between 39"), "{said}");
-    assert_eq!(err, format!("warning: {DRIVE}: {said}\n"));
+    let stretches = report["beyond_limits"].as_array().unwrap().len();
+    let verdict = format!("error: {DRIVE}: the motion is beyond a limit in {stretches} stretch");
+    assert!(err.starts_with(&format!("warning: {DRIVE}: {said}\n")) && err.contains(&verdict), "{err}");
+    assert!(err.contains("hint: a vehicle that does move so deserves larger limits (--limit-speed"), "{err}");
+    // both at once: each is named
+    let (code, _, err) = trajectory(&["check", DRIVE, "--limit-speed", "24", "--max-position-m", "1e-9"]);
+    assert!(code == 3 && err.contains("beyond 1e-9 m") && err.contains("; the motion is beyond"), "{err}");
 }
 
 #[test]

@@ -11,8 +11,8 @@ use nav_sim_signal::units::DEG;
 /// Check a trajectory: could a vehicle move so, and does navigation close on it?
 ///
 /// Closure: the noise-free IMU samples of the trajectory are mechanised from its exact start and compared with
-/// it. The difference is the error of the strapdown algorithm at this rate; beyond a bound the exit code is 3.
-/// Motion beyond a limit, and velocity columns that contradict the positions, are warnings.
+/// it. The difference is the error of the strapdown algorithm at this rate. Closure beyond a bound and motion beyond
+/// a limit end with exit code 3. Velocity columns that contradict the positions are warnings.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -68,11 +68,19 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let check = TrajectoryCheck::new(found, &trajectory, (largest, &beyond), (closure, args.bounds()));
     let limits = [args.limit_speed, args.limit_accel, args.limit_jerk, args.limit_rate];
     session.show(|| crate::report::json(&check), || check.text(limits));
-    if check.is_closed() {
-        return Ok(());
+    match check.missed() {
+        Some(missed) => Err(Failure::bound(missed).hint(hint(&check))),
+        None => Ok(()),
     }
-    let hint = "a higher --rate-hz closes better; rough motion may deserve a wider bound";
-    Err(Failure::bound(check.beyond_bounds()).hint(hint))
+}
+
+/// What may help where a bound or a limit is not kept.
+fn hint(check: &TrajectoryCheck) -> &'static str {
+    if check.is_closed() {
+        "a vehicle that does move so deserves larger limits (--limit-speed, --limit-accel, --limit-jerk, --limit-rate)"
+    } else {
+        "a higher --rate-hz closes better; rough motion may deserve a wider bound"
+    }
 }
 
 impl Args {
