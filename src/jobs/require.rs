@@ -2,7 +2,8 @@
 
 use super::turn_on;
 use crate::formats::model_file::{ModelFile, PROGRAM};
-use crate::report::require::{Bridged, CURVE_S, Longest, NeededImu, Question, RankedUnit};
+use crate::report::require::{Bridged, CURVE_S, LONGEST_S, Longest, NeededImu, Question, RankedUnit};
+use nav_sim_navigation::ekf::BeliefError;
 use nav_sim_navigation::require::{
     Answer, Course, Drift, IMU_PARAMETERS, ImuParameters, Limit, Margins, Need, Quantity, RequireError,
     Worst, evenly,
@@ -42,8 +43,6 @@ const SETTLED_S: f64 = 300.0;
 const TOGETHER_S: f64 = 60_000.0;
 /// Beginnings at least.
 const BEGINNINGS: f64 = 16.0;
-/// Longest outage that is looked at (s).
-const LONGEST_S: f64 = 600.0;
 /// Points of a curve of equal drift.
 const POINTS: u32 = 8;
 
@@ -158,7 +157,7 @@ impl Requirements {
         let curves = course.curves(scenario, model)?;
         let of_limit = |limit: &Limit| CURVE_S.map(|s| worst_after(&curves, s, limit.quantity));
         let bridged = Bridged {
-            longest: longest(&curves, &self.limits),
+            longest: self.longest_of(&course, (scenario, model), &curves)?,
             curves: self.limits.iter().map(of_limit).collect(),
         };
         Ok((bridged, self.question(outages)))
@@ -194,7 +193,29 @@ impl Requirements {
             not_stated: unit.not_stated.clone(),
             worst,
             curve: CURVE_S.map(|s| worst_after(&curves, s, worst.limit.quantity)),
-            longest: longest(&curves, &self.limits),
+            longest: self.longest_of(course, (&unit.scenario, &unit.model), &curves)?,
+        })
+    }
+
+    /// The longest outage of which all places are within the limits, in whole seconds. The first place holds the longest.
+    fn longest_of(
+        &self,
+        course: &Course<'_>,
+        (scenario, model): (&Scenario, &Model),
+        curves: &[Vec<Drift>],
+    ) -> Result<Longest, BeliefError> {
+        let first = curves.first().map_or(&[][..], Vec::as_slice);
+        let lengths: Vec<f64> = first.iter().map(|d| d.after_s).collect();
+        let is_missed = |length_s: &f64| {
+            after(curves, *length_s).iter().any(|drift| self.limits.iter().any(|l| drift.exceeds(l)))
+        };
+        Ok(match lengths.iter().position(is_missed) {
+            Some(0) => {
+                let worst = Worst::of(&self.limits, &course.with_all_fixes(scenario, model)?);
+                worst.filter(|worst| worst.margin() < 0.0).map_or(Longest::Seconds(0.0), Longest::Never)
+            }
+            Some(first) => Longest::Seconds(lengths[first - 1]),
+            None => Longest::AtLeast(lengths.last().copied().unwrap_or(0.0)),
         })
     }
 
@@ -232,29 +253,37 @@ impl Requirements {
     fn outages(&self) -> Vec<Outage> {
         match self.ask {
             Ask::Window(outage) => vec![outage],
-            ask => self.beginnings(ask.length_s()),
+            ask => self.places(ask.length_s(), ask.length_s()),
         }
     }
 
-    /// An outage of this length at all its beginnings.
-    fn beginnings(&self, length_s: f64) -> Vec<Outage> {
+    /// An outage of this length at all its beginnings; fewer where outages of `mean_s` would together last too long.
+    fn places(&self, length_s: f64, mean_s: f64) -> Vec<Outage> {
         let end_s = self.trajectory.end_s();
         let seconds = (end_s - length_s - self.first_s).floor().max(0.0) + 1.0;
-        let count = seconds.min((TOGETHER_S / length_s).max(BEGINNINGS));
+        let count = seconds.min((TOGETHER_S / mean_s).max(BEGINNINGS));
         evenly(self.first_s, end_s, length_s, count as u32)
     }
 
-    /// The outage at the places that it is asked for, each as long as the trajectory allows. Where the longest is sought,
-    /// all of one length.
+    /// The outage at the places that it is asked for, each as long as the trajectory allows.
     fn long_outages(&self) -> Vec<Outage> {
         let end_s = self.trajectory.end_s();
-        if self.ask == Ask::Longest {
-            let length_s = (0.5 * (end_s - self.first_s)).floor().min(LONGEST_S).max(self.ask.length_s());
-            return self.beginnings(length_s);
-        }
         // The same places whatever is made of them: a unit is judged alike alone and in a ranking.
         let lasting = |o: Outage| Outage { end_s: end_s.min(o.start_s + LONGEST_S).max(o.end_s), ..o };
-        self.outages().into_iter().map(lasting).collect()
+        let places = match self.ask {
+            // Where the longest is sought every length is, at all places that leave room for it.
+            Ask::Longest => self.places(self.ask.length_s(), self.mean_length_s()),
+            _ => self.outages(),
+        };
+        places.into_iter().map(lasting).collect()
+    }
+
+    /// Mean length of outages that begin anywhere, each as long as the trajectory allows (s).
+    fn mean_length_s(&self) -> f64 {
+        let left_s = self.trajectory.end_s() - self.first_s;
+        let longest_s = left_s.min(LONGEST_S);
+        // All are the longest but those that begin later than that before the end, half as long in the mean.
+        longest_s * (1.0 - 0.5 * longest_s / left_s)
     }
 
     fn course(&self, outages: &[Outage]) -> Result<Course<'_>, ExperimentError> {
@@ -293,16 +322,4 @@ fn after(curves: &[Vec<Drift>], length_s: f64) -> Vec<Drift> {
 /// The largest value of a quantity after a time without fixes.
 fn worst_after(curves: &[Vec<Drift>], length_s: u32, quantity: Quantity) -> Option<f64> {
     Drift::largest(&after(curves, f64::from(length_s)), quantity).map(|(_, value)| value)
-}
-
-/// The longest outage within the limits, in whole seconds. The first place holds the longest.
-fn longest(curves: &[Vec<Drift>], limits: &[Limit]) -> Longest {
-    let lengths: Vec<f64> = curves.first().map_or_else(Vec::new, |c| c.iter().map(|d| d.after_s).collect());
-    let is_missed =
-        |length_s: &f64| after(curves, *length_s).iter().any(|drift| limits.iter().any(|l| drift.exceeds(l)));
-    match lengths.iter().position(is_missed) {
-        Some(0) => Longest::Seconds(0.0),
-        Some(first) => Longest::Seconds(lengths[first - 1]),
-        None => Longest::AtLeast(lengths.last().copied().unwrap_or(0.0)),
-    }
 }

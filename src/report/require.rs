@@ -9,6 +9,8 @@ use serde_json::{Value, json};
 
 /// Lengths of an outage in the table of units (s).
 pub(crate) const CURVE_S: [u32; 7] = [1, 3, 10, 30, 60, 120, 300];
+/// Longest outage that is looked at (s).
+pub(crate) const LONGEST_S: f64 = 600.0;
 
 /// The IMU that a limit needs.
 #[derive(Debug, Clone)]
@@ -34,6 +36,8 @@ pub(crate) enum Longest {
     Seconds(f64),
     /// All that was looked at (s).
     AtLeast(f64),
+    /// None: a limit is exceeded where every fix comes. The hardest, just before a fix.
+    Never(Worst),
 }
 
 /// What a model bridges.
@@ -219,10 +223,28 @@ impl NeededImu {
 }
 
 impl Longest {
-    pub(super) fn in_words(self) -> String {
+    /// In a cell of a table.
+    fn in_short(self) -> String {
         match self {
-            Self::Seconds(s) => format!("{} s", seconds(s)),
-            Self::AtLeast(s) => format!("at least {} s", seconds(s)),
+            Self::Seconds(s) => at_least_a_second(s),
+            Self::AtLeast(s) => format!("≥ {} s", seconds(s)),
+            Self::Never(_) => "none".to_owned(),
+        }
+    }
+
+    fn in_words(self) -> String {
+        match self {
+            Self::Seconds(s) => at_least_a_second(s),
+            Self::AtLeast(s) if s < LONGEST_S => {
+                format!("at least {} s, which is as long as this trajectory allows", seconds(s))
+            }
+            Self::AtLeast(s) => format!("at least {} s; longer ones are not looked at", seconds(s)),
+            Self::Never(worst) => format!(
+                "none; even without an outage {} is {} just before a fix, {} of the limit",
+                worst.limit.quantity.name(),
+                readable(worst.value),
+                readable(worst.value / worst.limit.most)
+            ),
         }
     }
 
@@ -230,13 +252,22 @@ impl Longest {
         match self {
             Self::Seconds(s) => json!({ "longest_s": s }),
             Self::AtLeast(s) => json!({ "at_least_s": s }),
+            Self::Never(worst) => {
+                let with_all_fixes = json!({ "quantity": worst.limit.quantity.name(), "value": worst.value, "limit": worst.limit.most });
+                json!({ "longest_s": 0.0, "with_all_fixes": with_all_fixes })
+            }
         }
     }
 }
 
+/// Curves begin with the first second: what is not kept then may be kept for a part of it.
+fn at_least_a_second(length_s: f64) -> String {
+    if length_s < 1.0 { "less than 1 s".to_owned() } else { format!("{} s", seconds(length_s)) }
+}
+
 /// The longest outage, in a sentence.
 pub(crate) fn longest_verdict(longest: Longest, question: &Question) -> String {
-    format!("longest outage within the limits: {} ({})", longest.in_words(), question.limits_in_words())
+    format!("longest outage within the limits ({}): {}", question.limits_in_words(), longest.in_words())
 }
 
 /// The longest outage.
@@ -321,8 +352,7 @@ pub(crate) fn catalogue_rows(units: &[RankedUnit]) -> Vec<Vec<String>> {
             (false, true) => "open",
             (false, false) => "not met",
         };
-        let longest = unit.longest.in_words().replace("at least", "≥");
-        let mut row = vec![unit.name.clone(), met.to_owned(), longest];
+        let mut row = vec![unit.name.clone(), met.to_owned(), unit.longest.in_short()];
         row.extend(unit.curve.iter().map(|x| x.map_or_else(|| "–".to_owned(), readable)));
         row.push(unit.not_stated.join(", ").replace("accel bias, gyro bias", "both biases"));
         row

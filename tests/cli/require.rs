@@ -53,6 +53,60 @@ fn the_imu_that_is_named_meets_the_limit_and_a_tighter_one_not() {
     }
 }
 
+/// A limit that is missed where every fix comes is told so, with the error just before a fix. With a fix every two seconds
+/// that is what `run` finds at the end of an outage where every other fix of one a second is withheld.
+#[test]
+fn a_limit_that_no_fix_keeps_is_told_with_the_error_without_an_outage() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
+    file("rare.toml", "[gnss]\nrate_hz = 0.5\n");
+    file("every_other.toml", "[outage_periodic]\nfirst_s = 1\nevery_s = 2\nduration_s = 1\n");
+    let model = format!("{ROOT}/calib_data/tactical.toml");
+    let asked = [&model, "--scenario", "rare.toml", "--outage", "62:92", "--p95-m", "0.5"];
+    let said = stdout(&require(dir.path(), &asked).code(3));
+    assert!(said.contains("within the limits: none; even without an outage p95_m is "), "{said}");
+    let judged = stdout(&require(dir.path(), &[&asked[..], &["--format", "json"]].concat()));
+    let judged: Value = serde_json::from_str(&judged).unwrap();
+    let drive = format!("{ROOT}/trajectories/figure_eight.toml");
+    let run = ["run", &drive, &model, "--filter", "full", "--method", "lincov"];
+    let mut command = Command::cargo_bin("nav-sim").unwrap();
+    let command = command.current_dir(dir.path()).args(run).args(["--scenario", "every_other.toml"]);
+    command.args(["-o", "run"]).assert().success();
+    let summary = std::fs::read_to_string(dir.path().join("run/summary.json")).unwrap();
+    let summary: Value = serde_json::from_str(&summary).unwrap();
+    let outages = summary["outages"].as_array().unwrap();
+    let before_fix = outages.iter().find(|outage| outage["end_s"] == 62.0).unwrap();
+    let expected = before_fix["horizontal_error_end_m"]["p95"].as_f64().unwrap();
+    let found = judged["outage"]["with_all_fixes"]["value"].as_f64().unwrap();
+    // steps of a second against those of a fifth: the reserve of the search
+    assert!((found / expected - 1.0).abs() < 2e-3, "{found} {expected}");
+    assert_eq!(judged["outage"]["longest_s"], 0.0);
+}
+
+/// The longest outage is looked for as far as the drive goes, not up to half of what is left of it.
+#[test]
+fn the_longest_outage_is_sought_to_the_end_of_a_short_drive() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("drive.toml"), TURNS).unwrap();
+    let model = format!("{ROOT}/calib_data/tactical.toml");
+    let longest = |arguments: &[&str]| {
+        let asked = ["require", "drive.toml", &model, "--outage", "longest"];
+        let mut command = Command::cargo_bin("nav-sim").unwrap();
+        stdout(&command.current_dir(dir.path()).args(asked).args(arguments).assert().success())
+    };
+    // of 180 s, 100 s are left from 80 s on
+    let all = longest(&["--start", "80", "--p95-m", "1000"]);
+    assert!(all.contains("at least 100 s, which is as long as this trajectory allows"), "{all}");
+    // a limit that the error from 80 s on reaches after more than half of that
+    let found = longest(&["--start", "80", "--p95-m", "8", "--format", "json"]);
+    let found: Value = serde_json::from_str(&found).unwrap();
+    let seconds = found["outage"]["longest_s"].as_f64().unwrap();
+    assert!(seconds > 50.0 && seconds < 100.0, "{found}");
+    let later = format!("80:{}", 80.0 + seconds);
+    let judged = ["require", "drive.toml", &model, "--outage", &later, "--p95-m", "8"];
+    Command::cargo_bin("nav-sim").unwrap().current_dir(dir.path()).args(judged).assert().success();
+}
+
 #[test]
 fn a_directory_of_models_is_ranked() {
     let dir = tempfile::tempdir().unwrap();

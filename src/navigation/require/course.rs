@@ -165,6 +165,17 @@ impl<'a> Course<'a> {
         Ok(laws.into_iter().zip(&self.outages).map(curve).collect())
     }
 
+    /// Errors where no outage is, just before the first fix from the beginning of each outage on: the largest between two
+    /// fixes.
+    ///
+    /// # Errors
+    /// When the model has no such filter.
+    pub fn with_all_fixes(&self, scenario: &Scenario, model: &Model) -> Result<Vec<Drift>, BeliefError> {
+        // What ends where it begins withholds no fix, and is looked at before the first fix from there on.
+        let empty: Vec<Outage> = self.outages.iter().map(|o| Outage { end_s: o.start_s, ..*o }).collect();
+        self.drifts_in(&empty, scenario, model)
+    }
+
     /// The errors of each group of sources alone, under the gains of the filter that knows them all.
     pub(super) fn parts(
         &self,

@@ -102,7 +102,7 @@ pub(crate) fn model_page(margins: Option<&Margins>, question: &Question, bridged
     let (tone, verdict) = match margins {
         Some(margins) => (Tone::from(margins.met()), margins_verdict(margins, question, bridged.longest)),
         None => {
-            let bridges = bridged.longest != Longest::Seconds(0.0);
+            let bridges = !matches!(bridged.longest, Longest::Never(_) | Longest::Seconds(0.0));
             (Tone::from(bridges), longest_verdict(bridged.longest, question))
         }
     };
