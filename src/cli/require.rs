@@ -184,22 +184,10 @@ fn given(path: &Path, args: &Args, requirements: &Requirements, session: &Sessio
     turn_on::expect(&mut scenario.initial, &file, path, session);
     turn_on::make(&mut scenario.imu, &file, path, session);
     let model = read::at_rate(path, &file.model, scenario.imu.rate_hz, session)?;
-    let (bridged, places) = requirements.longest(&scenario, &model).map_err(unusable)?;
-    if args.outage == Ask::Longest {
-        let text = || words::longest_verdict(bridged.longest, &places);
-        session.show(|| words::longest_json(&bridged, &places), text);
-        return args.pictures.write(|| model_page(None, &places, &bridged), session);
-    }
-    let (margins, question) = requirements.margins(&scenario, &model).map_err(unusable)?;
-    let text = || {
-        let verdict = words::margins_verdict(&margins, &question, bridged.longest);
-        format!("{verdict}\n\n{}", markdown_table(&words::margins_rows(&margins)))
-    };
-    session.show(|| words::margins_json(&margins, &question, &bridged), text);
-    args.pictures.write(|| model_page(Some(&margins), &question, &bridged), session)?;
-    if margins.met() {
-        return Ok(());
-    }
+    let judged = requirements.judged(&scenario, &model).map_err(unusable)?;
+    session.show(|| judged.json(), || judged.text());
+    args.pictures.write(|| model_page(&judged), session)?;
+    let Some(margins) = judged.margins.filter(|margins| !margins.met()) else { return Ok(()) };
     let worst = margins.worst;
     let (name, most) = (worst.limit.quantity.name(), worst.limit.most);
     let unit = worst.limit.quantity.unit();

@@ -2,13 +2,17 @@
 
 use super::turn_on;
 use crate::formats::model_file::{ModelFile, PROGRAM};
-use crate::report::require::{Bridged, CURVE_S, LONGEST_S, Longest, NeededImu, Question, RankedUnit};
+use crate::report::require::{
+    BeyondLinear, Bridged, CURVE_S, Judged, LONGEST_S, Longest, NeededImu, Question, RankedUnit,
+};
 use nav_sim_navigation::ekf::BeliefError;
+use nav_sim_navigation::metrics::Expected;
 use nav_sim_navigation::require::{
     Answer, Course, Drift, IMU_PARAMETERS, ImuParameters, Limit, Margins, Need, Quantity, RequireError,
     Worst, evenly,
 };
 use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::sensors::imu::Truth;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::ExperimentError;
 use nav_sim_navigation::trajectory::Trajectory;
@@ -108,7 +112,8 @@ impl Requirements {
         let course = self.course(&outages)?;
         let need = Need { course: &course, scenario: &self.scenario, limits: &self.limits, t_corr_s };
         let (imu, shares) = need.allocated()?;
-        let ends = course.drifts(&self.scenario, &imu.model(self.scenario.imu.rate_hz))?;
+        let model = imu.model(self.scenario.imu.rate_hz);
+        let ends = course.drifts(&self.scenario, &model)?;
         let worst = Worst::of(&self.limits, &ends).expect("at least one limit and one place");
         let mut needed = NeededImu {
             imu,
@@ -117,6 +122,7 @@ impl Requirements {
             alone: [Answer::Any; IMU_PARAMETERS],
             others_better: [Answer::Any; IMU_PARAMETERS],
             iso_drift: None,
+            beyond_linear: self.beyond_linear(&self.scenario, &model, outages[worst.place])?,
         };
         for i in 0..IMU_PARAMETERS {
             needed.alone[i] = need.quite_alone(&imu, i)?;
@@ -128,39 +134,55 @@ impl Requirements {
         Ok((needed, self.question(outages)))
     }
 
-    /// What a model makes of the limits; `scenario` is that of the unit, with its turn-on biases.
+    /// What a model makes of the limits, and the longest outage that it bridges within them: at the places that the outage
+    /// asked for has, each as far as the trajectory goes. `scenario` is that of the unit, with its turn-on biases.
     ///
     /// # Errors
     /// When the model has no filter.
-    pub(crate) fn margins(
-        &self,
-        scenario: &Scenario,
-        model: &Model,
-    ) -> Result<(Margins, Question), RequireError> {
-        let outages = self.outages();
-        let course = self.course(&outages)?;
-        Ok((Margins::of(&course, scenario, model, &self.limits)?, self.question(outages)))
+    pub(crate) fn judged(&self, scenario: &Scenario, model: &Model) -> Result<Judged, RequireError> {
+        let long = self.long_outages();
+        let course = self.course(&long)?;
+        let curves = course.curves(scenario, model)?;
+        let longest = self.longest_of(&course, (scenario, model), &curves)?;
+        let of_limit = |limit: &Limit| CURVE_S.map(|s| worst_after(&curves, s, limit.quantity));
+        let bridged = Bridged { longest, curves: self.limits.iter().map(of_limit).collect() };
+        let (margins, outages, judged) = if self.ask == Ask::Longest {
+            let length_s = longest.length_s();
+            let worst = Worst::of(&self.limits, &after(&curves, length_s));
+            let judged = worst
+                .map(|worst| Outage { end_s: long[worst.place].start_s + length_s, ..long[worst.place] });
+            (None, long, judged)
+        } else {
+            let outages = self.outages();
+            let margins = Margins::of(&self.course(&outages)?, scenario, model, &self.limits)?;
+            let judged = outages[margins.worst.place];
+            (Some(margins), outages, Some(judged))
+        };
+        let beyond_linear = match judged {
+            Some(outage) => self.beyond_linear(scenario, model, outage)?,
+            None => None,
+        };
+        Ok(Judged { margins, question: self.question(outages), bridged, beyond_linear })
     }
 
-    /// The longest outage that a model bridges within the limits, and where: at the places that the outage asked for
-    /// has, each as far as the trajectory goes.
-    ///
-    /// # Errors
-    /// When the model has no filter.
-    pub(crate) fn longest(
+    /// Whether `run` would say that the errors in an outage are beyond linear theory: by the covariance analysis that it
+    /// makes.
+    fn beyond_linear(
         &self,
         scenario: &Scenario,
         model: &Model,
-    ) -> Result<(Bridged, Question), RequireError> {
-        let outages = self.long_outages();
-        let course = self.course(&outages)?;
-        let curves = course.curves(scenario, model)?;
-        let of_limit = |limit: &Limit| CURVE_S.map(|s| worst_after(&curves, s, limit.quantity));
-        let bridged = Bridged {
-            longest: self.longest_of(&course, (scenario, model), &curves)?,
-            curves: self.limits.iter().map(of_limit).collect(),
-        };
-        Ok((bridged, self.question(outages)))
+        outage: Outage,
+    ) -> Result<Option<BeyondLinear>, RequireError> {
+        let (scenario, outages) = (scenario.with_full_noise(), [outage]);
+        let track = scenario.track(&self.trajectory, model, &outages)?;
+        let belief = scenario.belief(model, &outages, &track)?;
+        let experiment = scenario.experiment(&self.trajectory, Truth::Model(model), &[], &outages, 0);
+        let Some(expected) = Expected::along(&track, &experiment, &belief, model) else { return Ok(None) };
+        let mut summary = expected.summary();
+        if scenario.baro.is_some() {
+            summary.see_height();
+        }
+        Ok(summary.outages.first().and_then(BeyondLinear::of))
     }
 
     /// How units do after the outage and after those of `CURVE_S`, the best first: those that keep the limits, those

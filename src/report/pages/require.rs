@@ -2,10 +2,7 @@
 
 use super::sentence;
 use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, Table, Tone};
-use crate::report::require::{
-    Bridged, CURVE_S, Longest, NeededImu, Question, RankedUnit, catalogue_rows, longest_verdict,
-    margins_verdict,
-};
+use crate::report::require::{Bridged, CURVE_S, Judged, NeededImu, Question, RankedUnit, catalogue_rows};
 use nav_sim_navigation::require::{Answer, IMU_PARAMETERS, ImuParameters, Margins, Quantity};
 
 const CHECKED: &str = "the IMU that a limit needs meets it in sampled runs, and a larger error of the IMU never makes a smaller one of \
@@ -98,15 +95,10 @@ fn iso_table(points: &[(f64, Answer)]) -> Table {
 }
 
 /// The page of what a given IMU makes of the limits; without margins, of the longest outage that it bridges.
-pub(crate) fn model_page(margins: Option<&Margins>, question: &Question, bridged: &Bridged) -> Page {
-    let (tone, verdict) = match margins {
-        Some(margins) => (Tone::from(margins.met()), margins_verdict(margins, question, bridged.longest)),
-        None => {
-            let bridges = !matches!(bridged.longest, Longest::Never(_) | Longest::Seconds(0.0));
-            (Tone::from(bridges), longest_verdict(bridged.longest, question))
-        }
-    };
-    let mut page = Page::new("An IMU against its limits", tone, &sentence(&verdict));
+pub(crate) fn model_page(judged: &Judged) -> Page {
+    let Judged { margins, question, bridged, .. } = judged;
+    let mut page =
+        Page::new("An IMU against its limits", Tone::from(judged.is_good()), &sentence(&judged.verdict()));
     page.section("Error against the length of an outage");
     for (i, limit) in question.limits.iter().enumerate() {
         let Some(curve) = bridged.curves.get(i) else { continue };

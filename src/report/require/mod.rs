@@ -1,9 +1,13 @@
 //! What a limit needs of an IMU, and what a given one makes of it, on one screen and as JSON.
 
+mod judged;
+mod second_order;
+
+pub(crate) use judged::{Bridged, Judged, Longest};
+pub(crate) use second_order::BeyondLinear;
+
 use super::number::{readable, seconds, window};
-use nav_sim_navigation::require::{
-    Answer, GroupMargin, IMU_PARAMETERS, ImuParameters, IsoDrift, Limit, Margins, Worst,
-};
+use nav_sim_navigation::require::{Answer, IMU_PARAMETERS, ImuParameters, IsoDrift, Limit, Worst};
 use nav_sim_navigation::sensors::outage::Outage;
 use serde_json::{Value, json};
 
@@ -27,33 +31,8 @@ pub(crate) struct NeededImu {
     pub others_better: [Answer; IMU_PARAMETERS],
     /// The curve of equal drift.
     pub iso_drift: Option<IsoDrift>,
-}
-
-/// The longest outage that keeps the limits.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Longest {
-    /// So long (s).
-    Seconds(f64),
-    /// All that was looked at (s).
-    AtLeast(f64),
-    /// None: a limit is exceeded where every fix comes. The hardest, just before a fix.
-    Never(Worst),
-}
-
-/// What a model bridges.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Bridged {
-    /// The longest outage within the limits.
-    pub longest: Longest,
-    /// The quantity of each limit, at its worst place, after [`CURVE_S`]; none where the trajectory is too short.
-    pub curves: Vec<[Option<f64>; CURVE_S.len()]>,
-}
-
-impl Bridged {
-    fn json(&self, question: &Question) -> Value {
-        let curve = |(limit, curve): (&Limit, &[Option<f64>; CURVE_S.len()])| json!({ "quantity": limit.quantity.name(), "points": points_json(curve) });
-        question.limits.iter().zip(&self.curves).map(curve).collect()
-    }
+    /// Where the answer is beyond linear theory.
+    pub beyond_linear: Option<BeyondLinear>,
 }
 
 fn points_json(curve: &[Option<f64>; CURVE_S.len()]) -> Vec<Value> {
@@ -164,12 +143,13 @@ impl NeededImu {
         let (from_s, to_s) = self.imu.floor_s();
         format!(
             "needed for {}: an IMU as allocated below (bias instability: the floor of the Allan deviation, here from {} s \
-             to {} s); with it {}; GNSS and the start take {} of the variance there",
+             to {} s); with it {}; GNSS and the start take {} of the variance there{}",
             question.in_words(),
             readable(from_s),
             readable(to_s),
             question.worst(&self.worst),
-            share(self.shares[IMU_PARAMETERS])
+            share(self.shares[IMU_PARAMETERS]),
+            second_order::line(self.beyond_linear.as_ref())
         )
     }
 
@@ -217,123 +197,10 @@ impl NeededImu {
             "figures": (0..IMU_PARAMETERS).map(figure).collect::<Vec<_>>(),
             "share_of_gnss_and_start": self.shares[IMU_PARAMETERS],
             "place": self.worst.place,
+            "beyond_linear": self.beyond_linear,
             "iso_drift": self.iso_drift.as_ref().map(|c| c.points.iter().map(point).collect::<Vec<_>>()),
         }))
     }
-}
-
-impl Longest {
-    /// In a cell of a table.
-    fn in_short(self) -> String {
-        match self {
-            Self::Seconds(s) => at_least_a_second(s),
-            Self::AtLeast(s) => format!("≥ {} s", seconds(s)),
-            Self::Never(_) => "none".to_owned(),
-        }
-    }
-
-    fn in_words(self) -> String {
-        match self {
-            Self::Seconds(s) => at_least_a_second(s),
-            Self::AtLeast(s) if s < LONGEST_S => {
-                format!("at least {} s, which is as long as this trajectory allows", seconds(s))
-            }
-            Self::AtLeast(s) => format!("at least {} s; longer ones are not looked at", seconds(s)),
-            Self::Never(worst) => format!(
-                "none; even without an outage {} is {} just before a fix, {} of the limit",
-                worst.limit.quantity.name(),
-                readable(worst.value),
-                readable(worst.value / worst.limit.most)
-            ),
-        }
-    }
-
-    fn json(self) -> Value {
-        match self {
-            Self::Seconds(s) => json!({ "longest_s": s }),
-            Self::AtLeast(s) => json!({ "at_least_s": s }),
-            Self::Never(worst) => {
-                let with_all_fixes = json!({ "quantity": worst.limit.quantity.name(), "value": worst.value, "limit": worst.limit.most });
-                json!({ "longest_s": 0.0, "with_all_fixes": with_all_fixes })
-            }
-        }
-    }
-}
-
-/// Curves begin with the first second: what is not kept then may be kept for a part of it.
-fn at_least_a_second(length_s: f64) -> String {
-    if length_s < 1.0 { "less than 1 s".to_owned() } else { format!("{} s", seconds(length_s)) }
-}
-
-/// The longest outage, in a sentence.
-pub(crate) fn longest_verdict(longest: Longest, question: &Question) -> String {
-    format!("longest outage within the limits ({}): {}", question.limits_in_words(), longest.in_words())
-}
-
-/// The longest outage.
-pub(crate) fn longest_json(bridged: &Bridged, question: &Question) -> String {
-    super::json(&json!({
-        "schema_version": 1,
-        "question": question.json(),
-        "outage": bridged.longest.json(),
-        "curves": bridged.json(question),
-    }))
-}
-
-/// Whether a model keeps its limits, in a sentence.
-pub(crate) fn margins_verdict(margins: &Margins, question: &Question, longest: Longest) -> String {
-    let times = readable(margins.worst.value / margins.worst.limit.most);
-    let word = if margins.met() { "met" } else { "NOT met" };
-    format!(
-        "{word}: {}; {}, {times} of the limit; longest outage within the limits: {}",
-        question.in_words(),
-        question.worst(&margins.worst),
-        longest.in_words()
-    )
-}
-
-/// A row for each part of the IMU.
-pub(crate) fn margins_rows(margins: &Margins) -> Vec<Vec<String>> {
-    let mut rows = vec![
-        ["part of the error", "share", "factor on its sigma that alone meets the limit"]
-            .map(str::to_owned)
-            .to_vec(),
-    ];
-    let largest = margins.groups.iter().map(|g| g.share).fold(0.0, f64::max);
-    let binding = |g: &GroupMargin| if g.share == largest { " (binding)" } else { "" };
-    for g in &margins.groups {
-        let factor = match g.factor {
-            Some(f) if f >= 1.0 => format!("× {} (slack: so much worse it may be)", readable(f)),
-            Some(f) => format!("× {}", readable(f)),
-            None if margins.met() => "any value".to_owned(),
-            None => "none: the rest is too large".to_owned(),
-        };
-        rows.push(vec![format!("{}{}", g.group.name(), binding(g)), share(g.share), factor]);
-    }
-    if margins.drift > 0.0 {
-        rows.push(vec!["drift".to_owned(), share(margins.drift), String::new()]);
-    }
-    rows.push(vec!["GNSS, start, turn-on biases".to_owned(), share(margins.rest), String::new()]);
-    rows
-}
-
-/// All of it.
-pub(crate) fn margins_json(margins: &Margins, question: &Question, bridged: &Bridged) -> String {
-    let group = |g: &GroupMargin| json!({ "part": g.group.name(), "share": g.share, "factor": g.factor });
-    super::json(&json!({
-        "schema_version": 1,
-        "question": question.json(),
-        "met": margins.met(),
-        "quantity": margins.worst.limit.quantity.name(),
-        "value": margins.worst.value,
-        "limit": margins.worst.limit.most,
-        "place": margins.worst.place,
-        "groups": margins.groups.iter().map(group).collect::<Vec<_>>(),
-        "share_of_drifts": margins.drift,
-        "share_of_the_rest": margins.rest,
-        "outage": bridged.longest.json(),
-        "curves": bridged.json(question),
-    }))
 }
 
 /// The units of a catalogue, the best first.

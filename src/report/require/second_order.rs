@@ -1,0 +1,50 @@
+//! Where the errors that an answer rests on are too large for linear theory.
+
+use crate::report::number::{readable, window};
+use nav_sim_navigation::metrics::OutageSummary;
+use serde::Serialize;
+
+/// An outage whose errors are beyond linear theory, by the rules of `run`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(crate) struct BeyondLinear {
+    start_s: f64,
+    end_s: f64,
+    /// Shift of the velocity down over the filter's standard deviation.
+    vel_d_share: Option<f64>,
+    /// What heading error times tilt adds to the NEES at most.
+    nees: Option<f64>,
+}
+
+impl BeyondLinear {
+    /// None where linear theory covers the outage.
+    pub(crate) fn of(outage: &OutageSummary) -> Option<Self> {
+        let (vel_d_share, nees) = (outage.beyond_linear(), outage.beyond_linear_horizontally());
+        let is_beyond = vel_d_share.or(nees).is_some();
+        is_beyond.then_some(Self { start_s: outage.start_s, end_s: outage.end_s, vel_d_share, nees })
+    }
+
+    /// A sentence.
+    fn in_words(&self) -> String {
+        let down = self.vel_d_share.map(|share| {
+            format!(
+                "attitude errors shift the velocity down by {:.0} % of the filter's standard deviation",
+                100.0 * share
+            )
+        });
+        let horizontal = self.nees.map(|nees| {
+            format!("heading error times tilt makes the NEES larger by up to about {}", readable(nees))
+        });
+        let both: Vec<String> = down.into_iter().chain(horizontal).collect();
+        format!(
+            "beyond linear: in the outage {} {}; errors of second order are in no covariance analysis, and `nav-sim run --method \
+             both` shows how far they are from the answer",
+            window(self.start_s, self.end_s),
+            both.join(" and ")
+        )
+    }
+}
+
+/// The sentence on a line of its own, if there is one.
+pub(super) fn line(beyond: Option<&BeyondLinear>) -> String {
+    beyond.map_or_else(String::new, |beyond| format!("\n{}", beyond.in_words()))
+}
