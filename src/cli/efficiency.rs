@@ -53,6 +53,10 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if done > 0 {
         session.say(format!("{done} sets are there already"));
     }
+    if directory.told > done {
+        let (out, told) = (args.out.display(), directory.told);
+        session.warn(format!("{out}/sets.csv was cut: {done} of the {told} sets of {out}/results.json are left; the rest is estimated anew"));
+    }
     let progress = session.progress("sets", sets.saturating_sub(done));
     // Long enough that no thread waits for the last set of a block for a large part of it.
     let block = 8 * session.threads() as u64;

@@ -1,5 +1,6 @@
 //! The directory of an estimator study: what it is (`study.json`), and the estimates from each set as they
-//! are finished (`sets.csv`), from which a study that was stopped goes on.
+//! are finished (`sets.csv`), from which a study that was stopped goes on. Each row of that ends with a checksum of the rest of
+//! it: an incomplete set at the end is made anew, a changed one is refused.
 
 use super::atomic::{self, Claim};
 use super::difference::{self, Difference};
@@ -28,6 +29,13 @@ pub(crate) struct Layout {
     pub parameters: Vec<String>,
 }
 
+impl Layout {
+    fn header(&self) -> String {
+        let names: Vec<String> = self.parameters.iter().map(|n| n.replace(' ', "_")).collect();
+        format!("set,scenario,estimator,{},objective,without_root,checksum\n", names.join(","))
+    }
+}
+
 /// An open study directory.
 #[derive(Debug)]
 pub(crate) struct StudyDirectory {
@@ -37,6 +45,8 @@ pub(crate) struct StudyDirectory {
     _claim: Claim,
     /// The sets already estimated from, in order.
     pub done: Vec<Vec<Estimate>>,
+    /// Sets that the results of the directory rest on; more than are done where `sets.csv` lost some.
+    pub told: u64,
 }
 
 impl StudyDirectory {
@@ -65,9 +75,10 @@ impl StudyDirectory {
         let mut file = File::options().create(true).write(true).truncate(false).open(&sets).map_err(io)?;
         file.set_len(whole).map_err(io)?;
         std::io::Seek::seek(&mut file, std::io::SeekFrom::End(0)).map_err(io)?;
-        let mut directory = Self { path: sets.clone(), layout, sets: file, _claim: claim, done };
+        let told = told(&path.join("results.json"));
+        let mut directory = Self { path: sets.clone(), layout, sets: file, _claim: claim, done, told };
         if whole == 0 {
-            directory.write(directory.header().as_bytes())?;
+            directory.write(directory.layout.header().as_bytes())?;
         }
         Ok(directory)
     }
@@ -84,17 +95,13 @@ impl StudyDirectory {
                 let mut row = vec![number.clone(), scenario.clone(), estimator.clone()];
                 row.extend(e.theta.iter().map(|v| format!("{v:e}")));
                 row.extend([format!("{:e}", e.objective), e.without_root.to_string()]);
+                row.push(checksum(row.iter().map(String::as_str)));
                 rows.write_record(&row).map_err(|e| FileError::io(&self.path, e.into()))?;
             }
             self.done.push(set);
         }
         let text = rows.into_inner().map_err(|e| FileError::io(&self.path, e.into_error()))?;
         self.write(&text)
-    }
-
-    fn header(&self) -> String {
-        let names: Vec<String> = self.layout.parameters.iter().map(|n| n.replace(' ', "_")).collect();
-        format!("set,scenario,estimator,{},objective,without_root\n", names.join(","))
     }
 
     fn write(&mut self, text: &[u8]) -> Result<()> {
@@ -136,6 +143,23 @@ fn same(path: &Path, text: &str, wanted: &Value) -> Result<()> {
     }
 }
 
+/// How many sets the results are of; none without results.
+fn told(results: &Path) -> u64 {
+    let text = fs::read_to_string(results).unwrap_or_default();
+    serde_json::from_str::<Value>(&text).ok().and_then(|results| results["sets"].as_u64()).unwrap_or(0)
+}
+
+/// Of the fields of a row, in 16 hexadecimal digits.
+fn checksum<'a>(fields: impl Iterator<Item = &'a str>) -> String {
+    let mut hasher = blake3::Hasher::new();
+    for field in fields {
+        hasher.update(field.as_bytes());
+        // what ends a field: "1", "23" are not "12", "3"
+        hasher.update(b"\n");
+    }
+    hasher.finalize().to_hex()[..16].to_owned()
+}
+
 /// The complete sets, and how many bytes they take with the header.
 fn parse(path: &Path, text: &str, layout: &Layout) -> Result<(Vec<Vec<Estimate>>, u64)> {
     let terminated = &text[..text.rfind('\n').map_or(0, |i| i + 1)];
@@ -145,12 +169,19 @@ fn parse(path: &Path, text: &str, layout: &Layout) -> Result<(Vec<Vec<Estimate>>
         return Ok((Vec::new(), 0));
     }
     reader.headers().map_err(|e| damaged(1, &e.to_string()))?;
+    if !terminated.starts_with(&layout.header()) {
+        return Err(damaged(1, "is not the header of this study's sets, whose rows end with a checksum"));
+    }
     let (mut sets, mut set, mut whole) = (Vec::new(), Vec::new(), reader.position().byte());
     let mut record = csv::StringRecord::new();
     while reader.read_record(&mut record).map_err(|e| damaged(reader.position().line(), &e.to_string()))? {
         let line = record.position().map_or(0, csv::Position::line);
         let row = estimate(&record, sets.len() + 1, set.len(), layout);
         set.push(row.ok_or_else(|| damaged(line, "is not a row of this study"))?);
+        let last = record.len() - 1;
+        if record[last] != checksum(record.iter().take(last)) {
+            return Err(damaged(line, "is not as it was written: its checksum is that of another row"));
+        }
         if set.len() == layout.rows.len() {
             sets.push(std::mem::take(&mut set));
             whole = reader.position().byte();
@@ -162,7 +193,7 @@ fn parse(path: &Path, text: &str, layout: &Layout) -> Result<(Vec<Vec<Estimate>>
 fn estimate(record: &csv::StringRecord, set: usize, row: usize, layout: &Layout) -> Option<Estimate> {
     let (scenario, estimator) = layout.rows.get(row)?;
     let p = layout.parameters.len();
-    let as_expected = record.len() == p + 5
+    let as_expected = record.len() == p + 6
         && record[0].parse() == Ok(set)
         && record[1] == **scenario
         && record[2] == **estimator;
@@ -236,9 +267,24 @@ mod tests {
         assert!(e.ends_with("its \"levels\" is 12, not 11"), "{e}");
         let file = dir.path().join("sets.csv");
         let text = fs::read_to_string(&file).unwrap().replace("dr-awv", "gmwm");
-        fs::write(&file, text).unwrap();
-        let e = StudyDirectory::open(dir.path(), &json!({ "seed": 1 }), layout()).unwrap_err();
-        assert!(e.to_string().ends_with("sets.csv, line 3: is not a row of this study"), "{e}");
+        let whole = fs::read_to_string(&file).unwrap();
+        let refused = |text: &str| {
+            fs::write(&file, text).unwrap();
+            StudyDirectory::open(dir.path(), &json!({ "seed": 1 }), layout()).unwrap_err().to_string()
+        };
+        let e = refused(&text);
+        assert!(e.ends_with("sets.csv, line 3: is not a row of this study"), "{e}");
+        // one digit of an estimate, one of the objective: still numbers
+        for (was, is) in [("3.333", "3.334"), (",-1e0,", ",-2e0,")] {
+            assert!(whole.contains(was), "{whole}");
+            let e = refused(&whole.replace(was, is));
+            assert!(
+                e.contains("sets.csv, line ") && e.contains(": is not as it was written: its checksum"),
+                "{e}"
+            );
+        }
+        let e = refused(&whole.replace("checksum", "sum"));
+        assert!(e.contains("sets.csv, line 1: is not the header of this study's sets"), "{e}");
         fs::remove_file(dir.path().join("study.json")).unwrap();
         let e = StudyDirectory::open(dir.path(), &json!({ "seed": 1 }), layout()).unwrap_err();
         assert!(e.to_string().ends_with("holds sets.csv, which is not of a study"), "{e}");

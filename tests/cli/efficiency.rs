@@ -34,6 +34,10 @@ fn a_stopped_study_goes_on_to_the_same_results_at_any_number_of_threads() {
     fs::write(&sets, &text[..text.len() - 40]).unwrap();
     let assert = efficiency(dir.path(), "--sets 9 -j 3 -o parts").assert().success();
     assert!(said(&assert).contains("3 sets are there already"), "{}", said(&assert));
+    let cut = "warning: parts/sets.csv was cut: 3 of the 4 sets of parts/results.json are left; the rest is estimated anew";
+    assert!(said(&assert).contains(cut), "{}", said(&assert));
+    let again = efficiency(dir.path(), "--sets 9 -o parts").assert().success();
+    assert!(!said(&again).contains("warning"), "{}", said(&again));
     for file in FILES {
         assert_eq!(read(&dir.path().join("whole"), file), read(&dir.path().join("parts"), file), "{file}");
     }
