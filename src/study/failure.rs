@@ -5,12 +5,17 @@ use super::plan::Unit;
 use super::remedy::Remedy;
 use super::unit_file::UnitFileError;
 use crate::formats::FileError;
+use nav_sim_navigation::ekf::BeliefError;
 use nav_sim_navigation::metrics::ComparisonError;
 use nav_sim_navigation::sensors::outage::OutageError;
 use std::path::PathBuf;
 
 /// Any error, where only its words matter.
 type Source = Box<dyn std::error::Error + Send + Sync>;
+
+/// What helps where fixes are too rare to reduce a model.
+const RARE_FIXES: &str =
+    "raise it, or take the full filter alone (filters = [\"full\"]), which reduces nothing";
 
 /// A study that cannot be planned, run, merged or verified.
 #[derive(Debug, thiserror::Error)]
@@ -88,6 +93,14 @@ pub enum StudyError {
         part: String,
         /// Why.
         source: Source,
+    },
+    /// A candidate's model without the filter that is asked for.
+    #[error("{part}: {source}")]
+    NoFilter {
+        /// The candidate.
+        part: String,
+        /// Why.
+        source: BeliefError,
     },
     /// A covariance that ran away.
     #[error("{cell}: the covariance analysis of {column} did not stay finite and positive definite")]
@@ -171,6 +184,9 @@ impl StudyError {
             Self::Description { source, .. } => source.hint().map(Remedy::Advice),
             Self::Outage { source, .. } => source.hint().map(|hint| Remedy::Advice(hint.to_owned())),
             Self::Candidate { source, .. } => source.remedy(),
+            Self::NoFilter { source: BeliefError::Setting(_), .. } => {
+                Some(Remedy::Advice(RARE_FIXES.to_owned()))
+            }
             Self::NoPlan { .. } => Some(Remedy::Plan),
             Self::OtherStudy { .. } => Some(Remedy::PlanElsewhere),
             Self::Changed { .. } => Some(Remedy::PutBack),

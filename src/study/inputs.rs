@@ -212,7 +212,8 @@ impl<'a> Inputs<'a> {
             let part = || format!("candidate {}", column.name);
             let model = &models[plan.model(column.candidate, cell.truth).path.as_str()];
             let model = continuous::at_rate(model, scenario.imu.rate_hz).map_err(|e| unfit(part(), e))?;
-            variant.belief(&model, outages, track).map_err(|e| unfit(part(), e))
+            let belief = variant.belief(&model, outages, track);
+            belief.map_err(|source| StudyError::NoFilter { part: part(), source })
         };
         grid.columns.par_iter().map(belief).collect()
     }

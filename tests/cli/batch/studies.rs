@@ -133,3 +133,23 @@ fn scripts_for_schedulers_are_well_formed() {
     assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
     assert!(dir.join("out/results/outages.csv").exists());
 }
+
+/// As `run` does: by the key of the receiver's rate, with what helps; the full filter takes it.
+#[test]
+fn fixes_too_rare_for_the_reduction_are_blamed_on_their_rate() {
+    let place = place();
+    let walk = MODEL.replace("\"AR1\", phi = 0.9999, sigma2", "\"RW\", gamma2");
+    fs::write(place.path().join("imu.toml"), walk).unwrap();
+    let rare = STUDY.replace("{ sweep = { start_s = 30, duration_s = [2, 4, 8, 16] } }, ", "")
+        + "[[gnss]]\nname = \"rare\"\nsettings.rate_hz = 0.001\n";
+    fs::write(place.path().join("study.toml"), &rare).unwrap();
+    let planned = batch(place.path(), "plan study.toml -o rare");
+    let ran = batch(place.path(), "run study.toml -o rare");
+    let said = [planned.stderr, ran.stderr].map(|text| String::from_utf8_lossy(&text).into_owned()).concat();
+    let words =
+        ["candidate imu: gnss.rate_hz = 0.001 is refused", "hint: raise it, or take the full filter alone"];
+    assert!(words.iter().all(|words| said.contains(words)), "{said}");
+    fs::write(place.path().join("study.toml"), format!("filters = [\"full\"]\n{rare}")).unwrap();
+    done(place.path(), "plan study.toml -o full");
+    done(place.path(), "run study.toml -o full");
+}
