@@ -15,6 +15,7 @@ mod outage;
 mod quadratic_form;
 mod ratio;
 mod reduction;
+mod reduction_words;
 mod requirement;
 mod second_order;
 mod sensitivity;

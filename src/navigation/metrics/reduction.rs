@@ -4,16 +4,12 @@ use super::estimate::PerState;
 use crate::ekf::Belief;
 use crate::ekf::belief::BiasGroup;
 use crate::fusion::IN_WORDS;
-use crate::imu::{Channel, Sensor};
+use crate::imu::Channel;
 use crate::noise::{Ar1, Composite, Model, ParameterError, Process, White, continuous, reduction};
 use crate::simulation::REPORTED;
 use crate::simulation::lincov::{Assessment, Consistency};
 use glam::DVec3;
 use serde::Serialize;
-
-/// From so many windows of correlation time on a bias is called a random walk: over a window `w` its variance grows by
-/// `1 − exp(−w/T)`, which is linear to `w/2T`, half a per mille.
-const WALK: f64 = 1000.0;
 
 /// A ratio of RMSE to standard deviation that is further from 1 at the end of an outage deserves a warning.
 pub const TOLERANCE: f64 = 0.1;
@@ -98,39 +94,6 @@ impl ReductionSummary {
     #[must_use]
     pub fn is_exact(&self) -> bool {
         self.axes.iter().all(|a| a.misfit == 0.0)
-    }
-
-    /// A line for the axes of a sensor that are reduced alike.
-    #[must_use]
-    pub fn lines(&self) -> Vec<String> {
-        let describe = |name: &str, unit: &str, a: &AxisReduction| {
-            let left_out = if a.quantization_left_out { "; quantization noise left out" } else { "" };
-            // A bias that keeps its value far beyond the window is known there by its steps alone.
-            let bias = if a.bias_t_corr_s > WALK * self.window_s {
-                let steps = a.bias_sigma * (2.0 / a.bias_t_corr_s).sqrt();
-                format!("one bias that is a random walk of {steps:.3e} {unit}/√s")
-            } else {
-                format!("one bias of {:.3e} {unit}, correlation time {:.0} s", a.bias_sigma, a.bias_t_corr_s)
-            };
-            format!(
-                "{name} reduced to white noise of {:.3e} {unit} per sample and {bias} (wavelet variance reproduced within \
-                 {:.0} %{left_out})",
-                a.white_sigma2.sqrt(),
-                100.0 * a.misfit.exp_m1()
-            )
-        };
-        let mut lines = Vec::new();
-        for (sensor, axes) in Sensor::ALL.into_iter().zip(self.axes.chunks(3)) {
-            let alike = |a: &AxisReduction, b: &AxisReduction| {
-                (a.white_sigma2, a.bias_phi, a.bias_sigma2) == (b.white_sigma2, b.bias_phi, b.bias_sigma2)
-            };
-            for shown in axes.chunk_by(alike) {
-                let names: Vec<&str> = shown.iter().map(|a| a.axis.as_str()).collect();
-                let name = if names.len() == 3 { sensor.name().to_owned() } else { names.join(", ") };
-                lines.push(describe(&name, sensor.unit(), &shown[0]));
-            }
-        }
-        lines
     }
 }
 
@@ -235,17 +198,17 @@ impl ReductionQuality {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::ekf::{FilterStates, InitialSettings};
-    use crate::noise::{Quantization, RandomWalk};
+    use crate::noise::Quantization;
 
-    fn summary(model: &Model) -> ReductionSummary {
+    pub(in crate::metrics) fn summary(model: &Model) -> ReductionSummary {
         let belief = Belief::new(model, FilterStates::Reduced15, 1.0, 800.0).unwrap();
         ReductionSummary::of(model, &belief, 1.0, 800.0).unwrap()
     }
 
-    fn model(second: f64) -> Model {
+    pub(in crate::metrics) fn model(second: f64) -> Model {
         let mut processes = vec![
             Process::White(White::new(5e-5).unwrap()),
             Process::Ar1(Ar1::new(0.9995, 2e-10).unwrap()),
@@ -256,17 +219,6 @@ mod tests {
         }
         let axis = Composite::new(processes);
         Model::pooled(100.0, &axis, &axis)
-    }
-
-    /// The steps of a walk of density K after one second are K.
-    #[test]
-    fn a_bias_beyond_any_window_is_said_to_be_a_random_walk() {
-        let walk = RandomWalk::new(1e-12).unwrap();
-        let axis = Composite::new(vec![Process::White(White::new(5e-5).unwrap()), Process::RandomWalk(walk)]);
-        let lines = summary(&Model::pooled(100.0, &axis, &axis)).lines();
-        assert!(lines[0].contains("one bias that is a random walk of 1.000e-5 m/s²/√s ("), "{lines:?}");
-        let lines = summary(&model(0.0)).lines();
-        assert!(lines[0].contains(", correlation time 20 s ("), "{lines:?}");
     }
 
     #[test]
