@@ -101,14 +101,15 @@ pub(crate) struct Row {
     pub ratio_error_pct: f64,
     /// Mean of its absolute value.
     pub abs_ratio_error_pct: f64,
-    /// 95 % interval of the signed mean: Monte Carlo and, where it is known, what the calibrations leave open.
-    pub ci95_pct: [f64; 2],
+    /// 95 % interval of the signed mean: Monte Carlo and, where it is known, what the calibrations leave open; null where
+    /// nothing was drawn and nothing is known of those.
+    pub ci95_pct: Option<[f64; 2]>,
     /// Half the interval that the calibrations alone leave (points); null where it is not known.
     pub calibration_half_pct: Option<f64>,
     /// (ratio − 1)·100 of the RMSE at the outage's end.
     pub rmse_end_ratio_error_pct: f64,
-    /// Its 95 % Monte-Carlo interval.
-    pub rmse_end_ci95_pct: [f64; 2],
+    /// Its 95 % Monte-Carlo interval; null where nothing was drawn.
+    pub rmse_end_ci95_pct: Option<[f64; 2]>,
 }
 
 /// Consistency of one run in one outage, beside the reference's.
@@ -194,9 +195,11 @@ pub(crate) fn verdict_lines(verdicts: &[VerdictRow]) -> Vec<String> {
 
 /// What the ± of the table are.
 pub(crate) fn meaning_of_intervals(candidates: &[CandidateResult]) -> &'static str {
-    let mut states = candidates.iter().flat_map(|c| &c.outages).flat_map(|outage| &outage.states);
-    if states.any(|state| state.calibration_half_pct.is_some()) {
+    let states = || candidates.iter().flat_map(|c| &c.outages).flat_map(|outage| &outage.states);
+    if states().any(|state| state.calibration_half_pct.is_some()) {
         "± half the 95 % interval, Monte Carlo and calibrations together"
+    } else if states().all(|state| state.asee.ci95_pct.is_none()) {
+        "nothing is drawn in a covariance analysis, and what the calibrations leave open is not known: no intervals"
     } else {
         "± half the 95 % interval of Monte Carlo; what the calibrations leave open (run --method lincov) is not in it"
     }

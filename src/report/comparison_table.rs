@@ -46,8 +46,8 @@ pub(crate) fn ratio_rows(
                 let window = [*start_s, *end_s].map(shortest);
                 let numbers = [
                     found.map(|ratio| ratio.asee.pct),
-                    found.map(|ratio| ratio.asee.ci95_pct[0]),
-                    found.map(|ratio| ratio.asee.ci95_pct[1]),
+                    found.and_then(|ratio| Some(ratio.asee.ci95_pct?[0])),
+                    found.and_then(|ratio| Some(ratio.asee.ci95_pct?[1])),
                     found.and_then(|ratio| ratio.calibration_half_pct),
                     found.map(|ratio| ratio.asee_abs_pct),
                 ];
@@ -149,11 +149,10 @@ fn cell(candidate: &CandidateResult, outage: usize, state: usize) -> String {
 
 /// A ratio's distance from unity with half its 95 % interval (%).
 fn signed(error: &RatioError) -> String {
-    let half = (error.ci95_pct[1] - error.ci95_pct[0]) / 2.0;
-    let interval = match half {
-        h if h >= 0.005 => format!(" ± {h:.2}"),
+    let interval = match error.ci95_pct.map(|[low, high]| (high - low) / 2.0) {
+        Some(half) if half >= 0.005 => format!(" ± {half:.2}"),
         // below that it is the rounding of equal ratios
-        h if h > 1e-9 => format!(" ± {h:.0e}"),
+        Some(half) if half > 1e-9 => format!(" ± {half:.0e}"),
         _ => String::new(),
     };
     format!("{:+.2}{interval}", error.pct)
@@ -165,7 +164,7 @@ pub(super) mod tests {
     use nav_sim_navigation::metrics::{OutageComparison, StateRatio, Verdict};
 
     pub(in crate::report) fn candidate(run: &str, pct: f64, is_reference: bool) -> CandidateResult {
-        let error = RatioError { pct, ci95_pct: [pct - 0.5, pct + 0.5] };
+        let error = RatioError { pct, ci95_pct: Some([pct - 0.5, pct + 0.5]) };
         let state = StateRatio {
             asee: error,
             asee_abs_pct: pct.abs() + 1.0,

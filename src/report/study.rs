@@ -168,7 +168,8 @@ fn outage_values(o: &OutageMetrics, verdict_ratio: f64, kept: u64) -> Vec<f64> {
 fn ratio_values(comparison: Option<&OutageComparison>) -> Vec<f64> {
     let Some(c) = comparison else { return vec![f64::NAN; 7 * REPORTED + 4] };
     let of_state = |s: &metrics::StateRatio| {
-        let ([low, high], [rmse_low, rmse_high]) = (s.asee.ci95_pct, s.rmse_end.ci95_pct);
+        let [[low, high], [rmse_low, rmse_high]] =
+            [s.asee.ci95_pct, s.rmse_end.ci95_pct].map(|interval| interval.unwrap_or([f64::NAN; 2]));
         [s.asee.pct, s.asee_abs_pct, low, high, s.rmse_end.pct, rmse_low, rmse_high]
     };
     c.states.iter().flat_map(of_state).chain(c.nees).chain(c.coverage).collect()

@@ -121,14 +121,14 @@ pub enum ComparisonError {
     },
 }
 
-/// A mean ratio's distance from unity (%) and the 95 % interval of it; NaN where runs are too few.
+/// A mean ratio's distance from unity (%) and the 95 % interval of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RatioError {
     /// (ratio − 1)·100.
     pub pct: f64,
     /// Its interval: of Monte Carlo, and of what the calibrations leave open where that is known
-    /// ([`OutageComparison::widen`]).
-    pub ci95_pct: [f64; 2],
+    /// ([`OutageComparison::widen`]). NaN where runs are too few; none where nothing was drawn and nothing else is known.
+    pub ci95_pct: Option<[f64; 2]>,
 }
 
 /// One state in one outage.
@@ -226,7 +226,7 @@ fn outage(
         let pct = mean(ratios.iter().copied());
         let asee = pairing.mean_ratio(&see(&records.0), &see(&records.1));
         StateRatio {
-            asee: RatioError { pct, ci95_pct: [pct - asee.half_width_pct, pct + asee.half_width_pct] },
+            asee: RatioError { pct, ci95_pct: asee.half_width_pct.map(|half| [pct - half, pct + half]) },
             asee_abs_pct: mean(ratios.iter().map(|e| e.abs())),
             calibration_half_pct: None,
             rmse_end: pairing.mean_ratio(&square(&records.0), &square(&records.1)).root(),
@@ -246,12 +246,13 @@ impl OutageComparison {
     pub fn widen(&mut self, candidate: &PerState<(f64, f64)>, reference: &PerState<(f64, f64)>) {
         let half_of_log = |(low, high): (f64, f64)| 0.5 * (high / low).ln();
         for (state, (c, r)) in self.states.iter_mut().zip(candidate.0.iter().zip(&reference.0)) {
-            let RatioError { pct, ci95_pct: [low, high] } = state.asee;
+            let RatioError { pct, ci95_pct } = state.asee;
             // In logarithms, where the intervals of scale parameters are nearly symmetric; independent, so
             // squares add.
             let calibration = (100.0 + pct) * half_of_log(*c).hypot(half_of_log(*r));
-            let half = (0.5 * (high - low)).hypot(calibration);
-            state.asee.ci95_pct = [pct - half, pct + half];
+            // Where nothing was drawn, what the calibrations leave open is all.
+            let half = ci95_pct.map_or(0.0, |[low, high]| 0.5 * (high - low)).hypot(calibration);
+            state.asee.ci95_pct = Some([pct - half, pct + half]);
             state.calibration_half_pct = Some(calibration);
         }
     }
@@ -275,10 +276,10 @@ fn records<'a>(
     kept(candidate).filter_map(|c| Some((record(c), record(of_run.get(&c.run)?)))).unzip()
 }
 
-/// A ratio of means and half the width of its 95 % interval (%).
+/// A ratio of means and half the width of its 95 % interval (%); none where no side was sampled.
 struct MeanRatio {
     ratio: f64,
-    half_width_pct: f64,
+    half_width_pct: Option<f64>,
 }
 
 impl MeanRatio {
@@ -287,9 +288,10 @@ impl MeanRatio {
     fn root(&self) -> RatioError {
         let root = self.ratio.sqrt();
         // d ln √R = dR/(2R).
-        let half = self.half_width_pct / 100.0 / (2.0 * self.ratio);
+        let half = self.half_width_pct.map(|half| half / 100.0 / (2.0 * self.ratio));
         let pct = |root: f64| (root - 1.0) * 100.0;
-        RatioError { pct: pct(root), ci95_pct: [-half, half].map(|x| pct(root * x.exp())) }
+        let interval = |half: f64| [-half, half].map(|x| pct(root * x.exp()));
+        RatioError { pct: pct(root), ci95_pct: half.map(interval) }
     }
 }
 
@@ -313,7 +315,7 @@ impl Pairing {
             .filter_map(|(side, exact)| (!exact).then_some(side))
             .collect();
         let Some(fewest) = sampled.iter().map(|side| side.len()).min() else {
-            return MeanRatio { ratio, half_width_pct: 0.0 };
+            return MeanRatio { ratio, half_width_pct: None };
         };
         let variance = if sampled.len() == 1 {
             // Var(a/b̄) is Var(ā)/b̄² with b certain, and ρ² Var(b̄)/b̄² with a certain.
@@ -330,7 +332,7 @@ impl Pairing {
         // The smaller sample decides: fewer degrees of freedom make a wider interval, never a narrower one.
         let freedom = SampleSize::of(fewest as u64, self.windows).independent - 1.0;
         let t = StudentsT::new(0.0, 1.0, freedom).map_or(f64::NAN, |t| t.inverse_cdf(0.975));
-        MeanRatio { ratio, half_width_pct: t * variance.sqrt() / mean_b * 100.0 }
+        MeanRatio { ratio, half_width_pct: Some(t * variance.sqrt() / mean_b * 100.0) }
     }
 
     fn variance_of_mean(&self, values: &[f64]) -> f64 {

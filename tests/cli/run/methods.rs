@@ -59,9 +59,14 @@ fn covariance_analysis_is_a_method_of_run() {
     let row = json(&place.path().join("comparison.json"))["rows"][0].clone();
     assert!(row["ratio_error_pct"].as_f64().unwrap().abs() < 1.0, "{row}");
     done(place.path(), "run drive.toml imu.toml --method lincov --filter full --outage 30:45 -o full");
-    done(place.path(), "compare full --reference expected -o exact.json");
+    // nothing is drawn on either side: no interval, which one of no width would hide
+    let ran = done(place.path(), "compare full --reference expected -o exact.json");
+    assert!(!ran.stdout.contains('±') && ran.stdout.contains("no intervals"), "{}", ran.stdout);
     let row = json(&place.path().join("exact.json"))["rows"][0].clone();
-    assert_eq!(row["ci95_pct"][0], row["ci95_pct"][1], "{row}");
+    assert!(row["ci95_pct"].is_null() && row["rmse_end_ci95_pct"].is_null(), "{row}");
+    let csv = done(place.path(), "compare full --reference expected --table csv -o exact.json").stdout;
+    let cells: Vec<&str> = csv.lines().nth(1).unwrap().split(',').collect();
+    assert!(cells[7].parse::<f64>().is_ok() && cells[8..11] == ["", "", ""], "{csv}");
 }
 
 /// Fixes too rare for a reduction are the fault of the receiver's rate, not of the model: the full filter takes both.
