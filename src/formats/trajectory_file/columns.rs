@@ -129,6 +129,11 @@ impl Columns {
         self.get(quantity).map_or(0, |(_, index, _)| index)
     }
 
+    /// Whether a column has the opposite sign of the quantity: a velocity up.
+    pub(super) fn is_turned(&self, quantity: Quantity) -> bool {
+        self.get(quantity).is_some_and(|(_, _, factor)| factor < 0.0)
+    }
+
     /// The value of a quantity in a row, in SI; 0 where the table does not have it.
     pub(super) fn value(&self, quantity: Quantity, row: &[f64]) -> f64 {
         self.get(quantity).map_or(0.0, |(_, index, factor)| row[index] * factor)

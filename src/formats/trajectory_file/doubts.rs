@@ -1,9 +1,11 @@
 //! What is doubtful about a trajectory file that can be used all the same.
 
 use super::samples::{Attitude, MOVING, Rows};
+use super::velocities::Velocities;
+use nav_sim_navigation::earth::geodetic_to_ecef;
 use nav_sim_navigation::frames::{NavState, RollPitchYaw, wrap_angle};
 use nav_sim_navigation::trajectory::Trajectory;
-use nav_sim_navigation::trajectory::plausibility::VelocityMisfit;
+use nav_sim_navigation::trajectory::plausibility::Limits;
 use nav_sim_signal::units::DEG;
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -11,6 +13,8 @@ use std::f64::consts::{FRAC_PI_2, PI};
 pub(super) const LONG_STEP_S: f64 = 1.0 + 1e-6;
 /// Heights that are not doubted (m).
 const PLAUSIBLE_HEIGHT: std::ops::RangeInclusive<f64> = -500.0..=100_000.0;
+/// Length of the mean direction above which a course hardly changes: within ±45° it is 0.9.
+const STRAIGHT: f64 = 0.9;
 /// Instants at which path and attitude are compared: more tell no more.
 const LOOKS: usize = 2000;
 
@@ -27,11 +31,37 @@ pub(super) fn steps(rows: &mut Rows) {
         (rows.lines[i], message)
     });
     if median > LONG_STEP_S {
-        let text = format!("rows are {median} s apart: less than one a second, the path between is a guess");
+        let milliseconds = if is_slow(rows) { "; or is the time in milliseconds (t_ms)?" } else { "" };
+        let text = format!(
+            "rows are {median} s apart: less than one a second, the path between is a guess{milliseconds}"
+        );
         rows.doubt(None, text);
     }
     if let Some((line, message)) = last {
         rows.doubt(Some(line), message);
+    }
+}
+
+/// Whether the rows are of a motion that would be a vehicle's if the time were a thousandth of what it is.
+fn is_slow(rows: &Rows) -> bool {
+    let place = |i: usize| geodetic_to_ecef(rows.samples[i].lat, rows.samples[i].lon, rows.samples[i].h);
+    let last = rows.samples.len() - 1;
+    let path_m: f64 = (0..last).map(|i| place(i).distance(place(i + 1))).sum();
+    let speed = path_m / (rows.samples[last].t_s - rows.samples[0].t_s);
+    // metres, not the scatter of a receiver at rest
+    path_m > 100.0 && 1e3 * speed <= Limits::default().speed
+}
+
+/// Positions too fast for a vehicle, and not so if the time were in minutes.
+fn minutes(rows: &mut Rows, trajectory: &Trajectory) {
+    let mut speeds: Vec<f64> = rows.samples.iter().map(|s| trajectory.state(s.t_s).v_n.length()).collect();
+    speeds.sort_by(f64::total_cmp);
+    let (median, limit) = (speeds[speeds.len() / 2], Limits::default().speed);
+    if median > limit && median <= 60.0 * limit {
+        let text = format!(
+            "the positions move at {median:.0} m/s (median): is the time in minutes? It is expected in seconds"
+        );
+        rows.doubt(None, text);
     }
 }
 
@@ -61,15 +91,10 @@ pub(super) fn of_trajectory(rows: &mut Rows, trajectory: &Trajectory) {
         let list = "lat_deg and lon_deg never exceed π";
         rows.doubt(None, format!("{list}: radians? Then name the columns lat_rad, lon_rad"));
     }
-    velocities(rows, trajectory);
-}
-
-fn velocities(rows: &mut Rows, trajectory: &Trajectory) {
-    let times = rows.samples.iter().map(|s| s.t_s);
-    let given: Vec<_> = times.zip(rows.velocities.iter().copied()).collect();
-    if let Some(misfit) = VelocityMisfit::new(trajectory, &given).filter(VelocityMisfit::contradicts) {
-        let line = given.iter().position(|(t, _)| *t == misfit.worst_s).map(|i| rows.lines[i]);
-        rows.doubt(line, format!("{misfit}; the positions are used"));
+    let contradictions = rows.doubts.len();
+    Velocities::doubt(rows, trajectory);
+    if rows.doubts.len() == contradictions {
+        minutes(rows, trajectory);
     }
 }
 
@@ -124,12 +149,35 @@ impl Moving {
         let as_given = self.off(|yaw| yaw);
         let others = CONVENTIONS.iter().map(|(words, meant)| (self.off(meant), words));
         let (best, words) = others.min_by(|a, b| a.0.total_cmp(&b.0))?;
-        (as_given > 20.0 * DEG && best < 0.25 * as_given).then(|| {
+        let convention = (as_given > 20.0 * DEG && best < 0.25 * as_given).then(|| {
             format!(
                 "yaw is {:.0}° from the course in the mean, and {:.1}° when it is read {words}: yaw is expected clockwise \
                  from north",
                 as_given / DEG,
                 best / DEG
+            )
+        });
+        convention.or_else(|| self.turned())
+    }
+
+    /// A heading that is off by the same angle whatever the course: wind and drift would change it from leg to leg.
+    fn turned(&self) -> Option<String> {
+        let mean = |angle: &dyn Fn(&[f64; 4]) -> f64| {
+            let (sin, cos) =
+                self.0.iter().map(|a| angle(a).sin_cos()).fold((0.0, 0.0), |s, a| (s.0 + a.0, s.1 + a.1));
+            (sin.atan2(cos), sin.hypot(cos) / self.0.len() as f64)
+        };
+        // of one direction, or of all: the length of the mean direction
+        let (_, straight) = mean(&|[course, ..]| *course);
+        let (offset, _) = mean(&|[course, _, yaw, _]| yaw - course);
+        let left = self.off(|yaw| yaw - offset);
+        (straight < STRAIGHT && offset.abs() > 3.0 * DEG && left < 0.25 * offset.abs()).then(|| {
+            format!(
+                "yaw is {:.1}° {} of the course wherever the vehicle goes (within {:.1}° in the mean): a magnetic heading, or an \
+                 IMU that is mounted turned?",
+                offset.abs() / DEG,
+                if offset > 0.0 { "clockwise" } else { "anticlockwise" },
+                left / DEG
             )
         })
     }

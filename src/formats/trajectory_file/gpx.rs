@@ -5,6 +5,7 @@
 
 use super::samples::{Attitude, Rows};
 use super::table::{Table, no_rows};
+use super::velocities::Velocities;
 use crate::formats::FileError as Error;
 use chrono::{DateTime, NaiveDateTime, Utc};
 use glam::DQuat;
@@ -24,7 +25,7 @@ pub(super) fn gpx(path: &str, text: &str) -> Result<Rows, Error> {
         lines: Vec::new(),
         samples: Vec::new(),
         attitude: Attitude::OfPath,
-        velocities: Vec::new(),
+        velocities: Velocities::default(),
         geodetic: false,
         doubts: Vec::new(),
     };

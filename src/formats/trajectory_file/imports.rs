@@ -3,6 +3,7 @@
 use super::Options;
 use super::samples::{Attitude, Rows, local};
 use super::table::{Numbers, Table, no_rows};
+use super::velocities::Velocities;
 use crate::formats::FileError as Error;
 use glam::{DQuat, DVec3};
 use nav_sim_navigation::trajectory::TrajectorySample;
@@ -79,7 +80,7 @@ fn of_samples(path: &str, table: &Table, samples: Vec<TrajectorySample>, attitud
         lines: table.rows.iter().map(|(line, _)| *line).collect(),
         samples,
         attitude,
-        velocities: Vec::new(),
+        velocities: Velocities::default(),
         geodetic: false,
         doubts: Vec::new(),
     }
@@ -117,7 +118,7 @@ pub(super) fn motion_definition(path: &str, text: &str) -> Result<Rows, Error> {
         lines: command_lines(&samples, &motion, start.0, rest),
         samples,
         attitude: Attitude::Given,
-        velocities: Vec::new(),
+        velocities: Velocities::default(),
         geodetic: false,
         doubts: Vec::new(),
     };

@@ -8,6 +8,7 @@ mod profile;
 mod reference;
 mod samples;
 pub(in crate::formats) mod table;
+mod velocities;
 mod write;
 
 pub(crate) use profile::schema as profile_schema;

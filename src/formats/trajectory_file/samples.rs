@@ -3,6 +3,7 @@
 use super::columns::{Columns, Quantity};
 use super::doubts;
 use super::table::{Numbers, Table};
+use super::velocities::Velocities;
 use super::{Options, Warning};
 use crate::formats::{FileError as Error, Place, Setting};
 use glam::{DQuat, DVec3};
@@ -40,8 +41,8 @@ pub(super) struct Rows {
     pub(super) lines: Vec<u64>,
     pub(super) samples: Vec<TrajectorySample>,
     pub(super) attitude: Attitude,
-    /// Velocities in n (m/s) that the file gives, one for each sample, or none at all.
-    pub(super) velocities: Vec<DVec3>,
+    /// What the positions are compared with.
+    pub(super) velocities: Velocities,
     /// Whether positions are latitude and longitude, which may have been given in the wrong unit.
     pub(super) geodetic: bool,
     /// What is doubtful.
@@ -180,12 +181,16 @@ pub(super) fn rows(mut table: Table, options: &Options, numbers: Numbers) -> Res
     Ok(rows)
 }
 
-fn velocities(table: &Table, columns: &Columns) -> Vec<DVec3> {
+fn velocities(table: &Table, columns: &Columns) -> Velocities {
     if !columns.has(Vn) {
-        return Vec::new();
+        return Velocities::default();
     }
     let given = |(_, row): &(u64, Vec<f64>)| DVec3::from([Vn, Ve, Vd].map(|q| columns.value(q, row)));
-    table.rows.iter().map(given).collect()
+    Velocities {
+        given: table.rows.iter().map(given).collect(),
+        columns: [Vn, Ve, Vd].map(|q| table.columns[columns.index(q)].clone()),
+        is_up: columns.is_turned(Vd),
+    }
 }
 
 fn samples(table: &Table, columns: &Columns, options: &Options) -> Result<Vec<TrajectorySample>, Error> {

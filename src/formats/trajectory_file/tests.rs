@@ -1,3 +1,4 @@
+mod contradictions;
 mod profiles;
 
 use super::*;
