@@ -1,5 +1,6 @@
 //! `nav-sim batch` as a user runs it: sharded, stopped, damaged, misused.
 
+mod parts;
 mod studies;
 
 use crate::common::batch::*;
@@ -330,75 +331,4 @@ fn another_seed_than_the_plans_is_refused() {
         assert!(said.contains("\"seed\" is 5 in the plan, 6 in the study"), "{said}");
     }
     done(dir, "status study.toml -o out --seed 5");
-}
-
-#[test]
-fn what_is_missing_is_told_by_cell_and_runs() {
-    let place = place();
-    let dir = place.path();
-    let said = done(dir, "plan study.toml -o out");
-    assert!(said.contains("cell \"none\" has no outages: its table is empty"), "{said}");
-    done(dir, "run study.toml -o out --shard 0/2");
-    let output = batch(dir, "merge study.toml -o out --format json -v");
-    assert_eq!(output.status.code(), Some(75));
-    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    let missing = json["missing"].as_array().unwrap();
-    assert_eq!((json["units"].as_u64(), missing.len()), (Some(50), 25));
-    assert_eq!(missing[0]["runs"], serde_json::json!([8, 16]));
-    assert_eq!(missing[24]["cell"], serde_json::json!(["drive", "imu", "default", "default", "none"]));
-    assert_eq!(missing[24]["runs"], serde_json::json!([72, 77]));
-    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-    for unit in missing {
-        assert!(said.contains(&format!("{}: drive, imu, default", unit["unit"].as_str().unwrap())), "{said}");
-    }
-    assert!(said.contains("none, runs 72 to 76"), "{said}");
-}
-
-#[test]
-fn a_time_limit_and_sigterm_end_with_75_and_two_on_one_shard_do_no_harm() {
-    let place = place();
-    let dir = place.path();
-    let undisturbed = whole(dir, "one");
-    done(dir, "plan study.toml -o out");
-    // Not one unit fits: to go on would be to go on for ever.
-    let said = refused(dir, "run study.toml -o out --time-limit 0", 1);
-    assert!(said.contains("the time limit is too short for a single unit; 50 units left"), "{said}");
-    // A study that lasts, to be stopped.
-    fs::write(dir.join("long.toml"), STUDY.replace("runs = 77", "runs = 100000")).unwrap();
-    done(dir, "plan long.toml -o long");
-    let said = refused(dir, "run long.toml -o long --time-limit 3", 75);
-    assert!(said.contains("stopped by the time limit; ") && said.contains("goes on"), "{said}");
-    units(&dir.join("long")).iter().for_each(|unit| fs::remove_file(unit).unwrap());
-    let mut child = spawn(dir, "run long.toml -o long");
-    while units(&dir.join("long")).is_empty() {
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
-    let kill = std::process::Command::new("kill").args(["-TERM", &child.id().to_string()]).status();
-    assert!(kill.unwrap().success());
-    assert_eq!(child.wait().unwrap().code(), Some(75));
-    let mut twins = [spawn(dir, "run study.toml -o out -j 1"), spawn(dir, "run study.toml -o out -j 1")];
-    assert!(twins.iter_mut().all(|t| t.wait().unwrap().success()));
-    done(dir, "merge study.toml -o out");
-    assert_eq!(results(&dir.join("out")), undisturbed);
-}
-
-#[test]
-fn the_scheduler_says_which_shard() {
-    let place = place();
-    let dir = place.path();
-    done(dir, "plan study.toml -o out");
-    let slurm = |index: &str| {
-        let mut command = command(dir, "run study.toml -o out");
-        command.env("SLURM_ARRAY_TASK_ID", index).env("SLURM_ARRAY_TASK_MIN", "1");
-        command.env("SLURM_ARRAY_TASK_COUNT", "2").output().unwrap()
-    };
-    let output = slurm("2");
-    assert!(output.status.success());
-    assert!(String::from_utf8_lossy(&output.stderr).contains("shard 1/2 (SLURM_ARRAY_TASK_ID=2)"));
-    assert_eq!(units(&dir.join("out")).len(), 25);
-    assert!(slurm("1").status.success());
-    assert_eq!(units(&dir.join("out")).len(), UNITS);
-    assert_eq!(slurm("3").status.code(), Some(2));
-    let too_many = batch(dir, "run study.toml -o out -j 65535");
-    assert_eq!(too_many.status.code(), Some(2));
 }

@@ -27,6 +27,7 @@ mod efficiency;
 mod examples;
 mod existing;
 mod export;
+mod file_commands;
 mod fuse;
 mod help_examples;
 mod laboratory;

@@ -5,7 +5,8 @@
 //! much as they do among the others of the furthest; independent from scale to scale: more chances of a large F than
 //! real differences, which hang together, have). Then the furthest is taken out and the others are looked at again.
 
-use super::contrasts::{Distance, FEWEST, Furthest, Noise, Table, Window, furthest};
+use super::contrasts::{Distance, FEWEST, Furthest, Table, furthest};
+use super::noise::{Noise, Window};
 use crate::rng::StreamKey;
 use rayon::prelude::*;
 

@@ -1,7 +1,8 @@
 //! All recordings against one another, by one test.
 
 use super::alarm::{Found, alarms};
-use super::contrasts::{Noise, Table, scores};
+use super::contrasts::{Table, scores};
+use super::noise::Noise;
 use super::piece::{Piece, Test};
 use super::result::{Alarm, DriftAlarm};
 use crate::curve::Replicate;

@@ -6,7 +6,7 @@
 //! numbers, alike on the axes, F follows Fisher's law with A and A(n − 1) degrees of freedom, or lies below.
 //! The spread is that of the contrast itself, so however the scales hang together, nothing is assumed of it.
 
-use crate::curve::sampling::SamplingLaw;
+use super::noise::{Noise, Window};
 use crate::rng::Generator;
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -14,91 +14,8 @@ use rand_distr::StandardNormal;
 /// Fewer recordings cannot say which of them is abnormal.
 pub(super) const FEWEST: usize = 4;
 
-/// Numbers of neighbouring scales that are taken together.
-const WIDTHS: [usize; 3] = [1, 3, 5];
 /// Fewest recordings of which one of the others may be passed over.
 const FEWEST_TO_PASS_OVER: usize = 6;
-
-/// Neighbouring scales.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Window {
-    /// Index of the first.
-    pub(super) first: usize,
-    /// Number of scales.
-    pub(super) width: usize,
-}
-
-impl Window {
-    /// All windows over so many scales.
-    pub(super) fn all(levels: usize) -> Vec<Self> {
-        let of_width =
-            |width: usize| (0..(levels + 1).saturating_sub(width)).map(move |first| Self { first, width });
-        WIDTHS.into_iter().flat_map(of_width).collect()
-    }
-
-    fn range(self) -> std::ops::Range<usize> {
-        self.first..self.first + self.width
-    }
-}
-
-/// Scatter of one axis by noise alone.
-#[derive(Debug, Clone)]
-pub(super) struct Noise {
-    kind: NoiseKind,
-    /// Degrees of freedom, `[file][level]`.
-    edof: Vec<Vec<f64>>,
-    /// Variance of the contrast of each window, `[window][file]`.
-    variances: Vec<Vec<f64>>,
-}
-
-/// Law of the values of a file.
-#[derive(Debug, Clone)]
-enum NoiseKind {
-    /// Logarithms of wavelet variances.
-    Law(SamplingLaw),
-    /// One Gaussian number of unit variance, times what its deviation differs by from file to file: the standard deviation of
-    /// its logarithm.
-    Normal(f64),
-}
-
-impl Noise {
-    /// Noise of files of one Gaussian number each, whose standard deviation is log-normal about 1 with `log_deviation`.
-    pub(super) fn normal(files: usize, log_deviation: f64) -> Self {
-        let kind = NoiseKind::Normal(log_deviation);
-        Self { kind, edof: vec![vec![1.0]; files], variances: vec![vec![1.0; files]] }
-    }
-
-    /// Draws the values of a file by noise alone, level by level.
-    fn draw(&self, file: usize, generator: &mut Generator) -> Vec<f64> {
-        match &self.kind {
-            NoiseKind::Law(law) => law.draw(&self.edof[file], generator).into_iter().map(f64::ln).collect(),
-            NoiseKind::Normal(log_deviation) => {
-                let mut normal = || generator.sample::<f64, _>(StandardNormal);
-                // A normal number whose standard deviation is itself log-normal: recordings differ in how far they move.
-                vec![(log_deviation * normal()).exp() * normal()]
-            }
-        }
-    }
-
-    /// Noise of files with these degrees of freedom, `[file][level]`.
-    pub(super) fn new(law: SamplingLaw, edof: Vec<Vec<f64>>) -> Self {
-        let levels = edof.first().map_or(0, Vec::len);
-        let deviations: Vec<Vec<f64>> = edof
-            .iter()
-            .map(|e| e.iter().zip(&law.shapes).map(|(e, shape)| shape.variance_of_log(*e).sqrt()).collect())
-            .collect();
-        let of_window = |window: Window| {
-            let of_file = |s: &Vec<f64>| {
-                let pair =
-                    |i: usize| window.range().map(|j| law.correlation[(i, j)] * s[i] * s[j]).sum::<f64>();
-                window.range().map(pair).sum::<f64>() / (window.width * window.width) as f64
-            };
-            deviations.iter().map(of_file).collect()
-        };
-        let variances = Window::all(levels).into_iter().map(of_window).collect();
-        Self { kind: NoiseKind::Law(law), edof, variances }
-    }
-}
 
 /// Values of every file on one axis, level by level as far as it has them; none of a file without that axis.
 type Files = Vec<Option<Vec<f64>>>;
@@ -171,7 +88,7 @@ impl Table {
 
     /// Standard deviation by which the active files differ at each level, beyond their noise.
     pub(super) fn between(&self, noise: &[Noise], active: &[bool]) -> Vec<f64> {
-        let levels = noise.first().and_then(|n| n.edof.first()).map_or(0, Vec::len);
+        let levels = noise.first().map_or(0, Noise::levels);
         let level = |j: usize| {
             let contrasts = self.contrasts(noise, Window { first: j, width: 1 }, j, active);
             let (mut squares, mut freedom, mut own) = (0.0, 0.0, 0.0);
@@ -304,7 +221,7 @@ pub(super) struct Furthest {
 
 /// The largest distances of every file.
 pub(super) fn furthest(table: &Table, noise: &[Noise], active: &[bool]) -> Vec<Furthest> {
-    let levels = noise.first().and_then(|n| n.edof.first()).map_or(0, Vec::len);
+    let levels = noise.first().map_or(0, Noise::levels);
     let count = active.iter().filter(|on| **on).count();
     let mut all = vec![Furthest { f: [0.0; 2], at: [None, None] }; active.len()];
     for (index, window) in Window::all(levels).into_iter().enumerate() {
@@ -332,7 +249,7 @@ pub(super) fn furthest(table: &Table, noise: &[Noise], active: &[bool]) -> Vec<F
 
 /// Deviations of a file at every single scale, `[axis][level]`; 0 where nothing can be said.
 pub(super) fn scores(table: &Table, noise: &[Noise], active: &[bool], file: usize) -> Vec<Vec<f64>> {
-    let levels = noise.first().and_then(|n| n.edof.first()).map_or(0, Vec::len);
+    let levels = noise.first().map_or(0, Noise::levels);
     let mut scores = vec![vec![0.0; levels]; table.logs.len()];
     for j in 0..levels {
         let contrasts = table.contrasts(noise, Window { first: j, width: 1 }, j, active);
@@ -346,6 +263,7 @@ pub(super) fn scores(table: &Table, noise: &[Noise], active: &[bool], file: usiz
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::curve::sampling::SamplingLaw;
     use crate::curve::shape::variance_of_log;
     use crate::noise::{Composite, Process, White};
     use rand::SeedableRng;

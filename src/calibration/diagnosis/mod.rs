@@ -15,6 +15,7 @@ mod comparison;
 mod contrasts;
 mod diagnose;
 mod leave_out;
+mod noise;
 mod piece;
 mod result;
 
