@@ -36,8 +36,8 @@ impl BeyondLinear {
         });
         let both: Vec<String> = down.into_iter().chain(horizontal).collect();
         format!(
-            "beyond linear: in the outage {} {}; errors of second order are in no covariance analysis, and `nav-sim run --method \
-             both` shows how far they are from the answer",
+            "beyond linear: in the outage {} {}; errors of second order are not in the answer, and `nav-sim run --method both` shows how \
+             far they are from it",
             window(self.start_s, self.end_s),
             both.join(" and ")
         )

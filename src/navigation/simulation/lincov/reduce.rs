@@ -10,7 +10,7 @@ use super::descent::Descent;
 use super::pass::{Assessment, Consistency, assess};
 use super::track::Track;
 use crate::earth::GravityModel;
-use crate::ekf::{Belief, InitialSettings};
+use crate::ekf::{Belief, FilterStates, InitialSettings};
 use crate::imu::{Axis, Channel};
 use crate::noise::{Model, Process, reduction};
 use crate::sensors::defects::ImuSettings;
@@ -41,7 +41,11 @@ pub fn reduced_belief(model: &Model, wavelet: Belief, track: &Track, alike: Alik
     if free.is_empty() {
         return wavelet;
     }
-    let search = Search { model, base: wavelet, track: track.coarse(), exact, alike, free };
+    let track = track.coarse();
+    // The interval of fixes and the window matter to a reduction alone; here each process has a state.
+    let full = Belief::new(model, FilterStates::Full, 1.0, 1.0);
+    let best = full.map_or(Vec::new(), |full| horizontal_m(&assess(&track, &full, model)).collect());
+    let search = Search { model, base: wavelet, track, best, exact, alike, free };
     search.belief(&search.minimise())
 }
 
@@ -67,6 +71,8 @@ struct Search<'a> {
     model: &'a Model,
     base: Belief,
     track: Track,
+    /// Horizontal RMSE (m) at the outage ends of the filter with a state for each process; empty where the model has no such filter.
+    best: Vec<f64>,
     /// Axes that are left as they are.
     exact: [bool; 6],
     alike: Alike,
@@ -95,7 +101,14 @@ impl Search<'_> {
 
     fn cost(&self, ln: &Factors) -> f64 {
         let assessment = assess(&self.track, &self.belief(ln), self.model);
-        cost(&assessment) + RIDGE * ln.iter().map(|x| x * x).sum::<f64>()
+        cost(&assessment) + self.lost(&assessment) + RIDGE * ln.iter().map(|x| x * x).sum::<f64>()
+    }
+
+    /// What the horizontal position at the outage ends loses to the filter with all states counts where it is a fiftieth, steeply.
+    fn lost(&self, assessment: &Assessment) -> f64 {
+        let lost = |(own, best): (f64, &f64)| ((own / best).ln().max(0.0) / LOST).powi(4);
+        let lost: Vec<f64> = horizontal_m(assessment).zip(&self.best).map(lost).collect();
+        ENDS * LOST_WEIGHT * lost.iter().sum::<f64>() / lost.len().max(1) as f64
     }
 
     /// The factors that are free descend from where the search starts.
@@ -126,12 +139,20 @@ const ENOUGH: f64 = 2e-4;
 const ENDS: f64 = 0.3;
 /// A ratio whose logarithm is this far from 0 begins to count for itself, with this weight.
 const OFF: f64 = 0.08;
-const OFF_WEIGHT: f64 = 0.3;
+const OFF_WEIGHT: f64 = 0.4;
+/// The same for a horizontal position that is less accurate than that of the filter with all states.
+const LOST: f64 = 0.02;
+const LOST_WEIGHT: f64 = 0.4;
 /// Weight in the cost of the states whose ratio is off over the whole drive.
 const WAY: f64 = 0.3;
 /// The same for the mean NEES: the logarithm at which it begins to count, and its weight.
-const NEES_OFF: f64 = 0.04;
+const NEES_OFF: f64 = 0.03;
 const NEES_WEIGHT: f64 = 0.1;
+
+/// Horizontal RMSE at the outage ends (m).
+fn horizontal_m(assessment: &Assessment) -> impl Iterator<Item = f64> {
+    assessment.outage_ends.iter().map(|end| end.rmse[0].hypot(end.rmse[1]))
+}
 
 /// The divergence at the outage ends and on the average; a single state whose ratio is a tenth off, at an outage's end or
 /// over the whole way, counts beside it, steeply: the divergence alone gives one state away for eight. So does the mean
@@ -150,7 +171,7 @@ fn cost(assessment: &Assessment) -> f64 {
 }
 
 fn steep(ratio: f64) -> f64 {
-    // The fourth power: 8 % off cost 0.3, 4 % a sixteenth of that, 16 % sixteen times as much; in the
+    // The fourth power: 8 % off cost 0.4, 4 % a sixteenth of that, 16 % sixteen times as much; in the
     // logarithm, so that both directions count alike.
     OFF_WEIGHT * (ratio.ln() / OFF).powi(4)
 }
