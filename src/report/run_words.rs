@@ -65,8 +65,8 @@ fn beyond_vertically(summary: &Summary) -> Option<String> {
     let (outage, share) = beyond.max_by(|a, b| a.1.total_cmp(&b.1))?;
     Some(format!(
         "beyond linear: attitude errors of the outage {} shift the velocity down by {} m/s to second order, {:.0} % of the \
-         filter's standard deviation; the covariance analysis contains this up to the outage's end, and not what the first fixes make \
-         of it: for some minutes the velocity down and the vertical accelerometer bias can be twice as wrong as believed{}. A shorter \
+         filter's standard deviation; of a covariance analysis the RMSE and ASEE of position and velocity down contain this up to the outage's \
+         end, its NEES, coverage and verdict do not, nor what the first fixes make of it: for some minutes the velocity down and the vertical accelerometer bias can be twice as wrong as believed{}. A shorter \
          outage or {} removes it, and so does a barometer, unless the accelerometer is so quiet that the filter takes no bias for its cause",
         window(outage.start_s, outage.end_s),
         readable(outage.second_order_vel_d_m_s),

@@ -93,7 +93,8 @@ pub(super) fn of_trajectory(rows: &mut Rows, trajectory: &Trajectory) {
     }
     let contradictions = rows.doubts.len();
     Velocities::doubt(rows, trajectory);
-    if rows.doubts.len() == contradictions {
+    // velocities that agree with the positions confirm the time
+    if rows.doubts.len() == contradictions && rows.velocities.given.is_empty() {
         minutes(rows, trajectory);
     }
 }

@@ -10,7 +10,8 @@ use super::verdict::{OutageVerdict, Verdict};
 use crate::ekf::Belief;
 use crate::noise::Model;
 use crate::simulation::lincov::{
-    ErrorLaw, FilterPass, Instant, Judged, SecondOrder, Track, TruthSide, vertical_second_order,
+    ErrorLaw, FilterPass, Instant, Judged, SecondOrder, Settling, Track, TruthSide, stated_while_settling,
+    vertical_second_order,
 };
 use crate::simulation::{BIASES, COVERAGE_DOF, Experiment, NEES_DOF, OutageRecord, REPORTED, RunRecord};
 use crate::units::DEG;
@@ -55,6 +56,10 @@ impl Expected {
         let reports = law.reports.iter().zip(filter.bias_sigmas());
         let mut epochs: Vec<EpochMetrics> =
             reports.map(|(instant, bias)| epoch(instant, *bias, limit)).collect::<Option<_>>()?;
+        // without an error of the start there is nothing to settle
+        if !experiment.initial.perfect {
+            add_settling(&mut epochs, &stated_while_settling(track, belief, &truth, experiment.outages));
+        }
         let second_order = vertical_second_order(track, belief, &truth, experiment.outages);
         for second in second_order.iter().flatten() {
             // the fix that ends an outage is used at the epoch of that instant, but not at the outage's end
@@ -149,6 +154,17 @@ fn add_second_order(asee: &mut PerState<Estimate>, rmse: &mut PerState<Estimate>
     for (k, i) in DOWN.into_iter().enumerate() {
         asee.0[i].value = (asee.0[i].value.powi(2) + second.believed[k]).sqrt();
         rmse.0[i].value = (rmse.0[i].value.powi(2) + second.variance[k] + second.mean[k].powi(2)).sqrt();
+    }
+}
+
+/// Adds what filters state more, on average over the runs, while the attitude of the start settles.
+fn add_settling(epochs: &mut [EpochMetrics], settling: &[Settling]) {
+    for settling in settling {
+        if let Some(epoch) = epochs.iter_mut().find(|epoch| epoch.t_s == settling.t_s) {
+            for (asee, larger) in epoch.asee.0.iter_mut().zip(settling.believed) {
+                asee.value = (asee.value.powi(2) + larger).sqrt();
+            }
+        }
     }
 }
 

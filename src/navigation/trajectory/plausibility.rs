@@ -113,7 +113,8 @@ pub fn examine(trajectory: &Trajectory, limits: &Limits) -> ([f64; 4], Vec<Exces
             largest[i] = larger(largest[i], value);
             let limit = Quantity::ALL[i].limit(limits);
             // NaN lies beyond every limit: it is to be reported, not passed over.
-            if value.is_nan() || value > limit {
+            // A motion made to reach the limit exactly does so to rounding.
+            if value.is_nan() || value > limit * (1.0 + 1e-6) {
                 let event = Excess {
                     quantity: Quantity::ALL[i],
                     limit,

@@ -306,7 +306,7 @@ fn squares(jacobian: &[DVec3; 3], p: &[Nav; NAV]) -> [f64; REPORTED] {
 }
 
 /// Standard deviations of the reported states (m, m/s, degrees).
-fn deviations(jacobian: &[DVec3; 3], p: &[Nav; NAV]) -> [f64; REPORTED] {
+pub(super) fn deviations(jacobian: &[DVec3; 3], p: &[Nav; NAV]) -> [f64; REPORTED] {
     let roots = squares(jacobian, p).map(f64::sqrt);
     std::array::from_fn(|i| if i < 6 { roots[i] } else { roots[i] / DEG })
 }
