@@ -51,7 +51,10 @@ impl Velocities {
         }
         let looks = looks.map_or_else(String::new, |looks| format!("; {looks}"));
         let line = given.iter().position(|(t, _)| *t == misfit.worst_s).map(|i| rows.lines[i]);
-        rows.doubt(line, format!("{misfit}{looks}; the positions are used"));
+        rows.doubt(
+            line,
+            format!("{misfit}{looks}; the positions are used, whose columns may be the wrong ones instead"),
+        );
     }
 
     /// The columns that agree with the positions when their sign is turned.
