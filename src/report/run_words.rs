@@ -66,7 +66,7 @@ fn beyond_vertically(summary: &Summary) -> Option<String> {
     Some(format!(
         "beyond linear: attitude errors of the outage {} shift the velocity down by {} m/s to second order, {:.0} % of the \
          filter's standard deviation; of a covariance analysis the RMSE and ASEE of position and velocity down contain this up to the outage's \
-         end, its NEES, coverage and verdict do not, nor what the first fixes make of it: for some minutes the velocity down and the vertical accelerometer bias can be twice as wrong as believed{}. A shorter \
+         end, its NEES and coverage do not, nor what the first fixes make of it: for some minutes the velocity down and the vertical accelerometer bias can be twice as wrong as believed{}. A shorter \
          outage or {} removes it, and so does a barometer, unless the accelerometer is so quiet that the filter takes no bias for its cause",
         window(outage.start_s, outage.end_s),
         readable(outage.second_order_vel_d_m_s),
