@@ -162,8 +162,8 @@ pub fn navigate(
         }
     };
     navigation.summary.reduction = reduction;
-    if scenario.baro.is_some() {
-        navigation.summary.see_height();
+    if let Some(baro) = &scenario.baro {
+        navigation.summary.see_height(baro);
     }
     // Which fixes a gate refuses is drawn with the errors: the gains of such a filter are not those of the analysis.
     if scenario.filter.nis_gate.is_none() {

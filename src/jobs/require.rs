@@ -179,8 +179,8 @@ impl Requirements {
         let experiment = scenario.experiment(&self.trajectory, Truth::Model(model), &[], &outages, 0);
         let Some(expected) = Expected::along(&track, &experiment, &belief, model) else { return Ok(None) };
         let mut summary = expected.summary();
-        if scenario.baro.is_some() {
-            summary.see_height();
+        if let Some(baro) = &scenario.baro {
+            summary.see_height(baro);
         }
         Ok(summary.outages.first().and_then(BeyondLinear::of))
     }

@@ -6,6 +6,7 @@ use nav_sim::formats::trajectory_file::{Options, load};
 use nav_sim::monte_carlo;
 use nav_sim::noise::{Ar1, Composite, Model, Process, RandomWalk, White};
 use nav_sim::scenario::Scenario;
+use nav_sim::sensors::baro::BaroSettings;
 use nav_sim::sensors::imu::Truth;
 use nav_sim::sensors::outage::Outage;
 use nav_sim::simulation::{NEES_DOF, RunResult};
@@ -172,6 +173,9 @@ fn long_outages_shift_the_velocity_down_by_the_square_of_the_tilts() {
     assert!((mean - shift).abs() < 3.5 * error + 0.1 * shift, "{mean} ± {error} against {shift}");
     assert!(mean > 3.0 * error, "{mean} ± {error} could be chance");
     assert!(summary.outages[0].beyond_linear().is_some());
-    summary.see_height();
+    // a height in ten minutes falls into no outage of five
+    summary.see_height(&BaroSettings { rate_hz: 1.0 / 600.0, sigma_m: 1.0 });
+    assert!(summary.outages[0].beyond_linear().is_some());
+    summary.see_height(&BaroSettings { rate_hz: 1.0, sigma_m: 1.0 });
     assert!(summary.outages[0].beyond_linear().is_none());
 }

@@ -21,6 +21,7 @@ use super::epoch::EpochMetrics;
 use super::outage::{OutageMetrics, within};
 use super::summary::{OutageSummary, Summary};
 use super::verdict::TOLERANCE;
+use crate::sensors::baro::BaroSettings;
 use crate::simulation::NEES_DOF;
 use crate::units::{DEG, STANDARD_GRAVITY};
 use nalgebra::{SMatrix, SVector};
@@ -90,13 +91,14 @@ impl Summary {
         }
     }
 
-    /// A barometer sees the vertical channel: no shift grows there without being corrected, and none is stated.
-    pub fn see_height(&mut self) {
-        for outage in &mut self.outages {
+    /// A barometer sees the vertical channel: in outages that have a height no shift grows without being corrected, and none is stated.
+    pub fn see_height(&mut self, baro: &BaroSettings) {
+        let has_height = |outage: &&mut OutageSummary| (outage.end_s - outage.start_s) * baro.rate_hz >= 1.0;
+        for outage in self.outages.iter_mut().filter(has_height) {
             outage.second_order_vel_d_m_s = f64::NAN;
         }
         if let Some(expected) = &mut self.lincov {
-            expected.see_height();
+            expected.see_height(baro);
         }
     }
 }
