@@ -147,7 +147,7 @@ fn the_filters_of_runs_state_what_is_expected_of_the_vertical_channel() {
 }
 
 /// The consumer IMU at rest with fixes: the filters of runs take their tilt errors for accelerations and believe to learn the heading
-/// from them, by which they state 0.8 % less of it after 15 s than the filter along the reference. The analysis has their mean to half
+/// from them, by which they state 1 % less of it after 15 s than the filter along the reference. The analysis has their mean to half
 /// a per cent, in every state.
 #[test]
 fn the_filters_of_runs_state_what_is_expected_while_they_settle() {
@@ -171,7 +171,6 @@ fn the_filters_of_runs_state_what_is_expected_while_they_settle() {
             assert!(excess.abs() < 5e-3 + slack, "{second} s, state {i}: {excess}");
             if (second, i) == (15, 8) {
                 let excess = runs.value / linear[second].sigma()[i] - 1.0;
-                println!("{excess} {slack}");
                 assert!(excess < -5e-3 - slack, "yaw: {excess} ± {}", slack / 3.5);
             }
         }

@@ -58,7 +58,7 @@ impl Expected {
             reports.map(|(instant, bias)| epoch(instant, *bias, limit)).collect::<Option<_>>()?;
         // without an error of the start there is nothing to settle
         if !experiment.initial.perfect {
-            add_settling(&mut epochs, &stated_while_settling(track, belief, &truth, experiment.outages));
+            add_settling(&mut epochs, &stated_while_settling(track, belief, experiment.outages));
         }
         let second_order = vertical_second_order(track, belief, &truth, experiment.outages);
         for second in second_order.iter().flatten() {

@@ -58,8 +58,6 @@ pub(crate) fn vertical_second_order(
     truth: &TruthSide,
     outages: &[Outage],
 ) -> Vec<Vec<SecondOrder>> {
-    // What is small itself needs no steps finer than a second.
-    let track = &track.merged();
     let is_centred = truth.inertial.states.iter().all(|state| state.level == 0.0);
     let ways: Vec<_> = outages
         .iter()
@@ -67,14 +65,15 @@ pub(crate) fn vertical_second_order(
         .map(|(k, outage)| track.unaided(k, outage).filter(|_| is_centred))
         .collect();
     let mut found = vec![Vec::new(); outages.len()];
-    let last = ways.iter().flatten().map(|way| *way.end()).max();
+    let Some(last) = ways.iter().flatten().map(|way| *way.end()).max() else { return found };
+    // What is small itself needs no steps finer than a second; the marks stay.
+    let track = &track.merged();
     let believed = Sources::of_belief(belief);
     let sides = Sides::of_errors(&believed, &truth.inertial, track);
     let own = Sides::of_filter(believed, track);
     let mut pass = Pass::new(track, &own, &sides, truth);
     let mut channel = Channel::default();
-    let marks = 0..last.map_or(0, |last| last + 1);
-    for (index, (steps, mark)) in track.legs(marks).enumerate() {
+    for (index, (steps, mark)) in track.legs(0..last + 1).enumerate() {
         pass.follow(steps);
         let way = ways.iter().position(|way| way.as_ref().is_some_and(|way| way.contains(&index)));
         if let Some((outage, way)) = way.and_then(|k| Some((k, ways[k].as_ref()?))) {
