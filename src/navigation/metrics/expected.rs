@@ -10,7 +10,7 @@ use super::verdict::{OutageVerdict, Verdict};
 use crate::ekf::Belief;
 use crate::noise::Model;
 use crate::simulation::lincov::{
-    ErrorLaw, FilterPass, Instant, Judged, SecondOrder, Settling, Track, TruthSide, stated_while_settling,
+    ErrorLaw, FilterPass, Instant, Judged, SecondOrder, Track, TruthSide, stated_while_settling,
     vertical_second_order,
 };
 use crate::simulation::{BIASES, COVERAGE_DOF, Experiment, NEES_DOF, OutageRecord, REPORTED, RunRecord};
@@ -56,9 +56,9 @@ impl Expected {
         let reports = law.reports.iter().zip(filter.bias_sigmas());
         let mut epochs: Vec<EpochMetrics> =
             reports.map(|(instant, bias)| epoch(instant, *bias, limit)).collect::<Option<_>>()?;
-        // without an error of the start there is nothing to settle
-        if !experiment.initial.perfect {
-            add_settling(&mut epochs, &stated_while_settling(track, belief, experiment.outages));
+        let settling = stated_while_settling(track, belief, &truth, experiment.outages);
+        for (epoch, more) in epochs.iter_mut().zip(settling.reports) {
+            add_variances(&mut epoch.asee, more);
         }
         let second_order = vertical_second_order(track, belief, &truth, experiment.outages);
         for second in second_order.iter().flatten() {
@@ -71,6 +71,9 @@ impl Expected {
         let ends = experiment.outages.iter().zip(&law.outage_ends);
         let mut outages: Vec<OutageMetrics> =
             ends.map(|(window, end)| outage((window.start_s, window.end_s), end, &epochs)).collect();
+        for (outage, more) in outages.iter_mut().zip(settling.outage_ends) {
+            add_variances(&mut outage.asee_end, more);
+        }
         for (outage, second) in outages.iter_mut().zip(&second_order) {
             if let Some(end) = second.last() {
                 add_second_order(&mut outage.asee_end, &mut outage.rmse_end, end);
@@ -157,14 +160,10 @@ fn add_second_order(asee: &mut PerState<Estimate>, rmse: &mut PerState<Estimate>
     }
 }
 
-/// Adds what filters state more, on average over the runs, while the attitude of the start settles.
-fn add_settling(epochs: &mut [EpochMetrics], settling: &[Settling]) {
-    for settling in settling {
-        if let Some(epoch) = epochs.iter_mut().find(|epoch| epoch.t_s == settling.t_s) {
-            for (asee, larger) in epoch.asee.0.iter_mut().zip(settling.believed) {
-                asee.value = (asee.value.powi(2) + larger).sqrt();
-            }
-        }
+/// Adds variances to standard deviations that the filter states.
+fn add_variances(asee: &mut PerState<Estimate>, more: [f64; REPORTED]) {
+    for (asee, more) in asee.0.iter_mut().zip(more) {
+        asee.value = (asee.value.powi(2) + more).sqrt();
     }
 }
 

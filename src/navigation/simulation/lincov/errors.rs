@@ -31,8 +31,9 @@ impl<'a> Errors<'a> {
     pub(super) fn measure(&mut self, row: &Row, gain: &Gain) -> f64 {
         // Without its noise where the source under study is another one: covariances of independent sources
         // add.
-        let y = self.joint.innovation(row, if self.truth.has_noise(row.what) { row.r } else { 0.0 });
-        let mean = self.mean.as_ref().map_or(0.0, |mean| mean.innovation(row));
+        let measured = self.joint.measured(row);
+        let y = self.joint.innovation(&measured, if self.truth.has_noise(row.what) { row.r } else { 0.0 });
+        let mean = self.mean.as_ref().map_or(0.0, |mean| measured.dot(&mean.values));
         self.joint.correct(&y, gain);
         self.mean.iter_mut().for_each(|m| m.correct(mean, gain));
         y.s + mean * mean
@@ -49,7 +50,7 @@ impl<'a> Errors<'a> {
             measured: !mark.rows.is_empty(),
             fix: mark.fix,
             covariance: self.joint.xx,
-            mean: self.mean.as_ref().map_or([0.0; NAV], |mean| mean.x),
+            mean: self.mean.as_ref().map_or([0.0; NAV], |mean| mean.values.x),
             jacobian: mark.jacobian,
         }
     }

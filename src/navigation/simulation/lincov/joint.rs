@@ -1,6 +1,7 @@
 //! The covariance of \[navigation error; bias estimates\] and its correlation with the states of the truth.
 
-use super::input::{SIGNALS, Source, StepOfSource};
+use super::column::Column;
+use super::input::{SIGNALS, StepOfSource};
 use super::mean::Mean;
 use super::sides::{Inputs, Sides};
 use super::track::{NAV, Nav, Row, Step};
@@ -60,11 +61,28 @@ impl<'a> Joint<'a> {
         variances
     }
 
-    /// Covariance of everything with a state of the navigation error as it is now: as time goes on, that of the present with the past.
-    pub(super) fn covariance_with(&self, state: usize) -> Mean<'a> {
-        let with_states = |columns: &[Nav]| columns.iter().map(|x| x[state]).collect();
-        let (b, t) = (with_states(&self.xb), with_states(&self.xt));
-        Mean { sides: self.sides, x: self.xx[state], b, t, elapsed: self.elapsed }
+    /// Covariance of everything with a linear form of the states as they are now.
+    pub(super) fn covariance_with(&self, form: &Column) -> Column {
+        let (nb, nt) = (self.xb.len(), self.xt.len());
+        let mut x = [0.0; NAV];
+        for (column, h) in self.xx.iter().zip(&form.x) {
+            add_scaled(&mut x, *h, column);
+        }
+        let product = |x: &Nav| -> f64 { x.iter().zip(&form.x).map(|(a, h)| a * h).sum() };
+        let mut b: Vec<f64> = self.xb.iter().map(product).collect();
+        let mut t: Vec<f64> = self.xt.iter().map(product).collect();
+        // Most measurements are of the navigation error alone.
+        for (j, h) in form.b.iter().enumerate().filter(|(_, h)| **h != 0.0) {
+            add_scaled(&mut x, *h, &self.xb[j]);
+            (0..nb).for_each(|i| b[i] += h * self.bb[i * nb + j]);
+            (0..nt).for_each(|i| t[i] += h * self.bt[j * nt + i]);
+        }
+        for (j, h) in form.t.iter().enumerate().filter(|(_, h)| **h != 0.0) {
+            add_scaled(&mut x, *h, &self.xt[j]);
+            (0..nb).for_each(|i| b[i] += h * self.bt[i * nt + j]);
+            t[j] += h * self.tt[j];
+        }
+        Column { x, b, t }
     }
 
     /// Over one step: A P Aᵀ + Q in blocks.
@@ -138,44 +156,38 @@ impl<'a> Joint<'a> {
         }
     }
 
-    /// Covariance of z with what a row measures, and of t with it; the variance of that with its noise, `r`.
-    pub(super) fn innovation(&self, row: &Row, r: f64) -> Innovation {
-        let (nb, nt) = (self.xb.len(), self.xt.len());
-        let mut x = [0.0; NAV];
-        for (column, h) in self.xx.iter().zip(&row.h) {
-            add_scaled(&mut x, *h, column);
-        }
-        let product = |x: &Nav| -> f64 { x.iter().zip(&row.h).map(|(a, h)| a * h).sum() };
-        let mut b: Vec<f64> = self.xb.iter().map(product).collect();
-        let mut t: Vec<f64> = self.xt.iter().map(product).collect();
-        let mut s = r;
-        let coefficients =
-            |s: &[Source]| -> Vec<f64> { s.iter().map(|x| row.coefficient(x, self.elapsed)).collect() };
-        let (hb, ht) = (coefficients(&self.sides.b.states), coefficients(&self.sides.t.states));
-        // only a velocity on a lever arm feels the gyroscope, only a position the receiver's correlated error
-        if hb.iter().chain(&ht).any(|h| *h != 0.0) {
-            for (j, h) in hb.iter().enumerate() {
-                add_scaled(&mut x, *h, &self.xb[j]);
-                (0..nb).for_each(|i| b[i] += h * self.bb[i * nb + j]);
-                (0..nt).for_each(|i| t[i] += h * self.bt[j * nt + i]);
-            }
-            for (j, h) in ht.iter().enumerate() {
-                add_scaled(&mut x, *h, &self.xt[j]);
-                (0..nb).for_each(|i| b[i] += h * self.bt[i * nt + j]);
-                t[j] += h * self.tt[j];
-            }
-            let dot = |h: &[f64], c: &[f64]| -> f64 { h.iter().zip(c).map(|(h, c)| h * c).sum() };
-            s += dot(&hb, &b) + dot(&ht, &t);
-        }
-        // hᵀ P h + r; x has by now its part from b and t.
-        s += product(&x);
-        Innovation { x, b, t, s }
+    /// The same, to be taken along: as time goes on, the covariance of the present with that past.
+    pub(super) fn correlated(&self, form: &Column) -> Mean<'a> {
+        Mean { sides: self.sides, values: self.covariance_with(form), elapsed: self.elapsed }
+    }
+
+    /// One of the navigation errors, as a linear form.
+    pub(super) fn state(&self, state: usize) -> Column {
+        Column::state(state, self.sides)
+    }
+
+    /// The error of the specific force along an axis of n (m/s for a sample) over a step that begins now, as a linear form.
+    pub(super) fn force_error(&self, axis: usize, step: &Step) -> Column {
+        Column::force_error(axis, step, self.sides, self.elapsed)
+    }
+
+    /// What a row measures, as a linear form.
+    pub(super) fn measured(&self, row: &Row) -> Column {
+        Column::measured(row, self.sides, self.elapsed)
+    }
+
+    /// A measurement with white noise of variance `r`.
+    pub(super) fn innovation(&self, measured: &Column, r: f64) -> Innovation {
+        let with = self.covariance_with(measured);
+        // hᵀ P h + r
+        let s = r + measured.dot(&with);
+        Innovation { with, s }
     }
 
     /// Corrects by a measurement as the filter does whose own covariance this is; returns its gain, and the variance that it
     /// states for the innovation.
     pub(super) fn measure(&mut self, row: &Row) -> (Gain, f64) {
-        let y = self.innovation(row, row.r);
+        let y = self.innovation(&self.measured(row), row.r);
         let gain = y.gain();
         self.correct(&y, &gain);
         (gain, y.s)
@@ -183,30 +195,30 @@ impl<'a> Joint<'a> {
 
     /// z ← z − k y for an innovation y; the gain belongs to a filter that need not be right.
     pub(super) fn correct(&mut self, y: &Innovation, gain: &Gain) {
-        let (nb, nt) = (self.xb.len(), self.xt.len());
+        let (nb, nt, with) = (self.xb.len(), self.xt.len(), &y.with);
         // P − k cᵀ − c kᵀ + k s kᵀ, by (s k − c) kᵀ − k cᵀ
         // With the optimal gain s k = c and the first term is zero. Here c is of the truth and k of the
         // filter.
-        let rest_x: Nav = std::array::from_fn(|i| y.s * gain.x[i] - y.x[i]);
+        let rest_x: Nav = std::array::from_fn(|i| y.s * gain.x[i] - with.x[i]);
         for j in 0..NAV {
             add_scaled(&mut self.xx[j], gain.x[j], &rest_x);
-            add_scaled(&mut self.xx[j], -y.x[j], &gain.x);
+            add_scaled(&mut self.xx[j], -with.x[j], &gain.x);
         }
         for j in 0..nb {
             add_scaled(&mut self.xb[j], gain.b[j], &rest_x);
-            add_scaled(&mut self.xb[j], -y.b[j], &gain.x);
-            let rest = y.s * gain.b[j] - y.b[j];
+            add_scaled(&mut self.xb[j], -with.b[j], &gain.x);
+            let rest = y.s * gain.b[j] - with.b[j];
             for i in 0..nb {
-                self.bb[j * nb + i] += rest * gain.b[i] - gain.b[j] * y.b[i];
+                self.bb[j * nb + i] += rest * gain.b[i] - gain.b[j] * with.b[i];
             }
             for i in 0..nt {
                 // t has no gain: a measurement does not change what truly makes the errors, only the
                 // estimate's relation to it.
-                self.bt[j * nt + i] -= gain.b[j] * y.t[i];
+                self.bt[j * nt + i] -= gain.b[j] * with.t[i];
             }
         }
         for j in 0..nt {
-            add_scaled(&mut self.xt[j], -y.t[j], &gain.x);
+            add_scaled(&mut self.xt[j], -with.t[j], &gain.x);
         }
         self.symmetrise();
     }
@@ -234,9 +246,7 @@ impl<'a> Joint<'a> {
 /// Covariances with an innovation, and its variance.
 #[derive(Debug, Clone)]
 pub(super) struct Innovation {
-    x: Nav,
-    b: Vec<f64>,
-    t: Vec<f64>,
+    pub(super) with: Column,
     /// Its variance.
     pub(super) s: f64,
 }
@@ -244,7 +254,7 @@ pub(super) struct Innovation {
 impl Innovation {
     /// The gain that is best where the covariance is right.
     fn gain(&self) -> Gain {
-        Gain { x: self.x.map(|c| c / self.s), b: self.b.iter().map(|c| c / self.s).collect() }
+        Gain { x: self.with.x.map(|c| c / self.s), b: self.with.b.iter().map(|c| c / self.s).collect() }
     }
 }
 

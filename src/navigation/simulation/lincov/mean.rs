@@ -1,18 +1,17 @@
 //! The mean of the true errors, which is the same in every run, and what else moves as a mean does.
 
-use super::input::{SIGNALS, Source, StepOfSource};
+use super::column::Column;
+use super::input::{SIGNALS, StepOfSource};
 use super::joint::Gain;
 use super::sides::Sides;
-use super::track::{NAV, Nav, Row, Step};
+use super::track::{NAV, Step};
 
-/// Mean of z = \[navigation error; bias estimates\] and of the truth's states, as [`Joint`](super::joint::Joint)
-/// has their covariance; or their covariance with a variable of the past, of which later noise knows nothing.
+/// Mean of z and of the truth's states, as [`Joint`](super::joint::Joint) has their covariance; or their covariance with a variable of the
+/// past, of which later noise knows nothing.
 #[derive(Debug, Clone)]
 pub(super) struct Mean<'a> {
     pub(super) sides: &'a Sides,
-    pub(super) x: Nav,
-    pub(super) b: Vec<f64>,
-    pub(super) t: Vec<f64>,
+    pub(super) values: Column,
     /// Samples so far.
     pub(super) elapsed: f64,
 }
@@ -22,12 +21,13 @@ impl<'a> Mean<'a> {
     pub(super) fn new(sides: &'a Sides) -> Option<Self> {
         let (b, t) = (&sides.b, &sides.t);
         // A mean is rare (drifts of the truth): without one the whole propagation is spared.
-        t.states.iter().any(|s| s.level != 0.0).then(|| Self {
-            sides,
-            x: [0.0; NAV],
-            b: vec![0.0; b.states.len()],
-            t: t.states.iter().map(|s| s.level).collect(),
-            elapsed: 0.0,
+        t.states.iter().any(|s| s.level != 0.0).then(|| {
+            let values = Column {
+                x: [0.0; NAV],
+                b: vec![0.0; b.states.len()],
+                t: t.states.iter().map(|s| s.level).collect(),
+            };
+            Self { sides, values, elapsed: 0.0 }
         })
     }
 
@@ -42,24 +42,15 @@ impl<'a> Mean<'a> {
                 *state *= s.decay;
             }
         };
-        add(&mut self.b, &inputs.b);
-        add(&mut self.t, &inputs.t);
-        self.x = step.map(&self.x, &error);
+        add(&mut self.values.b, &inputs.b);
+        add(&mut self.values.t, &inputs.t);
+        self.values.x = step.map(&self.values.x, &error);
         self.elapsed += f64::from(step.samples);
     }
 
-    /// Mean of what a row measures less what is expected.
-    pub(super) fn innovation(&self, row: &Row) -> f64 {
-        let of_x: f64 = self.x.iter().zip(&row.h).map(|(x, h)| x * h).sum();
-        let measured = |states: &[f64], sources: &[Source]| -> f64 {
-            states.iter().zip(sources).map(|(x, s)| x * row.coefficient(s, self.elapsed)).sum()
-        };
-        of_x + measured(&self.b, &self.sides.b.states) + measured(&self.t, &self.sides.t.states)
-    }
-
-    /// z ← z − k y.
+    /// z ← z − k y for an innovation whose mean is y.
     pub(super) fn correct(&mut self, y: f64, gain: &Gain) {
-        self.x.iter_mut().zip(&gain.x).for_each(|(x, k)| *x -= k * y);
-        self.b.iter_mut().zip(&gain.b).for_each(|(b, k)| *b -= k * y);
+        self.values.x.iter_mut().zip(&gain.x).for_each(|(x, k)| *x -= k * y);
+        self.values.b.iter_mut().zip(&gain.b).for_each(|(b, k)| *b -= k * y);
     }
 }

@@ -9,8 +9,10 @@
 //! of a second. Any number of beliefs and truths are then assessed along it, in milliseconds each.
 
 mod branch;
+mod column;
 mod descent;
 mod errors;
+mod force_errors;
 mod heading;
 mod input;
 mod joint;
@@ -30,7 +32,7 @@ pub use heading::{HeadingDoubt, weak_heading};
 pub use pass::{Assessment, Consistency, ErrorLaw, FilterPass, Instant, Judged, assess};
 pub use reduce::{Alike, drive, reduced_belief};
 pub(crate) use root::Crossing;
-pub(crate) use settling::{Settling, stated_while_settling};
+pub(crate) use settling::stated_while_settling;
 pub use track::Track;
 pub use truth::{DRIFT, NamedSource, TrueErrors, TruthSide};
 pub(crate) use tune::times;

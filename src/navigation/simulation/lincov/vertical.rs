@@ -123,7 +123,7 @@ fn half_impulse(step: &Step) -> Matrix3<f64> {
 
 /// Covariances of the attitude errors of now (rows) with those of then.
 fn attitudes(columns: &[Mean<'_>; 3]) -> Matrix3<f64> {
-    Matrix3::from_fn(|i, j| columns[j].x[3 * PSI + i])
+    Matrix3::from_fn(|i, j| columns[j].values.x[3 * PSI + i])
 }
 
 /// A bilinear form of attitude errors at one instant, and what it does later.
@@ -138,7 +138,8 @@ struct Impulse<'a> {
 
 impl<'a> Impulse<'a> {
     fn new(form: Matrix3<f64>, pass: &Pass<'a>) -> Self {
-        let with_attitude = |joint: &Joint<'a>| std::array::from_fn(|j| joint.covariance_with(3 * PSI + j));
+        let with_attitude =
+            |joint: &Joint<'a>| std::array::from_fn(|j| joint.correlated(&joint.state(3 * PSI + j)));
         let (truth, filter) = (with_attitude(&pass.errors.joint), with_attitude(&pass.filter));
         Self { form, truth, filter, response: VELOCITY }
     }
