@@ -20,15 +20,21 @@ use glam::DVec3;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// The times for which errors of the specific force are followed (s): the first by whose end the attitude has settled.
+/// The times for which errors of the specific force are followed (s): the first by whose end the attitude has settled, or the last.
 const WINDOWS_S: [f64; 4] = [120.0, 240.0, 480.0, 960.0];
 /// Functions of time: with 8, 16 and 32 of them the standard deviation of the heading comes within 0.81, 0.32 and 0.14 % of that of 300 runs after two
 /// minutes at rest, where gyroscopes and accelerometers have four times the white noise that the filter believes in.
 const PATHS: usize = 16;
 /// A change of a variance, as a share of it, that is none.
 const NOTHING: f64 = 1e-3;
+/// Standard deviation of the heading (degrees) from which on little more is believed to be learned of it: what is, per time and as a share, goes with
+/// its square.
+const KNOWN_DEG: f64 = 0.5;
 /// Marks until it is looked at again whether anything changes.
 const MARKS: usize = 30;
+
+/// Yaw among the reported states.
+const YAW: usize = 8;
 
 /// Variances of the reported states (m², (m/s)², degrees²), or what is added to them.
 type Variances = [f64; REPORTED];
@@ -80,7 +86,7 @@ struct Filter<'a> {
 
 impl Settling {
     /// The average over filters whose specific force is off by `paths` over the legs to the first `marks` marks, followed until nothing is left of
-    /// it; whether that is so at the end of the paths.
+    /// it; whether that is so at the end of the paths, and the heading known.
     fn average(&mut self, track: &Track, own: &Sides, paths: &[Vec<DVec3>], marks: usize) -> bool {
         let filter = |force| Filter::at_start(Joint::new(track.start, own), force);
         let mut along = filter(Vec::new());
@@ -105,7 +111,8 @@ impl Settling {
             let is_nothing = last
                 .is_none_or(|(more, stated)| more.iter().zip(stated).all(|(m, s)| m.abs() <= NOTHING * s));
             if is_nothing || until == track.marks.len() {
-                return is_nothing && until == marks;
+                let is_known = along.reports.last().is_none_or(|stated| stated[YAW] < KNOWN_DEG * KNOWN_DEG);
+                return is_nothing && is_known && until == marks;
             }
             (done, until) = (until, (until + MARKS).min(track.marks.len()));
         }
