@@ -212,9 +212,10 @@ pub mod metrics {
     #[doc(inline)]
     pub use nav_sim_navigation::metrics::{
         AccuracySummary, Agreement, AxisReduction, Budget, ComparisonError, Consistency, Coverage,
-        EpochMetrics, Estimate, Expected, FanEpoch, Met, Nis, OutageMetrics, OutageSummary, OutageVerdict,
-        PerState, Quantile, Reconvergence, Recovery, ReductionQuality, ReductionSummary, SampleSize,
-        Sensitivities, Spread, StateName, Summary, Verdict, VerdictKind, epochs,
+        EpochMetrics, Estimate, Expected, FanEpoch, Met, Nis, OutageMetrics, OutageSecondOrder,
+        OutageSummary, OutageVerdict, PerState, Quantile, Reconvergence, Recovery, ReductionQuality,
+        ReductionSummary, SampleSize, Sensitivities, Spread, StateName, Summary, Verdict, VerdictKind,
+        epochs,
     };
 }
 

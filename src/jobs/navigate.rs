@@ -162,6 +162,7 @@ pub fn navigate(
         }
     };
     navigation.summary.reduction = reduction;
+    navigation.summary.measure_second_order(&assessment.outage_ends);
     if let Some(baro) = &scenario.baro {
         navigation.summary.see_height(baro);
     }

@@ -178,11 +178,7 @@ impl Requirements {
         let belief = scenario.belief(model, &outages, &track)?;
         let experiment = scenario.experiment(&self.trajectory, Truth::Model(model), &[], &outages, 0);
         let Some(expected) = Expected::along(&track, &experiment, &belief, model) else { return Ok(None) };
-        let mut summary = expected.summary();
-        if let Some(baro) = &scenario.baro {
-            summary.see_height(baro);
-        }
-        Ok(summary.outages.first().and_then(BeyondLinear::of))
+        Ok(expected.outages.first().and_then(BeyondLinear::of))
     }
 
     /// How units do after the outage and after those of `CURVE_S`, the best first: those that keep the limits, those

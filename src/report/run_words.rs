@@ -61,23 +61,24 @@ pub(crate) fn beyond_linear(summary: &Summary) -> Option<String> {
 }
 
 fn beyond_vertically(summary: &Summary) -> Option<String> {
-    let beyond = summary.outages.iter().filter_map(|o| Some((o, o.beyond_linear()?)));
-    let (outage, share) = beyond.max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let beyond = summary.outages.iter().filter_map(|o| Some((o, o.second_order.beyond_linear()?)));
+    let (outage, sigmas) = beyond.max_by(|a, b| a.1.total_cmp(&b.1))?;
     Some(format!(
-        "beyond linear: attitude errors of the outage {} shift the velocity down by {} m/s to second order, {:.0} % of the \
-         filter's standard deviation; of a covariance analysis the RMSE and ASEE of position and velocity down contain this up to the outage's \
+        "beyond linear: attitude errors of the outage {} shift the velocity down by {} m/s to second order, {} times the \
+         standard deviation that linear theory gives it; of a covariance analysis the RMSE and ASEE of position and velocity down contain this up to the outage's \
          end, its NEES and coverage do not, nor what the first fixes make of it: for some minutes the velocity down and the vertical accelerometer bias can be twice as wrong as believed{}. A shorter \
          outage or {} removes it, and so does a barometer, unless the accelerometer is so quiet that the filter takes no bias for its cause",
         window(outage.start_s, outage.end_s),
-        readable(outage.second_order_vel_d_m_s),
-        100.0 * share,
+        readable(outage.second_order.vel_d_m_s),
+        readable(sigmas),
         how_far(summary),
         smaller(outage, &TILT)
     ))
 }
 
 fn beyond_horizontally(summary: &Summary) -> Option<String> {
-    let beyond = summary.outages.iter().filter_map(|o| Some((o, o.beyond_linear_horizontally()?)));
+    let beyond =
+        summary.outages.iter().filter_map(|o| Some((o, o.second_order.beyond_linear_horizontally()?)));
     let (outage, nees) = beyond.max_by(|a, b| a.1.total_cmp(&b.1))?;
     Some(format!(
         "beyond linear: heading error times tilt in the outage {} shifts horizontal velocity and position to second order, by which the \

@@ -1,6 +1,6 @@
 //! Unit files of studies: what a unit found, as bytes with a checksum.
 //!
-//! `nav-sim unit 4\n`, the length of the head (u32), the head (JSON), the numbers (little-endian f64 and
+//! `nav-sim unit 5\n`, the length of the head (u32), the head (JSON), the numbers (little-endian f64 and
 //! u64: for each column its runs, then its epochs; of a covariance analysis what it expects), BLAKE3 of all before. A file that is cut off or changed
 //! in one bit is no unit file.
 
@@ -17,7 +17,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-const MAGIC: &[u8] = b"nav-sim unit 4\n";
+const MAGIC: &[u8] = b"nav-sim unit 5\n";
 const CHECKSUM: usize = 32;
 
 /// A unit file that cannot be used.

@@ -11,6 +11,7 @@ use nav_sim::sensors::imu::Truth;
 use nav_sim::sensors::outage::Outage;
 use nav_sim::simulation::{NEES_DOF, RunResult};
 use nav_sim::trajectory::Trajectory;
+use nav_sim_navigation::simulation::lincov::assess;
 use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF};
 use std::path::Path;
 
@@ -167,15 +168,16 @@ fn long_outages_shift_the_velocity_down_by_the_square_of_the_tilts() {
     let result = monte_carlo::run(&experiment, 256, &|_| {}).unwrap().remove(0);
     let epochs = nav_sim::metrics::epochs(&result);
     let mut summary = nav_sim::metrics::Summary::of(&result, &epochs, 5);
-    let shift = summary.outages[0].second_order_vel_d_m_s;
+    summary.measure_second_order(&assess(&track, &beliefs[0], &file.model).outage_ends);
+    let shift = summary.outages[0].second_order.vel_d_m_s;
     let end = epochs.iter().rev().find(|e| e.t_s < 399.5).unwrap();
     let (mean, error) = (end.bias.0[5].value, end.bias.0[5].std_error);
     assert!((mean - shift).abs() < 3.5 * error + 0.1 * shift, "{mean} ± {error} against {shift}");
     assert!(mean > 3.0 * error, "{mean} ± {error} could be chance");
-    assert!(summary.outages[0].beyond_linear().is_some());
+    assert!(summary.outages[0].second_order.beyond_linear().is_some());
     // a height in ten minutes falls into no outage of five
     summary.see_height(&BaroSettings { rate_hz: 1.0 / 600.0, sigma_m: 1.0 });
-    assert!(summary.outages[0].beyond_linear().is_some());
+    assert!(summary.outages[0].second_order.beyond_linear().is_some());
     summary.see_height(&BaroSettings { rate_hz: 1.0, sigma_m: 1.0 });
-    assert!(summary.outages[0].beyond_linear().is_none());
+    assert!(summary.outages[0].second_order.beyond_linear().is_none());
 }

@@ -50,7 +50,7 @@ fn outage(heading_deg: f64) -> (Vec<OutageRecord>, f64) {
     let experiment = scenario.experiment(&path, Truth::Model(&model), &beliefs, &outages, 7);
     let runs = monte_carlo::run(&experiment, RUNS, &|_| {}).unwrap().remove(0).runs;
     let expected = Expected::along(&track, &experiment, &beliefs[0], &model).unwrap().summary();
-    (runs.into_iter().map(|run| run.outages[0].clone()).collect(), expected.outages[0].second_order_nees)
+    (runs.into_iter().map(|run| run.outages[0].clone()).collect(), expected.outages[0].second_order.nees)
 }
 
 /// The same draws with a heading of 2° and of 0.01°: all else, also what the tilts alone shift downwards, is in both, so that

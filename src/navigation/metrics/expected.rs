@@ -4,7 +4,7 @@ use super::epoch::{Accuracy, EpochMetrics};
 use super::estimate::{Estimate, PerState, Quantile};
 use super::outage::{OutageMetrics, Reconvergence, within};
 use super::quadratic_form::QuadraticForm;
-use super::second_order::horizontal_nees;
+use super::second_order::{OutageSecondOrder, VELOCITY_DOWN, horizontal_nees, velocity_down_m_s};
 use super::summary::{AccuracySummary, Consistency, Coverage, Nis, OutageSummary, SCHEMA_VERSION, Summary};
 use super::verdict::{OutageVerdict, Verdict};
 use crate::ekf::Belief;
@@ -82,8 +82,16 @@ impl Expected {
         let believed = |epoch: &EpochMetrics| {
             law.reports.iter().find(|report| report.errors.t_s == epoch.t_s).map(|report| &report.believed)
         };
-        for outage in &mut outages {
-            outage.second_order_nees = horizontal_nees((outage.start_s, outage.end_s), &epochs, believed);
+        for (outage, end) in outages.iter_mut().zip(&law.outage_ends) {
+            let window = (outage.start_s, outage.end_s);
+            outage.second_order = OutageSecondOrder {
+                vel_d_m_s: velocity_down_m_s(window, &epochs),
+                linear_vel_d_m_s: end.sigma()[VELOCITY_DOWN],
+                nees: horizontal_nees(window, &epochs, believed),
+            };
+            if let Some(baro) = experiment.baro {
+                outage.second_order.see_height(window, baro);
+            }
         }
         let record = record(&epochs, &law, &outages);
         // NaN comes from a believed covariance without a Cholesky factor: at any report it makes the mean
@@ -115,7 +123,7 @@ impl Expected {
             filter_states: self.filter_states,
             seed: Some(self.seed),
             accuracy: AccuracySummary::from(&Accuracy::over(self.epochs.iter())),
-            outages: OutageSummary::all(&self.outages, OutageVerdict::expected(&self.record), &self.epochs),
+            outages: OutageSummary::all(&self.outages, OutageVerdict::expected(&self.record)),
             nees: Consistency {
                 dof: NEES_DOF,
                 mean: self.record.nees_mean,
@@ -148,7 +156,7 @@ impl Expected {
 }
 
 /// Position and velocity down among the reported states.
-const DOWN: [usize; 2] = [2, 5];
+const DOWN: [usize; 2] = [2, VELOCITY_DOWN];
 
 /// Adds what is of second order in position and velocity down to standard deviations that the filter states and to root mean
 /// squares of its errors. NEES, coverage and quantiles stay those of first order: they are of the whole covariance of one run, which
@@ -237,7 +245,7 @@ fn outage((start_s, end_s): (f64, f64), end: &Judged, epochs: &[EpochMetrics]) -
         horizontal_p95_m: quantile(p95),
         horizontal_p999_m: Some(p999),
         horizontal_max_m: f64::NAN,
-        second_order_nees: f64::NAN,
+        second_order: OutageSecondOrder::UNKNOWN,
         reconvergence: Reconvergence { p50_s: quantile(f64::NAN), p95_s: quantile(f64::NAN), never: None },
     }
 }

@@ -2,6 +2,7 @@
 
 use super::epoch::{Accuracy, EpochMetrics, epochs};
 use super::estimate::{Estimate, PerState, Quantile, quantile};
+use super::second_order::{OutageSecondOrder, velocity_down_m_s};
 use crate::sensors::outage::Outage;
 use crate::simulation::{OutageRecord, REPORTED, RunResult};
 
@@ -32,8 +33,8 @@ pub struct OutageMetrics {
     pub horizontal_p999_m: Option<f64>,
     /// Largest; NaN of a covariance analysis, whose law has no end.
     pub horizontal_max_m: f64,
-    /// What the horizontal errors of second order add to the expected NEES at most; of a covariance analysis only.
-    pub second_order_nees: f64,
+    /// What its errors have of second order.
+    pub second_order: OutageSecondOrder,
     /// How soon the runs recover.
     pub reconvergence: Reconvergence,
 }
@@ -57,10 +58,10 @@ pub fn outages(result: &RunResult) -> Vec<OutageMetrics> {
     let epochs = epochs(result);
     let metrics_of_outage = |(i, window): (usize, &(f64, f64))| {
         let records: Vec<&OutageRecord> = kept().filter_map(|r| r.outages.get(i)).collect();
-        OutageMetrics {
-            rmse_mean: Accuracy::over(within(*window, &epochs)).rmse_mean,
-            ..outage(*window, &records, result.independent_windows)
-        }
+        let mut metrics = outage(*window, &records, result.independent_windows);
+        metrics.rmse_mean = Accuracy::over(within(*window, &epochs)).rmse_mean;
+        metrics.second_order.vel_d_m_s = velocity_down_m_s(*window, &epochs);
+        metrics
     };
     result.outages.iter().enumerate().map(metrics_of_outage).collect()
 }
@@ -74,7 +75,7 @@ pub(super) fn within(
     epochs.iter().filter(move |e| outage.withholds(e.t_s))
 }
 
-/// Statistics of an outage from the records of the runs; the mean RMSE, which needs the epochs, is NaN.
+/// Statistics of an outage from the records of the runs; what needs the epochs is NaN.
 fn outage((start_s, end_s): (f64, f64), records: &[&OutageRecord], windows: Option<f64>) -> OutageMetrics {
     let horizontal = sorted(records.iter().map(|r| r.horizontal_error_end_m));
     // Runs that never recover have NaN here. They are counted apart: no finite time stands for them.
@@ -96,7 +97,7 @@ fn outage((start_s, end_s): (f64, f64), records: &[&OutageRecord], windows: Opti
         horizontal_p95_m: quantile(&horizontal, 0.95, windows),
         horizontal_p999_m: None,
         horizontal_max_m: horizontal.last().copied().unwrap_or(f64::NAN),
-        second_order_nees: f64::NAN,
+        second_order: OutageSecondOrder::UNKNOWN,
         reconvergence: Reconvergence {
             p50_s: quantile(&recovery, 0.5, windows),
             p95_s: quantile(&recovery, 0.95, windows),

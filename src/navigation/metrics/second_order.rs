@@ -18,33 +18,52 @@
 //! (tilts that grow in the outage, and turns, make it less), and the largest over the epochs, which need not be the end.
 
 use super::epoch::EpochMetrics;
-use super::outage::{OutageMetrics, within};
-use super::summary::{OutageSummary, Summary};
+use super::outage::within;
+use super::summary::Summary;
 use super::verdict::TOLERANCE;
 use crate::sensors::baro::BaroSettings;
 use crate::simulation::NEES_DOF;
+use crate::simulation::lincov::Consistency;
 use crate::units::{DEG, STANDARD_GRAVITY};
 use nalgebra::{SMatrix, SVector};
+use serde::Serialize;
 
 /// Roll, pitch among the reported states.
 const TILT: [usize; 2] = [6, 7];
 /// Yaw among the reported states.
 const YAW: usize = 8;
 /// Velocity down among the reported states.
-const VELOCITY_DOWN: usize = 5;
+pub(super) const VELOCITY_DOWN: usize = 5;
+
+/// What attitude errors do to second order in an outage; NaN where nobody says it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct OutageSecondOrder {
+    /// Mean shift of the velocity down (m/s) just before the first fix after the outage, which no linear filter contains and
+    /// covariance analysis contains up to there (null where the epochs were not kept, or a barometer sees the height).
+    #[serde(rename = "second_order_vel_d_m_s")]
+    pub vel_d_m_s: f64,
+    /// Standard deviation of the velocity down (m/s) at the same instant that linear theory gives it in the filter. What the
+    /// filters of runs state, and covariance analysis with them, grows with the shift and is no measure of it.
+    #[serde(skip)]
+    pub linear_vel_d_m_s: f64,
+    /// What heading error times tilt adds to the expected NEES in the outage at most; of a covariance analysis, for which runs
+    /// keep too little.
+    #[serde(skip)]
+    pub nees: f64,
+}
 
 /// Mean shift of the velocity down (m/s) that the tilt makes to second order over an outage: ∫ g (ψ_roll² + ψ_pitch²)/2 dt
 /// with the mean squares of the errors, by the trapezoidal rule over the reporting epochs. NaN where no epochs were kept.
-pub(super) fn velocity_down_m_s(outage: &OutageMetrics, epochs: &[EpochMetrics]) -> f64 {
+pub(super) fn velocity_down_m_s(window: (f64, f64), epochs: &[EpochMetrics]) -> f64 {
     let acceleration = |epoch: &EpochMetrics| {
         // 1 − cos ψ ≈ ψ²/2 for each of the two tilts; in mean squares, so that no draw is needed.
         STANDARD_GRAVITY / 2.0 * TILT.map(|i| (epoch.rmse.0[i].value * DEG).powi(2)).iter().sum::<f64>()
     };
-    let inside = within((outage.start_s, outage.end_s), epochs);
+    let inside = within(window, epochs);
     let points: Vec<(f64, f64)> = inside.map(|e| (e.t_s, acceleration(e))).collect();
     let Some(&(_, last)) = points.last() else { return f64::NAN };
     // from the last epoch on as there: the fix that ends the outage is not inside
-    let end = (outage.end_s, last);
+    let end = (window.1, last);
     let ends = points.iter().zip(points.iter().skip(1).chain([&end]));
     ends.map(|(a, b)| (b.0 - a.0) * (a.1 + b.1) / 2.0).sum()
 }
@@ -87,37 +106,52 @@ impl Summary {
     /// little.
     pub(super) fn take_second_order(&mut self, expected: &Self) {
         for (own, expected) in self.outages.iter_mut().zip(&expected.outages) {
-            own.second_order_nees = expected.second_order_nees;
+            own.second_order.nees = expected.second_order.nees;
         }
     }
 
-    /// A barometer sees the vertical channel: in outages that have a height no shift grows without being corrected, and none is stated.
-    pub fn see_height(&mut self, baro: &BaroSettings) {
-        let has_height = |outage: &&mut OutageSummary| (outage.end_s - outage.start_s) * baro.rate_hz >= 1.0;
-        for outage in self.outages.iter_mut().filter(has_height) {
-            outage.second_order_vel_d_m_s = f64::NAN;
+    /// With what linear theory gives the filter at the end of each outage, as [`assess`](crate::simulation::lincov::assess) finds
+    /// it beside any runs.
+    pub fn measure_second_order(&mut self, ends: &[Consistency]) {
+        for (outage, end) in self.outages.iter_mut().zip(ends) {
+            outage.second_order.linear_vel_d_m_s = end.sigma[VELOCITY_DOWN];
         }
-        if let Some(expected) = &mut self.lincov {
-            expected.see_height(baro);
+    }
+
+    /// With the heights of a barometer, of which runs keep nothing.
+    pub fn see_height(&mut self, baro: &BaroSettings) {
+        for outage in &mut self.outages {
+            outage.second_order.see_height((outage.start_s, outage.end_s), baro);
         }
     }
 }
 
-impl OutageSummary {
-    /// The share of the filter's own standard deviation that the second order shifts the velocity down by at the end,
-    /// where the filter's linear model ends: where it is above `SECOND_ORDER_LIMIT`.
+impl OutageSecondOrder {
+    /// Nothing is known yet.
+    pub(super) const UNKNOWN: Self = Self { vel_d_m_s: f64::NAN, linear_vel_d_m_s: f64::NAN, nees: f64::NAN };
+
+    /// A barometer sees the vertical channel: in an outage that has a height no shift grows without being corrected, and none is
+    /// stated.
+    pub(super) fn see_height(&mut self, (start_s, end_s): (f64, f64), baro: &BaroSettings) {
+        if (end_s - start_s) * baro.rate_hz >= 1.0 {
+            self.vel_d_m_s = f64::NAN;
+        }
+    }
+
+    /// By how many standard deviations of linear theory the velocity down is shifted at the end, where linear theory ends:
+    /// where it is above `SECOND_ORDER_LIMIT`.
     #[must_use]
     pub fn beyond_linear(&self) -> Option<f64> {
-        let share = self.second_order_vel_d_m_s / self.asee_end.0[VELOCITY_DOWN];
-        (share > Self::SECOND_ORDER_LIMIT).then_some(share)
+        let sigmas = self.vel_d_m_s / self.linear_vel_d_m_s;
+        (sigmas > Self::SECOND_ORDER_LIMIT).then_some(sigmas)
     }
 
     /// What heading error times tilt adds to the expected NEES at most, where that makes the errors of all states together larger
     /// by more than verdicts let pass.
     #[must_use]
     pub fn beyond_linear_horizontally(&self) -> Option<f64> {
-        let ratio = (1.0 + self.second_order_nees / NEES_DOF as f64).sqrt();
-        (ratio > 1.0 + TOLERANCE).then_some(self.second_order_nees)
+        let ratio = (1.0 + self.nees / NEES_DOF as f64).sqrt();
+        (ratio > 1.0 + TOLERANCE).then_some(self.nees)
     }
 
     /// See [`Self::beyond_linear`]: with equal tilts about two axes the mean square of the shift is twice its mean squared, and
@@ -165,20 +199,11 @@ mod tests {
             tilt[TILT[0]].value = rate * (epoch.t_s - 100.0).max(0.0);
             epoch.rmse = PerState(tilt);
         }
-        let result = RunResult {
-            runs: vec![crate::simulation::RunRecord {
-                outages: vec![crate::simulation::OutageRecord::default()],
-                ..Default::default()
-            }],
-            outages: vec![(100.0, 200.0)],
-            ..result
-        };
-        let outage = &crate::metrics::outages(&result)[0];
         let c = rate * DEG;
         // 100 to 199 s, and a second at the tilt of 99 s
         let to_last = STANDARD_GRAVITY * c * c * (99.0_f64.powi(3) / 6.0 + 99.0 / 12.0);
         let closed = to_last + STANDARD_GRAVITY / 2.0 * (99.0 * c).powi(2);
-        assert!((velocity_down_m_s(outage, &epochs) / closed - 1.0).abs() < 1e-12);
-        assert!(velocity_down_m_s(outage, &[]).is_nan());
+        assert!((velocity_down_m_s((100.0, 200.0), &epochs) / closed - 1.0).abs() < 1e-12);
+        assert!(velocity_down_m_s((100.0, 200.0), &[]).is_nan());
     }
 }

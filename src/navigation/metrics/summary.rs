@@ -8,7 +8,7 @@ use super::estimate::{Estimate, PerState, Quantile, SampleSize};
 use super::outage::{self, OutageMetrics};
 use super::reduction::ReductionSummary;
 use super::requirement::Met;
-use super::second_order::velocity_down_m_s;
+use super::second_order::OutageSecondOrder;
 use super::sensitivity::Sensitivities;
 use super::verdict::{OutageVerdict, Verdict};
 use crate::simulation::{NEES_DOF, RunResult};
@@ -124,13 +124,9 @@ pub struct OutageSummary {
     pub log_density_end_std_error: f64,
     /// Horizontal error at the same instant.
     pub horizontal_error_end_m: Spread,
-    /// Mean shift of the velocity down at the same instant that attitude errors make to second order, which neither
-    /// filter nor covariance analysis contains (null where the epochs were not kept, or a barometer sees the height).
-    pub second_order_vel_d_m_s: f64,
-    /// What heading error times tilt, which is of second order, adds to the expected NEES in the outage at most; NaN where no
-    /// covariance analysis stands beside the runs.
-    #[serde(skip)]
-    pub second_order_nees: f64,
+    /// What its errors have of second order.
+    #[serde(flatten)]
+    pub second_order: OutageSecondOrder,
     /// Time until the error is back to what it was before.
     pub reconvergence_s: Recovery,
     /// Shares of the sources of the true errors in their mean squares just before the first fix after the outage,
@@ -242,7 +238,7 @@ impl Summary {
             filter_states: result.filter_states,
             seed: Some(seed),
             accuracy: AccuracySummary::from(&Accuracy::over(epochs.iter())),
-            outages: OutageSummary::all(&outage::outages(result), verdicts, epochs),
+            outages: OutageSummary::all(&outage::outages(result), verdicts),
             nees: nees(epochs, windows),
             nis: nis(result),
             coverage: coverage(epochs, result.coverage_level, windows),
@@ -275,16 +271,11 @@ impl From<&Accuracy> for AccuracySummary {
 
 impl OutageSummary {
     /// All outages with their verdicts.
-    pub(super) fn all(
-        outages: &[OutageMetrics],
-        verdicts: Vec<OutageVerdict>,
-        epochs: &[EpochMetrics],
-    ) -> Vec<Self> {
-        let outages = outages.iter().zip(verdicts);
-        outages.map(|(o, verdict)| Self::new(o, verdict, velocity_down_m_s(o, epochs))).collect()
+    pub(super) fn all(outages: &[OutageMetrics], verdicts: Vec<OutageVerdict>) -> Vec<Self> {
+        outages.iter().zip(verdicts).map(|(o, verdict)| Self::new(o, verdict)).collect()
     }
 
-    fn new(o: &OutageMetrics, verdict: OutageVerdict, second_order_vel_d_m_s: f64) -> Self {
+    fn new(o: &OutageMetrics, verdict: OutageVerdict) -> Self {
         Self {
             start_s: o.start_s,
             end_s: o.end_s,
@@ -308,8 +299,7 @@ impl OutageSummary {
                 p999: o.horizontal_p999_m,
                 ..Spread::new(o.horizontal_p50_m, o.horizontal_p95_m, o.horizontal_max_m)
             },
-            second_order_vel_d_m_s,
-            second_order_nees: o.second_order_nees,
+            second_order: o.second_order,
             reconvergence_s: Recovery {
                 p50: o.reconvergence.p50_s.value,
                 p95: o.reconvergence.p95_s.value,

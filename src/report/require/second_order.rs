@@ -1,7 +1,7 @@
 //! Where the errors that an answer rests on are too large for linear theory.
 
 use crate::report::number::{readable, window};
-use nav_sim_navigation::metrics::OutageSummary;
+use nav_sim_navigation::metrics::OutageMetrics;
 use serde::Serialize;
 
 /// An outage whose errors are beyond linear theory, by the rules of `run`.
@@ -9,7 +9,7 @@ use serde::Serialize;
 pub(crate) struct BeyondLinear {
     start_s: f64,
     end_s: f64,
-    /// Shift of the velocity down over the filter's standard deviation.
+    /// Shift of the velocity down over the standard deviation that linear theory gives it.
     vel_d_share: Option<f64>,
     /// What heading error times tilt adds to the NEES at most.
     nees: Option<f64>,
@@ -17,8 +17,9 @@ pub(crate) struct BeyondLinear {
 
 impl BeyondLinear {
     /// None where linear theory covers the outage.
-    pub(crate) fn of(outage: &OutageSummary) -> Option<Self> {
-        let (vel_d_share, nees) = (outage.beyond_linear(), outage.beyond_linear_horizontally());
+    pub(crate) fn of(outage: &OutageMetrics) -> Option<Self> {
+        let second = &outage.second_order;
+        let (vel_d_share, nees) = (second.beyond_linear(), second.beyond_linear_horizontally());
         let is_beyond = vel_d_share.or(nees).is_some();
         is_beyond.then_some(Self { start_s: outage.start_s, end_s: outage.end_s, vel_d_share, nees })
     }
@@ -27,8 +28,8 @@ impl BeyondLinear {
     fn in_words(&self) -> String {
         let down = self.vel_d_share.map(|share| {
             format!(
-                "attitude errors shift the velocity down by {:.0} % of the filter's standard deviation",
-                100.0 * share
+                "attitude errors shift the velocity down by {} times the standard deviation that linear theory gives it",
+                readable(share)
             )
         });
         let horizontal = self.nees.map(|nees| {
