@@ -49,7 +49,14 @@ pub(crate) fn read(directory: &Path) -> Result<RunDirectory, FileError> {
     let (verdict, asee_mean_ci95) = found(directory, &manifest)?;
     let outages = manifest.configuration.outage.iter().flatten().map(|o| (o.start_s, o.end_s)).collect();
     let independent_windows = manifest.independent_windows;
-    let experiment = Measured { epochs, runs, outages, independent_windows, is_expected };
+    let experiment = Measured {
+        epochs,
+        runs,
+        outages,
+        independent_windows,
+        is_expected,
+        beyond_linear: verdict.beyond_linear,
+    };
     Ok(RunDirectory { manifest, experiment, verdict, asee_mean_ci95 })
 }
 

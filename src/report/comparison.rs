@@ -1,8 +1,8 @@
 //! `comparison.json`, what is in it and what is said of it.
 
 use super::short::short_names;
-use super::verdict::{verdict_in_short, verdict_word};
-use nav_sim_navigation::metrics::{OutageComparison, Verdict, VerdictKind};
+use super::verdict::{Grade, verdict_in_short};
+use nav_sim_navigation::metrics::{OutageComparison, Verdict};
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 use serde::Serialize;
 
@@ -179,18 +179,16 @@ fn rows<'a>(
     })
 }
 
-/// Which filters are as good as they believe: a line a kind of verdict, the gravest first.
+/// Which filters are as good as they believe: a line a grade, the gravest first.
 pub(crate) fn verdict_lines(verdicts: &[VerdictRow]) -> Vec<String> {
-    let kinds =
-        [VerdictKind::Diverged, VerdictKind::Overconfident, VerdictKind::Underconfident, VerdictKind::Ok];
     let names = short_names(&verdicts.iter().map(|row| row.run.as_str()).collect::<Vec<_>>());
-    let line = |kind: VerdictKind| {
-        let of_kind = verdicts.iter().zip(&names).filter(|(row, _)| row.verdict.kind == kind);
+    let line = |grade: Grade| {
+        let of_grade = verdicts.iter().zip(&names).filter(|(row, _)| Grade::of(&row.verdict) == grade);
         let runs: Vec<String> =
-            of_kind.map(|(row, name)| format!("{name} ({})", verdict_in_short(&row.verdict))).collect();
-        (!runs.is_empty()).then(|| format!("{}: {}", verdict_word(kind), runs.join(", ")))
+            of_grade.map(|(row, name)| format!("{name} ({})", verdict_in_short(&row.verdict))).collect();
+        (!runs.is_empty()).then(|| format!("{}: {}", grade.words(), runs.join(", ")))
     };
-    kinds.into_iter().filter_map(line).collect()
+    Grade::ALL.into_iter().filter_map(line).collect()
 }
 
 /// What the ± of the table are.

@@ -4,7 +4,7 @@
 use super::comparison::{CandidateResult, Label};
 use super::comparison_table::{table_rows, with_times};
 use super::number::{readable, window};
-use super::verdict::{verdict_in_short, verdict_word};
+use super::verdict::{Grade, verdict_in_short};
 use nav_sim_navigation::metrics::{self, EpochMetrics, Measured, OutageComparison, OutageMetrics, Verdict};
 use nav_sim_navigation::simulation::{BIAS_NAMES, REPORTED, REPORTED_NAMES};
 
@@ -130,7 +130,7 @@ pub(crate) fn outage_rows(
     let runs = result.measured.sampled().len() as u64;
     let diverged = result.measured.sampled().iter().filter(|r| r.diverged).count() as u64;
     let verdict = result.measured.verdict();
-    let words = [result.reference, verdict_word(verdict.kind), verdict.worst_state];
+    let words = [result.reference, Grade::of(&verdict).words(), verdict.worst_state];
     let row = |(i, outage): (usize, &OutageMetrics)| {
         let mut row = keys(result);
         row.extend(words.map(|word| Value::Text(word.to_owned())));
@@ -284,7 +284,7 @@ pub(crate) fn verdict_table(cells: &[ShownCell]) -> Vec<Vec<String>> {
         rows[0].extend(cell.columns.iter().map(|c| c.name.clone()));
     }
     let shown = |column: &ShownColumn| {
-        format!("{}, {}", verdict_word(column.verdict.kind), verdict_in_short(&column.verdict))
+        format!("{}, {}", Grade::of(&column.verdict).words(), verdict_in_short(&column.verdict))
     };
     rows.extend(
         cells

@@ -6,39 +6,54 @@ use nav_sim_navigation::metrics::{ALL_STATES, StateName, Verdict, VerdictKind};
 /// One line: the verdict, by how much and where, the figures it rests on. `outages` are those of the
 /// experiment (start, end) in seconds; `runs` and `diverged` count its runs.
 pub(crate) fn verdict_line(verdict: &Verdict, outages: &[(f64, f64)], runs: u64, diverged: u64) -> String {
-    let is_expected = verdict.independent_runs.is_infinite();
     let figures = format!(
         "NEES {} (9 if right), coverage {:.3}",
         with_error(verdict.nees, verdict.nees_std_error),
         verdict.coverage
     );
-    let by = if is_expected { ", by covariance analysis" } else { "" };
+    let by = if verdict.is_expected() { ", by covariance analysis" } else { "" };
+    let beyond = beyond(verdict, outages);
     let departure = departure(verdict, outages);
     match verdict.kind {
         VerdictKind::Diverged if diverged == runs => format!("diverged: all {runs} runs"),
         VerdictKind::Diverged => {
-            format!("diverged: {diverged} of {runs} runs; of the others, {departure}; {figures}")
+            format!("diverged: {diverged} of {runs} runs; of the others, {departure}; {figures}{beyond}")
         }
         VerdictKind::Overconfident if verdict.is_lost() => {
             format!("OVERCONFIDENT BY FAR, the filter is lost: {departure}; {figures}")
         }
-        VerdictKind::Overconfident => format!("overconfident: {departure}; {figures}{by}"),
-        VerdictKind::Underconfident => format!("underconfident: {departure}; {figures}{by}"),
-        VerdictKind::Ok if is_expected => format!(
-            "consistent: {figures}; by covariance analysis no state is off by more than {:.0} %, over the run or at the \
-             end of an outage",
+        VerdictKind::Overconfident => format!("overconfident: {departure}; {figures}{by}{beyond}"),
+        VerdictKind::Underconfident => format!("underconfident: {departure}; {figures}{by}{beyond}"),
+        VerdictKind::Ok if verdict.is_expected() => format!(
+            "{}: {figures}; by covariance analysis no state is off by more than {:.0} %, over the run or at the \
+             end of an outage{beyond}",
+            Grade::of(verdict).words(),
             100.0 * verdict.tolerance
         ),
         VerdictKind::Ok => {
             let percent = |ratio: f64| readable(100.0 * (ratio - 1.0));
             format!(
                 "consistent: {figures}; {} can detect errors {} % above the filter's standard deviations, {} % in one \
-                 state alone",
+                 state alone{beyond}",
                 independent(verdict.independent_runs),
                 percent(verdict.detectable_ratio),
                 percent(verdict.detectable_state_ratio)
             )
         }
+    }
+}
+
+/// Until where a verdict of linear theory holds, and what decides then.
+fn beyond(verdict: &Verdict, outages: &[(f64, f64)]) -> String {
+    let Some((start_s, end_s)) = verdict.beyond_linear.and_then(|k| outages.get(k)) else {
+        return String::new();
+    };
+    let window = window(*start_s, *end_s);
+    match verdict.is_expected() {
+        true => format!(
+            "; this holds until the outage {window}, in which errors grow beyond linear theory: confirm with --method both"
+        ),
+        false => format!("; the runs decide, since errors grow beyond linear theory in the outage {window}"),
     }
 }
 
@@ -93,13 +108,51 @@ pub(crate) fn verdict_in_short(verdict: &Verdict) -> String {
     }
 }
 
-/// The verdict in one word.
-pub(crate) const fn verdict_word(kind: VerdictKind) -> &'static str {
-    match kind {
-        VerdictKind::Ok => "consistent",
-        VerdictKind::Overconfident => "overconfident",
-        VerdictKind::Underconfident => "underconfident",
-        VerdictKind::Diverged => "diverged",
+/// What a verdict says of a filter, the gravest first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Grade {
+    /// At least one run came to nothing.
+    Diverged,
+    /// Errors are larger than the filter believes.
+    Overconfident,
+    /// Errors are smaller than the filter believes.
+    Underconfident,
+    /// Linear theory finds no fault, and errors are beyond it.
+    LinearOnly,
+    /// Nothing speaks against the filter.
+    Consistent,
+}
+
+impl Grade {
+    /// All of them.
+    pub(crate) const ALL: [Self; 5] =
+        [Self::Diverged, Self::Overconfident, Self::Underconfident, Self::LinearOnly, Self::Consistent];
+
+    /// Of a verdict.
+    pub(crate) fn of(verdict: &Verdict) -> Self {
+        match verdict.kind {
+            VerdictKind::Diverged => Self::Diverged,
+            VerdictKind::Overconfident => Self::Overconfident,
+            VerdictKind::Underconfident => Self::Underconfident,
+            VerdictKind::Ok if verdict.is_expected() && verdict.beyond_linear.is_some() => Self::LinearOnly,
+            VerdictKind::Ok => Self::Consistent,
+        }
+    }
+
+    /// The gravest of several.
+    pub(crate) fn gravest<'a>(verdicts: impl Iterator<Item = &'a Verdict>) -> Self {
+        verdicts.map(Self::of).min().unwrap_or(Self::Consistent)
+    }
+
+    /// In a word, or a few.
+    pub(crate) const fn words(self) -> &'static str {
+        match self {
+            Self::Diverged => "diverged",
+            Self::Overconfident => "overconfident",
+            Self::Underconfident => "underconfident",
+            Self::LinearOnly => "consistent in linear theory only",
+            Self::Consistent => "consistent",
+        }
     }
 }
 

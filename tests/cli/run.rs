@@ -1,5 +1,6 @@
 //! `nav-sim run` as a user runs it, on a drive of a minute.
 
+mod beyond_linear;
 mod methods;
 
 use crate::common::drive::*;

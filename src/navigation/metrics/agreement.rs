@@ -66,13 +66,15 @@ impl Agreement {
 
 impl Summary {
     /// With what covariance analysis expects beside the runs. The verdict becomes that of the expected figures, of
-    /// which chance has no part, unless the runs contradict them: then errors are no longer small, and the runs are right.
+    /// which chance has no part, unless the runs contradict them: then errors are no longer small, and the runs are right. Where errors
+    /// are beyond linear theory the runs are believed without that, being too few to contradict it.
     pub fn expect(&mut self, expected: Self, agreement: Agreement) {
         self.method = "both";
         self.take_second_order(&expected);
         let diverged = self.verdict.kind == VerdictKind::Diverged;
         self.is_second_order = self.surpasses(&expected) && agreement.is_broken();
-        if !agreement.is_broken() {
+        let is_linear = expected.verdict.beyond_linear.is_none();
+        if !agreement.is_broken() && (is_linear || self.is_faulted_by(&expected)) {
             self.take_verdicts(&expected);
             // Divergence is a fact of the runs that no linear analysis can take back.
             if diverged {
@@ -80,6 +82,7 @@ impl Summary {
                 self.outages.iter_mut().for_each(|o| o.verdict.kind = VerdictKind::Diverged);
             }
         }
+        self.verdict.beyond_linear = expected.verdict.beyond_linear;
         self.lincov = Some(Box::new(expected));
         self.agreement = Some(agreement);
     }
@@ -89,11 +92,21 @@ impl Summary {
     pub fn doubt_by(&mut self, expected: &Self) {
         self.take_second_order(expected);
         self.is_second_order = self.surpasses(expected) && Agreement::of(self, expected).is_broken();
-        // The runs' own alarm stands, and an expectation without fault adds nothing to it.
-        let is_told = self.verdict.kind != VerdictKind::Ok || expected.verdict.kind == VerdictKind::Ok;
-        if !is_told && !Agreement::of(self, expected).is_broken() {
+        if self.is_faulted_by(expected) && !Agreement::of(self, expected).is_broken() {
             self.take_verdicts(expected);
         }
+    }
+
+    /// Whether covariance analysis finds a fault where the runs find none: their own alarm stands, and an expectation without fault
+    /// adds nothing to it.
+    fn is_faulted_by(&self, expected: &Self) -> bool {
+        let is_fault = match expected.verdict.kind {
+            VerdictKind::Overconfident => true,
+            // errors that linear theory has too small are larger by what it does not contain
+            VerdictKind::Underconfident => expected.verdict.beyond_linear.is_none(),
+            VerdictKind::Ok | VerdictKind::Diverged => false,
+        };
+        self.verdict.kind == VerdictKind::Ok && is_fault
     }
 
     /// Whether the runs alone find errors larger than the filter believes.

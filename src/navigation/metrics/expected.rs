@@ -4,7 +4,7 @@ use super::epoch::{Accuracy, EpochMetrics};
 use super::estimate::{Estimate, PerState, Quantile};
 use super::outage::{OutageMetrics, Reconvergence, within};
 use super::quadratic_form::QuadraticForm;
-use super::second_order::{OutageSecondOrder, VELOCITY_DOWN, horizontal_nees, velocity_down_m_s};
+use super::second_order::{DOWN, OutageSecondOrder, VELOCITY_DOWN, horizontal_nees, velocity_down_m_s};
 use super::summary::{AccuracySummary, Consistency, Coverage, Nis, OutageSummary, SCHEMA_VERSION, Summary};
 use super::verdict::{OutageVerdict, Verdict};
 use crate::ekf::Belief;
@@ -107,10 +107,15 @@ impl Expected {
         })
     }
 
+    /// The first outage in which errors are beyond linear theory.
+    pub(super) fn beyond_linear(&self) -> Option<usize> {
+        self.outages.iter().position(|outage| outage.second_order.is_beyond_linear())
+    }
+
     /// The summary: as that of runs, without what only runs have (null).
     #[must_use]
     pub fn summary(&self) -> Summary {
-        let verdict = Verdict::expected(&self.record);
+        let verdict = Verdict::expected(&self.record, self.beyond_linear());
         let unknown = f64::NAN;
         Summary {
             schema_version: SCHEMA_VERSION,
@@ -154,9 +159,6 @@ impl Expected {
         }
     }
 }
-
-/// Position and velocity down among the reported states.
-const DOWN: [usize; 2] = [2, VELOCITY_DOWN];
 
 /// Adds what is of second order in position and velocity down to standard deviations that the filter states and to root mean
 /// squares of its errors. NEES, coverage and quantiles stay those of first order: they are of the whole covariance of one run, which

@@ -49,6 +49,8 @@ pub struct Measured {
     pub independent_windows: Option<f64>,
     /// Whether the one run stands for what covariance analysis expects: it has no Monte-Carlo error.
     pub is_expected: bool,
+    /// Of a covariance analysis, the first outage in which errors are beyond linear theory.
+    pub beyond_linear: Option<usize>,
 }
 
 impl From<&RunResult> for Measured {
@@ -59,6 +61,7 @@ impl From<&RunResult> for Measured {
             outages: result.outages.clone(),
             independent_windows: result.independent_windows,
             is_expected: false,
+            beyond_linear: None,
         }
     }
 }
@@ -71,6 +74,7 @@ impl From<&Expected> for Measured {
             outages: expected.outages.iter().map(|o| (o.start_s, o.end_s)).collect(),
             independent_windows: None,
             is_expected: true,
+            beyond_linear: expected.beyond_linear(),
         }
     }
 }
@@ -86,7 +90,7 @@ impl Measured {
     #[must_use]
     pub fn verdict(&self) -> Verdict {
         match self.runs.as_slice() {
-            [record] if self.is_expected => Verdict::expected(record),
+            [record] if self.is_expected => Verdict::expected(record, self.beyond_linear),
             runs => Verdict::of(runs, self.outages.len(), self.independent_windows),
         }
     }

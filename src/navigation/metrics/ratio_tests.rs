@@ -16,7 +16,14 @@ fn run(run: u64, see: f64, error: f64) -> RunRecord {
 
 fn experiment(asee: &[f64], runs: Vec<RunRecord>) -> Measured {
     let epochs = asee.iter().enumerate().map(|(i, a)| row(i as f64, *a)).collect();
-    Measured { epochs, runs, outages: vec![(1.0, 3.0)], independent_windows: None, is_expected: false }
+    Measured {
+        epochs,
+        runs,
+        outages: vec![(1.0, 3.0)],
+        independent_windows: None,
+        is_expected: false,
+        beyond_linear: None,
+    }
 }
 
 #[test]

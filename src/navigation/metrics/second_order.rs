@@ -34,6 +34,8 @@ const TILT: [usize; 2] = [6, 7];
 const YAW: usize = 8;
 /// Velocity down among the reported states.
 pub(super) const VELOCITY_DOWN: usize = 5;
+/// Position and velocity down among them.
+pub(super) const DOWN: [usize; 2] = [2, VELOCITY_DOWN];
 
 /// What attitude errors do to second order in an outage; NaN where nobody says it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -136,6 +138,11 @@ impl OutageSecondOrder {
         if (end_s - start_s) * baro.rate_hz >= 1.0 {
             self.vel_d_m_s = f64::NAN;
         }
+    }
+
+    /// Whether errors in the outage are beyond linear theory.
+    pub(super) fn is_beyond_linear(&self) -> bool {
+        self.beyond_linear().or(self.beyond_linear_horizontally()).is_some()
     }
 
     /// By how many standard deviations of linear theory the velocity down is shifted at the end, where linear theory ends:

@@ -67,6 +67,9 @@ pub struct Verdict {
     /// Its Monte-Carlo standard error.
     #[serde(deserialize_with = "number")]
     pub ratio_std_error: f64,
+    /// The first outage (from 0) in which errors are beyond linear theory, where covariance analysis, which is linear, found the
+    /// verdict or would have. A verdict that rests on the analysis is one of linear theory alone from there on.
+    pub beyond_linear: Option<usize>,
     /// Runs that count as independent; infinitely many (null) of a covariance analysis.
     #[serde(deserialize_with = "count")]
     pub independent_runs: f64,
@@ -146,11 +149,12 @@ impl Verdict {
 
     /// From the run whose squares are the expected ones: nothing is left to chance, and what is off by more than
     /// the tolerance is wrong.
-    pub(crate) fn expected(record: &RunRecord) -> Self {
+    pub(crate) fn expected(record: &RunRecord, beyond_linear: Option<usize>) -> Self {
         let evidence = Evidence { runs: &[record], windows: None };
         let statistics = evidence.statistics(record.outages.len());
         let judge = Judge { limits: [(1.0, 1.0); 2] };
-        Self::by(&judge, judge.kind(&statistics), &evidence, &statistics, f64::INFINITY)
+        let verdict = Self::by(&judge, judge.kind(&statistics), &evidence, &statistics, f64::INFINITY);
+        Self { beyond_linear, ..verdict }
     }
 
     fn by(
@@ -173,12 +177,19 @@ impl Verdict {
             worst_outage: worst.outage,
             ratio: worst.ratio.value,
             ratio_std_error: worst.ratio.std_error,
+            beyond_linear: None,
             independent_runs,
             detectable_ratio: judge.limits[0].1.max(1.0 + TOLERANCE),
             detectable_state_ratio: judge.limits[1].1.max(1.0 + TOLERANCE),
             level: LEVEL,
             tolerance: TOLERANCE,
         }
+    }
+
+    /// Whether it rests on covariance analysis, not on runs.
+    #[must_use]
+    pub const fn is_expected(&self) -> bool {
+        self.independent_runs.is_infinite()
     }
 
     /// Whether the errors are of another order than the filter believes.

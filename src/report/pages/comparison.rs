@@ -8,7 +8,8 @@ use crate::report::comparison::{
 use crate::report::comparison_table::{table_rows, with_times};
 use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, Table, svg};
 use crate::report::short_names;
-use nav_sim_navigation::metrics::{Measured, VerdictKind};
+use crate::report::verdict::Grade;
+use nav_sim_navigation::metrics::Measured;
 use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
 
 /// How the ASEE of a run departs from that of the reference over time.
@@ -49,10 +50,8 @@ impl ShownComparison<'_> {
     /// The page of a comparison file. `links`: pages beneath, path and name.
     pub(crate) fn page(&self, file: &ComparisonFile, links: &[(String, String)]) -> String {
         let Self { candidates, outages, states, .. } = *self;
-        let gravest = [VerdictKind::Diverged, VerdictKind::Overconfident, VerdictKind::Underconfident];
-        let has = |kind: &VerdictKind| file.verdicts.iter().any(|row| row.verdict.kind == *kind);
-        let kind = gravest.into_iter().find(has).unwrap_or(VerdictKind::Ok);
-        let mut page = Page::new("What the filters believe, compared", tone(kind), &verdict(file));
+        let grade = Grade::gravest(file.verdicts.iter().map(|row| &row.verdict));
+        let mut page = Page::new("What the filters believe, compared", tone(grade), &verdict(file));
         let paired = if file.paired {
             "; the runs saw the same noise, intervals are those of paired differences"
         } else {
@@ -146,7 +145,7 @@ impl ShownComparison<'_> {
 /// Which filters are not as good as they believe, or better.
 fn verdict(file: &ComparisonFile) -> String {
     let (right, wrong): (Vec<_>, Vec<_>) =
-        file.verdicts.iter().cloned().partition(|row| row.verdict.kind == VerdictKind::Ok);
+        file.verdicts.iter().cloned().partition(|row| Grade::of(&row.verdict) == Grade::Consistent);
     let lines = verdict_lines(&wrong);
     match (right.len(), lines.as_slice()) {
         (n, []) => format!("All {n} filters are consistent: their errors are as large as they believe."),

@@ -30,7 +30,7 @@ pub(crate) use wavelet::{wavelet_page, wavelet_text};
 
 use super::number;
 use super::page::Tone;
-use nav_sim_navigation::metrics::VerdictKind;
+use super::verdict::Grade;
 use nav_sim_navigation::simulation::REPORTED;
 
 /// The reported states and their units, in words.
@@ -51,11 +51,11 @@ fn error_of(state: &str) -> String {
     state.replacen(" (", " error (", 1)
 }
 
-fn tone(kind: VerdictKind) -> Tone {
-    match kind {
-        VerdictKind::Ok => Tone::Good,
-        VerdictKind::Underconfident => Tone::Doubtful,
-        VerdictKind::Overconfident | VerdictKind::Diverged => Tone::Bad,
+const fn tone(grade: Grade) -> Tone {
+    match grade {
+        Grade::Consistent => Tone::Good,
+        Grade::LinearOnly | Grade::Underconfident => Tone::Doubtful,
+        Grade::Overconfident | Grade::Diverged => Tone::Bad,
     }
 }
 

@@ -7,9 +7,9 @@ use super::{STATES, sentence, tone, window};
 use crate::report::manifest::Manifest;
 use crate::report::number::readable;
 use crate::report::page::{Cell, Page, Table};
-use crate::report::run_words::beyond_linear;
+use crate::report::run_words::{beyond_linear, met_by, met_word};
 use crate::report::trajectory::TrajectorySeries;
-use crate::report::verdict::verdict_line;
+use crate::report::verdict::{Grade, verdict_line};
 use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::metrics::{Budget, EpochMetrics, FanEpoch, OutageSummary, PerState, Summary};
 use nav_sim_navigation::sensors::defects::ImuSettings;
@@ -31,7 +31,7 @@ pub(crate) fn run_page(
     let windows = windows(summary);
     let verdict = verdict_line(&summary.verdict, &windows, summary.runs, summary.diverged);
     let title = if summary.runs > 0 { "INS/GNSS Monte-Carlo run" } else { "INS/GNSS covariance analysis" };
-    let mut page = Page::new(title, tone(summary.verdict.kind), &format!("The filter is {verdict}"));
+    let mut page = Page::new(title, tone(Grade::of(&summary.verdict)), &format!("The filter is {verdict}"));
     if let Some(words) = beyond_linear(summary) {
         page.text(&sentence(&words));
     }
@@ -80,8 +80,8 @@ fn fan_caption(fan: &[FanEpoch], summary: &Summary) -> String {
 
 fn requirements(summary: &Summary, page: &mut Page) {
     for met in &summary.require {
-        let word = if met.met { "met" } else { "NOT MET" };
-        page.text(&format!("Required {} ≤ {}: {word}, found {}.", met.name, met.limit, readable(met.value)));
+        let (word, value, by) = (met_word(met), readable(met.value), met_by(met));
+        page.text(&format!("Required {} ≤ {}: {word}, found {value}{by}.", met.name, met.limit));
     }
 }
 

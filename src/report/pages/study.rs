@@ -4,8 +4,8 @@ use super::sentence;
 use crate::report::choose::RankedPlace;
 use crate::report::page::{Axis, Chart, Colour, Interval, Mark, Page, Panel, Series, Table};
 use crate::report::study::{ShownCell, drift_table, ratio_table, verdict_table};
-use crate::report::verdict::verdict_word;
-use nav_sim_navigation::metrics::{OutageMetrics, VerdictKind};
+use crate::report::verdict::Grade;
+use nav_sim_navigation::metrics::OutageMetrics;
 
 /// The page of a merged study. `reference`: what ratios refer to; `more`: cells that are in outages.csv only; `rankings`:
 /// of candidates calibrated without the recordings that make the errors.
@@ -16,11 +16,8 @@ pub(crate) fn study_page(
     more: usize,
     rankings: &[RankedPlace],
 ) -> String {
-    let all = || cells.iter().flat_map(|cell| &cell.columns);
-    let gravest = [VerdictKind::Diverged, VerdictKind::Overconfident, VerdictKind::Underconfident];
-    let has = |kind: &VerdictKind| all().any(|c| c.verdict.kind == *kind);
-    let kind = gravest.into_iter().find(has).unwrap_or(VerdictKind::Ok);
-    let mut page = Page::new("Study", super::tone(kind), &verdict(cells));
+    let grade = Grade::gravest(cells.iter().flat_map(|cell| &cell.columns).map(|column| &column.verdict));
+    let mut page = Page::new("Study", super::tone(grade), &verdict(cells));
     for place in rankings {
         page.section(&format!("Candidates on recordings left out: {}", place.name));
         place.verdict.iter().for_each(|line| page.text(&sentence(line)));
@@ -52,14 +49,13 @@ pub(crate) fn study_page(
 /// Candidate by candidate: in how many cells its filter is as good as it believes, and what it is in the others.
 fn verdict(cells: &[ShownCell]) -> String {
     let Some(first) = cells.first() else { return "The study has no cell.".to_owned() };
-    let kinds =
-        [VerdictKind::Ok, VerdictKind::Overconfident, VerdictKind::Underconfident, VerdictKind::Diverged];
+    let [diverged, over, under, linear, right] = Grade::ALL;
+    let grades = [right, linear, over, under, diverged];
     let of_column = |(k, name): (usize, &str)| {
         let column_results = || cells.iter().filter_map(|cell| cell.columns.get(k));
-        let count = |kind: VerdictKind| column_results().filter(|c| c.verdict.kind == kind).count();
-        let told = kinds.into_iter().filter(|kind| count(*kind) > 0);
-        let words: Vec<String> =
-            told.map(|kind| format!("{} in {}", verdict_word(kind), count(kind))).collect();
+        let count = |grade: Grade| column_results().filter(|c| Grade::of(&c.verdict) == grade).count();
+        let told = grades.into_iter().filter(|grade| count(*grade) > 0);
+        let words: Vec<String> = told.map(|grade| format!("{} in {}", grade.words(), count(grade))).collect();
         format!("{name}: {}", words.join(", "))
     };
     let all: Vec<String> = first.columns.iter().map(|c| c.name.as_str()).enumerate().map(of_column).collect();
