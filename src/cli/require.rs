@@ -206,7 +206,9 @@ fn ranked(
         None => catalogue(requirements)?,
     };
     let (units, question) = requirements.ranked(&units).map_err(Failure::input)?;
-    let text = || format!("{}:\n\n{}", question.in_words(), columns(&words::catalogue_rows(&units)));
+    let beyond =
+        words::catalogue_beyond_linear(&units).map_or_else(String::new, |line| format!("\n\n{line}"));
+    let text = || format!("{}:\n\n{}{beyond}", question.in_words(), columns(&words::catalogue_rows(&units)));
     session.show(|| words::catalogue_json(&units, &question), text);
     args.pictures.write(|| catalogue_page(&units, &question), session)?;
     if units.iter().any(|unit| !unit.not_stated.is_empty()) {

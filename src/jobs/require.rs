@@ -2,9 +2,8 @@
 
 use super::turn_on;
 use crate::formats::model_file::{ModelFile, PROGRAM};
-use crate::report::require::{
-    BeyondLinear, Bridged, CURVE_S, Judged, LONGEST_S, Longest, NeededImu, Question, RankedUnit,
-};
+use crate::report::BeyondLinear;
+use crate::report::require::{Bridged, CURVE_S, Judged, LONGEST_S, Longest, NeededImu, Question, RankedUnit};
 use nav_sim_navigation::ekf::BeliefError;
 use nav_sim_navigation::metrics::Expected;
 use nav_sim_navigation::require::{
@@ -17,6 +16,7 @@ use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::ExperimentError;
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_signal::noise::Model;
+use rayon::prelude::*;
 
 /// The outage that is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -178,7 +178,7 @@ impl Requirements {
         let belief = scenario.belief(model, &outages, &track)?;
         let experiment = scenario.experiment(&self.trajectory, Truth::Model(model), &[], &outages, 0);
         let Some(expected) = Expected::along(&track, &experiment, &belief, model) else { return Ok(None) };
-        Ok(expected.outages.first().and_then(BeyondLinear::of))
+        Ok(expected.outages.first().and_then(|o| BeyondLinear::of((o.start_s, o.end_s), &o.second_order)))
     }
 
     /// How units do after the outage and after those of `CURVE_S`, the best first: those that keep the limits, those
@@ -195,7 +195,8 @@ impl Requirements {
         let named =
             |unit: &CatalogueUnit, e| RequireError::Unit { name: unit.name.clone(), source: Box::new(e) };
         let ranked = |unit: &CatalogueUnit| self.rank(&course, unit).map_err(|e| named(unit, e));
-        let mut ranked = units.iter().map(ranked).collect::<Result<Vec<_>, _>>()?;
+        let mut ranked =
+            units.par_iter().map(ranked).collect::<Vec<_>>().into_iter().collect::<Result<Vec<_>, _>>()?;
         let class = |u: &RankedUnit| (!u.is_within(), !u.not_stated.is_empty());
         ranked.sort_by(|a, b| class(a).cmp(&class(b)).then(b.worst.margin().total_cmp(&a.worst.margin())));
         Ok((ranked, self.question(self.outages())))
@@ -212,6 +213,7 @@ impl Requirements {
             worst,
             curve: CURVE_S.map(|s| worst_after(&curves, s, worst.limit.quantity)),
             longest: self.longest_of(course, (&unit.scenario, &unit.model), &curves)?,
+            beyond_linear: self.beyond_linear(&unit.scenario, &unit.model, self.outages()[worst.place])?,
         })
     }
 

@@ -1,6 +1,7 @@
 //! Results as files: tables, JSON, self-contained pages (`page`). The module computes no statistic and touches
 //! no file: every function returns a text, and the command line writes it.
 
+mod beyond_linear;
 mod brief;
 mod choose;
 mod closure;
@@ -39,6 +40,7 @@ mod turn_on;
 mod verdict;
 mod warm_up;
 
+pub(crate) use beyond_linear::{BeyondLinear, BeyondLinearPlaces, OF_A_VERDICT};
 pub(crate) use brief::brief;
 pub(crate) use choose::{ChoiceReport, RankedPlace};
 pub(crate) use closure::TrajectoryCheck;

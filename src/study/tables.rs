@@ -5,7 +5,7 @@ use super::failure::StudyError;
 use super::planned::Planned;
 use crate::formats::atomic::AtomicDir;
 use crate::formats::table_files::{TableFiles, TableFormat};
-use crate::report::{self, RankedPlace, ShownCell, markdown, markdown_table};
+use crate::report::{self, BeyondLinearPlaces, RankedPlace, ShownCell, markdown, markdown_table};
 
 /// The tables being written.
 pub(super) struct Tables {
@@ -49,6 +49,8 @@ pub(super) struct Texts {
     intervals: &'static str,
     cells: Vec<ShownCell>,
     more: usize,
+    /// Where covariance analysis is beyond linear theory, of all cells.
+    beyond: BeyondLinearPlaces,
     /// Where recordings are left out: which candidate is best, place by place.
     pub(super) rankings: Vec<RankedPlace>,
 }
@@ -60,10 +62,18 @@ impl Texts {
         let same = if planned.plan.study.filters.len() > 1 { " with the same filter" } else { "" };
         let reference = format!("{}{same}", planned.reference()?.1);
         let intervals = if planned.plan.study.is_sampled() { " ± half the 95 % interval" } else { "" };
-        Ok(Self { reference, intervals, cells: Vec::new(), more: 0, rankings: Vec::new() })
+        Ok(Self {
+            reference,
+            intervals,
+            cells: Vec::new(),
+            more: 0,
+            beyond: BeyondLinearPlaces::default(),
+            rankings: Vec::new(),
+        })
     }
 
     pub(super) fn add(&mut self, cell: ShownCell) {
+        self.beyond.add(&cell.name, cell.beyond_linear());
         if self.cells.len() < SHOWN {
             self.cells.push(cell);
         } else {
@@ -72,7 +82,18 @@ impl Texts {
     }
 
     pub(super) fn page(&self, states: &[usize]) -> String {
-        report::study_page(&self.cells, &self.reference, states, self.more, &self.rankings)
+        report::study_page(
+            &self.cells,
+            &self.reference,
+            states,
+            self.more,
+            &self.rankings,
+            self.beyond_linear(),
+        )
+    }
+
+    fn beyond_linear(&self) -> Option<String> {
+        self.beyond.line("cells", report::OF_A_VERDICT)
     }
 
     pub(super) fn render(&self, states: &[usize]) -> String {
@@ -85,6 +106,9 @@ impl Texts {
         text += "Verdict on each filter: NEES over the run (9 if right), error over its standard deviation in the \
                  state that is farthest off; detectable: what so many runs find in one state\n\n";
         text += &markdown_table(&report::verdict_table(&self.cells));
+        if let Some(line) = self.beyond_linear() {
+            text += &format!("\n\n{}", markdown(&line));
+        }
         text += "\n\nHorizontal error before the first fix after the outage, median (95 %), m\n\n";
         text += &markdown_table(&report::drift_table(&self.cells));
         let has_ratios = |cell: &&ShownCell| cell.columns.len() > 1 && cell.columns[0].comparison.is_some();

@@ -105,6 +105,39 @@ fn units_are_sharded_mended_and_verified_as_those_of_runs() {
     assert!(String::from_utf8_lossy(&verified.stdout).starts_with("5 of 5 finished units"));
 }
 
+/// An outage of 16 s from a start whose tilts are known to 3° is beyond linear theory, one after fixes is not: said in one line of the
+/// results, in the verdicts of the cells and on the page.
+#[test]
+fn cells_beyond_linear_theory_are_named() {
+    let place = place_of_analyses();
+    let dir = place.path();
+    let study = fs::read_to_string(dir.join("study.toml")).unwrap();
+    let (rest, _) = study.split_once("outages =").unwrap();
+    let rest = rest.replace(", { name = \"wrong\", model = \"wrong.toml\" }", "");
+    let outages =
+        "outages = [{ name = \"start\", windows = [[0, 16]] }, { name = \"later\", windows = [[40, 45]] }]\n";
+    let scenario = "scenario = [{ name = \"tilted\", settings = { initial.att_sigma_deg = [3, 3, 3] } }]\n";
+    fs::write(dir.join("study.toml"), format!("{rest}{scenario}{outages}")).unwrap();
+    done(dir, "plan study.toml -o out");
+    done(dir, "run study.toml -o out");
+    let merged = batch(dir, "merge study.toml -o out");
+    let said = String::from_utf8_lossy(&merged.stdout);
+    let line = said.lines().find(|line| line.starts_with("beyond linear: ")).unwrap();
+    assert!(
+        line.starts_with("beyond linear: 1 of 2 cells (") && line.contains(": in the outage 0–16 s "),
+        "{line}"
+    );
+    assert!(line.ends_with("runs have to confirm the rest"), "{line}");
+    let words = |name: &str| fs::read_to_string(dir.join("out/results").join(name)).unwrap();
+    assert!(words("tables.md").contains("beyond linear: 1 of 2 cells"));
+    assert!(words("report.html").contains("Beyond linear: 1 of 2 cells"));
+    let verdict = |set: &str| {
+        rows(&dir.join("out/results/outages.csv")).iter().find(|r| r["outage_set"] == set).unwrap()["verdict"]
+            .clone()
+    };
+    assert_eq!([verdict("start"), verdict("later")], ["consistent in linear theory only", "consistent"]);
+}
+
 #[test]
 fn what_covariance_analysis_cannot_do_is_refused_by_the_plan() {
     let place = place_of_analyses();

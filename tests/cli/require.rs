@@ -148,6 +148,36 @@ fn an_answer_beyond_linear_theory_says_so_as_run_does() {
     );
 }
 
+/// Of two units, the one whose figure is beyond linear theory is named below the table, by what it says of itself alone.
+#[test]
+fn a_catalogue_names_the_units_beyond_linear_theory() {
+    let dir = tempfile::tempdir().unwrap();
+    let drive = format!("{ROOT}/trajectories/land_vehicle.toml");
+    std::fs::create_dir(dir.path().join("units")).unwrap();
+    for file in ["consumer_mems.toml", "tactical.toml"] {
+        std::fs::copy(format!("{ROOT}/calib_data/{file}"), dir.path().join("units").join(file)).unwrap();
+    }
+    let judged = |arguments: &[&str]| {
+        let asked = ["require", &drive, "--outage", "300:600", "--p95-m", "20000"];
+        let mut command = Command::cargo_bin("nav-sim").unwrap();
+        stdout(&command.current_dir(dir.path()).args(asked).args(arguments).assert().success())
+    };
+    let told = judged(&["--catalogue", "units"]);
+    let line = told.lines().find(|line| line.starts_with("beyond linear: ")).unwrap();
+    let named =
+        "beyond linear: 1 of 2 units (consumer_mems), the worst in consumer_mems: in the outage 300–600 s";
+    assert!(line.starts_with(named), "{line}");
+    let json = |arguments: &[&str]| -> Value {
+        serde_json::from_str(&judged(&[arguments, &["--format", "json"]].concat())).unwrap()
+    };
+    for unit in json(&["--catalogue", "units"])["units"].as_array().unwrap() {
+        let name = unit["unit"].as_str().unwrap();
+        let alone = json(&[&format!("units/{name}.toml")]);
+        assert_eq!(unit["beyond_linear"], alone["beyond_linear"], "{name}");
+        assert_eq!(unit["beyond_linear"].is_null(), name == "tactical", "{unit}");
+    }
+}
+
 #[test]
 fn a_directory_of_models_is_ranked() {
     let dir = tempfile::tempdir().unwrap();

@@ -20,13 +20,13 @@
 use super::epoch::EpochMetrics;
 use super::outage::within;
 use super::summary::Summary;
-use super::verdict::TOLERANCE;
+use super::verdict::{TOLERANCE, number};
 use crate::sensors::baro::BaroSettings;
 use crate::simulation::NEES_DOF;
 use crate::simulation::lincov::Consistency;
 use crate::units::{DEG, STANDARD_GRAVITY};
 use nalgebra::{SMatrix, SVector};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Roll, pitch among the reported states.
 const TILT: [usize; 2] = [6, 7];
@@ -38,19 +38,19 @@ pub(super) const VELOCITY_DOWN: usize = 5;
 pub(super) const DOWN: [usize; 2] = [2, VELOCITY_DOWN];
 
 /// What attitude errors do to second order in an outage; NaN where nobody says it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct OutageSecondOrder {
     /// Mean shift of the velocity down (m/s) just before the first fix after the outage, which no linear filter contains and
     /// covariance analysis contains up to there (null where the epochs were not kept, or a barometer sees the height).
-    #[serde(rename = "second_order_vel_d_m_s")]
+    #[serde(rename = "second_order_vel_d_m_s", deserialize_with = "number")]
     pub vel_d_m_s: f64,
     /// Standard deviation of the velocity down (m/s) at the same instant that linear theory gives it in the filter. What the
     /// filters of runs state, and covariance analysis with them, grows with the shift and is no measure of it.
-    #[serde(skip)]
+    #[serde(rename = "linear_asee_vel_d_m_s", default = "unknown", deserialize_with = "number")]
     pub linear_vel_d_m_s: f64,
     /// What heading error times tilt adds to the expected NEES in the outage at most; of a covariance analysis, for which runs
     /// keep too little.
-    #[serde(skip)]
+    #[serde(rename = "second_order_nees", default = "unknown", deserialize_with = "number")]
     pub nees: f64,
 }
 
@@ -128,6 +128,11 @@ impl Summary {
     }
 }
 
+/// What a run directory of an earlier build does not have.
+const fn unknown() -> f64 {
+    f64::NAN
+}
+
 impl OutageSecondOrder {
     /// Nothing is known yet.
     pub(super) const UNKNOWN: Self = Self { vel_d_m_s: f64::NAN, linear_vel_d_m_s: f64::NAN, nees: f64::NAN };
@@ -157,13 +162,18 @@ impl OutageSecondOrder {
     /// by more than verdicts let pass.
     #[must_use]
     pub fn beyond_linear_horizontally(&self) -> Option<f64> {
-        let ratio = (1.0 + self.nees / NEES_DOF as f64).sqrt();
-        (ratio > 1.0 + TOLERANCE).then_some(self.nees)
+        (Self::ratio_of_nees(self.nees) > 1.0 + TOLERANCE).then_some(self.nees)
+    }
+
+    /// How much larger so much more NEES makes the errors of all states together.
+    #[must_use]
+    pub fn ratio_of_nees(nees: f64) -> f64 {
+        (1.0 + nees / NEES_DOF as f64).sqrt()
     }
 
     /// See [`Self::beyond_linear`]: with equal tilts about two axes the mean square of the shift is twice its mean squared, and
     /// √(1 + 2·0.3²) is 1.09, just within what verdicts let pass at the end; after it, runs were up to 1.13 times off.
-    pub(crate) const SECOND_ORDER_LIMIT: f64 = 0.3;
+    pub const SECOND_ORDER_LIMIT: f64 = 0.3;
 }
 
 #[cfg(test)]

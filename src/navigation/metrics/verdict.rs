@@ -86,7 +86,7 @@ pub struct Verdict {
 }
 
 /// A number as JSON has it: null if it is none.
-fn number<'de, D: Deserializer<'de>>(value: D) -> Result<f64, D::Error> {
+pub(super) fn number<'de, D: Deserializer<'de>>(value: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(value)?.unwrap_or(f64::NAN))
 }
 

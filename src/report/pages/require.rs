@@ -2,7 +2,9 @@
 
 use super::sentence;
 use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, Table, Tone};
-use crate::report::require::{Bridged, CURVE_S, Judged, NeededImu, Question, RankedUnit, catalogue_rows};
+use crate::report::require::{
+    Bridged, CURVE_S, Judged, NeededImu, Question, RankedUnit, catalogue_beyond_linear, catalogue_rows,
+};
 use nav_sim_navigation::require::{Answer, IMU_PARAMETERS, ImuParameters, Margins, Quantity};
 
 const CHECKED: &str = "the IMU that a limit needs meets it in sampled runs, and a larger error of the IMU never makes a smaller one of \
@@ -173,6 +175,9 @@ pub(crate) fn catalogue_page(units: &[RankedUnit], question: &Question) -> Page 
     // the errors are in the table below, with all their sources
     rows.iter_mut().for_each(|row| drop(row.drain(3..3 + CURVE_S.len())));
     page.table(&Table::of_rows(&rows));
+    if let Some(line) = catalogue_beyond_linear(units) {
+        page.text(&sentence(&line));
+    }
     if units.iter().any(|unit| !unit.not_stated.is_empty()) {
         page.text("Figures that are not stated count as none: such a unit looks better than it is (open).");
     }

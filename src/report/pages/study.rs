@@ -8,13 +8,14 @@ use crate::report::verdict::Grade;
 use nav_sim_navigation::metrics::OutageMetrics;
 
 /// The page of a merged study. `reference`: what ratios refer to; `more`: cells that are in outages.csv only; `rankings`:
-/// of candidates calibrated without the recordings that make the errors.
+/// of candidates calibrated without the recordings that make the errors; `beyond_linear`: where covariance analysis does not hold.
 pub(crate) fn study_page(
     cells: &[ShownCell],
     reference: &str,
     states: &[usize],
     more: usize,
     rankings: &[RankedPlace],
+    beyond_linear: Option<String>,
 ) -> String {
     let grade = Grade::gravest(cells.iter().flat_map(|cell| &cell.columns).map(|column| &column.verdict));
     let mut page = Page::new("Study", super::tone(grade), &verdict(cells));
@@ -30,6 +31,9 @@ pub(crate) fn study_page(
     page.section("Verdict on each filter");
     page.text("NEES over the run (9 if right), error over its standard deviation in the state that is farthest off; of a filter that the runs do not find wrong, the smallest error in one state that so many runs find (detectable).");
     page.table(&Table::of_rows(&verdict_table(cells)));
+    if let Some(line) = beyond_linear {
+        page.text(&sentence(&line));
+    }
     page.section("Horizontal error at the ends of outages: median (95 %), m");
     page.table(&Table::of_rows(&drift_table(cells)));
     for cell in cells.iter().filter(|c| c.columns.len() > 1 && c.columns[0].comparison.is_some()) {

@@ -1,6 +1,6 @@
 //! What a given IMU makes of the limits, in words and as JSON.
 
-use super::{BeyondLinear, CURVE_S, LONGEST_S, Question, points_json, second_order, share};
+use super::{BeyondLinear, CURVE_S, LONGEST_S, Question, points_json, share};
 use crate::report::markdown_table;
 use crate::report::number::{readable, seconds};
 use nav_sim_navigation::require::{GroupMargin, Limit, Margins, Worst};
@@ -113,7 +113,7 @@ impl Judged {
             }
             None => format!("longest outage within the limits ({}): {longest}", question.limits_in_words()),
         };
-        answer + &second_order::line(self.beyond_linear.as_ref())
+        answer + &BeyondLinear::line(self.beyond_linear.as_ref())
     }
 
     /// The verdict, and what decides.

@@ -1,11 +1,10 @@
 //! What a limit needs of an IMU, and what a given one makes of it, on one screen and as JSON.
 
 mod judged;
-mod second_order;
 
 pub(crate) use judged::{Bridged, Judged, Longest};
-pub(crate) use second_order::BeyondLinear;
 
+use super::beyond_linear::{BeyondLinear, BeyondLinearPlaces, OF_A_FIGURE};
 use super::number::{readable, seconds, window};
 use nav_sim_navigation::require::{Answer, IMU_PARAMETERS, ImuParameters, IsoDrift, Limit, Worst};
 use nav_sim_navigation::sensors::outage::Outage;
@@ -52,6 +51,8 @@ pub(crate) struct RankedUnit {
     pub curve: [Option<f64>; CURVE_S.len()],
     /// The longest outage within the limits.
     pub longest: Longest,
+    /// Where its figure for the outage asked for is beyond linear theory.
+    pub beyond_linear: Option<BeyondLinear>,
 }
 
 impl RankedUnit {
@@ -149,7 +150,7 @@ impl NeededImu {
             readable(to_s),
             question.worst(&self.worst),
             share(self.shares[IMU_PARAMETERS]),
-            second_order::line(self.beyond_linear.as_ref())
+            BeyondLinear::line(self.beyond_linear.as_ref())
         )
     }
 
@@ -227,6 +228,15 @@ pub(crate) fn catalogue_rows(units: &[RankedUnit]) -> Vec<Vec<String>> {
     std::iter::once(head).chain(units.iter().map(row)).collect()
 }
 
+/// The units whose figures for the outage asked for are beyond linear theory, in a line.
+pub(crate) fn catalogue_beyond_linear(units: &[RankedUnit]) -> Option<String> {
+    let mut places = BeyondLinearPlaces::default();
+    for unit in units {
+        places.add(&unit.name, unit.beyond_linear.iter().map(|beyond| (unit.name.clone(), beyond.clone())));
+    }
+    places.line("units", OF_A_FIGURE)
+}
+
 /// All of it.
 pub(crate) fn catalogue_json(units: &[RankedUnit], question: &Question) -> String {
     let unit = |u: &RankedUnit| {
@@ -239,6 +249,7 @@ pub(crate) fn catalogue_json(units: &[RankedUnit], question: &Question) -> Strin
             "place": u.worst.place,
             "outage": u.longest.json(),
             "curve": points_json(&u.curve),
+            "beyond_linear": u.beyond_linear,
         })
     };
     super::json(&json!({

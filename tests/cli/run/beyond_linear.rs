@@ -118,6 +118,32 @@ fn a_verdict_of_linear_theory_says_until_where_it_holds() {
     );
 }
 
+/// Directories of covariance analyses say so again where they are compared: how many, and the worst; those of runs need not.
+#[test]
+fn a_comparison_names_the_runs_beyond_linear_theory() {
+    let place = place();
+    standing(place.path());
+    fs::write(place.path().join("level.toml"), "initial.att_sigma_deg = [0.01, 0.01, 0.1]\n").unwrap();
+    let run = |options: &str| {
+        drop(nav_sim(place.path(), &format!("run still.toml quiet.toml --outage 0:120 {options}")))
+    };
+    run("--method lincov -o tilted");
+    run("--method lincov --scenario level.toml -o level");
+    run("--runs 2 --seed 1 -o sampled");
+    let told = done(place.path(), "compare tilted sampled level --reference level").stdout;
+    assert!(told.starts_with("consistent in linear theory only: tilted ("), "{told}");
+    let line = told.lines().find(|line| line.starts_with("beyond linear: ")).unwrap();
+    assert!(
+        line.starts_with(
+            "beyond linear: 1 of 3 runs (tilted), the worst in tilted: in the outage 0–120 s attitude"
+        ),
+        "{line}"
+    );
+    let page = fs::read_to_string(place.path().join("comparison.html")).unwrap();
+    assert!(page.contains("Beyond linear: 1 of 3 runs (tilted)"), "{page}");
+    assert!(!done(place.path(), "compare sampled --reference level").stdout.contains("beyond linear"));
+}
+
 /// The first fixes after an outage of five minutes make of the shift of the velocity down what no covariance analysis contains: at the end
 /// of a second outage the RMSE of 1000 runs in position down is 84 m where it has 50 m. Within a limit of 60 m it shows nothing, and beside
 /// runs they decide; the horizontal errors, in which the second order has no part, it can judge.
