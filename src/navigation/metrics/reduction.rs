@@ -175,11 +175,27 @@ impl ReductionQuality {
         } else {
             format!("RMSE over its own sigma {low:.2} to {high:.2} at the ends of outages, ")
         };
-        let lost = self.rmse_over_full.iter().flatten().flat_map(|e| e.0).reduce(f64::max);
-        let lost = lost.map_or(String::new(), |lost| {
-            format!("; errors at most {:.0} % above those of the full filter", 100.0 * (lost - 1.0))
+        let lost = self.lost().map_or(String::new(), |(horizontal, (state, most))| {
+            let percent = |ratio: f64| format!("{:.1} %", 100.0 * (ratio - 1.0).max(0.0));
+            let others = match most > horizontal {
+                true => format!(", of {}, which loses most, {}", IN_WORDS[state], percent(most)),
+                false => ", of every other state less".to_owned(),
+            };
+            format!(
+                "; errors of the horizontal position there at most {} above those of --filter full{others}",
+                percent(horizontal)
+            )
         });
         format!("the reduced filter by covariance analysis: {ends}NEES {:.2} of 9{lost}", self.nees)
+    }
+
+    /// The largest ratio to the full filter at the ends of outages: of the horizontal position (north or east, whichever is
+    /// larger: their root sum of squares has no larger one), and of all states with the one that has it.
+    fn lost(&self) -> Option<(f64, (usize, f64))> {
+        let ends = || self.rmse_over_full.iter().flatten();
+        let most = |state: usize| (state, ends().map(|end| end.0[state]).fold(0.0, f64::max));
+        let worst = (0..REPORTED).map(most).max_by(|a, b| a.1.total_cmp(&b.1))?;
+        (worst.1 > 0.0).then_some((most(0).1.max(most(1).1), worst))
     }
 
     /// What to be warned of: a standard deviation at an outage's end that is too small or too large.
@@ -275,6 +291,29 @@ pub(super) mod tests {
         let reports = vec![report(0.0, 1.0, 9.0), report(1.0, 2.0, 36.0), report(2.0, 4.0, 144.0)];
         let quality = ReductionQuality::of(&Assessment { reports, outage_ends: vec![] }, None);
         assert_eq!((quality.mean.0, quality.nees), ([3.0; REPORTED], 90.0));
+    }
+
+    /// The position north loses 1.9 % at the end of one outage, yaw a quarter at that of the other; without yaw the position loses most.
+    #[test]
+    fn what_a_reduction_costs_is_told_with_the_state_that_loses_most() {
+        let mut ends = vec![PerState([1.0; REPORTED]); 2];
+        (ends[0].0[0], ends[1].0[8]) = (1.019, 1.24);
+        let quality = |ends: &[PerState<f64>]| ReductionQuality {
+            outage_end: vec![PerState([1.0; REPORTED]); ends.len()],
+            mean: PerState([1.0; REPORTED]),
+            nees: 9.0,
+            rmse_over_full: Some(ends.to_vec()),
+        };
+        let line = quality(&ends).line();
+        let words = "; errors of the horizontal position there at most 1.9 % above those of --filter full, of yaw, which loses most, 24.0 %";
+        assert!(line.ends_with(words), "{line}");
+        ends[1].0[8] = 1.01;
+        let line = quality(&ends).line();
+        assert!(
+            line.ends_with("at most 1.9 % above those of --filter full, of every other state less"),
+            "{line}"
+        );
+        assert!(quality(&[]).line().ends_with("NEES 9.00 of 9"));
     }
 
     #[test]
