@@ -124,7 +124,12 @@ mod tests {
     /// Two cells of three, the worse by five times the limit in the velocity down against a NEES whose root is 1.5 times too large.
     #[test]
     fn places_are_counted_and_the_worst_is_named() {
-        let second = |vel_d_m_s: f64, nees: f64| OutageSecondOrder { vel_d_m_s, linear_vel_d_m_s: 0.1, nees };
+        let second = |vel_d_m_s: f64, nees: f64| OutageSecondOrder {
+            vel_d_m_s,
+            linear_vel_d_m_s: 0.1,
+            nees,
+            ..OutageSecondOrder::UNKNOWN
+        };
         let found = |outages: &[OutageSecondOrder]| {
             let windows = outages
                 .iter()

@@ -55,7 +55,7 @@ pub(super) fn put_expected(bytes: &mut Vec<u8>, expected: &Expected) {
         let p999 = o.horizontal_p999_m.unwrap_or(f64::NAN);
         put(bytes, &[o.nees_end.value, o.log_density_end.value]);
         put(bytes, &[o.horizontal_p50_m.value, o.horizontal_p95_m.value, p999]);
-        let OutageSecondOrder { vel_d_m_s, linear_vel_d_m_s, nees } = o.second_order;
+        let OutageSecondOrder { vel_d_m_s, linear_vel_d_m_s, nees, .. } = o.second_order;
         put(bytes, &[vel_d_m_s, linear_vel_d_m_s, nees]);
     }
     for e in &expected.epochs {
@@ -166,6 +166,7 @@ pub(super) fn expected_outage((start_s, end_s): (f64, f64), words: &mut Words<'_
             vel_d_m_s: words.float(),
             linear_vel_d_m_s: words.float(),
             nees: words.float(),
+            ..OutageSecondOrder::UNKNOWN
         },
         reconvergence: Reconvergence { p50_s: unknown, p95_s: unknown, never: None },
     }

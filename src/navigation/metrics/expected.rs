@@ -82,12 +82,13 @@ impl Expected {
         let believed = |epoch: &EpochMetrics| {
             law.reports.iter().find(|report| report.errors.t_s == epoch.t_s).map(|report| &report.believed)
         };
-        for (outage, end) in outages.iter_mut().zip(&law.outage_ends) {
+        for ((outage, end), second) in outages.iter_mut().zip(&law.outage_ends).zip(&second_order) {
             let window = (outage.start_s, outage.end_s);
             outage.second_order = OutageSecondOrder {
                 vel_d_m_s: velocity_down_m_s(window, &epochs),
                 linear_vel_d_m_s: end.sigma()[VELOCITY_DOWN],
                 nees: horizontal_nees(window, &epochs, believed),
+                mean_squares: second.last().map_or([0.0; 2], mean_squares),
             };
             if let Some(baro) = experiment.baro {
                 outage.second_order.see_height(window, baro);
@@ -166,8 +167,12 @@ impl Expected {
 fn add_second_order(asee: &mut PerState<Estimate>, rmse: &mut PerState<Estimate>, second: &SecondOrder) {
     for (k, i) in DOWN.into_iter().enumerate() {
         asee.0[i].value = (asee.0[i].value.powi(2) + second.believed[k]).sqrt();
-        rmse.0[i].value = (rmse.0[i].value.powi(2) + second.variance[k] + second.mean[k].powi(2)).sqrt();
+        rmse.0[i].value = (rmse.0[i].value.powi(2) + mean_squares(second)[k]).sqrt();
     }
+}
+
+fn mean_squares(second: &SecondOrder) -> [f64; 2] {
+    [0, 1].map(|k| second.variance[k] + second.mean[k].powi(2))
 }
 
 /// Adds variances to standard deviations that the filter states.

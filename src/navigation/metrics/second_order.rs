@@ -22,8 +22,8 @@ use super::outage::within;
 use super::summary::Summary;
 use super::verdict::{TOLERANCE, number};
 use crate::sensors::baro::BaroSettings;
-use crate::simulation::NEES_DOF;
 use crate::simulation::lincov::Consistency;
+use crate::simulation::{NEES_DOF, REPORTED};
 use crate::units::{DEG, STANDARD_GRAVITY};
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
@@ -52,6 +52,10 @@ pub struct OutageSecondOrder {
     /// keep too little.
     #[serde(rename = "second_order_nees", default = "unknown", deserialize_with = "number")]
     pub nees: f64,
+    /// What position and velocity down have of second order in their mean squares (m², (m/s)²) just before the first fix after the
+    /// outage, by covariance analysis; 0 where it says nothing.
+    #[serde(skip)]
+    pub mean_squares: [f64; 2],
 }
 
 /// Mean shift of the velocity down (m/s) that the tilt makes to second order over an outage: ∫ g (ψ_roll² + ψ_pitch²)/2 dt
@@ -108,7 +112,8 @@ impl Summary {
     /// little.
     pub(super) fn take_second_order(&mut self, expected: &Self) {
         for (own, expected) in self.outages.iter_mut().zip(&expected.outages) {
-            own.second_order.nees = expected.second_order.nees;
+            let OutageSecondOrder { nees, mean_squares, .. } = expected.second_order;
+            (own.second_order.nees, own.second_order.mean_squares) = (nees, mean_squares);
         }
     }
 
@@ -135,7 +140,8 @@ const fn unknown() -> f64 {
 
 impl OutageSecondOrder {
     /// Nothing is known yet.
-    pub(super) const UNKNOWN: Self = Self { vel_d_m_s: f64::NAN, linear_vel_d_m_s: f64::NAN, nees: f64::NAN };
+    pub const UNKNOWN: Self =
+        Self { vel_d_m_s: f64::NAN, linear_vel_d_m_s: f64::NAN, nees: f64::NAN, mean_squares: [0.0; 2] };
 
     /// A barometer sees the vertical channel: in an outage that has a height no shift grows without being corrected, and none is
     /// stated.
@@ -143,6 +149,14 @@ impl OutageSecondOrder {
         if (end_s - start_s) * baro.rate_hz >= 1.0 {
             self.vel_d_m_s = f64::NAN;
         }
+    }
+
+    /// By which share the RMSE of position and velocity down are smaller in linear theory, where that has these mean squares of the
+    /// reported states.
+    #[must_use]
+    pub fn shares_of_rmse(&self, linear: &[f64; REPORTED]) -> [f64; 2] {
+        let share = |k: usize| 1.0 - (linear[DOWN[k]] / (linear[DOWN[k]] + self.mean_squares[k])).sqrt();
+        [share(0), share(1)]
     }
 
     /// Whether errors in the outage are beyond linear theory.
