@@ -9,6 +9,7 @@ mod fusion;
 mod paper;
 mod require;
 mod run;
+mod run_budgets;
 mod run_charts;
 mod study;
 mod tune;
