@@ -3,7 +3,9 @@
 use super::turn_on;
 use crate::formats::model_file::{ModelFile, PROGRAM};
 use crate::report::BeyondLinear;
-use crate::report::require::{Bridged, CURVE_S, Judged, LONGEST_S, Longest, NeededImu, Question, RankedUnit};
+use crate::report::require::{
+    Bridged, CURVE_S, GivenImu, LONGEST_S, Longest, NeededImu, Question, RankedUnit,
+};
 use nav_sim_navigation::ekf::BeliefError;
 use nav_sim_navigation::metrics::Expected;
 use nav_sim_navigation::require::{
@@ -139,7 +141,7 @@ impl Requirements {
     ///
     /// # Errors
     /// When the model has no filter.
-    pub(crate) fn judged(&self, scenario: &Scenario, model: &Model) -> Result<Judged, RequireError> {
+    pub(crate) fn judged(&self, scenario: &Scenario, model: &Model) -> Result<GivenImu, RequireError> {
         let long = self.long_outages();
         let course = self.course(&long)?;
         let curves = course.curves(scenario, model)?;
@@ -162,7 +164,7 @@ impl Requirements {
             Some(outage) => self.beyond_linear(scenario, model, outage)?,
             None => None,
         };
-        Ok(Judged { margins, question: self.question(outages), bridged, beyond_linear })
+        Ok(GivenImu { margins, question: self.question(outages), bridged, beyond_linear })
     }
 
     /// Whether `run` would say that the errors in an outage are beyond linear theory: by the covariance analysis that it

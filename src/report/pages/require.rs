@@ -3,7 +3,7 @@
 use super::sentence;
 use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, Table, Tone};
 use crate::report::require::{
-    Bridged, CURVE_S, Judged, NeededImu, Question, RankedUnit, catalogue_beyond_linear, catalogue_rows,
+    Bridged, CURVE_S, GivenImu, NeededImu, Question, RankedUnit, catalogue_beyond_linear, catalogue_rows,
 };
 use nav_sim_navigation::require::{Answer, IMU_PARAMETERS, ImuParameters, Margins, Quantity};
 
@@ -97,8 +97,8 @@ fn iso_table(points: &[(f64, Answer)]) -> Table {
 }
 
 /// The page of what a given IMU makes of the limits; without margins, of the longest outage that it bridges.
-pub(crate) fn model_page(judged: &Judged) -> Page {
-    let Judged { margins, question, bridged, .. } = judged;
+pub(crate) fn model_page(judged: &GivenImu) -> Page {
+    let GivenImu { margins, question, bridged, .. } = judged;
     let mut page =
         Page::new("An IMU against its limits", Tone::from(judged.is_good()), &sentence(&judged.verdict()));
     page.section("Error against the length of an outage");

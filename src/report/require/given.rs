@@ -86,7 +86,7 @@ fn at_least_a_second(length_s: f64) -> String {
 
 /// A model against its limits.
 #[derive(Debug, Clone)]
-pub(crate) struct Judged {
+pub(crate) struct GivenImu {
     /// Margins after the outage that was asked for; none where the longest is sought.
     pub margins: Option<Margins>,
     /// What was asked, and where.
@@ -97,7 +97,7 @@ pub(crate) struct Judged {
     pub beyond_linear: Option<BeyondLinear>,
 }
 
-impl Judged {
+impl GivenImu {
     /// The answer, and where linear theory does not cover it.
     pub(crate) fn verdict(&self) -> String {
         let (question, longest) = (&self.question, self.bridged.longest.in_words());

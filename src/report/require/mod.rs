@@ -1,8 +1,8 @@
 //! What a limit needs of an IMU, and what a given one makes of it, on one screen and as JSON.
 
-mod judged;
+mod given;
 
-pub(crate) use judged::{Bridged, Judged, Longest};
+pub(crate) use given::{Bridged, GivenImu, Longest};
 
 use super::beyond_linear::{BeyondLinear, BeyondLinearPlaces, OF_A_FIGURE};
 use super::number::{readable, seconds, window};
