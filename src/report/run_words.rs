@@ -3,7 +3,9 @@
 use super::markdown::markdown_table as table;
 use super::number::{readable, window};
 use super::verdict::verdict_line;
-use nav_sim_navigation::metrics::{Agreement, Budget, Met, OutageSummary, PerState, Summary};
+use nav_sim_navigation::metrics::{
+    Agreement, Budget, Met, OutageSummary, PerState, SettlingSecondOrder, Summary,
+};
 use nav_sim_navigation::scenario::Method;
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 
@@ -56,8 +58,29 @@ pub(crate) fn text(summary: &Summary) -> String {
 /// Where errors are too large for a linear filter, and for covariance analysis: the outages where it is worst.
 pub(crate) fn beyond_linear(summary: &Summary) -> Option<String> {
     let lines: Vec<String> =
-        [beyond_vertically(summary), beyond_horizontally(summary)].into_iter().flatten().collect();
+        [beyond_at_start(summary), beyond_vertically(summary), beyond_horizontally(summary)]
+            .into_iter()
+            .flatten()
+            .collect();
     (!lines.is_empty()).then(|| lines.join("\n"))
+}
+
+fn beyond_at_start(summary: &Summary) -> Option<String> {
+    let SettlingSecondOrder { state, share, until_s } = summary.settling?;
+    let than = if share > 0.0 { "smaller" } else { "larger" };
+    let how = match summary.is_analysed() {
+        true => {
+            "; true errors and NEES are larger there than covariance analysis says, and --method both shows by how much"
+        }
+        false => "",
+    };
+    Some(format!(
+        "beyond linear: while the attitude of the start settles, until {} s, the filters of runs state a standard deviation of {state} up to \
+         {:.0} % {than} than linear theory, since they take attitude errors for accelerations{how}. A better initial attitude (a smaller \
+         initial.att_sigma_deg), or accelerometers with a smaller turn-on bias, remove it",
+        readable(until_s),
+        100.0 * share.abs()
+    ))
 }
 
 fn beyond_vertically(summary: &Summary) -> Option<String> {

@@ -262,6 +262,8 @@ fn expected(head: &ColumnHead, words: &mut Words<'_>) -> Expected {
         epochs: (0..head.epochs).map(|_| expected_epoch(words)).collect(),
         record,
         outages,
+        // The tables of studies are of outages: of the start a unit keeps no words.
+        settling: None,
         filter_states: head.filter_states,
         fix_components: head.fix_components,
         coverage_level: head.coverage_level,

@@ -12,8 +12,8 @@ const LEVEL: f64 = 1e-3;
 /// Figures of runs, each as its distance from the expected one in its own Monte-Carlo standard errors.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Agreement {
-    /// How many figures are compared: RMSE of every state and NEES at the end of each outage, means over the run
-    /// of NEES and coverage.
+    /// How many figures are compared: RMSE of every state and NEES at the end of each outage, means over the run of RMSE, NEES
+    /// and coverage.
     pub figures: usize,
     /// The largest distance, with its sign.
     pub largest_z: f64,
@@ -36,6 +36,11 @@ impl Agreement {
         let nees_z = distance(v.nees, v.nees_std_error, expected.nees.mean);
         let coverage_z = distance(v.coverage, v.coverage_std_error, expected.coverage.mean);
         let mut all = vec![(nees_z, "NEES".to_owned()), (coverage_z, "coverage".to_owned())];
+        let (a, e) = (&runs.accuracy, &expected.accuracy);
+        for (i, name) in REPORTED_NAMES.iter().enumerate() {
+            let z = distance(a.rmse_mean.0[i], a.rmse_mean_std_error.0[i], e.rmse_mean.0[i]);
+            all.push((z, format!("RMSE of {name} over the run")));
+        }
         for (k, (o, e)) in runs.outages.iter().zip(&expected.outages).enumerate() {
             let place = format!("at the end of outage {}", k + 1);
             all.push((distance(o.nees_end, o.nees_end_std_error, e.nees_end), format!("NEES {place}")));

@@ -4,7 +4,9 @@ use super::epoch::{Accuracy, EpochMetrics};
 use super::estimate::{Estimate, PerState, Quantile};
 use super::outage::{OutageMetrics, Reconvergence, within};
 use super::quadratic_form::QuadraticForm;
-use super::second_order::{DOWN, OutageSecondOrder, VELOCITY_DOWN, horizontal_nees, velocity_down_m_s};
+use super::second_order::{
+    DOWN, OutageSecondOrder, SettlingSecondOrder, VELOCITY_DOWN, horizontal_nees, velocity_down_m_s,
+};
 use super::summary::{AccuracySummary, Consistency, Coverage, Nis, OutageSummary, SCHEMA_VERSION, Summary};
 use super::verdict::{OutageVerdict, Verdict};
 use crate::ekf::Belief;
@@ -32,6 +34,8 @@ pub struct Expected {
     pub record: RunRecord,
     /// Outages in time order.
     pub outages: Vec<OutageMetrics>,
+    /// What of the start is beyond linear theory.
+    pub settling: Option<SettlingSecondOrder>,
     /// States of the filter.
     pub filter_states: usize,
     /// Components of a fix.
@@ -57,9 +61,12 @@ impl Expected {
         let mut epochs: Vec<EpochMetrics> =
             reports.map(|(instant, bias)| epoch(instant, *bias, limit)).collect::<Option<_>>()?;
         let settling = stated_while_settling(track, belief, &truth, experiment.outages);
-        for (epoch, more) in epochs.iter_mut().zip(settling.reports) {
+        let settling_ratios = epochs.iter_mut().zip(settling.reports).map(|(epoch, more)| {
+            let linear = epoch.asee.clone();
             add_variances(&mut epoch.asee, more);
-        }
+            (epoch.t_s, std::array::from_fn(|i| epoch.asee.0[i].value / linear.0[i].value))
+        });
+        let settling_second_order = SettlingSecondOrder::among(settling_ratios);
         let second_order = vertical_second_order(track, belief, &truth, experiment.outages);
         for second in second_order.iter().flatten() {
             // the fix that ends an outage is used at the epoch of that instant, but not at the outage's end
@@ -101,6 +108,7 @@ impl Expected {
             epochs,
             record,
             outages,
+            settling: settling_second_order,
             filter_states: belief.states,
             fix_components: experiment.gnss.components(),
             coverage_level: experiment.coverage_level,
@@ -155,6 +163,7 @@ impl Expected {
             reduction: None,
             lincov: None,
             agreement: None,
+            settling: self.settling,
             is_second_order: false,
             require: Vec::new(),
         }

@@ -34,7 +34,7 @@ pub use quadratic_form::QuadraticForm;
 pub use ratio::{ComparisonError, EpochRow, Measured, OutageComparison, RatioError, StateRatio, compare};
 pub use reduction::{AxisReduction, ReductionQuality, ReductionSummary, TOLERANCE};
 pub use requirement::{Met, Requirement, UnknownRequirement};
-pub use second_order::OutageSecondOrder;
+pub use second_order::{OutageSecondOrder, SettlingSecondOrder};
 pub use sensitivity::Sensitivities;
 pub use summary::{AccuracySummary, Consistency, Coverage, Nis, OutageSummary, Recovery, Spread, Summary};
 pub use verdict::{ALL_STATES, OutageVerdict, StateName, Verdict, VerdictKind};

@@ -20,10 +20,10 @@
 use super::epoch::EpochMetrics;
 use super::outage::within;
 use super::summary::Summary;
-use super::verdict::{TOLERANCE, number};
+use super::verdict::{StateName, TOLERANCE, number};
 use crate::sensors::baro::BaroSettings;
 use crate::simulation::lincov::Consistency;
-use crate::simulation::{NEES_DOF, REPORTED};
+use crate::simulation::{NEES_DOF, REPORTED, REPORTED_NAMES};
 use crate::units::{DEG, STANDARD_GRAVITY};
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
@@ -56,6 +56,36 @@ pub struct OutageSecondOrder {
     /// outage, by covariance analysis; 0 where it says nothing.
     #[serde(skip)]
     pub mean_squares: [f64; 2],
+}
+
+/// What filters of runs state less (or more) than linear theory while the attitude of the start settles, where that is more than verdicts let pass:
+/// they take attitude errors for accelerations, and believe to learn from them what they do not.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SettlingSecondOrder {
+    /// State of which it is the most.
+    pub state: StateName,
+    /// Share of the standard deviation that linear theory gives the filter.
+    pub share: f64,
+    /// The last report (s on the trajectory) at which it is more than verdicts let pass, in any state.
+    pub until_s: f64,
+}
+
+impl SettlingSecondOrder {
+    /// Of reports in time order: the time, and what standard deviations are of those of linear theory.
+    pub(super) fn among(reports: impl Iterator<Item = (f64, [f64; REPORTED])>) -> Option<Self> {
+        let mut found: Option<Self> = None;
+        for (t_s, ratios) in reports {
+            for (ratio, state) in ratios.into_iter().zip(REPORTED_NAMES) {
+                let share = 1.0 - ratio;
+                if share.abs() > TOLERANCE {
+                    let most = found.filter(|most| most.share.abs() >= share.abs());
+                    found =
+                        Some(Self { until_s: t_s, ..most.unwrap_or(Self { state, share, until_s: t_s }) });
+                }
+            }
+        }
+        found
+    }
 }
 
 /// Mean shift of the velocity down (m/s) that the tilt makes to second order over an outage: ∫ g (ψ_roll² + ψ_pitch²)/2 dt
@@ -111,6 +141,7 @@ impl Summary {
     /// With what the covariance analysis of the same filter finds of the horizontal second order, for which runs keep too
     /// little.
     pub(super) fn take_second_order(&mut self, expected: &Self) {
+        self.settling = expected.settling;
         for (own, expected) in self.outages.iter_mut().zip(&expected.outages) {
             let OutageSecondOrder { nees, mean_squares, .. } = expected.second_order;
             (own.second_order.nees, own.second_order.mean_squares) = (nees, mean_squares);
@@ -195,6 +226,21 @@ mod tests {
     use super::*;
     use crate::metrics::{Estimate, PerState};
     use crate::simulation::{EpochSums, REPORTED, RunResult};
+
+    /// Nothing up to a tenth; beyond, the state and the share where it is most, until the last report beyond it, whichever state's.
+    #[test]
+    fn the_most_and_the_last_of_a_start_are_told() {
+        let report = |t_s: f64, roll: f64, yaw: f64| {
+            let mut ratios = [1.0; REPORTED];
+            (ratios[6], ratios[8]) = (roll, yaw);
+            (t_s, ratios)
+        };
+        assert_eq!(SettlingSecondOrder::among([report(1.0, 0.91, 1.09)].into_iter()), None);
+        let reports =
+            [report(1.0, 1.0, 0.8), report(2.0, 1.0, 0.5), report(3.0, 1.2, 0.95), report(4.0, 1.0, 1.0)];
+        let most = SettlingSecondOrder { state: "yaw_deg", share: 0.5, until_s: 3.0 };
+        assert_eq!(SettlingSecondOrder::among(reports.into_iter()), Some(most));
+    }
 
     /// A heading error of 2° and tilts of 0.5° for 100 s: ½gψ_dψ is 1.5 mm/s², hence 0.15 m/s and 7.5 m, each measured by what the filter
     /// states of it alone, north and east.

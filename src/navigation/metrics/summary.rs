@@ -8,7 +8,7 @@ use super::estimate::{Estimate, PerState, Quantile, SampleSize};
 use super::outage::{self, OutageMetrics};
 use super::reduction::ReductionSummary;
 use super::requirement::Met;
-use super::second_order::OutageSecondOrder;
+use super::second_order::{OutageSecondOrder, SettlingSecondOrder};
 use super::sensitivity::Sensitivities;
 use super::verdict::{OutageVerdict, Verdict};
 use crate::simulation::{NEES_DOF, RunResult};
@@ -58,6 +58,9 @@ pub struct Summary {
     /// How far the runs are from it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub agreement: Option<Agreement>,
+    /// Where errors are beyond linear theory while the attitude of the start settles, by covariance analysis; none where they are not.
+    #[serde(rename = "second_order_start", skip_serializing_if = "Option::is_none")]
+    pub settling: Option<SettlingSecondOrder>,
     /// Whether the errors are of second order: larger than the filter believes in the runs, and contradicting a covariance
     /// analysis that finds no fault with it.
     #[serde(skip)]
@@ -251,6 +254,7 @@ impl Summary {
             reduction: None,
             lincov: None,
             agreement: None,
+            settling: None,
             is_second_order: false,
             require: Vec::new(),
         }
