@@ -39,11 +39,11 @@ pub(crate) fn compare(runs: &[PathBuf], reference: &Path) -> Result<Comparison, 
         let run = path.display().to_string();
         let candidate = run_directory::read(path)?;
         let differences = differences(&candidate.manifest, &directory.manifest);
-        doubts.extend(
-            differences
-                .iter()
-                .map(|what| format!("{run}: {what} not that of the reference; the runs are not paired")),
-        );
+        let doubt = |what: &&str| format!("{run}: {what} not that of the reference; the runs are not paired");
+        // two covariance analyses have no runs that could be paired, and nothing by chance that pairing would take away
+        if !(candidate.experiment.is_expected && directory.experiment.is_expected) {
+            doubts.extend(differences.iter().map(doubt));
+        }
         let is_paired = differences.is_empty();
         let is_reference = is_same_place(path, reference);
         if !is_reference {
@@ -52,7 +52,8 @@ pub(crate) fn compare(runs: &[PathBuf], reference: &Path) -> Result<Comparison, 
         candidates.push(compared(run, &candidate, &directory, is_paired, is_reference)?);
         curves.push(RatioCurves::of(&candidate.experiment, &directory.experiment));
     }
-    let mut file = ComparisonFile::new((&name, &directory.verdict), doubts.is_empty(), &candidates);
+    let is_paired = candidates.iter().all(|candidate| candidate.is_paired);
+    let mut file = ComparisonFile::new((&name, &directory.verdict), is_paired, &candidates);
     let names = short_names(&beyond.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>());
     let mut places = BeyondLinearPlaces::default();
     for (name, (_, found)) in names.iter().zip(beyond) {

@@ -55,7 +55,8 @@ impl ShownComparison<'_> {
         if let Some(line) = &file.beyond_linear {
             page.text(&sentence(line));
         }
-        let paired = if file.paired {
+        let is_drawn = file.rows.iter().any(|row| row.rmse_end_ci95_pct.is_some());
+        let paired = if file.paired && is_drawn {
             "; the runs saw the same noise, intervals are those of paired differences"
         } else {
             ""

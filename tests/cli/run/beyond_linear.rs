@@ -157,7 +157,17 @@ fn a_comparison_names_the_runs_beyond_linear_theory() {
     run("--method lincov -o tilted");
     run("--method lincov --scenario level.toml -o level");
     run("--runs 2 --seed 1 -o sampled");
-    let told = done(place.path(), "compare tilted sampled level --reference level").stdout;
+    let analyses = done(place.path(), "compare tilted --reference level");
+    assert!(!analyses.stderr.contains("paired"), "{}", analyses.stderr);
+    assert_eq!(json(&place.path().join("comparison.json"))["paired"], false);
+    let same = done(place.path(), "compare level --reference level");
+    let page = fs::read_to_string(place.path().join("comparison.html")).unwrap();
+    assert!(!page.contains("the runs saw the same noise") && same.code == 0, "{page}");
+    let compared = done(place.path(), "compare tilted sampled level --reference level");
+    assert!(
+        compared.stderr.contains("sampled: the method is not that of the reference; the runs are not paired")
+    );
+    let told = compared.stdout;
     assert!(told.starts_with("consistent in linear theory only: tilted ("), "{told}");
     let line = told.lines().find(|line| line.starts_with("beyond linear: ")).unwrap();
     assert!(
