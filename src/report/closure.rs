@@ -70,6 +70,11 @@ impl TrajectoryCheck {
         self.closure.within_bounds
     }
 
+    /// Whether the motion is within the limits.
+    pub(crate) const fn is_plausible(&self) -> bool {
+        self.beyond_limits.is_empty()
+    }
+
     /// The same for people; limits of speed, acceleration, jerk and rate (deg/s) as they were given.
     pub(crate) fn text(&self, [speed, acceleration, jerk, rate_deg_s]: [f64; 4]) -> String {
         let (l, c, b) = (&self.largest, &self.closure.closure, &self.bounds);

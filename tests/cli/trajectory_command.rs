@@ -48,6 +48,10 @@ fn check_speaks_json_and_exits_with_3_beyond_a_limit() {
     // both at once: each is named
     let (code, _, err) = trajectory(&["check", DRIVE, "--limit-speed", "24", "--max-position-m", "1e-9"]);
     assert!(code == 3 && err.contains("beyond 1e-9 m") && err.contains("; the motion is beyond"), "{err}");
+    assert!(
+        err.contains("hint: a higher --rate-hz") && err.contains("; a vehicle that does move so deserves"),
+        "{err}"
+    );
 }
 
 #[test]

@@ -75,12 +75,12 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 }
 
 /// What may help where a bound or a limit is not kept.
-fn hint(check: &TrajectoryCheck) -> &'static str {
-    if check.is_closed() {
-        "a vehicle that does move so deserves larger limits (--limit-speed, --limit-accel, --limit-jerk, --limit-rate)"
-    } else {
-        "a higher --rate-hz closes better; rough motion may deserve a wider bound"
-    }
+fn hint(check: &TrajectoryCheck) -> String {
+    let closure = (!check.is_closed())
+        .then_some("a higher --rate-hz closes better; rough motion may deserve a wider bound");
+    let motion = (!check.is_plausible())
+        .then_some("a vehicle that does move so deserves larger limits (--limit-speed, --limit-accel, --limit-jerk, --limit-rate)");
+    closure.into_iter().chain(motion).collect::<Vec<_>>().join("; ")
 }
 
 impl Args {

@@ -15,6 +15,12 @@ pub(super) const LONG_STEP_S: f64 = 1.0 + 1e-6;
 const PLAUSIBLE_HEIGHT: std::ops::RangeInclusive<f64> = -500.0..=100_000.0;
 /// Length of the mean direction above which a course hardly changes: within ±45° it is 0.9.
 const STRAIGHT: f64 = 0.9;
+/// The same above which a course turns too little to tell whether a heading turns with it: within ±60° it is 0.8.
+const TURNING: f64 = 0.7;
+/// Share of the scatter of the course that a heading which has nothing to do with it leaves at least.
+const UNRELATED: f64 = 0.7;
+/// Horizontal speed (m/s) from which on what drives or flies forward looks ahead; slower vehicles turn on the spot, and hover.
+const FAST: f64 = 3.0;
 /// Instants at which path and attitude are compared: more tell no more.
 const LOOKS: usize = 2000;
 
@@ -77,13 +83,14 @@ pub(super) fn heights(rows: &mut Rows) {
 pub(super) fn of_trajectory(rows: &mut Rows, trajectory: &Trajectory) {
     let radian = |limit: f64| move |angle: f64| angle.abs() <= limit * DEG + 1e-8;
     if rows.attitude == Attitude::Given {
-        let moving = Moving::of(rows, trajectory);
+        let moving = Moving::of(rows, trajectory, MOVING);
         let rpy: Vec<RollPitchYaw> = rows.samples.iter().map(|s| RollPitchYaw::from_quat(s.q_b_n)).collect();
         let zero = rpy.iter().all(|a| [a.roll, a.pitch, a.yaw].into_iter().all(radian(0.0)));
         let small =
             |a: &RollPitchYaw| radian(PI)(a.roll) && radian(0.5 * PI)(a.pitch) && radian(2.0 * PI)(a.yaw);
         let radians = if !zero && rpy.iter().all(small) { moving.radians() } else { None };
-        let message = radians.or_else(|| moving.heading());
+        let unrelated = || Moving::of(rows, trajectory, FAST).unrelated();
+        let message = radians.or_else(|| moving.heading()).or_else(unrelated);
         message.into_iter().for_each(|text| rows.doubt(None, text));
         moving.kilometres().into_iter().for_each(|text| rows.doubt(None, text));
     }
@@ -102,13 +109,22 @@ pub(super) fn of_trajectory(rows: &mut Rows, trajectory: &Trajectory) {
 /// Course, climb angle, heading and pitch (rad) wherever the vehicle moves.
 struct Moving(Vec<[f64; 4]>);
 
+/// The direction (rad) in the mean, and its length: 1 where all are alike, 0 where they are spread all round.
+fn mean_direction(angles: impl Iterator<Item = f64>) -> (f64, f64) {
+    let (sin, cos, count) = angles.fold((0.0, 0.0, 0.0), |(sin, cos, count), angle| {
+        (sin + angle.sin(), cos + angle.cos(), count + 1.0)
+    });
+    (sin.atan2(cos), sin.hypot(cos) / count)
+}
+
 impl Moving {
-    fn of(rows: &Rows, trajectory: &Trajectory) -> Self {
+    /// Where it moves horizontally with more than this speed (m/s).
+    fn of(rows: &Rows, trajectory: &Trajectory, least: f64) -> Self {
         let look = |i: usize| -> Option<[f64; 4]> {
             let NavState { v_n, q_b_n, .. } = trajectory.state(rows.samples[i].t_s);
             let (speed, attitude) = (v_n.x.hypot(v_n.y), RollPitchYaw::from_quat(q_b_n));
             let angles = [v_n.y.atan2(v_n.x), (-v_n.z).atan2(speed), attitude.yaw, attitude.pitch];
-            (speed > MOVING).then_some(angles)
+            (speed > least).then_some(angles)
         };
         let n = rows.samples.len();
         Self((0..n).step_by(n.div_ceil(LOOKS)).filter_map(look).collect())
@@ -163,14 +179,8 @@ impl Moving {
 
     /// A heading that is off by the same angle whatever the course: wind and drift would change it from leg to leg.
     fn turned(&self) -> Option<String> {
-        let mean = |angle: &dyn Fn(&[f64; 4]) -> f64| {
-            let (sin, cos) =
-                self.0.iter().map(|a| angle(a).sin_cos()).fold((0.0, 0.0), |s, a| (s.0 + a.0, s.1 + a.1));
-            (sin.atan2(cos), sin.hypot(cos) / self.0.len() as f64)
-        };
-        // of one direction, or of all: the length of the mean direction
-        let (_, straight) = mean(&|[course, ..]| *course);
-        let (offset, _) = mean(&|[course, _, yaw, _]| yaw - course);
+        let (_, straight) = mean_direction(self.0.iter().map(|[course, ..]| *course));
+        let (offset, _) = mean_direction(self.0.iter().map(|[course, _, yaw, _]| yaw - course));
         let left = self.off(|yaw| yaw - offset);
         (straight < STRAIGHT && offset.abs() > 3.0 * DEG && left < 0.25 * offset.abs()).then(|| {
             format!(
@@ -179,6 +189,22 @@ impl Moving {
                 offset.abs() / DEG,
                 if offset > 0.0 { "clockwise" } else { "anticlockwise" },
                 left / DEG
+            )
+        })
+    }
+
+    /// A heading that does not turn with the course: of a sideslip, a crab angle or a mounting it keeps most of it.
+    fn unrelated(&self) -> Option<String> {
+        let length = |angle: fn(&[f64; 4]) -> f64| mean_direction(self.0.iter().map(angle)).1;
+        let (course, between) = (length(|[course, ..]| *course), length(|[course, _, yaw, _]| yaw - course));
+        // too few looks have a mean direction by chance
+        let is_unrelated =
+            self.0.len() >= 20 && course < TURNING && 1.0 - between > UNRELATED * (1.0 - course);
+        is_unrelated.then(|| {
+            let how = if length(|[_, _, yaw, _]| *yaw) > 0.99 { "yaw stays the same while the course turns" } else { "yaw does not turn with the course" };
+            format!(
+                "{how}: they are {:.0}° apart in the mean. A helicopter or a drone may fly so; of other vehicles, is it the heading?",
+                self.off(|yaw| yaw) / DEG
             )
         })
     }

@@ -43,7 +43,9 @@ impl Velocities {
         let pairs: Vec<_> = given.iter().map(|(t_s, given)| (*given, trajectory.state(*t_s).v_n)).collect();
         let looks = rows.velocities.wrong_signs(&pairs).or_else(|| {
             let step_s = (given[given.len() - 1].0 - given[0].0) / given.len() as f64;
-            misfit.contradicts().then(|| rows.velocities.other_reading(&pairs, step_s)).flatten()
+            let reading =
+                || rows.velocities.zeros(&pairs).or_else(|| rows.velocities.other_reading(&pairs, step_s));
+            misfit.contradicts().then(reading).flatten()
         });
         // A component that is small beside the speed contradicts by its sign alone.
         if looks.is_none() && !misfit.contradicts() {
@@ -68,6 +70,20 @@ impl Velocities {
         let words = |i: usize| format!("{} has the sign of a velocity {}", self.columns[i], opposite[i]);
         let turned: Vec<String> = (0..3).filter(is_turned).map(words).collect();
         (!turned.is_empty()).then(|| turned.join(", "))
+    }
+
+    /// The columns that nobody filled in, though the positions move.
+    fn zeros(&self, pairs: &[(DVec3, DVec3)]) -> Option<String> {
+        let is_empty = |i: &usize| {
+            let moved: f64 = pairs.iter().map(|(_, p)| p[*i].powi(2)).sum();
+            pairs.iter().all(|(given, _)| given[*i] == 0.0) && moved > SHOWN * pairs.len() as f64
+        };
+        let empty: Vec<&str> = (0..3).filter(is_empty).map(|i| self.columns[i].as_str()).collect();
+        match empty.as_slice() {
+            [] => None,
+            [one] => Some(format!("{one} is zero throughout")),
+            several => Some(format!("{} are zero throughout", several.join(", "))),
+        }
     }
 
     /// Another unit, of the velocities or of the time, or exchanged columns.

@@ -37,6 +37,16 @@ fn velocities_of_another_sign_order_or_unit_are_named() {
     said(|[t, n, e, d, y, a, b, c]| [t, n, e, d, y, a, -b, c], "v_e_m_s has the sign of a velocity west");
     said(|[t, n, e, d, y, a, b, c]| [t, n, e, d, y, b, a, c], "v_n_m_s and v_e_m_s look exchanged");
     said(|[t, n, e, d, y, a, b, c]| [t, n, e, d, y, 3.6 * a, 3.6 * b, 3.6 * c], "look like km/h");
+    said(
+        |[t, n, e, d, y, ..]| [t, n, e, d, y, 0.0, 0.0, 0.0],
+        "; v_n_m_s, v_e_m_s, v_d_m_s are zero throughout; the positions",
+    );
+    said(
+        |[t, n, e, d, y, a, b, _]| [t, n, e, 3.0 * d, y, a, b, 0.0],
+        "; v_d_m_s is zero throughout; the positions",
+    );
+    // a plane drive has no vertical velocity
+    assert_eq!(driven(NAMES, |[t, n, e, _, y, a, b, _]| [t, n, e, 0.0, y, a, b, 0.0]), [""; 0]);
     // the name that the file has, and the other way round
     let up = NAMES.replace("v_d_m_s", "v_up_m_s");
     let found = driven(&up, |row| row);
@@ -88,4 +98,27 @@ fn a_heading_that_is_turned_by_a_constant_angle_is_named() {
     // crabbing in a wind from the west of 2 m/s: as far to the right as to the left
     let crabbing = |[t, n, e, d, y, a, b, c]: [f64; 8]| [t, n, e, d, y - 11.0 * (y * DEG).cos(), a, b, c];
     assert_eq!(driven(NAMES, crabbing), [""; 0]);
+}
+
+/// A heading that nobody filled in, or of something else; not that of a slow vehicle, nor one that slips by up to 40° either way.
+#[test]
+fn a_heading_without_a_relation_to_the_path_is_doubted() {
+    said(
+        |[t, n, e, d, _, a, b, c]| [t, n, e, d, 30.0, a, b, c],
+        "yaw stays the same while the course turns: they are ",
+    );
+    said(
+        |[t, n, e, d, _, a, b, c]| [t, n, e, d, 0.0, a, b, c],
+        "yaw stays the same while the course turns: they are ",
+    );
+    // six times as fast as the course: all round in whichever convention
+    said(
+        |[t, n, e, d, _, a, b, c]| [t, n, e, d, 7.0 * t, a, b, c],
+        "yaw does not turn with the course: they are 9",
+    );
+    let slow =
+        |[t, n, e, d, _, a, b, c]: [f64; 8]| [t, 0.2 * n, 0.2 * e, 0.2 * d, 30.0, 0.2 * a, 0.2 * b, 0.2 * c];
+    assert_eq!(driven(NAMES, slow), [""; 0]);
+    let slipping = |[t, n, e, d, y, a, b, c]: [f64; 8]| [t, n, e, d, y + 40.0 * (0.05 * t).sin(), a, b, c];
+    assert_eq!(driven(NAMES, slipping), [""; 0]);
 }
