@@ -62,7 +62,7 @@ impl Expected {
             reports.map(|(instant, bias)| epoch(instant, *bias, limit)).collect::<Option<_>>()?;
         let settling = stated_while_settling(track, belief, &truth, experiment.outages);
         let settling_ratios = epochs.iter_mut().zip(settling.reports).map(|(epoch, more)| {
-            let linear = epoch.asee.clone();
+            let linear = epoch.asee;
             add_variances(&mut epoch.asee, more);
             (epoch.t_s, std::array::from_fn(|i| epoch.asee.0[i].value / linear.0[i].value))
         });
