@@ -125,9 +125,9 @@ fn an_answer_beyond_linear_theory_says_so_as_run_does() {
         let experiment = ["run", &drive, model, "--scenario", "start.toml", "--outage", outage];
         told(&[&experiment[..], &["--method", "lincov", "--filter", "full", "--force", "-o", "run"]].concat())
     };
-    // the number between two phrases of the line that begins so
+    // the number between two phrases of a line that begins so; of the start `run` has another
     let figure = |said: &str, before: &str, after: &str| {
-        let line = said.lines().find(|line| line.starts_with("beyond linear: "))?;
+        let line = said.lines().find(|line| line.starts_with("beyond linear: ") && line.contains(before))?;
         let words: Vec<&str> = line.split(before).nth(1)?.split(after).next()?.split_whitespace().collect();
         Some(words.last()?.parse::<f64>().unwrap())
     };

@@ -103,7 +103,7 @@ fn runs_stand_beside_what_is_expected_of_them() {
     assert_eq!((&summary["method"], &summary["lincov"]["method"]), (&"both".into(), &"lincov".into()));
     assert_eq!(summary["verdict"], summary["lincov"]["verdict"]);
     let agreement = &summary["agreement"];
-    assert_eq!(agreement["figures"], 12);
+    assert_eq!(agreement["figures"], 2 + 9 + 10);
     let fan = fs::read_to_string(place.path().join("out/fan.csv")).unwrap();
     let names = "p05_m,p25_m,p50_m,p75_m,p95_m";
     assert!(fan.starts_with(&format!("t_s,{names},lincov_{}\n", names.replace(',', ",lincov_"))), "{fan}");
