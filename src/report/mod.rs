@@ -25,6 +25,7 @@ mod practical;
 mod recording;
 mod replicates;
 pub(crate) mod require;
+pub(crate) mod requirement;
 mod run_directory;
 pub(crate) mod run_words;
 #[cfg(test)]

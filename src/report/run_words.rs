@@ -2,10 +2,9 @@
 
 use super::markdown::markdown_table as table;
 use super::number::{readable, window};
+use super::requirement::requirement_line;
 use super::verdict::verdict_line;
-use nav_sim_navigation::metrics::{
-    Agreement, Budget, Met, OutageSummary, PerState, SettlingSecondOrder, Summary,
-};
+use nav_sim_navigation::metrics::{Agreement, Budget, OutageSummary, PerState, SettlingSecondOrder, Summary};
 use nav_sim_navigation::scenario::Method;
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 
@@ -18,14 +17,17 @@ pub(crate) fn verdict(summary: &Summary) -> String {
 /// The summary for people, the verdict first.
 pub(crate) fn text(summary: &Summary) -> String {
     let mut text = format!("verdict: {}\n", verdict(summary));
+    summary.require.iter().for_each(|met| text += &format!("{}\n", requirement_line(met, summary)));
     text += &beyond_linear(summary).map_or_else(String::new, |words| format!("{words}\n"));
-    summary.require.iter().for_each(|met| text += &format!("{}\n", met_line(met)));
     text += &format!("{}\n", how(summary));
     if summary.runs > 0 && summary.diverged == summary.runs {
         return text.trim_end().to_owned();
     }
     text += &if summary.outages.is_empty() {
-        format!("{}\nmeans over the run of RMSE and of ", whole_run_table(summary))
+        format!(
+            "{}\nmeans over the run (the verdict rests on the root mean square of error over sigma, epoch by epoch): RMSE and ",
+            whole_run_table(summary)
+        )
     } else {
         format!("{}\njust before the first fix after the outage: RMSE and ", outage_table(&summary.outages))
     };
@@ -135,40 +137,6 @@ fn smaller(outage: &OutageSummary, states: &[usize]) -> &'static str {
     }
 }
 
-/// `required p95_m<=5: NOT MET, 7.41 at the end of outage 1`
-pub(crate) fn met_line(met: &Met) -> String {
-    let place = met.outage.map_or("over the run".to_owned(), |k| format!("at the end of outage {}", k + 1));
-    format!(
-        "required {}<={}: {}, {} {place}{}",
-        met.name,
-        met.limit,
-        met_word(met),
-        readable(met.value),
-        met_by(met)
-    )
-}
-
-/// Whether a limit is kept; by a figure that is within it and proves nothing, neither.
-pub(crate) fn met_word(met: &Met) -> &'static str {
-    match met.met {
-        true => "met",
-        false if met.value <= met.limit => "NOT SHOWN",
-        false => "NOT MET",
-    }
-}
-
-/// What a figure rests on where covariance analysis does not hold.
-pub(crate) fn met_by(met: &Met) -> String {
-    let Some(outage) = met.beyond_linear.map(|outage| outage + 1) else { return String::new() };
-    match !met.met && met.value <= met.limit {
-        true => format!(
-            " by covariance analysis, which does not hold for position and velocity down after outage {outage}, in which errors grow \
-             beyond linear theory: confirm with --method both"
-        ),
-        false => format!(" by the runs, since errors grow beyond linear theory in outage {outage}"),
-    }
-}
-
 /// What the calibrations leave open: a line for each of the first outages.
 fn calibration_lines(outages: &[OutageSummary]) -> String {
     let shown = |value: f64, (low, high): (f64, f64)| {
@@ -271,7 +239,7 @@ fn outage_table(outages: &[OutageSummary]) -> String {
         "RMSE roll_deg",
         "ASEE",
         "ratio",
-        "largest ratio",
+        "ratio farthest from 1",
     ];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     for o in outages {
@@ -283,8 +251,9 @@ fn outage_table(outages: &[OutageSummary]) -> String {
             let values = [o.rmse_end.0[state], o.asee_end.0[state]].map(|v| format!("{v:.3}"));
             row.extend(values.into_iter().chain([format!("{:.2}", ratios[state])]));
         }
-        let largest = (0..ratios.len()).max_by(|a, b| ratios[*a].total_cmp(&ratios[*b])).unwrap_or(0);
-        row.push(format!("{:.2} {}", ratios[largest], REPORTED_NAMES[largest]));
+        let distance = |state: &usize| ratios[*state].ln().abs();
+        let farthest = (0..ratios.len()).max_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(0);
+        row.push(format!("{:.2} {}", ratios[farthest], REPORTED_NAMES[farthest]));
         rows.push(row);
     }
     table(&rows)

@@ -10,6 +10,7 @@ use super::pictures::PlotArgs;
 use super::{Failure, Session};
 use crate::formats::scenario_file;
 use crate::jobs::{self, NavigateError, Navigation};
+use crate::report::requirement::requirement_line;
 use crate::report::{Manifest, TrajectorySeries, run_words, window};
 use inputs::Inputs;
 use nav_sim_navigation::metrics::{Requirement, Summary};
@@ -188,7 +189,8 @@ fn requirable(all: &[Requirement], no_outage: bool) -> Result<(), Failure> {
 
 /// Whether everything required is met.
 fn required(summary: &Summary) -> Result<(), Failure> {
-    let missed: Vec<String> = summary.require.iter().filter(|r| !r.met).map(run_words::met_line).collect();
+    let missed: Vec<String> =
+        summary.require.iter().filter(|met| !met.met).map(|met| requirement_line(met, summary)).collect();
     if missed.is_empty() { Ok(()) } else { Err(Failure::bound(missed.join("; "))) }
 }
 

@@ -110,7 +110,7 @@ fn remedy(summary: &Summary, unexpected: &[Unexpected], truth: &TrueImu) -> Stri
             "the errors are not those that MODEL expects: nav-sim tune finds variances that cover them".to_owned()
         }
         // no draw is in a covariance analysis: what is larger there is noise that a filter has no state for
-        TrueImu::AsBelieved if summary.method == Method::Lincov.name() => {
+        TrueImu::AsBelieved if summary.method == Method::Lincov.name() && !is_too_large => {
             "MODEL has noise that no filter contains: nav-sim tune with MODEL as its own --truth finds variances that cover it"
                 .to_owned()
         }

@@ -5,12 +5,13 @@ use super::run_charts::{fan_chart, horizontal, horizontal_caption, nees, rmse_an
 use super::{STATES, sentence, tone, window};
 use crate::report::manifest::Manifest;
 use crate::report::number::readable;
-use crate::report::page::{Cell, Page, Table};
-use crate::report::run_words::{beyond_linear, met_by, met_word};
+use crate::report::page::{Cell, Page, Table, Tone};
+use crate::report::requirement::requirement_line;
+use crate::report::run_words::beyond_linear;
 use crate::report::trajectory::TrajectorySeries;
 use crate::report::verdict::{Grade, verdict_line};
 use nav_sim_navigation::ekf::InitialSettings;
-use nav_sim_navigation::metrics::{EpochMetrics, FanEpoch, PerState, Summary};
+use nav_sim_navigation::metrics::{EpochMetrics, FanEpoch, Met, PerState, Summary};
 use nav_sim_navigation::sensors::defects::ImuSettings;
 use nav_sim_navigation::sensors::gnss::GnssSettings;
 use nav_sim_navigation::simulation::REPORTED_NAMES;
@@ -30,11 +31,16 @@ pub(crate) fn run_page(
     let windows = windows(summary);
     let verdict = verdict_line(&summary.verdict, &windows, summary.runs, summary.diverged);
     let title = if summary.runs > 0 { "INS/GNSS Monte-Carlo run" } else { "INS/GNSS covariance analysis" };
-    let mut page = Page::new(title, tone(Grade::of(&summary.verdict)), &format!("The filter is {verdict}"));
+    let (kept, missed): (Vec<&Met>, Vec<&Met>) = summary.require.iter().partition(|met| met.met);
+    let line = |met: &Met| sentence(&requirement_line(met, summary));
+    // What the command ends with is what the reader asked for: it comes before the filter.
+    let missed_lines: String = missed.iter().map(|met| format!("{} ", line(met))).collect();
+    let tone = if missed.is_empty() { tone(Grade::of(&summary.verdict)) } else { Tone::Bad };
+    let mut page = Page::new(title, tone, &format!("{missed_lines}The filter is {verdict}"));
+    kept.into_iter().for_each(|met| page.text(&line(met)));
     if let Some(words) = beyond_linear(summary) {
         page.text(&sentence(&words));
     }
-    requirements(summary, &mut page);
     page.facts(&assumptions(summary, manifest));
     page.chart(&track.map("Reference trajectory", &windows), "");
     page.chart(&horizontal(epochs, summary), horizontal_caption(summary));
@@ -75,13 +81,6 @@ fn fan_caption(fan: &[FanEpoch], summary: &Summary) -> String {
     format!(
         "Quantiles of {whose} over time: half of all errors in the dark band, nine in ten in both.{beside}{left_out} The numbers are in fan.csv."
     )
-}
-
-fn requirements(summary: &Summary, page: &mut Page) {
-    for met in &summary.require {
-        let (word, value, by) = (met_word(met), readable(met.value), met_by(met));
-        page.text(&format!("Required {} ≤ {}: {word}, found {value}{by}.", met.name, met.limit));
-    }
 }
 
 /// What the results rest on.

@@ -224,18 +224,21 @@ fn a_limit_is_not_met_by_a_figure_beyond_linear_theory() {
     };
     let (line, summary) = told("60", "--method lincov");
     assert!(line.starts_with("required rmse_pos_d_m<=60: NOT SHOWN, "), "{line}");
-    assert!(line.ends_with(" by covariance analysis, which does not hold for position and velocity down after outage 1, in which errors grow beyond linear theory: confirm with --method both"), "{line}");
+    assert!(line.ends_with(" by covariance analysis, which does not hold for position and velocity down after the outage 200–500 s, in which errors grow beyond linear theory: confirm with --method both"), "{line}");
     let of = |summary: &Value, k: usize, key: &str| summary["require"][k][key].clone();
     assert_eq!((of(&summary, 1, "met"), of(&summary, 1, "beyond_linear")), (false.into(), 0.into()));
     assert_eq!((of(&summary, 0, "met"), of(&summary, 0, "beyond_linear")), (true.into(), Value::Null));
     let (line, _) = told("1", "--method lincov");
-    assert!(line.contains(": NOT MET, ") && line.ends_with(" at the end of outage 2"), "{line}");
+    assert!(
+        line.contains(": NOT MET, ") && line.ends_with(" m at the end of the outage 550–850 s"),
+        "{line}"
+    );
 
     let (line, summary) = told("60", "--method both --runs 60 --seed 1");
     assert!(line.contains(": NOT MET, "), "{line}");
     assert!(
         line.ends_with(
-            " at the end of outage 2 by the runs, since errors grow beyond linear theory in outage 1"
+            " m at the end of the outage 550–850 s by the runs, since errors grow beyond linear theory in the outage 200–500 s"
         ),
         "{line}"
     );
