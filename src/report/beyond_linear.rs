@@ -58,8 +58,8 @@ impl BeyondLinear {
 }
 
 /// What a figure of covariance analysis is worth in such an outage.
-pub(super) const OF_A_FIGURE: &str = "errors of second order are not in the answer: in runs, horizontal errors and angles at the ends of such \
-                                      outages were within a tenth of it, and `nav-sim run --method both` shows how far yours are";
+pub(super) const OF_A_FIGURE: &str = "errors of second order are not in the answer; in runs, horizontal errors and angles at the ends of such outages were within a tenth \
+     of it (docs/limits.md), and `nav-sim run --method both` shows how far yours are";
 
 /// What its verdicts are worth.
 pub(crate) const OF_A_VERDICT: &str =

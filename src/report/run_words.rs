@@ -91,7 +91,7 @@ fn beyond_vertically(summary: &Summary) -> Option<String> {
     let of_analysis = match summary.is_analysed() {
         true => {
             "Covariance analysis has this in the RMSE and ASEE of position and velocity down up to the outage's end, but neither in NEES \
-             and coverage nor in what the first fixes make of it; its horizontal errors and angles hold. "
+             and coverage nor in what the first fixes make of it; its horizontal errors and angles hold to a tenth. "
         }
         false => "",
     };

@@ -178,11 +178,11 @@ impl ReductionQuality {
         let lost = self.lost().map_or(String::new(), |(horizontal, (state, most))| {
             let percent = |ratio: f64| format!("{:.1} %", 100.0 * (ratio - 1.0).max(0.0));
             let others = match most > horizontal {
-                true => format!(", of {}, which loses most, {}", IN_WORDS[state], percent(most)),
-                false => ", of every other state less".to_owned(),
+                true => format!(" and {} in {}, which loses most", percent(most), IN_WORDS[state]),
+                false => ", in every other state less".to_owned(),
             };
             format!(
-                "; errors of the horizontal position there at most {} above those of --filter full{others}",
+                "; errors there at most {} above those of --filter full in horizontal position{others}",
                 percent(horizontal)
             )
         });
@@ -305,14 +305,11 @@ pub(super) mod tests {
             rmse_over_full: Some(ends.to_vec()),
         };
         let line = quality(&ends).line();
-        let words = "; errors of the horizontal position there at most 1.9 % above those of --filter full, of yaw, which loses most, 24.0 %";
+        let words = "; errors there at most 1.9 % above those of --filter full in horizontal position and 24.0 % in yaw, which loses most";
         assert!(line.ends_with(words), "{line}");
         ends[1].0[8] = 1.01;
         let line = quality(&ends).line();
-        assert!(
-            line.ends_with("at most 1.9 % above those of --filter full, of every other state less"),
-            "{line}"
-        );
+        assert!(line.ends_with(" full in horizontal position, in every other state less"), "{line}");
         assert!(quality(&[]).line().ends_with("NEES 9.00 of 9"));
     }
 
