@@ -245,8 +245,8 @@ pub mod fusion {
 pub mod require {
     #[doc(inline)]
     pub use nav_sim_navigation::require::{
-        Answer, Course, Drift, Group, GroupMargin, IMU_PARAMETERS, ImuParameters, IsoDrift, Limit, Margins,
-        Need, Quantity, RequireError, Worst,
+        Answer, Course, Drift, IMU_PARAMETERS, ImuParameters, IsoDrift, Limit, Margins, Need, Part,
+        PartMargin, Quantity, RequireError, Worst,
     };
 }
 

@@ -31,6 +31,11 @@ pub(super) fn squared(unit: &str) -> String {
     }
 }
 
+/// A share, to one per cent.
+pub(crate) fn percent(share: f64) -> String {
+    format!("{:.0} %", 100.0 * share)
+}
+
 /// A number for people: three significant digits, or four figures before the point.
 #[must_use]
 pub fn readable(x: f64) -> String {

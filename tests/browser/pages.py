@@ -166,7 +166,7 @@ def check(program, page, results):
             except (KeyError, IndexError):
                 wrong.append(f"{pointer} is not in {results.name}")
                 continue
-            if readable(value) != text:
+            if text != (f"{100 * value:.0f} %" if text.endswith(" %") else readable(value)):
                 wrong.append(f"{pointer}: {text} on the page, {value} in {results.name}")
         print(f"  {len(seen['cells'])} numbers as in {results.name}")
     return wrong

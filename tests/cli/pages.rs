@@ -19,7 +19,12 @@ fn numbers_as_in(page: &str, results: &Value) -> usize {
         .collect();
     for (source, shown) in &cells {
         let value = results.pointer(source).unwrap_or_else(|| panic!("{source} is not in the results"));
-        assert_eq!(*shown, nav_sim::report::readable(value.as_f64().unwrap_or(f64::NAN)), "{source}");
+        let value = value.as_f64().unwrap_or(f64::NAN);
+        let expected = match shown.strip_suffix(" %") {
+            Some(_) => format!("{:.0} %", 100.0 * value),
+            None => nav_sim::report::readable(value),
+        };
+        assert_eq!(*shown, expected, "{source}");
     }
     cells.len()
 }

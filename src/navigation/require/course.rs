@@ -205,28 +205,32 @@ impl<'a> Course<'a> {
         Ok(worst.expect("at least one limit and one place"))
     }
 
-    /// Where the margin of the hardest limit falls to `reserve` along models of a rising logarithm, as
-    /// [`Crossing::from`] 0; the logarithm and what is left beyond the reserve.
+    /// Where the margin of the hardest limit falls to `reserve` along IMUs of a rising logarithm, each with the scenario
+    /// of a filter that knows it, as [`Crossing::from`] 0; the logarithm and what is left beyond the reserve.
     ///
     /// The search is at the places that were the worst so far; what it finds is held against all, and it goes on where
     /// another is worse. The answer is that of all places, at the cost of a few.
     pub(super) fn crossing(
         &self,
-        scenario: &Scenario,
         limits: &[Limit],
         (crossing, reserve): (&Crossing, f64),
-        model_at: impl Fn(f64) -> Model,
+        imu_at: impl Fn(f64) -> (Scenario, Model),
     ) -> Result<(f64, f64), BeliefError> {
-        let mut places = vec![self.worst(scenario, &model_at(0.0), limits)?.place];
+        let worst_at = |ln: f64| {
+            let (scenario, model) = imu_at(ln);
+            self.worst(&scenario, &model, limits)
+        };
+        let mut places = vec![worst_at(0.0)?.place];
         let mut start = 0.0;
         loop {
             let outages: Vec<Outage> = places.iter().map(|place| self.outages[*place]).collect();
             let margin_there = |ln: f64| {
-                let worst = Worst::of(limits, &self.drifts_in(&outages, scenario, &model_at(ln))?);
+                let (scenario, model) = imu_at(ln);
+                let worst = Worst::of(limits, &self.drifts_in(&outages, &scenario, &model)?);
                 Ok::<_, BeliefError>(worst.expect("at least one limit and one place").margin() - reserve)
             };
             let (ln, there) = crossing.from(start, margin_there)?;
-            let worst = self.worst(scenario, &model_at(ln), limits)?;
+            let worst = worst_at(ln)?;
             let everywhere = worst.margin() - reserve;
             if everywhere >= there - crossing.exact || places.contains(&worst.place) {
                 return Ok((ln, everywhere));

@@ -240,9 +240,8 @@ impl Need<'_> {
     ) -> Result<(f64, ImuParameters), BeliefError> {
         let scaled = |ln: f64| imu.times(weights.map(|w| (w * ln).exp()));
         let crossing = Crossing { bounds: (-RANGE, RANGE), step: 0.7, exact: EXACT };
-        let model_at = |ln: f64| scaled(ln).model(self.scenario.imu.rate_hz);
-        let (ln, margin) =
-            self.course.crossing(self.scenario, self.limits, (&crossing, RESERVE), model_at)?;
+        let imu_at = |ln: f64| (self.scenario.clone(), scaled(ln).model(self.scenario.imu.rate_hz));
+        let (ln, margin) = self.course.crossing(self.limits, (&crossing, RESERVE), imu_at)?;
         Ok((margin, scaled(ln)))
     }
 

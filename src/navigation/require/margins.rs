@@ -1,4 +1,4 @@
-//! By how much a given IMU keeps a limit or misses it, and what of it decides.
+//! By how much a given IMU keeps a limit or misses it, and what decides.
 
 use super::{Course, Limit, Worst};
 use crate::ekf::BeliefError;
@@ -7,64 +7,128 @@ use crate::noise::{Kind, Model};
 use crate::scenario::Scenario;
 use crate::simulation::lincov::{Crossing, DRIFT, NamedSource, times};
 
-/// A part of an IMU's noise.
+/// A part of the errors at the end of an outage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Group {
-    /// The sensor.
-    pub sensor: Sensor,
-    /// Whether it is the correlated noise, or the noise that is new in every sample.
-    pub correlated: bool,
+pub enum Part {
+    /// Noise of a sensor that is new in every sample.
+    White(Sensor),
+    /// Its correlated noise.
+    Correlated(Sensor),
+    /// Its turn-on bias.
+    TurnOn(Sensor),
+    /// The drifts of both sensors: the same in every run.
+    Drift,
+    /// Scale factors and misalignment of both sensors.
+    Scale,
+    /// Receiver and barometer.
+    Fixes,
+    /// Position, velocity and attitude at the start.
+    Start,
 }
 
-impl Group {
-    /// All four.
-    pub(crate) const ALL: [Self; 4] = [
-        Self { sensor: Sensor::Accel, correlated: false },
-        Self { sensor: Sensor::Accel, correlated: true },
-        Self { sensor: Sensor::Gyro, correlated: false },
-        Self { sensor: Sensor::Gyro, correlated: true },
+impl Part {
+    /// All of them.
+    const ALL: [Self; 10] = [
+        Self::White(Sensor::Accel),
+        Self::Correlated(Sensor::Accel),
+        Self::TurnOn(Sensor::Accel),
+        Self::White(Sensor::Gyro),
+        Self::Correlated(Sensor::Gyro),
+        Self::TurnOn(Sensor::Gyro),
+        Self::Drift,
+        Self::Scale,
+        Self::Fixes,
+        Self::Start,
     ];
 
     /// `gyro, correlated`
     #[must_use]
     pub fn name(self) -> String {
-        format!("{}, {}", self.sensor.name(), if self.correlated { "correlated" } else { "white" })
+        match self {
+            Self::White(sensor) => format!("{}, white", sensor.name()),
+            Self::Correlated(sensor) => format!("{}, correlated", sensor.name()),
+            Self::TurnOn(sensor) => format!("{}, turn-on bias", sensor.name()),
+            Self::Drift => "drift".to_owned(),
+            Self::Scale => "scale factors, misalignment".to_owned(),
+            Self::Fixes => "GNSS".to_owned(),
+            Self::Start => "start".to_owned(),
+        }
     }
 
-    /// Whether a process of a sensor belongs to it. A drift belongs to none: it is the same in every run.
-    fn includes(self, sensor: Sensor, kind: Kind) -> bool {
-        let correlated = match kind {
-            Kind::Ar1 | Kind::GaussMarkov | Kind::RandomWalk => true,
-            Kind::White | Kind::Quantization | Kind::Ma1 => false,
-            Kind::Drift => return false,
-        };
-        sensor == self.sensor && correlated == self.correlated
+    /// Whether a better IMU makes it smaller.
+    #[must_use]
+    pub const fn is_of_imu(self) -> bool {
+        !matches!(self, Self::Fixes | Self::Start)
     }
 
-    /// The model with this part's standard deviations multiplied.
-    fn multiplied(self, model: &Model, factor: f64) -> Model {
-        let mut changed = model.clone();
-        for channel in Channel::ALL.into_iter().filter(|c| c.sensor == self.sensor) {
-            for process in &mut changed.axes[channel.index()].processes {
-                if self.includes(self.sensor, process.kind()) {
-                    // The factor is on standard deviations, the parameter a variance.
-                    *process = times(process, factor * factor, model.rate_hz);
+    fn of(source: &NamedSource) -> Self {
+        if let Some((sensor, kind)) = source.process {
+            return Self::of_process(sensor, kind);
+        }
+        let name = source.name.as_str();
+        let turn_on = |sensor: &Sensor| name == format!("{}.turn_on_bias", sensor.name());
+        match name {
+            DRIFT => Self::Drift,
+            "initial" => Self::Start,
+            fixes if fixes.starts_with("gnss.") || fixes == "baro" => Self::Fixes,
+            _ => Sensor::ALL.into_iter().find(turn_on).map_or(Self::Scale, Self::TurnOn),
+        }
+    }
+
+    const fn of_process(sensor: Sensor, kind: Kind) -> Self {
+        match kind {
+            Kind::Ar1 | Kind::GaussMarkov | Kind::RandomWalk => Self::Correlated(sensor),
+            Kind::White | Kind::Quantization | Kind::Ma1 => Self::White(sensor),
+            Kind::Drift => Self::Drift,
+        }
+    }
+
+    /// An IMU and the filter that knows it with this part's standard deviations multiplied; GNSS and start stay.
+    fn multiplied(self, (scenario, model): &(Scenario, Model), factor: f64) -> (Scenario, Model) {
+        let (mut scenario, mut model) = (scenario.clone(), model.clone());
+        let (imu, initial) = (&mut scenario.imu, &mut scenario.initial);
+        let scaled = |sigma: &mut Option<f64>| *sigma = sigma.map(|sigma| factor * sigma);
+        match self {
+            Self::TurnOn(Sensor::Accel) => {
+                scaled(&mut imu.turn_on_bias_accel_m_s2);
+                scaled(&mut initial.accel_bias_sigma_m_s2);
+            }
+            Self::TurnOn(Sensor::Gyro) => {
+                scaled(&mut imu.turn_on_bias_gyro_rad_s);
+                scaled(&mut initial.gyro_bias_sigma_rad_s);
+            }
+            Self::Scale => {
+                imu.scale_ppm_accel *= factor;
+                imu.scale_ppm_gyro *= factor;
+                imu.misalignment_rad *= factor;
+                scaled(&mut initial.accel_scale_sigma_ppm);
+                scaled(&mut initial.gyro_scale_sigma_ppm);
+            }
+            Self::White(_) | Self::Correlated(_) | Self::Drift => {
+                for channel in Channel::ALL {
+                    for process in &mut model.axes[channel.index()].processes {
+                        if Self::of_process(channel.sensor, process.kind()) == self {
+                            // The factor is on standard deviations, the parameter a variance.
+                            *process = times(process, factor * factor, model.rate_hz);
+                        }
+                    }
                 }
             }
+            Self::Fixes | Self::Start => (),
         }
-        changed
+        (scenario, model)
     }
 }
 
-/// The effect of a part of an IMU's noise on a limit.
+/// The effect of a part on a limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GroupMargin {
+pub struct PartMargin {
     /// The part.
-    pub group: Group,
+    pub part: Part,
     /// Its share in the mean square of what is limited.
     pub share: f64,
-    /// The factor on its standard deviations that alone meets the limit exactly; none where none does: too little or
-    /// too much whatever it is.
+    /// The factor on its standard deviations that alone meets the limit exactly; none where none does (too little or too
+    /// much whatever it is), and of GNSS and start, which are no choice of an IMU.
     pub factor: Option<f64>,
 }
 
@@ -73,12 +137,10 @@ pub struct GroupMargin {
 pub struct Margins {
     /// The hardest limit.
     pub worst: Worst,
-    /// The parts of the IMU that it has.
-    pub groups: Vec<GroupMargin>,
-    /// Share of the drifts of the noise model.
-    pub drift: f64,
-    /// Share of GNSS, start and what the noise model does not have (turn-on biases).
-    pub rest: f64,
+    /// The same for an IMU without errors: what GNSS and start leave.
+    pub without_imu: Worst,
+    /// The parts that there are; their shares sum to 1.
+    pub parts: Vec<PartMargin>,
 }
 
 /// How far a factor is sought, as a logarithm.
@@ -96,31 +158,53 @@ impl Margins {
         limits: &[Limit],
     ) -> Result<Self, BeliefError> {
         let worst = course.worst(scenario, model, limits)?;
-        let [drift, rest] = [Group::ALL.len(), Group::ALL.len() + 1];
-        let part = |source: &NamedSource| match source.process {
-            Some((sensor, kind)) => Group::ALL.iter().position(|g| g.includes(sensor, kind)).unwrap_or(rest),
-            None if source.name == DRIFT => drift,
-            None => rest,
+        let part_of = |source: &NamedSource| {
+            Part::ALL.iter().position(|part| *part == Part::of(source)).expect("one of all")
         };
-        let parts = course.parts(worst.place, scenario, model, &part, rest + 1)?;
-        let squares: Vec<f64> = parts.iter().map(|part| part.square(worst.limit.quantity)).collect();
+        let alone = course.parts(worst.place, scenario, model, &part_of, Part::ALL.len())?;
+        let squares: Vec<f64> = alone.iter().map(|drift| drift.square(worst.limit.quantity)).collect();
         let total: f64 = squares.iter().sum();
-        let mut groups = Vec::new();
-        for (group, square) in Group::ALL.into_iter().zip(&squares).filter(|(_, square)| **square > 0.0) {
-            let crossing = Crossing { bounds: (-RANGE, RANGE), step: 0.7, exact: 1e-3 };
-            let model_at = |ln: f64| group.multiplied(model, ln.exp());
-            let (ln, left) = course.crossing(scenario, limits, (&crossing, 0.0), model_at)?;
-            // A value left at a bound is no crossing: with this part without noise, or with any, the limit
-            // stays where it is.
-            let factor = (left.abs() <= 1e-2).then(|| ln.exp());
-            groups.push(GroupMargin { group, share: square / total, factor });
+        let given = (scenario.clone(), model.clone());
+        let mut parts = Vec::new();
+        for (part, square) in Part::ALL.into_iter().zip(&squares).filter(|(_, square)| **square > 0.0) {
+            let mut factor = None;
+            if part.is_of_imu() {
+                let crossing = Crossing { bounds: (-RANGE, RANGE), step: 0.7, exact: 1e-3 };
+                let imu_at = |ln: f64| part.multiplied(&given, ln.exp());
+                let (ln, left) = course.crossing(limits, (&crossing, 0.0), imu_at)?;
+                // A value left at a bound is no crossing: with this part without noise, or with any, the limit
+                // stays where it is.
+                factor = (left.abs() <= 1e-2).then(|| ln.exp());
+            }
+            parts.push(PartMargin { part, share: square / total, factor });
         }
-        Ok(Self { worst, groups, drift: squares[drift] / total, rest: squares[rest] / total })
+        // Not zero: a filter that knows no uncertainty has no inverse. Squared, 1e-4 of the deviations leave 1e-8.
+        let without = |imu, part: Part| part.multiplied(&imu, (-RANGE).exp());
+        let (scenario, model) = Part::ALL.into_iter().fold(given, without);
+        Ok(Self { worst, without_imu: course.worst(&scenario, &model, limits)?, parts })
     }
 
     /// Whether the limits are kept.
     #[must_use]
     pub fn met(&self) -> bool {
         self.worst.margin() >= 0.0
+    }
+
+    /// Whether any IMU keeps the limits.
+    #[must_use]
+    pub fn an_imu_helps(&self) -> bool {
+        self.without_imu.margin() >= 0.0
+    }
+
+    /// The largest part.
+    #[must_use]
+    pub fn binding(&self) -> Option<&PartMargin> {
+        self.parts.iter().max_by(|a, b| a.share.total_cmp(&b.share))
+    }
+
+    /// The share of all that a better IMU makes smaller.
+    #[must_use]
+    pub fn share_of_imu(&self) -> f64 {
+        self.parts.iter().filter(|p| p.part.is_of_imu()).map(|p| p.share).sum()
     }
 }

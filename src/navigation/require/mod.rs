@@ -9,7 +9,7 @@ mod margins;
 
 pub use course::{Course, Drift, evenly};
 pub use imu::{Answer, IMU_PARAMETERS, ImuParameters, IsoDrift, Need};
-pub use margins::{Group, GroupMargin, Margins};
+pub use margins::{Margins, Part, PartMargin};
 
 use crate::ekf::BeliefError;
 use crate::simulation::ExperimentError;

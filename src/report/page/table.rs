@@ -1,7 +1,7 @@
 //! Tables of a page.
 
 use super::escape;
-use crate::report::number::readable;
+use crate::report::number::{percent, readable};
 use std::fmt::Write as _;
 
 /// Characters beyond which a text has more than one line.
@@ -21,6 +21,11 @@ impl Cell {
     /// such as `/outages/0/nees_end`: tests hold the page against it.
     pub(crate) fn number(value: f64, source: &str) -> Self {
         Self { text: readable(value), source: source.to_owned(), is_number: true }
+    }
+
+    /// A share, shown in per cent; `source` as that of [`Self::number`].
+    pub(crate) fn share(value: f64, source: &str) -> Self {
+        Self { text: percent(value), ..Self::number(value, source) }
     }
 
     /// A number, or several, as they are to be shown.

@@ -4,6 +4,7 @@ use super::sentence;
 use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, Table, Tone};
 use crate::report::require::{
     Bridged, CURVE_S, GivenImu, NeededImu, Question, RankedUnit, catalogue_beyond_linear, catalogue_rows,
+    parts_in_words, what_decides,
 };
 use nav_sim_navigation::require::{Answer, IMU_PARAMETERS, ImuParameters, Margins, Quantity};
 
@@ -40,7 +41,7 @@ fn figures(needed: &NeededImu) -> Table {
         table.row([
             ImuParameters::NAMES[i].into(),
             Cell::number(ImuParameters::in_datasheets(i, needed.imu.values[i]), &source_of("allocated")),
-            Cell::number(needed.shares[i], &source_of("share")),
+            Cell::share(needed.shares[i], &source_of("share")),
             answer(i, &needed.alone[i], &source_of("alone")),
             answer(i, &needed.others_better[i], &source_of("others_10_times_better")),
         ]);
@@ -48,7 +49,7 @@ fn figures(needed: &NeededImu) -> Table {
     table.row([
         "GNSS and start".into(),
         Cell::figures(""),
-        Cell::number(needed.shares[IMU_PARAMETERS], "/share_of_gnss_and_start"),
+        Cell::share(needed.shares[IMU_PARAMETERS], "/share_of_gnss_and_start"),
         Cell::figures(""),
         Cell::figures(""),
     ]);
@@ -112,6 +113,7 @@ pub(crate) fn model_page(judged: &GivenImu) -> Page {
     if let Some(margins) = margins {
         page.section("What decides, and what is slack");
         page.table(&parts(margins));
+        page.text(&sentence(&what_decides(margins, question)));
     }
     page.checked(CHECKED);
     page
@@ -133,21 +135,11 @@ fn drift_table(question: &Question, bridged: &Bridged) -> Table {
 /// Shares of the error, and the factor on each part that alone meets the limit.
 fn parts(margins: &Margins) -> Table {
     let mut table = Table::new(["part of the error", "share", "factor on its σ that alone meets the limit"]);
-    for (i, group) in margins.groups.iter().enumerate() {
-        let factor = match group.factor {
-            Some(factor) => Cell::number(factor, &format!("/groups/{i}/factor")),
-            None if margins.met() => Cell::figures("any value"),
-            None => Cell::figures("none: the rest is too large"),
-        };
-        table.row([
-            group.group.name().into(),
-            Cell::number(group.share, &format!("/groups/{i}/share")),
-            factor,
-        ]);
+    for (i, (name, p, factor)) in parts_in_words(margins).enumerate() {
+        let number = |factor| Cell::number(factor, &format!("/parts/{i}/factor"));
+        let share = Cell::share(p.share, &format!("/parts/{i}/share"));
+        table.row([name.into(), share, p.factor.map_or_else(|| Cell::figures(factor), number)]);
     }
-    table.row(["drift".into(), Cell::number(margins.drift, "/share_of_drifts"), Cell::figures("")]);
-    let rest = Cell::number(margins.rest, "/share_of_the_rest");
-    table.row(["GNSS, start, turn-on biases".into(), rest, Cell::figures("")]);
     table
 }
 

@@ -1,9 +1,9 @@
 //! What a given IMU makes of the limits, in words and as JSON.
 
-use super::{BeyondLinear, CURVE_S, LONGEST_S, Question, points_json, share};
+use super::{BeyondLinear, CURVE_S, LONGEST_S, Question, points_json};
 use crate::report::markdown_table;
-use crate::report::number::{readable, seconds};
-use nav_sim_navigation::require::{GroupMargin, Limit, Margins, Worst};
+use crate::report::number::{percent, readable, seconds};
+use nav_sim_navigation::require::{Limit, Margins, PartMargin, Worst};
 use serde_json::{Value, json};
 
 /// The longest outage that keeps the limits.
@@ -119,7 +119,11 @@ impl GivenImu {
     /// The verdict, and what decides.
     pub(crate) fn text(&self) -> String {
         match &self.margins {
-            Some(margins) => format!("{}\n\n{}", self.verdict(), markdown_table(&margins_rows(margins))),
+            Some(margins) => {
+                let (table, decides) =
+                    (markdown_table(&margins_rows(margins)), what_decides(margins, &self.question));
+                format!("{}\n\n{table}\n{decides}", self.verdict())
+            }
             None => self.verdict(),
         }
     }
@@ -142,42 +146,57 @@ impl GivenImu {
             "beyond_linear": self.beyond_linear,
         });
         if let Some(margins) = &self.margins {
-            let group =
-                |g: &GroupMargin| json!({ "part": g.group.name(), "share": g.share, "factor": g.factor });
+            let part =
+                |p: &PartMargin| json!({ "part": p.part.name(), "share": p.share, "factor": p.factor });
             answer["met"] = json!(margins.met());
             answer["quantity"] = json!(margins.worst.limit.quantity.name());
             answer["value"] = json!(margins.worst.value);
             answer["limit"] = json!(margins.worst.limit.most);
             answer["place"] = json!(margins.worst.place);
-            answer["groups"] = margins.groups.iter().map(group).collect();
-            answer["share_of_drifts"] = json!(margins.drift);
-            answer["share_of_the_rest"] = json!(margins.rest);
+            answer["parts"] = margins.parts.iter().map(part).collect();
+            answer["binding"] = json!(margins.binding().map(|p| p.part.name()));
+            answer["share_of_imu"] = json!(margins.share_of_imu());
+            answer["without_imu_errors"] = json!(margins.without_imu.value);
         }
         crate::report::json(&answer)
     }
 }
 
-/// A row for each part of the IMU.
-fn margins_rows(margins: &Margins) -> Vec<Vec<String>> {
-    let mut rows = vec![
-        ["part of the error", "share", "factor on its sigma that alone meets the limit"]
-            .map(str::to_owned)
-            .to_vec(),
-    ];
-    let largest = margins.groups.iter().map(|g| g.share).fold(0.0, f64::max);
-    let binding = |g: &GroupMargin| if g.share == largest { " (binding)" } else { "" };
-    for g in &margins.groups {
-        let factor = match g.factor {
+/// Each part with its name, the largest marked, and the factor on it that meets the limit, as text where it is none.
+pub(crate) fn parts_in_words(margins: &Margins) -> impl Iterator<Item = (String, &PartMargin, String)> {
+    let binding = margins.binding().map(|binding| binding.part);
+    margins.parts.iter().map(move |p| {
+        let mark = if Some(p.part) == binding { " (binding)" } else { "" };
+        let factor = match p.factor {
             Some(f) if f >= 1.0 => format!("× {} (slack: so much worse it may be)", readable(f)),
             Some(f) => format!("× {}", readable(f)),
+            None if !p.part.is_of_imu() => String::new(),
             None if margins.met() => "any value".to_owned(),
             None => "none: the rest is too large".to_owned(),
         };
-        rows.push(vec![format!("{}{}", g.group.name(), binding(g)), share(g.share), factor]);
-    }
-    if margins.drift > 0.0 {
-        rows.push(vec!["drift".to_owned(), share(margins.drift), String::new()]);
-    }
-    rows.push(vec!["GNSS, start, turn-on biases".to_owned(), share(margins.rest), String::new()]);
-    rows
+        (p.part.name() + mark, p, factor)
+    })
+}
+
+/// What decides, and whether a better IMU helps.
+pub(crate) fn what_decides(margins: &Margins, question: &Question) -> String {
+    let Some(binding) = margins.binding() else { return String::new() };
+    let of_imu = percent(margins.share_of_imu());
+    let without = question.worst(&margins.without_imu);
+    let better = if margins.an_imu_helps() {
+        format!("an IMU without errors would leave {without}")
+    } else {
+        format!("no IMU keeps the limit: one without errors would leave {without}, from GNSS and start")
+    };
+    format!(
+        "{} decides ({}); the whole IMU takes {of_imu} of the mean square; {better}",
+        binding.part.name(),
+        percent(binding.share)
+    )
+}
+
+fn margins_rows(margins: &Margins) -> Vec<Vec<String>> {
+    let head = ["part of the error", "share", "factor on its sigma that alone meets the limit"];
+    let row = |(name, p, factor): (String, &PartMargin, String)| vec![name, percent(p.share), factor];
+    std::iter::once(head.map(str::to_owned).to_vec()).chain(parts_in_words(margins).map(row)).collect()
 }

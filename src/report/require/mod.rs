@@ -2,10 +2,10 @@
 
 mod given;
 
-pub(crate) use given::{Bridged, GivenImu, Longest};
+pub(crate) use given::{Bridged, GivenImu, Longest, parts_in_words, what_decides};
 
 use super::beyond_linear::{BeyondLinear, BeyondLinearPlaces, OF_A_FIGURE};
-use super::number::{readable, seconds, window};
+use super::number::{percent, readable, seconds, window};
 use nav_sim_navigation::require::{Answer, IMU_PARAMETERS, ImuParameters, IsoDrift, Limit, Worst};
 use nav_sim_navigation::sensors::outage::Outage;
 use serde_json::{Value, json};
@@ -134,10 +134,6 @@ fn answer_json(which: usize, found: &Answer) -> Value {
     }
 }
 
-fn share(x: f64) -> String {
-    format!("{:.0} %", 100.0 * x)
-}
-
 impl NeededImu {
     /// What is needed, in a sentence.
     pub(crate) fn verdict(&self, question: &Question) -> String {
@@ -149,7 +145,7 @@ impl NeededImu {
             readable(from_s),
             readable(to_s),
             question.worst(&self.worst),
-            share(self.shares[IMU_PARAMETERS]),
+            percent(self.shares[IMU_PARAMETERS]),
             BeyondLinear::line(self.beyond_linear.as_ref())
         )
     }
@@ -162,7 +158,7 @@ impl NeededImu {
             rows.push(vec![
                 ImuParameters::NAMES[i].to_owned(),
                 answer(i, &Answer::AtMost(self.imu.values[i])),
-                share(self.shares[i]),
+                percent(self.shares[i]),
                 answer(i, &self.alone[i]),
                 answer(i, &self.others_better[i]),
             ]);
