@@ -174,6 +174,16 @@ fn doubt(sheet: &Datasheet, sensor: Sensor, session: &Session) {
         session
             .warn(format!("{name}: no bias instability is given (--{name}-bias): the bias does not wander"));
     }
+    if sheet.value(sensor, Figure::TurnOn).is_none() {
+        session.warn(format!(
+            "{name}: no turn-on bias (its repeatability) is given (--{name}-turn-on): the model has none"
+        ));
+    }
+    if let Some(offset) = sheet.given(sensor, Figure::Offset) {
+        session.say(format!(
+            "{name}: a zero offset of ±{offset} is an initial tolerance, measured and removed before use: not in the model"
+        ));
+    }
     if let Some(ppm) = sheet.value(sensor, Figure::Scale) {
         session.say(format!(
             "{name}: a scale factor of {ppm} ppm is not noise; the filter expects it with `run --scale-ppm`, the true \

@@ -183,6 +183,10 @@ fn given(path: &Path, args: &Args, requirements: &Requirements, session: &Sessio
     let mut scenario = requirements.scenario.clone();
     turn_on::expect(&mut scenario.initial, &file, path, session);
     turn_on::make(&mut scenario.imu, &file, path, session);
+    let not_stated = words::stated_in_words(&file.not_stated());
+    if !not_stated.is_empty() {
+        session.warn(format!("{}: what is not stated counts as none: {not_stated}", path.display()));
+    }
     let model = read::at_rate(path, &file.model, scenario.imu.rate_hz, session)?;
     let judged = requirements.judged(&scenario, &model).map_err(unusable)?;
     session.show(|| judged.json(), || judged.text());
@@ -206,9 +210,11 @@ fn ranked(
         None => catalogue(requirements)?,
     };
     let (units, question) = requirements.ranked(&units).map_err(Failure::input)?;
-    let beyond =
-        words::catalogue_beyond_linear(&units).map_or_else(String::new, |line| format!("\n\n{line}"));
-    let text = || format!("{}:\n\n{}{beyond}", question.in_words(), columns(&words::catalogue_rows(&units)));
+    let beyond = words::catalogue_beyond_linear(&units).map_or_else(String::new, |line| format!("\n{line}"));
+    let text = || {
+        let (legend, rows) = (words::LEGEND.join("\n"), words::catalogue_rows(&units));
+        format!("{}:\n\n{}\n\n{legend}{beyond}", question.in_words(), columns(&rows))
+    };
     session.show(|| words::catalogue_json(&units, &question), text);
     args.pictures.write(|| catalogue_page(&units, &question), session)?;
     if units.iter().any(|unit| !unit.not_stated.is_empty()) {
@@ -248,8 +254,7 @@ fn units_of(
         }
         let file = read::model(path, session)?;
         let model = read::at_rate(path, &file.model, asked.scenario.imu.rate_hz, session)?;
-        let not_stated = file.missing.iter().map(ToString::to_string).collect();
-        Ok(asked.unit(name, &file, model, not_stated))
+        Ok(asked.unit(name, &file, model))
     };
     paths.iter().map(unit).collect()
 }
@@ -257,6 +262,5 @@ fn units_of(
 fn of_sheet(name: String, sheet: &Datasheet, requirements: &Requirements) -> Result<CatalogueUnit, Failure> {
     let made = sheet.model_file(requirements.scenario.imu.rate_hz);
     let file = made.map_err(|e| Failure::input(format!("{name}: {e}")))?.file;
-    let model = file.model.clone();
-    Ok(requirements.unit(name, &file, model, sheet.not_stated()))
+    Ok(requirements.unit(name, &file, file.model.clone()))
 }

@@ -243,17 +243,11 @@ impl Requirements {
 
     /// A unit whose turn-on biases are there and expected; `model` is at the rate of the IMU.
     #[must_use]
-    pub(crate) fn unit(
-        &self,
-        name: String,
-        file: &ModelFile,
-        model: Model,
-        not_stated: Vec<String>,
-    ) -> CatalogueUnit {
+    pub(crate) fn unit(&self, name: String, file: &ModelFile, model: Model) -> CatalogueUnit {
         let mut scenario = self.scenario.clone();
         turn_on::expect(&mut scenario.initial, file);
         turn_on::make(&mut scenario.imu, file);
-        CatalogueUnit { name, model, scenario, not_stated }
+        CatalogueUnit { name, model, scenario, not_stated: file.not_stated() }
     }
 
     /// The model file of an IMU that is needed.

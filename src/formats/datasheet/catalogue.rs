@@ -6,7 +6,7 @@
 //! name = "STIM300"
 //! class = "tactical"                  # consumer, industrial, tactical, navigation
 //! assumptions = ["…"]
-//! [gyro]                              # noise, bias, corr_time, walk, turn_on, scale
+//! [gyro]                              # noise, bias, corr_time, walk, turn_on, offset, scale
 //! noise = { value = "0.15 deg/sqrt(h)", source = "document, revision, page; where it was read", quote = "…" }
 //! ```
 

@@ -14,8 +14,10 @@ pub enum Figure {
     CorrelationTime,
     /// Rate random walk.
     Walk,
-    /// Constant bias of a switching-on.
+    /// Constant bias of a switching-on: its repeatability from one to the next.
     TurnOn,
+    /// Initial tolerance of the zero offset, which is measured and removed before use.
+    Offset,
     /// Scale-factor error.
     Scale,
 }
@@ -62,8 +64,8 @@ const RATIO: Units = &[("ppm", 1.0), ("%", 1e4)];
 
 impl Figure {
     /// All of them.
-    pub(crate) const ALL: [Self; 6] =
-        [Self::Noise, Self::Bias, Self::CorrelationTime, Self::Walk, Self::TurnOn, Self::Scale];
+    pub(crate) const ALL: [Self; 7] =
+        [Self::Noise, Self::Bias, Self::CorrelationTime, Self::Walk, Self::TurnOn, Self::Offset, Self::Scale];
 
     /// The key in a catalogue entry.
     pub(crate) const fn key(self) -> &'static str {
@@ -73,6 +75,7 @@ impl Figure {
             Self::CorrelationTime => "corr_time",
             Self::Walk => "walk",
             Self::TurnOn => "turn_on",
+            Self::Offset => "offset",
             Self::Scale => "scale",
         }
     }
@@ -82,8 +85,8 @@ impl Figure {
         match (self, sensor) {
             (Self::Noise, Sensor::Accel) => ACCEL_NOISE,
             (Self::Noise, Sensor::Gyro) => GYRO_NOISE,
-            (Self::Bias | Self::TurnOn, Sensor::Accel) => ACCELERATION,
-            (Self::Bias | Self::TurnOn, Sensor::Gyro) => RATE,
+            (Self::Bias | Self::TurnOn | Self::Offset, Sensor::Accel) => ACCELERATION,
+            (Self::Bias | Self::TurnOn | Self::Offset, Sensor::Gyro) => RATE,
             (Self::Walk, Sensor::Accel) => ACCEL_WALK,
             (Self::Walk, Sensor::Gyro) => GYRO_WALK,
             (Self::CorrelationTime, _) => TIME,

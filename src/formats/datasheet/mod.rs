@@ -5,7 +5,8 @@
 //! | noise density N | white noise, sigma2 = N²·rate |
 //! | bias instability B, correlation time T | Gauss-Markov processes whose Allan deviation has the floor B |
 //! | rate random walk K | a random walk, gamma2 = K²/rate |
-//! | turn-on bias | `[turn_on]` of the model file, taken as a standard deviation |
+//! | turn-on bias (repeatability) | `[turn_on]` of the model file, taken as a standard deviation |
+//! | zero offset (initial tolerance) | said, not part of a noise model: measured and removed before use |
 //! | scale factor | said, not part of a noise model |
 //!
 //! **Bias instability.** Manufacturers read B off the lowest point of the Allan deviation (Sensonor's FAQ: "the
@@ -24,7 +25,7 @@ pub(crate) use catalogue::CATALOGUE;
 pub use catalogue::{catalogued, read};
 pub use figure::{Figure, Quantity, QuantityError};
 
-use crate::formats::model_file::{ModelFile, PROGRAM, SCHEMA, TurnOn};
+use crate::formats::model_file::{ModelFile, NOT_STATED, PROGRAM, SCHEMA, TurnOn};
 use crate::report::readable;
 use nav_sim_signal::imu::{Channel, Sensor};
 use nav_sim_signal::noise::{
@@ -76,14 +77,23 @@ impl Datasheet {
     /// A figure in SI (ppm for scale factors).
     #[must_use]
     pub fn value(&self, sensor: Sensor, figure: Figure) -> Option<f64> {
-        let entry = self.entries.iter().find(|e| e.sensor == sensor && e.figure == figure)?;
-        Some(entry.quantity.value)
+        Some(self.quantity(sensor, figure)?.value)
     }
 
-    /// The figures that a noise model needs and the datasheet does not state: the model has no such noise.
+    /// The same as it is given.
+    pub(crate) fn given(&self, sensor: Sensor, figure: Figure) -> Option<&str> {
+        Some(self.quantity(sensor, figure)?.given.as_str())
+    }
+
+    fn quantity(&self, sensor: Sensor, figure: Figure) -> Option<&Quantity> {
+        self.entries.iter().find(|e| e.sensor == sensor && e.figure == figure).map(|e| &e.quantity)
+    }
+
+    /// The figures that decide an outage and the datasheet does not state: the model has no such error.
     pub(crate) fn not_stated(&self) -> Vec<String> {
-        let figures = |sensor: Sensor| [Figure::Noise, Figure::Bias].map(|figure| (sensor, figure));
-        let needed = Sensor::ALL.into_iter().flat_map(figures);
+        // A tolerance of the zero offset stands for no turn-on bias: once removed, it says nothing of the next switching-on.
+        let figures = [Figure::Noise, Figure::Bias, Figure::TurnOn].into_iter();
+        let needed = figures.flat_map(|figure| Sensor::ALL.map(|sensor| (sensor, figure)));
         let lacking = needed.filter(|(sensor, figure)| self.value(*sensor, *figure).is_none());
         lacking.map(|(sensor, figure)| format!("{} {}", sensor.name(), figure.key())).collect()
     }
@@ -152,6 +162,10 @@ impl Datasheet {
         table.insert("assumptions".into(), assumptions.into());
         let figures: Vec<toml::Value> = self.entries.iter().map(|e| e.provenance().into()).collect();
         table.insert("figures".into(), figures.into());
+        let not_stated: Vec<toml::Value> = self.not_stated().into_iter().map(Into::into).collect();
+        if !not_stated.is_empty() {
+            table.insert(NOT_STATED.into(), not_stated.into());
+        }
         table
     }
 }
@@ -182,6 +196,9 @@ const fn became(figure: Figure) -> &'static str {
         Figure::CorrelationTime => "the longest correlation time T of these processes: beta = 1/T",
         Figure::Walk => "a random walk of this density: gamma2 = K² / rate_hz",
         Figure::TurnOn => "the standard deviation of a constant bias, alike on three axes",
+        Figure::Offset => {
+            "nothing: an initial tolerance, measured and removed before use; it says nothing of the next switching-on"
+        }
         Figure::Scale => {
             "nothing: a scale factor is not noise (run --scale-ppm, [imu] scale_ppm of a scenario)"
         }

@@ -129,6 +129,11 @@ fn the_catalogue_is_sound() {
         }
         for sensor in Sensor::ALL {
             assert!(sheet.value(sensor, Figure::Noise).is_some(), "{name}");
+            // one rule for all: what is removed before use is no turn-on bias, and the entry says so
+            if sheet.value(sensor, Figure::Offset).is_some() {
+                assert!(sheet.value(sensor, Figure::TurnOn).is_none(), "{name}");
+                assert!(sheet.assumptions.iter().any(|text| text.contains("removed before use")), "{name}");
+            }
         }
         let file = sheet.model_file(100.0).unwrap().file;
         assert!(file.missing.is_empty());

@@ -33,6 +33,8 @@ pub use write::write;
 use nav_sim_signal::imu::{Channel, Sensor};
 use nav_sim_signal::noise::{Model, Spread};
 
+/// Where the provenance of a model made from a data sheet names the figures that it lacks.
+pub(crate) const NOT_STATED: &str = "not_stated";
 /// What wrote a file, in its provenance.
 pub(crate) const PROGRAM: &str = concat!("nav-sim ", env!("CARGO_PKG_VERSION"));
 
@@ -64,6 +66,16 @@ impl ModelFile {
             format!("{shown} has no noise model for {channel}; it is taken as free of noise")
         };
         self.missing.iter().map(unsaid).collect()
+    }
+
+    /// What counts as none in it because its data sheet does not state it: figures, or axes without noise.
+    pub(crate) fn not_stated(&self) -> Vec<String> {
+        let figures = self.provenance.as_ref().and_then(|table| table.get(NOT_STATED)?.as_array());
+        let name = |figure: &toml::Value| figure.as_str().map(str::to_owned);
+        match figures {
+            Some(figures) => figures.iter().filter_map(name).collect(),
+            None => self.missing.iter().map(ToString::to_string).collect(),
+        }
     }
 
     /// A model of all six axes and nothing beside.

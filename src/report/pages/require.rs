@@ -3,8 +3,8 @@
 use super::sentence;
 use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, Table, Tone};
 use crate::report::require::{
-    Bridged, CURVE_S, GivenImu, NeededImu, Question, RankedUnit, catalogue_beyond_linear, catalogue_rows,
-    parts_in_words, what_decides,
+    Bridged, CURVE_S, GivenImu, LEGEND, NeededImu, Question, RankedUnit, catalogue_beyond_linear,
+    catalogue_rows, parts_in_words, what_decides,
 };
 use nav_sim_navigation::require::{Answer, IMU_PARAMETERS, ImuParameters, Margins, Quantity};
 
@@ -172,6 +172,7 @@ pub(crate) fn catalogue_page(units: &[RankedUnit], question: &Question) -> Page 
     }
     if units.iter().any(|unit| !unit.not_stated.is_empty()) {
         page.text("Figures that are not stated count as none: such a unit looks better than it is (open).");
+        page.text(&sentence(LEGEND.join(" ").trim_end_matches('.')));
     }
     page.heading("Errors");
     let mut table = Table::new(["unit"]).and(CURVE_S.iter().map(|s| format!("at {s} s")));

@@ -200,6 +200,21 @@ impl NeededImu {
     }
 }
 
+/// What a ranking takes for granted.
+pub(crate) const LEGEND: [&str; 2] = [
+    "not stated: of both sensors where none is named. Turn-on bias is the repeatability from one",
+    "switching-on to the next; an initial tolerance of the zero offset counts as removed before use.",
+];
+
+/// `bias, accel turn-on`: figures that both sensors lack are named once.
+pub(crate) fn stated_in_words(not_stated: &[String]) -> String {
+    let mut words = not_stated.join(", ").replace('_', "-");
+    for figure in ["noise", "bias", "turn-on"] {
+        words = words.replace(&format!("accel {figure}, gyro {figure}"), figure);
+    }
+    words
+}
+
 /// The units of a catalogue, the best first.
 pub(crate) fn catalogue_rows(units: &[RankedUnit]) -> Vec<Vec<String>> {
     let name = units.first().map_or("", |u| u.worst.limit.quantity.name());
@@ -218,7 +233,7 @@ pub(crate) fn catalogue_rows(units: &[RankedUnit]) -> Vec<Vec<String>> {
         };
         let mut row = vec![unit.name.clone(), met.to_owned(), unit.longest.in_short()];
         row.extend(unit.curve.iter().map(|x| x.map_or_else(|| "–".to_owned(), readable)));
-        row.push(unit.not_stated.join(", ").replace("accel bias, gyro bias", "both biases"));
+        row.push(stated_in_words(&unit.not_stated));
         row
     };
     std::iter::once(head).chain(units.iter().map(row)).collect()
