@@ -17,7 +17,8 @@ use std::path::{Path, PathBuf};
 /// Find the IMU that keeps the errors at the end of an outage within limits, or judge MODEL by them
 ///
 /// Uses linear covariance analysis, along TRAJECTORY with its fixes, of a filter that knows its IMU. Without MODEL it
-/// finds the white noise and bias instability that each sensor may have. With MODEL it says whether the limits are
+/// finds the white noise and bias instability that each sensor may have beside the turn-on biases of [imu] in --scenario
+/// (none without it). With MODEL it says whether the limits are
 /// kept (exit code 3: they are not), which part of the IMU decides, and the longest outage that it bridges.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
@@ -170,7 +171,7 @@ fn sought(args: &Args, requirements: &Requirements, session: &Session) -> Result
     session.show(|| needed.json(&question), text);
     let drawn = args.pictures.write(|| needed_page(&needed, &question), session);
     if let Some(out) = &args.out {
-        model_file::write(out, &requirements.model_file(&needed.imu, &question), session.existing())?;
+        model_file::write(out, &requirements.model_file(&needed, &question), session.existing())?;
         session.wrote(out);
     }
     drawn

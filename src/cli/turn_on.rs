@@ -11,12 +11,17 @@ use std::path::Path;
 
 /// Lets the filter expect the turn-on bias of its model; `--turn-on-bias` and `[initial]` win.
 pub(super) fn expect(initial: &mut InitialSettings, file: &ModelFile, path: &Path, session: &Session) {
-    say("the filter expects", &jobs::turn_on::expect(initial, file), path, session);
+    say(
+        "the filter expects",
+        &jobs::turn_on::expect(initial, &file.turn_on.unwrap_or_default()),
+        path,
+        session,
+    );
 }
 
 /// Gives the true IMU the turn-on bias of the model that makes its errors; `[imu]` wins, a 0 too.
 pub(super) fn make(imu: &mut ImuSettings, file: &ModelFile, path: &Path, session: &Session) {
-    say("the true IMU has", &jobs::turn_on::make(imu, file), path, session);
+    say("the true IMU has", &jobs::turn_on::make(imu, &file.turn_on.unwrap_or_default()), path, session);
 }
 
 fn say(who: &str, set: &[(Sensor, f64)], path: &Path, session: &Session) {

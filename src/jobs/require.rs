@@ -1,7 +1,7 @@
 //! Which IMU a limit on the errors after an outage needs, what a given one makes of it, and a ranking.
 
 use super::turn_on;
-use crate::formats::model_file::{ModelFile, PROGRAM};
+use crate::formats::model_file::{ModelFile, PROGRAM, TurnOn};
 use crate::report::BeyondLinear;
 use crate::report::require::{
     Bridged, CURVE_S, GivenImu, LONGEST_S, Longest, NeededImu, Question, RankedUnit,
@@ -17,6 +17,7 @@ use nav_sim_navigation::sensors::imu::Truth;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::ExperimentError;
 use nav_sim_navigation::trajectory::Trajectory;
+use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::Model;
 use rayon::prelude::*;
 
@@ -112,10 +113,11 @@ impl Requirements {
     ) -> Result<(NeededImu, Question), RequireError> {
         let outages = self.outages();
         let course = self.course(&outages)?;
-        let need = Need { course: &course, scenario: &self.scenario, limits: &self.limits, t_corr_s };
+        let scenario = &self.with_stated_turn_on();
+        let need = Need { course: &course, scenario, limits: &self.limits, t_corr_s };
         let (imu, shares) = need.allocated()?;
         let model = imu.model(self.scenario.imu.rate_hz);
-        let ends = course.drifts(&self.scenario, &model)?;
+        let ends = course.drifts(scenario, &model)?;
         let worst = Worst::of(&self.limits, &ends).expect("at least one limit and one place");
         let mut needed = NeededImu {
             imu,
@@ -124,7 +126,8 @@ impl Requirements {
             alone: [Answer::Any; IMU_PARAMETERS],
             others_better: [Answer::Any; IMU_PARAMETERS],
             iso_drift: None,
-            beyond_linear: self.beyond_linear(&self.scenario, &model, outages[worst.place])?,
+            turn_on: Sensor::ALL.map(|sensor| scenario.imu.turn_on_bias(sensor).unwrap_or(0.0)),
+            beyond_linear: self.beyond_linear(scenario, &model, outages[worst.place])?,
         };
         for i in 0..IMU_PARAMETERS {
             needed.alone[i] = need.quite_alone(&imu, i)?;
@@ -134,6 +137,18 @@ impl Requirements {
             needed.iso_drift = Some(need.iso_drift(&imu, POINTS)?);
         }
         Ok((needed, self.question(outages)))
+    }
+
+    /// The scenario with a filter that expects the turn-on biases that `[imu]` states, as it expects those of a model file.
+    fn with_stated_turn_on(&self) -> Scenario {
+        let mut scenario = self.scenario.clone();
+        turn_on::expect(&mut scenario.initial, &self.stated_turn_on());
+        scenario
+    }
+
+    fn stated_turn_on(&self) -> TurnOn {
+        let sigma = |sensor| self.scenario.imu.turn_on_bias(sensor).map(|sigma| [sigma; 3]);
+        TurnOn { accel_m_s2: sigma(Sensor::Accel), gyro_rad_s: sigma(Sensor::Gyro) }
     }
 
     /// What a model makes of the limits, and the longest outage that it bridges within them: at the places that the outage
@@ -245,24 +260,30 @@ impl Requirements {
     #[must_use]
     pub(crate) fn unit(&self, name: String, file: &ModelFile, model: Model) -> CatalogueUnit {
         let mut scenario = self.scenario.clone();
-        turn_on::expect(&mut scenario.initial, file);
-        turn_on::make(&mut scenario.imu, file);
+        let stated = file.turn_on.unwrap_or_default();
+        turn_on::expect(&mut scenario.initial, &stated);
+        turn_on::make(&mut scenario.imu, &stated);
         CatalogueUnit { name, model, scenario, not_stated: file.not_stated() }
     }
 
     /// The model file of an IMU that is needed.
     #[must_use]
-    pub(crate) fn model_file(&self, imu: &ImuParameters, question: &Question) -> ModelFile {
+    pub(crate) fn model_file(&self, needed: &NeededImu, question: &Question) -> ModelFile {
+        let imu = &needed.imu;
         let mut provenance = toml::Table::new();
         let mut put = |key: &str, value: toml::Value| provenance.insert(key.to_owned(), value);
         put("program", PROGRAM.into());
         put("made_by", "require".into());
         put("label", "what a limit needs: not a calibration".into());
         put("question", question.in_words().into());
+        put("turn_on_bias", needed.turn_on_in_words().into());
         for (i, name) in ImuParameters::NAMES.iter().enumerate() {
             put(name, ImuParameters::in_datasheets(i, imu.values[i]).into());
         }
-        ModelFile { provenance: Some(provenance), ..ModelFile::new(imu.model(self.scenario.imu.rate_hz)) }
+        let stated = self.stated_turn_on();
+        let turn_on = (stated != TurnOn::default()).then_some(stated);
+        let model = imu.model(self.scenario.imu.rate_hz);
+        ModelFile { provenance: Some(provenance), turn_on, ..ModelFile::new(model) }
     }
 
     /// The places of the outage; those of one second where the longest is sought.

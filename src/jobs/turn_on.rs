@@ -1,23 +1,24 @@
 //! The constant bias of a switching-on that a model file states, used where settings are silent.
 
-use crate::formats::model_file::ModelFile;
+use crate::formats::model_file::TurnOn;
 use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::sensors::defects::ImuSettings;
 use nav_sim_signal::imu::Sensor;
 
 /// Lets the filter expect the turn-on bias of its model; settings win. What was set.
-pub(crate) fn expect(initial: &mut InitialSettings, file: &ModelFile) -> Vec<(Sensor, f64)> {
-    set([&mut initial.accel_bias_sigma_m_s2, &mut initial.gyro_bias_sigma_rad_s], file)
+pub(crate) fn expect(initial: &mut InitialSettings, stated: &TurnOn) -> Vec<(Sensor, f64)> {
+    set([&mut initial.accel_bias_sigma_m_s2, &mut initial.gyro_bias_sigma_rad_s], stated)
 }
 
 /// Gives the true IMU the turn-on bias of the model that makes its errors; settings win, a 0 too. What was set.
-pub(crate) fn make(imu: &mut ImuSettings, file: &ModelFile) -> Vec<(Sensor, f64)> {
-    set([&mut imu.turn_on_bias_accel_m_s2, &mut imu.turn_on_bias_gyro_rad_s], file)
+pub(crate) fn make(imu: &mut ImuSettings, stated: &TurnOn) -> Vec<(Sensor, f64)> {
+    set([&mut imu.turn_on_bias_accel_m_s2, &mut imu.turn_on_bias_gyro_rad_s], stated)
 }
 
 /// Fills in the settings of both sensors that are not given.
-fn set(settings: [&mut Option<f64>; 2], file: &ModelFile) -> Vec<(Sensor, f64)> {
-    let mut set = stated(file);
+fn set(settings: [&mut Option<f64>; 2], stated: &TurnOn) -> Vec<(Sensor, f64)> {
+    let sigmas = Sensor::ALL.into_iter().filter_map(|sensor| Some((sensor, stated.sigma(sensor)?)));
+    let mut set: Vec<(Sensor, f64)> = sigmas.collect();
     let [accel, gyro] = settings;
     set.retain(|(sensor, sigma)| {
         let setting = if *sensor == Sensor::Accel { &mut *accel } else { &mut *gyro };
@@ -26,9 +27,4 @@ fn set(settings: [&mut Option<f64>; 2], file: &ModelFile) -> Vec<(Sensor, f64)> 
         is_open
     });
     set
-}
-
-fn stated(file: &ModelFile) -> Vec<(Sensor, f64)> {
-    let turn_on = file.turn_on.unwrap_or_default();
-    Sensor::ALL.into_iter().filter_map(|sensor| Some((sensor, turn_on.sigma(sensor)?))).collect()
 }

@@ -53,6 +53,32 @@ fn the_imu_that_is_named_meets_the_limit_and_a_tighter_one_not() {
     }
 }
 
+/// The turn-on biases that an answer takes for granted are said, and stand in the model file that is written: it keeps the
+/// limit by itself. An IMU that has them may have less noise.
+#[test]
+fn the_turn_on_biases_of_a_needed_imu_are_said_and_written() {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("biased.toml"), "[imu]\nturn_on_bias_accel_m_s2 = 0.02\n").unwrap();
+    let asked = ["--outage", "60:90", "--p95-m", "10"];
+    let needed = |more: &[&str], out: &str| {
+        let said = stdout(&require(dir.path(), &[&asked[..], &["-o", out], more].concat()).success());
+        (said, std::fs::read_to_string(dir.path().join(out)).unwrap())
+    };
+    let (said, file) = needed(&[], "needed.toml");
+    assert!(said.contains("an IMU without turn-on bias ([imu] of --scenario states one)"), "{said}");
+    assert!(file.contains("turn_on_bias = \"without turn-on bias") && !file.contains("[turn_on]"), "{file}");
+    let (said, file) = needed(&["--scenario", "biased.toml"], "biased_imu.toml");
+    assert!(said.contains("an IMU with turn-on biases of 0.0200 m/s² (accel) and 0 rad/s (gyro)"), "{said}");
+    assert!(file.contains("[turn_on]\naccel_m_s2 = 0.02"), "{file}");
+    let walk = |file: &str| -> f64 {
+        let provenance = file.parse::<toml::Table>().unwrap()["provenance"].clone();
+        provenance["velocity random walk (m/s/√h)"].as_float().unwrap()
+    };
+    let unbiased = std::fs::read_to_string(dir.path().join("needed.toml")).unwrap();
+    assert!(walk(&file) < walk(&unbiased), "{file}{unbiased}");
+    require(dir.path(), &[&["biased_imu.toml"], &asked[..]].concat()).success();
+}
+
 /// A limit that is missed where every fix comes is told so, with the error just before a fix. With a fix every two seconds
 /// that is what `run` finds at the end of an outage where every other fix of one a second is withheld.
 #[test]

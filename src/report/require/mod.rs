@@ -30,6 +30,8 @@ pub(crate) struct NeededImu {
     pub others_better: [Answer; IMU_PARAMETERS],
     /// The curve of equal drift.
     pub iso_drift: Option<IsoDrift>,
+    /// Turn-on biases that it has: accelerometer (m/s²), gyroscope (rad/s).
+    pub turn_on: [f64; 2],
     /// Where the answer is beyond linear theory.
     pub beyond_linear: Option<BeyondLinear>,
 }
@@ -135,13 +137,23 @@ fn answer_json(which: usize, found: &Answer) -> Value {
 }
 
 impl NeededImu {
+    /// The turn-on biases that the answer takes for granted.
+    pub(crate) fn turn_on_in_words(&self) -> String {
+        if self.turn_on == [0.0; 2] {
+            return "without turn-on bias ([imu] of --scenario states one)".to_owned();
+        }
+        let [accel, gyro] = self.turn_on.map(readable);
+        format!("with turn-on biases of {accel} m/s² (accel) and {gyro} rad/s (gyro)")
+    }
+
     /// What is needed, in a sentence.
     pub(crate) fn verdict(&self, question: &Question) -> String {
         let (from_s, to_s) = self.imu.floor_s();
         format!(
-            "needed for {}: an IMU as allocated below (bias instability: the floor of the Allan deviation, here from {} s \
+            "needed for {}: an IMU {}, as allocated below (bias instability: the floor of the Allan deviation, here from {} s \
              to {} s); with it {}; GNSS and the start take {} of the variance there{}",
             question.in_words(),
+            self.turn_on_in_words(),
             readable(from_s),
             readable(to_s),
             question.worst(&self.worst),
@@ -191,6 +203,7 @@ impl NeededImu {
             "schema_version": 1,
             "question": question.json(),
             "t_corr_s": self.imu.t_corr_s,
+            "turn_on_bias": { "accel_m_s2": self.turn_on[0], "gyro_rad_s": self.turn_on[1] },
             "figures": (0..IMU_PARAMETERS).map(figure).collect::<Vec<_>>(),
             "share_of_gnss_and_start": self.shares[IMU_PARAMETERS],
             "place": self.worst.place,
