@@ -55,11 +55,11 @@ impl Longest {
         match self {
             Self::Seconds(s) => at_least_a_second(s),
             Self::AtLeast(s) if s < LONGEST_S => {
-                format!("at least {} s, which is as long as this trajectory allows", seconds(s))
+                format!("at least {} s, from the earliest start to the end of the trajectory", seconds(s))
             }
             Self::AtLeast(s) => format!("at least {} s; longer ones are not looked at", seconds(s)),
             Self::Never(worst) => format!(
-                "none; even without an outage {} is {} just before a fix, {} of the limit",
+                "none; even without an outage {} is {} just before a fix, {} times the limit",
                 worst.limit.quantity.name(),
                 readable(worst.value),
                 readable(worst.value / worst.limit.most)
@@ -105,13 +105,18 @@ impl GivenImu {
             Some(margins) => {
                 let times = readable(margins.worst.value / margins.worst.limit.most);
                 let word = if margins.met() { "met" } else { "NOT met" };
+                let starts = if question.outages.len() > 1 { "from the same starts" } else { "from there on" };
                 format!(
-                    "{word}: {}; {}, {times} of the limit; longest outage within the limits: {longest}",
+                    "{word}: {}; {}, {times} times the limit; longest outage within the limits, {starts}: {longest}",
                     question.in_words(),
                     question.worst(&margins.worst)
                 )
             }
-            None => format!("longest outage within the limits ({}): {longest}", question.limits_in_words()),
+            None => format!(
+                "longest outage within the limits ({}), {}: {longest}",
+                question.limits_in_words(),
+                question.starts()
+            ),
         };
         answer + &BeyondLinear::line(self.beyond_linear.as_ref())
     }

@@ -79,20 +79,22 @@ pub(crate) struct Question {
 }
 
 impl Question {
-    /// `p95_m ≤ 5 after an outage of 60 s (from 300 s on)`, `(the worst of 541 places, beginning from 300 to 840 s)`
+    /// `p95_m ≤ 5 after an outage of 60 s (from 300 s on)`, `(the worst of 541 starts tried, 300 to 840 s)`
     pub(crate) fn in_words(&self) -> String {
         let first = self.outages[0];
-        let places = match self.outages.as_slice() {
-            [.., last] if last.start_s > first.start_s => format!(
-                "the worst of {} places, beginning from {} to {} s",
-                self.outages.len(),
-                seconds(first.start_s),
-                seconds(last.start_s)
-            ),
-            _ => format!("from {} s on", seconds(first.start_s)),
-        };
+        let worst = if self.outages.len() > 1 { "the worst of " } else { "" };
         let length = seconds(first.end_s - first.start_s);
-        format!("{} after an outage of {length} s ({places})", self.limits_in_words())
+        format!("{} after an outage of {length} s ({worst}{})", self.limits_in_words(), self.starts())
+    }
+
+    /// Where the outage was tried: `541 starts tried, 300 to 840 s`, or `from 300 s on`.
+    fn starts(&self) -> String {
+        let [first, last] = [self.outages.first(), self.outages.last()].map(|o| o.map_or(0.0, |o| o.start_s));
+        if last > first {
+            format!("{} starts tried, {} to {} s", self.outages.len(), seconds(first), seconds(last))
+        } else {
+            format!("from {} s on", seconds(first))
+        }
     }
 
     fn limits_in_words(&self) -> String {
