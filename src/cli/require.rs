@@ -10,7 +10,7 @@ use crate::jobs::{Ask, CatalogueUnit, Misplaced, Requirements};
 use crate::report::require as words;
 use crate::report::require::RankedUnit;
 use crate::report::{catalogue_page, columns, markdown_table, model_page, needed_page};
-use nav_sim_navigation::require::{Limit, Quantity, RequireError};
+use nav_sim_navigation::require::{Limit, Quantity, RequireError, Worst};
 use nav_sim_navigation::sensors::outage::NotAnOutage;
 use std::path::{Path, PathBuf};
 
@@ -48,7 +48,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
     /// Longest correlation time of the biases of the required IMU (s)
-    #[arg(long, value_name = "SECONDS", value_parser = parse::positive, default_value = "300", conflicts_with = "model")]
+    #[arg(long, value_name = "SECONDS", value_parser = parse_corr_time, default_value = "300", conflicts_with = "model")]
     corr_time_s: f64,
     /// Also print a curve of equal drift: eight gyroscope biases, and the velocity random walk that each allows
     #[arg(long, conflicts_with = "model")]
@@ -106,6 +106,15 @@ impl Limits {
         }
         Ok(limits)
     }
+}
+
+/// Beyond, the bias has more processes a factor of 16 apart than a filter has states for.
+const LONGEST_CORR_TIME_S: f64 = 1e9;
+
+fn parse_corr_time(text: &str) -> Result<f64, String> {
+    let is_within = |s: &f64| *s <= LONGEST_CORR_TIME_S;
+    let s = parse::positive(text)?;
+    Some(s).filter(is_within).ok_or_else(|| format!("more than {LONGEST_CORR_TIME_S:e} s"))
 }
 
 fn parse_ask(text: &str) -> Result<Ask, String> {
@@ -193,10 +202,9 @@ fn given(path: &Path, args: &Args, requirements: &Requirements, session: &Sessio
     session.show(|| judged.json(), || judged.text());
     args.pictures.write(|| model_page(&judged), session)?;
     let Some(margins) = judged.margins.filter(|margins| !margins.met()) else { return Ok(()) };
-    let worst = margins.worst;
-    let (name, most) = (worst.limit.quantity.name(), worst.limit.most);
-    let unit = worst.limit.quantity.unit();
-    Err(Failure::bound(format!("{name} is {:.3} {unit}, the limit is {most} {unit}", worst.value)))
+    let Worst { limit, value, .. } = margins.worst;
+    let [value, most] = [value, limit.most].map(|x| limit.quantity.shown(x));
+    Err(Failure::bound(format!("{} is {value}, the limit is {most}", limit.quantity.name())))
 }
 
 /// The units of the catalogue or of a directory, the best first.
@@ -242,6 +250,10 @@ fn units_of(
     asked: &Requirements,
     session: &Session,
 ) -> Result<Vec<CatalogueUnit>, Failure> {
+    if !directory.exists() {
+        let message = format!("--catalogue {}: there is no such directory", directory.display());
+        return Err(Failure::input(message).hint("without a directory, --catalogue ranks the catalogued IMUs"));
+    }
     let mut paths = read::listed(&[directory.to_owned()])?;
     paths.retain(|p| p.extension().is_some_and(|e| e == "toml"));
     if paths.is_empty() {

@@ -55,6 +55,7 @@ fn a_unit_that_is_missing_or_wrong_is_refused_with_those_that_fit() {
     refused("--arw 10deg/h", &["--arw", "has the unit deg/h, which does not fit", "deg/sqrt(h)"]);
     refused("--corr-time 300ms", &["--corr-time", "units that fit: s, min, h"]);
     refused("--vrw=-1ug/sqrt(Hz)", &["--vrw", "does not begin with a number > 0"]);
+    refused("--vrw=1e300m/s/sqrt(h)", &["--vrw", "is more than 1e12 in SI units"]);
     refused("", &["no figure is given that makes a noise model", "--unit NAME"]);
     refused("--gyro-scale 300ppm", &["no figure is given that makes a noise model"]);
     refused("--unit stim30", &["the catalogue has no such unit", "did you mean stim300?"]);

@@ -353,13 +353,15 @@ fn requests_that_mean_nothing_are_refused() {
     let window = ["--outage", "60:90", "--start", "70", "--p95-m", "5"];
     refused(&window, ["--start 70 beside --outage 60:90", "a length alone"]);
     refused(&["--outage", "1e5", "--p95-m", "5"], ["is not on the trajectory", "a shorter --outage"]);
-    refused(&["--outage", "60:90", "--p95-m", "0.01"], ["no IMU keeps p95_m ≤ 0.01", "a larger limit"]);
+    refused(&["--outage", "60:90", "--p95-m", "0.01"], ["no IMU keeps p95_m ≤ 0.01 m", "a larger limit"]);
+    let long = ["--outage", "60:90", "--p95-m", "5", "--corr-time-s", "1e12"];
+    refused(&long, ["--corr-time-s", "more than 1e9 s"]);
+    let nowhere = ["--outage", "60:90", "--p95-m", "5", "--catalogue", "nowhere"];
+    refused(&nowhere, ["--catalogue nowhere: there is no such directory", "hint"]);
     // the poorest IMU keeps them: to look further made a noise without a finite variance, and a panic
-    for loose in ["1e6", "1e9"] {
-        refused(
-            &["--outage", "60:90", "--p95-m", loose],
-            ["no IMU is too poor for p95_m ≤ 1", "a smaller limit"],
-        );
+    for (loose, shown) in [("1e6", "1.00e6 m:"), ("1e300", "1.00e300 m:")] {
+        let said = format!("no IMU is too poor for p95_m ≤ {shown}");
+        refused(&["--outage", "60:90", "--p95-m", loose], [&said, "a smaller limit"]);
     }
     let model = format!("{ROOT}/calib_data/tactical.toml");
     refused(&[&model, "--outage", "30", "--p95-m", "5", "-o", "x.toml"], ["cannot be used with", "--out"]);

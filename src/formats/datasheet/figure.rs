@@ -95,6 +95,9 @@ impl Figure {
     }
 }
 
+/// The largest figure (SI, ppm for scale factors).
+const MOST: f64 = 1e12;
+
 /// A figure as given, and what it is in SI (ppm for scale factors).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantity {
@@ -113,6 +116,9 @@ pub enum QuantityError {
         /// One that would do.
         example: String,
     },
+    /// More than any sensor has: its square, times a rate, is to stay a variance.
+    #[error("is more than {MOST:e} in SI units, which no sensor has")]
+    TooLarge,
     /// A number alone.
     #[error("has no unit; units that fit: {fitting}")]
     NoUnit {
@@ -148,6 +154,7 @@ impl Quantity {
             return Err(QuantityError::NoUnit { fitting: fitting() });
         }
         match units.iter().find(|(name, _)| plain(name) == plain(unit)) {
+            Some((_, factor)) if number * factor > MOST => Err(QuantityError::TooLarge),
             Some((_, factor)) => Ok(Self { given: given.to_owned(), value: number * factor }),
             None => Err(QuantityError::Unit { unit: unit.to_owned(), fitting: fitting() }),
         }
@@ -244,6 +251,7 @@ mod tests {
         let refused = |text| parse(Sensor::Gyro, Figure::Bias, text).unwrap_err();
         assert_eq!(refused("10"), format!("has no unit; {fitting}"));
         assert_eq!(refused("10 ug"), format!("has the unit ug, which does not fit; {fitting}"));
+        assert_eq!(refused("1e300 deg/s"), "is more than 1e12 in SI units, which no sensor has");
         for text in ["", "deg/h", "-1 deg/h", "0 deg/h", "1e999 deg/h", "nan deg/h", "1.2.3 deg/h"] {
             assert_eq!(refused(text), "does not begin with a number > 0, such as 0.1 deg/h", "{text}");
         }

@@ -141,6 +141,9 @@ fn read_processes(table: &Section<'_>, channel: Channel, file: &mut ModelFile) -
     Ok(())
 }
 
+/// What is made of larger parameters, such as the sum of a random walk's variances, may be no number any more.
+const LARGEST: f64 = 1e30;
+
 fn read_process(section: &Section<'_>, rate_hz: f64) -> Result<Process, FileError> {
     let code = section.require_str("type")?;
     let Some(kind) = Kind::named(code) else {
@@ -157,6 +160,10 @@ fn read_process(section: &Section<'_>, rate_hz: f64) -> Result<Process, FileErro
         ["type"].iter().chain(&names).copied().chain(ci.iter().map(String::as_str)).collect();
     section.only(&legal)?;
     let values = names.iter().map(|n| section.require_f64(n)).collect::<Result<Vec<_>, _>>()?;
+    if let Some((name, _)) = names.iter().zip(&values).find(|(_, value)| value.abs() > LARGEST) {
+        let reason = format!("is more than {LARGEST:e}, which no sensor has");
+        return Err(section.refuse(name, reason, None));
+    }
     let process = kind.process(&values, rate_hz).expect("as many values as the kind has parameters");
     process.map_err(|e| refuse_parameter(section, &e))
 }

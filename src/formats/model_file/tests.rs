@@ -130,6 +130,10 @@ fn wrong_values_are_refused_with_line_key_and_value() {
          a variance is never negative; 0 switches the process off"
     );
     assert_eq!(
+        process_refusal("type = \"RW\", gamma2 = 1e150"),
+        "m.toml, line 4: \"accel.processes[1].gamma2\" = 1e150 is more than 1e30, which no sensor has | "
+    );
+    assert_eq!(
         process_refusal("type = \"QN\", q2 = nan"),
         "m.toml, line 4: \"accel.processes[1].q2\" = nan is not a finite number | a number such as 1.5e-4; neither nan nor inf"
     );

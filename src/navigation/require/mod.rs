@@ -49,6 +49,17 @@ impl Quantity {
             Self::Angle(_) => "deg",
         }
     }
+
+    /// A value with its unit, to a thousandth; a larger one, or a smaller, in powers of ten.
+    #[must_use]
+    pub fn shown(self, value: f64) -> String {
+        let rounded = (value * 1e3).round() / 1e3;
+        if (1e-3..1e6).contains(&value) {
+            format!("{rounded} {}", self.unit())
+        } else {
+            format!("{value:.2e} {}", self.unit())
+        }
+    }
 }
 
 /// A quantity and the most it may be.
@@ -100,7 +111,7 @@ impl Worst {
 #[derive(Debug, thiserror::Error)]
 pub enum RequireError {
     /// Not even an IMU without errors keeps a limit.
-    #[error("no IMU keeps {} ≤ {}: without any noise of it, the error is {value:.3} {}, from GNSS, the start and what else the scenario has", .limit.quantity.name(), .limit.most, .limit.quantity.unit())]
+    #[error("no IMU keeps {} ≤ {}: without any noise of it, the error is {}, from GNSS, the start and what else the scenario has", limit.quantity.name(), limit.quantity.shown(limit.most), limit.quantity.shown(*value))]
     Floor {
         /// The limit.
         limit: Limit,
@@ -108,7 +119,7 @@ pub enum RequireError {
         value: f64,
     },
     /// The poorest IMU that is sought keeps every limit.
-    #[error("no IMU is too poor for {} ≤ {}: any that is sought keeps it; with the poorest of the search the error is {value:.3} {} ({})", .limit.quantity.name(), .limit.most, .limit.quantity.unit(), .poorest.in_words())]
+    #[error("no IMU is too poor for {} ≤ {}: any that is sought keeps it; with the poorest of the search the error is {} ({})", limit.quantity.name(), limit.quantity.shown(limit.most), limit.quantity.shown(*value), poorest.in_words())]
     Loose {
         /// The hardest limit.
         limit: Limit,
