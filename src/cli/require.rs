@@ -9,7 +9,7 @@ use crate::formats::scenario_file;
 use crate::jobs::{Ask, CatalogueUnit, Misplaced, Requirements};
 use crate::report::require as words;
 use crate::report::require::RankedUnit;
-use crate::report::{catalogue_page, columns, markdown_table, model_page, needed_page};
+use crate::report::{catalogue_page, columns, model_page, needed_page};
 use nav_sim_navigation::require::{Limit, Quantity, RequireError, Worst};
 use nav_sim_navigation::sensors::outage::NotAnOutage;
 use std::path::{Path, PathBuf};
@@ -173,11 +173,7 @@ fn sought(args: &Args, requirements: &Requirements, session: &Session) -> Result
         };
         Failure::input(e).hint(hint)
     })?;
-    let text = || {
-        let tables: Vec<String> = needed.tables().iter().map(|t| markdown_table(t)).collect();
-        format!("{}\n\n{}", needed.verdict(&question), tables.join("\n\n"))
-    };
-    session.show(|| needed.json(&question), text);
+    session.show(|| needed.json(&question), || needed.text(&question));
     let drawn = args.pictures.write(|| needed_page(&needed, &question), session);
     if let Some(out) = &args.out {
         model_file::write(out, &requirements.model_file(&needed, &question), session.existing())?;
@@ -221,7 +217,7 @@ fn ranked(
     let (units, question) = requirements.ranked(&units).map_err(Failure::input)?;
     let beyond = words::catalogue_beyond_linear(&units).map_or_else(String::new, |line| format!("\n{line}"));
     let text = || {
-        let (legend, rows) = (words::LEGEND.join("\n"), words::catalogue_rows(&units));
+        let (legend, rows) = (words::legend(&question), words::catalogue_rows(&units));
         format!("{}:\n\n{}\n\n{legend}{beyond}", question.in_words(), columns(&rows))
     };
     session.show(|| words::catalogue_json(&units, &question), text);
@@ -252,7 +248,9 @@ fn units_of(
 ) -> Result<Vec<CatalogueUnit>, Failure> {
     if !directory.exists() {
         let message = format!("--catalogue {}: there is no such directory", directory.display());
-        return Err(Failure::input(message).hint("without a directory, --catalogue ranks the catalogued IMUs"));
+        return Err(
+            Failure::input(message).hint("without a directory, --catalogue ranks the catalogued IMUs")
+        );
     }
     let mut paths = read::listed(&[directory.to_owned()])?;
     paths.retain(|p| p.extension().is_some_and(|e| e == "toml"));

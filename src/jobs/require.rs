@@ -228,7 +228,7 @@ impl Requirements {
             name: unit.name.clone(),
             not_stated: unit.not_stated.clone(),
             worst,
-            curve: CURVE_S.map(|s| worst_after(&curves, s, worst.limit.quantity)),
+            curve: CURVE_S.map(|s| worst_after(&curves, s, self.limits[0].quantity)),
             longest: self.longest_of(course, (&unit.scenario, &unit.model), &curves)?,
             beyond_linear: self.beyond_linear(&unit.scenario, &unit.model, self.outages()[worst.place])?,
         })

@@ -90,7 +90,10 @@ fn a_limit_that_no_fix_keeps_is_told_with_the_error_without_an_outage() {
     let model = format!("{ROOT}/calib_data/tactical.toml");
     let asked = [&model, "--scenario", "rare.toml", "--outage", "62:92", "--p95-m", "0.5"];
     let said = stdout(&require(dir.path(), &asked).code(3));
-    assert!(said.contains("within the limits, from there on: none; even without an outage p95_m is "), "{said}");
+    assert!(
+        said.contains("within the limits, from there on: none; even without an outage p95_m is "),
+        "{said}"
+    );
     let judged = stdout(&require(dir.path(), &[&asked[..], &["--format", "json"]].concat()));
     let judged: Value = serde_json::from_str(&judged).unwrap();
     let drive = format!("{ROOT}/trajectories/figure_eight.toml");
@@ -227,6 +230,25 @@ fn a_directory_of_models_is_ranked() {
     assert!(none.contains("  open ") && !none.contains("  met "), "{none}");
 }
 
+/// Curves of a ranking are of one quantity, that of the first limit, whichever limit is the hardest for a unit.
+#[test]
+fn the_curves_of_a_ranking_are_of_one_quantity() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = "tactical.toml";
+    std::fs::create_dir(dir.path().join("units")).unwrap();
+    std::fs::copy(format!("{ROOT}/calib_data/{file}"), dir.path().join("units").join(file)).unwrap();
+    let ranked = |limits: &[&str]| -> Value {
+        let asked = ["--outage", "60:90", "--catalogue", "units", "--format", "json"];
+        serde_json::from_str(&stdout(&require(dir.path(), &[&asked[..], limits].concat()))).unwrap()
+    };
+    let (alone, both) = (ranked(&["--p95-m", "100"]), ranked(&["--p95-m", "100", "--yaw-deg", "0.01"]));
+    assert_eq!(
+        (&both["curve_quantity"], &both["units"][0]["quantity"]),
+        (&"p95_m".into(), &"yaw_deg".into())
+    );
+    assert_eq!(alone["units"][0]["curve"], both["units"][0]["curve"]);
+}
+
 /// A catalogue entry of hardly any noise, with more figures of accelerometer and gyroscope.
 fn entry_with([accel, gyro]: [&str; 2]) -> String {
     format!(
@@ -332,12 +354,28 @@ fn the_catalogue_is_ranked_without_a_directory() {
     let rows =
         shown.lines().filter(|l| ["  met  ", "  open  ", "not met"].iter().any(|word| l.contains(word)));
     assert_eq!(rows.count(), 17, "{shown}");
+    assert!(shown.contains("1 s … 300 s: horizontal error, 95 % quantile (m), after an outage"), "{shown}");
     assert!(
         shown.contains("an initial tolerance of the zero offset counts as removed before use"),
         "{shown}"
     );
     assert!(shown.find("stim300").unwrap() < shown.find("mpu6050").unwrap(), "{shown}");
     assert!(shown.lines().all(|line| line.chars().count() <= 100), "{shown}");
+}
+
+/// The curve of equal drift says what it holds beside.
+#[test]
+fn the_curve_of_equal_drift_names_the_figures_it_keeps() {
+    let dir = tempfile::tempdir().unwrap();
+    let asked = ["--outage", "60:90", "--p95-m", "10", "--iso-drift"];
+    let shown = stdout(&require(dir.path(), &asked).success());
+    let allocated = |figure: &str| {
+        let row = shown.lines().find(|line| line.starts_with(&format!("| {figure}"))).unwrap();
+        row.split('|').nth(2).unwrap().trim().to_owned()
+    };
+    let [bias, walk] = ["accelerometer bias instability (µg)", "angle random walk (deg/√h)"]
+        .map(|figure| format!("{figure} {}", allocated(figure)));
+    assert!(shown.contains(&format!("equal drift beside {bias} and {walk}, as allocated:")), "{shown}");
 }
 
 #[test]

@@ -102,6 +102,12 @@ impl ImuParameters {
         (0..IMU_PARAMETERS).map(figure).collect::<Vec<_>>().join(", ")
     }
 
+    /// As good as without noise.
+    pub(super) fn perfect(t_corr_s: f64) -> Self {
+        // 1e-5 of a consumer IMU, not zero: intensities are sought as logarithms.
+        Self { values: START, t_corr_s }.times([NONE; IMU_PARAMETERS])
+    }
+
     fn times(&self, factors: [f64; IMU_PARAMETERS]) -> Self {
         Self { values: std::array::from_fn(|i| self.values[i] * factors[i]), ..*self }
     }
@@ -145,8 +151,7 @@ impl Need<'_> {
     /// When not even a perfect IMU meets them, or the poorest that is sought does.
     pub fn allocated(&self) -> Result<(ImuParameters, [f64; IMU_PARAMETERS + 1]), RequireError> {
         let start = ImuParameters { values: START, t_corr_s: self.t_corr_s };
-        // 1e-5 of a consumer IMU, not zero: intensities are sought as logarithms.
-        let perfect = self.worst(&start.times([NONE; IMU_PARAMETERS]))?;
+        let perfect = self.worst(&ImuParameters::perfect(self.t_corr_s))?;
         if perfect.margin() <= RESERVE {
             return Err(RequireError::Floor { limit: perfect.limit, value: perfect.value });
         }

@@ -1,6 +1,6 @@
 //! By how much a given IMU keeps a limit or misses it, and what decides.
 
-use super::{Course, Limit, Worst};
+use super::{Course, ImuParameters, Limit, Worst};
 use crate::ekf::BeliefError;
 use crate::imu::{Channel, Sensor};
 use crate::noise::{Kind, Model};
@@ -143,6 +143,8 @@ pub struct Margins {
     pub parts: Vec<PartMargin>,
 }
 
+/// Correlation time of the biases of an IMU that has next to none (s): any would do.
+const SLOW_S: f64 = 300.0;
 /// How far a factor is sought, as a logarithm.
 const RANGE: f64 = 9.0;
 
@@ -178,10 +180,11 @@ impl Margins {
             }
             parts.push(PartMargin { part, share: square / total, factor });
         }
-        // Not zero: a filter that knows no uncertainty has no inverse. Squared, 1e-4 of the deviations leave 1e-8.
-        let without = |imu, part: Part| part.multiplied(&imu, (-RANGE).exp());
-        let (scenario, model) = Part::ALL.into_iter().fold(given, without);
-        Ok(Self { worst, without_imu: course.worst(&scenario, &model, limits)?, parts })
+        let without = |imu, part: Part| part.multiplied(&imu, 0.0);
+        let beside_noise = [Part::TurnOn(Sensor::Accel), Part::TurnOn(Sensor::Gyro), Part::Scale];
+        let (scenario, _) = beside_noise.into_iter().fold(given, without);
+        let perfect = ImuParameters::perfect(SLOW_S).model(model.rate_hz);
+        Ok(Self { worst, without_imu: course.worst(&scenario, &perfect, limits)?, parts })
     }
 
     /// Whether the limits are kept.

@@ -3,8 +3,8 @@
 use super::sentence;
 use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, Table, Tone};
 use crate::report::require::{
-    Bridged, CURVE_S, GivenImu, LEGEND, NeededImu, Question, RankedUnit, catalogue_beyond_linear,
-    catalogue_rows, parts_in_words, what_decides,
+    Bridged, CURVE_S, GivenImu, NeededImu, Question, RULE, RankedUnit, catalogue_beyond_linear,
+    catalogue_rows, parts_in_words, quantity_in_words, what_decides,
 };
 use nav_sim_navigation::require::{Answer, IMU_PARAMETERS, ImuParameters, Margins, Quantity};
 
@@ -24,6 +24,7 @@ pub(crate) fn needed_page(needed: &NeededImu, question: &Question) -> Page {
     page.chart(&shares(needed), "Parts of the variance at the limit, with the allocated figures.");
     if let Some(curve) = &needed.iso_drift {
         page.section("Equal drift");
+        page.text(&sentence(&needed.iso_drift_in_words()));
         page.chart(&iso_drift(&curve.points), ISO_DRIFT);
         page.table(&iso_table(&curve.points));
     }
@@ -120,7 +121,7 @@ pub(crate) fn model_page(judged: &GivenImu) -> Page {
 }
 
 fn drift_table(question: &Question, bridged: &Bridged) -> Table {
-    let names = question.limits.iter().map(|l| label(l.quantity).to_owned());
+    let names = question.limits.iter().map(|l| quantity_in_words(l.quantity).to_owned());
     let mut table = Table::new(["outage (s)"]).and(names);
     for (k, length_s) in CURVE_S.iter().enumerate() {
         let cell = |(i, curve): (usize, &[Option<f64>; CURVE_S.len()])| {
@@ -159,9 +160,7 @@ pub(crate) fn catalogue_page(units: &[RankedUnit], question: &Question) -> Page 
     };
     let mut page = Page::new("IMUs against a limit", Tone::from(!met.is_empty()), &verdict);
     page.section("Error against the length of an outage");
-    if let Some(first) = units.first() {
-        page.chart(&drift_chart(first.worst.limit.quantity, unit_curves(units)), DRIFT);
-    }
+    page.chart(&drift_chart(question.curve_of(), unit_curves(units, question)), DRIFT);
     page.section("Ranking");
     let mut rows = catalogue_rows(units);
     // the errors are in the table below, with all their sources
@@ -172,10 +171,10 @@ pub(crate) fn catalogue_page(units: &[RankedUnit], question: &Question) -> Page 
     }
     if units.iter().any(|unit| !unit.not_stated.is_empty()) {
         page.text("Figures that are not stated count as none: such a unit looks better than it is (open).");
-        page.text(&sentence(LEGEND.join(" ").trim_end_matches('.')));
+        page.text(&sentence(RULE.join(" ").trim_end_matches('.')));
     }
-    page.heading("Errors");
-    let mut table = Table::new(["unit"]).and(CURVE_S.iter().map(|s| format!("at {s} s")));
+    page.heading(&format!("Error after an outage: {}", quantity_in_words(question.curve_of())));
+    let mut table = Table::new(["unit"]).and(CURVE_S.iter().map(|s| format!("after {s} s")));
     for (i, unit) in units.iter().enumerate() {
         let cell = |(k, x): (usize, &Option<f64>)| value(*x, &format!("/units/{i}/curve/{k}/value"));
         table.row(std::iter::once(unit.name.clone().into()).chain(unit.curve.iter().enumerate().map(cell)));
@@ -188,8 +187,8 @@ pub(crate) fn catalogue_page(units: &[RankedUnit], question: &Question) -> Page 
 /// Units beyond so many are drawn grey: more hues cannot be told apart.
 const COLOURED: usize = 6;
 
-fn unit_curves(units: &[RankedUnit]) -> Vec<Series> {
-    let limit = Series::new("limit", Colour::Ink, Mark::Level(units[0].worst.limit.most));
+fn unit_curves(units: &[RankedUnit], question: &Question) -> Vec<Series> {
+    let limit = Series::new("limit", Colour::Ink, Mark::Level(question.limits[0].most));
     let curve = |(k, unit): (usize, &RankedUnit)| {
         if k < COLOURED {
             Series::line(&unit.name, Colour::Hue(k), points(&unit.curve))
@@ -205,7 +204,7 @@ fn unit_curves(units: &[RankedUnit]) -> Vec<Series> {
 }
 
 fn drift_chart(quantity: Quantity, series: Vec<Series>) -> Chart {
-    let panel = Panel { height: 1.3, ..Panel::new(Axis::log(label(quantity)), series) };
+    let panel = Panel { height: 1.3, ..Panel::new(Axis::log(quantity_in_words(quantity)), series) };
     Chart::new("Drift without fixes", Axis::log("length of the outage (s)"), vec![panel])
 }
 
@@ -215,15 +214,4 @@ fn points(curve: &[Option<f64>; CURVE_S.len()]) -> Vec<(f64, f64)> {
 
 fn value(x: Option<f64>, source: &str) -> Cell {
     x.map_or_else(|| Cell::figures("–"), |x| Cell::number(x, source))
-}
-
-const fn label(quantity: Quantity) -> &'static str {
-    match quantity {
-        Quantity::P50 => "horizontal error, median (m)",
-        Quantity::P95 => "horizontal error, 95 % quantile (m)",
-        Quantity::Rmse => "horizontal error, RMSE (m)",
-        Quantity::Angle(0) => "roll, RMSE (°)",
-        Quantity::Angle(1) => "pitch, RMSE (°)",
-        Quantity::Angle(_) => "yaw, RMSE (°)",
-    }
 }

@@ -105,7 +105,8 @@ impl GivenImu {
             Some(margins) => {
                 let times = readable(margins.worst.value / margins.worst.limit.most);
                 let word = if margins.met() { "met" } else { "NOT met" };
-                let starts = if question.outages.len() > 1 { "from the same starts" } else { "from there on" };
+                let starts =
+                    if question.outages.len() > 1 { "from the same starts" } else { "from there on" };
                 format!(
                     "{word}: {}; {}, {times} times the limit; longest outage within the limits, {starts}: {longest}",
                     question.in_words(),
@@ -127,7 +128,7 @@ impl GivenImu {
             Some(margins) => {
                 let (table, decides) =
                     (markdown_table(&margins_rows(margins)), what_decides(margins, &self.question));
-                format!("{}\n\n{table}\n{decides}", self.verdict())
+                format!("{}\n\n{table}\n\n{decides}", self.verdict())
             }
             None => self.verdict(),
         }
@@ -161,7 +162,9 @@ impl GivenImu {
             answer["parts"] = margins.parts.iter().map(part).collect();
             answer["binding"] = json!(margins.binding().map(|p| p.part.name()));
             answer["share_of_imu"] = json!(margins.share_of_imu());
-            answer["without_imu_errors"] = json!(margins.without_imu.value);
+            let without = &margins.without_imu;
+            answer["without_imu_errors"] =
+                json!({ "quantity": without.limit.quantity.name(), "value": without.value });
         }
         crate::report::json(&answer)
     }

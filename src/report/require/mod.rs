@@ -5,8 +5,9 @@ mod given;
 pub(crate) use given::{Bridged, GivenImu, Longest, parts_in_words, what_decides};
 
 use super::beyond_linear::{BeyondLinear, BeyondLinearPlaces, OF_A_FIGURE};
+use super::markdown_table;
 use super::number::{percent, readable, seconds, window};
-use nav_sim_navigation::require::{Answer, IMU_PARAMETERS, ImuParameters, IsoDrift, Limit, Worst};
+use nav_sim_navigation::require::{Answer, IMU_PARAMETERS, ImuParameters, IsoDrift, Limit, Quantity, Worst};
 use nav_sim_navigation::sensors::outage::Outage;
 use serde_json::{Value, json};
 
@@ -49,7 +50,7 @@ pub(crate) struct RankedUnit {
     pub not_stated: Vec<String>,
     /// The hardest limit for the outage asked for.
     pub worst: Worst,
-    /// The quantity of that limit, at its worst place, after [`CURVE_S`]; none where the trajectory is too short.
+    /// The quantity of the first limit, at its worst place, after [`CURVE_S`]; none where the trajectory is too short.
     pub curve: [Option<f64>; CURVE_S.len()],
     /// The longest outage within the limits.
     pub longest: Longest,
@@ -97,6 +98,11 @@ impl Question {
         }
     }
 
+    /// The quantity that curves of units show: one for all, that of the first limit.
+    pub(crate) fn curve_of(&self) -> Quantity {
+        self.limits[0].quantity
+    }
+
     fn limits_in_words(&self) -> String {
         let limit = |l: &Limit| format!("{} ≤ {}", l.quantity.name(), readable(l.most));
         self.limits.iter().map(limit).collect::<Vec<_>>().join(", ")
@@ -119,6 +125,18 @@ impl Question {
             readable(worst.value),
             window(outage.start_s, outage.end_s)
         )
+    }
+}
+
+/// A quantity and its unit, for axes and heads.
+pub(crate) const fn quantity_in_words(quantity: Quantity) -> &'static str {
+    match quantity {
+        Quantity::P50 => "horizontal error, median (m)",
+        Quantity::P95 => "horizontal error, 95 % quantile (m)",
+        Quantity::Rmse => "horizontal error, RMSE (m)",
+        Quantity::Angle(0) => "roll, RMSE (°)",
+        Quantity::Angle(1) => "pitch, RMSE (°)",
+        Quantity::Angle(_) => "yaw, RMSE (°)",
     }
 }
 
@@ -164,8 +182,8 @@ impl NeededImu {
         )
     }
 
-    /// The figures, and the curve of equal drift if it was asked for.
-    pub(crate) fn tables(&self) -> Vec<Vec<Vec<String>>> {
+    /// The verdict, the figures, and the curve of equal drift if it was asked for.
+    pub(crate) fn text(&self, question: &Question) -> String {
         let head = ["figure, at most", "allocated", "share", "if alone", "others 10 × better"];
         let mut rows = vec![head.map(str::to_owned).to_vec()];
         for i in 0..IMU_PARAMETERS {
@@ -177,14 +195,23 @@ impl NeededImu {
                 answer(i, &self.others_better[i]),
             ]);
         }
-        let mut tables = vec![rows];
+        let mut text = format!("{}\n\n{}", self.verdict(question), markdown_table(&rows));
         if let Some(curve) = &self.iso_drift {
             let mut rows = vec![vec![ImuParameters::NAMES[3].to_owned(), ImuParameters::NAMES[0].to_owned()]];
             let row = |(bias, walk): &(f64, Answer)| vec![answer(3, &Answer::AtMost(*bias)), answer(0, walk)];
             rows.extend(curve.points.iter().map(row));
-            tables.push(rows);
+            text += &format!("\n\n{}:\n\n{}", self.iso_drift_in_words(), markdown_table(&rows));
         }
-        tables
+        text
+    }
+
+    /// Where the curve of equal drift holds.
+    pub(crate) fn iso_drift_in_words(&self) -> String {
+        let beside = |i: usize| {
+            let value = readable(ImuParameters::in_datasheets(i, self.imu.values[i]));
+            format!("{} {value}", ImuParameters::NAMES[i])
+        };
+        format!("equal drift beside {} and {}, as allocated", beside(1), beside(2))
     }
 
     /// All of it.
@@ -215,8 +242,18 @@ impl NeededImu {
     }
 }
 
+/// What the columns of a ranking hold.
+pub(crate) fn legend(question: &Question) -> String {
+    let (of, to_s) = (quantity_in_words(question.curve_of()), CURVE_S[CURVE_S.len() - 1]);
+    let first = format!("1 s … {to_s} s: {of}, after an outage of so long.");
+    format!(
+        "{first}\nbridges: the longest outage within the limits, from the same starts.\n{}",
+        RULE.join("\n")
+    )
+}
+
 /// What a ranking takes for granted.
-pub(crate) const LEGEND: [&str; 2] = [
+pub(crate) const RULE: [&str; 2] = [
     "not stated: of both sensors where none is named. Turn-on bias is the repeatability from one",
     "switching-on to the next; an initial tolerance of the zero offset counts as removed before use.",
 ];
@@ -232,13 +269,9 @@ pub(crate) fn stated_in_words(not_stated: &[String]) -> String {
 
 /// The units of a catalogue, the best first.
 pub(crate) fn catalogue_rows(units: &[RankedUnit]) -> Vec<Vec<String>> {
-    let name = units.first().map_or("", |u| u.worst.limit.quantity.name());
     // a line of a terminal has room for short heads only
     let mut head = vec!["unit".to_owned(), "limit".to_owned(), "bridges".to_owned()];
-    head.extend(CURVE_S.iter().enumerate().map(|(k, s)| match k {
-        0 => format!("{name} {s} s"),
-        _ => format!("{s} s"),
-    }));
+    head.extend(CURVE_S.iter().map(|s| format!("{s} s")));
     head.push("not stated".to_owned());
     let row = |unit: &RankedUnit| {
         let met = match (unit.is_met(), unit.is_within()) {
@@ -281,6 +314,7 @@ pub(crate) fn catalogue_json(units: &[RankedUnit], question: &Question) -> Strin
     super::json(&json!({
         "schema_version": 1,
         "question": question.json(),
+        "curve_quantity": question.curve_of().name(),
         "units": units.iter().map(unit).collect::<Vec<_>>(),
     }))
 }
