@@ -202,6 +202,7 @@ impl Drive {
         let task = Task {
             model,
             truths: &truths,
+            drawn: None,
             track: &self.track,
             full: &full,
             // a reduced filter is made so that it is as honest as the full one

@@ -5,8 +5,9 @@ use super::parse::one_of;
 use super::pictures::{PageArgs, claim_output};
 use super::run::{OutageArg, checked_scenario, parse_outage, placed};
 use super::{Failure, Session, read, turn_on};
+use crate::formats::draws_file::{self, Draws};
 use crate::formats::model_file::{self, ModelFile};
-use crate::jobs::{self, TuneInputs};
+use crate::jobs::{self, Truths, TuneInputs};
 use crate::report::{Input, markdown_table, tune_page};
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::scenario::Scenario;
@@ -35,7 +36,8 @@ pub(crate) struct Args {
     /// Noise models that may make the errors, such as those of single recordings
     #[arg(long = "truth", value_name = "MODEL2", num_args = 1..)]
     truths: Vec<PathBuf>,
-    /// Take as truths MODEL itself, with its parameters at the ends of their 95 % intervals
+    /// Take as truths MODEL itself and the draws of its calibration (MODEL.draws.json, which `calibrate` writes beside it):
+    /// what counts of an error is the upper end of the 95 % interval that `run` states
     #[arg(long, conflicts_with = "truths")]
     intervals: bool,
     /// Trajectory: motion profile (.toml) or table (.csv) [default: a built-in drive with outages of that length]
@@ -82,7 +84,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let file = read::model(&args.model, session)?;
     let model = read::at_rate(&args.model, &file.model, scenario.imu.rate_hz, session)?;
     turn_on::expect(&mut scenario.initial, &file, &args.model, session);
-    let truths = truths(args, &file, &scenario, session)?;
+    let truths = truths(args, (&file, &model), &scenario, session)?;
     let (track, outages) = track(args, &scenario, &model, session)?;
     let result = jobs::tune(&TuneInputs {
         scenario: &scenario,
@@ -114,7 +116,7 @@ fn refuse_recordings(args: &Args) -> Result<(), Failure> {
     if args.truths.is_empty() && !args.intervals {
         return Err(Failure::input("no truth to be consistent with: neither --truth nor --intervals is given").hint(
             "give models of what may be true (--truth OTHER.toml, one for each recording or day), or --intervals \
-             for a MODEL that `nav-sim calibrate` wrote with intervals",
+             for a MODEL that `nav-sim calibrate` wrote with its draws beside it",
         ));
     }
     let is_samples =
@@ -127,43 +129,47 @@ fn refuse_recordings(args: &Args) -> Result<(), Failure> {
 }
 
 fn files(args: &Args) -> Result<Vec<Input>, Failure> {
+    let draws = draws_file::beside(&args.model);
     let mut named = vec![("model", &args.model)];
+    named.extend((args.intervals && draws.exists()).then_some(("draws", &draws)));
     named.extend(args.truths.iter().map(|p| ("truth", p)));
     named.extend(args.trajectory.iter().map(|p| ("trajectory", p)));
     named.extend(args.scenario.iter().map(|p| ("scenario", p)));
     named.iter().map(|(role, path)| read::input(role, path)).collect()
 }
 
-/// What may be true, by name, at the rate of the IMU: noise, turn-on bias, and what the scenario states of the true
-/// IMU and receiver.
+/// What may be true, at the rate of the IMU: noise, turn-on bias, and what the scenario states of the true IMU and
+/// receiver.
 fn truths(
     args: &Args,
-    file: &ModelFile,
+    (file, model): (&ModelFile, &Model),
     scenario: &Scenario,
     session: &Session,
-) -> Result<(Vec<String>, Vec<TrueErrors>), Failure> {
-    let true_errors = |path: &Path, name: &str, model: &Model, turned_on: &ModelFile| {
-        let model = read::at_rate(Path::new(name), model, scenario.imu.rate_hz, session)?;
+) -> Result<Truths, Failure> {
+    let true_errors = |path: &Path, model: Model, turned_on: &ModelFile| {
         let (mut imu, gnss) = (scenario.imu.clone(), scenario.gnss.clone());
         turn_on::make(&mut imu, turned_on, path, session);
-        Ok::<_, Failure>((name.to_owned(), TrueErrors { model, imu, gnss }))
+        TrueErrors { model, imu, gnss }
     };
-    let named = if args.intervals {
-        let extremes = file.extremes().ok_or_else(|| {
-            Failure::input(format!("{}: no parameter has an interval", args.model.display()))
-                .hint("`nav-sim calibrate` writes them beside the parameters (unless --bootstrap 0)")
-        })?;
-        let all = extremes.iter().map(|(name, model)| true_errors(&args.model, name, model, file));
-        all.collect::<Result<Vec<_>, _>>()?
+    let truths = if args.intervals {
+        let draws = draws(&args.model, file, scenario.imu.rate_hz)?;
+        let estimate = true_errors(&args.model, model.clone(), file);
+        let names = vec![format!("{} and the {} draws beside it", args.model.display(), draws.models.len())];
+        let drawn = draws.models.into_iter().map(|model| TrueErrors { model, ..estimate.clone() });
+        let errors = std::iter::once(estimate.clone()).chain(drawn).collect();
+        Truths { names, errors, stretch: Some(draws.stretch) }
     } else {
         let truth = |path: &PathBuf| {
             let file = read::model(path, session)?;
-            true_errors(path, &path.display().to_string(), &file.model, &file)
+            let model = read::at_rate(path, &file.model, scenario.imu.rate_hz, session)?;
+            Ok::<_, Failure>((path.display().to_string(), true_errors(path, model, &file)))
         };
-        args.truths.iter().map(truth).collect::<Result<Vec<_>, _>>()?
+        let named = args.truths.iter().map(truth).collect::<Result<Vec<_>, _>>()?;
+        let (names, errors) = named.into_iter().unzip();
+        Truths { names, errors, stretch: None }
     };
     let mut doubts = Vec::new();
-    for (_, truth) in &named {
+    for truth in &truths.errors {
         for doubt in (Scenario { imu: truth.imu.clone(), ..scenario.clone() }).doubts() {
             if !doubts.contains(&doubt) {
                 doubts.push(doubt);
@@ -171,7 +177,20 @@ fn truths(
         }
     }
     session.warn_all(&doubts);
-    Ok(named.into_iter().unzip())
+    Ok(truths)
+}
+
+/// The draws beside a model file; what the intervals in the file itself leave out is how its parameters hang together.
+fn draws(path: &Path, file: &ModelFile, rate_hz: f64) -> Result<Draws, Failure> {
+    let missing =
+        || format!("{}: the draws of its calibration are missing", draws_file::beside(path).display());
+    let found = draws_file::usable(path, &file.model, rate_hz).and_then(|draws| draws.ok_or_else(missing));
+    found.map_err(|doubt| {
+        Failure::input(doubt).hint(
+            "--intervals takes them for true: calibrate again, and leave the file where `nav-sim calibrate` writes it, beside \
+             MODEL (none with --bootstrap 0)",
+        )
+    })
 }
 
 /// The way of the analysis with its outages.

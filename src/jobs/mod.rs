@@ -65,5 +65,5 @@ pub use remarks::{Remark, Remarks, Silence};
 pub(crate) use require::{Ask, CatalogueUnit, Misplaced, Requirements};
 pub(crate) use start_files::{StartFiles, write_start_files};
 pub use synthesize::Synthesis;
-pub(crate) use tune::{TuneInputs, tune, tuned};
+pub(crate) use tune::{Truths, TuneInputs, tune, tuned};
 pub(crate) use wavelet::{Intervals, WaveletOptions, wavelet_variances};

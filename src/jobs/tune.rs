@@ -2,11 +2,14 @@
 
 use crate::formats::model_file::{ModelFile, PROGRAM};
 use crate::report::{FactorEntry, Input, TuneResult};
+use nav_sim_calibration::derived_interval;
 use nav_sim_navigation::ekf::{BeliefError, FilterStates};
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::defects::ImuSettings;
 use nav_sim_navigation::sensors::outage::Outage;
-use nav_sim_navigation::simulation::lincov::{Aim, Factor, Honesty, Per, Task, Track, TrueErrors, scaled};
+use nav_sim_navigation::simulation::lincov::{
+    Aim, Factor, Honesty, Margins, Per, Task, Track, TrueErrors, UpperEnd, scaled,
+};
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::Model;
 
@@ -16,8 +19,8 @@ pub(crate) struct TuneInputs<'a> {
     pub scenario: &'a Scenario,
     /// The model to be tuned.
     pub model: &'a Model,
-    /// What may be true, by name.
-    pub truths: (Vec<String>, Vec<TrueErrors>),
+    /// What may be true.
+    pub truths: Truths,
     /// The way of the analysis.
     pub track: &'a Track,
     /// Its outages.
@@ -32,12 +35,29 @@ pub(crate) struct TuneInputs<'a> {
     pub allow_smaller: bool,
 }
 
+/// What may be true of an IMU: some models, or one and the draws of its calibration.
+pub(crate) struct Truths {
+    /// The names of the models; of draws one for all.
+    pub names: Vec<String>,
+    /// What they are; the model first, where the others are its draws.
+    pub errors: Vec<TrueErrors>,
+    /// Of draws, what distances from their median are multiplied by.
+    pub stretch: Option<f64>,
+}
+
 /// The factors, and the filter before and after them.
 ///
 /// # Errors
 /// When a model has no filter.
 pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
-    let TuneInputs { model, truths: (names, truths), track, outages, states, per, aim, .. } = inputs;
+    let TuneInputs { model, truths, track, outages, states, per, aim, .. } = inputs;
+    // Draws are many: within 1.2e-3 the analysis is the same with one step from fix to fix, which `run` takes for them too.
+    let merged = truths.stretch.map(|_| track.merged());
+    let judged = merged.as_ref().unwrap_or(track);
+    // The interval that `run` states for an error: the filter and its standard deviation are the same in all draws.
+    let upper_end =
+        |stretch| move |estimate: f64, draws: Vec<f64>| derived_interval(estimate, draws, stretch)[1];
+    let upper_end = truths.stretch.map(upper_end);
     let full = inputs.scenario.with_full_noise();
     let mut reduced = inputs.scenario.clone();
     if !reduced.filter.states.is_reduced() {
@@ -48,8 +68,9 @@ pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
     let reduced = |model: &Model| reduced.belief(model, outages, track);
     let task = Task {
         model,
-        truths,
-        track,
+        truths: &truths.errors,
+        drawn: upper_end.as_ref().map(|end| end as &UpperEnd<'_>),
+        track: judged,
         full: &full,
         filter: if states.is_reduced() { &reduced } else { &full },
         per: *per,
@@ -58,17 +79,19 @@ pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
     };
     let factors = task.factors()?;
     let ones: Vec<Factor> = factors.iter().map(|f| Factor { on_variance: 1.0, ..f.clone() }).collect();
+    let (after, margins) = task.judged(task.filter, &factors)?;
     Ok(TuneResult {
         filter: if states.is_reduced() { filter_of_run } else { *states },
         filter_of_run,
         before: task.honesty(task.filter, &ones)?,
-        after: task.honesty(task.filter, &factors)?,
+        after,
         reduced: task.honesty(&reduced, &factors)?,
         informed: task
             .informed(|truth| knowing(inputs.scenario, &truth.imu).belief(&truth.model, outages, track))?,
-        sweep: sweep(&task, &factors)?,
+        sweep: sweep(&task, &factors, margins.as_ref())?,
         factors,
-        truths: names.clone(),
+        truths: truths.names.clone(),
+        is_drawn: truths.stretch.is_some(),
     })
 }
 
@@ -88,13 +111,17 @@ fn knowing(scenario: &Scenario, imu: &ImuSettings) -> Scenario {
     knowing
 }
 
-/// The tuned filter with all its variances times 1/16, 1/8, … 16.
-fn sweep(task: &Task<'_>, factors: &[Factor]) -> Result<Vec<(f64, Honesty)>, BeliefError> {
+/// The tuned filter with all its variances times 1/16, 1/8, … 16; what draws add is as for the tuned one.
+fn sweep(
+    task: &Task<'_>,
+    factors: &[Factor],
+    margins: Option<&Margins>,
+) -> Result<Vec<(f64, Honesty)>, BeliefError> {
     let times = |power: i32| {
         let on_variances = f64::from(power).exp2();
         let scaled = |f: &Factor| Factor { on_variance: f.on_variance * on_variances, ..f.clone() };
         let factors: Vec<Factor> = factors.iter().map(scaled).collect();
-        Ok((on_variances, task.honesty(task.filter, &factors)?))
+        Ok((on_variances, task.honesty_with(task.filter, &factors, margins)?))
     };
     (-4..=4).map(times).collect()
 }

@@ -29,14 +29,17 @@ pub(crate) struct TuneResult {
     pub informed: Honesty,
     /// The tuned filter with all its variances times a factor: how sharp the answer is.
     pub sweep: Vec<(f64, Honesty)>,
-    /// Names of the truths.
+    /// Names of the truths; of draws one for all.
     pub truths: Vec<String>,
+    /// Whether the truths are the draws of a calibration, and what counts is the upper end of an interval.
+    pub is_drawn: bool,
 }
 
 impl TuneResult {
     /// The verdict: how honest the filter was, with which factors it is, and what that costs.
     pub(crate) fn verdict(&self) -> String {
-        let before = format!("the {} is {}", filter_name(self.filter), judged(&self.before));
+        let scope = if self.is_drawn { "within what the calibration leaves open (95 %), " } else { "" };
+        let before = format!("{scope}the {} is {}", filter_name(self.filter), judged(&self.before));
         if self.factors.iter().all(|f| (f.on_variance - 1.0).abs() < RIGHT) {
             return match excess(&self.before) {
                 Excess::Underconfident => {
@@ -93,19 +96,20 @@ impl TuneResult {
 
     /// A row for each filter under a head.
     pub(crate) fn rows(&self) -> Vec<Vec<String>> {
-        let mut head = vec!["filter".to_owned(), "NEES (9)".to_owned(), "largest RMSE/sigma".to_owned()];
+        let largest = if self.is_drawn { "largest RMSE/sigma, 95 %" } else { "largest RMSE/sigma" };
+        let mut head = vec!["filter".to_owned(), "NEES (9)".to_owned(), largest.to_owned()];
         head.extend(self.before.end_s.iter().map(|t| format!("horizontal RMSE at {} s (m)", seconds(*t))));
         let several = self.truths.len() > 1;
         let row = |(name, h): (&str, &Honesty)| {
-            let mut largest = format!("{} in {}", readable(h.ratio), REPORTED_NAMES[h.state]);
-            match h.outage {
+            let mut largest = format!("{} in {}", readable(h.largest.ratio), REPORTED_NAMES[h.largest.state]);
+            match h.largest.outage {
                 Some(outage) if h.end_s.len() > 1 => {
                     largest += &format!(" at {} s", seconds(h.end_s[outage]))
                 }
                 _ => largest += over_run(h),
             }
             if several {
-                largest += &format!(", {}", self.truths[h.truth]);
+                largest += &format!(", {}", self.truths[h.largest.truth]);
             }
             let mut row = vec![name.to_owned(), readable(h.nees), largest];
             row.extend(h.horizontal_m().map(readable));
@@ -129,9 +133,9 @@ impl TuneResult {
         let filter = |(name, h): (&'static str, &Honesty)| FilterEntry {
             filter: name,
             nees: h.nees,
-            largest_ratio: h.ratio,
-            state: REPORTED_NAMES[h.state],
-            truth: self.truths[h.truth].clone(),
+            largest_ratio: h.largest.ratio,
+            state: REPORTED_NAMES[h.largest.state],
+            truth: self.truths[if self.is_drawn { 0 } else { h.largest.truth }].clone(),
             outage_end: h
                 .end_s
                 .iter()
@@ -146,7 +150,7 @@ impl TuneResult {
         let swept = |(on_variances, h): &(f64, Honesty)| SweepEntry {
             on_variances: *on_variances,
             nees: h.nees,
-            largest_ratio: h.ratio,
+            largest_ratio: h.largest.ratio,
             horizontal_rmse_cost: self.cost_of(h),
         };
         super::json(&TuneFile {
@@ -169,9 +173,9 @@ enum Excess {
 
 fn excess(h: &Honesty) -> Excess {
     let nees = h.nees / 9.0 - 1.0;
-    if h.ratio > 1.0 + RIGHT || nees > RIGHT {
+    if h.largest.ratio > 1.0 + RIGHT || nees > RIGHT {
         Excess::Overconfident
-    } else if nees < -RIGHT || h.ratio < 1.0 - RIGHT {
+    } else if nees < -RIGHT || h.largest.ratio < 1.0 - RIGHT {
         Excess::Underconfident
     } else {
         Excess::None
@@ -183,11 +187,11 @@ fn judged(h: &Honesty) -> String {
     let nees = readable(h.nees);
     match excess(h) {
         Excess::None => format!("honest (NEES {nees}, 9 is right)"),
-        Excess::Overconfident if h.ratio > 1.0 + RIGHT => {
+        Excess::Overconfident if h.largest.ratio > 1.0 + RIGHT => {
             format!(
                 "overconfident by {} in {}{} (NEES {nees}, 9 is right)",
-                readable(h.ratio),
-                REPORTED_NAMES[h.state],
+                readable(h.largest.ratio),
+                REPORTED_NAMES[h.largest.state],
                 over_run(h)
             )
         }
@@ -198,7 +202,7 @@ fn judged(h: &Honesty) -> String {
 
 /// Where the largest ratio is, if not at the end of an outage.
 const fn over_run(h: &Honesty) -> &'static str {
-    if h.outage.is_none() && !h.end_s.is_empty() { " over the run" } else { "" }
+    if h.largest.outage.is_none() && !h.end_s.is_empty() { " over the run" } else { "" }
 }
 
 /// `filter of 15 states`
@@ -208,7 +212,7 @@ fn filter_name(states: FilterStates) -> String {
 
 /// No error larger than stated, in any state or all together.
 fn is_honest(h: &Honesty) -> bool {
-    h.ratio <= 1.0 + RIGHT && h.nees <= 9.0 * (1.0 + RIGHT)
+    h.largest.ratio <= 1.0 + RIGHT && h.nees <= 9.0 * (1.0 + RIGHT)
 }
 
 /// The tuned filter: `it is honest (NEES 7.9)`
@@ -218,10 +222,10 @@ fn judged_after(h: &Honesty) -> String {
     if is_honest(h) {
         return format!("it is honest: no error{place} larger than stated (NEES {nees})");
     }
-    if h.ratio <= 1.0 + RIGHT {
+    if h.largest.ratio <= 1.0 + RIGHT {
         return format!("no error{place} is larger than stated, but the NEES is {nees} where 9 is right");
     }
-    let (ratio, state) = (readable(h.ratio), REPORTED_NAMES[h.state]);
+    let (ratio, state) = (readable(h.largest.ratio), REPORTED_NAMES[h.largest.state]);
     format!("the NEES is {nees}, {state} still overconfident by {ratio}{}", over_run(h))
 }
 
@@ -304,11 +308,12 @@ struct EndEntry {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use nav_sim_navigation::simulation::lincov::Departure;
     use nav_sim_signal::imu::Sensor;
 
     fn honesty(ratio: f64, nees: f64) -> Honesty {
         let (end_s, rmse_end) = (vec![90.0], vec![[1.0; 9]]);
-        Honesty { nees, ratio, state: 8, outage: Some(0), truth: 0, end_s, rmse_end }
+        Honesty { nees, largest: Departure { ratio, state: 8, outage: Some(0), truth: 0 }, end_s, rmse_end }
     }
 
     fn result(filter: FilterStates, reduced: Honesty) -> TuneResult {
@@ -321,6 +326,7 @@ mod tests {
             reduced,
             informed: honesty(1.0, 9.0),
             truths: vec!["truth.toml".to_owned()],
+            is_drawn: false,
             sweep: Vec::new(),
         }
     }

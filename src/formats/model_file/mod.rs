@@ -18,7 +18,6 @@
 //! [`ModelFile::missing`].
 
 mod calibrated;
-mod extremes;
 mod read;
 mod schema;
 mod write;

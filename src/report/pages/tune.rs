@@ -58,7 +58,7 @@ fn sweep(result: &TuneResult) -> Chart {
         ),
         Panel::new(
             Axis::log("largest RMSE/σ"),
-            vec![right(1.0), Series::line("tuned × factor", Colour::REAL, curve(&|h| h.ratio))],
+            vec![right(1.0), Series::line("tuned × factor", Colour::REAL, curve(&|h| h.largest.ratio))],
         ),
     ];
     if !result.after.end_s.is_empty() {
@@ -78,8 +78,8 @@ fn filters(result: &TuneResult) -> Table {
         let mut row = vec![
             name.into(),
             number(h.nees, "nees".to_owned()),
-            number(h.ratio, "largest_ratio".to_owned()),
-            STATES[h.state].into(),
+            number(h.largest.ratio, "largest_ratio".to_owned()),
+            STATES[h.largest.state].into(),
         ];
         let ends = h.horizontal_m().enumerate();
         row.extend(ends.map(|(k, rmse)| number(rmse, format!("outage_end/{k}/horizontal_rmse_m"))));

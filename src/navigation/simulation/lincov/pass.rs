@@ -69,18 +69,7 @@ impl Assessment {
 /// the same drift is in every run, [`super::TruthSide`] adds the errors instead of their variances.
 #[must_use]
 pub fn assess(track: &Track, belief: &Belief, truth: &Model) -> Assessment {
-    assess_side(track, belief, &TruthSide::as_expected(belief, truth, !track.perfect))
-}
-
-/// The same where settings state more of the true errors than a noise model.
-pub(super) fn assess_stated(track: &Track, belief: &Belief, truth: &TrueErrors) -> Assessment {
-    assess_side(track, belief, &TruthSide::as_stated(belief, truth, !track.perfect))
-}
-
-fn assess_side(track: &Track, belief: &Belief, truth: &TruthSide) -> Assessment {
-    let law = FilterPass::new(track, belief).errors(truth);
-    let consistency = |all: &[Judged]| all.iter().map(Judged::consistency).collect();
-    Assessment { reports: consistency(&law.reports), outage_ends: consistency(&law.outage_ends) }
+    FilterPass::new(track, belief).assess_side(&TruthSide::as_expected(belief, truth, !track.perfect))
 }
 
 /// The law of a filter's true errors at one instant: normal, with this mean and covariance, in the filter's navigation states
@@ -187,6 +176,17 @@ impl<'a> FilterPass<'a> {
             std::array::from_fn(|i| within().map(|(_, sigma)| sigma[i]).sum::<f64>() / count)
         };
         outages.iter().map(mean).collect()
+    }
+
+    /// As [`assess`], of the filter's own belief, where settings state more of the true errors than a noise model.
+    pub(super) fn assess_stated(&self, belief: &Belief, truth: &TrueErrors) -> Assessment {
+        self.assess_side(&TruthSide::as_stated(belief, truth, !self.track.perfect))
+    }
+
+    fn assess_side(&self, truth: &TruthSide) -> Assessment {
+        let law = self.errors(truth);
+        let consistency = |all: &[Judged]| all.iter().map(Judged::consistency).collect();
+        Assessment { reports: consistency(&law.reports), outage_ends: consistency(&law.outage_ends) }
     }
 
     /// The true errors of the filter.

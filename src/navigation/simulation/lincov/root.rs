@@ -36,6 +36,10 @@ impl Crossing {
                 return Ok(near);
             }
             far = (next, value(next)?);
+            // Zero may be where the function ends and not where it crosses.
+            if far.1.abs() <= self.exact {
+                return Ok(far);
+            }
             step *= 2.0;
         }
         for _ in 0..TRIALS {
@@ -71,6 +75,8 @@ mod tests {
             assert!((found(start, falling) + std::f64::consts::LN_2).abs() < 1e-8);
         }
         assert_eq!((found(0.0, |x| 9.0 - x), found(0.0, |x| -9.0 - x)), (5.0, -5.0));
+        // it comes close to zero from above and never crosses
+        assert!(found(0.0, |x| (-20.0 * x).exp()) < 2.0);
         // a step: the bracket closes on it
         assert!((found(0.0, |x| if x < 1.25 { 1.0 } else { -1.0 }) - 1.25).abs() < 0.1);
     }

@@ -6,7 +6,8 @@
 //! on all of them makes the filter exactly honest.
 
 use super::descent::Descent;
-use super::pass::{Assessment, assess_stated};
+use super::honesty::{Honesty, Margins, UpperEnd};
+use super::pass::{Assessment, FilterPass};
 use super::reduce::divergence;
 use super::root::Crossing;
 use super::track::Track;
@@ -50,6 +51,9 @@ pub struct Task<'a> {
     pub model: &'a Model,
     /// What may make the errors; at least one.
     pub truths: &'a [TrueErrors],
+    /// Where the truths but the first are draws of what is not known of it: the upper end of an interval, which counts in the
+    /// place of the worst truth.
+    pub drawn: Option<&'a UpperEnd<'a>>,
     /// The trajectory with its fixes and outages.
     pub track: &'a Track,
     /// The filter with a state for each process, for which the factors are found.
@@ -83,26 +87,6 @@ impl Factor {
     }
 }
 
-/// How honest a filter is over several truths.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Honesty {
-    /// Expected NEES, mean over time and truths; 9 is right.
-    pub nees: f64,
-    /// Largest true RMSE over stated standard deviation at an outage's end and over the whole run (without outages: at any
-    /// time).
-    pub ratio: f64,
-    /// The reported state with that ratio.
-    pub state: usize,
-    /// The outage at whose end it is, counted from 0; none: over the whole run.
-    pub outage: Option<usize>,
-    /// The truth in which it is, counted from 0.
-    pub truth: usize,
-    /// When the outages end (s from the start).
-    pub end_s: Vec<f64>,
-    /// True RMSE of the reported states at these ends, root mean square over the truths.
-    pub rmse_end: Vec<[f64; REPORTED]>,
-}
-
 /// Largest logarithm of a factor.
 const MAX_LN: f64 = 12.0;
 const ITERATIONS: usize = 60;
@@ -116,6 +100,8 @@ const RIDGE: f64 = 2e-5;
 const OVERCONFIDENT: f64 = 200.0;
 /// A filter whose measure of honesty is this close to 1 is honest.
 const TOLERANCE: f64 = 0.005;
+/// How often at most what draws add is found anew.
+const ROUNDS: usize = 5;
 /// How close the last factor brings it.
 const EXACT: f64 = 1e-3;
 
@@ -128,26 +114,46 @@ impl Task<'_> {
         let mut factors = multiplied(self.model, self.per);
         // Asked for its error alone: inside the search a model without a filter is only an infinite cost.
         (self.full)(self.model)?;
-        if self.dishonesty(&factors)?.abs() <= TOLERANCE {
+        let (honesty, mut margins) = self.judged(self.filter, &factors)?;
+        if self.dishonesty(&honesty).abs() <= TOLERANCE {
             return Ok(factors);
         }
+        // Draws are many, and what they add to an error hardly depends on the filter: the search has the first truth alone
+        // with that added, and again with what they add under the filter that was found.
+        for _ in 0..ROUNDS {
+            factors = self.search(&factors, margins.as_ref())?;
+            if margins.is_none() {
+                break;
+            }
+            let found = self.judged(self.filter, &factors)?;
+            if self.dishonesty(&found.0).abs() <= TOLERANCE {
+                break;
+            }
+            margins = found.1;
+        }
+        Ok(factors)
+    }
+
+    /// The factors for all truths, or for the first with what draws add to it.
+    fn search(&self, factors: &[Factor], margins: Option<&Margins>) -> Result<Vec<Factor>, BeliefError> {
         let track = self.track.coarse();
         let cost = |ln: &[f64]| {
-            self.cost(&set(&factors, ln), &track) + RIDGE * ln.iter().map(|x| x * x).sum::<f64>()
+            let ridge = RIDGE * ln.iter().map(|x| x * x).sum::<f64>();
+            self.cost(&set(factors, ln), &track, margins) + ridge
         };
         let low = if self.allow_smaller { -MAX_LN } else { 0.0 };
         let descent = Descent { cost: &cost, bounds: (low, MAX_LN), iterations: ITERATIONS, enough: ENOUGH };
         // From the model as it is, which keeps factors small; and from one factor on all that is honest, since between
         // the two the valley may be flat. The second counts where it is better by what can be seen.
         let unchanged = vec![0.0; factors.len()];
-        let alike = self.exact(&factors, &unchanged, low)?.iter().map(|f| f.on_variance.ln()).collect();
+        let exact = |ln: &[f64]| self.exact(factors, ln, low, margins);
+        let alike = exact(&unchanged)?.iter().map(|f| f.on_variance.ln()).collect();
         let near = descent.minimum(unchanged.clone()).unwrap_or(unchanged);
         let best = match descent.minimum(alike) {
             Some(far) if cost(&far) < cost(&near) - VISIBLE => far,
             _ => near,
         };
-        factors = self.exact(&factors, &best, low)?;
-        Ok(factors)
+        exact(&best)
     }
 
     /// Every truth under a filter made of the scaled model.
@@ -155,8 +161,38 @@ impl Task<'_> {
     /// # Errors
     /// When the model has no such filter.
     pub fn honesty(&self, filter: &Filter<'_>, factors: &[Factor]) -> Result<Honesty, BeliefError> {
+        Ok(self.judged(filter, factors)?.0)
+    }
+
+    /// The same, and what draws add to the first truth there.
+    ///
+    /// # Errors
+    /// When the model has no such filter.
+    pub fn judged(
+        &self,
+        filter: &Filter<'_>,
+        factors: &[Factor],
+    ) -> Result<(Honesty, Option<Margins>), BeliefError> {
         let belief = filter(&scaled(self.model, factors))?;
-        Ok(Honesty::of(&self.assessments(&belief, self.track)))
+        let assessments = self.assessments(&belief, self.track, None);
+        let honesty = Honesty::of(&assessments, self.drawn);
+        let margins = self.drawn.map(|drawn| Margins::of(&assessments, drawn, &honesty));
+        Ok((honesty, margins))
+    }
+
+    /// The honesty by the first truth with what draws add to it; without draws that by all truths.
+    ///
+    /// # Errors
+    /// When the model has no such filter.
+    pub fn honesty_with(
+        &self,
+        filter: &Filter<'_>,
+        factors: &[Factor],
+        margins: Option<&Margins>,
+    ) -> Result<Honesty, BeliefError> {
+        let Some(margins) = margins else { return self.honesty(filter, factors) };
+        let belief = filter(&scaled(self.model, factors))?;
+        Ok(margins.honesty(&self.assessments(&belief, self.track, Some(margins))))
     }
 
     /// Every truth under the filter that `knows` makes of it.
@@ -167,18 +203,25 @@ impl Task<'_> {
         &self,
         knows: impl Fn(&TrueErrors) -> Result<Belief, BeliefError> + Sync,
     ) -> Result<Honesty, BeliefError> {
-        let assessed = |truth: &TrueErrors| Ok(assess_stated(self.track, &knows(truth)?, truth));
+        let assessed = |truth: &TrueErrors| {
+            let belief = knows(truth)?;
+            Ok(FilterPass::new(self.track, &belief).assess_stated(&belief, truth))
+        };
         let assessments: Result<Vec<Assessment>, BeliefError> =
             self.truths.par_iter().map(assessed).collect();
-        Ok(Honesty::of(&assessments?))
+        Ok(Honesty::of(&assessments?, self.drawn))
     }
 
-    fn assessments(&self, belief: &Belief, track: &Track) -> Vec<Assessment> {
-        self.truths.par_iter().map(|truth| assess_stated(track, belief, truth)).collect()
+    /// Of all truths; of the first alone where what draws add to it is known.
+    fn assessments(&self, belief: &Belief, track: &Track, margins: Option<&Margins>) -> Vec<Assessment> {
+        // No truth changes the filter: its gains are found once.
+        let pass = FilterPass::new(track, belief);
+        let count = if margins.is_some() { 1 } else { self.truths.len() };
+        self.truths[..count].par_iter().map(|truth| pass.assess_stated(belief, truth)).collect()
     }
 
     /// Mean divergence over the truths, and what no error may be.
-    fn cost(&self, factors: &[Factor], track: &Track) -> f64 {
+    fn cost(&self, factors: &[Factor], track: &Track, margins: Option<&Margins>) -> f64 {
         let Ok(belief) = (self.full)(&scaled(self.model, factors)) else { return f64::INFINITY };
         let overconfidence = |ratios: [f64; REPORTED]| -> f64 {
             match self.aim {
@@ -191,21 +234,28 @@ impl Task<'_> {
         let cost_of_truth = |a: &Assessment| {
             divergence(a, |end| overconfidence(end.ratio())) + overconfidence(a.ratio_over_run())
         };
-        let costs: Vec<f64> = self.assessments(&belief, track).iter().map(cost_of_truth).collect();
+        let mut assessments = self.assessments(&belief, track, margins);
+        margins.into_iter().for_each(|margins| assessments.iter_mut().for_each(|a| margins.enlarge(a)));
+        let costs: Vec<f64> = assessments.iter().map(cost_of_truth).collect();
         costs.iter().sum::<f64>() / costs.len() as f64
     }
 
     /// Logarithm of what should be 1: above 0 the filter is overconfident.
-    fn dishonesty(&self, factors: &[Factor]) -> Result<f64, BeliefError> {
-        let honesty = self.honesty(self.filter, factors)?;
-        Ok(match self.aim {
+    fn dishonesty(&self, honesty: &Honesty) -> f64 {
+        match self.aim {
             Aim::Mean => (honesty.nees / NEES_DOF as f64).ln(),
-            Aim::Worst => honesty.ratio.ln(),
-        })
+            Aim::Worst => honesty.largest.ratio.ln(),
+        }
     }
 
     /// One more factor on all of them, no factor below the lowest, so that the filter is honest.
-    fn exact(&self, factors: &[Factor], ln: &[f64], low: f64) -> Result<Vec<Factor>, BeliefError> {
+    fn exact(
+        &self,
+        factors: &[Factor],
+        ln: &[f64],
+        low: f64,
+        margins: Option<&Margins>,
+    ) -> Result<Vec<Factor>, BeliefError> {
         let moved = |by: f64| {
             let ln: Vec<f64> = ln.iter().map(|x| (x + by).clamp(low, MAX_LN)).collect();
             set(factors, &ln)
@@ -213,47 +263,12 @@ impl Task<'_> {
         // Down to where the largest factor meets the lowest bound: below that nothing changes any more.
         let highest = ln.iter().copied().fold(low, f64::max);
         let crossing = Crossing { bounds: (low - highest, MAX_LN), step: 0.1, exact: EXACT };
-        let (by, _) = crossing.from(0.0, |by| self.dishonesty(&moved(by)))?;
+        let dishonesty = |by: f64| {
+            let honesty = self.honesty_with(self.filter, &moved(by), margins)?;
+            Ok::<_, BeliefError>(self.dishonesty(&honesty))
+        };
+        let (by, _) = crossing.from(0.0, dishonesty)?;
         Ok(moved(by))
-    }
-}
-
-impl Honesty {
-    /// The honesty of one filter under several truths.
-    fn of(assessments: &[Assessment]) -> Self {
-        let count = assessments.len() as f64;
-        let mean = |a: &Assessment| a.reports.iter().map(|r| r.nees).sum::<f64>() / a.reports.len() as f64;
-        let nees = assessments.iter().map(mean).sum::<f64>() / count;
-        let end_s: Vec<f64> = assessments[0].outage_ends.iter().map(|end| end.after_s).collect();
-        let rmse_end = vec![[0.0; REPORTED]; end_s.len()];
-        let mut honesty = Self { nees, ratio: 0.0, state: 0, outage: None, truth: 0, end_s, rmse_end };
-        for (truth, assessment) in assessments.iter().enumerate() {
-            let ends = &assessment.outage_ends;
-            for (sum, end) in honesty.rmse_end.iter_mut().zip(ends) {
-                sum.iter_mut().zip(&end.rmse).for_each(|(sum, rmse)| *sum += rmse * rmse / count);
-            }
-            // Without outages the filter is judged wherever it reports.
-            let judged: Vec<(Option<usize>, [f64; REPORTED])> = if ends.is_empty() {
-                assessment.reports.iter().map(|report| (None, report.ratio())).collect()
-            } else {
-                let at_ends = ends.iter().enumerate().map(|(outage, end)| (Some(outage), end.ratio()));
-                at_ends.chain([(None, assessment.ratio_over_run())]).collect()
-            };
-            for (outage, ratios) in judged {
-                for (state, ratio) in ratios.into_iter().enumerate() {
-                    if ratio > honesty.ratio {
-                        honesty = Self { ratio, state, outage, truth, ..honesty };
-                    }
-                }
-            }
-        }
-        honesty.rmse_end.iter_mut().flatten().for_each(|x| *x = x.sqrt());
-        honesty
-    }
-
-    /// Horizontal RMSE at the end of each outage (m).
-    pub fn horizontal_m(&self) -> impl Iterator<Item = f64> {
-        self.rmse_end.iter().map(|rmse| rmse[0].hypot(rmse[1]))
     }
 }
 

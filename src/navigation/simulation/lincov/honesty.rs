@@ -1,0 +1,166 @@
+//! How honest a filter is over several truths.
+
+use super::pass::{Assessment, Consistency};
+use crate::simulation::REPORTED;
+
+/// The upper end of the interval of a figure, from the figure itself and those of the draws around it.
+pub type UpperEnd<'a> = dyn Fn(f64, Vec<f64>) -> f64 + Sync + 'a;
+
+/// What counts of the ratios that the truths have of one error: the largest, or the upper end around the first, below which
+/// that itself is not.
+fn counted(ratios: &[f64], drawn: Option<&UpperEnd<'_>>) -> f64 {
+    match (drawn, ratios) {
+        (Some(upper_end), [first, draws @ ..]) => upper_end(*first, draws.to_vec()).max(*first),
+        _ => ratios.iter().copied().fold(0.0, f64::max),
+    }
+}
+
+/// How honest a filter is over several truths.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Honesty {
+    /// Expected NEES, mean over time and truths; 9 is right.
+    pub nees: f64,
+    /// Where errors are largest against what is stated, at an outage's end or over the whole run (without outages: at any time).
+    pub largest: Departure,
+    /// When the outages end (s from the start).
+    pub end_s: Vec<f64>,
+    /// True RMSE of the reported states at these ends, root mean square over the truths.
+    pub rmse_end: Vec<[f64; REPORTED]>,
+}
+
+/// An error over what the filter states of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Departure {
+    /// What counts of true RMSE over stated standard deviation in the truths.
+    pub ratio: f64,
+    /// The reported state.
+    pub state: usize,
+    /// The outage at whose end it is, counted from 0; none: over the whole run.
+    pub outage: Option<usize>,
+    /// The truth whose ratio is nearest to what counts, counted from 0.
+    pub truth: usize,
+}
+
+impl Honesty {
+    /// The honesty of one filter under several truths.
+    pub(super) fn of(assessments: &[Assessment], drawn: Option<&UpperEnd<'_>>) -> Self {
+        let count = assessments.len() as f64;
+        let mean = |a: &Assessment| a.reports.iter().map(|r| r.nees).sum::<f64>() / a.reports.len() as f64;
+        let end_s: Vec<f64> = assessments[0].outage_ends.iter().map(|end| end.after_s).collect();
+        let mut rmse_end = vec![[0.0; REPORTED]; end_s.len()];
+        for assessment in assessments {
+            for (sum, end) in rmse_end.iter_mut().zip(&assessment.outage_ends) {
+                sum.iter_mut().zip(&end.rmse).for_each(|(sum, rmse)| *sum += rmse * rmse / count);
+            }
+        }
+        rmse_end.iter_mut().flatten().for_each(|x| *x = x.sqrt());
+        Self {
+            nees: assessments.iter().map(mean).sum::<f64>() / count,
+            largest: Departure::largest(departures(assessments, drawn)),
+            end_s,
+            rmse_end,
+        }
+    }
+
+    /// Horizontal RMSE at the end of each outage (m).
+    pub fn horizontal_m(&self) -> impl Iterator<Item = f64> {
+        self.rmse_end.iter().map(|rmse| rmse[0].hypot(rmse[1]))
+    }
+}
+
+impl Departure {
+    fn largest(all: Vec<Self>) -> Self {
+        let none = Self { ratio: 0.0, state: 0, outage: None, truth: 0 };
+        all.into_iter().fold(none, |a, b| if b.ratio > a.ratio { b } else { a })
+    }
+}
+
+/// What draws add to the first truth under a filter, as factors; they hardly depend on the filter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Margins {
+    /// The upper end of each ratio, in the order of [`departures`].
+    ratios: Vec<f64>,
+    /// The same of the ratios over the whole run.
+    over_run: [f64; REPORTED],
+    /// The mean NEES of all.
+    nees: f64,
+    /// The root mean square of all at the ends of outages.
+    rmse_end: Vec<[f64; REPORTED]>,
+}
+
+impl Margins {
+    /// Of a filter under the first truth and its draws, whose honesty is known.
+    pub(super) fn of(assessments: &[Assessment], drawn: &UpperEnd<'_>, honesty: &Honesty) -> Self {
+        let first = &assessments[..1];
+        let (all, alone) = (departures(assessments, Some(drawn)), departures(first, None));
+        let over_run = over_run(assessments, Some(drawn)).map(|d| d.ratio);
+        let alone_over_run = self::over_run(first, None).map(|d| d.ratio);
+        let honesty_alone = Honesty::of(first, None);
+        let over =
+            |all: &[f64; REPORTED], alone: &[f64; REPORTED]| std::array::from_fn(|i| all[i] / alone[i]);
+        let rmse_end = honesty.rmse_end.iter().zip(&honesty_alone.rmse_end);
+        Self {
+            ratios: all.iter().zip(&alone).map(|(all, alone)| all.ratio / alone.ratio).collect(),
+            over_run: over(&over_run, &alone_over_run),
+            nees: honesty.nees / honesty_alone.nees,
+            rmse_end: rmse_end.map(|(all, alone)| over(all, alone)).collect(),
+        }
+    }
+
+    /// The honesty of another filter, by the first truth.
+    pub(super) fn honesty(&self, first: &[Assessment]) -> Honesty {
+        let mut honesty = Honesty::of(first, None);
+        let mut departures = departures(first, None);
+        departures.iter_mut().zip(&self.ratios).for_each(|(d, margin)| d.ratio *= margin);
+        honesty.largest = Departure::largest(departures);
+        honesty.nees *= self.nees;
+        let ends = honesty.rmse_end.iter_mut().flatten();
+        ends.zip(self.rmse_end.iter().flatten()).for_each(|(rmse, margin)| *rmse *= margin);
+        honesty
+    }
+
+    /// Takes the errors of the first truth to the upper ends of their intervals.
+    pub(super) fn enlarge(&self, first: &mut Assessment) {
+        let ends = first.outage_ends.iter_mut().flat_map(|end| &mut end.rmse);
+        ends.zip(&self.ratios).for_each(|(rmse, margin)| *rmse *= margin);
+        for report in &mut first.reports {
+            report.rmse.iter_mut().zip(&self.over_run).for_each(|(rmse, margin)| *rmse *= margin);
+        }
+    }
+}
+
+/// Every state at every place where a filter is judged: at the ends of outages and then over the whole run; without outages
+/// wherever it reports.
+fn departures(assessments: &[Assessment], drawn: Option<&UpperEnd<'_>>) -> Vec<Departure> {
+    let at = |outage: Option<usize>, instants: fn(&Assessment) -> &[Consistency], k: usize| {
+        states(assessments, drawn, outage, &|a| instants(a)[k].ratio())
+    };
+    match assessments[0].outage_ends.len() {
+        0 => (0..assessments[0].reports.len()).flat_map(|k| at(None, |a| &a.reports, k)).collect(),
+        ends => {
+            let at_ends = (0..ends).flat_map(|k| at(Some(k), |a| &a.outage_ends, k));
+            at_ends.chain(over_run(assessments, drawn)).collect()
+        }
+    }
+}
+
+fn over_run(assessments: &[Assessment], drawn: Option<&UpperEnd<'_>>) -> [Departure; REPORTED] {
+    states(assessments, drawn, None, &Assessment::ratio_over_run)
+}
+
+/// Every state at one place.
+fn states(
+    assessments: &[Assessment],
+    drawn: Option<&UpperEnd<'_>>,
+    outage: Option<usize>,
+    ratios: &dyn Fn(&Assessment) -> [f64; REPORTED],
+) -> [Departure; REPORTED] {
+    let of_truths: Vec<[f64; REPORTED]> = assessments.iter().map(ratios).collect();
+    std::array::from_fn(|state| {
+        let ratios: Vec<f64> = of_truths.iter().map(|of_truth| of_truth[state]).collect();
+        let ratio = counted(&ratios, drawn);
+        let distance = |truth: &usize| (ratios[*truth] - ratio).abs();
+        let truth = (0..ratios.len()).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        Departure { ratio, state, outage, truth: truth.unwrap_or(0) }
+    })
+}
