@@ -53,7 +53,8 @@ pub(crate) struct Args {
     /// Whether each sensor or each process has a factor of its own
     #[arg(long, value_name = "WHAT", value_parser = one_of::<Per>(&Per::NAMES), default_value_t)]
     per: Per,
-    /// The filter to tune: full, or that of the scenario (15 states; takes longer); the verdict judges both
+    /// The filter to tune, whatever the scenario has: full, 15 or 21 (these take longer); the verdict judges that of the
+    /// scenario, which `run` makes by default, too
     #[arg(long, value_name = "STATES", default_value = "full")]
     filter: FilterStates,
     /// Factors may be below 1

@@ -58,21 +58,24 @@ pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
     let upper_end =
         |stretch| move |estimate: f64, draws: Vec<f64>| derived_interval(estimate, draws, stretch)[1];
     let upper_end = truths.stretch.map(upper_end);
-    let full = inputs.scenario.with_full_noise();
-    let mut reduced = inputs.scenario.clone();
-    if !reduced.filter.states.is_reduced() {
-        reduced.filter.states = FilterStates::default();
+    let mut scenario = inputs.scenario.clone();
+    match states {
+        // what goes with the filter of 21 states beside the model stays
+        FilterStates::Full => scenario = scenario.with_full_noise(),
+        reduced => scenario.filter.states = *reduced,
     }
-    let filter_of_run = reduced.filter.states;
-    let full = |model: &Model| full.belief(model, outages, track);
-    let reduced = |model: &Model| reduced.belief(model, outages, track);
+    let filter_of_run = inputs.scenario.filter.states;
+    let full = scenario.with_full_noise();
+    let full = |model: &Model| full.belief(model, outages, judged);
+    let tuned = |model: &Model| scenario.belief(model, outages, judged);
+    let of_run = |model: &Model| inputs.scenario.belief(model, outages, judged);
     let task = Task {
         model,
         truths: &truths.errors,
         drawn: upper_end.as_ref().map(|end| end as &UpperEnd<'_>),
         track: judged,
         full: &full,
-        filter: if states.is_reduced() { &reduced } else { &full },
+        filter: &tuned,
         per: *per,
         aim: *aim,
         allow_smaller: inputs.allow_smaller,
@@ -81,13 +84,13 @@ pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
     let ones: Vec<Factor> = factors.iter().map(|f| Factor { on_variance: 1.0, ..f.clone() }).collect();
     let (after, margins) = task.judged(task.filter, &factors)?;
     Ok(TuneResult {
-        filter: if states.is_reduced() { filter_of_run } else { *states },
+        filter: *states,
         filter_of_run,
         before: task.honesty(task.filter, &ones)?,
         after,
-        reduced: task.honesty(&reduced, &factors)?,
+        of_run: (*states != filter_of_run).then(|| task.honesty(&of_run, &factors)).transpose()?,
         informed: task
-            .informed(|truth| knowing(inputs.scenario, &truth.imu).belief(&truth.model, outages, track))?,
+            .informed(|truth| knowing(&scenario, &truth.imu).belief(&truth.model, outages, judged))?,
         sweep: sweep(&task, &factors, margins.as_ref())?,
         factors,
         truths: truths.names.clone(),

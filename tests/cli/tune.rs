@@ -43,6 +43,35 @@ fn the_tuned_file_has_the_factor_and_says_where_it_came_from() {
     );
 }
 
+/// `--filter` wins over the scenario, as with `run`; a filter that `run` makes anyway is judged once.
+#[test]
+fn the_filter_that_is_asked_for_is_tuned_and_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
+    put("model.toml", MODEL);
+    put("truth.toml", &MODEL.replace("1e-12", "4e-12"));
+    put("drive.toml", crate::common::drive::DRIVE);
+    put("states.toml", "[filter]\nstates = \"21\"\n");
+    let cases = [
+        ("--filter 15", "the filter of 15 states is ", "", 3),
+        (
+            "--filter 15 --scenario states.toml",
+            "the filter of 15 states is ",
+            "; in the filter of 21 states, ",
+            4,
+        ),
+        ("--filter 21", "the filter of 21 states is ", "; in the filter of 15 states, ", 4),
+    ];
+    for (filter, begin, then, filters) in cases {
+        let rest = "--trajectory drive.toml --outage 20:30 --format json";
+        let output = tune_or_run(dir.path(), &format!("tune model.toml --truth truth.toml {filter} {rest}"));
+        let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+        let verdict = found["verdict"].as_str().unwrap();
+        assert!(verdict.starts_with(begin) && verdict.contains(then), "{verdict}");
+        assert_eq!(found["filters"].as_array().unwrap().len(), filters, "{verdict}");
+    }
+}
+
 #[test]
 fn a_truth_that_is_none_is_refused() {
     let dir = tempfile::tempdir().unwrap();

@@ -107,7 +107,7 @@ fn remedy(summary: &Summary, unexpected: &[Unexpected], truth: &TrueImu) -> Stri
             "--filter full has a state for each process of the model".to_owned()
         }
         TrueImu::Model(_) | TrueImu::Recordings(_) => {
-            "the errors are not those that MODEL expects: nav-sim tune finds variances that cover them".to_owned()
+            "the errors are not those that MODEL expects: nav-sim tune (--for worst) finds variances that cover them".to_owned()
         }
         // no draw is in a covariance analysis: what is larger there is noise that a filter has no state for
         TrueImu::AsBelieved if summary.method == Method::Lincov.name() && !is_too_large => {

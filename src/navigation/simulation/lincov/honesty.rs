@@ -22,6 +22,8 @@ pub struct Honesty {
     pub nees: f64,
     /// Where errors are largest against what is stated, at an outage's end or over the whole run (without outages: at any time).
     pub largest: Departure,
+    /// Where they are smallest.
+    pub smallest: Departure,
     /// When the outages end (s from the start).
     pub end_s: Vec<f64>,
     /// True RMSE of the reported states at these ends, root mean square over the truths.
@@ -54,12 +56,8 @@ impl Honesty {
             }
         }
         rmse_end.iter_mut().flatten().for_each(|x| *x = x.sqrt());
-        Self {
-            nees: assessments.iter().map(mean).sum::<f64>() / count,
-            largest: Departure::largest(departures(assessments, drawn)),
-            end_s,
-            rmse_end,
-        }
+        let [smallest, largest] = Departure::extremes(&departures(assessments, drawn));
+        Self { nees: assessments.iter().map(mean).sum::<f64>() / count, largest, smallest, end_s, rmse_end }
     }
 
     /// Horizontal RMSE at the end of each outage (m).
@@ -69,9 +67,12 @@ impl Honesty {
 }
 
 impl Departure {
-    fn largest(all: Vec<Self>) -> Self {
-        let none = Self { ratio: 0.0, state: 0, outage: None, truth: 0 };
-        all.into_iter().fold(none, |a, b| if b.ratio > a.ratio { b } else { a })
+    /// The smallest and the largest.
+    fn extremes(all: &[Self]) -> [Self; 2] {
+        let none = |ratio: f64| Self { ratio, state: 0, outage: None, truth: 0 };
+        let smallest = all.iter().fold(none(f64::INFINITY), |a, b| if b.ratio < a.ratio { *b } else { a });
+        let largest = all.iter().fold(none(0.0), |a, b| if b.ratio > a.ratio { *b } else { a });
+        [smallest, largest]
     }
 }
 
@@ -112,7 +113,7 @@ impl Margins {
         let mut honesty = Honesty::of(first, None);
         let mut departures = departures(first, None);
         departures.iter_mut().zip(&self.ratios).for_each(|(d, margin)| d.ratio *= margin);
-        honesty.largest = Departure::largest(departures);
+        [honesty.smallest, honesty.largest] = Departure::extremes(&departures);
         honesty.nees *= self.nees;
         let ends = honesty.rmse_end.iter_mut().flatten();
         ends.zip(self.rmse_end.iter().flatten()).for_each(|(rmse, margin)| *rmse *= margin);
