@@ -20,7 +20,8 @@ use std::path::{Path, PathBuf};
 ///
 /// Factors multiply variances; quantization noise, which is in no filter, stays as it is. They are found by linear
 /// covariance analysis along the trajectory, without random numbers: first the smallest divergence between the
-/// filter's covariance and that of its true errors, then one common factor that makes the filter consistent.
+/// filter's covariance and that of its true errors, then one common factor that makes the filter consistent. Where none
+/// does, the exit code is 3 and no model is written.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -102,6 +103,11 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let text = || format!("{}\n\n{}", result.verdict(), markdown_table(&result.rows()));
     session.show(|| result.json(), text);
     let drawn = args.pictures.write(|| tune_page(&result), session);
+    if let Some(unmet) = result.unmet() {
+        drawn?;
+        let failure = Failure::bound(format!("{}: {unmet}; no tuned model is written", args.model.display()));
+        return Err(failure.hint(result.remedy()));
+    }
     if let Some(out) = &args.out {
         let aim = if args.aim == Aim::Mean { "mean of" } else { "worst of" };
         let honest_for = format!("{aim} {}", if args.intervals { "intervals" } else { "truths" });

@@ -95,6 +95,8 @@ pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
         factors,
         truths: truths.names.clone(),
         is_drawn: truths.stretch.is_some(),
+        aim: *aim,
+        without_factor: task.without_factor(),
     })
 }
 

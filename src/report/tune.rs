@@ -4,11 +4,15 @@ use super::number::{readable, seconds};
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::metrics::PerState;
 use nav_sim_navigation::simulation::REPORTED_NAMES;
-use nav_sim_navigation::simulation::lincov::{Factor, Honesty};
+use nav_sim_navigation::simulation::lincov::{Aim, Factor, Honesty};
+use nav_sim_signal::imu::Sensor;
 use serde::Serialize;
 
-/// How far errors are below what is stated where `run` calls a filter underconfident.
-const TIMID: f64 = 0.1;
+/// How far errors are off what is stated where `run` calls a filter overconfident or underconfident.
+const OFF: f64 = 0.1;
+/// Horizontal RMSE over that of a filter that knows the truth, less 1, where the noise of one sensor was made to stand for
+/// that of the other.
+const ABSURD: f64 = 1.0;
 /// A deviation of the NEES or of a ratio from what is right that is not worth a word.
 const RIGHT: f64 = 0.01;
 
@@ -33,6 +37,10 @@ pub(crate) struct TuneResult {
     pub sweep: Vec<(f64, Honesty)>,
     /// Names of the truths; of draws one for all.
     pub truths: Vec<String>,
+    /// When the filter counts as honest.
+    pub aim: Aim,
+    /// Sensors without noise that a factor could multiply, where a truth has some.
+    pub without_factor: Vec<Sensor>,
     /// Whether the truths are the draws of a calibration, and what counts is the upper end of an interval.
     pub is_drawn: bool,
 }
@@ -42,7 +50,11 @@ impl TuneResult {
     pub(crate) fn verdict(&self) -> String {
         let scope = if self.is_drawn { "within what the calibration leaves open (95 %), " } else { "" };
         let before = format!("{scope}the {} is {}", filter_name(self.filter), judged(&self.before));
+        let unmet = self.unmet().map_or(String::new(), |unmet| format!("; {unmet}"));
         if self.factors.iter().all(|f| (f.on_variance - 1.0).abs() < RIGHT) {
+            if !unmet.is_empty() {
+                return before + &unmet;
+            }
             return match excess(&self.before) {
                 Excess::Underconfident => {
                     format!("{before}; no factor is needed (--allow-smaller seeks one below 1)")
@@ -59,11 +71,38 @@ impl TuneResult {
             );
         }
         verdict += &self.default_of_run();
-        if self.factors.iter().any(Factor::is_at_limit) {
-            verdict += "; a factor is the largest that is tried: larger noise alone does not make this model honest \
-                        in this sense (--for worst, or another model)";
+        verdict + &unmet
+    }
+
+    /// Why the factors are of no use, if they are not.
+    pub(crate) fn unmet(&self) -> Option<String> {
+        let (ratio, nees) = (self.after.largest.ratio, self.after.nees / 9.0);
+        let is_dishonest = match self.aim {
+            Aim::Worst => ratio > 1.0 + OFF,
+            Aim::Mean => nees > (1.0 + OFF).powi(2),
+        };
+        let is_at_limit = self.factors.iter().any(Factor::is_at_limit);
+        let names: Vec<&str> = self.without_factor.iter().map(|sensor| sensor.name()).collect();
+        if !names.is_empty() && (is_dishonest || is_at_limit || self.cost() > ABSURD) {
+            let names = names.join(" and ");
+            return Some(format!("the model has no {names} noise to multiply, where the truth has some"));
         }
-        verdict
+        let limit = if is_at_limit { ": a factor is the largest that is tried" } else { "" };
+        let unmet = || format!("larger noise alone does not make this model honest{limit}");
+        (is_dishonest || is_at_limit).then(unmet)
+    }
+
+    /// What helps there.
+    pub(crate) fn remedy(&self) -> String {
+        if !self.without_factor.is_empty() {
+            return "give it the white noise and bias instability of its data sheet (nav-sim datasheet) or of the truth, and \
+                    tune again"
+                .to_owned();
+        }
+        let aim = if self.aim == Aim::Mean { "--for worst, or " } else { "" };
+        format!(
+            "{aim}a model of other processes, or with the turn-on bias and scale factors that the truth has"
+        )
     }
 
     /// What `run` makes of the tuned model unless told otherwise, where that is not the filter that was tuned.
@@ -205,7 +244,7 @@ const fn over_run(h: &Honesty) -> &'static str {
 /// yaw_deg (0.756 of what is stated)`.
 fn timid(h: &Honesty) -> String {
     let smallest = &h.smallest;
-    if smallest.ratio >= 1.0 - TIMID {
+    if smallest.ratio >= 1.0 - OFF {
         return String::new();
     }
     let over_run = if smallest.outage.is_none() && !h.end_s.is_empty() { " over the run" } else { "" };
@@ -317,7 +356,6 @@ struct EndEntry {
 mod tests {
     use super::*;
     use nav_sim_navigation::simulation::lincov::Departure;
-    use nav_sim_signal::imu::Sensor;
 
     fn honesty(ratio: f64, nees: f64) -> Honesty {
         let (end_s, rmse_end) = (vec![90.0], vec![[1.0; 9]]);
@@ -341,6 +379,8 @@ mod tests {
             informed: honesty(1.0, 9.0),
             truths: vec!["truth.toml".to_owned()],
             is_drawn: false,
+            aim: Aim::Worst,
+            without_factor: Vec::new(),
             sweep: Vec::new(),
         }
     }

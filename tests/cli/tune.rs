@@ -72,6 +72,29 @@ fn the_filter_that_is_asked_for_is_tuned_and_named() {
     }
 }
 
+/// A model without noise, or without that of the sensor that makes the errors, is not made honest by any factor: it is
+/// said which sensor, and no model is written.
+#[test]
+fn a_model_without_noise_to_multiply_is_not_tuned() {
+    let dir = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| std::fs::write(dir.path().join(name), text).unwrap();
+    put("none.toml", "rate_hz = 100.0\n[accel]\nprocesses = []\n[gyro]\nprocesses = []\n");
+    let white = "[gyro]\nprocesses = [{ type = \"WN\", sigma2 = 1e-10 }]\n";
+    put("gyro.toml", &format!("rate_hz = 100.0\n[accel]\nprocesses = []\n{white}"));
+    for (model, sensors) in [("none.toml", "accel and gyro"), ("gyro.toml", "accel")] {
+        let output = tune(dir.path(), &[model, "--truth", "truth.toml", "-o", "tuned.toml"]).code(3);
+        let output = output.get_output();
+        let (shown, said) =
+            (String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr));
+        let words = format!("the model has no {sensors} noise to multiply, where the truth has some");
+        assert!(
+            shown.contains(&words) && said.contains(&words) && said.contains("nav-sim datasheet"),
+            "{said}"
+        );
+        assert!(!shown.contains("no factor is needed") && !dir.path().join("tuned.toml").exists(), "{shown}");
+    }
+}
+
 #[test]
 fn a_truth_that_is_none_is_refused() {
     let dir = tempfile::tempdir().unwrap();

@@ -134,6 +134,18 @@ impl Task<'_> {
         Ok(factors)
     }
 
+    /// Sensors whose model has no noise that a factor could multiply, where that of a truth has some.
+    #[must_use]
+    pub fn without_factor(&self) -> Vec<Sensor> {
+        let has_factor = |model: &Model, sensor: &Sensor| {
+            multiplied(model, Per::Sensor).iter().any(|factor| factor.sensor == *sensor)
+        };
+        let is_without = |sensor: &Sensor| {
+            !has_factor(self.model, sensor) && self.truths.iter().any(|t| has_factor(&t.model, sensor))
+        };
+        Sensor::ALL.into_iter().filter(is_without).collect()
+    }
+
     /// The factors for all truths, or for the first with what draws add to it.
     fn search(&self, factors: &[Factor], margins: Option<&Margins>) -> Result<Vec<Factor>, BeliefError> {
         let track = self.track.coarse();
