@@ -34,6 +34,7 @@ mod laboratory;
 mod pages;
 mod readme;
 mod require;
+mod require_catalogue;
 mod run;
 mod study;
 mod synthesize;
