@@ -226,8 +226,22 @@ fn how(summary: &Summary) -> String {
     )
 }
 
-fn outage_table(outages: &[OutageSummary]) -> String {
-    let is_expected = outages.iter().any(|o| o.horizontal_error_end_m.p999.is_some());
+/// Most outages in the table.
+const OUTAGES: usize = 6;
+
+/// The outages, of many those with the largest errors, in time order.
+fn outage_table(all: &[OutageSummary]) -> String {
+    let is_expected = all.iter().any(|o| o.horizontal_error_end_m.p999.is_some());
+    let mut outages: Vec<&OutageSummary> = all.iter().collect();
+    outages.sort_by(|a, b| b.horizontal_error_end_m.p95.total_cmp(&a.horizontal_error_end_m.p95));
+    outages.truncate(OUTAGES);
+    outages.sort_by(|a, b| a.start_s.total_cmp(&b.start_s));
+    let left_out = match all.len() > OUTAGES {
+        true => {
+            format!("\nthe {OUTAGES} of {} outages with the largest errors; summary.json has all", all.len())
+        }
+        false => String::new(),
+    };
     let head = [
         "outage",
         "horizontal p50 (m)",
@@ -256,7 +270,7 @@ fn outage_table(outages: &[OutageSummary]) -> String {
         row.push(format!("{:.2} {}", ratios[farthest], REPORTED_NAMES[farthest]));
         rows.push(row);
     }
-    table(&rows)
+    format!("{}{left_out}", table(&rows))
 }
 
 fn ratios(rmse: &PerState<f64>, asee: &PerState<f64>) -> Vec<f64> {

@@ -303,3 +303,27 @@ fn the_remedy_is_for_what_the_filter_does_not_expect() {
         "{page}"
     );
 }
+
+/// Of eight outages the table has the six with the largest errors, in time order, and says so: what is printed stays on a screen.
+#[test]
+fn of_many_outages_the_largest_errors_are_shown() {
+    let place = place();
+    let outages: String = (0..8).map(|k| format!(" --outage {}:{}", 10 + 6 * k, 12 + 6 * k)).collect();
+    let ran = done(place.path(), &format!("run drive.toml imu.toml --method lincov{outages} -o out"));
+    let summary = json(&place.path().join("out/summary.json"));
+    let mut errors: Vec<(f64, String)> = summary["outages"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|o| (o["horizontal_error_end_m"]["p95"].as_f64().unwrap(), o["start_s"].to_string()))
+        .collect();
+    errors.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let is_shown = |start: &str| ran.stdout.contains(&format!("| {}–", start.trim_end_matches(".0")));
+    assert!(errors[2..].iter().all(|(_, start)| is_shown(start)), "{}", ran.stdout);
+    assert!(
+        ran.stdout.contains("the 6 of 8 outages with the largest errors; summary.json has all"),
+        "{}",
+        ran.stdout
+    );
+    assert!(ran.stdout.lines().count() <= 20, "{}", ran.stdout);
+}
