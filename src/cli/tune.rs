@@ -26,7 +26,7 @@ use std::path::{Path, PathBuf};
 #[command(before_help = "\
 Examples:
   nav-sim tune calib_data/tactical.toml --truth calib_data/consumer_mems.toml -o tuned.toml
-  nav-sim tune examples/white_and_walk.toml --for mean \\
+  nav-sim tune calib_data/tactical.toml --for mean \\
       --truth calib_data/tactical.toml calib_data/consumer_mems.toml \\
       --trajectory trajectories/figure_eight.toml --outage 60:90
   nav-sim tune calib_data/tactical.toml --per process --format json \\
