@@ -8,7 +8,7 @@ use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::defects::ImuSettings;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{
-    Aim, Factor, Honesty, Margins, Per, Task, Track, TrueErrors, UpperEnd, scaled,
+    Aim, DrawFactors, Factor, Honesty, Per, Task, Track, TrueErrors, UpperEnd, scaled,
 };
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::Model;
@@ -82,7 +82,7 @@ pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
     };
     let factors = task.factors()?;
     let ones: Vec<Factor> = factors.iter().map(|f| Factor { on_variance: 1.0, ..f.clone() }).collect();
-    let (after, margins) = task.judged(task.filter, &factors)?;
+    let (after, draw_factors) = task.judged(task.filter, &factors)?;
     Ok(TuneResult {
         filter: *states,
         filter_of_run,
@@ -91,7 +91,7 @@ pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
         of_run: (*states != filter_of_run).then(|| task.honesty(&of_run, &factors)).transpose()?,
         informed: task
             .informed(|truth| knowing(&scenario, &truth.imu).belief(&truth.model, outages, judged))?,
-        sweep: sweep(&task, &factors, margins.as_ref())?,
+        sweep: sweep(&task, &factors, draw_factors.as_ref())?,
         factors,
         truths: truths.names.clone(),
         is_drawn: truths.stretch.is_some(),
@@ -120,13 +120,13 @@ fn knowing(scenario: &Scenario, imu: &ImuSettings) -> Scenario {
 fn sweep(
     task: &Task<'_>,
     factors: &[Factor],
-    margins: Option<&Margins>,
+    draw_factors: Option<&DrawFactors>,
 ) -> Result<Vec<(f64, Honesty)>, BeliefError> {
     let times = |power: i32| {
         let on_variances = f64::from(power).exp2();
         let scaled = |f: &Factor| Factor { on_variance: f.on_variance * on_variances, ..f.clone() };
         let factors: Vec<Factor> = factors.iter().map(scaled).collect();
-        Ok((on_variances, task.honesty_with(task.filter, &factors, margins)?))
+        Ok((on_variances, task.honesty_with(task.filter, &factors, draw_factors)?))
     };
     (-4..=4).map(times).collect()
 }

@@ -78,7 +78,7 @@ impl Departure {
 
 /// What draws add to the first truth under a filter, as factors; they hardly depend on the filter.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Margins {
+pub struct DrawFactors {
     /// The upper end of each ratio, in the order of [`departures`].
     ratios: Vec<f64>,
     /// The same of the ratios over the whole run.
@@ -89,7 +89,7 @@ pub struct Margins {
     rmse_end: Vec<[f64; REPORTED]>,
 }
 
-impl Margins {
+impl DrawFactors {
     /// Of a filter under the first truth and its draws, whose honesty is known.
     pub(super) fn of(assessments: &[Assessment], drawn: &UpperEnd<'_>, honesty: &Honesty) -> Self {
         let first = &assessments[..1];

@@ -30,7 +30,7 @@ mod vertical;
 
 pub(crate) use branch::{Moments, errors_in_outages};
 pub use heading::{HeadingDoubt, weak_heading};
-pub use honesty::{Departure, Honesty, Margins, UpperEnd};
+pub use honesty::{Departure, DrawFactors, Honesty, UpperEnd};
 pub use pass::{Assessment, Consistency, ErrorLaw, FilterPass, Instant, Judged, assess};
 pub use reduce::{Alike, drive, reduced_belief};
 pub(crate) use root::Crossing;

@@ -6,7 +6,7 @@
 //! on all of them makes the filter exactly honest.
 
 use super::descent::Descent;
-use super::honesty::{Honesty, Margins, UpperEnd};
+use super::honesty::{DrawFactors, Honesty, UpperEnd};
 use super::pass::{Assessment, FilterPass};
 use super::reduce::divergence;
 use super::root::Crossing;
@@ -114,22 +114,22 @@ impl Task<'_> {
         let mut factors = multiplied(self.model, self.per);
         // Asked for its error alone: inside the search a model without a filter is only an infinite cost.
         (self.full)(self.model)?;
-        let (honesty, mut margins) = self.judged(self.filter, &factors)?;
+        let (honesty, mut draw_factors) = self.judged(self.filter, &factors)?;
         if self.dishonesty(&honesty).abs() <= TOLERANCE {
             return Ok(factors);
         }
         // Draws are many, and what they add to an error hardly depends on the filter: the search has the first truth alone
         // with that added, and again with what they add under the filter that was found.
         for _ in 0..ROUNDS {
-            factors = self.search(&factors, margins.as_ref())?;
-            if margins.is_none() {
+            factors = self.search(&factors, draw_factors.as_ref())?;
+            if draw_factors.is_none() {
                 break;
             }
             let found = self.judged(self.filter, &factors)?;
             if self.dishonesty(&found.0).abs() <= TOLERANCE {
                 break;
             }
-            margins = found.1;
+            draw_factors = found.1;
         }
         Ok(factors)
     }
@@ -147,18 +147,22 @@ impl Task<'_> {
     }
 
     /// The factors for all truths, or for the first with what draws add to it.
-    fn search(&self, factors: &[Factor], margins: Option<&Margins>) -> Result<Vec<Factor>, BeliefError> {
+    fn search(
+        &self,
+        factors: &[Factor],
+        draw_factors: Option<&DrawFactors>,
+    ) -> Result<Vec<Factor>, BeliefError> {
         let track = self.track.coarse();
         let cost = |ln: &[f64]| {
             let ridge = RIDGE * ln.iter().map(|x| x * x).sum::<f64>();
-            self.cost(&set(factors, ln), &track, margins) + ridge
+            self.cost(&set(factors, ln), &track, draw_factors) + ridge
         };
         let low = if self.allow_smaller { -MAX_LN } else { 0.0 };
         let descent = Descent { cost: &cost, bounds: (low, MAX_LN), iterations: ITERATIONS, enough: ENOUGH };
         // From the model as it is, which keeps factors small; and from one factor on all that is honest, since between
         // the two the valley may be flat. The second counts where it is better by what can be seen.
         let unchanged = vec![0.0; factors.len()];
-        let exact = |ln: &[f64]| self.exact(factors, ln, low, margins);
+        let exact = |ln: &[f64]| self.exact(factors, ln, low, draw_factors);
         let alike = exact(&unchanged)?.iter().map(|f| f.on_variance.ln()).collect();
         let near = descent.minimum(unchanged.clone()).unwrap_or(unchanged);
         let best = match descent.minimum(alike) {
@@ -184,12 +188,12 @@ impl Task<'_> {
         &self,
         filter: &Filter<'_>,
         factors: &[Factor],
-    ) -> Result<(Honesty, Option<Margins>), BeliefError> {
+    ) -> Result<(Honesty, Option<DrawFactors>), BeliefError> {
         let belief = filter(&scaled(self.model, factors))?;
         let assessments = self.assessments(&belief, self.track, None);
         let honesty = Honesty::of(&assessments, self.drawn);
-        let margins = self.drawn.map(|drawn| Margins::of(&assessments, drawn, &honesty));
-        Ok((honesty, margins))
+        let draw_factors = self.drawn.map(|drawn| DrawFactors::of(&assessments, drawn, &honesty));
+        Ok((honesty, draw_factors))
     }
 
     /// The honesty by the first truth with what draws add to it; without draws that by all truths.
@@ -200,11 +204,11 @@ impl Task<'_> {
         &self,
         filter: &Filter<'_>,
         factors: &[Factor],
-        margins: Option<&Margins>,
+        draw_factors: Option<&DrawFactors>,
     ) -> Result<Honesty, BeliefError> {
-        let Some(margins) = margins else { return self.honesty(filter, factors) };
+        let Some(draw_factors) = draw_factors else { return self.honesty(filter, factors) };
         let belief = filter(&scaled(self.model, factors))?;
-        Ok(margins.honesty(&self.assessments(&belief, self.track, Some(margins))))
+        Ok(draw_factors.honesty(&self.assessments(&belief, self.track, Some(draw_factors))))
     }
 
     /// Every truth under the filter that `knows` makes of it.
@@ -225,15 +229,20 @@ impl Task<'_> {
     }
 
     /// Of all truths; of the first alone where what draws add to it is known.
-    fn assessments(&self, belief: &Belief, track: &Track, margins: Option<&Margins>) -> Vec<Assessment> {
+    fn assessments(
+        &self,
+        belief: &Belief,
+        track: &Track,
+        draw_factors: Option<&DrawFactors>,
+    ) -> Vec<Assessment> {
         // No truth changes the filter: its gains are found once.
         let pass = FilterPass::new(track, belief);
-        let count = if margins.is_some() { 1 } else { self.truths.len() };
+        let count = if draw_factors.is_some() { 1 } else { self.truths.len() };
         self.truths[..count].par_iter().map(|truth| pass.assess_stated(belief, truth)).collect()
     }
 
     /// Mean divergence over the truths, and what no error may be.
-    fn cost(&self, factors: &[Factor], track: &Track, margins: Option<&Margins>) -> f64 {
+    fn cost(&self, factors: &[Factor], track: &Track, draw_factors: Option<&DrawFactors>) -> f64 {
         let Ok(belief) = (self.full)(&scaled(self.model, factors)) else { return f64::INFINITY };
         let overconfidence = |ratios: [f64; REPORTED]| -> f64 {
             match self.aim {
@@ -246,8 +255,10 @@ impl Task<'_> {
         let cost_of_truth = |a: &Assessment| {
             divergence(a, |end| overconfidence(end.ratio())) + overconfidence(a.ratio_over_run())
         };
-        let mut assessments = self.assessments(&belief, track, margins);
-        margins.into_iter().for_each(|margins| assessments.iter_mut().for_each(|a| margins.enlarge(a)));
+        let mut assessments = self.assessments(&belief, track, draw_factors);
+        draw_factors
+            .into_iter()
+            .for_each(|draw_factors| assessments.iter_mut().for_each(|a| draw_factors.enlarge(a)));
         let costs: Vec<f64> = assessments.iter().map(cost_of_truth).collect();
         costs.iter().sum::<f64>() / costs.len() as f64
     }
@@ -266,7 +277,7 @@ impl Task<'_> {
         factors: &[Factor],
         ln: &[f64],
         low: f64,
-        margins: Option<&Margins>,
+        draw_factors: Option<&DrawFactors>,
     ) -> Result<Vec<Factor>, BeliefError> {
         let moved = |by: f64| {
             let ln: Vec<f64> = ln.iter().map(|x| (x + by).clamp(low, MAX_LN)).collect();
@@ -276,7 +287,7 @@ impl Task<'_> {
         let highest = ln.iter().copied().fold(low, f64::max);
         let crossing = Crossing { bounds: (low - highest, MAX_LN), step: 0.1, exact: EXACT };
         let dishonesty = |by: f64| {
-            let honesty = self.honesty_with(self.filter, &moved(by), margins)?;
+            let honesty = self.honesty_with(self.filter, &moved(by), draw_factors)?;
             Ok::<_, BeliefError>(self.dishonesty(&honesty))
         };
         let (by, _) = crossing.from(0.0, dishonesty)?;
