@@ -5,10 +5,10 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 
 use nav_sim::calibration::{ModelSpec, Weighting, fit};
-use nav_sim::noise::{Ar1, Process, Quantization, RandomWalk, White};
-use nav_sim::rng::StreamKey;
-use nav_sim::wavelet;
-use nav_sim::wavelet::{Convention, Curve, Tuning};
+use nav_sim::signal::noise::{Ar1, Process, Quantization, RandomWalk, White};
+use nav_sim::signal::rng::StreamKey;
+use nav_sim::signal::wavelet;
+use nav_sim::signal::wavelet::{Convention, Curve, Tuning};
 use nav_sim_signal::wavelet::interval;
 use rand::RngExt;
 use rand_distr::StandardNormal;

@@ -12,11 +12,11 @@ use kinavis_kernel::{
     Angle, Distance, GeodeticPoint, Height, Instant, Position, Speed, TrueCourse, Utc, Vector3,
 };
 use nalgebra::SMatrix;
-use nav_sim::ekf::{Belief, FilterStates};
 use nav_sim::formats::trajectory_file;
-use nav_sim::scenario::Scenario;
-use nav_sim::sensors::imu::Truth;
-use nav_sim::sensors::outage::Outage;
+use nav_sim::navigation::ekf::{Belief, FilterStates};
+use nav_sim::navigation::scenario::Scenario;
+use nav_sim::navigation::sensors::imu::Truth;
+use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim_navigation::lanes::Level;
 use nav_sim_navigation::metrics::Budget;
 use nav_sim_navigation::simulation::lincov::{FilterPass, TruthSide};

@@ -2,8 +2,8 @@
 //! size the simulation uses. Throughput is samples, so that its inverse is the cost of one.
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use nav_sim::noise::{Composite, Kind, Process, Synthesizer};
-use nav_sim::rng::StreamKey;
+use nav_sim::signal::noise::{Composite, Kind, Process, Synthesizer};
+use nav_sim::signal::rng::StreamKey;
 use std::hint::black_box;
 
 const BLOCK: usize = 1024;

@@ -1,9 +1,9 @@
 //! The effect of one shock on the classical wavelet variance, and its absence in the robust one.
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
-use nav_sim::noise::{Ar1, Composite, Process, RandomWalk, Synthesizer, White};
-use nav_sim::rng::StreamKey;
-use nav_sim::wavelet::{Convention, Tuning, both};
+use nav_sim::signal::noise::{Ar1, Composite, Process, RandomWalk, Synthesizer, White};
+use nav_sim::signal::rng::StreamKey;
+use nav_sim::signal::wavelet::{Convention, Tuning, both};
 
 pub(crate) fn main() -> Result<(), Box<dyn std::error::Error>> {
     // N1 of Minaretzis et al. 2024 for an accelerometer, per sample at 100 Hz

@@ -2,9 +2,9 @@
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
 use nav_sim::calibration::{Estimator, ModelSpec, Replicate, Trim, Weighting, average, fit};
-use nav_sim::noise::{Ar1, Composite, Process, RandomWalk, Synthesizer, White};
-use nav_sim::rng::StreamKey;
-use nav_sim::wavelet::{Convention, Tuning, both};
+use nav_sim::signal::noise::{Ar1, Composite, Process, RandomWalk, Synthesizer, White};
+use nav_sim::signal::rng::StreamKey;
+use nav_sim::signal::wavelet::{Convention, Tuning, both};
 
 const SAMPLES: usize = 1 << 16;
 const LEVELS: u32 = 15;

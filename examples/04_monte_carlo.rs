@@ -2,14 +2,14 @@
 //! times as steady. Prints the errors that they claim and the true ones.
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
-use nav_sim::ekf::{Belief, FilterStates};
 use nav_sim::formats::trajectory_file::{Options, load};
-use nav_sim::metrics::{Summary, epochs};
-use nav_sim::monte_carlo;
-use nav_sim::noise::{Ar1, Composite, Model, Process, White};
-use nav_sim::scenario::Scenario;
-use nav_sim::sensors::imu::Truth;
-use nav_sim::sensors::outage::Outage;
+use nav_sim::navigation::ekf::{Belief, FilterStates};
+use nav_sim::navigation::metrics::{Summary, epochs};
+use nav_sim::navigation::monte_carlo;
+use nav_sim::navigation::scenario::Scenario;
+use nav_sim::navigation::sensors::imu::Truth;
+use nav_sim::navigation::sensors::outage::Outage;
+use nav_sim::signal::noise::{Ar1, Composite, Model, Process, White};
 use std::path::Path;
 
 fn model(gyro_bias_sigma: f64) -> Result<Model, Box<dyn std::error::Error>> {

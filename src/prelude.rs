@@ -1,28 +1,30 @@
-//! The types and functions to calibrate recordings and to navigate with the model: `use nav_sim::prelude::*;`.
+//! The names that most programs need: `use nav_sim::prelude::*;`.
 //!
+//! The figures that filters ask for, from a model:
 //! ```
 //! use nav_sim::prelude::*;
 //!
-//! let white = Composite::new(vec![Process::White(White::new(1e-6)?)]);
-//! let (trajectory, _) = load_trajectory("trajectories/figure_eight.toml".as_ref(), &TrajectoryOptions::default())?;
-//! let inputs = NavigateInputs::new(trajectory, Model::pooled(100.0, &white, &white), TrueImu::AsBelieved);
-//! let mut scenario = Scenario::default();
-//! scenario.run.method = Method::Lincov;
-//! let outage = Outage { start_s: 60.0, end_s: 90.0 };
-//! let found = navigate(&inputs, &scenario, &[outage], 1, &())?;
-//! // the filter's model is the truth: nine states, NEES 9
-//! assert!((found.summary.nees.mean - 9.0).abs() < 0.1);
+//! let model = read_model("calib_data/tactical.toml".as_ref())?.model;
+//! let gyro_x = model.axis(Channel { sensor: Sensor::Gyro, axis: Axis::X });
+//! let figures = AxisParameters::of(&[gyro_x], model.rate_hz, Horizon::default(), Policy::Matched, 1e4)?;
+//! println!("N {:.2e} rad/s/sqrt(Hz), K {:.2e} rad/s^2/sqrt(Hz)", figures.walk.density, figures.walk.walk);
+//! // The pair has the Allan deviation of the model at 1 s (100 samples), but for quantization noise, which it leaves out.
+//! let ratio = figures.walk.allan_variance(100, 100.0) / gyro_x.allan_variance(100);
+//! assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub use crate::calibration::Estimator;
+pub use crate::formats::model_file::{ModelFile, read as read_model};
 pub use crate::formats::trajectory_file::{Options as TrajectoryOptions, load as load_trajectory};
 pub use crate::jobs::{
     Calibration, CalibrationOptions, NavigateInputs, Navigation, Note, Remarks, Silence, TrueImu, calibrate,
     navigate,
 };
-pub use crate::noise::{Composite, Model, Process, White};
 pub use crate::observer::Observer;
-pub use crate::scenario::{Method, Scenario};
-pub use crate::sensors::outage::Outage;
-pub use crate::trajectory::Trajectory;
+pub use nav_sim_calibration::Estimator;
+pub use nav_sim_navigation::scenario::{Method, Scenario};
+pub use nav_sim_navigation::sensors::outage::Outage;
+pub use nav_sim_navigation::trajectory::Trajectory;
+pub use nav_sim_signal::imu::{Axis, Channel, Sensor};
+pub use nav_sim_signal::noise::practical::{AxisParameters, Horizon, Pair, Policy};
+pub use nav_sim_signal::noise::{Composite, Model, Process, White};

@@ -3,12 +3,12 @@
 #![allow(clippy::unwrap_used, reason = "a test")]
 #![allow(unsafe_code, reason = "an allocator that counts")]
 
-use nav_sim::ekf::{Belief, FilterStates};
 use nav_sim::formats::trajectory_file::{Options, load};
-use nav_sim::scenario::Scenario;
-use nav_sim::sensors::imu::Truth;
-use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::Plan;
+use nav_sim::navigation::ekf::{Belief, FilterStates};
+use nav_sim::navigation::scenario::Scenario;
+use nav_sim::navigation::sensors::imu::Truth;
+use nav_sim::navigation::sensors::outage::Outage;
+use nav_sim::navigation::simulation::Plan;
 use nav_sim_navigation::simulation::run_batch;
 use nav_sim_navigation::throughput;
 use std::alloc::{GlobalAlloc, Layout, System};

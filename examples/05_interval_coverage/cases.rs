@@ -2,8 +2,8 @@
 
 use crate::Failure;
 use nav_sim::calibration::Estimator;
-use nav_sim::efficiency::Design;
-use nav_sim::noise::{Composite, Model, Process, Spread};
+use nav_sim::calibration::efficiency::Design;
+use nav_sim::signal::noise::{Composite, Model, Process, Spread};
 
 /// A case by its name.
 pub(crate) fn case(name: &str, paper: Design) -> Result<Design, Failure> {

@@ -9,14 +9,14 @@
 mod cases;
 
 use cases::case;
+use nav_sim::calibration::efficiency::{Design, target};
 use nav_sim::calibration::{
     Bootstrap, ModelChoice, Outcome, Pool, Replicate, Settings, calibrate, grouped, infer,
 };
-use nav_sim::efficiency::{Design, target};
 use nav_sim::formats::efficiency_file;
-use nav_sim::noise::Synthesizer;
-use nav_sim::rng::StreamKey;
-use nav_sim::wavelet::both;
+use nav_sim::signal::noise::Synthesizer;
+use nav_sim::signal::rng::StreamKey;
+use nav_sim::signal::wavelet::both;
 use rayon::prelude::*;
 use std::error::Error;
 use std::path::Path;

@@ -8,17 +8,17 @@
 //! horizontal error is from its binomial mean, in standard deviations. Every truth has random numbers of its own.
 #![expect(clippy::print_stdout, reason = "an example shows its results")]
 
-use nav_sim::ekf::FilterStates;
 use nav_sim::formats::{model_file, trajectory_file};
-use nav_sim::imu::Channel;
-use nav_sim::metrics::{Expected, OutageMetrics, epochs};
-use nav_sim::monte_carlo;
-use nav_sim::noise::{Kind, Model};
-use nav_sim::scenario::Scenario;
-use nav_sim::sensors::imu::Truth;
-use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::RunResult;
-use nav_sim::trajectory::Trajectory;
+use nav_sim::navigation::ekf::FilterStates;
+use nav_sim::navigation::metrics::{Expected, OutageMetrics, epochs};
+use nav_sim::navigation::monte_carlo;
+use nav_sim::navigation::scenario::Scenario;
+use nav_sim::navigation::sensors::imu::Truth;
+use nav_sim::navigation::sensors::outage::Outage;
+use nav_sim::navigation::simulation::RunResult;
+use nav_sim::navigation::trajectory::Trajectory;
+use nav_sim::signal::imu::Channel;
+use nav_sim::signal::noise::{Kind, Model};
 use std::error::Error;
 use std::path::Path;
 

@@ -9,10 +9,10 @@
 use nav_sim::calibration::{Settings, replicates};
 use nav_sim::choose::{Candidate, Contender, Drive, Fold, Laboratory, Ranking, Unit};
 use nav_sim::formats::{contamination_file, model_file};
-use nav_sim::imu::{Channel, Recording};
-use nav_sim::noise::VirtualImu;
-use nav_sim::noise::contamination::Contamination;
 use nav_sim::prelude::*;
+use nav_sim::signal::imu::{Channel, Recording};
+use nav_sim::signal::noise::VirtualImu;
+use nav_sim::signal::noise::contamination::Contamination;
 use rayon::prelude::*;
 use std::error::Error;
 use std::path::{Path, PathBuf};

@@ -10,11 +10,11 @@ use nav_sim::calibration::{
 };
 use nav_sim::choose::{Drive, Laboratory};
 use nav_sim::formats::{contamination_file, model_file};
-use nav_sim::imu::{Axis, Channel, Sensor};
-use nav_sim::noise::VirtualImu;
-use nav_sim::noise::contamination::{Contamination, Operation};
 use nav_sim::prelude::*;
-use nav_sim::wavelet::Curve;
+use nav_sim::signal::imu::{Axis, Channel, Sensor};
+use nav_sim::signal::noise::VirtualImu;
+use nav_sim::signal::noise::contamination::{Contamination, Operation};
+use nav_sim::signal::wavelet::Curve;
 use std::error::Error;
 
 const REPLICATES: u64 = 8;

@@ -10,8 +10,8 @@
 //! ```
 //! use nav_sim::choose::{Candidate, Drive, Laboratory, Unit};
 //! use nav_sim::calibration::{Settings, replicates};
-//! use nav_sim::imu::Channel;
-//! use nav_sim::noise::{Composite, Model, Process, VirtualImu, White};
+//! use nav_sim::signal::imu::Channel;
+//! use nav_sim::signal::noise::{Composite, Model, Process, VirtualImu, White};
 //! use nav_sim::prelude::*;
 //!
 //! let white = Composite::new(vec![Process::White(White::new(1e-6)?)]);
@@ -20,7 +20,7 @@
 //! let recordings =
 //!     (1..=4).map(|k| imu.recording(k, &Channel::ALL, 20_000)).collect::<Result<Vec<_>, _>>()?;
 //! let settings = Settings { rate_hz: 100.0, ..Settings::default() };
-//! let unit = |r: &nav_sim::imu::Recording| {
+//! let unit = |r: &nav_sim::signal::imu::Recording| {
 //!     Ok::<_, Box<dyn std::error::Error>>(Unit { name: r.name.clone(), replicates: replicates(r, Some(10), &settings.tuning)? })
 //! };
 //! let units = recordings.iter().map(unit).collect::<Result<Vec<_>, _>>()?;

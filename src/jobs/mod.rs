@@ -4,8 +4,8 @@
 //! [`calibrate()`] goes from a directory of recordings to models. From signals in memory:
 //! ```
 //! use nav_sim::calibration::{ModelChoice, Pool, Settings, calibrate, grouped, replicates};
-//! use nav_sim::imu::Channel;
-//! use nav_sim::noise::{Composite, Model, Process, VirtualImu, White};
+//! use nav_sim::signal::imu::Channel;
+//! use nav_sim::signal::noise::{Composite, Model, Process, VirtualImu, White};
 //!
 //! let white = Composite::new(vec![Process::White(White::new(4e-6)?)]);
 //! let model = Model::pooled(100.0, &white, &white);

@@ -119,7 +119,7 @@ fn damaged_units_are_noticed_and_computed_again() {
 #[test]
 fn what_stands_in_the_place_of_a_unit_is_computed_again() {
     use nav_sim::study::{Finding, unit_file};
-    fn sampled(finding: &mut Finding) -> &mut nav_sim::simulation::RunResult {
+    fn sampled(finding: &mut Finding) -> &mut nav_sim::navigation::simulation::RunResult {
         match finding {
             Finding::Sampled(result) => result,
             Finding::Expected(_) => panic!("a study of runs"),

@@ -59,7 +59,7 @@ fn a_cell_is_what_run_finds_without_runs() {
     let is = |name: &str, value: &serde_json::Value| {
         assert_eq!(outage[name].parse::<f64>().unwrap(), value.as_f64().unwrap(), "{name}");
     };
-    for state in nav_sim::simulation::REPORTED_NAMES {
+    for state in nav_sim::navigation::simulation::REPORTED_NAMES {
         for figure in ["asee_mean", "rmse_mean", "asee_end", "rmse_end"] {
             is(&format!("{figure}_{state}"), &expected[figure][state]);
         }

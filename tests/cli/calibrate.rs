@@ -3,8 +3,8 @@
 mod requests;
 
 use assert_cmd::Command;
-use nav_sim::noise::{Ar1, Composite, Process, RandomWalk, White};
-use nav_sim::rng::StreamKey;
+use nav_sim::signal::noise::{Ar1, Composite, Process, RandomWalk, White};
+use nav_sim::signal::rng::StreamKey;
 use rand::RngExt;
 use rand_distr::StandardNormal;
 use serde_json::Value;
@@ -275,7 +275,7 @@ fn wv_prints_the_curves_of_every_signal() {
     let x = signal(1, "gyro.x");
     let mean = x.iter().sum::<f64>() / SAMPLES as f64;
     let centred: Vec<f64> = x.iter().map(|v| v - mean).collect();
-    let expected = nav_sim::wavelet::classical(&centred, 13).unwrap();
+    let expected = nav_sim::signal::wavelet::classical(&centred, 13).unwrap();
     for (actual, expected) in numbers(&signals[0]["classical"]["wv"]).iter().zip(expected) {
         // The file holds all digits; the mean is removed twice along different roads.
         assert!((actual / expected - 1.0).abs() < 1e-9);

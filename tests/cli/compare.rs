@@ -1,11 +1,11 @@
 //! `nav-sim compare` on made-up run directories whose ratios are known.
 
 use assert_cmd::Command;
-use nav_sim::metrics::{self, Summary};
+use nav_sim::navigation::metrics::{self, Summary};
+use nav_sim::navigation::scenario::Scenario;
+use nav_sim::navigation::sensors::outage::Outage;
+use nav_sim::navigation::simulation::{EpochSums, OutageRecord, RunRecord, RunResult};
 use nav_sim::report::{self, Input, Manifest, ModelNote};
-use nav_sim::scenario::Scenario;
-use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::{EpochSums, OutageRecord, RunRecord, RunResult};
 use std::path::Path;
 
 const RUNS: u32 = 20;

@@ -1,7 +1,7 @@
 //! The Rust examples run.
 
-use nav_sim::scenario::Scenario;
-use nav_sim::sensors::outage::Outage;
+use nav_sim::navigation::scenario::Scenario;
+use nav_sim::navigation::sensors::outage::Outage;
 use std::process::Command;
 
 #[path = "../../examples/01_robust_wavelet_variance.rs"]

@@ -2,7 +2,7 @@
 
 use crate::common::drive::*;
 use nav_sim::formats::model_file;
-use nav_sim::imu::Sensor;
+use nav_sim::signal::imu::Sensor;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;

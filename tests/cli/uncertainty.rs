@@ -29,7 +29,7 @@ fn intervals_go_from_recordings_to_navigation() {
         let [low, high, value] = [&ends[0], &ends[1], value].map(|v| v.as_f64().unwrap());
         assert!(low < value && value < high, "{low} {value} {high}");
     };
-    for state in nav_sim::simulation::REPORTED_NAMES {
+    for state in nav_sim::navigation::simulation::REPORTED_NAMES {
         for figure in ["asee_end", "asee_mean", "rmse_end"] {
             holds(&outage[format!("{figure}_ci95")][state], &outage[figure][state]);
         }

@@ -2,21 +2,21 @@
 //! says, and never the wrong way round.
 
 use glam::{DQuat, DVec3};
-use nav_sim::earth::GravityModel;
-use nav_sim::ekf::{Belief, FilterStates};
 use nav_sim::formats::model_file;
-use nav_sim::frames::RollPitchYaw;
-use nav_sim::fusion::alignment::{Alignment, coarse};
-use nav_sim::fusion::{Recorded, Settings, Verdict};
-use nav_sim::imu::Sensor;
-use nav_sim::noise::Model;
-use nav_sim::scenario::Scenario;
-use nav_sim::sensors::defects::ImuSettings;
-use nav_sim::sensors::gnss::GnssSettings;
-use nav_sim::sensors::imu::Truth;
-use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::{Plan, Recording, record};
-use nav_sim::trajectory::{Trajectory, TrajectorySample};
+use nav_sim::navigation::earth::GravityModel;
+use nav_sim::navigation::ekf::{Belief, FilterStates};
+use nav_sim::navigation::frames::RollPitchYaw;
+use nav_sim::navigation::fusion::alignment::{Alignment, coarse};
+use nav_sim::navigation::fusion::{Recorded, Settings, Verdict};
+use nav_sim::navigation::scenario::Scenario;
+use nav_sim::navigation::sensors::defects::ImuSettings;
+use nav_sim::navigation::sensors::gnss::GnssSettings;
+use nav_sim::navigation::sensors::imu::Truth;
+use nav_sim::navigation::sensors::outage::Outage;
+use nav_sim::navigation::simulation::{Plan, Recording, record};
+use nav_sim::navigation::trajectory::{Trajectory, TrajectorySample};
+use nav_sim::signal::imu::Sensor;
+use nav_sim::signal::noise::Model;
 use nav_sim_navigation::earth::radii;
 use nav_sim_navigation::frames::wrap_angle;
 use std::path::Path;

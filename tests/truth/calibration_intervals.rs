@@ -6,13 +6,13 @@ use nav_sim::calibration::{
     Bootstrap, Estimator, ModelChoice, Outcome, Pool, Settings, calibrate, grouped, infer, replicates,
 };
 use nav_sim::formats::draws_file::{Draws, DrawsFile};
-use nav_sim::imu::Channel;
 use nav_sim::jobs::{NavigateInputs, TrueImu, navigate};
-use nav_sim::metrics::Summary;
-use nav_sim::noise::{Ar1, Composite, Model, Process, VirtualImu, White};
-use nav_sim::scenario::Scenario;
-use nav_sim::simulation::REPORTED_NAMES;
-use nav_sim::trajectory::Trajectory;
+use nav_sim::navigation::metrics::Summary;
+use nav_sim::navigation::scenario::Scenario;
+use nav_sim::navigation::simulation::REPORTED_NAMES;
+use nav_sim::navigation::trajectory::Trajectory;
+use nav_sim::signal::imu::Channel;
+use nav_sim::signal::noise::{Ar1, Composite, Model, Process, VirtualImu, White};
 
 /// What every laboratory has.
 struct World {

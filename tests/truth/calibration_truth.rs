@@ -1,9 +1,11 @@
 //! Theory and estimators against numbers from independent implementations (`tests/data/README.md`).
 
 use nav_sim::calibration::{Termination, Weighting, fit};
-use nav_sim::noise::{Ar1, Composite, Drift, GaussMarkov, Ma1, Process, Quantization, RandomWalk, White};
-use nav_sim::wavelet;
-use nav_sim::wavelet::{Convention, Curve, Tuning};
+use nav_sim::signal::noise::{
+    Ar1, Composite, Drift, GaussMarkov, Ma1, Process, Quantization, RandomWalk, White,
+};
+use nav_sim::signal::wavelet;
+use nav_sim::signal::wavelet::{Convention, Curve, Tuning};
 use nav_sim_signal::wavelet::{coefficient_count, interval};
 use serde_json::Value;
 

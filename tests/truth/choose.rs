@@ -3,10 +3,10 @@
 
 use nav_sim::calibration::{Estimator, Group, ModelChoice, ModelSpec, Scope, Settings, fit_curve};
 use nav_sim::choose::{Drive, Laboratory};
-use nav_sim::imu::Sensor;
-use nav_sim::noise::{Ar1, Composite, Model, Process, RandomWalk, White};
 use nav_sim::prelude::*;
-use nav_sim::wavelet::Curve;
+use nav_sim::signal::imu::Sensor;
+use nav_sim::signal::noise::{Ar1, Composite, Model, Process, RandomWalk, White};
+use nav_sim::signal::wavelet::Curve;
 
 const RATE_HZ: f64 = 100.0;
 

@@ -1,16 +1,16 @@
 //! Filters whose models are right are as sure as they should be, on three shipped trajectories, with 15 states
 //! and with all states of the model; a model that is wrong by 4 in any parameter shows.
 
-use nav_sim::ekf::{Belief, FilterStates};
 use nav_sim::formats::trajectory_file::{Options, load};
-use nav_sim::monte_carlo;
-use nav_sim::noise::{Ar1, Composite, Model, Process, RandomWalk, White};
-use nav_sim::scenario::Scenario;
-use nav_sim::sensors::baro::BaroSettings;
-use nav_sim::sensors::imu::Truth;
-use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::{NEES_DOF, RunResult};
-use nav_sim::trajectory::Trajectory;
+use nav_sim::navigation::ekf::{Belief, FilterStates};
+use nav_sim::navigation::monte_carlo;
+use nav_sim::navigation::scenario::Scenario;
+use nav_sim::navigation::sensors::baro::BaroSettings;
+use nav_sim::navigation::sensors::imu::Truth;
+use nav_sim::navigation::sensors::outage::Outage;
+use nav_sim::navigation::simulation::{NEES_DOF, RunResult};
+use nav_sim::navigation::trajectory::Trajectory;
+use nav_sim::signal::noise::{Ar1, Composite, Model, Process, RandomWalk, White};
 use nav_sim_navigation::simulation::lincov::assess;
 use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF};
 use std::path::Path;
@@ -166,8 +166,8 @@ fn long_outages_shift_the_velocity_down_by_the_square_of_the_tilts() {
     let beliefs = [full];
     let experiment = scenario.experiment(&trajectory, Truth::Model(&file.model), &beliefs, &outages, 5);
     let result = monte_carlo::run(&experiment, 256, &|_| {}).unwrap().remove(0);
-    let epochs = nav_sim::metrics::epochs(&result);
-    let mut summary = nav_sim::metrics::Summary::of(&result, &epochs, 5);
+    let epochs = nav_sim::navigation::metrics::epochs(&result);
+    let mut summary = nav_sim::navigation::metrics::Summary::of(&result, &epochs, 5);
     summary.measure_second_order(&assess(&track, &beliefs[0], &file.model).outage_ends);
     let shift = summary.outages[0].second_order.vel_d_m_s;
     let end = epochs.iter().rev().find(|e| e.t_s < 399.5).unwrap();

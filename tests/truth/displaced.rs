@@ -2,11 +2,11 @@
 
 use crate::fusion::{belief, model, recorded, run, settings, shipped};
 use glam::{DQuat, DVec3};
-use nav_sim::fusion::{Displaced, Recorded, Settings, Start, displaced, outcome};
-use nav_sim::sensors::gnss::GnssSettings;
-use nav_sim::simulation::Recording;
-use nav_sim::trajectory::reference::Reference;
-use nav_sim::trajectory::{Trajectory, TrajectorySample};
+use nav_sim::navigation::fusion::{Displaced, Recorded, Settings, Start, displaced, outcome};
+use nav_sim::navigation::sensors::gnss::GnssSettings;
+use nav_sim::navigation::simulation::Recording;
+use nav_sim::navigation::trajectory::reference::Reference;
+use nav_sim::navigation::trajectory::{Trajectory, TrajectorySample};
 
 /// Front, right, down (m).
 const ARM: DVec3 = DVec3::new(-1.5, 0.4, -0.9);

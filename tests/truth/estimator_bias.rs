@@ -2,9 +2,9 @@
 //! the estimators know by how much their variance is read high. Last scales: what is low by chance does not rule the fit.
 
 use nav_sim::calibration::{Estimator, ModelSpec, Replicate, Trim, Weighting, average, fit, implied};
-use nav_sim::noise::{Ar1, Composite, Process, Quantization, RandomWalk, Synthesizer, White};
-use nav_sim::rng::StreamKey;
-use nav_sim::wavelet::{Convention, Curve, Tuning, both};
+use nav_sim::signal::noise::{Ar1, Composite, Process, Quantization, RandomWalk, Synthesizer, White};
+use nav_sim::signal::rng::StreamKey;
+use nav_sim::signal::wavelet::{Convention, Curve, Tuning, both};
 use nav_sim_calibration::trend;
 use rayon::prelude::*;
 

@@ -2,8 +2,8 @@
 
 use nav_sim::formats::model_file;
 use nav_sim::formats::recordings::{ReadOptions, read};
-use nav_sim::imu::Recording;
-use nav_sim::noise::Composite;
+use nav_sim::signal::imu::Recording;
+use nav_sim::signal::noise::Composite;
 use std::path::{Path, PathBuf};
 
 fn shipped(name: &str) -> PathBuf {

@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 use nav_sim::calibration::{ModelSpec, Weighting, fit};
-use nav_sim::noise::{Composite, Process, Synthesizer, White};
-use nav_sim::rng::StreamKey;
-use nav_sim::wavelet::{Curve, classical};
+use nav_sim::signal::noise::{Composite, Process, Synthesizer, White};
+use nav_sim::signal::rng::StreamKey;
+use nav_sim::signal::wavelet::{Curve, classical};
 
 const SAMPLES: usize = 2048;
 const LEVELS: u32 = 6;

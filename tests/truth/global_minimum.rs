@@ -4,9 +4,9 @@
 
 use nalgebra::{DMatrix, DVector};
 use nav_sim::calibration::{ModelSpec, Weighting, fit};
-use nav_sim::noise::{Ar1, Composite, Process, Quantization, RandomWalk, White};
-use nav_sim::rng::{Generator, StreamKey};
-use nav_sim::wavelet::{Convention, Curve, Tuning, both};
+use nav_sim::signal::noise::{Ar1, Composite, Process, Quantization, RandomWalk, White};
+use nav_sim::signal::rng::{Generator, StreamKey};
+use nav_sim::signal::wavelet::{Convention, Curve, Tuning, both};
 use nav_sim_signal::wavelet::interval;
 use rand::RngExt;
 use rand_distr::StandardNormal;

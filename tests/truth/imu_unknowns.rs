@@ -2,15 +2,15 @@
 //! be, one that does not is far too sure.
 
 use crate::common::drive::{DRIVE, MODEL, done, nav_sim, place_with};
-use nav_sim::ekf::Belief;
 use nav_sim::formats::trajectory_file::{Options, load};
-use nav_sim::monte_carlo;
-use nav_sim::noise::{Ar1, Composite, Drift, Model, Process, White};
-use nav_sim::scenario::Scenario;
-use nav_sim::sensors::imu::Truth;
-use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::{NEES_DOF, RunResult};
-use nav_sim::trajectory::Trajectory;
+use nav_sim::navigation::ekf::Belief;
+use nav_sim::navigation::monte_carlo;
+use nav_sim::navigation::scenario::Scenario;
+use nav_sim::navigation::sensors::imu::Truth;
+use nav_sim::navigation::sensors::outage::Outage;
+use nav_sim::navigation::simulation::{NEES_DOF, RunResult};
+use nav_sim::navigation::trajectory::Trajectory;
+use nav_sim::signal::noise::{Ar1, Composite, Drift, Model, Process, White};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use std::fs;
 use std::path::Path;

@@ -1,15 +1,17 @@
 //! The covariance of true errors without sampling: against closed forms and against Monte Carlo.
 
 use glam::DVec3;
-use nav_sim::ekf::{Belief, FilterStates, InitialSettings};
-use nav_sim::metrics::{Estimate, SampleSize, Sensitivities};
-use nav_sim::monte_carlo;
-use nav_sim::noise::{Ar1, Composite, Drift, Ma1, Model, Process, Quantization, RandomWalk, White};
-use nav_sim::scenario::Scenario;
-use nav_sim::sensors::imu::Truth;
-use nav_sim::sensors::outage::Outage;
-use nav_sim::trajectory::Trajectory;
-use nav_sim::trajectory::profile::{Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning};
+use nav_sim::navigation::ekf::{Belief, FilterStates, InitialSettings};
+use nav_sim::navigation::metrics::{Estimate, SampleSize, Sensitivities};
+use nav_sim::navigation::monte_carlo;
+use nav_sim::navigation::scenario::Scenario;
+use nav_sim::navigation::sensors::imu::Truth;
+use nav_sim::navigation::sensors::outage::Outage;
+use nav_sim::navigation::trajectory::Trajectory;
+use nav_sim::navigation::trajectory::profile::{
+    Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
+};
+use nav_sim::signal::noise::{Ar1, Composite, Drift, Ma1, Model, Process, Quantization, RandomWalk, White};
 use nav_sim_navigation::simulation::lincov::{DRIFT, FilterPass, TruthSide, assess};
 
 const RATE_HZ: f64 = 100.0;

@@ -1,17 +1,19 @@
 //! What covariance analysis expects, against runs that are drawn: a drive of two minutes with an outage, for what
 //! the true IMU and the receiver can have and filters do or do not expect.
 
-use nav_sim::earth::GravityModel;
-use nav_sim::ekf::FilterStates;
-use nav_sim::metrics::{Estimate, Expected, FanEpoch, Sensitivities, epochs};
-use nav_sim::monte_carlo;
-use nav_sim::noise::{Ar1, Composite, Drift, Model, Process, Quantization, RandomWalk, White};
-use nav_sim::scenario::Scenario;
-use nav_sim::sensors::imu::Truth;
-use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::{Plan, RunRecord, RunResult};
-use nav_sim::trajectory::Trajectory;
-use nav_sim::trajectory::profile::{Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning};
+use nav_sim::navigation::earth::GravityModel;
+use nav_sim::navigation::ekf::FilterStates;
+use nav_sim::navigation::metrics::{Estimate, Expected, FanEpoch, Sensitivities, epochs};
+use nav_sim::navigation::monte_carlo;
+use nav_sim::navigation::scenario::Scenario;
+use nav_sim::navigation::sensors::imu::Truth;
+use nav_sim::navigation::sensors::outage::Outage;
+use nav_sim::navigation::simulation::{Plan, RunRecord, RunResult};
+use nav_sim::navigation::trajectory::Trajectory;
+use nav_sim::navigation::trajectory::profile::{
+    Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
+};
+use nav_sim::signal::noise::{Ar1, Composite, Drift, Model, Process, Quantization, RandomWalk, White};
 use nav_sim_navigation::earth::gravity_down;
 use nav_sim_navigation::metrics::{Budget, FAN_LEVELS};
 use nav_sim_navigation::metrics::{expected_fan, fan};

@@ -1,6 +1,6 @@
 //! The classical wavelet variance of 10⁸ samples on an offset of 9.81, to 1e-12 against exact integers.
 
-use nav_sim::wavelet::classical;
+use nav_sim::signal::wavelet::classical;
 
 const SAMPLES: usize = 100_000_000;
 const LEVELS: u32 = 25;

@@ -3,15 +3,15 @@
 use crate::alignment::{Step, belief, phone, recorded, settings, trajectory};
 use crate::fusion::shipped;
 use glam::{DQuat, DVec3};
-use nav_sim::ekf::{Belief, FilterStates};
-use nav_sim::frames::RollPitchYaw;
-use nav_sim::fusion::alignment::coarse;
-use nav_sim::fusion::mounting::{Mounting, MountingError, find};
-use nav_sim::fusion::{Recorded, Settings, fuse};
-use nav_sim::imu::ImuIncrement;
-use nav_sim::simulation::Recording;
-use nav_sim::trajectory::Trajectory;
-use nav_sim::trajectory::reference::Reference;
+use nav_sim::navigation::ekf::{Belief, FilterStates};
+use nav_sim::navigation::frames::RollPitchYaw;
+use nav_sim::navigation::fusion::alignment::coarse;
+use nav_sim::navigation::fusion::mounting::{Mounting, MountingError, find};
+use nav_sim::navigation::fusion::{Recorded, Settings, fuse};
+use nav_sim::navigation::simulation::Recording;
+use nav_sim::navigation::trajectory::Trajectory;
+use nav_sim::navigation::trajectory::reference::Reference;
+use nav_sim::signal::imu::ImuIncrement;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 const DEG: f64 = std::f64::consts::PI / 180.0;

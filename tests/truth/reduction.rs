@@ -3,8 +3,8 @@
 
 use nav_sim::formats::model_file;
 use nav_sim::formats::trajectory_file::{Options, load};
-use nav_sim::scenario::{Reduction, Scenario};
-use nav_sim::sensors::outage::Outage;
+use nav_sim::navigation::scenario::{Reduction, Scenario};
+use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{Assessment, assess};
 use std::path::Path;
 

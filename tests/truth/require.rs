@@ -1,17 +1,19 @@
 //! The IMU that a limit needs meets it in sampled runs, and answers are monotone.
 
 use nav_sim::formats::datasheet::{Figure, catalogued};
-use nav_sim::imu::Sensor;
-use nav_sim::monte_carlo;
-use nav_sim::noise::{Ar1, Composite, Drift as NoiseDrift, GaussMarkov, Model, Process, White};
-use nav_sim::require::{
+use nav_sim::navigation::monte_carlo;
+use nav_sim::navigation::require::{
     Answer, Course, Drift, IMU_PARAMETERS, Limit, Margins, Need, Part, PartMargin, Quantity, RequireError,
 };
-use nav_sim::scenario::Scenario;
-use nav_sim::sensors::imu::Truth;
-use nav_sim::sensors::outage::Outage;
-use nav_sim::trajectory::Trajectory;
-use nav_sim::trajectory::profile::{Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning};
+use nav_sim::navigation::scenario::Scenario;
+use nav_sim::navigation::sensors::imu::Truth;
+use nav_sim::navigation::sensors::outage::Outage;
+use nav_sim::navigation::trajectory::Trajectory;
+use nav_sim::navigation::trajectory::profile::{
+    Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
+};
+use nav_sim::signal::imu::Sensor;
+use nav_sim::signal::noise::{Ar1, Composite, Drift as NoiseDrift, GaussMarkov, Model, Process, White};
 use nav_sim_navigation::simulation::REPORTED;
 use nav_sim_navigation::simulation::lincov::{FilterPass, Track, TruthSide};
 

@@ -1,16 +1,16 @@
 //! What attitude errors do to second order: to the vertical channel, and to the NEES of a filter whose model is right; against closed
 //! forms and against runs.
 
-use nav_sim::metrics::{Estimate, Expected, Summary};
-use nav_sim::monte_carlo;
-use nav_sim::noise::{Ar1, Composite, Kind as Noise, Model, Process, White};
+use nav_sim::navigation::metrics::{Estimate, Expected, Summary};
+use nav_sim::navigation::monte_carlo;
+use nav_sim::navigation::scenario::Scenario;
+use nav_sim::navigation::sensors::imu::Truth;
+use nav_sim::navigation::sensors::outage::Outage;
+use nav_sim::navigation::simulation::OutageRecord;
+use nav_sim::navigation::trajectory::Trajectory;
+use nav_sim::navigation::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start};
 use nav_sim::prelude::{TrajectoryOptions, load_trajectory};
-use nav_sim::scenario::Scenario;
-use nav_sim::sensors::imu::Truth;
-use nav_sim::sensors::outage::Outage;
-use nav_sim::simulation::OutageRecord;
-use nav_sim::trajectory::Trajectory;
-use nav_sim::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start};
+use nav_sim::signal::noise::{Ar1, Composite, Kind as Noise, Model, Process, White};
 use nav_sim_navigation::simulation::lincov::{FilterPass, TruthSide};
 use std::path::Path;
 
@@ -130,7 +130,7 @@ fn the_filters_of_runs_state_what_is_expected_of_the_vertical_channel() {
     let beliefs = [scenario.with_full_noise().belief(&model, &outages, &track).unwrap()];
     let experiment = scenario.experiment(&path, Truth::Model(&model), &beliefs, &outages, 3);
     let sampled = monte_carlo::run(&experiment, RUNS, &|_| {}).unwrap().remove(0);
-    let epochs = nav_sim::metrics::epochs(&sampled);
+    let epochs = nav_sim::navigation::metrics::epochs(&sampled);
     let sampled = &Summary::of(&sampled, &epochs, 3).outages[0];
     let expected = &Expected::along(&track, &experiment, &beliefs[0], &model).unwrap().outages[0];
     let linear = FilterPass::new(&track, &beliefs[0]).sigma_at_ends()[0];
@@ -176,7 +176,7 @@ fn state_what_is_expected(scenario: &Scenario, model: &Model, truth: &Model) {
     let expected = Expected::along(&track, &experiment, &beliefs[0], truth).unwrap().epochs;
     let sources = TruthSide::together(&TruthSide::sources(&experiment, truth));
     let linear = FilterPass::new(&track, &beliefs[0]).errors(&sources).reports;
-    let epochs = nav_sim::metrics::epochs(&sampled);
+    let epochs = nav_sim::navigation::metrics::epochs(&sampled);
     for (second, (sampled, expected)) in epochs.iter().zip(&expected).enumerate() {
         for i in 0..9 {
             let runs = sampled.asee.0[i];

@@ -2,11 +2,11 @@
 //! them. And ideal samples and strapdown agree with independent truth.
 
 use glam::DVec3;
-use nav_sim::earth::GravityModel;
 use nav_sim::formats::trajectory_file::{Options, load};
-use nav_sim::frames::NavState;
-use nav_sim::sensors::ideal_imu::ideal_imu;
-use nav_sim::trajectory::Trajectory;
+use nav_sim::navigation::earth::GravityModel;
+use nav_sim::navigation::frames::NavState;
+use nav_sim::navigation::sensors::ideal_imu::ideal_imu;
+use nav_sim::navigation::trajectory::Trajectory;
 use nav_sim_navigation::closure::{Bounds, Closure};
 use nav_sim_navigation::earth::ned_difference;
 use nav_sim_navigation::lanes::Vec3;

@@ -1,14 +1,16 @@
 //! Tuned models are honest: the factor of a process that is larger in truth is found, and sampled runs agree.
 
-use nav_sim::ekf::Belief;
-use nav_sim::metrics::{Estimate, Expected, VerdictKind};
-use nav_sim::monte_carlo;
-use nav_sim::noise::{Composite, Model, Process, RandomWalk, White};
-use nav_sim::scenario::Scenario;
-use nav_sim::sensors::imu::Truth;
-use nav_sim::sensors::outage::Outage;
-use nav_sim::trajectory::Trajectory;
-use nav_sim::trajectory::profile::{Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning};
+use nav_sim::navigation::ekf::Belief;
+use nav_sim::navigation::metrics::{Estimate, Expected, VerdictKind};
+use nav_sim::navigation::monte_carlo;
+use nav_sim::navigation::scenario::Scenario;
+use nav_sim::navigation::sensors::imu::Truth;
+use nav_sim::navigation::sensors::outage::Outage;
+use nav_sim::navigation::trajectory::Trajectory;
+use nav_sim::navigation::trajectory::profile::{
+    Acceleration, Bank, Kind, Length, Profile, Segment, Start, Turning,
+};
+use nav_sim::signal::noise::{Composite, Model, Process, RandomWalk, White};
 use nav_sim_navigation::simulation::lincov::{Aim, Factor, Filter, Per, Task, Track, TrueErrors, scaled};
 
 const OUTAGES: [Outage; 1] = [Outage { start_s: 200.0, end_s: 260.0 }];
