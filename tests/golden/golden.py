@@ -6,7 +6,8 @@
     golden.py PROGRAM --against OLD    also runs OLD and shows the first differences of each output
 
 Commands run on shipped data, with fixed seeds, in a temporary directory. Left out of the hashes: what depends on the
-machine or the run (times, threads, commands, versions, hashes), and words (verdicts, notes, comments).
+machine or the run (times, threads, commands, versions, hashes), and words (verdicts, notes, comments). Hashes are
+stored for each arithmetic (see `arithmetic`); where it is another, the check is skipped.
 --only TEXT runs the commands up to the last whose name has TEXT, and compares those that have it.
 """
 
@@ -15,6 +16,7 @@ import csv
 import hashlib
 import io
 import json
+import math
 import re
 import shutil
 import subprocess
@@ -239,10 +241,13 @@ def digest(lines):
     return hashlib.sha256("\n".join(lines).encode()).hexdigest()[:20]
 
 
-def width(program):
-    """Vector instructions that the program uses on this machine: the last digits may depend on them."""
+def arithmetic(program):
+    """What the last digits depend on: fused multiply-add in the kernels (AVX2 and AVX-512 give the same), and the
+    system's elementary functions, by a hash of their values."""
     said = subprocess.run([program, "--version", "-v"], capture_output=True, text=True).stdout
-    return next((name for name in ["AVX-512", "AVX2"] if name in said), "portable")
+    kernels = "fused" if "AVX" in said else "portable"
+    values = [f(0.001 * i) for i in range(1, 3000) for f in (math.sin, math.exp, math.log, math.tan, math.cosh)]
+    return f"{kernels}, libm {digest([repr(value) for value in values])[:8]}"
 
 
 def show(name, old, new):
@@ -264,7 +269,7 @@ def main():
     parser.add_argument("--against", type=lambda path: str(Path(path).resolve()))
     parser.add_argument("--only", default="")
     arguments = parser.parse_args()
-    here = width(arguments.program)
+    here = arithmetic(arguments.program)
     outputs = all_outputs(arguments.program, arguments.only)
     hashes = {name: digest(lines) for name, lines in outputs.items()}
     stored = json.loads(HASHES.read_text()) if HASHES.exists() else {}
