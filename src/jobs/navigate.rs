@@ -155,7 +155,10 @@ pub fn navigate(
                 Some((_, expected)) if method == Method::Both => {
                     sampled = sampled.beside(expected, &analysis.fan(&belief), observer);
                 }
-                Some((_, expected)) => sampled.summary.doubt_by(&expected),
+                Some((_, expected)) => {
+                    let agreement = Agreement::of(&sampled.summary, &expected);
+                    sampled.summary.compare_with(&expected, &agreement);
+                }
                 None => {}
             }
             sampled
@@ -339,7 +342,7 @@ impl<'a> Analysis<'a> {
 }
 
 impl Navigation {
-    /// Runs beside what was expected of them: the verdict is that of the expected figures.
+    /// Runs beside what was expected of them.
     fn beside(mut self, expected: Summary, fan: &[FanEpoch], observer: &dyn Observer<Note>) -> Self {
         let agreement = Agreement::of(&self.summary, &expected);
         observer.remark(&Note::Agreement(agreement.clone()));

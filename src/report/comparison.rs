@@ -1,8 +1,8 @@
 //! `comparison.json`, what is in it and what is said of it.
 
 use super::short::short_names;
-use super::verdict::{Grade, verdict_in_short};
-use nav_sim_navigation::metrics::{OutageComparison, Verdict};
+use super::verdict::verdict_in_short;
+use nav_sim_navigation::metrics::{OutageComparison, Verdict, VerdictKind};
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 use serde::Serialize;
 
@@ -183,16 +183,16 @@ fn rows<'a>(
     })
 }
 
-/// Which filters are as good as they believe: a line a grade, the gravest first.
+/// Which filters are as good as they believe: a line a kind, the gravest first.
 pub(crate) fn verdict_lines(verdicts: &[VerdictRow]) -> Vec<String> {
     let names = short_names(&verdicts.iter().map(|row| row.run.as_str()).collect::<Vec<_>>());
-    let line = |grade: Grade| {
-        let of_grade = verdicts.iter().zip(&names).filter(|(row, _)| Grade::of(&row.verdict) == grade);
+    let line = |kind: VerdictKind| {
+        let of_kind = verdicts.iter().zip(&names).filter(|(row, _)| row.verdict.kind == kind);
         let runs: Vec<String> =
-            of_grade.map(|(row, name)| format!("{name} ({})", verdict_in_short(&row.verdict))).collect();
-        (!runs.is_empty()).then(|| format!("{}: {}", grade.words(), runs.join(", ")))
+            of_kind.map(|(row, name)| format!("{name} ({})", verdict_in_short(&row.verdict))).collect();
+        (!runs.is_empty()).then(|| format!("{kind}: {}", runs.join(", ")))
     };
-    Grade::ALL.into_iter().filter_map(line).collect()
+    VerdictKind::ALL.into_iter().rev().filter_map(line).collect()
 }
 
 /// What the ± of the table are.

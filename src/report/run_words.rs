@@ -3,20 +3,14 @@
 use super::markdown::markdown_table as table;
 use super::number::{readable, window};
 use super::requirement::requirement_line;
-use super::verdict::verdict_line;
+use super::verdict::verdict_lines;
 use nav_sim_navigation::metrics::{Agreement, Budget, OutageSummary, PerState, SettlingSecondOrder, Summary};
 use nav_sim_navigation::scenario::Method;
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 
-/// The verdict in words.
-pub(crate) fn verdict(summary: &Summary) -> String {
-    let windows: Vec<(f64, f64)> = summary.outages.iter().map(|o| (o.start_s, o.end_s)).collect();
-    verdict_line(&summary.verdict, &windows, summary.runs, summary.diverged)
-}
-
 /// The summary for people, the verdict first.
 pub(crate) fn text(summary: &Summary) -> String {
-    let mut text = format!("verdict: {}\n", verdict(summary));
+    let mut text = format!("verdict: {}\n", verdict_lines(summary).join("\n"));
     summary.require.iter().for_each(|met| text += &format!("{}\n", requirement_line(met, summary)));
     text += &beyond_linear(summary).map_or_else(String::new, |words| format!("{words}\n"));
     text += &format!("{}\n", how(summary));

@@ -5,7 +5,7 @@ use super::beyond_linear::BeyondLinear;
 use super::comparison::{CandidateResult, Label};
 use super::comparison_table::{table_rows, with_times};
 use super::number::{readable, window};
-use super::verdict::{Grade, verdict_in_short};
+use super::verdict::verdict_in_short;
 use nav_sim_navigation::metrics::{self, EpochMetrics, Measured, OutageComparison, OutageMetrics, Verdict};
 use nav_sim_navigation::simulation::{BIAS_NAMES, REPORTED, REPORTED_NAMES};
 
@@ -131,7 +131,7 @@ pub(crate) fn outage_rows(
     let runs = result.measured.sampled().len() as u64;
     let diverged = result.measured.sampled().iter().filter(|r| r.diverged).count() as u64;
     let verdict = result.measured.verdict();
-    let words = [result.reference, Grade::of(&verdict).words(), verdict.worst_state];
+    let words = [result.reference, verdict.kind.name(), verdict.worst_state];
     let row = |(i, outage): (usize, &OutageMetrics)| {
         let mut row = keys(result);
         row.extend(words.map(|word| Value::Text(word.to_owned())));
@@ -299,9 +299,8 @@ pub(crate) fn verdict_table(cells: &[ShownCell]) -> Vec<Vec<String>> {
     if let Some(cell) = cells.first() {
         rows[0].extend(cell.columns.iter().map(|c| c.name.clone()));
     }
-    let shown = |column: &ShownColumn| {
-        format!("{}, {}", Grade::of(&column.verdict).words(), verdict_in_short(&column.verdict))
-    };
+    let shown =
+        |column: &ShownColumn| format!("{}, {}", column.verdict.kind, verdict_in_short(&column.verdict));
     rows.extend(
         cells
             .iter()

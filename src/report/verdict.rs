@@ -1,88 +1,97 @@
 //! Verdicts in words.
 
 use super::number::{readable, window};
-use nav_sim_navigation::metrics::{ALL_STATES, StateName, Verdict, VerdictKind};
+use nav_sim_navigation::metrics::{ALL_STATES, StateName, Summary, Verdict, VerdictKind};
 
-/// One line: the verdict, by how much and where, the figures it rests on. `outages` are those of the
-/// experiment (start, end) in seconds; `runs` and `diverged` count its runs.
-pub(crate) fn verdict_line(verdict: &Verdict, outages: &[(f64, f64)], runs: u64, diverged: u64) -> String {
-    let figures = format!(
-        "NEES {} (9 if right), coverage {:.3}",
-        with_error(verdict.nees, verdict.nees_std_error),
-        verdict.coverage
-    );
-    let by = if verdict.is_expected() { ", by covariance analysis" } else { "" };
-    let beyond = beyond(verdict, outages);
-    let departure = departure(verdict, outages);
-    match verdict.kind {
+/// Most characters of a line, of which "verdict: " takes some.
+const WIDTH: usize = 111;
+
+/// The verdict on the filter of a run, what it rests on, and the word of covariance analysis beside it; a contradiction of
+/// the two comes first.
+pub(crate) fn verdict_lines(summary: &Summary) -> Vec<String> {
+    let verdict = &summary.verdict;
+    let mut lines = vec![words(summary)];
+    let Some(analysed) = verdict.by_covariance_analysis else { return lines };
+    if summary.is_contradicted {
+        let line = format!(
+            "{} in the runs, {analysed} by covariance analysis: errors are no longer small",
+            verdict.kind
+        );
+        lines.insert(0, line);
+        return lines;
+    }
+    let beside = format!("by covariance analysis {analysed}");
+    match format!("{}; {beside}", lines[0]) {
+        both if both.chars().count() <= WIDTH => lines[0] = both,
+        _ => lines.push(beside),
+    }
+    lines
+}
+
+fn words(summary: &Summary) -> String {
+    let (verdict, runs, diverged) = (&summary.verdict, summary.runs, summary.diverged);
+    let windows: Vec<(f64, f64)> = summary.outages.iter().map(|o| (o.start_s, o.end_s)).collect();
+    let nees = format!("NEES {} (9 if right)", with_error(verdict.nees, verdict.nees_std_error));
+    let by = if verdict.is_expected() { " by covariance analysis" } else { "" };
+    let kind = verdict.kind;
+    match kind {
         VerdictKind::Diverged if diverged == runs => format!("diverged: all {runs} runs"),
         VerdictKind::Diverged => {
-            format!("diverged: {diverged} of {runs} runs; of the others, {departure}; {figures}{beyond}")
+            format!("diverged: {diverged} of {runs} runs; of the others, {}", departure(verdict, &windows))
         }
-        VerdictKind::Overconfident if verdict.is_lost() => {
-            format!("OVERCONFIDENT BY FAR, the filter is lost: {departure}; {figures}")
+        VerdictKind::Overconfident | VerdictKind::Underconfident => {
+            let far = if verdict.is_far_off() { " by far" } else { "" };
+            format!("{kind}{far}{by}: {}; NEES {}", departure(verdict, &windows), readable(verdict.nees))
         }
-        VerdictKind::Overconfident => format!("overconfident: {departure}; {figures}{by}{beyond}"),
-        VerdictKind::Underconfident => format!("underconfident: {departure}; {figures}{by}{beyond}"),
-        VerdictKind::Ok if verdict.is_expected() => format!(
-            "{}: {figures}; by covariance analysis no state is off by more than {:.0} %, over the run or at the \
-             end of an outage{beyond}",
-            Grade::of(verdict).words(),
-            100.0 * verdict.tolerance
-        ),
-        VerdictKind::Ok => {
-            let percent = |ratio: f64| readable(100.0 * (ratio - 1.0));
+        VerdictKind::Undecided => {
+            let percent = 100.0 * (verdict.detectable_state_ratio - 1.0);
+            let needed = verdict.runs_to_decide.unwrap_or_default();
             format!(
-                "consistent: {figures}; {} can detect errors {} % above the filter's standard deviations, {} % in one \
-                 state alone{beyond}",
-                independent(verdict.independent_runs),
-                percent(verdict.detectable_ratio),
-                percent(verdict.detectable_state_ratio)
+                "undecided: {} cannot tell errors below {percent:.0} % in one state; {needed} would decide",
+                independent(verdict.independent_runs)
             )
+        }
+        VerdictKind::Doubtful => {
+            format!("doubtful: NEES {}{by}, {}", readable(verdict.nees), beyond(verdict, &windows))
+        }
+        VerdictKind::Consistent | VerdictKind::NotMet => {
+            let rest = match verdict.is_expected() {
+                true => "by covariance analysis".to_owned(),
+                false => independent(verdict.independent_runs),
+            };
+            format!("{kind}: {nees}, coverage {:.3}; {rest}", verdict.coverage)
         }
     }
 }
 
-/// Until where a verdict of linear theory holds, and what decides then.
+/// Until where covariance analysis holds, and what decides then.
 fn beyond(verdict: &Verdict, outages: &[(f64, f64)]) -> String {
-    let Some((start_s, end_s)) = verdict.beyond_linear.and_then(|k| outages.get(k)) else {
-        return String::new();
-    };
-    let window = window(*start_s, *end_s);
-    match verdict.is_expected() {
-        true => format!(
-            "; this holds until the outage {window}, in which errors grow beyond linear theory: confirm with --method both"
-        ),
-        false => format!("; the runs decide, since errors grow beyond linear theory in the outage {window}"),
-    }
+    let outage = verdict.beyond_linear.and_then(|k| outages.get(k));
+    let place = outage
+        .map_or_else(String::new, |(start_s, end_s)| format!(" in outage {}", window(*start_s, *end_s)));
+    format!("beyond linear theory{place}: confirm with --method both")
 }
 
 fn independent(runs: f64) -> String {
-    let shown = if runs.fract() == 0.0 { format!("{runs}") } else { format!("{runs:.1}") };
-    if runs == 1.0 { "one run".to_owned() } else { format!("{shown} independent runs") }
+    match runs {
+        1.0 => "one run".to_owned(),
+        _ if runs.fract() == 0.0 => format!("{runs} runs"),
+        _ => format!("runs worth {runs:.1} independent ones"),
+    }
 }
 
 /// How far errors are from what the filter believes, in which state and when.
 fn departure(verdict: &Verdict, outages: &[(f64, f64)]) -> String {
     let place = match verdict.worst_outage.and_then(|k| outages.get(k)) {
-        Some((start_s, end_s)) => {
-            format!("at the end of the outage {}", window(*start_s, *end_s))
-        }
+        Some((start_s, end_s)) => format!("at the end of outage {}", window(*start_s, *end_s)),
         None => "over the run".to_owned(),
     };
     let times = with_error(verdict.ratio, verdict.ratio_std_error);
-    match verdict.worst_state {
-        ALL_STATES => format!(
-            "errors are {times} times what the filter believes of all states together, and of no single one, {place} (NEES \
-             {} there)",
-            readable(9.0 * verdict.ratio.powi(2))
-        ),
-        state => format!("errors are {times} times the filter's standard deviation in {state} {place}"),
-    }
+    format!("errors {times} times sigma in {} {place}", state_in_words(verdict.worst_state))
 }
 
 fn with_error(value: f64, error: f64) -> String {
-    if error.is_finite() { format!("{} ± {}", readable(value), readable(error)) } else { readable(value) }
+    if error > 0.0 { format!("{} ± {error:.2}", readable(value)) } else { readable(value) }
 }
 
 /// A state, or all of them, in words.
@@ -90,79 +99,28 @@ pub(crate) fn state_in_words(name: StateName) -> &'static str {
     if name == ALL_STATES { "all states together" } else { name }
 }
 
-/// For a line or a cell among several: "NEES 1189, 34.6 × in yaw_deg"; of runs that found nothing, what they would have found:
-/// "NEES 8.7, 0.91 × in yaw_deg, 57 % detectable".
+/// For a line or a cell among several: "NEES 1189, 34.6 × in yaw_deg"; of runs too few to decide, how many would:
+/// "NEES 8.7, 0.91 × in yaw_deg, 27 runs would decide".
 pub(crate) fn verdict_in_short(verdict: &Verdict) -> String {
-    let figures = format!(
-        "NEES {}, {} × in {}",
-        readable(verdict.nees),
-        readable(verdict.ratio),
-        state_in_words(verdict.worst_state)
-    );
-    match verdict.kind {
-        VerdictKind::Ok if verdict.independent_runs.is_finite() => {
-            format!("{figures}, {} % detectable", readable(100.0 * (verdict.detectable_state_ratio - 1.0)))
-        }
-        VerdictKind::Overconfident if verdict.is_lost() => format!("the filter is lost, {figures}"),
-        _ => figures,
-    }
+    let decide =
+        verdict.runs_to_decide.map_or_else(String::new, |runs| format!(", {runs} runs would decide"));
+    let state = state_in_words(verdict.worst_state);
+    format!("NEES {}, {} × in {state}{decide}", readable(verdict.nees), readable(verdict.ratio))
 }
 
-/// What a verdict says of a filter, the gravest first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Grade {
-    /// At least one run came to nothing.
-    Diverged,
-    /// Errors are larger than the filter believes.
-    Overconfident,
-    /// Errors are smaller than the filter believes.
-    Underconfident,
-    /// Linear theory finds no fault, and errors are beyond it.
-    LinearOnly,
-    /// Nothing speaks against the filter.
-    Consistent,
-}
-
-impl Grade {
-    /// All of them.
-    pub(crate) const ALL: [Self; 5] =
-        [Self::Diverged, Self::Overconfident, Self::Underconfident, Self::LinearOnly, Self::Consistent];
-
-    /// Of a verdict.
-    pub(crate) fn of(verdict: &Verdict) -> Self {
-        match verdict.kind {
-            VerdictKind::Diverged => Self::Diverged,
-            VerdictKind::Overconfident => Self::Overconfident,
-            VerdictKind::Underconfident => Self::Underconfident,
-            VerdictKind::Ok if verdict.is_expected() && verdict.beyond_linear.is_some() => Self::LinearOnly,
-            VerdictKind::Ok => Self::Consistent,
-        }
-    }
-
-    /// The gravest of several.
-    pub(crate) fn gravest<'a>(verdicts: impl Iterator<Item = &'a Verdict>) -> Self {
-        verdicts.map(Self::of).min().unwrap_or(Self::Consistent)
-    }
-
-    /// In a word, or a few.
-    pub(crate) const fn words(self) -> &'static str {
-        match self {
-            Self::Diverged => "diverged",
-            Self::Overconfident => "overconfident",
-            Self::Underconfident => "underconfident",
-            Self::LinearOnly => "consistent in linear theory only",
-            Self::Consistent => "consistent",
-        }
-    }
+/// The gravest of several.
+pub(crate) fn gravest<'a>(verdicts: impl Iterator<Item = &'a Verdict>) -> VerdictKind {
+    verdicts.map(|verdict| verdict.kind).max().unwrap_or(VerdictKind::Consistent)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nav_sim_navigation::simulation::{OutageRecord, RunRecord};
+    use nav_sim_navigation::metrics::epochs;
+    use nav_sim_navigation::simulation::{OutageRecord, RunRecord, RunResult};
 
     /// Runs whose errors are `scale` times what the filter believes, in every state and at every time.
-    fn verdict(runs: u64, scale: f64) -> Verdict {
+    fn summary(runs: u64, scale: f64) -> Summary {
         let square = scale * scale;
         let outage = OutageRecord {
             see_end: [1.0; 9],
@@ -178,34 +136,39 @@ mod tests {
             normalised_sq: [square; 9],
             ..RunRecord::default()
         };
-        Verdict::of(&(0..runs).map(run).collect::<Vec<_>>(), 1, None)
+        let result = RunResult {
+            runs: (0..runs).map(run).collect(),
+            outages: vec![(300.123_456_789, 390.0)],
+            ..RunResult::default()
+        };
+        Summary::of(&result, &epochs(&result), 1)
     }
 
     #[test]
-    fn verdicts_are_told_in_words() {
-        let outages = [(300.123_456_789, 390.0)];
-        let line = |scale: f64| verdict_line(&verdict(100, scale), &outages, 100, 0);
-        assert!(
-            line(1.0)
-                .starts_with("consistent: NEES 9.00 ± 0 (9 if right), coverage 0.500; 100 independent runs")
-        );
-        let over = line(1.5);
-        let expected = "overconfident: errors are 1.50 ± 0 times the filter's standard deviation in ";
-        assert!(
-            over.starts_with(expected) && over.contains("at the end of the outage 300.12–390 s"),
-            "{over}"
-        );
-        assert!(line(0.5).starts_with("underconfident: errors are 0.500"), "{}", line(0.5));
-        let short = |runs: u64, scale: f64| verdict_in_short(&verdict(runs, scale));
-        assert!(
-            short(100, 1.0).contains(" × in ") && short(100, 1.0).ends_with(" % detectable"),
-            "{}",
-            short(100, 1.0)
-        );
-        assert!(
-            !short(100, 1.5).contains("detectable")
-                && short(100, 12.0).starts_with("the filter is lost, NEES")
-        );
-        assert!(line(12.0).starts_with("OVERCONFIDENT BY FAR, the filter is lost: "), "{}", line(12.0));
+    fn verdicts_are_told_in_one_line() {
+        let line = |runs: u64, scale: f64| {
+            let lines = verdict_lines(&summary(runs, scale));
+            assert!(lines.len() == 1 && lines[0].chars().count() <= WIDTH, "{lines:?}");
+            lines[0].clone()
+        };
+        assert_eq!(line(100, 1.0), "consistent: NEES 9.00 (9 if right), coverage 0.500; 100 runs");
+        let over = line(100, 1.5);
+        assert!(over.starts_with("overconfident: errors 1.50 times sigma in "), "{over}");
+        assert!(over.contains("at the end of outage 300.12–390 s"), "{over}");
+        assert!(line(100, 0.5).starts_with("underconfident: errors 0.500"), "{}", line(100, 0.5));
+        assert!(line(100, 12.0).starts_with("overconfident by far: "), "{}", line(100, 12.0));
+        let few = line(8, 1.0);
+        assert!(few.starts_with("undecided: 8 runs cannot tell") && few.ends_with(" would decide"), "{few}");
+    }
+
+    /// The word of covariance analysis stands beside the verdict; what the runs contradict comes first.
+    #[test]
+    fn covariance_analysis_has_a_word_beside_the_runs() {
+        let mut found = summary(8, 1.0);
+        found.verdict.by_covariance_analysis = Some(VerdictKind::Overconfident);
+        let lines = verdict_lines(&found);
+        assert!(lines.join("\n").ends_with("by covariance analysis overconfident"), "{lines:?}");
+        found.is_contradicted = true;
+        assert!(verdict_lines(&found)[0].starts_with("undecided in the runs, overconfident by"), "{lines:?}");
     }
 }

@@ -104,7 +104,7 @@ impl Texts {
             text += &format!("{}\n\n{said}\n\n{}\n{legend}\n\n", markdown(name), markdown_table(rows));
         }
         text += "Verdict on each filter: NEES over the run (9 if right), error over its standard deviation in the \
-                 state that is farthest off; detectable: what so many runs find in one state\n\n";
+                 state that is farthest off\n\n";
         text += &markdown_table(&report::verdict_table(&self.cells));
         if let Some(line) = self.beyond_linear() {
             text += &format!("\n\n{}", markdown(&line));

@@ -117,7 +117,7 @@ fn ratios_are_those_that_were_made() {
     // errors are 1; the filters believe 1, 1.75 and 0.9 times (1 to 1.38): the second is too timid for 20 runs
     let mut lines = ran.stdout.lines();
     assert!(lines.next().unwrap().starts_with("underconfident: II_awv (NEES 9.00, 0."), "{}", ran.stdout);
-    assert!(lines.next().unwrap().starts_with("consistent: I_awv (NEES 9.00, "), "{}", ran.stdout);
+    assert!(lines.next().unwrap().starts_with("undecided: I_awv (NEES 9.00, "), "{}", ran.stdout);
     assert!(ran.stdout.contains("NEES, coverage, RMSE SR-AWV"), "{}", ran.stdout);
     assert!(ran.stdout.contains("9.00, 0.950, +0.00, +0.00") && ran.stdout.lines().count() <= 20);
     // the same table for other programs, outages by their times
@@ -155,7 +155,7 @@ fn ratios_are_those_that_were_made() {
     assert_eq!((&json["reference"], &json["paired"]), (&"I_awv".into(), &true.into()));
     let kinds: Vec<&str> =
         json["verdicts"].as_array().unwrap().iter().map(|v| v["kind"].as_str().unwrap()).collect();
-    assert_eq!(kinds, ["ok", "underconfident", "ok"]);
+    assert_eq!(kinds, ["undecided", "underconfident", "undecided"]);
     let row =
         json["rows"].as_array().unwrap().iter().find(|r| r["run"] == "II_awv" && r["state"] == "roll_deg");
     let row = row.unwrap();
@@ -172,7 +172,7 @@ fn verdicts_are_those_of_the_directories() {
     write(&directory.path().join("b"), 1.0, |_| {});
     let summary = directory.path().join("b/summary.json");
     let text = std::fs::read_to_string(&summary).unwrap();
-    let doubted = text.replacen("\"kind\": \"ok\"", "\"kind\": \"overconfident\"", 1);
+    let doubted = text.replacen("\"kind\": \"undecided\"", "\"kind\": \"overconfident\"", 1);
     assert_ne!(doubted, text);
     std::fs::write(&summary, doubted).unwrap();
     let manifest = directory.path().join("b/manifest.json");
@@ -182,7 +182,7 @@ fn verdicts_are_those_of_the_directories() {
     std::fs::write(manifest, json.to_string()).unwrap();
     let ran = compare(directory.path(), &["a", "b", "--reference", "a"]);
     assert!(ran.stdout.starts_with("overconfident: b (NEES 9.00, "), "{}\n{}", ran.stdout, ran.stderr);
-    assert!(ran.stdout.contains("\nconsistent: a ("), "{}", ran.stdout);
+    assert!(ran.stdout.contains("\nundecided: a ("), "{}", ran.stdout);
 }
 
 /// Without `--out` a file of the default's name is replaced only if it is a comparison.

@@ -146,7 +146,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     output::doubt_filter(&found.summary, &scenario, &inputs.job.truth, session);
     session.wrote(&args.out);
     all_finite(&found.summary)?;
-    not_lost(&found.summary, &scenario)?;
+    not_far_off(&found.summary, &scenario)?;
     required(&found.summary)
 }
 
@@ -204,12 +204,14 @@ fn seed(scenario: &Scenario, session: &Session) -> Option<u64> {
 }
 
 /// A filter whose errors are of another order than it believes did what was asked for, and is of no use.
-fn not_lost(summary: &Summary, scenario: &Scenario) -> Result<(), Failure> {
-    if !summary.verdict.is_lost() {
+fn not_far_off(summary: &Summary, scenario: &Scenario) -> Result<(), Failure> {
+    if !summary.verdict.is_far_off() {
         return Ok(());
     }
-    let message =
-        format!("the filter is lost: NEES {:.0}, {} if it is right", summary.nees.mean, summary.nees.dof);
+    let message = format!(
+        "the filter is overconfident by far: NEES {:.0}, {} if it is right",
+        summary.nees.mean, summary.nees.dof
+    );
     let hint = match scenario.doubts().is_empty() {
         true => "the results are written; does MODEL describe the errors of --truth or --static?",
         false => "the results are written; the warnings name what the filter does not expect",

@@ -77,9 +77,11 @@ pub(super) fn write(
 
 /// Says aloud that a filter believes too much of itself, and what helps.
 pub(super) fn doubt_filter(summary: &Summary, scenario: &Scenario, truth: &TrueImu, session: &Session) {
-    if summary.verdict.kind == VerdictKind::Overconfident {
+    let (own, analysed) = (summary.verdict.kind, summary.verdict.by_covariance_analysis);
+    let undecided = own == VerdictKind::Undecided;
+    if own == VerdictKind::Overconfident || undecided && analysed == Some(VerdictKind::Overconfident) {
         let remedy = remedy(summary, &scenario.doubts(), truth);
-        session.warn(format!("the filter is {}; {remedy}", run_words::verdict(summary)));
+        session.warn(format!("the filter is overconfident: {remedy}"));
     }
 }
 
@@ -92,7 +94,7 @@ fn remedy(summary: &Summary, unexpected: &[Unexpected], truth: &TrueImu) -> Stri
     let quality = summary.reduction.as_ref().and_then(|reduction| reduction.quality.as_ref());
     let ratios =
         quality.into_iter().flat_map(|q| q.outage_end.iter().chain([&q.mean]).flat_map(|state| state.0));
-    if summary.is_second_order {
+    if summary.is_contradicted {
         return TOO_LARGE.to_owned();
     }
     if let Some(largest) = largest(summary, unexpected) {

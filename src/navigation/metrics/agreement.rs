@@ -1,7 +1,6 @@
 //! Whether runs scatter about what covariance analysis expects of them.
 
 use super::summary::Summary;
-use super::verdict::VerdictKind;
 use crate::simulation::REPORTED_NAMES;
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -70,60 +69,19 @@ impl Agreement {
 }
 
 impl Summary {
-    /// With what covariance analysis expects beside the runs. The verdict becomes that of the expected figures, of
-    /// which chance has no part, unless the runs contradict them: then errors are no longer small, and the runs are right. Where errors
-    /// are beyond linear theory the runs are believed without that, being too few to contradict it.
+    /// With what covariance analysis expects beside the runs.
     pub fn expect(&mut self, expected: Self, agreement: Agreement) {
         self.method = "both";
-        self.take_second_order(&expected);
-        let diverged = self.verdict.kind == VerdictKind::Diverged;
-        self.is_second_order = self.surpasses(&expected) && agreement.is_broken();
-        let is_linear = expected.verdict.beyond_linear.is_none();
-        if !agreement.is_broken() && (is_linear || self.is_faulted_by(&expected)) {
-            self.take_verdicts(&expected);
-            // Divergence is a fact of the runs that no linear analysis can take back.
-            if diverged {
-                self.verdict.kind = VerdictKind::Diverged;
-                self.outages.iter_mut().for_each(|o| o.verdict.kind = VerdictKind::Diverged);
-            }
-        }
-        self.verdict.beyond_linear = expected.verdict.beyond_linear;
+        self.compare_with(&expected, &agreement);
         self.lincov = Some(Box::new(expected));
         self.agreement = Some(agreement);
     }
 
-    /// A filter that runs do not find wrong, being too few, is wrong where covariance analysis finds it so and the runs
-    /// do not contradict that.
-    pub fn doubt_by(&mut self, expected: &Self) {
+    /// Puts the word of covariance analysis beside the verdict, which stays that of the runs.
+    pub fn compare_with(&mut self, expected: &Self, agreement: &Agreement) {
         self.take_second_order(expected);
-        self.is_second_order = self.surpasses(expected) && Agreement::of(self, expected).is_broken();
-        if self.is_faulted_by(expected) && !Agreement::of(self, expected).is_broken() {
-            self.take_verdicts(expected);
-        }
-    }
-
-    /// Whether covariance analysis finds a fault where the runs find none: their own alarm stands, and an expectation without fault
-    /// adds nothing to it.
-    fn is_faulted_by(&self, expected: &Self) -> bool {
-        let is_fault = match expected.verdict.kind {
-            VerdictKind::Overconfident => true,
-            // errors that linear theory has too small are larger by what it does not contain
-            VerdictKind::Underconfident => expected.verdict.beyond_linear.is_none(),
-            VerdictKind::Ok | VerdictKind::Diverged => false,
-        };
-        self.verdict.kind == VerdictKind::Ok && is_fault
-    }
-
-    /// Whether the runs alone find errors larger than the filter believes.
-    fn surpasses(&self, expected: &Self) -> bool {
-        let kinds = [self, expected].map(|summary| summary.verdict.kind == VerdictKind::Overconfident);
-        kinds == [true, false]
-    }
-
-    fn take_verdicts(&mut self, expected: &Self) {
-        self.verdict = expected.verdict;
-        for (own, expected) in self.outages.iter_mut().zip(&expected.outages) {
-            own.verdict = expected.verdict;
-        }
+        self.verdict.by_covariance_analysis = Some(expected.verdict.kind);
+        self.verdict.beyond_linear = expected.verdict.beyond_linear;
+        self.is_contradicted = agreement.is_broken() && self.verdict.kind != expected.verdict.kind;
     }
 }

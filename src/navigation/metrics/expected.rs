@@ -164,7 +164,7 @@ impl Expected {
             lincov: None,
             agreement: None,
             settling: self.settling,
-            is_second_order: false,
+            is_contradicted: false,
             require: Vec::new(),
         }
     }

@@ -61,10 +61,9 @@ pub struct Summary {
     /// Where errors are beyond linear theory while the attitude of the start settles, by covariance analysis; none where they are not.
     #[serde(rename = "second_order_start", skip_serializing_if = "Option::is_none")]
     pub settling: Option<SettlingSecondOrder>,
-    /// Whether the errors are of second order: larger than the filter believes in the runs, and contradicting a covariance
-    /// analysis that finds no fault with it.
+    /// Whether covariance analysis has another verdict, and figures that the runs contradict: errors are no longer small.
     #[serde(skip)]
-    pub is_second_order: bool,
+    pub is_contradicted: bool,
     /// What was required, and whether it is met.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub require: Vec<Met>,
@@ -255,7 +254,7 @@ impl Summary {
             lincov: None,
             agreement: None,
             settling: None,
-            is_second_order: false,
+            is_contradicted: false,
             require: Vec::new(),
         }
     }

@@ -6,6 +6,9 @@
 //! over epochs is given the freedom of a single epoch: an interval that holds whatever their correlation, exact
 //! at the ends of outages. All statistics together alarm on a right filter with probability 1 % at most
 //! (Bonferroni), and what is significant but smaller than 10 % is let pass.
+//!
+//! A filter that does not alarm is consistent only where the runs would have found errors that matter: 25 % above the
+//! filter's standard deviations in all states together, 50 % in one of them. Fewer runs leave it undecided.
 
 use super::consistency::chi_square_interval;
 use super::estimate::Estimate;
@@ -16,22 +19,40 @@ use serde::{Deserialize, Deserializer, Serialize};
 const LEVEL: f64 = 0.01;
 /// Errors that differ by less than this share from the filter's standard deviations are let pass.
 pub(super) const TOLERANCE: f64 = 0.1;
-/// A mean NEES above this is not a matter of tuning: the filter has lost its way.
-const LOST: f64 = 100.0;
+/// Runs decide where errors so much larger than the filter's standard deviations would alarm: of all states together, of
+/// one state.
+const DECISIVE: [f64; 2] = [1.25, 1.5];
+/// A mean NEES above this is not a matter of tuning: errors are of another order than the filter believes.
+const FAR: f64 = 100.0;
 
-/// What the verdict is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
+/// Verdict on a filter in one word, the gravest last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum VerdictKind {
-    /// Nothing speaks against the filter.
-    Ok,
-    /// Errors are larger than the filter believes.
-    Overconfident,
+    /// Errors are as large as the filter believes; other ones would have been found.
+    Consistent,
+    /// No fault was found, by runs too few to find one.
+    Undecided,
     /// Errors are smaller than the filter believes.
     Underconfident,
+    /// No fault was found by a method that does not hold here, or something else speaks against the result.
+    Doubtful,
+    /// Errors are larger than the filter believes.
+    Overconfident,
+    /// A limit that was required is not kept.
+    NotMet,
     /// A state or covariance stopped being finite in at least one run.
     Diverged,
 }
+
+nav_sim_signal::named!(VerdictKind {
+    Consistent = "consistent",
+    Undecided = "undecided",
+    Underconfident = "underconfident",
+    Doubtful = "doubtful",
+    Overconfident = "overconfident",
+    NotMet = "not_met",
+    Diverged = "diverged",
+}, in files);
 
 /// One of [`REPORTED_NAMES`], or [`ALL_STATES`]; `serde` would borrow what it saw as a reference.
 pub type StateName = &'static str;
@@ -67,8 +88,9 @@ pub struct Verdict {
     /// Its Monte-Carlo standard error.
     #[serde(deserialize_with = "number")]
     pub ratio_std_error: f64,
-    /// The first outage (from 0) in which errors are beyond linear theory, where covariance analysis, which is linear, found the
-    /// verdict or would have. A verdict that rests on the analysis is one of linear theory alone from there on.
+    /// Verdict by covariance analysis, where that was made beside the runs.
+    pub by_covariance_analysis: Option<VerdictKind>,
+    /// The first outage (from 0) in which errors are beyond linear theory, where covariance analysis does not hold.
     pub beyond_linear: Option<usize>,
     /// Runs that count as independent; infinitely many (null) of a covariance analysis.
     #[serde(deserialize_with = "count")]
@@ -79,6 +101,8 @@ pub struct Verdict {
     /// The same of one state alone.
     #[serde(deserialize_with = "number")]
     pub detectable_state_ratio: f64,
+    /// Independent runs that would decide; none (null) where the verdict is decided.
+    pub runs_to_decide: Option<u64>,
     /// Probability at which a right filter is called wrong, all statistics together.
     pub level: f64,
     /// Errors that differ by less than this share from the filter's standard deviations are let pass.
@@ -119,17 +143,16 @@ impl OutageVerdict {
     /// where the filter is not. A run that diverged did so in every outage, since nobody knows when.
     pub(crate) fn of(runs: &[RunRecord], outages: usize, independent_windows: Option<f64>) -> Vec<Self> {
         let kept: Vec<&RunRecord> = runs.iter().filter(|r| !r.diverged).collect();
-        let statistics = Evidence { runs: &kept, windows: independent_windows }.statistics(outages);
-        let independent_runs = independent_windows.unwrap_or(f64::INFINITY).min(kept.len() as f64);
-        let judge = Judge::new(independent_runs, LEVEL / (2.0 * statistics.len() as f64));
+        let evidence = Evidence { runs: &kept, windows: independent_windows };
+        let statistics = evidence.statistics(outages);
+        let judge = Judge::new(evidence.independent_runs(), statistics.len());
         judge.outages(&statistics, outages, kept.len() < runs.len())
     }
 
     /// From the run whose squares are the expected ones, as [`Verdict::expected`].
     pub(crate) fn expected(record: &RunRecord) -> Vec<Self> {
         let statistics = Evidence { runs: &[record], windows: None }.statistics(record.outages.len());
-        // Nothing is left to chance: the limits of significance close on 1, and the tolerance alone decides.
-        Judge { limits: [(1.0, 1.0); 2] }.outages(&statistics, record.outages.len(), false)
+        Judge::EXACT.outages(&statistics, record.outages.len(), false)
     }
 }
 
@@ -141,19 +164,22 @@ impl Verdict {
         let kept: Vec<&RunRecord> = runs.iter().filter(|r| !r.diverged).collect();
         let evidence = Evidence { runs: &kept, windows: independent_windows };
         let statistics = evidence.statistics(outages);
-        let independent_runs = independent_windows.unwrap_or(f64::INFINITY).min(kept.len() as f64);
-        let judge = Judge::new(independent_runs, LEVEL / (2.0 * statistics.len() as f64));
+        let independent_runs = evidence.independent_runs();
+        let judge = Judge::new(independent_runs, statistics.len());
         let kind = if kept.len() < runs.len() { VerdictKind::Diverged } else { judge.kind(&statistics) };
         Self::by(&judge, kind, &evidence, &statistics, independent_runs)
     }
 
     /// From the run whose squares are the expected ones: nothing is left to chance, and what is off by more than
-    /// the tolerance is wrong.
+    /// the tolerance is wrong. Where errors are beyond linear theory, finding no fault is no proof.
     pub(crate) fn expected(record: &RunRecord, beyond_linear: Option<usize>) -> Self {
         let evidence = Evidence { runs: &[record], windows: None };
         let statistics = evidence.statistics(record.outages.len());
-        let judge = Judge { limits: [(1.0, 1.0); 2] };
-        let verdict = Self::by(&judge, judge.kind(&statistics), &evidence, &statistics, f64::INFINITY);
+        let kind = match Judge::EXACT.kind(&statistics) {
+            VerdictKind::Consistent if beyond_linear.is_some() => VerdictKind::Doubtful,
+            kind => kind,
+        };
+        let verdict = Self::by(&Judge::EXACT, kind, &evidence, &statistics, f64::INFINITY);
         Self { beyond_linear, ..verdict }
     }
 
@@ -167,6 +193,8 @@ impl Verdict {
         let worst = judge.worst(statistics, kind);
         let nees = evidence.mean(&|r| r.nees_mean);
         let coverage = evidence.mean(&|r| r.covered);
+        let [detectable_ratio, detectable_state_ratio] = judge.detectable();
+        let is_undecided = kind == VerdictKind::Undecided;
         Self {
             kind,
             nees: nees.value,
@@ -177,10 +205,12 @@ impl Verdict {
             worst_outage: worst.outage,
             ratio: worst.ratio.value,
             ratio_std_error: worst.ratio.std_error,
+            by_covariance_analysis: None,
             beyond_linear: None,
             independent_runs,
-            detectable_ratio: judge.limits[0].1.max(1.0 + TOLERANCE),
-            detectable_state_ratio: judge.limits[1].1.max(1.0 + TOLERANCE),
+            detectable_ratio,
+            detectable_state_ratio,
+            runs_to_decide: is_undecided.then(|| Judge::runs_to_decide(statistics.len())),
             level: LEVEL,
             tolerance: TOLERANCE,
         }
@@ -194,8 +224,8 @@ impl Verdict {
 
     /// Whether the errors are of another order than the filter believes.
     #[must_use]
-    pub fn is_lost(&self) -> bool {
-        self.nees > LOST
+    pub fn is_far_off(&self) -> bool {
+        self.nees > FAR
     }
 }
 
@@ -223,6 +253,10 @@ struct Evidence<'a> {
 }
 
 impl Evidence<'_> {
+    fn independent_runs(&self) -> f64 {
+        self.windows.unwrap_or(f64::INFINITY).min(self.runs.len() as f64)
+    }
+
     fn mean(&self, value: &dyn Fn(&RunRecord) -> f64) -> Estimate {
         Estimate::mean_of(self.runs.iter().map(|r| value(r)), self.windows)
     }
@@ -260,8 +294,12 @@ struct Judge {
 }
 
 impl Judge {
-    /// With probability `tail` beyond each limit.
-    fn new(independent_runs: f64, tail: f64) -> Self {
+    /// Nothing is left to chance: the limits of significance close on 1, and the tolerance alone decides.
+    const EXACT: Self = Self { limits: [(1.0, 1.0); 2] };
+
+    /// Of so many independent runs and so many statistics on both sides.
+    fn new(independent_runs: f64, statistics: usize) -> Self {
+        let tail = LEVEL / (2.0 * statistics as f64);
         let limits = [NEES_DOF, 1].map(|dof| {
             // Of a right filter the square is χ² over its degrees of freedom; the ratio is its root.
             let band = chi_square_interval(dof, independent_runs, tail);
@@ -271,26 +309,49 @@ impl Judge {
         Self { limits }
     }
 
+    /// Errors over standard deviations from which on it alarms: of all states together, of one state.
+    fn detectable(&self) -> [f64; 2] {
+        self.limits.map(|(_, upper)| upper.max(1.0 + TOLERANCE))
+    }
+
+    /// Whether it finds errors that matter.
+    fn is_decisive(&self) -> bool {
+        self.limits.iter().zip(DECISIVE).all(|((_, upper), limit)| *upper <= limit)
+    }
+
+    /// The fewest independent runs that decide, by bisection: the limits close on 1 as runs are added.
+    fn runs_to_decide(statistics: usize) -> u64 {
+        let decides = |runs: u64| Self::new(runs as f64, statistics).is_decisive();
+        let (mut few, mut enough) = (0, 1);
+        while !decides(enough) {
+            (few, enough) = (enough, 2 * enough);
+        }
+        while enough - few > 1 {
+            let middle = few.midpoint(enough);
+            if decides(middle) { enough = middle } else { few = middle }
+        }
+        enough
+    }
+
     /// Whether a statistic is significantly and materially off.
-    fn of(&self, statistic: &Statistic) -> VerdictKind {
+    fn fault(&self, statistic: &Statistic) -> Option<VerdictKind> {
         let (lower, upper) = self.limits[usize::from(statistic.state.is_some())];
         let ratio = statistic.ratio.value;
         // Both: significant, since chance must not alarm; material, since with enough runs any linear filter
         // is wrong. Below, 1/1.1 is the same distance in the logarithm.
         if ratio > upper && ratio > 1.0 + TOLERANCE {
-            VerdictKind::Overconfident
+            Some(VerdictKind::Overconfident)
         } else if ratio < lower && ratio < 1.0 / (1.0 + TOLERANCE) {
-            VerdictKind::Underconfident
+            Some(VerdictKind::Underconfident)
         } else {
-            VerdictKind::Ok
+            None
         }
     }
 
     /// Too much confidence anywhere is the graver fault.
     fn kind(&self, all: &[Statistic]) -> VerdictKind {
-        let found: Vec<VerdictKind> = all.iter().map(|s| self.of(s)).collect();
-        let faults = [VerdictKind::Overconfident, VerdictKind::Underconfident];
-        faults.into_iter().find(|fault| found.contains(fault)).unwrap_or(VerdictKind::Ok)
+        let without_fault = if self.is_decisive() { VerdictKind::Consistent } else { VerdictKind::Undecided };
+        all.iter().filter_map(|s| self.fault(s)).max().unwrap_or(without_fault)
     }
 
     /// The verdicts on outages, from the statistics at their ends.
@@ -315,10 +376,10 @@ impl Judge {
         let distance = |s: &Statistic| match kind {
             VerdictKind::Underconfident => -s.ratio.value.ln(),
             VerdictKind::Overconfident => s.ratio.value.ln(),
-            VerdictKind::Ok | VerdictKind::Diverged => s.ratio.value.ln().abs(),
+            _ => s.ratio.value.ln().abs(),
         };
-        let key = |s: &&Statistic| (self.of(s) == kind, distance(s));
-        let alarms = |s: &&Statistic| kind != VerdictKind::Ok && self.of(s) == kind;
+        let alarms = |s: &&Statistic| self.fault(s) == Some(kind);
+        let key = |s: &&Statistic| (alarms(s), distance(s));
         let alone = all.iter().filter(alarms).any(|s| s.state.is_some());
         let together = !alone && all.iter().filter(alarms).any(|s| s.state.is_none());
         let states = all.iter().filter(|s| s.state.is_none() == together);

@@ -39,7 +39,7 @@ fn runs(count: u64, epochs: usize, seed: u64, scale: [f64; REPORTED]) -> Vec<Run
 fn a_right_filter_is_rarely_called_wrong() {
     for count in [8, 30] {
         let wrong =
-            |seed: &u64| Verdict::of(&runs(count, 1, *seed, [1.0; 9]), 1, None).kind != VerdictKind::Ok;
+            |seed: &u64| Verdict::of(&runs(count, 1, *seed, [1.0; 9]), 1, None).kind > VerdictKind::Undecided;
         let alarms = (0..1500).filter(wrong).count();
         assert!(alarms <= 27, "{alarms} of 1500 with {count} runs");
     }
@@ -75,9 +75,9 @@ fn states_that_are_wrong_together_only_are_named_together() {
 
 #[test]
 fn too_little_confidence_is_told_and_too_much_comes_first() {
-    let timid = Verdict::of(&runs(200, 20, 3, [0.7; 9]), 1, None);
-    assert_eq!(timid.kind, VerdictKind::Underconfident);
-    assert!(timid.ratio < 0.8, "{timid:?}");
+    let large = Verdict::of(&runs(200, 20, 3, [0.7; 9]), 1, None);
+    assert_eq!(large.kind, VerdictKind::Underconfident);
+    assert!(large.ratio < 0.8, "{large:?}");
     let mut scale = [0.7; 9];
     scale[8] = 2.0;
     let both = Verdict::of(&runs(200, 20, 3, scale), 1, None);
@@ -93,7 +93,7 @@ fn each_outage_has_a_verdict_of_its_own() {
     let wrong = runs(200, 20, 4, scale);
     all.iter_mut().zip(wrong).for_each(|(run, wrong)| run.outages.extend(wrong.outages));
     let found = OutageVerdict::of(&all, 2, None);
-    assert_eq!(found[0].kind, VerdictKind::Ok);
+    assert_eq!(found[0].kind, VerdictKind::Consistent);
     assert_eq!((found[1].kind, found[1].worst_state), (VerdictKind::Overconfident, "roll_deg"));
     assert!((found[1].ratio - 1.5).abs() < 5.0 * 1.5 / 20.0, "{found:?}");
     assert_eq!(Verdict::of(&all, 2, None).worst_outage, Some(1));
@@ -105,7 +105,7 @@ fn each_outage_has_a_verdict_of_its_own() {
 #[test]
 fn a_small_difference_is_no_verdict() {
     let verdict = Verdict::of(&runs(20_000, 1, 3, [1.05; 9]), 1, None);
-    assert_eq!(verdict.kind, VerdictKind::Ok);
+    assert_eq!(verdict.kind, VerdictKind::Consistent);
     assert!((verdict.nees / 9.0 - 1.05 * 1.05).abs() < 0.02, "{verdict:?}");
 }
 
@@ -115,14 +115,14 @@ fn runs_that_share_their_noise_tell_less() {
     let records = runs(100, 1, 3, [1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.5, 1.0, 1.0]);
     assert_eq!(Verdict::of(&records, 1, None).kind, VerdictKind::Overconfident);
     let shared = Verdict::of(&records, 1, Some(3.0));
-    assert_eq!((shared.kind, shared.independent_runs), (VerdictKind::Ok, 3.0));
+    assert_eq!((shared.kind, shared.independent_runs), (VerdictKind::Undecided, 3.0));
     assert!(shared.detectable_state_ratio > 2.0 && shared.ratio_std_error > 0.2, "{shared:?}");
 }
 
 #[test]
 fn a_lost_filter_and_a_diverged_run_are_told() {
     let far = Verdict::of(&runs(1, 20, 3, [11.0; 9]), 1, None);
-    assert!(far.is_lost() && far.kind == VerdictKind::Overconfident && far.nees_std_error.is_nan());
+    assert!(far.is_far_off() && far.kind == VerdictKind::Overconfident && far.nees_std_error.is_nan());
     let mut records = runs(8, 20, 3, [1.0; 9]);
     records[3] = RunRecord { diverged: true, nees_mean: f64::NAN, ..records[3].clone() };
     let verdict = Verdict::of(&records, 1, None);
@@ -130,4 +130,21 @@ fn a_lost_filter_and_a_diverged_run_are_told() {
     records.iter_mut().for_each(|r| r.diverged = true);
     let none = Verdict::of(&records, 1, None);
     assert!(none.kind == VerdictKind::Diverged && none.nees.is_nan());
+}
+
+/// 8 runs with one outage would miss errors of 50 % in one state; the number that decides is the first that finds them, and
+/// faults that 8 runs find stay faults.
+#[test]
+fn too_few_runs_leave_a_right_filter_undecided() {
+    let verdict = |count: u64, scale: f64| Verdict::of(&runs(count, 1, 3, [scale; 9]), 1, None);
+    let few = verdict(8, 1.0);
+    assert_eq!(few.kind, VerdictKind::Undecided);
+    assert!(few.detectable_state_ratio > 1.5, "{few:?}");
+    let enough = few.runs_to_decide.unwrap();
+    let [one_less, decided] = [enough - 1, enough].map(|count| verdict(count, 1.0));
+    assert_eq!((one_less.kind, decided.kind), (VerdictKind::Undecided, VerdictKind::Consistent));
+    assert!(decided.detectable_state_ratio <= 1.5 && decided.detectable_ratio <= 1.25, "{decided:?}");
+    assert!(one_less.detectable_state_ratio > 1.5 && decided.runs_to_decide.is_none());
+    assert!(OutageVerdict::of(&runs(8, 1, 3, [1.0; 9]), 1, None)[0].kind == VerdictKind::Undecided);
+    assert_eq!(verdict(8, 2.5).kind, VerdictKind::Overconfident);
 }

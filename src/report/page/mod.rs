@@ -29,6 +29,8 @@ const SCRIPT: &str = include_str!("page.js");
 pub(crate) enum Tone {
     /// As it should be.
     Good,
+    /// Not known.
+    Undecided,
     /// To be looked at.
     Doubtful,
     /// Not to be believed.
@@ -49,6 +51,7 @@ impl Page {
     pub(crate) fn new(title: &str, tone: Tone, verdict: &str) -> Self {
         let class = match tone {
             Tone::Good => "",
+            Tone::Undecided => " undecided",
             Tone::Doubtful => " doubtful",
             Tone::Bad => " bad",
         };

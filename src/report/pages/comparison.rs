@@ -8,8 +8,8 @@ use crate::report::comparison::{
 use crate::report::comparison_table::{table_rows, with_times};
 use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, Table, svg};
 use crate::report::short_names;
-use crate::report::verdict::Grade;
-use nav_sim_navigation::metrics::Measured;
+use crate::report::verdict::gravest;
+use nav_sim_navigation::metrics::{Measured, VerdictKind};
 use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
 
 /// How the ASEE of a run departs from that of the reference over time.
@@ -50,8 +50,8 @@ impl ShownComparison<'_> {
     /// The page of a comparison file. `links`: pages beneath, path and name.
     pub(crate) fn page(&self, file: &ComparisonFile, links: &[(String, String)]) -> String {
         let Self { candidates, outages, states, .. } = *self;
-        let grade = Grade::gravest(file.verdicts.iter().map(|row| &row.verdict));
-        let mut page = Page::new("What the filters believe, compared", tone(grade), &verdict(file));
+        let kind = gravest(file.verdicts.iter().map(|row| &row.verdict));
+        let mut page = Page::new("What the filters believe, compared", tone(kind), &verdict(file));
         if let Some(line) = &file.beyond_linear {
             page.text(&sentence(line));
         }
@@ -149,7 +149,7 @@ impl ShownComparison<'_> {
 /// Which filters are not as good as they believe, or better.
 fn verdict(file: &ComparisonFile) -> String {
     let (right, wrong): (Vec<_>, Vec<_>) =
-        file.verdicts.iter().cloned().partition(|row| Grade::of(&row.verdict) == Grade::Consistent);
+        file.verdicts.iter().cloned().partition(|row| row.verdict.kind == VerdictKind::Consistent);
     let lines = verdict_lines(&wrong);
     match (right.len(), lines.as_slice()) {
         (n, []) => format!("All {n} filters are consistent: their errors are as large as they believe."),

@@ -31,7 +31,7 @@ pub(crate) use wavelet::{wavelet_page, wavelet_text};
 
 use super::number;
 use super::page::Tone;
-use super::verdict::Grade;
+use nav_sim_navigation::metrics::VerdictKind;
 use nav_sim_navigation::simulation::REPORTED;
 
 /// The reported states and their units, in words.
@@ -52,11 +52,12 @@ fn error_of(state: &str) -> String {
     state.replacen(" (", " error (", 1)
 }
 
-const fn tone(grade: Grade) -> Tone {
-    match grade {
-        Grade::Consistent => Tone::Good,
-        Grade::LinearOnly | Grade::Underconfident => Tone::Doubtful,
-        Grade::Overconfident | Grade::Diverged => Tone::Bad,
+const fn tone(kind: VerdictKind) -> Tone {
+    match kind {
+        VerdictKind::Consistent => Tone::Good,
+        VerdictKind::Undecided => Tone::Undecided,
+        VerdictKind::Doubtful | VerdictKind::Underconfident => Tone::Doubtful,
+        VerdictKind::Overconfident | VerdictKind::NotMet | VerdictKind::Diverged => Tone::Bad,
     }
 }
 

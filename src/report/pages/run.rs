@@ -9,7 +9,7 @@ use crate::report::page::{Cell, Page, Table, Tone};
 use crate::report::requirement::requirement_line;
 use crate::report::run_words::beyond_linear;
 use crate::report::trajectory::TrajectorySeries;
-use crate::report::verdict::{Grade, verdict_line};
+use crate::report::verdict::verdict_lines;
 use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::metrics::{EpochMetrics, FanEpoch, Met, PerState, Summary};
 use nav_sim_navigation::sensors::defects::ImuSettings;
@@ -29,14 +29,14 @@ pub(crate) fn run_page(
     track: &TrajectorySeries,
 ) -> String {
     let windows = windows(summary);
-    let verdict = verdict_line(&summary.verdict, &windows, summary.runs, summary.diverged);
+    let verdict = verdict_lines(summary).join(". ");
     let title = if summary.runs > 0 { "INS/GNSS Monte-Carlo run" } else { "INS/GNSS covariance analysis" };
     let (kept, missed): (Vec<&Met>, Vec<&Met>) = summary.require.iter().partition(|met| met.met);
     let line = |met: &Met| sentence(&requirement_line(met, summary));
     // What the command ends with is what the reader asked for: it comes before the filter.
     let missed_lines: String = missed.iter().map(|met| format!("{} ", line(met))).collect();
-    let tone = if missed.is_empty() { tone(Grade::of(&summary.verdict)) } else { Tone::Bad };
-    let mut page = Page::new(title, tone, &format!("{missed_lines}The filter is {verdict}"));
+    let tone = if missed.is_empty() { tone(summary.verdict.kind) } else { Tone::Bad };
+    let mut page = Page::new(title, tone, &format!("{missed_lines}{}", sentence(&verdict)));
     kept.into_iter().for_each(|met| page.text(&line(met)));
     if let Some(words) = beyond_linear(summary) {
         page.text(&sentence(&words));

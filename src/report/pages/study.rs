@@ -4,8 +4,8 @@ use super::sentence;
 use crate::report::choose::RankedPlace;
 use crate::report::page::{Axis, Chart, Colour, Interval, Mark, Page, Panel, Series, Table};
 use crate::report::study::{ShownCell, drift_table, ratio_table, verdict_table};
-use crate::report::verdict::Grade;
-use nav_sim_navigation::metrics::OutageMetrics;
+use crate::report::verdict::gravest;
+use nav_sim_navigation::metrics::{OutageMetrics, VerdictKind};
 
 /// The page of a merged study. `reference`: what ratios refer to; `more`: cells that are in outages.csv only; `rankings`:
 /// of candidates calibrated without the recordings that make the errors; `beyond_linear`: where covariance analysis does not hold.
@@ -17,8 +17,8 @@ pub(crate) fn study_page(
     rankings: &[RankedPlace],
     beyond_linear: Option<String>,
 ) -> String {
-    let grade = Grade::gravest(cells.iter().flat_map(|cell| &cell.columns).map(|column| &column.verdict));
-    let mut page = Page::new("Study", super::tone(grade), &verdict(cells));
+    let kind = gravest(cells.iter().flat_map(|cell| &cell.columns).map(|column| &column.verdict));
+    let mut page = Page::new("Study", super::tone(kind), &verdict(cells));
     for place in rankings {
         page.section(&format!("Candidates on recordings left out: {}", place.name));
         place.verdict.iter().for_each(|line| page.text(&sentence(line)));
@@ -29,7 +29,7 @@ pub(crate) fn study_page(
         page.chart(&chart, "Horizontal error just before the first fix after an outage: median over the runs, the bar up to the 95 % quantile.");
     }
     page.section("Verdict on each filter");
-    page.text("NEES over the run (9 if right), error over its standard deviation in the state that is farthest off; of a filter that the runs do not find wrong, the smallest error in one state that so many runs find (detectable).");
+    page.text("NEES over the run (9 if right), error over its standard deviation in the state that is farthest off; of an undecided filter, the runs that would decide.");
     page.table(&Table::of_rows(&verdict_table(cells)));
     if let Some(line) = beyond_linear {
         page.text(&sentence(&line));
@@ -53,13 +53,11 @@ pub(crate) fn study_page(
 /// Candidate by candidate: in how many cells its filter is as good as it believes, and what it is in the others.
 fn verdict(cells: &[ShownCell]) -> String {
     let Some(first) = cells.first() else { return "The study has no cell.".to_owned() };
-    let [diverged, over, under, linear, right] = Grade::ALL;
-    let grades = [right, linear, over, under, diverged];
     let of_column = |(k, name): (usize, &str)| {
         let column_results = || cells.iter().filter_map(|cell| cell.columns.get(k));
-        let count = |grade: Grade| column_results().filter(|c| Grade::of(&c.verdict) == grade).count();
-        let told = grades.into_iter().filter(|grade| count(*grade) > 0);
-        let words: Vec<String> = told.map(|grade| format!("{} in {}", grade.words(), count(grade))).collect();
+        let count = |kind: VerdictKind| column_results().filter(|c| c.verdict.kind == kind).count();
+        let told = VerdictKind::ALL.into_iter().filter(|kind| count(*kind) > 0);
+        let words: Vec<String> = told.map(|kind| format!("{kind} in {}", count(kind))).collect();
         format!("{name}: {}", words.join(", "))
     };
     let all: Vec<String> = first.columns.iter().map(|c| c.name.as_str()).enumerate().map(of_column).collect();

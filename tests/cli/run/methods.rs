@@ -101,7 +101,9 @@ fn runs_stand_beside_what_is_expected_of_them() {
     assert!(!ran.stderr.contains("contradict"), "{}", ran.stderr);
     let summary = json(&place.path().join("out/summary.json"));
     assert_eq!((&summary["method"], &summary["lincov"]["method"]), (&"both".into(), &"lincov".into()));
-    assert_eq!(summary["verdict"], summary["lincov"]["verdict"]);
+    let verdicts = [&summary["verdict"], &summary["lincov"]["verdict"]].map(|verdict| &verdict["kind"]);
+    assert_eq!(verdicts, ["consistent", "consistent"]);
+    assert_eq!(summary["verdict"]["by_covariance_analysis"], "consistent");
     let agreement = &summary["agreement"];
     assert_eq!(agreement["figures"], 2 + 9 + 10);
     let fan = fs::read_to_string(place.path().join("out/fan.csv")).unwrap();
@@ -115,24 +117,25 @@ fn runs_stand_beside_what_is_expected_of_them() {
     assert!(place.path().join("out/runs.csv").exists());
 }
 
-/// Two runs tell nothing of a filter whose accelerometer is twice as bad as it believes: covariance analysis does.
+/// Two runs tell nothing of a filter whose accelerometer is twice as bad as it believes: the verdict is that of the runs, and
+/// covariance analysis has its word beside it.
 #[test]
 fn few_runs_do_not_hide_a_filter_that_is_wrong() {
     let place = place();
     fs::write(place.path().join("rough.toml"), MODEL.replace("1e-9", "4e-9")).unwrap();
     let command = "run drive.toml imu.toml --truth rough.toml --outage 20:50 --seed 2";
     let sampled = done(place.path(), &format!("{command} --runs 2 -o out"));
-    assert!(sampled.stdout.starts_with("verdict: overconfident: errors are 1."), "{}", sampled.stdout);
-    assert!(
-        sampled.stdout.lines().next().unwrap().ends_with(", by covariance analysis"),
-        "{}",
-        sampled.stdout
-    );
+    let verdict = sampled.stdout.lines().next().unwrap();
+    assert!(verdict.starts_with("verdict: undecided: 2 runs cannot tell errors below "), "{verdict}");
+    assert!(verdict.ends_with("; by covariance analysis overconfident"), "{verdict}");
+    assert!(sampled.stderr.contains("warning: the filter is overconfident: "), "{}", sampled.stderr);
     done(place.path(), &format!("{command} --method lincov -o expected"));
     let summary = |run: &str| json(&place.path().join(run).join("summary.json"));
     let (sampled, expected) = (summary("out"), summary("expected"));
-    assert_eq!(sampled["verdict"], expected["verdict"]);
-    assert_eq!(sampled["outages"][0]["verdict"], expected["outages"][0]["verdict"]);
+    assert_eq!(sampled["verdict"]["kind"], "undecided");
+    assert_eq!(sampled["outages"][0]["verdict"]["kind"], "undecided");
+    assert_eq!(sampled["verdict"]["by_covariance_analysis"], expected["verdict"]["kind"]);
+    assert_eq!(expected["verdict"]["kind"], "overconfident");
     assert_eq!((&sampled["method"], &sampled["lincov"]), (&"monte-carlo".into(), &Value::Null));
 }
 
