@@ -1,16 +1,14 @@
 //! The units of a cell, added up and as rows of tables.
 
 use super::description::{Metric, Study};
-use super::error::DescriptionError;
 use super::failure::StudyError;
 use super::grid::{Cell, Column};
-use super::plan::{Kept, Unit};
+use super::plan::{Kept, NamedUnit};
 use super::planned::Planned;
-use super::sums::CellSums;
-use super::unit::{Finding, UnitResult};
+use super::unit::Finding;
 use super::unit_file::{self, UnitFileError};
 use crate::report::{self, ColumnResult, Label, ShownCell, ShownColumn, TableRow};
-use nav_sim_navigation::metrics::{self, EpochMetrics, Measured, OutageComparison};
+use nav_sim_navigation::metrics::{self, Measured};
 use nav_sim_navigation::simulation::RunRecord;
 
 /// What a cell contributes.
@@ -27,38 +25,28 @@ pub(super) struct CellTables {
     pub(super) diverged: u64,
 }
 
-/// Units of a cell that are damaged.
-pub(super) struct DamagedUnits(pub(super) Vec<(Unit, String)>);
-
-impl Planned {
-    pub(super) fn keeps_epochs(&self) -> bool {
-        self.plan.study.keeps(Metric::Epochs)
-    }
-
-    /// Position and name of the candidate that ratios refer to.
-    pub(super) fn reference(&self) -> Result<(usize, String), StudyError> {
-        let refused =
-            |source: DescriptionError| StudyError::Description { study: self.study.clone(), source };
-        let index = self.plan.study.reference().map_err(refused)?;
-        Ok((index, self.plan.study.candidates().swap_remove(index).0))
-    }
-}
-
 impl CellTables {
-    /// From the units of one cell, in run order.
+    /// From the units of one cell, in run order; or those of them that are damaged.
     pub(super) fn make(
         planned: &Planned,
-        units: &[(Unit, String)],
-    ) -> Result<Result<Self, DamagedUnits>, StudyError> {
-        let sums = match sums(planned, units)? {
-            Ok(sums) => sums,
-            Err(damaged) => return Ok(Err(damaged)),
-        };
-        let grid = &planned.grid;
+        units: &[NamedUnit],
+    ) -> Result<Result<Self, Vec<NamedUnit>>, StudyError> {
+        let (mut findings, mut damaged) = (Vec::<Finding>::new(), Vec::new());
+        for named in units {
+            match unit_file::read(&planned.directory, &named.1) {
+                Ok(unit) if findings.is_empty() => findings = unit.columns,
+                Ok(unit) => findings.iter_mut().zip(unit.columns).for_each(|(sum, later)| sum.append(later)),
+                Err(e @ UnitFileError::Io { .. }) => return Err(e.into()),
+                Err(_) => damaged.push(named.clone()),
+            }
+        }
+        if !damaged.is_empty() {
+            return Ok(Err(damaged));
+        }
+        let Planned { plan, grid, .. } = planned;
         let cell = grid.cell(units[0].0.cell);
-        let reference = planned.reference()?;
-        let measured: Vec<Measured> = sums.columns.iter().map(Finding::measured).collect();
-        let comparisons = comparisons(planned, &measured, reference.0)?;
+        let reference = planned.reference();
+        let measured: Vec<Measured> = findings.iter().map(Finding::measured).collect();
         let mut tables = Self {
             cell,
             windows: measured.first().map_or(Vec::new(), |m| m.outages.clone()),
@@ -69,31 +57,48 @@ impl CellTables {
             runs: Vec::new(),
             diverged: 0,
         };
-        let columns = grid.columns.iter().zip(&sums.columns).zip(&measured).zip(comparisons);
-        for (((column, finding), measured), (comparison, is_reference)) in columns {
-            let reference = if comparison.is_some() { reference.1.as_str() } else { "" };
+        for ((i, column), (finding, measured_here)) in
+            grid.columns.iter().enumerate().zip(findings.iter().zip(&measured))
+        {
+            // the reference that has the same filter
+            let is_reference = |c: &Column| c.candidate == reference.0 && c.filter == column.filter;
+            let of_reference = grid.columns.iter().position(is_reference).unwrap_or(0);
+            let comparison = match plan.kept() {
+                Kept::Runs => None,
+                _ => Some(metrics::compare(measured_here, &measured[of_reference], true)?),
+            };
             let filter = grid.filter(cell, column).name();
-            let (cell, candidate) = (grid.names(cell), column.name.as_str());
-            let result = ColumnResult { cell, candidate, filter, reference, measured };
-            let (name, label) = shown_names(&planned.plan.study, column, filter);
-            let (outages, verdict) = (finding.outages(), measured.verdict());
-            let shown = ShownColumn { name, label, outages, comparison, is_reference, verdict };
-            let epochs = planned.keeps_epochs().then(|| finding.epochs());
-            tables.add(&result, shown, epochs.as_deref());
+            let result = ColumnResult {
+                cell: grid.names(cell),
+                candidate: &column.name,
+                filter,
+                reference: comparison.as_ref().map_or("", |_| reference.1.as_str()),
+                measured: measured_here,
+            };
+            let outages = finding.outages();
+            tables.outages.extend(report::outage_rows(&result, &outages, comparison.as_deref()));
+            tables.runs.extend(report::run_rows(&result));
+            if plan.study.keeps(Metric::Epochs) {
+                tables.epochs.extend(report::epoch_rows(&result, &finding.epochs()));
+            }
+            tables.diverged += measured_here.sampled().iter().filter(|r| r.diverged).count() as u64;
+            let (name, label) = shown_names(&plan.study, column, filter);
+            let is_reference = comparison.is_some() && of_reference == i;
+            let verdict = measured_here.verdict();
+            tables.shown.columns.push(ShownColumn { name, label, outages, comparison, is_reference, verdict });
         }
-        if planned.plan.study.leaves_out() {
+        if plan.study.leaves_out() {
             tables.runs_of_columns = measured.into_iter().map(|m| m.runs).collect();
         }
         Ok(Ok(tables))
     }
+}
 
-    /// The rows of a column.
-    fn add(&mut self, result: &ColumnResult<'_>, shown: ShownColumn, epochs: Option<&[EpochMetrics]>) {
-        self.outages.extend(report::outage_rows(result, &shown.outages, shown.comparison.as_deref()));
-        self.runs.extend(report::run_rows(result));
-        self.epochs.extend(epochs.into_iter().flat_map(|epochs| report::epoch_rows(result, epochs)));
-        self.diverged += result.measured.sampled().iter().filter(|r| r.diverged).count() as u64;
-        self.shown.columns.push(shown);
+impl Planned {
+    /// Position and name of the candidate that ratios refer to: the study was checked when it was read.
+    pub(super) fn reference(&self) -> (usize, String) {
+        let index = self.plan.study.reference().unwrap_or(0);
+        (index, self.plan.study.candidates().swap_remove(index).0)
     }
 }
 
@@ -111,51 +116,4 @@ fn shown_names(study: &Study, column: &Column, filter: &str) -> (String, Label) 
         estimator: of_several.map_or_else(String::new, |e| e.name().to_uppercase()),
     };
     (with_filter(&name), label)
-}
-
-/// Whether a unit is what the plan says; that its outages are those of the cell's others is seen when it is added.
-fn fits(planned: &Planned, unit: Unit, result: &UnitResult) -> bool {
-    let outages = result.columns.first().map_or(Vec::new(), Finding::windows);
-    result.fits(unit, planned.grid.columns.len(), &outages)
-}
-
-fn sums(planned: &Planned, units: &[(Unit, String)]) -> Result<Result<CellSums, DamagedUnits>, StudyError> {
-    let mut sums = CellSums::default();
-    let mut damaged = Vec::new();
-    for (unit, id) in units {
-        match unit_file::read(&planned.directory, id) {
-            Ok(result) if fits(planned, *unit, &result) => {
-                if damaged.is_empty() && !sums.add(result) {
-                    damaged.push((*unit, id.clone()));
-                }
-            }
-            Err(e @ UnitFileError::Io { .. }) => return Err(e.into()),
-            Ok(_) | Err(_) => damaged.push((*unit, id.clone())),
-        }
-    }
-    Ok(if damaged.is_empty() { Ok(sums) } else { Err(DamagedUnits(damaged)) })
-}
-
-type Compared = (Option<Vec<OutageComparison>>, bool);
-
-/// The comparison of each column with the reference that has the same filter, if ratios are kept.
-fn comparisons(
-    planned: &Planned,
-    experiments: &[Measured],
-    reference: usize,
-) -> Result<Vec<Compared>, StudyError> {
-    let columns = &planned.grid.columns;
-    if planned.plan.kept() == Kept::Runs {
-        return Ok(vec![(None, false); columns.len()]);
-    }
-    let compared = |i: usize| {
-        let filter = columns[i].filter;
-        let reference_column =
-            columns.iter().position(|c| c.candidate == reference && c.filter == filter).unwrap_or(0);
-        Ok((
-            Some(metrics::compare(&experiments[i], &experiments[reference_column], true)?),
-            reference_column == i,
-        ))
-    };
-    (0..columns.len()).map(compared).collect()
 }

@@ -1,8 +1,7 @@
 //! What is wrong with a study.
 
 use crate::formats::suggest::{self, nearest};
-use nav_sim_calibration::{CalibrationError, Estimator, ModelSpec, SignalError, SpecError};
-use nav_sim_signal::noise::ReplicateError;
+use nav_sim_calibration::{Estimator, ModelSpec, SpecError};
 
 /// A study that means no grid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -129,28 +128,4 @@ impl DescriptionError {
             _ => None,
         }
     }
-}
-
-/// A calibration step or virtual recording that cannot be made.
-#[derive(Debug, thiserror::Error)]
-pub enum PrepareError {
-    /// Virtual recordings.
-    #[error(transparent)]
-    Replicate(#[from] ReplicateError),
-    /// Wavelet variances.
-    #[error(transparent)]
-    Signal(#[from] SignalError),
-    /// Fits.
-    #[error(transparent)]
-    Calibration(#[from] CalibrationError),
-    /// A word that means nothing.
-    #[error("\"{key}\" = \"{value}\" {reason}")]
-    Word {
-        /// Key.
-        key: &'static str,
-        /// Value.
-        value: String,
-        /// Why.
-        reason: String,
-    },
 }

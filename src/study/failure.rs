@@ -1,21 +1,10 @@
 //! Why the engine stops, and what to do about it.
 
-use super::error::{DescriptionError, PrepareError};
-use super::plan::Unit;
-use super::remedy::Remedy;
+use super::plan::NamedUnit;
 use super::unit_file::UnitFileError;
 use crate::formats::FileError;
-use nav_sim_navigation::ekf::BeliefError;
 use nav_sim_navigation::metrics::ComparisonError;
-use nav_sim_navigation::sensors::outage::OutageError;
 use std::path::PathBuf;
-
-/// Any error, where only its words matter.
-type Source = Box<dyn std::error::Error + Send + Sync>;
-
-/// What helps where fixes are too rare to reduce a model.
-const RARE_FIXES: &str =
-    "raise it, or take the full filter alone (filters = [\"full\"]), which reduces nothing";
 
 /// A study that cannot be planned, run, merged or verified.
 #[derive(Debug, thiserror::Error)]
@@ -34,38 +23,26 @@ pub enum StudyError {
         directory: PathBuf,
     },
     /// It is the plan of another study, or the study has changed since.
-    #[error(
-        "{} is the plan of another study, or the study has changed since: \"{key}\" is {found} in the plan, {wanted} in the study",
-        .plan.display()
-    )]
+    #[error("{} is of another study: \"{key}\" is {found} in the plan, {wanted} in the study", .plan.display())]
     OtherStudy {
         /// The plan's file.
         plan: PathBuf,
-        /// What differs.
+        /// The key that differs.
         key: String,
-        /// What is in the plan.
+        /// Its value in the plan.
         found: String,
-        /// What is in the study.
+        /// Its value in the study.
         wanted: String,
     },
-    /// The study means no grid.
-    #[error("{}: {source}", .study.display())]
-    Description {
-        /// Its file.
-        study: PathBuf,
+    /// A part of the study that cannot be made, or does not fit the others.
+    #[error("{part}: {reason}")]
+    Unfit {
+        /// Names of the cell, the candidate, or a file.
+        part: String,
         /// Why.
-        source: DescriptionError,
-    },
-    /// A step of calibration, or virtual recordings.
-    #[error(transparent)]
-    Prepare(#[from] PrepareError),
-    /// A candidate that cannot be calibrated.
-    #[error("{candidate}: {source}")]
-    Candidate {
-        /// Its name.
-        candidate: String,
-        /// Why.
-        source: Box<StudyError>,
+        reason: String,
+        /// What helps.
+        hint: Option<String>,
     },
     /// A candidate that leaves out the recordings of a truth, and has none of them, or no other.
     #[error("leave_out: {}", match .left {
@@ -78,30 +55,6 @@ pub enum StudyError {
         /// How many recordings are left.
         left: usize,
     },
-    /// Outages that do not lie on a trajectory.
-    #[error("{place}: {source}")]
-    Outage {
-        /// Study file and names of the cell.
-        place: String,
-        /// Which, and why.
-        source: OutageError,
-    },
-    /// Trajectory, truth, scenario and candidate that do not fit together.
-    #[error("{part}: {source}")]
-    Unfit {
-        /// Names of the cell, or the candidate.
-        part: String,
-        /// Why.
-        source: Source,
-    },
-    /// A candidate's model without the filter that is asked for.
-    #[error("{part}: {source}")]
-    NoFilter {
-        /// The candidate.
-        part: String,
-        /// Why.
-        source: BeliefError,
-    },
     /// A covariance that ran away.
     #[error("{cell}: the covariance analysis of {column} did not stay finite and positive definite")]
     NotFinite {
@@ -110,12 +63,6 @@ pub enum StudyError {
         /// The candidate.
         column: String,
     },
-    /// A model without the spread that virtual recordings draw from.
-    #[error("{}: has no [spread], which \"spread = true\" draws from", .model.display())]
-    NoSpread {
-        /// File.
-        model: PathBuf,
-    },
     /// An input is not what it was.
     #[error("{what} has changed since the study was planned")]
     Changed {
@@ -123,13 +70,10 @@ pub enum StudyError {
         what: String,
     },
     /// A model calibrated by the plan is lost, or not what it was.
-    #[error(transparent)]
-    CalibratedModel(Box<StudyError>),
-    /// A model that is lost comes out otherwise now.
-    #[error("{model} cannot be made again as it was planned")]
-    NotMadeAgain {
-        /// File.
-        model: String,
+    #[error("{} is lost, or has changed since the study was planned", .path.display())]
+    LostModel {
+        /// Its file.
+        path: PathBuf,
     },
     /// This build or machine makes other numbers than the one that planned.
     #[error(
@@ -147,10 +91,8 @@ pub enum StudyError {
     Incomplete {
         /// Units of the plan.
         units: usize,
-        /// Those, with their names.
-        missing: Vec<(Unit, String)>,
-        /// Tables that another plan left.
-        stale: Option<PathBuf>,
+        /// The missing and damaged units.
+        missing: Vec<NamedUnit>,
     },
     /// There is nothing to verify.
     #[error("no unit is done yet")]
@@ -167,34 +109,33 @@ impl From<FileError> for StudyError {
 }
 
 impl StudyError {
+    pub(super) fn unfit(part: impl ToString, reason: impl ToString) -> Self {
+        Self::Unfit { part: part.to_string(), reason: reason.to_string(), hint: None }
+    }
+
     /// Whether contents or the request are at fault (rather than the machine).
     pub(crate) fn is_usage(&self) -> bool {
         match self {
             Self::File(e) => !e.is_system(),
-            Self::Candidate { source, .. } | Self::CalibratedModel(source) => source.is_usage(),
-            Self::Unit(_) | Self::Comparison(_) | Self::NotFinite { .. } => false,
+            Self::Unit(_) | Self::Comparison(_) | Self::NotFinite { .. } | Self::LostModel { .. } => false,
             _ => true,
         }
     }
 
     /// What to do about it.
-    pub(crate) fn remedy(&self) -> Option<Remedy> {
-        match self {
-            Self::File(e) => e.hint().map(Remedy::Advice),
-            Self::Description { source, .. } => source.hint().map(Remedy::Advice),
-            Self::Outage { source, .. } => source.hint().map(|hint| Remedy::Advice(hint.to_owned())),
-            Self::Candidate { source, .. } => source.remedy(),
-            Self::NoFilter { source: BeliefError::Setting(_), .. } => {
-                Some(Remedy::Advice(RARE_FIXES.to_owned()))
-            }
-            Self::NoPlan { .. } => Some(Remedy::Plan),
-            Self::OtherStudy { .. } => Some(Remedy::PlanElsewhere),
-            Self::Changed { .. } => Some(Remedy::PutBack),
-            Self::CalibratedModel(_) => Some(Remedy::PlanAgain),
-            Self::NotMadeAgain { .. } => Some(Remedy::UsePlanningBuild),
-            Self::OtherNumbers { .. } => Some(Remedy::UseOneBuild),
-            Self::Incomplete { .. } | Self::NothingDone => Some(Remedy::Run),
-            _ => None,
-        }
+    pub(crate) fn hint(&self) -> Option<String> {
+        let hint = match self {
+            Self::File(e) => return e.hint(),
+            Self::Unfit { hint, .. } => return hint.clone(),
+            Self::NoPlan { .. } => "make one with `nav-sim batch plan STUDY.toml`",
+            Self::OtherStudy { .. } => "plan into another directory with --out, or remove this one",
+            Self::Changed { .. } => "put it back, or plan into another directory with --out",
+            Self::LostModel { .. } => "`nav-sim batch plan` makes it anew",
+            Self::OtherNumbers { .. } => "use the build that planned, or plan into another directory with --out",
+            Self::Incomplete { .. } => "`nav-sim batch run` computes them; nothing was written",
+            Self::NothingDone => "see `nav-sim batch run`",
+            _ => return None,
+        };
+        Some(hint.to_owned())
     }
 }

@@ -1,18 +1,19 @@
-//! What the cells of a plan are made of, loaded when first needed and checked against the plan's hashes.
+//! The cells of a plan, set up from its files and computed. A file must be what it was when the study was planned.
 
-use super::directory;
 use super::failure::StudyError;
 use super::file::beside;
 use super::grid::{Cell, Column};
-use super::plan::Unit;
+use super::plan::{CALIBRATED, Unit};
 use super::planned::Planned;
-use super::reader::{Reader, TruthSource};
+use super::reader::{Reader, TruthSource, unchanged};
 use super::remark::Remark;
-use crate::formats::{input, model_file};
+use super::unit::{Finding, UnitResult};
+use crate::formats::{hash, model_file};
 use crate::observer::Observer;
 use crate::report::Input;
-use nav_sim_navigation::ekf::Belief;
+use nav_sim_navigation::ekf::{Belief, BeliefError};
 use nav_sim_navigation::metrics::Expected;
+use nav_sim_navigation::monte_carlo;
 use nav_sim_navigation::scenario::{Method, Reduction, Scenario};
 use nav_sim_navigation::sensors::imu::Truth;
 use nav_sim_navigation::sensors::outage::{Outage, PlacedOutages};
@@ -25,38 +26,46 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
-/// Role of models that the plan calibrated.
-pub(super) const CALIBRATED: &str = "calibrated";
-
-/// Model files that are made and not written yet: path in the study's directory, contents.
-pub(super) type ModelTexts = Vec<(String, String)>;
-
 /// A cell, set up.
 pub(super) enum Work<'a> {
     /// For runs.
     Sampling(simulation::Plan<'a>),
     /// For covariance analysis.
-    Analysis(Analysis<'a>),
+    Analysis { track: &'a Track, experiment: &'a Experiment<'a>, truth: &'a Model },
 }
 
-/// A covariance analysis of a cell.
-pub(super) struct Analysis<'a> {
-    track: &'a Track,
-    experiment: &'a Experiment<'a>,
-    truth: &'a Model,
-    /// Names of the cell, and of its columns.
-    names: (String, Vec<String>),
-}
-
-impl Analysis<'_> {
-    /// What is expected of each column.
-    pub(super) fn expected(&self) -> Result<Vec<Expected>, StudyError> {
-        let of_column = |(belief, column): (&Belief, &String)| {
-            let expected = Expected::along(self.track, self.experiment, belief, self.truth);
-            expected
-                .ok_or_else(|| StudyError::NotFinite { cell: self.names.0.clone(), column: column.clone() })
+impl Work<'_> {
+    /// The result of a unit; `None` if the observer stopped on the way.
+    pub(super) fn unit(
+        &self,
+        planned: &Planned,
+        (unit, id): (Unit, &str),
+        observer: &dyn Observer<Remark>,
+    ) -> Result<Option<UnitResult>, StudyError> {
+        let progress = |runs| observer.advance(runs);
+        let mut columns: Vec<Finding> = match self {
+            Self::Sampling(plan) => {
+                let go_on = || observer.go_on();
+                match monte_carlo::run_range(plan, unit.first, unit.runs, &go_on, &progress) {
+                    Some(results) => results.into_iter().map(Finding::Sampled).collect(),
+                    None => return Ok(None),
+                }
+            }
+            Self::Analysis { track, experiment, truth } => {
+                let grid = &planned.grid;
+                let of_column = |(belief, column): (&Belief, &Column)| {
+                    let expected = Expected::along(track, experiment, belief, truth).map(Finding::Expected);
+                    let cell = || grid.names(grid.cell(unit.cell)).join(", ");
+                    expected.ok_or_else(|| StudyError::NotFinite { cell: cell(), column: column.name.clone() })
+                };
+                let columns = experiment.beliefs.par_iter().zip(&grid.columns).map(of_column);
+                let columns = columns.collect::<Result<_, _>>()?;
+                progress(unit.runs);
+                columns
+            }
         };
-        self.experiment.beliefs.par_iter().zip(&self.names.1).map(of_column).collect()
+        columns.iter_mut().for_each(|finding| finding.reduce(planned.plan.kept()));
+        Ok(Some(UnitResult { id: id.to_owned(), first: unit.first, runs: unit.runs, columns }))
     }
 }
 
@@ -64,6 +73,7 @@ impl Analysis<'_> {
 pub(super) struct Inputs<'a> {
     planned: &'a Planned,
     reader: Reader<'a>,
+    /// Calibrated models that are not in the directory yet.
     made: &'a [(String, String)],
     trajectory: Option<(usize, Arc<Trajectory>)>,
     truth: Option<(usize, Arc<TruthSource>)>,
@@ -72,14 +82,13 @@ pub(super) struct Inputs<'a> {
 }
 
 impl<'a> Inputs<'a> {
-    pub(super) fn new(planned: &'a Planned, observer: &'a dyn Observer<Remark>) -> Self {
+    pub(super) fn new(
+        planned: &'a Planned,
+        made: &'a [(String, String)],
+        observer: &'a dyn Observer<Remark>,
+    ) -> Self {
         let reader = Reader { study: &planned.study, observer };
-        Self { planned, reader, made: &[], trajectory: None, truth: None, models: HashMap::new() }
-    }
-
-    /// With calibrated models that are not in the directory yet.
-    pub(super) fn with_models(self, made: &'a ModelTexts) -> Self {
-        Self { made, ..self }
+        Self { planned, reader, made, trajectory: None, truth: None, models: HashMap::new() }
     }
 
     /// Calls `f` with a cell, set up.
@@ -88,8 +97,7 @@ impl<'a> Inputs<'a> {
         cell: Cell,
         f: impl FnOnce(&Work<'_>) -> Result<T, StudyError>,
     ) -> Result<T, StudyError> {
-        let scenario = self.planned.grid.scenario(cell, self.planned.plan.seed);
-        self.set_up(cell, &scenario, f)
+        self.set_up(cell, &self.planned.grid.scenario(cell, self.planned.plan.seed), f)
     }
 
     /// Refuses a cell whose parts do not fit together. Filters are reduced the quick way: what is refused is the same.
@@ -105,37 +113,32 @@ impl<'a> Inputs<'a> {
         scenario: &Scenario,
         f: impl FnOnce(&Work<'_>) -> Result<T, StudyError>,
     ) -> Result<T, StudyError> {
-        let (plan, grid) = (&self.planned.plan, &self.planned.grid);
+        let Planned { plan, grid, .. } = self.planned;
         let trajectory = self.trajectory(cell.trajectory)?;
         let truth = self.truth(cell.truth)?;
         let outages = self.outages(cell)?.windows;
-        let part = || grid.names(cell).join(", ");
+        let name = grid.names(cell).join(", ");
         let truth_model;
         let truth = match &*truth {
             TruthSource::Recordings(recordings) => Truth::Static(recordings),
             TruthSource::Model(model) => {
-                truth_model =
-                    continuous::at_rate(model, scenario.imu.rate_hz).map_err(|e| unfit(part(), e))?;
+                let model = continuous::at_rate(model, scenario.imu.rate_hz);
+                truth_model = model.map_err(|e| StudyError::unfit(&name, e))?;
                 Truth::Model(&truth_model)
             }
         };
         let bare = scenario.experiment(&trajectory, truth, &[], &outages, plan.seed);
-        let track = Track::along(&bare).map_err(|e| unfit(part(), e))?;
+        let track = Track::along(&bare).map_err(|e| StudyError::unfit(&name, e))?;
         let beliefs = self.beliefs(cell, scenario, &track, &outages)?;
         let experiment = Experiment { beliefs: &beliefs, ..bare };
-        let work = match (plan.study.method, truth) {
+        f(&match (plan.study.method, truth) {
             (Method::Lincov, Truth::Model(truth)) => {
-                let columns = grid.columns.iter().map(|c| c.name.clone()).collect();
-                Work::Analysis(Analysis {
-                    track: &track,
-                    experiment: &experiment,
-                    truth,
-                    names: (part(), columns),
-                })
+                Work::Analysis { track: &track, experiment: &experiment, truth }
             }
-            _ => Work::Sampling(simulation::Plan::new(&experiment).map_err(|e| unfit(part(), e))?),
-        };
-        f(&work)
+            _ => Work::Sampling(
+                simulation::Plan::new(&experiment).map_err(|e| StudyError::unfit(&name, e))?,
+            ),
+        })
     }
 
     /// The outages of a cell; refuses those that do not lie on its trajectory.
@@ -143,9 +146,10 @@ impl<'a> Inputs<'a> {
         let trajectory = self.trajectory(cell.trajectory)?;
         let span_s = (trajectory.start_s(), trajectory.end_s());
         let Planned { plan, grid, study, .. } = self.planned;
-        grid.scenario(cell, plan.seed).outages_on(span_s, plan.seed).map_err(|source| StudyError::Outage {
-            place: format!("{}: {}", study.display(), grid.names(cell).join(", ")),
-            source,
+        grid.scenario(cell, plan.seed).outages_on(span_s, plan.seed).map_err(|e| StudyError::Unfit {
+            part: format!("{}: {}", study.display(), grid.names(cell).join(", ")),
+            reason: e.to_string(),
+            hint: e.hint().map(str::to_owned),
         })
     }
 
@@ -155,42 +159,24 @@ impl<'a> Inputs<'a> {
         Ok(trajectory.end_s() - trajectory.start_s())
     }
 
-    /// Whether a unit is there and what the plan says; what is wrong with it, if it is damaged.
-    pub(super) fn finished(&mut self, (unit, id): (Unit, &str)) -> Result<Result<bool, String>, StudyError> {
-        let outages = self.outages(self.planned.grid.cell(unit.cell))?.windows;
-        let outages: Vec<(f64, f64)> = outages.iter().map(|o| (o.start_s, o.end_s)).collect();
-        let columns = self.planned.grid.columns.len();
-        Ok(directory::finished(&self.planned.directory, (unit, id), columns, &outages)?)
-    }
-
     fn trajectory(&mut self, index: usize) -> Result<Arc<Trajectory>, StudyError> {
-        if let Some((kept, trajectory)) = &self.trajectory
-            && *kept == index
-        {
-            return Ok(Arc::clone(trajectory));
-        }
-        let plan = &self.planned.plan;
-        let path = beside(&self.planned.study, &plan.study.trajectory[index].file);
-        unchanged(&path, &plan.trajectories[index])?;
-        let trajectory = Arc::new(self.reader.trajectory(&path)?);
-        self.trajectory = Some((index, Arc::clone(&trajectory)));
-        Ok(trajectory)
+        let Planned { plan, study, .. } = self.planned;
+        kept(&mut self.trajectory, index, || {
+            let path = beside(study, &plan.study.trajectory[index].file);
+            unchanged(&path, &plan.trajectories[index])?;
+            Ok(self.reader.trajectory(&path)?)
+        })
     }
 
     fn truth(&mut self, index: usize) -> Result<Arc<TruthSource>, StudyError> {
-        if let Some((kept, truth)) = &self.truth
-            && *kept == index
-        {
-            return Ok(Arc::clone(truth));
-        }
         let plan = &self.planned.plan;
-        let entry = &plan.study.truth[index];
-        if self.reader.truth_hash(entry, plan.seed)? != plan.truths[index] {
-            return Err(StudyError::Changed { what: format!("the truth \"{}\"", entry.name) });
-        }
-        let truth = Arc::new(self.reader.truth(entry, plan.seed)?);
-        self.truth = Some((index, Arc::clone(&truth)));
-        Ok(truth)
+        kept(&mut self.truth, index, || {
+            let entry = &plan.study.truth[index];
+            if self.reader.truth_hash(entry, plan.seed)? != plan.truths[index] {
+                return Err(StudyError::Changed { what: format!("the truth \"{}\"", entry.name) });
+            }
+            self.reader.truth(entry, plan.seed)
+        })
     }
 
     fn beliefs(
@@ -200,33 +186,35 @@ impl<'a> Inputs<'a> {
         track: &Track,
         outages: &[Outage],
     ) -> Result<Vec<Belief>, StudyError> {
-        let grid = &self.planned.grid;
-        let plan = &self.planned.plan;
+        let Planned { plan, grid, .. } = self.planned;
         for column in &grid.columns {
-            self.load_model(plan.model(column.candidate, cell.truth))?;
+            let file = plan.model(column.candidate, cell.truth);
+            if !self.models.contains_key(file.path.as_str()) {
+                let model = self.model(file)?;
+                self.models.insert(&file.path, model);
+            }
         }
         let models = &self.models;
         let belief = |column: &Column| {
             let mut variant = scenario.clone();
             variant.filter.states = grid.filter(cell, column);
-            let part = || format!("candidate {}", column.name);
+            let part = format!("candidate {}", column.name);
             let model = &models[plan.model(column.candidate, cell.truth).path.as_str()];
-            let model = continuous::at_rate(model, scenario.imu.rate_hz).map_err(|e| unfit(part(), e))?;
-            let belief = variant.belief(&model, outages, track);
-            belief.map_err(|source| StudyError::NoFilter { part: part(), source })
+            let model = continuous::at_rate(model, scenario.imu.rate_hz);
+            let model = model.map_err(|e| StudyError::unfit(&part, e))?;
+            variant.belief(&model, outages, track).map_err(|e| StudyError::Unfit {
+                part,
+                reason: e.to_string(),
+                // fixes are too rare to reduce a model
+                hint: matches!(e, BeliefError::Setting(_)).then(|| {
+                    "raise it, or take the full filter alone (filters = [\"full\"]), which reduces nothing".to_owned()
+                }),
+            })
         };
         grid.columns.par_iter().map(belief).collect()
     }
 
-    fn load_model(&mut self, prepared: &'a Input) -> Result<(), StudyError> {
-        if !self.models.contains_key(prepared.path.as_str()) {
-            let model = self.read_model(prepared)?;
-            self.models.insert(&prepared.path, model);
-        }
-        Ok(())
-    }
-
-    fn read_model(&self, model: &Input) -> Result<Model, StudyError> {
+    fn model(&self, model: &Input) -> Result<Model, StudyError> {
         if model.role != CALIBRATED {
             let path = beside(&self.planned.study, Path::new(&model.path));
             unchanged(&path, &model.blake3)?;
@@ -238,19 +226,25 @@ impl<'a> Inputs<'a> {
             self.reader.doubt(file.doubts(&path));
             return Ok(file.model);
         }
-        unchanged(&path, &model.blake3).map_err(|e| StudyError::CalibratedModel(Box::new(e)))?;
-        Ok(self.reader.model(&path)?.model)
+        if hash::of_file(&path).is_ok_and(|found| found == model.blake3) {
+            return Ok(self.reader.model(&path)?.model);
+        }
+        Err(StudyError::LostModel { path })
     }
 }
 
-fn unfit(part: String, e: impl std::error::Error + Send + Sync + 'static) -> StudyError {
-    StudyError::Unfit { part, source: Box::new(e) }
-}
-
-/// Refuses a file that is not what it was when the study was planned.
-pub(super) fn unchanged(path: &Path, blake3: &str) -> Result<(), StudyError> {
-    if input::fingerprint(path)? == blake3 {
-        return Ok(());
+/// What was loaded last, if it is of this index; else it is loaded.
+fn kept<T>(
+    last: &mut Option<(usize, Arc<T>)>,
+    index: usize,
+    load: impl FnOnce() -> Result<T, StudyError>,
+) -> Result<Arc<T>, StudyError> {
+    match last {
+        Some((kept, value)) if *kept == index => Ok(Arc::clone(value)),
+        _ => {
+            let value = Arc::new(load()?);
+            *last = Some((index, Arc::clone(&value)));
+            Ok(value)
+        }
     }
-    Err(StudyError::Changed { what: path.display().to_string() })
 }

@@ -1,9 +1,10 @@
 //! Merging: units to tables.
 
-use super::cell_tables::{CellTables, DamagedUnits};
+use super::cell_tables::CellTables;
 use super::failure::StudyError;
 use super::leave_one_out::Folds;
-use super::plan::Unit;
+use super::description::Metric;
+use super::plan::NamedUnit;
 use super::planned::Planned;
 use super::remark::Remark;
 use super::tables::{Tables, Texts};
@@ -50,22 +51,20 @@ pub fn merge(
     observer: &dyn Observer<Remark>,
 ) -> Result<MergeReport, StudyError> {
     planned.inputs_unchanged()?;
-    let status = planned.status()?;
-    if let Some(remark) = planned.foreign_units(&status) {
-        observer.remark(&remark);
-    }
-    if !status.missing.is_empty() {
-        return Err(incomplete(planned, status.units, status.missing));
+    planned.remark_foreign(observer)?;
+    let units = planned.plan.named_units(&planned.grid);
+    let missing = planned.missing()?;
+    if !missing.is_empty() {
+        return Err(StudyError::Incomplete { units: units.len(), missing });
     }
     let results = planned.directory.join("results");
     let mut out = AtomicDir::create(&results)?;
     let mut tables = Tables::create(&mut out, planned)?;
-    let mut texts = Texts::new(planned)?;
+    let mut texts = Texts::new(planned);
     let mut folds = Folds::default();
-    let units: Vec<(Unit, String)> = planned.plan.named_units(&planned.grid).collect();
     let diverged = match gather(planned, &units, options.threads, &mut tables, &mut texts, &mut folds)? {
         Ok(diverged) => diverged,
-        Err(damaged) => return Err(incomplete(planned, units.len(), damaged)),
+        Err(missing) => return Err(StudyError::Incomplete { units: units.len(), missing }),
     };
     tables.finish()?;
     texts.rankings = folds.ranked(planned);
@@ -87,17 +86,17 @@ pub fn merge(
 /// that are damaged.
 fn gather(
     planned: &Planned,
-    units: &[(Unit, String)],
+    units: &[NamedUnit],
     threads: usize,
     tables: &mut Tables,
     texts: &mut Texts,
     folds: &mut Folds,
-) -> Result<Result<u64, Vec<(Unit, String)>>, StudyError> {
-    let cells: Vec<&[(Unit, String)]> = units.chunk_by(|a, b| a.0.cell == b.0.cell).collect();
+) -> Result<Result<u64, Vec<NamedUnit>>, StudyError> {
+    let cells: Vec<&[NamedUnit]> = units.chunk_by(|a, b| a.0.cell == b.0.cell).collect();
     let mut damaged = Vec::new();
     let mut diverged = 0;
     for wave in cells.chunks(cells_at_once(planned, threads)) {
-        let found: Vec<Result<Result<CellTables, DamagedUnits>, StudyError>> =
+        let found: Vec<Result<Result<CellTables, Vec<NamedUnit>>, StudyError>> =
             wave.par_iter().map(|units| CellTables::make(planned, units)).collect();
         for cell in found {
             match cell? {
@@ -108,15 +107,11 @@ fn gather(
                     texts.add(cell.shown);
                 }
                 Ok(_) => {}
-                Err(DamagedUnits(units)) => damaged.extend(units),
+                Err(units) => damaged.extend(units),
             }
         }
     }
     Ok(if damaged.is_empty() { Ok(diverged) } else { Err(damaged) })
-}
-
-fn incomplete(planned: &Planned, units: usize, missing: Vec<(Unit, String)>) -> StudyError {
-    StudyError::Incomplete { units, missing, stale: planned.stale_results() }
 }
 
 /// Cells that are held in memory together.
@@ -129,7 +124,7 @@ fn cells_at_once(planned: &Planned, threads: usize) -> usize {
 
 /// Removes tables of an earlier plan that this one does not write; all others are replaced.
 fn remove_stale(planned: &Planned) -> Result<(), StudyError> {
-    let epochs: &[&str] = if planned.keeps_epochs() { &[] } else { &["epochs.csv", "epochs.parquet"] };
+    let epochs: &[&str] = if planned.plan.study.keeps(Metric::Epochs) { &[] } else { &["epochs.csv", "epochs.parquet"] };
     let ranking: &[&str] = if planned.plan.study.leaves_out() { &[] } else { &["ranking.json"] };
     for name in epochs.iter().chain(ranking) {
         let path = planned.directory.join("results").join(name);

@@ -4,7 +4,7 @@
 //! A study is the product of trajectories, truths, scenarios, receivers and outage sets: its *cells*.
 //! Candidates (noise models) and filter variants are the *columns* of a cell: all of them run on one draw
 //! of the noise, so that ratios between them are paired. The runs of a cell are cut into *units*; a unit is
-//! named by the hash of everything that decides its bytes (`Plan::unit_id`), so that finished work is
+//! named by the hash of everything that decides its bytes (`Plan::named_units`), so that finished work is
 //! recognised wherever it was done, and work of another study never passes for it.
 //!
 //! ```text
@@ -35,10 +35,10 @@
 //! # Ok::<(), study::StudyError>(())
 //! ```
 
+mod calibrating;
 mod cell_tables;
 mod check;
 mod description;
-pub(crate) mod directory;
 mod error;
 mod failure;
 pub(crate) mod file;
@@ -51,31 +51,25 @@ pub(crate) mod named_files;
 mod plan;
 mod planned;
 mod planning;
-mod prepare;
 mod reader;
 mod remark;
-mod remedy;
 mod rules;
 mod running;
-mod sums;
 mod sweep;
 mod tables;
 mod unit;
 pub mod unit_file;
 mod unit_words;
-mod verification;
 
 pub(crate) use description::Study;
-pub use error::{DescriptionError, PrepareError};
+pub use error::DescriptionError;
 pub use failure::StudyError;
 pub use grid::Grid;
 pub use merging::{MergeOptions, MergeReport, merge};
-pub use plan::{Plan, Unit};
+pub use plan::{NamedUnit, Plan, Shard, Unit};
+pub(crate) use planned::plan_in;
 pub use planned::{Planned, Status};
 pub use planning::{PlanOptions, PlanReport, Writing, plan};
-pub(crate) use remark::Importance;
-pub use remark::Remark;
-pub(crate) use remedy::Remedy;
-pub use running::{RunOptions, RunReport, Shard, run};
+pub use remark::{Importance, Remark};
+pub use running::{RunOptions, RunReport, VerifyOptions, VerifyReport, run, verify};
 pub use unit::{Finding, UnitResult};
-pub use verification::{VerifyOptions, VerifyReport, verify};

@@ -1,13 +1,15 @@
 //! The plan: what a study's files were when it was planned, and how its runs are cut into units.
 
 use super::description::{Metric, Study};
-use super::error::DescriptionError;
-use super::grid::{Cell, Grid};
+use super::grid::{Cell, Column, Grid};
 use crate::report::Input;
 use nav_sim_navigation::lanes::LANES;
 use nav_sim_navigation::scenario::{Method, Scenario};
 use nav_sim_navigation::sensors::gnss::GnssSettings;
 use serde::{Deserialize, Serialize};
+
+/// Role of models that the plan calibrated.
+pub(super) const CALIBRATED: &str = "calibrated";
 
 /// A plan. It does not hold the units: they follow from it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -63,19 +65,6 @@ pub(crate) enum Kept {
     AllEpochs,
 }
 
-impl Kept {
-    /// What the metrics of a study need.
-    pub(crate) fn of(study: &Study) -> Self {
-        if study.keeps(Metric::Epochs) {
-            Self::AllEpochs
-        } else if study.keeps(Metric::Ratios) {
-            Self::OutageEpochs
-        } else {
-            Self::Runs
-        }
-    }
-}
-
 /// A unit of work: runs `first..first + runs` of a cell; a covariance analysis counts as one run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Unit {
@@ -87,6 +76,37 @@ pub struct Unit {
     pub first: u64,
     /// Number of runs.
     pub runs: u64,
+}
+
+/// A unit with its name.
+pub type NamedUnit = (Unit, String);
+
+/// Units whose position leaves `index` when divided by `count`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    index: u64,
+    count: u64,
+}
+
+impl Shard {
+    /// All units.
+    pub(crate) const ALL: Self = Self { index: 0, count: 1 };
+
+    /// One of `count`, from 0.
+    #[must_use]
+    pub const fn new(index: u64, count: u64) -> Option<Self> {
+        if index < count { Some(Self { index, count }) } else { None }
+    }
+
+    /// Index and count.
+    pub(crate) const fn parts(self) -> (u64, u64) {
+        (self.index, self.count)
+    }
+
+    /// Whether a unit belongs to it.
+    pub(crate) const fn has(self, unit: usize) -> bool {
+        unit as u64 % self.count == self.index
+    }
 }
 
 /// What decides the bytes of a cell's units, beside the run range.
@@ -106,14 +126,6 @@ impl Plan {
     /// Version of the layout.
     pub(crate) const SCHEMA_VERSION: u32 = 2;
 
-    /// The grid of the plan.
-    ///
-    /// # Errors
-    /// When the study's outage sets are refused.
-    pub(crate) fn grid(&self) -> Result<Grid, DescriptionError> {
-        Grid::new(&self.study, &self.scenarios, &self.gnss)
-    }
-
     /// The model file of a candidate where this truth makes the errors.
     pub(super) fn model(&self, candidate: usize, truth: usize) -> &Input {
         let files = &self.models[candidate];
@@ -122,7 +134,13 @@ impl Plan {
 
     /// What units keep of the runs.
     pub(crate) fn kept(&self) -> Kept {
-        Kept::of(&self.study)
+        if self.study.keeps(Metric::Epochs) {
+            Kept::AllEpochs
+        } else if self.study.keeps(Metric::Ratios) {
+            Kept::OutageEpochs
+        } else {
+            Kept::Runs
+        }
     }
 
     /// Runs of each cell; a covariance analysis counts as one.
@@ -170,8 +188,8 @@ impl Plan {
     }
 
     /// Hash of everything that decides the bytes of a cell's units.
-    pub(crate) fn cell_hash(&self, grid: &Grid, cell: Cell) -> blake3::Hash {
-        let scenario = grid.scenario(cell, self.seed);
+    fn cell_hash(&self, grid: &Grid, cell: Cell) -> blake3::Hash {
+        let column = |c: &Column| (self.model(c.candidate, cell.truth).blake3.as_str(), grid.filter(cell, c));
         let key = CellKey {
             version: &self.version,
             numerics: &self.numerics,
@@ -179,44 +197,37 @@ impl Plan {
             kept: self.kept(),
             trajectory: &self.trajectories[cell.trajectory],
             truth: &self.truths[cell.truth],
-            scenario: &scenario,
-            columns: grid
-                .columns
-                .iter()
-                .map(|c| (self.model(c.candidate, cell.truth).blake3.as_str(), grid.filter(cell, c)))
-                .collect(),
+            scenario: &grid.scenario(cell, self.seed),
+            columns: grid.columns.iter().map(column).collect(),
         };
-        let json = serde_json::to_vec(&key).expect("plain structs are always JSON");
-        blake3::hash(&json)
+        blake3::hash(&json(&key))
     }
 
-    /// The name of a unit: hash of its cell's hash and its run range, 32 hexadecimal digits.
-    pub(crate) fn unit_id(cell_hash: &blake3::Hash, unit: Unit) -> String {
-        let mut hasher = blake3::Hasher::new();
-        hasher.update(cell_hash.as_bytes());
-        hasher.update(&unit.first.to_le_bytes()).update(&unit.runs.to_le_bytes());
-        hasher.finalize().to_hex()[..32].to_owned()
-    }
-
-    /// All units with their names, in order; each cell is hashed once.
-    pub(crate) fn named_units<'a>(&'a self, grid: &'a Grid) -> impl Iterator<Item = (Unit, String)> + 'a {
-        let mut last: Option<(usize, blake3::Hash)> = None;
-        self.units(grid).map(move |unit| {
-            let hash = match last {
-                Some((cell, hash)) if cell == unit.cell => hash,
-                _ => self.cell_hash(grid, grid.cell(unit.cell)),
+    /// All units with their names, in order: 32 hexadecimal digits of the hash of the cell's hash and the run range.
+    pub(crate) fn named_units(&self, grid: &Grid) -> Vec<NamedUnit> {
+        let units: Vec<Unit> = self.units(grid).collect();
+        let of_cell = |units: &[Unit]| {
+            let hash = self.cell_hash(grid, grid.cell(units[0].cell));
+            let named = |unit: &Unit| {
+                let mut hasher = blake3::Hasher::new();
+                hasher.update(hash.as_bytes());
+                hasher.update(&unit.first.to_le_bytes()).update(&unit.runs.to_le_bytes());
+                (*unit, hasher.finalize().to_hex()[..32].to_owned())
             };
-            last = Some((unit.cell, hash));
-            (unit, Self::unit_id(&hash, unit))
-        })
+            units.iter().map(named).collect::<Vec<_>>()
+        };
+        units.chunk_by(|a, b| a.cell == b.cell).flat_map(of_cell).collect()
     }
 
     /// The plan's own name: hash of everything but the estimate.
     pub(crate) fn id(&self) -> String {
         let bare = Self { estimate: Estimate::default(), ..self.clone() };
-        let json = serde_json::to_vec(&bare).expect("plain structs are always JSON");
-        blake3::hash(&json).to_hex()[..16].to_owned()
+        blake3::hash(&json(&bare)).to_hex()[..16].to_owned()
     }
+}
+
+fn json(value: &impl Serialize) -> Vec<u8> {
+    serde_json::to_vec(value).expect("plain structs are always JSON")
 }
 
 #[cfg(test)]
@@ -251,18 +262,22 @@ mod tests {
             unit_runs: vec![100, 8],
             estimate: Estimate::default(),
         };
-        let grid = plan.grid().unwrap();
+        let grid = Grid::new(&plan.study, &plan.scenarios, &plan.gnss).unwrap();
         (plan, grid)
     }
 
-    fn named(plan: &Plan, grid: &Grid) -> Vec<(Unit, String)> {
-        plan.named_units(grid).collect()
+    #[test]
+    fn shards_share_out_the_units() {
+        assert_eq!((Shard::new(3, 3), Shard::new(0, 0)), (None, None));
+        for unit in 0..20 {
+            assert_eq!((0..3).filter(|i| Shard::new(*i, 3).unwrap().has(unit)).count(), 1);
+        }
     }
 
     #[test]
     fn units_cover_every_run_of_every_cell_once() {
         let (plan, grid) = plan(|_| {});
-        let units = named(&plan, &grid);
+        let units = plan.named_units(&grid);
         assert_eq!((grid.len(), grid.columns.len()), (12, 4));
         assert_eq!((units.len(), plan.unit_count(&grid)), (6 * 3 + 6 * 32, 6 * 3 + 6 * 32));
         assert!(units.iter().enumerate().all(|(i, (unit, _))| unit.index == i));
@@ -293,10 +308,10 @@ mod tests {
     #[test]
     fn names_differ_in_everything_that_decides_the_bytes_and_in_nothing_else() {
         let (base, grid) = plan(|_| {});
-        let names: HashSet<String> = named(&base, &grid).into_iter().map(|(_, id)| id).collect();
+        let names: HashSet<String> = base.named_units(&grid).into_iter().map(|(_, id)| id).collect();
         assert_eq!(names.len(), base.unit_count(&grid));
         let shared =
-            |other: &(Plan, Grid)| named(&other.0, &other.1).iter().filter(|u| names.contains(&u.1)).count();
+            |other: &(Plan, Grid)| other.0.named_units(&other.1).iter().filter(|u| names.contains(&u.1)).count();
         let with = |change: &dyn Fn(&mut Plan)| {
             let mut other = base.clone();
             change(&mut other);

@@ -1,16 +1,21 @@
-//! A study that has been planned, opened again.
+//! The directory of a study: `plan.json`, `models/` calibrated by the plan, `units/`, and `results/`.
 
-use super::directory;
+use super::description::Study;
 use super::failure::StudyError;
 use super::file::{self, beside};
 use super::fingerprint::fingerprint;
 use super::grid::Grid;
-use super::inputs::unchanged;
-use super::plan::{Plan, Unit};
+use super::plan::{NamedUnit, Plan, Shard, Unit};
+use super::reader::unchanged;
 use super::remark::Remark;
-use super::unit_file;
+use super::unit_file::{self, UnitFileError};
+use crate::formats::difference::{self, Difference};
+use crate::formats::{FileError, atomic, source};
 use crate::observer::Observer;
+use crate::report::Input;
 use std::collections::BTreeSet;
+use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// A plan with its grid and its places.
@@ -26,6 +31,58 @@ pub struct Planned {
     pub directory: PathBuf,
 }
 
+/// The state of a unit's file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum UnitState {
+    Whole,
+    Missing,
+    /// With the reason.
+    Damaged(String),
+}
+
+/// What is there of a plan.
+#[derive(Debug, Clone, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Status {
+    /// Units of the plan.
+    pub units: usize,
+    /// Those that are there and whole.
+    pub done: usize,
+    /// Those that are there and damaged.
+    pub damaged: usize,
+    /// Cells all of whose units are done.
+    pub cells_done: usize,
+    /// Processor time of the units that are not done (s).
+    pub left_s: f64,
+    /// Names of units of another plan.
+    pub foreign: Vec<String>,
+}
+
+/// The plan in a directory, if there is one.
+pub(crate) fn plan_in(directory: &Path) -> Result<Option<Plan>, FileError> {
+    let path = directory.join("plan.json");
+    let text = match source::text(&path) {
+        Ok(text) => text,
+        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(e) => return Err(FileError::io(&path, e)),
+    };
+    let damaged = |line: usize, message: &str| {
+        FileError::contents(path.display().to_string(), line, message)
+            .advice("remove the directory and plan again")
+    };
+    let plan: Plan = serde_json::from_str(&text)
+        .map_err(|e| damaged(e.line(), e.to_string().split(" at line ").next().unwrap_or_default()))?;
+    let sizes = [plan.unit_runs.len(), plan.trajectories.len()];
+    let fits = |files: &Vec<Input>| files.len() == 1 || files.len() == plan.study.truth.len();
+    if sizes != [plan.study.trajectory.len(); 2]
+        || plan.models.len() != plan.study.candidates().len()
+        || !plan.models.iter().all(fits)
+    {
+        return Err(damaged(1, "its numbers of trajectories and models are not those of its study"));
+    }
+    Ok(Some(plan))
+}
+
 impl Planned {
     /// The plan in a directory, which must be that of the study, and have the seed if one is asked for.
     ///
@@ -33,13 +90,41 @@ impl Planned {
     /// When there is no plan, or that of another study.
     pub fn open(study: &Path, directory: &Path, seed: Option<u64>) -> Result<Self, StudyError> {
         let file = file::read(study)?;
-        Self::new(study, directory, directory::plan_of(directory, &file.study, seed)?)
+        let plan = plan_in(directory)?.ok_or_else(|| StudyError::NoPlan { directory: directory.to_owned() })?;
+        let planned = Self::new(study, directory, plan)?;
+        planned.must_be_of(&file.study, seed)?;
+        Ok(planned)
     }
 
     pub(super) fn new(study: &Path, directory: &Path, plan: Plan) -> Result<Self, StudyError> {
-        let refused = |source| StudyError::Description { study: study.to_owned(), source };
-        let grid = plan.grid().map_err(refused)?;
+        let refused = |e| StudyError::unfit(study.display(), e);
+        let grid = Grid::new(&plan.study, &plan.scenarios, &plan.gnss).map_err(refused)?;
         Ok(Self { plan, grid, study: study.to_owned(), directory: directory.to_owned() })
+    }
+
+    /// Refuses another study than the one that was planned, and another seed. A study without a seed takes the plan's.
+    pub(super) fn must_be_of(&self, study: &Study, seed: Option<u64>) -> Result<(), StudyError> {
+        let other = |Difference { key, found, wanted }| {
+            let plan = self.directory.join("plan.json");
+            Err(StudyError::OtherStudy { plan, key, found, wanted })
+        };
+        let planned = &self.plan;
+        if let Some(seed) = seed.filter(|seed| *seed != planned.seed) {
+            let [found, wanted] = [planned.seed, seed].map(|seed| seed.to_string());
+            return other(Difference { key: "seed".to_owned(), found, wanted });
+        }
+        let study = Study { seed: study.seed.or(planned.study.seed), ..study.clone() };
+        let keys = |study: &Study| match serde_json::to_value(study) {
+            Ok(serde_json::Value::Object(keys)) => keys,
+            _ => serde_json::Map::new(),
+        };
+        difference::first(&keys(&planned.study), &keys(&study)).map_or(Ok(()), other)
+    }
+
+    /// Writes the plan.
+    pub(super) fn write_plan(&self) -> Result<(), FileError> {
+        let json = serde_json::to_string_pretty(&self.plan).expect("plain structs are always JSON") + "\n";
+        atomic::write(&self.directory.join("plan.json"), json)
     }
 
     /// Refuses to compute with a build or on a machine that makes other numbers than the one that planned.
@@ -49,7 +134,7 @@ impl Planned {
         if planned == here { Ok(()) } else { Err(StudyError::OtherNumbers { planned, here }) }
     }
 
-    /// Refuses a study one of whose files is not what it was when the study was planned: what is done is no result of it.
+    /// Refuses a study one of whose files is not what it was when the study was planned.
     /// A file that is not here (on another machine, say) has not changed.
     ///
     /// # Errors
@@ -73,90 +158,92 @@ impl Planned {
         self.plan.units(&self.grid).map(wall_s).fold(0.0, f64::max)
     }
 
-    /// What is there of the units; whether they are whole is not looked at.
+    /// The units of the plan and what is there of them: all of them are read.
     ///
     /// # Errors
     /// When the directory cannot be read.
     pub fn status(&self) -> Result<Status, StudyError> {
-        self.status_by(&|_| true)
+        let units = self.survey(Shard::ALL)?;
+        let is_done = |(_, _, state): &&(Unit, String, UnitState)| *state == UnitState::Whole;
+        let is_damaged = |(_, _, state): &&(Unit, String, UnitState)| matches!(state, UnitState::Damaged(_));
+        let cells = units.chunk_by(|(a, ..), (b, ..)| a.cell == b.cell);
+        let left = units.iter().filter(|unit| !is_done(unit));
+        Ok(Status {
+            units: units.len(),
+            done: units.iter().filter(is_done).count(),
+            damaged: units.iter().filter(is_damaged).count(),
+            cells_done: cells.filter(|cell| cell.iter().all(|unit| is_done(&unit))).count(),
+            left_s: left.map(|(unit, ..)| self.plan.unit_s(&self.grid, *unit)).sum(),
+            foreign: self.foreign()?,
+        })
     }
 
-    /// What is there of the units and whole: all of them are read.
+    /// The units of a shard and what is there of each.
+    pub(super) fn survey(&self, shard: Shard) -> Result<Vec<(Unit, String, UnitState)>, StudyError> {
+        let present = self.unit_names()?;
+        let state = |(unit, id): NamedUnit| {
+            let state = match present.contains(&id).then(|| unit_file::read(&self.directory, &id)) {
+                None | Some(Err(UnitFileError::Missing { .. })) => UnitState::Missing,
+                Some(Ok(_)) => UnitState::Whole,
+                Some(Err(e @ UnitFileError::Damaged { .. })) => UnitState::Damaged(e.to_string()),
+                Some(Err(e)) => return Err(e.into()),
+            };
+            Ok((unit, id, state))
+        };
+        let units = self.plan.named_units(&self.grid).into_iter();
+        units.filter(|(unit, _)| shard.has(unit.index)).map(state).collect()
+    }
+
+    /// The units of which there is no file.
+    pub(super) fn missing(&self) -> Result<Vec<NamedUnit>, StudyError> {
+        let present = self.unit_names()?;
+        let mut units = self.plan.named_units(&self.grid);
+        units.retain(|(_, id)| !present.contains(id));
+        Ok(units)
+    }
+
+    /// Names of the unit files that are not of this plan.
+    fn foreign(&self) -> Result<Vec<String>, StudyError> {
+        let mut present = self.unit_names()?;
+        for (_, id) in self.plan.named_units(&self.grid) {
+            present.remove(&id);
+        }
+        Ok(present.into_iter().collect())
+    }
+
+    /// Remarks unit files that another plan left in the directory.
     ///
     /// # Errors
     /// When the directory cannot be read.
-    pub(crate) fn status_of_whole(&self) -> Result<Status, StudyError> {
-        self.status_by(&|id| unit_file::read(&self.directory, id).is_ok())
-    }
-
-    fn status_by(&self, is_whole: &dyn Fn(&str) -> bool) -> Result<Status, StudyError> {
-        let mut present = directory::units(&self.directory)?;
-        let (plan, grid) = (&self.plan, &self.grid);
-        let mut status = Status::default();
-        let mut cell_whole = true;
-        for (unit, id) in plan.named_units(grid) {
-            let is_there = present.remove(&id);
-            let done = is_there && is_whole(&id);
-            status.units += 1;
-            status.damaged += usize::from(is_there && !done);
-            status.done += usize::from(done);
-            cell_whole &= done;
-            if !done {
-                status.left_s += plan.unit_s(grid, unit);
-                status.missing.push((unit, id));
-            }
-            if unit.first + unit.runs == plan.runs() {
-                status.cells_done += usize::from(cell_whole);
-                cell_whole = true;
-            }
-        }
-        status.foreign = present;
-        Ok(status)
-    }
-
-    /// How many unit files are not of this plan, and where.
-    pub(crate) fn foreign_units(&self, status: &Status) -> Option<Remark> {
-        let first = status.foreign.first()?;
-        let example = unit_file::path(&self.directory, first);
-        Some(Remark::ForeignUnits { units: status.foreign.len(), example })
-    }
-
-    /// The results that another plan left here, if there are any.
-    pub(super) fn stale_results(&self) -> Option<PathBuf> {
-        let path = self.directory.join("results");
-        let text = std::fs::read_to_string(path.join("study.json")).ok()?;
-        let summary: serde_json::Value = serde_json::from_str(&text).ok()?;
-        (summary["plan"] != self.plan.id().as_str()).then_some(path)
-    }
-
-    /// Remarks what other plans left in the directory.
-    pub(super) fn remark_leftovers(&self, observer: &dyn Observer<Remark>) -> Result<(), StudyError> {
-        if let Some(remark) = self.foreign_units(&self.status()?) {
-            observer.remark(&remark);
-        }
-        if let Some(path) = self.stale_results() {
-            observer.remark(&Remark::StaleResults { path });
+    pub(crate) fn remark_foreign(&self, observer: &dyn Observer<Remark>) -> Result<(), StudyError> {
+        let foreign = self.foreign()?;
+        if let Some(first) = foreign.first() {
+            let example = unit_file::path(&self.directory, first);
+            let (units, example) = (foreign.len(), example.display());
+            let text = format!("{units} unit files are of another plan and left out, such as {example}");
+            observer.remark(&Remark::warning(text));
         }
         Ok(())
     }
+
+    /// The names of the units in the directory.
+    fn unit_names(&self) -> Result<BTreeSet<String>, FileError> {
+        let mut names = BTreeSet::new();
+        for inner in entries(&self.directory.join("units"))? {
+            for path in entries(&inner)? {
+                let stem = path.file_name().and_then(|n| n.to_str()).and_then(|n| n.strip_suffix(".unit"));
+                names.extend(stem.filter(|n| !n.starts_with('.')).map(str::to_owned));
+            }
+        }
+        Ok(names)
+    }
 }
 
-/// What is there of a plan.
-#[derive(Debug, Clone, Default, PartialEq)]
-#[non_exhaustive]
-pub struct Status {
-    /// Units of the plan.
-    pub units: usize,
-    /// Those that are there.
-    pub done: usize,
-    /// Those that are there and not whole, where that was looked at.
-    pub damaged: usize,
-    /// Cells all of whose units are there.
-    pub cells_done: usize,
-    /// Processor time of the units that are not there (s).
-    pub left_s: f64,
-    /// These units, with their names.
-    pub missing: Vec<(Unit, String)>,
-    /// Names of units of another plan.
-    pub foreign: BTreeSet<String>,
+fn entries(path: &Path) -> Result<Vec<PathBuf>, FileError> {
+    let io = |e| FileError::io(path, e);
+    match fs::read_dir(path) {
+        Ok(entries) => entries.map(|e| e.map(|e| e.path()).map_err(io)).collect(),
+        Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => Ok(Vec::new()),
+        Err(e) => Err(io(e)),
+    }
 }

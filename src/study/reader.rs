@@ -3,16 +3,16 @@
 use super::description::{Synthesis, TruthEntry};
 use super::failure::StudyError;
 use super::file::beside;
-use super::prepare::Material;
 use super::remark::Remark;
 use crate::formats::model_file::{self, ModelFile};
 use crate::formats::recordings::{self, ReadOptions};
-use crate::formats::{contamination_file, hash, input, trajectory_file};
+use crate::formats::{FileError, contamination_file, hash, input, trajectory_file};
 use crate::observer::Observer;
 use nav_sim_navigation::trajectory::Trajectory;
-use nav_sim_signal::imu::Recording;
-use nav_sim_signal::noise::Model;
+use nav_sim_signal::imu::{Channel, Recording};
 use nav_sim_signal::noise::contamination::Contamination;
+use nav_sim_signal::noise::{Model, ReplicateError, VirtualImu};
+use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
 /// What is added to the study's seed for virtual recordings of truths, and of candidates.
@@ -33,49 +33,38 @@ pub(super) struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    pub(super) fn trajectory(&self, path: &Path) -> Result<Trajectory, StudyError> {
+    pub(super) fn trajectory(&self, path: &Path) -> Result<Trajectory, FileError> {
         let (trajectory, warnings) = trajectory_file::load(path, &trajectory_file::Options::default())?;
-        self.doubt(warnings.iter().map(ToString::to_string));
+        self.doubt(warnings);
         Ok(trajectory)
     }
 
-    pub(super) fn model(&self, path: &Path) -> Result<ModelFile, StudyError> {
+    pub(super) fn model(&self, path: &Path) -> Result<ModelFile, FileError> {
         let file = model_file::read(path)?;
         self.doubt(file.doubts(path));
         Ok(file)
     }
 
-    /// The recordings that the study names.
+    /// The recordings in files and directories.
     pub(super) fn recordings(
         &self,
         paths: &[PathBuf],
         rate_hz: Option<f64>,
-    ) -> Result<Vec<Recording>, StudyError> {
-        self.recordings_in(&self.beside_all(paths), rate_hz)
-    }
-
-    /// The recordings in files and directories.
-    pub(super) fn recordings_in(
-        &self,
-        paths: &[PathBuf],
-        rate_hz: Option<f64>,
-    ) -> Result<Vec<Recording>, StudyError> {
+    ) -> Result<Vec<Recording>, FileError> {
         let (recordings, report) =
             recordings::read(paths, &ReadOptions { rate_hz, ..ReadOptions::default() })?;
         self.doubt(report.doubts());
-        for file in &report.files {
-            self.observer.remark(&Remark::InputRead(file.to_string()));
-        }
+        report.files.iter().for_each(|file| self.observer.remark(&Remark::detail(file)));
         Ok(recordings)
     }
 
-    pub(super) fn doubt(&self, doubts: impl IntoIterator<Item = String>) {
-        doubts.into_iter().for_each(|doubt| self.observer.remark(&Remark::InputDoubt(doubt)));
+    pub(super) fn doubt(&self, doubts: impl IntoIterator<Item = impl ToString>) {
+        doubts.into_iter().for_each(|doubt| self.observer.remark(&Remark::warning(doubt)));
     }
 
-    /// The files behind a list of recordings, directories in name order.
-    pub(super) fn listed(&self, recordings: &[PathBuf]) -> Result<Vec<PathBuf>, StudyError> {
-        Ok(input::listed(&self.beside_all(recordings))?)
+    /// What paths of the study mean.
+    pub(super) fn beside(&self, paths: &[PathBuf]) -> Vec<PathBuf> {
+        paths.iter().map(|path| beside(self.study, path)).collect()
     }
 
     /// The files behind a list of recordings that do not make the errors of a truth.
@@ -84,42 +73,48 @@ impl Reader<'_> {
         recordings: &[PathBuf],
         truth: &TruthEntry,
     ) -> Result<Vec<PathBuf>, StudyError> {
-        let of_truth: Vec<String> = hashes(&recordings::listed(&self.beside_all(&truth.recordings))?)?;
-        let mut files = recordings::listed(&self.beside_all(recordings))?;
-        let all = files.len();
+        let of_truth = hashes(&recordings::listed(&self.beside(&truth.recordings))?)?;
+        let files = recordings::listed(&self.beside(recordings))?;
         // by their contents: the same file may be named in two ways
-        let same = hashes(&files)?;
-        let mut is_other = same.iter().map(|hash| !of_truth.contains(hash));
-        files.retain(|_| is_other.next().unwrap_or(true));
-        if files.is_empty() || files.len() == all {
-            return Err(StudyError::NothingLeftOut { truth: truth.name.clone(), left: files.len() });
+        let pairs = hashes(&files)?.into_iter().zip(&files);
+        let others: Vec<PathBuf> =
+            pairs.filter(|(hash, _)| !of_truth.contains(hash)).map(|(_, file)| file.clone()).collect();
+        if others.is_empty() || others.len() == files.len() {
+            return Err(StudyError::NothingLeftOut { truth: truth.name.clone(), left: others.len() });
         }
-        Ok(files)
+        Ok(others)
     }
 
-    fn beside_all(&self, paths: &[PathBuf]) -> Vec<PathBuf> {
-        paths.iter().map(|path| beside(self.study, path)).collect()
-    }
-
-    /// Virtual recordings of the study.
+    /// Virtual recordings of the study, means removed: those of `nav-sim synthesize` with the same model and seed.
     pub(super) fn synthesised(&self, step: &Synthesis, seed: u64) -> Result<Vec<Recording>, StudyError> {
-        let file = self.model(&beside(self.study, &step.model))?;
+        let path = beside(self.study, &step.model);
+        let file = self.model(&path)?;
         let contamination = self.contamination(step, file.model.rate_hz)?;
         if step.spread && file.spread.is_none() {
-            return Err(StudyError::NoSpread { model: step.model.clone() });
+            let reason = "has no [spread], which \"spread = true\" draws from";
+            return Err(StudyError::unfit(path.display(), reason));
         }
-        let (spread, contamination) = (file.spread.as_ref(), contamination.as_ref());
-        Ok(Material { step, model: &file.model, spread, contamination, seed }.recordings()?)
+        let channels = Channel::named(&step.axes);
+        if channels.is_empty() {
+            let reason = format!("axes = \"{}\" is not all, accel, gyro, x, y, z, or one channel such as accel.x", step.axes);
+            return Err(StudyError::unfit("synthesize", reason));
+        }
+        let imu = VirtualImu {
+            model: &file.model,
+            spread: file.spread.as_ref().filter(|_| step.spread),
+            contamination: contamination.as_ref(),
+            seed: step.seed.unwrap_or(seed),
+        };
+        let recording = |replicate: u64| imu.recording(replicate, &channels, step.samples);
+        let recordings: Result<_, ReplicateError> = (1..=step.replicates).into_par_iter().map(recording).collect();
+        recordings.map_err(|e| StudyError::unfit(path.display(), e))
     }
 
-    fn contamination(&self, step: &Synthesis, rate_hz: f64) -> Result<Option<Contamination>, StudyError> {
+    fn contamination(&self, step: &Synthesis, rate_hz: f64) -> Result<Option<Contamination>, FileError> {
         let Some(name) = &step.contaminate else { return Ok(None) };
-        let found = if contamination_file::names().contains(&name.as_str()) {
-            contamination_file::find(name, rate_hz)
-        } else {
-            contamination_file::find(&beside(self.study, Path::new(name)).to_string_lossy(), rate_hz)
-        };
-        Ok(Some(found?))
+        let is_known = contamination_file::names().contains(&name.as_str());
+        let place = if is_known { PathBuf::from(name) } else { beside(self.study, Path::new(name)) };
+        contamination_file::find(&place.to_string_lossy(), rate_hz).map(Some)
     }
 
     /// What makes the errors of a truth.
@@ -129,22 +124,22 @@ impl Reader<'_> {
         }
         let recordings = match &entry.synthesize {
             Some(step) => self.synthesised(step, seed.wrapping_add(TRUTH_SEED))?,
-            None => self.recordings(&entry.recordings, entry.rate_hz)?,
+            None => self.recordings(&self.beside(&entry.recordings), entry.rate_hz)?,
         };
         Ok(TruthSource::Recordings(recordings))
     }
 
     /// Hash of what makes a truth: files, and how virtual recordings are made.
-    pub(super) fn truth_hash(&self, entry: &TruthEntry, seed: u64) -> Result<String, StudyError> {
+    pub(super) fn truth_hash(&self, entry: &TruthEntry, seed: u64) -> Result<String, FileError> {
         if let Some(model) = &entry.model {
-            return Ok(input::fingerprint(&beside(self.study, model))?);
+            return input::fingerprint(&beside(self.study, model));
         }
         let mut hasher = blake3::Hasher::new();
         if let Some(rate_hz) = entry.rate_hz {
             hasher.update(&rate_hz.to_bits().to_le_bytes());
         }
-        for file in self.listed(&entry.recordings)? {
-            hasher.update(input::fingerprint(&file)?.as_bytes());
+        for hash in hashes(&input::listed(&self.beside(&entry.recordings))?)? {
+            hasher.update(hash.as_bytes());
         }
         if let Some(step) = &entry.synthesize {
             hasher.update(self.synthesis_hash(step, seed.wrapping_add(TRUTH_SEED))?.as_bytes());
@@ -152,9 +147,8 @@ impl Reader<'_> {
         Ok(hasher.finalize().to_hex().to_string())
     }
 
-    fn synthesis_hash(&self, step: &Synthesis, seed: u64) -> Result<String, StudyError> {
-        let mut step = step.clone();
-        step.seed = Some(step.seed.unwrap_or(seed));
+    fn synthesis_hash(&self, step: &Synthesis, seed: u64) -> Result<String, FileError> {
+        let step = Synthesis { seed: Some(step.seed.unwrap_or(seed)), ..step.clone() };
         let model = beside(self.study, &step.model);
         let rate_hz = model_file::read(&model)?.model.rate_hz;
         let rules = self.contamination(&step, rate_hz)?.map(|contamination| contamination.rules);
@@ -163,6 +157,14 @@ impl Reader<'_> {
     }
 }
 
-fn hashes(files: &[PathBuf]) -> Result<Vec<String>, StudyError> {
-    files.iter().map(|file| Ok(input::fingerprint(file)?)).collect()
+fn hashes(files: &[PathBuf]) -> Result<Vec<String>, FileError> {
+    files.iter().map(|file| input::fingerprint(file)).collect()
+}
+
+/// Refuses a file that is not what it was when the study was planned.
+pub(super) fn unchanged(path: &Path, blake3: &str) -> Result<(), StudyError> {
+    if input::fingerprint(path)? == blake3 {
+        return Ok(());
+    }
+    Err(StudyError::Changed { what: path.display().to_string() })
 }

@@ -1,44 +1,16 @@
-//! Running: the units of a shard that are not done yet.
+//! Running the units of a shard that are not done yet, and verifying: units computed again and compared.
 
-use super::directory;
 use super::failure::StudyError;
 use super::inputs::{Inputs, Work};
-use super::plan::Unit;
-use super::planned::Planned;
+use super::plan::{NamedUnit, Shard};
+use super::planned::{Planned, UnitState};
 use super::remark::Remark;
-use super::unit::compute;
 use super::unit_file;
 use crate::observer::Observer;
 use nav_sim_navigation::lanes::LANES;
+use nav_sim_signal::rng::StreamKey;
+use rand::seq::IndexedRandom;
 use rayon::prelude::*;
-
-/// Units whose position leaves `index` when divided by `count`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Shard {
-    index: u64,
-    count: u64,
-}
-
-impl Shard {
-    /// All units.
-    pub(crate) const ALL: Self = Self { index: 0, count: 1 };
-
-    /// One of `count`, from 0.
-    #[must_use]
-    pub const fn new(index: u64, count: u64) -> Option<Self> {
-        if index < count { Some(Self { index, count }) } else { None }
-    }
-
-    /// Which of them, and how many there are.
-    pub(crate) const fn parts(self) -> (u64, u64) {
-        (self.index, self.count)
-    }
-
-    /// Whether a unit belongs to it.
-    pub(crate) const fn has(self, unit: usize) -> bool {
-        unit as u64 % self.count == self.index
-    }
-}
 
 /// Which units to run, and on how much.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -72,11 +44,23 @@ pub fn run(
 ) -> Result<RunReport, StudyError> {
     planned.same_numbers()?;
     planned.inputs_unchanged()?;
-    if let Some(remark) = planned.foreign_units(&planned.status()?) {
-        observer.remark(&remark);
+    planned.remark_foreign(observer)?;
+    let (mut pending, mut done) = (Vec::new(), 0_usize);
+    for (unit, id, state) in planned.survey(options.shard)? {
+        match state {
+            UnitState::Whole => done += 1,
+            UnitState::Missing => pending.push((unit, id)),
+            UnitState::Damaged(what) => {
+                observer.remark(&Remark::warning(format!("{what}; it is computed again")));
+                pending.push((unit, id));
+            }
+        }
     }
-    let mut inputs = Inputs::new(planned, observer);
-    let pending = pending(planned, options.shard, &mut inputs, observer)?;
+    if done > 0 {
+        let text = format!("{done} units are done already, {} to do", pending.len());
+        observer.remark(&Remark::note(text));
+    }
+    let mut inputs = Inputs::new(planned, &[], observer);
     observer.begin(pending.iter().map(|(unit, _)| unit.runs).sum());
     let mut finished = 0;
     for of_cell in pending.chunk_by(|a, b| a.0.cell == b.0.cell) {
@@ -94,38 +78,8 @@ pub fn run(
     Ok(RunReport { finished, left: pending.len() - finished })
 }
 
-type Named = (Unit, String);
-
-/// The units of a shard that are not there, or damaged.
-fn pending(
-    planned: &Planned,
-    shard: Shard,
-    inputs: &mut Inputs<'_>,
-    observer: &dyn Observer<Remark>,
-) -> Result<Vec<Named>, StudyError> {
-    let names = directory::units(&planned.directory)?;
-    let mine = planned.plan.named_units(&planned.grid).filter(|(unit, _)| shard.has(unit.index));
-    let (mut pending, mut done) = (Vec::new(), 0_usize);
-    for (unit, id) in mine {
-        // Without the unit's file its trajectory need not be read yet.
-        let found = if names.contains(&id) { inputs.finished((unit, &id))? } else { Ok(false) };
-        match found {
-            Ok(true) => done += 1,
-            Ok(false) => pending.push((unit, id)),
-            Err(what) => {
-                observer.remark(&Remark::DamagedUnit { what });
-                pending.push((unit, id));
-            }
-        }
-    }
-    if done > 0 {
-        observer.remark(&Remark::DoneAlready { done, pending: pending.len() });
-    }
-    Ok(pending)
-}
-
 /// How many units are computed at once: more than one where each has too few batches for the threads.
-fn at_once(units: &[Named], threads: usize) -> usize {
+fn at_once(units: &[NamedUnit], threads: usize) -> usize {
     let batches = units[0].0.runs.div_ceil(LANES as u64) as usize;
     (16 * threads / batches).max(1)
 }
@@ -134,33 +88,79 @@ fn at_once(units: &[Named], threads: usize) -> usize {
 fn run_units(
     planned: &Planned,
     work: &Work<'_>,
-    units: &[Named],
+    units: &[NamedUnit],
     observer: &dyn Observer<Remark>,
 ) -> Result<usize, StudyError> {
-    let run_one = |(unit, id): &Named| -> Result<bool, StudyError> {
-        let (go_on, progress) = (|| observer.go_on(), |runs| observer.advance(runs));
-        match compute(&planned.plan, work, (*unit, id), &go_on, &progress)? {
-            Some(result) => Ok(unit_file::write(&planned.directory, &result).map(|()| true)?),
-            None => Ok(false),
+    let run_one = |(unit, id): &NamedUnit| -> Result<usize, StudyError> {
+        match work.unit(planned, (*unit, id), observer)? {
+            Some(result) => Ok(unit_file::write(&planned.directory, &result).map(|()| 1)?),
+            None => Ok(0),
         }
     };
-    let outcomes: Vec<Result<bool, StudyError>> = units.par_iter().map(run_one).collect();
-    let mut finished = 0;
-    for outcome in outcomes {
-        finished += usize::from(outcome?);
-    }
-    Ok(finished)
+    let outcomes: Vec<Result<usize, StudyError>> = units.par_iter().map(run_one).collect();
+    outcomes.into_iter().sum()
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// Which units to compute again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct VerifyOptions {
+    /// How many.
+    pub units: usize,
+    /// Seed that draws them.
+    pub seed: u64,
+}
 
-    #[test]
-    fn shards_share_out_the_units() {
-        assert_eq!((Shard::new(3, 3), Shard::new(0, 0)), (None, None));
-        for unit in 0..20 {
-            assert_eq!((0..3).filter(|i| Shard::new(*i, 3).unwrap().has(unit)).count(), 1);
+/// What verifying found.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct VerifyReport {
+    /// Units that are there and whole.
+    pub whole: usize,
+    /// Those of them that were computed again.
+    pub compared: usize,
+    /// What is wrong with units that are damaged.
+    pub damaged: Vec<String>,
+    /// Units that differ, with their cells.
+    pub different: Vec<String>,
+}
+
+/// Reads all finished units, computes some of them again and compares them bit by bit.
+///
+/// # Errors
+/// When no unit is done, the plan is of another build, or an input has changed.
+pub fn verify(
+    planned: &Planned,
+    options: &VerifyOptions,
+    observer: &dyn Observer<Remark>,
+) -> Result<VerifyReport, StudyError> {
+    planned.same_numbers()?;
+    planned.inputs_unchanged()?;
+    let (mut whole, mut damaged) = (Vec::new(), Vec::new());
+    for (unit, id, state) in planned.survey(Shard::ALL)? {
+        match state {
+            UnitState::Whole => whole.push((unit, id)),
+            UnitState::Missing => {}
+            UnitState::Damaged(what) => damaged.push(what),
         }
     }
+    if whole.is_empty() && damaged.is_empty() {
+        return Err(StudyError::NothingDone);
+    }
+    let key =
+        StreamKey { seed: options.seed, scenario: "", run: 0, source: "batch.verify", process: "units" };
+    let mut chosen: Vec<&NamedUnit> = whole.sample(&mut key.generator(), options.units).collect();
+    chosen.sort_by_key(|(unit, _)| unit.index);
+    observer.begin(chosen.iter().map(|(unit, _)| unit.runs).sum());
+    let mut inputs = Inputs::new(planned, &[], observer);
+    let mut different = Vec::new();
+    for (unit, id) in &chosen {
+        let found = unit_file::read(&planned.directory, id)?;
+        let cell = planned.grid.cell(unit.cell);
+        let again = inputs.with_cell(cell, |work| work.unit(planned, (*unit, id), observer))?;
+        let Some(again) = again else { break };
+        if unit_file::encode(&again) != unit_file::encode(&found) {
+            different.push(format!("{id} ({})", planned.grid.names(cell).join(", ")));
+        }
+    }
+    Ok(VerifyReport { whole: whole.len(), compared: chosen.len(), damaged, different })
 }

@@ -1,6 +1,7 @@
 //! The tables of a study as they are written, cell by cell.
 
 use super::cell_tables::CellTables;
+use super::description::Metric;
 use super::failure::StudyError;
 use super::planned::Planned;
 use crate::formats::atomic::AtomicDir;
@@ -20,7 +21,9 @@ impl Tables {
         let runs = TableFiles::create(out, "runs", &[TableFormat::Parquet], report::run_columns())?;
         let formats = [TableFormat::Csv, TableFormat::Parquet];
         let epochs = planned
-            .keeps_epochs()
+            .plan
+            .study
+            .keeps(Metric::Epochs)
             .then(|| TableFiles::create(out, "epochs", &formats, report::epoch_columns()));
         Ok(Self { outages, runs, epochs: epochs.transpose()? })
     }
@@ -58,18 +61,18 @@ pub(super) struct Texts {
 const SHOWN: usize = 24;
 
 impl Texts {
-    pub(super) fn new(planned: &Planned) -> Result<Self, StudyError> {
+    pub(super) fn new(planned: &Planned) -> Self {
         let same = if planned.plan.study.filters.len() > 1 { " with the same filter" } else { "" };
-        let reference = format!("{}{same}", planned.reference()?.1);
+        let reference = format!("{}{same}", planned.reference().1);
         let intervals = if planned.plan.study.is_sampled() { " ± half the 95 % interval" } else { "" };
-        Ok(Self {
+        Self {
             reference,
             intervals,
             cells: Vec::new(),
             more: 0,
             beyond: BeyondLinearPlaces::default(),
             rankings: Vec::new(),
-        })
+        }
     }
 
     pub(super) fn add(&mut self, cell: ShownCell) {

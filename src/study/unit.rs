@@ -1,12 +1,9 @@
 //! One unit of work: some runs of one cell, or its covariance analysis, through all its columns.
 
-use super::failure::StudyError;
-use super::inputs::Work;
-use super::plan::{Kept, Plan, Unit};
+use super::plan::Kept;
 use nav_sim_navigation::metrics::{self, EpochMetrics, Expected, Measured, OutageMetrics};
-use nav_sim_navigation::monte_carlo;
 use nav_sim_navigation::sensors::outage::Outage;
-use nav_sim_navigation::simulation::{self, RunRecord, RunResult};
+use nav_sim_navigation::simulation::{RunRecord, RunResult};
 
 /// What is found of one column.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,18 +25,6 @@ pub struct UnitResult {
     pub runs: u64,
     /// One finding a column.
     pub columns: Vec<Finding>,
-}
-
-impl UnitResult {
-    /// Whether it holds the runs of this unit of a plan, all of them, in so many columns with these outages (start and
-    /// end, s).
-    pub(crate) fn fits(&self, unit: Unit, columns: usize, outages: &[(f64, f64)]) -> bool {
-        let numbers = || unit.first..unit.first + unit.runs;
-        let column_fits =
-            |c: &Finding| c.windows() == outages && c.records().iter().map(|r| r.run).eq(numbers());
-        (self.first, self.runs, self.columns.len()) == (unit.first, unit.runs, columns)
-            && self.columns.iter().all(column_fits)
-    }
 }
 
 impl Finding {
@@ -84,7 +69,15 @@ impl Finding {
         }
     }
 
-    fn reduce(&mut self, kept: Kept) {
+    /// Adds later runs; what is expected of all runs has no second part.
+    pub(super) fn append(&mut self, later: Self) {
+        if let (Self::Sampled(sum), Self::Sampled(later)) = (self, later) {
+            sum.append(later);
+        }
+    }
+
+    /// Drops the sums at epochs that are not kept.
+    pub(super) fn reduce(&mut self, kept: Kept) {
         let windows = self.windows();
         let inside =
             |t_s: f64| windows.iter().any(|&(start_s, end_s)| Outage { start_s, end_s }.withholds(t_s));
@@ -94,45 +87,4 @@ impl Finding {
             Self::Expected(expected) => expected.epochs.retain(|e| keeps(e.t_s)),
         }
     }
-}
-
-/// Computes runs `first..first + runs`; `None` if `go_on` said no on the way. `progress` is told of runs
-/// completed.
-pub(crate) fn run_unit(
-    plan: &simulation::Plan<'_>,
-    (first, runs): (u64, u64),
-    kept: Kept,
-    go_on: &(dyn Fn() -> bool + Sync),
-    progress: &(dyn Fn(u64) + Sync),
-) -> Option<Vec<Finding>> {
-    let results = monte_carlo::run_range(plan, first, runs, go_on, progress)?;
-    Some(reduced(kept, results.into_iter().map(Finding::Sampled)))
-}
-
-fn reduced(kept: Kept, findings: impl Iterator<Item = Finding>) -> Vec<Finding> {
-    let mut findings: Vec<Finding> = findings.collect();
-    findings.iter_mut().for_each(|finding| finding.reduce(kept));
-    findings
-}
-
-/// The result of a unit; `None` if `go_on` said no on the way.
-pub(super) fn compute(
-    plan: &Plan,
-    work: &Work<'_>,
-    (unit, id): (Unit, &str),
-    go_on: &(dyn Fn() -> bool + Sync),
-    progress: &(dyn Fn(u64) + Sync),
-) -> Result<Option<UnitResult>, StudyError> {
-    let columns = match work {
-        Work::Sampling(simulation) => {
-            run_unit(simulation, (unit.first, unit.runs), plan.kept(), go_on, progress)
-        }
-        Work::Analysis(analysis) => {
-            let expected = analysis.expected()?;
-            progress(unit.runs);
-            Some(reduced(plan.kept(), expected.into_iter().map(Finding::Expected)))
-        }
-    };
-    let named = |columns| UnitResult { id: id.to_owned(), first: unit.first, runs: unit.runs, columns };
-    Ok(columns.map(named))
 }

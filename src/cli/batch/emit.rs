@@ -2,7 +2,7 @@
 
 use super::{Place, duration};
 use crate::cli::{Failure, Session};
-use crate::study::{directory, file};
+use crate::study::{file, plan_in};
 use std::path::Path;
 
 /// Print a script that runs a planned study on a cluster or here
@@ -50,7 +50,7 @@ enum Target {
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     file::read(&args.place.study)?;
     let script = Script::of(args, session.asked_seed());
-    let is_planned = directory::plan(&args.place.directory())?.is_some();
+    let is_planned = plan_in(&args.place.directory())?.is_some();
     if is_planned && args.target != Target::Local {
         let planned = args.place.planned(session.asked_seed())?;
         long_enough(script.limit_s() as f64, planned.longest_unit_s(u64::from(args.cpus)), session)?;

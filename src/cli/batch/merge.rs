@@ -3,9 +3,8 @@
 use super::Place;
 use super::watch::Watch;
 use crate::cli::{Failure, Session};
-use crate::study::{self, MergeOptions, Planned, StudyError, Unit};
+use crate::study::{self, MergeOptions, NamedUnit, Planned, StudyError, Unit};
 use serde_json::json;
-use std::path::PathBuf;
 
 /// Write the tables of a finished study: outages, ratios to the reference, epochs, runs
 ///
@@ -13,7 +12,7 @@ use std::path::PathBuf;
 /// of each candidate in each cell), runs.parquet, epochs.csv and .parquet if the study asks for them, tables.md, report.html. The
 /// bytes depend on the plan alone, not on how it was run. Ratios are taken within a filter: column `reference`
 /// names the candidate they refer to, in the row's own filter. Nothing is written while units are missing: they
-/// are listed (all of them with --verbose or --format json), and the exit code is 75.
+/// are listed with --verbose or --format json, and the exit code is 1.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -34,9 +33,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let planned = args.place.planned(session.asked_seed())?;
     let options = MergeOptions { states, threads: session.threads() };
     let merged = study::merge(&planned, &options, &Watch::new(session, || true)).map_err(|e| match e {
-        StudyError::Incomplete { units, missing, stale } => {
+        StudyError::Incomplete { units, missing } => {
             list_missing(&planned, units, &missing, session);
-            incomplete(units, &missing, stale)
+            incomplete(&planned, units, &missing)
         }
         e => e.into(),
     })?;
@@ -64,10 +63,10 @@ fn beginning(text: &str) -> String {
 }
 
 /// Units that are missing or damaged, all of them on stdout as JSON or with --verbose.
-fn list_missing(planned: &Planned, units: usize, missing: &[(Unit, String)], session: &Session) {
+fn list_missing(planned: &Planned, units: usize, missing: &[NamedUnit], session: &Session) {
     let cell = |unit: &Unit| planned.grid.names(planned.grid.cell(unit.cell));
     if session.json() {
-        let json_of_unit = |(unit, id): &(Unit, String)| {
+        let json_of_unit = |(unit, id): &NamedUnit| {
             let runs = [unit.first, unit.first + unit.runs];
             json!({ "unit": id, "index": unit.index, "cell": cell(unit), "runs": runs })
         };
@@ -83,11 +82,13 @@ fn list_missing(planned: &Planned, units: usize, missing: &[(Unit, String)], ses
     }
 }
 
-fn incomplete(units: usize, missing: &[(Unit, String)], stale: Option<PathBuf>) -> Failure {
-    let shown: Vec<&str> = missing.iter().take(10).map(|(_, id)| id.as_str()).collect();
-    let more = if missing.len() > shown.len() { ", … (all with --verbose)" } else { "" };
-    let n = missing.len();
-    let message = format!("{n} of {units} units are missing or damaged: {}{more}", shown.join(", "));
-    let stale = stale.map_or(String::new(), |path| format!("; {} is of another plan", path.display()));
-    Failure::stopped(message).hint(format!("`nav-sim batch run` computes them; nothing was written{stale}"))
+fn incomplete(planned: &Planned, units: usize, missing: &[NamedUnit]) -> Failure {
+    const NAMED: usize = 6;
+    let mut cells: Vec<String> =
+        missing.iter().map(|(unit, _)| planned.grid.short_name(planned.grid.cell(unit.cell))).collect();
+    cells.dedup();
+    let more = if cells.len() > NAMED { format!(" and {} more", cells.len() - NAMED) } else { String::new() };
+    cells.truncate(NAMED);
+    let message = format!("{} of {units} units are missing or damaged, of the cells {}{more}", missing.len(), cells.join("; "));
+    Failure::could_not(message).hint("`nav-sim batch run` computes them; --verbose lists them; nothing was written")
 }

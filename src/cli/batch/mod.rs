@@ -12,7 +12,7 @@ mod watch;
 pub(super) use emit::shell_words;
 
 use super::{Failure, Session, read};
-use crate::study::{Planned, Remedy, StudyError};
+use crate::study::{Planned, StudyError};
 use std::path::{Path, PathBuf};
 
 /// Run studies: plan a grid of experiments, run it in pieces on any machines, merge the results
@@ -85,29 +85,12 @@ impl Place {
 
 impl From<StudyError> for Failure {
     fn from(e: StudyError) -> Self {
-        let hint = e.remedy().map(|remedy| words(&remedy).to_owned());
+        let hint = e.hint();
         match e {
             StudyError::File(e) => read::of_study(&e),
-            StudyError::Candidate { candidate, source } => Self::from(*source).within(&candidate),
             e if e.is_usage() => Self::input(e).maybe_hint(hint),
             e => Self::could_not(e).maybe_hint(hint),
         }
-    }
-}
-
-/// A remedy in the words of this command line.
-fn words(remedy: &Remedy) -> &str {
-    match remedy {
-        Remedy::Advice(advice) => advice,
-        Remedy::Plan => "make one with `nav-sim batch plan STUDY.toml`",
-        Remedy::PlanElsewhere => "plan into another directory with --out, or remove this one",
-        Remedy::PutBack => "put it back, or plan into another directory with --out",
-        Remedy::PlanAgain => "`nav-sim batch plan` makes it anew",
-        Remedy::UsePlanningBuild => "use the build that planned, or plan into another directory with --out",
-        Remedy::UseOneBuild => {
-            "use one build on machines of one kind (same processor features and system library), or plan anew"
-        }
-        Remedy::Run => "see `nav-sim batch run`",
     }
 }
 

@@ -3,7 +3,6 @@
 use super::watch::Watch;
 use super::{Place, duration};
 use crate::cli::{Failure, Session};
-use crate::observer::Observer;
 use serde_json::json;
 
 /// Say what is done of a study and what is left
@@ -25,7 +24,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let planned = args.place.planned(session.asked_seed())?;
     planned.inputs_unchanged()?;
-    let status = planned.status_of_whole()?;
+    let status = planned.status()?;
     let (plan, grid) = (&planned.plan, &planned.grid);
     if session.json() {
         let json = json!({
@@ -51,8 +50,5 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         duration(status.left_s / plan.estimate.threads.max(1) as f64),
         plan.estimate.threads
     ));
-    if let Some(remark) = planned.foreign_units(&status) {
-        Watch::new(session, || true).remark(&remark);
-    }
-    Ok(())
+    Ok(planned.remark_foreign(&Watch::new(session, || true))?)
 }

@@ -21,11 +21,10 @@ impl<'a, F: Fn() -> bool + Sync> Watch<'a, F> {
 
 impl<F: Fn() -> bool + Sync> Observer<Remark> for Watch<'_, F> {
     fn remark(&self, remark: &Remark) {
-        let text = remark.to_string();
-        match remark.importance() {
-            Importance::Detail => self.session.detail(&text),
-            Importance::Note => self.session.say(&text),
-            Importance::Warning => self.session.warn(&text),
+        match remark.importance {
+            Importance::Detail => self.session.detail(&remark.text),
+            Importance::Note => self.session.say(&remark.text),
+            Importance::Warning => self.session.warn(&remark.text),
         }
     }
 
