@@ -29,7 +29,11 @@ pub(super) fn models(
         models.extend(entry.model.iter().map(|path| vec![model(path)]));
         let Some(step) = &entry.calibrate else { continue };
         let estimators: Vec<&str> = step.estimators.iter().map(|e| e.name()).collect();
-        reader.observer.remark(&Remark::note(format!("calibrating {} ({})", entry.name, estimators.join(", "))));
+        reader.observer.remark(&Remark::note(format!(
+            "calibrating {} ({})",
+            entry.name,
+            estimators.join(", ")
+        )));
         let folds: Vec<Option<&TruthEntry>> =
             if step.leave_out { study.truth.iter().map(Some).collect() } else { vec![None] };
         let mut of_estimators = vec![Vec::new(); step.estimators.len()];

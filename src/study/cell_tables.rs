@@ -85,7 +85,14 @@ impl CellTables {
             let (name, label) = shown_names(&plan.study, column, filter);
             let is_reference = comparison.is_some() && of_reference == i;
             let verdict = measured_here.verdict();
-            tables.shown.columns.push(ShownColumn { name, label, outages, comparison, is_reference, verdict });
+            tables.shown.columns.push(ShownColumn {
+                name,
+                label,
+                outages,
+                comparison,
+                is_reference,
+                verdict,
+            });
         }
         if plan.study.leaves_out() {
             tables.runs_of_columns = measured.into_iter().map(|m| m.runs).collect();

@@ -131,7 +131,9 @@ impl StudyError {
             Self::OtherStudy { .. } => "plan into another directory with --out, or remove this one",
             Self::Changed { .. } => "put it back, or plan into another directory with --out",
             Self::LostModel { .. } => "`nav-sim batch plan` makes it anew",
-            Self::OtherNumbers { .. } => "use the build that planned, or plan into another directory with --out",
+            Self::OtherNumbers { .. } => {
+                "use the build that planned, or plan into another directory with --out"
+            }
             Self::Incomplete { .. } => "`nav-sim batch run` computes them; nothing was written",
             Self::NothingDone => "see `nav-sim batch run`",
             _ => return None,

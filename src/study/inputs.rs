@@ -29,7 +29,7 @@ use std::sync::Arc;
 /// A cell, set up.
 pub(super) enum Work<'a> {
     /// For runs.
-    Sampling(simulation::Plan<'a>),
+    Sampling(&'a simulation::Plan<'a>),
     /// For covariance analysis.
     Analysis { track: &'a Track, experiment: &'a Experiment<'a>, truth: &'a Model },
 }
@@ -56,7 +56,8 @@ impl Work<'_> {
                 let of_column = |(belief, column): (&Belief, &Column)| {
                     let expected = Expected::along(track, experiment, belief, truth).map(Finding::Expected);
                     let cell = || grid.names(grid.cell(unit.cell)).join(", ");
-                    expected.ok_or_else(|| StudyError::NotFinite { cell: cell(), column: column.name.clone() })
+                    expected
+                        .ok_or_else(|| StudyError::NotFinite { cell: cell(), column: column.name.clone() })
                 };
                 let columns = experiment.beliefs.par_iter().zip(&grid.columns).map(of_column);
                 let columns = columns.collect::<Result<_, _>>()?;
@@ -131,13 +132,15 @@ impl<'a> Inputs<'a> {
         let track = Track::along(&bare).map_err(|e| StudyError::unfit(&name, e))?;
         let beliefs = self.beliefs(cell, scenario, &track, &outages)?;
         let experiment = Experiment { beliefs: &beliefs, ..bare };
+        let sampling;
         f(&match (plan.study.method, truth) {
             (Method::Lincov, Truth::Model(truth)) => {
                 Work::Analysis { track: &track, experiment: &experiment, truth }
             }
-            _ => Work::Sampling(
-                simulation::Plan::new(&experiment).map_err(|e| StudyError::unfit(&name, e))?,
-            ),
+            _ => {
+                sampling = simulation::Plan::new(&experiment).map_err(|e| StudyError::unfit(&name, e))?;
+                Work::Sampling(&sampling)
+            }
         })
     }
 

@@ -1,9 +1,9 @@
 //! Merging: units to tables.
 
 use super::cell_tables::CellTables;
+use super::description::Metric;
 use super::failure::StudyError;
 use super::leave_one_out::Folds;
-use super::description::Metric;
 use super::plan::NamedUnit;
 use super::planned::Planned;
 use super::remark::Remark;
@@ -124,7 +124,8 @@ fn cells_at_once(planned: &Planned, threads: usize) -> usize {
 
 /// Removes tables of an earlier plan that this one does not write; all others are replaced.
 fn remove_stale(planned: &Planned) -> Result<(), StudyError> {
-    let epochs: &[&str] = if planned.plan.study.keeps(Metric::Epochs) { &[] } else { &["epochs.csv", "epochs.parquet"] };
+    let epochs: &[&str] =
+        if planned.plan.study.keeps(Metric::Epochs) { &[] } else { &["epochs.csv", "epochs.parquet"] };
     let ranking: &[&str] = if planned.plan.study.leaves_out() { &[] } else { &["ranking.json"] };
     for name in epochs.iter().chain(ranking) {
         let path = planned.directory.join("results").join(name);

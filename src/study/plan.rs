@@ -310,8 +310,9 @@ mod tests {
         let (base, grid) = plan(|_| {});
         let names: HashSet<String> = base.named_units(&grid).into_iter().map(|(_, id)| id).collect();
         assert_eq!(names.len(), base.unit_count(&grid));
-        let shared =
-            |other: &(Plan, Grid)| other.0.named_units(&other.1).iter().filter(|u| names.contains(&u.1)).count();
+        let shared = |other: &(Plan, Grid)| {
+            other.0.named_units(&other.1).iter().filter(|u| names.contains(&u.1)).count()
+        };
         let with = |change: &dyn Fn(&mut Plan)| {
             let mut other = base.clone();
             change(&mut other);

@@ -90,7 +90,8 @@ impl Planned {
     /// When there is no plan, or that of another study.
     pub fn open(study: &Path, directory: &Path, seed: Option<u64>) -> Result<Self, StudyError> {
         let file = file::read(study)?;
-        let plan = plan_in(directory)?.ok_or_else(|| StudyError::NoPlan { directory: directory.to_owned() })?;
+        let plan =
+            plan_in(directory)?.ok_or_else(|| StudyError::NoPlan { directory: directory.to_owned() })?;
         let planned = Self::new(study, directory, plan)?;
         planned.must_be_of(&file.study, seed)?;
         Ok(planned)

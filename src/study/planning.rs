@@ -199,7 +199,10 @@ fn validate(
             observer.remark(&Remark::warning(format!("cell \"{cell}\" has no outages: its table is empty")));
         }
         [cell, ..] => {
-            let text = format!("{} cells have no outages, such as \"{cell}\": their tables are empty", without.len());
+            let text = format!(
+                "{} cells have no outages, such as \"{cell}\": their tables are empty",
+                without.len()
+            );
             observer.remark(&Remark::warning(text));
         }
     }

@@ -96,7 +96,10 @@ impl Reader<'_> {
         }
         let channels = Channel::named(&step.axes);
         if channels.is_empty() {
-            let reason = format!("axes = \"{}\" is not all, accel, gyro, x, y, z, or one channel such as accel.x", step.axes);
+            let reason = format!(
+                "axes = \"{}\" is not all, accel, gyro, x, y, z, or one channel such as accel.x",
+                step.axes
+            );
             return Err(StudyError::unfit("synthesize", reason));
         }
         let imu = VirtualImu {
@@ -106,7 +109,8 @@ impl Reader<'_> {
             seed: step.seed.unwrap_or(seed),
         };
         let recording = |replicate: u64| imu.recording(replicate, &channels, step.samples);
-        let recordings: Result<_, ReplicateError> = (1..=step.replicates).into_par_iter().map(recording).collect();
+        let recordings: Result<_, ReplicateError> =
+            (1..=step.replicates).into_par_iter().map(recording).collect();
         recordings.map_err(|e| StudyError::unfit(path.display(), e))
     }
 

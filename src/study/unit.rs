@@ -3,7 +3,7 @@
 use super::plan::Kept;
 use nav_sim_navigation::metrics::{self, EpochMetrics, Expected, Measured, OutageMetrics};
 use nav_sim_navigation::sensors::outage::Outage;
-use nav_sim_navigation::simulation::{RunRecord, RunResult};
+use nav_sim_navigation::simulation::RunResult;
 
 /// What is found of one column.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,14 +34,6 @@ impl Finding {
         match self {
             Self::Sampled(result) => result.outages.clone(),
             Self::Expected(expected) => expected.outages.iter().map(|o| (o.start_s, o.end_s)).collect(),
-        }
-    }
-
-    /// One record a run; that which stands for all runs in a covariance analysis.
-    pub(crate) fn records(&self) -> &[RunRecord] {
-        match self {
-            Self::Sampled(result) => &result.runs,
-            Self::Expected(expected) => std::slice::from_ref(&expected.record),
         }
     }
 

@@ -66,11 +66,12 @@ fn the_library_makes_the_bytes_of_the_command() {
     let watch = Watch::until(u64::MAX);
     let rest = run(0, &watch);
     assert_eq!((rest.finished, rest.left), (first.left, 0));
-    let already = Remark::DoneAlready { done: first.finished, pending: first.left };
-    assert_eq!(*watch.remarks.lock().unwrap(), [already]);
+    let already = format!("{} units are done already, {} to do", first.finished, first.left);
+    let remarks = watch.remarks.lock().unwrap();
+    assert_eq!(remarks.iter().map(|remark| remark.text.as_str()).collect::<Vec<_>>(), [already]);
     let merge = || study::merge(&planned, &MergeOptions { states: vec![1, 6], threads: 2 }, &());
     match merge() {
-        Err(StudyError::Incomplete { units: UNITS, missing, stale: None }) => {
+        Err(StudyError::Incomplete { units: UNITS, missing }) => {
             assert_eq!(missing.len(), UNITS / 2);
         }
         other => panic!("{other:?}"),

@@ -89,6 +89,11 @@ fn incomplete(planned: &Planned, units: usize, missing: &[NamedUnit]) -> Failure
     cells.dedup();
     let more = if cells.len() > NAMED { format!(" and {} more", cells.len() - NAMED) } else { String::new() };
     cells.truncate(NAMED);
-    let message = format!("{} of {units} units are missing or damaged, of the cells {}{more}", missing.len(), cells.join("; "));
-    Failure::could_not(message).hint("`nav-sim batch run` computes them; --verbose lists them; nothing was written")
+    let message = format!(
+        "{} of {units} units are missing or damaged, of the cells {}{more}",
+        missing.len(),
+        cells.join("; ")
+    );
+    Failure::could_not(message)
+        .hint("`nav-sim batch run` computes them; --verbose lists them; nothing was written")
 }

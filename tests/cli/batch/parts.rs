@@ -10,7 +10,7 @@ fn what_is_missing_is_told_by_cell_and_runs() {
     assert!(said.contains("cell \"none\" has no outages: its table is empty"), "{said}");
     done(dir, "run study.toml -o out --shard 0/2");
     let output = batch(dir, "merge study.toml -o out --format json -v");
-    assert_eq!(output.status.code(), Some(75));
+    assert_eq!(output.status.code(), Some(1));
     let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     let missing = json["missing"].as_array().unwrap();
     assert_eq!((json["units"].as_u64(), missing.len()), (Some(50), 25));
