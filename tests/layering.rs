@@ -10,8 +10,13 @@ use std::{
 };
 
 /// Each crate's list of modules, in layer order.
-const CRATES: [&str; 4] =
-    ["src/signal/lib.rs", "src/calibration/lib.rs", "src/navigation/lib.rs", "src/lib.rs"];
+const CRATES: [&str; 5] = [
+    "src/signal/lib.rs",
+    "src/calibration/lib.rs",
+    "src/navigation/lib.rs",
+    "src/document/lib.rs",
+    "src/lib.rs",
+];
 
 fn repository() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR"))

@@ -2,6 +2,8 @@
 
 use super::{Failure, Printer, Progress};
 use crate::formats::atomic::{self, Existing};
+use crate::report::{Answer, WIDTH, json};
+use nav_sim_document::{Document, Importance};
 use std::fmt::Display;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -87,6 +89,25 @@ impl Session {
     pub(crate) fn show(&self, json: impl FnOnce() -> String, text: impl FnOnce() -> String) {
         let shown = if self.json() { json() } else { text() };
         self.printer.result(shown.trim_end());
+    }
+
+    /// Puts a result to stdout, as JSON or in words, and its notes to stderr; returns its document, for page and picture.
+    #[allow(dead_code, reason = "results move to documents one by one")]
+    pub(crate) fn answer(&self, answer: &impl Answer) -> Document {
+        let document = answer.document();
+        let shown = match (self.json(), self.verbose()) {
+            (true, _) => json(answer),
+            (false, true) => document.verbose(WIDTH),
+            (false, false) => document.terminal(WIDTH),
+        };
+        self.result(shown.trim_end());
+        for note in document.spoken(self.verbose()) {
+            match note.importance {
+                Importance::Warning => self.warn(&note.text),
+                _ => self.say(format!("note: {}", note.text)),
+            }
+        }
+        document
     }
 
     /// Puts a result to stdout.

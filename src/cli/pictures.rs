@@ -3,12 +3,13 @@
 use super::{Failure, Session};
 use crate::formats::atomic::{self, Claim};
 use crate::report::page::{self, Form, Page};
+use nav_sim_document::Document;
 use std::path::{Path, PathBuf};
 
 /// The figures as a file.
 #[derive(clap::Args, Debug)]
 pub(super) struct PlotArgs {
-    /// Also write the figures as a picture: .svg, .png (300 dots an inch) or .pdf
+    /// Also write the figures as a picture: .svg or .png (300 dots an inch)
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 }
@@ -52,6 +53,13 @@ impl PageArgs {
         Ok([page, self.plot.claim(inputs)?])
     }
 
+    /// Writes what is asked for of a document.
+    #[allow(dead_code, reason = "results move to documents one by one")]
+    pub(super) fn draw(&self, document: &Document, session: &Session) -> Result<(), Failure> {
+        let written = self.page.iter().try_for_each(|path| session.write(path, document.html()));
+        self.plot.write(|| document.svg(), session).and(written)
+    }
+
     /// Writes what is asked for.
     pub(super) fn write(&self, page: impl FnOnce() -> Page, session: &Session) -> Result<(), Failure> {
         if self.page.is_none() && self.plot.plot.is_none() {
@@ -88,8 +96,8 @@ pub(super) fn claim_output(
 /// The form of a picture, by its name.
 fn form(path: &Path) -> Result<Form, Failure> {
     Form::of(path).ok_or_else(|| {
-        Failure::input(format!("{}: a picture is written as SVG, PNG or PDF", path.display()))
-            .hint("name a file that ends in .svg, .png or .pdf")
+        Failure::input(format!("{}: a picture is written as SVG or PNG", path.display()))
+            .hint("name a file that ends in .svg or .png")
     })
 }
 

@@ -33,9 +33,6 @@ pub(crate) struct Args {
     /// Write the curves as JSON
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Also draw the wavelet deviations in the terminal
-    #[arg(long)]
-    chart: bool,
     #[command(flatten)]
     pictures: PageArgs,
 }
@@ -70,9 +67,6 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         () => digest(&file),
     };
     session.result(&text);
-    if args.chart && !session.json() {
-        session.result(report::wavelet_text(&file));
-    }
     written.and(drawn)
 }
 

@@ -1,6 +1,6 @@
 //! A calibration on one screen: the verdict first, then the parameters in the terms of practitioners.
 
-use super::columns::columns;
+use super::columns;
 use super::number::readable;
 use super::practical::{PracticalRow, interval, policy, practical_rows};
 use super::turn_on::turn_on_lines;

@@ -1,6 +1,6 @@
 //! `comparison.json`, what is in it and what is said of it.
 
-use super::short::short_names;
+use super::short_names;
 use super::verdict::verdict_in_short;
 use nav_sim_navigation::metrics::{OutageComparison, Verdict, VerdictKind};
 use nav_sim_navigation::simulation::REPORTED_NAMES;

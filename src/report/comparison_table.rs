@@ -2,7 +2,7 @@
 
 use super::comparison::{CandidateResult, Label, in_order};
 use super::number::{readable, shortest, window};
-use super::short::short_names;
+use super::short_names;
 use nav_sim_navigation::metrics::RatioError;
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 

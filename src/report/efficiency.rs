@@ -1,7 +1,7 @@
 //! Results of an estimator study: `results.csv`, `results.json`, the table on the terminal and the data of
 //! the paper's Figure 2.
 
-use super::markdown::plain_table;
+use super::markdown_table as plain_table;
 use super::number::shortest;
 use nav_sim_calibration::efficiency::Accuracy;
 use serde::Serialize;

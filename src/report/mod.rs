@@ -5,7 +5,6 @@ mod beyond_linear;
 mod brief;
 mod choose;
 mod closure;
-mod columns;
 mod comparison;
 mod comparison_table;
 mod curves;
@@ -17,9 +16,6 @@ mod fits;
 mod fusion;
 mod fusion_files;
 mod manifest;
-mod markdown;
-mod number;
-pub(crate) mod page;
 mod pages;
 mod practical;
 mod recording;
@@ -30,7 +26,6 @@ mod run_directory;
 pub(crate) mod run_words;
 #[cfg(test)]
 pub(crate) mod sample;
-mod short;
 mod signals;
 mod smoothed;
 mod study;
@@ -41,11 +36,13 @@ mod turn_on;
 mod verdict;
 mod warm_up;
 
+use nav_sim_document::Document;
+use serde::Serialize;
+
 pub(crate) use beyond_linear::{BeyondLinear, BeyondLinearPlaces, OF_A_VERDICT};
 pub(crate) use brief::brief;
 pub(crate) use choose::{ChoiceReport, RankedPlace};
 pub(crate) use closure::TrajectoryCheck;
-pub(crate) use columns::{columns, terminal_columns, terminal_table};
 pub(crate) use comparison::{CandidateResult, ComparisonFile, Label, meaning_of_intervals, verdict_lines};
 pub(crate) use comparison_table::{consistency_rows, ratio_rows, table_rows, with_times};
 pub(crate) use curves::{CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile};
@@ -58,20 +55,24 @@ pub(crate) use fusion::FusionSummary;
 pub(crate) use fusion_files::{FUSION_FILES, fusion_directory};
 pub(crate) use manifest::{FusionConfiguration, FusionKind, FusionManifest};
 pub use manifest::{Input, Manifest, ModelNote};
-pub(crate) use markdown::{csv_table, latex_table, markdown, markdown_table};
-pub use number::readable;
-pub(crate) use number::{seconds, six_digits, window};
+/// A result: what is printed, drawn or saved of it is it itself as JSON, or its document.
+#[allow(dead_code, reason = "results move to documents one by one")]
+pub(crate) trait Answer: Serialize {
+    /// What it says, in words, tables and charts.
+    fn document(&self) -> Document;
+}
+
+pub use nav_sim_document::readable;
+pub(crate) use nav_sim_document::{seconds, short_names, six_digits, window};
 pub(crate) use pages::{
     PaperFigure, RatioCurves, ShownComparison, StudyCurves, calibration_page, calibration_svg,
     catalogue_page, choice_page, design_page, efficiency_page, efficiency_svg, fusion_page, model_page,
-    needed_page, paper_figures, paper_page, run_svg, run_text, study_page, tune_page, wavelet_page,
-    wavelet_text,
+    needed_page, paper_figures, paper_page, run_svg, study_page, tune_page, wavelet_page,
 };
 pub(crate) use recording::{gnss_csv, imu_csv, initial_toml};
 pub(crate) use replicates::describe_replicates;
 pub use run_directory::{OutputFile, run_directory};
 pub(crate) use run_directory::{RUN_FILES, json, summary_json};
-pub(crate) use short::short_names;
 pub(crate) use signals::{intervals_note, signal_rows, signals_csv, signals_digest, signals_per_file};
 pub(crate) use study::{
     ColumnResult, ShownCell, ShownColumn, TableColumn, TableRow, Value, ValueKind, drift_table,
@@ -84,3 +85,53 @@ pub(crate) use tune::{FactorEntry, TuneResult};
 pub(crate) use turn_on::{turn_on_lines, turn_on_remark};
 pub use warm_up::BeginsOtherwise;
 pub(crate) use warm_up::{warm_up_in_short, warm_up_lines};
+
+/// Names of `nav_sim_document` for files that have not moved to documents yet.
+pub(crate) mod page {
+    pub(crate) use nav_sim_document::{
+        Axis, Cell, Chart, Colour, Document as Page, Form, Interval, Mark, Panel, Series, Stroke, Table,
+        Tone, encode, escape, is_own, svg,
+    };
+}
+
+mod number {
+    pub(crate) use nav_sim_document::{percent, readable, seconds, shortest, squared, window};
+}
+
+/// Characters of a line in a terminal.
+pub(crate) const WIDTH: usize = 100;
+
+/// A table of rows, of which the first is the head, in Markdown.
+pub(crate) fn markdown_table(rows: &[Vec<String>]) -> String {
+    page::Table::of_rows(rows).markdown()
+}
+
+/// The same for a terminal.
+pub(crate) fn columns(rows: &[Vec<String>]) -> String {
+    page::Table::of_rows(rows).columns(usize::MAX)
+}
+
+/// The same, cut where a line would be too long, each part with the first column.
+pub(crate) fn terminal_columns(rows: &[Vec<String>]) -> String {
+    terminal_table(rows, 1)
+}
+
+/// The same with so many columns in each part.
+pub(crate) fn terminal_table(rows: &[Vec<String>], keys: usize) -> String {
+    page::Table::of_rows(rows).with_keys(keys).columns(WIDTH)
+}
+
+/// A text in Markdown, of which no part is taken for a cell's end, a line's end or HTML.
+pub(crate) fn markdown(text: &str) -> String {
+    text.replace('|', "\\|").replace('<', "&lt;").replace(['\n', '\r'], " ")
+}
+
+/// The same as CSV.
+pub(crate) fn csv_table(rows: &[Vec<String>]) -> String {
+    page::Table::of_rows(rows).csv()
+}
+
+/// The same as a `tabular` of LaTeX.
+pub(crate) fn latex_table(rows: &[Vec<String>]) -> String {
+    page::Table::of_rows(rows).latex()
+}

@@ -1,6 +1,6 @@
 //! What a run found, in words and tables: the verdict first.
 
-use super::markdown::markdown_table as table;
+use super::markdown_table as table;
 use super::number::{readable, window};
 use super::requirement::requirement_line;
 use super::verdict::verdict_lines;

@@ -2,7 +2,7 @@
 
 use super::curves::{Band, SignalCurves, SignalsFile};
 use super::number::{shortest, squared};
-use super::short::short_names;
+use super::short_names;
 use nav_sim_calibration::{duration, median};
 use nav_sim_signal::wavelet::Tuning;
 

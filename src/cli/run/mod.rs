@@ -72,9 +72,6 @@ pub(crate) struct Args {
     /// All settings of the run in one TOML file; flags override it (see `nav-sim schema scenario`)
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
-    /// Also draw the horizontal error over time in the terminal
-    #[arg(long)]
-    chart: bool,
     #[command(flatten)]
     plot: PlotArgs,
     /// Run directory to make
@@ -166,9 +163,6 @@ fn show(
     args.plot.write(|| crate::report::run_svg(&found.epochs, &found.fan, &found.summary), session)?;
     if throughput_epochs_per_s > 0.0 {
         session.say(format!("{:.2} million IMU epochs/s", throughput_epochs_per_s / 1e6));
-    }
-    if args.chart && !session.json() {
-        session.result(crate::report::run_text(&found.epochs, &found.summary));
     }
     if session.verbose() && !session.json() {
         session.result(run_words::sensitivity_table(&found.summary).trim_end());

@@ -27,7 +27,7 @@ pub(crate) fn calibration_page(
 ) -> String {
     let (tone, verdict) = verdict(curves, outcomes, diagnoses);
     let estimator = outcomes.first().map_or("", |(_, o)| o.estimator.name());
-    let mut page = Page::new(&format!("Stochastic calibration, {estimator}"), tone, &verdict);
+    let mut page = Page::new(&format!("Stochastic calibration, {estimator}"), tone, [verdict]);
     for (fitted, (index, outcome)) in curves.curves.iter().zip(outcomes) {
         page.section(&format!("{} · {}", group_name(fitted), outcome.spec));
         if let Some(practical) = outcome.practical(settings.rate_hz) {

@@ -14,7 +14,7 @@ pub(crate) fn choice_page(report: &ChoiceReport<'_>) -> Page {
     let placed = &report.ranking.candidates;
     let tone = if report.ranking.tells { Tone::Good } else { Tone::Doubtful };
     let mut verdict = report.verdict();
-    let mut page = Page::new("Which noise model", tone, &sentence(&verdict.remove(0)));
+    let mut page = Page::new("Which noise model", tone, [sentence(&verdict.remove(0))]);
     verdict.iter().for_each(|line| page.text(&sentence(line)));
     page.facts(&[
         ("trajectory", report.trajectory.to_owned()),

@@ -51,7 +51,7 @@ impl ShownComparison<'_> {
     pub(crate) fn page(&self, file: &ComparisonFile, links: &[(String, String)]) -> String {
         let Self { candidates, outages, states, .. } = *self;
         let kind = gravest(file.verdicts.iter().map(|row| &row.verdict));
-        let mut page = Page::new("What the filters believe, compared", tone(kind), &verdict(file));
+        let mut page = Page::new("What the filters believe, compared", tone(kind), [verdict(file)]);
         if let Some(line) = &file.beyond_linear {
             page.text(&sentence(line));
         }

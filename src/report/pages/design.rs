@@ -7,7 +7,7 @@ use crate::report::page::{Axis, Cell, Chart, Colour, Mark, Page, Panel, Series, 
 /// The page.
 pub(crate) fn design_page(designs: &[Design]) -> Page {
     let (tone, verdict) = verdict(designs);
-    let mut page = Page::new("What recordings would tell", tone, &verdict);
+    let mut page = Page::new("What recordings would tell", tone, [verdict]);
     design_verdict(designs).lines().for_each(|line| page.text(&super::sentence(line)));
     let parameters = designs.first().map_or(0, |d| d.parameters.len());
     if designs.len() == 1 {

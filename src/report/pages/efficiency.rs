@@ -7,7 +7,7 @@ use crate::report::page::{Axis, Cell, Chart, Colour, Interval, Mark, Page, Panel
 
 /// The page.
 pub(crate) fn efficiency_page(file: &EfficiencyFile) -> String {
-    let mut page = Page::new("Study of the estimators", Tone::Good, &verdict(file));
+    let mut page = Page::new("Study of the estimators", Tone::Good, [verdict(file)]);
     page.text(CAPTION);
     charts(file).iter().for_each(|chart| page.chart(chart, ""));
     page.section("All numbers");

@@ -13,7 +13,7 @@ pub(crate) fn fusion_page(solution: &Solution, summary: &FusionSummary, inputs: 
     let mut page = Page::new(
         "INS/GNSS fusion of recorded data",
         summary.tone(),
-        &format!("The solution is {}.", summary.verdict_line().trim_start_matches("verdict: ")),
+        [format!("The solution is {}.", summary.verdict_line().trim_start_matches("verdict: "))],
     );
     let facts: Vec<(&str, String)> =
         inputs.iter().map(|(role, path)| (role.as_str(), path.clone())).collect();

@@ -24,10 +24,10 @@ pub(crate) use fusion::fusion_page;
 pub(crate) use paper::{PaperFigure, StudyCurves, paper_figures, paper_page};
 pub(crate) use require::{catalogue_page, model_page, needed_page};
 pub(super) use run::run_page;
-pub(crate) use run_charts::{run_svg, run_text};
+pub(crate) use run_charts::run_svg;
 pub(crate) use study::study_page;
 pub(crate) use tune::tune_page;
-pub(crate) use wavelet::{wavelet_page, wavelet_text};
+pub(crate) use wavelet::wavelet_page;
 
 use super::number;
 use super::page::Tone;

@@ -14,7 +14,7 @@ const DRIFT: &str = "The error at the end of an outage against its length, at th
 
 /// The page of the IMU that is needed.
 pub(crate) fn needed_page(needed: &NeededImu, question: &Question) -> Page {
-    let mut page = Page::new("The IMU that a limit needs", Tone::Good, &sentence(&needed.verdict(question)));
+    let mut page = Page::new("The IMU that a limit needs", Tone::Good, [sentence(&needed.verdict(question))]);
     page.section("Figures, at most");
     page.text(
         "Allocated: with equal shares of what GNSS and start leave. If alone: if there were no other error of the IMU. Others 10 × \
@@ -102,7 +102,7 @@ fn iso_table(points: &[(f64, Answer)]) -> Table {
 pub(crate) fn model_page(judged: &GivenImu) -> Page {
     let GivenImu { margins, question, bridged, .. } = judged;
     let mut page =
-        Page::new("An IMU against its limits", Tone::from(judged.is_good()), &sentence(&judged.verdict()));
+        Page::new("An IMU against its limits", Tone::from(judged.is_good()), [sentence(&judged.verdict())]);
     page.section("Error against the length of an outage");
     for (i, limit) in question.limits.iter().enumerate() {
         let Some(curve) = bridged.curves.get(i) else { continue };
@@ -158,7 +158,7 @@ pub(crate) fn catalogue_page(units: &[RankedUnit], question: &Question) -> Page 
             )
         }
     };
-    let mut page = Page::new("IMUs against a limit", Tone::from(!met.is_empty()), &verdict);
+    let mut page = Page::new("IMUs against a limit", Tone::from(!met.is_empty()), [verdict]);
     page.section("Error against the length of an outage");
     page.chart(&drift_chart(question.curve_of(), unit_curves(units, question)), DRIFT);
     page.section("Ranking");

@@ -36,7 +36,7 @@ pub(crate) fn run_page(
     // What the command ends with is what the reader asked for: it comes before the filter.
     let missed_lines: String = missed.iter().map(|met| format!("{} ", line(met))).collect();
     let tone = if missed.is_empty() { tone(summary.verdict.kind) } else { Tone::Bad };
-    let mut page = Page::new(title, tone, &format!("{missed_lines}{}", sentence(&verdict)));
+    let mut page = Page::new(title, tone, [format!("{missed_lines}{}", sentence(&verdict))]);
     kept.into_iter().for_each(|met| page.text(&line(met)));
     if let Some(words) = beyond_linear(summary) {
         page.text(&sentence(&words));

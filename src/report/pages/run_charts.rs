@@ -1,17 +1,12 @@
 //! The figures of a run.
 
 use super::{STATES, error_of};
-use crate::report::page::{Axis, Chart, Colour, Interval, Mark, Panel, Series, svg, terminal};
+use crate::report::page::{Axis, Chart, Colour, Interval, Mark, Panel, Series, svg};
 use nav_sim_navigation::metrics::{Budget, EpochMetrics, FanEpoch, OutageSummary, Summary};
 
 /// What of it most people want as a picture.
 pub(crate) fn run_svg(epochs: &[EpochMetrics], fan: &[FanEpoch], summary: &Summary) -> String {
     svg("Navigation errors", &[horizontal(epochs, summary), fan_chart(fan, summary), nees(epochs, summary)])
-}
-
-/// The horizontal error over time for a terminal.
-pub(crate) fn run_text(epochs: &[EpochMetrics], summary: &Summary) -> String {
-    terminal(&horizontal(epochs, summary), 86, 15).join("\n")
 }
 
 /// The outages (start, end) (s).

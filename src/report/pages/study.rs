@@ -18,7 +18,7 @@ pub(crate) fn study_page(
     beyond_linear: Option<String>,
 ) -> String {
     let kind = gravest(cells.iter().flat_map(|cell| &cell.columns).map(|column| &column.verdict));
-    let mut page = Page::new("Study", super::tone(kind), &verdict(cells));
+    let mut page = Page::new("Study", super::tone(kind), [verdict(cells)]);
     for place in rankings {
         page.section(&format!("Candidates on recordings left out: {}", place.name));
         place.verdict.iter().for_each(|line| page.text(&sentence(line)));

@@ -10,7 +10,7 @@ use nav_sim_navigation::simulation::lincov::Honesty;
 /// The page.
 pub(crate) fn tune_page(result: &TuneResult) -> Page {
     let tone = if result.is_honest() { Tone::Good } else { Tone::Doubtful };
-    let mut page = Page::new("Honest inflation of a noise model", tone, &super::sentence(&result.verdict()));
+    let mut page = Page::new("Honest inflation of a noise model", tone, [super::sentence(&result.verdict())]);
     page.facts(&[("truths", result.truths.join(", "))]);
     page.section("Factors");
     page.text("On the variances of the model; the standard deviations take their square roots.");

@@ -2,7 +2,7 @@
 
 use crate::report::curves::{SignalCurves, SignalsFile};
 use crate::report::number::squared;
-use crate::report::page::{Axis, Chart, Colour, Mark, Page, Panel, Series, Table, Tone, beside, terminal};
+use crate::report::page::{Axis, Chart, Colour, Mark, Page, Panel, Series, Table, Tone};
 use crate::report::short_names;
 use nav_sim_calibration::duration;
 use nav_sim_signal::imu::Sensor;
@@ -60,7 +60,7 @@ pub(crate) fn wavelet_page(file: &SignalsFile) -> Page {
             ),
         ),
     };
-    let mut page = Page::new("Wavelet variance of static recordings", tone, &verdict);
+    let mut page = Page::new("Wavelet variance of static recordings", tone, [verdict]);
     let caption = "Lines: robust wavelet variance with its 95 % band; dashed: classical, which outliers raise. White noise falls by 1 a decade, a random walk rises by 1; a flat stretch is bias \
                    instability. τ is twice the averaging time of the Allan deviation, which is √(2 ν).";
     page.text(caption);
@@ -77,25 +77,6 @@ pub(crate) fn wavelet_page(file: &SignalsFile) -> Page {
     );
     page
 }
-
-/// The robust wavelet deviations for a terminal, a plot a sensor: each axis with its letter.
-pub(crate) fn wavelet_text(file: &SignalsFile) -> String {
-    let plot = |sensor: Sensor| {
-        let of_sensor = file.signals.iter().filter(|s| s.sensor == sensor.name());
-        let deviation = |s: &SignalCurves| -> Vec<(f64, f64)> {
-            s.tau_s.iter().zip(&s.robust.wv).map(|(tau, nu)| (*tau, nu.sqrt())).collect()
-        };
-        let series = of_sensor.map(|s| Series::line(&s.axis, Colour::Ink, deviation(s))).collect();
-        let panel = Panel::new(Axis::log(&format!("{} ({})", sensor.name(), sensor.unit())), series);
-        terminal(&Chart::new("", scale_axis(), vec![panel]), TEXT.0, TEXT.1)
-    };
-    let [accel, gyro] = Sensor::ALL.map(plot);
-    let plots = if accel.is_empty() { gyro } else { beside(&accel, &gyro, TEXT.0) };
-    format!("wavelet deviation √ν, robust\n{}", plots.join("\n"))
-}
-
-/// Columns and rows of a plot in a terminal.
-const TEXT: (usize, usize) = (42, 13);
 
 /// Classical over robust beyond which outliers are suspected.
 const OUTLIERS: f64 = 1.5;

@@ -1,11 +1,18 @@
 //! Charts as a picture for a paper or a slide: SVG in plain colours, which every program reads, and what is made of it.
 
-use super::draw::{WIDE, draw, text};
-use super::{CHART_STYLE, COLOURS, Chart, escape};
+use crate::canvas::{WIDE, text};
+use crate::chart::Chart;
+use crate::draw::draw;
+use crate::escape::escape;
 use resvg::{tiny_skia, usvg};
 use std::fmt::Write as _;
 use std::path::Path;
 use std::sync::Arc;
+
+/// Colours by name, by day and by night.
+pub(crate) const COLOURS: &str = include_str!("colours.css");
+/// Style of charts.
+pub(crate) const CHART_STYLE: &str = include_str!("chart.css");
 
 /// Dots an inch of a PNG; an SVG's pixel is 1/96 inch.
 const DENSITY: f32 = 300.0;
@@ -15,22 +22,19 @@ const MOST_DOTS: f32 = 8e7;
 
 /// In which form a picture is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Form {
+pub enum Form {
     /// Lines and text, as they are.
     Svg,
     /// Dots, 300 an inch.
     Png,
-    /// Lines, text as outlines.
-    Pdf,
 }
 
 impl Form {
     /// By the ending of a file's name, in capitals or not.
-    pub(crate) fn of(path: &Path) -> Option<Self> {
+    pub fn of(path: &Path) -> Option<Self> {
         match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
             "svg" => Some(Self::Svg),
             "png" => Some(Self::Png),
-            "pdf" => Some(Self::Pdf),
             _ => None,
         }
     }
@@ -39,13 +43,13 @@ impl Form {
 /// Why there is no picture.
 #[derive(Debug, thiserror::Error)]
 #[error("the picture cannot be drawn as {form:?}: {cause}")]
-pub(crate) struct PictureError {
+pub struct PictureError {
     form: Form,
     cause: String,
 }
 
 /// Charts below one another as an SVG file; those without a value are left out.
-pub(crate) fn svg(title: &str, charts: &[Chart]) -> String {
+pub fn svg(title: &str, charts: &[Chart]) -> String {
     const MARGIN: f64 = 16.0;
     let line = 2.0 * WIDE.font;
     let (mut body, mut top) = (String::new(), MARGIN);
@@ -78,11 +82,10 @@ fn plain_style() -> String {
 ///
 /// # Errors
 /// Where a text in it has a character that XML does not know, and where its dots do not fit into memory.
-pub(crate) fn encode(svg: String, form: Form) -> Result<Vec<u8>, PictureError> {
+pub fn encode(svg: String, form: Form) -> Result<Vec<u8>, PictureError> {
     let drawn = match form {
         Form::Svg => return Ok(svg.into_bytes()),
         Form::Png => png(&drawable(&svg)),
-        Form::Pdf => pdf(&drawable(&svg)),
     };
     drawn.map_err(|cause| PictureError { form, cause })
 }
@@ -114,29 +117,4 @@ fn png(svg: &str) -> Result<Vec<u8>, String> {
         tiny_skia::Pixmap::new(dots.width(), dots.height()).ok_or("it does not fit into memory")?;
     resvg::render(&picture, tiny_skia::Transform::from_scale(zoom, zoom), &mut dotted.as_mut());
     dotted.encode_png().map_err(|e| e.to_string())
-}
-
-fn pdf(svg: &str) -> Result<Vec<u8>, String> {
-    // Text becomes outlines, so that no reader of the file needs the font.
-    let outlines = usvg::WriteOptions { preserve_text: false, ..usvg::WriteOptions::default() };
-    let picture = parsed(&parsed(svg)?.to_string(&outlines))?;
-    let page = svg2pdf::PageOptions { dpi: PIXELS_AN_INCH };
-    let document = svg2pdf::to_pdf(&picture, svg2pdf::ConversionOptions::default(), page);
-    document.map(|bytes| ordered(&bytes)).map_err(|e| e.to_string())
-}
-
-/// `svg2pdf` lists the resources of a page in an order of chance, which means nothing; by name, the same drawing has the same
-/// bytes. What moves stays within its list, so that all offsets hold.
-fn ordered(document: &[u8]) -> Vec<u8> {
-    let is_resource = |line: &&[u8]| {
-        let words: Vec<&[u8]> = line.split(|b| *b == b' ').filter(|word| !word.is_empty()).collect();
-        matches!(words[..], [[b'/', ..], _, b"0", b"R"])
-    };
-    let mut lines: Vec<&[u8]> = document.split(|b| *b == b'\n').collect();
-    for list in lines.chunk_by_mut(|a, b| is_resource(a) && is_resource(b)) {
-        if is_resource(&list[0]) {
-            list.sort_unstable();
-        }
-    }
-    lines.join(&b'\n')
 }

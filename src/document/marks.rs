@@ -1,20 +1,21 @@
 //! Marks as SVG paths.
 
-use super::axis::{Ruler, is_shown};
-use super::chart::{Interval, Mark, Scale, Series};
-use super::escape;
+use crate::axis::{Ruler, is_shown};
+use crate::canvas::short;
+use crate::chart::{Interval, Mark, Scale, Series};
+use crate::escape::escape;
 use std::fmt::Write as _;
 
 /// Points beyond which each is small.
 const MANY: usize = 150;
 
 /// Rulers and scales of one panel.
-pub(super) struct Frame<'a> {
-    pub(super) x: Ruler,
-    pub(super) y: Ruler,
-    pub(super) scales: [&'a Scale; 2],
+pub(crate) struct Frame<'a> {
+    pub(crate) x: Ruler,
+    pub(crate) y: Ruler,
+    pub(crate) scales: [&'a Scale; 2],
     /// Points of a line that can be told apart.
-    pub(super) most: usize,
+    pub(crate) most: usize,
 }
 
 impl Frame<'_> {
@@ -27,7 +28,7 @@ impl Frame<'_> {
     }
 
     /// The series as a group of paths.
-    pub(super) fn series(&self, series: &Series, key: usize, svg: &mut String) {
+    pub(crate) fn series(&self, series: &Series, key: usize, svg: &mut String) {
         let _ = write!(
             svg,
             "<g class=\"series {}\" data-k=\"{key}\" data-name=\"{}\">",
@@ -47,8 +48,12 @@ impl Frame<'_> {
                 let (a, b) = self.x.range;
                 path(svg, "area", &self.band(&[(a, *low, *high), (b, *low, *high)]));
             }
-            Mark::Place(x, y) => {
-                path(svg, "dot", &format!("M{}h0", self.point(*x, *y)));
+            Mark::Place(x, y) => path(svg, "dot", &format!("M{}h0", self.point(*x, *y))),
+            Mark::Reading(x, y) => {
+                let (left, bottom) = (short(self.x.pixels.0), short(self.y.pixels.0));
+                let (px, py) = (short(self.x.at(*x)), short(self.y.at(*y)));
+                path(svg, "line level", &format!("M{left} {py}H{px}V{bottom}"));
+                path(svg, "dot", &format!("M{px} {py}h0"));
             }
         }
         *svg += "</g>\n";
@@ -121,12 +126,6 @@ fn path(svg: &mut String, class: &str, d: &str) {
     if !d.is_empty() {
         let _ = write!(svg, "<path class=\"{class}\" d=\"{d}\"/>");
     }
-}
-
-/// A coordinate to a tenth of a pixel, without idle zeros.
-pub(super) fn short(pixels: f64) -> String {
-    let text = format!("{pixels:.1}");
-    text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
 /// At most about so many points: of each bucket its lowest and its highest one, so that peaks stay; a gap stays

@@ -2,28 +2,28 @@
 
 /// The shortest decimal text that reads back to the same number; powers of ten where plain digits would be
 /// long; `NaN` for what is unknown.
-pub(super) fn shortest(x: f64) -> String {
+pub fn shortest(x: f64) -> String {
     let plain = x == 0.0 || (1e-5..1e15).contains(&x.abs()) || !x.is_finite();
     if plain { format!("{x}") } else { format!("{x:e}") }
 }
 
 /// A time of a schedule, to a hundredth of a second.
-pub(crate) fn seconds(t_s: f64) -> String {
+pub fn seconds(t_s: f64) -> String {
     format!("{}", (t_s * 100.0).round() / 100.0)
 }
 
 /// A value as the nearest of six significant digits: more of a rate or a time is no one's to read.
-pub(crate) fn six_digits(value: f64) -> f64 {
+pub fn six_digits(value: f64) -> f64 {
     format!("{value:.5e}").parse().unwrap_or(value)
 }
 
 /// A window of a schedule: `300–390 s`.
-pub(crate) fn window(start_s: f64, end_s: f64) -> String {
+pub fn window(start_s: f64, end_s: f64) -> String {
     format!("{}–{} s", seconds(start_s), seconds(end_s))
 }
 
 /// The square of a sensor's unit.
-pub(super) fn squared(unit: &str) -> String {
+pub fn squared(unit: &str) -> String {
     match unit {
         "m/s²" => "m²/s⁴".to_owned(),
         "rad/s" => "rad²/s²".to_owned(),
@@ -32,7 +32,7 @@ pub(super) fn squared(unit: &str) -> String {
 }
 
 /// A share, to one per cent.
-pub(crate) fn percent(share: f64) -> String {
+pub fn percent(share: f64) -> String {
     format!("{:.0} %", 100.0 * share)
 }
 

@@ -1,7 +1,7 @@
 //! Names of files short enough for a legend.
 
 /// Each path by the shortest of its ends that no other one of them has: `run1.csv`, or `a/run1.csv` beside `b/run1.csv`.
-pub(crate) fn short_names(paths: &[&str]) -> Vec<String> {
+pub fn short_names(paths: &[&str]) -> Vec<String> {
     let parts: Vec<Vec<&str>> = paths.iter().map(|path| components(path)).collect();
     let tail = |parts: &[&str], length: usize| parts[parts.len().saturating_sub(length)..].join("/");
     let shortest = |components: &Vec<&str>| {

@@ -1,40 +1,18 @@
 //! Charts as SVG: layout, axes, stripes; for a screen and for a phone, so that text is never scaled.
 
-use super::axis::{Ruler, extremes, is_shown, minor_ticks, range, ticks};
-use super::chart::{Chart, Mark, Panel, Scale, Stroke};
-use super::escape;
-use super::legend::{Legend, text_width};
-use super::marks::{Frame, short};
+use crate::axis::{Ruler, extremes, is_shown, minor_ticks, range, ticks};
+use crate::canvas::{Canvas, short, text};
+use crate::chart::{Chart, Mark, Panel, Scale, Stroke};
+use crate::escape::escape;
+use crate::legend::{Legend, text_width};
+use crate::marks::Frame;
 use std::fmt::Write as _;
-
-/// A size to draw in.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Canvas {
-    /// Class of the style sheet.
-    pub(super) class: &'static str,
-    pub(super) width: f64,
-    /// Usual height of a panel.
-    panel: f64,
-    /// Size of text.
-    pub(super) font: f64,
-    /// About how many labels the x axis has.
-    labels: usize,
-    /// Most that a map may be high.
-    map: f64,
-}
-
-pub(super) const WIDE: Canvas =
-    Canvas { class: "wide", width: 960.0, panel: 250.0, font: 14.0, labels: 10, map: 480.0 };
-pub(super) const NARROW: Canvas =
-    Canvas { class: "narrow", width: 358.0, panel: 200.0, font: 12.0, labels: 5, map: 340.0 };
-pub(super) const SMALL: Canvas =
-    Canvas { class: "small", width: 310.0, panel: 150.0, font: 12.0, labels: 5, map: 260.0 };
 
 /// Between panels, and at the right of all.
 const GAP: f64 = 14.0;
 
 /// The content of an `<svg>` and its height; nothing without a value to show.
-pub(super) fn draw(chart: &Chart, canvas: &Canvas) -> Option<(String, f64)> {
+pub(crate) fn draw(chart: &Chart, canvas: &Canvas) -> Option<(String, f64)> {
     let mut svg = String::new();
     let legend = Legend::of(chart);
     let mut top = 0.0;
@@ -231,7 +209,9 @@ impl Sketch<'_> {
     fn places(&self, canvas: &Canvas, svg: &mut String) {
         let (x, y) = (&self.frame.x, &self.frame.y);
         let named = self.panel.series.iter().filter_map(|s| match s.mark {
-            Mark::Place(px, py) if is_shown(px, &self.chart.x.scale) && is_shown(py, &self.panel.y.scale) => {
+            Mark::Place(px, py) | Mark::Reading(px, py)
+                if is_shown(px, &self.chart.x.scale) && is_shown(py, &self.panel.y.scale) =>
+            {
                 Some((s, x.at(px), y.at(py)))
             }
             _ => None,
@@ -281,7 +261,7 @@ fn xs(mark: &Mark) -> Vec<f64> {
         Mark::Points(points) => points.iter().map(|p| p.x).collect(),
         Mark::Bars(bars) => bars.iter().map(|b| b.0).collect(),
         Mark::Level(_) | Mark::Zone(..) => Vec::new(),
-        Mark::Place(x, _) => vec![*x],
+        Mark::Place(x, _) | Mark::Reading(x, _) => vec![*x],
     }
 }
 
@@ -293,13 +273,16 @@ fn ys(mark: &Mark) -> Vec<f64> {
         Mark::Bars(bars) => bars.iter().flat_map(|b| [b.1, b.2]).collect(),
         Mark::Level(y) => vec![*y],
         Mark::Zone(low, high) => vec![*low, *high],
-        Mark::Place(_, y) => vec![*y],
+        Mark::Place(_, y) | Mark::Reading(_, y) => vec![*y],
     }
 }
 
 /// Whether a mark must be seen whole: bands, bars and auxiliary lines may leave the panel.
 fn is_main(mark: &Mark) -> bool {
-    matches!(mark, Mark::Line(_, Stroke::Plain) | Mark::Level(_) | Mark::Points(_) | Mark::Place(..))
+    matches!(
+        mark,
+        Mark::Line(_, Stroke::Plain) | Mark::Level(_) | Mark::Points(_) | Mark::Place(..) | Mark::Reading(..)
+    )
 }
 
 /// How far beyond the main curves a logarithmic axis follows others.
@@ -324,15 +307,6 @@ fn y_range(panel: &Panel) -> Option<(f64, f64)> {
     };
     let shown = values.into_iter().filter(|y| is_shown(*y, &panel.y.scale));
     range(&panel.y, shown.map(|y| y.clamp(low, high)), air)
-}
-
-pub(super) fn text(svg: &mut String, class: &str, (x, y): (f64, f64), anchor: &str, words: &str) {
-    let (x, y) = (short(x), short(y));
-    let _ = writeln!(
-        svg,
-        "<text class=\"{class}\" x=\"{x}\" y=\"{y}\" text-anchor=\"{anchor}\">{}</text>",
-        escape(words)
-    );
 }
 
 /// A tick label that ends at a point, rising towards it.

@@ -1,44 +1,44 @@
 //! Ranges, ticks and their labels.
 
-use super::chart::{Axis, Scale};
-use crate::report::number::readable;
+use crate::chart::{Axis, Scale};
+use crate::number::readable;
 
 /// From values to pixels along one axis.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Ruler {
+pub(crate) struct Ruler {
     /// First and last value shown.
-    pub(super) range: (f64, f64),
-    pub(super) is_log: bool,
+    pub(crate) range: (f64, f64),
+    pub(crate) is_log: bool,
     /// Pixels of the first and the last value.
-    pub(super) pixels: (f64, f64),
+    pub(crate) pixels: (f64, f64),
 }
 
 impl Ruler {
-    pub(super) fn at(&self, value: f64) -> f64 {
+    pub(crate) fn at(&self, value: f64) -> f64 {
         let along = |v: f64| if self.is_log { v.log10() } else { v };
         let (low, high) = (along(self.range.0), along(self.range.1));
         self.pixels.0 + (along(value) - low) / (high - low) * (self.pixels.1 - self.pixels.0)
     }
 
     /// The same, no farther than the ends.
-    pub(super) fn within(&self, value: f64) -> f64 {
+    pub(crate) fn within(&self, value: f64) -> f64 {
         self.at(value.clamp(self.range.0, self.range.1))
     }
 
     /// `log 1e-3 100`, for the script.
-    pub(super) fn data(&self) -> String {
+    pub(crate) fn data(&self) -> String {
         let word = if self.is_log { "log" } else { "linear" };
         format!("{word} {:e} {:e}", self.range.0, self.range.1)
     }
 }
 
 /// Whether a value can be shown on an axis.
-pub(super) fn is_shown(value: f64, scale: &Scale) -> bool {
+pub(crate) fn is_shown(value: f64, scale: &Scale) -> bool {
     value.is_finite() && (*scale != Scale::Log || value > 0.0)
 }
 
 /// What an axis shows: the values with some air, none without a value.
-pub(super) fn range(axis: &Axis, values: impl Iterator<Item = f64>, air: f64) -> Option<(f64, f64)> {
+pub(crate) fn range(axis: &Axis, values: impl Iterator<Item = f64>, air: f64) -> Option<(f64, f64)> {
     if let Scale::Names(names) = &axis.scale {
         return Some((-0.5, names.len() as f64 - 0.5));
     }
@@ -56,7 +56,7 @@ pub(super) fn range(axis: &Axis, values: impl Iterator<Item = f64>, air: f64) ->
 }
 
 /// Least and largest.
-pub(super) fn extremes(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+pub(crate) fn extremes(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     values.fold(None, |range, v| {
         let (low, high) = range.unwrap_or((v, v));
         Some((low.min(v), high.max(v)))
@@ -64,7 +64,7 @@ pub(super) fn extremes(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> 
 }
 
 /// Places of an axis that have a label, and the labels; `most`: about how many.
-pub(super) fn ticks(axis: &Axis, range: (f64, f64), most: usize) -> Vec<(f64, String)> {
+pub(crate) fn ticks(axis: &Axis, range: (f64, f64), most: usize) -> Vec<(f64, String)> {
     match &axis.scale {
         Scale::Names(names) => names.iter().enumerate().map(|(k, name)| (k as f64, name.clone())).collect(),
         Scale::Log if range.1 / range.0 >= 6.0 => decades(range, most),
@@ -87,7 +87,7 @@ fn decades((low, high): (f64, f64), most: usize) -> Vec<(f64, String)> {
 }
 
 /// Between the labelled powers of ten: 2 to 9 times each.
-pub(super) fn minor_ticks((low, high): (f64, f64)) -> Vec<f64> {
+pub(crate) fn minor_ticks((low, high): (f64, f64)) -> Vec<f64> {
     let exponents = low.log10().floor() as i32..=high.log10().ceil() as i32;
     let all = exponents.flat_map(|e| (2..10).map(move |f| f64::from(f) * 10f64.powi(e)));
     all.filter(|v| (low..=high).contains(v)).collect()

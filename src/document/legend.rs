@@ -1,13 +1,12 @@
 //! The legend above the panels.
 
-use super::chart::{Chart, Mark, Series};
-use super::draw::{Canvas, text};
-use super::marks::short;
+use crate::canvas::{Canvas, short, text};
+use crate::chart::{Chart, Mark, Series};
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
 /// Width of a text (pixels), rather too much: that of a wide typeface.
-pub(super) fn text_width(text: &str, font: f64) -> f64 {
+pub(crate) fn text_width(text: &str, font: f64) -> f64 {
     let width = |c: char| match c {
         'i' | 'j' | 'l' | 'f' | 't' | 'r' | '.' | ',' | ':' | '(' | ')' | '|' | '/' | ' ' => 0.42,
         'm' | 'w' | 'M' | 'W' | '%' | '−' => 0.95,
@@ -29,18 +28,18 @@ struct Entry<'a> {
 }
 
 /// Names that are told. One name alone is told by the axis.
-pub(super) struct Legend<'a> {
+pub(crate) struct Legend<'a> {
     entries: Vec<Entry<'a>>,
     stripes: Option<&'a str>,
 }
 
 impl<'a> Legend<'a> {
-    pub(super) fn of(chart: &'a Chart) -> Self {
+    pub(crate) fn of(chart: &'a Chart) -> Self {
         let mut entries: Vec<Entry<'a>> = Vec::new();
         for (panel, series) in
             chart.panels.iter().enumerate().flat_map(|(i, p)| p.series.iter().map(move |s| (i, s)))
         {
-            if series.name.is_empty() || matches!(series.mark, Mark::Place(..)) {
+            if series.name.is_empty() || matches!(series.mark, Mark::Place(..) | Mark::Reading(..)) {
                 continue;
             }
             match entries.iter_mut().find(|e| e.name == series.name) {
@@ -53,12 +52,12 @@ impl<'a> Legend<'a> {
     }
 
     /// The number of a name, of which the script knows what to hide.
-    pub(super) fn key(&self, name: &str) -> usize {
+    pub(crate) fn key(&self, name: &str) -> usize {
         self.entries.iter().position(|e| e.name == name).unwrap_or(self.entries.len())
     }
 
     /// Draws what one panel tells, beginning behind `title`, at the height `top`; returns where it ends.
-    pub(super) fn draw(
+    pub(crate) fn draw(
         &self,
         panel: usize,
         title: &str,
@@ -145,7 +144,9 @@ fn swatch(mark: &Mark, (x, y): (f64, f64), svg: &mut String) {
         Mark::Band(_) | Mark::Zone(..) => ("area", square()),
         Mark::InnerBand(_) => ("area inner", square()),
         Mark::Bars(_) => ("bar", square()),
-        Mark::Points(_) | Mark::Place(..) => ("dot", format!("M{} {}h0", short(x + 0.5 * SWATCH), short(y))),
+        Mark::Points(_) | Mark::Place(..) | Mark::Reading(..) => {
+            ("dot", format!("M{} {}h0", short(x + 0.5 * SWATCH), short(y)))
+        }
     };
     let _ = write!(svg, "<path class=\"{class}\" d=\"{d}\"/>");
 }

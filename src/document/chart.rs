@@ -2,7 +2,7 @@
 
 /// How an axis runs.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Scale {
+pub enum Scale {
     /// Evenly.
     Linear,
     /// By powers of ten; what is not positive is not shown.
@@ -13,7 +13,7 @@ pub(crate) enum Scale {
 
 /// An axis.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Axis {
+pub struct Axis {
     /// Quantity and unit, such as `time (s)`.
     pub label: String,
     /// How it runs.
@@ -24,29 +24,35 @@ pub(crate) struct Axis {
 
 impl Axis {
     /// A linear axis.
-    pub(crate) fn linear(label: &str) -> Self {
+    pub fn linear(label: &str) -> Self {
         Self { label: label.to_owned(), scale: Scale::Linear, include: None }
     }
 
     /// A logarithmic axis.
-    pub(crate) fn log(label: &str) -> Self {
+    pub fn log(label: &str) -> Self {
         Self { scale: Scale::Log, ..Self::linear(label) }
     }
 
     /// An axis of names.
-    pub(crate) fn names(names: Vec<String>) -> Self {
+    pub fn names(names: Vec<String>) -> Self {
         Self { scale: Scale::Names(names), ..Self::linear("") }
     }
 
     /// The same, showing at least the values from `low` to `high`.
-    pub(crate) fn including(self, low: f64, high: f64) -> Self {
+    pub fn including(self, low: f64, high: f64) -> Self {
         Self { include: Some((low, high)), ..self }
+    }
+
+    /// The same with zero inside, as an axis of errors must be.
+    #[must_use]
+    pub fn with_zero(self) -> Self {
+        self.including(0.0, 0.0)
     }
 }
 
 /// A colour of the palette, which the blind to red or green can tell apart too (Okabe and Ito).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Colour {
+pub enum Colour {
     /// That of the text: measurements.
     Ink,
     /// Grey: what stands in the background.
@@ -57,16 +63,16 @@ pub(crate) enum Colour {
 
 impl Colour {
     /// Hues of the palette.
-    pub(crate) const HUES: usize = 8;
+    pub const HUES: usize = 8;
     /// What a filter or a model believes.
-    pub(crate) const BELIEVED: Self = Self::Hue(0);
+    pub const BELIEVED: Self = Self::Hue(0);
     /// What is true.
-    pub(crate) const REAL: Self = Self::Hue(1);
+    pub const REAL: Self = Self::Hue(1);
     /// Where a right filter or model stays.
-    pub(crate) const RIGHT: Self = Self::Hue(2);
+    pub const RIGHT: Self = Self::Hue(2);
 
     /// Class of the style sheet.
-    pub(super) fn class(self) -> String {
+    pub(crate) fn class(self) -> String {
         match self {
             Self::Ink => "ink".to_owned(),
             Self::Soft => "soft".to_owned(),
@@ -77,7 +83,7 @@ impl Colour {
 
 /// How a line is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Stroke {
+pub enum Stroke {
     /// As most are.
     Plain,
     /// One of many.
@@ -90,7 +96,7 @@ pub(crate) enum Stroke {
 
 impl Stroke {
     /// Class of the style sheet.
-    pub(super) const fn class(self) -> &'static str {
+    pub(crate) const fn class(self) -> &'static str {
         match self {
             Self::Plain => "line",
             Self::Thin => "line thin",
@@ -102,7 +108,7 @@ impl Stroke {
 
 /// A point and its interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Interval {
+pub struct Interval {
     /// Where.
     pub x: f64,
     /// The value.
@@ -115,7 +121,7 @@ pub(crate) struct Interval {
 
 /// What is drawn of a series.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Mark {
+pub enum Mark {
     /// A line through points (x, y); a value that cannot be shown breaks it.
     Line(Vec<(f64, f64)>, Stroke),
     /// The area between two curves (x, low, high).
@@ -132,11 +138,13 @@ pub(crate) enum Mark {
     Zone(f64, f64),
     /// A dot with its name beside it, at (x, y); not in the legend.
     Place(f64, f64),
+    /// The same, with lines to both axes: a value that is read off a curve, such as N at 1 s of an Allan deviation.
+    Reading(f64, f64),
 }
 
 /// Something to see and its name in the legend. Series of one name, in all panels, are one entry there.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Series {
+pub struct Series {
     /// Name; of an empty one the legend says nothing.
     pub name: String,
     /// Colour.
@@ -147,45 +155,41 @@ pub(crate) struct Series {
 
 impl Series {
     /// A series.
-    pub(crate) fn new(name: &str, colour: Colour, mark: Mark) -> Self {
+    pub fn new(name: &str, colour: Colour, mark: Mark) -> Self {
         Self { name: name.to_owned(), colour, mark }
     }
 
     /// A line.
-    pub(crate) fn line(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
+    pub fn line(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
         Self::new(name, colour, Mark::Line(points, Stroke::Plain))
     }
 
     /// A thin line.
-    pub(crate) fn thin(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
+    pub fn thin(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
         Self::new(name, colour, Mark::Line(points, Stroke::Thin))
     }
 
     /// A line with a point at each of its ends and bends.
-    pub(crate) fn dotted_line(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> [Self; 2] {
+    pub fn dotted_line(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> [Self; 2] {
         let dots = points.clone().into_iter().map(|(x, y)| (x, y, f64::NAN));
         [Self::line(name, colour, points), Self::points(name, colour, dots)]
     }
 
     /// Points (x, y, half of the interval; NaN: none).
-    pub(crate) fn points(
-        name: &str,
-        colour: Colour,
-        points: impl IntoIterator<Item = (f64, f64, f64)>,
-    ) -> Self {
+    pub fn points(name: &str, colour: Colour, points: impl IntoIterator<Item = (f64, f64, f64)>) -> Self {
         let point = |(x, y, half): (f64, f64, f64)| Interval { x, y, low: y - half, high: y + half };
         Self::new(name, colour, Mark::Points(points.into_iter().map(point).collect()))
     }
 
     /// A dashed line.
-    pub(crate) fn dashed(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
+    pub fn dashed(name: &str, colour: Colour, points: Vec<(f64, f64)>) -> Self {
         Self::new(name, colour, Mark::Line(points, Stroke::Dashed))
     }
 }
 
 /// One plot of a chart, all of which share their x axis.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Panel {
+pub struct Panel {
     /// Its own axis.
     pub y: Axis,
     /// What is in it, the first at the bottom.
@@ -196,23 +200,23 @@ pub(crate) struct Panel {
 
 impl Panel {
     /// A panel of the usual height.
-    pub(crate) fn new(y: Axis, series: Vec<Series>) -> Self {
+    pub fn new(y: Axis, series: Vec<Series>) -> Self {
         Self { y, series, height: 1.0 }
     }
 }
 
 /// How much room a chart takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Size {
+pub enum Size {
     /// The whole width: drawn twice, for a screen and for a phone.
     Full,
-    /// One of several side by side ([`super::Page::charts`]).
+    /// One of several side by side ([`crate::Document::charts`]).
     Small,
 }
 
 /// Panels above one another with one x axis.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Chart {
+pub struct Chart {
     /// What it shows, in words.
     pub title: String,
     /// The axis of all panels.
@@ -231,7 +235,7 @@ pub(crate) struct Chart {
 
 impl Chart {
     /// A chart of one or more panels, of the whole width.
-    pub(crate) fn new(title: &str, x: Axis, panels: Vec<Panel>) -> Self {
+    pub fn new(title: &str, x: Axis, panels: Vec<Panel>) -> Self {
         Self {
             title: title.to_owned(),
             x,
@@ -244,23 +248,23 @@ impl Chart {
     }
 
     /// A map: east to the right, north up, in metres, one scale.
-    pub(crate) fn map(title: &str, series: Vec<Series>) -> Self {
+    pub fn map(title: &str, series: Vec<Series>) -> Self {
         let panel = Panel::new(Axis::linear("north (m)"), series);
         Self { is_map: true, ..Self::new(title, Axis::linear("east (m)"), vec![panel]) }
     }
 
     /// The same with outages (start, end) marked.
-    pub(crate) fn with_outages(self, outages: &[(f64, f64)]) -> Self {
+    pub fn with_outages(self, outages: &[(f64, f64)]) -> Self {
         Self { stripes: ("outage".to_owned(), outages.to_vec()), ..self }
     }
 
     /// The same in a group of charts that are zoomed together.
-    pub(crate) fn in_group(self, group: &str) -> Self {
+    pub fn in_group(self, group: &str) -> Self {
         Self { group: group.to_owned(), ..self }
     }
 
     /// The same, small.
-    pub(crate) fn small(self) -> Self {
+    pub fn small(self) -> Self {
         Self { size: Size::Small, ..self }
     }
 }
