@@ -1,6 +1,5 @@
 //! `nav-sim demo`: the case study of the paper, command by command.
 
-use super::batch::shell_words;
 use super::compare::Compared;
 use super::{Cli, Command, Failure, Session, read};
 use crate::formats::atomic::Existing;
@@ -241,5 +240,16 @@ fn commands(args: &Args, seed: u64) -> Vec<Vec<String>> {
 
 /// A command as it would be typed.
 fn typed(command: &[String]) -> String {
-    format!("nav-sim {}", shell_words(command))
+    let words: Vec<String> = command.iter().map(|word| shell_quoted(word)).collect();
+    format!("nav-sim {}", words.join(" "))
+}
+
+/// A word as a shell reads it.
+fn shell_quoted(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "-_./:,+=".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        word.to_owned()
+    } else {
+        format!("'{}'", word.replace('\'', "'\\''"))
+    }
 }

@@ -6,7 +6,7 @@ use nav_sim_navigation::sensors::outage::OutageError;
 use std::fmt;
 
 /// A failure: exit code, message and hint. 1 could not (I/O, numerics); 2 usage or configuration;
-/// 3 a stated bound was not met; 75 stopped early, resume; 130 interrupted.
+/// 3 a stated bound was not met; 75 stopped early, resume; 130 interrupted (143 by SIGTERM, 129 by SIGHUP).
 #[derive(Debug)]
 pub(crate) struct Failure {
     code: u8,

@@ -38,8 +38,12 @@ mod turn_on;
 mod version;
 mod wv;
 
+use clap::error::{ContextKind, ErrorKind};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
+use std::error::Error;
 use std::ffi::{OsStr, OsString};
+use std::io::Write;
+use std::num::ParseIntError;
 use std::process::ExitCode;
 
 pub(crate) use common::{Common, Session};
@@ -49,7 +53,7 @@ pub(crate) use progress::Progress;
 
 /// INS/GNSS navigation simulator with a robust stochastic-calibration front end.
 #[derive(Parser)]
-#[command(name = "nav-sim", version, arg_required_else_help = true)]
+#[command(name = "nav-sim", version)]
 struct Cli {
     #[command(flatten)]
     common: Common,
@@ -97,8 +101,8 @@ impl Command {
 
     fn run(self, session: &Session) -> Result<(), Failure> {
         if session.csv() && !matches!(self, Self::Wv(_)) {
-            let failure = Failure::input("--format csv is a format of wv alone");
-            return Err(failure.hint("--format json, or the CSV files that the command writes"));
+            let failure = Failure::input("--format csv: only wv prints CSV");
+            return Err(failure.hint("compare has --table csv; other commands write CSV files to --out"));
         }
         match self {
             Self::Wv(args) => wv::run(&args, session),
@@ -126,6 +130,25 @@ impl Command {
         }
     }
 }
+
+/// What `nav-sim` alone prints.
+const OVERVIEW: &str = "\
+nav-sim COMMAND --help has examples of each command; the book is docs/README.md.
+
+recordings    wv, calibrate       noise and a model of it from static recordings
+              choose, design      which model navigates best; how many recordings it takes
+              synthesize          recordings from a model
+models        datasheet, export   from a data sheet; to Kalibr, PX4, GTSAM and others
+              tune, require       factors that make a filter consistent; the IMU that an outage needs
+navigation    trajectory          make, check, convert and draw reference trajectories
+              run, compare        INS/GNSS by Monte Carlo or covariance analysis; ratios between runs
+              fuse                recorded IMU and GNSS data
+studies       batch, efficiency   grids of runs on any machines; accuracy of the estimators
+to start      demo, init          the case study of the paper; a directory with files of every kind
+              check, schema       check files; their JSON schemas
+              completions, man    for shells and manuals
+
+first:        nav-sim init study && cd study && nav-sim run trajectories/land_vehicle.toml calib_data/tactical.toml";
 
 /// The whole command line as clap knows it.
 fn command() -> clap::Command {
@@ -168,13 +191,35 @@ fn is_bare_option(word: &OsStr) -> bool {
     text.len() > 2 && text.starts_with("--") && !text.contains('=')
 }
 
+/// Ends the program as clap would, with clearer words where a count or a format is wrong.
+fn end(e: &clap::Error) -> ! {
+    let said = |kind| e.get(kind).map(ToString::to_string).unwrap_or_default();
+    let (option, value) = (said(ContextKind::InvalidArg), said(ContextKind::InvalidValue));
+    let is_count = e.kind() == ErrorKind::ValueValidation
+        && e.source().is_some_and(|source| source.downcast_ref::<ParseIntError>().is_some());
+    let failure = if is_count {
+        Failure::input(format!("{option}: \"{value}\" is not a count")).hint("a whole number such as 100")
+    } else if e.kind() == ErrorKind::InvalidValue && option.starts_with("--format") {
+        Failure::input(format!("--format \"{value}\" is none of text, json, csv (of wv)"))
+            .hint("compare has --table csv, latex and markdown")
+    } else {
+        e.exit()
+    };
+    Printer::plain().failure(&failure);
+    std::process::exit(failure.code().into())
+}
+
 /// Parses the arguments of the process, does what they ask for and maps the outcome to an exit code.
 #[must_use]
 pub fn main() -> ExitCode {
     let given = words(std::env::args_os());
     let words: Vec<String> = given.iter().map(|w| w.to_string_lossy().into_owned()).collect();
+    if given.len() < 2 {
+        let _ = writeln!(std::io::stderr(), "{OVERVIEW}");
+        return ExitCode::from(2);
+    }
     let known = command().color(color_choice(&words)).version(&*version::version(&words).leak());
-    let matches = known.get_matches_from(&given);
+    let matches = known.try_get_matches_from(&given).unwrap_or_else(|e| end(&e));
     let cli = Cli::from_arg_matches(&matches).unwrap_or_else(|e| e.exit());
     let printer = Printer::new(&cli.common);
     if !cli.command.heeds_signals() {

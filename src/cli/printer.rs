@@ -27,6 +27,11 @@ impl Printer {
         Self { quiet: common.quiet, verbose: common.verbose, color, muted: false }
     }
 
+    /// For what is wrong before the flags are read.
+    pub(crate) const fn plain() -> Self {
+        Self { quiet: false, verbose: false, color: false, muted: false }
+    }
+
     /// The same, but results are kept back.
     pub(crate) const fn without_results(self) -> Self {
         Self { muted: true, ..self }

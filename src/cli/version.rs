@@ -17,5 +17,8 @@ pub(super) fn version(words: &[String]) -> String {
     let linked = if cfg!(target_feature = "crt-static") { "static" } else { "dynamic" };
     let profile = if cfg!(debug_assertions) { "debug" } else { "release" };
     let level = Level::best();
-    format!("{number}\nbuild         {profile}, {ARCH}-{OS}-{library}, {linked}\nvector units  {level}")
+    let features = if cfg!(feature = "parquet") { "parquet" } else { "none" };
+    format!(
+        "{number}\nbuild         {profile}, {ARCH}-{OS}-{library}, {linked}\nvector units  {level}\nfeatures      {features}"
+    )
 }

@@ -16,6 +16,8 @@ pub(crate) mod input;
 pub mod model_file;
 pub(crate) mod npy;
 pub(crate) mod parameters_file;
+#[cfg(feature = "parquet")]
+mod parquet_file;
 pub mod recordings;
 pub(crate) mod run_directory;
 mod run_tables;

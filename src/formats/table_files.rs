@@ -1,74 +1,69 @@
-//! Tables as files, written row by row: CSV, JSON (a list of records) and Parquet. The only module that knows
-//! the `parquet` crate.
+//! Tables as files, written row by row: CSV, where asked for JSON (a list of records), and Parquet in builds that have it.
 
 use super::FileError;
 use super::atomic::AtomicDir;
-use crate::report::{TableColumn, TableRow, Value, ValueKind};
-use parquet::basic::{Compression, LogicalType, Repetition, Type as Physical};
-use parquet::column::writer::ColumnWriter;
-use parquet::data_type::ByteArray;
-use parquet::errors::ParquetError;
-use parquet::file::properties::WriterProperties;
-use parquet::file::writer::SerializedFileWriter;
-use parquet::schema::types::Type;
+#[cfg(feature = "parquet")]
+use super::parquet_file::ParquetWriter;
+use crate::report::{TableColumn, TableRow, Value};
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
-use std::sync::Arc;
 
-/// Formats of a table.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum TableFormat {
-    /// Text with a header.
-    Csv,
-    /// A list of objects.
-    Json,
-    /// Apache Parquet, Snappy-compressed.
-    Parquet,
+/// A form of a table.
+pub(super) trait TableWriter {
+    /// Writes rows.
+    fn rows(&mut self, columns: &[TableColumn], rows: &[TableRow]) -> io::Result<()>;
+    /// Ends the file.
+    fn finish(self: Box<Self>) -> io::Result<()>;
 }
 
-impl TableFormat {
-    /// All of them.
-    pub(crate) const ALL: [Self; 3] = [Self::Csv, Self::Json, Self::Parquet];
-
-    const fn ending(self) -> &'static str {
-        match self {
-            Self::Csv => "csv",
-            Self::Json => "json",
-            Self::Parquet => "parquet",
-        }
-    }
-}
-
-/// A table being written, in one or more formats.
+/// A table being written, in all its forms.
 pub(crate) struct TableFiles {
     name: String,
     columns: Vec<TableColumn>,
-    writers: Vec<Writer>,
+    writers: Vec<Box<dyn TableWriter>>,
     rows: Vec<TableRow>,
 }
 
 /// Rows that are written together.
-const GROUP: usize = 1 << 14;
+pub(super) const GROUP: usize = 1 << 14;
 
 impl TableFiles {
-    /// Begins `name.csv`, `name.json`, … in a directory.
+    /// Begins `name.csv` in a directory, and `name.parquet` where this build writes it.
     ///
     /// # Errors
     /// When a file cannot be made.
     pub(crate) fn create(
         directory: &mut AtomicDir,
         name: &str,
-        formats: &[TableFormat],
         columns: Vec<TableColumn>,
     ) -> Result<Self, FileError> {
-        let mut writers = Vec::new();
-        for format in formats {
-            let path = directory.path(&format!("{name}.{}", format.ending()));
-            let made = File::create(&path).and_then(|file| Writer::new(*format, file, &columns));
-            writers.push(made.map_err(|e| FileError::io(&path, e))?);
-        }
-        Ok(Self { name: name.to_owned(), columns, writers, rows: Vec::new() })
+        let mut table = Self { name: name.to_owned(), columns, writers: Vec::new(), rows: Vec::new() };
+        table.begin(directory, "csv", Csv::new)?;
+        #[cfg(feature = "parquet")]
+        table.begin(directory, "parquet", ParquetWriter::new)?;
+        Ok(table)
+    }
+
+    /// Also `name.json`.
+    ///
+    /// # Errors
+    /// When the file cannot be made.
+    pub(crate) fn with_json(mut self, directory: &mut AtomicDir) -> Result<Self, FileError> {
+        self.begin(directory, "json", Json::new)?;
+        Ok(self)
+    }
+
+    fn begin<W: TableWriter + 'static>(
+        &mut self,
+        directory: &mut AtomicDir,
+        ending: &str,
+        writer: impl Fn(File, &[TableColumn]) -> io::Result<W>,
+    ) -> Result<(), FileError> {
+        let path = directory.path(&format!("{}.{ending}", self.name));
+        let made = File::create(&path).and_then(|file| writer(file, &self.columns));
+        self.writers.push(Box::new(made.map_err(|e| FileError::io(&path, e))?));
+        Ok(())
     }
 
     /// Adds rows.
@@ -100,62 +95,59 @@ impl TableFiles {
     pub(crate) fn finish(mut self) -> Result<(), FileError> {
         self.flush()?;
         let name = self.name;
-        let finished = self.writers.into_iter().try_for_each(Writer::finish);
+        let finished = self.writers.into_iter().try_for_each(|writer| writer.finish());
         finished.map_err(|e| FileError::io(Path::new(&name), e))
     }
 }
 
-enum Writer {
-    Csv(BufWriter<File>),
-    Json(BufWriter<File>, bool),
-    Parquet(SerializedFileWriter<File>),
+/// Text with a header.
+struct Csv(BufWriter<File>);
+
+impl Csv {
+    fn new(file: File, columns: &[TableColumn]) -> io::Result<Self> {
+        let mut to = BufWriter::with_capacity(1 << 17, file);
+        let names: Vec<String> = columns.iter().map(|(name, _)| quoted(name)).collect();
+        writeln!(to, "{}", names.join(","))?;
+        Ok(Self(to))
+    }
 }
 
-impl Writer {
-    fn new(format: TableFormat, file: File, columns: &[TableColumn]) -> io::Result<Self> {
-        let buffered = |file| BufWriter::with_capacity(1 << 17, file);
-        match format {
-            TableFormat::Csv => {
-                let mut to = buffered(file);
-                let names: Vec<String> = columns.iter().map(|(name, _)| quoted(name)).collect();
-                writeln!(to, "{}", names.join(","))?;
-                Ok(Self::Csv(to))
-            }
-            TableFormat::Json => {
-                let mut to = buffered(file);
-                to.write_all(b"[")?;
-                Ok(Self::Json(to, true))
-            }
-            TableFormat::Parquet => {
-                let properties = WriterProperties::builder()
-                    .set_compression(Compression::SNAPPY)
-                    .set_created_by(concat!("nav-sim ", env!("CARGO_PKG_VERSION")).to_owned())
-                    .build();
-                let schema = schema(columns).map_err(io::Error::other)?;
-                let writer = SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties));
-                Ok(Self::Parquet(writer.map_err(io::Error::other)?))
-            }
-        }
+impl TableWriter for Csv {
+    fn rows(&mut self, _columns: &[TableColumn], rows: &[TableRow]) -> io::Result<()> {
+        rows.iter().try_for_each(|row| csv_row(&mut self.0, row))
     }
 
+    fn finish(mut self: Box<Self>) -> io::Result<()> {
+        self.0.flush()
+    }
+}
+
+/// A list of objects.
+struct Json {
+    to: BufWriter<File>,
+    is_empty: bool,
+}
+
+impl Json {
+    fn new(file: File, _columns: &[TableColumn]) -> io::Result<Self> {
+        let mut to = BufWriter::with_capacity(1 << 17, file);
+        to.write_all(b"[")?;
+        Ok(Self { to, is_empty: true })
+    }
+}
+
+impl TableWriter for Json {
     fn rows(&mut self, columns: &[TableColumn], rows: &[TableRow]) -> io::Result<()> {
-        match self {
-            Self::Csv(to) => rows.iter().try_for_each(|row| csv_row(to, row)),
-            Self::Json(to, first) => rows.iter().try_for_each(|row| {
-                to.write_all(if std::mem::take(first) { b"\n" } else { b",\n" })?;
-                json_row(to, columns, row)
-            }),
-            Self::Parquet(_) if rows.is_empty() => Ok(()),
-            Self::Parquet(to) => row_group(to, columns.len(), rows).map_err(io::Error::other),
-        }
+        rows.iter().try_for_each(|row| {
+            let separator: &[u8] = if std::mem::take(&mut self.is_empty) { b"\n" } else { b",\n" };
+            self.to.write_all(separator)?;
+            json_row(&mut self.to, columns, row)
+        })
     }
 
-    fn finish(self) -> io::Result<()> {
-        match self {
-            Self::Csv(mut to) => to.flush(),
-            Self::Json(mut to, _) => to.write_all(b"\n]\n").and_then(|()| to.flush()),
-            Self::Parquet(to) => to.close().map(|_| ()).map_err(io::Error::other),
-        }
+    fn finish(mut self: Box<Self>) -> io::Result<()> {
+        self.to.write_all(b"\n]\n")?;
+        self.to.flush()
     }
 }
 
@@ -203,60 +195,10 @@ fn quoted(field: &str) -> String {
     }
 }
 
-fn schema(columns: &[TableColumn]) -> Result<Type, ParquetError> {
-    let field = |(name, kind): &TableColumn| {
-        let physical = match kind {
-            ValueKind::Text => Physical::BYTE_ARRAY,
-            ValueKind::Int => Physical::INT64,
-            ValueKind::Float => Physical::DOUBLE,
-        };
-        let logical = (*kind == ValueKind::Text).then_some(LogicalType::String);
-        let builder = Type::primitive_type_builder(name, physical).with_repetition(Repetition::REQUIRED);
-        builder.with_logical_type(logical).build().map(Arc::new)
-    };
-    let fields = columns.iter().map(field).collect::<Result<Vec<_>, _>>()?;
-    Type::group_type_builder("nav_sim").with_fields(fields).build()
-}
-
-fn row_group(
-    to: &mut SerializedFileWriter<File>,
-    columns: usize,
-    rows: &[TableRow],
-) -> Result<(), ParquetError> {
-    let mut group = to.next_row_group()?;
-    for i in 0..columns {
-        let Some(mut column) = group.next_column()? else { break };
-        match column.untyped() {
-            ColumnWriter::DoubleColumnWriter(writer) => {
-                let float = |row: &TableRow| if let Value::Float(x) = row[i] { x } else { f64::NAN };
-                writer.write_batch(&rows.iter().map(float).collect::<Vec<_>>(), None, None)?;
-            }
-            ColumnWriter::Int64ColumnWriter(writer) => {
-                let int = |row: &TableRow| if let Value::Int(n) = row[i] { n as i64 } else { 0 };
-                writer.write_batch(&rows.iter().map(int).collect::<Vec<_>>(), None, None)?;
-            }
-            ColumnWriter::ByteArrayColumnWriter(writer) => {
-                let text = |row: &TableRow| {
-                    if let Value::Text(t) = &row[i] {
-                        ByteArray::from(t.as_str())
-                    } else {
-                        ByteArray::from("")
-                    }
-                };
-                writer.write_batch(&rows.iter().map(text).collect::<Vec<_>>(), None, None)?;
-            }
-            _ => {}
-        }
-        column.close()?;
-    }
-    group.close().map(|_| ())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use parquet::file::reader::{FileReader, SerializedFileReader};
-    use parquet::record::Field;
+    use crate::report::ValueKind;
 
     const ROWS: usize = GROUP + 3;
 
@@ -270,7 +212,8 @@ mod tests {
         let mut out = AtomicDir::create(&dir.path().join("results")).unwrap();
         let columns = [("name", ValueKind::Text), ("run", ValueKind::Int), ("error_m", ValueKind::Float)];
         let columns = columns.map(|(n, k)| (n.to_owned(), k)).to_vec();
-        let mut table = TableFiles::create(&mut out, "t", &TableFormat::ALL, columns).unwrap();
+        let mut table =
+            TableFiles::create(&mut out, "t", columns).and_then(|table| table.with_json(&mut out)).unwrap();
         table.add((0..ROWS).map(row)).unwrap();
         table.finish().unwrap();
         out.commit().unwrap();
@@ -284,15 +227,7 @@ mod tests {
         let csv: Vec<csv::StringRecord> = csv.records().map(Result::unwrap).collect();
         let json = std::fs::read_to_string(dir.path().join("results/t.json")).unwrap();
         let json: Vec<serde_json::Value> = serde_json::from_str(&json).unwrap();
-        let file = File::open(dir.path().join("results/t.parquet")).unwrap();
-        let parquet = SerializedFileReader::new(file).unwrap();
-        assert_eq!(parquet.num_row_groups(), 2);
-        let parquet: Vec<Vec<Field>> = parquet
-            .get_row_iter(None)
-            .unwrap()
-            .map(|row| row.unwrap().get_column_iter().map(|(_, f)| f.clone()).collect())
-            .collect();
-        assert_eq!([csv.len(), json.len(), parquet.len()], [ROWS; 3]);
+        assert_eq!([csv.len(), json.len()], [ROWS; 2]);
         for k in 0..ROWS {
             let [Value::Text(name), Value::Int(run), Value::Float(x)] = &row(k)[..] else { panic!() };
             assert_eq!((&csv[k][0], &csv[k][1]), (name.as_str(), run.to_string().as_str()));
@@ -302,7 +237,23 @@ mod tests {
                 (Some(name.as_str()), Some(*run))
             );
             assert_eq!(json[k]["error_m"].as_f64(), x.is_finite().then_some(*x));
-            let [Field::Str(n), Field::Long(r), Field::Double(y)] = &parquet[k][..] else { panic!() };
+        }
+    }
+
+    #[cfg(feature = "parquet")]
+    #[test]
+    fn parquet_holds_the_same_numbers() {
+        use parquet::file::reader::{FileReader, SerializedFileReader};
+        use parquet::record::Field;
+        let dir = written();
+        let file = File::open(dir.path().join("results/t.parquet")).unwrap();
+        let reader = SerializedFileReader::new(file).unwrap();
+        assert_eq!(reader.num_row_groups(), 2);
+        for (k, found) in reader.get_row_iter(None).unwrap().enumerate() {
+            let found: Vec<Field> =
+                found.unwrap().get_column_iter().map(|(_, field)| field.clone()).collect();
+            let [Value::Text(name), Value::Int(run), Value::Float(x)] = &row(k)[..] else { panic!() };
+            let [Field::Str(n), Field::Long(r), Field::Double(y)] = &found[..] else { panic!() };
             assert_eq!((n, *r as u64, y.to_bits()), (name, *run, x.to_bits()));
         }
     }
@@ -310,10 +261,11 @@ mod tests {
     #[test]
     fn the_same_rows_are_the_same_bytes() {
         let (a, b) = (written(), written());
-        for name in ["t.csv", "t.json", "t.parquet"] {
+        for entry in std::fs::read_dir(a.path().join("results")).unwrap() {
+            let name = entry.unwrap().file_name();
             let bytes =
-                |dir: &tempfile::TempDir| std::fs::read(dir.path().join("results").join(name)).unwrap();
-            assert_eq!(bytes(&a), bytes(&b), "{name}");
+                |dir: &tempfile::TempDir| std::fs::read(dir.path().join("results").join(&name)).unwrap();
+            assert_eq!(bytes(&a), bytes(&b), "{name:?}");
         }
     }
 }

@@ -74,10 +74,11 @@ pub(crate) use replicates::describe_replicates;
 pub use run_directory::{OutputFile, run_directory};
 pub(crate) use run_directory::{RUN_FILES, json, summary_json};
 pub(crate) use signals::{intervals_note, signal_rows, signals_csv, signals_digest, signals_per_file};
+#[cfg(any(test, feature = "parquet"))]
+pub(crate) use study::ValueKind;
 pub(crate) use study::{
-    ColumnResult, ShownCell, ShownColumn, TableColumn, TableRow, Value, ValueKind, drift_table,
-    epoch_columns, epoch_rows, outage_columns, outage_rows, ratio_table, run_columns, run_rows,
-    verdict_table,
+    ColumnResult, ShownCell, ShownColumn, TableColumn, TableRow, Value, drift_table, epoch_columns,
+    epoch_rows, outage_columns, outage_rows, ratio_table, run_columns, run_rows, verdict_table,
 };
 pub use trajectory::TrajectorySeries;
 pub(crate) use trajectory::trajectory_svg;

@@ -150,15 +150,6 @@ impl Planned {
         self.plan.units(&self.grid).map(|unit| self.plan.unit_s(&self.grid, unit)).sum()
     }
 
-    /// What the longest unit takes by the plan's probe (s) on so many threads.
-    pub(crate) fn longest_unit_s(&self, threads: u64) -> f64 {
-        let wall_s = |unit: Unit| {
-            let batches = unit.runs.div_ceil(self.plan.lanes());
-            self.plan.unit_s(&self.grid, unit) / threads.clamp(1, batches.max(1)) as f64
-        };
-        self.plan.units(&self.grid).map(wall_s).fold(0.0, f64::max)
-    }
-
     /// The units of the plan and what is there of them: all of them are read.
     ///
     /// # Errors

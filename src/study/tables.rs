@@ -5,7 +5,7 @@ use super::description::Metric;
 use super::failure::StudyError;
 use super::planned::Planned;
 use crate::formats::atomic::AtomicDir;
-use crate::formats::table_files::{TableFiles, TableFormat};
+use crate::formats::table_files::TableFiles;
 use crate::report::{self, BeyondLinearPlaces, RankedPlace, ShownCell, markdown, markdown_table};
 
 /// The tables being written.
@@ -17,14 +17,13 @@ pub(super) struct Tables {
 
 impl Tables {
     pub(super) fn create(out: &mut AtomicDir, planned: &Planned) -> Result<Self, StudyError> {
-        let outages = TableFiles::create(out, "outages", &TableFormat::ALL, report::outage_columns())?;
-        let runs = TableFiles::create(out, "runs", &[TableFormat::Parquet], report::run_columns())?;
-        let formats = [TableFormat::Csv, TableFormat::Parquet];
+        let outages = TableFiles::create(out, "outages", report::outage_columns())?.with_json(out)?;
+        let runs = TableFiles::create(out, "runs", report::run_columns())?;
         let epochs = planned
             .plan
             .study
             .keeps(Metric::Epochs)
-            .then(|| TableFiles::create(out, "epochs", &formats, report::epoch_columns()));
+            .then(|| TableFiles::create(out, "epochs", report::epoch_columns()));
         Ok(Self { outages, runs, epochs: epochs.transpose()? })
     }
 

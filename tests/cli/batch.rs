@@ -7,17 +7,8 @@ use crate::common::batch::*;
 use std::fs;
 use std::path::Path;
 
-const FILES: [&str; 9] = [
-    "epochs.csv",
-    "epochs.parquet",
-    "outages.csv",
-    "outages.json",
-    "outages.parquet",
-    "report.html",
-    "runs.parquet",
-    "study.json",
-    "tables.md",
-];
+const FILES: [&str; 7] =
+    ["epochs.csv", "outages.csv", "outages.json", "report.html", "runs.csv", "study.json", "tables.md"];
 
 /// Plans and runs the study in one process.
 fn whole(dir: &Path, out: &str) -> Vec<(String, Vec<u8>)> {

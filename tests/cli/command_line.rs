@@ -14,7 +14,10 @@ fn usage_errors_exit_with_2_and_suggest() {
     let said = String::from_utf8(output.stderr).unwrap();
     assert_eq!(output.status.code(), Some(2));
     assert!(said.contains("error: unrecognized subcommand") && said.contains("'compare'"), "{said}");
-    assert_eq!(nav_sim().output().unwrap().status.code(), Some(2));
+    let alone = nav_sim().output().unwrap();
+    let overview = String::from_utf8(alone.stderr).unwrap();
+    assert_eq!(alone.status.code(), Some(2));
+    assert!(overview.lines().count() <= 20 && overview.contains("calibrate"), "{overview}");
 }
 
 #[test]
@@ -180,6 +183,8 @@ fn the_version_says_more_if_asked() {
 fn negative_values_are_refused_in_the_words_of_their_option() {
     for (arguments, reason) in [
         ("run a.toml b.toml --seed -1", "not a whole number from 0 to"),
+        ("run a.toml b.toml --runs -3", "\"-3\" is not a count\n\nhint: a whole number"),
+        ("compare a --reference b --format latex", "compare has --table csv, latex and markdown"),
         ("calibrate a --skip-s -5", "not a finite number ≥ 0"),
         ("design a --recordings 3 --hours -2", "not a finite number > 0"),
         ("require a.toml --outage 60 --p95-m -3", "not a finite number > 0"),

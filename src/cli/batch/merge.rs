@@ -8,8 +8,8 @@ use serde_json::json;
 
 /// Write the tables of a finished study: outages, ratios to the reference, epochs, runs
 ///
-/// Writes results/ in the directory of the study: outages.csv, .json and .parquet (one row for each outage
-/// of each candidate in each cell), runs.parquet, epochs.csv and .parquet if the study asks for them, tables.md, report.html. The
+/// Writes results/ in the directory of the study: outages.csv and .json (one row for each outage of each candidate in
+/// each cell), runs.csv, epochs.csv if the study asks for it, tables.md, report.html. The
 /// bytes depend on the plan alone, not on how it was run. Ratios are taken within a filter: column `reference`
 /// names the candidate they refer to, in the row's own filter. Nothing is written while units are missing: they
 /// are listed with --verbose or --format json, and the exit code is 1.
@@ -46,7 +46,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         return Ok(());
     }
     let failure = Failure::bound(format!("{} runs diverged", merged.diverged));
-    Err(failure.hint("they are in runs.parquet, diverged = 1, and in no other number"))
+    Err(failure.hint("they are in runs.csv, diverged = 1, and in no other number"))
 }
 
 /// Lines that are shown unless all are asked for.

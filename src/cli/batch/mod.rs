@@ -1,6 +1,5 @@
 //! `nav-sim batch`: grids of experiments in units that survive, resume and spread over machines.
 
-mod emit;
 mod merge;
 mod plan;
 mod run;
@@ -8,8 +7,6 @@ mod shard;
 mod status;
 mod verify;
 mod watch;
-
-pub(super) use emit::shell_words;
 
 use super::{Failure, Session, read};
 use crate::study::{Planned, StudyError};
@@ -39,7 +36,6 @@ enum Command {
     Merge(merge::Args),
     Status(status::Args),
     Verify(verify::Args),
-    Emit(emit::Args),
 }
 
 impl Args {
@@ -56,7 +52,6 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         Command::Merge(args) => merge::run(args, session),
         Command::Status(args) => status::run(args, session),
         Command::Verify(args) => verify::run(args, session),
-        Command::Emit(args) => emit::run(args, session),
     }
 }
 

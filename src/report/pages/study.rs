@@ -46,7 +46,7 @@ pub(crate) fn study_page(
     if more > 0 {
         page.text(&format!("{more} more cells are in outages.csv."));
     }
-    page.text("All numbers: outages.csv, outages.json, runs.parquet.");
+    page.text("All numbers: outages.csv, outages.json, runs.csv.");
     page.html()
 }
 

@@ -93,47 +93,6 @@ fn shipped_studies_are_studies_and_their_schema_knows_their_keys() {
     }
 }
 
-#[test]
-fn scripts_for_schedulers_are_well_formed() {
-    let place = place();
-    let dir = place.path();
-    for (target, shell) in
-        [("slurm", true), ("pbs", true), ("local", true), ("k8s", false), ("hyperqueue", false)]
-    {
-        let output = batch(dir, &format!("emit {target} study.toml -o out --shards 3 --time 90m"));
-        assert!(output.status.success());
-        let script = String::from_utf8(output.stdout).unwrap();
-        assert!(script.contains("--shards 3") || script.contains("\"--shards\", \"3\"") || target == "local");
-        fs::write(dir.join("script"), &script).unwrap();
-        if shell {
-            assert!(
-                std::process::Command::new("bash")
-                    .args(["-n", "script"])
-                    .current_dir(dir)
-                    .status()
-                    .unwrap()
-                    .success()
-            );
-        }
-    }
-    // a task that can finish no unit
-    fs::write(
-        dir.join("long.toml"),
-        STUDY.replace("_runs = 8", "_runs = 1000000").replace("= 77", "= 1000000"),
-    )
-    .unwrap();
-    done(dir, "plan long.toml -o long");
-    let said = refused(dir, "emit slurm long.toml -o long --time 2s", 2);
-    assert!(said.contains("a task works for 2 s, but a unit takes about"), "{said}");
-    fs::write(dir.join("script"), batch(dir, "emit local study.toml -o out --shards 2").stdout).unwrap();
-    let bin = Path::new(env!("CARGO_BIN_EXE_nav-sim")).parent().unwrap().display().to_string();
-    let path = format!("{bin}:{}", std::env::var("PATH").unwrap());
-    let ran =
-        std::process::Command::new("bash").arg("script").current_dir(dir).env("PATH", path).output().unwrap();
-    assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
-    assert!(dir.join("out/results/outages.csv").exists());
-}
-
 /// As `run` does: by the key of the receiver's rate, with what helps; the full filter takes it.
 #[test]
 fn fixes_too_rare_for_the_reduction_are_blamed_on_their_rate() {
