@@ -59,7 +59,7 @@ pub struct Status {
 }
 
 /// The plan in a directory, if there is one.
-pub(crate) fn plan_in(directory: &Path) -> Result<Option<Plan>, FileError> {
+pub(super) fn plan_in(directory: &Path) -> Result<Option<Plan>, FileError> {
     let path = directory.join("plan.json");
     let text = match source::text(&path) {
         Ok(text) => text,
