@@ -2,7 +2,7 @@
 //! of it four times as strong, and the other errors that the true IMU and the receiver can have.
 //!
 //! `cargo run --release --example 07_lincov_against_runs -- RUNS TRAJECTORY… TRUTH…` (default 2000, the three shipped
-//! trajectories, all truths). Every ten seconds: the largest departure of the ASEE in per cent, and since when it is within half a per cent; the
+//! trajectories, all truths). Every ten seconds: the largest departure of the ASEE in per cent, and since when it is within two; the
 //! largest departures of RMSE (nine states), NEES and coverage in Monte-Carlo standard errors, and how many of how many
 //! RMSE are beyond four of them. At the ends of the outages: how far the number of runs below the expected p50 and p95 of the
 //! horizontal error is from its binomial mean, in standard deviations. Every truth has random numbers of its own.
@@ -42,8 +42,9 @@ const BESIDE: [(&str, &str); 5] = [
     ("lever arm", "gnss = { lever_arm_m = [1.0, -0.5, -1.2] }"),
 ];
 
-/// How far the ASEE of the runs may be from the expected one (per cent).
-const AIM: f64 = 0.5;
+/// How far the ASEE of the runs may be from the expected one (per cent): what attitude errors do to second order, in the
+/// velocity down before all, is not in linear theory.
+const AIM: f64 = 2.0;
 /// Every how many epochs of a second runs and expectation are compared.
 const EVERY_S: usize = 10;
 

@@ -137,7 +137,6 @@ impl Compared {
     fn text(&self) -> String {
         let Comparison { file, candidates, outages, .. } = &self.found;
         let mut lines = report::verdict_lines(&file.verdicts);
-        lines.extend(file.beyond_linear.clone());
         if candidates.iter().any(|c| !c.outages.is_empty()) {
             lines.push(format!(
                 "ASEE against {}, mean over the outage, % (in parentheses: mean size of the deviations; {}):",

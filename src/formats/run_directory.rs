@@ -3,7 +3,7 @@
 use super::run_tables::{REPEAT, parse_epochs, parse_runs};
 use super::{FileError, Place, atomic, hash, source};
 use crate::report::Manifest;
-use nav_sim_navigation::metrics::{EpochRow, Measured, OutageSecondOrder, PerState, Verdict};
+use nav_sim_navigation::metrics::{EpochRow, Measured, PerState, Verdict};
 use nav_sim_navigation::scenario::Method;
 use nav_sim_navigation::simulation::{OutageRecord, RunRecord};
 use std::path::Path;
@@ -20,8 +20,6 @@ pub(crate) struct RunDirectory {
     pub experiment: Measured,
     /// Whether the filter is as good as it believes: as its own command found it, covariance analysis included.
     pub verdict: Verdict,
-    /// What the errors of each outage have of second order.
-    pub second_order: Vec<OutageSecondOrder>,
     /// 95 % interval of the mean ASEE over each outage by what the calibration leaves open, where it is known.
     pub asee_mean_ci95: Vec<OpenEnds>,
 }
@@ -48,8 +46,7 @@ pub(crate) fn read(directory: &Path) -> Result<RunDirectory, FileError> {
         as_written(directory, &manifest, "runs.csv", &runs_text)?;
         runs
     };
-    let (verdict, found_of_outages) = found(directory, &manifest)?;
-    let (second_order, asee_mean_ci95) = found_of_outages.into_iter().unzip();
+    let (verdict, asee_mean_ci95) = found(directory, &manifest)?;
     let outages = manifest.configuration.outage.iter().flatten().map(|o| (o.start_s, o.end_s)).collect();
     let independent_windows = manifest.independent_windows;
     let experiment = Measured {
@@ -60,14 +57,11 @@ pub(crate) fn read(directory: &Path) -> Result<RunDirectory, FileError> {
         is_expected,
         beyond_linear: verdict.beyond_linear,
     };
-    Ok(RunDirectory { manifest, experiment, verdict, second_order, asee_mean_ci95 })
+    Ok(RunDirectory { manifest, experiment, verdict, asee_mean_ci95 })
 }
 
-/// The verdict; what is of second order and what the calibration leaves open, outage by outage, from the summary.
-fn found(
-    directory: &Path,
-    manifest: &Manifest,
-) -> Result<(Verdict, Vec<(OutageSecondOrder, OpenEnds)>), FileError> {
+/// The verdict, and the intervals that the calibration leaves outage by outage, from the summary.
+fn found(directory: &Path, manifest: &Manifest) -> Result<(Verdict, Vec<OpenEnds>), FileError> {
     #[derive(serde::Deserialize)]
     struct Found {
         verdict: Verdict,
@@ -75,14 +69,12 @@ fn found(
     }
     #[derive(serde::Deserialize)]
     struct FoundOutage {
-        #[serde(flatten)]
-        second_order: OutageSecondOrder,
         asee_mean_ci95: Option<PerState<(f64, f64)>>,
     }
     let (path, summary) = text(directory, "summary.json")?;
     let found: Found = serde_json::from_str(&summary).map_err(|e| not_json(&path, &e))?;
     as_written(directory, manifest, "summary.json", &summary)?;
-    Ok((found.verdict, found.outages.into_iter().map(|o| (o.second_order, o.asee_mean_ci95)).collect()))
+    Ok((found.verdict, found.outages.into_iter().map(|o| o.asee_mean_ci95).collect()))
 }
 
 /// Refuses a file that is not the one the manifest tells of; what can be read of it was, for a more exact message.

@@ -2,10 +2,7 @@
 
 use super::JobError;
 use crate::formats::run_directory::{self, RunDirectory};
-use crate::report::{
-    BeyondLinear, BeyondLinearPlaces, CandidateResult, ComparisonFile, Label, Manifest, OF_A_VERDICT,
-    RatioCurves, short_names,
-};
+use crate::report::{CandidateResult, ComparisonFile, Label, Manifest, RatioCurves};
 use nav_sim_navigation::metrics;
 use nav_sim_navigation::scenario::Method;
 use std::path::{Path, PathBuf};
@@ -34,7 +31,6 @@ pub(crate) fn compare(runs: &[PathBuf], reference: &Path) -> Result<Comparison, 
     let name = reference.display().to_string();
     let directory = run_directory::read(reference)?;
     let (mut candidates, mut curves, mut doubts) = (Vec::new(), Vec::new(), Vec::new());
-    let mut beyond = vec![(name.clone(), beyond_linear(&directory))];
     for path in runs {
         let run = path.display().to_string();
         let candidate = run_directory::read(path)?;
@@ -46,28 +42,12 @@ pub(crate) fn compare(runs: &[PathBuf], reference: &Path) -> Result<Comparison, 
         }
         let is_paired = differences.is_empty();
         let is_reference = is_same_place(path, reference);
-        if !is_reference {
-            beyond.push((run.clone(), beyond_linear(&candidate)));
-        }
         candidates.push(compared(run, &candidate, &directory, is_paired, is_reference)?);
         curves.push(RatioCurves::of(&candidate.experiment, &directory.experiment));
     }
     let is_paired = candidates.iter().all(|candidate| candidate.is_paired);
-    let mut file = ComparisonFile::new((&name, &directory.verdict), is_paired, &candidates);
-    let names = short_names(&beyond.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>());
-    let mut places = BeyondLinearPlaces::default();
-    for (name, (_, found)) in names.iter().zip(beyond) {
-        places.add(name, found.into_iter().map(|beyond| (name.clone(), beyond)));
-    }
-    file.beyond_linear = places.line("runs", OF_A_VERDICT);
+    let file = ComparisonFile::new((&name, &directory.verdict), is_paired, &candidates);
     Ok(Comparison { file, candidates, curves, outages: directory.experiment.outages, doubts })
-}
-
-/// The outages in which a verdict of covariance analysis is beyond linear theory.
-fn beyond_linear(run: &RunDirectory) -> Vec<BeyondLinear> {
-    let outages = run.experiment.outages.iter().copied().zip(&run.second_order);
-    let of_analysis = outages.filter(|_| run.verdict.is_expected());
-    BeyondLinear::among(of_analysis)
 }
 
 /// One run.

@@ -165,10 +165,6 @@ pub fn navigate(
         }
     };
     navigation.summary.reduction = reduction;
-    navigation.summary.measure_second_order(&assessment.outage_ends);
-    if let Some(baro) = &scenario.baro {
-        navigation.summary.see_height(baro);
-    }
     // Which fixes a gate refuses is drawn with the errors: the gains of such a filter are not those of the analysis.
     if scenario.filter.nis_gate.is_none() {
         analysis.add_budgets(&mut navigation.summary, &belief);

@@ -195,7 +195,7 @@ impl Requirements {
         let belief = scenario.belief(model, &outages, &track)?;
         let experiment = scenario.experiment(&self.trajectory, Truth::Model(model), &[], &outages, 0);
         let Some(expected) = Expected::along(&track, &experiment, &belief, model) else { return Ok(None) };
-        Ok(expected.outages.first().and_then(|o| BeyondLinear::of((o.start_s, o.end_s), &o.second_order)))
+        Ok(expected.outages.first().and_then(BeyondLinear::of))
     }
 
     /// How units do after the outage and after those of `CURVE_S`, the best first: those that keep the limits, those

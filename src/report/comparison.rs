@@ -74,9 +74,6 @@ pub(crate) struct ComparisonFile {
     pub rows: Vec<Row>,
     /// One row a run and outage.
     pub consistency: Vec<ConsistencyRow>,
-    /// Where verdicts of covariance analysis are beyond linear theory, in words.
-    #[serde(skip)]
-    pub beyond_linear: Option<String>,
 }
 
 /// Whether the filter of a run is as good as it believes.
@@ -145,7 +142,6 @@ impl ComparisonFile {
             verdicts: std::iter::once(reference_row).chain(verdicts).collect(),
             rows: Vec::new(),
             consistency: Vec::new(),
-            beyond_linear: None,
         };
         for candidate in candidates {
             for (outage, comparison) in candidate.outages.iter().enumerate() {

@@ -39,7 +39,7 @@ mod warm_up;
 use nav_sim_document::Document;
 use serde::Serialize;
 
-pub(crate) use beyond_linear::{BeyondLinear, BeyondLinearPlaces, OF_A_VERDICT};
+pub(crate) use beyond_linear::BeyondLinear;
 pub(crate) use brief::brief;
 pub(crate) use choose::{ChoiceReport, RankedPlace};
 pub(crate) use closure::TrajectoryCheck;

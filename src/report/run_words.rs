@@ -4,7 +4,7 @@ use super::markdown_table as table;
 use super::number::{readable, window};
 use super::requirement::requirement_line;
 use super::verdict::verdict_lines;
-use nav_sim_navigation::metrics::{Agreement, Budget, OutageSummary, PerState, SettlingSecondOrder, Summary};
+use nav_sim_navigation::metrics::{Agreement, Budget, OutageSummary, PerState, Summary};
 use nav_sim_navigation::scenario::Method;
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 
@@ -12,7 +12,6 @@ use nav_sim_navigation::simulation::REPORTED_NAMES;
 pub(crate) fn text(summary: &Summary) -> String {
     let mut text = format!("verdict: {}\n", verdict_lines(summary).join("\n"));
     summary.require.iter().for_each(|met| text += &format!("{}\n", requirement_line(met, summary)));
-    text += &beyond_linear(summary).map_or_else(String::new, |words| format!("{words}\n"));
     text += &format!("{}\n", how(summary));
     if summary.runs > 0 && summary.diverged == summary.runs {
         return text.trim_end().to_owned();
@@ -49,86 +48,6 @@ pub(crate) fn text(summary: &Summary) -> String {
         text += &format!("\nruns against the covariance analysis: {}", agreement_line(agreement));
     }
     text
-}
-
-/// Where errors are too large for a linear filter, and for covariance analysis: the outages where it is worst.
-pub(crate) fn beyond_linear(summary: &Summary) -> Option<String> {
-    let lines: Vec<String> =
-        [beyond_at_start(summary), beyond_vertically(summary), beyond_horizontally(summary)]
-            .into_iter()
-            .flatten()
-            .collect();
-    (!lines.is_empty()).then(|| lines.join("\n"))
-}
-
-fn beyond_at_start(summary: &Summary) -> Option<String> {
-    let SettlingSecondOrder { state, share, until_s } = summary.settling?;
-    let than = if share > 0.0 { "smaller" } else { "larger" };
-    let how = match summary.is_analysed() {
-        true => {
-            "; true errors and NEES are larger there than covariance analysis says, and --method both shows by how much"
-        }
-        false => "",
-    };
-    Some(format!(
-        "beyond linear: while the attitude of the start settles, until {} s, the filters of runs state a standard deviation of {state} up to \
-         {:.0} % {than} than linear theory, since they take attitude errors for accelerations{how}. A better initial attitude (a smaller \
-         initial.att_sigma_deg), or accelerometers with a smaller turn-on bias, remove it",
-        readable(until_s),
-        100.0 * share.abs()
-    ))
-}
-
-fn beyond_vertically(summary: &Summary) -> Option<String> {
-    let beyond = summary.outages.iter().filter_map(|o| Some((o, o.second_order.beyond_linear()?)));
-    let (outage, sigmas) = beyond.max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let of_analysis = match summary.is_analysed() {
-        true => {
-            "Covariance analysis has this in the RMSE and ASEE of position and velocity down up to the outage's end, but neither in NEES \
-             and coverage nor in what the first fixes make of it; its horizontal errors and angles hold to a tenth. "
-        }
-        false => "",
-    };
-    Some(format!(
-        "beyond linear: attitude errors in the outage {} shift the velocity down by {} m/s to second order, {} times the \
-         standard deviation that linear theory gives it. {of_analysis}For some minutes after the outage the velocity down and the vertical \
-         accelerometer bias can be twice as wrong as believed. A shorter outage or {} removes it, and so does a barometer, unless the \
-         accelerometer is so quiet that the filter takes no bias for its cause",
-        window(outage.start_s, outage.end_s),
-        readable(outage.second_order.vel_d_m_s),
-        readable(sigmas),
-        smaller(outage, &TILT)
-    ))
-}
-
-fn beyond_horizontally(summary: &Summary) -> Option<String> {
-    let beyond =
-        summary.outages.iter().filter_map(|o| Some((o, o.second_order.beyond_linear_horizontally()?)));
-    let (outage, nees) = beyond.max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let of_analysis = if summary.is_analysed() { ", which covariance analysis does not contain" } else { "" };
-    Some(format!(
-        "beyond linear: heading error times tilt in the outage {} shifts horizontal velocity and position to second order, by which the \
-         NEES is larger by up to about {}{of_analysis}. A shorter outage or {} removes it",
-        window(outage.start_s, outage.end_s),
-        readable(nees),
-        smaller(outage, &[YAW])
-    ))
-}
-
-/// Roll and pitch, and yaw, among the reported states.
-const TILT: [usize; 2] = [6, 7];
-const YAW: usize = 8;
-
-/// What makes these attitude errors smaller: where most of them was there at the start, no gyroscope.
-fn smaller(outage: &OutageSummary, states: &[usize]) -> &'static str {
-    let largest = outage.budget.as_ref().and_then(|b| Some(b.ranked(states).first()?.0));
-    match largest {
-        Some(name) if name.starts_with("accel") => "a better accelerometer",
-        Some("initial") => {
-            "a better initial attitude (fixes before the outage, a smaller initial.att_sigma_deg)"
-        }
-        _ => "a better gyroscope",
-    }
 }
 
 /// What the calibrations leave open: a line for each of the first outages.

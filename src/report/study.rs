@@ -1,7 +1,6 @@
 //! Tables of studies: one row a cell, column and outage (and epoch, and run). Every column has its unit in
 //! its name; numbers that do not exist are NaN (null in JSON).
 
-use super::beyond_linear::BeyondLinear;
 use super::comparison::{CandidateResult, Label};
 use super::comparison_table::{table_rows, with_times};
 use super::number::{readable, window};
@@ -256,21 +255,6 @@ pub(crate) struct ShownCell {
     pub name: String,
     /// Its columns.
     pub columns: Vec<ShownColumn>,
-}
-
-impl ShownCell {
-    /// The outages in which covariance analysis is beyond linear theory, column by column.
-    pub(crate) fn beyond_linear(&self) -> Vec<(String, BeyondLinear)> {
-        let of_column = |column: &ShownColumn| {
-            let outages = column.outages.iter().map(|o| ((o.start_s, o.end_s), &o.second_order));
-            let name = format!("{}, {}", self.name, column.name);
-            BeyondLinear::among(outages)
-                .into_iter()
-                .map(move |beyond| (name.clone(), beyond))
-                .collect::<Vec<_>>()
-        };
-        self.columns.iter().flat_map(of_column).collect()
-    }
 }
 
 /// The layout of the paper's Table I for one cell, a candidate (with its filter, where there are several) in the place of

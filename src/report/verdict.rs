@@ -47,7 +47,7 @@ fn words(summary: &Summary) -> String {
             let percent = 100.0 * (verdict.detectable_state_ratio - 1.0);
             let needed = verdict.runs_to_decide.unwrap_or_default();
             format!(
-                "undecided: {} cannot tell errors below {percent:.0} % in one state; {needed} would decide",
+                "undecided: {} miss errors below {percent:.0} % in one state; {needed} would decide",
                 independent(verdict.independent_runs)
             )
         }
@@ -74,7 +74,7 @@ fn beyond(verdict: &Verdict, outages: &[(f64, f64)]) -> String {
 
 fn independent(runs: f64) -> String {
     match runs {
-        1.0 => "one run".to_owned(),
+        1.0 => "1 run".to_owned(),
         _ if runs.fract() == 0.0 => format!("{runs} runs"),
         _ => format!("runs worth {runs:.1} independent ones"),
     }
@@ -158,7 +158,7 @@ mod tests {
         assert!(line(100, 0.5).starts_with("underconfident: errors 0.500"), "{}", line(100, 0.5));
         assert!(line(100, 12.0).starts_with("overconfident by far: "), "{}", line(100, 12.0));
         let few = line(8, 1.0);
-        assert!(few.starts_with("undecided: 8 runs cannot tell") && few.ends_with(" would decide"), "{few}");
+        assert!(few.starts_with("undecided: 8 runs miss") && few.ends_with(" would decide"), "{few}");
     }
 
     /// The word of covariance analysis stands beside the verdict; what the runs contradict comes first.

@@ -47,13 +47,6 @@ sources! {
     Maybeck79;
     /// J. P. Imhof: *Computing the distribution of quadratic forms in normal variables*, Biometrika 48, 1961.
     Imhof61;
-    /// L. Isserlis: *On a formula for the product-moment coefficient of any order of a normal frequency distribution
-    /// in any number of variables*, Biometrika 12, 1918.
-    Isserlis18;
-    /// M. Loève: *Probability Theory II*, 4th ed., Springer, 1978, section 37.5.
-    Loeve78;
-    /// R. L. Plackett, J. P. Burman: *The design of optimum multifactorial experiments*, Biometrika 33, 1946.
-    PlackettBurman46;
     /// J. A. C. Weideman, L. N. Trefethen: *Parabolic and hyperbolic contours for computing the Bromwich integral*,
     /// Math. Comp. 76, 2007.
     WeidemanTrefethen07;

@@ -6,7 +6,7 @@ use super::failure::StudyError;
 use super::planned::Planned;
 use crate::formats::atomic::AtomicDir;
 use crate::formats::table_files::TableFiles;
-use crate::report::{self, BeyondLinearPlaces, RankedPlace, ShownCell, markdown, markdown_table};
+use crate::report::{self, RankedPlace, ShownCell, markdown, markdown_table};
 
 /// The tables being written.
 pub(super) struct Tables {
@@ -51,8 +51,6 @@ pub(super) struct Texts {
     intervals: &'static str,
     cells: Vec<ShownCell>,
     more: usize,
-    /// Where covariance analysis is beyond linear theory, of all cells.
-    beyond: BeyondLinearPlaces,
     /// Where recordings are left out: which candidate is best, place by place.
     pub(super) rankings: Vec<RankedPlace>,
 }
@@ -69,13 +67,11 @@ impl Texts {
             intervals,
             cells: Vec::new(),
             more: 0,
-            beyond: BeyondLinearPlaces::default(),
             rankings: Vec::new(),
         }
     }
 
     pub(super) fn add(&mut self, cell: ShownCell) {
-        self.beyond.add(&cell.name, cell.beyond_linear());
         if self.cells.len() < SHOWN {
             self.cells.push(cell);
         } else {
@@ -84,18 +80,7 @@ impl Texts {
     }
 
     pub(super) fn page(&self, states: &[usize]) -> String {
-        report::study_page(
-            &self.cells,
-            &self.reference,
-            states,
-            self.more,
-            &self.rankings,
-            self.beyond_linear(),
-        )
-    }
-
-    fn beyond_linear(&self) -> Option<String> {
-        self.beyond.line("cells", report::OF_A_VERDICT)
+        report::study_page(&self.cells, &self.reference, states, self.more, &self.rankings)
     }
 
     pub(super) fn render(&self, states: &[usize]) -> String {
@@ -108,9 +93,6 @@ impl Texts {
         text += "Verdict on each filter: NEES over the run (9 if right), error over its standard deviation in the \
                  state that is farthest off\n\n";
         text += &markdown_table(&report::verdict_table(&self.cells));
-        if let Some(line) = self.beyond_linear() {
-            text += &format!("\n\n{}", markdown(&line));
-        }
         text += "\n\nHorizontal error before the first fix after the outage, median (95 %), m\n\n";
         text += &markdown_table(&report::drift_table(&self.cells));
         let has_ratios = |cell: &&ShownCell| cell.columns.len() > 1 && cell.columns[0].comparison.is_some();

@@ -263,7 +263,6 @@ fn expected(head: &ColumnHead, words: &mut Words<'_>) -> Expected {
         record,
         outages,
         // The tables of studies are of outages: of the start a unit keeps no words.
-        settling: None,
         filter_states: head.filter_states,
         fix_components: head.fix_components,
         coverage_level: head.coverage_level,

@@ -1,7 +1,7 @@
 //! The numbers of a unit file, eight bytes each: integers and floating point, little-endian.
 
 use nav_sim_navigation::metrics::{
-    EpochMetrics, Estimate, Expected, OutageMetrics, OutageSecondOrder, PerState, Quantile, Reconvergence,
+    EpochMetrics, Estimate, Expected, OutageMetrics, PerState, Quantile, Reconvergence,
 };
 use nav_sim_navigation::simulation::{BIASES, EpochSums, OutageRecord, REPORTED, RunRecord};
 
@@ -10,7 +10,7 @@ pub(super) const OUTAGE: usize = 3 * REPORTED + 4;
 pub(super) const EPOCH: usize = 4 + 5 * REPORTED + BIASES + 6;
 pub(super) const RUN: usize = 7 + REPORTED;
 /// Numbers of an outage and an epoch of a covariance analysis.
-pub(super) const EXPECTED_OUTAGE: usize = 4 * REPORTED + 8;
+pub(super) const EXPECTED_OUTAGE: usize = 4 * REPORTED + 6;
 pub(super) const EXPECTED_EPOCH: usize = 3 * REPORTED + BIASES + 6;
 
 fn put(bytes: &mut Vec<u8>, values: &[f64]) {
@@ -55,8 +55,7 @@ pub(super) fn put_expected(bytes: &mut Vec<u8>, expected: &Expected) {
         let p999 = o.horizontal_p999_m.unwrap_or(f64::NAN);
         put(bytes, &[o.nees_end.value, o.log_density_end.value]);
         put(bytes, &[o.horizontal_p50_m.value, o.horizontal_p95_m.value, p999]);
-        let OutageSecondOrder { vel_d_m_s, linear_vel_d_m_s, nees, .. } = o.second_order;
-        put(bytes, &[vel_d_m_s, linear_vel_d_m_s, nees]);
+        bytes.extend(u64::from(o.beyond_linear).to_le_bytes());
     }
     for e in &expected.epochs {
         put(bytes, &[e.t_s]);
@@ -162,12 +161,7 @@ pub(super) fn expected_outage((start_s, end_s): (f64, f64), words: &mut Words<'_
         horizontal_p95_m: words.quantile(),
         horizontal_p999_m: Some(words.float()),
         horizontal_max_m: f64::NAN,
-        second_order: OutageSecondOrder {
-            vel_d_m_s: words.float(),
-            linear_vel_d_m_s: words.float(),
-            nees: words.float(),
-            ..OutageSecondOrder::UNKNOWN
-        },
+        beyond_linear: words.int() != 0,
         reconvergence: Reconvergence { p50_s: unknown, p95_s: unknown, never: None },
     }
 }

@@ -105,8 +105,8 @@ fn units_are_sharded_mended_and_verified_as_those_of_runs() {
     assert!(String::from_utf8_lossy(&verified.stdout).starts_with("5 of 5 finished units"));
 }
 
-/// An outage of 16 s from a start whose tilts are known to 3° is beyond linear theory, one after fixes is not: said in one line of the
-/// results, in the verdicts of the cells and on the page.
+/// An outage of 16 s from a start whose tilts are known to 3° is beyond linear theory, one after fixes is not: told by the verdicts
+/// of the cells.
 #[test]
 fn cells_beyond_linear_theory_are_named() {
     let place = place_of_analyses();
@@ -120,17 +120,7 @@ fn cells_beyond_linear_theory_are_named() {
     fs::write(dir.join("study.toml"), format!("{rest}{scenario}{outages}")).unwrap();
     done(dir, "plan study.toml -o out");
     done(dir, "run study.toml -o out");
-    let merged = batch(dir, "merge study.toml -o out");
-    let said = String::from_utf8_lossy(&merged.stdout);
-    let line = said.lines().find(|line| line.starts_with("beyond linear: ")).unwrap();
-    assert!(
-        line.starts_with("beyond linear: 1 of 2 cells (") && line.contains(": in the outage 0–16 s "),
-        "{line}"
-    );
-    assert!(line.ends_with("runs have to confirm the rest"), "{line}");
-    let words = |name: &str| fs::read_to_string(dir.join("out/results").join(name)).unwrap();
-    assert!(words("tables.md").contains("beyond linear: 1 of 2 cells"));
-    assert!(words("report.html").contains("Beyond linear: 1 of 2 cells"));
+    done(dir, "merge study.toml -o out");
     let verdict = |set: &str| {
         rows(&dir.join("out/results/outages.csv")).iter().find(|r| r["outage_set"] == set).unwrap()["verdict"]
             .clone()

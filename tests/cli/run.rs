@@ -31,7 +31,7 @@ fn json(path: &Path) -> Value {
 fn a_run_directory_holds_what_the_interface_says() {
     let place = place();
     let ran = done(place.path(), "run drive.toml imu.toml --runs 10 --outage 30:40 --seed 5 -o out");
-    assert!(ran.stdout.starts_with("verdict: undecided: 10 runs cannot tell "), "{}", ran.stdout);
+    assert!(ran.stdout.starts_with("verdict: undecided: 10 runs miss "), "{}", ran.stdout);
     assert!(ran.stdout.contains("10 runs (0 diverged), 15 states, seed 5"), "{}", ran.stdout);
     let out = place.path().join("out");
     let summary = json(&out.join("summary.json"));

@@ -3,6 +3,7 @@
 
 use nav_sim::formats::trajectory_file::{Options, load};
 use nav_sim::navigation::ekf::{Belief, FilterStates};
+use nav_sim::navigation::metrics::{EpochMetrics, Expected};
 use nav_sim::navigation::monte_carlo;
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::baro::BaroSettings;
@@ -11,7 +12,6 @@ use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::simulation::{NEES_DOF, RunResult};
 use nav_sim::navigation::trajectory::Trajectory;
 use nav_sim::signal::noise::{Ar1, Composite, Model, Process, RandomWalk, White};
-use nav_sim_navigation::simulation::lincov::assess;
 use statrs::distribution::{Binomial, ChiSquared, ContinuousCDF, DiscreteCDF};
 use std::path::Path;
 
@@ -167,17 +167,24 @@ fn long_outages_shift_the_velocity_down_by_the_square_of_the_tilts() {
     let experiment = scenario.experiment(&trajectory, Truth::Model(&file.model), &beliefs, &outages, 5);
     let result = monte_carlo::run(&experiment, 256, &|_| {}).unwrap().remove(0);
     let epochs = nav_sim::navigation::metrics::epochs(&result);
-    let mut summary = nav_sim::navigation::metrics::Summary::of(&result, &epochs, 5);
-    summary.measure_second_order(&assess(&track, &beliefs[0], &file.model).outage_ends);
-    let shift = summary.outages[0].second_order.vel_d_m_s;
+    let tilts = |e: &EpochMetrics| [6, 7].map(|i| e.rmse.0[i].value.to_radians().powi(2)).iter().sum::<f64>();
+    let shift: f64 =
+        epochs.iter().filter(|e| outages[0].withholds(e.t_s)).map(|e| 9.80665 / 2.0 * tilts(e)).sum();
     let end = epochs.iter().rev().find(|e| e.t_s < 399.5).unwrap();
     let (mean, error) = (end.bias.0[5].value, end.bias.0[5].std_error);
     assert!((mean - shift).abs() < 3.5 * error + 0.1 * shift, "{mean} ± {error} against {shift}");
     assert!(mean > 3.0 * error, "{mean} ± {error} could be chance");
-    assert!(summary.outages[0].second_order.beyond_linear().is_some());
-    // a height in ten minutes falls into no outage of five
-    summary.see_height(&BaroSettings { rate_hz: 1.0 / 600.0, sigma_m: 1.0 });
-    assert!(summary.outages[0].second_order.beyond_linear().is_some());
-    summary.see_height(&BaroSettings { rate_hz: 1.0, sigma_m: 1.0 });
-    assert!(summary.outages[0].second_order.beyond_linear().is_none());
+    // linear theory knows where it ends; a height in ten minutes falls into no outage of five, one a second corrects it
+    let baros = [
+        None,
+        Some(BaroSettings { rate_hz: 1.0 / 600.0, sigma_m: 1.0 }),
+        Some(BaroSettings { rate_hz: 1.0, sigma_m: 1.0 }),
+    ];
+    for (baro, is_beyond) in baros.into_iter().zip([true, true, false]) {
+        let scenario = Scenario { baro, ..Scenario::default() };
+        let track = scenario.track(&trajectory, &file.model, &outages).unwrap();
+        let experiment = scenario.experiment(&trajectory, Truth::Model(&file.model), &beliefs, &outages, 5);
+        let expected = Expected::along(&track, &experiment, &beliefs[0], &file.model).unwrap();
+        assert_eq!(expected.outages[0].beyond_linear, is_beyond, "{:?}", scenario.baro);
+    }
 }

@@ -32,7 +32,6 @@ mod long_records;
 mod mounting;
 mod reduction;
 mod require;
-mod second_order;
 mod smoothing;
 mod trajectories;
 mod tune;

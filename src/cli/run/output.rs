@@ -3,7 +3,7 @@
 use crate::cli::{Failure, Session};
 use crate::formats::atomic::{AtomicDir, Claim, Found, claim_directory};
 use crate::jobs::{Navigation, TrueImu};
-use crate::report::{self, Input, Manifest, ModelNote, TrajectorySeries, run_words, window};
+use crate::report::{self, Input, Manifest, ModelNote, TrajectorySeries, window};
 use nav_sim_navigation::metrics::{Summary, VerdictKind};
 use nav_sim_navigation::scenario::{Method, Scenario, Unexpected};
 use nav_sim_navigation::sensors::outage::Outage;
@@ -100,7 +100,7 @@ fn remedy(summary: &Summary, unexpected: &[Unexpected], truth: &TrueImu) -> Stri
     if let Some(largest) = largest(summary, unexpected) {
         return largest;
     }
-    let is_too_large = run_words::beyond_linear(summary).is_some();
+    let is_too_large = summary.verdict.beyond_linear.is_some();
     match truth {
         // what recordings contain is unknown, and so is whether linear analysis would find the filter wrong
         TrueImu::Recordings(_) if is_too_large => TOO_LARGE.to_owned(),

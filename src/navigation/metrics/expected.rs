@@ -2,19 +2,13 @@
 
 use super::epoch::{Accuracy, EpochMetrics};
 use super::estimate::{Estimate, PerState, Quantile};
-use super::outage::{OutageMetrics, Reconvergence, within};
+use super::outage::{OutageMetrics, Reconvergence, is_beyond_linear, within};
 use super::quadratic_form::QuadraticForm;
-use super::second_order::{
-    DOWN, OutageSecondOrder, SettlingSecondOrder, VELOCITY_DOWN, horizontal_nees, velocity_down_m_s,
-};
 use super::summary::{AccuracySummary, Consistency, Coverage, Nis, OutageSummary, SCHEMA_VERSION, Summary};
 use super::verdict::{OutageVerdict, Verdict};
 use crate::ekf::Belief;
 use crate::noise::Model;
-use crate::simulation::lincov::{
-    ErrorLaw, FilterPass, Instant, Judged, SecondOrder, Track, TruthSide, stated_while_settling,
-    vertical_second_order,
-};
+use crate::simulation::lincov::{ErrorLaw, FilterPass, Instant, Judged, Track, TruthSide};
 use crate::simulation::{BIASES, COVERAGE_DOF, Experiment, NEES_DOF, OutageRecord, REPORTED, RunRecord};
 use crate::units::DEG;
 use nalgebra::DMatrix;
@@ -22,6 +16,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// States of the coverage statistic among those of the filter: position, attitude.
 const COVERED: [usize; COVERAGE_DOF] = [0, 1, 2, 6, 7, 8];
+/// Velocity down among the reported states.
+const VELOCITY_DOWN: usize = 5;
 /// Probability of the quantile that stands for the largest error, which a law without end does not have.
 const NEARLY_ALL: f64 = 0.999;
 
@@ -34,8 +30,6 @@ pub struct Expected {
     pub record: RunRecord,
     /// Outages in time order.
     pub outages: Vec<OutageMetrics>,
-    /// What of the start is beyond linear theory.
-    pub settling: Option<SettlingSecondOrder>,
     /// States of the filter.
     pub filter_states: usize,
     /// Components of a fix.
@@ -58,48 +52,17 @@ impl Expected {
         // The limit that the filter itself would take for this level: it believes in a chi-square law.
         let limit = chi2.inverse_cdf(experiment.coverage_level);
         let reports = law.reports.iter().zip(filter.bias_sigmas());
-        let mut epochs: Vec<EpochMetrics> =
+        let epochs: Vec<EpochMetrics> =
             reports.map(|(instant, bias)| epoch(instant, *bias, limit)).collect::<Option<_>>()?;
-        let settling = stated_while_settling(track, belief, &truth, experiment.outages);
-        let settling_ratios = epochs.iter_mut().zip(settling.reports).map(|(epoch, more)| {
-            let linear = epoch.asee;
-            add_variances(&mut epoch.asee, more);
-            (epoch.t_s, std::array::from_fn(|i| epoch.asee.0[i].value / linear.0[i].value))
-        });
-        let settling_second_order = SettlingSecondOrder::among(settling_ratios);
-        let second_order = vertical_second_order(track, belief, &truth, experiment.outages);
-        for second in second_order.iter().flatten() {
-            // the fix that ends an outage is used at the epoch of that instant, but not at the outage's end
-            if let Some(epoch) = epochs.iter_mut().find(|epoch| epoch.t_s == second.t_s && !epoch.gnss) {
-                add_second_order(&mut epoch.asee, &mut epoch.rmse, second);
-                DOWN.into_iter().zip(second.mean).for_each(|(i, mean)| epoch.bias.0[i].value += mean);
-            }
-        }
         let ends = experiment.outages.iter().zip(&law.outage_ends);
         let mut outages: Vec<OutageMetrics> =
             ends.map(|(window, end)| outage((window.start_s, window.end_s), end, &epochs)).collect();
-        for (outage, more) in outages.iter_mut().zip(settling.outage_ends) {
-            add_variances(&mut outage.asee_end, more);
-        }
-        for (outage, second) in outages.iter_mut().zip(&second_order) {
-            if let Some(end) = second.last() {
-                add_second_order(&mut outage.asee_end, &mut outage.rmse_end, end);
-            }
-        }
-        let believed = |epoch: &EpochMetrics| {
-            law.reports.iter().find(|report| report.errors.t_s == epoch.t_s).map(|report| &report.believed)
-        };
-        for ((outage, end), second) in outages.iter_mut().zip(&law.outage_ends).zip(&second_order) {
+        for outage in &mut outages {
             let window = (outage.start_s, outage.end_s);
-            outage.second_order = OutageSecondOrder {
-                vel_d_m_s: velocity_down_m_s(window, &epochs),
-                linear_vel_d_m_s: end.sigma()[VELOCITY_DOWN],
-                nees: horizontal_nees(window, &epochs, believed),
-                mean_squares: second.last().map_or([0.0; 2], mean_squares),
-            };
-            if let Some(baro) = experiment.baro {
-                outage.second_order.see_height(window, baro);
-            }
+            // A barometer that measures in the outage corrects what grows upwards.
+            let sees_height = experiment.baro.is_some_and(|b| (window.1 - window.0) * b.rate_hz >= 1.0);
+            let sigma_m_s = outage.asee_end.0[VELOCITY_DOWN].value;
+            outage.beyond_linear = !sees_height && is_beyond_linear(window, &epochs, sigma_m_s);
         }
         let record = record(&epochs, &law, &outages);
         // NaN comes from a believed covariance without a Cholesky factor: at any report it makes the mean
@@ -108,7 +71,6 @@ impl Expected {
             epochs,
             record,
             outages,
-            settling: settling_second_order,
             filter_states: belief.states,
             fix_components: experiment.gnss.components(),
             coverage_level: experiment.coverage_level,
@@ -118,7 +80,7 @@ impl Expected {
 
     /// The first outage in which errors are beyond linear theory.
     pub(super) fn beyond_linear(&self) -> Option<usize> {
-        self.outages.iter().position(|outage| outage.second_order.is_beyond_linear())
+        self.outages.iter().position(|outage| outage.beyond_linear)
     }
 
     /// The summary: as that of runs, without what only runs have (null).
@@ -163,31 +125,9 @@ impl Expected {
             reduction: None,
             lincov: None,
             agreement: None,
-            settling: self.settling,
             is_contradicted: false,
             require: Vec::new(),
         }
-    }
-}
-
-/// Adds what is of second order in position and velocity down to standard deviations that the filter states and to root mean
-/// squares of its errors. NEES, coverage and quantiles stay those of first order: they are of the whole covariance of one run, which
-/// its mean over the runs does not stand for.
-fn add_second_order(asee: &mut PerState<Estimate>, rmse: &mut PerState<Estimate>, second: &SecondOrder) {
-    for (k, i) in DOWN.into_iter().enumerate() {
-        asee.0[i].value = (asee.0[i].value.powi(2) + second.believed[k]).sqrt();
-        rmse.0[i].value = (rmse.0[i].value.powi(2) + mean_squares(second)[k]).sqrt();
-    }
-}
-
-fn mean_squares(second: &SecondOrder) -> [f64; 2] {
-    [0, 1].map(|k| second.variance[k] + second.mean[k].powi(2))
-}
-
-/// Adds variances to standard deviations that the filter states.
-fn add_variances(asee: &mut PerState<Estimate>, more: [f64; REPORTED]) {
-    for (asee, more) in asee.0.iter_mut().zip(more) {
-        asee.value = (asee.value.powi(2) + more).sqrt();
     }
 }
 
@@ -261,7 +201,7 @@ fn outage((start_s, end_s): (f64, f64), end: &Judged, epochs: &[EpochMetrics]) -
         horizontal_p95_m: quantile(p95),
         horizontal_p999_m: Some(p999),
         horizontal_max_m: f64::NAN,
-        second_order: OutageSecondOrder::UNKNOWN,
+        beyond_linear: false,
         reconvergence: Reconvergence { p50_s: quantile(f64::NAN), p95_s: quantile(f64::NAN), never: None },
     }
 }

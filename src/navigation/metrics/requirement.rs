@@ -1,6 +1,5 @@
 //! Limits that the errors must keep.
 
-use super::second_order::DOWN;
 use super::summary::{OutageSummary, Summary};
 use crate::simulation::REPORTED_NAMES;
 use serde::Serialize;
@@ -24,6 +23,9 @@ pub struct Requirement {
     figure: Figure,
     limit: f64,
 }
+
+/// Position and velocity down among the reported states.
+const DOWN: [usize; 2] = [2, 5];
 
 /// Not a requirement.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -86,9 +88,9 @@ impl Requirement {
         }
     }
 
-    /// Compares the limit with the expectation of the covariance analysis where there is one, else with the runs. Position and velocity
-    /// down are beyond it after an outage that shifts them: its first fixes make of the shift what no linear analysis contains. There
-    /// the runs beside it decide, and without runs no limit is met. All other figures hold (docs/limits.md).
+    /// Compares the limit with the expectation of the covariance analysis where there is one, else with the runs. From the first
+    /// outage that is beyond linear theory on, position and velocity down are not in the analysis: the runs beside it decide, and
+    /// without runs no limit is met. All other figures hold (docs/limits.md).
     #[must_use]
     pub fn check(&self, summary: &Summary) -> Met {
         // Free of chance: a limit is then not kept or missed by the luck of the runs.
@@ -99,9 +101,9 @@ impl Requirement {
             Figure::Rmse(state) => o.rmse_end.0[state],
         };
         let is_down = matches!(self.figure, Figure::Rmse(state) if DOWN.contains(&state));
-        let is_shifted = |o: &OutageSummary| o.second_order.beyond_linear().is_some();
+        let is_shifted = |o: &OutageSummary| o.beyond_linear;
         let shifted = expected.outages.iter().position(is_shifted).filter(|_| is_down && expected.runs == 0);
-        let is_beyond = |outage: usize| shifted.is_some_and(|shifted| outage > shifted);
+        let is_beyond = |outage: usize| shifted.is_some_and(|shifted| outage >= shifted);
         let outages = summary.outages.iter().zip(&expected.outages).enumerate();
         let ends =
             outages.map(|(k, (own, expected))| (k, of_outage(if is_beyond(k) { own } else { expected })));

@@ -8,7 +8,6 @@ use super::estimate::{Estimate, PerState, Quantile, SampleSize};
 use super::outage::{self, OutageMetrics};
 use super::reduction::ReductionSummary;
 use super::requirement::Met;
-use super::second_order::{OutageSecondOrder, SettlingSecondOrder};
 use super::sensitivity::Sensitivities;
 use super::verdict::{OutageVerdict, Verdict};
 use crate::simulation::{NEES_DOF, RunResult};
@@ -58,9 +57,6 @@ pub struct Summary {
     /// How far the runs are from it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub agreement: Option<Agreement>,
-    /// Where errors are beyond linear theory while the attitude of the start settles, by covariance analysis; none where they are not.
-    #[serde(rename = "second_order_start", skip_serializing_if = "Option::is_none")]
-    pub settling: Option<SettlingSecondOrder>,
     /// Whether covariance analysis has another verdict, and figures that the runs contradict: errors are no longer small.
     #[serde(skip)]
     pub is_contradicted: bool,
@@ -126,9 +122,8 @@ pub struct OutageSummary {
     pub log_density_end_std_error: f64,
     /// Horizontal error at the same instant.
     pub horizontal_error_end_m: Spread,
-    /// What its errors have of second order.
-    #[serde(flatten)]
-    pub second_order: OutageSecondOrder,
+    /// Whether covariance analysis finds errors in it that are beyond linear theory.
+    pub beyond_linear: bool,
     /// Time until the error is back to what it was before.
     pub reconvergence_s: Recovery,
     /// Shares of the sources of the true errors in their mean squares just before the first fix after the outage,
@@ -253,7 +248,6 @@ impl Summary {
             reduction: None,
             lincov: None,
             agreement: None,
-            settling: None,
             is_contradicted: false,
             require: Vec::new(),
         }
@@ -308,7 +302,7 @@ impl OutageSummary {
                 p999: o.horizontal_p999_m,
                 ..Spread::new(o.horizontal_p50_m, o.horizontal_p95_m, o.horizontal_max_m)
             },
-            second_order: o.second_order,
+            beyond_linear: o.beyond_linear,
             reconvergence_s: Recovery {
                 p50: o.reconvergence.p50_s.value,
                 p95: o.reconvergence.p95_s.value,

@@ -1,7 +1,7 @@
 //! The page of a comparison: what the filters believe over time beside the reference, the paper's Figure 7 and Table I.
 
 use super::paper::PaperFigure;
-use super::{STATES, sentence, tone, window};
+use super::{STATES, tone, window};
 use crate::report::comparison::{
     CandidateResult, ComparisonFile, Row, in_order, meaning_of_intervals, verdict_lines,
 };
@@ -52,9 +52,6 @@ impl ShownComparison<'_> {
         let Self { candidates, outages, states, .. } = *self;
         let kind = gravest(file.verdicts.iter().map(|row| &row.verdict));
         let mut page = Page::new("What the filters believe, compared", tone(kind), [verdict(file)]);
-        if let Some(line) = &file.beyond_linear {
-            page.text(&sentence(line));
-        }
         let is_drawn = file.rows.iter().any(|row| row.rmse_end_ci95_pct.is_some());
         let paired = if file.paired && is_drawn {
             "; the runs saw the same noise, intervals are those of paired differences"

@@ -7,7 +7,6 @@ use crate::report::manifest::Manifest;
 use crate::report::number::readable;
 use crate::report::page::{Cell, Page, Table, Tone};
 use crate::report::requirement::requirement_line;
-use crate::report::run_words::beyond_linear;
 use crate::report::trajectory::TrajectorySeries;
 use crate::report::verdict::verdict_lines;
 use nav_sim_navigation::ekf::InitialSettings;
@@ -38,9 +37,6 @@ pub(crate) fn run_page(
     let tone = if missed.is_empty() { tone(summary.verdict.kind) } else { Tone::Bad };
     let mut page = Page::new(title, tone, [format!("{missed_lines}{}", sentence(&verdict))]);
     kept.into_iter().for_each(|met| page.text(&line(met)));
-    if let Some(words) = beyond_linear(summary) {
-        page.text(&sentence(&words));
-    }
     page.facts(&assumptions(summary, manifest));
     page.chart(&track.map("Reference trajectory", &windows), "");
     page.chart(&horizontal(epochs, summary), horizontal_caption(summary));

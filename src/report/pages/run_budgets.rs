@@ -28,9 +28,6 @@ pub(super) fn budgets(summary: &Summary, shown: &[usize], page: &mut Page) {
     }
     page.section("Sources of errors");
     page.chart(&budget_chart(&bars), "Shares in the mean square at the end of each outage: of the true errors, by covariance analysis, and of those that the filter believes in.");
-    if let Some(words) = linear_shares(shown.iter().map(|i| &summary.outages[*i])) {
-        page.text(&words);
-    }
     for i in shown {
         let o = &summary.outages[*i];
         for (kind, budget, key) in kinds(o) {
@@ -41,22 +38,6 @@ pub(super) fn budgets(summary: &Summary, shown: &[usize], page: &mut Page) {
             page.folded(&title, |page| page.table(&table));
         }
     }
-}
-
-/// Shares are those of linear theory: said where the RMSE beside them is larger than that by more than a hundredth.
-fn linear_shares<'a>(outages: impl Iterator<Item = &'a OutageSummary>) -> Option<String> {
-    let share = |o: &'a OutageSummary| Some((o, o.second_order.shares_of_rmse(&o.budget.as_ref()?.total)));
-    let largest = |shares: &[f64; 2]| shares[0].max(shares[1]);
-    let (outage, shares) =
-        outages.filter_map(share).max_by(|a, b| largest(&a.1).total_cmp(&largest(&b.1)))?;
-    let [position, velocity] = shares.map(|share| format!("{:.0} %", 100.0 * share));
-    (largest(&shares) > 0.01).then(|| {
-        format!(
-            "The shares of position and velocity down are of linear theory, in which their RMSE at the end of {} is smaller by {position} and \
-             {velocity}; the second order has no source of its own.",
-            window((outage.start_s, outage.end_s))
-        )
-    })
 }
 
 fn budget_table(budget: &Budget, place: &str) -> Table {

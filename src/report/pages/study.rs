@@ -8,14 +8,13 @@ use crate::report::verdict::gravest;
 use nav_sim_navigation::metrics::{OutageMetrics, VerdictKind};
 
 /// The page of a merged study. `reference`: what ratios refer to; `more`: cells that are in outages.csv only; `rankings`:
-/// of candidates calibrated without the recordings that make the errors; `beyond_linear`: where covariance analysis does not hold.
+/// of candidates calibrated without the recordings that make the errors.
 pub(crate) fn study_page(
     cells: &[ShownCell],
     reference: &str,
     states: &[usize],
     more: usize,
     rankings: &[RankedPlace],
-    beyond_linear: Option<String>,
 ) -> String {
     let kind = gravest(cells.iter().flat_map(|cell| &cell.columns).map(|column| &column.verdict));
     let mut page = Page::new("Study", super::tone(kind), [verdict(cells)]);
@@ -31,9 +30,6 @@ pub(crate) fn study_page(
     page.section("Verdict on each filter");
     page.text("NEES over the run (9 if right), error over its standard deviation in the state that is farthest off; of an undecided filter, the runs that would decide.");
     page.table(&Table::of_rows(&verdict_table(cells)));
-    if let Some(line) = beyond_linear {
-        page.text(&sentence(&line));
-    }
     page.section("Horizontal error at the ends of outages: median (95 %), m");
     page.table(&Table::of_rows(&drift_table(cells)));
     for cell in cells.iter().filter(|c| c.columns.len() > 1 && c.columns[0].comparison.is_some()) {

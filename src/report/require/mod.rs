@@ -4,7 +4,7 @@ mod given;
 
 pub(crate) use given::{Bridged, GivenImu, Longest, parts_in_words, what_decides};
 
-use super::beyond_linear::{BeyondLinear, BeyondLinearPlaces, OF_A_FIGURE};
+use super::beyond_linear::{BeyondLinear, CONFIRM};
 use super::markdown_table;
 use super::number::{percent, readable, seconds, window};
 use nav_sim_navigation::require::{Answer, IMU_PARAMETERS, ImuParameters, IsoDrift, Limit, Quantity, Worst};
@@ -289,11 +289,14 @@ pub(crate) fn catalogue_rows(units: &[RankedUnit]) -> Vec<Vec<String>> {
 
 /// The units whose figures for the outage asked for are beyond linear theory, in a line.
 pub(crate) fn catalogue_beyond_linear(units: &[RankedUnit]) -> Option<String> {
-    let mut places = BeyondLinearPlaces::default();
-    for unit in units {
-        places.add(&unit.name, unit.beyond_linear.iter().map(|beyond| (unit.name.clone(), beyond.clone())));
-    }
-    places.line("units", OF_A_FIGURE)
+    let beyond = units.iter().filter(|unit| unit.beyond_linear.is_some());
+    let names: Vec<&str> = beyond.map(|unit| unit.name.as_str()).collect();
+    let units = match names.len() {
+        0 => return None,
+        1..=3 => names.join(", "),
+        more => format!("{more} of {} units", units.len()),
+    };
+    Some(format!("beyond linear theory: {units}: {CONFIRM}"))
 }
 
 /// All of it.

@@ -2,7 +2,6 @@
 
 use super::column::Column;
 use super::input::{SIGNALS, StepOfSource};
-use super::mean::Mean;
 use super::sides::{Inputs, Sides};
 use super::track::{NAV, Nav, Row, Step};
 use crate::simulation::BIASES;
@@ -154,21 +153,6 @@ impl<'a> Joint<'a> {
         for (p, s) in self.tt.iter_mut().zip(&inputs.t) {
             *p = *p * s.decay * s.decay + s.q_state;
         }
-    }
-
-    /// The same, to be taken along: as time goes on, the covariance of the present with that past.
-    pub(super) fn correlated(&self, form: &Column) -> Mean<'a> {
-        Mean { sides: self.sides, values: self.covariance_with(form), elapsed: self.elapsed }
-    }
-
-    /// One of the navigation errors, as a linear form.
-    pub(super) fn state(&self, state: usize) -> Column {
-        Column::state(state, self.sides)
-    }
-
-    /// The error of the specific force along an axis of n (m/s for a sample) over a step that begins now, as a linear form.
-    pub(super) fn force_error(&self, axis: usize, step: &Step) -> Column {
-        Column::force_error(axis, step, self.sides, self.elapsed)
     }
 
     /// What a row measures, as a linear form.

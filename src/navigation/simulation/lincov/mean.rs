@@ -1,4 +1,4 @@
-//! The mean of the true errors, which is the same in every run, and what else moves as a mean does.
+//! The mean of the true errors, which is the same in every run.
 
 use super::column::Column;
 use super::input::{SIGNALS, StepOfSource};
@@ -6,14 +6,13 @@ use super::joint::Gain;
 use super::sides::Sides;
 use super::track::{NAV, Step};
 
-/// Mean of z and of the truth's states, as [`Joint`](super::joint::Joint) has their covariance; or their covariance with a variable of the
-/// past, of which later noise knows nothing.
+/// Mean of z and of the truth's states, as [`Joint`](super::joint::Joint) has their covariance.
 #[derive(Debug, Clone)]
 pub(super) struct Mean<'a> {
-    pub(super) sides: &'a Sides,
+    sides: &'a Sides,
     pub(super) values: Column,
     /// Samples so far.
-    pub(super) elapsed: f64,
+    elapsed: f64,
 }
 
 impl<'a> Mean<'a> {
