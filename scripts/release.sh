@@ -15,7 +15,7 @@ libc=gnu
 target=$arch-unknown-linux-$libc
 echo "building for $target"
 RUSTFLAGS="${RUSTFLAGS:-} -C target-feature=+crt-static" \
-    cargo build --locked --profile dist --bin nav-sim --target "$target"
+    cargo build --locked --profile dist --features pictures,parquet --bin nav-sim --target "$target"
 binary=${CARGO_TARGET_DIR:-target}/$target/dist/nav-sim
 
 # Nothing is looked for when it starts: no interpreter, no library.

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 /// The figures as a file.
 #[derive(clap::Args, Debug)]
 pub(super) struct PlotArgs {
-    /// Also write the figures as a picture: .svg or .png (300 dots an inch)
+    /// Also write the figures as a picture: .svg (.png with the feature `pictures`)
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 }
@@ -95,10 +95,13 @@ pub(super) fn claim_output(
 
 /// The form of a picture, by its name.
 fn form(path: &Path) -> Result<Form, Failure> {
-    Form::of(path).ok_or_else(|| {
-        Failure::input(format!("{}: a picture is written as SVG or PNG", path.display()))
-            .hint("name a file that ends in .svg or .png")
-    })
+    let (forms, hint) = if cfg!(feature = "pictures") {
+        ("SVG or PNG", "name a file that ends in .svg or .png")
+    } else {
+        ("SVG", "name a file that ends in .svg; PNG needs a build with --features pictures")
+    };
+    let refused = || Failure::input(format!("{}: a picture is written as {forms}", path.display()));
+    Form::of(path).ok_or_else(|| refused().hint(hint))
 }
 
 /// Writes a picture in the form that its name says.

@@ -17,7 +17,12 @@ pub(super) fn version(words: &[String]) -> String {
     let linked = if cfg!(target_feature = "crt-static") { "static" } else { "dynamic" };
     let profile = if cfg!(debug_assertions) { "debug" } else { "release" };
     let level = Level::best();
-    let features = if cfg!(feature = "parquet") { "parquet" } else { "none" };
+    let features = match (cfg!(feature = "pictures"), cfg!(feature = "parquet")) {
+        (true, true) => "pictures, parquet",
+        (true, false) => "pictures",
+        (false, true) => "parquet",
+        (false, false) => "none",
+    };
     format!(
         "{number}\nbuild         {profile}, {ARCH}-{OS}-{library}, {linked}\nvector units  {level}\nfeatures      {features}"
     )

@@ -29,6 +29,8 @@ mod marks;
 mod draw;
 // L5
 mod picture;
+#[cfg(feature = "pictures")]
+mod png;
 // L6: tables
 mod table;
 // L7
@@ -46,6 +48,6 @@ pub use escape::escape;
 pub use names::short_names;
 pub use number::{percent, readable, seconds, shortest, six_digits, squared, window};
 pub use page::is_own;
-pub use picture::{Form, PictureError, encode, svg};
+pub use picture::{Form, encode, svg};
 pub use table::{Cell, Table};
 pub use terminal::NOTES;

@@ -13,14 +13,14 @@ use std::path::PathBuf;
 Examples:
   nav-sim trajectory plot trajectories/land_vehicle.toml -o drive.svg
   nav-sim trajectory plot trajectories/land_vehicle.toml --outage 300:390 -o outage.svg
-  nav-sim trajectory plot trajectories/fixed_wing.toml -o flight.pdf")]
+  nav-sim trajectory plot trajectories/fixed_wing.toml -o flight.svg")]
 pub(super) struct Args {
     #[command(flatten)]
     source: Source,
     /// A stretch without GNSS to mark, in seconds (repeatable)
     #[arg(long = "outage", value_name = "START:END")]
     outages: Vec<Outage>,
-    /// Picture to write: .svg, .png (300 dots an inch) or .pdf
+    /// Picture to write: .svg (.png with the feature `pictures`)
     #[arg(long, short, value_name = "FILE")]
     out: PathBuf,
 }

@@ -1,0 +1,40 @@
+//! A picture as dots.
+
+use resvg::{tiny_skia, usvg};
+use std::sync::Arc;
+
+/// Dots an inch of a PNG; an SVG's pixel is 1/96 inch.
+const DENSITY: f32 = 300.0;
+const PIXELS_AN_INCH: f32 = 96.0;
+/// Of a PNG: a taller picture has fewer dots an inch, so that no viewer refuses it.
+const MOST_DOTS: f32 = 8e7;
+
+/// With a question mark for each character of the scripts that the font lacks (those of East Asia, pictographs): it would
+/// be drawn as an empty box.
+fn drawable(svg: &str) -> String {
+    let is_lacking = |c: char| matches!(c, '\u{1100}'..='\u{11ff}' | '\u{2e80}'..='\u{a4cf}' | '\u{ac00}'..='\u{d7ff}' | '\u{f900}'..='\u{faff}' | '\u{ff00}'..='\u{ffef}' | '\u{1f000}'..);
+    svg.replace(is_lacking, "?")
+}
+
+/// With the font that is compiled in: the same drawing on every machine, also where no font is installed.
+fn parsed(svg: &str) -> Result<usvg::Tree, String> {
+    let mut fonts = usvg::fontdb::Database::new();
+    for font in [dejavu::sans::regular(), dejavu::sans::bold()] {
+        fonts.load_font_source(usvg::fontdb::Source::Binary(Arc::new(font)));
+    }
+    fonts.set_sans_serif_family("DejaVu Sans");
+    let options = usvg::Options { fontdb: Arc::new(fonts), ..usvg::Options::default() };
+    usvg::Tree::from_str(svg, &options).map_err(|e| e.to_string())
+}
+
+/// The dots of an SVG picture.
+pub(crate) fn png(svg: &str) -> Result<Vec<u8>, String> {
+    let picture = parsed(&drawable(svg))?;
+    let (width, height) = (picture.size().width(), picture.size().height());
+    let zoom = (DENSITY / PIXELS_AN_INCH).min((MOST_DOTS / (width * height)).sqrt());
+    let dots = picture.size().to_int_size().scale_by(zoom).ok_or("it has no size")?;
+    let mut dotted =
+        tiny_skia::Pixmap::new(dots.width(), dots.height()).ok_or("it does not fit into memory")?;
+    resvg::render(&picture, tiny_skia::Transform::from_scale(zoom, zoom), &mut dotted.as_mut());
+    dotted.encode_png().map_err(|e| e.to_string())
+}
