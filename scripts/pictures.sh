@@ -1,5 +1,5 @@
 #!/bin/sh
-# Makes the pictures of the README, from the top of the repository; tests/cli/readme.rs holds that they are current.
+# Makes the pictures of README and book, from the top of the repository; tests/cli/readme.rs holds that they are current.
 #
 #   scripts/pictures.sh [NAV-SIM [DIRECTORY]]
 set -eu
@@ -8,8 +8,8 @@ out=${2:-docs/figures}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 mkdir -p "$out"
-"$nav_sim" synthesize calib_data/consumer_mems.toml --replicates 4 --samples 65536 --axes accel.x,gyro.x --spread \
-    --seed 1 -o "$work/static" > "$work/said"
+"$nav_sim" synthesize calib_data/consumer_mems.toml --replicates 6 --samples 65536 --spread \
+    --contaminate examples/one_bad_recording.toml --axes gyro.x --seed 1 -o "$work/static" > "$work/said"
 "$nav_sim" calibrate "$work/static" --axes gyro.x --bootstrap 50 --seed 1 \
     -o "$work/model.toml" --plot "$out/calibration.svg" --force > "$work/said"
 "$nav_sim" run trajectories/land_vehicle.toml calib_data/consumer_mems.toml --method lincov --seed 1 \

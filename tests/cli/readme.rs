@@ -1,11 +1,13 @@
-//! The shell blocks of README and book work: each `sh` block is run, those marked `slow` are only looked at; links lead
-//! somewhere.
+//! The shell blocks of README and book work: each `sh` block is run, those marked `slow` are only looked at; a block
+//! marked `text output` is what the block before it prints; links lead somewhere.
+//!
+//! After a change of words, `BLESS=1 cargo test --test cli readme` writes the outputs anew.
 
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-const README: &str = include_str!("../../README.md");
+const COMMANDS: &str = include_str!("../../docs/commands.md");
 const ROOT: &str = env!("CARGO_MANIFEST_DIR");
 
 /// README and the pages of the book.
@@ -39,39 +41,64 @@ fn blocks(page: &str) -> Vec<(String, String)> {
     found
 }
 
-/// The blocks of a page, one after the other in a directory of their own; what went wrong.
-fn run(page: &Path) -> Option<String> {
+/// The page with the outputs of its blocks, run one after the other in a directory of their own; or what went wrong.
+fn run(page: &Path) -> Result<String, String> {
     let directory = tempfile::tempdir().unwrap();
     for name in ["trajectories", "calib_data", "examples"] {
         std::os::unix::fs::symlink(Path::new(ROOT).join(name), directory.path().join(name)).unwrap();
     }
     let bin = Path::new(env!("CARGO_BIN_EXE_nav-sim")).parent().unwrap().display().to_string();
     let path = format!("{bin}:{}", std::env::var("PATH").unwrap());
-    let text = std::fs::read_to_string(page).unwrap();
-    for (_, script) in blocks(&text).into_iter().filter(|(info, _)| info == "sh") {
-        let arguments = ["-euc", &script];
-        let output =
-            Command::new("bash").args(arguments).current_dir(&directory).env("PATH", &path).output().unwrap();
-        if !output.status.success() {
-            return Some(format!(
-                "{}\n{script}\n{}",
-                page.display(),
-                String::from_utf8_lossy(&output.stderr)
-            ));
+    let mut text = std::fs::read_to_string(page).unwrap();
+    let mut printed = String::new();
+    for (info, block) in blocks(&text) {
+        match info.as_str() {
+            "sh" => {
+                let mut shell = Command::new("bash");
+                let shell = shell.args(["-euc", &block]).current_dir(&directory).env("PATH", &path);
+                let output = shell.output().unwrap();
+                if !output.status.success() {
+                    let said = String::from_utf8_lossy(&output.stderr);
+                    return Err(format!("{}\n{block}\n{said}", page.display()));
+                }
+                printed = String::from_utf8(output.stdout).unwrap();
+            }
+            OUTPUT => {
+                let fence = |content: &str| format!("```{OUTPUT}\n{content}```\n");
+                text = text.replacen(&fence(&block), &fence(&printed), 1);
+            }
+            _ => {}
         }
     }
-    None
+    Ok(text)
+}
+
+/// Info string of a block that the block before it prints.
+const OUTPUT: &str = "text output";
+
+/// Whether two texts have the same words, and the same numbers to a hundredth: another processor may round otherwise.
+fn alike(a: &str, b: &str) -> bool {
+    let ((a, a_words), (b, b_words)) = (numbers(a), numbers(b));
+    let squeeze = |words: &str| words.split_whitespace().collect::<String>();
+    let near = |(a, b): (&f64, &f64)| (a - b).abs() <= 0.011 * a.abs().max(b.abs());
+    squeeze(&a_words) == squeeze(&b_words) && a.len() == b.len() && a.iter().zip(&b).all(near)
 }
 
 #[test]
 fn shell_blocks_run() {
     let pages = pages();
     assert!(pages.len() > 12, "{pages:?}");
-    let failures: Vec<String> = pages.par_iter().filter_map(|page| run(page)).collect();
+    let bless = std::env::var_os("BLESS").is_some();
+    let failure = |page: &PathBuf| match run(page) {
+        Err(failure) => Some(failure),
+        Ok(text) if bless => std::fs::write(page, text).err().map(|e| e.to_string()),
+        Ok(text) if alike(&text, &std::fs::read_to_string(page).unwrap()) => None,
+        Ok(text) => Some(format!("{} shows other outputs (BLESS=1 writes them anew):\n{text}", page.display())),
+    };
+    let failures: Vec<String> = pages.par_iter().filter_map(failure).collect();
     assert!(failures.is_empty(), "{}", failures.join("\n\n"));
 }
 
-/// Every relative link of README and book leads to a file.
 /// Numbers of a picture, and what stands between them.
 fn numbers(picture: &str) -> (Vec<f64>, String) {
     let is_number = |c: char| c.is_ascii_digit() || c == '.';
@@ -79,7 +106,7 @@ fn numbers(picture: &str) -> (Vec<f64>, String) {
     (words.collect(), picture.replace(is_number, ""))
 }
 
-/// The script makes the pictures of the README as they are there, to a fifth of a pixel: another processor may round
+/// The script makes the pictures of README and book as they are there, to a fifth of a pixel: another processor may round
 /// otherwise.
 #[test]
 fn pictures_are_current() {
@@ -88,7 +115,9 @@ fn pictures_are_current() {
     let ran = Command::new("sh").current_dir(ROOT).args(script).arg(made.path()).output().unwrap();
     assert!(ran.status.success(), "{}", String::from_utf8_lossy(&ran.stderr));
     for name in ["calibration.svg", "run.svg"] {
-        assert!(README.contains(&format!("(docs/figures/{name})")), "{name}");
+        let link = format!("figures/{name})");
+        let shown = pages().iter().any(|page| std::fs::read_to_string(page).unwrap().contains(&link));
+        assert!(shown, "{name}");
         let read = |directory: &Path| std::fs::read_to_string(directory.join(name)).unwrap();
         let (there, words) = numbers(&read(&Path::new(ROOT).join("docs/figures")));
         let (new, new_words) = numbers(&read(made.path()));
@@ -98,6 +127,7 @@ fn pictures_are_current() {
     }
 }
 
+/// Every relative link of README and book leads to a file.
 #[test]
 fn links_lead_somewhere() {
     for page in pages() {
@@ -124,7 +154,7 @@ fn the_table_of_commands_is_complete() {
         .filter(|n| *n != "help")
         .collect();
     let rows =
-        README.lines().skip_while(|l| *l != "| command | does |").skip(2).take_while(|l| l.starts_with('|'));
+        COMMANDS.lines().skip_while(|l| *l != "| command | does |").skip(2).take_while(|l| l.starts_with('|'));
     let first_cell = |l: &'static str| l.split('|').nth(1).unwrap();
     let mut named: Vec<&str> = rows.flat_map(|l| first_cell(l).split('`').skip(1).step_by(2)).collect();
     commands.sort_unstable();
