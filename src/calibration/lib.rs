@@ -3,6 +3,24 @@
 //! [`replicates()`] computes the wavelet variances of all signals, [`average()`] averages those of a group to one
 //! curve, and [`fit()`] finds the model whose theoretical wavelet variance is closest to the curve. [`calibrate`]
 //! does the last two.
+//!
+//! ```
+//! use nav_sim_calibration::{ModelSpec, Weighting, fit};
+//! use nav_sim_signal::noise::{Composite, Process, RandomWalk, White};
+//! use nav_sim_signal::wavelet::Curve;
+//!
+//! let (white, walk) = (White::new(4e-6)?, RandomWalk::new(1e-12)?);
+//! let truth = Composite::new(vec![Process::White(white), Process::RandomWalk(walk)]);
+//! let levels: Vec<u32> = (1..=14).collect();
+//! let wv = levels.iter().map(|level| truth.haar_wv(*level)).collect();
+//! let curve = Curve { wv, edof: vec![100.0; levels.len()], levels, ..Curve::default() };
+//! let found = fit(&curve, &"WN+RW".parse::<ModelSpec>()?, 100.0, Weighting::Model)?.composite;
+//! // An exact curve gives the parameters back.
+//! for (found, true_value) in found.parameters().zip([4e-6, 1e-12]) {
+//!     assert!((found.1 / true_value - 1.0).abs() < 1e-9);
+//! }
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 #[allow(unused_imports, reason = "sources are named in the documentation")]
 pub(crate) use nav_sim_signal::bibliography;

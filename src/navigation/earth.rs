@@ -3,6 +3,15 @@
 //! [Groves](crate::bibliography::Groves13), sec. 2.4).
 //!
 //! Formulas are written over [`Real`]: one text for a scalar and for eight runs at a time.
+//!
+//! ```
+//! use nav_sim_navigation::earth::{A, GravityModel, geodetic_to_ecef, gravity_down};
+//!
+//! // Normal gravity at the equator and at the poles (m/s²), by the definition of WGS-84.
+//! assert!((gravity_down(GravityModel::Wgs84, 0.0, 0.0) - 9.780_325_335_9).abs() < 1e-9);
+//! assert!((gravity_down(GravityModel::Wgs84, 1.0, 0.0) - 9.832_184_937_9).abs() < 1e-9);
+//! assert!((geodetic_to_ecef(0.0, 0.0, 100.0).x - (A + 100.0)).abs() < 1e-6);
+//! ```
 
 use crate::frames::{NavState, q_e_n};
 use crate::lanes::Real;

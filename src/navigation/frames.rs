@@ -3,6 +3,15 @@
 //! n = North-East-Down at the vehicle, b = front-right-down, e = Earth-centred Earth-fixed.
 //! `q_b_n` takes a vector written in b and returns it in n. Euler angles are ZYX: yaw about down, then
 //! pitch, then roll ([Groves](crate::bibliography::Groves13), sec. 2.2).
+//!
+//! ```
+//! use glam::DVec3;
+//! use nav_sim_navigation::frames::RollPitchYaw;
+//!
+//! let heading_east = RollPitchYaw { roll: 0.0, pitch: 0.0, yaw: 90_f64.to_radians() };
+//! let front_n = heading_east.to_quat() * DVec3::X;
+//! assert!((front_n - DVec3::Y).length() < 1e-15);
+//! ```
 
 use glam::{DQuat, DVec3, EulerRot};
 

@@ -6,6 +6,25 @@
 //! No small-angle, flat-Earth or Euler-angle assumption: any heading and attitude, either hemisphere,
 //! across ±180° of longitude. Latitude and longitude lose their meaning at the poles: whoever drives the
 //! mechanisation refuses |lat| > [`MAX_LATITUDE`](crate::earth::MAX_LATITUDE).
+//!
+//! ```
+//! use glam::{DQuat, DVec3};
+//! use nav_sim_navigation::earth::{GravityModel, gravity_down, omega_ie_n};
+//! use nav_sim_navigation::frames::NavState;
+//! use nav_sim_navigation::lanes::{Lanes, Vec3};
+//! use nav_sim_navigation::strapdown::Strapdown;
+//!
+//! let start = NavState { lat: 0.9, lon: 0.2, h: 100.0, v_n: DVec3::ZERO, q_b_n: DQuat::IDENTITY };
+//! let mut vehicle = Strapdown::<Lanes>::new(&start, GravityModel::Wgs84);
+//! // At rest gyroscopes feel the rotation of the Earth, accelerometers the support against gravity.
+//! let gravity = gravity_down(GravityModel::Wgs84, start.lat.sin(), start.h);
+//! let (dtheta, dv) = (omega_ie_n(start.lat) * 0.01, DVec3::new(0.0, 0.0, -gravity * 0.01));
+//! for _ in 0..6000 {
+//!     vehicle.step(Vec3::splat(dtheta), Vec3::splat(dv), 0.01);
+//! }
+//! assert!(vehicle.lane(0).v_n.length() < 1e-9);
+//! assert!((vehicle.lane(0).lat - start.lat).abs() < 1e-14);
+//! ```
 
 use crate::earth::{GravityModel, OMEGA_IE, Parallel};
 use crate::frames::{NavState, wrap_angle};

@@ -1,5 +1,20 @@
 //! Random streams: every noise source of every run owns one, keyed by what it is, never by when or
 //! where it is drawn. The same key gives the same numbers on any number of threads, lanes or shards.
+//!
+//! ```
+//! use nav_sim_signal::noise::{Composite, Process, Synthesizer, White};
+//! use nav_sim_signal::rng::StreamKey;
+//!
+//! let noise = Composite::new(vec![Process::White(White::new(4e-6)?)]);
+//! let key = StreamKey { seed: 1, scenario: "", run: 0, source: "gyro.x", process: "" };
+//! let mut signals = [vec![0.0; 1 << 16], vec![0.0; 1 << 16]];
+//! signals.iter_mut().for_each(|signal| Synthesizer::new(&noise, key).fill(signal));
+//! assert_eq!(signals[0], signals[1]);
+//! // The variance of 2^16 samples is known to √(2/2^16) = 0.55 %.
+//! let variance = signals[0].iter().map(|x| x * x).sum::<f64>() / 65_536.0;
+//! assert!((variance / 4e-6 - 1.0).abs() < 0.02);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;

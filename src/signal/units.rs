@@ -1,5 +1,12 @@
 //! The border: units that headers, keys and flags name, and the values they may take. Inside, everything
 //! is SI and radians.
+//!
+//! ```
+//! use nav_sim_signal::units::DEG_PER_HOUR;
+//!
+//! // The Earth turns by 15.041 degrees an hour.
+//! assert!((15.041_067 * DEG_PER_HOUR - 7.292_115e-5).abs() < 1e-11);
+//! ```
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 

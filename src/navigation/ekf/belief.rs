@@ -1,4 +1,19 @@
 //! What the filter believes of the inertial noise: a noise model in the form of filter states.
+//!
+//! ```
+//! use nav_sim_navigation::ekf::{Belief, FilterStates};
+//! use nav_sim_signal::imu::Sensor;
+//! use nav_sim_signal::noise::{Ar1, Composite, Model, Process, White};
+//!
+//! // A bias of 1e-4 rad/s with a correlation time of 100 s at 100 Hz.
+//! let bias = Ar1::new(0.9999, 1e-8 * (1.0 - 0.9999 * 0.9999))?;
+//! let axis = Composite::new(vec![Process::White(White::new(1e-6)?), Process::Ar1(bias)]);
+//! let belief = Belief::new(&Model::pooled(100.0, &axis, &axis), FilterStates::Full, 1.0, 800.0)?;
+//! // Position, velocity, attitude, and a bias for each of six axes.
+//! assert_eq!(belief.states, 15);
+//! assert!((belief.initial_bias_sigma(Sensor::Gyro) / 1e-4 - 1.0).abs() < 1e-9);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use super::initial::InitialSettings;
 use super::states::FilterStates;

@@ -3,6 +3,47 @@
 //! The IMU's axes are those of its housing; `q_s_b` takes them (s) to the vehicle's front, right, down
 //! (b). The filter works in s, so that its noise model stays with the axes it was calibrated on; attitudes
 //! go in and come out as those of the vehicle.
+//!
+//! ```
+//! # use nav_sim_navigation::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start as ProfileStart};
+//! use glam::{DQuat, DVec3};
+//! use nav_sim_navigation::earth::GravityModel;
+//! use nav_sim_navigation::ekf::{Belief, FilterStates};
+//! use nav_sim_navigation::fusion::{Recorded, Settings, Start, fuse};
+//! use nav_sim_navigation::scenario::Scenario;
+//! use nav_sim_navigation::sensors::imu::Truth;
+//! use nav_sim_navigation::simulation::{Plan, record};
+//! use nav_sim_signal::noise::{Composite, Model, Process, RandomWalk, White};
+//!
+//! # let start = ProfileStart { t_s: 0.0, lat: 0.9, lon: 0.2, h: 0.0, heading: 0.0, speed: 20.0 };
+//! # let north = Segment { kind: Kind::Straight(Length::Duration(60.0)), climb_m: 0.0, ramp_s: None };
+//! # let drive = Profile { start, bank: Bank::None, ramp_s: 2.0, segments: vec![north] }.build()?;
+//! let axis = Composite::new(vec![Process::White(White::new(1e-6)?), Process::RandomWalk(RandomWalk::new(1e-14)?)]);
+//! let model = Model::pooled(100.0, &axis, &axis);
+//! let scenario = Scenario::default();
+//! let beliefs = [Belief::new(&model, FilterStates::Full, 1.0, 800.0)?.with_initial(&scenario.initial)];
+//! let experiment = scenario.experiment(&drive, Truth::Model(&model), &beliefs, &[], 1);
+//! let recording = record(&Plan::new(&experiment)?, 0);
+//! let recorded = Recorded { imu: &recording.imu, gnss: &recording.gnss };
+//! let sigma = scenario.initial.clone();
+//! let start = Start { t_s: 0.0, state: recording.start, sigma, how: vec![] };
+//! let settings = Settings {
+//!     q_s_b: DQuat::IDENTITY,
+//!     mounting_sigma_b: DVec3::ZERO,
+//!     lever_arm_b: DVec3::ZERO,
+//!     gravity: GravityModel::Wgs84,
+//!     outages: vec![],
+//!     nis_gate: None,
+//!     rows_hz: 1.0,
+//!     smooth: false,
+//! };
+//! let solution = fuse(&recorded, &beliefs[0], &start, &settings, None)?;
+//! let end = solution.rows.last().expect("rows");
+//! let north_m = (end.state.lat - drive.state(end.t_s).lat) * 6.37e6;
+//! // Within four of the standard deviations that the filter states.
+//! assert!(north_m.abs() < 4.0 * end.sigma[0]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 pub mod alignment;
 mod assessment;

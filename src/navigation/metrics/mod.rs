@@ -3,6 +3,15 @@
 //!
 //! Everything here is a pure function of a [`RunResult`](crate::simulation::RunResult) or of what a run
 //! directory keeps of it.
+//!
+//! ```
+//! use nav_sim_navigation::metrics::chi_square_band;
+//!
+//! // Of two degrees of freedom the chi-square law is exponential: its quantiles are −2 ln(1 − p).
+//! let band = chi_square_band(2, 1.0);
+//! assert!((band.lower + 2.0 * 0.975_f64.ln()).abs() < 1e-9);
+//! assert!((band.upper + 2.0 * 0.025_f64.ln()).abs() < 1e-9);
+//! ```
 
 mod agreement;
 mod budget;

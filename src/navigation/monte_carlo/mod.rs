@@ -3,6 +3,31 @@
 //! Batches of eight runs are handed out in order to any number of threads and added up in order as they
 //! come back, so that the result is the same to the last bit. One batch per thread is in flight and few
 //! wait for their turn: memory does not grow with the number of runs, except for one small record per run.
+//!
+//! ```
+//! # use nav_sim_navigation::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start};
+//! use nav_sim_navigation::ekf::{Belief, FilterStates};
+//! use nav_sim_navigation::metrics::{chi_square_band, epochs};
+//! use nav_sim_navigation::monte_carlo;
+//! use nav_sim_navigation::scenario::Scenario;
+//! use nav_sim_navigation::sensors::imu::Truth;
+//! use nav_sim_signal::noise::{Composite, Model, Process, RandomWalk, White};
+//!
+//! # let start = Start { t_s: 0.0, lat: 0.9, lon: 0.2, h: 0.0, heading: 0.0, speed: 20.0 };
+//! # let north = Segment { kind: Kind::Straight(Length::Duration(60.0)), climb_m: 0.0, ramp_s: None };
+//! # let drive = Profile { start, bank: Bank::None, ramp_s: 2.0, segments: vec![north] }.build()?;
+//! let axis = Composite::new(vec![Process::White(White::new(1e-6)?), Process::RandomWalk(RandomWalk::new(1e-14)?)]);
+//! let model = Model::pooled(100.0, &axis, &axis);
+//! let scenario = Scenario::default();
+//! let beliefs = [Belief::new(&model, FilterStates::Full, 1.0, 800.0)?.with_initial(&scenario.initial)];
+//! let experiment = scenario.experiment(&drive, Truth::Model(&model), &beliefs, &[], 1);
+//! let results = monte_carlo::run(&experiment, 40, &|_| {})?;
+//! let last = epochs(&results[0]).pop().expect("an epoch a second");
+//! // The filter has the model of the truth: the mean of 40 NEES is chi-square of 360 degrees of freedom over 40.
+//! let band = chi_square_band(9, 40.0);
+//! assert!((band.lower..band.upper).contains(&last.nees.value));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 use crate::lanes::LANES;
 use crate::simulation::{

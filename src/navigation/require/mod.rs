@@ -2,6 +2,15 @@
 //!
 //! Everything here is linear covariance analysis of a filter that knows its IMU: a state for every process, with the
 //! gains that follow. Errors grow with every noise intensity, so each answer is the zero of a monotone function.
+//!
+//! ```
+//! use nav_sim_navigation::require::{Limit, Quantity, Worst};
+//!
+//! let limit = Limit { quantity: Quantity::P95, most: 5.0 };
+//! let found = Worst { limit, value: 10.0, place: 0 };
+//! // Twice the error allowed.
+//! assert!((found.margin() + 2_f64.ln()).abs() < 1e-15);
+//! ```
 
 mod course;
 mod imu;

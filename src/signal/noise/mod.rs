@@ -2,6 +2,18 @@
 //!
 //! A [`Process`] is one latent stochastic process; a [`Composite`] is the sum of processes that one axis
 //! carries; a [`Model`] is the six axes of an IMU at a sample rate. Parameters are per sample at that rate.
+//!
+//! ```
+//! use nav_sim_signal::noise::{Composite, Process, RandomWalk, White};
+//!
+//! let (white, walk) = (White::new(4e-6)?, RandomWalk::new(1e-12)?);
+//! let axis = Composite::new(vec![Process::White(white), Process::RandomWalk(walk)]);
+//! // At the scale tau = 2^10 samples: sigma2/tau + gamma2 (tau² + 2)/(12 tau).
+//! let tau = 1024.0;
+//! let expected = 4e-6 / tau + 1e-12 * (tau * tau + 2.0) / (12.0 * tau);
+//! assert!((axis.haar_wv(10) / expected - 1.0).abs() < 1e-12);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod allan;
 mod ar1;

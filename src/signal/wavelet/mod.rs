@@ -1,6 +1,15 @@
 //! Haar wavelet variance of recordings: classical, robust, intervals.
 //!
 //! Level j = 1, 2, … has scale tau = 2^j samples. Vectors over levels hold level j at index j − 1.
+//!
+//! ```
+//! use nav_sim_signal::wavelet::classical;
+//!
+//! // Samples of ±1 in turn: neighbours differ by 2, the means of neighbouring pairs not at all.
+//! let signal: Vec<f64> = (0..64).map(|k| if k % 2 == 0 { 1.0 } else { -1.0 }).collect();
+//! assert_eq!(classical(&signal, 2)?, [1.0, 0.0]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod curve;
 pub mod haar;

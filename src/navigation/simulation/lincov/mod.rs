@@ -7,6 +7,27 @@
 //!
 //! The trajectory is reduced once to a [`Track`]: exact maps of the navigation error over steps of a fraction
 //! of a second. Any number of beliefs and truths are then assessed along it, in milliseconds each.
+//!
+//! ```
+//! # use nav_sim_navigation::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start};
+//! use nav_sim_navigation::ekf::{Belief, FilterStates};
+//! use nav_sim_navigation::scenario::Scenario;
+//! use nav_sim_navigation::simulation::lincov::assess;
+//! use nav_sim_signal::noise::{Composite, Model, Process, RandomWalk, White};
+//!
+//! # let start = Start { t_s: 0.0, lat: 0.9, lon: 0.2, h: 0.0, heading: 0.0, speed: 20.0 };
+//! # let north = Segment { kind: Kind::Straight(Length::Duration(60.0)), climb_m: 0.0, ramp_s: None };
+//! # let drive = Profile { start, bank: Bank::None, ramp_s: 2.0, segments: vec![north] }.build()?;
+//! let axis = Composite::new(vec![Process::White(White::new(1e-6)?), Process::RandomWalk(RandomWalk::new(1e-14)?)]);
+//! let model = Model::pooled(100.0, &axis, &axis);
+//! let scenario = Scenario::default();
+//! let track = scenario.track(&drive, &model, &[])?;
+//! let belief = Belief::new(&model, FilterStates::Full, 1.0, 800.0)?.with_initial(&scenario.initial);
+//! let assessment = assess(&track, &belief, &model);
+//! // A filter that has the model of the truth states its errors: a NEES of 9 for nine states.
+//! assert!(assessment.reports.iter().all(|report| (report.nees - 9.0).abs() < 1e-6));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod branch;
 mod column;

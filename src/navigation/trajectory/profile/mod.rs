@@ -3,6 +3,19 @@
 //!
 //! Heading, speed and slope are closed-form functions of time within a segment; latitude and longitude are
 //! integrated on the ellipsoid (Runge-Kutta of fourth order, 0.02 s), then splined.
+//!
+//! ```
+//! use nav_sim_navigation::earth::radii;
+//! use nav_sim_navigation::trajectory::profile::{Bank, Kind, Length, Profile, Segment, Start};
+//!
+//! let start = Start { t_s: 0.0, lat: 0.9, lon: 0.2, h: 0.0, heading: 0.0, speed: 20.0 };
+//! let north = Segment { kind: Kind::Straight(Length::Duration(60.0)), climb_m: 0.0, ramp_s: None };
+//! let drive = Profile { start, bank: Bank::None, ramp_s: 2.0, segments: vec![north] }.build()?;
+//! let arc_m = (drive.state(60.0).lat - start.lat) * radii(start.lat.sin()).meridian;
+//! // 60 s at 20 m/s; the radius changes by 1e-6 on the way.
+//! assert!((arc_m - 1200.0).abs() < 0.01);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod error;
 mod path;
