@@ -84,7 +84,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let candidates = candidates(args)?;
     let inputs = args.inputs.iter().chain([&args.trajectory]).chain(&args.scenario).map(PathBuf::as_path);
     let _own = jobs::claim_choice(&args.out, inputs, session.existing())?;
-    let _picture = args.plot.claim(args.inputs.iter().chain([&args.trajectory]))?;
+    let _picture = args.plot.claim(args.inputs.iter().chain([&args.trajectory]), session)?;
     let scenario = checked_scenario(args.scenario.as_deref(), &args.outages)?;
     let trajectory = read::trajectory(&args.trajectory, session)?;
     let seed = session.seed(scenario.run.seed);

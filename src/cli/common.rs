@@ -27,7 +27,7 @@ pub(crate) struct Common {
     /// Show no progress, neither bars nor lines
     #[arg(long, global = true)]
     pub(crate) no_progress: bool,
-    /// Replace existing results that differ
+    /// Replace results of another kind, configuration or seed
     #[arg(long, global = true)]
     pub(crate) force: bool,
     /// When to use colour
@@ -137,7 +137,7 @@ impl Session {
 
     /// Writes a result as a file, and says so.
     pub(crate) fn write(&self, path: &Path, contents: impl AsRef<[u8]>) -> Result<(), Failure> {
-        atomic::write_result(path, contents, self.existing())?;
+        atomic::write(path, contents)?;
         self.wrote(path);
         Ok(())
     }

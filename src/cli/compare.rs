@@ -1,12 +1,12 @@
 //! `nav-sim compare`: ratios between runs.
 
-use super::pictures::{PlotArgs, replaceable};
+use super::pictures::{PlotArgs, claim_output};
 use super::{Failure, Session};
-use crate::formats::atomic;
+use crate::formats::atomic::{self, Written};
 use crate::jobs::{self, Comparison};
 use crate::report::{self, PaperFigure, ShownComparison};
 use nav_sim_navigation::simulation::REPORTED_NAMES;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Compare runs: verdicts, and ratios of ASEE and RMSE per outage and state
 ///
@@ -35,7 +35,7 @@ pub(crate) struct Args {
     /// States in the table (repeatable), or "all"
     #[arg(long = "state", value_name = "STATE", default_values = ["pos_e_m", "roll_deg"])]
     states: Vec<String>,
-    /// Where to write the comparison [default: comparison.json, unless that name is taken by something else]
+    /// Where to write the comparison [default: comparison.json]
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Print the table of ASEE ratios alone, in this form
@@ -56,20 +56,18 @@ enum TableForm {
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
-    let out = &args.out.clone().map_or_else(unasked_output, Ok)?;
+    let out = args.out.as_deref().unwrap_or(Path::new("comparison.json"));
     let page = out.with_extension("html");
     let read_from = args.runs.iter().chain([&args.reference]);
     let inputs: Vec<PathBuf> =
         read_from.flat_map(|run| report::RUN_FILES.map(|name| run.join(name))).collect();
-    let _own = atomic::claim_file(out, inputs.iter().map(PathBuf::as_path))?;
-    let _page = atomic::claim_file(&page, inputs.iter().map(PathBuf::as_path))?;
-    let _picture = args.plot.claim(&inputs)?;
-    replaceable(&page)?;
+    let _own = claim_output(Some(out), &inputs, Written::Comparison, session)?;
+    let _page = claim_output(Some(&page), &inputs, Written::Page, session)?;
+    let _picture = args.plot.claim(&inputs, session)?;
     let compared = Compared::new(args, session)?;
     let json = report::json(&compared.found.file);
-    // Before the files: what was found is seen also where a name is taken.
     session.show(|| json.clone(), || args.table.map_or_else(|| compared.text(), |form| compared.table(form)));
-    atomic::write_result(out, &json, session.existing())?;
+    atomic::write(out, &json)?;
     atomic::write(&page, compared.page(&[]))?;
     args.plot.write(|| compared.shown().svg(), session)?;
     session.say(format!("wrote {}, {}", out.display(), page.display()));
@@ -154,20 +152,6 @@ impl Compared {
         }
         lines.join("\n")
     }
-}
-
-/// The output that nobody named: a file there that is no comparison is somebody's own.
-fn unasked_output() -> Result<PathBuf, Failure> {
-    let path = PathBuf::from("comparison.json");
-    let is_comparison = |text: String| {
-        let file: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
-        ["schema_version", "reference", "paired", "rows"].iter().all(|key| !file[key].is_null())
-    };
-    if !path.exists() || std::fs::read_to_string(&path).is_ok_and(is_comparison) {
-        return Ok(path);
-    }
-    let failure = Failure::input(format!("{} is there and is no comparison", path.display()));
-    Err(failure.hint("name the output with --out"))
 }
 
 pub(super) fn states(names: &[String]) -> Result<Vec<usize>, Failure> {

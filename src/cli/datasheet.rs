@@ -2,6 +2,7 @@
 
 use super::pictures::claim_output;
 use super::{Failure, Session, parse};
+use crate::formats::atomic::Written;
 use crate::formats::datasheet::{self, CATALOGUE, Datasheet, Entry, Figure, Quantity};
 use crate::formats::model_file;
 use crate::formats::suggest::nearest;
@@ -128,7 +129,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         session.result(listed.trim_end());
         return Ok(());
     }
-    let _own = claim_output(args.out.as_deref(), &args.entry)?;
+    let _own = claim_output(args.out.as_deref(), &args.entry, Written::Datasheet, session)?;
     let mut sheet = match (&args.entry, &args.unit) {
         (Some(path), _) => datasheet::read(path)?,
         (None, Some(name)) => named(name)?,
@@ -149,7 +150,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         session.result(&if session.json() { as_json(&toml)? } else { toml.trim_end().to_owned() });
         return Ok(());
     };
-    model_file::write(out, &made.file, session.existing())?;
+    model_file::write(out, &made.file)?;
     if session.json() {
         session.result(&as_json(&model_file::to_toml(&made.file))?);
     }

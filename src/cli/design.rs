@@ -65,7 +65,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if args.hours.is_some_and(|hours| hours > LONGEST_H) {
         return Err(Failure::input("--hours: longer than a year"));
     }
-    let _pictures = args.pictures.claim(std::iter::once(&args.model).chain(&args.trajectory))?;
+    let _pictures = args.pictures.claim(std::iter::once(&args.model).chain(&args.trajectory), session)?;
     let file = read::model(&args.model, session)?;
     let mut scenario = scenario(args)?;
     let mut navigation = None;

@@ -4,7 +4,7 @@ use super::parse::one_of;
 use super::pictures::claim_output;
 use super::{Failure, Session};
 use crate::export::{Export, ExportError, Settings, Target};
-use crate::formats::atomic;
+use crate::formats::atomic::{self, Written};
 use crate::formats::model_file::{self, ModelFile};
 use crate::jobs::{self, Recorded};
 use crate::report;
@@ -55,7 +55,7 @@ fn horizon(text: &str) -> Result<Horizon, String> {
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let file = model_file::read(&args.model)?;
     let shown = args.model.display().to_string();
-    let _own = claim_output(args.out.as_deref(), [&args.model])?;
+    let _own = claim_output(args.out.as_deref(), [&args.model], Written::Export, session)?;
     let turn_on = file.turn_on.unwrap_or_default();
     let settings = Settings {
         policy: args.policy,
@@ -67,7 +67,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         .map_err(|e| Failure::input(format!("{shown}: {e}")).maybe_hint(advice(&e)))?;
     let text = export.text(&shown);
     if let Some(out) = &args.out {
-        atomic::write_result(out, text.clone() + "\n", session.existing())?;
+        atomic::write(out, text.clone() + "\n")?;
     }
     for line in export.summary() {
         session.say(&line);

@@ -1,7 +1,7 @@
 //! Pictures and pages that commands write beside their results.
 
 use super::{Failure, Session};
-use crate::formats::atomic::{self, Claim};
+use crate::formats::atomic::{self, Claim, Written};
 use crate::report::page::{self, Form, Page};
 use nav_sim_document::Document;
 use std::path::{Path, PathBuf};
@@ -19,14 +19,15 @@ impl PlotArgs {
     pub(super) fn claim(
         &self,
         inputs: impl IntoIterator<Item: AsRef<Path>>,
+        session: &Session,
     ) -> Result<Option<Claim>, Failure> {
-        self.plot.as_deref().map(|path| claim_picture(path, inputs)).transpose()
+        self.plot.as_deref().map(|path| claim_picture(path, inputs, session)).transpose()
     }
 
     /// Writes the picture, if one is asked for.
     pub(super) fn write(&self, picture: impl FnOnce() -> String, session: &Session) -> Result<(), Failure> {
         if let Some(path) = &self.plot {
-            write_picture(path, picture(), session)?;
+            write_picture(path, picture())?;
             session.wrote(path);
         }
         Ok(())
@@ -48,9 +49,10 @@ impl PageArgs {
     pub(super) fn claim(
         &self,
         inputs: impl IntoIterator<Item: AsRef<Path>> + Clone,
+        session: &Session,
     ) -> Result<[Option<Claim>; 2], Failure> {
-        let page = claim_output(self.page.as_deref(), inputs.clone())?;
-        Ok([page, self.plot.claim(inputs)?])
+        let page = claim_output(self.page.as_deref(), inputs.clone(), Written::Page, session)?;
+        Ok([page, self.plot.claim(inputs, session)?])
     }
 
     /// Writes what is asked for of a document.
@@ -75,22 +77,30 @@ impl PageArgs {
 pub(super) fn claim_picture(
     path: &Path,
     inputs: impl IntoIterator<Item: AsRef<Path>>,
+    session: &Session,
 ) -> Result<Claim, Failure> {
-    form(path)?;
-    claim_own(path, inputs)
+    let kind = if form(path)? == Form::Svg { Written::Svg } else { Written::Png };
+    claim_own(path, inputs, kind, session)
 }
 
-fn claim_own(path: &Path, inputs: impl IntoIterator<Item: AsRef<Path>>) -> Result<Claim, Failure> {
+fn claim_own(
+    path: &Path,
+    inputs: impl IntoIterator<Item: AsRef<Path>>,
+    kind: Written,
+    session: &Session,
+) -> Result<Claim, Failure> {
     let inputs: Vec<_> = inputs.into_iter().collect();
-    Ok(atomic::claim_file(path, inputs.iter().map(AsRef::as_ref))?)
+    Ok(atomic::claim_result(path, inputs.iter().map(AsRef::as_ref), kind, session.existing())?)
 }
 
-/// Claims an output that is written where it is named; refuses one that is an input.
+/// Claims an output of that kind, if one is asked for.
 pub(super) fn claim_output(
     path: Option<&Path>,
     inputs: impl IntoIterator<Item: AsRef<Path>>,
+    kind: Written,
+    session: &Session,
 ) -> Result<Option<Claim>, Failure> {
-    path.map(|path| claim_own(path, inputs)).transpose()
+    path.map(|path| claim_own(path, inputs, kind, session)).transpose()
 }
 
 /// The form of a picture, by its name.
@@ -105,19 +115,7 @@ fn form(path: &Path) -> Result<Form, Failure> {
 }
 
 /// Writes a picture in the form that its name says.
-pub(super) fn write_picture(path: &Path, svg: String, session: &Session) -> Result<(), Failure> {
+pub(super) fn write_picture(path: &Path, svg: String) -> Result<(), Failure> {
     let picture = page::encode(svg, form(path)?).map_err(Failure::could_not)?;
-    Ok(atomic::write_result(path, picture, session.existing())?)
-}
-
-/// Refuses to replace a page of somebody else by one that nobody named.
-pub(super) fn replaceable(path: &Path) -> Result<(), Failure> {
-    match std::fs::read_to_string(path) {
-        Ok(text) if !page::is_own(&text) => {
-            let message =
-                format!("{} is there and is no page of nav-sim: it is not replaced", path.display());
-            Err(Failure::input(message).hint("move it away, or name another output"))
-        }
-        _ => Ok(()),
-    }
+    Ok(atomic::write(path, picture)?)
 }

@@ -2,6 +2,7 @@
 
 use super::pictures::{PageArgs, claim_output};
 use super::{Failure, Session, parse, read, turn_on};
+use crate::formats::atomic::Written;
 use crate::formats::datasheet::{self, CATALOGUE, Datasheet};
 use crate::formats::file_kind::{self, FileKind};
 use crate::formats::model_file;
@@ -154,7 +155,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             Failure::input("--outage longest needs a MODEL").hint("without one, give a length in seconds")
         );
     }
-    let _pictures = args.pictures.claim(std::iter::once(&args.trajectory).chain(&args.model))?;
+    let _pictures = args.pictures.claim(std::iter::once(&args.trajectory).chain(&args.model), session)?;
     let asked = requirements(args, session)?;
     match (&args.model, &args.catalogue) {
         (Some(path), _) => given(path, args, &asked, session),
@@ -165,7 +166,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 /// The IMU that is needed.
 fn sought(args: &Args, requirements: &Requirements, session: &Session) -> Result<(), Failure> {
-    let _own = claim_output(args.out.as_deref(), [&args.trajectory])?;
+    let _own = claim_output(args.out.as_deref(), [&args.trajectory], Written::Required, session)?;
     let (needed, question) = requirements.needed(args.corr_time_s, args.iso_drift).map_err(|e| {
         let hint = match e {
             RequireError::Loose { .. } => "a smaller limit, or a longer outage",
@@ -176,7 +177,7 @@ fn sought(args: &Args, requirements: &Requirements, session: &Session) -> Result
     session.show(|| needed.json(&question), || needed.text(&question));
     let drawn = args.pictures.write(|| needed_page(&needed, &question), session);
     if let Some(out) = &args.out {
-        model_file::write(out, &requirements.model_file(&needed, &question), session.existing())?;
+        model_file::write(out, &requirements.model_file(&needed, &question))?;
         session.wrote(out);
     }
     drawn

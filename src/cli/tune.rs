@@ -5,6 +5,7 @@ use super::parse::one_of;
 use super::pictures::{PageArgs, claim_output};
 use super::run::{OutageArg, checked_scenario, parse_outage, placed};
 use super::{Failure, Session, read, turn_on};
+use crate::formats::atomic::Written;
 use crate::formats::draws_file::{self, Draws};
 use crate::formats::model_file::{self, ModelFile};
 use crate::jobs::{self, Truths, TuneInputs};
@@ -81,8 +82,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     refuse_recordings(args)?;
     let mut scenario = checked_scenario(args.scenario.as_deref(), &args.outages)?;
     let files = files(args)?;
-    let _pictures = args.pictures.claim(files.iter().map(|f| &f.path))?;
-    let _own = claim_output(args.out.as_deref(), files.iter().map(|f| &f.path))?;
+    let _pictures = args.pictures.claim(files.iter().map(|f| &f.path), session)?;
+    let _own = claim_output(args.out.as_deref(), files.iter().map(|f| &f.path), Written::Tuned, session)?;
     let file = read::model(&args.model, session)?;
     let model = read::at_rate(&args.model, &file.model, scenario.imu.rate_hz, session)?;
     turn_on::expect(&mut scenario.initial, &file, &args.model, session);
@@ -112,7 +113,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         let aim = if args.aim == Aim::Mean { "mean of" } else { "worst of" };
         let honest_for = format!("{aim} {}", if args.intervals { "intervals" } else { "truths" });
         let tuned = jobs::tuned(&file, &result.factors, &honest_for, &files);
-        model_file::write(out, &tuned, session.existing())?;
+        model_file::write(out, &tuned)?;
         session.wrote(out);
     }
     drawn

@@ -5,6 +5,7 @@ use super::pictures::{PageArgs, claim_output};
 use super::recordings::{RecordingArgs, Said};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
+use crate::formats::atomic::Written;
 use crate::jobs::{self, Intervals, WaveletOptions};
 use crate::report::{self, SignalCurves, SignalsFile};
 use std::path::PathBuf;
@@ -45,8 +46,8 @@ const INTERVALS: [(&str, &str); 2] = [
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let tuning = args.tuning.tuning()?;
     let inputs = read::listed(&args.files)?;
-    let _own = claim_output(args.out.as_deref(), &inputs)?;
-    let _pictures = args.pictures.claim(&inputs)?;
+    let _own = claim_output(args.out.as_deref(), &inputs, Written::Signals, session)?;
+    let _pictures = args.pictures.claim(&inputs, session)?;
     let intervals = args.intervals;
     let options = WaveletOptions {
         reading: args.recordings.options(),

@@ -47,7 +47,6 @@ pub use document::{Banner, Block, Document, Importance, Note, Tone};
 pub use escape::escape;
 pub use names::short_names;
 pub use number::{percent, readable, seconds, shortest, six_digits, squared, window};
-pub use page::is_own;
 pub use picture::{Form, encode, svg};
 pub use table::{Cell, Table};
 pub use terminal::NOTES;

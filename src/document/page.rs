@@ -18,12 +18,6 @@ const GENERATOR: &str = "<meta name=\"generator\" content=\"nav-sim\">";
 /// Characters beyond which a text in a table has more than one line.
 const LONG: usize = 40;
 
-/// Whether a text is a page of this crate.
-#[must_use]
-pub fn is_own(html: &str) -> bool {
-    html.contains(GENERATOR)
-}
-
 impl Document {
     /// The page.
     #[must_use]

@@ -36,5 +36,13 @@ pub(crate) fn png(svg: &str) -> Result<Vec<u8>, String> {
     let mut dotted =
         tiny_skia::Pixmap::new(dots.width(), dots.height()).ok_or("it does not fit into memory")?;
     resvg::render(&picture, tiny_skia::Transform::from_scale(zoom, zoom), &mut dotted.as_mut());
-    dotted.encode_png().map_err(|e| e.to_string())
+    dotted.encode_png().map(|png| signed(&png)).map_err(|e| e.to_string())
+}
+
+/// With the name of the program in a text chunk behind the signature and the header.
+fn signed(png: &[u8]) -> Vec<u8> {
+    const SIGNATURE_AND_HEADER: usize = 33;
+    const CHUNK: &[u8] = b"\0\0\0\x10tEXtSoftware\0nav-sim\x58\x6e\x2b\xd7";
+    let (head, rest) = png.split_at(SIGNATURE_AND_HEADER);
+    [head, CHUNK, rest].concat()
 }

@@ -31,7 +31,6 @@ mod toml_path;
 mod toml_places;
 pub mod trajectory_file;
 
-pub use atomic::Existing;
 pub use error::FileError;
 pub(crate) use error::system_words;
 pub(crate) use error::{Kind, Place, Setting};

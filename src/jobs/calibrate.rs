@@ -56,6 +56,14 @@ impl EstimatorChoice {
         matches!(self, Self::One(estimator) if estimator.is_single())
     }
 
+    /// The estimators that it may come to.
+    pub(crate) fn possible(self) -> Vec<Estimator> {
+        match self {
+            Self::One(estimator) => vec![estimator],
+            Self::All => [1, 2].into_iter().flat_map(|n| self.estimators(n)).flatten().collect(),
+        }
+    }
+
     /// The estimators for so many recordings.
     fn estimators(self, recordings: usize) -> Result<Vec<Estimator>, JobError> {
         match self {

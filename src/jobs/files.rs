@@ -1,10 +1,10 @@
 //! The files of a calibration: for each estimator a model, the curves behind it and the draws behind its intervals.
 
 use super::Calibration;
-use crate::formats::atomic::{self, AtomicFile, Claim, Existing};
+use crate::formats::atomic::{self, AtomicFile, Claim, Existing, Written};
 use crate::formats::draws_file::{self, DrawsFile};
 use crate::formats::model_file::{self, CalibrationNote, ModelFile};
-use crate::formats::{FileError, Place, Setting, hash};
+use crate::formats::{FileError, Place, hash};
 use crate::report::{self, CurvesFile};
 use nav_sim_calibration::{Diagnosis, Estimator, Outcome};
 use nav_sim_signal::noise::Model;
@@ -37,55 +37,25 @@ impl ModelFiles {
         estimators.iter().map(files).collect()
     }
 
-    /// The files of each estimator, claimed before the work but for `out` itself, and none of them an input.
+    /// The files of each estimator, claimed before the work. None of them is an input.
     ///
     /// # Errors
-    /// When one cannot be made, is an input, or another command writes it.
+    /// When one cannot be made, is an input or not of a calibration, or another command writes it.
     pub(crate) fn claim(
         out: &Path,
         estimators: &[Estimator],
         inputs: &[PathBuf],
-    ) -> Result<(Vec<Self>, Vec<Claim>), FileError> {
-        let all = Self::of(out, estimators);
-        let inputs = || inputs.iter().map(PathBuf::as_path);
-        atomic::guard_inputs(out, inputs())?;
-        // What stands beside a model is claimed even where it is called like `out`: it would replace the model.
-        let models = all.iter().map(|f| &f.model).filter(|path| *path != out);
-        let others = models.chain(all.iter().flat_map(|f| [&f.curves, &f.draws, &f.page]));
-        let claims = others.map(|path| atomic::claim_file(path, inputs())).collect::<Result<_, _>>()?;
-        Ok((all, claims))
-    }
-
-    /// Where the files go: beside other models that are there and are to stay.
-    pub(crate) fn placed(
-        &self,
-        calibration: &Calibration,
-        note: &CalibrationNote,
         existing: Existing,
-    ) -> Self {
-        let (curves, model) = self.contents(calibration, note);
-        let model = model_file::to_toml(&model);
-        let files_of_path = |path: &Path| Self::of(path, &[self.estimator]).remove(0);
-        let is_usable = |path: &Path| {
-            atomic::guard_contents(path, model.as_bytes(), existing)
-                .and_then(|()| {
-                    atomic::guard_contents(&files_of_path(path).curves, curves.as_bytes(), existing)
-                })
-                .is_ok()
+    ) -> Result<(Vec<Self>, Vec<Claim>), FileError> {
+        is_file(out)?;
+        let all = Self::of(out, estimators);
+        let kinds = [Written::Calibrated, Written::Curves, Written::Draws, Written::Page];
+        let paths = all.iter().flat_map(|f| [&f.model, &f.curves, &f.draws, &f.page].into_iter().zip(kinds));
+        let claim = |(path, kind): (&PathBuf, Written)| {
+            atomic::claim_result(path, inputs.iter().map(PathBuf::as_path), kind, existing)
         };
-        if is_usable(&self.model) {
-            self.clone()
-        } else {
-            files_of_path(&atomic::name_beside(&self.model, is_usable))
-        }
-    }
-
-    /// Refuses what had to be written beside.
-    ///
-    /// # Errors
-    /// When it was.
-    pub(crate) fn refuse_beside(&self, placed: &Self) -> Result<(), FileError> {
-        if placed == self { Ok(()) } else { Err(atomic::kept_beside(&self.model, &placed.model)) }
+        let claims = paths.map(claim).collect::<Result<_, _>>()?;
+        Ok((all, claims))
     }
 
     /// Writes the files of all estimators, the pages among them; their names.
@@ -182,56 +152,15 @@ impl ModelFiles {
     }
 }
 
-/// Claims a model file before the work: several files are made of it, by its name.
-///
-/// # Errors
-/// When it cannot be replaced by a file, or another command writes it.
-pub(crate) fn claim_model(out: &Path) -> Result<Claim, FileError> {
-    let what = match std::fs::metadata(out) {
-        _ if out.as_os_str() == "-" => "is no file, and a model is a file with its curves beside it",
-        Ok(m) if m.is_dir() => "is a directory",
-        Ok(m) if !m.is_file() => "is a device, and a model is a file with its curves beside it",
-        _ if out.file_name().is_none() || out.as_os_str().to_string_lossy().ends_with('/') => {
-            "is a directory"
-        }
-        _ => return atomic::claim_file(out, []),
-    };
-    let error = FileError::contents(out.display().to_string(), Place::Itself, what);
-    Err(error.advice("name a file, such as model.toml"))
-}
-
-/// Refuses at once what would be refused after the work: a file that is no calibration is another result, and where the
-/// bootstrap, and so the file, is another each time (`drawn`), so is a calibration.
-///
-/// # Errors
-/// When the file is to stay.
-pub(crate) fn not_anew(out: &Path, drawn: bool, existing: Existing) -> Result<(), FileError> {
-    if drawn || !is_calibrated(out) {
-        atomic::guard_contents(out, &[], existing)?;
-    }
-    Ok(())
-}
-
-/// Refuses to replace a file of the default name that no calibration wrote: nobody asked for it by name.
-///
-/// # Errors
-/// When there is one.
-pub(crate) fn not_of_others(out: &Path) -> Result<(), FileError> {
-    if !out.exists() || is_calibrated(out) {
+/// Refuses what is no regular file: several files are made of a model's, by its name.
+fn is_file(out: &Path) -> Result<(), FileError> {
+    let is_directory =
+        out.is_dir() || out.file_name().is_none() || out.as_os_str().to_string_lossy().ends_with('/');
+    if !is_directory && out.as_os_str() != "-" && (out.is_file() || !out.exists()) {
         return Ok(());
     }
-    let message = "is not a model that nav-sim calibrate wrote: it is not replaced";
-    let error = FileError::contents(out.display().to_string(), Place::Itself, message);
-    Err(error.setting(Setting::Output).advice("move that file away"))
-}
-
-/// Whether a file is a model that a calibration wrote.
-fn is_calibrated(path: &Path) -> bool {
-    let provenance = model_file::read(path).ok().and_then(|file| file.provenance);
-    provenance.is_some_and(|p| {
-        let program = p.get("program").and_then(toml::Value::as_str);
-        program.is_some_and(|name| name.starts_with("nav-sim")) && p.contains_key("estimator")
-    })
+    let error = FileError::contents(out.display().to_string(), Place::Itself, "is not a file");
+    Err(error.advice("name a file, such as model.toml"))
 }
 
 fn with_suffix(path: &Path, suffix: &str) -> PathBuf {

@@ -57,7 +57,7 @@ pub(crate) use curves::read_curves;
 pub(crate) use design::{DesignInputs, Destination, design};
 pub use error::JobError;
 pub(crate) use estimator_study::EstimatorStudy;
-pub(crate) use files::{ModelFiles, claim_model, not_anew, not_of_others};
+pub(crate) use files::ModelFiles;
 pub use fuse::{FusionFilter, FusionFilterError};
 pub use fusion::{FuseError, Fused, RecordedDrive};
 pub use navigate::{NavigateError, NavigateInputs, Navigation, Note, TrueImu, navigate};

@@ -91,7 +91,7 @@ pub(crate) use warm_up::{warm_up_in_short, warm_up_lines};
 pub(crate) mod page {
     pub(crate) use nav_sim_document::{
         Axis, Cell, Chart, Colour, Document as Page, Form, Interval, Mark, Panel, Series, Stroke, Table,
-        Tone, encode, escape, is_own, svg,
+        Tone, encode, escape, svg,
     };
 }
 

@@ -1,4 +1,4 @@
-//! Results are never replaced silently: what holds another result is refused, the same is written again.
+//! A file takes the place of an earlier result of its kind, a directory that of the same run; nothing else is replaced.
 
 use crate::common::drive::{MODEL, Ran, done, place_with, plain};
 use std::fs;
@@ -13,15 +13,15 @@ fn refused(ran: &Ran, what: &str) {
     assert!(ran.stderr.contains(what) && ran.stderr.contains("--force"), "{}", ran.stderr);
 }
 
-/// Each command twice (the same: fine), then as it makes something else (refused, the old stays), then with --force.
+/// Each command twice, then as it makes something else.
 #[test]
-fn another_result_is_refused() {
+fn files_take_the_place_of_their_kind_and_directories_that_of_the_same_run() {
     let place = place_with(DRIVE, MODEL);
     let at = |name: &str| place.path().join(name);
     done(place.path(), "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec");
     done(place.path(), "trajectory record drive.toml imu.toml --seed 3 -o log");
     done(place.path(), "run drive.toml imu.toml --runs 2 --outage none --seed 1 -o reference");
-    let calibrate = "calibrate rec --model WN+RW --bootstrap 0 -o out.toml";
+    let calibrate = "calibrate rec --model WN+RW --bootstrap 0 -o out.toml --plot out.svg";
     let fuse = "fuse log/imu.csv log/gnss.csv imu.toml --initial log/initial.toml -o fused";
     for (command, change, file) in [
         ("run drive.toml imu.toml --runs 2 --outage none --seed 1 -o run", "--seed 2", "run/summary.json"),
@@ -29,10 +29,11 @@ fn another_result_is_refused() {
         ("synthesize imu.toml --samples 64 --seed 1 -o made", "--samples 65", "made/replicate_1.csv"),
         ("trajectory record drive.toml imu.toml --seed 1 -o again", "--seed 2", "again/imu.csv"),
         (calibrate, "--weighting edof", "out.toml"),
+        (calibrate, "--weighting ci", "out.svg"),
         ("export imu.toml --target kalibr -o imu.yaml", "--policy envelope", "imu.yaml"),
         ("datasheet --unit stim300 -o sheet.toml", "--rate-hz 200", "sheet.toml"),
         ("compare run --reference reference", "--reference run", "comparison.json"),
-        ("wv rec -o wv.json", "--scales 5", "wv.json"),
+        ("wv rec -o wv.json --page wv.html", "--scales 5", "wv.json"),
         ("trajectory convert drive.toml --rate-hz 1 -o drive.csv", "--rate-hz 2", "drive.csv"),
         ("trajectory generate drive.toml --rate-hz 1 -o drive.csv.gz", "--rate-hz 2", "drive.csv.gz"),
     ] {
@@ -42,7 +43,7 @@ fn another_result_is_refused() {
         }
         let before = fs::read(at(file)).unwrap();
         let flag = change.split(' ').next().unwrap();
-        let other = match command.split_once(&format!("{flag} ")) {
+        let mut other = match command.split_once(&format!("{flag} ")) {
             Some((start, rest)) => {
                 format!(
                     "{start}{change}{}",
@@ -51,16 +52,15 @@ fn another_result_is_refused() {
             }
             None => format!("{command} {change}"),
         };
-        refused(&plain(place.path(), &other), "holds");
-        assert!(fs::read(at(file)).unwrap() == before, "{other}");
-        let ran = plain(place.path(), &format!("{other} --force"));
+        if file.contains('/') {
+            refused(&plain(place.path(), &other), "holds");
+            assert!(fs::read(at(file)).unwrap() == before, "{other}");
+            other += " --force";
+        }
+        let ran = plain(place.path(), &other);
         assert_eq!(ran.code, 0, "{other}\n{}", ran.stderr);
         assert!(fs::read(at(file)).unwrap() != before, "{other}");
     }
-    // A seed that is drawn makes another model: known before the work.
-    let ran = plain(place.path(), "calibrate rec --model WN+RW --bootstrap 19 -o out.toml");
-    refused(&ran, "out.toml");
-    assert!(!ran.stderr.contains("recordings at"), "{}", ran.stderr);
 }
 
 /// A fusion is known by what decides it: not by the words of its command, its order, or where its files are.
@@ -136,38 +136,63 @@ fn what_another_command_writes_is_refused_at_once() {
     }
 }
 
-/// What the work has made is kept beside what is not replaced, under the first name that is free or holds the same.
+/// Before the work, and with `--force` too; another kind of result gives way to `--force`.
 #[test]
-fn a_result_that_is_refused_after_the_work_is_not_lost() {
+fn what_nav_sim_did_not_write_is_never_replaced() {
     let place = place_with(DRIVE, MODEL);
     let at = |name: &str| place.path().join(name);
-    let text = |name: &str| fs::read_to_string(at(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
     done(place.path(), "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec");
-    let calibrate = "calibrate rec --model WN+RW --bootstrap 0 --seed 1 --quiet";
-    done(place.path(), &format!("{calibrate} --weighting edof -o wanted.toml --plot wanted.svg"));
-    done(place.path(), &format!("{calibrate} -o m.toml --plot m.svg"));
-    let before = text("m.toml");
-    for _ in 0..2 {
-        let ran = plain(place.path(), &format!("{calibrate} --weighting edof -o m.toml --plot m.svg"));
-        refused(&ran, "error: m.toml holds another result, this one is in m-2.toml");
-        assert!(!ran.stdout.is_empty(), "the fits are shown");
+    let header = "t_s,lat_deg,lon_deg,h_m,v_n_m_s,v_e_m_s,v_d_m_s,roll_deg,pitch_deg,yaw_deg\n";
+    let own_table = format!("{header}0.0,46.5,6.5,400.0,0.0,0.0,0.0,0.0,0.0,0.0\n");
+    let own_model = fs::read_to_string(at("imu.toml")).unwrap();
+    let calibrate = "calibrate rec --model WN --bootstrap 0 -o";
+    for (command, file, own) in [
+        (format!("{calibrate} m.toml"), "m.toml", own_model.as_str()),
+        (format!("{calibrate} m.toml"), "m.wv.json", "{ \"schema_version\": 1 }"),
+        (format!("{calibrate} m.toml"), "m.html", "<html></html>"),
+        (format!("{calibrate} m.toml --plot m.svg"), "m.svg", "<svg></svg>"),
+        ("datasheet --unit stim300 -o imu.toml".to_owned(), "imu.toml", own_model.as_str()),
+        ("wv rec -o a.json".to_owned(), "a.json", "{}"),
+        ("trajectory convert drive.toml --rate-hz 1 -o own.csv".to_owned(), "own.csv", own_table.as_str()),
+        ("trajectory plot drive.toml -o drive.svg".to_owned(), "drive.svg", "<svg></svg>"),
+    ] {
+        fs::write(at(file), own).unwrap();
+        for force in ["", " --force"] {
+            let ran = plain(place.path(), &format!("{command}{force}"));
+            let told = format!("{file} is not of this command: it is not replaced");
+            assert!(ran.code == 2 && ran.stderr.contains(&told), "{command}: {}", ran.stderr);
+            assert!(ran.stdout.is_empty() && !ran.stderr.contains("4096"), "{command}: {}", ran.stderr);
+            assert_eq!(fs::read_to_string(at(file)).unwrap(), own, "{command}");
+        }
+        fs::remove_file(at(file)).unwrap();
     }
-    assert_eq!(text("m.toml"), before);
-    // the curves beside it are its own: the hash in the model says so
-    for (beside, wanted) in
-        [("m-2.toml", "wanted.toml"), ("m-2.wv.json", "wanted.wv.json"), ("m-2.svg", "wanted.svg")]
-    {
-        assert_eq!(text(beside), text(wanted), "{beside}");
-    }
-    assert!(at("m-2.html").exists() && !at("m-3.toml").exists());
+    done(place.path(), "datasheet --unit stim300 -o m.toml");
+    refused(&plain(place.path(), &format!("{calibrate} m.toml")), "m.toml holds another kind of result");
+    done(place.path(), &format!("{calibrate} m.toml"));
+}
 
-    done(place.path(), "wv rec --scales 5 -o wanted.json --page wanted.html");
-    fs::write(at("a.json"), "{}").unwrap();
-    fs::write(at("a.page.html"), "mine").unwrap();
-    let ran = plain(place.path(), "wv rec --scales 5 -o a.json --page a.page.html");
-    refused(&ran, "a.json holds another result, this one is in a-2.json");
-    assert_eq!((text("a-2.json"), text("a-2.page.html")), (text("wanted.json"), text("wanted.html")));
-    assert_eq!((text("a.json"), text("a.page.html")), ("{}".to_owned(), "mine".to_owned()));
+/// The default name has the newest, and what stands beside it is of the newest.
+#[test]
+fn a_second_calibration_takes_the_place_of_the_first() {
+    let place = place_with(DRIVE, MODEL);
+    let text = |name: &str| fs::read_to_string(place.path().join(name)).unwrap();
+    for (rec, seed) in [("a", 1), ("b", 2)] {
+        done(place.path(), &format!("synthesize imu.toml --samples 4096 --seed {seed} -o {rec}"));
+        let calibrate =
+            "calibrate {rec} --estimator rgmwm --model WN+RW --bootstrap 19".replace("{rec}", rec);
+        let ran = plain(place.path(), &calibrate);
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        done(place.path(), &format!("{calibrate} --seed 1 -o {rec}.toml"));
+        assert!(text("model.toml").contains(&format!("{rec}/replicate_1.csv")));
+        assert_eq!(text("model.wv.json"), text(&format!("{rec}.wv.json")));
+    }
+    let mut names: Vec<_> = fs::read_dir(place.path())
+        .unwrap()
+        .filter_map(|entry| entry.unwrap().file_name().into_string().ok())
+        .filter(|name| name.starts_with("model"))
+        .collect();
+    names.sort();
+    assert_eq!(names, ["model.draws.json", "model.html", "model.toml", "model.wv.json"]);
 }
 
 /// A run whose seed is drawn is another one the next time: the hint says how to make the first one again.
@@ -214,11 +239,8 @@ fn calibrate_begins_where_init_ended_and_replaces_no_other_model() {
     }
     let own = fs::read(place.path().join("imu.toml")).unwrap();
     let ran = plain(place.path(), &format!("{calibrate} -o imu.toml"));
-    refused(&ran, "imu.toml holds another result");
-    assert!(!ran.stderr.contains("4096 samples"), "{}", ran.stderr);
+    assert!(ran.code == 2 && ran.stderr.contains("imu.toml is not of this command"), "{}", ran.stderr);
     assert!(fs::read(place.path().join("imu.toml")).unwrap() == own);
-    let ran = plain(place.path(), &format!("{calibrate} -o imu.toml --force"));
-    assert_eq!(ran.code, 0, "{}", ran.stderr);
 }
 
 /// The output of the command itself, redirected into the directory of its recordings, is no recording.

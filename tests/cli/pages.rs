@@ -81,11 +81,7 @@ fn a_page_of_somebody_else_is_not_replaced() {
     recordings(dir);
     fs::write(dir.join("m.html"), "<p>mine</p>").unwrap();
     let ran = nav_sim(dir, "calibrate static --model WN --seed 1 --bootstrap 0 -o m.toml");
-    assert!(
-        ran.code == 2 && ran.stderr.contains("m.html is there and is no page of nav-sim"),
-        "{}",
-        ran.stderr
-    );
+    assert!(ran.code == 2 && ran.stderr.contains("m.html is not of this command"), "{}", ran.stderr);
     assert!(text(&dir.join("m.html")) == "<p>mine</p>" && !dir.join("m.toml").exists());
 }
 

@@ -10,12 +10,11 @@ use super::recordings::{RecordingArgs, Said};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
 use crate::formats::parameters_file;
-use crate::jobs::{self, CalibrationOptions, EstimatorChoice, JobError};
+use crate::jobs::{self, CalibrationOptions, EstimatorChoice, JobError, ModelFiles};
 use nav_sim_calibration::{
     Bootstrap, Estimator, FitRange, ModelChoice, ModelSpec, ParameterLimit, Pool, Settings, Trim, Weighting,
 };
 use nav_sim_signal::imu::Sensor;
-use output::outputs;
 use std::path::{Path, PathBuf};
 
 /// Fit a noise model to static recordings
@@ -157,11 +156,11 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 
 fn recordings(args: &Args, settings: Settings, session: &Session) -> Result<(), Failure> {
     let out = args.out.as_deref().unwrap_or(Path::new("model.toml"));
-    let _own = jobs::claim_model(out)?;
-    let _picture = args.plot.claim(&read::listed(&args.inputs)?)?;
-    if args.out.is_none() {
-        jobs::not_of_others(out)?;
-    }
+    let listed = read::listed(&args.inputs)?;
+    let guarded: Vec<PathBuf> = listed.iter().chain(&args.parameters).cloned().collect();
+    let (mut outputs, _claims) =
+        ModelFiles::claim(out, &args.estimator.possible(), &guarded, session.existing())?;
+    let _picture = args.plot.claim(&listed, session)?;
     let options = CalibrationOptions {
         reading: args.recordings.options(),
         skip_warm_up: args.recordings.skips_warm_up(),
@@ -172,14 +171,9 @@ fn recordings(args: &Args, settings: Settings, session: &Session) -> Result<(), 
         bootstrap: bootstrap(args, session),
         turn_on: !args.no_turn_on,
     };
-    if args.estimator != EstimatorChoice::All {
-        let drawn = args.bootstrap > 0 && session.asked_seed().is_none();
-        jobs::not_anew(out, drawn, session.existing())?;
-    }
     let measured = jobs::measure(&args.inputs, &options, &mut Said::new(session))?;
     let files: Vec<PathBuf> = measured.report.files.iter().map(|f| f.path.clone()).collect();
-    let guarded: Vec<PathBuf> = files.iter().chain(&args.parameters).cloned().collect();
-    let (outputs, _claims) = outputs(out, &measured.settings.estimators, &guarded)?;
+    outputs.retain(|files| measured.settings.estimators.contains(&files.estimator));
     let inputs = files.iter().map(|f| read::input("recording", f)).collect::<Result<Vec<_>, _>>()?;
     let calibration = {
         let progress = session.progress("steps of the fits", measured.steps());
@@ -205,10 +199,9 @@ fn curves(args: &Args, path: &Path, settings: &Settings, session: &Session) -> R
     };
     let inputs: Vec<PathBuf> =
         [path].into_iter().map(Path::to_owned).chain(args.parameters.clone()).collect();
-    let _own = args.out.as_deref().map(jobs::claim_model).transpose()?;
-    let _picture = args.plot.claim(&inputs)?;
+    let _picture = args.plot.claim(&inputs, session)?;
     let (outputs, _claims) = match &args.out {
-        Some(out) => outputs(out, &curves.settings.estimators, &inputs)?,
+        Some(out) => ModelFiles::claim(out, &curves.settings.estimators, &inputs, session.existing())?,
         None => Default::default(),
     };
     let calibration = curves.calibrate(bootstrap(args, session))?;

@@ -1,25 +1,12 @@
 //! The files of a calibration: one model and its curves for each estimator.
 
 use super::Args;
-use crate::cli::pictures::{PlotArgs, replaceable};
+use crate::cli::pictures::PlotArgs;
 use crate::cli::{Failure, Session, read};
-use crate::formats::atomic::Claim;
 use crate::formats::model_file::CalibrationNote;
 use crate::jobs::{Calibration, ModelFiles};
 use crate::report::{self, CurvesFile, FitsFile, Input};
-use nav_sim_calibration::{Estimator, Outcome, Settings, diagnose};
-use std::path::{Path, PathBuf};
-
-/// The files of each estimator, none of them an input or a page of somebody else, and the claims to them.
-pub(super) fn outputs(
-    out: &Path,
-    estimators: &[Estimator],
-    inputs: &[PathBuf],
-) -> Result<(Vec<ModelFiles>, Vec<Claim>), Failure> {
-    let (outputs, claims) = ModelFiles::claim(out, estimators, inputs)?;
-    outputs.iter().try_for_each(|files| replaceable(&files.page))?;
-    Ok((outputs, claims))
-}
+use nav_sim_calibration::{Outcome, Settings, diagnose};
 
 /// How the recordings were read and grouped; of a curve nothing is known.
 fn reading(args: &Args, settings: &Settings) -> toml::Table {
@@ -62,9 +49,7 @@ pub(super) fn finish(
 ) -> Result<(), Failure> {
     let Calibration { groups, outcomes, settings, turn_on } = calibration;
     let diagnoses = diagnose(groups, outcomes, settings);
-    let placed: Vec<ModelFiles> =
-        outputs.iter().map(|files| files.placed(calibration, note, session.existing())).collect();
-    let files = ModelFiles::write_all(&placed, calibration, note, &diagnoses)?;
+    let files = ModelFiles::write_all(outputs, calibration, note, &diagnoses)?;
     let files: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
     let all: Vec<&Outcome> = outcomes.iter().collect();
     let drawn =
@@ -89,7 +74,6 @@ pub(super) fn finish(
     if outcomes.iter().any(|o| o.recordings > 1) {
         session.detail(WHICH);
     }
-    outputs.iter().zip(&placed).try_for_each(|(asked, placed)| asked.refuse_beside(placed))?;
     drawn
 }
 

@@ -116,7 +116,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let (inputs, files) = Inputs::read(args, session)?;
     let manifest = output::manifest(inputs.configuration(args, &settings), files);
     let _own = output::claim(&args.out, &manifest, session)?;
-    let _picture = args.plot.claim(manifest.inputs.iter().map(|i| &i.path))?;
+    let _picture = args.plot.claim(manifest.inputs.iter().map(|i| &i.path), session)?;
     let Inputs { drive, model, states, expected } = inputs;
     let filter = FusionFilter { model: &model.model, states, initial: &expected };
     let fused = drive.fuse(&filter, settings, &Words::new(session)).map_err(|e| impossible(e, args))?;

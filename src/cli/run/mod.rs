@@ -128,7 +128,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         session,
     );
     let _own = output::claim(&args.out, &manifest, session)?;
-    let _picture = args.plot.claim(inputs.files.iter().map(|i| &i.path))?;
+    let _picture = args.plot.claim(inputs.files.iter().map(|i| &i.path), session)?;
     let words = Words::new(session);
     let found = jobs::navigate(&inputs.job, &scenario, &outages, seed, &words);
     let mut found = found.map_err(|e| impossible(e, args))?;

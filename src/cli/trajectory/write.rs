@@ -2,7 +2,7 @@
 
 use super::{Source, wrote};
 use crate::cli::{Failure, Session, parse};
-use crate::formats::atomic::claim_file;
+use crate::formats::atomic::{Written, claim_result};
 use crate::formats::trajectory_file::{Rows, write_csv, write_rows};
 use std::path::{Path, PathBuf};
 
@@ -65,9 +65,9 @@ pub(super) fn convert(args: &ConvertArgs, session: &Session) -> Result<(), Failu
 }
 
 fn write(source: &Source, out: &Path, rows: Rows, session: &Session) -> Result<(), Failure> {
-    let _own = claim_file(out, [source.path.as_path()])?;
+    let _own = claim_result(out, [source.path.as_path()], Written::Trajectory, session.existing())?;
     let (trajectory, _) = source.read(session)?;
-    write_csv(out, &trajectory, rows, session.existing())?;
+    write_csv(out, &trajectory, rows)?;
     wrote(out, session);
     Ok(())
 }

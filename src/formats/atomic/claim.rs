@@ -1,7 +1,13 @@
-//! Whether a command may write its results to a file or into a directory, and that no other does meanwhile.
+//! Outputs that a command may write, found out before its work, and that no other writes meanwhile.
+//!
+//! Refused, with `--force` too: an input, what another command writes, what nav-sim did not write.
+//! A file takes the place of an earlier result of its own kind; `--force` is for one of another kind.
+//! A directory takes the place of the same run; `--force` is for one of another configuration, inputs or seed.
 
+use super::directory::{AtomicDir, recover};
+use super::file::{AtomicFile, make_parent};
 use super::temporary::Temporary;
-use super::{AtomicDir, AtomicFile, Existing, guard_inputs, kept, make_parent, recover};
+use super::written::Written;
 use crate::formats::{FileError, Place, Setting};
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -75,7 +81,7 @@ fn resolved(path: &Path) -> PathBuf {
     path.canonicalize().ok().or_else(by_parent).unwrap_or_else(|| path.to_owned())
 }
 
-/// Claims a file that can be made and is none of the inputs, before the work. A device is everybody's.
+/// Claims a file that can be made and is none of the inputs. A device is everybody's.
 ///
 /// # Errors
 /// When it is an input, cannot be made, or another command writes it.
@@ -92,14 +98,66 @@ pub(crate) fn claim_file<'a>(
     Claim::new(output, &marker_beside(&output_at), vec![output_at])
 }
 
-/// What a directory holds, told by its last file, which appears when the others are whole.
+/// Claims a file for a result: what stands there may be replaced.
+///
+/// # Errors
+/// As [`claim_file`]; when nav-sim did not write what stands there, or it is a result of another kind and to stay.
+pub(crate) fn claim_result<'a>(
+    output: &Path,
+    inputs: impl IntoIterator<Item = &'a Path>,
+    kind: Written,
+    existing: Existing,
+) -> Result<Claim, FileError> {
+    let claim = claim_file(output, inputs)?;
+    replaceable(output, kind.found(output), existing)?;
+    Ok(claim)
+}
+
+fn replaceable(path: &Path, found: Found, existing: Existing) -> Result<(), FileError> {
+    let refused = |why: &str| FileError::contents(path.display().to_string(), Place::Itself, why);
+    match found {
+        Found::Foreign => {
+            let error = refused("is not of this command: it is not replaced").setting(Setting::Output);
+            Err(error.advice("move it away"))
+        }
+        Found::Other(why) if existing == Existing::Keep => Err(refused(why).setting(Setting::Force)),
+        Found::Other(_) | Found::Same => Ok(()),
+    }
+}
+
+/// Refuses an output that is one of the inputs, under whatever name.
+///
+/// # Errors
+/// When it is one.
+pub(super) fn guard_inputs<'a>(
+    output: &Path,
+    inputs: impl IntoIterator<Item = &'a Path>,
+) -> Result<(), FileError> {
+    let Ok(target) = output.canonicalize() else { return Ok(()) };
+    if !inputs.into_iter().any(|i| i.canonicalize().is_ok_and(|i| i == target)) {
+        return Ok(());
+    }
+    let message = "is an input of this command and would be overwritten";
+    Err(FileError::contents(output.display().to_string(), Place::Itself, message).setting(Setting::Output))
+}
+
+/// What may become of a result that is there already.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Existing {
+    /// It stays, unless what takes its place is of the same kind or run.
+    Keep,
+    /// Another takes its place.
+    Replace,
+}
+
+/// What stands where a result is to be written; in a directory told by its last file, which appears when the others are whole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Found {
-    /// The result of another command.
+    /// Nothing that may be replaced.
     Foreign,
-    /// Another result of this command, or one that may be: how so.
+    /// Another result: how so.
     Other(&'static str),
-    /// What is to be written.
+    /// An earlier result of what is to be written, or nothing.
     Same,
 }
 
@@ -136,32 +194,15 @@ pub(crate) fn claim_directory<'a>(
     recover(directory);
     let last = directory.join(files.last().map_or("", AsRef::as_ref));
     match fs::read_to_string(&last) {
-        Err(_) => empty_or_new(directory)?,
-        Ok(text) => match recognise(&text)? {
-            Found::Foreign => return Err(unusable(&last, "is of another command, or of another version")),
-            Found::Other(why) if existing == Existing::Keep => return Err(kept(directory, why)),
-            Found::Other(_) | Found::Same => {}
-        },
+        Err(_) => replaceable(directory, empty_or_new(directory), existing)?,
+        Ok(text) => replaceable(directory, recognise(&text)?, existing)?,
     }
     Ok(claim)
 }
 
-/// Refuses a directory that holds anything: files of the same names would be lost.
-fn empty_or_new(directory: &Path) -> Result<(), FileError> {
-    let Ok(entries) = fs::read_dir(directory) else { return Ok(()) };
-    let is_visible = |name: &OsString| !name.to_string_lossy().starts_with('.');
-    let first = entries.flatten().map(|entry| entry.file_name()).filter(is_visible).min();
-    match first {
-        None => Ok(()),
-        Some(first) => {
-            let first = first.to_string_lossy();
-            Err(unusable(directory, format!("is not empty, and not of this command: it holds {first}")))
-        }
-    }
-}
-
-fn unusable(path: &Path, why: impl Into<Box<str>>) -> FileError {
-    FileError::contents(path.display().to_string(), Place::Itself, why)
-        .setting(Setting::OutputDirectory)
-        .advice("remove it")
+/// Files of the same names would be lost in a directory that holds anything.
+fn empty_or_new(directory: &Path) -> Found {
+    let entries = fs::read_dir(directory).into_iter().flatten().flatten();
+    let is_visible = |name: OsString| !name.to_string_lossy().starts_with('.');
+    if entries.map(|entry| entry.file_name()).any(is_visible) { Found::Foreign } else { Found::Same }
 }

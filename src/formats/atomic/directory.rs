@@ -1,6 +1,6 @@
 //! A directory of outputs.
 
-use super::make_parent;
+use super::file::make_parent;
 use super::temporary::{self, Temporary};
 use crate::formats::FileError;
 use std::fs::{self, File};

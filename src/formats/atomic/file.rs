@@ -1,8 +1,7 @@
 //! A single output file.
 
 use super::temporary::{self, Temporary};
-use super::{Existing, kept_beside, make_parent, name_beside};
-use crate::formats::{FileError, hash};
+use crate::formats::FileError;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -51,25 +50,6 @@ impl AtomicFile {
         self.finish().map_err(|e| FileError::io(&self.destination, e))
     }
 
-    /// As [`AtomicFile::commit`], but not in the place of another result: then it gets a name beside, so that the work
-    /// is not lost. `shown` is the destination as the user named it.
-    ///
-    /// # Errors
-    /// When the destination holds something else and is to stay, too; which name it has then.
-    pub(crate) fn commit_result(mut self, shown: &Path, existing: Existing) -> Result<(), FileError> {
-        self.file.flush().map_err(|e| FileError::io(shown, e))?;
-        if let (Existing::Keep, Some(temporary)) = (existing, &self.temporary) {
-            let contents_hash = hash::of_file(temporary.path()).ok();
-            let is_usable = |path: &Path| !path.is_file() || hash::of_file(path).ok() == contents_hash;
-            if !is_usable(&self.destination) {
-                self.destination = name_beside(&self.destination, is_usable);
-                let refusal = kept_beside(shown, &self.destination);
-                return self.commit().and(Err(refusal));
-            }
-        }
-        self.commit()
-    }
-
     fn finish(&mut self) -> io::Result<()> {
         self.file.flush()?;
         let Some(temporary) = &mut self.temporary else { return Ok(()) };
@@ -84,5 +64,13 @@ impl Write for AtomicFile {
     }
     fn flush(&mut self) -> io::Result<()> {
         self.file.flush()
+    }
+}
+
+/// Makes the directory that `path` is to stand in.
+pub(super) fn make_parent(path: &Path) -> io::Result<()> {
+    match path.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => fs::create_dir_all(parent),
+        _ => Ok(()),
     }
 }

@@ -1,6 +1,7 @@
 //! Outputs appear whole or not at all, whoever is killed.
 
 use super::*;
+use crate::formats::atomic::claim::guard_inputs;
 use std::fs;
 
 fn listing(dir: &Path) -> Vec<String> {

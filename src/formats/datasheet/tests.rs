@@ -140,7 +140,7 @@ fn the_catalogue_is_sound() {
         let text = model_file::to_toml(&file);
         let place = tempfile::tempdir().unwrap();
         let path = place.path().join("model.toml");
-        model_file::write(&path, &file, crate::formats::atomic::Existing::Keep).unwrap();
+        model_file::write(&path, &file).unwrap();
         assert_eq!(model_file::read(&path).unwrap(), file, "{text}");
     }
 }

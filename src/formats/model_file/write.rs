@@ -2,7 +2,7 @@
 
 use super::{CI, Interval, ModelFile, SCHEMA, TurnOn};
 use crate::formats::FileError;
-use crate::formats::atomic::{self, Existing};
+use crate::formats::atomic;
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::noise::{Law, Process, Variation};
 use std::fmt::Write;
@@ -12,8 +12,8 @@ use std::path::Path;
 ///
 /// # Errors
 /// When the system refuses, or another model is there and is to stay.
-pub fn write(path: &Path, file: &ModelFile, existing: Existing) -> Result<(), FileError> {
-    atomic::write_result(path, to_toml(file), existing)
+pub fn write(path: &Path, file: &ModelFile) -> Result<(), FileError> {
+    atomic::write(path, to_toml(file))
 }
 
 /// The text of a model file. A sensor whose three axes are alike is written once.

@@ -2,7 +2,6 @@ mod contradictions;
 mod profiles;
 
 use super::*;
-use crate::formats::atomic::Existing;
 use crate::formats::toml_file::Source;
 use glam::DVec3;
 use nav_sim_navigation::frames::RollPitchYaw;
@@ -245,7 +244,7 @@ fn what_is_written_reads_back_the_same() {
     let (t, _) = read(&drive(None)).unwrap();
     for name in ["t.csv", "t.csv.gz"] {
         let path = dir.path().join(name);
-        write_csv(&path, &t, Rows::Rate(10.0), Existing::Replace).unwrap();
+        write_csv(&path, &t, Rows::Rate(10.0)).unwrap();
         let (back, warnings) = load(&path, &Options::default()).unwrap();
         assert!(warnings.is_empty(), "{warnings:?}");
         assert_eq!((back.knots().len(), back.end_s()), (96, 9.5));
@@ -253,7 +252,7 @@ fn what_is_written_reads_back_the_same() {
         assert!((a.v_n - b.v_n).length() < 1e-6 && (a.lat - b.lat).abs() < 1e-14, "{}", a.v_n - b.v_n);
     }
     let path = dir.path().join("knots.csv");
-    write_csv(&path, &t, Rows::Knots, Existing::Replace).unwrap();
+    write_csv(&path, &t, Rows::Knots).unwrap();
     assert_eq!(load(&path, &Options::default()).unwrap().0.knots(), t.knots());
     let e = load(&dir.path().join("t.xyz"), &Options::default()).unwrap_err();
     assert!(e.to_string().contains("t.xyz: a trajectory file ends in .toml"), "{e}");

@@ -1,7 +1,7 @@
 //! Trajectories as CSV.
 
 use crate::formats::FileError;
-use crate::formats::atomic::{AtomicFile, Existing};
+use crate::formats::atomic::AtomicFile;
 use flate2::{Compression, write::GzEncoder};
 use nav_sim_navigation::frames::{RollPitchYaw, wrap_angle};
 use nav_sim_navigation::trajectory::Trajectory;
@@ -36,13 +36,8 @@ impl Rows {
 /// velocities to 1e-9 m/s, angles to 1e-12 degrees.
 ///
 /// # Errors
-/// The file cannot be written, or holds another result that is to stay.
-pub(crate) fn write_csv(
-    path: &Path,
-    trajectory: &Trajectory,
-    rows: Rows,
-    existing: Existing,
-) -> Result<(), FileError> {
+/// The file cannot be written.
+pub(crate) fn write_csv(path: &Path, trajectory: &Trajectory, rows: Rows) -> Result<(), FileError> {
     let mut file = AtomicFile::create(path)?;
     let io = |e| FileError::io(path, e);
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz")) {
@@ -52,7 +47,7 @@ pub(crate) fn write_csv(
     } else {
         write_rows(&mut file, trajectory, rows).map_err(io)?;
     }
-    file.commit_result(path, existing)
+    file.commit()
 }
 
 /// Writes the header and the rows.
