@@ -56,7 +56,7 @@ fn models_and_curves_say_what_they_are_of() {
     let ran = refused(place.path(), &format!("{calibrate} --sensor accel -o m.toml"));
     assert!(ran.stderr.contains("--sensor"), "{}", ran.stderr);
     let ran = refused(place.path(), &format!("{calibrate} -o -"));
-    assert!(ran.stderr.contains("- is no file") && !place.path().join("-").exists(), "{}", ran.stderr);
+    assert!(ran.stderr.contains("- is not a file") && !place.path().join("-").exists(), "{}", ran.stderr);
     // A curve that does not say its sensor.
     fs::write(place.path().join("c.csv"), "tau_samples,wv,edof\n2,4,900\n4,2,400\n8,1,200\n").unwrap();
     let curve = "calibrate --curve c.csv --rate-hz 100 --model WN --bootstrap 0";

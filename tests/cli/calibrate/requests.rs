@@ -84,8 +84,8 @@ fn bad_requests_are_refused_with_a_hint() {
     check(onto_parameters, &["known.toml is an input of this command and would be overwritten"]);
     assert_eq!(std::fs::read(dir.path().join("runs/run0.csv")).unwrap(), before);
     std::fs::create_dir(dir.path().join("taken.toml")).unwrap();
-    check(calibrate(&["-o", "taken.toml"], 2), &["taken.toml is a directory", "hint:"]);
-    check(calibrate(&["-o", "/dev/full"], 2), &["/dev/full is a device"]);
+    check(calibrate(&["-o", "taken.toml"], 2), &["taken.toml is not a file", "hint:"]);
+    check(calibrate(&["-o", "/dev/full"], 2), &["/dev/full is not a file"]);
     check(refusal(dir.path(), &["calibrate"], 2), &["required"]);
     check(refusal(dir.path(), &["calibrate", "nowhere.csv"], 1), &["nowhere.csv: No such file"]);
     check(refusal(dir.path(), &["wv", "runs", "--axes", "gyro.w"], 2), &["gyro.w", "accel.x"]);
