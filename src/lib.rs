@@ -59,6 +59,8 @@ pub mod report;
 pub mod formats;
 // The engine of studies.
 pub mod study;
+// A room for each command: job, result, document.
+mod tune;
 // What a command does, as one call.
 pub mod jobs;
 // All that most programs need.

@@ -92,7 +92,6 @@ impl Session {
     }
 
     /// Puts a result to stdout, as JSON or in words, and its notes to stderr; returns its document, for page and picture.
-    #[allow(dead_code, reason = "results move to documents one by one")]
     pub(crate) fn answer(&self, answer: &impl Answer) -> Document {
         let document = answer.document();
         let shown = match (self.json(), self.verbose()) {

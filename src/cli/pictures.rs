@@ -56,7 +56,6 @@ impl PageArgs {
     }
 
     /// Writes what is asked for of a document.
-    #[allow(dead_code, reason = "results move to documents one by one")]
     pub(super) fn draw(&self, document: &Document, session: &Session) -> Result<(), Failure> {
         let written = self.page.iter().try_for_each(|path| session.write(path, document.html()));
         self.plot.write(|| document.svg(), session).and(written)

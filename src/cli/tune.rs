@@ -1,4 +1,4 @@
-//! `nav-sim tune`: honest inflation of a noise model.
+//! `nav-sim tune`: factors on a noise model that make its filter consistent.
 
 use super::filter::no_filter;
 use super::parse::one_of;
@@ -8,8 +8,8 @@ use super::{Failure, Session, read, turn_on};
 use crate::formats::atomic::Written;
 use crate::formats::draws_file::{self, Draws};
 use crate::formats::model_file::{self, ModelFile};
-use crate::jobs::{self, Truths, TuneInputs};
-use crate::report::{Input, markdown_table, tune_page};
+use crate::report::Input;
+use crate::tune::{self, Truths, TuneInputs};
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::outage::Outage;
@@ -19,10 +19,9 @@ use std::path::{Path, PathBuf};
 
 /// Find the smallest factors on MODEL that make its filter consistent for another truth
 ///
-/// Factors multiply variances; quantization noise, which is in no filter, stays as it is. They are found by linear
-/// covariance analysis along the trajectory, without random numbers: first the smallest divergence between the
-/// filter's covariance and that of its true errors, then one common factor that makes the filter consistent. Where none
-/// does, the exit code is 3 and no model is written.
+/// Factors multiply variances of all processes but quantization noise, which is in no filter. They are found by linear
+/// covariance analysis along the trajectory. Where no factor makes the filter consistent, the exit code is 3 and no model
+/// is written.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -38,8 +37,8 @@ pub(crate) struct Args {
     /// Noise models that may make the errors, such as those of single recordings
     #[arg(long = "truth", value_name = "MODEL2", num_args = 1..)]
     truths: Vec<PathBuf>,
-    /// Take as truths MODEL itself and the draws of its calibration (MODEL.draws.json, which `calibrate` writes beside it):
-    /// what counts of an error is the upper end of the 95 % interval that `run` states
+    /// Truths are MODEL itself and the draws of its calibration (MODEL.draws.json, which `calibrate` writes): errors count up
+    /// to the upper end of the 95 % interval that `run` states
     #[arg(long, conflicts_with = "truths")]
     intervals: bool,
     /// Trajectory: motion profile (.toml) or table (.csv) [default: a built-in drive with outages of that length]
@@ -48,15 +47,13 @@ pub(crate) struct Args {
     /// Window without fixes, in seconds (repeatable), or "none" (default: 300:390 and 700:790)
     #[arg(long = "outage", value_name = "START:END", value_parser = parse_outage)]
     outages: Vec<OutageArg>,
-    /// What consistent means: worst, for no truth is the error of any state at the end of an outage larger than the
-    /// filter states; mean, the expected NEES, averaged over truths and time, is right
+    /// Meaning of consistent: worst, no error of any truth exceeds what the filter states; mean, the NEES is right on average
     #[arg(long = "for", value_name = "AIM", value_parser = one_of::<Aim>(&Aim::NAMES), default_value_t)]
     aim: Aim,
     /// Whether each sensor or each process has a factor of its own
     #[arg(long, value_name = "WHAT", value_parser = one_of::<Per>(&Per::NAMES), default_value_t)]
     per: Per,
-    /// The filter to tune, whatever the scenario has: full, 15 or 21 (these take longer); the verdict judges that of the
-    /// scenario, which `run` makes by default, too
+    /// Filter to tune: full, 15 or 21 (these take longer); the filter that `run` makes by default is assessed too
     #[arg(long, value_name = "STATES", default_value = "full")]
     filter: FilterStates,
     /// Factors may be below 1
@@ -89,7 +86,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     turn_on::expect(&mut scenario.initial, &file, &args.model, session);
     let truths = truths(args, (&file, &model), &scenario, session)?;
     let (track, outages) = track(args, &scenario, &model, session)?;
-    let result = jobs::tune(&TuneInputs {
+    let result = tune::tune(&TuneInputs {
         scenario: &scenario,
         model: &model,
         truths,
@@ -101,18 +98,16 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         allow_smaller: args.allow_smaller,
     });
     let result = result.map_err(|e| no_filter(&e, &args.model, args.scenario.as_deref(), RARE_FIXES))?;
-    let text = || format!("{}\n\n{}", result.verdict(), markdown_table(&result.rows()));
-    session.show(|| result.json(), text);
-    let drawn = args.pictures.write(|| tune_page(&result), session);
+    let document = session.answer(&result);
+    let drawn = args.pictures.draw(&document, session);
     if let Some(unmet) = result.unmet() {
         drawn?;
         let failure = Failure::bound(format!("{}: {unmet}; no tuned model is written", args.model.display()));
         return Err(failure.hint(result.remedy()));
     }
     if let Some(out) = &args.out {
-        let aim = if args.aim == Aim::Mean { "mean of" } else { "worst of" };
-        let honest_for = format!("{aim} {}", if args.intervals { "intervals" } else { "truths" });
-        let tuned = jobs::tuned(&file, &result.factors, &honest_for, &files);
+        let goal = format!("{} of {}", args.aim, if args.intervals { "intervals" } else { "truths" });
+        let tuned = tune::tuned(&file, &result.factors, &goal, &files);
         model_file::write(out, &tuned)?;
         session.wrote(out);
     }
@@ -122,10 +117,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 /// A directory or a table holds samples: a truth is a model.
 fn refuse_recordings(args: &Args) -> Result<(), Failure> {
     if args.truths.is_empty() && !args.intervals {
-        return Err(Failure::input("no truth to be consistent with: neither --truth nor --intervals is given").hint(
-            "give models of what may be true (--truth OTHER.toml, one for each recording or day), or --intervals \
-             for a MODEL that `nav-sim calibrate` wrote with its draws beside it",
-        ));
+        return Err(Failure::input("no truth to be consistent with: neither --truth nor --intervals is given")
+            .hint("give models (--truth OTHER.toml, one a recording), or --intervals for a MODEL of `nav-sim calibrate`"));
     }
     let is_samples =
         |p: &&PathBuf| p.is_dir() || p.extension().is_some_and(|e| e == "csv" || e == "npy" || e == "gz");
@@ -194,10 +187,8 @@ fn draws(path: &Path, file: &ModelFile, rate_hz: f64) -> Result<Draws, Failure> 
         || format!("{}: the draws of its calibration are missing", draws_file::beside(path).display());
     let found = draws_file::usable(path, &file.model, rate_hz).and_then(|draws| draws.ok_or_else(missing));
     found.map_err(|doubt| {
-        Failure::input(doubt).hint(
-            "--intervals takes them for true: calibrate again, and leave the file where `nav-sim calibrate` writes it, beside \
-             MODEL (none with --bootstrap 0)",
-        )
+        Failure::input(doubt)
+            .hint("calibrate again: the draws are written beside MODEL, unless with --bootstrap 0")
     })
 }
 

@@ -31,7 +31,6 @@ mod smoothed;
 mod study;
 pub(crate) mod tables;
 mod trajectory;
-mod tune;
 mod turn_on;
 mod verdict;
 mod warm_up;
@@ -56,7 +55,6 @@ pub(crate) use fusion_files::{FUSION_FILES, fusion_directory};
 pub(crate) use manifest::{FusionConfiguration, FusionKind, FusionManifest};
 pub use manifest::{Input, Manifest, ModelNote};
 /// A result: what is printed, drawn or saved of it is it itself as JSON, or its document.
-#[allow(dead_code, reason = "results move to documents one by one")]
 pub(crate) trait Answer: Serialize {
     /// What it says, in words, tables and charts.
     fn document(&self) -> Document;
@@ -65,9 +63,9 @@ pub(crate) trait Answer: Serialize {
 pub use nav_sim_document::readable;
 pub(crate) use nav_sim_document::{seconds, short_names, six_digits, window};
 pub(crate) use pages::{
-    PaperFigure, RatioCurves, ShownComparison, StudyCurves, calibration_page, calibration_svg,
-    catalogue_page, choice_page, design_page, efficiency_page, efficiency_svg, fusion_page, model_page,
-    needed_page, paper_figures, paper_page, run_svg, study_page, tune_page, wavelet_page,
+    PaperFigure, RatioCurves, STATES, ShownComparison, StudyCurves, calibration_page, calibration_svg,
+    catalogue_page, choice_page, design_page, efficiency_page, efficiency_svg, error_of, fusion_page,
+    model_page, needed_page, paper_figures, paper_page, run_svg, study_page, wavelet_page,
 };
 pub(crate) use recording::{gnss_csv, imu_csv, initial_toml};
 pub(crate) use replicates::describe_replicates;
@@ -82,7 +80,6 @@ pub(crate) use study::{
 };
 pub use trajectory::TrajectorySeries;
 pub(crate) use trajectory::trajectory_svg;
-pub(crate) use tune::{FactorEntry, TuneResult};
 pub(crate) use turn_on::{turn_on_lines, turn_on_remark};
 pub use warm_up::BeginsOtherwise;
 pub(crate) use warm_up::{warm_up_in_short, warm_up_lines};
@@ -100,7 +97,7 @@ mod number {
 }
 
 /// Characters of a line in a terminal.
-pub(crate) const WIDTH: usize = 100;
+pub(crate) const WIDTH: usize = 120;
 
 /// A table of rows, of which the first is the head, in Markdown.
 pub(crate) fn markdown_table(rows: &[Vec<String>]) -> String {

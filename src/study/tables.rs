@@ -62,13 +62,7 @@ impl Texts {
         let same = if planned.plan.study.filters.len() > 1 { " with the same filter" } else { "" };
         let reference = format!("{}{same}", planned.reference().1);
         let intervals = if planned.plan.study.is_sampled() { " ± half the 95 % interval" } else { "" };
-        Self {
-            reference,
-            intervals,
-            cells: Vec::new(),
-            more: 0,
-            rankings: Vec::new(),
-        }
+        Self { reference, intervals, cells: Vec::new(), more: 0, rankings: Vec::new() }
     }
 
     pub(super) fn add(&mut self, cell: ShownCell) {

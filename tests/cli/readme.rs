@@ -93,7 +93,9 @@ fn shell_blocks_run() {
         Err(failure) => Some(failure),
         Ok(text) if bless => std::fs::write(page, text).err().map(|e| e.to_string()),
         Ok(text) if alike(&text, &std::fs::read_to_string(page).unwrap()) => None,
-        Ok(text) => Some(format!("{} shows other outputs (BLESS=1 writes them anew):\n{text}", page.display())),
+        Ok(text) => {
+            Some(format!("{} shows other outputs (BLESS=1 writes them anew):\n{text}", page.display()))
+        }
     };
     let failures: Vec<String> = pages.par_iter().filter_map(failure).collect();
     assert!(failures.is_empty(), "{}", failures.join("\n\n"));
@@ -153,8 +155,11 @@ fn the_table_of_commands_is_complete() {
         .filter_map(|l| l.split_whitespace().next())
         .filter(|n| *n != "help")
         .collect();
-    let rows =
-        COMMANDS.lines().skip_while(|l| *l != "| command | does |").skip(2).take_while(|l| l.starts_with('|'));
+    let rows = COMMANDS
+        .lines()
+        .skip_while(|l| *l != "| command | does |")
+        .skip(2)
+        .take_while(|l| l.starts_with('|'));
     let first_cell = |l: &'static str| l.split('|').nth(1).unwrap();
     let mut named: Vec<&str> = rows.flat_map(|l| first_cell(l).split('`').skip(1).step_by(2)).collect();
     commands.sort_unstable();

@@ -1,4 +1,4 @@
-//! Tuned models are honest: the factor of a process that is larger in truth is found, and sampled runs agree.
+//! Tuned models are consistent: the factor of a process that is larger in truth is found, and sampled runs agree.
 
 use nav_sim::navigation::ekf::Belief;
 use nav_sim::navigation::metrics::{Estimate, Expected, VerdictKind};
@@ -70,10 +70,10 @@ impl Drive {
             allow_smaller: false,
         };
         let factors = task.factors().unwrap();
-        let honesty = task.honesty(filter, &factors).unwrap();
+        let consistency = task.consistency(filter, &factors).unwrap();
         match aim {
-            Aim::Mean => assert!((honesty.nees / 9.0 - 1.0).abs() < 5e-3, "{honesty:?}"),
-            Aim::Worst => assert!((honesty.largest.ratio - 1.0).abs() < 5e-3, "{honesty:?}"),
+            Aim::Mean => assert!((consistency.nees / 9.0 - 1.0).abs() < 5e-3, "{consistency:?}"),
+            Aim::Worst => assert!((consistency.largest.ratio - 1.0).abs() < 5e-3, "{consistency:?}"),
         }
         factors
     }

@@ -12,7 +12,6 @@ mod run;
 mod run_budgets;
 mod run_charts;
 mod study;
-mod tune;
 mod wavelet;
 
 pub(crate) use calibration::{calibration_page, calibration_svg};
@@ -26,7 +25,6 @@ pub(crate) use require::{catalogue_page, model_page, needed_page};
 pub(super) use run::run_page;
 pub(crate) use run_charts::run_svg;
 pub(crate) use study::study_page;
-pub(crate) use tune::tune_page;
 pub(crate) use wavelet::wavelet_page;
 
 use super::number;
@@ -35,7 +33,7 @@ use nav_sim_navigation::metrics::VerdictKind;
 use nav_sim_navigation::simulation::REPORTED;
 
 /// The reported states and their units, in words.
-const STATES: [&str; REPORTED] = [
+pub(crate) const STATES: [&str; REPORTED] = [
     "position north (m)",
     "position east (m)",
     "position down (m)",
@@ -48,7 +46,7 @@ const STATES: [&str; REPORTED] = [
 ];
 
 /// A state as the title of a chart of its errors: `roll error (°)`.
-fn error_of(state: &str) -> String {
+pub(crate) fn error_of(state: &str) -> String {
     state.replacen(" (", " error (", 1)
 }
 

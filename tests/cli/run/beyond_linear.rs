@@ -15,7 +15,11 @@ fn errors_of_second_order_are_not_to_be_tuned_away() {
     let command = "run still.toml imu.toml --runs 60 --outage 60:150 --seed 3 --scenario wide.toml";
     for method in ["both", "monte-carlo"] {
         let ran = nav_sim(place.path(), &format!("{command} --method {method} -o {method}"));
-        assert!(ran.stdout.starts_with("verdict: overconfident in the runs, consistent by"), "{}", ran.stdout);
+        assert!(
+            ran.stdout.starts_with("verdict: overconfident in the runs, consistent by"),
+            "{}",
+            ran.stdout
+        );
         let warning = ran.stderr.lines().find(|line| line.contains("the filter is overconfident")).unwrap();
         assert!(warning.contains("too large for a linear filter, and neither"), "{warning}");
     }

@@ -31,10 +31,10 @@
 
 mod branch;
 mod column;
+mod consistency;
 mod descent;
 mod errors;
 mod heading;
-mod honesty;
 mod input;
 mod joint;
 mod mean;
@@ -47,8 +47,8 @@ mod truth;
 mod tune;
 
 pub(crate) use branch::{Moments, errors_in_outages};
+pub use consistency::{Departure, DrawFactors, FilterConsistency, UpperEnd};
 pub use heading::{HeadingDoubt, weak_heading};
-pub use honesty::{Departure, DrawFactors, Honesty, UpperEnd};
 pub use pass::{Assessment, Consistency, ErrorLaw, FilterPass, Instant, Judged, assess};
 pub use reduce::{Alike, drive, reduced_belief};
 pub(crate) use root::Crossing;

@@ -156,7 +156,7 @@ fn horizontal_m(assessment: &Assessment) -> impl Iterator<Item = f64> {
 
 /// The divergence at the outage ends and on the average; a single state whose ratio is a tenth off, at an outage's end or
 /// over the whole way, counts beside it, steeply: the divergence alone gives one state away for eight. So does the mean
-/// NEES: the divergence is that of a filter that is rather too timid.
+/// NEES: the divergence is that of a filter that is rather underconfident.
 fn cost(assessment: &Assessment) -> f64 {
     let ends = divergence(assessment, |end| end.ratio().into_iter().map(steep).sum());
     let reports = assessment.reports.get(1..).unwrap_or_default();

@@ -1,12 +1,12 @@
-//! The smallest factors on a noise model that make the filter made of it honest.
+//! Smallest factors on a noise model that make the filter made of it consistent.
 //!
 //! What a filter believes is enlarged until it covers its true errors: where the truth is another model, one of
 //! several, or the same model with other parameters. The factors come from the least divergence between the
 //! covariance that the filter states and that of its errors ([`super::Consistency::divergence`]), then one factor
-//! on all of them makes the filter exactly honest.
+//! on all of them makes the filter exactly consistent.
 
+use super::consistency::{DrawFactors, FilterConsistency, UpperEnd};
 use super::descent::Descent;
-use super::honesty::{DrawFactors, Honesty, UpperEnd};
 use super::pass::{Assessment, FilterPass};
 use super::reduce::divergence;
 use super::root::Crossing;
@@ -33,7 +33,7 @@ pub enum Per {
 
 nav_sim_signal::named!(Per { Sensor = "sensor", Process = "process" });
 
-/// When a filter counts as honest.
+/// Condition under which a filter counts as consistent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Aim {
     /// The expected NEES, averaged over time and truths, is what it should be.
@@ -45,7 +45,7 @@ pub enum Aim {
 
 nav_sim_signal::named!(Aim { Worst = "worst", Mean = "mean" });
 
-/// A model, and the truths that its filter is to be honest for.
+/// A model, and the truths that its filter is to be consistent with.
 pub struct Task<'a> {
     /// The noise model that the filter is made of.
     pub model: &'a Model,
@@ -58,11 +58,11 @@ pub struct Task<'a> {
     pub track: &'a Track,
     /// The filter with a state for each process, for which the factors are found.
     pub full: &'a Filter<'a>,
-    /// The filter that is made honest in the end.
+    /// The filter that is made consistent in the end.
     pub filter: &'a Filter<'a>,
     /// What has a factor.
     pub per: Per,
-    /// When it is honest.
+    /// Condition under which it is consistent.
     pub aim: Aim,
     /// Whether a factor may be below 1.
     pub allow_smaller: bool,
@@ -98,7 +98,7 @@ const VISIBLE: f64 = 0.01;
 const RIDGE: f64 = 2e-5;
 /// Cost of a state at an outage's end whose error is e times what is stated, where none may be larger.
 const OVERCONFIDENT: f64 = 200.0;
-/// A filter whose measure of honesty is this close to 1 is honest.
+/// A filter whose ratio is this close to 1 is consistent.
 const TOLERANCE: f64 = 0.005;
 /// How often at most what draws add is found anew.
 const ROUNDS: usize = 5;
@@ -106,7 +106,7 @@ const ROUNDS: usize = 5;
 const EXACT: f64 = 1e-3;
 
 impl Task<'_> {
-    /// The factors, 1 for all where the filter is honest already.
+    /// The factors, 1 for all where the filter is consistent already.
     ///
     /// # Errors
     /// When the model has no such filter.
@@ -114,8 +114,8 @@ impl Task<'_> {
         let mut factors = multiplied(self.model, self.per);
         // Asked for its error alone: inside the search a model without a filter is only an infinite cost.
         (self.full)(self.model)?;
-        let (honesty, mut draw_factors) = self.judged(self.filter, &factors)?;
-        if self.dishonesty(&honesty).abs() <= TOLERANCE {
+        let (consistency, mut draw_factors) = self.consistency_and_draws(self.filter, &factors)?;
+        if self.excess(&consistency).abs() <= TOLERANCE {
             return Ok(factors);
         }
         // Draws are many, and what they add to an error hardly depends on the filter: the search has the first truth alone
@@ -125,8 +125,8 @@ impl Task<'_> {
             if draw_factors.is_none() {
                 break;
             }
-            let found = self.judged(self.filter, &factors)?;
-            if self.dishonesty(&found.0).abs() <= TOLERANCE {
+            let found = self.consistency_and_draws(self.filter, &factors)?;
+            if self.excess(&found.0).abs() <= TOLERANCE {
                 break;
             }
             draw_factors = found.1;
@@ -159,7 +159,7 @@ impl Task<'_> {
         };
         let low = if self.allow_smaller { -MAX_LN } else { 0.0 };
         let descent = Descent { cost: &cost, bounds: (low, MAX_LN), iterations: ITERATIONS, enough: ENOUGH };
-        // From the model as it is, which keeps factors small; and from one factor on all that is honest, since between
+        // From the model as it is, which keeps factors small; and from one factor on all that makes it consistent, since between
         // the two the valley may be flat. The second counts where it is better by what can be seen.
         let unchanged = vec![0.0; factors.len()];
         let exact = |ln: &[f64]| self.exact(factors, ln, low, draw_factors);
@@ -176,39 +176,43 @@ impl Task<'_> {
     ///
     /// # Errors
     /// When the model has no such filter.
-    pub fn honesty(&self, filter: &Filter<'_>, factors: &[Factor]) -> Result<Honesty, BeliefError> {
-        Ok(self.judged(filter, factors)?.0)
+    pub fn consistency(
+        &self,
+        filter: &Filter<'_>,
+        factors: &[Factor],
+    ) -> Result<FilterConsistency, BeliefError> {
+        Ok(self.consistency_and_draws(filter, factors)?.0)
     }
 
     /// The same, and what draws add to the first truth there.
     ///
     /// # Errors
     /// When the model has no such filter.
-    pub fn judged(
+    pub fn consistency_and_draws(
         &self,
         filter: &Filter<'_>,
         factors: &[Factor],
-    ) -> Result<(Honesty, Option<DrawFactors>), BeliefError> {
+    ) -> Result<(FilterConsistency, Option<DrawFactors>), BeliefError> {
         let belief = filter(&scaled(self.model, factors))?;
         let assessments = self.assessments(&belief, self.track, None);
-        let honesty = Honesty::of(&assessments, self.drawn);
-        let draw_factors = self.drawn.map(|drawn| DrawFactors::of(&assessments, drawn, &honesty));
-        Ok((honesty, draw_factors))
+        let consistency = FilterConsistency::of(&assessments, self.drawn);
+        let draw_factors = self.drawn.map(|drawn| DrawFactors::of(&assessments, drawn, &consistency));
+        Ok((consistency, draw_factors))
     }
 
-    /// The honesty by the first truth with what draws add to it; without draws that by all truths.
+    /// The consistency by the first truth with what draws add to it; without draws that by all truths.
     ///
     /// # Errors
     /// When the model has no such filter.
-    pub fn honesty_with(
+    pub fn consistency_with(
         &self,
         filter: &Filter<'_>,
         factors: &[Factor],
         draw_factors: Option<&DrawFactors>,
-    ) -> Result<Honesty, BeliefError> {
-        let Some(draw_factors) = draw_factors else { return self.honesty(filter, factors) };
+    ) -> Result<FilterConsistency, BeliefError> {
+        let Some(draw_factors) = draw_factors else { return self.consistency(filter, factors) };
         let belief = filter(&scaled(self.model, factors))?;
-        Ok(draw_factors.honesty(&self.assessments(&belief, self.track, Some(draw_factors))))
+        Ok(draw_factors.consistency(&self.assessments(&belief, self.track, Some(draw_factors))))
     }
 
     /// Every truth under the filter that `knows` makes of it.
@@ -218,14 +222,14 @@ impl Task<'_> {
     pub fn informed(
         &self,
         knows: impl Fn(&TrueErrors) -> Result<Belief, BeliefError> + Sync,
-    ) -> Result<Honesty, BeliefError> {
+    ) -> Result<FilterConsistency, BeliefError> {
         let assessed = |truth: &TrueErrors| {
             let belief = knows(truth)?;
             Ok(FilterPass::new(self.track, &belief).assess_stated(&belief, truth))
         };
         let assessments: Result<Vec<Assessment>, BeliefError> =
             self.truths.par_iter().map(assessed).collect();
-        Ok(Honesty::of(&assessments?, self.drawn))
+        Ok(FilterConsistency::of(&assessments?, self.drawn))
     }
 
     /// Of all truths; of the first alone where what draws add to it is known.
@@ -248,7 +252,7 @@ impl Task<'_> {
             match self.aim {
                 Aim::Mean => 0.0,
                 // One-sided: an error smaller than stated costs nothing here, the divergence alone speaks of
-                // timidity.
+                // caution.
                 Aim::Worst => ratios.iter().map(|r| OVERCONFIDENT * r.ln().max(0.0).powi(2)).sum(),
             }
         };
@@ -264,14 +268,14 @@ impl Task<'_> {
     }
 
     /// Logarithm of what should be 1: above 0 the filter is overconfident.
-    fn dishonesty(&self, honesty: &Honesty) -> f64 {
+    fn excess(&self, consistency: &FilterConsistency) -> f64 {
         match self.aim {
-            Aim::Mean => (honesty.nees / NEES_DOF as f64).ln(),
-            Aim::Worst => honesty.largest.ratio.ln(),
+            Aim::Mean => (consistency.nees / NEES_DOF as f64).ln(),
+            Aim::Worst => consistency.largest.ratio.ln(),
         }
     }
 
-    /// One more factor on all of them, no factor below the lowest, so that the filter is honest.
+    /// One more factor on all of them, no factor below the lowest, so that the filter is consistent.
     fn exact(
         &self,
         factors: &[Factor],
@@ -286,11 +290,11 @@ impl Task<'_> {
         // Down to where the largest factor meets the lowest bound: below that nothing changes any more.
         let highest = ln.iter().copied().fold(low, f64::max);
         let crossing = Crossing { bounds: (low - highest, MAX_LN), step: 0.1, exact: EXACT };
-        let dishonesty = |by: f64| {
-            let honesty = self.honesty_with(self.filter, &moved(by), draw_factors)?;
-            Ok::<_, BeliefError>(self.dishonesty(&honesty))
+        let excess = |by: f64| {
+            let consistency = self.consistency_with(self.filter, &moved(by), draw_factors)?;
+            Ok::<_, BeliefError>(self.excess(&consistency))
         };
-        let (by, _) = crossing.from(0.0, dishonesty)?;
+        let (by, _) = crossing.from(0.0, excess)?;
         Ok(moved(by))
     }
 }

@@ -1,7 +1,7 @@
-//! How honest a filter is over several truths.
+//! Consistency of a filter with several truths.
 
 use super::pass::{Assessment, Consistency};
-use crate::simulation::REPORTED;
+use crate::simulation::{NEES_DOF, REPORTED};
 
 /// The upper end of the interval of a figure, from the figure itself and those of the draws around it.
 pub type UpperEnd<'a> = dyn Fn(f64, Vec<f64>) -> f64 + Sync + 'a;
@@ -15,15 +15,16 @@ fn counted(ratios: &[f64], drawn: Option<&UpperEnd<'_>>) -> f64 {
     }
 }
 
-/// How honest a filter is over several truths.
+/// Consistency of a filter with several truths.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Honesty {
+pub struct FilterConsistency {
     /// Expected NEES, mean over time and truths; 9 is right.
     pub nees: f64,
     /// Where errors are largest against what is stated, at an outage's end or over the whole run (without outages: at any time).
     pub largest: Departure,
-    /// Where they are smallest.
-    pub smallest: Departure,
+    /// Smallest and largest ratio of any state and of all together, in the first truth where the others are its draws: what
+    /// `run` calls the filter by.
+    pub range: [f64; 2],
     /// When the outages end (s from the start).
     pub end_s: Vec<f64>,
     /// True RMSE of the reported states at these ends, root mean square over the truths.
@@ -43,8 +44,8 @@ pub struct Departure {
     pub truth: usize,
 }
 
-impl Honesty {
-    /// The honesty of one filter under several truths.
+impl FilterConsistency {
+    /// Of one filter under several truths.
     pub(super) fn of(assessments: &[Assessment], drawn: Option<&UpperEnd<'_>>) -> Self {
         let count = assessments.len() as f64;
         let mean = |a: &Assessment| a.reports.iter().map(|r| r.nees).sum::<f64>() / a.reports.len() as f64;
@@ -56,8 +57,18 @@ impl Honesty {
             }
         }
         rmse_end.iter_mut().flatten().for_each(|x| *x = x.sqrt());
-        let [smallest, largest] = Departure::extremes(&departures(assessments, drawn));
-        Self { nees: assessments.iter().map(mean).sum::<f64>() / count, largest, smallest, end_s, rmse_end }
+        let largest = Departure::largest(&departures(assessments, drawn));
+        let nees = assessments.iter().map(mean).sum::<f64>() / count;
+        let first = if drawn.is_some() { &assessments[..1] } else { assessments };
+        let nees_over_run = first.iter().map(mean).sum::<f64>() / first.len() as f64;
+        let at_ends = first.iter().flat_map(|a| a.outage_ends.iter().map(|end| end.nees));
+        let together =
+            std::iter::once(nees_over_run).chain(at_ends).map(|nees| (nees / NEES_DOF as f64).sqrt());
+        let places =
+            if end_s.is_empty() { over_run_of(first, None).to_vec() } else { departures(first, None) };
+        let ratios = places.into_iter().map(|d| d.ratio).chain(together);
+        let range = ratios.fold([f64::INFINITY, 0.0], |[low, high], r| [r.min(low), r.max(high)]);
+        Self { nees, largest, range, end_s, rmse_end }
     }
 
     /// Horizontal RMSE at the end of each outage (m).
@@ -67,12 +78,9 @@ impl Honesty {
 }
 
 impl Departure {
-    /// The smallest and the largest.
-    fn extremes(all: &[Self]) -> [Self; 2] {
-        let none = |ratio: f64| Self { ratio, state: 0, outage: None, truth: 0 };
-        let smallest = all.iter().fold(none(f64::INFINITY), |a, b| if b.ratio < a.ratio { *b } else { a });
-        let largest = all.iter().fold(none(0.0), |a, b| if b.ratio > a.ratio { *b } else { a });
-        [smallest, largest]
+    fn largest(all: &[Self]) -> Self {
+        let none = Self { ratio: 0.0, state: 0, outage: None, truth: 0 };
+        all.iter().fold(none, |a, b| if b.ratio > a.ratio { *b } else { a })
     }
 }
 
@@ -90,34 +98,38 @@ pub struct DrawFactors {
 }
 
 impl DrawFactors {
-    /// Of a filter under the first truth and its draws, whose honesty is known.
-    pub(super) fn of(assessments: &[Assessment], drawn: &UpperEnd<'_>, honesty: &Honesty) -> Self {
+    /// Of a filter under the first truth and its draws, whose consistency is known.
+    pub(super) fn of(
+        assessments: &[Assessment],
+        drawn: &UpperEnd<'_>,
+        consistency: &FilterConsistency,
+    ) -> Self {
         let first = &assessments[..1];
         let (all, alone) = (departures(assessments, Some(drawn)), departures(first, None));
-        let over_run = over_run(assessments, Some(drawn)).map(|d| d.ratio);
-        let alone_over_run = self::over_run(first, None).map(|d| d.ratio);
-        let honesty_alone = Honesty::of(first, None);
+        let over_run = over_run_of(assessments, Some(drawn)).map(|d| d.ratio);
+        let alone_over_run = over_run_of(first, None).map(|d| d.ratio);
+        let alone_consistency = FilterConsistency::of(first, None);
         let over =
             |all: &[f64; REPORTED], alone: &[f64; REPORTED]| std::array::from_fn(|i| all[i] / alone[i]);
-        let rmse_end = honesty.rmse_end.iter().zip(&honesty_alone.rmse_end);
+        let rmse_end = consistency.rmse_end.iter().zip(&alone_consistency.rmse_end);
         Self {
             ratios: all.iter().zip(&alone).map(|(all, alone)| all.ratio / alone.ratio).collect(),
             over_run: over(&over_run, &alone_over_run),
-            nees: honesty.nees / honesty_alone.nees,
+            nees: consistency.nees / alone_consistency.nees,
             rmse_end: rmse_end.map(|(all, alone)| over(all, alone)).collect(),
         }
     }
 
-    /// The honesty of another filter, by the first truth.
-    pub(super) fn honesty(&self, first: &[Assessment]) -> Honesty {
-        let mut honesty = Honesty::of(first, None);
+    /// The consistency of another filter, by the first truth.
+    pub(super) fn consistency(&self, first: &[Assessment]) -> FilterConsistency {
+        let mut consistency = FilterConsistency::of(first, None);
         let mut departures = departures(first, None);
         departures.iter_mut().zip(&self.ratios).for_each(|(d, margin)| d.ratio *= margin);
-        [honesty.smallest, honesty.largest] = Departure::extremes(&departures);
-        honesty.nees *= self.nees;
-        let ends = honesty.rmse_end.iter_mut().flatten();
+        consistency.largest = Departure::largest(&departures);
+        consistency.nees *= self.nees;
+        let ends = consistency.rmse_end.iter_mut().flatten();
         ends.zip(self.rmse_end.iter().flatten()).for_each(|(rmse, margin)| *rmse *= margin);
-        honesty
+        consistency
     }
 
     /// Takes the errors of the first truth to the upper ends of their intervals.
@@ -140,12 +152,12 @@ fn departures(assessments: &[Assessment], drawn: Option<&UpperEnd<'_>>) -> Vec<D
         0 => (0..assessments[0].reports.len()).flat_map(|k| at(None, |a| &a.reports, k)).collect(),
         ends => {
             let at_ends = (0..ends).flat_map(|k| at(Some(k), |a| &a.outage_ends, k));
-            at_ends.chain(over_run(assessments, drawn)).collect()
+            at_ends.chain(over_run_of(assessments, drawn)).collect()
         }
     }
 }
 
-fn over_run(assessments: &[Assessment], drawn: Option<&UpperEnd<'_>>) -> [Departure; REPORTED] {
+fn over_run_of(assessments: &[Assessment], drawn: Option<&UpperEnd<'_>>) -> [Departure; REPORTED] {
     states(assessments, drawn, None, &Assessment::ratio_over_run)
 }
 

@@ -1,14 +1,15 @@
-//! The smallest factors on a model that make its filter honest for another truth.
+//! Smallest factors on a model that make its filter consistent with another truth.
 
+use super::result::{FactorEntry, TuneResult};
 use crate::formats::model_file::{ModelFile, PROGRAM};
-use crate::report::{FactorEntry, Input, TuneResult};
+use crate::report::Input;
 use nav_sim_calibration::derived_interval;
 use nav_sim_navigation::ekf::{BeliefError, FilterStates};
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::defects::ImuSettings;
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::lincov::{
-    Aim, DrawFactors, Factor, Honesty, Per, Task, Track, TrueErrors, UpperEnd, scaled,
+    Aim, DrawFactors, Factor, FilterConsistency, Per, Task, Track, TrueErrors, UpperEnd, scaled,
 };
 use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::Model;
@@ -25,11 +26,11 @@ pub(crate) struct TuneInputs<'a> {
     pub track: &'a Track,
     /// Its outages.
     pub outages: &'a [Outage],
-    /// The filter that is made honest.
+    /// The filter that is made consistent.
     pub states: FilterStates,
     /// What has a factor of its own.
     pub per: Per,
-    /// When the filter is honest.
+    /// Condition under which the filter is consistent.
     pub aim: Aim,
     /// Whether factors may be below 1.
     pub allow_smaller: bool,
@@ -53,7 +54,7 @@ pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
     let TuneInputs { model, truths, track, outages, states, per, aim, .. } = inputs;
     // Draws are many: within 1.2e-3 the analysis is the same with one step from fix to fix, which `run` takes for them too.
     let merged = truths.stretch.map(|_| track.merged());
-    let judged = merged.as_ref().unwrap_or(track);
+    let analysed = merged.as_ref().unwrap_or(track);
     // The interval that `run` states for an error: the filter and its standard deviation are the same in all draws.
     let upper_end =
         |stretch| move |estimate: f64, draws: Vec<f64>| derived_interval(estimate, draws, stretch)[1];
@@ -66,14 +67,14 @@ pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
     }
     let filter_of_run = inputs.scenario.filter.states;
     let full = scenario.with_full_noise();
-    let full = |model: &Model| full.belief(model, outages, judged);
-    let tuned = |model: &Model| scenario.belief(model, outages, judged);
-    let of_run = |model: &Model| inputs.scenario.belief(model, outages, judged);
+    let full = |model: &Model| full.belief(model, outages, analysed);
+    let tuned = |model: &Model| scenario.belief(model, outages, analysed);
+    let of_run = |model: &Model| inputs.scenario.belief(model, outages, analysed);
     let task = Task {
         model,
         truths: &truths.errors,
         drawn: upper_end.as_ref().map(|end| end as &UpperEnd<'_>),
-        track: judged,
+        track: analysed,
         full: &full,
         filter: &tuned,
         per: *per,
@@ -82,15 +83,15 @@ pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
     };
     let factors = task.factors()?;
     let ones: Vec<Factor> = factors.iter().map(|f| Factor { on_variance: 1.0, ..f.clone() }).collect();
-    let (after, draw_factors) = task.judged(task.filter, &factors)?;
+    let (after, draw_factors) = task.consistency_and_draws(task.filter, &factors)?;
     Ok(TuneResult {
         filter: *states,
         filter_of_run,
-        before: task.honesty(task.filter, &ones)?,
+        before: task.consistency(task.filter, &ones)?,
         after,
-        of_run: (*states != filter_of_run).then(|| task.honesty(&of_run, &factors)).transpose()?,
+        of_run: (*states != filter_of_run).then(|| task.consistency(&of_run, &factors)).transpose()?,
         informed: task
-            .informed(|truth| knowing(&scenario, &truth.imu).belief(&truth.model, outages, judged))?,
+            .informed(|truth| knowing(&scenario, &truth.imu).belief(&truth.model, outages, analysed))?,
         sweep: sweep(&task, &factors, draw_factors.as_ref())?,
         factors,
         truths: truths.names.clone(),
@@ -121,23 +122,23 @@ fn sweep(
     task: &Task<'_>,
     factors: &[Factor],
     draw_factors: Option<&DrawFactors>,
-) -> Result<Vec<(f64, Honesty)>, BeliefError> {
+) -> Result<Vec<(f64, FilterConsistency)>, BeliefError> {
     let times = |power: i32| {
         let on_variances = f64::from(power).exp2();
         let scaled = |f: &Factor| Factor { on_variance: f.on_variance * on_variances, ..f.clone() };
         let factors: Vec<Factor> = factors.iter().map(scaled).collect();
-        Ok((on_variances, task.honesty_with(task.filter, &factors, draw_factors)?))
+        Ok((on_variances, task.consistency_with(task.filter, &factors, draw_factors)?))
     };
     (-4..=4).map(times).collect()
 }
 
-/// The tuned model, and where it came from; `honest_for`: the aim and what was taken for true.
-pub(crate) fn tuned(file: &ModelFile, factors: &[Factor], honest_for: &str, inputs: &[Input]) -> ModelFile {
+/// The tuned model, and where it came from; `goal`: the aim and what was taken for true.
+pub(crate) fn tuned(file: &ModelFile, factors: &[Factor], goal: &str, inputs: &[Input]) -> ModelFile {
     let mut provenance = toml::Table::new();
     let mut put = |key: &str, value: toml::Value| provenance.insert(key.to_owned(), value);
     put("program", PROGRAM.into());
     put("made_by", "tune".into());
-    put("honest_for", honest_for.into());
+    put("honest_for", goal.into());
     let table = |t: Result<toml::Table, toml::ser::Error>| toml::Value::from(t.unwrap_or_default());
     let entries = factors.iter().map(|f| table(toml::Table::try_from(FactorEntry::of(f))));
     put("factors", entries.collect::<Vec<_>>().into());

@@ -1,0 +1,133 @@
+//! Document of a tuning: factors and their cost, the filters beside one another, how sharp the answer is.
+
+use super::result::{TuneResult, kind};
+use crate::report::{Answer, STATES, error_of};
+use nav_sim_document::{
+    Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, Tone, readable, seconds,
+};
+use nav_sim_navigation::metrics::VerdictKind;
+use nav_sim_navigation::simulation::lincov::{Aim, FilterConsistency};
+use nav_sim_navigation::simulation::{NEES_DOF, REPORTED_NAMES};
+
+const SWEEP: &str = "The tuned filter with all its variances times a factor (1: as tuned). Cost: horizontal RMSE at the ends of outages against a filter that knows the truth.";
+const ENDS: &str = "True RMSE at the end of each outage, root mean square over the truths.";
+
+impl Answer for TuneResult {
+    fn document(&self) -> Document {
+        let found = kind(&self.after);
+        let tone = match self.unmet() {
+            Some(_) => Tone::Bad,
+            None if self.is_unchanged() && found == VerdictKind::Consistent => Tone::Good,
+            None => Tone::Doubtful,
+        };
+        let mut document = Document::new("Factors on a noise model", tone, self.verdict());
+        if found == VerdictKind::Underconfident && self.is_unchanged() {
+            document.note(Importance::Remark, "--allow-smaller seeks factors below 1");
+        } else if found == VerdictKind::Underconfident && self.aim == Aim::Worst {
+            let why =
+                "no error exceeds its sigma in any truth; --for mean aims at the right NEES in the mean";
+            document.note(Importance::Remark, why);
+        }
+        if self.is_drawn {
+            let counted = "errors count up to the upper end of the 95 % interval that run states";
+            document.note(Importance::Remark, counted);
+        }
+        document.facts(&[("truths", self.truths.join(", "))]);
+        document.section("Filters");
+        document.lead(self.table());
+        document.text("RMSE/sigma: largest error over what the filter states. RMSE: horizontal, at the end of an outage.");
+        document.section("Factors");
+        document.table(&self.factor_table());
+        document.section("How sharp the answer is");
+        document.chart(&self.sweep_chart(), SWEEP);
+        if !self.after.end_s.is_empty() {
+            document.charts(&self.ends(), ENDS);
+        }
+        document.checked("covariance analysis against 2000 Monte-Carlo runs: docs/validation.md.");
+        document
+    }
+}
+
+impl TuneResult {
+    fn table(&self) -> Table {
+        let ends = self.before.end_s.iter().map(|t| format!("RMSE {} s (m)", seconds(*t)));
+        let nees = format!("NEES ({NEES_DOF})");
+        let mut table = Table::new(["filter", "verdict", &nees, "RMSE/sigma", "in"]).and(ends);
+        for (i, (name, found)) in self.filters().enumerate() {
+            let number = |value: f64, key: String| Cell::number(value, &format!("/filters/{i}/{key}"));
+            let mut row = vec![
+                name.into(),
+                kind(found).to_string().into(),
+                number(found.nees, "nees".to_owned()),
+                number(found.largest.ratio, "largest_ratio".to_owned()),
+                self.place(found).into(),
+            ];
+            let ends = found.horizontal_m().enumerate();
+            row.extend(ends.map(|(k, rmse)| number(rmse, format!("outage_end/{k}/horizontal_rmse_m"))));
+            table.row(row);
+        }
+        table
+    }
+
+    /// State, time and truth of the largest error.
+    fn place(&self, found: &FilterConsistency) -> String {
+        let mut place = REPORTED_NAMES[found.largest.state].to_owned();
+        match found.largest.outage {
+            Some(outage) if found.end_s.len() > 1 => {
+                place += &format!(" at {} s", seconds(found.end_s[outage]))
+            }
+            None if !found.end_s.is_empty() => place += " over the run",
+            _ => {}
+        }
+        if self.truths.len() > 1 { format!("{place}, {}", self.worst_truth(found)) } else { place }
+    }
+
+    fn factor_table(&self) -> Table {
+        let mut table =
+            Table::new(["sensor", "process", "factor on the variance", "on the standard deviation"]);
+        for (i, f) in self.factors.iter().enumerate() {
+            table.row([
+                f.sensor.name().into(),
+                f.process.clone().unwrap_or_else(|| "all".to_owned()).into(),
+                Cell::number(f.on_variance, &format!("/factors/{i}/on_variance")),
+                Cell::figures(readable(f.on_variance.sqrt())),
+            ]);
+        }
+        table
+    }
+
+    fn sweep_chart(&self) -> Chart {
+        let curve = |value: &dyn Fn(&FilterConsistency) -> f64| {
+            let points = self.sweep.iter().map(|(factor, found)| (*factor, value(found)));
+            Series::line("tuned × factor", Colour::REAL, points.collect())
+        };
+        let right = |y: f64| Series::new("right", Colour::RIGHT, Mark::Level(y));
+        let nees = Axis::log(&format!("NEES ({NEES_DOF} if right)"));
+        let mut panels = vec![
+            Panel::new(nees, vec![right(NEES_DOF as f64), curve(&|h| h.nees)]),
+            Panel::new(Axis::log("largest RMSE/sigma"), vec![right(1.0), curve(&|h| h.largest.ratio)]),
+        ];
+        if !self.after.end_s.is_empty() {
+            let cost = vec![curve(&|h| 100.0 * self.cost(h))];
+            panels.push(Panel::new(Axis::linear("cost (%)").with_zero(), cost));
+        }
+        panels.iter_mut().for_each(|panel| panel.height = 0.7);
+        Chart::new("Consistency and cost against the variances", Axis::log("factor on all variances"), panels)
+    }
+
+    /// A small chart a state: the RMSE of each filter at the ends of outages.
+    fn ends(&self) -> Vec<Chart> {
+        let names: Vec<String> = self.before.end_s.iter().map(|t| format!("{} s", seconds(*t))).collect();
+        let chart = |(state, name): (usize, &&str)| {
+            let series = self.filters().enumerate().map(|(hue, (filter, found))| {
+                let point = |(k, rmse): (usize, &[f64; STATES.len()])| {
+                    (k as f64 + 0.12 * (hue as f64 - 1.5), rmse[state], f64::NAN)
+                };
+                Series::points(filter, Colour::Hue(hue), found.rmse_end.iter().enumerate().map(point))
+            });
+            let panel = Panel::new(Axis::linear("").with_zero(), series.collect());
+            Chart::new(&error_of(name), Axis::names(names.clone()), vec![panel]).small()
+        };
+        STATES.iter().enumerate().map(chart).collect()
+    }
+}

@@ -1,0 +1,69 @@
+//! Verdict and document of a tuning.
+
+use super::*;
+use crate::report::Answer;
+use nav_sim_document::Tone;
+use nav_sim_navigation::simulation::lincov::Departure;
+
+fn consistency(ratio: f64, nees: f64) -> FilterConsistency {
+    let (end_s, rmse_end) = (vec![90.0], vec![[1.0; 9]]);
+    FilterConsistency {
+        nees,
+        largest: Departure { ratio, state: 8, outage: Some(0), truth: 0 },
+        range: [0.95, ratio],
+        end_s,
+        rmse_end,
+    }
+}
+
+fn result(filter: FilterStates, of_run: FilterConsistency) -> TuneResult {
+    TuneResult {
+        filter,
+        filter_of_run: FilterStates::Reduced15,
+        factors: vec![Factor { sensor: Sensor::Gyro, process: None, on_variance: 4.0 }],
+        before: consistency(2.0, 30.0),
+        after: consistency(1.0, 8.8),
+        of_run: (filter != FilterStates::Reduced15).then_some(of_run),
+        informed: consistency(1.0, 9.0),
+        truths: vec!["truth.toml".to_owned()],
+        is_drawn: false,
+        aim: Aim::Worst,
+        without_factor: Vec::new(),
+        sweep: Vec::new(),
+    }
+}
+
+/// The filter that was tuned is named, and what `run` makes by default beside it: a verdict on the full filter is not one on
+/// that of 15 states.
+#[test]
+fn the_verdict_has_factors_cost_and_both_filters() {
+    let lines = result(FilterStates::Full, consistency(1.19, 9.51)).verdict();
+    assert_eq!(
+        lines[0],
+        "gyro × 4.00 (variance); cost 0.0 % of horizontal RMSE; NEES 30.0 → 8.80 (9 if right)"
+    );
+    assert_eq!(lines[1], "tuned, the full filter is consistent: errors 0.950 to 1.00 × sigma");
+    assert!(lines[2].contains("the default of run, is overconfident: errors 0.950 to 1.19"), "{lines:?}");
+    assert_eq!(result(FilterStates::Reduced15, consistency(1.0, 8.8)).verdict().len(), 2);
+}
+
+/// Never green where a filter is over- or underconfident; what `run` calls underconfident is called so.
+#[test]
+fn the_colour_is_that_of_the_worst_word() {
+    let mut tuned = result(FilterStates::Reduced15, consistency(1.0, 8.8));
+    assert_eq!(tuned.document().verdict.tone, Tone::Doubtful);
+    tuned.after.range[0] = 0.756;
+    let document = tuned.document();
+    assert!(document.verdict.lines[1].contains("is underconfident: errors 0.756 to"), "{document:?}");
+    assert!(document.notes()[0].text.contains("--for mean"), "{document:?}");
+    tuned.factors[0].on_variance = 1.0;
+    (tuned.before, tuned.after) = (consistency(1.0, 9.0), consistency(1.0, 9.0));
+    assert_eq!(tuned.document().verdict.tone, Tone::Good);
+    (tuned.before.range, tuned.after.range) = ([0.8, 0.9], [0.8, 0.9]);
+    let document = tuned.document();
+    assert!(
+        document.verdict.tone == Tone::Doubtful
+            && document.verdict.lines[0].starts_with("no factor is needed")
+    );
+    assert!(document.notes()[0].text.contains("--allow-smaller"), "{document:?}");
+}
