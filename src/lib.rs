@@ -63,6 +63,7 @@ pub mod study;
 mod tune;
 // What a command does, as one call.
 pub mod jobs;
+mod require;
 // All that most programs need.
 pub mod prelude;
 // Arguments, words and exit codes.

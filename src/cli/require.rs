@@ -7,28 +7,26 @@ use crate::formats::datasheet::{self, CATALOGUE, Datasheet};
 use crate::formats::file_kind::{self, FileKind};
 use crate::formats::model_file;
 use crate::formats::scenario_file;
-use crate::jobs::{Ask, CatalogueUnit, Misplaced, Requirements};
-use crate::report::require as words;
-use crate::report::require::RankedUnit;
-use crate::report::{catalogue_page, columns, model_page, needed_page};
+use crate::require::{Ask, CatalogueUnit, Misplaced, Requirements, stated_in_words};
 use nav_sim_navigation::require::{Limit, Quantity, RequireError, Worst};
 use nav_sim_navigation::sensors::outage::NotAnOutage;
 use std::path::{Path, PathBuf};
 
 /// Find the IMU that keeps the errors at the end of an outage within limits, or judge MODEL by them
 ///
-/// Uses linear covariance analysis, along TRAJECTORY with its fixes, of a filter that knows its IMU. Without MODEL it
-/// finds the white noise and bias instability that each sensor may have beside the turn-on biases of [imu] in --scenario
-/// (none without it). With MODEL it says whether the limits are
-/// kept (exit code 3: they are not), which part of the IMU decides, and the longest outage that it bridges.
+/// Uses linear covariance analysis along TRAJECTORY of a filter that knows its IMU. Without MODEL it finds the white noise
+/// and bias instability that each sensor may have beside the turn-on biases of [imu] in --scenario. With MODEL it says
+/// whether the limits are kept (exit code 3: they are not), which part of the IMU decides, and the longest outage that it
+/// bridges.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
-  nav-sim require trajectories/figure_eight.toml --outage 60 --p95-m 50 -o needed.toml
+  nav-sim require trajectories/figure_eight.toml --outage 60 \\
+      --require 'p95_m<=50' -o needed.toml
   nav-sim require trajectories/figure_eight.toml calib_data/tactical.toml \\
-      --outage 60:120 --rmse-m 100
+      --outage 60:120 --require 'rmse_m<=100'
   nav-sim require trajectories/figure_eight.toml calib_data/tactical.toml \\
-      --outage longest --p95-m 20")]
+      --outage longest --require 'p95_m<=20'")]
 pub(crate) struct Args {
     /// Trajectory: motion profile (.toml) or table (.csv)
     trajectory: PathBuf,
@@ -40,8 +38,12 @@ pub(crate) struct Args {
     /// Earliest start of the outage in seconds [default: 300, less if the trajectory is short]
     #[arg(long, value_name = "SECONDS", value_parser = parse::non_negative)]
     start: Option<f64>,
+    /// Limit at the end of the outage, as NAME<=LIMIT (repeatable): p50_m, p95_m, rmse_m (horizontal), roll_deg, pitch_deg,
+    /// yaw_deg
+    #[arg(long = "require", value_name = "NAME<=LIMIT", value_parser = parse_limit)]
+    limits: Vec<Limit>,
     #[command(flatten)]
-    limits: Limits,
+    old: OldLimits,
     /// Scenario file whose [gnss] section is used
     #[arg(long, value_name = "FILE")]
     gnss: Option<PathBuf>,
@@ -64,49 +66,44 @@ pub(crate) struct Args {
     out: Option<PathBuf>,
 }
 
-/// At the end of the outage; at least one.
+/// Limits of the release before, by a name each.
 #[derive(clap::Args, Debug)]
-#[command(next_help_heading = "Limits at the end of the outage")]
-struct Limits {
-    /// 95 % quantile of the horizontal error
-    #[arg(long, value_name = "METRES", value_parser = parse::positive)]
+struct OldLimits {
+    #[arg(long, hide = true, value_parser = parse::positive)]
     p95_m: Option<f64>,
-    /// Median of the horizontal error
-    #[arg(long, value_name = "METRES", value_parser = parse::positive)]
+    #[arg(long, hide = true, value_parser = parse::positive)]
     p50_m: Option<f64>,
-    /// RMSE of the horizontal position
-    #[arg(long, value_name = "METRES", value_parser = parse::positive)]
+    #[arg(long, hide = true, value_parser = parse::positive)]
     rmse_m: Option<f64>,
-    /// RMSE of roll
-    #[arg(long, value_name = "DEGREES", value_parser = parse::positive)]
+    #[arg(long, hide = true, value_parser = parse::positive)]
     roll_deg: Option<f64>,
-    /// RMSE of pitch
-    #[arg(long, value_name = "DEGREES", value_parser = parse::positive)]
+    #[arg(long, hide = true, value_parser = parse::positive)]
     pitch_deg: Option<f64>,
-    /// RMSE of yaw
-    #[arg(long, value_name = "DEGREES", value_parser = parse::positive)]
+    #[arg(long, hide = true, value_parser = parse::positive)]
     yaw_deg: Option<f64>,
 }
 
-impl Limits {
-    fn given(&self) -> Result<Vec<Limit>, Failure> {
-        let all = [
-            (Quantity::P95, self.p95_m),
-            (Quantity::P50, self.p50_m),
-            (Quantity::Rmse, self.rmse_m),
-            (Quantity::Angle(0), self.roll_deg),
-            (Quantity::Angle(1), self.pitch_deg),
-            (Quantity::Angle(2), self.yaw_deg),
-        ];
-        let limit = |(quantity, most): (Quantity, Option<f64>)| Some(Limit { quantity, most: most? });
-        let limits: Vec<Limit> = all.into_iter().filter_map(limit).collect();
-        if limits.is_empty() {
-            return Err(
-                Failure::input("no limit is given").hint("give one, such as --p95-m 5 or --yaw-deg 1")
-            );
-        }
-        Ok(limits)
+/// The limits that are given; at least one.
+fn limits(args: &Args) -> Result<Vec<Limit>, Failure> {
+    let OldLimits { p95_m, p50_m, rmse_m, roll_deg, pitch_deg, yaw_deg } = args.old;
+    let old = Quantity::ALL.into_iter().zip([p95_m, p50_m, rmse_m, roll_deg, pitch_deg, yaw_deg]);
+    let old = old.filter_map(|(quantity, most)| Some(Limit { quantity, most: most? }));
+    let limits: Vec<Limit> = args.limits.iter().copied().chain(old).collect();
+    if limits.is_empty() {
+        let hint = "give one, such as --require 'p95_m<=5' or --require 'yaw_deg<=1'";
+        return Err(Failure::input("no limit is given").hint(hint));
     }
+    Ok(limits)
+}
+
+fn parse_limit(text: &str) -> Result<Limit, String> {
+    let limit = || {
+        let (name, most) = text.split_once("<=").or_else(|| text.split_once('<'))?;
+        let quantity = Quantity::ALL.into_iter().find(|quantity| quantity.name() == name.trim())?;
+        Some(Limit { quantity, most: parse::positive(most.trim()).ok()? })
+    };
+    let names = Quantity::ALL.map(Quantity::name).join(", ");
+    limit().ok_or_else(|| format!("expected NAME<=LIMIT with a positive limit, NAME one of {names}"))
 }
 
 /// Beyond, the bias has more processes a factor of 16 apart than a filter has states for.
@@ -132,7 +129,7 @@ fn parse_ask(text: &str) -> Result<Ask, String> {
 
 /// What is asked, with the files read.
 fn requirements(args: &Args, session: &Session) -> Result<Requirements, Failure> {
-    let limits = args.limits.given()?;
+    let limits = limits(args)?;
     let mut scenario = args.scenario.as_deref().map(scenario_file::read).transpose()?.unwrap_or_default();
     if let Some(path) = &args.gnss {
         scenario.gnss = scenario_file::read(path)?.gnss;
@@ -167,17 +164,16 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 /// The IMU that is needed.
 fn sought(args: &Args, requirements: &Requirements, session: &Session) -> Result<(), Failure> {
     let _own = claim_output(args.out.as_deref(), [&args.trajectory], Written::Required, session)?;
-    let (needed, question) = requirements.needed(args.corr_time_s, args.iso_drift).map_err(|e| {
+    let needed = requirements.needed(args.corr_time_s, args.iso_drift).map_err(|e| {
         let hint = match e {
             RequireError::Loose { .. } => "a smaller limit, or a longer outage",
             _ => "a larger limit, a shorter outage, or a better receiver ([gnss] of --scenario)",
         };
         Failure::input(e).hint(hint)
     })?;
-    session.show(|| needed.json(&question), || needed.text(&question));
-    let drawn = args.pictures.write(|| needed_page(&needed, &question), session);
+    let drawn = args.pictures.draw(&session.answer(&needed), session);
     if let Some(out) = &args.out {
-        model_file::write(out, &requirements.model_file(&needed, &question))?;
+        model_file::write(out, &requirements.model_file(&needed))?;
         session.wrote(out);
     }
     drawn
@@ -190,14 +186,13 @@ fn given(path: &Path, args: &Args, requirements: &Requirements, session: &Sessio
     let mut scenario = requirements.scenario.clone();
     turn_on::expect(&mut scenario.initial, &file, path, session);
     turn_on::make(&mut scenario.imu, &file, path, session);
-    let not_stated = words::stated_in_words(&file.not_stated());
+    let not_stated = stated_in_words(&file.not_stated());
     if !not_stated.is_empty() {
         session.warn(format!("{}: what is not stated counts as none: {not_stated}", path.display()));
     }
     let model = read::at_rate(path, &file.model, scenario.imu.rate_hz, session)?;
     let judged = requirements.judged(&scenario, &model).map_err(unusable)?;
-    session.show(|| judged.json(), || judged.text());
-    args.pictures.write(|| model_page(&judged), session)?;
+    args.pictures.draw(&session.answer(&judged), session)?;
     let Some(margins) = judged.margins.filter(|margins| !margins.met()) else { return Ok(()) };
     let Worst { limit, value, .. } = margins.worst;
     let [value, most] = [value, limit.most].map(|x| limit.quantity.shown(x));
@@ -215,18 +210,9 @@ fn ranked(
         Some(directory) => units_of(directory, requirements, session)?,
         None => catalogue(requirements)?,
     };
-    let (units, question) = requirements.ranked(&units).map_err(Failure::input)?;
-    let beyond = words::catalogue_beyond_linear(&units).map_or_else(String::new, |line| format!("\n{line}"));
-    let text = || {
-        let (legend, rows) = (words::legend(&question), words::catalogue_rows(&units));
-        format!("{}:\n\n{}\n\n{legend}{beyond}", question.in_words(), columns(&rows))
-    };
-    session.show(|| words::catalogue_json(&units, &question), text);
-    args.pictures.write(|| catalogue_page(&units, &question), session)?;
-    if units.iter().any(|unit| !unit.not_stated.is_empty()) {
-        session.warn("figures that are not stated count as none: such a unit looks better than it is (open)");
-    }
-    if units.iter().any(RankedUnit::is_met) {
+    let ranking = requirements.ranked(&units).map_err(Failure::input)?;
+    args.pictures.draw(&session.answer(&ranking), session)?;
+    if ranking.is_met() {
         return Ok(());
     }
     Err(Failure::bound("no unit keeps the limits by figures that are all stated"))

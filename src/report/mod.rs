@@ -1,7 +1,6 @@
 //! Results as files: tables, JSON, self-contained pages (`page`). The module computes no statistic and touches
 //! no file: every function returns a text, and the command line writes it.
 
-mod beyond_linear;
 mod brief;
 mod choose;
 mod closure;
@@ -20,7 +19,6 @@ mod pages;
 mod practical;
 mod recording;
 mod replicates;
-pub(crate) mod require;
 pub(crate) mod requirement;
 mod run_directory;
 pub(crate) mod run_words;
@@ -38,7 +36,6 @@ mod warm_up;
 use nav_sim_document::Document;
 use serde::Serialize;
 
-pub(crate) use beyond_linear::BeyondLinear;
 pub(crate) use brief::brief;
 pub(crate) use choose::{ChoiceReport, RankedPlace};
 pub(crate) use closure::TrajectoryCheck;
@@ -64,8 +61,8 @@ pub use nav_sim_document::readable;
 pub(crate) use nav_sim_document::{seconds, short_names, six_digits, window};
 pub(crate) use pages::{
     PaperFigure, RatioCurves, STATES, ShownComparison, StudyCurves, calibration_page, calibration_svg,
-    catalogue_page, choice_page, design_page, efficiency_page, efficiency_svg, error_of, fusion_page,
-    model_page, needed_page, paper_figures, paper_page, run_svg, study_page, wavelet_page,
+    choice_page, design_page, efficiency_page, efficiency_svg, error_of, fusion_page, paper_figures,
+    paper_page, run_svg, study_page, wavelet_page,
 };
 pub(crate) use recording::{gnss_csv, imu_csv, initial_toml};
 pub(crate) use replicates::describe_replicates;
@@ -93,7 +90,7 @@ pub(crate) mod page {
 }
 
 mod number {
-    pub(crate) use nav_sim_document::{percent, readable, seconds, shortest, squared, window};
+    pub(crate) use nav_sim_document::{readable, seconds, shortest, squared, window};
 }
 
 /// Characters of a line in a terminal.

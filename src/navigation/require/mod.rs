@@ -37,6 +37,10 @@ pub enum Quantity {
 }
 
 impl Quantity {
+    /// All quantities.
+    pub const ALL: [Self; 6] =
+        [Self::P95, Self::P50, Self::Rmse, Self::Angle(0), Self::Angle(1), Self::Angle(2)];
+
     /// Its name, unit included.
     #[must_use]
     pub const fn name(self) -> &'static str {

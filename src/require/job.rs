@@ -1,11 +1,11 @@
 //! Which IMU a limit on the errors after an outage needs, what a given one makes of it, and a ranking.
 
-use super::turn_on;
+use super::given::{GivenImu, Longest};
+use super::needed::NeededImu;
+use super::question::{BeyondLinear, CURVE_S, LONGEST_S, Question};
+use super::ranking::{RankedUnit, Ranking};
 use crate::formats::model_file::{ModelFile, PROGRAM, TurnOn};
-use crate::report::BeyondLinear;
-use crate::report::require::{
-    Bridged, CURVE_S, GivenImu, LONGEST_S, Longest, NeededImu, Question, RankedUnit,
-};
+use crate::jobs::turn_on;
 use nav_sim_navigation::ekf::BeliefError;
 use nav_sim_navigation::metrics::Expected;
 use nav_sim_navigation::require::{
@@ -106,11 +106,7 @@ impl Requirements {
     ///
     /// # Errors
     /// When no IMU keeps the limits, or trajectory and rates do not fit together.
-    pub(crate) fn needed(
-        &self,
-        t_corr_s: f64,
-        iso_drift: bool,
-    ) -> Result<(NeededImu, Question), RequireError> {
+    pub(crate) fn needed(&self, t_corr_s: f64, iso_drift: bool) -> Result<NeededImu, RequireError> {
         let outages = self.outages();
         let course = self.course(&outages)?;
         let scenario = &self.with_stated_turn_on();
@@ -120,6 +116,7 @@ impl Requirements {
         let ends = course.drifts(scenario, &model)?;
         let worst = Worst::of(&self.limits, &ends).expect("at least one limit and one place");
         let mut needed = NeededImu {
+            question: self.question(outages.clone()),
             imu,
             shares,
             worst,
@@ -136,7 +133,7 @@ impl Requirements {
         if iso_drift {
             needed.iso_drift = Some(need.iso_drift(&imu, POINTS)?);
         }
-        Ok((needed, self.question(outages)))
+        Ok(needed)
     }
 
     /// The scenario with a filter that expects the turn-on biases that `[imu]` states, as it expects those of a model file.
@@ -162,7 +159,7 @@ impl Requirements {
         let curves = course.curves(scenario, model)?;
         let longest = self.longest_of(&course, (scenario, model), &curves)?;
         let of_limit = |limit: &Limit| CURVE_S.map(|s| worst_after(&curves, s, limit.quantity));
-        let bridged = Bridged { longest, curves: self.limits.iter().map(of_limit).collect() };
+        let curve_of_limit = self.limits.iter().map(of_limit).collect();
         let (margins, outages, judged) = if self.ask == Ask::Longest {
             let length_s = longest.length_s();
             let worst = Worst::of(&self.limits, &after(&curves, length_s));
@@ -179,7 +176,13 @@ impl Requirements {
             Some(outage) => self.beyond_linear(scenario, model, outage)?,
             None => None,
         };
-        Ok(GivenImu { margins, question: self.question(outages), bridged, beyond_linear })
+        Ok(GivenImu {
+            margins,
+            question: self.question(outages),
+            longest,
+            curves: curve_of_limit,
+            beyond_linear,
+        })
     }
 
     /// Whether `run` would say that the errors in an outage are beyond linear theory: by the covariance analysis that it
@@ -198,25 +201,24 @@ impl Requirements {
         Ok(expected.outages.first().and_then(BeyondLinear::of))
     }
 
-    /// How units do after the outage and after those of `CURVE_S`, the best first: those that keep the limits, those
-    /// that would if figures that are not stated were zero, those that do not.
+    /// Units after the outage and after those of `CURVE_S`: those whose figures are all stated, the best first, then the others
+    /// by name.
     ///
     /// # Errors
     /// When a model has no filter, with its name, or the length is not a whole number of seconds.
-    pub(crate) fn ranked(
-        &self,
-        units: &[CatalogueUnit],
-    ) -> Result<(Vec<RankedUnit>, Question), RequireError> {
+    pub(crate) fn ranked(&self, units: &[CatalogueUnit]) -> Result<Ranking, RequireError> {
         let outages = self.long_outages();
         let course = self.course(&outages)?;
-        let named =
-            |unit: &CatalogueUnit, e| RequireError::Unit { name: unit.name.clone(), source: Box::new(e) };
-        let ranked = |unit: &CatalogueUnit| self.rank(&course, unit).map_err(|e| named(unit, e));
-        let mut ranked =
-            units.par_iter().map(ranked).collect::<Vec<_>>().into_iter().collect::<Result<Vec<_>, _>>()?;
-        let class = |u: &RankedUnit| (!u.is_within(), !u.not_stated.is_empty());
-        ranked.sort_by(|a, b| class(a).cmp(&class(b)).then(b.worst.margin().total_cmp(&a.worst.margin())));
-        Ok((ranked, self.question(self.outages())))
+        let named = |name: &str, e| RequireError::Unit { name: name.to_owned(), source: Box::new(e) };
+        let ranked = |unit: &CatalogueUnit| self.rank(&course, unit).map_err(|e| named(&unit.name, e));
+        let ranked: Vec<Result<RankedUnit, RequireError>> = units.par_iter().map(ranked).collect();
+        let mut units = ranked.into_iter().collect::<Result<Vec<_>, _>>()?;
+        units.sort_by(|a, b| match (a.is_complete(), b.is_complete()) {
+            (true, true) => b.worst.margin().total_cmp(&a.worst.margin()),
+            (false, false) => a.name.cmp(&b.name),
+            (a, b) => b.cmp(&a),
+        });
+        Ok(Ranking { units, question: self.question(self.outages()) })
     }
 
     fn rank(&self, course: &Course<'_>, unit: &CatalogueUnit) -> Result<RankedUnit, RequireError> {
@@ -268,14 +270,14 @@ impl Requirements {
 
     /// The model file of an IMU that is needed.
     #[must_use]
-    pub(crate) fn model_file(&self, needed: &NeededImu, question: &Question) -> ModelFile {
+    pub(crate) fn model_file(&self, needed: &NeededImu) -> ModelFile {
         let imu = &needed.imu;
         let mut provenance = toml::Table::new();
         let mut put = |key: &str, value: toml::Value| provenance.insert(key.to_owned(), value);
         put("program", PROGRAM.into());
         put("made_by", "require".into());
         put("label", "what a limit needs: not a calibration".into());
-        put("question", question.in_words().into());
+        put("question", needed.question.in_words().into());
         put("turn_on_bias", needed.turn_on_in_words().into());
         for (i, name) in ImuParameters::NAMES.iter().enumerate() {
             put(name, ImuParameters::in_datasheets(i, imu.values[i]).into());

@@ -1,0 +1,199 @@
+//! A given IMU against its limits.
+
+use super::question::{
+    BeyondLinear, CHECKED, CURVE_S, DRIFT, DriftCurve, LONGEST_S, Question, drift_chart, points, points_json,
+    quantity_in_words, value,
+};
+use crate::report::Answer;
+use nav_sim_document::{Cell, Colour, Document, Mark, Series, Table, Tone, percent, readable, seconds};
+use nav_sim_navigation::require::{Limit, Margins, PartMargin, Worst};
+use serde::{Serialize, Serializer};
+use serde_json::{Value, json};
+
+/// The longest outage that keeps the limits.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Longest {
+    /// So long (s).
+    Seconds(f64),
+    /// All that was looked at (s).
+    AtLeast(f64),
+    /// None: a limit is exceeded where every fix comes. The hardest, just before a fix.
+    Never(Worst),
+}
+
+impl Longest {
+    /// What is bridged (s).
+    pub(super) const fn length_s(self) -> f64 {
+        match self {
+            Self::Seconds(s) | Self::AtLeast(s) => s,
+            Self::Never(_) => 0.0,
+        }
+    }
+
+    /// In a cell of a table.
+    pub(super) fn in_short(self) -> String {
+        match self {
+            // curves begin with the first second: what is not kept then may be kept for a part of it
+            Self::Seconds(s) if s < 1.0 => "less than 1 s".to_owned(),
+            Self::Seconds(s) => format!("{} s", seconds(s)),
+            Self::AtLeast(s) => format!("≥ {} s", seconds(s)),
+            Self::Never(_) => "none".to_owned(),
+        }
+    }
+
+    fn in_words(self) -> String {
+        match self {
+            Self::AtLeast(s) if s < LONGEST_S => format!("{}, to the end of the trajectory", self.in_short()),
+            Self::AtLeast(_) => format!("{}, longer ones are not looked at", self.in_short()),
+            Self::Never(worst) => {
+                let (name, value) = (worst.limit.quantity.name(), readable(worst.value));
+                format!("none; even without an outage {name} is {value} just before a fix")
+            }
+            Self::Seconds(_) => self.in_short(),
+        }
+    }
+
+    pub(super) fn json(self) -> Value {
+        match self {
+            Self::Seconds(s) => json!({ "longest_s": s }),
+            Self::AtLeast(s) => json!({ "at_least_s": s }),
+            Self::Never(worst) => {
+                let (quantity, most) = (worst.limit.quantity.name(), worst.limit.most);
+                let with_all_fixes = json!({ "quantity": quantity, "value": worst.value, "limit": most });
+                json!({ "longest_s": 0.0, "with_all_fixes": with_all_fixes })
+            }
+        }
+    }
+}
+
+/// A model against its limits.
+#[derive(Debug, Clone)]
+pub(crate) struct GivenImu {
+    /// Margins after the outage that was asked for; none where the longest is sought.
+    pub margins: Option<Margins>,
+    /// What was asked, and where.
+    pub question: Question,
+    /// The longest outage within the limits.
+    pub(super) longest: Longest,
+    /// The quantity of each limit, at its worst place, after outages of growing length.
+    pub(super) curves: Vec<DriftCurve>,
+    /// Where the answer is beyond linear theory.
+    pub beyond_linear: Option<BeyondLinear>,
+}
+
+impl GivenImu {
+    fn verdict(&self) -> Vec<String> {
+        let (question, longest) = (&self.question, self.longest.in_words());
+        let Some(margins) = &self.margins else {
+            let (limits, starts) = (question.limits_in_words(), question.starts());
+            return vec![format!("longest outage within {limits}: {longest} ({starts})")];
+        };
+        let word = if margins.met() { "met" } else { "NOT met" };
+        let times = readable(margins.worst.value / margins.worst.limit.most);
+        let mut lines = vec![
+            format!("{word}: {}, {times} times the limit", question.worst(&margins.worst)),
+            format!("asked: {}", question.in_words()),
+            format!("longest outage within the limits, from the same starts: {longest}"),
+        ];
+        lines.extend(self.what_decides(margins));
+        lines
+    }
+
+    /// The part that decides, and whether a better IMU helps.
+    fn what_decides(&self, margins: &Margins) -> Option<String> {
+        let binding = margins.binding()?;
+        let without = readable(margins.without_imu.value);
+        let name = margins.without_imu.limit.quantity.name();
+        let better = match margins.an_imu_helps() {
+            true => format!("an IMU without errors would leave {name} {without}"),
+            false => format!("no IMU keeps the limit: GNSS and start alone leave {name} {without}"),
+        };
+        Some(format!("{} decides ({}); {better}", binding.part.name(), percent(binding.share)))
+    }
+
+    fn parts(margins: &Margins) -> Table {
+        let mut table =
+            Table::new(["part of the error", "share", "factor on its sigma that alone meets the limit"]);
+        let binding = margins.binding().map(|binding| binding.part);
+        for (i, p) in margins.parts.iter().enumerate() {
+            let mark = if Some(p.part) == binding { " (binding)" } else { "" };
+            let factor = match p.factor {
+                Some(factor) => Cell::number(factor, &format!("/parts/{i}/factor")),
+                None if !p.part.is_of_imu() => Cell::figures(""),
+                None if margins.met() => Cell::figures("any value"),
+                None => Cell::figures("none: the rest is too large"),
+            };
+            table.row([
+                (p.part.name() + mark).into(),
+                Cell::share(p.share, &format!("/parts/{i}/share")),
+                factor,
+            ]);
+        }
+        table
+    }
+
+    fn drift_table(&self) -> Table {
+        let names = self.question.limits.iter().map(|l| quantity_in_words(l.quantity).to_owned());
+        let mut table = Table::new(["outage (s)"]).and(names);
+        for (k, length_s) in CURVE_S.iter().enumerate() {
+            let cell =
+                |(i, curve): (usize, &DriftCurve)| value(curve[k], &format!("/curves/{i}/points/{k}/value"));
+            let first = Cell::figures(length_s.to_string());
+            table.row(std::iter::once(first).chain(self.curves.iter().enumerate().map(cell)));
+        }
+        table
+    }
+}
+
+impl Answer for GivenImu {
+    fn document(&self) -> Document {
+        let is_good = match &self.margins {
+            Some(margins) => margins.met(),
+            None => self.longest.length_s() > 0.0,
+        };
+        let mut document = Document::new("An IMU against its limits", Tone::from(is_good), self.verdict());
+        BeyondLinear::note(self.beyond_linear.as_ref(), &mut document);
+        if let Some(margins) = &self.margins {
+            document.section("Parts of the error");
+            document.lead(Self::parts(margins));
+        }
+        document.section("Error against the length of an outage");
+        for (limit, curve) in self.question.limits.iter().zip(&self.curves) {
+            let mut series = vec![Series::new("limit", Colour::RIGHT, Mark::Level(limit.most))];
+            series.extend(Series::dotted_line("this IMU", Colour::REAL, points(curve)));
+            document.chart(&drift_chart(limit.quantity, series), DRIFT);
+        }
+        document.table(&self.drift_table());
+        document.checked(CHECKED);
+        document
+    }
+}
+
+impl Serialize for GivenImu {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let curve = |(limit, curve): (&Limit, &DriftCurve)| json!({ "quantity": limit.quantity.name(), "points": points_json(curve) });
+        let mut file = json!({
+            "schema_version": 1,
+            "question": self.question.json(),
+            "outage": self.longest.json(),
+            "curves": self.question.limits.iter().zip(&self.curves).map(curve).collect::<Value>(),
+            "beyond_linear": self.beyond_linear,
+        });
+        if let Some(margins) = &self.margins {
+            let part =
+                |p: &PartMargin| json!({ "part": p.part.name(), "share": p.share, "factor": p.factor });
+            let without = &margins.without_imu;
+            file["met"] = json!(margins.met());
+            file["quantity"] = json!(margins.worst.limit.quantity.name());
+            file["value"] = json!(margins.worst.value);
+            file["limit"] = json!(margins.worst.limit.most);
+            file["place"] = json!(margins.worst.place);
+            file["parts"] = margins.parts.iter().map(part).collect();
+            file["binding"] = json!(margins.binding().map(|p| p.part.name()));
+            file["share_of_imu"] = json!(margins.share_of_imu());
+            file["without_imu_errors"] =
+                json!({ "quantity": without.limit.quantity.name(), "value": without.value });
+        }
+        file.serialize(serializer)
+    }
+}
