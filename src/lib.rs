@@ -47,6 +47,8 @@
 #[doc(inline)]
 pub use {nav_sim_calibration as calibration, nav_sim_navigation as navigation, nav_sim_signal as signal};
 
+pub use jobs::export;
+
 // Parameters for other programs.
 mod export;
 // Which model, on the user's own recordings.

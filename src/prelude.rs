@@ -17,8 +17,8 @@
 pub use crate::formats::model_file::{ModelFile, read as read_model};
 pub use crate::formats::trajectory_file::{Options as TrajectoryOptions, load as load_trajectory};
 pub use crate::jobs::{
-    Calibration, CalibrationOptions, NavigateInputs, Navigation, Note, Remarks, Silence, TrueImu, calibrate,
-    navigate,
+    Calibration, CalibrationOptions, NavigateInputs, Navigation, Note, Remarks, Silence, Target, TrueImu,
+    calibrate, navigate,
 };
 pub use crate::observer::Observer;
 pub use nav_sim_calibration::Estimator;

@@ -40,8 +40,8 @@ mod uncertainty;
 mod selection;
 // Diagnosis: recordings that are unlike the others.
 mod diagnosis;
-// All of these in words.
-mod words;
+// Numbers for people.
+mod format;
 // The whole calibration.
 mod pipeline;
 // Turn-on bias, from the means of recordings.
@@ -53,24 +53,21 @@ pub mod efficiency;
 
 pub use anticipated::{Anticipated, AnticipationError};
 pub use curve::{
-    AverageError, Change, Estimator, Group, Pool, Replicate, Scope, SignalError, Trim, TrimError, WarmUp,
-    average, grouped, implied, median, replicates, trend, warm_up,
+    AverageError, Beginning, Beginnings, Change, Estimator, Group, Pool, Replicate, Scope, SignalError, Trim,
+    TrimError, WarmUp, average, grouped, implied, median, replicates, trend, warm_up,
 };
 pub use diagnosis::{
-    Alarm, AxisScores, CoarseSteps, CommonDrift, CommonOutliers, Diagnosis, Differing, DriftAlarm,
-    GaussianQuantization, LeftOut, Misfit, Movement, Verdict, diagnose,
+    Alarm, AxisScores, CoarseSteps, CommonDrift, CommonOutliers, Diagnosis, DriftAlarm, GaussianQuantization,
+    LeftOut, Movement, Verdict, diagnose,
 };
 pub use fit::{Fit, FitError, Termination, Weighting, estimate, fit};
+pub use format::{duration, percent};
 pub use model::{BoundDomain, LimitError, Limits, ModelSpec, SpecError};
 pub use outcome::{
     Advance, AxesDiffer, Bootstrap, Candidate, Departure, FitRange, Goodness, Indistinct, Inference,
-    LevelSpread, Miss, ModelChoice, Outcome, ParameterInterval, ParameterLimit, Practical,
-    PracticalIntervals, Ranking, Settings, TooSimple, Undetermined, model_of, put, tau_s,
+    LevelSpread, Misfit, Miss, ModelChoice, Note, Outcome, ParameterInterval, ParameterLimit, Practical,
+    PracticalIntervals, Ranking, Settings, Share, TooSimple, Undetermined, model_of, put, shares, tau_s,
 };
 pub use pipeline::{CalibrationError, Cause, calibrate, calibrate_telling, fit_curve, infer, infer_telling};
 pub use turn_on::{MeansOfAxis, TURN_ON_LEVEL, TurnOnFinding, TurnOnSpread, turn_on};
-pub use uncertainty::{ALIKE_LEVEL, CurveInfluence, Scattering, derived_interval};
-pub use words::{
-    Share, advice, axes_remark, correlation_time_s, duration, effects, percent, reasons, shares, signals,
-    undetermined,
-};
+pub use uncertainty::{ALIKE_LEVEL, CurveInfluence, Scattering, WIDEST, derived_interval};

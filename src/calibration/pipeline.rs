@@ -9,7 +9,6 @@ use crate::uncertainty::axes::axes_differ;
 use crate::uncertainty::bootstrap::CurveSampler;
 use crate::uncertainty::inference::inference;
 use crate::wavelet::Curve;
-use crate::words::{notes, notes_of_inference};
 use rayon::prelude::*;
 
 /// Why a group has no model.
@@ -121,13 +120,11 @@ fn fit_telling(
         curve,
         fit,
         axes_differ: axes_differ(&group.replicates, estimator, &settings.tuning),
-        notes: Vec::new(),
         inference: None,
     };
     if settings.weighting == Weighting::Full && estimator != Estimator::Avlr {
         weigh_fully(group, &mut outcome, settings).map_err(|e| error(e.into()))?;
     }
-    outcome.notes = notes(&outcome, &group.replicates, settings.rate_hz);
     Ok(outcome)
 }
 
@@ -179,7 +176,6 @@ pub fn infer_telling(
     outcomes.par_iter_mut().for_each(|outcome| {
         let Some(group) = groups.iter().find(|g| g.scope == outcome.scope) else { return };
         outcome.inference = Some(inference(group, outcome, settings, bootstrap, advance));
-        outcome.notes.extend(notes_of_inference(outcome));
     });
 }
 

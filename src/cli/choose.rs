@@ -92,7 +92,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let options = CalibrationOptions {
         reading: args.recordings.options(),
         skip_warm_up: args.recordings.skips_warm_up(),
-        scales: args.tuning.scales,
+        scales: args.tuning.levels(),
         estimators: EstimatorChoice::default(),
         pool: args.pool,
         settings: Settings { trim: args.trim, tuning: args.tuning.tuning()?, ..Settings::default() },
@@ -117,7 +117,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         seed,
     };
     let note = CalibrationNote {
-        efficiency_convention: args.tuning.convention().to_owned(),
+        efficiency_convention: nav_sim_signal::wavelet::Convention::Exact,
         reading: args.recordings.provenance(),
         seed: Some(seed),
         inputs: Vec::new(),

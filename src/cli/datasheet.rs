@@ -41,7 +41,7 @@ pub(crate) struct Args {
     out: Option<PathBuf>,
 }
 
-/// Figures: a number and its unit, such as '0.15 deg/sqrt(h)'.
+/// Figures: a number and its unit, such as '0.15 deg/sqrt(h)'; others in a catalogue entry.
 #[derive(clap::Args, Debug)]
 #[command(next_help_heading = "Figures, a number and its unit ('0.15 deg/sqrt(h)')")]
 struct Figures {
@@ -60,30 +60,12 @@ struct Figures {
     /// Longest correlation time of both biases: s, min, h [default: 300 s, with a warning]
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::CorrelationTime))]
     corr_time: Option<Quantity>,
-    /// Correlation time of the accelerometers' bias
-    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::CorrelationTime))]
-    accel_corr_time: Option<Quantity>,
-    /// Correlation time of the gyroscopes' bias
-    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::CorrelationTime))]
-    gyro_corr_time: Option<Quantity>,
-    /// Rate random walk of the accelerometers: m/s²/sqrt(s), ug/sqrt(h), …
-    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::Walk))]
-    accel_rrw: Option<Quantity>,
-    /// Rate random walk of the gyroscopes: deg/h/sqrt(h), rad/s/sqrt(s), …
-    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::Walk))]
-    gyro_rrw: Option<Quantity>,
     /// Turn-on bias of the accelerometers, as a standard deviation: mg, m/s²
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::TurnOn))]
     accel_turn_on: Option<Quantity>,
     /// Turn-on bias of the gyroscopes, as a standard deviation: deg/s, deg/h
     #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::TurnOn))]
     gyro_turn_on: Option<Quantity>,
-    /// Scale-factor error of the accelerometers: ppm, %
-    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Accel, Figure::Scale))]
-    accel_scale: Option<Quantity>,
-    /// Scale-factor error of the gyroscopes: ppm, %
-    #[arg(long, value_name = "FIGURE", value_parser = figure(Sensor::Gyro, Figure::Scale))]
-    gyro_scale: Option<Quantity>,
 }
 
 /// Reads a figure of a sensor.
@@ -94,20 +76,15 @@ fn figure(sensor: Sensor, figure: Figure) -> impl Fn(&str) -> Result<Quantity, S
 impl Figures {
     /// Those that are given, in the place of those of an entry.
     fn over(&self, sheet: &mut Datasheet) {
-        let [accel, gyro] = [&self.accel_corr_time, &self.gyro_corr_time];
         let given = [
             (Sensor::Accel, Figure::Noise, &self.vrw),
             (Sensor::Gyro, Figure::Noise, &self.arw),
             (Sensor::Accel, Figure::Bias, &self.accel_bias),
             (Sensor::Gyro, Figure::Bias, &self.gyro_bias),
-            (Sensor::Accel, Figure::CorrelationTime, if accel.is_some() { accel } else { &self.corr_time }),
-            (Sensor::Gyro, Figure::CorrelationTime, if gyro.is_some() { gyro } else { &self.corr_time }),
-            (Sensor::Accel, Figure::Walk, &self.accel_rrw),
-            (Sensor::Gyro, Figure::Walk, &self.gyro_rrw),
+            (Sensor::Accel, Figure::CorrelationTime, &self.corr_time),
+            (Sensor::Gyro, Figure::CorrelationTime, &self.corr_time),
             (Sensor::Accel, Figure::TurnOn, &self.accel_turn_on),
             (Sensor::Gyro, Figure::TurnOn, &self.gyro_turn_on),
-            (Sensor::Accel, Figure::Scale, &self.accel_scale),
-            (Sensor::Gyro, Figure::Scale, &self.gyro_scale),
         ];
         for (sensor, figure, quantity) in given {
             if let Some(quantity) = quantity.clone() {
@@ -169,27 +146,20 @@ fn doubt(sheet: &Datasheet, sensor: Sensor, session: &Session) {
     let name = sensor.name();
     let flag = if sensor == Sensor::Accel { "--vrw" } else { "--arw" };
     if sheet.value(sensor, Figure::Noise).is_none() {
-        session.warn(format!("{name}: no white noise is given ({flag}): the model has none"));
+        session.warn(format!("{name}: no white noise is given ({flag})"));
     }
     if sheet.value(sensor, Figure::Bias).is_none() {
-        session
-            .warn(format!("{name}: no bias instability is given (--{name}-bias): the bias does not wander"));
+        session.warn(format!("{name}: no bias instability is given (--{name}-bias)"));
     }
     if sheet.value(sensor, Figure::TurnOn).is_none() {
-        session.warn(format!(
-            "{name}: no turn-on bias (its repeatability) is given (--{name}-turn-on): the model has none"
-        ));
+        session.warn(format!("{name}: no turn-on bias is given (--{name}-turn-on)"));
     }
     if let Some(offset) = sheet.given(sensor, Figure::Offset) {
-        session.say(format!(
-            "{name}: a zero offset of ±{offset} is an initial tolerance, measured and removed before use: not in the model"
-        ));
+        session
+            .say(format!("{name}: the zero offset of ±{offset} is removed before use and not in the model"));
     }
     if let Some(ppm) = sheet.value(sensor, Figure::Scale) {
-        session.say(format!(
-            "{name}: a scale factor of {ppm} ppm is not noise; the filter expects it with `run --scale-ppm`, the true \
-             IMU has it with [imu] scale_ppm_{name} of a scenario"
-        ));
+        session.say(format!("{name}: the scale factor of {ppm} ppm is not in the model: run --scale-ppm"));
     }
 }
 

@@ -87,7 +87,7 @@ impl From<FileError> for Failure {
 /// How the commands say a setting that helps.
 pub(crate) const fn option_for(setting: Setting) -> &'static str {
     match setting {
-        Setting::ColumnNames => "give the names with --columns",
+        Setting::ColumnNames => "correct the header",
         Setting::Channels => "leave the axis out with --axes",
         Setting::FewerChannels => "take fewer signals at a time with --axes",
         Setting::Gaps => {

@@ -3,21 +3,18 @@
 use super::parse::one_of;
 use super::pictures::claim_output;
 use super::{Failure, Session};
-use crate::export::{Export, ExportError, Settings, Target};
 use crate::formats::atomic::{self, Written};
 use crate::formats::model_file::{self, ModelFile};
-use crate::jobs::{self, Recorded};
+use crate::jobs::{self, Export, ExportError, Recorded, Target};
 use crate::report;
 use nav_sim_calibration::duration;
-use nav_sim_signal::imu::Sensor;
 use nav_sim_signal::noise::practical::{Horizon, Policy};
 use std::path::PathBuf;
 
 /// Write a noise model as the parameters of another program
 ///
 /// Other filters know white noise (N) and one bias process, a random walk (K) or a Gauss-Markov process. --policy says
-/// which such pair stands for the model's noisiest axis over --horizon. The head of the file and stderr say by how much
-/// the two differ.
+/// which such pair stands for the model's noisiest axis over --horizon.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -56,14 +53,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let file = model_file::read(&args.model)?;
     let shown = args.model.display().to_string();
     let _own = claim_output(args.out.as_deref(), [&args.model], Written::Export, session)?;
-    let turn_on = file.turn_on.unwrap_or_default();
-    let settings = Settings {
-        policy: args.policy,
-        horizon: args.horizon,
-        range_s: file.observed_s().unwrap_or(LONGEST_S).max(args.horizon.to_s),
-        turn_on: Sensor::ALL.map(|sensor| turn_on.sigma(sensor)),
-    };
-    let export = Export::new(args.target, &file.model, &file.missing, settings)
+    let export = jobs::exported(&file, args.target, args.policy, args.horizon)
         .map_err(|e| Failure::input(format!("{shown}: {e}")).maybe_hint(advice(&e)))?;
     let text = export.text(&shown);
     if let Some(out) = &args.out {
@@ -97,17 +87,12 @@ fn certificate(export: &Export, file: &ModelFile, session: &Session) -> Result<(
         recorded.samples as f64 / file.model.rate_hz
     );
     for certificate in certificates {
-        let name = certificate.sensor.name();
-        let all = certificate.scales.len();
+        let (name, all) = (certificate.sensor.name(), certificate.scales.len());
         let outside = certificate.scales.iter().filter(|s| !s.inside).count();
         match certificate.worst() {
-            None => session.say(format!(
-                "{name}: certified: the model lies within the 95 % band of {made} of the exported pair at all {all} \
-                 scales of the horizon"
-            )),
+            None => session.say(format!("{name}: certified: within the 95 % band of {made} at all {all} scales")),
             Some(worst) => session.warn(format!(
-                "{name}: not certified: the model lies outside the 95 % band of {made} of the exported pair at {outside} of \
-                 {all} scales of the horizon, most over averages of {}: {:.2} times their Allan deviation",
+                "{name}: not certified: outside the 95 % band of {made} at {outside} of {all} scales, most at {}: {:.2} times",
                 duration(worst.average_s),
                 worst.ratio
             )),
@@ -115,9 +100,6 @@ fn certificate(export: &Export, file: &ModelFile, session: &Session) -> Result<(
     }
     Ok(())
 }
-
-/// Longest averaging time at which a minimum is believed of a model that no calibration made (s).
-const LONGEST_S: f64 = 10_000.0;
 
 fn advice(e: &ExportError) -> Option<String> {
     match e {

@@ -47,7 +47,7 @@ impl From<JobError> for Failure {
             }
             JobError::NoRate { .. } => Self::input(e)
                 .hint("give the rate with --rate-hz: correlation times and the model file need it"),
-            JobError::NoSensor { .. } => Self::input(e).hint("--sensor accel or --sensor gyro"),
+            JobError::NoSensor { .. } => Self::input(e).hint("--axes accel or --axes gyro"),
             JobError::TwoCurves { .. } => {
                 Self::input(e).hint("calibrate the recordings themselves: it averages them")
             }

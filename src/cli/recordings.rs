@@ -5,7 +5,8 @@ use super::parse::words;
 use super::{Progress, Session};
 use crate::formats::recordings::{Gaps, ReadOptions, Report};
 use crate::jobs::{Remark, Remarks};
-use crate::report::{BeginsOtherwise, six_digits, warm_up_in_short, warm_up_lines};
+use crate::report::six_digits;
+use nav_sim_signal::imu::Sensor;
 
 /// How recordings are read.
 #[derive(clap::Args, Debug)]
@@ -23,10 +24,6 @@ pub(crate) struct RecordingArgs {
     /// Signals to use: all, accel, gyro, x, accel.x, … (repeatable or comma-separated; default: all)
     #[arg(long, value_name = "AXES", value_delimiter = ',', value_parser = ChannelSet::named)]
     axes: Vec<ChannelSet>,
-    /// Names of the columns, comma-separated, instead of the header (and for files without one; default for .npy: the
-    /// accelerometers' x, y, z, then the gyroscopes')
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
-    columns: Option<Vec<String>>,
 }
 
 const GAPS: &[(&str, &str)] = &[
@@ -65,6 +62,15 @@ impl RecordingArgs {
         self.rate_hz
     }
 
+    /// The sensor whose signals alone are asked for.
+    pub(crate) fn sensor(&self) -> Option<Sensor> {
+        let of_sensor = |sensor: &Sensor| {
+            let mut channels = self.axes.iter().flat_map(|set| &set.0).peekable();
+            channels.peek().is_some() && channels.all(|channel| channel.sensor == *sensor)
+        };
+        Sensor::ALL.into_iter().find(of_sensor)
+    }
+
     /// What decides what is read of the files, for the provenance of a result.
     pub(crate) fn provenance(&self) -> toml::Table {
         let mut table = toml::Table::new();
@@ -80,9 +86,6 @@ impl RecordingArgs {
         if !self.axes.is_empty() {
             let channels = self.axes.iter().flat_map(|set| &set.0).map(ToString::to_string);
             put("axes", channels.collect::<Vec<_>>().into());
-        }
-        if let Some(columns) = &self.columns {
-            put("columns", columns.clone().into());
         }
         if let Some(rate_hz) = self.rate_hz {
             put("rate_hz_given", rate_hz.into());
@@ -100,7 +103,6 @@ impl RecordingArgs {
             },
             gaps: self.gaps,
             channels: (!self.axes.is_empty()).then(|| self.axes.iter().flat_map(|s| s.0.clone()).collect()),
-            columns: self.columns.clone(),
             ..ReadOptions::default()
         }
     }
@@ -110,13 +112,11 @@ impl RecordingArgs {
 pub(crate) struct Said<'a> {
     session: &'a Session,
     progress: Option<Progress>,
-    /// The recordings, and how long each is (s).
-    lengths: Vec<(String, f64)>,
 }
 
 impl<'a> Said<'a> {
     pub(crate) const fn new(session: &'a Session) -> Self {
-        Self { session, progress: None, lengths: Vec::new() }
+        Self { session, progress: None }
     }
 
     fn report(&mut self, report: &Report) {
@@ -137,24 +137,6 @@ impl<'a> Said<'a> {
         for warning in report.all_warnings() {
             printer.warn(&warning);
         }
-        for file in &report.files {
-            let seconds = |(name, samples)| (name, samples as f64 / file.rate_hz);
-            self.lengths.extend(file.recordings().map(seconds));
-        }
-    }
-
-    /// `; 262 s of them are used`, of recordings whose beginning is left out.
-    fn used(&self, found: &[BeginsOtherwise]) -> String {
-        let length =
-            |name: &str| self.lengths.iter().find(|(recording, _)| recording == name).map(|(_, s)| *s);
-        let used =
-            found.iter().filter_map(|recording| Some(length(&recording.recording)? - recording.skip_s?));
-        let (low, high) = used.fold((f64::INFINITY, 0.0_f64), |(low, high), s| (low.min(s), high.max(s)));
-        match high - low {
-            _ if high == 0.0 => String::new(),
-            ..0.5 => format!("; {high:.0} s of it are used"),
-            _ => format!("; {low:.0} to {high:.0} s of them are used"),
-        }
     }
 }
 
@@ -170,14 +152,6 @@ impl Remarks for Said<'_> {
         self.progress = None;
         match remark {
             Remark::Read(report) => self.report(report),
-            Remark::WarmUp { found, recordings, left_out, rate_hz } => {
-                for line in warm_up_lines(found, rate_hz) {
-                    self.session.detail(&line);
-                }
-                let used = if left_out { self.used(found) } else { String::new() };
-                let short = warm_up_in_short(found, recordings, left_out, rate_hz);
-                self.session.warn(format!("{short}{used}"));
-            }
             Remark::Rate { found_hz, taken_hz } => self.session.say(format!(
                 "the recordings run at {} Hz: taken as {taken_hz} Hz, so that fixes meet samples",
                 six_digits(found_hz)

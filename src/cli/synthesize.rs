@@ -1,7 +1,6 @@
 //! `nav-sim synthesize`: replicate recordings from a noise model.
 
 use super::axes::ChannelSet;
-use super::parse::one_of;
 use super::{Failure, Session, read};
 use crate::formats::contamination_file;
 use crate::formats::model_file::{self, ModelFile};
@@ -22,7 +21,7 @@ Examples:
       --replicates 9 --samples 65536 --spread --seed 1 -o replicates
   nav-sim synthesize calib_data/consumer_mems.toml --replicates 8 --samples 65536 \\
       --axes x --contaminate section5-II -o corrupted
-  nav-sim synthesize calib_data/tactical.toml --duration 600 --output-format npy -o tactical")]
+  nav-sim synthesize calib_data/tactical.toml --duration 600 -o tactical")]
 pub(crate) struct Args {
     /// Noise model (TOML)
     #[arg(value_name = "MODEL")]
@@ -45,9 +44,6 @@ pub(crate) struct Args {
     /// Signals to make: all, accel, gyro, x, accel.x, … (comma-separated)
     #[arg(long, value_name = "AXES", value_delimiter = ',', value_parser = ChannelSet::named, default_value = "all")]
     axes: Vec<ChannelSet>,
-    /// Format of the recordings: csv has ten digits and the time, npy all digits (samples × signals)
-    #[arg(long, value_name = "FORMAT", value_parser = one_of::<FileFormat>(&FileFormat::NAMES), default_value_t)]
-    output_format: FileFormat,
     /// Directory to write to
     #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
@@ -109,7 +105,7 @@ fn synthesis(args: &Args, session: &Session) -> Result<Synthesis, Failure> {
         input: read::input("model", &args.model)?,
         replicates: args.replicates,
         samples: samples as usize,
-        format: args.output_format,
+        format: FileFormat::Csv,
         spread: args.spread,
         seed: session.seed(None),
         file,

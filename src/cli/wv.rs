@@ -7,7 +7,7 @@ use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
 use crate::formats::atomic::Written;
 use crate::jobs::{self, Intervals, WaveletOptions};
-use crate::report::{self, SignalCurves, SignalsFile};
+use crate::report::{self, Answer};
 use std::path::PathBuf;
 
 /// Compute wavelet variances (classical, robust) and Allan deviations of static recordings
@@ -52,53 +52,29 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let options = WaveletOptions {
         reading: args.recordings.options(),
         skip_warm_up: args.recordings.skips_warm_up(),
-        scales: args.tuning.scales,
+        scales: args.tuning.levels(),
         tuning,
         intervals,
     };
     let file = jobs::wavelet_variances(&args.files, &options, &mut Said::new(session))?;
     let json = report::json(&file);
     let written = args.out.iter().try_for_each(|out| session.write(out, &json));
-    let drawn = args.pictures.write(|| report::wavelet_page(&file), session);
-    let text = match () {
-        () if session.json() => json.trim_end().to_owned(),
-        () if session.csv() => report::signals_csv(&file).trim_end().to_owned(),
-        () if args.per_file => side_by_side(&file),
-        () if session.verbose() => all_scales(&file, &report::intervals_note(intervals.name(), &tuning)),
-        () => digest(&file),
-    };
-    session.result(&text);
+    let drawn = args.pictures.draw(&file.document(), session);
+    match () {
+        () if session.csv() => session.result(report::signals_csv(&file).trim_end()),
+        () if args.per_file && !session.json() => session.result(side_by_side(&file)),
+        () => {
+            session.answer(&file);
+        }
+    }
     written.and(drawn)
 }
 
-/// A row for each sensor and axis.
-fn digest(file: &SignalsFile) -> String {
-    let mut recordings: Vec<&str> = file.signals.iter().map(|s| s.file.as_str()).collect();
-    recordings.dedup();
-    let median_note = if recordings.len() > 1 {
-        format!(", median of {} recordings", recordings.len())
-    } else {
-        String::new()
-    };
-    format!(
-        "Allan deviation over averages of{median_note}:\n{}\nrobust/classical: smallest ratio of the wavelet variances, marked * where it \
-         is lower than chance explains, as with outliers; all scales with intervals: --verbose, --format csv; recordings side by side: --per-file",
-        report::columns(&report::signals_digest(file))
-    )
-}
-
-fn side_by_side(file: &SignalsFile) -> String {
-    let table =
-        |(title, rows): (String, Vec<Vec<String>>)| format!("{title}\n{}", report::terminal_columns(&rows));
-    report::signals_per_file(file).into_iter().map(table).collect::<Vec<_>>().join("\n")
-}
-
-fn all_scales(file: &SignalsFile, note: &str) -> String {
-    let table = |signal: &SignalCurves| {
-        let SignalCurves { file, sensor, axis, samples, .. } = signal;
-        let rows = report::columns(&report::signal_rows(signal));
-        format!("{file} · {sensor}.{axis} · {samples} samples\n{rows}")
-    };
-    let tables = file.signals.iter().map(table).chain([note.to_owned()]);
-    tables.collect::<Vec<_>>().join("\n")
+/// A table for each sensor and axis.
+fn side_by_side(file: &report::SignalsFile) -> String {
+    let tables = report::wavelet::side_by_side(file).into_iter();
+    tables
+        .map(|(title, table)| format!("{title}\n{}", table.columns(report::WIDTH)))
+        .collect::<Vec<_>>()
+        .join("\n")
 }

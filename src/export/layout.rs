@@ -39,7 +39,7 @@ pub(super) const PLAIN: Layout = Layout {
 impl Export {
     /// The file: a head of comments that says what it is and how good it is, then the parameters. `model` is the name of
     /// the model file.
-    pub(crate) fn text(&self, model: &str) -> String {
+    pub fn text(&self, model: &str) -> String {
         let layout = self.target.layout();
         let mut lines: Vec<String> = layout.first.iter().map(|l| (*l).to_owned()).collect();
         let head = self.head(model);

@@ -15,7 +15,7 @@ mod words;
 
 pub(crate) use json::parameters as parameters_json;
 pub(crate) use sheet::Quantity;
-pub(crate) use target::Target;
+pub use target::Target;
 
 use nav_sim_signal::imu::{Channel, Sensor};
 use nav_sim_signal::noise::practical::{
@@ -24,7 +24,7 @@ use nav_sim_signal::noise::practical::{
 use nav_sim_signal::noise::{Composite, Model, Process};
 
 /// How a model is turned into parameters.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Settings {
     /// Which pair stands for the model.
     pub policy: Policy,
@@ -34,11 +34,13 @@ pub(crate) struct Settings {
     pub range_s: f64,
     /// Standard deviation of the turn-on bias of accelerometer (m/s²) and gyroscope (rad/s), where known.
     pub turn_on: [Option<f64>; 2],
+    /// Disagreement of the model with its recordings, in words.
+    pub misfit: Option<String>,
 }
 
 /// Why a model cannot be exported.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub(crate) enum ExportError {
+pub enum ExportError {
     /// A sensor is not in the model.
     #[error("the model has no {}, and {target} needs both sensors", .sensor.name())]
     NoSensor {
@@ -130,17 +132,17 @@ pub(crate) struct SensorExport {
 
 /// A model in the terms of a target.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Export {
+pub struct Export {
     /// Which program.
-    pub target: Target,
+    pub(crate) target: Target,
     /// Sample rate of the model, for values per sample (Hz).
-    pub rate_hz: f64,
+    pub(crate) rate_hz: f64,
     /// How it was made.
-    pub settings: Settings,
+    pub(crate) settings: Settings,
     /// Accelerometer and gyroscope.
-    pub sensors: [SensorExport; 2],
+    pub(crate) sensors: [SensorExport; 2],
     /// The lines of the file.
-    pub entries: Vec<Entry>,
+    pub(crate) entries: Vec<Entry>,
 }
 
 impl Export {
@@ -174,7 +176,7 @@ impl Export {
         let bias = common_bias(target, settings.policy, [&curves[0].1, &curves[1].1]);
         let mut sensors = Vec::new();
         for (channels, curve) in &curves {
-            sensors.push(SensorExport::new(model, channels, curve, bias, settings)?);
+            sensors.push(SensorExport::new(model, channels, curve, bias, &settings)?);
         }
         let sensors: [SensorExport; 2] = sensors.try_into().expect("two sensors");
         if let (Target::KfGins, [Some(accel), Some(gyro)]) =
@@ -215,7 +217,7 @@ impl SensorExport {
         channels: &[Channel],
         curve: &Curve,
         bias: Bias,
-        settings: Settings,
+        settings: &Settings,
     ) -> Result<Self, ExportError> {
         let sensor = channels[0].sensor;
         let parameters = |axes: &[&Composite]| {

@@ -6,7 +6,7 @@ use nav_sim_signal::noise::practical::Bias;
 
 /// A program that parameters are written for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Target {
+pub enum Target {
     /// Kalibr, imu.yaml.
     Kalibr,
     /// `OpenVINS`, `kalibr_imu_chain.yaml`.

@@ -1,11 +1,13 @@
 //! Calibration: from static recordings, or directories of them, to a noise model for each sensor or axis.
 
-use super::{BeginsOtherwise, JobError, Remark, Remarks};
+use super::{JobError, Remark, Remarks};
 use crate::formats::hash;
 use crate::formats::recordings::{self, FileReport, ReadOptions, Report};
+use crate::report::CurvesFile;
+use crate::report::calibration::ShownCalibration;
 use nav_sim_calibration::{
-    self, Advance, Bootstrap, Estimator, Group, Outcome, Pool, Replicate, Settings, SignalError,
-    TurnOnSpread, WarmUp, grouped, infer_telling, replicates, turn_on, warm_up,
+    self, Advance, Beginning, Beginnings, Bootstrap, Diagnosis, Estimator, Group, Outcome, Pool, Replicate,
+    Settings, SignalError, TurnOnSpread, WarmUp, grouped, infer_telling, replicates, turn_on, warm_up,
 };
 use nav_sim_signal::imu::{Channel, Recording, Signal};
 use nav_sim_signal::names::UnknownName;
@@ -121,6 +123,8 @@ pub struct Measured {
     pub report: Report,
     /// The wavelet variances.
     pub groups: Vec<Group>,
+    /// The recordings that do not begin as they go on.
+    pub beginnings: Beginnings,
     /// How models are fitted.
     pub settings: Settings,
     /// The draws behind intervals.
@@ -139,6 +143,8 @@ pub struct Calibration {
     pub outcomes: Vec<Outcome>,
     /// How they were fitted.
     pub settings: Settings,
+    /// The recordings that do not begin as they go on.
+    pub beginnings: Beginnings,
     /// Turn-on bias from the recordings' means, for each estimator and sensor; empty if it was not tested.
     pub turn_on: Vec<TurnOnSpread>,
 }
@@ -169,7 +175,8 @@ pub fn measure(
     // As many scales as parameters, and one that the default leaves out.
     let needed = scales.map_or(2 << settings.model.parameters(), |j| 1 << j);
     let reading = ReadOptions { min_samples: needed, ..reading.clone() };
-    let look = |recording: Recording| Look::new(recording, *skip_warm_up, *scales, &settings.tuning);
+    let look =
+        |recording: Recording| MeasuredRecording::new(recording, *skip_warm_up, *scales, &settings.tuning);
     let (looks, report) = visit(paths, &reading, &look, remarks)?;
     let looks = looks.into_iter().collect::<Result<Vec<_>, _>>()?;
     distinct(&looks)?;
@@ -177,8 +184,7 @@ pub fn measure(
         return Err(JobError::Overlap { later: later.to_owned(), first: first.to_owned(), share });
     }
     let rate_hz = report.files[0].rate_hz;
-    let beginnings = looks.iter().map(|look| (look.recording.as_str(), &look.warm_ups[..]));
-    warm_ups(beginnings, (reading.skip_s, *skip_warm_up), rate_hz, remarks);
+    let beginnings = beginnings(&looks, (reading.skip_s, *skip_warm_up), rate_hz);
     shortest(&report, *scales, remarks);
     let estimators = estimators.estimators(report.files.iter().map(|f| f.samples.len()).sum())?;
     let settings = Settings { estimators, rate_hz, ..settings.clone() };
@@ -188,7 +194,7 @@ pub fn measure(
     let mut measured: Vec<_> = looks.into_iter().flat_map(|look| look.replicates).collect();
     one_switching_on(&report, &mut measured);
     let groups = grouped(measured, pool.unwrap_or(settings.pool()));
-    Ok(Measured { report, groups, settings, bootstrap: *bootstrap, turn_on: *turn_on })
+    Ok(Measured { report, groups, beginnings, settings, bootstrap: *bootstrap, turn_on: *turn_on })
 }
 
 impl Measured {
@@ -204,9 +210,9 @@ impl Measured {
     /// # Errors
     /// When a trim leaves no replicate, or a curve is too short for the model.
     pub fn calibrate(self, advance: Advance<'_>) -> Result<Calibration, JobError> {
-        let Self { groups, settings, bootstrap, turn_on, .. } = self;
+        let Self { groups, beginnings, settings, bootstrap, turn_on, .. } = self;
         let outcomes = nav_sim_calibration::calibrate_telling(&groups, &settings, advance)?;
-        let calibration = Calibration { groups, outcomes, settings, turn_on: Vec::new() };
+        let calibration = Calibration { groups, outcomes, settings, beginnings, turn_on: Vec::new() };
         let calibration = if turn_on { calibration.with_turn_on() } else { calibration };
         Ok(calibration.with_inference(bootstrap, advance))
     }
@@ -218,6 +224,25 @@ impl Calibration {
     pub fn model(&self, estimator: Estimator) -> Model {
         let own = self.outcomes.iter().filter(|o| o.estimator == estimator);
         nav_sim_calibration::model_of(own, self.settings.rate_hz)
+    }
+
+    /// The fits that are chosen, to be shown.
+    pub(crate) fn shown<'a>(
+        &'a self,
+        diagnoses: &'a [Diagnosis],
+        is_chosen: impl Fn(&Outcome) -> bool,
+    ) -> ShownCalibration<'a> {
+        let outcomes: Vec<(usize, &Outcome)> =
+            self.outcomes.iter().enumerate().filter(|(_, outcome)| is_chosen(outcome)).collect();
+        let chosen: Vec<&Outcome> = outcomes.iter().map(|(_, outcome)| *outcome).collect();
+        ShownCalibration {
+            curves: CurvesFile::new(&self.groups, &chosen, &self.settings),
+            outcomes,
+            diagnoses,
+            turn_on: &self.turn_on,
+            beginnings: &self.beginnings,
+            settings: &self.settings,
+        }
     }
 
     /// The same with what the recordings' means say.
@@ -253,8 +278,8 @@ pub(super) fn visit<T: Send>(
     Ok((looks, report))
 }
 
-/// What is kept of a recording, or of one signal of it.
-struct Look {
+/// Wavelet variances and hashes of a recording; its samples are dropped.
+struct MeasuredRecording {
     recording: String,
     /// What tells the samples of each signal from others.
     signals: Vec<(Channel, String)>,
@@ -262,7 +287,7 @@ struct Look {
     replicates: Vec<(Channel, Replicate)>,
 }
 
-impl Look {
+impl MeasuredRecording {
     fn new(
         recording: Recording,
         skip_warm_up: bool,
@@ -285,9 +310,9 @@ fn one_switching_on(report: &Report, measured: &mut [(Channel, Replicate)]) {
 }
 
 /// Refuses copies of a recording.
-fn distinct(looks: &[Look]) -> Result<(), JobError> {
+fn distinct(looks: &[MeasuredRecording]) -> Result<(), JobError> {
     for (i, look) in looks.iter().enumerate() {
-        let copy = |other: &&Look| {
+        let copy = |other: &&MeasuredRecording| {
             other.recording != look.recording && other.signals.iter().any(|s| look.signals.contains(s))
         };
         if let Some(first) = looks[..i].iter().find(copy) {
@@ -297,36 +322,15 @@ fn distinct(looks: &[Look]) -> Result<(), JobError> {
     Ok(())
 }
 
-/// Remarks which recordings do not begin as they go on after what was skipped.
-pub(super) fn warm_ups<'a>(
-    looks: impl Iterator<Item = (&'a str, &'a [(Channel, WarmUp)])>,
-    (skipped_s, left_out): (f64, bool),
-    rate_hz: f64,
-    remarks: &mut dyn Remarks,
-) {
-    let mut found: Vec<BeginsOtherwise> = Vec::new();
-    let mut names: Vec<&str> = Vec::new();
-    // The signals of a long recording are looked at one by one.
-    for (recording, signals) in looks {
-        if names.last() != Some(&recording) {
-            names.push(recording);
-        }
-        match found.last_mut() {
-            Some(last) if last.recording == recording => last.signals.extend(signals),
-            _ if signals.is_empty() => {}
-            _ => found.push(BeginsOtherwise {
-                recording: recording.to_owned(),
-                signals: signals.to_vec(),
-                skip_s: None,
-            }),
-        }
-    }
-    for of_one in &mut found {
-        of_one.skip_s = longest(&of_one.signals).map(|n| (skipped_s + n as f64 / rate_hz).ceil());
-    }
-    if !found.is_empty() {
-        remarks.remark(Remark::WarmUp { found: &found, recordings: names.len(), left_out, rate_hz });
-    }
+/// The recordings that do not begin as they go on after what was skipped.
+fn beginnings(looks: &[MeasuredRecording], (skipped_s, left_out): (f64, bool), rate_hz: f64) -> Beginnings {
+    let beginning = |look: &MeasuredRecording| Beginning {
+        recording: look.recording.clone(),
+        signals: look.warm_ups.clone(),
+        skip_s: longest(&look.warm_ups).map(|n| (skipped_s + n as f64 / rate_hz).ceil()),
+    };
+    let found = looks.iter().filter(|look| !look.warm_ups.is_empty());
+    Beginnings { all: found.map(beginning).collect(), left_out }
 }
 
 /// Samples to leave out of a recording for all its signals; none where that does not help one of them.

@@ -159,12 +159,13 @@ mod tests {
             horizon: Horizon::default(),
             range_s: 1e3,
             turn_on: [None; 2],
+            misfit: None,
         };
         let recorded = Recorded { recordings: 4, samples: 1 << 18, seed: 1 };
         let certificates = |processes: Vec<Process>| {
             let axis = Composite::new(processes);
             let model = Model::pooled(100.0, &axis, &axis);
-            let export = Export::new(Target::Kalibr, &model, &[], settings).unwrap();
+            let export = Export::new(Target::Kalibr, &model, &[], settings.clone()).unwrap();
             (certify(&export, &model, &[], recorded).unwrap(), axis)
         };
         for certificate in certificates(vec![white, walk]).0 {

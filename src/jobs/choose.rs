@@ -106,8 +106,9 @@ pub fn choose(
     let calibrated = model_of(&outcomes, settings.rate_hz);
     let model = drive.inflated(&laboratory, None, &winner, &calibrated)?;
     let influence = drive.influence(&laboratory, &groups, &outcomes, &settings)?;
-    let calibration = Calibration { groups, outcomes, settings, turn_on: Vec::new() }
-        .with_inference(options.bootstrap, &|_| {});
+    let calibration =
+        Calibration { groups, outcomes, settings, beginnings: Default::default(), turn_on: Vec::new() }
+            .with_inference(options.bootstrap, &|_| {});
     let files = files.into_iter().map(|file| file.path).collect();
     Ok(Chosen { ranking, winner, calibration, influence, model, files })
 }

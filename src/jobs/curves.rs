@@ -62,7 +62,8 @@ impl Curves {
             outcomes.push(fit_curve(&group, estimator, curve, &settings)?);
             groups.push(group);
         }
-        let calibration = Calibration { groups, outcomes, settings, turn_on: Vec::new() };
+        let calibration =
+            Calibration { groups, outcomes, settings, beginnings: Default::default(), turn_on: Vec::new() };
         Ok(calibration.with_inference(bootstrap, &|_| {}))
     }
 }

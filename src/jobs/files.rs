@@ -21,6 +21,8 @@ pub(crate) struct ModelFiles {
     pub curves: PathBuf,
     /// The page, `<model>.html` beside it.
     pub page: PathBuf,
+    /// The figures of the page, `<model>.svg` beside it.
+    pub figures: PathBuf,
     /// The draws behind its intervals, `<model>.draws.json` beside it.
     pub draws: PathBuf,
 }
@@ -31,8 +33,9 @@ impl ModelFiles {
         let files = |estimator: &Estimator| {
             let suffix = if estimators.len() > 1 { format!("_{estimator}") } else { String::new() };
             let model = with_suffix(out, &suffix);
-            let (curves, page) = (model.with_extension("wv.json"), model.with_extension("html"));
-            Self { estimator: *estimator, curves, draws: draws_file::beside(&model), page, model }
+            let [curves, page, figures] =
+                ["wv.json", "html", "svg"].map(|ending| model.with_extension(ending));
+            Self { estimator: *estimator, curves, draws: draws_file::beside(&model), page, figures, model }
         };
         estimators.iter().map(files).collect()
     }
@@ -49,8 +52,9 @@ impl ModelFiles {
     ) -> Result<(Vec<Self>, Vec<Claim>), FileError> {
         is_file(out)?;
         let all = Self::of(out, estimators);
-        let kinds = [Written::Calibrated, Written::Curves, Written::Draws, Written::Page];
-        let paths = all.iter().flat_map(|f| [&f.model, &f.curves, &f.draws, &f.page].into_iter().zip(kinds));
+        let kinds = [Written::Calibrated, Written::Curves, Written::Draws, Written::Page, Written::Svg];
+        let paths =
+            all.iter().flat_map(|f| [&f.model, &f.curves, &f.draws, &f.page, &f.figures].into_iter().zip(kinds));
         let claim = |(path, kind): (&PathBuf, Written)| {
             atomic::claim_result(path, inputs.iter().map(PathBuf::as_path), kind, existing)
         };
@@ -74,13 +78,15 @@ impl ModelFiles {
             files.write(calibration, note)?;
             files.write_page(calibration, diagnoses)?;
             let draws = has_draws.then_some(&files.draws);
-            written.extend([&files.model, &files.curves].into_iter().chain(draws).chain([&files.page]));
+            written.extend(
+                [&files.model, &files.curves].into_iter().chain(draws).chain([&files.page, &files.figures]),
+            );
         }
         Ok(written.into_iter().map(PathBuf::as_path).collect())
     }
 
     fn contents(&self, calibration: &Calibration, note: &CalibrationNote) -> (String, ModelFile) {
-        let Calibration { groups, outcomes, settings, turn_on } = calibration;
+        let Calibration { groups, outcomes, settings, turn_on, .. } = calibration;
         let chosen: Vec<&Outcome> = outcomes.iter().filter(|o| o.estimator == self.estimator).collect();
         let curves = report::json(&CurvesFile::new(groups, &chosen, settings));
         let blake3 = hash::of_bytes(curves.as_bytes());
@@ -135,7 +141,7 @@ impl ModelFiles {
 }
 
 impl ModelFiles {
-    /// Writes the page of the models of the estimator.
+    /// Writes the page of the models of the estimator, and its figures.
     ///
     /// # Errors
     /// When the system refuses.
@@ -144,11 +150,10 @@ impl ModelFiles {
         calibration: &Calibration,
         diagnoses: &[Diagnosis],
     ) -> Result<(), FileError> {
-        let Calibration { groups, outcomes, settings, turn_on } = calibration;
-        let chosen = outcomes.iter().enumerate().filter(|(_, o)| o.estimator == self.estimator);
-        let chosen: Vec<(usize, &Outcome)> = chosen.collect();
-        let curves = CurvesFile::new(groups, &chosen.iter().map(|(_, o)| *o).collect::<Vec<_>>(), settings);
-        atomic::write(&self.page, report::calibration_page(&curves, &chosen, diagnoses, turn_on, settings))
+        let shown = calibration.shown(diagnoses, |outcome| outcome.estimator == self.estimator);
+        let document = shown.document();
+        atomic::write(&self.page, document.html())?;
+        atomic::write(&self.figures, document.svg())
     }
 }
 

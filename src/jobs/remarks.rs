@@ -1,7 +1,6 @@
 //! What is found on the way to a result.
 
 use crate::formats::recordings::Report;
-use crate::report::BeginsOtherwise;
 
 /// What a user may want to know beside the result.
 #[derive(Debug, Clone, Copy)]
@@ -9,17 +8,6 @@ use crate::report::BeginsOtherwise;
 pub enum Remark<'a> {
     /// What was found in the recordings, and what is doubtful about them.
     Read(&'a Report),
-    /// Recordings that do not begin as they go on.
-    WarmUp {
-        /// Each of them.
-        found: &'a [BeginsOtherwise],
-        /// Of so many recordings.
-        recordings: usize,
-        /// Whether that was left out of each.
-        left_out: bool,
-        /// Sample rate (Hz).
-        rate_hz: f64,
-    },
     /// The recordings run at a rate that is no whole multiple of the fixes' but for the error of a clock.
     Rate {
         /// Their rate (Hz).

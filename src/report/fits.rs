@@ -1,10 +1,11 @@
 //! Fitted models as JSON.
 
+use super::calibration::{notes, reasons};
 use super::turn_on::TurnOnEntry;
 use crate::export::parameters_json;
 use nav_sim_calibration::{
     Candidate, Diagnosis, Goodness, Indistinct, LevelSpread, Miss, Outcome, ParameterInterval, Practical,
-    Ranking, Settings, TurnOnSpread, reasons, tau_s, undetermined,
+    Ranking, Settings, TurnOnSpread, tau_s,
 };
 use nav_sim_signal::noise::{Composite, ParameterRef, Process};
 use serde::Serialize;
@@ -159,13 +160,12 @@ pub(crate) struct MissEntry {
 
 impl FitEntry {
     /// The entry of an outcome.
-    pub(crate) fn new(outcome: &Outcome, rate_hz: f64) -> Self {
+    pub(crate) fn new(outcome: &Outcome, settings: &Settings) -> Self {
+        let rate_hz = settings.rate_hz;
         let fit = &outcome.fit;
         let inference = outcome.inference.as_ref();
         let labels = fit.composite.labels();
         let labelled = |processes: &[usize]| processes.iter().map(|i| labels[*i].clone()).collect();
-        let intervals = inference.into_iter().flat_map(|i| &i.intervals);
-        let open = intervals.filter_map(|i| undetermined(i, &labels));
         let miss =
             |m: &Miss| MissEntry { tau_s: tau_s(m.level, rate_hz), ratio: m.ratio, deviations: m.deviations };
         Self {
@@ -195,7 +195,7 @@ impl FitEntry {
             runner_up: fit.runner_up,
             zero: labelled(&fit.zero),
             at_end: labelled(&fit.at_end),
-            notes: outcome.notes.iter().cloned().chain(open).collect(),
+            notes: notes(outcome, settings),
         }
     }
 }
@@ -231,7 +231,7 @@ impl<'a> FitsFile<'a> {
             schema_version: 1,
             rate_hz,
             model: settings.model.to_string(),
-            fits: outcomes.iter().map(|o| FitEntry::new(o, rate_hz)).collect(),
+            fits: outcomes.iter().map(|o| FitEntry::new(o, settings)).collect(),
             replicates: diagnoses,
             turn_on: turn_on.iter().map(TurnOnEntry::new).collect(),
             files,

@@ -1,13 +1,12 @@
 //! Results as files: tables, JSON, self-contained pages (`page`). The module computes no statistic and touches
 //! no file: every function returns a text, and the command line writes it.
 
-mod brief;
+pub(crate) mod calibration;
 mod choose;
 mod closure;
 mod comparison;
 mod comparison_table;
 mod curves;
-mod describe;
 mod design;
 mod displaced;
 mod efficiency;
@@ -16,33 +15,28 @@ mod fusion;
 mod fusion_files;
 mod manifest;
 mod pages;
-mod practical;
 mod recording;
-mod replicates;
 pub(crate) mod requirement;
 mod run_directory;
 pub(crate) mod run_words;
 #[cfg(test)]
 pub(crate) mod sample;
-mod signals;
 mod smoothed;
 mod study;
 pub(crate) mod tables;
 mod trajectory;
 mod turn_on;
 mod verdict;
-mod warm_up;
+pub(crate) mod wavelet;
 
 use nav_sim_document::Document;
 use serde::Serialize;
 
-pub(crate) use brief::brief;
 pub(crate) use choose::{ChoiceReport, RankedPlace};
 pub(crate) use closure::TrajectoryCheck;
 pub(crate) use comparison::{CandidateResult, ComparisonFile, Label, meaning_of_intervals, verdict_lines};
 pub(crate) use comparison_table::{consistency_rows, ratio_rows, table_rows, with_times};
 pub(crate) use curves::{CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile};
-pub(crate) use describe::describe;
 pub(crate) use design::{Design, DesignedParameter, DesignedQuantile, design_rows, design_verdict};
 pub(crate) use displaced::displaced_words;
 pub(crate) use efficiency::{EfficiencyFile, EfficiencyRow, efficiency_csv, efficiency_table};
@@ -60,15 +54,12 @@ pub(crate) trait Answer: Serialize {
 pub use nav_sim_document::readable;
 pub(crate) use nav_sim_document::{seconds, short_names, six_digits, window};
 pub(crate) use pages::{
-    PaperFigure, RatioCurves, STATES, ShownComparison, StudyCurves, calibration_page, calibration_svg,
-    choice_page, design_page, efficiency_page, efficiency_svg, error_of, fusion_page, paper_figures,
-    paper_page, run_svg, study_page, wavelet_page,
+    PaperFigure, RatioCurves, STATES, ShownComparison, StudyCurves, choice_page, design_page, efficiency_page,
+    efficiency_svg, error_of, fusion_page, paper_figures, paper_page, run_svg, study_page,
 };
 pub(crate) use recording::{gnss_csv, imu_csv, initial_toml};
-pub(crate) use replicates::describe_replicates;
 pub use run_directory::{OutputFile, run_directory};
 pub(crate) use run_directory::{RUN_FILES, json, summary_json};
-pub(crate) use signals::{intervals_note, signal_rows, signals_csv, signals_digest, signals_per_file};
 #[cfg(any(test, feature = "parquet"))]
 pub(crate) use study::ValueKind;
 pub(crate) use study::{
@@ -77,9 +68,7 @@ pub(crate) use study::{
 };
 pub use trajectory::TrajectorySeries;
 pub(crate) use trajectory::trajectory_svg;
-pub(crate) use turn_on::{turn_on_lines, turn_on_remark};
-pub use warm_up::BeginsOtherwise;
-pub(crate) use warm_up::{warm_up_in_short, warm_up_lines};
+pub(crate) use wavelet::signals_csv;
 
 /// Names of `nav_sim_document` for files that have not moved to documents yet.
 pub(crate) mod page {
@@ -90,7 +79,7 @@ pub(crate) mod page {
 }
 
 mod number {
-    pub(crate) use nav_sim_document::{readable, seconds, shortest, squared, window};
+    pub(crate) use nav_sim_document::{readable, seconds, shortest, window};
 }
 
 /// Characters of a line in a terminal.

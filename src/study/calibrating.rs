@@ -78,7 +78,7 @@ fn calibrated(
     let (outcomes, settings) = fitted(candidate, &recordings, step)?;
     let inputs = files.iter().map(|file| input::input("recording", file));
     let note = CalibrationNote {
-        efficiency_convention: step.efficiency_convention.unwrap_or_default().to_string(),
+        efficiency_convention: step.efficiency_convention.unwrap_or_default(),
         seed: None,
         reading: toml::Table::new(),
         inputs: inputs.collect::<Result<Vec<Input>, _>>()?,

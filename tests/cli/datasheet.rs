@@ -13,9 +13,8 @@ fn figures_in_the_units_of_a_datasheet_become_a_model() {
     let ran = done(
         place.path(),
         "datasheet --vrw 0.02m/s/sqrt(h) --arw 0.15°/√h --accel-bias 40ug --gyro-bias 10deg/h --corr-time 5min \
-         --accel-turn-on 2mg --gyro-scale 300ppm --rate-hz 200 -o model.toml",
+         --accel-turn-on 2mg --rate-hz 200 -o model.toml",
     );
-    assert!(ran.stderr.contains("gyro: a scale factor of 300 ppm is not noise"), "{}", ran.stderr);
     assert!(ran.stderr.contains("wrote model.toml: an assumption, not a calibration"), "{}", ran.stderr);
     let file = model_file::read(&place.path().join("model.toml")).unwrap();
     assert_eq!(file.model.rate_hz, 200.0);
@@ -34,7 +33,7 @@ fn figures_in_the_units_of_a_datasheet_become_a_model() {
     assert_eq!(file.turn_on.unwrap().gyro_rad_s, None);
     let provenance = file.provenance.unwrap();
     assert!(provenance["label"].as_str().unwrap().starts_with("an assumption"));
-    assert_eq!(provenance["figures"].as_array().unwrap().len(), 8); // the correlation time is of both sensors
+    assert_eq!(provenance["figures"].as_array().unwrap().len(), 7); // the correlation time is of both sensors
 }
 
 #[test]
@@ -57,21 +56,20 @@ fn a_unit_that_is_missing_or_wrong_is_refused_with_those_that_fit() {
     refused("--vrw=-1ug/sqrt(Hz)", &["--vrw", "does not begin with a number > 0"]);
     refused("--vrw=1e300m/s/sqrt(h)", &["--vrw", "is more than 1e12 in SI units"]);
     refused("", &["no figure is given that makes a noise model", "--unit NAME"]);
-    refused("--gyro-scale 300ppm", &["no figure is given that makes a noise model"]);
+    refused("--accel-turn-on 2mg", &["no figure is given that makes a noise model"]);
     refused("--unit stim30", &["the catalogue has no such unit", "did you mean stim300?"]);
 }
 
 #[test]
 fn flags_win_over_an_entry_and_what_is_assumed_is_said() {
     let place = tempfile::tempdir().unwrap();
-    let ran = done(place.path(), "datasheet --unit STIM300 --arw 0.3deg/sqrt(h) --gyro-corr-time 100s");
+    let ran = done(place.path(), "datasheet --unit STIM300 --arw 0.3deg/sqrt(h)");
     assert!(
         ran.stdout.contains("given = \"0.3 deg/sqrt(h)\"")
             || ran.stdout.contains("given = \"0.3deg/sqrt(h)\"")
     );
     assert!(!ran.stdout.contains("0.15 deg/sqrt(h)"), "{}", ran.stdout);
     assert!(ran.stderr.contains("accel: no correlation time is given; 300 s is assumed"), "{}", ran.stderr);
-    assert!(!ran.stderr.contains("gyro: no correlation time"), "{}", ran.stderr);
     let json: Value =
         serde_json::from_str(&done(place.path(), "datasheet --unit stim300 --format json").stdout).unwrap();
     assert_eq!(

@@ -21,7 +21,7 @@ fn files_take_the_place_of_their_kind_and_directories_that_of_the_same_run() {
     done(place.path(), "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec");
     done(place.path(), "trajectory record drive.toml imu.toml --seed 3 -o log");
     done(place.path(), "run drive.toml imu.toml --runs 2 --outage none --seed 1 -o reference");
-    let calibrate = "calibrate rec --model WN+RW --bootstrap 0 -o out.toml --plot out.svg";
+    let calibrate = "calibrate rec --model WN+RW --bootstrap 0 -o out.toml";
     let fuse = "fuse log/imu.csv log/gnss.csv imu.toml --initial log/initial.toml -o fused";
     for (command, change, file) in [
         ("run drive.toml imu.toml --runs 2 --outage none --seed 1 -o run", "--seed 2", "run/summary.json"),
@@ -150,7 +150,7 @@ fn what_nav_sim_did_not_write_is_never_replaced() {
         (format!("{calibrate} m.toml"), "m.toml", own_model.as_str()),
         (format!("{calibrate} m.toml"), "m.wv.json", "{ \"schema_version\": 1 }"),
         (format!("{calibrate} m.toml"), "m.html", "<html></html>"),
-        (format!("{calibrate} m.toml --plot m.svg"), "m.svg", "<svg></svg>"),
+        (format!("{calibrate} m.toml"), "m.svg", "<svg></svg>"),
         ("datasheet --unit stim300 -o imu.toml".to_owned(), "imu.toml", own_model.as_str()),
         ("wv rec -o a.json".to_owned(), "a.json", "{}"),
         ("trajectory convert drive.toml --rate-hz 1 -o own.csv".to_owned(), "own.csv", own_table.as_str()),
@@ -192,7 +192,7 @@ fn a_second_calibration_takes_the_place_of_the_first() {
         .filter(|name| name.starts_with("model"))
         .collect();
     names.sort();
-    assert_eq!(names, ["model.draws.json", "model.html", "model.toml", "model.wv.json"]);
+    assert_eq!(names, ["model.draws.json", "model.html", "model.svg", "model.toml", "model.wv.json"]);
 }
 
 /// A run whose seed is drawn is another one the next time: the hint says how to make the first one again.
@@ -215,7 +215,7 @@ fn two_outputs_of_one_name_are_refused_at_once() {
     done(place.path(), "synthesize imu.toml --replicates 2 --samples 4096 --seed 1 -o rec");
     for (command, output) in [
         ("run drive.toml imu.toml --runs 2 --outage none -o a.svg --plot a.svg", "a.svg"),
-        ("calibrate rec --model WN --bootstrap 0 -o a.svg --plot ./a.svg", "./a.svg"),
+        ("calibrate rec --model WN --bootstrap 0 -o a.svg", "a.svg"),
         ("wv rec -o a.html --page a.html", "a.html"),
         ("compare log --reference log -o a.html", "a.html"),
         ("calibrate rec --model WN --bootstrap 0 -o a.html", "a.html"),

@@ -48,21 +48,19 @@ fn models_and_curves_say_what_they_are_of() {
     // Two estimators of one signal are told apart.
     let calibrate = "calibrate rec --model WN --bootstrap 0";
     let ran =
-        plain(place.path(), &format!("{calibrate} --estimator all --fit-range 0.001min:1h -o both.toml"));
+        plain(place.path(), &format!("{calibrate} --estimator all --scales 0.001min:1h -o both.toml"));
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     for name in ["gyro.x gmwm ", "gyro.x rgmwm "] {
         assert!(ran.stdout.lines().any(|line| line.trim_start().starts_with(name)), "{}", ran.stdout);
     }
-    let ran = refused(place.path(), &format!("{calibrate} --sensor accel -o m.toml"));
-    assert!(ran.stderr.contains("--sensor"), "{}", ran.stderr);
     let ran = refused(place.path(), &format!("{calibrate} -o -"));
     assert!(ran.stderr.contains("- is not a file") && !place.path().join("-").exists(), "{}", ran.stderr);
     // A curve that does not say its sensor.
     fs::write(place.path().join("c.csv"), "tau_samples,wv,edof\n2,4,900\n4,2,400\n8,1,200\n").unwrap();
     let curve = "calibrate --curve c.csv --rate-hz 100 --model WN --bootstrap 0";
     let told = |more: &str| plain(place.path(), &format!("{curve}{more}")).stderr;
-    assert!(told("").contains("taken as that of an accelerometer"), "{}", told(""));
-    assert!(!told(" --sensor gyro").contains("taken as"), "{}", told(" --sensor gyro"));
+    assert!(told("").contains("taken as of an accelerometer"), "{}", told(""));
+    assert!(!told(" --axes gyro").contains("taken as"), "{}", told(" --axes gyro"));
 }
 
 /// What the program wrote beside a result is no broken curve.

@@ -91,13 +91,12 @@ fn replicates_read_back_and_the_manifest_says_what_was_drawn() {
 #[test]
 fn the_same_seed_gives_the_same_bytes_at_any_number_of_threads() {
     let place = Place::new();
-    let args = ["--replicates", "4", "--samples", "1000", "--spread", "--output-format", "npy"];
+    let args = ["--replicates", "4", "--samples", "1000", "--spread"];
     place.make("one", &[&args[..], &["-j", "1"]].concat());
     place.make("two", &[&args[..], &["-j", "2"]].concat());
     for k in 1..=4 {
-        let file = |out: &str| place.bytes(&format!("{out}/replicate_{k}.npy"));
+        let file = |out: &str| place.bytes(&format!("{out}/replicate_{k}.csv"));
         assert_eq!(file("one"), file("two"));
-        assert_eq!(file("one").len(), 128 + 1000 * 4 * 8);
     }
 }
 

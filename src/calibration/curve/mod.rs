@@ -12,4 +12,4 @@ pub use average::{AverageError, Estimator, Replicate, Trim, TrimError, average};
 pub use implied::implied;
 pub use replicates::{Group, Pool, Scope, SignalError, grouped, replicates, trend};
 pub use robust_scale::median;
-pub use stationarity::{Change, WarmUp, warm_up};
+pub use stationarity::{Beginning, Beginnings, Change, WarmUp, warm_up};

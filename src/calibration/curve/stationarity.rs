@@ -7,6 +7,7 @@
 //! first is out of place at 1 in 10⁴, the first part is given up and the next looked at. What remains is cut into sixteen
 //! again, until nothing is out of place: whoever leaves out what is said is not told of more.
 
+use crate::imu::Channel;
 use crate::wavelet::interval::edof_eta3;
 use crate::wavelet::{classical, default_levels};
 use statrs::distribution::{ContinuousCDF, StudentsT};
@@ -25,13 +26,8 @@ const LEVEL: f64 = 1e-4;
 pub struct WarmUp {
     /// Samples to leave out: what remains begins as it goes on.
     pub samples: usize,
-    /// Whether the mean moves (rather than the noise being another).
-    pub mean: bool,
     /// The first part against the last eight, in their standard deviations.
     pub deviations: f64,
-    /// Whether that is an eighth of the record or more: what fades so slowly may not be over in the rest, which is then too
-    /// short to tell.
-    pub late: bool,
     /// Change by leaving them out; none where not even the later half begins as it goes on, and nothing is to
     /// be left out.
     pub change: Option<Change>,
@@ -46,6 +42,34 @@ pub struct Change {
     pub ratio: f64,
 }
 
+/// Recording that does not begin as it goes on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Beginning {
+    /// The recording.
+    pub recording: String,
+    /// Its signals of which that is so.
+    pub signals: Vec<(Channel, WarmUp)>,
+    /// Seconds to leave out from the beginning of the file; none where that does not help.
+    pub skip_s: Option<f64>,
+}
+
+impl Beginning {
+    /// The signal that is furthest from its rest.
+    #[must_use]
+    pub fn surest(&self) -> Option<(Channel, WarmUp)> {
+        self.signals.iter().copied().max_by(|a, b| a.1.deviations.abs().total_cmp(&b.1.deviations.abs()))
+    }
+}
+
+/// Recordings of a calibration that do not begin as they go on.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Beginnings {
+    /// Each of them.
+    pub all: Vec<Beginning>,
+    /// Whether their beginnings were left out.
+    pub left_out: bool,
+}
+
 /// Looks at a signal, again after what would be left out, until what remains begins as it goes on; none where it does from
 /// the start, or is too short to tell.
 #[must_use]
@@ -56,8 +80,7 @@ pub fn warm_up(samples: &[f64]) -> Option<WarmUp> {
         match look(&samples[left..]) {
             Some(more) => left += more.samples,
             None => {
-                let late = 8 * left >= samples.len();
-                return Some(WarmUp { samples: left, late, change: change(samples, left), ..first });
+                return Some(WarmUp { samples: left, change: change(samples, left), ..first });
             }
         }
     }
@@ -96,14 +119,11 @@ fn look(samples: &[f64]) -> Option<WarmUp> {
     let mut found = None;
     // The parts that are compared with the last eight must not be among them; a step needs two parts.
     for first in 0..PARTS - LAST - 1 {
-        let [mean, variance] =
-            [&steps, &noise].map(|values| out_of_place(values[first], &values[values.len() - LAST..]));
-        let Some((deviations, mean)) = mean.map(|d| (d, true)).or(variance.map(|d| (d, false))) else {
-            break;
-        };
+        let out_of_place_in = |values: &Vec<f64>| out_of_place(values[first], &values[values.len() - LAST..]);
+        let Some(deviations) = out_of_place_in(&steps).or_else(|| out_of_place_in(&noise)) else { break };
         // The first alarm is the one that is told; later ones only lengthen what is left out.
-        let (mean, deviations) = found.map_or((mean, deviations), |f: WarmUp| (f.mean, f.deviations));
-        found = Some(WarmUp { samples: (first + 1) * length, mean, deviations, late: false, change: None });
+        let deviations = found.map_or(deviations, |f: WarmUp| f.deviations);
+        found = Some(WarmUp { samples: (first + 1) * length, deviations, change: None });
     }
     found
 }
@@ -161,19 +181,7 @@ mod tests {
             .map(|(t, x)| x + 200.0 * (-(t as f64) / length).exp())
             .collect();
         let found = warm_up(&signal).unwrap();
-        assert!(found.mean, "{found:?}");
         assert!((2 * SAMPLES / 16..=6 * SAMPLES / 16).contains(&found.samples), "{found:?}");
-    }
-
-    /// A tail of e^-4 of a mean that settles with a time constant of an eighth hides in the noise: it is said that it may.
-    #[test]
-    fn what_settles_late_is_said_to_be_doubtful() {
-        let mut generator = Generator::seed_from_u64(6);
-        let settles = |t: usize| 200.0 * (-8.0 * t as f64 / SAMPLES as f64).exp();
-        let signal: Vec<f64> =
-            signal(&mut generator).iter().enumerate().map(|(t, x)| x + settles(t)).collect();
-        let found = warm_up(&signal).unwrap();
-        assert!(found.late && found.samples > SAMPLES / 4, "{found:?}");
     }
 
     #[test]
@@ -183,7 +191,7 @@ mod tests {
         let mut normal = || generator.sample::<f64, _>(StandardNormal);
         signal[..SAMPLES / 8].iter_mut().for_each(|x| *x += 2.0 * normal());
         let found = warm_up(&signal).unwrap();
-        assert_eq!((found.samples, found.mean), (SAMPLES / 8, false), "{found:?}");
+        assert_eq!(found.samples, SAMPLES / 8, "{found:?}");
         // An eighth with five times the variance at the first scale: without it 1/(1 + 4/8) = 0.67.
         let change = found.change.unwrap();
         assert!(change.level == 1 && (change.ratio - 0.67).abs() < 0.03, "{change:?}");

@@ -22,8 +22,7 @@ mod result;
 pub use common::{CoarseSteps, CommonOutliers, GaussianQuantization};
 pub use diagnose::diagnose;
 pub use leave_out::{LeftOut, Movement};
-pub(crate) use piece::excess_of_classical;
-pub use result::{Alarm, AxisScores, CommonDrift, Diagnosis, Differing, DriftAlarm, Misfit, Verdict};
+pub use result::{Alarm, AxisScores, CommonDrift, Diagnosis, DriftAlarm, Verdict};
 
 #[cfg(test)]
 mod tests;

@@ -59,7 +59,7 @@ pub(super) enum Test {
 }
 
 /// ln (classical / robust) at a level.
-pub(crate) fn excess_of_classical(r: &Replicate, level: usize) -> f64 {
+pub(super) fn excess_of_classical(r: &Replicate, level: usize) -> f64 {
     (r.value(Estimator::Awv, level) / r.value(Estimator::SrAwv, level)).ln()
 }
 

@@ -2,9 +2,7 @@
 
 use super::common::{CoarseSteps, CommonOutliers, GaussianQuantization};
 use super::leave_out::LeftOut;
-use crate::curve::{Estimator, Pool};
 use crate::imu::{Axis, Sensor};
-use crate::outcome::LevelSpread;
 use serde::{Serialize, Serializer};
 
 /// Verdict on a recording.
@@ -101,9 +99,6 @@ pub struct Diagnosis {
     pub name: String,
     /// Sensor.
     pub sensor: Sensor,
-    /// Axes of the sensor that it has.
-    #[serde(skip)]
-    pub axes: usize,
     /// The verdict.
     pub verdict: Verdict,
     /// Why its noise is not that of the others.
@@ -127,35 +122,6 @@ pub struct Diagnosis {
     /// Scores; empty when there are fewer than four recordings.
     #[serde(serialize_with = "scores_by_axis")]
     pub scores: Vec<AxisScores>,
-    /// Whether the axes of the sensor were pooled, and what DR-AWV dropped at each end of each scale, if it ran.
-    #[serde(skip)]
-    pub dropped: Option<(Pool, usize)>,
     /// Effect of leaving it out on each fit.
     pub left_out: Vec<LeftOut>,
-    /// The fits to this sensor whose model does not describe the curve, by the J-test.
-    #[serde(skip)]
-    pub misfits: Vec<Misfit>,
-    /// Difference of the recordings of this sensor beyond their noise, if a fit's test says that they do.
-    #[serde(skip)]
-    pub differing: Option<Differing>,
-}
-
-/// Recordings that differ beyond their noise, though none of them need stand out.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Differing {
-    /// Probability that recordings of one noise differ so at some scale.
-    pub p_value: f64,
-    /// Spread at the scale where they differ most.
-    pub most: LevelSpread,
-}
-
-/// A fit that the J-test rejects at 5 %.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Misfit {
-    /// The group, `accel` or `accel.x`.
-    pub group: String,
-    /// The estimator.
-    pub estimator: Estimator,
-    /// Probability of such a distance if the model holds.
-    pub p_value: f64,
 }

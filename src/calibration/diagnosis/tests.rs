@@ -4,10 +4,10 @@ use super::*;
 use crate::curve::{Estimator, Replicate};
 use crate::imu::Channel;
 use crate::imu::{Axis, Sensor};
-use crate::outcome::{LevelSpread, Settings};
+use crate::outcome::Settings;
 use crate::rng::{Generator, StreamKey};
 use crate::wavelet::{Convention, Tuning, both};
-use crate::{ModelChoice, Pool, Trim, Weighting, advice, calibrate, effects, grouped, trend};
+use crate::{ModelChoice, Pool, Trim, Weighting, calibrate, grouped, trend};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
@@ -153,14 +153,6 @@ fn outliers_and_another_noise_are_told_apart() {
     assert_eq!(verdicts(&all), [Normal, Normal, Outliers, Normal, Normal, Noise, Normal]);
     let alarm = all[2].outliers.as_ref().unwrap();
     assert!(alarm.deviations[0].1 > 5.0 && alarm.deviations[2].1 < 5.0, "{alarm:?}");
-    let words = advice(&all, Sensor::Accel);
-    assert!(words[1].starts_with("run2 is abnormal: outliers within it"), "{words:?}");
-    assert!(
-        words[0].contains("dr-awv with a trim of at least 1 (axes apart) or 3 (axes pooled) leaves it out"),
-        "{words:?}"
-    );
-    assert!(effects(&all, Sensor::Accel).iter().any(|l| l.starts_with("without run2 accel awv moves by")));
-    assert!(advice(&all, Sensor::Gyro).is_empty());
 }
 
 /// What spikes do to the parameters: 3 of 60² on two of three axes of 2048 samples make the sigma2 of AWV 1 +
@@ -206,9 +198,6 @@ fn outliers_in_all_recordings_are_told() {
     assert!(all.iter().all(|d| d.verdict == Verdict::Normal));
     let common = all[0].common.as_ref().unwrap();
     assert!((common.excess / 0.64 - 1.0).abs() < 0.3 && common.tau_s.contains(&2.0), "{common:?}");
-    let words = advice(&all, Sensor::Accel);
-    assert_eq!(words[0], "the 6 recordings agree: use them all");
-    assert!(words[1].starts_with("outliers in all or most of the 6 recordings"), "{words:?}");
     for seed in 0..6 {
         assert_eq!(set(seed, 6, NONE, |_, _, _| ())[0].common, None);
     }
@@ -240,57 +229,12 @@ fn gaussian_quantization_noise_is_not_taken_for_outliers() {
     let gaussian = all[0].gaussian_quantization.as_ref().unwrap();
     assert!(all[0].common.is_none() && gaussian.tau_s[0] == 2.0, "{gaussian:?}");
     assert!((0.08..0.154).contains(&gaussian.read_low), "{gaussian:?}");
-    let words = advice(&all, Sensor::Accel);
-    assert!(words[1].starts_with("the noise that the model calls quantization is Gaussian"), "{words:?}");
     let quantizer = &found(false, 0)[0];
     assert!(quantizer.common.is_none() && quantizer.gaussian_quantization.is_none(), "{quantizer:?}");
     // 0.3 % of 5 deviations in a quantizer's numbers add 7.5 % to the classical variance: outliers, though fewer than the
     // 15 % that would make the two variances equal
     let glitched = &found(false, 99)[0];
     assert!(glitched.common.is_some() && glitched.gaussian_quantization.is_none(), "{glitched:?}");
-}
-
-/// One abnormal recording of three axes, pooled: a trim of 3 already does without it.
-#[test]
-fn a_trim_that_suffices_is_not_asked_for() {
-    let mut one = set(7, 8, NONE, |file, _, signal| {
-        if file == 1 {
-            signal.iter_mut().for_each(|x| *x *= 2.0_f64.sqrt());
-        }
-    });
-    assert!(advice(&one, Sensor::Accel)[0].contains("trim of at least 1"));
-    one[0].dropped = Some((Pool::Sensor, 3));
-    assert!(advice(&one, Sensor::Accel)[0].contains("with its trim of 3, already"));
-}
-
-/// That none stands out is not that they agree.
-#[test]
-fn recordings_that_differ_are_not_said_to_agree() {
-    let mut all = set(7, 6, NONE, |_, _, _| ());
-    let most = LevelSpread { tau_s: 8.0, within: 0.01, between: 0.36 };
-    all.iter_mut().for_each(|d| d.differing = Some(Differing { p_value: 0.002, most }));
-    all[3].scores[0].noise[2] = -9.9;
-    let words = advice(&all, Sensor::Accel);
-    let expected = "none of the 6 recordings stands out, but they differ among themselves beyond their noise, by 36 % of the \
-                    wavelet variance at 8 s (p = 0.002)";
-    assert!(words[0].starts_with(expected), "{words:?}");
-    let farthest = format!(
-        "farthest from the others is {} ({} -9.9 deviations)",
-        all[3].name,
-        all[3].scores[0].axis.name()
-    );
-    assert!(words[0].ends_with(&farthest), "{words:?}");
-}
-
-/// A model that the J-test rejects is told whatever the recordings say of one another; no estimator is advised for a filter.
-#[test]
-fn advice_is_conditioned_on_the_j_test() {
-    let mut all = set(7, 6, NONE, |_, _, _| ());
-    assert_eq!(advice(&all, Sensor::Accel), ["the 6 recordings agree: use them all"]);
-    let misfit = Misfit { group: "accel".to_owned(), estimator: Estimator::DrAwv, p_value: 0.005 };
-    all.iter_mut().for_each(|d| d.misfits = vec![misfit.clone()]);
-    let words = advice(&all, Sensor::Accel);
-    assert!(words[1].starts_with("the J-test rejects the model (accel dr-awv, p = 0.005)"), "{words:?}");
 }
 
 /// A slow drift of one of eight recordings over its whole length, on one axis of three. The level's change between the halves
@@ -314,6 +258,5 @@ fn a_slow_drift_is_found() {
 fn three_recordings_cannot_say_which() {
     let all = set(7, 3, NONE, |_, _, _| ());
     assert!(all.iter().all(|d| d.scores.is_empty() && d.verdict == Verdict::Normal));
-    assert!(advice(&all, Sensor::Accel)[0].starts_with("too few recordings"));
     assert!(set(7, 1, NONE, |_, _, _| ()).is_empty());
 }

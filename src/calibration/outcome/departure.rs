@@ -6,7 +6,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// Scales missed by more standard deviations than this are told.
 const MISSED: f64 = 4.0;
-/// A neighbour belongs to a stretch while it is off by more standard deviations than this, to the same side.
+/// Scales off by more standard deviations than this are what speaks against a model whose scales are off together.
 const DOUBTFUL: f64 = 2.0;
 /// Standard deviation (relative) to which a wavelet variance must be known for its distance from the model to be told.
 const KNOWN: f64 = 0.1;
@@ -20,7 +20,21 @@ pub struct Miss {
     pub ratio: f64,
     /// The normal score of that ratio, a chi-square over its degrees of freedom where the model holds.
     pub deviations: f64,
+    /// Whether the scale counts in the fit.
+    pub is_fitted: bool,
 }
+
+/// Disagreement of a curve with its model.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Misfit {
+    /// Probability of the J-test, if it was made.
+    pub p_value: Option<f64>,
+    /// The scale with the ratio furthest from 1 of all that are missed, those that count in no fit included.
+    pub worst: Miss,
+}
+
+/// Probability of the scores of all scales together below which a model is not said to fit, where no J-test was made.
+const IMPOSSIBLE: f64 = 1e-4;
 
 /// The normal score of a chi-square over its degrees of freedom (Wilson and Hilferty): of few degrees the ratio less one over
 /// its deviation would never be far below zero, however improbable it is.
@@ -37,6 +51,8 @@ pub struct Departure {
     pub scales: usize,
     /// Those that are missed by more than four standard deviations.
     pub missed: Vec<Miss>,
+    /// Of the scales that count in no fit and are missed as far, the one with the ratio furthest from 1.
+    pub left_out: Option<Miss>,
     /// Of the scales that are known to 10 % (of all, if none is), the one with the ratio furthest from 1.
     pub furthest: Option<Miss>,
     /// The longest of these scales, where there are longer ones.
@@ -50,6 +66,8 @@ pub struct Departure {
 
 impl Departure {
     fn of(all: &[Miss], is_known: impl Fn(&&Miss) -> bool) -> Self {
+        let (all, ignored): (Vec<Miss>, Vec<Miss>) = all.iter().copied().partition(|m| m.is_fitted);
+        let ignored: Vec<Miss> = ignored.into_iter().filter(|m| m.deviations.abs() > MISSED).collect();
         let beyond = |deviations: f64| -> Vec<Miss> {
             all.iter().copied().filter(|m| m.deviations.abs() > deviations).collect()
         };
@@ -59,7 +77,8 @@ impl Departure {
         Self {
             scales: all.len(),
             missed: beyond(MISSED),
-            furthest: furthest(if known.is_empty() { all } else { &known }),
+            left_out: furthest(&ignored),
+            furthest: furthest(if known.is_empty() { &all } else { &known }),
             known_to: known.last().map(|m| m.level).filter(|level| Some(*level) != longest),
             doubtful: furthest(&beyond(DOUBTFUL)),
             chance: ChiSquared::new(all.len().max(1) as f64).map_or(1.0, |law| law.sf(squares)),
@@ -71,11 +90,6 @@ impl Departure {
     pub fn worst(&self) -> Option<Miss> {
         furthest(&self.missed)
     }
-
-    /// Of the scales that are missed, the one that noise explains least.
-    pub(crate) fn surest(&self) -> Option<Miss> {
-        self.missed.iter().copied().max_by(|a, b| a.deviations.abs().total_cmp(&b.deviations.abs()))
-    }
 }
 
 fn furthest(all: &[Miss]) -> Option<Miss> {
@@ -84,7 +98,22 @@ fn furthest(all: &[Miss]) -> Option<Miss> {
 }
 
 impl Outcome {
-    /// The curve against the model at the scales that count.
+    /// The disagreement of the curve with its model, by single scales, by all together or by the J-test; none where it fits.
+    #[must_use]
+    pub fn misfit(&self) -> Option<Misfit> {
+        let departure = self.departure();
+        let goodness = self.inference.as_ref().and_then(|i| i.goodness);
+        let together = match goodness {
+            Some(goodness) => goodness.is_rejected(),
+            None => departure.chance < IMPOSSIBLE && departure.doubtful.is_some(),
+        };
+        let missed: Vec<Miss> = departure.missed.iter().chain(&departure.left_out).copied().collect();
+        let worst = furthest(&missed).or(departure.doubtful).or(departure.furthest);
+        let is_missed = together || !departure.missed.is_empty();
+        worst.filter(|_| is_missed).map(|worst| Misfit { p_value: goodness.map(|g| g.p_value), worst })
+    }
+
+    /// The curve against the model.
     #[must_use]
     pub fn departure(&self) -> Departure {
         let is_known = |m: &&Miss| {
@@ -92,19 +121,6 @@ impl Outcome {
             place.is_some_and(|i| (2.0 / self.curve.edof[i]).sqrt() <= KNOWN)
         };
         Departure::of(&self.misses(), is_known)
-    }
-
-    /// First and last level of the stretch around a miss that is off to the same side.
-    pub(crate) fn stretch(&self, around: Miss) -> (u32, u32) {
-        let all = self.misses();
-        let Some(place) = all.iter().position(|m| m.level == around.level) else {
-            return (around.level, around.level);
-        };
-        // The same side: a curve that crosses the model misses it for another reason on the other side.
-        let belongs = |m: &&Miss| m.deviations * around.deviations.signum() > DOUBTFUL;
-        let before = all[..place].iter().rev().take_while(belongs).last();
-        let after = all[place + 1..].iter().take_while(belongs).last();
-        (before.unwrap_or(&around).level, after.unwrap_or(&around).level)
     }
 
     /// The scales that count.
@@ -118,10 +134,10 @@ impl Outcome {
         let implied = implied(&self.fit.composite, curve);
         let scales = curve.levels.iter().zip(&curve.wv).zip(&curve.edof).zip(implied);
         scales
-            .filter(|(((level, _), _), _)| !curve.ignored.contains(level))
             .map(|(((level, nu), edof), implied)| {
                 let ratio = nu / implied;
-                Miss { level: *level, ratio, deviations: score(ratio, *edof) }
+                let is_fitted = !curve.ignored.contains(level);
+                Miss { level: *level, ratio, deviations: score(ratio, *edof), is_fitted }
             })
             .collect()
     }
@@ -138,7 +154,14 @@ mod tests {
     #[test]
     fn scales_are_judged_together_and_told_as_far_as_they_are_known() {
         let off = |deviations: f64| -> Vec<Miss> {
-            (1..=12).map(|level| Miss { level, ratio: 1.0 - 0.05 * f64::from(level), deviations }).collect()
+            (1..=12)
+                .map(|level| Miss {
+                    level,
+                    ratio: 1.0 - 0.05 * f64::from(level),
+                    deviations,
+                    is_fitted: true,
+                })
+                .collect()
         };
         let departure = |deviations| Departure::of(&off(deviations), |m| m.level <= 8);
         let allowed = departure(-1.0);

@@ -2,14 +2,16 @@
 
 mod departure;
 mod inference;
+mod note;
 mod ranking;
 mod settings;
 
-pub use departure::{Departure, Miss};
+pub use departure::{Departure, Misfit, Miss};
 pub use inference::{
     AxesDiffer, Bootstrap, Goodness, Indistinct, Inference, LevelSpread, ParameterInterval, Practical,
     PracticalIntervals, Undetermined,
 };
+pub use note::{Note, Share, shares};
 pub use ranking::{Candidate, Ranking, TooSimple};
 pub use settings::{Advance, FitRange, ModelChoice, ParameterLimit, Settings};
 
@@ -60,8 +62,6 @@ pub struct Outcome {
     pub fit: Fit,
     /// Difference of the pooled axes, where there is one.
     pub axes_differ: Option<AxesDiffer>,
-    /// Remarks, in words.
-    pub notes: Vec<String>,
     /// Intervals of its parameters and goodness of fit, once [`infer`](crate::infer) was asked for them.
     pub inference: Option<Inference>,
 }

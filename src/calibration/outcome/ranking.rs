@@ -21,7 +21,8 @@ pub struct Candidate {
 
 impl Candidate {
     /// Whether it was tested and does not describe the curve.
-    pub(crate) fn is_rejected(&self) -> bool {
+    #[must_use]
+    pub fn is_rejected(&self) -> bool {
         self.j_p_value.is_some_and(|p| p < LEVEL)
     }
 

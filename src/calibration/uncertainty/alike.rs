@@ -10,6 +10,7 @@ use crate::curve::sampling::SamplingLaw;
 use crate::curve::shape::Shape;
 use crate::curve::{Estimator, Replicate};
 use crate::imu::Axis;
+use crate::outcome::{LevelSpread, Outcome};
 use crate::rng::StreamKey;
 use rayon::prelude::*;
 
@@ -56,6 +57,19 @@ pub(crate) fn p_value(
     // The observed set counts as one of the draws, all exchangeable if the fitted law holds: p is never 0,
     // and the level is kept (Davison and Hinkley 1997, chapter 4).
     Some((1 + larger) as f64 / (1 + DRAWS) as f64)
+}
+
+impl Outcome {
+    /// Probability of such differences of the replicates and the scale where they are largest, where they differ beyond their noise.
+    #[must_use]
+    pub fn differing(&self) -> Option<(f64, LevelSpread)> {
+        let inference = self.inference.as_ref()?;
+        let p_value = inference.alike.filter(|p| *p <= LEVEL)?;
+        // Relative to the noise: at the last scales recordings scatter most for lack of coefficients, which is no difference.
+        let ratio = |s: &LevelSpread| s.between / s.within;
+        let most = inference.spread.iter().max_by(|a, b| ratio(a).total_cmp(&ratio(b)))?;
+        Some((p_value, *most))
+    }
 }
 
 /// The replicates that are compared at one scale.

@@ -15,5 +15,4 @@ pub(crate) mod spread;
 pub use alike::LEVEL as ALIKE_LEVEL;
 pub use bootstrap::Scattering;
 pub use influence::CurveInfluence;
-pub(crate) use intervals::WIDEST;
-pub use intervals::derived_interval;
+pub use intervals::{WIDEST, derived_interval};

@@ -3,16 +3,14 @@
 mod output;
 
 use super::jobs::unknown_model;
-use super::parse::one_of;
 use super::parse::words;
-use super::pictures::PlotArgs;
 use super::recordings::{RecordingArgs, Said};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
 use crate::formats::parameters_file;
 use crate::jobs::{self, CalibrationOptions, EstimatorChoice, JobError, ModelFiles};
 use nav_sim_calibration::{
-    Bootstrap, Estimator, FitRange, ModelChoice, ModelSpec, ParameterLimit, Pool, Settings, Trim, Weighting,
+    Bootstrap, Estimator, ModelChoice, ModelSpec, ParameterLimit, Pool, Settings, Trim, Weighting,
 };
 use nav_sim_signal::imu::Sensor;
 use std::path::{Path, PathBuf};
@@ -21,8 +19,8 @@ use std::path::{Path, PathBuf};
 ///
 /// Each recording is one replicate. By default the three axes of a sensor are pooled: there is one model per
 /// sensor, and the signals of its axes are replicates of one another. The model goes to a TOML file. Beside it,
-/// <model>.wv.json holds the curves, <model>.draws.json the draws behind the intervals, <model>.html a page with
-/// figures. With `--estimator all` there is such a set for each estimator, <model>_<estimator>.toml and so on.
+/// <model>.wv.json holds the curves, <model>.draws.json the draws behind the intervals, <model>.html a page and
+/// <model>.svg its figures. With `--estimator all` there is such a set for each estimator, <model>_<estimator>.toml and so on.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -37,9 +35,6 @@ pub(crate) struct Args {
     /// Fit a curve instead of recordings: CSV tau_samples,wv,edof, or a .wv.json of calibrate or wv
     #[arg(long, value_name = "FILE", conflicts_with_all = OF_RECORDINGS)]
     curve: Option<PathBuf>,
-    /// Sensor of a CSV curve, for the model file
-    #[arg(long, value_name = "SENSOR", value_parser = one_of::<Sensor>(&Sensor::NAMES), requires = "curve", conflicts_with = "inputs")]
-    sensor: Option<Sensor>,
     /// Which curve is fitted: an average over the replicates (awv; sr-awv, robust to outliers; dr-awv, robust to
     /// abnormal replicates too), or the curve of a single recording (gmwm, rgmwm; avlr: slopes of its Allan deviation)
     #[arg(long, value_parser = words::<EstimatorChoice>(&ESTIMATORS), default_value_t)]
@@ -57,24 +52,15 @@ pub(crate) struct Args {
     /// Weight of a scale in the fit
     #[arg(long, value_parser = words::<Weighting>(&WEIGHTINGS), default_value_t)]
     weighting: Weighting,
-    /// Scales that enter the fit, such as 1s:1000s; the others are only shown
-    #[arg(long, value_name = "FROM:TO", value_parser = fit_range)]
-    fit_range: Option<FitRange>,
     /// Which signals are replicates of one another (default: sensor; axes for gmwm, rgmwm and avlr)
     #[arg(long, value_parser = words::<Pool>(&POOLS))]
     pool: Option<Pool>,
-    /// Draws of the parametric bootstrap behind intervals and goodness of fit (0: neither)
-    #[arg(long, value_name = "B", default_value_t = Bootstrap::DRAWS as u32, value_parser = clap::value_parser!(u32).range(0..=100_000))]
+    /// Draws behind intervals and goodness of fit (0: neither), fewer for tests
+    #[arg(long, value_name = "B", hide = true, default_value_t = Bootstrap::DRAWS as u32, value_parser = clap::value_parser!(u32).range(0..=100_000))]
     bootstrap: u32,
-    /// Do not test the recordings' means for a turn-on bias (for recordings in one fixed mounting, each a power-on of
-    /// its own, it is stored as [turn_on] if it is significant)
-    #[arg(long)]
-    no_turn_on: bool,
     /// The model file (default: model.toml; none for --curve)
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
-    #[command(flatten)]
-    plot: PlotArgs,
     #[command(flatten)]
     recordings: RecordingArgs,
     #[command(flatten)]
@@ -82,19 +68,7 @@ pub(crate) struct Args {
 }
 
 /// Flags about recordings and their averages, which a curve has behind it.
-const OF_RECORDINGS: [&str; 11] = [
-    "estimator",
-    "trim",
-    "pool",
-    "skip_s",
-    "gaps",
-    "axes",
-    "columns",
-    "efficiency",
-    "efficiency_convention",
-    "scales",
-    "no_turn_on",
-];
+const OF_RECORDINGS: [&str; 6] = ["estimator", "trim", "pool", "skip_s", "gaps", "efficiency"];
 
 /// Those of several recordings first, then those of one.
 pub(super) const ESTIMATORS: [(&str, &str); 7] = [
@@ -129,14 +103,6 @@ const POOLS: [(&str, &str); 2] = [
     (Pool::Sensor.name(), "Those of all axes of a sensor: one model per sensor"),
 ];
 
-fn fit_range(text: &str) -> Result<FitRange, String> {
-    let (from_s, to_s) = super::parse::seconds_range(text)?;
-    if from_s >= to_s {
-        return Err("the shorter scale comes first".into());
-    }
-    Ok(FitRange { from_s, to_s })
-}
-
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let model = model(args)?;
     let settings = Settings {
@@ -145,7 +111,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         trim: args.trim,
         tuning: args.tuning.tuning()?,
         weighting: args.weighting,
-        fit_range: args.fit_range,
+        fit_range: args.tuning.fitted(),
         ..Settings::default()
     };
     match &args.curve {
@@ -160,16 +126,15 @@ fn recordings(args: &Args, settings: Settings, session: &Session) -> Result<(), 
     let guarded: Vec<PathBuf> = listed.iter().chain(&args.parameters).cloned().collect();
     let (mut outputs, _claims) =
         ModelFiles::claim(out, &args.estimator.possible(), &guarded, session.existing())?;
-    let _picture = args.plot.claim(&listed, session)?;
     let options = CalibrationOptions {
         reading: args.recordings.options(),
         skip_warm_up: args.recordings.skips_warm_up(),
-        scales: args.tuning.scales,
+        scales: args.tuning.levels(),
         estimators: args.estimator,
         pool: args.pool,
         settings,
         bootstrap: bootstrap(args, session),
-        turn_on: !args.no_turn_on,
+        turn_on: true,
     };
     let measured = jobs::measure(&args.inputs, &options, &mut Said::new(session))?;
     let files: Vec<PathBuf> = measured.report.files.iter().map(|f| f.path.clone()).collect();
@@ -180,18 +145,18 @@ fn recordings(args: &Args, settings: Settings, session: &Session) -> Result<(), 
         measured.calibrate(&|steps| progress.add(steps))?
     };
     let note = output::note(args, &calibration.settings, inputs, session)?;
-    output::finish(&outputs, &calibration, &note, &args.plot, session)
+    output::finish(&outputs, &calibration, &note, session)
 }
 
 /// Fitting curves that come from elsewhere.
 fn curves(args: &Args, path: &Path, settings: &Settings, session: &Session) -> Result<(), Failure> {
     let curves_of = |sensor| jobs::read_curves(path, args.recordings.rate_hz(), sensor, settings);
-    let curves = match curves_of(args.sensor) {
+    let curves = match curves_of(args.recordings.sensor()) {
         // What is only printed needs a sensor for its units alone.
         Err(JobError::NoSensor { .. }) if args.out.is_none() => {
-            let shown = path.display();
             session.say(format!(
-                "{shown}: does not say its sensor: taken as that of an accelerometer, in m/s² (--sensor gyro: rad/s)"
+                "{}: taken as of an accelerometer (--axes gyro: of a gyroscope)",
+                path.display()
             ));
             curves_of(Some(Sensor::Accel))?
         }
@@ -199,7 +164,6 @@ fn curves(args: &Args, path: &Path, settings: &Settings, session: &Session) -> R
     };
     let inputs: Vec<PathBuf> =
         [path].into_iter().map(Path::to_owned).chain(args.parameters.clone()).collect();
-    let _picture = args.plot.claim(&inputs, session)?;
     let (outputs, _claims) = match &args.out {
         Some(out) => ModelFiles::claim(out, &curves.settings.estimators, &inputs, session.existing())?,
         None => Default::default(),
@@ -207,7 +171,7 @@ fn curves(args: &Args, path: &Path, settings: &Settings, session: &Session) -> R
     let calibration = curves.calibrate(bootstrap(args, session))?;
     let input = read::input("curve", path)?;
     let note = output::note(args, &calibration.settings, vec![input], session)?;
-    output::finish(&outputs, &calibration, &note, &args.plot, session)
+    output::finish(&outputs, &calibration, &note, session)
 }
 
 fn bootstrap(args: &Args, session: &Session) -> Option<Bootstrap> {
@@ -216,8 +180,8 @@ fn bootstrap(args: &Args, session: &Session) -> Option<Bootstrap> {
 
 fn model(args: &Args) -> Result<ModelChoice, Failure> {
     let chosen: ModelChoice = args.model.parse().map_err(unknown_model)?;
-    if args.estimator == EstimatorChoice::One(Estimator::Avlr) && args.fit_range.is_some() {
-        let message = "--fit-range with --estimator avlr: slopes are read where they are found";
+    if args.estimator == EstimatorChoice::One(Estimator::Avlr) && args.tuning.fitted().is_some() {
+        let message = "--scales FROM:TO with --estimator avlr: slopes are read where they are found";
         return Err(Failure::input(message).hint("--estimator gmwm fits the same curve over a range"));
     }
     if args.estimator != EstimatorChoice::One(Estimator::Avlr) {

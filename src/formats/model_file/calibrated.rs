@@ -1,17 +1,20 @@
 //! The model file of a calibration.
 
 use super::{Interval, ModelFile, PROGRAM, SCHEMA, TurnOn};
-use crate::report::{Input, turn_on_remark};
-use nav_sim_calibration::{Estimator, Outcome, ParameterLimit, Settings, TurnOnSpread, undetermined};
+use crate::report::calibration::{notes, turn_on_remark};
+use crate::report::{Input, readable};
+use nav_sim_calibration::{Estimator, Outcome, ParameterLimit, Settings, TurnOnSpread, duration, tau_s};
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::noise::Model;
+use nav_sim_signal::wavelet::Convention;
+use std::fmt;
 use toml::{Table, Value};
 
 /// What a calibration leaves in the file beside the model.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct CalibrationNote {
-    /// How the tuning constant follows from the efficiency: `exact` or `wv`.
-    pub efficiency_convention: String,
+    /// How the tuning constant follows from the efficiency.
+    pub efficiency_convention: Convention,
     /// Seed of the bootstrap, if there was one.
     pub seed: Option<u64>,
     /// How the recordings were read and grouped, key by key: what was left out at their beginning, gaps, axes, scales, pool.
@@ -64,7 +67,7 @@ impl CalibrationNote {
         }
         if estimator.is_robust() {
             put("efficiency", settings.tuning.efficiency().into());
-            put("efficiency_convention", self.efficiency_convention.as_str().into());
+            put("efficiency_convention", self.efficiency_convention.name().into());
         }
         for (key, value) in &self.reading {
             put(key, value.clone());
@@ -78,11 +81,45 @@ impl CalibrationNote {
     }
 }
 
+/// Disagreement of a model with the recordings that it was fitted to, as its provenance has it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Misfit {
+    /// Probability of the J-test, if it was made.
+    pub p_value: Option<f64>,
+    /// Wavelet variance of the data over that of the model where it is furthest from 1, and that scale (s).
+    pub worst: Option<(f64, f64)>,
+}
+
+impl fmt::Display for Misfit {
+    /// `does not fit its recordings (p = 0.005, data/model 0.33 at 0.02 s)`
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let p = self.p_value.map(|p| format!("p = {p:.3}"));
+        let worst =
+            self.worst.map(|(ratio, tau_s)| format!("data/model {} at {}", readable(ratio), duration(tau_s)));
+        let figures: Vec<String> = p.into_iter().chain(worst).collect();
+        write!(f, "does not fit its recordings ({})", figures.join(", "))
+    }
+}
+
 impl ModelFile {
     /// The estimator that made the model, if known.
     pub(crate) fn estimator(&self) -> Option<String> {
         let estimator = self.provenance.as_ref()?.get("estimator")?;
         estimator.as_str().map(str::to_owned)
+    }
+
+    /// The worst disagreement of the model with its recordings, where a fit of it does not describe them.
+    #[must_use]
+    pub fn misfit(&self) -> Option<Misfit> {
+        let fits = self.provenance.as_ref()?.get("fits")?.as_array()?;
+        let of_fit = |fit: &Value| {
+            let number = |key| fit.get(key).and_then(Value::as_float);
+            let (p_value, ratio) = (number("j_p_value"), number("worst_ratio"));
+            let is_missed = ratio.is_some() || p_value.is_some_and(|p| p < 0.05);
+            is_missed.then(|| Misfit { p_value, worst: ratio.zip(number("worst_tau_s")) })
+        };
+        let size = |m: &Misfit| m.worst.map_or(0.0, |(ratio, _)| ratio.ln().abs());
+        fits.iter().filter_map(of_fit).max_by(|a, b| size(a).total_cmp(&size(b)))
     }
 
     /// The largest whole number of that name that the provenance has of a fit.
@@ -163,10 +200,11 @@ fn fit(outcome: &Outcome, settings: &Settings) -> Table {
             put("j_p_value", goodness.p_value.into());
         }
     }
-    let labels = fit.composite.labels();
-    let intervals = outcome.inference.iter().flat_map(|i| &i.intervals);
-    let open = intervals.filter_map(|i| undetermined(i, &labels));
-    put("notes", outcome.notes.iter().cloned().chain(open).collect::<Vec<_>>().into());
+    if let Some(misfit) = outcome.misfit() {
+        put("worst_ratio", misfit.worst.ratio.into());
+        put("worst_tau_s", tau_s(misfit.worst.level, settings.rate_hz).into());
+    }
+    put("notes", notes(outcome, settings).into());
     table
 }
 

@@ -23,6 +23,7 @@ mod schema;
 mod write;
 
 pub(crate) use calibrated::CalibrationNote;
+pub use calibrated::Misfit;
 pub(crate) use read::from_text;
 pub use read::read;
 pub(crate) use schema::schema;
@@ -58,13 +59,14 @@ pub struct ModelFile {
 }
 
 impl ModelFile {
-    /// What the file at this path leaves open, in words.
+    /// What is doubtful about the file at this path, in words.
     pub(crate) fn doubts(&self, path: &std::path::Path) -> Vec<String> {
         let shown = path.display();
         let unsaid = |channel: &Channel| {
             format!("{shown} has no noise model for {channel}; it is taken as free of noise")
         };
-        self.missing.iter().map(unsaid).collect()
+        let misfit = self.misfit().map(|misfit| format!("{shown} {misfit}"));
+        misfit.into_iter().chain(self.missing.iter().map(unsaid)).collect()
     }
 
     /// What counts as none in it because its data sheet does not state it: figures, or axes without noise.

@@ -1,6 +1,5 @@
 //! The page of each result.
 
-mod calibration;
 mod choice;
 mod comparison;
 mod design;
@@ -11,9 +10,7 @@ mod run;
 mod run_budgets;
 mod run_charts;
 mod study;
-mod wavelet;
 
-pub(crate) use calibration::{calibration_page, calibration_svg};
 pub(crate) use choice::choice_page;
 pub(crate) use comparison::{RatioCurves, ShownComparison};
 pub(crate) use design::design_page;
@@ -23,7 +20,6 @@ pub(crate) use paper::{PaperFigure, StudyCurves, paper_figures, paper_page};
 pub(super) use run::run_page;
 pub(crate) use run_charts::run_svg;
 pub(crate) use study::study_page;
-pub(crate) use wavelet::wavelet_page;
 
 use super::number;
 use super::page::Tone;

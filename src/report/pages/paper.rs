@@ -1,10 +1,10 @@
 //! The figures of Minaretzis et al. 2024 from the files of a case study: what it shows of each, in the paper's order.
 
-use super::calibration::{CAPTION as FITTED, chart as fitted_chart};
-use super::wavelet::{curve, scale_axis, variance_axis};
+use crate::report::calibration::{CAPTION as FITTED, variance_chart as fitted_chart};
 use crate::report::curves::{CurvesFile, FittedCurve};
 use crate::report::page::{Chart, Colour, Page, Panel, Series, Tone, svg};
 use crate::report::trajectory::TrajectorySeries;
+use crate::report::wavelet::{curve, scale_axis, sensor_name, variance_axis};
 use nav_sim_signal::imu::Sensor;
 
 /// A figure of the paper.
@@ -127,7 +127,7 @@ fn averages<'a>(fitted_curve: &dyn Fn(&str, &str, Sensor) -> Option<&'a FittedCu
             axis.label = format!("scenario {scenario}: {}", axis.label);
             Panel::new(axis, series)
         };
-        let title = super::wavelet::sensor_name(sensor.name());
+        let title = sensor_name(sensor.name());
         Chart::new(title, scale_axis(), ["II", "III"].iter().map(panel).collect())
     };
     Sensor::ALL.map(chart).into()

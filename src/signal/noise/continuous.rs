@@ -35,6 +35,18 @@ pub fn correlation_time_s(phi: f64, rate_hz: f64) -> f64 {
     -1.0 / (rate_hz * (phi - 1.0).ln_1p())
 }
 
+impl Process {
+    /// Correlation time (s) of an AR1 with phi > 0 or a GM; none of the others.
+    #[must_use]
+    pub fn correlation_time_s(&self, rate_hz: f64) -> Option<f64> {
+        match self {
+            Self::Ar1(p) if p.phi() > 0.0 => Some(correlation_time_s(p.phi(), rate_hz)),
+            Self::GaussMarkov(p) => Some(1.0 / p.beta()),
+            _ => None,
+        }
+    }
+}
+
 /// Why a model cannot be used at another rate.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RateError {

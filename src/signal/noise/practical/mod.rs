@@ -29,7 +29,7 @@ mod reading;
 
 pub use reading::{AxisParameters, CorrelatedProcess, Minimum};
 
-use super::continuous::{correlation_time_s, walk_density, white_density};
+use super::continuous::{walk_density, white_density};
 use super::{Composite, Process};
 
 /// Allan deviation over B of pure flicker noise: √(2 ln 2/π) = 0.664.
@@ -330,15 +330,13 @@ fn walk_gamma2(axis: &Composite) -> f64 {
 
 /// Standard deviation and correlation time of an AR1 or GM that has them.
 fn markov_of(process: &Process, rate_hz: f64) -> Option<Markov> {
-    match process {
-        Process::Ar1(p) if p.phi() > 0.0 && p.sigma2() > 0.0 => {
-            Some(Markov { sigma: p.variance().sqrt(), t_corr_s: correlation_time_s(p.phi(), rate_hz) })
-        }
-        Process::GaussMarkov(p) if p.s2() > 0.0 => {
-            Some(Markov { sigma: p.s2().sqrt(), t_corr_s: 1.0 / p.beta() })
-        }
-        _ => None,
-    }
+    let variance = match process {
+        Process::Ar1(p) => p.variance(),
+        Process::GaussMarkov(p) => p.s2(),
+        _ => return None,
+    };
+    let t_corr_s = process.correlation_time_s(rate_hz).filter(|_| variance > 0.0)?;
+    Some(Markov { sigma: variance.sqrt(), t_corr_s })
 }
 
 #[cfg(test)]

@@ -1,22 +1,125 @@
-//! Wavelet variances of recordings for people: a digest, recordings side by side, all scales.
+//! The document of `wv`: Allan deviations of recordings, as a digest and side by side.
 
+use super::Answer;
+use super::calibration::stem;
 use super::curves::{Band, SignalCurves, SignalsFile};
-use super::number::{shortest, squared};
-use super::short_names;
 use nav_sim_calibration::{duration, median};
-use nav_sim_signal::wavelet::Tuning;
+use nav_sim_document::{
+    Axis, Cell, Chart, Colour, Document, Mark, Panel, Series, Table, Tone, short_names, shortest,
+    squared,
+};
+use nav_sim_signal::imu::Sensor;
 
 /// Degrees of freedom from which on robust over classical tells of outliers rather than of chance.
 const LEAST: f64 = 100.0;
+/// Classical over robust beyond which outliers are suspected.
+const OUTLIERS: f64 = 1.5;
+
+/// The axis of scales.
+pub(crate) fn scale_axis() -> Axis {
+    Axis::log("scale τ (s)")
+}
+
+/// The axis of wavelet variances of a sensor.
+pub(crate) fn variance_axis(sensor: &str) -> Axis {
+    Axis::log(&format!("wavelet variance ({})", squared(unit(sensor))))
+}
+
+/// Unit of a sensor, by its name in files.
+pub(crate) fn unit(sensor: &str) -> &'static str {
+    Sensor::ALL.into_iter().find(|s| s.name() == sensor).map_or("", Sensor::unit)
+}
+
+/// A sensor in words.
+pub(crate) fn sensor_name(sensor: &str) -> &'static str {
+    if sensor == Sensor::Accel.name() { "Accelerometer" } else { "Gyroscope" }
+}
+
+/// Points of a curve.
+pub(crate) fn curve(tau_s: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
+    tau_s.iter().copied().zip(values.iter().copied()).collect()
+}
+
+/// The area between two curves.
+pub(crate) fn band(tau_s: &[f64], low: &[f64], high: &[f64]) -> Mark {
+    Mark::Band(tau_s.iter().zip(low).zip(high).map(|((t, a), b)| (*t, *a, *b)).collect())
+}
+
+impl Answer for SignalsFile {
+    fn document(&self) -> Document {
+        let worst = self.signals.iter().filter_map(|s| Some((excess(s)?, s)));
+        let worst = worst.max_by(|a, b| a.0.1.total_cmp(&b.0.1));
+        let count = recordings(self).len();
+        let (tone, verdict) = match worst {
+            Some(((tau_s, ratio), s)) if ratio > OUTLIERS => {
+                let (at, name) = (duration(tau_s), short_names(&[&s.file]).remove(0));
+                let of = format!("{} {}.{}", stem(&name), s.sensor, s.axis);
+                (
+                    Tone::Doubtful,
+                    format!(
+                        "outliers? {of}: classical wavelet variance {ratio:.2} times the robust one at {at}"
+                    ),
+                )
+            }
+            _ => (Tone::Good, "classical and robust wavelet variances agree".to_owned()),
+        };
+        let median = if count > 1 { format!(", median of {count} recordings") } else { String::new() };
+        let head = format!("Allan deviation over averages{median}; ratio: robust/classical, * less than by chance");
+        let mut document = Document::new("Wavelet variance of static recordings", tone, [verdict, head]);
+        document.lead(digest(self));
+        let charts: Vec<Chart> = channels(self).into_iter().map(|channel| chart(self, channel)).collect();
+        document.charts(&charts, "Robust wavelet variance; dashed: classical, which outliers raise. τ is twice the averaging time.");
+        for (title, table) in side_by_side(self) {
+            document.folded(&title, |inside| inside.table(&table));
+        }
+        document.checked(
+            "wavelet variances to 1e-12, ends of intervals to 1e-9 of an independent implementation",
+        );
+        document
+    }
+}
+
+/// A chart of an axis, the recordings in colour.
+fn chart(file: &SignalsFile, (sensor, axis): (&str, &str)) -> Chart {
+    let files = recordings(file);
+    let names = short_names(&files);
+    let names: Vec<&str> = names.iter().map(|name| stem(name)).collect();
+    let mut series = Vec::new();
+    for s in signals_of(file, sensor, axis) {
+        let k = files.iter().position(|name| *name == s.file).unwrap_or(0);
+        let (name, colour) = (names[k], Colour::Hue(k));
+        if files.len() == 1 {
+            series.push(Series::new("95 %", colour, band(&s.tau_s, &s.robust.ci_low, &s.robust.ci_high)));
+        }
+        series.push(Series::dashed("", colour, curve(&s.tau_s, &s.classical.wv)));
+        series.push(Series::line(name, colour, curve(&s.tau_s, &s.robust.wv)));
+    }
+    let title = format!("{} {axis}", sensor_name(sensor));
+    Chart::new(&title, scale_axis(), vec![Panel::new(variance_axis(sensor), series)])
+        .small()
+        .in_group("scales")
+}
+
+/// The recordings, each once.
+fn recordings(file: &SignalsFile) -> Vec<&str> {
+    super::comparison::in_order(file.signals.iter().map(|s| s.file.as_str()))
+}
+
+/// The scale at which classical over robust is largest of those that are well known, and that ratio.
+fn excess(s: &SignalCurves) -> Option<(f64, f64)> {
+    let ratio = |i: usize| (s.tau_s[i], s.classical.wv[i] / s.robust.wv[i]);
+    let told = (0..s.tau_s.len()).filter(|i| s.edof[*i] >= LEAST).map(ratio).filter(|r| r.1.is_finite());
+    told.max_by(|a, b| a.1.total_cmp(&b.1))
+}
 
 /// One table for all recordings: a row for each sensor and axis, its Allan deviation at one averaging time a decade (the
 /// median over the recordings), the lowest of all averaging times, and how far the robust wavelet variance is below the
 /// classical one.
-pub(crate) fn signals_digest(file: &SignalsFile) -> Vec<Vec<String>> {
+fn digest(file: &SignalsFile) -> Table {
     let decades = decades(file);
     let times = decades.iter().map(|i| duration(allan_time_s(&longest(file).tau_s, *i)));
-    let head = ["", "unit"].map(str::to_owned).into_iter().chain(times);
-    let head = head.chain(["lowest", "robust/classical"].map(str::to_owned)).collect();
+    let head = times.chain(["lowest", "ratio"].map(str::to_owned));
+    let mut table = Table::new(["axis"]).and(head);
     let row = |(sensor, axis): (&str, &str)| {
         let signals = signals_of(file, sensor, axis);
         let median_at = |i: usize| {
@@ -24,36 +127,37 @@ pub(crate) fn signals_digest(file: &SignalsFile) -> Vec<Vec<String>> {
             let all: Vec<f64> = of_files.collect();
             (!all.is_empty()).then(|| median(&all))
         };
-        let cells = decades.iter().map(|i| median_at(*i).map_or(String::new(), |x| format!("{x:.3e}")));
-        let name = [format!("{sensor}.{axis}"), unit(sensor).to_owned()];
+        let cells = decades.iter().map(|i| median_at(*i).map_or(String::new(), |x| format!("{x:.2e}")));
+        let name = format!("{sensor}.{axis} ({})", unit(sensor));
         let scales = signals.iter().map(|s| s.tau_s.len()).max().unwrap_or(0);
         let lowest = (0..scales).filter_map(|i| Some((i, median_at(i)?))).min_by(|a, b| a.1.total_cmp(&b.1));
         let lowest = lowest.map_or(String::new(), |(i, deviation)| {
-            format!("{deviation:.3e} at {}", duration(allan_time_s(&longest(file).tau_s, i)))
+            format!("{deviation:.2e} at {}", duration(allan_time_s(&longest(file).tau_s, i)))
         });
         let ratios: Vec<Ratio> = signals.iter().flat_map(|s| ratios(s, file.efficiency)).collect();
         let ratio = least_ratio(&ratios).map_or(String::new(), |(r, mark)| format!("{r:.2}{mark}"));
-        name.into_iter().chain(cells).chain([lowest, ratio]).collect()
+        let figures = cells.chain([lowest, ratio]).map(Cell::figures);
+        std::iter::once(Cell::from(name)).chain(figures).collect::<Vec<Cell>>()
     };
-    std::iter::once(head).chain(channels(file).into_iter().map(row)).collect()
+    channels(file).into_iter().for_each(|channel| table.row(row(channel)));
+    table
 }
 
-/// For each sensor and axis a title and a table: a row an averaging time, one a decade, a column a recording.
-pub(crate) fn signals_per_file(file: &SignalsFile) -> Vec<(String, Vec<Vec<String>>)> {
-    let decades = decades(file);
+/// For each sensor and axis a title and a table: a row a scale, a column a recording.
+pub(crate) fn side_by_side(file: &SignalsFile) -> Vec<(String, Table)> {
     let table = |(sensor, axis): (&str, &str)| {
         let signals = signals_of(file, sensor, axis);
         let names = short_names(&signals.iter().map(|s| s.file.as_str()).collect::<Vec<_>>());
-        let head = std::iter::once("averages of".to_owned()).chain(names).collect::<Vec<_>>();
-        let row = |i: &usize| {
+        let mut table = Table::new(["averages of"]).and(names);
+        for i in 0..signals.iter().map(|s| s.tau_s.len()).max().unwrap_or(0) {
             let cell = |s: &&SignalCurves| {
-                s.classical.wv.get(*i).map_or(String::new(), |wv| format!("{:.3e}", allan_deviation(*wv)))
+                let deviation = s.classical.wv.get(i).map(|wv| format!("{:.3e}", allan_deviation(*wv)));
+                Cell::figures(deviation.unwrap_or_default())
             };
-            let time = duration(allan_time_s(&longest(file).tau_s, *i));
-            std::iter::once(time).chain(signals.iter().map(cell)).collect::<Vec<_>>()
-        };
-        let title = format!("{sensor}.{axis}: Allan deviation ({})", unit(sensor));
-        (title, std::iter::once(head).chain(decades.iter().map(row)).collect())
+            let time = duration(allan_time_s(&longest(file).tau_s, i));
+            table.row(std::iter::once(Cell::from(time)).chain(signals.iter().map(cell)));
+        }
+        (format!("{sensor}.{axis}: Allan deviation ({})", unit(sensor)), table)
     };
     channels(file).into_iter().map(table).collect()
 }
@@ -88,48 +192,6 @@ pub(crate) fn signals_csv(file: &SignalsFile) -> String {
     text
 }
 
-/// A signal's curves as a table: rows of text, the first its head.
-pub(crate) fn signal_rows(curves: &SignalCurves) -> Vec<Vec<String>> {
-    let unit = unit(&curves.sensor);
-    let head = [
-        "scale tau (s)".to_owned(),
-        format!("classical ({})", squared(unit)),
-        "95 % interval".to_owned(),
-        format!("robust ({})", squared(unit)),
-        "95 % interval".to_owned(),
-        String::new(),
-        "averages of (s)".to_owned(),
-        format!("Allan deviation ({unit})"),
-    ];
-    let number = |x: f64| format!("{x:.4e}");
-    let range = |band: &Band, i: usize| format!("{} – {}", number(band.ci_low[i]), number(band.ci_high[i]));
-    let row = |i: usize| {
-        let (classical, robust) = (&curves.classical, &curves.robust);
-        let status =
-            if robust.status[i] == "ok" { String::new() } else { robust.status[i].replace('_', " ") };
-        vec![
-            format!("{}", curves.tau_s[i]),
-            number(classical.wv[i]),
-            range(classical, i),
-            number(robust.wv[i]),
-            range(robust, i),
-            status,
-            format!("{}", allan_time_s(&curves.tau_s, i)),
-            number(allan_deviation(classical.wv[i])),
-        ]
-    };
-    std::iter::once(head.to_vec()).chain((0..curves.tau_s.len()).map(row)).collect()
-}
-
-/// What a file of signals says about its intervals.
-pub(crate) fn intervals_note(edof_method: &str, tuning: &Tuning) -> String {
-    let kind = match edof_method {
-        "large-sample" => "large-sample degrees of freedom (eta1)",
-        _ => "degrees of freedom eta3, conservative beyond the first scale",
-    };
-    format!("intervals: 95 %, {kind}; robust: times the efficiency {:.3}", tuning.efficiency())
-}
-
 /// A scale is two averages long.
 fn allan_time_s(tau_s: &[f64], index: usize) -> f64 {
     0.5 * tau_s[index]
@@ -138,10 +200,6 @@ fn allan_time_s(tau_s: &[f64], index: usize) -> f64 {
 /// The wavelet variance is half the Allan variance.
 fn allan_deviation(wv: f64) -> f64 {
     (2.0 * wv).sqrt()
-}
-
-fn unit(sensor: &str) -> &'static str {
-    if sensor == "accel" { "m/s²" } else { "rad/s" }
 }
 
 fn signals_of<'a>(file: &'a SignalsFile, sensor: &str, axis: &str) -> Vec<&'a SignalCurves> {
@@ -242,11 +300,12 @@ mod tests {
     /// 1/√t at the octaves nearest to the decades: 0.01, 0.08, 1.28 and 10.24 s (81.92 s is the last).
     #[test]
     fn a_digest_has_a_row_a_channel() {
-        let rows = signals_digest(&file(3));
+        let text = digest(&file(3)).csv();
+        let rows: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
         assert_eq!(rows.len(), 2);
-        assert_eq!(rows[0][2..7], ["0.01 s", "0.08 s", "1.28 s", "10.2 s", "81.9 s"]);
-        assert_eq!(rows[1][..3], ["gyro.z", "rad/s", "1.000e1"]);
-        assert_eq!(rows[1][6..], ["1.105e-1", "1.105e-1 at 81.9 s", "0.90 *"]);
+        assert_eq!(rows[0][1..6], ["0.01 s", "0.08 s", "1.28 s", "10.2 s", "81.9 s"]);
+        assert_eq!(rows[1][..2], ["gyro.z (rad/s)", "1.00e1"]);
+        assert_eq!(rows[1][5..], ["1.10e-1", "1.10e-1 at 81.9 s", "0.90 *"]);
     }
 
     /// 200 recordings of white noise, 4096 samples each: at most 2.5 % have a mark, four deviations of a binomial share more,
@@ -279,10 +338,10 @@ mod tests {
 
     #[test]
     fn recordings_stand_side_by_side() {
-        let tables = signals_per_file(&file(2));
+        let tables = side_by_side(&file(2));
         assert_eq!(tables.len(), 1);
-        assert_eq!(tables[0].1[0], ["averages of", "run0.csv", "run1.csv"]);
-        assert_eq!(tables[0].1.len(), 6);
+        let text = tables[0].1.csv();
+        assert!(text.starts_with("averages of,run0.csv,run1.csv\n") && text.lines().count() == 15, "{text}");
         assert_eq!(signals_csv(&file(2)).lines().count(), 1 + 2 * 14);
     }
 }

@@ -10,16 +10,6 @@ pub fn percent(part: f64) -> String {
     }
 }
 
-/// A change, in per cent with its sign: `+12 %`, `-0.03 %`.
-pub(super) fn signed_percent(change: f64) -> String {
-    let value = 100.0 * change;
-    match value.abs() {
-        v if v >= 9.5 => format!("{value:+.0} %"),
-        v if v >= 0.95 => format!("{value:+.1} %"),
-        _ => format!("{value:+.2} %"),
-    }
-}
-
 /// A time for people: seconds, minutes or hours.
 #[must_use]
 pub fn duration(seconds: f64) -> String {
@@ -31,7 +21,7 @@ pub fn duration(seconds: f64) -> String {
 }
 
 /// Three digits, without zeros at the end.
-pub(super) fn three_digits(x: f64) -> String {
+fn three_digits(x: f64) -> String {
     if x >= 1e6 || (x > 0.0 && x < 1e-3) {
         return format!("{x:.2e}");
     }
