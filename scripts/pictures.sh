@@ -11,6 +11,7 @@ mkdir -p "$out"
 "$nav_sim" synthesize calib_data/consumer_mems.toml --replicates 6 --samples 65536 --spread \
     --contaminate examples/one_bad_recording.toml --axes gyro.x --seed 1 -o "$work/static" > "$work/said"
 "$nav_sim" calibrate "$work/static" --axes gyro.x --bootstrap 50 --seed 1 \
-    -o "$work/model.toml" --plot "$out/calibration.svg" --force > "$work/said"
+    -o "$work/model.toml" --force > "$work/said"
+cp "$work/model.svg" "$out/calibration.svg"
 "$nav_sim" run trajectories/land_vehicle.toml calib_data/consumer_mems.toml --method lincov --seed 1 \
     --outage 300:390 --outage 700:790 -o "$work/run" --plot "$out/run.svg" --force > "$work/said"

@@ -53,8 +53,9 @@ impl ModelFiles {
         is_file(out)?;
         let all = Self::of(out, estimators);
         let kinds = [Written::Calibrated, Written::Curves, Written::Draws, Written::Page, Written::Svg];
-        let paths =
-            all.iter().flat_map(|f| [&f.model, &f.curves, &f.draws, &f.page, &f.figures].into_iter().zip(kinds));
+        let paths = all
+            .iter()
+            .flat_map(|f| [&f.model, &f.curves, &f.draws, &f.page, &f.figures].into_iter().zip(kinds));
         let claim = |(path, kind): (&PathBuf, Written)| {
             atomic::claim_result(path, inputs.iter().map(PathBuf::as_path), kind, existing)
         };

@@ -5,8 +5,7 @@ use super::calibration::stem;
 use super::curves::{Band, SignalCurves, SignalsFile};
 use nav_sim_calibration::{duration, median};
 use nav_sim_document::{
-    Axis, Cell, Chart, Colour, Document, Mark, Panel, Series, Table, Tone, short_names, shortest,
-    squared,
+    Axis, Cell, Chart, Colour, Document, Mark, Panel, Series, Table, Tone, short_names, shortest, squared,
 };
 use nav_sim_signal::imu::Sensor;
 
@@ -64,7 +63,8 @@ impl Answer for SignalsFile {
             _ => (Tone::Good, "classical and robust wavelet variances agree".to_owned()),
         };
         let median = if count > 1 { format!(", median of {count} recordings") } else { String::new() };
-        let head = format!("Allan deviation over averages{median}; ratio: robust/classical, * less than by chance");
+        let head =
+            format!("Allan deviation over averages{median}; ratio: robust/classical, * less than by chance");
         let mut document = Document::new("Wavelet variance of static recordings", tone, [verdict, head]);
         document.lead(digest(self));
         let charts: Vec<Chart> = channels(self).into_iter().map(|channel| chart(self, channel)).collect();
@@ -269,7 +269,7 @@ fn least_ratio(ratios: &[Ratio]) -> Option<(f64, &'static str)> {
 mod tests {
     use super::*;
     use nav_sim_signal::rng::Generator;
-    use nav_sim_signal::wavelet::{Convention, interval};
+    use nav_sim_signal::wavelet::{Convention, Tuning, interval};
     use rand::{RngExt, SeedableRng};
     use rand_distr::StandardNormal;
 

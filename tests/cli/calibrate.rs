@@ -295,10 +295,7 @@ fn wv_prints_the_curves_of_every_signal() {
     };
     let (digest, all) = (text(&[]), text(&["--verbose"]));
     assert!(digest.lines().count() <= 20 && digest.contains("gyro.x (rad/s)"), "{digest}");
-    assert!(
-        all.contains("gyro.x: Allan deviation (rad/s)") && all.contains("run0.csv"),
-        "{all}"
-    );
+    assert!(all.contains("gyro.x: Allan deviation (rad/s)") && all.contains("run0.csv"), "{all}");
     assert!(text(&["--per-file"]).contains("run0.csv  run1.csv"));
     assert!(text(&["--per-file"]).lines().all(|line| line.chars().count() <= 120));
     assert_eq!(text(&["--format", "csv"]).lines().count(), 1 + 4 * 13);
@@ -363,10 +360,7 @@ fn a_model_is_chosen_and_slopes_are_read() {
     let out = json(dir.path(), &[&avlr[..], &["--model", "WN+QN+RW"]].concat());
     let fit = &out["fits"][0];
     assert_eq!(fit["zero"].to_string(), "[\"QN\"]");
-    assert!(
-        fit["notes"].to_string().contains("QN is zero") && fit["goodness"].is_null(),
-        "{fit}"
-    );
+    assert!(fit["notes"].to_string().contains("QN is zero") && fit["goodness"].is_null(), "{fit}");
     let full = json(
         dir.path(),
         &["calibrate", "runs", "--model", "N1", "--estimator", "awv", "--weighting", "full"],

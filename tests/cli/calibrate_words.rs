@@ -119,7 +119,10 @@ fn bad_data_are_told_in_a_line() {
     let text = String::from_utf8(output.get_output().stdout.clone()).unwrap();
     let first = text.lines().next().unwrap();
     assert!(first.starts_with("gyro: WN does not fit (p = ") && first.contains("data/model "), "{first}");
-    assert!(text.lines().nth(1).unwrap().starts_with("1 of 4 recordings are abnormal: run3 (gyro noise"), "{text}");
+    assert!(
+        text.lines().nth(1).unwrap().starts_with("1 of 4 recordings are abnormal: run3 (gyro noise"),
+        "{text}"
+    );
     let said = String::from_utf8(output.get_output().stderr.clone()).unwrap();
     assert!(said.contains("gyro: axes differ: "), "{said}");
 }

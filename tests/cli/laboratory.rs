@@ -47,8 +47,7 @@ fn models_and_curves_say_what_they_are_of() {
     done(place.path(), "synthesize imu.toml --replicates 1 --samples 4096 --axes gyro.x --seed 1 -o rec");
     // Two estimators of one signal are told apart.
     let calibrate = "calibrate rec --model WN --bootstrap 0";
-    let ran =
-        plain(place.path(), &format!("{calibrate} --estimator all --scales 0.001min:1h -o both.toml"));
+    let ran = plain(place.path(), &format!("{calibrate} --estimator all --scales 0.001min:1h -o both.toml"));
     assert_eq!(ran.code, 0, "{}", ran.stderr);
     for name in ["gyro.x gmwm ", "gyro.x rgmwm "] {
         assert!(ran.stdout.lines().any(|line| line.trim_start().starts_with(name)), "{}", ran.stdout);

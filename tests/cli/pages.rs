@@ -48,14 +48,9 @@ fn calibrate_writes_its_page_beside_the_model_the_same_on_any_number_of_threads(
     let place = place_with(DRIVE, MODEL);
     let dir = place.path();
     recordings(dir);
-    let command =
-        "calibrate static --model WN+RW --seed 1 --bootstrap 20 --format json -o m.toml";
+    let command = "calibrate static --model WN+RW --seed 1 --bootstrap 20 --format json -o m.toml";
     let ran = done(dir, &format!("{command} -j 1"));
-    assert!(
-        ran.stderr.contains("m.wv.json, m.draws.json, m.html, m.svg"),
-        "{}",
-        ran.stderr
-    );
+    assert!(ran.stderr.contains("m.wv.json, m.draws.json, m.html, m.svg"), "{}", ran.stderr);
     let page = text(&dir.join("m.html"));
     is_whole(&page);
     assert!(page.contains("Accelerometer, all axes") && page.contains("data / model"));
