@@ -16,9 +16,6 @@ impl From<JobError> for Failure {
             JobError::Wavelet(e) => Self::could_not(e),
             JobError::Calibration(e) => of_calibration(&e),
             JobError::Copy { .. } => Self::input(e).hint("leave one of them out"),
-            JobError::Overlap { .. } => {
-                Self::input(e).hint("leave one of them out, or cut off the rows that both have")
-            }
             JobError::Single { .. } => {
                 Self::input(format!("--estimator {e}")).hint("awv, sr-awv and dr-awv take several")
             }

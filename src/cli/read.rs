@@ -128,7 +128,7 @@ pub(super) fn recordings_at(
     };
     let (recordings, report) = recordings::read(paths, &ReadOptions { rate_hz, ..ReadOptions::default() })
         .map_err(|e| Failure::of_file(&e, hint))?;
-    session.warn_all(report.doubts());
+    session.warn_all(report.all_warnings());
     for file in &report.files {
         session.detail(file);
     }

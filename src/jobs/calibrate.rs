@@ -180,9 +180,6 @@ pub fn measure(
     let (looks, report) = visit(paths, &reading, &look, remarks)?;
     let looks = looks.into_iter().collect::<Result<Vec<_>, _>>()?;
     distinct(&looks)?;
-    if let Some((first, later, share)) = report.overlap() {
-        return Err(JobError::Overlap { later: later.to_owned(), first: first.to_owned(), share });
-    }
     let rate_hz = report.files[0].rate_hz;
     let beginnings = beginnings(&looks, (reading.skip_s, *skip_warm_up), rate_hz);
     shortest(&report, *scales, remarks);

@@ -33,19 +33,6 @@ pub enum JobError {
         /// The one it is a copy of.
         first: String,
     },
-    /// Recordings that have samples in common, such as a copy less its first rows.
-    #[error(
-        "{later} and {first} have samples in common, about {:.0} % of the shorter: they are no two replicates",
-        100.0 * share
-    )]
-    Overlap {
-        /// The later recording.
-        later: String,
-        /// The one before.
-        first: String,
-        /// Which part of the shorter is in the other.
-        share: f64,
-    },
     /// Too few recordings to leave one out.
     #[error("{recordings} recordings are too few to leave one out: {needed} or more are needed")]
     TooFew {

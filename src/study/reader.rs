@@ -53,7 +53,7 @@ impl Reader<'_> {
     ) -> Result<Vec<Recording>, FileError> {
         let (recordings, report) =
             recordings::read(paths, &ReadOptions { rate_hz, ..ReadOptions::default() })?;
-        self.doubt(report.doubts());
+        self.doubt(report.all_warnings());
         report.files.iter().for_each(|file| self.observer.remark(&Remark::detail(file)));
         Ok(recordings)
     }

@@ -1,8 +1,8 @@
 //! Units and plausibility of the signals.
 
-use super::FileReport;
 use super::error::{no_unit, storage};
 use super::header::{Role, Unit};
+use super::report::FileReport;
 use super::table::{Column, Raw};
 use super::values::Values;
 use crate::formats::{FileError, Place, Setting};
@@ -12,31 +12,19 @@ use nav_sim_signal::units::STANDARD_GRAVITY;
 use std::io;
 use std::ops::Range;
 
-/// From so many samples of one value on, and such a share of the record, a signal stands still.
-const LONG_STANDING: usize = 100;
-const LONG_SHARE: f64 = 0.1;
 /// Below this (m/s²) the mean was removed before: nothing to be learnt from it.
 const NO_GRAVITY: f64 = 0.3;
 
-/// What brings each column to SI units; refuses dead axes, tells those that stand still for long.
-pub(super) fn factors(raw: &Raw, rate_hz: f64, report: &mut FileReport) -> Result<Vec<f64>, FileError> {
+/// What brings each column to SI units; refuses dead axes.
+pub(super) fn factors(raw: &Raw, rate_hz: f64) -> Result<Vec<f64>, FileError> {
     let from_gravity = gravity_factor(raw)?;
     let factor = |column: &Column| {
         let Role::Signal { channel, unit } = column.role else { return Ok(1.0) };
-        let Standing { first, count, value } = standing(&column.values).map_err(storage(&raw.path))?;
-        let all = column.values.len();
-        if count == all && all > 1 {
+        if let Some(value) = only_value(&column.values).map_err(storage(&raw.path))? {
             let message = format!("{channel} (column \"{}\") is dead: every sample is {value}", column.name);
             return Err(FileError::contents(raw.path.as_str(), Place::Within, message)
                 .setting(Setting::Channels)
                 .advice("record again"));
-        }
-        if count >= LONG_STANDING && count as f64 > LONG_SHARE * all as f64 {
-            let (percent, line) = (100.0 * count as f64 / all as f64, raw.lines.of(first));
-            report.warn(format!(
-                "{channel} (column \"{}\") stands at {value} for {percent:.0} % of the record, from line {line} on",
-                column.name
-            ));
         }
         Ok(match unit {
             Unit::Si(factor) => factor,
@@ -70,29 +58,55 @@ pub(in crate::formats) fn gravity_factor(raw: &Raw) -> Result<f64, FileError> {
     Err(no_unit(&raw.path, raw.lines.of(0).saturating_sub(1).max(1), &first.name))
 }
 
-/// The longest stretch of one value.
-#[derive(Debug, Clone, Copy, Default)]
-struct Standing {
-    first: usize,
-    count: usize,
-    value: f64,
+/// The value of all samples, if two or more have the same.
+fn only_value(values: &Values) -> io::Result<Option<f64>> {
+    let (mut first, mut is_same) = (None, values.len() > 1);
+    values.each_block(0..values.len(), |block| {
+        let first = first.get_or_insert(block[0]).to_bits();
+        is_same &= block.iter().all(|value| value.to_bits() == first);
+    })?;
+    Ok(first.filter(|_| is_same))
 }
 
-fn standing(values: &Values) -> io::Result<Standing> {
-    let (mut longest, mut last, mut sample) = (Standing::default(), Standing::default(), 0);
-    values.each_block(0..values.len(), |block| {
-        for &value in block {
-            if last.count == 0 || value.to_bits() != last.value.to_bits() {
-                last = Standing { first: sample, count: 0, value };
+/// Warns of axes whose samples pile up at an end of their range. Noise that is quantized, however coarsely, has fewer
+/// values at its ends than next to them.
+pub(super) fn clipped(raw: &Raw, report: &mut FileReport) -> Result<(), FileError> {
+    const SHARE: f64 = 0.01;
+    const FEWEST: usize = 20;
+    for column in &raw.columns {
+        let Some(channel) = column.channel() else { continue };
+        let rows = column.values.len() as f64;
+        let ends = [1.0, -1.0].map(|side| outermost(&column.values, side));
+        let [high, low] = ends.map(|end| end.map_err(storage(&raw.path)));
+        let (high, low) = (high?, low?);
+        let has_four_values = -low[1].0 < high[1].0;
+        for (side, [end, next]) in [(1.0, high), (-1.0, low)] {
+            let share = end.1 as f64 / rows;
+            if has_four_values && end.1 >= FEWEST && share > SHARE && end.1 > 4 * next.1 {
+                let (value, percent) = (side * end.0, 100.0 * share);
+                report.warn(format!(
+                    "{channel} is clipped: {percent:.0} % of the rows are {value}, its extreme"
+                ));
             }
-            last.count += 1;
-            sample += 1;
-            if last.count > longest.count {
-                longest = last;
+        }
+    }
+    Ok(())
+}
+
+/// The two outermost values on a side (times ±1), and how often each comes.
+fn outermost(values: &Values, side: f64) -> io::Result<[(f64, usize); 2]> {
+    let mut ends = [(f64::NEG_INFINITY, 0); 2];
+    values.each_block(0..values.len(), |block| {
+        for value in block.iter().map(|value| value * side) {
+            match ends.iter().position(|end| end.0 == value) {
+                Some(known) => ends[known].1 += 1,
+                None if value > ends[0].0 => ends = [(value, 1), ends[0]],
+                None if value > ends[1].0 => ends[1] = (value, 1),
+                None => {}
             }
         }
     })?;
-    Ok(longest)
+    Ok(ends)
 }
 
 /// The mean of a stretch times a factor, summed about the first of them so that a large offset costs no digits.
@@ -110,23 +124,16 @@ fn norm(vector: &[f64]) -> f64 {
 }
 
 /// Static specific force is gravity, or nothing where the mean was removed before; rates are small.
-pub(super) fn plausible(
-    means: &[(Channel, f64)],
-    rate_hz: f64,
-    report: &mut FileReport,
-) -> Result<(), FileError> {
-    /// Room for local gravity, a scale error and a bias of 30 mg.
-    const NEAR: f64 = 0.03;
+pub(super) fn plausible(means: &[(Channel, f64)], report: &mut FileReport) -> Result<(), FileError> {
     let means_of_sensor = |sensor| -> Vec<f64> {
         means.iter().filter(|(channel, _)| channel.sensor == sensor).map(|(_, mean)| *mean).collect()
     };
     let (accel, gyro) = (means_of_sensor(Sensor::Accel), means_of_sensor(Sensor::Gyro));
     let is_gravity = |mean: &[f64]| (norm(mean) / STANDARD_GRAVITY - 1.0).abs() < 0.1;
     if accel.len() == 3 && gyro.len() == 3 && norm(&accel) < NO_GRAVITY && is_gravity(&gyro) {
+        let (f, rate) = (norm(&accel), norm(&gyro));
         let message = format!(
-            "static |f| is {:.4} m/s² and the mean angular rate {:.4} rad/s: accelerometers and gyroscopes are exchanged",
-            norm(&accel),
-            norm(&gyro)
+            "accelerometers and gyroscopes are exchanged: |f| is {f:.4} m/s², the mean rate {rate:.4} rad/s"
         );
         return Err(FileError::contents(report.file.as_str(), Place::Within, message)
             .advice("without names the first three columns are the accelerometers")
@@ -134,14 +141,6 @@ pub(super) fn plausible(
     }
     if accel.len() == 3 {
         check_gravity(&report.file, norm(&accel))?;
-        let in_an_interval = STANDARD_GRAVITY / rate_hz;
-        if (norm(&accel) / in_an_interval - 1.0).abs() < NEAR && (rate_hz - 1.0).abs() > NEAR {
-            report.warn(format!(
-                "static |f| is {:.4} m/s², which is what gravity adds in one sample interval: increments named as \
-                 rates? Name the columns dv_x_m_s, … and dtheta_x_rad, …",
-                norm(&accel)
-            ));
-        }
     }
     if norm(&gyro) > 0.1 {
         let degrees = norm(&gyro).to_degrees();

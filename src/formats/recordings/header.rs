@@ -13,8 +13,6 @@
 //! | loggers | `ax_mps2`, `gx_radps`, `gyro_x_dps`, `acc_x [mg]`, … |
 
 use super::error::{COLUMNS, no_unit, shown};
-use super::table::Column;
-use super::values::Values;
 use crate::formats::{FileError, Kind, Setting};
 use nav_sim_signal::imu::{Axis, Channel, Sensor};
 use nav_sim_signal::units::{DEG, DEG_PER_HOUR, STANDARD_GRAVITY};
@@ -245,12 +243,6 @@ fn stem_axis(stem: &str, sensor: Sensor) -> Option<(Axis, bool)> {
 }
 
 impl Layout {
-    /// Where each column stands in a row, and the columns, empty.
-    pub(super) fn columns(&self) -> (Vec<usize>, Vec<Column>) {
-        let empty = |f: &Found| Column { name: f.name.clone(), role: f.role, values: Values::default() };
-        self.found.iter().map(|f| (f.index, empty(f))).unzip()
-    }
-
     /// The columns with a meaning among `names`, of the `wanted` channels (all if none are given).
     pub(super) fn new(
         place: HeaderPlace<'_>,

@@ -1,47 +1,6 @@
-//! The bytes of a text table, made plain for its reader: blanks that align its columns, a last line that does not end.
+//! The bytes of a table whose columns are aligned by blanks.
 
-use std::cell::Cell;
 use std::io::{Read, Result};
-use std::rc::Rc;
-
-/// Where the bytes of a file end in a line that does not, once they are all read.
-pub(super) type OpenAt = Rc<Cell<Option<u64>>>;
-
-/// The bytes, with a line end after a last line that has none.
-pub(super) struct Ended<R> {
-    inner: R,
-    read: u64,
-    last: u8,
-    open_at: OpenAt,
-}
-
-impl<R: Read> Ended<R> {
-    pub(super) fn new(inner: R) -> (Self, OpenAt) {
-        let open_at = OpenAt::default();
-        (Self { inner, read: 0, last: b'\n', open_at: Rc::clone(&open_at) }, open_at)
-    }
-}
-
-impl<R: Read> Read for Ended<R> {
-    fn read(&mut self, buffer: &mut [u8]) -> Result<usize> {
-        if buffer.is_empty() {
-            return Ok(0);
-        }
-        let count = self.inner.read(buffer)?;
-        if count > 0 {
-            self.read += count as u64;
-            self.last = buffer[count - 1];
-            return Ok(count);
-        }
-        if b"\r\n".contains(&self.last) {
-            return Ok(0);
-        }
-        self.open_at.set(Some(self.read));
-        self.last = b'\n';
-        buffer[0] = b'\n';
-        Ok(1)
-    }
-}
 
 /// The bytes with one blank for several, and none at the beginning of a line.
 pub(super) struct Blanks<R> {
@@ -85,16 +44,6 @@ mod tests {
         let mut text = String::new();
         reader.read_to_string(&mut text).unwrap();
         text
-    }
-
-    #[test]
-    fn a_line_that_does_not_end_is_ended_and_told() {
-        for (text, expected, open) in
-            [("a\nb", "a\nb\n", Some(3)), ("a\n", "a\n", None), ("a\r\n", "a\r\n", None), ("", "", None)]
-        {
-            let (reader, open_at) = Ended::new(text.as_bytes());
-            assert_eq!((all(reader).as_str(), open_at.get()), (expected, open));
-        }
     }
 
     #[test]

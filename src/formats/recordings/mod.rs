@@ -7,83 +7,35 @@
 
 pub(crate) mod header;
 
+mod array;
 pub(in crate::formats) mod checks;
 pub(in crate::formats) mod error;
 mod files;
 mod lines;
 mod manifest;
+mod options;
 mod prepared;
-mod repeats;
 mod report;
 mod table;
 mod text;
-mod texture;
 pub(in crate::formats) mod time_unit;
 pub(in crate::formats) mod timing;
-mod unused;
 mod values;
 mod write;
 
 pub(crate) use files::{is_recording, listed};
+pub use options::{Gaps, ReadOptions};
 pub use report::{FileReport, Report};
 pub use write::FileFormat;
 
-pub(in crate::formats) use table::{Raw, load};
+pub(in crate::formats) use table::Raw;
 
 use super::{FileError, Kind};
 use error::no_files;
-use nav_sim_signal::imu::{Channel, Recording};
+use nav_sim_signal::imu::Recording;
 use prepared::Prepared;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
-
-/// How recordings are read.
-#[derive(Debug, Clone)]
-pub struct ReadOptions {
-    /// Sample rate (Hz) for files without a time column; where there is one, it must agree within 1 %, and wins where
-    /// gaps are ignored.
-    pub rate_hz: Option<f64>,
-    /// Seconds to leave out at the beginning (warm-up).
-    pub skip_s: f64,
-    /// What to do where the time jumps or stands still.
-    pub gaps: Gaps,
-    /// The channels wanted; none: all. Others are neither parsed nor checked nor held in memory.
-    pub channels: Option<Vec<Channel>>,
-    /// Names of the columns, for files without a header and instead of the header of those with one.
-    pub columns: Option<Vec<String>>,
-    /// Fewest samples a recording must have (at least 2).
-    pub min_samples: usize,
-    /// Bytes of one file's samples that are held in memory (512 MiB); those of a longer one wait in a temporary file.
-    pub hold_bytes: usize,
-}
-
-impl Default for ReadOptions {
-    fn default() -> Self {
-        Self {
-            rate_hz: None,
-            skip_s: 0.0,
-            gaps: Gaps::default(),
-            channels: None,
-            columns: None,
-            min_samples: 2,
-            hold_bytes: 512 << 20,
-        }
-    }
-}
-
-/// What to do where a time step is over 1.5 or under 0.5 of the median step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Gaps {
-    /// Refuse the file.
-    #[default]
-    Refuse,
-    /// Make each stretch between such steps a recording of its own.
-    Split,
-    /// Take the samples as evenly spaced over the whole time all the same (late stamps, not lost samples).
-    Ignore,
-}
-
-nav_sim_signal::named!(Gaps { Refuse = "refuse", Split = "split", Ignore = "ignore" });
 
 /// Reads recordings; those of a directory in name order (numbers in names by value). All are held.
 ///
@@ -159,6 +111,15 @@ fn held<T>(
         return Ok((report, Vec::new(), Some(prepared)));
     }
     Ok((report, prepared.recordings()?.into_iter().map(look).collect(), None))
+}
+
+/// Reads a file's columns.
+pub(in crate::formats) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError> {
+    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) {
+        array::load(path, options)
+    } else {
+        text::load(path, options)
+    }
 }
 
 #[cfg(test)]

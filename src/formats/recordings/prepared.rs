@@ -1,11 +1,12 @@
 //! A file whose time, units and stretches are decided: what is left is to take its samples.
 
+use super::checks;
 use super::error::{storage, too_short};
 use super::header::Role;
-use super::report::name_of;
+use super::options::ReadOptions;
+use super::report::{FileReport, name_of};
 use super::table::{Column, Raw};
 use super::timing::{self, Timing};
-use super::{FileReport, ReadOptions, checks, repeats, texture};
 use crate::formats::{FileError, Place, Setting};
 use nav_sim_signal::imu::{Channel, Recording, Signal};
 use std::ops::Range;
@@ -36,9 +37,8 @@ impl Prepared {
         let timing = timing::timing(&mut raw, options, &mut report)?;
         raw.columns.retain(|c| matches!(c.role, Role::Signal { .. }));
         raw.columns.sort_by_key(|c| c.channel().map(Channel::index));
-        let factors = checks::factors(&raw, timing.rate_hz, &mut report)?;
-        texture::doubts(&raw, &factors, &mut report)?;
-        repeats::doubts(&raw, &mut report)?;
+        let factors = checks::factors(&raw, timing.rate_hz)?;
+        checks::clipped(&raw, &mut report)?;
         let samples = raw.columns.first().map_or(0, |c| c.values.len());
         let pieces = pieces(&raw.path, samples, &timing, options, &mut report)?;
         let stored = storage(&raw.path);
@@ -51,7 +51,7 @@ impl Prepared {
         }
         let means_of = |i| columns.iter().map(|c| (c.channel, c.means[i])).collect::<Vec<_>>();
         for i in 0..pieces.len() {
-            checks::plausible(&means_of(i), timing.rate_hz, &mut report)?;
+            checks::plausible(&means_of(i), &mut report)?;
         }
         report.samples = pieces.iter().map(Range::len).collect();
         report.rate_hz = timing.rate_hz;

@@ -1,9 +1,7 @@
 //! What was found in the files, for the user to check.
 
-use super::header::{self, Role, Unit};
-use super::repeats::{self, Sketch};
+use super::header::{Role, Unit};
 use super::table::{Column, Raw};
-use crate::formats::suggest::nearest;
 use crate::report::six_digits;
 use nav_sim_signal::imu::{Channel, Sensor};
 use std::fmt;
@@ -30,28 +28,6 @@ impl Report {
         let assumed = self.files.iter().any(|f| !f.assumptions.is_empty());
         let assumed = if assumed { ", with assumptions" } else { "" };
         format!("{} recordings at {rate_hz} Hz, {length}{assumed}", self.files.len())
-    }
-
-    /// The first two files that have samples in common, wherever these stand in them, and about which share of the
-    /// shorter is in the other.
-    pub(crate) fn overlap(&self) -> Option<(&str, &str, f64)> {
-        let pairs =
-            self.files.iter().enumerate().flat_map(|(i, b)| self.files[..i].iter().map(move |a| (a, b)));
-        pairs.into_iter().find_map(|(a, b)| {
-            let jaccard = repeats::jaccard(&a.sketches, &b.sketches)?;
-            let [shorter, longer] = if a.count() <= b.count() { [a, b] } else { [b, a] };
-            // What is common is J/(1 + J) of all samples of both.
-            let both = 1.0 + longer.count() as f64 / shorter.count().max(1) as f64;
-            let share = (both * jaccard / (1.0 + jaccard)).min(1.0);
-            Some((a.file.as_str(), b.file.as_str(), share))
-        })
-    }
-
-    /// Every doubt, and which files have samples in common.
-    pub(crate) fn doubts(&self) -> Vec<String> {
-        let common =
-            self.overlap().map(|(one, other, _)| format!("{other} and {one} have samples in common"));
-        self.all_warnings().into_iter().chain(common).collect()
     }
 
     /// Every doubt, those about a file with its name.
@@ -87,8 +63,6 @@ pub struct FileReport {
     pub assumptions: Vec<String>,
     /// Doubts, in words.
     pub warnings: Vec<String>,
-    /// What tells the samples of each column from others.
-    pub(super) sketches: Vec<(Channel, Sketch)>,
 }
 
 /// The name of one of the recordings of a file.
@@ -111,15 +85,6 @@ impl FileReport {
             warnings: raw.notes.warnings.clone(),
             ..Self::default()
         };
-        let has = |channel: Channel| raw.columns.iter().any(|c| c.channel() == Some(channel));
-        let missing: Vec<String> =
-            Channel::ALL.into_iter().filter(|c| !has(*c)).map(header::column_name).collect();
-        // One that means something was not asked for.
-        for name in raw.ignored.iter().filter(|name| header::classify(name, true).is_none()) {
-            if let Some(meant) = nearest(name, missing.iter().map(String::as_str)) {
-                report.warn(format!("column \"{name}\" is passed over: is it {meant}?"));
-            }
-        }
         let increments = |c: &Column| matches!(c.role, Role::Signal { unit: Unit::Increment(_), .. });
         if raw.columns.iter().any(increments) {
             report.assumptions.push("increments divided by the sample interval".into());

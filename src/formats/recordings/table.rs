@@ -1,13 +1,9 @@
 //! A file as columns of numbers, before anything is decided about time and units.
 
-use super::error::{COLUMNS, sample, storage};
-use super::header::{self, HeaderPlace, Role};
-use super::manifest::{MANIFEST, Manifest};
+use super::header::{Found, Layout, Role};
+use super::options::ReadOptions;
 use super::values::Values;
-use super::{ReadOptions, text};
-use crate::formats::{FileError, Place, Setting, npy};
 use nav_sim_signal::imu::Channel;
-use std::path::Path;
 
 /// A file's columns as found, before anything is decided about time and units.
 #[derive(Debug)]
@@ -48,6 +44,12 @@ impl Column {
     }
 }
 
+/// Where each column of a layout stands in a row, and the columns, empty.
+pub(super) fn empty_columns(layout: &Layout) -> (Vec<usize>, Vec<Column>) {
+    let empty = |f: &Found| Column { name: f.name.clone(), role: f.role, values: Values::default() };
+    layout.found.iter().map(|f| (f.index, empty(f))).unzip()
+}
+
 /// Which line of the file each sample stands on.
 #[derive(Debug, Default)]
 pub(crate) struct Lines {
@@ -77,74 +79,6 @@ impl Lines {
 /// Beyond this a number is no measurement, and its square may be no number.
 pub(super) const LARGEST: f64 = 1e100;
 pub(super) const BEYOND: &str = "is beyond 1e100, no measurement";
-
-/// Reads a file's columns.
-pub(crate) fn load(path: &Path, options: &ReadOptions) -> Result<Raw, FileError> {
-    if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy")) {
-        load_npy(path, options)
-    } else {
-        text::load(path, options)
-    }
-}
-
-fn load_npy(path: &Path, options: &ReadOptions) -> Result<Raw, FileError> {
-    let name = path.display().to_string();
-    let array = npy::open(path)?;
-    let expected = array.columns();
-    let manifest = Manifest::beside(path);
-    let names = match &options.columns {
-        Some(names) => names.clone(),
-        None => {
-            let said = manifest.as_ref().and_then(|manifest| manifest.columns(expected));
-            said.or_else(|| header::npy_order(expected)).ok_or_else(|| unnamed(&name, expected))?
-        }
-    };
-    if names.len() != expected {
-        return Err(FileError::row_length(&name, 1, expected, names.len()));
-    }
-    let place = HeaderPlace { path: &name, line: 1 };
-    let layout = header::Layout::new(place, &names, false, options.channels.as_deref())?;
-    let (indices, mut columns) = layout.columns();
-    let place: Vec<Option<usize>> =
-        (0..expected).map(|index| indices.iter().position(|i| *i == index)).collect();
-    let stored = storage(&name);
-    let mut count = 0;
-    array.each(|row, index, value| {
-        let Some(target) = place[index] else { return Ok(()) };
-        if !value.is_finite() || value.abs() > LARGEST {
-            return Err(not_a_measurement(&name, row as u64 + 1, &columns[target].name, value));
-        }
-        if count % BETWEEN == 0 {
-            relieve(&mut columns, options).map_err(&stored)?;
-        }
-        count += 1;
-        columns[target].values.push(value);
-        Ok(())
-    })?;
-    settle(&mut columns, options).map_err(&stored)?;
-    Ok(Raw {
-        path: name.clone(),
-        columns,
-        ignored: layout.ignored,
-        head_rate: manifest.map(|manifest| (manifest.rate_hz, MANIFEST)),
-        lines: Lines::default(),
-        notes: Notes::default(),
-    })
-}
-
-/// An array whose columns are not known.
-fn unnamed(path: &str, columns: usize) -> FileError {
-    let message = format!("an array of {columns} columns, which names are not known");
-    FileError::contents(path, Place::Within, message).advice(COLUMNS).setting(Setting::ColumnNames)
-}
-
-fn not_a_measurement(path: &str, line: u64, column: &str, value: f64) -> FileError {
-    if value.is_finite() {
-        sample(path, line, column, &format!("{value:e}"), BEYOND)
-    } else {
-        sample(path, line, column, &format!("\"{value}\""), "is not finite")
-    }
-}
 
 /// So many rows, or elements, come between one look at what is held and the next.
 pub(super) const BETWEEN: usize = 1 << 16;

@@ -6,7 +6,7 @@ mod texts;
 
 use super::*;
 use crate::formats::npy;
-use nav_sim_signal::imu::Signal;
+use nav_sim_signal::imu::{Channel, Signal};
 use nav_sim_signal::units::{DEG, STANDARD_GRAVITY};
 use std::fs;
 use tempfile::TempDir;

@@ -1,11 +1,10 @@
 //! Text tables: comment head, header, rows.
 
-use super::ReadOptions;
 use super::error::{COLUMNS, empty, sample, shown, storage, unreadable};
 use super::header::{HeaderPlace, Layout, Role, classify};
-use super::lines::{Blanks, Ended};
-use super::table::{BETWEEN, BEYOND, Column, LARGEST, Lines, Notes, Raw, relieve, settle};
-use super::unused::Unused;
+use super::lines::Blanks;
+use super::options::ReadOptions;
+use super::table::{BETWEEN, BEYOND, Column, LARGEST, Lines, Notes, Raw, empty_columns, relieve, settle};
 use super::values::Values;
 use crate::formats::error::decimal_comma;
 use crate::formats::{FileError, Kind, Place, Setting, source};
@@ -41,7 +40,7 @@ pub(super) fn parse(name: &str, mut reader: Reader, options: &ReadOptions) -> Re
     let head = Head::read(name, &mut reader, options)?;
     let place = HeaderPlace { path: name, line: head.line };
     let layout = Layout::new(place, &head.names, head.xsens, options.channels.as_deref())?;
-    let (indices, mut columns) = layout.columns();
+    let (indices, mut columns) = empty_columns(&layout);
     let mut notes = Notes::default();
     if head.is_latin_1 && options.columns.is_none() {
         notes.assumptions.push("header not in UTF-8, taken as ISO-8859-1".to_owned());
@@ -195,7 +194,6 @@ fn read_rows(
     let rows = Cursor::new(head.first_row.clone()).chain(reader);
     let rows: Box<dyn Read> =
         if head.delimiter == b' ' { Box::new(Blanks::new(rows)) } else { Box::new(rows) };
-    let (rows, open_at) = Ended::new(rows);
     let mut rows = csv::ReaderBuilder::new()
         .has_headers(false)
         .flexible(true)
@@ -203,16 +201,10 @@ fn read_rows(
         .buffer_capacity(BUFFER)
         .from_reader(rows);
     let (mut lines, mut record, mut sample) = (Lines::default(), csv::ByteRecord::new(), 0);
-    let (mut shortest, mut largest, mut has_units) = (0, f64::INFINITY, false);
+    let mut has_units = false;
     let expected = head.names.len();
-    let has_clock = columns.iter().any(|c| !matches!(c.role, Role::Signal { .. }));
-    let mut unused = Unused::new((0..expected).filter(|i| !has_clock && !indices.contains(i)));
-    loop {
-        match rows.read_byte_record(&mut record) {
-            Ok(true) => {}
-            Ok(false) => break,
-            Err(e) => return Err(unreadable(Path::new(name), of_csv(e))),
-        }
+    let cannot = |e| unreadable(Path::new(name), of_csv(e));
+    while rows.read_byte_record(&mut record).map_err(cannot)? {
         let line = head.lines_before + line_of(&record, rows.position().line());
         let found = record.len();
         if sample == 0 && !has_units && found == expected && is_words(&record) {
@@ -220,24 +212,16 @@ fn read_rows(
             notes.assumptions.push(format!("line {line} has words and no numbers: passed over"));
             continue;
         }
-        let last_used = found == expected && indices.contains(&(expected - 1));
-        let last = record.get(expected - 1).filter(|_| last_used).unwrap_or(b"0");
-        let (length, size) = (length_of(last), number(last).map_or(f64::INFINITY, f64::abs));
-        // A number that was cut off is another number: `5.1e-0` of `5.1e-04`, `9` of `9.81`. It has fewer characters than all before,
-        // or, where these are of many lengths, another size without its exponent.
-        let is_cut = || found < expected || length < shortest || size > TEN_TIMES * largest;
-        if open_at.get().is_some_and(|end| rows.position().byte() > end) && is_cut() {
-            notes.assumptions.push(format!("line {line}, the last, does not end and may be cut: left out"));
-            break;
-        }
-        let is_first = sample == 0;
-        shortest = if is_first { length } else { shortest.min(length) };
-        largest = if is_first { size } else { largest.max(size) };
         let trailing =
             found == expected + 1 && record.get(expected).is_some_and(|c| c.trim_ascii().is_empty());
         if found != expected && !trailing {
             if record.iter().all(|c| c.trim_ascii().is_empty()) {
                 continue;
+            }
+            // a logger that lost its power within a row
+            if found < expected && sample > 0 && !rows.read_byte_record(&mut record).map_err(cannot)? {
+                notes.assumptions.push(format!("line {line}, the last, is cut off: left out"));
+                break;
             }
             return Err(FileError::row_length(name, line, found, expected));
         }
@@ -253,11 +237,9 @@ fn read_rows(
                 parsed => return Err(bad_cell(name, line, &column.name, cell, parsed)),
             }
         }
-        unused.look(&record);
         lines.push(sample, line);
         sample += 1;
     }
-    unused.tell(&head.names, notes);
     Ok(lines)
 }
 
@@ -268,15 +250,6 @@ fn is_words(record: &csv::ByteRecord) -> bool {
         number(cell).is_none() && begins(cell).is_none_or(|b| !b.is_ascii_digit() && !b"+-.".contains(&b))
     };
     record.iter().all(is_word) && record.iter().any(|cell| begins(cell).is_some())
-}
-
-/// A number so many times as large as any before is not of its column.
-const TEN_TIMES: f64 = 10.0;
-
-/// Characters of a number without its sign.
-fn length_of(cell: &[u8]) -> usize {
-    let cell = cell.trim_ascii();
-    cell.len() - usize::from(cell.starts_with(b"-") || cell.starts_with(b"+"))
 }
 
 /// What the system said, with its kind.

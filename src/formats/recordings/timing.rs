@@ -2,15 +2,13 @@
 
 use super::error::{storage, too_short};
 use super::header::Role;
+use super::options::{Gaps, ReadOptions};
+use super::report::FileReport;
 use super::table::{Column, Raw};
-use super::time_unit::{Guess, UNITS};
+use super::time_unit::{Guess, UNITS, USUAL_RATES_HZ};
 use super::values::Values;
-use super::{FileReport, Gaps, ReadOptions};
 use crate::formats::{FileError, Place, Setting};
 use crate::report::six_digits;
-
-/// Rates beyond these are looked at twice (Hz).
-pub(super) const USUAL_RATES_HZ: std::ops::RangeInclusive<f64> = 0.5..=20_000.0;
 
 /// All numbers of a column.
 fn of_file(raw: &Raw, values: Values) -> Result<Vec<f64>, FileError> {
@@ -105,17 +103,15 @@ fn doubt(timing: &Checked, column: &str, raw: &Raw, options: &ReadOptions, repor
         let n = timing.breaks.len();
         report.warn(match options.gaps {
             Gaps::Ignore => {
-                let mut text = format!("{n} gaps or duplicates in time ignored, the first in line {first}");
                 // Lost samples lengthen the span, late stamps do not.
                 let is_other = (timing.step_hz / timing.found_hz - 1.0).abs() > DISAGREEING;
-                if is_other && options.rate_hz.is_none() {
+                let rates = if is_other && options.rate_hz.is_none() {
                     let (span, step) = (six_digits(timing.found_hz), six_digits(timing.step_hz));
-                    text += &format!(
-                        "; the rate over the whole is {span} Hz, that of the median step {step} Hz: were samples lost, give \
-                         the rate (--rate-hz), or split the recording (--gaps split)"
-                    );
-                }
-                text
+                    format!("; {span} Hz over the whole, {step} Hz by the median step")
+                } else {
+                    String::new()
+                };
+                format!("{n} gaps or duplicates in time ignored, the first in line {first}{rates}")
             }
             _ => format!("split at {n} gaps or duplicates in time, the first in line {first}"),
         });

@@ -11,25 +11,16 @@ fn doubts_are_told() {
     };
     // seven levels in an order that does not come again
     let level = |k: usize| (k * k % 1009 % 7) as f64 * 1e-3;
-    let rows = |step: f64, stands_from: usize| {
-        let value = |k: usize| level(k.min(stands_from));
+    let rows = |step: f64| {
         (0..1000)
-            .map(|k| format!("{},{},{}\n", k as f64 * step, value(k), (k % 5) as f64))
+            .map(|k| format!("{},{},{}\n", k as f64 * step, level(k), (k % 5) as f64))
             .collect::<String>()
     };
     let plain = ReadOptions::default();
-    assert_eq!(warnings(&format!("t_s,gyro_x_rad_s,temperature\n{}", rows(0.01, 1000)), &plain), [""; 0]);
+    assert_eq!(warnings(&format!("t_s,gyro_x_rad_s,temperature\n{}", rows(0.01)), &plain), [""; 0]);
     assert_eq!(
-        warnings(&format!("t_s,gyro_x_rad_s,gryo_y_rad_s\n{}", rows(0.01, 1000)), &plain),
-        ["column \"gryo_y_rad_s\" is passed over: is it gyro_y_rad_s?"]
-    );
-    assert_eq!(
-        warnings(&format!("t_s,gyro_x_rad_s,b\n{}", rows(10.0, 1000)), &plain),
+        warnings(&format!("t_s,gyro_x_rad_s,b\n{}", rows(10.0)), &plain),
         ["0.1 Hz is no usual rate of an IMU: is the unit of \"t_s\" right?"]
-    );
-    assert_eq!(
-        warnings(&format!("t_s,gyro_x_rad_s,b\n{}", rows(0.01, 249)), &plain),
-        ["gyro.x (column \"gyro_x_rad_s\") stands at 0.004 for 75 % of the record, from line 251 on"]
     );
     // A stretch of 30 beside one of 969 would cost all the long scales.
     let gap = |k: usize| k as f64 * 0.01 + if k >= 970 { 1.0 } else { 0.0 };
@@ -66,10 +57,9 @@ fn warnings_of(rows: &[String]) -> Vec<String> {
     read(&[path], &at_100_hz()).unwrap().1.files.remove(0).warnings
 }
 
-/// What no sensor gives though every number is one. Sound samples, quantized ones and such of which an axis has
-/// three levels only raise none of these doubts.
+/// Sound samples, quantized ones and such of which an axis has three levels only are not clipped.
 #[test]
-fn numbers_that_no_sensor_gives_are_told() {
+fn clipped_axes_are_told() {
     let sound = triads(4000, |_, v| v);
     assert_eq!(warnings_of(&sound), [""; 0]);
     for (accel, gyro) in [(0.01, 5e-4), (0.04, 2e-3)] {
@@ -77,71 +67,14 @@ fn numbers_that_no_sensor_gives_are_told() {
         let coarse = triads(4000, |_, v| std::array::from_fn(|i| (v[i] / steps[i]).round() * steps[i]));
         assert_eq!(warnings_of(&coarse), [""; 0]);
     }
-    let twice: Vec<String> = sound.iter().flat_map(|row| [row.clone(), row.clone()]).collect();
-    let said = warnings_of(&twice);
-    assert_eq!(said.len(), 1, "{said:?}");
-    assert!(
-        said[0].starts_with("accel.x, accel.y, accel.z, gyro.x, gyro.y, gyro.z: of every 2 rows"),
-        "{said:?}"
-    );
-
-    let mut block = sound.clone();
-    block.splice(3000..3000, sound[1000..2000].to_vec());
-    assert_eq!(
-        warnings_of(&block),
-        ["lines 3002 to 4001 are the same as lines 1002 to 2001: a block written twice? Remove one of them"]
-    );
-
     let clipped = triads(4000, |_, mut v| {
         v[0] = v[0].min(0.11);
         v[1] = v[1].clamp(-0.21, -0.19);
         v
     });
     let said = warnings_of(&clipped);
-    assert_eq!(said.len(), 1, "{said:?}");
-    for part in [
-        "accel.x (column \"accel_x_m_s2\") stands at its largest value, 0.11, in 3",
-        "; accel.y (column \"accel_y_m_s2\") stands at its largest value, -0.19, in 3",
-        " and at its smallest value, -0.21, in 3",
-    ] {
-        assert!(said[0].contains(part), "{said:?}");
-    }
-
-    let x_in_g = triads(4000, |_, mut v| {
-        v[0] /= STANDARD_GRAVITY;
-        v
-    });
-    let said = warnings_of(&x_in_g);
-    assert_eq!(said.len(), 1, "{said:?}");
-    assert!(
-        said[0].starts_with("accel.x: its steps from row to row are 9.") && said[0].contains("smaller"),
-        "{said:?}"
-    );
-
-    let said = warnings_of(&triads(4000, |_, v| v.map(|v| v / 100.0)));
-    assert_eq!(said.len(), 1, "{said:?}");
-    assert!(said[0].contains("which is what gravity adds in one sample interval"), "{said:?}");
-}
-
-/// A copy of a recording is known by any large part of it, wherever it begins; other recordings share nothing.
-#[test]
-fn recordings_that_share_samples_are_known() {
-    let rows = triads(8000, |_, v| v);
-    let overlap = |a: &[String], b: &[String]| {
-        let files = Files::new();
-        let add = |name, rows: &[String]| files.add(name, format!("{TRIADS}{}\n", rows.join("\n")));
-        let paths = [add("a.csv", a), add("b.csv", b)];
-        read(&paths, &at_100_hz()).unwrap().1.overlap().map(|(_, _, share)| share)
-    };
-    assert_eq!(overlap(&rows[..4000], &rows[4000..]), None);
-    assert!(overlap(&rows[..4000], &rows[1..4000]).unwrap() > 0.95);
-    // a half: of 64 hashes 21 ± 4 are shared, a third of the union
-    let half = overlap(&rows[..4000], &rows[2000..6000]).unwrap();
-    assert!((0.2..0.8).contains(&half), "{half}");
-    // All of a file half as long: the union is shared by half ± 0.0625 (one standard deviation), J/(1 + J) of 6000
-    // samples; within three of these, 0.75 of the shorter at least.
-    let whole = overlap(&rows[..4000], &rows[1000..3000]).unwrap();
-    assert!((0.75..=1.0).contains(&whole), "{whole}");
+    let parts = ["accel.x is clipped: 3", " are 0.11", " are -0.19", " are -0.21"];
+    assert!(said.len() == 3 && parts.iter().all(|part| said.concat().contains(part)), "{said:?}");
 }
 
 #[test]

@@ -43,7 +43,7 @@ fn exchanged_sensors_are_refused() {
     }
     let (message, hint) = refusal_with("a.npy", &bytes, &at_100_hz());
     assert!(
-        message.starts_with("a.npy: static |f| is 0.000") && message.ends_with("gyroscopes are exchanged"),
+        message.starts_with("a.npy: accelerometers and gyroscopes are exchanged: |f| is 0.000"),
         "{message}"
     );
     assert!(hint.contains("give the names of the columns"), "{hint}");
