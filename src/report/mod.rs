@@ -54,8 +54,8 @@ pub(crate) trait Answer: Serialize {
 pub use nav_sim_document::readable;
 pub(crate) use nav_sim_document::{seconds, short_names, six_digits, window};
 pub(crate) use pages::{
-    PaperFigure, RatioCurves, STATES, ShownComparison, StudyCurves, choice_page, design_page,
-    efficiency_page, efficiency_svg, error_of, fusion_page, paper_figures, paper_page, run_svg, study_page,
+    PaperFigure, RatioCurves, ShownComparison, StudyCurves, choice_page, design_page, efficiency_page,
+    efficiency_svg, fusion_page, paper_figures, paper_page, run_svg, study_page,
 };
 pub(crate) use recording::{gnss_csv, imu_csv, initial_toml};
 pub use run_directory::{OutputFile, run_directory};

@@ -3,7 +3,7 @@
 use super::question::{BeyondLinear, CHECKED, Question};
 use crate::report::Answer;
 use nav_sim_document::{
-    Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, Tone, percent, readable,
+    Axis, Cell, Chart, Colour, Document, Importance, Panel, Series, Table, Tone, percent, readable,
 };
 use nav_sim_navigation::require::{Answer as Bound, IMU_PARAMETERS, ImuParameters, IsoDrift, Worst};
 use serde::{Serialize, Serializer};
@@ -66,15 +66,6 @@ impl NeededImu {
         table
     }
 
-    fn shares_chart(&self) -> Chart {
-        let names = ImuParameters::NAMES.map(|name| name.split(" (").next().unwrap_or(name).to_owned());
-        let names = names.into_iter().chain(["GNSS and start".to_owned()]).collect();
-        let bars = self.shares.iter().enumerate().map(|(k, share)| (k as f64, 0.0, 100.0 * share)).collect();
-        let series = vec![Series::new("", Colour::BELIEVED, Mark::Bars(bars))];
-        let panel = Panel { height: 0.7, ..Panel::new(Axis::linear("share of the variance (%)"), series) };
-        Chart::new("What makes the error", Axis::names(names), vec![panel])
-    }
-
     fn iso_drift_section(&self, curve: &IsoDrift, document: &mut Document) {
         let beside = |i: usize| {
             let value = readable(ImuParameters::in_datasheets(i, self.imu.values[i]));
@@ -108,7 +99,7 @@ impl Answer for NeededImu {
     fn document(&self) -> Document {
         let gnss = percent(self.shares[IMU_PARAMETERS]);
         let lines = [
-            format!("needed for {}: the IMU below", self.question.in_words()),
+            format!("needed for {}", self.question.in_words()),
             format!("an IMU {}", self.turn_on_in_words()),
             format!("hardest: {}, where GNSS and start take {gnss}", self.question.worst(&self.worst)),
         ];
@@ -124,7 +115,6 @@ impl Answer for NeededImu {
         document.section("Figures, at most");
         document.text("If alone: without any other error of the IMU. Others 10 × better: every other figure ten times smaller.");
         document.lead(self.figures());
-        document.chart(&self.shares_chart(), "Parts of the variance at the limit.");
         if let Some(curve) = &self.iso_drift {
             self.iso_drift_section(curve, &mut document);
         }

@@ -74,7 +74,7 @@ impl Ranking {
         let missing = self.incomplete().len();
         if missing > 0 {
             lines.push(format!(
-                "{missing} units are not ranked: their data sheets leave figures out, which count as none"
+                "{missing} units are not ranked: their data sheets leave figures out (--verbose lists them)"
             ));
         }
         lines
@@ -128,9 +128,8 @@ impl Answer for Ranking {
         let columns = format!(
             "1 s … 300 s: {quantity} after such an outage; bridges: longest outage within the limits"
         );
-        document.note(Importance::Remark, columns.clone());
+        document.note(Importance::Remark, columns);
         document.section("Ranking");
-        document.text(&columns);
         document.lead(self.table(self.complete(), 0));
         document.chart(&drift_chart(self.question.curve_of(), self.curves()), DRIFT);
         if !self.incomplete().is_empty() {

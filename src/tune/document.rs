@@ -1,16 +1,16 @@
 //! Document of a tuning: factors and their cost, the filters beside one another, how sharp the answer is.
 
 use super::result::{TuneResult, kind};
-use crate::report::{Answer, STATES, error_of};
+use crate::report::Answer;
 use nav_sim_document::{
     Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, Tone, readable, seconds,
+    short_names,
 };
 use nav_sim_navigation::metrics::VerdictKind;
 use nav_sim_navigation::simulation::lincov::{Aim, FilterConsistency};
 use nav_sim_navigation::simulation::{NEES_DOF, REPORTED_NAMES};
 
 const SWEEP: &str = "The tuned filter with all its variances times a factor (1: as tuned). Cost: horizontal RMSE at the ends of outages against a filter that knows the truth.";
-const ENDS: &str = "True RMSE at the end of each outage, root mean square over the truths.";
 
 impl Answer for TuneResult {
     fn document(&self) -> Document {
@@ -28,11 +28,16 @@ impl Answer for TuneResult {
                 "no error exceeds its sigma in any truth; --for mean aims at the right NEES in the mean";
             document.note(Importance::Remark, why);
         }
+        if self.of_run.as_ref().is_some_and(|of_run| kind(of_run) == VerdictKind::Overconfident) {
+            let states = self.filter_of_run;
+            document.note(Importance::Remark, format!("--filter {states} tunes the default of run"));
+        }
         if self.is_drawn {
             let counted = "errors count up to the upper end of the 95 % interval that run states";
             document.note(Importance::Remark, counted);
         }
-        document.facts(&[("truths", self.truths.join(", "))]);
+        let truths: Vec<&str> = self.truths.iter().map(String::as_str).collect();
+        document.facts(&[("truths", short_names(&truths).join(", "))]);
         document.section("Filters");
         document.lead(self.table());
         document.text("RMSE/sigma: largest error over what the filter states. RMSE: horizontal, at the end of an outage.");
@@ -40,9 +45,6 @@ impl Answer for TuneResult {
         document.table(&self.factor_table());
         document.section("How sharp the answer is");
         document.chart(&self.sweep_chart(), SWEEP);
-        if !self.after.end_s.is_empty() {
-            document.charts(&self.ends(), ENDS);
-        }
         document.checked("covariance analysis against 2000 Monte-Carlo runs: docs/validation.md.");
         document
     }
@@ -113,21 +115,5 @@ impl TuneResult {
         }
         panels.iter_mut().for_each(|panel| panel.height = 0.7);
         Chart::new("Consistency and cost against the variances", Axis::log("factor on all variances"), panels)
-    }
-
-    /// A small chart a state: the RMSE of each filter at the ends of outages.
-    fn ends(&self) -> Vec<Chart> {
-        let names: Vec<String> = self.before.end_s.iter().map(|t| format!("{} s", seconds(*t))).collect();
-        let chart = |(state, name): (usize, &&str)| {
-            let series = self.filters().enumerate().map(|(hue, (filter, found))| {
-                let point = |(k, rmse): (usize, &[f64; STATES.len()])| {
-                    (k as f64 + 0.12 * (hue as f64 - 1.5), rmse[state], f64::NAN)
-                };
-                Series::points(filter, Colour::Hue(hue), found.rmse_end.iter().enumerate().map(point))
-            });
-            let panel = Panel::new(Axis::linear("").with_zero(), series.collect());
-            Chart::new(&error_of(name), Axis::names(names.clone()), vec![panel]).small()
-        };
-        STATES.iter().enumerate().map(chart).collect()
     }
 }

@@ -27,7 +27,7 @@ use nav_sim_navigation::metrics::VerdictKind;
 use nav_sim_navigation::simulation::REPORTED;
 
 /// The reported states and their units, in words.
-pub(crate) const STATES: [&str; REPORTED] = [
+const STATES: [&str; REPORTED] = [
     "position north (m)",
     "position east (m)",
     "position down (m)",
@@ -40,7 +40,7 @@ pub(crate) const STATES: [&str; REPORTED] = [
 ];
 
 /// A state as the title of a chart of its errors: `roll error (°)`.
-pub(crate) fn error_of(state: &str) -> String {
+fn error_of(state: &str) -> String {
     state.replacen(" (", " error (", 1)
 }
 
