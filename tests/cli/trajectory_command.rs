@@ -44,7 +44,7 @@ fn check_speaks_json_and_exits_with_3_beyond_a_limit() {
     let stretches = report["beyond_limits"].as_array().unwrap().len();
     let verdict = format!("error: {DRIVE}: the motion is beyond a limit in {stretches} stretch");
     assert!(err.starts_with(&format!("warning: {DRIVE}: {said}\n")) && err.contains(&verdict), "{err}");
-    assert!(err.contains("hint: a vehicle that does move so deserves larger limits (--limit-speed"), "{err}");
+    assert!(err.contains("hint: a vehicle that does move so deserves a larger --limit-speed"), "{err}");
     // both at once: each is named
     let (code, _, err) = trajectory(&["check", DRIVE, "--limit-speed", "24", "--max-position-m", "1e-9"]);
     assert!(code == 3 && err.contains("beyond 1e-9 m") && err.contains("; the motion is beyond"), "{err}");

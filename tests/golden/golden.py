@@ -30,7 +30,7 @@ HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 HASHES = HERE / "hashes.json"
 UNKNOWN_KEYS = {
-    "verdict", "throughput", "throughput_epochs_per_s", "wall_s", "command", "threads", "version", "program",
+    "verdict", "verdicts", "throughput", "throughput_epochs_per_s", "wall_s", "command", "threads", "version", "program",
     "processor_s", "processor_s_left", "run_s", "seconds",
 }
 HASH = re.compile(r"^[0-9a-f]{16,64}$")

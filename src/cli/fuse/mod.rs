@@ -4,7 +4,6 @@ mod inputs;
 mod output;
 
 use super::filter::FilterArgs;
-use super::parse::one_of;
 use super::pictures::PlotArgs;
 use super::run::{Words, parse_outage, windows_of};
 use super::{Failure, Printer, Session, parse};
@@ -73,9 +72,6 @@ pub(crate) struct Args {
     /// What the logger calls x, y, z; --mounting applies after this
     #[arg(long, value_name = "AXES", value_enum, default_value = "frd")]
     axes: inputs::LoggerAxes,
-    /// How gravity decreases with height: wgs84 (second order) or first-order
-    #[arg(long, value_name = "MODEL", value_parser = one_of::<GravityModel>(&GravityModel::NAMES), default_value = "wgs84")]
-    gravity: GravityModel,
     /// Reference trajectory to compare with; stretches where it jumps are left out
     #[arg(long, value_name = "TRAJECTORY")]
     reference: Option<PathBuf>,
@@ -168,7 +164,7 @@ fn settings(args: &Args) -> Result<Settings, Failure> {
         q_s_b: inputs::mounting(args.axes, args.mounting),
         mounting_sigma_b: args.mounting.map_or(glam::DVec3::ZERO, inputs::MountingArg::sigma_b),
         lever_arm_b,
-        gravity: args.gravity,
+        gravity: GravityModel::default(),
         outages: windows_of(&args.outages)?,
         nis_gate: args.nis_gate,
         rows_hz: args.rate_hz,

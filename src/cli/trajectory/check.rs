@@ -28,24 +28,9 @@ pub(super) struct Args {
     /// Bound on the position error of the closure (m)
     #[arg(long, value_name = "M", default_value_t = Bounds::default().position_m, value_parser = parse::positive)]
     max_position_m: f64,
-    /// Bound on the velocity error of the closure (m/s)
-    #[arg(long, value_name = "M_S", default_value_t = Bounds::default().velocity_m_s, value_parser = parse::positive)]
-    max_velocity_m_s: f64,
-    /// Bound on the attitude error of the closure (rad)
-    #[arg(long, value_name = "RAD", default_value_t = Bounds::default().attitude_rad, value_parser = parse::positive)]
-    max_attitude_rad: f64,
     /// Largest plausible speed (m/s)
     #[arg(long, value_name = "M_S", default_value_t = Limits::default().speed, value_parser = parse::positive)]
     limit_speed: f64,
-    /// Largest plausible acceleration (m/s²)
-    #[arg(long, value_name = "M_S2", default_value_t = Limits::default().acceleration, value_parser = parse::positive)]
-    limit_accel: f64,
-    /// Largest plausible change of acceleration over 0.1 s (m/s³)
-    #[arg(long, value_name = "M_S3", default_value_t = Limits::default().jerk, value_parser = parse::positive)]
-    limit_jerk: f64,
-    /// Largest plausible angular rate (deg/s)
-    #[arg(long, value_name = "DEG_S", default_value_t = Limits::default().rate / DEG, value_parser = parse::positive)]
-    limit_rate: f64,
 }
 
 /// Stretches beyond limits that are said one by one.
@@ -66,7 +51,8 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         .map_err(|e| Failure::input(format!("{name}: {e}")).hint("give another --rate-hz"))?;
     let found = (args.source.name(), warnings);
     let check = TrajectoryCheck::new(found, &trajectory, (largest, &beyond), (closure, args.bounds()));
-    let limits = [args.limit_speed, args.limit_accel, args.limit_jerk, args.limit_rate];
+    let Limits { speed, acceleration, jerk, rate } = args.limits();
+    let limits = [speed, acceleration, jerk, rate / DEG];
     session.show(|| crate::report::json(&check), || check.text(limits));
     match check.missed() {
         Some(missed) => Err(Failure::bound(missed).hint(hint(&check))),
@@ -78,19 +64,17 @@ pub(super) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 fn hint(check: &TrajectoryCheck) -> String {
     let closure = (!check.is_closed())
         .then_some("a higher --rate-hz closes better; rough motion may deserve a wider bound");
-    let motion = (!check.is_plausible())
-        .then_some("a vehicle that does move so deserves larger limits (--limit-speed, --limit-accel, --limit-jerk, --limit-rate)");
+    let motion =
+        (!check.is_plausible()).then_some("a vehicle that does move so deserves a larger --limit-speed");
     closure.into_iter().chain(motion).collect::<Vec<_>>().join("; ")
 }
 
 impl Args {
     fn limits(&self) -> Limits {
-        let (speed, acceleration) = (self.limit_speed, self.limit_accel);
-        Limits { speed, acceleration, jerk: self.limit_jerk, rate: self.limit_rate * DEG }
+        Limits { speed: self.limit_speed, ..Limits::default() }
     }
 
     fn bounds(&self) -> Bounds {
-        let (position_m, velocity_m_s) = (self.max_position_m, self.max_velocity_m_s);
-        Bounds { position_m, velocity_m_s, attitude_rad: self.max_attitude_rad }
+        Bounds { position_m: self.max_position_m, ..Bounds::default() }
     }
 }
