@@ -11,7 +11,7 @@ use super::{Failure, Session, read};
 use crate::choose::{Candidate, Inflation};
 use crate::formats::model_file::CalibrationNote;
 use crate::jobs::{self, CalibrationOptions, ChoiceDrive, EstimatorChoice};
-use crate::report::{ChoiceReport, choice_page, terminal_columns, terminal_table};
+use crate::report::ChoiceReport;
 use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Pool, Settings, Trim};
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::scenario::Scenario;
@@ -123,25 +123,13 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         inputs: Vec::new(),
     };
     chosen.write(&args.out, &args.trajectory, note, &report)?;
-    session.show(|| report.json(), || text(&report, session));
-    args.plot.write(|| choice_page(&report).svg(), session)?;
+    let document = session.answer(&report);
+    args.plot.write(|| document.svg(), session)?;
     session.say(format!(
         "wrote {0}: report.html, ranking.json, model.toml (nav-sim export {0}/model.toml)",
         args.out.display()
     ));
     Ok(())
-}
-
-fn text(report: &ChoiceReport<'_>, session: &Session) -> String {
-    let mut parts = vec![
-        report.verdict().into_iter().chain(report.decisive_scales()).collect::<Vec<_>>().join("\n"),
-        format!("{}\n{}", terminal_columns(&report.brief_rows()), report.legend()),
-    ];
-    if session.verbose() {
-        let more = [report.rows(), report.fold_rows(), report.recording_rows(), report.scale_rows()];
-        parts.extend(more.iter().map(|rows| terminal_table(rows, 1)));
-    }
-    parts.join("\n\n")
 }
 
 /// The estimators that are one.

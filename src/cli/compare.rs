@@ -3,20 +3,18 @@
 use super::pictures::{PlotArgs, claim_output};
 use super::{Failure, Session};
 use crate::formats::atomic::{self, Written};
-use crate::jobs::{self, Comparison};
-use crate::report::{self, PaperFigure, ShownComparison};
+use crate::jobs;
+use crate::report::{self, Answer, Comparison};
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 use std::path::{Path, PathBuf};
 
 /// Compare runs: verdicts, and ratios of ASEE and RMSE per outage and state
 ///
-/// The table has the layout of the paper's Table I: rows scenario × outage, columns state × estimator, both
-/// from the names of the directories (II_sr-awv, or II/sr-awv). Each cell holds the mean over the outage of
-/// (ASEE ratio − 1)·100, ± half its 95 % interval, and in parentheses the mean of its absolute value. The interval
-/// covers the Monte-Carlo error, and the uncertainty of the calibrations if both runs used --method lincov or both
-/// with models of calibrate. ASEE, the averaged standard estimation error, is what the filter believes, not how
-/// wrong it is. So the verdict on every filter comes first, and a second table has NEES, coverage and the ratios of
-/// the RMSE at the end of the outage. All states are in the JSON file; a page with figures is written beside it.
+/// ASEE, the averaged standard estimation error, is what a filter believes of its error. A cell holds the mean over the
+/// outage of (ASEE ratio − 1)·100 ± half its 95 % interval: that of Monte Carlo, and of the calibrations if both runs
+/// used --method lincov or both with models of calibrate. Scenario and estimator are those of the directories' names
+/// (II_sr-awv, or II/sr-awv); --table prints the layout of the paper's Table I. All states are in the JSON file; a page
+/// with NEES, coverage and RMSE is written beside it.
 #[derive(clap::Args, Debug)]
 #[command(before_help = "\
 Examples:
@@ -56,6 +54,11 @@ enum TableForm {
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
+    compare(args, "", session).map(|_| ())
+}
+
+/// Compares, prints and writes; `cause`: beginning of the verdict, or nothing.
+pub(super) fn compare(args: &Args, cause: &str, session: &Session) -> Result<Comparison, Failure> {
     let out = args.out.as_deref().unwrap_or(Path::new("comparison.json"));
     let page = out.with_extension("html");
     let read_from = args.runs.iter().chain([&args.reference]);
@@ -64,94 +67,26 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let _own = claim_output(Some(out), &inputs, Written::Comparison, session)?;
     let _page = claim_output(Some(&page), &inputs, Written::Page, session)?;
     let _picture = args.plot.claim(&inputs, session)?;
-    let compared = Compared::new(args, session)?;
-    let json = report::json(&compared.found.file);
-    session.show(|| json.clone(), || args.table.map_or_else(|| compared.text(), |form| compared.table(form)));
-    atomic::write(out, &json)?;
-    atomic::write(&page, compared.page(&[]))?;
-    args.plot.write(|| compared.shown().svg(), session)?;
+    let found = jobs::compare(&args.runs, &args.reference, states(&args.states)?)?;
+    let found = Comparison { cause: cause.to_owned(), ..found };
+    let document = match args.table {
+        None => session.answer(&found),
+        Some(form) => {
+            let table = match form {
+                TableForm::Markdown => found.table().markdown(),
+                TableForm::Csv => found.csv(),
+                TableForm::Latex => found.table().latex(),
+            };
+            session.warn_all(&found.doubts);
+            session.show(|| report::json(&found), || table);
+            found.document()
+        }
+    };
+    atomic::write(out, report::json(&found))?;
+    atomic::write(&page, document.html())?;
+    args.plot.write(|| document.svg(), session)?;
     session.say(format!("wrote {}, {}", out.display(), page.display()));
-    Ok(())
-}
-
-/// Columns that say what a row is of: scenario and outage.
-const LEAD: usize = 2;
-
-/// What was found, and how it is shown.
-pub(super) struct Compared {
-    found: Comparison,
-    /// The states that are shown.
-    states: Vec<usize>,
-}
-
-impl Compared {
-    /// Reads the runs and compares them.
-    pub(super) fn new(args: &Args, session: &Session) -> Result<Self, Failure> {
-        let states = states(&args.states)?;
-        let found = jobs::compare(&args.runs, &args.reference)?;
-        session.warn_all(&found.doubts);
-        Ok(Self { found, states })
-    }
-
-    /// The page, with links to those beneath it.
-    pub(super) fn page(&self, links: &[(String, String)]) -> String {
-        self.shown().page(&self.found.file, links)
-    }
-
-    /// The paper's Figure 7.
-    pub(super) fn figure(&self) -> PaperFigure {
-        self.shown().figure()
-    }
-
-    /// The outages (start, end) (s).
-    pub(super) fn outages(&self) -> &[(f64, f64)] {
-        &self.found.outages
-    }
-
-    fn shown(&self) -> ShownComparison<'_> {
-        let Comparison { candidates, curves, outages, .. } = &self.found;
-        ShownComparison { candidates, curves, outages, states: &self.states }
-    }
-
-    /// The table of ASEE ratios.
-    fn rows(&self) -> Vec<Vec<String>> {
-        let rows = report::table_rows(&self.found.candidates, &self.states);
-        report::with_times(rows, &self.found.outages)
-    }
-
-    fn table(&self, form: TableForm) -> String {
-        let Comparison { file, candidates, outages, .. } = &self.found;
-        match form {
-            TableForm::Markdown => report::markdown_table(&self.rows()),
-            TableForm::Csv => {
-                let rows = report::ratio_rows(candidates, &self.states, outages, &file.reference);
-                report::csv_table(&rows).trim_end().to_owned()
-            }
-            TableForm::Latex => report::latex_table(&self.rows()),
-        }
-    }
-
-    /// The verdicts, the table of ASEE ratios, and what stands beside them.
-    fn text(&self) -> String {
-        let Comparison { file, candidates, outages, .. } = &self.found;
-        let mut lines = report::verdict_lines(&file.verdicts);
-        if candidates.iter().any(|c| !c.outages.is_empty()) {
-            lines.push(format!(
-                "ASEE against {}, mean over the outage, % (in parentheses: mean size of the deviations; {}):",
-                file.reference,
-                report::meaning_of_intervals(candidates)
-            ));
-            lines.push(report::terminal_table(&self.rows(), LEAD));
-            let names: Vec<&str> = self.states.iter().map(|s| REPORTED_NAMES[*s]).collect();
-            lines.push(format!(
-                "NEES (9 if right) and coverage over the outage, RMSE at its end ({}) against the reference, %:",
-                names.join(", ")
-            ));
-            let rows = report::consistency_rows(candidates, &self.states);
-            lines.push(report::terminal_table(&report::with_times(rows, outages), LEAD));
-        }
-        lines.join("\n")
-    }
+    Ok(found)
 }
 
 pub(super) fn states(names: &[String]) -> Result<Vec<usize>, Failure> {

@@ -1,10 +1,10 @@
 //! `nav-sim demo`: the case study of the paper, command by command.
 
-use super::compare::Compared;
+use super::compare::compare;
 use super::{Cli, Command, Failure, Session, read};
 use crate::formats::atomic::Existing;
 use crate::formats::{FileError, atomic, model_file};
-use crate::report::{self, StudyCurves, TrajectorySeries, paper_figures, paper_page};
+use crate::report::{self, Answer, Comparison, StudyCurves, TrajectorySeries, paper_figures, paper_page};
 use clap::Parser;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -12,8 +12,7 @@ use std::path::{Path, PathBuf};
 /// Run the case study of Minaretzis et al. 2024, Section V, on a virtual IMU: calibrate with three estimators
 /// on clean and corrupted recordings, navigate with each model, compare (their Table I)
 ///
-/// Runs other commands of nav-sim one after the other and shows each, so that it can be pasted, changed and
-/// run again: eight static recordings of a virtual consumer IMU (scenario I), the same with replaced points,
+/// Runs other commands of nav-sim one after the other (--print lists them, to be pasted, changed and run again): eight static recordings of a virtual consumer IMU (scenario I), the same with replaced points,
 /// vibrations and steps (II), and with two abnormal recordings of each sensor (III); AWV, SR-AWV and DR-AWV
 /// on each; Monte-Carlo navigation with errors from windows of one more clean recording and two outages of
 /// 90 s, the filter with a state for each AR1 and random walk as in the paper; the ASEE of each filter relative to AWV in
@@ -111,19 +110,23 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         session.say(&told);
     }
     progress.write(&args.out)?;
+    let bar = session.progress("commands", (commands.len() - done) as u64);
     for (i, command) in commands.iter().enumerate().skip(done) {
-        session.say(format!("$ {}", typed(command)));
+        session.detail(format!("$ {}", typed(command)));
         let words = std::iter::once("nav-sim").chain(command.iter().map(String::as_str));
         let cli = Cli::try_parse_from(words).map_err(Failure::input)?;
         let inner = session.within(&cli.common, i < last);
-        if let Command::Compare(compare) = &cli.command {
-            let compared = Compared::new(compare, session)?;
-            index(&compared, &args.out)?;
-            figures(&compared, &args.out, session)?;
+        match cli.command {
+            Command::Compare(compared) => {
+                let found = compare(&compared, "contamination costs", &inner)?;
+                figures(&found, &args.out, session)?;
+                index(found, &args.out)?;
+            }
+            command => command.run(&inner)?,
         }
-        cli.command.run(&inner)?;
         progress.commands_done = i + 1;
         progress.write(&args.out)?;
+        bar.add(1);
     }
     session.say(format!("all results on one page: {}", page(&args.out).display()));
     Ok(())
@@ -166,7 +169,7 @@ fn page(out: &str) -> PathBuf {
 }
 
 /// Writes that page: the comparison, with links to the pages of its models and runs.
-fn index(compared: &Compared, out: &str) -> Result<(), Failure> {
+fn index(found: Comparison, out: &str) -> Result<(), Failure> {
     let mut links = vec![("figures/index.html".to_owned(), "the paper's figures".to_owned())];
     for name in names() {
         links.push((format!("models/{name}.html"), format!("model {name}: curves and parameters")));
@@ -175,11 +178,11 @@ fn index(compared: &Compared, out: &str) -> Result<(), Failure> {
             format!("navigation with {name}: errors and consistency"),
         ));
     }
-    Ok(atomic::write(&page(out), compared.page(&links))?)
+    Ok(atomic::write(&page(out), Comparison { links, ..found }.document().html())?)
 }
 
 /// Writes the paper's figures and a page of them; Figure 2 is of `nav-sim efficiency`.
-fn figures(compared: &Compared, out: &str, session: &Session) -> Result<(), Failure> {
+fn figures(found: &Comparison, out: &str, session: &Session) -> Result<(), Failure> {
     let mut curves = Vec::new();
     for (scenario, estimator) in
         SCENARIOS.iter().flat_map(|scenario| ESTIMATORS.iter().map(move |estimator| (scenario, estimator)))
@@ -192,8 +195,8 @@ fn figures(compared: &Compared, out: &str, session: &Session) -> Result<(), Fail
     }
     let trajectory = read::trajectory(Path::new(TRAJECTORY), session)?;
     let track = TrajectorySeries::of(&trajectory);
-    let mut figures = paper_figures(&curves, &track, compared.outages());
-    figures.push(compared.figure());
+    let mut figures = paper_figures(&curves, &track, &found.outages);
+    figures.push(found.figure());
     let directory = Path::new(out).join("figures");
     std::fs::create_dir_all(&directory).map_err(|e| FileError::io(&directory, e))?;
     for figure in &figures {

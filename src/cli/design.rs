@@ -7,11 +7,10 @@ use super::run::{OutageArg, parse_outage, windows_of};
 use super::{Failure, Session, read};
 use crate::formats::model_file::ModelFile;
 use crate::jobs::{self, DesignInputs, Destination, NavigateInputs, TrueImu};
-use crate::report::{Design, design_page, design_rows, design_verdict, markdown_table};
+use crate::report::{Design, Designs};
 use nav_sim_calibration::{Bootstrap, Estimator, Settings};
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::scenario::{Method, Scenario};
-use serde_json::json;
 use std::path::PathBuf;
 
 /// Predict how well a number of recordings of given length would determine an IMU like MODEL
@@ -80,12 +79,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     }
     let destination =
         navigation.as_mut().map(|(inputs, outages)| Destination { inputs, scenario: &scenario, outages });
-    let designs = designs(args, &file, destination, session)?;
-    session.show(
-        || json!({ "schema_version": 1, "designs": designs }).to_string(),
-        || format!("{}\n{}", design_verdict(&designs), markdown_table(&design_rows(&designs))),
-    );
-    args.pictures.write(|| design_page(&designs), session)
+    let designs = Designs { schema_version: 1, designs: designs(args, &file, destination, session)? };
+    let document = session.answer(&designs);
+    args.pictures.draw(&document, session)
 }
 
 /// Drives are analysed, with a state for every process.

@@ -70,12 +70,9 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 }
 
 fn write(out: &Path, results: &EfficiencyFile, session: &Session) -> Result<(), Failure> {
-    let (json, table) = (report::json(results), report::efficiency_table(results));
+    let document = session.answer(results);
     atomic::write(&out.join("results.csv"), report::efficiency_csv(results))?;
-    atomic::write(&out.join("results.txt"), format!("{table}\n"))?;
-    atomic::write(&out.join("results.json"), &json)?;
-    atomic::write(&out.join("rmse.svg"), report::efficiency_svg(results))?;
-    atomic::write(&out.join("report.html"), report::efficiency_page(results))?;
-    session.result(if session.json() { json.trim_end() } else { &table });
-    Ok(())
+    atomic::write(&out.join("results.json"), report::json(results))?;
+    atomic::write(&out.join("rmse.svg"), document.svg())?;
+    Ok(atomic::write(&out.join("report.html"), document.html())?)
 }

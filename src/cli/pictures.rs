@@ -2,7 +2,7 @@
 
 use super::{Failure, Session};
 use crate::formats::atomic::{self, Claim, Written};
-use crate::report::page::{self, Form, Page};
+use crate::report::page::{self, Form};
 use nav_sim_document::Document;
 use std::path::{Path, PathBuf};
 
@@ -59,16 +59,6 @@ impl PageArgs {
     pub(super) fn draw(&self, document: &Document, session: &Session) -> Result<(), Failure> {
         let written = self.page.iter().try_for_each(|path| session.write(path, document.html()));
         self.plot.write(|| document.svg(), session).and(written)
-    }
-
-    /// Writes what is asked for.
-    pub(super) fn write(&self, page: impl FnOnce() -> Page, session: &Session) -> Result<(), Failure> {
-        if self.page.is_none() && self.plot.plot.is_none() {
-            return Ok(());
-        }
-        let page = page();
-        let written = self.page.iter().try_for_each(|path| session.write(path, page.html()));
-        self.plot.write(|| page.svg(), session).and(written)
     }
 }
 

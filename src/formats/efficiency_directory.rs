@@ -14,8 +14,8 @@ use std::path::{Path, PathBuf};
 type Result<T> = std::result::Result<T, FileError>;
 
 /// What a study writes beside `study.json`.
-const FILES: [&str; 7] =
-    ["sets.csv", "results.csv", "results.txt", "results.json", "rmse.svg", "report.html", "sensitivity.csv"];
+const FILES: [&str; 6] =
+    ["sets.csv", "results.csv", "results.json", "rmse.svg", "report.html", "sensitivity.csv"];
 
 /// What follows from other keys where it is not given: blamed last.
 const FOLLOWING: [&str; 2] = ["levels", "trim"];

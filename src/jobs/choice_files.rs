@@ -6,7 +6,7 @@ use crate::formats::FileError;
 use crate::formats::atomic::{AtomicDir, Claim, Existing, Found, claim_directory};
 use crate::formats::input::input;
 use crate::formats::model_file::CalibrationNote;
-use crate::report::{ChoiceReport, choice_page};
+use crate::report::{Answer, ChoiceReport, json};
 use nav_sim_calibration::diagnose;
 use std::path::Path;
 
@@ -62,8 +62,8 @@ impl Chosen {
             let Calibration { groups, outcomes, settings, .. } = calibration;
             files.write_page(calibration, &diagnose(groups, outcomes, settings))?;
         }
-        directory.write("report.html", choice_page(report).html())?;
-        directory.write("ranking.json", report.json())?;
+        directory.write("report.html", report.document().html())?;
+        directory.write("ranking.json", json(report))?;
         directory.commit()
     }
 }

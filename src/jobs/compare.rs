@@ -2,32 +2,20 @@
 
 use super::JobError;
 use crate::formats::run_directory::{self, RunDirectory};
-use crate::report::{CandidateResult, ComparisonFile, Label, Manifest, RatioCurves};
+use crate::report::{CandidateResult, Comparison, Label, Manifest, RatioCurves};
 use nav_sim_navigation::metrics;
 use nav_sim_navigation::scenario::Method;
 use std::path::{Path, PathBuf};
 
-/// What was found.
-#[derive(Debug)]
-#[non_exhaustive]
-pub(crate) struct Comparison {
-    /// All of it, as it is written to a file.
-    pub file: ComparisonFile,
-    /// The runs.
-    pub candidates: Vec<CandidateResult>,
-    /// How their ratios go with time, run by run.
-    pub curves: Vec<RatioCurves>,
-    /// Start and end of each outage (s).
-    pub outages: Vec<(f64, f64)>,
-    /// Why runs are not paired with the reference.
-    pub doubts: Vec<String>,
-}
-
-/// Compares runs with a reference.
+/// Compares runs with a reference; `states` are shown.
 ///
 /// # Errors
 /// When a directory cannot be read, or is of something else.
-pub(crate) fn compare(runs: &[PathBuf], reference: &Path) -> Result<Comparison, JobError> {
+pub(crate) fn compare(
+    runs: &[PathBuf],
+    reference: &Path,
+    states: Vec<usize>,
+) -> Result<Comparison, JobError> {
     let name = reference.display().to_string();
     let directory = run_directory::read(reference)?;
     let (mut candidates, mut curves, mut doubts) = (Vec::new(), Vec::new(), Vec::new());
@@ -40,14 +28,13 @@ pub(crate) fn compare(runs: &[PathBuf], reference: &Path) -> Result<Comparison, 
         if !(candidate.experiment.is_expected && directory.experiment.is_expected) {
             doubts.extend(differences.iter().map(doubt));
         }
-        let is_paired = differences.is_empty();
         let is_reference = is_same_place(path, reference);
-        candidates.push(compared(run, &candidate, &directory, is_paired, is_reference)?);
         curves.push(RatioCurves::of(&candidate.experiment, &directory.experiment));
+        candidates.push(compared(run, &candidate, &directory, differences.is_empty(), is_reference)?);
     }
-    let is_paired = candidates.iter().all(|candidate| candidate.is_paired);
-    let file = ComparisonFile::new((&name, &directory.verdict), is_paired, &candidates);
-    Ok(Comparison { file, candidates, curves, outages: directory.experiment.outages, doubts })
+    let outages = directory.experiment.outages;
+    let comparison = Comparison::new((&name, &directory.verdict), candidates, curves, outages);
+    Ok(Comparison { doubts, states, ..comparison })
 }
 
 /// One run.

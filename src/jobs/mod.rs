@@ -50,7 +50,7 @@ pub(crate) use catalogue::{catalogue_json, catalogue_text};
 pub(crate) use certify::{Recorded, certify};
 pub(crate) use choice_files::claim_choice;
 pub use choose::{ChoiceDrive, Chosen, choose};
-pub(crate) use compare::{Comparison, compare};
+pub(crate) use compare::compare;
 pub(crate) use curves::read_curves;
 pub(crate) use design::{DesignInputs, Destination, design};
 pub use error::JobError;

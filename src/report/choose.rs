@@ -1,10 +1,16 @@
-//! The ranking of candidates, on one screen and as JSON.
+//! The ranking of candidates: `ranking.json`, and what is said and drawn of it.
 
-use super::number::{readable, window};
-use crate::choose::{Influence, Mean, Placed, Ranking};
+use super::Answer;
+use super::comparison_table::in_order;
+use super::dots::{Dots, dot_chart};
+use crate::choose::{FoldScore, Influence, Mean, Placed, Ranking, ScaleInfluence};
+use nav_sim_document::{
+    Axis, Cell, Chart, Colour, Document, Importance, Interval, Mark, Panel, Series, Table, Tone, readable,
+    short_names, window,
+};
 use nav_sim_navigation::sensors::outage::Outage;
 use nav_sim_navigation::simulation::NEES_DOF;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// Share of the largest influence from which on a scale decides.
 const DECISIVE: f64 = 0.25;
@@ -33,10 +39,8 @@ pub(crate) struct RankedPlace {
     pub name: String,
     /// What the data say.
     pub verdict: Vec<String>,
-    /// A row for each candidate under a head.
-    pub rows: Vec<Vec<String>>,
-    /// What the marks of the table mean.
-    pub legend: String,
+    /// A row for each candidate.
+    pub table: Table,
     /// As in `ranking.json`, and `place`.
     pub json: serde_json::Value,
 }
@@ -59,172 +63,142 @@ struct RankingFile<'a> {
 }
 
 impl ChoiceReport<'_> {
-    /// The verdict, a sentence or two a line: the winner, what cannot be told from it, which recordings decide.
+    /// The verdict: the winner, what cannot be told from it, and how good it is.
     pub(crate) fn verdict(&self) -> Vec<String> {
-        let ranking = self.ranking;
-        let mut lines = vec![self.best()];
+        const NAMED: usize = 3;
+        let (ranking, winner) = (self.ranking, self.ranking.winner());
+        let name = &winner.candidate;
+        let eligible = ranking.candidates.iter().filter(|p| p.eligible).count();
+        let recordings = winner.folds.len();
+        let first = match (ranking.tells, eligible) {
+            (_, 1) => format!("{name}: there is no other candidate"),
+            (true, _) => format!("{name} is the best of {eligible} candidates on {recordings} recordings"),
+            (false, _) => format!(
+                "undecided: {recordings} recordings cannot tell {eligible} candidates apart; {name} scores highest"
+            ),
+        };
+        let mut lines = vec![first];
         let tied: Vec<&str> = self.tied().collect();
         if ranking.tells && !tied.is_empty() {
-            lines.push(format!("cannot be told from it: {}", tied.join("; ")));
+            let more =
+                if tied.len() > NAMED { format!(" and {} more", tied.len() - NAMED) } else { String::new() };
+            let named = tied.iter().take(NAMED).copied().collect::<Vec<_>>().join("; ");
+            lines.push(format!("cannot be told from it: {named}{more}"));
         }
-        lines.extend(self.dishonest());
-        if !ranking.undescribed.is_empty() {
-            // what most of the recordings have is not one recording's fault
-            let cure = if 2 * ranking.undescribed.len() > ranking.winner().folds.len() {
-                "something moves in most of them: where it is a warm-up at their beginning, --skip-s auto leaves it out"
-            } else {
-                "look at it with nav-sim calibrate --verbose, and run again with --skip-s auto (a warm-up) or without it"
-            };
-            lines.push(format!(
-                "no candidate describes {}: errors are far larger than every filter believes; {cure}",
-                ranking.undescribed.join(", ")
-            ));
-        }
-        if !ranking.decisive.is_empty() {
-            lines.push(format!(
-                "without {} another candidate would win",
-                ranking.decisive.join(", or without ")
-            ));
-        }
-        if ranking.winner().folds.iter().any(|fold| fold.windows == 0) {
-            lines.push(
-                "recordings shorter than the trajectory are judged by covariance analysis with their own N2 as truth"
-                    .to_owned(),
-            );
-        }
-        lines
-    }
-
-    /// The winner, and whether the data can tell that it is.
-    fn best(&self) -> String {
-        let winner = self.ranking.winner();
-        let recordings = winner.folds.len();
-        let figures = format!(
-            "{} m of horizontal RMSE at the end of an outage where its filter believes {} m, NEES {} (9 if right)",
+        lines.push(format!(
+            "its horizontal error at the ends of outages: {} m, believed {} m, NEES {} (9 if right)",
             readable(winner.rmse_m),
             readable(winner.believed_m),
             readable(winner.nees.value)
-        );
-        let eligible = self.ranking.candidates.iter().filter(|p| p.eligible).count();
-        match (self.ranking.tells, eligible) {
-            (_, 1) => format!("{}: {figures}; there is no other candidate", winner.candidate),
-            (true, _) => format!("{} is the best: {figures}", winner.candidate),
-            (false, _) if recordings < 4 => format!(
-                "{recordings} recordings cannot tell the candidates apart; {} has the highest score: {figures}",
-                winner.candidate
-            ),
-            (false, _) => format!(
-                "the recordings differ more than the candidates do: the data cannot tell; {} has the highest score: \
-                 {figures}",
-                winner.candidate
-            ),
-        }
+        ));
+        lines
     }
 
-    /// The candidates whose filters believe too little or too much.
-    fn dishonest(&self) -> Vec<String> {
-        let right = NEES_DOF as f64;
-        let line = |word: &str, is_so: &dyn Fn(&Placed) -> bool| {
-            let all = self.ranking.candidates.iter().filter(|p| p.eligible && is_so(p));
-            let names = all.map(|p| p.candidate.as_str()).collect::<Vec<_>>().join("; ");
-            (!names.is_empty()).then(|| format!("{word} (NEES over the recordings): {names}"))
-        };
-        let over = line("overconfident", &|p| p.nees.ci95.0 > right);
-        let under = line("underconfident", &|p| p.nees.ci95.1 < right);
-        over.into_iter().chain(under).collect()
-    }
-
-    /// A row for each candidate under a head.
-    pub(crate) fn rows(&self) -> Vec<Vec<String>> {
-        let head = [
-            "candidate",
-            "RMSE (m)",
-            "against the best (%)",
-            "believed (m)",
-            "NEES (9)",
-            "coverage",
-            "log score (nats)",
-        ];
-        let mut rows = vec![head.map(str::to_owned).to_vec()];
-        rows.extend(self.ranking.candidates.iter().map(|p| self.row(p)));
-        rows
-    }
-
-    /// The table as a terminal of 120 columns and a few lines shows it: the best, and what decides.
-    pub(crate) fn brief_rows(&self) -> Vec<Vec<String>> {
-        const SHOWN: usize = 9;
-        let brief = |row: Vec<String>| {
-            let kept = |(column, cell)| (![BELIEVED, COVERAGE].contains(&column)).then_some(cell);
-            row.into_iter().enumerate().filter_map(kept).collect::<Vec<String>>()
-        };
-        let mut rows: Vec<Vec<String>> = self.rows().into_iter().take(1 + SHOWN).map(brief).collect();
-        let more = self.ranking.candidates.len().saturating_sub(SHOWN);
-        if more > 0 {
-            let mut rest = vec![String::new(); rows[0].len()];
-            rest[0] = format!("… and {more} more");
-            rows.push(rest);
-        }
-        rows
-    }
-
-    fn row(&self, placed: &Placed) -> Vec<String> {
-        let is_winner = placed.index == self.ranking.winner().index;
-        let mark = match (is_winner, placed.eligible, placed.tied) {
-            (true, ..) => " *",
-            (_, false, _) => " †",
-            (_, _, true) => " =",
-            _ => "",
-        };
-        let against = |mean: &Mean| {
-            if is_winner {
-                "–".to_owned()
-            } else if mean.value.is_infinite() {
-                // an error that the filter held for impossible
-                "−∞".to_owned()
+    /// What else is to be known, the most important first.
+    fn notes(&self, document: &mut Document) {
+        let ranking = self.ranking;
+        if !ranking.undescribed.is_empty() {
+            let names = ranking.undescribed.join(", ");
+            let cure = if 2 * ranking.undescribed.len() > ranking.winner().folds.len() {
+                "a warm-up? try --skip-s auto"
             } else {
-                let [value, low, high] = [mean.value, mean.ci95.0, mean.ci95.1].map(signed_few);
-                format!("{value} [{low}, {high}]")
+                "look at it with nav-sim calibrate"
+            };
+            document.note(Importance::Warning, format!("no candidate describes {names}: {cure}"));
+        }
+        if !ranking.decisive.is_empty() {
+            let names = ranking.decisive.join(", or without ");
+            document.note(Importance::Warning, format!("without {names} another candidate would win"));
+        }
+        if ranking.winner().folds.iter().any(|fold| fold.windows == 0) {
+            document.note(
+                Importance::Remark,
+                "recordings shorter than the trajectory are judged by covariance analysis, their own N2 as truth",
+            );
+        }
+        document.note(
+            Importance::Remark,
+            "* best log score, = not told from it, † of one recording; [95 % interval over recordings]",
+        );
+        let right = NEES_DOF as f64;
+        let mut of_kind = |word: &str, is_so: &dyn Fn(&Placed) -> bool| {
+            let all = ranking.candidates.iter().filter(|p| p.eligible && is_so(p));
+            let names = all.map(|p| p.candidate.as_str()).collect::<Vec<_>>().join("; ");
+            if !names.is_empty() {
+                document.note(Importance::Detail, format!("{word} over the recordings: {names}"));
             }
         };
-        vec![
-            format!("{}{mark}", placed.candidate),
-            readable(placed.rmse_m),
-            against(&placed.difference.rmse_pct),
-            readable(placed.believed_m),
-            format!("{} [{}, {}]", few(placed.nees.value), few(placed.nees.ci95.0), few(placed.nees.ci95.1)),
-            placed.coverage.map_or("–".to_owned(), |c| format!("{c:.2}")),
-            if is_winner {
-                format!("{:.2}", placed.log_score.value)
-            } else {
-                against(&placed.difference.log_score)
-            },
-        ]
+        of_kind("overconfident", &|p| p.nees.ci95.0 > right);
+        of_kind("underconfident", &|p| p.nees.ci95.1 < right);
+        for line in self.decisive_scales() {
+            document.note(Importance::Detail, line);
+        }
     }
 
-    /// What the marks of the table mean.
-    pub(crate) fn legend(&self) -> String {
-        let recordings = self.ranking.winner().folds.len();
-        let ends: Vec<String> = self.outages.iter().map(|o| window(o.start_s, o.end_s)).collect();
-        format!(
-            "{recordings} recordings, each left out once; [95 % over recordings]; horizontal RMSE at the ends of the outages \
-             {}\n* best log score, the others relative to it; = not distinguishable from it, given the number of candidates; † of one recording; NEES 9, coverage 0.95 if \
-             the filter is right",
-            ends.join(", ")
-        )
+    /// A row for each candidate.
+    fn table(&self) -> Table {
+        let mut table =
+            Table::new(["candidate", "log score (nats)", "NEES (9)", "RMSE (m)", "against the best (%)"]);
+        for placed in &self.ranking.candidates {
+            let is_winner = placed.index == self.ranking.winner().index;
+            let mark = match (is_winner, placed.eligible, placed.tied) {
+                (true, ..) => " *",
+                (_, false, _) => " †",
+                (_, _, true) => " =",
+                _ => "",
+            };
+            let against = |mean: &Mean| match mean.value {
+                _ if is_winner => "–".to_owned(),
+                // an error that the filter held for impossible
+                value if value.is_infinite() => "−∞".to_owned(),
+                value => interval(value, mean.ci95, &signed_few),
+            };
+            let score = match is_winner {
+                true => few(placed.log_score.value),
+                false => against(&placed.difference.log_score),
+            };
+            table.row([
+                format!("{}{mark}", placed.candidate).into(),
+                Cell::figures(score),
+                Cell::figures(interval(placed.nees.value, placed.nees.ci95, &few)),
+                Cell::figures(readable(placed.rmse_m)),
+                Cell::figures(against(&placed.difference.rmse_pct)),
+            ]);
+        }
+        table
+    }
+
+    /// What each filter believes, and how often it is right.
+    fn beliefs(&self) -> Table {
+        let mut table = Table::new(["candidate", "RMSE (m)", "believed (m)", "coverage (0.95)"]);
+        for (i, p) in self.ranking.candidates.iter().enumerate() {
+            let number = |value: f64, key: &str| Cell::number(value, &format!("/candidates/{i}/{key}"));
+            table.row([
+                p.candidate.as_str().into(),
+                number(p.rmse_m, "rmse_m"),
+                number(p.believed_m, "believed_m"),
+                p.coverage.map_or_else(|| Cell::figures("–"), |c| number(c, "coverage")),
+            ]);
+        }
+        table
     }
 
     /// Recording by recording: NEES and log score of every candidate.
-    pub(crate) fn fold_rows(&self) -> Vec<Vec<String>> {
-        let winner = self.ranking.winner();
-        let mut head = vec!["NEES (log score, nats)".to_owned()];
-        head.extend(winner.folds.iter().map(|fold| fold.recording.clone()));
-        let row = |p: &Placed| {
-            let cell = |fold: &crate::choose::FoldScore| {
-                format!("{} ({:.1})", readable(fold.score.nees), fold.score.log_score)
+    fn folds(&self) -> Table {
+        let heads = self.recordings().into_iter().map(|name| format!("{name}: NEES (nats)"));
+        let mut table = Table::new(["candidate"]).and(heads);
+        for p in &self.ranking.candidates {
+            let cell = |fold: &FoldScore| {
+                Cell::figures(format!("{} ({:.1})", readable(fold.score.nees), fold.score.log_score))
             };
-            std::iter::once(p.candidate.clone()).chain(p.folds.iter().map(cell)).collect()
-        };
-        std::iter::once(head).chain(self.ranking.candidates.iter().map(row)).collect()
+            table.row(std::iter::once(p.candidate.as_str().into()).chain(p.folds.iter().map(cell)));
+        }
+        table
+    }
+
+    fn recordings(&self) -> Vec<String> {
+        let folds = &self.ranking.winner().folds;
+        short_names(&folds.iter().map(|fold| fold.recording.as_str()).collect::<Vec<_>>())
     }
 
     /// Which scales of which sensors decide: a line each, those of a quarter of the largest influence or more.
@@ -238,7 +212,7 @@ impl ChoiceReport<'_> {
             }
             let of_signals: Vec<_> = scales.iter().filter(|s| s.signals == first.signals).collect();
             // the scales around the one that counts most
-            let decides = |s: &&crate::choose::ScaleInfluence| s.on_error >= DECISIVE * largest;
+            let decides = |s: &&ScaleInfluence| s.on_error >= DECISIVE * largest;
             let peak = (0..of_signals.len())
                 .max_by(|a, b| of_signals[*a].on_error.total_cmp(&of_signals[*b].on_error))
                 .unwrap_or(0);
@@ -260,25 +234,57 @@ impl ChoiceReport<'_> {
         lines
     }
 
-    /// Scale by scale under a head.
-    pub(crate) fn scale_rows(&self) -> Vec<Vec<String>> {
-        let head = ["signals", "scale (s)", "% of horizontal error for 1 % of wavelet variance"];
-        let row = |s: &crate::choose::ScaleInfluence| {
-            vec![s.signals.clone(), readable(s.tau_s), signed(s.on_error)]
-        };
-        let head = head.map(str::to_owned).to_vec();
-        std::iter::once(head).chain(self.influence.iter().flat_map(|i| &i.scales).map(row)).collect()
+    /// What decides: scales and recordings.
+    fn decides(&self, document: &mut Document) {
+        let Some(influence) = self.influence else { return };
+        document.section("What decides");
+        if !influence.scales.is_empty() {
+            document.chart(&over_scales(&influence.scales), INFLUENCE);
+        }
+        document.text("What each recording adds to the expected horizontal error, to first order, with each way of averaging.");
+        let mut table = Table::new(["recording", "awv (%)", "sr-awv (%)", "dr-awv (%)"]);
+        for (i, r) in influence.recordings.iter().enumerate() {
+            let cell =
+                |value: f64, key: &str| Cell::number(value, &format!("/influence/recordings/{i}/{key}"));
+            table.row([
+                r.recording.clone().into(),
+                cell(r.awv_pct, "awv_pct"),
+                cell(r.sr_awv_pct, "sr_awv_pct"),
+                cell(r.dr_awv_pct, "dr_awv_pct"),
+            ]);
+        }
+        document.table(&table);
     }
 
-    /// Recording by recording under a head.
-    pub(crate) fn recording_rows(&self) -> Vec<Vec<String>> {
-        let head = ["adds to the expected horizontal error (%)", "awv", "sr-awv", "dr-awv"];
-        let row = |r: &crate::choose::RecordingInfluence| {
-            let adds = [r.awv_pct, r.sr_awv_pct, r.dr_awv_pct].map(signed);
-            std::iter::once(r.recording.clone()).chain(adds).collect()
+    /// Log scores, NEES, and errors beside what is believed of them.
+    fn charts(&self) -> Vec<Chart> {
+        let placed = &self.ranking.candidates;
+        let names = || placed.iter().map(|p| p.candidate.clone());
+        let of = |value: &dyn Fn(&Placed) -> Mean| {
+            let point = |p: &Placed| {
+                let Mean { value, ci95: (low, high) } = value(p);
+                [value, low, high]
+            };
+            placed.iter().map(point).collect::<Vec<_>>()
         };
-        let head = head.map(str::to_owned).to_vec();
-        std::iter::once(head).chain(self.influence.iter().flat_map(|i| &i.recordings).map(row)).collect()
+        let alone = |value: f64| Mean { value, ci95: (f64::NAN, f64::NAN) };
+        let dots = |name, colour, points| Dots { name, colour, points };
+        let scores = dots("", Colour::BELIEVED, of(&|p| p.difference.log_score));
+        let nees = dots("NEES", Colour::Ink, of(&|p| p.nees));
+        let real = dots("true RMSE", Colour::REAL, of(&|p| alone(p.rmse_m)));
+        let believed = dots("believed", Colour::BELIEVED, of(&|p| alone(p.believed_m)));
+        let right = Some(("right", NEES_DOF as f64));
+        vec![
+            dot_chart(
+                "Log score against the best",
+                Axis::linear("nats"),
+                names(),
+                Some(("best", 0.0)),
+                &[scores],
+            ),
+            dot_chart("Consistency at the ends of outages", Axis::log("NEES"), names(), right, &[nees]),
+            dot_chart("Accuracy", Axis::log("horizontal error (m)"), names(), None, &[real, believed]),
+        ]
     }
 
     fn tied(&self) -> impl Iterator<Item = &str> {
@@ -286,20 +292,17 @@ impl ChoiceReport<'_> {
         others.filter(|p| p.eligible && p.tied).map(|p| p.candidate.as_str())
     }
 
-    /// `ranking.json`.
-    pub(crate) fn json(&self) -> String {
-        super::json(&self.file())
-    }
-
-    /// The same as one of several rankings.
+    /// One of several rankings.
     pub(crate) fn of_place(&self, name: String) -> RankedPlace {
-        let mut json = serde_json::to_value(self.file()).expect("plain structs are always JSON");
+        let mut json = serde_json::to_value(self).expect("plain structs are always JSON");
         json["place"] = name.as_str().into();
-        RankedPlace { name, verdict: self.verdict(), rows: self.rows(), legend: self.legend(), json }
+        RankedPlace { name, verdict: self.verdict(), table: self.table(), json }
     }
+}
 
-    fn file(&self) -> RankingFile<'_> {
-        RankingFile {
+impl Serialize for ChoiceReport<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let file = RankingFile {
             schema_version: SCHEMA_VERSION,
             verdict: self.verdict(),
             winner: &self.ranking.winner().candidate,
@@ -309,13 +312,71 @@ impl ChoiceReport<'_> {
             seed: self.seed,
             ranking: self.ranking,
             influence: self.influence,
-        }
+        };
+        file.serialize(serializer)
     }
 }
 
-/// Columns of [`ChoiceReport::rows`] that a terminal does not show unless asked.
-const BELIEVED: usize = 3;
-const COVERAGE: usize = 5;
+impl Answer for ChoiceReport<'_> {
+    fn document(&self) -> Document {
+        let tone = if self.ranking.tells { Tone::Good } else { Tone::Undecided };
+        let mut document = Document::new("Which noise model", tone, self.verdict());
+        self.notes(&mut document);
+        let ends: Vec<String> = self.outages.iter().map(|o| window(o.start_s, o.end_s)).collect();
+        document.facts(&[
+            ("trajectory", self.trajectory.to_owned()),
+            ("outages", ends.join(", ")),
+            ("recordings", self.ranking.winner().folds.len().to_string()),
+            ("seed", self.seed.to_string()),
+        ]);
+        document.lead(self.table());
+        document.charts(&self.charts()[..2], SCORE);
+        document.section("Accuracy");
+        document.chart(&self.charts()[2], "");
+        document.table(&self.beliefs());
+        document.section("Recording by recording");
+        document.text("Each recording judges models of the others; NEES at the ends of outages, in brackets the mean log score (nats).");
+        document.chart(
+            &fold_chart(&self.ranking.candidates, self.recordings()),
+            "A recording whose points all stand high is described by no candidate.",
+        );
+        document.table(&self.folds());
+        self.decides(&mut document);
+        document
+    }
+}
+
+const SCORE: &str = "Log score: the mean log density of the true errors under the filter's covariance, less that of the best. NEES above 9: overconfident. Bars: 95 % intervals over recordings.";
+const INFLUENCE: &str = "Growth of the horizontal error at the ends of outages with the wavelet variance of each scale (% for 1 %).";
+
+/// NEES of each candidate on each recording.
+fn fold_chart(placed: &[Placed], recordings: Vec<String>) -> Chart {
+    let mut series = vec![Series::new("right", Colour::RIGHT, Mark::Level(NEES_DOF as f64))];
+    for (hue, p) in placed.iter().enumerate() {
+        let beside = 0.6 * ((hue as f64 + 0.5) / placed.len() as f64 - 0.5);
+        let point = |(k, fold): (usize, &FoldScore)| {
+            let (x, y) = (k as f64 + beside, fold.score.nees);
+            Interval { x, y, low: f64::NAN, high: f64::NAN }
+        };
+        let points = p.folds.iter().enumerate().map(point).collect();
+        series.push(Series::new(&p.candidate, Colour::Hue(hue), Mark::Points(points)));
+    }
+    let panel = Panel::new(Axis::log("NEES"), series);
+    Chart::new("NEES on the recording left out", Axis::names(recordings), vec![panel])
+}
+
+/// Influence over scales, a line a sensor or axis.
+fn over_scales(scales: &[ScaleInfluence]) -> Chart {
+    let signals = in_order(scales.iter().map(|s| s.signals.as_str()));
+    let mut series = vec![Series::new("", Colour::Soft, Mark::Level(0.0))];
+    series.extend(signals.iter().enumerate().map(|(hue, name)| {
+        let of_signals = scales.iter().filter(|s| s.signals == **name);
+        let line = of_signals.map(|s| (s.tau_s, s.on_error)).collect();
+        Series::line(name, Colour::Hue(hue), line)
+    }));
+    let panel = Panel::new(Axis::linear("% of error for 1 %"), series);
+    Chart::new("Influence of the wavelet variance", Axis::log("scale (s)"), vec![panel])
+}
 
 /// A number in a table that is wide enough already: two decimals at most.
 fn few(x: f64) -> String {
@@ -331,6 +392,11 @@ fn few(x: f64) -> String {
 fn signed_few(x: f64) -> String {
     let shown = few(x);
     if x > 0.0 { format!("+{shown}") } else { shown }
+}
+
+/// `9.1 [8.0, 10.2]`
+fn interval(value: f64, (low, high): (f64, f64), shown: &dyn Fn(f64) -> String) -> String {
+    format!("{} [{}, {}]", shown(value), shown(low), shown(high))
 }
 
 /// A number with its sign.

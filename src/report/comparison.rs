@@ -1,67 +1,41 @@
-//! `comparison.json`, what is in it and what is said of it.
+//! A comparison of runs: `comparison.json`, and what is said and drawn of it.
 
-use super::short_names;
-use super::verdict::verdict_in_short;
-use nav_sim_navigation::metrics::{OutageComparison, Verdict, VerdictKind};
-use nav_sim_navigation::simulation::REPORTED_NAMES;
+use super::Answer;
+use super::comparison_table::{CandidateResult, Layout, ratio_rows, ratio_table};
+use super::pages::{PaperFigure, tone};
+use super::states::{STATES, axis_of};
+use super::verdict::{gravest, verdict_in_short};
+use nav_sim_document::{
+    Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Table, short_names, window,
+};
+use nav_sim_navigation::metrics::{Measured, OutageComparison, Verdict, VerdictKind};
+use nav_sim_navigation::simulation::{REPORTED, REPORTED_NAMES};
 use serde::Serialize;
 
-/// Estimators by the names their run directories end in.
-const ESTIMATORS: [&str; 6] = ["sr-awv", "dr-awv", "awv", "rgmwm", "gmwm", "avlr"];
-
-/// Where a run stands in Table I: its row (scenario) and column (estimator, may be empty).
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Label {
-    /// Row.
-    pub scenario: String,
-    /// Column.
-    pub estimator: String,
+/// How the ASEE of a run departs from that of the reference over time.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct RatioCurves {
+    /// Time (s).
+    pub t_s: Vec<f64>,
+    /// (ratio − 1)·100 of each reported state.
+    pub asee_pct: Vec<[f64; REPORTED]>,
 }
 
-impl Label {
-    /// From a run directory's name: `II_sr-awv` or `II/sr-awv` is scenario II, estimator SR-AWV. A name
-    /// that ends in no estimator is a scenario of its own; the estimator is then the one the model was
-    /// made with, if known.
-    pub(crate) fn of(directory: &str, model_estimator: Option<&str>) -> Self {
-        let parts: Vec<&str> = directory.split('/').filter(|p| !p.is_empty() && *p != ".").collect();
-        let name = parts.last().copied().unwrap_or(directory);
-        let lower = name.to_lowercase();
-        for estimator in ESTIMATORS {
-            let Some(head) = lower.strip_suffix(estimator) else { continue };
-            let parent = parts.len().checked_sub(2).map_or("", |i| parts[i]);
-            let separated = head.ends_with(['_', '-', '.', ' ']);
-            let scenario = match head.len() {
-                0 => parent,
-                n if separated => name[..n].trim_end_matches(['_', '-', '.', ' ']),
-                _ => continue,
-            };
-            return Self { scenario: scenario.to_owned(), estimator: estimator.to_uppercase() };
+impl RatioCurves {
+    /// Of two experiments with the same epochs.
+    pub(crate) fn of(candidate: &Measured, reference: &Measured) -> Self {
+        let both = candidate.epochs.iter().zip(&reference.epochs);
+        let pct = |i: usize, a: &[f64; REPORTED], b: &[f64; REPORTED]| 100.0 * (a[i] / b[i] - 1.0);
+        Self {
+            t_s: candidate.epochs.iter().map(|e| e.t_s).collect(),
+            asee_pct: both.map(|(c, r)| std::array::from_fn(|i| pct(i, &c.asee, &r.asee))).collect(),
         }
-        let estimator = model_estimator.unwrap_or_default().to_uppercase();
-        Self { scenario: name.to_owned(), estimator }
     }
 }
 
-/// A candidate and what the comparison with the reference found.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct CandidateResult {
-    /// Run directory.
-    pub run: String,
-    /// Its place in the table.
-    pub label: Label,
-    /// Whether it is the reference itself.
-    pub is_reference: bool,
-    /// Whether run k saw the same noise as that of the reference.
-    pub is_paired: bool,
-    /// Whether its filter is as good as it believes.
-    pub verdict: Verdict,
-    /// Outage by outage.
-    pub outages: Vec<OutageComparison>,
-}
-
-/// What `comparison.json` holds.
+/// Runs against a reference: as JSON, `comparison.json`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(crate) struct ComparisonFile {
+pub(crate) struct Comparison {
     /// Layout version.
     pub schema_version: u32,
     /// Run directory of the reference.
@@ -74,6 +48,27 @@ pub(crate) struct ComparisonFile {
     pub rows: Vec<Row>,
     /// One row a run and outage.
     pub consistency: Vec<ConsistencyRow>,
+    /// The runs.
+    #[serde(skip)]
+    pub candidates: Vec<CandidateResult>,
+    /// How their ratios go with time, one a run.
+    #[serde(skip)]
+    pub curves: Vec<RatioCurves>,
+    /// Start and end of each outage (s).
+    #[serde(skip)]
+    pub outages: Vec<(f64, f64)>,
+    /// Why runs are not paired with the reference.
+    #[serde(skip)]
+    pub doubts: Vec<String>,
+    /// The states that are shown.
+    #[serde(skip)]
+    pub states: Vec<usize>,
+    /// Beginning of the verdict, such as "contamination costs"; empty: the name of the reference.
+    #[serde(skip)]
+    pub cause: String,
+    /// Pages of the single results, path and name.
+    #[serde(skip)]
+    pub links: Vec<(String, String)>,
 }
 
 /// Whether the filter of a run is as good as it believes.
@@ -129,24 +124,23 @@ pub(crate) struct ConsistencyRow {
     pub coverage_mean_reference: f64,
 }
 
-impl ComparisonFile {
-    /// All candidates against one reference.
-    pub(crate) fn new(reference: (&str, &Verdict), paired: bool, candidates: &[CandidateResult]) -> Self {
-        let reference_row = VerdictRow { run: reference.0.to_owned(), verdict: *reference.1 };
-        let others = candidates.iter().filter(|c| !c.is_reference);
-        let verdicts = others.map(|c| VerdictRow { run: c.run.clone(), verdict: c.verdict });
-        let mut file = Self {
-            schema_version: 1,
-            reference: reference.0.to_owned(),
-            paired,
-            verdicts: std::iter::once(reference_row).chain(verdicts).collect(),
-            rows: Vec::new(),
-            consistency: Vec::new(),
-        };
-        for candidate in candidates {
+impl Comparison {
+    /// All candidates against one reference; `curves`: one a candidate.
+    pub(crate) fn new(
+        reference: (&str, &Verdict),
+        candidates: Vec<CandidateResult>,
+        curves: Vec<RatioCurves>,
+        outages: Vec<(f64, f64)>,
+    ) -> Self {
+        let others = candidates.iter().filter(|c| !c.is_reference).map(|c| (c.run.as_str(), &c.verdict));
+        let verdicts = std::iter::once(reference).chain(others);
+        let row = |(run, verdict): (&str, &Verdict)| VerdictRow { run: run.to_owned(), verdict: *verdict };
+        let verdicts = verdicts.map(row).collect();
+        let (mut all_rows, mut consistency) = (Vec::new(), Vec::new());
+        for candidate in &candidates {
             for (outage, comparison) in candidate.outages.iter().enumerate() {
-                file.rows.extend(rows(candidate, outage, comparison));
-                file.consistency.push(ConsistencyRow {
+                all_rows.extend(rows(candidate, outage, comparison));
+                consistency.push(ConsistencyRow {
                     run: candidate.run.clone(),
                     outage,
                     nees_mean: comparison.nees[0],
@@ -156,8 +150,199 @@ impl ComparisonFile {
                 });
             }
         }
-        file
+        Self {
+            schema_version: 1,
+            reference: reference.0.to_owned(),
+            paired: candidates.iter().all(|candidate| candidate.is_paired),
+            verdicts,
+            rows: all_rows,
+            consistency,
+            candidates,
+            curves,
+            outages,
+            doubts: Vec::new(),
+            states: vec![1, 6],
+            cause: String::new(),
+            links: Vec::new(),
+        }
     }
+
+    /// The paper's Table I.
+    pub(crate) fn table(&self) -> Table {
+        ratio_table(&self.candidates, &self.states, &self.outages)
+    }
+
+    /// The same for other programs.
+    pub(crate) fn csv(&self) -> String {
+        ratio_rows(&self.candidates, &self.states, &self.outages, &self.reference).csv()
+    }
+
+    /// The paper's Figure 7, beside its other ones.
+    pub(crate) fn figure(&self) -> PaperFigure {
+        PaperFigure::new(7, FIGURE, self.charts())
+    }
+
+    /// How much larger or smaller than the reference's the standard deviations are that the filters state.
+    fn cost(&self) -> Option<String> {
+        let state = *self.states.first()?;
+        let layout = Layout::of(&self.candidates);
+        let reference = self.candidates.iter().find(|c| c.is_reference);
+        let scenario = reference.map_or("", |c| c.label.scenario.as_str());
+        let others: Vec<(&CandidateResult, String)> = match layout.is_grid() {
+            true => {
+                let others = self.candidates.iter().filter(|c| c.label.scenario != scenario);
+                others.map(|c| (c, c.label.estimator.clone())).collect()
+            }
+            false => {
+                let others: Vec<_> = self.candidates.iter().filter(|c| !c.is_reference).collect();
+                let names = short_names(&others.iter().map(|c| c.run.as_str()).collect::<Vec<_>>());
+                others.into_iter().zip(names).collect()
+            }
+        };
+        let in_state = STATES[state];
+        if let [(only, name)] = others.as_slice() {
+            let (own, worst) = (range(&[only], state)?, worst(only)?);
+            let reference = short_names(&[self.reference.as_str()]).concat();
+            return Some(format!("{name} against {reference}: uncertainty of {in_state} {own}, {worst}"));
+        }
+        let mut names: Vec<&str> = Vec::new();
+        others.iter().for_each(|(_, name)| {
+            if !names.contains(&name.as_str()) {
+                names.push(name)
+            }
+        });
+        let cost = |name: &&str| {
+            let of_name: Vec<_> = others.iter().filter(|(_, other)| other == name).map(|(c, _)| *c).collect();
+            range(&of_name, state).map(|range| format!("{name} {range}"))
+        };
+        let costs: Vec<String> = names.iter().filter_map(cost).collect();
+        let named = costs.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(", ");
+        let more = if costs.len() > NAMED { ", …" } else { "" };
+        let cause = match self.cause.as_str() {
+            "" => format!("against {}:", short_names(&[self.reference.as_str()]).concat()),
+            cause => cause.to_owned(),
+        };
+        (!costs.is_empty()).then(|| format!("{cause} {named}{more} of the uncertainty of {in_state}"))
+    }
+
+    /// Departure of the ASEE over time: a chart a scenario, with a curve an estimator; where the names of the runs tell
+    /// neither, one with all runs.
+    fn charts(&self) -> Vec<Chart> {
+        let all: Vec<(&CandidateResult, &RatioCurves)> =
+            self.candidates.iter().zip(&self.curves).filter(|(c, _)| !c.is_reference).collect();
+        let layout = Layout::of(&self.candidates);
+        if !layout.is_grid() || layout.scenarios.len() > SCENARIOS {
+            let names = short_names(&all.iter().map(|(c, _)| c.run.as_str()).collect::<Vec<_>>());
+            let curve = |(hue, (name, (_, curves)))| (name, hue, curves);
+            let curves: Vec<_> = names.iter().map(String::as_str).zip(all).enumerate().map(curve).collect();
+            return vec![self.chart(&self.title(), &curves)];
+        }
+        let hue = |estimator: &str| layout.estimators.iter().position(|e| e == estimator).unwrap_or(0);
+        let of_scenario = |scenario: &String| {
+            let curve = |(c, curves): &(&'_ CandidateResult, &'_ RatioCurves)| {
+                (c.label.estimator.clone(), hue(&c.label.estimator), (*curves).clone())
+            };
+            let of_scenario = all.iter().filter(|(c, _)| c.label.scenario == *scenario).map(curve);
+            let curves: Vec<(String, usize, RatioCurves)> = of_scenario.collect();
+            let curves: Vec<_> =
+                curves.iter().map(|(name, hue, curves)| (name.as_str(), *hue, curves)).collect();
+            let title = format!("{}, scenario {scenario}", self.title());
+            (!curves.is_empty()).then(|| self.chart(&title, &curves))
+        };
+        layout.scenarios.iter().filter_map(of_scenario).collect()
+    }
+
+    fn title(&self) -> String {
+        format!("ASEE against {}", short_names(&[self.reference.as_str()]).concat())
+    }
+
+    fn chart(&self, title: &str, curves: &[(&str, usize, &RatioCurves)]) -> Chart {
+        let panel = |state: &usize| {
+            let line = |(name, hue, curves): &(&str, usize, &RatioCurves)| {
+                let points = curves.t_s.iter().zip(&curves.asee_pct).map(|(t, pct)| (*t, pct[*state]));
+                Series::line(name, Colour::Hue(*hue), points.collect())
+            };
+            let zero = Series::new("", Colour::Ink, Mark::Level(0.0));
+            let axis = Axis::linear(&format!("{}: (ratio − 1)·100 (%)", STATES[*state])).including(-1.0, 1.0);
+            let series = std::iter::once(zero).chain(curves.iter().map(line)).collect();
+            Panel { height: 0.8, ..Panel::new(axis, series) }
+        };
+        let panels = self.states.iter().map(panel).collect();
+        Chart::new(title, Axis::linear("time (s)"), panels).with_outages(&self.outages).in_group("time")
+    }
+
+    /// A row a run and outage, as they stand in comparison.json.
+    fn consistency_table(&self) -> Table {
+        let errors = self.states.iter().map(|s| format!("RMSE {} (%)", axis_of(*s)));
+        let mut table =
+            Table::new(["run", "outage", "NEES", "NEES of the reference", "coverage"]).and(errors);
+        let names = short_names(&self.consistency.iter().map(|row| row.run.as_str()).collect::<Vec<_>>());
+        for (i, (row, name)) in self.consistency.iter().zip(names).enumerate() {
+            let source_of = |key: &str| format!("/consistency/{i}/{key}");
+            let mut cells: Vec<Cell> = vec![
+                name.into(),
+                self.outages.get(row.outage).map_or_else(String::new, |w| window(w.0, w.1)).into(),
+                Cell::number(row.nees_mean, &source_of("nees_mean")),
+                Cell::number(row.nees_mean_reference, &source_of("nees_mean_reference")),
+                Cell::number(row.coverage_mean, &source_of("coverage_mean")),
+            ];
+            for state in &self.states {
+                let k = REPORTED * i + state;
+                let pointer = format!("/rows/{k}/rmse_end_ratio_error_pct");
+                cells.push(Cell::number(self.rows[k].rmse_end_ratio_error_pct, &pointer));
+            }
+            table.row(cells);
+        }
+        table
+    }
+}
+
+impl Answer for Comparison {
+    fn document(&self) -> Document {
+        let kind = gravest(self.verdicts.iter().map(|row| &row.verdict));
+        let lines = self.cost().into_iter().chain(verdict_lines(&self.verdicts));
+        let mut document = Document::new("What the filters believe, compared", tone(kind), lines);
+        self.doubts.iter().for_each(|doubt| document.note(Importance::Warning, doubt));
+        if !self.outages.is_empty() && !self.candidates.is_empty() {
+            document.text(&format!(
+                "Mean over the outage of (ASEE ratio − 1)·100 against {}; {}.",
+                short_names(&[self.reference.as_str()]).concat(),
+                meaning_of_intervals(&self.candidates)
+            ));
+            document.lead(Layout::of(&self.candidates).by_state(&self.states, &self.outages));
+        }
+        if !self.links.is_empty() {
+            document.folded("Pages of the single results", |page| page.links(&self.links));
+        }
+        document.text(CAPTION);
+        document.charts(&self.charts(), "");
+        if !self.outages.is_empty() {
+            document.section("Consistency and errors");
+            document.text("NEES (9 if right) and coverage over the outage; RMSE at its end against the reference, (ratio − 1)·100.");
+            document.table(&self.consistency_table());
+        }
+        document
+    }
+}
+
+/// Smallest and largest departure of the ASEE of a state, over runs and outages: "+3 %", "+24 to +35 %".
+fn range(candidates: &[&CandidateResult], state: usize) -> Option<String> {
+    let all = candidates.iter().flat_map(|c| &c.outages).map(|outage| outage.states[state].asee.pct);
+    let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), pct| (a.min(pct), b.max(pct)));
+    let [low_text, high_text] = [low, high].map(|pct| format!("{pct:+.0}"));
+    match low_text == high_text {
+        _ if low > high => None,
+        true => Some(format!("{low_text} %")),
+        false => Some(format!("{low_text} to {high_text} %")),
+    }
+}
+
+/// The state whose ASEE departs most: "most in roll (+8 %)".
+fn worst(candidate: &CandidateResult) -> Option<String> {
+    let all =
+        candidate.outages.iter().flat_map(|outage| outage.states.iter().map(|s| s.asee.pct).enumerate());
+    let (state, pct) = all.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))?;
+    Some(format!("most in {} ({pct:+.0} %)", STATES[state]))
 }
 
 fn rows<'a>(
@@ -179,39 +364,59 @@ fn rows<'a>(
     })
 }
 
-/// Which filters are as good as they believe: a line a kind, the gravest first.
+/// How many filters are consistent and undecided, and which are neither: one line, or one a kind where that is long.
 pub(crate) fn verdict_lines(verdicts: &[VerdictRow]) -> Vec<String> {
     let names = short_names(&verdicts.iter().map(|row| row.run.as_str()).collect::<Vec<_>>());
-    let line = |kind: VerdictKind| {
-        let of_kind = verdicts.iter().zip(&names).filter(|(row, _)| row.verdict.kind == kind);
-        let runs: Vec<String> =
-            of_kind.map(|(row, name)| format!("{name} ({})", verdict_in_short(&row.verdict))).collect();
-        (!runs.is_empty()).then(|| format!("{kind}: {}", runs.join(", ")))
+    let mut kinds: Vec<VerdictKind> = verdicts.iter().map(|row| row.verdict.kind).collect();
+    kinds.sort_unstable_by(|a, b| b.cmp(a));
+    kinds.dedup();
+    let part = |kind: &VerdictKind| {
+        let of_kind: Vec<_> =
+            verdicts.iter().zip(&names).filter(|(row, _)| row.verdict.kind == *kind).collect();
+        let count = format!("{} of {} filters {kind}", of_kind.len(), verdicts.len());
+        match kind {
+            VerdictKind::Consistent => count,
+            VerdictKind::Undecided => {
+                let needed = of_kind.iter().filter_map(|(row, _)| row.verdict.runs_to_decide).max();
+                format!("{count} ({} runs would decide)", needed.unwrap_or_default())
+            }
+            VerdictKind::Doubtful => format!("{count} (beyond linear theory: run --method both)"),
+            _ => {
+                let named = |(row, name): &(&VerdictRow, &String)| {
+                    format!("{name} ({})", verdict_in_short(&row.verdict))
+                };
+                let worst = of_kind.iter().max_by(|a, b| a.0.verdict.nees.total_cmp(&b.0.verdict.nees));
+                format!("{count}, most: {}", worst.map(named).unwrap_or_default())
+            }
+        }
     };
-    VerdictKind::ALL.into_iter().rev().filter_map(line).collect()
+    let parts: Vec<String> = kinds.iter().map(part).collect();
+    let line = parts.join("; ");
+    if line.chars().count() <= LINE { vec![line] } else { parts }
 }
+
+/// Characters of a line.
+const LINE: usize = 120;
+/// Estimators or runs that the verdict names.
+const NAMED: usize = 3;
+/// Scenarios that have a chart each; of more, one chart has all runs.
+const SCENARIOS: usize = 6;
+
+const FIGURE: &str =
+    "Departure of the ASEE of each filter from that of AWV in scenario I, (ratio − 1)·100; outages shaded.";
+
+const CAPTION: &str = "ASEE (averaged standard estimation error) is the filter's own standard deviation: 0 % is as the reference believes.";
 
 /// What the ± of the table are.
 pub(crate) fn meaning_of_intervals(candidates: &[CandidateResult]) -> &'static str {
     let states = || candidates.iter().flat_map(|c| &c.outages).flat_map(|outage| &outage.states);
     if states().any(|state| state.calibration_half_pct.is_some()) {
-        "± half the 95 % interval, Monte Carlo and calibrations together"
+        "± half the 95 % interval, Monte Carlo and calibrations"
     } else if states().all(|state| state.asee.ci95_pct.is_none()) {
-        "nothing is drawn in a covariance analysis, and what the calibrations leave open is not known: no intervals"
+        "covariance analysis: no Monte-Carlo intervals"
     } else {
-        "± half the 95 % interval of Monte Carlo; what the calibrations leave open (run --method lincov) is not in it"
+        "± half the 95 % interval of Monte Carlo"
     }
-}
-
-/// Each name once, where it stood first.
-pub(super) fn in_order<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
-    let mut unique = Vec::new();
-    for name in names {
-        if !unique.contains(&name) {
-            unique.push(name);
-        }
-    }
-    unique
 }
 
 #[cfg(test)]
@@ -220,33 +425,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_of_directories_are_places_in_the_table() {
-        let cases = [
-            ("runs/II_sr-awv", "II", "SR-AWV"),
-            ("II/dr-awv", "II", "DR-AWV"),
-            ("./III-AWV/", "III", "AWV"),
-            ("awv", "", "AWV"),
-            ("rgmwm", "", "RGMWM"),
-            ("city", "city", "GMWM"),
-            ("lawv", "lawv", "GMWM"),
-        ];
-        for (directory, scenario, estimator) in cases {
-            let label = Label::of(directory, Some("gmwm"));
-            assert_eq!(
-                (label.scenario.as_str(), label.estimator.as_str()),
-                (scenario, estimator),
-                "{directory}"
-            );
-        }
-    }
-
-    #[test]
     fn the_file_has_the_keys_of_the_interface() {
-        let file = ComparisonFile::new(
-            ("I/awv", &Verdict::of(&[], 2, None)),
-            true,
-            &[candidate("II/awv", 3.0, false)],
-        );
+        let verdict = Verdict::of(&[], 2, None);
+        let file =
+            Comparison::new(("I/awv", &verdict), vec![candidate("II/awv", 3.0, false)], vec![], vec![]);
         let json = serde_json::to_value(&file).unwrap();
         assert_eq!(json["reference"], "I/awv");
         assert_eq!(json["rows"].as_array().unwrap().len(), 18);

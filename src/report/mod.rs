@@ -9,11 +9,13 @@ mod comparison_table;
 mod curves;
 mod design;
 mod displaced;
+mod dots;
 mod efficiency;
 mod fits;
 mod fusion;
 mod fusion_files;
 mod manifest;
+mod merged_study;
 mod pages;
 mod recording;
 pub(crate) mod requirement;
@@ -22,6 +24,7 @@ pub(crate) mod run_words;
 #[cfg(test)]
 pub(crate) mod sample;
 mod smoothed;
+mod states;
 mod study;
 pub(crate) mod tables;
 mod trajectory;
@@ -34,12 +37,12 @@ use serde::Serialize;
 
 pub(crate) use choose::{ChoiceReport, RankedPlace};
 pub(crate) use closure::TrajectoryCheck;
-pub(crate) use comparison::{CandidateResult, ComparisonFile, Label, meaning_of_intervals, verdict_lines};
-pub(crate) use comparison_table::{consistency_rows, ratio_rows, table_rows, with_times};
+pub(crate) use comparison::{Comparison, RatioCurves};
+pub(crate) use comparison_table::{CandidateResult, Label};
 pub(crate) use curves::{CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile};
-pub(crate) use design::{Design, DesignedParameter, DesignedQuantile, design_rows, design_verdict};
+pub(crate) use design::{Design, DesignedParameter, DesignedQuantile, Designs};
 pub(crate) use displaced::displaced_words;
-pub(crate) use efficiency::{EfficiencyFile, EfficiencyRow, efficiency_csv, efficiency_table};
+pub(crate) use efficiency::{EfficiencyFile, EfficiencyRow, efficiency_csv};
 pub(crate) use fits::FitsFile;
 pub(crate) use fusion::FusionSummary;
 pub(crate) use fusion_files::{FUSION_FILES, fusion_directory};
@@ -51,20 +54,18 @@ pub(crate) trait Answer: Serialize {
     fn document(&self) -> Document;
 }
 
+pub(crate) use merged_study::{MergedStudy, ShownCell, ShownColumn};
 pub use nav_sim_document::readable;
-pub(crate) use nav_sim_document::{seconds, short_names, six_digits, window};
-pub(crate) use pages::{
-    PaperFigure, RatioCurves, ShownComparison, StudyCurves, choice_page, design_page, efficiency_page,
-    efficiency_svg, fusion_page, paper_figures, paper_page, run_svg, study_page,
-};
+pub(crate) use nav_sim_document::{seconds, six_digits, window};
+pub(crate) use pages::{StudyCurves, fusion_page, paper_figures, paper_page, run_svg};
 pub(crate) use recording::{gnss_csv, imu_csv, initial_toml};
 pub use run_directory::{OutputFile, run_directory};
 pub(crate) use run_directory::{RUN_FILES, json, summary_json};
 #[cfg(any(test, feature = "parquet"))]
 pub(crate) use study::ValueKind;
 pub(crate) use study::{
-    ColumnResult, ShownCell, ShownColumn, TableColumn, TableRow, Value, drift_table, epoch_columns,
-    epoch_rows, outage_columns, outage_rows, ratio_table, run_columns, run_rows, verdict_table,
+    ColumnResult, TableColumn, TableRow, Value, epoch_columns, epoch_rows, outage_columns, outage_rows,
+    run_columns, run_rows,
 };
 pub use trajectory::TrajectorySeries;
 pub(crate) use trajectory::trajectory_svg;
@@ -88,29 +89,4 @@ pub(crate) const WIDTH: usize = 120;
 /// A table of rows, of which the first is the head, in Markdown.
 pub(crate) fn markdown_table(rows: &[Vec<String>]) -> String {
     page::Table::of_rows(rows).markdown()
-}
-
-/// The same, cut where a line would be too long, each part with the first column.
-pub(crate) fn terminal_columns(rows: &[Vec<String>]) -> String {
-    terminal_table(rows, 1)
-}
-
-/// The same with so many columns in each part.
-pub(crate) fn terminal_table(rows: &[Vec<String>], keys: usize) -> String {
-    page::Table::of_rows(rows).with_keys(keys).columns(WIDTH)
-}
-
-/// A text in Markdown, of which no part is taken for a cell's end, a line's end or HTML.
-pub(crate) fn markdown(text: &str) -> String {
-    text.replace('|', "\\|").replace('<', "&lt;").replace(['\n', '\r'], " ")
-}
-
-/// The same as CSV.
-pub(crate) fn csv_table(rows: &[Vec<String>]) -> String {
-    page::Table::of_rows(rows).csv()
-}
-
-/// The same as a `tabular` of LaTeX.
-pub(crate) fn latex_table(rows: &[Vec<String>]) -> String {
-    page::Table::of_rows(rows).latex()
 }

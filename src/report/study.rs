@@ -1,11 +1,7 @@
 //! Tables of studies: one row a cell, column and outage (and epoch, and run). Every column has its unit in
 //! its name; numbers that do not exist are NaN (null in JSON).
 
-use super::comparison::{CandidateResult, Label};
-use super::comparison_table::{table_rows, with_times};
-use super::number::{readable, window};
-use super::verdict::verdict_in_short;
-use nav_sim_navigation::metrics::{self, EpochMetrics, Measured, OutageComparison, OutageMetrics, Verdict};
+use nav_sim_navigation::metrics::{self, EpochMetrics, Measured, OutageComparison, OutageMetrics};
 use nav_sim_navigation::simulation::{BIAS_NAMES, REPORTED, REPORTED_NAMES};
 
 /// A value of a table.
@@ -225,91 +221,6 @@ pub(crate) fn run_rows(result: &ColumnResult<'_>) -> Vec<TableRow> {
             let states = whole.chain(o.see_mean).chain(o.see_end).chain(o.error_end);
             let ends = [o.nees_end, o.log_density_end, o.horizontal_error_end_m, o.reconvergence_s];
             row.extend(states.chain(ends).map(Value::Float));
-            rows.push(row);
-        }
-    }
-    rows
-}
-
-/// A column of a cell as people read it.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct ShownColumn {
-    /// Candidate, and filter where there are several.
-    pub name: String,
-    /// Its place in the table of ratios.
-    pub label: Label,
-    /// Its outages.
-    pub outages: Vec<OutageMetrics>,
-    /// Against the reference, if ratios are kept.
-    pub comparison: Option<Vec<OutageComparison>>,
-    /// Whether it is the reference.
-    pub is_reference: bool,
-    /// Whether its filter is as good as it believes.
-    pub verdict: Verdict,
-}
-
-/// A cell as people read it.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct ShownCell {
-    /// Its name.
-    pub name: String,
-    /// Its columns.
-    pub columns: Vec<ShownColumn>,
-}
-
-/// The layout of the paper's Table I for one cell, a candidate (with its filter, where there are several) in the place of
-/// a scenario; `states` are indices of reported states.
-pub(crate) fn ratio_table(cell: &ShownCell, states: &[usize]) -> Vec<Vec<String>> {
-    let candidate = |column: &ShownColumn| CandidateResult {
-        run: column.name.clone(),
-        label: column.label.clone(),
-        is_reference: column.is_reference,
-        is_paired: true,
-        verdict: column.verdict,
-        outages: column.comparison.clone().unwrap_or_default(),
-    };
-    let rows = table_rows(&cell.columns.iter().map(candidate).collect::<Vec<_>>(), states);
-    let outages = cell.columns.first().map_or(&[][..], |column| &column.outages);
-    let outages: Vec<(f64, f64)> = outages.iter().map(|o| (o.start_s, o.end_s)).collect();
-    let mut rows = with_times(rows, &outages);
-    rows[0][0] = "candidate".to_owned();
-    rows
-}
-
-/// Whether the filters are as good as they believe: a row a cell, a column a candidate; the ratio is that of
-/// error to standard deviation in the state that is farthest off.
-pub(crate) fn verdict_table(cells: &[ShownCell]) -> Vec<Vec<String>> {
-    let mut rows = vec![vec!["cell".to_owned()]];
-    if let Some(cell) = cells.first() {
-        rows[0].extend(cell.columns.iter().map(|c| c.name.clone()));
-    }
-    let shown =
-        |column: &ShownColumn| format!("{}, {}", column.verdict.kind, verdict_in_short(&column.verdict));
-    rows.extend(
-        cells
-            .iter()
-            .map(|cell| std::iter::once(cell.name.clone()).chain(cell.columns.iter().map(shown)).collect()),
-    );
-    rows
-}
-
-/// Horizontal error just before the first fix after each outage, median and (95 %) in metres: a row an
-/// outage, a column a candidate.
-pub(crate) fn drift_table(cells: &[ShownCell]) -> Vec<Vec<String>> {
-    let mut rows = vec![["cell", "outage"].map(str::to_owned).to_vec()];
-    if let Some(cell) = cells.first() {
-        rows[0].extend(cell.columns.iter().map(|c| c.name.clone()));
-    }
-    for ShownCell { name, columns } in cells {
-        let Some(first) = columns.first() else { continue };
-        for (i, o) in first.outages.iter().enumerate() {
-            let mut row = vec![name.clone(), window(o.start_s, o.end_s)];
-            let shown = |column: &ShownColumn| {
-                let o = &column.outages[i];
-                let (p50, p95) = (o.horizontal_p50_m.value, o.horizontal_p95_m.value);
-                format!("{} ({})", readable(p50), readable(p95))
-            };
-            row.extend(columns.iter().map(shown));
             rows.push(row);
         }
     }

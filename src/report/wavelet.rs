@@ -102,7 +102,7 @@ fn chart(file: &SignalsFile, (sensor, axis): (&str, &str)) -> Chart {
 
 /// The recordings, each once.
 fn recordings(file: &SignalsFile) -> Vec<&str> {
-    super::comparison::in_order(file.signals.iter().map(|s| s.file.as_str()))
+    super::comparison_table::in_order(file.signals.iter().map(|s| s.file.as_str()))
 }
 
 /// The scale at which classical over robust is largest of those that are well known, and that ratio.

@@ -7,11 +7,12 @@ use super::leave_one_out::Folds;
 use super::plan::NamedUnit;
 use super::planned::Planned;
 use super::remark::Remark;
-use super::tables::{Tables, Texts};
+use super::tables::Tables;
 use crate::formats::FileError;
 use crate::formats::atomic::AtomicDir;
 use crate::observer::Observer;
-use crate::report;
+use crate::report::{self, MergedStudy};
+use nav_sim_document::Document;
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 use rayon::prelude::*;
 use serde_json::json;
@@ -33,8 +34,8 @@ pub struct MergeOptions {
 pub struct MergeReport {
     /// The directory of the tables.
     pub results: PathBuf,
-    /// Tables for people: those of `tables.md`.
-    pub text: String,
+    /// What is said and drawn of it.
+    pub document: Document,
     /// `study.json`: where the results are from.
     pub summary: serde_json::Value,
     /// Runs that diverged; they are in no number.
@@ -60,26 +61,25 @@ pub fn merge(
     let results = planned.directory.join("results");
     let mut out = AtomicDir::create(&results)?;
     let mut tables = Tables::create(&mut out, planned)?;
-    let mut texts = Texts::new(planned);
+    let mut merged = subject(planned, &options.states);
     let mut folds = Folds::default();
-    let diverged = match gather(planned, &units, options.threads, &mut tables, &mut texts, &mut folds)? {
+    let diverged = match gather(planned, &units, options.threads, &mut tables, &mut merged, &mut folds)? {
         Ok(diverged) => diverged,
         Err(missing) => return Err(StudyError::Incomplete { units: units.len(), missing }),
     };
     tables.finish()?;
-    texts.rankings = folds.ranked(planned);
-    let text = texts.render(&options.states);
-    out.write("tables.md", format!("{text}\n"))?;
-    out.write("report.html", texts.page(&options.states))?;
-    if !texts.rankings.is_empty() {
-        let rankings: Vec<&serde_json::Value> = texts.rankings.iter().map(|place| &place.json).collect();
+    merged.rankings = folds.ranked(planned);
+    let document = merged.document();
+    out.write("report.html", document.html())?;
+    if !merged.rankings.is_empty() {
+        let rankings: Vec<&serde_json::Value> = merged.rankings.iter().map(|place| &place.json).collect();
         out.write("ranking.json", report::json(&json!({ "schema_version": 1, "rankings": rankings })))?;
     }
     let summary = summary(planned, units.len(), diverged);
     out.write("study.json", report::json(&summary))?;
     remove_stale(planned)?;
     out.commit()?;
-    Ok(MergeReport { results, text, summary, diverged })
+    Ok(MergeReport { results, document, summary, diverged })
 }
 
 /// Takes cell by cell into the tables, in their order, as long as no unit is damaged; how many runs diverged, or all units
@@ -89,7 +89,7 @@ fn gather(
     units: &[NamedUnit],
     threads: usize,
     tables: &mut Tables,
-    texts: &mut Texts,
+    merged: &mut MergedStudy,
     folds: &mut Folds,
 ) -> Result<Result<u64, Vec<NamedUnit>>, StudyError> {
     let cells: Vec<&[NamedUnit]> = units.chunk_by(|a, b| a.0.cell == b.0.cell).collect();
@@ -104,7 +104,7 @@ fn gather(
                     diverged += cell.diverged;
                     tables.add(&cell)?;
                     folds.add(planned, &cell);
-                    texts.add(cell.shown);
+                    merged.add(cell.shown);
                 }
                 Ok(_) => {}
                 Err(units) => damaged.extend(units),
@@ -112,6 +112,25 @@ fn gather(
         }
     }
     Ok(if damaged.is_empty() { Ok(diverged) } else { Err(damaged) })
+}
+
+/// A merged study without cells.
+fn subject(planned: &Planned, states: &[usize]) -> MergedStudy {
+    let study = &planned.plan.study;
+    let same = if study.filters.len() > 1 { " with the same filter" } else { "" };
+    let runs = match study.is_sampled() {
+        true => format!("{} runs a cell", study.runs),
+        false => "covariance analysis".to_owned(),
+    };
+    let name = planned.study.file_stem().unwrap_or_default().to_string_lossy();
+    MergedStudy {
+        subject: format!("study {name} on {}, {runs}", planned.grid.trajectories.join(", ")),
+        reference: format!("{}{same}", planned.reference().1),
+        states: states.to_vec(),
+        cells: Vec::new(),
+        more: 0,
+        rankings: Vec::new(),
+    }
 }
 
 /// Cells that are held in memory together.

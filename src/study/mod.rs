@@ -31,7 +31,7 @@
 //!     study::run(&planned, &RunOptions { shard, threads: 2 }, &())?;
 //! }
 //! let merged = study::merge(&planned, &MergeOptions { states: vec![1, 6], threads: 2 }, &())?;
-//! println!("{}", merged.text);
+//! println!("{}", merged.document.terminal(100));
 //! # Ok::<(), study::StudyError>(())
 //! ```
 

@@ -7,8 +7,8 @@ use crate::common::batch::*;
 use std::fs;
 use std::path::Path;
 
-const FILES: [&str; 7] =
-    ["epochs.csv", "outages.csv", "outages.json", "report.html", "runs.csv", "study.json", "tables.md"];
+const FILES: [&str; 6] =
+    ["epochs.csv", "outages.csv", "outages.json", "report.html", "runs.csv", "study.json"];
 
 /// Plans and runs the study in one process.
 fn whole(dir: &Path, out: &str) -> Vec<(String, Vec<u8>)> {
@@ -244,17 +244,17 @@ fn every_candidate_and_filter_is_in_the_ratio_table() {
     let two = MODEL.replace("4e-12 }", "4e-12 }, { type = \"AR1\", phi = 0.99, sigma2 = 1e-8 }");
     fs::write(dir.join("wrong.toml"), two).unwrap();
     whole(dir, "out");
-    let text = fs::read_to_string(dir.join("out/results/tables.md")).unwrap();
-    let (_, ratios) = text.split_once(": ASEE relative to III/awv with the same filter, mean").unwrap();
-    let ratios = ratios.split("none: ASEE").next().unwrap();
+    let page = fs::read_to_string(dir.join("out/results/report.html")).unwrap();
+    let (_, ratios) = page.split_once(": ASEE relative to III/awv with the same filter</h2>").unwrap();
+    let ratios = ratios.split("</table>").next().unwrap();
     let filters = ["15", "full"];
     for name in ["clean/awv", "III/awv", "II"].iter().flat_map(|c| filters.map(|f| format!("{c} {f}"))) {
-        let row: Vec<&str> = ratios.lines().filter(|l| l.contains(&name)).collect();
-        assert_eq!(row.len(), 1, "{name}: {ratios}");
+        let rows: Vec<&str> = ratios.split("<tr>").filter(|row| row.contains(&format!(">{name}<"))).collect();
+        assert_eq!(rows.len(), 1, "{name}: {ratios}");
         // two states are shown, each by estimator: two for the calibrated ones, none for the others
-        let filled = row[0].matches('(').count() + row[0].matches(" –").count();
+        let filled = rows[0].matches('±').count() + rows[0].matches("reference").count();
         assert_eq!(filled, if name.starts_with("II ") { 4 } else { 2 }, "{ratios}");
-        assert_eq!(row[0].contains(" –"), name.starts_with("III"), "{ratios}");
+        assert_eq!(rows[0].contains("reference"), name.starts_with("III"), "{ratios}");
     }
     let text = fs::read_to_string(dir.join("out/results/outages.json")).unwrap();
     let rows: Vec<serde_json::Value> = serde_json::from_str(&text).unwrap();

@@ -54,7 +54,7 @@ fn an_interrupted_demo_goes_on() {
     let said = String::from_utf8(refused.stderr).unwrap();
     assert!(refused.status.code() == Some(2) && said.contains("is of a demo of another seed"), "{said}");
 
-    let said = interrupted(demo(&out, &[]).spawn().unwrap(), &out, done + 1);
+    let said = interrupted(demo(&out, &["--verbose"]).spawn().unwrap(), &out, done + 1);
     assert!(said.contains(&format!("{done} of 17 commands are done, seed {seed}\n")), "{said}");
     assert_eq!(progress(&out).1, seed);
     let commands: Vec<&str> = said.lines().filter(|line| line.starts_with("$ ")).collect();

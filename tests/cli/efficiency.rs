@@ -21,7 +21,7 @@ fn read(dir: &Path, file: &str) -> String {
     fs::read_to_string(dir.join(file)).unwrap()
 }
 
-const FILES: [&str; 5] = ["study.json", "sets.csv", "results.csv", "results.json", "results.txt"];
+const FILES: [&str; 5] = ["study.json", "sets.csv", "results.csv", "results.json", "report.html"];
 
 #[test]
 fn a_stopped_study_goes_on_to_the_same_results_at_any_number_of_threads() {

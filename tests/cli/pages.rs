@@ -130,7 +130,7 @@ fn runs_and_their_comparison_have_pages_with_the_numbers_of_their_results() {
     is_whole(&page);
     let comparison: Value = serde_json::from_str(&text(&dir.join("out/c.json"))).unwrap();
     assert_eq!(numbers_as_in(&page, &comparison), 5); // one run, one outage: NEES, its reference, coverage, two RMSE
-    assert!(page.contains("30–40 s") && text(&dir.join("c.svg")).contains("position east"));
+    assert!(page.contains("30–40 s") && text(&dir.join("c.svg")).contains("East position"));
 }
 
 #[test]

@@ -3,13 +3,14 @@
 use super::Place;
 use super::watch::Watch;
 use crate::cli::{Failure, Session};
+use crate::report::WIDTH;
 use crate::study::{self, MergeOptions, NamedUnit, Planned, StudyError, Unit};
 use serde_json::json;
 
 /// Write the tables of a finished study: outages, ratios to the reference, epochs, runs
 ///
 /// Writes results/ in the directory of the study: outages.csv and .json (one row for each outage of each candidate in
-/// each cell), runs.csv, epochs.csv if the study asks for it, tables.md, report.html. The
+/// each cell), runs.csv, epochs.csv if the study asks for it, report.html. The
 /// bytes depend on the plan alone, not on how it was run. Ratios are taken within a filter: column `reference`
 /// names the candidate they refer to, in the row's own filter. Nothing is written while units are missing: they
 /// are listed with --verbose or --format json, and the exit code is 1.
@@ -39,27 +40,16 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         }
         e => e.into(),
     })?;
-    let text = || if session.verbose() { merged.text.clone() } else { beginning(merged.text.trim_end()) };
+    let document = &merged.document;
+    let text = || if session.verbose() { document.verbose(WIDTH) } else { document.terminal(WIDTH) };
     session.show(|| merged.summary.to_string(), text);
+    document.spoken(session.verbose()).for_each(|note| session.say(&note.text));
     session.wrote(&merged.results);
     if merged.diverged == 0 {
         return Ok(());
     }
     let failure = Failure::bound(format!("{} runs diverged", merged.diverged));
     Err(failure.hint("they are in runs.csv, diverged = 1, and in no other number"))
-}
-
-/// Lines that are shown unless all are asked for.
-const LINES: usize = 18;
-
-/// The beginning of a text that is longer than a screen.
-fn beginning(text: &str) -> String {
-    let all = text.lines().count();
-    if all <= LINES {
-        return text.to_owned();
-    }
-    let shown: Vec<&str> = text.lines().take(LINES - 1).collect();
-    format!("{}\n… {} lines more: --verbose, or tables.md", shown.join("\n"), all - shown.len())
 }
 
 /// Units that are missing or damaged, all of them on stdout as JSON or with --verbose.

@@ -103,9 +103,6 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let planned = args.place.planned(session.asked_seed())?;
     let variable = |name: &str| std::env::var(name).ok();
     let (shard, from) = shard::find(args.shard, args.shards, &variable)?;
-    if let Some(remark) = shard::mismatch(args.shard, args.shards, &variable) {
-        session.warn(&remark);
-    }
     let (index, count) = shard.parts();
     session.say(format!("shard {index}/{count} ({from})"));
     let options = RunOptions { shard, threads: session.threads() };

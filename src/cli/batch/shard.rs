@@ -66,21 +66,6 @@ pub(super) fn find(
     }
 }
 
-/// What to say when a Slurm array has another number of tasks than there are shards: right for a part of an
-/// array that is submitted again, a mistake otherwise.
-pub(super) fn mismatch(
-    flag: Option<Shard>,
-    shards: Option<u64>,
-    variable: &dyn Fn(&str) -> Option<String>,
-) -> Option<String> {
-    let of_slurm = flag.is_none() && variable("HQ_TASK_ID").is_none();
-    let shards = shards.filter(|_| of_slurm)?;
-    variable("SLURM_ARRAY_TASK_ID")?;
-    let count: u64 = variable("SLURM_ARRAY_TASK_COUNT")?.trim().parse().ok()?;
-    let others = if count < shards { "the other shards are not done by it" } else { "some have no shard" };
-    (count != shards).then(|| format!("--shards {shards}, but the Slurm array has {count} tasks: {others}"))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -128,20 +113,5 @@ mod tests {
                 .contains("PBS_ARRAY_INDEX=x is not a number")
         );
         assert!(error(found(None, Some(7), &[])).contains("no scheduler"));
-    }
-
-    #[test]
-    fn an_array_of_another_size_is_said() {
-        let said = |shards: Option<u64>, count: &str| {
-            let variable = |name: &str| match name {
-                "SLURM_ARRAY_TASK_ID" => Some("0".to_owned()),
-                "SLURM_ARRAY_TASK_COUNT" => Some(count.to_owned()),
-                _ => None,
-            };
-            mismatch(None, shards, &variable)
-        };
-        assert!(said(None, "4").is_none() && said(Some(4), "4").is_none());
-        assert!(said(Some(8), "4").unwrap().contains("the Slurm array has 4 tasks: the other shards"));
-        assert!(said(Some(2), "4").unwrap().contains("some have no shard"));
     }
 }

@@ -8,7 +8,7 @@ pub(crate) use charts::{CAPTION, variance as variance_chart};
 pub(crate) use words::{notes, reasons, stem, turn_on_remark};
 
 use crate::report::Answer;
-use crate::report::comparison::in_order;
+use crate::report::comparison_table::in_order;
 use crate::report::curves::{CurvesFile, FittedCurve};
 use crate::report::fits::{FitsFile, interval_of};
 use figures::{averages, figures, policy};

@@ -1,6 +1,6 @@
 //! A calibration in words: the verdict on models and recordings, the remarks.
 
-use crate::report::comparison::in_order;
+use crate::report::comparison_table::in_order;
 use nav_sim_calibration::{
     Beginning, Beginnings, Candidate, Diagnosis, Estimator, Misfit, Miss, Note, Outcome, ParameterInterval,
     Ranking, Settings, TurnOnFinding, TurnOnSpread, Undetermined, Verdict, WIDEST, WarmUp, duration, percent,

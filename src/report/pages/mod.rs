@@ -1,25 +1,14 @@
 //! The page of each result.
 
-mod choice;
-mod comparison;
-mod design;
-mod efficiency;
 mod fusion;
 mod paper;
 mod run;
 mod run_budgets;
 mod run_charts;
-mod study;
-
-pub(crate) use choice::choice_page;
-pub(crate) use comparison::{RatioCurves, ShownComparison};
-pub(crate) use design::design_page;
-pub(crate) use efficiency::{efficiency_page, efficiency_svg};
 pub(crate) use fusion::fusion_page;
 pub(crate) use paper::{PaperFigure, StudyCurves, paper_figures, paper_page};
 pub(super) use run::run_page;
 pub(crate) use run_charts::run_svg;
-pub(crate) use study::study_page;
 
 use super::number;
 use super::page::Tone;
@@ -44,7 +33,7 @@ fn error_of(state: &str) -> String {
     state.replacen(" (", " error (", 1)
 }
 
-const fn tone(kind: VerdictKind) -> Tone {
+pub(super) const fn tone(kind: VerdictKind) -> Tone {
     match kind {
         VerdictKind::Consistent => Tone::Good,
         VerdictKind::Undecided => Tone::Undecided,

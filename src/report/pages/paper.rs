@@ -28,7 +28,7 @@ impl PaperFigure {
         svg(&format!("Fig. {}: {}", self.number, self.caption), &self.charts)
     }
 
-    pub(super) fn new(number: u32, caption: &str, charts: Vec<Chart>) -> Self {
+    pub(crate) fn new(number: u32, caption: &str, charts: Vec<Chart>) -> Self {
         Self { number, caption: caption.to_owned(), charts }
     }
 }

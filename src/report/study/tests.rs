@@ -75,25 +75,3 @@ fn values_stand_under_their_names() {
     assert_eq!(value_of("horizontal_error_end_max_m"), Value::Float(o.horizontal_max_m));
     assert!(matches!(value_of("coverage_mean"), Value::Float(x) if x.is_nan()));
 }
-
-/// A row is of a candidate and of an outage, which is told by its times.
-#[test]
-fn ratios_stand_beside_candidates_and_times() {
-    let result = sample::result();
-    let (outages, experiment) = (metrics::outages(&result), Measured::from(&result));
-    let comparison = metrics::compare(&experiment, &experiment, true).unwrap();
-    let column = |name: &str, is_reference: bool| ShownColumn {
-        name: name.to_owned(),
-        label: Label::of(name, None),
-        outages: outages.clone(),
-        comparison: Some(comparison.clone()),
-        is_reference,
-        verdict: Verdict::of(&[], 2, None),
-    };
-    let cell =
-        ShownCell { name: "land".to_owned(), columns: vec![column("right", true), column("wrong", false)] };
-    let rows = ratio_table(&cell, &[1]);
-    assert_eq!(rows[0][..2], ["candidate", "outage"]);
-    assert_eq!(rows[1][..2], ["right".to_owned(), window(outages[0].start_s, outages[0].end_s)]);
-    assert_eq!(rows.len(), 1 + 2 * outages.len());
-}
