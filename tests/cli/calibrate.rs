@@ -296,7 +296,7 @@ fn wv_prints_the_curves_of_every_signal() {
     let (digest, all) = (text(&[]), text(&["--verbose"]));
     assert!(digest.lines().count() <= 20 && digest.contains("gyro.x (rad/s)"), "{digest}");
     assert!(all.contains("gyro.x: Allan deviation (rad/s)") && all.contains("run0.csv"), "{all}");
-    assert!(text(&["--per-file"]).contains("run0.csv  run1.csv"));
+    assert!(["run0.csv", "run1.csv"].iter().all(|name| text(&["--per-file"]).contains(name)));
     assert!(text(&["--per-file"]).lines().all(|line| line.chars().count() <= 120));
     assert_eq!(text(&["--format", "csv"]).lines().count(), 1 + 4 * 13);
     let stderr = refusal(dir.path(), &["check", "runs/run0.csv", "--format", "csv"], 2);

@@ -100,7 +100,7 @@ impl ShownCalibration<'_> {
             notes.push((importance, format!("{}: {}", found.sensor.name(), turn_on_remark(found))));
         }
         notes.extend(
-            words::beginnings(self.beginnings, fits, settings).map(|line| (Importance::Remark, line)),
+            words::beginnings(self.beginnings, fits).map(|line| (Importance::Remark, line)),
         );
         for outcome in fits {
             let reasons = outcome.ranking.iter().flat_map(|r| reasons(r, settings.rate_hz));

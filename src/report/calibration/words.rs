@@ -15,7 +15,7 @@ const NAMED: usize = 4;
 /// The verdict: a line for each model (of more than two, for each sensor), and one for the recordings.
 pub(super) fn verdict(outcomes: &[&Outcome], diagnoses: &[Diagnosis], settings: &Settings) -> Vec<String> {
     let mut lines: Vec<String> = match outcomes.len() {
-        0..=2 => outcomes.iter().map(|o| fit_line(o, settings.rate_hz)).collect(),
+        0..=2 => outcomes.iter().map(|o| fit_line(o, &fit_name(o, outcomes), settings.rate_hz)).collect(),
         _ => Sensor::ALL
             .into_iter()
             .filter_map(|sensor| of_sensor(sensor, outcomes, settings.rate_hz))
@@ -26,8 +26,8 @@ pub(super) fn verdict(outcomes: &[&Outcome], diagnoses: &[Diagnosis], settings: 
 }
 
 /// `accel: N1 does not fit (p = 0.005): data/model 0.33 at 0.02 s (not fitted), 1.26 at 1.28 s; 6 of 16 scales off`
-fn fit_line(outcome: &Outcome, rate_hz: f64) -> String {
-    let (name, spec, departure) = (outcome.scope.name(), &outcome.spec, outcome.departure());
+fn fit_line(outcome: &Outcome, name: &str, rate_hz: f64) -> String {
+    let (spec, departure) = (&outcome.spec, outcome.departure());
     let ratio = |miss: Miss| {
         let left_out = if miss.is_fitted { "" } else { " (not fitted)" };
         format!("{} at {}{left_out}", readable(miss.ratio), duration(tau_s(miss.level, rate_hz)))
@@ -121,7 +121,7 @@ const NOTABLE: f64 = 0.05;
 const BEGINNINGS: usize = 2;
 
 /// Beginnings that are left out, or that change a wavelet variance by more than the parameters of its sensor are known to.
-pub(super) fn beginnings(found: &Beginnings, outcomes: &[&Outcome], settings: &Settings) -> Option<String> {
+pub(super) fn beginnings(found: &Beginnings, outcomes: &[&Outcome]) -> Option<String> {
     let known_to = |sensor: Sensor| {
         let fits = outcomes.iter().filter(|o| o.scope.sensor == sensor).filter_map(|o| o.inference.as_ref());
         let amplitudes =
@@ -140,8 +140,7 @@ pub(super) fn beginnings(found: &Beginnings, outcomes: &[&Outcome], settings: &S
     let line = |(b, name): (&&Beginning, &String)| {
         let change = b.surest().and_then(|(channel, w)| Some((channel, w.change?)));
         let change = change.map_or(String::new(), |(channel, c)| {
-            let at = duration(tau_s(c.level, settings.rate_hz));
-            format!(" ({channel} {:+.0} % at {at})", 100.0 * (c.ratio - 1.0))
+            format!(" ({channel} {:+.0} %)", 100.0 * (c.ratio - 1.0))
         });
         match b.skip_s {
             Some(s) if found.left_out => format!("{} {s} s", stem(name)),

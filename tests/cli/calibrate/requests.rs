@@ -95,9 +95,7 @@ fn bad_requests_are_refused_with_a_hint() {
         &["curve.csv, line 3: wv = 0 is not a number from 1e-100 to 1e100", "hint: a curve is a CSV"],
     );
     std::fs::write(dir.path().join("curve.csv"), "tau_samples,wv,edof\n2,1e-5,10\n4,1e-5,5\n").unwrap();
-    for flag in
-        [["--trim", "1"], ["--skip-s", "0"], ["--estimator", "awv"], ["--scales", "2"], ["--axes", "x"]]
-    {
+    for flag in [["--trim", "1"], ["--skip-s", "0"], ["--estimator", "awv"]] {
         let arguments = [&["calibrate", "--curve", "curve.csv", "--rate-hz", "1"][..], &flag].concat();
         check(refusal(dir.path(), &arguments, 2), &["cannot be used with", "--curve"]);
     }
