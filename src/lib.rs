@@ -50,7 +50,7 @@ pub use {nav_sim_calibration as calibration, nav_sim_navigation as navigation, n
 pub use jobs::export;
 
 // Parameters for other programs.
-mod export;
+pub mod export;
 // Which model, on the user's own recordings.
 pub mod choose;
 // What follows a job.

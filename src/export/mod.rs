@@ -2,6 +2,21 @@
 //!
 //! [`Export::new`] fits the pair that the target knows ([`noise::practical`](nav_sim_signal::noise::practical)) to the model's
 //! noisiest axis, states by how much the two differ, and [`Export::text`] writes it in the target's own syntax.
+//!
+//! ```
+//! use nav_sim::export::{Export, Settings, Target};
+//! use nav_sim::prelude::*;
+//!
+//! let white = Composite::new(vec![Process::White(White::new(4e-6)?)]);
+//! let model = Model::pooled(100.0, &white, &white);
+//! let (policy, horizon) = (Policy::Matched, Horizon::default());
+//! let settings = Settings { policy, horizon, range_s: 1e4, turn_on: [None; 2], misfit: None };
+//! let exported = Export::new(Target::Kalibr, &model, &[], settings)?;
+//! let gyroscope = exported.entries.iter().find(|line| line.key == "gyroscope_noise_density").expect("a key of Kalibr");
+//! // N = √(sigma2/f)
+//! assert!((gyroscope.value / (4e-6_f64 / 100.0).sqrt() - 1.0).abs() < 1e-9);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod autopilots;
 mod filters;
@@ -25,7 +40,7 @@ use nav_sim_signal::noise::{Composite, Model, Process};
 
 /// How a model is turned into parameters.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Settings {
+pub struct Settings {
     /// Which pair stands for the model.
     pub policy: Policy,
     /// Over which averaging times.
@@ -79,7 +94,7 @@ pub enum ExportError {
 
 /// One line of the exported file.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Entry {
+pub struct Entry {
     /// Key, as the target writes it.
     pub key: &'static str,
     /// The value, in the target's unit.
@@ -109,7 +124,7 @@ impl Entry {
 
 /// What is known of one sensor.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct SensorExport {
+pub struct SensorExport {
     /// Which sensor.
     pub sensor: Sensor,
     /// Parameters of each axis that the model has.
@@ -150,7 +165,7 @@ impl Export {
     ///
     /// # Errors
     /// When a sensor is missing or has no noise over the horizon, or the horizon does not suit the rate.
-    pub(crate) fn new(
+    pub fn new(
         target: Target,
         model: &Model,
         missing: &[Channel],
