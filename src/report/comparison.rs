@@ -200,9 +200,10 @@ impl Comparison {
             }
         };
         let in_state = STATES[state];
-        if let [(only, name)] = others.as_slice() {
+        if let [(only, _)] = others.as_slice() {
             let (own, worst) = (range(&[only], state)?, worst(only)?);
-            let reference = short_names(&[self.reference.as_str()]).concat();
+            let [name, reference] =
+                [&only.run, &self.reference].map(|run| short_names(&[run.as_str()]).concat());
             return Some(format!("{name} against {reference}: uncertainty of {in_state} {own}, {worst}"));
         }
         let mut names: Vec<&str> = Vec::new();

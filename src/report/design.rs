@@ -187,8 +187,8 @@ impl Answer for Designs {
     }
 }
 
-const BESIDE: &str = "Half of the 95 % interval to expect (% of the value); grey: of recordings without end, where they differ among themselves.";
-const AGAINST: &str = "Half of the 95 % interval to expect (% of the value) against the length of each recording; dashed: of recordings without end.";
+const BESIDE: &str = "Half of the 95 % interval to expect (% of the value).";
+const AGAINST: &str = "Half of the 95 % interval to expect (% of the value) against the length of each recording; dashed: however long they are.";
 
 /// Every parameter of one design.
 fn parameters(design: &Design) -> Table {
