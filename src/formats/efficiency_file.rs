@@ -19,8 +19,7 @@
 use super::FileError;
 use super::contamination_file;
 use super::model_file;
-use super::toml_described::Document;
-use super::toml_file::{Section, Source};
+use super::toml_file::{Source, Version};
 use nav_sim_calibration::efficiency::Design;
 use nav_sim_calibration::{AverageError, Estimator, Trim, Weighting};
 use nav_sim_signal::imu::Channel;
@@ -50,13 +49,12 @@ pub struct StudyFile {
 #[schemars(title = "Study")]
 struct Description {
     /// Version of the layout
-    #[schemars(range(min = 1, max = 1))]
-    schema: Option<u64>,
+    #[serde(rename = "schema")]
+    _schema: Option<Version>,
     /// Model file with `[spread]`, relative to this file
     model: String,
     /// The axis studied: accel.x (default) … gyro.z
-    #[serde(default = "accel_x")]
-    axis: String,
+    axis: Option<String>,
     /// What is fitted, such as N1
     fit: String,
     /// Replicates of a set, K
@@ -77,9 +75,9 @@ struct Description {
     #[schemars(length(min = 1), extend("uniqueItems" = true))]
     scenarios: Vec<String>,
     /// Estimators (default: awv, sr-awv, dr-awv)
-    #[serde(default = "of_models")]
+    #[serde(default = "default_estimators")]
     #[schemars(length(min = 1), extend("uniqueItems" = true))]
-    estimators: Vec<Several>,
+    estimators: Vec<AveragingEstimator>,
     /// Replicates that dr-awv drops at each end (default: 30 %)
     trim: Option<u64>,
     /// Efficiency of the robust wavelet variance
@@ -92,30 +90,26 @@ struct Description {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 #[schemars(inline)]
-enum Several {
+enum AveragingEstimator {
     Awv,
     SrAwv,
     DrAwv,
     Avlr,
 }
 
-impl From<Several> for Estimator {
-    fn from(estimator: Several) -> Self {
+impl From<AveragingEstimator> for Estimator {
+    fn from(estimator: AveragingEstimator) -> Self {
         match estimator {
-            Several::Awv => Self::Awv,
-            Several::SrAwv => Self::SrAwv,
-            Several::DrAwv => Self::DrAwv,
-            Several::Avlr => Self::Avlr,
+            AveragingEstimator::Awv => Self::Awv,
+            AveragingEstimator::SrAwv => Self::SrAwv,
+            AveragingEstimator::DrAwv => Self::DrAwv,
+            AveragingEstimator::Avlr => Self::Avlr,
         }
     }
 }
 
-fn accel_x() -> String {
-    "accel.x".to_owned()
-}
-
-fn of_models() -> Vec<Several> {
-    vec![Several::Awv, Several::SrAwv, Several::DrAwv]
+fn default_estimators() -> Vec<AveragingEstimator> {
+    vec![AveragingEstimator::Awv, AveragingEstimator::SrAwv, AveragingEstimator::DrAwv]
 }
 
 const fn efficiency() -> f64 {
@@ -134,38 +128,33 @@ pub(crate) fn schema() -> serde_json::Value {
 /// When a file cannot be read, has unknown keys, lacks some, or has values that mean no study.
 pub fn read(path: &Path) -> Result<StudyFile, FileError> {
     let source = Source::read(path)?;
-    let document = Document::parse(&source)?;
-    let d: Description = document.read()?;
-    let root = document.root();
-    if d.schema.is_some_and(|s| s != 1) {
-        return Err(root.refuse("schema", "is not a schema this version reads: it reads 1", None));
-    }
-    at_least(&root, "samples", d.samples, 4)?;
-    at_least(&root, "replicates", d.replicates, 1)?;
-    at_least(&root, "sets", d.sets, 1)?;
+    let d: Description = source.get()?;
+    at_least(&source, "samples", d.samples, 4)?;
+    at_least(&source, "replicates", d.replicates, 1)?;
+    at_least(&source, "sets", d.sets, 1)?;
     let beside = |name: &str| path.parent().unwrap_or(Path::new("")).join(name);
     let model = beside(&d.model);
     let file = model_file::read(&model)?;
     let samples = d.samples as usize;
     let design = Design {
         seed: 0,
-        channel: channel(&root, &d.axis, &file.missing)?,
+        channel: channel(&source, d.axis.as_deref(), &file.missing)?,
         replicates: d.replicates,
         samples,
-        levels: levels(&root, d.levels, samples)?,
-        scenarios: scenarios(&root, &d.scenarios, file.model.rate_hz, beside)?,
-        estimators: estimators(&root, d.estimators)?,
-        spec: d.fit.parse().map_err(|e| root.refuse("fit", format!("is not a model: {e}"), None))?,
+        levels: levels(&source, d.levels, samples)?,
+        scenarios: scenarios(&source, &d.scenarios, file.model.rate_hz, beside)?,
+        estimators: estimators(&source, d.estimators)?,
+        spec: d.fit.parse().map_err(|e| source.refused("fit", format!("is not a model: {e}")))?,
         trim: d.trim.map_or(Trim::default(), |a| Trim::Count(a as usize)),
         tuning: Tuning::new(d.efficiency, Convention::Exact)
-            .map_err(|_| root.refuse("efficiency", "is not between 0.3 and 0.99", None))?,
+            .map_err(|_| source.refused("efficiency", "is not between 0.3 and 0.99"))?,
         weighting: Weighting::Edof,
         spread: file.spread.unwrap_or_default(),
         model: file.model,
     };
-    enough(&root, &design)?;
-    has_slopes(&root, &design)?;
-    has_targets(&root, &design)?;
+    enough(&source, &design)?;
+    fit_has_slopes(&source, &design)?;
+    has_targets(&source, &design)?;
     Ok(StudyFile { design, seed: d.seed, sets: d.sets, model })
 }
 
@@ -173,55 +162,57 @@ pub fn read(path: &Path) -> Result<StudyFile, FileError> {
 const MOST: u64 = 1 << 40;
 
 /// Refuses a whole number that is too small, or too large.
-fn at_least(root: &Section<'_>, key: &str, value: u64, least: u64) -> Result<(), FileError> {
+fn at_least(source: &Source, key: &str, value: u64, least: u64) -> Result<(), FileError> {
     if (least..=MOST).contains(&value) {
         return Ok(());
     }
-    Err(root.refuse(key, format!("is not a whole number ≥ {least}"), None))
+    Err(source.refused(key, format!("is not a whole number ≥ {least}")))
 }
 
-fn channel(root: &Section<'_>, name: &str, missing: &[Channel]) -> Result<Channel, FileError> {
+fn channel(source: &Source, name: Option<&str>, missing: &[Channel]) -> Result<Channel, FileError> {
     let names = || Channel::ALL.map(|c| c.to_string()).join(", ");
-    let Some(channel) = Channel::ALL.into_iter().find(|c| c.to_string() == name) else {
-        return Err(root.refuse("axis", "is no axis", Some(format!("axes: {}", names()))));
+    let Some(channel) = Channel::ALL.into_iter().find(|c| c.to_string() == name.unwrap_or("accel.x")) else {
+        return Err(source.refused("axis", "is no axis").advice(format!("axes: {}", names())));
     };
     if missing.contains(&channel) {
-        let key = if root.has("axis") { "axis" } else { "model" };
-        return Err(root.refuse(key, format!("has no noise of {channel}"), None));
+        let key = if name.is_some() { "axis" } else { "model" };
+        return Err(source.refused(key, format!("has no noise of {channel}")));
     }
     Ok(channel)
 }
 
-fn levels(root: &Section<'_>, levels: Option<u64>, samples: usize) -> Result<u32, FileError> {
+fn levels(source: &Source, levels: Option<u64>, samples: usize) -> Result<u32, FileError> {
     let most = max_levels(samples);
     match levels {
         None => Ok(default_levels(samples)),
         Some(levels) if (1..=u64::from(most)).contains(&levels) => Ok(levels as u32),
         Some(_) => {
             let reason = format!("is not between 1 and {most}, the most that {samples} samples allow");
-            Err(root.refuse("levels", reason, None))
+            Err(source.refused("levels", reason))
         }
     }
 }
 
 fn scenarios(
-    root: &Section<'_>,
+    source: &Source,
     names: &[String],
     rate_hz: f64,
     beside: impl Fn(&str) -> PathBuf,
 ) -> Result<Vec<Contamination>, FileError> {
     if names.is_empty() {
-        return Err(root.refuse("scenarios", "names none", None));
+        return Err(source.refused("scenarios", "names none"));
     }
     if let Some(twice) = (1..names.len()).find(|i| names[..*i].contains(&names[*i])) {
-        return Err(root.refuse("scenarios", format!("names {} twice", names[twice]), None));
+        return Err(source.refused("scenarios", format!("names {} twice", names[twice])));
     }
     let find = |name: &String| {
         let file = beside(name);
         let preset = contamination_file::names().contains(&name.as_str());
         if !preset && !file.is_file() {
             let hint = contamination_file::meant(name).map(|m| format!("did you mean \"{m}\"?"));
-            return Err(root.refuse("scenarios", format!("names {name}, which is not there"), hint));
+            return Err(source
+                .refused("scenarios", format!("names {name}, which is not there"))
+                .advice_if(hint));
         }
         let place = if preset { name.clone() } else { file.display().to_string() };
         Ok(Contamination { name: name.clone(), ..contamination_file::find(&place, rate_hz)? })
@@ -229,32 +220,32 @@ fn scenarios(
     names.iter().map(find).collect()
 }
 
-fn estimators(root: &Section<'_>, named: Vec<Several>) -> Result<Vec<Estimator>, FileError> {
+fn estimators(source: &Source, named: Vec<AveragingEstimator>) -> Result<Vec<Estimator>, FileError> {
     let repeated = (1..named.len()).any(|i| named[..i].contains(&named[i]));
     if named.is_empty() || repeated {
-        return Err(root.refuse("estimators", "is not a list of different estimators", None));
+        return Err(source.refused("estimators", "is not a list of different estimators"));
     }
     Ok(named.into_iter().map(Estimator::from).collect())
 }
 
-fn enough(root: &Section<'_>, design: &Design) -> Result<(), FileError> {
+fn enough(source: &Source, design: &Design) -> Result<(), FileError> {
     let replicates = usize::try_from(design.replicates).unwrap_or(usize::MAX);
     let trim = design.trim.count(replicates);
     // Not 2·trim: the number is the user's.
     if design.estimators.contains(&Estimator::DrAwv) && trim >= replicates.div_ceil(2) {
         let reason = format!("are too few: {}", AverageError::Trim { trim, replicates });
-        return Err(root.refuse("replicates", reason, Some("a smaller \"trim\"".into())));
+        return Err(source.refused("replicates", reason).advice("a smaller \"trim\""));
     }
     Ok(())
 }
 
 /// AVLR reads slopes, and some processes have none.
-fn has_slopes(root: &Section<'_>, design: &Design) -> Result<(), FileError> {
+fn fit_has_slopes(source: &Source, design: &Design) -> Result<(), FileError> {
     let without = design.spec.kinds().iter().find(|k| k.shape().is_some());
     match without {
         Some(kind) if design.estimators.contains(&Estimator::Avlr) => {
             let reason = format!("has avlr, which cannot tell {}: it has no slope of its own", kind.code());
-            Err(root.refuse("estimators", reason, Some("fit = \"WN+RW\", a sum of WN, QN, RW, DR".into())))
+            Err(source.refused("estimators", reason).advice("fit = \"WN+RW\", a sum of WN, QN, RW, DR"))
         }
         _ => Ok(()),
     }
@@ -262,7 +253,7 @@ fn has_slopes(root: &Section<'_>, design: &Design) -> Result<(), FileError> {
 
 /// Refuses a fit that holds the model and a process more: what is estimated has no true value, and no error relative to it.
 /// One of a kind that is there may have one where parameters vary: the expected variance is not that of a single one.
-fn has_targets(root: &Section<'_>, design: &Design) -> Result<(), FileError> {
+fn has_targets(source: &Source, design: &Design) -> Result<(), FileError> {
     let axis = design.channel.index();
     // one process in two forms
     let alike = |kind: Kind| if kind == Kind::GaussMarkov { Kind::Ar1 } else { kind };
@@ -285,11 +276,8 @@ fn has_targets(root: &Section<'_>, design: &Design) -> Result<(), FileError> {
     let reason =
         format!("is more than the model: {} has {has}, so that there is no true value", design.channel);
     let codes: Vec<&str> = there.iter().map(|kind| kind.code()).collect();
-    Err(root.refuse(
-        "fit",
-        reason,
-        Some(format!("fit = \"{}\", or a model with such a process", codes.join("+"))),
-    ))
+    let advice = format!("fit = \"{}\", or a model with such a process", codes.join("+"));
+    Err(source.refused("fit", reason).advice(advice))
 }
 
 #[cfg(test)]

@@ -25,10 +25,7 @@ pub(crate) mod scenario_file;
 pub(crate) mod source;
 pub(crate) mod suggest;
 pub(crate) mod table_files;
-pub(crate) mod toml_described;
 pub(crate) mod toml_file;
-mod toml_path;
-mod toml_places;
 pub mod trajectory_file;
 
 pub use error::FileError;

@@ -14,23 +14,88 @@
 //! sensor, and that over what is said of all.
 
 use super::FileError;
-use super::toml_described::Finite;
-use super::toml_file::{Section, Source};
+use super::toml_file::{Finite, Source, Version, dotted};
 use nav_sim_calibration::{BoundDomain, ModelSpec, ParameterLimit};
 use nav_sim_signal::imu::{Axis, Sensor};
 use nav_sim_signal::noise::Kind;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
 use std::path::Path;
-use toml::de::DeTable;
+
+/// What is known, by process and parameter.
+type Processes = BTreeMap<String, BTreeMap<String, Range>>;
+
+/// Of a sensor: of all its axes, and of each.
+#[derive(Default, Deserialize)]
+struct OfSensor {
+    #[serde(default)]
+    x: Processes,
+    #[serde(default)]
+    y: Processes,
+    #[serde(default)]
+    z: Processes,
+    #[serde(flatten)]
+    all: Processes,
+}
+
+/// What is known of a model's parameters before it is fitted
+#[derive(Deserialize)]
+struct Description {
+    #[serde(rename = "schema")]
+    _schema: Option<Version>,
+    #[serde(default)]
+    accel: OfSensor,
+    #[serde(default)]
+    gyro: OfSensor,
+    #[serde(flatten)]
+    all: Processes,
+}
+
+/// Where a parameter may be, in the units of model files: fixed, or bounded on one side or both
+#[derive(Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(inline, extend("oneOf" = [{ "required": ["fix"], "maxProperties": 1 }, { "minProperties": 1, "not": { "required": ["fix"] } }]))]
+struct Range {
+    fix: Option<Finite>,
+    lower: Option<Finite>,
+    upper: Option<Finite>,
+}
+
+/// Processes of one part of the signals.
+struct Part {
+    path: String,
+    sensor: Option<Sensor>,
+    axis: Option<Axis>,
+    processes: Processes,
+}
+
+impl Description {
+    /// The parts, the more special later: they win.
+    fn parts(self) -> Vec<Part> {
+        let mut parts = vec![Part { path: String::new(), sensor: None, axis: None, processes: self.all }];
+        let mut of_axes = Vec::new();
+        for (sensor, own) in Sensor::ALL.into_iter().zip([self.accel, self.gyro]) {
+            let (path, sensor) = (sensor.name().to_owned(), Some(sensor));
+            for (axis, processes) in Axis::ALL.into_iter().zip([own.x, own.y, own.z]) {
+                let path = format!("{path}.{}", axis.name());
+                of_axes.push(Part { path, sensor, axis: Some(axis), processes });
+            }
+            parts.push(Part { path, sensor, axis: None, processes: own.all });
+        }
+        parts.extend(of_axes);
+        parts
+    }
+}
 
 /// Reads the limits of a file. Each is tried on the model.
 ///
 /// # Errors
 /// When it cannot be read, names what the model does not have, or bounds between which nothing lies.
 pub(crate) fn read(path: &Path, spec: &ModelSpec) -> Result<Vec<ParameterLimit>, FileError> {
-    limits(&Source::read(path)?, spec)
+    let source = Source::read(path)?;
+    limits(&source, source.get()?, spec)
 }
 
 /// Reads a file without a model: its layout and its bounds, process by process that it names.
@@ -39,25 +104,14 @@ pub(crate) fn read(path: &Path, spec: &ModelSpec) -> Result<Vec<ParameterLimit>,
 /// As [`read`], for a model of the processes named.
 pub(crate) fn check(path: &Path) -> Result<(), FileError> {
     let source = Source::read(path)?;
-    let table = source.parse()?;
-    let mut names = Vec::new();
-    named(table.get_ref(), &mut names);
-    let spec = spec_of(&names).unwrap_or_else(ModelSpec::n2);
-    limits(&source, &spec).map(|_| ())
-}
-
-/// Labels of processes that a table names, at any depth.
-fn named(table: &DeTable<'_>, names: &mut Vec<String>) {
-    for (key, value) in table {
-        let (key, Some(inner)) = (key.get_ref(), value.get_ref().as_table()) else { continue };
-        let outer = Sensor::ALL.iter().any(|s| s.name() == key) || Axis::ALL.iter().any(|a| a.name() == key);
-        if outer { named(inner, names) } else { names.push(key.to_string()) }
-    }
+    let parts = source.get::<Description>()?.parts();
+    let spec = spec_of(parts.iter().flat_map(|part| part.processes.keys())).unwrap_or_else(ModelSpec::n2);
+    limits(&source, source.get()?, &spec).map(|_| ())
 }
 
 /// The smallest model that has processes of those labels.
-fn spec_of(labels: &[String]) -> Option<ModelSpec> {
-    let mut terms = std::collections::BTreeMap::new();
+fn spec_of<'a>(labels: impl Iterator<Item = &'a String>) -> Option<ModelSpec> {
+    let mut terms = BTreeMap::new();
     for label in labels {
         let (code, count) = label.split_once('_').unwrap_or((label, "1"));
         let count: usize = count.parse().ok()?;
@@ -68,97 +122,60 @@ fn spec_of(labels: &[String]) -> Option<ModelSpec> {
     sum.join("+").parse().ok()
 }
 
-fn limits(source: &Source, spec: &ModelSpec) -> Result<Vec<ParameterLimit>, FileError> {
-    let table = source.parse()?;
-    let root = source.root(&table);
-    if root.u64("schema")?.is_some_and(|s| s != 1) {
-        return Err(root.refuse("schema", "is not a schema this version reads: it reads 1", None));
-    }
+fn limits(
+    source: &Source,
+    description: Description,
+    spec: &ModelSpec,
+) -> Result<Vec<ParameterLimit>, FileError> {
     let labels = spec.labels();
-    let mut known: Vec<&str> = labels.iter().map(String::as_str).collect();
-    let processes = known.clone();
-    known.extend(Sensor::ALL.map(Sensor::name));
     let mut limits = Vec::new();
-    not_of_the_model(&root, &processes, spec)?;
-    root.only(&[known.as_slice(), &["schema"]].concat())?;
-    of_processes(&root, &processes, None, None, spec, &mut limits)?;
-    for sensor in Sensor::ALL {
-        let Some(section) = root.section(sensor.name())? else { continue };
-        not_of_the_model(&section, &processes, spec)?;
-        section.only(&[processes.as_slice(), &Axis::ALL.map(Axis::name)].concat())?;
-        of_processes(&section, &processes, Some(sensor), None, spec, &mut limits)?;
-        for axis in Axis::ALL {
-            let Some(section) = section.section(axis.name())? else { continue };
-            not_of_the_model(&section, &processes, spec)?;
-            section.only(&processes)?;
-            of_processes(&section, &processes, Some(sensor), Some(axis), spec, &mut limits)?;
+    for part in description.parts() {
+        let of_model = |process: &&String| !labels.contains(process);
+        if let Some(process) = part.processes.keys().find(of_model) {
+            return Err(not_of_the_model(source, &dotted(&part.path, process), &labels, spec));
+        }
+        for process in &labels {
+            let Some(ranges) = part.processes.get(process) else { continue };
+            let (path, legal) = (dotted(&part.path, process), spec.parameter_names(process));
+            if let Some(unknown) = ranges.keys().find(|name| !legal.contains(&name.as_str())) {
+                return Err(source.unknown(&dotted(&path, unknown), legal.iter().copied()));
+            }
+            for parameter in legal {
+                let Some(range) = ranges.get(parameter) else { continue };
+                let path = dotted(&path, parameter);
+                let (low, high) = bounds(source, &path, *range)?;
+                spec.clone()
+                    .limit(process, parameter, low, high)
+                    .map_err(|e| source.refused(&path, format!("is not possible: {e}")).advice(e.hint()))?;
+                let (process, parameter) = (process.clone(), parameter.to_owned());
+                let Part { sensor, axis, .. } = part;
+                limits.push(ParameterLimit { sensor, axis, process, parameter, low, high });
+            }
         }
     }
-    // The more special later: they win.
-    limits.sort_by_key(|l| usize::from(l.sensor.is_some()) + usize::from(l.axis.is_some()));
     Ok(limits)
 }
 
-/// Refuses a process that there is, but not in this model.
-fn not_of_the_model(section: &Section<'_>, processes: &[&str], spec: &ModelSpec) -> Result<(), FileError> {
-    let is_process = |key: &str| Kind::ALL.iter().any(|k| Some(k.code()) == key.split('_').next());
-    match section.keys().into_iter().find(|key| is_process(key) && !processes.contains(key)) {
-        None => Ok(()),
-        Some(key) => {
-            let hint = format!("its processes: {}", processes.join(", "));
-            Err(section.refuse(key, format!("is no process of the model {spec}"), Some(hint)))
-        }
+/// The refusal of a process that there is, but not in this model, or that there is not.
+fn not_of_the_model(source: &Source, path: &str, labels: &[String], spec: &ModelSpec) -> FileError {
+    let process = path.rsplit('.').next().unwrap_or_default();
+    if Kind::ALL.iter().any(|k| Some(k.code()) == process.split('_').next()) {
+        let refusal = source.refused(path, format!("is no process of the model {spec}"));
+        return refusal.advice(format!("its processes: {}", labels.join(", ")));
     }
+    source.unknown(path, labels.iter().map(String::as_str))
 }
 
-fn of_processes(
-    section: &Section<'_>,
-    processes: &[&str],
-    sensor: Option<Sensor>,
-    axis: Option<Axis>,
-    spec: &ModelSpec,
-    into: &mut Vec<ParameterLimit>,
-) -> Result<(), FileError> {
-    for process in processes {
-        let Some(table) = section.section(process)? else { continue };
-        table.only(&spec.parameter_names(process))?;
-        for parameter in table.keys() {
-            let Some(range) = table.section(parameter)? else { continue };
-            let (low, high) = bounds(&table, parameter, &range.read()?)?;
-            let refuse = |e: nav_sim_calibration::LimitError| {
-                table.refuse(parameter, format!("is not possible: {e}"), Some(e.hint()))
-            };
-            spec.clone().limit(process, parameter, low, high).map_err(refuse)?;
-            let (process, parameter) = ((*process).to_owned(), parameter.to_owned());
-            into.push(ParameterLimit { sensor, axis, process, parameter, low, high });
-        }
-    }
-    Ok(())
-}
-
-/// Where a parameter may be, in the units of model files: fixed, or bounded on one side or both
-#[derive(Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-#[schemars(inline, extend("oneOf" = [{ "required": ["fix"], "maxProperties": 1 }, { "minProperties": 1, "not": { "required": ["fix"] } }]))]
-struct Range {
-    fix: Option<Finite>,
-    lower: Option<Finite>,
-    upper: Option<Finite>,
-}
-
-fn bounds(
-    table: &Section<'_>,
-    parameter: &str,
-    range: &Range,
-) -> Result<(Option<f64>, Option<f64>), FileError> {
+fn bounds(source: &Source, path: &str, range: Range) -> Result<(Option<f64>, Option<f64>), FileError> {
     let [fix, lower, upper] = [range.fix, range.lower, range.upper].map(|value| value.map(|v| v.0));
-    let hint = || Some("{ fix = 0.98 }, or { lower = 0.9, upper = 0.99 }, or one of these two".to_owned());
-    match (fix, lower, upper) {
-        (Some(value), None, None) => Ok((Some(value), Some(value))),
-        (Some(_), ..) => Err(table.refuse(parameter, "is both fixed and bounded", hint())),
-        (None, None, None) => Err(table.refuse(parameter, "neither fixes nor bounds the parameter", hint())),
-        (None, lower, upper) => Ok((lower, upper)),
-    }
+    let reason = match (fix, lower, upper) {
+        (Some(value), None, None) => return Ok((Some(value), Some(value))),
+        (Some(_), ..) => "is both fixed and bounded",
+        (None, None, None) => "neither fixes nor bounds the parameter",
+        (None, lower, upper) => return Ok((lower, upper)),
+    };
+    let advice = "{ fix = 0.98 }, or { lower = 0.9, upper = 0.99 }, or one of these two";
+    Err(source.refused(path, reason).advice(advice))
 }
 
 /// The JSON schema of such a file: [`Range`] under the names of the table of processes.
@@ -208,8 +225,9 @@ mod tests {
     use super::*;
 
     fn read(text: &str) -> Result<Vec<ParameterLimit>, String> {
-        limits(&Source::new("p.toml", text), &ModelSpec::n2())
-            .map_err(|e| format!("{e} | {}", e.hint().unwrap_or_default()))
+        let source = Source::new("p.toml", text);
+        let limits = source.get().and_then(|description| limits(&source, description, &ModelSpec::n2()));
+        limits.map_err(|e| format!("{e} | {}", e.hint().unwrap_or_default()))
     }
 
     #[test]

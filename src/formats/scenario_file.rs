@@ -1,7 +1,6 @@
 //! Scenario files (TOML): see [`Scenario`].
 
 use super::FileError;
-use super::toml_described::Document;
 use super::toml_file::Source;
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_signal::units::SettingError;
@@ -30,9 +29,8 @@ fn from_source(
     source: &Source,
     rule: impl FnOnce(&Scenario) -> Result<(), SettingError>,
 ) -> Result<Scenario, FileError> {
-    let document = Document::parse(source)?;
-    let scenario: Scenario = document.read_placed()?;
-    scenario.validate().and_then(|()| rule(&scenario)).map_err(|e| document.refused(&e))?;
+    let scenario: Scenario = source.get()?;
+    scenario.validate().and_then(|()| rule(&scenario)).map_err(|e| source.setting(&e))?;
     Ok(scenario)
 }
 
@@ -57,11 +55,8 @@ mod tests {
     }
 
     #[test]
-    fn a_key_in_the_wrong_table_is_told_where_it_belongs() {
+    fn one_table_in_the_place_of_several_is_told_how_they_are_written() {
         let hint = |text: &str| refused(text).1.unwrap();
-        assert_eq!(hint("[gnss]\nnis_gate = 0.5\n"), "\"nis_gate\" belongs in [filter]");
-        assert_eq!(hint("rate_hz = 10\n"), "\"rate_hz\" belongs in [baro], [gnss] or [imu]");
-        assert_eq!(hint("[run]\nend_s = 10\n"), "\"end_s\" belongs in [[outage]]");
         assert_eq!(
             hint("[outage]\nstart_s = 1\nend_s = 2\n"),
             "there may be several: write [[outage]], in double brackets"
@@ -138,8 +133,7 @@ mod tests {
             beside.split_inclusive('\n').filter(|l| !l.starts_with(&format!("{name} "))).collect();
         let head = if section.ends_with(']') { "[[outage]]".to_owned() } else { format!("[{section}]") };
         let source = Source::new("s.toml", &format!("{head}\n{beside}{name} = {value}\n"));
-        let document = Document::parse(&source).unwrap();
-        let scenario: Result<Scenario, _> = document.read();
+        let scenario: Result<Scenario, _> = source.get();
         scenario.map_or(true, |scenario| {
             scenario.validate().is_err_and(|e| e.key == key && !e.requirement.contains("multiple"))
         })

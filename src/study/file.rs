@@ -2,13 +2,13 @@
 
 use super::description::{GnssEntry, ScenarioEntry, Study, TruthEntry};
 use super::error::DescriptionError;
-use crate::formats::toml_described::Document;
-use crate::formats::toml_file::{Section, Source};
+use crate::formats::toml_file::Source;
 use crate::formats::{FileError, Kind};
 use crate::formats::{recordings, scenario_file};
 use nav_sim_navigation::scenario::Scenario;
 use nav_sim_navigation::sensors::gnss::GnssSettings;
 use nav_sim_signal::units::SettingError;
+use serde::Deserialize;
 use std::path::{Path, PathBuf};
 
 /// A study, read, with the scenario and receiver files it names.
@@ -35,20 +35,22 @@ pub(crate) fn beside(study: &Path, path: &Path) -> PathBuf {
 /// File, line, key and value of what is refused; a mistyped key with the nearest legal one.
 pub(crate) fn read(path: &Path) -> Result<StudyFile, FileError> {
     let source = Source::read(path)?;
-    let document = Document::parse(&source)?;
-    let mut study: Study = document.read_placed()?;
-    let root = document.root();
-    for key in ["filters", "scenario", "gnss", "outages"] {
-        if root.is_empty_list(key) {
-            return Err(root.refuse(key, "makes no cell; leave the key out for the default", None));
-        }
+    let mut study: Study = source.get()?;
+    let empty = [
+        ("filters", study.filters.is_empty()),
+        ("scenario", study.scenario.is_empty()),
+        ("gnss", study.gnss.is_empty()),
+        ("outages", study.outages.is_empty()),
+    ];
+    if let Some((key, _)) = empty.into_iter().find(|(key, is_empty)| *is_empty && source.has(key)) {
+        return Err(source.refused(key, "makes no cell; leave the key out for the default"));
     }
     let written = one_truth_each(&mut study, path)?;
     let checked = study.resolve().and_then(|()| study.reference()).and_then(|_| single(&study, path));
-    checked.map_err(|e| located(&e, &written, &document, &source))?;
-    let scenarios = scenarios(&study, path, &document)?;
-    let gnss = receivers(&study, path, &document)?;
-    let unused = unused(&study, path, &root)?;
+    checked.map_err(|e| located(&e, &written, &source))?;
+    let scenarios = scenarios(&study, path, &source)?;
+    let gnss = receivers(&study, path, &source)?;
+    let unused = unused(&study, path, &source)?;
     Ok(StudyFile { study, scenarios, gnss, unused })
 }
 
@@ -105,22 +107,31 @@ fn single(study: &Study, path: &Path) -> Result<(), DescriptionError> {
 }
 
 /// What scenarios say of the runs beside the level of coverage: a study has its own.
-fn unused(study: &Study, path: &Path, root: &Section<'_>) -> Result<Vec<String>, FileError> {
-    let of_run = |scenario: &Section<'_>| -> Result<Vec<String>, FileError> {
-        let run = scenario.section("run")?;
-        let keys = run.iter().flat_map(Section::keys).filter(|key| *key != "coverage_level");
-        Ok(keys.map(str::to_owned).collect())
-    };
+fn unused(study: &Study, path: &Path, source: &Source) -> Result<Vec<String>, FileError> {
+    /// Of a scenario file or of settings, the keys of `[run]`.
+    #[derive(Deserialize)]
+    struct OfRun {
+        #[serde(default)]
+        run: toml::Table,
+    }
+    #[derive(Deserialize)]
+    struct Entry {
+        settings: Option<OfRun>,
+    }
+    #[derive(Deserialize)]
+    struct Entries {
+        #[serde(default)]
+        scenario: Vec<Entry>,
+    }
+    let written: Entries = source.get()?;
     let mut said = Vec::new();
-    for (entry, section) in study.scenario.iter().zip(root.sections("scenario").unwrap_or_default()) {
-        let keys = match &entry.file {
-            Some(file) => {
-                let source = Source::read(&beside(path, file))?;
-                let table = source.parse()?;
-                of_run(&source.root(&table))?
-            }
-            None => section.section("settings")?.as_ref().map_or(Ok(Vec::new()), of_run)?,
+    for (entry, written) in study.scenario.iter().zip(written.scenario) {
+        let of_run = match &entry.file {
+            Some(file) => Some(Source::read(&beside(path, file))?.get()?),
+            None => written.settings,
         };
+        let keys = of_run.into_iter().flat_map(|OfRun { run }| run.into_iter().map(|(key, _)| key));
+        let keys: Vec<String> = keys.filter(|key| key != "coverage_level").collect();
         if !keys.is_empty() {
             said.push(format!(
                 "scenario \"{}\": of its [run] a study uses coverage_level alone, not {}; the study has its own",
@@ -132,7 +143,7 @@ fn unused(study: &Study, path: &Path, root: &Section<'_>) -> Result<Vec<String>,
     Ok(said)
 }
 
-fn scenarios(study: &Study, path: &Path, document: &Document<'_>) -> Result<Vec<Scenario>, FileError> {
+fn scenarios(study: &Study, path: &Path, source: &Source) -> Result<Vec<Scenario>, FileError> {
     let scenario = |(i, entry): (usize, &ScenarioEntry)| match (&entry.file, &entry.settings) {
         (Some(file), _) => {
             scenario_file::read_for(&beside(path, file), |scenario| analysable(study, scenario))
@@ -141,20 +152,20 @@ fn scenarios(study: &Study, path: &Path, document: &Document<'_>) -> Result<Vec<
             let scenario = settings.clone().unwrap_or_default();
             let checked = scenario.validate().and_then(|()| analysable(study, &scenario));
             let section = format!("scenario[{}].settings", i + 1);
-            checked.map_err(|e| document.refused(&e.in_section(&section)))?;
+            checked.map_err(|e| source.setting(&e.in_section(&section)))?;
             Ok(scenario)
         }
     };
     study.scenario.iter().enumerate().map(scenario).collect()
 }
 
-fn receivers(study: &Study, path: &Path, document: &Document<'_>) -> Result<Vec<GnssSettings>, FileError> {
+fn receivers(study: &Study, path: &Path, source: &Source) -> Result<Vec<GnssSettings>, FileError> {
     let receiver = |(i, entry): (usize, &GnssEntry)| match (&entry.file, &entry.settings) {
         (Some(file), _) => Ok(scenario_file::read(&beside(path, file))?.gnss),
         (None, settings) => {
             let gnss = settings.clone().unwrap_or_default();
             let section = format!("gnss[{}].settings", i + 1);
-            gnss.validate().map_err(|e| document.refused(&e.in_section(&section)))?;
+            gnss.validate().map_err(|e| source.setting(&e.in_section(&section)))?;
             Ok(gnss)
         }
     };
@@ -175,19 +186,13 @@ fn analysable(study: &Study, scenario: &Scenario) -> Result<(), SettingError> {
 }
 
 /// A refusal by [`Study::resolve`] at the line its key stands in; `truths`: the entry of the file that each truth is of.
-fn located(
-    error: &DescriptionError,
-    truths: &[usize],
-    document: &Document<'_>,
-    source: &Source,
-) -> FileError {
+fn located(error: &DescriptionError, truths: &[usize], source: &Source) -> FileError {
     let mut key = error.key();
     if let Some((number, rest)) = key.strip_prefix("truth[").and_then(|rest| rest.split_once(']')) {
         let written = number.parse().ok().and_then(|i: usize| truths.get(i.checked_sub(1)?));
         key = written.map_or_else(|| "truth".to_owned(), |number| format!("truth[{number}]{rest}"));
     }
-    let line = document.line_of(&key);
-    source.error(line, Kind::Contents(error.to_string().into())).advice_if(error.hint())
+    source.error(&key, Kind::Contents(error.to_string().into())).advice_if(error.hint())
 }
 
 #[cfg(test)]
@@ -261,7 +266,7 @@ mod tests {
         );
         assert_eq!(
             with("runs = 8", "sweep = {}"),
-            "s.toml, line 1: unknown key \"sweep\" | \"sweep\" belongs in [[outages]]"
+            "s.toml, line 1: unknown key \"sweep\" | legal here: schema, runs, seed, method, metrics, reference, unit_runs, filters, trajectory, truth, candidate, scenario, gnss, outages"
         );
         assert_eq!(
             with("runs = 8", "runs = 0"),

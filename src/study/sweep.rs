@@ -2,7 +2,7 @@
 
 use super::error::DescriptionError;
 use super::rules::{MAX_CELLS, exactly_one};
-use crate::formats::toml_described::OneOrEach;
+use crate::formats::toml_file::OneOrEach;
 use nav_sim_navigation::sensors::outage::{Outage, OutagePlan, PeriodicOutages, RandomOutages};
 use nav_sim_signal::units::{Positive, SettingError};
 use schemars::JsonSchema;

@@ -193,3 +193,15 @@ fn check_hints_at_what_helps() {
     let (_, found, _) = check("whole.csv", &table(0..0));
     assert!(found.starts_with("whole.csv: read as a static recording, 1 channels"), "{found}");
 }
+
+/// A model in the place of the trajectory, and the trajectory in that of the model.
+#[test]
+fn arguments_in_another_order_are_told() {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let (model, drive) = ("calib_data/tactical.toml", "trajectories/land_vehicle.toml");
+    for arguments in [["run", model, drive], ["synthesize", drive, "-q"]] {
+        let output = nav_sim().current_dir(root).args(arguments).output().unwrap();
+        let said = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.code() == Some(2) && said.contains("arguments in another order?"), "{said}");
+    }
+}

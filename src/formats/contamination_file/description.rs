@@ -1,12 +1,11 @@
 //! What contamination files hold: one description an operation, for readers and for editors.
 
-use crate::formats::FileError;
-use crate::formats::toml_described::{Finite, OneOrEach};
-use crate::formats::toml_file::Section;
-use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use crate::formats::toml_file::{
+    Between, Finite, NonNegative, OneOrEach, Positive, Share, Stationary, Version,
+};
+use schemars::JsonSchema;
 use serde::Deserialize;
-use serde::de::{DeserializeOwned, IgnoredAny};
-use std::borrow::Cow;
+use std::num::NonZero;
 
 /// Errors and disturbances put into recordings: nav-sim synthesize --contaminate
 #[derive(Deserialize, JsonSchema)]
@@ -14,39 +13,30 @@ use std::borrow::Cow;
 #[schemars(title = "Contamination")]
 pub(super) struct Description {
     /// Version of the layout
-    #[schemars(range(min = 1, max = 1))]
-    pub(super) schema: Option<u64>,
+    #[serde(rename = "schema")]
+    pub(super) _schema: Option<Version>,
     /// Of all axes of the accelerometers
-    #[serde(default, rename = "accel")]
-    #[schemars(with = "Vec<RuleDescription>")]
-    _accel: IgnoredAny,
+    #[serde(default)]
+    pub(super) accel: Vec<RuleTable>,
     /// Of all axes of the gyroscopes
-    #[serde(default, rename = "gyro")]
-    #[schemars(with = "Vec<RuleDescription>")]
-    _gyro: IgnoredAny,
+    #[serde(default)]
+    pub(super) gyro: Vec<RuleTable>,
 }
 
 /// What is done to the signals of a sensor
-#[derive(JsonSchema)]
-#[schemars(deny_unknown_fields)]
-#[expect(dead_code, reason = "what describes files, for editors")]
-struct RuleDescription {
-    #[schemars(flatten)]
-    of: Of,
-    #[schemars(flatten)]
-    operation: Described,
-}
-
 #[derive(Deserialize, JsonSchema)]
-pub(super) struct Of {
+#[schemars(deny_unknown_fields)]
+pub(super) struct RuleTable {
     /// Replicates, counted from 1 (default: every one)
-    #[schemars(length(min = 1), inner(range(min = 1)))]
-    pub(super) replicates: Option<Vec<u64>>,
+    #[schemars(length(min = 1))]
+    pub(super) replicates: Option<Vec<NonZero<u64>>>,
+    #[serde(flatten)]
+    pub(super) operation: Described,
 }
 
 /// The operations of files, each with its keys.
-#[derive(JsonSchema)]
-#[schemars(tag = "operation", rename_all = "kebab-case")]
+#[derive(Deserialize, JsonSchema)]
+#[serde(tag = "operation", rename_all = "kebab-case")]
 pub(super) enum Described {
     /// A jump of the mean
     Step(Step),
@@ -65,43 +55,46 @@ pub(super) enum Described {
 }
 
 #[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(!deny_unknown_fields)]
 pub(super) struct Step {
     /// Height of the step (units of the signal)
-    pub(super) amplitude: Numbers,
+    pub(super) amplitude: OneOrEach<Finite>,
     /// Where in the record, as a share of it (default: 0.5)
-    #[schemars(with = "Option<OneOrEach<Share>>")]
-    pub(super) at_share: Option<Numbers>,
+    pub(super) at_share: Option<OneOrEach<Share>>,
     /// Where in the record (samples)
     pub(super) at_samples: Option<u64>,
     /// Where in the record (s)
-    #[schemars(with = "Option<OneOrEach<NonNegative>>")]
-    pub(super) at_s: Option<Numbers>,
+    pub(super) at_s: Option<OneOrEach<NonNegative>>,
 }
 
 #[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(!deny_unknown_fields)]
 pub(super) struct Drift {
     /// Value at the end of the record (units of the signal)
-    pub(super) amplitude: Numbers,
+    pub(super) amplitude: OneOrEach<Finite>,
 }
 
 #[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(!deny_unknown_fields)]
 pub(super) struct Replace {
     /// Share of the samples
-    #[schemars(with = "Option<OneOrEach<Share>>")]
-    pub(super) share: Option<Numbers>,
+    pub(super) share: Option<OneOrEach<Share>>,
     /// Number of samples
     pub(super) points: Option<u64>,
     /// Samples replaced together (default: 1)
-    #[schemars(range(min = 1))]
-    pub(super) length_samples: Option<u64>,
+    pub(super) length_samples: Option<NonZero<u64>>,
     /// Standard deviation of what replaces them
-    #[schemars(with = "OneOrEach<NonNegative>")]
-    pub(super) sigma: Numbers,
+    pub(super) sigma: OneOrEach<NonNegative>,
     /// Mean of what replaces them (default: the signal's)
     pub(super) mean: Option<Mean>,
 }
 
 #[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(!deny_unknown_fields)]
 pub(super) struct Bursts {
     /// Number of bursts (default: 5)
     pub(super) count: Option<u64>,
@@ -110,99 +103,53 @@ pub(super) struct Bursts {
     /// From one burst to the next (samples; default: 90000)
     pub(super) spacing_samples: Option<u64>,
     /// Length of the record that these are meant for (samples; default: as it is)
-    #[schemars(with = "Option<OneOrEach<AtLeastOne>>")]
-    pub(super) of_samples: Option<Numbers>,
+    pub(super) of_samples: Option<OneOrEach<AtLeastOne>>,
     /// Amplitude (units of the signal)
-    pub(super) amplitude: Numbers,
+    pub(super) amplitude: OneOrEach<Finite>,
     /// Frequency (Hz; default: 5)
-    #[schemars(with = "Option<OneOrEach<Positive>>")]
-    pub(super) frequency_hz: Option<Numbers>,
+    pub(super) frequency_hz: Option<OneOrEach<Positive>>,
 }
 
 #[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(!deny_unknown_fields)]
 pub(super) struct Autoregression {
     /// Coefficient
-    #[schemars(with = "OneOrEach<Stationary>")]
-    pub(super) phi: Numbers,
+    pub(super) phi: OneOrEach<Stationary>,
     /// Innovation variance per sample
-    #[schemars(with = "OneOrEach<NonNegative>")]
-    pub(super) sigma2: Numbers,
+    pub(super) sigma2: OneOrEach<NonNegative>,
 }
 
 #[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(!deny_unknown_fields)]
 pub(super) struct HeavyTails {
     /// Degrees of freedom, more than 2
-    #[schemars(with = "OneOrEach<AboveTwo>")]
-    pub(super) freedom: Numbers,
+    pub(super) freedom: OneOrEach<AboveTwo>,
     /// Scale of Student's t (units of the signal)
-    #[schemars(with = "OneOrEach<NonNegative>")]
-    pub(super) sigma: Numbers,
+    pub(super) sigma: OneOrEach<NonNegative>,
 }
 
 #[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(!deny_unknown_fields)]
 pub(super) struct Scale {
     /// Process of the model, such as RW
     pub(super) process: String,
     /// Its parameter, such as gamma2
     pub(super) parameter: String,
     /// What it is multiplied by
-    #[schemars(with = "OneOrEach<NonNegative>")]
-    pub(super) factor: Numbers,
+    pub(super) factor: OneOrEach<NonNegative>,
 }
 
-/// Numbers between two whole ones, for schemas and for the reader: open without them; `i64::MAX` is no end.
-pub(super) struct Between<const LOW: i64, const HIGH: i64, const OPEN: bool>;
-
-/// A part of a whole.
-pub(super) type Share = Between<0, 1, false>;
-pub(super) type NonNegative = Between<0, { i64::MAX }, false>;
-pub(super) type Positive = Between<0, { i64::MAX }, true>;
-pub(super) type AtLeastOne = Between<1, { i64::MAX }, false>;
 /// Degrees of freedom with a variance.
 pub(super) type AboveTwo = Between<2, { i64::MAX }, true>;
-/// Coefficients of a stationary AR(1), as [`Ar1::new`](nav_sim_signal::noise::Ar1::new) takes them.
-type Stationary = Between<-1, 1, true>;
-
-impl<const LOW: i64, const HIGH: i64, const OPEN: bool> Between<LOW, HIGH, OPEN> {
-    pub(super) fn contains(value: f64) -> bool {
-        let (low, high) = (LOW as f64, if HIGH == i64::MAX { f64::INFINITY } else { HIGH as f64 });
-        if OPEN { low < value && value < high } else { (low..=high).contains(&value) }
-    }
-}
-
-impl<const LOW: i64, const HIGH: i64, const OPEN: bool> JsonSchema for Between<LOW, HIGH, OPEN> {
-    fn inline_schema() -> bool {
-        true
-    }
-
-    fn schema_name() -> Cow<'static, str> {
-        format!("Between_{LOW}_{HIGH}_{OPEN}").into()
-    }
-
-    fn json_schema(_: &mut SchemaGenerator) -> Schema {
-        let (least, most) =
-            if OPEN { ("exclusiveMinimum", "exclusiveMaximum") } else { ("minimum", "maximum") };
-        let mut schema = json_schema!({ "type": "number" });
-        schema.insert(least.to_owned(), LOW.into());
-        if HIGH < i64::MAX {
-            schema.insert(most.to_owned(), HIGH.into());
-        }
-        schema
-    }
-}
-
-/// One number for all, or one for each replicate listed
-#[derive(Deserialize, JsonSchema)]
-#[serde(untagged, expecting = "is neither a finite number nor a list of finite numbers")]
-pub(super) enum Numbers {
-    One(Finite),
-    Each(Vec<Finite>),
-}
+pub(super) type AtLeastOne = Between<1, { i64::MAX }, false>;
 
 #[derive(Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "is neither a number nor \"signal\"")]
 pub(super) enum Mean {
-    Own(Numbers),
+    Own(OneOrEach<Finite>),
     Kept(Signal),
 }
 
@@ -215,24 +162,4 @@ pub(super) enum Signal {
 /// The JSON schema of such a file.
 pub(crate) fn schema() -> serde_json::Value {
     schemars::schema_for!(Description).to_value()
-}
-
-/// What a table of a file describes.
-pub(super) fn describe(section: &Section<'_>) -> Result<Described, FileError> {
-    fn keys_of<T: DeserializeOwned + JsonSchema>(section: &Section<'_>) -> Result<T, FileError> {
-        section.read_own(&["operation", "replicates"])
-    }
-    match section.require_str("operation")? {
-        "step" => keys_of(section).map(Described::Step),
-        "drift" => keys_of(section).map(Described::Drift),
-        "replace" => keys_of(section).map(Described::Replace),
-        "bursts" => keys_of(section).map(Described::Bursts),
-        "ar1" => keys_of(section).map(Described::Ar1),
-        "heavy-tails" => keys_of(section).map(Described::HeavyTails),
-        "scale" => keys_of(section).map(Described::Scale),
-        _ => {
-            let hint = "operations: step, drift, replace, bursts, ar1, heavy-tails, scale".to_owned();
-            Err(section.refuse("operation", "is not an operation", Some(hint)))
-        }
-    }
 }

@@ -23,15 +23,12 @@ mod description;
 
 use super::FileError;
 use super::suggest::nearest;
-use super::toml_described::Document;
-use super::toml_file::{Section, Source};
-use description::{
-    AboveTwo, AtLeastOne, Autoregression, Bursts, Described, Description, HeavyTails, Mean, NonNegative,
-    Numbers, Of, Positive, Replace, Scale, Share, Signal, Step, describe,
-};
+use super::toml_file::{OneOrEach, Source};
+use description::{Bursts, Described, Description, Mean, Replace, RuleTable, Step};
 use nav_sim_signal::imu::Sensor;
-use nav_sim_signal::noise::Ar1;
 use nav_sim_signal::noise::contamination::{Contamination, Extent, Operation, Rule};
+use nav_sim_signal::noise::{Ar1, ParameterError};
+use std::num::NonZero;
 use std::path::Path;
 
 pub(crate) use description::schema;
@@ -70,152 +67,139 @@ pub(crate) fn meant(name: &str) -> Option<&'static str> {
 }
 
 fn parse(source: &Source, rate_hz: f64) -> Result<Contamination, FileError> {
-    let document = Document::parse(source)?;
-    let Description { schema, .. } = document.read()?;
-    let root = document.root();
-    if schema.is_some_and(|s| s != 1) {
-        return Err(root.refuse("schema", "is not a schema this version reads: it reads 1", None));
-    }
+    let Description { accel, gyro, .. } = source.get()?;
     let mut rules = Vec::new();
-    for sensor in Sensor::ALL {
-        for section in root.sections(sensor.name())? {
-            read_rules(&section, sensor, rate_hz, &mut rules)?;
+    for (sensor, tables) in [(Sensor::Accel, accel), (Sensor::Gyro, gyro)] {
+        for (i, table) in (1..).zip(&tables) {
+            let key = format!("{}[{i}]", sensor.name());
+            read_rules(source, sensor, key, table, rate_hz, &mut rules)?;
         }
     }
     Ok(Contamination { name: source.path().to_owned(), rules })
 }
 
 fn read_rules(
-    section: &Section<'_>,
+    source: &Source,
     sensor: Sensor,
+    key: String,
+    table: &RuleTable,
     rate_hz: f64,
     into: &mut Vec<Rule>,
 ) -> Result<(), FileError> {
-    let described = describe(section)?;
-    let Of { replicates } = section.read()?;
-    if replicates.as_ref().is_some_and(|r| r.is_empty() || r.contains(&0)) {
-        return Err(section.refuse(
-            "replicates",
-            "is not a list of replicates: they are counted from 1",
-            None,
-        ));
+    let RuleTable { replicates, operation } = table;
+    if replicates.as_ref().is_some_and(Vec::is_empty) {
+        return Err(source.refused(&format!("{key}.replicates"), "lists none"));
     }
+    let place = format!("{}, line {}", source.path(), source.line_of(&key));
     let listed = replicates.as_ref().map_or(1, Vec::len);
+    let mut entry = Entry { source, key, i: 0, listed };
     for i in 0..listed {
-        let entry = Entry { section, i, listed };
-        let operation = match &described {
+        entry.i = i;
+        let operation = match operation {
             Described::Step(step) => entry.step(step, rate_hz)?,
             Described::Drift(drift) => {
-                Operation::Drift { amplitude: entry.any("amplitude", &drift.amplitude)? }
+                Operation::Drift { amplitude: entry.number("amplitude", &drift.amplitude)? }
             }
             Described::Replace(replace) => entry.replace(replace)?,
             Described::Bursts(bursts) => entry.bursts(bursts)?,
-            Described::Ar1(process) => entry.ar1(process)?,
-            Described::HeavyTails(tails) => entry.heavy_tails(tails)?,
-            Described::Scale(scale) => entry.scale(scale)?,
+            Described::Ar1(process) => {
+                let phi = entry.number("phi", &process.phi)?;
+                let sigma2 = entry.number("sigma2", &process.sigma2)?;
+                let refused = |e: ParameterError| entry.refused(e.parameter, format!("is not {}", e.domain));
+                Operation::Ar1(Ar1::new(phi, sigma2).map_err(refused)?)
+            }
+            Described::HeavyTails(tails) => Operation::HeavyTails {
+                freedom: entry.number("freedom", &tails.freedom)?,
+                sigma: entry.number("sigma", &tails.sigma)?,
+            },
+            Described::Scale(scale) => Operation::Scale {
+                process: scale.process.clone(),
+                parameter: scale.parameter.clone(),
+                factor: entry.number("factor", &scale.factor)?,
+            },
         };
-        let replicate = replicates.as_ref().map(|r| r[i]);
-        let place = format!("{}, line {}", section.source.path(), section.line());
-        into.push(Rule { sensor, replicate, operation, place });
+        let replicate = replicates.as_ref().map(|r| r[i].get());
+        into.push(Rule { sensor, replicate, operation, place: place.clone() });
     }
     Ok(())
 }
 
 /// One replicate's share of a rule.
 struct Entry<'a> {
-    section: &'a Section<'a>,
+    source: &'a Source,
+    key: String,
     i: usize,
     listed: usize,
 }
 
 impl Entry<'_> {
-    /// A number, or this replicate's of a list, in a domain.
-    fn number(
-        &self,
-        key: &str,
-        given: &Numbers,
-        domain: &str,
-        inside: impl Fn(f64) -> bool,
-    ) -> Result<f64, FileError> {
-        let value = match given {
-            Numbers::One(value) => value.0,
-            Numbers::Each(values) if values.len() == self.listed => values[self.i].0,
-            Numbers::Each(values) => {
+    fn refused(&self, key: &str, reason: impl Into<Box<str>>) -> FileError {
+        self.source.refused(&format!("{}.{key}", self.key), reason)
+    }
+
+    /// A number, or this replicate's of a list.
+    fn number<T: Copy + Into<f64>>(&self, key: &str, given: &OneOrEach<T>) -> Result<f64, FileError> {
+        match given {
+            OneOrEach::One(value) => Ok((*value).into()),
+            OneOrEach::Each(values) if values.len() == self.listed => Ok(values[self.i].into()),
+            OneOrEach::Each(values) => {
                 let reason = format!("has {} values for {} replicates", values.len(), self.listed);
-                return Err(self.section.refuse(key, reason, None));
+                Err(self.refused(key, reason))
             }
-        };
-        if inside(value) {
-            Ok(value)
-        } else {
-            Err(self.section.refuse(key, format!("is not {domain}"), None))
         }
     }
 
-    fn any(&self, key: &str, given: &Numbers) -> Result<f64, FileError> {
-        self.number(key, given, "a number", |_| true)
-    }
-
-    fn at_least_0(&self, key: &str, given: &Numbers) -> Result<f64, FileError> {
-        self.number(key, given, "a number ≥ 0", NonNegative::contains)
-    }
-
-    fn share(&self, key: &str, given: &Numbers) -> Result<Extent, FileError> {
-        self.number(key, given, "between 0 and 1", Share::contains).map(Extent::Share)
+    fn optional<T: Copy + Into<f64>>(
+        &self,
+        key: &str,
+        given: &Option<OneOrEach<T>>,
+    ) -> Result<Option<f64>, FileError> {
+        given.as_ref().map(|given| self.number(key, given)).transpose()
     }
 
     /// Refuses more than one of several ways to say the same.
-    fn at_most_one(&self, keys: &[&str]) -> Result<(), FileError> {
-        let mut given = keys.iter().filter(|k| self.section.has(k));
+    fn at_most_one(&self, keys: &[(&str, bool)]) -> Result<(), FileError> {
+        let mut given = keys.iter().filter(|(_, is_given)| *is_given);
         match (given.next(), given.next()) {
-            (Some(first), Some(second)) => {
-                Err(self.section.refuse(second, format!("says again what \"{first}\" says"), None))
+            (Some((first, _)), Some((second, _))) => {
+                Err(self.refused(second, format!("says again what \"{first}\" says")))
             }
             _ => Ok(()),
         }
     }
 
     fn step(&self, step: &Step, rate_hz: f64) -> Result<Operation, FileError> {
-        self.at_most_one(&["at_share", "at_samples", "at_s"])?;
-        let extent = match (step.at_samples, &step.at_s, &step.at_share) {
-            (Some(samples), ..) => Extent::Samples(samples),
-            (_, Some(seconds), _) => {
-                let seconds = self.number("at_s", seconds, "a time ≥ 0", NonNegative::contains)?;
-                Extent::Samples((seconds * rate_hz).round() as u64)
-            }
-            (_, _, Some(share)) => self.share("at_share", share)?,
-            _ => Extent::Share(0.5),
-        };
-        Ok(Operation::Step { at: extent, amplitude: self.any("amplitude", &step.amplitude)? })
+        let (share, samples, seconds) = (&step.at_share, step.at_samples, &step.at_s);
+        self.at_most_one(&[
+            ("at_share", share.is_some()),
+            ("at_samples", samples.is_some()),
+            ("at_s", seconds.is_some()),
+        ])?;
+        let share = self.optional("at_share", share)?.unwrap_or(0.5);
+        let seconds = self.optional("at_s", seconds)?.map(|seconds| (seconds * rate_hz).round() as u64);
+        Ok(Operation::Step {
+            at: samples.or(seconds).map_or(Extent::Share(share), Extent::Samples),
+            amplitude: self.number("amplitude", &step.amplitude)?,
+        })
     }
 
     fn replace(&self, replace: &Replace) -> Result<Operation, FileError> {
-        self.at_most_one(&["share", "points"])?;
-        let points = match (replace.points, &replace.share) {
+        self.at_most_one(&[("share", replace.share.is_some()), ("points", replace.points.is_some())])?;
+        let points = match (replace.points, self.optional("share", &replace.share)?) {
             (Some(points), _) => Extent::Samples(points),
-            (None, Some(share)) => self.share("share", share)?,
-            (None, None) => return Err(self.section.missing_one_of(&["share", "points"])),
+            (None, Some(share)) => Extent::Share(share),
+            (None, None) => return Err(self.source.missing(&self.key, &["share", "points"])),
         };
         let mean = match &replace.mean {
-            None | Some(Mean::Kept(Signal::Signal)) => None,
-            Some(Mean::Own(mean)) => Some(self.any("mean", mean)?),
+            None | Some(Mean::Kept(_)) => None,
+            Some(Mean::Own(mean)) => Some(self.number("mean", mean)?),
         };
-        let sigma = self.at_least_0("sigma", &replace.sigma)?;
-        let block = Extent::Samples(replace.length_samples.unwrap_or(1));
-        if block == Extent::Samples(0) {
-            return Err(self.section.refuse("length_samples", "is not a number of samples > 0", None));
-        }
-        Ok(Operation::Replace { points, block, mean, sigma })
+        let block = Extent::Samples(replace.length_samples.map_or(1, NonZero::get));
+        Ok(Operation::Replace { points, block, mean, sigma: self.number("sigma", &replace.sigma)? })
     }
 
     fn bursts(&self, bursts: &Bursts) -> Result<Operation, FileError> {
-        let given = |key, given: &Option<Numbers>, domain, inside: fn(f64) -> bool| match given {
-            Some(given) => self.number(key, given, domain, inside).map(Some),
-            None => Ok(None),
-        };
-        let period =
-            given("of_samples", &bursts.of_samples, "a number of samples > 0", AtLeastOne::contains)?;
-        let frequency = given("frequency_hz", &bursts.frequency_hz, "a frequency > 0", Positive::contains)?;
+        let period = self.optional("of_samples", &bursts.of_samples)?;
         let extent = |samples: u64| match period {
             Some(period) => Extent::Share(samples as f64 / period),
             None => Extent::Samples(samples),
@@ -224,28 +208,9 @@ impl Entry<'_> {
             count: bursts.count.unwrap_or(5),
             length: extent(bursts.length_samples.unwrap_or(500)),
             spacing: extent(bursts.spacing_samples.unwrap_or(90_000)),
-            amplitude: self.any("amplitude", &bursts.amplitude)?,
-            frequency_hz: frequency.unwrap_or(5.0),
+            amplitude: self.number("amplitude", &bursts.amplitude)?,
+            frequency_hz: self.optional("frequency_hz", &bursts.frequency_hz)?.unwrap_or(5.0),
         })
-    }
-
-    fn ar1(&self, process: &Autoregression) -> Result<Operation, FileError> {
-        let (phi, sigma2) = (self.any("phi", &process.phi)?, self.any("sigma2", &process.sigma2)?);
-        let refuse = |e: nav_sim_signal::noise::ParameterError| {
-            self.section.refuse(e.parameter, format!("is not {}", e.domain), None)
-        };
-        Ok(Operation::Ar1(Ar1::new(phi, sigma2).map_err(refuse)?))
-    }
-
-    fn heavy_tails(&self, tails: &HeavyTails) -> Result<Operation, FileError> {
-        let domain = "a number > 2: fewer degrees have no variance";
-        let freedom = self.number("freedom", &tails.freedom, domain, AboveTwo::contains)?;
-        Ok(Operation::HeavyTails { freedom, sigma: self.at_least_0("sigma", &tails.sigma)? })
-    }
-
-    fn scale(&self, scale: &Scale) -> Result<Operation, FileError> {
-        let (process, parameter) = (scale.process.clone(), scale.parameter.clone());
-        Ok(Operation::Scale { process, parameter, factor: self.at_least_0("factor", &scale.factor)? })
     }
 }
 
@@ -339,7 +304,7 @@ mod tests {
         );
         assert_eq!(
             step("at_s = -1\namplitude = 1"),
-            "c.toml, line 3: \"accel[1].at_s\" = -1 is not a time ≥ 0 | "
+            "c.toml, line 3: \"accel[1].at_s\" = -1 is not a finite number ≥ 0 | "
         );
         assert_eq!(
             step("at_s = 1\nat_share = 0.5\namplitude = 1"),
@@ -351,11 +316,11 @@ mod tests {
         );
         assert_eq!(
             step("amplitude = 1\nreplicates = [0]"),
-            "c.toml, line 4: \"accel[1].replicates\" = [0] is not a list of replicates: they are counted from 1 | "
+            "c.toml, line 4: \"accel[1].replicates\" = 0 is not a whole number ≥ 1 | "
         );
         assert_eq!(
             refusal("[[gyro]]\noperation = \"jump\"\n"),
-            "c.toml, line 2: \"gyro[1].operation\" = \"jump\" is not an operation | operations: step, drift, replace, bursts, ar1, heavy-tails, scale"
+            "c.toml, line 2: \"gyro[1].operation\" = \"jump\" is not one of \"step\", \"drift\", \"replace\", \"bursts\", \"ar1\", \"heavy-tails\", \"scale\" | "
         );
         assert_eq!(
             refusal("[[gyro]]\noperation = \"replace\"\nsigma = 1\n"),
@@ -367,11 +332,11 @@ mod tests {
         );
         assert_eq!(
             refusal("[[gyro]]\noperation = \"heavy-tails\"\nfreedom = 2\nsigma = 1\n"),
-            "c.toml, line 3: \"gyro[1].freedom\" = 2 is not a number > 2: fewer degrees have no variance | "
+            "c.toml, line 3: \"gyro[1].freedom\" = 2 is not a finite number > 2 | "
         );
         assert_eq!(
             refusal("[[gyro]]\noperation = \"replace\"\npoints = 9\nsigma = 1\nlength_samples = 0\n"),
-            "c.toml, line 5: \"gyro[1].length_samples\" = 0 is not a number of samples > 0 | "
+            "c.toml, line 5: \"gyro[1].length_samples\" = 0 is not a whole number ≥ 1 | "
         );
         assert_eq!(meant("section5-2"), Some("section5-I"));
     }

@@ -11,9 +11,8 @@
 //! ```
 
 use super::{Datasheet, Entry, Figure, Quantity};
-use crate::formats::error::{FileError, Kind};
-use crate::formats::toml_described::Document;
-use crate::formats::toml_file::{Source, unknown_key};
+use crate::formats::FileError;
+use crate::formats::toml_file::Source;
 use nav_sim_signal::imu::Sensor;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -69,7 +68,7 @@ struct Unit {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Given {
-    value: toml::Spanned<String>,
+    value: String,
     source: String,
     quote: Option<String>,
 }
@@ -90,7 +89,7 @@ pub fn catalogued(name: &str) -> Option<Result<Datasheet, FileError>> {
 }
 
 pub(super) fn parse(source: &Source) -> Result<Datasheet, FileError> {
-    let file: File = Document::parse(source)?.read()?;
+    let file: File = source.get()?;
     let mut entries = Vec::new();
     for (sensor, table) in [(Sensor::Accel, file.accel), (Sensor::Gyro, file.gyro)] {
         for (key, given) in table {
@@ -102,16 +101,11 @@ pub(super) fn parse(source: &Source) -> Result<Datasheet, FileError> {
 }
 
 fn entry(source: &Source, sensor: Sensor, key: &str, given: Given) -> Result<Entry, FileError> {
-    let line = source.line(given.value.span().start);
-    let dotted = format!("{}.{key}", sensor.name());
+    let path = format!("{}.{key}", sensor.name());
     let Some(figure) = Figure::ALL.into_iter().find(|f| f.key() == key) else {
-        let known = Figure::ALL.map(Figure::key);
-        return Err(unknown_key(source, line, dotted, key, known.iter().copied()));
+        return Err(source.unknown(&path, Figure::ALL.map(Figure::key).into_iter()));
     };
-    let text = given.value.into_inner();
-    let quantity = Quantity::parse(&text, figure.units(sensor)).map_err(|e| {
-        let (value, reason) = (format!("\"{text}\"").into(), e.to_string().into());
-        source.error(line, Kind::Value { key: dotted.into(), value, reason })
-    })?;
+    let quantity = Quantity::parse(&given.value, figure.units(sensor))
+        .map_err(|e| source.refused(&format!("{path}.value"), e.to_string()))?;
     Ok(Entry { sensor, figure, quantity, source: Some(given.source), quote: given.quote })
 }

@@ -153,11 +153,11 @@ fn entries_are_refused_with_line_key_and_value() {
     };
     assert_eq!(
         refused("[gyro]\nbias = { value = \"10\", source = \"s\" }\n"),
-        "u.toml, line 6: \"gyro.bias\" = \"10\" has no unit; units that fit: deg/h, deg/s, mdeg/s, rad/s"
+        "u.toml, line 6: \"gyro.bias.value\" = \"10\" has no unit; units that fit: deg/h, deg/s, mdeg/s, rad/s"
     );
     assert_eq!(
         refused("[accel]\nnoise = { value = \"1 deg/h\", source = \"s\" }\n"),
-        "u.toml, line 6: \"accel.noise\" = \"1 deg/h\" has the unit deg/h, which does not fit; units that fit: \
+        "u.toml, line 6: \"accel.noise.value\" = \"1 deg/h\" has the unit deg/h, which does not fit; units that fit: \
          m/s/sqrt(h), m/s/sqrt(s), ft/s/sqrt(h), m/s²/sqrt(Hz), mg/sqrt(Hz), ug/sqrt(Hz)"
     );
     assert_eq!(

@@ -1,8 +1,7 @@
 //! An initial state (TOML).
 
 use crate::formats::FileError;
-use crate::formats::toml_described::Document;
-use crate::formats::toml_file::Source;
+use crate::formats::toml_file::{Between, Finite, Source};
 use glam::DVec3;
 use nav_sim_navigation::earth::MAX_LATITUDE_DEG;
 use nav_sim_navigation::ekf::InitialSettings;
@@ -13,45 +12,35 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 use std::path::Path;
 
-/// Largest angles.
-const LON_DEG: f64 = 360.0;
-const ROLL_DEG: f64 = 180.0;
-const PITCH_DEG: f64 = 90.0;
-const YAW_DEG: f64 = 360.0;
-
 /// Where and how a drive begins: nav-sim fuse --initial
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "Initial state")]
 struct Description {
     /// Time (s)
-    t_s: f64,
+    t_s: Finite,
     /// Latitude of the IMU (degrees)
     #[schemars(range(min = -MAX_LATITUDE_DEG, max = MAX_LATITUDE_DEG))]
-    lat_deg: f64,
+    lat_deg: Finite,
     /// Longitude of the IMU (degrees)
-    #[schemars(range(min = -LON_DEG, max = LON_DEG))]
-    lon_deg: f64,
+    lon_deg: Between<-360, 360, false>,
     /// Height of the IMU above the ellipsoid (m)
-    h_m: f64,
+    h_m: Finite,
     /// Velocity north (m/s; default: 0)
     #[serde(default)]
-    v_n_m_s: f64,
+    v_n_m_s: Finite,
     /// Velocity east (m/s; default: 0)
     #[serde(default)]
-    v_e_m_s: f64,
+    v_e_m_s: Finite,
     /// Velocity down (m/s; default: 0)
     #[serde(default)]
-    v_d_m_s: f64,
+    v_d_m_s: Finite,
     /// Roll of the vehicle (degrees)
-    #[schemars(range(min = -ROLL_DEG, max = ROLL_DEG))]
-    roll_deg: f64,
+    roll_deg: Between<-180, 180, false>,
     /// Pitch (degrees)
-    #[schemars(range(min = -PITCH_DEG, max = PITCH_DEG))]
-    pitch_deg: f64,
+    pitch_deg: Between<-90, 90, false>,
     /// Yaw (degrees)
-    #[schemars(range(min = -YAW_DEG, max = YAW_DEG))]
-    yaw_deg: f64,
+    yaw_deg: Between<-360, 360, false>,
     /// Standard deviations of the position north, east, down (m; default: as in scenarios)
     pos_sigma_m: Option<[f64; 3]>,
     /// Of the velocity (m/s)
@@ -93,15 +82,16 @@ pub(crate) fn read_initial(path: &Path) -> Result<Start, FileError> {
 }
 
 fn parse(source: &Source) -> Result<Start, FileError> {
-    let document = Document::parse(source)?;
-    let d: Description = document.read()?;
-    check(&d).map_err(|(key, reason)| document.root().refuse(key, reason, None))?;
-    let [roll, pitch, yaw] = [d.roll_deg, d.pitch_deg, d.yaw_deg].map(|degrees| degrees * DEG);
+    let d: Description = source.get()?;
+    if d.lat_deg.0.abs() > MAX_LATITUDE_DEG {
+        return Err(source.refused("lat_deg", format!("is not within ±{MAX_LATITUDE_DEG}")));
+    }
+    let (roll, pitch, yaw) = (d.roll_deg.0 * DEG, d.pitch_deg.0 * DEG, d.yaw_deg.0 * DEG);
     let state = NavState {
-        lat: d.lat_deg * DEG,
-        lon: d.lon_deg * DEG,
-        h: d.h_m,
-        v_n: DVec3::new(d.v_n_m_s, d.v_e_m_s, d.v_d_m_s),
+        lat: d.lat_deg.0 * DEG,
+        lon: d.lon_deg.0 * DEG,
+        h: d.h_m.0,
+        v_n: DVec3::new(d.v_n_m_s.0, d.v_e_m_s.0, d.v_d_m_s.0),
         q_b_n: RollPitchYaw { roll, pitch, yaw }.to_quat(),
     };
     let default = InitialSettings::default();
@@ -115,38 +105,8 @@ fn parse(source: &Source) -> Result<Start, FileError> {
         gyro_scale_sigma_ppm: d.gyro_scale_sigma_ppm,
         perfect: false,
     };
-    sigma.validate().map_err(|e| document.refused(&e))?;
-    Ok(Start { t_s: d.t_s, state, sigma, how: vec![format!("as {} says", source.path())] })
-}
-
-/// The key whose value means no state, and why.
-fn check(d: &Description) -> Result<(), (&'static str, String)> {
-    let limits = [
-        ("lat_deg", d.lat_deg, 90.0),
-        ("lon_deg", d.lon_deg, LON_DEG),
-        ("roll_deg", d.roll_deg, ROLL_DEG),
-        ("pitch_deg", d.pitch_deg, PITCH_DEG),
-        ("yaw_deg", d.yaw_deg, YAW_DEG),
-    ];
-    if let Some((key, _, limit)) =
-        limits.iter().find(|(_, value, limit)| value.is_nan() || value.abs() > *limit)
-    {
-        return Err((key, format!("is not within ±{limit}")));
-    }
-    let unlimited = [
-        ("t_s", d.t_s),
-        ("h_m", d.h_m),
-        ("v_n_m_s", d.v_n_m_s),
-        ("v_e_m_s", d.v_e_m_s),
-        ("v_d_m_s", d.v_d_m_s),
-    ];
-    if let Some((key, _)) = unlimited.iter().find(|(_, value)| !value.is_finite()) {
-        return Err((key, "is not a finite number".to_owned()));
-    }
-    if d.lat_deg.abs() > MAX_LATITUDE_DEG {
-        return Err(("lat_deg", "is too near a pole to navigate in latitude and longitude".to_owned()));
-    }
-    Ok(())
+    sigma.validate().map_err(|e| source.setting(&e))?;
+    Ok(Start { t_s: d.t_s.0, state, sigma, how: vec![format!("as {} says", source.path())] })
 }
 
 #[cfg(test)]
@@ -163,13 +123,13 @@ mod tests {
         };
         assert_eq!(parse(&Source::new("i.toml", sound)).unwrap().sigma, InitialSettings::default());
         for (old, new, expected) in [
-            ("= 46", "= 91", "i.toml, line 2: \"lat_deg\" = 91 is not within ±90 | "),
+            ("= 46", "= 91", "i.toml, line 2: \"lat_deg\" = 91 is not within ±89.9 | "),
+            ("= 46", "= 89.95", "i.toml, line 2: \"lat_deg\" = 89.95 is not within ±89.9 | "),
             (
-                "= 46",
-                "= 89.95",
-                "i.toml, line 2: \"lat_deg\" = 89.95 is too near a pole to navigate in latitude and longitude | ",
+                "= 400",
+                "= inf",
+                "i.toml, line 4: \"h_m\" = inf is not a finite number | a number such as 1.5e-4; neither nan nor inf",
             ),
-            ("= 400", "= inf", "i.toml, line 4: \"h_m\" = inf is not a finite number | "),
             ("h_m = 400\n", "", "i.toml, line 1: \"h_m\" is missing | add the key \"h_m\""),
             (
                 "yaw_deg",

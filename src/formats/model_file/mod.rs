@@ -18,15 +18,15 @@
 //! [`ModelFile::missing`].
 
 mod calibrated;
+mod description;
 mod read;
-mod schema;
 mod write;
 
 pub(crate) use calibrated::CalibrationNote;
 pub use calibrated::Misfit;
+pub(crate) use description::schema;
 pub(crate) use read::from_text;
 pub use read::read;
-pub(crate) use schema::schema;
 pub(crate) use write::to_toml;
 pub use write::write;
 

@@ -139,11 +139,11 @@ fn wrong_values_are_refused_with_line_key_and_value() {
     );
     assert_eq!(
         process_refusal("type = \"WN\", sigma2 = \"1\""),
-        "m.toml, line 4: \"accel.processes[1].sigma2\" = \"1\" is not a finite number | a number such as 1.5e-4; neither nan nor inf"
+        "m.toml, line 4: \"accel.processes[1].sigma2\" = \"1\" is not a number | "
     );
     assert_eq!(
         process_refusal("type = \"WN\", sigma2 = 1, sigma2_ci95 = [1]"),
-        "m.toml, line 4: \"accel.processes[1].sigma2_ci95\" = [1] is not a pair [low, high] | "
+        "m.toml, line 4: \"accel.processes[1].sigma2_ci95\" = [1] is not an array of length 2 | "
     );
     assert_eq!(
         refusal("rate_hz = 0\n"),
@@ -154,8 +154,7 @@ fn wrong_values_are_refused_with_line_key_and_value() {
     assert_eq!(twice, "m.toml, line 2, column 1: the key \"rate_hz\" is there already | ");
     assert_eq!(
         refusal("schema = 2\n"),
-        "m.toml, line 1: \"schema\" = 2 is not a schema this version reads: it reads 1 | \
-         was the file made by a newer nav-sim?"
+        "m.toml, line 1: \"schema\" = 2 is not a schema this version reads: it reads 1 | "
     );
 }
 
@@ -167,12 +166,11 @@ fn wrong_keys_are_refused_with_what_was_meant() {
     );
     assert_eq!(
         process_refusal("type = \"ARI\", phi = 0.5, sigma2 = 1"),
-        "m.toml, line 4: \"accel.processes[1].type\" = \"ARI\" is not a process | did you mean \"AR1\"?"
+        "m.toml, line 4: \"accel.processes[1].type\" = \"ARI\" is not one of \"WN\", \"QN\", \"AR1\", \"GM\", \"MA1\", \"RW\", \"DR\" | did you mean \"AR1\"?"
     );
     assert_eq!(
         process_refusal("type = \"flicker\""),
-        "m.toml, line 4: \"accel.processes[1].type\" = \"flicker\" is not a process | \
-         processes: WN, QN, AR1, GM, MA1, RW, DR"
+        "m.toml, line 4: \"accel.processes[1].type\" = \"flicker\" is not one of \"WN\", \"QN\", \"AR1\", \"GM\", \"MA1\", \"RW\", \"DR\" | "
     );
     assert_eq!(
         process_refusal("sigma2 = 1"),
@@ -219,8 +217,7 @@ fn laws_of_spread_are_checked_against_the_model() {
     );
     assert_eq!(
         spread("process = \"AR1\"\nparameter = \"phi\"\ndistribution = \"gamma\"\n"),
-        "m.toml, line 7: \"spread.accel[1].distribution\" = \"gamma\" is not a distribution known here | \
-         distributions: beta, normal"
+        "m.toml, line 7: \"spread.accel[1].distribution\" = \"gamma\" is not one of \"beta\", \"normal\" | "
     );
     assert_eq!(
         spread(
@@ -266,10 +263,7 @@ fn turn_on_biases_are_one_or_three_standard_deviations() {
     for (text, reason) in [
         ("accel_m_s2 = -1", "\"turn_on.accel_m_s2\" = -1 is not a standard deviation between 0 and 10 m/s²"),
         ("gyro_rad_s = 2", "\"turn_on.gyro_rad_s\" = 2 is not a standard deviation between 0 and 1 rad/s"),
-        (
-            "gyro_rad_s = [1e-3, 2e-3]",
-            "\"turn_on.gyro_rad_s\" = [1e-3, 2e-3] is not one number or three, x, y, z",
-        ),
+        ("gyro_rad_s = [1e-3, 2e-3]", "\"turn_on.gyro_rad_s\" = [1e-3, 2e-3] is not an array of length 3"),
         ("gyro_deg_h = 1", "unknown key \"turn_on.gyro_deg_h\""),
     ] {
         let message = with(text).unwrap_err().to_string();

@@ -1,12 +1,11 @@
 //! Keys of a motion profile: their types, ranges and words, for the reader and for editors.
 
 use super::super::samples::HEIGHT;
-use crate::formats::toml_described::Finite;
+use crate::formats::toml_file::Finite;
 use nav_sim_navigation::earth::MAX_LATITUDE_DEG;
 use nav_sim_signal::units::{NonNegative, Positive};
 use schemars::JsonSchema;
 use serde::Deserialize;
-use serde::de::IgnoredAny;
 
 /// A drive by what the vehicle does: the trajectory of nav-sim run
 #[derive(Deserialize, JsonSchema)]
@@ -17,9 +16,8 @@ pub(super) struct Description {
     #[serde(default)]
     pub(super) vehicle: Vehicle,
     /// What the vehicle does, in order
-    #[schemars(with = "Vec<SegmentDescription>", length(min = 1))]
-    #[serde(rename = "segment")]
-    pub(super) _segment: IgnoredAny,
+    #[schemars(length(min = 1))]
+    pub(super) segment: Vec<SegmentTable>,
 }
 
 /// Where and how it starts
@@ -66,28 +64,19 @@ pub(super) enum Roll {
 }
 
 /// One segment
-#[derive(JsonSchema)]
-#[schemars(deny_unknown_fields)]
-#[expect(dead_code, reason = "what describes files, for editors")]
-pub(super) struct SegmentDescription {
-    #[schemars(flatten)]
-    pub(super) of: Of,
-    #[schemars(flatten)]
-    pub(super) kind: Described,
-}
-
-/// What every segment may have.
 #[derive(Deserialize, JsonSchema)]
-pub(super) struct Of {
+#[schemars(deny_unknown_fields)]
+pub(super) struct SegmentTable {
     /// Overrides that of the vehicle (s)
     #[schemars(with = "Option<Positive>")]
     pub(super) ramp_s: Option<Finite>,
+    #[serde(flatten)]
+    pub(super) kind: Described,
 }
 
 /// The kinds of segment, each with its keys.
-#[derive(JsonSchema)]
-#[schemars(tag = "kind", rename_all = "lowercase")]
-#[expect(dead_code, reason = "what describes files, for editors")]
+#[derive(Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "lowercase")]
 pub(super) enum Described {
     /// Constant speed and heading; at speed zero, standing
     Straight(Straight),
@@ -104,6 +93,8 @@ pub(super) enum Described {
 }
 
 #[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(!deny_unknown_fields)]
 pub(super) struct Straight {
     /// Duration (s), or …
     #[schemars(with = "Option<Positive>")]
@@ -117,6 +108,8 @@ pub(super) struct Straight {
 }
 
 #[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(!deny_unknown_fields)]
 pub(super) struct Climb {
     /// Height gained (m)
     pub(super) height_m: Finite,
@@ -129,6 +122,8 @@ pub(super) struct Climb {
 }
 
 #[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(!deny_unknown_fields)]
 pub(super) struct Accelerate {
     /// Final speed (m/s)
     #[schemars(with = "NonNegative")]
@@ -145,6 +140,8 @@ pub(super) struct Accelerate {
 }
 
 #[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(!deny_unknown_fields)]
 pub(super) struct Turn {
     /// Change of heading, positive to the right (degrees)
     pub(super) angle_deg: Finite,
@@ -166,6 +163,8 @@ pub(super) struct Turn {
 }
 
 #[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(!deny_unknown_fields)]
 pub(super) struct Stop {
     /// Time at rest (s)
     #[schemars(with = "Positive")]
@@ -179,11 +178,12 @@ pub(super) struct Stop {
 }
 
 #[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(!deny_unknown_fields)]
 pub(super) struct Waypoints {
     /// The points; the path ends at the last and passes inside the others
-    #[schemars(with = "Vec<Point>", length(min = 1))]
-    #[serde(rename = "points")]
-    pub(super) _points: IgnoredAny,
+    #[schemars(length(min = 1))]
+    pub(super) points: Vec<Point>,
     /// Largest rate of turns (degrees/s), or …
     #[schemars(with = "Option<Positive>")]
     pub(super) rate_deg_s: Option<Finite>,

@@ -41,10 +41,7 @@ fn profiles_are_refused_with_line_key_and_hint() {
         segment("kind = \"straight\"\nduration_s = -3"),
         ("p.toml, line 8: \"segment[1].duration_s\" = -3 is not a finite number > 0".into(), String::new())
     );
-    assert_eq!(
-        segment("kind = \"strait\"").1,
-        "kinds are straight, accelerate, turn, climb, stop, waypoints"
-    );
+    assert_eq!(segment("kind = \"strait\"").1, "did you mean \"straight\"?");
     assert_eq!(
         segment("kind = \"turn\"\nangle_deg = 90\nradius = 3"),
         ("p.toml, line 9: unknown key \"segment[1].radius\"".into(), "did you mean \"radius_m\"?".into())
