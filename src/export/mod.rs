@@ -11,10 +11,11 @@
 //! let model = Model::pooled(100.0, &white, &white);
 //! let (policy, horizon) = (Policy::Matched, Horizon::default());
 //! let settings = Settings { policy, horizon, range_s: 1e4, turn_on: [None; 2], misfit: None };
-//! let exported = Export::new(Target::Kalibr, &model, &[], settings)?;
-//! let n = exported.entries.iter().find(|line| line.key == "gyroscope_noise_density").map(|line| line.value);
-//! // N = √(sigma2/f)
-//! assert!((n.expect("a key of Kalibr") / (4e-6_f64 / 100.0).sqrt() - 1.0).abs() < 1e-9);
+//! let yaml = Export::new(Target::Kalibr, &model, &[], settings)?.text("white");
+//! // N = √(sigma2/f) = √(4e-6/100)
+//! let line = yaml.lines().find(|line| line.starts_with("gyroscope_noise_density: ")).expect("a key of Kalibr");
+//! let n: f64 = line.split(' ').nth(1).expect("a value").parse()?;
+//! assert!((n / 2e-4 - 1.0).abs() < 1e-9);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 

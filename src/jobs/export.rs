@@ -38,7 +38,7 @@ pub fn exported(
 ///
 /// let model = read_model("calib_data/tactical.toml".as_ref())?;
 /// let yaml = nav_sim::export(&model, "tactical", Target::Kalibr)?;
-/// assert!(yaml.contains("\ngyroscope_noise_density: 4.3"), "{yaml}");
+/// assert!(yaml.contains("\ngyroscope_noise_density: 1.234"), "{yaml}");
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
