@@ -27,10 +27,10 @@ mod legend;
 mod marks;
 // L4
 mod draw;
-// L5
-mod picture;
 #[cfg(feature = "pictures")]
 mod png;
+// L5
+mod picture;
 // L6: tables
 mod table;
 // L7
