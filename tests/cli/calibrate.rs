@@ -300,7 +300,7 @@ fn wv_prints_the_curves_of_every_signal() {
     assert!(text(&["--per-file"]).lines().all(|line| line.chars().count() <= 120));
     assert_eq!(text(&["--format", "csv"]).lines().count(), 1 + 4 * 13);
     let stderr = refusal(dir.path(), &["check", "runs/run0.csv", "--format", "csv"], 2);
-    assert!(stderr.contains("--format csv is a format of wv alone"), "{stderr}");
+    assert!(stderr.contains("only wv prints CSV"), "{stderr}");
 }
 
 /// sigma2 is fixed at the truth, phi bounded away from it: the fit is where it was told to be.

@@ -199,7 +199,7 @@ fn check_hints_at_what_helps() {
 fn arguments_in_another_order_are_told() {
     let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
     let (model, drive) = ("calib_data/tactical.toml", "trajectories/land_vehicle.toml");
-    for arguments in [["run", model, drive], ["synthesize", drive, "-q"]] {
+    for arguments in [["run", model, drive, "-q"], ["synthesize", drive, "-o", "never"]] {
         let output = nav_sim().current_dir(root).args(arguments).output().unwrap();
         let said = String::from_utf8(output.stderr).unwrap();
         assert!(output.status.code() == Some(2) && said.contains("arguments in another order?"), "{said}");

@@ -277,7 +277,8 @@ fn no_text(bytes: &[u8]) -> Option<&'static str> {
 /// lines.)
 fn line_of(record: &csv::ByteRecord, next: u64) -> u64 {
     let start = record.position().map_or(0, csv::Position::line);
-    if next == start + 1 {
+    // behind a last row without a line end the reader stands in the row itself
+    if next <= start + 1 {
         return start;
     }
     let inside = record.as_slice().iter().filter(|b| **b == b'\n').count() as u64;
