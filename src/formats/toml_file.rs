@@ -259,7 +259,12 @@ fn culprit<T: DeserializeOwned>(table: &Spanned<DeTable<'_>>, error: &toml::de::
     if path.ends_with(']') {
         path.truncate(path.rfind('[').unwrap_or_default()); // the head of a list is that of its first entry
     }
+    let unknown = message.strip_prefix("unknown field `").and_then(|rest| rest.split('`').next());
     loop {
+        // the unknown key itself may be a list: nothing inside it is to blame
+        if unknown.is_some() && path.rsplit('.').next() == unknown {
+            return path;
+        }
         let inner = match value_at(table.get_ref(), &path) {
             Some(DeValue::Array(items)) if items.iter().any(|item| item.get_ref().is_table()) => {
                 let mut alone = (1..=items.len()).map(|i| (i, only(table.get_ref(), &path, i)));

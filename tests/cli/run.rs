@@ -187,7 +187,7 @@ fn refusals_name_what_is_wrong_and_leave_nothing() {
     let base = "run drive.toml imu.toml --seed 1 -o out";
     refused("run none.toml imu.toml -o out", 1, "none.toml: No such file");
     refused("run drive.toml none.toml -o out", 1, "none.toml: No such file");
-    refused("run drive.toml drive.toml -o out", 2, "drive.toml, line 2: unknown key \"start\"");
+    refused("run drive.toml drive.toml -o out", 2, "drive.toml, line 4: unknown key \"segment\"");
     refused(&format!("{base} --outage 70:90"), 2, "outage 70:90 does not lie on the data");
     refused(&format!("{base} --outage=-10:20"), 2, "outage -10:20 does not lie on the data");
     refused(&format!("{base} --outage 30.2:30.7"), 2, "outage 30.2:30.7 withholds no fix");
@@ -324,7 +324,7 @@ fn a_directory_of_another_command_is_refused() {
     let before = fs::read(place.path().join("made/manifest.json")).unwrap();
     let ran = nav_sim(place.path(), "run drive.toml imu.toml --runs 1 --outage none --seed 1 -o made");
     assert_eq!(ran.code, 2, "{}", ran.stderr);
-    assert!(ran.stderr.contains("made/manifest.json is of another command"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("made is not of this command"), "{}", ran.stderr);
     assert_eq!(fs::read(place.path().join("made/manifest.json")).unwrap(), before);
     for _ in 0..2 {
         done(place.path(), "run drive.toml imu.toml --runs 1 --outage none --seed 1 -o mine");

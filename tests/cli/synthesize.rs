@@ -187,7 +187,7 @@ fn mistakes_are_refused_and_leave_nothing() {
     );
     fs::write(place.path("plain.toml"), "[[accel]]\noperation = \"replace\"\npoints = 500\nsigma = 1\n")
         .unwrap();
-    refused(&["plain.toml"], "plain.toml, line 1: \"rate_hz\" is missing", "");
+    refused(&["plain.toml"], "plain.toml, line 1: \"accel[1]\"", "");
 }
 
 #[test]

@@ -92,7 +92,7 @@ fn a_verdict_of_linear_theory_says_until_where_it_holds() {
     let z = |key: &str| agreement[key].as_f64().unwrap();
     assert!(z("largest_z").abs() < z("bound_z"), "{agreement}");
     let verdict = both.stdout.lines().next().unwrap();
-    assert!(verdict.starts_with("verdict: overconfident in the runs, consistent by"), "{verdict}");
+    assert!(verdict.starts_with("verdict: overconfident: errors 1."), "{verdict}");
     assert!(both.stdout.contains("by covariance analysis doubtful"), "{}", both.stdout);
     assert_eq!(
         (&summary["verdict"]["beyond_linear"], &summary["lincov"]["verdict"]["kind"]),
@@ -123,8 +123,8 @@ fn a_comparison_names_the_runs_beyond_linear_theory() {
         compared.stderr.contains("sampled: the method is not that of the reference; the runs are not paired")
     );
     let told = compared.stdout;
-    assert!(told.starts_with("doubtful: tilted ("), "{told}");
-    assert!(told.contains("\nconsistent: level ("), "{told}");
+    assert!(told.starts_with("against level: tilted "), "{told}");
+    assert!(told.contains("\n1 of 3 filters doubtful (beyond linear theory"), "{told}");
 }
 
 /// The first fixes after an outage of five minutes make of the shift of the velocity down what no covariance analysis contains: at the end
