@@ -187,7 +187,7 @@ fn refusals_name_what_is_wrong_and_leave_nothing() {
     let base = "run drive.toml imu.toml --seed 1 -o out";
     refused("run none.toml imu.toml -o out", 1, "none.toml: No such file");
     refused("run drive.toml none.toml -o out", 1, "none.toml: No such file");
-    refused("run drive.toml drive.toml -o out", 2, "drive.toml, line 4: unknown key \"segment\"");
+    refused("run drive.toml drive.toml -o out", 2, "drive.toml, line 3: unknown key \"segment\"");
     refused(&format!("{base} --outage 70:90"), 2, "outage 70:90 does not lie on the data");
     refused(&format!("{base} --outage=-10:20"), 2, "outage -10:20 does not lie on the data");
     refused(&format!("{base} --outage 30.2:30.7"), 2, "outage 30.2:30.7 withholds no fix");
