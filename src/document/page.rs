@@ -73,6 +73,10 @@ fn block(block: &Block, html: &mut String) {
         Block::Table { table, .. } => self::table(table),
         Block::Charts(charts, caption) => match charts.as_slice() {
             [chart] => figure(chart, caption),
+            charts if charts.iter().any(|chart| chart.size != Size::Small) => {
+                let figures: String = charts.iter().map(|chart| figure(chart, "")).collect();
+                figures + &captioned(caption)
+            }
             charts => {
                 let figures: String = charts.iter().map(|chart| figure(chart, "")).collect();
                 format!("<div class=\"charts\">\n{figures}</div>\n{}", captioned(caption))

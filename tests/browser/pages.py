@@ -55,9 +55,11 @@ frame.addEventListener("load", () => {
       clientX: corner.x + dx, clientY: corner.y + dy }));
     mouse("pointermove", 0, 0);
     answers.cross = chart.querySelectorAll(".cross").length;
-    mouse("pointerdown", -40, -30);
-    mouse("pointermove", 40, 30);
-    mouse("pointerup", 40, 30);
+    // within the plot, which has the height of its rows where names stand on the axis
+    const reach = Math.min(30, 0.3 * Number(box.getAttribute("height")) * chart.getScreenCTM().d);
+    mouse("pointerdown", -40, -reach);
+    mouse("pointermove", 40, reach);
+    mouse("pointerup", 40, reach);
     answers.zoomed = box.getAttribute("viewBox") !== box.dataset.whole;
     chart.dispatchEvent(new view.MouseEvent("dblclick", { bubbles: true }));
     answers.reset = box.getAttribute("viewBox") === box.dataset.whole;
