@@ -16,11 +16,10 @@ mod fusion;
 mod fusion_files;
 mod manifest;
 mod merged_study;
+mod output;
 mod pages;
 mod recording;
 pub(crate) mod requirement;
-mod run_directory;
-pub(crate) mod run_words;
 #[cfg(test)]
 pub(crate) mod sample;
 mod smoothed;
@@ -29,7 +28,8 @@ mod study;
 pub(crate) mod tables;
 mod trajectory;
 mod turn_on;
-mod verdict;
+mod unexpected;
+pub(crate) mod verdict;
 pub(crate) mod wavelet;
 
 use nav_sim_document::Document;
@@ -56,11 +56,10 @@ pub(crate) trait Answer: Serialize {
 
 pub(crate) use merged_study::{MergedStudy, ShownCell, ShownColumn};
 pub use nav_sim_document::readable;
-pub(crate) use nav_sim_document::{seconds, six_digits, window};
-pub(crate) use pages::{StudyCurves, fusion_page, paper_figures, paper_page, run_svg};
+pub(crate) use nav_sim_document::{seconds, six_digits};
+pub(crate) use output::{OutputFile, json};
+pub(crate) use pages::{STATES, StudyCurves, error_of, fusion_page, paper_figures, paper_page, tone};
 pub(crate) use recording::{gnss_csv, imu_csv, initial_toml};
-pub use run_directory::{OutputFile, run_directory};
-pub(crate) use run_directory::{RUN_FILES, json, summary_json};
 #[cfg(any(test, feature = "parquet"))]
 pub(crate) use study::ValueKind;
 pub(crate) use study::{
@@ -69,6 +68,7 @@ pub(crate) use study::{
 };
 pub use trajectory::TrajectorySeries;
 pub(crate) use trajectory::trajectory_svg;
+pub(crate) use unexpected::{reduction_doubt, reduction_line, unexpected_in_words, unexpected_line};
 pub(crate) use wavelet::signals_csv;
 
 /// Names of `nav_sim_document` for files that have not moved to documents yet.

@@ -3,12 +3,12 @@
 mod inputs;
 mod output;
 
-use super::filter::FilterArgs;
 use super::pictures::PlotArgs;
-use super::run::{Words, parse_outage, windows_of};
+use super::run::Words;
 use super::{Failure, Printer, Session, parse};
 use crate::jobs::{FuseError, Fused, FusionFilter, FusionFilterError};
 use crate::report::{FusionManifest, fusion_page};
+use crate::run::{FilterRequest, OutageFlag, windows_of};
 use inputs::Inputs;
 use nav_sim_navigation::earth::GravityModel;
 use nav_sim_navigation::fusion::{Assessment, FusionError, Settings, Verdict};
@@ -76,10 +76,10 @@ pub(crate) struct Args {
     #[arg(long, value_name = "TRAJECTORY")]
     reference: Option<PathBuf>,
     /// Window in which fixes are withheld, on the clock of the data in seconds (repeatable)
-    #[arg(long = "outage", value_name = "START:END", value_parser = parse_outage)]
-    outages: Vec<super::run::OutageArg>,
+    #[arg(long = "outage", value_name = "START:END")]
+    outages: Vec<OutageFlag>,
     #[command(flatten)]
-    filter: FilterArgs,
+    filter: FilterRequest,
     /// Standard deviations where the GNSS file states none: of the position in m, and after a colon of the velocity in
     /// m/s; each one number or north,east,down
     #[arg(long, value_name = "POS[:VEL]", value_parser = inputs::parse_sigma)]

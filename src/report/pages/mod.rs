@@ -2,6 +2,7 @@
 
 mod fusion;
 mod paper;
+<<<<<<< HEAD
 mod run;
 mod run_budgets;
 mod run_charts;
@@ -9,6 +10,17 @@ pub(crate) use fusion::fusion_page;
 pub(crate) use paper::{PaperFigure, StudyCurves, paper_figures, paper_page};
 pub(super) use run::run_page;
 pub(crate) use run_charts::run_svg;
+=======
+mod study;
+
+pub(crate) use choice::choice_page;
+pub(crate) use comparison::{RatioCurves, ShownComparison};
+pub(crate) use design::design_page;
+pub(crate) use efficiency::{efficiency_page, efficiency_svg};
+pub(crate) use fusion::fusion_page;
+pub(crate) use paper::{PaperFigure, StudyCurves, paper_figures, paper_page};
+pub(crate) use study::study_page;
+>>>>>>> f613028 (The main job is one call: a request that clap and serde share, run(&request, &observer), an answer with one document)
 
 use super::number;
 use super::page::Tone;
@@ -33,7 +45,11 @@ fn error_of(state: &str) -> String {
     state.replacen(" (", " error (", 1)
 }
 
+<<<<<<< HEAD
 pub(super) const fn tone(kind: VerdictKind) -> Tone {
+=======
+pub(crate) const fn tone(kind: VerdictKind) -> Tone {
+>>>>>>> f613028 (The main job is one call: a request that clap and serde share, run(&request, &observer), an answer with one document)
     match kind {
         VerdictKind::Consistent => Tone::Good,
         VerdictKind::Undecided => Tone::Undecided,
@@ -43,7 +59,7 @@ pub(super) const fn tone(kind: VerdictKind) -> Tone {
 }
 
 /// With a capital letter and a full stop.
-fn sentence(line: &str) -> String {
+pub(crate) fn sentence(line: &str) -> String {
     let mut letters = line.chars();
     let first: String = letters.next().into_iter().flat_map(char::to_uppercase).collect();
     format!("{first}{}.", letters.as_str())

@@ -7,7 +7,7 @@ use std::fmt::Debug;
 use std::str::FromStr;
 
 /// One of some words, each with what it means.
-pub(super) fn words<T>(words: &'static [(&'static str, &'static str)]) -> impl TypedValueParser<Value = T>
+pub(crate) fn words<T>(words: &'static [(&'static str, &'static str)]) -> impl TypedValueParser<Value = T>
 where
     T: FromStr<Err: Debug> + Clone + Send + Sync + 'static,
 {
@@ -16,12 +16,12 @@ where
 }
 
 /// A finite number.
-pub(super) fn finite(text: &str) -> Result<f64, String> {
+pub(crate) fn finite(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| "not a finite number".into())
 }
 
 /// A finite number ≥ 0.
-pub(super) fn non_negative(text: &str) -> Result<f64, String> {
+pub(crate) fn non_negative(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(x) if x.is_finite() && x >= 0.0 => Ok(x),
         _ => Err("not a finite number ≥ 0".into()),
@@ -29,7 +29,7 @@ pub(super) fn non_negative(text: &str) -> Result<f64, String> {
 }
 
 /// A sample rate (Hz).
-pub(super) fn rate_hz(text: &str) -> Result<f64, String> {
+pub(crate) fn rate_hz(text: &str) -> Result<f64, String> {
     match positive(text)? {
         x if x <= MAX_RATE_HZ => Ok(x),
         _ => Err(format!("more than {MAX_RATE_HZ} samples a second")),
@@ -37,7 +37,7 @@ pub(super) fn rate_hz(text: &str) -> Result<f64, String> {
 }
 
 /// A finite number > 0.
-pub(super) fn positive(text: &str) -> Result<f64, String> {
+pub(crate) fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(x) if x.is_finite() && x > 0.0 => Ok(x),
         _ => Err("not a finite number > 0".into()),
@@ -45,7 +45,7 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
 }
 
 /// Two times (s): `1s:100s`, also without the unit.
-pub(super) fn seconds_range(text: &str) -> Result<(f64, f64), String> {
+pub(crate) fn seconds_range(text: &str) -> Result<(f64, f64), String> {
     let seconds = |text: &str| {
         let text = text.trim();
         // as results have it
@@ -62,11 +62,11 @@ pub(super) fn seconds_range(text: &str) -> Result<(f64, f64), String> {
 
 /// Three finite numbers.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Triple(pub(super) [f64; 3]);
+pub(crate) struct Triple(pub(crate) [f64; 3]);
 
 /// Two finite numbers ≥ 0.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Pair(pub(super) [f64; 2]);
+pub(crate) struct Pair(pub(crate) [f64; 2]);
 
 /// Numbers between commas.
 fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
@@ -76,18 +76,18 @@ fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
 }
 
 /// `X,Y,Z`.
-pub(super) fn triple(text: &str) -> Result<Triple, String> {
+pub(crate) fn triple(text: &str) -> Result<Triple, String> {
     numbers(text).map(Triple).ok_or_else(|| "expected three numbers, such as 0.5,0,-1.2".into())
 }
 
 /// `A,B`.
-pub(super) fn pair(text: &str) -> Result<Pair, String> {
+pub(crate) fn pair(text: &str) -> Result<[f64; 2], String> {
     let pair = numbers::<2>(text).filter(|p| p.iter().all(|x| *x >= 0.0));
-    pair.map(Pair).ok_or_else(|| "expected two numbers ≥ 0, such as 0.1,0.002".into())
+    pair.ok_or_else(|| "expected two numbers ≥ 0, such as 0.1,0.002".into())
 }
 
 /// A probability between 0 and 1, both excluded.
-pub(super) fn probability(text: &str) -> Result<f64, String> {
+pub(crate) fn probability(text: &str) -> Result<f64, String> {
     match positive(text)? {
         x if x < 1.0 => Ok(x),
         _ => Err("not a probability below 1, such as 0.999".into()),
@@ -95,11 +95,15 @@ pub(super) fn probability(text: &str) -> Result<f64, String> {
 }
 
 /// `A,B`, both above 0.
-pub(super) fn positive_pair(text: &str) -> Result<Pair, String> {
-    pair(text).ok().filter(|p| p.0.iter().all(|x| *x > 0.0)).ok_or_else(|| "expected two numbers > 0".into())
+pub(crate) fn positive_pair(text: &str) -> Result<Pair, String> {
+    pair(text)
+        .ok()
+        .filter(|p| p.iter().all(|x| *x > 0.0))
+        .map(Pair)
+        .ok_or_else(|| "expected two numbers > 0".into())
 }
 /// A member of a closed set by its name; help and completions list the names.
-pub(super) fn one_of<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
+pub(crate) fn one_of<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
 where
     T: FromStr<Err = UnknownName> + Clone + Send + Sync + 'static,
 {
