@@ -1,6 +1,6 @@
 //! Words on what a filter does not expect, and on what a reduction costs it.
 
-use super::number::{percent, readable};
+use nav_sim_document::{percent, readable};
 use nav_sim_navigation::ekf::InitialSettings;
 use nav_sim_navigation::metrics::ReductionQuality;
 use nav_sim_navigation::scenario::Unexpected;
