@@ -85,8 +85,3 @@ mod number {
 
 /// Characters of a line in a terminal.
 pub(crate) const WIDTH: usize = 120;
-
-/// A table of rows, of which the first is the head, in Markdown.
-pub(crate) fn markdown_table(rows: &[Vec<String>]) -> String {
-    page::Table::of_rows(rows).markdown()
-}

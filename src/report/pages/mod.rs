@@ -2,33 +2,15 @@
 
 mod fusion;
 mod paper;
-<<<<<<< HEAD
-mod run;
-mod run_budgets;
-mod run_charts;
 pub(crate) use fusion::fusion_page;
 pub(crate) use paper::{PaperFigure, StudyCurves, paper_figures, paper_page};
-pub(super) use run::run_page;
-pub(crate) use run_charts::run_svg;
-=======
-mod study;
 
-pub(crate) use choice::choice_page;
-pub(crate) use comparison::{RatioCurves, ShownComparison};
-pub(crate) use design::design_page;
-pub(crate) use efficiency::{efficiency_page, efficiency_svg};
-pub(crate) use fusion::fusion_page;
-pub(crate) use paper::{PaperFigure, StudyCurves, paper_figures, paper_page};
-pub(crate) use study::study_page;
->>>>>>> f613028 (The main job is one call: a request that clap and serde share, run(&request, &observer), an answer with one document)
-
-use super::number;
 use super::page::Tone;
 use nav_sim_navigation::metrics::VerdictKind;
 use nav_sim_navigation::simulation::REPORTED;
 
 /// The reported states and their units, in words.
-const STATES: [&str; REPORTED] = [
+pub(crate) const STATES: [&str; REPORTED] = [
     "position north (m)",
     "position east (m)",
     "position down (m)",
@@ -41,31 +23,15 @@ const STATES: [&str; REPORTED] = [
 ];
 
 /// A state as the title of a chart of its errors: `roll error (°)`.
-fn error_of(state: &str) -> String {
+pub(crate) fn error_of(state: &str) -> String {
     state.replacen(" (", " error (", 1)
 }
 
-<<<<<<< HEAD
-pub(super) const fn tone(kind: VerdictKind) -> Tone {
-=======
 pub(crate) const fn tone(kind: VerdictKind) -> Tone {
->>>>>>> f613028 (The main job is one call: a request that clap and serde share, run(&request, &observer), an answer with one document)
     match kind {
         VerdictKind::Consistent => Tone::Good,
         VerdictKind::Undecided => Tone::Undecided,
         VerdictKind::Doubtful | VerdictKind::Underconfident => Tone::Doubtful,
         VerdictKind::Overconfident | VerdictKind::NotMet | VerdictKind::Diverged => Tone::Bad,
     }
-}
-
-/// With a capital letter and a full stop.
-pub(crate) fn sentence(line: &str) -> String {
-    let mut letters = line.chars();
-    let first: String = letters.next().into_iter().flat_map(char::to_uppercase).collect();
-    format!("{first}{}.", letters.as_str())
-}
-
-/// `300–390 s`
-fn window((start_s, end_s): (f64, f64)) -> String {
-    number::window(start_s, end_s)
 }
