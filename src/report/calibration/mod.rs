@@ -99,9 +99,7 @@ impl ShownCalibration<'_> {
             let importance = if is_stored { Importance::Warning } else { Importance::Detail };
             notes.push((importance, format!("{}: {}", found.sensor.name(), turn_on_remark(found))));
         }
-        notes.extend(
-            words::beginnings(self.beginnings, fits).map(|line| (Importance::Remark, line)),
-        );
+        notes.extend(words::beginnings(self.beginnings, fits).map(|line| (Importance::Remark, line)));
         for outcome in fits {
             let reasons = outcome.ranking.iter().flat_map(|r| reasons(r, settings.rate_hz));
             let name = words::fit_name(outcome, fits);

@@ -139,9 +139,8 @@ pub(super) fn beginnings(found: &Beginnings, outcomes: &[&Outcome]) -> Option<St
     let names: Vec<&str> = told.iter().map(|b| b.recording.as_str()).collect();
     let line = |(b, name): (&&Beginning, &String)| {
         let change = b.surest().and_then(|(channel, w)| Some((channel, w.change?)));
-        let change = change.map_or(String::new(), |(channel, c)| {
-            format!(" ({channel} {:+.0} %)", 100.0 * (c.ratio - 1.0))
-        });
+        let change = change
+            .map_or(String::new(), |(channel, c)| format!(" ({channel} {:+.0} %)", 100.0 * (c.ratio - 1.0)));
         match b.skip_s {
             Some(s) if found.left_out => format!("{} {s} s", stem(name)),
             Some(s) => format!("{} --skip-s {s}{change}", stem(name)),
