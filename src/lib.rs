@@ -66,6 +66,8 @@ mod tune;
 // What a command does, as one call.
 pub mod jobs;
 mod require;
+// Recorded drives.
+pub mod fuse;
 // All that most programs need.
 pub mod prelude;
 // Arguments, words and exit codes.

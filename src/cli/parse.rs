@@ -15,11 +15,6 @@ where
     PossibleValuesParser::new(values).map(|word| word.parse().expect("a word of the list"))
 }
 
-/// A finite number.
-pub(super) fn finite(text: &str) -> Result<f64, String> {
-    text.parse().ok().filter(|x: &f64| x.is_finite()).ok_or_else(|| "not a finite number".into())
-}
-
 /// A finite number ≥ 0.
 pub(super) fn non_negative(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -60,10 +55,6 @@ pub(super) fn seconds_range(text: &str) -> Result<(f64, f64), String> {
     }
 }
 
-/// Three finite numbers.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Triple(pub(super) [f64; 3]);
-
 /// Two finite numbers ≥ 0.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pair(pub(super) [f64; 2]);
@@ -75,29 +66,12 @@ fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
     parsed?.try_into().ok()
 }
 
-/// `X,Y,Z`.
-pub(super) fn triple(text: &str) -> Result<Triple, String> {
-    numbers(text).map(Triple).ok_or_else(|| "expected three numbers, such as 0.5,0,-1.2".into())
-}
-
 /// `A,B`.
 pub(super) fn pair(text: &str) -> Result<Pair, String> {
     let pair = numbers::<2>(text).filter(|p| p.iter().all(|x| *x >= 0.0));
     pair.map(Pair).ok_or_else(|| "expected two numbers ≥ 0, such as 0.1,0.002".into())
 }
 
-/// A probability between 0 and 1, both excluded.
-pub(super) fn probability(text: &str) -> Result<f64, String> {
-    match positive(text)? {
-        x if x < 1.0 => Ok(x),
-        _ => Err("not a probability below 1, such as 0.999".into()),
-    }
-}
-
-/// `A,B`, both above 0.
-pub(super) fn positive_pair(text: &str) -> Result<Pair, String> {
-    pair(text).ok().filter(|p| p.0.iter().all(|x| *x > 0.0)).ok_or_else(|| "expected two numbers > 0".into())
-}
 /// A member of a closed set by its name; help and completions list the names.
 pub(super) fn one_of<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
 where

@@ -10,7 +10,6 @@ use crate::formats::{FileError, Setting};
 use crate::report::Input;
 use nav_sim_navigation::trajectory::Trajectory;
 use nav_sim_navigation::trajectory::plausibility::{Excess, Limits, examine};
-use nav_sim_navigation::trajectory::reference::Reference;
 use nav_sim_signal::imu::Recording;
 use nav_sim_signal::noise::{Model, continuous};
 use std::path::{Path, PathBuf};
@@ -47,7 +46,7 @@ pub(super) fn refused_for_fusion(e: FileError) -> Failure {
         Setting::ColumnNames => Some("correct the header"),
         Setting::Channels | Setting::FewerChannels | Setting::Gaps => None,
         Setting::RemoveLine => Some("remove the line: gaps of up to 5 s are bridged"),
-        other => Some(option_for(other)),
+        other => Some(elsewhere(other)),
     })
 }
 
@@ -82,14 +81,6 @@ fn implausible(path: &Path, trajectory: &Trajectory, session: &Session) {
         };
         session.warn(format!("{shown}: {worst}{more} (nav-sim trajectory check {shown} lists them)"));
     }
-}
-
-/// A trajectory to compare with; what is left out of it is said.
-pub(super) fn reference(path: &Path, session: &Session) -> Result<Reference, Failure> {
-    let (reference, warnings) = trajectory_file::load_reference(path, &trajectory_file::Options::default())
-        .map_err(without_options)?;
-    session.warn_all(warnings);
-    Ok(reference)
 }
 
 /// A model; axes that it does not name are said.

@@ -6,7 +6,6 @@ use super::uncertainty::Analysed;
 use crate::formats::draws_file::Draws;
 use crate::observer::Observer;
 use nav_sim_navigation::ekf::{Belief, BeliefError};
-use nav_sim_navigation::fusion::{Assessment as Trust, Start};
 use nav_sim_navigation::metrics::{
     Agreement, Budget, EpochMetrics, Expected, FanEpoch, ReductionQuality, ReductionSummary, Sensitivities,
     Summary, epochs, expected_fan, fan,
@@ -82,12 +81,6 @@ pub enum Note {
     Agreement(Agreement),
     /// A window without fixes is not as it was asked for.
     Outage(OutageRemark),
-    /// Where the filter starts on a recorded drive.
-    Start(Start),
-    /// A window that ends before the start of the solution (s): it is not an outage.
-    EarlyOutage(Outage, f64),
-    /// Whether the solution of a recorded drive is to be believed, and how far it is from the reference at most (m).
-    Fused(Trust, Option<f64>),
 }
 
 /// Error of [`navigate()`].

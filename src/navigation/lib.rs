@@ -25,7 +25,6 @@ pub mod strapdown;
 pub mod ekf;
 // L6
 pub mod closure;
-pub mod fusion;
 pub mod simulation;
 pub mod throughput;
 // L7
@@ -34,4 +33,5 @@ pub mod scenario;
 // L8
 pub mod metrics;
 // L9
+pub mod fusion;
 pub mod require;

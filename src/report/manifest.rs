@@ -1,9 +1,5 @@
-//! `manifest.json`: all it takes to know where the directory of a run or a fusion came from, and to make it again.
+//! `manifest.json`: all it takes to know where the directory of a run came from, and to make it again.
 
-use nav_sim_navigation::ekf::{FilterStates, InitialSettings};
-use nav_sim_navigation::fusion::Settings;
-use nav_sim_navigation::fusion::mounting::Mounted;
-use nav_sim_navigation::gnss::FixSigma;
 use nav_sim_navigation::scenario::Scenario;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -83,64 +79,6 @@ impl Manifest {
 }
 
 /// What files hold and what for, wherever they are.
-fn contents(inputs: &[Input]) -> Vec<(&str, &str)> {
+pub(crate) fn contents(inputs: &[Input]) -> Vec<(&str, &str)> {
     inputs.iter().map(|i| (i.role.as_str(), i.blake3.as_str())).collect()
-}
-
-/// Where a fusion came from.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct FusionManifest {
-    /// Layout version.
-    pub schema_version: u32,
-    /// What made the directory.
-    pub kind: FusionKind,
-    /// Version of nav-sim.
-    pub version: String,
-    /// The command as given.
-    pub command: Vec<String>,
-    /// All that decides the result beside the files.
-    pub configuration: FusionConfiguration,
-    /// Every file that was read.
-    pub inputs: Vec<Input>,
-    /// Time from start to results (s).
-    pub wall_s: f64,
-}
-
-/// Tells the directory of a fusion from that of a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub(crate) enum FusionKind {
-    /// `nav-sim fuse`.
-    Fusion,
-}
-
-/// What decides a fusion beside its files.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct FusionConfiguration {
-    /// How it is fused; where the mounting is found, about which axes it is looked for.
-    pub settings: Settings,
-    /// Whether the mounting is found.
-    pub mounted: Mounted,
-    /// States of the filter.
-    pub filter: FilterStates,
-    /// What it expects at the start, and of the IMU beside the model.
-    pub initial: InitialSettings,
-    /// Standard deviations of fixes that state none.
-    pub gnss_sigma: Option<FixSigma>,
-    /// What the standard deviations of position and velocity are multiplied by.
-    pub gnss_sigma_factor: [f64; 2],
-    /// How much earlier than its time a fix is taken to be (s).
-    pub gnss_delay_s: f64,
-}
-
-impl FusionManifest {
-    /// Version of the layout.
-    pub(crate) const SCHEMA_VERSION: u32 = 2;
-
-    /// Whether a fusion of the one is a fusion of the other: all that decides the results is the same.
-    #[must_use]
-    pub(crate) fn is_same_fusion(&self, other: &Self) -> bool {
-        (&self.version, &self.configuration) == (&other.version, &other.configuration)
-            && contents(&self.inputs) == contents(&other.inputs)
-    }
 }

@@ -8,12 +8,9 @@ mod comparison;
 mod comparison_table;
 mod curves;
 mod design;
-mod displaced;
 mod dots;
 mod efficiency;
 mod fits;
-mod fusion;
-mod fusion_files;
 mod manifest;
 mod merged_study;
 mod pages;
@@ -23,7 +20,6 @@ mod run_directory;
 pub(crate) mod run_words;
 #[cfg(test)]
 pub(crate) mod sample;
-mod smoothed;
 mod states;
 mod study;
 pub(crate) mod tables;
@@ -41,12 +37,9 @@ pub(crate) use comparison::{Comparison, RatioCurves};
 pub(crate) use comparison_table::{CandidateResult, Label};
 pub(crate) use curves::{CurvesFile, FittedCurve, ReplicateCurve, SignalCurves, SignalsFile};
 pub(crate) use design::{Design, DesignedParameter, DesignedQuantile, Designs};
-pub(crate) use displaced::displaced_words;
 pub(crate) use efficiency::{EfficiencyFile, EfficiencyRow, efficiency_csv};
 pub(crate) use fits::FitsFile;
-pub(crate) use fusion::FusionSummary;
-pub(crate) use fusion_files::{FUSION_FILES, fusion_directory};
-pub(crate) use manifest::{FusionConfiguration, FusionKind, FusionManifest};
+pub(crate) use manifest::contents;
 pub use manifest::{Input, Manifest, ModelNote};
 /// A result: what is printed, drawn or saved of it is it itself as JSON, or its document.
 pub(crate) trait Answer: Serialize {
@@ -57,7 +50,7 @@ pub(crate) trait Answer: Serialize {
 pub(crate) use merged_study::{MergedStudy, ShownCell, ShownColumn};
 pub use nav_sim_document::readable;
 pub(crate) use nav_sim_document::{seconds, six_digits, window};
-pub(crate) use pages::{StudyCurves, fusion_page, paper_figures, paper_page, run_svg};
+pub(crate) use pages::{StudyCurves, paper_figures, paper_page, run_svg};
 pub(crate) use recording::{gnss_csv, imu_csv, initial_toml};
 pub use run_directory::{OutputFile, run_directory};
 pub(crate) use run_directory::{RUN_FILES, json, summary_json};
@@ -75,12 +68,12 @@ pub(crate) use wavelet::signals_csv;
 pub(crate) mod page {
     pub(crate) use nav_sim_document::{
         Axis, Cell, Chart, Colour, Document as Page, Form, Interval, Mark, Panel, Series, Stroke, Table,
-        Tone, encode, escape, svg,
+        Tone, encode, svg,
     };
 }
 
 mod number {
-    pub(crate) use nav_sim_document::{readable, seconds, shortest, window};
+    pub(crate) use nav_sim_document::{readable, shortest, window};
 }
 
 /// Characters of a line in a terminal.

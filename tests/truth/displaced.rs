@@ -77,7 +77,7 @@ fn corrections_of_a_reference_are_no_errors_of_velocity() {
         let sound = run(&recording.imu, &recording.gnss, start, &settings(), &trajectory);
         let uneven = run(&recording.imu, &recording.gnss, start, &settings(), &stepped);
         let [sound, uneven] = [sound, uneven].map(|s| outcome(&s, &[]).reference.unwrap());
-        assert!(sound.velocity_sigma < 0.01 && uneven.velocity_sigma > 1.0, "{sound:?} {uneven:?}");
+        assert!(sound.velocity_sigma_m_s < 0.01 && uneven.velocity_sigma_m_s > 1.0, "{sound:?} {uneven:?}");
         assert!(
             sound.nees_mean < 15.0 && uneven.nees_mean < 15.0,
             "{} {}",

@@ -62,12 +62,8 @@ pub(crate) fn recorded(
     let plan = Plan::new(&experiment).unwrap();
     for run in 0..runs {
         let recording = record(&plan, run);
-        let start = Start {
-            t_s: trajectory.start_s(),
-            state: recording.start,
-            sigma: initial.clone(),
-            how: Vec::new(),
-        };
+        let start =
+            Start { t_s: trajectory.start_s(), state: recording.start, sigma: initial.clone(), found: None };
         then(&recording, &start);
     }
 }
@@ -192,11 +188,11 @@ fn mounting_angles_take_a_turned_imu_back() {
         }
         assert_eq!(a.fixes.iter().filter(|f| f.used == Use::Withheld).count(), 20);
         let drift = &outcome(&a, &outages).outages[0];
-        assert_eq!(drift.withheld, 20);
-        let (fix, reference) = (drift.from_fix.unwrap(), drift.from_reference.unwrap());
+        assert_eq!(drift.fixes_withheld, 20);
+        let (fix, reference) = (drift.end_from_fix.unwrap(), drift.end_from_reference.unwrap());
         // the two differ by the noise of one fix, 2.8 m in the horizontal: within 4 of them
         assert!((fix.horizontal_m - reference.horizontal_m).abs() < 11.4);
-        assert!(reference.horizontal_m < 4.0 * reference.sigma_m);
+        assert!(reference.horizontal_m < 4.0 * reference.expected_sigma_m);
     });
 }
 

@@ -60,7 +60,7 @@ fn at_rest_the_smoothed_position_is_the_closed_form_of_an_integrated_wiener_proc
         att_sigma_deg: [1e-9; 3],
         ..InitialSettings::default()
     };
-    let start = Start { t_s: trajectory.start_s(), state: truth, sigma, how: Vec::new() };
+    let start = Start { t_s: trajectory.start_s(), state: truth, sigma, found: None };
     // fixes between the samples too, without a pattern, north and east each its own
     let times: Vec<f64> = (1..60).filter(|k| !(20..40).contains(k)).map(|k| f64::from(k) + 0.0037).collect();
     let offset = |k: usize, axis: usize| ((k * 7 + axis * 5 + k * k) % 11) as f64 * 0.4 - 2.0;
@@ -161,7 +161,7 @@ impl Experiment {
         let solution = |run: u64| {
             let Recording { imu, gnss, start, .. } = record(&plan, run);
             let sigma = scenario.initial.clone();
-            let start = Start { t_s: trajectory.start_s(), state: start, sigma, how: Vec::new() };
+            let start = Start { t_s: trajectory.start_s(), state: start, sigma, found: None };
             fuse(&Recorded { imu: &imu, gnss: &gnss }, &belief, &start, &settings, Some(&reference)).unwrap()
         };
         (0..runs).map(solution).collect()
@@ -306,6 +306,5 @@ fn a_tape_that_is_too_long_is_refused() {
         let refused = fuse(&recorded, &belief(&model()), start, &long, None).unwrap_err();
         let FusionError::Memory { bytes, states: 15, .. } = refused else { panic!("{refused}") };
         assert!((2.8e9..3.5e9).contains(&bytes), "{bytes}");
-        assert!(refused.hint().unwrap().contains("fewer rows a second"), "{refused}");
     });
 }

@@ -1,9 +1,9 @@
 //! What a job tells, in words.
 
-use crate::cli::{Progress, Session, fuse};
+use crate::cli::{Progress, Session};
 use crate::jobs::Note;
 use crate::observer::Observer;
-use crate::report::{run_words, seconds};
+use crate::report::run_words;
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
@@ -49,18 +49,6 @@ impl Observer<Note> for Words<'_> {
             )),
             Note::Agreement(_) => {}
             Note::Outage(remark) => printer.warn(&remark.to_string()),
-            Note::Start(start) => {
-                for line in &start.how {
-                    printer.say(&format!("initial state at {} s: {line}", seconds(start.t_s)));
-                }
-            }
-            Note::EarlyOutage(outage, start_s) => printer.warn(&format!(
-                "outage {}:{} lies before the start of the solution at {} s: it is not an outage",
-                seconds(outage.start_s),
-                seconds(outage.end_s),
-                seconds(*start_s)
-            )),
-            Note::Fused(assessment, farthest_m) => fuse::judge(assessment, *farthest_m, printer),
         }
     }
 

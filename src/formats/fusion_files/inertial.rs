@@ -64,9 +64,8 @@ pub(crate) fn read_imu(path: &Path) -> Result<ImuFile, Error> {
     columns.increments()
 }
 
-/// What a text without a header may be.
-const KF_GINS: &str = "a KF-GINS text has 7 columns (t_s, dtheta_x, dtheta_y, dtheta_z in rad, dv_x, dv_y, dv_z in m/s), \
-                       or 8 with an odometer's speed, which is not used";
+/// A text without a header.
+const KF_GINS: &str = "KF-GINS: 7 columns (t_s, dtheta_x, dtheta_y, dtheta_z in rad, dv_x, dv_y, dv_z in m/s), or 8 with an odometer";
 
 fn kf_gins(path: &Path, text: &str) -> Result<Columns, Error> {
     const NAMES: [&str; 8] = [
@@ -131,8 +130,7 @@ fn headed(path: &Path) -> Result<Columns, Error> {
 /// A recording without a signal or a clock that is needed.
 fn lacking(path: &str, message: &str) -> Error {
     Error::contents(path, Place::Within, message).advice(
-        "name the columns t_s, gyro_x_rad_s … accel_z_m_s2 (rates) or t_s, dtheta_x_rad … dv_z_m_s (increments, time \
-         = end of the interval), or give a KF-GINS text of 7 or 8 columns",
+        "columns: t_s, gyro_x_rad_s … accel_z_m_s2 (rates) or t_s, dtheta_x_rad … dv_z_m_s (increments)",
     )
 }
 
@@ -177,21 +175,17 @@ impl Columns {
             let refuse = |message: String| Error::contents(self.path.as_str(), self.lines[k], message);
             if is_hole && since_s - step > LONGEST_S + 0.5 * step {
                 let previous_s = self.t_s[k - 1];
-                let message = format!(
-                    "no samples from {previous_s} s to {t_s} s: more than {LONGEST_S} s cannot be bridged"
-                );
+                let message =
+                    format!("no samples from {previous_s} s to {t_s} s: {LONGEST_S} s can be bridged");
                 return Err(refuse(message).advice("fuse the stretches before and after it one by one"));
             }
             let angle = sample.dtheta.length();
             if angle > MAX_ROTATION {
-                let message = format!(
-                    "a rotation of {:.1}° in one sample, at most {:.1}° can be followed",
-                    angle / DEG,
-                    MAX_ROTATION / DEG
-                );
-                return Err(refuse(message).advice(
-                    "is the unit right? gyro_x_deg_s is in degrees, gyro_x_rad_s in radians a second",
-                ));
+                let [degrees, most] = [angle, MAX_ROTATION].map(|a| a / DEG);
+                let message = format!("a rotation of {degrees:.1}° in one sample, {most:.1}° at most");
+                let advice =
+                    "is the unit right? gyro_x_deg_s is in degrees, gyro_x_rad_s in radians a second";
+                return Err(refuse(message).advice(advice));
             }
             if is_hole {
                 holes.push((k, since_s - step));
@@ -204,20 +198,11 @@ impl Columns {
     }
 
     fn tell_of_holes(&mut self, holes: &[(usize, f64)]) {
-        const SHOWN: usize = 5;
-        let shown = |(k, seconds): &(usize, f64)| {
-            format!("{seconds:.2} s before {:.2} s (line {})", self.t_s[*k], self.lines[*k])
-        };
-        let mut list: Vec<String> = holes.iter().take(SHOWN).map(shown).collect();
-        if holes.len() > SHOWN {
-            list.push(format!("and {} more", holes.len() - SHOWN));
-        }
-        if !list.is_empty() {
-            self.remarks.push(Remark::doubt(format!(
-                "samples missing: {}; bridged with those beside them, as uncertain as this recording is over such times",
-                list.join(", ")
-            )));
-        }
+        let Some((k, seconds)) = holes.first() else { return };
+        let (t_s, line, more) = (self.t_s[*k], self.lines[*k], holes.len() - 1);
+        self.remarks.push(Remark::doubt(format!(
+            "samples missing: {seconds:.2} s before {t_s:.2} s (line {line}) and {more} more gaps; bridged"
+        )));
     }
 
     /// Sample k over `dt` seconds that end at `t_s`.

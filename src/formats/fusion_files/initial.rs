@@ -106,7 +106,7 @@ fn parse(source: &Source) -> Result<Start, FileError> {
         perfect: false,
     };
     sigma.validate().map_err(|e| source.setting(&e))?;
-    Ok(Start { t_s: d.t_s.0, state, sigma, how: vec![format!("as {} says", source.path())] })
+    Ok(Start { t_s: d.t_s.0, state, sigma, found: None })
 }
 
 #[cfg(test)]

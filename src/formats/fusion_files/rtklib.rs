@@ -53,8 +53,7 @@ pub(super) fn rows(path: &str, text: &str) -> Result<(String, String), Error> {
                 return refuse(
                     i,
                     "not a row of time, position, quality, satellites and standard deviations",
-                    "an RTKLIB row begins 2021/03/01 00:00:01.000 (or 2147 86401.000), then latitude, longitude, height, Q, ns, \
-                     sdn, sde, sdu",
+                    "2021/03/01 00:00:01.000 (or 2147 86401.000), latitude, longitude, height, Q, ns, sdn, sde, sdu",
                 );
             };
             let week = *first_week.get_or_insert((t_s / WEEK_S).floor());

@@ -1,208 +1,157 @@
-//! What the columns of a trajectory table mean.
+//! Columns of a table by the quantity that their names stand for, with its unit.
 
-use super::table::{COLUMNS, Table};
+use super::table::Table;
 use crate::formats::suggest::nearest;
 use crate::formats::{FileError as Error, Kind};
 use nav_sim_signal::units::DEG;
 
-/// What a column holds.
+/// Kind of a quantity, by which its unit may be told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Quantity {
+pub(in crate::formats) enum Unit {
     Time,
-    Lat,
-    Lon,
-    H,
-    N,
-    E,
-    D,
-    Roll,
-    Pitch,
-    Yaw,
-    Vn,
-    Ve,
-    Vd,
+    Angle,
+    Length,
+    Speed,
+    Count,
 }
 
-nav_sim_signal::named!(
-    Quantity {
-        Time = "t_s",
-        Lat = "lat_deg",
-        Lon = "lon_deg",
-        H = "h_m",
-        N = "n_m",
-        E = "e_m",
-        D = "d_m",
-        Roll = "roll_deg",
-        Pitch = "pitch_deg",
-        Yaw = "yaw_deg",
-        Vn = "v_n_m_s",
-        Ve = "v_e_m_s",
-        Vd = "v_d_m_s",
-    }
-);
-
-use Quantity::{D, E, H, Lat, Lon, N, Pitch, Roll, Time, Vd, Ve, Vn, Yaw};
-
-/// Names of a quantity without their unit. Angles end in `_deg` or `_rad` (nothing: degrees), times in
-/// `_s`, `_ms`, `_us`, `_ns`, lengths in `_m`, velocities in `_m_s` or `_mps`.
-const STEMS: [(&[&str], Quantity, f64); 15] = [
-    (&["t", "time", "timestamp"], Time, 1.0),
-    (&["lat", "latitude"], Lat, 1.0),
-    (&["lon", "lng", "longitude"], Lon, 1.0),
-    (&["h", "alt", "height", "altitude"], H, 1.0),
-    (&["n", "north"], N, 1.0),
-    (&["e", "east"], E, 1.0),
-    (&["d", "down"], D, 1.0),
-    (&["u", "up"], D, -1.0),
-    (&["roll"], Roll, 1.0),
-    (&["pitch"], Pitch, 1.0),
-    (&["yaw", "heading", "azimuth"], Yaw, 1.0),
-    (&["v_n", "vn", "v_north"], Vn, 1.0),
-    (&["v_e", "ve", "v_east"], Ve, 1.0),
-    (&["v_d", "vd", "v_down"], Vd, 1.0),
-    (&["v_u", "v_up"], Vd, -1.0),
-];
-
-/// The quantity a name stands for and the factor to SI.
-fn classify(name: &str) -> Option<(Quantity, f64)> {
-    let name = name.to_lowercase().replace([' ', '-'], "_");
-    let units: [(&str, f64, &[Quantity]); 10] = [
-        ("_ms", 1e-3, &[Time]),
-        ("_us", 1e-6, &[Time]),
-        ("_ns", 1e-9, &[Time]),
-        ("_m_s", 1.0, &[Vn, Ve, Vd]),
-        ("_mps", 1.0, &[Vn, Ve, Vd]),
-        ("_s", 1.0, &[Time]),
-        ("_deg", DEG, &[Lat, Lon, Roll, Pitch, Yaw]),
-        ("_rad", 1.0, &[Lat, Lon, Roll, Pitch, Yaw]),
-        ("_m", 1.0, &[H, N, E, D]),
-        ("", 1.0, &[Time, H]),
-    ];
-    let of_stem =
-        |stem: &str| STEMS.iter().find(|(names, ..)| names.contains(&stem)).map(|&(_, q, sign)| (q, sign));
-    for (suffix, factor, quantities) in units {
-        let found = name.strip_suffix(suffix).and_then(of_stem);
-        if let Some((q, sign)) = found.filter(|(q, _)| quantities.contains(q)) {
-            return Some((q, sign * factor));
+impl Unit {
+    /// Endings of names and the factors to SI.
+    const fn endings(self) -> &'static [(&'static str, f64)] {
+        match self {
+            Self::Time => &[("_s", 1.0), ("_ms", 1e-3), ("_us", 1e-6), ("_ns", 1e-9)],
+            Self::Angle => &[("_deg", DEG), ("_rad", 1.0)],
+            Self::Length => &[("_m", 1.0)],
+            Self::Speed => &[("_m_s", 1.0), ("_mps", 1.0)],
+            Self::Count => &[],
         }
     }
-    // Angles without a unit are degrees.
-    of_stem(&name).filter(|(q, _)| [Lat, Lon, Roll, Pitch, Yaw].contains(q)).map(|(q, sign)| (q, sign * DEG))
+
+    /// Factor of a name without a unit: seconds, degrees, metres, metres a second.
+    const fn bare(self) -> f64 {
+        if matches!(self, Self::Angle) { DEG } else { 1.0 }
+    }
 }
 
-/// Where each quantity stands in a table.
+/// A quantity: its own name, the names that other programs have for it without the unit, whether these may stand without
+/// it, and its sign.
 #[derive(Debug)]
-pub(super) struct Columns {
-    found: Vec<(Quantity, usize, f64)>,
+pub(in crate::formats) struct Known {
+    pub(in crate::formats) name: &'static str,
+    pub(in crate::formats) stems: &'static [&'static str],
+    pub(in crate::formats) unit: Unit,
+    pub(in crate::formats) may_be_bare: bool,
+    pub(in crate::formats) sign: f64,
+}
+
+impl Known {
+    pub(in crate::formats) const fn new(
+        name: &'static str,
+        stems: &'static [&'static str],
+        unit: Unit,
+        may_be_bare: bool,
+    ) -> Self {
+        Self { name, stems, unit, may_be_bare, sign: 1.0 }
+    }
+
+    /// The factor of a column of this name; none of another quantity.
+    fn factor(&self, name: &str) -> Option<f64> {
+        let of_ending = |(ending, factor): &(&str, f64)| {
+            self.stems.contains(&name.strip_suffix(ending)?).then_some(*factor)
+        };
+        let bare = || (self.may_be_bare && self.stems.contains(&name)).then(|| self.unit.bare());
+        self.unit.endings().iter().find_map(of_ending).or_else(bare).map(|factor| self.sign * factor)
+    }
+}
+
+/// Quantity of a name and the factor to SI.
+pub(super) fn classify(known: &'static [Known], name: &str) -> Option<(&'static str, f64)> {
+    let name = name.to_lowercase().replace([' ', '-'], "_");
+    known.iter().find_map(|quantity| Some((quantity.name, quantity.factor(&name)?)))
+}
+
+/// A column of a quantity.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::formats) struct Column {
+    pub(in crate::formats) index: usize,
+    factor: f64,
+}
+
+impl Column {
+    /// The value in a row, in SI.
+    pub(in crate::formats) fn of(self, row: &[f64]) -> f64 {
+        row[self.index] * self.factor
+    }
+}
+
+/// Columns of the quantities in a table.
+#[derive(Debug)]
+pub(in crate::formats) struct Columns {
+    found: Vec<(&'static str, Column)>,
     /// Columns that mean nothing here.
-    pub(super) ignored: Vec<String>,
+    pub(in crate::formats) ignored: Vec<String>,
 }
 
 impl Columns {
-    pub(super) fn of(table: &Table) -> Result<Self, Error> {
+    /// Finds them.
+    ///
+    /// # Errors
+    /// Two columns of one quantity.
+    pub(in crate::formats) fn new(table: &Table, known: &'static [Known]) -> Result<Self, Error> {
         let mut columns = Self { found: Vec::new(), ignored: Vec::new() };
         for (index, name) in table.columns.iter().enumerate() {
-            let Some((quantity, factor)) = classify(name) else {
+            let Some((quantity, factor)) = classify(known, name) else {
                 columns.ignored.push(name.clone());
                 continue;
             };
-            if let Some((_, earlier, _)) = columns.get(quantity) {
-                return Err(table.given_twice([earlier, index], quantity.name()));
+            if let Some(earlier) = columns.get(quantity) {
+                let first = &table.columns[earlier.index];
+                let message = format!("columns \"{first}\" and \"{name}\" both give {quantity}");
+                return Err(Error::contents(table.path.as_str(), table.header_line, message)
+                    .advice("remove one of them"));
             }
-            columns.found.push((quantity, index, factor));
+            columns.found.push((quantity, Column { index, factor }));
         }
-        columns.refuse_slips(table)?;
-        columns.complete(table)?;
         Ok(columns)
     }
 
-    fn get(&self, quantity: Quantity) -> Option<(Quantity, usize, f64)> {
-        self.found.iter().copied().find(|(q, ..)| *q == quantity)
+    pub(in crate::formats) fn get(&self, quantity: &str) -> Option<Column> {
+        self.found.iter().find(|(name, _)| *name == quantity).map(|(_, column)| *column)
     }
 
-    pub(super) fn has(&self, quantity: Quantity) -> bool {
+    pub(in crate::formats) fn has(&self, quantity: &str) -> bool {
         self.get(quantity).is_some()
     }
 
-    /// Index of a column, for messages.
-    pub(super) fn index(&self, quantity: Quantity) -> usize {
-        self.get(quantity).map_or(0, |(_, index, _)| index)
+    /// Three quantities; none where one is missing.
+    pub(in crate::formats) fn three(&self, quantities: [&str; 3]) -> Option<[Column; 3]> {
+        let [a, b, c] = quantities.map(|quantity| self.get(quantity));
+        Some([a?, b?, c?])
     }
 
-    /// Whether a column has the opposite sign of the quantity: a velocity up.
-    pub(super) fn is_turned(&self, quantity: Quantity) -> bool {
-        self.get(quantity).is_some_and(|(_, _, factor)| factor < 0.0)
-    }
-
-    /// The value of a quantity in a row, in SI; 0 where the table does not have it.
-    pub(super) fn value(&self, quantity: Quantity, row: &[f64]) -> f64 {
-        self.get(quantity).map_or(0.0, |(_, index, factor)| row[index] * factor)
-    }
-
-    /// A column that nearly has the name of one that is missing is a slip, not an extra.
-    fn refuse_slips(&self, table: &Table) -> Result<(), Error> {
-        let missing: Vec<_> =
-            Quantity::ALL.into_iter().filter(|q| !self.has(*q)).map(Quantity::name).collect();
-        for column in &self.ignored {
-            if let Some(meant) = nearest(column, missing.iter().copied()) {
-                let message = format!("unknown column \"{column}\"");
-                return Err(Error::contents(table.path.as_str(), table.header_line, message)
-                    .advice(format!("did you mean \"{meant}\"?")));
-            }
-        }
-        Ok(())
-    }
-
-    fn complete(&self, table: &Table) -> Result<(), Error> {
-        let local = [N, E, D].into_iter().any(|q| self.has(q)) && !self.has(Lat);
-        let mut needed = vec![Time];
-        needed.extend(if local { [N, E, D] } else { [Lat, Lon, H] });
-        for optional in [[Roll, Pitch, Yaw], [Vn, Ve, Vd]] {
-            if optional.into_iter().any(|q| self.has(q)) {
-                needed.extend(optional);
-            }
-        }
-        let missing: Vec<_> = needed.into_iter().filter(|q| !self.has(*q)).map(Quantity::name).collect();
-        if missing.is_empty() {
-            return Ok(());
+    /// Refuses a table without one of the quantities that are needed; a column that nearly has the name of a missing one
+    /// is a slip.
+    ///
+    /// # Errors
+    /// What is missing, with `advice`.
+    pub(in crate::formats) fn require(
+        &self,
+        table: &Table,
+        needed: impl IntoIterator<Item = &'static str>,
+        advice: &'static str,
+    ) -> Result<(), Error> {
+        let missing: Vec<_> = needed.into_iter().filter(|quantity| !self.has(quantity)).collect();
+        let refuse = |kind| Error::new(table.path.as_str(), table.header_line, kind);
+        let slip = |name: &String| Some((name.clone(), nearest(name, missing.iter().copied())?));
+        if let Some((name, meant)) = self.ignored.iter().find_map(slip) {
+            let kind = Kind::Contents(format!("unknown column \"{name}\"").into());
+            return Err(refuse(kind).advice(format!("did you mean \"{meant}\"?")));
         }
         let columns = match &missing[..] {
+            [] => return Ok(()),
             [one] => format!("column {one} is missing"),
             many => format!("columns {} are missing", many.join(", ")),
         };
-        Err(Error::new(table.path.as_str(), table.header_line, Kind::Columns(columns.into())).advice(COLUMNS))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_of_many_tools() {
-        for (name, quantity, factor) in [
-            ("t_s", Time, 1.0),
-            ("time_s", Time, 1.0),
-            ("timestamp_ns", Time, 1e-9),
-            ("Latitude", Lat, DEG),
-            ("lon_deg", Lon, DEG),
-            ("lat_rad", Lat, 1.0),
-            ("alt_m", H, 1.0),
-            ("height_m", H, 1.0),
-            ("heading_deg", Yaw, DEG),
-            ("roll", Roll, DEG),
-            ("pitch_rad", Pitch, 1.0),
-            ("vn_mps", Vn, 1.0),
-            ("v_d_m_s", Vd, 1.0),
-            ("v_up_m_s", Vd, -1.0),
-            ("up_m", D, -1.0),
-            ("e_m", E, 1.0),
-        ] {
-            assert_eq!(classify(name), Some((quantity, factor)), "{name}");
-        }
-        for name in ["sd_roll_deg", "gnss", "e", "n", "roll_m", "lat_m", "t_deg", "v_n_deg"] {
-            assert_eq!(classify(name), None, "{name}");
-        }
-        assert!(Quantity::ALL.into_iter().all(|q| classify(q.name()).is_some_and(|(found, _)| found == q)));
+        Err(refuse(Kind::Columns(columns.into())).advice(advice))
     }
 }

@@ -5,7 +5,6 @@
 
 use super::samples::{Attitude, Rows};
 use super::table::{Table, no_rows};
-use super::velocities::Velocities;
 use crate::formats::FileError as Error;
 use chrono::{DateTime, NaiveDateTime, Utc};
 use glam::DQuat;
@@ -20,21 +19,12 @@ const COLUMNS: [&str; 4] = ["time", "lat", "lon", "ele"];
 /// A GPX track; heading and pitch follow the path.
 pub(super) fn gpx(path: &str, text: &str) -> Result<Rows, Error> {
     let table = Table::of_columns(path, &COLUMNS);
-    let mut rows = Rows {
-        path: path.to_owned(),
-        lines: Vec::new(),
-        samples: Vec::new(),
-        attitude: Attitude::OfPath,
-        velocities: Velocities::default(),
-        geodetic: false,
-        doubts: Vec::new(),
-    };
+    let mut rows = Rows::new(path, Vec::new(), Vec::new(), Attitude::OfPath);
     let mut start = None;
     for Point { line, texts } in track_points(path, text)? {
         let absent = |column: usize| {
-            table.cell(line, column, "the track point", "does not have it, or not as a number").advice(
-                "every <trkpt> needs lat, lon, <ele> and <time>: export the track with heights and times",
-            )
+            let error = table.cell(line, column, "the track point", "does not have it, or not as a number");
+            error.advice("every <trkpt> needs lat, lon, <ele> and <time>: export them with the track")
         };
         let number = |column: usize| texts[column].trim().parse::<f64>().map_err(|_| absent(column));
         let time = instant(texts[0].trim()).ok_or_else(|| absent(0))?;
@@ -51,8 +41,10 @@ pub(super) fn gpx(path: &str, text: &str) -> Result<Rows, Error> {
     if rows.samples.is_empty() {
         return Err(no_rows(path));
     }
-    rows.doubt(None, "no attitude in GPX: heading and pitch follow the path, roll is 0");
-    rows.doubt(None, "elevations are taken as heights above the ellipsoid, times from the first point");
+    rows.doubt(
+        None,
+        "GPX: heading and pitch follow the path, roll is 0; elevations are taken as ellipsoidal heights",
+    );
     Ok(rows)
 }
 
@@ -157,7 +149,7 @@ mod tests {
     fn tracks_get_their_heading_from_the_path() {
         let text = track();
         let (t, warnings) = load("a.gpx", &text).unwrap();
-        assert_eq!((t.start_s(), t.end_s(), warnings.len()), (0.0, 8.0, 2));
+        assert_eq!((t.start_s(), t.end_s(), warnings.len()), (0.0, 8.0, 1));
         let (state, rpy) = (t.state(4.0), RollPitchYaw::from_quat(t.state(4.0).q_b_n));
         assert!((state.v_n - DVec3::new(11.117, 0.0, -1.0)).length() < 0.01, "{}", state.v_n);
         assert!(rpy.yaw.abs() < 1e-6 && (rpy.pitch - (1.0_f64 / 11.117).atan()).abs() < 1e-3, "{rpy:?}");

@@ -3,7 +3,6 @@
 use super::Options;
 use super::samples::{Attitude, Rows, local};
 use super::table::{Numbers, Table, no_rows};
-use super::velocities::Velocities;
 use crate::formats::FileError as Error;
 use glam::{DQuat, DVec3};
 use nav_sim_navigation::trajectory::TrajectorySample;
@@ -68,22 +67,10 @@ pub(super) fn tum(path: &str, text: &str, options: &Options, numbers: Numbers) -
         let r_ned = q_enu_ned * DVec3::new(row[1], row[2], row[3]);
         samples.push(local(row[0], origin, r_ned, q_enu_ned * q_flu_enu * q_frd_flu));
     }
-    let mut rows = of_samples(path, &table, samples, Attitude::Given);
+    let lines = table.rows.iter().map(|(line, _)| *line).collect();
+    let mut rows = Rows::new(path, lines, samples, Attitude::Given);
     rows.doubt(None, "axes taken as ROS has them: position east, north, up; body forward, left, up");
     Ok(rows)
-}
-
-/// Samples of the rows of a table, without velocities.
-fn of_samples(path: &str, table: &Table, samples: Vec<TrajectorySample>, attitude: Attitude) -> Rows {
-    Rows {
-        path: path.to_owned(),
-        lines: table.rows.iter().map(|(line, _)| *line).collect(),
-        samples,
-        attitude,
-        velocities: Velocities::default(),
-        geodetic: false,
-        doubts: Vec::new(),
-    }
 }
 
 /// Whether a text is a motion definition of gnss-ins-sim.
@@ -113,20 +100,10 @@ pub(super) fn motion_definition(path: &str, text: &str) -> Result<Rows, Error> {
     };
     let timed = command_all(&mut motion, path, rest)?;
     let samples = motion.samples();
-    let mut rows = Rows {
-        path: path.to_owned(),
-        lines: command_lines(&samples, &motion, start.0, rest),
-        samples,
-        attitude: Attitude::Given,
-        velocities: Velocities::default(),
-        geodetic: false,
-        doubts: Vec::new(),
-    };
+    let lines = command_lines(&samples, &motion, start.0, rest);
+    let mut rows = Rows::new(path, lines, samples, Attitude::Given);
     if !timed {
-        rows.doubt(
-            None,
-            "commands of type 2 to 5 take all of their time here, not only what a vehicle needs",
-        );
+        rows.doubt(None, "commands of type 2 to 5 take all of their time, not only what a vehicle needs");
     }
     Ok(rows)
 }
@@ -145,12 +122,18 @@ fn command_all(motion: &mut BodyMotion, path: &str, lines: &[(u64, &str)]) -> Re
             3 => (angles, speeds),
             4 => (angles - rpy, speeds),
             5 => (angles, speeds - v_b),
-            _ => return Err(bad_line(path, line, format!("command type {} is none of 1 to 5", cells[0]))),
+            _ => {
+                return Err(Error::contents(
+                    path,
+                    line,
+                    format!("command type {} is none of 1 to 5", cells[0]),
+                ));
+            }
         };
         total_s += duration_s;
         if duration_s <= 0.0 || total_s > DAY_S {
             let message = format!("command duration {duration_s} s is not > 0, or makes more than a day");
-            return Err(bad_line(path, line, message));
+            return Err(Error::contents(path, line, message));
         }
         timed &= cells[0] as i64 == 1;
         (rpy, v_b) = (rpy + change.0, v_b + change.1);
@@ -179,17 +162,13 @@ fn command_lines(
 fn numbers(path: &str, line: u64, text: &str, least: usize) -> Result<Vec<f64>, Error> {
     let number = |cell: &str| match cell.trim().parse::<f64>() {
         Ok(x) if x.is_finite() => Ok(x),
-        _ => Err(bad_line(path, line, format!("\"{}\" is not a number", cell.trim()))),
+        _ => Err(Error::contents(path, line, format!("\"{}\" is not a number", cell.trim()))),
     };
     let cells = text.split(',').map(number).collect::<Result<Vec<_>, _>>()?;
     if cells.len() < least {
         return Err(Error::row_length(path, line, cells.len(), least));
     }
     Ok(cells)
-}
-
-fn bad_line(path: &str, line: u64, message: String) -> Error {
-    Error::contents(path, line, message)
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
 //! Trajectory files: CSV, motion profiles (TOML), imports.
 
-mod columns;
+pub(in crate::formats) mod columns;
 mod doubts;
 mod gpx;
 mod imports;
@@ -8,7 +8,6 @@ mod profile;
 mod reference;
 mod samples;
 pub(in crate::formats) mod table;
-mod velocities;
 mod write;
 
 pub(crate) use profile::schema as profile_schema;

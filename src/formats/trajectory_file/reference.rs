@@ -31,10 +31,9 @@ impl Rows {
         };
         if let Some(first) = found.first() {
             let (line, at) = (self.lines[first.index], self.samples[first.index].t_s);
-            let other =
-                if found.len() > 1 { format!(" and {} more", found.len() - 1) } else { String::new() };
+            let other = found.len() - 1;
             let text = format!(
-                "{} at {at:.2} s{other}: what is near is not compared with; {seconds:.1} s in {parts} stretches are",
+                "{} at {at:.2} s and {other} more: compared with {seconds:.1} s in {parts} stretches",
                 first.fault
             );
             self.doubt(Some(line), text);

@@ -1,9 +1,8 @@
 //! From rows to a trajectory.
 
-use super::columns::{Columns, Quantity};
+use super::columns::{Column, Columns, Known, Unit};
 use super::doubts;
-use super::table::{Numbers, Table};
-use super::velocities::Velocities;
+use super::table::{COLUMNS, Numbers, Table};
 use super::{Options, Warning};
 use crate::formats::{FileError as Error, Place, Setting};
 use glam::{DQuat, DVec3};
@@ -11,8 +10,6 @@ use nav_sim_navigation::earth::{e_to_n, ecef_to_geodetic, geodetic_to_ecef};
 use nav_sim_navigation::frames::{RollPitchYaw, q_e_n, wrap_angle};
 use nav_sim_navigation::trajectory::{self, Trajectory, TrajectorySample};
 use nav_sim_signal::units::DEG;
-
-use Quantity::{D, E, H, Lat, Lon, N, Pitch, Roll, Time, Vd, Ve, Vn, Yaw};
 
 /// Positions faster than this from one row to the next are no motion (m/s).
 const MAX_SPEED: f64 = 8000.0;
@@ -24,7 +21,30 @@ pub(super) const MOVING: f64 = 0.5;
 /// than there is.
 const MAX_DURATION_S: f64 = 86_400.0;
 
-/// Where the attitude of rows comes from.
+/// Quantities of a trajectory.
+static KNOWN: [Known; 15] = [
+    Known::new("t_s", &["t", "time", "timestamp"], Unit::Time, true),
+    Known::new("lat_deg", &["lat", "latitude"], Unit::Angle, true),
+    Known::new("lon_deg", &["lon", "lng", "longitude"], Unit::Angle, true),
+    Known::new("h_m", &["h", "alt", "height", "altitude"], Unit::Length, true),
+    Known::new("n_m", &["n", "north"], Unit::Length, false),
+    Known::new("e_m", &["e", "east"], Unit::Length, false),
+    Known::new("d_m", &["d", "down"], Unit::Length, false),
+    Known { sign: -1.0, ..Known::new("d_m", &["u", "up"], Unit::Length, false) },
+    Known::new("roll_deg", &["roll"], Unit::Angle, true),
+    Known::new("pitch_deg", &["pitch"], Unit::Angle, true),
+    Known::new("yaw_deg", &["yaw", "heading", "azimuth"], Unit::Angle, true),
+    Known::new("v_n_m_s", &["v_n", "vn", "v_north"], Unit::Speed, false),
+    Known::new("v_e_m_s", &["v_e", "ve", "v_east"], Unit::Speed, false),
+    Known::new("v_d_m_s", &["v_d", "vd", "v_down"], Unit::Speed, false),
+    Known { sign: -1.0, ..Known::new("v_d_m_s", &["v_u", "v_up"], Unit::Speed, false) },
+];
+const GEODETIC: [&str; 3] = ["lat_deg", "lon_deg", "h_m"];
+const LOCAL: [&str; 3] = ["n_m", "e_m", "d_m"];
+const ATTITUDE: [&str; 3] = ["roll_deg", "pitch_deg", "yaw_deg"];
+const VELOCITY: [&str; 3] = ["v_n_m_s", "v_e_m_s", "v_d_m_s"];
+
+/// Source of the attitude of rows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Attitude {
     /// The file.
@@ -33,7 +53,7 @@ pub(super) enum Attitude {
     OfPath,
 }
 
-/// What a file of any format holds: samples, and the line that each comes from.
+/// Samples of a file of any format, and the line that each comes from.
 #[derive(Debug)]
 pub(super) struct Rows {
     pub(super) path: String,
@@ -41,15 +61,25 @@ pub(super) struct Rows {
     pub(super) lines: Vec<u64>,
     pub(super) samples: Vec<TrajectorySample>,
     pub(super) attitude: Attitude,
-    /// What the positions are compared with.
-    pub(super) velocities: Velocities,
+    /// Velocities in n that the positions are compared with (m/s), one for each sample or none at all.
+    pub(super) velocities: Vec<DVec3>,
     /// Whether positions are latitude and longitude, which may have been given in the wrong unit.
     pub(super) geodetic: bool,
-    /// What is doubtful.
     pub(super) doubts: Vec<Warning>,
 }
 
 impl Rows {
+    /// Samples without velocities.
+    pub(super) fn new(
+        path: &str,
+        lines: Vec<u64>,
+        samples: Vec<TrajectorySample>,
+        attitude: Attitude,
+    ) -> Self {
+        let (velocities, doubts) = (Vec::new(), Vec::new());
+        Self { path: path.to_owned(), lines, samples, attitude, velocities, geodetic: false, doubts }
+    }
+
     pub(super) fn doubt(&mut self, line: Option<u64>, message: impl Into<String>) {
         self.doubts.push(Warning { path: self.path.clone(), line, message: message.into() });
     }
@@ -60,7 +90,6 @@ impl Rows {
         self.check_heights()?;
         self.check_steps()?;
         doubts::steps(&mut self);
-        doubts::heights(&mut self);
         self.check_jumps()?;
         if self.attitude == Attitude::OfPath {
             self.through(&self.samples)?; // times increase, positions are on the Earth
@@ -82,11 +111,9 @@ impl Rows {
     /// Heights below the deepest trench and beyond a low orbit are no heights in metres; neither is what is
     /// not finite.
     fn check_heights(&self) -> Result<(), Error> {
-        let bad = self.samples.iter().zip(&self.lines).find(|(s, _)| !HEIGHT.contains(&s.h));
-        let Some((sample, line)) = bad else { return Ok(()) };
-        let message = format!("height {:?} m is not within −12 to 1000 km", sample.h);
-        Err(Error::contents(self.path.as_str(), *line, message)
-            .advice("is a value in the wrong column, or the row damaged?"))
+        let Some(bad) = self.samples.iter().position(|s| !HEIGHT.contains(&s.h)) else { return Ok(()) };
+        let message = format!("height {:?} m is not within −12 to 1000 km", self.samples[bad].h);
+        Err(self.refuse(bad, message, "is a value in the wrong column, or the row damaged?"))
     }
 
     /// Rows a minute apart are no trajectory of a vehicle, their time is in milliseconds; and one time stamp
@@ -100,30 +127,38 @@ impl Rows {
         };
         if step(middle) >= 50.0 {
             let message = format!("the rows are {} s apart", step(middle));
-            return Err(Error::contents(self.path.as_str(), self.lines[1], message)
-                .advice("give at least one row a second; is the time in milliseconds (t_ms)?"));
+            return Err(self.refuse(
+                1,
+                message,
+                "one row a second at least; is the time in milliseconds (t_ms)?",
+            ));
         }
         let duration_s = self.samples[self.samples.len() - 1].t_s - self.samples[0].t_s;
         if duration_s <= MAX_DURATION_S {
             return Ok(());
         }
         let (previous_s, t_s) = (self.samples[longest - 1].t_s, self.samples[longest].t_s);
-        let message =
-            format!("time goes from {previous_s} s to {t_s} s: the rows cover {duration_s} s, a day at most");
-        Err(Error::contents(self.path.as_str(), self.lines[longest], message).advice(
-            "is that time stamp damaged, on another clock, or in another unit? Split what lasts longer than a day",
+        let message = format!("time goes from {previous_s} s to {t_s} s, and may span a day at most");
+        Err(self.refuse(
+            longest,
+            message,
+            "is that time stamp damaged, on another clock, or in another unit?",
         ))
+    }
+
+    fn refuse(&self, index: usize, message: String, advice: &'static str) -> Error {
+        Error::contents(self.path.as_str(), self.lines[index], message).advice(advice)
     }
 
     fn check_jumps(&self) -> Result<(), Error> {
         let place = |s: &TrajectorySample| geodetic_to_ecef(s.lat, s.lon, s.h);
-        for (pair, line) in self.samples.windows(2).zip(&self.lines[1..]) {
+        for (i, pair) in self.samples.windows(2).enumerate() {
             let (metres, seconds) = (place(&pair[1]).distance(place(&pair[0])), pair[1].t_s - pair[0].t_s);
             if seconds > 0.0 && metres > MAX_SPEED * seconds {
-                let seconds = (seconds * 1e6).round() / 1e6;
-                let message = format!("position jumps by {metres:.0} m in {seconds} s");
-                return Err(Error::contents(self.path.as_str(), *line, message)
-                    .advice("is a latitude swapped with a longitude, a sign lost, or a row damaged?"));
+                let message =
+                    format!("position jumps by {metres:.0} m in {} s", (seconds * 1e6).round() / 1e6);
+                let advice = "is a latitude swapped with a longitude, a sign lost, or a row damaged?";
+                return Err(self.refuse(i + 1, message, advice));
             }
         }
         Ok(())
@@ -138,18 +173,23 @@ pub(super) fn no_trajectory(path: &str, line: u64, source: &trajectory::Error) -
             "remove repeated rows, sort by time, or split the file where the clock was set back"
         }
         E::Rotation { .. } => {
-            "is an angle in the wrong column or unit? If the vehicle does turn this fast, give more rows a second"
+            "is an angle in the wrong column or unit? A vehicle that turns so fast needs more rows"
         }
         E::TooFew { .. } => "give at least four rows, one a second or more",
         E::Latitude { .. } => "latitude and longitude cannot navigate at the poles; is a column swapped?",
-        _ => return Error::contents(path, line, source.to_string()),
+        E::NotFinite { .. } => return Error::contents(path, line, source.to_string()),
     };
     Error::contents(path, line, source.to_string()).advice(advice)
 }
 
 /// The rows of a table. Cells out of range are refused, or their rows left out where not every row is needed.
 pub(super) fn rows(mut table: Table, options: &Options, numbers: Numbers) -> Result<Rows, Error> {
-    let columns = Columns::of(&table)?;
+    let columns = Columns::new(&table, &KNOWN)?;
+    let any = |names: [&str; 3]| names.into_iter().any(|name| columns.has(name));
+    let is_local = any(LOCAL) && !columns.has("lat_deg");
+    let optional = [ATTITUDE, VELOCITY].into_iter().filter(|names| any(*names)).flatten();
+    let position = if is_local { LOCAL } else { GEODETIC };
+    columns.require(&table, ["t_s"].into_iter().chain(position).chain(optional), COLUMNS)?;
     let all = table.rows.len();
     match numbers {
         Numbers::Finite => check_ranges(&table, &columns)?,
@@ -157,20 +197,16 @@ pub(super) fn rows(mut table: Table, options: &Options, numbers: Numbers) -> Res
             .rows
             .retain(|row| row.1.iter().all(|x| x.is_finite()) && out_of_range(row, &columns).is_none()),
     }
-    let mut rows = Rows {
-        lines: table.rows.iter().map(|(line, _)| *line).collect(),
-        samples: samples(&table, &columns, options)?,
-        attitude: if columns.has(Yaw) { Attitude::Given } else { Attitude::OfPath },
-        velocities: velocities(&table, &columns),
-        geodetic: columns.has(Lat),
-        doubts: Vec::new(),
-        path: table.path,
-    };
+    let attitude = if any(ATTITUDE) { Attitude::Given } else { Attitude::OfPath };
+    let lines = table.rows.iter().map(|(line, _)| *line).collect();
+    let mut rows = Rows::new(&table.path, lines, samples(&table, &columns, options)?, attitude);
+    rows.geodetic = !is_local;
+    rows.velocities = columns
+        .three(VELOCITY)
+        .map_or_else(Vec::new, |velocity| table.rows.iter().map(|(_, row)| triad(velocity, row)).collect());
     if all > rows.lines.len() {
-        rows.doubt(
-            None,
-            format!("{} rows left out: values not finite, or out of range", all - rows.lines.len()),
-        );
+        let left_out = all - rows.lines.len();
+        rows.doubt(None, format!("{left_out} rows left out: values not finite, or out of range"));
     }
     if !columns.ignored.is_empty() {
         rows.doubt(None, format!("columns not used: {}", columns.ignored.join(", ")));
@@ -181,35 +217,26 @@ pub(super) fn rows(mut table: Table, options: &Options, numbers: Numbers) -> Res
     Ok(rows)
 }
 
-fn velocities(table: &Table, columns: &Columns) -> Velocities {
-    if !columns.has(Vn) {
-        return Velocities::default();
-    }
-    let given = |(_, row): &(u64, Vec<f64>)| DVec3::from([Vn, Ve, Vd].map(|q| columns.value(q, row)));
-    Velocities {
-        given: table.rows.iter().map(given).collect(),
-        columns: [Vn, Ve, Vd].map(|q| table.columns[columns.index(q)].clone()),
-        is_up: columns.is_turned(Vd),
-    }
+fn triad(columns: [Column; 3], row: &[f64]) -> DVec3 {
+    columns.map(|column| column.of(row)).into()
 }
 
 fn samples(table: &Table, columns: &Columns, options: &Options) -> Result<Vec<TrajectorySample>, Error> {
-    let origin = if columns.has(Lat) { None } else { Some(origin(table, options)?) };
-    let sample_of_row = |(_, row): &(u64, Vec<f64>)| {
-        let value = |q| columns.value(q, row);
-        let attitude = RollPitchYaw { roll: value(Roll), pitch: value(Pitch), yaw: value(Yaw) }.to_quat();
+    let (time, attitude) = (columns.get("t_s"), columns.three(ATTITUDE));
+    let geodetic = columns.three(GEODETIC);
+    let place = geodetic.or(columns.three(LOCAL));
+    let origin = if geodetic.is_some() { None } else { Some(origin(table, options)?) };
+    let sample = |(_, row): &(u64, Vec<f64>)| {
+        let t_s = time.map_or(f64::NAN, |time| time.of(row));
+        let [roll, pitch, yaw] = attitude.map_or([0.0; 3], |columns| columns.map(|column| column.of(row)));
+        let q_b_n = RollPitchYaw { roll, pitch, yaw }.to_quat();
+        let place = place.map_or(DVec3::NAN, |columns| triad(columns, row));
         match origin {
-            None => TrajectorySample {
-                t_s: value(Time),
-                lat: value(Lat),
-                lon: value(Lon),
-                h: value(H),
-                q_b_n: attitude,
-            },
-            Some(origin) => local(value(Time), origin, DVec3::new(value(N), value(E), value(D)), attitude),
+            None => TrajectorySample { t_s, lat: place.x, lon: place.y, h: place.z, q_b_n },
+            Some(origin) => local(t_s, origin, place, q_b_n),
         }
     };
-    Ok(table.rows.iter().map(sample_of_row).collect())
+    Ok(table.rows.iter().map(sample).collect())
 }
 
 /// A sample given in the axes north, east, down of the origin.
@@ -248,19 +275,17 @@ pub(crate) fn parse_origin(text: &str) -> Option<[f64; 3]> {
 fn out_of_range((_, row): &(u64, Vec<f64>), columns: &Columns) -> Option<(usize, &'static str)> {
     // a heading that was unwrapped goes on below −180 and above 180: the same angle
     let ranges = [
-        (Lat, 90.0, 90.0, "is not a latitude"),
-        (Lon, 180.0, 360.0, "is not a longitude"),
-        (Roll, 180.0, 180.0, "is not a roll angle"),
-        (Pitch, 90.0, 90.0, "is not a pitch angle"),
-        (Yaw, 360.0, 360.0, "is not a heading"),
+        ("lat_deg", 90.0, 90.0, "is not a latitude"),
+        ("lon_deg", 180.0, 360.0, "is not a longitude"),
+        ("roll_deg", 180.0, 180.0, "is not a roll angle"),
+        ("pitch_deg", 90.0, 90.0, "is not a pitch angle"),
+        ("yaw_deg", 360.0, 360.0, "is not a heading"),
     ];
-    let outside = |(quantity, below, above, _): &(Quantity, f64, f64, &str)| {
-        !(-below - 1e-9..=above + 1e-9).contains(&(columns.value(*quantity, row) / DEG))
-    };
-    ranges
-        .iter()
-        .find(|range| outside(range))
-        .map(|(quantity, .., reason)| (columns.index(*quantity), *reason))
+    ranges.into_iter().find_map(|(name, below, above, reason)| {
+        let column = columns.get(name)?;
+        let is_within = (-below - 1e-9..=above + 1e-9).contains(&(column.of(row) / DEG));
+        (!is_within).then_some((column.index, reason))
+    })
 }
 
 fn check_ranges(table: &Table, columns: &Columns) -> Result<(), Error> {
@@ -310,4 +335,39 @@ fn direction(samples: &[TrajectorySample], i: usize) -> Option<(f64, f64)> {
     };
     let v = e_to_n(samples[i].lat, samples[i].lon, velocity);
     (v.length() > MOVING).then(|| (v.y.atan2(v.x), (-v.z).atan2(v.x.hypot(v.y))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::columns::classify;
+    use super::*;
+
+    #[test]
+    fn names_of_many_tools() {
+        for (name, quantity, factor) in [
+            ("t_s", "t_s", 1.0),
+            ("time_s", "t_s", 1.0),
+            ("timestamp_ns", "t_s", 1e-9),
+            ("Latitude", "lat_deg", DEG),
+            ("lon_deg", "lon_deg", DEG),
+            ("lat_rad", "lat_deg", 1.0),
+            ("alt_m", "h_m", 1.0),
+            ("height_m", "h_m", 1.0),
+            ("heading_deg", "yaw_deg", DEG),
+            ("roll", "roll_deg", DEG),
+            ("pitch_rad", "pitch_deg", 1.0),
+            ("vn_mps", "v_n_m_s", 1.0),
+            ("v_d_m_s", "v_d_m_s", 1.0),
+            ("v_up_m_s", "v_d_m_s", -1.0),
+            ("up_m", "d_m", -1.0),
+            ("e_m", "e_m", 1.0),
+        ] {
+            assert_eq!(classify(&KNOWN, name), Some((quantity, factor)), "{name}");
+        }
+        for name in ["sd_roll_deg", "gnss", "e", "n", "roll_m", "lat_m", "t_deg", "v_n_deg"] {
+            assert_eq!(classify(&KNOWN, name), None, "{name}");
+        }
+        let own = |known: &Known| classify(&KNOWN, known.name).map(|(name, _)| name) == Some(known.name);
+        assert!(KNOWN.iter().all(own));
+    }
 }

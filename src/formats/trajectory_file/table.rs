@@ -49,13 +49,6 @@ pub(in crate::formats) enum Numbers {
 const LONGEST_LINE: u64 = 1 << 16;
 
 impl Table {
-    /// Two columns of one quantity.
-    pub(in crate::formats) fn given_twice(&self, columns: [usize; 2], quantity: &str) -> Error {
-        let [first, second] = columns.map(|column| &self.columns[column]);
-        let message = format!("columns \"{first}\" and \"{second}\" both give {quantity}");
-        Error::contents(self.path.as_str(), self.header_line, message).advice("remove one of them")
-    }
-
     /// Reads a table. Without `columns` its first line that is no comment names them; with them it has no
     /// header and its cells stand between blanks.
     pub(in crate::formats) fn read(
@@ -164,11 +157,10 @@ impl Table {
     }
 }
 
-/// What the columns of a trajectory are called.
-pub(super) const COLUMNS: &str = "a trajectory has the columns t_s, lat_deg, lon_deg, h_m (or n_m, e_m, d_m with an origin), roll_deg, pitch_deg, \
-     yaw_deg, and may have v_n_m_s, v_e_m_s, v_d_m_s";
-const DEGREES: &str = "angles are in degrees: latitude within ±89.9, longitude and yaw in (−180, 180] or [0, 360), pitch \
-                       within ±90";
+/// Columns of a trajectory.
+pub(super) const COLUMNS: &str = "a trajectory has the columns t_s, lat_deg, lon_deg, h_m (or n_m, e_m, d_m) and may have roll_deg, pitch_deg, yaw_deg";
+const DEGREES: &str =
+    "degrees: latitude within ±89.9, longitude and yaw in (−180, 180] or [0, 360), pitch within ±90";
 
 /// A file without rows.
 pub(super) fn no_rows(path: &str) -> Error {

@@ -1,4 +1,3 @@
-mod contradictions;
 mod profiles;
 
 use super::*;
@@ -140,8 +139,7 @@ fn doubtful_files_are_read_with_a_warning() {
     assert_eq!(
         doubted(&(HEADER.to_owned() + &text)),
         [
-            "a.csv: roll_deg, pitch_deg and yaw_deg never exceed π, and the path agrees with radians: radians? Then \
-          name the columns roll_rad, pitch_rad, yaw_rad"
+            "a.csv: yaw is 88° from the course in the mean, 0.0° when read in radians (name the column yaw_rad)"
         ]
     );
     // Level and northbound: zeros are zeros, and 1.5° of heading is what the path has.
@@ -157,7 +155,7 @@ fn doubtful_files_are_read_with_a_warning() {
     let slow: String = (0..6).map(|k| format!("{},46.5,6.6,400,0,0,90\n", 5 * k)).collect();
     assert_eq!(
         doubted(&(HEADER.to_owned() + &slow)),
-        ["a.csv: rows are 5 s apart: less than one a second, the path between is a guess"]
+        ["a.csv: rows are 5 s apart: the path between is a guess"]
     );
     let gap = drive(None).replace("\n4,", "\n#").replace("\n4.5,", "\n#").replace("\n5,", "\n#");
     assert_eq!(doubted(&gap), ["a.csv, line 13: gap of 2.000 s before 5.5 s: the path in it is a guess"]);
@@ -178,8 +176,7 @@ fn velocities_that_contradict_the_positions_are_said() {
     assert_eq!(doubted(&with(["5.56", "5.56", "0"])), [""; 0]);
     let wrong = doubted(&with(["5.56", "-5.56", "0"]));
     assert!(wrong[0].starts_with("a.csv, line "), "{wrong:?}");
-    assert!(wrong[0].contains("velocity columns differ from the positions by 11.12"), "{wrong:?}");
-    assert!(wrong[0].contains("5.56, -5.56, 0.00 given, 5.56, 5.57, 0.00 by the positions"), "{wrong:?}");
+    assert!(wrong[0].contains("velocity columns differ") && wrong[0].contains("by 11.12"), "{wrong:?}");
 }
 
 #[test]
@@ -265,10 +262,7 @@ fn what_is_written_reads_back_the_same() {
 fn a_far_time_stamp_is_refused_with_its_line_in_every_format() {
     let text = drive(Some((19, "1700000000,46.5005,6.6007,400,0.5,-1,45")));
     let (message, hint) = refused(&text);
-    assert_eq!(
-        message,
-        "a.csv, line 21: time goes from 9 s to 1700000000 s: the rows cover 1700000000 s, a day at most"
-    );
+    assert_eq!(message, "a.csv, line 21: time goes from 9 s to 1700000000 s, and may span a day at most");
     assert!(hint.starts_with("is that time stamp damaged"));
     let tum: String =
         (0..6).map(|k| format!("{} 0 0 0 0 0 0 1\n", if k == 5 { 1e12 } else { f64::from(k) })).collect();
@@ -348,14 +342,13 @@ fn other_conventions_of_heading_and_height_are_doubted() {
         let found = hills(row);
         assert!(found.len() == 1 && found[0].contains(words), "{words}: {found:?}");
     };
-    said(|[t, lat, lon, h, r, p, y]| [t, lat, lon, h, r, p, -y], "with the opposite sign");
+    said(|[t, lat, lon, h, r, p, y]| [t, lat, lon, h, r, p, -y], "anticlockwise from north");
     said(|[t, lat, lon, h, r, p, y]| [t, lat, lon, h, r, p, 90.0 - y], "anticlockwise from east");
     said(|[t, lat, lon, h, r, p, y]| [t, lon, lat, h, r, p, y], "latitude and longitude swapped");
     said(
         |[t, lat, lon, h, r, p, y]| [t, lat, lon, h, r, p, if y > 0.0 { y - 180.0 } else { y + 180.0 }],
         "backwards",
     );
-    said(|[t, lat, lon, h, r, p, y]| [t, lat, lon, 1e-3 * h, r, p, y], "are they in kilometres?");
 }
 
 /// A reference with a glitch of 2.4 km, a row without attitude and one far stamp is used but for these.

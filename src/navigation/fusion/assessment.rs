@@ -1,76 +1,116 @@
-//! Whether a solution is to be believed: by its own innovations, and by a reference where there is one.
+//! Worth of a solution: by its own innovations, and by a reference where there is one.
 
-use super::{FixRecord, IN_WORDS, Outcome, Recorded, Solution, Use, clocks_apart};
+use super::{FixRecord, FromReference, Outcome, Solution, Use};
+use crate::metrics::VerdictKind;
+use crate::simulation::REPORTED_NAMES;
+use serde::Serialize;
 
-/// NIS per component that is doubtful, and that is not to be believed: innovations 1.4 times and twice as large
-/// as stated. Receivers state their standard deviations to a factor like that; right solutions of real drives
-/// have a NIS below 1.5, most of them far below 1.
+/// NIS per component that is doubtful, and that is too large: innovations 1.4 times and twice as large as stated.
+/// Receivers state their standard deviations to a factor like that; right solutions of real drives have a NIS below
+/// 1.5, most of them far below 1.
 const NIS_LIMITS: (f64, f64) = (2.0, 4.0);
-/// NIS per component below which the standard deviations are far too large, four times those of the innovations.
-const NIS_CAUTIOUS: f64 = 1.0 / 16.0;
-/// Mean NEES of nine states against a reference beyond which the errors are twice as large as stated.
-const NEES_LIMIT: f64 = 36.0;
-/// A stretch in which the NIS is looked at by itself (s), and the share of bad ones that is too much.
+/// NIS per component below which the fixes do not tell: their standard deviations are too large, or their errors last,
+/// and then the position's are too small.
+const NIS_LOW: f64 = 0.5;
+/// Components of which the mean NIS of a right filter stays below the first limit.
+const FEWEST: usize = 50;
+/// Stretch in which the NIS is looked at by itself (s), and the share of bad ones that is too much.
 const STRETCH_S: f64 = 60.0;
 const BAD_STRETCHES: f64 = 0.1;
-/// Share of rejected fixes that is doubtful, and that leaves nothing to believe.
+/// Share of rejected fixes that is doubtful, and that is too much.
 const REJECTED: (f64, f64) = (0.1, 0.5);
+/// Root mean square of error over standard deviation, of all states together, that is not right: below and above.
+/// A drive in which no error ever changes shows nine of them once: chi-square is below 9/4 once in 76 such drives, above
+/// 81/4 once in 61.
+const ALL_STATES: (f64, f64) = (0.5, 1.5);
+/// The same of one state by itself: one of nine that never change is three standard deviations off once in 41 drives.
+const ONE_STATE: f64 = 3.0;
 
-/// What a solution is worth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Verdict {
-    /// As good as it states.
-    Ok,
-    /// The fixes agree with it far better than stated.
-    Underconfident,
-    /// Something speaks against it.
-    Doubtful,
-    /// Worse than it states: not to be believed.
-    Overconfident,
+/// Evidence on a solution.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(tag = "evidence", rename_all = "snake_case")]
+pub enum Finding {
+    /// No fix was used.
+    NoFix,
+    /// The fixes of the minute after the start contradict it, and every other that was tried.
+    Start {
+        /// Their NIS divided by the number of components.
+        nis_per_component: f64,
+    },
+    /// The fixes do not tell whether the vehicle goes forwards or backwards: forwards is taken.
+    Direction,
+    /// Axes of the IMU that are hardly front, right, down.
+    NotLevel {
+        /// Roll at the start (degrees).
+        roll_deg: f64,
+        /// Pitch (degrees).
+        pitch_deg: f64,
+    },
+    /// Mean NIS of the fixes used.
+    Nis {
+        /// Divided by the number of components: 1 if right.
+        per_component: f64,
+    },
+    /// Minutes in which most fixes are too far from the solution.
+    Minutes {
+        /// How many of them.
+        bad: usize,
+        /// All minutes with fixes.
+        of: usize,
+        /// Beginning of the worst (s).
+        worst_s: f64,
+        /// NIS per component of the nearest nine tenths of its fixes.
+        nis_per_component: f64,
+    },
+    /// Fixes rejected by the gate.
+    Rejected {
+        /// How many of them.
+        rejected: usize,
+        /// Those used and rejected.
+        of: usize,
+    },
+    /// Errors against the reference.
+    Reference(Confidence),
 }
 
-impl Verdict {
-    /// Name in files.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Ok => "ok",
-            Self::Underconfident => "underconfident",
-            Self::Doubtful => "doubtful",
-            Self::Overconfident => "overconfident",
-        }
-    }
-}
-
-/// A verdict and its reasons.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// VerdictKind and evidence.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Assessment {
-    /// The worst of the reasons.
-    pub verdict: Verdict,
-    /// What speaks against the solution, each with its weight.
-    pub reasons: Vec<(Verdict, String)>,
+    /// The gravest of the findings.
+    pub verdict: VerdictKind,
+    /// What was found, the gravest first.
+    pub findings: Vec<(VerdictKind, Finding)>,
 }
 
-impl Assessment {
-    fn of(mut reasons: Vec<(Verdict, String)>) -> Self {
-        let verdict = reasons.iter().map(|(v, _)| *v).max().unwrap_or(Verdict::Ok);
-        // caution is no comfort beside a doubt
-        reasons.retain(|(v, _)| *v >= verdict.min(Verdict::Doubtful));
-        // what weighs most first
-        reasons.sort_by_key(|(v, _)| std::cmp::Reverse(*v));
-        Self { verdict, reasons }
-    }
+/// Standard deviations against the errors by a reference.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Confidence {
+    /// Whether they are as large.
+    pub verdict: VerdictKind,
+    /// Root mean square of error over standard deviation, of all states together.
+    pub error_over_sigma: f64,
+    /// State that is farthest off in the direction of the verdict; of a right one, that with the largest errors.
+    pub worst_state: &'static str,
+    /// Root mean square of error over standard deviation of this state.
+    pub worst_error_over_sigma: f64,
+}
 
-    /// The same, beginning with what the recorded data themselves show to be the cause: clocks that are apart, or
-    /// what else is found, in words.
+impl FromReference {
+    /// Whether the errors are as large as stated.
     #[must_use]
-    pub fn explained(mut self, recorded: &Recorded<'_>, found: impl FnOnce() -> Option<String>) -> Self {
-        if self.verdict >= Verdict::Doubtful {
-            let clocks = clocks_apart(recorded).map(|apart| apart.to_string());
-            let cause = clocks.or_else(found);
-            self.reasons.splice(0..0, cause.map(|text| (Verdict::Doubtful, text)));
-        }
-        self
+    pub fn confidence(&self) -> Confidence {
+        let all = (self.nees_mean / self.nees_dof as f64).sqrt();
+        let states = || REPORTED_NAMES.into_iter().zip(self.error_over_sigma.0);
+        let by_size = |a: &(&str, f64), b: &(&str, f64)| a.1.total_cmp(&b.1);
+        let largest = states().max_by(by_size).unwrap_or_default();
+        let (verdict, worst) = if all > ALL_STATES.1 || largest.1 > ONE_STATE {
+            (VerdictKind::Overconfident, largest)
+        } else if all < ALL_STATES.0 {
+            (VerdictKind::Underconfident, states().min_by(by_size).unwrap_or_default())
+        } else {
+            (VerdictKind::Consistent, largest)
+        };
+        Confidence { verdict, error_over_sigma: all, worst_state: worst.0, worst_error_over_sigma: worst.1 }
     }
 }
 
@@ -80,55 +120,49 @@ fn bound(limit: f64, components: usize) -> f64 {
     limit.max(1.0 + 5.0 * (2.0 / components.max(1) as f64).sqrt())
 }
 
-/// Mean NIS per component above which a solution is not to be believed.
+/// Mean NIS per component above which a solution is overconfident.
 pub(super) fn nis_bound(components: usize) -> f64 {
     bound(NIS_LIMITS.1, components)
 }
 
 /// Judges a solution. `of_start` is what speaks against the start, as the alignment found it.
 #[must_use]
-pub fn assess(solution: &Solution, outcome: &Outcome, of_start: &[(Verdict, String)]) -> Assessment {
-    let mut reasons = of_start.to_vec();
-    reasons.extend(nis(solution, outcome));
-    reasons.extend(stretches(solution));
-    reasons.extend(rejected(outcome));
-    reasons.extend(nees(outcome));
-    Assessment::of(reasons)
+pub fn assess(solution: &Solution, outcome: &Outcome, of_start: &[(VerdictKind, Finding)]) -> Assessment {
+    let mut findings = of_start.to_vec();
+    findings.push(nis(solution, outcome));
+    findings.extend(stretches(solution));
+    findings.extend(rejected(outcome));
+    if let Some(reference) = outcome.reference {
+        // the reference tells what fixes do not
+        findings.retain(|(verdict, _)| *verdict != VerdictKind::Undecided);
+        let confidence = reference.confidence();
+        findings.push((confidence.verdict, Finding::Reference(confidence)));
+    }
+    findings.sort_by_key(|(verdict, _)| std::cmp::Reverse(*verdict));
+    let verdict = findings.first().map_or(VerdictKind::Consistent, |(verdict, _)| *verdict);
+    Assessment { verdict, findings }
 }
 
 fn used(solution: &Solution) -> impl Iterator<Item = &FixRecord> {
     solution.fixes.iter().filter(|f| f.used == Use::Used)
 }
 
-fn nis(solution: &Solution, outcome: &Outcome) -> Option<(Verdict, String)> {
+fn nis(solution: &Solution, outcome: &Outcome) -> (VerdictKind, Finding) {
     let components: usize = used(solution).map(|f| f.innovation.len()).sum();
-    let nis = outcome.nis_per_component;
-    let verdict = match nis {
-        _ if components == 0 => return Some((Verdict::Doubtful, "no fix was used".to_owned())),
-        nis if nis > nis_bound(components) => Verdict::Overconfident,
-        nis if nis > bound(NIS_LIMITS.0, components) => Verdict::Doubtful,
-        // sixty components have a mean below 1/16 by chance once in 10^50
-        nis if nis < NIS_CAUTIOUS && components >= 60 => {
-            let text = format!(
-                "NIS {nis:.2} per component, where 1 is right: the fixes agree {:.0} times better than their \
-                 standard deviations say, as when their errors hardly change from one to the next; the stated \
-                 position errors mean little while there are fixes",
-                1.0 / nis.sqrt()
-            );
-            return Some((Verdict::Underconfident, text));
-        }
-        _ => return None,
+    let per_component = outcome.nis_per_component;
+    let verdict = match per_component {
+        _ if components == 0 => return (VerdictKind::Doubtful, Finding::NoFix),
+        nis if nis > nis_bound(components) => VerdictKind::Overconfident,
+        nis if nis > bound(NIS_LIMITS.0, components) => VerdictKind::Doubtful,
+        nis if nis < NIS_LOW || components < FEWEST => VerdictKind::Undecided,
+        _ => VerdictKind::Consistent,
     };
-    let text = format!(
-        "NIS {nis:.1} per component, where 1 is right: the fixes are {:.1} times as far from the solution as it states",
-        nis.sqrt()
-    );
-    Some((verdict, text))
+    (verdict, Finding::Nis { per_component })
 }
 
 /// Minutes in which most fixes are far from what is stated. The farthest tenth of them is left out: single
 /// wild fixes are the receiver's.
-fn stretches(solution: &Solution) -> Option<(Verdict, String)> {
+fn stretches(solution: &Solution) -> Option<(VerdictKind, Finding)> {
     let begin_s = used(solution).next()?.t_s;
     let mut minutes: Vec<Vec<&FixRecord>> = Vec::new();
     for fix in used(solution) {
@@ -136,22 +170,17 @@ fn stretches(solution: &Solution) -> Option<(Verdict, String)> {
         minutes.resize(minutes.len().max(minute + 1), Vec::new());
         minutes[minute].push(fix);
     }
-    let all = minutes.iter().filter(|m| !m.is_empty()).count();
+    let of = minutes.iter().filter(|m| !m.is_empty()).count();
     let bad: Vec<(usize, f64)> =
         minutes.iter().enumerate().filter_map(|(k, fixes)| Some((k, far(fixes)?))).collect();
-    let (worst, nis) = *bad.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
-    let share = bad.len() as f64 / all as f64;
-    let verdict = if share > BAD_STRETCHES { Verdict::Overconfident } else { Verdict::Doubtful };
-    let from = begin_s + STRETCH_S * worst as f64;
-    let text = format!(
-        "in {} of {all} minutes the NIS is far above 1: {nis:.1} per component from {from:.0} to {:.0} s",
-        bad.len(),
-        from + STRETCH_S
-    );
-    Some((verdict, text))
+    let (worst, nis_per_component) = *bad.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let is_much = bad.len() as f64 > BAD_STRETCHES * of as f64;
+    let verdict = if is_much { VerdictKind::Overconfident } else { VerdictKind::Doubtful };
+    let worst_s = begin_s + STRETCH_S * worst as f64;
+    Some((verdict, Finding::Minutes { bad: bad.len(), of, worst_s, nis_per_component }))
 }
 
-/// The mean NIS per component of the nearest nine tenths of these fixes, where it is not to be believed.
+/// Mean NIS per component of the nearest nine tenths of these fixes, where it is too large.
 fn far(fixes: &[&FixRecord]) -> Option<f64> {
     let mut sorted: Vec<(f64, usize)> = fixes.iter().map(|f| (f.nis, f.innovation.len())).collect();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -161,43 +190,24 @@ fn far(fixes: &[&FixRecord]) -> Option<f64> {
     (components > 0 && nis > nis_bound(components)).then_some(nis)
 }
 
-fn rejected(outcome: &Outcome) -> Option<(Verdict, String)> {
+fn rejected(outcome: &Outcome) -> Option<(VerdictKind, Finding)> {
     let [used, _, rejected] = outcome.fixes;
-    let share = rejected as f64 / (used + rejected).max(1) as f64;
+    let of = used + rejected;
+    let share = rejected as f64 / of.max(1) as f64;
     let verdict = match share {
-        share if share > REJECTED.1 => Verdict::Overconfident,
+        share if share > REJECTED.1 => VerdictKind::Overconfident,
         // three of a short recording are no share
-        share if share > REJECTED.0 && rejected > 3 => Verdict::Doubtful,
+        share if share > REJECTED.0 && rejected > 3 => VerdictKind::Doubtful,
         _ => return None,
     };
-    let text = format!(
-        "{rejected} of {} fixes were rejected: the solution departed from the fixes",
-        used + rejected
-    );
-    Some((verdict, text))
-}
-
-fn nees(outcome: &Outcome) -> Option<(Verdict, String)> {
-    let reference = outcome.reference.filter(|r| r.nees_mean > NEES_LIMIT)?;
-    let nees = reference.nees_mean;
-    let worst = reference.over_sigma.iter().zip(IN_WORDS).max_by(|a, b| a.0.total_cmp(b.0));
-    let most = worst.map_or(String::new(), |(ratio, name)| format!(", most in {name} ({ratio:.1} times)"));
-    let coloured = if outcome.nis_per_component < 1.0 {
-        "; the innovations do not show it, as when the errors of the fixes hardly change from one to the next"
-    } else {
-        ""
-    };
-    let text = format!(
-        "NEES {nees:.0} against the reference, where 9 is right: the errors are {:.1} times as large as stated{most}{coloured}",
-        (nees / 9.0).sqrt()
-    );
-    Some((Verdict::Overconfident, text))
+    Some((verdict, Finding::Rejected { rejected, of }))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fusion::{FromReference, outcome};
+    use crate::fusion::outcome;
+    use crate::metrics::PerState;
     use statrs::distribution::{ChiSquared, ContinuousCDF};
 
     /// A fix a second of three components with this NIS per component.
@@ -219,44 +229,72 @@ mod tests {
     }
 
     #[test]
-    fn innovations_as_large_as_stated_are_ok_twice_as_large_are_not_believed() {
+    fn the_nis_tells_what_is_consistent_too_large_and_untold() {
         let verdict = |nis: f64| judged(&solution(|_| nis, 600)).verdict;
-        assert_eq!([0.2, 1.0, 1.6].map(verdict), [Verdict::Ok; 3]);
+        assert_eq!([0.6, 1.0, 1.6].map(verdict), [VerdictKind::Consistent; 3]);
         assert_eq!(
-            [0.03, 2.5, 5.0].map(verdict),
-            [Verdict::Underconfident, Verdict::Doubtful, Verdict::Overconfident]
+            [0.3, 2.5, 5.0].map(verdict),
+            [VerdictKind::Undecided, VerdictKind::Doubtful, VerdictKind::Overconfident]
         );
+        assert_eq!(judged(&solution(|_| 1.0, 10)).verdict, VerdictKind::Undecided);
     }
 
     /// Bad minutes count although the mean over the drive hides them; one wild fix is no bad minute.
     #[test]
     fn bad_minutes_count_and_wild_fixes_do_not() {
         let bad = |minutes: usize| judged(&solution(move |k| if k < 60 * minutes { 9.0 } else { 0.3 }, 1800));
-        assert_eq!(bad(1).verdict, Verdict::Doubtful);
-        assert!(bad(1).reasons[0].1.starts_with("in 1 of 30 minutes"), "{:?}", bad(1));
-        assert_eq!(bad(4).verdict, Verdict::Overconfident);
-        assert_eq!(judged(&solution(|k| if k == 77 { 200.0 } else { 0.5 }, 600)).verdict, Verdict::Ok);
+        assert_eq!(bad(1).verdict, VerdictKind::Doubtful);
+        assert!(matches!(bad(1).findings[0].1, Finding::Minutes { bad: 1, of: 30, .. }), "{:?}", bad(1));
+        assert_eq!(bad(4).verdict, VerdictKind::Overconfident);
+        assert_eq!(
+            judged(&solution(|k| if k == 77 { 200.0 } else { 0.5 }, 600)).verdict,
+            VerdictKind::Consistent
+        );
     }
 
     #[test]
     fn a_solution_that_rejects_its_fixes_is_not_believed() {
         let mut all = solution(|_| 1.0, 600);
         all.fixes[..90].iter_mut().for_each(|f| f.used = Use::Rejected);
-        assert_eq!(judged(&all).verdict, Verdict::Doubtful);
+        assert_eq!(judged(&all).verdict, VerdictKind::Doubtful);
         all.fixes[..400].iter_mut().for_each(|f| f.used = Use::Rejected);
-        assert_eq!(judged(&all).verdict, Verdict::Overconfident);
+        assert_eq!(judged(&all).verdict, VerdictKind::Overconfident);
     }
 
+    /// The reference decides, also where the fixes do not tell.
     #[test]
-    fn a_reference_that_is_three_sigma_off_in_every_state_is_not_believed() {
-        let all = solution(|_| 1.0, 600);
-        let verdict = |nees| {
-            let reference =
-                FromReference { nees_mean: nees, over_sigma: [3.0; 9], ..FromReference::default() };
-            let outcome = Outcome { reference: Some(reference), ..outcome(&all, &[]) };
-            assess(&all, &outcome, &[]).verdict
+    fn a_reference_decides_and_names_the_state_farthest_off() {
+        let all = solution(|_| 0.3, 600);
+        let judged = |over_sigma: [f64; 9], nees_mean: f64| {
+            let reference = FromReference {
+                rmse: PerState([1.0; 9]),
+                horizontal_rmse_m: 1.0,
+                horizontal_max_m: 1.0,
+                error_over_sigma: PerState(over_sigma),
+                nees_mean,
+                nees_dof: 9,
+                velocity_sigma_m_s: 0.0,
+            };
+            let assessment = assess(&all, &Outcome { reference: Some(reference), ..outcome(&all, &[]) }, &[]);
+            let Finding::Reference(confidence) = assessment.findings[0].1 else { panic!("{assessment:?}") };
+            (assessment.verdict, confidence.worst_state)
         };
-        assert_eq!([9.0, 20.0, 81.0].map(verdict), [Verdict::Ok, Verdict::Ok, Verdict::Overconfident]);
+        let with = |state: usize, value: f64| std::array::from_fn(|i| if i == state { value } else { 1.0 });
+        assert_eq!(judged(with(8, 1.4), 9.0), (VerdictKind::Consistent, "yaw_deg"));
+        assert_eq!(judged(with(8, 1.4), 9.0 * 1.6 * 1.6), (VerdictKind::Overconfident, "yaw_deg"));
+        assert_eq!(judged(with(2, 3.1), 9.0), (VerdictKind::Overconfident, "pos_d_m"));
+        assert_eq!(judged(with(6, 0.1), 9.0 * 0.16), (VerdictKind::Underconfident, "roll_deg"));
+    }
+
+    /// Right standard deviations are called wrong by chance in fewer than 1 of 18 drives, however little errors change
+    /// within them.
+    #[test]
+    fn chance_is_no_verdict_by_a_reference() {
+        let (nine, one) = (ChiSquared::new(9.0).unwrap(), ChiSquared::new(1.0).unwrap());
+        let (below, above) = (nine.cdf(9.0 * ALL_STATES.0.powi(2)), nine.sf(9.0 * ALL_STATES.1.powi(2)));
+        let in_one = 9.0 * one.sf(ONE_STATE.powi(2));
+        assert!((1.0 / below).round() == 76.0 && (1.0 / above).round() == 61.0, "{below} {above}");
+        assert!((1.0 / in_one).round() == 41.0 && below + above + in_one < 1.0 / 18.0, "{in_one}");
     }
 
     /// What is as believed is doubted once in 500 at most, however few its fixes.

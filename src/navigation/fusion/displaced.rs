@@ -1,4 +1,4 @@
-//! Whether the fixes are those of an antenna elsewhere, or of an earlier time, than the filter was told.
+//! Lever arm and delay of the fixes that explain large innovations.
 //!
 //! The innovations change almost linearly with the place of the antenna and with the delay of the fixes. The filter is
 //! run with each a little off; least squares over the innovations of all fixes give the values at which they are
@@ -6,11 +6,12 @@
 //! here). What was found is a cause only if the filter, run with it, makes a solution to be believed: an explanation is
 //! tested by taking the cause away.
 
-use super::{Recorded, Settings, Start, Use, fuse};
+use super::{FixRecord, Recorded, Settings, Start, Use, fuse};
 use crate::ekf::Belief;
 use crate::gnss::GnssFix;
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
+use serde::Serialize;
 use std::ops::Range;
 
 /// How far off the filter is run (m; s).
@@ -30,7 +31,7 @@ const BELIEVED: (f64, f64) = (2.0, 0.9);
 const FARTHEST: (f64, f64) = (10.0, 1.0);
 
 /// What makes the fixes agree with the IMU.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Displaced {
     /// Antenna from IMU: front, right, down (m), and standard deviations; none where it is as given.
     pub lever_arm_b: Option<[DVec3; 2]>,
@@ -107,11 +108,11 @@ impl Scene<'_> {
         let recorded = Recorded { gnss: &gnss, ..self.recorded };
         let solution = fuse(&recorded, self.belief, self.start, &settings, None).ok()?;
         let first = gnss.partition_point(|f| f.t_s <= self.start.t_s);
-        let mut all = vec![None; gnss.len()];
+        let mut of_fix = vec![None; gnss.len()];
         for (k, fix) in solution.fixes.into_iter().enumerate().filter(|(_, f)| f.used == Use::Used) {
-            all[first + k] = Some(OneFix { z: fix.innovation, sigma: fix.sigma, nis: fix.nis });
+            of_fix[first + k] = Some(fix);
         }
-        Some(Innovations { of_fix: all })
+        Some(Innovations { of_fix })
     }
 
     /// Takes a Gauss-Newton step; returns the innovations where it leads.
@@ -131,10 +132,10 @@ impl Scene<'_> {
         let (mut information, mut gradient) = (Matrix4::zeros(), Vector4::zeros());
         for (i, fix) in there.of_fix.iter().enumerate() {
             let Some(fix) = fix else { continue };
-            let moved: Option<Vec<&OneFix>> = aside.iter().map(|a| a.of_fix[i].as_ref()).collect();
+            let moved: Option<Vec<&FixRecord>> = aside.iter().map(|a| a.of_fix[i].as_ref()).collect();
             let Some(moved) = moved else { continue };
-            for (c, (z, sigma)) in fix.z.iter().zip(&fix.sigma).enumerate() {
-                let slope = Vector4::from_fn(|k, _| (moved[k].z[c] - z) / (OFF[k] * sigma));
+            for (c, (z, sigma)) in fix.innovation.iter().zip(&fix.sigma).enumerate() {
+                let slope = Vector4::from_fn(|k, _| (moved[k].innovation[c] - z) / (OFF[k] * sigma));
                 information += slope * slope.transpose();
                 gradient -= slope * (z / sigma);
             }
@@ -143,24 +144,16 @@ impl Scene<'_> {
     }
 }
 
-/// A fix as the filter saw it: innovation, its standard deviations, NIS.
-#[derive(Debug, Clone)]
-struct OneFix {
-    z: Vec<f64>,
-    sigma: Vec<f64>,
-    nis: f64,
-}
-
 /// What the filter made of each fix of the recording that it used.
 struct Innovations {
-    of_fix: Vec<Option<OneFix>>,
+    of_fix: Vec<Option<FixRecord>>,
 }
 
 impl Innovations {
     /// Mean NIS per component.
     fn nis(&self) -> f64 {
         let used = || self.of_fix.iter().flatten();
-        used().map(|f| f.nis).sum::<f64>() / used().map(|f| f.z.len()).sum::<usize>().max(1) as f64
+        used().map(|f| f.nis).sum::<f64>() / used().map(|f| f.innovation.len()).sum::<usize>().max(1) as f64
     }
 }
 

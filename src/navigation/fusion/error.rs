@@ -1,12 +1,10 @@
-//! Why recorded data cannot be fused, and what to do about it.
+//! Recorded data that cannot be fused.
 
-/// Why recorded data cannot be fused.
+/// Recorded data that cannot be fused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FusionError {
     /// The clocks have nothing in common.
-    #[error(
-        "the clocks do not overlap: the IMU runs from {} to {} s, GNSS from {} to {} s", .imu.0, .imu.1, .gnss.0, .gnss.1
-    )]
+    #[error("the clocks do not overlap: IMU {} to {} s, GNSS {} to {} s", .imu.0, .imu.1, .gnss.0, .gnss.1)]
     Clocks {
         /// First and last sample (s).
         imu: (f64, f64),
@@ -23,7 +21,7 @@ pub enum FusionError {
     },
     /// The initial position is not where the fixes are.
     #[error(
-        "the initial position is {metres:.0} m from the fix at {t_s} s (both together are good to {sigma_m:.1} m)"
+        "the initial position is {metres:.0} m from the fix at {t_s} s, with a standard deviation of {sigma_m:.1} m"
     )]
     Place {
         /// The first fix after the start (s).
@@ -34,9 +32,7 @@ pub enum FusionError {
         sigma_m: f64,
     },
     /// Latitude and longitude lose their meaning.
-    #[error(
-        "latitude {lat_deg:.3}° at {t_s} s: beyond ±89.9° there is no navigation in latitude and longitude"
-    )]
+    #[error("latitude {lat_deg:.3}° at {t_s} s is beyond ±89.9°")]
     Pole {
         /// When (s).
         t_s: f64,
@@ -44,10 +40,7 @@ pub enum FusionError {
         lat_deg: f64,
     },
     /// What a smoother would have to keep.
-    #[error(
-        "the smoother would take {:.1} GB of memory for {marks} rows and fixes of {states} states; it takes 2 GB at most",
-        bytes / 1e9
-    )]
+    #[error("the smoother would take {:.1} GB for {marks} rows and fixes of {states} states, 2 GB at most", bytes / 1e9)]
     Memory {
         /// How much (bytes).
         bytes: f64,
@@ -64,33 +57,17 @@ pub enum FusionError {
     },
 }
 
-/// What to look at where a solution is not to be believed.
-pub const DOUBTFUL: &str = "are the IMU's axes front, right, down, its units right, the initial state true?";
+/// Seconds of a GNSS week.
+const WEEK_S: f64 = 604_800.0;
 
 impl FusionError {
-    /// What to do about it.
+    /// How late the fixes are by their clock, where that is why nothing overlaps (s): whole weeks, or what makes both
+    /// recordings begin in the same second.
     #[must_use]
-    pub fn hint(&self) -> Option<String> {
-        const WEEK_S: f64 = 604_800.0;
-        match self {
-            Self::Clocks { imu, gnss } => {
-                let weeks = ((imu.0 - gnss.0) / WEEK_S).round();
-                let rest = (imu.0 - gnss.0 - weeks * WEEK_S).abs();
-                Some(if weeks != 0.0 && rest < 86_400.0 {
-                    format!("they are {weeks} GPS weeks apart: give both in seconds of the week, without a week column")
-                } else {
-                    "both files need one clock: is one in milliseconds, or counted from its own start?".into()
-                })
-            }
-            Self::Start { .. } => Some("give t_s of the initial state on the clock of the IMU".into()),
-            Self::Diverged { .. } => Some(DOUBTFUL.to_owned()),
-            Self::Place { .. } => Some(
-                "are t_s, lat_deg and lon_deg of the initial state those of this recording, its pos_sigma_m honest?".into(),
-            ),
-            Self::Memory { .. } => {
-                Some("fewer rows a second, or a filter of fewer states, take less".into())
-            }
-            Self::Pole { .. } => None,
-        }
+    pub fn delay_s(&self) -> Option<f64> {
+        let Self::Clocks { imu, gnss } = self else { return None };
+        let apart_s = gnss.0 - imu.0;
+        let overlap = |delay_s: &f64| gnss.0 - delay_s <= imu.1 && imu.0 <= gnss.1 - delay_s;
+        [WEEK_S, 1.0].map(|step| (apart_s / step).round() * step).into_iter().find(overlap)
     }
 }

@@ -26,7 +26,7 @@
 //! let recording = record(&Plan::new(&experiment)?, 0);
 //! let recorded = Recorded { imu: &recording.imu, gnss: &recording.gnss };
 //! let sigma = scenario.initial.clone();
-//! let start = Start { t_s: 0.0, state: recording.start, sigma, how: vec![] };
+//! let start = Start { t_s: 0.0, state: recording.start, sigma, found: None };
 //! let settings = Settings {
 //!     q_s_b: DQuat::IDENTITY,
 //!     mounting_sigma_b: DVec3::ZERO,
@@ -48,7 +48,6 @@
 pub mod alignment;
 mod assessment;
 mod clocks;
-mod confidence;
 mod displaced;
 mod error;
 mod filter;
@@ -57,16 +56,11 @@ pub mod mounting;
 mod outcome;
 mod smoother;
 
-use assessment::nis_bound;
-pub use assessment::{Assessment, Verdict, assess};
-pub use clocks::ClocksApart;
-pub(crate) use clocks::clocks_apart;
-pub use confidence::Confidence;
+pub use assessment::{Assessment, Confidence, Finding, assess};
+pub use clocks::{ClocksApart, clocks_apart};
 pub use displaced::{Displaced, displaced};
-pub use error::{DOUBTFUL, FusionError};
-pub use outcome::{
-    Drift, Farthest, FromReference, OutageDrift, Outcome, SmoothedOutage, SmoothedOutcome, outcome,
-};
+pub use error::FusionError;
+pub use outcome::{Drift, FromReference, OutageDrift, Outcome, SmoothedOutage, SmoothedOutcome, outcome};
 
 use crate::earth::{GravityModel, MAX_LATITUDE, geodetic_to_ecef};
 use crate::ekf::{Belief, InitialSettings, nis_limit};
@@ -84,19 +78,6 @@ use smoother::Tape;
 
 /// Position (m, north, east, down), velocity (m/s), roll, pitch, yaw (degrees).
 pub(crate) type Nine = [f64; 9];
-
-/// The nine in words.
-pub(crate) const IN_WORDS: [&str; 9] = [
-    "position north",
-    "position east",
-    "position down",
-    "velocity north",
-    "velocity east",
-    "velocity down",
-    "roll",
-    "pitch",
-    "yaw",
-];
 
 /// What was recorded, both in order of time.
 #[derive(Debug, Clone, Copy)]
@@ -140,8 +121,31 @@ pub struct Start {
     pub state: NavState,
     /// How well they are known.
     pub sigma: InitialSettings,
-    /// How they were found.
-    pub how: Vec<String>,
+    /// How they were found; none where they were given.
+    pub found: Option<Found>,
+}
+
+/// How [`alignment::coarse`] found a start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Found {
+    /// Where roll and pitch come from.
+    pub level: Levelling,
+    /// Standard deviation of the course as a heading (degrees).
+    pub course_sigma_deg: f64,
+    /// Whether the vehicle goes backwards along its course.
+    pub is_reversing: bool,
+    /// How far the fixes of the next minute move the heading from the course (degrees), where that is more than three
+    /// standard deviations: wind, slip.
+    pub moved_deg: Option<f64>,
+}
+
+/// Source of roll and pitch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Levelling {
+    /// Gravity at rest until a time (s), carried on by the gyroscopes.
+    AtRest(f64),
+    /// Specific force and change of the GNSS velocity over so long (s).
+    InMotion(f64),
 }
 
 /// The state at an instant, and how well it is known.

@@ -1,32 +1,36 @@
-//! What a fusion says of itself: how many fixes, how consistent, how far off at the end of outages.
+//! Figures of a fusion: fixes used, consistency, errors at the ends of outages. They serialize as `summary.json` has them.
 
-use super::{Nine, Row, RowError, Solution, Use};
+use super::{Confidence, Nine, Row, RowError, Solution, Use};
+use crate::metrics::PerState;
 use crate::sensors::outage::Outage;
+use serde::Serialize;
 
-/// A distance at the end of an outage, and what the filter believed of it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Distance at the end of an outage, and what the filter states of it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Drift {
     /// Horizontal distance (m).
     pub horizontal_m: f64,
     /// Difference down (m).
     pub down_m: f64,
     /// Horizontal standard deviation that the filter states (m).
-    pub sigma_m: f64,
+    pub expected_sigma_m: f64,
 }
 
-/// What an outage did.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Errors at the end of an outage.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct OutageDrift {
     /// The outage.
+    #[serde(flatten)]
     pub outage: Outage,
     /// Fixes that were withheld.
-    pub withheld: usize,
+    pub fixes_withheld: usize,
     /// Whether a fix follows it.
-    pub is_followed: bool,
+    pub followed_by_fix: bool,
     /// Against the first fix after it (the last withheld one, when none follows).
-    pub from_fix: Option<Drift>,
+    pub end_from_fix: Option<Drift>,
     /// Against the reference at that time.
-    pub from_reference: Option<Drift>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub end_from_reference: Option<Drift>,
 }
 
 /// Figures of a solution.
@@ -36,58 +40,66 @@ pub struct Outcome {
     pub fixes: [usize; 3],
     /// Mean NIS of the fixes used, divided by their number of components: 1 if all is as believed.
     pub nis_per_component: f64,
-    /// What each outage did.
+    /// Errors at the end of each outage.
     pub outages: Vec<OutageDrift>,
-    /// How far the rows are from the reference, where one reaches them.
+    /// Differences of the rows from the reference, where one reaches them.
     pub reference: Option<FromReference>,
-    /// What smoothing does, where it was done.
+    /// Figures of the smoothed solution, where there is one.
     pub smoothed: Option<SmoothedOutcome>,
 }
 
 /// Differences of rows from a reference.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FromReference {
     /// Root mean square in each state.
-    pub rmse: Nine,
-    /// Root mean square of the difference over its standard deviation in each state: 1 if both are right.
-    pub over_sigma: Nine,
+    pub rmse: PerState<f64>,
+    /// The same of the horizontal distance (m).
+    pub horizontal_rmse_m: f64,
     /// Largest horizontal distance (m).
     pub horizontal_max_m: f64,
-    /// Mean NEES (9 if both are right).
+    /// Root mean square of the difference over its standard deviation in each state: 1 if both are right.
+    pub error_over_sigma: PerState<f64>,
+    /// Mean NEES.
     pub nees_mean: f64,
+    /// What it is if both are right.
+    pub nees_dof: usize,
     /// How well the velocity of the reference is known, which the NEES allows for: root mean square (m/s).
-    pub velocity_sigma: f64,
+    pub velocity_sigma_m_s: f64,
 }
 
-/// What smoothing does to a solution.
-#[derive(Debug, Clone, Default, PartialEq)]
+/// Figures of a smoothed solution beside the filter's.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct SmoothedOutcome {
-    /// Root mean square of the horizontal standard deviations, of the filter and smoothed (m).
-    pub sigma_rms_m: [f64; 2],
-    /// How far the smoothed rows are from the reference.
+    /// Root mean square of the smoothed horizontal standard deviation (m).
+    pub horizontal_sigma_rms_m: f64,
+    /// The same of the filter's (m).
+    pub horizontal_sigma_rms_filter_m: f64,
+    /// Differences of the smoothed rows from the reference.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub reference: Option<FromReference>,
+    /// Their verdict.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub confidence: Option<Confidence>,
     /// The outages in which there are rows.
     pub outages: Vec<SmoothedOutage>,
 }
 
-/// The rows in an outage.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// The largest of the rows in an outage.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SmoothedOutage {
     /// The outage.
+    #[serde(flatten)]
     pub outage: Outage,
-    /// Of the filter.
-    pub filtered: Farthest,
-    /// Smoothed.
-    pub smoothed: Farthest,
-}
-
-/// The largest of some rows.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Farthest {
-    /// Horizontal standard deviation (m).
-    pub sigma_m: f64,
-    /// Horizontal distance from the reference (m).
-    pub from_reference_m: Option<f64>,
+    /// Smoothed horizontal standard deviation (m).
+    pub sigma_max_m: f64,
+    /// The filter's (m).
+    pub sigma_max_filter_m: f64,
+    /// Smoothed horizontal distance from the reference (m).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub horizontal_max_m: Option<f64>,
+    /// The filter's (m).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub horizontal_max_filter_m: Option<f64>,
 }
 
 /// The figures of a solution with these outages.
@@ -109,12 +121,16 @@ fn from_reference(rows: &[Row]) -> Option<FromReference> {
     let errors: Vec<RowError> = rows.iter().filter_map(|row| row.error).collect();
     let n = errors.len() as f64;
     let rms = |of: &dyn Fn(&RowError) -> f64| (errors.iter().map(|e| of(e).powi(2)).sum::<f64>() / n).sqrt();
+    let per_state = |of: &dyn Fn(&RowError, usize) -> f64| std::array::from_fn(|i| rms(&|e| of(e, i)));
+    let rmse: Nine = per_state(&|e, i| e.values[i]);
     (!errors.is_empty()).then(|| FromReference {
-        rmse: std::array::from_fn(|i| rms(&|e| e.values[i])),
-        over_sigma: std::array::from_fn(|i| rms(&|e| e.values[i] / e.sigma[i].max(f64::MIN_POSITIVE))),
-        velocity_sigma: rms(&|e| e.velocity_sigma),
+        rmse: PerState(rmse),
+        horizontal_rmse_m: horizontal(&rmse),
         horizontal_max_m: errors.iter().map(|e| horizontal(&e.values)).fold(0.0, f64::max),
+        error_over_sigma: PerState(per_state(&|e, i| e.values[i] / e.sigma[i].max(f64::MIN_POSITIVE))),
         nees_mean: errors.iter().map(|e| e.nees).sum::<f64>() / n,
+        nees_dof: rmse.len(),
+        velocity_sigma_m_s: rms(&|e| e.velocity_sigma),
     })
 }
 
@@ -123,46 +139,57 @@ fn horizontal(values: &Nine) -> f64 {
 }
 
 fn smoothed(filtered: &[Row], smoothed: &[Row], outages: &[Outage]) -> SmoothedOutcome {
-    let mean_square =
-        |rows: &[Row]| rows.iter().map(|row| horizontal(&row.sigma).powi(2)).sum::<f64>() / rows.len() as f64;
-    let of_outage = |outage: &Outage| {
-        let [filtered, smoothed] = [filtered, smoothed].map(|rows| farthest(rows, outage));
-        Some(SmoothedOutage { outage: *outage, filtered: filtered?, smoothed: smoothed? })
+    let sigma_rms = |rows: &[Row]| {
+        (rows.iter().map(|row| horizontal(&row.sigma).powi(2)).sum::<f64>() / rows.len() as f64).sqrt()
     };
+    let of_outage = |outage: &Outage| {
+        let [(sigma_max_filter_m, horizontal_max_filter_m), (sigma_max_m, horizontal_max_m)] =
+            [largest(filtered, outage)?, largest(smoothed, outage)?];
+        let outage = *outage;
+        Some(SmoothedOutage {
+            outage,
+            sigma_max_m,
+            sigma_max_filter_m,
+            horizontal_max_m,
+            horizontal_max_filter_m,
+        })
+    };
+    let reference = from_reference(smoothed);
     SmoothedOutcome {
-        sigma_rms_m: [filtered, smoothed].map(|rows| mean_square(rows).sqrt()),
-        reference: from_reference(smoothed),
+        horizontal_sigma_rms_m: sigma_rms(smoothed),
+        horizontal_sigma_rms_filter_m: sigma_rms(filtered),
+        confidence: reference.as_ref().map(FromReference::confidence),
+        reference,
         outages: outages.iter().filter_map(of_outage).collect(),
     }
 }
 
-/// The largest of the rows in an outage; none without rows.
-fn farthest(rows: &[Row], outage: &Outage) -> Option<Farthest> {
+/// Largest horizontal standard deviation of the rows in an outage and distance from the reference; none without rows.
+fn largest(rows: &[Row], outage: &Outage) -> Option<(f64, Option<f64>)> {
     let within = || rows.iter().filter(|row| outage.withholds(row.t_s));
-    Some(Farthest {
-        sigma_m: within().map(|row| horizontal(&row.sigma)).reduce(f64::max)?,
-        from_reference_m: within().filter_map(|row| Some(horizontal(&row.error?.values))).reduce(f64::max),
-    })
+    let error = within().filter_map(|row| Some(horizontal(&row.error?.values))).reduce(f64::max);
+    Some((within().map(|row| horizontal(&row.sigma)).reduce(f64::max)?, error))
 }
 
 fn drift(solution: &Solution, outage: Outage) -> OutageDrift {
     let withheld = || solution.fixes.iter().filter(|f| outage.withholds(f.t_s));
     let after = solution.fixes.iter().find(|f| f.t_s + 1e-9 >= outage.end_s);
     let last = after.or(withheld().next_back());
-    let from_fix = last.map(|f| Drift {
+    let end_from_fix = last.map(|f| Drift {
         horizontal_m: f.innovation[0].hypot(f.innovation[1]),
         down_m: f.innovation[2],
-        sigma_m: f.sigma[0].hypot(f.sigma[1]),
+        expected_sigma_m: f.sigma[0].hypot(f.sigma[1]),
     });
-    let from_reference = last.and_then(|f| {
+    let end_from_reference = last.and_then(|f| {
         let error = f.error?;
-        Some(Drift { horizontal_m: horizontal(&error), down_m: error[2], sigma_m: f.horizontal_sigma_m })
+        let (horizontal_m, expected_sigma_m) = (horizontal(&error), f.horizontal_sigma_m);
+        Some(Drift { horizontal_m, down_m: error[2], expected_sigma_m })
     });
     OutageDrift {
         outage,
-        withheld: withheld().count(),
-        is_followed: after.is_some(),
-        from_fix,
-        from_reference,
+        fixes_withheld: withheld().count(),
+        followed_by_fix: after.is_some(),
+        end_from_fix,
+        end_from_reference,
     }
 }

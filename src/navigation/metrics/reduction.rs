@@ -3,13 +3,25 @@
 use super::estimate::PerState;
 use crate::ekf::Belief;
 use crate::ekf::belief::BiasGroup;
-use crate::fusion::IN_WORDS;
 use crate::imu::Channel;
 use crate::noise::{Ar1, Composite, Model, ParameterError, Process, White, continuous, reduction};
 use crate::simulation::REPORTED;
 use crate::simulation::lincov::{Assessment, Consistency};
 use glam::DVec3;
 use serde::Serialize;
+
+/// The reported states in words.
+const IN_WORDS: [&str; 9] = [
+    "position north",
+    "position east",
+    "position down",
+    "velocity north",
+    "velocity east",
+    "velocity down",
+    "roll",
+    "pitch",
+    "yaw",
+];
 
 /// A ratio of RMSE to standard deviation that is further from 1 at the end of an outage deserves a warning.
 pub const TOLERANCE: f64 = 0.1;

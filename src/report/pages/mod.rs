@@ -1,11 +1,9 @@
 //! The page of each result.
 
-mod fusion;
 mod paper;
 mod run;
 mod run_budgets;
 mod run_charts;
-pub(crate) use fusion::fusion_page;
 pub(crate) use paper::{PaperFigure, StudyCurves, paper_figures, paper_page};
 pub(super) use run::run_page;
 pub(crate) use run_charts::run_svg;

@@ -2,7 +2,6 @@
 
 use super::{recorded, table};
 use crate::common::drive::{done, nav_sim, place_with};
-use std::collections::HashSet;
 use std::fs;
 
 #[test]
@@ -12,16 +11,15 @@ fn a_smoothed_fusion_lies_beside_the_filter_s_and_is_the_same_on_any_number_of_t
     let fuse = "fuse rec/imu.csv rec/gnss.csv imu.toml --reference rec/reference.csv --outage 60:75";
     done(place.path(), &format!("{fuse} -o plain"));
     let one = done(place.path(), &format!("{fuse} --smooth -j 1 -o one"));
-    done(place.path(), &format!("{fuse} --smooth -j 3 -o three --plot fused.svg"));
+    done(place.path(), &format!("{fuse} --smooth -j 3 -o three"));
     for name in ["smoothed.csv", "errors_smoothed.csv", "smoothed.kml", "summary.json"] {
         assert_eq!(read(&format!("one/{name}")), read(&format!("three/{name}")), "{name}");
     }
     for name in ["solution.csv", "errors.csv", "innovations.csv", "solution.kml"] {
         assert_eq!(read(&format!("plain/{name}")), read(&format!("one/{name}")), "{name}");
     }
-    let line = one.stdout.lines().find(|l| l.starts_with("smoothed, in outages")).unwrap();
-    assert!(line.contains("from the reference"), "{line}");
-    assert!(read("fused.svg").contains("smoothed"));
+    let row = one.stdout.lines().find(|l| l.contains("horizontal RMSE")).unwrap();
+    assert_eq!(row.split_whitespace().count(), 5, "{row}");
     let header = |name: &str| read(name).lines().next().unwrap().to_owned();
     assert_eq!(header("one/smoothed.csv"), header("one/solution.csv"));
     let (filter, smoothed) =
@@ -53,13 +51,11 @@ fn a_smoothed_solution_has_a_verdict_by_the_reference() {
     done(place.path(), "trajectory record drive.toml imu.toml --seed 3 -o rec");
     let start = "--initial rec/initial.toml --reference rec/reference.csv --rate-hz 1";
     let worse = concat!(env!("CARGO_MANIFEST_DIR"), "/calib_data/consumer_mems.toml");
-    for (model, factor, verdict, said) in [
-        ("imu.toml", 1.0, "ok", "smoothed solution consistent with the reference: errors "),
-        ("imu.toml", 0.3, "overconfident", "smoothed solution overconfident: errors "),
-        (worse, 10.0, "underconfident", "smoothed solution underconfident: errors "),
-    ] {
+    for (model, factor, verdict) in
+        [("imu.toml", 1.0, "consistent"), ("imu.toml", 0.3, "overconfident"), (worse, 10.0, "underconfident")]
+    {
         let fuse = format!("fuse rec/imu.csv rec/gnss.csv {model} {start} --outage 300:360 --smooth -o out");
-        let ran = nav_sim(place.path(), &format!("{fuse} --gnss-sigma-factor {factor},{factor}"));
+        nav_sim(place.path(), &format!("{fuse} --gnss-sigma-factor {factor},{factor}"));
         let summary = fs::read_to_string(place.path().join("out/summary.json")).unwrap();
         let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
         let confidence = &summary["smoothed"]["confidence"];
@@ -67,27 +63,16 @@ fn a_smoothed_solution_has_a_verdict_by_the_reference() {
         let state = confidence["worst_state"].as_str().unwrap();
         let of_state = &summary["smoothed"]["reference"]["error_over_sigma"][state];
         assert_eq!(*of_state, confidence["worst_error_over_sigma"]);
-        let line = ran
-            .stdout
-            .lines()
-            .find(|line| line.starts_with(said))
-            .unwrap_or_else(|| panic!("{}", ran.stdout));
-        assert!(line.ends_with(&format!(" times in {state}")), "{line}");
     }
     let page = fs::read_to_string(place.path().join("out/report.html")).unwrap();
-    // legends of nine panels of errors, each on one line
+    // nine panels of errors, each with zero inside
     let panels: Vec<&str> = page.split("<svg class=\"chart small\"").skip(1).collect();
     assert_eq!(panels.len(), 9);
     for panel in panels {
-        let legend = panel.split("<g class=\"ticks\">").next().unwrap();
-        let texts = legend.split(" y=\"").skip(1).filter(|y| y.contains("text-anchor"));
-        let lines: HashSet<&str> = texts.filter_map(|y| y.split('"').next()).collect();
-        assert!(legend.contains("smoothed") && legend.contains("outage") && lines.len() == 1, "{legend}");
+        let ticks = panel.split("<g class=\"ticks\">").nth(1).unwrap();
+        assert!(ticks.contains(">0</text>"), "{ticks:.600}");
     }
-    assert!(
-        page.contains("largest horizontal 1 σ, smoothed (m)")
-            && page.contains("/smoothed/outages/0/sigma_max_m")
-    );
+    assert!(page.contains("/smoothed/outages/0/sigma_max_m") && page.len() < 350_000, "{}", page.len());
 }
 
 #[test]
@@ -98,6 +83,6 @@ fn without_outages_or_a_reference_it_says_what_it_knows() {
         "fuse rec/imu.csv rec/gnss.csv imu.toml --filter 21 --smooth --rate-hz 1 -o out",
     );
     assert_eq!(ran.code, 0, "{}", ran.stderr);
-    let line = ran.stdout.lines().find(|l| l.starts_with("smoothed")).unwrap();
-    assert!(line.contains("horizontal 1 sigma") && !line.contains("reference"), "{line}");
+    let line = ran.stdout.lines().find(|l| l.contains("horizontal 1 σ")).unwrap();
+    assert!(line.split_whitespace().count() > 6 && !ran.stdout.contains("RMSE"), "{line}");
 }

@@ -204,40 +204,30 @@ impl Log {
         let moving = fixes.iter().filter(|(_, fix)| fix.velocity.is_some()).count();
         let count = fixes.len();
         let mut remarks = vec![Remark::note(format!(
-            "NMEA sentences: {count} fixes, {moving} with a horizontal velocity, times are {}",
-            clock.words
+            "NMEA sentences: {count} fixes, {moving} with a horizontal velocity, {} left out, times are {}",
+            self.left_out, clock.words
         ))];
-        remarks.extend(clock.doubts.into_iter().map(Remark::doubt));
-        if !self.has_checksums {
-            remarks.push(Remark::doubt(
-                "no sentence has a checksum, so that damaged digits go unseen: let the receiver write checksums",
-            ));
+        let is_unsaid = |e: &Epoch| e.position.is_some() && e.sigma.is_none();
+        if self.epochs.iter().any(is_unsaid) {
+            remarks.push(Remark::note("standard deviations without GST as given, in proportion to HDOP"));
         }
-        if self.left_out > 0 {
-            remarks.push(Remark::note(format!(
-                "{} positions left out: no fix, dead reckoning or typed in",
-                self.left_out
-            )));
-        }
-        if self.epochs.iter().any(|e| e.position.is_some() && e.sigma.is_none()) {
-            remarks.push(Remark::note(
-                "standard deviations of positions without GST as given, in proportion to HDOP",
-            ));
-        }
-        if moving == 0
-            && self.epochs.iter().any(|e| e.velocity.is_some())
-            && unsaid.is_none_or(|s| s.vel_m_s.is_none())
-        {
-            remarks.push(Remark::doubt(
-                "speed and course are not used: NMEA states no standard deviations of them; give them behind a colon \
-                 (--gnss-sigma 2,2,4:0.1)",
-            ));
-        }
-        if !self.has_separation {
-            remarks.push(Remark::doubt(
+        let is_unused = moving == 0 && self.epochs.iter().any(|e| e.velocity.is_some());
+        let doubts = [
+            (
+                clock.is_rolled,
+                "the dates are 1024 weeks or more before the IMU's: a week counter has rolled over",
+            ),
+            (!self.has_checksums, "no sentence has a checksum: damaged digits go unseen"),
+            (
+                is_unused && unsaid.is_none_or(|s| s.vel_m_s.is_none()),
+                "speed and course are not used without standard deviations: --gnss-sigma 2,2,4:0.1",
+            ),
+            (
+                !self.has_separation,
                 "GGA states no geoid separation: heights are above the sea, up to 100 m off",
-            ));
-        }
+            ),
+        ];
+        remarks.extend(doubts.into_iter().filter(|(is, _)| *is).map(|(_, text)| Remark::doubt(text)));
         remarks
     }
 }

@@ -1,6 +1,6 @@
 //! What stands in a sentence.
 
-use chrono::{DateTime, NaiveDate};
+use chrono::NaiveDate;
 use glam::DVec2;
 use nav_sim_signal::units::DEG;
 
@@ -68,12 +68,6 @@ pub(super) fn angle(text: &str, hemisphere: &str, limit_deg: f64) -> Option<f64>
 pub(super) fn midnight(year: i32, month: u32, day: u32) -> Option<f64> {
     let date = NaiveDate::from_ymd_opt(year, month, day)?;
     Some(date.and_hms_opt(0, 0, 0)?.and_utc().timestamp() as f64)
-}
-
-/// The date of a time (Unix s).
-pub(super) fn date_of(unix_s: f64) -> String {
-    let time = DateTime::from_timestamp(unix_s as i64, 0);
-    time.map_or_else(|| format!("{unix_s} s"), |time| time.date_naive().to_string())
 }
 
 /// `ddmmyy`; years from 80 on are of the last century, as receivers count GPS.

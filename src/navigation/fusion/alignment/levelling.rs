@@ -5,7 +5,7 @@ use super::course::Moving;
 use super::{BiasSigma, between, carried};
 use crate::earth::radii;
 use crate::frames::{RollPitchYaw, wrap_angle};
-use crate::fusion::{Recorded, Settings};
+use crate::fusion::{Levelling, Recorded, Settings};
 use crate::gnss::GnssFix;
 use crate::imu::ImuIncrement;
 use glam::{DQuat, DVec3};
@@ -32,13 +32,13 @@ pub(super) struct Scene<'a> {
 }
 
 /// Roll and pitch at the first moving fix.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Level {
     pub(super) roll: f64,
     pub(super) pitch: f64,
     /// Standard deviation of both (rad).
     pub(super) sigma: f64,
-    pub(super) how: String,
+    pub(super) from: Levelling,
 }
 
 /// Statistics of a window in the vehicle's axes.
@@ -64,7 +64,7 @@ fn window(samples: &[ImuIncrement], q_s_b: DQuat) -> Window {
     Window { end_s, seconds, f: q_s_b * f, omega: q_s_b * omega, spread }
 }
 
-/// Whether the specific force is spread too much for anything that stands: vibrations at rest are less.
+/// True where the specific force is spread too much for anything that stands: vibrations at rest are less.
 #[must_use]
 pub fn moves(imu: &[ImuIncrement]) -> bool {
     window(imu, DQuat::IDENTITY).spread.0 >= STILL.0
@@ -126,8 +126,8 @@ impl Scene<'_> {
         };
         let now = RollPitchYaw::from_quat(q);
         let own = (w.spread.0 / self.g / 10.0).hypot(unseen);
-        let how = format!("from levelling at rest until {:.2} s, carried on by the gyroscopes", w.end_s);
-        Some(Level { roll: now.roll, pitch: now.pitch, sigma: self.tilt_sigma(age_s, own), how })
+        let from = Levelling::AtRest(w.end_s);
+        Some(Level { roll: now.roll, pitch: now.pitch, sigma: self.tilt_sigma(age_s, own), from })
     }
 
     /// A levelling at rest carried on with the gyroscopes: the attitude from level axes whose first is the
@@ -159,9 +159,8 @@ impl Scene<'_> {
         let (roll, pitch) = level(dv / seconds, DQuat::from_rotation_z(-heading) * (a_n - DVec3::Z * self.g));
         let velocities = from.sigma().hypot(to.sigma()) / (seconds * self.g);
         let own = velocities.hypot(heading_sigma * a_n.truncate().length() / self.g);
-        let how =
-            format!("from accelerations over the {seconds:.1} s after it (no better static window before)");
-        Some(Level { roll, pitch, sigma: self.tilt_sigma(0.5 * seconds, own), how })
+        let sigma = self.tilt_sigma(0.5 * seconds, own);
+        Some(Level { roll, pitch, sigma, from: Levelling::InMotion(seconds) })
     }
 }
 

@@ -11,12 +11,14 @@ pub(super) mod course;
 mod levelling;
 mod trial;
 
-use super::{Recorded, Settings, Start, Verdict};
+use super::assessment::Finding;
+use super::{Found, Recorded, Settings, Start};
 use crate::earth::{gravity_down, radii};
 use crate::ekf::{Belief, InitialSettings};
 use crate::frames::{NavState, RollPitchYaw, wrap_angle};
 use crate::gnss::GnssFix;
 use crate::imu::{ImuIncrement, Sensor};
+use crate::metrics::VerdictKind;
 use crate::units::DEG;
 use course::{Moving, courses, first_fast, nearest_to_fast};
 use glam::{DQuat, DVec3};
@@ -45,9 +47,8 @@ struct BiasSigma {
 pub enum AlignmentError {
     /// It never moves fast enough.
     #[error(
-        "no fix within the IMU recording moves at {MIN_SPEED:.1} m/s or more and at five standard deviations \
-         of its velocity or more{}: its course would be no heading",
-        .nearest.map_or_else(String::new, |(t, v, s)| format!(" (nearest to it: {v:.2} ± {s:.2} m/s at {t} s)"))
+        "no course: no fix moves at {MIN_SPEED:.1} m/s and five standard deviations{}",
+        .nearest.map_or_else(String::new, |(t, v, s)| format!(" (nearest: {v:.2} ± {s:.2} m/s at {t:.2} s)"))
     )]
     NoCourse {
         /// The fix that comes nearest to it: when (s), its speed and the standard deviation of that (m/s).
@@ -67,7 +68,7 @@ pub struct Alignment {
     /// Where the filter starts.
     pub start: Start,
     /// What speaks against it.
-    pub doubts: Vec<(Verdict, String)>,
+    pub doubts: Vec<(VerdictKind, Finding)>,
 }
 
 /// The start of a recording. Fixes that are withheld are not looked at.
@@ -90,7 +91,7 @@ pub fn coarse(
     let later = LATER_S.iter().filter_map(|s| first_fast(&courses, first_s + s));
     let finished = |mut candidate: Candidate| {
         trial::widen(&recorded, belief, settings, &mut candidate.start);
-        candidate.alignment(first_s)
+        candidate.alignment()
     };
     let mut best: Option<Candidate> = None;
     let mut tried_s = f64::NEG_INFINITY;
@@ -128,44 +129,23 @@ impl Candidate {
         self.trial.agreements.iter().all(trial::Agreement::holds)
     }
 
-    fn alignment(self, first_s: f64) -> Alignment {
-        let (start_s, nis) = (self.start.t_s, self.trial.agreements[0].nis);
+    fn alignment(self) -> Alignment {
         let mut doubts = Vec::new();
         if !self.agrees() {
-            let text = format!(
-                "the start at {start_s} s is contradicted by the fixes of the minute after it (NIS {nis:.1} per \
-                 component), forwards and backwards along the course, and so is every other that was tried"
-            );
-            doubts.push((Verdict::Overconfident, text));
-        } else if start_s > first_s {
-            let text = format!(
-                "the {:.0} s from the first moving fix at {first_s} s are left out: no start there agrees with the \
-                 fixes after it",
-                start_s - first_s
-            );
-            doubts.push((Verdict::Doubtful, text));
+            let nis_per_component = self.trial.agreements[0].nis;
+            doubts.push((VerdictKind::Overconfident, Finding::Start { nis_per_component }));
         }
         if !self.trial.decided {
-            let text =
-                "the fixes do not tell whether the vehicle goes forwards or backwards: forwards is taken";
-            doubts.push((Verdict::Doubtful, text.to_owned()));
+            doubts.push((VerdictKind::Doubtful, Finding::Direction));
         }
-        doubts.extend(not_upright(&self.start).map(|text| (Verdict::Doubtful, text)));
+        // a vehicle is level, more or less, at its start
+        let RollPitchYaw { roll, pitch, .. } = RollPitchYaw::from_quat(self.start.state.q_b_n);
+        if (roll.cos() * pitch.cos()).acos() > UPRIGHT {
+            let (roll_deg, pitch_deg) = (roll / DEG, pitch / DEG);
+            doubts.push((VerdictKind::Doubtful, Finding::NotLevel { roll_deg, pitch_deg }));
+        }
         Alignment { start: self.start, doubts }
     }
-}
-
-/// A vehicle is level, more or less, at its start.
-fn not_upright(start: &Start) -> Option<String> {
-    let RollPitchYaw { roll, pitch, .. } = RollPitchYaw::from_quat(start.state.q_b_n);
-    let tilt = (roll.cos() * pitch.cos()).acos();
-    let turned = if tilt > 150.0 * DEG {
-        "upside down: its z axis points up"
-    } else {
-        "not level: its axes are not front, right, down"
-    };
-    let text = || format!("the IMU is {turned} (roll {:.0}°, pitch {:.0}°)", roll / DEG, pitch / DEG);
-    (tilt > UPRIGHT).then(text)
 }
 
 /// The starts at a moving fix, the one whose levelling is known best first, in the direction that the fixes
@@ -187,7 +167,7 @@ fn candidates(
     let in_motion = |heading| scene.in_motion(&courses[at..], heading, heading_sigma);
     let forwards = moving.course();
     let backwards = wrap_angle(forwards + PI);
-    let rest = scene.at_rest(&courses[..at], moving).map(|level| [level.clone(), level]);
+    let rest = scene.at_rest(&courses[..at], moving).map(|level| [level; 2]);
     let motion = in_motion(forwards).zip(in_motion(backwards)).map(|(f, b)| [f, b]);
     let mut levels: Vec<[Level; 2]> = [rest, motion].into_iter().flatten().collect();
     levels.sort_by(|a, b| a[0].sigma.total_cmp(&b[0].sigma));
@@ -208,7 +188,7 @@ fn start(
     (yaw, heading_sigma): (f64, f64),
     settings: &Settings,
 ) -> Start {
-    let (fix, speed) = (moving.fix, moving.speed());
+    let fix = moving.fix;
     let q_b_n = RollPitchYaw { roll: level.roll, pitch: level.pitch, yaw }.to_quat();
     let arm_n = q_b_n * settings.lever_arm_b;
     let r = radii(fix.lat.sin());
@@ -227,16 +207,13 @@ fn start(
         att_sigma_deg: [tilt, tilt, heading],
         ..InitialSettings::default()
     };
-    let (roll, pitch) = (level.roll / DEG, level.pitch / DEG);
-    let tilts = format!("roll {roll:.2}°, pitch {pitch:.2}° ± {tilt:.2}° {}", level.how);
-    let back = if direction == Direction::Backwards { ", reversing" } else { "" };
-    let headings = format!(
-        "heading {:.1}° ± {heading:.1}° from the course of the fix at {} s ({speed:.1} m/s{back})",
-        yaw / DEG,
-        fix.t_s
-    );
-    let how = vec![tilts, headings, "biases start at zero".to_owned()];
-    Start { t_s: fix.t_s, state, sigma, how }
+    let found = Found {
+        level: level.from,
+        course_sigma_deg: heading,
+        is_reversing: direction == Direction::Backwards,
+        moved_deg: None,
+    };
+    Start { t_s: fix.t_s, state, sigma, found: Some(found) }
 }
 
 /// Samples whose interval ends in (from, to].

@@ -3,7 +3,8 @@
 use super::Recorded;
 use crate::ekf::Belief;
 use crate::frames::{RollPitchYaw, wrap_angle};
-use crate::fusion::{Settings, Solution, Start, Use, fuse, nis_bound};
+use crate::fusion::assessment::nis_bound;
+use crate::fusion::{Settings, Solution, Start, Use, fuse};
 use crate::units::DEG;
 
 /// How much of the recording is tried at first (s). Doubled while the two starts are not told apart.
@@ -114,9 +115,6 @@ pub(super) fn widen(recorded: &Recorded<'_>, belief: &Belief, settings: &Setting
     let sigma_deg = &mut start.sigma.att_sigma_deg[2];
     if moved_deg.abs() > MOVED * *sigma_deg {
         *sigma_deg = sigma_deg.hypot(moved_deg).min(WIDEST_DEG);
-        let text = format!(
-            "heading ± {sigma_deg:.1}°: by the fixes of the minute after it, it is {moved_deg:+.0}° from the course (wind, slip)"
-        );
-        start.how.push(text);
+        start.found.iter_mut().for_each(|found| found.moved_deg = Some(moved_deg));
     }
 }

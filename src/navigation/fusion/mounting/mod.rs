@@ -42,8 +42,8 @@ pub struct Mounting {
     pub angles: RollPitchYaw,
     /// Standard deviations about the vehicle's front, right and down axes (rad).
     pub sigma_b: DVec3,
-    /// What it rests on.
-    pub how: String,
+    /// Distance driven with a known course (m).
+    pub way_m: f64,
 }
 
 impl Mounting {
@@ -60,62 +60,59 @@ impl Mounting {
     }
 }
 
-/// Why a drive does not show the mounting.
+/// A drive that does not show the mounting.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MountingError {
     /// Hardly any of it is fast enough to have a course.
-    #[error(
-        "the mounting is not found: {seconds:.0} s of the drive have a course (3 m/s or more and five standard deviations of \
-         the velocity), fewer than {needed:.0} s"
-    )]
+    #[error("the mounting is not found: {seconds:.0} s of the drive have a course, {needed:.0} s are needed")]
     TooSlow {
         /// Time with a course (s).
         seconds: f64,
         /// How much is needed (s).
         needed: f64,
     },
-    /// It neither accelerates nor turns enough.
-    #[error(
-        "the mounting is not found: accelerations and turns of the GNSS velocity show the IMU's yaw in the vehicle to \
-         ±{sigma_deg:.0}° only (±{limit_deg:.0}° are needed)"
-    )]
-    NoAccelerations {
-        /// Standard deviation of the yaw (degrees).
-        sigma_deg: f64,
-        /// Largest that is still used (degrees).
-        limit_deg: f64,
-    },
     /// It goes as much backwards as forwards.
-    #[error(
-        "the mounting is not found: {:.0} % of the way goes against the direction of the rest: forwards and backwards are not \
-         told apart", 100.0 * .share
-    )]
+    #[error("the mounting is not found: {:.0} % of the way goes against the direction of the rest", 100.0 * .share)]
     Directions {
         /// Share of the lesser direction.
         share: f64,
     },
     /// It is no road vehicle.
     #[error(
-        "the mounting is not found: the vehicle banks by {bank_deg:.0}° (root mean square) along its track, as an aircraft does; the angles can be found for road vehicles only"
+        "the mounting is not found: the vehicle banks by {bank_deg:.0}° (rms) along its track, as aircraft do"
     )]
     Banks {
         /// Root mean square of the angles about the way (degrees).
         bank_deg: f64,
     },
     /// The angles scatter too much.
-    #[error(
-        "the mounting is not found: the drive shows the IMU's {axis} in the vehicle to ±{sigma_deg:.1}° only (±{:.0}° is the \
-         most that is taken)", DETERMINED / DEG
-    )]
+    #[error("the mounting is not found: {axis} is known to ±{sigma_deg:.1}°, ±{limit_deg:.0}° is needed")]
     NotDetermined {
         /// `roll`, `pitch` or `yaw`.
         axis: &'static str,
         /// Its standard deviation (degrees).
         sigma_deg: f64,
+        /// Largest that is taken (degrees).
+        limit_deg: f64,
     },
     /// The fixes contradict the filter that carries the attitude.
-    #[error("the mounting is not found: the filter that carries the attitude is not to be believed: {0}")]
-    Contradicted(String),
+    #[error(
+        "the mounting is not found: the fixes contradict the filter, NIS {nis_per_component:.1} per component"
+    )]
+    Contradicted {
+        /// Mean NIS of the fixes.
+        nis_per_component: f64,
+    },
+    /// The filter's yaw is not that of the accelerations.
+    #[error(
+        "the mounting is not found: the filter's yaw is {yaw_deg:.1} ± {sigma_deg:.1}° from that of accelerations"
+    )]
+    Disagree {
+        /// Difference (degrees).
+        yaw_deg: f64,
+        /// Its standard deviation (degrees).
+        sigma_deg: f64,
+    },
     /// The filter found no start with what was found so far.
     #[error("the mounting is not found: {0}")]
     Alignment(#[from] AlignmentError),
@@ -143,8 +140,9 @@ pub fn find(
     // NaN is not determined either
     let worst = named.into_iter().find(|(_, sigma)| sigma.is_nan() || *sigma > DETERMINED);
     if let Some((axis, sigma)) = worst {
-        return Err(MountingError::NotDetermined { axis, sigma_deg: sigma / DEG });
+        let (sigma_deg, limit_deg) = (sigma / DEG, DETERMINED / DEG);
+        return Err(MountingError::NotDetermined { axis, sigma_deg, limit_deg });
     }
     let angles = RollPitchYaw::from_quat(fine.q_s_b * settings.q_s_b.inverse());
-    Ok(Mounting { q_s_b: fine.q_s_b, angles, sigma_b: fine.sigma_b, how: fine.how })
+    Ok(Mounting { q_s_b: fine.q_s_b, angles, sigma_b: fine.sigma_b, way_m: fine.way_m })
 }

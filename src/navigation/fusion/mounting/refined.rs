@@ -5,7 +5,10 @@ use super::blocks::{BLOCK_S, Blocks, FEWEST};
 use super::track::{Rough, track_attitude};
 use crate::ekf::Belief;
 use crate::fusion::alignment::{Alignment, MIN_SPEED, coarse};
-use crate::fusion::{Assessment, Recorded, Row, Settings, Verdict, assess, fuse, outcome};
+use crate::fusion::assessment::assess;
+use crate::fusion::outcome::outcome;
+use crate::fusion::{Recorded, Row, Settings, fuse};
+use crate::metrics::VerdictKind;
 use crate::units::DEG;
 use glam::{DQuat, DVec3};
 
@@ -30,31 +33,18 @@ const BANKED: f64 = 8.0 * DEG;
 /// Share of the way in the lesser direction from which nobody knows which one is forwards.
 const UNDECIDED: f64 = 0.25;
 
-/// The mounting, its standard deviations (rad), what it rests on.
+/// The mounting, its standard deviations (rad), the way it rests on (m).
 pub(super) struct Refined {
     pub(super) q_s_b: DQuat,
     pub(super) sigma_b: DVec3,
-    pub(super) how: String,
-}
-
-/// Attitudes of a filter that the fixes contradict are no worse than it states only by chance.
-fn believed(assessment: &Assessment) -> Result<(), MountingError> {
-    let broken = assessment.reasons.iter().find(|(verdict, _)| *verdict == Verdict::Overconfident);
-    broken.map_or(Ok(()), |(_, reason)| Err(MountingError::Contradicted(reason.clone())))
+    pub(super) way_m: f64,
 }
 
 /// The filter's yaw must be that of the accelerations: biases, which a filter may not expect, do not touch the latter.
 fn agreeing(mean: DQuat, sigma: f64) -> Result<(), MountingError> {
-    let turn = (if mean.w < 0.0 { -mean } else { mean }).to_scaled_axis().z;
-    if turn.abs() <= APART * sigma {
-        return Ok(());
-    }
-    let text = format!(
-        "its yaw is {:.1}° from that of the accelerations, where both are good to ±{:.1}°",
-        turn.abs() / DEG,
-        sigma / DEG
-    );
-    Err(MountingError::Contradicted(text))
+    let turn = (if mean.w < 0.0 { -mean } else { mean }).to_scaled_axis().z.abs();
+    let disagree = || MountingError::Disagree { yaw_deg: turn / DEG, sigma_deg: sigma / DEG };
+    if turn <= APART * sigma { Ok(()) } else { Err(disagree()) }
 }
 
 /// An instant in motion.
@@ -81,7 +71,11 @@ pub(super) fn through(
     // what the rows state is then of the IMU's attitude
     let settings = Settings { mounting_sigma_b: DVec3::ZERO, ..settings };
     let solution = fuse(recorded, belief, &start, &settings, None)?;
-    believed(&assess(&solution, &outcome(&solution, &settings.outages), &doubts))?;
+    let outcome = outcome(&solution, &settings.outages);
+    // attitudes of a filter that the fixes contradict are no worse than it states only by chance
+    if assess(&solution, &outcome, &doubts).verdict == VerdictKind::Overconfident {
+        return Err(MountingError::Contradicted { nis_per_component: outcome.nis_per_component });
+    }
     let mut moments: Vec<Moment> =
         solution.rows.windows(3).filter_map(|w| moment(&w[0], &w[1], &w[2])).collect();
     turn_to_front(&mut moments)?;
@@ -97,12 +91,8 @@ pub(super) fn through(
     let scatter = DVec3::from_array(blocks.each_ref().map(Blocks::sigma));
     let sigma_b = (scatter.powf(2.0) + of_filter(&moments).powf(2.0) + UNSEEN.powf(2.0)).powf(0.5);
     agreeing(mean, rough.yaw_sigma.hypot(sigma_b.z))?;
-    let km = moments.iter().map(|m| m.way_m).sum::<f64>() / 1000.0;
-    let how = format!(
-        "from gravity, accelerations and turns, and the attitude of the IMU beside the track over {km:.1} km; the roads taken \
-         as level across on average, the vehicle as going where it looks"
-    );
-    Ok(Refined { q_s_b: (mean * rough.q_s_b).normalize(), sigma_b, how })
+    let way_m = moments.iter().map(|m| m.way_m).sum();
+    Ok(Refined { q_s_b: (mean * rough.q_s_b).normalize(), sigma_b, way_m })
 }
 
 /// The vehicle beside its track at a row that moves fast enough for a course.

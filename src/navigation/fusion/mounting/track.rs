@@ -83,7 +83,11 @@ pub(super) fn along(recorded: &Recorded<'_>, settings: &Settings) -> Result<Roug
         Ok(Rough { q_s_b: (turn * level).normalize(), yaw_sigma })
     } else {
         let degrees = |angle: f64| if angle.is_finite() { (angle / DEG).min(180.0) } else { 180.0 };
-        Err(MountingError::NoAccelerations { sigma_deg: degrees(yaw_sigma), limit_deg: ROUGH / DEG })
+        Err(MountingError::NotDetermined {
+            axis: "yaw",
+            sigma_deg: degrees(yaw_sigma),
+            limit_deg: ROUGH / DEG,
+        })
     }
 }
 

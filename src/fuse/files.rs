@@ -1,11 +1,10 @@
-//! The files of a fusion directory: tables, the path for maps, the summary, the page.
+//! Files of a fusion directory: tables, track for maps, summary, page.
 
-use super::fusion::{FusionSummary, STATE, values};
-use super::json;
-use super::manifest::FusionManifest;
-use super::number::shortest;
-use super::pages::fusion_page;
-use super::run_directory::OutputFile;
+use super::FuseAnswer;
+use super::manifest::FuseManifest;
+use super::summary::{STATE, values};
+use crate::report::{Answer, OutputFile, json};
+use nav_sim_document::shortest;
 use nav_sim_navigation::earth::radii;
 use nav_sim_navigation::frames::wrap_angle;
 use nav_sim_navigation::fusion::{Row, Solution, Use};
@@ -14,7 +13,7 @@ use nav_sim_signal::units::DEG;
 use std::fmt::Write as _;
 
 /// Names of the files of a fusion directory, the manifest last. The smoothed ones are there where that was asked for.
-pub(crate) const FUSION_FILES: [&str; 10] = [
+pub(crate) const FILES: [&str; 10] = [
     "solution.csv",
     "innovations.csv",
     "errors.csv",
@@ -31,14 +30,9 @@ const COMPONENTS: [&str; 6] = ["pos_n_m", "pos_e_m", "pos_d_m", "vel_n_m_s", "ve
 
 /// The files of a fusion directory, the manifest last; `errors.csv` is empty but for its header without a
 /// reference.
-#[must_use]
-pub(crate) fn fusion_directory(
-    solution: &Solution,
-    summary: &FusionSummary,
-    manifest: &FusionManifest,
-    title: &str,
-) -> Vec<OutputFile<'static>> {
-    let inputs: Vec<_> = manifest.inputs.iter().map(|i| (i.role.clone(), i.path.clone())).collect();
+pub(crate) fn directory(answer: &FuseAnswer, manifest: &FuseManifest) -> Vec<OutputFile<'static>> {
+    let FuseAnswer { solution, summary, .. } = answer;
+    let title = manifest.inputs.first().map_or("solution", |imu| imu.path.as_str());
     let smoothed = solution.smoothed.as_deref();
     let contents = [
         Some(solution_csv(&solution.rows)),
@@ -49,10 +43,10 @@ pub(crate) fn fusion_directory(
         smoothed.map(errors_csv),
         smoothed.map(|rows| kml(rows, "smoothed solution", title)),
         Some(json(summary)),
-        Some(fusion_page(solution, summary, &inputs).html()),
+        Some(answer.document().html()),
         Some(json(manifest)),
     ];
-    let files = FUSION_FILES.into_iter().zip(contents);
+    let files = FILES.into_iter().zip(contents);
     files.filter_map(|(name, text)| Some(OutputFile::whole(name, text?))).collect()
 }
 
@@ -68,8 +62,7 @@ fn fixed(x: f64, digits: usize) -> String {
 
 /// `solution.csv` and `smoothed.csv`: states, their standard deviations (those of latitude and longitude in degrees), bias
 /// estimates, the horizontal standard deviations in metres, and those of the biases.
-#[must_use]
-pub(crate) fn solution_csv(rows: &[Row]) -> String {
+fn solution_csv(rows: &[Row]) -> String {
     let mut text = header(&[
         ("", &STATE),
         ("sd_", &STATE),
@@ -136,13 +129,22 @@ fn kml(rows: &[Row], name: &str, title: &str) -> String {
             last = row.t_s;
         }
     }
-    let title = super::page::escape(title);
+    let title = title.replace('&', "&amp;").replace('<', "&lt;");
+    let points = line.trim_end();
     format!(
-        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<kml xmlns=\"http://www.opengis.net/kml/2.2\">\n<Document>\n\
-         <name>{title}</name>\n<Placemark>\n<name>{name}</name>\n<Style><LineStyle><color>ff0050ff</color>\
-         <width>3</width></LineStyle></Style>\n<LineString><tessellate>1</tessellate>\
-         <altitudeMode>clampToGround</altitudeMode>\n<coordinates>{}</coordinates>\n</LineString>\n</Placemark>\n\
-         </Document>\n</kml>\n",
-        line.trim_end()
+        r#"<?xml version="1.0" encoding="UTF-8"?>
+<kml xmlns="http://www.opengis.net/kml/2.2">
+<Document>
+<name>{title}</name>
+<Placemark>
+<name>{name}</name>
+<Style><LineStyle><color>ff0050ff</color><width>3</width></LineStyle></Style>
+<LineString><tessellate>1</tessellate><altitudeMode>clampToGround</altitudeMode>
+<coordinates>{points}</coordinates>
+</LineString>
+</Placemark>
+</Document>
+</kml>
+"#
     )
 }

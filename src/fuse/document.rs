@@ -1,0 +1,456 @@
+//! A fusion as a document: verdict, figures, track, errors, innovations.
+
+use super::summary::{Cause, Fixes};
+use super::{FuseAnswer, FuseNote};
+use crate::report::Answer;
+use glam::{DVec2, DVec3};
+use nav_sim_document::{
+    Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Stroke, Table, Tone, readable,
+    seconds, window,
+};
+use nav_sim_navigation::earth::ned_difference;
+use nav_sim_navigation::fusion::{
+    Drift, Finding, FixRecord, FromReference, Row, SmoothedOutage, Solution, Use,
+};
+use nav_sim_navigation::metrics::{VerdictKind, chi_square_band};
+use std::path::Path;
+
+impl Answer for FuseAnswer {
+    fn document(&self) -> Document {
+        let (solution, summary) = (&self.solution, &self.summary);
+        let tone = match summary.verdict.kind {
+            VerdictKind::Consistent => Tone::Good,
+            VerdictKind::Undecided => Tone::Undecided,
+            VerdictKind::Overconfident => Tone::Bad,
+            _ => Tone::Doubtful,
+        };
+        let mut document = Document::new("INS/GNSS fusion of recorded data", tone, self.verdict());
+        document.facts(&self.facts());
+        let outages: Vec<_> = summary.outages.iter().map(|o| (o.outage.start_s, o.outage.end_s)).collect();
+        document.section("Figures");
+        document.lead(self.figures());
+        if !outages.is_empty() {
+            document.heading("Outages");
+            document.table(&self.outage_table());
+        }
+        if let Some(reference) = &summary.reference {
+            document.heading("States");
+            document.table(&state_table(reference));
+        }
+        document.section("Track");
+        document.chart(&map(solution, &outages), "North and east of the start.");
+        document.section("Position");
+        document.chart(&position(solution, &outages), POSITION);
+        if solution.rows.iter().any(|row| row.error.is_some()) {
+            document.section("Errors against the reference");
+            document.charts(&errors(solution, &outages), ERRORS);
+        }
+        document.section("Fixes");
+        document.chart(&innovations(solution, &outages), INNOVATIONS);
+        document.chart(&nis(&solution.fixes, &outages), NIS);
+        document.checked(CHECKED);
+        self.notes.iter().for_each(|note| add(&mut document, note));
+        if let Some(quality) = self.reduction.as_ref().and_then(|reduction| reduction.quality.as_ref()) {
+            let rank = if quality.doubt().is_some() { Importance::Warning } else { Importance::Remark };
+            document.note(rank, quality.doubt().unwrap_or_else(|| quality.line()));
+        }
+        document
+    }
+}
+
+impl FuseAnswer {
+    /// The answer in lines, the gravest evidence first.
+    fn verdict(&self) -> Vec<String> {
+        let summary = &self.summary;
+        let verdict = &summary.verdict;
+        let mut evidence = verdict.evidence.iter().map(evidence);
+        let first = evidence.next().unwrap_or_else(|| {
+            let nees = summary.reference.map(|r| format!(", NEES {} (9 if right)", readable(r.nees_mean)));
+            let nis = readable(summary.nis_per_component);
+            format!("NIS {nis} per component over {} fixes{}", summary.fixes.used, nees.unwrap_or_default())
+        });
+        let mut lines = vec![format!("{}: {first}", verdict.kind)];
+        lines.extend(verdict.cause.as_ref().map(cause));
+        lines.extend(evidence.take(2));
+        lines.extend(summary.mounting.as_ref().map(|m| {
+            let [front, right, down] = m.sigma_deg;
+            let (roll, pitch, yaw) = (m.roll_deg, m.pitch_deg, m.yaw_deg);
+            format!(
+                "mounting found: --mounting={roll:.2},{pitch:.2},{yaw:.2}:{front:.2},{right:.2},{down:.2}"
+            )
+        }));
+        lines
+    }
+
+    /// What helps where the solution is overconfident.
+    pub(crate) fn advice(&self) -> &'static str {
+        if self.summary.nis_per_component < 1.0 {
+            "errors of fixes that last make a filter overconfident: --gnss-sigma-factor; or the reference's axes differ"
+        } else {
+            "check axes (--axes, --mounting), units, start (--initial), clocks (--gnss-delay) and antenna (--lever-arm)"
+        }
+    }
+
+    fn facts(&self) -> Vec<(&str, String)> {
+        let summary = &self.summary;
+        let name =
+            |path: &str| Path::new(path).file_name().map_or_else(String::new, |n| n.to_string_lossy().into());
+        let mut facts: Vec<_> = self.inputs.iter().map(|i| (i.role.as_str(), name(&i.path))).collect();
+        let (samples, rate_hz) = (summary.imu_samples, summary.imu_rate_hz);
+        let span = window(summary.start_s, summary.end_s);
+        let states = summary.filter_states - summary.turn_on_states;
+        let turn_on = match summary.turn_on_states {
+            0 => String::new(),
+            n => format!(" + {n} turn-on"),
+        };
+        facts.push((
+            "solution",
+            format!("{span}, {samples} IMU samples at {rate_hz:.2} Hz, {states}{turn_on} states"),
+        ));
+        facts.push(("start", summary.initial.how.join("; ")));
+        facts
+    }
+
+    /// Consistency and errors, of the filter and smoothed.
+    fn figures(&self) -> Table {
+        let summary = &self.summary;
+        let smoothed = summary.smoothed.as_ref();
+        let mut table = Table::new(["", "filter", "smoothed"]);
+        let Fixes { used, withheld, rejected } = summary.fixes;
+        let fixes = format!("NIS per component, {used} fixes used, {withheld} withheld, {rejected} rejected");
+        let nis = Cell::number(summary.nis_per_component, "/nis_per_component");
+        table.row([fixes.into(), nis, Cell::figures("–")]);
+        let rows = &self.solution.rows;
+        let square = |row: &Row| row.sigma[0].powi(2) + row.sigma[1].powi(2);
+        let sigma = (rows.iter().map(square).sum::<f64>() / rows.len() as f64).sqrt();
+        let of_smoothed =
+            number(smoothed.map(|s| s.horizontal_sigma_rms_m), "/smoothed/horizontal_sigma_rms_m");
+        table.row(["horizontal 1 σ, rms (m)".into(), Cell::figures(readable(sigma)), of_smoothed]);
+        let both = [summary.reference.as_ref(), smoothed.and_then(|s| s.reference.as_ref())];
+        let shown: [Figure; 7] = [
+            ("NEES (9 if right)", "nees_mean", |r| r.nees_mean),
+            ("horizontal RMSE (m)", "horizontal_rmse_m", |r| r.horizontal_rmse_m),
+            ("horizontal error, largest (m)", "horizontal_max_m", |r| r.horizontal_max_m),
+            ("down RMSE (m)", "rmse/pos_d_m", |r| r.rmse.0[2]),
+            ("roll RMSE (°)", "rmse/roll_deg", |r| r.rmse.0[6]),
+            ("pitch RMSE (°)", "rmse/pitch_deg", |r| r.rmse.0[7]),
+            ("yaw RMSE (°)", "rmse/yaw_deg", |r| r.rmse.0[8]),
+        ];
+        for (name, key, value) in shown.into_iter().filter(|_| both[0].is_some()) {
+            let [filter, smoothed] = both.map(|reference| reference.map(value));
+            let pointers = [format!("/reference/{key}"), format!("/smoothed/reference/{key}")];
+            table.row([name.into(), number(filter, &pointers[0]), number(smoothed, &pointers[1])]);
+        }
+        for o in &summary.outages {
+            let name = format!("end of outage {}: error (1 σ) (m)", window(o.outage.start_s, o.outage.end_s));
+            table.row([name.into(), drift(o.end_from_reference.or(o.end_from_fix)), Cell::figures("–")]);
+        }
+        table.without_unknown()
+    }
+
+    /// Errors at the ends of outages, and the largest in them.
+    fn outage_table(&self) -> Table {
+        let mut table = Table::new(["outage", "fixes withheld", "end: from the next fix (1 σ) (m)"]).and(
+            [
+                "end: from the reference (1 σ) (m)",
+                "largest 1 σ (m)",
+                "smoothed (m)",
+                "largest error (m)",
+                "smoothed (m)",
+            ]
+            .map(str::to_owned),
+        );
+        for (i, o) in self.summary.outages.iter().enumerate() {
+            let smoothed = self.summary.smoothed.as_ref();
+            let inside = smoothed.and_then(|s| s.outages.iter().find(|s| s.outage == o.outage));
+            let largest = |key: &str, value: fn(&SmoothedOutage) -> Option<f64>| {
+                number(inside.and_then(value), &format!("/smoothed/outages/{i}/{key}"))
+            };
+            table.row([
+                window(o.outage.start_s, o.outage.end_s).into(),
+                Cell::figures(o.fixes_withheld.to_string()),
+                drift(o.end_from_fix),
+                drift(o.end_from_reference),
+                largest("sigma_max_filter_m", |s| Some(s.sigma_max_filter_m)),
+                largest("sigma_max_m", |s| Some(s.sigma_max_m)),
+                largest("horizontal_max_filter_m", |s| s.horizontal_max_filter_m),
+                largest("horizontal_max_m", |s| s.horizontal_max_m),
+            ]);
+        }
+        table.without_unknown()
+    }
+}
+
+/// Name, key in JSON, value.
+type Figure = (&'static str, &'static str, fn(&FromReference) -> f64);
+
+fn number(value: Option<f64>, pointer: &str) -> Cell {
+    value.map_or_else(|| Cell::figures("–"), |value| Cell::number(value, pointer))
+}
+
+/// A distance and what the filter states of it.
+fn drift(end: Option<Drift>) -> Cell {
+    let text = end.map(|end| format!("{} ({})", readable(end.horizontal_m), readable(end.expected_sigma_m)));
+    Cell::figures(text.unwrap_or_else(|| "–".to_owned()))
+}
+
+/// Errors of each state, and over their standard deviations.
+fn state_table(reference: &FromReference) -> Table {
+    let mut table = Table::new(["state", "RMSE", "error over σ, rms"]);
+    for (i, (key, name)) in STATES.iter().enumerate() {
+        let cell = |value: f64, group: &str| Cell::number(value, &format!("/reference/{group}/{key}"));
+        let [rmse, ratio] = [reference.rmse.0[i], reference.error_over_sigma.0[i]];
+        table.row([(*name).into(), cell(rmse, "rmse"), cell(ratio, "error_over_sigma")]);
+    }
+    table
+}
+
+/// Evidence in a sentence.
+fn evidence(finding: &Finding) -> String {
+    match *finding {
+        Finding::NoFix => "no fix was used".to_owned(),
+        Finding::Start { nis_per_component } => format!(
+            "the fixes of the first minute contradict every start that was tried (NIS {})",
+            readable(nis_per_component)
+        ),
+        Finding::Direction => {
+            "the fixes do not tell whether the vehicle goes forwards or backwards".to_owned()
+        }
+        Finding::NotLevel { roll_deg, pitch_deg } => {
+            format!(
+                "the axes are not front, right, down: roll {roll_deg:.0}°, pitch {pitch_deg:.0}° at the start"
+            )
+        }
+        Finding::Nis { per_component } if per_component > 1.0 => format!(
+            "NIS {} per component: the fixes are {:.1} times as far from the solution as stated",
+            readable(per_component),
+            per_component.sqrt()
+        ),
+        Finding::Nis { per_component } => format!(
+            "NIS {} per component: the stated errors of the fixes are too large, or last; a reference decides",
+            readable(per_component)
+        ),
+        Finding::Minutes { bad, of, worst_s, nis_per_component } => format!(
+            "in {bad} of {of} minutes the fixes are too far from the solution: NIS {} after {} s",
+            readable(nis_per_component),
+            seconds(worst_s)
+        ),
+        Finding::Rejected { rejected, of } => format!("{rejected} of {of} fixes were rejected"),
+        Finding::Reference(c) => format!(
+            "errors against the reference are {:.1} times as large as stated (NEES), {:.1} times in {}",
+            c.error_over_sigma, c.worst_error_over_sigma, c.worst_state
+        ),
+    }
+}
+
+/// A cause and the options that take it away.
+fn cause(cause: &Cause) -> String {
+    let three = |v: DVec3| format!("{:.2},{:.2},{:.2}", v.x, v.y, v.z);
+    match cause {
+        Cause::Clocks(clocks) => {
+            let [now, then] = clocks.correlation;
+            format!(
+                "the clocks are apart: --gnss-delay={:.1} makes the turns agree (correlation {then:.2}, now {now:.2})",
+                clocks.delay_s
+            )
+        }
+        Cause::Displaced(found) => {
+            let arm = found
+                .lever_arm_b
+                .map(|[arm, sigma]| format!("--lever-arm={} (± {})", three(arm), three(sigma)));
+            let delay = found.delay_s.map(|[delay, sigma]| format!("--gnss-delay={delay:.3} (± {sigma:.3})"));
+            let options: Vec<_> = arm.into_iter().chain(delay).collect();
+            let [now, then] = found.nis;
+            format!("the fixes agree with {}: NIS {then:.2}, now {now:.2}", options.join(" "))
+        }
+    }
+}
+
+fn add(document: &mut Document, note: &FuseNote) {
+    let (importance, text) = match note {
+        FuseNote::Read(text) => (Importance::Remark, text.clone()),
+        FuseNote::Doubt(text) => (Importance::Warning, text.clone()),
+        FuseNote::Rate([from, to]) => {
+            (Importance::Detail, format!("the model was converted from {from} Hz to {to:.3} Hz"))
+        }
+        FuseNote::TurnOn(sensor, sigma) => (
+            Importance::Remark,
+            format!("the model states a turn-on bias: {} {} ({sensor})", readable(*sigma), sensor.unit()),
+        ),
+        FuseNote::Outage(remark) => (Importance::Warning, remark.to_string()),
+        FuseNote::EarlyOutage(outage) => {
+            let span = window(outage.start_s, outage.end_s);
+            (
+                Importance::Warning,
+                format!("outage {span} ends before the start of the solution: it is left out"),
+            )
+        }
+        FuseNote::Heading(doubt) => (Importance::Warning, doubt.to_string()),
+    };
+    document.note(importance, text);
+}
+
+/// States in JSON and on axes.
+const STATES: [(&str, &str); 9] = [
+    ("pos_n_m", "north (m)"),
+    ("pos_e_m", "east (m)"),
+    ("pos_d_m", "down (m)"),
+    ("vel_n_m_s", "velocity north (m/s)"),
+    ("vel_e_m_s", "velocity east (m/s)"),
+    ("vel_d_m_s", "velocity down (m/s)"),
+    ("roll_deg", "roll (°)"),
+    ("pitch_deg", "pitch (°)"),
+    ("yaw_deg", "yaw (°)"),
+];
+/// Points of a curve that is smooth: more do not show.
+const MOST: usize = 120;
+/// Points of a map along its larger half.
+const PIXELS: f64 = 400.0;
+/// Velocities of a reference that are known worse than this are not drawn: its positions jump (m/s).
+const UNEVEN: f64 = 0.5;
+
+const POSITION: &str = "Dashed: horizontal 1 σ stated. Line: distance from the reference.";
+const ERRORS: &str = "Lines: estimate less reference. Bands: ± 1 σ.";
+const INNOVATIONS: &str =
+    "Estimated less measured position over its 1 σ; 95 % of used fixes belong into the band.";
+const NIS: &str = "Normalised innovation squared of each fix; 95 % belong into the band of a right filter.";
+const CHECKED: &str =
+    "solutions of simulated recordings are consistent with their covariance, smoothed ones too.";
+
+/// Colour of what is smoothed.
+const SMOOTHED: Colour = Colour::Hue(2);
+
+fn timed(title: &str, panels: Vec<Panel>, outages: &[(f64, f64)]) -> Chart {
+    Chart::new(title, Axis::linear("time (s)"), panels).with_outages(outages).in_group("time")
+}
+
+fn map(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
+    let Some(first) = solution.rows.first() else { return Chart::map("Track", Vec::new()) };
+    let place = |row: &Row| {
+        let moved = ned_difference(&first.state, row.state.lat, row.state.lon, row.state.h);
+        DVec2::new(moved.y, moved.x)
+    };
+    let error = |row: &Row| row.error.map_or(DVec2::NAN, |e| DVec2::new(e.values[1], e.values[0]));
+    let reference = |row: &Row| place(row) - error(row);
+    let all: Vec<DVec2> = solution.rows.iter().map(place).collect();
+    let extent = all.iter().fold(DVec2::ZERO, |most, p| most.max(p.abs())).max_element();
+    // what lies within a pixel is one point
+    let way = |points: &mut dyn Iterator<Item = DVec2>| {
+        let mut kept: Vec<DVec2> = Vec::new();
+        points.for_each(|p| match kept.last() {
+            Some(last) if last.distance(p) < extent / PIXELS => {}
+            _ => kept.push(p),
+        });
+        kept.into_iter().map(|p| (p.x, p.y)).collect::<Vec<_>>()
+    };
+    let mut series = Vec::new();
+    // the three lie on one another but for metres: wide beneath narrow beneath dashed, all are seen
+    if solution.rows.iter().any(|row| row.error.is_some()) {
+        let line = Mark::Line(way(&mut solution.rows.iter().map(reference)), Stroke::Bold);
+        series.push(Series::new("reference", Colour::Ink, line));
+    }
+    for (start_s, end_s) in outages {
+        let within = solution.rows.iter().filter(|row| (start_s..end_s).contains(&&row.t_s));
+        let line = Mark::Line(way(&mut within.map(place)), Stroke::Bold);
+        series.push(Series::new("outage", Colour::Hue(4), line));
+    }
+    series.push(Series::line("solution", Colour::REAL, way(&mut all.iter().copied())));
+    let smoothed = solution.smoothed.iter();
+    series
+        .extend(smoothed.map(|rows| Series::dashed("smoothed", SMOOTHED, way(&mut rows.iter().map(place)))));
+    let ends = [("start", Some(first)), ("end", solution.rows.last())];
+    series.extend(ends.into_iter().filter_map(|(name, row)| {
+        let DVec2 { x, y } = place(row?);
+        Some(Series::new(name, Colour::RIGHT, Mark::Place(x, y)))
+    }));
+    Chart::map("Track", series)
+}
+
+/// Some of many rows, for curves that are smooth.
+fn thinned(rows: &[Row]) -> impl Iterator<Item = &Row> {
+    rows.iter().step_by(rows.len().div_ceil(MOST).max(1))
+}
+
+/// Rows of the filter, and smoothed ones: names of what is stated and of the error, colours. A panel has room for three
+/// names in its legend.
+fn solutions(solution: &Solution) -> Vec<(&[Row], [&'static str; 2], [Colour; 2])> {
+    let rows = solution.rows.as_slice();
+    match solution.smoothed.as_deref() {
+        None => vec![(rows, ["1 σ", "error"], [Colour::BELIEVED, Colour::REAL])],
+        Some(smoothed) => {
+            vec![(rows, ["filter"; 2], [Colour::REAL; 2]), (smoothed, ["smoothed"; 2], [SMOOTHED; 2])]
+        }
+    }
+}
+
+fn position(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
+    let mut series = Vec::new();
+    for (rows, [stated, error], [believed, real]) in solutions(solution) {
+        let sigma = thinned(rows).map(|row| (row.t_s, row.sigma[0].hypot(row.sigma[1]))).collect();
+        series.push(Series::dashed(stated, believed, sigma));
+        let errors =
+            rows.iter().filter_map(|row| Some((row.t_s, row.error?.values[0].hypot(row.error?.values[1]))));
+        let errors: Vec<_> = errors.collect();
+        series.extend((!errors.is_empty()).then(|| Series::line(error, real, errors)));
+    }
+    timed("Horizontal position", vec![Panel::new(Axis::log("horizontal (m)"), series)], outages)
+}
+
+fn errors(solution: &Solution, outages: &[(f64, f64)]) -> Vec<Chart> {
+    let chart = |(i, (_, name)): (usize, &(&str, &str))| {
+        let is_velocity = (3..6).contains(&i);
+        let error = |row: &Row| {
+            let known = row.error.filter(|e| !is_velocity || e.velocity_sigma < UNEVEN);
+            (row.t_s, known.map_or(f64::NAN, |e| e.values[i]))
+        };
+        let mut series = Vec::new();
+        for (rows, [stated, line], [believed, real]) in solutions(solution) {
+            let sigma = thinned(rows).map(|row| (row.t_s, -row.sigma[i], row.sigma[i])).collect();
+            series.push(Series::new(stated, believed, Mark::Band(sigma)));
+            series.push(Series::line(line, real, rows.iter().map(error).collect()));
+        }
+        timed(name, vec![Panel::new(Axis::linear("").with_zero(), series)], outages).small()
+    };
+    STATES.iter().enumerate().map(chart).collect()
+}
+
+/// Fates of fixes, and their colours.
+const FATES: [(Use, &str, Colour); 3] = [
+    (Use::Used, "used", Colour::BELIEVED),
+    (Use::Withheld, "withheld", Colour::Soft),
+    (Use::Rejected, "rejected", Colour::REAL),
+];
+
+/// A series for each fate of fixes.
+fn fixes(fixes: &[FixRecord], value: &dyn Fn(&FixRecord) -> f64) -> Vec<Series> {
+    let of_fate = |(fate, name, colour): (Use, &str, Colour)| {
+        let points = fixes.iter().filter(|f| f.used == fate).map(|f| (f.t_s, value(f), f64::NAN));
+        let points: Vec<_> = points.collect();
+        (!points.is_empty()).then(|| Series::points(name, colour, points))
+    };
+    FATES.into_iter().filter_map(of_fate).collect()
+}
+
+fn innovations(solution: &Solution, outages: &[(f64, f64)]) -> Chart {
+    let panel = |(i, name): (usize, &str)| {
+        let normalised =
+            |f: &FixRecord| f.innovation.get(i).zip(f.sigma.get(i)).map_or(f64::NAN, |(x, s)| x / s);
+        let mut series = vec![Series::new("95 % band", Colour::RIGHT, Mark::Zone(-1.96, 1.96))];
+        series.extend(fixes(&solution.fixes, &normalised));
+        Panel {
+            height: 0.55,
+            ..Panel::new(Axis::linear(&format!("{name} (σ)")).including(-3.0, 3.0), series)
+        }
+    };
+    let panels = ["north", "east", "down"].into_iter().enumerate().map(panel).collect();
+    timed("Innovations of position, normalised", panels, outages)
+}
+
+fn nis(records: &[FixRecord], outages: &[(f64, f64)]) -> Chart {
+    let dof = records.iter().map(|f| f.innovation.len()).max().unwrap_or(0);
+    let band = chi_square_band(dof, 1.0);
+    let mut series =
+        vec![Series::new("95 % band of a right filter", Colour::RIGHT, Mark::Zone(band.lower, band.upper))];
+    series.extend(fixes(records, &|f| f.nis));
+    timed("NIS", vec![Panel::new(Axis::log(&format!("NIS ({dof} if right)")), series)], outages)
+}

@@ -1,0 +1,259 @@
+//! From the files of a request to a solution and its figures.
+
+use super::manifest::{Configuration, FuseManifest, Kind};
+use super::summary::{Cause, Fixes, FuseSummary, FuseVerdict, Initial};
+use super::{FuseError, FuseRequest, filter};
+use crate::formats::fusion_files::{self, read_gnss, read_imu, read_initial};
+use crate::formats::input;
+use crate::formats::model_file::{self, ModelFile};
+use crate::formats::trajectory_file::{self, load_reference};
+use crate::jobs::turn_on;
+use nav_sim_navigation::ekf::InitialSettings;
+use nav_sim_navigation::fusion::alignment::{Alignment, coarse};
+use nav_sim_navigation::fusion::mounting::{self, Mounted, Mounting};
+use nav_sim_navigation::fusion::{
+    Assessment, Displaced, Recorded, Settings, Solution, Start, assess, check_clocks, clocks_apart,
+    displaced, fuse, outcome,
+};
+use nav_sim_navigation::gnss::GnssFix;
+use nav_sim_navigation::metrics::{ReductionSummary, VerdictKind};
+use nav_sim_navigation::sensors::outage::{FixedData, Outage, OutagePlan, OutageRemark};
+use nav_sim_navigation::simulation::lincov::{HeadingDoubt, weak_heading};
+use nav_sim_navigation::trajectory::reference::Reference;
+use nav_sim_signal::imu::{ImuIncrement, Sensor};
+use nav_sim_signal::units::DEG;
+use serde::{Serialize, Serializer};
+
+/// Remark on the files or the drive.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum FuseNote {
+    /// How a file was read.
+    Read(String),
+    /// A doubt about a file.
+    Doubt(String),
+    /// The model was converted from one rate to another (Hz).
+    Rate([f64; 2]),
+    /// The filter expects the turn-on bias that the model states (m/s² or rad/s).
+    TurnOn(Sensor, f64),
+    /// An outage was moved or cut.
+    Outage(OutageRemark),
+    /// An outage ends before the start of the solution.
+    EarlyOutage(Outage),
+    /// The motion hardly shows the heading.
+    Heading(HeadingDoubt),
+}
+
+/// Solution of a recorded drive.
+#[derive(Debug)]
+#[non_exhaustive]
+pub struct FuseAnswer {
+    /// States, standard deviations and innovations.
+    pub solution: Solution,
+    /// Verdict and figures: `summary.json`.
+    pub summary: FuseSummary,
+    /// Reduction of the model to the filter's states, where it loses something.
+    pub reduction: Option<ReductionSummary>,
+    /// Remarks on the files and the drive.
+    pub notes: Vec<FuseNote>,
+    /// Files by their roles.
+    pub(super) inputs: Vec<crate::report::Input>,
+}
+
+impl Serialize for FuseAnswer {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        self.summary.serialize(to)
+    }
+}
+
+/// A drive that was read.
+pub(crate) struct Drive {
+    request: FuseRequest,
+    settings: Settings,
+    imu: Vec<ImuIncrement>,
+    imu_rate_hz: f64,
+    gnss: Vec<GnssFix>,
+    model: ModelFile,
+    expected: InitialSettings,
+    initial: Option<Start>,
+    reference: Option<Reference>,
+    notes: Vec<FuseNote>,
+    /// Its manifest, but for the command and the time.
+    pub(crate) manifest: FuseManifest,
+}
+
+impl Drive {
+    /// Reads the files of a request.
+    ///
+    /// # Errors
+    /// A setting out of range, a file that cannot be used.
+    pub(crate) fn read(request: &FuseRequest) -> Result<Self, FuseError> {
+        let settings = request.settings()?;
+        let inputs =
+            request.files().map(|(role, path)| input::input(role, path)).collect::<Result<_, _>>()?;
+        let imu = read_imu(&request.imu)?;
+        let span_s = imu.samples.first().zip(imu.samples.last()).map(|(first, last)| (first.t_s, last.t_s));
+        let (mut gnss, remarks) = read_gnss(&request.gnss, request.gnss_sigma.as_ref(), span_s)?;
+        let [position, velocity] = request.gnss_sigma_factor;
+        for fix in &mut gnss {
+            *fix = fix.with_sigmas_times(position, velocity);
+            fix.t_s -= request.gnss_delay_s;
+        }
+        let mut notes: Vec<FuseNote> = imu.remarks.into_iter().chain(remarks).map(FuseNote::from).collect();
+        let initial = request.initial_file().map(|path| read_initial(path)).transpose()?;
+        let model = model_file::read(&request.model)?;
+        notes.extend(model.doubts(&request.model).into_iter().map(FuseNote::Doubt));
+        if (model.model.rate_hz / imu.rate_hz - 1.0).abs() > 0.01 {
+            notes.push(FuseNote::Rate([model.model.rate_hz, imu.rate_hz]));
+        }
+        let of_file = initial.as_ref().map(|start| start.sigma.clone()).unwrap_or_default();
+        let mut expected = request.expected(of_file);
+        let stated = turn_on::expect(&mut expected, &model.turn_on.unwrap_or_default());
+        notes.extend(stated.into_iter().map(|(sensor, sigma)| FuseNote::TurnOn(sensor, sigma)));
+        expected.validate().map_err(|e| FuseError::Setting(e.to_string()))?;
+        let options = trajectory_file::Options::default();
+        let reference =
+            request.reference.as_deref().map(|path| load_reference(path, &options)).transpose()?;
+        let reference = reference.map(|(reference, warnings)| {
+            notes.extend(warnings.iter().map(|warning| FuseNote::Doubt(warning.to_string())));
+            reference
+        });
+        let configuration = Configuration {
+            settings: settings.clone(),
+            mounted: request.mounted(),
+            filter: request.filter,
+            initial: expected.clone(),
+            gnss_sigma: request.gnss_sigma,
+            gnss_sigma_factor: request.gnss_sigma_factor,
+            gnss_delay_s: request.gnss_delay_s,
+        };
+        let manifest = FuseManifest {
+            schema_version: 2,
+            kind: Kind::Fusion,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            command: Vec::new(),
+            configuration,
+            inputs,
+            wall_s: 0.0,
+        };
+        Ok(Self {
+            request: request.clone(),
+            settings,
+            imu: imu.samples,
+            imu_rate_hz: imu.rate_hz,
+            gnss,
+            model,
+            expected,
+            initial,
+            reference,
+            notes,
+            manifest,
+        })
+    }
+
+    /// Fuses it. Outages are placed on the fixes, those before the start are left out.
+    ///
+    /// # Errors
+    /// Data and settings that do not fit together, or a filter that diverges.
+    pub(crate) fn fuse(mut self) -> Result<FuseAnswer, FuseError> {
+        let recorded = Recorded { imu: &self.imu, gnss: &self.gnss };
+        check_clocks(&recorded)?;
+        let mut settings = self.settings.clone();
+        let of_model = (&self.model.model, self.request.filter, &self.expected);
+        let (belief, reduction) = filter::belief(of_model, self.imu_rate_hz, &self.gnss, &settings.outages)?;
+        let plan = OutagePlan { fixed: settings.outages, ..OutagePlan::default() };
+        let times_s: Vec<f64> = self.gnss.iter().map(|fix| fix.t_s).collect();
+        let placed = plan.on(&FixedData::recorded(&times_s), 0)?;
+        self.notes.extend(placed.remarks.into_iter().map(FuseNote::Outage));
+        settings.outages = placed.windows;
+        let mounting = match self.request.mounted() {
+            Mounted::AsGiven => None,
+            Mounted::AsFound => Some(mounting::find(&recorded, &settings, &belief)?),
+        };
+        if let Some(Mounting { q_s_b, sigma_b, .. }) = mounting {
+            (settings.q_s_b, settings.mounting_sigma_b) = (q_s_b, sigma_b);
+        }
+        let Alignment { start, doubts } = match self.initial {
+            Some(start) => Alignment { start: beside_mounting(start, &settings), doubts: Vec::new() },
+            None => coarse(&recorded, &settings, &belief)?,
+        };
+        let is_early = |outage: &Outage| outage.end_s <= start.t_s;
+        let early = settings.outages.iter().copied().filter(is_early).map(FuseNote::EarlyOutage);
+        self.notes.extend(early.collect::<Vec<_>>());
+        settings.outages.retain(|outage| !is_early(outage));
+        let solution = fuse(&recorded, &belief, &start, &settings, self.reference.as_ref())?;
+        if self.reference.is_some() && solution.rows.iter().all(|row| row.error.is_none()) {
+            return Err(FuseError::NothingInCommon);
+        }
+        self.notes.extend(doubt_heading(&solution, &settings.outages).map(FuseNote::Heading));
+        let outcome = outcome(&solution, &settings.outages);
+        let Assessment { verdict: kind, findings } = assess(&solution, &outcome, &doubts);
+        let scene = || displaced(&recorded, &belief, &start, &settings);
+        let explained = (kind >= VerdictKind::Doubtful).then(|| cause(&recorded, scene)).flatten();
+        let cause = explained.map(|cause| cause.after(self.request.gnss_delay_s));
+        let against = |(verdict, finding)| (verdict > VerdictKind::Consistent).then_some(finding);
+        let evidence = findings.into_iter().filter_map(against).collect();
+        let constants = belief.groups.iter().flatten().filter(|g| g.is_constant()).count();
+        let [used, withheld, rejected] = outcome.fixes;
+        let summary = FuseSummary {
+            schema_version: 1,
+            method: "fusion",
+            verdict: FuseVerdict { kind, evidence, cause },
+            imu_samples: solution.samples,
+            imu_rate_hz: self.imu_rate_hz,
+            start_s: start.t_s,
+            end_s: solution.rows.last().map_or(start.t_s, |row| row.t_s),
+            filter_states: belief.states,
+            turn_on_states: 3 * constants,
+            initial: Initial::new(&start, self.request.initial_file().map(|path| path.as_path())),
+            mounting: mounting.as_ref().map(Into::into),
+            fixes: Fixes { used, withheld, rejected },
+            nis_per_component: outcome.nis_per_component,
+            outages: outcome.outages,
+            reference: outcome.reference,
+            smoothed: outcome.smoothed,
+        };
+        Ok(FuseAnswer { solution, summary, reduction, notes: self.notes, inputs: self.manifest.inputs })
+    }
+}
+
+impl From<fusion_files::Remark> for FuseNote {
+    fn from(remark: fusion_files::Remark) -> Self {
+        match remark {
+            fusion_files::Remark::Note(text) => Self::Read(text),
+            fusion_files::Remark::Doubt(text) => Self::Doubt(text),
+        }
+    }
+}
+
+/// Cause of large innovations: the clocks, else the antenna or a small delay.
+fn cause(recorded: &Recorded<'_>, displaced: impl FnOnce() -> Option<Displaced>) -> Option<Cause> {
+    clocks_apart(recorded).map(Cause::Clocks).or_else(|| displaced().map(Cause::Displaced))
+}
+
+impl Cause {
+    /// The same where the fixes were delayed already (s).
+    fn after(mut self, given_s: f64) -> Self {
+        match &mut self {
+            Self::Clocks(clocks) => clocks.delay_s += given_s,
+            Self::Displaced(found) => found.delay_s.iter_mut().for_each(|[delay_s, _]| *delay_s += given_s),
+        }
+        self
+    }
+}
+
+/// A start that states the attitude of the vehicle: that of the IMU is known no better than the mounting.
+fn beside_mounting(mut start: Start, settings: &Settings) -> Start {
+    let mounting_deg = (settings.mounting_sigma_b / DEG).to_array();
+    for (sigma, mounting) in start.sigma.att_sigma_deg.iter_mut().zip(mounting_deg) {
+        *sigma = sigma.hypot(mounting).min(30.0).max(*sigma);
+    }
+    start
+}
+
+/// Heading that the motion between outages hardly shows.
+fn doubt_heading(solution: &Solution, outages: &[Outage]) -> Option<HeadingDoubt> {
+    let start_s = solution.rows.first()?.t_s;
+    let fixed = solution.rows.iter().filter(|row| !outages.iter().any(|o| o.withholds(row.t_s)));
+    weak_heading(fixed.map(|row| (row.t_s - start_s, row.sigma[8])))
+}

@@ -1,0 +1,39 @@
+//! Fusion of recorded IMU and GNSS: request, solution, document.
+//!
+//! ```
+//! use nav_sim::fuse::{FuseRequest, fuse};
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let files = ["imu.csv", "gnss.csv", "model.toml"];
+//! let request = FuseRequest { turn_on_bias: Some([0.3, 0.01]), ..FuseRequest::new(files[0], files[1], files[2]) };
+//! match fuse(&request) {
+//!     Ok(answer) => println!("{}", answer.document().verdict.lines[0]),
+//!     Err(e) => println!("{e}"),
+//! }
+//! # Ok(())
+//! # }
+//! ```
+
+mod document;
+mod drive;
+mod error;
+mod files;
+mod filter;
+mod manifest;
+mod request;
+mod summary;
+
+pub(crate) use drive::Drive;
+pub use drive::{FuseAnswer, FuseNote};
+pub use error::FuseError;
+pub(crate) use files::{FILES, directory};
+pub(crate) use manifest::FuseManifest;
+pub use request::{FuseRequest, LoggerAxes, MountingChoice};
+pub use summary::{Cause, FuseSummary};
+
+/// Reads the files of a request and fuses them.
+///
+/// # Errors
+/// A setting out of range, a file that cannot be used, data and settings that do not fit together.
+pub fn fuse(request: &FuseRequest) -> Result<FuseAnswer, FuseError> {
+    Drive::read(request)?.fuse()
+}

@@ -1,0 +1,302 @@
+//! Arguments of a fusion.
+
+use super::FuseError;
+use glam::{DMat3, DQuat, DVec3};
+use nav_sim_navigation::earth::GravityModel;
+use nav_sim_navigation::ekf::{FilterStates, InitialSettings};
+use nav_sim_navigation::frames::RollPitchYaw;
+use nav_sim_navigation::fusion::Settings;
+use nav_sim_navigation::fusion::mounting::Mounted;
+use nav_sim_navigation::gnss::FixSigma;
+use nav_sim_navigation::sensors::gnss::MAX_LEVER_ARM_M;
+use nav_sim_navigation::sensors::outage::Outage;
+use nav_sim_signal::imu::MAX_RATE_HZ;
+use nav_sim_signal::units::DEG;
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// Files and settings of a fusion: the arguments of `nav-sim fuse`.
+#[derive(clap::Args, Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FuseRequest {
+    /// IMU recording (.csv, .tsv, .txt, .npy, also .gz)
+    #[arg(value_name = "IMU")]
+    pub imu: PathBuf,
+    /// GNSS fixes (.csv, .txt, .pos, .nmea, also .gz)
+    #[arg(value_name = "GNSS")]
+    pub gnss: PathBuf,
+    /// Noise model that the filter believes
+    #[arg(value_name = "MODEL")]
+    pub model: PathBuf,
+    /// Initial state (TOML), or auto: level from the IMU, heading from the GNSS course
+    #[arg(long, value_name = "FILE|auto", default_value = "auto")]
+    pub initial: PathBuf,
+    /// GNSS antenna from the IMU: front, right, down (m)
+    #[arg(long = "lever-arm", value_name = "X,Y,Z", value_parser = numbers::<3>, default_value = "0,0,0",
+        hide_default_value = true, allow_hyphen_values = true)]
+    pub lever_arm_m: [f64; 3],
+    /// Attitude of the IMU in the vehicle (degrees) if its axes are not front, right, down; after a colon the standard
+    /// deviations about the vehicle's front, right, down; auto: estimated from the drive of a road vehicle
+    #[arg(long, value_name = "ROLL,PITCH,YAW[:SD,SD,SD]|auto", allow_hyphen_values = true)]
+    pub mounting: Option<MountingChoice>,
+    /// Axes as the logger has them; --mounting applies after this
+    #[arg(long, value_name = "AXES", value_enum, default_value_t)]
+    pub axes: LoggerAxes,
+    /// Reference trajectory to compare with; stretches where it jumps are left out
+    #[arg(long, value_name = "TRAJECTORY")]
+    pub reference: Option<PathBuf>,
+    /// Window in which fixes are withheld, on the clock of the data in seconds (repeatable)
+    #[arg(long = "outage", value_name = "START:END")]
+    pub outages: Vec<Outage>,
+    /// States of the filter: 15 (one bias an axis, to which the model is reduced), 21 (and a scale factor an axis) or
+    /// full (a bias state for each process)
+    #[arg(long, value_name = "STATES", default_value = "15")]
+    pub filter: FilterStates,
+    /// Constant biases that the filter expects beside the model: standard deviations, accelerometer in m/s²,
+    /// gyroscope in rad/s
+    #[arg(long, value_name = "ACCEL,GYRO", value_parser = at_least_zero)]
+    pub turn_on_bias: Option<[f64; 2]>,
+    /// Standard deviations where the GNSS file states none: of the position in m, and after a colon of the velocity in
+    /// m/s; each one number or north,east,down
+    #[arg(long, value_name = "POS[:VEL]", value_parser = fix_sigma)]
+    pub gnss_sigma: Option<FixSigma>,
+    /// Time by which receiver or logger stamp the fixes late (s)
+    #[arg(long = "gnss-delay", value_name = "S", value_parser = number, default_value = "0", allow_hyphen_values = true)]
+    pub gnss_delay_s: f64,
+    /// Multiply the receiver's standard deviations, of position and of velocity
+    #[arg(long, value_name = "POS,VEL", value_parser = numbers::<2>, default_value = "1,1", hide_default_value = true)]
+    pub gnss_sigma_factor: [f64; 2],
+    /// Rows of the solution per second
+    #[arg(long, value_name = "HZ", value_parser = number, default_value = "10")]
+    pub rate_hz: f64,
+    /// Also smooth the solution: every row is then estimated from all fixes, later ones included
+    #[arg(long)]
+    pub smooth: bool,
+}
+
+impl Default for FuseRequest {
+    fn default() -> Self {
+        Self {
+            imu: PathBuf::new(),
+            gnss: PathBuf::new(),
+            model: PathBuf::new(),
+            initial: "auto".into(),
+            lever_arm_m: [0.0; 3],
+            mounting: None,
+            axes: LoggerAxes::Frd,
+            reference: None,
+            outages: Vec::new(),
+            filter: FilterStates::default(),
+            turn_on_bias: None,
+            gnss_sigma: None,
+            gnss_delay_s: 0.0,
+            gnss_sigma_factor: [1.0; 2],
+            rate_hz: 10.0,
+            smooth: false,
+        }
+    }
+}
+
+impl FuseRequest {
+    /// A fusion of these files with default settings.
+    pub fn new(imu: impl Into<PathBuf>, gnss: impl Into<PathBuf>, model: impl Into<PathBuf>) -> Self {
+        Self { imu: imu.into(), gnss: gnss.into(), model: model.into(), ..Self::default() }
+    }
+
+    /// The file of the initial state; none where it is found in the data.
+    pub(super) fn initial_file(&self) -> Option<&PathBuf> {
+        (self.initial.as_os_str() != "auto").then_some(&self.initial)
+    }
+
+    /// Every file that is read, by its role.
+    pub(super) fn files(&self) -> impl Iterator<Item = (&'static str, &PathBuf)> {
+        let given = [("imu", &self.imu), ("gnss", &self.gnss), ("model", &self.model)];
+        let asked = [("initial", self.initial_file()), ("reference", self.reference.as_ref())];
+        given.into_iter().chain(asked.into_iter().filter_map(|(role, path)| Some((role, path?))))
+    }
+
+    /// Source of the mounting.
+    pub(super) fn mounted(&self) -> Mounted {
+        if self.mounting == Some(MountingChoice::Auto) { Mounted::AsFound } else { Mounted::AsGiven }
+    }
+
+    /// The filter's expectation of constant biases, over that of a file.
+    pub(super) fn expected(&self, of_file: InitialSettings) -> InitialSettings {
+        let Some([accel, gyro]) = self.turn_on_bias else { return of_file };
+        InitialSettings { accel_bias_sigma_m_s2: Some(accel), gyro_bias_sigma_rad_s: Some(gyro), ..of_file }
+    }
+
+    /// Settings of the filter's run.
+    ///
+    /// # Errors
+    /// A value that is out of its range.
+    pub(super) fn settings(&self) -> Result<Settings, FuseError> {
+        let refuse = |message: String| Err(FuseError::Setting(message));
+        let [x, y, z] = self.lever_arm_m;
+        if !self.lever_arm_m.iter().all(|metres| metres.abs() <= MAX_LEVER_ARM_M) {
+            return refuse(format!("--lever-arm {x},{y},{z}: more than {MAX_LEVER_ARM_M} m"));
+        }
+        if !(self.rate_hz > 0.0 && self.rate_hz <= MAX_RATE_HZ) {
+            return refuse(format!("--rate-hz {}: not a rate of 0 to {MAX_RATE_HZ} Hz", self.rate_hz));
+        }
+        if !self.gnss_sigma_factor.iter().all(|factor| *factor > 0.0) {
+            return refuse("--gnss-sigma-factor: not two numbers > 0".to_owned());
+        }
+        let (frd, mounting_sigma_b) = match self.mounting {
+            Some(MountingChoice::Angles { deg: [roll, pitch, yaw], sigma_deg }) => (
+                RollPitchYaw { roll: roll * DEG, pitch: pitch * DEG, yaw: yaw * DEG }.to_quat(),
+                DVec3::from(sigma_deg) * DEG,
+            ),
+            _ => (DQuat::IDENTITY, DVec3::ZERO),
+        };
+        Ok(Settings {
+            q_s_b: frd * self.axes.to_frd(),
+            mounting_sigma_b,
+            lever_arm_b: self.lever_arm_m.into(),
+            gravity: GravityModel::default(),
+            outages: self.outages.clone(),
+            nis_gate: None,
+            rows_hz: self.rate_hz,
+            smooth: self.smooth,
+        })
+    }
+}
+
+/// Axes as loggers name them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LoggerAxes {
+    /// Front, right, down
+    #[default]
+    Frd,
+    /// Front, left, up
+    Flu,
+    /// Right, front, up: east, north, up of an IMU that points north
+    Rfu,
+    /// The same as rfu
+    Enu,
+}
+
+impl LoggerAxes {
+    /// Takes a vector in the logger's axes to front, right, down.
+    fn to_frd(self) -> DQuat {
+        let columns = match self {
+            Self::Frd => return DQuat::IDENTITY,
+            Self::Flu => [DVec3::X, DVec3::NEG_Y, DVec3::NEG_Z],
+            Self::Rfu | Self::Enu => [DVec3::Y, DVec3::X, DVec3::NEG_Z],
+        };
+        DQuat::from_mat3(&DMat3::from_cols(columns[0], columns[1], columns[2]))
+    }
+}
+
+/// Attitude of the IMU in the vehicle.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MountingChoice {
+    /// Found from the drive.
+    Auto,
+    /// Given.
+    Angles {
+        /// Roll, pitch, yaw (degrees).
+        deg: [f64; 3],
+        /// Standard deviations about the vehicle's front, right, down (degrees).
+        sigma_deg: [f64; 3],
+    },
+}
+
+/// Largest standard deviation of a mounting that small angles describe (degrees).
+const MAX_MOUNTING_SIGMA_DEG: f64 = 30.0;
+
+impl FromStr for MountingChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "auto" {
+            return Ok(Self::Auto);
+        }
+        let (angles, sigma) = text.split_once(':').unwrap_or((text, "0,0,0"));
+        match (list(angles), list(sigma)) {
+            (Some(deg), Some(sigma_deg))
+                if sigma_deg.iter().all(|s: &f64| (0.0..=MAX_MOUNTING_SIGMA_DEG).contains(s)) =>
+            {
+                Ok(Self::Angles { deg, sigma_deg })
+            }
+            _ => Err("expected degrees, such as -9.5,-60.8,-166.8 or -9.5,-60.8,-166.8:1.5,0.5,0.8, or auto"
+                .into()),
+        }
+    }
+}
+
+/// Finite numbers between commas.
+fn list<const N: usize>(text: &str) -> Option<[f64; N]> {
+    let all: Option<Vec<f64>> = text.split(',').map(|x| number(x.trim()).ok()).collect();
+    all?.try_into().ok()
+}
+
+fn number(text: &str) -> Result<f64, &'static str> {
+    text.parse().ok().filter(|x: &f64| x.is_finite()).ok_or("not a finite number")
+}
+
+fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    list(text).ok_or_else(|| format!("expected {N} numbers between commas"))
+}
+
+fn at_least_zero(text: &str) -> Result<[f64; 2], &'static str> {
+    let pair = list(text).filter(|pair| pair.iter().all(|x| *x >= 0.0));
+    pair.ok_or("expected two numbers ≥ 0, such as 0.1,0.002")
+}
+
+/// `POS` or `N,E,D` in metres, then `:VEL` or `:N,E,D` in m/s.
+fn fix_sigma(text: &str) -> Result<FixSigma, &'static str> {
+    let three = |part: &str| {
+        let three = list::<3>(part).or(list::<1>(part).map(|[all]| [all; 3]));
+        three.filter(|sigma| sigma.iter().all(|x| *x > 0.0)).ok_or(
+            "expected metres above 0, one or three (north, east, down), and after a colon m/s: 2,2,4:0.1",
+        )
+    };
+    let (position, velocity) = text.split_once(':').map_or((text, None), |(p, v)| (p, Some(v)));
+    Ok(FixSigma { pos_m: three(position)?, vel_m_s: velocity.map(three).transpose()? })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// At rest and level an accelerometer measures g upwards: −z of front, right, down.
+    #[test]
+    fn axes_of_loggers_are_rotations_to_front_right_down() {
+        let to = |axes: LoggerAxes, v: DVec3| (axes.to_frd() * v).round();
+        for axes in [LoggerAxes::Flu, LoggerAxes::Rfu, LoggerAxes::Enu] {
+            assert_eq!(to(axes, DVec3::Z), DVec3::NEG_Z, "{axes:?}");
+        }
+        assert_eq!((to(LoggerAxes::Flu, DVec3::X), to(LoggerAxes::Flu, DVec3::Y)), (DVec3::X, DVec3::NEG_Y));
+        assert_eq!((to(LoggerAxes::Rfu, DVec3::X), to(LoggerAxes::Rfu, DVec3::Y)), (DVec3::Y, DVec3::X));
+        assert_eq!(FuseRequest::default().settings().unwrap().q_s_b, DQuat::IDENTITY);
+    }
+
+    #[test]
+    fn standard_deviations_of_a_receiver() {
+        let sigma = |text| fix_sigma(text).map(|s| (s.pos_m, s.vel_m_s));
+        assert_eq!(sigma("2"), Ok(([2.0; 3], None)));
+        assert_eq!(sigma("2,2,4:0.1"), Ok(([2.0, 2.0, 4.0], Some([0.1; 3]))));
+        assert_eq!(sigma("1:0.1,0.1,0.2"), Ok(([1.0; 3], Some([0.1, 0.1, 0.2]))));
+        for bad in ["", "0", "1,2", "nan", "1:", "1:2:3", "1,2,-3"] {
+            assert!(sigma(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_request_is_a_file_too() {
+        let text = r#"{ "imu": "a", "gnss": "b", "model": "c", "mounting": "auto", "filter": "full", "axes": "flu" }"#;
+        let request: FuseRequest = serde_json::from_str(text).unwrap();
+        let expected = FuseRequest {
+            mounting: Some(MountingChoice::Auto),
+            filter: FilterStates::Full,
+            axes: LoggerAxes::Flu,
+            ..FuseRequest::new("a", "b", "c")
+        };
+        assert_eq!(request, expected);
+        assert!(serde_json::from_str::<FuseRequest>(r#"{ "imu": "a", "delay": 1 }"#).is_err());
+    }
+}
