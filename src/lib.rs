@@ -49,6 +49,8 @@ pub use {nav_sim_calibration as calibration, nav_sim_navigation as navigation, n
 
 pub use jobs::export;
 
+// Values of arguments.
+mod parse;
 // Parameters for other programs.
 pub mod export;
 // Which model, on the user's own recordings.
@@ -68,6 +70,8 @@ pub mod jobs;
 mod require;
 // Recorded drives.
 pub mod fuse;
+// The main job, from a request to its document.
+pub mod run;
 // All that most programs need.
 pub mod prelude;
 // Arguments, words and exit codes.

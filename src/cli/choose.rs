@@ -4,14 +4,16 @@ use super::calibrate::ESTIMATORS;
 use super::jobs::unknown_model;
 use super::parse::words;
 use super::pictures::PlotArgs;
+use super::read::placed;
 use super::recordings::{RecordingArgs, Said};
-use super::run::{OutageArg, Words, checked_scenario, parse_outage, placed};
+use super::run::Words;
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
 use crate::choose::{Candidate, Inflation};
 use crate::formats::model_file::CalibrationNote;
 use crate::jobs::{self, CalibrationOptions, ChoiceDrive, EstimatorChoice};
 use crate::report::ChoiceReport;
+use crate::run::{OutageFlag, checked_scenario};
 use nav_sim_calibration::{Bootstrap, Estimator, ModelChoice, Pool, Settings, Trim};
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::scenario::Scenario;
@@ -42,8 +44,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE")]
     trajectory: PathBuf,
     /// Window without fixes, in seconds (repeatable) (default: 300:390 and 700:790)
-    #[arg(long = "outage", value_name = "START:END", value_parser = parse_outage)]
-    outages: Vec<OutageArg>,
+    #[arg(long = "outage", value_name = "START:END")]
+    outages: Vec<OutageFlag>,
     /// Estimators to compare [default: awv, sr-awv, dr-awv and, for comparison, gmwm and avlr of single recordings]
     #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = words::<Estimator>(EACH))]
     estimator: Vec<Estimator>,

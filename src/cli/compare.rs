@@ -63,7 +63,7 @@ pub(super) fn compare(args: &Args, cause: &str, session: &Session) -> Result<Com
     let page = out.with_extension("html");
     let read_from = args.runs.iter().chain([&args.reference]);
     let inputs: Vec<PathBuf> =
-        read_from.flat_map(|run| report::RUN_FILES.map(|name| run.join(name))).collect();
+        read_from.flat_map(|run| crate::run::RUN_FILES.map(|name| run.join(name))).collect();
     let _own = claim_output(Some(out), &inputs, Written::Comparison, session)?;
     let _page = claim_output(Some(&page), &inputs, Written::Page, session)?;
     let _picture = args.plot.claim(&inputs, session)?;

@@ -3,11 +3,11 @@
 use super::calibrate::ESTIMATORS;
 use super::parse;
 use super::pictures::PageArgs;
-use super::run::{OutageArg, parse_outage, windows_of};
 use super::{Failure, Session, read};
 use crate::formats::model_file::ModelFile;
 use crate::jobs::{self, DesignInputs, Destination, NavigateInputs, TrueImu};
 use crate::report::{Design, Designs};
+use crate::run::{OutageFlag, windows_of};
 use nav_sim_calibration::{Bootstrap, Estimator, Settings};
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::scenario::{Method, Scenario};
@@ -48,8 +48,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE")]
     trajectory: Option<PathBuf>,
     /// Window without fixes, in seconds (repeatable; default: 300:390 and 700:790)
-    #[arg(long = "outage", value_name = "START:END", value_parser = parse_outage, requires = "trajectory")]
-    outages: Vec<OutageArg>,
+    #[arg(long = "outage", value_name = "START:END", requires = "trajectory")]
+    outages: Vec<OutageFlag>,
     #[command(flatten)]
     pictures: PageArgs,
 }

@@ -1,17 +1,18 @@
 //! Reading inputs for commands: doubts are said, refusals become failures.
 
 use super::exit::option_for;
+use super::run::Words;
 use super::{Failure, Session};
 use crate::formats::input;
-use crate::formats::model_file::{self, ModelFile};
-use crate::formats::recordings::{self, ReadOptions};
-use crate::formats::trajectory_file;
+use crate::formats::model_file::ModelFile;
 use crate::formats::{FileError, Setting};
 use crate::report::Input;
+use crate::run::{RunError, read};
+use nav_sim_navigation::scenario::Scenario;
+use nav_sim_navigation::sensors::outage::{Outage, PlacedOutages};
 use nav_sim_navigation::trajectory::Trajectory;
-use nav_sim_navigation::trajectory::plausibility::{Excess, Limits, examine};
 use nav_sim_signal::imu::Recording;
-use nav_sim_signal::noise::{Model, continuous};
+use nav_sim_signal::noise::Model;
 use std::path::{Path, PathBuf};
 
 /// For commands without the option `--origin`: `trajectory convert` has it.
@@ -62,45 +63,29 @@ pub(super) fn listed(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
 
 /// A trajectory.
 pub(super) fn trajectory(path: &Path, session: &Session) -> Result<Trajectory, Failure> {
-    let (trajectory, warnings) =
-        trajectory_file::load(path, &trajectory_file::Options::default()).map_err(without_options)?;
-    session.warn_all(warnings);
-    implausible(path, &trajectory, session);
-    Ok(trajectory)
+    read::trajectory(path, &Words::new(session)).map_err(without_options)
 }
 
-/// Says where no vehicle moves so.
-fn implausible(path: &Path, trajectory: &Trajectory, session: &Session) {
-    let (_, beyond) = examine(trajectory, &Limits::default());
-    let farthest = |e: &&Excess| e.worst / e.limit;
-    if let Some(worst) = beyond.iter().max_by(|a, b| farthest(a).total_cmp(&farthest(b))) {
-        let shown = path.display();
-        let more = match beyond.len() - 1 {
-            0 => String::new(),
-            n => format!(", and {n} more such stretches"),
-        };
-        session.warn(format!("{shown}: {worst}{more} (nav-sim trajectory check {shown} lists them)"));
-    }
+/// The outages on a trajectory; what is doubtful about them is said.
+pub(super) fn placed(
+    scenario: &Scenario,
+    span_s: (f64, f64),
+    seed: u64,
+    session: &Session,
+) -> Result<Vec<Outage>, Failure> {
+    let PlacedOutages { windows, remarks } = scenario.outages_on(span_s, seed)?;
+    session.warn_all(&remarks);
+    Ok(windows)
 }
 
 /// A model; axes that it does not name are said.
 pub(super) fn model(path: &Path, session: &Session) -> Result<ModelFile, Failure> {
-    let file = model_file::read(path)?;
-    session.warn_all(file.doubts(path));
-    Ok(file)
+    Ok(read::model(path, &Words::new(session))?)
 }
 
 /// A noise model at the rate of the IMU; that it is converted is said.
 pub(super) fn at_rate(path: &Path, model: &Model, imu_hz: f64, session: &Session) -> Result<Model, Failure> {
-    let (shown, from_hz) = (path.display(), model.rate_hz);
-    let converted = continuous::at_rate(model, imu_hz).map_err(|e| {
-        let hint = format!("set rate_hz = {from_hz} in the [imu] section of a --scenario file");
-        Failure::input(format!("{shown}: {e}")).hint(hint)
-    })?;
-    if !continuous::same_rate(from_hz, imu_hz) {
-        session.say(format!("{shown}: converted from {from_hz} Hz to {imu_hz} Hz"));
-    }
-    Ok(converted)
+    Ok(read::at_rate(path, model, imu_hz, &Words::new(session))?)
 }
 
 /// Static recordings, every channel of them; files without a time column at a rate that is given.
@@ -109,19 +94,5 @@ pub(super) fn recordings_at(
     rate_hz: Option<f64>,
     session: &Session,
 ) -> Result<Vec<Recording>, Failure> {
-    let hint = |setting| {
-        Some(match setting {
-            Setting::Gaps => {
-                "wv and calibrate read it with --gaps split or --gaps ignore; fuse bridges gaps of up to 5 s"
-            }
-            other => option_for(other),
-        })
-    };
-    let (recordings, report) = recordings::read(paths, &ReadOptions { rate_hz, ..ReadOptions::default() })
-        .map_err(|e| Failure::of_file(&e, hint))?;
-    session.warn_all(report.all_warnings());
-    for file in &report.files {
-        session.detail(file);
-    }
-    Ok(recordings)
+    Ok(read::recordings(paths, rate_hz, &Words::new(session)).map_err(RunError::File)?)
 }

@@ -1,14 +1,15 @@
 //! `nav-sim tune`: factors on a noise model that make its filter consistent.
 
-use super::filter::no_filter;
 use super::parse::one_of;
 use super::pictures::{PageArgs, claim_output};
-use super::run::{OutageArg, checked_scenario, parse_outage, placed};
+use super::read::placed;
+use super::run::no_filter;
 use super::{Failure, Session, read, turn_on};
 use crate::formats::atomic::Written;
 use crate::formats::draws_file::{self, Draws};
 use crate::formats::model_file::{self, ModelFile};
-use crate::report::Input;
+use crate::report::{Input, unexpected_line};
+use crate::run::{OutageFlag, checked_scenario};
 use crate::tune::{self, Truths, TuneInputs};
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::scenario::Scenario;
@@ -45,8 +46,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "FILE")]
     trajectory: Option<PathBuf>,
     /// Window without fixes, in seconds (repeatable), or "none" (default: 300:390 and 700:790)
-    #[arg(long = "outage", value_name = "START:END", value_parser = parse_outage)]
-    outages: Vec<OutageArg>,
+    #[arg(long = "outage", value_name = "START:END")]
+    outages: Vec<OutageFlag>,
     /// Meaning of consistent: worst, no error of any truth exceeds what the filter states; mean, the NEES is right on average
     #[arg(long = "for", value_name = "AIM", value_parser = one_of::<Aim>(&Aim::NAMES), default_value_t)]
     aim: Aim,
@@ -171,13 +172,13 @@ fn truths(
     };
     let mut doubts = Vec::new();
     for truth in &truths.errors {
-        for doubt in (Scenario { imu: truth.imu.clone(), ..scenario.clone() }).doubts() {
+        for doubt in (Scenario { imu: truth.imu.clone(), ..scenario.clone() }).unexpected() {
             if !doubts.contains(&doubt) {
                 doubts.push(doubt);
             }
         }
     }
-    session.warn_all(&doubts);
+    session.warn_all(doubts.iter().map(unexpected_line));
     Ok(truths)
 }
 

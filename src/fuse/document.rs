@@ -2,7 +2,7 @@
 
 use super::summary::{Cause, Fixes};
 use super::{FuseAnswer, FuseNote};
-use crate::report::Answer;
+use crate::report::{Answer, reduction_doubt, reduction_line};
 use glam::{DVec2, DVec3};
 use nav_sim_document::{
     Axis, Cell, Chart, Colour, Document, Importance, Mark, Panel, Series, Stroke, Table, Tone, readable,
@@ -51,8 +51,10 @@ impl Answer for FuseAnswer {
         document.checked(CHECKED);
         self.notes.iter().for_each(|note| add(&mut document, note));
         if let Some(quality) = self.reduction.as_ref().and_then(|reduction| reduction.quality.as_ref()) {
-            let rank = if quality.doubt().is_some() { Importance::Warning } else { Importance::Remark };
-            document.note(rank, quality.doubt().unwrap_or_else(|| quality.line()));
+            match reduction_doubt(quality) {
+                Some(doubt) => document.note(Importance::Warning, doubt),
+                None => document.note(Importance::Remark, reduction_line(quality)),
+            }
         }
         document
     }

@@ -11,7 +11,7 @@ use nav_sim_navigation::metrics::{
     Summary, epochs, expected_fan, fan,
 };
 use nav_sim_navigation::monte_carlo;
-use nav_sim_navigation::scenario::{Method, Scenario};
+use nav_sim_navigation::scenario::{Method, Scenario, Unexpected};
 use nav_sim_navigation::sensors::imu::Truth;
 use nav_sim_navigation::sensors::outage::{Outage, OutageRemark};
 use nav_sim_navigation::simulation::lincov::{
@@ -67,18 +67,20 @@ pub struct Navigation {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Note {
+    /// A doubt about a file or a setting.
+    Warning(String),
+    /// What was made of a file or a setting.
+    Remark(String),
+    /// The same, for those who ask for more.
+    Detail(String),
     /// The filter starts with a bias of this standard deviation (m/s² or rad/s), too large to be meant.
     LargeBias(Sensor, f64),
-    /// The true IMU has a defect that the filter does not expect.
-    Unexpected(String),
-    /// How the model was reduced to 15 states.
-    Reduction(ReductionSummary),
-    /// How consistent the reduced filter is; whether the model has a full filter.
-    ReductionQuality(ReductionQuality, bool),
+    /// The true IMU or receiver has an error that the filter does not expect.
+    Unexpected(Unexpected),
+    /// How consistent the reduced filter is, and what it costs.
+    Reduction(ReductionQuality),
     /// The motion hardly makes the heading observable.
     Heading(HeadingDoubt),
-    /// How far the runs are from what the covariance analysis expects.
-    Agreement(Agreement),
     /// A window without fixes is not as it was asked for.
     Outage(OutageRemark),
 }
@@ -146,7 +148,7 @@ pub fn navigate(
             let mut sampled = sampled(&experiment, scenario.run.runs, seed, observer)?;
             match expected {
                 Some((_, expected)) if method == Method::Both => {
-                    sampled = sampled.beside(expected, &analysis.fan(&belief), observer);
+                    sampled = sampled.beside(expected, &analysis.fan(&belief));
                 }
                 Some((_, expected)) => {
                     let agreement = Agreement::of(&sampled.summary, &expected);
@@ -181,7 +183,7 @@ fn possible(inputs: &NavigateInputs, scenario: &Scenario) -> Result<(), Navigate
 /// What speaks against the filter before anything was computed.
 fn doubt(inputs: &NavigateInputs, belief: &Belief, scenario: &Scenario, observer: &dyn Observer<Note>) {
     if let TrueImu::Recordings(recordings) = &inputs.truth {
-        recordings.iter().filter_map(motion).for_each(|doubt| observer.remark(&Note::Unexpected(doubt)));
+        recordings.iter().filter_map(motion).for_each(|doubt| observer.remark(&Note::Warning(doubt)));
     }
     // A Gauss-Markov process of phi ≈ 1 may have any stationary variance: a filter that starts with it believes
     // nothing of its first sensor readings.
@@ -191,7 +193,7 @@ fn doubt(inputs: &NavigateInputs, belief: &Belief, scenario: &Scenario, observer
             observer.remark(&Note::LargeBias(sensor, sigma));
         }
     }
-    scenario.doubts().into_iter().for_each(|doubt| observer.remark(&Note::Unexpected(doubt.to_string())));
+    scenario.unexpected().into_iter().for_each(|found| observer.remark(&Note::Unexpected(found)));
 }
 
 /// Means over a second that differ so much are motion, not noise: m/s², rad/s.
@@ -254,10 +256,7 @@ fn sampled(
     let mut results = monte_carlo::run_plan(&plan, runs, &|n| observer.advance(n));
     observer.end();
     let result = results.swap_remove(0);
-    let epochs = epochs(&result);
-    let summary = Summary::of(&result, &epochs, seed);
-    let fan = fan(&result);
-    Ok(Navigation { runs: Some(result), epochs, fan, summary })
+    Ok(Navigation::of_runs(result, seed))
 }
 
 /// What a covariance analysis is made of.
@@ -331,10 +330,17 @@ impl<'a> Analysis<'a> {
 }
 
 impl Navigation {
+    /// The statistics of runs of a seed.
+    #[must_use]
+    pub fn of_runs(result: RunResult, seed: u64) -> Self {
+        let epochs = epochs(&result);
+        let summary = Summary::of(&result, &epochs, seed);
+        Self { fan: fan(&result), runs: Some(result), epochs, summary }
+    }
+
     /// Runs beside what was expected of them.
-    fn beside(mut self, expected: Summary, fan: &[FanEpoch], observer: &dyn Observer<Note>) -> Self {
+    fn beside(mut self, expected: Summary, fan: &[FanEpoch]) -> Self {
         let agreement = Agreement::of(&self.summary, &expected);
-        observer.remark(&Note::Agreement(agreement.clone()));
         self.summary.expect(expected, agreement);
         for (own, expected) in self.fan.iter_mut().zip(fan) {
             own.lincov_m = Some(expected.quantiles_m);

@@ -37,10 +37,9 @@ impl Reduced<'_> {
         if summary.is_exact() {
             return Ok(summary);
         }
-        observer.remark(&Note::Reduction(summary.clone()));
         let full = self.full.as_ref().map(|full| assess(track, full, model));
         let quality = ReductionQuality::of(&assess(track, belief, model), full.as_ref());
-        observer.remark(&Note::ReductionQuality(quality.clone(), full.is_some()));
+        observer.remark(&Note::Reduction(quality.clone()));
         summary.quality = Some(quality);
         Ok(summary)
     }

@@ -243,64 +243,36 @@ impl Scenario {
         full
     }
 
-    /// What the true IMU and receiver have and the filter does not expect: its errors will be larger than it says.
+    /// Errors that the true IMU and receiver have and the filter does not expect: its own will be larger than it says.
     #[must_use]
-    pub fn doubts(&self) -> Vec<Unexpected> {
-        let mut doubts = Vec::new();
+    pub fn unexpected(&self) -> Vec<Unexpected> {
+        let mut found = Vec::new();
         for sensor in Sensor::ALL {
-            let (name, unit) = (sensor.name(), sensor.unit());
             let (bias, ppm) = self.imu.deviations(sensor);
             // of half of what is there, errors may be twice as large as stated
             let expected = self.initial.bias_sigma(sensor).unwrap_or(0.0);
             if expected < 0.5 * bias {
-                let key = InitialSettings::bias_key(sensor);
-                doubts.push(Unexpected {
-                    sources: vec![format!("{name}.turn_on_bias")],
-                    what: format!(
-                        "the true {name} has a turn-on bias of {bias} {unit}, the filter expects {expected}"
-                    ),
-                    remedy: format!("initial.{key} gives it states"),
-                });
+                found.push(Unexpected::TurnOnBias { sensor, sigma: bias, expected });
             }
             let by_default = self.filter.states.scale_sigma() * 1e6;
-            let expected = self.initial.scale_sigma_ppm(sensor).unwrap_or(by_default);
-            if expected < 0.5 * ppm {
-                let key = InitialSettings::scale_key(sensor);
-                doubts.push(Unexpected {
-                    sources: vec![format!("{name}.scale")],
-                    what: format!(
-                        "the true {name} has a scale-factor error of {ppm} ppm, the filter expects {expected}"
-                    ),
-                    remedy: format!("initial.{key} gives it states"),
-                });
+            let expected_ppm = self.initial.scale_sigma_ppm(sensor).unwrap_or(by_default);
+            if expected_ppm < 0.5 * ppm {
+                found.push(Unexpected::Scale { sensor, ppm, expected_ppm });
             }
         }
-        let angle = self.imu.misalignment_rad;
-        if angle > 0.0 {
-            doubts.push(Unexpected {
-                sources: Sensor::ALL.map(|sensor| format!("{}.misalignment", sensor.name())).into(),
-                what: format!("the true IMU has a misalignment of {angle} rad, the filter expects none"),
-                remedy: "no filter has states for it; a calibration of the axes (a smaller imu.misalignment_rad) removes it"
-                    .to_owned(),
-            });
+        if self.imu.misalignment_rad > 0.0 {
+            found.push(Unexpected::Misalignment { angle_rad: self.imu.misalignment_rad });
         }
-        let GnssSettings { rate_hz, pos_sigma_m, correlated_pos_sigma_m, correlation_time_s, .. } =
-            &self.gnss;
+        let GnssSettings {
+            rate_hz, pos_sigma_m, correlated_pos_sigma_m: sigma_m, correlation_time_s, ..
+        } = self.gnss;
         // A filter averages the white noise of so many fixes while the correlated error stays: that is felt when it is no
         // longer small beside their mean.
         let fixes = (rate_hz * correlation_time_s).max(1.0);
-        if (0..3).any(|i| correlated_pos_sigma_m[i] > 0.5 * pos_sigma_m[i] / fixes.sqrt()) {
-            let [north, east, down] = correlated_pos_sigma_m;
-            doubts.push(Unexpected {
-                sources: vec!["gnss.correlated".to_owned()],
-                what: format!(
-                    "the true receiver has correlated position errors of {north}, {east}, {down} m (north, east, down) over \
-                     {correlation_time_s} s, the filter expects white ones"
-                ),
-                remedy: "no filter has states for them; a larger gnss.pos_sigma_m makes it trust positions less".to_owned(),
-            });
+        if (0..3).any(|i| sigma_m[i] > 0.5 * pos_sigma_m[i] / fixes.sqrt()) {
+            found.push(Unexpected::CorrelatedPositions { sigma_m, correlation_time_s });
         }
-        doubts
+        found
     }
 
     /// The outages on a trajectory that lasts from `span_s.0` to `span_s.1`.
@@ -324,20 +296,51 @@ impl Scenario {
     }
 }
 
-/// What the true IMU or receiver has, and the filter does not expect.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Unexpected {
-    /// Its names among the sources of a [`Budget`](crate::metrics::Budget): their shares together are its own.
-    pub sources: Vec<String>,
-    /// What it is.
-    pub what: String,
-    /// What lets the filter expect it.
-    pub remedy: String,
+/// An error that the true IMU or receiver has, and the filter does not expect.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Unexpected {
+    /// A constant bias (1 σ, m/s² or rad/s), and that of which the filter has states.
+    TurnOnBias {
+        /// Sensor.
+        sensor: Sensor,
+        /// Of the true IMU.
+        sigma: f64,
+        /// In the filter.
+        expected: f64,
+    },
+    /// A scale-factor error (1 σ, ppm), and that of which the filter has states.
+    Scale {
+        /// Sensor.
+        sensor: Sensor,
+        /// Of the true IMU.
+        ppm: f64,
+        /// In the filter.
+        expected_ppm: f64,
+    },
+    /// A misalignment of the axes (1 σ, rad), of which no filter has states.
+    Misalignment {
+        /// Of the true IMU.
+        angle_rad: f64,
+    },
+    /// Position errors that last, of which no filter has states.
+    CorrelatedPositions {
+        /// North, east, down (1 σ, m).
+        sigma_m: [f64; 3],
+        /// How long they last (s).
+        correlation_time_s: f64,
+    },
 }
 
-impl std::fmt::Display for Unexpected {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}: {}", self.what, self.remedy)
+impl Unexpected {
+    /// Its names among the sources of a [`Budget`](crate::metrics::Budget): their shares together are its own.
+    #[must_use]
+    pub fn sources(&self) -> Vec<String> {
+        match self {
+            Self::TurnOnBias { sensor, .. } => vec![format!("{}.turn_on_bias", sensor.name())],
+            Self::Scale { sensor, .. } => vec![format!("{}.scale", sensor.name())],
+            Self::Misalignment { .. } => Sensor::ALL.map(|s| format!("{}.misalignment", s.name())).into(),
+            Self::CorrelatedPositions { .. } => vec!["gnss.correlated".to_owned()],
+        }
     }
 }
 

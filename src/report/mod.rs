@@ -13,11 +13,10 @@ mod efficiency;
 mod fits;
 mod manifest;
 mod merged_study;
+mod output;
 mod pages;
 mod recording;
 pub(crate) mod requirement;
-mod run_directory;
-pub(crate) mod run_words;
 #[cfg(test)]
 pub(crate) mod sample;
 mod states;
@@ -25,7 +24,8 @@ mod study;
 pub(crate) mod tables;
 mod trajectory;
 mod turn_on;
-mod verdict;
+mod unexpected;
+pub(crate) mod verdict;
 pub(crate) mod wavelet;
 
 use nav_sim_document::Document;
@@ -49,11 +49,10 @@ pub(crate) trait Answer: Serialize {
 
 pub(crate) use merged_study::{MergedStudy, ShownCell, ShownColumn};
 pub use nav_sim_document::readable;
-pub(crate) use nav_sim_document::{seconds, six_digits, window};
-pub(crate) use pages::{StudyCurves, paper_figures, paper_page, run_svg};
+pub(crate) use nav_sim_document::{seconds, six_digits};
+pub(crate) use output::{OutputFile, json};
+pub(crate) use pages::{STATES, StudyCurves, error_of, paper_figures, paper_page, tone};
 pub(crate) use recording::{gnss_csv, imu_csv, initial_toml};
-pub use run_directory::{OutputFile, run_directory};
-pub(crate) use run_directory::{RUN_FILES, json, summary_json};
 #[cfg(any(test, feature = "parquet"))]
 pub(crate) use study::ValueKind;
 pub(crate) use study::{
@@ -62,13 +61,13 @@ pub(crate) use study::{
 };
 pub use trajectory::TrajectorySeries;
 pub(crate) use trajectory::trajectory_svg;
+pub(crate) use unexpected::{reduction_doubt, reduction_line, unexpected_in_words, unexpected_line};
 pub(crate) use wavelet::signals_csv;
 
 /// Names of `nav_sim_document` for files that have not moved to documents yet.
 pub(crate) mod page {
     pub(crate) use nav_sim_document::{
-        Axis, Cell, Chart, Colour, Document as Page, Form, Interval, Mark, Panel, Series, Stroke, Table,
-        Tone, encode, svg,
+        Axis, Chart, Colour, Document as Page, Form, Mark, Panel, Series, Stroke, Tone, encode, svg,
     };
 }
 
@@ -78,8 +77,3 @@ mod number {
 
 /// Characters of a line in a terminal.
 pub(crate) const WIDTH: usize = 120;
-
-/// A table of rows, of which the first is the head, in Markdown.
-pub(crate) fn markdown_table(rows: &[Vec<String>]) -> String {
-    page::Table::of_rows(rows).markdown()
-}

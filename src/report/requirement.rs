@@ -5,6 +5,10 @@ use nav_sim_navigation::metrics::{Met, Summary};
 
 /// `required p95_m<=5: NOT MET, 7.41 m at the end of the outage 300–390 s`
 pub(crate) fn requirement_line(met: &Met, summary: &Summary) -> String {
+    if met.name == "consistent" {
+        let word = if met.met { "met" } else { "NOT MET" };
+        return format!("required consistent: {word}, the filter is {}", summary.verdict.kind);
+    }
     let outage =
         |k: usize| format!("outage {}", window(summary.outages[k].start_s, summary.outages[k].end_s));
     let place =
@@ -18,13 +22,8 @@ pub(crate) fn requirement_line(met: &Met, summary: &Summary) -> String {
     };
     let by = match met.beyond_linear.map(outage) {
         None => String::new(),
-        Some(outage) if is_shown => {
-            format!(" by the runs, since errors grow beyond linear theory in the {outage}")
-        }
-        Some(outage) => format!(
-            " by covariance analysis, which does not hold for position and velocity down after the {outage}, in which errors grow beyond \
-             linear theory: confirm with --method both"
-        ),
+        Some(outage) if is_shown => format!(" by the runs, beyond linear theory from the {outage} on"),
+        Some(outage) => format!(" beyond linear theory from the {outage} on: confirm with --method both"),
     };
     let (name, limit, value, unit) = (&met.name, met.limit, readable(met.value), unit(&met.name));
     format!("required {name}<={limit}: {word}, {value} {unit} {place}{by}")

@@ -45,7 +45,7 @@ impl TrajectorySeries {
     }
 
     /// The way on a map: outages marked, start and end named.
-    pub(super) fn map(&self, title: &str, outages: &[(f64, f64)]) -> Chart {
+    pub(crate) fn map(&self, title: &str, outages: &[(f64, f64)]) -> Chart {
         let east_north = |p: &[f64; 2]| (p[1], p[0]);
         let way = self.north_east_m.iter().map(east_north).collect();
         let mut series = vec![Series::line("reference", Colour::BELIEVED, way)];

@@ -4,6 +4,7 @@ use super::description::Study;
 use super::error::DescriptionError;
 use super::rules::MAX_CELLS;
 use super::sweep::OutageSet;
+use crate::report::unexpected_line;
 use nav_sim_calibration::Estimator;
 use nav_sim_navigation::ekf::FilterStates;
 use nav_sim_navigation::scenario::Scenario;
@@ -158,7 +159,7 @@ impl Grid {
         scenario
     }
 
-    /// What the true IMU of a scenario has and a filter does not expect ([`Scenario::doubts`]), each once.
+    /// What the true IMU of a scenario has and a filter does not expect ([`Scenario::unexpected`]), each once.
     pub(crate) fn doubts(&self) -> Vec<String> {
         let mut found: Vec<String> = Vec::new();
         for (name, scenario) in &self.scenarios {
@@ -167,7 +168,10 @@ impl Grid {
                 variant.filter.states = column.filter.unwrap_or(variant.filter.states);
                 let states = variant.filter.states;
                 found.extend(
-                    variant.doubts().iter().map(|doubt| format!("scenario {name}, filter {states}: {doubt}")),
+                    variant
+                        .unexpected()
+                        .iter()
+                        .map(|found| format!("scenario {name}, filter {states}: {}", unexpected_line(found))),
                 );
             }
         }

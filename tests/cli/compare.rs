@@ -1,11 +1,12 @@
 //! `nav-sim compare` on made-up run directories whose ratios are known.
 
 use assert_cmd::Command;
-use nav_sim::navigation::metrics::{self, Summary};
+use nav_sim::jobs::Navigation;
 use nav_sim::navigation::scenario::Scenario;
 use nav_sim::navigation::sensors::outage::Outage;
 use nav_sim::navigation::simulation::{EpochSums, OutageRecord, RunRecord, RunResult};
-use nav_sim::report::{self, Input, Manifest, ModelNote};
+use nav_sim::report::{Input, Manifest, ModelNote, TrajectorySeries};
+use nav_sim::run::RunAnswer;
 use std::path::Path;
 
 const RUNS: u32 = 20;
@@ -61,8 +62,6 @@ fn result(factor: f64) -> RunResult {
 
 fn write(directory: &Path, factor: f64, change: impl FnOnce(&mut Manifest)) {
     let result = result(factor);
-    let epochs = metrics::epochs(&result);
-    let summary = Summary::of(&result, &epochs, 7);
     let outage = Some(vec![Outage { start_s: 4.0, end_s: 8.0 }]);
     let mut manifest = Manifest {
         schema_version: Manifest::SCHEMA_VERSION,
@@ -79,11 +78,8 @@ fn write(directory: &Path, factor: f64, change: impl FnOnce(&mut Manifest)) {
         throughput_epochs_per_s: 1.0,
     };
     change(&mut manifest);
-    std::fs::create_dir_all(directory).unwrap();
-    let track = report::TrajectorySeries::default();
-    for file in report::run_directory(Some(&result), &epochs, &[], &summary, &manifest, &track) {
-        std::fs::write(directory.join(file.name), file.parts.collect::<String>()).unwrap();
-    }
+    let answer = RunAnswer::new(Navigation::of_runs(result, 7), manifest, TrajectorySeries::default());
+    answer.write(directory).unwrap();
 }
 
 struct Ran {

@@ -32,7 +32,11 @@ fn a_run_directory_holds_what_the_interface_says() {
     let place = place();
     let ran = done(place.path(), "run drive.toml imu.toml --runs 10 --outage 30:40 --seed 5 -o out");
     assert!(ran.stdout.starts_with("verdict: undecided: 10 runs miss "), "{}", ran.stdout);
-    assert!(ran.stdout.contains("10 runs (0 diverged), 15 states, seed 5"), "{}", ran.stdout);
+    assert!(
+        ran.stdout.lines().all(|line| line.chars().count() <= 120) && ran.stdout.lines().count() <= 20,
+        "{}",
+        ran.stdout
+    );
     let out = place.path().join("out");
     let summary = json(&out.join("summary.json"));
     assert_eq!(
@@ -69,7 +73,6 @@ fn the_same_seed_gives_the_same_bytes_on_any_number_of_threads() {
     let one = done(place.path(), &format!("{command} -j 1 -o one"));
     let two = done(place.path(), &format!("{command} -j 2 -o two"));
     assert_eq!(one.stdout, two.stdout);
-    assert!(one.stderr.contains("million IMU epochs/s"), "{}", one.stderr);
     for name in ["epochs.csv", "fan.csv", "runs.csv", "summary.json", "report.html"] {
         // how fast it was found is the one number that the seed does not determine
         let timeless = |run: &str| {
@@ -281,15 +284,14 @@ fn the_reduction_of_the_model_is_said_and_kept() {
     );
     fs::write(place.path().join("two.toml"), two).unwrap();
     let ran = done(place.path(), "run drive.toml two.toml --runs 2 --outage 20:40 --seed 1 -o out");
-    for axes in ["accel.x, accel.y", "accel.z"] {
-        assert!(ran.stderr.contains(&format!("\n{axes} reduced to white noise")), "{}", ran.stderr);
-    }
+    let told: Vec<&str> = ran.stderr.lines().filter(|line| line.contains("reduced")).collect();
+    assert!(told.len() == 1 && told[0].starts_with("reduced filter: NEES "), "{}", ran.stderr);
     let reduction = &json(&place.path().join("out/summary.json"))["reduction"];
     assert_eq!(reduction["axes"].as_array().unwrap().len(), 6);
     let ratio = reduction["quality"]["outage_end"][0]["pos_e_m"].as_f64().unwrap();
     assert!((0.5..2.0).contains(&ratio), "{ratio}");
     let ran = done(place.path(), "run drive.toml imu.toml --runs 2 --outage 20:40 --seed 1 -o same");
-    assert!(!ran.stderr.contains("reduced to"), "{}", ran.stderr);
+    assert!(!ran.stderr.contains("reduced"), "{}", ran.stderr);
     assert_eq!(json(&place.path().join("same/summary.json"))["reduction"]["axes"][0]["misfit"], 0.0);
     done(place.path(), "run drive.toml two.toml --filter full --runs 2 --outage 20:40 --seed 1 -o full");
     assert!(json(&place.path().join("full/summary.json"))["reduction"].is_null());

@@ -3,7 +3,7 @@
 use crate::cli::{Progress, Session};
 use crate::jobs::Note;
 use crate::observer::Observer;
-use crate::report::run_words;
+use crate::report::{reduction_doubt, reduction_line, unexpected_line};
 use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
@@ -29,25 +29,19 @@ impl Observer<Note> for Words<'_> {
     fn remark(&self, note: &Note) {
         let printer = &self.session.printer;
         match note {
+            Note::Warning(text) => printer.warn(text),
+            Note::Remark(text) => printer.say(text),
+            Note::Detail(text) => printer.detail(text),
             Note::LargeBias(sensor, sigma) => printer.warn(&format!(
-                "the filter starts with a bias of {sigma:.3} {} ({} of the model, its correlated processes together): \
-                 an AR1 of phi near 1? `nav-sim calibrate --parameters` bounds it",
-                sensor.unit(),
-                sensor.name()
+                "the filter starts with a bias of {sigma:.3} {} ({sensor}): an AR1 of phi near 1?",
+                sensor.unit()
             )),
-            Note::Unexpected(doubt) => printer.warn(doubt),
-            Note::Reduction(summary) => summary.lines().iter().for_each(|line| printer.say(line)),
-            Note::ReductionQuality(quality, has_full) => {
-                printer.say(&quality.line());
-                let remedy = if *has_full { "; --filter full has a state for every process" } else { "" };
-                quality.doubt().iter().for_each(|doubt| printer.warn(&format!("{doubt}{remedy}")));
+            Note::Unexpected(found) => printer.warn(&unexpected_line(found)),
+            Note::Reduction(quality) => {
+                printer.say(&reduction_line(quality));
+                reduction_doubt(quality).iter().for_each(|doubt| printer.warn(doubt));
             }
             Note::Heading(doubt) => printer.warn(&doubt.to_string()),
-            Note::Agreement(agreement) if agreement.is_broken() => printer.warn(&format!(
-                "the runs contradict the covariance analysis: {}; errors are no longer small",
-                run_words::agreement_line(agreement)
-            )),
-            Note::Agreement(_) => {}
             Note::Outage(remark) => printer.warn(&remark.to_string()),
         }
     }

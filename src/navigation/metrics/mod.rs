@@ -24,7 +24,6 @@ mod outage;
 mod quadratic_form;
 mod ratio;
 mod reduction;
-mod reduction_words;
 mod requirement;
 mod sensitivity;
 mod summary;

@@ -1,4 +1,4 @@
-//! What the reduction of a model to 15 states leaves of it, and how honest the reduced filter is.
+//! What the reduction of a model to 15 states leaves of it, and how consistent the reduced filter is.
 
 use super::estimate::PerState;
 use crate::ekf::Belief;
@@ -9,19 +9,6 @@ use crate::simulation::REPORTED;
 use crate::simulation::lincov::{Assessment, Consistency};
 use glam::DVec3;
 use serde::Serialize;
-
-/// The reported states in words.
-const IN_WORDS: [&str; 9] = [
-    "position north",
-    "position east",
-    "position down",
-    "velocity north",
-    "velocity east",
-    "velocity down",
-    "roll",
-    "pitch",
-    "yaw",
-];
 
 /// A ratio of RMSE to standard deviation that is further from 1 at the end of an outage deserves a warning.
 pub const TOLERANCE: f64 = 0.1;
@@ -169,74 +156,39 @@ impl ReductionQuality {
         }
     }
 
-    /// The state and outage (counted from 1) whose ratio is furthest from 1, and the ratio.
-    fn worst(&self) -> Option<(usize, usize, f64)> {
-        let ends = self.outage_end.iter().enumerate();
-        let all = ends.flat_map(|(o, end)| end.0.iter().enumerate().map(move |(s, r)| (s, o + 1, *r)));
-        // By the logarithm: half and twice are equally far off.
-        all.max_by(|a, b| a.2.ln().abs().total_cmp(&b.2.ln().abs()))
-    }
-
-    /// One line: how sure the filter is of itself, and what it loses.
+    /// Reported state, outage and ratio that is further from 1 than the tolerance, the furthest of all; none where none is.
     #[must_use]
-    pub fn line(&self) -> String {
-        let ratios = || self.outage_end.iter().flat_map(|e| e.0);
-        let (low, high) = (ratios().fold(f64::INFINITY, f64::min), ratios().fold(0.0, f64::max));
-        let ends = if self.outage_end.is_empty() {
-            String::new()
-        } else {
-            format!("RMSE over its own sigma {low:.2} to {high:.2} at the ends of outages, ")
-        };
-        let lost = self.lost().map_or(String::new(), |(horizontal, (state, most))| {
-            let percent = |ratio: f64| format!("{:.1} %", 100.0 * (ratio - 1.0).max(0.0));
-            let others = match most > horizontal {
-                true => format!(" and {} in {}, which loses most", percent(most), IN_WORDS[state]),
-                false => ", in every other state less".to_owned(),
-            };
-            format!(
-                "; errors there at most {} above those of --filter full in horizontal position{others}",
-                percent(horizontal)
-            )
-        });
-        format!("the reduced filter by covariance analysis: {ends}NEES {:.2} of 9{lost}", self.nees)
+    pub fn worst(&self) -> Option<(usize, usize, f64)> {
+        let ends = self.outage_end.iter().enumerate();
+        let all = ends.flat_map(|(outage, end)| end.0.iter().enumerate().map(move |(s, r)| (s, outage, *r)));
+        // By the logarithm: half and twice are equally far off.
+        let worst = all.max_by(|a, b| a.2.ln().abs().total_cmp(&b.2.ln().abs()))?;
+        (worst.2.ln().abs() > TOLERANCE.ln_1p()).then_some(worst)
     }
 
-    /// The largest ratio to the full filter at the ends of outages: of the horizontal position (north or east, whichever is
-    /// larger: their root sum of squares has no larger one), and of all states with the one that has it.
-    fn lost(&self) -> Option<(f64, (usize, f64))> {
+    /// Errors over those of the full filter at the ends of outages: the largest ratio of the horizontal position (north or east,
+    /// whichever is larger), and that of all states with its state.
+    #[must_use]
+    pub fn cost(&self) -> Option<(f64, (usize, f64))> {
         let ends = || self.rmse_over_full.iter().flatten();
         let most = |state: usize| (state, ends().map(|end| end.0[state]).fold(0.0, f64::max));
         let worst = (0..REPORTED).map(most).max_by(|a, b| a.1.total_cmp(&b.1))?;
         (worst.1 > 0.0).then_some((most(0).1.max(most(1).1), worst))
     }
-
-    /// What to be warned of: a standard deviation at an outage's end that is too small or too large.
-    #[must_use]
-    pub fn doubt(&self) -> Option<String> {
-        let (state, outage, ratio) = self.worst().filter(|(_, _, r)| r.ln().abs() > TOLERANCE.ln_1p())?;
-        let off = 100.0 * (1.0 / ratio - 1.0).abs();
-        let (size, meaning) =
-            if ratio > 1.0 { ("small", "overconfident") } else { ("large", "overcautious") };
-        Some(format!(
-            "the sigma of {} at the end of outage {outage} is {off:.0} % too {size}: there the filter reduced to 15 \
-             states is {meaning}",
-            IN_WORDS[state]
-        ))
-    }
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use super::*;
     use crate::ekf::{FilterStates, InitialSettings};
     use crate::noise::Quantization;
 
-    pub(in crate::metrics) fn summary(model: &Model) -> ReductionSummary {
+    fn summary(model: &Model) -> ReductionSummary {
         let belief = Belief::new(model, FilterStates::Reduced15, 1.0, 800.0).unwrap();
         ReductionSummary::of(model, &belief, 1.0, 800.0).unwrap()
     }
 
-    pub(in crate::metrics) fn model(second: f64) -> Model {
+    fn model(second: f64) -> Model {
         let mut processes = vec![
             Process::White(White::new(5e-5).unwrap()),
             Process::Ar1(Ar1::new(0.9995, 2e-10).unwrap()),
@@ -256,7 +208,6 @@ pub(super) mod tests {
         let a = &summary.axes[3];
         assert_eq!((a.axis.as_str(), a.model_wv == a.reduced_wv), ("gyro.x", true));
         assert!((a.bias_t_corr_s - 0.01 / 0.9995_f64.ln().abs()).abs() < 1e-6);
-        assert_eq!(summary.lines().len(), 2);
     }
 
     /// The states of a turn-on bias are no bias of the model.
@@ -305,44 +256,23 @@ pub(super) mod tests {
         assert_eq!((quality.mean.0, quality.nees), ([3.0; REPORTED], 90.0));
     }
 
-    /// The position north loses 1.9 % at the end of one outage, yaw a quarter at that of the other; without yaw the position loses most.
+    /// The position north costs 1.9 % at the end of one outage, yaw a quarter at that of the other; the sigma of yaw is off by 1.25.
     #[test]
-    fn what_a_reduction_costs_is_told_with_the_state_that_loses_most() {
+    fn cost_and_worst_state_of_a_reduction() {
         let mut ends = vec![PerState([1.0; REPORTED]); 2];
-        (ends[0].0[0], ends[1].0[8]) = (1.019, 1.24);
+        (ends[0].0[0], ends[1].0[8]) = (1.019, 1.25);
         let quality = |ends: &[PerState<f64>]| ReductionQuality {
-            outage_end: vec![PerState([1.0; REPORTED]); ends.len()],
+            outage_end: ends.to_vec(),
             mean: PerState([1.0; REPORTED]),
             nees: 9.0,
             rmse_over_full: Some(ends.to_vec()),
         };
-        let line = quality(&ends).line();
-        let words = "; errors there at most 1.9 % above those of --filter full in horizontal position and 24.0 % in yaw, which loses most";
-        assert!(line.ends_with(words), "{line}");
-        ends[1].0[8] = 1.01;
-        let line = quality(&ends).line();
-        assert!(line.ends_with(" full in horizontal position, in every other state less"), "{line}");
-        assert!(quality(&[]).line().ends_with("NEES 9.00 of 9"));
-    }
-
-    #[test]
-    fn the_warning_names_state_outage_and_direction() {
-        let mut ends = vec![PerState([1.0; REPORTED]); 2];
-        ends[1].0[8] = 1.25;
-        ends[0].0[0] = 0.95;
-        let quality = |outage_end: Vec<PerState<f64>>| ReductionQuality {
-            outage_end,
-            mean: PerState([1.0; REPORTED]),
-            nees: 9.0,
-            rmse_over_full: None,
-        };
-        let doubt = quality(ends.clone()).doubt().unwrap();
-        assert!(doubt.contains("yaw at the end of outage 2 is 20 % too small"), "{doubt}");
-        assert!(doubt.contains("overconfident"));
-        ends[1].0[8] = 0.8;
-        let doubt = quality(ends.clone()).doubt().unwrap();
-        assert!(doubt.contains("25 % too large") && doubt.contains("overcautious"), "{doubt}");
-        ends[1].0[8] = 1.09;
-        assert_eq!(quality(ends).doubt(), None);
+        assert_eq!(quality(&ends).cost(), Some((1.019, (8, 1.25))));
+        assert_eq!(quality(&ends).worst(), Some((8, 1, 1.25)));
+        assert_eq!((quality(&[]).cost(), quality(&[]).worst()), (None, None));
+        ends[1].0[8] = 1.0 / 1.25;
+        assert_eq!(quality(&ends).worst(), Some((8, 1, 0.8)));
+        ends[1].0[8] = 1.05;
+        assert_eq!(quality(&ends).worst(), None);
     }
 }

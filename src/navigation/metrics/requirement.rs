@@ -1,8 +1,9 @@
 //! Limits that the errors must keep.
 
 use super::summary::{OutageSummary, Summary};
+use super::verdict::{TOLERANCE, Verdict, VerdictKind};
 use crate::simulation::REPORTED_NAMES;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
@@ -15,10 +16,14 @@ enum Figure {
     P95,
     /// RMSE of a reported state at the end of an outage; without outages its mean over the run.
     Rmse(usize),
+    /// The verdict on the filter: its worst ratio of error to standard deviation, and that runs could have found a larger one.
+    Consistent,
 }
 
-/// A figure and the most it may be, at the end of every outage: `p95_m<=5`, `rmse_pos_e_m<=2`, `yaw_deg<=1`.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A figure and the most it may be, at the end of every outage: `p95_m<=5`, `rmse_pos_e_m<=2`, `yaw_deg<=1`; or
+/// `consistent`, a verdict.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
 pub struct Requirement {
     figure: Figure,
     limit: f64,
@@ -30,7 +35,7 @@ const DOWN: [usize; 2] = [2, 5];
 /// Not a requirement.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
-    "expected NAME<=LIMIT with a positive limit, NAME one of p50_m, p95_m, rmse_pos_e_m, yaw_deg and the other states"
+    "expected \"consistent\" or NAME<=LIMIT with a positive limit, NAME one of p50_m, p95_m, rmse_pos_e_m, yaw_deg and the other states"
 )]
 pub struct UnknownRequirement;
 
@@ -56,6 +61,9 @@ impl FromStr for Requirement {
     type Err = UnknownRequirement;
 
     fn from_str(text: &str) -> Result<Self, UnknownRequirement> {
+        if text.trim() == "consistent" {
+            return Ok(Self { figure: Figure::Consistent, limit: 1.0 + TOLERANCE });
+        }
         let (name, limit) =
             text.split_once("<=").or_else(|| text.split_once('<')).ok_or(UnknownRequirement)?;
         let limit: f64 = limit.trim().parse().map_err(|_| UnknownRequirement)?;
@@ -85,6 +93,7 @@ impl Requirement {
             Figure::P50 => "p50_m".to_owned(),
             Figure::P95 => "p95_m".to_owned(),
             Figure::Rmse(state) => format!("rmse_{}", REPORTED_NAMES[state]),
+            Figure::Consistent => "consistent".to_owned(),
         }
     }
 
@@ -93,12 +102,18 @@ impl Requirement {
     /// without runs no limit is met. All other figures hold (docs/limits.md).
     #[must_use]
     pub fn check(&self, summary: &Summary) -> Met {
+        if self.figure == Figure::Consistent {
+            let Verdict { kind, ratio, worst_outage, beyond_linear, .. } = summary.verdict;
+            let (name, met) = (self.name(), kind == VerdictKind::Consistent);
+            return Met { name, limit: self.limit, value: ratio, outage: worst_outage, met, beyond_linear };
+        }
         // Free of chance: a limit is then not kept or missed by the luck of the runs.
         let expected = summary.lincov.as_deref().unwrap_or(summary);
         let of_outage = |o: &OutageSummary| match self.figure {
             Figure::P50 => o.horizontal_error_end_m.p50,
             Figure::P95 => o.horizontal_error_end_m.p95,
             Figure::Rmse(state) => o.rmse_end.0[state],
+            Figure::Consistent => o.verdict.ratio,
         };
         let is_down = matches!(self.figure, Figure::Rmse(state) if DOWN.contains(&state));
         let is_shifted = |o: &OutageSummary| o.beyond_linear;
@@ -128,7 +143,24 @@ impl Requirement {
 
 impl fmt::Display for Requirement {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}<={}", self.name(), self.limit)
+        match self.figure {
+            Figure::Consistent => f.write_str("consistent"),
+            _ => write!(f, "{}<={}", self.name(), self.limit),
+        }
+    }
+}
+
+impl TryFrom<String> for Requirement {
+    type Error = UnknownRequirement;
+
+    fn try_from(text: String) -> Result<Self, UnknownRequirement> {
+        text.parse()
+    }
+}
+
+impl From<Requirement> for String {
+    fn from(requirement: Requirement) -> Self {
+        requirement.to_string()
     }
 }
 
@@ -143,6 +175,7 @@ mod tests {
             ("p50_m < 2.5", "p50_m<=2.5"),
             ("rmse_pos_e_m<=1", "rmse_pos_e_m<=1"),
             ("yaw_deg<=0.5", "rmse_yaw_deg<=0.5"),
+            ("consistent", "consistent"),
         ] {
             assert_eq!(text.parse::<Requirement>().unwrap().to_string(), shown);
         }

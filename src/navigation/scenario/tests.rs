@@ -50,22 +50,23 @@ fn every_key_of_the_interface_is_understood() {
 }
 
 #[test]
-fn what_the_filter_does_not_expect_is_said_of_each_sensor() {
-    let doubts = |text: &str| toml::from_str::<Scenario>(text).unwrap().doubts();
-    assert!(doubts("").is_empty());
-    let bias = doubts("imu = { turn_on_bias_gyro_rad_s = 1e-4, turn_on_bias_accel_m_s2 = 0.02 }");
-    assert!(bias.len() == 2 && bias[0].remedy.contains("initial.accel_bias_sigma_m_s2"), "{bias:?}");
+fn what_the_filter_does_not_expect_is_found_of_each_sensor() {
+    let found = |text: &str| toml::from_str::<Scenario>(text).unwrap().unexpected();
+    assert!(found("").is_empty());
+    let bias = found("imu = { turn_on_bias_gyro_rad_s = 1e-4, turn_on_bias_accel_m_s2 = 0.02 }");
+    let accel = Unexpected::TurnOnBias { sensor: Sensor::Accel, sigma: 0.02, expected: 0.0 };
+    assert!(bias.len() == 2 && bias[0] == accel, "{bias:?}");
     let expected = "imu.turn_on_bias_gyro_rad_s = 1e-4\ninitial.gyro_bias_sigma_rad_s = ";
-    assert_eq!((doubts(&format!("{expected}1e-4")).len(), doubts(&format!("{expected}4e-5")).len()), (0, 1));
-    let scale = doubts("imu.scale_ppm_accel = 300");
-    assert!(scale.len() == 1 && scale[0].remedy.contains("initial.accel_scale_sigma_ppm"), "{scale:?}");
-    assert!(doubts("imu.scale_ppm_accel = 300\nfilter.states = 21").is_empty());
-    let crossed = doubts("imu.misalignment_rad = 1e-3");
-    assert!(crossed.len() == 1 && crossed[0].remedy.contains("imu.misalignment_rad"), "{crossed:?}");
-    assert_eq!(crossed[0].sources, ["accel.misalignment", "gyro.misalignment"]);
+    assert_eq!((found(&format!("{expected}1e-4")).len(), found(&format!("{expected}4e-5")).len()), (0, 1));
+    let scale = [Unexpected::Scale { sensor: Sensor::Accel, ppm: 300.0, expected_ppm: 0.0 }];
+    assert_eq!(found("imu.scale_ppm_accel = 300"), scale);
+    assert!(found("imu.scale_ppm_accel = 300\nfilter.states = 21").is_empty());
+    let crossed = found("imu.misalignment_rad = 1e-3");
+    assert_eq!(crossed, [Unexpected::Misalignment { angle_rad: 1e-3 }]);
+    assert_eq!(crossed[0].sources(), ["accel.misalignment", "gyro.misalignment"]);
     // white noise of 2 m is known to 0.2 m from the hundred fixes of the default correlation time
-    let coloured = |m: f64| doubts(&format!("gnss.correlated_pos_sigma_m = [{m}, 0.0, 0.0]"));
-    assert!(coloured(0.09).is_empty() && coloured(0.11)[0].sources == ["gnss.correlated"]);
+    let coloured = |m: f64| found(&format!("gnss.correlated_pos_sigma_m = [{m}, 0.0, 0.0]"));
+    assert!(coloured(0.09).is_empty() && coloured(0.11)[0].sources() == ["gnss.correlated"]);
 }
 
 /// Ten seconds at rest.

@@ -1,13 +1,13 @@
 //! The sources of errors on the page of a run directory.
 
-use super::run_charts::budget_chart;
-use super::{STATES, window};
-use crate::report::page::{Cell, Page, Table};
+use super::charts::budget_chart;
+use crate::report::STATES;
+use nav_sim_document::{Cell, Document, Table, window};
 use nav_sim_navigation::metrics::{Budget, OutageSummary, Summary};
 use nav_sim_navigation::simulation::REPORTED_NAMES;
 
 /// What the errors at the ends of the outages that are shown are made of, beside what the filter believes.
-pub(super) fn budgets(summary: &Summary, shown: &[usize], page: &mut Page) {
+pub(super) fn budgets(summary: &Summary, shown: &[usize], page: &mut Document) {
     let kinds = |o: &'_ OutageSummary| {
         [
             ("true errors", o.budget.clone(), "budget"),
@@ -19,7 +19,7 @@ pub(super) fn budgets(summary: &Summary, shown: &[usize], page: &mut Page) {
         let o = &summary.outages[*i];
         let word = |kind: &str| if kind == "true errors" { "true" } else { "believed" };
         let known = kinds(o).into_iter().filter_map(|(kind, budget, _)| {
-            Some((format!("{}, {}", window((o.start_s, o.end_s)), word(kind)), budget?))
+            Some((format!("{}, {}", window(o.start_s, o.end_s), word(kind)), budget?))
         });
         bars.extend(known);
     }
@@ -33,7 +33,7 @@ pub(super) fn budgets(summary: &Summary, shown: &[usize], page: &mut Page) {
         for (kind, budget, key) in kinds(o) {
             let Some(budget) = budget else { continue };
             let title =
-                format!("Sources of errors at the end of {}: {kind} (shares)", window((o.start_s, o.end_s)));
+                format!("Sources of errors at the end of {}: {kind} (shares)", window(o.start_s, o.end_s));
             let table = budget_table(&budget, &format!("/outages/{i}/{key}"));
             page.folded(&title, |page| page.table(&table));
         }

@@ -7,7 +7,7 @@ use std::fmt::Debug;
 use std::str::FromStr;
 
 /// One of some words, each with what it means.
-pub(super) fn words<T>(words: &'static [(&'static str, &'static str)]) -> impl TypedValueParser<Value = T>
+pub(crate) fn words<T>(words: &'static [(&'static str, &'static str)]) -> impl TypedValueParser<Value = T>
 where
     T: FromStr<Err: Debug> + Clone + Send + Sync + 'static,
 {
@@ -16,7 +16,7 @@ where
 }
 
 /// A finite number ≥ 0.
-pub(super) fn non_negative(text: &str) -> Result<f64, String> {
+pub(crate) fn non_negative(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(x) if x.is_finite() && x >= 0.0 => Ok(x),
         _ => Err("not a finite number ≥ 0".into()),
@@ -24,7 +24,7 @@ pub(super) fn non_negative(text: &str) -> Result<f64, String> {
 }
 
 /// A sample rate (Hz).
-pub(super) fn rate_hz(text: &str) -> Result<f64, String> {
+pub(crate) fn rate_hz(text: &str) -> Result<f64, String> {
     match positive(text)? {
         x if x <= MAX_RATE_HZ => Ok(x),
         _ => Err(format!("more than {MAX_RATE_HZ} samples a second")),
@@ -32,7 +32,7 @@ pub(super) fn rate_hz(text: &str) -> Result<f64, String> {
 }
 
 /// A finite number > 0.
-pub(super) fn positive(text: &str) -> Result<f64, String> {
+pub(crate) fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(x) if x.is_finite() && x > 0.0 => Ok(x),
         _ => Err("not a finite number > 0".into()),
@@ -40,7 +40,7 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
 }
 
 /// Two times (s): `1s:100s`, also without the unit.
-pub(super) fn seconds_range(text: &str) -> Result<(f64, f64), String> {
+pub(crate) fn seconds_range(text: &str) -> Result<(f64, f64), String> {
     let seconds = |text: &str| {
         let text = text.trim();
         // as results have it
@@ -55,10 +55,6 @@ pub(super) fn seconds_range(text: &str) -> Result<(f64, f64), String> {
     }
 }
 
-/// Two finite numbers ≥ 0.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Pair(pub(super) [f64; 2]);
-
 /// Numbers between commas.
 fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
     let parsed: Option<Vec<f64>> =
@@ -67,13 +63,13 @@ fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
 }
 
 /// `A,B`.
-pub(super) fn pair(text: &str) -> Result<Pair, String> {
+pub(crate) fn pair(text: &str) -> Result<[f64; 2], String> {
     let pair = numbers::<2>(text).filter(|p| p.iter().all(|x| *x >= 0.0));
-    pair.map(Pair).ok_or_else(|| "expected two numbers ≥ 0, such as 0.1,0.002".into())
+    pair.ok_or_else(|| "expected two numbers ≥ 0, such as 0.1,0.002".into())
 }
 
 /// A member of a closed set by its name; help and completions list the names.
-pub(super) fn one_of<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
+pub(crate) fn one_of<T>(names: &'static [&'static str]) -> impl TypedValueParser<Value = T>
 where
     T: FromStr<Err = UnknownName> + Clone + Send + Sync + 'static,
 {

@@ -1,13 +1,8 @@
 //! The figures of a run.
 
-use super::{STATES, error_of};
-use crate::report::page::{Axis, Chart, Colour, Interval, Mark, Panel, Series, svg};
+use crate::report::{STATES, error_of};
+use nav_sim_document::{Axis, Chart, Colour, Interval, Mark, Panel, Series};
 use nav_sim_navigation::metrics::{Budget, EpochMetrics, FanEpoch, OutageSummary, Summary};
-
-/// What of it most people want as a picture.
-pub(crate) fn run_svg(epochs: &[EpochMetrics], fan: &[FanEpoch], summary: &Summary) -> String {
-    svg("Navigation errors", &[horizontal(epochs, summary), fan_chart(fan, summary), nees(epochs, summary)])
-}
 
 /// The outages (start, end) (s).
 pub(super) fn windows(summary: &Summary) -> Vec<(f64, f64)> {

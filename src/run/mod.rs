@@ -1,0 +1,48 @@
+//! The main job as one call: a request, what is read for it, the job, the answer and its document.
+//!
+//! ```
+//! use nav_sim::run::{RunRequest, run};
+//!
+//! let request = RunRequest {
+//!     trajectory: "trajectories/figure_eight.toml".into(),
+//!     model: "calib_data/tactical.toml".into(),
+//!     outages: vec!["60:90".parse()?],
+//!     runs: Some(2),
+//!     seed: Some(1),
+//!     ..RunRequest::default()
+//! };
+//! let answer = run(&request, &())?;
+//! // Two runs are too few to say that the filter is right.
+//! assert_eq!(answer.navigation.summary.verdict.kind.name(), "undecided");
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod answer;
+mod budgets;
+mod charts;
+mod document;
+mod error;
+mod prepared;
+pub(crate) mod read;
+mod request;
+
+pub(crate) use answer::RUN_FILES;
+pub use answer::RunAnswer;
+pub use error::RunError;
+pub use prepared::PreparedRun;
+pub use request::{FilterRequest, OutageFlag, RunRequest};
+pub(crate) use request::{checked_scenario, windows_of};
+
+use crate::jobs::Note;
+use crate::observer::Observer;
+
+/// Seed of a run for which neither the request nor the scenario has one, where nobody draws it.
+const SEED: u64 = 1;
+
+/// Does what `nav-sim run` does: reads the files, places the outages, navigates, checks the requirements.
+///
+/// # Errors
+/// What is wrong with a file or a setting, or does not fit together; what the method cannot do.
+pub fn run(request: &RunRequest, observer: &dyn Observer<Note>) -> Result<RunAnswer, RunError> {
+    request.prepare(|| SEED, observer)?.navigate(observer)
+}
