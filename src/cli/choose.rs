@@ -5,9 +5,8 @@ use super::jobs::unknown_model;
 use super::parse::words;
 use super::pictures::PlotArgs;
 use super::read::placed;
-use super::recordings::{RecordingArgs, Said};
+use super::recordings::{ReadingArgs, Said};
 use super::run::Words;
-use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
 use crate::choose::{Candidate, Inflation};
 use crate::formats::model_file::CalibrationNote;
@@ -65,9 +64,6 @@ pub(crate) struct Args {
     /// What DR-AWV drops at each end of each scale: a number, or a share such as 30%
     #[arg(long, value_name = "A", default_value_t)]
     trim: Trim,
-    /// Which signals are replicates of one another: sensor or axes [default: sensor]
-    #[arg(long, value_name = "HOW")]
-    pool: Option<Pool>,
     /// Scenario file: receiver, start, what filters expect (see `nav-sim schema scenario`)
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
@@ -77,9 +73,7 @@ pub(crate) struct Args {
     #[arg(long, short, value_name = "DIR", default_value = "out/choice")]
     out: PathBuf,
     #[command(flatten)]
-    recordings: RecordingArgs,
-    #[command(flatten)]
-    tuning: TuningArgs,
+    recordings: ReadingArgs,
 }
 
 pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
@@ -94,19 +88,11 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let options = CalibrationOptions {
         reading: args.recordings.options(),
         skip_warm_up: args.recordings.skips_warm_up(),
-        scales: args.tuning.levels(),
-        estimators: EstimatorChoice::default(),
-        pool: args.pool,
-        settings: Settings { trim: args.trim, tuning: args.tuning.tuning()?, ..Settings::default() },
+        settings: Settings { trim: args.trim, ..Settings::default() },
         bootstrap: Some(Bootstrap { seed, ..Bootstrap::default() }),
         turn_on: false,
+        ..CalibrationOptions::default()
     };
-    if let Some(wanted) = &options.reading.channels
-        && let Some(missing) = Channel::ALL.into_iter().find(|c| !wanted.contains(c))
-    {
-        let message = format!("--axes leaves {missing} out, and candidates navigate with all six signals");
-        return Err(Failure::input(message).hint("leave --axes out"));
-    }
     let drive = ChoiceDrive { trajectory, scenario, outages: outages.clone(), seed, runs: args.runs };
     let words = Words::new(session);
     let chosen = jobs::choose(&args.inputs, &options, &candidates, drive, &mut Said::new(session), &words)?;
@@ -126,7 +112,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     };
     chosen.write(&args.out, &args.trajectory, note, &report)?;
     let document = session.answer(&report);
-    args.plot.write(|| document.svg(), session)?;
+    args.plot.draw(&document, session)?;
     session.say(format!(
         "wrote {0}: report.html, ranking.json, model.toml (nav-sim export {0}/model.toml)",
         args.out.display()

@@ -84,7 +84,7 @@ pub(super) fn compare(args: &Args, cause: &str, session: &Session) -> Result<Com
     };
     atomic::write(out, report::json(&found))?;
     atomic::write(&page, document.html())?;
-    args.plot.write(|| document.svg(), session)?;
+    args.plot.draw(&document, session)?;
     session.say(format!("wrote {}, {}", out.display(), page.display()));
     Ok(found)
 }

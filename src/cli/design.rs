@@ -2,7 +2,7 @@
 
 use super::calibrate::ESTIMATORS;
 use super::parse;
-use super::pictures::PageArgs;
+use super::pictures::PlotArgs;
 use super::{Failure, Session, read};
 use crate::formats::model_file::ModelFile;
 use crate::jobs::{self, DesignInputs, Destination, NavigateInputs, TrueImu};
@@ -51,7 +51,7 @@ pub(crate) struct Args {
     #[arg(long = "outage", value_name = "START:END", requires = "trajectory")]
     outages: Vec<OutageFlag>,
     #[command(flatten)]
-    pictures: PageArgs,
+    plot: PlotArgs,
 }
 
 /// The estimators of several recordings.
@@ -64,7 +64,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     if args.hours.is_some_and(|hours| hours > LONGEST_H) {
         return Err(Failure::input("--hours: longer than a year"));
     }
-    let _pictures = args.pictures.claim(std::iter::once(&args.model).chain(&args.trajectory), session)?;
+    let _pictures = args.plot.claim(std::iter::once(&args.model).chain(&args.trajectory), session)?;
     let file = read::model(&args.model, session)?;
     let mut scenario = scenario(args)?;
     let mut navigation = None;
@@ -81,7 +81,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         navigation.as_mut().map(|(inputs, outages)| Destination { inputs, scenario: &scenario, outages });
     let designs = Designs { schema_version: 1, designs: designs(args, &file, destination, session)? };
     let document = session.answer(&designs);
-    args.pictures.draw(&document, session)
+    args.plot.draw(&document, session)
 }
 
 /// Drives are analysed, with a state for every process.

@@ -6,69 +6,62 @@ use crate::report::page::{self, Form};
 use nav_sim_document::Document;
 use std::path::{Path, PathBuf};
 
-/// The figures as a file.
+/// Files that show a result.
 #[derive(clap::Args, Debug)]
 pub(super) struct PlotArgs {
-    /// Also write the figures as a picture: .svg (.png with the feature `pictures`)
-    #[arg(long, value_name = "FILE")]
-    plot: Option<PathBuf>,
+    /// Also write the page (.html) or its figures (.svg; .png with the feature `pictures`) (repeatable)
+    #[arg(long = "plot", value_name = "FILE")]
+    plots: Vec<PathBuf>,
 }
 
 impl PlotArgs {
-    /// Claims the picture; refuses one that is an input or cannot be made, or of another form.
-    pub(super) fn claim(
-        &self,
-        inputs: impl IntoIterator<Item: AsRef<Path>>,
-        session: &Session,
-    ) -> Result<Option<Claim>, Failure> {
-        self.plot.as_deref().map(|path| claim_picture(path, inputs, session)).transpose()
-    }
-
-    /// Writes the picture, if one is asked for.
-    pub(super) fn write(&self, picture: impl FnOnce() -> String, session: &Session) -> Result<(), Failure> {
-        if let Some(path) = &self.plot {
-            write_picture(path, picture())?;
-            session.wrote(path);
-        }
-        Ok(())
-    }
-}
-
-/// A page, and its figures as a file.
-#[derive(clap::Args, Debug)]
-pub(super) struct PageArgs {
-    /// Write a page with figures
-    #[arg(long, value_name = "FILE.html")]
-    page: Option<PathBuf>,
-    #[command(flatten)]
-    plot: PlotArgs,
-}
-
-impl PageArgs {
-    /// Claims page and picture; refuses what is an input or cannot be made, and a picture of another form.
+    /// Claims the files; refuses what is an input or cannot be made, or has another ending.
     pub(super) fn claim(
         &self,
         inputs: impl IntoIterator<Item: AsRef<Path>> + Clone,
         session: &Session,
-    ) -> Result<[Option<Claim>; 2], Failure> {
-        let page = claim_output(self.page.as_deref(), inputs.clone(), Written::Page, session)?;
-        Ok([page, self.plot.claim(inputs, session)?])
+    ) -> Result<Vec<Claim>, Failure> {
+        self.plots.iter().map(|path| claim_picture(path, inputs.clone(), session)).collect()
     }
 
     /// Writes what is asked for of a document.
     pub(super) fn draw(&self, document: &Document, session: &Session) -> Result<(), Failure> {
-        let written = self.page.iter().try_for_each(|path| session.write(path, document.html()));
-        self.plot.write(|| document.svg(), session).and(written)
+        self.write(document, || document.svg(), session)
+    }
+
+    /// The same with figures of its own.
+    pub(super) fn write(
+        &self,
+        document: &Document,
+        figures: impl Fn() -> String,
+        session: &Session,
+    ) -> Result<(), Failure> {
+        self.plots.iter().try_for_each(|path| {
+            match is_page(path) {
+                true => atomic::write(path, document.html())?,
+                false => write_picture(path, figures())?,
+            }
+            session.wrote(path);
+            Ok(())
+        })
     }
 }
 
-/// Claims a picture before the work; refuses one of another form.
+fn is_page(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("html"))
+}
+
+/// Claims a page or a picture before the work; refuses one of another form.
 pub(super) fn claim_picture(
     path: &Path,
     inputs: impl IntoIterator<Item: AsRef<Path>>,
     session: &Session,
 ) -> Result<Claim, Failure> {
-    let kind = if form(path)? == Form::Svg { Written::Svg } else { Written::Png };
+    let kind = match is_page(path) {
+        true => Written::Page,
+        false if form(path)? == Form::Svg => Written::Svg,
+        false => Written::Png,
+    };
     claim_own(path, inputs, kind, session)
 }
 

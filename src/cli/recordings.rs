@@ -6,12 +6,12 @@ use super::{Progress, Session};
 use crate::formats::recordings::{Gaps, ReadOptions, Report};
 use crate::jobs::{Remark, Remarks};
 use crate::report::six_digits;
-use nav_sim_signal::imu::Sensor;
+use nav_sim_signal::imu::{Channel, Sensor};
 
 /// How recordings are read.
 #[derive(clap::Args, Debug)]
 #[command(next_help_heading = "Recordings")]
-pub(crate) struct RecordingArgs {
+pub(crate) struct ReadingArgs {
     /// Sample rate (Hz) of files without a time column
     #[arg(long, value_name = "HZ", value_parser = super::parse::rate_hz)]
     rate_hz: Option<f64>,
@@ -21,6 +21,14 @@ pub(crate) struct RecordingArgs {
     /// What to do where the time jumps or stands still
     #[arg(long, value_parser = words::<Gaps>(GAPS), default_value_t)]
     gaps: Gaps,
+}
+
+/// How recordings are read, and which of their signals are used.
+#[derive(clap::Args, Debug)]
+#[command(next_help_heading = "Recordings")]
+pub(crate) struct RecordingArgs {
+    #[command(flatten)]
+    pub(crate) reading: ReadingArgs,
     /// Signals to use: all, accel, gyro, x, accel.x, … (repeatable or comma-separated; default: all)
     #[arg(long, value_name = "AXES", value_delimiter = ',', value_parser = ChannelSet::named)]
     axes: Vec<ChannelSet>,
@@ -51,7 +59,7 @@ fn skip(text: &str) -> Result<Skip, String> {
     }
 }
 
-impl RecordingArgs {
+impl ReadingArgs {
     /// Whether each recording's own warm-up is left out.
     pub(crate) fn skips_warm_up(&self) -> bool {
         self.skip_s == Skip::Auto
@@ -62,10 +70,37 @@ impl RecordingArgs {
         self.rate_hz
     }
 
+    /// What decides what is read of the files, for the provenance of a result.
+    pub(crate) fn provenance(&self) -> toml::Table {
+        let skip_s = match self.skip_s {
+            Skip::Seconds(s) => s.into(),
+            Skip::Auto => "auto".into(),
+        };
+        let mut table = toml::Table::new();
+        table.insert("skip_s".to_owned(), skip_s);
+        table.insert("gaps".to_owned(), self.gaps.name().into());
+        if let Some(rate_hz) = self.rate_hz {
+            table.insert("rate_hz_given".to_owned(), rate_hz.into());
+        }
+        table
+    }
+
+    /// How the files are to be read.
+    pub(crate) fn options(&self) -> ReadOptions {
+        let skip_s = if let Skip::Seconds(s) = self.skip_s { s } else { 0.0 };
+        ReadOptions { rate_hz: self.rate_hz, skip_s, gaps: self.gaps, ..ReadOptions::default() }
+    }
+}
+
+impl RecordingArgs {
+    fn channels(&self) -> impl Iterator<Item = &Channel> {
+        self.axes.iter().flat_map(|set| &set.0)
+    }
+
     /// The sensor whose signals alone are asked for.
     pub(crate) fn sensor(&self) -> Option<Sensor> {
         let of_sensor = |sensor: &Sensor| {
-            let mut channels = self.axes.iter().flat_map(|set| &set.0).peekable();
+            let mut channels = self.channels().peekable();
             channels.peek().is_some() && channels.all(|channel| channel.sensor == *sensor)
         };
         Sensor::ALL.into_iter().find(of_sensor)
@@ -73,38 +108,18 @@ impl RecordingArgs {
 
     /// What decides what is read of the files, for the provenance of a result.
     pub(crate) fn provenance(&self) -> toml::Table {
-        let mut table = toml::Table::new();
-        let mut put = |key: &str, value: toml::Value| table.insert(key.to_owned(), value);
-        put(
-            "skip_s",
-            match self.skip_s {
-                Skip::Seconds(s) => s.into(),
-                Skip::Auto => "auto".into(),
-            },
-        );
-        put("gaps", self.gaps.name().into());
+        let mut table = self.reading.provenance();
         if !self.axes.is_empty() {
-            let channels = self.axes.iter().flat_map(|set| &set.0).map(ToString::to_string);
-            put("axes", channels.collect::<Vec<_>>().into());
-        }
-        if let Some(rate_hz) = self.rate_hz {
-            put("rate_hz_given", rate_hz.into());
+            let channels = self.channels().map(ToString::to_string);
+            table.insert("axes".to_owned(), channels.collect::<Vec<_>>().into());
         }
         table
     }
 
     /// How the files are to be read.
     pub(crate) fn options(&self) -> ReadOptions {
-        ReadOptions {
-            rate_hz: self.rate_hz,
-            skip_s: match self.skip_s {
-                Skip::Seconds(s) => s,
-                Skip::Auto => 0.0,
-            },
-            gaps: self.gaps,
-            channels: (!self.axes.is_empty()).then(|| self.axes.iter().flat_map(|s| s.0.clone()).collect()),
-            ..ReadOptions::default()
-        }
+        let channels = (!self.axes.is_empty()).then(|| self.channels().copied().collect());
+        ReadOptions { channels, ..self.reading.options() }
     }
 }
 

@@ -1,6 +1,6 @@
 //! `nav-sim require`: which IMU a limit needs, and what a given one makes of it.
 
-use super::pictures::{PageArgs, claim_output};
+use super::pictures::{PlotArgs, claim_output};
 use super::{Failure, Session, parse, read, turn_on};
 use crate::formats::atomic::Written;
 use crate::formats::datasheet::{self, CATALOGUE, Datasheet};
@@ -50,9 +50,6 @@ pub(crate) struct Args {
     /// Scenario file: receiver, start, IMU rate (see `nav-sim schema scenario`)
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
-    /// Longest correlation time of the biases of the required IMU (s)
-    #[arg(long, value_name = "SECONDS", value_parser = parse_corr_time, default_value = "300", conflicts_with = "model")]
-    corr_time_s: f64,
     /// Also print a curve of equal drift: eight gyroscope biases, and the velocity random walk that each allows
     #[arg(long, conflicts_with = "model")]
     iso_drift: bool,
@@ -60,7 +57,7 @@ pub(crate) struct Args {
     #[arg(long, value_name = "DIR", num_args = 0..=1, conflicts_with_all = ["model", "iso_drift", "out"])]
     catalogue: Option<Option<PathBuf>>,
     #[command(flatten)]
-    pictures: PageArgs,
+    plot: PlotArgs,
     /// Model file to write, of the required IMU
     #[arg(long, short, value_name = "FILE", conflicts_with = "model")]
     out: Option<PathBuf>,
@@ -106,15 +103,6 @@ fn parse_limit(text: &str) -> Result<Limit, String> {
     limit().ok_or_else(|| format!("expected NAME<=LIMIT with a positive limit, NAME one of {names}"))
 }
 
-/// Beyond, the bias has more processes a factor of 16 apart than a filter has states for.
-const LONGEST_CORR_TIME_S: f64 = 1e9;
-
-fn parse_corr_time(text: &str) -> Result<f64, String> {
-    let is_within = |s: &f64| *s <= LONGEST_CORR_TIME_S;
-    let s = parse::positive(text)?;
-    Some(s).filter(is_within).ok_or_else(|| format!("more than {LONGEST_CORR_TIME_S:e} s"))
-}
-
 fn parse_ask(text: &str) -> Result<Ask, String> {
     match text {
         "longest" => Ok(Ask::Longest),
@@ -152,7 +140,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
             Failure::input("--outage longest needs a MODEL").hint("without one, give a length in seconds")
         );
     }
-    let _pictures = args.pictures.claim(std::iter::once(&args.trajectory).chain(&args.model), session)?;
+    let _pictures = args.plot.claim(std::iter::once(&args.trajectory).chain(&args.model), session)?;
     let asked = requirements(args, session)?;
     match (&args.model, &args.catalogue) {
         (Some(path), _) => given(path, args, &asked, session),
@@ -164,14 +152,14 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
 /// The IMU that is needed.
 fn sought(args: &Args, requirements: &Requirements, session: &Session) -> Result<(), Failure> {
     let _own = claim_output(args.out.as_deref(), [&args.trajectory], Written::Required, session)?;
-    let needed = requirements.needed(args.corr_time_s, args.iso_drift).map_err(|e| {
+    let needed = requirements.needed(args.iso_drift).map_err(|e| {
         let hint = match e {
             RequireError::Loose { .. } => "a smaller limit, or a longer outage",
             _ => "a larger limit, a shorter outage, or a better receiver ([gnss] of --scenario)",
         };
         Failure::input(e).hint(hint)
     })?;
-    let drawn = args.pictures.draw(&session.answer(&needed), session);
+    let drawn = args.plot.draw(&session.answer(&needed), session);
     if let Some(out) = &args.out {
         model_file::write(out, &requirements.model_file(&needed))?;
         session.wrote(out);
@@ -192,7 +180,7 @@ fn given(path: &Path, args: &Args, requirements: &Requirements, session: &Sessio
     }
     let model = read::at_rate(path, &file.model, scenario.imu.rate_hz, session)?;
     let judged = requirements.judged(&scenario, &model).map_err(unusable)?;
-    args.pictures.draw(&session.answer(&judged), session)?;
+    args.plot.draw(&session.answer(&judged), session)?;
     let Some(margins) = judged.margins.filter(|margins| !margins.met()) else { return Ok(()) };
     let Worst { limit, value, .. } = margins.worst;
     let [value, most] = [value, limit.most].map(|x| limit.quantity.shown(x));
@@ -211,7 +199,7 @@ fn ranked(
         None => catalogue(requirements)?,
     };
     let ranking = requirements.ranked(&units).map_err(Failure::input)?;
-    args.pictures.draw(&session.answer(&ranking), session)?;
+    args.plot.draw(&session.answer(&ranking), session)?;
     if ranking.is_met() {
         return Ok(());
     }

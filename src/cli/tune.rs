@@ -1,7 +1,7 @@
 //! `nav-sim tune`: factors on a noise model that make its filter consistent.
 
 use super::parse::one_of;
-use super::pictures::{PageArgs, claim_output};
+use super::pictures::{PlotArgs, claim_output};
 use super::read::placed;
 use super::run::no_filter;
 use super::{Failure, Session, read, turn_on};
@@ -57,14 +57,11 @@ pub(crate) struct Args {
     /// Filter to tune: full, 15 or 21 (these take longer); the filter that `run` makes by default is assessed too
     #[arg(long, value_name = "STATES", default_value = "full")]
     filter: FilterStates,
-    /// Factors may be below 1
-    #[arg(long)]
-    allow_smaller: bool,
     /// Scenario file: receiver, start, IMU rate (see `nav-sim schema scenario`)
     #[arg(long, value_name = "FILE")]
     scenario: Option<PathBuf>,
     #[command(flatten)]
-    pictures: PageArgs,
+    plot: PlotArgs,
     /// Model file to write
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -80,7 +77,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     refuse_recordings(args)?;
     let mut scenario = checked_scenario(args.scenario.as_deref(), &args.outages)?;
     let files = files(args)?;
-    let _pictures = args.pictures.claim(files.iter().map(|f| &f.path), session)?;
+    let _pictures = args.plot.claim(files.iter().map(|f| &f.path), session)?;
     let _own = claim_output(args.out.as_deref(), files.iter().map(|f| &f.path), Written::Tuned, session)?;
     let file = read::model(&args.model, session)?;
     let model = read::at_rate(&args.model, &file.model, scenario.imu.rate_hz, session)?;
@@ -96,11 +93,10 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
         states: args.filter,
         per: args.per,
         aim: args.aim,
-        allow_smaller: args.allow_smaller,
     });
     let result = result.map_err(|e| no_filter(&e, &args.model, args.scenario.as_deref(), RARE_FIXES))?;
     let document = session.answer(&result);
-    let drawn = args.pictures.draw(&document, session);
+    let drawn = args.plot.draw(&document, session);
     if let Some(unmet) = result.unmet() {
         drawn?;
         let failure = Failure::bound(format!("{}: {unmet}; no tuned model is written", args.model.display()));

@@ -1,7 +1,7 @@
 //! `nav-sim wv`: wavelet variance of static recordings.
 
 use super::parse::words;
-use super::pictures::{PageArgs, claim_output};
+use super::pictures::{PlotArgs, claim_output};
 use super::recordings::{RecordingArgs, Said};
 use super::tuning::TuningArgs;
 use super::{Failure, Session, read};
@@ -35,7 +35,7 @@ pub(crate) struct Args {
     #[arg(long, short, value_name = "FILE")]
     out: Option<PathBuf>,
     #[command(flatten)]
-    pictures: PageArgs,
+    plot: PlotArgs,
 }
 
 const INTERVALS: [(&str, &str); 2] = [
@@ -47,11 +47,11 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let tuning = args.tuning.tuning()?;
     let inputs = read::listed(&args.files)?;
     let _own = claim_output(args.out.as_deref(), &inputs, Written::Signals, session)?;
-    let _pictures = args.pictures.claim(&inputs, session)?;
+    let _pictures = args.plot.claim(&inputs, session)?;
     let intervals = args.intervals;
     let options = WaveletOptions {
         reading: args.recordings.options(),
-        skip_warm_up: args.recordings.skips_warm_up(),
+        skip_warm_up: args.recordings.reading.skips_warm_up(),
         scales: args.tuning.levels(),
         tuning,
         intervals,
@@ -59,7 +59,7 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let file = jobs::wavelet_variances(&args.files, &options, &mut Said::new(session))?;
     let json = report::json(&file);
     let written = args.out.iter().try_for_each(|out| session.write(out, &json));
-    let drawn = args.pictures.draw(&file.document(), session);
+    let drawn = args.plot.draw(&file.document(), session);
     match () {
         () if session.csv() => session.result(report::signals_csv(&file).trim_end()),
         () if args.per_file && !session.json() => session.result(side_by_side(&file)),

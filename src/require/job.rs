@@ -43,6 +43,9 @@ impl Ask {
     }
 }
 
+/// Correlation time of the biases of an IMU that is sought (s).
+const CORRELATION_TIME_S: f64 = 300.0;
+
 /// Earliest start of an outage where nothing else is said (s): by then a filter has aligned itself.
 const SETTLED_S: f64 = 300.0;
 /// An outage of which only the length is given begins at every whole second, at fewer where all of them together would
@@ -102,15 +105,15 @@ impl Requirements {
         Ok(Self { scenario, trajectory, limits, ask, first_s })
     }
 
-    /// The IMU that is needed, biases with this correlation time (s), and a curve of equal drift if wished.
+    /// The IMU that is needed, and a curve of equal drift if wished.
     ///
     /// # Errors
     /// When no IMU keeps the limits, or trajectory and rates do not fit together.
-    pub(crate) fn needed(&self, t_corr_s: f64, iso_drift: bool) -> Result<NeededImu, RequireError> {
+    pub(crate) fn needed(&self, iso_drift: bool) -> Result<NeededImu, RequireError> {
         let outages = self.outages();
         let course = self.course(&outages)?;
         let scenario = &self.with_stated_turn_on();
-        let need = Need { course: &course, scenario, limits: &self.limits, t_corr_s };
+        let need = Need { course: &course, scenario, limits: &self.limits, t_corr_s: CORRELATION_TIME_S };
         let (imu, shares) = need.allocated()?;
         let model = imu.model(self.scenario.imu.rate_hz);
         let ends = course.drifts(scenario, &model)?;

@@ -21,9 +21,7 @@ impl Answer for TuneResult {
             None => Tone::Doubtful,
         };
         let mut document = Document::new("Factors on a noise model", tone, self.verdict());
-        if found == VerdictKind::Underconfident && self.is_unchanged() {
-            document.note(Importance::Remark, "--allow-smaller seeks factors below 1");
-        } else if found == VerdictKind::Underconfident && self.aim == Aim::Worst {
+        if found == VerdictKind::Underconfident && self.aim == Aim::Worst {
             let why =
                 "no error exceeds its sigma in any truth; --for mean aims at the right NEES in the mean";
             document.note(Importance::Remark, why);

@@ -32,8 +32,6 @@ pub(crate) struct TuneInputs<'a> {
     pub per: Per,
     /// Condition under which the filter is consistent.
     pub aim: Aim,
-    /// Whether factors may be below 1.
-    pub allow_smaller: bool,
 }
 
 /// What may be true of an IMU: some models, or one and the draws of its calibration.
@@ -79,7 +77,7 @@ pub(crate) fn tune(inputs: &TuneInputs<'_>) -> Result<TuneResult, BeliefError> {
         filter: &tuned,
         per: *per,
         aim: *aim,
-        allow_smaller: inputs.allow_smaller,
+        allow_smaller: false,
     };
     let factors = task.factors()?;
     let ones: Vec<Factor> = factors.iter().map(|f| Factor { on_variance: 1.0, ..f.clone() }).collect();

@@ -189,7 +189,7 @@ def make(nav_sim, place):
         os.symlink(here / name, place / name)
     model = "calib_data/consumer_mems.toml"
     run(f"synthesize {model} --replicates 4 --samples 32768 --spread --seed 1 -o static")
-    run("wv static/replicate_1.csv --page wv.html")
+    run("wv static/replicate_1.csv --plot wv.html")
     run("calibrate static --seed 1 --bootstrap 50 --format json -o model.toml", keep="fits.json")
     for run_of, extra in [("I_awv", ""), ("I_dr-awv", f"--truth {model}")]:
         made = "model.toml" if run_of == "I_dr-awv" else model
@@ -206,17 +206,17 @@ def make(nav_sim, place):
     run("batch run examples/quick_study.toml -o study")
     run("batch merge examples/quick_study.toml -o study", codes=(0, 3))
     tuned = "tune calib_data/tactical.toml --truth calib_data/consumer_mems.toml --outage 60:90"
-    run(f"{tuned} --page tuned.html --format json", keep="tuned.json")
+    run(f"{tuned} --plot tuned.html --format json", keep="tuned.json")
     asked = "require trajectories/figure_eight.toml"
-    run(f"{asked} --outage 60 --p95-m 50 --iso-drift --page needed.html --format json", keep="needed.json")
-    run(f"{asked} calib_data/tactical.toml --outage 60:120 --rmse-m 100 --page given.html --format json",
+    run(f"{asked} --outage 60 --p95-m 50 --iso-drift --plot needed.html --format json", keep="needed.json")
+    run(f"{asked} calib_data/tactical.toml --outage 60:120 --rmse-m 100 --plot given.html --format json",
         keep="given.json", codes=(0, 3))
-    run(f"{asked} --outage 60 --p95-m 50 --catalogue --page ranked.html --format json", keep="ranked.json",
+    run(f"{asked} --outage 60 --p95-m 50 --catalogue --plot ranked.html --format json", keep="ranked.json",
         codes=(0, 3))
-    run("design calib_data/consumer_mems.toml --draws 40 --estimator awv --page designs.html --format json",
+    run("design calib_data/consumer_mems.toml --draws 40 --estimator awv --plot designs.html --format json",
         keep="designs.json")
     run("design calib_data/tactical.toml --recordings 4 --hours 1 --draws 40 --trajectory trajectories/figure_eight.toml "
-        "--outage 300:360 --page design.html --format json", keep="design.json")
+        "--outage 300:360 --plot design.html --format json", keep="design.json")
     pages = [("wv.html", None), ("model.html", "fits.json"), ("runs/I_awv/report.html", "runs/I_awv/summary.json"),
              ("runs/lincov/report.html", "runs/lincov/summary.json"), ("comparison.html", "comparison.json"),
              ("fused/report.html", "fused/summary.json"), ("efficiency/report.html", "efficiency/results.json"),

@@ -54,7 +54,7 @@ fn a_closed_pipe_loses_neither_files_nor_the_verdict() {
     assert_eq!(code(&format!("{run} bad --truth rough.toml")), 3);
     assert_eq!(code(&format!("{run} good")), 0);
     assert_eq!(code("compare good --reference bad -o comparison.json --plot ratios.svg"), 0);
-    assert_eq!(code("tune imu.toml --truth rough.toml -o tuned.toml --page tuned.html"), 0);
+    assert_eq!(code("tune imu.toml --truth rough.toml -o tuned.toml --plot tuned.html"), 0);
     for file in ["comparison.json", "comparison.html", "ratios.svg", "tuned.toml", "tuned.html"] {
         assert!(place.path().join(file).exists(), "{file}");
     }

@@ -33,7 +33,7 @@ fn files_take_the_place_of_their_kind_and_directories_that_of_the_same_run() {
         ("export imu.toml --target kalibr -o imu.yaml", "--policy envelope", "imu.yaml"),
         ("datasheet --unit stim300 -o sheet.toml", "--rate-hz 200", "sheet.toml"),
         ("compare run --reference reference", "--reference run", "comparison.json"),
-        ("wv rec -o wv.json --page wv.html", "--scales 5", "wv.json"),
+        ("wv rec -o wv.json --plot wv.html", "--scales 5", "wv.json"),
         ("trajectory convert drive.toml --rate-hz 1 -o drive.csv", "--rate-hz 2", "drive.csv"),
         ("trajectory generate drive.toml --rate-hz 1 -o drive.csv.gz", "--rate-hz 2", "drive.csv.gz"),
     ] {
@@ -216,7 +216,7 @@ fn two_outputs_of_one_name_are_refused_at_once() {
     for (command, output) in [
         ("run drive.toml imu.toml --runs 2 --outage none -o a.svg --plot a.svg", "a.svg"),
         ("calibrate rec --model WN --bootstrap 0 -o a.svg", "a.svg"),
-        ("wv rec -o a.html --page a.html", "a.html"),
+        ("wv rec -o a.html --plot a.html", "a.html"),
         ("compare log --reference log -o a.html", "a.html"),
         ("calibrate rec --model WN --bootstrap 0 -o a.html", "a.html"),
     ] {

@@ -85,7 +85,7 @@ fn wv_writes_a_page_and_a_picture_where_it_is_told() {
     let place = place_with(DRIVE, MODEL);
     let dir = place.path();
     recordings(dir);
-    done(dir, "wv static --page curves.html --plot curves.svg");
+    done(dir, "wv static --plot curves.html --plot curves.svg");
     is_whole(&text(&dir.join("curves.html")));
     assert!(text(&dir.join("curves.svg")).contains("Gyroscope"));
     let ran = nav_sim(dir, "wv static --plot curves.PNG");
@@ -97,7 +97,7 @@ fn wv_writes_a_page_and_a_picture_where_it_is_told() {
     }
     let ran = nav_sim(dir, "wv static --plot curves");
     assert!(ran.code == 2 && ran.stderr.contains("curves: a picture is written as SVG"), "{}", ran.stderr);
-    let ran = nav_sim(dir, "wv static --page static/replicate_1.csv");
+    let ran = nav_sim(dir, "wv static --plot static/replicate_1.csv");
     assert!(ran.code == 2 && ran.stderr.contains("would be overwritten"), "{}", ran.stderr);
 }
 
@@ -147,7 +147,7 @@ fn tune_require_and_design_write_a_page_with_the_numbers_they_print() {
         ("design imu.toml --recordings 3 --hours 0.2 --draws 40", 2),
     ];
     for (k, (command, least)) in commands.into_iter().enumerate() {
-        let ran = nav_sim(dir, &format!("{command} --format json --page {k}.html --plot {k}.svg"));
+        let ran = nav_sim(dir, &format!("{command} --format json --plot {k}.html --plot {k}.svg"));
         assert!(ran.code == 0 || ran.code == 3, "{command}: {}", ran.stderr);
         assert!(ran.stderr.contains(&format!("wrote {k}.html")), "{}", ran.stderr);
         let page = text(&dir.join(format!("{k}.html")));
@@ -158,6 +158,6 @@ fn tune_require_and_design_write_a_page_with_the_numbers_they_print() {
         let numbers = numbers_as_in(&page, &serde_json::from_str(&ran.stdout).unwrap());
         assert!(numbers >= least, "{command}: {numbers}");
     }
-    let ran = nav_sim(dir, "tune imu.toml --truth worse.toml --page worse.toml");
+    let ran = nav_sim(dir, "tune imu.toml --truth worse.toml --plot worse.toml");
     assert!(ran.code == 2 && ran.stderr.contains("would be overwritten"), "{}", ran.stderr);
 }

@@ -222,8 +222,6 @@ fn requests_that_mean_nothing_are_refused() {
         &["--outage", "60:90", "--require", "p95_m<=0.01"],
         ["no IMU keeps p95_m ≤ 0.01 m", "a larger limit"],
     );
-    let long = ["--outage", "60:90", "--require", "p95_m<=5", "--corr-time-s", "1e12"];
-    refused(&long, ["--corr-time-s", "more than 1e9 s"]);
     let nowhere = ["--outage", "60:90", "--require", "p95_m<=5", "--catalogue", "nowhere"];
     refused(&nowhere, ["--catalogue nowhere: there is no such directory", "hint"]);
     // the poorest IMU keeps them: to look further made a noise without a finite variance, and a panic

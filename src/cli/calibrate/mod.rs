@@ -128,7 +128,7 @@ fn recordings(args: &Args, settings: Settings, session: &Session) -> Result<(), 
         ModelFiles::claim(out, &args.estimator.possible(), &guarded, session.existing())?;
     let options = CalibrationOptions {
         reading: args.recordings.options(),
-        skip_warm_up: args.recordings.skips_warm_up(),
+        skip_warm_up: args.recordings.reading.skips_warm_up(),
         scales: args.tuning.levels(),
         estimators: args.estimator,
         pool: args.pool,
@@ -150,7 +150,7 @@ fn recordings(args: &Args, settings: Settings, session: &Session) -> Result<(), 
 
 /// Fitting curves that come from elsewhere.
 fn curves(args: &Args, path: &Path, settings: &Settings, session: &Session) -> Result<(), Failure> {
-    let curves_of = |sensor| jobs::read_curves(path, args.recordings.rate_hz(), sensor, settings);
+    let curves_of = |sensor| jobs::read_curves(path, args.recordings.reading.rate_hz(), sensor, settings);
     let curves = match curves_of(args.recordings.sensor()) {
         // What is only printed needs a sensor for its units alone.
         Err(JobError::NoSensor { .. }) if args.out.is_none() => {

@@ -48,8 +48,8 @@ pub(crate) fn run(args: &Args, session: &Session) -> Result<(), Failure> {
     let mut answer = prepared.navigate(&words)?;
     answer.took(words.runs_s());
     answer.write(&args.out)?;
-    session.answer(&answer);
-    args.plot.write(|| answer.svg(), session)?;
+    let document = session.answer(&answer);
+    args.plot.write(&document, || answer.svg(), session)?;
     session.wrote(&args.out);
     succeeded(&answer.navigation.summary)
 }
